@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+# Shared by every CMakeLists.txt of the project.
+
+# Warnings and arithmetic of the project's own translation units. Contraction is off so that float
+# results do not depend on whether the compiler sees an fma: kernels that want one call fma().
+function(gsnav_private_options target)
+  target_compile_features(${target} PRIVATE cxx_std_20)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow -ffp-contract=off)
+  if(GSNAV_WERROR)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+endfunction()
+
+# gsnav_library(name SOURCES ... PUBLIC libs... PRIVATE libs...): a compiled component gsnav::<name>.
+function(gsnav_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(gsnav_${name} ${ARG_SOURCES})
+  add_library(gsnav::${name} ALIAS gsnav_${name})
+  set_target_properties(gsnav_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  gsnav_private_options(gsnav_${name})
+  target_link_libraries(gsnav_${name} PUBLIC gsnav ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  set_property(GLOBAL APPEND PROPERTY GSNAV_COMPONENTS gsnav_${name})
+endfunction()
+
+# gsnav_executable(name SOURCES ... LIBS ...)
+function(gsnav_executable name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  gsnav_private_options(${name})
+  target_link_libraries(${name} PRIVATE gsnav ${ARG_LIBS})
+endfunction()
+
+# gsnav_test(name SOURCES ... LIBS ...): a doctest executable that ctest runs. tests/support holds the
+# shared main() and helpers; GSNAV_DATA_DIR reaches the tests as a definition.
+function(gsnav_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  gsnav_executable(test_${name} SOURCES ${ARG_SOURCES} ${PROJECT_SOURCE_DIR}/tests/support/main.cpp
+                   LIBS ${ARG_LIBS} doctest::doctest)
+  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_compile_definitions(test_${name} PRIVATE GSNAV_DATA_DIR="${GSNAV_DATA_DIR}")
+  add_test(NAME ${name} COMMAND test_${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT 900)
+endfunction()

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "gsnav/version.hpp"
+
+/// GSNAV_HD marks a function that runs on the host and, under nvcc, on the device.
+/// On the host it is always inlined: objects compiled for different instruction sets may be linked
+/// together, and an out-of-line copy of a shared inline function would be picked from any of them.
+#if defined(__CUDACC__)
+#define GSNAV_HD __host__ __device__ __forceinline__
+#elif defined(__GNUC__)
+#define GSNAV_HD inline __attribute__((always_inline))
+#else
+#define GSNAV_HD inline
+#endif
+
+/// True while nvcc compiles device code. Lane packs (SIMD) exist on the host only.
+#if defined(__CUDA_ARCH__)
+#define GSNAV_DEVICE_CODE 1
+#else
+#define GSNAV_DEVICE_CODE 0
+#endif

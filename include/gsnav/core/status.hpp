@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+
+namespace gsnav {
+
+/// What kind of thing went wrong; the message says which file, field and value.
+enum class Errc {
+  ok = 0,
+  invalid_argument,   ///< a value the caller gave is impossible
+  invalid_file,       ///< a file's content is malformed, truncated or hostile
+  file_not_found,     ///< a path does not exist or cannot be opened
+  unsupported,        ///< legal, but not handled
+  out_of_memory,      ///< an allocation failed
+  nothing_navigable,  ///< a NavMesh build found no walkable surface
+  backend_failure,    ///< a device or driver reported an error
+};
+
+/// The exception behind `.value()` and `.throw_if_error()`.
+class Error : public std::runtime_error {
+ public:
+  Error(Errc code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  Errc code() const noexcept { return code_; }
+
+ private:
+  Errc code_;
+};
+
+namespace detail {
+[[noreturn]] inline void fail(Errc code, const std::string& message) {
+#if defined(__cpp_exceptions)
+  throw Error(code, message);
+#else
+  (void)code;
+  std::fprintf(stderr, "gsnav: %s\n", message.c_str());
+  std::abort();
+#endif
+}
+}  // namespace detail
+
+/// Success, or a code with a message for people.
+class [[nodiscard]] Status {
+ public:
+  Status() = default;
+  Status(Errc code, std::string message) : code_(code), message_(std::move(message)) {}
+
+  bool ok() const noexcept { return code_ == Errc::ok; }
+  explicit operator bool() const noexcept { return ok(); }
+  Errc code() const noexcept { return code_; }
+  const std::string& message() const noexcept { return message_; }
+  /// Throws gsnav::Error (aborts under -fno-exceptions) unless ok.
+  void throw_if_error() const {
+    if (!ok()) detail::fail(code_, message_);
+  }
+
+ private:
+  Errc code_ = Errc::ok;
+  std::string message_;
+};
+
+/// A value or the Status that says why there is none.
+template <class T>
+class [[nodiscard]] Result {
+ public:
+  Result(T value) : content_(std::move(value)) {}
+  Result(Status status) : content_(std::move(status)) {}
+  Result(Errc code, std::string message) : content_(Status(code, std::move(message))) {}
+
+  bool ok() const noexcept { return content_.index() == 0; }
+  explicit operator bool() const noexcept { return ok(); }
+  /// The error, or an ok Status.
+  Status status() const { return ok() ? Status() : *std::get_if<1>(&content_); }
+  Errc code() const noexcept { return ok() ? Errc::ok : std::get_if<1>(&content_)->code(); }
+  std::string message() const { return status().message(); }
+
+  /// The value; throws gsnav::Error (aborts under -fno-exceptions) where there is none.
+  T& value() & {
+    require();
+    return *std::get_if<0>(&content_);
+  }
+  const T& value() const& {
+    require();
+    return *std::get_if<0>(&content_);
+  }
+  T&& value() && {
+    require();
+    return std::move(*std::get_if<0>(&content_));
+  }
+  T* operator->() { return &value(); }
+  const T* operator->() const { return &value(); }
+  T& operator*() & { return value(); }
+  const T& operator*() const& { return value(); }
+  T&& operator*() && { return std::move(*this).value(); }
+
+ private:
+  void require() const {
+    if (!ok()) {
+      const Status& s = *std::get_if<1>(&content_);
+      detail::fail(s.code(), s.message());
+    }
+  }
+  std::variant<T, Status> content_;
+};
+
+}  // namespace gsnav

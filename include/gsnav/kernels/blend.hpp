@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/core/view.hpp"
+#include "gsnav/kernels/depth.hpp"
+#include "gsnav/kernels/splat.hpp"
+#include "gsnav/kernels/tiles.hpp"
+#include "gsnav/math/functions.hpp"
+
+namespace gsnav {
+
+/// Images a render may produce; combine with |. Nothing that is not asked for is computed.
+enum Output : unsigned {
+  kRgb = 1u << 0,               ///< [H][W][3], unclamped, over the background
+  kAlpha = 1u << 1,             ///< [H][W], 1 - transmittance
+  kMedianDepth = 1u << 2,       ///< [H][W] metres, where transmittance crosses 1/2; 0: no return
+  kExpectedDepth = 1u << 3,     ///< [H][W] metres, sum(w z) / sum(w); 0 where sum(w) = 0
+  kAccumulatedDepth = 1u << 4,  ///< [H][W] metres, sum(w z)
+  kFirstHitDepth = 1u << 5,     ///< [H][W] metres, where alpha first reaches first_hit_tau; 0: never
+};
+inline constexpr unsigned kAnyDepth =
+    kMedianDepth | kExpectedDepth | kAccumulatedDepth | kFirstHitDepth;
+
+/// The rules of blending, in the scalar of the kernel.
+template <class S>
+struct BlendRules {
+  S max_alpha{S(0.99)};
+  S transmittance_min{S(1e-4)};  ///< a pixel is closed by the Gaussian that takes T below this
+  S first_hit_tau{S(0.5)};
+};
+
+/// Which depth images a compiled blend loop serves; less is cheaper.
+enum class DepthMode { none, median, any };
+
+/// Running state of one pixel (or a pack of them), front to back.
+template <class L, DepthMode D>
+struct BlendState {
+  L transmittance{scalar_of<L>(1)};
+  L r{scalar_of<L>(0)}, g{scalar_of<L>(0)}, b{scalar_of<L>(0)};
+  L median{scalar_of<L>(0)};
+  L accumulated{scalar_of<L>(0)}, first_hit{scalar_of<L>(0)};
+};
+
+/// Blends one splat onto pixels. (dx, dy): pixel centre - mean2d; `row` = b dy. Pixels outside the
+/// footprint, and closed pixels, keep their state bit for bit. Returns the pixels that changed.
+///
+/// The exponent comparison |w|^2 <= s_max is alpha >= 1/255: the footprint does not depend on tiles.
+template <bool Color, DepthMode D, Exp2 M, class L, class S>
+GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& rules,
+                                const SplatGeometry<S>& g, const SplatColor<S>& color,
+                                const SplatDepth<S>* depth, L dx, L dy, L row) noexcept {
+  const L w1 = dx * L(g.a);
+  const L w2 = fma(dx, L(g.k), row);
+  const L s = fma(w2, w2, w1 * w1);
+  const auto hit = (s <= L(g.s_max)) && (state.transmittance >= L(rules.transmittance_min));
+  if (!any(hit)) return hit;
+  const L zero(S(0));
+  const L alpha =
+      select(hit, min(exp2<M>(L(g.log2_opacity) - s), L(rules.max_alpha)), zero);
+  const L before = state.transmittance;
+  const L weight = alpha * before;
+  const L after = fma(-alpha, before, before);
+  state.transmittance = after;
+  if constexpr (Color) {
+    state.r = fma(weight, L(color.r), state.r);
+    state.g = fma(weight, L(color.g), state.g);
+    state.b = fma(weight, L(color.b), state.b);
+  }
+  if constexpr (D == DepthMode::median) {
+    const L half(S(0.5));
+    const auto crosses = (before > half) && (after <= half);
+    if (any(crosses)) {
+      state.median = select(crosses, ray_depth(*depth, g.z, dx, dy), state.median);
+    }
+  }
+  if constexpr (D == DepthMode::any) {
+    const L half(S(0.5));
+    const L z = ray_depth(*depth, g.z, dx, dy);
+    state.median = select((before > half) && (after <= half), z, state.median);
+    state.accumulated = fma(weight, z, state.accumulated);
+    const L open(S(1) - rules.first_hit_tau);
+    state.first_hit = select((before > open) && (after <= open), z, state.first_hit);
+  }
+  return hit;
+}
+
+/// Images of one camera; a null pointer is an image not asked for.
+template <class S>
+struct FrameImages {
+  S* rgb = nullptr;
+  S* alpha = nullptr;
+  S* median_depth = nullptr;
+  S* expected_depth = nullptr;
+  S* accumulated_depth = nullptr;
+  S* first_hit_depth = nullptr;
+};
+
+/// Arguments of blending the tiles of one camera.
+template <class S>
+struct RasterArgs {
+  TileGrid grid;
+  View<const std::uint64_t> tile_offsets;  ///< [tiles + 1]
+  View<const std::uint32_t> tile_splats;   ///< per tile, front to back
+  View<const SplatGeometry<S>> geometry;
+  View<const SplatColor<S>> colors;        ///< empty: no colour asked for
+  View<const SplatDepth<S>> depths;        ///< empty: no depth asked for
+  BlendRules<S> rules;
+  Vec3<S> background;
+  Exp2 exp2_method = Exp2::degree6;
+  FrameImages<S> images;
+
+  GSNAV_HD DepthMode depth_mode() const noexcept {
+    if (images.expected_depth != nullptr || images.accumulated_depth != nullptr ||
+        images.first_hit_depth != nullptr) {
+      return DepthMode::any;
+    }
+    return images.median_depth != nullptr ? DepthMode::median : DepthMode::none;
+  }
+};
+
+/// Writes a finished pixel.
+template <class S, DepthMode D>
+GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
+                          const BlendState<S, D>& state) noexcept {
+  const FrameImages<S>& out = args.images;
+  const S t = state.transmittance, alpha = S(1) - t;
+  if (out.rgb != nullptr) {
+    out.rgb[3 * pixel] = fma(t, args.background.x, state.r);
+    out.rgb[3 * pixel + 1] = fma(t, args.background.y, state.g);
+    out.rgb[3 * pixel + 2] = fma(t, args.background.z, state.b);
+  }
+  if (out.alpha != nullptr) out.alpha[pixel] = alpha;
+  if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
+  if (out.expected_depth != nullptr) {
+    out.expected_depth[pixel] = alpha > S(0) ? state.accumulated / alpha : S(0);
+  }
+  if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = state.accumulated;
+  if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
+}
+
+/// Blends one pixel: the generic fallback, one work item a pixel, on any backend and scalar.
+template <class S, bool Color, DepthMode D, Exp2 M>
+struct RasterizePixel {
+  RasterArgs<S> args;
+
+  GSNAV_HD void operator()(std::size_t pixel) const noexcept {
+    const std::size_t width = static_cast<std::size_t>(args.grid.width);
+    const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
+    const std::size_t tile = static_cast<std::size_t>(y / args.grid.tile_size) *
+                                 static_cast<std::size_t>(args.grid.columns) +
+                             static_cast<std::size_t>(x / args.grid.tile_size);
+    const S px = S(x) + S(0.5), py = S(y) + S(0.5);
+    BlendState<S, D> state;
+    const SplatColor<S> none{};
+    for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {
+      const std::uint32_t splat = args.tile_splats[i];
+      const SplatGeometry<S>& g = args.geometry[splat];
+      const S dy = py - g.mean_y;
+      blend_splat<Color, D, M>(state, args.rules, g, Color ? args.colors[splat] : none,
+                               D == DepthMode::none ? nullptr : &args.depths[splat], px - g.mean_x,
+                               dy, g.b * dy);
+      if (state.transmittance < args.rules.transmittance_min) break;
+    }
+    write_pixel(args, pixel, state);
+  }
+};
+
+/// Calls f with compile-time <Color, DepthMode, Exp2> for what `args` asks for.
+template <class S, class F>
+void dispatch_raster(const RasterArgs<S>& args, const F& f) {
+  const auto with_exp2 = [&]<bool C, DepthMode D>() {
+    if (std::is_same_v<S, float> && args.exp2_method == Exp2::degree3) {
+      f.template operator()<C, D, Exp2::degree3>();
+    } else {
+      f.template operator()<C, D, Exp2::degree6>();
+    }
+  };
+  const auto with_depth = [&]<bool C>() {
+    switch (args.depth_mode()) {
+      case DepthMode::none: return with_exp2.template operator()<C, DepthMode::none>();
+      case DepthMode::median: return with_exp2.template operator()<C, DepthMode::median>();
+      case DepthMode::any: return with_exp2.template operator()<C, DepthMode::any>();
+    }
+  };
+  if (args.images.rgb != nullptr) {
+    with_depth.template operator()<true>();
+  } else {
+    with_depth.template operator()<false>();
+  }
+}
+
+}  // namespace gsnav

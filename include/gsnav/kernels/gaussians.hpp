@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/core/view.hpp"
+#include "gsnav/math/similarity.hpp"
+#include "gsnav/math/vec.hpp"
+
+namespace gsnav {
+
+/// The screen-space filter that an asset was trained with.
+enum class Filter : std::uint8_t {
+  classic,  ///< eps2d is added to the 2D covariance, opacity stays (INRIA)
+  mip,      ///< ... and opacity is multiplied by sqrt(det0 / det) (Mip-Splatting, antialiased)
+};
+
+/// Number of SH coefficients per channel up to `degree`.
+GSNAV_HD constexpr int sh_coefficient_count(int degree) noexcept { return (degree + 1) * (degree + 1); }
+
+/// Highest SH degree the kernels evaluate.
+inline constexpr int kMaxShDegree = 3;
+
+/// Read-only arrays of N Gaussians, as kernels see them. Owns nothing.
+///
+/// Metres in the asset's own frame. A position is `origins[origin_ids[i]] + mean_i`: float32 offsets
+/// from origins on a 64 m lattice, so that scenes far from zero lose nothing.
+struct GaussianView {
+  std::size_t size = 0;                    ///< N
+  View<const float> means[3];              ///< x, y, z offsets, [N] each
+  View<const float> quats[4];              ///< w, x, y, z of unit length, [N] each
+  View<const float> scales[3];             ///< standard deviations >= 0, [N] each
+  View<const float> opacities;             ///< in [0, 1], [N]
+  View<const float> sh0;                   ///< [N][3], the degree-0 coefficients
+  View<const float> shN;                   ///< [N][(degree+1)^2 - 1][3], empty for degree 0
+  int sh_degree = 0;                       ///< 0 to 3
+  View<const std::uint32_t> origin_ids;    ///< [N], or empty: all 0
+  View<const Vec3d> origins;               ///< host memory; empty: one origin at zero
+  /// Rotation each Gaussian has made since training (w, x, y, z), empty where none has: the view
+  /// direction is turned back by it before SH is evaluated. Used for skinned sets of degree >= 1.
+  View<const float> sh_rotations[4];
+};
+
+/// One set of Gaussians in the world: a scene tile, an avatar, an object.
+struct GaussianSet {
+  GaussianView gaussians;
+  Similarity world_from_asset{};
+  Filter filter = Filter::classic;
+  float eps2d = 0.3f;  ///< px^2 added to the diagonal of the 2D covariance
+};
+
+}  // namespace gsnav

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/core/parallel.hpp"
+#include "gsnav/core/view.hpp"
+#include "gsnav/kernels/splat.hpp"
+#include "gsnav/math/functions.hpp"
+
+namespace gsnav {
+
+/// Whether a footprint may cover a pixel whose centre lies in the box [x0, x1] x [y0, y1]. Never false
+/// where one does: the smallest |w|^2 over the box is compared with s_max enlarged by the rounding of
+/// the pixel test. Boxes may be lanes.
+///
+/// |w|^2 is convex, so outside the mean's row and column of the box its minimum lies on one of the two
+/// edges nearest to the mean; on each it is a parabola with a known vertex.
+template <class L, class S>
+GSNAV_HD mask_of<L> ellipse_touches_box(const SplatGeometry<S>& g, L x0, L x1, L y0, L y1) noexcept {
+  const L zero(S(0));
+  const L dx0 = x0 - L(g.mean_x), dx1 = x1 - L(g.mean_x);
+  const L dy0 = y0 - L(g.mean_y), dy1 = y1 - L(g.mean_y);
+  const L a(g.a), k(g.k), b(g.b);
+  const L near_x = clamp(zero, dx0, dx1), near_y = clamp(zero, dy0, dy1);
+  const S slope_y = -g.k / g.b;
+  const S slope_x = -(g.k * g.b) / fma(g.a, g.a, g.k * g.k);
+  const L best_y = clamp(L(slope_y) * near_x, dy0, dy1);
+  const L best_x = clamp(L(slope_x) * near_y, dx0, dx1);
+  const L w1a = a * near_x, w2a = fma(k, near_x, b * best_y);
+  const L w1b = a * best_x, w2b = fma(k, best_x, b * near_y);
+  const L s = min(fma(w2a, w2a, w1a * w1a), fma(w2b, w2b, w1b * w1b));
+  const L far_x = max(abs(dx0), abs(dx1)), far_y = max(abs(dy0), abs(dy1));
+  const L error = L(S(2e-6)) * fma(abs(k), far_x, fma(b, far_y, a * far_x));
+  const L r = L(sqrt(g.s_max)) + error;
+  return s <= r * r * L(S(1.000002));
+}
+
+/// How an image is cut into square tiles.
+struct TileGrid {
+  int width = 0, height = 0;  ///< image, pixels
+  int tile_size = 16;
+  int columns = 0, rows = 0;
+
+  static TileGrid of(int width, int height, int tile_size) noexcept {
+    return {width, height, tile_size, (width + tile_size - 1) / tile_size,
+            (height + tile_size - 1) / tile_size};
+  }
+  GSNAV_HD std::size_t count() const noexcept {
+    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  }
+};
+
+/// Calls f(tile) for each tile, in row order, that a splat may touch.
+template <class S, class F>
+GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
+                            const F& f) noexcept {
+  const int ts = grid.tile_size;
+  const int tx0 = b.x0 / ts, tx1 = (b.x1 - 1) / ts, ty0 = b.y0 / ts, ty1 = (b.y1 - 1) / ts;
+  const bool single = tx0 == tx1 && ty0 == ty1;
+  for (int ty = ty0; ty <= ty1; ++ty) {
+    for (int tx = tx0; tx <= tx1; ++tx) {
+      const int x_end = min((tx + 1) * ts, grid.width), y_end = min((ty + 1) * ts, grid.height);
+      if (single || ellipse_touches_box<S, S>(g, S(tx * ts) + S(0.5), S(x_end) - S(0.5),
+                                              S(ty * ts) + S(0.5), S(y_end) - S(0.5))) {
+        f(static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns) +
+          static_cast<std::size_t>(tx));
+      }
+    }
+  }
+}
+
+/// Arguments of binning: `order` lists visible splats front to back.
+template <class S>
+struct BinArgs {
+  TileGrid grid;
+  View<const std::uint32_t> order;
+  View<const SplatGeometry<S>> geometry;
+  View<const SplatBounds> bounds;
+  std::size_t blocks = 1;                ///< pieces that `order` is cut into
+  View<std::uint64_t> cursors;           ///< [blocks][tiles]: counts, then write positions
+  View<std::uint64_t> tile_offsets;      ///< [tiles + 1]
+  View<std::uint32_t> tile_splats;       ///< splats of all tiles, each tile's in order
+};
+
+/// Counts the tile intersections of one block.
+template <class S>
+struct CountTileIntersections {
+  BinArgs<S> args;
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    std::uint64_t* counts = args.cursors.data + block * args.grid.count();
+    for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
+    const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
+    for (std::size_t i = r.begin; i < r.end; ++i) {
+      const std::uint32_t splat = args.order[i];
+      for_each_tile(args.grid, args.geometry[splat], args.bounds[splat],
+                    [=](std::size_t tile) { ++counts[tile]; });
+    }
+  }
+};
+
+/// Turns counts into write positions (block-major within each tile) and tile offsets.
+template <class S>
+struct ScanTileIntersections {
+  BinArgs<S> args;
+  GSNAV_HD void operator()(std::size_t) const noexcept {
+    const std::size_t tiles = args.grid.count();
+    std::uint64_t sum = 0;
+    for (std::size_t t = 0; t < tiles; ++t) {
+      args.tile_offsets[t] = sum;
+      for (std::size_t b = 0; b < args.blocks; ++b) {
+        std::uint64_t& c = args.cursors[b * tiles + t];
+        const std::uint64_t n = c;
+        c = sum;
+        sum += n;
+      }
+    }
+    args.tile_offsets[tiles] = sum;
+  }
+};
+
+/// Writes the splats of one block into their tiles: a stable scatter, so that depth order survives.
+template <class S>
+struct ScatterTileIntersections {
+  BinArgs<S> args;
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
+    std::uint32_t* out = args.tile_splats.data;
+    const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
+    for (std::size_t i = r.begin; i < r.end; ++i) {
+      const std::uint32_t splat = args.order[i];
+      for_each_tile(args.grid, args.geometry[splat], args.bounds[splat],
+                    [=](std::size_t tile) { out[cursors[tile]++] = splat; });
+    }
+  }
+};
+
+}  // namespace gsnav

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include "gsnav/config.hpp"
+
+// Scalar functions under one set of names for float, double and long double. math/pack.hpp adds the
+// same names for lanes, so that a kernel written once runs on any of them. Everything here uses
+// correctly rounded operations only (+ - * / sqrt fma), except exp2, log2 and the trigonometric
+// functions of double, which come from the platform.
+
+namespace gsnav {
+
+template <class L>
+struct LaneTraits {
+  using scalar = L;   ///< the element type
+  using mask = bool;  ///< the result of a comparison
+  static constexpr int width = 1;
+};
+/// Element type of a scalar or lane pack.
+template <class L>
+using scalar_of = typename LaneTraits<L>::scalar;
+/// Comparison result of a scalar or lane pack.
+template <class L>
+using mask_of = typename LaneTraits<L>::mask;
+
+#if defined(__CUDACC__)
+GSNAV_HD float fma(float a, float b, float c) noexcept { return ::fmaf(a, b, c); }
+GSNAV_HD double fma(double a, double b, double c) noexcept { return ::fma(a, b, c); }
+GSNAV_HD float sqrt(float a) noexcept { return ::sqrtf(a); }
+GSNAV_HD double sqrt(double a) noexcept { return ::sqrt(a); }
+GSNAV_HD float abs(float a) noexcept { return ::fabsf(a); }
+GSNAV_HD double abs(double a) noexcept { return ::fabs(a); }
+#else
+GSNAV_HD float fma(float a, float b, float c) noexcept { return __builtin_fmaf(a, b, c); }
+GSNAV_HD double fma(double a, double b, double c) noexcept { return __builtin_fma(a, b, c); }
+GSNAV_HD long double fma(long double a, long double b, long double c) noexcept {
+  return __builtin_fmal(a, b, c);
+}
+GSNAV_HD float sqrt(float a) noexcept { return __builtin_sqrtf(a); }
+GSNAV_HD double sqrt(double a) noexcept { return __builtin_sqrt(a); }
+GSNAV_HD long double sqrt(long double a) noexcept { return __builtin_sqrtl(a); }
+GSNAV_HD float abs(float a) noexcept { return __builtin_fabsf(a); }
+GSNAV_HD double abs(double a) noexcept { return __builtin_fabs(a); }
+GSNAV_HD long double abs(long double a) noexcept { return __builtin_fabsl(a); }
+#endif
+
+GSNAV_HD float sin(float a) noexcept { return ::sinf(a); }
+GSNAV_HD double sin(double a) noexcept { return ::sin(a); }
+GSNAV_HD float cos(float a) noexcept { return ::cosf(a); }
+GSNAV_HD double cos(double a) noexcept { return ::cos(a); }
+GSNAV_HD float acos(float a) noexcept { return ::acosf(a); }
+GSNAV_HD double acos(double a) noexcept { return ::acos(a); }
+
+/// Smaller of two values; the second where either is NaN (the rule of SSE and of `a < b ? a : b`).
+template <class S>
+GSNAV_HD constexpr S min(S a, S b) noexcept {
+  return a < b ? a : b;
+}
+/// Larger of two values; the second where either is NaN.
+template <class S>
+GSNAV_HD constexpr S max(S a, S b) noexcept {
+  return a > b ? a : b;
+}
+template <class S>
+GSNAV_HD S clamp(S v, S low, S high) noexcept {
+  return min(max(v, low), high);
+}
+template <class S>
+GSNAV_HD constexpr S select(bool mask, S a, S b) noexcept {
+  return mask ? a : b;
+}
+GSNAV_HD constexpr bool any(bool mask) noexcept { return mask; }
+GSNAV_HD constexpr bool all(bool mask) noexcept { return mask; }
+
+GSNAV_HD std::uint32_t bits_of(float a) noexcept {
+  std::uint32_t u;
+  std::memcpy(&u, &a, sizeof u);
+  return u;
+}
+GSNAV_HD float float_of_bits(std::uint32_t u) noexcept {
+  float a;
+  std::memcpy(&a, &u, sizeof a);
+  return a;
+}
+
+GSNAV_HD bool is_finite(float a) noexcept { return (bits_of(a) & 0x7f800000u) != 0x7f800000u; }
+GSNAV_HD bool is_finite(double a) noexcept { return abs(a) <= std::numeric_limits<double>::max(); }
+#if !defined(__CUDACC__)
+GSNAV_HD bool is_finite(long double a) noexcept {
+  return abs(a) <= std::numeric_limits<long double>::max();
+}
+#endif
+
+/// How exp2 is computed in float. Relative error against the true value, over [-126, 126]:
+/// degree 6: 1.2e-7 (rounding); degree 3: 1.0e-4 (the polynomial).
+enum class Exp2 { degree6, degree3 };
+
+namespace detail {
+
+// Interpolants of 2^f at the Chebyshev nodes of [-1/2, 1/2].
+template <class L>
+GSNAV_HD L exp2_degree6(L f) noexcept {
+  L p = fma(f, L(1.546144469856913e-4f), L(1.3400428177615838e-3f));
+  p = fma(f, p, L(9.618056678524637e-3f));
+  p = fma(f, p, L(5.550327226670302e-2f));
+  p = fma(f, p, L(2.4022650922288757e-1f));
+  p = fma(f, p, L(6.931472067028326e-1f));
+  return fma(f, p, L(1.0f));
+}
+template <class L>
+GSNAV_HD L exp2_degree3(L f) noexcept {
+  L p = fma(f, L(5.5838282946219855e-2f), L(2.4263947854625853e-1f));
+  p = fma(f, p, L(6.931367338836215e-1f));
+  return fma(f, p, L(9.999245569508708e-1f));
+}
+
+/// Adding this to |x| < 2^21 rounds x to an integer, which stands in the low bits of the sum.
+inline constexpr float kRoundMagic = 12582912.0f;
+
+}  // namespace detail
+
+/// 2^x. In float: x is clamped to [-126, 126], the integer part goes into the exponent and a
+/// polynomial does the rest; every step is a correctly rounded operation, so all backends agree on
+/// the bits. In double and long double: the platform's.
+template <Exp2 M = Exp2::degree6>
+GSNAV_HD float exp2(float x) noexcept {
+  x = clamp(x, -126.0f, 126.0f);
+  const float t = x + detail::kRoundMagic;
+  const float f = x - (t - detail::kRoundMagic);
+  const float p = M == Exp2::degree6 ? detail::exp2_degree6(f) : detail::exp2_degree3(f);
+  return float_of_bits(bits_of(p) + (bits_of(t) << 23));
+}
+template <Exp2 = Exp2::degree6>
+GSNAV_HD double exp2(double x) noexcept {
+  return ::exp2(x);
+}
+#if !defined(__CUDACC__)
+template <Exp2 = Exp2::degree6>
+GSNAV_HD long double exp2(long double x) noexcept {
+  return ::exp2l(x);
+}
+#endif
+
+/// log2(x) for a positive normal x, from correctly rounded operations only: the same bits on every
+/// backend. Error below 1e-7 absolute + 1.2e-7 relative. log2(m) = 2/ln 2 * artanh((m-1)/(m+1)).
+GSNAV_HD float log2(float x) noexcept {
+  const std::uint32_t u = bits_of(x);
+  // Subtracting the bits of sqrt(1/2) puts the mantissa into [sqrt(1/2), sqrt(2)).
+  const std::int32_t e = static_cast<std::int32_t>(u - 0x3f3504f3u) >> 23;
+  const float m = float_of_bits(u - (static_cast<std::uint32_t>(e) << 23));
+  const float t = (m - 1.0f) / (m + 1.0f);
+  const float t2 = t * t;
+  float p = fma(t2, 0.32059889f, 0.41219858f);  // 2 / (9 ln 2), 2 / (7 ln 2)
+  p = fma(t2, p, 0.57707802f);                  // 2 / (5 ln 2)
+  p = fma(t2, p, 0.96179669f);                  // 2 / (3 ln 2)
+  p = fma(t2, p, 2.8853901f);                   // 2 / ln 2
+  return fma(t, p, static_cast<float>(e));
+}
+GSNAV_HD double log2(double x) noexcept { return ::log2(x); }
+#if !defined(__CUDACC__)
+GSNAV_HD long double log2(long double x) noexcept { return ::log2l(x); }
+#endif
+
+}  // namespace gsnav

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/core/parallel.hpp"
+#include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/projection.hpp"
+#include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/render_config.hpp"
+
+namespace gsnav {
+
+/// What one camera's frame was made of.
+struct RenderStats {
+  std::uint64_t gaussians = 0;           ///< in all sets
+  std::uint64_t visible = 0;             ///< whose footprint bounds reach the image
+  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs
+};
+
+/// Scratch of `render_camera`; grows to the largest frame and is then reused.
+template <class S, Backend B>
+struct RenderWorkspace {
+  explicit RenderWorkspace(B& b)
+      : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), bounds(b), chunk_keys(b),
+        counts(b), keys(b), order(b), sort(b), cursors(b), tile_offsets(b), tile_splats(b) {}
+
+  Buffer<Vec3<float>, B> offsets_f;
+  Buffer<Vec3<S>, B> offsets;
+  Buffer<SplatGeometry<S>, B> geometry;
+  Buffer<SplatColor<S>, B> colors;
+  Buffer<SplatDepth<S>, B> depths;
+  Buffer<SplatBounds, B> bounds;
+  Buffer<std::uint32_t, B> chunk_keys, counts, keys, order;
+  SortScratch<B> sort;
+  Buffer<std::uint64_t, B> cursors, tile_offsets;
+  Buffer<std::uint32_t, B> tile_splats;
+  std::vector<std::uint32_t> host_counts;
+  std::vector<std::uint64_t> host_chunk_offsets;
+  std::vector<Vec3<float>> host_offsets_f;
+  std::vector<Vec3<S>> host_offsets;
+
+  std::size_t bytes() const noexcept {
+    return offsets_f.capacity_bytes() + offsets.capacity_bytes() + geometry.capacity_bytes() +
+           colors.capacity_bytes() + depths.capacity_bytes() + bounds.capacity_bytes() +
+           chunk_keys.capacity_bytes() + counts.capacity_bytes() + keys.capacity_bytes() +
+           order.capacity_bytes() + sort.bytes() + cursors.capacity_bytes() +
+           tile_offsets.capacity_bytes() + tile_splats.capacity_bytes();
+  }
+};
+
+namespace detail {
+
+/// Moves the survivors of the chunks into one list: (key, slot) pairs in stable id order.
+struct GatherVisible {
+  View<const std::uint32_t> chunk_keys, counts;
+  View<const std::uint64_t> chunk_offsets;
+  View<std::uint32_t> keys, order;
+  GSNAV_HD void operator()(std::size_t chunk) const noexcept {
+    const std::size_t from = chunk * kProjectChunk, to = chunk_offsets[chunk];
+    for (std::size_t i = 0; i < counts[chunk]; ++i) {
+      keys[to + i] = chunk_keys[from + i];
+      order[to + i] = static_cast<std::uint32_t>(from + i);
+    }
+  }
+};
+
+/// One work item per row of pixels: enough parallelism on a CPU at little overhead.
+template <class S, class PixelKernel>
+struct RasterizeRow {
+  PixelKernel kernel;
+  std::size_t width;
+  GSNAV_HD void operator()(std::size_t y) const noexcept {
+    for (std::size_t x = 0; x < width; ++x) kernel(y * width + x);
+  }
+};
+
+template <class S, Backend B>
+void rasterize(B& backend, const RasterArgs<S>& args) {
+  if constexpr (requires { backend.rasterize_tiles(args); }) {
+    backend.rasterize_tiles(args);
+  } else {
+    const std::size_t width = static_cast<std::size_t>(args.grid.width);
+    const std::size_t height = static_cast<std::size_t>(args.grid.height);
+    dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M>() {
+      using Kernel = RasterizePixel<S, C, D, M>;
+      if constexpr (is_host_backend<B>) {
+        backend.parallel_for(height, RasterizeRow<S, Kernel>{{args}, width});
+      } else {
+        backend.parallel_for(width * height, Kernel{args});
+      }
+    });
+  }
+}
+
+}  // namespace detail
+
+/// Checks a set against what kernels assume; names the array that does not fit.
+inline Status validate(const GaussianSet& set) {
+  const GaussianView& g = set.gaussians;
+  const auto bad = [](const std::string& what) {
+    return Status(Errc::invalid_argument, "GaussianSet: " + what);
+  };
+  const auto sized = [&](const View<const float>& v, std::size_t n, const char* name) {
+    return v.size == n ? Status()
+                       : bad(std::string(name) + " has " + std::to_string(v.size) +
+                             " values where " + std::to_string(n) + " are needed");
+  };
+  if (g.sh_degree < 0 || g.sh_degree > kMaxShDegree) {
+    return bad("sh_degree = " + std::to_string(g.sh_degree) + ": must be in [0, 3]");
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (Status s = sized(g.means[k], g.size, "means"); !s) return s;
+    if (Status s = sized(g.scales[k], g.size, "scales"); !s) return s;
+  }
+  for (int k = 0; k < 4; ++k) {
+    if (Status s = sized(g.quats[k], g.size, "quats"); !s) return s;
+    if (!g.sh_rotations[k].empty()) {
+      if (Status s = sized(g.sh_rotations[k], g.size, "sh_rotations"); !s) return s;
+    }
+  }
+  if (Status s = sized(g.opacities, g.size, "opacities"); !s) return s;
+  if (Status s = sized(g.sh0, 3 * g.size, "sh0"); !s) return s;
+  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(g.sh_degree) - 1);
+  if (Status s = sized(g.shN, 3 * rest * g.size, "shN"); !s) return s;
+  if (!g.origin_ids.empty() && (g.origin_ids.size != g.size || g.origins.empty())) {
+    return bad("origin_ids needs one id per Gaussian and a table of origins");
+  }
+  if (!(set.eps2d > 0) || !is_finite(set.eps2d)) {
+    return bad("eps2d = " + std::to_string(set.eps2d) + ": must be positive");
+  }
+  const Similarity& a = set.world_from_asset;
+  if (!(a.scale > 0) || !is_finite(a.scale) || !is_finite(a.translation) ||
+      !(abs(dot(a.rotation, a.rotation) - 1.0) < 1e-6)) {
+    return bad("world_from_asset must have a unit quaternion, a positive scale and be finite");
+  }
+  return {};
+}
+
+/// Renders sets of Gaussians as one sorted list into the images of one camera: project, sort by
+/// (float32 key, set, row), bin into tiles, blend. Arrays of `sets` and pointers of `images` are in the
+/// backend's memory ([H][W] row-major). Fills `stats` when given. The result is there after
+/// `backend.synchronize()`.
+///
+/// Errors: invalid_argument naming the field; out_of_memory is thrown by the workspace.
+template <class S, Backend B>
+Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
+                     const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
+                     RenderStats* stats = nullptr) {
+  if (Status s = validate(config); !s) return s;
+  if (Status s = validate(camera); !s) return s;
+  std::size_t chunks = 0, total = 0, origins = 0;
+  for (const GaussianSet& set : sets) {
+    if (Status s = validate(set); !s) return s;
+    chunks += (set.gaussians.size + kProjectChunk - 1) / kProjectChunk;
+    total += set.gaussians.size;
+    origins += set.gaussians.origins.empty() ? 1 : set.gaussians.origins.size;
+  }
+  const std::size_t slots = chunks * kProjectChunk;
+  if (slots > std::numeric_limits<std::uint32_t>::max()) {
+    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
+  }
+  const bool color = images.rgb != nullptr;
+  const bool depth = images.median_depth != nullptr || images.expected_depth != nullptr ||
+                     images.accumulated_depth != nullptr || images.first_hit_depth != nullptr;
+
+  // ---- project
+  ws.geometry.resize_discard(slots);
+  ws.bounds.resize_discard(slots);
+  ws.chunk_keys.resize_discard(slots);
+  ws.colors.resize_discard(color ? slots : 0);
+  ws.depths.resize_discard(depth ? slots : 0);
+  ws.counts.resize_discard(chunks);
+
+  std::vector<ProjectionCamera<S>> cameras;
+  cameras.reserve(sets.size());
+  ws.host_offsets.clear();
+  ws.host_offsets_f.clear();
+  for (const GaussianSet& set : sets) {
+    cameras.push_back(make_projection_camera<S>(camera, set, config.sort_order));
+    const View<const Vec3d> table = set.gaussians.origins;
+    for (std::size_t o = 0; o < (table.empty() ? 1 : table.size); ++o) {
+      const Vec3d offset = (table.empty() ? Vec3d{} : table[o]) - cameras.back().position;
+      ws.host_offsets.push_back(vec_cast<S>(offset));
+      ws.host_offsets_f.push_back(vec_cast<float>(offset));
+    }
+  }
+  ws.offsets.upload(ws.host_offsets.data(), origins);
+  ws.offsets_f.upload(ws.host_offsets_f.data(), origins);
+
+  std::size_t first_chunk = 0, first_origin = 0;
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    const std::size_t n = sets[i].gaussians.origins.empty() ? 1 : sets[i].gaussians.origins.size;
+    ProjectArgs<S> args;
+    args.gaussians = sets[i].gaussians;
+    args.camera = cameras[i];
+    args.offsets = {ws.offsets.data() + first_origin, n};
+    args.offsets_f = {ws.offsets_f.data() + first_origin, n};
+    args.color = color;
+    args.depth = depth;
+    args.first_chunk = first_chunk;
+    args.geometry = ws.geometry.view();
+    args.colors = ws.colors.view();
+    args.depths = ws.depths.view();
+    args.bounds = ws.bounds.view();
+    args.keys = ws.chunk_keys.view();
+    args.counts = ws.counts.view();
+    if constexpr (requires { backend.project(args); }) {
+      backend.project(args);
+    } else {
+      backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
+    }
+    first_chunk += args.chunk_count();
+    first_origin += n;
+  }
+
+  // ---- compact and sort
+  ws.host_counts.resize(chunks);
+  ws.counts.download(ws.host_counts.data(), chunks);
+  if (Status s = backend.synchronize(); !s) return s;
+  ws.host_chunk_offsets.resize(chunks);
+  std::uint64_t visible = 0;
+  for (std::size_t c = 0; c < chunks; ++c) {
+    ws.host_chunk_offsets[c] = visible;
+    visible += ws.host_counts[c];
+  }
+  ws.keys.resize_discard(visible);
+  ws.order.resize_discard(visible);
+  ws.cursors.upload(ws.host_chunk_offsets.data(), chunks);
+  backend.parallel_for(chunks, detail::GatherVisible{ws.chunk_keys.view(), ws.counts.view(),
+                                                     ws.cursors.view(), ws.keys.view(),
+                                                     ws.order.view()});
+  sort_pairs(backend, ws.keys, ws.order, ws.sort);
+
+  // ---- bin
+  BinArgs<S> bin;
+  bin.grid = TileGrid::of(camera.width, camera.height, config.tile_size);
+  bin.order = ws.order.view();
+  bin.geometry = ws.geometry.view();
+  bin.bounds = ws.bounds.view();
+  bin.blocks = visible < 4096 ? 1 : concurrency_of(backend);
+  ws.cursors.resize_discard(bin.blocks * bin.grid.count());
+  ws.tile_offsets.resize_discard(bin.grid.count() + 1);
+  bin.cursors = ws.cursors.view();
+  bin.tile_offsets = ws.tile_offsets.view();
+  backend.parallel_for(bin.blocks, CountTileIntersections<S>{bin});
+  backend.parallel_for(1, ScanTileIntersections<S>{bin});
+  std::uint64_t intersections = 0;
+  ws.tile_offsets.download(&intersections, 1, bin.grid.count());
+  if (Status s = backend.synchronize(); !s) return s;
+  ws.tile_splats.resize_discard(intersections);
+  bin.tile_splats = ws.tile_splats.view();
+  backend.parallel_for(bin.blocks, ScatterTileIntersections<S>{bin});
+
+  // ---- blend
+  RasterArgs<S> raster;
+  raster.grid = bin.grid;
+  raster.tile_offsets = ws.tile_offsets.view();
+  raster.tile_splats = ws.tile_splats.view();
+  raster.geometry = ws.geometry.view();
+  raster.colors = ws.colors.view();
+  raster.depths = ws.depths.view();
+  raster.rules = {static_cast<S>(config.max_alpha), static_cast<S>(config.transmittance_min),
+                  static_cast<S>(config.first_hit_tau)};
+  raster.background = vec_cast<S>(config.background);
+  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree6;
+  raster.images = images;
+  detail::rasterize(backend, raster);
+
+  if (stats != nullptr) *stats = {total, visible, intersections};
+  return {};
+}
+
+}  // namespace gsnav

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/camera.hpp"
+#include "gsnav/kernels/projection.hpp"
+
+namespace gsnav {
+
+/// How much accuracy is traded for speed. Budgets against the float64 contract image are in
+/// docs/accuracy.md.
+enum class Profile {
+  exact,  ///< rounding only
+  fast,   ///< exp2 by a cubic: alpha within 1.0e-4 relative
+};
+
+/// What to render and by which rules. Defaults are the contract's.
+struct RenderConfig {
+  unsigned outputs = kRgb | kAlpha | kMedianDepth;
+  Profile profile = Profile::exact;
+  SortOrder sort_order = SortOrder::z_depth;
+  int tile_size = 16;                  ///< 8, 16 or 32; the image does not depend on it
+  double max_alpha = 0.99;             ///< in (0, 1]
+  double transmittance_min = 1e-4;     ///< in [0, 1)
+  double first_hit_tau = 0.5;          ///< in (0, 1): first-hit depth is where alpha reaches this
+  Vec3d background{0, 0, 0};           ///< display-referred
+};
+
+/// Names the field that cannot be, or ok.
+inline Status validate(const RenderConfig& c) {
+  const auto bad = [](const char* field, const std::string& value, const char* rule) {
+    return Status(Errc::invalid_argument,
+                  std::string("RenderConfig.") + field + " = " + value + ": " + rule);
+  };
+  if (c.outputs == 0 || (c.outputs & ~(kRgb | kAlpha | kAnyDepth)) != 0) {
+    return bad("outputs", std::to_string(c.outputs), "name at least one known output");
+  }
+  if (c.tile_size != 8 && c.tile_size != 16 && c.tile_size != 32) {
+    return bad("tile_size", std::to_string(c.tile_size), "must be 8, 16 or 32");
+  }
+  if (!(c.max_alpha > 0 && c.max_alpha <= 1)) {
+    return bad("max_alpha", std::to_string(c.max_alpha), "must be in (0, 1]");
+  }
+  if (!(c.transmittance_min >= 0 && c.transmittance_min < 1)) {
+    return bad("transmittance_min", std::to_string(c.transmittance_min), "must be in [0, 1)");
+  }
+  if (!(c.first_hit_tau > 0 && c.first_hit_tau < 1)) {
+    return bad("first_hit_tau", std::to_string(c.first_hit_tau), "must be in (0, 1)");
+  }
+  if (!is_finite(c.background)) return bad("background", "not finite", "must be finite");
+  return {};
+}
+
+/// Largest image side; tile counts and pixel offsets stay well inside their types.
+inline constexpr int kMaxImageSide = 16384;
+
+/// Names the field that cannot be, or ok.
+inline Status validate(const Camera& c) {
+  const auto bad = [](const char* field, const std::string& value, const char* rule) {
+    return Status(Errc::invalid_argument, std::string("Camera.") + field + " = " + value + ": " + rule);
+  };
+  if (c.width < 1 || c.width > kMaxImageSide) {
+    return bad("width", std::to_string(c.width), "must be in [1, 16384]");
+  }
+  if (c.height < 1 || c.height > kMaxImageSide) {
+    return bad("height", std::to_string(c.height), "must be in [1, 16384]");
+  }
+  if (!(c.fx > 0 && is_finite(c.fx))) return bad("fx", std::to_string(c.fx), "must be positive");
+  if (!(c.fy > 0 && is_finite(c.fy))) return bad("fy", std::to_string(c.fy), "must be positive");
+  if (!is_finite(c.cx) || !is_finite(c.cy)) return bad("cx, cy", "not finite", "must be finite");
+  if (!(c.near_plane > 0 && is_finite(c.near_plane))) {
+    return bad("near_plane", std::to_string(c.near_plane), "must be positive");
+  }
+  if (!(c.near_sigma >= 0 && is_finite(c.near_sigma))) {
+    return bad("near_sigma", std::to_string(c.near_sigma), "must be >= 0");
+  }
+  if (!is_finite(c.viewmat.translation)) {
+    return bad("viewmat", "a translation that is not finite", "must be finite");
+  }
+  const Mat3d gram = c.viewmat.linear * transpose(c.viewmat.linear);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      if (!(abs(gram(i, j) - (i == j ? 1.0 : 0.0)) < 1e-3)) {
+        return bad("viewmat", "a linear part that is no rotation", "must be rigid (within 1e-3)");
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace gsnav

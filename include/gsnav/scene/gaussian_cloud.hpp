@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/kernels/projection.hpp"
+#include "gsnav/scene/load_report.hpp"
+
+namespace gsnav {
+
+/// One Gaussian as files store it: raw, before any activation.
+struct RawGaussian {
+  Vec3d mean{};              ///< metres, asset frame
+  Quatd quat{};              ///< w, x, y, z, any length
+  Vec3d log_scales{};        ///< natural logarithm of the standard deviations
+  double opacity_logit = 0;  ///< opacity = 1 / (1 + exp(-logit)); infinities are legal
+  std::array<float, 3> sh0{};
+  const float* shN = nullptr;  ///< [(degree+1)^2 - 1][3], colour inner; null for degree 0
+};
+
+/// N Gaussians in host memory, ready for kernels: linear scales, opacities after the sigmoid, unit
+/// quaternions. Positions are float32 offsets from origins on a 64 m lattice.
+struct GaussianCloud {
+  std::array<std::vector<float>, 3> means;   ///< x, y, z offsets from the origin, metres, [N] each
+  std::array<std::vector<float>, 4> quats;   ///< w, x, y, z, [N] each
+  std::array<std::vector<float>, 3> scales;  ///< standard deviations, metres, [N] each
+  std::vector<float> opacities;              ///< in [0, 1], [N]
+  std::vector<float> sh0;                    ///< [N][3]
+  std::vector<float> shN;                    ///< [N][(degree+1)^2 - 1][3]
+  int sh_degree = 0;                         ///< 0 to 3
+  std::vector<std::uint32_t> origin_ids;     ///< [N], or empty while every origin is zero
+  std::vector<Vec3d> origins;                ///< lattice points in use; empty with origin_ids
+
+  // How the asset was trained; copied into each GaussianSet made of the cloud.
+  Filter filter = Filter::classic;
+  float eps2d = 0.3f;
+  SortOrder sort_order = SortOrder::z_depth;
+
+  std::size_t size() const noexcept { return opacities.size(); }
+
+  /// Mean of Gaussian i in the asset's frame, metres.
+  Vec3d mean(std::size_t i) const noexcept {
+    const Vec3d o = origin_ids.empty() ? Vec3d{} : origins[origin_ids[i]];
+    return o + Vec3d{means[0][i], means[1][i], means[2][i]};
+  }
+
+  /// Bytes held by the arrays.
+  std::size_t bytes() const noexcept {
+    return sizeof(float) * (11 * size() + sh0.size() + shN.size()) +
+           sizeof(std::uint32_t) * origin_ids.size() + sizeof(Vec3d) * origins.size();
+  }
+
+  /// What kernels read; valid while the cloud lives and does not grow.
+  GaussianView view() const noexcept {
+    GaussianView v;
+    v.size = size();
+    for (std::size_t k = 0; k < 3; ++k) v.means[k] = view_of(means[k]);
+    for (std::size_t k = 0; k < 4; ++k) v.quats[k] = view_of(quats[k]);
+    for (std::size_t k = 0; k < 3; ++k) v.scales[k] = view_of(scales[k]);
+    v.opacities = view_of(opacities);
+    v.sh0 = view_of(sh0);
+    v.shN = view_of(shN);
+    v.sh_degree = sh_degree;
+    v.origin_ids = view_of(origin_ids);
+    v.origins = view_of(origins);
+    return v;
+  }
+
+  /// The cloud placed in the world.
+  GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
+    return {view(), world_from_asset, filter, eps2d};
+  }
+};
+
+/// Spacing of the lattice that positions are stored relative to, metres.
+inline constexpr double kOriginLattice = 64.0;
+
+/// Fills a GaussianCloud from raw Gaussians by the contract's rules, counting every repair and drop:
+/// quaternions are normalised (largest component first; zero or non-finite: dropped), log-scales are
+/// clamped to [-20, 20] (minus infinity is a legal flat axis), opacities go through the sigmoid, rows
+/// with NaN anywhere are dropped whole, and Gaussians that can never reach 1/255 are left out.
+class GaussianCloudBuilder {
+ public:
+  /// `sh_degree` in [0, 3] is what every added Gaussian carries.
+  explicit GaussianCloudBuilder(int sh_degree, std::string source = {}) {
+    cloud_.sh_degree = report_.sh_degree = sh_degree;
+    report_.source = std::move(source);
+    rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(sh_degree) - 1);
+  }
+
+  void reserve(std::size_t n) {
+    for (auto& p : cloud_.means) p.reserve(n);
+    for (auto& p : cloud_.quats) p.reserve(n);
+    for (auto& p : cloud_.scales) p.reserve(n);
+    cloud_.opacities.reserve(n);
+    cloud_.sh0.reserve(3 * n);
+    cloud_.shN.reserve(rest_ * n);
+  }
+
+  /// Adds one Gaussian or counts why not. Returns whether it was kept.
+  bool add(const RawGaussian& raw) {
+    ++report_.read;
+    bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);
+    for (int k = 0; k < 3; ++k) {
+      finite = finite && !std::isnan(raw.log_scales[k]) &&
+               is_finite(raw.sh0[static_cast<std::size_t>(k)]);
+    }
+    for (std::size_t k = 0; k < rest_; ++k) finite = finite && is_finite(raw.shN[k]);
+    if (!finite) {
+      ++report_.dropped_non_finite;
+      return false;
+    }
+    Quatd quat = raw.quat;
+    if (!normalize(quat)) {
+      ++report_.dropped_zero_quat;
+      return false;
+    }
+    const double opacity = 1.0 / (1.0 + std::exp(-raw.opacity_logit));
+    if (static_cast<float>(opacity) < 1.0f / 255.0f) {
+      ++report_.dropped_transparent;
+      return false;
+    }
+    Vec3d scales;
+    bool clamped = false;
+    for (int k = 0; k < 3; ++k) {
+      const double s = raw.log_scales[k];
+      const double limited = std::isinf(s) && s < 0 ? s : clamp(s, -20.0, 20.0);
+      clamped = clamped || limited != s;
+      scales[k] = std::exp(limited);
+    }
+    report_.clamped_scales += clamped ? 1 : 0;
+
+    push_mean(raw.mean);
+    const double q[4] = {quat.w, quat.x, quat.y, quat.z};
+    for (std::size_t k = 0; k < 4; ++k) cloud_.quats[k].push_back(static_cast<float>(q[k]));
+    for (std::size_t k = 0; k < 3; ++k) {
+      cloud_.scales[k].push_back(static_cast<float>(scales[static_cast<int>(k)]));
+    }
+    cloud_.opacities.push_back(static_cast<float>(opacity));
+    cloud_.sh0.insert(cloud_.sh0.end(), raw.sh0.begin(), raw.sh0.end());
+    if (rest_ != 0) cloud_.shN.insert(cloud_.shN.end(), raw.shN, raw.shN + rest_);
+    report_.bounds.add(raw.mean);
+    ++report_.kept;
+    return true;
+  }
+
+  LoadReport& report() noexcept { return report_; }
+  GaussianCloud& cloud() noexcept { return cloud_; }
+
+ private:
+  void push_mean(const Vec3d& mean) {
+    Vec3d origin;
+    for (int k = 0; k < 3; ++k) origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);
+    const auto key = std::make_tuple(origin.x, origin.y, origin.z);
+    const bool zero = origin == Vec3d{};
+    if (!zero && cloud_.origins.empty()) {  // the first Gaussian away from zero
+      cloud_.origin_ids.assign(cloud_.size(), 0);
+      cloud_.origins.push_back({});
+      origin_index_.emplace(std::make_tuple(0.0, 0.0, 0.0), 0u);
+    }
+    if (!cloud_.origins.empty()) {
+      const auto [it, added] =
+          origin_index_.emplace(key, static_cast<std::uint32_t>(cloud_.origins.size()));
+      if (added) cloud_.origins.push_back(origin);
+      cloud_.origin_ids.push_back(it->second);
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      cloud_.means[k].push_back(
+          static_cast<float>(mean[static_cast<int>(k)] - origin[static_cast<int>(k)]));
+    }
+  }
+
+  GaussianCloud cloud_;
+  LoadReport report_;
+  std::size_t rest_ = 0;
+  std::map<std::tuple<double, double, double>, std::uint32_t> origin_index_;
+};
+
+/// A cloud with the report of how it was read.
+struct LoadedCloud {
+  GaussianCloud cloud;
+  LoadReport report;
+};
+
+/// Appends `b` to `a`; the SH degree becomes the larger (missing bands are zero). Used to merge the
+/// tiles of one scene. Metadata (filter, order) must agree.
+
+inline Status append(GaussianCloud& a, const GaussianCloud& b) {
+  if (a.size() == 0) {
+    a = b;
+    return {};
+  }
+  if (a.filter != b.filter || a.eps2d != b.eps2d || a.sort_order != b.sort_order) {
+    return {Errc::invalid_argument, "clouds with different filters or sort orders cannot be merged"};
+  }
+  const int degree = max(a.sh_degree, b.sh_degree);
+  const auto widen = [degree](const GaussianCloud& c) {
+    const std::size_t from = 3 * static_cast<std::size_t>(sh_coefficient_count(c.sh_degree) - 1);
+    const std::size_t to = 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1);
+    if (from == to) return c.shN;
+    std::vector<float> out(c.size() * to, 0.0f);
+    for (std::size_t i = 0; i < c.size(); ++i) {
+      for (std::size_t k = 0; k < from; ++k) out[i * to + k] = c.shN[i * from + k];
+    }
+    return out;
+  };
+  std::vector<float> rest = widen(b);
+  if (a.sh_degree != degree) a.shN = widen(a);
+  a.sh_degree = degree;
+  a.shN.insert(a.shN.end(), rest.begin(), rest.end());
+  if (!a.origins.empty() || !b.origins.empty()) {
+    if (a.origins.empty()) {
+      a.origins.push_back({});
+      a.origin_ids.assign(a.size(), 0);
+    }
+    const std::uint32_t shift = static_cast<std::uint32_t>(a.origins.size());
+    if (b.origins.empty()) {
+      a.origins.push_back({});
+      a.origin_ids.insert(a.origin_ids.end(), b.size(), shift);
+    } else {
+      a.origins.insert(a.origins.end(), b.origins.begin(), b.origins.end());
+      for (const std::uint32_t id : b.origin_ids) a.origin_ids.push_back(shift + id);
+    }
+  }
+  const auto join = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  for (std::size_t k = 0; k < 3; ++k) join(a.means[k], b.means[k]);
+  for (std::size_t k = 0; k < 4; ++k) join(a.quats[k], b.quats[k]);
+  for (std::size_t k = 0; k < 3; ++k) join(a.scales[k], b.scales[k]);
+  join(a.opacities, b.opacities);
+  join(a.sh0, b.sh0);
+  return {};
+}
+
+}  // namespace gsnav

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/ops/render.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav {
+
+/// Images of a batch of cameras of one size in host memory; an image not asked for is empty.
+template <class S>
+struct Frames {
+  std::size_t cameras = 0, height = 0, width = 0;
+  std::vector<S> rgb;                ///< [C][H][W][3]
+  std::vector<S> alpha;              ///< [C][H][W]
+  std::vector<S> median_depth;       ///< [C][H][W] metres, 0: no return
+  std::vector<S> expected_depth;     ///< [C][H][W]
+  std::vector<S> accumulated_depth;  ///< [C][H][W]
+  std::vector<S> first_hit_depth;    ///< [C][H][W]
+  std::vector<RenderStats> stats;    ///< [C]
+};
+
+/// A cloud's arrays in a backend's own memory. On host backends nothing is copied: the cloud must
+/// outlive it.
+template <Backend B>
+class GaussianArrays {
+ public:
+  GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
+    if constexpr (!is_host_backend<B>) {
+      GaussianView& v = set_.gaussians;
+      for (auto& p : v.means) to_device(backend, p);
+      for (auto& p : v.quats) to_device(backend, p);
+      for (auto& p : v.scales) to_device(backend, p);
+      to_device(backend, v.opacities);
+      to_device(backend, v.sh0);
+      to_device(backend, v.shN);
+      ids_.emplace_back(backend).upload(v.origin_ids.data, v.origin_ids.size);
+      v.origin_ids = {ids_.back().data(), v.origin_ids.size};
+      origins_ = cloud.origins;  // read by the host
+      v.origins = view_of(std::as_const(origins_));
+    }
+  }
+  GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
+    GaussianSet s = set_;
+    s.world_from_asset = world_from_asset;
+    return s;
+  }
+
+ private:
+  void to_device(B& backend, View<const float>& v) {
+    floats_.emplace_back(backend).upload(v.data, v.size);
+    v = {floats_.back().data(), v.size};
+  }
+  GaussianSet set_;
+  std::vector<Buffer<float, B>> floats_;
+  std::vector<Buffer<std::uint32_t, B>> ids_;
+  std::vector<Vec3d> origins_;
+};
+
+/// Renders Gaussians on a backend. Keeps its scratch between calls: a steady frame allocates nothing
+/// but what its caller's vectors need. `S` is the scalar of all arithmetic; sort keys are float32 for
+/// every S. The backend must outlive it.
+///
+///     gsnav::SerialBackend backend;
+///     gsnav::Renderer<float, gsnav::SerialBackend> renderer(backend);
+///     auto frames = renderer.render({{cloud.set()}}, {{camera}}).value();   // frames.rgb, ...
+template <class S, Backend B>
+class Renderer {
+ public:
+  explicit Renderer(B& backend, const RenderConfig& config = {})
+      : backend_(&backend), config_(config), workspace_(backend), device_images_(backend) {}
+
+  const RenderConfig& config() const noexcept { return config_; }
+  void set_config(const RenderConfig& config) { config_ = config; }
+
+  /// Renders all sets, as one sorted list, from each camera; all cameras have one size. `sets` hold
+  /// arrays in the backend's memory. Errors: invalid_argument (names the field), backend_failure.
+  Result<Frames<S>> render(std::span<const GaussianSet> sets, std::span<const Camera> cameras) {
+    Frames<S> frames;
+    if (Status s = render(sets, cameras, frames); !s) return s;
+    return frames;
+  }
+  Result<Frames<S>> render(const GaussianSet& set, const Camera& camera) {
+    return render(std::span(&set, 1), std::span(&camera, 1));
+  }
+
+  /// The same into images that are used again.
+  Status render(std::span<const GaussianSet> sets, std::span<const Camera> cameras, Frames<S>& out) {
+    if (cameras.empty()) return {Errc::invalid_argument, "no camera to render from"};
+    for (const Camera& c : cameras) {
+      if (Status s = validate(c); !s) return s;
+      if (c.width != cameras[0].width || c.height != cameras[0].height) {
+        return {Errc::invalid_argument, "cameras of one batch must have one size"};
+      }
+    }
+    out.cameras = cameras.size();
+    out.width = static_cast<std::size_t>(cameras[0].width);
+    out.height = static_cast<std::size_t>(cameras[0].height);
+    const std::size_t pixels = out.width * out.height;
+    const auto size_image = [&](std::vector<S>& image, unsigned output, std::size_t channels) {
+      image.resize((config_.outputs & output) != 0 ? cameras.size() * pixels * channels : 0);
+    };
+    size_image(out.rgb, kRgb, 3);
+    size_image(out.alpha, kAlpha, 1);
+    size_image(out.median_depth, kMedianDepth, 1);
+    size_image(out.expected_depth, kExpectedDepth, 1);
+    size_image(out.accumulated_depth, kAccumulatedDepth, 1);
+    size_image(out.first_hit_depth, kFirstHitDepth, 1);
+    out.stats.assign(cameras.size(), {});
+
+    if constexpr (!is_host_backend<B>) device_images_.resize_discard(8 * pixels);
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      std::size_t device_offset = 0;
+      const auto image_pointer = [&](std::vector<S>& image, std::size_t channels) -> S* {
+        if (image.empty()) return nullptr;
+        if constexpr (is_host_backend<B>) {
+          return image.data() + c * pixels * channels;
+        } else {
+          S* p = device_images_.data() + device_offset;
+          device_offset += pixels * channels;
+          return p;
+        }
+      };
+      FrameImages<S> images;
+      images.rgb = image_pointer(out.rgb, 3);
+      images.alpha = image_pointer(out.alpha, 1);
+      images.median_depth = image_pointer(out.median_depth, 1);
+      images.expected_depth = image_pointer(out.expected_depth, 1);
+      images.accumulated_depth = image_pointer(out.accumulated_depth, 1);
+      images.first_hit_depth = image_pointer(out.first_hit_depth, 1);
+      if (Status s = render_camera<S>(*backend_, workspace_, sets, cameras[c], config_, images,
+                                      &out.stats[c]);
+          !s) {
+        return s;
+      }
+      if constexpr (!is_host_backend<B>) {
+        const auto fetch = [&](std::vector<S>& image, S* device, std::size_t channels) {
+          if (device != nullptr) {
+            backend_->copy(image.data() + c * pixels * channels, device,
+                           pixels * channels * sizeof(S), CopyKind::device_to_host);
+          }
+        };
+        fetch(out.rgb, images.rgb, 3);
+        fetch(out.alpha, images.alpha, 1);
+        fetch(out.median_depth, images.median_depth, 1);
+        fetch(out.expected_depth, images.expected_depth, 1);
+        fetch(out.accumulated_depth, images.accumulated_depth, 1);
+        fetch(out.first_hit_depth, images.first_hit_depth, 1);
+      }
+    }
+    return backend_->synchronize();
+  }
+
+  /// Bytes of scratch held.
+  std::size_t scratch_bytes() const noexcept { return workspace_.bytes(); }
+
+ private:
+  B* backend_;
+  RenderConfig config_;
+  RenderWorkspace<S, B> workspace_;
+  Buffer<S, B> device_images_;
+};
+
+}  // namespace gsnav

@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+/// The library's version; CMake reads these three lines.
+#define GSNAV_VERSION_MAJOR 0
+#define GSNAV_VERSION_MINOR 1
+#define GSNAV_VERSION_PATCH 0
