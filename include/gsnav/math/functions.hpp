@@ -146,20 +146,27 @@ GSNAV_HD long double exp2(long double x) noexcept {
 }
 #endif
 
+namespace detail {
+/// log2(m) + exponent for t = (m - 1) / (m + 1): log2(m) = 2 / ln 2 * artanh(t).
+template <class L>
+GSNAV_HD L log2_from_ratio(L t, L exponent) noexcept {
+  const L t2 = t * t;
+  L p = fma(t2, L(0.32059889f), L(0.41219858f));  // 2 / (9 ln 2), 2 / (7 ln 2)
+  p = fma(t2, p, L(0.57707802f));                 // 2 / (5 ln 2)
+  p = fma(t2, p, L(0.96179669f));                 // 2 / (3 ln 2)
+  p = fma(t2, p, L(2.8853901f));                  // 2 / ln 2
+  return fma(t, p, exponent);
+}
+}  // namespace detail
+
 /// log2(x) for a positive normal x, from correctly rounded operations only: the same bits on every
-/// backend. Error below 1e-7 absolute + 1.2e-7 relative. log2(m) = 2/ln 2 * artanh((m-1)/(m+1)).
+/// backend. Error below 1e-7 absolute + 1.2e-7 relative.
 GSNAV_HD float log2(float x) noexcept {
   const std::uint32_t u = bits_of(x);
   // Subtracting the bits of sqrt(1/2) puts the mantissa into [sqrt(1/2), sqrt(2)).
   const std::int32_t e = static_cast<std::int32_t>(u - 0x3f3504f3u) >> 23;
   const float m = float_of_bits(u - (static_cast<std::uint32_t>(e) << 23));
-  const float t = (m - 1.0f) / (m + 1.0f);
-  const float t2 = t * t;
-  float p = fma(t2, 0.32059889f, 0.41219858f);  // 2 / (9 ln 2), 2 / (7 ln 2)
-  p = fma(t2, p, 0.57707802f);                  // 2 / (5 ln 2)
-  p = fma(t2, p, 0.96179669f);                  // 2 / (3 ln 2)
-  p = fma(t2, p, 2.8853901f);                   // 2 / ln 2
-  return fma(t, p, static_cast<float>(e));
+  return detail::log2_from_ratio((m - 1.0f) / (m + 1.0f), static_cast<float>(e));
 }
 GSNAV_HD double log2(double x) noexcept { return ::log2(x); }
 #if !defined(__CUDACC__)

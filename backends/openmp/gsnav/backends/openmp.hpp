@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdlib>
+#include <cstring>
+
+#if defined(_OPENMP)
+#include <omp.h>
+#endif
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/projection.hpp"
+#if !defined(GSNAV_OPENMP_COMPILED)
+#include "gsnav/kernels/lanes/project_chunk.hpp"
+#include "gsnav/kernels/lanes/rasterize_tile.hpp"
+#endif
+
+namespace gsnav {
+
+/// The lane kernels of one instruction set.
+struct LaneKernels {
+  const char* name;
+  int width;
+  void (*project_chunk)(const ProjectArgs<float>&, std::size_t) noexcept;
+  void (*rasterize_tile)(const RasterArgs<float>&, std::size_t) noexcept;
+};
+
+#if defined(GSNAV_OPENMP_COMPILED)
+/// The widest lane kernels in gsnav::openmp that this processor runs (baseline, AVX2, AVX-512). The
+/// environment variable GSNAV_ISA=baseline|avx2|avx512 lowers the choice.
+const LaneKernels& lane_kernels() noexcept;
+#else
+namespace lanes {
+inline namespace GSNAV_LANES_TAG {
+inline const LaneKernels& native_kernels() noexcept {
+  static const LaneKernels k{"native", kWidth, &project_chunk, &rasterize_tile_any};
+  return k;
+}
+}  // namespace GSNAV_LANES_TAG
+}  // namespace lanes
+/// Header only: the lane kernels that this translation unit's flags give.
+inline const LaneKernels& lane_kernels() noexcept { return lanes::native_kernels(); }
+#endif
+
+/// Runs on the processor's cores. float32 frames go through lane kernels; every other scalar through
+/// the generic ones. Results do not depend on the number of threads.
+class OpenMPBackend {
+ public:
+  using memory_space = HostSpace;
+
+  /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS).
+  explicit OpenMPBackend(int threads = 0) noexcept : threads_(threads) {
+#if defined(_OPENMP)
+    if (threads_ <= 0) threads_ = omp_get_max_threads();
+#else
+    threads_ = 1;
+#endif
+  }
+
+  int threads() const noexcept { return threads_; }
+  std::size_t concurrency() const noexcept { return static_cast<std::size_t>(threads_); }
+
+  void* allocate(std::size_t bytes, std::size_t align) noexcept {
+    return std::aligned_alloc(align, (bytes + align - 1) / align * align);
+  }
+  void deallocate(void* p, std::size_t) noexcept { std::free(p); }
+  void copy(void* dst, const void* src, std::size_t bytes, CopyKind) noexcept {
+    std::memcpy(dst, src, bytes);
+  }
+  void fill(void* p, unsigned char byte, std::size_t bytes) noexcept { std::memset(p, byte, bytes); }
+
+  template <class F>
+  void parallel_for(std::size_t n, const F& f) {
+#if defined(_OPENMP)
+    if (threads_ > 1 && n > 1) {
+      // Pieces are handed out as threads come free: work items differ in cost.
+      const std::size_t piece = n / (static_cast<std::size_t>(threads_) * 32) + 1;
+      const std::ptrdiff_t pieces = static_cast<std::ptrdiff_t>((n + piece - 1) / piece);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_)
+      for (std::ptrdiff_t p = 0; p < pieces; ++p) {
+        const std::size_t begin = static_cast<std::size_t>(p) * piece;
+        const std::size_t end = begin + piece < n ? begin + piece : n;
+        for (std::size_t i = begin; i < end; ++i) f(i);
+      }
+      return;
+    }
+#endif
+    for (std::size_t i = 0; i < n; ++i) f(i);
+  }
+  Status synchronize() { return {}; }
+
+  /// Optional member: projection in lanes.
+  void project(const ProjectArgs<float>& args) {
+    const auto kernel = lane_kernels().project_chunk;
+    parallel_for(args.chunk_count(), [&args, kernel](std::size_t c) { kernel(args, c); });
+  }
+  /// Optional member: blending in lanes.
+  void rasterize_tiles(const RasterArgs<float>& args) {
+    const auto kernel = lane_kernels().rasterize_tile;
+    parallel_for(args.grid.count(), [&args, kernel](std::size_t tile) { kernel(args, tile); });
+  }
+
+ private:
+  int threads_;
+};
+
+static_assert(Backend<OpenMPBackend>);
+
+}  // namespace gsnav

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdlib>
+#include <cstring>
+
+#include "gsnav/backends/openmp.hpp"
+
+namespace gsnav {
+
+namespace lanes {
+namespace baseline {
+extern const LaneKernels kKernels;
+}
+#if defined(GSNAV_ISA_DISPATCH)
+namespace avx2 {
+extern const LaneKernels kKernels;
+}
+namespace avx512 {
+extern const LaneKernels kKernels;
+}
+#endif
+}  // namespace lanes
+
+namespace {
+
+const LaneKernels& choose() noexcept {
+#if defined(GSNAV_ISA_DISPATCH)
+  const char* limit = std::getenv("GSNAV_ISA");
+  const auto allowed = [limit](const char* name) {
+    return limit == nullptr || std::strcmp(limit, name) == 0 ||
+           (std::strcmp(limit, "avx512") == 0 && std::strcmp(name, "avx2") == 0);
+  };
+  __builtin_cpu_init();
+  if (allowed("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw")) {
+    return lanes::avx512::kKernels;
+  }
+  if (allowed("avx2") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+    return lanes::avx2::kKernels;
+  }
+#endif
+  return lanes::baseline::kKernels;
+}
+
+}  // namespace
+
+const LaneKernels& lane_kernels() noexcept {
+  static const LaneKernels& chosen = choose();
+  return chosen;
+}
+
+}  // namespace gsnav

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "gsnav/math/pack.hpp"
+
+// Code over lanes is compiled once per instruction set and chosen at run time, so every function of it
+// lives in a namespace named after the set: no linker can mix two of them up.
+#if defined(__AVX512F__)
+#define GSNAV_LANES_TAG avx512
+#elif defined(__AVX2__)
+#define GSNAV_LANES_TAG avx2
+#else
+#define GSNAV_LANES_TAG baseline
+#endif
+
+namespace gsnav::lanes {
+inline namespace GSNAV_LANES_TAG {
+
+inline constexpr int kWidth = GSNAV_PACK_WIDTH;
+using F = Pack<float, kWidth>;
+
+}  // namespace GSNAV_LANES_TAG
+}  // namespace gsnav::lanes

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#if defined(__CUDACC__)
+#error "math/pack.hpp is host code: nvcc has no vector types in device functions"
+#endif
+
+#include <cstdint>
+#include <cstring>
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+#include "gsnav/math/functions.hpp"
+
+// Float lanes over the compilers' vector extension: the functions of math/functions.hpp with the same
+// bits per lane. Kernels are written over `L` and run on a Pack where pixels or Gaussians go side by
+// side. Where the instruction set has no fma, one is computed with correct rounding.
+
+/// Lanes that the flags of this translation unit make natural.
+#if defined(__AVX512F__)
+#define GSNAV_PACK_WIDTH 16
+#elif defined(__AVX2__)
+#define GSNAV_PACK_WIDTH 8
+#else
+#define GSNAV_PACK_WIDTH 4
+#endif
+
+namespace gsnav {
+
+namespace detail {
+
+// g++ 12 rejects a vector_size that depends on a template parameter, so widths are spelled out.
+template <int N>
+struct PackTypes;
+template <>
+struct PackTypes<4> {
+  typedef float f __attribute__((vector_size(16)));
+  typedef std::int32_t i __attribute__((vector_size(16)));
+};
+template <>
+struct PackTypes<8> {
+  typedef float f __attribute__((vector_size(32)));
+  typedef std::int32_t i __attribute__((vector_size(32)));
+};
+template <>
+struct PackTypes<16> {
+  typedef float f __attribute__((vector_size(64)));
+  typedef std::int32_t i __attribute__((vector_size(64)));
+};
+
+}  // namespace detail
+
+/// Comparison result of a Pack: all bits of a lane set, or none.
+template <int N>
+struct Mask {
+  using vector = typename detail::PackTypes<N>::i;
+  vector v{};
+
+  GSNAV_HD Mask() noexcept = default;
+  GSNAV_HD explicit Mask(bool b) noexcept : v(vector{} - static_cast<std::int32_t>(b)) {}
+  GSNAV_HD explicit Mask(vector x) noexcept : v(x) {}
+
+  GSNAV_HD friend Mask operator&&(Mask a, Mask b) noexcept { return Mask(a.v & b.v); }
+  GSNAV_HD friend Mask operator||(Mask a, Mask b) noexcept { return Mask(a.v | b.v); }
+  GSNAV_HD friend Mask operator!(Mask a) noexcept { return Mask(~a.v); }
+};
+
+/// N floats that are computed with together.
+template <class T, int N>
+struct Pack;
+
+template <int N>
+struct Pack<float, N> {
+  using vector = typename detail::PackTypes<N>::f;
+  using ints = typename detail::PackTypes<N>::i;
+  vector v{};
+
+  GSNAV_HD Pack() noexcept = default;
+  GSNAV_HD Pack(float s) noexcept : v(vector{} + s) {}
+  GSNAV_HD explicit Pack(vector x) noexcept : v(x) {}
+
+  /// Reads N floats from any address.
+  GSNAV_HD static Pack load(const float* p) noexcept {
+    Pack r;
+    std::memcpy(&r.v, p, sizeof r.v);
+    return r;
+  }
+  GSNAV_HD void store(float* p) const noexcept { std::memcpy(p, &v, sizeof v); }
+  GSNAV_HD float operator[](int i) const noexcept { return v[i]; }
+
+  GSNAV_HD friend Pack operator+(Pack a, Pack b) noexcept { return Pack(a.v + b.v); }
+  GSNAV_HD friend Pack operator-(Pack a, Pack b) noexcept { return Pack(a.v - b.v); }
+  GSNAV_HD friend Pack operator*(Pack a, Pack b) noexcept { return Pack(a.v * b.v); }
+  GSNAV_HD friend Pack operator/(Pack a, Pack b) noexcept { return Pack(a.v / b.v); }
+  GSNAV_HD friend Pack operator-(Pack a) noexcept { return Pack(-a.v); }
+  GSNAV_HD friend Mask<N> operator<(Pack a, Pack b) noexcept { return Mask<N>(a.v < b.v); }
+  GSNAV_HD friend Mask<N> operator<=(Pack a, Pack b) noexcept { return Mask<N>(a.v <= b.v); }
+  GSNAV_HD friend Mask<N> operator>(Pack a, Pack b) noexcept { return Mask<N>(a.v > b.v); }
+  GSNAV_HD friend Mask<N> operator>=(Pack a, Pack b) noexcept { return Mask<N>(a.v >= b.v); }
+};
+
+template <int N>
+struct LaneTraits<Pack<float, N>> {
+  using scalar = float;
+  using mask = Mask<N>;
+  static constexpr int width = N;
+};
+
+template <int N>
+GSNAV_HD Pack<float, N> select(Mask<N> m, Pack<float, N> a, Pack<float, N> b) noexcept {
+  return Pack<float, N>(m.v ? a.v : b.v);
+}
+template <int N>
+GSNAV_HD Pack<float, N> min(Pack<float, N> a, Pack<float, N> b) noexcept {
+  return select(a < b, a, b);
+}
+template <int N>
+GSNAV_HD Pack<float, N> max(Pack<float, N> a, Pack<float, N> b) noexcept {
+  return select(a > b, a, b);
+}
+template <int N>
+GSNAV_HD Pack<float, N> clamp(Pack<float, N> v, Pack<float, N> low, Pack<float, N> high) noexcept {
+  return min(max(v, low), high);
+}
+
+namespace detail {
+template <int N>
+GSNAV_HD typename PackTypes<N>::i bits(typename PackTypes<N>::f x) noexcept {
+  typename PackTypes<N>::i r;
+  std::memcpy(&r, &x, sizeof r);
+  return r;
+}
+template <int N>
+GSNAV_HD typename PackTypes<N>::f floats(typename PackTypes<N>::i x) noexcept {
+  typename PackTypes<N>::f r;
+  std::memcpy(&r, &x, sizeof r);
+  return r;
+}
+}  // namespace detail
+
+template <int N>
+GSNAV_HD Pack<float, N> abs(Pack<float, N> a) noexcept {
+  return Pack<float, N>(detail::floats<N>(detail::bits<N>(a.v) & 0x7fffffff));
+}
+
+/// Bit i is set where lane i is.
+template <int N>
+GSNAV_HD std::uint32_t lane_bits(Mask<N> m) noexcept {
+#if defined(__AVX512DQ__)
+  if constexpr (N == 16) return _mm512_movepi32_mask(reinterpret_cast<__m512i>(m.v));
+#endif
+#if defined(__AVX__)
+  if constexpr (N == 8) {
+    return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(m.v)));
+  }
+#endif
+#if defined(__SSE2__)
+  if constexpr (N == 4) {
+    return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(m.v)));
+  }
+#endif
+  std::uint32_t r = 0;
+  for (int i = 0; i < N; ++i) r |= static_cast<std::uint32_t>(m.v[i] & 1) << i;
+  return r;
+}
+template <int N>
+GSNAV_HD bool any(Mask<N> m) noexcept {
+  return lane_bits(m) != 0;
+}
+template <int N>
+GSNAV_HD bool all(Mask<N> m) noexcept {
+  return lane_bits(m) == (N == 32 ? ~0u : (1u << N) - 1u);
+}
+
+/// Square root, correctly rounded.
+template <int N>
+GSNAV_HD Pack<float, N> sqrt(Pack<float, N> a) noexcept {
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
+        _mm512_maskz_sqrt_ps(static_cast<__mmask16>(-1), reinterpret_cast<__m512>(a.v))));
+  }
+#endif
+#if defined(__AVX__)
+  if constexpr (N == 8) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
+        _mm256_sqrt_ps(reinterpret_cast<__m256>(a.v))));
+  }
+#endif
+#if defined(__SSE2__)
+  if constexpr (N == 4) {
+    return Pack<float, N>(
+        reinterpret_cast<typename Pack<float, N>::vector>(_mm_sqrt_ps(reinterpret_cast<__m128>(a.v))));
+  }
+#endif
+  Pack<float, N> r;
+  for (int i = 0; i < N; ++i) r.v[i] = __builtin_sqrtf(a.v[i]);
+  return r;
+}
+
+namespace detail {
+
+/// fma by way of double: the product is exact there, the sum is rounded to odd, and rounding that to
+/// float gives the correctly rounded result (Boldo and Melquiond 2008).
+GSNAV_HD float fma_by_double(float a, float b, float c) noexcept {
+  const double p = static_cast<double>(a) * static_cast<double>(b), d = static_cast<double>(c);
+  double s = p + d;
+  const double t = s - p;
+  const double error = (p - (s - t)) + (d - t);
+  std::uint64_t u;
+  std::memcpy(&u, &s, sizeof u);
+  if ((error > 0 || error < 0) && (u & 1) == 0) {
+    u = (error > 0) == (s > 0) ? u + 1 : u - 1;
+    std::memcpy(&s, &u, sizeof s);
+  }
+  return static_cast<float>(s);
+}
+
+}  // namespace detail
+
+/// a * b + c with one rounding.
+template <int N>
+GSNAV_HD Pack<float, N> fma(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c) noexcept {
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
+        _mm512_fmadd_ps(reinterpret_cast<__m512>(a.v), reinterpret_cast<__m512>(b.v),
+                        reinterpret_cast<__m512>(c.v))));
+  }
+#endif
+#if defined(__FMA__)
+  if constexpr (N == 8) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
+        _mm256_fmadd_ps(reinterpret_cast<__m256>(a.v), reinterpret_cast<__m256>(b.v),
+                        reinterpret_cast<__m256>(c.v))));
+  }
+  if constexpr (N == 4) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
+        _mm_fmadd_ps(reinterpret_cast<__m128>(a.v), reinterpret_cast<__m128>(b.v),
+                     reinterpret_cast<__m128>(c.v))));
+  }
+#endif
+  Pack<float, N> r;
+  for (int i = 0; i < N; ++i) {
+#if defined(__FMA__) || !defined(__SSE2__)
+    r.v[i] = __builtin_fmaf(a.v[i], b.v[i], c.v[i]);
+#else
+    r.v[i] = detail::fma_by_double(a.v[i], b.v[i], c.v[i]);
+#endif
+  }
+  return r;
+}
+
+/// 2^x, lane by lane the bits of the scalar exp2.
+template <Exp2 M = Exp2::degree6, int N>
+GSNAV_HD Pack<float, N> exp2(Pack<float, N> x) noexcept {
+  using P = Pack<float, N>;
+  x = clamp(x, P(-126.0f), P(126.0f));
+  const P t = x + P(detail::kRoundMagic);
+  const P f = x - (t - P(detail::kRoundMagic));
+  const P p = M == Exp2::degree6 ? detail::exp2_degree6(f) : detail::exp2_degree3(f);
+  return P(detail::floats<N>(detail::bits<N>(p.v) + (detail::bits<N>(t.v) << 23)));
+}
+
+/// log2(x), lane by lane the bits of the scalar log2.
+template <int N>
+GSNAV_HD Pack<float, N> log2(Pack<float, N> x) noexcept {
+  using P = Pack<float, N>;
+  const auto u = detail::bits<N>(x.v);
+  const auto e = (u - 0x3f3504f3) >> 23;
+  const P m(detail::floats<N>(u - (e << 23)));
+  const P t = (m - P(1.0f)) / (m + P(1.0f));
+  P exponent;
+  exponent.v = __builtin_convertvector(e, typename P::vector);
+  return detail::log2_from_ratio(t, exponent);
+}
+
+}  // namespace gsnav
