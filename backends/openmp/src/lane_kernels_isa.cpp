@@ -2,14 +2,14 @@
 // Compiled once per instruction set. Nothing here may leave a function behind that another object could
 // pick up: every definition lives in the set's own namespace or is always inlined.
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/kernels/lanes/project_chunk.hpp"
-#include "gsnav/kernels/lanes/rasterize_tile.hpp"
+#include "gsnav/kernels/lanes/kernels.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
 extern const LaneKernels kKernels;
-const LaneKernels kKernels{GSNAV_LANES_NAME, kWidth, &project_chunk, &rasterize_tile_any};
+const LaneKernels kKernels{GSNAV_LANES_NAME, kWidth,         &project_chunk,
+                           &count_tiles,     &scatter_tiles, &rasterize_tile_any};
 
 }  // namespace GSNAV_LANES_TAG
 }  // namespace gsnav::lanes

@@ -33,8 +33,9 @@ struct NoopFunctor {
 ///     Status synchronize();
 ///
 /// Members that are used where they exist, with a generic fallback where they do not:
-///     rasterize_tiles(const RasterArgs<S>&)   blend all tiles (ops/rasterize.hpp)
-///     project(const ProjectArgs<S>&)          project one set of Gaussians (ops/project.hpp)
+///     rasterize_tiles(const RasterArgs<S>&)   blend all tiles (kernels/blend.hpp)
+///     project(const ProjectArgs<S>&)          project one set of Gaussians (kernels/projection.hpp)
+///     count_tiles, scatter_tiles(const BinArgs<S>&)   bin (kernels/tiles.hpp)
 ///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)
 template <class B>
 concept Backend = requires(B& b, void* p, const void* q, std::size_t n, detail::NoopFunctor f) {

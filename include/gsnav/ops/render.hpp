@@ -250,14 +250,22 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.tile_offsets.resize_discard(bin.grid.count() + 1);
   bin.cursors = ws.cursors.view();
   bin.tile_offsets = ws.tile_offsets.view();
-  backend.parallel_for(bin.blocks, CountTileIntersections<S>{bin});
+  if constexpr (requires { backend.count_tiles(bin); }) {
+    backend.count_tiles(bin);
+  } else {
+    backend.parallel_for(bin.blocks, CountTileIntersections<S>{bin});
+  }
   backend.parallel_for(1, ScanTileIntersections<S>{bin});
   std::uint64_t intersections = 0;
   ws.tile_offsets.download(&intersections, 1, bin.grid.count());
   if (Status s = backend.synchronize(); !s) return s;
   ws.tile_splats.resize_discard(intersections);
   bin.tile_splats = ws.tile_splats.view();
-  backend.parallel_for(bin.blocks, ScatterTileIntersections<S>{bin});
+  if constexpr (requires { backend.scatter_tiles(bin); }) {
+    backend.scatter_tiles(bin);
+  } else {
+    backend.parallel_for(bin.blocks, ScatterTileIntersections<S>{bin});
+  }
 
   // ---- blend
   RasterArgs<S> raster;

@@ -12,9 +12,9 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/projection.hpp"
+#include "gsnav/kernels/tiles.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
-#include "gsnav/kernels/lanes/project_chunk.hpp"
-#include "gsnav/kernels/lanes/rasterize_tile.hpp"
+#include "gsnav/kernels/lanes/kernels.hpp"
 #endif
 
 namespace gsnav {
@@ -23,8 +23,10 @@ namespace gsnav {
 struct LaneKernels {
   const char* name;
   int width;
-  void (*project_chunk)(const ProjectArgs<float>&, std::size_t) noexcept;
-  void (*rasterize_tile)(const RasterArgs<float>&, std::size_t) noexcept;
+  void (*project_chunk)(const ProjectArgs<float>&, std::size_t chunk) noexcept;
+  void (*count_tiles)(const BinArgs<float>&, std::size_t block) noexcept;
+  void (*scatter_tiles)(const BinArgs<float>&, std::size_t block) noexcept;
+  void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
 };
 
 #if defined(GSNAV_OPENMP_COMPILED)
@@ -35,7 +37,8 @@ const LaneKernels& lane_kernels() noexcept;
 namespace lanes {
 inline namespace GSNAV_LANES_TAG {
 inline const LaneKernels& native_kernels() noexcept {
-  static const LaneKernels k{"native", kWidth, &project_chunk, &rasterize_tile_any};
+  static const LaneKernels k{"native",      kWidth,         &project_chunk,
+                             &count_tiles,  &scatter_tiles, &rasterize_tile_any};
   return k;
 }
 }  // namespace GSNAV_LANES_TAG
@@ -95,6 +98,15 @@ class OpenMPBackend {
   void project(const ProjectArgs<float>& args) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, kernel](std::size_t c) { kernel(args, c); });
+  }
+  /// Optional members: binning with the instruction set's own fma.
+  void count_tiles(const BinArgs<float>& args) {
+    const auto kernel = lane_kernels().count_tiles;
+    parallel_for(args.blocks, [&args, kernel](std::size_t block) { kernel(args, block); });
+  }
+  void scatter_tiles(const BinArgs<float>& args) {
+    const auto kernel = lane_kernels().scatter_tiles;
+    parallel_for(args.blocks, [&args, kernel](std::size_t block) { kernel(args, block); });
   }
   /// Optional member: blending in lanes.
   void rasterize_tiles(const RasterArgs<float>& args) {
