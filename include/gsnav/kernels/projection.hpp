@@ -312,7 +312,9 @@ struct ProjectChunk {
                                 args.offsets_f[origin]);
       if (!(z > args.camera.near_plane)) continue;
       const Vec3<S> delta = vec_cast<S>(mean) + args.offsets[origin];
-      const Quat<S> quat{S(gs.quats[0][i]), S(gs.quats[1][i]), S(gs.quats[2][i]), S(gs.quats[3][i])};
+      Quat<S> quat{S(gs.quats[0][i]), S(gs.quats[1][i]), S(gs.quats[2][i]), S(gs.quats[3][i])};
+      // Rounded to float a unit quaternion is off by 6e-8: nothing in float, but not in a reference.
+      if constexpr (sizeof(S) > sizeof(float)) normalize(quat);
       const Vec3<S> scales{S(gs.scales[0][i]), S(gs.scales[1][i]), S(gs.scales[2][i])};
       CameraAxes<S> frame;
       const Projected<S> p =
