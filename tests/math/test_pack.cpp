@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// A pack is its lanes: the same bits as the scalar functions.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <cstdint>
+
+#include "gsnav/core/rng.hpp"
+#include "gsnav/math/pack.hpp"
+#include "gsnav/math/quat.hpp"
+
+using namespace gsnav;
+
+namespace {
+
+template <int N>
+void check_lanes() {
+  using P = Pack<float, N>;
+  Rng rng(7);
+  for (int round = 0; round < 20000; ++round) {
+    float a[N], b[N], c[N], positive[N];
+    for (int i = 0; i < N; ++i) {
+      a[i] = static_cast<float>(std::exp2(rng.uniform(-20, 20)) * (rng.uniform() < 0.5 ? -1 : 1));
+      b[i] = static_cast<float>(std::exp2(rng.uniform(-20, 20)) * (rng.uniform() < 0.5 ? -1 : 1));
+      c[i] = round % 2 == 0 ? -a[i] * b[i] : static_cast<float>(rng.normal());
+      positive[i] = static_cast<float>(std::exp2(rng.uniform(-100, 100)));
+    }
+    const P pa = P::load(a), pb = P::load(b), pc = P::load(c), pp = P::load(positive);
+    const P sum = pa + pb, product = pa * pb, quotient = pa / pb, fused = fma(pa, pb, pc);
+    const P root = sqrt(pp), power = gsnav::exp2(pb), logarithm = gsnav::log2(pp);
+    const P coarse = gsnav::exp2<Exp2::degree3>(pb);
+    const P low = min(pa, pb), high = max(pa, pb), magnitude = abs(pa);
+    const auto less = pa < pb;
+    const P chosen = select(less, pa, pc);
+    std::uint32_t bits = 0;
+    for (int i = 0; i < N; ++i) {
+      const auto same = [&](const P& p, float s) { return bits_of(p[i]) == bits_of(s); };
+      REQUIRE(same(sum, a[i] + b[i]));
+      REQUIRE(same(product, a[i] * b[i]));
+      REQUIRE(same(quotient, a[i] / b[i]));
+      REQUIRE(same(fused, gsnav::fma(a[i], b[i], c[i])));
+      REQUIRE(same(root, gsnav::sqrt(positive[i])));
+      REQUIRE(same(power, gsnav::exp2(b[i])));
+      REQUIRE(same(coarse, gsnav::exp2<Exp2::degree3>(b[i])));
+      REQUIRE(same(logarithm, gsnav::log2(positive[i])));
+      REQUIRE(same(low, gsnav::min(a[i], b[i])));
+      REQUIRE(same(high, gsnav::max(a[i], b[i])));
+      REQUIRE(same(magnitude, std::abs(a[i])));
+      REQUIRE(same(chosen, a[i] < b[i] ? a[i] : c[i]));
+      bits |= (a[i] < b[i] ? 1u : 0u) << i;
+    }
+    REQUIRE(lane_bits(less) == bits);
+    REQUIRE(any(less) == (bits != 0));
+    REQUIRE(all(less || !less));
+    REQUIRE(!any(less && !less));
+  }
+}
+
+}  // namespace
+
+TEST_CASE("packs of the natural width are their lanes") { check_lanes<GSNAV_PACK_WIDTH>(); }
+TEST_CASE("packs of four are their lanes") { check_lanes<4>(); }
+
+TEST_CASE("vector code over packs is its lanes") {
+  using P = Pack<float, GSNAV_PACK_WIDTH>;
+  Rng rng(8);
+  for (int round = 0; round < 2000; ++round) {
+    float v[7][GSNAV_PACK_WIDTH];
+    for (auto& plane : v) {
+      for (float& x : plane) x = static_cast<float>(rng.normal());
+    }
+    const Quat<P> q{P::load(v[0]), P::load(v[1]), P::load(v[2]), P::load(v[3])};
+    const Vec3<P> r = rotate(q, Vec3<P>{P::load(v[4]), P::load(v[5]), P::load(v[6])});
+    const Vec3<P> x = cross(r, Vec3<P>{q.x, q.y, q.z});
+    for (int i = 0; i < GSNAV_PACK_WIDTH; ++i) {
+      const Quatf qs{v[0][i], v[1][i], v[2][i], v[3][i]};
+      const Vec3f rs = rotate(qs, Vec3f{v[4][i], v[5][i], v[6][i]});
+      const Vec3f xs = cross(rs, Vec3f{qs.x, qs.y, qs.z});
+      REQUIRE(r.x[i] == rs.x);
+      REQUIRE(r.y[i] == rs.y);
+      REQUIRE(r.z[i] == rs.z);
+      REQUIRE(x.y[i] == xs.y);
+    }
+  }
+}
