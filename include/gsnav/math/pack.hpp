@@ -67,6 +67,45 @@ struct Mask {
   GSNAV_HD friend Mask operator!(Mask a) noexcept { return Mask(~a.v); }
 };
 
+#if defined(__AVX512F__)
+/// With AVX-512 a mask is a register of one bit a lane; g++ does not see through the vector form.
+template <>
+struct Mask<16> {
+  __mmask16 v = 0;
+
+  GSNAV_HD Mask() noexcept = default;
+  GSNAV_HD explicit Mask(bool b) noexcept : v(static_cast<__mmask16>(b ? 0xffff : 0)) {}
+  GSNAV_HD static Mask of(__mmask16 m) noexcept {
+    Mask r;
+    r.v = m;
+    return r;
+  }
+  GSNAV_HD friend Mask operator&&(Mask a, Mask b) noexcept {
+    return of(static_cast<__mmask16>(a.v & b.v));
+  }
+  GSNAV_HD friend Mask operator||(Mask a, Mask b) noexcept {
+    return of(static_cast<__mmask16>(a.v | b.v));
+  }
+  GSNAV_HD friend Mask operator!(Mask a) noexcept { return of(static_cast<__mmask16>(~a.v)); }
+};
+#endif
+
+namespace detail {
+enum class Compare { less, less_equal };
+template <int N, Compare C>
+GSNAV_HD Mask<N> compare(typename PackTypes<N>::f a, typename PackTypes<N>::f b) noexcept {
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {
+    return Mask<16>::of(_mm512_cmp_ps_mask(reinterpret_cast<__m512>(a), reinterpret_cast<__m512>(b),
+                                           C == Compare::less ? _CMP_LT_OQ : _CMP_LE_OQ));
+  } else
+#endif
+  {
+    return C == Compare::less ? Mask<N>(a < b) : Mask<N>(a <= b);
+  }
+}
+}  // namespace detail
+
 /// N floats that are computed with together.
 template <class T, int N>
 struct Pack;
@@ -78,7 +117,8 @@ struct Pack<float, N> {
   vector v{};
 
   GSNAV_HD Pack() noexcept = default;
-  GSNAV_HD Pack(float s) noexcept : v(vector{} + s) {}
+  // s - 0 is s for every s, -0 included, so this is a plain broadcast.
+  GSNAV_HD Pack(float s) noexcept : v(s - vector{}) {}
   GSNAV_HD explicit Pack(vector x) noexcept : v(x) {}
 
   /// Reads N floats from any address.
@@ -95,10 +135,14 @@ struct Pack<float, N> {
   GSNAV_HD friend Pack operator*(Pack a, Pack b) noexcept { return Pack(a.v * b.v); }
   GSNAV_HD friend Pack operator/(Pack a, Pack b) noexcept { return Pack(a.v / b.v); }
   GSNAV_HD friend Pack operator-(Pack a) noexcept { return Pack(-a.v); }
-  GSNAV_HD friend Mask<N> operator<(Pack a, Pack b) noexcept { return Mask<N>(a.v < b.v); }
-  GSNAV_HD friend Mask<N> operator<=(Pack a, Pack b) noexcept { return Mask<N>(a.v <= b.v); }
-  GSNAV_HD friend Mask<N> operator>(Pack a, Pack b) noexcept { return Mask<N>(a.v > b.v); }
-  GSNAV_HD friend Mask<N> operator>=(Pack a, Pack b) noexcept { return Mask<N>(a.v >= b.v); }
+  GSNAV_HD friend Mask<N> operator<(Pack a, Pack b) noexcept {
+    return detail::compare<N, detail::Compare::less>(a.v, b.v);
+  }
+  GSNAV_HD friend Mask<N> operator<=(Pack a, Pack b) noexcept {
+    return detail::compare<N, detail::Compare::less_equal>(a.v, b.v);
+  }
+  GSNAV_HD friend Mask<N> operator>(Pack a, Pack b) noexcept { return b < a; }
+  GSNAV_HD friend Mask<N> operator>=(Pack a, Pack b) noexcept { return b <= a; }
 };
 
 template <int N>
@@ -110,7 +154,15 @@ struct LaneTraits<Pack<float, N>> {
 
 template <int N>
 GSNAV_HD Pack<float, N> select(Mask<N> m, Pack<float, N> a, Pack<float, N> b) noexcept {
-  return Pack<float, N>(m.v ? a.v : b.v);
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
+        _mm512_mask_blend_ps(m.v, reinterpret_cast<__m512>(b.v), reinterpret_cast<__m512>(a.v))));
+  } else
+#endif
+  {
+    return Pack<float, N>(m.v ? a.v : b.v);
+  }
 }
 template <int N>
 GSNAV_HD Pack<float, N> min(Pack<float, N> a, Pack<float, N> b) noexcept {
@@ -148,22 +200,26 @@ GSNAV_HD Pack<float, N> abs(Pack<float, N> a) noexcept {
 /// Bit i is set where lane i is.
 template <int N>
 GSNAV_HD std::uint32_t lane_bits(Mask<N> m) noexcept {
-#if defined(__AVX512DQ__)
-  if constexpr (N == 16) return _mm512_movepi32_mask(reinterpret_cast<__m512i>(m.v));
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {
+    return m.v;
+  } else
 #endif
 #if defined(__AVX__)
-  if constexpr (N == 8) {
+      if constexpr (N == 8) {
     return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(m.v)));
-  }
+  } else
 #endif
 #if defined(__SSE2__)
-  if constexpr (N == 4) {
+      if constexpr (N == 4) {
     return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(m.v)));
-  }
+  } else
 #endif
-  std::uint32_t r = 0;
-  for (int i = 0; i < N; ++i) r |= static_cast<std::uint32_t>(m.v[i] & 1) << i;
-  return r;
+  {
+    std::uint32_t r = 0;
+    for (int i = 0; i < N; ++i) r |= static_cast<std::uint32_t>(m.v[i] & 1) << i;
+    return r;
+  }
 }
 template <int N>
 GSNAV_HD bool any(Mask<N> m) noexcept {
@@ -218,6 +274,31 @@ GSNAV_HD float fma_by_double(float a, float b, float c) noexcept {
   return static_cast<float>(s);
 }
 
+#if defined(__SSE2__) && !defined(__FMA__)
+/// The same for two lanes at once.
+GSNAV_HD __m128 fma_by_double(__m128 a, __m128 b, __m128 c) noexcept {
+  const auto half = [](__m128d x, __m128d y, __m128d d) {
+    const __m128d p = _mm_mul_pd(x, y), s = _mm_add_pd(p, d), t = _mm_sub_pd(s, p);
+    const __m128d error = _mm_add_pd(_mm_sub_pd(p, _mm_sub_pd(s, t)), _mm_sub_pd(d, t));
+    const __m128d zero = _mm_setzero_pd();
+    const __m128i u = _mm_castpd_si128(s), one = _mm_set1_epi64x(1);
+    const __m128d inexact = _mm_or_pd(_mm_cmplt_pd(error, zero), _mm_cmpgt_pd(error, zero));
+    // All ones where the last bit is 0: subtracting 1 from that bit alone.
+    const __m128i even = _mm_sub_epi64(_mm_and_si128(u, one), one);
+    const __m128d same_sign = _mm_cmpge_pd(
+        _mm_mul_pd(_mm_or_pd(_mm_and_pd(error, _mm_set1_pd(-0.0)), _mm_set1_pd(1.0)), s), zero);
+    // +1 where error and sum point the same way, else -1.
+    const __m128i move =
+        _mm_or_si128(_mm_andnot_si128(_mm_castpd_si128(same_sign), _mm_set1_epi64x(-1)), one);
+    const __m128i apply = _mm_and_si128(_mm_castpd_si128(inexact), even);
+    return _mm_castsi128_pd(_mm_add_epi64(u, _mm_and_si128(move, apply)));
+  };
+  const auto high = [](__m128 x) { return _mm_cvtps_pd(_mm_movehl_ps(x, x)); };
+  const __m128 low = _mm_cvtpd_ps(half(_mm_cvtps_pd(a), _mm_cvtps_pd(b), _mm_cvtps_pd(c)));
+  return _mm_movelh_ps(low, _mm_cvtpd_ps(half(high(a), high(b), high(c))));
+}
+#endif
+
 }  // namespace detail
 
 /// a * b + c with one rounding.
@@ -225,31 +306,28 @@ template <int N>
 GSNAV_HD Pack<float, N> fma(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c) noexcept {
 #if defined(__AVX512F__)
   if constexpr (N == 16) {
-    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
-        _mm512_fmadd_ps(reinterpret_cast<__m512>(a.v), reinterpret_cast<__m512>(b.v),
-                        reinterpret_cast<__m512>(c.v))));
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(_mm512_fmadd_ps(
+        reinterpret_cast<__m512>(a.v), reinterpret_cast<__m512>(b.v), reinterpret_cast<__m512>(c.v))));
   }
 #endif
 #if defined(__FMA__)
   if constexpr (N == 8) {
-    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
-        _mm256_fmadd_ps(reinterpret_cast<__m256>(a.v), reinterpret_cast<__m256>(b.v),
-                        reinterpret_cast<__m256>(c.v))));
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(_mm256_fmadd_ps(
+        reinterpret_cast<__m256>(a.v), reinterpret_cast<__m256>(b.v), reinterpret_cast<__m256>(c.v))));
   }
   if constexpr (N == 4) {
-    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
-        _mm_fmadd_ps(reinterpret_cast<__m128>(a.v), reinterpret_cast<__m128>(b.v),
-                     reinterpret_cast<__m128>(c.v))));
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(_mm_fmadd_ps(
+        reinterpret_cast<__m128>(a.v), reinterpret_cast<__m128>(b.v), reinterpret_cast<__m128>(c.v))));
+  }
+#endif
+#if defined(__SSE2__) && !defined(__FMA__)
+  if constexpr (N == 4) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(detail::fma_by_double(
+        reinterpret_cast<__m128>(a.v), reinterpret_cast<__m128>(b.v), reinterpret_cast<__m128>(c.v))));
   }
 #endif
   Pack<float, N> r;
-  for (int i = 0; i < N; ++i) {
-#if defined(__FMA__) || !defined(__SSE2__)
-    r.v[i] = __builtin_fmaf(a.v[i], b.v[i], c.v[i]);
-#else
-    r.v[i] = detail::fma_by_double(a.v[i], b.v[i], c.v[i]);
-#endif
-  }
+  for (int i = 0; i < N; ++i) r.v[i] = __builtin_fmaf(a.v[i], b.v[i], c.v[i]);
   return r;
 }
 

@@ -67,7 +67,14 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
   for (std::uint64_t first = args.tile_offsets[tile]; first < end && open_count > 0; first += kBatch) {
     const int n = static_cast<int>(end - first < kBatch ? end - first : std::uint64_t{kBatch});
     std::memset(counts, 0, static_cast<std::size_t>(blocks));
+    // Records lie in file order, not in the tile's: asked for early, they are there when needed.
+    constexpr int kAhead = 8;
     for (int j = 0; j < n; ++j) {
+      if (j + kAhead < n) {
+        const std::uint32_t next = args.tile_splats[first + static_cast<std::uint64_t>(j + kAhead)];
+        __builtin_prefetch(&args.geometry[next]);
+        if constexpr (Color) __builtin_prefetch(&args.colors[next]);
+      }
       const std::uint32_t splat = args.tile_splats[first + static_cast<std::uint64_t>(j)];
       geometry[j] = args.geometry[splat];
       if constexpr (Color) colors[j] = args.colors[splat];
