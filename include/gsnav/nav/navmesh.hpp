@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "gsnav/core/rng.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/math/aabb.hpp"
+#include "gsnav/math/vec.hpp"
+#include "gsnav/nav/navmesh_settings.hpp"
+
+namespace gsnav {
+
+/// Index of a polygon of a NavMesh.
+using PolyId = std::uint32_t;
+inline constexpr PolyId kNoPoly = 0xffffffffu;
+
+/// A point on the surface of a NavMesh: world position (metres, Y up) and the polygon it lies on.
+/// Kept from one step to the next, the polygon saves the search for it.
+struct NavPoint {
+  Vec3d position{};
+  PolyId poly = kNoPoly;
+};
+
+/// How far a point may lie from the surface to be snapped to it: half extents of a box, metres.
+struct SnapOptions {
+  Vec3d half_extents{2.0, 4.0, 2.0};
+};
+
+/// A path along the surface: corners from start to goal and its length in metres.
+struct NavPath {
+  std::vector<Vec3d> points;
+  double length = 0.0;
+};
+
+/// A point of a walk and when it is reached, as a fraction of the displacement asked for.
+struct WalkPoint {
+  Vec3d position{};
+  PolyId poly = kNoPoly;
+  double fraction = 0.0;
+};
+
+/// A straight or sliding walk along the surface. Each leg between consecutive points lies within one
+/// polygon and follows its height to a centimetre. A walk that ends before fraction 1 was stopped.
+struct SurfaceWalk {
+  std::vector<WalkPoint> points;  ///< at least the start
+  double length = 0.0;            ///< metres walked, in three dimensions
+  bool hit_wall = false;          ///< an edge of the mesh stopped or turned the walk
+  Vec3d wall_normal{};  ///< ground-plane normal of the last wall met, pointing into the mesh
+};
+
+/// Where agents can walk: a Recast NavMesh with queries. Built once, then constant: every query is
+/// const, changes no flags and may run from any number of threads at the same time.
+class NavMesh {
+ public:
+  using Triangle = std::array<std::uint32_t, 3>;
+
+  /// Builds from triangles (counter-clockwise seen from above is walkable; Y up, metres), at any
+  /// distance from the world's origin. Errors: invalid_argument naming the setting, vertex or index
+  /// at fault or the size of a grid beyond `max_cells`; nothing_navigable where no surface is left.
+  static Result<NavMesh> build(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
+                               std::span<const Triangle> triangles);
+
+  NavMesh(NavMesh&&) noexcept;
+  NavMesh& operator=(NavMesh&&) noexcept;
+  ~NavMesh();
+
+  const NavMeshSettings& settings() const noexcept;
+  /// Box around the navigable surface.
+  Aabb<double> bounds() const noexcept;
+  std::size_t polygon_count() const noexcept;
+  /// Area of the surface, square metres.
+  double navigable_area() const noexcept;
+  /// The surface as triangles, for drawing.
+  std::vector<std::array<Vec3d, 3>> triangles() const;
+
+  // ---- islands: connected pieces of the surface, numbered by falling area
+  std::size_t island_count() const noexcept;
+  /// Island of a polygon; island 0 is the largest.
+  std::size_t island_of(PolyId poly) const noexcept;
+  double island_area(std::size_t island) const noexcept;
+  /// Greatest ground-plane distance of a vertex from the island's centroid of area, metres.
+  double island_radius(std::size_t island) const noexcept;
+
+  // ---- points
+  /// Nearest point of the surface within the extents; none for NaN or infinite input.
+  std::optional<NavPoint> snap_point(const Vec3d& p, const SnapOptions& options = {}) const;
+  /// True where p lies above or below the surface by at most `max_height_delta` metres.
+  bool is_navigable(const Vec3d& p, double max_height_delta = 0.5) const;
+  /// Height of the surface on `poly` at the ground position of p.
+  double height_at(PolyId poly, const Vec3d& p) const noexcept;
+  /// Uniform over the surface by area, from the caller's generator; `island` restricts it.
+  NavPoint random_point(Rng& rng, std::optional<std::size_t> island = {}) const;
+  /// Ground-plane distance from p, snapped, to the nearest edge of the mesh, at most `max_radius`;
+  /// infinity where p cannot be snapped.
+  double distance_to_closest_obstacle(const Vec3d& p, double max_radius = 2.0) const;
+
+  // ---- paths
+  /// A short path between two points, after snapping (Detour's A* over polygons, string-pulled).
+  /// Errors (nothing_navigable) say why there is none: a point off the mesh, different islands, or a
+  /// mesh too large to search.
+  Result<NavPath> find_path(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const;
+  /// Length of find_path, infinity where there is none.
+  double geodesic_distance(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const;
+
+  // ---- walking
+  /// Walks from `start` along the ground-plane part of `displacement`, polygon by polygon, so that no
+  /// step is too long. At an edge of the mesh it slides along it, or stops at the first one. Where
+  /// `start.poly` is not known or does not hold the position, the start is snapped first (within the
+  /// agent's radius plus 0.1 m beside and twice its climb plus 0.1 m up or down); `points` is empty
+  /// where that fails.
+  SurfaceWalk walk(const NavPoint& start, const Vec3d& displacement, bool slide) const;
+
+  struct Impl;
+  explicit NavMesh(std::unique_ptr<Impl> impl) noexcept;
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace gsnav

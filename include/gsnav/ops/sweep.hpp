@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "gsnav/core/view.hpp"
+#include "gsnav/kernels/capsule.hpp"
+
+// One agent against many capsules. The outcome does not depend on the order of the capsules: equal
+// times and equal gaps are decided by (avatar, bone).
+
+namespace gsnav {
+
+namespace detail {
+
+/// The part [u0, u1] of a body's motion, relative to `origin`, in the sweep's scalar.
+template <class S>
+MovingCapsule<S> local_motion(const MovingCapsule<double>& m, double u0, double u1,
+                              const Vec3d& origin) noexcept {
+  const auto local = [&](const Capsule<double>& c) {
+    return Capsule<S>{vec_cast<S>(c.p0 - origin), vec_cast<S>(c.p1 - origin), static_cast<S>(c.radius)};
+  };
+  return {local(lerp(m.begin, m.end, u0)), local(lerp(m.begin, m.end, u1))};
+}
+
+inline bool id_less(std::uint32_t avatar_a, std::uint32_t bone_a, std::uint32_t avatar_b,
+                    std::uint32_t bone_b) noexcept {
+  return avatar_a != avatar_b ? avatar_a < avatar_b : bone_a < bone_b;
+}
+
+}  // namespace detail
+
+/// The first body that an agent's motion runs into.
+template <class S>
+struct FirstImpact {
+  SweepResult<S> sweep{};  ///< relative to the interval swept; meaningful where `hit`
+  bool hit = false;
+  std::uint32_t avatar = 0, bone = 0;  ///< whom, where `hit`
+  bool started_overlapping = false;    ///< some body overlapped the agent at the start
+  bool pushed = false;                 ///< some body came closer from contact by its own motion
+  std::uint32_t pushed_avatar = 0, pushed_bone = 0;  ///< the least id that did
+};
+
+/// Sweeps `agent` over the part [u0, u1] of the bodies' motion and merges the outcome into `best`.
+/// Positions are made relative to the agent's start in double before they become S.
+template <class S = double>
+void first_impact(const MovingCapsule<double>& agent, View<const DynamicCapsule> bodies, double u0,
+                  double u1, const SweepRules<S>& rules, FirstImpact<S>& best) noexcept {
+  const Vec3d origin = agent.begin.p0;
+  const MovingCapsule<S> a = detail::local_motion<S>(agent, 0.0, 1.0, origin);
+  for (const DynamicCapsule& body : bodies) {
+    const SweepResult<S> r = sweep(a, detail::local_motion<S>(body.motion, u0, u1, origin), rules);
+    if (r.start_gap < S(0)) best.started_overlapping = true;
+    if (r.pushed && (!best.pushed || detail::id_less(body.avatar, body.bone, best.pushed_avatar,
+                                                     best.pushed_bone))) {
+      best.pushed = true;
+      best.pushed_avatar = body.avatar;
+      best.pushed_bone = body.bone;
+    }
+    if (!r.hit) continue;
+    bool first = !best.hit || r.time < best.sweep.time;
+    if (!first && !(best.sweep.time < r.time)) {
+      first = r.contact_time < best.sweep.contact_time;
+      if (!first && !(best.sweep.contact_time < r.contact_time)) {
+        first = detail::id_less(body.avatar, body.bone, best.avatar, best.bone);
+      }
+    }
+    if (first) {
+      best.hit = true;
+      best.sweep = r;
+      best.avatar = body.avatar;
+      best.bone = body.bone;
+    }
+  }
+}
+
+/// The body nearest to an agent.
+struct Clearance {
+  double distance = std::numeric_limits<double>::infinity();  ///< metres, negative: depth of overlap
+  std::uint32_t avatar = 0, bone = 0;                         ///< meaningful where distance is finite
+  Vec3d on_agent{}, on_body{};  ///< points of the two surfaces, world
+  Vec3d normal{};               ///< unit, from the body to the agent
+};
+
+/// Signed gap of a standing agent and the nearest body at the part u in [0, 1] of the bodies' motion,
+/// merged into `best`.
+template <class S = double>
+void nearest_body(const Capsule<double>& agent, View<const DynamicCapsule> bodies, double u,
+                  Clearance& best) noexcept {
+  const Vec3d origin = agent.p0;
+  const Capsule<S> a{{}, vec_cast<S>(agent.p1 - origin), static_cast<S>(agent.radius)};
+  for (const DynamicCapsule& body : bodies) {
+    const MovingCapsule<S> b = detail::local_motion<S>(body.motion, u, u, origin);
+    const CapsuleGap<S> g = capsule_gap(a, b.begin);
+    const double gap = static_cast<double>(g.gap);
+    const bool equal = !(gap < best.distance) && !(best.distance < gap);
+    if (gap < best.distance ||
+        (equal && detail::id_less(body.avatar, body.bone, best.avatar, best.bone))) {
+      best = {gap,
+              body.avatar,
+              body.bone,
+              vec_cast<double>(g.on_a) + origin,
+              vec_cast<double>(g.on_b) + origin,
+              vec_cast<double>(g.normal)};
+    }
+  }
+}
+
+}  // namespace gsnav

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/nav/navmesh.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <limits>
+
+#include "navmesh_impl.hpp"
+
+namespace gsnav {
+namespace {
+
+struct Float3 {
+  float v[3];
+  explicit Float3(const Vec3d& p) noexcept
+      : v{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)} {}
+};
+
+std::string text(const Vec3d& p) {
+  char buffer[96];
+  std::snprintf(buffer, sizeof buffer, "(%.6g, %.6g, %.6g)", p.x, p.y, p.z);
+  return buffer;
+}
+
+}  // namespace
+
+NavMesh::Impl::Lease::Lease(const Impl& impl) : impl_(impl) {
+  {
+    const std::lock_guard lock(impl_.mutex_);
+    if (!impl_.idle_.empty()) {
+      query_ = std::move(impl_.idle_.back());
+      impl_.idle_.pop_back();
+      return;
+    }
+  }
+  query_.reset(dtAllocNavMeshQuery());
+  if (query_ != nullptr && dtStatusFailed(query_->init(impl_.mesh.get(), impl_.node_pool))) query_.reset();
+}
+
+NavMesh::Impl::Lease::~Lease() {
+  if (query_ == nullptr) return;
+  const std::lock_guard lock(impl_.mutex_);
+  impl_.idle_.push_back(std::move(query_));
+}
+
+NavMesh::NavMesh(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
+NavMesh::NavMesh(NavMesh&&) noexcept = default;
+NavMesh& NavMesh::operator=(NavMesh&&) noexcept = default;
+NavMesh::~NavMesh() = default;
+
+const NavMeshSettings& NavMesh::settings() const noexcept { return impl_->settings; }
+Aabb<double> NavMesh::bounds() const noexcept { return impl_->bounds; }
+std::size_t NavMesh::polygon_count() const noexcept { return impl_->polys.polys.size(); }
+double NavMesh::navigable_area() const noexcept { return impl_->polys.area_sum.back(); }
+
+std::vector<std::array<Vec3d, 3>> NavMesh::triangles() const {
+  std::vector<std::array<Vec3d, 3>> out = impl_->polys.tris;
+  for (auto& t : out) {
+    for (Vec3d& p : t) p += impl_->origin;
+  }
+  return out;
+}
+
+std::size_t NavMesh::island_count() const noexcept { return impl_->polys.islands.size(); }
+std::size_t NavMesh::island_of(PolyId poly) const noexcept { return impl_->polys.polys[poly].island; }
+double NavMesh::island_area(std::size_t island) const noexcept {
+  return impl_->polys.islands[island].area;
+}
+double NavMesh::island_radius(std::size_t island) const noexcept {
+  return impl_->polys.islands[island].radius;
+}
+
+std::optional<NavPoint> NavMesh::snap_point(const Vec3d& p, const SnapOptions& options) const {
+  if (!is_finite(p) || !is_finite(options.half_extents)) return {};
+  const Impl::Lease query(*impl_);
+  if (!query) return {};
+  const Vec3d local = p - impl_->origin;
+  const Float3 center(local), extents(options.half_extents);
+  const dtQueryFilter filter;
+  dtPolyRef ref = 0;
+  float nearest[3];
+  if (dtStatusFailed(query->findNearestPoly(center.v, extents.v, &filter, &ref, nearest)) || ref == 0) {
+    return {};
+  }
+  // Detour chose the polygon; the point on it is found again in double.
+  const PolyId id = impl_->id_of(ref);
+  Vec3d q = impl_->polys.clamped(id, local);
+  q.y = impl_->polys.height(id, q);
+  return NavPoint{q + impl_->origin, id};
+}
+
+bool NavMesh::is_navigable(const Vec3d& p, double max_height_delta) const {
+  constexpr double kBeside = 1e-3;
+  const auto s = snap_point(p, {{kBeside, max_height_delta + kBeside, kBeside}});
+  if (!s) return false;
+  const double dx = s->position.x - p.x, dz = s->position.z - p.z;
+  return dx * dx + dz * dz <= 1e-8 && std::abs(s->position.y - p.y) <= max_height_delta;
+}
+
+double NavMesh::height_at(PolyId poly, const Vec3d& p) const noexcept {
+  return impl_->polys.height(poly, p - impl_->origin) + impl_->origin.y;
+}
+
+NavPoint NavMesh::random_point(Rng& rng, std::optional<std::size_t> island) const {
+  const detail::PolyMesh& m = impl_->polys;
+  std::size_t first = 0, last = m.by_island.size();
+  if (island && *island < m.islands.size()) {
+    first = m.islands[*island].first;
+    last = first + m.islands[*island].count;
+  }
+  const double low = first == 0 ? 0.0 : m.area_sum[first - 1];
+  const double at = low + rng.uniform() * (m.area_sum[last - 1] - low);
+  const auto it = std::upper_bound(m.area_sum.begin() + static_cast<std::ptrdiff_t>(first),
+                                   m.area_sum.begin() + static_cast<std::ptrdiff_t>(last - 1), at);
+  const PolyId id = m.by_island[static_cast<std::size_t>(it - m.area_sum.begin())];
+  const detail::PolyMesh::Poly& poly = m.polys[id];
+  double rest = rng.uniform() * poly.area;
+  std::uint32_t k = 1;
+  for (; k + 2 < poly.count; ++k) {
+    rest -= 0.5 * norm(cross(m.corner(poly, k) - m.corner(poly, 0), m.corner(poly, k + 1) - m.corner(poly, 0)));
+    if (rest < 0) break;
+  }
+  // Uniform in a triangle: sqrt makes strips of equal area equally likely.
+  const double u = std::sqrt(rng.uniform()), v = rng.uniform();
+  Vec3d p = m.corner(poly, 0) * (1 - u) + m.corner(poly, k) * (u * (1 - v)) + m.corner(poly, k + 1) * (u * v);
+  p.y = m.height(id, p);
+  return {p + impl_->origin, id};
+}
+
+double NavMesh::distance_to_closest_obstacle(const Vec3d& p, double max_radius) const {
+  const double inf = std::numeric_limits<double>::infinity();
+  const auto s = snap_point(p);
+  if (!s) return inf;
+  const Impl::Lease query(*impl_);
+  if (!query) return inf;
+  const Float3 center(s->position - impl_->origin);
+  const dtQueryFilter filter;
+  float distance = 0, at[3], normal[3];
+  if (dtStatusFailed(query->findDistanceToWall(impl_->ref_of(s->poly), center.v,
+                                               static_cast<float>(max_radius), &filter, &distance, at,
+                                               normal))) {
+    return inf;
+  }
+  return static_cast<double>(distance);
+}
+
+Result<NavPath> NavMesh::find_path(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const {
+  const auto a = snap_point(start, options), b = snap_point(goal, options);
+  for (const auto& [name, p, s] : {std::tuple{"start", &start, &a}, std::tuple{"goal", &goal, &b}}) {
+    if (!*s) {
+      return Status(Errc::nothing_navigable, std::string("no path: the ") + name + " " + text(*p) +
+                                                 " is not near the NavMesh");
+    }
+  }
+  const std::size_t ia = island_of(a->poly), ib = island_of(b->poly);
+  if (ia != ib) {
+    return Status(Errc::nothing_navigable, "no path: start is on island " + std::to_string(ia) + ", goal on " +
+                                               std::to_string(ib));
+  }
+  NavPath path;
+  path.points.push_back(a->position);
+  if (a->poly != b->poly) {
+    const Impl::Lease query(*impl_);
+    if (!query) return Status(Errc::out_of_memory, "no path: no memory for a search");
+    const Float3 from(a->position - impl_->origin), to(b->position - impl_->origin);
+    const dtQueryFilter filter;
+    // A path visits a polygon once, and a corner is a vertex between two of them.
+    const int most = static_cast<int>(polygon_count()) + 2;
+    std::vector<dtPolyRef> refs(static_cast<std::size_t>(most));
+    int count = 0;
+    dtStatus status = query->findPath(impl_->ref_of(a->poly), impl_->ref_of(b->poly), from.v, to.v,
+                                      &filter, refs.data(), &count, most);
+    if (dtStatusDetail(status, DT_OUT_OF_NODES)) {
+      return Status(Errc::unsupported, "no path found within " + std::to_string(impl_->node_pool) +
+                                           " search nodes of a mesh of " +
+                                           std::to_string(polygon_count()) + " polygons");
+    }
+    if (dtStatusFailed(status) || dtStatusDetail(status, DT_PARTIAL_RESULT)) {
+      return Status(Errc::nothing_navigable, "no path: the search did not reach the goal");
+    }
+    std::vector<float> corners(3 * static_cast<std::size_t>(count + 2));
+    int corner_count = 0;
+    status = query->findStraightPath(from.v, to.v, refs.data(), count, corners.data(), nullptr, nullptr,
+                                     &corner_count, count + 2, 0);
+    if (dtStatusFailed(status)) return Status(Errc::nothing_navigable, "no path: straightening failed");
+    for (int i = 1; i + 1 < corner_count; ++i) {
+      const float* c = corners.data() + 3 * i;
+      path.points.push_back(Vec3d{static_cast<double>(c[0]), static_cast<double>(c[1]),
+                                  static_cast<double>(c[2])} + impl_->origin);
+    }
+  }
+  path.points.push_back(b->position);
+  for (std::size_t i = 1; i < path.points.size(); ++i) {
+    path.length += norm(path.points[i] - path.points[i - 1]);
+  }
+  return path;
+}
+
+double NavMesh::geodesic_distance(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const {
+  const Result<NavPath> path = find_path(start, goal, options);
+  return path.ok() ? path->length : std::numeric_limits<double>::infinity();
+}
+
+SurfaceWalk NavMesh::walk(const NavPoint& start, const Vec3d& displacement, bool slide) const {
+  SurfaceWalk out;
+  if (!is_finite(start.position) || !is_finite(displacement)) return out;
+  const NavMeshSettings& s = impl_->settings;
+  const double up = 2 * s.agent_max_climb + 0.1, beside = s.agent_radius + 0.1;
+  NavPoint from = start;
+  const Vec3d local = from.position - impl_->origin;
+  const bool known = from.poly < polygon_count() && impl_->polys.holds(from.poly, local, 1e-4) &&
+                     std::abs(impl_->polys.height(from.poly, local) - local.y) <= up;
+  if (!known) {
+    const auto snapped = snap_point(from.position, {{beside, up, beside}});
+    if (!snapped) return out;
+    from = *snapped;
+  }
+  impl_->polys.walk(from.poly, from.position - impl_->origin, displacement.x, displacement.z, slide, out);
+  for (WalkPoint& p : out.points) p.position += impl_->origin;
+  return out;
+}
+
+}  // namespace gsnav

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <DetourNavMeshBuilder.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "navmesh_impl.hpp"
+
+namespace gsnav {
+namespace detail {
+namespace {
+
+constexpr double kEdge = 1e-6;  // what rounding may add to a length that is a multiple of a cell
+
+int cells_up(double length, double cell) noexcept {
+  return static_cast<int>(std::ceil(length / cell - kEdge));
+}
+
+int clamp_cells(double v) noexcept { return static_cast<int>(min(max(v, 0.0), 30000.0)); }
+
+Status stage(const char* what, const RecastLog& log) {
+  return {Errc::out_of_memory,
+          std::string("NavMesh: ") + what + " failed" +
+              (log.last_error().empty() ? std::string() : ": " + log.last_error())};
+}
+
+double walkable_area(const rcHeightfield& f) noexcept {
+  std::size_t spans = 0;
+  for (int i = 0; i < f.width * f.height; ++i) {
+    for (const rcSpan* s = f.spans[i]; s != nullptr; s = s->next) spans += s->area != RC_NULL_AREA ? 1 : 0;
+  }
+  return static_cast<double>(spans) * static_cast<double>(f.cs) * static_cast<double>(f.cs);
+}
+
+double walkable_area(const rcCompactHeightfield& f) noexcept {
+  std::size_t spans = 0;
+  for (int i = 0; i < f.spanCount; ++i) spans += f.areas[i] != RC_NULL_AREA ? 1 : 0;
+  return static_cast<double>(spans) * static_cast<double>(f.cs) * static_cast<double>(f.cs);
+}
+
+Vec3d vec3(const float* p) noexcept {
+  return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
+}
+
+/// The polygons of the only tile, counter-clockwise, with neighbours and height triangles.
+void extract(const dtMeshTile& tile, PolyMesh& out) {
+  const dtMeshHeader& h = *tile.header;
+  for (int i = 0; i < h.polyCount; ++i) {
+    const dtPoly& p = tile.polys[i];
+    PolyMesh::Poly poly;
+    poly.first = static_cast<std::uint32_t>(out.corners.size());
+    poly.count = p.vertCount;
+    poly.tri_first = static_cast<std::uint32_t>(out.tris.size());
+    Vec3d v[DT_VERTS_PER_POLYGON];
+    PolyId n[DT_VERTS_PER_POLYGON];
+    double twice = 0;
+    const std::size_t count = p.vertCount;
+    for (std::size_t k = 0; k < count; ++k) {
+      v[k] = vec3(&tile.verts[3 * p.verts[k]]);
+      n[k] = p.neis[k] == 0 || (p.neis[k] & DT_EXT_LINK) != 0 ? kNoPoly : p.neis[k] - 1u;
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      const Vec3d &a = v[k], &b = v[(k + 1) % count];
+      twice += a.x * b.z - b.x * a.z;
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      // Reversed, edge k runs from corner count-1-k to the one before it.
+      out.corners.push_back(twice >= 0 ? v[k] : v[count - 1 - k]);
+      out.neighbours.push_back(twice >= 0 ? n[k] : n[(2 * count - 2 - k) % count]);
+    }
+    const dtPolyDetail& d = tile.detailMeshes[i];
+    for (unsigned t = 0; t < d.triCount; ++t) {
+      const unsigned char* ids = &tile.detailTris[4 * (d.triBase + t)];
+      std::array<Vec3d, 3> tri;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const unsigned id = ids[k];
+        tri[k] = id < p.vertCount ? vec3(&tile.verts[3 * p.verts[id]])
+                                  : vec3(&tile.detailVerts[3 * (d.vertBase + id - p.vertCount)]);
+      }
+      out.tris.push_back(tri);
+    }
+    poly.tri_count = static_cast<std::uint32_t>(out.tris.size()) - poly.tri_first;
+    out.polys.push_back(poly);
+  }
+  out.finish();
+}
+
+}  // namespace
+
+VoxelSettings::VoxelSettings(const NavMeshSettings& s) noexcept
+    : height(max(3, clamp_cells(std::ceil(s.agent_height / s.cell_height - kEdge)))),
+      climb(clamp_cells(std::floor(s.agent_max_climb / s.cell_height + kEdge))),
+      radius(clamp_cells(std::ceil(s.agent_radius / s.cell_size - kEdge))) {}
+
+Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshSettings& settings,
+                                                  const Vec3d& low, const Vec3d& high) {
+  const double cs = settings.cell_size, ch = settings.cell_height;
+  const double columns = (high.x - low.x) / cs, rows = (high.z - low.z) / cs;
+  const double levels = (high.y - low.y) / ch;
+  // Recast keeps vertices in 16 bits and spans in RC_SPAN_HEIGHT_BITS.
+  const auto size = [&] {
+    return std::to_string(columns) + " x " + std::to_string(rows) + " cells of " + std::to_string(cs) +
+           " m, " + std::to_string(levels) + " levels of " + std::to_string(ch) + " m";
+  };
+  if (!(columns < 65000 && rows < 65000 &&
+        (columns + 1) * (rows + 1) <= static_cast<double>(settings.max_cells))) {
+    return Status(Errc::invalid_argument,
+                  "NavMesh: a grid of " + size() + " exceeds 65000 a side or NavMeshSettings.max_cells = " +
+                      std::to_string(settings.max_cells) + "; raise cell_size or crop the scene");
+  }
+  if (!(levels < static_cast<double>(RC_SPAN_MAX_HEIGHT))) {
+    return Status(Errc::invalid_argument, "NavMesh: a grid of " + size() + " exceeds " +
+                                              std::to_string(RC_SPAN_MAX_HEIGHT) +
+                                              " levels; raise cell_height");
+  }
+  RecastPtr<rcHeightfield> field(rcAllocHeightfield());
+  const float bmin[3] = {static_cast<float>(low.x), static_cast<float>(low.y), static_cast<float>(low.z)};
+  const int w = max(1, cells_up(high.x - low.x, cs)), h = max(1, cells_up(high.z - low.z, cs));
+  const float bmax[3] = {static_cast<float>(low.x + w * cs), static_cast<float>(high.y),
+                         static_cast<float>(low.z + h * cs)};
+  if (field == nullptr || !rcCreateHeightfield(&log, *field, w, h, bmin, bmax, static_cast<float>(cs),
+                                               static_cast<float>(ch))) {
+    return stage("allocating the heightfield", log);
+  }
+  return field;
+}
+
+Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& s, rcHeightfield& field,
+                               const Vec3d& origin) {
+  const VoxelSettings voxels(s);
+  const double rasterised = walkable_area(field);
+  if (s.filter_low_hanging_obstacles) rcFilterLowHangingWalkableObstacles(&log, voxels.climb, field);
+  if (s.filter_ledge_spans) rcFilterLedgeSpans(&log, voxels.height, voxels.climb, field);
+  if (s.filter_walkable_low_height_spans) rcFilterWalkableLowHeightSpans(&log, voxels.height, field);
+  const double clear = walkable_area(field);
+
+  RecastPtr<rcCompactHeightfield> compact(rcAllocCompactHeightfield());
+  if (!rcBuildCompactHeightfield(&log, voxels.height, voxels.climb, field, *compact)) {
+    return stage("compacting the heightfield", log);
+  }
+  if (voxels.radius > 0 && !rcErodeWalkableArea(&log, voxels.radius, *compact)) {
+    return stage("eroding by the agent's radius", log);
+  }
+  const double eroded = walkable_area(*compact);
+  const auto nothing = [&](const char* why) {
+    return Status(Errc::nothing_navigable,
+                  std::string("NavMesh: ") + why + "; area that faces up " + std::to_string(rasterised) +
+                      " m2, with clearance for agent_height " + std::to_string(s.agent_height) + " m " +
+                      std::to_string(clear) + " m2, after agent_radius " +
+                      std::to_string(s.agent_radius) + " m " + std::to_string(eroded) + " m2");
+  };
+  if (!(eroded > 0)) return nothing("no walkable cell is left");
+
+  const auto squared = [](double v) { return static_cast<int>(min(v * v, 2e9)); };
+  if (!rcBuildDistanceField(&log, *compact) ||
+      !rcBuildRegions(&log, *compact, 0, squared(s.region_min_size), squared(s.region_merge_size))) {
+    return stage("building regions", log);
+  }
+  RecastPtr<rcContourSet> contours(rcAllocContourSet());
+  if (!rcBuildContours(&log, *compact, static_cast<float>(s.edge_max_error),
+                       static_cast<int>(s.edge_max_len / s.cell_size), *contours)) {
+    return stage("tracing contours", log);
+  }
+  RecastPtr<rcPolyMesh> poly(rcAllocPolyMesh());
+  if (!rcBuildPolyMesh(&log, *contours, s.verts_per_poly, *poly)) return stage("building polygons", log);
+  if (poly->npolys == 0) return nothing("every region is smaller than region_min_size");
+  RecastPtr<rcPolyMeshDetail> detail_mesh(rcAllocPolyMeshDetail());
+  const double sample = s.detail_sample_dist < 0.9 ? 0.0 : s.detail_sample_dist * s.cell_size;
+  if (!rcBuildPolyMeshDetail(&log, *poly, *compact, static_cast<float>(sample),
+                             static_cast<float>(s.cell_height * s.detail_sample_max_error),
+                             *detail_mesh)) {
+    return stage("sampling heights", log);
+  }
+  for (int i = 0; i < poly->npolys; ++i) poly->flags[i] = 1;
+
+  dtNavMeshCreateParams params{};
+  params.verts = poly->verts;
+  params.vertCount = poly->nverts;
+  params.polys = poly->polys;
+  params.polyAreas = poly->areas;
+  params.polyFlags = poly->flags;
+  params.polyCount = poly->npolys;
+  params.nvp = poly->nvp;
+  params.detailMeshes = detail_mesh->meshes;
+  params.detailVerts = detail_mesh->verts;
+  params.detailVertsCount = detail_mesh->nverts;
+  params.detailTris = detail_mesh->tris;
+  params.detailTriCount = detail_mesh->ntris;
+  params.walkableHeight = static_cast<float>(s.agent_height);
+  params.walkableRadius = static_cast<float>(s.agent_radius);
+  params.walkableClimb = static_cast<float>(s.agent_max_climb);
+  for (int k = 0; k < 3; ++k) {
+    params.bmin[k] = poly->bmin[k];
+    params.bmax[k] = poly->bmax[k];
+  }
+  params.cs = field.cs;
+  params.ch = field.ch;
+  params.buildBvTree = true;
+  unsigned char* data = nullptr;
+  int size = 0;
+  if (!dtCreateNavMeshData(&params, &data, &size)) {
+    return Status(Errc::unsupported, "NavMesh: Detour refused the mesh of " +
+                                         std::to_string(poly->npolys) + " polygons and " +
+                                         std::to_string(poly->nverts) + " vertices");
+  }
+  auto impl = std::make_unique<NavMesh::Impl>();
+  impl->mesh.reset(dtAllocNavMesh());
+  if (impl->mesh == nullptr || dtStatusFailed(impl->mesh->init(data, size, DT_TILE_FREE_DATA))) {
+    dtFree(data);
+    return stage("initialising Detour", log);
+  }
+  impl->settings = s;
+  impl->origin = origin;
+  const dtNavMesh& mesh = *impl->mesh;
+  const dtMeshTile& tile = *mesh.getTile(0);
+  impl->ref_base = mesh.getPolyRefBase(&tile);
+  extract(tile, impl->polys);
+  for (const auto& t : impl->polys.tris) {
+    for (const Vec3d& p : t) impl->bounds.add(p + origin);
+  }
+  // One search node a polygon is all that A* can open; Detour numbers them in 16 bits.
+  impl->node_pool = min(65535, 2 * static_cast<int>(impl->polys.polys.size()) + 64);
+  return NavMesh(std::move(impl));
+}
+
+}  // namespace detail
+
+Result<NavMesh> NavMesh::build(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
+                               std::span<const Triangle> triangles) {
+  if (Status s = settings.validate(); !s.ok()) return s;
+  if (vertices.empty() || triangles.empty()) {
+    return Status(Errc::nothing_navigable, "NavMesh: there are no triangles to build from");
+  }
+  Aabb<double> box;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (!is_finite(vertices[i])) {
+      return Status(Errc::invalid_argument, "NavMesh: vertex " + std::to_string(i) + " is not finite");
+    }
+    box.add(vertices[i]);
+  }
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    for (const std::uint32_t v : triangles[i]) {
+      if (v >= vertices.size()) {
+        return Status(Errc::invalid_argument, "NavMesh: triangle " + std::to_string(i) + " names vertex " +
+                                                  std::to_string(v) + " of " +
+                                                  std::to_string(vertices.size()));
+      }
+    }
+  }
+  // Recast computes in float: its zero goes near the mesh, on whole metres.
+  const Vec3d middle = (box.low + box.high) * 0.5;
+  const Vec3d origin{std::floor(middle.x), std::floor(middle.y), std::floor(middle.z)};
+  detail::RecastLog log;
+  auto field = detail::make_heightfield(log, settings, box.low - origin, box.high - origin);
+  if (!field.ok()) return field.status();
+  const int climb = detail::VoxelSettings(settings).climb;
+  const double cos_slope = std::cos(settings.agent_max_slope * 3.14159265358979323846 / 180.0);
+  for (const Triangle& t : triangles) {
+    float v[9];
+    Vec3d p[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      p[k] = vertices[t[k]] - origin;
+      for (int c = 0; c < 3; ++c) v[3 * k + static_cast<std::size_t>(c)] = static_cast<float>(p[k][c]);
+    }
+    const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
+    const unsigned char area = n.y > cos_slope * norm(n) ? RC_WALKABLE_AREA : RC_NULL_AREA;
+    if (!rcRasterizeTriangle(&log, v, v + 3, v + 6, area, **field, climb)) {
+      return detail::stage("rasterising triangles", log);
+    }
+  }
+  return detail::finish_navmesh(log, settings, **field, origin);
+}
+
+}  // namespace gsnav

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <DetourNavMesh.h>
+#include <DetourNavMeshQuery.h>
+#include <Recast.h>
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "gsnav/nav/navmesh.hpp"
+#include "poly_mesh.hpp"
+
+namespace gsnav {
+
+namespace detail {
+
+struct DetourDeleter {
+  void operator()(dtNavMesh* p) const noexcept { dtFreeNavMesh(p); }
+  void operator()(dtNavMeshQuery* p) const noexcept { dtFreeNavMeshQuery(p); }
+};
+using NavMeshPtr = std::unique_ptr<dtNavMesh, DetourDeleter>;
+using QueryPtr = std::unique_ptr<dtNavMeshQuery, DetourDeleter>;
+
+struct RecastDeleter {
+  void operator()(rcHeightfield* p) const noexcept { rcFreeHeightField(p); }
+  void operator()(rcCompactHeightfield* p) const noexcept { rcFreeCompactHeightfield(p); }
+  void operator()(rcContourSet* p) const noexcept { rcFreeContourSet(p); }
+  void operator()(rcPolyMesh* p) const noexcept { rcFreePolyMesh(p); }
+  void operator()(rcPolyMeshDetail* p) const noexcept { rcFreePolyMeshDetail(p); }
+};
+template <class T>
+using RecastPtr = std::unique_ptr<T, RecastDeleter>;
+
+/// Keeps Recast's last error line.
+class RecastLog : public rcContext {
+ public:
+  RecastLog() : rcContext(true) {}
+  const std::string& last_error() const noexcept { return error_; }
+
+ protected:
+  void doLog(rcLogCategory category, const char* message, int length) override {
+    if (category == RC_LOG_ERROR) error_.assign(message, static_cast<std::size_t>(length));
+  }
+
+ private:
+  std::string error_;
+};
+
+/// An empty heightfield over a box (relative to the mesh's origin). Errors: the grid exceeds
+/// `settings.max_cells` or the height what Recast can number.
+Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshSettings& settings,
+                                                  const Vec3d& low, const Vec3d& high);
+
+/// Everything after voxelisation: filters, erosion, regions, contours, polygons, Detour. `origin` is
+/// where the heightfield's frame lies in the world. nothing_navigable, naming the areas left at each
+/// stage, where no polygon comes out.
+Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& settings, rcHeightfield& field,
+                               const Vec3d& origin);
+
+/// Settings in voxels, rounded as NavMeshSettings says.
+struct VoxelSettings {
+  int height = 0, climb = 0, radius = 0;
+  explicit VoxelSettings(const NavMeshSettings& s) noexcept;
+};
+
+}  // namespace detail
+
+struct NavMesh::Impl {
+  NavMeshSettings settings;
+  Vec3d origin{};  ///< world position of the mesh's own zero
+  detail::NavMeshPtr mesh;
+  detail::PolyMesh polys;
+  Aabb<double> bounds;  ///< world
+  dtPolyRef ref_base = 0;
+  int node_pool = 0;
+
+  /// A query object for as long as a call lasts: Detour's searches write to it.
+  class Lease {
+   public:
+    explicit Lease(const Impl& impl);
+    ~Lease();
+    Lease(const Lease&) = delete;
+    Lease& operator=(const Lease&) = delete;
+    dtNavMeshQuery* operator->() const noexcept { return query_.get(); }
+    explicit operator bool() const noexcept { return query_ != nullptr; }
+
+   private:
+    const Impl& impl_;
+    detail::QueryPtr query_;
+  };
+
+  dtPolyRef ref_of(PolyId id) const noexcept { return ref_base | static_cast<dtPolyRef>(id); }
+  PolyId id_of(dtPolyRef ref) const noexcept { return static_cast<PolyId>(ref ^ ref_base); }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::vector<detail::QueryPtr> idle_;
+};
+
+}  // namespace gsnav

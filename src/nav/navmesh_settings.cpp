@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/nav/navmesh_settings.hpp"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace gsnav {
+
+Status NavMeshSettings::validate() const {
+  constexpr double kHuge = 1e6;
+  struct Field {
+    const char* name;
+    double value, low, high;
+  };
+  constexpr double kTiny = 1e-4;
+  const Field fields[] = {
+      {"cell_size", cell_size, kTiny, kHuge},
+      {"cell_height", cell_height, kTiny, kHuge},
+      {"agent_height", agent_height, kTiny, kHuge},
+      {"agent_radius", agent_radius, 0.0, kHuge},
+      {"agent_max_climb", agent_max_climb, 0.0, kHuge},
+      {"agent_max_slope", agent_max_slope, 0.0, 90.0},
+      {"region_min_size", region_min_size, 0.0, kHuge},
+      {"region_merge_size", region_merge_size, 0.0, kHuge},
+      {"edge_max_len", edge_max_len, 0.0, kHuge},
+      {"edge_max_error", edge_max_error, 0.0, kHuge},
+      {"verts_per_poly", static_cast<double>(verts_per_poly), 3.0, 6.0},
+      {"detail_sample_dist", detail_sample_dist, 0.0, kHuge},
+      {"detail_sample_max_error", detail_sample_max_error, 0.0, kHuge},
+  };
+  for (const Field& f : fields) {
+    if (!(f.value >= f.low && f.value <= f.high)) {  // false for NaN
+      return {Errc::invalid_argument, std::string("NavMeshSettings.") + f.name + " = " +
+                                          std::to_string(f.value) + " is not in [" +
+                                          std::to_string(f.low) + ", " + std::to_string(f.high) + "]"};
+    }
+  }
+  if (max_cells == 0) return {Errc::invalid_argument, "NavMeshSettings.max_cells is 0"};
+  return {};
+}
+
+}  // namespace gsnav

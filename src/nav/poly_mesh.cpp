@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "poly_mesh.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+namespace gsnav::detail {
+namespace {
+
+double cross_xz(const Vec3d& a, const Vec3d& b, const Vec3d& c) noexcept {
+  return (b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z);
+}
+
+Vec3d nearest_on_edge_xz(const Vec3d& a, const Vec3d& b, const Vec3d& q) noexcept {
+  const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
+  const double s =
+      len2 > 0 ? clamp(((q.x - a.x) * ex + (q.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
+  return {a.x + s * ex, a.y + s * (b.y - a.y), a.z + s * ez};
+}
+
+double distance2_xz(const Vec3d& a, const Vec3d& b) noexcept {
+  return (a.x - b.x) * (a.x - b.x) + (a.z - b.z) * (a.z - b.z);
+}
+
+std::uint32_t find_root(std::vector<std::uint32_t>& parent, std::uint32_t i) noexcept {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+}  // namespace
+
+bool PolyMesh::holds(PolyId id, const Vec3d& q, double margin) const noexcept {
+  const Vec3d c = clamped(id, q);
+  return distance2_xz(c, q) <= margin * margin;
+}
+
+Vec3d PolyMesh::clamped(PolyId id, const Vec3d& q) const noexcept {
+  const Poly& p = polys[id];
+  bool inside = true;
+  double best = std::numeric_limits<double>::max();
+  Vec3d nearest = q;
+  for (std::uint32_t k = 0; k < p.count; ++k) {
+    const Vec3d &a = corner(p, k), &b = corner(p, k + 1);
+    if (cross_xz(a, b, q) < 0) inside = false;
+    const Vec3d n = nearest_on_edge_xz(a, b, q);
+    const double d2 = distance2_xz(n, q);
+    if (d2 < best) {
+      best = d2;
+      nearest = {n.x, q.y, n.z};
+    }
+  }
+  return inside ? q : nearest;
+}
+
+double PolyMesh::height(PolyId id, const Vec3d& q) const noexcept {
+  const Poly& p = polys[id];
+  // The triangle that q is in, or is least outside of: points on edges always find one.
+  double best = -std::numeric_limits<double>::max(), y = p.count != 0 ? corner(p, 0).y : q.y;
+  for (std::uint32_t i = p.tri_first; i < p.tri_first + p.tri_count; ++i) {
+    const auto& t = tris[i];
+    const double area = cross_xz(t[0], t[1], t[2]);
+    if (!(std::abs(area) > 1e-12)) continue;
+    const double u = cross_xz(t[1], t[2], q) / area, v = cross_xz(t[2], t[0], q) / area;
+    const double w = 1.0 - u - v, least = min(u, min(v, w));
+    if (least <= best) continue;
+    best = least;
+    const double cu = max(u, 0.0), cv = max(v, 0.0), cw = max(w, 0.0), sum = cu + cv + cw;
+    y = (cu * t[0].y + cv * t[1].y + cw * t[2].y) / sum;
+    if (least >= 0) break;
+  }
+  return y;
+}
+
+void PolyMesh::finish() {
+  std::vector<std::uint32_t> parent(polys.size());
+  std::iota(parent.begin(), parent.end(), 0u);
+  for (std::uint32_t i = 0; i < polys.size(); ++i) {
+    Poly& p = polys[i];
+    p.area = 0;
+    for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
+      p.area += 0.5 * norm(cross(corner(p, k) - corner(p, 0), corner(p, k + 1) - corner(p, 0)));
+    }
+    for (std::uint32_t k = 0; k < p.count; ++k) {
+      const PolyId n = neighbours[p.first + k];
+      if (n == kNoPoly) continue;
+      const std::uint32_t a = find_root(parent, i), b = find_root(parent, n);
+      parent[max(a, b)] = min(a, b);
+    }
+  }
+  // Number islands by falling area; equal areas by their least polygon.
+  std::vector<std::uint32_t> roots;
+  std::vector<double> root_area(polys.size(), 0.0);
+  for (std::uint32_t i = 0; i < polys.size(); ++i) {
+    const std::uint32_t r = find_root(parent, i);
+    if (r == i) roots.push_back(i);
+    root_area[r] += polys[i].area;
+  }
+  std::stable_sort(roots.begin(), roots.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return root_area[a] > root_area[b]; });
+  std::vector<std::uint32_t> island_of_root(polys.size(), 0);
+  islands.assign(roots.size(), {});
+  for (std::uint32_t k = 0; k < roots.size(); ++k) {
+    island_of_root[roots[k]] = k;
+    islands[k].area = root_area[roots[k]];
+  }
+  for (std::uint32_t i = 0; i < polys.size(); ++i) {
+    polys[i].island = island_of_root[find_root(parent, i)];
+  }
+  by_island.resize(polys.size());
+  std::iota(by_island.begin(), by_island.end(), 0u);
+  std::stable_sort(by_island.begin(), by_island.end(),
+                   [&](PolyId a, PolyId b) { return polys[a].island < polys[b].island; });
+  area_sum.resize(polys.size());
+  double sum = 0;
+  for (std::uint32_t i = 0; i < by_island.size(); ++i) {
+    Island& island = islands[polys[by_island[i]].island];
+    if (island.count++ == 0) island.first = i;
+    sum += polys[by_island[i]].area;
+    area_sum[i] = sum;
+  }
+  for (Island& island : islands) {
+    Vec3d centroid{};
+    double weight = 0;
+    for (std::uint32_t i = island.first; i < island.first + island.count; ++i) {
+      const Poly& p = polys[by_island[i]];
+      for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
+        const Vec3d &a = corner(p, 0), &b = corner(p, k), &c = corner(p, k + 1);
+        const double area = norm(cross(b - a, c - a));
+        centroid += (a + b + c) * (area / 3.0);
+        weight += area;
+      }
+    }
+    if (weight > 0) centroid = centroid * (1.0 / weight);
+    double r2 = 0;
+    for (std::uint32_t i = island.first; i < island.first + island.count; ++i) {
+      const Poly& p = polys[by_island[i]];
+      for (std::uint32_t k = 0; k < p.count; ++k) r2 = max(r2, distance2_xz(corner(p, k), centroid));
+    }
+    island.radius = std::sqrt(r2);
+  }
+}
+
+}  // namespace gsnav::detail

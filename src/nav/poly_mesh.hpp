@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "gsnav/nav/navmesh.hpp"
+
+namespace gsnav::detail {
+
+/// The convex polygons of a NavMesh in double, relative to the mesh's origin, counter-clockwise in
+/// (x, z), with the neighbour across each edge. Walking, heights, islands and sampling need no Detour.
+struct PolyMesh {
+  struct Poly {
+    std::uint32_t first = 0, count = 0;          ///< edges and corners
+    std::uint32_t tri_first = 0, tri_count = 0;  ///< height triangles
+    std::uint32_t island = 0;
+    double area = 0.0;
+  };
+  struct Island {
+    std::uint32_t first = 0, count = 0;  ///< in `by_island`
+    double area = 0.0, radius = 0.0;
+  };
+
+  std::vector<Poly> polys;
+  std::vector<Vec3d> corners;               ///< edge k of a polygon runs from corner k to the next
+  std::vector<PolyId> neighbours;           ///< across each edge; kNoPoly at a wall
+  std::vector<std::array<Vec3d, 3>> tris;   ///< height triangles, by polygon
+  std::vector<Island> islands;              ///< by falling area
+  std::vector<PolyId> by_island;            ///< polygons, island after island
+  std::vector<double> area_sum;             ///< running sum of area over `by_island`
+
+  /// Fills everything that follows from polys, corners, neighbours and tris.
+  void finish();
+
+  const Vec3d& corner(const Poly& p, std::uint32_t k) const noexcept {
+    return corners[p.first + (k < p.count ? k : k - p.count)];
+  }
+  /// True where (x, z) of q is inside or within `margin` metres of an edge.
+  bool holds(PolyId id, const Vec3d& q, double margin) const noexcept;
+  /// q moved on the ground plane to the nearest point of the polygon (unchanged inside).
+  Vec3d clamped(PolyId id, const Vec3d& q) const noexcept;
+  /// Height of the surface at (x, z) of q.
+  double height(PolyId id, const Vec3d& q) const noexcept;
+  /// See NavMesh::walk; positions relative to the mesh's origin.
+  void walk(PolyId start_poly, const Vec3d& start, double dx, double dz, bool slide,
+            SurfaceWalk& out) const;
+};
+
+}  // namespace gsnav::detail

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <limits>
+
+#include "poly_mesh.hpp"
+
+// A straight walk crosses convex polygons one after the other; only at a corner or a wall, where it makes
+// no progress, are all polygons around the point looked at. Which of them the direction enters, or along
+// which wall it slides farthest, is then decided without regard to the polygon it came from.
+
+namespace gsnav::detail {
+namespace {
+
+constexpr double kTouch = 1e-9;      // metres: closer than this is at it
+constexpr double kParallel = 1e-12;  // sine of an angle
+constexpr std::size_t kMaxFan = 64;  // polygons around one point
+constexpr int kDepth = 9;            // of halving a leg that is not straight in height
+
+struct Exit {
+  double t = std::numeric_limits<double>::max();  // in units of the direction given
+  std::uint32_t edge = 0;
+  bool found = false;
+};
+
+struct Direction {
+  double x = 0, z = 0;
+  double length() const noexcept { return std::sqrt(x * x + z * z); }
+};
+
+Exit exit_of(const PolyMesh& m, PolyId id, const Vec3d& p, const Direction& d) noexcept {
+  const PolyMesh::Poly& poly = m.polys[id];
+  const double dl = d.length();
+  Exit best;
+  for (std::uint32_t k = 0; k < poly.count; ++k) {
+    const Vec3d &a = m.corner(poly, k), &b = m.corner(poly, k + 1);
+    const double nx = b.z - a.z, nz = a.x - b.x;  // outward: corners run counter-clockwise
+    const double rate = d.x * nx + d.z * nz, nl = std::sqrt(nx * nx + nz * nz);
+    if (!(rate > kParallel * dl * nl)) continue;
+    const double t = max(((a.x - p.x) * nx + (a.z - p.z) * nz) / rate, 0.0);
+    if (t < best.t) best = {t, k, true};
+  }
+  return best;
+}
+
+bool touches(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
+  const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
+  const double s = len2 > 0 ? clamp(((p.x - a.x) * ex + (p.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
+  const double x = a.x + s * ex - p.x, z = a.z + s * ez - p.z;
+  return x * x + z * z <= kTouch * kTouch;
+}
+
+struct Fan {
+  PolyId polys[kMaxFan];
+  std::size_t count = 0;
+};
+
+/// All polygons that meet at p, reached across edges that touch it.
+Fan fan_at(const PolyMesh& m, PolyId start, const Vec3d& p) noexcept {
+  Fan fan;
+  fan.polys[fan.count++] = start;
+  for (std::size_t i = 0; i < fan.count; ++i) {
+    const PolyMesh::Poly& poly = m.polys[fan.polys[i]];
+    for (std::uint32_t k = 0; k < poly.count; ++k) {
+      const PolyId n = m.neighbours[poly.first + k];
+      if (n == kNoPoly || fan.count == kMaxFan) continue;
+      if (std::find(fan.polys, fan.polys + fan.count, n) != fan.polys + fan.count) continue;
+      if (touches(m.corner(poly, k), m.corner(poly, k + 1), p)) fan.polys[fan.count++] = n;
+    }
+  }
+  return fan;
+}
+
+/// The way on from p: the polygon that is entered, the direction and where that leaves the polygon.
+struct Way {
+  PolyId poly = kNoPoly;
+  Direction d{};
+  Exit exit{};
+};
+
+bool progresses(const Exit& e, const Direction& d) noexcept {
+  return !e.found || e.t * d.length() > kTouch;
+}
+
+Way enter(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Direction& d) noexcept {
+  Way best;
+  for (std::size_t i = 0; i < fan.count; ++i) {
+    const Exit e = exit_of(m, fan.polys[i], p, d);
+    if (progresses(e, d) && (best.poly == kNoPoly || e.t > best.exit.t)) best = {fan.polys[i], d, e};
+  }
+  return best;
+}
+
+/// The fastest way along a wall that stops d at p; `normal` is set to the wall's.
+Way slide_along_wall(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Direction& d, bool slide,
+                     Vec3d& normal) noexcept {
+  Way best;
+  double best_speed = -1;
+  for (std::size_t i = 0; i < fan.count; ++i) {
+    const PolyMesh::Poly& poly = m.polys[fan.polys[i]];
+    for (std::uint32_t k = 0; k < poly.count; ++k) {
+      if (m.neighbours[poly.first + k] != kNoPoly) continue;
+      const Vec3d &a = m.corner(poly, k), &b = m.corner(poly, k + 1);
+      const double ex = b.x - a.x, ez = b.z - a.z, el = std::sqrt(ex * ex + ez * ez);
+      if (!(el > 0) || !touches(a, b, p) || !(d.x * ez - d.z * ex > 0)) continue;
+      const double along = (d.x * ex + d.z * ez) / el;
+      const Vec3d n{-ez / el, 0, ex / el};
+      if (best_speed < 0) {
+        best_speed = 0;
+        normal = n;
+      }
+      if (!slide || !(std::abs(along) > max(best_speed, kParallel * d.length()))) continue;
+      const Way w = enter(m, fan, p, {along * ex / el, along * ez / el});
+      if (w.poly == kNoPoly) continue;
+      best = w;
+      best_speed = std::abs(along);
+      normal = n;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz, bool slide,
+                    SurfaceWalk& out) const {
+  out = {};
+  Vec3d p = clamped(start_poly, start);
+  PolyId poly = start_poly;
+  p.y = height(poly, p);
+  out.points.push_back({p, poly, 0.0});
+  const Direction wanted{dx, dz};
+  const double wanted_length = wanted.length();
+  if (!(wanted_length > 0)) return;
+
+  // Heights between two points of a polygon may leave the straight line: halve until they do not.
+  const auto arrive = [&](const Vec3d& to, PolyId on, double from_fraction, double to_fraction) {
+    const auto refine = [&](auto&& self, const Vec3d& a, const Vec3d& b, double fa, double fb,
+                            int depth) -> void {
+      if (depth > 0 && norm(b - a) > 0.2) {
+        Vec3d mid = (a + b) * 0.5;
+        const double straight = mid.y, fm = 0.5 * (fa + fb);
+        mid.y = height(on, mid);
+        if (depth > kDepth - 2 || std::abs(mid.y - straight) > 0.01) {
+          self(self, a, mid, fa, fm, depth - 1);
+          self(self, mid, b, fm, fb, depth - 1);
+          return;
+        }
+      }
+      out.length += norm(b - a);
+      out.points.push_back({b, on, fb});
+    };
+    const bool curved = polys[on].tri_count + 2 > polys[on].count;
+    if (norm(to - p) > 0) refine(refine, p, to, from_fraction, to_fraction, curved ? kDepth : 0);
+    p = to;
+  };
+
+  double left = 1.0;
+  const std::size_t cap = 64 + 16 * polys.size();
+  for (std::size_t hops = 0; left > 0; ++hops) {
+    if (hops == cap) break;
+    Way way{poly, wanted, exit_of(*this, poly, p, wanted)};
+    if (!progresses(way.exit, wanted)) {
+      const Fan fan = fan_at(*this, poly, p);
+      way = enter(*this, fan, p, wanted);
+      if (way.poly == kNoPoly) {
+        out.hit_wall = true;
+        way = slide_along_wall(*this, fan, p, wanted, slide, out.wall_normal);
+        if (way.poly == kNoPoly) break;
+      }
+    }
+    poly = way.poly;
+    const bool ends_here = way.exit.t >= left;
+    const double t = ends_here ? left : way.exit.t;
+    Vec3d to{p.x + t * way.d.x, p.y, p.z + t * way.d.z};
+    to.y = height(poly, to);
+    arrive(to, poly, 1.0 - left, ends_here ? 1.0 : 1.0 - (left - t));
+    if (ends_here) break;
+    left -= t;
+    const PolyId next = neighbours[polys[poly].first + way.exit.edge];
+    if (next != kNoPoly) {
+      poly = next;
+      out.points.back().poly = poly;
+    }
+  }
+}
+
+}  // namespace gsnav::detail
