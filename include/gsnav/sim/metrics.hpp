@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <span>
+
+#include "gsnav/math/functions.hpp"
+
+namespace gsnav {
+
+// Symbols: l  shortest path from start to goal along the surface, metres
+//          p  length of the path that the agent took, metres
+//          g  what is left to the goal at the end along the surface (DTG), metres
+
+/// S = 1 where stop was called and g < threshold (strictly), else 0.
+inline bool episode_success(bool stop_called, double g, double threshold) noexcept {
+  return stop_called && g < threshold;
+}
+
+namespace detail {
+/// l / max(l, p); with l = 0: 1 for an agent that stayed, else 0. An unreachable goal gives 0.
+inline double path_efficiency(double l, double p) noexcept {
+  if (!is_finite(l) || !(l >= 0)) return 0.0;
+  if (l == 0) return p == 0 ? 1.0 : 0.0;
+  return l / max(l, p);
+}
+}  // namespace detail
+
+/// SPL = S l / max(l, p). With l = 0: S where p = 0, else 0.
+inline double success_weighted_by_path_length(bool success, double l, double p) noexcept {
+  return success ? detail::path_efficiency(l, p) : 0.0;
+}
+
+/// SoftSPL = max(0, 1 - g / l) l / max(l, p). With l = 0 the progress term is 1 where g = 0, else 0.
+inline double soft_success_weighted_by_path_length(double g, double l, double p) noexcept {
+  const double progress = l > 0 ? max(0.0, 1.0 - g / l) : (g == 0 ? 1.0 : 0.0);
+  const double soft = progress * detail::path_efficiency(l, p);
+  return is_finite(soft) ? soft : 0.0;
+}
+
+/// Within this distance of a person the agent intrudes, metres.
+inline constexpr double kPersonalSpace = 1.0;
+
+/// clamp(1 - d / 1 m, 0, 1): how far the agent is inside a person's space. d: metres from the agent's
+/// surface to the avatar's nearest capsule surface; negative in overlap, infinity with nobody there.
+inline double intrusion(double d) noexcept {
+  return d < kPersonalSpace ? clamp(1.0 - d / kPersonalSpace, 0.0, 1.0) : 0.0;
+}
+
+/// What one action did, for the metrics. `stop` is no step.
+struct StepRecord {
+  double moved = 0.0;          ///< metres from the position before to the one after, straight
+  bool wall_collision = false; ///< an edge of the NavMesh stopped or turned the move
+  bool capsule_blocked = false;  ///< an avatar stopped or turned the move
+  bool avatar_contact = false;   ///< touched during the step, whoever's fault
+  /// Smallest distance during the step to each avatar that is active, metres; empty with none.
+  std::span<const double> avatar_distances{};
+};
+
+/// The outcome of one episode.
+struct EpisodeMetrics {
+  bool success = false;
+  double spl = 0.0;
+  double soft_spl = 0.0;
+  double distance_to_goal = 0.0;            ///< geodesic, metres; infinity where cut off
+  double euclidean_distance_to_goal = 0.0;  ///< straight, metres
+  double collision_rate = 0.0;  ///< CR: steps with avatar contact or a capsule-blocked move / steps
+  double psi = 0.0;             ///< mean intrusion over steps and avatars active then; 0 with none
+  bool human_collision = false; ///< any step of the episode counted by CR
+  std::size_t collisions = 0;   ///< steps that ran into a wall
+  std::size_t collision_steps = 0;  ///< steps counted by CR
+  std::size_t steps = 0;        ///< actions, stop excluded
+  double start_distance = 0.0;  ///< l, metres
+  double path_length = 0.0;     ///< p, metres
+  double min_clearance = std::numeric_limits<double>::infinity();  ///< to any avatar, metres
+  bool stop_called = false;
+};
+
+/// Collects the steps of one episode.
+class EpisodeTracker {
+ public:
+  /// Begins an episode whose goal is `start_distance` metres away along the surface.
+  void reset(double start_distance) noexcept {
+    *this = {};
+    m_.start_distance = start_distance;
+  }
+
+  void add(const StepRecord& r) noexcept {
+    ++m_.steps;
+    m_.path_length += r.moved;
+    m_.collisions += r.wall_collision ? 1 : 0;
+    if (r.avatar_contact || r.capsule_blocked) {
+      ++m_.collision_steps;
+      m_.human_collision = true;
+    }
+    for (const double d : r.avatar_distances) {
+      intrusion_ += intrusion(d);
+      ++pairs_;
+      m_.min_clearance = min(d, m_.min_clearance);
+    }
+  }
+
+  /// The metrics if the episode ended here, `geodesic` and `euclidean` metres from the goal.
+  EpisodeMetrics finish(bool stop_called, double geodesic, double euclidean,
+                        double success_distance) const noexcept {
+    EpisodeMetrics m = m_;
+    m.stop_called = stop_called;
+    m.distance_to_goal = geodesic;
+    m.euclidean_distance_to_goal = euclidean;
+    m.success = episode_success(stop_called, geodesic, success_distance);
+    m.spl = success_weighted_by_path_length(m.success, m.start_distance, m.path_length);
+    m.soft_spl = soft_success_weighted_by_path_length(geodesic, m.start_distance, m.path_length);
+    m.collision_rate = m.steps == 0 ? 0.0 : static_cast<double>(m.collision_steps) / static_cast<double>(m.steps);
+    m.psi = pairs_ == 0 ? 0.0 : intrusion_ / static_cast<double>(pairs_);
+    return m;
+  }
+
+ private:
+  EpisodeMetrics m_{};
+  double intrusion_ = 0.0;
+  std::size_t pairs_ = 0;
+};
+
+/// Means over episodes, each episode counting once.
+struct MetricsSummary {
+  std::size_t episodes = 0;
+  double success_rate = 0.0;      ///< SR
+  double spl = 0.0;
+  double soft_spl = 0.0;
+  double distance_to_goal = 0.0;  ///< DTG, geodesic, metres
+  double euclidean_distance_to_goal = 0.0;
+  double collision_rate = 0.0;    ///< CR
+  double psi = 0.0;
+  double collisions = 0.0;        ///< wall hits an episode
+  double human_collision_episode_rate = 0.0;  ///< episodes with any step counted by CR / episodes
+  double steps = 0.0;
+  double path_length = 0.0;
+  double min_clearance = std::numeric_limits<double>::infinity();  ///< the least of all episodes
+};
+
+/// Means of `episodes`; zeros for none.
+inline MetricsSummary summarize(std::span<const EpisodeMetrics> episodes) noexcept {
+  MetricsSummary s;
+  s.episodes = episodes.size();
+  if (episodes.empty()) return s;
+  for (const EpisodeMetrics& e : episodes) {
+    s.success_rate += e.success ? 1.0 : 0.0;
+    s.spl += e.spl;
+    s.soft_spl += e.soft_spl;
+    s.distance_to_goal += e.distance_to_goal;
+    s.euclidean_distance_to_goal += e.euclidean_distance_to_goal;
+    s.collision_rate += e.collision_rate;
+    s.psi += e.psi;
+    s.collisions += static_cast<double>(e.collisions);
+    s.human_collision_episode_rate += e.human_collision ? 1.0 : 0.0;
+    s.steps += static_cast<double>(e.steps);
+    s.path_length += e.path_length;
+    s.min_clearance = min(e.min_clearance, s.min_clearance);
+  }
+  const double n = static_cast<double>(episodes.size());
+  for (double* v : {&s.success_rate, &s.spl, &s.soft_spl, &s.distance_to_goal,
+                    &s.euclidean_distance_to_goal, &s.collision_rate, &s.psi, &s.collisions,
+                    &s.human_collision_episode_rate, &s.steps, &s.path_length}) {
+    *v /= n;
+  }
+  return s;
+}
+
+}  // namespace gsnav

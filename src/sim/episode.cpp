@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/sim/episode.hpp"
+
+namespace gsnav {
+namespace {
+
+constexpr double kTwoPi = 6.283185307179586;
+
+Status bad(const char* field, double value, const char* rule) {
+  return {Errc::invalid_argument,
+          std::string("EpisodeRules.") + field + " = " + std::to_string(value) + ": " + rule};
+}
+
+/// Only islands that are wide enough are drawn from, in proportion to their area.
+std::vector<std::size_t> wide_islands(const NavMesh& navmesh, double least_radius) {
+  std::vector<std::size_t> wide;
+  for (std::size_t i = 0; i < navmesh.island_count(); ++i) {
+    if (navmesh.island_radius(i) >= least_radius) wide.push_back(i);
+  }
+  return wide;
+}
+
+std::size_t draw_island(const NavMesh& navmesh, const std::vector<std::size_t>& islands, Rng& rng) {
+  double total = 0;
+  for (const std::size_t i : islands) total += navmesh.island_area(i);
+  double at = rng.uniform() * total;
+  for (const std::size_t i : islands) {
+    at -= navmesh.island_area(i);
+    if (at < 0) return i;
+  }
+  return islands.back();
+}
+
+}  // namespace
+
+Status validate(const EpisodeRules& r) {
+  if (!(r.min_distance >= 0 && is_finite(r.min_distance))) return bad("min_distance", r.min_distance, "must be >= 0");
+  if (!(r.max_distance >= r.min_distance)) return bad("max_distance", r.max_distance, "must be >= min_distance");
+  if (!(r.min_island_radius >= 0)) return bad("min_island_radius", r.min_island_radius, "must be >= 0");
+  if (!(r.max_height_difference >= 0)) {
+    return bad("max_height_difference", r.max_height_difference, "must be >= 0");
+  }
+  if (!(r.straight_ratio >= 0)) return bad("straight_ratio", r.straight_ratio, "must be >= 0");
+  if (r.retries_per_goal < 1) return bad("retries_per_goal", r.retries_per_goal, "must be >= 1");
+  if (r.max_goals < 1) return bad("max_goals", r.max_goals, "must be >= 1");
+  return {};
+}
+
+Result<PointNavEpisode> generate_episode(const NavMesh& navmesh, Rng& rng, const EpisodeRules& rules) {
+  if (Status s = validate(rules); !s) return s;
+  const std::vector<std::size_t> islands = wide_islands(navmesh, rules.min_island_radius);
+  if (islands.empty()) {
+    return {Errc::nothing_navigable, "no island of the NavMesh has a radius of " +
+                                         std::to_string(rules.min_island_radius) + " m"};
+  }
+  for (int goals = 0; goals < rules.max_goals; ++goals) {
+    // A start on another island could never reach the goal: both are drawn from one.
+    const std::size_t island = draw_island(navmesh, islands, rng);
+    const Vec3d goal = navmesh.random_point(rng, island).position;
+    for (int tries = 0; tries < rules.retries_per_goal; ++tries) {
+      const Vec3d start = navmesh.random_point(rng, island).position;
+      if (abs(start.y - goal.y) > rules.max_height_difference) continue;
+      const double distance = navmesh.geodesic_distance(start, goal);
+      if (!(distance >= rules.min_distance && distance <= rules.max_distance)) continue;
+      const double ratio = distance / norm(goal - start);
+      if (ratio < rules.straight_ratio) {
+        const double excess = ratio - 0.98;
+        if (rng.uniform() > 20.0 * excess * excess) continue;
+      }
+      PointNavEpisode e;
+      e.start_position = start;
+      e.goal_position = goal;
+      e.start_rotation = yaw_rotation(rng.uniform(0.0, kTwoPi));
+      e.geodesic_distance = distance;
+      return e;
+    }
+  }
+  return {Errc::nothing_navigable,
+          "no start and goal between " + std::to_string(rules.min_distance) + " m and " +
+              std::to_string(rules.max_distance) + " m apart were found on the NavMesh"};
+}
+
+Result<std::vector<PointNavEpisode>> generate_episodes(const NavMesh& navmesh, std::size_t count,
+                                                       std::uint64_t seed, const EpisodeRules& rules) {
+  Rng rng(seed);
+  std::vector<PointNavEpisode> episodes;
+  episodes.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    Result<PointNavEpisode> e = generate_episode(navmesh, rng, rules);
+    if (!e) return e.status();
+    e->id = std::to_string(i);
+    episodes.push_back(std::move(*e));
+  }
+  return episodes;
+}
+
+}  // namespace gsnav

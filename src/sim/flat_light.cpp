@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Light of the default scene: sky through windows, sun, lamps, and what walls and floor throw back.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "flat_painter.hpp"
+
+namespace gsnav::flat {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+const Vec3d kToSun = normalized(Vec3d{-0.42, 0.78, -0.85});
+
+/// Where the ray o + t d enters the box, or infinity; a start inside does not count.
+double enter(const Box& b, const Vec3d& o, const Vec3d& inverse) noexcept {
+  double t0 = 0, t1 = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    const double a = (b.low[k] - o[k]) * inverse[k], c = (b.high[k] - o[k]) * inverse[k];
+    t0 = std::max(t0, std::min(a, c));
+    t1 = std::min(t1, std::max(a, c));
+  }
+  return t0 < t1 && t0 > 1e-4 ? t0 : std::numeric_limits<double>::infinity();
+}
+
+/// Where a ray that starts inside leaves the box.
+double leave(const Box& b, const Vec3d& o, const Vec3d& inverse) noexcept {
+  double t1 = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    t1 = std::min(t1, std::max((b.low[k] - o[k]) * inverse[k], (b.high[k] - o[k]) * inverse[k]));
+  }
+  return std::max(t1, 0.0);
+}
+
+Vec3d inverse_of(const Vec3d& d) noexcept {
+  const auto safe = [](double x) { return 1.0 / (abs(x) < 1e-9 ? 1e-9 : x); };
+  return {safe(d.x), safe(d.y), safe(d.z)};
+}
+
+bool blocked(const Room& room, const Vec3d& from, const Vec3d& to) noexcept {
+  const Vec3d inverse = inverse_of(to - from);
+  for (const Box& b : room.blockers) {
+    if (enter(b, from, inverse) < 0.999) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Vec3d Painter::light_at(const Room& room, const Vec3d& point, const Vec3d& n) const {
+  const Vec3d p = point + n * 0.015;
+
+  // Ambient: near surfaces darken, low ones give the floor's colour.
+  const Vec3d u = normalized(cross(abs(n.y) < 0.9 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0}, n)), v = cross(n, u);
+  Vec3d ambient{};
+  for (const Vec3d& h : hemisphere_) {
+    const Vec3d d = u * h.x + v * h.y + n * h.z;
+    const Vec3d inverse = inverse_of(d);
+    double t = leave(room.inside, p, inverse);
+    for (const Box& b : room.blockers) t = std::min(t, enter(b, p, inverse));
+    const double open = t * t / (t * t + 0.16);
+    const double down = std::clamp(-d.y * 1.5, 0.0, 1.0);
+    ambient += lerp(Vec3d{1.0, 0.98, 0.95}, room.bounce, down) * (0.25 + 0.75 * open);
+  }
+  Vec3d sum = ambient * (0.60 / static_cast<double>(hemisphere_.size()));
+
+  for (const Window& w : room.windows) {
+    const Vec3d facing = cross(w.u, w.v);
+    const double area = norm(facing);
+    constexpr int kAcross = 4, kUp = 4;
+    double direct = 0;
+    for (int k = 0; k < kAcross * kUp; ++k) {
+      const Vec3d q = w.corner + w.u * ((k % kAcross + 0.5) / kAcross) + w.v * ((k / kAcross + 0.5) / kUp);
+      const Vec3d d = q - p;
+      const double r2 = dot(d, d), c0 = dot(d, n), c1 = -dot(d, facing) / area;
+      if (c0 <= 0 || c1 <= 0 || blocked(room, p, q + facing * (0.02 / area))) continue;
+      direct += c0 * c1 / (r2 * (r2 + 0.05));
+    }
+    sum += Vec3d{0.93, 0.98, 1.06} * (5.2 * direct * area / (kPi * kAcross * kUp));
+  }
+  for (const Lamp& l : room.lamps) {
+    double direct = 0;
+    for (int k = 0; k < 4; ++k) {
+      const Vec3d q = l.position + Vec3d{(k & 1) != 0 ? 0.08 : -0.08, 0, (k & 2) != 0 ? 0.08 : -0.08};
+      const Vec3d d = q - p;
+      const double r2 = dot(d, d), c = dot(d, n) / std::sqrt(r2);
+      if (c > 0 && !blocked(room, p, q)) direct += c / (r2 + 0.12);
+    }
+    sum += Vec3d{1.0, 0.80, 0.55} * (0.25 * 0.30 * l.power * direct);
+  }
+  return sum;
+}
+
+bool Painter::sun_at(const Room& room, const Vec3d& point, const Vec3d& n) const {
+  if (dot(n, kToSun) < 0.05) return false;
+  const Vec3d p = point + n * 0.01;
+  for (const Window& w : room.windows) {
+    const Vec3d facing = cross(w.u, w.v);
+    const double rate = dot(kToSun, facing);
+    if (rate >= 0) continue;  // the sun is behind this wall
+    const double t = dot(w.corner - p, facing) / rate;
+    if (t <= 0) continue;
+    const Vec3d q = p + kToSun * t - w.corner;
+    const double a = dot(q, w.u) / dot(w.u, w.u), b = dot(q, w.v) / dot(w.v, w.v);
+    // Two bars cross the pane.
+    if (a < 0.03 || a > 0.97 || b < 0.03 || b > 0.97 || abs(a - 0.5) < 0.025 || abs(b - 0.62) < 0.02) continue;
+    return !blocked(room, p, p + kToSun * t);
+  }
+  return false;
+}
+
+}  // namespace gsnav::flat

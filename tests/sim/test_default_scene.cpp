@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include "gsnav/nav/navmesh.hpp"
+#include "gsnav/sim/default_scene.hpp"
+
+using namespace gsnav;
+
+TEST_CASE("the flat is made of valid Gaussians inside its walls") {
+  const DefaultScene scene = make_default_scene(0.1).value();
+  const GaussianCloud& c = scene.cloud;
+  REQUIRE(c.size() > 20000);
+  CHECK(c.sh_degree == 0);
+  CHECK(c.origins.empty());
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    const double q = c.quats[0][i] * c.quats[0][i] + c.quats[1][i] * c.quats[1][i] +
+                     c.quats[2][i] * c.quats[2][i] + c.quats[3][i] * c.quats[3][i];
+    REQUIRE(abs(q - 1.0) < 1e-5);
+    REQUIRE(c.opacities[i] > 0.9f);
+    for (const auto& s : c.scales) REQUIRE((s[i] > 0.0f && s[i] < 0.5f));
+    for (std::size_t k = 0; k < 3; ++k) REQUIRE(is_finite(c.sh0[3 * i + k]));
+  }
+  CHECK(scene.bounds.low.y > -0.01);
+  CHECK(scene.bounds.high.y < 2.71);
+  CHECK(scene.bounds.low.x > -0.3);
+  CHECK(scene.bounds.high.x < 10.3);
+  for (const auto& t : scene.triangles) {
+    for (const std::uint32_t v : t) REQUIRE(v < scene.vertices.size());
+  }
+}
+
+TEST_CASE("the flat is the same every time") {
+  const DefaultScene a = make_default_scene(0.1).value(), b = make_default_scene(0.1).value();
+  CHECK(a.cloud.means == b.cloud.means);
+  CHECK(a.cloud.quats == b.cloud.quats);
+  CHECK(a.cloud.scales == b.cloud.scales);
+  CHECK(a.cloud.sh0 == b.cloud.sh0);
+  CHECK(a.triangles == b.triangles);
+}
+
+TEST_CASE("density changes the Gaussians, never the mesh") {
+  const DefaultScene a = make_default_scene(0.1).value(), b = make_default_scene(0.2).value();
+  CHECK(b.cloud.size() > 1.3 * static_cast<double>(a.cloud.size()));
+  CHECK(a.vertices == b.vertices);
+  CHECK(make_default_scene(0.0).code() == Errc::invalid_argument);
+  CHECK(make_default_scene(std::nan("")).code() == Errc::invalid_argument);
+}
+
+TEST_CASE("the flat's mesh gives one floor that joins all rooms") {
+  const DefaultScene scene = make_default_scene(0.05).value();
+  const NavMesh mesh = NavMesh::build({}, scene.vertices, scene.triangles).value();
+  // 80 m2 less walls, furniture and the agent's radius.
+  CHECK(mesh.island_area(0) > 35.0);
+  CHECK(mesh.island_area(0) < 70.0);
+  CHECK(mesh.island_radius(0) > 4.0);
+  const Vec3d rooms[] = {{4.5, 0, 3.0}, {8.5, 0, 3.6}, {4.2, 0, 5.8}, {6.0, 0, 7.0}};
+  for (const Vec3d& a : rooms) {
+    for (const Vec3d& b : rooms) CHECK(mesh.geodesic_distance(a, b) < 15.0);
+  }
+}
