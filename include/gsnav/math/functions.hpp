@@ -89,7 +89,8 @@ GSNAV_HD float float_of_bits(std::uint32_t u) noexcept {
 }
 
 GSNAV_HD bool is_finite(float a) noexcept { return (bits_of(a) & 0x7f800000u) != 0x7f800000u; }
-GSNAV_HD bool is_finite(double a) noexcept { return abs(a) <= std::numeric_limits<double>::max(); }
+// A literal: numeric_limits' constexpr functions are host code to nvcc.
+GSNAV_HD bool is_finite(double a) noexcept { return abs(a) <= 1.7976931348623157e308; }
 #if !defined(__CUDACC__)
 GSNAV_HD bool is_finite(long double a) noexcept {
   return abs(a) <= std::numeric_limits<long double>::max();

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+// gsnav-render: images of a scene of Gaussians from the cameras of a file.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io/image_file.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/renderer.hpp"
+
+namespace {
+
+using namespace gsnav;
+
+struct Options {
+  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median";
+  int width = 0, height = 0, threads = 0;
+  double near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0;
+  bool npy = false, png = false;
+};
+
+/// Which image --depth names; first hit may carry its tau.
+struct DepthChoice {
+  unsigned output = kMedianDepth;
+  double tau = 0.5;
+};
+
+std::optional<DepthChoice> parse_depth(const std::string& text) {
+  if (text == "median") return DepthChoice{kMedianDepth, 0.5};
+  if (text == "expected") return DepthChoice{kExpectedDepth, 0.5};
+  if (text == "accumulated") return DepthChoice{kAccumulatedDepth, 0.5};
+  if (text == "first") return DepthChoice{kFirstHitDepth, 0.5};
+  if (text.rfind("first:", 0) == 0) {
+    try {
+      std::size_t used = 0;
+      const double tau = std::stod(text.substr(6), &used);
+      if (used == text.size() - 6 && tau > 0 && tau < 1) return DepthChoice{kFirstHitDepth, tau};
+    } catch (const std::exception&) {
+    }
+  }
+  return std::nullopt;
+}
+
+void print_report(const LoadReport& r) {
+  std::printf("%s: %llu Gaussians of %llu rows, SH degree %d\n", r.source.c_str(),
+              static_cast<unsigned long long>(r.kept), static_cast<unsigned long long>(r.read),
+              r.sh_degree);
+  const auto line = [](std::uint64_t n, const char* what) {
+    if (n != 0) std::printf("  %llu %s\n", static_cast<unsigned long long>(n), what);
+  };
+  line(r.dropped_non_finite, "dropped: a value that is not finite");
+  line(r.dropped_zero_quat, "dropped: a zero quaternion");
+  line(r.dropped_transparent, "left out: opacity below 1/255, never visible");
+  line(r.clamped_scales, "repaired: log-scale clamped to [-20, 20]");
+  for (const std::string& w : r.warnings) std::printf("  warning: %s\n", w.c_str());
+}
+
+template <class S, class B>
+int run(B& backend, const Options& o, const DepthChoice& depth, const GaussianCloud& cloud,
+        const std::vector<Camera>& cameras) {
+  RenderConfig config;
+  config.outputs = kRgb | kAlpha | depth.output;
+  config.profile = o.profile == "fast" ? Profile::fast : Profile::exact;
+  config.max_alpha = o.max_alpha;
+  config.first_hit_tau = depth.tau;
+  config.sort_order = cloud.sort_order;
+  Renderer<S, B> renderer(backend, config);
+  const std::vector<GaussianSet> sets{cloud.set()};
+  Frames<S> f;
+  double total_ms = 0;
+  const bool terminal = isatty(fileno(stdout)) != 0;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const auto start = std::chrono::steady_clock::now();
+    if (const Status s = renderer.render(sets, std::span(&cameras[c], 1), f); !s) {
+      std::fprintf(stderr, "gsnav-render: camera %zu: %s\n", c, s.message().c_str());
+      return 1;
+    }
+    total_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    const std::vector<S>& z = depth.output == kMedianDepth        ? f.median_depth
+                              : depth.output == kExpectedDepth    ? f.expected_depth
+                              : depth.output == kAccumulatedDepth ? f.accumulated_depth
+                                                                  : f.first_hit_depth;
+    char number[16];
+    std::snprintf(number, sizeof number, "%04zu", c);
+    const std::filesystem::path stem = std::filesystem::path(o.out) / number;
+    const std::vector<float> rgb(f.rgb.begin(), f.rgb.end()), alpha(f.alpha.begin(), f.alpha.end()),
+        metres(z.begin(), z.end());
+    const std::vector<std::size_t> image{f.height, f.width}, color{f.height, f.width, 3};
+    Status s;
+    const auto keep = [&](Status next) {
+      if (s.ok()) s = std::move(next);
+    };
+    if (o.npy) {
+      keep(io::save_npy(stem.string() + ".rgb.npy", rgb, color));
+      keep(io::save_npy(stem.string() + ".depth.npy", metres, image));
+      keep(io::save_npy(stem.string() + ".alpha.npy", alpha, image));
+    }
+    if (o.png) {
+      keep(io::save_png_rgb(stem.string() + ".rgb.png", rgb, f.width, f.height));
+      keep(io::save_png_rgb8(stem.string() + ".depth.png",
+                             io::colorize_depth(metres, static_cast<float>(o.depth_near),
+                                                static_cast<float>(o.depth_far)),
+                             f.width, f.height));
+    }
+    if (!s) {
+      std::fprintf(stderr, "gsnav-render: %s\n", s.message().c_str());
+      return 1;
+    }
+    if (terminal || c + 1 == cameras.size()) {
+      std::printf("%s%zu/%zu views, %.1f ms a view", terminal ? "\r" : "", c + 1, cameras.size(),
+                  total_ms / static_cast<double>(c + 1));
+      std::fflush(stdout);
+    }
+  }
+  std::printf("\n");
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options o;
+  CLI::App app{
+      "Renders a scene of 3D Gaussians from the cameras of an INRIA cameras.json. Writes NNNN.rgb.npy "
+      "(H, W, 3 float32, unclamped), NNNN.depth.npy and NNNN.alpha.npy (H, W float32; metres, 0 = no "
+      "return) and PNG pictures. The scene is used in its own frame: no up axis is applied."};
+  app.add_option("--scene", o.scene,
+                 "INRIA .ply, .sog, a SOG folder, or a folder's sibling tiles: DIR/2_0,2_1,2_2")
+      ->required();
+  app.add_option("--cameras", o.cameras, "INRIA cameras.json (camera-to-world, OpenCV axes)")
+      ->required()
+      ->check(CLI::ExistingFile);
+  app.add_option("--out", o.out, "Folder for the images; made where it does not exist")->required();
+  app.add_option("--width", o.width, "Image width; with --height, focal lengths scale by it")
+      ->check(CLI::Range(1, kMaxImageSide));
+  app.add_option("--height", o.height, "Image height")->check(CLI::Range(1, kMaxImageSide));
+  app.add_option("--near", o.near_plane, "Gaussians whose centre is not beyond this are not drawn, metres")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--backend", o.backend, "serial (float32), serial64 (the float64 reference), openmp, cuda")
+      ->check(CLI::IsMember({"serial", "serial64", "openmp", "cuda"}))
+      ->capture_default_str();
+  app.add_option("--profile", o.profile, "exact, or fast (docs/accuracy.md)")
+      ->check(CLI::IsMember({"exact", "fast"}))
+      ->capture_default_str();
+  app.add_option("--depth", o.depth, "median, expected, accumulated, first or first:TAU")
+      ->capture_default_str();
+  app.add_option("--max-alpha", o.max_alpha, "Largest alpha of one Gaussian at a pixel")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_option("--threads", o.threads, "Threads of the openmp backend; 0: OMP_NUM_THREADS")
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--depth-near", o.depth_near, "Depth picture: nearest metre of the colour scale");
+  app.add_option("--depth-far", o.depth_far, "Depth picture: farthest; 0: the image's own range");
+  app.add_flag("--npy", o.npy, "Write NPY arrays");
+  app.add_flag("--png", o.png, "Write PNG pictures (both are written where neither flag is given)");
+  CLI11_PARSE(app, argc, argv);
+
+  if (!o.npy && !o.png) o.npy = o.png = true;
+  const auto fail = [](const std::string& message) {
+    std::fprintf(stderr, "gsnav-render: %s\n", message.c_str());
+    return 1;
+  };
+  const std::optional<DepthChoice> depth = parse_depth(o.depth);
+  if (!depth) {
+    return fail("--depth " + o.depth + ": use median, expected, accumulated, first or first:TAU, 0 < TAU < 1");
+  }
+  if ((o.width > 0) != (o.height > 0)) return fail("--width and --height go together");
+  if (o.backend == "cuda") return fail("--backend cuda: this build has no CUDA backend; use openmp");
+
+  auto scene = io::load_scene(o.scene);
+  if (!scene) return fail(scene.message());
+  print_report(scene->report);
+  auto cameras = io::load_cameras(o.cameras, o.width, o.height);
+  if (!cameras) return fail(cameras.message());
+  for (Camera& c : *cameras) c.near_plane = o.near_plane;
+  std::error_code error;
+  std::filesystem::create_directories(o.out, error);
+  if (error) return fail("--out " + o.out + ": " + error.message());
+
+  SerialBackend serial;
+  if (o.backend == "serial") return run<float>(serial, o, *depth, scene->cloud, *cameras);
+  if (o.backend == "serial64") return run<double>(serial, o, *depth, scene->cloud, *cameras);
+  OpenMPBackend openmp(o.threads);
+  return run<float>(openmp, o, *depth, scene->cloud, *cameras);
+}
