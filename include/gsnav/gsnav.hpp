@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Everything that needs only a C++20 compiler. Add a backend (gsnav/backends/...); nav, io, sim and
+// interop have headers of their own, because they need a library to link or to include.
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/core/parallel.hpp"
+#include "gsnav/core/rng.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/core/view.hpp"
+#include "gsnav/math/aabb.hpp"
+#include "gsnav/math/capsule.hpp"
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/mat.hpp"
+#include "gsnav/math/quat.hpp"
+#include "gsnav/math/similarity.hpp"
+#include "gsnav/math/vec.hpp"
+#include "gsnav/ops/render.hpp"
+#include "gsnav/ops/render_config.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/load_report.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "gsnav/version.hpp"

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <string>
+#include <type_traits>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/kernels/camera.hpp"
+#include "gsnav/math/similarity.hpp"
+
+// What the interop headers share: layouts they rely on, camera axes, taking a matrix apart.
+
+namespace gsnav::interop {
+
+namespace detail {
+/// True where an array of T is S S S ... without gaps, so that other libraries' matrices can lie over it.
+template <class T, class S, int N>
+inline constexpr bool is_packed = sizeof(T) == N * sizeof(S) && alignof(T) == alignof(S) &&
+                                  std::is_standard_layout_v<T> && std::is_trivially_copyable_v<T>;
+static_assert(is_packed<Vec3f, float, 3> && is_packed<Vec3d, double, 3>);
+static_assert(is_packed<Mat3f, float, 9> && is_packed<Mat3d, double, 9>);
+static_assert(is_packed<Quatf, float, 4> && is_packed<Quatd, double, 4>);
+}  // namespace detail
+
+/// Axes of a camera's own frame.
+enum class CameraAxes {
+  opencv,  ///< x right, y down, z forward: gsnav's
+  opengl,  ///< x right, y up, -z forward: OpenGL, glm::lookAt, Habitat
+};
+
+/// World-to-camera map with OpenCV axes from one with the given axes, or the other way: turning a camera
+/// half round its x axis is its own inverse.
+template <class S>
+Affine3<S> view_with_axes(const Affine3<S>& view, CameraAxes axes) noexcept {
+  if (axes == CameraAxes::opencv) return view;
+  const Mat3<S>& m = view.linear;
+  const Vec3<S>& t = view.translation;
+  return {{{m.row[0], -m.row[1], -m.row[2]}}, {t.x, -t.y, -t.z}};
+}
+
+/// The similarity that an affine map is. Errors (invalid_argument): the map is not finite, mirrors, or
+/// scales or shears by more than `tolerance` relative, which Gaussians cannot follow.
+inline Result<Similarity> similarity_from(const Affine3<double>& a, double tolerance = 1e-4) {
+  const auto bad = [](const char* what) {
+    return Status(Errc::invalid_argument, std::string("not a similarity: the map ") + what);
+  };
+  const double volume = determinant(a.linear);
+  if (!is_finite(volume) || !is_finite(a.translation)) return bad("is not finite");
+  if (!(volume > 0)) return bad("mirrors or flattens");
+  const double scale = std::cbrt(volume);
+  const Mat3d rotation = a.linear * (1.0 / scale);
+  const Mat3d gram = rotation * transpose(rotation);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      if (!(abs(gram(i, j) - (i == j ? 1.0 : 0.0)) <= tolerance)) return bad("shears or scales unevenly");
+    }
+  }
+  return Similarity{quat_from_matrix(rotation), a.translation, scale};
+}
+
+/// The affine map that a similarity is.
+inline Affine3<double> affine_from(const Similarity& s) noexcept {
+  return {rotation_matrix(s.rotation) * s.scale, s.translation};
+}
+
+}  // namespace gsnav::interop

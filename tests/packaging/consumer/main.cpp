@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Touches each component that it was linked with, so that a missing link or header shows.
+#include <cstdio>
+
+#include <gsnav/backends/serial.hpp>
+#include <gsnav/gsnav.hpp>
+#if defined(WITH_OPENMP)
+#include <gsnav/backends/openmp.hpp>
+#endif
+#if defined(WITH_NAV)
+#include <gsnav/nav/navmesh_settings.hpp>
+#endif
+#if defined(WITH_SIM)
+#include <gsnav/sim/default_scene.hpp>
+#endif
+#if defined(WITH_INTEROP_EIGEN)
+#include <gsnav/interop/eigen.hpp>
+#endif
+#if defined(WITH_INTEROP_GLM)
+#include <gsnav/interop/glm.hpp>
+#endif
+
+namespace {
+
+int failures = 0;
+
+void check(const char* what, bool ok) {
+  std::printf("%-14s %s\n", what, ok ? "ok" : "FAILED");
+  failures += ok ? 0 : 1;
+}
+
+template <class B>
+bool renders_one_gaussian(B& backend) {
+  gsnav::GaussianCloud cloud;
+  for (auto& column : cloud.means) column = {0};
+  for (auto& column : cloud.quats) column = {0};
+  for (auto& column : cloud.scales) column = {0.5f};
+  cloud.means[2] = {2};
+  cloud.quats[0] = {1};
+  cloud.opacities = {0.9f};
+  cloud.sh0 = {1, 1, 1};
+  gsnav::Renderer<float, B> renderer(backend);
+  const auto camera = gsnav::Camera::look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 32, 32, 90);
+  return renderer.render(cloud.set(), camera).value().alpha[16 * 32 + 16] > 0.8f;
+}
+
+}  // namespace
+
+int main() {
+  gsnav::SerialBackend serial;
+  check("gsnav", renders_one_gaussian(serial));
+#if defined(WITH_OPENMP)
+  gsnav::OpenMPBackend openmp;
+  check("openmp", renders_one_gaussian(openmp));
+#endif
+#if defined(WITH_NAV)
+  check("nav", gsnav::NavMeshSettings{}.validate().ok());
+#endif
+#if defined(WITH_SIM)
+  check("sim", gsnav::make_default_scene(0.05).ok());
+#endif
+#if defined(WITH_INTEROP_EIGEN)
+  check("interop_eigen", gsnav::interop::to_eigen(gsnav::Quatd{}).w() == 1.0);
+#endif
+#if defined(WITH_INTEROP_GLM)
+  check("interop_glm", gsnav::interop::to_glm(gsnav::Quatd{}).w == 1.0);
+#endif
+  return failures;
+}

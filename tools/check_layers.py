@@ -1,0 +1,107 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Checks that no include points up or sideways (docs/architecture.md, "Layers").
+
+usage: check_layers.py [root]      check a source tree (default: this one)
+       check_layers.py --self-test plant violations in a scratch tree and expect to find each
+"""
+import pathlib
+import re
+import sys
+import tempfile
+
+RANK = {"base": 0, "math": 1, "core": 2, "kernels": 3, "ops": 4, "scene": 5, "avatar": 5, "nav": 5,
+        "io": 6, "interop": 6, "sim": 6}
+DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp"}  # avatar may include these
+UMBRELLA = {"math", "core", "kernels", "ops", "scene", "avatar", "base"}
+# Intrinsics that the standard library's headers do not reach.
+COMPILER_HEADERS = {"immintrin.h", "arm_neon.h"}
+SOURCES = {".hpp", ".cpp", ".h", ".inl", ".cu", ".cuh"}
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
+
+
+def layer_of(path):
+    """Layer of a file named from the root: 'include/gsnav/core/view.hpp' is in core."""
+    parts = path.parts
+    if parts[:2] == ("include", "gsnav"):
+        if len(parts) == 3:
+            return "umbrella" if parts[2] == "gsnav.hpp" else "base"
+        return parts[2]
+    return f"backend {parts[1]}" if parts[0] == "backends" else parts[1]  # src/<layer>
+
+
+def allowed(layer, target, target_path):
+    if layer == target:
+        return True
+    if layer == "umbrella":
+        return target in UMBRELLA
+    if layer.startswith("backend"):
+        return RANK.get(target, 99) <= RANK["ops"]
+    if layer == "avatar" and target_path in DATA_ONLY:
+        return True
+    return RANK.get(target, 99) < RANK[layer]
+
+
+def check(root):
+    """Lines 'file: what is wrong', one per include that may not be."""
+    wrong = []
+    files = [p for top in ("include/gsnav", "src", "backends") for p in sorted((root / top).rglob("*"))
+             if p.suffix in SOURCES]
+    for file in files:
+        path = file.relative_to(root)
+        layer = layer_of(path)
+        if layer not in RANK and layer != "umbrella" and not layer.startswith("backend"):
+            wrong.append(f"{path}: '{layer}' is not a layer")
+            continue
+        for quote, name in INCLUDE.findall(file.read_text(encoding="utf-8")):
+            if name.startswith("gsnav/backends/"):
+                target = f"backend {pathlib.PurePath(name).stem}"
+            elif name.startswith("gsnav/"):
+                target = layer_of(pathlib.PurePath("include") / name)
+            elif quote == '"' and (file.parent / name).exists():
+                target = layer_of((file.parent / name).resolve().relative_to(root.resolve()))
+            else:
+                public = path.parts[0] == "include" and layer != "interop"
+                standard = quote == "<" and re.fullmatch(r"[a-z_0-9]+", name)
+                if public and not standard and name not in COMPILER_HEADERS:
+                    wrong.append(f"{path}: a public header includes {name}, which is not standard")
+                continue
+            if not allowed(layer, target, name.removeprefix("gsnav/")):
+                wrong.append(f"{path}: {layer} may not include {name} ({target})")
+    return files, wrong
+
+
+def self_test():
+    good = {"include/gsnav/config.hpp": "", "include/gsnav/core/view.hpp": '"gsnav/math/vec.hpp"',
+            "include/gsnav/avatar/asset.hpp": '"gsnav/scene/gaussian_cloud.hpp"',
+            "include/gsnav/interop/eigen.hpp": "<Eigen/Core>", "src/io/a.cpp": "<png.h>",
+            "backends/x/gsnav/backends/x.hpp": '"gsnav/ops/render.hpp"'}
+    bad = {"include/gsnav/core/up.hpp": '"gsnav/kernels/sh.hpp"',
+           "include/gsnav/scene/sideways.hpp": '"gsnav/nav/navmesh.hpp"',
+           "include/gsnav/avatar/not_data.hpp": '"gsnav/scene/renderer.hpp"',
+           "include/gsnav/ops/backend.hpp": "<gsnav/backends/serial.hpp>",
+           "include/gsnav/scene/library.hpp": "<Eigen/Core>", "include/gsnav/gsnav.hpp": '"gsnav/io/ply.hpp"',
+           "src/sim/reads.cpp": '#  include "../io/private.hpp"', "src/io/private.hpp": "",
+           "backends/y/gsnav/backends/y.hpp": '"gsnav/backends/x.hpp"',
+           "backends/z/src/z.cpp": '"gsnav/scene/renderer.hpp"', "src/other/o.cpp": ""}
+    with tempfile.TemporaryDirectory() as scratch:
+        root = pathlib.Path(scratch)
+        for name, include in {**good, **bad}.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            line = include if include.startswith("#") or not include else f"#include {include}"
+            (root / name).write_text(line + "\n", encoding="utf-8")
+        found = {line.split(":")[0] for line in check(root)[1]}
+    expected = set(bad) - {"src/io/private.hpp"}
+    if found != expected:
+        sys.exit(f"missed: {sorted(expected - found)}\nwrongly found: {sorted(found - expected)}")
+    print(f"{len(expected)} planted violations found")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--self-test"]:
+        self_test()
+    else:
+        tree = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).parents[1]
+        checked, violations = check(tree)
+        print("\n".join(violations) or f"{len(checked)} files keep to their layers")
+        sys.exit(1 if violations or not checked else 0)
