@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Headers, libraries, tools, CMake package and pkg-config file. Each compiled component has an export of
+# Headers, libraries, CMake package and pkg-config file. Each compiled component has an export of
 # its own, so that a user needs the dependencies of the components asked for and no others.
 include(CMakePackageConfigHelpers)
 
@@ -97,9 +97,4 @@ endif()
 configure_file("${PROJECT_SOURCE_DIR}/cmake/gsnav.pc.in" "${PROJECT_BINARY_DIR}/cmake/gsnav.pc" @ONLY)
 install(FILES "${PROJECT_BINARY_DIR}/cmake/gsnav.pc" DESTINATION "${_pc_dir}")
 
-# ---- programs and licence
-get_property(_tools GLOBAL PROPERTY GSNAV_PROGRAMS)
-if(_tools)
-  install(TARGETS ${_tools} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
-endif()
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}")

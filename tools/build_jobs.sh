@@ -1,0 +1,10 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# Prints how many files to compile at a time: one per processor, but 1.5 GiB of memory each.
+set -euo pipefail
+processors=$(nproc)
+memory_kib=$(awk '/^MemAvailable:/ { print $2 }' /proc/meminfo 2> /dev/null || true)
+fit=$(( ${memory_kib:-$((processors * 1572864))} / 1572864 ))
+jobs=$(( fit < processors ? fit : processors ))
+echo $(( jobs > 0 ? jobs : 1 ))

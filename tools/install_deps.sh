@@ -1,0 +1,64 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# Installs the Debian (or Ubuntu) packages that a job needs; does nothing where all are there.
+#
+# usage: tools/install_deps.sh demo|tests|ci
+#   demo   build and run the navigation loop
+#   tests  ... and the tests, benchmarks and packaging checks
+#   ci     ... and clang with its OpenMP
+#
+# GSNAV_NO_APT=1   never call apt-get: name what is missing and go on
+set -euo pipefail
+
+job=${1:-demo}
+packages=(g++ cmake ninja-build libpng-dev libwebp-dev zlib1g-dev nlohmann-json3-dev librecast-dev
+          libcli11-dev)
+if [[ $job == tests || $job == ci ]]; then
+  packages+=(doctest-dev libbenchmark-dev libeigen3-dev libglm-dev pkg-config python3)
+fi
+if [[ $job == ci ]]; then
+  packages+=(clang libomp-dev ccache)
+fi
+
+if ! command -v apt-get > /dev/null || ! command -v dpkg-query > /dev/null; then
+  echo "No apt-get here. Needed are a C++20 compiler, CMake 3.25, Ninja and what Debian calls:"
+  echo "  ${packages[*]}"
+  exit 0
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  state=$(dpkg-query -W -f '${Status}' "$package" 2> /dev/null || true)
+  [[ $state == "install ok installed" ]] || missing+=("$package")
+done
+if [[ ${#missing[@]} -eq 0 ]]; then
+  exit 0
+fi
+if [[ ${GSNAV_NO_APT:-0} == 1 ]]; then
+  echo "Not installed, as GSNAV_NO_APT=1: ${missing[*]}"
+  exit 0
+fi
+
+as_root=()
+if [[ $(id -u) -ne 0 ]]; then
+  if ! command -v sudo > /dev/null; then
+    echo "These packages are missing, and there is neither root nor sudo to install them. As root, run:" >&2
+    echo "  apt-get update && apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+
+apt() { "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@"; }
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+echo "Installing ${missing[*]}"
+# Lists may be old or absent; an update that fails is no failure while the packages can be had.
+apt update > "$log" 2>&1 || echo "apt-get update failed; trying with the lists that are there"
+if ! apt install -y --no-install-recommends "${missing[@]}" >> "$log" 2>&1; then
+  tail -n 20 "$log" >&2
+  echo "apt-get could not install: ${missing[*]}" >&2
+  echo "Check the network and /etc/apt/sources.list, or install them yourself and run this again." >&2
+  exit 1
+fi
