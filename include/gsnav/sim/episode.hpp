@@ -18,6 +18,7 @@ struct PointNavEpisode {
   Quatd start_rotation{};            ///< w, x, y, z; a turn about +Y
   Vec3d goal_position{};
   double geodesic_distance = 0.0;    ///< from start to goal along the surface, metres
+  double start_time = 0.0;           ///< seconds on the avatars' clock when the episode begins
 };
 
 /// Rotation about +Y: positive angles (radians) turn the agent left.

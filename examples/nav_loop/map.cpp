@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "gsnav/kernels/sh.hpp"
+
+namespace nav_loop {
+namespace {
+
+using gsnav::Vec3d;
+
+constexpr Rgb kNavMesh{0.36f, 0.66f, 0.86f}, kEdge{0.20f, 0.47f, 0.70f}, kShortest{0.15f, 0.15f, 0.17f};
+constexpr Rgb kAgent{0.05f, 0.30f, 0.85f}, kStart{0.10f, 0.60f, 0.25f}, kGoal{0.86f, 0.10f, 0.16f}, kInk{0.1f, 0.1f, 0.1f};
+constexpr double kMargin = 0.6;      // metres around the NavMesh
+constexpr double kCutHeight = 1.95;  // metres above the floor: what hangs higher would hide the rooms
+
+struct Frame {
+  double x0, z0, scale;
+  double x(const Vec3d& p) const { return (p.x - x0) * scale; }
+  double y(const Vec3d& p) const { return (p.z - z0) * scale; }
+};
+
+void draw_scene(Canvas& canvas, const Frame& f, const MapContent& m, double floor) {
+  const gsnav::GaussianCloud& c = *m.cloud;
+  std::vector<Vec3d> at(c.size());
+  std::vector<std::uint32_t> order;
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    at[i] = m.world_from_asset * c.mean(i);
+    const bool in_picture = f.x(at[i]) > -50 && f.y(at[i]) > -50 && f.x(at[i]) < canvas.width() + 50 && f.y(at[i]) < canvas.height() + 50;
+    if (in_picture && at[i].y > floor - 0.3 && at[i].y < floor + kCutHeight && c.opacities[i] > 0.1f) {
+      order.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  // Painted from the floor up; ties in file order, so that the picture is the same every time.
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return at[a].y < at[b].y; });
+  for (const std::uint32_t i : order) {
+    const double size = m.world_from_asset.scale *
+                        std::max({static_cast<double>(c.scales[0][i]), static_cast<double>(c.scales[1][i]), static_cast<double>(c.scales[2][i])});
+    const double radius = std::clamp(size * f.scale, 0.6, 8.0);
+    Rgb color;
+    float* out[3] = {&color.r, &color.g, &color.b};
+    for (std::size_t k = 0; k < 3; ++k) {
+      *out[k] = std::clamp(0.5f + static_cast<float>(gsnav::kSh0) * c.sh0[3 * i + k], 0.0f, 1.0f);
+    }
+    canvas.disc(f.x(at[i]), f.y(at[i]), radius, color, 0.85f * c.opacities[i]);
+  }
+}
+
+void polyline(Canvas& canvas, const Frame& f, const std::vector<Vec3d>& points, double radius, Rgb color, float alpha) {
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    canvas.stroke(f.x(points[i - 1]), f.y(points[i - 1]), f.x(points[i]), f.y(points[i]), radius, color, alpha);
+  }
+}
+
+void dashed(Canvas& canvas, const Frame& f, const std::vector<Vec3d>& points, double radius, Rgb color) {
+  double phase = 0;  // pixels along the whole line
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const double ax = f.x(points[i - 1]), ay = f.y(points[i - 1]), bx = f.x(points[i]), by = f.y(points[i]);
+    const double length = std::hypot(bx - ax, by - ay);
+    for (double s = 0; s < length;) {
+      const double in_dash = std::fmod(phase, 16.0);
+      const double piece = std::min(length - s, (in_dash < 9 ? 9.0 : 16.0) - in_dash + 1e-6);
+      if (in_dash < 9) {
+        const double k0 = s / length, k1 = (s + piece) / length;
+        canvas.stroke(ax + (bx - ax) * k0, ay + (by - ay) * k0, ax + (bx - ax) * k1, ay + (by - ay) * k1, radius, color, 1.0f);
+      }
+      s += piece;
+      phase += piece;
+    }
+  }
+}
+
+void scale_bar(Canvas& canvas, double scale) {
+  double metres = 1;
+  for (const double m : {2.0, 5.0, 10.0, 20.0, 50.0}) {
+    if (metres * scale < 90) metres = m;
+  }
+  const int w = static_cast<int>(metres * scale), x = 24, y = canvas.height() - 34;
+  canvas.rect(x - 10, y - 26, w + 20, 48, {1, 1, 1}, 0.75f);
+  canvas.rect(x, y, w, 4, kInk, 1.0f);
+  canvas.rect(x, y - 5, 3, 14, kInk, 1.0f);
+  canvas.rect(x + w - 3, y - 5, 3, 14, kInk, 1.0f);
+  canvas.text(x + w / 2 - 14, y - 20, std::to_string(static_cast<int>(metres)) + " m", 3, kInk);
+}
+
+}  // namespace
+
+Rgb avatar_color(std::size_t index) {
+  static constexpr Rgb kColors[] = {{0.90f, 0.45f, 0.05f}, {0.55f, 0.15f, 0.65f}, {0.05f, 0.55f, 0.50f},
+                                    {0.75f, 0.10f, 0.40f}, {0.45f, 0.45f, 0.05f}, {0.35f, 0.25f, 0.15f}};
+  return kColors[index % std::size(kColors)];
+}
+
+Canvas draw_map(const MapContent& m) {
+  const gsnav::Aabb<double> box = m.navmesh->bounds();
+  const double w = box.high.x - box.low.x + 2 * kMargin, h = box.high.z - box.low.z + 2 * kMargin;
+  const Frame f{box.low.x - kMargin, box.low.z - kMargin, 1200.0 / std::max(w, h)};
+  Canvas canvas(std::max(1, static_cast<int>(w * f.scale)), std::max(1, static_cast<int>(h * f.scale)), {0.96f, 0.96f, 0.96f});
+  if (m.cloud != nullptr) draw_scene(canvas, f, m, m.start.y);
+  canvas.rect(0, 0, canvas.width(), canvas.height(), {1, 1, 1}, 0.30f);
+
+  for (const auto& t : m.navmesh->triangles()) {
+    const gsnav::Vec2<double> p[3] = {{f.x(t[0]), f.y(t[0])}, {f.x(t[1]), f.y(t[1])}, {f.x(t[2]), f.y(t[2])}};
+    canvas.triangle(p, kNavMesh, 0.38f);
+    for (int i = 0; i < 3; ++i) canvas.stroke(p[i].x, p[i].y, p[(i + 1) % 3].x, p[(i + 1) % 3].y, 0.4, kEdge, 0.35f);
+  }
+  for (std::size_t i = 0; i < m.avatars.size(); ++i) polyline(canvas, f, m.avatars[i], 1.6, avatar_color(i), 0.75f);
+  for (std::size_t k = 0; k < m.snapshots.size(); ++k) {
+    const bool last = k + 1 == m.snapshots.size();
+    for (const gsnav::DynamicCapsule& body : m.snapshots[k]) {
+      const gsnav::Capsule<double>& c = body.motion.begin;
+      canvas.stroke(f.x(c.p0), f.y(c.p0), f.x(c.p1), f.y(c.p1), c.radius * f.scale, avatar_color(body.avatar), last ? 0.55f : 0.13f);
+    }
+  }
+  dashed(canvas, f, m.shortest, 1.8, kShortest);
+  polyline(canvas, f, m.agent, 3.2, {1, 1, 1}, 0.9f);
+  polyline(canvas, f, m.agent, 2.2, kAgent, 1.0f);
+  if (!m.agent.empty()) {
+    const Vec3d& end = m.agent.back();
+    canvas.disc(f.x(end), f.y(end), std::max(m.agent_radius * f.scale, 4.0), kAgent, 0.9f);
+  }
+  canvas.disc(f.x(m.start), f.y(m.start), 8, {1, 1, 1}, 1.0f);
+  canvas.disc(f.x(m.start), f.y(m.start), 6, kStart, 1.0f);
+  canvas.disc(f.x(m.goal), f.y(m.goal), 4, kGoal, 1.0f);
+  canvas.ring(f.x(m.goal), f.y(m.goal), 10, 3, kGoal, 1.0f);
+  scale_bar(canvas, f.scale);
+  return canvas;
+}
+
+}  // namespace nav_loop

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gsnav/sim/episode.hpp"
+#include "gsnav/sim/metrics.hpp"
+#include "options.hpp"
+
+namespace nav_loop {
+
+/// Wall-clock seconds of the parts of a run.
+struct Timings {
+  double load = 0, navmesh = 0;        ///< once
+  double physics = 0, render = 0, policy = 0;  ///< summed over steps
+  std::size_t steps = 0, renders = 0;
+};
+
+/// What the report says about where the run took place.
+struct SceneFacts {
+  std::string name;
+  std::string backend;
+  std::string navmesh_source;
+  std::size_t gaussians = 0, avatar_gaussians = 0;
+  std::size_t navmesh_polygons = 0, islands = 0;
+  double area = 0, island_area = 0;  ///< square metres: all, and the largest island
+};
+
+struct EpisodeRecord {
+  gsnav::PointNavEpisode episode;
+  gsnav::EpisodeMetrics metrics;
+  bool pushed = false;  ///< an avatar walked into the agent
+};
+
+/// Shows how far the run is: one line that is rewritten on a terminal, one line an episode elsewhere.
+class Progress {
+ public:
+  explicit Progress(int episodes);
+  void step(int episode, std::size_t step, double distance);
+  void episode(int episode, const EpisodeRecord& record);
+
+ private:
+  int episodes_;
+  bool terminal_;
+};
+
+void print_table(const Options& options, const SceneFacts& facts, const std::vector<EpisodeRecord>& records,
+                 const Timings& timings);
+
+/// Writes metrics.json. Errors: file_not_found naming the path.
+gsnav::Status write_json(const std::string& path, const Options& options, const SceneFacts& facts,
+                         const std::vector<EpisodeRecord>& records, const Timings& timings);
+
+}  // namespace nav_loop

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "gsnav/nav/step.hpp"
+
+namespace gsnav {
+
+/// Smallest distance during a tick from an agent that goes along `path` (StepResult::path; it stands
+/// still after the last point) to each avatar among `bodies`: surface to surface, metres, negative in
+/// overlap. `out[k]` belongs to bodies.groups()[k].
+///
+/// The tick is sampled at nine times and at the path's corners; around the least, the time is
+/// narrowed to 1/2000 of the tick. Between samples a capsule can only come nearer by what it moves in
+/// an eighth of a tick.
+void closest_approach(std::span<const WalkPoint> path, double radius, double height,
+                      const CapsuleSet& bodies, std::vector<double>& out);
+
+}  // namespace gsnav

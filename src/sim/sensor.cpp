@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/sim/sensor.hpp"
+
+#include "gsnav/ops/render_config.hpp"
+
+namespace gsnav {
+
+std::vector<SensorSpec> rgbd_sensors(int height, int width, double hfov, const Vec3d& position) {
+  SensorSpec rgb;
+  rgb.resolution = {height, width};
+  rgb.hfov = hfov;
+  rgb.position = position;
+  SensorSpec depth = rgb;
+  depth.uuid = "depth";
+  depth.kind = SensorKind::depth;
+  return {rgb, depth};
+}
+
+Status validate(const SensorSpec& s) {
+  const auto bad = [&](const char* field, const std::string& value, const char* rule) {
+    return Status(Errc::invalid_argument, "SensorSpec \"" + s.uuid + "\": " + field + " = " + value + ": " + rule);
+  };
+  if (s.uuid.empty()) return {Errc::invalid_argument, "SensorSpec.uuid is empty: a sensor needs a name"};
+  for (const int side : s.resolution) {
+    if (side < 1 || side > kMaxImageSide) return bad("resolution", std::to_string(side), "must be in [1, 16384]");
+  }
+  if (!(s.hfov > 0 && s.hfov < 180)) return bad("hfov", std::to_string(s.hfov), "must be in (0, 180) degrees");
+  if (!is_finite(s.position)) return bad("position", "not finite", "must be finite");
+  if (!is_finite(s.orientation)) return bad("orientation", "not finite", "must be finite");
+  if (!(s.near_plane > 0 && is_finite(s.near_plane))) {
+    return bad("near_plane", std::to_string(s.near_plane), "must be positive");
+  }
+  if (!(s.near_sigma >= 0 && is_finite(s.near_sigma))) {
+    return bad("near_sigma", std::to_string(s.near_sigma), "must be >= 0");
+  }
+  if (!(s.far_plane > s.near_plane)) {
+    return bad("far_plane", std::to_string(s.far_plane), "must be beyond near_plane");
+  }
+  return {};
+}
+
+bool same_camera(const SensorSpec& a, const SensorSpec& b) noexcept {
+  return a.resolution == b.resolution && a.hfov == b.hfov && a.position == b.position &&
+         a.orientation == b.orientation && a.near_plane == b.near_plane && a.near_sigma == b.near_sigma &&
+         a.far_plane == b.far_plane;
+}
+
+Camera sensor_camera(const SensorSpec& spec, const Vec3d& base, const Quatd& rotation) noexcept {
+  const Vec3d& o = spec.orientation;
+  const Quatd local = axis_angle(Vec3d{0, 0, 1}, o.z) * axis_angle(Vec3d{0, 1, 0}, o.y) *
+                      axis_angle(Vec3d{1, 0, 0}, o.x);
+  const Mat3d sensor_from_world = transpose(rotation_matrix(rotation * local));
+  Camera c;
+  c.set_hfov(spec.resolution[1], spec.resolution[0], spec.hfov);
+  c.viewmat.linear = {{sensor_from_world.row[0], -sensor_from_world.row[1], -sensor_from_world.row[2]}};
+  c.viewmat.translation = -(c.viewmat.linear * (base + rotate(rotation, spec.position)));
+  c.near_plane = spec.near_plane;
+  c.near_sigma = spec.near_sigma;
+  return c;
+}
+
+void to_bytes(std::span<const float> rgb, std::span<std::uint8_t> out) noexcept {
+  for (std::size_t i = 0; i < rgb.size() && i < out.size(); ++i) {
+    out[i] = static_cast<std::uint8_t>(255.0f * clamp(rgb[i], 0.0f, 1.0f) + 0.5f);
+  }
+}
+
+}  // namespace gsnav
