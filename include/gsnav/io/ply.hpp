@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav::io {
+
+/// Reads a Gaussian PLY in INRIA's layout: x y z (metres), f_dc_0..2, opacity (logit), scale_0..2
+/// (natural logarithm), rot_0..3 (w, x, y, z, any length), and f_rest_* for SH degree 1 to 3.
+///
+/// Properties may come in any order and any scalar type; others (nx ny nz, ...) and other elements are
+/// skipped. Binary of either byte order and ascii. f_rest is channel-major with 0, 9, 24 or 45
+/// properties; of 72 (degree 4) the bands up to degree 3 are read, with a warning. A comment
+/// `SplatRenderMode: mip` or `antialiased 1` sets the cloud's filter to mip.
+///
+/// Rows that hold no drawable Gaussian are dropped and counted in the report. Errors: file_not_found;
+/// invalid_file (malformed header, fewer rows than promised, a property missing or twice, a count of
+/// f_rest that is none of the above); unsupported (compressed PLY, list properties of a vertex);
+/// out_of_memory. Never throws.
+Result<LoadedCloud> load_ply(const std::filesystem::path& path);
+
+/// The same for a file's bytes; `source` names them in messages and in the report.
+Result<LoadedCloud> parse_ply(std::span<const std::byte> bytes, std::string source);
+
+/// How save_ply writes.
+struct SavePlyOptions {
+  /// x y z as float64. INRIA's layout has float32, which far from zero (from some kilometres on) is
+  /// coarser than what a GaussianCloud holds; several readers accept nothing else.
+  bool double_positions = false;
+};
+
+/// Writes a cloud in INRIA's layout, little endian, float32, f_rest as the cloud's degree needs. The
+/// mip filter becomes a comment; eps2d and sort_order have no place in the file. An opacity of exactly
+/// 1 is written as +infinity and a scale of 0 as -infinity, which load_ply reads back.
+/// Errors: file_not_found (the parent folder is missing, or the file cannot be written);
+/// invalid_argument (arrays of different lengths).
+Status save_ply(const std::filesystem::path& path, const GaussianCloud& cloud,
+                const SavePlyOptions& options = {});
+
+}  // namespace gsnav::io

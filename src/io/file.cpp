@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "file.hpp"
+
+#include <bit>
+#include <cerrno>
+#include <system_error>
+
+namespace gsnav::io::detail {
+
+// Every binary format here is little-endian and read by memcpy.
+static_assert(std::endian::native == std::endian::little, "gsnav::io needs a little-endian machine");
+
+Result<FileBytes> read_file(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) return {Errc::file_not_found, name + ": no such file"};
+  if (!std::filesystem::is_regular_file(status)) {
+    return {Errc::file_not_found, name + ": not a regular file"};
+  }
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) return {Errc::file_not_found, name + ": " + error.message()};
+  if (size > PTRDIFF_MAX) return {Errc::out_of_memory, name + ": too large"};
+  std::FILE* file = std::fopen(path.c_str(), "rb");
+  if (file == nullptr) {
+    return {Errc::file_not_found, name + ": " + std::generic_category().message(errno)};
+  }
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> closer(file, &std::fclose);
+  FileBytes bytes;
+  bytes.data.reset(new (std::nothrow) std::byte[static_cast<std::size_t>(size) + 1]);
+  if (!bytes.data) return {Errc::out_of_memory, name + ": not enough memory"};
+  bytes.size = std::fread(bytes.data.get(), 1, static_cast<std::size_t>(size), file);
+  if (std::ferror(file) != 0) return {Errc::invalid_file, name + ": reading failed"};
+  return bytes;
+}
+
+OutFile::~OutFile() {
+  if (file_ != nullptr) std::fclose(file_);
+}
+
+Status OutFile::open(const std::filesystem::path& path) {
+  path_ = path;
+  std::error_code error;
+  const std::filesystem::path parent = path.parent_path();
+  if (!parent.empty() && !std::filesystem::is_directory(parent, error)) {
+    return {Errc::file_not_found, path.string() + ": the folder " + parent.string() + " does not exist"};
+  }
+  file_ = std::fopen(path.c_str(), "wb");
+  if (file_ == nullptr) {
+    return {Errc::file_not_found,
+            path.string() + ": cannot be written: " + std::generic_category().message(errno)};
+  }
+  return {};
+}
+
+Status OutFile::close() {
+  const bool bad = failed_ || std::ferror(file_) != 0;
+  const bool bad_close = std::fclose(file_) != 0;
+  file_ = nullptr;
+  if (bad || bad_close) return {Errc::file_not_found, path_.string() + ": writing failed"};
+  return {};
+}
+
+std::string in_quotes(std::string_view text) {
+  constexpr std::size_t kLongest = 60;
+  std::string out = "'";
+  for (const char c : text.substr(0, kLongest)) out += c >= ' ' && c <= '~' ? c : '?';
+  return out + (text.size() > kLongest ? "...'" : "'");
+}
+
+}  // namespace gsnav::io::detail

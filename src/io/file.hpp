@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <new>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "gsnav/core/status.hpp"
+
+namespace gsnav::io::detail {
+
+/// A whole file in memory, not zeroed before it is read.
+struct FileBytes {
+  std::unique_ptr<std::byte[]> data;
+  std::size_t size = 0;
+  std::span<const std::byte> span() const noexcept { return {data.get(), size}; }
+};
+
+/// Reads a regular file. Folders, pipes and devices are refused: reading one could wait for ever.
+Result<FileBytes> read_file(const std::filesystem::path& path);
+
+/// A file being written; what goes wrong is kept until close().
+class OutFile {
+ public:
+  OutFile() = default;
+  OutFile(const OutFile&) = delete;
+  OutFile& operator=(const OutFile&) = delete;
+  ~OutFile();
+
+  /// Names the parent folder where that is what is missing.
+  Status open(const std::filesystem::path& path);
+  void write(const void* data, std::size_t size) {
+    failed_ = failed_ || std::fwrite(data, 1, size, file_) != size;
+  }
+  std::FILE* handle() noexcept { return file_; }
+  Status close();
+
+ private:
+  std::filesystem::path path_;
+  std::FILE* file_ = nullptr;
+  bool failed_ = false;
+};
+
+/// Runs `f`, turning a failed allocation into a Status; `what` names the file.
+template <class F>
+auto guarded(const std::string& what, F&& f) -> decltype(f()) {
+  try {
+    return f();
+  } catch (const std::bad_alloc&) {
+    return Status(Errc::out_of_memory, what + ": not enough memory");
+  } catch (const std::length_error&) {
+    return Status(Errc::out_of_memory, what + ": not enough memory");
+  } catch (const std::filesystem::filesystem_error& e) {
+    return Status(Errc::file_not_found, what + ": " + e.what());
+  }
+}
+
+/// Reads a little-endian value at `p`, which need not be aligned.
+template <class T>
+T load_le(const std::byte* p) noexcept {
+  T value;
+  std::memcpy(&value, p, sizeof value);
+  return value;
+}
+
+/// Text from a file for an error message: control characters replaced, cut where long.
+std::string in_quotes(std::string_view text);
+
+}  // namespace gsnav::io::detail

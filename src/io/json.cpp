@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "json.hpp"
+
+#include <cmath>
+
+#include "file.hpp"
+
+namespace gsnav::io::detail {
+
+Result<Json> parse_json(std::span<const std::byte> text, const std::string& source) {
+  const char* first = reinterpret_cast<const char*>(text.data());
+  try {
+    return Json::parse(first, first + text.size());
+  } catch (const Json::parse_error& e) {
+    return {Errc::invalid_file, source + ": not valid JSON at byte " + std::to_string(e.byte)};
+  } catch (const Json::exception&) {
+    return {Errc::invalid_file, source + ": JSON with a number out of range"};
+  }
+}
+
+std::string shown(const Json& value) {
+  return in_quotes(value.is_structured() ? std::string(value.type_name())
+                                         : value.dump(-1, ' ', true, Json::error_handler_t::replace));
+}
+
+const Json* member(const Json& object, const char* key) {
+  if (!object.is_object()) return nullptr;
+  const auto found = object.find(key);
+  return found == object.end() ? nullptr : &*found;
+}
+
+namespace {
+
+Status missing(const char* key, const std::string& where) {
+  return {Errc::invalid_file, where + ": '" + key + "' is missing"};
+}
+
+}  // namespace
+
+Result<double> get_number(const Json& object, const char* key, const std::string& where) {
+  const Json* value = member(object, key);
+  if (value == nullptr) return missing(key, where);
+  if (!value->is_number() || !std::isfinite(value->get<double>())) {
+    return {Errc::invalid_file,
+            where + ": '" + key + "' is " + shown(*value) + ", must be a finite number"};
+  }
+  return value->get<double>();
+}
+
+Result<std::int64_t> get_integer(const Json& object, const char* key, std::int64_t low,
+                                 std::int64_t high, const std::string& where) {
+  const Json* value = member(object, key);
+  if (value == nullptr) return missing(key, where);
+  // Some writers put a dot behind every number.
+  const double number = value->is_number() ? value->get<double>() : NAN;
+  if (!(number >= static_cast<double>(low) && number <= static_cast<double>(high)) ||
+      number != std::floor(number)) {
+    return {Errc::invalid_file, where + ": '" + key + "' is " + shown(*value) +
+                                    ", must be an integer from " + std::to_string(low) + " to " +
+                                    std::to_string(high)};
+  }
+  return static_cast<std::int64_t>(number);
+}
+
+Result<std::vector<double>> get_numbers(const Json& object, const char* key, std::size_t size,
+                                        const std::string& where) {
+  const Json* value = member(object, key);
+  if (value == nullptr) return missing(key, where);
+  if (!value->is_array() || value->size() != size) {
+    const std::string found =
+        value->is_array() ? std::to_string(value->size()) + " values" : shown(*value);
+    return {Errc::invalid_file,
+            where + ": '" + key + "' is " + found + ", must be " + std::to_string(size) + " numbers"};
+  }
+  std::vector<double> out;
+  out.reserve(size);
+  for (std::size_t i = 0; i < size; ++i) {
+    const Json& item = (*value)[i];
+    if (!item.is_number() || !std::isfinite(item.get<double>())) {
+      return {Errc::invalid_file, where + ": '" + key + "[" + std::to_string(i) + "]' is " +
+                                      shown(item) + ", must be a finite number"};
+    }
+    out.push_back(item.get<double>());
+  }
+  return out;
+}
+
+}  // namespace gsnav::io::detail

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gsnav/core/status.hpp"
+
+namespace gsnav::io::detail {
+
+using Json = nlohmann::json;
+
+/// Parses JSON text; the error says at which byte it stops making sense.
+Result<Json> parse_json(std::span<const std::byte> text, const std::string& source);
+
+/// A value of a file as it is shown in an error message.
+std::string shown(const Json& value);
+
+/// Member `key` of `object`, or null where it is none or lacks it.
+const Json* member(const Json& object, const char* key);
+
+/// Reads `key` of `object` with messages that begin with `where` ("file: camera 3").
+Result<double> get_number(const Json& object, const char* key, const std::string& where);
+/// ... an integer in [low, high].
+Result<std::int64_t> get_integer(const Json& object, const char* key, std::int64_t low,
+                                 std::int64_t high, const std::string& where);
+/// ... an array of exactly `size` finite numbers.
+Result<std::vector<double>> get_numbers(const Json& object, const char* key, std::size_t size,
+                                        const std::string& where);
+
+}  // namespace gsnav::io::detail

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/io/mesh_file.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <string_view>
+
+#include "file.hpp"
+
+namespace gsnav::io {
+namespace {
+
+using detail::in_quotes;
+
+std::string_view take_word(std::string_view& line) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!line.empty() && blank(line.front())) line.remove_prefix(1);
+  std::size_t n = 0;
+  while (n < line.size() && !blank(line[n])) ++n;
+  const std::string_view word = line.substr(0, n);
+  line.remove_prefix(n);
+  return word;
+}
+
+/// Parses all of `word`; false where it is anything but one number.
+template <class T>
+bool parse(std::string_view word, T& value) {
+  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return !word.empty() && error == std::errc{} && end == word.data() + word.size();
+}
+
+class ObjParser {
+ public:
+  explicit ObjParser(const std::string& source) : source_(source) {}
+
+  Result<TriangleMesh> run(std::string_view text) {
+    for (std::size_t at = 0; at < text.size();) {
+      ++line_number_;
+      const std::size_t end = std::min(text.find('\n', at), text.size());
+      std::string_view line = text.substr(at, end - at);
+      at = end + 1;
+      const std::string_view word = take_word(line);
+      Status s;
+      if (word == "v") s = vertex(line);
+      if (word == "f") s = face(line);
+      if (!s) return s;
+    }
+    return std::move(mesh_);
+  }
+
+ private:
+  Status fail(const std::string& what) const {
+    return {Errc::invalid_file, source_ + ": line " + std::to_string(line_number_) + ": " + what};
+  }
+
+  Status vertex(std::string_view line) {
+    Vec3f v;
+    for (int k = 0; k < 3; ++k) {
+      const std::string_view word = take_word(line);
+      double value = 0;
+      if (!parse(word, value) || !std::isfinite(static_cast<float>(value))) {
+        return fail(std::string("coordinate ") + "xyz"[k] + " is " + in_quotes(word) +
+                    ", no finite number");
+      }
+      v[k] = static_cast<float>(value);
+    }
+    mesh_.vertices.push_back(v);  // a weight or a colour may follow
+    return {};
+  }
+
+  Status face(std::string_view line) {
+    std::uint32_t first = 0, last = 0;
+    int corners = 0;
+    for (std::string_view word = take_word(line); !word.empty(); word = take_word(line), ++corners) {
+      const std::int64_t count = static_cast<std::int64_t>(mesh_.vertices.size());
+      std::int64_t index = 0;
+      if (word.front() == '#') break;
+      if (!parse(word.substr(0, word.find('/')), index) || index == 0 || index > count ||
+          index < -count) {
+        return fail("face corner " + in_quotes(word) + ", must be 1 to " + std::to_string(count) +
+                    " or -1 to -" + std::to_string(count));
+      }
+      const auto corner = static_cast<std::uint32_t>(index > 0 ? index - 1 : count + index);
+      if (corners == 0) first = corner;
+      if (corners >= 2) mesh_.triangles.push_back({first, last, corner});
+      last = corner;
+    }
+    if (corners < 3) return fail("a face of " + std::to_string(corners) + " corners, must be 3 or more");
+    return {};
+  }
+
+  const std::string& source_;
+  TriangleMesh mesh_;
+  std::size_t line_number_ = 0;
+};
+
+}  // namespace
+
+Result<TriangleMesh> load_obj(const std::filesystem::path& path) {
+  const std::string source = path.string();
+  return detail::guarded(source, [&]() -> Result<TriangleMesh> {
+    const auto file = detail::read_file(path);
+    if (!file) return file.status();
+    return ObjParser(source).run({reinterpret_cast<const char*>(file->data.get()), file->size});
+  });
+}
+
+}  // namespace gsnav::io

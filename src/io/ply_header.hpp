@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gsnav/core/status.hpp"
+
+namespace gsnav::io::detail {
+
+enum class PlyFormat { ascii, little, big };
+enum class PlyType : std::uint8_t { i8, u8, i16, u16, i32, u32, f32, f64 };
+
+constexpr std::size_t size_of(PlyType t) noexcept {
+  constexpr std::size_t sizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return sizes[static_cast<std::size_t>(t)];
+}
+
+struct PlyProperty {
+  std::string name;
+  PlyType type = PlyType::f32;
+  bool is_list = false;
+  PlyType count_type = PlyType::u8;
+  std::size_t offset = 0;  ///< in a row; meaningful while no list comes before
+};
+
+struct PlyElement {
+  std::string name;
+  std::uint64_t count = 0;  ///< as the header says, which may be a lie
+  std::vector<PlyProperty> properties;
+  std::size_t stride = 0;  ///< bytes a row, lists left out
+  bool has_list = false;
+
+  const PlyProperty* find(const std::string& property) const {
+    for (const PlyProperty& p : properties) {
+      if (p.name == property) return &p;
+    }
+    return nullptr;
+  }
+};
+
+struct PlyHeader {
+  PlyFormat format = PlyFormat::little;
+  std::vector<PlyElement> elements;
+  bool mip = false;      ///< a comment asks for the antialiased filter
+  std::size_t size = 0;  ///< bytes up to the first row
+};
+
+/// Parses the text up to end_header. Errors name `source`, the line's number and the word.
+Result<PlyHeader> parse_ply_header(std::span<const std::byte> bytes, const std::string& source);
+
+}  // namespace gsnav::io::detail

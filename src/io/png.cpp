@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <png.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csetjmp>
+
+#include "file.hpp"
+#include "gsnav/io/image_file.hpp"
+
+namespace gsnav::io {
+namespace {
+
+constexpr int kLargestSide = 65535;
+constexpr std::uint64_t kDeflateRatio = 1032;  // no deflate stream grows more than this
+
+// libpng leaves by longjmp, so what it may leave holds no object with a destructor.
+void on_error(png_structp png, png_const_charp) { png_longjmp(png, 1); }
+void on_warning(png_structp, png_const_charp) {}
+
+bool encode(std::FILE* file, png_const_bytep pixels, int width, int height, int bits, int channels) {
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, on_error, on_warning);
+  if (png == nullptr) return false;
+  png_infop info = png_create_info_struct(png);
+  if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {
+    png_destroy_write_struct(&png, &info);
+    return false;
+  }
+  png_init_io(png, file);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits,
+               channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(png, info);
+  if (bits == 16) png_set_swap(png);
+  const std::size_t stride = static_cast<std::size_t>(width) * static_cast<std::size_t>(channels) *
+                             static_cast<std::size_t>(bits / 8);
+  for (int row = 0; row < height; ++row)
+    png_write_row(png, pixels + static_cast<std::size_t>(row) * stride);
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
+  return true;
+}
+
+Status save(const std::filesystem::path& path, const void* pixels, std::size_t samples, int width,
+            int height, int bits, int channels) {
+  if (width <= 0 || height <= 0 || width > kLargestSide || height > kLargestSide ||
+      samples != static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+                     static_cast<std::size_t>(channels)) {
+    return {Errc::invalid_argument, path.string() + ": " + std::to_string(samples) + " samples are no " +
+                                        std::to_string(width) + " x " + std::to_string(height) +
+                                        " image of " + std::to_string(channels) + " channels"};
+  }
+  detail::OutFile file;
+  if (Status s = file.open(path); !s) return s;
+  const bool ok =
+      encode(file.handle(), static_cast<png_const_bytep>(pixels), width, height, bits, channels);
+  Status closed = file.close();
+  if (!ok) return {Errc::file_not_found, path.string() + ": writing the PNG failed"};
+  return closed;
+}
+
+struct Source {
+  const std::byte* data;
+  std::size_t left;
+};
+
+void read_bytes(png_structp png, png_bytep to, std::size_t n) {
+  Source& source = *static_cast<Source*>(png_get_io_ptr(png));
+  if (n > source.left) png_error(png, "truncated");
+  std::memcpy(to, source.data, n);
+  source.data += n;
+  source.left -= n;
+}
+
+/// Decoder with its own lifetime, so that allocation happens outside of setjmp's reach.
+class Decoder {
+ public:
+  Decoder() = default;
+  Decoder(const Decoder&) = delete;
+  Decoder& operator=(const Decoder&) = delete;
+  ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
+
+  bool read_header(std::span<const std::byte> bytes) {
+    source_ = {bytes.data(), bytes.size()};
+    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, on_error, on_warning);
+    info_ = png_ != nullptr ? png_create_info_struct(png_) : nullptr;
+    if (info_ == nullptr || setjmp(png_jmpbuf(png_)) != 0) return false;
+    png_set_user_limits(png_, kLargestSide, kLargestSide);
+    png_set_read_fn(png_, &source_, read_bytes);
+    png_read_info(png_, info_);
+    png_set_expand(png_);
+    if (png_get_bit_depth(png_, info_) == 16) png_set_swap(png_);
+    png_set_interlace_handling(png_);
+    png_read_update_info(png_, info_);
+    return true;
+  }
+  bool read_rows(png_bytepp rows) {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;
+    png_read_image(png_, rows);
+    png_read_end(png_, nullptr);
+    return true;
+  }
+
+  std::size_t width() const { return png_get_image_width(png_, info_); }
+  std::size_t height() const { return png_get_image_height(png_, info_); }
+  std::size_t stride() const { return png_get_rowbytes(png_, info_); }
+  int channels() const { return png_get_channels(png_, info_); }
+  int bits() const { return png_get_bit_depth(png_, info_); }
+
+ private:
+  png_structp png_ = nullptr;
+  png_infop info_ = nullptr;
+  Source source_{};
+};
+
+Result<PngImage> decode(std::span<const std::byte> bytes, const std::string& name) {
+  Decoder decoder;
+  if (!decoder.read_header(bytes))
+    return {Errc::invalid_file, name + ": not a PNG, or its header is damaged"};
+  const std::size_t size = decoder.stride() * decoder.height();
+  // Expanding 1-bit palettes makes at most 32 bits of one.
+  if (size / 32 > kDeflateRatio * bytes.size()) {
+    return {Errc::invalid_file, name + ": " + std::to_string(decoder.width()) + " x " +
+                                    std::to_string(decoder.height()) + " pixels cannot be in " +
+                                    std::to_string(bytes.size()) + " bytes"};
+  }
+  std::vector<png_byte> pixels(size);
+  std::vector<png_bytep> rows(decoder.height());
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = pixels.data() + i * decoder.stride();
+  if (!decoder.read_rows(rows.data()))
+    return {Errc::invalid_file, name + ": damaged or truncated PNG data"};
+  PngImage image;
+  image.width = static_cast<int>(decoder.width());
+  image.height = static_cast<int>(decoder.height());
+  image.channels = decoder.channels();
+  image.bits = decoder.bits();
+  if (image.bits == 16) {
+    image.samples.resize(pixels.size() / 2);
+    std::memcpy(image.samples.data(), pixels.data(), pixels.size());
+  } else {
+    image.samples.assign(pixels.begin(), pixels.end());
+  }
+  return image;
+}
+
+}  // namespace
+
+Status save_png_rgb(const std::filesystem::path& path, std::span<const float> rgb, int width,
+                    int height) {
+  return detail::guarded(path.string(), [&]() -> Status {
+    std::vector<std::uint8_t> bytes(rgb.size());
+    // fmax drops a NaN.
+    std::transform(rgb.begin(), rgb.end(), bytes.begin(), [](float x) {
+      return static_cast<std::uint8_t>(std::lround(255.0f * std::fmin(std::fmax(x, 0.0f), 1.0f)));
+    });
+    return save(path, bytes.data(), bytes.size(), width, height, 8, 3);
+  });
+}
+
+Status save_png_rgb8(const std::filesystem::path& path, std::span<const std::uint8_t> rgb, int width,
+                     int height) {
+  return detail::guarded(path.string(),
+                         [&] { return save(path, rgb.data(), rgb.size(), width, height, 8, 3); });
+}
+
+Status save_png_gray16(const std::filesystem::path& path, std::span<const std::uint16_t> values,
+                       int width, int height) {
+  return detail::guarded(path.string(),
+                         [&] { return save(path, values.data(), values.size(), width, height, 16, 1); });
+}
+
+Result<PngImage> load_png(const std::filesystem::path& path) {
+  return detail::guarded(path.string(), [&]() -> Result<PngImage> {
+    const auto file = detail::read_file(path);
+    if (!file) return file.status();
+    return decode(file->span(), path.string());
+  });
+}
+
+}  // namespace gsnav::io

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/io/sog.hpp"
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "file.hpp"
+#include "sog_meta.hpp"
+#include "webp.hpp"
+#include "zip.hpp"
+
+namespace gsnav::io {
+namespace {
+
+using detail::Codebook;
+using detail::RgbaImage;
+using detail::SogMeta;
+
+// A constant plane of 16383 x 16383 pixels fits in some bytes of WebP. Real planes hold about one
+// Gaussian a byte of all files; what claims many times that is refused before memory is asked for.
+constexpr std::size_t kMostGaussiansPerByte = 32;
+constexpr std::size_t kGaussianSlack = std::size_t{1} << 20;
+
+/// The files of a SOG, whether in a folder or in a bundle.
+class SogFiles {
+ public:
+  Status open(const std::filesystem::path& path) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) {
+      folder_ = path;
+    } else if (path.extension() == ".json") {
+      folder_ = path.parent_path();
+      meta_ = path.filename().string();
+    } else {
+      return open_bundle(path);
+    }
+    return {};
+  }
+
+  const std::string& meta() const noexcept { return meta_; }
+  /// How a file of the set is called in messages.
+  std::string label(const std::string& name) const {
+    return zip_ ? bundle_name_ + ": " + name : (folder_ / name).string();
+  }
+
+  Result<std::vector<std::byte>> read(const std::string& name) const {
+    if (zip_) return zip_->read(name);
+    auto file = detail::read_file(folder_ / name);
+    if (!file) return file.status();
+    return std::vector<std::byte>(file->span().begin(), file->span().end());
+  }
+
+ private:
+  Status open_bundle(const std::filesystem::path& path) {
+    bundle_name_ = path.string();
+    auto file = detail::read_file(path);
+    if (!file) return file.status();
+    bundle_ = std::move(*file);
+    auto zip = detail::ZipReader::open(bundle_.span(), bundle_name_);
+    if (!zip) return zip.status();
+    zip_ = std::move(*zip);
+    return {};
+  }
+
+  std::filesystem::path folder_;
+  std::string meta_ = "meta.json";
+  std::string bundle_name_;
+  detail::FileBytes bundle_;
+  std::optional<detail::ZipReader> zip_;
+};
+
+/// A plane: its bytes first, its pixels once all sizes have been checked.
+struct Plane {
+  std::string name, label;
+  std::vector<std::byte> bytes;
+  detail::WebpSize size;
+  RgbaImage image;
+
+  Status read(const SogFiles& files, const std::string& file) {
+    name = file;
+    label = files.label(file);
+    auto content = files.read(file);
+    if (!content) return content.status();
+    bytes = std::move(*content);
+    const auto found = detail::webp_size(bytes, label);
+    if (!found) return found.status();
+    size = *found;
+    return {};
+  }
+  Status decode() {
+    auto decoded = detail::decode_webp(bytes, label);
+    if (!decoded) return decoded.status();
+    image = std::move(*decoded);
+    bytes = {};
+    return {};
+  }
+  std::string dimensions() const {
+    return std::to_string(size.width) + " x " + std::to_string(size.height);
+  }
+  /// Error about pixel i of this plane.
+  Status fail(std::size_t i, const std::string& what) const {
+    return {Errc::invalid_file, label + ": pixel " + std::to_string(i) + ": " + what};
+  }
+};
+
+class SogReader {
+ public:
+  SogReader(const SogFiles& files, SogMeta meta) : files_(files), meta_(std::move(meta)) {}
+
+  Result<LoadedCloud> run(const std::string& source) {
+    if (Status s = read_planes(); !s) return s;
+    GaussianCloudBuilder builder(meta_.degree, source);
+    builder.cloud().filter = meta_.antialias ? Filter::mip : Filter::classic;
+    builder.reserve(meta_.count);
+    RawGaussian raw;
+    std::array<float, 45> rest;
+    raw.shN = rest.data();
+    for (std::size_t i = 0; i < meta_.count; ++i) {
+      if (Status s = gaussian(i, raw, rest); !s) return s;
+      builder.add(raw);
+    }
+    return LoadedCloud{std::move(builder.cloud()), std::move(builder.report())};
+  }
+
+ private:
+  Status read_planes() {
+    const std::pair<Plane*, const std::string*> wanted[] = {
+        {&low_, &meta_.means_low}, {&high_, &meta_.means_high}, {&scales_, &meta_.scales},
+        {&quats_, &meta_.quats},   {&sh0_, &meta_.sh0},         {&labels_, &meta_.labels}};
+    const std::size_t planes = meta_.degree > 0 ? 6 : 5;
+    std::size_t bytes = 0;
+    for (std::size_t k = 0; k < planes; ++k) {
+      Plane& p = *wanted[k].first;
+      if (Status s = p.read(files_, *wanted[k].second); !s) return s;
+      bytes += p.bytes.size();
+      if (p.size.width != low_.size.width || p.size.height != low_.size.height) {
+        return {Errc::invalid_file, p.label + ": " + p.dimensions() + " pixels, but " + low_.name +
+                                        " has " + low_.dimensions()};
+      }
+    }
+    const std::size_t pixels = low_.size.width * low_.size.height;
+    const std::string where =
+        files_.label(files_.meta()) + ": 'count' is " + std::to_string(meta_.count);
+    if (meta_.count > pixels) {
+      return {Errc::invalid_file, where + ", but the planes have " + low_.dimensions() + " pixels"};
+    }
+    if (pixels > kGaussianSlack + kMostGaussiansPerByte * bytes) {
+      return {Errc::invalid_file, where + " in planes of " + low_.dimensions() + " pixels, which " +
+                                      std::to_string(bytes) + " bytes are too few for"};
+    }
+    for (std::size_t k = 0; k < planes; ++k) {
+      if (Status s = wanted[k].first->decode(); !s) return s;
+    }
+    return meta_.degree > 0 ? read_palette() : Status();
+  }
+
+  Status read_palette() {
+    const std::size_t coefficients = static_cast<std::size_t>(sh_coefficient_count(meta_.degree) - 1);
+    if (Status s = centroids_.read(files_, meta_.centroids); !s) return s;
+    const std::size_t width = kEntriesPerRow * coefficients;
+    const std::size_t rows = (meta_.palette + kEntriesPerRow - 1) / kEntriesPerRow;
+    // The palette has at most 65536 entries, so a larger image only wastes memory.
+    if (centroids_.size.width != width || centroids_.size.height < rows ||
+        centroids_.size.height > kMostRows) {
+      return {Errc::invalid_file, centroids_.label + ": " + centroids_.dimensions() +
+                                      " pixels, must be " + std::to_string(width) + " x " +
+                                      std::to_string(rows) + " for " + std::to_string(meta_.palette) +
+                                      " entries of " + std::to_string(meta_.degree) + " bands"};
+    }
+    return centroids_.decode();
+  }
+
+  Status look_up(const Plane& plane, std::size_t pixel, std::size_t channel, const Codebook& book,
+                 double& value) const {
+    const std::size_t index = plane.image.pixel(pixel)[channel];
+    if (index >= book.size()) {
+      return plane.fail(pixel, "codebook index " + std::to_string(index) + ", the codebook has " +
+                                   std::to_string(book.size()) + " entries");
+    }
+    value = book[index];
+    return {};
+  }
+
+  Status gaussian(std::size_t i, RawGaussian& raw, std::array<float, 45>& rest) const {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int axis = static_cast<int>(k);
+      const unsigned steps = low_.image.pixel(i)[k] + 256u * high_.image.pixel(i)[k];
+      const double v = std::lerp(meta_.mins[k], meta_.maxs[k], steps / 65535.0);
+      raw.mean[axis] = std::copysign(std::expm1(std::fabs(v)), v);
+      double dc = 0;
+      if (Status s = look_up(scales_, i, k, meta_.log_scales[k], raw.log_scales[axis]); !s) return s;
+      if (Status s = look_up(sh0_, i, k, meta_.dc[k], dc); !s) return s;
+      raw.sh0[k] = static_cast<float>(dc);
+    }
+    raw.opacity_logit = meta_.opacity_logits[sh0_.image.pixel(i)[3]];
+    if (Status s = quaternion(i, raw.quat); !s) return s;
+    return meta_.degree > 0 ? palette_entry(i, rest) : Status();
+  }
+
+  /// Three components in [-1, 1] / sqrt(2); the fourth, the largest, is what unit length leaves.
+  Status quaternion(std::size_t i, Quatd& quat) const {
+    const std::uint8_t* p = quats_.image.pixel(i);
+    if (p[3] < kFirstMode) {
+      return quats_.fail(i, "quaternion mode " + std::to_string(p[3]) + ", must be 252 to 255");
+    }
+    double q[4], sum = 0;
+    const std::size_t largest = static_cast<std::size_t>(p[3] - kFirstMode);
+    for (std::size_t k = 0, stored = 0; k < 4; ++k) {
+      if (k == largest) continue;
+      q[k] = (p[stored++] / 255.0 - 0.5) * std::sqrt(2.0);
+      sum += q[k] * q[k];
+    }
+    q[largest] = std::sqrt(std::fmax(0.0, 1.0 - sum));
+    quat = {q[0], q[1], q[2], q[3]};
+    return {};
+  }
+
+  Status palette_entry(std::size_t i, std::array<float, 45>& rest) const {
+    const std::uint8_t* p = labels_.image.pixel(i);
+    const std::size_t label = p[0] + std::size_t{256} * p[1];
+    if (label >= meta_.palette) {
+      return labels_.fail(i, "label " + std::to_string(label) + ", the palette has " +
+                                 std::to_string(meta_.palette) + " entries");
+    }
+    const std::size_t coefficients = centroids_.size.width / kEntriesPerRow;
+    const std::size_t first =
+        label / kEntriesPerRow * centroids_.size.width + label % kEntriesPerRow * coefficients;
+    for (std::size_t k = 0; k < 3 * coefficients; ++k) {
+      double value = 0;
+      if (Status s = look_up(centroids_, first + k / 3, k % 3, meta_.rest, value); !s) return s;
+      rest[k] = static_cast<float>(value);
+    }
+    return {};
+  }
+
+  static constexpr int kFirstMode = 252;
+  static constexpr std::size_t kEntriesPerRow = 64, kMostRows = 1024;
+
+  const SogFiles& files_;
+  SogMeta meta_;
+  Plane low_, high_, scales_, quats_, sh0_, labels_, centroids_;
+};
+
+}  // namespace
+
+Result<LoadedCloud> load_sog(const std::filesystem::path& path) {
+  return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
+    SogFiles files;
+    if (Status s = files.open(path); !s) return s;
+    const auto text = files.read(files.meta());
+    if (!text) return text.status();
+    auto meta = detail::parse_sog_meta(*text, files.label(files.meta()));
+    if (!meta) return meta.status();
+    return SogReader(files, std::move(*meta)).run(path.string());
+  });
+}
+
+}  // namespace gsnav::io

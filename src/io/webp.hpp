@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gsnav/core/status.hpp"
+
+namespace gsnav::io::detail {
+
+/// Eight-bit pixels, row-major: [height][width][4], R G B A.
+struct RgbaImage {
+  std::size_t width = 0, height = 0;
+  std::vector<std::uint8_t> pixels;
+  const std::uint8_t* pixel(std::size_t i) const noexcept { return pixels.data() + 4 * i; }
+};
+
+/// What a WebP's header says, read before anything is allocated.
+struct WebpSize {
+  std::size_t width = 0, height = 0;
+};
+
+/// Errors: invalid_file (no WebP), unsupported (lossy or animated: planes hold numbers, not pictures).
+Result<WebpSize> webp_size(std::span<const std::byte> bytes, const std::string& what);
+
+/// Decodes a lossless WebP; alpha is left as stored, not multiplied into the colours.
+Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::string& what);
+
+}  // namespace gsnav::io::detail

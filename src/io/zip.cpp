@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "zip.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "file.hpp"
+
+namespace gsnav::io::detail {
+namespace {
+
+constexpr std::uint32_t kEndSignature = 0x06054b50, kCentralSignature = 0x02014b50,
+                        kLocalSignature = 0x04034b50;
+constexpr std::size_t kEndSize = 22, kCentralSize = 46, kLocalSize = 30, kLongestComment = 65535;
+constexpr std::uint16_t kStored = 0, kDeflated = 8, kEncrypted = 1;
+
+/// Offset of the record that ends an archive; a comment of unknown length may follow it.
+std::optional<std::size_t> find_end(std::span<const std::byte> bytes) {
+  if (bytes.size() < kEndSize) return std::nullopt;
+  const std::size_t last = bytes.size() - kEndSize;
+  const std::size_t first = last > kLongestComment ? last - kLongestComment : 0;
+  for (std::size_t at = last + 1; at-- > first;) {
+    if (load_le<std::uint32_t>(bytes.data() + at) == kEndSignature &&
+        load_le<std::uint16_t>(bytes.data() + at + 20) == last - at) {
+      return at;
+    }
+  }
+  return std::nullopt;
+}
+
+Status inflate_raw(std::span<const std::byte> packed, std::span<std::byte> out,
+                   const std::string& what) {
+  z_stream z{};
+  if (inflateInit2(&z, -MAX_WBITS) != Z_OK) return {Errc::out_of_memory, what + ": zlib has no memory"};
+  // zlib's counters are 32-bit, as are the sizes of an entry.
+  z.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(packed.data()));
+  z.avail_in = static_cast<uInt>(packed.size());
+  z.next_out = reinterpret_cast<Bytef*>(out.data());
+  z.avail_out = static_cast<uInt>(out.size());
+  const int code = inflate(&z, Z_FINISH);
+  const bool whole = code == Z_STREAM_END && z.avail_out == 0 && z.avail_in == 0;
+  inflateEnd(&z);
+  if (!whole) return {Errc::invalid_file, what + ": the deflated data do not give the size promised"};
+  return {};
+}
+
+}  // namespace
+
+bool is_safe_name(const std::string& name) {
+  if (name.empty() || name.front() == '/') return false;
+  for (const char c : name) {
+    if (c == '\\' || c == ':' || static_cast<unsigned char>(c) < ' ') return false;
+  }
+  for (std::size_t at = 0; at <= name.size();) {
+    const std::size_t end = std::min(name.find('/', at), name.size());
+    if (name.compare(at, end - at, "..") == 0) return false;
+    at = end + 1;
+  }
+  return true;
+}
+
+Result<ZipReader> ZipReader::open(std::span<const std::byte> bytes, std::string source) {
+  ZipReader reader;
+  reader.bytes_ = bytes;
+  reader.source_ = std::move(source);
+  const auto end = find_end(bytes);
+  if (!end) return {Errc::invalid_file, reader.source_ + ": no zip archive, or its end is missing"};
+  if (Status s = reader.read_directory(*end); !s) return s;
+  return reader;
+}
+
+Status ZipReader::read_directory(std::size_t end_record) {
+  const std::byte* end = bytes_.data() + end_record;
+  const auto count = load_le<std::uint16_t>(end + 10);
+  const auto size = load_le<std::uint32_t>(end + 12);
+  const auto offset = load_le<std::uint32_t>(end + 16);
+  if (count == 0xffff || size == 0xffffffff || offset == 0xffffffff) {
+    return {Errc::unsupported, source_ + ": zip64 archives are not read"};
+  }
+  if (load_le<std::uint16_t>(end + 4) != 0 || load_le<std::uint16_t>(end + 6) != 0 ||
+      load_le<std::uint16_t>(end + 8) != count) {
+    return {Errc::unsupported, source_ + ": zip archives of several volumes are not read"};
+  }
+  if (offset > end_record || size > end_record - offset) {
+    return {Errc::invalid_file, source_ + ": the zip directory (" + std::to_string(size) + " bytes at " +
+                                    std::to_string(offset) + ") is not inside the file"};
+  }
+  std::size_t at = offset;
+  const std::size_t directory_end = at + size;
+  for (unsigned i = 0; i < count; ++i) {
+    const std::string entry = source_ + ": zip entry " + std::to_string(i);
+    const std::byte* p = bytes_.data() + at;
+    if (directory_end - at < kCentralSize || load_le<std::uint32_t>(p) != kCentralSignature) {
+      return {Errc::invalid_file,
+              entry + " of " + std::to_string(count) + " is missing in the directory"};
+    }
+    const std::size_t name_size = load_le<std::uint16_t>(p + 28);
+    const std::size_t record =
+        kCentralSize + name_size + load_le<std::uint16_t>(p + 30) + load_le<std::uint16_t>(p + 32);
+    if (directory_end - at < record) return {Errc::invalid_file, entry + " is cut off"};
+    const std::string name(reinterpret_cast<const char*>(p + kCentralSize), name_size);
+    if (!is_safe_name(name)) {
+      return {Errc::invalid_file,
+              entry + ": the name " + in_quotes(name) + " leaves the archive's folder"};
+    }
+    Entry e;
+    e.flags = load_le<std::uint16_t>(p + 8);
+    e.method = load_le<std::uint16_t>(p + 10);
+    e.crc = load_le<std::uint32_t>(p + 16);
+    e.packed = load_le<std::uint32_t>(p + 20);
+    e.size = load_le<std::uint32_t>(p + 24);
+    e.local_offset = load_le<std::uint32_t>(p + 42);
+    if (name.back() != '/' && !entries_.emplace(name, e).second) {
+      return {Errc::invalid_file, entry + ": the name " + in_quotes(name) + " comes twice"};
+    }
+    at += record;
+  }
+  return {};
+}
+
+std::vector<std::string> ZipReader::names() const {
+  std::vector<std::string> out;
+  for (const auto& [name, entry] : entries_) out.push_back(name);
+  return out;
+}
+
+Result<std::vector<std::byte>> ZipReader::read(const std::string& name) const {
+  const std::string what = source_ + ": " + name;
+  const auto found = entries_.find(name);
+  if (found == entries_.end()) return {Errc::file_not_found, what + ": not in the archive"};
+  const Entry& e = found->second;
+  if ((e.flags & kEncrypted) != 0) return {Errc::unsupported, what + ": encrypted"};
+  if (e.method != kStored && e.method != kDeflated) {
+    return {Errc::unsupported, what + ": compression method " + std::to_string(e.method) +
+                                   ", only stored (0) and deflated (8) are read"};
+  }
+  if (e.local_offset > bytes_.size() || bytes_.size() - e.local_offset < kLocalSize ||
+      load_le<std::uint32_t>(bytes_.data() + e.local_offset) != kLocalSignature) {
+    return {Errc::invalid_file, what + ": no local header at offset " + std::to_string(e.local_offset)};
+  }
+  const std::byte* local = bytes_.data() + e.local_offset;
+  // The local header's own copies of the sizes may be zero (streamed archives); the directory's count.
+  const std::size_t data = e.local_offset + kLocalSize + load_le<std::uint16_t>(local + 26) +
+                           std::size_t{load_le<std::uint16_t>(local + 28)};
+  if (data > bytes_.size() || e.packed > bytes_.size() - data) {
+    return {Errc::invalid_file, what + ": " + std::to_string(e.packed) + " bytes at offset " +
+                                    std::to_string(data) + " are not inside the file"};
+  }
+  if (e.method == kStored ? e.size != e.packed : e.size > kInflationSlack + kMostInflation * e.packed) {
+    return {Errc::invalid_file, what + ": a size of " + std::to_string(e.size) + " bytes from " +
+                                    std::to_string(e.packed) + " is not believed"};
+  }
+  const std::span<const std::byte> packed = bytes_.subspan(data, e.packed);
+  std::vector<std::byte> out;
+  if (e.method == kStored) {
+    out.assign(packed.begin(), packed.end());
+  } else {
+    out.resize(e.size);
+    if (Status s = inflate_raw(packed, out, what); !s) return s;
+  }
+  const uLong crc = crc32(0, reinterpret_cast<const Bytef*>(out.data()), static_cast<uInt>(out.size()));
+  if (crc != e.crc) return {Errc::invalid_file, what + ": its checksum does not fit"};
+  return out;
+}
+
+}  // namespace gsnav::io::detail
