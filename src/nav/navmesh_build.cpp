@@ -18,12 +18,6 @@ int cells_up(double length, double cell) noexcept {
 
 int clamp_cells(double v) noexcept { return static_cast<int>(min(max(v, 0.0), 30000.0)); }
 
-Status stage(const char* what, const RecastLog& log) {
-  return {Errc::out_of_memory,
-          std::string("NavMesh: ") + what + " failed" +
-              (log.last_error().empty() ? std::string() : ": " + log.last_error())};
-}
-
 double walkable_area(const rcHeightfield& f) noexcept {
   std::size_t spans = 0;
   for (int i = 0; i < f.width * f.height; ++i) {
@@ -87,6 +81,12 @@ void extract(const dtMeshTile& tile, PolyMesh& out) {
 
 }  // namespace
 
+Status stage(const char* what, const RecastLog& log) {
+  return {Errc::out_of_memory,
+          std::string("NavMesh: ") + what + " failed" +
+              (log.last_error().empty() ? std::string() : ": " + log.last_error())};
+}
+
 VoxelSettings::VoxelSettings(const NavMeshSettings& s) noexcept
     : height(max(3, clamp_cells(std::ceil(s.agent_height / s.cell_height - kEdge)))),
       climb(clamp_cells(std::floor(s.agent_max_climb / s.cell_height + kEdge))),
@@ -126,7 +126,8 @@ Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshS
 }
 
 Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& s, rcHeightfield& field,
-                               const Vec3d& origin) {
+                               const Vec3d& origin,
+                               const std::function<void(rcCompactHeightfield&)>& prune) {
   const VoxelSettings voxels(s);
   const double rasterised = walkable_area(field);
   if (s.filter_low_hanging_obstacles) rcFilterLowHangingWalkableObstacles(&log, voxels.climb, field);
@@ -141,6 +142,7 @@ Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& s, rcHeigh
   if (voxels.radius > 0 && !rcErodeWalkableArea(&log, voxels.radius, *compact)) {
     return stage("eroding by the agent's radius", log);
   }
+  if (prune) prune(*compact);
   const double eroded = walkable_area(*compact);
   const auto nothing = [&](const char* why) {
     return Status(Errc::nothing_navigable,

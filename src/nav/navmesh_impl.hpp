@@ -5,6 +5,7 @@
 #include <DetourNavMeshQuery.h>
 #include <Recast.h>
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -55,10 +56,14 @@ Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshS
                                                   const Vec3d& low, const Vec3d& high);
 
 /// Everything after voxelisation: filters, erosion, regions, contours, polygons, Detour. `origin` is
-/// where the heightfield's frame lies in the world. nothing_navigable, naming the areas left at each
+/// where the heightfield's frame lies in the world; `prune` may take areas away after erosion. nothing_navigable, naming the areas left at each
 /// stage, where no polygon comes out.
 Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& settings, rcHeightfield& field,
-                               const Vec3d& origin);
+                               const Vec3d& origin,
+                               const std::function<void(rcCompactHeightfield&)>& prune = {});
+
+/// An error of a stage of the build, with Recast's own words.
+Status stage(const char* what, const RecastLog& log);
 
 /// Settings in voxels, rounded as NavMeshSettings says.
 struct VoxelSettings {

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/nav/navmesh.hpp"
+
+namespace gsnav {
+
+/// How a NavMesh is read off Gaussians. Lengths in metres.
+struct GaussianNavOptions {
+  double min_opacity = 0.1;  ///< Gaussians fainter than this are ignored
+  double sigmas = 2.0;       ///< how far out a Gaussian counts as solid, in standard deviations
+  /// A voxel is solid where what passes through it blocks at least this share of light.
+  double solid_alpha = 0.5;
+  std::size_t min_support = 40;  ///< connected solid voxels below this count are floaters
+  double max_hole = 0.3;         ///< gaps in the floor up to this wide are closed where nothing stands
+  double floor_band = 0.2;       ///< the walkable surface stays within this of the floor's height
+  double min_island_area = 1.0;  ///< smaller pieces of floor are dropped, square metres
+  /// Where most of the floor lies below a ceiling, pieces that do not (outside the walls) are dropped.
+  bool drop_uncovered = true;
+  std::size_t max_voxels = std::size_t{1} << 27;  ///< refuse a grid larger than this
+};
+
+/// What was found on the way.
+struct GaussianNavReport {
+  double floor_y = 0.0;  ///< height of the floor, world
+  double ceiling_share = 0.0;  ///< share of the floor that has something solid above head height
+  Aabb<double> bounds{};       ///< box that was voxelised, world
+  std::size_t columns = 0, voxels = 0;          ///< of the grid
+  std::size_t solid_voxels = 0, floater_voxels = 0;
+  std::size_t gaussians_used = 0;
+  std::size_t gaussians_faint = 0;    ///< below min_opacity, or not finite
+  std::size_t gaussians_outside = 0;  ///< outliers outside the box
+  std::size_t holes_filled = 0;       ///< floor cells closed over
+  double dropped_area = 0.0;          ///< floor left out as too small or outside, square metres
+  double area = 0.0;                  ///< of the NavMesh
+  std::vector<double> island_areas;   ///< by falling area
+};
+
+struct NavMeshFromGaussians {
+  NavMesh mesh;
+  GaussianNavReport report;
+};
+
+/// NavMeshSettings with voxels fine enough in height (0.05 m) for a floor made of Gaussians.
+inline NavMeshSettings gaussian_navmesh_settings() noexcept {
+  NavMeshSettings s;
+  s.cell_height = 0.05;
+  return s;
+}
+
+/// Builds a NavMesh straight from sets of Gaussians, each placed by its `world_from_asset` (Y up).
+///
+/// Every Gaussian is rasterised as the oriented ellipsoid it is, widened by a voxel's own extent only, and
+/// its opacity adds up in each voxel. The floor is the lowest height at which many columns are solid with
+/// an agent's height free above. Solid voxels then become spans of Recast's heightfield: the tops near the
+/// floor are walkable, small gaps in it are closed, and clearance, radius and regions are Recast's.
+///
+/// Errors: invalid_argument naming a setting or option, or a grid above `max_voxels`; nothing_navigable
+/// naming the floor height found and the areas left at each stage.
+Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
+                                           std::span<const GaussianSet> sets,
+                                           const GaussianNavOptions& options = {});
+
+}  // namespace gsnav

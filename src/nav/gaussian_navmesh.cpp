@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/nav/gaussian_navmesh.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "gaussian_voxels.hpp"
+#include "navmesh_impl.hpp"
+
+namespace gsnav {
+namespace {
+
+using detail::VoxelGrid;
+
+Status validate(const GaussianNavOptions& o) {
+  struct Field {
+    const char* name;
+    double value, low, high;
+  };
+  const Field fields[] = {
+      {"min_opacity", o.min_opacity, 0.0, 1.0},      {"sigmas", o.sigmas, 0.1, 10.0},
+      {"solid_alpha", o.solid_alpha, 0.01, 0.999999}, {"max_hole", o.max_hole, 0.0, 100.0},
+      {"floor_band", o.floor_band, 0.0, 1000.0},      {"min_island_area", o.min_island_area, 0.0, 1e9},
+  };
+  for (const Field& f : fields) {
+    if (!(f.value >= f.low && f.value <= f.high)) {
+      return {Errc::invalid_argument, std::string("GaussianNavOptions.") + f.name + " = " +
+                                          std::to_string(f.value) + " is not in [" +
+                                          std::to_string(f.low) + ", " + std::to_string(f.high) + "]"};
+    }
+  }
+  return {};
+}
+
+/// Level of a voxel whose top is walkable, per column; kNone where there is none.
+constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+/// Levels free above (x, level, z) before the next solid voxel; `covered` tells whether there is one.
+std::size_t free_above(const VoxelGrid& g, std::size_t x, std::size_t level, std::size_t z, bool& covered) {
+  for (std::size_t y = level + 1; y < g.ny; ++y) {
+    if (g.solid[g.at(x, y, z)] != 0) {
+      covered = true;
+      return y - level - 1;
+    }
+  }
+  covered = false;
+  return kNone;
+}
+
+struct Floor {
+  bool found = false;
+  std::size_t level = 0;  ///< whose top the floor is
+  double best_area = 0;   ///< largest area at any height, square metres
+};
+
+/// The lowest height at which a good share of the columns that have room for the agent end. Columns below a
+/// ceiling decide where the scene has one: a garden around a house is not its floor.
+Floor find_floor(const VoxelGrid& g, std::size_t clearance, std::size_t smooth) {
+  std::vector<double> open(g.ny, 0.0), roofed(g.ny, 0.0);
+  for (std::size_t z = 0; z < g.nz; ++z) {
+    for (std::size_t x = 0; x < g.nx; ++x) {
+      for (std::size_t y = 0; y < g.ny; ++y) {
+        if (g.solid[g.at(x, y, z)] == 0) continue;
+        bool covered = false;
+        const std::size_t room = free_above(g, x, y, z, covered);
+        if (room < clearance) continue;
+        open[y] += 1;
+        if (covered) roofed[y] += 1;
+      }
+    }
+  }
+  const auto smoothed = [&](const std::vector<double>& h) {
+    std::vector<double> s(h.size(), 0.0);
+    for (std::size_t y = 0; y < h.size(); ++y) {
+      for (std::size_t k = y - min(y, smooth); k <= min(y + smooth, h.size() - 1); ++k) s[y] += h[k];
+    }
+    return s;
+  };
+  const std::vector<double> all = smoothed(open), under = smoothed(roofed);
+  const double most = *std::max_element(all.begin(), all.end());
+  const double most_under = *std::max_element(under.begin(), under.end());
+  const bool indoors = most_under >= 0.25 * most;
+  const std::vector<double>& score = indoors ? under : all;
+  const std::vector<double>& raw = indoors ? roofed : open;
+  const double top = indoors ? most_under : most;
+  Floor floor;
+  floor.best_area = most * g.cell * g.cell;
+  if (!(top > 0)) return floor;
+  for (std::size_t y = 0; y < g.ny; ++y) {
+    if (score[y] < 0.4 * top) continue;
+    // The peak itself: the fullest level within twice the smoothing above.
+    floor.level = y;
+    for (std::size_t k = y; k <= min(y + 2 * smooth, g.ny - 1); ++k) {
+      if (raw[k] > raw[floor.level]) floor.level = k;
+    }
+    floor.found = true;
+    break;
+  }
+  return floor;
+}
+
+/// Top level of the floor in each column: the highest solid voxel of the run that ends in the band.
+std::vector<std::size_t> floor_tops(const VoxelGrid& g, std::size_t level, std::size_t band) {
+  std::vector<std::size_t> tops(g.nx * g.nz, kNone);
+  for (std::size_t z = 0; z < g.nz; ++z) {
+    for (std::size_t x = 0; x < g.nx; ++x) {
+      for (std::size_t y = min(level + band, g.ny - 1) + 1; y-- > level - min(level, band);) {
+        if (g.solid[g.at(x, y, z)] != 0 && (y + 1 == g.ny || g.solid[g.at(x, y + 1, z)] == 0)) {
+          tops[x + g.nx * z] = y;
+          break;
+        }
+      }
+    }
+  }
+  return tops;
+}
+
+/// Distance from every cell to the nearest set one, in cells, chessboard metric, up to `limit`.
+std::vector<int> distances(const std::vector<std::uint8_t>& set, std::size_t nx, std::size_t nz, int limit) {
+  std::vector<int> d(set.size());
+  for (std::size_t i = 0; i < set.size(); ++i) d[i] = set[i] != 0 ? 0 : limit + 1;
+  const auto relax = [&](std::size_t i, std::size_t j) { d[i] = min(d[i], d[j] + 1); };
+  for (std::size_t z = 0; z < nz; ++z) {
+    for (std::size_t x = 0; x < nx; ++x) {
+      const std::size_t i = x + nx * z;
+      if (x > 0) relax(i, i - 1);
+      if (z > 0) relax(i, i - nx);
+      if (x > 0 && z > 0) relax(i, i - nx - 1);
+      if (x + 1 < nx && z > 0) relax(i, i - nx + 1);
+    }
+  }
+  for (std::size_t z = nz; z-- > 0;) {
+    for (std::size_t x = nx; x-- > 0;) {
+      const std::size_t i = x + nx * z;
+      if (x + 1 < nx) relax(i, i + 1);
+      if (z + 1 < nz) relax(i, i + nx);
+      if (x + 1 < nx && z + 1 < nz) relax(i, i + nx + 1);
+      if (x > 0 && z + 1 < nz) relax(i, i + nx - 1);
+    }
+  }
+  return d;
+}
+
+/// Morphological closing of the floor: cells without floor that no square of `width` cells free of floor
+/// fits over get the floor's height. What stands there keeps them from being walkable.
+std::size_t close_holes(const VoxelGrid& g, std::vector<std::size_t>& tops, std::size_t level, int width) {
+  const int radius = width / 2;
+  if (radius <= 0) return 0;
+  std::vector<std::uint8_t> mask(tops.size());
+  for (std::size_t i = 0; i < tops.size(); ++i) mask[i] = tops[i] != kNone ? 1 : 0;
+  const std::vector<int> to_floor = distances(mask, g.nx, g.nz, radius);
+  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = to_floor[i] > radius ? 1 : 0;  // stays empty
+  const std::vector<int> to_empty = distances(mask, g.nx, g.nz, radius);
+  std::size_t filled = 0;
+  for (std::size_t i = 0; i < tops.size(); ++i) {
+    if (tops[i] != kNone || to_empty[i] <= radius) continue;
+    tops[i] = level;
+    ++filled;
+  }
+  return filled;
+}
+
+/// Drops pieces of the floor that are small, or uncovered where the floor as a whole is covered.
+struct Pruner {
+  const VoxelGrid& grid;
+  const std::vector<std::uint8_t>& covered;  // per column
+  const GaussianNavOptions& options;
+  GaussianNavReport& report;
+
+  void operator()(rcCompactHeightfield& f) const {
+    const auto count = static_cast<std::size_t>(f.spanCount);
+    std::vector<int> part(count, -1), column(count);
+    struct Piece {
+      double area = 0, covered = 0;
+    };
+    std::vector<Piece> pieces;
+    for (int c = 0; c < f.width * f.height; ++c) {
+      for (unsigned i = 0; i < f.cells[c].count; ++i) column[f.cells[c].index + i] = c;
+    }
+    const double cell_area = grid.cell * grid.cell;
+    std::vector<std::size_t> stack;
+    for (std::size_t start = 0; start < count; ++start) {
+      if (f.areas[start] == RC_NULL_AREA || part[start] >= 0) continue;
+      const int id = static_cast<int>(pieces.size());
+      pieces.push_back({});
+      stack.assign(1, start);
+      part[start] = id;
+      while (!stack.empty()) {
+        const std::size_t i = stack.back();
+        stack.pop_back();
+        pieces.back().area += cell_area;
+        if (covered[static_cast<std::size_t>(column[i])] != 0) pieces.back().covered += cell_area;
+        const int x = column[i] % f.width, z = column[i] / f.width;
+        for (int dir = 0; dir < 4; ++dir) {
+          const int link = rcGetCon(f.spans[i], dir);
+          if (link == RC_NOT_CONNECTED) continue;
+          const int c = (x + rcGetDirOffsetX(dir)) + (z + rcGetDirOffsetY(dir)) * f.width;
+          const std::size_t n = f.cells[c].index + static_cast<unsigned>(link);
+          if (f.areas[n] == RC_NULL_AREA || part[n] >= 0) continue;
+          part[n] = id;
+          stack.push_back(n);
+        }
+      }
+    }
+    double area = 0, under = 0;
+    for (const Piece& p : pieces) {
+      area += p.area;
+      under += p.covered;
+    }
+    report.ceiling_share = area > 0 ? under / area : 0;
+    const bool indoors = options.drop_uncovered && under > 0.5 * area;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (part[i] < 0) continue;
+      const Piece& p = pieces[static_cast<std::size_t>(part[i])];
+      if (p.area >= options.min_island_area && !(indoors && p.covered < 0.5 * p.area)) continue;
+      f.areas[i] = RC_NULL_AREA;
+      report.dropped_area += cell_area;
+    }
+  }
+};
+
+Status add_spans(detail::RecastLog& log, const VoxelGrid& g, const std::vector<std::size_t>& tops, int climb,
+                 rcHeightfield& field) {
+  for (std::size_t z = 0; z < g.nz; ++z) {
+    for (std::size_t x = 0; x < g.nx; ++x) {
+      const std::size_t top = tops[x + g.nx * z];
+      const auto add = [&](std::size_t first, std::size_t end) {
+        const unsigned char area = top != kNone && end == top + 1 ? RC_WALKABLE_AREA : RC_NULL_AREA;
+        return rcAddSpan(&log, field, static_cast<int>(x), static_cast<int>(z),
+                         static_cast<unsigned short>(first), static_cast<unsigned short>(end), area, climb);
+      };
+      const auto solid = [&](std::size_t y) { return g.solid[g.at(x, y, z)] != 0 || y == top; };
+      for (std::size_t y = 0; y < g.ny;) {
+        if (!solid(y)) {
+          ++y;
+          continue;
+        }
+        const std::size_t first = y;
+        while (y < g.ny && solid(y)) ++y;
+        if (!add(first, y)) return detail::stage("adding spans", log);
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
+                                           std::span<const GaussianSet> sets,
+                                           const GaussianNavOptions& options) {
+  if (Status s = settings.validate(); !s.ok()) return s;
+  if (Status s = validate(options); !s.ok()) return s;
+  GaussianNavReport report;
+  auto voxels = detail::voxelise(settings, sets, options, report);
+  if (!voxels.ok()) return voxels.status();
+  const VoxelGrid& g = *voxels;
+  const detail::VoxelSettings cells(settings);
+  const auto levels = [&](double metres) { return static_cast<std::size_t>(std::floor(metres / g.level + 1e-6)); };
+
+  const Floor floor = find_floor(g, static_cast<std::size_t>(cells.height), max<std::size_t>(1, levels(0.08)));
+  const double least_area = max(options.min_island_area, g.cell * g.cell);
+  if (!floor.found || floor.best_area < least_area) {
+    return Status(Errc::nothing_navigable,
+                  "NavMesh from Gaussians: no floor: at no height does solid ground with " +
+                      std::to_string(settings.agent_height) + " m (agent_height) free above cover " +
+                      std::to_string(least_area) + " m2; the most is " + std::to_string(floor.best_area) +
+                      " m2, of " + std::to_string(report.solid_voxels) + " solid voxels");
+  }
+  // A floor's voxel holds its surface near the middle.
+  report.floor_y = g.low.y + (static_cast<double>(floor.level) + 0.5) * g.level;
+  std::vector<std::size_t> tops = floor_tops(g, floor.level, levels(options.floor_band));
+  report.holes_filled =
+      close_holes(g, tops, floor.level, static_cast<int>(options.max_hole / g.cell + 1e-6));
+  std::vector<std::uint8_t> covered(tops.size(), 0);
+  for (std::size_t i = 0; i < tops.size(); ++i) {
+    bool above = false;
+    if (tops[i] != kNone) free_above(g, i % g.nx, tops[i], i / g.nx, above);
+    covered[i] = above ? 1 : 0;
+  }
+
+  detail::RecastLog log;
+  const Vec3d extent{static_cast<double>(g.nx) * g.cell, static_cast<double>(g.ny) * g.level,
+                     static_cast<double>(g.nz) * g.cell};
+  auto field = detail::make_heightfield(log, settings, {}, extent);
+  if (!field.ok()) return field.status();
+  if (Status s = add_spans(log, g, tops, cells.climb, **field); !s.ok()) return s;
+  // Tops of voxels stand half a voxel above the surface in them.
+  const Vec3d origin = g.low - Vec3d{0, 0.5 * g.level, 0};
+  auto mesh = detail::finish_navmesh(log, settings, **field, origin,
+                                     Pruner{g, covered, options, report});
+  if (!mesh.ok()) {
+    return Status(mesh.code(), mesh.message() + "; floor found at y = " + std::to_string(report.floor_y) +
+                                   ", floor left out as small or outside " +
+                                   std::to_string(report.dropped_area) + " m2");
+  }
+  report.area = mesh->navigable_area();
+  for (std::size_t i = 0; i < mesh->island_count(); ++i) report.island_areas.push_back(mesh->island_area(i));
+  return NavMeshFromGaussians{std::move(*mesh), std::move(report)};
+}
+
+}  // namespace gsnav
