@@ -3,10 +3,12 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <array>
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
@@ -65,6 +67,20 @@ void print_report(const LoadReport& r) {
   for (const std::string& w : r.warnings) std::printf("  warning: %s\n", w.c_str());
 }
 
+/// Depth in colours over the range asked for, or over the image's own from its 2nd to 98th percentile.
+std::vector<std::uint8_t> depth_picture(const std::vector<float>& metres, const Options& o) {
+  float near = static_cast<float>(o.depth_near), far = static_cast<float>(o.depth_far);
+  if (!(far > near)) {
+    std::vector<float> seen;
+    std::copy_if(metres.begin(), metres.end(), std::back_inserter(seen), [](float z) { return z > 0; });
+    std::sort(seen.begin(), seen.end());
+    near = seen.empty() ? 0.0f : seen[seen.size() / 50];
+    far = seen.empty() ? 0.0f : seen[seen.size() - 1 - seen.size() / 50];
+    if (!(far > near)) far = near + 1.0f;
+  }
+  return io::colorize_depth(metres, near, far);
+}
+
 template <class S, class B>
 int run(B& backend, const Options& o, const DepthChoice& depth, const GaussianCloud& cloud,
         const std::vector<Camera>& cameras) {
@@ -106,11 +122,9 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const GaussianCl
       keep(io::save_npy(stem.string() + ".alpha.npy", alpha, image));
     }
     if (o.png) {
-      keep(io::save_png_rgb(stem.string() + ".rgb.png", rgb, f.width, f.height));
-      keep(io::save_png_rgb8(stem.string() + ".depth.png",
-                             io::colorize_depth(metres, static_cast<float>(o.depth_near),
-                                                static_cast<float>(o.depth_far)),
-                             f.width, f.height));
+      const int w = cameras[c].width, h = cameras[c].height;
+      keep(io::save_png_rgb(stem.string() + ".rgb.png", rgb, w, h));
+      keep(io::save_png_rgb8(stem.string() + ".depth.png", depth_picture(metres, o), w, h));
     }
     if (!s) {
       std::fprintf(stderr, "gsnav-render: %s\n", s.message().c_str());
@@ -161,7 +175,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", o.threads, "Threads of the openmp backend; 0: OMP_NUM_THREADS")
       ->check(CLI::Range(0, 1024));
   app.add_option("--depth-near", o.depth_near, "Depth picture: nearest metre of the colour scale");
-  app.add_option("--depth-far", o.depth_far, "Depth picture: farthest; 0: the image's own range");
+  app.add_option("--depth-far", o.depth_far, "Depth picture: farthest; 0: the image's own range (2nd to 98th percentile)");
   app.add_flag("--npy", o.npy, "Write NPY arrays");
   app.add_flag("--png", o.png, "Write PNG pictures (both are written where neither flag is given)");
   CLI11_PARSE(app, argc, argv);

@@ -84,6 +84,24 @@ struct BinArgs {
   View<std::uint32_t> tile_splats;       ///< splats of all tiles, each tile's in order
 };
 
+namespace detail {
+/// `order` walks the records at random: asked for early, they are there when needed.
+template <class S>
+GSNAV_HD void prefetch_splat(const BinArgs<S>& args, std::size_t i) noexcept {
+#if !GSNAV_DEVICE_CODE && defined(__GNUC__)
+  constexpr std::size_t kAhead = 16;
+  if (i + kAhead < args.order.size) {
+    const std::uint32_t next = args.order[i + kAhead];
+    __builtin_prefetch(&args.geometry[next]);
+    __builtin_prefetch(&args.bounds[next]);
+  }
+#else
+  (void)args;
+  (void)i;
+#endif
+}
+}  // namespace detail
+
 /// Counts the tile intersections of one block.
 template <class S>
 struct CountTileIntersections {
@@ -93,6 +111,7 @@ struct CountTileIntersections {
     for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
     const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
     for (std::size_t i = r.begin; i < r.end; ++i) {
+      detail::prefetch_splat(args, i);
       const std::uint32_t splat = args.order[i];
       for_each_tile(args.grid, args.geometry[splat], args.bounds[splat],
                     [=](std::size_t tile) { ++counts[tile]; });
@@ -129,6 +148,7 @@ struct ScatterTileIntersections {
     std::uint32_t* out = args.tile_splats.data;
     const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
     for (std::size_t i = r.begin; i < r.end; ++i) {
+      detail::prefetch_splat(args, i);
       const std::uint32_t splat = args.order[i];
       for_each_tile(args.grid, args.geometry[splat], args.bounds[splat],
                     [=](std::size_t tile) { out[cursors[tile]++] = splat; });
