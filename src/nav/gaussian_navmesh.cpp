@@ -100,14 +100,104 @@ Floor find_floor(const VoxelGrid& g, std::size_t clearance, std::size_t smooth) 
   return floor;
 }
 
-/// Top level of the floor in each column: the highest solid voxel of the run that ends in the band.
-std::vector<std::size_t> floor_tops(const VoxelGrid& g, std::size_t level, std::size_t band) {
+/// The floor's own level in each column: scans drift by decimetres over a flat and real floors slope. From
+/// where the floor stands at the level found, patches of about a metre follow their neighbours' within
+/// `band` levels; between patch centres the level is interpolated.
+class FloorField {
+ public:
+  FloorField(const VoxelGrid& g, std::size_t level, std::size_t clearance, std::size_t band)
+      : g_(g), side_(max<std::size_t>(1, static_cast<std::size_t>(1.0 / g.cell + 0.5))),
+        px_((g.nx + side_ - 1) / side_), pz_((g.nz + side_ - 1) / side_) {
+    std::vector<std::vector<float>> tops(px_ * pz_);
+    for (std::size_t p = 0; p < tops.size(); ++p) tops[p] = histogram(p, clearance);
+    levels_.assign(px_ * pz_, -1.0);
+    std::vector<std::size_t> queue;
+    for (std::size_t p = 0; p < tops.size(); ++p) {
+      const double peak = peak_near(tops[p], static_cast<double>(level), 2);
+      if (peak < 0) continue;
+      levels_[p] = peak;
+      queue.push_back(p);
+    }
+    for (std::size_t k = 0; k < queue.size(); ++k) {
+      const std::size_t p = queue[k], x = p % px_, z = p / px_;
+      const auto visit = [&](std::size_t n) {
+        if (levels_[n] >= 0) return;
+        const double peak = peak_near(tops[n], levels_[p], band);
+        if (peak < 0) return;
+        levels_[n] = peak;
+        queue.push_back(n);
+      };
+      if (x > 0) visit(p - 1);
+      if (x + 1 < px_) visit(p + 1);
+      if (z > 0) visit(p - px_);
+      if (z + 1 < pz_) visit(p + px_);
+    }
+  }
+
+  /// Level of the floor in a column, or kNone away from every patch that has one.
+  std::size_t at(std::size_t x, std::size_t z) const {
+    const double side = static_cast<double>(side_);
+    const double fx = (static_cast<double>(x) + 0.5) / side - 0.5, fz = (static_cast<double>(z) + 0.5) / side - 0.5;
+    const double x0 = std::floor(fx), z0 = std::floor(fz);
+    double sum = 0, weight = 0;
+    for (int k = 0; k < 4; ++k) {
+      const double cx = x0 + (k & 1), cz = z0 + (k >> 1);
+      if (cx < 0 || cz < 0 || cx >= static_cast<double>(px_) || cz >= static_cast<double>(pz_)) continue;
+      const double level = levels_[static_cast<std::size_t>(cx) + px_ * static_cast<std::size_t>(cz)];
+      if (level < 0) continue;
+      const double w = (1.0 - std::abs(fx - cx)) * (1.0 - std::abs(fz - cz));
+      sum += w * level;
+      weight += w;
+    }
+    return weight > 0 ? static_cast<std::size_t>(sum / weight + 0.5) : kNone;
+  }
+
+ private:
+  std::vector<float> histogram(std::size_t patch, std::size_t clearance) const {
+    std::vector<float> h(g_.ny, 0.0f);
+    const std::size_t x0 = patch % px_ * side_, z0 = patch / px_ * side_;
+    for (std::size_t z = z0; z < min(z0 + side_, g_.nz); ++z) {
+      for (std::size_t x = x0; x < min(x0 + side_, g_.nx); ++x) {
+        for (std::size_t y = 0; y < g_.ny; ++y) {
+          bool covered = false;
+          if (g_.solid[g_.at(x, y, z)] != 0 && free_above(g_, x, y, z, covered) >= clearance) h[y] += 1;
+        }
+      }
+    }
+    return h;
+  }
+
+  /// Mean level around the fullest one within `band` of `level`; -1 where fewer than a twentieth of the
+  /// patch's columns end there.
+  double peak_near(const std::vector<float>& h, double level, std::size_t band) const {
+    const auto c = static_cast<std::size_t>(level + 0.5);
+    const std::size_t low = c - min(c, band), high = min(c + band, h.size() - 1);
+    std::size_t best = low;
+    for (std::size_t y = low; y <= high; ++y) best = h[y] > h[best] ? y : best;
+    double sum = 0, weight = 0;
+    for (std::size_t y = best - min<std::size_t>(best, 1); y <= min(best + 1, h.size() - 1); ++y) {
+      sum += static_cast<double>(h[y]) * static_cast<double>(y);
+      weight += static_cast<double>(h[y]);
+    }
+    return weight >= 0.05 * static_cast<double>(side_ * side_) ? sum / weight : -1.0;
+  }
+
+  const VoxelGrid& g_;
+  std::size_t side_, px_, pz_;
+  std::vector<double> levels_;
+};
+
+/// Top level of the floor in each column: the highest solid run that ends within the band. Pits below the
+/// floor's own level are noise and are levelled.
+std::vector<std::size_t> floor_tops(const VoxelGrid& g, const FloorField& floor, std::size_t band) {
   std::vector<std::size_t> tops(g.nx * g.nz, kNone);
   for (std::size_t z = 0; z < g.nz; ++z) {
     for (std::size_t x = 0; x < g.nx; ++x) {
+      const std::size_t level = floor.at(x, z);
+      if (level == kNone) continue;
       for (std::size_t y = min(level + band, g.ny - 1) + 1; y-- > level - min(level, band);) {
         if (g.solid[g.at(x, y, z)] != 0 && (y + 1 == g.ny || g.solid[g.at(x, y + 1, z)] == 0)) {
-          tops[x + g.nx * z] = y;
+          tops[x + g.nx * z] = max(y, level);
           break;
         }
       }
@@ -144,7 +234,8 @@ std::vector<int> distances(const std::vector<std::uint8_t>& set, std::size_t nx,
 
 /// Morphological closing of the floor: cells without floor that no square of `width` cells free of floor
 /// fits over get the floor's height. What stands there keeps them from being walkable.
-std::size_t close_holes(const VoxelGrid& g, std::vector<std::size_t>& tops, std::size_t level, int width) {
+std::size_t close_holes(const VoxelGrid& g, std::vector<std::size_t>& tops, const FloorField& floor,
+                        int width) {
   const int radius = width / 2;
   if (radius <= 0) return 0;
   std::vector<std::uint8_t> mask(tops.size());
@@ -155,8 +246,8 @@ std::size_t close_holes(const VoxelGrid& g, std::vector<std::size_t>& tops, std:
   std::size_t filled = 0;
   for (std::size_t i = 0; i < tops.size(); ++i) {
     if (tops[i] != kNone || to_empty[i] <= radius) continue;
-    tops[i] = level;
-    ++filled;
+    tops[i] = floor.at(i % g.nx, i / g.nx);
+    filled += tops[i] != kNone ? 1 : 0;
   }
   return filled;
 }
@@ -270,9 +361,10 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
   }
   // A floor's voxel holds its surface near the middle.
   report.floor_y = g.low.y + (static_cast<double>(floor.level) + 0.5) * g.level;
-  std::vector<std::size_t> tops = floor_tops(g, floor.level, levels(options.floor_band));
-  report.holes_filled =
-      close_holes(g, tops, floor.level, static_cast<int>(options.max_hole / g.cell + 1e-6));
+  const std::size_t band = levels(options.floor_band);
+  const FloorField field_of_floor(g, floor.level, static_cast<std::size_t>(cells.height), band);
+  std::vector<std::size_t> tops = floor_tops(g, field_of_floor, band);
+  report.holes_filled = close_holes(g, tops, field_of_floor, static_cast<int>(options.max_hole / g.cell + 1e-6));
   std::vector<std::uint8_t> covered(tops.size(), 0);
   for (std::size_t i = 0; i < tops.size(); ++i) {
     bool above = false;
