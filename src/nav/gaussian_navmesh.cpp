@@ -232,81 +232,81 @@ std::vector<int> distances(const std::vector<std::uint8_t>& set, std::size_t nx,
   return d;
 }
 
-/// Morphological closing of the floor: cells without floor that no square of `width` cells free of floor
-/// fits over get the floor's height. What stands there keeps them from being walkable.
+/// Morphological closing: sets cells that no empty square of `width` cells fits over.
+void close_mask(std::vector<std::uint8_t>& mask, std::size_t nx, std::size_t nz, int width) {
+  const int radius = width / 2;
+  if (radius <= 0) return;
+  const std::vector<int> to_set = distances(mask, nx, nz, radius);
+  std::vector<std::uint8_t> empty(mask.size());
+  for (std::size_t i = 0; i < mask.size(); ++i) empty[i] = to_set[i] > radius ? 1 : 0;
+  const std::vector<int> to_empty = distances(empty, nx, nz, radius);
+  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = mask[i] != 0 || to_empty[i] > radius ? 1 : 0;
+}
+
+/// Gives small gaps in the floor the floor's level. What stands there keeps them from being walkable.
 std::size_t close_holes(const VoxelGrid& g, std::vector<std::size_t>& tops, const FloorField& floor,
                         int width) {
-  const int radius = width / 2;
-  if (radius <= 0) return 0;
   std::vector<std::uint8_t> mask(tops.size());
   for (std::size_t i = 0; i < tops.size(); ++i) mask[i] = tops[i] != kNone ? 1 : 0;
-  const std::vector<int> to_floor = distances(mask, g.nx, g.nz, radius);
-  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = to_floor[i] > radius ? 1 : 0;  // stays empty
-  const std::vector<int> to_empty = distances(mask, g.nx, g.nz, radius);
+  close_mask(mask, g.nx, g.nz, width);
   std::size_t filled = 0;
   for (std::size_t i = 0; i < tops.size(); ++i) {
-    if (tops[i] != kNone || to_empty[i] <= radius) continue;
+    if (tops[i] != kNone || mask[i] == 0) continue;
     tops[i] = floor.at(i % g.nx, i / g.nx);
     filled += tops[i] != kNone ? 1 : 0;
   }
   return filled;
 }
 
-/// Drops pieces of the floor that are small, or uncovered where the floor as a whole is covered.
+/// Which columns lie below a ceiling, holes in it of up to `width` cells closed.
+std::vector<std::uint8_t> covered_columns(const VoxelGrid& g, const std::vector<std::size_t>& tops,
+                                          std::size_t clearance, int width) {
+  std::vector<std::uint8_t> mask(tops.size(), 0);
+  for (std::size_t i = 0; i < tops.size(); ++i) {
+    if (tops[i] == kNone) continue;
+    for (std::size_t y = tops[i] + clearance; y < g.ny && mask[i] == 0; ++y) {
+      mask[i] = g.solid[g.at(i % g.nx, y, i / g.nx)];
+    }
+  }
+  close_mask(mask, g.nx, g.nz, width);
+  return mask;
+}
+
+/// Drops pieces of the floor that are too small to be a place.
 struct Pruner {
-  const VoxelGrid& grid;
-  const std::vector<std::uint8_t>& covered;  // per column
-  const GaussianNavOptions& options;
+  double min_area;
   GaussianNavReport& report;
 
   void operator()(rcCompactHeightfield& f) const {
     const auto count = static_cast<std::size_t>(f.spanCount);
-    std::vector<int> part(count, -1), column(count);
-    struct Piece {
-      double area = 0, covered = 0;
-    };
-    std::vector<Piece> pieces;
+    const double cell_area = static_cast<double>(f.cs) * static_cast<double>(f.cs);
+    std::vector<int> column(count);
     for (int c = 0; c < f.width * f.height; ++c) {
       for (unsigned i = 0; i < f.cells[c].count; ++i) column[f.cells[c].index + i] = c;
     }
-    const double cell_area = grid.cell * grid.cell;
-    std::vector<std::size_t> stack;
+    std::vector<std::uint8_t> seen(count, 0);
+    std::vector<std::size_t> piece;
     for (std::size_t start = 0; start < count; ++start) {
-      if (f.areas[start] == RC_NULL_AREA || part[start] >= 0) continue;
-      const int id = static_cast<int>(pieces.size());
-      pieces.push_back({});
-      stack.assign(1, start);
-      part[start] = id;
-      while (!stack.empty()) {
-        const std::size_t i = stack.back();
-        stack.pop_back();
-        pieces.back().area += cell_area;
-        if (covered[static_cast<std::size_t>(column[i])] != 0) pieces.back().covered += cell_area;
+      if (f.areas[start] == RC_NULL_AREA || seen[start] != 0) continue;
+      piece.assign(1, start);
+      seen[start] = 1;
+      for (std::size_t k = 0; k < piece.size(); ++k) {
+        const std::size_t i = piece[k];
         const int x = column[i] % f.width, z = column[i] / f.width;
         for (int dir = 0; dir < 4; ++dir) {
           const int link = rcGetCon(f.spans[i], dir);
           if (link == RC_NOT_CONNECTED) continue;
           const int c = (x + rcGetDirOffsetX(dir)) + (z + rcGetDirOffsetY(dir)) * f.width;
           const std::size_t n = f.cells[c].index + static_cast<unsigned>(link);
-          if (f.areas[n] == RC_NULL_AREA || part[n] >= 0) continue;
-          part[n] = id;
-          stack.push_back(n);
+          if (f.areas[n] == RC_NULL_AREA || seen[n] != 0) continue;
+          seen[n] = 1;
+          piece.push_back(n);
         }
       }
-    }
-    double area = 0, under = 0;
-    for (const Piece& p : pieces) {
-      area += p.area;
-      under += p.covered;
-    }
-    report.ceiling_share = area > 0 ? under / area : 0;
-    const bool indoors = options.drop_uncovered && under > 0.5 * area;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (part[i] < 0) continue;
-      const Piece& p = pieces[static_cast<std::size_t>(part[i])];
-      if (p.area >= options.min_island_area && !(indoors && p.covered < 0.5 * p.area)) continue;
-      f.areas[i] = RC_NULL_AREA;
-      report.dropped_area += cell_area;
+      const double area = static_cast<double>(piece.size()) * cell_area;
+      if (area >= min_area) continue;
+      for (const std::size_t i : piece) f.areas[i] = RC_NULL_AREA;
+      report.dropped_small += area;
     }
   }
 };
@@ -365,11 +365,19 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
   const FloorField field_of_floor(g, floor.level, static_cast<std::size_t>(cells.height), band);
   std::vector<std::size_t> tops = floor_tops(g, field_of_floor, band);
   report.holes_filled = close_holes(g, tops, field_of_floor, static_cast<int>(options.max_hole / g.cell + 1e-6));
-  std::vector<std::uint8_t> covered(tops.size(), 0);
+  const std::vector<std::uint8_t> covered =
+      covered_columns(g, tops, static_cast<std::size_t>(cells.height), static_cast<int>(0.6 / g.cell));
+  std::size_t on_floor = 0, below_ceiling = 0;
   for (std::size_t i = 0; i < tops.size(); ++i) {
-    bool above = false;
-    if (tops[i] != kNone) free_above(g, i % g.nx, tops[i], i / g.nx, above);
-    covered[i] = above ? 1 : 0;
+    on_floor += tops[i] != kNone ? 1 : 0;
+    below_ceiling += tops[i] != kNone && covered[i] != 0 ? 1 : 0;
+  }
+  report.ceiling_share = on_floor > 0 ? static_cast<double>(below_ceiling) / static_cast<double>(on_floor) : 0;
+  if (options.drop_uncovered && report.ceiling_share > 0.5) {
+    for (std::size_t i = 0; i < tops.size(); ++i) {
+      if (tops[i] != kNone && covered[i] == 0) tops[i] = kNone;
+    }
+    report.dropped_uncovered = static_cast<double>(on_floor - below_ceiling) * g.cell * g.cell;
   }
 
   detail::RecastLog log;
@@ -381,11 +389,12 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
   // Tops of voxels stand half a voxel above the surface in them.
   const Vec3d origin = g.low - Vec3d{0, 0.5 * g.level, 0};
   auto mesh = detail::finish_navmesh(log, settings, **field, origin,
-                                     Pruner{g, covered, options, report});
+                                     Pruner{options.min_island_area, report});
   if (!mesh.ok()) {
     return Status(mesh.code(), mesh.message() + "; floor found at y = " + std::to_string(report.floor_y) +
-                                   ", floor left out as small or outside " +
-                                   std::to_string(report.dropped_area) + " m2");
+                                   ", left out as too small " +
+                                   std::to_string(report.dropped_small) + " m2, as outside " +
+                                   std::to_string(report.dropped_uncovered) + " m2");
   }
   report.area = mesh->navigable_area();
   for (std::size_t i = 0; i < mesh->island_count(); ++i) report.island_areas.push_back(mesh->island_area(i));

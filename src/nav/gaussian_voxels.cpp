@@ -46,7 +46,7 @@ void for_each_opaque(std::span<const GaussianSet> sets, double min_opacity, std:
 /// and a far shell of sky are parts of their own.
 Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptions& options) {
   constexpr double kCoarse = 1.0;   // metres
-  constexpr double kMinMass = 4.0;  // opaque Gaussians in a coarse cell
+  constexpr double kSparse = 0.02;  // of what the middle Gaussian's coarse cell holds: not the scene
   constexpr double kFar = 1e7;
   using Cell = std::array<std::int64_t, 3>;
   std::map<Cell, double> mass;
@@ -59,6 +59,18 @@ Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptio
     }
     mass[c] += s.opacity;
   });
+  std::vector<double> filled;
+  double total = 0;
+  for (const auto& [cell, m] : mass) {
+    filled.push_back(m);
+    total += m;
+  }
+  std::sort(filled.begin(), filled.end());
+  double least = 0, below = 0;
+  for (std::size_t i = 0; i < filled.size() && below < 0.5 * total; ++i) {
+    below += filled[i];
+    least = kSparse * filled[i];
+  }
   struct Part {
     double mass = 0;
     Aabb<double> box;
@@ -66,7 +78,7 @@ Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptio
   std::vector<Part> parts;
   std::map<Cell, bool> seen;
   for (const auto& [start, m] : mass) {
-    if (m < kMinMass || seen[start]) continue;
+    if (m < least || seen[start]) continue;
     Part part;
     std::vector<Cell> stack{start};
     seen[start] = true;
@@ -80,7 +92,7 @@ Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptio
       for (std::int64_t i = 0; i < 27; ++i) {
         const Cell n{c[0] + i % 3 - 1, c[1] + i / 3 % 3 - 1, c[2] + i / 9 - 1};
         const auto it = mass.find(n);
-        if (it == mass.end() || it->second < kMinMass || seen[n]) continue;
+        if (it == mass.end() || it->second < least || seen[n]) continue;
         seen[n] = true;
         stack.push_back(n);
       }

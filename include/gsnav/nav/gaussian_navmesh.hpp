@@ -20,7 +20,7 @@ struct GaussianNavOptions {
   double max_hole = 0.3;         ///< gaps in the floor up to this wide are closed where nothing stands
   double floor_band = 0.2;       ///< the walkable surface stays within this of the floor's height
   double min_island_area = 1.0;  ///< smaller pieces of floor are dropped, square metres
-  /// Where most of the floor lies below a ceiling, pieces that do not (outside the walls) are dropped.
+  /// Where most of the floor lies below a ceiling, floor that does not (outside the walls) is left out.
   bool drop_uncovered = true;
   std::size_t max_voxels = std::size_t{1} << 27;  ///< refuse a grid larger than this
 };
@@ -36,7 +36,8 @@ struct GaussianNavReport {
   std::size_t gaussians_faint = 0;    ///< below min_opacity, or not finite
   std::size_t gaussians_outside = 0;  ///< outliers outside the box
   std::size_t holes_filled = 0;       ///< floor cells closed over
-  double dropped_area = 0.0;          ///< floor left out as too small or outside, square metres
+  double dropped_small = 0.0;         ///< floor left out as too small a piece, square metres
+  double dropped_uncovered = 0.0;     ///< floor left out as outside, square metres
   double area = 0.0;                  ///< of the NavMesh
   std::vector<double> island_areas;   ///< by falling area
 };
