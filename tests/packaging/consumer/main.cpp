@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Touches each component that it was linked with, so that a missing link or header shows.
 #include <cstdio>
+#include <vector>
 
 #include <gsnav/backends/serial.hpp>
 #include <gsnav/gsnav.hpp>
 #if defined(WITH_OPENMP)
 #include <gsnav/backends/openmp.hpp>
+#endif
+#if defined(WITH_IO)
+#include <gsnav/io/image_file.hpp>
+#include <gsnav/io/sog.hpp>
 #endif
 #if defined(WITH_NAV)
 #include <gsnav/nav/navmesh_settings.hpp>
@@ -52,6 +57,13 @@ int main() {
 #if defined(WITH_OPENMP)
   gsnav::OpenMPBackend openmp;
   check("openmp", renders_one_gaussian(openmp));
+#endif
+#if defined(WITH_IO)
+  // Each format's library must be linked: PNG, and WebP and zlib behind SOG.
+  const std::vector<float> pixel{1, 0, 0};
+  check("io", gsnav::io::save_png_rgb("consumer.png", pixel, 1, 1).ok() &&
+                  gsnav::io::load_png("consumer.png").value().samples[0] == 255 &&
+                  gsnav::io::load_sog("no_such_file.sog").code() == gsnav::Errc::file_not_found);
 #endif
 #if defined(WITH_NAV)
   check("nav", gsnav::NavMeshSettings{}.validate().ok());
