@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "ply_file.hpp"
+
+namespace gsnav_test {
+
+/// Whether a and b agree to `relative`, or to 1e-7 where both are small.
+inline bool near(long double a, long double b, long double relative = 3e-7L) {
+  return std::fabs(a - b) <= relative * std::fabs(b) + 1e-7L;
+}
+
+/// Checks Gaussian i of a cloud against the row it was read from. `rest_in_file` is the number of
+/// f_rest_* properties that the row has.
+inline void check_gaussian(const gsnav::GaussianCloud& c, std::size_t i, const PlyRow& row,
+                           int rest_in_file) {
+  const ExpectedGaussian e(row);
+  const gsnav::Vec3d mean = c.mean(i);
+  for (std::size_t k = 0; k < 3; ++k) {
+    CHECK(near(mean[static_cast<int>(k)], e.mean[k]));
+    CHECK(near(c.scales[k][i], e.scale[k]));
+    CHECK(c.sh0[3 * i + k] == static_cast<float>(e.dc[k]));
+  }
+  for (std::size_t k = 0; k < 4; ++k) CHECK(near(c.quats[k][i], e.quat[k]));
+  CHECK(near(c.opacities[i], e.opacity));
+  const int kept = (c.sh_degree + 1) * (c.sh_degree + 1) - 1;
+  bool rest_ok = true;
+  for (int coefficient = 0; coefficient < kept; ++coefficient) {
+    for (int channel = 0; channel < 3; ++channel) {
+      const double want = row.at("f_rest_" + std::to_string(channel * (rest_in_file / 3) + coefficient));
+      const std::size_t at =
+          i * 3 * static_cast<std::size_t>(kept) + static_cast<std::size_t>(3 * coefficient + channel);
+      rest_ok = rest_ok && c.shN[at] == static_cast<float>(want);
+    }
+  }
+  CHECK(rest_ok);
+}
+
+/// Checks that the arrays of a cloud belong together and that its report adds up.
+inline void check_consistent(const gsnav::LoadedCloud& loaded) {
+  const gsnav::GaussianCloud& c = loaded.cloud;
+  const gsnav::LoadReport& r = loaded.report;
+  CHECK(r.kept == c.size());
+  CHECK(r.read == r.kept + r.dropped());
+  CHECK(c.sh0.size() == 3 * c.size());
+  const auto degree = static_cast<std::size_t>(c.sh_degree);
+  CHECK(c.shN.size() == 3 * ((degree + 1) * (degree + 1) - 1) * c.size());
+  for (const auto& axis : c.means) CHECK(axis.size() == c.size());
+  for (const auto& axis : c.scales) CHECK(axis.size() == c.size());
+  for (const auto& part : c.quats) CHECK(part.size() == c.size());
+  bool finite = true;
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    const gsnav::Vec3d m = c.mean(i);
+    finite = finite && std::isfinite(m.x) && std::isfinite(m.y) && std::isfinite(m.z) &&
+             c.opacities[i] >= 0 && c.opacities[i] <= 1;
+  }
+  CHECK(finite);
+}
+
+}  // namespace gsnav_test

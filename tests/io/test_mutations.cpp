@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cstdio>
+#include <functional>
+#include <random>
+
+#include "allocations.hpp"
+#include "check_cloud.hpp"
+#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io/image_file.hpp"
+#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/io/ply.hpp"
+#include "gsnav/io/sog.hpp"
+#include "sog_file.hpp"
+
+// Files with a byte changed, dropped or doubled: a loader returns a Status that names the file or a
+// result that is whole, and asks for no more memory than such a small file can need.
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+constexpr std::size_t kMostMemory = 8000000;
+
+std::string mutated(const std::string& text, std::mt19937& generator) {
+  std::string out = text;
+  const int times = generator() % 4 == 0 ? 3 : 1;
+  for (int k = 0; k < times; ++k) {
+    const std::size_t at = generator() % out.size();
+    switch (generator() % 6) {
+      case 0:
+        out.erase(at, 1 + generator() % 4);
+        break;
+      case 1:
+        out.insert(at, 1, static_cast<char>(generator()));
+        break;
+      case 2:
+        out[at] = static_cast<char>(out[at] ^ (1 << (generator() % 8)));
+        break;
+      case 3:
+        out[at] = "0123456789-.eE,[]{}\" \n"[generator() % 22];
+        break;
+      default:
+        out[at] = static_cast<char>(generator());
+        break;
+    }
+    if (out.empty()) out = "x";
+  }
+  return out;
+}
+
+struct Tally {
+  int ok = 0, failed = 0;
+};
+
+/// Feeds `n` mutations to `load`, which returns the Status.
+Tally feed(const std::string& text, int n, unsigned seed, const std::string& name,
+           const std::function<Status(const std::string&)>& load) {
+  std::mt19937 generator(seed);
+  Tally tally;
+  for (int i = 0; i < n; ++i) {
+    const std::string bad = mutated(text, generator);
+    reset_largest_allocation();
+    const Status s = load(bad);
+    CAPTURE(i);
+    CAPTURE(s.message());
+    REQUIRE(largest_allocation() < kMostMemory);
+    REQUIRE((s.ok() || contains(s.message(), name)));
+    REQUIRE(s.code() != Errc::out_of_memory);
+    ++(s.ok() ? tally.ok : tally.failed);
+  }
+  std::printf("%s: of %d mutations %d were refused\n", name.c_str(), n, tally.failed);
+  return tally;
+}
+
+Status check_cloud(const Result<LoadedCloud>& loaded) {
+  if (loaded) check_consistent(*loaded);
+  return loaded.status();
+}
+
+}  // namespace
+
+TEST_CASE("mutations: ply") {
+  for (const char* format : {"binary_little_endian", "binary_big_endian", "ascii"}) {
+    PlyFile file;
+    file.format = format;
+    file.properties = inria_properties(9);
+    file.properties[1].second = "double";
+    file.rows = random_rows(6, 9, 2);
+    file.before_header = "element face 2\nproperty list uchar short a\n";
+    file.before_rows = file.format == "ascii" ? "1 5\n0\n" : std::string("\1\0\5\0", 4);
+    const Tally t = feed(file.text(), 3000, 1, "some.ply", [](const std::string& text) {
+      return check_cloud(io::parse_ply(bytes_of(text), "some.ply"));
+    });
+    CHECK(t.ok > 100);
+    CHECK(t.failed > 100);
+    // Only the header: there every byte counts.
+    const std::string rows = file.text().substr(file.header().size());
+    feed(file.header(), 3000, 2, "some.ply", [&](const std::string& header) {
+      return check_cloud(io::parse_ply(bytes_of(header + rows), "some.ply"));
+    });
+  }
+}
+
+TEST_CASE("mutations: each file of a SOG, and its bundle") {
+  TempFolder folder("mutations");
+  SogFile f(2);
+  f.make_files();
+  f.write_folder(folder / "set");
+  for (const auto& [name, content] : f.files) {
+    const Tally t = feed(content, name == "meta.json" ? 2000 : 300, 3, (folder / "set").string(),
+                         [&, file = name](const std::string& text) {
+                           write_file(folder / "set" / file, text);
+                           return check_cloud(io::load_sog(folder / "set"));
+                         });
+    CHECK(t.failed > 20);
+    write_file(folder / "set" / name, content);
+  }
+  for (const bool deflated : {false, true}) {
+    const Tally t = feed(f.bundle(deflated), 2000, 4, "a.sog", [&](const std::string& text) {
+      write_file(folder / "a.sog", text);
+      return check_cloud(io::load_sog(folder / "a.sog"));
+    });
+    CHECK(t.failed > 1000);
+  }
+}
+
+TEST_CASE("mutations: cameras, images, arrays, meshes") {
+  TempFolder folder("mutations_other");
+  const std::vector<Camera> cameras(2);
+  REQUIRE(io::save_cameras(folder / "a.json", cameras).ok());
+  feed(read_file(folder / "a.json"), 3000, 5, "a.json", [&](const std::string& text) {
+    write_file(folder / "a.json", text);
+    return io::load_cameras(folder / "a.json").status();
+  });
+  REQUIRE(io::save_png_rgb(folder / "a.png", std::vector<float>(75, 0.3f), 5, 5).ok());
+  feed(read_file(folder / "a.png"), 2000, 6, "a.png", [&](const std::string& text) {
+    write_file(folder / "a.png", text);
+    return io::load_png(folder / "a.png").status();
+  });
+  REQUIRE(io::save_npy(folder / "a.npy", std::vector<float>(6), std::vector<std::size_t>{2, 3}).ok());
+  feed(read_file(folder / "a.npy"), 3000, 7, "a.npy", [&](const std::string& text) {
+    write_file(folder / "a.npy", text);
+    const auto a = io::load_npy(folder / "a.npy");
+    if (a) CHECK(a->values.size() <= 6);
+    return a.status();
+  });
+  feed("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nf -1/2/3 -2//4 -3\n", 3000, 8, "a.obj",
+       [&](const std::string& text) {
+         write_file(folder / "a.obj", text);
+         const auto m = io::load_obj(folder / "a.obj");
+         if (m) {
+           for (const auto& t : m->triangles) {
+             for (const std::uint32_t v : t) REQUIRE(v < m->vertices.size());
+           }
+         }
+         return m.status();
+       });
+}
