@@ -389,7 +389,7 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
   // Tops of voxels stand half a voxel above the surface in them.
   const Vec3d origin = g.low - Vec3d{0, 0.5 * g.level, 0};
   auto mesh = detail::finish_navmesh(log, settings, **field, origin,
-                                     Pruner{options.min_island_area, report});
+                                     {Pruner{options.min_island_area, report}, {}});
   if (!mesh.ok()) {
     return Status(mesh.code(), mesh.message() + "; floor found at y = " + std::to_string(report.floor_y) +
                                    ", left out as too small " +

@@ -91,7 +91,8 @@ std::optional<NavPoint> NavMesh::snap_point(const Vec3d& p, const SnapOptions& o
 
 bool NavMesh::is_navigable(const Vec3d& p, double max_height_delta) const {
   constexpr double kBeside = 1e-3;
-  const auto s = snap_point(p, {{kBeside, max_height_delta + kBeside, kBeside}});
+  // Detour's surface lies up to a cell height above this one.
+  const auto s = snap_point(p, {{kBeside, max_height_delta + 2 * impl_->settings.cell_height, kBeside}});
   if (!s) return false;
   const double dx = s->position.x - p.x, dz = s->position.z - p.z;
   return dx * dx + dz * dz <= 1e-8 && std::abs(s->position.y - p.y) <= max_height_delta;
@@ -179,14 +180,17 @@ Result<NavPath> NavMesh::find_path(const Vec3d& start, const Vec3d& goal, const 
       return Status(Errc::nothing_navigable, "no path: the search did not reach the goal");
     }
     std::vector<float> corners(3 * static_cast<std::size_t>(count + 2));
+    std::vector<dtPolyRef> corner_refs(static_cast<std::size_t>(count + 2));
     int corner_count = 0;
-    status = query->findStraightPath(from.v, to.v, refs.data(), count, corners.data(), nullptr, nullptr,
-                                     &corner_count, count + 2, 0);
+    status = query->findStraightPath(from.v, to.v, refs.data(), count, corners.data(), nullptr,
+                                     corner_refs.data(), &corner_count, count + 2, 0);
     if (dtStatusFailed(status)) return Status(Errc::nothing_navigable, "no path: straightening failed");
     for (int i = 1; i + 1 < corner_count; ++i) {
       const float* c = corners.data() + 3 * i;
-      path.points.push_back(Vec3d{static_cast<double>(c[0]), static_cast<double>(c[1]),
-                                  static_cast<double>(c[2])} + impl_->origin);
+      Vec3d p{static_cast<double>(c[0]), static_cast<double>(c[1]), static_cast<double>(c[2])};
+      const dtPolyRef ref = corner_refs[static_cast<std::size_t>(i)];
+      if (ref != 0) p.y = impl_->polys.height(impl_->id_of(ref), p);
+      path.points.push_back(p + impl_->origin);
     }
   }
   path.points.push_back(b->position);

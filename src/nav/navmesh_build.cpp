@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "navmesh_impl.hpp"
+#include "triangle_heights.hpp"
 
 namespace gsnav {
 namespace detail {
@@ -37,7 +38,7 @@ Vec3d vec3(const float* p) noexcept {
 }
 
 /// The polygons of the only tile, counter-clockwise, with neighbours and height triangles.
-void extract(const dtMeshTile& tile, PolyMesh& out) {
+void extract(const dtMeshTile& tile, const std::function<double(const Vec3d&)>& height, PolyMesh& out) {
   const dtMeshHeader& h = *tile.header;
   for (int i = 0; i < h.polyCount; ++i) {
     const dtPoly& p = tile.polys[i];
@@ -75,6 +76,12 @@ void extract(const dtMeshTile& tile, PolyMesh& out) {
     }
     poly.tri_count = static_cast<std::uint32_t>(out.tris.size()) - poly.tri_first;
     out.polys.push_back(poly);
+  }
+  if (height) {
+    for (Vec3d& p : out.corners) p.y = height(p);
+    for (auto& t : out.tris) {
+      for (Vec3d& p : t) p.y = height(p);
+    }
   }
   out.finish();
 }
@@ -126,8 +133,7 @@ Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshS
 }
 
 Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& s, rcHeightfield& field,
-                               const Vec3d& origin,
-                               const std::function<void(rcCompactHeightfield&)>& prune) {
+                               const Vec3d& origin, const BuildHooks& hooks) {
   const VoxelSettings voxels(s);
   const double rasterised = walkable_area(field);
   if (s.filter_low_hanging_obstacles) rcFilterLowHangingWalkableObstacles(&log, voxels.climb, field);
@@ -142,7 +148,7 @@ Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& s, rcHeigh
   if (voxels.radius > 0 && !rcErodeWalkableArea(&log, voxels.radius, *compact)) {
     return stage("eroding by the agent's radius", log);
   }
-  if (prune) prune(*compact);
+  if (hooks.prune) hooks.prune(*compact);
   const double eroded = walkable_area(*compact);
   const auto nothing = [&](const char* why) {
     return Status(Errc::nothing_navigable,
@@ -216,7 +222,7 @@ Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& s, rcHeigh
   const dtNavMesh& mesh = *impl->mesh;
   const dtMeshTile& tile = *mesh.getTile(0);
   impl->ref_base = mesh.getPolyRefBase(&tile);
-  extract(tile, impl->polys);
+  extract(tile, hooks.height, impl->polys);
   for (const auto& t : impl->polys.tris) {
     for (const Vec3d& p : t) impl->bounds.add(p + origin);
   }
@@ -270,7 +276,14 @@ Result<NavMesh> NavMesh::build(const NavMeshSettings& settings, std::span<const 
       return detail::stage("rasterising triangles", log);
     }
   }
-  return detail::finish_navmesh(log, settings, **field, origin);
+  const detail::TriangleHeights heights(vertices, triangles, origin, {box.low - origin, box.high - origin});
+  const double ch = settings.cell_height;
+  // A span's top is the highest point of the surface within its cell, rounded up.
+  const double below = 1.01 * ch + settings.cell_size * (cos_slope > 0.1 ? 1.0 / cos_slope : 10.0);
+  return detail::finish_navmesh(
+      log, settings, **field, origin, {{}, [&](const Vec3d& p) {
+        return heights.at(p, below, 0.5 * ch).value_or(p.y - 0.5 * ch);
+      }});
 }
 
 }  // namespace gsnav

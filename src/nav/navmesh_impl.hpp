@@ -55,12 +55,17 @@ class RecastLog : public rcContext {
 Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshSettings& settings,
                                                   const Vec3d& low, const Vec3d& high);
 
+/// What a source of voxels may add to the build.
+struct BuildHooks {
+  std::function<void(rcCompactHeightfield&)> prune;  ///< takes areas away after erosion
+  std::function<double(const Vec3d&)> height;        ///< true height of a vertex of the surface
+};
+
 /// Everything after voxelisation: filters, erosion, regions, contours, polygons, Detour. `origin` is
-/// where the heightfield's frame lies in the world; `prune` may take areas away after erosion. nothing_navigable, naming the areas left at each
+/// where the heightfield's frame lies in the world. nothing_navigable, naming the areas left at each
 /// stage, where no polygon comes out.
 Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& settings, rcHeightfield& field,
-                               const Vec3d& origin,
-                               const std::function<void(rcCompactHeightfield&)>& prune = {});
+                               const Vec3d& origin, const BuildHooks& hooks = {});
 
 /// An error of a stage of the build, with Recast's own words.
 Status stage(const char* what, const RecastLog& log);
