@@ -104,7 +104,8 @@ TEST_CASE("ply: CRLF header, comments that name the filter") {
       {"comment made by mip\n", Filter::classic},
       {"obj_info SplatRenderMode: mip\n", Filter::mip},
       {"", Filter::classic}};
-  for (const auto& [comment, filter] : comments) {
+  for (const auto& [line, filter] : comments) {
+    const std::string comment = line;
     for (const char* eol : {"\n", "\r\n"}) {
       CAPTURE(comment);
       PlyFile file;
