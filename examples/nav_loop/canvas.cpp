@@ -80,17 +80,22 @@ void Canvas::rect(int x, int y, int w, int h, Rgb color, float alpha) {
 }
 
 void Canvas::text(int x, int y, std::string_view s, int scale, Rgb color) {
-  // Rows of three bits, top first.
+  // Rows of bits, top first: three to a row, five for m.
   static constexpr std::uint16_t kDigits[10] = {075557, 026227, 071747, 071717, 055711, 074717, 074757, 071111, 075757, 075717};
-  static constexpr std::uint16_t kM = 005775, kDot = 000002;
+  static constexpr std::uint16_t kDot = 000002;
+  static constexpr std::uint8_t kM[5] = {0, 0, 0b11110, 0b10101, 0b10101};
+  const auto pixel = [&](int col, int row) { rect(x + col * scale, y + row * scale, scale, scale, color, 1.0f); };
   for (const char c : s) {
-    const std::uint16_t glyph = c >= '0' && c <= '9' ? kDigits[c - '0'] : (c == 'm' ? kM : (c == '.' ? kDot : 0));
+    const std::uint16_t glyph = c >= '0' && c <= '9' ? kDigits[c - '0'] : (c == '.' ? kDot : 0);
     for (int row = 0; row < 5; ++row) {
       for (int col = 0; col < 3; ++col) {
-        if (((glyph >> (3 * (4 - row) + (2 - col))) & 1) != 0) rect(x + col * scale, y + row * scale, scale, scale, color, 1.0f);
+        if (((glyph >> (3 * (4 - row) + (2 - col))) & 1) != 0) pixel(col, row);
+      }
+      for (int col = 0; c == 'm' && col < 5; ++col) {
+        if (((kM[row] >> (4 - col)) & 1) != 0) pixel(col, row);
       }
     }
-    x += 4 * scale;
+    x += (c == 'm' ? 6 : 4) * scale;
   }
 }
 

@@ -15,6 +15,7 @@ using gsnav::Vec3d;
 constexpr Rgb kNavMesh{0.36f, 0.66f, 0.86f}, kEdge{0.20f, 0.47f, 0.70f}, kShortest{0.15f, 0.15f, 0.17f};
 constexpr Rgb kAgent{0.05f, 0.30f, 0.85f}, kStart{0.10f, 0.60f, 0.25f}, kGoal{0.86f, 0.10f, 0.16f}, kInk{0.1f, 0.1f, 0.1f};
 constexpr double kMargin = 0.6;      // metres around the NavMesh
+constexpr double kLeastIsland = 1.5;  // metres: episodes use no smaller ones
 constexpr double kCutHeight = 1.95;  // metres above the floor: what hangs higher would hide the rooms
 
 struct Frame {
@@ -37,15 +38,23 @@ void draw_scene(Canvas& canvas, const Frame& f, const MapContent& m, double floo
   // Painted from the floor up; ties in file order, so that the picture is the same every time.
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return at[a].y < at[b].y; });
   for (const std::uint32_t i : order) {
-    const double size = m.world_from_asset.scale *
-                        std::max({static_cast<double>(c.scales[0][i]), static_cast<double>(c.scales[1][i]), static_cast<double>(c.scales[2][i])});
-    const double radius = std::clamp(size * f.scale, 0.6, 8.0);
+    // Seen from above a Gaussian is a stroke along its longest axis, as wide as its middle one.
+    const double sizes[3] = {c.scales[0][i], c.scales[1][i], c.scales[2][i]};
+    const auto axis = static_cast<int>(std::max_element(sizes, sizes + 3) - sizes);
+    const double longest = sizes[axis], least = *std::min_element(sizes, sizes + 3);
+    const double middle = sizes[0] + sizes[1] + sizes[2] - longest - least;
+    const double k_pixels = 1.3 * m.world_from_asset.scale * f.scale;
+    const double radius = std::clamp(k_pixels * middle, 0.7, 8.0);
+    const gsnav::Quatd q{c.quats[0][i], c.quats[1][i], c.quats[2][i], c.quats[3][i]};
+    const Vec3d along = rotate(m.world_from_asset.rotation, rotation_matrix(q).column(axis)) *
+                        std::clamp(k_pixels * (longest - middle), 0.0, 12.0);
     Rgb color;
     float* out[3] = {&color.r, &color.g, &color.b};
     for (std::size_t k = 0; k < 3; ++k) {
       *out[k] = std::clamp(0.5f + static_cast<float>(gsnav::kSh0) * c.sh0[3 * i + k], 0.0f, 1.0f);
     }
-    canvas.disc(f.x(at[i]), f.y(at[i]), radius, color, 0.85f * c.opacities[i]);
+    const double x = f.x(at[i]), y = f.y(at[i]);
+    canvas.stroke(x - along.x, y - along.z, x + along.x, y + along.z, radius, color, 0.85f * c.opacities[i]);
   }
 }
 
@@ -104,7 +113,9 @@ Canvas draw_map(const MapContent& m) {
 
   for (const auto& t : m.navmesh->triangles()) {
     const gsnav::Vec2<double> p[3] = {{f.x(t[0]), f.y(t[0])}, {f.x(t[1]), f.y(t[1])}, {f.x(t[2]), f.y(t[2])}};
-    canvas.triangle(p, kNavMesh, 0.38f);
+    const auto on = m.navmesh->snap_point((t[0] + t[1] + t[2]) * (1.0 / 3.0), {{0.1, 0.5, 0.1}});
+    if (!on || m.navmesh->island_radius(m.navmesh->island_of(on->poly)) < kLeastIsland) continue;  // a table top
+    canvas.triangle(p, kNavMesh, 0.32f);
     for (int i = 0; i < 3; ++i) canvas.stroke(p[i].x, p[i].y, p[(i + 1) % 3].x, p[(i + 1) % 3].y, 0.4, kEdge, 0.35f);
   }
   for (std::size_t i = 0; i < m.avatars.size(); ++i) polyline(canvas, f, m.avatars[i], 1.6, avatar_color(i), 0.75f);

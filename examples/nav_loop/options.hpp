@@ -26,7 +26,7 @@ struct Options {
   gsnav::Profile profile = gsnav::Profile::exact;
   std::string navmesh = "auto";    ///< auto, mesh, gaussians
   int frame_every = 10;            ///< 0: no frames
-  int shown_episode = 0;           ///< strip and map
+  int shown_episode = -1;          ///< of strip and map; -1: the one that met people most closely
   int max_steps = 500;
 };
 

@@ -55,17 +55,17 @@ void sofa(Painter& p, double width, const Vec3d& fabric, const Vec3d& cushion_a,
 }
 
 void coffee_table(Painter& p) {
-  const double w = 1.1, d = 0.58;
-  p.box({-w / 2, 0.36, -d / 2}, {w / 2, 0.40, d / 2}, wood(kWalnut * 1.3, w, 51), 0.022, Painter::kAll);
+  const double w = 1.1, d = 0.58;  // high enough not to be a step of a staircase to a NavMesh in 0.2 m voxels
+  p.box({-w / 2, 0.40, -d / 2}, {w / 2, 0.44, d / 2}, wood(kWalnut * 1.3, w, 51), 0.022, Painter::kAll);
   p.box({-w / 2 + 0.08, 0.12, -d / 2 + 0.06}, {w / 2 - 0.08, 0.14, d / 2 - 0.06}, wood(kWalnut, w, 52), 0.035);
-  legs(p, w, d, -d / 2, 0.36, 0.045, kWalnut);
+  legs(p, w, d, -d / 2, 0.40, 0.045, kWalnut);
   // Two books and a bowl.
-  p.box({-0.36, 0.40, -0.13}, {-0.08, 0.43, 0.09}, plain(srgb(0xc8553d)), 0.018, Painter::kAll, false);
-  p.box({-0.33, 0.43, -0.10}, {-0.10, 0.455, 0.07}, plain(srgb(0xe8e0cf)), 0.018, Painter::kAll, false);
-  p.cone({0.24, 0.40, 0.02}, 0.06, 0.13, 0.07, plain(srgb(0x3f6f78)), 0.016, false);
+  p.box({-0.36, 0.44, -0.13}, {-0.08, 0.47, 0.09}, plain(srgb(0xc8553d)), 0.018, Painter::kAll, false);
+  p.box({-0.33, 0.47, -0.10}, {-0.10, 0.495, 0.07}, plain(srgb(0xe8e0cf)), 0.018, Painter::kAll, false);
+  p.cone({0.24, 0.44, 0.02}, 0.06, 0.13, 0.07, plain(srgb(0x3f6f78)), 0.016, false);
   for (int i = 0; i < 5; ++i) {
     const double a = 1.2566 * i;
-    p.ellipsoid({0.24 + 0.06 * std::cos(a), 0.465, 0.02 + 0.06 * std::sin(a)}, {0.04, 0.04, 0.04},
+    p.ellipsoid({0.24 + 0.06 * std::cos(a), 0.505, 0.02 + 0.06 * std::sin(a)}, {0.04, 0.04, 0.04},
                 plain(srgb(i % 2 == 0 ? 0xe2a13b : 0xd0652f)), 0.013);
   }
 }

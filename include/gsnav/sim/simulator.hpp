@@ -97,6 +97,25 @@ class Simulator {
     return observe();
   }
 
+  /// Renders what the agent sees now, without acting.
+  Result<Observations> observe() {
+    Observations obs;
+    static_cast<StepInfo&>(obs) = world_.last_step();
+    obs.point_goal = world_.point_goal();
+    obs.time = world_.time();
+    if (!config_.rendering || groups_.empty()) return obs;
+    if (Status s = pose_avatars(); !s) return s;
+    for (Group& g : groups_) {
+      const SensorSpec& first = config_.sensors[g.sensors.front()];
+      const Camera camera = sensor_camera(first, world_.agent().position, world_.agent().rotation());
+      if (Status s = render_into(camera, g.outputs, g.frames); !s) return s;
+      for (float& z : g.frames.median_depth) z = static_cast<double>(z) > first.far_plane ? 0.0f : z;
+      for (const std::size_t i : g.sensors) images_[i].data = image_of(config_.sensors[i].kind, g.frames);
+    }
+    obs.images = images_;
+    return obs;
+  }
+
   bool done() const noexcept { return world_.done(); }
   EpisodeMetrics metrics() const { return world_.metrics(); }
   double clock() const noexcept { return world_.time(); }
@@ -112,7 +131,7 @@ class Simulator {
 
   /// Renders any camera at the present time (a map, a spectator). Images live until the next call.
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) {
-    pose_avatars();
+    if (Status s = pose_avatars(); !s) return s;
     if (Status s = render_into(camera, outputs, spectator_); !s) return s;
     return &spectator_;
   }
@@ -171,15 +190,20 @@ class Simulator {
     return kind == SensorKind::rgb ? kRgb : (kind == SensorKind::depth ? kMedianDepth : kAlpha);
   }
 
-  void pose_avatars() {
-    if (posed_ && posed_time_ == world_.time()) return;
+  static std::span<const float> image_of(SensorKind kind, const Frames<float>& f) noexcept {
+    return kind == SensorKind::rgb ? f.rgb : (kind == SensorKind::depth ? f.median_depth : f.alpha);
+  }
+
+  Status pose_avatars() {
+    if (posed_ && posed_time_ == world_.time()) return {};
     sets_.resize(assets_.size());
     for (std::size_t i = 0; i < skins_.size(); ++i) {
-      skins_[i].pose((*avatars_)[i], world_.time());
+      if (Status s = skins_[i].pose((*avatars_)[i], world_.time()); !s) return s;
       sets_.push_back(skins_[i].set());
     }
     posed_ = true;
     posed_time_ = world_.time();
+    return {};
   }
 
   Status render_into(const Camera& camera, unsigned outputs, Frames<float>& frames) {
@@ -188,30 +212,6 @@ class Simulator {
     renderer_.set_config(rc);
     ++render_count_;
     return renderer_.render(sets_, std::span(&camera, 1), frames);
-  }
-
-  Result<Observations> observe() {
-    Observations obs;
-    static_cast<StepInfo&>(obs) = world_.last_step();
-    obs.point_goal = world_.point_goal();
-    obs.time = world_.time();
-    if (!config_.rendering || groups_.empty()) return obs;
-    pose_avatars();
-    for (Group& g : groups_) {
-      const SensorSpec& first = config_.sensors[g.sensors.front()];
-      const Camera camera = sensor_camera(first, world_.agent().position, world_.agent().rotation());
-      if (Status s = render_into(camera, g.outputs, g.frames); !s) return s;
-      for (float& z : g.frames.median_depth) z = static_cast<double>(z) > first.far_plane ? 0.0f : z;
-      for (const std::size_t i : g.sensors) {
-        const SensorKind kind = config_.sensors[i].kind;
-        images_[i].data = kind == SensorKind::rgb
-                              ? std::span<const float>(g.frames.rgb)
-                              : std::span<const float>(kind == SensorKind::depth ? g.frames.median_depth : g.frames.alpha);
-        images_[i].uuid = config_.sensors[i].uuid;
-      }
-    }
-    obs.images = images_;
-    return obs;
   }
 
   World world_;

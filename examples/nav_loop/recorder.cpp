@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recorder.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+#include "gsnav/io/image_file.hpp"
+
+namespace nav_loop {
+namespace {
+
+constexpr float kNear = 0.3f, kFar = 7.0f;  // range of depth colours, metres
+constexpr std::size_t kMostShots = 64;      // kept in memory for the strip
+
+std::vector<std::uint8_t> bytes_of(std::span<const float> rgb) {
+  std::vector<std::uint8_t> out(rgb.size());
+  gsnav::to_bytes(rgb, out);
+  return out;
+}
+
+}  // namespace
+
+gsnav::Status Recorder::open() {
+  std::error_code error;
+  const std::string frames = options_.out + "/frames";
+  std::filesystem::create_directories(options_.frame_every > 0 ? frames : options_.out, error);
+  if (error) return {gsnav::Errc::file_not_found, "--out " + options_.out + ": " + error.message()};
+  return {};
+}
+
+void Recorder::begin(const gsnav::World& world, int episode) {
+  episode_ = episode;
+  step_ = 0;
+  stride_ = 1;
+  current_ = {};
+  if (!wanted()) return;
+  MapContent& map = current_.map;
+  map.start = world.agent().position;
+  map.goal = world.episode().goal_position;
+  map.agent_radius = world.config().agent_radius;
+  const auto path = world.navmesh().find_path(map.start, map.goal);
+  if (path) map.shortest = path->points;
+}
+
+gsnav::Status Recorder::add(const gsnav::World& world, const gsnav::Observations& obs) {
+  const std::size_t step = step_++;
+  const bool save = options_.frame_every > 0 && step % static_cast<std::size_t>(options_.frame_every) == 0;
+  const bool keep = wanted() && step % stride_ == 0;
+  if (wanted()) {
+    current_.map.agent.push_back(world.agent().position);
+    if (step % 8 == 0) {
+      const auto now = world.bodies(world.time(), world.time());
+      if (now) current_.map.snapshots.emplace_back(now->capsules().begin(), now->capsules().end());
+    }
+  }
+  if (!save && !keep) return {};
+  Shot shot{bytes_of(obs["rgb"]), gsnav::io::colorize_depth(obs["depth"], kNear, kFar)};
+  if (save) {
+    char name[64];
+    std::snprintf(name, sizeof name, "/frames/ep%03d_step%04zu", episode_, step);
+    const std::string base = options_.out + name;
+    if (auto s = gsnav::io::save_png_rgb8(base + "_rgb.png", shot.rgb, options_.width, options_.height); !s) return s;
+    if (auto s = gsnav::io::save_png_rgb8(base + "_depth.png", shot.depth, options_.width, options_.height); !s) return s;
+  }
+  if (keep) {
+    std::vector<Shot>& shots = current_.shots;
+    shots.push_back(std::move(shot));
+    if (shots.size() > kMostShots) {  // long episodes are kept at half the rate
+      for (std::size_t i = 1; 2 * i < shots.size(); ++i) shots[i] = std::move(shots[2 * i]);
+      shots.resize((shots.size() + 1) / 2);
+      stride_ *= 2;
+    }
+  }
+  return {};
+}
+
+void Recorder::end(const gsnav::World& world, const std::vector<gsnav::AvatarActor>& avatars) {
+  if (!wanted()) return;
+  const gsnav::EpisodeMetrics m = world.metrics();
+  current_.interest = (m.success ? 1.0 : 0.0) + m.psi;
+  if (current_.interest <= best_.interest) return;
+  for (const gsnav::AvatarActor& actor : avatars) {
+    std::vector<gsnav::Vec3d>& way = current_.map.avatars.emplace_back();
+    for (double t = world.episode().start_time; t <= world.time(); t += 0.25) way.push_back(actor.placement(t).translation);
+  }
+  const auto now = world.bodies(world.time(), world.time());
+  if (now) current_.map.snapshots.emplace_back(now->capsules().begin(), now->capsules().end());
+  best_ = std::move(current_);
+}
+
+gsnav::Status Recorder::write_strip() const {
+  const std::vector<Shot>& shots = best_.shots;
+  const int columns = static_cast<int>(std::min<std::size_t>(8, shots.size()));
+  const int w = options_.width, h = options_.height, gap = 4;
+  Canvas sheet(columns * (w + gap) + gap, 2 * (h + gap) + gap, {1, 1, 1});
+  for (int i = 0; i < columns; ++i) {
+    const std::size_t at = columns == 1 ? 0 : static_cast<std::size_t>(i) * (shots.size() - 1) / static_cast<std::size_t>(columns - 1);
+    const int x = gap + i * (w + gap);
+    sheet.paste(shots[at].rgb.data(), w, h, x, gap);
+    sheet.paste(shots[at].depth.data(), w, h, x, h + 2 * gap);
+  }
+  return gsnav::io::save_png_rgb8(options_.out + "/strip.png", sheet.bytes(), sheet.width(), sheet.height());
+}
+
+gsnav::Status Recorder::finish(const gsnav::SimulatorScene& scene) {
+  if (best_.shots.empty()) return {};
+  if (auto s = write_strip(); !s) return s;
+  MapContent& map = best_.map;
+  if (!scene.assets.empty()) {
+    map.cloud = scene.assets.front().cloud.get();
+    map.world_from_asset = scene.assets.front().world_from_asset;
+  }
+  map.navmesh = scene.navmesh.get();
+  const Canvas picture = draw_map(map);
+  return gsnav::io::save_png_rgb8(options_.out + "/map.png", picture.bytes(), picture.width(), picture.height());
+}
+
+}  // namespace nav_loop

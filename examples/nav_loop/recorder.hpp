@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "gsnav/sim/simulator.hpp"
+#include "map.hpp"
+#include "options.hpp"
+
+namespace nav_loop {
+
+/// Writes the pictures of a run: sampled frames, and of one episode a strip and a map.
+class Recorder {
+ public:
+  explicit Recorder(const Options& options) : options_(options) {}
+
+  /// Makes the folders. Errors: file_not_found naming the folder.
+  gsnav::Status open();
+  void begin(const gsnav::World& world, int episode);
+  gsnav::Status add(const gsnav::World& world, const gsnav::Observations& obs);
+  /// Keeps the episode that ended if it is the one to show so far.
+  void end(const gsnav::World& world, const std::vector<gsnav::AvatarActor>& avatars);
+  /// Writes strip.png and map.png.
+  gsnav::Status finish(const gsnav::SimulatorScene& scene);
+
+ private:
+  struct Shot {
+    std::vector<std::uint8_t> rgb, depth;
+  };
+  struct Take {  // one episode
+    std::vector<Shot> shots;
+    MapContent map;
+    double interest = -1.0;
+  };
+  gsnav::Status write_strip() const;
+  bool wanted() const { return options_.shown_episode < 0 || options_.shown_episode == episode_; }
+
+  const Options& options_;
+  int episode_ = -1;
+  std::size_t step_ = 0, stride_ = 1;
+  Take current_, best_;
+};
+
+}  // namespace nav_loop

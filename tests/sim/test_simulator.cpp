@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include "flat_world.hpp"
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/sim/simulator.hpp"
+
+using namespace gsnav;
+
+namespace {
+
+SimulatorScene flat_scene() {
+  static const auto cloud = std::make_shared<const GaussianCloud>(make_default_scene(0.05).value().cloud);
+  SimulatorScene s;
+  s.assets.push_back({cloud, {}});
+  s.navmesh = gsnav_test::flat_navmesh();
+  return s;
+}
+
+SimulatorConfig small_config() {
+  SimulatorConfig c;
+  c.sensors = rgbd_sensors(48, 64);
+  return c;
+}
+
+PointNavEpisode to_kitchen() {
+  PointNavEpisode e;
+  e.start_position = {4.6, 0, 3.6};
+  e.goal_position = {8.8, 0, 3.4};
+  return e;
+}
+
+}  // namespace
+
+TEST_CASE("RGB and depth at one place share one render") {
+  SerialBackend backend;
+  auto sim = make_simulator(backend, flat_scene(), small_config()).value();
+  auto obs = sim.reset(to_kitchen()).value();
+  CHECK(sim.render_count() == 1);
+  CHECK(obs.images.size() == 2);
+  CHECK(obs["rgb"].size() == 48 * 64 * 3);
+  CHECK(obs["depth"].size() == 48 * 64);
+  CHECK(obs["nothing"].empty());
+  CHECK(obs.images[0].height == 48);
+  CHECK(obs.images[0].width == 64);
+  CHECK(obs.images[0].channels == 3);
+  sim.step(Action::turn_left).value();
+  CHECK(sim.render_count() == 2);
+
+  SimulatorConfig three = small_config();
+  three.sensors.push_back(three.sensors[0]);
+  three.sensors[2].uuid = "low";
+  three.sensors[2].position.y = 0.4;
+  three.sensors[2].kind = SensorKind::alpha;
+  auto other = make_simulator(backend, flat_scene(), three).value();
+  obs = other.reset(to_kitchen()).value();
+  CHECK(other.render_count() == 2);
+  CHECK(obs["low"].size() == 48 * 64);
+  // Closed walls all around: every pixel is covered.
+  CHECK(*std::min_element(obs["low"].begin(), obs["low"].end()) > 0.9f);
+}
+
+TEST_CASE("images are used again: a steady episode keeps its buffers") {
+  SerialBackend backend;
+  auto sim = make_simulator(backend, flat_scene(), small_config()).value();
+  const float* rgb = sim.reset(to_kitchen())->images[0].data.data();
+  for (int i = 0; i < 3; ++i) CHECK(sim.step(Action::move_forward)->images[0].data.data() == rgb);
+}
+
+TEST_CASE("without rendering there are no images and everything else") {
+  SerialBackend backend;
+  SimulatorConfig c = small_config();
+  c.rendering = false;
+  auto sim = make_simulator(backend, flat_scene(), c).value();
+  auto obs = sim.reset(to_kitchen()).value();
+  CHECK(obs.images.empty());
+  CHECK(sim.render_count() == 0);
+  obs = sim.step(Action::move_forward).value();
+  CHECK(obs.moved == doctest::Approx(0.25));
+  CHECK(obs.time == 0.25);
+  sim.set_rendering(true);
+  CHECK(sim.observe()->images.size() == 2);
+}
+
+TEST_CASE("the camera looks where the agent goes") {
+  SensorSpec spec;
+  spec.resolution = {48, 64};
+  const Vec3d base{1, 0, 2};
+  for (const double yaw : {0.0, 0.7, -2.0}) {
+    const Camera c = sensor_camera(spec, base, yaw_rotation(yaw));
+    CHECK(norm(c.position() - (base + Vec3d{0, 1.5, 0})) < 1e-12);
+    // A point ahead of the agent at eye level is on the axis; up in the world is up in the image.
+    const Vec3d ahead = base + Vec3d{-std::sin(yaw), 1.5, -std::cos(yaw)} * 1.0;
+    const Vec3d p = c.viewmat * ahead;
+    CHECK(abs(p.x) < 1e-12);
+    CHECK(abs(p.y) < 1e-12);
+    CHECK(p.z == doctest::Approx(1.0));
+    CHECK((c.viewmat * (ahead + Vec3d{0, 0.1, 0})).y == doctest::Approx(-0.1));
+    const Vec3d left = ahead + Vec3d{-std::cos(yaw), 0, std::sin(yaw)} * 0.1;
+    CHECK((c.viewmat * left).x == doctest::Approx(-0.1));
+  }
+  // Square pixels: at 90 degrees the focal length is half the width.
+  CHECK(sensor_camera(spec, base, {}).fx == doctest::Approx(32.0));
+  CHECK(sensor_camera(spec, base, {}).fy == doctest::Approx(32.0));
+  spec.orientation = {-0.5, 0, 0};  // looks down
+  CHECK((sensor_camera(spec, base, {}).viewmat * (base + Vec3d{0, 1.5, -1})).y < 0);
+}
+
+TEST_CASE("depth is planar z in metres, and nothing beyond the far plane") {
+  SerialBackend backend;
+  SimulatorConfig c = small_config();
+  auto sim = make_simulator(backend, flat_scene(), c).value();
+  PointNavEpisode e = to_kitchen();
+  e.start_position = {4.2, 0, 3.6};
+  e.start_rotation = yaw_rotation(3.14159265358979323846);  // towards +Z, the wall at z = 4.54
+  auto obs = sim.reset(e).value();
+  const double truth = 4.54 - sim.agent().position.z;
+  for (const std::size_t row : {20u, 24u, 30u}) {
+    CHECK(obs["depth"][row * 64 + 32] == doctest::Approx(truth).epsilon(0.03));
+  }
+  for (SensorSpec& s : c.sensors) s.far_plane = 0.5;
+  auto near = make_simulator(backend, flat_scene(), c).value();
+  obs = near.reset(e).value();
+  CHECK(obs["depth"][24 * 64 + 32] == 0.0f);
+}
+
+TEST_CASE("impossible configurations name what is wrong") {
+  SerialBackend backend;
+  const auto message = [&](auto change) {
+    SimulatorScene s = flat_scene();
+    SimulatorConfig c = small_config();
+    change(s, c);
+    const auto sim = make_simulator(backend, std::move(s), std::move(c));
+    CHECK(sim.code() == Errc::invalid_argument);
+    return sim.message();
+  };
+  const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  CHECK(has(message([](auto& s, auto&) { s.navmesh = nullptr; }), "navmesh"));
+  CHECK(has(message([](auto& s, auto&) { s.assets[0].cloud = nullptr; }), "assets[0]"));
+  CHECK(has(message([](auto&, auto& c) { c.sensors[1].uuid = "rgb"; }), "twice"));
+  CHECK(has(message([](auto&, auto& c) { c.sensors[1].uuid = ""; }), "uuid"));
+  CHECK(has(message([](auto&, auto& c) { c.sensors[0].resolution = {0, 64}; }), "resolution"));
+  CHECK(has(message([](auto&, auto& c) { c.sensors[0].hfov = 180; }), "hfov"));
+  CHECK(has(message([](auto&, auto& c) { c.sensors[0].near_plane = 0; }), "near_plane"));
+  CHECK(has(message([](auto&, auto& c) { c.sensors[0].far_plane = 0.001; }), "far_plane"));
+  CHECK(has(message([](auto&, auto& c) { c.sensors[0].near_sigma = -1; }), "near_sigma"));
+  CHECK(has(message([](auto&, auto& c) { c.sensors[0].position.x = std::nan(""); }), "position"));
+  CHECK(has(message([](auto&, auto& c) { c.task.forward_step = 0; }), "forward_step"));
+  CHECK(has(message([](auto&, auto& c) { c.render.tile_size = 7; }), "tile_size"));
+}
+
+TEST_CASE("bytes round and clamp") {
+  const float in[6] = {-1.0f, 0.0f, 0.5f, 1.0f, 7.0f, std::nanf("")};
+  std::uint8_t out[6];
+  to_bytes(in, out);
+  CHECK(out[0] == 0);
+  CHECK(out[2] == 128);
+  CHECK(out[3] == 255);
+  CHECK(out[4] == 255);
+  CHECK(out[5] == 0);
+}
