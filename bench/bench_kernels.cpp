@@ -2,8 +2,11 @@
 // One row a kernel and backend: time with the error against the same kernel in float64 beside it.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "error.hpp"
@@ -11,6 +14,7 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/kernels/capsule.hpp"
+#include "gsnav/ops/skin.hpp"
 #include "gsnav/scene/renderer.hpp"
 
 using namespace gsnav;
@@ -150,6 +154,66 @@ void blend(benchmark::State& state) {
   state.counters["rgb_psnr"] = e.psnr;
 }
 
+/// Random rigid joints and weights for n Gaussians; what an avatar of 55 joints asks of skinning.
+template <class S, class B>
+void skin(benchmark::State& state) {
+  const std::size_t n = static_cast<std::size_t>(state.range(0)), joints = 55;
+  Rng rng(3);
+  const GaussianCloud cloud = wall(n, 0);
+  const GaussianView view = cloud.view();
+  std::vector<Affine3<double>> matrices(joints);
+  for (auto& m : matrices) {
+    m.linear = rotation_matrix(
+        axis_angle(normalized(Vec3d{rng.normal(), rng.normal(), rng.normal()}), rng.uniform(0, 1)));
+    m.translation = {rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)};
+  }
+  std::vector<std::uint16_t> indices(4 * view.size);
+  std::vector<float> weights(4 * view.size);
+  for (std::size_t i = 0; i < view.size; ++i) {
+    const float w[4] = {0.55f, 0.25f, 0.125f, 0.075f};
+    for (std::size_t k = 0; k < 4; ++k) {
+      indices[4 * i + k] = static_cast<std::uint16_t>(rng.below(joints));
+      weights[4 * i + k] = w[k];
+    }
+  }
+  const auto run = [&]<class T, class Out>(auto& backend, std::vector<std::vector<Out>>& out, bool check) {
+    out.assign(7, std::vector<Out>(view.size));
+    std::vector<Affine3<T>> converted;
+    for (const auto& m : matrices) converted.push_back(affine_cast<T>(m));
+    SkinningArgs<T, Out> args;
+    for (std::size_t k = 0; k < 3; ++k) {
+      args.means[k] = view.means[k];
+      args.means_out[k] = view_of(out[k]);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      args.quats[k] = view.quats[k];
+      args.quats_out[k] = view_of(out[3 + k]);
+    }
+    args.joint_indices = view_of(std::as_const(indices));
+    args.weights = view_of(std::as_const(weights));
+    args.joints = view_of(std::as_const(converted));
+    if (check) {
+      skin_gaussians(backend, args).throw_if_error();
+    } else {
+      for (auto _ : state) skin_gaussians(backend, args).throw_if_error();
+    }
+  };
+  B backend;
+  SerialBackend serial;
+  std::vector<std::vector<float>> out;
+  std::vector<std::vector<double>> truth;
+  run.template operator()<S, float>(backend, out, false);
+  run.template operator()<double, double>(serial, truth, true);
+  double mean_max = 0, quat_max = 0;
+  for (std::size_t k = 0; k < 7; ++k) {
+    double& worst = k < 3 ? mean_max : quat_max;
+    worst = std::max(worst, gsnav_bench::error_of(out[k], truth[k]).max);
+  }
+  state.counters["mean_max_m"] = mean_max;
+  state.counters["quat_max"] = quat_max;
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations()) * static_cast<std::int64_t>(view.size));
+}
+
 struct CapsulePairs {
   std::vector<MovingCapsule<double>> agents, bodies;
   explicit CapsulePairs(std::size_t n) {
@@ -236,6 +300,9 @@ BENCHMARK(project<double, SerialBackend>)->Arg(0)->Arg(3)->Unit(benchmark::kMill
 BENCHMARK(blend<float, OneThread>)->Arg(100000)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(blend<float, OpenMPBackend>)->Arg(100000)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(blend<float, SerialBackend>)->Arg(100000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(skin<float, SerialBackend>)->Arg(200000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(skin<float, OpenMPBackend>)->Arg(200000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(skin<double, SerialBackend>)->Arg(200000)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(capsule_distance<float>)->UseRealTime();
 BENCHMARK(capsule_distance<double>)->UseRealTime();
 BENCHMARK(capsule_sweep<float>)->UseRealTime();

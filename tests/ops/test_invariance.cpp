@@ -2,6 +2,7 @@
 // Properties of the image that must hold bit for bit.
 #include <doctest/doctest.h>
 
+#include "gsnav/ops/skin.hpp"
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
 
@@ -55,6 +56,49 @@ TEST_CASE("threads do not change a bit, and lanes are the scalar kernels") {
       OpenMPBackend openmp(threads);
       CHECK(same(reference, render<float>(openmp, {cloud.set()}, wide_camera(), config)));
     }
+  }
+}
+
+TEST_CASE("skinning in lanes is the scalar kernel, for any number of threads") {
+  Rng rng(40);
+  const GaussianCloud cloud = random_cloud(40, {.count = 5003});
+  const GaussianView view = cloud.view();
+  const std::size_t n = view.size;
+  std::vector<Affine3<float>> joints(20);
+  for (auto& j : joints) {
+    Quatd q{rng.normal(), rng.normal(), rng.normal(), rng.normal()};
+    normalize(q);
+    j = {mat_cast<float>(rotation_matrix(q)), {static_cast<float>(rng.normal()), 0.5f, -1.0f}};
+  }
+  std::vector<std::uint16_t> indices(4 * n);
+  std::vector<float> weights(4 * n);
+  for (std::size_t i = 0; i < 4 * n; ++i) {
+    indices[i] = static_cast<std::uint16_t>(rng.below(joints.size()));
+    weights[i] = i % 4 == 0 ? 0.55f : 0.15f;
+  }
+  const auto skinned = [&](auto& backend) {
+    std::vector<std::vector<float>> out(11, std::vector<float>(n));
+    SkinningArgs<float> args;
+    for (std::size_t k = 0; k < 3; ++k) {
+      args.means[k] = view.means[k];
+      args.means_out[k] = view_of(out[k]);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      args.quats[k] = view.quats[k];
+      args.quats_out[k] = view_of(out[3 + k]);
+      args.rotations_out[k] = view_of(out[7 + k]);
+    }
+    args.joint_indices = view_of(std::as_const(indices));
+    args.weights = view_of(std::as_const(weights));
+    args.joints = view_of(std::as_const(joints));
+    REQUIRE(skin_gaussians(backend, args).ok());
+    return out;
+  };
+  SerialBackend serial;
+  const auto reference = skinned(serial);
+  for (const int threads : {1, 3}) {
+    OpenMPBackend openmp(threads);
+    CHECK(skinned(openmp) == reference);
   }
 }
 

@@ -39,6 +39,7 @@ GSNAV_HD Mat3<L> polar_rotation(const Mat3<L>& m) noexcept {
   const L converged(sizeof(S) > sizeof(float) ? S(1e-16) : S(1e-7));
   const L half(S(0.5));
   Mat3<L> x = m;
+  auto active = half > L(S(0));
   for (int step = 0; step < 16; ++step) {
     const Mat3<L> c = detail::cofactors(x);
     const L weight = half / dot(x.row[0], c.row[0]);
@@ -49,9 +50,12 @@ GSNAV_HD Mat3<L> polar_rotation(const Mat3<L>& m) noexcept {
                          fma(weight, c.row[i].z, half * x.row[i].z)};
       const Vec3<L> d = next - x.row[i];
       change = change + dot(d, d);
-      x.row[i] = next;
+      // A lane that has converged stays: a pack gives the bits of its lanes alone.
+      x.row[i] = {select(active, next.x, x.row[i].x), select(active, next.y, x.row[i].y),
+                  select(active, next.z, x.row[i].z)};
     }
-    if (!any(change > converged)) break;
+    active = active && (change > converged);
+    if (!any(active)) break;
   }
   return x;
 }

@@ -11,6 +11,7 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/lbs.hpp"
 #include "gsnav/kernels/projection.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
@@ -27,6 +28,7 @@ struct LaneKernels {
   void (*count_tiles)(const BinArgs<float>&, std::size_t block) noexcept;
   void (*scatter_tiles)(const BinArgs<float>&, std::size_t block) noexcept;
   void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
 };
 
 #if defined(GSNAV_OPENMP_COMPILED)
@@ -38,7 +40,7 @@ namespace lanes {
 inline namespace GSNAV_LANES_TAG {
 inline const LaneKernels& native_kernels() noexcept {
   static const LaneKernels k{"native",      kWidth,         &project_chunk,
-                             &count_tiles,  &scatter_tiles, &rasterize_tile_any};
+                             &count_tiles,  &scatter_tiles, &rasterize_tile_any, &skin_range};
   return k;
 }
 }  // namespace GSNAV_LANES_TAG
@@ -112,6 +114,15 @@ class OpenMPBackend {
   void rasterize_tiles(const RasterArgs<float>& args) {
     const auto kernel = lane_kernels().rasterize_tile;
     parallel_for(args.grid.count(), [&args, kernel](std::size_t tile) { kernel(args, tile); });
+  }
+  /// Optional member: skinning in lanes.
+  void skin(const SkinningArgs<float>& args) {
+    constexpr std::size_t kRange = 1024;
+    const auto kernel = lane_kernels().skin_range;
+    const std::size_t n = args.size();
+    parallel_for((n + kRange - 1) / kRange, [&args, kernel, n](std::size_t r) {
+      kernel(args, r * kRange, (r + 1) * kRange < n ? (r + 1) * kRange : n);
+    });
   }
 
  private:

@@ -3,6 +3,7 @@
 
 #include "gsnav/kernels/lanes/project_chunk.hpp"
 #include "gsnav/kernels/lanes/rasterize_tile.hpp"
+#include "gsnav/kernels/lanes/skin.hpp"
 #include "gsnav/kernels/tiles.hpp"
 
 namespace gsnav::lanes {
