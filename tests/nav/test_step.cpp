@@ -268,7 +268,7 @@ TEST_CASE("step: clipping a clipped step changes nothing; a longer agent radius 
   const NavMesh mesh = room();
   Rng rng(24);
   int contacts = 0;
-  for (int i = 0; i < 1000; ++i) {
+  for (int i = 0; i < 2000; ++i) {
     std::vector<DynamicCapsule> list = crowd(rng, 0.0, 3);
     for (DynamicCapsule& c : list) c.motion.end = c.motion.begin;
     const CapsuleSet set = CapsuleSet::create(list).value();
