@@ -1,88 +1,137 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
-#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
-#include "gsnav/avatar/skeleton.hpp"
-#include "gsnav/avatar/walk.hpp"
-#include "gsnav/core/view.hpp"
-#include "gsnav/kernels/fk.hpp"
-#include "gsnav/kernels/lbs.hpp"
+#include "gsnav/avatar/asset.hpp"
+#include "gsnav/avatar/motion.hpp"
+#include "gsnav/avatar/trajectory.hpp"
+#include "gsnav/core/status.hpp"
 #include "gsnav/math/capsule.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/math/similarity.hpp"
 
 namespace gsnav {
 
-/// A capsule fixed to a joint: endpoints in the avatar's rest frame, metres.
-struct ProxyCapsule {
-  std::uint16_t joint = 0;
-  Capsule<double> rest{};
+struct ActorOptions {
+  double time_begin = 0.0;                                        ///< seconds on the scene's clock
+  double time_end = std::numeric_limits<double>::infinity();      ///< it is gone after this
+  double scale = 1.0;                                             ///< uniform, > 0
 };
 
-/// A person before any motion: canonical Gaussians, skin and skeleton. Frame: Y up, facing -Z, feet on
-/// y = 0, metres.
-struct AvatarAsset {
-  Skeleton skeleton;
-  GaussianCloud canonical;
-  std::vector<std::uint16_t> joint_indices;  ///< [N][4]
-  std::vector<float> skinning_weights;       ///< [N][4], >= 0, sum 1
-  std::vector<ProxyCapsule> capsules;
-  double stride = 1.3;  ///< metres walked in one cycle of the gait (two steps)
-};
-
-/// A person in the world: an asset on its way. Const and cheap to copy.
+/// Somebody in the scene: a body, how its joints move, and where it goes. Everything is a function of the
+/// scene's clock: actors keep no state, so any number of simulators may share one.
 class AvatarActor {
  public:
-  AvatarActor(std::shared_ptr<const AvatarAsset> asset, WalkTrajectory trajectory)
-      : asset_(std::move(asset)), trajectory_(std::move(trajectory)) {}
-
-  const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
-  const WalkTrajectory& trajectory() const noexcept { return trajectory_; }
-
-  /// World from avatar frame at time t (seconds).
-  Similarity placement(double t) const noexcept { return trajectory_.placement(t); }
-
-  /// Joint matrices (posed * inverse bind) in the avatar's frame at time t, [J].
-  void joint_matrices(double t, std::vector<Affine3<double>>& out) const {
-    const std::size_t n = asset_->skeleton.joint_count();
-    const Pose pose = walk_pose(asset_->skeleton, trajectory_.distance(t) / asset_->stride, trajectory_.effort(t));
-    std::vector<Affine3<double>> globals(n);
-    out.resize(n);
-    forward_kinematics<double>(view_of(std::as_const(asset_->skeleton.parents)),
-                               view_of(std::as_const(asset_->skeleton.rest_positions)),
-                               view_of(std::as_const(pose.rotations)), pose.root_translation,
-                               view_of(globals), view_of(out));
+  /// `motion` null: the asset's idle pose. `trajectory` null: stands at the world's origin.
+  /// Errors: what the asset and motion report; a motion for another number of joints; the options.
+  static Result<AvatarActor> create(std::shared_ptr<const AvatarAsset> asset,
+                                    std::shared_ptr<const MotionSource> motion = nullptr,
+                                    std::shared_ptr<const Trajectory> trajectory = nullptr,
+                                    const ActorOptions& options = {}) {
+    const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, "AvatarActor: " + what); };
+    if (asset == nullptr) return bad("no asset");
+    if (Status s = asset->validate(); !s) return s;
+    if (motion == nullptr) {
+      motion = std::make_shared<const FixedPose>(asset->idle.rotations.empty() ? asset->skeleton.rest_pose()
+                                                                               : asset->idle);
+    }
+    if (trajectory == nullptr) trajectory = std::make_shared<const StandingTrajectory>();
+    if (Status s = motion->validate(); !s) return s;
+    if (motion->joint_count() != asset->skeleton.size()) {
+      return bad("a motion of " + std::to_string(motion->joint_count()) + " joints for a skeleton of " +
+                 std::to_string(asset->skeleton.size()));
+    }
+    if (!(options.scale > 0) || !is_finite(options.scale)) return bad("ActorOptions.scale must be positive");
+    if (!is_finite(options.time_begin) || !(options.time_end >= options.time_begin)) {
+      return bad("ActorOptions.time_end lies before time_begin");
+    }
+    AvatarActor actor;
+    actor.inverse_binds_ = asset->skeleton.bind_inverses();
+    actor.asset_ = std::move(asset);
+    actor.motion_ = std::move(motion);
+    actor.trajectory_ = std::move(trajectory);
+    actor.options_ = options;
+    return actor;
   }
 
-  /// Proxy capsules in the world at time t.
+  const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
+  const Trajectory& trajectory() const noexcept { return *trajectory_; }
+  const ActorOptions& options() const noexcept { return options_; }
+
+  /// Whether it is in the scene at time t (seconds on the scene's clock, as everywhere below).
+  bool active(double t) const noexcept { return t >= options_.time_begin && t <= options_.time_end; }
+
+  /// World from the avatar's root frame: Y up, facing -Z, feet on y = 0.
+  Similarity placement(double t) const {
+    LocalPose pose;
+    return placement(t, pose);
+  }
+
+  /// Joint to root frame, [J], metres.
+  void joint_globals(double t, std::vector<Affine3<double>>& out) const {
+    LocalPose pose;
+    placement(t, pose);
+    forward_kinematics(asset_->skeleton, pose, out);
+  }
+
+  /// What skinning reads: joint to root frame times inverse bind, [J].
+  void joint_matrices(double t, std::vector<Affine3<double>>& out) const {
+    joint_globals(t, out);
+    for (std::size_t j = 0; j < out.size(); ++j) out[j] = out[j] * inverse_binds_[j];
+  }
+
+  /// The proxy capsules in the world; none while it is not active.
   std::vector<Capsule<double>> capsules(double t) const {
-    std::vector<Affine3<double>> joints;
-    joint_matrices(t, joints);
-    const Similarity world = placement(t);
     std::vector<Capsule<double>> out;
-    for (const ProxyCapsule& c : asset_->capsules) {
-      const Affine3<double>& m = joints[c.joint];
-      out.push_back({world * (m * c.rest.p0), world * (m * c.rest.p1), world.scale * c.rest.radius});
-    }
+    if (active(t)) append_capsules(t, out);
     return out;
   }
 
-  /// Appends the capsules' linear motion over [t0, t1].
+  /// Appends the proxy capsules as they move over [t0, t1], endpoints linear in between, with `avatar` as
+  /// the body's number. None unless it is active at some time in between.
   void dynamic_capsules(double t0, double t1, std::uint32_t avatar, std::vector<DynamicCapsule>& out) const {
-    const std::vector<Capsule<double>> a = capsules(t0), b = capsules(t1);
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      out.push_back({{a[i], b[i]}, avatar, static_cast<std::uint32_t>(i)});
+    if (t1 < options_.time_begin || t0 > options_.time_end) return;
+    std::vector<Capsule<double>> begin, end;
+    append_capsules(t0, begin);
+    append_capsules(t1, end);
+    for (std::size_t c = 0; c < begin.size(); ++c) {
+      out.push_back({{begin[c], end[c]}, avatar, static_cast<std::uint32_t>(c)});
     }
   }
 
  private:
+  Similarity placement(double t, LocalPose& pose) const {
+    const double local = t - options_.time_begin;
+    const TrajectorySample at = trajectory_->at(local);
+    motion_->pose({local, at.distance / options_.scale, at.turned, at.walking, at.turning}, pose);
+    // The path of a clip goes into the placement, so that joint matrices stay small numbers.
+    const Similarity base{axis_angle(Vec3d{0, 1, 0}, at.yaw), at.position, options_.scale};
+    return {base.rotation, base * pose.root, base.scale};
+  }
+
+  void append_capsules(double t, std::vector<Capsule<double>>& out) const {
+    LocalPose pose;
+    const Similarity world = placement(t, pose);
+    std::vector<Affine3<double>> globals;
+    forward_kinematics(asset_->skeleton, pose, globals);
+    for (const ProxyCapsule& c : asset_->capsules) {
+      const Affine3<double>& g = globals[c.joint];
+      out.push_back({world * (g * c.p0), world * (g * c.p1), c.radius * world.scale});
+    }
+  }
+
+  AvatarActor() = default;
   std::shared_ptr<const AvatarAsset> asset_;
-  WalkTrajectory trajectory_;
+  std::shared_ptr<const MotionSource> motion_;
+  std::shared_ptr<const Trajectory> trajectory_;
+  std::vector<Affine3<double>> inverse_binds_;
+  ActorOptions options_;
 };
 
 }  // namespace gsnav

@@ -1,91 +1,112 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "gsnav/avatar/actor.hpp"
+#include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/core/status.hpp"
 #include "gsnav/ops/skin.hpp"
 
 namespace gsnav {
 
-/// The posed Gaussians of one avatar in a backend's memory. Means and orientations are written per pose;
-/// scales, opacities and SH are the asset's own. The backend must outlive it.
+/// The Gaussians of one actor, posed on a backend and ready to be rendered in one list with the scene.
+/// Only means and orientations (and for SH of degree >= 1 the rotations that colours are turned back by)
+/// are written per frame, into buffers that are used again; all else is the asset's own memory, which on
+/// other than host backends is uploaded once. The backend must outlive it.
+///
+///     SkinnedGaussians skin(backend, actor.asset());
+///     skin.pose(actor, t).throw_if_error();
+///     renderer.render({{cloud.set(), skin.set()}}, cameras);
 template <Backend B>
 class SkinnedGaussians {
  public:
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarAsset> asset)
-      : backend_(&backend), asset_(std::move(asset)), indices_(backend), weights_(backend), joints_(backend) {
-    set_ = asset_->canonical.set();
-    const std::size_t n = set_.gaussians.size;
-    GaussianView& v = set_.gaussians;
-    for (int k = 0; k < 3; ++k) canonical_means_[k] = resident(v.means[k]);
-    for (int k = 0; k < 4; ++k) canonical_quats_[k] = resident(v.quats[k]);
-    for (int k = 0; k < 3; ++k) v.scales[k] = resident(v.scales[k]);
-    v.opacities = resident(v.opacities);
-    v.sh0 = resident(v.sh0);
-    v.shN = resident(v.shN);
-    indices_.upload(asset_->joint_indices.data(), asset_->joint_indices.size());
-    weights_.upload(asset_->skinning_weights.data(), asset_->skinning_weights.size());
-    const int planes = v.sh_degree > 0 ? 11 : 7;
-    for (int k = 0; k < planes; ++k) {
-      posed_.emplace_back(backend).resize_discard(n);
-      const View<float> plane = posed_.back().view();
-      if (k < 3) {
-        v.means[k] = plane;
-      } else if (k < 7) {
-        v.quats[k - 3] = plane;
-      } else {
-        v.sh_rotations[k - 7] = plane;
+      : backend_(&backend), asset_(std::move(asset)), joints_(backend), indices_(backend) {
+    GaussianView v = asset_->cloud.view();
+    args_.joint_indices = view_of(asset_->joint_indices);
+    args_.weights = view_of(asset_->skinning_weights);
+    if constexpr (!is_host_backend<B>) {
+      for (auto& p : v.means) to_device(p);
+      for (auto& p : v.quats) to_device(p);
+      for (auto& p : v.scales) to_device(p);
+      to_device(v.opacities);
+      to_device(v.sh0);
+      to_device(v.shN);
+      to_device(args_.weights);
+      indices_.upload(args_.joint_indices.data, args_.joint_indices.size);
+      args_.joint_indices = std::as_const(indices_).view();
+    }
+    for (std::size_t k = 0; k < 3; ++k) args_.means[k] = v.means[k];
+    for (std::size_t k = 0; k < 4; ++k) args_.quats[k] = v.quats[k];
+    set_ = asset_->cloud.set();
+    set_.gaussians = v;
+    for (std::size_t k = 0; k < 3; ++k) {
+      args_.means_out[k] = output(v.size);
+      set_.gaussians.means[k] = args_.means_out[k];
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      args_.quats_out[k] = output(v.size);
+      set_.gaussians.quats[k] = args_.quats_out[k];
+      if (v.sh_degree >= 1) {
+        args_.rotations_out[k] = output(v.size);
+        set_.gaussians.sh_rotations[k] = args_.rotations_out[k];
       }
     }
   }
 
-  /// Skins for time t. Errors: what skin_gaussians reports.
+  /// Poses the Gaussians as `actor` is at time t (seconds). An actor that is not in the scene then leaves
+  /// an empty set. The Gaussians are there after `backend.synchronize()`, which rendering does.
+  /// Errors: invalid_argument for an actor with another asset.
   Status pose(const AvatarActor& actor, double t) {
-    actor.joint_matrices(t, host_joints_);
-    host_joints_f_.clear();
-    for (const auto& m : host_joints_) host_joints_f_.push_back(affine_cast<float>(m));
-    joints_.upload(host_joints_f_.data(), host_joints_f_.size());
-    SkinningArgs<float> args;
-    args.size = set_.gaussians.size;
-    args.joint_indices = std::as_const(indices_).view();
-    args.skinning_weights = std::as_const(weights_).view();
-    args.joint_matrices = std::as_const(joints_).view();
-    for (std::size_t k = 0; k < 3; ++k) {
-      args.means[k] = canonical_means_[k];
-      args.posed_means[k] = posed_[k].view();
+    if (actor.asset() != asset_) {
+      return {Errc::invalid_argument, "SkinnedGaussians: the actor has another asset than was given at creation"};
     }
-    for (std::size_t k = 0; k < 4; ++k) {
-      args.quats[k] = canonical_quats_[k];
-      args.posed_quats[k] = posed_[3 + k].view();
-      if (posed_.size() > 7) args.sh_rotations[k] = posed_[7 + k].view();
-    }
+    visible_ = actor.active(t);
+    if (!visible_) return {};
     set_.world_from_asset = actor.placement(t);
-    return skin_gaussians<float>(*backend_, args);
+    actor.joint_matrices(t, matrices_);
+    host_joints_.clear();
+    for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
+    joints_.upload(host_joints_.data(), host_joints_.size());
+    args_.joints = std::as_const(joints_).view();
+    return skin_gaussians<float>(*backend_, args_);
   }
 
-  /// The avatar as it was last posed, for the renderer.
-  const GaussianSet& set() const noexcept { return set_; }
+  /// The posed Gaussians where the actor stands; empty before the first `pose`. Valid until the next.
+  GaussianSet set() const noexcept {
+    GaussianSet s = set_;
+    if (!visible_) s.gaussians = {};
+    return s;
+  }
+
+  const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
 
  private:
-  View<const float> resident(const View<const float>& v) {
-    if constexpr (is_host_backend<B>) return v;
-    planes_.emplace_back(*backend_).upload(v.data, v.size);
-    return std::as_const(planes_.back()).view();
+  void to_device(View<const float>& v) {
+    floats_.emplace_back(*backend_).upload(v.data, v.size);
+    v = {floats_.back().data(), v.size};
   }
+  View<float> output(std::size_t n) {
+    floats_.emplace_back(*backend_).resize_discard(n);
+    return {floats_.back().data(), n};
+  }
+
   B* backend_;
   std::shared_ptr<const AvatarAsset> asset_;
+  SkinningArgs<float> args_;
   GaussianSet set_;
-  View<const float> canonical_means_[3], canonical_quats_[4];
-  std::vector<Buffer<float, B>> planes_, posed_;
-  Buffer<std::uint16_t, B> indices_;
-  Buffer<float, B> weights_;
   Buffer<Affine3<float>, B> joints_;
-  std::vector<Affine3<double>> host_joints_;
-  std::vector<Affine3<float>> host_joints_f_;
+  Buffer<std::uint16_t, B> indices_;
+  std::vector<Buffer<float, B>> floats_;  // a Buffer's memory stays where it is when the vector grows
+  std::vector<Affine3<double>> matrices_;
+  std::vector<Affine3<float>> host_joints_;
+  bool visible_ = false;
 };
 
 }  // namespace gsnav

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "gsnav/avatar/skeleton.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/core/view.hpp"
+#include "gsnav/kernels/lbs.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav {
+
+/// A capsule that moves with one joint: what navigation sees of a body.
+struct ProxyCapsule {
+  std::uint16_t joint = 0;
+  Vec3d p0{}, p1{};     ///< in the joint's bind frame, metres
+  double radius = 0.0;  ///< metres
+};
+
+/// A body: what all actors that look alike share. Immutable once built.
+struct AvatarAsset {
+  std::string name;
+  Skeleton skeleton;
+  GaussianCloud cloud;                       ///< canonical pose, root frame (Y up, facing -Z), metres
+  std::vector<std::uint16_t> joint_indices;  ///< [N][4], the greatest weight first
+  std::vector<float> skinning_weights;       ///< [N][4], each row sums to 1
+  std::vector<ProxyCapsule> capsules;
+  LocalPose idle;                            ///< how it stands without a motion; empty: the rest pose
+
+  std::size_t size() const noexcept { return cloud.size(); }
+
+  /// Takes any K weights a Gaussian ([N][K], joint indices alongside; K = J with all joints for dense
+  /// weights): keeps the four greatest, sorts them, and divides by their sum in double, the last being
+  /// what is missing to 1, so that a body far from the root does not drift. Returns the greatest mass
+  /// that was left out of a row. Errors: invalid_argument (sizes, a joint that does not exist, a weight
+  /// that is negative or not finite, a Gaussian without weight), naming the Gaussian.
+  Result<double> set_weights(std::size_t k, const std::vector<std::uint16_t>& indices,
+                             const std::vector<float>& weights) {
+    const std::size_t n = size();
+    if (k == 0 || indices.size() != n * k || weights.size() != n * k) {
+      return {Errc::invalid_argument, "AvatarAsset: " + std::to_string(weights.size()) + " weights and " +
+                                          std::to_string(indices.size()) + " joint indices for " +
+                                          std::to_string(n) + " Gaussians of " + std::to_string(k)};
+    }
+    std::vector<std::uint16_t> joint_out(n * kInfluences, 0);
+    std::vector<float> weight_out(n * kInfluences, 0.0f);
+    std::vector<std::size_t> order(k);
+    double dropped = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto bad = [&](const std::string& what) {
+        return Status(Errc::invalid_argument, "AvatarAsset: Gaussian " + std::to_string(i) + " " + what);
+      };
+      double all = 0.0, kept = 0.0;
+      for (std::size_t j = 0; j < k; ++j) {
+        const float w = weights[i * k + j];
+        if (!(w >= 0) || !is_finite(w)) return bad("has weight " + std::to_string(w));
+        if (indices[i * k + j] >= skeleton.size()) {
+          return bad("names joint " + std::to_string(indices[i * k + j]) + " of " + std::to_string(skeleton.size()));
+        }
+        all += static_cast<double>(w);
+        order[j] = j;
+      }
+      if (!(all > 0)) return bad("has no weight");
+      std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return weights[i * k + a] > weights[i * k + b];
+      });
+      const std::size_t used = min(k, static_cast<std::size_t>(kInfluences));
+      for (std::size_t j = 0; j < used; ++j) kept += static_cast<double>(weights[i * k + order[j]]);
+      dropped = max(dropped, 1.0 - kept / all);
+      double rest = 1.0;
+      for (std::size_t j = used; j-- > 0;) {
+        const std::size_t at = i * kInfluences + j;
+        joint_out[at] = indices[i * k + order[j]];
+        // The first, greatest one takes what rounding has left.
+        weight_out[at] = static_cast<float>(j == 0 ? rest : static_cast<double>(weights[i * k + order[j]]) / kept);
+        rest -= static_cast<double>(weight_out[at]);
+      }
+      for (std::size_t j = used; j < kInfluences; ++j) joint_out[i * kInfluences + j] = joint_out[i * kInfluences];
+    }
+    joint_indices = std::move(joint_out);
+    skinning_weights = std::move(weight_out);
+    return dropped;
+  }
+
+  /// invalid_argument naming the array, Gaussian, joint or capsule; unsupported for a canonical cloud
+  /// further than 32 m from its root.
+  Status validate() const {
+    const auto bad = [&](const std::string& what) {
+      return Status(Errc::invalid_argument, "AvatarAsset" + (name.empty() ? "" : " \"" + name + "\"") + ": " + what);
+    };
+    if (Status s = skeleton.validate(); !s) return s;
+    const std::size_t n = size(), joints = skeleton.size();
+    if (joints > 65535) return bad("more than 65535 joints");
+    if (!cloud.origins.empty()) {
+      return {Errc::unsupported, "AvatarAsset: a canonical Gaussian lies more than 32 m from the root"};
+    }
+    if (joint_indices.size() != n * kInfluences || skinning_weights.size() != n * kInfluences) {
+      return bad("joint_indices and skinning_weights need 4 values a Gaussian (set_weights makes them)");
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      double sum = 0.0;
+      for (std::size_t k = i * kInfluences; k < (i + 1) * kInfluences; ++k) {
+        if (joint_indices[k] >= joints) {
+          return bad("Gaussian " + std::to_string(i) + " names joint " + std::to_string(joint_indices[k]) +
+                     " of " + std::to_string(joints));
+        }
+        const float w = skinning_weights[k];
+        // Rounding may put two equal weights in either order.
+        if (!(w >= 0) || w > skinning_weights[i * kInfluences] + 1e-6f) {
+          return bad("Gaussian " + std::to_string(i) + " has a negative weight or not the greatest first");
+        }
+        sum += static_cast<double>(w);
+      }
+      if (!(abs(sum - 1.0) < 1e-6)) {
+        return bad("weights of Gaussian " + std::to_string(i) + " sum to " + std::to_string(sum));
+      }
+    }
+    for (std::size_t c = 0; c < capsules.size(); ++c) {
+      const ProxyCapsule& p = capsules[c];
+      if (p.joint >= joints || !(p.radius >= 0) || !is_finite(p.radius) || !is_finite(p.p0) || !is_finite(p.p1)) {
+        return bad("capsule " + std::to_string(c) + " names no joint or is not finite");
+      }
+    }
+    if (!idle.rotations.empty() && (idle.rotations.size() != joints || idle.translations.size() != joints)) {
+      return bad("idle has another number of joints than the skeleton");
+    }
+    return {};
+  }
+};
+
+}  // namespace gsnav

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "gsnav/avatar/asset.hpp"
+#include "gsnav/avatar/body_shape.hpp"
+#include "gsnav/avatar/humanoid_body.hpp"
+#include "gsnav/core/rng.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/kernels/sh.hpp"
+
+namespace gsnav::detail {
+
+/// A point of the surface before it becomes a Gaussian.
+struct SurfacePoint {
+  Vec3d position{}, normal{};
+  double spacing = 0;     // metres to the nearest other point, at least
+  std::size_t lobe = 0;   // the nearest
+};
+
+/// Points no nearer to each other than their spacing, looked up by cells.
+class PointGrid {
+ public:
+  PointGrid(const Vec3d& low, const Vec3d& high, double cell) : low_(low), cell_(cell) {
+    for (int k = 0; k < 3; ++k) size_[k] = static_cast<int>((high[k] - low[k]) / cell) + 3;
+    heads_.assign(static_cast<std::size_t>(size_[0]) * static_cast<std::size_t>(size_[1]) *
+                      static_cast<std::size_t>(size_[2]), -1);
+  }
+  /// Keeps p unless a kept point lies nearer than `spacing`.
+  bool add(const Vec3d& p, double spacing) {
+    int c[3];
+    for (int k = 0; k < 3; ++k) c[k] = std::clamp(static_cast<int>((p[k] - low_[k]) / cell_) + 1, 1, size_[k] - 2);
+    const double limit = spacing * spacing;
+    for (int z = -1; z <= 1; ++z) {
+      for (int y = -1; y <= 1; ++y) {
+        for (int x = -1; x <= 1; ++x) {
+          for (int i = heads_[index(c[0] + x, c[1] + y, c[2] + z)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) {
+            const Vec3d d = points_[static_cast<std::size_t>(i)] - p;
+            if (dot(d, d) < limit) return false;
+          }
+        }
+      }
+    }
+    int& head = heads_[index(c[0], c[1], c[2])];
+    next_.push_back(head);
+    head = static_cast<int>(points_.size());
+    points_.push_back(p);
+    return true;
+  }
+
+ private:
+  std::size_t index(int x, int y, int z) const noexcept {
+    return static_cast<std::size_t>((z * size_[1] + y) * size_[0] + x);
+  }
+  Vec3d low_;
+  double cell_;
+  int size_[3] = {};
+  std::vector<int> heads_, next_;
+  std::vector<Vec3d> points_;
+};
+
+/// Spreads points over the surface of the shape: random ones on the lobes, moved to the smooth union,
+/// kept where no other is near (dart throwing).
+inline std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidOptions& o,
+                                                const std::vector<double>& density) {
+  Rng rng(o.seed);
+  double weighted = 0;
+  for (std::size_t i = 0; i < shape.lobes.size(); ++i) weighted += shape.lobes[i].area() * density[i] * density[i];
+  // Measured: lobes overlap, and dart throwing gives about 0.7 points per square of the spacing.
+  const double spacing = std::sqrt(0.40 * weighted / o.gaussians);
+  const double scale = o.height / 1.70;
+  PointGrid grid(Vec3d{-1.0, -0.1, -0.4} * scale, Vec3d{1.0, 1.8, 0.4} * scale, spacing);
+  std::vector<SurfacePoint> out;
+  std::vector<std::vector<std::size_t>> among;
+  std::vector<double> sum{0.0};
+  for (std::size_t i = 0; i < shape.lobes.size(); ++i) {
+    among.push_back(shape.neighbours(i, 0.04 * scale));
+    sum.push_back(sum.back() + shape.lobes[i].area() * density[i] * density[i]);
+  }
+  const int tries = 14 * o.gaussians;
+  for (int n = 0; n < tries; ++n) {
+    const auto at = std::upper_bound(sum.begin(), sum.end(), rng.uniform() * sum.back());
+    const std::size_t i = min(static_cast<std::size_t>(at - sum.begin()) - 1, shape.lobes.size() - 1);
+    const Lobe& l = shape.lobes[i];
+    const double z = rng.uniform(-1, 1), angle = rng.uniform(0, 6.283185307179586), q = std::sqrt(1 - z * z);
+    const Vec3d unit{q * std::cos(angle), z, q * std::sin(angle)};
+    // A share of the points goes to the round ends by their length.
+    const double straight = norm(l.b - l.a), ends = l.radii_a.y + l.radii_b.y;
+    SurfacePoint p;
+    const Mat3d back = transpose(l.axes);
+    if (rng.uniform() * (straight + ends) < straight) {
+      const double t = rng.uniform(), c = std::cos(angle), s = std::sin(angle);
+      const Vec3d r = lerp(l.radii_a, l.radii_b, t);
+      // Around the segment, whatever its direction is against the axes.
+      const Vec3d along = normalized(l.axes * (l.b - l.a));
+      Vec3d u = abs(along.y) < 0.9 ? cross(along, Vec3d{0, 1, 0}) : cross(along, Vec3d{1, 0, 0});
+      u = normalized(u);
+      const Vec3d v = cross(along, u), d = u * c + v * s;
+      p.position = lerp(l.a, l.b, t) + back * Vec3d{d.x * r.x, d.y * r.y, d.z * r.z};
+    } else {
+      const bool first = rng.uniform() < 0.5;
+      const Vec3d r = first ? l.radii_a : l.radii_b;
+      p.position = (first ? l.a : l.b) + back * Vec3d{unit.x * r.x, unit.y * r.y, unit.z * r.z};
+    }
+    if (!shape.project(p.position, among[i])) continue;
+    double nearest = std::numeric_limits<double>::max();
+    for (const std::size_t k : among[i]) {
+      const double d = shape.lobes[k].distance(p.position);
+      if (d < nearest) {
+        nearest = d;
+        p.lobe = k;
+      }
+    }
+    p.spacing = spacing / density[p.lobe];
+    if (!grid.add(p.position, p.spacing)) continue;
+    p.normal = normalized(shape.gradient(p.position, among[i]));
+    out.push_back(p);
+  }
+  return out;
+}
+
+/// Colour of a point: its part, small features of the face, folds, and shading from above and from
+/// crevices, as light in a room would leave in a captured person.
+class HumanoidPainter {
+ public:
+  HumanoidPainter(const HumanoidOptions& o, const BodyShape& shape) : o_(o), shape_(shape), scale_(o.height / 1.70) {
+    for (std::size_t i = 0; i < shape.lobes.size(); ++i) among_.push_back(shape.neighbours(i, 0.08));
+  }
+
+  Vec3d color(const SurfacePoint& p, Rng& rng) const {
+    const Vec3d x = p.position * (1.0 / scale_);
+    const Lobe& lobe = shape_.lobes[p.lobe];
+    Vec3d c;
+    double noise = 0.012, fold = 0.0;
+    switch (lobe.part) {
+      case BodyPart::skin: c = face(x); break;
+      case BodyPart::hair:
+        c = o_.hair * (1.0 + 0.16 * std::sin(90 * x.x + 25 * std::sin(20 * x.y)));
+        noise = 0.02;
+        break;
+      case BodyPart::top:
+        c = o_.top;
+        fold = std::sin(21 * x.y + 7 * std::sin(9 * x.x + 3) + 5 * x.z);
+        break;
+      case BodyPart::trousers:
+        c = x.y > 0.965 ? o_.shoes * 0.8 : o_.trousers;  // belt
+        fold = std::sin(17 * x.y + 6 * std::sin(11 * x.x) + 9 * x.z);
+        break;
+      case BodyPart::shoes: c = x.y < 0.014 ? Vec3d{0.55, 0.54, 0.52} : o_.shoes; break;  // sole
+    }
+    // Short sleeves end half-way to the elbow.
+    const double light = 0.80 + 0.20 * (0.5 + 0.5 * p.normal.y) + 0.03 * fold;
+    const double reach = 0.05 * scale_;
+    const double open = clamp(shape_.distance(p.position + p.normal * reach, among_[p.lobe]) / reach, 0.0, 1.0);
+    const double shade = light * (0.62 + 0.38 * open) + noise * rng.normal();
+    for (int k = 0; k < 3; ++k) c[k] = clamp(c[k] * shade, 0.0, 1.0);
+    return c;
+  }
+
+ private:
+  static double spot(const Vec3d& x, const Vec3d& at, double rx, double ry) noexcept {
+    const double dx = (x.x - at.x) / rx, dy = (x.y - at.y) / ry;
+    return x.z < 0 ? dx * dx + dy * dy : 1e3;
+  }
+
+  Vec3d face(const Vec3d& x) const {
+    if (x.y < 1.47) return o_.skin;
+    const auto mix = [](const Vec3d& a, const Vec3d& b, double t) { return lerp(a, b, clamp(t, 0.0, 1.0)); };
+    Vec3d c = o_.skin;
+    const Vec3d m{abs(x.x), x.y, x.z};
+    if (spot(m, {0.034, 1.586, 0}, 0.015, 0.007) < 1) {
+      c = spot(m, {0.034, 1.586, 0}, 0.0065, 0.0065) < 1 ? Vec3d{0.12, 0.09, 0.07} : Vec3d{0.88, 0.86, 0.84};
+    } else if (spot(m, {0.034, 1.590, 0}, 0.018, 0.0075) < 1) {
+      c = o_.skin * 0.55;  // lashes
+    } else if (spot(m, {0.035, 1.608 - 0.15 * abs(m.x - 0.035), 0}, 0.021, 0.0045) < 1) {
+      c = mix(o_.hair, o_.skin, 0.2);
+    } else if (spot(m, {0, 1.533, 0}, 0.024, 0.008) < 1) {
+      c = abs(x.y - 1.5335) < 0.0016 ? o_.skin * 0.5 : mix(o_.skin, Vec3d{0.66, 0.30, 0.29}, 0.55);
+    } else if (spot(m, {0.045, 1.560, 0}, 0.022, 0.018) < 1) {
+      c = mix(o_.skin, Vec3d{0.85, 0.45, 0.40}, 0.12);
+    }
+    return c;
+  }
+
+  HumanoidOptions o_;
+  const BodyShape& shape_;
+  double scale_;
+  std::vector<std::vector<std::size_t>> among_;
+};
+
+/// Weights of a point: falling off exponentially with the distance from what each joint moves, among the
+/// joints within two steps up or down the tree from the nearest one's.
+inline void weigh(const BodyShape& shape, const Skeleton& skeleton, double scale, const SurfacePoint& p,
+                  std::vector<float>& row) {
+  const std::size_t joints = skeleton.size();
+  std::vector<double> distance(joints, 1e3);
+  for (const Lobe& l : shape.lobes) distance[l.joint] = min(distance[l.joint], l.distance(p.position));
+  const std::size_t home = shape.lobes[p.lobe].joint;
+  const auto related = [&](std::size_t a, std::size_t b) {  // b at most two steps above a
+    for (int step = 0; step < 3; ++step) {
+      if (a == b) return true;
+      if (skeleton.parents[a] < 0) return false;
+      a = static_cast<std::size_t>(skeleton.parents[a]);
+    }
+    return false;
+  };
+  row.assign(joints, 0.0f);
+  for (std::size_t j = 0; j < joints; ++j) {
+    if (distance[j] > 100 || !(related(home, j) || related(j, home))) continue;
+    const std::string& boundary = skeleton.names[max(home, j)];  // the lower of the two
+    const auto has = [&](const char* word) { return boundary.find(word) != boundary.npos; };
+    double soft = 0.005;
+    if (has("spine") || has("collar")) soft = 0.030;
+    if (has("hip") || has("shoulder")) soft = 0.022;
+    if (has("knee") || has("neck") || has("head")) soft = 0.016;
+    if (has("elbow")) soft = 0.013;
+    if (has("ankle") || has("foot") || has("wrist")) soft = 0.010;
+    const double w = std::exp(-(distance[j] - max(distance[home], -0.01)) / (soft * scale));
+    row[j] = static_cast<float>(min(w, 1.0));
+    if (row[j] < 1e-4f) row[j] = 0.0f;
+  }
+}
+
+/// Fills cloud and weights of `asset` with the surface of `shape`.
+inline Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& shape, AvatarAsset& asset) {
+  std::vector<double> density;
+  for (const Lobe& l : shape.lobes) {
+    const std::string& n = asset.skeleton.names[l.joint];
+    const bool fine = n.find("index") != n.npos || n.find("middle") != n.npos || n.find("ring") != n.npos ||
+                      n.find("pinky") != n.npos || n.find("thumb") != n.npos;
+    density.push_back(n == "head" ? (l.part == BodyPart::skin ? 2.2 : 1.4) : fine ? 1.8 : 1.0);
+  }
+  const std::vector<SurfacePoint> points = sample_surface(shape, o, density);
+  const HumanoidPainter painter(o, shape);
+  Rng rng(o.seed ^ 0x636f6c6f7572ull);
+  GaussianCloudBuilder builder(o.sh_degree, "procedural humanoid");
+  builder.reserve(points.size());
+  const std::vector<float> rest(3 * static_cast<std::size_t>(sh_coefficient_count(o.sh_degree) - 1), 0.0f);
+  std::vector<std::uint16_t> indices;
+  std::vector<float> weights, row;
+  for (const SurfacePoint& p : points) {
+    RawGaussian g;
+    g.mean = p.position;
+    const Vec3d n = p.normal, u = normalized(abs(n.y) < 0.9 ? cross(Vec3d{0, 1, 0}, n) : cross(Vec3d{1, 0, 0}, n));
+    const Vec3d v = cross(n, u);
+    g.quat = quat_from_matrix(transpose(Mat3d{{u, v, n}}));
+    const double flat = std::log(0.62 * p.spacing);
+    g.log_scales = {flat, flat, std::log(0.12 * p.spacing)};
+    g.opacity_logit = 3.9;  // 0.98
+    const Vec3d c = painter.color(p, rng);
+    for (int k = 0; k < 3; ++k) g.sh0[static_cast<std::size_t>(k)] = static_cast<float>((c[k] - 0.5) / kSh0);
+    g.shN = rest.empty() ? nullptr : rest.data();
+    if (!builder.add(g)) continue;
+    weigh(shape, asset.skeleton, o.height / 1.70, p, row);
+    // The heaviest eight are enough for set_weights to choose four from.
+    std::array<std::size_t, 8> best{};
+    for (auto& b : best) {
+      b = static_cast<std::size_t>(std::max_element(row.begin(), row.end()) - row.begin());
+      indices.push_back(static_cast<std::uint16_t>(b));
+      weights.push_back(row[b]);
+      row[b] = 0.0f;
+    }
+  }
+  asset.cloud = std::move(builder.cloud());
+  return asset.set_weights(8, indices, weights).status();
+}
+
+}  // namespace gsnav::detail

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gsnav/avatar/skeleton.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/kernels/lbs.hpp"
+
+namespace gsnav {
+
+/// What a motion may depend on: time, and how the actor gets about at that time.
+struct MotionInput {
+  double time = 0.0;      ///< seconds since the actor appeared
+  double distance = 0.0;  ///< metres walked since then
+  double turned = 0.0;    ///< radians turned on the spot since then, counted up whatever the direction
+  double walking = 0.0;   ///< speed as a share of the walking speed, [0, 1]
+  double turning = 0.0;   ///< 1 in the middle of a turn on the spot, else [0, 1)
+};
+
+/// Gives the joints' local transforms over time. Implementations are immutable: many actors on many
+/// threads may share one.
+class MotionSource {
+ public:
+  virtual ~MotionSource() = default;
+  /// Fills all of `out`. The same input gives the same pose.
+  virtual void pose(const MotionInput& input, LocalPose& out) const = 0;
+  /// Number of joints of the poses.
+  virtual std::size_t joint_count() const noexcept = 0;
+  /// invalid_argument naming what is wrong.
+  virtual Status validate() const { return {}; }
+};
+
+/// One pose for ever.
+class FixedPose final : public MotionSource {
+ public:
+  explicit FixedPose(LocalPose pose) : pose_(std::move(pose)) {}
+  void pose(const MotionInput&, LocalPose& out) const override { out = pose_; }
+  std::size_t joint_count() const noexcept override { return pose_.rotations.size(); }
+
+ private:
+  LocalPose pose_;
+};
+
+/// What happens after the last frame of a clip.
+enum class ClipEnd : std::uint8_t {
+  hold,          ///< the last pose stays
+  loop,          ///< back to the first pose over `wrap_time`; the root goes back as well
+  loop_forward,  ///< the same, but the root goes on from where it has come to
+};
+
+/// Key poses at a fixed rate. Between keys rotations are interpolated by slerp in local joint space and
+/// translations linearly: bones keep their length, unlike with interpolated matrices.
+class MotionClip final : public MotionSource {
+ public:
+  double frame_rate = 30.0;                ///< keys a second
+  std::size_t joints = 0;                  ///< J
+  std::vector<Quatd> rotations;            ///< [T][J] joint to parent, unit
+  std::vector<Vec3d> translations;         ///< [T][J] or [J] (the same in all keys), metres
+  std::vector<Vec3d> root_translation;     ///< [T] path of the whole avatar in its frame, or empty
+  ClipEnd end = ClipEnd::loop;
+  double wrap_time = 0.0;                  ///< seconds from last to first key; at least one frame
+
+  std::size_t frames() const noexcept { return joints == 0 ? 0 : rotations.size() / joints; }
+  /// Seconds from the first key to the last.
+  double duration() const noexcept {
+    return frames() == 0 ? 0.0 : static_cast<double>(frames() - 1) / frame_rate;
+  }
+  /// Seconds of one round of a loop.
+  double period() const noexcept { return duration() + wrap(); }
+
+  std::size_t joint_count() const noexcept override { return joints; }
+
+  Status validate() const override {
+    const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, "MotionClip." + what); };
+    const std::size_t t = frames();
+    if (!(frame_rate > 0) || !is_finite(frame_rate)) return bad("frame_rate must be positive");
+    if (t == 0 || rotations.size() != t * joints) {
+      return bad("rotations has " + std::to_string(rotations.size()) + " values: no multiple of " +
+                 std::to_string(joints) + " joints");
+    }
+    if (translations.size() != joints && translations.size() != t * joints) {
+      return bad("translations has " + std::to_string(translations.size()) + " values");
+    }
+    if (!root_translation.empty() && root_translation.size() != t) {
+      return bad("root_translation has " + std::to_string(root_translation.size()) + " values for " +
+                 std::to_string(t) + " keys");
+    }
+    if (!(wrap_time >= 0) || !is_finite(wrap_time)) return bad("wrap_time must be >= 0");
+    for (std::size_t i = 0; i < rotations.size(); ++i) {
+      if (!(abs(dot(rotations[i], rotations[i]) - 1.0) < 1e-4)) {
+        return bad("rotations: key " + std::to_string(i / joints) + ", joint " +
+                   std::to_string(i % joints) + " is no unit quaternion");
+      }
+    }
+    for (const Vec3d& v : translations) {
+      if (!is_finite(v)) return bad("translations is not finite");
+    }
+    for (const Vec3d& v : root_translation) {
+      if (!is_finite(v)) return bad("root_translation is not finite");
+    }
+    return {};
+  }
+
+  void pose(const MotionInput& input, LocalPose& out) const override {
+    const std::size_t last = frames() - 1;
+    double t = input.time, rounds = 0.0;
+    std::size_t a = 0, b = 0;
+    double u = 0.0;
+    if (end != ClipEnd::hold) {
+      rounds = std::floor(t / period());
+      t -= rounds * period();
+    }
+    if (t >= duration()) {
+      a = last;
+      b = end == ClipEnd::hold ? last : 0;
+      u = end == ClipEnd::hold ? 0.0 : clamp((t - duration()) / wrap(), 0.0, 1.0);
+    } else if (t > 0) {
+      a = static_cast<std::size_t>(t * frame_rate);
+      a = a < last ? a : last - 1;
+      b = a + 1;
+      u = clamp(t * frame_rate - static_cast<double>(a), 0.0, 1.0);
+    }
+    out.rotations.resize(joints);
+    out.translations.resize(joints);
+    const bool moving = translations.size() != joints;
+    for (std::size_t j = 0; j < joints; ++j) {
+      out.rotations[j] = slerp(rotations[a * joints + j], rotations[b * joints + j], u);
+      out.translations[j] =
+          moving ? lerp(translations[a * joints + j], translations[b * joints + j], u) : translations[j];
+    }
+    out.root = {};
+    if (!root_translation.empty()) {
+      const Vec3d travel = end == ClipEnd::loop_forward ? root_translation[last] - root_translation[0] : Vec3d{};
+      const Vec3d next = root_translation[b] + (a == last && b == 0 ? travel : Vec3d{});
+      out.root = lerp(root_translation[a], next, u) + travel * rounds;
+    }
+  }
+
+ private:
+  double wrap() const noexcept { return max(wrap_time, 1.0 / frame_rate); }
+};
+
+/// A clip from matrices: `matrices` is [T][J], joint to root frame, or with `skinning` the product of
+/// that and the skeleton's inverse bind. Each is taken apart into a rotation (its polar factor) and a
+/// translation in its parent, so that sampling is by slerp and not by mixing matrices. The path of the
+/// first root joint becomes `root_translation`. Errors: invalid_argument.
+inline Result<MotionClip> clip_from_matrices(const Skeleton& skeleton, double frame_rate,
+                                             const std::vector<Affine3<double>>& matrices, bool skinning) {
+  if (Status s = skeleton.validate(); !s) return s;
+  const std::size_t count = skeleton.size(), frames = matrices.size() / count;
+  if (frames == 0 || matrices.size() != frames * count) {
+    return {Errc::invalid_argument, "joint matrices: " + std::to_string(matrices.size()) +
+                                        " is no multiple of " + std::to_string(count) + " joints"};
+  }
+  std::vector<Affine3<double>> binds = skeleton.bind_inverses();
+  for (auto& m : binds) m = rigid_inverse(m);
+  MotionClip clip;
+  clip.frame_rate = frame_rate;
+  clip.joints = count;
+  std::vector<Affine3<double>> globals(count);
+  for (std::size_t t = 0; t < frames; ++t) {
+    for (std::size_t j = 0; j < count; ++j) {
+      const Affine3<double>& m = matrices[t * count + j];
+      if (!is_finite(m.translation) || !(determinant(m.linear) > kMinBlendDeterminant)) {
+        return {Errc::invalid_argument, "joint matrices: key " + std::to_string(t) + ", joint " +
+                                            std::to_string(j) + " is no rigid transform"};
+      }
+      const Affine3<double> rigid{polar_rotation(m.linear), m.translation};
+      globals[j] = skinning ? rigid * binds[j] : rigid;
+      const std::int32_t parent = skeleton.parents[j];
+      const Affine3<double> local =
+          parent < 0 ? globals[j] : rigid_inverse(globals[static_cast<std::size_t>(parent)]) * globals[j];
+      clip.rotations.push_back(quat_from_matrix(local.linear));
+      clip.translations.push_back(local.translation);
+    }
+    const Vec3d root = clip.translations[t * count] - skeleton.rest_local[0].translation;
+    clip.root_translation.push_back(root);
+    for (std::size_t j = 0; j < count; ++j) {
+      if (skeleton.parents[j] < 0) clip.translations[t * count + j] -= root;
+    }
+  }
+  if (Status s = clip.validate(); !s) return s;
+  return clip;
+}
+
+}  // namespace gsnav
