@@ -4,6 +4,7 @@
 // Everything that needs only a C++20 compiler. Add a backend (gsnav/backends/...); nav, io, sim and
 // interop have headers of their own, because they need a library to link or to include.
 
+#include "gsnav/avatar/avatar.hpp"
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/parallel.hpp"
