@@ -7,12 +7,15 @@
 
 int main() {
   gsnav::SerialBackend backend;
-  auto scene = gsnav::make_default_scene(0.2).value();  // or gsnav::io::load_scene("flat.ply").value().cloud
+  auto scene =
+      gsnav::make_default_scene(0.2).value();  // or gsnav::io::load_scene("flat.ply").value().cloud
   auto view = gsnav::default_scene_views()[0];
   auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 256, 256, 90);
   gsnav::Renderer<float, gsnav::SerialBackend> renderer(backend);
-  auto frames = renderer.render(scene.cloud.set(), camera).value();  // rgb [256][256][3], median_depth [256][256]
+  auto frames =
+      renderer.render(scene.cloud.set(), camera).value();  // rgb [256][256][3], median_depth [256][256]
   std::size_t center = 128 * 256 + 128;
-  std::printf("%zu Gaussians; the centre pixel is %.2f m away\n", scene.cloud.size(), frames.median_depth[center]);
+  std::printf("%zu Gaussians; the centre pixel is %.2f m away\n", scene.cloud.size(),
+              frames.median_depth[center]);
   return frames.median_depth[center] > 0 ? 0 : 1;
 }

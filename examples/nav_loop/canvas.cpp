@@ -7,11 +7,14 @@
 namespace nav_loop {
 
 Canvas::Canvas(int width, int height, Rgb fill)
-    : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), fill) {}
+    : width_(width),
+      height_(height),
+      pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), fill) {}
 
 void Canvas::blend(int x, int y, Rgb c, float alpha) {
   if (x < 0 || y < 0 || x >= width_ || y >= height_) return;
-  Rgb& p = pixels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
+  Rgb& p = pixels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+                   static_cast<std::size_t>(x)];
   p.r += alpha * (c.r - p.r);
   p.g += alpha * (c.g - p.g);
   p.b += alpha * (c.b - p.b);
@@ -22,16 +25,19 @@ struct PixelBox {
   int x0, y0, x1, y1;
 };
 PixelBox around(double x0, double y0, double x1, double y1, int width, int height) {
-  const auto limited = [](double v, int high) { return static_cast<int>(std::clamp(v, 0.0, static_cast<double>(high))); };
-  return {limited(std::floor(x0), width), limited(std::floor(y0), height), limited(std::ceil(x1) + 1, width),
-          limited(std::ceil(y1) + 1, height)};
+  const auto limited = [](double v, int high) {
+    return static_cast<int>(std::clamp(v, 0.0, static_cast<double>(high)));
+  };
+  return {limited(std::floor(x0), width), limited(std::floor(y0), height),
+          limited(std::ceil(x1) + 1, width), limited(std::ceil(y1) + 1, height)};
 }
 float coverage(double distance) { return static_cast<float>(std::clamp(0.5 - distance, 0.0, 1.0)); }
 }  // namespace
 
 void Canvas::stroke(double x0, double y0, double x1, double y1, double radius, Rgb color, float alpha) {
-  const PixelBox b = around(std::min(x0, x1) - radius - 1, std::min(y0, y1) - radius - 1, std::max(x0, x1) + radius + 1,
-                            std::max(y0, y1) + radius + 1, width_, height_);
+  const PixelBox b =
+      around(std::min(x0, x1) - radius - 1, std::min(y0, y1) - radius - 1, std::max(x0, x1) + radius + 1,
+             std::max(y0, y1) + radius + 1, width_, height_);
   const double dx = x1 - x0, dy = y1 - y0, length2 = std::max(dx * dx + dy * dy, 1e-12);
   for (int y = b.y0; y < b.y1; ++y) {
     for (int x = b.x0; x < b.x1; ++x) {
@@ -58,8 +64,9 @@ void Canvas::triangle(const gsnav::Vec2<double> (&p)[3], Rgb color, float alpha)
   const double area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
   if (area == 0) return;
   const double sign = area > 0 ? 1.0 : -1.0;
-  const PixelBox b = around(std::min({p[0].x, p[1].x, p[2].x}), std::min({p[0].y, p[1].y, p[2].y}),
-                            std::max({p[0].x, p[1].x, p[2].x}), std::max({p[0].y, p[1].y, p[2].y}), width_, height_);
+  const PixelBox b =
+      around(std::min({p[0].x, p[1].x, p[2].x}), std::min({p[0].y, p[1].y, p[2].y}),
+             std::max({p[0].x, p[1].x, p[2].x}), std::max({p[0].y, p[1].y, p[2].y}), width_, height_);
   for (int y = b.y0; y < b.y1; ++y) {
     for (int x = b.x0; x < b.x1; ++x) {
       bool inside = true;  // no smoothing: neighbours share their edges
@@ -81,10 +88,13 @@ void Canvas::rect(int x, int y, int w, int h, Rgb color, float alpha) {
 
 void Canvas::text(int x, int y, std::string_view s, int scale, Rgb color) {
   // Rows of bits, top first: three to a row, five for m.
-  static constexpr std::uint16_t kDigits[10] = {075557, 026227, 071747, 071717, 055711, 074717, 074757, 071111, 075757, 075717};
+  static constexpr std::uint16_t kDigits[10] = {075557, 026227, 071747, 071717, 055711,
+                                                074717, 074757, 071111, 075757, 075717};
   static constexpr std::uint16_t kDot = 000002;
   static constexpr std::uint8_t kM[5] = {0, 0, 0b11110, 0b10101, 0b10101};
-  const auto pixel = [&](int col, int row) { rect(x + col * scale, y + row * scale, scale, scale, color, 1.0f); };
+  const auto pixel = [&](int col, int row) {
+    rect(x + col * scale, y + row * scale, scale, scale, color, 1.0f);
+  };
   for (const char c : s) {
     const std::uint16_t glyph = c >= '0' && c <= '9' ? kDigits[c - '0'] : (c == '.' ? kDot : 0);
     for (int row = 0; row < 5; ++row) {
@@ -102,7 +112,10 @@ void Canvas::text(int x, int y, std::string_view s, int scale, Rgb color) {
 void Canvas::paste(const std::uint8_t* rgb, int w, int h, int x, int y) {
   for (int j = 0; j < h; ++j) {
     for (int i = 0; i < w; ++i, rgb += 3) {
-      blend(x + i, y + j, {static_cast<float>(rgb[0]) / 255, static_cast<float>(rgb[1]) / 255, static_cast<float>(rgb[2]) / 255}, 1.0f);
+      blend(x + i, y + j,
+            {static_cast<float>(rgb[0]) / 255, static_cast<float>(rgb[1]) / 255,
+             static_cast<float>(rgb[2]) / 255},
+            1.0f);
     }
   }
 }
@@ -111,7 +124,8 @@ std::vector<std::uint8_t> Canvas::bytes() const {
   std::vector<std::uint8_t> out;
   out.reserve(3 * pixels_.size());
   for (const Rgb& p : pixels_) {
-    for (const float v : {p.r, p.g, p.b}) out.push_back(static_cast<std::uint8_t>(255 * std::clamp(v, 0.0f, 1.0f) + 0.5f));
+    for (const float v : {p.r, p.g, p.b})
+      out.push_back(static_cast<std::uint8_t>(255 * std::clamp(v, 0.0f, 1.0f) + 0.5f));
   }
   return out;
 }

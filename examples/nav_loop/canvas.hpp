@@ -25,7 +25,9 @@ class Canvas {
   void blend(int x, int y, Rgb color, float alpha);
   /// A line with round ends; a disc where both ends are equal.
   void stroke(double x0, double y0, double x1, double y1, double radius, Rgb color, float alpha);
-  void disc(double x, double y, double radius, Rgb color, float alpha) { stroke(x, y, x, y, radius, color, alpha); }
+  void disc(double x, double y, double radius, Rgb color, float alpha) {
+    stroke(x, y, x, y, radius, color, alpha);
+  }
   void ring(double x, double y, double radius, double width, Rgb color, float alpha);
   void triangle(const gsnav::Vec2<double> (&p)[3], Rgb color, float alpha);
   void rect(int x, int y, int w, int h, Rgb color, float alpha);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The navigation loop: a scene of Gaussians, people walking in it, an agent that looks and finds its way.
+// The navigation loop: a scene of Gaussians, people walking in it, an agent that looks and finds its
+// way.
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <exception>
-
-#include <CLI/CLI.hpp>
 
 #include "gsnav/backends/serial.hpp"
 #if defined(NAV_LOOP_OPENMP)
@@ -20,7 +20,9 @@ namespace {
 using gsnav::Status;
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
+double seconds_since(Clock::time_point t) {
+  return std::chrono::duration<double>(Clock::now() - t).count();
+}
 
 template <gsnav::Backend B>
 Status run(B& backend, const Options& options) {
@@ -30,7 +32,8 @@ Status run(B& backend, const Options& options) {
 
   gsnav::SimulatorConfig config;
   config.task.max_steps = options.max_steps;
-  config.sensors = gsnav::rgbd_sensors(options.height, options.width, options.hfov, {0, options.eye_height, 0});
+  config.sensors =
+      gsnav::rgbd_sensors(options.height, options.width, options.hfov, {0, options.eye_height, 0});
   config.render.profile = options.profile;
   const auto episodes = make_episodes(options, setup.scene, config.task);
   if (!episodes) return episodes.status();
@@ -85,7 +88,8 @@ Status run(B& backend, const Options& options) {
   }
   if (Status s = recorder.finish(setup.scene); !s) return s;
   print_table(options, setup.facts, records, t);
-  if (Status s = write_json(options.out + "/metrics.json", options, setup.facts, records, t); !s) return s;
+  if (Status s = write_json(options.out + "/metrics.json", options, setup.facts, records, t); !s)
+    return s;
   std::printf("Pictures and metrics.json are in %s\n", options.out.c_str());
   return {};
 }
@@ -100,7 +104,8 @@ Status dispatch(const Options& options) {
     gsnav::OpenMPBackend backend(options.threads);
     return run(backend, options);
 #else
-    return {gsnav::Errc::unsupported, "--backend openmp: this build has none (GSNAV_OPENMP=OFF); use serial"};
+    return {gsnav::Errc::unsupported,
+            "--backend openmp: this build has none (GSNAV_OPENMP=OFF); use serial"};
 #endif
   }
   return {gsnav::Errc::unsupported, "--backend " + options.backend + ": nav_loop was not built with it"};
@@ -115,28 +120,59 @@ int main(int argc, char** argv) try {
   o.backend = "serial";
 #endif
   CLI::App app{
-      "Runs PointNav episodes in a scene of Gaussians with people walking in it, and writes frames, a strip, a\n"
+      "Runs PointNav episodes in a scene of Gaussians with people walking in it, and writes frames, a "
+      "strip, a\n"
       "map and metrics.json. Without arguments: an embedded furnished flat with three people."};
-  app.add_option("--scene", o.scene, "scene to load: .ply, .sog, meta.json or its folder; a comma joins sibling tiles");
-  app.add_option("--up", o.up, "axis of the scene that points up: x, y, z, -x, -y or -z")->capture_default_str();
-  app.add_option("--avatars", o.avatars, "people walking about")->capture_default_str()->check(CLI::Range(0, 64));
-  app.add_option("--episodes", o.episodes, "episodes to run")->capture_default_str()->check(CLI::Range(1, 100000));
-  app.add_option("--backend", o.backend, "what renders")->capture_default_str()->check(CLI::IsMember({"serial", "openmp", "cuda"}));
-  app.add_option("--threads", o.threads, "threads of the openmp backend, 0: all")->capture_default_str()->check(CLI::Range(0, 1024));
-  app.add_option("--seed", o.seed, "decides episodes and ways; the same seed gives the same run")->capture_default_str();
-  app.add_option("--out", o.out, "folder for everything written; made where missing")->capture_default_str();
-  app.add_option("--width", o.width, "image width, pixels")->capture_default_str()->check(CLI::Range(16, 4096));
-  app.add_option("--height", o.height, "image height, pixels")->capture_default_str()->check(CLI::Range(16, 4096));
-  app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")->capture_default_str()->check(CLI::Range(10.0, 170.0));
-  app.add_option("--eye-height", o.eye_height, "camera above the floor, metres")->capture_default_str()->check(CLI::Range(0.05, 3.0));
+  app.add_option("--scene", o.scene,
+                 "scene to load: .ply, .sog, meta.json or its folder; a comma joins sibling tiles");
+  app.add_option("--up", o.up, "axis of the scene that points up: x, y, z, -x, -y or -z")
+      ->capture_default_str();
+  app.add_option("--avatars", o.avatars, "people walking about")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 64));
+  app.add_option("--episodes", o.episodes, "episodes to run")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  app.add_option("--backend", o.backend, "what renders")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"serial", "openmp", "cuda"}));
+  app.add_option("--threads", o.threads, "threads of the openmp backend, 0: all")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--seed", o.seed, "decides episodes and ways; the same seed gives the same run")
+      ->capture_default_str();
+  app.add_option("--out", o.out, "folder for everything written; made where missing")
+      ->capture_default_str();
+  app.add_option("--width", o.width, "image width, pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 4096));
+  app.add_option("--height", o.height, "image height, pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 4096));
+  app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")
+      ->capture_default_str()
+      ->check(CLI::Range(10.0, 170.0));
+  app.add_option("--eye-height", o.eye_height, "camera above the floor, metres")
+      ->capture_default_str()
+      ->check(CLI::Range(0.05, 3.0));
   app.add_option("--profile", o.profile, "accuracy: exact, or fast (a cheaper exponential)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, gsnav::Profile>{{"exact", gsnav::Profile::exact}, {"fast", gsnav::Profile::fast}}))
+      ->transform(CLI::CheckedTransformer(std::map<std::string, gsnav::Profile>{
+          {"exact", gsnav::Profile::exact}, {"fast", gsnav::Profile::fast}}))
       ->default_str("exact");
-  app.add_option("--navmesh", o.navmesh, "built from: gaussians, mesh (the flat only), auto (the mesh where there is one)")
-      ->capture_default_str()->check(CLI::IsMember({"auto", "mesh", "gaussians"}));
-  app.add_option("--frames-every", o.frame_every, "write every k-th RGB and depth frame, 0: none")->capture_default_str()->check(CLI::Range(0, 100000));
-  app.add_option("--show", o.shown_episode, "episode of strip.png and map.png, from 0; -1: the one that met people most closely")->capture_default_str()->check(CLI::Range(-1, 100000));
-  app.add_option("--max-steps", o.max_steps, "actions after which an episode is cut off")->capture_default_str()->check(CLI::Range(1, 1000000));
+  app.add_option("--navmesh", o.navmesh,
+                 "built from: gaussians, mesh (the flat only), auto (the mesh where there is one)")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "mesh", "gaussians"}));
+  app.add_option("--frames-every", o.frame_every, "write every k-th RGB and depth frame, 0: none")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 100000));
+  app.add_option("--show", o.shown_episode,
+                 "episode of strip.png and map.png, from 0; -1: the one that met people most closely")
+      ->capture_default_str()
+      ->check(CLI::Range(-1, 100000));
+  app.add_option("--max-steps", o.max_steps, "actions after which an episode is cut off")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
   CLI11_PARSE(app, argc, argv);
 
   const gsnav::Status s = nav_loop::dispatch(o);

@@ -13,10 +13,11 @@ namespace {
 using gsnav::Vec3d;
 
 constexpr Rgb kNavMesh{0.36f, 0.66f, 0.86f}, kEdge{0.20f, 0.47f, 0.70f}, kShortest{0.15f, 0.15f, 0.17f};
-constexpr Rgb kAgent{0.05f, 0.30f, 0.85f}, kStart{0.10f, 0.60f, 0.25f}, kGoal{0.86f, 0.10f, 0.16f}, kInk{0.1f, 0.1f, 0.1f};
-constexpr double kMargin = 0.6;      // metres around the NavMesh
+constexpr Rgb kAgent{0.05f, 0.30f, 0.85f}, kStart{0.10f, 0.60f, 0.25f}, kGoal{0.86f, 0.10f, 0.16f},
+    kInk{0.1f, 0.1f, 0.1f};
+constexpr double kMargin = 0.6;       // metres around the NavMesh
 constexpr double kLeastIsland = 1.5;  // metres: episodes use no smaller ones
-constexpr double kCutHeight = 1.95;  // metres above the floor: what hangs higher would hide the rooms
+constexpr double kCutHeight = 1.95;   // metres above the floor: what hangs higher would hide the rooms
 
 struct Frame {
   double x0, z0, scale;
@@ -30,13 +31,15 @@ void draw_scene(Canvas& canvas, const Frame& f, const MapContent& m, double floo
   std::vector<std::uint32_t> order;
   for (std::size_t i = 0; i < c.size(); ++i) {
     at[i] = m.world_from_asset * c.mean(i);
-    const bool in_picture = f.x(at[i]) > -50 && f.y(at[i]) > -50 && f.x(at[i]) < canvas.width() + 50 && f.y(at[i]) < canvas.height() + 50;
+    const bool in_picture = f.x(at[i]) > -50 && f.y(at[i]) > -50 && f.x(at[i]) < canvas.width() + 50 &&
+                            f.y(at[i]) < canvas.height() + 50;
     if (in_picture && at[i].y > floor - 0.3 && at[i].y < floor + kCutHeight && c.opacities[i] > 0.1f) {
       order.push_back(static_cast<std::uint32_t>(i));
     }
   }
   // Painted from the floor up; ties in file order, so that the picture is the same every time.
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return at[a].y < at[b].y; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return at[a].y < at[b].y; });
   for (const std::uint32_t i : order) {
     // Seen from above a Gaussian is a stroke along its longest axis, as wide as its middle one.
     const double sizes[3] = {c.scales[0][i], c.scales[1][i], c.scales[2][i]};
@@ -54,27 +57,32 @@ void draw_scene(Canvas& canvas, const Frame& f, const MapContent& m, double floo
       *out[k] = std::clamp(0.5f + static_cast<float>(gsnav::kSh0) * c.sh0[3 * i + k], 0.0f, 1.0f);
     }
     const double x = f.x(at[i]), y = f.y(at[i]);
-    canvas.stroke(x - along.x, y - along.z, x + along.x, y + along.z, radius, color, 0.85f * c.opacities[i]);
+    canvas.stroke(x - along.x, y - along.z, x + along.x, y + along.z, radius, color,
+                  0.85f * c.opacities[i]);
   }
 }
 
-void polyline(Canvas& canvas, const Frame& f, const std::vector<Vec3d>& points, double radius, Rgb color, float alpha) {
+void polyline(Canvas& canvas, const Frame& f, const std::vector<Vec3d>& points, double radius, Rgb color,
+              float alpha) {
   for (std::size_t i = 1; i < points.size(); ++i) {
-    canvas.stroke(f.x(points[i - 1]), f.y(points[i - 1]), f.x(points[i]), f.y(points[i]), radius, color, alpha);
+    canvas.stroke(f.x(points[i - 1]), f.y(points[i - 1]), f.x(points[i]), f.y(points[i]), radius, color,
+                  alpha);
   }
 }
 
 void dashed(Canvas& canvas, const Frame& f, const std::vector<Vec3d>& points, double radius, Rgb color) {
   double phase = 0;  // pixels along the whole line
   for (std::size_t i = 1; i < points.size(); ++i) {
-    const double ax = f.x(points[i - 1]), ay = f.y(points[i - 1]), bx = f.x(points[i]), by = f.y(points[i]);
+    const double ax = f.x(points[i - 1]), ay = f.y(points[i - 1]), bx = f.x(points[i]),
+                 by = f.y(points[i]);
     const double length = std::hypot(bx - ax, by - ay);
     for (double s = 0; s < length;) {
       const double in_dash = std::fmod(phase, 16.0);
       const double piece = std::min(length - s, (in_dash < 9 ? 9.0 : 16.0) - in_dash + 1e-6);
       if (in_dash < 9) {
         const double k0 = s / length, k1 = (s + piece) / length;
-        canvas.stroke(ax + (bx - ax) * k0, ay + (by - ay) * k0, ax + (bx - ax) * k1, ay + (by - ay) * k1, radius, color, 1.0f);
+        canvas.stroke(ax + (bx - ax) * k0, ay + (by - ay) * k0, ax + (bx - ax) * k1, ay + (by - ay) * k1,
+                      radius, color, 1.0f);
       }
       s += piece;
       phase += piece;
@@ -107,23 +115,29 @@ Canvas draw_map(const MapContent& m) {
   const gsnav::Aabb<double> box = m.navmesh->bounds();
   const double w = box.high.x - box.low.x + 2 * kMargin, h = box.high.z - box.low.z + 2 * kMargin;
   const Frame f{box.low.x - kMargin, box.low.z - kMargin, 1200.0 / std::max(w, h)};
-  Canvas canvas(std::max(1, static_cast<int>(w * f.scale)), std::max(1, static_cast<int>(h * f.scale)), {0.96f, 0.96f, 0.96f});
+  Canvas canvas(std::max(1, static_cast<int>(w * f.scale)), std::max(1, static_cast<int>(h * f.scale)),
+                {0.96f, 0.96f, 0.96f});
   if (m.cloud != nullptr) draw_scene(canvas, f, m, m.start.y);
   canvas.rect(0, 0, canvas.width(), canvas.height(), {1, 1, 1}, 0.30f);
 
   for (const auto& t : m.navmesh->triangles()) {
-    const gsnav::Vec2<double> p[3] = {{f.x(t[0]), f.y(t[0])}, {f.x(t[1]), f.y(t[1])}, {f.x(t[2]), f.y(t[2])}};
+    const gsnav::Vec2<double> p[3] = {
+        {f.x(t[0]), f.y(t[0])}, {f.x(t[1]), f.y(t[1])}, {f.x(t[2]), f.y(t[2])}};
     const auto on = m.navmesh->snap_point((t[0] + t[1] + t[2]) * (1.0 / 3.0), {{0.1, 0.5, 0.1}});
-    if (!on || m.navmesh->island_radius(m.navmesh->island_of(on->poly)) < kLeastIsland) continue;  // a table top
+    if (!on || m.navmesh->island_radius(m.navmesh->island_of(on->poly)) < kLeastIsland)
+      continue;  // a table top
     canvas.triangle(p, kNavMesh, 0.32f);
-    for (int i = 0; i < 3; ++i) canvas.stroke(p[i].x, p[i].y, p[(i + 1) % 3].x, p[(i + 1) % 3].y, 0.4, kEdge, 0.35f);
+    for (int i = 0; i < 3; ++i)
+      canvas.stroke(p[i].x, p[i].y, p[(i + 1) % 3].x, p[(i + 1) % 3].y, 0.4, kEdge, 0.35f);
   }
-  for (std::size_t i = 0; i < m.avatars.size(); ++i) polyline(canvas, f, m.avatars[i], 1.6, avatar_color(i), 0.75f);
+  for (std::size_t i = 0; i < m.avatars.size(); ++i)
+    polyline(canvas, f, m.avatars[i], 1.6, avatar_color(i), 0.75f);
   for (std::size_t k = 0; k < m.snapshots.size(); ++k) {
     const bool last = k + 1 == m.snapshots.size();
     for (const gsnav::DynamicCapsule& body : m.snapshots[k]) {
       const gsnav::Capsule<double>& c = body.motion.begin;
-      canvas.stroke(f.x(c.p0), f.y(c.p0), f.x(c.p1), f.y(c.p1), c.radius * f.scale, avatar_color(body.avatar), last ? 0.55f : 0.13f);
+      canvas.stroke(f.x(c.p0), f.y(c.p0), f.x(c.p1), f.y(c.p1), c.radius * f.scale,
+                    avatar_color(body.avatar), last ? 0.55f : 0.13f);
     }
   }
   dashed(canvas, f, m.shortest, 1.8, kShortest);

@@ -16,9 +16,9 @@ struct MapContent {
   gsnav::Similarity world_from_asset{};
   const gsnav::NavMesh* navmesh = nullptr;
   gsnav::Vec3d start{}, goal{};
-  std::vector<gsnav::Vec3d> shortest;                          ///< planned before the episode
-  std::vector<gsnav::Vec3d> agent;                             ///< one point a step
-  std::vector<std::vector<gsnav::Vec3d>> avatars;              ///< where each one's root went
+  std::vector<gsnav::Vec3d> shortest;              ///< planned before the episode
+  std::vector<gsnav::Vec3d> agent;                 ///< one point a step
+  std::vector<std::vector<gsnav::Vec3d>> avatars;  ///< where each one's root went
   /// All bodies' capsules at a few times; the last is the end.
   std::vector<std::vector<gsnav::DynamicCapsule>> snapshots;
   double agent_radius = 0.1;

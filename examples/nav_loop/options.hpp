@@ -12,7 +12,7 @@ namespace nav_loop {
 
 /// What the command line asks for.
 struct Options {
-  std::string scene;               ///< empty: the embedded flat
+  std::string scene;  ///< empty: the embedded flat
   std::string up = "y";
   int avatars = 3;
   int episodes = 10;
@@ -24,9 +24,9 @@ struct Options {
   double hfov = 90.0;
   double eye_height = 1.5;
   gsnav::Profile profile = gsnav::Profile::exact;
-  std::string navmesh = "auto";    ///< auto, mesh, gaussians
-  int frame_every = 10;            ///< 0: no frames
-  int shown_episode = -1;          ///< of strip and map; -1: the one that met people most closely
+  std::string navmesh = "auto";  ///< auto, mesh, gaussians
+  int frame_every = 10;          ///< 0: no frames
+  int shown_episode = -1;        ///< of strip and map; -1: the one that met people most closely
   int max_steps = 500;
 };
 

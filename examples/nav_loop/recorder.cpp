@@ -45,7 +45,8 @@ void Recorder::begin(const gsnav::World& world, int episode) {
 
 gsnav::Status Recorder::add(const gsnav::World& world, const gsnav::Observations& obs) {
   const std::size_t step = step_++;
-  const bool save = options_.frame_every > 0 && step % static_cast<std::size_t>(options_.frame_every) == 0;
+  const bool save =
+      options_.frame_every > 0 && step % static_cast<std::size_t>(options_.frame_every) == 0;
   const bool keep = wanted() && step % stride_ == 0;
   if (wanted()) {
     current_.map.agent.push_back(world.agent().position);
@@ -60,8 +61,13 @@ gsnav::Status Recorder::add(const gsnav::World& world, const gsnav::Observations
     char name[64];
     std::snprintf(name, sizeof name, "/frames/ep%03d_step%04zu", episode_, step);
     const std::string base = options_.out + name;
-    if (auto s = gsnav::io::save_png_rgb8(base + "_rgb.png", shot.rgb, options_.width, options_.height); !s) return s;
-    if (auto s = gsnav::io::save_png_rgb8(base + "_depth.png", shot.depth, options_.width, options_.height); !s) return s;
+    if (auto s = gsnav::io::save_png_rgb8(base + "_rgb.png", shot.rgb, options_.width, options_.height);
+        !s)
+      return s;
+    if (auto s =
+            gsnav::io::save_png_rgb8(base + "_depth.png", shot.depth, options_.width, options_.height);
+        !s)
+      return s;
   }
   if (keep) {
     std::vector<Shot>& shots = current_.shots;
@@ -82,7 +88,8 @@ void Recorder::end(const gsnav::World& world, const std::vector<gsnav::AvatarAct
   if (current_.interest <= best_.interest) return;
   for (const gsnav::AvatarActor& actor : avatars) {
     std::vector<gsnav::Vec3d>& way = current_.map.avatars.emplace_back();
-    for (double t = world.episode().start_time; t <= world.time(); t += 0.25) way.push_back(actor.placement(t).translation);
+    for (double t = world.episode().start_time; t <= world.time(); t += 0.25)
+      way.push_back(actor.placement(t).translation);
   }
   const auto now = world.bodies(world.time(), world.time());
   if (now) current_.map.snapshots.emplace_back(now->capsules().begin(), now->capsules().end());
@@ -95,12 +102,15 @@ gsnav::Status Recorder::write_strip() const {
   const int w = options_.width, h = options_.height, gap = 4;
   Canvas sheet(columns * (w + gap) + gap, 2 * (h + gap) + gap, {1, 1, 1});
   for (int i = 0; i < columns; ++i) {
-    const std::size_t at = columns == 1 ? 0 : static_cast<std::size_t>(i) * (shots.size() - 1) / static_cast<std::size_t>(columns - 1);
+    const std::size_t at = columns == 1 ? 0
+                                        : static_cast<std::size_t>(i) * (shots.size() - 1) /
+                                              static_cast<std::size_t>(columns - 1);
     const int x = gap + i * (w + gap);
     sheet.paste(shots[at].rgb.data(), w, h, x, gap);
     sheet.paste(shots[at].depth.data(), w, h, x, h + 2 * gap);
   }
-  return gsnav::io::save_png_rgb8(options_.out + "/strip.png", sheet.bytes(), sheet.width(), sheet.height());
+  return gsnav::io::save_png_rgb8(options_.out + "/strip.png", sheet.bytes(), sheet.width(),
+                                  sheet.height());
 }
 
 gsnav::Status Recorder::finish(const gsnav::SimulatorScene& scene) {
@@ -113,7 +123,8 @@ gsnav::Status Recorder::finish(const gsnav::SimulatorScene& scene) {
   }
   map.navmesh = scene.navmesh.get();
   const Canvas picture = draw_map(map);
-  return gsnav::io::save_png_rgb8(options_.out + "/map.png", picture.bytes(), picture.width(), picture.height());
+  return gsnav::io::save_png_rgb8(options_.out + "/map.png", picture.bytes(), picture.width(),
+                                  picture.height());
 }
 
 }  // namespace nav_loop

@@ -5,7 +5,6 @@
 
 #include <cstdio>
 #include <fstream>
-
 #include <nlohmann/json.hpp>
 
 #include "gsnav/version.hpp"
@@ -29,25 +28,31 @@ Progress::Progress(int episodes) : episodes_(episodes), terminal_(isatty(fileno(
 
 void Progress::step(int episode, std::size_t step, double distance) {
   if (!terminal_ || step % 4 != 0) return;
-  std::fprintf(stderr, "\r\x1b[Kepisode %d/%d  step %zu  %.2f m to go", episode + 1, episodes_, step, distance);
+  std::fprintf(stderr, "\r\x1b[Kepisode %d/%d  step %zu  %.2f m to go", episode + 1, episodes_, step,
+               distance);
   std::fflush(stderr);
 }
 
 void Progress::episode(int episode, const EpisodeRecord& r) {
   const gsnav::EpisodeMetrics& m = r.metrics;
-  std::fprintf(stderr, "%sepisode %3d/%d  %-7s  %3zu steps  l %5.2f m  p %5.2f m  SPL %.2f  DTG %5.2f m  contact steps %zu\n",
-               terminal_ ? "\r\x1b[K" : "", episode + 1, episodes_, m.success ? "reached" : (m.stop_called ? "missed" : "timeout"), m.steps,
-               m.start_distance, m.path_length, m.spl, m.distance_to_goal, m.collision_steps);
+  std::fprintf(stderr,
+               "%sepisode %3d/%d  %-7s  %3zu steps  l %5.2f m  p %5.2f m  SPL %.2f  DTG %5.2f m  "
+               "contact steps %zu\n",
+               terminal_ ? "\r\x1b[K" : "", episode + 1, episodes_,
+               m.success ? "reached" : (m.stop_called ? "missed" : "timeout"), m.steps, m.start_distance,
+               m.path_length, m.spl, m.distance_to_goal, m.collision_steps);
 }
 
-void print_table(const Options& options, const SceneFacts& facts, const std::vector<EpisodeRecord>& records,
-                 const Timings& t) {
+void print_table(const Options& options, const SceneFacts& facts,
+                 const std::vector<EpisodeRecord>& records, const Timings& t) {
   const auto metrics = metrics_of(records);
   const gsnav::MetricsSummary s = gsnav::summarize(metrics);
   std::size_t pushed = 0;
   for (const EpisodeRecord& r : records) pushed += r.pushed ? 1 : 0;
-  std::printf("\n%s: %zu Gaussians, %d avatars (%zu Gaussians each), NavMesh %.1f m2 (%s), backend %s\n\n", facts.name.c_str(), facts.gaussians,
-              options.avatars, facts.avatar_gaussians, facts.area, facts.navmesh_source.c_str(), facts.backend.c_str());
+  std::printf(
+      "\n%s: %zu Gaussians, %d avatars (%zu Gaussians each), NavMesh %.1f m2 (%s), backend %s\n\n",
+      facts.name.c_str(), facts.gaussians, options.avatars, facts.avatar_gaussians, facts.area,
+      facts.navmesh_source.c_str(), facts.backend.c_str());
   std::printf("  %-34s %10zu\n", "episodes", s.episodes);
   const auto row = [](const char* name, double v, const char* format = "%10.3f") {
     std::printf("  %-34s ", name);
@@ -64,7 +69,8 @@ void print_table(const Options& options, const SceneFacts& facts, const std::vec
   row("wall collisions an episode", s.collisions, "%10.1f");
   row("least clearance to an avatar (m)", s.min_clearance);
   row("episodes in which one walked into us", static_cast<double>(pushed), "%10.0f");
-  row("steps/s (physics + RGB-D)", t.physics + t.render > 0 ? static_cast<double>(t.steps) / (t.physics + t.render) : 0.0, "%10.1f");
+  row("steps/s (physics + RGB-D)",
+      t.physics + t.render > 0 ? static_cast<double>(t.steps) / (t.physics + t.render) : 0.0, "%10.1f");
   row("render (ms, RGB-D in one pass)", 1e3 * per(t.render, t.renders), "%10.2f");
   row("physics (ms a step)", 1e3 * per(t.physics, t.steps), "%10.3f");
   row("policy (ms a step)", 1e3 * per(t.policy, t.steps), "%10.2f");
@@ -76,31 +82,68 @@ gsnav::Status write_json(const std::string& path, const Options& o, const SceneF
   const auto metrics = metrics_of(records);
   const gsnav::MetricsSummary s = gsnav::summarize(metrics);
   nlohmann::ordered_json j;
-  j["gsnav"] = std::to_string(GSNAV_VERSION_MAJOR) + "." + std::to_string(GSNAV_VERSION_MINOR) + "." + std::to_string(GSNAV_VERSION_PATCH);
-  j["config"] = {{"scene", f.name}, {"up", o.up}, {"avatars", o.avatars}, {"episodes", o.episodes}, {"backend", f.backend},
-                 {"seed", o.seed}, {"width", o.width}, {"height", o.height}, {"hfov", o.hfov}, {"eye_height", o.eye_height},
-                 {"profile", o.profile == gsnav::Profile::exact ? "exact" : "fast"}, {"max_steps", o.max_steps}};
-  j["scene"] = {{"gaussians", f.gaussians}, {"avatar_gaussians", f.avatar_gaussians}, {"navmesh", f.navmesh_source},
-                {"navmesh_polygons", f.navmesh_polygons}, {"navmesh_islands", f.islands}, {"navmesh_area", f.area},
+  j["gsnav"] = std::to_string(GSNAV_VERSION_MAJOR) + "." + std::to_string(GSNAV_VERSION_MINOR) + "." +
+               std::to_string(GSNAV_VERSION_PATCH);
+  j["config"] = {{"scene", f.name},
+                 {"up", o.up},
+                 {"avatars", o.avatars},
+                 {"episodes", o.episodes},
+                 {"backend", f.backend},
+                 {"seed", o.seed},
+                 {"width", o.width},
+                 {"height", o.height},
+                 {"hfov", o.hfov},
+                 {"eye_height", o.eye_height},
+                 {"profile", o.profile == gsnav::Profile::exact ? "exact" : "fast"},
+                 {"max_steps", o.max_steps}};
+  j["scene"] = {{"gaussians", f.gaussians},
+                {"avatar_gaussians", f.avatar_gaussians},
+                {"navmesh", f.navmesh_source},
+                {"navmesh_polygons", f.navmesh_polygons},
+                {"navmesh_islands", f.islands},
+                {"navmesh_area", f.area},
                 {"largest_island_area", f.island_area}};
-  j["means"] = {{"success_rate", s.success_rate}, {"spl", s.spl}, {"soft_spl", s.soft_spl}, {"distance_to_goal", s.distance_to_goal},
-                {"euclidean_distance_to_goal", s.euclidean_distance_to_goal}, {"collision_rate", s.collision_rate}, {"psi", s.psi},
-                {"human_collision_episode_rate", s.human_collision_episode_rate}, {"collisions", s.collisions}, {"steps", s.steps},
-                {"path_length", s.path_length}, {"min_clearance", s.min_clearance}};
+  j["means"] = {{"success_rate", s.success_rate},
+                {"spl", s.spl},
+                {"soft_spl", s.soft_spl},
+                {"distance_to_goal", s.distance_to_goal},
+                {"euclidean_distance_to_goal", s.euclidean_distance_to_goal},
+                {"collision_rate", s.collision_rate},
+                {"psi", s.psi},
+                {"human_collision_episode_rate", s.human_collision_episode_rate},
+                {"collisions", s.collisions},
+                {"steps", s.steps},
+                {"path_length", s.path_length},
+                {"min_clearance", s.min_clearance}};
   nlohmann::ordered_json episodes = nlohmann::ordered_json::array();
   for (const EpisodeRecord& r : records) {
     const gsnav::EpisodeMetrics& m = r.metrics;
-    episodes.push_back({{"id", r.episode.id}, {"start", point(r.episode.start_position)}, {"goal", point(r.episode.goal_position)},
-                        {"start_time", r.episode.start_time}, {"success", m.success}, {"spl", m.spl}, {"soft_spl", m.soft_spl},
-                        {"distance_to_goal", m.distance_to_goal}, {"euclidean_distance_to_goal", m.euclidean_distance_to_goal},
-                        {"collision_rate", m.collision_rate}, {"psi", m.psi}, {"human_collision", m.human_collision},
-                        {"collisions", m.collisions}, {"steps", m.steps}, {"start_distance", m.start_distance},
-                        {"path_length", m.path_length}, {"min_clearance", m.min_clearance}, {"pushed_into", r.pushed},
+    episodes.push_back({{"id", r.episode.id},
+                        {"start", point(r.episode.start_position)},
+                        {"goal", point(r.episode.goal_position)},
+                        {"start_time", r.episode.start_time},
+                        {"success", m.success},
+                        {"spl", m.spl},
+                        {"soft_spl", m.soft_spl},
+                        {"distance_to_goal", m.distance_to_goal},
+                        {"euclidean_distance_to_goal", m.euclidean_distance_to_goal},
+                        {"collision_rate", m.collision_rate},
+                        {"psi", m.psi},
+                        {"human_collision", m.human_collision},
+                        {"collisions", m.collisions},
+                        {"steps", m.steps},
+                        {"start_distance", m.start_distance},
+                        {"path_length", m.path_length},
+                        {"min_clearance", m.min_clearance},
+                        {"pushed_into", r.pushed},
                         {"stop_called", m.stop_called}});
   }
   j["episodes"] = std::move(episodes);
-  j["timings"] = {{"load_s", t.load}, {"navmesh_s", t.navmesh}, {"physics_ms_per_step", 1e3 * per(t.physics, t.steps)},
-                  {"render_ms", 1e3 * per(t.render, t.renders)}, {"policy_ms_per_step", 1e3 * per(t.policy, t.steps)},
+  j["timings"] = {{"load_s", t.load},
+                  {"navmesh_s", t.navmesh},
+                  {"physics_ms_per_step", 1e3 * per(t.physics, t.steps)},
+                  {"render_ms", 1e3 * per(t.render, t.renders)},
+                  {"policy_ms_per_step", 1e3 * per(t.policy, t.steps)},
                   {"steps", t.steps}};
   std::ofstream file(path);
   file << j.dump(2) << "\n";

@@ -12,7 +12,7 @@ namespace nav_loop {
 
 /// Wall-clock seconds of the parts of a run.
 struct Timings {
-  double load = 0, navmesh = 0;        ///< once
+  double load = 0, navmesh = 0;                ///< once
   double physics = 0, render = 0, policy = 0;  ///< summed over steps
   std::size_t steps = 0, renders = 0;
 };
@@ -45,8 +45,8 @@ class Progress {
   bool terminal_;
 };
 
-void print_table(const Options& options, const SceneFacts& facts, const std::vector<EpisodeRecord>& records,
-                 const Timings& timings);
+void print_table(const Options& options, const SceneFacts& facts,
+                 const std::vector<EpisodeRecord>& records, const Timings& timings);
 
 /// Writes metrics.json. Errors: file_not_found naming the path.
 gsnav::Status write_json(const std::string& path, const Options& options, const SceneFacts& facts,

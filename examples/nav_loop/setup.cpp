@@ -21,83 +21,91 @@ using gsnav::Result;
 using gsnav::Vec3d;
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
-
-constexpr double kRound = 48.0;    // seconds: everybody is back at the start of their way after that
-constexpr double kApart = 0.75;    // metres between two people, root to root, where it can be had
-constexpr double kUsualPace = 1.0; // metres a second
-
-using Walk = std::shared_ptr<const gsnav::WalkTrajectory>;
-
-Walk make_walk(const std::vector<Vec3d>& way, double speed) {
-  gsnav::WalkOptions o;
-  o.speed = speed;
-  auto walk = gsnav::WalkTrajectory::create(way, o);
-  return walk ? std::make_shared<const gsnav::WalkTrajectory>(std::move(*walk)) : nullptr;
+double seconds_since(Clock::time_point t) {
+  return std::chrono::duration<double>(Clock::now() - t).count();
 }
 
-/// A way through random places, walked back and forth in `kRound` seconds. Null where chance gave a way
+constexpr double kRound = 48.0;     // seconds: everybody is back at the start of their way after that
+constexpr double kApart = 0.75;     // metres between two people, root to root, where it can be had
+constexpr double kUsualPace = 1.0;  // metres a second
+
+/// Where somebody goes, and how fast.
+struct Way {
+  std::vector<Vec3d> points;
+  gsnav::WalkOptions walk;
+  gsnav::WalkTrajectory trajectory;
+};
+
+std::optional<Way> make_way(const std::vector<Vec3d>& points, double speed) {
+  gsnav::WalkOptions walk;
+  walk.speed = speed;
+  auto trajectory = gsnav::WalkTrajectory::create(points, walk);
+  if (!trajectory) return {};
+  return Way{points, walk, std::move(*trajectory)};
+}
+
+/// A way through random places, walked back and forth in `kRound` seconds. None where chance gave a way
 /// that would have to be walked too fast or too slowly.
-Walk random_walk(const gsnav::NavMesh& mesh, gsnav::Rng& rng) {
-  std::vector<Vec3d> way{mesh.random_point(rng, 0).position};
+std::optional<Way> random_way(const gsnav::NavMesh& mesh, gsnav::Rng& rng) {
+  std::vector<Vec3d> points{mesh.random_point(rng, 0).position};
   double length = 0;
   for (int tries = 0; tries < 40 && length < 0.40 * kRound * kUsualPace; ++tries) {
-    const auto path = mesh.find_path(way.back(), mesh.random_point(rng, 0).position);
+    const auto path = mesh.find_path(points.back(), mesh.random_point(rng, 0).position);
     if (!path || path->length < 1.0) continue;
     length += path->length;
-    way.insert(way.end(), path->points.begin() + 1, path->points.end());
+    points.insert(points.end(), path->points.begin() + 1, path->points.end());
   }
   double speed = kUsualPace;
   for (int i = 0; i < 30; ++i) {  // turns on the spot take their own time: the speed is found by trial
-    const Walk walk = make_walk(way, speed);
-    if (walk == nullptr || !(walk->period() > 0) || speed < 0.6 || speed > 1.4) return nullptr;
-    if (std::abs(walk->period() - kRound) < 1e-9) return walk;
-    speed *= walk->period() / kRound;
+    auto way = make_way(points, speed);
+    if (!way || !(way->trajectory.period() > 0) || speed < 0.6 || speed > 1.4) return {};
+    if (std::abs(way->trajectory.period() - kRound) < 1e-9) return way;
+    speed *= way->trajectory.period() / kRound;
   }
-  return nullptr;
+  return {};
 }
 
-double closest(const gsnav::Trajectory& a, const std::vector<Walk>& others) {
+double closest(const Way& a, const std::vector<Way>& others) {
   double least = std::numeric_limits<double>::infinity();
-  for (const Walk& b : others) {
-    for (double t = 0; t < kRound; t += 0.2) least = std::min(least, gsnav::norm(a.at(t).position - b->at(t).position));
+  for (const Way& b : others) {
+    for (double t = 0; t < kRound; t += 0.2) {
+      least = std::min(least, gsnav::norm(a.trajectory.at(t).position - b.trajectory.at(t).position));
+    }
   }
   return least;
 }
 
-Result<gsnav::AvatarActor> make_person(const gsnav::HumanoidOptions& look, Walk walk) {
-  auto asset = std::make_shared<const gsnav::AvatarAsset>(gsnav::make_humanoid(look));
-  return gsnav::AvatarActor::create(std::move(asset), nullptr, std::move(walk));
-}
-
-/// People on random ways. Ways are drawn until one keeps apart from those before it: all have one period,
-/// so what holds for one round holds for ever.
-Result<std::vector<gsnav::AvatarActor>> spawn_avatars(const Options& options, const gsnav::NavMesh& mesh) {
-  std::vector<Walk> walks;
+/// People on random ways. Ways are drawn until one keeps apart from those before it: all have one
+/// period, so what holds for one round holds for ever.
+Result<std::vector<gsnav::AvatarActor>> spawn_avatars(const Options& options,
+                                                      const gsnav::NavMesh& mesh) {
+  std::vector<Way> ways;
   std::vector<gsnav::AvatarActor> people;
   gsnav::Rng rng(options.seed ^ 0x70656f706c65ull);
   for (int i = 0; i < options.avatars; ++i) {
-    Walk best;
+    std::optional<Way> best;
     double best_distance = -1;
     for (int tries = 0; tries < 80 && best_distance < kApart; ++tries) {
-      const Walk walk = random_walk(mesh, rng);
-      if (walk == nullptr) continue;
-      const double d = closest(*walk, walks);
+      auto way = random_way(mesh, rng);
+      if (!way) continue;
+      const double d = closest(*way, ways);
       if (d > best_distance) {
         best_distance = d;
-        best = walk;
+        best = std::move(way);
       }
     }
-    if (best == nullptr) best = make_walk({mesh.random_point(rng, 0).position}, kUsualPace);
-    gsnav::HumanoidOptions look;
-    const Rgb shirt = avatar_color(static_cast<std::size_t>(i));  // as in the map
-    look.shirt = {shirt.r, shirt.g, shirt.b};
-    look.seed = static_cast<std::uint64_t>(i) + 1;
-    look.height = 1.62 + 0.05 * ((i * 2) % 5);
-    auto actor = make_person(look, best);
+    if (!best) best = make_way({mesh.random_point(rng, 0).position}, kUsualPace);
+    if (!best) return {Errc::nothing_navigable, "no place for an avatar"};
+    gsnav::HumanoidOptions look = gsnav::random_person(static_cast<std::uint64_t>(i) + 1);
+    const Rgb color = avatar_color(static_cast<std::size_t>(i));  // as in the map
+    look.top = {color.r, color.g, color.b};
+    auto body = gsnav::try_make_humanoid(look);
+    if (!body) return body.status();
+    auto actor = gsnav::make_walker(std::make_shared<const gsnav::AvatarAsset>(std::move(*body)),
+                                    best->points, best->walk);
     if (!actor) return actor.status();
     people.push_back(std::move(*actor));
-    walks.push_back(best);
+    ways.push_back(std::move(*best));
   }
   return people;
 }
@@ -134,9 +142,11 @@ Result<Setup> prepare(const Options& options) {
 
   from = Clock::now();
   const bool from_mesh = !triangles.empty() && options.navmesh != "gaussians";
-  if (!from_mesh && options.navmesh == "mesh") return {Errc::invalid_argument, "--navmesh mesh: only the embedded flat has a mesh"};
+  if (!from_mesh && options.navmesh == "mesh")
+    return {Errc::invalid_argument, "--navmesh mesh: only the embedded flat has a mesh"};
   const auto build = [&](double radius, double height) -> Result<gsnav::NavMesh> {
-    gsnav::NavMeshSettings settings = from_mesh ? gsnav::NavMeshSettings{} : gsnav::gaussian_navmesh_settings();
+    gsnav::NavMeshSettings settings =
+        from_mesh ? gsnav::NavMeshSettings{} : gsnav::gaussian_navmesh_settings();
     settings.agent_radius = radius;
     settings.agent_height = height;
     if (from_mesh) return gsnav::NavMesh::build(settings, vertices, triangles);
@@ -171,9 +181,11 @@ Result<Setup> prepare(const Options& options) {
   return setup;
 }
 
-Result<std::vector<gsnav::PointNavEpisode>> make_episodes(const Options& options, const gsnav::SimulatorScene& scene,
+Result<std::vector<gsnav::PointNavEpisode>> make_episodes(const Options& options,
+                                                          const gsnav::SimulatorScene& scene,
                                                           const gsnav::TaskConfig& task) {
-  auto episodes = gsnav::generate_episodes(*scene.navmesh, static_cast<std::size_t>(options.episodes), options.seed);
+  auto episodes =
+      gsnav::generate_episodes(*scene.navmesh, static_cast<std::size_t>(options.episodes), options.seed);
   if (!episodes) return episodes;
   gsnav::Rng rng(options.seed ^ 0x7469636bull);
   for (gsnav::PointNavEpisode& e : *episodes) {
@@ -181,11 +193,15 @@ Result<std::vector<gsnav::PointNavEpisode>> make_episodes(const Options& options
       e.start_time = rng.uniform(0.0, 600.0);
       std::vector<gsnav::DynamicCapsule> now;
       for (std::size_t i = 0; i < scene.avatars.size(); ++i) {
-        scene.avatars[i].dynamic_capsules(e.start_time, e.start_time, static_cast<std::uint32_t>(i), now);
+        scene.avatars[i].dynamic_capsules(e.start_time, e.start_time, static_cast<std::uint32_t>(i),
+                                          now);
       }
       const auto bodies = gsnav::CapsuleSet::create(std::move(now), e.start_time, e.start_time);
       if (!bodies) return bodies.status();
-      if (gsnav::clearance({e.start_position, task.agent_radius, task.agent_height}, *bodies, e.start_time).distance > 0.6) break;
+      if (gsnav::clearance({e.start_position, task.agent_radius, task.agent_height}, *bodies,
+                           e.start_time)
+              .distance > 0.6)
+        break;
     }
   }
   return episodes;

@@ -19,7 +19,8 @@ struct Setup {
 gsnav::Result<Setup> prepare(const Options& options);
 
 /// Episodes that begin at a moment when no avatar is within 0.6 m of the start.
-gsnav::Result<std::vector<gsnav::PointNavEpisode>> make_episodes(const Options& options, const gsnav::SimulatorScene& scene,
+gsnav::Result<std::vector<gsnav::PointNavEpisode>> make_episodes(const Options& options,
+                                                                 const gsnav::SimulatorScene& scene,
                                                                  const gsnav::TaskConfig& task);
 
 }  // namespace nav_loop

@@ -35,7 +35,9 @@ void living_room(Painter& p) {
   p.add_room({{kWest, 0, kSouth}, {kKitchen - kHalf, kCeiling, kMiddle - kHalf}}, srgb(0xe0bf94));
   const Vec3d cream = srgb(0xf0eadf), sage = srgb(0x9cab92);
   walls(p, {sage, cream, cream, cream},
-        {{}, {kLivingKitchen}, {{O::window, 1.25, 2.65, 0.85, 2.25}, {O::window, 3.5, 4.9, 0.85, 2.25}},
+        {{},
+         {kLivingKitchen},
+         {{O::window, 1.25, 2.65, 0.85, 2.25}, {O::window, 3.5, 4.9, 0.85, 2.25}},
          {kLivingBedroom, kLivingStudy}});
   wood_floor(p, srgb(0xc0905c));
 
@@ -127,7 +129,9 @@ void study(Painter& p) {
   p.add_room({{kStudy + kHalf, 0, kMiddle + kHalf}, {kEast, kCeiling, kNorth}}, srgb(0xd8b890));
   const Vec3d cream = srgb(0xf1ebe0), clay = srgb(0xcf9f7c);
   walls(p, {cream, clay, cream, cream},
-        {{far_side(kBedroomStudy)}, {}, {far_side(kLivingStudy), far_side(kKitchenStudy)},
+        {{far_side(kBedroomStudy)},
+         {},
+         {far_side(kLivingStudy), far_side(kKitchenStudy)},
          {{O::window, 6.6, 8.4, 0.9, 2.2}}});
   wood_floor(p, srgb(0xc0905c));
   p.place({0, 0, 8}, 2 * kQuarter);

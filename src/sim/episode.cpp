@@ -34,8 +34,10 @@ std::size_t draw_island(const NavMesh& navmesh, const std::vector<std::size_t>& 
 }  // namespace
 
 Status validate(const EpisodeRules& r) {
-  if (!(r.min_distance >= 0 && is_finite(r.min_distance))) return bad("min_distance", r.min_distance, "must be >= 0");
-  if (!(r.max_distance >= r.min_distance)) return bad("max_distance", r.max_distance, "must be >= min_distance");
+  if (!(r.min_distance >= 0 && is_finite(r.min_distance)))
+    return bad("min_distance", r.min_distance, "must be >= 0");
+  if (!(r.max_distance >= r.min_distance))
+    return bad("max_distance", r.max_distance, "must be >= min_distance");
   if (!(r.min_island_radius >= 0)) return bad("min_island_radius", r.min_island_radius, "must be >= 0");
   if (!(r.max_height_difference >= 0)) {
     return bad("max_height_difference", r.max_height_difference, "must be >= 0");
@@ -75,9 +77,9 @@ Result<PointNavEpisode> generate_episode(const NavMesh& navmesh, Rng& rng, const
       return e;
     }
   }
-  return {Errc::nothing_navigable,
-          "no start and goal between " + std::to_string(rules.min_distance) + " m and " +
-              std::to_string(rules.max_distance) + " m apart were found on the NavMesh"};
+  return {Errc::nothing_navigable, "no start and goal between " + std::to_string(rules.min_distance) +
+                                       " m and " + std::to_string(rules.max_distance) +
+                                       " m apart were found on the NavMesh"};
 }
 
 Result<std::vector<PointNavEpisode>> generate_episodes(const NavMesh& navmesh, std::size_t count,

@@ -33,7 +33,8 @@ void legs(Painter& p, double width, double depth, double z0, double height, doub
 
 }  // namespace
 
-void sofa(Painter& p, double width, const Vec3d& fabric, const Vec3d& cushion_a, const Vec3d& cushion_b) {
+void sofa(Painter& p, double width, const Vec3d& fabric, const Vec3d& cushion_a,
+          const Vec3d& cushion_b) {
   const double depth = 0.92, arm = 0.17, w = width / 2;
   const Field cloth = woven(fabric, 21);
   p.rounded_box({-w, 0.10, 0.02}, {w, 0.30, depth}, 0.04, cloth, 0.030);
@@ -44,20 +45,26 @@ void sofa(Painter& p, double width, const Vec3d& fabric, const Vec3d& cushion_a,
   const int seats = std::max(1, static_cast<int>(std::lround(inner / 0.72)));
   for (int i = 0; i < seats; ++i) {
     const double a = -inner / 2 + inner * i / seats, b = a + inner / seats;
-    p.rounded_box({a + 0.006, 0.27, 0.20}, {b - 0.006, 0.46, depth + 0.02}, 0.06, woven(fabric * 1.12, 22 + i), 0.024);
-    p.rounded_box({a + 0.012, 0.44, 0.17}, {b - 0.012, 0.82, 0.36}, 0.09, woven(fabric * 1.06, 32 + i), 0.024);
+    p.rounded_box({a + 0.006, 0.27, 0.20}, {b - 0.006, 0.46, depth + 0.02}, 0.06,
+                  woven(fabric * 1.12, 22 + i), 0.024);
+    p.rounded_box({a + 0.012, 0.44, 0.17}, {b - 0.012, 0.82, 0.36}, 0.09, woven(fabric * 1.06, 32 + i),
+                  0.024);
   }
-  p.rounded_box({-inner / 2 + 0.03, 0.46, 0.32}, {-inner / 2 + 0.45, 0.84, 0.50}, 0.09, woven(cushion_a, 41), 0.021);
+  p.rounded_box({-inner / 2 + 0.03, 0.46, 0.32}, {-inner / 2 + 0.45, 0.84, 0.50}, 0.09,
+                woven(cushion_a, 41), 0.021);
   if (seats > 1) {
-    p.rounded_box({inner / 2 - 0.45, 0.46, 0.32}, {inner / 2 - 0.04, 0.82, 0.50}, 0.09, woven(cushion_b, 42), 0.021);
+    p.rounded_box({inner / 2 - 0.45, 0.46, 0.32}, {inner / 2 - 0.04, 0.82, 0.50}, 0.09,
+                  woven(cushion_b, 42), 0.021);
   }
   legs(p, width - 0.1, depth - 0.1, 0.05, 0.10, 0.05, kWalnut);
 }
 
 void coffee_table(Painter& p) {
-  const double w = 1.1, d = 0.58;  // high enough not to be a step of a staircase to a NavMesh in 0.2 m voxels
+  const double w = 1.1,
+               d = 0.58;  // high enough not to be a step of a staircase to a NavMesh in 0.2 m voxels
   p.box({-w / 2, 0.40, -d / 2}, {w / 2, 0.44, d / 2}, wood(kWalnut * 1.3, w, 51), 0.022, Painter::kAll);
-  p.box({-w / 2 + 0.08, 0.12, -d / 2 + 0.06}, {w / 2 - 0.08, 0.14, d / 2 - 0.06}, wood(kWalnut, w, 52), 0.035);
+  p.box({-w / 2 + 0.08, 0.12, -d / 2 + 0.06}, {w / 2 - 0.08, 0.14, d / 2 - 0.06}, wood(kWalnut, w, 52),
+        0.035);
   legs(p, w, d, -d / 2, 0.40, 0.045, kWalnut);
   // Two books and a bowl.
   p.box({-0.36, 0.44, -0.13}, {-0.08, 0.47, 0.09}, plain(srgb(0xc8553d)), 0.018, Painter::kAll, false);
@@ -71,8 +78,8 @@ void coffee_table(Painter& p) {
 }
 
 void table(Painter& p, double width, double depth, double height, const Vec3d& tone) {
-  p.box({-width / 2, height - 0.04, -depth / 2}, {width / 2, height, depth / 2}, wood(tone, width, 61), 0.024,
-        Painter::kAll);
+  p.box({-width / 2, height - 0.04, -depth / 2}, {width / 2, height, depth / 2}, wood(tone, width, 61),
+        0.024, Painter::kAll);
   legs(p, width - 0.1, depth - 0.1, -depth / 2 + 0.05, height - 0.04, 0.06, tone * 0.8);
 }
 
@@ -91,14 +98,17 @@ void bed(Painter& p, const Vec3d& cover) {
   p.box({-w / 2, 0.06, 0.07}, {w / 2, 0.26, l}, wood(kOak * 0.9, w, 82), 0.034);
   p.rounded_box({-w / 2 + 0.01, 0.25, 0.07}, {w / 2 - 0.01, 0.50, l - 0.01}, 0.06, plain(kWhite), 0.034);
   // The cover hangs over three sides and is turned down towards the pillows.
-  p.rounded_box({-w / 2 - 0.03, 0.16, 0.72}, {w / 2 + 0.03, 0.54, l + 0.03}, 0.07,
-                [=](double s, double t) {
-                  const double quilt = 0.5 + 0.5 * std::sin(38 * s) * std::sin(38 * t);
-                  return cover * (0.88 + 0.16 * quilt);
-                },
-                0.026);
-  p.rounded_box({-w / 2 - 0.035, 0.20, 0.66}, {w / 2 + 0.035, 0.555, 0.98}, 0.06, plain(kWhite * 0.95), 0.028);
-  p.rounded_box({-w / 2 - 0.045, 0.22, 1.52}, {w / 2 + 0.045, 0.565, 1.90}, 0.05, woven(srgb(0xb0784c), 84), 0.024);
+  p.rounded_box(
+      {-w / 2 - 0.03, 0.16, 0.72}, {w / 2 + 0.03, 0.54, l + 0.03}, 0.07,
+      [=](double s, double t) {
+        const double quilt = 0.5 + 0.5 * std::sin(38 * s) * std::sin(38 * t);
+        return cover * (0.88 + 0.16 * quilt);
+      },
+      0.026);
+  p.rounded_box({-w / 2 - 0.035, 0.20, 0.66}, {w / 2 + 0.035, 0.555, 0.98}, 0.06, plain(kWhite * 0.95),
+                0.028);
+  p.rounded_box({-w / 2 - 0.045, 0.22, 1.52}, {w / 2 + 0.045, 0.565, 1.90}, 0.05,
+                woven(srgb(0xb0784c), 84), 0.024);
   for (const double x : {-0.40, 0.40}) {
     p.rounded_box({x - 0.33, 0.49, 0.12}, {x + 0.33, 0.66, 0.52}, 0.085, plain(kWhite * 1.02), 0.026);
   }
@@ -107,15 +117,17 @@ void bed(Painter& p, const Vec3d& cover) {
 
 void bedside(Painter& p, bool lamp) {
   p.box({-0.22, 0.10, 0.0}, {0.22, 0.48, 0.38}, wood(kOak, 0.4, 91), 0.03);
-  p.box({-0.20, 0.14, 0.38}, {0.20, 0.45, 0.392}, wood(kOak * 1.08, 0.4, 92), 0.03, Painter::kAll, false);
+  p.box({-0.20, 0.14, 0.38}, {0.20, 0.45, 0.392}, wood(kOak * 1.08, 0.4, 92), 0.03, Painter::kAll,
+        false);
   p.ellipsoid({0, 0.30, 0.40}, {0.015, 0.015, 0.012}, plain(srgb(0x2b2b2b)), 0.01);
   if (!lamp) {
     p.box({-0.12, 0.48, 0.08}, {0.08, 0.52, 0.24}, plain(srgb(0x7a9e9f)), 0.02, Painter::kAll, false);
     return;
   }
   p.cone({0, 0.48, 0.18}, 0.06, 0.03, 0.20, plain(srgb(0x86a397)), 0.018, false);
-  p.cone({0, 0.66, 0.18}, 0.13, 0.09, 0.19,
-         [](double, double t) { return lerp(srgb(0xffd9a0), srgb(0xfff0d4), t) * 1.9; }, 0.02, false, true);
+  p.cone(
+      {0, 0.66, 0.18}, 0.13, 0.09, 0.19,
+      [](double, double t) { return lerp(srgb(0xffd9a0), srgb(0xfff0d4), t) * 1.9; }, 0.02, false, true);
   p.room().lamps.push_back({p.world({0, 0.78, 0.20}), 0.45});
 }
 
@@ -126,12 +138,15 @@ void wardrobe(Painter& p, double width) {
         Painter::kZp | Painter::kXn | Painter::kXp, false);
   const int doors = std::max(2, static_cast<int>(std::lround(width / 0.55)));
   for (int i = 0; i < doors; ++i) {
-    const double a = -width / 2 + width * i / doors + 0.008, b = -width / 2 + width * (i + 1) / doors - 0.008;
-    p.box({a, 0.08, d}, {b, h - 0.02, d + 0.02}, wood(srgb(0xe9e2d6), h, 102 + i, true), 0.034, Painter::kAll, false);
-    p.box({a + 0.07, 0.20, d + 0.02}, {b - 0.07, h - 0.14, d + 0.026}, wood(srgb(0xddd4c4), h, 112 + i, true), 0.034,
+    const double a = -width / 2 + width * i / doors + 0.008,
+                 b = -width / 2 + width * (i + 1) / doors - 0.008;
+    p.box({a, 0.08, d}, {b, h - 0.02, d + 0.02}, wood(srgb(0xe9e2d6), h, 102 + i, true), 0.034,
           Painter::kAll, false);
+    p.box({a + 0.07, 0.20, d + 0.02}, {b - 0.07, h - 0.14, d + 0.026},
+          wood(srgb(0xddd4c4), h, 112 + i, true), 0.034, Painter::kAll, false);
     const double x = i % 2 == 0 ? b - 0.035 : a + 0.035;
-    p.box({x - 0.008, 0.98, d + 0.02}, {x + 0.008, 1.16, d + 0.05}, plain(srgb(0x6b5a3e)), 0.014, Painter::kAll, false);
+    p.box({x - 0.008, 0.98, d + 0.02}, {x + 0.008, 1.16, d + 0.05}, plain(srgb(0x6b5a3e)), 0.014,
+          Painter::kAll, false);
   }
 }
 
@@ -140,8 +155,10 @@ void sideboard(Painter& p, double width) {
   p.box({-width / 2, 0.14, 0}, {width / 2, h, d}, wood(kWalnut * 1.35, width, 121), 0.028);
   const int doors = 3;
   for (int i = 0; i < doors; ++i) {
-    const double a = -width / 2 + width * i / doors + 0.01, b = -width / 2 + width * (i + 1) / doors - 0.01;
-    p.box({a, 0.17, d}, {b, h - 0.05, d + 0.014}, wood(kWalnut * 1.5, 0.6, 122 + i), 0.026, Painter::kAll, false);
+    const double a = -width / 2 + width * i / doors + 0.01,
+                 b = -width / 2 + width * (i + 1) / doors - 0.01;
+    p.box({a, 0.17, d}, {b, h - 0.05, d + 0.014}, wood(kWalnut * 1.5, 0.6, 122 + i), 0.026,
+          Painter::kAll, false);
     p.ellipsoid({b - 0.04, 0.48, d + 0.02}, {0.012, 0.012, 0.012}, plain(srgb(0xc9a24b)), 0.009);
   }
   legs(p, width - 0.06, d - 0.06, 0.03, 0.14, 0.035, kWalnut);
@@ -156,12 +173,13 @@ void desk(Painter& p) {
   // Monitor, keyboard, mug, papers.
   const Field dark = plain(srgb(0x26282b));
   p.box({-0.31, h + 0.11, 0.14}, {0.31, h + 0.48, 0.165}, dark, 0.03, Painter::kAll);
-  p.rect({-0.295, h + 0.125, 0.168}, {0.59, 0, 0}, {0, 0.34, 0},
-         [](double s, double t) {
-           const bool bar = t > 0.93 || (s < 0.22 && std::fmod(t * 17, 1.0) > 0.35);
-           return bar ? srgb(0x5d8fa8) : lerp(srgb(0x1d3a4c), srgb(0x3b7d8c), s * t);
-         },
-         0.02, true);
+  p.rect(
+      {-0.295, h + 0.125, 0.168}, {0.59, 0, 0}, {0, 0.34, 0},
+      [](double s, double t) {
+        const bool bar = t > 0.93 || (s < 0.22 && std::fmod(t * 17, 1.0) > 0.35);
+        return bar ? srgb(0x5d8fa8) : lerp(srgb(0x1d3a4c), srgb(0x3b7d8c), s * t);
+      },
+      0.02, true);
   p.box({-0.04, h, 0.12}, {0.04, h + 0.13, 0.15}, dark, 0.02, Painter::kAll, false);
   p.box({-0.13, h, 0.06}, {0.13, h + 0.012, 0.24}, dark, 0.02, Painter::kAll, false);
   p.box({-0.22, h, 0.36}, {0.22, h + 0.018, 0.50}, plain(srgb(0xd7d9da)), 0.018, Painter::kAll, false);

@@ -51,7 +51,8 @@ Vec3d Painter::light_at(const Room& room, const Vec3d& point, const Vec3d& n) co
   const Vec3d p = point + n * 0.015;
 
   // Ambient: near surfaces darken, low ones give the floor's colour.
-  const Vec3d u = normalized(cross(abs(n.y) < 0.9 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0}, n)), v = cross(n, u);
+  const Vec3d u = normalized(cross(abs(n.y) < 0.9 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0}, n)),
+              v = cross(n, u);
   Vec3d ambient{};
   for (const Vec3d& h : hemisphere_) {
     const Vec3d d = u * h.x + v * h.y + n * h.z;
@@ -70,7 +71,8 @@ Vec3d Painter::light_at(const Room& room, const Vec3d& point, const Vec3d& n) co
     constexpr int kAcross = 4, kUp = 4;
     double direct = 0;
     for (int k = 0; k < kAcross * kUp; ++k) {
-      const Vec3d q = w.corner + w.u * ((k % kAcross + 0.5) / kAcross) + w.v * ((k / kAcross + 0.5) / kUp);
+      const Vec3d q =
+          w.corner + w.u * ((k % kAcross + 0.5) / kAcross) + w.v * ((k / kAcross + 0.5) / kUp);
       const Vec3d d = q - p;
       const double r2 = dot(d, d), c0 = dot(d, n), c1 = -dot(d, facing) / area;
       if (c0 <= 0 || c1 <= 0 || blocked(room, p, q + facing * (0.02 / area))) continue;
@@ -103,7 +105,8 @@ bool Painter::sun_at(const Room& room, const Vec3d& point, const Vec3d& n) const
     const Vec3d q = p + kToSun * t - w.corner;
     const double a = dot(q, w.u) / dot(w.u, w.u), b = dot(q, w.v) / dot(w.v, w.v);
     // Two bars cross the pane.
-    if (a < 0.03 || a > 0.97 || b < 0.03 || b > 0.97 || abs(a - 0.5) < 0.025 || abs(b - 0.62) < 0.02) continue;
+    if (a < 0.03 || a > 0.97 || b < 0.03 || b > 0.97 || abs(a - 0.5) < 0.025 || abs(b - 0.62) < 0.02)
+      continue;
     return !blocked(room, p, p + kToSun * t);
   }
   return false;

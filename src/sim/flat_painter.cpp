@@ -26,7 +26,8 @@ Vec3d srgb(unsigned hex) noexcept {
 }
 
 double hash01(int a, int b, int c) noexcept {
-  std::uint32_t h = static_cast<std::uint32_t>(a) * 0x8da6b343u ^ static_cast<std::uint32_t>(b) * 0xd8163841u ^
+  std::uint32_t h = static_cast<std::uint32_t>(a) * 0x8da6b343u ^
+                    static_cast<std::uint32_t>(b) * 0xd8163841u ^
                     static_cast<std::uint32_t>(c) * 0xcb1ab31fu;
   h = (h ^ (h >> 16)) * 0x7feb352du;
   h = (h ^ (h >> 15)) * 0x846ca68bu;
@@ -96,7 +97,9 @@ void Painter::blocker(const Vec3d& low, const Vec3d& high) {
   room().blockers.push_back(world_box(low, high));
 }
 
-void Painter::cover(const Vec3d& low, const Vec3d& high) { room().covered.push_back(world_box(low, high)); }
+void Painter::cover(const Vec3d& low, const Vec3d& high) {
+  room().covered.push_back(world_box(low, high));
+}
 
 void Painter::box(const Vec3d& l, const Vec3d& h, const Field& color, Spacing spacing, unsigned faces,
                   bool blocks) {
@@ -184,8 +187,8 @@ Tangents tangents(const Field& position, double s, double t) {
   };
   const double s0 = std::max(s - h, 0.0), s1 = std::min(s + h, 1.0);
   const double t0 = std::max(t - h, 0.0), t1 = std::min(t + h, 1.0);
-  Tangents out{difference(s0, t, s1, t) * (1.0 / (s1 - s0)), difference(s, t0, s, t1) * (1.0 / (t1 - t0)),
-               {}};
+  Tangents out{
+      difference(s0, t, s1, t) * (1.0 / (s1 - s0)), difference(s, t0, s, t1) * (1.0 / (t1 - t0)), {}};
   out.normal = normalized(cross(out.ds, out.dt));
   return out;
 }
@@ -267,7 +270,8 @@ void Painter::emit_gaussians(const Patch& patch, GaussianCloudBuilder& builder) 
     for (int i = 0; i < columns; ++i) {
       const double s = (i + 0.5) / columns;
       const Vec3d p = patch.position(s, t);
-      if (std::any_of(where.covered.begin(), where.covered.end(), [&](const Box& b) { return inside(b, p); })) {
+      if (std::any_of(where.covered.begin(), where.covered.end(),
+                      [&](const Box& b) { return inside(b, p); })) {
         continue;
       }
       if (!patch.flat) f = tangents(patch.position, s, t);
@@ -297,8 +301,7 @@ void Painter::emit_triangles(const Patch& patch, DefaultScene& scene) {
   const int ns = patch.cells_s, nt = patch.cells_t;
   for (int j = 0; j <= nt; ++j) {
     for (int i = 0; i <= ns; ++i) {
-      scene.vertices.push_back(
-          patch.position(static_cast<double>(i) / ns, static_cast<double>(j) / nt));
+      scene.vertices.push_back(patch.position(static_cast<double>(i) / ns, static_cast<double>(j) / nt));
     }
   }
   for (int j = 0; j < nt; ++j) {

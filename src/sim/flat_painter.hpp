@@ -68,8 +68,7 @@ class Painter {
   Vec3d world(const Vec3d& p) const noexcept { return rotate(turn_, p) + origin_; }
 
   /// A surface; its front is on the side of dP/ds x dP/dt. `cells_s` x `cells_t` triangulates it.
-  void patch(Field position, Field color, Spacing spacing, int cells_s, int cells_t,
-             bool glows = false);
+  void patch(Field position, Field color, Spacing spacing, int cells_s, int cells_t, bool glows = false);
   void rect(const Vec3d& o, const Vec3d& a, const Vec3d& b, Field color, Spacing spacing,
             bool glows = false);
 

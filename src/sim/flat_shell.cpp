@@ -24,9 +24,11 @@ Vec3d outside(double x, double y) {
 void window(Painter& p, double x0, double x1, double y0, double y1) {
   const double w = x1 - x0, h = y1 - y0, deep = 0.14;
   const Field trim = plain(kTrim * 1.15);
-  p.rect({x0, y0, -deep}, {w, 0, 0}, {0, h, 0},
-         [](double s, double t) { return outside(s, t); }, 0.035, true);
-  p.room().windows.push_back({p.world({x0, y0, -deep}), p.world({x1, y0, -deep}) - p.world({x0, y0, -deep}),
+  p.rect(
+      {x0, y0, -deep}, {w, 0, 0}, {0, h, 0}, [](double s, double t) { return outside(s, t); }, 0.035,
+      true);
+  p.room().windows.push_back({p.world({x0, y0, -deep}),
+                              p.world({x1, y0, -deep}) - p.world({x0, y0, -deep}),
                               p.world({x0, y1, -deep}) - p.world({x0, y0, -deep})});
   p.rect({x0, y0, 0}, {0, 0, -deep}, {0, h, 0}, trim, 0.035);
   p.rect({x1, y0, -deep}, {0, 0, deep}, {0, h, 0}, trim, 0.035);
@@ -76,10 +78,18 @@ void wall(Painter& p, Side side, const Vec3d& paint, std::span<const Opening> op
   bool forward = true;
   double origin = 0;
   switch (side) {
-    case Side::z_low: p.place(in.low, 0); break;
-    case Side::z_high: p.place({in.high.x, 0, in.high.z}, 2 * kHalfPi); break;
-    case Side::x_low: p.place({in.low.x, 0, in.high.z}, kHalfPi); break;
-    case Side::x_high: p.place({in.high.x, 0, in.low.z}, -kHalfPi); break;
+    case Side::z_low:
+      p.place(in.low, 0);
+      break;
+    case Side::z_high:
+      p.place({in.high.x, 0, in.high.z}, 2 * kHalfPi);
+      break;
+    case Side::x_low:
+      p.place({in.low.x, 0, in.high.z}, kHalfPi);
+      break;
+    case Side::x_high:
+      p.place({in.high.x, 0, in.low.z}, -kHalfPi);
+      break;
   }
   const bool along_x = side == Side::z_low || side == Side::z_high;
   length = along_x ? in.high.x - in.low.x : in.high.z - in.low.z;
@@ -92,18 +102,20 @@ void wall(Painter& p, Side side, const Vec3d& paint, std::span<const Opening> op
   };
   std::vector<Hole> holes;
   for (const Opening& o : openings) {
-    holes.push_back(forward ? Hole{o.from - origin, o.to - origin, &o} : Hole{origin - o.to, origin - o.from, &o});
+    holes.push_back(forward ? Hole{o.from - origin, o.to - origin, &o}
+                            : Hole{origin - o.to, origin - o.from, &o});
   }
   std::sort(holes.begin(), holes.end(), [](const Hole& a, const Hole& b) { return a.x0 < b.x0; });
 
   const auto painted = [&](double x0, double x1, double y0, double y1) {
     if (x1 - x0 < 1e-6 || y1 - y0 < 1e-6) return;
     const double w = x1 - x0, h = y1 - y0;
-    p.rect({x0, y0, 0}, {w, 0, 0}, {0, h, 0},
-           [=](double s, double t) {
-             return paint * (0.975 + 0.05 * noise(2.5 * (x0 + s * w), 2.5 * (y0 + t * h), 11));
-           },
-           0.058);
+    p.rect(
+        {x0, y0, 0}, {w, 0, 0}, {0, h, 0},
+        [=](double s, double t) {
+          return paint * (0.975 + 0.05 * noise(2.5 * (x0 + s * w), 2.5 * (y0 + t * h), 11));
+        },
+        0.058);
   };
   const auto skirting = [&](double x0, double x1) {
     if (x1 - x0 < 0.02) return;
@@ -175,13 +187,15 @@ void tile_floor(Painter& p) {
       if (w < 0.02 || h < 0.02) continue;
       const Vec3d c = srgb((i + j) % 2 == 0 ? 0xdcd6ca : 0xb9b4aa) * (0.95 + 0.1 * hash01(i, j, 9));
       const double ox = x, oz = z;
-      p.rect({x + grout, 0, z + h}, {w - grout, 0, 0}, {0, 0, grout - h},
-             [=](double s, double t) {
-               return c * (0.92 + 0.16 * noise(6 * (ox + s * w), 6 * (oz - t * h), 13));
-             },
-             0.046);
+      p.rect(
+          {x + grout, 0, z + h}, {w - grout, 0, 0}, {0, 0, grout - h},
+          [=](double s, double t) {
+            return c * (0.92 + 0.16 * noise(6 * (ox + s * w), 6 * (oz - t * h), 13));
+          },
+          0.046);
       p.rect({x, 0, z + h}, {grout, 0, 0}, {0, 0, -h}, plain(srgb(0x8f8a80)), {grout, 0.05});
-      p.rect({x + grout, 0, z + grout}, {w - grout, 0, 0}, {0, 0, -grout}, plain(srgb(0x8f8a80)), {0.05, grout});
+      p.rect({x + grout, 0, z + grout}, {w - grout, 0, 0}, {0, 0, -grout}, plain(srgb(0x8f8a80)),
+             {0.05, grout});
     }
   }
 }
@@ -190,7 +204,8 @@ void curtain(Painter& p, double x0, double x1, const Vec3d& cloth) {
   const double w = x1 - x0;
   p.patch(
       [=](double s, double t) {
-        return Vec3d{x0 + w * s, 0.03 + 2.42 * t, 0.085 + 0.028 * std::sin(6.283185307179586 * w * 9 * s)};
+        return Vec3d{x0 + w * s, 0.03 + 2.42 * t,
+                     0.085 + 0.028 * std::sin(6.283185307179586 * w * 9 * s)};
       },
       [=](double s, double) { return cloth * (0.86 + 0.14 * std::sin(6.283185307179586 * w * 9 * s)); },
       {0.024, 0.08}, 24, 1);

@@ -52,8 +52,12 @@ Guide guide(const NavMesh& mesh, const Vec3d& from, const Vec3d& goal, double be
 class Lookahead {
  public:
   Lookahead(const World& world, const std::vector<CapsuleSet>& bodies, int horizon, double comfort)
-      : world_(world), bodies_(bodies), horizon_(horizon), comfort_(comfort),
-        turn_(world.config().turn_angle * kPi / 180.0), reach_(0.95 * world.config().success_distance) {}
+      : world_(world),
+        bodies_(bodies),
+        horizon_(horizon),
+        comfort_(comfort),
+        turn_(world.config().turn_angle * kPi / 180.0),
+        reach_(0.95 * world.config().success_distance) {}
 
   Outlook play(const Plan& plan) const {
     static const CapsuleSet nobody;

@@ -18,13 +18,16 @@ std::vector<SensorSpec> rgbd_sensors(int height, int width, double hfov, const V
 
 Status validate(const SensorSpec& s) {
   const auto bad = [&](const char* field, const std::string& value, const char* rule) {
-    return Status(Errc::invalid_argument, "SensorSpec \"" + s.uuid + "\": " + field + " = " + value + ": " + rule);
+    return Status(Errc::invalid_argument,
+                  "SensorSpec \"" + s.uuid + "\": " + field + " = " + value + ": " + rule);
   };
   if (s.uuid.empty()) return {Errc::invalid_argument, "SensorSpec.uuid is empty: a sensor needs a name"};
   for (const int side : s.resolution) {
-    if (side < 1 || side > kMaxImageSide) return bad("resolution", std::to_string(side), "must be in [1, 16384]");
+    if (side < 1 || side > kMaxImageSide)
+      return bad("resolution", std::to_string(side), "must be in [1, 16384]");
   }
-  if (!(s.hfov > 0 && s.hfov < 180)) return bad("hfov", std::to_string(s.hfov), "must be in (0, 180) degrees");
+  if (!(s.hfov > 0 && s.hfov < 180))
+    return bad("hfov", std::to_string(s.hfov), "must be in (0, 180) degrees");
   if (!is_finite(s.position)) return bad("position", "not finite", "must be finite");
   if (!is_finite(s.orientation)) return bad("orientation", "not finite", "must be finite");
   if (!(s.near_plane > 0 && is_finite(s.near_plane))) {
@@ -41,8 +44,8 @@ Status validate(const SensorSpec& s) {
 
 bool same_camera(const SensorSpec& a, const SensorSpec& b) noexcept {
   return a.resolution == b.resolution && a.hfov == b.hfov && a.position == b.position &&
-         a.orientation == b.orientation && a.near_plane == b.near_plane && a.near_sigma == b.near_sigma &&
-         a.far_plane == b.far_plane;
+         a.orientation == b.orientation && a.near_plane == b.near_plane &&
+         a.near_sigma == b.near_sigma && a.far_plane == b.far_plane;
 }
 
 Camera sensor_camera(const SensorSpec& spec, const Vec3d& base, const Quatd& rotation) noexcept {

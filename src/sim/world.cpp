@@ -37,10 +37,12 @@ Status validate(const TaskConfig& c) {
   if (!not_negative(c.agent_radius)) return bad("agent_radius", c.agent_radius, "must be >= 0");
   if (!positive(c.agent_height)) return bad("agent_height", c.agent_height, "must be positive");
   if (!positive(c.forward_step)) return bad("forward_step", c.forward_step, "must be positive");
-  if (!(c.turn_angle > 0 && c.turn_angle <= 180)) return bad("turn_angle", c.turn_angle, "must be in (0, 180]");
+  if (!(c.turn_angle > 0 && c.turn_angle <= 180))
+    return bad("turn_angle", c.turn_angle, "must be in (0, 180]");
   if (!positive(c.control_period)) return bad("control_period", c.control_period, "must be positive");
   if (c.max_steps < 1) return bad("max_steps", c.max_steps, "must be >= 1");
-  if (!not_negative(c.success_distance)) return bad("success_distance", c.success_distance, "must be >= 0");
+  if (!not_negative(c.success_distance))
+    return bad("success_distance", c.success_distance, "must be >= 0");
   if (!positive(c.skin)) return bad("skin", c.skin, "must be positive");
   return {};
 }
@@ -106,10 +108,18 @@ Result<StepInfo> World::step(Action action) {
   Vec3d displacement{};
   const double turn = config_.turn_angle * kPi / 180.0;
   switch (action) {
-    case Action::move_forward: displacement = agent_.forward() * config_.forward_step; break;
-    case Action::turn_left: agent_.yaw = wrapped(agent_.yaw + turn); break;
-    case Action::turn_right: agent_.yaw = wrapped(agent_.yaw - turn); break;
-    default: return {Errc::invalid_argument, "action " + std::to_string(static_cast<int>(action)) + " is unknown"};
+    case Action::move_forward:
+      displacement = agent_.forward() * config_.forward_step;
+      break;
+    case Action::turn_left:
+      agent_.yaw = wrapped(agent_.yaw + turn);
+      break;
+    case Action::turn_right:
+      agent_.yaw = wrapped(agent_.yaw - turn);
+      break;
+    default:
+      return {Errc::invalid_argument,
+              "action " + std::to_string(static_cast<int>(action)) + " is unknown"};
   }
   const StepOptions options{config_.allow_sliding, config_.skin, StepOptions{}.max_slides};
   const StepResult r = gsnav::step(*navmesh_, agent_state(), displacement, *bodies_now, options);
@@ -123,7 +133,8 @@ Result<StepInfo> World::step(Action action) {
   last_.pushed_into = r.pushed_into;
   last_.avatar_contact = last_.capsule_blocked || r.pushed_into || last_.avatar_clearance <= 0.0;
   last_.collided = r.blocked();
-  tracker_.add({last_.moved, last_.wall_collision, last_.capsule_blocked, last_.avatar_contact, distances_});
+  tracker_.add(
+      {last_.moved, last_.wall_collision, last_.capsule_blocked, last_.avatar_contact, distances_});
 
   if (r.blocked_by != BlockedBy::invalid) {
     agent_.position = r.position;
@@ -146,8 +157,8 @@ PointGoal World::point_goal() const noexcept {
 }
 
 EpisodeMetrics World::metrics() const {
-  return tracker_.finish(stop_called_, distance_to_goal(), norm(episode_.goal_position - agent_.position),
-                         config_.success_distance);
+  return tracker_.finish(stop_called_, distance_to_goal(),
+                         norm(episode_.goal_position - agent_.position), config_.success_distance);
 }
 
 }  // namespace gsnav

@@ -13,7 +13,8 @@ namespace gsnav_test {
 inline std::shared_ptr<const gsnav::NavMesh> flat_navmesh() {
   static const auto mesh = [] {
     const gsnav::DefaultScene s = gsnav::make_default_scene(0.05).value();
-    return std::make_shared<const gsnav::NavMesh>(gsnav::NavMesh::build({}, s.vertices, s.triangles).value());
+    return std::make_shared<const gsnav::NavMesh>(
+        gsnav::NavMesh::build({}, s.vertices, s.triangles).value());
   }();
   return mesh;
 }
@@ -30,7 +31,8 @@ inline void circling_bodies(double t0, double t1, std::vector<gsnav::DynamicCaps
   }
 }
 
-inline gsnav::World flat_world(const gsnav::TaskConfig& config = {}, gsnav::World::BodySource bodies = {}) {
+inline gsnav::World flat_world(const gsnav::TaskConfig& config = {},
+                               gsnav::World::BodySource bodies = {}) {
   return gsnav::World::create(flat_navmesh(), config, std::move(bodies)).value();
 }
 

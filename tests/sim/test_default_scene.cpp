@@ -62,7 +62,8 @@ TEST_CASE("the flat's mesh gives one floor that joins all rooms") {
 TEST_CASE("furniture stands in the way") {
   const DefaultScene scene = make_default_scene(0.05).value();
   const NavMesh mesh = NavMesh::build({}, scene.vertices, scene.triangles).value();
-  const Vec3d taken[] = {{2.15, 0, 2.35}, {0.6, 0, 2.35}, {7.65, 0, 1.95}, {1.0, 0, 6.5}, {3.15, 0, 4.9}, {7.5, 0, 7.6}};
+  const Vec3d taken[] = {{2.15, 0, 2.35}, {0.6, 0, 2.35}, {7.65, 0, 1.95},
+                         {1.0, 0, 6.5},   {3.15, 0, 4.9}, {7.5, 0, 7.6}};
   for (const Vec3d& p : taken) {
     const auto on = mesh.snap_point(p, {{0.05, 0.3, 0.05}});
     CHECK_FALSE((on && mesh.island_of(on->poly) == 0));
@@ -71,7 +72,8 @@ TEST_CASE("furniture stands in the way") {
 
 TEST_CASE("the NavMesh of the Gaussians agrees with the mesh's") {
   const DefaultScene scene = make_default_scene().value();
-  const NavMesh mesh = NavMesh::build(gaussian_navmesh_settings(), scene.vertices, scene.triangles).value();
+  const NavMesh mesh =
+      NavMesh::build(gaussian_navmesh_settings(), scene.vertices, scene.triangles).value();
   const GaussianSet set = scene.cloud.set();
   GaussianNavOptions options;
   options.solid_alpha = 0.2;  // surfaces as thin as paper may fall between the centres of two voxels
@@ -81,7 +83,8 @@ TEST_CASE("the NavMesh of the Gaussians agrees with the mesh's") {
   const Vec3d rooms[] = {{4.5, 0, 3.0}, {8.5, 0, 3.6}, {4.2, 0, 5.8}, {6.0, 0, 7.0}};
   for (const Vec3d& a : rooms) {
     for (const Vec3d& b : rooms) {
-      CHECK(read.mesh.geodesic_distance(a, b) == doctest::Approx(mesh.geodesic_distance(a, b)).epsilon(0.06));
+      CHECK(read.mesh.geodesic_distance(a, b) ==
+            doctest::Approx(mesh.geodesic_distance(a, b)).epsilon(0.06));
     }
   }
 }

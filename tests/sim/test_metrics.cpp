@@ -55,10 +55,10 @@ TEST_CASE("an episode of four steps by hand") {
   EpisodeTracker t;
   t.reset(1.0);
   const std::array<double, 2> far{2.0, 0.5}, near{0.0, 0.75};
-  t.add({0.25, false, false, false, far});   // intrusions 0, 0.5
-  t.add({0.0, true, true, true, near});      // 1, 0.25
-  t.add({0.25, true, false, false, {}});     // nobody is there any more
-  t.add({0.5, false, false, true, {}});      // a contact by the avatar's fault counts for CR
+  t.add({0.25, false, false, false, far});  // intrusions 0, 0.5
+  t.add({0.0, true, true, true, near});     // 1, 0.25
+  t.add({0.25, true, false, false, {}});    // nobody is there any more
+  t.add({0.5, false, false, true, {}});     // a contact by the avatar's fault counts for CR
   const EpisodeMetrics m = t.finish(true, 0.1, 0.05, 0.2);
   CHECK(m.steps == 4);
   CHECK(m.path_length == doctest::Approx(1.0));

@@ -10,7 +10,8 @@ using namespace gsnav;
 namespace {
 
 SimulatorScene flat_scene() {
-  static const auto cloud = std::make_shared<const GaussianCloud>(make_default_scene(0.05).value().cloud);
+  static const auto cloud =
+      std::make_shared<const GaussianCloud>(make_default_scene(0.05).value().cloud);
   SimulatorScene s;
   s.assets.push_back({cloud, {}});
   s.navmesh = gsnav_test::flat_navmesh();
@@ -134,7 +135,9 @@ TEST_CASE("impossible configurations name what is wrong") {
     CHECK(sim.code() == Errc::invalid_argument);
     return sim.message();
   };
-  const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  const auto has = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
   CHECK(has(message([](auto& s, auto&) { s.navmesh = nullptr; }), "navmesh"));
   CHECK(has(message([](auto& s, auto&) { s.assets[0].cloud = nullptr; }), "assets[0]"));
   CHECK(has(message([](auto&, auto& c) { c.sensors[1].uuid = "rgb"; }), "twice"));

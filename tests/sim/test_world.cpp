@@ -139,8 +139,8 @@ TEST_CASE("the same calls give the same bits, whatever ran before") {
     Rng rng(9);
     for (int i = 0; i < 120; ++i) {
       w.step(static_cast<Action>(1 + rng.below(3))).value();
-      trace.insert(trace.end(), {w.agent().position.x, w.agent().position.y, w.agent().position.z, w.agent().yaw,
-                                 w.last_step().avatar_clearance});
+      trace.insert(trace.end(), {w.agent().position.x, w.agent().position.y, w.agent().position.z,
+                                 w.agent().yaw, w.last_step().avatar_clearance});
     }
     trace.push_back(w.metrics().psi);
     return trace;

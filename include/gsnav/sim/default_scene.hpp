@@ -16,10 +16,10 @@ namespace gsnav {
 /// World frame: metres, Y up, floor at y = 0, ceiling at 2.7; inside walls x in [0, 10], z in [0, 8].
 /// Four furnished rooms joined by five openings, so that most targets can be reached two ways.
 struct DefaultScene {
-  GaussianCloud cloud;                                 ///< SH degree 0, light baked in
-  std::vector<Vec3d> vertices;                         ///< the same surfaces as a mesh
-  std::vector<std::array<std::uint32_t, 3>> triangles; ///< counter-clockwise seen from the front
-  Aabb<double> bounds{};                               ///< of the Gaussians' means
+  GaussianCloud cloud;                                  ///< SH degree 0, light baked in
+  std::vector<Vec3d> vertices;                          ///< the same surfaces as a mesh
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from the front
+  Aabb<double> bounds{};                                ///< of the Gaussians' means
 };
 
 /// A viewpoint in the flat that shows a room.

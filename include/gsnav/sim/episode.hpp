@@ -15,10 +15,10 @@ namespace gsnav {
 struct PointNavEpisode {
   std::string id;
   Vec3d start_position{};
-  Quatd start_rotation{};            ///< w, x, y, z; a turn about +Y
+  Quatd start_rotation{};  ///< w, x, y, z; a turn about +Y
   Vec3d goal_position{};
-  double geodesic_distance = 0.0;    ///< from start to goal along the surface, metres
-  double start_time = 0.0;           ///< seconds on the avatars' clock when the episode begins
+  double geodesic_distance = 0.0;  ///< from start to goal along the surface, metres
+  double start_time = 0.0;         ///< seconds on the avatars' clock when the episode begins
 };
 
 /// Rotation about +Y: positive angles (radians) turn the agent left.
@@ -28,15 +28,15 @@ inline Quatd yaw_rotation(double radians) noexcept {
 
 /// What makes a pair of points an episode. Defaults are Habitat's generator.
 struct EpisodeRules {
-  double min_distance = 1.0;         ///< least geodesic distance, metres
-  double max_distance = 30.0;        ///< largest geodesic distance, metres
-  double min_island_radius = 1.5;    ///< points on smaller islands are not used, metres
+  double min_distance = 1.0;           ///< least geodesic distance, metres
+  double max_distance = 30.0;          ///< largest geodesic distance, metres
+  double min_island_radius = 1.5;      ///< points on smaller islands are not used, metres
   double max_height_difference = 0.5;  ///< between start and goal, metres
   /// A path less than this much longer than the straight line is kept only sometimes: with probability
   /// 20 (ratio - 0.98)^2.
   double straight_ratio = 1.1;
-  int retries_per_goal = 10;         ///< starts tried for a goal before another goal is drawn
-  int max_goals = 2000;              ///< goals drawn before giving up on an episode
+  int retries_per_goal = 10;  ///< starts tried for a goal before another goal is drawn
+  int max_goals = 2000;       ///< goals drawn before giving up on an episode
 };
 
 /// invalid_argument, naming the field, where a value is impossible.

@@ -6,9 +6,9 @@
 namespace gsnav {
 
 struct FollowerOptions {
-  int horizon = 12;            ///< actions looked ahead, >= 1
-  double watch_distance = 4.0; ///< avatars farther than this are not planned for, metres
-  double comfort = 0.5;        ///< distance to avatars below which a plan is charged, metres
+  int horizon = 12;             ///< actions looked ahead, >= 1
+  double watch_distance = 4.0;  ///< avatars farther than this are not planned for, metres
+  double comfort = 0.5;         ///< distance to avatars below which a plan is charged, metres
 };
 
 /// A policy for demonstrations: follows the shortest path and gives way to avatars.

@@ -50,8 +50,8 @@ inline double intrusion(double d) noexcept {
 
 /// What one action did, for the metrics. `stop` is no step.
 struct StepRecord {
-  double moved = 0.0;          ///< metres from the position before to the one after, straight
-  bool wall_collision = false; ///< an edge of the NavMesh stopped or turned the move
+  double moved = 0.0;            ///< metres from the position before to the one after, straight
+  bool wall_collision = false;   ///< an edge of the NavMesh stopped or turned the move
   bool capsule_blocked = false;  ///< an avatar stopped or turned the move
   bool avatar_contact = false;   ///< touched during the step, whoever's fault
   /// Smallest distance during the step to each avatar that is active, metres; empty with none.
@@ -65,14 +65,14 @@ struct EpisodeMetrics {
   double soft_spl = 0.0;
   double distance_to_goal = 0.0;            ///< geodesic, metres; infinity where cut off
   double euclidean_distance_to_goal = 0.0;  ///< straight, metres
-  double collision_rate = 0.0;  ///< CR: steps with avatar contact or a capsule-blocked move / steps
-  double psi = 0.0;             ///< mean intrusion over steps and avatars active then; 0 with none
-  bool human_collision = false; ///< any step of the episode counted by CR
-  std::size_t collisions = 0;   ///< steps that ran into a wall
+  double collision_rate = 0.0;      ///< CR: steps with avatar contact or a capsule-blocked move / steps
+  double psi = 0.0;                 ///< mean intrusion over steps and avatars active then; 0 with none
+  bool human_collision = false;     ///< any step of the episode counted by CR
+  std::size_t collisions = 0;       ///< steps that ran into a wall
   std::size_t collision_steps = 0;  ///< steps counted by CR
-  std::size_t steps = 0;        ///< actions, stop excluded
-  double start_distance = 0.0;  ///< l, metres
-  double path_length = 0.0;     ///< p, metres
+  std::size_t steps = 0;            ///< actions, stop excluded
+  double start_distance = 0.0;      ///< l, metres
+  double path_length = 0.0;         ///< p, metres
   double min_clearance = std::numeric_limits<double>::infinity();  ///< to any avatar, metres
   bool stop_called = false;
 };
@@ -111,7 +111,8 @@ class EpisodeTracker {
     m.success = episode_success(stop_called, geodesic, success_distance);
     m.spl = success_weighted_by_path_length(m.success, m.start_distance, m.path_length);
     m.soft_spl = soft_success_weighted_by_path_length(geodesic, m.start_distance, m.path_length);
-    m.collision_rate = m.steps == 0 ? 0.0 : static_cast<double>(m.collision_steps) / static_cast<double>(m.steps);
+    m.collision_rate =
+        m.steps == 0 ? 0.0 : static_cast<double>(m.collision_steps) / static_cast<double>(m.steps);
     m.psi = pairs_ == 0 ? 0.0 : intrusion_ / static_cast<double>(pairs_);
     return m;
   }
@@ -125,14 +126,14 @@ class EpisodeTracker {
 /// Means over episodes, each episode counting once.
 struct MetricsSummary {
   std::size_t episodes = 0;
-  double success_rate = 0.0;      ///< SR
+  double success_rate = 0.0;  ///< SR
   double spl = 0.0;
   double soft_spl = 0.0;
   double distance_to_goal = 0.0;  ///< DTG, geodesic, metres
   double euclidean_distance_to_goal = 0.0;
-  double collision_rate = 0.0;    ///< CR
+  double collision_rate = 0.0;  ///< CR
   double psi = 0.0;
-  double collisions = 0.0;        ///< wall hits an episode
+  double collisions = 0.0;                    ///< wall hits an episode
   double human_collision_episode_rate = 0.0;  ///< episodes with any step counted by CR / episodes
   double steps = 0.0;
   double path_length = 0.0;

@@ -21,15 +21,15 @@ enum class SensorKind : std::uint8_t {
 
 /// A pinhole sensor fixed to the agent, with Habitat's conventions and defaults.
 struct SensorSpec {
-  std::string uuid = "rgb";                  ///< names the observation; unique
+  std::string uuid = "rgb";  ///< names the observation; unique
   SensorKind kind = SensorKind::rgb;
-  std::array<int, 2> resolution{256, 256};   ///< height, width in pixels
-  double hfov = 90.0;                        ///< horizontal field of view, degrees; square pixels
-  Vec3d position{0.0, 1.5, 0.0};             ///< from the agent's base, agent frame, metres
-  Vec3d orientation{};                       ///< Euler angles about X, then Y, then Z, radians
-  double near_plane = 0.01;                  ///< metres
-  double near_sigma = 1.0;                   ///< see Camera::near_sigma
-  double far_plane = 1000.0;                 ///< metres; depth beyond it is no return
+  std::array<int, 2> resolution{256, 256};  ///< height, width in pixels
+  double hfov = 90.0;                       ///< horizontal field of view, degrees; square pixels
+  Vec3d position{0.0, 1.5, 0.0};            ///< from the agent's base, agent frame, metres
+  Vec3d orientation{};                      ///< Euler angles about X, then Y, then Z, radians
+  double near_plane = 0.01;                 ///< metres
+  double near_sigma = 1.0;                  ///< see Camera::near_sigma
+  double far_plane = 1000.0;                ///< metres; depth beyond it is no return
 };
 
 /// An RGB and a depth sensor ("rgb", "depth") at one place: they share one render.

@@ -80,7 +80,8 @@ class Simulator {
           }
         });
     if (!world) return world.status();
-    Simulator sim(backend, std::move(*world), std::move(config), std::move(scene.assets), std::move(avatars));
+    Simulator sim(backend, std::move(*world), std::move(config), std::move(scene.assets),
+                  std::move(avatars));
     return sim;
   }
 
@@ -110,7 +111,8 @@ class Simulator {
       const Camera camera = sensor_camera(first, world_.agent().position, world_.agent().rotation());
       if (Status s = render_into(camera, g.outputs, g.frames); !s) return s;
       for (float& z : g.frames.median_depth) z = static_cast<double>(z) > first.far_plane ? 0.0f : z;
-      for (const std::size_t i : g.sensors) images_[i].data = image_of(config_.sensors[i].kind, g.frames);
+      for (const std::size_t i : g.sensors)
+        images_[i].data = image_of(config_.sensors[i].kind, g.frames);
     }
     obs.images = images_;
     return obs;
@@ -145,8 +147,11 @@ class Simulator {
 
   Simulator(B& backend, World world, SimulatorConfig config, std::vector<SceneAsset> assets,
             std::shared_ptr<const std::vector<AvatarActor>> avatars)
-      : world_(std::move(world)), config_(std::move(config)), assets_(std::move(assets)),
-        avatars_(std::move(avatars)), renderer_(backend) {
+      : world_(std::move(world)),
+        config_(std::move(config)),
+        assets_(std::move(assets)),
+        avatars_(std::move(avatars)),
+        renderer_(backend) {
     for (const SceneAsset& a : assets_) {
       arrays_.emplace_back(backend, *a.cloud);
       sets_.push_back(arrays_.back().set(a.world_from_asset));
@@ -162,8 +167,12 @@ class Simulator {
       if (group == nullptr) group = &groups_.emplace_back();
       group->sensors.push_back(i);
       group->outputs |= output_of(spec.kind);
-      images_.push_back({config_.sensors[i].uuid, spec.kind, spec.resolution[0], spec.resolution[1],
-                         spec.kind == SensorKind::rgb ? 3 : 1, {}});
+      images_.push_back({config_.sensors[i].uuid,
+                         spec.kind,
+                         spec.resolution[0],
+                         spec.resolution[1],
+                         spec.kind == SensorKind::rgb ? 3 : 1,
+                         {}});
     }
   }
 
@@ -171,7 +180,8 @@ class Simulator {
     const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, what); };
     if (scene.navmesh == nullptr) return bad("SimulatorScene.navmesh is null");
     for (std::size_t i = 0; i < scene.assets.size(); ++i) {
-      if (scene.assets[i].cloud == nullptr) return bad("SimulatorScene.assets[" + std::to_string(i) + "].cloud is null");
+      if (scene.assets[i].cloud == nullptr)
+        return bad("SimulatorScene.assets[" + std::to_string(i) + "].cloud is null");
     }
     if (Status s = validate(config.task); !s) return s;
     if (Status s = validate(config.render); !s) return s;

@@ -12,15 +12,15 @@ enum class Action : std::uint8_t { stop = 0, move_forward = 1, turn_left = 2, tu
 
 /// The agent's body and motion, and when an episode ends. Defaults are PointNav v1's.
 struct TaskConfig {
-  double agent_radius = 0.1;     ///< metres
-  double agent_height = 1.5;     ///< metres
-  double forward_step = 0.25;    ///< metres a move_forward
-  double turn_angle = 10.0;      ///< degrees a turn
-  bool allow_sliding = true;     ///< along walls and avatars; otherwise a move stops at the first
-  double control_period = 0.25;  ///< seconds an action takes: avatars walk on meanwhile
-  int max_steps = 500;           ///< actions, stop excluded, after which the episode is cut off
-  double success_distance = 0.2; ///< metres: stop nearer than this succeeds
-  double skin = 1e-4;            ///< metres that a stopped move keeps from an avatar
+  double agent_radius = 0.1;      ///< metres
+  double agent_height = 1.5;      ///< metres
+  double forward_step = 0.25;     ///< metres a move_forward
+  double turn_angle = 10.0;       ///< degrees a turn
+  bool allow_sliding = true;      ///< along walls and avatars; otherwise a move stops at the first
+  double control_period = 0.25;   ///< seconds an action takes: avatars walk on meanwhile
+  int max_steps = 500;            ///< actions, stop excluded, after which the episode is cut off
+  double success_distance = 0.2;  ///< metres: stop nearer than this succeeds
+  double skin = 1e-4;             ///< metres that a stopped move keeps from an avatar
 
   /// The settings of the PointNav v2 challenge that do not concern noise.
   static TaskConfig pointnav_v2() noexcept {

@@ -26,7 +26,7 @@ struct AgentPose {
 
 /// What one action did.
 struct StepInfo {
-  bool collided = false;         ///< a wall or an avatar stopped or turned the move
+  bool collided = false;  ///< a wall or an avatar stopped or turned the move
   bool wall_collision = false;
   bool capsule_blocked = false;  ///< an avatar stopped or turned the move
   bool avatar_contact = false;   ///< an avatar was touched, whoever's fault
