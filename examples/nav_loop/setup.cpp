@@ -98,7 +98,7 @@ Result<std::vector<gsnav::AvatarActor>> spawn_avatars(const Options& options,
     if (!best) return {Errc::nothing_navigable, "no place for an avatar"};
     gsnav::HumanoidOptions look = gsnav::random_person(static_cast<std::uint64_t>(i) + 1);
     const Rgb color = avatar_color(static_cast<std::size_t>(i));  // as in the map
-    look.top = {color.r, color.g, color.b};
+    look.top = Vec3d{color.r, color.g, color.b} * 0.72 + Vec3d{0.10, 0.10, 0.10};
     auto body = gsnav::try_make_humanoid(look);
     if (!body) return body.status();
     auto actor = gsnav::make_walker(std::make_shared<const gsnav::AvatarAsset>(std::move(*body)),

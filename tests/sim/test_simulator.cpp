@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "flat_world.hpp"
+#include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/sim/simulator.hpp"
 
@@ -150,6 +151,86 @@ TEST_CASE("impossible configurations name what is wrong") {
   CHECK(has(message([](auto&, auto& c) { c.sensors[0].position.x = std::nan(""); }), "position"));
   CHECK(has(message([](auto&, auto& c) { c.task.forward_step = 0; }), "forward_step"));
   CHECK(has(message([](auto&, auto& c) { c.render.tile_size = 7; }), "tile_size"));
+}
+
+namespace {
+
+/// Two people who walk to and fro across the living room.
+SimulatorScene peopled_scene() {
+  SimulatorScene s = flat_scene();
+  HumanoidOptions look;
+  look.gaussians = 3000;
+  const auto body = std::make_shared<const AvatarAsset>(make_humanoid(look));
+  s.avatars.push_back(make_walker(body, {{3.4, 0, 3.7}, {5.4, 0, 3.0}}).value());
+  s.avatars.push_back(make_walker(body, {{5.3, 0, 1.6}, {3.6, 0, 2.9}, {4.6, 0, 4.0}}).value());
+  return s;
+}
+
+}  // namespace
+
+TEST_CASE("people are seen, and move while the agent acts") {
+  SerialBackend backend;
+  auto empty = make_simulator(backend, flat_scene(), small_config()).value();
+  auto peopled = make_simulator(backend, peopled_scene(), small_config()).value();
+  PointNavEpisode e = to_kitchen();
+  e.start_position = {4.6, 0, 1.6};
+  e.start_rotation = yaw_rotation(3.14159265358979323846);
+  const auto differing = [](std::span<const float> a, std::span<const float> b) {
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) n += abs(a[i] - b[i]) > 0.02f ? 1 : 0;
+    return n;
+  };
+  const auto a = empty.reset(e).value(), b = peopled.reset(e).value();
+  CHECK(differing(a["depth"], b["depth"]) > 50);
+  CHECK(a.avatar_clearance == std::numeric_limits<double>::infinity());
+  CHECK(b.avatar_clearance < 2.0);
+  const std::vector<float> before(b["depth"].begin(), b["depth"].end());
+  const auto later = peopled.step(Action::turn_left).value();
+  CHECK(differing(later["depth"], before) > 50);
+}
+
+TEST_CASE("the same episode gives the same pictures, bit for bit") {
+  SerialBackend backend;
+  const auto run = [&](auto& sim) {
+    std::vector<float> trace;
+    Rng rng(3);
+    auto obs = sim.reset(to_kitchen()).value();
+    for (int i = 0; i < 12; ++i) {
+      obs = sim.step(static_cast<Action>(1 + rng.below(3))).value();
+      trace.insert(trace.end(), obs["rgb"].begin(), obs["rgb"].end());
+      trace.insert(trace.end(), obs["depth"].begin(), obs["depth"].end());
+      trace.push_back(static_cast<float>(sim.agent().position.x));
+    }
+    return trace;
+  };
+  auto a = make_simulator(backend, peopled_scene(), small_config()).value();
+  auto b = make_simulator(backend, peopled_scene(), small_config()).value();
+  const std::vector<float> first = run(a);
+  CHECK(run(b) == first);
+  CHECK(run(a) == first);
+}
+
+TEST_CASE("among walking people the agent never penetrates by its own doing") {
+  SerialBackend backend;
+  SimulatorConfig c = small_config();
+  c.rendering = false;
+  auto sim = make_simulator(backend, peopled_scene(), c).value();
+  Rng rng(21);
+  int contacts = 0;
+  for (int episode = 0; episode < 6; ++episode) {
+    PointNavEpisode e = to_kitchen();
+    e.start_time = 3.7 * episode;
+    double before = sim.reset(e)->avatar_clearance;
+    for (int i = 0; i < 100; ++i) {
+      const Observations obs =
+          sim.step(rng.below(4) == 0 ? Action::turn_left : Action::move_forward).value();
+      contacts += obs.avatar_contact ? 1 : 0;
+      if (!obs.pushed_into && before >= 0) CHECK(obs.avatar_clearance >= -1e-5);
+      const World& w = sim.world();
+      before = clearance(w.agent_state(), w.bodies(w.time(), w.time()).value(), w.time()).distance;
+    }
+  }
+  CHECK(contacts > 0);
 }
 
 TEST_CASE("bytes round and clamp") {
