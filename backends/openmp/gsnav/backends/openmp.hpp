@@ -2,14 +2,13 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdlib>
-#include <cstring>
 
 #if defined(_OPENMP)
 #include <omp.h>
 #endif
 
 #include "gsnav/core/backend.hpp"
+#include "gsnav/core/host_memory.hpp"
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/lbs.hpp"
 #include "gsnav/kernels/projection.hpp"
@@ -51,10 +50,8 @@ inline const LaneKernels& lane_kernels() noexcept { return lanes::native_kernels
 
 /// Runs on the processor's cores. float32 frames go through lane kernels; every other scalar through
 /// the generic ones. Results do not depend on the number of threads.
-class OpenMPBackend {
+class OpenMPBackend : public HostMemory {
  public:
-  using memory_space = HostSpace;
-
   /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS).
   explicit OpenMPBackend(int threads = 0) noexcept : threads_(threads) {
 #if defined(_OPENMP)
@@ -66,15 +63,6 @@ class OpenMPBackend {
 
   int threads() const noexcept { return threads_; }
   std::size_t concurrency() const noexcept { return static_cast<std::size_t>(threads_); }
-
-  void* allocate(std::size_t bytes, std::size_t align) noexcept {
-    return std::aligned_alloc(align, (bytes + align - 1) / align * align);
-  }
-  void deallocate(void* p, std::size_t) noexcept { std::free(p); }
-  void copy(void* dst, const void* src, std::size_t bytes, CopyKind) noexcept {
-    std::memcpy(dst, src, bytes);
-  }
-  void fill(void* p, unsigned char byte, std::size_t bytes) noexcept { std::memset(p, byte, bytes); }
 
   template <class F>
   void parallel_for(std::size_t n, const F& f) {

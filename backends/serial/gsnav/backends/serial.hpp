@@ -2,27 +2,16 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdlib>
-#include <cstring>
 
 #include "gsnav/core/backend.hpp"
+#include "gsnav/core/host_memory.hpp"
 
 namespace gsnav {
 
 /// Runs everything in order on the calling thread, by the generic kernels, in any scalar. In double it
 /// is the reference that every other backend is measured against.
-class SerialBackend {
+class SerialBackend : public HostMemory {
  public:
-  using memory_space = HostSpace;
-
-  void* allocate(std::size_t bytes, std::size_t align) noexcept {
-    return std::aligned_alloc(align, (bytes + align - 1) / align * align);
-  }
-  void deallocate(void* p, std::size_t) noexcept { std::free(p); }
-  void copy(void* dst, const void* src, std::size_t bytes, CopyKind) noexcept {
-    std::memcpy(dst, src, bytes);
-  }
-  void fill(void* p, unsigned char byte, std::size_t bytes) noexcept { std::memset(p, byte, bytes); }
   template <class F>
   void parallel_for(std::size_t n, const F& f) {
     for (std::size_t i = 0; i < n; ++i) f(i);
