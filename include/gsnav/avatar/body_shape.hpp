@@ -24,15 +24,21 @@ struct Lobe {
   std::uint16_t joint = 0;             ///< what moves it
   BodyPart part = BodyPart::skin;
 
-  /// Signed distance of p, to first order near the surface; metres, negative inside.
-  double distance(const Vec3d& p) const noexcept {
+  /// Signed distance of p, to first order near the surface; metres, negative inside. `normal` (not null)
+  /// gets the outward unit normal there.
+  double distance(const Vec3d& p, Vec3d* normal = nullptr) const noexcept {
     const Vec3d ab = b - a, ap = p - a;
     const double length2 = dot(ab, ab);
     const double t = length2 > 0 ? clamp(dot(ap, ab) / length2, 0.0, 1.0) : 0.0;
     const Vec3d r = lerp(radii_a, radii_b, t), v = axes * (ap - ab * t);
-    const Vec3d q{v.x / r.x, v.y / r.y, v.z / r.z};
-    const double k0 = norm(q), k1 = norm(Vec3d{q.x / r.x, q.y / r.y, q.z / r.z});
-    return k1 > 1e-9 ? k0 * (k0 - 1) / k1 : -min(min(r.x, r.y), r.z);
+    const Vec3d q{v.x / r.x, v.y / r.y, v.z / r.z}, g{q.x / r.x, q.y / r.y, q.z / r.z};
+    const double k0 = norm(q), k1 = norm(g);
+    if (!(k1 > 1e-9)) {
+      if (normal != nullptr) *normal = {0, 1, 0};
+      return -min(min(r.x, r.y), r.z);
+    }
+    if (normal != nullptr) *normal = transpose(axes) * (g * (1 / k1));
+    return k0 * (k0 - 1) / k1;
   }
 
   /// Radius of a ball around the middle of the segment that holds the lobe.
@@ -64,41 +70,37 @@ struct BodyShape {
     return out;
   }
 
-  /// Signed distance to the union of the lobes named by `among`.
-  double distance(const Vec3d& p, const std::vector<std::size_t>& among) const noexcept {
+  /// Signed distance to the union of the lobes named by `among`. `gradient` (not null) gets its
+  /// direction outwards, about of unit length.
+  double distance(const Vec3d& p, const std::vector<std::size_t>& among, Vec3d* gradient = nullptr) const noexcept {
     double d = 1e3;
+    Vec3d sum{0, 1, 0}, normal;
     for (const std::size_t k : among) {
-      const double e = lobes[k].distance(p), blend = lobes[k].blend;
+      const double e = lobes[k].distance(p, gradient != nullptr ? &normal : nullptr), blend = lobes[k].blend;
       const double h = max(blend - abs(d - e), 0.0) / blend;
+      const double other = e < d ? 1 - 0.5 * h : 0.5 * h;
+      if (gradient != nullptr) sum = lerp(sum, normal, other);
       d = min(d, e) - 0.25 * h * h * blend;
     }
-    return max(d, -p.y);
-  }
-
-  /// Outward gradient of `distance` by central differences.
-  Vec3d gradient(const Vec3d& p, const std::vector<std::size_t>& among) const noexcept {
-    constexpr double h = 2e-4;
-    Vec3d g;
-    for (int k = 0; k < 3; ++k) {
-      Vec3d lo = p, hi = p;
-      lo[k] -= h;
-      hi[k] += h;
-      g[k] = (distance(hi, among) - distance(lo, among)) / (2 * h);
+    if (-p.y > d) {
+      d = -p.y;
+      sum = {0, -1, 0};
     }
-    return g;
+    if (gradient != nullptr) *gradient = sum;
+    return d;
   }
 
-  /// Moves p onto the surface along the gradient; false where it does not get there.
-  bool project(Vec3d& p, const std::vector<std::size_t>& among) const noexcept {
-    for (int i = 0; i < 8; ++i) {
-      const double d = distance(p, among);
+  /// Moves p onto the surface along the gradient, which is left in `gradient`; false where it does not
+  /// get there.
+  bool project(Vec3d& p, const std::vector<std::size_t>& among, Vec3d& gradient) const noexcept {
+    for (int i = 0; i < 10; ++i) {
+      const double d = distance(p, among, &gradient);
       if (abs(d) < 1e-4) return true;
-      const Vec3d g = gradient(p, among);
-      const double g2 = dot(g, g);
-      if (!(g2 > 1e-3)) return false;
-      p -= g * (clamp(d / g2, -0.02, 0.02));
+      const double g2 = dot(gradient, gradient);
+      if (d < -0.03 || !(g2 > 1e-2)) return false;  // deep within another lobe
+      p -= gradient * clamp(d / g2, -0.02, 0.02);
     }
-    return abs(distance(p, among)) < 5e-4;
+    return false;
   }
 };
 

@@ -19,7 +19,7 @@ struct GaitOptions {
   double speed = 1.2;            ///< metres a second, chooses the stride where that is 0
   double stride = 0.0;           ///< metres from one step of a foot to its next; 0: by height and speed
   double duty = 0.62;            ///< share of the cycle that a foot is on the ground, (0.5, 0.75)
-  double arm_swing = 24.0;       ///< of the upper arm, each way
+  double arm_swing = 22.0;       ///< of the upper arm, each way
   double start_phase = 0.0;      ///< of the cycle at distance 0
 };
 
@@ -118,7 +118,7 @@ class WalkMotion final : public MotionSource {
       give(at(first + 3), about_x(f.pitch + f.toe));
 
       const double swing = 2.0 - s * options_.arm_swing * walking * c + 0.5 * breath * (1 - walking);
-      const double flex = 14.0 + walking * (14.0 + 0.5 * max(swing, -10.0));
+      const double flex = 13.0 + walking * (7.0 + 0.35 * max(swing, -12.0));
       const Quatd hang = about_z(s * hang_[side]);
       give(at(first + 4), chest * about_z(0.12 * s * hang_[side]));
       const Quatd upper = chest * about_x(swing) * hang;
@@ -173,7 +173,7 @@ class WalkMotion final : public MotionSource {
   void prepare() {
     const double height = rest(kHead).y / 0.894;  // the head's joint lies at the base of the skull
     stride_ = options_.stride > 0 ? options_.stride
-                                  : height * clamp(0.45 + 0.27 * options_.speed, 0.45, 0.95);
+                                  : height * clamp(0.43 + 0.27 * options_.speed, 0.45, 0.9);
     for (int side = 0; side < 2; ++side) {
       const int first = side == 0 ? kRightHip : kLeftHip;
       const Vec3d arm = rest(first + 6) - rest(first + 5);
@@ -195,7 +195,7 @@ class WalkMotion final : public MotionSource {
           stretch = max(stretch, solve(side, b, foot(side, phase, 1.0, 0.0)).stretch);
         }
       }
-      (stretch > 0.993 ? low : high) = drop;
+      (stretch > 0.998 ? low : high) = drop;
     }
     pelvis_drop_ = high;
   }
@@ -206,7 +206,7 @@ class WalkMotion final : public MotionSource {
     const double stand = 0.012;              // knees never lock
     b.roll = 3.0 * walking * std::cos(kTau * (phase - mid));
     b.rotation = about_y(6.0 * walking * std::cos(kTau * phase)) * about_z(b.roll) * about_x(-2.0 * walking);
-    const double bob = 0.016 * walking * std::cos(2 * kTau * (phase - mid));
+    const double bob = 0.020 * walking * std::cos(2 * kTau * (phase - mid + 0.03));
     b.pelvis = rest(kPelvis) + Vec3d{0.018 * walking * std::cos(kTau * (phase - mid)),
                                      bob - stand - walking * (drop - stand), 0};
     return b;
@@ -217,8 +217,9 @@ class WalkMotion final : public MotionSource {
   Foot stance(int side, double p, double walking) const {
     const double duty = options_.duty;
     Foot f;
-    f.pitch = walking * (18.0 * (1 - smooth(p / 0.09)) - 50.0 * smooth((p - 0.3) / (duty - 0.3)));
-    const double forward = walking * stride_ * (0.46 * duty - p);
+    const double rise = max((p - 0.36) / (duty - 0.36), 0.0);
+    f.pitch = walking * (20.0 * (1 - smooth(p / 0.10)) - 52.0 * rise * rise);
+    const double forward = walking * stride_ * (0.43 * duty - p);
     const int first = side == 0 ? kRightHip : kLeftHip;
     Vec3d ankle = rest(first + 2);
     ankle.x *= 1.0 - 0.25 * walking;  // feet go closer to the middle when walking
@@ -245,9 +246,10 @@ class WalkMotion final : public MotionSource {
     f.ankle = a.ankle * (2 * u3 - 3 * u2 + 1) + va * (u3 - 2 * u2 + u) + b.ankle * (3 * u2 - 2 * u3) +
               vb * (u3 - u2);
     const double bump = 16 * u2 * (1 - u) * (1 - u);
-    f.ankle.y += bump * (0.02 * walking + 0.05 * turning * (1 - walking));
-    f.pitch = a.pitch + (b.pitch - a.pitch) * smooth(u / 0.85);
-    f.toe = a.toe * (1 - smooth(u / 0.4));
+    f.ankle.y += bump * (0.045 * walking + 0.05 * turning * (1 - walking));
+    f.pitch = a.pitch * (2 * u3 - 3 * u2 + 1) + (a.pitch - a0.pitch) * span * (u3 - 2 * u2 + u) +
+              b.pitch * (3 * u2 - 2 * u3);
+    f.toe = max(-f.pitch, 0.0) * (1 - smooth(u / 0.7));
     return f;
   }
 

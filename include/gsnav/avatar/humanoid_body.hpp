@@ -90,7 +90,7 @@ class HumanoidBuilder {
                         37, 38, 21, 40, 41, 21, 43, 44, 21, 46, 47, 21, 49, 50, 21, 52, 53};
     skeleton.rest_local.resize(55);
     const auto put = [&](const std::string& name, const Vec3d& p) { at_[joint(name)] = p; };
-    put("pelvis", {0, 0.935, 0.005});
+    put("pelvis", {0, 0.945, 0.005});
     put("spine1", {0, 1.025, 0.02});
     put("spine2", {0, 1.135, 0.025});
     put("spine3", {0, 1.240, 0.02});
@@ -100,12 +100,12 @@ class HumanoidBuilder {
     const double w = options_.shoulders;
     for (const double s : {-1.0, 1.0}) {
       const std::string n = side(s);
-      put(n + "hip", {0.088 * s, 0.880, 0.005});
-      put(n + "knee", {0.098 * s, 0.480, -0.005});
+      put(n + "hip", {0.088 * s, 0.898, 0.005});
+      put(n + "knee", {0.098 * s, 0.485, -0.005});
       put(n + "ankle", {0.104 * s, 0.080, 0.030});
       put(n + "foot", {0.110 * s, 0.022, -0.095});
       put(n + "collar", {0.045 * s, 1.375, 0.012});
-      put(n + "shoulder", {0.172 * w * s, 1.385, 0.020});
+      put(n + "shoulder", {0.165 * w * s, 1.385, 0.020});
       put(n + "eye_smplhf", {0.031 * s, 1.588, -0.078});
       const Vec3d d = arm_direction(s), front{0, 0, -1}, under = palm(s);
       const Vec3d elbow = place(n + "shoulder") + d * 0.275 + Vec3d{0, 0, 0.008};
@@ -152,19 +152,19 @@ class HumanoidBuilder {
           r(0.080, 0.085, 0.075), r(0.080, 0.085, 0.075), 0.04);
     }
     add("spine1", BodyPart::top, {0, 0.985, 0.005}, {0, 1.05, 0.005}, r(0.147, 0.07, 0.102),
-        r(0.138, 0.08, 0.098), 0.04);
+        r(0.138, 0.08, 0.098), 0.02);
     add("spine2", BodyPart::top, {0, 1.10, 0.008}, {0, 1.17, 0.010}, {0.137 * g, 0.08, 0.100 * g},
-        {0.146 * g * w, 0.08, 0.106 * g}, 0.05);
+        {0.146 * g * w, 0.08, 0.106 * g}, 0.02);
     add("spine3", BodyPart::top, {0, 1.22, 0.010}, {0, 1.325, 0.015}, {0.150 * g * w, 0.09, 0.110 * g},
-        {0.150 * g * w, 0.085, 0.100 * g}, 0.05);
+        {0.150 * g * w, 0.085, 0.100 * g}, 0.02);
     for (const double s : {-1.0, 1.0}) {
       // Chest, and from the neck down to the shoulder.
       add("spine3", BodyPart::top, {0.065 * s, 1.285, -0.035}, {0.065 * s, 1.290, -0.035},
           r(0.070, 0.065, 0.062), r(0.070, 0.065, 0.062), 0.04);
       limb(side(s) + "collar", BodyPart::top, {0.04 * s, 1.375, 0.018}, {0.150 * w * s, 1.372, 0.020},
-           0.068 * g, 0.062 * g, 0.04);
-      limb(side(s) + "collar", BodyPart::top, {0.025 * s, 1.435, 0.028}, {0.125 * w * s, 1.398, 0.024}, 0.040,
-           0.040, 0.04);
+           0.062 * g, 0.055 * g, 0.03);
+      limb(side(s) + "collar", BodyPart::top, {0.025 * s, 1.435, 0.028}, {0.120 * w * s, 1.398, 0.024}, 0.036,
+           0.036, 0.03);
     }
   }
 
@@ -197,11 +197,11 @@ class HumanoidBuilder {
     const Vec3d shoulder = place(n + "shoulder"), elbow = place(n + "elbow"), wrist = place(n + "wrist");
     const Vec3d d = arm_direction(s), front{0, 0, -1};
     const BodyPart fore = options_.short_sleeves ? BodyPart::skin : BodyPart::top;
-    limb(n + "shoulder", BodyPart::top, shoulder, shoulder + d * 0.06, 0.060 * g, 0.056 * g, 0.04);
-    limb(n + "shoulder", BodyPart::top, shoulder + d * 0.03, elbow, 0.055 * g, 0.044 * g, 0.03);
-    limb(n + "elbow", fore, elbow, lerp(elbow, wrist, 0.35), 0.044 * g, 0.043 * g, 0.02);
+    limb(n + "shoulder", BodyPart::top, shoulder, shoulder + d * 0.06, 0.054 * g, 0.052 * g, 0.03);
+    limb(n + "shoulder", BodyPart::top, shoulder + d * 0.04, elbow, 0.051 * g, 0.042 * g, 0.008);
+    limb(n + "elbow", fore, elbow, lerp(elbow, wrist, 0.35), 0.042 * g, 0.041 * g, 0.008);
     limb(n + "elbow", fore, lerp(elbow, wrist, 0.3), lerp(elbow, wrist, fore == BodyPart::top ? 0.93 : 1.0),
-         0.043 * g, (fore == BodyPart::top ? 0.034 : 0.027) * g, 0.02);
+         0.041 * g, (fore == BodyPart::top ? 0.034 : 0.027) * g, 0.006);
     // Palm: wide along front, thin through.
     const Mat3d axes{{front, d, cross(front, d)}};
     add(n + "wrist", BodyPart::skin, wrist, wrist + d * 0.03, {0.027, 0.02, 0.021}, {0.034, 0.02, 0.017}, 0.015)
@@ -228,11 +228,11 @@ class HumanoidBuilder {
     const Vec3d hip = place(n + "hip"), knee = place(n + "knee"), ankle = place(n + "ankle");
     const BodyPart cloth = BodyPart::trousers;
     limb(n + "hip", cloth, hip + Vec3d{0, -0.03, 0.002}, lerp(hip, knee, 0.5), 0.084 * g, 0.074 * g, 0.03);
-    limb(n + "hip", cloth, lerp(hip, knee, 0.45), knee, 0.075 * g, 0.058 * g, 0.03);
-    limb(n + "knee", cloth, knee, lerp(knee, ankle, 0.3), 0.058 * g, 0.056 * g, 0.02);
+    limb(n + "hip", cloth, lerp(hip, knee, 0.45), knee, 0.075 * g, 0.057 * g, 0.008);
+    limb(n + "knee", cloth, knee, lerp(knee, ankle, 0.3), 0.056 * g, 0.054 * g, 0.008);
     limb(n + "knee", cloth, lerp(knee, ankle, 0.25) + Vec3d{0, 0, 0.012},
-         lerp(knee, ankle, 0.55) + Vec3d{0, 0, 0.008}, 0.056 * g, 0.050 * g, 0.03);
-    limb(n + "knee", cloth, lerp(knee, ankle, 0.5), lerp(knee, ankle, 0.86), 0.050 * g, 0.047 * g, 0.03);
+         lerp(knee, ankle, 0.55) + Vec3d{0, 0, 0.008}, 0.054 * g, 0.050 * g, 0.012);
+    limb(n + "knee", cloth, lerp(knee, ankle, 0.5), lerp(knee, ankle, 0.86), 0.050 * g, 0.047 * g, 0.008);
     const BodyPart shoe = BodyPart::shoes;
     const double x = ankle.x, out = 0.006 * s;
     limb(n + "ankle", shoe, {x, 0.060, 0.032}, {x, 0.105, 0.030}, 0.037, 0.036, 0.01);
