@@ -126,7 +126,8 @@ int main(int argc, char** argv) try {
   app.add_option("--scene", o.scene,
                  "scene to load: .ply, .sog, meta.json or its folder; a comma joins sibling tiles");
   app.add_option("--up", o.up, "axis of the scene that points up: x, y, z, -x, -y or -z")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(CLI::IsMember({"x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}));
   app.add_option("--avatars", o.avatars, "people walking about")
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
