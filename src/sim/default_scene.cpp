@@ -160,7 +160,7 @@ void study(Painter& p) {
 }  // namespace flat
 
 std::array<DefaultView, 4> default_scene_views() noexcept {
-  return {{{"living", {5.55, 1.5, 3.95}, {1.6, 0.95, 1.5}},
+  return {{{"living", {5.65, 1.5, 3.35}, {1.5, 0.95, 1.55}},
            {"kitchen", {6.5, 1.5, 4.1}, {8.9, 1.0, 1.0}},
            {"bedroom", {4.3, 1.5, 5.55}, {0.9, 0.75, 6.95}},
            {"study", {5.2, 1.5, 5.1}, {8.6, 0.95, 7.2}}}};
