@@ -89,7 +89,8 @@ class [[nodiscard]] Result {
     require();
     return *std::get_if<0>(&content_);
   }
-  T&& value() && {
+  /// By value, so that `for (auto& x : load().value())` does not outlive what it walks.
+  T value() && {
     require();
     return std::move(*std::get_if<0>(&content_));
   }
@@ -97,7 +98,7 @@ class [[nodiscard]] Result {
   const T* operator->() const { return &value(); }
   T& operator*() & { return value(); }
   const T& operator*() const& { return value(); }
-  T&& operator*() && { return std::move(*this).value(); }
+  T operator*() && { return std::move(*this).value(); }
 
  private:
   void require() const {
