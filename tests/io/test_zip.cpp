@@ -84,6 +84,8 @@ TEST_CASE("zip: sizes and offsets that lie") {
   check_fails(with([](auto& x) { x.size = 1100; }), Errc::invalid_file, "size promised");
   check_fails(with([](auto& x) { x.size = 0xfffffffe; }), Errc::invalid_file, "not believed");
   check_fails(with([](auto& x) { x.packed = 100; }), Errc::invalid_file, "size promised");
+  const auto longer = static_cast<std::uint32_t>(deflate_raw(e.content).size() + 4);
+  check_fails(with([&](auto& x) { x.packed = longer; }), Errc::invalid_file, "size promised");
   check_fails(with([](auto& x) { x.packed = 0xfffffffe; }), Errc::invalid_file, "not inside the file");
   check_fails(with([](auto& x) { x.offset = 7; }), Errc::invalid_file, "no local header");
   check_fails(with([](auto& x) { x.offset = 0xfffffffe; }), Errc::invalid_file, "no local header");
@@ -125,6 +127,16 @@ TEST_CASE("zip: directories that lie") {
     std::memcpy(out.data() + end + 10, &count, sizeof count);
     return out;
   };
+  // Lengths of the name, the extra field and the comment that run out of the directory.
+  const std::size_t record = end - (46 + 5 + 3 + 2);
+  for (const std::size_t field : {28u, 30u, 32u}) {
+    for (const int length : {9, 60000}) {
+      std::string out = archive;
+      const auto value = static_cast<std::uint16_t>(length);
+      std::memcpy(out.data() + record + field, &value, sizeof value);
+      check_fails(out, Errc::invalid_file, "entry 0 is cut off");
+    }
+  }
   check_fails(both(2), Errc::invalid_file, "entry 1 of 2");
   check_fails(both(65535), Errc::unsupported, "zip64");
   check_fails(with(8, std::uint16_t{7}), Errc::unsupported, "volumes");
