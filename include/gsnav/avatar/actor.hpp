@@ -109,9 +109,12 @@ class AvatarActor {
   Similarity placement(double t, LocalPose& pose) const {
     const double local = t - options_.time_begin;
     const TrajectorySample at = trajectory_->at(local);
-    motion_->pose({local, at.distance / options_.scale, at.turned, at.walking, at.turning}, pose);
+    const double scale = options_.scale;
+    motion_->pose({local, at.distance / scale, at.leg_begin / scale, at.leg_end / scale, at.turned, at.walking,
+                   at.turning},
+                  pose);
     // The path of a clip goes into the placement, so that joint matrices stay small numbers.
-    const Similarity base{axis_angle(Vec3d{0, 1, 0}, at.yaw), at.position, options_.scale};
+    const Similarity base{axis_angle(Vec3d{0, 1, 0}, at.yaw), at.position, scale};
     return {base.rotation, base * pose.root, base.scale};
   }
 

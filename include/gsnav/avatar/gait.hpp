@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,10 +27,12 @@ struct GaitOptions {
 /// A walk by joint angles for a skeleton with SMPL's names for the 22 body joints (Y up, facing -Z,
 /// standing upright in its bind pose; T and A poses both work, fingers are curled where there are any).
 ///
-/// The phase comes from the distance walked, and the feet from the phase: a foot on the ground moves back
-/// relative to the root exactly as fast as the root goes forward, rolling over heel and ball; hip, knee
-/// and ankle angles follow by two-bone inverse kinematics, so feet do not slide whatever the pelvis does.
-/// Timing after the usual division of the human gait cycle (62 % stance, heel off at a third).
+/// The phase comes from the distance walked and the feet from the phase: each footfall has a place on the
+/// path, where the foot stays while the root goes on, rolling over heel and ball. Hip, knee and ankle
+/// angles follow by two-bone inverse kinematics, so feet do not slide whatever the pelvis does. The
+/// first and last footfalls of a walk lie where the walker stood and will stand; strides between are
+/// shortened a little so that a whole number of steps fits. Timing after the usual division of the human
+/// gait cycle (62 % stance, heel off in its second half).
 class WalkMotion final : public MotionSource {
  public:
   /// Errors: invalid_argument naming the joint that is missing or the option.
@@ -72,16 +75,65 @@ class WalkMotion final : public MotionSource {
   const GaitOptions& options() const noexcept { return options_; }
 
   void pose(const MotionInput& input, LocalPose& out) const override {
-    // A round of two steps a stride walked, and one step for 60 degrees turned on the spot.
-    const double cycles = options_.start_phase + input.distance / stride_ + input.turned / 2.1;
-    // Steps stay long while the walker slows down, or the standing foot would slide.
+    Steps steps;
+    steps.stride = stride_;
+    const double length = input.leg_end - input.leg_begin;
+    if (is_finite(length) && length > 0) {
+      steps.stride = 2 * length / std::ceil(length / (0.5 * stride_));
+      steps.gone = input.distance - input.leg_begin;
+      steps.left = input.leg_end - input.distance;
+      // Off with the right foot in the air and the left one below the body.
+      steps.cycles = 0.5 + upright() + steps.gone / steps.stride;
+    } else {
+      steps.cycles = options_.start_phase + input.distance / stride_;
+    }
+    steps.turn_cycles = input.turned / 2.1;  // one step for 60 degrees
+    steps.turning = input.turning;
+    // The body sways fully already at half the speed: steps are as long as ever.
     const double slow = 1.0 - clamp(input.walking, 0.0, 1.0);
-    pose(cycles, 1.0 - slow * slow * slow, input.turning, input.time, out);
+    pose(steps, 1.0 - slow * slow * slow, input.time, out);
   }
 
-  /// The pose at `cycles` of the gait (0: right heel strikes, 0.5: left). `walking` in [0, 1] scales the
-  /// steps down to standing, `turning` lifts the feet in place, `time` (seconds) breathes.
-  void pose(double cycles, double walking, double turning, double time, LocalPose& out) const {
+  /// The pose at `cycles` of the gait in the middle of a walk (0: the right heel strikes, 0.5: the left).
+  /// `walking` 0 is standing, at any phase; `time` (seconds) breathes.
+  void pose(double cycles, double walking, double time, LocalPose& out) const {
+    Steps steps;
+    steps.cycles = cycles;
+    steps.stride = walking * stride_;
+    pose(steps, walking, time, out);
+  }
+
+ private:
+  static constexpr double kTau = 6.283185307179586;
+  static constexpr std::size_t kBodyJoints = 22;
+  enum : int { kPelvis, kSpine1, kSpine2, kSpine3, kNeck, kHead, kRightHip, kLeftHip = 14 };
+
+  struct Rest {
+    Quatd rotation;
+    Vec3d position;
+  };
+  struct Steps {
+    double cycles = 0, stride = 0;
+    double gone = std::numeric_limits<double>::infinity();  // metres since the last stop
+    double left = std::numeric_limits<double>::infinity();  // metres until the next
+    double turn_cycles = 0, turning = 0;
+  };
+  struct Body {
+    Vec3d pelvis;
+    Quatd rotation;
+    double roll;
+  };
+  struct Foot {
+    Vec3d ankle;
+    double pitch = 0, toe = 0;  // degrees, toe up positive
+  };
+  struct Leg {
+    Quatd thigh, shin;
+    double stretch;  // of the leg, 1: straight
+  };
+
+  void pose(const Steps& steps, double walking, double time, LocalPose& out) const {
+    const double cycles = steps.cycles;
     const double phase = cycles - std::floor(cycles);
     std::vector<Quatd> turn(parents_.size());  // of each joint from the bind pose, in the root frame
     const Body b = body(phase, walking, pelvis_drop_);
@@ -110,7 +162,7 @@ class WalkMotion final : public MotionSource {
     for (int side = 0; side < 2; ++side) {
       const double s = side == 0 ? 1.0 : -1.0;
       const int first = side == 0 ? kRightHip : kLeftHip;
-      const Foot f = foot(side, phase, walking, turning);
+      const Foot f = foot(side, steps, walking);
       const Leg leg = solve(side, b, f);
       give(at(first), leg.thigh);
       give(at(first + 1), leg.shin);
@@ -137,29 +189,6 @@ class WalkMotion final : public MotionSource {
     }
   }
 
- private:
-  static constexpr double kTau = 6.283185307179586;
-  static constexpr std::size_t kBodyJoints = 22;
-  enum : int { kPelvis, kSpine1, kSpine2, kSpine3, kNeck, kHead, kRightHip, kLeftHip = 14 };
-
-  struct Rest {
-    Quatd rotation;
-    Vec3d position;
-  };
-  struct Body {
-    Vec3d pelvis;
-    Quatd rotation;
-    double roll;
-  };
-  struct Foot {
-    Vec3d ankle;
-    double pitch = 0, toe = 0;  // degrees, toe up positive
-  };
-  struct Leg {
-    Quatd thigh, shin;
-    double stretch;  // of the leg, 1: straight
-  };
-
   std::size_t at(int joint) const noexcept { return joints_[static_cast<std::size_t>(joint)]; }
   Vec3d rest(int joint) const noexcept { return rest_globals_[at(joint)].position; }
   static Quatd about_x(double degrees) noexcept { return axis_angle(Vec3d{1, 0, 0}, degrees * kTau / 360); }
@@ -180,8 +209,9 @@ class WalkMotion final : public MotionSource {
       // From the bind pose to hanging 8 degrees away from the body.
       hang_[side] = -(82.0 - std::atan2(-arm.y, abs(arm.x)) * 360 / kTau);
       const Vec3d ankle = rest(first + 2), ball = rest(first + 3);
-      ball_[side] = {0, -ankle.y, ball.z - ankle.z};
-      heel_[side] = {0, -ankle.y, 0.35 * (ankle.z - ball.z)};
+      // Over the toes' joint, so that the toes stay flat on the floor; and over the heel's edge.
+      ball_[side] = {0, ball.y - ankle.y, ball.z - ankle.z};
+      heel_[side] = {0, -ankle.y, 0.40 * (ankle.z - ball.z)};
     }
     // The highest pelvis at which no leg has to be longer than it is.
     double low = 0.0, high = 0.25 * height;
@@ -192,7 +222,10 @@ class WalkMotion final : public MotionSource {
         const double phase = k / 64.0;
         const Body b = body(phase, 1.0, drop);
         for (int side = 0; side < 2; ++side) {
-          stretch = max(stretch, solve(side, b, foot(side, phase, 1.0, 0.0)).stretch);
+          Steps steps;
+          steps.cycles = phase;
+          steps.stride = stride_;
+          stretch = max(stretch, solve(side, b, foot(side, steps, 1.0)).stretch);
         }
       }
       (stretch > 0.998 ? low : high) = drop;
@@ -212,44 +245,59 @@ class WalkMotion final : public MotionSource {
     return b;
   }
 
-  // The ankle of a flat foot whose place on the ground, at phase p of its own cycle, is below the root
-  // when the leg stands upright; turned about heel or ball.
-  Foot stance(int side, double p, double walking) const {
-    const double duty = options_.duty;
-    Foot f;
-    const double rise = max((p - 0.36) / (duty - 0.36), 0.0);
-    f.pitch = walking * (20.0 * (1 - smooth(p / 0.10)) - 52.0 * rise * rise);
-    const double forward = walking * stride_ * (0.43 * duty - p);
-    const int first = side == 0 ? kRightHip : kLeftHip;
-    Vec3d ankle = rest(first + 2);
-    ankle.x *= 1.0 - 0.25 * walking;  // feet go closer to the middle when walking
-    ankle.z -= forward;
-    const Vec3d pivot = f.pitch > 0 ? heel_[side] : ball_[side];
-    f.ankle = ankle + pivot - rotate(about_x(f.pitch), pivot);
-    f.toe = max(-f.pitch, 0.0);
-    return f;
+  // Phase of its own cycle at which a foot is right below the root.
+  double upright() const noexcept { return 0.43 * options_.duty; }
+
+  // Pitch of a standing foot at phase p of its cycle, degrees: heel strikes, flat, heel rises.
+  double stance_pitch(double p, double walking) const noexcept {
+    const double rise = max((p - 0.36) / (options_.duty - 0.36), 0.0);
+    return walking * (20.0 * (1 - smooth(p / 0.10)) - 52.0 * rise * rise);
   }
 
-  Foot foot(int side, double phase, double walking, double turning) const {
-    double p = phase + (side == 0 ? 0.0 : 0.5);
+  // The ankle of a foot pitched about heel or toes, for a footfall `forward` of the root.
+  Vec3d ankle(int side, double forward, double pitch) const {
+    Vec3d a = rest((side == 0 ? kRightHip : kLeftHip) + 2);
+    a.x *= 0.85;
+    a.z -= forward;
+    const Vec3d pivot = pitch > 0 ? heel_[side] : ball_[side];
+    return a + pivot - rotate(about_x(pitch), pivot);
+  }
+
+  Foot foot(int side, const Steps& s, double walking) const {
+    double p = s.cycles + (side == 0 ? 0.0 : 0.5);
     p -= std::floor(p);
     const double duty = options_.duty;
-    if (p < duty) return stance(side, p, walking);
-    // Swing: from where the toes leave to where the heel will strike, leaving and arriving with the
-    // ground's velocity.
-    const double u = (p - duty) / (1 - duty), h = 1e-4, span = (1 - duty) / h;
-    const Foot a0 = stance(side, duty - h, walking), a = stance(side, duty, walking);
-    const Foot b = stance(side, 0.0, walking), b1 = stance(side, h, walking);
-    const Vec3d va = (a.ankle - a0.ankle) * span, vb = (b1.ankle - b.ankle) * span;
-    const double u2 = u * u, u3 = u2 * u;
+    // Of the footfall that is or was, and of the next: never before the start nor beyond the stop.
+    const double here = clamp(s.stride * (upright() - p), -s.gone, s.left);
+    const double next = clamp(s.stride * (upright() - p + 1), -s.gone, s.left);
     Foot f;
-    f.ankle = a.ankle * (2 * u3 - 3 * u2 + 1) + va * (u3 - 2 * u2 + u) + b.ankle * (3 * u2 - 2 * u3) +
-              vb * (u3 - u2);
-    const double bump = 16 * u2 * (1 - u) * (1 - u);
-    f.ankle.y += bump * (0.045 * walking + 0.05 * turning * (1 - walking));
-    f.pitch = a.pitch * (2 * u3 - 3 * u2 + 1) + (a.pitch - a0.pitch) * span * (u3 - 2 * u2 + u) +
-              b.pitch * (3 * u2 - 2 * u3);
-    f.toe = max(-f.pitch, 0.0) * (1 - smooth(u / 0.7));
+    if (p < duty) {
+      f.pitch = stance_pitch(p, walking);
+      f.ankle = ankle(side, here, f.pitch);
+      f.toe = max(-f.pitch, 0.0);
+    } else {
+      // Swing: from where the toes leave to where the heel will strike, with the feet's own velocity at
+      // both. After a start or before a stop a part of it has to do.
+      const double span = 1 - duty;
+      double from = 0.0, to = 1.0;
+      if (s.stride > 0) {
+        from = max(0.0, (p - s.gone / s.stride - duty) / span);
+        to = min(1.0, (p + s.left / s.stride - duty) / span);
+      }
+      const double u = to > from ? clamp(((p - duty) / span - from) / (to - from), 0.0, 1.0) : 1.0;
+      const double u2 = u * u, u3 = u2 * u, h = 1e-4;
+      const double h00 = 2 * u3 - 3 * u2 + 1, h01 = 1 - h00, h10 = u3 - 2 * u2 + u, h11 = u3 - u2;
+      const double off0 = stance_pitch(duty - h, walking), off = stance_pitch(duty, walking);
+      const double on = stance_pitch(0.0, walking), on1 = stance_pitch(h, walking);
+      const Vec3d va = (ankle(side, 0, off) - ankle(side, 0, off0)) * (span / h);
+      const Vec3d vb = (ankle(side, 0, on1) - ankle(side, 0, on)) * (span / h);
+      f.ankle = ankle(side, here, off) * h00 + va * h10 + ankle(side, next, on) * h01 + vb * h11;
+      f.ankle.y += 0.80 * u2 * (1 - u) * (1 - u) * walking;
+      f.pitch = off * h00 + (off - off0) * (span / h) * h10 + on * h01;
+      f.toe = max(-f.pitch, 0.0) * (1 - smooth(u));
+    }
+    const double turn = std::sin(kTau * (s.turn_cycles + 0.5 * side));
+    f.ankle.y += 0.04 * s.turning * max(turn, 0.0);
     return f;
   }
 

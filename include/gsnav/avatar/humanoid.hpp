@@ -94,12 +94,12 @@ inline Result<AvatarAsset> try_make_humanoid(const HumanoidOptions& options = {}
   GaitOptions gait;
   const Result<WalkMotion> walk = WalkMotion::create(asset.skeleton, gait);
   if (!walk) return walk.status();
-  walk->pose(0.3, 0.0, 0.0, 0.0, asset.idle);
+  walk->pose(0.3, 0.0, 0.0, asset.idle);
   asset.capsules = detail::humanoid_capsules(asset.skeleton, options.height / 1.70, options.build);
   std::vector<std::vector<Affine3<double>>> poses{asset.skeleton.rest_globals()};
   LocalPose pose;
   for (int k = 0; k <= 12; ++k) {
-    walk->pose(k / 12.0, k == 12 ? 0.0 : 1.0, 0.0, 0.0, pose);
+    walk->pose(k / 12.0, k == 12 ? 0.0 : 1.0, 0.0, pose);
     poses.emplace_back();
     forward_kinematics(asset.skeleton, pose, poses.back());
   }

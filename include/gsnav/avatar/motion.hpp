@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,9 +19,12 @@ namespace gsnav {
 struct MotionInput {
   double time = 0.0;      ///< seconds since the actor appeared
   double distance = 0.0;  ///< metres walked since then
+  /// Distances at which the present walk began and will end with a stop; infinite where there is none.
+  double leg_begin = -std::numeric_limits<double>::infinity();
+  double leg_end = std::numeric_limits<double>::infinity();
   double turned = 0.0;    ///< radians turned on the spot since then, counted up whatever the direction
   double walking = 0.0;   ///< speed as a share of the walking speed, [0, 1]
-  double turning = 0.0;   ///< 1 in the middle of a turn on the spot, else [0, 1)
+  double turning = 0.0;   ///< how much of a turn on the spot is going on, [0, 1]
 };
 
 /// Gives the joints' local transforms over time. Implementations are immutable: many actors on many

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +19,9 @@ struct TrajectorySample {
   Vec3d position{};
   double yaw = 0.0;       ///< radians, positive to the left
   double distance = 0.0;  ///< metres walked since time 0
+  /// Distances at which the present walk began and will end with a stop; infinite where there is none.
+  double leg_begin = -std::numeric_limits<double>::infinity();
+  double leg_end = std::numeric_limits<double>::infinity();
   double turned = 0.0;    ///< radians turned on the spot since time 0
   double walking = 0.0;   ///< speed as a share of the walking speed
   double turning = 0.0;   ///< how much of a turn on the spot is going on, [0, 1]
@@ -90,6 +94,8 @@ class WalkTrajectory final : public Trajectory {
     if (legs_.empty()) return standing_;
     TrajectorySample s = sample(t + options_.start), first = sample(options_.start);
     s.distance -= first.distance;
+    s.leg_begin -= first.distance;
+    s.leg_end -= first.distance;
     s.turned -= first.turned;
     return s;
   }
@@ -266,7 +272,12 @@ class WalkTrajectory final : public Trajectory {
     }
     out.position = place(leg, s);
     out.yaw = wrapped(out.yaw);
-    out.distance = leg.distance + s + rounds * length_;
+    const double begin = leg.distance + rounds * length_;
+    out.distance = begin + s;
+    if (!endless_) {
+      out.leg_begin = begin;
+      out.leg_end = begin + leg.length;
+    }
     return out;
   }
 
