@@ -38,7 +38,8 @@ class OutFile {
   /// Names the parent folder where that is what is missing.
   Status open(const std::filesystem::path& path);
   void write(const void* data, std::size_t size) {
-    failed_ = failed_ || std::fwrite(data, 1, size, file_) != size;
+    // fwrite must not be given a null pointer, not even for no bytes.
+    failed_ = failed_ || (size != 0 && std::fwrite(data, 1, size, file_) != size);
   }
   std::FILE* handle() noexcept { return file_; }
   Status close();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The benchmark flat: 300,000 Gaussians, four poses at 256x256, float32 against float64.
 #include <doctest/doctest.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -36,7 +37,8 @@ TEST_CASE("the benchmark flat at 300K") {
 #if !defined(GSNAV_BENCH_SCENE_GENERATOR)
   std::printf("SKIP: the generator of the benchmark flat is not there\n");
 #else
-  const std::filesystem::path dir = std::filesystem::temp_directory_path() / "gsnav_test_flat";
+  const std::filesystem::path dir = 
+      std::filesystem::temp_directory_path() / ("gsnav_test_flat_" + std::to_string(getpid()));
   std::filesystem::create_directories(dir);
   const std::string ply = (dir / "flat.ply").string(), cameras_path = (dir / "cameras.json").string();
   const std::string generator = GSNAV_BENCH_SCENE_GENERATOR;
