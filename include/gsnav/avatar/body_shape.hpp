@@ -28,18 +28,22 @@ struct Lobe {
   /// gets the outward unit normal there.
   double distance(const Vec3d& p, Vec3d* normal = nullptr) const noexcept {
     const Vec3d ab = b - a, ap = p - a;
-    const double length2 = dot(ab, ab);
-    const double t = length2 > 0 ? clamp(dot(ap, ab) / length2, 0.0, 1.0) : 0.0;
-    const Vec3d r = lerp(radii_a, radii_b, t), v = axes * (ap - ab * t);
+    const double length2 = product(ab, ab);
+    const double t = length2 > 0 ? clamp(product(ap, ab) / length2, 0.0, 1.0) : 0.0;
+    const Vec3d r = radii_a + (radii_b - radii_a) * t, off = ap - ab * t;
+    const Vec3d v{product(axes.row[0], off), product(axes.row[1], off), product(axes.row[2], off)};
     const Vec3d q{v.x / r.x, v.y / r.y, v.z / r.z}, g{q.x / r.x, q.y / r.y, q.z / r.z};
-    const double k0 = norm(q), k1 = norm(g);
+    const double k0 = sqrt(product(q, q)), k1 = sqrt(product(g, g));
     if (!(k1 > 1e-9)) {
       if (normal != nullptr) *normal = {0, 1, 0};
       return -min(min(r.x, r.y), r.z);
     }
-    if (normal != nullptr) *normal = transpose(axes) * (g * (1 / k1));
+    if (normal != nullptr) *normal = (axes.row[0] * g.x + axes.row[1] * g.y + axes.row[2] * g.z) * (1 / k1);
     return k0 * (k0 - 1) / k1;
   }
+
+  /// a . b without fma, which is a library call where the compiler may not assume one.
+  static double product(const Vec3d& x, const Vec3d& y) noexcept { return x.x * y.x + x.y * y.y + x.z * y.z; }
 
   /// Radius of a ball around the middle of the segment that holds the lobe.
   double reach() const noexcept {
@@ -54,16 +58,29 @@ struct Lobe {
   }
 };
 
+/// A ball that holds a lobe.
+struct LobeBall {
+  Vec3d center{};
+  double radius = 0;
+};
+
 /// A body as the smooth union of its lobes, in their order, cut off flat at the ground. The union is the
 /// quadratic polynomial smooth minimum (Quilez, "smooth minimum").
 struct BodyShape {
   std::vector<Lobe> lobes;
+  std::vector<LobeBall> balls;  ///< one a lobe, by `enclose`
+
+  /// To be called once the lobes are there.
+  void enclose() {
+    balls.clear();
+    for (const Lobe& l : lobes) balls.push_back({l.middle(), l.reach()});
+  }
 
   /// Indices of the lobes that can matter within `margin` metres of lobe `i`.
   std::vector<std::size_t> neighbours(std::size_t i, double margin) const {
     std::vector<std::size_t> out;
     for (std::size_t k = 0; k < lobes.size(); ++k) {
-      if (norm(lobes[k].middle() - lobes[i].middle()) < lobes[k].reach() + lobes[i].reach() + margin) {
+      if (norm(balls[k].center - balls[i].center) < balls[k].radius + balls[i].radius + margin) {
         out.push_back(k);
       }
     }
@@ -76,10 +93,15 @@ struct BodyShape {
     double d = 1e3;
     Vec3d sum{0, 1, 0}, normal;
     for (const std::size_t k : among) {
-      const double e = lobes[k].distance(p, gradient != nullptr ? &normal : nullptr), blend = lobes[k].blend;
+      const double blend = lobes[k].blend;
+      // Too far away to change anything.
+      const Vec3d apart = p - balls[k].center;
+      const double limit = balls[k].radius + blend + max(d, 0.0);
+      if (Lobe::product(apart, apart) > limit * limit) continue;
+      const double e = lobes[k].distance(p, gradient != nullptr ? &normal : nullptr);
       const double h = max(blend - abs(d - e), 0.0) / blend;
       const double other = e < d ? 1 - 0.5 * h : 0.5 * h;
-      if (gradient != nullptr) sum = lerp(sum, normal, other);
+      if (gradient != nullptr) sum = sum + (normal - sum) * other;
       d = min(d, e) - 0.25 * h * h * blend;
     }
     if (-p.y > d) {
@@ -96,7 +118,7 @@ struct BodyShape {
     for (int i = 0; i < 10; ++i) {
       const double d = distance(p, among, &gradient);
       if (abs(d) < 1e-4) return true;
-      const double g2 = dot(gradient, gradient);
+      const double g2 = Lobe::product(gradient, gradient);
       if (d < -0.03 || !(g2 > 1e-2)) return false;  // deep within another lobe
       p -= gradient * clamp(d / g2, -0.02, 0.02);
     }

@@ -66,6 +66,7 @@ class HumanoidBuilder {
       l.radii_b = l.radii_b * scale_;
       l.blend *= scale_;
     }
+    shape.enclose();
     for (std::size_t j = 0; j < 55; ++j) {
       const std::int32_t p = skeleton.parents[j];
       skeleton.rest_local[j].translation =

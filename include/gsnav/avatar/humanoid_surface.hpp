@@ -84,7 +84,7 @@ inline std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const Hu
     among.push_back(shape.neighbours(i, 0.04 * scale));
     sum.push_back(sum.back() + shape.lobes[i].area() * density[i] * density[i]);
   }
-  const int tries = 45 * o.gaussians;
+  const int tries = 30 * o.gaussians;
   for (int n = 0; n < tries; ++n) {
     const auto at = std::upper_bound(sum.begin(), sum.end(), rng.uniform() * sum.back());
     const std::size_t i = min(static_cast<std::size_t>(at - sum.begin()) - 1, shape.lobes.size() - 1);
@@ -142,7 +142,7 @@ class HumanoidPainter {
     switch (part(x, lobe)) {
       case BodyPart::skin: c = face(x); break;
       case BodyPart::hair:
-        c = o_.hair * (1.0 + 0.16 * std::sin(90 * x.x + 25 * std::sin(20 * x.y)));
+        c = o_.hair * (1.0 + 0.09 * std::sin(90 * x.x + 25 * std::sin(20 * x.y)));
         noise = 0.02;
         break;
       case BodyPart::top:

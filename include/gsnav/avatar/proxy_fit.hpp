@@ -60,7 +60,7 @@ inline std::vector<ProxyCapsule> bone_capsules(const Skeleton& skeleton, double 
 /// drawn in or out along the axis and the radius is the `percentile` of the distances in all poses.
 /// Capsules that get no Gaussian are dropped.
 inline void fit_capsules(AvatarAsset& asset, const std::vector<std::vector<Affine3<double>>>& poses,
-                         double percentile = 0.997) {
+                         double percentile = 0.99) {
   const std::vector<Affine3<double>> rest = asset.skeleton.rest_globals(), inverse = asset.skeleton.bind_inverses();
   std::vector<ProxyCapsule>& capsules = asset.capsules;
   std::vector<std::vector<std::size_t>> members(capsules.size());
