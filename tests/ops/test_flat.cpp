@@ -19,7 +19,7 @@ using namespace gsnav_test;
 namespace {
 
 /// Error in metres below which 99 % of the pixels with alpha over 0.9 lie.
-double depth_error_p99(const Frames<float>& f, const Frames<double>& reference) {
+[[maybe_unused]] double depth_error_p99(const Frames<float>& f, const Frames<double>& reference) {
   std::vector<double> errors;
   for (std::size_t p = 0; p < f.alpha.size(); ++p) {
     if (reference.alpha[p] > 0.9) {
