@@ -55,6 +55,10 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
     open_flags[b] = inside[0];
     open_count += inside[0] > 0 ? 1 : 0;
   }
+  // A small tile has fewer blocks than a pack has lanes: the lanes left over are closed.
+  for (int b = blocks; b % kWidth != 0; ++b) {
+    box_x0[b] = box_x1[b] = box_y0[b] = box_y1[b] = open_flags[b] = 0.0f;
+  }
 
   SplatGeometry<float> geometry[kBatch];
   SplatColor<float> colors[Color ? kBatch : 1];
