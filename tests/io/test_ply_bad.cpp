@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
+#include <sys/stat.h>
 
 #include "allocations.hpp"
 #include "gsnav/io/ply.hpp"
@@ -147,6 +148,9 @@ TEST_CASE("ply: what is no file, what is compressed") {
   CHECK(contains(io::load_ply(folder / "none.ply").message(), "none.ply"));
   CHECK(io::load_ply(folder.path()).code() == Errc::file_not_found);
   CHECK(io::load_ply("/dev/zero").code() == Errc::file_not_found);
+  // Nobody writes to the pipe: whoever opens it waits.
+  REQUIRE(::mkfifo((folder / "pipe.ply").c_str(), 0600) == 0);
+  CHECK(io::load_ply(folder / "pipe.ply").code() == Errc::file_not_found);
   for (const char* name :
        {"splats/statues/angel.compressed.ply", "splats/playcanvas/guitar.compressed.ply"}) {
     const std::string path = data_file(name);
