@@ -51,7 +51,7 @@ struct Projection {
   std::vector<SplatBounds> bounds;
   std::vector<std::uint32_t> keys, counts;
   std::vector<Vec3<float>> offsets_f{Vec3<float>{}};
-  std::vector<Vec3<S>> offsets{Vec3<S>{}};
+  std::vector<Vec3d> offsets{Vec3d{}};
   ProjectArgs<S> args;
 
   explicit Projection(const GaussianCloud& cloud) {
@@ -59,7 +59,9 @@ struct Projection {
     camera.set_hfov(256, 256, 90);
     const GaussianSet set = cloud.set();
     args.gaussians = set.gaussians;
-    args.camera = make_projection_camera<S>(camera, set, SortOrder::z_depth);
+    args.camera = make_projection_camera<S>(camera, set);
+    args.camera64 = make_projection_camera<double>(camera, set);
+    args.sh_degree = cloud.sh_degree;
     const std::size_t slots = args.chunk_count() * kProjectChunk;
     geometry.resize(slots);
     colors.resize(slots);
@@ -104,7 +106,8 @@ void project(benchmark::State& state) {
   SerialBackend().parallel_for(truth.args.chunk_count(), ProjectChunk<double>{truth.args});
   const auto mean = [](const auto& q) {
     return q.survivors([&](std::size_t i, std::vector<double>& out) {
-      out.push_back(static_cast<double>(q.geometry[i].mean_x));
+      const auto& g = q.geometry[i];
+      out.push_back(static_cast<double>(g.ref_x) - static_cast<double>(g.w1) / static_cast<double>(g.a));
     });
   };
   const auto color = [](const auto& q) {

@@ -50,17 +50,15 @@ TEST_CASE_TEMPLATE("N04 needles of 1e4 to 1 keep their determinant", S, float, d
   double worst = 0;
   for (int i = 0; i < 20000; ++i) {
     const double s_max = std::pow(10.0, rng.uniform(-1, 2));
-    ProjectionCamera<S> camera = make_projection_camera<S>(axis_camera(1024, 1000), GaussianSet{},
-                                                           SortOrder::z_depth);
+    ProjectionCamera<S> camera = make_projection_camera<S>(axis_camera(1024, 1000), GaussianSet{});
     Quatd qd{rng.normal(), rng.normal(), rng.normal(), rng.normal()};
     normalize(qd);
     const Quat<S> q = quat_cast<S>(qd);
     const Vec3<S> scales{S(s_max), S(s_max * 1e-4), S(s_max * 1e-4)};
     const Vec3<S> delta{S(rng.uniform(-3, 3)), S(rng.uniform(-3, 3)), S(rng.uniform(5, 10))};
-    CameraAxes<S> frame;
-    const auto p = project<S, float>(camera, delta, 5.0f, q, scales, S(0.9), frame);
+    const auto p = project<S, float>(camera, splat_axes(camera.rotation, delta, q, scales), 5.0f, S(0.9));
     // a b = kWhitenScale^2 / sqrt(det), so the determinant is what the triple says it is.
-    const long double product = static_cast<long double>(p.geometry.a) * p.geometry.b;
+    const long double product = static_cast<long double>(p.a) * p.b;
     const long double det = std::pow(static_cast<long double>(kWhitenScale), 4) / (product * product);
     // Reference from the same inputs in long double: A C - B^2 of the dilated covariance.
     const long double x = delta.x, y = delta.y, z = delta.z;

@@ -34,7 +34,7 @@ struct NoopFunctor {
 ///
 /// Members that are used where they exist, with a generic fallback where they do not:
 ///     rasterize_tiles(const RasterArgs<S>&)   blend all tiles (kernels/blend.hpp)
-///     project(const ProjectArgs<S>&)          project one set of Gaussians (kernels/projection.hpp)
+///     project(const ProjectArgs<S>&)          project one set of Gaussians (kernels/project_chunk.hpp)
 ///     count_tiles, scatter_tiles(const BinArgs<S>&)   bin (kernels/tiles.hpp)
 ///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)
 template <class B>

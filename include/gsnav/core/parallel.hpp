@@ -84,17 +84,18 @@ struct SortScratch {
   }
 };
 
-/// Sorts (key, value) pairs by key, stably; fewer than 2^32 of them. LSD radix, 11 bits a pass.
+/// Sorts (key, value) pairs by the lowest `bits` of the key (the others zero), stably; fewer than 2^32 of
+/// them. LSD radix, 11 bits a pass.
 template <Backend B>
 void sort_pairs(B& backend, Buffer<std::uint32_t, B>& keys, Buffer<std::uint32_t, B>& values,
-                SortScratch<B>& scratch) {
+                SortScratch<B>& scratch, int bits = 32) {
   const std::size_t n = keys.size();
   if (n < 2) return;
   const std::size_t blocks = n < 8192 ? 1 : concurrency_of(backend);
   scratch.keys.resize_discard(n);
   scratch.values.resize_discard(n);
   scratch.histogram.resize_discard(blocks * detail::kRadixSize);
-  for (int shift = 0; shift < 32; shift += detail::kRadixBits) {
+  for (int shift = 0; shift < bits; shift += detail::kRadixBits) {
     backend.parallel_for(
         blocks, detail::RadixHistogram{keys.view(), scratch.histogram.view(), blocks, shift});
     backend.parallel_for(1, detail::RadixOffsets{scratch.histogram.view(), blocks});

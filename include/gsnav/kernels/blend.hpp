@@ -30,6 +30,9 @@ struct BlendRules {
   S max_alpha{S(0.99)};
   S transmittance_min{S(1e-4)};  ///< a pixel is closed by the Gaussian that takes T below this
   S first_hit_tau{S(0.5)};
+  S log2_alpha_min{S(-7.9943534368588579)};  ///< log2 of the smallest alpha that is blended
+  S return_alpha{S(0)};          ///< expected depth has no return where alpha is not above this
+  bool exclusive_stop = false;   ///< the Gaussian that closes a pixel is not blended (Compat)
 };
 
 /// Which depth images a compiled blend loop serves; less is cheaper.
@@ -41,46 +44,75 @@ struct BlendState {
   L transmittance{scalar_of<L>(1)};
   L r{scalar_of<L>(0)}, g{scalar_of<L>(0)}, b{scalar_of<L>(0)};
   L median{scalar_of<L>(0)};
-  L accumulated{scalar_of<L>(0)}, first_hit{scalar_of<L>(0)};
+  /// sum w (z - z_ref), z_ref the first depth blended: a far wall's depths lose no digits to their size.
+  L accumulated{scalar_of<L>(0)}, z_ref{scalar_of<L>(0)};
+  L first_hit{scalar_of<L>(0)};
 };
 
-/// Blends one splat onto pixels. (dx, dy): pixel centre - mean2d; `row` = b dy. Pixels outside the
-/// footprint, and closed pixels, keep their state bit for bit. Returns the pixels that changed.
+/// The records of one splat that blending may read; null where no output needs them.
+template <class S>
+struct SplatRecords {
+  const SplatGeometry<S>* geometry;
+  const SplatColor<S>* color;
+  const SplatDepth<S>* depth;
+  const SplatPerspective<S>* perspective;
+};
+
+/// Blends one splat onto pixels. (px, py): pixel centres. Pixels outside the footprint, and closed
+/// pixels, keep their state bit for bit. Returns the pixels that changed. A pixel that an exclusive stop
+/// closed keeps its transmittance, negated.
 ///
-/// The exponent comparison |w|^2 <= s_max is alpha >= 1/255: the footprint does not depend on tiles.
-template <bool Color, DepthMode D, Exp2 M, class L, class S>
+/// The footprint is alpha >= 2^log2_alpha_min, decided by the exponent: it does not depend on tiles.
+template <bool Color, DepthMode D, Exp2 M, bool Perspective, class L, class S>
 GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& rules,
-                                const SplatGeometry<S>& g, const SplatColor<S>& color,
-                                const SplatDepth<S>* depth, L dx, L dy, L row) noexcept {
-  const L w1 = dx * L(g.a);
-  const L w2 = fma(dx, L(g.k), row);
-  const L s = fma(w2, w2, w1 * w1);
-  const auto hit = (s <= L(g.s_max)) && (state.transmittance >= L(rules.transmittance_min));
-  if (!any(hit)) return hit;
+                                const SplatRecords<S>& splat, L px, L py) noexcept {
+  const SplatGeometry<S>& g = *splat.geometry;
   const L zero(S(0));
-  const L alpha =
-      select(hit, min(exp2<M>(L(g.log2_opacity) - s), L(rules.max_alpha)), zero);
+  const L dx = px - L(g.ref_x), dy = py - L(g.ref_y);
+  const L w1 = fma(dx, L(g.a), L(g.w1));
+  const L w2 = fma(dx, L(g.k), fma(dy, L(g.b), L(g.w2)));
+  L s = fma(w2, w2, w1 * w1);
+  auto hit = state.transmittance >= L(rules.transmittance_min);
+  if constexpr (Perspective) {
+    const SplatPerspective<S>& v = *splat.perspective;
+    const L f = fma(dx, L(v.fx), fma(dy, L(v.fy), L(v.f0)));
+    s = s / fma(f, f, L(v.c) * s);
+    hit = hit && (f > zero);
+  }
+  const L exponent = L(g.log2_opacity) - s;
+  hit = hit && (exponent >= L(rules.log2_alpha_min));
+  if (!any(hit)) return hit;
+  L alpha = select(hit, min(exp2<M>(exponent), L(rules.max_alpha)), zero);
   const L before = state.transmittance;
+  L after = fma(-alpha, before, before);
+  if (rules.exclusive_stop) {
+    const auto closes = hit && (after < L(rules.transmittance_min));
+    alpha = select(closes, zero, alpha);
+    after = select(closes, before, after);
+    state.transmittance = select(closes, -before, after);
+  } else {
+    state.transmittance = after;
+  }
   const L weight = alpha * before;
-  const L after = fma(-alpha, before, before);
-  state.transmittance = after;
   if constexpr (Color) {
-    state.r = fma(weight, L(color.r), state.r);
-    state.g = fma(weight, L(color.g), state.g);
-    state.b = fma(weight, L(color.b), state.b);
+    const SplatColor<S>& c = *splat.color;
+    state.r = fma(weight, L(c.r), state.r);
+    state.g = fma(weight, L(c.g), state.g);
+    state.b = fma(weight, L(c.b), state.b);
   }
   if constexpr (D == DepthMode::median) {
     const L half(S(0.5));
     const auto crosses = (before > half) && (after <= half);
     if (any(crosses)) {
-      state.median = select(crosses, ray_depth(*depth, g.z, dx, dy), state.median);
+      state.median = select(crosses, ray_depth(*splat.depth, px, py), state.median);
     }
   }
   if constexpr (D == DepthMode::any) {
     const L half(S(0.5));
-    const L z = ray_depth(*depth, g.z, dx, dy);
+    const L z = ray_depth(*splat.depth, px, py);
     state.median = select((before > half) && (after <= half), z, state.median);
-    state.accumulated = fma(weight, z, state.accumulated);
+    state.z_ref = select((before >= L(S(1))) && (weight > zero), z, state.z_ref);
+    state.accumulated = fma(weight, z - state.z_ref, state.accumulated);
     const L open(S(1) - rules.first_hit_tau);
     state.first_hit = select((before > open) && (after <= open), z, state.first_hit);
   }
@@ -107,6 +139,7 @@ struct RasterArgs {
   View<const SplatGeometry<S>> geometry;
   View<const SplatColor<S>> colors;        ///< empty: no colour asked for
   View<const SplatDepth<S>> depths;        ///< empty: no depth asked for
+  View<const SplatPerspective<S>> perspectives;  ///< empty: Response::ewa
   BlendRules<S> rules;
   Vec3<S> background;
   Exp2 exp2_method = Exp2::degree6;
@@ -119,6 +152,11 @@ struct RasterArgs {
     }
     return images.median_depth != nullptr ? DepthMode::median : DepthMode::none;
   }
+  GSNAV_HD SplatRecords<S> records(std::size_t splat) const noexcept {
+    return {geometry.data + splat, colors.empty() ? nullptr : colors.data + splat,
+            depths.empty() ? nullptr : depths.data + splat,
+            perspectives.empty() ? nullptr : perspectives.data + splat};
+  }
 };
 
 /// Writes a finished pixel.
@@ -126,7 +164,7 @@ template <class S, DepthMode D>
 GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
                           const BlendState<S, D>& state) noexcept {
   const FrameImages<S>& out = args.images;
-  const S t = state.transmittance, alpha = S(1) - t;
+  const S t = abs(state.transmittance), alpha = S(1) - t;
   if (out.rgb != nullptr) {
     out.rgb[3 * pixel] = fma(t, args.background.x, state.r);
     out.rgb[3 * pixel + 1] = fma(t, args.background.y, state.g);
@@ -135,14 +173,17 @@ GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
   if (out.alpha != nullptr) out.alpha[pixel] = alpha;
   if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
   if (out.expected_depth != nullptr) {
-    out.expected_depth[pixel] = alpha > S(0) ? state.accumulated / alpha : S(0);
+    const bool returned = alpha > args.rules.return_alpha;
+    out.expected_depth[pixel] = returned ? state.accumulated / alpha + state.z_ref : S(0);
   }
-  if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = state.accumulated;
+  if (out.accumulated_depth != nullptr) {
+    out.accumulated_depth[pixel] = fma(alpha, state.z_ref, state.accumulated);
+  }
   if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
 }
 
 /// Blends one pixel: the generic fallback, one work item a pixel, on any backend and scalar.
-template <class S, bool Color, DepthMode D, Exp2 M>
+template <class S, bool Color, DepthMode D, Exp2 M, bool Perspective>
 struct RasterizePixel {
   RasterArgs<S> args;
 
@@ -154,28 +195,26 @@ struct RasterizePixel {
                              static_cast<std::size_t>(x / args.grid.tile_size);
     const S px = S(x) + S(0.5), py = S(y) + S(0.5);
     BlendState<S, D> state;
-    const SplatColor<S> none{};
     for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {
-      const std::uint32_t splat = args.tile_splats[i];
-      const SplatGeometry<S>& g = args.geometry[splat];
-      const S dy = py - g.mean_y;
-      blend_splat<Color, D, M>(state, args.rules, g, Color ? args.colors[splat] : none,
-                               D == DepthMode::none ? nullptr : &args.depths[splat], px - g.mean_x,
-                               dy, g.b * dy);
+      blend_splat<Color, D, M, Perspective>(state, args.rules, args.records(args.tile_splats[i]), px,
+                                            py);
       if (state.transmittance < args.rules.transmittance_min) break;
     }
     write_pixel(args, pixel, state);
   }
 };
 
-/// Calls f with compile-time <Color, DepthMode, Exp2> for what `args` asks for.
+/// Calls f with compile-time <Color, DepthMode, Exp2, Perspective> for what `args` asks for. The cubic
+/// exp2 serves Response::ewa only.
 template <class S, class F>
 void dispatch_raster(const RasterArgs<S>& args, const F& f) {
   const auto with_exp2 = [&]<bool C, DepthMode D>() {
-    if (std::is_same_v<S, float> && args.exp2_method == Exp2::degree3) {
-      f.template operator()<C, D, Exp2::degree3>();
+    if (!args.perspectives.empty()) {
+      f.template operator()<C, D, Exp2::degree6, true>();
+    } else if (std::is_same_v<S, float> && args.exp2_method == Exp2::degree3) {
+      f.template operator()<C, D, Exp2::degree3, false>();
     } else {
-      f.template operator()<C, D, Exp2::degree6>();
+      f.template operator()<C, D, Exp2::degree6, false>();
     }
   };
   const auto with_depth = [&]<bool C>() {

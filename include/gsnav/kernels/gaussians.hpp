@@ -40,6 +40,10 @@ struct GaussianView {
   /// Rotation each Gaussian has made since training (w, x, y, z), empty where none has: the view
   /// direction is turned back by it before SH is evaluated. Used for skinned sets of degree >= 1.
   View<const float> sh_rotations[4];
+  /// Shapes that are no rotated ellipsoids' (a skinned Gaussian's blended axes): [3 r + c] is row r,
+  /// column c of the factor M, Sigma = M M^T, asset frame, metres. They stand in for quats and scales,
+  /// which may then be empty; empty where those hold.
+  View<const float> axes[9];
 };
 
 /// One set of Gaussians in the world: a scene tile, an avatar, an object.

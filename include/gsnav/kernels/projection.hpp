@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
-
-#include "gsnav/kernels/camera.hpp"
-#include "gsnav/kernels/gaussians.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/kernels/projection_camera.hpp"
 #include "gsnav/kernels/splat.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/mat.hpp"
@@ -13,188 +9,240 @@
 
 namespace gsnav {
 
-/// What decides which Gaussian is in front.
-enum class SortOrder : std::uint8_t {
-  z_depth,          ///< depth of the centre along the view axis (INRIA)
-  camera_distance,  ///< distance of the centre from the camera (KHR_gaussian_splatting)
-};
-
-/// A camera as the projection of one set sees it: in the set's own frame, so that no Gaussian is
-/// transformed to place its asset in the world. With x_world = s R x + t, camera coordinates are
-/// s (W R)(x - c), c the camera's position in the asset's frame.
-template <class S>
-struct ProjectionCamera {
-  Mat3<S> rotation{};       ///< W R, asset axes to camera axes
-  Mat3<float> key_rotation{};  ///< the same in float: keys are float32 for every S
-  Vec3d position{};         ///< c, asset frame, double
-  S scale{1};               ///< s
-  float key_scale = 1;
-  S fx{}, fy{}, cx{}, cy{};
-  S u_min{}, u_max{}, v_min{}, v_max{};  ///< limits of x/z and y/z in the Jacobian
-  int width = 0, height = 0;
-  float near_plane = 0.2f;
-  S near_sigma{0};
-  S eps2d{S(0.3)};
-  bool mip = false;
-  SortOrder sort_order = SortOrder::z_depth;
-};
-
-/// Builds the ProjectionCamera of a set (host, in double, rounded once).
-template <class S>
-ProjectionCamera<S> make_projection_camera(const Camera& camera, const GaussianSet& set,
-                                           SortOrder sort_order) noexcept {
-  ProjectionCamera<S> p;
-  const Similarity& a = set.world_from_asset;
-  const Mat3d rotation = camera.viewmat.linear * rotation_matrix(a.rotation);
-  p.rotation = mat_cast<S>(rotation);
-  p.key_rotation = mat_cast<float>(rotation);
-  p.position = inverse(a) * camera.position();
-  p.scale = static_cast<S>(a.scale);
-  p.key_scale = static_cast<float>(a.scale);
-  p.fx = static_cast<S>(camera.fx);
-  p.fy = static_cast<S>(camera.fy);
-  p.cx = static_cast<S>(camera.cx);
-  p.cy = static_cast<S>(camera.cy);
-  const double tx = 0.3 * camera.width / (2 * camera.fx), ty = 0.3 * camera.height / (2 * camera.fy);
-  p.u_min = static_cast<S>(-(camera.cx / camera.fx + tx));
-  p.u_max = static_cast<S>((camera.width - camera.cx) / camera.fx + tx);
-  p.v_min = static_cast<S>(-(camera.cy / camera.fy + ty));
-  p.v_max = static_cast<S>((camera.height - camera.cy) / camera.fy + ty);
-  p.width = camera.width;
-  p.height = camera.height;
-  p.near_plane = static_cast<float>(camera.near_plane);
-  p.near_sigma = static_cast<S>(camera.near_sigma);
-  p.eps2d = static_cast<S>(set.eps2d);
-  p.mip = set.filter == Filter::mip;
-  p.sort_order = sort_order;
-  return p;
-}
-
 /// sqrt(log2(e) / 2): |w|^2 in the whitened coordinates of SplatGeometry is log2(e) q / 2.
 inline constexpr double kWhitenScale = 0.84932180028801904272;
-/// log2(255): the footprint is alpha >= 1/255.
-inline constexpr double kLog2Of255 = 7.9943534368588579;
 inline constexpr double kLn2 = 0.69314718055994530942;
+
+/// A Gaussian in camera axes: its mean, its factor M (Sigma = M M^T) and M's cofactors.
+template <class L>
+struct SplatAxes {
+  Vec3<L> position{};   ///< mean relative to the camera, asset units
+  Mat3<L> factor{};     ///< M: columns are the axes times their standard deviations, asset units
+  Mat3<L> cofactors{};  ///< columns c_i = m_j x m_k up to sign, asset units squared
+};
+
+/// From a unit quaternion and scales: the cofactors are products, exact to a rounding.
+/// `delta`: mean - camera position, asset frame.
+template <class L>
+GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
+                                 const Quat<L>& quat, const Vec3<L>& scales) noexcept {
+  const Mat3<L> r{{{L(rotation(0, 0)), L(rotation(0, 1)), L(rotation(0, 2))},
+                   {L(rotation(1, 0)), L(rotation(1, 1)), L(rotation(1, 2))},
+                   {L(rotation(2, 0)), L(rotation(2, 1)), L(rotation(2, 2))}}};
+  const Mat3<L> axes = r * rotation_matrix(quat);
+  const Vec3<L> areas{scales.y * scales.z, scales.z * scales.x, scales.x * scales.y};
+  SplatAxes<L> out;
+  out.position = r * delta;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<L>& a = axes.row[i];
+    out.factor.row[i] = {a.x * scales.x, a.y * scales.y, a.z * scales.z};
+    out.cofactors.row[i] = {a.x * areas.x, a.y * areas.y, a.z * areas.z};
+  }
+  return out;
+}
+
+/// From any factor in asset axes (a skinned Gaussian's blended axes need be neither orthogonal nor
+/// right-handed): cofactors by differences of products with one rounding.
+template <class L>
+GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
+                                 const Mat3<L>& factor) noexcept {
+  const Mat3<L> r{{{L(rotation(0, 0)), L(rotation(0, 1)), L(rotation(0, 2))},
+                   {L(rotation(1, 0)), L(rotation(1, 1)), L(rotation(1, 2))},
+                   {L(rotation(2, 0)), L(rotation(2, 1)), L(rotation(2, 2))}}};
+  SplatAxes<L> out;
+  out.position = r * delta;
+  out.factor = r * factor;
+  const Vec3<L> m0 = out.factor.column(0), m1 = out.factor.column(1), m2 = out.factor.column(2);
+  out.cofactors = transpose(Mat3<L>{{cross(m1, m2), cross(m2, m0), cross(m0, m1)}});
+  return out;
+}
 
 /// Result of `project`. `visible` holds where the footprint may reach the image; the rest is
 /// meaningful there only.
 template <class L>
 struct Projected {
   mask_of<L> visible{};
-  SplatGeometry<L> geometry{};
-  L half_width{}, half_height{};  ///< of the footprint, pixels, padded so that rounding only adds
+  L mean_x{}, mean_y{};            ///< pixels
+  L a{}, k{}, b{};                 ///< whitened triple about the mean (kernels/splat.hpp)
+  L log2_opacity{};
+  L s_max{};                       ///< |w|^2 at the edge of the footprint
+  L variance_x{}, variance_y{};    ///< diagonal of the 2D covariance, px^2
+  L center_x{}, center_y{};        ///< of the footprint's bounds: the mean, but under perspective
+  L half_width{}, half_height{};   ///< of the bounds, pixels, padded so that rounding only adds
+  L slope_x{}, slope_y{}, bend{};  ///< perspective: f = 1 + slope . d about the mean, and c
 };
 
-/// Camera-space axes of a Gaussian and what of them depth needs.
-template <class L>
-struct CameraAxes {
-  Vec3<L> position{};       ///< mean in camera axes, asset units
-  Mat3<L> axes{};           ///< columns: unit axes in camera space
-  Vec3<L> scales{};
-};
+namespace detail {
 
-/// EWA projection of Gaussians (Zwicker et al. 2001; Kerbl et al. 2023), one or a pack of them.
+/// Per-ray response of a Gaussian whose linearisation at the mean is whitened by (a, k, b).
 ///
-///  - The Jacobian is taken at the mean with x/z and y/z clamped to the camera's limits.
+/// Along the ray r = r_c + delta (r_c through the mean, third component 1) the maximum of the response
+/// of covariance S has exponent q = |mu x r|_S^2 / (r . adj(S) r). The numerator is the linearised q_e
+/// times D0 = r_c . adj(S) r_c; and by Sylvester's identity for the minors of adj(S),
+///     D0 (r . adj(S) r) = (r_c . adj(S) r)^2 + q_e D0 det(S) / z^2,
+/// so q = q_e / (f^2 + c q_e), f = r_c . adj(S) r / D0 linear in the pixel and c = det(S) / (z^2 D0):
+/// one division a pixel, no cancellation. S is Sigma dilated by h (z / f)^2 across the view axis, which
+/// is what h px^2 is at the mean's depth. Response::tangent_plane is c = 0 with S isotropic.
+template <class L, class S>
+GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes<L>& axes, L u, L v,
+                              Projected<L>& out) noexcept {
+  L slope_u, slope_v;
+  if (camera.response == Response::tangent_plane) {
+    const L inv = L(S(1)) / fma(u, u, fma(v, v, L(S(1))));
+    slope_u = u * inv;
+    slope_v = v * inv;
+    out.bend = L(S(0));
+  } else {
+    const Vec3<L>& mx = axes.factor.row[0];
+    const Vec3<L>& my = axes.factor.row[1];
+    const Vec3<L>& mz = axes.factor.row[2];
+    const Vec3<L>& cx = axes.cofactors.row[0];
+    const Vec3<L>& cy = axes.cofactors.row[1];
+    const L z = axes.position.z;
+    const L h(camera.eps2d);
+    const L ex = h * (z / L(camera.fx)) * (z / L(camera.fx));
+    const L ey = h * (z / L(camera.fy)) * (z / L(camera.fy));
+    const Vec3<L> area = fma(u, cx, fma(v, cy, axes.cofactors.row[2]));
+    const Vec3<L> across_x = fma(-u, mz, mx), across_y = fma(-v, mz, my);
+    const L d0 = fma(ex, ey, fma(ex, dot(across_y, across_y),
+                                 fma(ey, dot(across_x, across_x), dot(area, area))));
+    slope_u = fma(-ey, dot(mz, across_x), dot(cx, area)) / d0;
+    slope_v = fma(-ex, dot(mz, across_y), dot(cy, area)) / d0;
+    const L volume = dot(mx, cx);
+    const L det = fma(volume, volume,
+                      fma(ex, dot(cx, cx), fma(ey, dot(cy, cy), (ex * ey) * dot(mz, mz))));
+    out.bend = L(S(2 * kLn2)) * (det / ((z * z) * d0));
+  }
+  out.slope_x = slope_u / L(camera.fx);
+  out.slope_y = slope_v / L(camera.fy);
+
+  // The footprint |w| <= kappa f is a conic with a focus at the mean: an ellipse while e < 1.
+  const L one(S(1)), zero(S(0)), everywhere(S(1e30));
+  const L rest = one - out.bend * out.s_max;
+  const L kappa2 = out.s_max / rest;
+  const L m2 = out.slope_y / out.b;
+  const L m1 = (out.slope_x - out.k * m2) / out.a;
+  const L open = one - kappa2 * fma(m1, m1, m2 * m2);
+  // Closer to a parabola rounding decides its extent: the whole image bounds it.
+  const auto ellipse = (rest > zero) && (open > zero) && (rest * open > L(S(0.01)));
+  const L along_x = m1 / out.a, along_y = (m2 - out.k * along_x) / out.b;
+  const L reach_x = one / (out.a * out.a);
+  const L reach_y = out.variance_y * L(S(1.0 / (kWhitenScale * kWhitenScale)));
+  const L center_x = out.mean_x + kappa2 * along_x / open;
+  const L center_y = out.mean_y + kappa2 * along_y / open;
+  const L half_x = sqrt(kappa2 * fma(open, reach_x, kappa2 * along_x * along_x)) / open;
+  const L half_y = sqrt(kappa2 * fma(open, reach_y, kappa2 * along_y * along_y)) / open;
+  // What is taken from a difference may be off by its rounding: a thousandth is more.
+  const L pad(S(1.001)), pixel(S(0.01));
+  out.center_x = select(ellipse, center_x, zero);
+  out.center_y = select(ellipse, center_y, zero);
+  out.half_width = select(ellipse, fma(half_x, pad, pixel + abs(center_x) * L(S(1e-6))), everywhere);
+  out.half_height = select(ellipse, fma(half_y, pad, pixel + abs(center_y) * L(S(1e-6))), everywhere);
+}
+
+}  // namespace detail
+
+/// Projection of Gaussians (Zwicker et al. 2001; Kerbl et al. 2023), one or a pack of them.
+///
+///  - The Jacobian is taken at the mean; Response::ewa clamps its x/z and y/z to the camera's limits.
 ///  - det is built from products, never as AC - B^2 (Cauchy-Binet): det0 = (fx fy / z^2)^2 sum
-///    (s_j s_k r_i.(u, v, 1))^2 and det = det0 + h (|l1|^2 + |l2|^2) + h^2, so det > 0 always and its
-///    relative error stays near 1e-6 for needles of 1e4 : 1.
+///    (c_i.(u, v, 1))^2, c_i the cofactor columns, and det = det0 + h (|l1|^2 + |l2|^2) + h^2, so det > 0
+///    always and its relative error stays near 1e-6 for needles of 1e4 : 1.
 ///  - The inverse is kept as a Cholesky factor.
 ///
-/// `delta`: mean - camera position, asset frame. `key_z`: z of the centre in float32, metres, from
-/// `depth_key`. `opacity` in [0, 1].
+/// `key_z`: z of the centre in float32, metres, from `depth_key`. `opacity` in [0, 1].
 template <class L, class F>
-GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, const Vec3<L>& delta,
-                              F key_z, const Quat<L>& quat, const Vec3<L>& scales, L opacity,
-                              CameraAxes<L>& frame) noexcept {
+GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, const SplatAxes<L>& axes,
+                              F key_z, L opacity) noexcept {
   using S = scalar_of<L>;
   Projected<L> out;
-  SplatGeometry<L>& g = out.geometry;
-  const Mat3<L> rotation{{{L(camera.rotation(0, 0)), L(camera.rotation(0, 1)), L(camera.rotation(0, 2))},
-                          {L(camera.rotation(1, 0)), L(camera.rotation(1, 1)), L(camera.rotation(1, 2))},
-                          {L(camera.rotation(2, 0)), L(camera.rotation(2, 1)), L(camera.rotation(2, 2))}}};
-  const Vec3<L> t = rotation * delta;
-  const Mat3<L> axes = rotation * rotation_matrix(quat);
-  frame = {t, axes, scales};
+  const Vec3<L>& t = axes.position;
+  const Mat3<L>& m = axes.factor;
 
   const L inv_z = L(S(1)) / t.z;
   const L u = t.x * inv_z, v = t.y * inv_z;
-  g.mean_x = fma(L(camera.fx), u, L(camera.cx));
-  g.mean_y = fma(L(camera.fy), v, L(camera.cy));
-  g.z = t.z * L(camera.scale);
+  out.mean_x = fma(L(camera.fx), u, L(camera.cx));
+  out.mean_y = fma(L(camera.fy), v, L(camera.cy));
 
-  const L uj = clamp(u, L(camera.u_min), L(camera.u_max));
-  const L vj = clamp(v, L(camera.v_min), L(camera.v_max));
-  Vec3<L> m[3];  // rows of (camera axes) x (scales)
-  for (int i = 0; i < 3; ++i) {
-    m[i] = {axes.row[i].x * scales.x, axes.row[i].y * scales.y, axes.row[i].z * scales.z};
-  }
+  const bool ewa = camera.response == Response::ewa;
+  const L uj = ewa ? clamp(u, L(camera.u_min), L(camera.u_max)) : u;
+  const L vj = ewa ? clamp(v, L(camera.v_min), L(camera.v_max)) : v;
   const L fz_x = L(camera.fx) * inv_z, fz_y = L(camera.fy) * inv_z;
-  const Vec3<L> l1 = fma(-uj, m[2], m[0]) * fz_x;
-  const Vec3<L> l2 = fma(-vj, m[2], m[1]) * fz_y;
+  const Vec3<L> l1 = fma(-uj, m.row[2], m.row[0]) * fz_x;
+  const Vec3<L> l2 = fma(-vj, m.row[2], m.row[1]) * fz_y;
   const L a0 = dot(l1, l1), c0 = dot(l2, l2), b0 = dot(l1, l2);
-
-  // r_i . (u, v, 1) for the three axes, each weighted by the other two scales.
-  const Vec3<L> along = fma(uj, axes.row[0], fma(vj, axes.row[1], axes.row[2]));
-  const L fxfy = fz_x * fz_y;
-  const Vec3<L> area{fxfy * (scales.y * scales.z) * along.x, fxfy * (scales.z * scales.x) * along.y,
-                     fxfy * (scales.x * scales.y) * along.z};
+  const Vec3<L> area = fma(uj, axes.cofactors.row[0],
+                           fma(vj, axes.cofactors.row[1], axes.cofactors.row[2])) * (fz_x * fz_y);
   const L det0 = dot(area, area);
   const L h(camera.eps2d);
   const L det = fma(h, (a0 + c0) + h, det0);
   const L big_a = a0 + h, big_c = c0 + h;
+  out.variance_x = big_a;
+  out.variance_y = big_c;
 
   const L a_over_det = sqrt(big_a / det);
-  g.a = L(S(kWhitenScale)) / sqrt(big_a);
-  g.b = L(S(kWhitenScale)) * a_over_det;
-  g.k = -(b0 / big_a) * g.b;
+  out.a = L(S(kWhitenScale)) / sqrt(big_a);
+  out.b = L(S(kWhitenScale)) * a_over_det;
+  out.k = -(b0 / big_a) * out.b;
 
-  if (camera.mip) opacity = opacity * sqrt(det0 / det);
+  if (camera.mip) opacity = opacity * max(sqrt(det0 / det), L(camera.min_compensation));
   // The smallest normal number keeps log2 defined; such lanes fail s_max >= 0.
-  g.log2_opacity = log2(max(opacity, L(S(1.2e-38))));
-  g.s_max = g.log2_opacity + L(S(kLog2Of255));
+  out.log2_opacity = log2(max(opacity, L(S(1.2e-38))));
+  out.s_max = out.log2_opacity - L(camera.log2_alpha_min);
 
-  const L radius = sqrt(max(g.s_max, L(S(0))));
-  // In x the test's own rounding cannot pass w1^2; in y it may by the cancellation in k dx + b dy.
-  const L aspect = a_over_det * sqrt(big_c);
-  const L pad_x = fma(abs(g.mean_x), L(S(1e-6)), L(S(1e-3)));
-  const L pad_y = fma(abs(g.mean_y), L(S(1e-6)), L(S(1e-3)));
-  out.half_width = fma(radius / g.a, L(S(1.00001)), pad_x);
-  out.half_height = fma(radius * sqrt(big_c) * L(S(1.0 / kWhitenScale)),
-                        fma(aspect, L(S(5e-7)), L(S(1.00001))), pad_y);
+  if (ewa) {
+    const L radius = sqrt(max(out.s_max, L(S(0))));
+    // In x the test's own rounding cannot pass w1^2; in y it may by the cancellation in k dx + b dy.
+    const L aspect = a_over_det * sqrt(big_c);
+    const L pad_x = fma(abs(out.mean_x), L(S(1e-6)), L(S(1e-3)));
+    const L pad_y = fma(abs(out.mean_y), L(S(1e-6)), L(S(1e-3)));
+    out.center_x = out.mean_x;
+    out.center_y = out.mean_y;
+    out.half_width = fma(radius / out.a, L(S(1.00001)), pad_x);
+    out.half_height = fma(radius * sqrt(big_c) * L(S(1.0 / kWhitenScale)),
+                          fma(aspect, L(S(5e-7)), L(S(1.00001))), pad_y);
+  } else {
+    detail::add_perspective(camera, axes, u, v, out);
+  }
 
   const L huge(S(3e38));  // finite in float: an overflow is culled, never drawn as NaN
   const L half(S(0.5));
-  out.visible = (key_z > F(camera.near_plane)) && (g.s_max >= L(S(0))) && (det <= huge) &&
-                (big_a <= huge) && (g.mean_x + out.half_width >= half) &&
-                (g.mean_y + out.half_height >= half) &&
-                (g.mean_x - out.half_width <= L(S(camera.width)) - half) &&
-                (g.mean_y - out.half_height <= L(S(camera.height)) - half);
+  out.visible = (key_z > F(camera.near_plane)) && (out.s_max >= L(S(0))) && (det <= huge) &&
+                (big_a <= huge) && (abs(out.mean_x) <= huge) && (abs(out.mean_y) <= huge) &&
+                (out.center_x + out.half_width >= half) && (out.center_y + out.half_height >= half) &&
+                (out.center_x - out.half_width <= L(S(camera.width)) - half) &&
+                (out.center_y - out.half_height <= L(S(camera.height)) - half);
   if (camera.near_sigma > S(0)) {
-    out.visible = out.visible && (t.z > L(camera.near_sigma) * norm(m[2]));
+    out.visible = out.visible && (t.z > L(camera.near_sigma) * norm(m.row[2]));
   }
   return out;
 }
 
-/// The per-ray depth record of a projected Gaussian (kernels/depth.hpp).
+/// The per-ray depth record of a projected Gaussian (kernels/depth.hpp). Compat modes know the depth of
+/// the centre only.
 template <class S>
-GSNAV_HD SplatDepth<S> make_splat_depth(const ProjectionCamera<S>& camera, const CameraAxes<S>& f,
-                                        S s_max) noexcept {
+GSNAV_HD SplatDepth<S> make_splat_depth(const ProjectionCamera<S>& camera, const SplatAxes<S>& axes,
+                                        const Projected<S>& p) noexcept {
   SplatDepth<S> d;
-  // Scales relative to the largest, so that their products stay away from underflow.
-  const S largest = max(max(max(f.scales.x, f.scales.y), f.scales.z), S(1e-18));
-  const Vec3<S> s = f.scales * (S(1) / largest);
-  const S weight[3] = {s.y * s.z, s.z * s.x, s.x * s.y};
-  const S u = f.position.x / f.position.z, v = f.position.y / f.position.z;
+  d.mean_x = p.mean_x;
+  d.mean_y = p.mean_y;
+  d.z = axes.position.z * camera.scale;
+  if (camera.compat != Compat::none) return d;
+  // Cofactors relative to the largest entry, so that their products stay away from underflow.
+  S largest(0);
   for (int i = 0; i < 3; ++i) {
-    const Vec3<S> c = f.axes.column(i) * weight[i];
+    const Vec3<S>& c = axes.cofactors.row[i];
+    largest = max(largest, max(abs(c.x), max(abs(c.y), abs(c.z))));
+  }
+  const S unit = largest > S(1e-37) ? S(1) / largest : S(0);
+  const S u = axes.position.x / axes.position.z, v = axes.position.y / axes.position.z;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<S> c = axes.cofactors.column(i) * unit;
     d.g[i] = fma(u, c.x, fma(v, c.y, c.z));
     d.gx[i] = c.x / camera.fx;
     d.gy[i] = c.y / camera.fy;
   }
-  const Vec3<S> depth_row{f.axes.row[2].x * f.scales.x, f.axes.row[2].y * f.scales.y,
-                          f.axes.row[2].z * f.scales.z};
-  d.reach = sqrt(S(2 * kLn2) * s_max) * norm(depth_row) * camera.scale;
+  d.reach = sqrt(S(2 * kLn2) * p.s_max) * norm(axes.factor.row[2]) * camera.scale;
   return d;
 }
 
@@ -213,120 +261,5 @@ template <class F>
 GSNAV_HD F distance_key(float scale, const Vec3<F>& mean, const Vec3<F>& offset) noexcept {
   return norm(mean + offset) * F(scale);
 }
-
-/// How many consecutive Gaussians one work item projects. Its survivors lie together, in order.
-inline constexpr std::size_t kProjectChunk = 1024;
-
-/// Arguments of the projection of one set for one camera. Outputs have room for
-/// kProjectChunk records per chunk; chunk c of the set writes its survivors from
-/// (first_chunk + c) * kProjectChunk on and their number to counts[first_chunk + c].
-template <class S>
-struct ProjectArgs {
-  GaussianView gaussians;
-  ProjectionCamera<S> camera;
-  View<const Vec3<float>> offsets_f;  ///< float(origin - camera), one an origin
-  View<const Vec3<S>> offsets;        ///< the same in S
-  bool color = true;                  ///< evaluate SH (RGB asked for)
-  bool depth = true;                  ///< fill `depths`
-  std::size_t first_chunk = 0;
-  View<SplatGeometry<S>> geometry;
-  View<SplatColor<S>> colors;   ///< empty unless `color`
-  View<SplatDepth<S>> depths;   ///< empty unless `depth`
-  View<SplatBounds> bounds;
-  View<std::uint32_t> keys;     ///< bits of the float32 key (positive: they order like the floats)
-  View<std::uint32_t> counts;
-
-  GSNAV_HD std::size_t chunk_count() const noexcept {
-    return (gaussians.size + kProjectChunk - 1) / kProjectChunk;
-  }
-};
-
-/// Pixels whose centre lies within [center - half, center + half], clipped to [0, size): half-open.
-template <class S>
-GSNAV_HD void pixel_range(S center, S half, int size, std::int32_t& low, std::int32_t& high) noexcept {
-  const S first = clamp(center - half - S(0.5), S(-1), S(size));
-  const S last = clamp(center + half - S(0.5), S(-1), S(size));
-  low = static_cast<std::int32_t>(first);        // truncation: first >= -1 ...
-  if (S(low) < first) ++low;                     // ... made a ceiling
-  high = static_cast<std::int32_t>(last);
-  if (S(high) > last) --high;                    // floor
-  low = low < 0 ? 0 : low;
-  high = high >= size ? size : high + 1;
-}
-
-/// Colour of Gaussian i seen along `delta` (mean - camera, asset frame, any length).
-template <class S>
-GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, std::size_t i, Vec3<S> delta) noexcept {
-  if (gs.sh_degree > 0) {
-    const S n = norm(delta);
-    // A camera at the mean sees no direction; z stands in, so that the colour is finite.
-    delta = n > S(1e-12) ? delta * (S(1) / n) : Vec3<S>{S(0), S(0), S(1)};
-    if (!gs.sh_rotations[0].empty()) {
-      const Quat<S> q{S(gs.sh_rotations[0][i]), S(gs.sh_rotations[1][i]), S(gs.sh_rotations[2][i]),
-                      S(gs.sh_rotations[3][i])};
-      delta = rotate(conjugate(q), delta);
-    }
-  }
-  const float* sh0 = gs.sh0.data + 3 * i;
-  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
-  const float* shn = gs.shN.data + 3 * rest * i;
-  const Vec3<S> c = sh_color<S>(gs.sh_degree, delta, [=](int k) {
-    const float* p = k == 0 ? sh0 : shn + 3 * (k - 1);
-    return Vec3<S>{S(p[0]), S(p[1]), S(p[2])};
-  });
-  return {c.x, c.y, c.z, S(0)};
-}
-
-/// Writes one survivor. Returns false where no pixel centre lies in its bounds.
-template <class S>
-GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::size_t i, float key,
-                          const Projected<S>& p, const CameraAxes<S>& frame,
-                          const Vec3<S>& delta) noexcept {
-  SplatBounds b;
-  pixel_range(p.geometry.mean_x, p.half_width, args.camera.width, b.x0, b.x1);
-  pixel_range(p.geometry.mean_y, p.half_height, args.camera.height, b.y0, b.y1);
-  if (b.x0 >= b.x1 || b.y0 >= b.y1) return false;
-  args.geometry[slot] = p.geometry;
-  args.bounds[slot] = b;
-  args.keys[slot] = bits_of(key);
-  if (args.color) args.colors[slot] = gaussian_color<S>(args.gaussians, i, delta);
-  if (args.depth) args.depths[slot] = make_splat_depth(args.camera, frame, p.geometry.s_max);
-  return true;
-}
-
-/// Projects chunk `c` of a set, one Gaussian after the other.
-template <class S>
-struct ProjectChunk {
-  ProjectArgs<S> args;
-
-  GSNAV_HD void operator()(std::size_t c) const noexcept {
-    const GaussianView& gs = args.gaussians;
-    const std::size_t begin = c * kProjectChunk;
-    const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
-    const std::size_t base = (args.first_chunk + c) * kProjectChunk;
-    std::uint32_t written = 0;
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
-      const Vec3<float> mean{gs.means[0][i], gs.means[1][i], gs.means[2][i]};
-      const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean,
-                                args.offsets_f[origin]);
-      if (!(z > args.camera.near_plane)) continue;
-      const Vec3<S> delta = vec_cast<S>(mean) + args.offsets[origin];
-      Quat<S> quat{S(gs.quats[0][i]), S(gs.quats[1][i]), S(gs.quats[2][i]), S(gs.quats[3][i])};
-      // Rounded to float a unit quaternion is off by 6e-8: nothing in float, but not in a reference.
-      if constexpr (sizeof(S) > sizeof(float)) normalize(quat);
-      const Vec3<S> scales{S(gs.scales[0][i]), S(gs.scales[1][i]), S(gs.scales[2][i])};
-      CameraAxes<S> frame;
-      const Projected<S> p =
-          project<S, float>(args.camera, delta, z, quat, scales, S(gs.opacities[i]), frame);
-      if (!p.visible) continue;
-      const float key = args.camera.sort_order == SortOrder::z_depth
-                            ? z
-                            : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
-      if (write_splat(args, base + written, i, key, p, frame, delta)) ++written;
-    }
-    args.counts[args.first_chunk + c] = written;
-  }
-};
 
 }  // namespace gsnav

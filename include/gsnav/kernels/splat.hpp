@@ -7,16 +7,19 @@
 
 namespace gsnav {
 
-/// A projected Gaussian as blending reads it. With d = pixel centre - mean2d, the whitened offset is
-/// w = (a dx, k dx + b dy) and alpha = 2^(log2_opacity - |w|^2): the Cholesky factor of the inverse 2D
-/// covariance with sqrt(log2(e) / 2) folded in, so that the exponent cannot become positive.
+/// A projected Gaussian as blending reads it. With d = pixel centre - reference pixel, the whitened
+/// offset from the mean is w = (a dx + w1, k dx + b dy + w2) and alpha = 2^(log2_opacity - |w|^2): the
+/// Cholesky factor of the inverse 2D covariance with sqrt(log2(e) / 2) folded in, so that the exponent
+/// cannot become positive.
+///
+/// The reference pixel is the one that holds the mean, or the image's nearest to it: d is exact, and
+/// what a mean far outside the image costs in bits is paid once, in w1 and w2 (kernels/project_chunk.hpp).
 template <class S>
 struct SplatGeometry {
-  S mean_x{}, mean_y{};  ///< pixels
+  S ref_x{}, ref_y{};    ///< centre of the reference pixel (an integer + 0.5)
   S a{}, k{}, b{};       ///< whitened (Cholesky) triple
-  S s_max{};             ///< footprint: the pixels with |w|^2 <= s_max, where alpha >= 1/255
+  S w1{}, w2{};          ///< whitened offset of the reference pixel from the mean
   S log2_opacity{};      ///< log2 of the opacity after the filter's compensation
-  S z{};                 ///< depth of the centre, metres
 };
 
 /// Colour of a projected Gaussian, display-referred, >= 0.
@@ -29,9 +32,17 @@ struct SplatColor {
 /// ray through the mean (g) and its change per pixel in x and y.
 template <class S>
 struct SplatDepth {
+  S mean_x{}, mean_y{};  ///< pixels
+  S z{};                 ///< depth of the centre, metres
+  S reach{};             ///< largest |z - centre z|, metres: k sigma_z of the contract
   S g[3]{}, gx[3]{}, gy[3]{};
-  S reach{};  ///< largest |z - centre z|, metres: k sigma_z of the contract
-  S pad[2]{};
+};
+
+/// What turns the linearised response into one along each ray: with f = f0 + fx dx + fy dy, the exponent
+/// |w|^2 becomes |w|^2 / (f^2 + c |w|^2) where f > 0, and nothing where f <= 0 (behind the camera).
+template <class S>
+struct SplatPerspective {
+  S f0{}, fx{}, fy{}, c{};
 };
 
 /// Half-open pixel rectangle [x0, x1) x [y0, y1) that contains a footprint, clipped to the image.

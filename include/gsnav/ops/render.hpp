@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -12,7 +14,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/parallel.hpp"
 #include "gsnav/kernels/blend.hpp"
-#include "gsnav/kernels/projection.hpp"
+#include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/render_config.hpp"
 
@@ -29,14 +31,16 @@ struct RenderStats {
 template <class S, Backend B>
 struct RenderWorkspace {
   explicit RenderWorkspace(B& b)
-      : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), bounds(b), chunk_keys(b),
-        counts(b), keys(b), order(b), sort(b), cursors(b), tile_offsets(b), tile_splats(b) {}
+      : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
+        chunk_keys(b), counts(b), keys(b), order(b), sort(b), cursors(b), tile_offsets(b),
+        tile_splats(b) {}
 
   Buffer<Vec3<float>, B> offsets_f;
-  Buffer<Vec3<S>, B> offsets;
+  Buffer<Vec3d, B> offsets;
   Buffer<SplatGeometry<S>, B> geometry;
   Buffer<SplatColor<S>, B> colors;
   Buffer<SplatDepth<S>, B> depths;
+  Buffer<SplatPerspective<S>, B> perspectives;
   Buffer<SplatBounds, B> bounds;
   Buffer<std::uint32_t, B> chunk_keys, counts, keys, order;
   SortScratch<B> sort;
@@ -45,11 +49,12 @@ struct RenderWorkspace {
   std::vector<std::uint32_t> host_counts;
   std::vector<std::uint64_t> host_chunk_offsets;
   std::vector<Vec3<float>> host_offsets_f;
-  std::vector<Vec3<S>> host_offsets;
+  std::vector<Vec3d> host_offsets;
 
   std::size_t bytes() const noexcept {
     return offsets_f.capacity_bytes() + offsets.capacity_bytes() + geometry.capacity_bytes() +
-           colors.capacity_bytes() + depths.capacity_bytes() + bounds.capacity_bytes() +
+           colors.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
+           bounds.capacity_bytes() +
            chunk_keys.capacity_bytes() + counts.capacity_bytes() + keys.capacity_bytes() +
            order.capacity_bytes() + sort.bytes() + cursors.capacity_bytes() +
            tile_offsets.capacity_bytes() + tile_splats.capacity_bytes();
@@ -89,8 +94,8 @@ void rasterize(B& backend, const RasterArgs<S>& args) {
   } else {
     const std::size_t width = static_cast<std::size_t>(args.grid.width);
     const std::size_t height = static_cast<std::size_t>(args.grid.height);
-    dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M>() {
-      using Kernel = RasterizePixel<S, C, D, M>;
+    dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
+      using Kernel = RasterizePixel<S, C, D, M, P>;
       if constexpr (is_host_backend<B>) {
         backend.parallel_for(height, RasterizeRow<S, Kernel>{{args}, width});
       } else {
@@ -116,15 +121,21 @@ inline Status validate(const GaussianSet& set) {
   if (g.sh_degree < 0 || g.sh_degree > kMaxShDegree) {
     return bad("sh_degree = " + std::to_string(g.sh_degree) + ": must be in [0, 3]");
   }
+  const bool has_axes = !g.axes[0].empty();
+  for (int k = 0; k < 9 && has_axes; ++k) {
+    if (Status s = sized(g.axes[k], g.size, "axes"); !s) return s;
+  }
   for (int k = 0; k < 3; ++k) {
     if (Status s = sized(g.means[k], g.size, "means"); !s) return s;
+    if (has_axes) continue;
     if (Status s = sized(g.scales[k], g.size, "scales"); !s) return s;
   }
   for (int k = 0; k < 4; ++k) {
-    if (Status s = sized(g.quats[k], g.size, "quats"); !s) return s;
     if (!g.sh_rotations[k].empty()) {
       if (Status s = sized(g.sh_rotations[k], g.size, "sh_rotations"); !s) return s;
     }
+    if (has_axes) continue;
+    if (Status s = sized(g.quats[k], g.size, "quats"); !s) return s;
   }
   if (Status s = sized(g.opacities, g.size, "opacities"); !s) return s;
   if (Status s = sized(g.sh0, 3 * g.size, "sh0"); !s) return s;
@@ -177,18 +188,18 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.chunk_keys.resize_discard(slots);
   ws.colors.resize_discard(color ? slots : 0);
   ws.depths.resize_discard(depth ? slots : 0);
+  ws.perspectives.resize_discard(config.response != Response::ewa ? slots : 0);
   ws.counts.resize_discard(chunks);
 
-  std::vector<ProjectionCamera<S>> cameras;
-  cameras.reserve(sets.size());
+  const ProjectionRules rules = projection_rules(config);
   ws.host_offsets.clear();
   ws.host_offsets_f.clear();
   for (const GaussianSet& set : sets) {
-    cameras.push_back(make_projection_camera<S>(camera, set, config.sort_order));
+    const Vec3d eye = inverse(set.world_from_asset) * camera.position();
     const View<const Vec3d> table = set.gaussians.origins;
     for (std::size_t o = 0; o < (table.empty() ? 1 : table.size); ++o) {
-      const Vec3d offset = (table.empty() ? Vec3d{} : table[o]) - cameras.back().position;
-      ws.host_offsets.push_back(vec_cast<S>(offset));
+      const Vec3d offset = (table.empty() ? Vec3d{} : table[o]) - eye;
+      ws.host_offsets.push_back(offset);
       ws.host_offsets_f.push_back(vec_cast<float>(offset));
     }
   }
@@ -200,15 +211,18 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
     const std::size_t n = sets[i].gaussians.origins.empty() ? 1 : sets[i].gaussians.origins.size;
     ProjectArgs<S> args;
     args.gaussians = sets[i].gaussians;
-    args.camera = cameras[i];
+    args.camera = make_projection_camera<S>(camera, sets[i], rules);
+    args.camera64 = make_projection_camera<double>(camera, sets[i], rules);
     args.offsets = {ws.offsets.data() + first_origin, n};
     args.offsets_f = {ws.offsets_f.data() + first_origin, n};
+    args.sh_degree = std::min(sets[i].gaussians.sh_degree, config.max_sh_degree);
     args.color = color;
     args.depth = depth;
     args.first_chunk = first_chunk;
     args.geometry = ws.geometry.view();
     args.colors = ws.colors.view();
     args.depths = ws.depths.view();
+    args.perspectives = ws.perspectives.view();
     args.bounds = ws.bounds.view();
     args.keys = ws.chunk_keys.view();
     args.counts = ws.counts.view();
@@ -237,7 +251,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   backend.parallel_for(chunks, detail::GatherVisible{ws.chunk_keys.view(), ws.counts.view(),
                                                      ws.cursors.view(), ws.keys.view(),
                                                      ws.order.view()});
-  sort_pairs(backend, ws.keys, ws.order, ws.sort);
+  sort_pairs(backend, ws.keys, ws.order, ws.sort, config.key_bits);
 
   // ---- bin
   BinArgs<S> bin;
@@ -245,6 +259,8 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   bin.order = ws.order.view();
   bin.geometry = ws.geometry.view();
   bin.bounds = ws.bounds.view();
+  bin.log2_alpha_min = static_cast<S>(std::log2(config.alpha_min));
+  bin.elliptic = config.response == Response::ewa;
   bin.blocks = visible < 4096 ? 1 : concurrency_of(backend);
   ws.cursors.resize_discard(bin.blocks * bin.grid.count());
   ws.tile_offsets.resize_discard(bin.grid.count() + 1);
@@ -275,8 +291,8 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   raster.geometry = ws.geometry.view();
   raster.colors = ws.colors.view();
   raster.depths = ws.depths.view();
-  raster.rules = {static_cast<S>(config.max_alpha), static_cast<S>(config.transmittance_min),
-                  static_cast<S>(config.first_hit_tau)};
+  raster.perspectives = ws.perspectives.view();
+  raster.rules = blend_rules<S>(config);
   raster.background = vec_cast<S>(config.background);
   raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree6;
   raster.images = images;

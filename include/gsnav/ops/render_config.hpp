@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+#include <string>
+
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/camera.hpp"
@@ -20,7 +23,12 @@ struct RenderConfig {
   unsigned outputs = kRgb | kAlpha | kMedianDepth;
   Profile profile = Profile::exact;
   SortOrder sort_order = SortOrder::z_depth;
+  Response response = Response::ewa;
+  Compat compat = Compat::none;
   int tile_size = 16;                  ///< 8, 16 or 32; the image does not depend on it
+  int max_sh_degree = kMaxShDegree;    ///< in [0, 3]: bands above it are left out
+  int key_bits = 32;                   ///< in [8, 32]: how much of the sort key is compared
+  double alpha_min = 1.0 / 255;        ///< in (0, 1): a Gaussian is not blended where alpha is below
   double max_alpha = 0.99;             ///< in (0, 1]
   double transmittance_min = 1e-4;     ///< in [0, 1)
   double first_hit_tau = 0.5;          ///< in (0, 1): first-hit depth is where alpha reaches this
@@ -39,6 +47,21 @@ inline Status validate(const RenderConfig& c) {
   if (c.tile_size != 8 && c.tile_size != 16 && c.tile_size != 32) {
     return bad("tile_size", std::to_string(c.tile_size), "must be 8, 16 or 32");
   }
+  if (c.compat != Compat::none && c.tile_size == 32) {
+    return bad("tile_size", "32", "compat modes have tiles of 16 pixels: use 8 or 16");
+  }
+  if (c.compat != Compat::none && c.response != Response::ewa) {
+    return bad("response", std::to_string(static_cast<int>(c.response)), "compat modes know ewa only");
+  }
+  if (c.max_sh_degree < 0 || c.max_sh_degree > kMaxShDegree) {
+    return bad("max_sh_degree", std::to_string(c.max_sh_degree), "must be in [0, 3]");
+  }
+  if (c.key_bits < 8 || c.key_bits > 32) {
+    return bad("key_bits", std::to_string(c.key_bits), "must be in [8, 32]");
+  }
+  if (!(c.alpha_min > 0 && c.alpha_min < 1)) {
+    return bad("alpha_min", std::to_string(c.alpha_min), "must be in (0, 1)");
+  }
   if (!(c.max_alpha > 0 && c.max_alpha <= 1)) {
     return bad("max_alpha", std::to_string(c.max_alpha), "must be in (0, 1]");
   }
@@ -50,6 +73,26 @@ inline Status validate(const RenderConfig& c) {
   }
   if (!is_finite(c.background)) return bad("background", "not finite", "must be finite");
   return {};
+}
+
+/// The part of the rules that projection reads.
+inline ProjectionRules projection_rules(const RenderConfig& c) noexcept {
+  return {c.sort_order, c.response, c.compat, c.alpha_min, c.key_bits};
+}
+
+/// The part that blending reads, rounded to the scalar of the kernel.
+template <class S>
+BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
+  BlendRules<S> r;
+  r.max_alpha = static_cast<S>(c.max_alpha);
+  r.transmittance_min = static_cast<S>(c.transmittance_min);
+  r.first_hit_tau = static_cast<S>(c.first_hit_tau);
+  r.log2_alpha_min = static_cast<S>(std::log2(c.alpha_min));
+  r.exclusive_stop = c.compat != Compat::none;
+  // gsplat stops at T <= T_min where INRIA stops at T < T_min.
+  if (c.compat == Compat::gsplat) r.transmittance_min = std::nextafter(r.transmittance_min, S(1));
+  if (c.compat == Compat::habitat_gs) r.return_alpha = S(0.01);
+  return r;
 }
 
 /// Largest image side; tile counts and pixel offsets stay well inside their types.

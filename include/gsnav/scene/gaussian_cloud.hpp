@@ -13,7 +13,7 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/gaussians.hpp"
-#include "gsnav/kernels/projection.hpp"
+#include "gsnav/kernels/projection_camera.hpp"
 #include "gsnav/scene/load_report.hpp"
 
 namespace gsnav {

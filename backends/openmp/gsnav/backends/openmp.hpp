@@ -11,7 +11,7 @@
 #include "gsnav/core/host_memory.hpp"
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/lbs.hpp"
-#include "gsnav/kernels/projection.hpp"
+#include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
 #include "gsnav/kernels/lanes/kernels.hpp"

@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "gsnav/kernels/lanes/isa.hpp"
-#include "gsnav/kernels/projection.hpp"
+#include "gsnav/kernels/project_chunk.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
@@ -45,10 +45,19 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     const F z = depth_key(camera.key_rotation, camera.key_scale, mean, offset);
     if (!any(z > F(camera.near_plane))) continue;
     const Vec3<F> delta = mean + offset;
-    const Quat<F> quat{load(gs.quats[0]), load(gs.quats[1]), load(gs.quats[2]), load(gs.quats[3])};
-    const Vec3<F> scales{load(gs.scales[0]), load(gs.scales[1]), load(gs.scales[2])};
-    CameraAxes<F> frame;
-    const Projected<F> p = project<F, F>(camera, delta, z, quat, scales, load(gs.opacities), frame);
+    SplatAxes<F> axes;
+    if (gs.axes[0].empty()) {
+      const Quat<F> quat{load(gs.quats[0]), load(gs.quats[1]), load(gs.quats[2]), load(gs.quats[3])};
+      axes = splat_axes(camera.rotation, delta, quat,
+                        Vec3<F>{load(gs.scales[0]), load(gs.scales[1]), load(gs.scales[2])});
+    } else {
+      Mat3<F> factor;
+      for (int r = 0; r < 3; ++r) {
+        factor.row[r] = {load(gs.axes[3 * r]), load(gs.axes[3 * r + 1]), load(gs.axes[3 * r + 2])};
+      }
+      axes = splat_axes(camera.rotation, delta, factor);
+    }
+    const Projected<F> p = project<F, F>(camera, axes, z, load(gs.opacities));
     std::uint32_t bits = lane_bits(p.visible) & ((1u << count) - 1u);
     if (bits == 0) continue;
     const F key = camera.sort_order == SortOrder::z_depth
@@ -56,24 +65,40 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
                       : distance_key(camera.key_scale, mean, offset);
     for (; bits != 0; bits &= bits - 1) {
       const int lane = std::countr_zero(bits);
-      const SplatGeometry<F>& g = p.geometry;
       Projected<float> one;
       one.visible = true;
-      one.geometry = {g.mean_x[lane], g.mean_y[lane], g.a[lane],     g.k[lane],
-                      g.b[lane],      g.s_max[lane],  g.log2_opacity[lane], g.z[lane]};
+      one.mean_x = p.mean_x[lane];
+      one.mean_y = p.mean_y[lane];
+      one.a = p.a[lane];
+      one.k = p.k[lane];
+      one.b = p.b[lane];
+      one.log2_opacity = p.log2_opacity[lane];
+      one.s_max = p.s_max[lane];
+      one.variance_x = p.variance_x[lane];
+      one.variance_y = p.variance_y[lane];
+      one.center_x = p.center_x[lane];
+      one.center_y = p.center_y[lane];
       one.half_width = p.half_width[lane];
       one.half_height = p.half_height[lane];
-      CameraAxes<float> axes;
+      if (camera.response != Response::ewa) {
+        one.slope_x = p.slope_x[lane];
+        one.slope_y = p.slope_y[lane];
+        one.bend = p.bend[lane];
+      }
+      SplatAxes<float> own;
       if (args.depth) {
         for (int r = 0; r < 3; ++r) {
-          axes.axes.row[r] = {frame.axes.row[r].x[lane], frame.axes.row[r].y[lane],
-                              frame.axes.row[r].z[lane]};
+          const Vec3<F>& f = axes.factor.row[r];
+          const Vec3<F>& q = axes.cofactors.row[r];
+          own.factor.row[r] = {f.x[lane], f.y[lane], f.z[lane]};
+          own.cofactors.row[r] = {q.x[lane], q.y[lane], q.z[lane]};
         }
-        axes.position = {frame.position.x[lane], frame.position.y[lane], frame.position.z[lane]};
-        axes.scales = {scales.x[lane], scales.y[lane], scales.z[lane]};
+        own.position = {axes.position.x[lane], axes.position.y[lane], axes.position.z[lane]};
       }
-      const Vec3<float> d{delta.x[lane], delta.y[lane], delta.z[lane]};
-      if (write_splat(args, base + written, i + static_cast<std::size_t>(lane), key[lane], one, axes, d)) {
+      const std::size_t row = i + static_cast<std::size_t>(lane);
+      const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[row];
+      if (write_splat(args, base + written, row, key[lane], {mean.x[lane], mean.y[lane], mean.z[lane]},
+                      origin, one, own)) {
         ++written;
       }
     }

@@ -21,7 +21,7 @@ inline constexpr int kBatch = 128;
 /// found side by side; then each block runs through its own list with its state in registers. A closed
 /// block takes no more splats, and the tile ends when all are closed. Per pixel the order and the
 /// arithmetic are those of RasterizePixel: the same bits.
-template <bool Color, DepthMode D, Exp2 M>
+template <bool Color, DepthMode D, Exp2 M, bool Perspective>
 void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
   const TileGrid& grid = args.grid;
   const int ts = grid.tile_size;
@@ -62,10 +62,12 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
 
   SplatGeometry<float> geometry[kBatch];
   SplatColor<float> colors[Color ? kBatch : 1];
-  std::uint32_t ids[D == DepthMode::none ? 1 : kBatch];
+  constexpr bool kNeedsId = D != DepthMode::none || Perspective;
+  std::uint32_t ids[kNeedsId ? kBatch : 1];
   std::uint8_t lists[kMaxBlocks][kBatch];
   std::uint8_t counts[kMaxBlocks];
   const F closed_below(args.rules.transmittance_min);
+  const float log2_alpha_min = args.rules.log2_alpha_min;
 
   const std::uint64_t end = args.tile_offsets[tile + 1];
   for (std::uint64_t first = args.tile_offsets[tile]; first < end && open_count > 0; first += kBatch) {
@@ -82,12 +84,14 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
       const std::uint32_t splat = args.tile_splats[first + static_cast<std::uint64_t>(j)];
       geometry[j] = args.geometry[splat];
       if constexpr (Color) colors[j] = args.colors[splat];
-      if constexpr (D != DepthMode::none) ids[j] = splat;
+      if constexpr (kNeedsId) ids[j] = splat;
+      const FootprintBox<float> footprint(geometry[j], log2_alpha_min);
       for (int b = 0; b < blocks; b += kWidth) {
-        const auto reached = ellipse_touches_box<F, float>(geometry[j], F::load(box_x0 + b),
-                                                           F::load(box_x1 + b), F::load(box_y0 + b),
-                                                           F::load(box_y1 + b)) &&
-                             (F::load(open_flags + b) > F(0.0f));
+        auto reached = F::load(open_flags + b) > F(0.0f);
+        if constexpr (!Perspective) {  // under perspective the footprint is no ellipse
+          reached = reached && footprint.may_touch(F::load(box_x0 + b), F::load(box_x1 + b),
+                                                   F::load(box_y0 + b), F::load(box_y1 + b));
+        }
         for (std::uint32_t bits = lane_bits(reached); bits != 0; bits &= bits - 1) {
           const int at = b + std::countr_zero(bits);
           lists[at][counts[at]++] = static_cast<std::uint8_t>(j);
@@ -100,12 +104,11 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
       const F px = pixel_x[b], py = pixel_y[b];
       for (int i = 0; i < counts[b]; ++i) {
         const int j = lists[b][i];
-        const SplatGeometry<float>& g = geometry[j];
-        const F dy = py - F(g.mean_y);
-        const auto hit = blend_splat<Color, D, M>(
-            state, args.rules, g, colors[Color ? j : 0],
-            D == DepthMode::none ? nullptr : &args.depths[ids[D == DepthMode::none ? 0 : j]],
-            px - F(g.mean_x), dy, F(g.b) * dy);
+        const std::uint32_t id = ids[kNeedsId ? j : 0];
+        const SplatRecords<float> splat{&geometry[j], &colors[Color ? j : 0],
+                                        D == DepthMode::none ? nullptr : &args.depths[id],
+                                        Perspective ? &args.perspectives[id] : nullptr};
+        const auto hit = blend_splat<Color, D, M, Perspective>(state, args.rules, splat, px, py);
         if (any(hit) && !any(state.transmittance >= closed_below)) {
           open_flags[b] = 0.0f;
           --open_count;
@@ -129,6 +132,7 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
       one.b = s.b[l];
       one.median = s.median[l];
       one.accumulated = s.accumulated[l];
+      one.z_ref = s.z_ref[l];
       one.first_hit = s.first_hit[l];
       write_pixel(args,
                   static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
@@ -140,7 +144,9 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
 
 /// Blends one tile in the variant that `args` asks for.
 inline void rasterize_tile_any(const RasterArgs<float>& args, std::size_t tile) noexcept {
-  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M>() { rasterize_tile<C, D, M>(args, tile); });
+  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
+    rasterize_tile<C, D, M, P>(args, tile);
+  });
 }
 
 }  // namespace GSNAV_LANES_TAG

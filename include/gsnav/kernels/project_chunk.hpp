@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/core/view.hpp"
+#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/kernels/projection.hpp"
+#include "gsnav/kernels/sh.hpp"
+#include "gsnav/kernels/splat.hpp"
+
+namespace gsnav {
+
+/// How many consecutive Gaussians one work item projects. Its survivors lie together, in order.
+inline constexpr std::size_t kProjectChunk = 1024;
+
+/// Arguments of the projection of one set for one camera. Outputs have room for
+/// kProjectChunk records per chunk; chunk c of the set writes its survivors from
+/// (first_chunk + c) * kProjectChunk on and their number to counts[first_chunk + c].
+template <class S>
+struct ProjectArgs {
+  GaussianView gaussians;
+  ProjectionCamera<S> camera;
+  ProjectionCamera<double> camera64;  ///< for Gaussians whose geometry float cannot hold
+  View<const Vec3<float>> offsets_f;  ///< float(origin - camera), one an origin
+  View<const Vec3d> offsets;          ///< the same in double
+  int sh_degree = 0;                  ///< highest degree to evaluate, <= gaussians.sh_degree
+  bool color = true;                  ///< evaluate SH (RGB asked for)
+  bool depth = true;                  ///< fill `depths`
+  std::size_t first_chunk = 0;
+  View<SplatGeometry<S>> geometry;
+  View<SplatColor<S>> colors;   ///< empty unless `color`
+  View<SplatDepth<S>> depths;   ///< empty unless `depth`
+  View<SplatPerspective<S>> perspectives;  ///< empty for Response::ewa
+  View<SplatBounds> bounds;
+  View<std::uint32_t> keys;     ///< camera.key_code of the float32 key
+  View<std::uint32_t> counts;
+
+  GSNAV_HD std::size_t chunk_count() const noexcept {
+    return (gaussians.size + kProjectChunk - 1) / kProjectChunk;
+  }
+};
+
+namespace detail {
+
+/// mean - camera position, asset frame, in the scalar of the kernel.
+template <class S>
+GSNAV_HD Vec3<S> camera_delta(const ProjectArgs<S>& args, const Vec3<float>& mean,
+                              std::size_t origin) noexcept {
+  if constexpr (sizeof(S) == sizeof(float)) {
+    return mean + args.offsets_f[origin];
+  } else {
+    return vec_cast<S>(vec_cast<double>(mean) + args.offsets[origin]);
+  }
+}
+
+/// Pixels whose centre lies within [center - half, center + half], clipped to [0, size): half-open.
+template <class S>
+GSNAV_HD void pixel_range(S center, S half, int size, std::int32_t& low, std::int32_t& high) noexcept {
+  const S first = clamp(center - half - S(0.5), S(-1), S(size));
+  const S last = clamp(center + half - S(0.5), S(-1), S(size));
+  low = static_cast<std::int32_t>(first);        // truncation: first >= -1 ...
+  if (S(low) < first) ++low;                     // ... made a ceiling
+  high = static_cast<std::int32_t>(last);
+  if (S(high) > last) --high;                    // floor
+  low = low < 0 ? 0 : low;
+  high = high >= size ? size : high + 1;
+}
+
+/// The pixels of the 16-pixel tiles that [center - radius, center + radius] reaches, in a compat mode's
+/// own rounding: `slack` is what INRIA adds to the upper end (tile - 1 pixel) where gsplat rounds up.
+template <class S>
+GSNAV_HD void clip_to_tiles(S center, S radius, S slack, int size, std::int32_t& low,
+                            std::int32_t& high) noexcept {
+  constexpr int kTile = 16;
+  const S last_tile = S((size + kTile - 1) / kTile);
+  const S first = clamp((center - radius) * S(1.0 / kTile), S(0), last_tile);
+  const S last = clamp((center + radius + slack) * S(1.0 / kTile), S(0), last_tile);
+  std::int32_t end = static_cast<std::int32_t>(last);
+  if (slack == S(0) && S(end) < last) ++end;
+  const std::int32_t begin_px = static_cast<std::int32_t>(first) * kTile, end_px = end * kTile;
+  low = low > begin_px ? low : begin_px;
+  high = high < end_px ? high : end_px;
+}
+
+/// Whole number not below x >= 0.
+template <class S>
+GSNAV_HD S ceiling(S x) noexcept {
+  if (!(x < S(8388608))) return x;
+  const S whole = S(static_cast<std::int32_t>(x));
+  return whole < x ? whole + S(1) : whole;
+}
+
+/// Narrows bounds to the tiles that the renderer named by `compat` visits.
+template <class S>
+GSNAV_HD void narrow_to_compat(const ProjectionCamera<S>& camera, const Projected<S>& p,
+                               SplatBounds& b) noexcept {
+  const S scale2 = S(kWhitenScale * kWhitenScale);
+  if (camera.compat == Compat::gsplat) {
+    const S extent = min(S(3.33), sqrt(max(p.s_max, S(0))) * S(1 / kWhitenScale));
+    clip_to_tiles(p.mean_x, ceiling(extent * sqrt(p.variance_x)), S(0), camera.width, b.x0, b.x1);
+    clip_to_tiles(p.mean_y, ceiling(extent * sqrt(p.variance_y)), S(0), camera.height, b.y0, b.y1);
+    return;
+  }
+  // det = (scale^2 / (a b))^2; the larger eigenvalue by INRIA's formula with its floor of 0.1.
+  const S root_det = scale2 / (p.a * p.b);
+  const S mid = S(0.5) * (p.variance_x + p.variance_y);
+  const S radius = ceiling(S(3) * sqrt(mid + sqrt(max(S(0.1), fma(mid, mid, -(root_det * root_det))))));
+  clip_to_tiles(p.mean_x - S(0.5), radius, S(15), camera.width, b.x0, b.x1);
+  clip_to_tiles(p.mean_y - S(0.5), radius, S(15), camera.height, b.y0, b.y1);
+}
+
+/// Centre of the pixel of [0, size) that is nearest to x.
+template <class S>
+GSNAV_HD S reference_pixel(S x, int size) noexcept {
+  return S(static_cast<std::int32_t>(clamp(x, S(0), S(size - 1)))) + S(0.5);
+}
+
+/// Rounds what was computed in T (S, or double for the few that need it) to the records of slot.
+/// Returns false where no pixel centre lies in the bounds.
+template <class T, class S>
+GSNAV_HD bool store_splat(const ProjectArgs<S>& args, std::size_t slot,
+                          const ProjectionCamera<T>& camera, const Projected<T>& p,
+                          const SplatAxes<T>& axes) noexcept {
+  SplatBounds b;
+  pixel_range(p.center_x, p.half_width, camera.width, b.x0, b.x1);
+  pixel_range(p.center_y, p.half_height, camera.height, b.y0, b.y1);
+  if (camera.compat != Compat::none) narrow_to_compat(camera, p, b);
+  if (b.x0 >= b.x1 || b.y0 >= b.y1) return false;
+  args.bounds[slot] = b;
+
+  const T ref_x = reference_pixel(p.mean_x, camera.width);
+  const T ref_y = reference_pixel(p.mean_y, camera.height);
+  const T ox = ref_x - p.mean_x, oy = ref_y - p.mean_y;
+  SplatGeometry<S>& g = args.geometry[slot];
+  g.ref_x = static_cast<S>(ref_x);
+  g.ref_y = static_cast<S>(ref_y);
+  g.a = static_cast<S>(p.a);
+  g.k = static_cast<S>(p.k);
+  g.b = static_cast<S>(p.b);
+  g.w1 = static_cast<S>(p.a * ox);
+  g.w2 = static_cast<S>(fma(p.k, ox, p.b * oy));
+  g.log2_opacity = static_cast<S>(p.log2_opacity);
+  if (camera.response != Response::ewa) {
+    args.perspectives[slot] = {static_cast<S>(fma(p.slope_x, ox, fma(p.slope_y, oy, T(1)))),
+                               static_cast<S>(p.slope_x), static_cast<S>(p.slope_y),
+                               static_cast<S>(p.bend)};
+  }
+  if (args.depth) {
+    const SplatDepth<T> d = make_splat_depth(camera, axes, p);
+    SplatDepth<S>& out = args.depths[slot];
+    out.mean_x = static_cast<S>(d.mean_x);
+    out.mean_y = static_cast<S>(d.mean_y);
+    out.z = static_cast<S>(d.z);
+    out.reach = static_cast<S>(d.reach);
+    for (int i = 0; i < 3; ++i) {
+      out.g[i] = static_cast<S>(d.g[i]);
+      out.gx[i] = static_cast<S>(d.gx[i]);
+      out.gy[i] = static_cast<S>(d.gy[i]);
+    }
+  }
+  return true;
+}
+
+/// Whether the whitened form loses too much in float: k dx + b dy cancels over a long needle's visible
+/// length, or between a far mean and the image.
+template <class S>
+GSNAV_HD bool needs_double(const ProjectionCamera<S>& camera, const Projected<S>& p) noexcept {
+  const S ox = reference_pixel(p.mean_x, camera.width) - p.mean_x;
+  const S oy = reference_pixel(p.mean_y, camera.height) - p.mean_y;
+  const S length_x = min(p.half_width, S(camera.width)), length_y = min(p.half_height, S(camera.height));
+  return fma(abs(p.k), length_x, p.b * length_y) > S(512) ||
+         fma(abs(p.k), abs(ox), p.b * abs(oy)) > S(16);
+}
+
+/// Row i of the set's shape in camera axes.
+template <class S>
+GSNAV_HD SplatAxes<S> load_axes(const GaussianView& gs, const ProjectionCamera<S>& camera,
+                                const Vec3<S>& delta, std::size_t i) noexcept {
+  if (!gs.axes[0].empty()) {
+    Mat3<S> factor;
+    for (int r = 0; r < 3; ++r) {
+      factor.row[r] = {S(gs.axes[3 * r][i]), S(gs.axes[3 * r + 1][i]), S(gs.axes[3 * r + 2][i])};
+    }
+    return splat_axes(camera.rotation, delta, factor);
+  }
+  Quat<S> quat{S(gs.quats[0][i]), S(gs.quats[1][i]), S(gs.quats[2][i]), S(gs.quats[3][i])};
+  // Rounded to float a unit quaternion is off by 6e-8: nothing in float, but not in a reference.
+  if constexpr (sizeof(S) > sizeof(float)) normalize(quat);
+  return splat_axes(camera.rotation, delta, quat,
+                    Vec3<S>{S(gs.scales[0][i]), S(gs.scales[1][i]), S(gs.scales[2][i])});
+}
+
+}  // namespace detail
+
+/// Colour of Gaussian i seen along `delta` (mean - camera, asset frame, any length), SH to `degree`.
+template <class S>
+GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::size_t i,
+                                      Vec3<S> delta) noexcept {
+  if (degree > 0) {
+    const S n = norm(delta);
+    // A camera at the mean sees no direction; z stands in, so that the colour is finite.
+    delta = n > S(1e-12) ? delta * (S(1) / n) : Vec3<S>{S(0), S(0), S(1)};
+    if (!gs.sh_rotations[0].empty()) {
+      const Quat<S> q{S(gs.sh_rotations[0][i]), S(gs.sh_rotations[1][i]), S(gs.sh_rotations[2][i]),
+                      S(gs.sh_rotations[3][i])};
+      delta = rotate(conjugate(q), delta);
+    }
+  }
+  const float* sh0 = gs.sh0.data + 3 * i;
+  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
+  const float* shn = gs.shN.data + 3 * rest * i;
+  const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) {
+    const float* p = k == 0 ? sh0 : shn + 3 * (k - 1);
+    return Vec3<S>{S(p[0]), S(p[1]), S(p[2])};
+  });
+  return {c.x, c.y, c.z, S(0)};
+}
+
+/// Writes survivor i, whose mean is `mean` (stored offset), to `slot`. Returns false where no pixel
+/// centre lies in its bounds.
+template <class S>
+GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::size_t i, float key,
+                          const Vec3<float>& mean, std::size_t origin, const Projected<S>& p,
+                          const SplatAxes<S>& axes) noexcept {
+  const GaussianView& gs = args.gaussians;
+  bool written;
+  if (sizeof(S) == sizeof(float) && detail::needs_double(args.camera, p)) {
+    const Vec3d delta = vec_cast<double>(mean) + args.offsets[origin];
+    const SplatAxes<double> axes64 = detail::load_axes(gs, args.camera64, delta, i);
+    const Projected<double> p64 =
+        project<double, float>(args.camera64, axes64, key, static_cast<double>(gs.opacities[i]));
+    written = detail::store_splat(args, slot, args.camera64, p64, axes64);
+  } else {
+    written = detail::store_splat(args, slot, args.camera, p, axes);
+  }
+  if (!written) return false;
+  args.keys[slot] = args.camera.key_code(key);
+  if (args.color) {
+    args.colors[slot] =
+        gaussian_color<S>(gs, args.sh_degree, i, detail::camera_delta(args, mean, origin));
+  }
+  return true;
+}
+
+/// Projects chunk `c` of a set, one Gaussian after the other.
+template <class S>
+struct ProjectChunk {
+  ProjectArgs<S> args;
+
+  GSNAV_HD void operator()(std::size_t c) const noexcept {
+    const GaussianView& gs = args.gaussians;
+    const std::size_t begin = c * kProjectChunk;
+    const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
+    const std::size_t base = (args.first_chunk + c) * kProjectChunk;
+    std::uint32_t written = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
+      const Vec3<float> mean{gs.means[0][i], gs.means[1][i], gs.means[2][i]};
+      const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean,
+                                args.offsets_f[origin]);
+      if (!(z > args.camera.near_plane)) continue;
+      const SplatAxes<S> axes =
+          detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), i);
+      const Projected<S> p = project<S, float>(args.camera, axes, z, S(gs.opacities[i]));
+      if (!p.visible) continue;
+      const float key = args.camera.sort_order == SortOrder::z_depth
+                            ? z
+                            : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
+      if (write_splat(args, base + written, i, key, mean, origin, p, axes)) ++written;
+    }
+    args.counts[args.first_chunk + c] = written;
+  }
+};
+
+}  // namespace gsnav
