@@ -15,6 +15,9 @@
 #include "error.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda.hpp"
+#endif
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/renderer.hpp"
@@ -83,7 +86,8 @@ template <class B>
 void render_frames(benchmark::State& state, B& backend, const RenderConfig& config, int width,
                    int height) {
   const std::vector<Camera> cameras = sized(width, height);
-  const std::vector<GaussianSet> sets{workload().cloud.set()};
+  const GaussianArrays<B> arrays(backend, workload().cloud);
+  const std::vector<GaussianSet> sets{arrays.set()};
   Renderer<float, B> renderer(backend, config);
   Frames<float> frames;
   std::size_t next = 0;
@@ -151,6 +155,17 @@ void register_all() {
             ->Unit(benchmark::kMillisecond)
             ->UseRealTime();
       }
+#if defined(GSNAV_HAS_CUDA)
+      if (CudaBackend::device_count() > 0) {
+        benchmark::RegisterBenchmark(("cuda/" + suffix).c_str(),
+                                     [=, w = width, h = height](benchmark::State& state) {
+                                       CudaBackend backend;
+                                       render_frames(state, backend, config, w, h);
+                                     })
+            ->Unit(benchmark::kMillisecond)
+            ->UseRealTime();
+      }
+#endif
       if (width == 256) {
         benchmark::RegisterBenchmark(("serial/" + suffix).c_str(),
                                      [=, w = width, h = height](benchmark::State& state) {

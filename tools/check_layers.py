@@ -55,7 +55,7 @@ def check(root):
             continue
         for quote, name in INCLUDE.findall(file.read_text(encoding="utf-8")):
             if name.startswith("gsnav/backends/"):
-                target = f"backend {pathlib.PurePath(name).stem}"
+                target = f"backend {pathlib.PurePath(name.split('/')[2]).stem}"
             elif name.startswith("gsnav/"):
                 target = layer_of(pathlib.PurePath("include") / name)
             elif quote == '"' and (file.parent / name).exists():

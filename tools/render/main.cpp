@@ -15,6 +15,9 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda.hpp"
+#endif
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/scene_file.hpp"
@@ -91,7 +94,8 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const GaussianCl
   config.first_hit_tau = depth.tau;
   config.sort_order = cloud.sort_order;
   Renderer<S, B> renderer(backend, config);
-  const std::vector<GaussianSet> sets{cloud.set()};
+  const GaussianArrays<B> arrays(backend, cloud);
+  const std::vector<GaussianSet> sets{arrays.set()};
   Frames<S> f;
   double total_ms = 0;
   const bool terminal = isatty(fileno(stdout)) != 0;
@@ -106,7 +110,7 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const GaussianCl
                               : depth.output == kExpectedDepth    ? f.expected_depth
                               : depth.output == kAccumulatedDepth ? f.accumulated_depth
                                                                   : f.first_hit_depth;
-    char number[16];
+    char number[24];
     std::snprintf(number, sizeof number, "%04zu", c);
     const std::filesystem::path stem = std::filesystem::path(o.out) / number;
     const std::vector<float> rgb(f.rgb.begin(), f.rgb.end()), alpha(f.alpha.begin(), f.alpha.end()),
@@ -190,7 +194,13 @@ int main(int argc, char** argv) {
     return fail("--depth " + o.depth + ": use median, expected, accumulated, first or first:TAU, 0 < TAU < 1");
   }
   if ((o.width > 0) != (o.height > 0)) return fail("--width and --height go together");
+#if defined(GSNAV_HAS_CUDA)
+  if (o.backend == "cuda" && CudaBackend::device_count() == 0) {
+    return fail("--backend cuda: no GPU, or no driver for it; use openmp");
+  }
+#else
   if (o.backend == "cuda") return fail("--backend cuda: this build has no CUDA backend; use openmp");
+#endif
 
   auto scene = io::load_scene(o.scene);
   if (!scene) return fail(scene.message());
@@ -205,6 +215,12 @@ int main(int argc, char** argv) {
   SerialBackend serial;
   if (o.backend == "serial") return run<float>(serial, o, *depth, scene->cloud, *cameras);
   if (o.backend == "serial64") return run<double>(serial, o, *depth, scene->cloud, *cameras);
+#if defined(GSNAV_HAS_CUDA)
+  if (o.backend == "cuda") {
+    CudaBackend cuda;
+    return run<float>(cuda, o, *depth, scene->cloud, *cameras);
+  }
+#endif
   OpenMPBackend openmp(o.threads);
   return run<float>(openmp, o, *depth, scene->cloud, *cameras);
 }

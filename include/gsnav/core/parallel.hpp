@@ -91,6 +91,16 @@ void sort_pairs(B& backend, Buffer<std::uint32_t, B>& keys, Buffer<std::uint32_t
                 SortScratch<B>& scratch, int bits = 32) {
   const std::size_t n = keys.size();
   if (n < 2) return;
+  if constexpr (requires(std::uint32_t* p) { backend.sort_pairs(p, p, p, p, n, bits); }) {
+    scratch.keys.resize_discard(n);
+    scratch.values.resize_discard(n);
+    if (backend.sort_pairs(keys.data(), values.data(), scratch.keys.data(), scratch.values.data(), n,
+                           bits)) {
+      std::swap(keys, scratch.keys);
+      std::swap(values, scratch.values);
+    }
+    return;
+  }
   const std::size_t blocks = n < 8192 ? 1 : concurrency_of(backend);
   scratch.keys.resize_discard(n);
   scratch.values.resize_discard(n);

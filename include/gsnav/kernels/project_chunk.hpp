@@ -117,6 +117,16 @@ GSNAV_HD S reference_pixel(S x, int size) noexcept {
   return S(static_cast<std::int32_t>(clamp(x, S(0), S(size - 1)))) + S(0.5);
 }
 
+/// The pixels that a footprint may cover. Returns false where there are none.
+template <class T>
+GSNAV_HD bool splat_bounds(const ProjectionCamera<T>& camera, const Projected<T>& p,
+                           SplatBounds& b) noexcept {
+  pixel_range(p.center_x, p.half_width, camera.width, b.x0, b.x1);
+  pixel_range(p.center_y, p.half_height, camera.height, b.y0, b.y1);
+  if (camera.compat != Compat::none) narrow_to_compat(camera, p, b);
+  return b.x0 < b.x1 && b.y0 < b.y1;
+}
+
 /// Rounds what was computed in T (S, or double for the few that need it) to the records of slot.
 /// Returns false where no pixel centre lies in the bounds.
 template <class T, class S>
@@ -124,10 +134,7 @@ GSNAV_HD bool store_splat(const ProjectArgs<S>& args, std::size_t slot,
                           const ProjectionCamera<T>& camera, const Projected<T>& p,
                           const SplatAxes<T>& axes) noexcept {
   SplatBounds b;
-  pixel_range(p.center_x, p.half_width, camera.width, b.x0, b.x1);
-  pixel_range(p.center_y, p.half_height, camera.height, b.y0, b.y1);
-  if (camera.compat != Compat::none) narrow_to_compat(camera, p, b);
-  if (b.x0 >= b.x1 || b.y0 >= b.y1) return false;
+  if (!splat_bounds(camera, p, b)) return false;
   args.bounds[slot] = b;
 
   const T ref_x = reference_pixel(p.mean_x, camera.width);
@@ -218,6 +225,19 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
   return {c.x, c.y, c.z, S(0)};
 }
 
+namespace detail {
+/// Row i projected in double.
+template <class S>
+GSNAV_HD Projected<double> project64(const ProjectArgs<S>& args, std::size_t i, float key_z,
+                                     const Vec3<float>& mean, std::size_t origin,
+                                     SplatAxes<double>& axes) noexcept {
+  const Vec3d delta = vec_cast<double>(mean) + args.offsets[origin];
+  axes = load_axes(args.gaussians, args.camera64, delta, i);
+  return project<double, float>(args.camera64, axes, key_z,
+                                static_cast<double>(args.gaussians.opacities[i]));
+}
+}  // namespace detail
+
 /// Writes survivor i, whose mean is `mean` (stored offset), to `slot`. Returns false where no pixel
 /// centre lies in its bounds.
 template <class S>
@@ -227,10 +247,8 @@ GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::siz
   const GaussianView& gs = args.gaussians;
   bool written;
   if (sizeof(S) == sizeof(float) && detail::needs_double(args.camera, p)) {
-    const Vec3d delta = vec_cast<double>(mean) + args.offsets[origin];
-    const SplatAxes<double> axes64 = detail::load_axes(gs, args.camera64, delta, i);
-    const Projected<double> p64 =
-        project<double, float>(args.camera64, axes64, key, static_cast<double>(gs.opacities[i]));
+    SplatAxes<double> axes64;
+    const Projected<double> p64 = detail::project64(args, i, key, mean, origin, axes64);
     written = detail::store_splat(args, slot, args.camera64, p64, axes64);
   } else {
     written = detail::store_splat(args, slot, args.camera, p, axes);

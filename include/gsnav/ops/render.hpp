@@ -77,6 +77,18 @@ struct GatherVisible {
   }
 };
 
+/// The same with one work item a slot, for backends of very many threads.
+struct GatherSlot {
+  GatherVisible gather;
+  GSNAV_HD void operator()(std::size_t slot) const noexcept {
+    const std::size_t chunk = slot / kProjectChunk, i = slot % kProjectChunk;
+    if (i >= gather.counts[chunk]) return;
+    const std::size_t to = gather.chunk_offsets[chunk] + i;
+    gather.keys[to] = gather.chunk_keys[slot];
+    gather.order[to] = static_cast<std::uint32_t>(slot);
+  }
+};
+
 /// One work item per row of pixels: enough parallelism on a CPU at little overhead.
 template <class S, class PixelKernel>
 struct RasterizeRow {
@@ -248,9 +260,13 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.keys.resize_discard(visible);
   ws.order.resize_discard(visible);
   ws.cursors.upload(ws.host_chunk_offsets.data(), chunks);
-  backend.parallel_for(chunks, detail::GatherVisible{ws.chunk_keys.view(), ws.counts.view(),
-                                                     ws.cursors.view(), ws.keys.view(),
-                                                     ws.order.view()});
+  const detail::GatherVisible gather{ws.chunk_keys.view(), ws.counts.view(), ws.cursors.view(),
+                                     ws.keys.view(), ws.order.view()};
+  if constexpr (is_host_backend<B>) {
+    backend.parallel_for(chunks, gather);
+  } else {
+    backend.parallel_for(slots, detail::GatherSlot{gather});
+  }
   sort_pairs(backend, ws.keys, ws.order, ws.sort, config.key_bits);
 
   // ---- bin
@@ -266,12 +282,16 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.tile_offsets.resize_discard(bin.grid.count() + 1);
   bin.cursors = ws.cursors.view();
   bin.tile_offsets = ws.tile_offsets.view();
-  if constexpr (requires { backend.count_tiles(bin); }) {
-    backend.count_tiles(bin);
+  if constexpr (requires { backend.list_tiles(bin); }) {
+    backend.list_tiles(bin);
   } else {
-    backend.parallel_for(bin.blocks, CountTileIntersections<S>{bin});
+    if constexpr (requires { backend.count_tiles(bin); }) {
+      backend.count_tiles(bin);
+    } else {
+      backend.parallel_for(bin.blocks, CountTileIntersections<S>{bin});
+    }
+    backend.parallel_for(1, ScanTileIntersections<S>{bin});
   }
-  backend.parallel_for(1, ScanTileIntersections<S>{bin});
   std::uint64_t intersections = 0;
   ws.tile_offsets.download(&intersections, 1, bin.grid.count());
   if (Status s = backend.synchronize(); !s) return s;

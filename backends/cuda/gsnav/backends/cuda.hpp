@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/project_chunk.hpp"
+#include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/render.hpp"
+#include "gsnav/ops/skin.hpp"
+
+struct CUstream_st;
+
+namespace gsnav {
+
+/// Device memory of one GPU.
+struct CudaSpace {};
+
+/// Runs on one NVIDIA GPU, by the same kernels as the CPU: float32 images, keys and footprints have the
+/// CPU's bits. Work goes to one stream in order. Link gsnav::cuda; the header itself needs no CUDA.
+///
+/// A call that the driver refuses is remembered and reported by the next `synchronize()`; what was asked
+/// for after it is not done.
+class CudaBackend {
+ public:
+  using memory_space = CudaSpace;
+
+  /// GPUs that the driver shows; 0 where there is no driver.
+  static int device_count() noexcept;
+
+  /// `device`: in [0, device_count()). `stream`: the caller's cudaStream_t, or null for one of its own.
+  /// Throws gsnav::Error (backend_failure, invalid_argument) naming the device and what the driver said.
+  explicit CudaBackend(int device = 0, CUstream_st* stream = nullptr);
+  ~CudaBackend();
+  CudaBackend(const CudaBackend&) = delete;
+  CudaBackend& operator=(const CudaBackend&) = delete;
+
+  void* allocate(std::size_t bytes, std::size_t align);
+  void deallocate(void* p, std::size_t bytes) noexcept;
+  void copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);
+  void fill(void* p, unsigned char byte, std::size_t bytes);
+  /// Defined where nvcc compiles (backends/cuda/device.cuh).
+  template <class F>
+  void parallel_for(std::size_t n, const F& f);
+  Status synchronize();
+
+  std::size_t concurrency() const noexcept { return 1; }
+  CUstream_st* stream() const noexcept { return stream_; }
+  std::string device_name() const;
+
+  // Optional members (core/backend.hpp).
+  bool sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::uint32_t* keys_alt,
+                  std::uint32_t* values_alt, std::size_t n, int bits);
+  void project(const ProjectArgs<float>& args);
+  void list_tiles(const BinArgs<float>& args);
+  void scatter_tiles(const BinArgs<float>& args);
+  void rasterize_tiles(const RasterArgs<float>& args);
+
+ private:
+  bool usable() const noexcept { return error_ == 0; }
+  void note(int error, const char* what) noexcept;
+  void* scratch(int slot, std::size_t bytes);
+
+  static constexpr int kScratchSlots = 6;
+  struct Block {
+    void* data = nullptr;
+    std::size_t bytes = 0;
+  };
+  CUstream_st* stream_ = nullptr;
+  int device_ = 0;
+  bool owns_stream_ = false;
+  int error_ = 0;
+  const char* failed_ = "";
+  Block scratch_[kScratchSlots];
+};
+
+static_assert(Backend<CudaBackend>);
+
+#if !defined(__CUDACC__)
+// Compiled in gsnav::cuda: what a host compiler cannot.
+extern template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+                                                         std::span<const GaussianSet>, const Camera&,
+                                                         const RenderConfig&, const FrameImages<float>&,
+                                                         RenderStats*);
+extern template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
+#endif
+
+}  // namespace gsnav

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cuda_runtime.h>
+
+#include <cub/block/block_scan.cuh>
+
+#include "gsnav/backends/cuda.hpp"
+
+// Device code of gsnav::cuda: the library's kernels in loop nests that suit a GPU.
+
+namespace gsnav {
+namespace cuda {
+
+template <class F>
+__global__ void for_each(std::size_t n, const F f) {
+  const std::size_t i = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i < n) f(i);
+}
+
+inline constexpr int kProjectThreads = 128;
+
+/// One block a chunk: Gaussians are projected side by side, survivors packed in order by a block scan.
+__global__ void __launch_bounds__(kProjectThreads) project_kernel(const ProjectArgs<float> args) {
+  using Scan = cub::BlockScan<std::uint32_t, kProjectThreads>;
+  __shared__ typename Scan::TempStorage storage;
+  const GaussianView& gs = args.gaussians;
+  const std::size_t chunk = blockIdx.x, begin = chunk * kProjectChunk;
+  const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
+  const std::size_t base = (args.first_chunk + chunk) * kProjectChunk;
+  std::uint32_t written = 0;
+  for (std::size_t first = begin; first < end; first += kProjectThreads) {
+    const std::size_t i = first + threadIdx.x;
+    std::uint32_t keep = 0;
+    std::size_t origin = 0;
+    Vec3<float> mean;
+    float key = 0;
+    SplatAxes<float> axes;
+    Projected<float> p;
+    if (i < end) {
+      origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
+      mean = {gs.means[0][i], gs.means[1][i], gs.means[2][i]};
+      const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean,
+                                args.offsets_f[origin]);
+      if (z > args.camera.near_plane) {
+        axes = detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), i);
+        p = project<float, float>(args.camera, axes, z, gs.opacities[i]);
+        key = args.camera.sort_order == SortOrder::z_depth
+                  ? z
+                  : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
+        if (p.visible) {
+          SplatBounds bounds;
+          if (detail::needs_double(args.camera, p)) {
+            SplatAxes<double> axes64;
+            const Projected<double> p64 = detail::project64(args, i, key, mean, origin, axes64);
+            keep = detail::splat_bounds(args.camera64, p64, bounds) ? 1 : 0;
+          } else {
+            keep = detail::splat_bounds(args.camera, p, bounds) ? 1 : 0;
+          }
+        }
+      }
+    }
+    std::uint32_t at = 0, total = 0;
+    Scan(storage).ExclusiveSum(keep, at, total);
+    if (keep != 0) write_splat(args, base + written + at, i, key, mean, origin, p, axes);
+    written += total;
+    __syncthreads();
+  }
+  if (threadIdx.x == 0) args.counts[args.first_chunk + chunk] = written;
+}
+
+/// Tile intersections of each visible splat, and of each tile.
+struct CountSplatTiles {
+  BinArgs<float> args;
+  std::uint32_t* per_splat;
+  std::uint32_t* per_tile;
+  __device__ void operator()(std::size_t i) const {
+    const std::uint32_t splat = args.order[i];
+    std::uint32_t n = 0;
+    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
+                  [&](std::size_t tile) {
+                    atomicAdd(per_tile + tile, 1u);  // a sum of ones: the order does not matter
+                    ++n;
+                  });
+    per_splat[i] = n;
+  }
+};
+
+/// (tile, splat) pairs in depth order; a stable sort by tile then makes the lists.
+struct EmitSplatTiles {
+  BinArgs<float> args;
+  const std::uint64_t* offsets;
+  std::uint32_t* tiles;
+  std::uint32_t* splats;
+  __device__ void operator()(std::size_t i) const {
+    const std::uint32_t splat = args.order[i];
+    std::uint64_t at = offsets[i];
+    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
+                  [&](std::size_t tile) {
+                    tiles[at] = static_cast<std::uint32_t>(tile);
+                    splats[at++] = splat;
+                  });
+  }
+};
+
+inline constexpr int kRasterBatch = 64;
+
+/// One block a tile, one thread a pixel; splats come through shared memory in batches.
+template <bool Color, DepthMode D, Exp2 M, bool Perspective>
+__global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float> args) {
+  __shared__ SplatGeometry<float> geometry[kRasterBatch];
+  __shared__ SplatColor<float> colors[Color ? kRasterBatch : 1];
+  __shared__ std::uint32_t ids[kRasterBatch];
+  const TileGrid& grid = args.grid;
+  const int ts = grid.tile_size, threads = ts * ts, t = static_cast<int>(threadIdx.x);
+  const int x = static_cast<int>(blockIdx.x) % grid.columns * ts + t % ts;
+  const int y = static_cast<int>(blockIdx.x) / grid.columns * ts + t / ts;
+  const bool inside = x < grid.width && y < grid.height;
+  const float px = static_cast<float>(x) + 0.5f, py = static_cast<float>(y) + 0.5f;
+  BlendState<float, D> state;
+  bool open = inside;
+  const std::uint64_t end = args.tile_offsets[blockIdx.x + 1];
+  for (std::uint64_t first = args.tile_offsets[blockIdx.x]; first < end; first += kRasterBatch) {
+    if (__syncthreads_count(open ? 1 : 0) == 0) break;
+    const int n = end - first < kRasterBatch ? static_cast<int>(end - first) : kRasterBatch;
+    for (int j = t; j < n; j += threads) {
+      const std::uint32_t id = args.tile_splats[first + static_cast<std::uint64_t>(j)];
+      ids[j] = id;
+      geometry[j] = args.geometry[id];
+      if constexpr (Color) colors[j] = args.colors[id];
+    }
+    __syncthreads();
+    for (int j = 0; open && j < n; ++j) {
+      const SplatRecords<float> splat{geometry + j, Color ? colors + j : nullptr,
+                                      D == DepthMode::none ? nullptr : args.depths.data + ids[j],
+                                      Perspective ? args.perspectives.data + ids[j] : nullptr};
+      blend_splat<Color, D, M, Perspective>(state, args.rules, splat, px, py);
+      open = !(state.transmittance < args.rules.transmittance_min);
+    }
+  }
+  if (inside) {
+    write_pixel(args,
+                static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
+                    static_cast<std::size_t>(x),
+                state);
+  }
+}
+
+}  // namespace cuda
+
+template <class F>
+void CudaBackend::parallel_for(std::size_t n, const F& f) {
+  if (n == 0 || !usable()) return;
+  constexpr unsigned kThreads = 128;
+  const std::size_t blocks = (n + kThreads - 1) / kThreads;
+  if (blocks > 0x7fffffffu) return note(cudaErrorInvalidConfiguration, "a launch of too many work items");
+  cuda::for_each<F><<<static_cast<unsigned>(blocks), kThreads, 0, stream_>>>(n, f);
+  note(cudaGetLastError(), "a kernel launch");
+}
+
+}  // namespace gsnav

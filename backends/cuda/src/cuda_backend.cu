@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <bit>
+#include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
+
+#include "gsnav/backends/cuda/device.cuh"
+
+namespace gsnav {
+
+namespace {
+
+// Scratch that outlives a call, by use.
+enum Slot { kCubTemp, kPerSplat, kPerTile, kSplatOffsets, kPairTiles, kPairSplats };
+
+std::string describe(int device, int error, const char* what) {
+  return std::string("CUDA device ") + std::to_string(device) + ": " + what + " failed: " +
+         cudaGetErrorString(static_cast<cudaError_t>(error));
+}
+
+}  // namespace
+
+int CudaBackend::device_count() noexcept {
+  int n = 0;
+  if (cudaGetDeviceCount(&n) != cudaSuccess) {
+    cudaGetLastError();
+    return 0;
+  }
+  return n;
+}
+
+CudaBackend::CudaBackend(int device, CUstream_st* stream) : stream_(stream), device_(device) {
+  const int count = device_count();
+  if (count == 0) {
+    detail::fail(Errc::backend_failure,
+                 "CUDA: no device; install a driver for this GPU, or use the openmp backend");
+  }
+  if (device < 0 || device >= count) {
+    detail::fail(Errc::invalid_argument, std::string("CudaBackend: device = ") + std::to_string(device) +
+                                             ": must be in [0, " + std::to_string(count) + ")");
+  }
+  const auto need = [&](cudaError_t e, const char* what) {
+    if (e != cudaSuccess) detail::fail(Errc::backend_failure, describe(device, e, what));
+  };
+  need(cudaSetDevice(device), "cudaSetDevice");
+  if (stream_ == nullptr) {
+    need(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "cudaStreamCreate");
+    owns_stream_ = true;
+  }
+  // What a frame frees is kept for the next one.
+  cudaMemPool_t pool;
+  need(cudaDeviceGetDefaultMemPool(&pool, device), "cudaDeviceGetDefaultMemPool");
+  std::uint64_t keep = ~std::uint64_t{0};
+  need(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &keep), "cudaMemPoolSetAttribute");
+}
+
+CudaBackend::~CudaBackend() {
+  for (Block& b : scratch_) {
+    if (b.data != nullptr) cudaFreeAsync(b.data, stream_);
+  }
+  cudaStreamSynchronize(stream_);
+  if (owns_stream_) cudaStreamDestroy(stream_);
+}
+
+void CudaBackend::note(int error, const char* what) noexcept {
+  if (error_ == 0 && error != cudaSuccess) {
+    error_ = error;
+    failed_ = what;
+  }
+}
+
+std::string CudaBackend::device_name() const {
+  cudaDeviceProp properties;
+  return cudaGetDeviceProperties(&properties, device_) == cudaSuccess ? properties.name : "unknown";
+}
+
+void* CudaBackend::allocate(std::size_t bytes, std::size_t) {
+  void* p = nullptr;
+  if (!usable() || cudaMallocAsync(&p, bytes, stream_) != cudaSuccess) {
+    cudaGetLastError();  // out of memory is the caller's to report
+    return nullptr;
+  }
+  return p;
+}
+
+void CudaBackend::deallocate(void* p, std::size_t) noexcept { cudaFreeAsync(p, stream_); }
+
+void CudaBackend::copy(void* dst, const void* src, std::size_t bytes, CopyKind kind) {
+  if (bytes == 0 || !usable()) return;
+  const cudaMemcpyKind kinds[] = {cudaMemcpyHostToHost, cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost,
+                                  cudaMemcpyDeviceToDevice};
+  note(cudaMemcpyAsync(dst, src, bytes, kinds[static_cast<int>(kind)], stream_), "a copy");
+}
+
+void CudaBackend::fill(void* p, unsigned char byte, std::size_t bytes) {
+  if (bytes != 0 && usable()) note(cudaMemsetAsync(p, byte, bytes, stream_), "a fill");
+}
+
+Status CudaBackend::synchronize() {
+  if (usable()) note(cudaStreamSynchronize(stream_), "work on the stream");
+  if (usable()) return {};
+  return {Errc::backend_failure, describe(device_, error_, failed_)};
+}
+
+void* CudaBackend::scratch(int slot, std::size_t bytes) {
+  Block& b = scratch_[slot];
+  if (bytes > b.bytes) {
+    if (b.data != nullptr) cudaFreeAsync(b.data, stream_);
+    b.bytes = bytes + bytes / 8;
+    b.data = allocate(b.bytes, 256);
+    if (b.data == nullptr) {
+      b.bytes = 0;
+      detail::fail(Errc::out_of_memory, std::string("CUDA: cannot allocate ") + std::to_string(bytes) +
+                                            " bytes of scratch");
+    }
+  }
+  return b.data;
+}
+
+bool CudaBackend::sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::uint32_t* keys_alt,
+                             std::uint32_t* values_alt, std::size_t n, int bits) {
+  if (!usable()) return false;
+  cub::DoubleBuffer<std::uint32_t> k(keys, keys_alt), v(values, values_alt);
+  std::size_t bytes = 0;
+  note(cub::DeviceRadixSort::SortPairs(nullptr, bytes, k, v, n, 0, bits, stream_), "a sort");
+  void* temp = scratch(kCubTemp, bytes);
+  note(cub::DeviceRadixSort::SortPairs(temp, bytes, k, v, n, 0, bits, stream_), "a sort");
+  return k.Current() == keys_alt;
+}
+
+void CudaBackend::project(const ProjectArgs<float>& args) {
+  if (!usable() || args.gaussians.size == 0) return;
+  cuda::project_kernel<<<static_cast<unsigned>(args.chunk_count()), cuda::kProjectThreads, 0, stream_>>>(
+      args);
+  note(cudaGetLastError(), "the projection");
+}
+
+void CudaBackend::list_tiles(const BinArgs<float>& args) {
+  if (!usable()) return;
+  const std::size_t tiles = args.grid.count(), n = args.order.size;
+  auto* per_splat = static_cast<std::uint32_t*>(scratch(kPerSplat, (n + 1) * sizeof(std::uint32_t)));
+  auto* per_tile = static_cast<std::uint32_t*>(scratch(kPerTile, (tiles + 1) * sizeof(std::uint32_t)));
+  auto* offsets = static_cast<std::uint64_t*>(scratch(kSplatOffsets, (n + 1) * sizeof(std::uint64_t)));
+  fill(per_splat + n, 0, sizeof(std::uint32_t));
+  fill(per_tile, 0, (tiles + 1) * sizeof(std::uint32_t));
+  parallel_for(n, cuda::CountSplatTiles{args, per_splat, per_tile});
+  const auto scan = [&](const std::uint32_t* counts, std::uint64_t* out, std::size_t count) {
+    std::size_t bytes = 0;
+    note(cub::DeviceScan::ExclusiveScan(nullptr, bytes, counts, out, ::cuda::std::plus<>{},
+                                        std::uint64_t{0}, count, stream_), "a scan");
+    void* temp = scratch(kCubTemp, bytes);
+    note(cub::DeviceScan::ExclusiveScan(temp, bytes, counts, out, ::cuda::std::plus<>{}, std::uint64_t{0},
+                                        count, stream_), "a scan");
+  };
+  scan(per_splat, offsets, n + 1);
+  scan(per_tile, args.tile_offsets.data, tiles + 1);
+}
+
+void CudaBackend::scatter_tiles(const BinArgs<float>& args) {
+  const std::size_t pairs = args.tile_splats.size;
+  if (!usable() || pairs == 0) return;
+  auto* tiles = static_cast<std::uint32_t*>(scratch(kPairTiles, 2 * pairs * sizeof(std::uint32_t)));
+  auto* splats = static_cast<std::uint32_t*>(scratch(kPairSplats, pairs * sizeof(std::uint32_t)));
+  const auto* offsets = static_cast<const std::uint64_t*>(scratch_[kSplatOffsets].data);
+  parallel_for(args.order.size, cuda::EmitSplatTiles{args, offsets, tiles, splats});
+  const int bits = std::bit_width(args.grid.count() - 1) + (args.grid.count() == 1 ? 1 : 0);
+  std::size_t bytes = 0;
+  note(cub::DeviceRadixSort::SortPairs(nullptr, bytes, tiles, tiles + pairs, splats, args.tile_splats.data,
+                                       pairs, 0, bits, stream_), "a sort");
+  void* temp = scratch(kCubTemp, bytes);
+  note(cub::DeviceRadixSort::SortPairs(temp, bytes, tiles, tiles + pairs, splats, args.tile_splats.data,
+                                       pairs, 0, bits, stream_), "a sort");
+}
+
+void CudaBackend::rasterize_tiles(const RasterArgs<float>& args) {
+  if (!usable()) return;
+  const unsigned threads = static_cast<unsigned>(args.grid.tile_size * args.grid.tile_size);
+  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
+    cuda::rasterize_kernel<C, D, M, P>
+        <<<static_cast<unsigned>(args.grid.count()), threads, 0, stream_>>>(args);
+  });
+  note(cudaGetLastError(), "the blending");
+}
+
+template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+                                                  std::span<const GaussianSet>, const Camera&,
+                                                  const RenderConfig&, const FrameImages<float>&,
+                                                  RenderStats*);
+template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
+
+}  // namespace gsnav

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// The GPU against the CPU: the same kernels must give the same bits.
+#include <doctest/doctest.h>
+
+#include <cstdio>
+
+#include "ops/backends.hpp"
+#include "support/scenes.hpp"
+
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+bool no_gpu(const char* what) {
+  if (CudaBackend::device_count() > 0) return false;
+  std::printf("SKIP: %s: no GPU\n", what);
+  return true;
+}
+
+Frames<float> on_gpu(CudaBackend& cuda, const std::vector<const GaussianCloud*>& clouds,
+                     const Camera& camera, const RenderConfig& config) {
+  std::vector<GaussianArrays<CudaBackend>> arrays;
+  std::vector<GaussianSet> sets;
+  arrays.reserve(clouds.size());
+  for (const GaussianCloud* c : clouds) sets.push_back(arrays.emplace_back(cuda, *c).set());
+  Renderer<float, CudaBackend> renderer(cuda, config);
+  return renderer.render(sets, std::vector<Camera>{camera}).value();
+}
+
+}  // namespace
+
+TEST_CASE("cuda: images have the serial backend's bits") {
+  if (no_gpu("cuda images")) return;
+  CudaBackend cuda;
+  SerialBackend serial;
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const GaussianCloud a = random_cloud(seed, {.count = 4000, .needle = 0.3, .mip = seed == 2});
+    const GaussianCloud b = random_cloud(seed + 10, {.count = 2500, .sh_degree = 1, .scale = 0.2});
+    Camera camera = Camera::look_at({0.3, -0.2, 0.5}, {0.1, 0.1, 4}, {0, -1, 0.1}, 197, 131, 100);
+    camera.cx += 13.25;
+    for (const int tile : {8, 16, 32}) {
+      for (const Response response : {Response::ewa, Response::tangent_plane, Response::ray}) {
+        RenderConfig config;
+        config.outputs = kRgb | kAlpha | kAnyDepth;
+        config.tile_size = tile;
+        config.response = response;
+        const auto gpu = on_gpu(cuda, {&a, &b}, camera, config);
+        const auto cpu = render<float>(serial, {a.set(), b.set()}, camera, config);
+        CHECK(gpu.stats[0].visible == cpu.stats[0].visible);
+        CHECK(gpu.stats[0].tile_intersections == cpu.stats[0].tile_intersections);
+        CHECK(gpu.rgb == cpu.rgb);
+        CHECK(gpu.alpha == cpu.alpha);
+        CHECK(gpu.median_depth == cpu.median_depth);
+        CHECK(gpu.expected_depth == cpu.expected_depth);
+        CHECK(gpu.accumulated_depth == cpu.accumulated_depth);
+        CHECK(gpu.first_hit_depth == cpu.first_hit_depth);
+      }
+    }
+  }
+}
+
+TEST_CASE("cuda: outputs asked for alone, profiles and compat modes") {
+  if (no_gpu("cuda outputs")) return;
+  CudaBackend cuda;
+  SerialBackend serial;
+  const GaussianCloud cloud = random_cloud(7, {.count = 3000});
+  const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 97, 64, 70);
+  for (const unsigned outputs : {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth},
+                                 kRgb | kMedianDepth, unsigned{kExpectedDepth}}) {
+    for (const Profile profile : {Profile::exact, Profile::fast}) {
+      RenderConfig config;
+      config.outputs = outputs;
+      config.profile = profile;
+      const auto gpu = on_gpu(cuda, {&cloud}, camera, config);
+      const auto cpu = render<float>(serial, {cloud.set()}, camera, config);
+      CHECK(gpu.rgb == cpu.rgb);
+      CHECK(gpu.alpha == cpu.alpha);
+      CHECK(gpu.median_depth == cpu.median_depth);
+      CHECK(gpu.expected_depth == cpu.expected_depth);
+    }
+  }
+  for (const Compat compat : {Compat::inria, Compat::gsplat, Compat::habitat_gs}) {
+    RenderConfig config;
+    config.compat = compat;
+    CHECK(on_gpu(cuda, {&cloud}, camera, config).rgb ==
+          render<float>(serial, {cloud.set()}, camera, config).rgb);
+  }
+}
+
+TEST_CASE("cuda: an empty view, a steady frame, errors that say what to do") {
+  if (no_gpu("cuda states")) return;
+  CudaBackend cuda;
+  const GaussianCloud cloud = random_cloud(8, {.count = 500});
+  const Camera away = Camera::look_at({0, 0, 0}, {0, 0, -4}, {0, -1, 0}, 40, 30, 70);
+  RenderConfig config;
+  config.background = {0.25, 0.5, 0.75};
+  const auto f = on_gpu(cuda, {&cloud}, away, config);
+  CHECK(f.rgb[1] == 0.5f);
+  CHECK(f.alpha[0] == 0.0f);
+  CHECK(cuda.synchronize().ok());
+  try {
+    CudaBackend beyond(CudaBackend::device_count());
+    FAIL("a device that is not there was taken");
+  } catch (const Error& e) {
+    CHECK(std::string(e.what()).find("device = ") != std::string::npos);
+  }
+}
+#else
+TEST_CASE("cuda") { std::printf("SKIP: cuda: built without CUDA\n"); }
+#endif
