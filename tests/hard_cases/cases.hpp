@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <limits>
+#include <vector>
+
+#include "gsnav/core/rng.hpp"
+#include "gsnav/kernels/camera.hpp"
+#include "gsnav/math/quat.hpp"
+#include "gsnav/ops/render_config.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+// Inputs that several hard cases share.
+
+namespace gsnav_test {
+
+/// How many random samples a case draws: `base` times GSNAV_HARD_CASE_SAMPLES (1 where it is not set).
+inline std::size_t sample_count(std::size_t base) {
+  const char* factor = std::getenv("GSNAV_HARD_CASE_SAMPLES");
+  return static_cast<std::size_t>(static_cast<double>(base) * (factor != nullptr ? std::atof(factor) : 1.0));
+}
+
+/// Standard deviations may be 0: a flat axis.
+inline gsnav::RawGaussian gaussian(const gsnav::Vec3d& mean, const gsnav::Vec3d& scales, double opacity,
+                                   const std::array<float, 3>& sh0 = {0, 0, 0}) {
+  gsnav::RawGaussian g;
+  g.mean = mean;
+  g.log_scales = {std::log(scales.x), std::log(scales.y), std::log(scales.z)};
+  g.opacity_logit = std::log(opacity / (1 - opacity));
+  g.sh0 = sh0;
+  return g;
+}
+
+inline gsnav::GaussianCloud cloud_of(const std::vector<gsnav::RawGaussian>& gaussians) {
+  gsnav::GaussianCloudBuilder builder(0);
+  for (const gsnav::RawGaussian& g : gaussians) builder.add(g);
+  return builder.cloud();
+}
+
+/// Camera at the origin that looks along +z; an odd size has a pixel centre on the axis.
+inline gsnav::Camera axis_camera(int size = 65, double f = 64) {
+  gsnav::Camera c;
+  c.width = c.height = size;
+  c.fx = c.fy = f;
+  c.cx = c.cy = 0.5 * size;
+  return c;
+}
+
+inline gsnav::Quatd random_rotation(gsnav::Rng& rng) {
+  gsnav::Quatd q{rng.normal(), rng.normal(), rng.normal(), rng.normal()};
+  gsnav::normalize(q);
+  return q;
+}
+
+/// Every image there is.
+inline gsnav::RenderConfig all_outputs() {
+  gsnav::RenderConfig c;
+  c.outputs = gsnav::kRgb | gsnav::kAlpha | gsnav::kAnyDepth;
+  return c;
+}
+
+template <class S>
+bool all_finite(const gsnav::Frames<S>& f) {
+  const auto finite = [](const std::vector<S>& image) {
+    return std::all_of(image.begin(), image.end(), [](S v) { return gsnav::is_finite(v); });
+  };
+  return finite(f.rgb) && finite(f.alpha) && finite(f.median_depth) && finite(f.expected_depth) &&
+         finite(f.accumulated_depth) && finite(f.first_hit_depth);
+}
+
+}  // namespace gsnav_test
