@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_set>
+#include <vector>
+
+#include "gsnav/core/status.hpp"
+
+namespace gsnav_report {
+
+/// Columns of the report in the order they are written; rows of all kinds share them. Lengths are metres,
+/// shares 0 to 1, memory bytes; a field that does not apply is empty. `key` names the measurement
+/// (commit, scene, settings) for --resume.
+inline constexpr std::array<std::string_view, 49> kColumns{
+    "kind", "machine", "commit", "date", "scene", "view", "width", "height", "sensor", "backend", "threads",
+    "profile", "knob", "knob_value", "oracle", "rgb_max", "rgb_p999", "rgb_rmse", "rgb_psnr",
+    "rgb_over_half_lsb", "rgb_over_lsb", "rgb_over_2lsb", "ssim", "flip_mean", "flip_p99", "alpha_max",
+    "depth_p50", "depth_p99", "depth_max", "depth_absrel_p90", "depth_missing", "excluded", "time_p50_ms",
+    "time_p99_ms", "gaussians", "visible", "pairs", "evaluations", "bytes", "peak_rss", "image", "name",
+    "influences", "error_max", "error_p99", "error_unit", "items_per_second", "note", "key"};
+
+/// One row, by column name. Naming a column that does not exist throws gsnav::Error: a mistake in code.
+class Row {
+ public:
+  const std::string& get(std::string_view column) const { return fields_[index(column)]; }
+  /// The number in a field, or nothing where it is empty or none ("inf" is one).
+  std::optional<double> number(std::string_view column) const;
+
+  Row& set(std::string_view column, std::string value);
+  Row& set(std::string_view column, const char* value) { return set(column, std::string(value)); }
+  Row& set(std::string_view column, double value);  ///< 7 significant digits
+  Row& set(std::string_view column, std::uint64_t value);
+  Row& set(std::string_view column, int value) { return set(column, std::to_string(value)); }
+
+  /// One CSV line (RFC 4180) with its line feed.
+  std::string line() const;
+
+ private:
+  static std::size_t index(std::string_view column);
+  std::array<std::string, kColumns.size()> fields_;
+  friend gsnav::Result<std::vector<Row>> parse_csv(const std::string&, const std::string&);
+};
+
+/// Rows of CSV text with any subset of the columns in any order. A last line without its line feed was cut
+/// off while it was written and is left out. Errors: invalid_file naming `source` and the line.
+gsnav::Result<std::vector<Row>> parse_csv(const std::string& text, const std::string& source);
+
+/// The report's CSV while it grows: every row is on disk once `add` returns, so that the file is valid
+/// whenever the run ends.
+class CsvFile {
+ public:
+  /// Starts the file, or with `resume` takes up what is there. Errors: file_not_found (cannot be written),
+  /// invalid_file (resumed file is none of the report's).
+  static gsnav::Result<CsvFile> open(const std::filesystem::path& path, bool resume);
+
+  gsnav::Status add(Row row);
+  /// Whether a row of this key is there.
+  bool has(const std::string& key) const { return keys_.count(key) != 0; }
+  const std::vector<Row>& rows() const noexcept { return rows_; }
+  /// Rows may be completed later (worst view's image); `save` then writes the file anew.
+  std::vector<Row>& rows() noexcept { return rows_; }
+  gsnav::Status save();
+
+ private:
+  std::filesystem::path path_;
+  std::vector<Row> rows_;
+  std::unordered_set<std::string> keys_;
+  std::ofstream out_;
+};
+
+}  // namespace gsnav_report
