@@ -127,19 +127,19 @@ GSNAV_HD bool splat_bounds(const ProjectionCamera<T>& camera, const Projected<T>
   return b.x0 < b.x1 && b.y0 < b.y1;
 }
 
-/// Rounds what was computed in T (S, or double for the few that need it) to the records of slot.
+/// Rounds what was computed in T (S, or double for the few that need it) to the records of slot. The
+/// mean comes in U: its rounding in float, 3e-5 px, would be the largest error of the exponent.
 /// Returns false where no pixel centre lies in the bounds.
-template <class T, class S>
+template <class T, class U, class S>
 GSNAV_HD bool store_splat(const ProjectArgs<S>& args, std::size_t slot,
                           const ProjectionCamera<T>& camera, const Projected<T>& p,
-                          const SplatAxes<T>& axes) noexcept {
+                          const SplatAxes<T>& axes, U mean_x, U mean_y) noexcept {
   SplatBounds b;
   if (!splat_bounds(camera, p, b)) return false;
   args.bounds[slot] = b;
 
-  const T ref_x = reference_pixel(p.mean_x, camera.width);
-  const T ref_y = reference_pixel(p.mean_y, camera.height);
-  const T ox = ref_x - p.mean_x, oy = ref_y - p.mean_y;
+  const U ref_x = reference_pixel(mean_x, camera.width), ref_y = reference_pixel(mean_y, camera.height);
+  const T ox = static_cast<T>(ref_x - mean_x), oy = static_cast<T>(ref_y - mean_y);
   SplatGeometry<S>& g = args.geometry[slot];
   g.ref_x = static_cast<S>(ref_x);
   g.ref_y = static_cast<S>(ref_y);
@@ -168,6 +168,15 @@ GSNAV_HD bool store_splat(const ProjectArgs<S>& args, std::size_t slot,
     }
   }
   return true;
+}
+
+/// The mean alone, in double.
+GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3d& delta, double& mean_x,
+                           double& mean_y) noexcept {
+  const Vec3d t = camera.rotation * delta;
+  const double inv_z = 1.0 / t.z;
+  mean_x = fma(camera.fx, t.x * inv_z, camera.cx);
+  mean_y = fma(camera.fy, t.y * inv_z, camera.cy);
 }
 
 /// Whether the whitened form loses too much in float: k dx + b dy cancels over a long needle's visible
@@ -249,9 +258,13 @@ GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::siz
   if (sizeof(S) == sizeof(float) && detail::needs_double(args.camera, p)) {
     SplatAxes<double> axes64;
     const Projected<double> p64 = detail::project64(args, i, key, mean, origin, axes64);
-    written = detail::store_splat(args, slot, args.camera64, p64, axes64);
+    written = detail::store_splat(args, slot, args.camera64, p64, axes64, p64.mean_x, p64.mean_y);
+  } else if (sizeof(S) == sizeof(float)) {
+    double mean_x, mean_y;
+    detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin], mean_x, mean_y);
+    written = detail::store_splat(args, slot, args.camera, p, axes, mean_x, mean_y);
   } else {
-    written = detail::store_splat(args, slot, args.camera, p, axes);
+    written = detail::store_splat(args, slot, args.camera, p, axes, p.mean_x, p.mean_y);
   }
   if (!written) return false;
   args.keys[slot] = args.camera.key_code(key);
