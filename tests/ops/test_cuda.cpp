@@ -91,6 +91,51 @@ TEST_CASE("cuda: outputs asked for alone, profiles and compat modes") {
   }
 }
 
+TEST_CASE("N64_cpu_cuda_keys") {
+  if (no_gpu("N64_cpu_cuda_keys")) return;
+  CloudOptions options;
+  options.count = 2000000;
+  options.sh_degree = 1;
+  options.scale = 0.01;
+  options.center = {0, 0, 2};
+  options.extent = 3;
+  const GaussianCloud cloud = random_cloud(64, options);
+  const Camera camera = Camera::look_at({0.1, -0.2, 0.3}, {0.1, 0.1, 4}, {0, -1, 0.1}, 640, 480, 90);
+  const auto run = [&](auto& backend, Frames<float>& frames, auto& keys, auto& offsets, auto& splats) {
+    using B = std::remove_reference_t<decltype(backend)>;
+    const GaussianArrays<B> arrays(backend, cloud);
+    const std::vector<GaussianSet> sets{arrays.set()};
+    RenderWorkspace<float, B> workspace(backend);
+    const std::size_t pixels = 640 * 480;
+    Buffer<float, B> images(backend);
+    images.resize_discard(5 * pixels);
+    const FrameImages<float> out{images.data(), images.data() + 3 * pixels, images.data() + 4 * pixels,
+                                 nullptr, nullptr, nullptr};
+    REQUIRE(render_camera<float>(backend, workspace, sets, camera, RenderConfig{}, out).ok());
+    const auto fetch = [](const auto& buffer, auto& host) {
+      host.resize(buffer.size());
+      buffer.download(host.data(), host.size());
+    };
+    fetch(images, frames.rgb);
+    fetch(workspace.keys, keys);
+    fetch(workspace.tile_offsets, offsets);
+    fetch(workspace.tile_splats, splats);
+    REQUIRE(backend.synchronize().ok());
+  };
+  CudaBackend cuda;
+  SerialBackend serial;
+  Frames<float> a, b;
+  std::vector<std::uint32_t> keys_a, keys_b, splats_a, splats_b;
+  std::vector<std::uint64_t> offsets_a, offsets_b;
+  run(cuda, a, keys_a, offsets_a, splats_a);
+  run(serial, b, keys_b, offsets_b, splats_b);
+  CHECK(keys_a.size() > 100000);
+  CHECK(keys_a == keys_b);
+  CHECK(offsets_a == offsets_b);
+  CHECK(splats_a == splats_b);
+  CHECK(a.rgb == b.rgb);
+}
+
 TEST_CASE("cuda: an empty view, a steady frame, errors that say what to do") {
   if (no_gpu("cuda states")) return;
   CudaBackend cuda;
