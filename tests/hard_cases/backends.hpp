@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <memory>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -33,7 +34,7 @@ class CaseRenderer {
   explicit CaseRenderer(const char* name, Args&&... args)
       : name_(name), backend_(std::make_unique<B>(std::forward<Args>(args)...)) {}
 
-  const char* name() const noexcept { return name_; }
+  std::string name() const { return name_; }
   static constexpr bool is_float = sizeof(S) == sizeof(float);
   static constexpr double epsilon = is_float ? 0x1p-24 : 0x1p-53;
   /// The bound for the scalar at hand.

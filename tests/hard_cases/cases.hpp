@@ -57,6 +57,22 @@ inline gsnav::Quatd random_rotation(gsnav::Rng& rng) {
   return q;
 }
 
+/// Shapes from spheres to needles and disks of 1e5 : 1 (a ratio of variances of 1e10), anywhere in front
+/// of `axis_camera` and beside it, opacities over all that is drawn.
+inline gsnav::GaussianCloud needle_cloud(std::uint64_t seed, std::size_t count) {
+  gsnav::Rng rng(seed);
+  std::vector<gsnav::RawGaussian> gaussians(count);
+  for (gsnav::RawGaussian& g : gaussians) {
+    const double z = std::pow(10.0, rng.uniform(-0.5, 1.5));
+    const double scale = z * std::pow(10.0, rng.uniform(-3, 1));
+    const gsnav::Vec3d scales{scale, scale * std::pow(10.0, -5 * rng.uniform() * rng.uniform()),
+                              scale * std::pow(10.0, rng.uniform(-5, 0))};
+    g = gaussian({rng.uniform(-1, 1) * z, rng.uniform(-1, 1) * z, z}, scales, rng.uniform(0.004, 0.999));
+    g.quat = random_rotation(rng);
+  }
+  return cloud_of(gaussians);
+}
+
 /// Every image there is.
 inline gsnav::RenderConfig all_outputs() {
   gsnav::RenderConfig c;

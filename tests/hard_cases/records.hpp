@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/kernels/project_chunk.hpp"
+#include "gsnav/ops/render_config.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav_test {
+
+/// The records that a frame makes of one Gaussian of a cloud (without origins), by the kernel itself.
+template <class S>
+class RecordMaker {
+ public:
+  RecordMaker(const gsnav::GaussianCloud& cloud, const gsnav::Camera& camera,
+              const gsnav::RenderConfig& config) {
+    const gsnav::ProjectionRules rules = gsnav::projection_rules(config);
+    args_.gaussians = cloud.view();
+    args_.camera = gsnav::make_projection_camera<S>(camera, cloud.set(), rules);
+    args_.camera64 = gsnav::make_projection_camera<double>(camera, cloud.set(), rules);
+    const gsnav::Vec3d offset = -camera.position();
+    offset_ = offset;
+    offset_f_ = gsnav::vec_cast<float>(offset);
+    args_.color = args_.depth = false;
+  }
+
+  /// Returns whether Gaussian i is drawn at all; its records hold until the next call.
+  bool project(std::size_t i) {
+    gsnav::ProjectArgs<S> args = args_;
+    gsnav::GaussianView& g = args.gaussians;
+    g.size = 1;
+    for (auto& p : g.means) p = {p.data + i, 1};
+    for (auto& p : g.quats) p = {p.data + i, 1};
+    for (auto& p : g.scales) p = {p.data + i, 1};
+    g.opacities = {g.opacities.data + i, 1};
+    args.offsets = {&offset_, 1};
+    args.offsets_f = {&offset_f_, 1};
+    args.geometry = {&geometry_, 1};
+    args.perspectives = {&perspective_, 1};
+    args.bounds = {&bounds_, 1};
+    args.keys = {&key_, 1};
+    args.counts = {&count_, 1};
+    gsnav::ProjectChunk<S>{args}(0);
+    return count_ == 1;
+  }
+
+  const gsnav::SplatGeometry<S>& geometry() const { return geometry_; }
+  const gsnav::SplatPerspective<S>& perspective() const { return perspective_; }
+  const gsnav::SplatBounds& bounds() const { return bounds_; }
+
+ private:
+  gsnav::ProjectArgs<S> args_;
+  gsnav::Vec3d offset_;
+  gsnav::Vec3<float> offset_f_;
+  gsnav::SplatGeometry<S> geometry_;
+  gsnav::SplatPerspective<S> perspective_;
+  gsnav::SplatBounds bounds_;
+  std::uint32_t key_ = 0, count_ = 0;
+};
+
+}  // namespace gsnav_test
