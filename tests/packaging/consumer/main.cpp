@@ -18,6 +18,9 @@
 #if defined(WITH_SIM)
 #include <gsnav/sim/default_scene.hpp>
 #endif
+#if defined(WITH_EVAL)
+#include <gsnav/eval/ssim.hpp>
+#endif
 #if defined(WITH_INTEROP_EIGEN)
 #include <gsnav/interop/eigen.hpp>
 #endif
@@ -70,6 +73,9 @@ int main() {
 #endif
 #if defined(WITH_SIM)
   check("sim", gsnav::make_default_scene(0.05).ok());
+#endif
+#if defined(WITH_EVAL)
+  check("eval", gsnav::eval::ssim(std::vector<float>{1, 0, 0}, std::vector<float>{1, 0, 0}, 1, 1).ok());
 #endif
 #if defined(WITH_INTEROP_EIGEN)
   check("interop_eigen", gsnav::interop::to_eigen(gsnav::Quatd{}).w() == 1.0);
