@@ -122,16 +122,18 @@ class TruthRay {
   }
 
   /// Mahalanobis distance squared at the nearest point of the ray; negative where that is behind.
-  Real q(Real px, Real py) const {
+  Real q(Real px, Real py, Real* depth = nullptr) const {
     const Real r[3] = {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1};
     const Real at = form(r, splat_.mean) / form(r, r);
+    if (depth != nullptr) *depth = at;
     if (at <= 0) return -1;
     Real d[3];
     for (int i = 0; i < 3; ++i) d[i] = at * r[i] - splat_.mean[i];
     return form(d, d);
   }
-  Real alpha(Real px, Real py) const {
-    const Real distance = q(px, py);
+  /// `depth`: where given, z of that point.
+  Real alpha(Real px, Real py, Real* depth = nullptr) const {
+    const Real distance = q(px, py, depth);
     return distance < 0 ? 0 : opacity_ * std::exp(-distance / 2);
   }
 

@@ -20,29 +20,13 @@ bool same(const Frames<S>& a, const Frames<S>& b) {
          a.first_hit_depth == b.first_hit_depth;
 }
 
-RenderConfig everything(int tile_size = 16) {
+RenderConfig everything() {
   RenderConfig c;
   c.outputs = kRgb | kAlpha | kAnyDepth;
-  c.tile_size = tile_size;
   return c;
 }
 
 }  // namespace
-
-TEST_CASE("tile size does not change a bit") {
-  const GaussianCloud cloud = random_cloud(1, {.count = 3000, .needle = 0.3});
-  SerialBackend serial;
-  const auto reference = render<float>(serial, {cloud.set()}, wide_camera(), everything(16));
-  for (const int tile : {8, 32}) {
-    CHECK(same(reference, render<float>(serial, {cloud.set()}, wide_camera(), everything(tile))));
-  }
-#if defined(_OPENMP)
-  OpenMPBackend openmp(2);
-  for (const int tile : {8, 16, 32}) {
-    CHECK(same(reference, render<float>(openmp, {cloud.set()}, wide_camera(), everything(tile))));
-  }
-#endif
-}
 
 #if defined(_OPENMP)
 TEST_CASE("threads do not change a bit, and lanes are the scalar kernels") {
