@@ -13,7 +13,10 @@ namespace {
 
 constexpr std::uint32_t kEndSignature = 0x06054b50, kCentralSignature = 0x02014b50,
                         kLocalSignature = 0x04034b50;
+constexpr std::uint32_t kEnd64Signature = 0x06064b50, kLocator64Signature = 0x07064b50;
 constexpr std::size_t kEndSize = 22, kCentralSize = 46, kLocalSize = 30, kLongestComment = 65535;
+constexpr std::size_t kEnd64Size = 56, kLocator64Size = 20;
+constexpr std::uint32_t kIn64 = 0xffffffff;  // the value is in a zip64 field
 constexpr std::uint16_t kStored = 0, kDeflated = 8, kEncrypted = 1;
 
 /// Offset of the record that ends an archive; a comment of unknown length may follow it.
@@ -34,16 +37,77 @@ Status inflate_raw(std::span<const std::byte> packed, std::span<std::byte> out,
                    const std::string& what) {
   z_stream z{};
   if (inflateInit2(&z, -MAX_WBITS) != Z_OK) return {Errc::out_of_memory, what + ": zlib has no memory"};
-  // zlib's counters are 32-bit, as are the sizes of an entry.
-  z.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(packed.data()));
-  z.avail_in = static_cast<uInt>(packed.size());
-  z.next_out = reinterpret_cast<Bytef*>(out.data());
-  z.avail_out = static_cast<uInt>(out.size());
-  const int code = inflate(&z, Z_FINISH);
-  const bool whole = code == Z_STREAM_END && z.avail_out == 0 && z.avail_in == 0;
+  // zlib's counters are 32-bit; what is longer is handed over in parts.
+  constexpr std::size_t kPart = std::size_t{1} << 30;
+  std::size_t read = 0, written = 0;
+  int code = Z_OK;
+  while (code == Z_OK) {
+    const std::size_t in = std::min(kPart, packed.size() - read), room = std::min(kPart, out.size() - written);
+    z.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(packed.data() + read));
+    z.avail_in = static_cast<uInt>(in);
+    z.next_out = reinterpret_cast<Bytef*>(out.data() + written);
+    z.avail_out = static_cast<uInt>(room);
+    code = inflate(&z, Z_NO_FLUSH);
+    read += in - z.avail_in;
+    written += room - z.avail_out;
+    if (z.avail_in == in && z.avail_out == room) break;  // nothing more can come
+  }
+  const bool whole = code == Z_STREAM_END && written == out.size() && read == packed.size();
   inflateEnd(&z);
   if (!whole) return {Errc::invalid_file, what + ": the deflated data do not give the size promised"};
   return {};
+}
+
+struct Directory {
+  std::uint64_t count = 0, size = 0, offset = 0;
+  bool several_volumes = false;
+};
+
+/// The place of the directory, from the record at `at` or from the zip64 record it stands for.
+std::optional<Directory> find_directory(std::span<const std::byte> bytes, std::size_t at) {
+  const std::byte* end = bytes.data() + at;
+  Directory d{load_le<std::uint16_t>(end + 10), load_le<std::uint32_t>(end + 12),
+              load_le<std::uint32_t>(end + 16), false};
+  if (d.count != 0xffff && d.size != kIn64 && d.offset != kIn64) {
+    d.several_volumes = load_le<std::uint16_t>(end + 4) != 0 || load_le<std::uint16_t>(end + 6) != 0 ||
+                        load_le<std::uint16_t>(end + 8) != d.count;
+    return d;
+  }
+  if (at < kLocator64Size + kEnd64Size) return std::nullopt;
+  const std::byte* locator = end - kLocator64Size;
+  const auto record = load_le<std::uint64_t>(locator + 8);
+  if (load_le<std::uint32_t>(locator) != kLocator64Signature || record > at - kLocator64Size - kEnd64Size) {
+    return std::nullopt;
+  }
+  const std::byte* end64 = bytes.data() + record;
+  if (load_le<std::uint32_t>(end64) != kEnd64Signature) return std::nullopt;
+  d = {load_le<std::uint64_t>(end64 + 32), load_le<std::uint64_t>(end64 + 40),
+       load_le<std::uint64_t>(end64 + 48), false};
+  d.several_volumes = load_le<std::uint32_t>(end64 + 16) != 0 || load_le<std::uint32_t>(end64 + 20) != 0 ||
+                      load_le<std::uint64_t>(end64 + 24) != d.count;
+  return d;
+}
+
+/// Replaces the values that stand in the zip64 extra field, in this order; false where it lacks one.
+bool take_zip64(std::span<const std::byte> extra, std::uint64_t& size, std::uint64_t& packed,
+                std::uint64_t& offset) {
+  if (size != kIn64 && packed != kIn64 && offset != kIn64) return true;
+  while (extra.size() >= 4) {
+    const std::size_t length = load_le<std::uint16_t>(extra.data() + 2);
+    if (extra.size() - 4 < length) return false;
+    std::span<const std::byte> field = extra.subspan(4, length);
+    if (load_le<std::uint16_t>(extra.data()) == 1) {
+      for (std::uint64_t* value : {&size, &packed, &offset}) {
+        if (*value != kIn64) continue;
+        if (field.size() < 8) return false;
+        *value = load_le<std::uint64_t>(field.data());
+        field = field.subspan(8);
+      }
+      return true;
+    }
+    extra = extra.subspan(4 + length);
+  }
+  return false;
 }
 
 }  // namespace
@@ -72,15 +136,10 @@ Result<ZipReader> ZipReader::open(std::span<const std::byte> bytes, std::string 
 }
 
 Status ZipReader::read_directory(std::size_t end_record) {
-  const std::byte* end = bytes_.data() + end_record;
-  const auto count = load_le<std::uint16_t>(end + 10);
-  const auto size = load_le<std::uint32_t>(end + 12);
-  const auto offset = load_le<std::uint32_t>(end + 16);
-  if (count == 0xffff || size == 0xffffffff || offset == 0xffffffff) {
-    return {Errc::unsupported, source_ + ": zip64 archives are not read"};
-  }
-  if (load_le<std::uint16_t>(end + 4) != 0 || load_le<std::uint16_t>(end + 6) != 0 ||
-      load_le<std::uint16_t>(end + 8) != count) {
+  const auto directory = find_directory(bytes_, end_record);
+  if (!directory) return {Errc::invalid_file, source_ + ": its zip64 end record is missing"};
+  const auto [count, size, offset, several_volumes] = *directory;
+  if (several_volumes) {
     return {Errc::unsupported, source_ + ": zip archives of several volumes are not read"};
   }
   if (offset > end_record || size > end_record - offset) {
@@ -89,7 +148,7 @@ Status ZipReader::read_directory(std::size_t end_record) {
   }
   std::size_t at = offset;
   const std::size_t directory_end = at + size;
-  for (unsigned i = 0; i < count; ++i) {
+  for (std::uint64_t i = 0; i < count; ++i) {
     const std::string entry = source_ + ": zip entry " + std::to_string(i);
     const std::byte* p = bytes_.data() + at;
     if (directory_end - at < kCentralSize || load_le<std::uint32_t>(p) != kCentralSignature) {
@@ -97,8 +156,8 @@ Status ZipReader::read_directory(std::size_t end_record) {
               entry + " of " + std::to_string(count) + " is missing in the directory"};
     }
     const std::size_t name_size = load_le<std::uint16_t>(p + 28);
-    const std::size_t record =
-        kCentralSize + name_size + load_le<std::uint16_t>(p + 30) + load_le<std::uint16_t>(p + 32);
+    const std::size_t extra_size = load_le<std::uint16_t>(p + 30);
+    const std::size_t record = kCentralSize + name_size + extra_size + load_le<std::uint16_t>(p + 32);
     if (directory_end - at < record) return {Errc::invalid_file, entry + " is cut off"};
     const std::string name(reinterpret_cast<const char*>(p + kCentralSize), name_size);
     if (!is_safe_name(name)) {
@@ -112,6 +171,9 @@ Status ZipReader::read_directory(std::size_t end_record) {
     e.packed = load_le<std::uint32_t>(p + 20);
     e.size = load_le<std::uint32_t>(p + 24);
     e.local_offset = load_le<std::uint32_t>(p + 42);
+    if (!take_zip64({p + kCentralSize + name_size, extra_size}, e.size, e.packed, e.local_offset)) {
+      return {Errc::invalid_file, entry + " (" + in_quotes(name) + ") lacks a zip64 size or offset"};
+    }
     if (name.back() != '/' && !entries_.emplace(name, e).second) {
       return {Errc::invalid_file, entry + ": the name " + in_quotes(name) + " comes twice"};
     }
@@ -126,7 +188,7 @@ std::vector<std::string> ZipReader::names() const {
   return out;
 }
 
-Result<std::vector<std::byte>> ZipReader::read(const std::string& name) const {
+Result<std::vector<std::byte>> ZipReader::read(const std::string& name, std::uint64_t slack) const {
   const std::string what = source_ + ": " + name;
   const auto found = entries_.find(name);
   if (found == entries_.end()) return {Errc::file_not_found, what + ": not in the archive"};
@@ -148,7 +210,9 @@ Result<std::vector<std::byte>> ZipReader::read(const std::string& name) const {
     return {Errc::invalid_file, what + ": " + std::to_string(e.packed) + " bytes at offset " +
                                     std::to_string(data) + " are not inside the file"};
   }
-  if (e.method == kStored ? e.size != e.packed : e.size > kInflationSlack + kMostInflation * e.packed) {
+  // Dividing, so that no product overflows.
+  if (e.method == kStored ? e.size != e.packed
+                          : e.size > slack && (e.size - slack) / kMostInflation > e.packed) {
     return {Errc::invalid_file, what + ": a size of " + std::to_string(e.size) + " bytes from " +
                                     std::to_string(e.packed) + " is not believed"};
   }
@@ -160,7 +224,7 @@ Result<std::vector<std::byte>> ZipReader::read(const std::string& name) const {
     out.resize(e.size);
     if (Status s = inflate_raw(packed, out, what); !s) return s;
   }
-  const uLong crc = crc32(0, reinterpret_cast<const Bytef*>(out.data()), static_cast<uInt>(out.size()));
+  const uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(out.data()), out.size());
   if (crc != e.crc) return {Errc::invalid_file, what + ": its checksum does not fit"};
   return out;
 }

@@ -17,7 +17,7 @@ namespace gsnav::io::detail {
 inline constexpr std::uint64_t kMostInflation = 100;
 inline constexpr std::uint64_t kInflationSlack = std::uint64_t{1} << 16;
 
-/// Reads a zip archive in memory: stored and deflated entries, one volume, no encryption, no zip64.
+/// Reads a zip archive in memory: stored and deflated entries, zip64, one volume, no encryption.
 /// Every offset and size is checked against the bytes there are; names that leave the archive's folder
 /// and names that come twice are refused. Checksums are verified.
 class ZipReader {
@@ -28,13 +28,15 @@ class ZipReader {
   bool contains(const std::string& name) const { return entries_.count(name) != 0; }
   /// Names of all entries that are files, sorted.
   std::vector<std::string> names() const;
-  /// Decompresses an entry. Errors: file_not_found, invalid_file, unsupported.
-  Result<std::vector<std::byte>> read(const std::string& name) const;
+  /// Decompresses an entry. `slack`: bytes that are believed however small the entry is.
+  /// Errors: file_not_found, invalid_file, unsupported.
+  Result<std::vector<std::byte>> read(const std::string& name, std::uint64_t slack = kInflationSlack) const;
 
  private:
   struct Entry {
     std::uint16_t method = 0, flags = 0;
-    std::uint32_t crc = 0, packed = 0, size = 0, local_offset = 0;
+    std::uint32_t crc = 0;
+    std::uint64_t packed = 0, size = 0, local_offset = 0;
   };
 
   Status read_directory(std::size_t end_record);

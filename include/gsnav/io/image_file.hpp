@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "gsnav/core/status.hpp"
@@ -53,12 +54,15 @@ Status save_npy(const std::filesystem::path& path, std::span<const double> value
 /// What load_npy returns.
 struct NpyArray {
   std::vector<std::size_t> shape;
-  std::vector<double> values;  ///< C order; float32 widened, which is exact
+  std::vector<double> values;  ///< C order, whatever the file's; other types widened, which is exact
   bool is_double = false;      ///< the file holds float64
+  std::string descr;           ///< NumPy's name of the file's type, "<f4" say
 };
 
-/// Reads `.npy` version 1 with `<f4` or `<f8` in C order and exactly as many bytes as its shape says.
-/// Errors: file_not_found, invalid_file, unsupported (other types, Fortran order), out_of_memory.
+/// Reads `.npy` version 1 to 3: little-endian float16, 32 and 64, integers of 8 to 64 bits and booleans,
+/// C and Fortran order, any rank, exactly as many bytes as the shape says.
+/// Errors: file_not_found; invalid_file; unsupported (other types, integers that no double holds);
+/// out_of_memory.
 Result<NpyArray> load_npy(const std::filesystem::path& path);
 
 }  // namespace gsnav::io

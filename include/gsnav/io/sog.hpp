@@ -15,7 +15,7 @@ namespace gsnav::io {
 /// Errors name the file, the field and the value: file_not_found (a plane is missing); invalid_file
 /// (sizes of planes that do not fit the count or each other, a quaternion mode outside 252..255, a
 /// palette label or a codebook index beyond its end, a damaged zip or WebP, more pixels than so few
-/// bytes are believed to hold); unsupported (other versions, lossy planes, encrypted or zip64 bundles);
+/// bytes are believed to hold); unsupported (other versions, lossy planes, encrypted bundles);
 /// out_of_memory. Never throws.
 Result<LoadedCloud> load_sog(const std::filesystem::path& path);
 
