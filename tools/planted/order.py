@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Footprints, keys and order."""
+from . import plant
+
+PROJECTION = "include/gsnav/kernels/projection.hpp"
+TILES = "include/gsnav/kernels/tiles.hpp"
+FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
+ORDER = "tests/hard_cases/test_order.cpp"
+KEYS = "tests/hard_cases/test_keys.cpp"
+
+PLANTS = [
+    plant("three_sigma_box", PROJECTION,
+          "    const L radius = sqrt(max(out.s_max, L(S(0))));\n",
+          "    const L radius(S(3 * kWhitenScale));\n",
+          FOOTPRINT, "N11_tile_cover_conservative",
+          why="3 sigma is less than alpha = 1/255 of an opaque Gaussian"),
+    plant("mean_radius_box", PROJECTION,
+          "out.half_width = fma(radius / out.a, L(S(1.00001)), pad_x);",
+          "out.half_width = fma(radius * sqrt(L(S(0.5)) * (big_a + big_c)) * L(S(1.0 / kWhitenScale)), "
+          "L(S(1.00001)), pad_x);",
+          FOOTPRINT, "N11_tile_cover_conservative"),
+    plant("mean_radius_tiles", TILES,
+          "    const L s = min(fma(w2a, w2a, w1a * w1a), fma(w2b, w2b, w1b * w1b));\n",
+          "    const L rx = near_x - L(mean_x_), ry = near_y - L(mean_y_);\n"
+          "    const L s = (rx * rx + ry * ry) * a * b + L(S(0)) * (w1a + w2a + w1b + w2b);\n",
+          FOOTPRINT, "N11_tile_cover_conservative"),
+    plant("nearest_point_tiles", TILES,
+          "    const L best_y = clamp(fma(L(slope_y_), near_x, L(vertex_y_)), dy0, dy1);\n"
+          "    const L best_x = clamp(fma(L(slope_x_), near_y, L(vertex_x_)), dx0, dx1);\n",
+          "    const L best_y = near_y, best_x = near_x;\n",
+          FOOTPRINT, "N11_tile_cover_conservative",
+          why="nearest by Euclid is not nearest by the ellipse"),
+    plant("perspective_box_centred", PROJECTION,
+          "  out.center_x = select(ellipse, center_x, zero);\n"
+          "  out.center_y = select(ellipse, center_y, zero);\n",
+          "  out.center_x = select(ellipse, out.mean_x, zero);\n"
+          "  out.center_y = select(ellipse, out.mean_y, zero);\n",
+          FOOTPRINT, "N11_tile_cover_conservative",
+          why="under perspective the mean is a focus, not the centre"),
+    plant("key_not_fused", PROJECTION,
+          "  return dot(row, mean + offset) * F(scale);",
+          "  const Vec3<F> t = mean + offset;\n"
+          "  return ((row.x * t.x + row.y * t.y) + row.z * t.z) * F(scale);",
+          ORDER, "N22_depth_tie_grid"),
+    plant("key_of_another_expression", "include/gsnav/kernels/lanes/project_chunk.hpp",
+          "    const F z = depth_key(camera.key_rotation, camera.key_scale, mean, offset);\n",
+          "    const F z = depth_key(camera.key_rotation, camera.key_scale, mean, {F(0.0f), F(0.0f), F(0.0f)}) +\n"
+          "                depth_key(camera.key_rotation, camera.key_scale, offset, {F(0.0f), F(0.0f), F(0.0f)});\n",
+          ORDER, "N22_depth_tie_grid"),
+    plant("key_top_bits", "include/gsnav/kernels/projection_camera.hpp",
+          "    const std::uint32_t code = (bits_of(key) - base) >> shift;",
+          "    const std::uint32_t code = largest == 0xffffffffu ? bits_of(key) : bits_of(key) >> 16;",
+          ORDER, "N23_key_wide_range", why="bits spent on depths that no scene has"),
+    plant("ties_reversed", "include/gsnav/core/parallel.hpp",
+          "    for (std::size_t i = r.begin; i < r.end; ++i) {\n      const std::uint32_t at =",
+          "    for (std::size_t i = r.end; i-- > r.begin;) {\n      const std::uint32_t at =",
+          ORDER, "N21_depth_tie_stack", "N22_depth_tie_grid"),
+    plant("ties_dropped", "include/gsnav/ops/render.hpp",
+          "      keys[to + i] = chunk_keys[from + i];\n",
+          "      keys[to + i] = i > 0 && chunk_keys[from + i] == chunk_keys[from + i - 1] ? 0xffffffffu\n"
+          "                                                                            : chunk_keys[from + i];\n",
+          ORDER, "N22_depth_tie_grid"),
+    plant("last_tile_of_a_row_lost", TILES,
+          "tx1 = (b.x1 - 1) / ts, ty0", "tx1 = (b.x1 - 2) / ts, ty0",
+          KEYS, "N25_key_overflow"),
+    plant("background_forgotten", "include/gsnav/kernels/blend.hpp",
+          "    out.rgb[3 * pixel] = fma(t, args.background.x, state.r);",
+          "    out.rgb[3 * pixel] = state.r;",
+          KEYS, "N26_pair_count_zero"),
+]

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Projection: determinants, the exponent, filters, responses."""
+from . import Edit, Plant, plant
+
+PROJECTION = "include/gsnav/kernels/projection.hpp"
+CAMERA = "include/gsnav/kernels/projection_camera.hpp"
+CHUNK = "include/gsnav/kernels/project_chunk.hpp"
+BLEND = "include/gsnav/kernels/blend.hpp"
+DETERMINANT = "tests/hard_cases/test_determinant.cpp"
+EXPONENT = "tests/hard_cases/test_exponent.cpp"
+FILTER = "tests/hard_cases/test_filter.cpp"
+RESPONSE = "tests/hard_cases/test_response.cpp"
+FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
+
+PLANTS = [
+    plant("det_ac_minus_b2", PROJECTION,
+          "const L det = fma(h, (a0 + c0) + h, det0);",
+          "const L det = (a0 + h) * (c0 + h) - b0 * b0;",
+          DETERMINANT, "N03_det_needle_1e2", "N04_det_needle_1e4",
+          why="cancels for needles: INRIA, gsplat"),
+    plant("det0_ac_minus_b2", PROJECTION,
+          "const L det0 = dot(area, area);",
+          "const L det0 = max(a0 * c0 - b0 * b0, L(S(0)));",
+          DETERMINANT, "N05_comp_factor_needle"),
+    plant("conic_exponent", BLEND,
+          "  L s = fma(w2, w2, w1 * w1);\n",
+          """  const L ca = L(g.a) * L(g.a) + L(g.k) * L(g.k), cb = L(g.k) * L(g.b), cc = L(g.b) * L(g.b);
+  const L ox = L(g.w1) / L(g.a), oy = (L(g.w2) - L(g.k) * ox) / L(g.b);
+  const L cx = dx + ox, cy = dy + oy;
+  L s = ca * cx * cx + L(S(2)) * cb * cx * cy + cc * cy * cy;
+""",
+          EXPONENT, "N07_alpha_long_needle", "N08_power_sign",
+          why="positive powers and holes in long needles"),
+    plant("needles_in_float", CHUNK,
+          "  return fma(abs(p.k), length_x, p.b * length_y) > S(512) ||\n"
+          "         fma(abs(p.k), abs(ox), p.b * abs(oy)) > S(16);",
+          "  return length_x + length_y + ox + oy != length_x + length_y + ox + oy;",
+          EXPONENT, "N07_alpha_long_needle", "N09_huge_needle_tilelocal"),
+    plant("mean_in_float", CHUNK,
+          "    written = detail::store_splat(args, slot, args.camera, p, axes, mean_x, mean_y);",
+          "    written = detail::store_splat(args, slot, args.camera, p, axes, p.mean_x, p.mean_y);",
+          RESPONSE, "N01_ewa_offaxis_grid", "N02_exact_ray_grid"),
+    plant("overflow_drawn", PROJECTION,
+          "(out.s_max >= L(S(0))) && (det <= huge) &&\n                (big_a <= huge) &&",
+          "(out.s_max >= L(S(0))) &&",
+          EXPONENT, "N10_conic_overflow"),
+    plant("compensation_squared", PROJECTION,
+          "max(sqrt(det0 / det), L(camera.min_compensation))",
+          "max(det0 / det, L(camera.min_compensation))",
+          FILTER, "N12_classic_vs_mip_flag", "N13_comp_subpixel"),
+    plant("compensation_floor", PROJECTION,
+          "max(sqrt(det0 / det), L(camera.min_compensation))",
+          "max(sqrt(det0 / det), L(S(0.005)))",
+          FILTER, "N13_comp_subpixel", why="gsplat's floor is a bias"),
+    plant("filter_flag_ignored", CAMERA,
+          "p.mip = set.filter == Filter::mip || habitat;",
+          "p.mip = habitat;",
+          FILTER, "N12_classic_vs_mip_flag", "N14_h_0p1_asset"),
+    plant("dilation_fixed", CAMERA,
+          "p.eps2d = static_cast<S>(set.eps2d);",
+          "p.eps2d = static_cast<S>(0.3f);",
+          FILTER, "N14_h_0p1_asset", "N15_subpixel_drift"),
+    plant("no_dilation", PROJECTION,
+          "  const L h(camera.eps2d);\n  const L det =",
+          "  const L h(camera.eps2d * S(0.01));\n  const L det =",
+          FILTER, "N13_comp_subpixel", "N15_subpixel_drift", "N20_tiny_scales"),
+    plant("jacobian_unlimited", PROJECTION,
+          "const L uj = ewa ? clamp(u, L(camera.u_min), L(camera.u_max)) : u;",
+          "const L uj = u;",
+          FOOTPRINT, "N19_offscreen_rod_fan"),
+    plant("jacobian_limits_centred", CAMERA,
+          "p.u_max = static_cast<S>((camera.width - camera.cx) / camera.fx + tx);",
+          "p.u_max = static_cast<S>(camera.width / (2 * camera.fx) + tx);",
+          "tests/ops/test_oracle.cpp", "all images equal the long double oracle on random scenes with needles",
+          why="INRIA forgets the principal point"),
+    plant("ray_without_bend", PROJECTION,
+          "out.bend = L(S(2 * kLn2)) * (det / ((z * z) * d0));",
+          "out.bend = L(S(0)) * det;",
+          RESPONSE, "N02_exact_ray_grid"),
+    plant("ray_without_dilation", PROJECTION,
+          "const L ex = h * (z / L(camera.fx)) * (z / L(camera.fx));",
+          "const L ex = L(S(0)) * h;",
+          RESPONSE, "N02_exact_ray_grid"),
+    plant("tangent_is_ewa", PROJECTION,
+          "    slope_u = u * inv;\n",
+          "    slope_u = L(S(0)) * inv;\n",
+          RESPONSE, "N02_exact_ray_grid"),
+    plant("ray_drawn_behind", BLEND,
+          "    hit = hit && (f > zero);\n", "",
+          FOOTPRINT, "N11_tile_cover_conservative"),
+    plant("near_inclusive", "include/gsnav/kernels/project_chunk.hpp",
+          "if (!(z > args.camera.near_plane)) continue;",
+          "if (!(z >= args.camera.near_plane)) continue;",
+          "tests/hard_cases/test_near.cpp", "N16_near_plane_cross"),
+    plant("near_sigma_ignored", PROJECTION,
+          "if (camera.near_sigma > S(0)) {", "if (camera.near_sigma > S(1e9)) {",
+          "tests/hard_cases/test_near.cpp", "N17_camera_inside_splat"),
+    Plant("nan_depth_kept",
+          (Edit(PROJECTION, "(key_z > F(camera.near_plane)) &&", "!(key_z <= F(camera.near_plane)) &&"),
+           Edit(CHUNK, "if (!(z > args.camera.near_plane)) continue;",
+                "if (z <= args.camera.near_plane) continue;")),
+          "tests/hard_cases/test_order.cpp", ("N24_neg_zero_depth",)),
+]

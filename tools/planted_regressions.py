@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Shows that the tests would notice: puts naive formulas back, one at a time, and runs what must fail.
+
+    tools/planted_regressions.py [--list] [--only NAME ...] [--scratch DIR] [--cxx COMPILER] [--jobs N]
+
+The tree is copied; the original is never touched. A plant needs one translation unit of tests, compiled
+header-only with OpenMP, so none of the libraries is built. First every test case named must pass as the
+source is; then each plant's must fail. Exit status: 0 all caught, 1 one missed, 2 nothing could be said
+(a text to replace is not there once, a plant does not compile, a case fails unplanted).
+"""
+import argparse
+import concurrent.futures
+import importlib
+import os
+import pathlib
+import pkgutil
+import shutil
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import planted  # noqa: E402
+
+FLAGS = ["-std=c++20", "-O1", "-ffp-contract=off", "-fopenmp", "-w", "-Iinclude", "-Ibackends/serial",
+         "-Ibackends/openmp", "-Itests", '-DGSNAV_DATA_DIR="/nonexistent"']
+CASE_TIMEOUT_S = 600
+
+
+def all_plants():
+    plants = []
+    for module in sorted(m.name for m in pkgutil.iter_modules(planted.__path__)):
+        plants += importlib.import_module(f"planted.{module}").PLANTS
+    names = [p.name for p in plants]
+    assert len(names) == len(set(names)), "two plants of one name"
+    return plants
+
+
+def copy_tree(to):
+    """What git would commit, and what is new beside it; without git the folders that tests need."""
+    try:
+        listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "-z", "include", "backends",
+                                 "tests"], cwd=ROOT, capture_output=True, check=True).stdout
+        files = [f for f in listed.decode().split("\0") if f and (ROOT / f).is_file()]
+    except (OSError, subprocess.CalledProcessError):
+        files = [str(f.relative_to(ROOT)) for d in ("include", "backends", "tests")
+                 for f in (ROOT / d).rglob("*") if f.is_file()]
+    for f in files:
+        target = to / f
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / f, target)
+
+
+class Bench:
+    """A copy of the tree that compiles and runs tests."""
+
+    def __init__(self, scratch, cxx):
+        self.cxx, self.tree = cxx, scratch / "tree"
+        if self.tree.exists():
+            shutil.rmtree(self.tree)
+        copy_tree(self.tree)
+        self.main = scratch / "main.o"
+        self.run([cxx, *FLAGS, "-c", "tests/support/main.cpp", "-o", str(self.main)], check=True)
+
+    def run(self, command, cwd=None, **kwargs):
+        return subprocess.run(command, cwd=cwd or self.tree, text=True, capture_output=True, **kwargs)
+
+    def build(self, source, binary, tree=None):
+        """Returns what the compiler said, or nothing."""
+        done = self.run([self.cxx, *FLAGS, source, str(self.main), "-o", str(binary)], cwd=tree)
+        return "" if done.returncode == 0 else done.stderr.strip() or "the compiler failed"
+
+    def fails(self, binary, case):
+        """How a test case ended, or nothing where it passed."""
+        try:
+            done = self.run([str(binary), f"-tc={case}"], timeout=CASE_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            return "timeout"
+        if "test cases: 0 |" in " ".join(done.stdout.split()):
+            return "no such case"
+        if done.returncode == 0:
+            return ""
+        return "failed" if done.returncode == 1 else f"ended by {done.returncode}"
+
+
+def apply(tree, plant):
+    for e in plant.edits:
+        path = tree / e.file
+        text = path.read_text()
+        if text.count(e.old) != 1:
+            return f"{e.file} holds {text.count(e.old)} times: {e.old.strip().splitlines()[0]}"
+        path.write_text(text.replace(e.old, e.new))
+    return ""
+
+
+def check_plant(bench, plant, scratch):
+    """Returns (verdict, remark)."""
+    tree = scratch / plant.name
+    shutil.copytree(bench.tree, tree)
+    try:
+        if wrong := apply(tree, plant):
+            return "BROKEN", wrong
+        binary = scratch / f"{plant.name}.bin"
+        if said := bench.build(plant.source, binary, tree):
+            return "BROKEN", "does not compile: " + next((l for l in said.splitlines() if "error" in l), said)
+        missed = [c for c in plant.cases if not bench.fails(binary, c)]
+        binary.unlink()
+        return ("MISSED", ", ".join(missed)) if missed else ("caught", ", ".join(plant.cases))
+    finally:
+        shutil.rmtree(tree)
+
+
+def check_unplanted(bench, plants, scratch):
+    """Every case that a plant must fail passes as it is. Returns what does not."""
+    wrong = []
+    for source in sorted({p.source for p in plants}):
+        binary = scratch / "unplanted.bin"
+        if said := bench.build(source, binary):
+            wrong.append(f"{source} does not compile: {said.splitlines()[0]}")
+            continue
+        for case in sorted({c for p in plants if p.source == source for c in p.cases}):
+            if how := bench.fails(binary, case):
+                wrong.append(f"{source}: {case}: {how} without a plant")
+    return wrong
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--list", action="store_true")
+    parser.add_argument("--only", nargs="+", metavar="NAME")
+    parser.add_argument("--scratch", type=pathlib.Path)
+    parser.add_argument("--cxx", default=os.environ.get("CXX", "c++"))
+    parser.add_argument("--jobs", type=int, default=1)
+    args = parser.parse_args()
+    plants = [p for p in all_plants() if not args.only or p.name in args.only]
+    if args.list:
+        for p in plants:
+            print(f"{p.name:32} {p.source}: {', '.join(p.cases)}")
+        return 0
+    if not plants:
+        parser.error("no plant of that name")
+
+    with tempfile.TemporaryDirectory(dir=args.scratch) as folder:
+        scratch = pathlib.Path(folder)
+        bench = Bench(scratch, args.cxx)
+        if wrong := check_unplanted(bench, plants, scratch):
+            print("\n".join(wrong))
+            return 2
+        print(f"{len({(p.source, c) for p in plants for c in p.cases})} test cases pass unplanted", flush=True)
+        verdicts = []
+        with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
+            for p, (verdict, remark) in zip(plants, pool.map(
+                    lambda p: check_plant(bench, p, scratch), plants)):
+                verdicts.append(verdict)
+                print(f"{p.name:32} {verdict:7} {remark}", flush=True)
+    print(f"{verdicts.count('caught')} of {len(plants)} caught")
+    return 2 if "BROKEN" in verdicts else 1 if "MISSED" in verdicts else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
