@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "file.hpp"
+#include "ply_compressed.hpp"
 #include "ply_header.hpp"
 
 namespace gsnav::io {
 namespace {
 
-using detail::in_quotes;
+using detail::ply_rows_missing;
 using detail::PlyElement;
 using detail::PlyFormat;
 using detail::PlyHeader;
@@ -218,12 +219,6 @@ class Body {
   PlyFormat format_;
 };
 
-Status truncated(const std::string& source, const PlyElement& e, std::uint64_t present) {
-  return {Errc::invalid_file, source + ": element " + in_quotes(e.name) + " promises " +
-                                  std::to_string(e.count) + " rows, " + std::to_string(present) +
-                                  " are there"};
-}
-
 void add_block(GaussianCloudBuilder& builder, const Columns& columns, const double* block,
                std::size_t n) {
   std::array<float, 45> rest;
@@ -248,11 +243,7 @@ Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& s
   const auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
                                    [](const PlyElement& e) { return e.name == "vertex"; });
   if (vertex == header.elements.end()) return {Errc::invalid_file, source + ": no element 'vertex'"};
-  if (vertex->find("packed_position") != nullptr) {
-    return {Errc::unsupported, source +
-                                   ": compressed PLY (property 'packed_position') is not read; "
-                                   "convert it to a plain PLY or to SOG"};
-  }
+  if (detail::is_compressed_ply(header)) return detail::parse_compressed_ply(bytes, header, source);
   if (vertex->has_list) {
     return {Errc::unsupported, source + ": element 'vertex' has a list property"};
   }
@@ -262,10 +253,10 @@ Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& s
 
   Body body(bytes, header);
   for (auto e = header.elements.begin(); e != vertex; ++e) {
-    if (const std::uint64_t rows = body.skip(*e); rows != e->count) return truncated(source, *e, rows);
+    if (const std::uint64_t rows = body.skip(*e); rows != e->count) return ply_rows_missing(source, *e, rows);
   }
   if (const std::uint64_t rows = body.available(*vertex); rows < vertex->count) {
-    return truncated(source, *vertex, rows);
+    return ply_rows_missing(source, *vertex, rows);
   }
   const std::size_t count = static_cast<std::size_t>(vertex->count);
 
@@ -276,7 +267,7 @@ Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& s
   for (std::size_t row = 0; row < count; row += kBlock) {
     const std::size_t n = std::min(kBlock, count - row);
     const std::size_t there = body.read(*vertex, columns, n, block.data());
-    if (there != n) return truncated(source, *vertex, row + there);
+    if (there != n) return ply_rows_missing(source, *vertex, row + there);
     add_block(builder, columns, block.data(), n);
   }
 
@@ -286,7 +277,7 @@ Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& s
   }
   for (auto e = vertex + 1; e != header.elements.end(); ++e) {
     if (const std::uint64_t rows = body.skip(*e); rows != e->count) {
-      report.warnings.push_back(truncated(source, *e, rows).message());
+      report.warnings.push_back(ply_rows_missing(source, *e, rows).message());
       return LoadedCloud{std::move(builder.cloud()), std::move(report)};
     }
   }

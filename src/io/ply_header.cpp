@@ -173,4 +173,10 @@ Result<PlyHeader> parse_ply_header(std::span<const std::byte> bytes, const std::
   return HeaderParser({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, source).run();
 }
 
+Status ply_rows_missing(const std::string& source, const PlyElement& e, std::uint64_t present) {
+  return {Errc::invalid_file, source + ": element " + in_quotes(e.name) + " promises " +
+                                  std::to_string(e.count) + " rows, " + std::to_string(present) +
+                                  " are there"};
+}
+
 }  // namespace gsnav::io::detail

@@ -52,4 +52,7 @@ struct PlyHeader {
 /// Parses the text up to end_header. Errors name `source`, the line's number and the word.
 Result<PlyHeader> parse_ply_header(std::span<const std::byte> bytes, const std::string& source);
 
+/// The error of an element of which only `present` rows are there.
+Status ply_rows_missing(const std::string& source, const PlyElement& e, std::uint64_t present);
+
 }  // namespace gsnav::io::detail

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "file.hpp"
+#include "quantised.hpp"
 #include "sog_meta.hpp"
 #include "webp.hpp"
 #include "zip.hpp"
@@ -204,15 +205,9 @@ class SogReader {
     if (p[3] < kFirstMode) {
       return quats_.fail(i, "quaternion mode " + std::to_string(p[3]) + ", must be 252 to 255");
     }
-    double q[4], sum = 0;
-    const std::size_t largest = static_cast<std::size_t>(p[3] - kFirstMode);
-    for (std::size_t k = 0, stored = 0; k < 4; ++k) {
-      if (k == largest) continue;
-      q[k] = (p[stored++] / 255.0 - 0.5) * std::sqrt(2.0);
-      sum += q[k] * q[k];
-    }
-    q[largest] = std::sqrt(std::fmax(0.0, 1.0 - sum));
-    quat = {q[0], q[1], q[2], q[3]};
+    double others[3];
+    for (std::size_t k = 0; k < 3; ++k) others[k] = (p[k] / 255.0 - 0.5) * std::sqrt(2.0);
+    quat = detail::quat_without(static_cast<std::size_t>(p[3] - kFirstMode), others);
     return {};
   }
 

@@ -5,6 +5,7 @@
 
 #include "file.hpp"
 #include "json.hpp"
+#include "quantised.hpp"
 #include "zip.hpp"
 
 namespace gsnav::io::detail {
@@ -110,11 +111,7 @@ class MetaParser {
     }
     meta_.log_scales.fill(codebook("scales", scales));
     meta_.dc.fill(codebook("sh0", sh0));
-    for (std::size_t a = 0; a < kBytes; ++a) {
-      // The sigmoid of this logit is a / 255; its ends are the infinities.
-      const double value = static_cast<double>(a);
-      meta_.opacity_logits.push_back(std::log(value / (255.0 - value)));
-    }
+    for (unsigned a = 0; a < kBytes; ++a) meta_.opacity_logits.push_back(opacity_logit(a));
     const Json* rest = member(json_, "shN");
     if (rest == nullptr || rest->is_null()) return;
     std::int64_t bands = 0, palette = 0;

@@ -12,6 +12,7 @@
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/sog.hpp"
+#include "ply_compressed_file.hpp"
 #include "sog_file.hpp"
 
 // Files with a byte changed, dropped or doubled: a loader returns a Status that names the file or a
@@ -102,6 +103,21 @@ TEST_CASE("mutations: ply") {
       return check_cloud(io::parse_ply(bytes_of(header + rows), "some.ply"));
     });
   }
+}
+
+TEST_CASE("mutations: compressed ply") {
+  CompressedPlyFile file;
+  file.rest = 9;
+  file.rows = random_rows(6, 9, 2);
+  const Tally t = feed(file.text(), 3000, 9, "some.ply", [](const std::string& text) {
+    return check_cloud(io::parse_ply(bytes_of(text), "some.ply"));
+  });
+  CHECK(t.ok > 100);
+  CHECK(t.failed > 100);
+  const std::string rows = file.text().substr(file.header().size());
+  feed(file.header(), 3000, 10, "some.ply", [&](const std::string& header) {
+    return check_cloud(io::parse_ply(bytes_of(header + rows), "some.ply"));
+  });
 }
 
 TEST_CASE("mutations: each file of a SOG, and its bundle") {

@@ -5,7 +5,6 @@
 #include "allocations.hpp"
 #include "gsnav/io/ply.hpp"
 #include "ply_file.hpp"
-#include "support/data.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -142,7 +141,7 @@ TEST_CASE("ply: headers that make no sense") {
   check_fails(endless, Errc::invalid_file, "longer than 1 MiB");
 }
 
-TEST_CASE("ply: what is no file, what is compressed") {
+TEST_CASE("ply: what is no file") {
   TempFolder folder("ply_bad");
   CHECK(io::load_ply(folder / "none.ply").code() == Errc::file_not_found);
   CHECK(contains(io::load_ply(folder / "none.ply").message(), "none.ply"));
@@ -151,12 +150,4 @@ TEST_CASE("ply: what is no file, what is compressed") {
   // Nobody writes to the pipe: whoever opens it waits.
   REQUIRE(::mkfifo((folder / "pipe.ply").c_str(), 0600) == 0);
   CHECK(io::load_ply(folder / "pipe.ply").code() == Errc::file_not_found);
-  for (const char* name :
-       {"splats/statues/angel.compressed.ply", "splats/playcanvas/guitar.compressed.ply"}) {
-    const std::string path = data_file(name);
-    if (path.empty()) continue;
-    const auto result = io::load_ply(path);
-    CHECK(result.code() == Errc::unsupported);
-    CHECK(contains(result.message(), "compressed PLY"));
-  }
 }

@@ -19,9 +19,13 @@ namespace gsnav::io {
 /// properties; of 72 (degree 4) the bands up to degree 3 are read, with a warning. A comment
 /// `SplatRenderMode: mip` or `antialiased 1` sets the cloud's filter to mip.
 ///
+/// PlayCanvas' compressed PLY (`.compressed.ply`) is told by its header and read too: `chunk` with 12 or
+/// 18 float properties, `vertex` with four packed uint, and optionally `sh` with 9, 24, 45 or 72 uchar.
+///
 /// Rows that hold no drawable Gaussian are dropped and counted in the report. Errors: file_not_found;
 /// invalid_file (malformed header, fewer rows than promised, a property missing or twice, a count of
-/// f_rest that is none of the above); unsupported (compressed PLY, list properties of a vertex);
+/// f_rest that is none of the above, chunks that do not fit the vertices); unsupported (list properties
+/// of a vertex, a compressed PLY with lists or in another format than binary_little_endian);
 /// out_of_memory. Never throws.
 Result<LoadedCloud> load_ply(const std::filesystem::path& path);
 

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "ply_header.hpp"
+
+namespace gsnav::io::detail {
+
+/// Whether the header is that of PlayCanvas' compressed PLY.
+bool is_compressed_ply(const PlyHeader& header);
+
+/// Reads PlayCanvas' compressed PLY: 256 Gaussians share a row of `chunk`, the bounds that the packed
+/// integers of `vertex` are fractions of; the optional `sh` has a byte for each f_rest_*.
+/// `bytes` is the whole file. Errors as parse_ply.
+Result<LoadedCloud> parse_compressed_ply(std::span<const std::byte> bytes, const PlyHeader& header,
+                                         const std::string& source);
+
+}  // namespace gsnav::io::detail

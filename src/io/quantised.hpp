@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+#include "gsnav/kernels/sh.hpp"
+#include "gsnav/math/quat.hpp"
+
+namespace gsnav::io::detail {
+
+/// The logit whose sigmoid is byte / 255; the ends are the infinities.
+inline double opacity_logit(unsigned byte) noexcept {
+  const double value = static_cast<double>(byte);
+  return std::log(value / (255.0 - value));
+}
+
+/// The SH coefficient of degree 0 that is drawn as a colour in [0, 1].
+inline float sh0_of_colour(double colour) noexcept { return static_cast<float>((colour - 0.5) / kSh0); }
+
+/// Three components of a unit quaternion (w, x, y, z without the one at `largest`); the fourth, the
+/// largest, is what unit length leaves, and positive.
+inline Quatd quat_without(std::size_t largest, const double (&others)[3]) noexcept {
+  double q[4], sum = 0;
+  for (std::size_t k = 0, stored = 0; k < 4; ++k) {
+    if (k == largest) continue;
+    q[k] = others[stored++];
+    sum += q[k] * q[k];
+  }
+  q[largest] = std::sqrt(std::fmax(0.0, 1.0 - sum));
+  return {q[0], q[1], q[2], q[3]};
+}
+
+}  // namespace gsnav::io::detail
