@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/kernels/camera.hpp"
+#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/ops/render.hpp"
+#include "gsnav/ops/render_config.hpp"
+
+namespace gsnav::eval {
+
+/// What the image of a set of Gaussians is taken to be. An error figure names the kind it is against.
+enum class OracleKind : std::uint8_t {
+  contract,     ///< docs/accuracy.md, "The image"
+  untruncated,  ///< the contract without alpha_min and transmittance_min; max_alpha stays
+  ray,          ///< maximum response along each pixel's ray: the model error of EWA
+};
+
+/// What decides which Gaussian is in front. Ties go by stable id (set, row).
+enum class OracleOrder : std::uint8_t {
+  own,          ///< the kind's: float32_key, but per_ray for OracleKind::ray
+  float32_key,  ///< the contract's: the very key that renderers sort by
+  float64,      ///< the same quantity in float64
+  per_ray,      ///< at each pixel by the depth along its ray, the one that depth images show
+};
+
+/// Half-open rectangle of pixels [x0, x1) x [y0, y1).
+struct PixelRect {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+
+  bool empty() const noexcept { return x0 >= x1 || y0 >= y1; }
+  std::size_t width() const noexcept { return empty() ? 0 : static_cast<std::size_t>(x1 - x0); }
+  std::size_t height() const noexcept { return empty() ? 0 : static_cast<std::size_t>(y1 - y0); }
+  PixelRect intersection(const PixelRect& o) const noexcept {
+    return {max(x0, o.x0), max(y0, o.y0), min(x1, o.x1), min(y1, o.y1)};
+  }
+};
+
+/// Which oracle, by which rules.
+struct OracleConfig {
+  /// Rules of the image. `outputs`, `profile` and `tile_size` mean nothing here: every image is made, in
+  /// float64, without tiles. `response` and `compat` must be the contract's.
+  RenderConfig rules{};
+  OracleKind kind = OracleKind::contract;
+  OracleOrder order = OracleOrder::own;
+  /// true: each Gaussian is asked only at the pixels of the box where its alpha may pass; for `contract`
+  /// and `ray` the image is that of false, bit for bit. false: every Gaussian at every pixel.
+  /// `untruncated` with boxes leaves alpha < kNegligibleAlpha out.
+  bool boxed = true;
+  PixelRect crop{};  ///< what to render of the camera's image; all 0: everything
+};
+
+/// Below this the boxes of OracleKind::untruncated leave a Gaussian out. A pixel's colour is linear in each
+/// alpha with a slope of at most c, the largest colour component (background included), so n Gaussians
+/// left out move it by less than n c 2^-40 and its alpha by n 2^-40: 9.1e-7 c for a million.
+inline constexpr double kLog2NegligibleAlpha = -40;
+inline constexpr double kNegligibleAlpha = 0x1p-40;
+
+/// Where float32 may rightly take the other side of a comparison: relative distance of a float64 alpha
+/// from alpha_min and of T from the stop; absolute distance of T from a depth's crossing.
+inline constexpr double kUndecidedRelative = 1e-5;
+inline constexpr double kUndecidedCrossing = 1e-3;
+
+/// What an oracle's image was made of.
+struct OracleCounts {
+  std::uint64_t gaussians = 0;    ///< in all sets
+  std::uint64_t visible = 0;      ///< whose box reaches the crop
+  std::uint64_t listed = 0;       ///< (pixel, Gaussian) pairs that were asked, if the pixel was open
+  std::uint64_t evaluations = 0;  ///< pairs blended: what a renderer cannot do without
+  std::uint64_t order_flips = 0;  ///< pixels marked in order_flip
+
+  OracleCounts& operator+=(const OracleCounts& o) noexcept {
+    gaussians += o.gaussians;
+    visible += o.visible;
+    listed += o.listed;
+    evaluations += o.evaluations;
+    order_flips += o.order_flips;
+    return *this;
+  }
+};
+
+/// Images of one camera (or its crop) in float64, row-major from the top-left pixel. Masks: 0 or 1.
+struct OracleFrames {
+  std::size_t width = 0, height = 0;
+  std::vector<double> rgb;                ///< [H][W][3], over the background, unclamped
+  std::vector<double> alpha;              ///< [H][W], 1 - transmittance
+  std::vector<double> median_depth;       ///< [H][W] metres, where T crosses 1/2; 0: no return
+  std::vector<double> expected_depth;     ///< [H][W] metres, sum(w z) / sum(w); 0 where sum(w) = 0
+  std::vector<double> accumulated_depth;  ///< [H][W] metres, sum(w z)
+  std::vector<double> first_hit_depth;    ///< [H][W] metres, where alpha reaches first_hit_tau; 0: never
+  /// A Gaussian met before the stop has alpha within kUndecidedRelative of alpha_min, or one takes T
+  /// within kUndecidedRelative of transmittance_min.
+  std::vector<std::uint8_t> undecided;
+  /// A Gaussian takes T within kUndecidedCrossing of 1/2 or of 1 - first_hit_tau.
+  std::vector<std::uint8_t> undecided_depth;
+  /// The Gaussians blended here stand in another order by float64 (where the image is by the float32 key)
+  /// or by the float32 key (where it is by anything else). Exact: a list is out of order if and only if
+  /// two neighbours in it are.
+  std::vector<std::uint8_t> order_flip;
+  OracleCounts counts;
+
+  void resize(std::size_t w, std::size_t h) {
+    width = w;
+    height = h;
+    rgb.assign(3 * w * h, 0.0);
+    for (auto* image : {&alpha, &median_depth, &expected_depth, &accumulated_depth, &first_hit_depth}) {
+      image->assign(w * h, 0.0);
+    }
+    for (auto* mask : {&undecided, &undecided_depth, &order_flip}) mask->assign(w * h, 0);
+  }
+};
+
+/// Names the field that cannot be, or ok.
+inline Status validate(const OracleConfig& c, const Camera& camera) {
+  if (Status s = gsnav::validate(c.rules); !s) return s;
+  if (Status s = gsnav::validate(camera); !s) return s;
+  if (c.rules.response != Response::ewa) {
+    return {Errc::unsupported,
+            "OracleConfig.rules.response: oracles know Response::ewa only; OracleKind::ray is the exact "
+            "response"};
+  }
+  if (c.rules.compat != Compat::none) {
+    return {Errc::unsupported, "OracleConfig.rules.compat: no kind of oracle has other renderers' rules"};
+  }
+  const PixelRect& r = c.crop;
+  const bool whole = r.x0 == 0 && r.y0 == 0 && r.x1 == 0 && r.y1 == 0;
+  if (!whole && (r.empty() || r.x0 < 0 || r.y0 < 0 || r.x1 > camera.width || r.y1 > camera.height)) {
+    return {Errc::invalid_argument,
+            std::string("OracleConfig.crop = [") + std::to_string(r.x0) + ", " + std::to_string(r.x1) +
+                ") x [" + std::to_string(r.y0) + ", " + std::to_string(r.y1) +
+                "): must hold a pixel and lie inside the image, or be all 0"};
+  }
+  return {};
+}
+
+/// The pixels that a config asks for.
+inline PixelRect oracle_rect(const OracleConfig& c, const Camera& camera) noexcept {
+  return c.crop.empty() ? PixelRect{0, 0, camera.width, camera.height} : c.crop;
+}
+
+}  // namespace gsnav::eval

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/parallel.hpp"
+#include "gsnav/eval/oracle_config.hpp"
+#include "gsnav/kernels/depth.hpp"
+#include "gsnav/kernels/project_chunk.hpp"
+#include "gsnav/kernels/projection.hpp"
+
+// From sets of Gaussians to one sorted list of records: what oracles of every kind share, and the
+// contract's own model of a Gaussian.
+
+namespace gsnav::eval::detail {
+
+/// One set as a camera sees it.
+struct OracleSet {
+  GaussianSet set;
+  ProjectionCamera<double> camera;
+  std::vector<Vec3d> offsets;            ///< origin - camera, asset frame
+  std::vector<Vec3<float>> offsets_f;    ///< the same rounded: what keys are made of
+  std::size_t first_id = 0;              ///< stable id of row 0
+
+  OracleSet(const GaussianSet& s, const Camera& c, const RenderConfig& rules, std::size_t first)
+      : set(s), camera(make_projection_camera<double>(c, s, projection_rules(rules))), first_id(first) {
+    const Vec3d eye = inverse(s.world_from_asset) * c.position();
+    const View<const Vec3d> table = s.gaussians.origins;
+    for (std::size_t o = 0; o < (table.empty() ? 1 : table.size); ++o) {
+      offsets.push_back((table.empty() ? Vec3d{} : table[o]) - eye);
+      offsets_f.push_back(vec_cast<float>(offsets.back()));
+    }
+  }
+  std::size_t origin(std::size_t row) const noexcept {
+    return set.gaussians.origin_ids.empty() ? 0 : set.gaussians.origin_ids[row];
+  }
+  Vec3<float> mean(std::size_t row) const noexcept {
+    const GaussianView& g = set.gaussians;
+    return {g.means[0][row], g.means[1][row], g.means[2][row]};
+  }
+  /// mean - camera position, asset frame.
+  Vec3d delta(std::size_t row) const noexcept {
+    return vec_cast<double>(mean(row)) + offsets[origin(row)];
+  }
+  /// Depth of the centre in float32, as every backend culls and sorts by it.
+  float z_key(std::size_t row) const noexcept {
+    return depth_key(camera.key_rotation, camera.key_scale, mean(row), offsets_f[origin(row)]);
+  }
+  /// The contract's near rules.
+  bool in_front(std::size_t row, const SplatAxes<double>& axes) const noexcept {
+    return z_key(row) > camera.near_plane &&
+           (!(camera.near_sigma > 0) || axes.position.z > camera.near_sigma * norm(axes.factor.row[2]));
+  }
+};
+
+/// Pixels whose centre lies within the half sizes of the centre, in the image.
+inline PixelRect pixels_within(const ProjectionCamera<double>& camera, double center_x, double half_x,
+                               double center_y, double half_y) noexcept {
+  PixelRect r;
+  gsnav::detail::pixel_range(center_x, half_x, camera.width, r.x0, r.x1);
+  gsnav::detail::pixel_range(center_y, half_y, camera.height, r.y0, r.y1);
+  return r;
+}
+
+/// A Gaussian by the contract: the shared kernels in double.
+struct EwaModel {
+  double mean_x, mean_y, a, k, b, log2_opacity;
+  SplatDepth<double> ray;
+
+  /// False: not drawn. `box` holds every pixel with alpha >= 2^log2_cut.
+  static bool make(const OracleSet& s, std::size_t row, double log2_cut, EwaModel& out,
+                   PixelRect& box) noexcept {
+    const SplatAxes<double> axes =
+        gsnav::detail::load_axes(s.set.gaussians, s.camera, s.delta(row), row);
+    if (!s.in_front(row, axes)) return false;
+    const float opacity = s.set.gaussians.opacities[row];
+    Projected<double> p = project<double, float>(s.camera, axes, s.z_key(row),
+                                                 static_cast<double>(opacity));
+    // What overflows float32 is not drawn, by any backend.
+    constexpr double huge = 3e38;
+    const double determinant = std::pow(kWhitenScale, 4) / (p.a * p.a * p.b * p.b);
+    if (!(p.log2_opacity >= log2_cut && opacity > 0 && determinant <= huge && p.variance_x <= huge &&
+          p.variance_y <= huge && abs(p.mean_x) <= huge && abs(p.mean_y) <= huge)) {
+      return false;
+    }
+    p.s_max = max(p.s_max, 0.0);  // fainter than alpha_min throughout: depth of the centre
+    out = {p.mean_x, p.mean_y, p.a, p.k, p.b, p.log2_opacity, make_splat_depth(s.camera, axes, p)};
+    // q = k^2 touches x = mean +- k sqrt(A); the pad is a hundred times its rounding.
+    const double k = sqrt(2 * kLn2 * (p.log2_opacity - log2_cut)) * (1 + 1e-9);
+    box = pixels_within(s.camera, p.mean_x, k * sqrt(p.variance_x) + 1e-12 * abs(p.mean_x), p.mean_y,
+                        k * sqrt(p.variance_y) + 1e-12 * abs(p.mean_y));
+    return true;
+  }
+  /// log2 of alpha before max_alpha.
+  double log2_alpha(double px, double py) const noexcept {
+    const double dx = px - mean_x, dy = py - mean_y;
+    const double w1 = a * dx, w2 = k * dx + b * dy;
+    return log2_opacity - (w1 * w1 + w2 * w2);
+  }
+  double depth(double px, double py) const noexcept { return ray_depth(ray, px, py); }
+};
+
+/// A Gaussian ready to be blended.
+template <class Model>
+struct OracleRecord {
+  Model model;
+  Vec3d color;
+  PixelRect box;            ///< within the crop; may be empty where boxes are not used
+  std::uint32_t id;         ///< stable
+  std::uint32_t rank;       ///< place in the order that order_flip compares with
+};
+
+/// The rules of blending, limits in the form they are compared in.
+struct OracleRules {
+  double log2_alpha_min, max_alpha, transmittance_min, first_hit_tau;
+  Vec3d background;
+};
+
+/// Records in the order of the image (of float32 keys for OracleOrder::per_ray), for one camera and crop.
+template <class Model>
+struct OracleScene {
+  std::vector<OracleRecord<Model>> records;
+  OracleRules rules;
+  PixelRect rect;
+  double log2_cut;  ///< fainter pairs need not be asked
+  bool boxed, per_ray;
+  OracleCounts counts;
+};
+
+struct OracleCandidate {
+  double key64;
+  std::uint32_t code, id;
+};
+
+inline constexpr std::size_t kOracleChunk = 2048;
+
+/// Candidates of all sets by stable id: what is drawn and, where boxes are used, reaches the crop.
+template <class Model, Backend B>
+std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const OracleSet> sets,
+                                               OracleScene<Model>& scene) {
+  std::vector<OracleCandidate> all;
+  for (const OracleSet& s : sets) {
+    const std::size_t n = s.set.gaussians.size, chunks = (n + kOracleChunk - 1) / kOracleChunk;
+    std::vector<std::vector<OracleCandidate>> found(chunks);
+    std::vector<std::uint64_t> reaching(chunks);
+    backend.parallel_for(chunks, [&](std::size_t c) {
+      for (std::size_t row = c * kOracleChunk; row < std::min(n, (c + 1) * kOracleChunk); ++row) {
+        Model model;
+        PixelRect box;
+        if (!Model::make(s, row, scene.log2_cut, model, box)) continue;
+        const bool reaches = !box.intersection(scene.rect).empty();
+        reaching[c] += reaches ? 1 : 0;
+        if (scene.boxed && !reaches) continue;
+        const bool by_z = s.camera.sort_order == SortOrder::z_depth;
+        const Vec3d delta = s.delta(row);
+        const float key = by_z ? s.z_key(row)
+                               : distance_key(s.camera.key_scale, s.mean(row), s.offsets_f[s.origin(row)]);
+        const double key64 = by_z ? dot(s.camera.rotation.row[2], delta) : norm(delta);
+        found[c].push_back({key64 * s.camera.scale, s.camera.key_code(key),
+                            static_cast<std::uint32_t>(s.first_id + row)});
+      }
+    });
+    for (std::size_t c = 0; c < chunks; ++c) {
+      all.insert(all.end(), found[c].begin(), found[c].end());
+      scene.counts.visible += reaching[c];
+    }
+    scene.counts.gaussians += n;
+  }
+  return all;
+}
+
+/// Projects, culls and sorts. Holds sizeof(OracleRecord) + 24 bytes a visible Gaussian.
+template <class Model, Backend B>
+OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> gaussian_sets,
+                                     const Camera& camera, const OracleConfig& config) {
+  const RenderConfig& c = config.rules;
+  const bool truncated = config.kind != OracleKind::untruncated;
+  const double infinity = std::numeric_limits<double>::infinity();
+  OracleScene<Model> scene;
+  scene.rules = {truncated ? std::log2(c.alpha_min) : -infinity, c.max_alpha,
+                 truncated ? c.transmittance_min : 0.0, c.first_hit_tau, c.background};
+  scene.rect = oracle_rect(config, camera);
+  scene.boxed = config.boxed;
+  scene.per_ray = config.order == OracleOrder::per_ray ||
+                  (config.order == OracleOrder::own && config.kind == OracleKind::ray);
+  // What falls short of alpha_min by less than the undecided margin has to be seen too.
+  scene.log2_cut = truncated      ? scene.rules.log2_alpha_min - 3 * kUndecidedRelative
+                   : config.boxed ? kLog2NegligibleAlpha
+                                  : -infinity;
+
+  std::vector<OracleSet> sets;
+  std::size_t total = 0;
+  for (const GaussianSet& s : gaussian_sets) {
+    sets.emplace_back(s, camera, c, total);
+    total += s.gaussians.size;
+  }
+  std::vector<OracleCandidate> order = oracle_candidates<Model>(backend, sets, scene);
+  const auto by_code = [](const OracleCandidate& a, const OracleCandidate& b) {
+    return a.code != b.code ? a.code < b.code : a.id < b.id;
+  };
+  const auto by_key64 = [](const OracleCandidate& a, const OracleCandidate& b) {
+    return a.key64 != b.key64 ? a.key64 < b.key64 : a.id < b.id;
+  };
+  const bool in_float64 = config.order == OracleOrder::float64;
+  if (in_float64) {
+    std::sort(order.begin(), order.end(), by_key64);
+  } else {
+    std::sort(order.begin(), order.end(), by_code);
+  }
+  // Places in the other order, for order_flip; by pixel, the order of the list is the other one.
+  std::vector<std::uint32_t> place(order.size()), rank(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) place[i] = static_cast<std::uint32_t>(i);
+  if (!scene.per_ray) {
+    std::sort(place.begin(), place.end(), [&](std::uint32_t i, std::uint32_t j) {
+      return in_float64 ? by_code(order[i], order[j]) : by_key64(order[i], order[j]);
+    });
+  }
+  for (std::size_t i = 0; i < order.size(); ++i) rank[place[i]] = static_cast<std::uint32_t>(i);
+
+  scene.records.resize(order.size());
+  backend.parallel_for((order.size() + kOracleChunk - 1) / kOracleChunk, [&](std::size_t chunk) {
+    for (std::size_t i = chunk * kOracleChunk; i < std::min(order.size(), (chunk + 1) * kOracleChunk); ++i) {
+      const auto after = std::upper_bound(sets.begin(), sets.end(), order[i].id,
+                                          [](std::uint32_t id, const OracleSet& s) { return id < s.first_id; });
+      const OracleSet& s = *std::prev(after);
+      const std::size_t row = order[i].id - s.first_id;
+      OracleRecord<Model>& record = scene.records[i];
+      Model::make(s, row, scene.log2_cut, record.model, record.box);
+      record.box = record.box.intersection(scene.rect);
+      const SplatColor<double> color = gaussian_color<double>(
+          s.set.gaussians, min(s.set.gaussians.sh_degree, c.max_sh_degree), row, s.delta(row));
+      record.color = {color.r, color.g, color.b};
+      record.id = order[i].id;
+      record.rank = rank[i];
+    }
+  });
+  return scene;
+}
+
+}  // namespace gsnav::eval::detail

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "gsnav/eval/oracle_project.hpp"
+#include "gsnav/math/mat.hpp"
+
+namespace gsnav::eval::detail {
+
+/// A Gaussian by its largest response along each pixel's ray r = (u, v, 1), camera axes:
+///     q = (mu x r)' S (mu x r) / (r' adj(S) r),   S = Sigma + h diag((z/fx)^2, (z/fy)^2, 0),
+/// found at depth z - z (r' adj(S) d) / (r' adj(S) r), d = r - mu / z. S is the dilation of the contract
+/// carried to the mean's depth, and adj(S) = sum of n n' over the cross products n of two columns of S's
+/// factor (Cauchy-Binet), so that nothing cancels and nothing is inverted. A Gaussian whose response is
+/// largest behind the camera is not seen by that ray. No Jacobian, hence none of its limits.
+struct RayModel {
+  Mat3d factor;          ///< columns: axes times standard deviations, asset units
+  Vec3d dilation;        ///< diagonal of S - Sigma
+  Mat3d adjugate;        ///< adj(S)
+  double u, v, z;        ///< ray through the mean; its depth, asset units
+  double fx, fy, cx, cy;
+  double log2_opacity, reach, scale;
+
+  /// False: not drawn. `box` holds every pixel with alpha >= 2^log2_cut.
+  static bool make(const OracleSet& s, std::size_t row, double log2_cut, RayModel& out,
+                   PixelRect& box) noexcept {
+    const ProjectionCamera<double>& c = s.camera;
+    const SplatAxes<double> axes = gsnav::detail::load_axes(s.set.gaussians, c, s.delta(row), row);
+    if (!s.in_front(row, axes)) return false;
+    out.factor = axes.factor;
+    out.z = axes.position.z;
+    out.u = axes.position.x / out.z;
+    out.v = axes.position.y / out.z;
+    out.fx = c.fx;
+    out.fy = c.fy;
+    out.cx = c.cx;
+    out.cy = c.cy;
+    out.scale = c.scale;
+    const double wide = sqrt(c.eps2d) * out.z / c.fx, high = sqrt(c.eps2d) * out.z / c.fy;
+    out.dilation = {wide * wide, high * high, 0};
+    const Vec3d columns[5] = {axes.factor.column(0), axes.factor.column(1), axes.factor.column(2),
+                              {wide, 0, 0}, {0, high, 0}};
+    const Vec3d mean_ray{out.u, out.v, 1};
+    double area0 = 0, area = 0;  // of the outline's plane, without and with the dilation
+    out.adjugate = {};
+    for (int i = 0; i < 5; ++i) {
+      for (int j = i + 1; j < 5; ++j) {
+        const Vec3d n = cross(columns[i], columns[j]);
+        for (int k = 0; k < 3; ++k) out.adjugate.row[k] = out.adjugate.row[k] + n * n[k];
+        const double across = dot(n, mean_ray);
+        area += across * across;
+        if (j < 3) area0 += across * across;
+      }
+    }
+    double opacity = static_cast<double>(s.set.gaussians.opacities[row]);
+    if (c.mip) opacity *= sqrt(area0 / area);
+    out.log2_opacity = std::log2(opacity);
+    if (!(opacity > 0 && out.log2_opacity >= log2_cut && out.z > 0 && is_finite(area))) return false;
+    const double sigma_z = norm(axes.factor.row[2]);
+    out.reach = sqrt(max(2 * kLn2 * (out.log2_opacity - c.log2_alpha_min), 0.0)) * sigma_z;
+    box = out.outline(c, 2 * kLn2 * (out.log2_opacity - log2_cut));
+    return true;
+  }
+
+  double log2_alpha(double px, double py) const noexcept {
+    const double du = (px - cx) / fx - u, dv = (py - cy) / fy - v;
+    const Vec3d r{u + du, v + dv, 1}, turned = adjugate * r;
+    const double response = dot(r, turned);
+    if (!(response > du * turned.x + dv * turned.y)) return -std::numeric_limits<double>::infinity();
+    const Vec3d n{-dv * z, du * z, (u * dv - v * du) * z};  // mu x r
+    double q = dilation.x * n.x * n.x + dilation.y * n.y * n.y;
+    for (int k = 0; k < 3; ++k) {
+      const double along = factor(0, k) * n.x + factor(1, k) * n.y + factor(2, k) * n.z;
+      q += along * along;
+    }
+    return log2_opacity - q / response * (0.5 / kLn2);
+  }
+
+  /// Limited like the contract's: standard deviations along the view axis around the centre.
+  double depth(double px, double py) const noexcept {
+    const double du = (px - cx) / fx - u, dv = (py - cy) / fy - v;
+    const Vec3d r{u + du, v + dv, 1}, turned = adjugate * r;
+    const double off = -z * (du * turned.x + dv * turned.y) / dot(r, turned);
+    return (z + clamp(off, -reach, reach)) * scale;
+  }
+
+ private:
+  /// Pixels inside the outline of the ellipsoid q = k2. Its extent in u around the mean's, d, solves
+  /// (d z)^2 = k2 (X - 2 d Y + d^2 Z), X, Y, Z the covariance of (x - u z, z); it is bounded where the
+  /// ellipsoid lies wholly before the camera.
+  PixelRect outline(const ProjectionCamera<double>& c, double k2) const noexcept {
+    const double depth2 = dot(factor.row[2], factor.row[2]);
+    const double front = z * z - k2 * depth2;
+    // Closer to the camera than this, rounding decides the extent.
+    if (!(front > 1e-6 * z * z)) return {0, 0, c.width, c.height};
+    const auto extent = [&](double slope, int axis, double& center, double& half) {
+      const Vec3d across = factor.row[axis] - factor.row[2] * slope;
+      const double x = dot(across, across) + dilation[axis], y = dot(across, factor.row[2]);
+      center = -k2 * y / front;
+      half = sqrt(k2 * (k2 * y * y + front * x)) / front * (1 + 1e-8);
+    };
+    double center_u, half_u, center_v, half_v;
+    extent(u, 0, center_u, half_u);
+    extent(v, 1, center_v, half_v);
+    const double mean_x = cx + fx * u, mean_y = cy + fy * v;
+    // 1e-8 of the offset as well: `front` is a difference.
+    return pixels_within(c, mean_x + fx * center_u, fx * (half_u + 1e-8 * abs(center_u)) + 1e-12 * abs(mean_x),
+                         mean_y + fy * center_v, fy * (half_v + 1e-8 * abs(center_v)) + 1e-12 * abs(mean_y));
+  }
+};
+
+}  // namespace gsnav::eval::detail

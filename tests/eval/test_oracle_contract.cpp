@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+// The float64 oracle of the contract against closed forms, the long double oracle and Brush's images.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "eval/oracle_support.hpp"
+#include "gsnav/kernels/sh.hpp"
+#include "hard_cases/cases.hpp"
+#include "support/data.hpp"
+#include "support/oracle.hpp"
+#include "support/safetensors.hpp"
+#include "support/scenes.hpp"
+
+using namespace gsnav;
+using namespace gsnav::eval;
+using namespace gsnav_test;
+
+namespace {
+
+double color_of(const GaussianCloud& cloud, std::size_t i, std::size_t channel) {
+  return 0.5 + kSh0 * static_cast<double>(cloud.sh0[3 * i + channel]);
+}
+
+RawGaussian opaque(const Vec3d& mean, const Vec3d& scales, const std::array<float, 3>& sh0) {
+  RawGaussian g = gaussian(mean, scales, 0.5, sh0);
+  g.opacity_logit = std::numeric_limits<double>::infinity();
+  return g;
+}
+
+}  // namespace
+
+TEST_CASE("oracle: one Gaussian on the axis, by its closed form") {
+  const GaussianCloud cloud = cloud_of({gaussian({0, 0, 2}, {0.1, 0.05, 0.2}, 0.8, {0.3f, -0.4f, 1.2f})});
+  const Camera camera = axis_camera();
+  OracleConfig config;
+  config.rules.background = {0.1, 0.2, 0.3};
+  const OracleFrames f = oracle({cloud.set()}, camera, config);
+  const double sx = static_cast<double>(cloud.scales[0][0]), sy = static_cast<double>(cloud.scales[1][0]),
+               sz = static_cast<double>(cloud.scales[2][0]), o = static_cast<double>(cloud.opacities[0]);
+  const double h = static_cast<double>(0.3f);
+  const double a = std::pow(64 * sx / 2, 2) + h, c = std::pow(64 * sy / 2, 2) + h;
+  const double reach = std::sqrt(2 * std::log(255 * o)) * sz;
+  std::uint64_t drawn = 0;
+  for (std::size_t p = 0; p < f.alpha.size(); ++p) {
+    const double dx = static_cast<double>(p % 65) - 32, dy = static_cast<double>(p / 65) - 32;
+    double alpha = o * std::exp(-0.5 * (dx * dx / a + dy * dy / c));
+    if (alpha < 1.0 / 255) alpha = 0;
+    CHECK(std::abs(f.alpha[p] - alpha) < 1e-13);
+    for (std::size_t ch = 0; ch < 3; ++ch) {
+      const double expected =
+          alpha * color_of(cloud, 0, ch) + (1 - alpha) * config.rules.background[static_cast<int>(ch)];
+      CHECK(std::abs(f.rgb[3 * p + ch] - expected) < 1e-13);
+    }
+    const double u = dx / 64, v = dy / 64;
+    const double z = (2 / (sz * sz)) / (u * u / (sx * sx) + v * v / (sy * sy) + 1 / (sz * sz));
+    const double depth = alpha > 0 ? std::clamp(z, 2 - reach, 2 + reach) : 0;
+    CHECK(std::abs(f.expected_depth[p] - depth) < 1e-12);
+    CHECK(std::abs(f.accumulated_depth[p] - alpha * depth) < 1e-12);
+    CHECK(std::abs(f.median_depth[p] - (alpha >= 0.5 ? depth : 0)) < 1e-12);
+    drawn += alpha > 0 ? 1 : 0;
+  }
+  CHECK(f.counts.gaussians == 1);
+  CHECK(f.counts.visible == 1);
+  CHECK(f.counts.evaluations == drawn);
+  // The box is the ellipse's: 4 / pi of its pixels, and the rounding of its sides to whole pixels.
+  CHECK(f.counts.listed >= drawn);
+  CHECK(f.counts.listed < 1.5 * static_cast<double>(drawn));
+}
+
+TEST_CASE("oracle: two layers, their depths and what is marked undecided") {
+  const Vec3d wide{0.5, 0.5, 0.01};
+  const GaussianCloud cloud =
+      cloud_of({gaussian({0, 0, 4}, wide, 0.7, {1, 0, 0}), gaussian({0, 0, 2}, wide, 0.6, {0, 1, -1})});
+  OracleConfig config;
+  config.rules.first_hit_tau = 0.8;
+  config.rules.background = {1, 1, 1};
+  const OracleFrames f = oracle({cloud.set()}, axis_camera(), config);
+  const std::size_t center = 32 * 65 + 32;
+  const double o1 = static_cast<double>(cloud.opacities[1]), o2 = static_cast<double>(cloud.opacities[0]);
+  const double w1 = o1, w2 = (1 - o1) * o2, t = (1 - o1) * (1 - o2);
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double expected = w1 * color_of(cloud, 1, c) + w2 * color_of(cloud, 0, c) + t;
+    CHECK(std::abs(f.rgb[3 * center + c] - expected) < 1e-14);
+  }
+  CHECK(std::abs(f.alpha[center] - (1 - t)) < 1e-14);
+  CHECK(f.median_depth[center] == doctest::Approx(2).epsilon(1e-14));
+  CHECK(f.first_hit_depth[center] == doctest::Approx(4).epsilon(1e-14));
+  CHECK(f.accumulated_depth[center] == doctest::Approx(2 * w1 + 4 * w2).epsilon(1e-14));
+  CHECK(f.expected_depth[center] == doctest::Approx((2 * w1 + 4 * w2) / (w1 + w2)).epsilon(1e-14));
+  CHECK(f.undecided[center] == 0);
+  CHECK(f.undecided_depth[center] == 0);
+
+  const auto at_center = [&](const std::vector<RawGaussian>& g, const auto& mask, const OracleConfig& c = {}) {
+    return int{mask(oracle({cloud_of(g).set()}, axis_camera(), c))[center]};
+  };
+  const auto undecided = [](const OracleFrames& r) { return r.undecided; };
+  const auto undecided_depth = [](const OracleFrames& r) { return r.undecided_depth; };
+  CHECK(at_center({gaussian({0, 0, 2}, wide, (1 + 5e-6) / 255)}, undecided) == 1);
+  CHECK(at_center({gaussian({0, 0, 2}, wide, (1 + 5e-5) / 255)}, undecided) == 0);
+  // Twice max_alpha is T = 1e-4, the stop.
+  CHECK(at_center({opaque({0, 0, 2}, wide, {}), opaque({0, 0, 3}, wide, {})}, undecided) == 1);
+  CHECK(at_center({opaque({0, 0, 2}, wide, {}), gaussian({0, 0, 3}, wide, 0.98)}, undecided) == 0);
+  CHECK(at_center({gaussian({0, 0, 2}, wide, 0.4995)}, undecided_depth) == 1);
+  CHECK(at_center({gaussian({0, 0, 2}, wide, 0.498)}, undecided_depth) == 0);
+  CHECK(at_center({gaussian({0, 0, 2}, wide, 0.8005)}, undecided_depth, config) == 1);
+  CHECK(at_center({gaussian({0, 0, 2}, wide, 0.8005)}, undecided_depth) == 0);
+}
+
+TEST_CASE("oracle: a pixel is closed by the Gaussian that takes T below the stop, which counts") {
+  std::vector<RawGaussian> layers;
+  for (int i = 0; i < 5; ++i) layers.push_back(opaque({0, 0, 2.0 + i}, {0.5, 0.5, 0.01}, {}));
+  OracleConfig config;
+  config.rules.transmittance_min = 0.5e-4;
+  const GaussianCloud cloud = cloud_of(layers);
+  const std::size_t center = 32 * 65 + 32;
+  const OracleFrames f = oracle({cloud.set()}, axis_camera(), config);
+  CHECK(f.alpha[center] == doctest::Approx(1 - 1e-6).epsilon(1e-14));
+  config.crop = {32, 32, 33, 33};
+  CHECK(oracle({cloud.set()}, axis_camera(), config).counts.evaluations == 3);
+  config.kind = OracleKind::untruncated;
+  const OracleFrames u = oracle({cloud.set()}, axis_camera(), config);
+  CHECK(u.counts.evaluations == 5);
+  CHECK(u.alpha[0] == doctest::Approx(1 - 1e-10).epsilon(1e-14));
+}
+
+TEST_CASE("oracle: keys that tie in float32 and not in float64") {
+  // A kilometre away float32 keys are 6e-5 m apart; the first in the file stands 1e-6 m behind.
+  const Vec3d wide{100, 100, 1};
+  const GaussianCloud cloud = cloud_of({gaussian({0, 0, 1 + 0x1p-20}, wide, 0.6, {1, -1, 0}),
+                                        gaussian({0, 0, 1}, wide, 0.7, {-1, 1, 0})});
+  Camera camera = axis_camera();
+  camera.viewmat.translation = {0, 0, 1000.3};
+  const std::size_t center = 32 * 65 + 32;
+  for (const SortOrder sort : {SortOrder::z_depth, SortOrder::camera_distance}) {
+    OracleConfig config;
+    config.rules.sort_order = sort;
+    for (const OracleOrder order : {OracleOrder::float32_key, OracleOrder::float64}) {
+      config.order = order;
+      const OracleFrames f = oracle({cloud.set()}, camera, config);
+      const std::size_t front = order == OracleOrder::float32_key ? 0 : 1, back = 1 - front;
+      const double o1 = static_cast<double>(cloud.opacities[front]),
+                   o2 = static_cast<double>(cloud.opacities[back]);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double expected = o1 * color_of(cloud, front, c) + (1 - o1) * o2 * color_of(cloud, back, c);
+        CHECK(std::abs(f.rgb[3 * center + c] - expected) < 1e-12);
+      }
+      CHECK(f.order_flip[center] == 1);
+      CHECK(f.counts.order_flips ==
+            static_cast<std::uint64_t>(std::count(f.order_flip.begin(), f.order_flip.end(), 1)));
+      CHECK(f.order_flip[0] == 0);  // nothing reaches the corner
+    }
+  }
+}
+
+TEST_CASE("oracle: the long double oracle on random scenes") {
+  for (int seed = 0; seed < 4; ++seed) {
+    CAPTURE(seed);
+    CloudOptions options;
+    options.sh_degree = seed;
+    options.mip = seed % 2 == 1;
+    const GaussianCloud cloud = random_cloud(static_cast<std::uint64_t>(seed) + 50, options);
+    const GaussianCloud second = random_cloud(static_cast<std::uint64_t>(seed) + 60, {.count = 50});
+    Camera camera = Camera::look_at({0.3, -0.2, 0.5}, {0.1, 0.1, 4}, {0, -1, 0.1}, 60, 42, 80);
+    if (seed == 1) camera.cx = 11.5, camera.cy = 30.25, camera.fy = 44;
+    if (seed == 2) camera = Camera::look_at({0, 0, 4.2}, {1, 0.3, 3.5}, {0, -1, 0}, 48, 48, 110);
+    OracleConfig config;
+    config.rules.background = {0.2, 0.5, 0.7};
+    OracleOptions rules;
+    rules.background = config.rules.background;
+    const OracleImage truth = gsnav_test::oracle_render({&cloud, &second}, camera, rules);
+    const OracleFrames f = oracle({cloud.set(), second.set()}, camera, config);
+    CHECK(image_error(f.rgb, truth.rgb, 3, truth.undecided).max < 1e-11);
+    CHECK(image_error(f.alpha, truth.alpha, 1, truth.undecided).max < 1e-11);
+    for (std::size_t p = 0; p < f.alpha.size(); ++p) {
+      CHECK(bool{f.undecided[p] != 0} == truth.undecided[p]);
+      CHECK(bool{f.undecided_depth[p] != 0} == truth.undecided_depth[p]);
+      if (truth.undecided[p] || truth.undecided_depth[p]) continue;
+      CHECK(std::abs(f.median_depth[p] - static_cast<double>(truth.median[p])) < 1e-9);
+      CHECK(std::abs(f.first_hit_depth[p] - static_cast<double>(truth.first_hit[p])) < 1e-9);
+      CHECK(std::abs(f.accumulated_depth[p] - static_cast<double>(truth.accumulated[p])) < 1e-9);
+      CHECK(std::abs(f.expected_depth[p] - static_cast<double>(truth.expected[p])) < 1e-9);
+    }
+  }
+}
+
+TEST_CASE("oracle: Brush's reference images") {
+  for (const char* name : {"tiny_case", "basic_case"}) {
+    const std::string path = data_file(std::string("splats/brush_reference/") + name + ".safetensors");
+    if (path.empty()) continue;
+    CAPTURE(name);
+    auto t = read_safetensors(path);
+    GaussianCloudBuilder builder(3);
+    for (std::size_t i = 0; i < t["opacities"].size(); ++i) {
+      RawGaussian g;
+      for (std::size_t k = 0; k < 3; ++k) {
+        g.mean[static_cast<int>(k)] = t["means"][3 * i + k];
+        g.log_scales[static_cast<int>(k)] = t["scales"][3 * i + k];
+        g.sh0[k] = t["coeffs"][48 * i + k];
+      }
+      const float* q = t["quats"].data() + 4 * i;
+      g.quat = {q[0], q[1], q[2], q[3]};
+      g.opacity_logit = t["opacities"][i];
+      g.shN = t["coeffs"].data() + 48 * i + 3;
+      builder.add(g);
+    }
+    Camera camera;
+    camera.set_hfov(123, 82, 90);
+    camera.viewmat.translation = {-0.123, -0.456, 8.0};
+    OracleConfig config;
+    config.rules.max_alpha = 0.999;
+    config.rules.transmittance_min = 0;
+    const OracleFrames f = oracle({builder.cloud().set()}, camera, config);
+    const std::vector<float>& expected = t["out_img"];
+    double worst = 0;
+    for (std::size_t p = 0; p < f.alpha.size(); ++p) {
+      for (std::size_t c = 0; c < 4; ++c) {
+        const double value = c < 3 ? f.rgb[3 * p + c] : f.alpha[p];
+        worst = std::max(worst, std::abs(value - static_cast<double>(expected[4 * p + c])));
+      }
+    }
+    CHECK(worst < 1e-5);
+  }
+}
+
+TEST_CASE("oracle: what cannot be is named") {
+  const GaussianCloud cloud = cloud_of({gaussian({0, 0, 2}, {0.1, 0.1, 0.1}, 0.5)});
+  SerialBackend backend;
+  const auto message = [&](const OracleConfig& config, const Camera& camera = axis_camera()) {
+    const auto r = eval::oracle_render(backend, cloud.set(), camera, config);
+    CHECK(!r.ok());
+    return r.message();
+  };
+  OracleConfig config;
+  config.rules.response = Response::ray;
+  CHECK(message(config).find("rules.response") != std::string::npos);
+  config = {};
+  config.rules.compat = Compat::inria;
+  CHECK(message(config).find("rules.compat") != std::string::npos);
+  config = {};
+  config.rules.max_alpha = 2;
+  CHECK(message(config).find("max_alpha") != std::string::npos);
+  for (const PixelRect crop : {PixelRect{3, 3, 3, 5}, PixelRect{0, 0, 66, 10}, PixelRect{-1, 0, 5, 5}}) {
+    config = {};
+    config.crop = crop;
+    CHECK(message(config).find("crop") != std::string::npos);
+  }
+  Camera camera = axis_camera();
+  camera.fx = 0;
+  CHECK(message({}, camera).find("fx") != std::string::npos);
+  GaussianSet set = cloud.set();
+  set.eps2d = 0;
+  CHECK(eval::oracle_render(backend, set, axis_camera()).message().find("eps2d") != std::string::npos);
+  const auto nothing = eval::oracle_render(backend, std::span<const GaussianSet>(), axis_camera());
+  CHECK(nothing.value().alpha == std::vector<double>(65 * 65, 0.0));
+}
