@@ -12,8 +12,10 @@
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/sog.hpp"
+#include "gsnav/io/splat.hpp"
 #include "ply_compressed_file.hpp"
 #include "sog_file.hpp"
+#include "splat_file.hpp"
 
 // Files with a byte changed, dropped or doubled: a loader returns a Status that names the file or a
 // result that is whole, and asks for no more memory than such a small file can need.
@@ -118,6 +120,15 @@ TEST_CASE("mutations: compressed ply") {
   feed(file.header(), 3000, 10, "some.ply", [&](const std::string& header) {
     return check_cloud(io::parse_ply(bytes_of(header + rows), "some.ply"));
   });
+}
+
+TEST_CASE("mutations: splat") {
+  const Tally t = feed(splat_text(random_rows(6, 0, 2)), 3000, 11, "some.splat",
+                       [](const std::string& text) {
+                         return check_cloud(io::parse_splat(bytes_of(text), "some.splat"));
+                       });
+  CHECK(t.ok > 100);
+  CHECK(t.failed > 100);
 }
 
 TEST_CASE("mutations: each file of a SOG, and its bundle") {

@@ -98,14 +98,14 @@ TEST_CASE("scene: what cannot be read") {
     file.comments = "comment SplatRenderMode: mip\n";
     return file.text();
   }());
-  write_file(folder / "a.spz", "x");
+  write_file(folder / "a.lcc", "x");
   write_file(folder / "plain", "x");
   std::filesystem::create_directories(folder / "empty");
   std::filesystem::create_directories(folder / "streamed");
   write_file(folder / "streamed/lod-meta.json", "{}");
-  check_fails(at + "a.spz", Errc::unsupported, "a .ply, a .sog, a meta.json or a folder");
-  check_fails(at + "plain", Errc::unsupported, "a .ply, a .sog");
-  check_fails(at + "none.splat", Errc::file_not_found, "a .ply, a .sog");
+  check_fails(at + "a.lcc", Errc::unsupported, "or a folder");
+  check_fails(at + "plain", Errc::unsupported, "a .ply, ");
+  check_fails(at + "none.lcc", Errc::file_not_found, "a .ply, ");
   check_fails(at + "none.ply", Errc::file_not_found, "none.ply");
   check_fails(at + "empty", Errc::file_not_found, "no meta.json");
   check_fails(at + "streamed", Errc::file_not_found, "tiles");

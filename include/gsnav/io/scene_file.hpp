@@ -8,12 +8,12 @@
 
 namespace gsnav::io {
 
-/// Reads a scene of Gaussians by what its path names: a `.ply`, a `.sog`, a `meta.json`, or a folder
-/// with a meta.json.
+/// Reads a scene of Gaussians by what its path names: a `.ply`, `.splat` or `.sog`, a `meta.json`, or
+/// a folder with a meta.json.
 ///
 /// A comma names sibling tiles, which are merged into one cloud: `scenes/flat/2_0,2_1` reads
 /// scenes/flat/2_0 and scenes/flat/2_1. Their reports are summed, their warnings carry the tile's path.
-/// Errors: what load_ply and load_sog return; unsupported (an extension that is not in the list, named
+/// Errors: what the loaders of these formats return; unsupported (an extension that is not in the list, named
 /// with the list); invalid_argument (an empty name or a tile twice). Never throws.
 Result<LoadedCloud> load_scene(const std::string& spec);
 

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav::io {
+
+/// Reads antimatter15's `.splat`: records of 32 bytes and nothing else. Three float32 of position
+/// (metres), three of scale (linear, metres), colour and opacity as four bytes, the quaternion w, x, y,
+/// z as four bytes around 128. There are no SH bands, and nothing tells a file cut between two records.
+/// Untested on a real file.
+///
+/// Rows that hold no drawable Gaussian (also those of negative scale) are dropped and counted in the
+/// report. Errors: file_not_found; invalid_file (an empty file, a size that is no multiple of 32);
+/// out_of_memory. Never throws.
+Result<LoadedCloud> load_splat(const std::filesystem::path& path);
+
+/// The same for a file's bytes; `source` names them in messages and in the report.
+Result<LoadedCloud> parse_splat(std::span<const std::byte> bytes, std::string source);
+
+}  // namespace gsnav::io
