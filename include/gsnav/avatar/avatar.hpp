@@ -9,4 +9,5 @@
 #include "gsnav/avatar/motion.hpp"
 #include "gsnav/avatar/skeleton.hpp"
 #include "gsnav/avatar/skinned_gaussians.hpp"
+#include "gsnav/avatar/smpl_joints.hpp"
 #include "gsnav/avatar/trajectory.hpp"

@@ -9,6 +9,7 @@
 
 #include "gsnav/avatar/body_shape.hpp"
 #include "gsnav/avatar/skeleton.hpp"
+#include "gsnav/avatar/smpl_joints.hpp"
 
 namespace gsnav {
 
@@ -28,22 +29,6 @@ struct HumanoidOptions {
   Vec3d trousers{0.22, 0.23, 0.27};
   Vec3d shoes{0.13, 0.12, 0.12};
 };
-
-/// The 55 joint names of SMPL-X, in its order.
-inline const std::array<const char*, 55>& smplx_joint_names() noexcept {
-  static constexpr std::array<const char*, 55> kNames{
-      "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle",
-      "right_ankle", "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head",
-      "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "jaw",
-      "left_eye_smplhf", "right_eye_smplhf",
-      "left_index1", "left_index2", "left_index3", "left_middle1", "left_middle2", "left_middle3",
-      "left_pinky1", "left_pinky2", "left_pinky3", "left_ring1", "left_ring2", "left_ring3",
-      "left_thumb1", "left_thumb2", "left_thumb3",
-      "right_index1", "right_index2", "right_index3", "right_middle1", "right_middle2", "right_middle3",
-      "right_pinky1", "right_pinky2", "right_pinky3", "right_ring1", "right_ring2", "right_ring3",
-      "right_thumb1", "right_thumb2", "right_thumb3"};
-  return kNames;
-}
 
 namespace detail {
 
@@ -86,9 +71,7 @@ class HumanoidBuilder {
 
   void place_joints() {
     for (const char* n : smplx_joint_names()) skeleton.names.emplace_back(n);
-    skeleton.parents = {-1, 0,  0,  0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  9,  9,  12, 13, 14, 16,
-                        17, 18, 19, 15, 15, 15, 20, 25, 26, 20, 28, 29, 20, 31, 32, 20, 34, 35, 20,
-                        37, 38, 21, 40, 41, 21, 43, 44, 21, 46, 47, 21, 49, 50, 21, 52, 53};
+    skeleton.parents.assign(smplx_joint_parents().begin(), smplx_joint_parents().end());
     skeleton.rest_local.resize(55);
     const auto put = [&](const std::string& name, const Vec3d& p) { at_[joint(name)] = p; };
     put("pelvis", {0, 0.945, 0.005});

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "gsnav/avatar/asset.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/scene/load_report.hpp"
+
+namespace gsnav::io {
+
+/// What `shs` with one coefficient a Gaussian holds; files do not say.
+enum class AvatarColors : std::uint8_t {
+  guess,         ///< Habitat-GS's rule: RGB where every value of the file lies in [0, 1]
+  coefficients,  ///< SH coefficients
+  rgb,           ///< display colours
+};
+
+struct LoadAvatarOptions {
+  AvatarColors colors = AvatarColors::guess;
+  /// Names and parents of the joints. Empty: the file's own `joint_names` and `joint_parents`, else SMPL
+  /// for 24 joints and SMPL-X for 55.
+  std::vector<std::string> joint_names;
+  std::vector<std::int32_t> joint_parents;
+  /// Poses in which the error of dropping weights is measured: [pose][J] joint to root frame, metres.
+  std::vector<std::vector<Affine3<double>>> poses;
+  double weight_tolerance = 2e-4;  ///< metres; a Gaussian that is further off needs more influences
+};
+
+/// What keeping the greatest weights of each Gaussian has done to it, against all of the file's weights
+/// divided by their sum in double.
+struct WeightReport {
+  std::size_t most_weights = 0;    ///< that any kept Gaussian has above zero
+  double dropped_mass = 0.0;       ///< greatest share of a Gaussian's weight that was dropped
+  std::size_t poses = 0;           ///< in which the following are measured; 0: unknown
+  double position_error = 0.0;     ///< metres, greatest, with the four weights kept
+  double position_error_8 = 0.0;   ///< metres, greatest, had eight been kept
+  std::size_t needs_more = 0;      ///< Gaussians off by more than the tolerance with four
+};
+
+/// A body as its file gives it.
+struct LoadedAvatar {
+  AvatarAsset asset;
+  LoadReport report;
+  WeightReport weights;
+};
+
+/// Reads a canonical Gaussian avatar, `canonical_gs.npz` with Habitat-GS's keys, any number type in C or
+/// Fortran order: means [N,3] (metres), shs [N,3] or [N,K,3] (K = 1, 4, 9, 16; coefficient, then colour),
+/// scales [N,3] (linear, metres), quats [N,4] (w, x, y, z, any length), opacities [N] or [N,1] (0 to 1),
+/// lbs_weights [N,J] (any sum above zero), joints_inv_bind_matrix [J,4,4], [1,J,4,4] or [J,16] (row-major,
+/// rigid). Positions stay in the file's frame (SMPL's faces +Z, gsnav's avatars -Z).
+///
+/// A joint's frame is what its inverse bind says. Files made for Habitat-GS carry the inverse of SMPL's
+/// skinning matrices there, whose frames all have their origin at the rest pose's: they fit a driver's
+/// `joint_mats`, but not a motion that knows only rotations.
+///
+/// Four weights a Gaussian are kept; what that costs is in `weights`. Capsules are not part of the file.
+///
+/// Errors name the file, the array, the row and the value: file_not_found; invalid_file (an array is
+/// missing or has another shape, a value is not finite, an opacity outside [0, 1], a negative scale or
+/// weight, weights all zero, an inverse bind that is not rigid); unsupported (joints that are neither
+/// SMPL's nor SMPL-X's and have no names; SH above degree 3; a body further than 32 m from its root);
+/// invalid_argument (the options); out_of_memory. Never throws.
+Result<LoadedAvatar> load_avatar(const std::filesystem::path& path, const LoadAvatarOptions& options = {});
+
+/// Writes the same arrays, float32 except for the inverse binds (float64), weights dense. Joints that are
+/// not SMPL's or SMPL-X's add `joint_names` and `joint_parents`. SH of degree 0 that Habitat-GS's rule
+/// would take for RGB is written as RGB (float64, so that it comes back the same).
+/// Errors: what AvatarAsset::validate reports; file_not_found; unsupported (4 GiB or more).
+Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset);
+
+}  // namespace gsnav::io

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/io/avatar_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include "file.hpp"
+#include "gsnav/avatar/smpl_joints.hpp"
+#include "gsnav/io/npz_file.hpp"
+#include "npz_arrays.hpp"
+#include "weight_truncation.hpp"
+
+namespace gsnav::io {
+namespace {
+
+constexpr double kShC0 = 0.28209479177387814;  // Y_00, sqrt(1 / 4 pi)
+
+class AvatarReader {
+ public:
+  AvatarReader(const NpzFile& file, const LoadAvatarOptions& options)
+      : file_(file), arrays_(file), options_(options) {}
+
+  Result<LoadedAvatar> run() {
+    for (const auto& step : {&AvatarReader::read_joints, &AvatarReader::read_arrays,
+                             &AvatarReader::read_cloud, &AvatarReader::read_weights}) {
+      if (Status s = (this->*step)(); !s) return s;
+    }
+    out_.asset.name = std::filesystem::path(file_.source()).stem().string();
+    if (Status s = out_.asset.validate(); !s) return {s.code(), file_.source() + ": " + s.message()};
+    return std::move(out_);
+  }
+
+ private:
+  Status bad(const std::string& what) const { return {Errc::invalid_file, file_.source() + ": " + what}; }
+
+  Status read_joints() {
+    auto binds = detail::read_transforms(arrays_, "joints_inv_bind_matrix");
+    if (!binds) return binds.status();
+    Skeleton& skeleton = out_.asset.skeleton;
+    skeleton.inverse_binds = std::move(*binds);
+    const std::size_t joints = skeleton.inverse_binds.size();
+    if (Status s = name_joints(joints); !s) return s;
+    std::vector<Affine3<double>> globals;
+    for (std::size_t j = 0; j < joints; ++j) {
+      const Affine3<double>& m = skeleton.inverse_binds[j];
+      // Exactly rigid, which float32 matrices are not.
+      globals.push_back(rigid_inverse(Affine3<double>{polar_rotation(m.linear), m.translation}));
+      const std::int32_t parent = skeleton.parents[j];
+      skeleton.rest_local.push_back(
+          parent < 0 || static_cast<std::size_t>(parent) >= j
+              ? globals[j]
+              : rigid_inverse(globals[static_cast<std::size_t>(parent)]) * globals[j]);
+    }
+    if (Status s = skeleton.validate(); !s) return {s.code(), file_.source() + ": " + s.message()};
+    return {};
+  }
+
+  Status name_joints(std::size_t joints) {
+    Skeleton& skeleton = out_.asset.skeleton;
+    if (!options_.joint_names.empty() || !options_.joint_parents.empty()) {
+      if (options_.joint_names.size() != joints || options_.joint_parents.size() != joints) {
+        return {Errc::invalid_argument, file_.source() + ": " + std::to_string(options_.joint_names.size()) +
+                                            " joint_names and " + std::to_string(options_.joint_parents.size()) +
+                                            " joint_parents for " + std::to_string(joints) + " joints"};
+      }
+      skeleton.names = options_.joint_names;
+      skeleton.parents = options_.joint_parents;
+      return {};
+    }
+    if (file_.contains("joint_names")) return read_names(joints);
+    const BodyJoints known = body_joints(joints);
+    if (known.names.empty()) {
+      return {Errc::unsupported, file_.source() + ": joints_inv_bind_matrix has " + std::to_string(joints) +
+                                     " joints: neither SMPL's 24 nor SMPL-X's 55, and no joint_names"};
+    }
+    skeleton.names.assign(known.names.begin(), known.names.end());
+    skeleton.parents.assign(known.parents.begin(), known.parents.end());
+    return {};
+  }
+
+  Status read_names(std::size_t joints) {
+    Skeleton& skeleton = out_.asset.skeleton;
+    const auto names = file_.read_text("joint_names");
+    if (!names) return names.status();
+    for (std::size_t at = 0; at <= names->size();) {
+      const std::size_t end = std::min(names->find('\n', at), names->size());
+      skeleton.names.push_back(names->substr(at, end - at));
+      at = end + 1;
+    }
+    const auto parents = arrays_.read("joint_parents", {joints});
+    if (!parents) return parents.status();
+    for (std::size_t j = 0; j < joints; ++j) {
+      const double p = parents->values[j];
+      if (!(p >= -1 && p < static_cast<double>(joints)) || p != std::floor(p)) {
+        return bad("joint_parents[" + std::to_string(j) + "] is " + std::to_string(p));
+      }
+      skeleton.parents.push_back(static_cast<std::int32_t>(p));
+    }
+    return {};
+  }
+
+  Status read_arrays() {
+    const auto take = [&](NpyArray& to, const std::string& key, const std::vector<std::size_t>& shape) {
+      auto a = arrays_.read(key, shape);
+      if (!a) return a.status();
+      to = std::move(*a);
+      return Status();
+    };
+    constexpr std::size_t any = NpzArrays::kAny;
+    if (Status s = take(means_, "means", {any, 3}); !s) return s;
+    count_ = means_.shape[0];
+    if (count_ == 0) return bad("means has no Gaussians");
+    if (Status s = take(scales_, "scales", {count_, 3}); !s) return s;
+    if (Status s = take(quats_, "quats", {count_, 4}); !s) return s;
+    if (Status s = take(opacities_, "opacities", {count_, 1}); !s) return s;
+    if (Status s = take(weights_, "lbs_weights", {count_, out_.asset.skeleton.size()}); !s) return s;
+    for (const auto& [array, name, most] :
+         {std::tuple{&scales_, "scales", HUGE_VAL}, std::tuple{&opacities_, "opacities", 1.0},
+          std::tuple{&weights_, "lbs_weights", HUGE_VAL}}) {
+      const std::size_t row = array->values.size() / count_;
+      for (std::size_t i = 0; i < array->values.size(); ++i) {
+        const double v = array->values[i];
+        if (!(v >= 0 && v <= most)) {
+          return bad(std::string(name) + ": row " + std::to_string(i / row) + " has " + std::to_string(v));
+        }
+      }
+    }
+    return read_sh();
+  }
+
+  Status read_sh() {
+    auto a = arrays_.read("shs", {});
+    if (!a) return a.status();
+    const auto& shape = a->shape;
+    const std::size_t k = shape.size() == 2 ? 1 : shape.size() == 3 ? shape[1] : 0;
+    if (k == 0 || shape[0] != count_ || shape.back() != 3) {
+      return bad("shs has the shape " + detail::shape_text(shape) + ", must be [" + std::to_string(count_) +
+                 ", 3] or [" + std::to_string(count_) + ", K, 3]");
+    }
+    degree_ = 0;
+    while (static_cast<std::size_t>(sh_coefficient_count(degree_)) < k && degree_ < kMaxShDegree) ++degree_;
+    if (static_cast<std::size_t>(sh_coefficient_count(degree_)) != k) {
+      return {Errc::unsupported,
+              file_.source() + ": shs has " + std::to_string(k) + " coefficients, must be 1, 4, 9 or 16"};
+    }
+    shs_ = std::move(*a);
+    const bool could_be_rgb =
+        k == 1 && std::all_of(shs_.values.begin(), shs_.values.end(), [](double v) { return v >= 0 && v <= 1; });
+    if (k == 1 && (options_.colors == AvatarColors::rgb ||
+                   (options_.colors == AvatarColors::guess && could_be_rgb))) {
+      for (double& v : shs_.values) v = (v - 0.5) / kShC0;
+      if (options_.colors == AvatarColors::guess) {
+        out_.report.warnings.push_back("shs: all values lie in [0, 1] and were taken as RGB");
+      }
+    }
+    return {};
+  }
+
+  Status read_cloud() {
+    const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(degree_) - 1);
+    GaussianCloudBuilder builder(degree_, file_.source());
+    builder.report().warnings = std::move(out_.report.warnings);
+    builder.reserve(count_);
+    std::vector<float> shn(rest);
+    RawGaussian raw;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const double* sh = &shs_.values[i * (3 + rest)];
+      for (std::size_t k = 0; k < 3; ++k) {
+        raw.mean[static_cast<int>(k)] = means_.values[3 * i + k];
+        raw.log_scales[static_cast<int>(k)] = std::log(scales_.values[3 * i + k]);
+        raw.sh0[k] = static_cast<float>(sh[k]);
+      }
+      for (std::size_t k = 0; k < rest; ++k) shn[k] = static_cast<float>(sh[3 + k]);
+      raw.shN = shn.data();
+      const double* q = &quats_.values[4 * i];
+      raw.quat = {q[0], q[1], q[2], q[3]};
+      const double o = opacities_.values[i];
+      raw.opacity_logit = std::log(o) - std::log1p(-o);
+      if (builder.add(raw)) kept_.push_back(i);
+    }
+    out_.asset.cloud = std::move(builder.cloud());
+    out_.report = std::move(builder.report());
+    if (kept_.empty()) return bad("no Gaussian can be seen");
+    return {};
+  }
+
+  Status read_weights() {
+    const std::size_t joints = out_.asset.skeleton.size();
+    std::vector<std::uint16_t> indices;
+    std::vector<float> weights;
+    indices.reserve(kept_.size() * joints);
+    weights.reserve(kept_.size() * joints);
+    std::size_t unequal = 0;
+    for (const std::size_t i : kept_) {
+      const double* row = &weights_.values[i * joints];
+      double sum = 0.0;
+      std::size_t used = 0;
+      for (std::size_t j = 0; j < joints; ++j) {
+        indices.push_back(static_cast<std::uint16_t>(j));
+        weights.push_back(static_cast<float>(row[j]));
+        sum += row[j];
+        used += row[j] > 0 ? 1 : 0;
+      }
+      if (!(sum > 0)) return bad("lbs_weights: row " + std::to_string(i) + " is all zero");
+      unequal += std::fabs(sum - 1.0) > 1e-3 ? 1 : 0;
+      out_.weights.most_weights = std::max(out_.weights.most_weights, used);
+    }
+    if (unequal != 0) {
+      out_.report.warnings.push_back("lbs_weights: " + std::to_string(unequal) +
+                                     " rows do not sum to 1; they were divided by their sums");
+    }
+    const auto dropped = out_.asset.set_weights(joints, indices, weights);
+    if (!dropped) return bad("lbs_weights: " + dropped.status().message());
+    out_.weights.dropped_mass = *dropped;
+    if (Status s = detail::measure_truncation(out_.asset, weights_.values, kept_, options_, out_.weights); !s) {
+      return {s.code(), file_.source() + ": " + s.message()};
+    }
+    if (out_.weights.needs_more != 0) {
+      out_.report.warnings.push_back("lbs_weights: with four weights " + std::to_string(out_.weights.needs_more) +
+                                     " Gaussians are off by up to " +
+                                     std::to_string(1000 * out_.weights.position_error) + " mm");
+    }
+    return {};
+  }
+
+  using NpzArrays = detail::NpzArrays;
+
+  const NpzFile& file_;
+  NpzArrays arrays_;
+  const LoadAvatarOptions& options_;
+  LoadedAvatar out_;
+  NpyArray means_, shs_, scales_, quats_, opacities_, weights_;
+  std::vector<std::size_t> kept_;  // rows of the file that are in the cloud
+  std::size_t count_ = 0;
+  int degree_ = 0;
+};
+
+}  // namespace
+
+Result<LoadedAvatar> load_avatar(const std::filesystem::path& path, const LoadAvatarOptions& options) {
+  return detail::guarded(path.string(), [&]() -> Result<LoadedAvatar> {
+    const auto file = NpzFile::open(path);
+    if (!file) return file.status();
+    return AvatarReader(*file, options).run();
+  });
+}
+
+}  // namespace gsnav::io
