@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "synthetic.hpp"
+#include "table.hpp"
+#include "table_budget.hpp"
+
+using namespace gsnav_report;
+
+namespace {
+
+Row render(const char* profile, const char* knob, const char* value, int view, double psnr, double ms) {
+  Row r;
+  r.set("kind", "render").set("profile", profile).set("knob", knob).set("knob_value", value);
+  r.set("view", view)
+      .set("width", 64)
+      .set("height", 48)
+      .set("backend", "serial")
+      .set("oracle", "contract");
+  return r.set("scene", "box").set("rgb_psnr", psnr).set("time_p50_ms", ms);
+}
+
+const BudgetCheck* find(const std::vector<BudgetCheck>& checks, const std::string& profile,
+                        const std::string& measure) {
+  for (const BudgetCheck& c : checks) {
+    if (c.profile == profile && c.measure == measure) return &c;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+TEST_CASE("table: reads quoted fields, and says which file and record is wrong") {
+  const auto folder = std::filesystem::temp_directory_path() / "gsnav_report_table";
+  std::filesystem::create_directories(folder);
+  const auto write = [&](const char* text) {
+    std::ofstream(folder / "r.csv", std::ios::binary) << text;
+    return Table::read(folder / "r.csv");
+  };
+  const auto table = write("kind,name,note\nkernel,\"a, \"\"b\"\"\",\"two\nlines\"\nsweep,c,\n");
+  REQUIRE(table.ok());
+  REQUIRE(table->of_kind("kernel").size() == 1);
+  CHECK(table->of_kind("kernel")[0]->get("name") == "a, \"b\"");
+  CHECK(table->of_kind("kernel")[0]->get("note") == "two\nlines");
+  CHECK(table->distinct("name") == "a, \"b\", c");
+  CHECK(table->folder() == folder);
+
+  const auto wrong = write("kind,name\nkernel,a\nkernel\n");
+  CHECK(wrong.code() == gsnav::Errc::invalid_file);
+  CHECK(wrong.message().find("r.csv") != std::string::npos);
+  CHECK(wrong.message().find('3') != std::string::npos);
+  CHECK(Table::read(folder / "absent.csv").code() == gsnav::Errc::file_not_found);
+  std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("table: means, extremes and the rows they come from; an identical view counts as 140 dB") {
+  std::vector<Row> rows{render("exact", "none", "", 0, 90, 2), render("exact", "none", "", 1, 100, 4)};
+  rows.push_back(render("exact", "none", "", 2, 0, 6));
+  rows.back().set("rgb_psnr", "");
+  const Table table(rows, {});
+  Spread s = spread(table.of_kind("render"), "rgb_psnr");
+  CHECK(s.count == 2);
+  CHECK(s.mean == 95);
+  CHECK(s.lowest->get("view") == "0");
+  CHECK(s.highest->get("view") == "1");
+  CHECK(spread(table.of_kind("render"), "ssim").count == 0);
+  rows.back().set("rgb_psnr", "inf");
+  const Table second(rows, {});
+  CHECK(spread(second.of_kind("render"), "rgb_psnr").mean == doctest::Approx(110));
+}
+
+TEST_CASE("table: the ratio to exact is of the same view, geometric") {
+  std::vector<Row> rows{render("exact", "none", "", 0, 90, 2), render("exact", "none", "", 1, 90, 20),
+                        render("fast", "none", "", 0, 70, 1), render("fast", "none", "", 1, 70, 40),
+                        render("fast", "none", "", 7, 70, 1000)};  // no exact row of that view
+  const Table table(rows, {});
+  const RowRefs all = table.of_kind("render");
+  const RowRefs fast = select(all, [](const Row& r) { return r.get("profile") == "fast"; });
+  CHECK(ratio_to_exact(fast, all, "time_p50_ms").value() == doctest::Approx(1.0));
+  CHECK(!ratio_to_exact(fast, all, "pairs").has_value());
+  CHECK(exact_rows(fast, all).size() == 2);
+}
+
+TEST_CASE("table: values of a knob are in the order of numbers, names behind") {
+  std::vector<Group> groups{{"32", {}}, {"name", {}}, {"4", {}}, {"0.5", {}}, {"another", {}}};
+  sort_numerically(groups);
+  std::string order;
+  for (const Group& g : groups) order += g.name + " ";
+  CHECK(order == "0.5 4 32 name another ");
+}
+
+TEST_CASE("budgets: the worst row decides, in the unit of the budget; knobs and other oracles do not") {
+  std::vector<Row> rows{render("exact", "none", "", 0, 110, 2), render("exact", "none", "", 1, 84, 2),
+                        render("exact", "alpha_min", "0.1", 0, 20, 2),
+                        render("fast", "none", "", 0, 61, 2)};
+  rows[0].set("rgb_max", 0.4 / 255).set("depth_p99", 0.00005);
+  rows[1].set("rgb_max", 0.3 / 255).set("depth_p99", 0.0002);
+  rows.push_back(render("exact", "none", "", 0, 30, 2));
+  rows.back().set("oracle", "ray");
+  const std::vector<BudgetCheck> checks = check_budgets(Table(rows, {}));
+  const BudgetCheck* psnr = find(checks, "exact", "PSNR, dB");
+  REQUIRE(psnr != nullptr);
+  CHECK(psnr->worst == 84);
+  CHECK(!psnr->met());
+  CHECK(psnr->rows == 2);
+  CHECK(psnr->where.find("box, 1") == 0);
+  const BudgetCheck* largest = find(checks, "exact", "colour, largest error, LSB of 8 bit");
+  REQUIRE(largest != nullptr);
+  CHECK(largest->worst == doctest::Approx(0.4));
+  CHECK(largest->met());
+  const BudgetCheck* depth = find(checks, "exact", "depth, 99th percentile, mm");
+  REQUIRE(depth != nullptr);
+  CHECK(depth->worst == doctest::Approx(0.2));
+  CHECK(!depth->met());
+  REQUIRE(find(checks, "fast", "PSNR, dB") != nullptr);
+  CHECK(find(checks, "fast", "PSNR, dB")->met());
+  CHECK(find(checks, "fast", "depth, median error, mm") == nullptr);
+}
+
+TEST_CASE("budgets: an infinite or negative-infinite error is missed, not met") {
+  Row bad = render("exact", "none", "", 0, 0, 2);
+  bad.set("rgb_psnr", "-inf").set("rgb_max", "inf");
+  const std::vector<BudgetCheck> checks = check_budgets(Table({bad}, {}));
+  REQUIRE(checks.size() == 2);
+  CHECK(!checks[0].met());
+  CHECK(!checks[1].met());
+}

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "html.hpp"
+
+#include <array>
+#include <fstream>
+#include <system_error>
+
+#include "html_sections.hpp"
+#include "html_style.hpp"
+#include "html_text.hpp"
+#include "plot_pareto.hpp"
+
+namespace gsnav_report {
+
+using gsnav::Errc;
+using gsnav::Status;
+
+namespace {
+
+struct Section {
+  const char *id, *title, *intro;
+  std::string (*make)(const Table&);
+};
+
+const std::array<Section, 9> kSections{{
+    {"budgets", "Budgets", "The worst row of each profile against what it promises.", budget_section},
+    {"pareto", "Speed against error",
+     "Each mark is a setting on one backend: the mean over the views of all scenes, with a whisker to "
+     "the "
+     "worst view. Grey: another setting on that backend is as fast and as right, and better in one of "
+     "the "
+     "two. Dashed: the best that a given time buys. Hollow: measured on fewer views than the others, so "
+     "that "
+     "it beats nobody. Response and compat modes change what is right and are left out here.",
+     pareto_section},
+    {"knobs", "One knob at a time",
+     "Everything else as in the exact profile, which each chart shows beside its values. Means over "
+     "scenes, "
+     "views and resolutions with whiskers to the worst; time is the geometric mean of the ratio to "
+     "exact.",
+     knob_section},
+    {"settings", "All settings", "Means over views, the worst view in parentheses.", settings_section},
+    {"images", "Difference images of the worst views", "", image_section},
+    {"ledger", "Approximation ledger", "What each profile does not compute exactly.", ledger_section},
+    {"skinning", "Skinning", "", skinning_section},
+    {"sweeps", "Capsule distances and sweeps", "", sweep_section},
+    {"kernels", "Kernels", "Microbenchmarks, with the error against float64 beside the time.",
+     kernel_section},
+}};
+
+std::string fact(const char* name, const std::string& value) {
+  return value.empty() ? std::string()
+                       : "<span>" + std::string(name) + " <b>" + escape(value) + "</b></span>\n";
+}
+
+}  // namespace
+
+std::string html_page(const Table& table) {
+  std::string out =
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
+      "<title>gsnav: speed against error</title>\n<style>" +
+      std::string(kStyleSheet) +
+      "</style>\n</head>\n<body>\n<header><div>\n<h1>gsnav: speed against error</h1>\n";
+  out += "<div class=\"facts\">\n" + fact("date", table.distinct("date")) +
+         fact("machine", table.distinct("machine")) + fact("commit", table.distinct("commit")) +
+         fact("backends", table.distinct("backend")) + fact("scenes", table.distinct("scene")) +
+         "</div>\n<nav>\n";
+  for (const Section& s : kSections) {
+    out += "<a href=\"#" + std::string(s.id) + "\">" + s.title + "</a>\n";
+  }
+  out += "</nav>\n</div></header>\n<main>\n";
+  for (const Section& s : kSections) {
+    const std::string body = s.make(table);
+    out += "<section id=\"" + std::string(s.id) + "\">\n<h2>" + s.title + "</h2>\n";
+    if (body.empty()) {
+      out += "<p class=\"absent\">Nothing was measured for this section.</p>\n";
+    } else {
+      if (*s.intro != '\0') out += "<p class=\"note\">" + std::string(s.intro) + "</p>\n";
+      out += body;
+    }
+    out += "</section>\n";
+  }
+  return out +
+         "</main>\n<footer><div>Every error names the oracle that it was measured against; "
+         "docs/accuracy.md "
+         "defines them. SSIM: Wang et al. 2004. FLIP: Andersson et al. 2020, 67 pixels per "
+         "degree.</div></footer>\n"
+         "</body>\n</html>\n";
+}
+
+Status write_text(const std::string& text, const std::filesystem::path& path) {
+  const std::filesystem::path next = path.string() + ".new";
+  std::ofstream out(next, std::ios::binary | std::ios::trunc);
+  out << text;
+  out.close();
+  std::error_code error;
+  if (out) std::filesystem::rename(next, path, error);
+  if (!out || error) return {Errc::file_not_found, path.string() + ": cannot be written"};
+  return {};
+}
+
+Status write_html(const Table& table, const std::filesystem::path& path) {
+  return write_text(html_page(table), path);
+}
+
+}  // namespace gsnav_report

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "gsnav/core/status.hpp"
+#include "table.hpp"
+
+namespace gsnav_report {
+
+/// The report as one HTML page that needs no other file and no script; sections that the table has no
+/// rows for say so.
+std::string html_page(const Table& table);
+
+/// Writes html_page. Errors: file_not_found where the file cannot be written.
+gsnav::Status write_html(const Table& table, const std::filesystem::path& path);
+
+/// Writes text to a file that is whole or not there. Errors: file_not_found.
+gsnav::Status write_text(const std::string& text, const std::filesystem::path& path);
+
+}  // namespace gsnav_report

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "csv.hpp"
+#include "gsnav/core/status.hpp"
+
+namespace gsnav_report {
+
+using RowRefs = std::vector<const Row*>;
+
+/// The rows of a report's CSV, and the folder that its images are relative to.
+class Table {
+ public:
+  Table(std::vector<Row> rows, std::filesystem::path folder)
+      : rows_(std::move(rows)), folder_(std::move(folder)) {}
+  /// Reads a file. Errors: file_not_found, invalid_file naming file and record.
+  static gsnav::Result<Table> read(const std::filesystem::path& path);
+
+  RowRefs of_kind(std::string_view kind) const;
+  /// Different values of a column that are not empty, in order of appearance, joined by ", ".
+  std::string distinct(std::string_view column) const;
+  const std::filesystem::path& folder() const noexcept { return folder_; }
+
+ private:
+  std::vector<Row> rows_;
+  std::filesystem::path folder_;
+};
+
+/// A render row of a profile itself, no knob turned.
+bool is_plain(const Row& row);
+/// Colour compared with the float64 contract, whichever of its two orders.
+bool against_contract(const Row& row);
+/// "1920x1080".
+std::string resolution(const Row& row);
+/// "exact", or "alpha_min = 0.02" where a knob is turned (with its profile unless that is exact).
+std::string setting_label(const Row& row);
+
+RowRefs select(const RowRefs& rows, const std::function<bool(const Row&)>& wanted);
+/// Whether any of the rows has something in the column.
+bool has(const RowRefs& rows, std::string_view column);
+
+/// Rows whose `name` is the same, in order of first appearance.
+struct Group {
+  std::string name;
+  RowRefs rows;
+};
+std::vector<Group> group_by(const RowRefs& rows, const std::function<std::string(const Row&)>& name);
+/// Orders groups by the number their name is, groups that are none behind, as they were.
+void sort_numerically(std::vector<Group>& groups);
+
+/// PSNR of views where nothing differs: what they count as in means, dB.
+inline constexpr double kIdenticalPsnr = 140.0;
+
+/// Mean and extremes of a column over the rows that have a number there.
+struct Spread {
+  std::size_t count = 0;
+  double mean = 0.0, min = 0.0, max = 0.0;
+  const Row *lowest = nullptr, *highest = nullptr;
+};
+Spread spread(const RowRefs& rows, std::string_view column);
+
+/// Rows of the `exact` profile against the same oracle in the same view, sensor, backend and threads as
+/// one of `rows`.
+RowRefs exact_rows(const RowRefs& rows, const RowRefs& all);
+
+/// Geometric mean of a column over its value in the `exact` row of the same view, sensor, backend and
+/// threads; nothing where no pair has two positive numbers.
+std::optional<double> ratio_to_exact(const RowRefs& rows, const RowRefs& all, std::string_view column);
+
+}  // namespace gsnav_report
