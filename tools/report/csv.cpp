@@ -94,6 +94,13 @@ Row& Row::set(std::string_view column, double value) {
 
 Row& Row::set(std::string_view column, std::uint64_t value) { return set(column, std::to_string(value)); }
 
+Row& Row::fill(const Row& other) {
+  for (std::size_t k = 0; k < fields_.size(); ++k) {
+    if (!other.fields_[k].empty()) fields_[k] = other.fields_[k];
+  }
+  return *this;
+}
+
 std::string Row::line() const {
   std::string out;
   for (std::size_t k = 0; k < fields_.size(); ++k) {

@@ -40,6 +40,9 @@ class Row {
   Row& set(std::string_view column, std::uint64_t value);
   Row& set(std::string_view column, int value) { return set(column, std::to_string(value)); }
 
+  /// Takes over all fields of `other` that are not empty.
+  Row& fill(const Row& other);
+
   /// One CSV line (RFC 4180) with its line feed.
   std::string line() const;
 

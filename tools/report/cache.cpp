@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cache.hpp"
+
+#include <cstdio>
+#include <fstream>
+#include <system_error>
+#include <utility>
+
+#include <unistd.h>
+
+namespace gsnav_report {
+
+using namespace gsnav;
+
+namespace {
+
+constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'R', 'E', 'F'};
+constexpr std::uint32_t kFormat = 1;
+
+/// What stands at the front of an entry; the arrays follow in the order of the counts.
+struct Header {
+  char magic[8];
+  std::uint32_t format, header_size;
+  std::int32_t width, height;
+  std::uint64_t counts[5];  // rgb, alpha, depth, undecided, undecided_depth
+  std::uint64_t evaluations;
+  std::uint64_t checksum;  // of the arrays
+};
+static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 80);
+
+template <class R, class F>
+void each_array(R& r, const F& f) {
+  f(r.rgb);
+  f(r.alpha);
+  f(r.depth);
+  f(r.undecided);
+  f(r.undecided_depth);
+}
+
+std::uint64_t checksum(const Reference& r) {
+  Hasher h;
+  each_array(r, [&](const auto& v) { h.array(v); });
+  return h.low();
+}
+
+}  // namespace
+
+void Hasher::word(std::uint64_t w) noexcept {
+  for (std::size_t k = 0; k < 2; ++k) {
+    std::uint64_t z = (state_[k] ^ w) + 0x9e3779b97f4a7c15ull * (k + 1);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+    state_[k] = z ^ (z >> 31);
+  }
+}
+
+void Hasher::bytes(const void* data, std::size_t size) noexcept {
+  const char* p = static_cast<const char*>(data);
+  std::uint64_t w = 0;
+  for (; size >= 8; size -= 8, p += 8) {
+    std::memcpy(&w, p, 8);
+    word(w);
+  }
+  if (size != 0) {
+    w = 0;
+    std::memcpy(&w, p, size);
+    word(w ^ (static_cast<std::uint64_t>(size) << 56));
+  }
+}
+
+std::string Hasher::hex() const {
+  char text[40];
+  std::snprintf(text, sizeof text, "%016llx%016llx", static_cast<unsigned long long>(state_[0]),
+                static_cast<unsigned long long>(state_[1]));
+  return text;
+}
+
+std::string content_hash(const GaussianCloud& cloud) {
+  Hasher h;
+  for (const auto& v : cloud.means) h.array(v);
+  for (const auto& v : cloud.quats) h.array(v);
+  for (const auto& v : cloud.scales) h.array(v);
+  h.array(cloud.opacities);
+  h.array(cloud.sh0);
+  h.array(cloud.shN);
+  h.array(cloud.origin_ids);
+  for (const Vec3d& o : cloud.origins) {
+    for (int k = 0; k < 3; ++k) h.value(o[k]);
+  }
+  h.value(cloud.sh_degree);
+  h.value(cloud.filter);
+  h.value(cloud.eps2d);
+  h.value(cloud.sort_order);
+  return h.hex();
+}
+
+void hash_camera(Hasher& h, const Camera& c) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) h.value(c.viewmat.linear(i, j));
+    h.value(c.viewmat.translation[i]);
+  }
+  for (const double v : {c.fx, c.fy, c.cx, c.cy, c.near_plane, c.near_sigma}) h.value(v);
+  h.value(c.width);
+  h.value(c.height);
+}
+
+std::optional<Reference> ReferenceCache::load(const std::string& hash, std::string& warning) const {
+  warning.clear();
+  const std::filesystem::path path = file(hash);
+  std::error_code error;
+  if (folder_.empty() || !std::filesystem::exists(path, error)) return std::nullopt;
+  const auto damaged = [&](const char* what) {
+    warning = path.string() + ": " + what + "; the reference is rendered again";
+    return std::nullopt;
+  };
+  std::ifstream in(path, std::ios::binary);
+  Header header{};
+  in.read(reinterpret_cast<char*>(&header), sizeof header);
+  if (!in || std::memcmp(header.magic, kMagic, sizeof kMagic) != 0) return damaged("no reference file");
+  if (header.format != kFormat || header.header_size != sizeof(Header)) {
+    return damaged("another version of the format");
+  }
+  // Sizes are compared with the file's before anything is allocated.
+  constexpr std::int32_t kMaxSide = 1 << 16;
+  if (header.width < 1 || header.height < 1 || header.width > kMaxSide || header.height > kMaxSide) {
+    return damaged("an impossible image size");
+  }
+  const std::uint64_t pixels = static_cast<std::uint64_t>(header.width) * static_cast<std::uint64_t>(header.height);
+  std::uint64_t bytes = sizeof(Header);
+  for (std::size_t k = 0; k < 5; ++k) {
+    const std::uint64_t full = k == 0 ? 3 * pixels : pixels;
+    if (header.counts[k] != full && header.counts[k] != 0) {
+      return damaged("array sizes that do not fit the image");
+    }
+    bytes += header.counts[k] * (k < 3 ? sizeof(float) : 1);
+  }
+  if (std::filesystem::file_size(path, error) != bytes || error) return damaged("another size than its header says");
+  Reference r;
+  r.width = header.width;
+  r.height = header.height;
+  r.evaluations = header.evaluations;
+  std::size_t k = 0;
+  each_array(r, [&](auto& v) {
+    v.resize(header.counts[k++]);
+    in.read(reinterpret_cast<char*>(v.data()),
+            static_cast<std::streamsize>(v.size() * sizeof(typename std::decay_t<decltype(v)>::value_type)));
+  });
+  if (!in) return damaged("cannot be read");
+  if (checksum(r) != header.checksum) return damaged("checksum does not agree");
+  return r;
+}
+
+Status ReferenceCache::store(const std::string& hash, const Reference& r) const {
+  if (folder_.empty()) return {};
+  std::error_code error;
+  std::filesystem::create_directories(folder_, error);
+  Header header{};
+  std::memcpy(header.magic, kMagic, sizeof kMagic);
+  header.format = kFormat;
+  header.header_size = sizeof(Header);
+  header.width = r.width;
+  header.height = r.height;
+  std::size_t k = 0;
+  each_array(r, [&](const auto& v) { header.counts[k++] = v.size(); });
+  header.evaluations = r.evaluations;
+  header.checksum = checksum(r);
+  const std::filesystem::path path = file(hash), next = path.string() + "." + std::to_string(getpid()) + ".new";
+  std::ofstream out(next, std::ios::binary | std::ios::trunc);
+  out.write(reinterpret_cast<const char*>(&header), sizeof header);
+  each_array(r, [&](const auto& v) {
+    out.write(reinterpret_cast<const char*>(v.data()),
+              static_cast<std::streamsize>(v.size() * sizeof(typename std::decay_t<decltype(v)>::value_type)));
+  });
+  out.close();
+  if (out) std::filesystem::rename(next, path, error);
+  if (!out || error) {
+    std::filesystem::remove(next, error);
+    return {Errc::file_not_found, path.string() + ": cannot be written"};
+  }
+  return {};
+}
+
+}  // namespace gsnav_report

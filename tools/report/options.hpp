@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "jobs.hpp"
+
+namespace gsnav_report {
+
+/// The command line of gsnav-report, checked.
+struct Options {
+  std::vector<std::string> scenes, flats;
+  bool default_scene = false;
+  std::string data;
+  int views = 4;
+  std::vector<ImageSize> sizes{{256, 256}, {640, 480}};
+  ImageSize knob_size{256, 256};
+  double hfov = 90, near_plane = 0.2;
+  std::vector<std::string> kinds{"render", "ledger", "skinning", "sweep", "kernel"};
+  std::vector<std::string> sensors{"rgbd", "rgb", "depth"}, profiles{"exact", "fast"},
+      backends{"openmp", "serial"}, knobs = knob_names();
+  std::vector<Oracle> oracles{Oracle::contract, Oracle::contract_f64, Oracle::photo4, Oracle::ray,
+                              Oracle::untruncated};
+  int threads = 0, runs = 15;
+  double max_seconds = 3;  ///< of timing one setting
+  std::string out = "report", cache, docs, benchmarks, commit, machine;
+  bool resume = false, no_html = false;
+
+  bool wants(const std::string& kind) const;
+};
+
+/// Parses the command line. Nothing: `exit_code` says how to end (help was asked for, or an error printed).
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
+
+}  // namespace gsnav_report

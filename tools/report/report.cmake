@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+# What the target `report` runs: cmake -DREPORT=... -DOUT=... -DSCENES=... -DSOURCE=... [-DKERNELS=...] -P
+execute_process(COMMAND git -C "${SOURCE}" describe --always --dirty
+                OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+set(options ${SCENES} --out "${OUT}" --docs "${OUT}/approximations.md")
+if(commit)
+  list(APPEND options --commit "${commit}")
+endif()
+file(MAKE_DIRECTORY "${OUT}")
+if(KERNELS)
+  execute_process(COMMAND "${KERNELS}" "--benchmark_out=${OUT}/kernels.json" --benchmark_out_format=json
+                  COMMAND_ERROR_IS_FATAL ANY)
+  list(APPEND options --benchmarks "${OUT}/kernels.json")
+endif()
+execute_process(COMMAND "${REPORT}" ${options} COMMAND_ERROR_IS_FATAL ANY)

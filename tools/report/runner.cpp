@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runner.hpp"
+
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "csv.hpp"
+#include "docs.hpp"
+#include "html.hpp"
+#include "kernels.hpp"
+#include "runner_ledger.hpp"
+#include "runner_scene.hpp"
+#include "runner_system.hpp"
+#include "skinning.hpp"
+#include "sweep.hpp"
+#include "table.hpp"
+
+namespace gsnav_report {
+
+using namespace gsnav;
+
+namespace {
+
+Result<std::vector<SceneSpec>> scene_specs(const Options& o) {
+  std::vector<SceneSpec> specs;
+  for (const std::string& text : o.scenes) {
+    Result<SceneSpec> spec = parse_scene(text);
+    if (!spec) return spec.status();
+    specs.push_back(std::move(*spec));
+  }
+  for (const std::string& ply : o.flats) {
+    Result<SceneSpec> spec = benchmark_flat(ply);
+    if (!spec) return spec.status();
+    specs.push_back(std::move(*spec));
+  }
+  if (o.default_scene) specs.push_back(default_flat());
+  if (!o.data.empty()) {
+    for (SceneSpec& spec : data_scenes(o.data)) specs.push_back(std::move(spec));
+  }
+  std::set<std::string> names;
+  for (const SceneSpec& spec : specs) {
+    if (!names.insert(spec.name).second) return {Errc::invalid_argument, "two scenes are called " + spec.name};
+  }
+  if (specs.empty()) return {Errc::file_not_found, "--data " + o.data + ": none of the known scenes is there"};
+  return specs;
+}
+
+PlanOptions plan_options(const Options& o, std::size_t views, int sh_degree) {
+  return {views, o.sizes, o.sensors, o.backends, o.profiles, o.knobs, o.oracles, o.knob_size, sh_degree};
+}
+
+Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
+  const Result<std::vector<SceneSpec>> specs = scene_specs(o);
+  if (!specs) return specs.status();
+  const ReferenceCache cache(o.cache);
+  // Until a scene is loaded it counts as one of the largest plan.
+  const std::size_t each = plan(plan_options(o, static_cast<std::size_t>(o.views), 3)).size();
+  std::size_t total = each * specs->size(), done = 0;
+  Progress progress(total);
+  for (const SceneSpec& spec : *specs) {
+    const Result<Scene> scene = load(spec, o.views);
+    if (!scene) return scene.status();
+    const std::vector<Setting> settings = plan(plan_options(o, scene->views.size(), scene->cloud.sh_degree));
+    progress.set_total(total -= each - settings.size());
+    SceneRunner runner(o, *scene, cache, csv, stamp);
+    for (const Setting& s : settings) {
+      if (interrupted()) return csv.save();
+      progress.show(done++, scene->name + " " + to_string(s.size) + " " + scene->views[s.view].name + " " + s.backend +
+                                " " + s.profile + (s.knob == "none" ? "" : " " + s.knob + " " + s.knob_value));
+      if (Status status = runner.run(s); !status) {
+        return {status.code(), "scene " + scene->name + ": " + status.message()};
+      }
+    }
+    if (Status status = runner.save_worst_views(); !status) return status;
+  }
+  progress.finish();
+  return {};
+}
+
+/// Adds rows that have no settings of their own: the whole set is there, or is made.
+Status add_rows(const Options& o, CsvFile& csv, const Row& stamp, const std::string& kind,
+                const std::function<Result<std::vector<Row>>()>& make) {
+  if (!o.wants(kind) || interrupted()) return {};
+  const std::string first = kind + " of " + stamp.get("commit") + " on " + stamp.get("machine");
+  if (csv.has(first + " 0")) return {};
+  std::fprintf(stderr, "%s rows\n", kind.c_str());
+  const Result<std::vector<Row>> rows = make();
+  if (!rows) return rows.status();
+  // The first key last, so that a set that was cut off is made again.
+  for (std::size_t i = rows->size(); i-- > 0;) {
+    const std::string key = first + " " + std::to_string(i);
+    if (csv.has(key)) continue;
+    Row row = stamp;
+    row.fill((*rows)[i]).set("key", key);
+    if (Status s = csv.add(std::move(row)); !s) return s;
+  }
+  return {};
+}
+
+}  // namespace
+
+Status run_report(const Options& o) {
+  std::error_code error;
+  std::filesystem::create_directories(o.out, error);
+  if (error) return {Errc::file_not_found, "--out " + o.out + ": " + error.message()};
+  const std::filesystem::path out(o.out), path = out / "report.csv";
+  Result<CsvFile> csv = CsvFile::open(path, o.resume);
+  if (!csv) return csv.status();
+  Row stamp;
+  stamp.set("machine", o.machine.empty() ? machine_name() : o.machine).set("commit", o.commit).set("date", today());
+
+  watch_interrupts();
+  if (Status s = add_rows(o, *csv, stamp, "ledger", [] { return ledger_rows(); }); !s) return s;
+  if (o.wants("render")) {
+    if (Status s = render_scenes(o, *csv, stamp); !s) return s;
+  }
+  SkinningOptions skinning;
+  skinning.threads = o.threads;
+  skinning.runs = o.runs;
+  if (Status s = add_rows(o, *csv, stamp, "skinning", [&] { return skinning_rows(skinning); }); !s) return s;
+  SweepOptions sweep;
+  sweep.runs = o.runs;
+  if (Status s = add_rows(o, *csv, stamp, "sweep", [&] { return sweep_rows(sweep); }); !s) return s;
+  if (!o.benchmarks.empty()) {
+    if (Status s = add_rows(o, *csv, stamp, "kernel", [&] { return kernel_rows(o.benchmarks); }); !s) return s;
+  }
+  if (interrupted()) std::fprintf(stderr, "\ninterrupted: %s holds the rows so far; --resume goes on\n", path.c_str());
+  const Result<Table> table = Table::read(path);
+  if (!table) return table.status();
+  if (!o.no_html) {
+    if (Status s = write_html(*table, out / "report.html"); !s) return s;
+  }
+  if (!o.docs.empty()) {
+    if (Status s = write_docs(*table, o.docs); !s) return s;
+  }
+  std::printf("%zu rows in %s\n", csv->rows().size(), path.c_str());
+  return {};
+}
+
+}  // namespace gsnav_report

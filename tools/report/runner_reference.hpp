@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "cache.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/kernels/gaussians.hpp"
+#include "jobs.hpp"
+
+namespace gsnav_report {
+
+/// To be raised when an oracle's image changes: older cached references are then not found.
+inline constexpr int kOracleVersion = 1;
+
+/// Names a reference by all that it depends on.
+std::string reference_hash(const std::string& scene_hash, const gsnav::Camera& camera, Oracle oracle,
+                           gsnav::SortOrder order);
+
+/// Renders the reference of a whole image on `threads` threads (0: all).
+gsnav::Result<Reference> render_reference(const gsnav::GaussianSet& set, const gsnav::Camera& camera,
+                                          Oracle oracle, gsnav::SortOrder order, int threads);
+
+}  // namespace gsnav_report

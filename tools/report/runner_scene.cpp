@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runner_scene.hpp"
+
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <system_error>
+
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda.hpp"
+#endif
+#include "runner_images.hpp"
+#include "runner_reference.hpp"
+#include "runner_system.hpp"
+#include "storage.hpp"
+
+namespace gsnav_report {
+
+using namespace gsnav;
+
+Camera SceneRunner::camera(const Setting& s) const {
+  return camera_of(scene_.views[s.view], s.size.width, s.size.height, options_.hfov, options_.near_plane);
+}
+
+int SceneRunner::threads(const Setting& s) const { return s.backend == "openmp" ? openmp_.threads() : 1; }
+
+std::string SceneRunner::key(const Setting& s, Oracle oracle) const {
+  Hasher h;
+  h.text(scene_.hash);
+  hash_camera(h, camera(s));
+  for (const std::string& t : {stamp_.get("commit"), stamp_.get("machine"), scene_.name, s.sensor, s.backend,
+                               s.profile, s.knob, s.knob_value, std::string(to_string(oracle))}) {
+    h.text(t);
+  }
+  h.value(threads(s));
+  return h.hex();
+}
+
+template <class B>
+Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s, const GaussianCloud& cloud,
+                                                    int runs) {
+  Outcome out;
+  const GaussianArrays<B> arrays(backend, cloud);
+  const GaussianSet set = arrays.set();
+  const Camera c = camera(s);
+  Renderer<float, B> renderer(backend, render_config(s, cloud.sort_order));
+  Status status;
+  const auto draw = [&] {
+    if (Status next = renderer.render(std::span(&set, 1), std::span(&c, 1), out.frames); !next) status = next;
+  };
+  reset_peak_memory();
+  if (runs > 0) {
+    out.timing = measure(draw, runs, options_.max_seconds);
+  } else {
+    draw();
+  }
+  out.peak_memory = peak_memory();
+  out.scratch_bytes = renderer.scratch_bytes();
+  if (!status) return status;
+  return out;
+}
+
+Result<SceneRunner::Outcome> SceneRunner::render(const Setting& s, const GaussianCloud& cloud, int runs) {
+#if defined(GSNAV_HAS_CUDA)
+  if (s.backend == "cuda") {
+    if (CudaBackend::device_count() == 0) return {Errc::backend_failure, "--backends cuda: no GPU, or no driver"};
+    CudaBackend cuda;
+    return render_on(cuda, s, cloud, runs);
+  }
+#endif
+  if (s.backend == "serial") return render_on(serial_, s, cloud, runs);
+  return render_on(openmp_, s, cloud, runs);
+}
+
+Result<SceneRunner::Named> SceneRunner::reference(const Setting& s, Oracle oracle) {
+  const Camera c = camera(s);
+  const SortOrder order = scene_.cloud.sort_order;
+  const std::string hash = reference_hash(scene_.hash, c, oracle, order);
+  for (const Named& n : recent_) {
+    if (n.hash == hash) return n;
+  }
+  std::string warning;
+  std::optional<Reference> found = cache_.load(hash, warning);
+  if (!warning.empty()) std::fprintf(stderr, "\ngsnav-report: warning: %s\n", warning.c_str());
+  if (!found) {
+    Result<Reference> made = render_reference(scene_.cloud.set(), c, oracle, order, options_.threads);
+    if (!made) return made.status();
+    if (Status stored = cache_.store(hash, *made); !stored) return stored;
+    found = std::move(*made);
+  }
+  recent_.push_back({hash, std::make_shared<const Reference>(std::move(*found))});
+  if (recent_.size() > 5) recent_.pop_front();
+  return recent_.back();
+}
+
+Status SceneRunner::run(const Setting& s) {
+  std::vector<Oracle> missing;
+  for (const Oracle q : s.oracles) {
+    if (!csv_.has(key(s, q))) missing.push_back(q);
+  }
+  if (missing.empty()) return {};
+  GaussianCloud encoded;
+  const GaussianCloud* cloud = &scene_.cloud;
+  std::size_t cloud_bytes = cloud->bytes();
+  if (s.knob == "storage") {
+    Result<GaussianCloud> stored = through_storage(*cloud, s.knob_value);
+    if (!stored) return stored.status();
+    encoded = std::move(*stored);
+    for (const StorageCodec& c : storage_codecs()) {
+      if (c.name == s.knob_value) cloud_bytes = stored_bytes(*cloud, c);
+    }
+    cloud = &encoded;
+  }
+  const Result<Outcome> outcome = render(s, *cloud, options_.runs);
+  if (!outcome) return outcome.status();
+  for (const Oracle q : missing) {
+    const Result<Named> named = reference(s, q);
+    if (!named) return named.status();
+    Row row = stamp_;
+    row.set("kind", "render").set("scene", scene_.name).set("view", scene_.views[s.view].name);
+    row.set("width", s.size.width).set("height", s.size.height).set("sensor", s.sensor);
+    row.set("backend", s.backend).set("threads", threads(s)).set("profile", s.profile);
+    row.set("knob", s.knob).set("knob_value", s.knob_value).set("oracle", std::string(to_string(q)));
+    if (Status judged = judge_(outcome->frames, *named->reference, named->hash, row); !judged) return judged;
+    const RenderStats& stats = outcome->frames.stats[0];
+    row.set("time_p50_ms", outcome->timing.p50_ms).set("time_p99_ms", outcome->timing.p99_ms);
+    row.set("gaussians", stats.gaussians).set("visible", stats.visible).set("pairs", stats.tile_intersections);
+    // What the contract cannot do without; knobs have other counts of their own.
+    if (s.knob == "none" && q == Oracle::contract) row.set("evaluations", named->reference->evaluations);
+    row.set("bytes", static_cast<std::uint64_t>(outcome->scratch_bytes + cloud_bytes));
+    row.set("peak_rss", outcome->peak_memory);
+    row.set("note", std::to_string(outcome->timing.runs) + " runs").set("key", key(s, q));
+    if (Status added = csv_.add(std::move(row)); !added) return added;
+  }
+  return {};
+}
+
+Status SceneRunner::save_worst_view(const ImageSize& size, const std::string& profile) {
+  Row* worst = nullptr;
+  for (Row& row : csv_.rows()) {
+    const bool candidate = row.get("scene") == scene_.name && row.get("commit") == stamp_.get("commit") &&
+                           row.get("kind") == "render" && row.get("knob") == "none" &&
+                           row.get("oracle") == "contract" && row.get("profile") == profile &&
+                           row.get("backend") == options_.backends.front() && row.get("sensor") != "depth" &&
+                           row.get("width") == std::to_string(size.width) &&
+                           row.get("height") == std::to_string(size.height) && row.number("rgb_max");
+    if (candidate && (worst == nullptr || *row.number("rgb_max") > *worst->number("rgb_max"))) worst = &row;
+  }
+  if (worst == nullptr || !worst->get("image").empty()) return {};
+  Setting s;
+  while (s.view < scene_.views.size() && scene_.views[s.view].name != worst->get("view")) ++s.view;
+  if (s.view == scene_.views.size()) return {};  // a resumed row of a view that this run has not
+  s.size = size;
+  s.sensor = worst->get("sensor");
+  s.backend = worst->get("backend");
+  s.profile = profile;
+  const Result<Outcome> outcome = render(s, scene_.cloud, 0);
+  if (!outcome) return outcome.status();
+  const Result<Named> named = reference(s, Oracle::contract);
+  if (!named) return named.status();
+  const std::filesystem::path images("images"), folder = std::filesystem::path(options_.out) / images;
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  const std::string file = scene_.name + "_" + to_string(size) + "_" + profile + ".png";
+  const Result<std::string> text = save_comparison(folder / file, outcome->frames.rgb, *named->reference);
+  if (!text) return text.status();
+  worst->set("image", (images / file).string()).set("note", worst->get("note") + "; worst view: " + *text);
+  return {};
+}
+
+Status SceneRunner::save_worst_views() {
+  for (const ImageSize& size : options_.sizes) {
+    for (const std::string& profile : options_.profiles) {
+      if (Status s = save_worst_view(size, profile); !s) return s;
+    }
+  }
+  return csv_.save();
+}
+
+}  // namespace gsnav_report

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cache.hpp"
+#include "csv.hpp"
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "options.hpp"
+#include "runner_metrics.hpp"
+#include "runner_timing.hpp"
+#include "scenes.hpp"
+
+namespace gsnav_report {
+
+/// The render rows of one scene.
+class SceneRunner {
+ public:
+  /// `stamp` holds the columns that all rows of the run share. All arguments must outlive it.
+  SceneRunner(const Options& options, const Scene& scene, const ReferenceCache& cache, CsvFile& csv, const Row& stamp)
+      : options_(options), scene_(scene), cache_(cache), csv_(csv), stamp_(stamp), openmp_(options.threads) {}
+
+  /// Renders a setting and adds a row for each of its judges; rows that are there already are not made again.
+  gsnav::Status run(const Setting& setting);
+
+  /// Pictures of the worst view of each size and profile, by the largest colour error among the rows there.
+  gsnav::Status save_worst_views();
+
+ private:
+  struct Outcome {
+    gsnav::Frames<float> frames;
+    Timing timing;
+    std::size_t scratch_bytes = 0;
+    std::uint64_t peak_memory = 0;
+  };
+  struct Named {
+    std::string hash;
+    std::shared_ptr<const Reference> reference;
+  };
+
+  gsnav::Camera camera(const Setting& s) const;
+  int threads(const Setting& s) const;
+  std::string key(const Setting& s, Oracle oracle) const;
+  gsnav::Result<Outcome> render(const Setting& s, const gsnav::GaussianCloud& cloud, int runs);
+  template <class B>
+  gsnav::Result<Outcome> render_on(B& backend, const Setting& s, const gsnav::GaussianCloud& cloud, int runs);
+  gsnav::Result<Named> reference(const Setting& s, Oracle oracle);
+  gsnav::Status save_worst_view(const ImageSize& size, const std::string& profile);
+
+  const Options& options_;
+  const Scene& scene_;
+  const ReferenceCache& cache_;
+  CsvFile& csv_;
+  const Row& stamp_;
+  gsnav::OpenMPBackend openmp_;
+  gsnav::SerialBackend serial_;
+  Judge judge_;
+  std::deque<Named> recent_;  // references of the view at hand
+};
+
+}  // namespace gsnav_report

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+namespace gsnav_report {
+
+/// Value below or at which the share `q` of the values lies (nearest rank); 0 for none. Reorders `values`.
+inline double percentile(std::vector<double>& values, double q) {
+  if (values.empty()) return 0;
+  const double rank = std::ceil(q * static_cast<double>(values.size())) - 1;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(std::max(rank, 0.0));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+struct Timing {
+  double p50_ms = 0, p99_ms = 0;
+  int runs = 0;
+};
+
+/// Times `f` `runs` times after two runs that do not count (buffers reach their size, caches fill). Stops
+/// after three runs at the earliest once `budget_s` seconds are spent.
+template <class F>
+Timing measure(const F& f, int runs, double budget_s) {
+  using Clock = std::chrono::steady_clock;
+  const auto seconds = [](Clock::duration d) { return std::chrono::duration<double>(d).count(); };
+  const auto begin = Clock::now();
+  f();
+  if (seconds(Clock::now() - begin) < budget_s) f();
+  std::vector<double> ms;
+  while (static_cast<int>(ms.size()) < runs && (ms.size() < 3 || seconds(Clock::now() - begin) < budget_s)) {
+    const auto start = Clock::now();
+    f();
+    ms.push_back(1e3 * seconds(Clock::now() - start));
+  }
+  Timing t;
+  t.runs = static_cast<int>(ms.size());
+  t.p50_ms = percentile(ms, 0.5);
+  t.p99_ms = percentile(ms, 0.99);
+  return t;
+}
+
+}  // namespace gsnav_report

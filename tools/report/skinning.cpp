@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "skinning.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "gsnav/avatar/avatar.hpp"
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/core/rng.hpp"
+#include "runner_timing.hpp"
+
+namespace gsnav_report {
+
+using namespace gsnav;
+
+namespace {
+
+using Matrices = std::vector<Affine3<double>>;
+
+/// Weights of all joints for every Gaussian, [N][J]: falling off exponentially, 25 mm a factor e, with the
+/// distance from the joint's capsules beyond the nearest one's.
+std::vector<double> dense_weights(const AvatarAsset& asset) {
+  constexpr double kSoftness = 0.025;
+  const std::size_t joints = asset.skeleton.size();
+  const Matrices rest = asset.skeleton.rest_globals();
+  std::vector<double> out(asset.size() * joints, 0.0), distance(joints);
+  for (std::size_t i = 0; i < asset.size(); ++i) {
+    std::fill(distance.begin(), distance.end(), std::numeric_limits<double>::infinity());
+    const Vec3d p = asset.cloud.mean(i);
+    for (const ProxyCapsule& c : asset.capsules) {
+      const Vec3d a = rest[c.joint] * c.p0, d = rest[c.joint] * c.p1 - a;
+      const double s = std::clamp(dot(p - a, d) / std::max(dot(d, d), 1e-12), 0.0, 1.0);
+      distance[c.joint] = std::min(distance[c.joint], std::max(norm(p - a - d * s) - c.radius, 0.0));
+    }
+    const double nearest = *std::min_element(distance.begin(), distance.end());
+    double sum = 0;
+    for (std::size_t j = 0; j < joints; ++j) sum += out[i * joints + j] = std::exp((nearest - distance[j]) / kSoftness);
+    for (std::size_t j = 0; j < joints; ++j) out[i * joints + j] /= sum;
+  }
+  return out;
+}
+
+/// Posed joint * inverse bind for each pose.
+std::vector<Matrices> skinning_matrices(const Skeleton& skeleton, const std::vector<LocalPose>& poses) {
+  const Matrices inverse = skeleton.bind_inverses();
+  std::vector<Matrices> out;
+  for (const LocalPose& pose : poses) {
+    forward_kinematics(skeleton, pose, out.emplace_back());
+    for (std::size_t j = 0; j < inverse.size(); ++j) out.back()[j] = out.back()[j] * inverse[j];
+  }
+  return out;
+}
+
+/// Every joint turned by up to `degrees` about an axis of its own.
+LocalPose random_pose(const Skeleton& skeleton, Rng& rng, double degrees) {
+  LocalPose pose = skeleton.rest_pose();
+  for (Quatd& q : pose.rotations) {
+    const Vec3d axis = normalized(Vec3d{rng.normal(), rng.normal(), rng.normal()});
+    q = q * axis_angle(axis, rng.uniform(-degrees, degrees) * 0.017453292519943295);
+  }
+  return pose;
+}
+
+struct Posed {
+  Vec3d mean{};
+  Mat3d rotation{};
+};
+
+/// Blends all joints with a weight in double: the definition, with the kernel's rule for blends that have no
+/// orientation.
+Posed blend(const Matrices& joints, const double* weights, const Vec3d& mean) {
+  Mat3d linear{};
+  Vec3d shift{};
+  std::size_t heaviest = 0;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (weights[j] == 0) continue;
+    linear = linear + joints[j].linear * weights[j];
+    shift = shift + joints[j].translation * weights[j];
+    if (weights[j] > weights[heaviest]) heaviest = j;
+  }
+  const bool usable = determinant(linear) > kMinBlendDeterminant;
+  return {linear * mean + shift, polar_rotation(usable ? linear : joints[heaviest].linear)};
+}
+
+/// Angle between two rotations, degrees; accurate near 0.
+double angle(const Mat3d& a, const Mat3d& b) {
+  const Mat3d d = transpose(a) * b;
+  const Vec3d axis{d(2, 1) - d(1, 2), d(0, 2) - d(2, 0), d(1, 0) - d(0, 1)};
+  return std::atan2(norm(axis), d(0, 0) + d(1, 1) + d(2, 2) - 1) * 57.29577951308232;
+}
+
+/// The k greatest of `dense`, divided by their sum; the rest 0.
+void truncate_weights(const double* dense, std::size_t joints, std::size_t k, std::vector<double>& out) {
+  std::vector<std::size_t> order(joints);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(k), order.end(),
+                    [&](std::size_t a, std::size_t b) { return dense[a] != dense[b] ? dense[a] > dense[b] : a < b; });
+  out.assign(joints, 0.0);
+  double sum = 0;
+  for (std::size_t j = 0; j < k; ++j) sum += dense[order[j]];
+  for (std::size_t j = 0; j < k; ++j) out[order[j]] = dense[order[j]] / sum;
+}
+
+struct Errors {
+  std::vector<double> position, rotation;
+};
+
+void add_rows(std::vector<Row>& rows, Row base, Errors& e) {
+  const auto add = [&](const char* name, const char* unit, std::vector<double>& values) {
+    Row row = base;
+    const double p99 = percentile(values, 0.99);
+    row.set("name", name).set("error_max", percentile(values, 1.0)).set("error_p99", p99).set("error_unit", unit);
+    rows.push_back(std::move(row));
+  };
+  add("position", "m", e.position);
+  add("rotation", "deg", e.rotation);
+}
+
+/// Arguments and arrays of one skinning in float32.
+struct FloatSkinning {
+  std::array<std::vector<float>, 3> means;
+  std::array<std::vector<float>, 4> quats, rotations;
+  std::vector<Affine3<float>> joints;
+  SkinningArgs<float> args;
+
+  explicit FloatSkinning(const AvatarAsset& asset) {
+    const GaussianView v = asset.cloud.view();
+    for (std::size_t k = 0; k < 3; ++k) {
+      means[k].resize(asset.size());
+      args.means[k] = v.means[k];
+      args.means_out[k] = view_of(means[k]);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      quats[k].resize(asset.size());
+      rotations[k].resize(asset.size());
+      args.quats[k] = v.quats[k];
+      args.quats_out[k] = view_of(quats[k]);
+      args.rotations_out[k] = view_of(rotations[k]);
+    }
+    args.joint_indices = view_of(asset.joint_indices);
+    args.weights = view_of(asset.skinning_weights);
+  }
+  void set_pose(const Matrices& m) {
+    joints.clear();
+    for (const auto& a : m) joints.push_back(affine_cast<float>(a));
+    args.joints = {joints.data(), joints.size()};
+  }
+};
+
+/// Float32 on a backend against float64 with the same four weights, and the time for 100,000 Gaussians.
+template <class B>
+Status float_rows(B& backend, Row base, const AvatarAsset& sampled, const AvatarAsset& timed,
+                  const std::vector<Matrices>& poses, const SkinningOptions& o, std::vector<Row>& rows) {
+  FloatSkinning small(sampled);
+  Errors e;
+  std::vector<double> weights(sampled.skeleton.size());
+  for (const Matrices& pose : poses) {
+    small.set_pose(pose);
+    if (Status s = skin_gaussians<float>(backend, small.args); !s) return s;
+    if (Status s = backend.synchronize(); !s) return s;
+    for (std::size_t i = 0; i < sampled.size(); ++i) {
+      std::fill(weights.begin(), weights.end(), 0.0);
+      for (std::size_t k = 4 * i; k < 4 * i + 4; ++k) {
+        weights[sampled.joint_indices[k]] += static_cast<double>(sampled.skinning_weights[k]);
+      }
+      const Posed truth = blend(pose, weights.data(), sampled.cloud.mean(i));
+      const Vec3d mean{small.means[0][i], small.means[1][i], small.means[2][i]};
+      const Quatd q{small.rotations[0][i], small.rotations[1][i], small.rotations[2][i], small.rotations[3][i]};
+      e.position.push_back(norm(mean - truth.mean));
+      e.rotation.push_back(angle(rotation_matrix(q), truth.rotation));
+    }
+  }
+  FloatSkinning large(timed);
+  large.set_pose(poses.front());
+  Status status;
+  const Timing t = measure(
+      [&] {
+        status = skin_gaussians<float>(backend, large.args);
+        if (status.ok()) status = backend.synchronize();
+      },
+      o.runs, 5.0);
+  const double per = 100000.0 / static_cast<double>(timed.size());
+  base.set("influences", kInfluences).set("gaussians", static_cast<std::uint64_t>(timed.size()));
+  base.set("time_p50_ms", t.p50_ms * per).set("time_p99_ms", t.p99_ms * per);
+  base.set("items_per_second", 1e3 * static_cast<double>(timed.size()) / t.p50_ms);
+  base.set("note", "float32 against float64 with the same weights; time for 100000 Gaussians");
+  add_rows(rows, std::move(base), e);
+  return status;
+}
+
+}  // namespace
+
+Result<std::vector<Row>> skinning_rows(const SkinningOptions& o) {
+  HumanoidOptions small, large;
+  small.gaussians = o.sampled;
+  large.gaussians = o.gaussians;
+  const Result<AvatarAsset> sampled = try_make_humanoid(small), timed = try_make_humanoid(large);
+  if (!sampled) return sampled.status();
+  if (!timed) return timed.status();
+  const Skeleton& skeleton = sampled->skeleton;
+  const Result<WalkMotion> walk = WalkMotion::create(skeleton, {});
+  if (!walk) return walk.status();
+  std::vector<LocalPose> walking(static_cast<std::size_t>(o.poses)), random;
+  Rng rng(17);
+  for (std::size_t p = 0; p < walking.size(); ++p) {
+    walk->pose(static_cast<double>(p) / o.poses, 1.0, 0.0, walking[p]);
+    random.push_back(random_pose(skeleton, rng, 60));
+  }
+  std::vector<Row> rows;
+  const std::vector<double> dense = dense_weights(*sampled);
+  const std::size_t joints = skeleton.size();
+  SerialBackend serial;
+  OpenMPBackend openmp(o.threads);
+  const std::pair<const char*, const std::vector<LocalPose>*> sets[] = {{"walk", &walking}, {"random_60deg", &random}};
+  for (const auto& [name, poses] : sets) {
+    const std::vector<Matrices> matrices = skinning_matrices(skeleton, *poses);
+    Row base;
+    base.set("kind", "skinning").set("scene", "humanoid").set("knob", "poses").set("knob_value", name);
+    std::vector<double> weights;
+    for (std::size_t k = 1; k <= 8; ++k) {
+      Errors e;
+      for (std::size_t i = 0; i < sampled->size(); ++i) {
+        truncate_weights(&dense[i * joints], joints, k, weights);
+        for (const Matrices& pose : matrices) {
+          const Posed truth = blend(pose, &dense[i * joints], sampled->cloud.mean(i));
+          const Posed cut = blend(pose, weights.data(), sampled->cloud.mean(i));
+          e.position.push_back(norm(cut.mean - truth.mean));
+          e.rotation.push_back(angle(cut.rotation, truth.rotation));
+        }
+      }
+      Row row = base;
+      row.set("influences", static_cast<int>(k)).set("note", "float64, K greatest weights against all joints");
+      add_rows(rows, std::move(row), e);
+    }
+    base.set("profile", "exact");
+    Row by_serial = base, by_openmp = base;
+    by_serial.set("backend", "serial").set("threads", 1);
+    by_openmp.set("backend", "openmp").set("threads", openmp.threads());
+    if (Status s = float_rows(serial, std::move(by_serial), *sampled, *timed, matrices, o, rows); !s) return s;
+    if (Status s = float_rows(openmp, std::move(by_openmp), *sampled, *timed, matrices, o, rows); !s) return s;
+  }
+  return rows;
+}
+
+}  // namespace gsnav_report

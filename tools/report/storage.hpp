@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav_report {
+
+/// A way to store one field of a cloud in fewer bits. Values in range come back within half a step; the
+/// formats named use it.
+struct StorageCodec {
+  std::string_view name, description;
+  double step;           ///< of the stored quantity, uniform; for fp16: relative, at the binade's lower end
+  double low, high;      ///< range; beyond it values are clamped (positions: no limit within a 64 m cell)
+  double bits;           ///< per value
+  int values;            ///< per Gaussian: 3, 4 (stored as 3 and an index), 1, or -1: all of shN
+};
+
+/// All codecs that the report measures, by name.
+std::span<const StorageCodec> storage_codecs() noexcept;
+
+/// `cloud` as it comes back from storage by the codec `name`; all other fields keep their bits.
+/// Errors: invalid_argument for an unknown name, with the known ones.
+gsnav::Result<gsnav::GaussianCloud> through_storage(const gsnav::GaussianCloud& cloud, std::string_view name);
+
+/// Bytes of the cloud's arrays with the codec's field in its stored size.
+std::size_t stored_bytes(const gsnav::GaussianCloud& cloud, const StorageCodec& codec) noexcept;
+
+/// The nearest float16 (ties to even, no infinities: clamped to 65504).
+float round_to_half(float x) noexcept;
+
+}  // namespace gsnav_report
