@@ -52,7 +52,8 @@ TEST_CASE("N16_near_plane_cross") {
   Camera turned = camera;
   const Quatd turn = axis_angle(normalized(Vec3d{1, 2, 3}), 0.7);
   turned.viewmat.linear = rotation_matrix(turn);
-  for (RawGaussian& g : gs) g.mean = rotate(conjugate(turn), g.mean);
+  turned.viewmat.translation = {0.1, -0.2, 0.3};
+  for (RawGaussian& g : gs) g.mean = rotate(conjugate(turn), g.mean - turned.viewmat.translation);
   const GaussianCloud cloud = cloud_of(gs);
   std::uint64_t visible = 0;
   for_each_renderer([&](auto& renderer) {

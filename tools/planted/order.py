@@ -44,9 +44,15 @@ PLANTS = [
           ORDER, "N22_depth_tie_grid"),
     plant("key_of_another_expression", "include/gsnav/kernels/lanes/project_chunk.hpp",
           "    const F z = depth_key(camera.key_rotation, camera.key_scale, mean, offset);\n",
-          "    const F z = depth_key(camera.key_rotation, camera.key_scale, mean, {F(0.0f), F(0.0f), F(0.0f)}) +\n"
-          "                depth_key(camera.key_rotation, camera.key_scale, offset, {F(0.0f), F(0.0f), F(0.0f)});\n",
-          ORDER, "N22_depth_tie_grid"),
+          "    const Vec3<F> none{F(0.0f), F(0.0f), F(0.0f)};\n"
+          "    const F z = depth_key(camera.key_rotation, camera.key_scale, mean, none) +\n"
+          "                depth_key(camera.key_rotation, camera.key_scale, offset, none);\n",
+          ORDER, "N22_depth_tie_grid", why="lanes that order by z of the view matrix"),
+    plant("visible_by_another_expression", "include/gsnav/kernels/lanes/project_chunk.hpp",
+          "    const Projected<F> p = project<F, F>(camera, axes, z, load(gs.opacities));\n",
+          "    const Projected<F> p = project<F, F>(camera, axes, axes.position.z * F(1.0000001f),\n"
+          "                                         load(gs.opacities));\n",
+          "tests/hard_cases/test_near.cpp", "N16_near_plane_cross"),
     plant("key_top_bits", "include/gsnav/kernels/projection_camera.hpp",
           "    const std::uint32_t code = (bits_of(key) - base) >> shift;",
           "    const std::uint32_t code = largest == 0xffffffffu ? bits_of(key) : bits_of(key) >> 16;",
@@ -62,7 +68,7 @@ PLANTS = [
           ORDER, "N22_depth_tie_grid"),
     plant("last_tile_of_a_row_lost", TILES,
           "tx1 = (b.x1 - 1) / ts, ty0", "tx1 = (b.x1 - 2) / ts, ty0",
-          KEYS, "N25_key_overflow"),
+          FOOTPRINT, "N11_tile_cover_conservative"),
     plant("background_forgotten", "include/gsnav/kernels/blend.hpp",
           "    out.rgb[3 * pixel] = fma(t, args.background.x, state.r);",
           "    out.rgb[3 * pixel] = state.r;",
