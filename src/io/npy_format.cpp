@@ -2,12 +2,12 @@
 #include "npy_format.hpp"
 
 #include <charconv>
-#include <cmath>
 #include <limits>
 #include <optional>
 #include <string_view>
 
 #include "file.hpp"
+#include "quantised.hpp"
 
 namespace gsnav::io::detail {
 namespace {
@@ -110,17 +110,6 @@ std::optional<Type> type_of(std::string_view descr) {
   return std::nullopt;
 }
 
-double from_half(std::uint16_t bits) {
-  const int exponent = (bits >> 10) & 31, mantissa = bits & 1023;
-  double v = 0;
-  if (exponent == 31) {
-    v = mantissa != 0 ? std::numeric_limits<double>::quiet_NaN() : std::numeric_limits<double>::infinity();
-  } else {
-    v = exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(mantissa + 1024, exponent - 25);
-  }
-  return (bits & 0x8000) != 0 ? -v : v;
-}
-
 template <class T>
 double number(const std::byte* p) {
   return static_cast<double>(load_le<T>(p));
@@ -133,7 +122,7 @@ double value_at(const std::byte* p, Type type) {
       if (type.kind == Kind::boolean) return load_le<std::uint8_t>(p) != 0 ? 1.0 : 0.0;
       return is_signed ? number<std::int8_t>(p) : number<std::uint8_t>(p);
     case 2:
-      if (real) return from_half(load_le<std::uint16_t>(p));
+      if (real) return half_to_double(load_le<std::uint16_t>(p));
       return is_signed ? number<std::int16_t>(p) : number<std::uint16_t>(p);
     case 4:
       if (real) return number<float>(p);

@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 
 #include "gsnav/kernels/sh.hpp"
 #include "gsnav/math/quat.hpp"
@@ -29,6 +31,19 @@ inline Quatd quat_without(std::size_t largest, const double (&others)[3]) noexce
   }
   q[largest] = std::sqrt(std::fmax(0.0, 1.0 - sum));
   return {q[0], q[1], q[2], q[3]};
+}
+
+/// The value of an IEEE 754 binary16.
+inline double half_to_double(std::uint16_t bits) noexcept {
+  const int exponent = (bits >> 10) & 31, mantissa = bits & 1023;
+  double v = 0;
+  if (exponent == 31) {
+    v = mantissa != 0 ? std::numeric_limits<double>::quiet_NaN()
+                      : std::numeric_limits<double>::infinity();
+  } else {
+    v = exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(mantissa + 1024, exponent - 25);
+  }
+  return (bits & 0x8000) != 0 ? -v : v;
 }
 
 }  // namespace gsnav::io::detail

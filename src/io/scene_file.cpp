@@ -10,13 +10,14 @@
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
+#include "gsnav/io/spz.hpp"
 
 namespace gsnav::io {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kSupported = "a .ply, .splat or .sog, a meta.json or a folder with a meta.json";
+constexpr const char* kSupported = "a .ply, .splat, .spz or .sog, a meta.json or a folder with a meta.json";
 
 Result<LoadedCloud> load_one(const fs::path& path) {
   std::error_code ignored;
@@ -35,6 +36,7 @@ Result<LoadedCloud> load_one(const fs::path& path) {
   if (extension == ".ply") return load_ply(path);
   if (extension == ".sog") return load_sog(path);
   if (extension == ".splat") return load_splat(path);
+  if (extension == ".spz") return load_spz(path);
   if (path.filename() == "meta.json") return load_sog(path);
   if (!fs::exists(path, ignored))
     return {Errc::file_not_found, name + ": no such file or folder; supported: " + kSupported};

@@ -13,9 +13,11 @@
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
+#include "gsnav/io/spz.hpp"
 #include "ply_compressed_file.hpp"
 #include "sog_file.hpp"
 #include "splat_file.hpp"
+#include "spz_file.hpp"
 
 // Files with a byte changed, dropped or doubled: a loader returns a Status that names the file or a
 // result that is whole, and asks for no more memory than such a small file can need.
@@ -123,12 +125,32 @@ TEST_CASE("mutations: compressed ply") {
 }
 
 TEST_CASE("mutations: splat") {
-  const Tally t = feed(splat_text(random_rows(6, 0, 2)), 3000, 11, "some.splat",
-                       [](const std::string& text) {
-                         return check_cloud(io::parse_splat(bytes_of(text), "some.splat"));
-                       });
+  const Tally t =
+      feed(splat_text(random_rows(6, 0, 2)), 3000, 11, "some.splat", [](const std::string& text) {
+        return check_cloud(io::parse_splat(bytes_of(text), "some.splat"));
+      });
   CHECK(t.ok > 100);
   CHECK(t.failed > 100);
+}
+
+TEST_CASE("mutations: spz, as it is and inside of its gzip stream") {
+  SpzFile file;
+  file.degree = 1;
+  file.rows = random_rows(6, 9, 2);
+  for (const std::uint32_t version : {1u, 2u, 3u}) {
+    file.version = version;
+    const auto load = [](const std::string& text) {
+      return check_cloud(io::parse_spz(bytes_of(text), "some.spz"));
+    };
+    CHECK(feed(file.text(), 2000, 12, "some.spz", load).failed > 1000);
+    const Tally t = feed(file.payload(), 2000, 13, "some.spz",
+                         [&](const std::string& payload) { return load(gzip(payload)); });
+    CHECK(t.ok > 100);
+    CHECK(t.failed > 100);
+    const std::string rest = file.payload().substr(16);
+    feed(file.payload().substr(0, 16), 2000, 14, "some.spz",
+         [&](const std::string& header) { return load(gzip(header + rest)); });
+  }
 }
 
 TEST_CASE("mutations: each file of a SOG, and its bundle") {

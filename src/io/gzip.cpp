@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gzip.hpp"
+
+#include <algorithm>
+#include <new>
+
+namespace gsnav::io::detail {
+namespace {
+constexpr std::size_t kMostAtOnce = std::size_t{1} << 30;  // zlib's counters are 32-bit
+}
+
+GzipReader::GzipReader(std::span<const std::byte> packed) : left_(packed) {
+  constexpr int kGzipOnly = 16;
+  code_ = inflateInit2(&stream_, MAX_WBITS + kGzipOnly);
+  if (code_ == Z_MEM_ERROR) throw std::bad_alloc();
+  open_ = code_ == Z_OK;
+}
+
+GzipReader::~GzipReader() {
+  if (open_) inflateEnd(&stream_);
+}
+
+std::size_t GzipReader::read(std::span<std::byte> out) {
+  std::size_t done = 0;
+  while (done < out.size() && code_ == Z_OK) {
+    if (stream_.avail_in == 0) {
+      const std::size_t n = std::min(left_.size(), kMostAtOnce);
+      stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(left_.data()));
+      stream_.avail_in = static_cast<uInt>(n);
+      left_ = left_.subspan(n);
+    }
+    const std::size_t room = std::min(out.size() - done, kMostAtOnce);
+    stream_.next_out = reinterpret_cast<Bytef*>(out.data() + done);
+    stream_.avail_out = static_cast<uInt>(room);
+    code_ = inflate(&stream_, Z_NO_FLUSH);  // Z_BUF_ERROR, no progress, where the stream is cut
+    done += room - stream_.avail_out;
+  }
+  return done;
+}
+
+}  // namespace gsnav::io::detail

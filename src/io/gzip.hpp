@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <zlib.h>
+
+#include <cstddef>
+#include <span>
+
+namespace gsnav::io::detail {
+
+/// Decompresses a gzip stream in memory, piece by piece: who reads says how much is believed.
+class GzipReader {
+ public:
+  /// The bytes must outlive the reader.
+  explicit GzipReader(std::span<const std::byte> packed);
+  GzipReader(const GzipReader&) = delete;
+  GzipReader& operator=(const GzipReader&) = delete;
+  ~GzipReader();
+
+  /// Fills `out` as far as the stream goes; returns how many bytes that were. Fewer than asked for:
+  /// the stream ended, was cut or is damaged.
+  std::size_t read(std::span<std::byte> out);
+
+  /// Whether the stream's end was reached and its checksum fits.
+  bool at_end() const noexcept { return code_ == Z_STREAM_END; }
+
+ private:
+  std::span<const std::byte> left_;  ///< not yet given to zlib
+  z_stream stream_{};
+  int code_ = Z_OK;
+  bool open_ = false;
+};
+
+}  // namespace gsnav::io::detail
