@@ -7,6 +7,7 @@
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/avatar/motion.hpp"
+#include "gsnav/avatar/retarget.hpp"
 #include "gsnav/avatar/skeleton.hpp"
 #include "gsnav/avatar/skinned_gaussians.hpp"
 #include "gsnav/avatar/smpl_joints.hpp"

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <sstream>
+
+#include "allocations.hpp"
+#include "files.hpp"
+#include "gsnav/avatar/humanoid.hpp"
+#include "gsnav/avatar/retarget.hpp"
+#include "gsnav/io/motion_file.hpp"
+#include "support/data.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+const char* const kArm =
+    "HIERARCHY\nROOT hips\n{\n OFFSET 1 2 3\n CHANNELS 6 Xposition Zposition Yposition Yrotation Xrotation Zrotation\n"
+    " JOINT arm\n {\n  OFFSET 0 5 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n"
+    "  JOINT hand\n  {\n   OFFSET -4 0 0.5\n   CHANNELS 1 Yrotation\n   End Site\n   {\n    OFFSET 0 1 0\n   }\n  }\n }\n}\n"
+    "MOTION\nFrames: 2\nFrame Time: 0.05\n"
+    "0.5 0.25 -1 10 20 30 40 50 60 70\n1 2 3 -10 -200 30 -40 150 -60 7e1\n";
+
+Result<io::LoadedMotion> load(const std::string& text, const io::BvhOptions& options = {}) {
+  TempFolder folder("bvh");
+  write_file(folder / "some.bvh", text);
+  return io::load_bvh(folder / "some.bvh", options);
+}
+
+using Real = long double;
+using Matrix = std::array<std::array<Real, 4>, 4>;
+
+Matrix times(const Matrix& a, const Matrix& b) {
+  Matrix c{};
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t j = 0; j < 4; ++j) {
+      for (std::size_t k = 0; k < 4; ++k) c[i][j] += a[i][k] * b[k][j];
+    }
+  }
+  return c;
+}
+
+Matrix moved(Real x, Real y, Real z) { return {{{1, 0, 0, x}, {0, 1, 0, y}, {0, 0, 1, z}, {0, 0, 0, 1}}}; }
+
+/// Rotation about 'X', 'Y' or 'Z', by the textbook.
+Matrix turned(char axis, Real degrees) {
+  const Real a = degrees * std::acos(Real{-1}) / 180, c = std::cos(a), s = std::sin(a);
+  if (axis == 'X') return {{{1, 0, 0, 0}, {0, c, -s, 0}, {0, s, c, 0}, {0, 0, 0, 1}}};
+  if (axis == 'Y') return {{{c, 0, s, 0}, {0, 1, 0, 0}, {-s, 0, c, 0}, {0, 0, 0, 1}}};
+  return {{{c, -s, 0, 0}, {s, c, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+}
+
+std::vector<Affine3<double>> pose_at(const io::LoadedMotion& m, double time) {
+  LocalPose pose;
+  m.clip.pose({time}, pose);
+  std::vector<Affine3<double>> globals;
+  forward_kinematics(m.skeleton, pose, globals);
+  for (auto& g : globals) g.translation += pose.root;
+  return globals;
+}
+
+}  // namespace
+
+TEST_CASE("bvh: kinematics against matrices in long double") {
+  const io::LoadedMotion m = load(kArm).value();
+  CHECK(m.skeleton.names == std::vector<std::string>{"hips", "arm", "hand"});
+  CHECK(m.skeleton.parents == std::vector<std::int32_t>{-1, 0, 1});
+  CHECK(m.clip.frame_rate == doctest::Approx(20.0));
+  REQUIRE(m.clip.frames() == 2);
+  const Real f[2][10] = {{0.5L, 0.25L, -1, 10, 20, 30, 40, 50, 60, 70}, {1, 2, 3, -10, -200, 30, -40, 150, -60, 70}};
+  for (std::size_t t = 0; t < 2; ++t) {
+    // The first frame's place is nearer to zero than to the OFFSET, so places are added to it.
+    const Matrix hips = times(times(times(moved(1 + f[t][0], 2 + f[t][2], 3 + f[t][1]), turned('Y', f[t][3])),
+                                    turned('X', f[t][4])),
+                              turned('Z', f[t][5]));
+    const Matrix arm = times(times(times(times(hips, moved(0, 5, 0)), turned('Z', f[t][6])), turned('X', f[t][7])),
+                             turned('Y', f[t][8]));
+    const Matrix hand = times(times(arm, moved(-4, 0, 0.5L)), turned('Y', f[t][9]));
+    const auto globals = pose_at(m, 0.05 * static_cast<double>(t));
+    const Matrix* truth[3] = {&hips, &arm, &hand};
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        const int row = static_cast<int>(i);
+        CHECK(globals[j].translation[row] == doctest::Approx(static_cast<double>((*truth[j])[i][3])).epsilon(1e-12));
+        for (std::size_t k = 0; k < 3; ++k) {
+          CHECK(std::abs(globals[j].linear(row, static_cast<int>(k)) - static_cast<double>((*truth[j])[i][k])) < 1e-12);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("bvh: units, Z up, and places that replace the offset") {
+  const io::LoadedMotion plain = load(kArm).value(), other = load(kArm, {0.01, true}).value();
+  for (const double time : {0.0, 0.02, 0.05}) {
+    const auto a = pose_at(plain, time), b = pose_at(other, time);
+    for (std::size_t j = 0; j < 3; ++j) {
+      const Vec3d p = a[j].translation * 0.01;
+      CHECK(norm(b[j].translation - Vec3d{p.x, p.z, -p.y}) < 1e-12);
+    }
+  }
+  std::string text = kArm;
+  text.replace(text.find("0.5 0.25 -1"), 11, "1.2 2.5 2.2");  // near (1, 2, 3) with its channels X Z Y
+  const io::LoadedMotion replaced = load(text).value();
+  CHECK(norm(pose_at(replaced, 0)[0].translation - Vec3d{1.2, 2.2, 2.5}) < 1e-12);
+  CHECK(norm(pose_at(replaced, 0.05)[0].translation - Vec3d{1, 3, 2}) < 1e-12);
+}
+
+TEST_CASE("bvh: what is wrong is named with its line") {
+  const auto fails = [](const std::string& from, const std::string& to, const std::string& part) {
+    std::string text = kArm;
+    text.replace(text.find(from), from.size(), to);
+    const Status s = load(text).status();
+    CAPTURE(s.message());
+    CHECK(s.code() == Errc::invalid_file);
+    CHECK(contains(s.message(), "some.bvh"));
+    CHECK(contains(s.message(), part));
+  };
+  fails("HIERARCHY", "HIERARCHIE", "line 1");
+  fails("OFFSET 0 5 0", "OFFSET 0 five 0", "line 8: 'five' is no number");
+  fails("OFFSET 0 5 0", "OFFSET 0 nan 0", "'nan' is no number");
+  fails("CHANNELS 1 Yrotation", "CHANNELS 1 Wrotation", "'Wrotation' is no channel");
+  fails("CHANNELS 1 Yrotation", "CHANNELS 7 Yrotation", "must be 0 to 6");
+  fails("JOINT hand", "JOINT arm", "name of another joint");
+  fails("JOINT hand", "JOINTS hand", "'JOINTS'");
+  fails("Frames: 2", "Frames: 3", "is no number");
+  fails("Frames: 2", "Frames: 1", "behind the last frame");
+  fails("Frames: 2", "Frames: 1.5", "frames of 10 channels");
+  fails("Frames: 2", "Frames: 1e12", "frames of 10 channels");
+  fails("Frame Time: 0.05", "Frame Time: 0", "not positive");
+  CHECK(load(kArm, {0.0, false}).code() == Errc::invalid_argument);
+  CHECK(io::load_bvh("/none/a.bvh").code() == Errc::file_not_found);
+  std::mt19937 generator(3);
+  int refused = 0;
+  for (int i = 0; i < 2000; ++i) {
+    std::string text = kArm;
+    const std::size_t at = generator() % text.size();
+    if (i % 4 == 0) {
+      text.resize(at);
+    } else {
+      text[at] = i % 4 == 1 ? "0123456789-.eE {}\n"[generator() % 18] : static_cast<char>(generator());
+    }
+    reset_largest_allocation();
+    const auto m = load(text);
+    REQUIRE(largest_allocation() < 100000);
+    REQUIRE((m.ok() || contains(m.status().message(), "some.bvh")));
+    refused += m.ok() ? 0 : 1;
+  }
+  std::printf("bvh: of 2000 mutations %d were refused\n", refused);
+  CHECK(refused > 700);
+}
+
+TEST_CASE("bvh: the rest pose of real files is the sum of their offsets") {
+  for (const char* name : {"makehuman_cc0/walk1.bvh", "makehuman_cc0/tpose.bvh", "cmu_mocap/sinusoidal.bvh"}) {
+    const std::string path = data_file(std::string("avatars/") + name);
+    if (path.empty()) continue;
+    const auto m = io::load_bvh(path);
+    CAPTURE(m.status().message());
+    REQUIRE(m.ok());
+    // A reader of its own: offsets summed along the open braces.
+    std::istringstream text(read_file(path));
+    std::vector<std::array<Real, 3>> sums;
+    std::size_t joint = 0;
+    const auto rest = m->skeleton.rest_globals();
+    bool end_site = false;
+    for (std::string word; text >> word && word != "MOTION";) {
+      if (word == "End") end_site = true;
+      if (word == "}") {
+        sums.pop_back();
+      } else if (word == "OFFSET") {
+        std::array<Real, 3> p = sums.empty() ? std::array<Real, 3>{} : sums.back();
+        for (Real& v : p) {
+          Real add = 0;
+          text >> add;
+          v += add;
+        }
+        sums.push_back(p);
+        if (!end_site) {
+          for (std::size_t k = 0; k < 3; ++k) {
+            CHECK(std::abs(rest[joint].translation[static_cast<int>(k)] - static_cast<double>(p[k])) < 1e-12);
+          }
+          ++joint;
+        }
+        end_site = false;
+      }
+    }
+    CHECK(joint == m->skeleton.size());
+  }
+}
+
+TEST_CASE("retarget: to itself, to another size, and from a T pose to an A pose") {
+  const io::LoadedMotion m = load(kArm).value();
+  RetargetOptions options;
+  for (const std::string& name : m.skeleton.names) options.joints.emplace_back(name, name);
+  options.root_scale = 1.0;
+  const MotionClip same = retarget(m.clip, m.skeleton, m.skeleton, options).value();
+  const auto globals = [](const MotionClip& clip, const Skeleton& skeleton, double time) {
+    return pose_at({skeleton, clip, {}}, time);
+  };
+  for (const double time : {0.0, 0.025, 0.05}) {
+    const auto a = globals(m.clip, m.skeleton, time), b = globals(same, m.skeleton, time);
+    for (std::size_t j = 0; j < 3; ++j) CHECK(norm(a[j].translation - b[j].translation) < 1e-12);
+  }
+  // A target whose bones are half as long, lie in other directions and have turned frames: each limb
+  // points where the source's does.
+  Skeleton target;
+  target.names = {"a", "b", "c"};
+  target.parents = {-1, 0, 1};
+  const Mat3d r = rotation_matrix(axis_angle(normalized(Vec3d{1, 2, 3}), 0.7));
+  target.rest_local = {{r, {0, 4, 0}}, {r, {1, 2, -1}}, {transpose(r), {0, 2, 0.5}}};
+  options.joints = {{"a", "hips"}, {"b", "arm"}, {"c", "hand"}};
+  options.yaw = 0.5;
+  options.root_scale = 0.5;
+  const MotionClip clip = retarget(m.clip, m.skeleton, target, options).value();
+  const Mat3d turn = rotation_matrix(axis_angle(Vec3d{0, 1, 0}, 0.5));
+  for (const double time : {0.0, 0.05}) {
+    const auto a = globals(m.clip, m.skeleton, time), b = globals(clip, target, time);
+    for (std::size_t j = 1; j < 3; ++j) {
+      const Vec3d want = normalized(turn * (a[j].translation - a[j - 1].translation));
+      const Vec3d bone = b[j].translation - b[j - 1].translation;
+      CHECK(norm(normalized(bone) - want) < 1e-12);
+      CHECK(norm(bone) == doctest::Approx(norm(target.rest_local[j].translation)).epsilon(1e-12));
+    }
+    const Vec3d path = turn * (a[0].translation - m.skeleton.rest_local[0].translation) * 0.5;
+    CHECK(norm(b[0].translation - target.rest_local[0].translation - path) < 1e-12);
+  }
+  options.joints[1].second = "leg";
+  CHECK(contains(retarget(m.clip, m.skeleton, target, options).status().message(), "\"leg\""));
+  options.joints.erase(options.joints.begin());
+  options.joints[0].second = "arm";
+  CHECK(contains(retarget(m.clip, m.skeleton, target, options).status().message(), "root"));
+}
