@@ -214,12 +214,15 @@ TEST_CASE("N18_screen_filling") {
 
 TEST_CASE("N19_offscreen_rod_fan") {
   // A rod of 3 m x 1 cm, its centre at twice the half field of view, turned to every side.
-  Camera camera;
-  camera.set_hfov(96, 72, 90);
+  Camera centred;
+  centred.set_hfov(96, 72, 90);
+  Camera shifted = centred;  // the Jacobian's limits follow the principal point
+  shifted.cx = 20.5;
   Rng rng(19);
   double ewa_inside = 0, true_inside = 0;
   int fans = 0;
   for (int round = 0; round < 150; ++round) {
+    const Camera& camera = round % 2 == 0 ? centred : shifted;
     RawGaussian g = gaussian({2 * 1.5, rng.uniform(-1, 1), 1.5}, {1, 0.01 / 3, 0.01 / 3}, 0.99);  // 3 m: +- 1.5 sigma
     g.quat = random_rotation(rng);
     const GaussianCloud cloud = cloud_of({g});
