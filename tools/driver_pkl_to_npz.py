@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Turns Habitat-GS's driver.pkl into the driver.npz that gsnav reads.
+
+usage: driver_pkl_to_npz.py driver.pkl driver.npz
+       driver_pkl_to_npz.py --self-test            convert a driver, expect hostile pickles to be refused
+
+A pickle can name any function for its reader to call. This one admits what NumPy needs to rebuild arrays
+and numbers; everything else in a pickle is dict, list, tuple, str, bytes, bool, int, float or None, which
+need no names. Strings and numbers become arrays of one element, nested values are refused.
+"""
+import io
+import pathlib
+import pickle
+import sys
+import tempfile
+
+try:
+    import numpy
+except ImportError:
+    numpy = None
+
+
+def latin1(text, encoding):
+    """Bytes, which protocols 0 to 2 write as a text and its encoding."""
+    if encoding != "latin1" or not isinstance(text, str):
+        raise pickle.UnpicklingError("an encoding other than latin1")
+    return text.encode("latin1")
+
+
+def allowed():
+    """Names a pickle may ask for: {(module, name): object}."""
+    arrays = numpy.empty(0)
+    rebuild = arrays.__reduce__()[0]  # where it lives differs between versions of NumPy
+    scalar = numpy.float64(0).__reduce__()[0]
+    names = {("numpy", "ndarray"): numpy.ndarray, ("numpy", "dtype"): numpy.dtype, ("_codecs", "encode"): latin1,
+             ("__builtin__", "bytes"): bytes}  # protocols 0 to 2 write bytes of length 0 as a call
+    for module in ("numpy.core.multiarray", "numpy._core.multiarray"):
+        names[module, "_reconstruct"] = rebuild
+        names[module, "scalar"] = scalar
+    # Protocol 5 stores an array's bytes beside it.
+    frombuffer = arrays.__reduce_ex__(5)[0]
+    for module in ("numpy.core.numeric", "numpy._core.numeric"):
+        names[module, "_frombuffer"] = frombuffer
+    return names
+
+
+class ArrayUnpickler(pickle.Unpickler):
+    """Reads arrays and plain values and nothing that runs code."""
+
+    def find_class(self, module, name):
+        try:
+            return allowed()[module, name]
+        except KeyError:
+            raise pickle.UnpicklingError(f"{module}.{name} is no array, dict, list, str or number") from None
+
+
+def as_array(key, value):
+    if isinstance(value, (list, tuple)):
+        value = numpy.asarray(value)
+    if isinstance(value, (str, bytes, bool, int, float)):
+        value = numpy.asarray(value)
+    if isinstance(value, numpy.generic):
+        value = numpy.asarray(value)
+    # Objects in an array may be anything, and an npz would hold them as a pickle again.
+    if not isinstance(value, numpy.ndarray) or value.dtype.kind not in "biufUS":
+        raise ValueError(f"'{key}' is {type(value).__name__} and no array of numbers or text")
+    return value
+
+
+def load(data):
+    try:
+        driver = ArrayUnpickler(io.BytesIO(data), encoding="latin1").load()  # Python 2 wrote bytes for text
+    except (ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, TypeError) as error:
+        raise ValueError(f"the pickle is damaged: {error}") from error
+    if not isinstance(driver, dict) or not all(isinstance(k, str) for k in driver):
+        raise ValueError("the pickle holds no dictionary with names")
+    return {key: as_array(key, value) for key, value in driver.items() if value is not None}
+
+
+def convert(source, target):
+    arrays = load(pathlib.Path(source).read_bytes())
+    if "joint_mats" not in arrays:
+        raise ValueError("there is no joint_mats")
+    with open(target, "wb") as out:
+        numpy.savez_compressed(out, **arrays)
+    return arrays
+
+
+class Hostile:
+    """Pickles to a call of `function`."""
+
+    def __init__(self, function, *arguments):
+        self.call = (function, arguments)
+
+    def __reduce__(self):
+        return self.call
+
+
+def self_test():
+    good = {"joint_mats": numpy.tile(numpy.eye(4, dtype=numpy.float32), (5, 24, 1, 1)), "joint_mats_fps": 40.0,
+            "joint_mats_space": "smpl_with_trans", "joint_mats_version": numpy.int64(1), "gender": b"neutral", "nothing": b"",
+            "order": numpy.asfortranarray(numpy.arange(6.0).reshape(2, 3)), "betas": [0.5, 1.0], "none": None}
+    with tempfile.TemporaryDirectory() as scratch:
+        mark = pathlib.Path(scratch) / "ran"
+        for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+            source, target = pathlib.Path(scratch) / "d.pkl", pathlib.Path(scratch) / "d.npz"
+            source.write_bytes(pickle.dumps(good, protocol))
+            convert(source, target)
+            with numpy.load(target, allow_pickle=False) as back:
+                assert set(back.files) == set(good) - {"none"}
+                for key in back.files:
+                    assert numpy.array_equal(back[key], numpy.asarray(good[key])), key
+            bad = [Hostile(open, str(mark), "w"), Hostile(eval, f"open({str(mark)!r}, 'w')"),
+                   Hostile(pathlib.Path.touch, mark), Hostile(getattr, "text", "upper"),
+                   {"joint_mats": Hostile(__import__, "os")}, numpy.array([Hostile(open, str(mark), "w")], dtype=object),
+                   {"joint_mats": numpy.array([None])}, {"joint_mats": {"a": 1}}, {"joint_mats": 1j}, [1, 2], {1: 2},
+                   {"other": 1.0}]
+            for number, value in enumerate(bad):
+                source.write_bytes(pickle.dumps(value, protocol))
+                try:
+                    convert(source, target)
+                except (pickle.UnpicklingError, ValueError):
+                    continue
+                sys.exit(f"protocol {protocol}: the bad pickle {number} was converted")
+        assert not mark.exists(), "a pickle ran code"
+    print(f"{pickle.HIGHEST_PROTOCOL + 1} protocols: a driver converted, {len(bad)} bad pickles refused")
+
+
+if __name__ == "__main__":
+    if numpy is None:
+        print("SKIP: NumPy is not there")
+        sys.exit(0 if sys.argv[1:] == ["--self-test"] else 1)
+    if sys.argv[1:] == ["--self-test"]:
+        self_test()
+    elif len(sys.argv) == 3:
+        try:
+            for name, array in convert(sys.argv[1], sys.argv[2]).items():
+                print(f"{name} {array.dtype} {list(array.shape)}")
+        except (OSError, pickle.UnpicklingError, ValueError) as error:
+            sys.exit(f"{sys.argv[1]}: {error}")
+    else:
+        sys.exit(__doc__)
