@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "eval/oracle_support.hpp"
 #include "gsnav/io/scene_file.hpp"
@@ -48,7 +47,8 @@ OracleFrames cut(const OracleFrames& f, const PixelRect& rect) {
   out.resize(rect.width(), rect.height());
   const auto copy = [&](const auto& from, auto& to, std::size_t channels) {
     for (std::size_t y = 0; y < out.height; ++y) {
-      const std::size_t first = (y + static_cast<std::size_t>(rect.y0)) * f.width + static_cast<std::size_t>(rect.x0);
+      const std::size_t first =
+          (y + static_cast<std::size_t>(rect.y0)) * f.width + static_cast<std::size_t>(rect.x0);
       std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(channels * first), channels * out.width,
                   to.begin() + static_cast<std::ptrdiff_t>(channels * y * out.width));
     }
@@ -199,4 +199,21 @@ TEST_CASE("oracle: the renderer in double gives the same image to rounding") {
     }
     CHECK(f.counts.visible <= rendered.stats[0].visible);
   }
+}
+
+TEST_CASE("oracle: the renderer's exact response is the ray oracle's, found another way") {
+  const TwoSets two(600, 41);
+  OracleConfig config;
+  config.kind = OracleKind::ray;
+  config.order = OracleOrder::float32_key;
+  config.rules.background = {0.3, 0.2, 0.1};
+  const OracleFrames f = oracle(two.sets, two.camera, config);
+  config.rules.response = Response::ray;
+  SerialBackend serial;
+  Renderer<double, SerialBackend> renderer(serial, config.rules);
+  const auto rendered = renderer.render(two.sets, {{two.camera}}).value();
+  std::vector<bool> skip(f.alpha.size());
+  for (std::size_t p = 0; p < skip.size(); ++p) skip[p] = f.undecided[p] != 0;
+  CHECK(image_error(rendered.rgb, f.rgb, 3, skip).max < 1e-9);
+  CHECK(image_error(rendered.alpha, f.alpha, 1, skip).max < 1e-9);
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -18,7 +19,8 @@ using namespace gsnav_test;
 
 namespace {
 
-OracleFrames photo(const std::vector<GaussianSet>& sets, const Camera& camera, int k, const OracleConfig& config = {}) {
+OracleFrames photo(const std::vector<GaussianSet>& sets, const Camera& camera, int k,
+                   const OracleConfig& config = {}) {
   OracleBackend backend;
   return oracle_photo(backend, std::span(sets), camera, k, config).value();
 }
@@ -42,7 +44,8 @@ TEST_CASE("photo oracle: blocks of the image at k times the resolution") {
     Camera fine_camera = camera;
     fine_camera.set_hfov(24 * k, 18 * k, 70);
     fine_camera.cx = 9.75 * k;
-    const OracleFrames fine = oracle({cloud.set()}, fine_camera, config), f = photo({cloud.set()}, camera, k, config);
+    const OracleFrames fine = oracle({cloud.set()}, fine_camera, config);
+    const OracleFrames f = photo({cloud.set()}, camera, k, config);
     REQUIRE(f.width == 24);
     REQUIRE(f.height == 18);
     for (std::size_t p = 0; p < f.alpha.size(); ++p) {
@@ -77,20 +80,22 @@ TEST_CASE("photo oracle: a sub-pixel Gaussian is its integral over each pixel") 
     const double s = 40 * static_cast<double>(cloud.scales[axis][0]);
     return std::sqrt(s * s + static_cast<double>(0.3f) / (k * k));
   };
-  const auto mass = [](double from, double to, double mean, double s) {
-    return 0.5 * (std::erf((to - mean) / (s * std::sqrt(2.0))) - std::erf((from - mean) / (s * std::sqrt(2.0))));
+  const auto below = [](double x, double mean, double s) {
+    return 0.5 * std::erf((x - mean) / (s * std::numbers::sqrt2));
   };
   const double sx = sigma(0), sy = sigma(1), peak = static_cast<double>(cloud.opacities[0]);
+  const double mx = 4.5 + 40 * static_cast<double>(cloud.means[0][0]);
+  const double my = 4.5 + 40 * static_cast<double>(cloud.means[1][0]);
+  const double integral = peak * 2 * std::numbers::pi * sx * sy;
   double total = 0;
   for (std::size_t p = 0; p < f.alpha.size(); ++p) {
     const double x = static_cast<double>(p % 9), y = static_cast<double>(p / 9);
-    const double expected = peak * 2 * 3.14159265358979323846 * sx * sy *
-                            mass(x, x + 1, 4.5 + 40 * static_cast<double>(cloud.means[0][0]), sx) *
-                            mass(y, y + 1, 4.5 + 40 * static_cast<double>(cloud.means[1][0]), sy);
+    const double expected = integral * (below(x + 1, mx, sx) - below(x, mx, sx)) *
+                            (below(y + 1, my, sy) - below(y, my, sy));
     CHECK(std::abs(f.alpha[p] - expected) < 2e-3 * peak);
     total += f.alpha[p];
   }
-  CHECK(total == doctest::Approx(peak * 2 * 3.14159265358979323846 * sx * sy).epsilon(1e-3));
+  CHECK(total == doctest::Approx(integral).epsilon(1e-3));
 }
 
 TEST_CASE("photo oracle: bands and crops") {

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <numbers>
 
 #include "eval/oracle_support.hpp"
@@ -93,7 +92,8 @@ TEST_CASE("ray oracle: alpha of single Gaussians is the maximum along the ray, w
       if (!(raw > 0.02L) || p % 7 != 0) continue;
       const Real peak = truth_project(splat, camera, false).opacity;
       const Real reach = std::sqrt(2 * std::log(255 * peak) * sigma[2][2]);
-      const Real depth = std::clamp(searched_depth(splat, camera, x, y), splat.mean[2] - reach, splat.mean[2] + reach);
+      const Real center = splat.mean[2];
+      const Real depth = std::clamp(searched_depth(splat, camera, x, y), center - reach, center + reach);
       CHECK(std::abs(f.expected_depth[p] - static_cast<double>(depth)) < 1e-6);
     }
   }
@@ -143,9 +143,12 @@ TEST_CASE("ray oracle: what EWA is off by, over N02's grid of spheres") {
       config.kind = OracleKind::ray;
       const OracleFrames ray = oracle({cloud.set()}, camera, config);
       double gap = 0;
-      for (std::size_t p = 0; p < ewa.alpha.size(); ++p) gap = std::max(gap, std::abs(ewa.alpha[p] - ray.alpha[p]));
+      for (std::size_t p = 0; p < ewa.alpha.size(); ++p) {
+        gap = std::max(gap, std::abs(ewa.alpha[p] - ray.alpha[p]));
+      }
       const double model = 1.2 * rho * std::tan(theta * kRadians) + 1.1 * rho * rho;
-      MESSAGE("rho " << rho << ", theta " << theta << ": EWA against the ray " << gap << ", 1.2 rho tan + 1.1 rho^2 = " << model);
+      MESSAGE("rho " << rho << ", theta " << theta << ": EWA against the ray " << gap
+                     << ", 1.2 rho tan + 1.1 rho^2 = " << model);
       CHECK(gap < 1.5 * model);
     }
   }

@@ -46,8 +46,9 @@ Status with_oracle_scene(B& backend, std::span<const GaussianSet> sets, const Ca
 
 /// The float64 image of sets of Gaussians, as one sorted list, from one camera. The backend, whose memory
 /// is the host's, only shares out the work: rows in parallel, the same bits for any number of threads.
-/// Memory, above the images: 250 bytes a visible Gaussian (those in all sets for `boxed` = false), 64 MiB
-/// of row lists, and for OracleOrder::per_ray 24 MiB a thread.
+/// Memory, above the images: at most 350 bytes a visible Gaussian (a drawn one for `boxed` = false), 64 MiB
+/// of row lists, and for OracleOrder::per_ray 24 MiB a thread (more only where one pixel is under a million
+/// Gaussians).
 /// Errors: invalid_argument or unsupported, naming the field.
 ///
 ///     gsnav::OpenMPBackend backend;

@@ -84,9 +84,9 @@ void blend_in_order(const OracleScene<Model>& scene, View<const std::uint32_t> l
     for (int x = span.x0; x < span.x1; ++x) {
       OraclePixel& pixel = pixels[static_cast<std::size_t>(x - scene.rect.x0)];
       if (pixel.closed) continue;
-      const double px = x + 0.5, py = y + 0.5;
-      pixel.blend(scene.rules, r.model.log2_alpha(px, py), r.color, r.rank,
-                  [&] { return r.model.depth(px, py); });
+      const double px = x + 0.5, py = y + 0.5, log2_alpha = r.model.log2_alpha(px, py);
+      if (!(log2_alpha >= scene.log2_cut)) continue;
+      pixel.blend(scene.rules, log2_alpha, r.color, r.rank, [&] { return r.model.depth(px, py); });
       open -= pixel.closed ? 1 : 0;
     }
   }

@@ -20,7 +20,7 @@ namespace gsnav::eval {
 enum class OracleKind : std::uint8_t {
   contract,     ///< docs/accuracy.md, "The image"
   untruncated,  ///< the contract without alpha_min and transmittance_min; max_alpha stays
-  ray,          ///< maximum response along each pixel's ray: the model error of EWA
+  ray,          ///< maximum response along each pixel's ray: the model error of EWA. Near rules stay
 };
 
 /// What decides which Gaussian is in front. Ties go by stable id (set, row).

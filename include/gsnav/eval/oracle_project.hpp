@@ -177,7 +177,8 @@ std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const Oracl
   return all;
 }
 
-/// Projects, culls and sorts. Holds sizeof(OracleRecord) + 24 bytes a visible Gaussian.
+/// Projects, culls and sorts; what is drawn is projected again to be recorded in its place, so that nothing
+/// is held twice.
 template <class Model, Backend B>
 OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> gaussian_sets,
                                      const Camera& camera, const OracleConfig& config) {
