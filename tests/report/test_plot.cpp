@@ -36,13 +36,13 @@ TEST_CASE("text: markup is escaped, base64 is RFC 4648's, numbers have no surpri
   CHECK(format(123.456) == "123");
   CHECK(format(0.0123456) == "0.0123");
   CHECK(format(-2.5) == "-2.50");
-  CHECK(format(1.5e-7) == "1.50e-07");
+  CHECK(format(1.5e-7) == "1.50e-7");
   CHECK(format(kInfinity) == "inf");
   CHECK(format(kNan) == "\u2013");
   CHECK(format(std::nullopt) == "\u2013");
   CHECK(format_round(0.5) == "0.5");
   CHECK(format_round(100) == "100");
-  CHECK(format_round(1e-5) == "1e-05");
+  CHECK(format_round(1e-5) == "1e-5");
 }
 
 TEST_CASE("axis: holds every finite value and has ticks within") {

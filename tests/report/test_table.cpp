@@ -84,6 +84,22 @@ TEST_CASE("table: the ratio to exact is of the same view, geometric") {
   CHECK(exact_rows(fast, all).size() == 2);
 }
 
+TEST_CASE("table: a knob at the value of exact is known by its errors, oracle by oracle") {
+  std::vector<Row> rows{render("exact", "none", "", 0, 110, 2),
+                        render("exact", "key_bits", "32", 0, 110, 3),
+                        render("exact", "key_bits", "16", 0, 60, 3)};
+  rows.push_back(render("exact", "key_bits", "32", 0, 30, 3));
+  rows.back().set("oracle", "ray");  // exact was not measured against it
+  const Table table(rows, {});
+  const RowRefs all = table.of_kind("render");
+  CHECK(same_as_exact({all[1], all[3]}, all));
+  CHECK(!same_as_exact({all[2]}, all));
+  CHECK(!same_as_exact({all[3]}, all));
+  CHECK(setting_label(*all[1]) == "key_bits = 32");
+  rows[1].set("knob_value", "0.00392156862745098");
+  CHECK(shown_value(rows[1]) == "0.003922");
+}
+
 TEST_CASE("table: values of a knob are in the order of numbers, names behind") {
   std::vector<Group> groups{{"32", {}}, {"name", {}}, {"4", {}}, {"0.5", {}}, {"another", {}}};
   sort_numerically(groups);

@@ -106,7 +106,10 @@ std::string knob_part(const Table& table) {
     std::vector<Group> values = group_by(knob.rows, [](const Row& r) { return r.get("knob_value"); });
     sort_numerically(values);
     out += "\n### `" + knob.name + "`\n\n" + header(with({"value", "backend"}, kErrorColumns));
-    for (const Group& v : values) out += error_lines({plain(v.name)}, v.rows, renders);
+    for (const Group& v : values) {
+      const std::string mark = same_as_exact(v.rows, renders) ? " (exact)" : "";
+      out += error_lines({plain(shown_value(*v.rows.front())) + mark}, v.rows, renders);
+    }
   }
   return out;
 }

@@ -14,7 +14,10 @@ std::string to_text(double value, std::chars_format form, int precision) {
   std::array<char, 400> buffer{};
   const auto end =
       std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, form, precision).ptr;
-  return {buffer.data(), end};
+  std::string text(buffer.data(), end);
+  const std::size_t e = text.find('e');  // 1e-05 is 1e-5
+  if (e != text.npos && text.size() == e + 4 && text[e + 2] == '0') text.erase(e + 2, 1);
+  return text;
 }
 
 }  // namespace

@@ -101,11 +101,18 @@ std::string knob_section(const Table& table) {
   for (const Group& knob : group_by(turned, [](const Row& r) { return r.get("knob"); })) {
     std::vector<Group> values = group_by(knob.rows, [](const Row& r) { return r.get("knob_value"); });
     sort_numerically(values);
-    const RowRefs exact = exact_rows(knob.rows, renders);
-    // At the end where the knob does least, so that the curve runs towards it.
-    const bool last = values.size() > 1 && spread(values.back().rows, "rgb_psnr").mean >
-                                               spread(values.front().rows, "rgb_psnr").mean;
-    if (!exact.empty()) values.insert(last ? values.end() : values.begin(), {kExact, exact});
+    bool has_default = false;
+    for (Group& v : values) {
+      const bool is_default = same_as_exact(v.rows, renders);
+      v.name = shown_value(*v.rows.front()) + (is_default ? " (exact)" : "");
+      has_default = has_default || is_default;
+    }
+    if (const RowRefs exact = exact_rows(knob.rows, renders); !has_default && !exact.empty()) {
+      // At the end where the knob does least, so that the curve runs towards it.
+      const bool last =
+          spread(values.back().rows, "rgb_psnr").mean > spread(values.front().rows, "rgb_psnr").mean;
+      values.insert(last ? values.end() : values.begin(), {kExact, exact});
+    }
     std::string plots;
     for (const Quantity& q : kErrors) {
       const bool higher = std::string(q.column) == "rgb_psnr";

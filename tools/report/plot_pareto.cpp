@@ -126,6 +126,8 @@ std::vector<ParetoPoint> pareto_points(const RowRefs& rows, const std::string& c
     const Spread error = spread(g.rows, column), time = spread(g.rows, "time_p50_ms");
     if (error.count == 0 || time.count == 0) continue;
     const Row& first = *g.rows.front();
+    // A knob at the value that exact has differs from it by the noise of timing only.
+    if (!is_plain(first) && same_as_exact(g.rows, rows)) continue;
     points.push_back({setting_label(first), first.get("backend"), first.get("profile"), time.mean,
                       error.mean, higher_is_better ? error.min : error.max, error.count, false, false});
     most = std::max(most, error.count);

@@ -23,7 +23,8 @@ struct ParetoPoint {
 /// Marks as dominated what is, among the points of one backend; `higher_is_better` as for PSNR.
 void mark_dominated(std::vector<ParetoPoint>& points, bool higher_is_better);
 
-/// One point a (backend, setting) of `rows`, which are of one resolution, sensor and oracle.
+/// One point a (backend, setting) of `rows`, which are of one resolution, sensor and oracle; settings
+/// whose images are those of `exact` are left out.
 std::vector<ParetoPoint> pareto_points(const RowRefs& rows, const std::string& column,
                                        bool higher_is_better);
 

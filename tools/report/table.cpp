@@ -10,6 +10,8 @@
 #include <map>
 #include <set>
 
+#include "html_text.hpp"
+
 namespace gsnav_report {
 
 using gsnav::Errc;
@@ -73,10 +75,15 @@ bool against_contract(const Row& row) {
 
 std::string resolution(const Row& row) { return row.get("width") + "x" + row.get("height"); }
 
+std::string shown_value(const Row& row) {
+  const std::optional<double> number = row.number("knob_value");
+  return number ? format_round(*number) : row.get("knob_value");
+}
+
 std::string setting_label(const Row& row) {
   const std::string& profile = row.get("profile");
   if (is_plain(row)) return profile;
-  const std::string turned = row.get("knob") + " = " + row.get("knob_value");
+  const std::string turned = row.get("knob") + " = " + shown_value(row);
   return profile.empty() || profile == "exact" ? turned : profile + ", " + turned;
 }
 
@@ -132,6 +139,22 @@ RowRefs exact_rows(const RowRefs& rows, const RowRefs& all) {
     return is_plain(r) && r.get("profile") == "exact" &&
            wanted.count(conditions(r) + r.get("oracle")) != 0;
   });
+}
+
+bool same_as_exact(const RowRefs& rows, const RowRefs& all) {
+  std::map<std::string, const Row*> exact;
+  for (const Row* row : exact_rows(rows, all)) exact.emplace(conditions(*row) + row->get("oracle"), row);
+  bool any = false;
+  for (const Row* row : rows) {
+    const auto it = exact.find(conditions(*row) + row->get("oracle"));
+    if (it == exact.end()) continue;
+    any = true;
+    for (const char* column :
+         {"rgb_max", "rgb_rmse", "rgb_psnr", "alpha_max", "depth_p99", "depth_max"}) {
+      if (row->get(column) != it->second->get(column)) return false;
+    }
+  }
+  return any;
 }
 
 std::optional<double> ratio_to_exact(const RowRefs& rows, const RowRefs& all, std::string_view column) {

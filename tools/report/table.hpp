@@ -40,6 +40,8 @@ bool is_plain(const Row& row);
 bool against_contract(const Row& row);
 /// "1920x1080".
 std::string resolution(const Row& row);
+/// The knob's value, numbers to 4 digits.
+std::string shown_value(const Row& row);
 /// "exact", or "alpha_min = 0.02" where a knob is turned (with its profile unless that is exact).
 std::string setting_label(const Row& row);
 
@@ -70,6 +72,10 @@ Spread spread(const RowRefs& rows, std::string_view column);
 /// Rows of the `exact` profile against the same oracle in the same view, sensor, backend and threads as
 /// one of `rows`.
 RowRefs exact_rows(const RowRefs& rows, const RowRefs& all);
+
+/// Whether every row that has such an exact row has its errors too, digit by digit, and one has: the
+/// knob's value is the one that `exact` uses, or might be.
+bool same_as_exact(const RowRefs& rows, const RowRefs& all);
 
 /// Geometric mean of a column over its value in the `exact` row of the same view, sensor, backend and
 /// threads; nothing where no pair has two positive numbers.
