@@ -9,13 +9,15 @@
 #include "file.hpp"
 #include "gsnav/avatar/smpl_joints.hpp"
 #include "gsnav/io/npz_file.hpp"
+#include "gsnav/kernels/sh.hpp"
 #include "npz_arrays.hpp"
 #include "weight_truncation.hpp"
 
 namespace gsnav::io {
 namespace {
 
-constexpr double kShC0 = 0.28209479177387814;  // Y_00, sqrt(1 / 4 pi)
+
+constexpr std::size_t kMostJoints = 4096;
 
 class AvatarReader {
  public:
@@ -41,6 +43,10 @@ class AvatarReader {
     Skeleton& skeleton = out_.asset.skeleton;
     skeleton.inverse_binds = std::move(*binds);
     const std::size_t joints = skeleton.inverse_binds.size();
+    if (joints > kMostJoints) {
+      return {Errc::unsupported, file_.source() + ": joints_inv_bind_matrix has " + std::to_string(joints) +
+                                     " joints, more than " + std::to_string(kMostJoints)};
+    }
     if (Status s = name_joints(joints); !s) return s;
     std::vector<Affine3<double>> globals;
     for (std::size_t j = 0; j < joints; ++j) {
@@ -150,7 +156,7 @@ class AvatarReader {
         k == 1 && std::all_of(shs_.values.begin(), shs_.values.end(), [](double v) { return v >= 0 && v <= 1; });
     if (k == 1 && (options_.colors == AvatarColors::rgb ||
                    (options_.colors == AvatarColors::guess && could_be_rgb))) {
-      for (double& v : shs_.values) v = (v - 0.5) / kShC0;
+      for (double& v : shs_.values) v = (v - 0.5) / kSh0;
       if (options_.colors == AvatarColors::guess) {
         out_.report.warnings.push_back("shs: all values lie in [0, 1] and were taken as RGB");
       }

@@ -6,11 +6,11 @@
 #include "gsnav/avatar/smpl_joints.hpp"
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/npz_file.hpp"
+#include "gsnav/kernels/sh.hpp"
 
 namespace gsnav::io {
 namespace {
 
-constexpr double kShC0 = 0.28209479177387814;  // Y_00, sqrt(1 / 4 pi)
 
 template <std::size_t K>
 std::vector<float> interleaved(const std::array<std::vector<float>, K>& planes, std::size_t n) {
@@ -63,7 +63,7 @@ Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset) 
                                   return v >= 0 && v <= 1;
                                 });
     if (looks_like_rgb) {
-      for (const float v : cloud.sh0) rgb.push_back(0.5 + kShC0 * static_cast<double>(v));
+      for (const float v : cloud.sh0) rgb.push_back(0.5 + kSh0 * static_cast<double>(v));
       entries.push_back({"shs", {n, 3}, rgb});
     } else {
       const std::size_t rest = 3 * (coefficients - 1);

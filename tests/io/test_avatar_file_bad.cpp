@@ -82,6 +82,8 @@ TEST_CASE("avatar file: shapes that do not fit each other") {
                 a["lbs_weights"].values.resize(750, 0.25);
               }),
               Errc::unsupported, {"has 25 joints"});
+  check_fails(changed([](TestArrays& a) { a["joints_inv_bind_matrix"] = identities(4097); }), Errc::unsupported,
+              {"more than 4096"});
 }
 
 TEST_CASE("avatar file: values that cannot be") {

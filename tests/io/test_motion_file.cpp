@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <random>
 #include <sstream>
+#include <tuple>
+#include <utility>
 
 #include "allocations.hpp"
 #include "files.hpp"
@@ -234,4 +236,50 @@ TEST_CASE("retarget: to itself, to another size, and from a T pose to an A pose"
   options.joints.erase(options.joints.begin());
   options.joints[0].second = "arm";
   CHECK(contains(retarget(m.clip, m.skeleton, target, options).status().message(), "root"));
+}
+
+TEST_CASE("retarget: a real walk on the humanoid, limb by limb") {
+  const std::string path = data_file("avatars/makehuman_cc0/walk1.bvh");
+  if (path.empty()) return;
+  const io::LoadedMotion walk = io::load_bvh(path, {0.1, true}).value();
+  const Skeleton body = make_humanoid({.gaussians = 2000}).skeleton;
+  RetargetOptions options;
+  options.yaw = std::acos(-1.0);  // MakeHuman faces +Z here
+  options.joints = {{"pelvis", "Root"}};
+  for (const std::string side : {"L", "R"}) {
+    const std::string name = side == "L" ? "left_" : "right_";
+    for (const auto& [to, from] : {std::pair{"hip", "UpLeg_"}, {"knee", "LoLeg_"}, {"ankle", "Foot_"},
+                                   {"shoulder", "UpArm_"}, {"elbow", "LoArm_"}, {"wrist", "Hand_"}}) {
+      options.joints.emplace_back(name + to, from + side);
+    }
+  }
+  const MotionClip clip = retarget(walk.clip, walk.skeleton, body, options).value();
+  REQUIRE(clip.frames() == 14);
+  double worst = 0, lowest = 1, highest = -1;
+  for (std::size_t t = 0; t < 14; ++t) {
+    const double time = static_cast<double>(t) / clip.frame_rate;
+    const auto a = pose_at(walk, time), b = pose_at({body, clip, {}}, time);
+    const auto place = [](const auto& globals, const Skeleton& s, const std::string& name) {
+      return globals[static_cast<std::size_t>(s.find(name))].translation;
+    };
+    double foot = 9;
+    for (const std::string side : {"L", "R"}) {
+      const std::string name = side == "L" ? "left_" : "right_";
+      for (const auto& [to, from, next_to, next_from] :
+           {std::tuple{"hip", "UpLeg_", "knee", "LoLeg_"}, {"knee", "LoLeg_", "ankle", "Foot_"},
+            {"shoulder", "UpArm_", "elbow", "LoArm_"}, {"elbow", "LoArm_", "wrist", "Hand_"}}) {
+        const Vec3d d = normalized(place(a, walk.skeleton, next_from + side) - place(a, walk.skeleton, from + side));
+        const Vec3d e = normalized(place(b, body, name + next_to) - place(b, body, name + to));
+        worst = max(worst, norm(Vec3d{-d.x, d.y, -d.z} - e));
+      }
+      foot = min(foot, place(b, body, name + "ankle").y);
+    }
+    lowest = min(lowest, foot);
+    highest = max(highest, foot);
+  }
+  CHECK(worst < 1e-12);
+  // The clip walks on the spot without rising: the standing foot stays near the floor.
+  std::printf("walk1 on the humanoid: the lower ankle is %.3f to %.3f m high\n", lowest, highest);
+  CHECK(lowest > -0.05);
+  CHECK(highest < 0.25);
 }

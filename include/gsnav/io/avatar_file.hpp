@@ -64,7 +64,7 @@ struct LoadedAvatar {
 /// Errors name the file, the array, the row and the value: file_not_found; invalid_file (an array is
 /// missing or has another shape, a value is not finite, an opacity outside [0, 1], a negative scale or
 /// weight, weights all zero, an inverse bind that is not rigid); unsupported (joints that are neither
-/// SMPL's nor SMPL-X's and have no names; SH above degree 3; a body further than 32 m from its root);
+/// SMPL's nor SMPL-X's and have no names, or more than 4096; SH above degree 3; a body further than 32 m from its root);
 /// invalid_argument (the options); out_of_memory. Never throws.
 Result<LoadedAvatar> load_avatar(const std::filesystem::path& path, const LoadAvatarOptions& options = {});
 
