@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "file.hpp"
+#include "gsnav/io/ksplat.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
@@ -17,7 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kSupported = "a .ply, .splat, .spz or .sog, a meta.json or a folder with a meta.json";
+constexpr const char* kSupported =
+    "a .ply, .splat, .ksplat, .spz or .sog, a meta.json or a folder with a meta.json";
 
 Result<LoadedCloud> load_one(const fs::path& path) {
   std::error_code ignored;
@@ -36,6 +38,7 @@ Result<LoadedCloud> load_one(const fs::path& path) {
   if (extension == ".ply") return load_ply(path);
   if (extension == ".sog") return load_sog(path);
   if (extension == ".splat") return load_splat(path);
+  if (extension == ".ksplat") return load_ksplat(path);
   if (extension == ".spz") return load_spz(path);
   if (path.filename() == "meta.json") return load_sog(path);
   if (!fs::exists(path, ignored))

@@ -9,11 +9,13 @@
 #include "check_cloud.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/io/ksplat.hpp"
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
 #include "gsnav/io/spz.hpp"
+#include "ksplat_file.hpp"
 #include "ply_compressed_file.hpp"
 #include "sog_file.hpp"
 #include "splat_file.hpp"
@@ -150,6 +152,33 @@ TEST_CASE("mutations: spz, as it is and inside of its gzip stream") {
     const std::string rest = file.payload().substr(16);
     feed(file.payload().substr(0, 16), 2000, 14, "some.spz",
          [&](const std::string& header) { return load(gzip(header + rest)); });
+  }
+}
+
+TEST_CASE("mutations: ksplat") {
+  for (const int level : {0, 1, 2}) {
+    KsplatFile file;
+    file.level = level;
+    file.empty_sections = 0;
+    file.sections = {{1, random_rows(6, 9, 2), 0}, {0, random_rows(5, 0, 3), 1}};
+    const std::string text = file.text();
+    const auto load = [](const std::string& bytes) {
+      return check_cloud(io::parse_ksplat(bytes_of(bytes), "some.ksplat"));
+    };
+    // The parts of the headers that are read, and the data; what lies between is padding.
+    const std::size_t main = 44, section = 42, first = KsplatFile::kHeader,
+                      second = first + KsplatFile::kSectionHeader,
+                      data = second + KsplatFile::kSectionHeader;
+    const std::size_t parts[][2] = {{0, main}, {first, section}, {second, section}};
+    for (const auto& part_of : parts) {
+      const std::size_t from = part_of[0], size = part_of[1];
+      feed(text.substr(from, size), 1000, 15, "some.ksplat", [&](std::string part) {
+        part.resize(size);
+        return load(text.substr(0, from) + part + text.substr(from + size));
+      });
+    }
+    feed(text.substr(data), 1000, 16, "some.ksplat",
+         [&](const std::string& bytes) { return load(text.substr(0, data) + bytes); });
   }
 }
 

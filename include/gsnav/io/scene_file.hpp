@@ -8,8 +8,8 @@
 
 namespace gsnav::io {
 
-/// Reads a scene of Gaussians by what its path names: a `.ply`, `.splat`, `.spz` or `.sog`, a
-/// `meta.json`, or a folder with a meta.json.
+/// Reads a scene of Gaussians by what its path names: a `.ply`, `.splat`, `.ksplat`, `.spz` or
+/// `.sog`, a `meta.json`, or a folder with a meta.json.
 ///
 /// A comma names sibling tiles, which are merged into one cloud: `scenes/flat/2_0,2_1` reads
 /// scenes/flat/2_0 and scenes/flat/2_1. Their reports are summed, their warnings carry the tile's path.
