@@ -24,7 +24,7 @@ struct Header {
   std::int32_t width, height;
   std::uint64_t counts[5];  // rgb, alpha, depth, undecided, undecided_depth
   std::uint64_t evaluations;
-  std::uint64_t checksum;  // of the arrays
+  std::uint64_t checksum;  // of all that comes back
 };
 static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 80);
 
@@ -39,6 +39,9 @@ void each_array(R& r, const F& f) {
 
 std::uint64_t checksum(const Reference& r) {
   Hasher h;
+  h.value(r.width);
+  h.value(r.height);
+  h.value(r.evaluations);
   each_array(r, [&](const auto& v) { h.array(v); });
   return h.low();
 }

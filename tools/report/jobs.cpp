@@ -14,10 +14,11 @@ using namespace gsnav;
 
 namespace {
 
-constexpr std::array<std::pair<Oracle, std::string_view>, 5> kOracles{{{Oracle::contract, "contract"},
+constexpr std::array<std::pair<Oracle, std::string_view>, 6> kOracles{{{Oracle::contract, "contract"},
                                                                        {Oracle::contract_f64, "contract_f64"},
                                                                        {Oracle::photo4, "photo4"},
                                                                        {Oracle::ray, "ray"},
+                                                                       {Oracle::ray_key, "ray_key"},
                                                                        {Oracle::untruncated, "untruncated"}}};
 
 struct Knob {
@@ -34,7 +35,7 @@ std::vector<Knob> knobs() {
       {"max_sh_degree", {"0", "1", "2", "3"}, {Oracle::contract}},
       {"key_bits", {"16", "20", "24", "32"}, {Oracle::contract}},
       {"storage", {}, {Oracle::contract}},
-      {"response", {"ewa", "tangent_plane", "ray"}, {Oracle::contract, Oracle::ray}},
+      {"response", {"ewa", "tangent_plane", "ray"}, {Oracle::contract, Oracle::ray_key, Oracle::ray}},
       {"compat", {"inria", "gsplat", "habitat_gs"}, {Oracle::contract}}};
   for (const StorageCodec& c : storage_codecs()) all[4].values.emplace_back(c.name);
   return all;

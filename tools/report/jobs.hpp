@@ -23,7 +23,8 @@ enum class Oracle {
   contract,      ///< float64 in float32-key order: what `exact` rounds
   contract_f64,  ///< float64 in float64 order: what the key's rounding swaps
   photo4,        ///< the contract at 4 times the resolution, box-averaged: the truth of anti-aliasing
-  ray,           ///< exact response along each pixel's ray: what EWA approximates
+  ray,           ///< exact response and order along each pixel's ray: what EWA and centre order approximate
+  ray_key,       ///< exact response in the contract's order: what EWA alone approximates
   untruncated,   ///< no alpha cut and no stop: what truncation leaves out
 };
 std::string_view to_string(Oracle oracle) noexcept;

@@ -22,7 +22,7 @@ struct Options {
   std::vector<std::string> sensors{"rgbd", "rgb", "depth"}, profiles{"exact", "fast"},
       backends{"openmp", "serial"}, knobs = knob_names();
   std::vector<Oracle> oracles{Oracle::contract, Oracle::contract_f64, Oracle::photo4, Oracle::ray,
-                              Oracle::untruncated};
+                              Oracle::ray_key, Oracle::untruncated};
   int threads = 0, runs = 15;
   double max_seconds = 3;  ///< of timing one setting
   std::string out = "report", cache, docs, benchmarks, commit, machine;

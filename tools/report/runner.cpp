@@ -87,17 +87,18 @@ Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
 Status add_rows(const Options& o, CsvFile& csv, const Row& stamp, const std::string& kind,
                 const std::function<Result<std::vector<Row>>()>& make) {
   if (!o.wants(kind) || interrupted()) return {};
-  const std::string first = kind + " of " + stamp.get("commit") + " on " + stamp.get("machine");
-  if (csv.has(first + " 0")) return {};
+  const std::string set = kind + " of " + stamp.get("commit") + " on " + stamp.get("machine");
+  const auto key = [&](std::size_t i, std::size_t n) {
+    return set + " " + (i + 1 == n ? std::string("end") : std::to_string(i));
+  };
+  if (csv.has(key(0, 1))) return {};
   std::fprintf(stderr, "%s rows\n", kind.c_str());
   const Result<std::vector<Row>> rows = make();
   if (!rows) return rows.status();
-  // The first key last, so that a set that was cut off is made again.
-  for (std::size_t i = rows->size(); i-- > 0;) {
-    const std::string key = first + " " + std::to_string(i);
-    if (csv.has(key)) continue;
+  for (std::size_t i = 0; i < rows->size(); ++i) {
+    if (csv.has(key(i, rows->size()))) continue;  // the set was cut off before
     Row row = stamp;
-    row.fill((*rows)[i]).set("key", key);
+    row.fill((*rows)[i]).set("key", key(i, rows->size()));
     if (Status s = csv.add(std::move(row)); !s) return s;
   }
   return {};

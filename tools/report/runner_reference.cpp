@@ -31,10 +31,8 @@ Result<Reference> render_reference(const GaussianSet& set, const Camera& camera,
   config.order = eval::OracleOrder::float32_key;
   if (oracle == Oracle::contract_f64) config.order = eval::OracleOrder::float64;
   if (oracle == Oracle::untruncated) config.kind = eval::OracleKind::untruncated;
-  if (oracle == Oracle::ray) {
-    config.kind = eval::OracleKind::ray;
-    config.order = eval::OracleOrder::own;
-  }
+  if (oracle == Oracle::ray || oracle == Oracle::ray_key) config.kind = eval::OracleKind::ray;
+  if (oracle == Oracle::ray) config.order = eval::OracleOrder::per_ray;
   Result<eval::OracleFrames> frames = oracle == Oracle::photo4
                                           ? eval::oracle_photo(backend, sets, camera, 4, config)
                                           : eval::oracle_render(backend, sets, camera, config);

@@ -112,6 +112,15 @@ std::vector<SceneSpec> data_scenes(const std::filesystem::path& folder) {
 Result<Scene> load(const SceneSpec& spec, int views) {
   Scene scene;
   scene.name = spec.name;
+  std::vector<ViewPoint> all = spec.views;
+  if (!spec.cameras.empty()) {  // before the scene, which may take long
+    const Result<std::vector<Camera>> cameras = io::load_cameras(spec.cameras);
+    if (!cameras) return Status(cameras.code(), "scene " + spec.name + ": " + cameras.message());
+    if (cameras->empty()) return {Errc::invalid_file, "scene " + spec.name + ": " + spec.cameras + " holds no camera"};
+    for (const Camera& c : *cameras) {
+      all.push_back({std::string("camera") + std::to_string(all.size()), c.viewmat});
+    }
+  }
   if (spec.path.empty()) {
     Result<DefaultScene> flat = make_default_scene();
     if (!flat) return flat.status();
@@ -122,17 +131,7 @@ Result<Scene> load(const SceneSpec& spec, int views) {
     scene.cloud = std::move(loaded->cloud);
   }
   scene.hash = content_hash(scene.cloud);
-  std::vector<ViewPoint> all = spec.views;
-  if (!spec.cameras.empty()) {
-    const Result<std::vector<Camera>> cameras = io::load_cameras(spec.cameras);
-    if (!cameras) return Status(cameras.code(), "scene " + spec.name + ": " + cameras.message());
-    for (const Camera& c : *cameras) {
-      all.push_back({std::string("camera") + std::to_string(all.size()), c.viewmat});
-    }
-  } else if (all.empty()) {
-    all = orbit(scene.cloud);
-  }
-  if (all.empty()) return {Errc::invalid_file, "scene " + spec.name + ": " + spec.cameras + " holds no camera"};
+  if (all.empty()) all = orbit(scene.cloud);
   const std::size_t wanted = std::min(all.size(), static_cast<std::size_t>(std::max(views, 1)));
   for (std::size_t i = 0; i < wanted; ++i) scene.views.push_back(all[i * all.size() / wanted]);
   return scene;

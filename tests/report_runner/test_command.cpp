@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program as people run it.
+#include <doctest/doctest.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "csv.hpp"
+#include "files.hpp"
+#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io/ply.hpp"
+#include "support/scenes.hpp"
+
+using namespace gsnav;
+using namespace gsnav_report;
+using namespace gsnav_test;
+
+namespace {
+
+struct Outcome {
+  bool ok = false;
+  std::string text;
+};
+
+Outcome run(const ScratchFolder& folder, const std::string& arguments) {
+  const std::string log = (folder / "log").string();
+  const std::string command = std::string("\"") + GSNAV_REPORT + "\" " + arguments + " > \"" + log + "\" 2>&1";
+  Outcome out;
+  out.ok = std::system(command.c_str()) == 0;
+  out.text = read_text(log);
+  return out;
+}
+
+/// Writes a small cloud and three cameras in front of it; returns the --scene option.
+std::string tiny_scene(const ScratchFolder& folder) {
+  const GaussianCloud cloud = random_cloud(3, {.count = 300, .sh_degree = 1});
+  io::save_ply(folder / "tiny.ply", cloud).throw_if_error();
+  std::vector<Camera> cameras;
+  for (const double x : {-0.5, 0.0, 0.5}) {
+    cameras.push_back(Camera::look_at({x, 0, 0}, {0, 0, 4}, {0, -1, 0}, 48, 32, 70));
+  }
+  io::save_cameras(folder / "cameras.json", cameras).throw_if_error();
+  return "--scene tiny=\"" + (folder / "tiny.ply").string() + ":" + (folder / "cameras.json").string() + "\"";
+}
+
+}  // namespace
+
+TEST_CASE("report: errors name the option and the value") {
+  const ScratchFolder folder("report_errors");
+  struct Case {
+    std::string arguments;
+    std::vector<const char*> parts;
+  };
+  const Case cases[] = {
+      {"", {"--scene", "--default"}},
+      {"--default --sizes 64", {"--sizes", "64", "WIDTHxHEIGHT"}},
+      {"--default --sizes 0x64", {"--sizes", "0x64"}},
+      {"--default --knob-size huge", {"--knob-size", "huge"}},
+      {"--default --profiles faster", {"--profiles", "faster"}},
+      {"--default --oracles truth", {"--oracles", "truth"}},
+      {"--default --runs 0", {"--runs", "0"}},
+      {"--scene nonsense", {"--scene", "nonsense", "NAME=PATH"}},
+      {"--scene a=/none.ply", {"/none.ply"}},
+      {"--flat /none.ply", {"--flat", "/none.ply"}},
+      {"--data /none", {"--data", "/none"}},
+      {"--kinds kernel --benchmarks /none.json", {"--benchmarks", "/none.json"}}};
+  for (const Case& c : cases) {
+    CAPTURE(c.arguments);
+    const Outcome o = run(folder, c.arguments + " --out \"" + (folder / "out").string() + "\"");
+    CAPTURE(o.text);
+    CHECK_FALSE(o.ok);
+    for (const char* part : c.parts) CHECK(o.text.find(part) != std::string::npos);
+  }
+  const Outcome help = run(folder, "--help");
+  CHECK(help.ok);
+  for (const char* option : {"--scene", "--sizes", "--resume", "--cache", "--docs"}) {
+    CHECK(help.text.find(option) != std::string::npos);
+  }
+}
+
+TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed") {
+  const ScratchFolder folder("report_smoke");
+  const std::string out = (folder / "out").string();
+  const std::string arguments = tiny_scene(folder) + " --views 2 --sizes 48x32 --knob-size 48x32 --runs 1 --kinds " +
+                                "render,ledger --knobs response,storage --threads 2 --commit c1 --out \"" + out + "\"";
+  Outcome first = run(folder, arguments);
+  CAPTURE(first.text);
+  REQUIRE(first.ok);
+  const std::string csv = read_text(folder / "out/report.csv");
+  const std::vector<Row> rows = parse_csv(csv, "report.csv").value();
+  int exact = 0, knobs = 0;
+  bool picture = false;
+  for (const Row& row : rows) {
+    if (row.get("kind") != "render") continue;
+    knobs += row.get("knob") != "none";
+    picture = picture || std::filesystem::exists(folder / ("out/" + row.get("image")));
+    CHECK(*row.number("time_p50_ms") > 0);
+    CHECK(*row.number("bytes") > 0);
+    if (row.get("profile") != "exact" || row.get("knob") != "none" || row.get("oracle") != "contract") continue;
+    ++exact;
+    CAPTURE(row.line());
+    CHECK(*row.number("excluded") <= 1e-3);  // of so few pixels one may lie on an edge
+    if (row.get("sensor") != "depth") {
+      CHECK(*row.number("rgb_max") <= 1.0 / 510);
+      CHECK(*row.number("rgb_p999") <= 1e-4);
+      CHECK(*row.number("rgb_psnr") >= 85);
+      CHECK(*row.number("ssim") > 0.99999);
+    }
+    if (row.get("sensor") != "rgb") {
+      CHECK(*row.number("depth_p99") <= 1e-4);
+      CHECK(*row.number("depth_max") <= 1e-3);
+    }
+  }
+  CHECK(exact == 2 * (3 + 1));  // views x (openmp by sensor, serial)
+  CHECK(knobs == 2 * (3 * 3 + 8));
+  CHECK(picture);
+  CHECK(std::filesystem::exists(folder / "out/report.html"));
+
+  // Resumed: nothing is left to do. Cut short: only what is missing is made.
+  REQUIRE(run(folder, arguments + " --resume").ok);
+  CHECK(read_text(folder / "out/report.csv") == csv);
+  write_text(folder / "out/report.csv", csv.substr(0, csv.size() / 2));
+  REQUIRE(run(folder, arguments + " --resume").ok);
+  CHECK(parse_csv(read_text(folder / "out/report.csv"), "report.csv").value().size() == rows.size());
+
+  // A damaged reference is rendered again, with a warning.
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "out/references")) {
+    std::string bytes = read_text(entry.path());
+    bytes.back() = static_cast<char>(bytes.back() ^ 1);
+    write_text(entry.path(), bytes);
+  }
+  const Outcome repaired = run(folder, arguments);
+  CHECK(repaired.ok);
+  CHECK(repaired.text.find("checksum") != std::string::npos);
+  CHECK(parse_csv(read_text(folder / "out/report.csv"), "report.csv").value().size() == rows.size());
+}

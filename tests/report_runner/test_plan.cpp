@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "files.hpp"
+#include "jobs.hpp"
+#include "runner_timing.hpp"
+#include "scenes.hpp"
+
+using namespace gsnav;
+using namespace gsnav_report;
+
+namespace {
+
+PlanOptions small_plan() {
+  PlanOptions o;
+  o.views = 2;
+  o.sizes = {{64, 64}, {128, 96}};
+  o.sensors = {"rgbd", "rgb", "depth"};
+  o.backends = {"openmp", "serial"};
+  o.profiles = {"exact", "fast"};
+  o.knobs = knob_names();
+  o.oracles = {Oracle::contract, Oracle::photo4, Oracle::ray, Oracle::untruncated};
+  o.knob_size = {64, 64};
+  return o;
+}
+
+}  // namespace
+
+TEST_CASE("plan: every combination once, knobs one at a time") {
+  const std::vector<Setting> settings = plan(small_plan());
+  std::set<std::string> seen;
+  for (const Setting& s : settings) {
+    CHECK(validate(render_config(s, SortOrder::z_depth)).ok());
+    CHECK_FALSE(s.oracles.empty());
+    CHECK(seen.insert(std::to_string(s.view) + to_string(s.size) + s.sensor + s.backend + s.profile + s.knob +
+                      s.knob_value).second);
+    if (s.knob != "none") {
+      CHECK(s.size == ImageSize{64, 64});
+      CHECK(s.profile == "exact");
+    }
+  }
+  const auto plain = std::count_if(settings.begin(), settings.end(), [](const Setting& s) { return s.knob == "none"; });
+  CHECK(plain == 2 * 2 * (3 * 2 + 2));  // views x sizes x (openmp by sensor and profile, serial as rgbd)
+}
+
+TEST_CASE("plan: a knob's config differs from exact in that knob") {
+  Setting s;
+  s.knob = "alpha_min";
+  s.knob_value = "0.015625";
+  CHECK(render_config(s, SortOrder::z_depth).alpha_min == 1.0 / 64);
+  s = {};
+  s.knob = "response";
+  s.knob_value = "ray";
+  CHECK(render_config(s, SortOrder::z_depth).response == Response::ray);
+  CHECK(render_config(s, SortOrder::z_depth).alpha_min == RenderConfig{}.alpha_min);
+  s = {};
+  s.sensor = "depth";
+  CHECK(render_config(s, SortOrder::camera_distance).outputs == (kAlpha | kMedianDepth));
+  CHECK(render_config(s, SortOrder::camera_distance).sort_order == SortOrder::camera_distance);
+  PlanOptions o = small_plan();
+  o.sh_degree = 0;
+  for (const Setting& t : plan(o)) CHECK((t.knob != "max_sh_degree" || t.knob_value == "0"));
+  CHECK(parse_oracle("photo4").value() == Oracle::photo4);
+  CHECK(parse_oracle("truth").message().find("contract_f64") != std::string::npos);
+}
+
+TEST_CASE("scenes: what --scene says") {
+  const gsnav_test::ScratchFolder folder("report_scenes");
+  const std::string cameras = (folder / "cameras.json").string();
+  gsnav_test::write_text(cameras, "[]");
+  const SceneSpec plain = parse_scene("flat=/data/2_0,2_1").value();
+  CHECK(plain.name == "flat");
+  CHECK(plain.path == "/data/2_0,2_1");
+  CHECK(plain.cameras.empty());
+  const SceneSpec with = parse_scene("a=b.ply:" + cameras).value();
+  CHECK(with.path == "b.ply");
+  CHECK(with.cameras == cameras);
+  CHECK(load({"a", {}, cameras}, 4).message().find("camera") != std::string::npos);
+  for (const char* bad : {"", "name", "=path", "name="}) CHECK_FALSE(parse_scene(bad).ok());
+  CHECK(parse_scene("a=b.ply:/none.json").code() == Errc::file_not_found);
+  CHECK(benchmark_flat("/none/flat.ply").message().find("--flat") != std::string::npos);
+  CHECK(data_scenes("/none").empty());
+}
+
+TEST_CASE("timing: percentiles are of values that were seen") {
+  std::vector<double> values{5, 1, 4, 2, 3};
+  CHECK(percentile(values, 0.5) == 3);
+  CHECK(percentile(values, 0.99) == 5);
+  CHECK(percentile(values, 0.2) == 1);
+  values.clear();
+  CHECK(percentile(values, 0.5) == 0);
+  int calls = 0;
+  CHECK(measure([&] { ++calls; }, 7, 10.0).runs == 7);
+  CHECK(calls == 9);
+}
