@@ -2,7 +2,6 @@
 #include "gsnav/nav/navmesh.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <limits>
 
 #include "navmesh_impl.hpp"
@@ -15,12 +14,6 @@ struct Float3 {
   explicit Float3(const Vec3d& p) noexcept
       : v{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)} {}
 };
-
-std::string text(const Vec3d& p) {
-  char buffer[96];
-  std::snprintf(buffer, sizeof buffer, "(%.6g, %.6g, %.6g)", p.x, p.y, p.z);
-  return buffer;
-}
 
 }  // namespace
 
@@ -143,66 +136,6 @@ double NavMesh::distance_to_closest_obstacle(const Vec3d& p, double max_radius) 
     return inf;
   }
   return static_cast<double>(distance);
-}
-
-Result<NavPath> NavMesh::find_path(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const {
-  const auto a = snap_point(start, options), b = snap_point(goal, options);
-  for (const auto& [name, p, s] : {std::tuple{"start", &start, &a}, std::tuple{"goal", &goal, &b}}) {
-    if (!*s) {
-      return Status(Errc::nothing_navigable, std::string("no path: the ") + name + " " + text(*p) +
-                                                 " is not near the NavMesh");
-    }
-  }
-  const std::size_t ia = island_of(a->poly), ib = island_of(b->poly);
-  if (ia != ib) {
-    return Status(Errc::nothing_navigable, "no path: start is on island " + std::to_string(ia) + ", goal on " +
-                                               std::to_string(ib));
-  }
-  NavPath path;
-  path.points.push_back(a->position);
-  if (a->poly != b->poly) {
-    const Impl::Lease query(*impl_);
-    if (!query) return Status(Errc::out_of_memory, "no path: no memory for a search");
-    const Float3 from(a->position - impl_->origin), to(b->position - impl_->origin);
-    const dtQueryFilter filter;
-    // A path visits a polygon once, and a corner is a vertex between two of them.
-    const int most = static_cast<int>(polygon_count()) + 2;
-    std::vector<dtPolyRef> refs(static_cast<std::size_t>(most));
-    int count = 0;
-    dtStatus status = query->findPath(impl_->ref_of(a->poly), impl_->ref_of(b->poly), from.v, to.v,
-                                      &filter, refs.data(), &count, most);
-    if (dtStatusDetail(status, DT_OUT_OF_NODES)) {
-      return Status(Errc::unsupported, "no path found within " + std::to_string(impl_->node_pool) +
-                                           " search nodes of a mesh of " +
-                                           std::to_string(polygon_count()) + " polygons");
-    }
-    if (dtStatusFailed(status) || dtStatusDetail(status, DT_PARTIAL_RESULT)) {
-      return Status(Errc::nothing_navigable, "no path: the search did not reach the goal");
-    }
-    std::vector<float> corners(3 * static_cast<std::size_t>(count + 2));
-    std::vector<dtPolyRef> corner_refs(static_cast<std::size_t>(count + 2));
-    int corner_count = 0;
-    status = query->findStraightPath(from.v, to.v, refs.data(), count, corners.data(), nullptr,
-                                     corner_refs.data(), &corner_count, count + 2, 0);
-    if (dtStatusFailed(status)) return Status(Errc::nothing_navigable, "no path: straightening failed");
-    for (int i = 1; i + 1 < corner_count; ++i) {
-      const float* c = corners.data() + 3 * i;
-      Vec3d p{static_cast<double>(c[0]), static_cast<double>(c[1]), static_cast<double>(c[2])};
-      const dtPolyRef ref = corner_refs[static_cast<std::size_t>(i)];
-      if (ref != 0) p.y = impl_->polys.height(impl_->id_of(ref), p);
-      path.points.push_back(p + impl_->origin);
-    }
-  }
-  path.points.push_back(b->position);
-  for (std::size_t i = 1; i < path.points.size(); ++i) {
-    path.length += norm(path.points[i] - path.points[i - 1]);
-  }
-  return path;
-}
-
-double NavMesh::geodesic_distance(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const {
-  const Result<NavPath> path = find_path(start, goal, options);
-  return path.ok() ? path->length : std::numeric_limits<double>::infinity();
 }
 
 SurfaceWalk NavMesh::walk(const NavPoint& start, const Vec3d& displacement, bool slide) const {

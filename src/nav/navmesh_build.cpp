@@ -223,10 +223,12 @@ Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& s, rcHeigh
   const dtMeshTile& tile = *mesh.getTile(0);
   impl->ref_base = mesh.getPolyRefBase(&tile);
   extract(tile, hooks.height, impl->polys);
+  impl->unfolded = std::make_shared<const UnfoldedMesh>(impl->polys);
   for (const auto& t : impl->polys.tris) {
     for (const Vec3d& p : t) impl->bounds.add(p + origin);
   }
-  // One search node a polygon is all that A* can open; Detour numbers them in 16 bits.
+  // One search node a polygon is all that a search for the nearest wall can open; Detour numbers them in
+  // 16 bits.
   impl->node_pool = min(65535, 2 * static_cast<int>(impl->polys.polys.size()) + 64);
   return NavMesh(std::move(impl));
 }

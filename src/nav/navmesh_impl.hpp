@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "gsnav/nav/navmesh.hpp"
+#include "geodesic_search.hpp"
 #include "poly_mesh.hpp"
 
 namespace gsnav {
@@ -83,6 +84,7 @@ struct NavMesh::Impl {
   Vec3d origin{};  ///< world position of the mesh's own zero
   detail::NavMeshPtr mesh;
   detail::PolyMesh polys;
+  std::shared_ptr<const detail::UnfoldedMesh> unfolded;  ///< shared with geodesic fields
   Aabb<double> bounds;  ///< world
   dtPolyRef ref_base = 0;
   int node_pool = 0;
@@ -101,6 +103,8 @@ struct NavMesh::Impl {
     const Impl& impl_;
     detail::QueryPtr query_;
   };
+
+  detail::Site site(const NavPoint& p) const noexcept;
 
   dtPolyRef ref_of(PolyId id) const noexcept { return ref_base | static_cast<dtPolyRef>(id); }
   PolyId id_of(dtPolyRef ref) const noexcept { return static_cast<PolyId>(ref ^ ref_base); }

@@ -33,10 +33,17 @@ struct SnapOptions {
   Vec3d half_extents{2.0, 4.0, 2.0};
 };
 
-/// A path along the surface: corners from start to goal and its length in metres.
+/// A path along the surface from start to goal: the corners it turns at, between them points wherever a
+/// straight line would leave the surface by more than a centimetre, and its length on the surface, metres.
 struct NavPath {
   std::vector<Vec3d> points;
   double length = 0.0;
+};
+
+/// The shortest of the paths to several goals.
+struct GoalPath {
+  std::size_t goal = 0;  ///< index of the goal reached
+  NavPath path;
 };
 
 /// A point of a walk and when it is reached, as a fraction of the displacement asked for.
@@ -101,13 +108,25 @@ class NavMesh {
   /// infinity where p cannot be snapped.
   double distance_to_closest_obstacle(const Vec3d& p, double max_radius = 2.0) const;
 
-  // ---- paths
-  /// A short path between two points, after snapping (Detour's A* over polygons, string-pulled).
-  /// Errors (nothing_navigable) say why there is none: a point off the mesh, different islands, or a
-  /// mesh too large to search.
+  // ---- paths: the shortest on the surface, exactly (Polyanya, unfolded over slopes), so that distances
+  // are symmetric and obey the triangle inequality. The surface is that of the height triangles; a polygon
+  // that is level to a millimetre counts as flat.
+  /// The shortest path between two points, after snapping. Errors (nothing_navigable) say why there is
+  /// none: a point off the mesh, or different islands.
   Result<NavPath> find_path(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const;
   /// Length of find_path, infinity where there is none.
   double geodesic_distance(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const;
+  /// The shortest of the paths to many goals, and the goal it leads to. Goals that cannot be reached are
+  /// passed over; the error says why none can.
+  Result<GoalPath> find_path_to_any(const Vec3d& start, std::span<const Vec3d> goals,
+                                    const SnapOptions& options = {}) const;
+  /// Distance to the nearest goal along the surface, infinity where none can be reached.
+  double geodesic_distance(const Vec3d& start, std::span<const Vec3d> goals,
+                           const SnapOptions& options = {}) const;
+  /// The same for points whose polygons are known, without a search for them. Errors: invalid_argument
+  /// for no polygon of this mesh; nothing_navigable.
+  Result<NavPath> path_between(const NavPoint& start, const NavPoint& goal) const;
+  double distance_between(const NavPoint& start, const NavPoint& goal) const;
 
   // ---- walking
   /// Walks from `start` along the ground-plane part of `displacement`, polygon by polygon, so that no
@@ -119,6 +138,7 @@ class NavMesh {
 
   struct Impl;
   explicit NavMesh(std::unique_ptr<Impl> impl) noexcept;
+  const Impl& impl() const noexcept { return *impl_; }  ///< for the library's own parts
 
  private:
   std::unique_ptr<Impl> impl_;

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// NavMesh queries beside Detour's on the same mesh: random connected pairs of one island.
+#include <benchmark/benchmark.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/nav/geodesic_field.hpp"
+#include "gsnav/sim/default_scene.hpp"
+#include "navmesh_impl.hpp"
+
+using namespace gsnav;
+
+namespace {
+
+struct Scene {
+  std::unique_ptr<NavMesh> mesh;
+  std::vector<NavPoint> points;
+  std::vector<Vec3d> positions;
+  std::unique_ptr<GeodesicField> field;
+
+  explicit Scene(NavMesh m) : mesh(std::make_unique<NavMesh>(std::move(m))) {
+    Rng rng(1);
+    for (int i = 0; i < 4096; ++i) {
+      points.push_back(mesh->random_point(rng, 0));
+      positions.push_back(points.back().position);
+    }
+    field = std::make_unique<GeodesicField>(GeodesicField::make(*mesh, std::span(positions).first(1)).value());
+  }
+};
+
+const Scene* flat() {
+  static const Scene scene([] {
+    const DefaultScene s = make_default_scene(0.1).value();
+    return NavMesh::build({}, s.vertices, s.triangles).value();
+  }());
+  return &scene;
+}
+
+/// A mesh of the data folder with Habitat's settings; null where it is not there.
+const Scene* data(const char* name) {
+  const auto mesh = io::load_obj(std::string(GSNAV_DATA_DIR "/nav/recast/") + name);
+  if (!mesh) return nullptr;
+  std::vector<Vec3d> vertices;
+  for (const Vec3f& v : mesh->vertices) {
+    vertices.push_back({static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)});
+  }
+  return new Scene(NavMesh::build({}, vertices, mesh->triangles).value());
+}
+const Scene* nav_test() {
+  static const Scene* scene = data("nav_test.obj");
+  return scene;
+}
+const Scene* dungeon() {
+  static const Scene* scene = data("dungeon.obj");
+  return scene;
+}
+
+/// Detour's snap of both ends, findPath and straight path, as Habitat calls them.
+double detour_geodesic(const NavMesh::Impl& impl, dtNavMeshQuery& query, const Vec3d& a, const Vec3d& b) {
+  const float extents[3] = {2, 4, 2};
+  const dtQueryFilter filter;
+  float ends[2][3];
+  dtPolyRef refs[2];
+  for (const int i : {0, 1}) {
+    const Vec3d p = (i == 0 ? a : b) - impl.origin;
+    const float center[3] = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+    query.findNearestPoly(center, extents, &filter, &refs[i], ends[i]);
+  }
+  dtPolyRef polys[256];
+  float corners[3 * 256];
+  int count = 0, n = 0;
+  query.findPath(refs[0], refs[1], ends[0], ends[1], &filter, polys, &count, 256);
+  query.findStraightPath(ends[0], ends[1], polys, count, corners, nullptr, nullptr, &n, 256);
+  double sum = 0;
+  for (int i = 1; i < n; ++i) {
+    const float *p = corners + 3 * (i - 1), *q = corners + 3 * i;
+    sum += static_cast<double>(std::sqrt((q[0] - p[0]) * (q[0] - p[0]) + (q[1] - p[1]) * (q[1] - p[1]) +
+                                         (q[2] - p[2]) * (q[2] - p[2])));
+  }
+  return sum;
+}
+
+template <class F>
+void pairs(benchmark::State& state, const Scene* (*make)(), F&& f) {
+  const Scene* scene = make();
+  if (scene == nullptr) return state.SkipWithError("the mesh is not in GSNAV_DATA_DIR");
+  std::size_t i = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(f(*scene, i & 4095u, (i + 1) & 4095u));
+    ++i;
+  }
+  state.counters["polygons"] = static_cast<double>(scene->mesh->polygon_count());
+}
+
+void detour(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
+    const NavMesh::Impl::Lease query(s.mesh->impl());
+    return detour_geodesic(s.mesh->impl(), *query.operator->(), s.positions[a], s.positions[b]);
+  });
+}
+void geodesic(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
+    return s.mesh->geodesic_distance(s.positions[a], s.positions[b]);
+  });
+}
+void geodesic_with_handles(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
+    return s.mesh->distance_between(s.points[a], s.points[b]);
+  });
+}
+void path_with_handles(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
+    return s.mesh->path_between(s.points[a], s.points[b])->length;
+  });
+}
+void field_lookup(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t) { return s.field->distance(s.points[a]); });
+}
+void field_of_a_goal(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t) {
+    return GeodesicField::make(*s.mesh, std::span(s.positions).subspan(a, 1)).ok();
+  });
+}
+void random_point(benchmark::State& state, const Scene* (*make)()) {
+  Rng rng(2);
+  pairs(state, make, [&](const Scene& s, std::size_t, std::size_t) { return s.mesh->random_point(rng).poly; });
+}
+void snap(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t) { return s.mesh->snap_point(s.positions[a])->poly; });
+}
+
+#define GSNAV_NAV_BENCH(name)                  \
+  BENCHMARK_CAPTURE(name, flat, flat);         \
+  BENCHMARK_CAPTURE(name, nav_test, nav_test); \
+  BENCHMARK_CAPTURE(name, dungeon, dungeon)
+GSNAV_NAV_BENCH(detour);
+GSNAV_NAV_BENCH(geodesic);
+GSNAV_NAV_BENCH(geodesic_with_handles);
+GSNAV_NAV_BENCH(path_with_handles);
+GSNAV_NAV_BENCH(field_lookup);
+GSNAV_NAV_BENCH(field_of_a_goal);
+GSNAV_NAV_BENCH(random_point);
+GSNAV_NAV_BENCH(snap);
+
+}  // namespace
+
+BENCHMARK_MAIN();

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdio>
+#include <limits>
+#include <numeric>
+
+#include "navmesh_impl.hpp"
+
+namespace gsnav {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::string text(const Vec3d& p) {
+  char buffer[96];
+  std::snprintf(buffer, sizeof buffer, "(%.6g, %.6g, %.6g)", p.x, p.y, p.z);
+  return buffer;
+}
+
+Status off_mesh(const char* name, const Vec3d& p) {
+  return {Errc::nothing_navigable,
+          std::string("no path: the ") + name + " " + text(p) + " is not near the NavMesh"};
+}
+
+}  // namespace
+
+detail::Site NavMesh::Impl::site(const NavPoint& p) const noexcept {
+  Vec3d local = polys.clamped(p.poly, p.position - origin);
+  local.y = polys.height(p.poly, local);
+  const std::uint32_t face = unfolded->face_at(p.poly, local);
+  return {face, unfolded->flat(unfolded->faces[face], local), local};
+}
+
+double NavMesh::distance_between(const NavPoint& start, const NavPoint& goal) const {
+  if (start.poly >= polygon_count() || goal.poly >= polygon_count()) return kInfinity;
+  if (!is_finite(start.position) || !is_finite(goal.position)) return kInfinity;
+  if (island_of(start.poly) != island_of(goal.poly)) return kInfinity;
+  return detail::thread_search().run(*impl_->unfolded, impl_->site(start), impl_->site(goal));
+}
+
+Result<NavPath> NavMesh::path_between(const NavPoint& start, const NavPoint& goal) const {
+  for (const auto& [name, p] : {std::pair{"start", &start}, std::pair{"goal", &goal}}) {
+    if (p->poly >= polygon_count() || !is_finite(p->position)) {
+      return Status(Errc::invalid_argument, std::string("no path: the ") + name + " " + text(p->position) +
+                                                " has polygon " + std::to_string(p->poly) + " of " +
+                                                std::to_string(polygon_count()));
+    }
+  }
+  const std::size_t ia = island_of(start.poly), ib = island_of(goal.poly);
+  if (ia != ib) {
+    return Status(Errc::nothing_navigable, "no path: start is on island " + std::to_string(ia) +
+                                               ", goal on " + std::to_string(ib));
+  }
+  detail::GeodesicSearch& search = detail::thread_search();
+  NavPath path;
+  path.length = search.run(*impl_->unfolded, impl_->site(start), impl_->site(goal));
+  if (!(path.length < kInfinity)) {
+    return Status(Errc::nothing_navigable, "no path: the search did not reach the goal");
+  }
+  path.points = search.path();
+  for (Vec3d& p : path.points) p += impl_->origin;
+  return path;
+}
+
+Result<NavPath> NavMesh::find_path(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const {
+  const auto a = snap_point(start, options);
+  if (!a) return off_mesh("start", start);
+  const auto b = snap_point(goal, options);
+  if (!b) return off_mesh("goal", goal);
+  return path_between(*a, *b);
+}
+
+double NavMesh::geodesic_distance(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const {
+  return geodesic_distance(start, std::span(&goal, 1), options);
+}
+
+double NavMesh::geodesic_distance(const Vec3d& start, std::span<const Vec3d> goals,
+                                  const SnapOptions& options) const {
+  const auto a = snap_point(start, options);
+  if (!a) return kInfinity;
+  double best = kInfinity;
+  for (const Vec3d& goal : goals) {
+    const auto b = snap_point(goal, options);
+    // No path is shorter than the straight line.
+    if (b && norm(b->position - a->position) < best) best = min(best, distance_between(*a, *b));
+  }
+  return best;
+}
+
+Result<GoalPath> NavMesh::find_path_to_any(const Vec3d& start, std::span<const Vec3d> goals,
+                                           const SnapOptions& options) const {
+  if (goals.empty()) return Status(Errc::invalid_argument, "no path: there are no goals");
+  const auto a = snap_point(start, options);
+  if (!a) return off_mesh("start", start);
+  double best = kInfinity;
+  NavPoint nearest;
+  GoalPath out;
+  Status why;
+  for (std::size_t i = 0; i < goals.size(); ++i) {
+    const auto b = snap_point(goals[i], options);
+    if (!b || island_of(b->poly) != island_of(a->poly)) {
+      if (why.ok()) why = b ? path_between(*a, *b).status() : off_mesh("goal", goals[i]);
+      continue;
+    }
+    if (!(norm(b->position - a->position) < best)) continue;
+    const double d = distance_between(*a, *b);
+    if (!(d < best)) continue;
+    best = d;
+    nearest = *b;
+    out.goal = i;
+  }
+  if (!(best < kInfinity)) return why;
+  auto path = path_between(*a, nearest);
+  if (!path) return path.status();
+  out.path = std::move(*path);
+  return out;
+}
+
+}  // namespace gsnav

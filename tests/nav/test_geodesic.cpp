@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "geodesic_oracle.hpp"
+#include "gsnav/nav/geodesic_field.hpp"
+#include "gsnav/nav/navmesh.hpp"
+#include "meshes.hpp"
+#include "metric_check.hpp"
+#include "navmesh_impl.hpp"
+#include "support/data.hpp"
+
+using namespace gsnav;
+using gsnav_test::check_metric;
+using gsnav_test::Soup;
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+NavMesh build(const Soup& soup, double cell = 0.1) {
+  NavMeshSettings s;
+  s.cell_size = cell;
+  return NavMesh::build(s, soup.vertices, soup.triangles).value();
+}
+
+Soup boxes(std::uint64_t seed, int count, double side) {
+  Soup soup;
+  soup.floor(0, 0, side, side);
+  Rng rng(seed);
+  for (int i = 0; i < count; ++i) {
+    const double x = rng.uniform(0.5, side - 2), z = rng.uniform(0.5, side - 2);
+    soup.box(x, z, x + rng.uniform(0.1, 2.5), z + rng.uniform(0.1, 1.5), 0, 2);
+  }
+  return soup;
+}
+
+double sum_of(const std::vector<Vec3d>& points) {
+  double sum = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) sum += norm(points[i] - points[i - 1]);
+  return sum;
+}
+
+/// Detour's path, each leg laid on the surface; infinity where a leg does not stay on it.
+double detour_length(const NavMesh& mesh, const NavPoint& a, const NavPoint& b) {
+  const NavMesh::Impl& impl = mesh.impl();
+  const NavMesh::Impl::Lease query(impl);
+  const auto f = [&](const Vec3d& p) {
+    const Vec3d q = p - impl.origin;
+    return std::array<float, 3>{static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
+  };
+  const auto from = f(a.position), to = f(b.position);
+  const dtQueryFilter filter;
+  std::vector<dtPolyRef> refs(mesh.polygon_count() + 2);
+  int count = 0, corners = 0;
+  if (query->findPath(impl.ref_of(a.poly), impl.ref_of(b.poly), from.data(), to.data(), &filter, refs.data(),
+                      &count, static_cast<int>(refs.size())) != DT_SUCCESS) {
+    return kInfinity;
+  }
+  std::vector<float> straight(3 * refs.size());
+  query->findStraightPath(from.data(), to.data(), refs.data(), count, straight.data(), nullptr, nullptr, &corners,
+                          static_cast<int>(refs.size()));
+  double sum = 0;
+  NavPoint at = a;
+  for (int i = 1; i < corners; ++i) {
+    const float* c = straight.data() + 3 * i;
+    const Vec3d goal = Vec3d{static_cast<double>(c[0]), 0, static_cast<double>(c[2])} + impl.origin;
+    const SurfaceWalk w = mesh.walk(at, goal - at.position, true);
+    if (w.points.empty()) return kInfinity;
+    at = {w.points.back().position, w.points.back().poly};
+    if (std::hypot(at.position.x - goal.x, at.position.z - goal.z) > 1e-3) return kInfinity;
+    sum += w.length;
+  }
+  return sum;
+}
+
+/// Never longer than Detour's; its mean excess is reported.
+void check_against_detour(const NavMesh& mesh, int pairs, double tolerance) {
+  Rng rng(5);
+  double worst = -kInfinity, ours = 0, theirs = 0;
+  int compared = 0;
+  for (int i = 0; i < pairs; ++i) {
+    const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
+    const double detour = detour_length(mesh, a, b);
+    if (!(detour < kInfinity)) continue;
+    const double d = mesh.distance_between(a, b);
+    worst = max(worst, d / detour - 1);
+    ours += d;
+    theirs += detour;
+    ++compared;
+  }
+  MESSAGE(compared << " of " << pairs << " paths of Detour: " << 100 * (theirs / ours - 1)
+                   << " % longer on average, ours longer by at most " << 100 * worst << " %");
+  CHECK(compared > pairs / 2);
+  CHECK(worst < tolerance);
+}
+
+NavMesh demo(const char* file) {
+  const Soup soup = gsnav_test::read_obj(gsnav_test::data_file(file));
+  NavMeshSettings s;
+  s.cell_size = 0.3;
+  s.agent_height = 2.0;
+  s.agent_radius = 0.6;
+  s.agent_max_climb = 0.9;
+  return NavMesh::build(s, soup.vertices, soup.triangles).value();
+}
+
+}  // namespace
+
+TEST_CASE("geodesic: equals brute force on the visibility graph of random floors with holes") {
+  double worst = 0;
+  std::size_t corners = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const NavMesh mesh = build(boxes(seed, 6 + 2 * static_cast<int>(seed), 12));
+    const gsnav_test::VisibilityGraph graph(mesh);
+    corners += graph.corner_count();
+    Rng rng(seed);
+    for (int i = 0; i < 60; ++i) {
+      const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
+      const auto expected = static_cast<double>(graph.distance(a.position, b.position));
+      const auto path = mesh.path_between(a, b);
+      REQUIRE(path.ok());
+      worst = max(worst, std::abs(path->length - expected));
+      REQUIRE(path->length == doctest::Approx(expected).epsilon(1e-9));
+      REQUIRE(sum_of(path->points) == doctest::Approx(expected).epsilon(1e-7));
+      REQUIRE(norm(path->points.front() - a.position) < 1e-9);
+      REQUIRE(norm(path->points.back() - b.position) < 1e-9);
+    }
+  }
+  MESSAGE("360 paths among " << corners << " corners: at most " << worst << " m from the truth");
+}
+
+TEST_CASE("geodesic: closed forms") {
+  Soup soup;
+  soup.floor(0, 0, 10, 10);
+  soup.box(3, 3, 7, 7, 0, 2);
+  const NavMesh mesh = build(soup, 0.05);
+  // The box grown by the agent's radius: two ways around are equally long, each over one corner.
+  const auto path = mesh.find_path({2, 0, 2}, {8, 0, 8});
+  REQUIRE(path.ok());
+  REQUIRE(path->points.size() == 3);
+  const Vec3d corner = path->points[1];
+  CHECK(max(std::abs(corner.x - 5), std::abs(corner.z - 5)) == doctest::Approx(2.1).epsilon(0.03));
+  CHECK(path->length == doctest::Approx(norm(corner - Vec3d{2, 0, 2}) + norm(corner - Vec3d{8, 0, 8})).epsilon(1e-9));
+  CHECK(path->length == doctest::Approx(2 * std::hypot(0.9, 5.1)).epsilon(0.01));
+  CHECK(mesh.geodesic_distance({1, 0, 1}, {9, 0, 1}) == doctest::Approx(8).epsilon(1e-9));
+  CHECK(mesh.geodesic_distance({1, 0, 1}, {1, 0, 1}) == 0);
+  CHECK(mesh.geodesic_distance(corner, {8, 0, 8}) == doctest::Approx(norm(corner - Vec3d{8, 0, 8})).epsilon(1e-9));
+
+  // Up a ramp of 30 degrees: the length is the slope's, not the plan's.
+  Soup ramp;
+  ramp.floor(0, 0, 4, 3);
+  const double rise = 4 * std::tan(3.14159265358979323846 / 6);
+  ramp.quad({4, 0, 0}, {4, 0, 3}, {8, rise, 3}, {8, rise, 0});
+  ramp.floor(8, 0, 12, 3, rise);
+  NavMeshSettings s;
+  s.cell_height = 0.05;
+  const NavMesh hill = NavMesh::build(s, ramp.vertices, ramp.triangles).value();
+  const double expected = 3 + std::hypot(4, rise) + 3;
+  CHECK(hill.geodesic_distance({1, 0, 1}, {11, rise, 1}) == doctest::Approx(expected).epsilon(0.002));
+  const auto up = hill.find_path({1, 0, 1}, {11, rise, 1});
+  CHECK(sum_of(up->points) == doctest::Approx(up->length).epsilon(1e-3));
+}
+
+TEST_CASE("geodesic: one floor above another is a floor of its own") {
+  Soup soup;
+  soup.floor(0, 0, 16, 8);
+  soup.floor(0, 0, 8, 4, 3);  // above
+  soup.quad({8, 3, 0}, {8, 3, 4}, {12, 0, 4}, {12, 0, 0});
+  const NavMesh mesh = build(soup);
+  // Beside the ramp to its foot, and up.
+  const double over = mesh.geodesic_distance({1, 0, 2}, {1, 3, 2});
+  CHECK(over > 23);
+  CHECK(over < 26);
+  CHECK(over == doctest::Approx(mesh.geodesic_distance({1, 3, 2}, {1, 0, 2})).epsilon(1e-9));
+  CHECK(mesh.geodesic_distance({1, 0, 2}, {4, 0, 2}) == doctest::Approx(3).epsilon(1e-6));
+}
+
+TEST_CASE("geodesic: symmetric, and no detour is shorter") {
+  check_metric(build(boxes(3, 30, 20)), 20000);
+  check_against_detour(build(boxes(3, 30, 20)), 1000, 1e-6);
+  for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/dungeon.obj"}) {
+    if (gsnav_test::data_file(file).empty()) continue;
+    const NavMesh mesh = demo(file);
+    check_metric(mesh, 10000);
+    check_against_detour(mesh, 1000, 2e-3);  // a walk's length cuts bumps of a centimetre
+  }
+}
+
+TEST_CASE("geodesic: thousands of polygons are no limit") {
+  Soup soup;
+  soup.floor(0, 0, 36, 36);
+  for (int i = 0; i < 34 * 34; ++i) {
+    const double x = 1 + i % 34, z = 1 + i / 34 + 0.25 * (i % 3);
+    soup.box(x, z, x + 0.3, z + 0.3, 0, 2);
+  }
+  const NavMesh mesh = build(soup);
+  CHECK(mesh.polygon_count() > 2048);
+  Rng rng(3);
+  for (int i = 0; i < 200; ++i) {
+    const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
+    const double d = mesh.distance_between(a, b), line = norm(b.position - a.position);
+    REQUIRE(d >= line - 1e-9);
+    REQUIRE(d < 1.5 * line + 1);
+  }
+}
+
+TEST_CASE("geodesic: many goals, and fields of distance") {
+  const NavMesh mesh = build(boxes(9, 30, 16));
+  Rng rng(1);
+  for (int round = 0; round < 5; ++round) {
+    std::vector<Vec3d> goals;
+    for (int i = 0; i <= round; ++i) goals.push_back(mesh.random_point(rng, 0).position);
+    const GeodesicField field = GeodesicField::make(mesh, goals).value();
+    for (int i = 0; i < 300; ++i) {
+      const NavPoint p = mesh.random_point(rng, 0);
+      double best = kInfinity;
+      std::size_t nearest = 0;
+      for (std::size_t k = 0; k < goals.size(); ++k) {
+        const double d = mesh.geodesic_distance(p.position, goals[k]);
+        if (d < best) nearest = k;
+        best = min(best, d);
+      }
+      REQUIRE(field.distance(p) == doctest::Approx(best).epsilon(1e-9));
+      REQUIRE(mesh.geodesic_distance(p.position, goals) == best);
+      const auto path = mesh.find_path_to_any(p.position, goals);
+      REQUIRE(path->goal == nearest);
+      REQUIRE(path->path.length == best);
+    }
+  }
+  CHECK(GeodesicField::make(mesh, {}).code() == Errc::invalid_argument);
+  const Vec3d off[] = {{3, 0, 3}, {500, 0, 0}};
+  CHECK(GeodesicField::make(mesh, off).message().find("goal 1") != std::string::npos);
+  CHECK(mesh.find_path_to_any({3, 0, 3}, {}).code() == Errc::invalid_argument);
+  CHECK(mesh.find_path_to_any({3, 0, 3}, std::span(off + 1, 1)).code() == Errc::nothing_navigable);
+  CHECK(mesh.path_between({{3, 0, 3}, 1u << 30}, {{3, 0, 3}, 0}).code() == Errc::invalid_argument);
+  CHECK(mesh.distance_between({}, {}) == kInfinity);
+}
+
+TEST_CASE("geodesic: fields over slopes") {
+  if (gsnav_test::data_file("nav/recast/nav_test.obj").empty()) return;
+  const NavMesh mesh = demo("nav/recast/nav_test.obj");
+  Rng rng(4);
+  const NavPoint goal = mesh.random_point(rng, 0);
+  const GeodesicField field = GeodesicField::make(mesh, std::span(&goal.position, 1)).value();
+  for (int i = 0; i < 500; ++i) {
+    const NavPoint p = mesh.random_point(rng, 0);
+    REQUIRE(field.distance(p) == doctest::Approx(mesh.distance_between(p, goal)).epsilon(1e-5));
+  }
+}
