@@ -173,6 +173,16 @@ TEST_CASE("oracle: crops, threads and bands of rows change no bit") {
   const OracleFrames whole = oracle({tall.set()}, camera, config);
   config.crop = {0, 5900, 2, 5950};
   CHECK(same_images(cut(whole, config.crop), oracle({tall.set()}, camera, config)));
+  // 2K columns that 800 Gaussians reach: more pairs than are ordered by pixel at once.
+  const GaussianCloud wide = random_cloud(5, {.count = 800, .sh_degree = 0, .scale = 0.5});
+  camera = axis_camera(2000, 500);
+  camera.height = 1;
+  camera.cy = 0.5;
+  config.order = OracleOrder::per_ray;
+  config.crop = {};
+  const OracleFrames row = oracle({wide.set()}, camera, config);
+  config.crop = {950, 0, 1050, 1};
+  CHECK(same_images(cut(row, config.crop), oracle({wide.set()}, camera, config)));
 }
 
 TEST_CASE("oracle: the renderer in double gives the same image to rounding") {

@@ -100,6 +100,10 @@ TEST_CASE("oracle: two layers, their depths and what is marked undecided") {
   const auto undecided_depth = [](const OracleFrames& r) { return r.undecided_depth; };
   CHECK(at_center({gaussian({0, 0, 2}, wide, (1 + 5e-6) / 255)}, undecided) == 1);
   CHECK(at_center({gaussian({0, 0, 2}, wide, (1 + 5e-5) / 255)}, undecided) == 0);
+  OracleConfig faint;
+  faint.rules.alpha_min = 0.01;
+  CHECK(at_center({gaussian({0, 0, 2}, wide, 0.01 * (1 - 5e-6))}, undecided, faint) == 1);  // and not drawn
+  CHECK(at_center({gaussian({0, 0, 2}, wide, 0.01 * (1 - 5e-5))}, undecided, faint) == 0);
   // Twice max_alpha is T = 1e-4, the stop.
   CHECK(at_center({opaque({0, 0, 2}, wide, {}), opaque({0, 0, 3}, wide, {})}, undecided) == 1);
   CHECK(at_center({opaque({0, 0, 2}, wide, {}), gaussian({0, 0, 3}, wide, 0.98)}, undecided) == 0);
@@ -113,7 +117,7 @@ TEST_CASE("oracle: a pixel is closed by the Gaussian that takes T below the stop
   std::vector<RawGaussian> layers;
   for (int i = 0; i < 5; ++i) layers.push_back(opaque({0, 0, 2.0 + i}, {0.5, 0.5, 0.01}, {}));
   OracleConfig config;
-  config.rules.transmittance_min = 0.5e-4;
+  config.rules.transmittance_min = 0.95e-4;  // the second layer's T is 1e-4
   const GaussianCloud cloud = cloud_of(layers);
   const std::size_t center = 32 * 65 + 32;
   const OracleFrames f = oracle({cloud.set()}, axis_camera(), config);
