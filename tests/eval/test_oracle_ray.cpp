@@ -130,6 +130,16 @@ TEST_CASE("ray oracle: two disks that cut through each other are ordered at each
   }
 }
 
+TEST_CASE("ray oracle: one depth is ordered by stable id") {
+  const Vec3d mean{0, 0, 4}, round{0.2, 0.2, 0.2};
+  const GaussianCloud cloud = cloud_of({gaussian(mean, round, 0.5, {1, 0, -1}), gaussian(mean, round, 0.5),
+                                        gaussian(mean, round, 0.5, {-1, 0, 1})});
+  const OracleFrames f = oracle({cloud.set()}, axis_camera(), {.kind = OracleKind::ray});
+  const std::size_t center = 32 * 65 + 32;
+  CHECK(f.rgb[3 * center] == doctest::Approx(0.5 * 0.875 + kSh0 * (0.5 - 0.125)).epsilon(1e-12));
+  CHECK(f.rgb[3 * center + 2] == doctest::Approx(0.5 * 0.875 - kSh0 * (0.5 - 0.125)).epsilon(1e-12));
+}
+
 TEST_CASE("ray oracle: what EWA is off by, over N02's grid of spheres") {
   Camera camera;
   camera.set_hfov(640, 480, 130);
