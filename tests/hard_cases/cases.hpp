@@ -14,6 +14,7 @@
 #include "gsnav/math/quat.hpp"
 #include "gsnav/ops/render_config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/renderer.hpp"
 
 // Inputs that several hard cases share.
 

@@ -43,6 +43,20 @@ double needle_error(R& renderer, double sigma_px, int windows, Rng& rng) {
   return worst;
 }
 
+/// Needles of 100 to 1e6 px and up to 3e5 : 1 with their means in the image of N08's camera.
+GaussianCloud long_needles(std::size_t count) {
+  Rng rng(88);
+  std::vector<RawGaussian> gs(count);
+  for (RawGaussian& g : gs) {
+    const double z = rng.uniform(1, 5), scale = std::pow(10, rng.uniform(2, 6)) * z / 100;
+    const double thin = scale * std::pow(10, rng.uniform(-5.5, -3));
+    g = gaussian({rng.uniform(-0.6, 0.6) * z, rng.uniform(-0.6, 0.6) * z, z}, {scale, thin, thin},
+                 rng.uniform(0.1, 0.99));
+    g.quat = random_rotation(rng);
+  }
+  return cloud_of(gs);
+}
+
 }  // namespace
 
 TEST_CASE("N07_alpha_long_needle") {
@@ -69,7 +83,8 @@ TEST_CASE("N08_power_sign") {
   RenderConfig config;
   config.max_alpha = 1;
   config.alpha_min = 1e-30;
-  const GaussianCloud cloud = needle_cloud(8, sample_count(40000));
+  GaussianCloud cloud = needle_cloud(8, sample_count(20000));
+  REQUIRE(append(cloud, long_needles(sample_count(20000))).ok());
   for_each_lane_type([&]<class L>(const std::string& name) {
     using S = scalar_of<L>;
     constexpr int kLanes = LaneIo<L>::width;
