@@ -8,14 +8,9 @@
 #include "gsnav/avatar/avatar.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
+#include "hard_cases/cases.hpp"
 
 namespace gsnav_test {
-
-inline gsnav::Quatd random_rotation(gsnav::Rng& rng) {
-  gsnav::Quatd q{rng.normal(), rng.normal(), rng.normal(), rng.normal()};
-  gsnav::normalize(q);
-  return q;
-}
 
 /// A rotation by at most `degrees`.
 inline gsnav::Quatd rotation_within(gsnav::Rng& rng, double degrees) {

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// N41 to N44: opaque, saturating, faint and deep stacks of layers.
+#include <doctest/doctest.h>
+
+#include <limits>
+
+#include "hard_cases/arrays.hpp"
+#include "hard_cases/cases.hpp"
+#include "hard_cases/truth.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+constexpr int kSize = 9;
+constexpr std::size_t kCenter = kSize * kSize / 2;
+
+/// Wide layers across the view axis, one millimetre apart, the nearest last in the file.
+GaussianCloud layers(const std::vector<double>& opacities, std::uint64_t seed = 0) {
+  Rng rng(seed);
+  std::vector<RawGaussian> gs;
+  for (std::size_t i = 0; i < opacities.size(); ++i) {
+    gs.push_back(gaussian({0, 0, 2 + 1e-3 * static_cast<double>(i)}, {50, 50, 1e-5}, opacities[i],
+                          {static_cast<float>(rng.normal()), static_cast<float>(rng.normal()), 1}));
+    if (std::isinf(opacities[i])) gs.back().opacity_logit = opacities[i];
+  }
+  std::reverse(gs.begin(), gs.end());
+  return cloud_of(gs);
+}
+
+/// The blend at the axis in long double from the stored opacities, nearest first.
+struct Blend {
+  Real red = 0, transmittance = 1, depth = 0;
+  Blend(const GaussianCloud& cloud, double max_alpha, double transmittance_min, bool exclusive) {
+    for (std::size_t i = cloud.size(); i-- > 0;) {
+      const Real alpha = std::min<Real>(cloud.opacities[i], static_cast<Real>(max_alpha));
+      if (alpha * 255 < 1) continue;
+      const Real after = transmittance * (1 - alpha);
+      if (exclusive && after < static_cast<Real>(transmittance_min)) return;
+      const Real dc = static_cast<Real>(cloud.sh0[3 * i]) / std::sqrt(4 * 3.14159265358979323846264338328L);
+      red += alpha * transmittance * std::max<Real>(0, 0.5L + dc);
+      depth += alpha * transmittance * static_cast<Real>(cloud.means[2][i]);
+      transmittance = after;
+      if (transmittance < static_cast<Real>(transmittance_min)) return;
+    }
+  }
+};
+
+template <class F>
+void on_axis(const GaussianCloud& cloud, const RenderConfig& config, const F& check) {
+  render_everywhere({&cloud}, axis_camera(kSize, 64), config, [&](const auto& f, const auto& renderer) {
+    check(static_cast<double>(f.alpha[kCenter]), static_cast<double>(f.rgb[3 * kCenter]), renderer);
+  });
+}
+
+}  // namespace
+
+TEST_CASE("N41_single_opaque") {
+  const GaussianCloud cloud = layers({std::numeric_limits<double>::infinity()}, 41);
+  REQUIRE(cloud.opacities[0] == 1.0f);
+  const Real color = std::max<Real>(0, 0.5L + static_cast<Real>(kSh0) * static_cast<Real>(cloud.sh0[0]));
+  REQUIRE(color > 0.1L);
+  for (const double max_alpha : {0.99, 1.0}) {
+    RenderConfig config = all_outputs();
+    config.max_alpha = max_alpha;
+    on_axis(cloud, config, [&](double alpha, double red, const auto&) {
+      CHECK(std::abs(alpha - max_alpha) < 1e-6);
+      CHECK(std::abs(red - max_alpha * static_cast<double>(color)) < 1e-6);
+    });
+    // INRIA leaves out what would close the pixel: at 0.99 nothing does, at 1 the Gaussian itself.
+    config.compat = Compat::inria;
+    on_axis(cloud, config, [&](double alpha, double red, const auto&) {
+      CHECK(std::abs(alpha - (max_alpha < 1 ? 0.99 : 0.0)) < 1e-6);
+      CHECK((red > 0) == (max_alpha < 1));
+    });
+  }
+}
+
+TEST_CASE("N42_saturation_stop") {
+  struct Row {
+    std::vector<double> opacities;
+    double max_alpha;
+  };
+  for (const Row& row : {Row{{0.05, 0.05, 0.05, 0.9999, 0.5}, 1.0}, Row{{0.01, 0.99, 0.99, 0.5}, 0.99},
+                         Row{{0.985, 0.985, 0.985, 0.5}, 0.99}}) {
+    const GaussianCloud cloud = layers(row.opacities, 42);
+    for (const Compat compat : {Compat::none, Compat::inria, Compat::gsplat}) {
+      RenderConfig config = all_outputs();
+      config.max_alpha = row.max_alpha;
+      config.compat = compat;
+      const Blend truth(cloud, row.max_alpha, 1e-4, compat != Compat::none);
+      if (compat == Compat::none) {
+        REQUIRE(truth.transmittance < 1e-4L);
+      } else {
+        REQUIRE(truth.transmittance > 1e-4L);  // up to 0.0099 of what lies behind shines through
+      }
+      on_axis(cloud, config, [&](double alpha, double red, const auto&) {
+        CHECK(std::abs(1 - alpha - static_cast<double>(truth.transmittance)) < 1e-6);
+        CHECK(std::abs(red - static_cast<double>(truth.red)) < 1e-6);
+        if (compat == Compat::none) CHECK(1 - alpha <= 1e-4);
+      });
+    }
+  }
+}
+
+TEST_CASE("N43_faint_fog") {
+  on_axis(layers(std::vector<double>(500, 0.0039)), all_outputs(), [](double alpha, double red, const auto&) {
+    CHECK(alpha == 0);
+    CHECK(red == 0);
+  });
+  // From 0.00393 on they count, and add up.
+  for (const double faint : {0.00393, 0.004, 0.01}) {
+    const GaussianCloud cloud = layers(std::vector<double>(500, faint), 43);
+    const Blend truth(cloud, 0.99, 1e-4, false);
+    on_axis(cloud, all_outputs(), [&](double alpha, double red, const auto&) {
+      CHECK(std::abs(alpha - static_cast<double>(1 - truth.transmittance)) < 1e-5);
+      CHECK(std::abs(red - static_cast<double>(truth.red)) < 1e-5);
+    });
+  }
+}
+
+TEST_CASE("N44_deep_stack") {
+  Rng rng(44);
+  std::vector<double> opacities;
+  for (int i = 0; i < 5000; ++i) opacities.push_back(rng.uniform(0.0045, 0.0055));
+  const GaussianCloud cloud = layers(opacities, 440);
+  for (const double stop : {1e-4, 0.0}) {
+    CAPTURE(stop);
+    RenderConfig config = all_outputs();
+    config.transmittance_min = stop;
+    const Blend truth(cloud, 0.99, stop, false);
+    double worst = 0, worst_depth = 0;
+    render_everywhere({&cloud}, axis_camera(kSize, 64), config, [&](const auto& f, const auto&) {
+      const double alpha = static_cast<double>(f.alpha[kCenter]), red = static_cast<double>(f.rgb[3 * kCenter]);
+      worst = std::max(worst, std::abs(alpha - static_cast<double>(1 - truth.transmittance)));
+      worst = std::max(worst, std::abs(red - static_cast<double>(truth.red)));
+      const double expected = static_cast<double>(truth.depth / (1 - truth.transmittance));
+      worst_depth = std::max(worst_depth, std::abs(static_cast<double>(f.expected_depth[kCenter]) - expected));
+    });
+    MESSAGE("stop at " << stop << ": colour and transmittance " << worst << ", depth " << worst_depth << " m");
+    CHECK(worst < 5e-6);
+    CHECK(worst_depth < 1e-5);
+  }
+}
