@@ -24,38 +24,6 @@ inline double angle_between(const gsnav::Quatd& a, const gsnav::Quatd& b) {
   return 2 * std::atan2(std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z), std::abs(d.w)) * 57.29577951308232;
 }
 
-/// Eigenvectors (columns) and eigenvalues of a symmetric matrix by cyclic Jacobi rotations.
-inline void jacobi(gsnav::Mat3d a, gsnav::Mat3d& vectors, double (&values)[3]) {
-  vectors = gsnav::Mat3d::identity();
-  for (int sweep = 0; sweep < 60; ++sweep) {
-    for (int p = 0; p < 3; ++p) {
-      for (int q = p + 1; q < 3; ++q) {
-        if (std::abs(a(p, q)) < 1e-300) continue;
-        const double theta = 0.5 * std::atan2(2 * a(p, q), a(q, q) - a(p, p));
-        gsnav::Mat3d r = gsnav::Mat3d::identity();
-        r(p, p) = r(q, q) = std::cos(theta);
-        r(p, q) = std::sin(theta);
-        r(q, p) = -std::sin(theta);
-        a = gsnav::transpose(r) * a * r;
-        vectors = vectors * r;
-      }
-    }
-  }
-  for (int k = 0; k < 3; ++k) values[k] = a(k, k);
-}
-
-/// Polar factor of b by way of the square root of b^T b: another road than the kernel's.
-inline gsnav::Mat3d polar_oracle(const gsnav::Mat3d& b) {
-  gsnav::Mat3d v;
-  double l[3];
-  jacobi(gsnav::transpose(b) * b, v, l);
-  gsnav::Mat3d scaled = v;
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) scaled(i, k) /= std::sqrt(l[k]);
-  }
-  return b * (scaled * gsnav::transpose(v));
-}
-
 /// The default person, made once.
 inline std::shared_ptr<const gsnav::AvatarAsset> person() {
   static const auto asset = std::make_shared<const gsnav::AvatarAsset>(gsnav::make_humanoid());
