@@ -27,14 +27,31 @@ void check_all(const PlyFile& file, int rest, int degree) {
 
 }  // namespace
 
-TEST_CASE("ply: every degree, more rows than a block") {
-  const int counts[] = {0, 9, 24, 45};
-  for (int degree = 0; degree < 4; ++degree) {
+TEST_CASE("N36_sh_degree_mismatch") {
+  // Every degree there is, more rows than a block; of degree 4 the bands that kernels evaluate.
+  const int counts[] = {0, 9, 24, 45, 72};
+  for (int degree = 0; degree <= 4; ++degree) {
     PlyFile file;
     file.properties = inria_properties(counts[degree]);
     file.rows = random_rows(600, counts[degree], 1u + static_cast<unsigned>(degree));
-    check_all(file, counts[degree], degree);
+    if (degree <= kMaxShDegree) {
+      check_all(file, counts[degree], degree);
+      continue;
+    }
+    const LoadedCloud loaded = parse(file.text());
+    CHECK(loaded.cloud.sh_degree == kMaxShDegree);
+    for (std::size_t i = 0; i < 600; ++i) check_gaussian(loaded.cloud, i, file.rows[i], 72);
+    REQUIRE(loaded.report.warnings.size() == 1);
+    CHECK(contains(loaded.report.warnings[0], "degree 4"));
   }
+  // 10 fit no degree; test_ply_bad.cpp has more such counts.
+  PlyFile file;
+  file.properties = inria_properties(10);
+  file.rows = random_rows(3, 10, 2);
+  const auto result = io::parse_ply(bytes_of(file.text()), "some.ply");
+  CHECK(result.code() == Errc::invalid_file);
+  CHECK(contains(result.message(), "some.ply"));
+  CHECK(contains(result.message(), "10 properties f_rest_*"));
 }
 
 TEST_CASE("ply: properties in any order") {
@@ -152,16 +169,58 @@ TEST_CASE("ply: other elements before and after") {
   }
 }
 
-TEST_CASE("ply: of degree 4 the first 15 coefficients of each channel are read") {
+TEST_CASE("N35_nan_position_row") {
+  // 100 000 rows of degree 1 by hand, so that the file is as large as files are.
+  constexpr std::size_t kRows = 100000, kFloats = 26;
   PlyFile file;
-  file.properties = inria_properties(72);
-  file.rows = random_rows(4, 72, 8);
-  const LoadedCloud loaded = parse(file.text());
-  CHECK(loaded.cloud.sh_degree == 3);
-  REQUIRE(loaded.cloud.size() == 4);
-  for (std::size_t i = 0; i < 4; ++i) check_gaussian(loaded.cloud, i, file.rows[i], 72);
-  REQUIRE(loaded.report.warnings.size() == 1);
-  CHECK(contains(loaded.report.warnings[0], "degree 4"));
+  file.properties = inria_properties(9);
+  REQUIRE(file.properties.size() == kFloats);
+  std::mt19937 generator(35);
+  std::uniform_real_distribution<float> uniform(0.1f, 2.0f);
+  std::vector<float> values(kRows * kFloats);
+  for (float& v : values) v = uniform(generator);
+  const auto text_of = [&](const std::vector<float>& rows) {
+    file.count = std::to_string(rows.size() / kFloats);
+    return file.header() + std::string(reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof(float));
+  };
+  std::vector<float> without = values;
+  without.erase(without.begin() + 17 * kFloats, without.begin() + 18 * kFloats);
+  const LoadedCloud expected = parse(text_of(without));
+  REQUIRE(expected.cloud.size() == kRows - 1);
+  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  // x, z and, for the same reason, a coefficient of SH.
+  for (const auto& [column, bad] : {std::pair<std::size_t, float>{0, nan}, {2, inf}, {9 + 4, nan}}) {
+    std::vector<float> rows = values;
+    rows[17 * kFloats + column] = bad;
+    const LoadedCloud loaded = parse(text_of(rows));
+    CHECK(loaded.report.read == kRows);
+    CHECK(loaded.report.kept == kRows - 1);
+    CHECK(loaded.report.dropped_non_finite == 1);
+    CHECK(loaded.report.dropped() == 1);
+    CHECK(loaded.cloud.means == expected.cloud.means);
+    CHECK(loaded.cloud.quats == expected.cloud.quats);
+    CHECK(loaded.cloud.scales == expected.cloud.scales);
+    CHECK(loaded.cloud.opacities == expected.cloud.opacities);
+    CHECK(loaded.cloud.sh0 == expected.cloud.sh0);
+    CHECK(loaded.cloud.shN == expected.cloud.shN);
+  }
+}
+
+TEST_CASE("N37_truncated_ply_zero_rows") {
+  // A writer that died: the header promises all rows, the disk has zeros after the first.
+  PlyFile file;
+  file.properties = inria_properties(45);
+  file.rows = random_rows(1000, 45, 37);
+  std::string text = file.text();
+  const std::size_t stride = (text.size() - file.header().size()) / 1000;
+  std::fill(text.begin() + static_cast<std::ptrdiff_t>(file.header().size() + stride), text.end(), '\0');
+  const LoadedCloud loaded = parse(text);
+  check_consistent(loaded);
+  CHECK(loaded.report.read == 1000);
+  CHECK(loaded.report.dropped_zero_quat == 999);
+  CHECK(loaded.report.dropped() == 999);
+  REQUIRE(loaded.cloud.size() == 1);
+  check_gaussian(loaded.cloud, 0, file.rows[0], 45);
 }
 
 TEST_CASE("ply: bad rows are counted and their neighbours stay whole") {
