@@ -79,7 +79,9 @@ void GeodesicSearch::flood(const UnfoldedMesh& mesh, const std::vector<Site>& st
 }
 
 void GeodesicSearch::settle() {
-  while (!heap_.empty()) {
+  // What no mesh of Recast needs: bent or folded polygons of a file could keep windows alive for ever.
+  const std::size_t most = 100000 + 1000 * mesh_->edges.size();
+  while (!heap_.empty() && nodes_.size() < most) {
     std::pop_heap(heap_.begin(), heap_.end(), std::greater<>());
     const auto [f, node] = heap_.back();
     heap_.pop_back();

@@ -33,59 +33,6 @@ double walkable_area(const rcCompactHeightfield& f) noexcept {
   return static_cast<double>(spans) * static_cast<double>(f.cs) * static_cast<double>(f.cs);
 }
 
-Vec3d vec3(const float* p) noexcept {
-  return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
-}
-
-/// The polygons of the only tile, counter-clockwise, with neighbours and height triangles.
-void extract(const dtMeshTile& tile, const std::function<double(const Vec3d&)>& height, PolyMesh& out) {
-  const dtMeshHeader& h = *tile.header;
-  for (int i = 0; i < h.polyCount; ++i) {
-    const dtPoly& p = tile.polys[i];
-    PolyMesh::Poly poly;
-    poly.first = static_cast<std::uint32_t>(out.corners.size());
-    poly.count = p.vertCount;
-    poly.tri_first = static_cast<std::uint32_t>(out.tris.size());
-    Vec3d v[DT_VERTS_PER_POLYGON];
-    PolyId n[DT_VERTS_PER_POLYGON];
-    double twice = 0;
-    const std::size_t count = p.vertCount;
-    for (std::size_t k = 0; k < count; ++k) {
-      v[k] = vec3(&tile.verts[3 * p.verts[k]]);
-      n[k] = p.neis[k] == 0 || (p.neis[k] & DT_EXT_LINK) != 0 ? kNoPoly : p.neis[k] - 1u;
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-      const Vec3d &a = v[k], &b = v[(k + 1) % count];
-      twice += a.x * b.z - b.x * a.z;
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-      // Reversed, edge k runs from corner count-1-k to the one before it.
-      out.corners.push_back(twice >= 0 ? v[k] : v[count - 1 - k]);
-      out.neighbours.push_back(twice >= 0 ? n[k] : n[(2 * count - 2 - k) % count]);
-    }
-    const dtPolyDetail& d = tile.detailMeshes[i];
-    for (unsigned t = 0; t < d.triCount; ++t) {
-      const unsigned char* ids = &tile.detailTris[4 * (d.triBase + t)];
-      std::array<Vec3d, 3> tri;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const unsigned id = ids[k];
-        tri[k] = id < p.vertCount ? vec3(&tile.verts[3 * p.verts[id]])
-                                  : vec3(&tile.detailVerts[3 * (d.vertBase + id - p.vertCount)]);
-      }
-      out.tris.push_back(tri);
-    }
-    poly.tri_count = static_cast<std::uint32_t>(out.tris.size()) - poly.tri_first;
-    out.polys.push_back(poly);
-  }
-  if (height) {
-    for (Vec3d& p : out.corners) p.y = height(p);
-    for (auto& t : out.tris) {
-      for (Vec3d& p : t) p.y = height(p);
-    }
-  }
-  out.finish();
-}
-
 }  // namespace
 
 Status stage(const char* what, const RecastLog& log) {
@@ -211,26 +158,12 @@ Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& s, rcHeigh
                                          std::to_string(poly->npolys) + " polygons and " +
                                          std::to_string(poly->nverts) + " vertices");
   }
-  auto impl = std::make_unique<NavMesh::Impl>();
-  impl->mesh.reset(dtAllocNavMesh());
-  if (impl->mesh == nullptr || dtStatusFailed(impl->mesh->init(data, size, DT_TILE_FREE_DATA))) {
+  NavMeshPtr mesh(dtAllocNavMesh());
+  if (mesh == nullptr || dtStatusFailed(mesh->init(data, size, DT_TILE_FREE_DATA))) {
     dtFree(data);
     return stage("initialising Detour", log);
   }
-  impl->settings = s;
-  impl->origin = origin;
-  const dtNavMesh& mesh = *impl->mesh;
-  const dtMeshTile& tile = *mesh.getTile(0);
-  impl->ref_base = mesh.getPolyRefBase(&tile);
-  extract(tile, hooks.height, impl->polys);
-  impl->unfolded = std::make_shared<const UnfoldedMesh>(impl->polys);
-  for (const auto& t : impl->polys.tris) {
-    for (const Vec3d& p : t) impl->bounds.add(p + origin);
-  }
-  // One search node a polygon is all that a search for the nearest wall can open; Detour numbers them in
-  // 16 bits.
-  impl->node_pool = min(65535, 2 * static_cast<int>(impl->polys.polys.size()) + 64);
-  return NavMesh(std::move(impl));
+  return assemble_navmesh(s, origin, std::move(mesh), hooks.height);
 }
 
 }  // namespace detail

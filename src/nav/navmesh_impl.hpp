@@ -68,6 +68,10 @@ struct BuildHooks {
 Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& settings, rcHeightfield& field,
                                const Vec3d& origin, const BuildHooks& hooks = {});
 
+/// A NavMesh of the tiles that Detour holds; `height` moves its vertices to the true floor.
+NavMesh assemble_navmesh(const NavMeshSettings& settings, const Vec3d& origin, NavMeshPtr mesh,
+                         const std::function<double(const Vec3d&)>& height = {});
+
 /// An error of a stage of the build, with Recast's own words.
 Status stage(const char* what, const RecastLog& log);
 
@@ -86,7 +90,8 @@ struct NavMesh::Impl {
   detail::PolyMesh polys;
   std::shared_ptr<const detail::UnfoldedMesh> unfolded;  ///< shared with geodesic fields
   Aabb<double> bounds;  ///< world
-  dtPolyRef ref_base = 0;
+  std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon
+  std::vector<PolyId> first_poly;   ///< of each of Detour's tiles
   int node_pool = 0;
 
   /// A query object for as long as a call lasts: Detour's searches write to it.
@@ -106,8 +111,10 @@ struct NavMesh::Impl {
 
   detail::Site site(const NavPoint& p) const noexcept;
 
-  dtPolyRef ref_of(PolyId id) const noexcept { return ref_base | static_cast<dtPolyRef>(id); }
-  PolyId id_of(dtPolyRef ref) const noexcept { return static_cast<PolyId>(ref ^ ref_base); }
+  dtPolyRef ref_of(PolyId id) const noexcept { return refs[id]; }
+  PolyId id_of(dtPolyRef ref) const noexcept {
+    return first_poly[mesh->decodePolyIdTile(ref)] + mesh->decodePolyIdPoly(ref);
+  }
 
  private:
   mutable std::mutex mutex_;

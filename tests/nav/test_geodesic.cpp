@@ -189,6 +189,28 @@ TEST_CASE("geodesic: symmetric, and no detour is shorter") {
   }
 }
 
+TEST_CASE("geodesic: RecastDemo's file of paths") {
+  const std::string file = gsnav_test::data_file("nav/recast/nav_mesh_test.txt");
+  if (file.empty()) return;
+  const NavMesh mesh = demo("nav/recast/nav_test.obj");
+  std::ifstream in(file);
+  int paths = 0;
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream words(line);
+    std::string tag;
+    Vec3d a, b;
+    if (!(words >> tag >> a.x >> a.y >> a.z >> b.x >> b.y >> b.z) || tag != "pf") continue;
+    const auto there = mesh.find_path(a, b), back = mesh.find_path(b, a);
+    REQUIRE(there.ok());
+    REQUIRE(there->length == doctest::Approx(back->length).epsilon(1e-7));
+    const NavPoint from = *mesh.snap_point(a), to = *mesh.snap_point(b);
+    REQUIRE(there->length >= norm(to.position - from.position) - 1e-6);
+    REQUIRE(there->length <= detour_length(mesh, from, to) * (1 + 1e-4));
+    ++paths;
+  }
+  CHECK(paths >= 18);
+}
+
 TEST_CASE("geodesic: thousands of polygons are no limit") {
   Soup soup;
   soup.floor(0, 0, 36, 36);

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "navmesh_impl.hpp"
+
+namespace gsnav::detail {
+namespace {
+
+constexpr double kNarrow = 1e-3;  // metres: portals between tiles below this are walls
+
+Vec3d vec3(const float* p) noexcept {
+  return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
+}
+
+Vec3d corner_of(const dtMeshTile& tile, const dtPoly& p, std::size_t k) noexcept {
+  return vec3(&tile.verts[3 * p.verts[k % p.vertCount]]);
+}
+
+/// A stretch of an edge that leads into another tile.
+struct Portal {
+  double from = 0, to = 0;  ///< shares of the edge's length
+  PolyId neighbour = kNoPoly;
+};
+
+class Extractor {
+ public:
+  Extractor(NavMesh::Impl& impl, const std::function<double(const Vec3d&)>& height)
+      : impl_(impl), mesh_(*impl.mesh), height_(height) {}
+
+  void run() {
+    for (int t = 0; t < mesh_.getMaxTiles(); ++t) {
+      const dtMeshTile& tile = *mesh_.getTile(t);
+      impl_.first_poly.push_back(static_cast<PolyId>(impl_.refs.size()));
+      if (tile.header == nullptr) continue;
+      const dtPolyRef base = mesh_.getPolyRefBase(&tile);
+      for (int i = 0; i < tile.header->polyCount; ++i) impl_.refs.push_back(base | static_cast<dtPolyRef>(i));
+    }
+    for (int t = 0; t < mesh_.getMaxTiles(); ++t) {
+      const dtMeshTile& tile = *mesh_.getTile(t);
+      if (tile.header == nullptr) continue;
+      for (int i = 0; i < tile.header->polyCount; ++i) add(t, tile, i);
+    }
+    impl_.polys.finish();
+  }
+
+ private:
+  void add(int tile_index, const dtMeshTile& tile, int i) {
+    const dtPoly& p = tile.polys[i];
+    std::vector<Vec3d> v;
+    std::vector<PolyId> n;
+    double twice = 0;
+    for (std::size_t k = 0; k < p.vertCount; ++k) {
+      const Vec3d a = corner_of(tile, p, k), b = corner_of(tile, p, k + 1);
+      twice += a.x * b.z - b.x * a.z;
+      if (p.neis[k] == 0 || (p.neis[k] & DT_EXT_LINK) == 0) {
+        v.push_back(a);
+        n.push_back(p.neis[k] == 0 ? kNoPoly
+                                   : impl_.first_poly[static_cast<std::size_t>(tile_index)] + p.neis[k] - 1u);
+        continue;
+      }
+      double at = 0;
+      const auto stretch = [&](double to, PolyId neighbour) {
+        if (!(to > at)) return;
+        v.push_back(lerp(a, b, at));
+        n.push_back(neighbour);
+        at = to;
+      };
+      const double weld = kNarrow / max(norm(b - a), kNarrow);
+      for (const Portal& portal : portals(tile, i, k)) {
+        if (portal.from > at + weld) stretch(portal.from, kNoPoly);
+        stretch(portal.to, portal.neighbour);
+      }
+      if (at < 1 - weld || at == 0) stretch(1, kNoPoly);
+    }
+    PolyMesh::Poly poly;
+    PolyMesh& out = impl_.polys;
+    poly.first = static_cast<std::uint32_t>(out.corners.size());
+    poly.count = static_cast<std::uint32_t>(v.size());
+    for (std::size_t k = 0; k < v.size(); ++k) {
+      // Reversed, edge k runs from corner count-1-k to the one before it.
+      const bool reversed = twice < 0;
+      out.corners.push_back(moved(v[reversed ? v.size() - 1 - k : k]));
+      out.neighbours.push_back(n[reversed ? (2 * v.size() - 2 - k) % v.size() : k]);
+    }
+    poly.tri_first = static_cast<std::uint32_t>(out.tris.size());
+    const dtPolyDetail& d = tile.detailMeshes[i];
+    for (unsigned t = 0; t < d.triCount; ++t) {
+      const unsigned char* ids = &tile.detailTris[4 * (d.triBase + t)];
+      std::array<Vec3d, 3> tri;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const unsigned id = ids[k];
+        tri[k] = moved(id < p.vertCount ? corner_of(tile, p, id)
+                                        : vec3(&tile.detailVerts[3 * (d.vertBase + id - p.vertCount)]));
+      }
+      out.tris.push_back(tri);
+    }
+    poly.tri_count = static_cast<std::uint32_t>(out.tris.size()) - poly.tri_first;
+    out.polys.push_back(poly);
+  }
+
+  Vec3d moved(Vec3d p) const {
+    if (height_) p.y = height_(p);
+    return p;
+  }
+
+  /// Where edge k meets edges of other tiles. Detour keeps that in steps of 1/255; the edges know it.
+  std::vector<Portal> portals(const dtMeshTile& tile, int i, std::size_t k) const {
+    std::vector<Portal> out;
+    const dtPoly& p = tile.polys[i];
+    const dtPolyRef self = mesh_.getPolyRefBase(&tile) | static_cast<dtPolyRef>(i);
+    const Vec3d a = corner_of(tile, p, k), b = corner_of(tile, p, k + 1);
+    const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
+    if (!(len2 > 0)) return out;
+    for (unsigned l = p.firstLink; l != DT_NULL_LINK; l = tile.links[l].next) {
+      if (tile.links[l].edge != k || tile.links[l].side == 0xff) continue;
+      const dtMeshTile* other = nullptr;
+      const dtPoly* q = nullptr;
+      mesh_.getTileAndPolyByRefUnsafe(tile.links[l].ref, &other, &q);
+      for (unsigned m = q->firstLink; m != DT_NULL_LINK; m = other->links[m].next) {
+        if (other->links[m].ref != self || other->links[m].side == 0xff) continue;
+        const auto along = [&](const Vec3d& c) {
+          return clamp(((c.x - a.x) * ex + (c.z - a.z) * ez) / len2, 0.0, 1.0);
+        };
+        const double s = along(corner_of(*other, *q, other->links[m].edge));
+        const double e = along(corner_of(*other, *q, other->links[m].edge + 1u));
+        if (std::abs(e - s) * std::sqrt(len2) > kNarrow) {
+          out.push_back({min(s, e), max(s, e), impl_.id_of(tile.links[l].ref)});
+        }
+      }
+    }
+    std::sort(out.begin(), out.end(), [](const Portal& u, const Portal& w) { return u.from < w.from; });
+    return out;
+  }
+
+  NavMesh::Impl& impl_;
+  const dtNavMesh& mesh_;
+  const std::function<double(const Vec3d&)>& height_;
+};
+
+}  // namespace
+
+NavMesh assemble_navmesh(const NavMeshSettings& settings, const Vec3d& origin, NavMeshPtr mesh,
+                         const std::function<double(const Vec3d&)>& height) {
+  auto impl = std::make_unique<NavMesh::Impl>();
+  impl->settings = settings;
+  impl->origin = origin;
+  impl->mesh = std::move(mesh);
+  Extractor(*impl, height).run();
+  impl->unfolded = std::make_shared<const UnfoldedMesh>(impl->polys);
+  for (const auto& t : impl->polys.tris) {
+    for (const Vec3d& p : t) impl->bounds.add(p + origin);
+  }
+  // One search node a polygon is all that a search for the nearest wall can open; Detour numbers them in
+  // 16 bits.
+  impl->node_pool = static_cast<int>(min<std::size_t>(65535, 2 * impl->polys.polys.size() + 64));
+  return NavMesh(std::move(impl));
+}
+
+}  // namespace gsnav::detail

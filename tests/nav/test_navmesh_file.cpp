@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "gsnav/nav/navmesh_file.hpp"
+#include "meshes.hpp"
+#include "navmesh_impl.hpp"
+#include "support/data.hpp"
+
+using namespace gsnav;
+using gsnav_test::Soup;
+
+namespace {
+
+std::string temporary(const char* name) { return (std::filesystem::temp_directory_path() / name).string(); }
+
+std::vector<std::byte> bytes_of(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  const std::vector<char> chars{std::istreambuf_iterator<char>(in), {}};
+  std::vector<std::byte> out(chars.size());
+  std::memcpy(out.data(), chars.data(), chars.size());
+  return out;
+}
+
+NavMesh boxes(const Vec3d& at = {}) {
+  Soup soup;
+  soup.floor(0, 0, 8, 6);
+  soup.box(2, 2, 4, 3, 0, 2);
+  soup.box(5, 1, 6, 5, 0, 2);
+  for (Vec3d& v : soup.vertices) v += at;
+  NavMeshSettings s;
+  s.agent_radius = 0.15;
+  s.region_min_size = 7;
+  s.filter_ledge_spans = false;
+  return NavMesh::build(s, soup.vertices, soup.triangles).value();
+}
+
+std::vector<std::byte> saved(const NavMesh& mesh, const char* name) {
+  const std::string path = temporary(name);
+  save_navmesh(mesh, path).throw_if_error();
+  auto bytes = bytes_of(path);
+  std::filesystem::remove(path);
+  return bytes;
+}
+
+void patch(std::vector<std::byte>& b, std::size_t at, std::int32_t v) { std::memcpy(b.data() + at, &v, 4); }
+
+/// Asks what reads most of a mesh.
+void use(const NavMesh& mesh) {
+  Rng rng(1);
+  for (int i = 0; i < 4; ++i) {
+    const NavPoint a = mesh.random_point(rng), b = mesh.random_point(rng);
+    (void)mesh.snap_point(a.position);
+    (void)mesh.path_between(a, b);
+    (void)mesh.walk(a, b.position - a.position, true);
+    (void)mesh.distance_to_closest_obstacle(a.position);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("navmesh file: a round trip keeps surface, settings and distances") {
+  const Vec3d at{120, -7, 33};
+  const NavMesh mesh = boxes(at);
+  const auto bytes = saved(mesh, "gsnav_round.navmesh");
+  const NavMesh back = parse_navmesh(bytes, "round").value();
+  CHECK(back.polygon_count() == mesh.polygon_count());
+  CHECK(back.navigable_area() == doctest::Approx(mesh.navigable_area()).epsilon(1e-5));
+  CHECK(back.settings().agent_radius == doctest::Approx(0.15));
+  CHECK(back.settings().region_min_size == 7);
+  CHECK(back.settings().verts_per_poly == 6);
+  CHECK_FALSE(back.settings().filter_ledge_spans);
+  CHECK(back.settings().filter_low_hanging_obstacles);
+  CHECK(norm(back.bounds().low - mesh.bounds().low) < 1e-4);
+  Rng rng(3);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3d a = mesh.random_point(rng, 0).position, b = mesh.random_point(rng, 0).position;
+    REQUIRE(std::abs(back.geodesic_distance(a, b) - mesh.geodesic_distance(a, b)) < 1e-3);
+    REQUIRE(std::abs(back.snap_point(a)->position.y - a.y) < 1e-4);
+  }
+  CHECK(saved(back, "gsnav_again.navmesh") == bytes);
+  // The format, byte by byte: Habitat reads raw structs.
+  CHECK(std::memcmp(bytes.data(), "TESM\2\0\0\0\1\0\0\0", 12) == 0);
+  float cell = 0, radius = 0;
+  std::memcpy(&cell, bytes.data() + 40, 4);
+  std::memcpy(&radius, bytes.data() + 52, 4);
+  CHECK(cell == 0.05f);
+  CHECK(radius == 0.15f);
+  CHECK(std::memcmp(bytes.data() + 104, "VAND\7\0\0\0", 8) == 0);
+  // Version 1 has no settings.
+  auto old = bytes;
+  old.erase(old.begin() + 40, old.begin() + 96);
+  patch(old, 4, 1);
+  const NavMesh v1 = parse_navmesh(old, "old").value();
+  CHECK(v1.polygon_count() == mesh.polygon_count());
+  CHECK(v1.settings().agent_radius == doctest::Approx(0.15));
+}
+
+TEST_CASE("navmesh file: 64-bit references and many tiles") {
+  const std::string path = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");
+  if (path.empty()) return;
+  const NavMesh mesh = load_navmesh(path).value();
+  CHECK(mesh.polygon_count() > 66);
+  // Tiles are joined exactly where Detour joins them.
+  const NavMesh::Impl& impl = mesh.impl();
+  std::vector<bool> reached(mesh.polygon_count(), false);
+  std::size_t islands = 0;
+  for (PolyId first = 0; first < mesh.polygon_count(); ++first) {
+    if (reached[first]) continue;
+    ++islands;
+    reached[first] = true;
+    std::vector<PolyId> queue{first};
+    for (std::size_t i = 0; i < queue.size(); ++i) {
+      REQUIRE(mesh.island_of(queue[i]) == mesh.island_of(first));
+      const dtMeshTile* tile = nullptr;
+      const dtPoly* poly = nullptr;
+      impl.mesh->getTileAndPolyByRefUnsafe(impl.ref_of(queue[i]), &tile, &poly);
+      for (unsigned l = poly->firstLink; l != DT_NULL_LINK; l = tile->links[l].next) {
+        const PolyId next = impl.id_of(tile->links[l].ref);
+        if (!reached[next]) queue.push_back(next);
+        reached[next] = true;
+      }
+    }
+  }
+  CHECK(islands == mesh.island_count());
+  CHECK(mesh.island_area(0) > 1000);
+  Rng rng(2);
+  for (int i = 0; i < 300; ++i) {
+    const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
+    const double d = mesh.distance_between(a, b);
+    REQUIRE(std::isfinite(d));
+    REQUIRE(d >= norm(b.position - a.position) - 1e-3);
+    REQUIRE(std::abs(d - mesh.distance_between(b, a)) < 1e-4);
+  }
+  const auto again = saved(mesh, "gsnav_tiles.navmesh");
+  const NavMesh back = parse_navmesh(again, "tiles").value();
+  CHECK(back.polygon_count() == mesh.polygon_count());
+  CHECK(back.island_count() == mesh.island_count());
+  CHECK(back.navigable_area() == doctest::Approx(mesh.navigable_area()).epsilon(1e-6));
+}
+
+TEST_CASE("navmesh file: what is wrong is named") {
+  CHECK(load_navmesh("/no/such/file.navmesh").code() == Errc::file_not_found);
+  const auto good = saved(boxes(), "gsnav_bad.navmesh");
+  const auto message = [&](std::size_t at, std::int32_t v) {
+    auto b = good;
+    patch(b, at, v);
+    const auto r = parse_navmesh(b, "x.navmesh");
+    REQUIRE_FALSE(r.ok());
+    CHECK(r.message().find("x.navmesh") == 0);
+    return r.message();
+  };
+  const auto names = [](const std::string& m, const char* word) { return m.find(word) != std::string::npos; };
+  CHECK(names(message(0, 7), "magic = 7"));
+  CHECK(names(message(4, 3), "version = 3"));
+  CHECK(names(message(8, 1 << 30), "numTiles = 1073741824"));
+  CHECK(names(message(40, 0x7fc00000), "cellSize"));
+  CHECK(names(message(100, -5), "dataSize = -5"));
+  CHECK(names(message(104 + 24, 0x7fffffff), "polyCount = 2147483647"));
+  CHECK(names(message(104 + 32, 0), "maxLinkCount = 0"));
+  CHECK(names(message(104 + 100, 0x7f800000), "vertex 0"));
+  for (const std::size_t size : {std::size_t{0}, std::size_t{20}, std::size_t{60}, std::size_t{110}, good.size() - 1}) {
+    CHECK(parse_navmesh(std::span(good).first(size), "x").code() == Errc::invalid_file);
+  }
+}
+
+TEST_CASE("navmesh file: mutated and truncated files do no harm") {
+  std::vector<std::vector<std::byte>> seeds{saved(boxes(), "gsnav_fuzz.navmesh")};
+  const std::string tiles = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");
+  if (!tiles.empty()) seeds.push_back(bytes_of(tiles));
+  Rng rng(11);
+  int read = 0, refused = 0;
+  for (const auto& seed : seeds) {
+    const int rounds = seed.size() < 20000 ? 4000 : 150;
+    for (int i = 0; i < rounds; ++i) {
+      auto b = seed;
+      for (std::uint64_t k = 1 + rng.below(4); k-- > 0;) {
+        const std::size_t at = rng.below(i % 2 ? min<std::size_t>(b.size(), 400) : b.size());
+        switch (rng.below(4)) {
+          case 0: b[at] ^= static_cast<std::byte>(1u << rng.below(8)); break;
+          case 1: b[at] = static_cast<std::byte>(rng.below(256)); break;
+          case 2:
+            if (at + 4 <= b.size()) patch(b, at & ~std::size_t{3}, static_cast<std::int32_t>(rng.next()));
+            break;
+          default:
+            if (rng.below(8) == 0) b.resize(at + 1);
+        }
+      }
+      const auto r = parse_navmesh(b, "fuzz");
+      (r.ok() ? read : refused) += 1;
+      if (r.ok() && (i % 4 == 0)) use(*r);
+    }
+  }
+  MESSAGE(read << " read, " << refused << " refused");
+  CHECK(refused > 100);
+}
