@@ -12,6 +12,7 @@
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
 #include "gsnav/io/spz.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -68,6 +69,11 @@ Result<std::vector<fs::path>> tiles_of(const std::string& spec) {
   return out;
 }
 
+Result<LoadedCloud> sorted(Result<LoadedCloud> scene) {
+  if (scene) sort_spatially(scene->cloud);
+  return scene;
+}
+
 void add_report(LoadReport& sum, const LoadReport& tile, const std::string& name) {
   sum.read += tile.read;
   sum.kept += tile.kept;
@@ -86,10 +92,10 @@ Result<LoadedCloud> load_scene(const std::string& spec) {
   return detail::guarded(spec, [&]() -> Result<LoadedCloud> {
     std::error_code ignored;
     // A file's own name may hold a comma.
-    if (fs::exists(spec, ignored)) return load_one(spec);
+    if (fs::exists(spec, ignored)) return sorted(load_one(spec));
     const auto tiles = tiles_of(spec);
     if (!tiles) return tiles.status();
-    if (tiles->size() == 1) return load_one(tiles->front());
+    if (tiles->size() == 1) return sorted(load_one(tiles->front()));
     LoadedCloud scene;
     scene.report.source = spec;
     for (const fs::path& path : *tiles) {
@@ -100,7 +106,7 @@ Result<LoadedCloud> load_scene(const std::string& spec) {
         return {s.code(), path.string() + ": " + s.message()};
       }
     }
-    return scene;
+    return sorted(std::move(scene));
   });
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "gsnav/kernels/sh.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 
 namespace gsnav::flat {
 namespace {
@@ -323,6 +324,7 @@ void Painter::finish(DefaultScene& scene) {
   }
   scene.bounds = builder.report().bounds;
   scene.cloud = std::move(builder.cloud());
+  sort_spatially(scene.cloud);
 }
 
 }  // namespace gsnav::flat

@@ -87,6 +87,7 @@ std::string content_hash(const GaussianCloud& cloud) {
   h.array(cloud.sh0);
   h.array(cloud.shN);
   h.array(cloud.origin_ids);
+  h.array(cloud.row_ids);
   for (const Vec3d& o : cloud.origins) {
     for (int k = 0; k < 3; ++k) h.value(o[k]);
   }

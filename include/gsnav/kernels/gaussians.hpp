@@ -22,6 +22,16 @@ GSNAV_HD constexpr int sh_coefficient_count(int degree) noexcept { return (degre
 /// Highest SH degree the kernels evaluate.
 inline constexpr int kMaxShDegree = 3;
 
+/// How many consecutive Gaussians are culled together and projected as one work item.
+inline constexpr std::size_t kProjectChunk = 256;
+
+/// What a chunk of Gaussians may reach: a bound for all of them, in the asset's frame.
+struct ChunkBounds {
+  Vec3d low{}, high{};    ///< box of the means, metres
+  float scale_max = 0;    ///< largest standard deviation, metres
+  float opacity_max = 0;  ///< in [0, 1]
+};
+
 /// Read-only arrays of N Gaussians, as kernels see them. Owns nothing.
 ///
 /// Metres in the asset's own frame. A position is `origins[origin_ids[i]] + mean_i`: float32 offsets
@@ -44,6 +54,14 @@ struct GaussianView {
   /// column c of the factor M, Sigma = M M^T, asset frame, metres. They stand in for quats and scales,
   /// which may then be empty; empty where those hold.
   View<const float> axes[9];
+  /// Place of each Gaussian in its file, [N], where rows have been sorted in space: Gaussians of one depth
+  /// are blended in that order. Empty: row order.
+  View<const std::uint32_t> row_ids;
+  /// One a chunk of kProjectChunk rows, [ceil(N / kProjectChunk)]: chunks that cannot be seen are not
+  /// touched. Empty: all are.
+  View<const ChunkBounds> chunk_bounds;
+
+  GSNAV_HD std::size_t chunk_count() const noexcept { return (size + kProjectChunk - 1) / kProjectChunk; }
 };
 
 /// One set of Gaussians in the world: a scene tile, an avatar, an object.

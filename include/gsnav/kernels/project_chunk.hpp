@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "gsnav/core/view.hpp"
+#include "gsnav/kernels/cull.hpp"
 #include "gsnav/kernels/gaussians.hpp"
 #include "gsnav/kernels/projection.hpp"
 #include "gsnav/kernels/sh.hpp"
@@ -12,11 +13,8 @@
 
 namespace gsnav {
 
-/// How many consecutive Gaussians one work item projects. Its survivors lie together, in order.
-inline constexpr std::size_t kProjectChunk = 1024;
-
 /// Arguments of the projection of one set for one camera. Outputs have room for
-/// kProjectChunk records per chunk; chunk c of the set writes its survivors from
+/// kProjectChunk records per chunk; chunk c of the set writes its survivors, in row order, from
 /// (first_chunk + c) * kProjectChunk on and their number to counts[first_chunk + c].
 template <class S>
 struct ProjectArgs {
@@ -29,18 +27,25 @@ struct ProjectArgs {
   bool color = true;                  ///< evaluate SH (RGB asked for)
   bool depth = true;                  ///< fill `depths`
   std::size_t first_chunk = 0;
+  std::uint32_t first_rank = 0;  ///< of the set's first Gaussian among all
   View<SplatGeometry<S>> geometry;
   View<SplatColor<S>> colors;   ///< empty unless `color`
   View<SplatDepth<S>> depths;   ///< empty unless `depth`
   View<SplatPerspective<S>> perspectives;  ///< empty for Response::ewa
   View<SplatBounds> bounds;
   View<std::uint32_t> keys;     ///< camera.key_code of the float32 key
+  View<std::uint32_t> ranks;    ///< what decides between equal keys; empty: the slot does
   View<std::uint32_t> counts;
 
-  GSNAV_HD std::size_t chunk_count() const noexcept {
-    return (gaussians.size + kProjectChunk - 1) / kProjectChunk;
-  }
+  GSNAV_HD std::size_t chunk_count() const noexcept { return gaussians.chunk_count(); }
 };
+
+/// Whether any Gaussian of chunk c may be visible. Never no where one is.
+template <class S>
+GSNAV_HD bool chunk_is_candidate(const ProjectArgs<S>& args, std::size_t c) noexcept {
+  const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
+  return bounds.empty() || may_be_visible(args.camera64, bounds[c]);
+}
 
 namespace detail {
 
@@ -268,6 +273,10 @@ GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::siz
   }
   if (!written) return false;
   args.keys[slot] = args.camera.key_code(key);
+  if (!args.ranks.empty()) {
+    const std::uint32_t row = gs.row_ids.empty() ? static_cast<std::uint32_t>(i) : gs.row_ids[i];
+    args.ranks[slot] = args.first_rank + row;
+  }
   if (args.color) {
     args.colors[slot] =
         gaussian_color<S>(gs, args.sh_degree, i, detail::camera_delta(args, mean, origin));
@@ -282,11 +291,12 @@ struct ProjectChunk {
 
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     const GaussianView& gs = args.gaussians;
+    const bool candidate = chunk_is_candidate(args, c);
     const std::size_t begin = c * kProjectChunk;
     const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
     const std::size_t base = (args.first_chunk + c) * kProjectChunk;
     std::uint32_t written = 0;
-    for (std::size_t i = begin; i < end; ++i) {
+    for (std::size_t i = begin; i < end && candidate; ++i) {
       const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
       const Vec3<float> mean{gs.means[0][i], gs.means[1][i], gs.means[2][i]};
       const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean,

@@ -166,11 +166,27 @@ GSNAV_HD Pack<float, N> select(Mask<N> m, Pack<float, N> a, Pack<float, N> b) no
 }
 template <int N>
 GSNAV_HD Pack<float, N> min(Pack<float, N> a, Pack<float, N> b) noexcept {
-  return select(a < b, a, b);
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {  // g++ does not make one instruction of the two
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(_mm512_maskz_min_ps(
+        static_cast<__mmask16>(-1), reinterpret_cast<__m512>(a.v), reinterpret_cast<__m512>(b.v))));
+  } else
+#endif
+  {
+    return select(a < b, a, b);
+  }
 }
 template <int N>
 GSNAV_HD Pack<float, N> max(Pack<float, N> a, Pack<float, N> b) noexcept {
-  return select(a > b, a, b);
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(_mm512_maskz_max_ps(
+        static_cast<__mmask16>(-1), reinterpret_cast<__m512>(a.v), reinterpret_cast<__m512>(b.v))));
+  } else
+#endif
+  {
+    return select(a > b, a, b);
+  }
 }
 template <int N>
 GSNAV_HD Pack<float, N> clamp(Pack<float, N> v, Pack<float, N> low, Pack<float, N> high) noexcept {
@@ -353,6 +369,47 @@ GSNAV_HD Pack<float, N> log2(Pack<float, N> x) noexcept {
   P exponent;
   exponent.v = __builtin_convertvector(e, typename P::vector);
   return detail::log2_from_ratio(t, exponent);
+}
+
+/// Reads a row-major matrix of N rows (one a lane) and K floats a row as K packs, one a column.
+template <int K, int N>
+GSNAV_HD void load_columns(const float* rows, Pack<float, N>* columns) noexcept {
+#if defined(__AVX512F__)
+  if constexpr (N == 16 && K == 8) {
+    // Rows i and i + 8 share a register: then each half is an 8 x 8 transpose.
+    using V = typename Pack<float, 16>::vector;
+    V r[8], t[8];
+    for (int i = 0; i < 8; ++i) {
+      const Pack<float, 8> a = Pack<float, 8>::load(rows + 8 * i), b = Pack<float, 8>::load(rows + 8 * (i + 8));
+      r[i] = __builtin_shufflevector(a.v, b.v, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    }
+    for (int i = 0; i < 8; i += 2) {
+      t[i] = __builtin_shufflevector(r[i], r[i + 1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+      t[i + 1] =
+          __builtin_shufflevector(r[i], r[i + 1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    }
+    for (int i = 0; i < 8; i += 4) {
+      for (int h = 0; h < 2; ++h) {
+        const V a = t[i + h], b = t[i + 2 + h];
+        r[i + 2 * h] = __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+        r[i + 2 * h + 1] =
+            __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
+      }
+    }
+    for (int i = 0; i < 4; ++i) {
+      const V a = r[i], b = r[i + 4];
+      columns[i].v = __builtin_shufflevector(a, b, 0, 1, 2, 3, 16, 17, 18, 19, 8, 9, 10, 11, 24, 25, 26, 27);
+      columns[i + 4].v =
+          __builtin_shufflevector(a, b, 4, 5, 6, 7, 20, 21, 22, 23, 12, 13, 14, 15, 28, 29, 30, 31);
+    }
+    return;
+  }
+#endif
+  for (int k = 0; k < K; ++k) {
+    float column[N];
+    for (int i = 0; i < N; ++i) column[i] = rows[K * i + k];
+    columns[k] = Pack<float, N>::load(column);
+  }
 }
 
 }  // namespace gsnav

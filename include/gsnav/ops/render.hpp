@@ -32,7 +32,7 @@ template <class S, Backend B>
 struct RenderWorkspace {
   explicit RenderWorkspace(B& b)
       : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
-        chunk_keys(b), counts(b), keys(b), order(b), sort(b), cursors(b), tile_offsets(b),
+        chunk_keys(b), ranks(b), counts(b), keys(b), order(b), sort(b), cursors(b), tile_offsets(b),
         tile_splats(b) {}
 
   Buffer<Vec3<float>, B> offsets_f;
@@ -42,7 +42,7 @@ struct RenderWorkspace {
   Buffer<SplatDepth<S>, B> depths;
   Buffer<SplatPerspective<S>, B> perspectives;
   Buffer<SplatBounds, B> bounds;
-  Buffer<std::uint32_t, B> chunk_keys, counts, keys, order;
+  Buffer<std::uint32_t, B> chunk_keys, ranks, counts, keys, order;
   SortScratch<B> sort;
   Buffer<std::uint64_t, B> cursors, tile_offsets;
   Buffer<std::uint32_t, B> tile_splats;
@@ -55,7 +55,7 @@ struct RenderWorkspace {
     return offsets_f.capacity_bytes() + offsets.capacity_bytes() + geometry.capacity_bytes() +
            colors.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
            bounds.capacity_bytes() +
-           chunk_keys.capacity_bytes() + counts.capacity_bytes() + keys.capacity_bytes() +
+           chunk_keys.capacity_bytes() + ranks.capacity_bytes() + counts.capacity_bytes() + keys.capacity_bytes() +
            order.capacity_bytes() + sort.bytes() + cursors.capacity_bytes() +
            tile_offsets.capacity_bytes() + tile_splats.capacity_bytes();
   }
@@ -86,6 +86,40 @@ struct GatherSlot {
     const std::size_t to = gather.chunk_offsets[chunk] + i;
     gather.keys[to] = gather.chunk_keys[slot];
     gather.order[to] = static_cast<std::uint32_t>(slot);
+  }
+};
+
+/// Sorts the slots of equal keys by rank: work item i does the run that starts at i.
+struct RankTies {
+  View<const std::uint32_t> keys, ranks;
+  View<std::uint32_t> order;
+  GSNAV_HD void operator()(std::size_t i) const noexcept {
+    const std::size_t n = keys.size;
+    if (i + 1 >= n || keys[i + 1] != keys[i] || (i > 0 && keys[i - 1] == keys[i])) return;
+    std::size_t end = i + 2;
+    while (end < n && keys[end] == keys[i]) ++end;
+    heap_sort(order.data + i, end - i);
+  }
+
+ private:
+  /// Ties are few, but a wall across the view may be one: n log n, in place, and no recursion.
+  GSNAV_HD void heap_sort(std::uint32_t* slots, std::size_t n) const noexcept {
+    for (std::size_t root = n / 2; root-- > 0;) sift_down(slots, root, n);
+    for (std::size_t end = n; end-- > 1;) {
+      const std::uint32_t last = slots[end];
+      slots[end] = slots[0];
+      slots[0] = last;
+      sift_down(slots, 0, end);
+    }
+  }
+  GSNAV_HD void sift_down(std::uint32_t* slots, std::size_t root, std::size_t n) const noexcept {
+    const std::uint32_t slot = slots[root];
+    for (std::size_t child; (child = 2 * root + 1) < n; root = child) {
+      if (child + 1 < n && ranks[slots[child + 1]] > ranks[slots[child]]) ++child;
+      if (ranks[slots[child]] <= ranks[slot]) break;
+      slots[root] = slots[child];
+    }
+    slots[root] = slot;
   }
 };
 
@@ -153,6 +187,14 @@ inline Status validate(const GaussianSet& set) {
   if (Status s = sized(g.sh0, 3 * g.size, "sh0"); !s) return s;
   const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(g.sh_degree) - 1);
   if (Status s = sized(g.shN, 3 * rest * g.size, "shN"); !s) return s;
+  if (!g.row_ids.empty() && g.row_ids.size != g.size) {
+    return bad("row_ids has " + std::to_string(g.row_ids.size) + " values where " +
+               std::to_string(g.size) + " are needed");
+  }
+  if (!g.chunk_bounds.empty() && g.chunk_bounds.size != g.chunk_count()) {
+    return bad("chunk_bounds has " + std::to_string(g.chunk_bounds.size) + " values where " +
+               std::to_string(g.chunk_count()) + " are needed");
+  }
   if (!g.origin_ids.empty() && (g.origin_ids.size != g.size || g.origins.empty())) {
     return bad("origin_ids needs one id per Gaussian and a table of origins");
   }
@@ -180,9 +222,11 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   if (Status s = validate(config); !s) return s;
   if (Status s = validate(camera); !s) return s;
   std::size_t chunks = 0, total = 0, origins = 0;
+  bool ranked = false;
   for (const GaussianSet& set : sets) {
     if (Status s = validate(set); !s) return s;
-    chunks += (set.gaussians.size + kProjectChunk - 1) / kProjectChunk;
+    chunks += set.gaussians.chunk_count();
+    ranked = ranked || !set.gaussians.row_ids.empty();
     total += set.gaussians.size;
     origins += set.gaussians.origins.empty() ? 1 : set.gaussians.origins.size;
   }
@@ -198,6 +242,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.geometry.resize_discard(slots);
   ws.bounds.resize_discard(slots);
   ws.chunk_keys.resize_discard(slots);
+  ws.ranks.resize_discard(ranked ? slots : 0);
   ws.colors.resize_discard(color ? slots : 0);
   ws.depths.resize_discard(depth ? slots : 0);
   ws.perspectives.resize_discard(config.response != Response::ewa ? slots : 0);
@@ -218,7 +263,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.offsets.upload(ws.host_offsets.data(), origins);
   ws.offsets_f.upload(ws.host_offsets_f.data(), origins);
 
-  std::size_t first_chunk = 0, first_origin = 0;
+  std::size_t first_chunk = 0, first_origin = 0, first_rank = 0;
   for (std::size_t i = 0; i < sets.size(); ++i) {
     const std::size_t n = sets[i].gaussians.origins.empty() ? 1 : sets[i].gaussians.origins.size;
     ProjectArgs<S> args;
@@ -231,12 +276,14 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
     args.color = color;
     args.depth = depth;
     args.first_chunk = first_chunk;
+    args.first_rank = static_cast<std::uint32_t>(first_rank);
     args.geometry = ws.geometry.view();
     args.colors = ws.colors.view();
     args.depths = ws.depths.view();
     args.perspectives = ws.perspectives.view();
     args.bounds = ws.bounds.view();
     args.keys = ws.chunk_keys.view();
+    args.ranks = ws.ranks.view();
     args.counts = ws.counts.view();
     if constexpr (requires { backend.project(args); }) {
       backend.project(args);
@@ -244,6 +291,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
       backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
     }
     first_chunk += args.chunk_count();
+    first_rank += args.gaussians.size;
     first_origin += n;
   }
 
@@ -268,6 +316,9 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
     backend.parallel_for(slots, detail::GatherSlot{gather});
   }
   sort_pairs(backend, ws.keys, ws.order, ws.sort, config.key_bits);
+  if (ranked) {
+    backend.parallel_for(visible, detail::RankTies{ws.keys.view(), ws.ranks.view(), ws.order.view()});
+  }
 
   // ---- bin
   BinArgs<S> bin;

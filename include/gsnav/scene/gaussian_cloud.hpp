@@ -40,6 +40,9 @@ struct GaussianCloud {
   int sh_degree = 0;                         ///< 0 to 3
   std::vector<std::uint32_t> origin_ids;     ///< [N], or empty while every origin is zero
   std::vector<Vec3d> origins;                ///< lattice points in use; empty with origin_ids
+  // Filled by sort_spatially (scene/spatial_order.hpp); whoever moves, adds or scales rows clears them.
+  std::vector<std::uint32_t> row_ids;        ///< place of each row in the file, [N], or empty
+  std::vector<ChunkBounds> chunk_bounds;     ///< [ceil(N / kProjectChunk)], or empty
 
   // How the asset was trained; copied into each GaussianSet made of the cloud.
   Filter filter = Filter::classic;
@@ -57,7 +60,8 @@ struct GaussianCloud {
   /// Bytes held by the arrays.
   std::size_t bytes() const noexcept {
     return sizeof(float) * (11 * size() + sh0.size() + shN.size()) +
-           sizeof(std::uint32_t) * origin_ids.size() + sizeof(Vec3d) * origins.size();
+           sizeof(std::uint32_t) * (origin_ids.size() + row_ids.size()) +
+           sizeof(Vec3d) * origins.size() + sizeof(ChunkBounds) * chunk_bounds.size();
   }
 
   /// What kernels read; valid while the cloud lives and does not grow.
@@ -73,6 +77,8 @@ struct GaussianCloud {
     v.sh_degree = sh_degree;
     v.origin_ids = view_of(origin_ids);
     v.origins = view_of(origins);
+    v.row_ids = view_of(row_ids);
+    v.chunk_bounds = view_of(chunk_bounds);
     return v;
   }
 
@@ -193,8 +199,7 @@ struct LoadedCloud {
 };
 
 /// Appends `b` to `a`; the SH degree becomes the larger (missing bands are zero). Used to merge the
-/// tiles of one scene. Metadata (filter, order) must agree.
-
+/// tiles of one scene. Metadata (filter, order) must agree. Chunks lose their bounds: sort again.
 inline Status append(GaussianCloud& a, const GaussianCloud& b) {
   if (a.size() == 0) {
     a = b;
@@ -231,6 +236,17 @@ inline Status append(GaussianCloud& a, const GaussianCloud& b) {
       a.origins.insert(a.origins.end(), b.origins.begin(), b.origins.end());
       for (const std::uint32_t id : b.origin_ids) a.origin_ids.push_back(shift + id);
     }
+  }
+  a.chunk_bounds.clear();
+  if (!a.row_ids.empty() || !b.row_ids.empty()) {
+    const auto ids = [](const GaussianCloud& c) {
+      std::vector<std::uint32_t> out = c.row_ids;
+      for (std::size_t i = out.size(); i < c.size(); ++i) out.push_back(static_cast<std::uint32_t>(i));
+      return out;
+    };
+    const std::uint32_t shift = static_cast<std::uint32_t>(a.size());
+    a.row_ids = ids(a);
+    for (const std::uint32_t id : ids(b)) a.row_ids.push_back(shift + id);
   }
   const auto join = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
   for (std::size_t k = 0; k < 3; ++k) join(a.means[k], b.means[k]);

@@ -32,14 +32,15 @@ class GaussianArrays {
   GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) {
       GaussianView& v = set_.gaussians;
-      for (auto& p : v.means) to_device(backend, p);
-      for (auto& p : v.quats) to_device(backend, p);
-      for (auto& p : v.scales) to_device(backend, p);
-      to_device(backend, v.opacities);
-      to_device(backend, v.sh0);
-      to_device(backend, v.shN);
-      ids_.emplace_back(backend).upload(v.origin_ids.data, v.origin_ids.size);
-      v.origin_ids = {ids_.back().data(), v.origin_ids.size};
+      for (auto& p : v.means) to_device(backend, p, floats_);
+      for (auto& p : v.quats) to_device(backend, p, floats_);
+      for (auto& p : v.scales) to_device(backend, p, floats_);
+      to_device(backend, v.opacities, floats_);
+      to_device(backend, v.sh0, floats_);
+      to_device(backend, v.shN, floats_);
+      to_device(backend, v.origin_ids, ids_);
+      to_device(backend, v.row_ids, ids_);
+      to_device(backend, v.chunk_bounds, bounds_);
       origins_ = cloud.origins;  // read by the host
       v.origins = view_of(std::as_const(origins_));
     }
@@ -51,13 +52,15 @@ class GaussianArrays {
   }
 
  private:
-  void to_device(B& backend, View<const float>& v) {
-    floats_.emplace_back(backend).upload(v.data, v.size);
-    v = {floats_.back().data(), v.size};
+  template <class T>
+  static void to_device(B& backend, View<const T>& v, std::vector<Buffer<T, B>>& held) {
+    held.emplace_back(backend).upload(v.data, v.size);
+    v = {held.back().data(), v.size};
   }
   GaussianSet set_;
   std::vector<Buffer<float, B>> floats_;
   std::vector<Buffer<std::uint32_t, B>> ids_;
+  std::vector<Buffer<ChunkBounds, B>> bounds_;
   std::vector<Vec3d> origins_;
 };
 

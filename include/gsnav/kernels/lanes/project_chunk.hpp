@@ -18,7 +18,8 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
   const std::size_t base = (args.first_chunk + c) * kProjectChunk;
   const std::size_t step = static_cast<std::size_t>(kWidth);
   std::uint32_t written = 0;
-  for (std::size_t i = begin; i < end; i += step) {
+  const bool candidate = chunk_is_candidate(args, c);
+  for (std::size_t i = begin; i < end && candidate; i += step) {
     const std::size_t count = end - i < step ? end - i : step;
     float tail[step];
     // The last pack of a set repeats its last Gaussian; those lanes are masked below.

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <bit>
+#include <cstring>
 
 #include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/footprint.hpp"
 #include "gsnav/kernels/lanes/isa.hpp"
 
 namespace gsnav::lanes {
@@ -14,12 +16,48 @@ inline constexpr int kBlockWidth = kWidth >= 8 ? 4 : 2;
 inline constexpr int kBlockHeight = kWidth / kBlockWidth;
 inline constexpr int kMaxTile = 32;
 inline constexpr int kMaxBlocks = kMaxTile * kMaxTile / kWidth;
-/// Splats whose blocks are found before any of them is blended.
+/// Splats whose blocks are found before any of them is blended; a multiple of kWidth.
 inline constexpr int kBatch = 128;
 
-/// Blends one tile. Splats go in batches: for each, the blocks of pixels that its ellipse reaches are
-/// found side by side; then each block runs through its own list with its state in registers. A closed
-/// block takes no more splats, and the tile ends when all are closed. Per pixel the order and the
+/// The splats that each block of a tile meets, of one batch.
+struct BlockLists {
+  std::uint8_t splats[kMaxBlocks][kBatch];
+  int counts[kMaxBlocks];
+};
+
+/// Lists splats first to first + kWidth - 1 of a batch, those of `lanes`, in the blocks of an image's tile
+/// at (tile_x, tile_y) that their ellipses reach and that are open.
+inline void list_blocks(const SplatGeometry<float>* batch, int first, std::uint32_t lanes,
+                        float log2_alpha_min, int tile_x, int tile_y, int tile_size, const bool* open,
+                        BlockLists& lists) noexcept {
+  static_assert(sizeof(SplatGeometry<float>) == 8 * sizeof(float));
+  F c[8];
+  load_columns<8>(&batch[first].ref_x, c);
+  const SplatGeometry<F> g{c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]};
+  const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
+  const FootprintStrips<F> footprint(g, log2_alpha_min, F(centre(tile_x)), F(centre(tile_x + tile_size - 1)),
+                                     F(centre(tile_y)), F(centre(tile_y + tile_size - 1)));
+  for (int y = 0, block = 0; y < tile_size; y += kBlockHeight) {
+    F left, right;
+    const auto in_strip = footprint.columns(F(centre(tile_y + y)), F(centre(tile_y + y + kBlockHeight - 1)),
+                                            left, right);
+    const std::uint32_t strip = lane_bits(in_strip) & lanes;
+    for (int x = 0; x < tile_size; x += kBlockWidth, ++block) {
+      if (strip == 0 || !open[block]) continue;
+      const auto reached = (right >= F(centre(tile_x + x))) && (left <= F(centre(tile_x + x + kBlockWidth - 1)));
+      std::uint8_t* list = lists.splats[block];
+      int count = lists.counts[block];
+      for (std::uint32_t bits = lane_bits(reached) & strip; bits != 0; bits &= bits - 1) {
+        list[count++] = static_cast<std::uint8_t>(first + std::countr_zero(bits));
+      }
+      lists.counts[block] = count;
+    }
+  }
+}
+
+/// Blends one tile. Splats go in batches: the blocks of pixels that their ellipses reach are found for
+/// kWidth of them side by side; then each block runs through its own list with its state in registers. A
+/// closed block takes no more splats, and the tile ends when all are closed. Per pixel the order and the
 /// arithmetic are those of RasterizePixel: the same bits.
 template <bool Color, DepthMode D, Exp2 M, bool Perspective>
 void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
@@ -31,48 +69,35 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
   const int blocks_x = ts / kBlockWidth, blocks = blocks_x * (ts / kBlockHeight);
 
   BlendState<F, D> states[kMaxBlocks];
-  F pixel_x[kMaxBlocks], pixel_y[kMaxBlocks];
-  // Boxes of pixel centres per block, laid out so that a pack holds kWidth blocks.
-  alignas(64) float box_x0[kMaxBlocks], box_x1[kMaxBlocks], box_y0[kMaxBlocks], box_y1[kMaxBlocks];
-  alignas(64) float open_flags[kMaxBlocks];
+  bool open[kMaxBlocks];
   int open_count = 0;
+  float lane_x[kWidth], lane_y[kWidth];
+  for (int l = 0; l < kWidth; ++l) {
+    lane_x[l] = static_cast<float>(l % kBlockWidth) + 0.5f;
+    lane_y[l] = static_cast<float>(l / kBlockWidth) + 0.5f;
+  }
+  const F pixel_x = F::load(lane_x), pixel_y = F::load(lane_y);
   for (int b = 0; b < blocks; ++b) {
     const int x0 = tile_x + (b % blocks_x) * kBlockWidth, y0 = tile_y + (b / blocks_x) * kBlockHeight;
-    float xs[kWidth], ys[kWidth], inside[kWidth];
-    for (int l = 0; l < kWidth; ++l) {
-      const int x = x0 + l % kBlockWidth, y = y0 + l / kBlockWidth;
-      xs[l] = static_cast<float>(x) + 0.5f;
-      ys[l] = static_cast<float>(y) + 0.5f;
-      inside[l] = x < grid.width && y < grid.height ? 1.0f : 0.0f;
-    }
-    pixel_x[b] = F::load(xs);
-    pixel_y[b] = F::load(ys);
-    states[b].transmittance = F::load(inside);  // 0 outside the image: closed from the start
-    box_x0[b] = xs[0];
-    box_x1[b] = xs[kWidth - 1];
-    box_y0[b] = ys[0];
-    box_y1[b] = ys[kWidth - 1];
-    open_flags[b] = inside[0];
-    open_count += inside[0] > 0 ? 1 : 0;
-  }
-  // A small tile has fewer blocks than a pack has lanes: the lanes left over are closed.
-  for (int b = blocks; b % kWidth != 0; ++b) {
-    box_x0[b] = box_x1[b] = box_y0[b] = box_y1[b] = open_flags[b] = 0.0f;
+    const auto inside = (pixel_x + F(static_cast<float>(x0)) < F(static_cast<float>(grid.width))) &&
+                        (pixel_y + F(static_cast<float>(y0)) < F(static_cast<float>(grid.height)));
+    // Closed from the start outside the image.
+    states[b].transmittance = select(inside, F(1.0f), F(0.0f));
+    open[b] = any(inside);
+    open_count += open[b] ? 1 : 0;
   }
 
-  SplatGeometry<float> geometry[kBatch];
+  SplatGeometry<float> geometry[kBatch] = {};
   SplatColor<float> colors[Color ? kBatch : 1];
   constexpr bool kNeedsId = D != DepthMode::none || Perspective;
   std::uint32_t ids[kNeedsId ? kBatch : 1];
-  std::uint8_t lists[kMaxBlocks][kBatch];
-  std::uint8_t counts[kMaxBlocks];
+  BlockLists lists;
   const F closed_below(args.rules.transmittance_min);
-  const float log2_alpha_min = args.rules.log2_alpha_min;
 
   const std::uint64_t end = args.tile_offsets[tile + 1];
   for (std::uint64_t first = args.tile_offsets[tile]; first < end && open_count > 0; first += kBatch) {
     const int n = static_cast<int>(end - first < kBatch ? end - first : std::uint64_t{kBatch});
-    std::memset(counts, 0, static_cast<std::size_t>(blocks));
+    std::memset(lists.counts, 0, sizeof lists.counts[0] * static_cast<std::size_t>(blocks));
     // Records lie in file order, not in the tile's: asked for early, they are there when needed.
     constexpr int kAhead = 8;
     for (int j = 0; j < n; ++j) {
@@ -85,32 +110,31 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
       geometry[j] = args.geometry[splat];
       if constexpr (Color) colors[j] = args.colors[splat];
       if constexpr (kNeedsId) ids[j] = splat;
-      const FootprintBox<float> footprint(geometry[j], log2_alpha_min);
-      for (int b = 0; b < blocks; b += kWidth) {
-        auto reached = F::load(open_flags + b) > F(0.0f);
-        if constexpr (!Perspective) {  // under perspective the footprint is no ellipse
-          reached = reached && footprint.may_touch(F::load(box_x0 + b), F::load(box_x1 + b),
-                                                   F::load(box_y0 + b), F::load(box_y1 + b));
-        }
-        for (std::uint32_t bits = lane_bits(reached); bits != 0; bits &= bits - 1) {
-          const int at = b + std::countr_zero(bits);
-          lists[at][counts[at]++] = static_cast<std::uint8_t>(j);
-        }
+    }
+    if constexpr (Perspective) {  // the footprint is no ellipse: every open block
+      for (int b = 0; b < blocks; ++b) {
+        for (int j = 0; open[b] && j < n; ++j) lists.splats[b][lists.counts[b]++] = static_cast<std::uint8_t>(j);
+      }
+    } else {
+      for (int j = 0; j < n; j += kWidth) {
+        const std::uint32_t lanes = n - j >= kWidth ? ~0u : (1u << (n - j)) - 1u;
+        list_blocks(geometry, j, lanes, args.rules.log2_alpha_min, tile_x, tile_y, ts, open, lists);
       }
     }
     for (int b = 0; b < blocks; ++b) {
-      if (counts[b] == 0) continue;
+      if (lists.counts[b] == 0) continue;
       BlendState<F, D> state = states[b];
-      const F px = pixel_x[b], py = pixel_y[b];
-      for (int i = 0; i < counts[b]; ++i) {
-        const int j = lists[b][i];
+      const F px = pixel_x + F(static_cast<float>(tile_x + (b % blocks_x) * kBlockWidth));
+      const F py = pixel_y + F(static_cast<float>(tile_y + (b / blocks_x) * kBlockHeight));
+      for (int i = 0; i < lists.counts[b]; ++i) {
+        const int j = lists.splats[b][i];
         const std::uint32_t id = ids[kNeedsId ? j : 0];
         const SplatRecords<float> splat{&geometry[j], &colors[Color ? j : 0],
                                         D == DepthMode::none ? nullptr : &args.depths[id],
                                         Perspective ? &args.perspectives[id] : nullptr};
         const auto hit = blend_splat<Color, D, M, Perspective>(state, args.rules, splat, px, py);
         if (any(hit) && !any(state.transmittance >= closed_below)) {
-          open_flags[b] = 0.0f;
+          open[b] = false;
           --open_count;
           break;
         }

@@ -29,7 +29,8 @@ __global__ void __launch_bounds__(kProjectThreads) project_kernel(const ProjectA
   const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
   const std::size_t base = (args.first_chunk + chunk) * kProjectChunk;
   std::uint32_t written = 0;
-  for (std::size_t first = begin; first < end; first += kProjectThreads) {
+  const bool candidate = chunk_is_candidate(args, chunk);
+  for (std::size_t first = begin; first < end && candidate; first += kProjectThreads) {
     const std::size_t i = first + threadIdx.x;
     std::uint32_t keep = 0;
     std::size_t origin = 0;
