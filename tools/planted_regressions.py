@@ -4,10 +4,11 @@
 
     tools/planted_regressions.py [--list] [--only NAME ...] [--scratch DIR] [--cxx COMPILER] [--jobs N]
 
-The tree is copied; the original is never touched. A plant needs one translation unit of tests, compiled
-header-only with OpenMP, so none of the libraries is built. First every test case named must pass as the
-source is; then each plant's must fail. Exit status: 0 all caught, 1 one missed, 2 nothing could be said
-(a text to replace is not there once, a plant does not compile, a case fails unplanted).
+The tree is copied; the original is never touched. A plant needs one translation unit of tests, header-only
+with OpenMP, and of the libraries at most the few files that it names, so nothing is built before. First every
+test case named must pass as the source is; then each plant's must fail. Exit status: 0 all caught, 1 one
+missed, 2 nothing could be said (a text to replace is not there once, a plant does not compile, a case fails
+unplanted).
 """
 import argparse
 import concurrent.futures
@@ -25,7 +26,8 @@ sys.path.insert(0, str(ROOT / "tools"))
 import planted  # noqa: E402
 
 FLAGS = ["-std=c++20", "-O1", "-ffp-contract=off", "-fopenmp", "-w", "-Iinclude", "-Ibackends/serial",
-         "-Ibackends/openmp", "-Itests", '-DGSNAV_DATA_DIR="/nonexistent"']
+         "-Ibackends/openmp", "-Itests", "-Isrc/io", '-DGSNAV_DATA_DIR="/nonexistent"']
+FOLDERS = ("include", "backends", "src", "tests")
 CASE_TIMEOUT_S = 600
 
 
@@ -41,12 +43,11 @@ def all_plants():
 def copy_tree(to):
     """What git would commit, and what is new beside it; without git the folders that tests need."""
     try:
-        listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "-z", "include", "backends",
-                                 "tests"], cwd=ROOT, capture_output=True, check=True).stdout
+        listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "-z", *FOLDERS], cwd=ROOT,
+                                capture_output=True, check=True).stdout
         files = [f for f in listed.decode().split("\0") if f and (ROOT / f).is_file()]
     except (OSError, subprocess.CalledProcessError):
-        files = [str(f.relative_to(ROOT)) for d in ("include", "backends", "tests")
-                 for f in (ROOT / d).rglob("*") if f.is_file()]
+        files = [str(f.relative_to(ROOT)) for d in FOLDERS for f in (ROOT / d).rglob("*") if f.is_file()]
     for f in files:
         target = to / f
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -67,9 +68,9 @@ class Bench:
     def run(self, command, cwd=None, **kwargs):
         return subprocess.run(command, cwd=cwd or self.tree, text=True, capture_output=True, **kwargs)
 
-    def build(self, source, binary, tree=None):
-        """Returns what the compiler said, or nothing."""
-        done = self.run([self.cxx, *FLAGS, source, str(self.main), "-o", str(binary)], cwd=tree)
+    def build(self, plant, binary, tree=None):
+        """Its test, planted or not. Returns what the compiler said, or nothing."""
+        done = self.run([self.cxx, *FLAGS, plant.source, *plant.more, str(self.main), "-o", str(binary)], cwd=tree)
         return "" if done.returncode == 0 else done.stderr.strip() or "the compiler failed"
 
     def fails(self, binary, case):
@@ -103,7 +104,7 @@ def check_plant(bench, plant, scratch):
         if wrong := apply(tree, plant):
             return "BROKEN", wrong
         binary = scratch / f"{plant.name}.bin"
-        if said := bench.build(plant.source, binary, tree):
+        if said := bench.build(plant, binary, tree):
             return "BROKEN", "does not compile: " + next((l for l in said.splitlines() if "error" in l), said)
         missed = [c for c in plant.cases if not bench.fails(binary, c)]
         binary.unlink()
@@ -112,18 +113,21 @@ def check_plant(bench, plant, scratch):
         shutil.rmtree(tree)
 
 
-def check_unplanted(bench, plants, scratch):
+def check_unplanted(bench, plants, scratch, pool):
     """Every case that a plant must fail passes as it is. Returns what does not."""
-    wrong = []
-    for source in sorted({p.source for p in plants}):
-        binary = scratch / "unplanted.bin"
-        if said := bench.build(source, binary):
-            wrong.append(f"{source} does not compile: {said.splitlines()[0]}")
-            continue
-        for case in sorted({c for p in plants if p.source == source for c in p.cases}):
-            if how := bench.fails(binary, case):
-                wrong.append(f"{source}: {case}: {how} without a plant")
-    return wrong
+    def check(some):
+        source = some[0].source
+        binary = scratch / (source.replace("/", "_") + ".bin")
+        if said := bench.build(some[0], binary):
+            return [f"{source} does not compile: {said.splitlines()[0]}"]
+        cases = sorted({c for p in some for c in p.cases})
+        return [f"{source}: {c}: {how} without a plant" for c in cases if (how := bench.fails(binary, c))]
+
+    by_source = {}
+    for p in plants:
+        by_source.setdefault(p.source, []).append(p)
+        assert p.more == by_source[p.source][0].more, f"{p.source} is compiled in two ways"
+    return sum(pool.map(check, by_source.values()), [])
 
 
 def main():
@@ -142,19 +146,19 @@ def main():
     if not plants:
         parser.error("no plant of that name")
 
-    with tempfile.TemporaryDirectory(dir=args.scratch) as folder:
+    verdicts = []
+    with tempfile.TemporaryDirectory(dir=args.scratch) as folder, \
+            concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
         scratch = pathlib.Path(folder)
         bench = Bench(scratch, args.cxx)
-        if wrong := check_unplanted(bench, plants, scratch):
+        if wrong := check_unplanted(bench, plants, scratch, pool):
             print("\n".join(wrong))
             return 2
         print(f"{len({(p.source, c) for p in plants for c in p.cases})} test cases pass unplanted", flush=True)
-        verdicts = []
-        with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
-            for p, (verdict, remark) in zip(plants, pool.map(
-                    lambda p: check_plant(bench, p, scratch), plants)):
-                verdicts.append(verdict)
-                print(f"{p.name:32} {verdict:7} {remark}", flush=True)
+        found = pool.map(lambda p: check_plant(bench, p, scratch), plants)
+        for p, (verdict, remark) in zip(plants, found):
+            verdicts.append(verdict)
+            print(f"{p.name:32} {verdict:7} {remark}", flush=True)
     print(f"{verdicts.count('caught')} of {len(plants)} caught")
     return 2 if "BROKEN" in verdicts else 1 if "MISSED" in verdicts else 0
 

@@ -2,7 +2,6 @@
 #include "gsnav/nav/navmesh.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "navmesh_impl.hpp"
 
@@ -44,7 +43,7 @@ NavMesh::~NavMesh() = default;
 const NavMeshSettings& NavMesh::settings() const noexcept { return impl_->settings; }
 Aabb<double> NavMesh::bounds() const noexcept { return impl_->bounds; }
 std::size_t NavMesh::polygon_count() const noexcept { return impl_->polys.polys.size(); }
-double NavMesh::navigable_area() const noexcept { return impl_->polys.area_sum.back(); }
+double NavMesh::navigable_area() const noexcept { return impl_->polys.total_area; }
 
 std::vector<std::array<Vec3d, 3>> NavMesh::triangles() const {
   std::vector<std::array<Vec3d, 3>> out = impl_->polys.tris;
@@ -93,49 +92,6 @@ bool NavMesh::is_navigable(const Vec3d& p, double max_height_delta) const {
 
 double NavMesh::height_at(PolyId poly, const Vec3d& p) const noexcept {
   return impl_->polys.height(poly, p - impl_->origin) + impl_->origin.y;
-}
-
-NavPoint NavMesh::random_point(Rng& rng, std::optional<std::size_t> island) const {
-  const detail::PolyMesh& m = impl_->polys;
-  std::size_t first = 0, last = m.by_island.size();
-  if (island && *island < m.islands.size()) {
-    first = m.islands[*island].first;
-    last = first + m.islands[*island].count;
-  }
-  const double low = first == 0 ? 0.0 : m.area_sum[first - 1];
-  const double at = low + rng.uniform() * (m.area_sum[last - 1] - low);
-  const auto it = std::upper_bound(m.area_sum.begin() + static_cast<std::ptrdiff_t>(first),
-                                   m.area_sum.begin() + static_cast<std::ptrdiff_t>(last - 1), at);
-  const PolyId id = m.by_island[static_cast<std::size_t>(it - m.area_sum.begin())];
-  const detail::PolyMesh::Poly& poly = m.polys[id];
-  double rest = rng.uniform() * poly.area;
-  std::uint32_t k = 1;
-  for (; k + 2 < poly.count; ++k) {
-    rest -= 0.5 * norm(cross(m.corner(poly, k) - m.corner(poly, 0), m.corner(poly, k + 1) - m.corner(poly, 0)));
-    if (rest < 0) break;
-  }
-  // Uniform in a triangle: sqrt makes strips of equal area equally likely.
-  const double u = std::sqrt(rng.uniform()), v = rng.uniform();
-  Vec3d p = m.corner(poly, 0) * (1 - u) + m.corner(poly, k) * (u * (1 - v)) + m.corner(poly, k + 1) * (u * v);
-  p.y = m.height(id, p);
-  return {p + impl_->origin, id};
-}
-
-double NavMesh::distance_to_closest_obstacle(const Vec3d& p, double max_radius) const {
-  const double inf = std::numeric_limits<double>::infinity();
-  const auto s = snap_point(p);
-  if (!s) return inf;
-  const Impl::Lease query(*impl_);
-  if (!query) return inf;
-  const Float3 center(s->position - impl_->origin);
-  const dtQueryFilter filter;
-  float distance = 0, at[3], normal[3];
-  if (dtStatusFailed(query->findDistanceToWall(impl_->ref_of(s->poly), center.v,
-                                               static_cast<float>(max_radius), &filter, &distance, at,
-                                               normal))) {
-    return inf;
-  }
-  return static_cast<double>(distance);
 }
 
 SurfaceWalk NavMesh::walk(const NavPoint& start, const Vec3d& displacement, bool slide) const {

@@ -111,13 +111,11 @@ void PolyMesh::finish() {
   std::iota(by_island.begin(), by_island.end(), 0u);
   std::stable_sort(by_island.begin(), by_island.end(),
                    [&](PolyId a, PolyId b) { return polys[a].island < polys[b].island; });
-  area_sum.resize(polys.size());
-  double sum = 0;
+  total_area = 0;
   for (std::uint32_t i = 0; i < by_island.size(); ++i) {
     Island& island = islands[polys[by_island[i]].island];
     if (island.count++ == 0) island.first = i;
-    sum += polys[by_island[i]].area;
-    area_sum[i] = sum;
+    total_area += polys[by_island[i]].area;
   }
   for (Island& island : islands) {
     Vec3d centroid{};
@@ -139,6 +137,50 @@ void PolyMesh::finish() {
     }
     island.radius = std::sqrt(r2);
   }
+  prepare_sampling();
+}
+
+void PolyMesh::prepare_sampling() {
+  std::vector<double> weights;
+  std::vector<std::vector<double>> weights_in(islands.size());
+  std::vector<std::vector<std::uint32_t>> pieces_in(islands.size());
+  for (PolyId i = 0; i < polys.size(); ++i) {
+    Poly& p = polys[i];
+    const Vec3d& o = corner(p, 0);
+    Vec3d normal{};
+    for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
+      const Vec3d twice = cross(corner(p, k + 1) - o, corner(p, k) - o);
+      normal += twice;
+      weights_in[p.island].push_back(0.5 * norm(twice));
+      pieces_in[p.island].push_back(static_cast<std::uint32_t>(pieces.size()));
+      weights.push_back(weights_in[p.island].back());
+      pieces.push_back({i, k});
+    }
+    const double scale = norm(normal);
+    const auto off = [&](const Vec3d& q) { return !(std::abs(dot(normal, q - o)) <= 1e-6 * scale); };
+    p.planar = true;
+    for (std::uint32_t k = 1; k < p.count; ++k) p.planar = p.planar && !off(corner(p, k));
+    for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
+      p.planar = p.planar && !std::any_of(tris[t].begin(), tris[t].end(), off);
+    }
+  }
+  by_area = AliasTable(weights, {});
+  for (std::size_t i = 0; i < islands.size(); ++i) by_area_in.emplace_back(weights_in[i], pieces_in[i]);
+}
+
+Vec3d PolyMesh::point_in(const std::array<std::uint32_t, 2>& piece, Rng& rng) const noexcept {
+  const Poly& p = polys[piece[0]];
+  const Vec3d& o = corner(p, 0);
+  double u = rng.uniform(), v = rng.uniform();
+  if (u + v > 1) {  // the other half of the parallelogram
+    u = 1 - u;
+    v = 1 - v;
+  }
+  const Vec3d &a = corner(p, piece[1]), &b = corner(p, piece[1] + 1);
+  Vec3d q{o.x + u * (a.x - o.x) + v * (b.x - o.x), o.y + u * (a.y - o.y) + v * (b.y - o.y),
+          o.z + u * (a.z - o.z) + v * (b.z - o.z)};
+  if (!p.planar) q.y = height(piece[0], q);
+  return q;
 }
 
 }  // namespace gsnav::detail

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "alias_table.hpp"
 #include "gsnav/nav/navmesh.hpp"
 
 namespace gsnav::detail {
@@ -17,6 +18,7 @@ struct PolyMesh {
     std::uint32_t tri_first = 0, tri_count = 0;  ///< height triangles
     std::uint32_t island = 0;
     double area = 0.0;
+    bool planar = false;  ///< corners and height triangles lie in one plane
   };
   struct Island {
     std::uint32_t first = 0, count = 0;  ///< in `by_island`
@@ -29,7 +31,10 @@ struct PolyMesh {
   std::vector<std::array<Vec3d, 3>> tris;   ///< height triangles, by polygon
   std::vector<Island> islands;              ///< by falling area
   std::vector<PolyId> by_island;            ///< polygons, island after island
-  std::vector<double> area_sum;             ///< running sum of area over `by_island`
+  double total_area = 0.0;
+  std::vector<std::array<std::uint32_t, 2>> pieces;  ///< polygon and middle corner of fan triangles
+  AliasTable by_area;                                ///< of `pieces`
+  std::vector<AliasTable> by_area_in;                ///< the same, by island
 
   /// Fills everything that follows from polys, corners, neighbours and tris.
   void finish();
@@ -43,9 +48,14 @@ struct PolyMesh {
   Vec3d clamped(PolyId id, const Vec3d& q) const noexcept;
   /// Height of the surface at (x, z) of q.
   double height(PolyId id, const Vec3d& q) const noexcept;
+  /// A point of a piece, uniform.
+  Vec3d point_in(const std::array<std::uint32_t, 2>& piece, Rng& rng) const noexcept;
   /// See NavMesh::walk; positions relative to the mesh's origin.
   void walk(PolyId start_poly, const Vec3d& start, double dx, double dz, bool slide,
             SurfaceWalk& out) const;
+
+ private:
+  void prepare_sampling();
 };
 
 }  // namespace gsnav::detail

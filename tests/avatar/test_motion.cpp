@@ -161,8 +161,11 @@ TEST_CASE("joint matrices become a clip that gives them back") {
         CHECK(norm(g[j].translation + pose.root - globals[static_cast<std::size_t>(t)][j].translation) < 1e-9);
       }
     }
-    matrices[5].linear = {};
-    CHECK(says(clip_from_matrices(s, 1.0, matrices, skinning).status(), "key 1, joint 1"));
+    const Mat3d turned = matrices[5].linear, mirror{{{1, 0, 0}, {0, -1, 0}, {0, 0, 1}}};
+    for (const Mat3d& linear : {Mat3d{}, turned * mirror}) {
+      matrices[5].linear = linear;
+      CHECK(says(clip_from_matrices(s, 1.0, matrices, skinning).status(), "key 1, joint 1"));
+    }
     matrices.pop_back();
     CHECK_FALSE(clip_from_matrices(s, 1.0, matrices, skinning).ok());
   }

@@ -9,9 +9,8 @@
 #include "eval/oracle_support.hpp"
 #include "gsnav/kernels/sh.hpp"
 #include "hard_cases/cases.hpp"
-#include "support/data.hpp"
+#include "support/brush.hpp"
 #include "support/oracle.hpp"
-#include "support/safetensors.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -191,41 +190,15 @@ TEST_CASE("oracle: the long double oracle on random scenes") {
 }
 
 TEST_CASE("oracle: Brush's reference images") {
-  for (const char* name : {"tiny_case", "basic_case"}) {
-    const std::string path = data_file(std::string("splats/brush_reference/") + name + ".safetensors");
-    if (path.empty()) continue;
+  for (const char* name : kBrushCases) {
+    const auto brush = brush_case(name);
+    if (!brush) continue;
     CAPTURE(name);
-    auto t = read_safetensors(path);
-    GaussianCloudBuilder builder(3);
-    for (std::size_t i = 0; i < t["opacities"].size(); ++i) {
-      RawGaussian g;
-      for (std::size_t k = 0; k < 3; ++k) {
-        g.mean[static_cast<int>(k)] = t["means"][3 * i + k];
-        g.log_scales[static_cast<int>(k)] = t["scales"][3 * i + k];
-        g.sh0[k] = t["coeffs"][48 * i + k];
-      }
-      const float* q = t["quats"].data() + 4 * i;
-      g.quat = {q[0], q[1], q[2], q[3]};
-      g.opacity_logit = t["opacities"][i];
-      g.shN = t["coeffs"].data() + 48 * i + 3;
-      builder.add(g);
-    }
-    Camera camera;
-    camera.set_hfov(123, 82, 90);
-    camera.viewmat.translation = {-0.123, -0.456, 8.0};
     OracleConfig config;
-    config.rules.max_alpha = 0.999;
-    config.rules.transmittance_min = 0;
-    const OracleFrames f = oracle({builder.cloud().set()}, camera, config);
-    const std::vector<float>& expected = t["out_img"];
-    double worst = 0;
-    for (std::size_t p = 0; p < f.alpha.size(); ++p) {
-      for (std::size_t c = 0; c < 4; ++c) {
-        const double value = c < 3 ? f.rgb[3 * p + c] : f.alpha[p];
-        worst = std::max(worst, std::abs(value - static_cast<double>(expected[4 * p + c])));
-      }
-    }
-    CHECK(worst < 1e-5);
+    config.rules.max_alpha = brush->max_alpha;
+    config.rules.transmittance_min = brush->transmittance_min;
+    const OracleFrames f = oracle({brush->cloud.set()}, brush->camera, config);
+    CHECK(brush->error(f.rgb, f.alpha) < 1e-5);
   }
 }
 

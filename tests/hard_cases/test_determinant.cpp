@@ -175,7 +175,7 @@ TEST_CASE("N06_det_flat_edge_on") {
     MESSAGE(name << ": det is off by " << worst);
   });
 
-  // The images of a disk edge-on, and of points, are finite.
+  // The images of a disk edge-on, and of points, are finite; along its plane the depth is the centre's.
   RawGaussian disk = gaussian({0, 0, 3}, {0, 0.2, 0.2}, 0.9);
   const GaussianCloud cloud = cloud_of({disk, gaussian({0.5, 0.5, 3}, {2e-9, 2e-9, 2e-9}, 0.9),
                                         gaussian({-0.5, 0.5, 3}, {0, 0, 0}, 0.9)});
@@ -183,6 +183,8 @@ TEST_CASE("N06_det_flat_edge_on") {
     CHECK(all_finite(f));
     // The disk is a vertical line of filter width; the point is the filter alone.
     CHECK(static_cast<double>(f.alpha[32 * 65 + 32]) == doctest::Approx(0.9).epsilon(1e-6));
+    CHECK(std::abs(static_cast<double>(f.median_depth[32 * 65 + 32]) - 3) < 1e-6);
+    CHECK(std::abs(static_cast<double>(f.expected_depth[32 * 65 + 32]) - 3) < 1e-6);
     const double px = 64 * (0.5 / 3) + 32.5, d = 0.5 + std::floor(px) - px;
     CHECK(static_cast<double>(f.alpha[static_cast<std::size_t>(std::floor(px)) * 66]) ==
           doctest::Approx(0.9 * std::exp(-d * d / 0.3)).epsilon(1e-5));

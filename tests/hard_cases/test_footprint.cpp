@@ -22,7 +22,8 @@ Camera footprint_camera() {
   return c;
 }
 
-/// 1: alpha is above the threshold beyond rounding; 0: below it; -1: within 1e-4 of it.
+/// 1: alpha is above the threshold beyond rounding; 0: below it; -1: within 1e-4 of it, or within 1e-3 of the
+/// line where an exact response goes behind the camera.
 template <class Truth>
 std::vector<int> covered_pixels(const Truth& truth, Real opacity) {
   std::vector<int> covered(kWidth * kHeight, 0);
@@ -32,7 +33,11 @@ std::vector<int> covered_pixels(const Truth& truth, Real opacity) {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       const Real q = truth.q(x + 0.5L, y + 0.5L);
-      if (q >= 0 && q <= q_low) covered[static_cast<std::size_t>(y * kWidth + x)] = q <= q_high ? 1 : -1;
+      int& c = covered[static_cast<std::size_t>(y * kWidth + x)];
+      if (q >= 0 && q <= q_low) c = q <= q_high ? 1 : -1;
+      if constexpr (requires { truth.at_horizon(Real(), Real()); }) {
+        if (truth.at_horizon(x + 0.5L, y + 0.5L)) c = -1;
+      }
     }
   }
   return covered;

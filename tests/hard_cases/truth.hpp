@@ -131,6 +131,13 @@ class TruthRay {
     for (int i = 0; i < 3; ++i) d[i] = at * r[i] - splat_.mean[i];
     return form(d, d);
   }
+  /// Whether a ray is close to the line where its largest response goes behind the camera, so that alpha
+  /// falls from some value to 0: form(r, c) / form(c, c), c the mean's ray, is 1 at the mean and 0 there.
+  bool at_horizon(Real px, Real py) const {
+    const Real r[3] = {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1};
+    const Real c[3] = {splat_.mean[0] / splat_.mean[2], splat_.mean[1] / splat_.mean[2], 1};
+    return std::abs(form(r, c)) < 1e-3L * form(c, c);
+  }
   /// `depth`: where given, z of that point.
   Real alpha(Real px, Real py, Real* depth = nullptr) const {
     const Real distance = q(px, py, depth);

@@ -20,8 +20,10 @@ class Plant:
     source: str             # the test's translation unit, relative to the source tree
     cases: tuple[str, ...]  # doctest cases in it; each must fail
     why: str = ""
+    more: tuple[str, ...] = ()  # compiled with it: what the test needs of the libraries
 
 
-def plant(name: str, file: str, old: str, new: str, source: str, *cases: str, why: str = "") -> Plant:
+def plant(name: str, file: str, old: str, new: str, source: str, *cases: str, why: str = "",
+          more: tuple[str, ...] = ()) -> Plant:
     """The usual kind: one edit."""
-    return Plant(name, (Edit(file, old, new),), source, cases, why)
+    return Plant(name, (Edit(file, old, new),), source, cases, why, more)

@@ -23,9 +23,18 @@ constexpr std::array<std::string_view, 10> kOwn{"family_index", "per_family_inst
                                                 "repetition_index", "threads", "iterations", "real_time",
                                                 "cpu_time", "items_per_second", "bytes_per_second"};
 
-/// How benchmarks name backends: by type; OneThread is the openmp backend on one thread.
-constexpr std::array<std::pair<std::string_view, const char*>, 4> kBackends{
-    {{"OpenMPBackend", "openmp"}, {"OneThread", "openmp"}, {"SerialBackend", "serial"}, {"CudaBackend", "cuda"}}};
+/// How benchmarks name backends: by type.
+constexpr std::array<std::pair<std::string_view, const char*>, 3> kBackends{
+    {{"OpenMPBackend", "openmp"}, {"SerialBackend", "serial"}, {"CudaBackend", "cuda"}}};
+
+/// The digits after `/threads:` in a benchmark's name; empty where it names no number of threads.
+std::string threads_of(const std::string& name) {
+  constexpr std::string_view kKey = "/threads:";
+  const std::size_t at = name.find(kKey);
+  if (at == name.npos) return {};
+  const std::size_t begin = at + kKey.size();
+  return name.substr(begin, name.find_first_not_of("0123456789", begin) - begin);
+}
 
 double milliseconds(const std::string& unit) {
   return unit == "ns" ? 1e-6 : unit == "us" ? 1e-3 : unit == "ms" ? 1.0 : unit == "s" ? 1e3 : 0.0;
@@ -60,6 +69,7 @@ Result<std::vector<Row>> parse_benchmarks(const std::string& text, const std::st
     for (const auto& [type, backend] : kBackends) {
       if (name.find(type) != name.npos) row.set("backend", backend);
     }
+    row.set("threads", threads_of(name));
     if (b.contains("items_per_second") && b["items_per_second"].is_number()) {
       row.set("items_per_second", b["items_per_second"].get<double>());
     }

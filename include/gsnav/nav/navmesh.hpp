@@ -33,6 +33,23 @@ struct SnapOptions {
   Vec3d half_extents{2.0, 4.0, 2.0};
 };
 
+/// The nearest edge of the mesh.
+struct ObstacleHit {
+  double distance = 0.0;  ///< on the ground plane, metres
+  Vec3d position{};       ///< nearest point of the edge
+  Vec3d normal{};         ///< of the edge, on the ground plane, into the mesh
+};
+
+/// The walkable surface near one height, seen from above. Each cell stands for its centre.
+struct TopDownMap {
+  Vec3d low{};                        ///< world corner of cell (0, 0)
+  double metres_per_cell = 0.0;
+  std::size_t columns = 0, rows = 0;  ///< along x and z
+  std::vector<std::int32_t> islands;  ///< columns * row + column: island, or -1 where nothing is walkable
+
+  bool walkable(std::size_t column, std::size_t row) const noexcept { return islands[columns * row + column] >= 0; }
+};
+
 /// A path along the surface from start to goal: the corners it turns at, between them points wherever a
 /// straight line would leave the surface by more than a centimetre, and its length on the surface, metres.
 struct NavPath {
@@ -102,11 +119,23 @@ class NavMesh {
   bool is_navigable(const Vec3d& p, double max_height_delta = 0.5) const;
   /// Height of the surface on `poly` at the ground position of p.
   double height_at(PolyId poly, const Vec3d& p) const noexcept;
-  /// Uniform over the surface by area, from the caller's generator; `island` restricts it.
+  /// Uniform over the surface by area (alias table: constant time), from the caller's generator; `island`
+  /// restricts it. No polygon where there is no such island.
   NavPoint random_point(Rng& rng, std::optional<std::size_t> island = {}) const;
-  /// Ground-plane distance from p, snapped, to the nearest edge of the mesh, at most `max_radius`;
-  /// infinity where p cannot be snapped.
-  double distance_to_closest_obstacle(const Vec3d& p, double max_radius = 2.0) const;
+  /// Uniform over the part of the surface within `radius` metres of p in space; none where there is no such
+  /// part or less than about a thousandth of what lies above or below the disc.
+  std::optional<NavPoint> random_point_near(Rng& rng, const Vec3d& p, double radius,
+                                            std::optional<std::size_t> island = {}) const;
+  /// Ground-plane distance from p, snapped, to the nearest edge of the mesh that can be reached on the
+  /// surface within it, at most `max_radius`; infinity where p cannot be snapped.
+  double distance_to_closest_obstacle(const Vec3d& p, double max_radius = 2.0,
+                                      const SnapOptions& options = {}) const;
+  /// The edge itself; none where p cannot be snapped or no edge is within `max_radius`.
+  std::optional<ObstacleHit> closest_obstacle(const Vec3d& p, double max_radius = 2.0,
+                                              const SnapOptions& options = {}) const;
+  /// Which cells of a grid over the bounds are walkable within `max_height_delta` of `height` (world, metres).
+  /// Errors: invalid_argument for a cell that is not positive or a grid of more than 2^28 cells.
+  Result<TopDownMap> top_down_map(double height, double metres_per_cell, double max_height_delta = 0.5) const;
 
   // ---- paths: the shortest on the surface, exactly (Polyanya, unfolded over slopes), so that distances
   // are symmetric and obey the triangle inequality. The surface is that of the height triangles; a polygon

@@ -126,7 +126,7 @@ TEST_CASE("N29_chunk_boundary") {
   const Vec3d edge{32, 0, 0};
   Rng rng(29);
   SUBCASE("positions that both cells hold exactly: the same bits, the camera on either side and between") {
-    std::vector<RawGaussian> gs = raw_scene(290, 800, 0x1p-18);
+    const std::vector<RawGaussian> gs = raw_scene(290, 800, 0x1p-18);
     const GaussianCloud across = shifted(gs, edge), inside = cloud_of(gs);
     REQUIRE(across.origins.size() == 2);
     REQUIRE(inside.origins.empty());
@@ -134,12 +134,20 @@ TEST_CASE("N29_chunk_boundary") {
     for (const std::uint32_t id : across.origin_ids) low += across.origins[id].x == 0 ? 1 : 0;
     REQUIRE(low > 300);
     REQUIRE(low < 500);
+    // Around a corner of eight cells, at once and put together from two files.
+    const Vec3d corner{32, -32, 28};
+    const GaussianCloud eight = shifted(gs, corner);
+    REQUIRE(eight.origins.size() == 8);
+    GaussianCloud halves = shifted({gs.begin(), gs.begin() + 400}, corner);
+    REQUIRE(append(halves, shifted({gs.begin() + 400, gs.end()}, corner)).ok());
     for (const double x : {-1.5, -0.001953125, 0.0, 0.001953125, 1.5}) {
       Camera camera = axis_camera(65, 64);
       camera.viewmat.translation = {-x, 0, 0};
       for_each_renderer([&](auto& renderer) {
-        CHECK(same_images(renderer.render({&inside}, camera, all_outputs()),
-                          renderer.render({&across}, shifted(camera, edge), all_outputs())));
+        const auto reference = renderer.render({&inside}, camera, all_outputs());
+        CHECK(same_images(reference, renderer.render({&across}, shifted(camera, edge), all_outputs())));
+        CHECK(same_images(reference, renderer.render({&eight}, shifted(camera, corner), all_outputs())));
+        CHECK(same_images(reference, renderer.render({&halves}, shifted(camera, corner), all_outputs())));
       });
     }
   }

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kernels of bodies: linear blend skinning, polar rotation, forward kinematics.
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/kernels/fk.hpp"
+#include "gsnav/ops/skin.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "kernel_bench.hpp"
+#include "native_lanes.hpp"
+
+using namespace gsnav;
+
+namespace gsnav_bench {
+
+namespace {
+
+/// Joints of an SMPL-X body.
+constexpr std::size_t kJoints = 55;
+
+Quat<double> random_turn(Rng& rng, double most) {
+  return axis_angle(normalized(Vec3d{rng.normal(), rng.normal(), rng.normal()}), rng.uniform(0, most));
+}
+
+std::vector<Affine3<double>> random_joints(Rng& rng) {
+  std::vector<Affine3<double>> joints(kJoints);
+  for (auto& m : joints) {
+    m.linear = rotation_matrix(random_turn(rng, 1));
+    m.translation = {rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)};
+  }
+  return joints;
+}
+
+/// One skinning with all its arrays in the backend's memory.
+template <class S, class Out, class B>
+class Skinning {
+ public:
+  Skinning(B& backend, const GaussianCloud& cloud) : backend_(&backend), arrays_(backend, cloud), indices_(backend),
+      weights_(backend), joints_(backend) {
+    const std::size_t n = cloud.size();
+    Rng rng(3);
+    std::vector<Affine3<S>> joints;
+    for (const auto& m : random_joints(rng)) joints.push_back(affine_cast<S>(m));
+    std::vector<std::uint16_t> indices(4 * n);
+    std::vector<float> weights(4 * n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const float w[4] = {0.55f, 0.25f, 0.125f, 0.075f};
+      for (std::size_t k = 0; k < 4; ++k) {
+        indices[4 * i + k] = static_cast<std::uint16_t>(rng.below(kJoints));
+        weights[4 * i + k] = w[k];
+      }
+    }
+    joints_.upload(joints.data(), joints.size());
+    indices_.upload(indices.data(), indices.size());
+    weights_.upload(weights.data(), weights.size());
+    const GaussianView view = arrays_.set().gaussians;
+    for (std::size_t k = 0; k < 7; ++k) {
+      out_.emplace_back(backend).resize_discard(n);
+      View<Out>& written = k < 3 ? args_.means_out[k] : args_.quats_out[k - 3];
+      written = out_.back().view();
+      if (k < 3) {
+        args_.means[k] = view.means[k];
+      } else {
+        args_.quats[k - 3] = view.quats[k - 3];
+      }
+    }
+    args_.joint_indices = std::as_const(indices_).view();
+    args_.weights = std::as_const(weights_).view();
+    args_.joints = std::as_const(joints_).view();
+  }
+  void run() {
+    skin_gaussians(*backend_, args_).throw_if_error();
+    backend_->synchronize().throw_if_error();
+  }
+  /// Plane k: x y z of the means, then w x y z of the quaternions.
+  std::vector<Out> plane(std::size_t k) const {
+    std::vector<Out> values(out_[k].size());
+    out_[k].download(values.data(), values.size());
+    backend_->synchronize().throw_if_error();
+    return values;
+  }
+
+ private:
+  B* backend_;
+  GaussianArrays<B> arrays_;
+  Buffer<std::uint16_t, B> indices_;
+  Buffer<float, B> weights_;
+  Buffer<Affine3<S>, B> joints_;
+  std::vector<Buffer<Out, B>> out_;
+  SkinningArgs<S, Out> args_;
+};
+
+struct SkinBody {
+  template <class S, class B>
+  void operator()(benchmark::State& state, B& backend) const {
+    const GaussianCloud cloud = wall(200000, 0);
+    Skinning<S, float, B> skinning(backend, cloud);
+    SerialBackend serial;
+    Skinning<double, double, SerialBackend> truth(serial, cloud);
+    truth.run();
+    for (auto _ : state) skinning.run();
+    double worst[2] = {0, 0};  // means, quaternions
+    for (std::size_t k = 0; k < 7; ++k) {
+      double& w = worst[k < 3 ? 0 : 1];
+      w = std::max(w, error_of(skinning.plane(k), truth.plane(k)).max);
+    }
+    state.counters["mean_max_m"] = worst[0];
+    state.counters["quat_max"] = worst[1];
+    constexpr std::size_t kBytes = 7 * sizeof(float) * 2 + 4 * (sizeof(float) + sizeof(std::uint16_t));
+    count(state, cloud.size(), kBytes);
+  }
+};
+
+/// Blends of four rotations as skinning makes them, all with determinants above its limit.
+std::vector<Mat3<double>> blended_matrices(std::size_t n) {
+  Rng rng(9);
+  std::vector<Mat3<double>> matrices;
+  while (matrices.size() < n) {
+    Mat3<double> m = rotation_matrix(random_turn(rng, 2)) * 0.55;
+    for (const double w : {0.25, 0.125, 0.075}) m = m + rotation_matrix(random_turn(rng, 2)) * w;
+    if (determinant(m) > kMinBlendDeterminant) matrices.push_back(m);
+  }
+  return matrices;
+}
+
+constexpr std::size_t kMatrices = 32768;
+
+struct PolarErrors {
+  double rotation = 0, orthogonality = 0;
+
+  /// `r` is what came out for the matrix m.
+  void add(const Mat3<double>& m, const Mat3<double>& r) {
+    const Mat3<double> truth = polar_rotation(m), gram = r * transpose(r);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        rotation = std::max(rotation, std::abs(r(i, j) - truth(i, j)));
+        orthogonality = std::max(orthogonality, std::abs(gram(i, j) - (i == j ? 1.0 : 0.0)));
+      }
+    }
+  }
+  void report(benchmark::State& state) const {
+    state.counters["rotation_max"] = rotation;
+    state.counters["orthogonality_max"] = orthogonality;
+  }
+};
+
+struct PolarBody {
+  template <class S, class B>
+  void operator()(benchmark::State& state, B& backend) const {
+    const std::vector<Mat3<double>> input = blended_matrices(kMatrices);
+    std::vector<Mat3<S>> in(kMatrices), out(kMatrices);
+    for (std::size_t i = 0; i < kMatrices; ++i) in[i] = mat_cast<S>(input[i]);
+    time_items(state, backend, kMatrices,
+               [in = in.data(), out = out.data()](std::size_t i) { out[i] = polar_rotation(in[i]); });
+    PolarErrors errors;
+    for (std::size_t i = 0; i < kMatrices; ++i) errors.add(mat_cast<double>(in[i]), mat_cast<double>(out[i]));
+    errors.report(state);
+  }
+};
+
+struct PolarLanesBody {
+  template <class S, class B>
+  void operator()(benchmark::State& state, B& backend) const {
+    const std::vector<Mat3<double>> input = blended_matrices(kMatrices);
+    std::vector<float> in(9 * kMatrices), out(9 * kMatrices);
+    const float* from[9];
+    float* to[9];
+    for (std::size_t k = 0; k < 9; ++k) {
+      from[k] = in.data() + k * kMatrices;
+      to[k] = out.data() + k * kMatrices;
+      for (std::size_t i = 0; i < kMatrices; ++i) {
+        in[k * kMatrices + i] = static_cast<float>(input[i](static_cast<int>(k / 3), static_cast<int>(k % 3)));
+      }
+    }
+    constexpr std::size_t kPiece = 1024;
+    for (auto _ : state) {
+      backend.parallel_for(kMatrices / kPiece,
+                           [&](std::size_t p) { native_polar(from, to, p * kPiece, (p + 1) * kPiece); });
+      benchmark::ClobberMemory();
+    }
+    count(state, kMatrices);
+    const auto matrix = [](const auto& planes, std::size_t i) {
+      Mat3<double> m;
+      for (int k = 0; k < 9; ++k) m(k / 3, k % 3) = static_cast<double>(planes[k][i]);
+      return m;
+    };
+    PolarErrors errors;
+    for (std::size_t i = 0; i < kMatrices; ++i) errors.add(matrix(from, i), matrix(to, i));
+    errors.report(state);
+  }
+};
+
+/// Poses of a tree of joints in the scalar S.
+template <class S>
+struct Poses {
+  std::vector<std::int32_t> parents;
+  std::vector<Quat<S>> rotations;
+  std::vector<Vec3<S>> translations;
+  std::vector<Affine3<S>> inverse_binds, globals, matrices;
+
+  explicit Poses(std::size_t actors) {
+    Rng rng(13);
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      parents.push_back(j == 0 ? -1 : static_cast<std::int32_t>((j - 1) / 2));
+      inverse_binds.push_back({Mat3<S>::identity(), vec_cast<S>(Vec3d{rng.uniform(-1, 1), rng.uniform(-1, 1), 0})});
+    }
+    for (std::size_t i = 0; i < actors * kJoints; ++i) {
+      const Quat<double> q = random_turn(rng, 1);
+      rotations.push_back({static_cast<S>(q.w), static_cast<S>(q.x), static_cast<S>(q.y), static_cast<S>(q.z)});
+      translations.push_back(vec_cast<S>(Vec3d{0.1 * rng.normal(), 0.3, 0.1 * rng.normal()}));
+    }
+    globals.resize(actors * kJoints);
+    matrices.resize(actors * kJoints);
+  }
+  ForwardKinematics<S> kernel() {
+    ForwardKinematicsArgs<S> args;
+    args.parents = view_of(std::as_const(parents));
+    args.rotations = view_of(std::as_const(rotations));
+    args.translations = view_of(std::as_const(translations));
+    args.inverse_binds = view_of(std::as_const(inverse_binds));
+    args.globals = view_of(globals);
+    args.joint_matrices = view_of(matrices);
+    return {args};
+  }
+};
+
+struct KinematicsBody {
+  template <class S, class B>
+  void operator()(benchmark::State& state, B& backend) const {
+    constexpr std::size_t kActors = 256;
+    Poses<S> poses(kActors);
+    const ForwardKinematics<S> kernel = poses.kernel();
+    for (auto _ : state) {
+      backend.parallel_for(kActors, kernel);
+      benchmark::ClobberMemory();
+    }
+    count(state, kActors * kJoints);
+    Poses<double> truth(kActors);
+    SerialBackend().parallel_for(kActors, truth.kernel());
+    double position = 0, rotation = 0;
+    for (std::size_t i = 0; i < truth.matrices.size(); ++i) {
+      const Affine3<double> m = affine_cast<double>(poses.matrices[i]);
+      for (int r = 0; r < 3; ++r) {
+        position = std::max(position, std::abs(m.translation[r] - truth.matrices[i].translation[r]));
+        for (int c = 0; c < 3; ++c) {
+          rotation = std::max(rotation, std::abs(m.linear(r, c) - truth.matrices[i].linear(r, c)));
+        }
+      }
+    }
+    state.counters["position_max_m"] = position;
+    state.counters["rotation_max"] = rotation;
+  }
+};
+
+}  // namespace
+
+void register_body_kernels() {
+  add_cpu_rows("skin", "influences:4", SkinBody{});
+  add_cuda_row("skin", "influences:4", SkinBody{});
+  add_cpu_rows("polar", "", PolarBody{});
+  add_openmp_rows("polar", "", "float x" + std::to_string(native_width()), PolarLanesBody{});
+  add_cpu_rows("forward_kinematics", "joints:55", KinematicsBody{});
+}
+
+}  // namespace gsnav_bench

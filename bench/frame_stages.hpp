@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gsnav/ops/render.hpp"
+#include "gsnav/scene/renderer.hpp"
+
+namespace gsnav_bench {
+
+/// The stages of one camera's frame, each on its own, on any backend: what `render_camera` runs in a row.
+/// One cloud, one origin, Response::ewa. Every stage reads what the one before it left and may be run any
+/// number of times; the constructor runs all but the blending once.
+template <class S, gsnav::Backend B>
+class FrameStages {
+ public:
+  FrameStages(B& backend, const gsnav::GaussianCloud& cloud, const gsnav::Camera& camera,
+              const gsnav::RenderConfig& config = {})
+      : config_(config), backend_(&backend), arrays_(backend, cloud), offsets_f_(backend), offsets_(backend),
+        geometry_(backend), colors_(backend), depths_(backend), bounds_(backend), chunk_keys_(backend),
+        counts_(backend), order_(backend), cursors_(backend), tile_offsets_(backend), tile_splats_(backend),
+        images_(backend) {
+    prepare_projection(camera);
+    project();
+    set_order();
+    prepare_bins(camera);
+    bin();
+  }
+
+  void project() {
+    if constexpr (requires { backend_->project(project_); }) {
+      backend_->project(project_);
+    } else {
+      backend_->parallel_for(project_.chunk_count(), gsnav::ProjectChunk<S>{project_});
+    }
+    sync();
+  }
+
+  /// Fills tile_offsets and tile_splats.
+  void bin() {
+    if constexpr (requires { backend_->list_tiles(bin_); }) {
+      backend_->list_tiles(bin_);
+    } else {
+      if constexpr (requires { backend_->count_tiles(bin_); }) {
+        backend_->count_tiles(bin_);
+      } else {
+        backend_->parallel_for(bin_.blocks, gsnav::CountTileIntersections<S>{bin_});
+      }
+      backend_->parallel_for(1, gsnav::ScanTileIntersections<S>{bin_});
+    }
+    tile_offsets_.download(&pairs_, 1, bin_.grid.count());
+    sync();
+    tile_splats_.resize_discard(pairs_);
+    bin_.tile_splats = tile_splats_.view();
+    if constexpr (requires { backend_->scatter_tiles(bin_); }) {
+      backend_->scatter_tiles(bin_);
+    } else {
+      backend_->parallel_for(bin_.blocks, gsnav::ScatterTileIntersections<S>{bin_});
+    }
+    sync();
+  }
+
+  /// RGB of the bins.
+  void blend() {
+    gsnav::RasterArgs<S> raster;
+    raster.grid = bin_.grid;
+    raster.tile_offsets = tile_offsets_.view();
+    raster.tile_splats = tile_splats_.view();
+    raster.geometry = geometry_.view();
+    raster.colors = colors_.view();
+    raster.rules = gsnav::blend_rules<S>(config_);
+    raster.exp2_method =
+        config_.profile == gsnav::Profile::fast ? gsnav::Exp2::degree3 : gsnav::Exp2::degree6;
+    raster.images.rgb = images_.data();
+    gsnav::detail::rasterize(*backend_, raster);
+    sync();
+  }
+
+  std::size_t visible() const noexcept { return order_.size(); }
+  std::size_t pairs() const noexcept { return static_cast<std::size_t>(pairs_); }
+  std::size_t pixels() const noexcept { return images_.size() / 3; }
+  const gsnav::BinArgs<S>& bins() const noexcept { return bin_; }
+
+  /// Records of the survivors, slot by slot of the chunks.
+  std::vector<gsnav::SplatGeometry<S>> survivors_geometry() const { return survivors(geometry_); }
+  std::vector<gsnav::SplatColor<S>> survivors_colors() const { return survivors(colors_); }
+  std::vector<std::uint64_t> tile_offsets() const { return all_of(tile_offsets_); }
+  std::vector<S> image() const { return all_of(images_); }
+
+ private:
+  void sync() { backend_->synchronize().throw_if_error(); }
+
+  template <class T>
+  std::vector<T> all_of(const gsnav::Buffer<T, B>& buffer) const {
+    std::vector<T> out(buffer.size());
+    buffer.download(out.data(), out.size());
+    backend_->synchronize().throw_if_error();
+    return out;
+  }
+
+  template <class T>
+  std::vector<T> survivors(const gsnav::Buffer<T, B>& buffer) const {
+    const std::vector<T> slots = all_of(buffer);
+    const std::vector<std::uint32_t> counts = all_of(counts_);
+    std::vector<T> out;
+    for (std::size_t c = 0; c < counts.size(); ++c) {
+      const auto first = slots.begin() + static_cast<std::ptrdiff_t>(c * gsnav::kProjectChunk);
+      out.insert(out.end(), first, first + counts[c]);
+    }
+    return out;
+  }
+
+  void prepare_projection(const gsnav::Camera& camera) {
+    const gsnav::GaussianSet set = arrays_.set();
+    const gsnav::ProjectionRules rules = gsnav::projection_rules(config_);
+    const gsnav::Vec3d eye = gsnav::inverse(set.world_from_asset) * camera.position();
+    std::vector<gsnav::Vec3d> offsets;
+    const gsnav::View<const gsnav::Vec3d> table = set.gaussians.origins;
+    for (std::size_t o = 0; o < (table.empty() ? 1 : table.size); ++o) {
+      offsets.push_back((table.empty() ? gsnav::Vec3d{} : table[o]) - eye);
+    }
+    std::vector<gsnav::Vec3<float>> offsets_f;
+    for (const gsnav::Vec3d& o : offsets) offsets_f.push_back(gsnav::vec_cast<float>(o));
+    offsets_.upload(offsets.data(), offsets.size());
+    offsets_f_.upload(offsets_f.data(), offsets_f.size());
+    project_.gaussians = set.gaussians;
+    project_.camera = gsnav::make_projection_camera<S>(camera, set, rules);
+    project_.camera64 = gsnav::make_projection_camera<double>(camera, set, rules);
+    project_.sh_degree = std::min(set.gaussians.sh_degree, config_.max_sh_degree);
+    project_.depth = (config_.outputs & gsnav::kAnyDepth) != 0;
+    const std::size_t slots = project_.chunk_count() * gsnav::kProjectChunk;
+    geometry_.resize_discard(slots);
+    colors_.resize_discard(slots);
+    depths_.resize_discard(project_.depth ? slots : 0);
+    bounds_.resize_discard(slots);
+    chunk_keys_.resize_discard(slots);
+    counts_.resize_discard(project_.chunk_count());
+    project_.geometry = geometry_.view();
+    project_.colors = colors_.view();
+    project_.depths = depths_.view();
+    project_.bounds = bounds_.view();
+    project_.keys = chunk_keys_.view();
+    project_.counts = counts_.view();
+    project_.offsets = offsets_.view();
+    project_.offsets_f = offsets_f_.view();
+    images_.resize_discard(static_cast<std::size_t>(3 * camera.width) * static_cast<std::size_t>(camera.height));
+  }
+
+  /// Depth order of the survivors, on the host: the sort has a benchmark of its own.
+  void set_order() {
+    const std::vector<std::uint32_t> keys = all_of(chunk_keys_), counts = all_of(counts_);
+    std::vector<std::uint32_t> order;
+    for (std::size_t c = 0; c < counts.size(); ++c) {
+      for (std::size_t i = 0; i < counts[c]; ++i) {
+        order.push_back(static_cast<std::uint32_t>(c * gsnav::kProjectChunk + i));
+      }
+    }
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
+    order_.upload(order.data(), order.size());
+  }
+
+  void prepare_bins(const gsnav::Camera& camera) {
+    bin_.grid = gsnav::TileGrid::of(camera.width, camera.height, config_.tile_size);
+    bin_.order = order_.view();
+    bin_.geometry = geometry_.view();
+    bin_.bounds = bounds_.view();
+    bin_.log2_alpha_min = static_cast<S>(std::log2(config_.alpha_min));
+    bin_.blocks = gsnav::concurrency_of(*backend_);
+    cursors_.resize_discard(bin_.blocks * bin_.grid.count());
+    tile_offsets_.resize_discard(bin_.grid.count() + 1);
+    bin_.cursors = cursors_.view();
+    bin_.tile_offsets = tile_offsets_.view();
+  }
+
+  gsnav::RenderConfig config_;
+  B* backend_;
+  gsnav::GaussianArrays<B> arrays_;
+  gsnav::Buffer<gsnav::Vec3<float>, B> offsets_f_;
+  gsnav::Buffer<gsnav::Vec3d, B> offsets_;
+  gsnav::Buffer<gsnav::SplatGeometry<S>, B> geometry_;
+  gsnav::Buffer<gsnav::SplatColor<S>, B> colors_;
+  gsnav::Buffer<gsnav::SplatDepth<S>, B> depths_;
+  gsnav::Buffer<gsnav::SplatBounds, B> bounds_;
+  gsnav::Buffer<std::uint32_t, B> chunk_keys_, counts_, order_;
+  gsnav::Buffer<std::uint64_t, B> cursors_, tile_offsets_;
+  gsnav::Buffer<std::uint32_t, B> tile_splats_;
+  gsnav::Buffer<S, B> images_;
+  gsnav::ProjectArgs<S> project_;
+  gsnav::BinArgs<S> bin_;
+  std::uint64_t pairs_ = 0;
+};
+
+}  // namespace gsnav_bench

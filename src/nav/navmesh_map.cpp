@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "navmesh_impl.hpp"
+
+namespace gsnav {
+namespace {
+
+constexpr double kMaxCells = 0x1p28;
+
+/// Part of the line z = const that lies in a polygon; none where low > high.
+struct Reach {
+  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+};
+
+Reach reach_at(const detail::PolyMesh& m, const detail::PolyMesh::Poly& poly, double z) noexcept {
+  Reach r;
+  for (std::uint32_t k = 0; k < poly.count; ++k) {
+    const Vec3d &a = m.corner(poly, k), &b = m.corner(poly, k + 1);
+    const double ex = b.x - a.x, ez = b.z - a.z;
+    // Inside is ex (z - a.z) - (x - a.x) ez >= 0.
+    if (ez > 0) {
+      r.high = min(r.high, a.x + ex * (z - a.z) / ez);
+    } else if (ez < 0) {
+      r.low = max(r.low, a.x + ex * (z - a.z) / ez);
+    } else if (ex * (z - a.z) < 0) {
+      return {1, 0};
+    }
+  }
+  return r;
+}
+
+}  // namespace
+
+Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell,
+                                         double max_height_delta) const {
+  const auto bad = [](const char* name, double value, const char* what) {
+    return Status(Errc::invalid_argument,
+                  std::string("top-down map: ") + name + " = " + std::to_string(value) + " " + what);
+  };
+  if (!is_finite(height)) return bad("height", height, "is not finite");
+  if (!(max_height_delta >= 0)) return bad("max_height_delta", max_height_delta, "must be at least 0");
+  if (!(metres_per_cell > 0) || !is_finite(metres_per_cell)) {
+    return bad("metres_per_cell", metres_per_cell, "must be positive and finite");
+  }
+  const Aabb<double> box = bounds();
+  const double columns = max(std::ceil((box.high.x - box.low.x) / metres_per_cell), 1.0);
+  const double rows = max(std::ceil((box.high.z - box.low.z) / metres_per_cell), 1.0);
+  if (!(columns * rows <= kMaxCells)) {
+    return bad("metres_per_cell", metres_per_cell, "makes more than 2^28 cells; raise it");
+  }
+  TopDownMap map;
+  map.low = box.low;
+  map.metres_per_cell = metres_per_cell;
+  map.columns = static_cast<std::size_t>(columns);
+  map.rows = static_cast<std::size_t>(rows);
+  map.islands.assign(map.columns * map.rows, -1);
+  std::vector<double> off(map.islands.size(), max_height_delta);  // of the surface shown, from `height`
+
+  const detail::PolyMesh& m = impl_->polys;
+  const Vec3d low = map.low - impl_->origin;
+  const double level = height - impl_->origin.y;
+  // The first cell whose centre is at or beyond `v`.
+  const auto cell_from = [&](double v, double n) {
+    return static_cast<std::size_t>(clamp(std::ceil(v / metres_per_cell - 0.5), 0.0, n));
+  };
+  for (PolyId id = 0; id < m.polys.size(); ++id) {
+    const auto& poly = m.polys[id];
+    Aabb<double> around;
+    for (std::uint32_t k = 0; k < poly.count; ++k) around.add(m.corner(poly, k));
+    for (std::size_t r = cell_from(around.low.z - low.z, rows); r < map.rows; ++r) {
+      Vec3d centre{0, 0, low.z + (static_cast<double>(r) + 0.5) * metres_per_cell};
+      if (centre.z > around.high.z) break;
+      const Reach reach = reach_at(m, poly, centre.z);
+      for (std::size_t c = cell_from(reach.low - low.x, columns); c < map.columns; ++c) {
+        centre.x = low.x + (static_cast<double>(c) + 0.5) * metres_per_cell;
+        if (centre.x > reach.high) break;
+        const double d = std::abs(m.height(id, centre) - level);
+        const std::size_t cell = map.columns * r + c;
+        if (d > off[cell]) continue;
+        off[cell] = d;
+        map.islands[cell] = static_cast<std::int32_t>(poly.island);
+      }
+    }
+  }
+  return map;
+}
+
+}  // namespace gsnav

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "navmesh_impl.hpp"
+
+namespace gsnav {
+namespace {
+
+using detail::PolyMesh;
+
+constexpr int kMaxTries = 10000;
+constexpr std::size_t kMaxCorners = 8;  // a triangle cut by four lines has at most seven
+
+/// A triangle's part within a square on the ground plane.
+struct Clipped {
+  std::array<Vec3d, kMaxCorners> p{};
+  std::size_t count = 0;
+
+  /// Keeps where sign * (coordinate - at) <= 0.
+  void cut(int axis, double at, double sign) {
+    std::array<Vec3d, kMaxCorners> out{};
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Vec3d &a = p[i], &b = p[(i + 1) % count];
+      const double da = sign * (a[axis] - at), db = sign * (b[axis] - at);
+      if (da <= 0) out[n++] = a;
+      if ((da < 0 && db > 0) || (da > 0 && db < 0)) out[n++] = lerp(a, b, da / (da - db));
+    }
+    p = out;
+    count = n;
+  }
+};
+
+/// Polygons in the order they were reached, each once. Belongs to a thread, so that it is not allocated
+/// anew.
+struct Reached {
+  std::vector<PolyId> queue;
+  std::vector<std::uint64_t> round_of;
+  std::uint64_t round = 0;
+
+  void begin(std::size_t polygons) {
+    queue.clear();
+    if (round_of.size() < polygons) round_of.resize(polygons, 0);
+    ++round;
+  }
+  void add(PolyId id) {
+    if (round_of[id] == round) return;
+    round_of[id] = round;
+    queue.push_back(id);
+  }
+};
+
+std::optional<ObstacleHit> closest_wall(const NavMesh::Impl& impl, const NavPoint& start,
+                                        double max_radius) {
+  const PolyMesh& m = impl.polys;
+  const Vec3d c = start.position - impl.origin;
+  std::optional<ObstacleHit> hit;
+  double best = max_radius;
+  // The straight way to the nearest wall crosses edges that are nearer than it: no others are crossed.
+  thread_local Reached reached;
+  reached.begin(m.polys.size());
+  reached.add(start.poly);
+  for (std::size_t i = 0; i < reached.queue.size(); ++i) {
+    const PolyMesh::Poly& poly = m.polys[reached.queue[i]];
+    for (std::uint32_t k = 0; k < poly.count; ++k) {
+      const Vec3d &a = m.corner(poly, k), &b = m.corner(poly, k + 1);
+      const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
+      if (!(len2 > 0)) continue;
+      const double t = clamp(((c.x - a.x) * ex + (c.z - a.z) * ez) / len2, 0.0, 1.0);
+      const double dx = a.x + t * ex - c.x, dz = a.z + t * ez - c.z, d = std::sqrt(dx * dx + dz * dz);
+      if (d > best) continue;
+      const PolyId next = m.neighbours[poly.first + k];
+      if (next != kNoPoly) {
+        reached.add(next);
+        continue;
+      }
+      const double inverse = 1 / std::sqrt(len2);
+      hit = ObstacleHit{d, lerp(a, b, t) + impl.origin, {-ez * inverse, 0, ex * inverse}};
+      best = d;
+    }
+  }
+  return hit;
+}
+
+}  // namespace
+
+NavPoint NavMesh::random_point(Rng& rng, std::optional<std::size_t> island) const {
+  const PolyMesh& m = impl_->polys;
+  if (island && *island >= m.islands.size()) return {};
+  const auto& piece = m.pieces[(island ? m.by_area_in[*island] : m.by_area).draw(rng)];
+  return {m.point_in(piece, rng) + impl_->origin, piece[0]};
+}
+
+std::optional<NavPoint> NavMesh::random_point_near(Rng& rng, const Vec3d& p, double radius,
+                                                   std::optional<std::size_t> island) const {
+  if (!is_finite(p) || !(radius >= 0) || !is_finite(radius)) return {};
+  const PolyMesh& m = impl_->polys;
+  const Vec3d c = p - impl_->origin;
+  struct Piece {
+    PolyId poly;
+    std::array<Vec3d, 3> corners;
+  };
+  std::vector<Piece> near;
+  std::vector<double> areas;
+  for (const auto& [id, k] : m.pieces) {
+    const PolyMesh::Poly& poly = m.polys[id];
+    if (island && poly.island != *island) continue;
+    Clipped part;
+    part.p = {m.corner(poly, 0), m.corner(poly, k), m.corner(poly, k + 1)};
+    part.count = 3;
+    for (const int axis : {0, 2}) {
+      part.cut(axis, c[axis] + radius, 1);
+      part.cut(axis, c[axis] - radius, -1);
+    }
+    for (std::size_t i = 1; i + 1 < part.count; ++i) {
+      near.push_back({id, {part.p[0], part.p[i], part.p[i + 1]}});
+      areas.push_back(0.5 * norm(cross(part.p[i] - part.p[0], part.p[i + 1] - part.p[0])));
+    }
+  }
+  if (near.empty()) return {};
+  const detail::AliasTable table(areas, {});
+  for (int i = 0; i < kMaxTries; ++i) {
+    const Piece& piece = near[table.draw(rng)];
+    const double u = std::sqrt(rng.uniform()), v = rng.uniform();
+    Vec3d q = piece.corners[0] * (1 - u) + piece.corners[1] * (u * (1 - v)) + piece.corners[2] * (u * v);
+    q.y = m.height(piece.poly, q);
+    if (norm(q - c) <= radius) return NavPoint{q + impl_->origin, piece.poly};
+  }
+  return {};
+}
+
+std::optional<ObstacleHit> NavMesh::closest_obstacle(const Vec3d& p, double max_radius,
+                                                     const SnapOptions& options) const {
+  const auto start = snap_point(p, options);
+  if (!start || !(max_radius >= 0)) return {};
+  return closest_wall(*impl_, *start, max_radius);
+}
+
+double NavMesh::distance_to_closest_obstacle(const Vec3d& p, double max_radius,
+                                             const SnapOptions& options) const {
+  const auto start = snap_point(p, options);
+  if (!start) return std::numeric_limits<double>::infinity();
+  const auto hit = closest_wall(*impl_, *start, max(max_radius, 0.0));
+  return hit ? hit->distance : max_radius;
+}
+
+}  // namespace gsnav

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Blending a pixel's stack, and its depths."""
+from . import Edit, Plant, plant
+
+BLEND = "include/gsnav/kernels/blend.hpp"
+DEPTH = "include/gsnav/kernels/depth.hpp"
+PROJECTION = "include/gsnav/kernels/projection.hpp"
+LANES = "include/gsnav/kernels/lanes/rasterize_tile.hpp"
+STACK_TEST = "tests/hard_cases/test_stack.cpp"
+DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
+CUT_TEST = "tests/hard_cases/test_determinism.cpp"
+
+OPEN = "auto hit = state.transmittance >= L(rules.transmittance_min);"
+DELTA = "  const L defined = select(denominator > L(S(0)), delta, L(S(0)));\n"
+CLAMPED = "return L(d.z) + clamp(defined, -reach, reach);"
+CROSSES = "select((before > half) && (after <= half), z, state.median)"
+FIRST = "select((before > open) && (after <= open), z, state.first_hit)"
+RETURNED = "const bool returned = alpha > args.rules.return_alpha;"
+
+PLANTS = [
+    plant("stop_exclusive", BLEND, "  if (rules.exclusive_stop) {", "  if (rules.exclusive_stop || true) {",
+          STACK_TEST, "N42_saturation_stop", why="INRIA, gsplat: up to 0.0099 of what lies behind"),
+    Plant("stop_dropped",
+          (Edit(BLEND, OPEN, "auto hit = state.transmittance >= L(S(0));"),
+           Edit(BLEND, "if (state.transmittance < args.rules.transmittance_min) break;", ""),
+           Edit(LANES, "if (any(hit) && !any(state.transmittance >= closed_below)) {", "if (false) {")),
+          STACK_TEST, ("N42_saturation_stop", "N44_deep_stack")),
+    plant("stop_by_the_block", BLEND, OPEN, "auto hit = state.transmittance >= L(S(0));",
+          CUT_TEST, "N63_determinism_100 of work that is cut",
+          why="a closed pixel goes on while its neighbours are open"),
+    plant("stop_at_a_hundredth", BLEND, OPEN,
+          "auto hit = state.transmittance >= L(rules.transmittance_min * S(100));",
+          STACK_TEST, "N42_saturation_stop", "N44_deep_stack"),
+    plant("alpha_threshold_skipped", BLEND,
+          "  hit = hit && (exponent >= L(rules.log2_alpha_min));\n", "",
+          STACK_TEST, "N43_faint_fog", why="training used it: the image has to"),
+    plant("alpha_threshold_moved", BLEND,
+          "hit = hit && (exponent >= L(rules.log2_alpha_min));",
+          "hit = hit && (exponent >= L(rules.log2_alpha_min + S(0.01)));",
+          STACK_TEST, "N43_faint_fog", why="0.7 % above 1/255"),
+    plant("alpha_not_limited", BLEND, "min(exp2<M>(exponent), L(rules.max_alpha))", "exp2<M>(exponent)",
+          STACK_TEST, "N41_single_opaque"),
+    plant("exp2_cubic", "include/gsnav/ops/render.hpp",
+          "config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree6", "Exp2::degree3",
+          "tests/hard_cases/test_response.cpp", "N01_ewa_offaxis_grid", why="off by 1e-4 of alpha"),
+    plant("color_summed_in_half", BLEND, "    state.r = fma(weight, L(c.r), state.r);\n",
+          "    state.r = fma(weight, L(c.r), state.r);\n"
+          "    const L split = state.r * L(S(8193));\n"
+          "    state.r = split - (split - state.r);\n",
+          STACK_TEST, "N44_deep_stack", why="11 bits of each sum"),
+    plant("depth_sum_from_the_camera", BLEND,
+          "    state.z_ref = select((before >= L(S(1))) && (weight > zero), z, state.z_ref);\n", "",
+          DEPTH_TEST, "N47_depth_far"),
+    plant("depth_reference_of_the_last", BLEND,
+          "select((before >= L(S(1))) && (weight > zero), z, state.z_ref)",
+          "select(weight > zero, z, state.z_ref)",
+          DEPTH_TEST, "N45_depth_definitions", "N47_depth_far"),
+    plant("depth_of_the_centre", PROJECTION, "  if (camera.compat != Compat::none) return d;\n", "  return d;\n",
+          DEPTH_TEST, "N46_depth_tilted_disk", "N47_depth_far", why="wrong by decimetres on tilted disks"),
+    plant("depth_not_clamped", DEPTH, CLAMPED, "return L(d.z) + defined;",
+          DEPTH_TEST, "N46_depth_tilted_disk", why="flat disks run past their extent, and behind the camera"),
+    plant("depth_clamped_at_3_sigma", PROJECTION, "d.reach = sqrt(S(2 * kLn2) * p.s_max) *", "d.reach = S(3) *",
+          DEPTH_TEST, "N46_depth_tilted_disk"),
+    plant("depth_of_edge_on_divided", DEPTH, DELTA, "  const L defined = delta;\n",
+          "tests/hard_cases/test_determinant.cpp", "N06_det_flat_edge_on", why="0 / 0"),
+    plant("median_of_the_last", BLEND, CROSSES, "select(after <= half, z, state.median)",
+          DEPTH_TEST, "N45_depth_definitions"),
+    plant("median_before_the_crossing", BLEND, CROSSES, "select(before > half, z, state.median)",
+          DEPTH_TEST, "N48_depth_no_return", why="a pixel that stays half open has no median"),
+    plant("median_alone_from_the_centre", BLEND,
+          "state.median = select(crosses, ray_depth(*splat.depth, px, py), state.median);",
+          "state.median = select(crosses, L(splat.depth->z), state.median);",
+          DEPTH_TEST, "N70_depth_only_equals_rgbd"),
+    plant("median_alone_at_another_t", BLEND,
+          "const auto crosses = (before > half) && (after <= half);",
+          "const auto crosses = (before > half) && (after <= L(S(0.49)));",
+          DEPTH_TEST, "N70_depth_only_equals_rgbd"),
+    plant("first_hit_of_the_last", BLEND, FIRST, "select(after <= open, z, state.first_hit)",
+          DEPTH_TEST, "N45_depth_definitions"),
+    plant("first_hit_before_the_crossing", BLEND, FIRST, "select(before > open, z, state.first_hit)",
+          DEPTH_TEST, "N45_depth_definitions", "N48_depth_no_return"),
+    plant("expected_not_divided", BLEND,
+          "returned ? state.accumulated / alpha + state.z_ref : S(0)",
+          "returned ? fma(alpha, state.z_ref, state.accumulated) : S(0)",
+          DEPTH_TEST, "N45_depth_definitions", "N48_depth_no_return", why="drawn towards the camera by what is clear"),
+    plant("accumulated_without_reference", BLEND, "fma(alpha, state.z_ref, state.accumulated);",
+          "state.accumulated;", DEPTH_TEST, "N45_depth_definitions"),
+    plant("empty_pixel_divided", BLEND, RETURNED, "const bool returned = true;",
+          DEPTH_TEST, "N48_depth_no_return", why="0 / 0 where nothing is"),
+    plant("return_alpha_ignored", BLEND, RETURNED, "const bool returned = alpha > S(0);",
+          DEPTH_TEST, "N48_depth_no_return"),
+    plant("behind_ends_the_chunk", "include/gsnav/kernels/project_chunk.hpp",
+          "      if (!(z > args.camera.near_plane)) continue;\n",
+          "      if (!(z > args.camera.near_plane)) break;\n",
+          CUT_TEST, "N65_cull_invariance"),
+    plant("behind_ends_the_chunk_of_lanes", "include/gsnav/kernels/lanes/project_chunk.hpp",
+          "    if (!any(z > F(camera.near_plane))) continue;\n",
+          "    if (!any(z > F(camera.near_plane))) break;\n",
+          CUT_TEST, "N65_cull_invariance"),
+    plant("culled_by_the_centre", PROJECTION,
+          "(out.center_x + out.half_width >= half) &&", "(out.center_x >= half) &&",
+          "tests/hard_cases/test_footprint.cpp", "N11_tile_cover_conservative",
+          why="what reaches in from beyond the border is lost"),
+    plant("tiles_appended_by_thread", "include/gsnav/kernels/tiles.hpp",
+          "      for (std::size_t b = 0; b < args.blocks; ++b) {\n        std::uint64_t& c = args.cursors[b",
+          "      for (std::size_t b = args.blocks; b-- > 0;) {\n        std::uint64_t& c = args.cursors[b",
+          CUT_TEST, "N63_determinism_100 of work that is cut", why="whoever is first, as atomics do it"),
+]

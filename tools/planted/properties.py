@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every image has to have, whatever is in it."""
+from . import Edit, Plant, plant
+
+BLEND = "include/gsnav/kernels/blend.hpp"
+PROJECTION = "include/gsnav/kernels/projection.hpp"
+CHUNK = "include/gsnav/kernels/project_chunk.hpp"
+TEST = "tests/hard_cases/test_properties.cpp"
+
+PLANTS = [
+    plant("depth_with_an_epsilon", PROJECTION,
+          "const L inv_z = L(S(1)) / t.z;", "const L inv_z = L(S(1)) / (t.z + L(S(1e-7)));",
+          TEST, "property_scale_by_power_of_two", why="INRIA: a length that belongs to no scene"),
+    plant("pixel_by_its_corner", BLEND,
+          "    const S px = S(x) + S(0.5), py = S(y) + S(0.5);\n", "    const S px = S(x), py = S(y);\n",
+          TEST, "property_roll_by_90_degrees", "property_horizontal_mirror"),
+    plant("limits_for_every_response", PROJECTION,
+          "const L uj = ewa ? clamp(u, L(camera.u_min), L(camera.u_max)) : u;",
+          "const L uj = clamp(u, L(camera.u_min), L(camera.u_max));",
+          TEST, "property_split_screen", why="what is seen would hang on how large the image is"),
+    plant("more_opacity_is_less", BLEND, "  if (rules.exclusive_stop) {", "  if (rules.exclusive_stop || true) {",
+          TEST, "property_opacity_monotonicity"),
+    Plant("closed_pixel_goes_on",
+          (Edit(BLEND, "auto hit = state.transmittance >= L(rules.transmittance_min);",
+                "auto hit = state.transmittance >= L(S(0));"),
+           Edit(BLEND, "if (state.transmittance < args.rules.transmittance_min) break;", "")),
+          TEST, ("property_occluded_changes_nothing",)),
+    plant("sets_one_after_the_other", CHUNK, "args.keys[slot] = args.camera.key_code(key);",
+          "args.keys[slot] = (args.camera.key_code(key) >> 1) | (args.first_chunk == 0 ? 0u : 0x80000000u);",
+          TEST, "property_union_is_the_merged_list", why="Habitat-GS: bodies in front of or behind a whole scene"),
+    plant("depth_in_asset_units", PROJECTION, "d.z = axes.position.z * camera.scale;", "d.z = axes.position.z;",
+          TEST, "property_placement"),
+    plant("reach_in_asset_units", PROJECTION, "* norm(axes.factor.row[2]) * camera.scale;",
+          "* norm(axes.factor.row[2]);", TEST, "property_placement"),
+]
