@@ -4,6 +4,7 @@ from . import plant
 
 PROJECTION = "include/gsnav/kernels/projection.hpp"
 TILES = "include/gsnav/kernels/tiles.hpp"
+STRIPS = "include/gsnav/kernels/footprint.hpp"
 FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
 ORDER = "tests/hard_cases/test_order.cpp"
 KEYS = "tests/hard_cases/test_keys.cpp"
@@ -19,17 +20,30 @@ PLANTS = [
           "out.half_width = fma(radius * sqrt(L(S(0.5)) * (big_a + big_c)) * L(S(1.0 / kWhitenScale)), "
           "L(S(1.00001)), pad_x);",
           FOOTPRINT, "N11_tile_cover_conservative"),
-    plant("mean_radius_tiles", TILES,
-          "    const L s = min(fma(w2a, w2a, w1a * w1a), fma(w2b, w2b, w1b * w1b));\n",
-          "    const L rx = near_x - L(mean_x_), ry = near_y - L(mean_y_);\n"
-          "    const L s = (rx * rx + ry * ry) * a * b + L(S(0)) * (w1a + w2a + w1b + w2b);\n",
-          FOOTPRINT, "N11_tile_cover_conservative"),
-    plant("nearest_point_tiles", TILES,
-          "    const L best_y = clamp(fma(L(slope_y_), near_x, L(vertex_y_)), dy0, dy1);\n"
-          "    const L best_x = clamp(fma(L(slope_x_), near_y, L(vertex_x_)), dx0, dx1);\n",
-          "    const L best_y = near_y, best_x = near_x;\n",
+    plant("strip_edges_only", STRIPS,
+          "    const L y_right = select(negative_k_, at_k, against_k);\n"
+          "    const L y_left = select(negative_k_, against_k, at_k);\n",
+          "    const L y_right = select(negative_k_, high, low);\n"
+          "    const L y_left = select(negative_k_, low, high);\n",
           FOOTPRINT, "N11_tile_cover_conservative",
-          why="nearest by Euclid is not nearest by the ellipse"),
+          why="the widest point of an ellipse may lie inside the strip"),
+    plant("strip_turned_wrong", STRIPS,
+          "    const L y_right = select(negative_k_, at_k, against_k);\n",
+          "    const L y_right = select(negative_k_, against_k, at_k);\n",
+          FOOTPRINT, "N11_tile_cover_conservative"),
+    plant("strip_without_rounding", STRIPS,
+          "    const L r = fma(size, L(S(2e-6)), edge * L(S(1.000002)));\n",
+          "    const L r = edge + L(S(0)) * size;\n",
+          FOOTPRINT, "N11_tile_cover_conservative",
+          why="the pixel test rounds by the size of its terms"),
+    plant("cull_by_means", "include/gsnav/kernels/cull.hpp",
+          "    const double reach = f * b.scale_max * sqrt(1 + limit * limit);\n",
+          "    const double reach = 0 * f * b.scale_max * sqrt(1 + limit * limit);\n",
+          "tests/hard_cases/test_culling.cpp", "N65_cull_invariance of chunks in space",
+          why="a Gaussian beside the image reaches into it"),
+    plant("ties_in_sorted_order", "include/gsnav/ops/render.hpp",
+          "    heap_sort(order.data + i, end - i);\n", "",
+          "tests/hard_cases/test_culling.cpp", "N21_depth_ties_keep_file_order when rows are sorted in space"),
     plant("perspective_box_centred", PROJECTION,
           "  out.center_x = select(ellipse, center_x, zero);\n"
           "  out.center_y = select(ellipse, center_y, zero);\n",
@@ -67,7 +81,7 @@ PLANTS = [
           "                                                                            : chunk_keys[from + i];\n",
           ORDER, "N22_depth_tie_grid"),
     plant("last_tile_of_a_row_lost", TILES,
-          "tx1 = (b.x1 - 1) / ts, ty0", "tx1 = (b.x1 - 2) / ts, ty0",
+          "tx1 = (b.x1 - 1) >> shift", "tx1 = (b.x1 - 2) >> shift",
           FOOTPRINT, "N11_tile_cover_conservative"),
     plant("background_forgotten", "include/gsnav/kernels/blend.hpp",
           "    out.rgb[3 * pixel] = fma(t, args.background.x, state.r);",
