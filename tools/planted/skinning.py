@@ -64,6 +64,8 @@ PLANTS = [
     for (auto& m : matrices_) m = Affine3<double>{rotation_matrix(place.rotation), place.translation} * m;
 """,
           SKIN_TEST, "N55_lbs_rigid_far", why="float's step at 1000 m, and the weights' sum times 1000 m"),
+    plant("quaternion_of_a_matrix_by_the_trace", QUAT, "  if (trace > S(0)) {\n", "  if (trace > S(-2)) {\n",
+          "tests/math/test_quat.cpp", "rotations by 180 degrees survive the way through a matrix"),
     plant("nlerp", QUAT, "  if (c > S(0.9999999)) {\n", "  if (c > S(-2)) {\n",
           POSE_TEST, "N60_slerp_vs_lerp", why="the same path at another speed"),
     plant("slerp_the_long_way", QUAT, SHORT, "", POSE_TEST, "N60_slerp_vs_lerp"),
