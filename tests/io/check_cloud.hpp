@@ -3,7 +3,9 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -62,6 +64,13 @@ inline void check_consistent(const gsnav::LoadedCloud& loaded) {
              c.opacities[i] >= 0 && c.opacities[i] <= 1;
   }
   CHECK(finite);
+}
+
+/// Where the row that was read as number `row` lies after sort_spatially.
+inline std::size_t place_of(const gsnav::GaussianCloud& cloud, std::size_t row) {
+  const auto at = std::find(cloud.row_ids.begin(), cloud.row_ids.end(), static_cast<std::uint32_t>(row));
+  REQUIRE(at != cloud.row_ids.end());
+  return static_cast<std::size_t>(at - cloud.row_ids.begin());
 }
 
 }  // namespace gsnav_test

@@ -65,11 +65,12 @@ TEST_CASE("scene: a comma list merges siblings and sums their reports") {
   CHECK(contains(scene.report.warnings[0], (folder / "c.ply").string()));
   REQUIRE(scene.cloud.size() == 17);
   REQUIRE(scene.cloud.sh_degree == 3);
-  for (std::size_t i = 0; i < 6; ++i) check_gaussian(scene.cloud, 4 + i, b.rows[i], 45);
-  for (std::size_t i = 0; i < 4; ++i) CHECK(near(scene.cloud.mean(i).x, a.rows[i]["x"]));
+  for (std::size_t i = 0; i < 6; ++i) check_gaussian(scene.cloud, place_of(scene.cloud, 4 + i), b.rows[i], 45);
+  for (std::size_t i = 0; i < 4; ++i) CHECK(near(scene.cloud.mean(place_of(scene.cloud, i)).x, a.rows[i]["x"]));
   for (std::size_t i = 0; i < 7; ++i) {
-    CHECK(near(scene.cloud.mean(10 + i).z, c.rows[i]["z"]));
-    const float* rest = &scene.cloud.shN[45 * (10 + i)];
+    const std::size_t at = place_of(scene.cloud, 10 + i);
+    CHECK(near(scene.cloud.mean(at).z, c.rows[i]["z"]));
+    const float* rest = &scene.cloud.shN[45 * at];
     CHECK(rest[2 * 3 + 1] == static_cast<float>(c.rows[i]["f_rest_5"]));  // green of the third
     CHECK(rest[3 * 3] == 0.0f);                                           // bands it does not have
   }
@@ -85,8 +86,8 @@ TEST_CASE("scene: SOG folders as tiles") {
   const LoadedCloud scene = io::load_scene((folder / "2_0").string() + ",2_1").value();
   check_consistent(scene);
   REQUIRE(scene.cloud.size() == 26);
-  CHECK(near(scene.cloud.mean(3).x, first.mean(3, 0)));
-  CHECK(near(scene.cloud.mean(16).x, second.mean(3, 0)));
+  CHECK(near(scene.cloud.mean(place_of(scene.cloud, 3)).x, first.mean(3, 0)));
+  CHECK(near(scene.cloud.mean(place_of(scene.cloud, 16)).x, second.mean(3, 0)));
 }
 
 TEST_CASE("scene: what cannot be read") {

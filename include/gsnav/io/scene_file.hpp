@@ -14,7 +14,7 @@ namespace gsnav::io {
 /// A comma names sibling tiles, which are merged into one cloud: `scenes/flat/2_0,2_1` reads
 /// scenes/flat/2_0 and scenes/flat/2_1. Their reports are summed, their warnings carry the tile's path.
 ///
-/// Rows come sorted in space (scene/spatial_order.hpp); `row_ids` has their places in the file.
+/// Rows come sorted in space (scene/spatial_order.hpp); `row_ids` has their places as they were read.
 /// Errors: what the loaders of these formats return; unsupported (an extension that is not in the list, named
 /// with the list); invalid_argument (an empty name or a tile twice). Never throws.
 Result<LoadedCloud> load_scene(const std::string& spec);

@@ -54,8 +54,8 @@ struct GaussianView {
   /// column c of the factor M, Sigma = M M^T, asset frame, metres. They stand in for quats and scales,
   /// which may then be empty; empty where those hold.
   View<const float> axes[9];
-  /// Place of each Gaussian in its file, [N], where rows have been sorted in space: Gaussians of one depth
-  /// are blended in that order. Empty: row order.
+  /// Place of each Gaussian before rows were sorted in space, [N]: those of one depth are blended in that
+  /// order. Empty: row order.
   View<const std::uint32_t> row_ids;
   /// One a chunk of kProjectChunk rows, [ceil(N / kProjectChunk)]: chunks that cannot be seen are not
   /// touched. Empty: all are.

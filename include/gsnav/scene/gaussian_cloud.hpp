@@ -41,7 +41,7 @@ struct GaussianCloud {
   std::vector<std::uint32_t> origin_ids;     ///< [N], or empty while every origin is zero
   std::vector<Vec3d> origins;                ///< lattice points in use; empty with origin_ids
   // Filled by sort_spatially (scene/spatial_order.hpp); whoever moves, adds or scales rows clears them.
-  std::vector<std::uint32_t> row_ids;        ///< place of each row in the file, [N], or empty
+  std::vector<std::uint32_t> row_ids;        ///< place of each row as it was read, [N], or empty
   std::vector<ChunkBounds> chunk_bounds;     ///< [ceil(N / kProjectChunk)], or empty
 
   // How the asset was trained; copied into each GaussianSet made of the cloud.
