@@ -3,70 +3,36 @@
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_render
 //
-// Without the variables: the embedded flat from its four viewpoints.
+// Without the variables: the embedded flat from its four viewpoints. floor_ratio of rows on the processor is
+// the time over the least that its frames could take on this machine (floor.hpp).
 #include <benchmark/benchmark.h>
 
+#include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <map>
 #include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "error.hpp"
+#include "floor.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
-#include "gsnav/io/cameras_file.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/sim/default_scene.hpp"
+#include "workload.hpp"
 
 using namespace gsnav;
+using gsnav_bench::sized;
+using gsnav_bench::workload;
 
 namespace {
 
 /// At most this many views have their float64 reference rendered.
 constexpr std::size_t kReferenceViews = 4;
-
-struct Workload {
-  GaussianCloud cloud;
-  std::vector<Camera> cameras;  // at some size; `sized` gives the others
-};
-
-const Workload& workload() {
-  static const Workload w = [] {
-    Workload made;
-    const char* scene = std::getenv("GSNAV_BENCH_SCENE");
-    const char* cameras = std::getenv("GSNAV_BENCH_CAMERAS");
-    if (scene != nullptr && cameras != nullptr) {
-      made.cloud = io::load_scene(scene).value().cloud;
-      made.cameras = io::load_cameras(cameras).value();
-    } else {
-      made.cloud = make_default_scene().value().cloud;
-      for (const DefaultView& v : default_scene_views()) {
-        made.cameras.push_back(Camera::look_at(v.eye, v.target, {0, 1, 0}, 256, 256, 90));
-      }
-    }
-    return made;
-  }();
-  return w;
-}
-
-std::vector<Camera> sized(int width, int height) {
-  std::vector<Camera> cameras = workload().cameras;
-  for (Camera& c : cameras) {
-    const double scale = static_cast<double>(width) / c.width;
-    c.fx *= scale;
-    c.fy *= scale;
-    c.width = width;
-    c.height = height;
-    c.cx = 0.5 * width;
-    c.cy = 0.5 * height;
-  }
-  return cameras;
-}
 
 const Frames<double>& reference(int width, int height) {
   static std::map<std::pair<int, int>, Frames<double>> cache;
@@ -82,9 +48,22 @@ const Frames<double>& reference(int width, int height) {
   return entry;
 }
 
+/// Work of every view, counted once a size and kind of output: the floor does not depend on the profile.
+const std::vector<gsnav_bench::FrameWork>& work_of_views(const RenderConfig& config, int width, int height) {
+  static std::map<std::tuple<int, int, bool>, std::vector<gsnav_bench::FrameWork>> cache;
+  const auto [entry, added] = cache.try_emplace({width, height, (config.outputs & kRgb) != 0});
+  if (added) {
+    for (const Camera& camera : sized(width, height)) {
+      entry->second.push_back(gsnav_bench::count_work(workload().cloud, camera, config));
+    }
+  }
+  return entry->second;
+}
+
+/// `threads`: of the processor; 0 for a row that is not the processor's, which has no floor here.
 template <class B>
 void render_frames(benchmark::State& state, B& backend, const RenderConfig& config, int width,
-                   int height) {
+                   int height, int threads) {
   const std::vector<Camera> cameras = sized(width, height);
   const GaussianArrays<B> arrays(backend, workload().cloud);
   const std::vector<GaussianSet> sets{arrays.set()};
@@ -96,12 +75,14 @@ void render_frames(benchmark::State& state, B& backend, const RenderConfig& conf
     renderer.render(sets, std::span(&cameras[c % cameras.size()], 1), frames).throw_if_error();
   };
   for (std::size_t c = 0; c < cameras.size(); ++c) draw(c);  // buffers reach their size
+  const auto begin = std::chrono::steady_clock::now();
   for (auto _ : state) {
     draw(next++);
     visible += static_cast<double>(frames.stats[0].visible);
     pairs += static_cast<double>(frames.stats[0].tile_intersections);
     ++count;
   }
+  const std::chrono::duration<double, std::milli> drawn = std::chrono::steady_clock::now() - begin;
   const Frames<double>& truth = reference(width, height);
   const std::span<const Camera> compared(cameras.data(), truth.cameras);
   const Frames<float> f = renderer.render(sets, compared).value();
@@ -121,6 +102,13 @@ void render_frames(benchmark::State& state, B& backend, const RenderConfig& conf
       }
     }
     state.counters["depth_p99_m"] = gsnav_bench::error_of(depth, depth_truth).p99;
+  }
+  if (threads > 0) {
+    const auto& work = work_of_views(config, width, height);
+    const gsnav_bench::UnitCosts costs = gsnav_bench::floor_costs(threads);
+    double floor = 0;  // of all frames timed
+    for (std::size_t i = 0; i < next; ++i) floor += gsnav_bench::floor_ms(work[i % work.size()], costs);
+    state.counters["floor_ratio"] = drawn.count() / floor;
   }
   state.counters["visible"] = visible / count;
   state.counters["pairs"] = pairs / count;
@@ -150,7 +138,7 @@ void register_all() {
             ("openmp" + std::to_string(threads) + "/" + suffix).c_str(),
             [=, w = width, h = height](benchmark::State& state) {
               OpenMPBackend backend(threads);
-              render_frames(state, backend, config, w, h);
+              render_frames(state, backend, config, w, h, threads);
             })
             ->Unit(benchmark::kMillisecond)
             ->UseRealTime();
@@ -160,7 +148,7 @@ void register_all() {
         benchmark::RegisterBenchmark(("cuda/" + suffix).c_str(),
                                      [=, w = width, h = height](benchmark::State& state) {
                                        CudaBackend backend;
-                                       render_frames(state, backend, config, w, h);
+                                       render_frames(state, backend, config, w, h, 0);
                                      })
             ->Unit(benchmark::kMillisecond)
             ->UseRealTime();
@@ -170,7 +158,7 @@ void register_all() {
         benchmark::RegisterBenchmark(("serial/" + suffix).c_str(),
                                      [=, w = width, h = height](benchmark::State& state) {
                                        SerialBackend backend;
-                                       render_frames(state, backend, config, w, h);
+                                       render_frames(state, backend, config, w, h, 1);
                                      })
             ->Unit(benchmark::kMillisecond)
             ->UseRealTime();

@@ -22,8 +22,8 @@ Camera footprint_camera() {
   return c;
 }
 
-/// 1: alpha is above the threshold beyond rounding; 0: below it; -1: within 1e-4 of it, or within 1e-3 of the
-/// line where an exact response goes behind the camera.
+/// 1: alpha is above the threshold beyond rounding; 0: below it; -1: within 1e-4 of it, or of the line where
+/// an exact response goes behind the camera.
 template <class Truth>
 std::vector<int> covered_pixels(const Truth& truth, Real opacity) {
   std::vector<int> covered(kWidth * kHeight, 0);

@@ -136,7 +136,7 @@ class TruthRay {
   bool at_horizon(Real px, Real py) const {
     const Real r[3] = {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1};
     const Real c[3] = {splat_.mean[0] / splat_.mean[2], splat_.mean[1] / splat_.mean[2], 1};
-    return std::abs(form(r, c)) < 1e-3L * form(c, c);
+    return std::abs(form(r, c)) < 1e-4L * form(c, c);
   }
   /// `depth`: where given, z of that point.
   Real alpha(Real px, Real py, Real* depth = nullptr) const {

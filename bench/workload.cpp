@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "workload.hpp"
+
+#include <cstdlib>
+
+#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/sim/default_scene.hpp"
+
+using namespace gsnav;
+
+namespace gsnav_bench {
+
+const Workload& workload() {
+  static const Workload w = [] {
+    Workload made;
+    const char* scene = std::getenv("GSNAV_BENCH_SCENE");
+    const char* cameras = std::getenv("GSNAV_BENCH_CAMERAS");
+    if (scene != nullptr && cameras != nullptr) {
+      made.cloud = io::load_scene(scene).value().cloud;
+      made.cameras = io::load_cameras(cameras).value();
+    } else {
+      made.cloud = make_default_scene().value().cloud;
+      for (const DefaultView& v : default_scene_views()) {
+        made.cameras.push_back(Camera::look_at(v.eye, v.target, {0, 1, 0}, 256, 256, 90));
+      }
+    }
+    return made;
+  }();
+  return w;
+}
+
+std::vector<Camera> sized(int width, int height) {
+  std::vector<Camera> cameras = workload().cameras;
+  for (Camera& c : cameras) {
+    const double scale = static_cast<double>(width) / c.width;
+    c.fx *= scale;
+    c.fy *= scale;
+    c.width = width;
+    c.height = height;
+    c.cx = 0.5 * width;
+    c.cy = 0.5 * height;
+  }
+  return cameras;
+}
+
+}  // namespace gsnav_bench
