@@ -2,11 +2,13 @@
 // Kernels of agents among people: capsule distance, time of impact.
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "gsnav/kernels/capsule.hpp"
 #include "gsnav/ops/sweep.hpp"
 #include "kernel_bench.hpp"
+#include "native_lanes.hpp"
 
 using namespace gsnav;
 
@@ -44,6 +46,56 @@ std::vector<MovingCapsule<S>> converted(const std::vector<MovingCapsule<double>>
   for (const auto& m : capsules) out.push_back({convert(m.begin), convert(m.end)});
   return out;
 }
+
+/// The pairs in float, by planes.
+struct PairPlanes {
+  std::vector<float> values;
+  const float* planes[kCapsulePlanes];
+
+  explicit PairPlanes(const CapsulePairs& pairs) : values(kCapsulePlanes * kPairs) {
+    for (std::size_t k = 0; k < kCapsulePlanes; ++k) planes[k] = values.data() + k * kPairs;
+    for (std::size_t i = 0; i < kPairs; ++i) {
+      const MovingCapsule<double>&a = pairs.agents[i], &b = pairs.bodies[i];
+      std::size_t k = 0;
+      const auto put = [&](double v) { values[k++ * kPairs + i] = static_cast<float>(v); };
+      for (const Capsule<double>* c : {&a.begin, &a.end, &b.begin, &b.end}) {
+        for (const Vec3d* p : {&c->p0, &c->p1}) {
+          put(p->x);
+          put(p->y);
+          put(p->z);
+        }
+        put(c->radius);
+      }
+    }
+  }
+};
+
+/// Distance or time of impact in lanes; counts the pairs whose bits are not those of one pair alone.
+struct LanesBody {
+  bool moving;
+  template <class S, class B>
+  void operator()(benchmark::State& state, B& backend) const {
+    const CapsulePairs pairs;
+    const PairPlanes input(pairs);
+    std::vector<float> out(kPairs);
+    constexpr std::size_t kPiece = 128;
+    for (auto _ : state) {
+      backend.parallel_for(kPairs / kPiece, [&](std::size_t p) {
+        const auto kernel = moving ? native_sweep : native_gap;
+        kernel(input.planes, out.data(), p * kPiece, (p + 1) * kPiece);
+      });
+      benchmark::ClobberMemory();
+    }
+    count(state, kPairs);
+    const auto a = converted<float>(pairs.agents), b = converted<float>(pairs.bodies);
+    double differ = 0;
+    for (std::size_t i = 0; i < kPairs; ++i) {
+      const float one = moving ? sweep(a[i], b[i], SweepRules<float>{}).time : capsule_gap(a[i].begin, b[i].begin).gap;
+      differ += bits_of(out[i]) != bits_of(one) ? 1 : 0;
+    }
+    state.counters["lanes_differ"] = differ;
+  }
+};
 
 struct DistanceBody {
   template <class S, class B>
@@ -127,8 +179,11 @@ struct CrowdBody {
 }  // namespace
 
 void register_capsule_kernels() {
+  const std::string lanes = "float x" + std::to_string(native_width());
   add_cpu_rows("capsule_distance", "", DistanceBody{});
+  add_openmp_rows("capsule_distance", "", lanes, LanesBody{false});
   add_cpu_rows("capsule_sweep", "", SweepBody{});
+  add_openmp_rows("capsule_sweep", "", lanes, LanesBody{true});
   add_cpu_rows("first_impact", "people:10", CrowdBody{10});
 }
 
