@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // NavMesh queries beside Detour's on the same mesh: random connected pairs of one island.
+#include <DetourNavMeshQuery.h>
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -22,6 +23,7 @@ struct Scene {
   std::vector<NavPoint> points;
   std::vector<Vec3d> positions;
   std::unique_ptr<GeodesicField> field;
+  std::unique_ptr<dtNavMeshQuery, void (*)(dtNavMeshQuery*)> detour{dtAllocNavMeshQuery(), dtFreeNavMeshQuery};
 
   explicit Scene(NavMesh m) : mesh(std::make_unique<NavMesh>(std::move(m))) {
     Rng rng(1);
@@ -29,6 +31,8 @@ struct Scene {
       points.push_back(mesh->random_point(rng, 0));
       positions.push_back(points.back().position);
     }
+    constexpr int kNodes = 65535;
+    detour->init(mesh->impl().mesh.get(), kNodes);
     field = std::make_unique<GeodesicField>(GeodesicField::make(*mesh, std::span(positions).first(1)).value());
   }
 };
@@ -99,8 +103,7 @@ void pairs(benchmark::State& state, const Scene* (*make)(), F&& f) {
 
 void detour(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
-    const NavMesh::Impl::Lease query(s.mesh->impl());
-    return detour_geodesic(s.mesh->impl(), *query.operator->(), s.positions[a], s.positions[b]);
+    return detour_geodesic(s.mesh->impl(), *s.detour, s.positions[a], s.positions[b]);
   });
 }
 void geodesic(benchmark::State& state, const Scene* (*make)()) {
@@ -133,6 +136,23 @@ void random_point(benchmark::State& state, const Scene* (*make)()) {
 void snap(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make, [](const Scene& s, std::size_t a, std::size_t) { return s.mesh->snap_point(s.positions[a])->poly; });
 }
+void detour_snap(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t) {
+    const Vec3d p = s.positions[a] - s.mesh->impl().origin;
+    const float center[3] = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+    const float extents[3] = {2, 4, 2};
+    const dtQueryFilter filter;
+    dtPolyRef ref = 0;
+    float at[3];
+    s.detour->findNearestPoly(center, extents, &filter, &ref, at);
+    return ref;
+  });
+}
+void obstacle(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t) {
+    return s.mesh->distance_to_closest_obstacle(s.positions[a]);
+  });
+}
 
 #define GSNAV_NAV_BENCH(name)                  \
   BENCHMARK_CAPTURE(name, flat, flat);         \
@@ -146,6 +166,8 @@ GSNAV_NAV_BENCH(field_lookup);
 GSNAV_NAV_BENCH(field_of_a_goal);
 GSNAV_NAV_BENCH(random_point);
 GSNAV_NAV_BENCH(snap);
+GSNAV_NAV_BENCH(detour_snap);
+GSNAV_NAV_BENCH(obstacle);
 
 }  // namespace
 

@@ -1,39 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/nav/navmesh.hpp"
 
-#include <algorithm>
-
 #include "navmesh_impl.hpp"
 
 namespace gsnav {
-namespace {
-
-struct Float3 {
-  float v[3];
-  explicit Float3(const Vec3d& p) noexcept
-      : v{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)} {}
-};
-
-}  // namespace
-
-NavMesh::Impl::Lease::Lease(const Impl& impl) : impl_(impl) {
-  {
-    const std::lock_guard lock(impl_.mutex_);
-    if (!impl_.idle_.empty()) {
-      query_ = std::move(impl_.idle_.back());
-      impl_.idle_.pop_back();
-      return;
-    }
-  }
-  query_.reset(dtAllocNavMeshQuery());
-  if (query_ != nullptr && dtStatusFailed(query_->init(impl_.mesh.get(), impl_.node_pool))) query_.reset();
-}
-
-NavMesh::Impl::Lease::~Lease() {
-  if (query_ == nullptr) return;
-  const std::lock_guard lock(impl_.mutex_);
-  impl_.idle_.push_back(std::move(query_));
-}
 
 NavMesh::NavMesh(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
 NavMesh::NavMesh(NavMesh&&) noexcept = default;
@@ -64,30 +34,16 @@ double NavMesh::island_radius(std::size_t island) const noexcept {
 
 std::optional<NavPoint> NavMesh::snap_point(const Vec3d& p, const SnapOptions& options) const {
   if (!is_finite(p) || !is_finite(options.half_extents)) return {};
-  const Impl::Lease query(*impl_);
-  if (!query) return {};
-  const Vec3d local = p - impl_->origin;
-  const Float3 center(local), extents(options.half_extents);
-  const dtQueryFilter filter;
-  dtPolyRef ref = 0;
-  float nearest[3];
-  if (dtStatusFailed(query->findNearestPoly(center.v, extents.v, &filter, &ref, nearest)) || ref == 0) {
-    return {};
-  }
-  // Detour chose the polygon; the point on it is found again in double.
-  const PolyId id = impl_->id_of(ref);
-  Vec3d q = impl_->polys.clamped(id, local);
-  q.y = impl_->polys.height(id, q);
-  return NavPoint{q + impl_->origin, id};
+  const detail::PolyMesh& m = impl_->polys;
+  NavPoint at = m.grid.nearest(m, p - impl_->origin, options.half_extents, impl_->settings.agent_max_climb);
+  if (at.poly == kNoPoly) return {};
+  at.position += impl_->origin;
+  return at;
 }
 
 bool NavMesh::is_navigable(const Vec3d& p, double max_height_delta) const {
-  constexpr double kBeside = 1e-3;
-  // Detour's surface lies up to a cell height above this one.
-  const auto s = snap_point(p, {{kBeside, max_height_delta + 2 * impl_->settings.cell_height, kBeside}});
-  if (!s) return false;
-  const double dx = s->position.x - p.x, dz = s->position.z - p.z;
-  return dx * dx + dz * dz <= 1e-8 && std::abs(s->position.y - p.y) <= max_height_delta;
+  constexpr double kBeside = 1e-4;
+  return snap_point(p, {{kBeside, max_height_delta, kBeside}}).has_value();
 }
 
 double NavMesh::height_at(PolyId poly, const Vec3d& p) const noexcept {

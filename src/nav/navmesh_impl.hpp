@@ -2,12 +2,10 @@
 #pragma once
 
 #include <DetourNavMesh.h>
-#include <DetourNavMeshQuery.h>
 #include <Recast.h>
 
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -21,10 +19,8 @@ namespace detail {
 
 struct DetourDeleter {
   void operator()(dtNavMesh* p) const noexcept { dtFreeNavMesh(p); }
-  void operator()(dtNavMeshQuery* p) const noexcept { dtFreeNavMeshQuery(p); }
 };
 using NavMeshPtr = std::unique_ptr<dtNavMesh, DetourDeleter>;
-using QueryPtr = std::unique_ptr<dtNavMeshQuery, DetourDeleter>;
 
 struct RecastDeleter {
   void operator()(rcHeightfield* p) const noexcept { rcFreeHeightField(p); }
@@ -92,22 +88,6 @@ struct NavMesh::Impl {
   Aabb<double> bounds;  ///< world
   std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon
   std::vector<PolyId> first_poly;   ///< of each of Detour's tiles
-  int node_pool = 0;
-
-  /// A query object for as long as a call lasts: Detour's searches write to it.
-  class Lease {
-   public:
-    explicit Lease(const Impl& impl);
-    ~Lease();
-    Lease(const Lease&) = delete;
-    Lease& operator=(const Lease&) = delete;
-    dtNavMeshQuery* operator->() const noexcept { return query_.get(); }
-    explicit operator bool() const noexcept { return query_ != nullptr; }
-
-   private:
-    const Impl& impl_;
-    detail::QueryPtr query_;
-  };
 
   detail::Site site(const NavPoint& p) const noexcept;
 
@@ -115,10 +95,6 @@ struct NavMesh::Impl {
   PolyId id_of(dtPolyRef ref) const noexcept {
     return first_poly[mesh->decodePolyIdTile(ref)] + mesh->decodePolyIdPoly(ref);
   }
-
- private:
-  mutable std::mutex mutex_;
-  mutable std::vector<detail::QueryPtr> idle_;
 };
 
 }  // namespace gsnav

@@ -62,6 +62,15 @@ Result<NavPath> NavMesh::path_between(const NavPoint& start, const NavPoint& goa
   return path;
 }
 
+PathStatus NavMesh::path_status(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const noexcept {
+  if (!is_finite(start) || !is_finite(goal)) return PathStatus::not_finite;
+  const auto a = snap_point(start, options);
+  if (!a) return PathStatus::start_off_mesh;
+  const auto b = snap_point(goal, options);
+  if (!b) return PathStatus::goal_off_mesh;
+  return island_of(a->poly) == island_of(b->poly) ? PathStatus::reachable : PathStatus::other_island;
+}
+
 Result<NavPath> NavMesh::find_path(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const {
   const auto a = snap_point(start, options);
   if (!a) return off_mesh("start", start);

@@ -151,9 +151,6 @@ NavMesh assemble_navmesh(const NavMeshSettings& settings, const Vec3d& origin, N
   for (const auto& t : impl->polys.tris) {
     for (const Vec3d& p : t) impl->bounds.add(p + origin);
   }
-  // One search node a polygon is all that a search for the nearest wall can open; Detour numbers them in
-  // 16 bits.
-  impl->node_pool = static_cast<int>(min<std::size_t>(65535, 2 * impl->polys.polys.size() + 64));
   return NavMesh(std::move(impl));
 }
 

@@ -138,6 +138,7 @@ void PolyMesh::finish() {
     island.radius = std::sqrt(r2);
   }
   prepare_sampling();
+  grid.build(*this);
 }
 
 void PolyMesh::prepare_sampling() {

@@ -7,6 +7,7 @@
 
 #include "alias_table.hpp"
 #include "gsnav/nav/navmesh.hpp"
+#include "poly_grid.hpp"
 
 namespace gsnav::detail {
 
@@ -35,6 +36,7 @@ struct PolyMesh {
   std::vector<std::array<std::uint32_t, 2>> pieces;  ///< polygon and middle corner of fan triangles
   AliasTable by_area;                                ///< of `pieces`
   std::vector<AliasTable> by_area_in;                ///< the same, by island
+  PolyGrid grid;
 
   /// Fills everything that follows from polys, corners, neighbours and tris.
   void finish();

@@ -38,6 +38,18 @@ struct Soup {
   }
 };
 
+/// A square floor from the origin with boxes of random place and size on it.
+inline Soup random_boxes(std::uint64_t seed, int count, double side) {
+  Soup soup;
+  soup.floor(0, 0, side, side);
+  gsnav::Rng rng(seed);
+  for (int i = 0; i < count; ++i) {
+    const double x = rng.uniform(0.5, side - 2), z = rng.uniform(0.5, side - 2);
+    soup.box(x, z, x + rng.uniform(0.1, 2.5), z + rng.uniform(0.1, 1.5), 0, 2);
+  }
+  return soup;
+}
+
 /// Positions and faces of a Wavefront OBJ file (positive indices); empty where it cannot be read.
 inline Soup read_obj(const std::string& path) {
   Soup soup;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "detour.hpp"
 #include "geodesic_oracle.hpp"
 #include "gsnav/nav/geodesic_field.hpp"
 #include "gsnav/nav/navmesh.hpp"
@@ -14,6 +15,10 @@
 
 using namespace gsnav;
 using gsnav_test::check_metric;
+using gsnav_test::detour_position;
+using gsnav_test::detour_query;
+using gsnav_test::DetourQuery;
+using gsnav_test::random_boxes;
 using gsnav_test::Soup;
 
 namespace {
@@ -27,17 +32,6 @@ NavMesh build(const Soup& soup, double cell = 0.1) {
   return NavMesh::build(s, soup.vertices, soup.triangles).value();
 }
 
-Soup boxes(std::uint64_t seed, int count, double side) {
-  Soup soup;
-  soup.floor(0, 0, side, side);
-  Rng rng(seed);
-  for (int i = 0; i < count; ++i) {
-    const double x = rng.uniform(0.5, side - 2), z = rng.uniform(0.5, side - 2);
-    soup.box(x, z, x + rng.uniform(0.1, 2.5), z + rng.uniform(0.1, 1.5), 0, 2);
-  }
-  return soup;
-}
-
 double sum_of(const std::vector<Vec3d>& points) {
   double sum = 0;
   for (std::size_t i = 1; i < points.size(); ++i) sum += norm(points[i] - points[i - 1]);
@@ -45,14 +39,9 @@ double sum_of(const std::vector<Vec3d>& points) {
 }
 
 /// Detour's path, each leg laid on the surface; infinity where a leg does not stay on it.
-double detour_length(const NavMesh& mesh, const NavPoint& a, const NavPoint& b) {
+double detour_length(const NavMesh& mesh, const dtNavMeshQuery* query, const NavPoint& a, const NavPoint& b) {
   const NavMesh::Impl& impl = mesh.impl();
-  const NavMesh::Impl::Lease query(impl);
-  const auto f = [&](const Vec3d& p) {
-    const Vec3d q = p - impl.origin;
-    return std::array<float, 3>{static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
-  };
-  const auto from = f(a.position), to = f(b.position);
+  const auto from = detour_position(mesh, a.position), to = detour_position(mesh, b.position);
   const dtQueryFilter filter;
   std::vector<dtPolyRef> refs(mesh.polygon_count() + 2);
   int count = 0, corners = 0;
@@ -79,12 +68,13 @@ double detour_length(const NavMesh& mesh, const NavPoint& a, const NavPoint& b) 
 
 /// Never longer than Detour's; its mean excess is reported.
 void check_against_detour(const NavMesh& mesh, int pairs, double tolerance) {
+  const DetourQuery query = detour_query(mesh);
   Rng rng(5);
   double worst = -kInfinity, ours = 0, theirs = 0;
   int compared = 0;
   for (int i = 0; i < pairs; ++i) {
     const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
-    const double detour = detour_length(mesh, a, b);
+    const double detour = detour_length(mesh, query.get(), a, b);
     if (!(detour < kInfinity)) continue;
     const double d = mesh.distance_between(a, b);
     worst = max(worst, (d - kFloatCorners) / detour - 1);
@@ -114,7 +104,7 @@ TEST_CASE("geodesic: equals brute force on the visibility graph of random floors
   double worst = 0;
   std::size_t corners = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const NavMesh mesh = build(boxes(seed, 6 + 2 * static_cast<int>(seed), 12));
+    const NavMesh mesh = build(random_boxes(seed, 6 + 2 * static_cast<int>(seed), 12));
     const gsnav_test::VisibilityGraph graph(mesh);
     corners += graph.corner_count();
     Rng rng(seed);
@@ -180,8 +170,8 @@ TEST_CASE("geodesic: one floor above another is a floor of its own") {
 }
 
 TEST_CASE("geodesic: symmetric, and no detour is shorter") {
-  check_metric(build(boxes(3, 30, 20)), 20000);
-  check_against_detour(build(boxes(3, 30, 20)), 1000, 1e-6);
+  check_metric(build(random_boxes(3, 30, 20)), 20000);
+  check_against_detour(build(random_boxes(3, 30, 20)), 1000, 1e-6);
   for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/dungeon.obj"}) {
     if (gsnav_test::data_file(file).empty()) continue;
     const NavMesh mesh = demo(file);
@@ -194,6 +184,7 @@ TEST_CASE("geodesic: RecastDemo's file of paths") {
   const std::string file = gsnav_test::data_file("nav/recast/nav_mesh_test.txt");
   if (file.empty()) return;
   const NavMesh mesh = demo("nav/recast/nav_test.obj");
+  const DetourQuery query = detour_query(mesh);
   std::ifstream in(file);
   int paths = 0;
   for (std::string line; std::getline(in, line);) {
@@ -206,7 +197,7 @@ TEST_CASE("geodesic: RecastDemo's file of paths") {
     REQUIRE(there->length == doctest::Approx(back->length).epsilon(1e-7));
     const NavPoint from = *mesh.snap_point(a), to = *mesh.snap_point(b);
     REQUIRE(there->length >= norm(to.position - from.position) - 1e-6);
-    REQUIRE(there->length <= detour_length(mesh, from, to) * (1 + 1e-4));
+    REQUIRE(there->length <= detour_length(mesh, query.get(), from, to) * (1 + 1e-4));
     ++paths;
   }
   CHECK(paths >= 18);
@@ -231,7 +222,7 @@ TEST_CASE("geodesic: thousands of polygons are no limit") {
 }
 
 TEST_CASE("geodesic: many goals, and fields of distance") {
-  const NavMesh mesh = build(boxes(9, 30, 16));
+  const NavMesh mesh = build(random_boxes(9, 30, 16));
   Rng rng(1);
   for (int round = 0; round < 5; ++round) {
     std::vector<Vec3d> goals;

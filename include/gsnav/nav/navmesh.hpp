@@ -28,7 +28,8 @@ struct NavPoint {
   PolyId poly = kNoPoly;
 };
 
-/// How far a point may lie from the surface to be snapped to it: half extents of a box, metres.
+/// How far a point may lie from the surface to be snapped to it: half extents of a box, metres. The defaults are
+/// Habitat's, and generous: two metres beside the mesh or four above it still snap.
 struct SnapOptions {
   Vec3d half_extents{2.0, 4.0, 2.0};
 };
@@ -55,6 +56,15 @@ struct TopDownMap {
 struct NavPath {
   std::vector<Vec3d> points;
   double length = 0.0;
+};
+
+/// Whether there is a path, and why not where there is none.
+enum class PathStatus : std::uint8_t {
+  reachable,
+  not_finite,      ///< a coordinate is NaN or infinite
+  start_off_mesh,  ///< the start is farther from the surface than snapping allows
+  goal_off_mesh,   ///< the goal is
+  other_island,    ///< both are on the surface, on pieces of it that do not touch
 };
 
 /// The shortest of the paths to several goals.
@@ -113,7 +123,9 @@ class NavMesh {
   double island_radius(std::size_t island) const noexcept;
 
   // ---- points
-  /// Nearest point of the surface within the extents; none for NaN or infinite input.
+  /// Nearest point of the surface within the extents; none for NaN or infinite input. Each polygon offers its
+  /// point nearest on the ground plane; surface straight above or below p by no more than the agent's climb
+  /// counts as at p, and of several such the nearest in height is taken.
   std::optional<NavPoint> snap_point(const Vec3d& p, const SnapOptions& options = {}) const;
   /// True where p lies above or below the surface by at most `max_height_delta` metres.
   bool is_navigable(const Vec3d& p, double max_height_delta = 0.5) const;
@@ -140,8 +152,10 @@ class NavMesh {
   // ---- paths: the shortest on the surface, exactly (Polyanya, unfolded over slopes), so that distances
   // are symmetric and obey the triangle inequality. The surface is that of the height triangles; a polygon
   // that is level to a millimetre counts as flat.
+  /// Whether find_path finds a path: every search ends, so this needs none.
+  PathStatus path_status(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const noexcept;
   /// The shortest path between two points, after snapping. Errors (nothing_navigable) say why there is
-  /// none: a point off the mesh, or different islands.
+  /// none, as path_status does: a point off the mesh, or different islands.
   Result<NavPath> find_path(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const;
   /// Length of find_path, infinity where there is none.
   double geodesic_distance(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const;

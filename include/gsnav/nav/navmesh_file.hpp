@@ -28,4 +28,8 @@ Result<NavMesh> parse_navmesh(std::span<const std::byte> bytes, const std::strin
 /// Errors: file_not_found where the file cannot be made or written.
 Status save_navmesh(const NavMesh& mesh, const std::filesystem::path& path);
 
+/// Writes the surface as a Wavefront OBJ for viewers: world coordinates, one group an island ("g island_0").
+/// Errors: file_not_found where the file cannot be made or written.
+Status save_navmesh_obj(const NavMesh& mesh, const std::filesystem::path& path);
+
 }  // namespace gsnav

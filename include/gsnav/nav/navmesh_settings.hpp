@@ -32,6 +32,9 @@ struct NavMeshSettings {
 
   /// invalid_argument, naming the field, where a value is impossible.
   Status validate() const;
+
+  /// Equal in every field.
+  friend bool operator==(const NavMeshSettings&, const NavMeshSettings&) = default;
 };
 
 }  // namespace gsnav

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/nav/navmesh_levels.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace gsnav {
+namespace {
+
+constexpr double kLevel = 0.984807753012208;  // cosine of 10 degrees
+constexpr double kLeastArea = 1e-6;           // square metres: below it is rounding
+
+struct Piece {
+  double height = 0, area = 0;
+};
+
+}  // namespace
+
+std::vector<NavLevel> find_levels(const NavMesh& mesh, const LevelOptions& options) {
+  std::vector<Piece> pieces;
+  for (const std::array<Vec3d, 3>& t : mesh.triangles()) {
+    const Vec3d n = cross(t[1] - t[0], t[2] - t[0]);
+    const double twice = norm(n);
+    if (twice > 0 && std::abs(n.y) >= kLevel * twice) {
+      pieces.push_back({(t[0].y + t[1].y + t[2].y) / 3.0, 0.5 * twice});
+    }
+  }
+  std::sort(pieces.begin(), pieces.end(),
+            [](const Piece& a, const Piece& b) { return a.height < b.height; });
+  std::vector<NavLevel> levels;
+  for (;;) {
+    // The window of two bands that holds the most area.
+    NavLevel best;
+    double area = 0, moment = 0;
+    for (std::size_t low = 0, high = 0; low < pieces.size(); ++low) {
+      for (; high < pieces.size() && pieces[high].height <= pieces[low].height + 2 * options.band;
+           ++high) {
+        area += pieces[high].area;
+        moment += pieces[high].area * pieces[high].height;
+      }
+      if (area > best.area) best = {moment / area, area};
+      area -= pieces[low].area;
+      moment -= pieces[low].area * pieces[low].height;
+    }
+    if (!(best.area >= max(options.min_area, kLeastArea))) break;
+    levels.push_back(best);
+    std::erase_if(pieces, [&](const Piece& p) {
+      const double off = std::abs(p.height - best.height);
+      return off < options.min_gap || off <= options.band;
+    });
+  }
+  std::sort(levels.begin(), levels.end(),
+            [](const NavLevel& a, const NavLevel& b) { return a.height < b.height; });
+  return levels;
+}
+
+std::optional<std::size_t> level_at(std::span<const NavLevel> levels, double y,
+                                    double tolerance) noexcept {
+  if (levels.empty() || std::isnan(y)) return {};
+  std::size_t at = 0;
+  while (at + 1 < levels.size() && levels[at + 1].height <= y + tolerance) ++at;
+  return at;
+}
+
+}  // namespace gsnav
