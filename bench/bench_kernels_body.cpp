@@ -106,6 +106,16 @@ struct SkinBody {
       double& w = worst[k < 3 ? 0 : 1];
       w = std::max(w, error_of(skinning.plane(k), truth.plane(k)).max);
     }
+    if constexpr (std::is_same_v<S, float>) {  // against the scalar form: values whose bits are not its
+      Skinning<float, float, SerialBackend> scalar(serial, cloud);
+      scalar.run();
+      double differ = 0;
+      for (std::size_t k = 0; k < 7; ++k) {
+        const std::vector<float> a = skinning.plane(k), b = scalar.plane(k);
+        for (std::size_t i = 0; i < a.size(); ++i) differ += bits_of(a[i]) != bits_of(b[i]) ? 1 : 0;
+      }
+      state.counters["bits_differ"] = differ;
+    }
     state.counters["mean_max_m"] = worst[0];
     state.counters["quat_max"] = worst[1];
     constexpr std::size_t kBytes = 7 * sizeof(float) * 2 + 4 * (sizeof(float) + sizeof(std::uint16_t));
