@@ -157,13 +157,18 @@ StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& desir
     } else {
       out.path.back().poly = walk.points[0].poly;
     }
+    bool back = false;
     for (std::size_t i = 1; i < walk.points.size() && !hit.hit; ++i) {
       const WalkPoint& p = walk.points[i];
+      // A wall may turn what a body has turned already against the way that was asked for.
+      const Vec3d leg = p.position - walk.points[i - 1].position;
+      back = leg.x * desired.x + leg.z * desired.z < -kRounding * asked * length_xz(leg);
+      if (back) break;
       hit = stepper.go({p.position, p.poly, begin + p.fraction * span});
       walked = p.fraction;
       if (hit.hit && span > 0) walked = (out.path.back().fraction - begin) / span;
     }
-    if (!hit.hit || !options.slide || slides >= options.max_slides) break;
+    if (back || !hit.hit || !options.slide || slides >= options.max_slides) break;
     const Vec3d n{hit.sweep.normal.x, 0, hit.sweep.normal.z};
     if (!(norm(n) > 1e-6)) break;  // from straight above or below: no way along the ground
     normals.push_back(normalized(n));

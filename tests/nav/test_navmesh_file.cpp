@@ -8,12 +8,14 @@
 #include <fstream>
 #include <iterator>
 
+#include "cases.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "meshes.hpp"
 #include "navmesh_impl.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;
+using gsnav_test::cases;
 using gsnav_test::Soup;
 
 namespace {
@@ -177,7 +179,7 @@ TEST_CASE("navmesh file: mutated and truncated files do no harm") {
   Rng rng(11);
   int read = 0, refused = 0;
   for (const auto& seed : seeds) {
-    const int rounds = seed.size() < 20000 ? 4000 : 150;
+    const int rounds = seed.size() < 20000 ? cases(100000) : cases(500);
     for (int i = 0; i < rounds; ++i) {
       auto b = seed;
       for (std::uint64_t k = 1 + rng.below(4); k-- > 0;) {

@@ -7,19 +7,16 @@
 
 #include "gsnav/nav/step.hpp"
 #include "meshes.hpp"
+#include "step_scene.hpp"
 
 using namespace gsnav;
+using gsnav_test::agent_at;
+using gsnav_test::crowd;
+using gsnav_test::frozen;
+using gsnav_test::room;
 using gsnav_test::Soup;
 
 namespace {
-
-NavMesh room() {
-  Soup soup;
-  soup.floor(-50, -50, 50, 50);
-  NavMeshSettings s;
-  s.cell_size = 0.25;
-  return NavMesh::build(s, soup.vertices, soup.triangles).value();
-}
 
 Capsule<double> post(double x, double z, double r = 0.2) { return {{x, 0.1, z}, {x, 1.7, z}, r}; }
 
@@ -31,13 +28,11 @@ CapsuleSet moving(const Capsule<double>& from, const Capsule<double>& to, std::u
   return CapsuleSet::create({{{from, to}, avatar, 0}}).value();
 }
 
-AgentState at(double x, double z) { return {{x, 0, z}, 0.1, 1.5, kNoPoly}; }
-
 }  // namespace
 
 TEST_CASE("step: free, stopped by a body at the skin, and slid around it") {
   const NavMesh mesh = room();
-  const AgentState agent = at(0, 0);
+  const AgentState agent = agent_at(0, 0);
   const StepResult free = step(mesh, agent, {1, 0, 0}, {});
   CHECK(free.blocked_by == BlockedBy::none);
   CHECK(free.position.x == doctest::Approx(1.0));
@@ -64,7 +59,7 @@ TEST_CASE("step: free, stopped by a body at the skin, and slid around it") {
 
 TEST_CASE("step: a moving body is met at the right time, and a standing agent is walked into") {
   const NavMesh mesh = room();
-  const AgentState agent = at(0, 0);
+  const AgentState agent = agent_at(0, 0);
   // Closing at 1 + 1 m a tick over a gap of 1.7 m.
   const CapsuleSet towards = moving(post(2, 0), post(1, 0));
   const StepResult r = step(mesh, agent, {1, 0, 0}, towards, {.slide = false});
@@ -103,7 +98,7 @@ TEST_CASE("capsules: bad ones are refused by avatar and bone") {
 TEST_CASE("step: invalid input returns the start") {
   const NavMesh mesh = room();
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
-  const AgentState good = at(1, 1);
+  const AgentState good = agent_at(1, 1);
   for (const Vec3d d : {Vec3d{nan, 0, 0}, Vec3d{0, inf, 0}, Vec3d{0, 0, -inf}}) {
     const StepResult r = step(mesh, good, d, {});
     CHECK(r.blocked_by == BlockedBy::invalid);
@@ -116,7 +111,7 @@ TEST_CASE("step: invalid input returns the start") {
   bad = good;
   bad.position.x = nan;
   CHECK(step(mesh, bad, {1, 0, 0}, {}).blocked_by == BlockedBy::invalid);
-  CHECK(step(mesh, at(500, 500), {1, 0, 0}, {}).blocked_by == BlockedBy::invalid);
+  CHECK(step(mesh, agent_at(500, 500), {1, 0, 0}, {}).blocked_by == BlockedBy::invalid);
   CHECK(std::isinf(clearance(bad, standing({post(0, 0)}), 0).distance));
 }
 
@@ -129,37 +124,17 @@ TEST_CASE("step: the solid is inside its height") {
   CHECK(low.p0.y == doctest::Approx(0.2));
   CHECK(low.radius == doctest::Approx(0.2));
   // A point agent is protected too.
-  AgentState point = at(0, 0);
+  AgentState point = agent_at(0, 0);
   point.radius = point.height = 0;
   const Capsule<double> log{{2, 0, -1}, {2, 0, 1}, 0.2};
   CHECK(step(room(), point, {5, 0, 0}, standing({log}), {.slide = false}).position.x ==
         doctest::Approx(1.8 - 1e-4).epsilon(1e-6));
   // Over the head and under the raised arm.
-  CHECK_FALSE(step(room(), at(0, 0), {5, 0, 0}, standing({{{2, 1.75, -1}, {2, 1.75, 1}, 0.2}})).blocked());
-  CHECK(step(room(), at(0, 0), {5, 0, 0}, standing({{{2, 1.6, -1}, {2, 1.6, 1}, 0.2}})).blocked());
+  CHECK_FALSE(step(room(), agent_at(0, 0), {5, 0, 0}, standing({{{2, 1.75, -1}, {2, 1.75, 1}, 0.2}})).blocked());
+  CHECK(step(room(), agent_at(0, 0), {5, 0, 0}, standing({{{2, 1.6, -1}, {2, 1.6, 1}, 0.2}})).blocked());
 }
 
 namespace {
-
-/// A crowd of walking bodies of eight bones each around the origin.
-std::vector<DynamicCapsule> crowd(Rng& rng, double speed, int avatars = 6) {
-  std::vector<DynamicCapsule> list;
-  for (int a = 0; a < avatars; ++a) {
-    const Vec3d where{rng.uniform(-4, 4), 0, rng.uniform(-4, 4)};
-    const Vec3d v{rng.uniform(-speed, speed), 0, rng.uniform(-speed, speed)};
-    for (int b = 0; b < 8; ++b) {
-      const auto joint = [&] { return Vec3d{rng.uniform(-0.3, 0.3), rng.uniform(0.05, 1.8), rng.uniform(-0.3, 0.3)}; };
-      const auto sway = [&] { return Vec3d{rng.uniform(-0.2, 0.2), rng.uniform(-0.1, 0.1), rng.uniform(-0.2, 0.2)}; };
-      DynamicCapsule c;
-      c.motion.begin = {where + joint(), where + joint(), rng.uniform(0.03, 0.15)};
-      c.motion.end = {c.motion.begin.p0 + v + sway(), c.motion.begin.p1 + v + sway(), rng.uniform(0.03, 0.15)};
-      c.avatar = static_cast<std::uint32_t>(a);
-      c.bone = static_cast<std::uint32_t>(b);
-      list.push_back(c);
-    }
-  }
-  return list;
-}
 
 /// The least gap while the agent moves along its path, from dense samples of the definition.
 double least_gap_on_path(const AgentState& agent, const StepResult& r, const CapsuleSet& set) {
@@ -185,7 +160,7 @@ TEST_CASE("step: the agent's motion never goes into a body, sliding or not, howe
   for (int i = 0; i < 6000; ++i) {
     const double speed = i % 3 == 0 ? 0.3 : (i % 3 == 1 ? 5 : 100);
     const CapsuleSet set = CapsuleSet::create(crowd(rng, speed)).value();
-    AgentState agent = at(rng.uniform(-4, 4), rng.uniform(-4, 4));
+    AgentState agent = agent_at(rng.uniform(-4, 4), rng.uniform(-4, 4));
     if (clearance(agent, set, 0).distance < 1e-4) continue;
     ++starts;
     const double length = i % 2 ? 0.25 : rng.uniform(0, 45), a = rng.uniform(0, 6.2832);
@@ -211,7 +186,7 @@ TEST_CASE("step: the order of bodies and bodies far away change no bit") {
   int contacts = 0;
   for (int i = 0; i < 400; ++i) {
     std::vector<DynamicCapsule> list = crowd(rng, 1.0);
-    const AgentState agent = at(rng.uniform(-4, 4), rng.uniform(-4, 4));
+    const AgentState agent = agent_at(rng.uniform(-4, 4), rng.uniform(-4, 4));
     const Vec3d d{rng.uniform(-3, 3), 0, rng.uniform(-3, 3)};
     const StepResult a = step(mesh, agent, d, CapsuleSet::create(list).value());
     const Clearance ca = clearance(agent, CapsuleSet::create(list).value(), 0.5);
@@ -269,10 +244,9 @@ TEST_CASE("step: clipping a clipped step changes nothing; a longer agent radius 
   Rng rng(24);
   int contacts = 0;
   for (int i = 0; i < 2000; ++i) {
-    std::vector<DynamicCapsule> list = crowd(rng, 0.0, 3);
-    for (DynamicCapsule& c : list) c.motion.end = c.motion.begin;
+    const std::vector<DynamicCapsule> list = frozen(crowd(rng, 0.0, 3));
     const CapsuleSet set = CapsuleSet::create(list).value();
-    AgentState agent = at(rng.uniform(-4, 4), rng.uniform(-4, 4));
+    AgentState agent = agent_at(rng.uniform(-4, 4), rng.uniform(-4, 4));
     if (clearance(agent, set, 0).distance < 1e-3) continue;
     const Vec3d d{rng.uniform(-5, 5), 0, rng.uniform(-5, 5)};
     const StepResult r = step(mesh, agent, d, set, {.slide = false});
@@ -298,7 +272,7 @@ TEST_CASE("step: clipping a clipped step changes nothing; a longer agent radius 
 TEST_CASE("step: an agent in a body can walk out and not further in") {
   const NavMesh mesh = room();
   const CapsuleSet body = standing({post(0, 0, 0.3)});
-  const AgentState inside = at(0.2, 0);
+  const AgentState inside = agent_at(0.2, 0);
   const StepResult out = step(mesh, inside, {1, 0, 0}, body);
   CHECK(out.started_overlapping);
   CHECK(out.blocked_by == BlockedBy::none);
@@ -318,7 +292,7 @@ TEST_CASE("step: an agent in a body can walk out and not further in") {
 
 TEST_CASE("step: one tick agrees with its two halves about the contact") {
   const NavMesh mesh = room();
-  const AgentState agent = at(0, 0);
+  const AgentState agent = agent_at(0, 0);
   const MovingCapsule<double> m{post(3, 0.5), post(1, -0.1)};
   const auto part = [&](double u0, double u1) {
     return CapsuleSet::create({{{lerp(m.begin, m.end, u0), lerp(m.begin, m.end, u1)}, 0, 0}}).value();

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdlib>
+
+namespace gsnav_test {
+
+/// How many random cases a property is tried on: n times the number in GSNAV_NAV_CASES (1 where it is
+/// not set; a tenth under the address sanitizer, which is that much slower).
+inline int cases(int n) {
+#if defined(__SANITIZE_ADDRESS__)
+  double factor = 0.1;
+#else
+  double factor = 1.0;
+#endif
+  if (const char* text = std::getenv("GSNAV_NAV_CASES")) factor = std::atof(text);
+  const double wanted = factor * n;
+  return wanted >= 1 ? static_cast<int>(wanted) : 1;
+}
+
+}  // namespace gsnav_test
