@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program as people run it.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "gsnav/io/image_file.hpp"
+#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/io/ply.hpp"
+#include "gsnav/nav/navmesh_file.hpp"
+#include "io/files.hpp"
+
+using namespace gsnav;
+using gsnav_test::read_file;
+using gsnav_test::TempFolder;
+using gsnav_test::write_file;
+
+namespace {
+
+struct Outcome {
+  bool ok = false;
+  std::string text;
+
+  bool says(const char* part) const { return text.find(part) != std::string::npos; }
+};
+
+Outcome run(const TempFolder& folder, const std::string& arguments) {
+  const std::string log = (folder / "log").string();
+  Outcome out;
+  std::string command("\"" GSNAV_NAVMESH "\" ");
+  command.append(arguments).append(" > \"").append(log).append("\" 2>&1");
+  out.ok = std::system(command.c_str()) == 0;
+  out.text = read_file(log);
+  return out;
+}
+
+std::string quoted(const std::filesystem::path& p) {
+  return std::string(1, '"').append(p.string()).append("\"");
+}
+
+/// Two floors of 8 m by 5 m, the upper one 3 m up and 10 m along x; z up, in centimetres.
+std::string two_floors_z_up() {
+  return "v 0 0 0\nv 800 0 0\nv 800 500 0\nv 0 500 0\nv 1000 0 300\nv 1800 0 300\nv 1800 500 300\nv "
+         "1000 500 300\n"
+         "f 1 2 3 4\nf 5 6 7 8\n";
+}
+
+const char* const kPlain = "--no-filter-ledge-spans --agent-radius 0";
+
+}  // namespace
+
+TEST_CASE("navmesh tool: builds, inspects, converts and draws") {
+  const TempFolder folder("navmesh_tool");
+  write_file(folder / "floors.obj", two_floors_z_up());
+  const Outcome made =
+      run(folder, quoted(folder / "floors.obj") + " --up z --scale 0.01 " + kPlain + " --out " +
+                      quoted(folder / "a.navmesh") + " --obj " + quoted(folder / "a.obj") + " --png " +
+                      quoted(folder / "a.png") + " --level 1");
+  INFO(made.text);
+  REQUIRE(made.ok);
+  CHECK(made.says("4 triangles"));
+  CHECK(made.says("island 1: 40"));
+  CHECK(made.says("level 1: at 3.00 m, 40"));
+  const NavMesh mesh = load_navmesh(folder / "a.navmesh").value();
+  CHECK(mesh.navigable_area() == doctest::Approx(80).epsilon(0.01));
+  CHECK(mesh.settings().agent_radius == 0);
+  CHECK(mesh.is_navigable({1, 0, -1}));  // y of the file is -z
+  CHECK(mesh.is_navigable({11, 3, -4}));
+  CHECK(io::load_obj(folder / "a.obj")->triangles.size() == mesh.triangles().size());
+  // The picture of the upper floor: coloured on the right, ground on the left.
+  const io::PngImage png = io::load_png(folder / "a.png").value();
+  const auto pixel = [&](double u, double v) {
+    const auto x = static_cast<std::size_t>(u * png.width), y = static_cast<std::size_t>(v * png.height);
+    const std::size_t at = 3 * (static_cast<std::size_t>(png.width) * y + x);
+    return std::vector<std::uint16_t>(png.samples.begin() + static_cast<std::ptrdiff_t>(at),
+                                      png.samples.begin() + static_cast<std::ptrdiff_t>(at + 3));
+  };
+  CHECK(png.width >= 1200);
+  CHECK(pixel(0.2, 0.5) == pixel(0.5, 0.5));
+  CHECK(pixel(0.8, 0.5) != pixel(0.5, 0.5));
+  const Outcome again =
+      run(folder, quoted(folder / "a.navmesh") + " --out " + quoted(folder / "b.navmesh"));
+  INFO(again.text);
+  REQUIRE(again.ok);
+  CHECK(again.says("level 1"));
+  CHECK(read_file(folder / "a.navmesh") == read_file(folder / "b.navmesh"));
+}
+
+TEST_CASE("navmesh tool: from Gaussians") {
+  const TempFolder folder("navmesh_tool_gaussians");
+  GaussianCloudBuilder builder(0);
+  for (int i = 0; i < 60; ++i) {
+    for (int k = 0; k < 40; ++k) {
+      RawGaussian g;
+      g.mean = {0.1 * i, 0, 0.1 * k};
+      g.log_scales = {std::log(0.06), std::log(0.03), std::log(0.06)};
+      g.opacity_logit = 6;
+      builder.add(g);
+    }
+  }
+  io::save_ply(folder / "floor.ply", builder.cloud()).throw_if_error();
+  const Outcome made =
+      run(folder, quoted(folder / "floor.ply") + " --out " + quoted(folder / "g.navmesh"));
+  INFO(made.text);
+  REQUIRE(made.ok);
+  CHECK(made.says("2400 Gaussians used"));
+  const NavMesh mesh = load_navmesh(folder / "g.navmesh").value();
+  CHECK(mesh.settings().cell_height == doctest::Approx(0.05));
+  CHECK(mesh.navigable_area() > 0.8 * 6 * 4);
+}
+
+TEST_CASE("navmesh tool: what is wrong is said on one line") {
+  const TempFolder folder("navmesh_tool_errors");
+  write_file(folder / "wall.obj", "v 0 0 0\nv 4 0 0\nv 4 3 0\nv 0 3 0\nf 1 2 3 4\n");
+  write_file(folder / "floor.obj", "v 0 0 0\nv 0 0 4\nv 4 0 4\nv 4 0 0\nf 1 2 3 4\n");
+  write_file(folder / "bad.navmesh", "TESM and nothing else");
+  const std::string floor = quoted(folder / "floor.obj");
+  struct Case {
+    std::string arguments;
+    std::vector<const char*> parts;
+  };
+  const Case cases[] = {
+      {"", {"input"}},
+      {quoted(folder / "none.obj"), {"none.obj"}},
+      {quoted(folder / "none.navmesh"), {"none.navmesh"}},
+      {quoted(folder / "bad.navmesh"), {"bad.navmesh", "size = 21"}},
+      {quoted(folder / "bad.navmesh") + " --up z", {"--up", "is a NavMesh"}},
+      {quoted(folder / "wall.obj"), {"no walkable cell", "agent_height 1.5", "agent_radius 0.1", "m2"}},
+      {floor + " --agent-radius 3", {"no walkable cell", "agent_radius 3", "m2"}},
+      {floor + " --region-min-size 1000", {"region_min_size"}},
+      {floor + " --cell-size 0", {"cell_size"}},
+      {floor + " --up up", {"--up"}},
+      {floor + " --png " + quoted(folder / "x.png") + " --height 50", {"height 50", "walkable"}},
+      {floor + " --png " + quoted(folder / "x.png") + " --level 5", {"--level 5", "1 levels"}},
+      {floor + " --out " + quoted(folder / "no" / "x.navmesh"), {"x.navmesh"}},
+      {floor + " --obj " + quoted(folder / "no" / "x.obj"), {"x.obj"}},
+      {floor + " --png " + quoted(folder / "no" / "x.png"), {"no"}},
+  };
+  for (const Case& c : cases) {
+    const Outcome r = run(folder, c.arguments);
+    INFO(c.arguments << "\n" << r.text);
+    CHECK_FALSE(r.ok);
+    for (const char* part : c.parts) CHECK(r.says(part));
+  }
+  const Outcome help = run(folder, "--help");
+  CHECK(help.ok);
+  for (const char* part : {"--out", "--png", "--agent-radius", "--solid-alpha", "--up"})
+    CHECK(help.says(part));
+}

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// gsnav-navmesh: builds, inspects, converts and draws NavMeshes.
+#include <algorithm>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "draw.hpp"
+#include "gsnav/io/image_file.hpp"
+#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/nav/navmesh_levels.hpp"
+#include "options.hpp"
+
+namespace {
+
+using namespace gsnav;
+using namespace gsnav_navmesh;
+
+/// The rotation that takes an axis to Y.
+Quatd upright(const std::string& up) {
+  constexpr double h = 0.70710678118654752;
+  static const std::map<std::string, Quatd> turns{{"y", {1, 0, 0, 0}},  {"-y", {0, 1, 0, 0}},
+                                                  {"z", {h, -h, 0, 0}}, {"-z", {h, h, 0, 0}},
+                                                  {"x", {h, 0, 0, h}},  {"-x", {h, 0, 0, -h}}};
+  return turns.at(up);
+}
+
+Result<NavMesh> from_triangles(const Options& o, const Similarity& placed) {
+  auto mesh = io::load_obj(o.input);
+  if (!mesh) return mesh.status();
+  std::vector<Vec3d> vertices;
+  for (const Vec3f& v : mesh->vertices) vertices.push_back(placed * vec_cast<double>(v));
+  std::printf("%s: %zu triangles\n", o.input.c_str(), mesh->triangles.size());
+  return NavMesh::build(o.settings, vertices, mesh->triangles);
+}
+
+Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
+  auto scene = io::load_scene(o.input);
+  if (!scene) return scene.status();
+  const GaussianSet set = scene->cloud.set(placed);
+  auto built = build_navmesh(o.settings, std::span(&set, 1), o.gaussians);
+  if (!built) return built.status();
+  const GaussianNavReport& r = built->report;
+  std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", o.input.c_str(), r.gaussians_used,
+              r.gaussians_faint, r.gaussians_outside);
+  std::printf(
+      "floor at %.3f m; %.0f %% of it under a ceiling; left out: %.2f m2 in small pieces, %.2f m2 "
+      "outside\n",
+      r.floor_y, 100 * r.ceiling_share, r.dropped_small, r.dropped_uncovered);
+  return std::move(built->mesh);
+}
+
+Result<NavMesh> make(const Options& o) {
+  const Similarity placed{upright(o.up), {}, o.scale};
+  switch (kind_of(o.input)) {
+    case InputKind::navmesh:
+      return load_navmesh(o.input);
+    case InputKind::mesh:
+      return from_triangles(o, placed);
+    default:
+      return from_gaussians(o, placed);
+  }
+}
+
+void print(const NavMesh& mesh, const std::vector<NavLevel>& levels) {
+  const Aabb<double> b = mesh.bounds();
+  const NavMeshSettings& s = mesh.settings();
+  std::printf("%zu polygons, %.2f m2 navigable, x %.2f to %.2f, y %.2f to %.2f, z %.2f to %.2f m\n",
+              mesh.polygon_count(), mesh.navigable_area(), b.low.x, b.high.x, b.low.y, b.high.y, b.low.z,
+              b.high.z);
+  std::printf("agent: height %g, radius %g, climb %g m, slope %g degrees; cells %g x %g m\n",
+              s.agent_height, s.agent_radius, s.agent_max_climb, s.agent_max_slope, s.cell_size,
+              s.cell_height);
+  constexpr std::size_t kShown = 10;
+  for (std::size_t i = 0; i < std::min(mesh.island_count(), kShown); ++i) {
+    std::printf("island %zu: %.2f m2, radius %.2f m\n", i, mesh.island_area(i), mesh.island_radius(i));
+  }
+  if (mesh.island_count() > kShown)
+    std::printf("and %zu smaller islands\n", mesh.island_count() - kShown);
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    std::printf("level %zu: at %.2f m, %.2f m2\n", i, levels[i].height, levels[i].area);
+  }
+}
+
+Status draw_png(const Options& o, const NavMesh& mesh, const std::vector<NavLevel>& levels) {
+  const Aabb<double> b = mesh.bounds();
+  double height = 0.5 * (b.low.y + b.high.y), band = std::numeric_limits<double>::infinity();
+  if (o.level && *o.level >= levels.size()) {
+    return {Errc::invalid_argument, "--level " + std::to_string(*o.level) + ": there are " +
+                                        std::to_string(levels.size()) + " levels"};
+  }
+  if (o.height) {
+    height = *o.height;
+    band = 0.5;
+  } else if (!levels.empty()) {
+    const auto most =
+        std::max_element(levels.begin(), levels.end(),
+                         [](const NavLevel& x, const NavLevel& y) { return x.area < y.area; });
+    height = o.level ? levels[*o.level].height : most->height;
+    band = 0.5 * LevelOptions{}.min_gap;
+  }
+  const double longer = std::max(b.high.x - b.low.x, b.high.z - b.low.z);
+  constexpr double kPixels = 1200;
+  const auto map =
+      mesh.top_down_map(height, o.metres_per_pixel > 0 ? o.metres_per_pixel : longer / kPixels, band);
+  if (!map) return map.status();
+  if (std::none_of(map->islands.begin(), map->islands.end(), [](std::int32_t i) { return i >= 0; })) {
+    return {Errc::nothing_navigable, "--png: nothing is walkable within " + std::to_string(band) +
+                                         " m of height " + std::to_string(height) +
+                                         " m; the surface spans " + std::to_string(b.low.y) + " to " +
+                                         std::to_string(b.high.y) + " m"};
+  }
+  const double bar = bar_length(b.high.x - b.low.x);
+  const Picture picture = draw(*map, bar);
+  if (Status s = io::save_png_rgb8(o.png, picture.rgb, picture.width, picture.height); !s) return s;
+  std::printf("%s: %d x %d pixels, %.4g m each, near height %.2f m; the bar is %g m\n", o.png.c_str(),
+              picture.width, picture.height, map->metres_per_cell, height, bar);
+  return {};
+}
+
+Status run(const Options& o) {
+  auto mesh = make(o);
+  if (!mesh) return mesh.status();
+  const std::vector<NavLevel> levels = find_levels(*mesh);
+  print(*mesh, levels);
+  if (!o.out.empty()) {
+    if (Status s = save_navmesh(*mesh, o.out); !s) return s;
+  }
+  if (!o.obj.empty()) {
+    if (Status s = save_navmesh_obj(*mesh, o.obj); !s) return s;
+  }
+  return o.png.empty() ? Status() : draw_png(o, *mesh, levels);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int exit_code = 0;
+  const auto options = parse_options(argc, argv, exit_code);
+  if (!options) return exit_code;
+  if (const Status s = run(*options); !s) {
+    std::fprintf(stderr, "gsnav-navmesh: %s\n", s.message().c_str());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+
+namespace gsnav_navmesh {
+namespace {
+
+const char kDescription[] =
+    "Builds, inspects, converts and draws NavMeshes. INPUT is read as a NavMesh where it ends in "
+    ".navmesh or .bin "
+    "(Habitat's and RecastDemo's MSET files), a NavMesh is built from its triangles where it ends in "
+    ".obj, and from "
+    "its Gaussians otherwise. What it is made of is printed; --out, --obj and --png write it. Lengths "
+    "in metres, "
+    "Y up. Exit status: 0, or 1 with one line that says what is wrong.";
+
+}  // namespace
+
+InputKind kind_of(const std::string& input) {
+  std::string extension = std::filesystem::path(input).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".navmesh" || extension == ".bin") return InputKind::navmesh;
+  return extension == ".obj" ? InputKind::mesh : InputKind::gaussians;
+}
+
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
+  Options o;
+  CLI::App app{kDescription};
+  app.add_option("input", o.input,
+                 "NavMesh (.navmesh, .bin), triangles (.obj) or Gaussians (.ply, .sog, .spz, .splat, "
+                 ".ksplat, a SOG "
+                 "folder, or sibling tiles: DIR/2_0,2_1)")
+      ->required();
+  auto* up = app.add_option("--up", o.up, "Axis of the input that points up; not for a NavMesh")
+                 ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}))
+                 ->capture_default_str();
+  auto* scale = app.add_option("--scale", o.scale, "Metres a unit of the input; not for a NavMesh")
+                    ->check(CLI::PositiveNumber)
+                    ->capture_default_str();
+
+  const char* write = "Write";
+  app.add_option("--out", o.out, "NavMesh file (MSET version 2, as Habitat reads it)")->group(write);
+  app.add_option("--obj", o.obj, "The surface as triangles, one group an island")->group(write);
+  app.add_option("--png", o.png, "The surface from above, islands by colour")->group(write);
+  auto* height =
+      app.add_option("--height", o.height, "Draw what is walkable near this height")->group(write);
+  app.add_option("--level", o.level,
+                 "Draw this storey, 0 is the lowest; the one with the most surface by default")
+      ->excludes(height)
+      ->group(write);
+  app.add_option("--metres-per-pixel", o.metres_per_pixel,
+                 "Of the picture; 0: 1200 pixels for the longer side")
+      ->check(CLI::NonNegativeNumber)
+      ->group(write);
+
+  gsnav::NavMeshSettings& s = o.settings;
+  const char* build = "Build (names and defaults are Habitat's)";
+  const auto number = [&](const char* name, double& value, const char* text) {
+    app.add_option(name, value, text)->capture_default_str()->group(build);
+  };
+  number("--cell-size", s.cell_size, "Voxel edge on the ground plane");
+  auto* cell_height = app.add_option("--cell-height", s.cell_height, "Voxel height; 0.05 for Gaussians")
+                          ->capture_default_str()
+                          ->group(build);
+  number("--agent-height", s.agent_height, "Clearance that the agent needs");
+  number("--agent-radius", s.agent_radius, "The surface ends this far from walls");
+  number("--agent-max-climb", s.agent_max_climb, "Highest step");
+  number("--agent-max-slope", s.agent_max_slope, "Steepest walkable triangle, degrees");
+  number("--region-min-size", s.region_min_size, "Regions below this many cells squared are dropped");
+  number("--region-merge-size", s.region_merge_size, "Regions below this many cells squared are merged");
+  number("--edge-max-len", s.edge_max_len, "Longest boundary edge");
+  number("--edge-max-error", s.edge_max_error, "How far a boundary may leave the cells, in cells");
+  app.add_option("--verts-per-poly", s.verts_per_poly, "3 to 6")->capture_default_str()->group(build);
+  number("--detail-sample-dist", s.detail_sample_dist,
+         "Spacing of height samples, in cells; below 0.9: none");
+  number("--detail-sample-max-error", s.detail_sample_max_error,
+         "Height error of the surface, in cell heights");
+  const auto without = [&](const char* name, bool& filter, const char* text) {
+    app.add_flag_callback(
+           name, [&filter] { filter = false; }, text)
+        ->group(build);
+  };
+  without("--no-filter-low-hanging-obstacles", s.filter_low_hanging_obstacles,
+          "Low obstacles are not stepped over");
+  without("--no-filter-ledge-spans", s.filter_ledge_spans, "Edges of drops stay walkable");
+  without("--no-filter-walkable-low-height-spans", s.filter_walkable_low_height_spans,
+          "Low rooms stay walkable");
+
+  gsnav::GaussianNavOptions& g = o.gaussians;
+  const char* from = "Build from Gaussians";
+  const auto option = [&](const char* name, auto& value, const char* text) {
+    app.add_option(name, value, text)->capture_default_str()->group(from);
+  };
+  option("--min-opacity", g.min_opacity, "Fainter Gaussians are ignored");
+  option("--sigmas", g.sigmas, "How far out a Gaussian is solid, in standard deviations");
+  option("--solid-alpha", g.solid_alpha, "Share of light that a solid voxel blocks");
+  option("--min-support", g.min_support, "Connected solid voxels below this count are floaters");
+  option("--max-hole", g.max_hole, "Gaps in the floor up to this wide are closed");
+  option("--floor-band", g.floor_band, "The surface stays within this of the floor's height");
+  option("--min-island-area", g.min_island_area, "Smaller pieces of floor are dropped, square metres");
+  app.add_flag_callback(
+         "--keep-uncovered", [&g] { g.drop_uncovered = false; },
+         "Keep floor that has no ceiling above it")
+      ->group(from);
+  try {
+    app.parse(argc, argv);
+    if (kind_of(o.input) == InputKind::navmesh && up->count() + scale->count() > 0) {
+      throw CLI::ValidationError("--up, --scale", o.input + " is a NavMesh: it stands as it is");
+    }
+  } catch (const CLI::ParseError& error) {
+    exit_code = app.exit(error) == 0 ? 0 : 1;
+    return std::nullopt;
+  }
+  if (kind_of(o.input) == InputKind::gaussians && cell_height->count() == 0) {
+    s.cell_height = gsnav::gaussian_navmesh_settings().cell_height;
+  }
+  return o;
+}
+
+}  // namespace gsnav_navmesh

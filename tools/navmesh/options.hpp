@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "gsnav/nav/gaussian_navmesh.hpp"
+#include "gsnav/nav/navmesh_settings.hpp"
+
+namespace gsnav_navmesh {
+
+/// What a file is, from its name.
+enum class InputKind { navmesh, mesh, gaussians };
+InputKind kind_of(const std::string& input);
+
+struct Options {
+  std::string input;
+  std::string up = "y";
+  double scale = 1.0;
+  std::string out, obj, png;
+  gsnav::NavMeshSettings settings;
+  gsnav::GaussianNavOptions gaussians;
+  std::optional<double> height;  ///< of the picture; a level's where it is not given
+  std::optional<std::size_t> level;
+  double metres_per_pixel = 0;  ///< 0: the longer side gets 1200 pixels
+};
+
+/// Reads the command line; prints help or what is wrong and sets `exit_code` where nothing is left to
+/// do.
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
+
+}  // namespace gsnav_navmesh
