@@ -23,7 +23,7 @@ class FrameStages {
       : config_(config), backend_(&backend), arrays_(backend, cloud), offsets_f_(backend), offsets_(backend),
         geometry_(backend), colors_(backend), depths_(backend), bounds_(backend), chunk_keys_(backend),
         counts_(backend), order_(backend), cursors_(backend), tile_offsets_(backend), tile_splats_(backend),
-        images_(backend) {
+        spans_(backend), images_(backend) {
     prepare_projection(camera);
     project();
     set_order();
@@ -42,6 +42,8 @@ class FrameStages {
 
   /// Fills tile_offsets and tile_splats.
   void bin() {
+    spans_.resize_discard(bin_.order.size);
+    bin_.spans = spans_.view();
     if constexpr (requires { backend_->list_tiles(bin_); }) {
       backend_->list_tiles(bin_);
     } else {
@@ -189,6 +191,7 @@ class FrameStages {
   gsnav::Buffer<std::uint32_t, B> chunk_keys_, counts_, order_;
   gsnav::Buffer<std::uint64_t, B> cursors_, tile_offsets_;
   gsnav::Buffer<std::uint32_t, B> tile_splats_;
+  gsnav::Buffer<gsnav::TileSpans, B> spans_;
   gsnav::Buffer<S, B> images_;
   gsnav::ProjectArgs<S> project_;
   gsnav::BinArgs<S> bin_;

@@ -10,35 +10,32 @@ STACK_TEST = "tests/hard_cases/test_stack.cpp"
 DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
 CUT_TEST = "tests/hard_cases/test_determinism.cpp"
 
-OPEN = "auto hit = state.transmittance >= L(rules.transmittance_min);"
+OPEN = "(after >= L(rules.transmittance_min))"
 DELTA = "  const L defined = select(denominator > L(S(0)), delta, L(S(0)));\n"
 CLAMPED = "return L(d.z) + clamp(defined, -reach, reach);"
 CROSSES = "select((before > half) && (after <= half), z, state.median)"
 FIRST = "select((before > open) && (after <= open), z, state.first_hit)"
-RETURNED = "const bool returned = alpha > args.rules.return_alpha;"
+RETURNED = "const auto returned = out.alpha > L(args.rules.return_alpha);"
 
 PLANTS = [
     plant("stop_exclusive", BLEND, "  if (rules.exclusive_stop) {", "  if (rules.exclusive_stop || true) {",
           STACK_TEST, "N42_saturation_stop", why="INRIA, gsplat: up to 0.0099 of what lies behind"),
-    Plant("stop_dropped",
-          (Edit(BLEND, OPEN, "auto hit = state.transmittance >= L(S(0));"),
-           Edit(BLEND, "if (state.transmittance < args.rules.transmittance_min) break;", ""),
-           Edit(LANES, "if (any(hit) && !any(state.transmittance >= closed_below)) {", "if (false) {")),
-          STACK_TEST, ("N42_saturation_stop", "N44_deep_stack")),
-    plant("stop_by_the_block", BLEND, OPEN, "auto hit = state.transmittance >= L(S(0));",
+    plant("stop_dropped", BLEND, OPEN, "(after >= L(S(0)))",
+          STACK_TEST, "N42_saturation_stop", "N44_deep_stack"),
+    plant("stop_by_the_block", BLEND, "mask_of<L> blended = state.open;", "mask_of<L> blended(any(state.open));",
           CUT_TEST, "N63_determinism_100 of work that is cut",
           why="a closed pixel goes on while its neighbours are open"),
     plant("stop_at_a_hundredth", BLEND, OPEN,
-          "auto hit = state.transmittance >= L(rules.transmittance_min * S(100));",
+          "(after >= L(rules.transmittance_min * S(100)))",
           STACK_TEST, "N42_saturation_stop", "N44_deep_stack"),
     plant("alpha_threshold_skipped", BLEND,
-          "  hit = hit && (exponent >= L(rules.log2_alpha_min));\n", "",
+          "  drawn = drawn && (exponent >= L(rules.log2_alpha_min));\n", "",
           STACK_TEST, "N43_faint_fog", why="training used it: the image has to"),
     plant("alpha_threshold_moved", BLEND,
-          "hit = hit && (exponent >= L(rules.log2_alpha_min));",
-          "hit = hit && (exponent >= L(rules.log2_alpha_min + S(0.01)));",
+          "drawn = drawn && (exponent >= L(rules.log2_alpha_min));",
+          "drawn = drawn && (exponent >= L(rules.log2_alpha_min + S(0.01)));",
           STACK_TEST, "N43_faint_fog", why="0.7 % above 1/255"),
-    plant("alpha_not_limited", BLEND, "min(exp2<M>(exponent), L(rules.max_alpha))", "exp2<M>(exponent)",
+    plant("alpha_not_limited", BLEND, "min(exp2_of_nonpositive<M>(exponent), L(rules.max_alpha))", "exp2_of_nonpositive<M>(exponent)",
           STACK_TEST, "N41_single_opaque"),
     plant("exp2_cubic", "include/gsnav/ops/render.hpp",
           "config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree6", "Exp2::degree3",
@@ -72,22 +69,22 @@ PLANTS = [
           "state.median = select(crosses, L(splat.depth->z), state.median);",
           DEPTH_TEST, "N70_depth_only_equals_rgbd"),
     plant("median_alone_at_another_t", BLEND,
-          "const auto crosses = (before > half) && (after <= half);",
-          "const auto crosses = (before > half) && (after <= L(S(0.49)));",
+          "const auto crosses = state.near && (after <= L(S(0.5)));",
+          "const auto crosses = state.near && (after <= L(S(0.49)));",
           DEPTH_TEST, "N70_depth_only_equals_rgbd"),
     plant("first_hit_of_the_last", BLEND, FIRST, "select(after <= open, z, state.first_hit)",
           DEPTH_TEST, "N45_depth_definitions"),
     plant("first_hit_before_the_crossing", BLEND, FIRST, "select(before > open, z, state.first_hit)",
           DEPTH_TEST, "N45_depth_definitions", "N48_depth_no_return"),
     plant("expected_not_divided", BLEND,
-          "returned ? state.accumulated / alpha + state.z_ref : S(0)",
-          "returned ? fma(alpha, state.z_ref, state.accumulated) : S(0)",
+          "state.accumulated / select(returned, out.alpha, L(S(1))) + state.z_ref",
+          "fma(out.alpha, state.z_ref, state.accumulated)",
           DEPTH_TEST, "N45_depth_definitions", "N48_depth_no_return", why="drawn towards the camera by what is clear"),
-    plant("accumulated_without_reference", BLEND, "fma(alpha, state.z_ref, state.accumulated);",
+    plant("accumulated_without_reference", BLEND, "fma(out.alpha, state.z_ref, state.accumulated);",
           "state.accumulated;", DEPTH_TEST, "N45_depth_definitions"),
-    plant("empty_pixel_divided", BLEND, RETURNED, "const bool returned = true;",
+    plant("empty_pixel_divided", BLEND, RETURNED, "const mask_of<L> returned(true);",
           DEPTH_TEST, "N48_depth_no_return", why="0 / 0 where nothing is"),
-    plant("return_alpha_ignored", BLEND, RETURNED, "const bool returned = alpha > S(0);",
+    plant("return_alpha_ignored", BLEND, RETURNED, "const auto returned = out.alpha > zero;",
           DEPTH_TEST, "N48_depth_no_return"),
     plant("behind_ends_the_chunk", "include/gsnav/kernels/project_chunk.hpp",
           "      if (!(z > args.camera.near_plane)) continue;\n",

@@ -79,7 +79,7 @@ PLANTS = [
           "tx1 = (b.x1 - 1) >> shift", "tx1 = (b.x1 - 2) >> shift",
           FOOTPRINT, "N11_tile_cover_conservative"),
     plant("background_forgotten", "include/gsnav/kernels/blend.hpp",
-          "    out.rgb[3 * pixel] = fma(t, args.background.x, state.r);",
-          "    out.rgb[3 * pixel] = state.r;",
+          "    out.r = fma(t, L(args.background.x), state.r);",
+          "    out.r = state.r;",
           KEYS, "N26_pair_count_zero"),
 ]

@@ -82,7 +82,7 @@ PLANTS = [
           "    slope_u = L(S(0)) * inv;\n",
           RESPONSE, "N02_exact_ray_grid"),
     plant("ray_drawn_behind", BLEND,
-          "    hit = hit && (f > zero);\n", "",
+          "    drawn = f > zero;\n", "",
           FOOTPRINT, "N11_tile_cover_conservative"),
     Plant("near_inclusive",
           (Edit(PROJECTION, "(key_z > F(camera.near_plane)) &&", "(key_z >= F(camera.near_plane)) &&"),

@@ -36,6 +36,7 @@ struct NoopFunctor {
 ///     rasterize_tiles(const RasterArgs<S>&)   blend all tiles (kernels/blend.hpp)
 ///     project(const ProjectArgs<S>&)          project one set of Gaussians (kernels/project_chunk.hpp)
 ///     count_tiles, scatter_tiles(const BinArgs<S>&)   bin (kernels/tiles.hpp)
+///     bins_in_lanes                           they want BinArgs::spans
 ///     list_tiles(const BinArgs<S>&)           fill tile_offsets at once, in place of count_tiles
 ///     sort_pairs(keys, values, keys_alt, values_alt, n, bits)   stable; true: the result is in *_alt
 ///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)

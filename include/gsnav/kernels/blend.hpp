@@ -47,6 +47,8 @@ struct BlendState {
   /// sum w (z - z_ref), z_ref the first depth blended: a far wall's depths lose no digits to their size.
   L accumulated{scalar_of<L>(0)}, z_ref{scalar_of<L>(0)};
   L first_hit{scalar_of<L>(0)};
+  mask_of<L> open{true};  ///< no Gaussian has closed the pixel yet
+  mask_of<L> near{true};  ///< transmittance > 1/2: the median depth is still to come
 };
 
 /// The records of one splat that blending may read; null where no output needs them.
@@ -72,28 +74,37 @@ GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& ru
   const L w1 = fma(dx, L(g.a), L(g.w1));
   const L w2 = fma(dx, L(g.k), fma(dy, L(g.b), L(g.w2)));
   L s = fma(w2, w2, w1 * w1);
-  auto hit = state.transmittance >= L(rules.transmittance_min);
+  mask_of<L> drawn(true);
   if constexpr (Perspective) {
     const SplatPerspective<S>& v = *splat.perspective;
     const L f = fma(dx, L(v.fx), fma(dy, L(v.fy), L(v.f0)));
     s = s / fma(f, f, L(v.c) * s);
-    hit = hit && (f > zero);
+    drawn = f > zero;
   }
   const L exponent = L(g.log2_opacity) - s;
-  hit = hit && (exponent >= L(rules.log2_alpha_min));
-  if (!any(hit)) return hit;
-  L alpha = select(hit, min(exp2<M>(exponent), L(rules.max_alpha)), zero);
+  drawn = drawn && (exponent >= L(rules.log2_alpha_min));
+  const mask_of<L> hit = drawn && state.open;
+  // Lanes are rarely all missed; asking costs them more than it saves.
+  if constexpr (LaneTraits<L>::width == 1) {
+    if (!hit) return hit;
+  }
+  // What does not depend on the pixel's history is computed before what does.
+  const L alpha = select(drawn, min(exp2_of_nonpositive<M>(exponent), L(rules.max_alpha)), zero);
   const L before = state.transmittance;
+  mask_of<L> blended = state.open;
   L after = fma(-alpha, before, before);
   if (rules.exclusive_stop) {
     const auto closes = hit && (after < L(rules.transmittance_min));
-    alpha = select(closes, zero, alpha);
-    after = select(closes, before, after);
-    state.transmittance = select(closes, -before, after);
+    blended = blended && !closes;
+    state.transmittance = select(closes, -before, select(blended, after, before));
+    after = select(blended, after, before);
+    state.open = blended;
   } else {
+    after = select(blended, after, before);
     state.transmittance = after;
+    state.open = blended && (after >= L(rules.transmittance_min));
   }
-  const L weight = alpha * before;
+  const L weight = select(blended, alpha * before, zero);
   if constexpr (Color) {
     const SplatColor<S>& c = *splat.color;
     state.r = fma(weight, L(c.r), state.r);
@@ -101,9 +112,9 @@ GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& ru
     state.b = fma(weight, L(c.b), state.b);
   }
   if constexpr (D == DepthMode::median) {
-    const L half(S(0.5));
-    const auto crosses = (before > half) && (after <= half);
+    const auto crosses = state.near && (after <= L(S(0.5)));
     if (any(crosses)) {
+      state.near = state.near && !crosses;
       state.median = select(crosses, ray_depth(*splat.depth, px, py), state.median);
     }
   }
@@ -159,27 +170,49 @@ struct RasterArgs {
   }
 };
 
+/// What a pixel (or a pack of them) ends as; the values of images that were not asked for mean nothing.
+template <class L>
+struct FinishedPixel {
+  L r{}, g{}, b{}, alpha{}, median{}, expected{}, accumulated{}, first_hit{};
+};
+
+template <class S, DepthMode D, class L>
+GSNAV_HD FinishedPixel<L> finish_pixel(const RasterArgs<S>& args, const BlendState<L, D>& state) noexcept {
+  FinishedPixel<L> out;
+  const L t = abs(state.transmittance), zero(S(0));
+  out.alpha = L(S(1)) - t;
+  if (args.images.rgb != nullptr) {
+    out.r = fma(t, L(args.background.x), state.r);
+    out.g = fma(t, L(args.background.y), state.g);
+    out.b = fma(t, L(args.background.z), state.b);
+  }
+  out.median = state.median;
+  if constexpr (D == DepthMode::any) {
+    const auto returned = out.alpha > L(args.rules.return_alpha);
+    out.expected =
+        select(returned, state.accumulated / select(returned, out.alpha, L(S(1))) + state.z_ref, zero);
+    out.accumulated = fma(out.alpha, state.z_ref, state.accumulated);
+    out.first_hit = state.first_hit;
+  }
+  return out;
+}
+
 /// Writes a finished pixel.
 template <class S, DepthMode D>
 GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
                           const BlendState<S, D>& state) noexcept {
   const FrameImages<S>& out = args.images;
-  const S t = abs(state.transmittance), alpha = S(1) - t;
+  const FinishedPixel<S> p = finish_pixel(args, state);
   if (out.rgb != nullptr) {
-    out.rgb[3 * pixel] = fma(t, args.background.x, state.r);
-    out.rgb[3 * pixel + 1] = fma(t, args.background.y, state.g);
-    out.rgb[3 * pixel + 2] = fma(t, args.background.z, state.b);
+    out.rgb[3 * pixel] = p.r;
+    out.rgb[3 * pixel + 1] = p.g;
+    out.rgb[3 * pixel + 2] = p.b;
   }
-  if (out.alpha != nullptr) out.alpha[pixel] = alpha;
-  if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
-  if (out.expected_depth != nullptr) {
-    const bool returned = alpha > args.rules.return_alpha;
-    out.expected_depth[pixel] = returned ? state.accumulated / alpha + state.z_ref : S(0);
-  }
-  if (out.accumulated_depth != nullptr) {
-    out.accumulated_depth[pixel] = fma(alpha, state.z_ref, state.accumulated);
-  }
-  if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
+  if (out.alpha != nullptr) out.alpha[pixel] = p.alpha;
+  if (out.median_depth != nullptr) out.median_depth[pixel] = p.median;
+  if (out.expected_depth != nullptr) out.expected_depth[pixel] = p.expected;
+  if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = p.accumulated;
+  if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = p.first_hit;
 }
 
 /// Blends one pixel: the generic fallback, one work item a pixel, on any backend and scalar.
@@ -198,7 +231,7 @@ struct RasterizePixel {
     for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {
       blend_splat<Color, D, M, Perspective>(state, args.rules, args.records(args.tile_splats[i]), px,
                                             py);
-      if (state.transmittance < args.rules.transmittance_min) break;
+      if (!state.open) break;
     }
     write_pixel(args, pixel, state);
   }

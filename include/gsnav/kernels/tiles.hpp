@@ -63,6 +63,16 @@ GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, con
   }
 }
 
+/// The tiles of a splat that covers few: columns first[r] to end[r] - 1 of each of its rows of tiles, from
+/// `tile` on.
+struct TileSpans {
+  static constexpr int kRows = 5, kColumns = 255;
+  static constexpr std::uint8_t kLarge = 255;  ///< in `rows`: too many to be kept
+  std::uint32_t tile;
+  std::uint8_t rows;
+  std::uint8_t first[kRows], end[kRows];
+};
+
 /// Arguments of binning: `order` lists visible splats front to back.
 template <class S>
 struct BinArgs {
@@ -76,6 +86,7 @@ struct BinArgs {
   View<std::uint64_t> cursors;           ///< [blocks][tiles]: counts, then write positions
   View<std::uint64_t> tile_offsets;      ///< [tiles + 1]
   View<std::uint32_t> tile_splats;       ///< splats of all tiles, each tile's in order
+  View<TileSpans> spans;                 ///< [order] scratch of backends that bin in lanes; else empty
 };
 
 namespace detail {

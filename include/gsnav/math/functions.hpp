@@ -128,21 +128,34 @@ inline constexpr float kRoundMagic = 12582912.0f;
 /// 2^x. In float: x is clamped to [-126, 126], the integer part goes into the exponent and a
 /// polynomial does the rest; every step is a correctly rounded operation, so all backends agree on
 /// the bits. In double and long double: the platform's.
+/// The same bits for x <= 126, without the clamp that such x do not need.
 template <Exp2 M = Exp2::degree6>
-GSNAV_HD float exp2(float x) noexcept {
-  x = clamp(x, -126.0f, 126.0f);
+GSNAV_HD float exp2_of_nonpositive(float x) noexcept {
+  x = max(x, -126.0f);
   const float t = x + detail::kRoundMagic;
   const float f = x - (t - detail::kRoundMagic);
   const float p = M == Exp2::degree6 ? detail::exp2_degree6(f) : detail::exp2_degree3(f);
   return float_of_bits(bits_of(p) + (bits_of(t) << 23));
 }
+template <Exp2 M = Exp2::degree6>
+GSNAV_HD float exp2(float x) noexcept {
+  return exp2_of_nonpositive<M>(min(x, 126.0f));
+}
 template <Exp2 = Exp2::degree6>
 GSNAV_HD double exp2(double x) noexcept {
+  return ::exp2(x);
+}
+template <Exp2 = Exp2::degree6>
+GSNAV_HD double exp2_of_nonpositive(double x) noexcept {
   return ::exp2(x);
 }
 #if !defined(__CUDACC__)
 template <Exp2 = Exp2::degree6>
 GSNAV_HD long double exp2(long double x) noexcept {
+  return ::exp2l(x);
+}
+template <Exp2 = Exp2::degree6>
+GSNAV_HD long double exp2_of_nonpositive(long double x) noexcept {
   return ::exp2l(x);
 }
 #endif

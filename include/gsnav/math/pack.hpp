@@ -80,13 +80,10 @@ struct Mask<16> {
     r.v = m;
     return r;
   }
-  GSNAV_HD friend Mask operator&&(Mask a, Mask b) noexcept {
-    return of(static_cast<__mmask16>(a.v & b.v));
-  }
-  GSNAV_HD friend Mask operator||(Mask a, Mask b) noexcept {
-    return of(static_cast<__mmask16>(a.v | b.v));
-  }
-  GSNAV_HD friend Mask operator!(Mask a) noexcept { return of(static_cast<__mmask16>(~a.v)); }
+  // By name, or g++ moves masks to general registers and back.
+  GSNAV_HD friend Mask operator&&(Mask a, Mask b) noexcept { return of(_kand_mask16(a.v, b.v)); }
+  GSNAV_HD friend Mask operator||(Mask a, Mask b) noexcept { return of(_kor_mask16(a.v, b.v)); }
+  GSNAV_HD friend Mask operator!(Mask a) noexcept { return of(_knot_mask16(a.v)); }
 };
 #endif
 
@@ -239,7 +236,14 @@ GSNAV_HD std::uint32_t lane_bits(Mask<N> m) noexcept {
 }
 template <int N>
 GSNAV_HD bool any(Mask<N> m) noexcept {
-  return lane_bits(m) != 0;
+#if defined(__AVX512DQ__)
+  if constexpr (N == 16) {
+    return _kortestz_mask16_u8(m.v, m.v) == 0;
+  } else
+#endif
+  {
+    return lane_bits(m) != 0;
+  }
 }
 template <int N>
 GSNAV_HD bool all(Mask<N> m) noexcept {
@@ -347,15 +351,20 @@ GSNAV_HD Pack<float, N> fma(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c
   return r;
 }
 
-/// 2^x, lane by lane the bits of the scalar exp2.
+/// 2^x for x <= 126, lane by lane the bits of the scalar exp2.
 template <Exp2 M = Exp2::degree6, int N>
-GSNAV_HD Pack<float, N> exp2(Pack<float, N> x) noexcept {
+GSNAV_HD Pack<float, N> exp2_of_nonpositive(Pack<float, N> x) noexcept {
   using P = Pack<float, N>;
-  x = clamp(x, P(-126.0f), P(126.0f));
+  x = max(x, P(-126.0f));
   const P t = x + P(detail::kRoundMagic);
   const P f = x - (t - P(detail::kRoundMagic));
   const P p = M == Exp2::degree6 ? detail::exp2_degree6(f) : detail::exp2_degree3(f);
   return P(detail::floats<N>(detail::bits<N>(p.v) + (detail::bits<N>(t.v) << 23)));
+}
+/// 2^x, lane by lane the bits of the scalar exp2.
+template <Exp2 M = Exp2::degree6, int N>
+GSNAV_HD Pack<float, N> exp2(Pack<float, N> x) noexcept {
+  return exp2_of_nonpositive<M>(min(x, Pack<float, N>(126.0f)));
 }
 
 /// log2(x), lane by lane the bits of the scalar log2.
@@ -371,6 +380,27 @@ GSNAV_HD Pack<float, N> log2(Pack<float, N> x) noexcept {
   return detail::log2_from_ratio(t, exponent);
 }
 
+/// Writes first + l for each lane l of `bits`, in order, and returns how many. Up to N bytes from `out` on
+/// are overwritten.
+template <int N>
+GSNAV_HD int store_lane_indices(std::uint32_t bits, int first, std::uint8_t* out) noexcept {
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {
+    const __m512i lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const __m512i indices = _mm512_add_epi32(lanes, _mm512_set1_epi32(first));
+    const __m512i packed = _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), indices);
+    const __m128i bytes = _mm512_maskz_cvtepi32_epi8(static_cast<__mmask16>(-1), packed);
+    std::memcpy(out, &bytes, sizeof bytes);
+    return __builtin_popcount(bits);
+  } else
+#endif
+  {
+    int count = 0;
+    for (; bits != 0; bits &= bits - 1) out[count++] = static_cast<std::uint8_t>(first + __builtin_ctz(bits));
+    return count;
+  }
+}
+
 /// Reads a row-major matrix of N rows (one a lane) and K floats a row as K packs, one a column.
 template <int K, int N>
 GSNAV_HD void load_columns(const float* rows, Pack<float, N>* columns) noexcept {
@@ -380,7 +410,8 @@ GSNAV_HD void load_columns(const float* rows, Pack<float, N>* columns) noexcept 
     using V = typename Pack<float, 16>::vector;
     V r[8], t[8];
     for (int i = 0; i < 8; ++i) {
-      const Pack<float, 8> a = Pack<float, 8>::load(rows + 8 * i), b = Pack<float, 8>::load(rows + 8 * (i + 8));
+      const Pack<float, 8> a = Pack<float, 8>::load(rows + 8 * i);
+      const Pack<float, 8> b = Pack<float, 8>::load(rows + 8 * (i + 8));
       r[i] = __builtin_shufflevector(a.v, b.v, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     }
     for (int i = 0; i < 8; i += 2) {

@@ -33,7 +33,7 @@ struct RenderWorkspace {
   explicit RenderWorkspace(B& b)
       : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
         chunk_keys(b), ranks(b), counts(b), keys(b), order(b), sort(b), cursors(b), tile_offsets(b),
-        tile_splats(b) {}
+        tile_splats(b), spans(b) {}
 
   Buffer<Vec3<float>, B> offsets_f;
   Buffer<Vec3d, B> offsets;
@@ -46,6 +46,7 @@ struct RenderWorkspace {
   SortScratch<B> sort;
   Buffer<std::uint64_t, B> cursors, tile_offsets;
   Buffer<std::uint32_t, B> tile_splats;
+  Buffer<TileSpans, B> spans;
   std::vector<std::uint32_t> host_counts;
   std::vector<std::uint64_t> host_chunk_offsets;
   std::vector<Vec3<float>> host_offsets_f;
@@ -57,7 +58,7 @@ struct RenderWorkspace {
            bounds.capacity_bytes() +
            chunk_keys.capacity_bytes() + ranks.capacity_bytes() + counts.capacity_bytes() + keys.capacity_bytes() +
            order.capacity_bytes() + sort.bytes() + cursors.capacity_bytes() +
-           tile_offsets.capacity_bytes() + tile_splats.capacity_bytes();
+           tile_offsets.capacity_bytes() + tile_splats.capacity_bytes() + spans.capacity_bytes();
   }
 };
 
@@ -333,6 +334,10 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.tile_offsets.resize_discard(bin.grid.count() + 1);
   bin.cursors = ws.cursors.view();
   bin.tile_offsets = ws.tile_offsets.view();
+  if constexpr (sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; }) {
+    ws.spans.resize_discard(visible);
+    bin.spans = ws.spans.view();
+  }
   if constexpr (requires { backend.list_tiles(bin); }) {
     backend.list_tiles(bin);
   } else {

@@ -89,7 +89,8 @@ class OpenMPBackend : public HostMemory {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, kernel](std::size_t c) { kernel(args, c); });
   }
-  /// Optional members: binning with the instruction set's own fma.
+  /// Optional members: binning in lanes, which keeps what it counted in BinArgs::spans.
+  static constexpr bool bins_in_lanes = true;
   void count_tiles(const BinArgs<float>& args) {
     const auto kernel = lane_kernels().count_tiles;
     parallel_for(args.blocks, [&args, kernel](std::size_t block) { kernel(args, block); });

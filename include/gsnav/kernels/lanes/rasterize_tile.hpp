@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <bit>
+#include <cstddef>
 #include <cstring>
+#include <new>
+#include <type_traits>
 
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/footprint.hpp"
@@ -19,9 +21,21 @@ inline constexpr int kMaxBlocks = kMaxTile * kMaxTile / kWidth;
 /// Splats whose blocks are found before any of them is blended; a multiple of kWidth.
 inline constexpr int kBatch = 128;
 
+/// An array whose elements have no value yet: a tile sets few of what the largest may need.
+template <class T, int N>
+class Unset {
+  static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+
+ public:
+  T& operator[](int i) noexcept { return *std::launder(reinterpret_cast<T*>(bytes_) + i); }
+
+ private:
+  alignas(T) std::byte bytes_[sizeof(T) * static_cast<std::size_t>(N)];
+};
+
 /// The splats that each block of a tile meets, of one batch.
 struct BlockLists {
-  std::uint8_t splats[kMaxBlocks][kBatch];
+  std::uint8_t splats[kMaxBlocks][kBatch + kWidth];  // whole packs are written
   int counts[kMaxBlocks];
 };
 
@@ -45,14 +59,48 @@ inline void list_blocks(const SplatGeometry<float>* batch, int first, std::uint3
     for (int x = 0; x < tile_size; x += kBlockWidth, ++block) {
       if (strip == 0 || !open[block]) continue;
       const auto reached = (right >= F(centre(tile_x + x))) && (left <= F(centre(tile_x + x + kBlockWidth - 1)));
-      std::uint8_t* list = lists.splats[block];
-      int count = lists.counts[block];
-      for (std::uint32_t bits = lane_bits(reached) & strip; bits != 0; bits &= bits - 1) {
-        list[count++] = static_cast<std::uint8_t>(first + std::countr_zero(bits));
-      }
-      lists.counts[block] = count;
+      int& count = lists.counts[block];
+      count += store_lane_indices<kWidth>(lane_bits(reached) & strip, first, lists.splats[block] + count);
     }
   }
+}
+
+/// Writes the finished pixels of a block that lie in the image.
+template <DepthMode D>
+void write_block(const RasterArgs<float>& args, int x0, int y0, const BlendState<F, D>& state) noexcept {
+  const FinishedPixel<F> p = finish_pixel(args, state);
+  const int columns = args.grid.width - x0 < kBlockWidth ? args.grid.width - x0 : kBlockWidth;
+  const int rows = args.grid.height - y0 < kBlockHeight ? args.grid.height - y0 : kBlockHeight;
+  float values[3][kWidth];
+  const auto each_row = [&](const auto& write) {
+    for (int y = 0; y < rows; ++y) {
+      write(static_cast<std::size_t>(y0 + y) * static_cast<std::size_t>(args.grid.width) +
+                static_cast<std::size_t>(x0), y * kBlockWidth);
+    }
+  };
+  const auto plane = [&](float* image, const F& v) {
+    if (image == nullptr) return;
+    v.store(values[0]);
+    each_row([&](std::size_t pixel, int lane) {
+      for (int x = 0; x < columns; ++x) image[pixel + static_cast<std::size_t>(x)] = values[0][lane + x];
+    });
+  };
+  if (float* rgb = args.images.rgb; rgb != nullptr) {
+    p.r.store(values[0]);
+    p.g.store(values[1]);
+    p.b.store(values[2]);
+    each_row([&](std::size_t pixel, int lane) {
+      float* at = rgb + 3 * pixel;
+      for (int x = 0; x < columns; ++x, at += 3) {
+        for (int c = 0; c < 3; ++c) at[c] = values[c][lane + x];
+      }
+    });
+  }
+  plane(args.images.alpha, p.alpha);
+  plane(args.images.median_depth, p.median);
+  plane(args.images.expected_depth, p.expected);
+  plane(args.images.accumulated_depth, p.accumulated);
+  plane(args.images.first_hit_depth, p.first_hit);
 }
 
 /// Blends one tile. Splats go in batches: the blocks of pixels that their ellipses reach are found for
@@ -68,7 +116,7 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
   const int tile_y = static_cast<int>(tile / static_cast<std::size_t>(columns)) * ts;
   const int blocks_x = ts / kBlockWidth, blocks = blocks_x * (ts / kBlockHeight);
 
-  BlendState<F, D> states[kMaxBlocks];
+  Unset<BlendState<F, D>, kMaxBlocks> states;
   bool open[kMaxBlocks];
   int open_count = 0;
   float lane_x[kWidth], lane_y[kWidth];
@@ -82,18 +130,18 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
     const auto inside = (pixel_x + F(static_cast<float>(x0)) < F(static_cast<float>(grid.width))) &&
                         (pixel_y + F(static_cast<float>(y0)) < F(static_cast<float>(grid.height)));
     // Closed from the start outside the image.
+    states[b] = {};
     states[b].transmittance = select(inside, F(1.0f), F(0.0f));
+    states[b].open = states[b].near = inside;
     open[b] = any(inside);
     open_count += open[b] ? 1 : 0;
   }
 
-  SplatGeometry<float> geometry[kBatch] = {};
-  SplatColor<float> colors[Color ? kBatch : 1];
+  Unset<SplatGeometry<float>, kBatch> geometry;
+  Unset<SplatColor<float>, Color ? kBatch : 1> colors;
   constexpr bool kNeedsId = D != DepthMode::none || Perspective;
   std::uint32_t ids[kNeedsId ? kBatch : 1];
   BlockLists lists;
-  const F closed_below(args.rules.transmittance_min);
-
   const std::uint64_t end = args.tile_offsets[tile + 1];
   for (std::uint64_t first = args.tile_offsets[tile]; first < end && open_count > 0; first += kBatch) {
     const int n = static_cast<int>(end - first < kBatch ? end - first : std::uint64_t{kBatch});
@@ -111,6 +159,7 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
       if constexpr (Color) colors[j] = args.colors[splat];
       if constexpr (kNeedsId) ids[j] = splat;
     }
+    for (int j = n; j % kWidth != 0; ++j) geometry[j] = {};  // lanes that are left out
     if constexpr (Perspective) {  // the footprint is no ellipse: every open block
       for (int b = 0; b < blocks; ++b) {
         for (int j = 0; open[b] && j < n; ++j) lists.splats[b][lists.counts[b]++] = static_cast<std::uint8_t>(j);
@@ -118,7 +167,7 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
     } else {
       for (int j = 0; j < n; j += kWidth) {
         const std::uint32_t lanes = n - j >= kWidth ? ~0u : (1u << (n - j)) - 1u;
-        list_blocks(geometry, j, lanes, args.rules.log2_alpha_min, tile_x, tile_y, ts, open, lists);
+        list_blocks(&geometry[0], j, lanes, args.rules.log2_alpha_min, tile_x, tile_y, ts, open, lists);
       }
     }
     for (int b = 0; b < blocks; ++b) {
@@ -132,8 +181,8 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
         const SplatRecords<float> splat{&geometry[j], &colors[Color ? j : 0],
                                         D == DepthMode::none ? nullptr : &args.depths[id],
                                         Perspective ? &args.perspectives[id] : nullptr};
-        const auto hit = blend_splat<Color, D, M, Perspective>(state, args.rules, splat, px, py);
-        if (any(hit) && !any(state.transmittance >= closed_below)) {
+        blend_splat<Color, D, M, Perspective>(state, args.rules, splat, px, py);
+        if (!any(state.open)) {
           open[b] = false;
           --open_count;
           break;
@@ -144,25 +193,7 @@ void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
   }
 
   for (int b = 0; b < blocks; ++b) {
-    const int x0 = tile_x + (b % blocks_x) * kBlockWidth, y0 = tile_y + (b / blocks_x) * kBlockHeight;
-    const BlendState<F, D>& s = states[b];
-    for (int l = 0; l < kWidth; ++l) {
-      const int x = x0 + l % kBlockWidth, y = y0 + l / kBlockWidth;
-      if (x >= grid.width || y >= grid.height) continue;
-      BlendState<float, D> one;
-      one.transmittance = s.transmittance[l];
-      one.r = s.r[l];
-      one.g = s.g[l];
-      one.b = s.b[l];
-      one.median = s.median[l];
-      one.accumulated = s.accumulated[l];
-      one.z_ref = s.z_ref[l];
-      one.first_hit = s.first_hit[l];
-      write_pixel(args,
-                  static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
-                      static_cast<std::size_t>(x),
-                  one);
-    }
+    write_block(args, tile_x + (b % blocks_x) * kBlockWidth, tile_y + (b / blocks_x) * kBlockHeight, states[b]);
   }
 }
 

@@ -136,7 +136,7 @@ __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float>
                                       D == DepthMode::none ? nullptr : args.depths.data + ids[j],
                                       Perspective ? args.perspectives.data + ids[j] : nullptr};
       blend_splat<Color, D, M, Perspective>(state, args.rules, splat, px, py);
-      open = !(state.transmittance < args.rules.transmittance_min);
+      open = state.open;
     }
   }
   if (inside) {
