@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Blending a pixel's stack, and its depths."""
-from . import Edit, Plant, plant
+from . import plant
 
 BLEND = "include/gsnav/kernels/blend.hpp"
 DEPTH = "include/gsnav/kernels/depth.hpp"
 PROJECTION = "include/gsnav/kernels/projection.hpp"
-LANES = "include/gsnav/kernels/lanes/rasterize_tile.hpp"
 STACK_TEST = "tests/hard_cases/test_stack.cpp"
 DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
 CUT_TEST = "tests/hard_cases/test_determinism.cpp"

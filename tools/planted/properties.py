@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every image has to have, whatever is in it."""
-from . import Edit, Plant, plant
+from . import plant
 
 BLEND = "include/gsnav/kernels/blend.hpp"
 PROJECTION = "include/gsnav/kernels/projection.hpp"
