@@ -11,6 +11,7 @@
 
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/nav/geodesic_field.hpp"
+#include "gsnav/nav/step.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "navmesh_impl.hpp"
 
@@ -154,6 +155,33 @@ void obstacle(benchmark::State& state, const Scene* (*make)()) {
   });
 }
 
+/// Steps of 0.25 m of agents that keep their polygons, among `avatars` walkers of 20 capsules spread over the mesh.
+void steps(benchmark::State& state, const Scene* (*make)()) {
+  const auto avatars = static_cast<std::size_t>(state.range(0));
+  const Scene* scene = make();
+  if (scene == nullptr) return state.SkipWithError("the mesh is not in GSNAV_DATA_DIR");
+  Rng rng(3);
+  std::vector<DynamicCapsule> list;
+  for (std::size_t a = 0; a < avatars; ++a) {
+    const Vec3d at = scene->positions[4095 - a], v{rng.uniform(-0.05, 0.05), 0, rng.uniform(-0.05, 0.05)};
+    for (std::uint32_t bone = 0; bone < 20; ++bone) {
+      const Vec3d p0{rng.uniform(-0.3, 0.3), rng.uniform(0.1, 1.7), rng.uniform(-0.3, 0.3)};
+      const Vec3d p1{rng.uniform(-0.3, 0.3), rng.uniform(0.1, 1.7), rng.uniform(-0.3, 0.3)};
+      const Capsule<double> c{at + p0, at + p1, 0.06};
+      list.push_back({{c, {c.p0 + v, c.p1 + v, 0.06}}, static_cast<std::uint32_t>(a), bone});
+    }
+  }
+  const CapsuleSet bodies = CapsuleSet::create(std::move(list)).value();
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const NavPoint& p = scene->points[i & 1023u];
+    const double a = static_cast<double>(i & 1023u);
+    benchmark::DoNotOptimize(step(*scene->mesh, {p.position, 0.1, 1.5, p.poly},
+                                  {0.25 * std::cos(a), 0, 0.25 * std::sin(a)}, bodies));
+    ++i;
+  }
+}
+
 #define GSNAV_NAV_BENCH(name)                  \
   BENCHMARK_CAPTURE(name, flat, flat);         \
   BENCHMARK_CAPTURE(name, nav_test, nav_test); \
@@ -168,6 +196,7 @@ GSNAV_NAV_BENCH(random_point);
 GSNAV_NAV_BENCH(snap);
 GSNAV_NAV_BENCH(detour_snap);
 GSNAV_NAV_BENCH(obstacle);
+BENCHMARK_CAPTURE(steps, flat, flat)->Arg(0)->Arg(3)->Arg(100);
 
 }  // namespace
 

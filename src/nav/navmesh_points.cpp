@@ -52,16 +52,14 @@ struct Reached {
   }
 };
 
-std::optional<ObstacleHit> closest_wall(const NavMesh::Impl& impl, const NavPoint& start,
-                                        double max_radius) {
-  const PolyMesh& m = impl.polys;
-  const Vec3d c = start.position - impl.origin;
-  std::optional<ObstacleHit> hit;
-  double best = max_radius;
-  // The straight way to the nearest wall crosses edges that are nearer than it: no others are crossed.
+/// Calls f(distance, a, b, nearest point) for the edges of the mesh within `radius` of c, relative to
+/// the mesh's origin; f may make the radius less. The straight way to an edge crosses edges that are
+/// nearer than it: no others are crossed.
+template <class F>
+void each_wall(const PolyMesh& m, PolyId start, const Vec3d& c, double& radius, F&& f) {
   thread_local Reached reached;
   reached.begin(m.polys.size());
-  reached.add(start.poly);
+  reached.add(start);
   for (std::size_t i = 0; i < reached.queue.size(); ++i) {
     const PolyMesh::Poly& poly = m.polys[reached.queue[i]];
     for (std::uint32_t k = 0; k < poly.count; ++k) {
@@ -70,17 +68,32 @@ std::optional<ObstacleHit> closest_wall(const NavMesh::Impl& impl, const NavPoin
       if (!(len2 > 0)) continue;
       const double t = clamp(((c.x - a.x) * ex + (c.z - a.z) * ez) / len2, 0.0, 1.0);
       const double dx = a.x + t * ex - c.x, dz = a.z + t * ez - c.z, d = std::sqrt(dx * dx + dz * dz);
-      if (d > best) continue;
+      if (d > radius) continue;
       const PolyId next = m.neighbours[poly.first + k];
       if (next != kNoPoly) {
         reached.add(next);
-        continue;
+      } else {
+        f(d, a, b, lerp(a, b, t));
       }
-      const double inverse = 1 / std::sqrt(len2);
-      hit = ObstacleHit{d, lerp(a, b, t) + impl.origin, {-ez * inverse, 0, ex * inverse}};
-      best = d;
     }
   }
+}
+
+/// Into the mesh: corners run counter-clockwise in (x, z).
+Vec3d inward(const Vec3d& a, const Vec3d& b) noexcept {
+  const double ex = b.x - a.x, ez = b.z - a.z, inverse = 1 / std::sqrt(ex * ex + ez * ez);
+  return {-ez * inverse, 0, ex * inverse};
+}
+
+std::optional<ObstacleHit> closest_wall(const NavMesh::Impl& impl, const NavPoint& start,
+                                        double max_radius) {
+  std::optional<ObstacleHit> hit;
+  double radius = max_radius;
+  each_wall(impl.polys, start.poly, start.position - impl.origin, radius,
+            [&](double d, const Vec3d& a, const Vec3d& b, const Vec3d& nearest) {
+              hit = ObstacleHit{d, nearest + impl.origin, inward(a, b)};
+              radius = d;
+            });
   return hit;
 }
 
@@ -136,6 +149,19 @@ std::optional<ObstacleHit> NavMesh::closest_obstacle(const Vec3d& p, double max_
   const auto start = snap_point(p, options);
   if (!start || !(max_radius >= 0)) return {};
   return closest_wall(*impl_, *start, max_radius);
+}
+
+std::vector<ObstacleHit> NavMesh::obstacles_near(const NavPoint& p, double radius) const {
+  std::vector<ObstacleHit> out;
+  if (p.poly >= polygon_count() || !is_finite(p.position) || !(radius >= 0)) return out;
+  const Vec3d c = p.position - impl_->origin;
+  each_wall(impl_->polys, p.poly, c, radius,
+            [&](double d, const Vec3d& a, const Vec3d& b, const Vec3d& nearest) {
+              constexpr double kTouching = 1e-9;  // metres
+              const Vec3d way{c.x - nearest.x, 0, c.z - nearest.z};
+              out.push_back({d, nearest + impl_->origin, d > kTouching ? way * (1 / d) : inward(a, b)});
+            });
+  return out;
 }
 
 double NavMesh::distance_to_closest_obstacle(const Vec3d& p, double max_radius,

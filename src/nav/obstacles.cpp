@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 
 namespace gsnav {
@@ -67,7 +68,41 @@ Result<CapsuleSet> CapsuleSet::create(std::vector<DynamicCapsule> capsules, doub
     add_swept(g.swept, c.motion.begin);
     add_swept(g.swept, c.motion.end);
   }
+  set.make_grid();
   return set;
+}
+
+void CapsuleSet::make_grid() {
+  Aabb<double> all;
+  for (const Group& g : groups_) {
+    all.add(g.swept.low);
+    all.add(g.swept.high);
+  }
+  // About one cell a body; a body that sweeps the whole grid is still in few of them.
+  constexpr double kMostCellsASide = 64;
+  const double side = groups_.empty()
+                          ? 1.0
+                          : clamp(std::sqrt(static_cast<double>(groups_.size())), 1.0, kMostCellsASide);
+  columns_ = rows_ = static_cast<std::uint32_t>(side);
+  if (!groups_.empty()) {
+    low_ = all.low;
+    columns_per_metre_ = columns_ / max(all.high.x - all.low.x, 1e-3);
+    rows_per_metre_ = rows_ / max(all.high.z - all.low.z, 1e-3);
+  }
+  cells_.clear();
+  for (const Group& g : groups_) cells_.push_back(cells_of(g.swept));
+  first_.assign(std::size_t{columns_} * rows_ + 1, 0);
+  const auto each = [&](const Cells& q, const auto& f) {
+    for (std::uint32_t r = q.r0; r <= q.r1; ++r) {
+      for (std::uint32_t c = q.c0; c <= q.c1; ++c) f(std::size_t{r} * columns_ + c);
+    }
+  };
+  for (const Cells& q : cells_) each(q, [&](std::size_t cell) { ++first_[cell + 1]; });
+  for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
+  in_cell_.assign(first_.back(), 0);
+  std::vector<std::uint32_t> at(first_.begin(), first_.end() - 1);
+  for (std::uint32_t g = 0; g < cells_.size(); ++g)
+    each(cells_[g], [&](std::size_t cell) { in_cell_[at[cell]++] = g; });
 }
 
 Result<CapsuleSet> CapsuleSet::standing(std::span<const Capsule<double>> capsules,

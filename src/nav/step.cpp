@@ -2,6 +2,7 @@
 #include "gsnav/nav/step.hpp"
 
 #include <cmath>
+#include <limits>
 
 namespace gsnav {
 namespace {
@@ -16,9 +17,14 @@ bool valid(const AgentState& a) noexcept {
          std::abs(a.position.y) <= kMaxCoordinate && std::abs(a.position.z) <= kMaxCoordinate;
 }
 
-bool apart(const Aabb<double>& a, const Aabb<double>& b) noexcept {
-  return a.high.x < b.low.x || b.high.x < a.low.x || a.high.y < b.low.y || b.high.y < a.low.y ||
-         a.high.z < b.low.z || b.high.z < a.low.z;
+/// How far two boxes are apart, at least.
+double distance(const Aabb<double>& a, const Aabb<double>& b) noexcept {
+  double d2 = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double d = max(max(a.low[k] - b.high[k], b.low[k] - a.high[k]), 0.0);
+    d2 += d * d;
+  }
+  return std::sqrt(d2);
 }
 
 double length_xz(const Vec3d& v) noexcept { return std::sqrt(v.x * v.x + v.z * v.z); }
@@ -41,11 +47,9 @@ struct Stepper {
       box.add(p - Vec3d{reach, reach, reach});
       box.add(p + Vec3d{reach, reach, reach});
     }
-    for (const CapsuleSet::Group& g : bodies.groups()) {
-      if (!apart(box, g.swept)) {
-        first_impact<double>({from, to}, bodies.capsules_of(g), ua, ub, rules, best);
-      }
-    }
+    bodies.groups_in(box, [&](const CapsuleSet::Group& g) {
+      first_impact<double>({from, to}, bodies.capsules_of(g), ua, ub, rules, best);
+    });
     return best;
   }
 
@@ -64,12 +68,14 @@ struct Stepper {
     out.avatar = hit.avatar;
     out.bone = hit.bone;
     // The sweep worked relative to the leg's start.
-    out.contact_point = hit.sweep.point + agent_capsule(out.path.back().position, agent.radius, agent.height).p0;
+    out.contact_point =
+        hit.sweep.point + agent_capsule(out.path.back().position, agent.radius, agent.height).p0;
     out.normal = hit.sweep.normal;
     out.agent_caused = hit.sweep.agent_closing;
   }
 
-  /// Goes from the end of the path to `to`, or as far as bodies let it. Returns the impact that stopped it.
+  /// Goes from the end of the path to `to`, or as far as bodies let it. Returns the impact that stopped
+  /// it.
   FirstImpact<double> go(const WalkPoint& to) const {
     const WalkPoint from = out.path.back();
     const FirstImpact<double> hit = sweep_leg(from.position, to.position, from.fraction, to.fraction);
@@ -193,9 +199,25 @@ Clearance clearance(const AgentState& agent, const CapsuleSet& bodies, double t)
   Clearance best;
   if (!valid(agent) || !is_finite(t)) return best;
   const double u = bodies.fraction_at(t);
-  for (const CapsuleSet::Group& g : bodies.groups()) {
-    nearest_body<double>(agent_capsule(agent.position, agent.radius, agent.height), bodies.capsules_of(g), u,
-                         best);
+  const Capsule<double> solid = agent_capsule(agent.position, agent.radius, agent.height);
+  const Vec3d r{solid.radius, solid.radius, solid.radius};
+  Aabb<double> box;
+  box.add(solid.p0 - r);
+  box.add(solid.p1 + r);
+  // The avatar whose box is nearest first: most of the others are then too far to look at.
+  const std::span<const CapsuleSet::Group> groups = bodies.groups();
+  std::size_t first = 0;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const double d = distance(box, groups[i].swept);
+    if (d >= nearest) continue;
+    nearest = d;
+    first = i;
+  }
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const CapsuleSet::Group& g = groups[i == 0 ? first : (i <= first ? i - 1 : i)];
+    if (distance(box, g.swept) > max(best.distance, 0.0) + kRounding) continue;  // boxes tell no depth
+    nearest_body<double>(solid, bodies.capsules_of(g), u, best);
   }
   return best;
 }

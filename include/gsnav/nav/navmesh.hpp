@@ -145,6 +145,9 @@ class NavMesh {
   /// The edge itself; none where p cannot be snapped or no edge is within `max_radius`.
   std::optional<ObstacleHit> closest_obstacle(const Vec3d& p, double max_radius = 2.0,
                                               const SnapOptions& options = {}) const;
+  /// All edges within `radius` that can be reached on the surface within it, each with its nearest point; the
+  /// normal there points to p, or into the mesh where p is on the edge.
+  std::vector<ObstacleHit> obstacles_near(const NavPoint& p, double radius) const;
   /// Which cells of a grid over the bounds are walkable within `max_height_delta` of `height` (world, metres).
   /// Errors: invalid_argument for a cell that is not positive or a grid of more than 2^28 cells.
   Result<TopDownMap> top_down_map(double height, double metres_per_cell, double max_height_delta = 0.5) const;

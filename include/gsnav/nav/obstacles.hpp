@@ -49,14 +49,55 @@ class CapsuleSet {
     Aabb<double> swept{};
   };
   std::span<const Group> groups() const noexcept { return groups_; }
+  /// Calls f(group), once each, for the groups whose swept box meets `box`: by a grid on the ground
+  /// plane.
+  template <class F>
+  void groups_in(const Aabb<double>& box, F&& f) const {
+    const Cells q = cells_of(box);
+    for (std::uint32_t r = q.r0; r <= q.r1; ++r) {
+      for (std::uint32_t c = q.c0; c <= q.c1; ++c) {
+        const std::size_t cell = std::size_t{r} * columns_ + c;
+        for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+          const std::uint32_t g = in_cell_[i];
+          // A group in many cells belongs to the first of those looked at.
+          if (c != max(q.c0, cells_[g].c0) || r != max(q.r0, cells_[g].r0)) continue;
+          if (!apart(box, groups_[g].swept)) f(groups_[g]);
+        }
+      }
+    }
+  }
   View<const DynamicCapsule> capsules_of(const Group& g) const noexcept {
     return {capsules_.data() + g.first, g.count};
   }
 
  private:
+  /// Cells that a box reaches into, both ends included.
+  struct Cells {
+    std::uint32_t c0 = 0, c1 = 0, r0 = 0, r1 = 0;
+  };
+  static bool apart(const Aabb<double>& a, const Aabb<double>& b) noexcept {
+    return a.high.x < b.low.x || b.high.x < a.low.x || a.high.y < b.low.y || b.high.y < a.low.y ||
+           a.high.z < b.low.z || b.high.z < a.low.z;
+  }
+  Cells cells_of(const Aabb<double>& box) const noexcept {
+    const auto cell = [](double v, double low, double per_metre, std::uint32_t n) {
+      return static_cast<std::uint32_t>(clamp((v - low) * per_metre, 0.0, static_cast<double>(n - 1)));
+    };
+    return {cell(box.low.x, low_.x, columns_per_metre_, columns_),
+            cell(box.high.x, low_.x, columns_per_metre_, columns_),
+            cell(box.low.z, low_.z, rows_per_metre_, rows_),
+            cell(box.high.z, low_.z, rows_per_metre_, rows_)};
+  }
+  void make_grid();
+
   std::vector<DynamicCapsule> capsules_;
   std::vector<Group> groups_;
   double t0_ = 0.0, t1_ = 1.0;
+  Vec3d low_{};  ///< of the grid
+  double columns_per_metre_ = 0.0, rows_per_metre_ = 0.0;
+  std::uint32_t columns_ = 1, rows_ = 1;
+  std::vector<std::uint32_t> first_{0, 0}, in_cell_;  ///< groups by cell
+  std::vector<Cells> cells_;                          ///< of each group
 };
 
 }  // namespace gsnav
