@@ -105,7 +105,7 @@ TEST_CASE(
     std::vector<DynamicCapsule> list;
     std::vector<Body> around;
     const double seconds = 0.1;
-    for (std::uint32_t a = 0; a < 1 + i % 5u; ++a) {
+    for (std::uint32_t a = 0; a <= static_cast<std::uint32_t>(i % 5); ++a) {
       const Vec3d to = flat(rng.uniform(0.6, 6), rng.uniform(0, 2 * kPi));
       const Vec3d v = flat(rng.uniform(0, 1.5), rng.uniform(0, 2 * kPi));
       list.push_back(walker(agent.position + to, v, seconds, 0.3, a));
