@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "gsnav/backends/cuda.hpp"
+
+namespace gsnav {
+
+/// One camera of a batch and what it sees.
+struct BatchCamera {
+  Camera camera;
+  /// Indices into the call's sets, each at most once; blended as one list, ties by place in this list.
+  /// Empty: all sets, in order. Read during the call only.
+  std::span<const std::uint32_t> sets;
+};
+
+/// Images of a batch in device memory, [C][H][W] row-major; null: not asked for. They stay on the device: a
+/// learner on the same stream reads them without a copy.
+struct BatchImages {
+  FrameImages<float> floats;   ///< rgb is [C][H][W][3], unclamped
+  std::uint8_t* rgb8 = nullptr;  ///< [C][H][W][3], round(255 clamp(c, 0, 1)); may stand beside floats.rgb
+};
+
+/// What a batch was made of; all cameras together.
+struct BatchStats {
+  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, tiles of 16 x 16 pixels
+  std::uint64_t scratch_bytes = 0;       ///< held on the device, without scene and images
+  int reruns = 0;                        ///< how often the batch was drawn again because scratch had to grow
+};
+
+/// Draws many cameras in one call on one GPU; docs/cuda.md says how. Images have the bits that
+/// `Renderer<float, CudaBackend>` gives each camera alone, whatever the batch.
+///
+///     gsnav::CudaBatchRenderer batch(cuda, config);
+///     batch.render(sets, cameras, images).throw_if_error();   // returns at once
+///     ...                                                      // work on cuda.stream() may follow
+///     batch.finish().throw_if_error();                         // images are there, and whole
+///
+/// `RenderConfig::outputs` and `tile_size` are not read: pointers say which images, and tiles are 16 pixels.
+class CudaBatchRenderer {
+ public:
+  /// The backend must outlive it; work goes to its stream.
+  explicit CudaBatchRenderer(CudaBackend& backend, const RenderConfig& config = {});
+  ~CudaBatchRenderer();
+  CudaBatchRenderer(const CudaBatchRenderer&) = delete;
+  CudaBatchRenderer& operator=(const CudaBatchRenderer&) = delete;
+
+  /// Draws the sets (arrays on the device) from all cameras, which have one size. Enqueues and returns;
+  /// images are whole once `finish()` has said ok. Errors: invalid_argument naming camera, set or field;
+  /// unsupported; backend_failure. Throws gsnav::Error (out_of_memory) where scratch cannot be allocated.
+  Status render(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+                const BatchImages& images);
+
+  /// Waits for the last `render`. Where scratch was too small, grows it and draws that batch again.
+  /// Arrays and images of that call must still be there. Errors: backend_failure, unsupported.
+  Status finish();
+
+  /// Of the last batch that `finish()` saw.
+  const BatchStats& stats() const noexcept;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace gsnav

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cuda_runtime.h>
+
+#include <cstdint>
+
+#include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/project_chunk.hpp"
+#include "gsnav/kernels/tiles.hpp"
+
+// What the kernels of a batch read and write (docs/cuda.md).
+
+namespace gsnav::cuda {
+
+inline constexpr int kBatchTile = 16;  ///< pixels a side
+inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
+
+/// A set seen by a camera. Instances of a set are neighbours; those of a camera are listed by
+/// camera_instances, in order of first_rank.
+struct BatchInstance {
+  ProjectArgs<float> args;  ///< without outputs
+  std::uint32_t camera;
+};
+
+/// A set of the call: its units of culling are first_unit + word * chunks + chunk, a word 32 instances.
+struct BatchSet {
+  std::uint64_t first_unit;
+  std::uint32_t first_instance, instances, chunks;
+};
+
+/// A chunk and those of 32 instances that may see it.
+struct BatchItem {
+  std::uint32_t first_instance, chunk, mask;
+};
+
+/// A survivor as blending reads it.
+struct alignas(16) SplatRecord {
+  std::uint32_t ref;  ///< x | y << 16 of the reference pixel
+  float a, k, b;
+  float w1, w2, log2_opacity, r;
+  float g, blue;
+  std::uint32_t x, y;  ///< bounds: first | end << 16
+};
+
+/// A survivor as binning reads it. `camera` is kNoSlot where a slot was taken and not used.
+struct alignas(16) SplatEntry {
+  std::uint32_t key, x, y, camera;
+};
+
+/// A slot whose record is still to be computed, in double, from row `row` of an instance.
+struct HardSplat {
+  std::uint32_t slot, instance, row;
+};
+
+/// A splat of a tile's list.
+struct Pair {
+  std::uint32_t key, slot;
+};
+
+/// Counts go on where capacities end, so that they say what would have been needed.
+struct BatchCounters {
+  unsigned long long slots, hard, large, pairs;
+  std::uint32_t items;
+};
+
+/// By value to every kernel.
+struct BatchArgs {
+  const BatchSet* sets;
+  const BatchInstance* instances;
+  const std::uint32_t* camera_first;      ///< [cameras + 1] into camera_instances
+  const std::uint32_t* camera_instances;
+  std::uint64_t units;
+  std::uint32_t set_count, cameras, tiles;  ///< tiles of all cameras
+  TileGrid grid;
+  float log2_alpha_min;
+  bool elliptic;
+
+  BatchItem* items;
+  BatchCounters* counters;
+  SplatRecord* records;
+  SplatEntry* entries;
+  std::uint32_t* sources;  ///< per slot: first_rank of its instance + row as stored
+  SplatDepth<float>* depths;              ///< null: no image sums depths
+  SplatPerspective<float>* perspectives;  ///< null: Response::ewa
+  HardSplat* hard;
+  std::uint32_t* large;
+  std::uint32_t* tile_counts;
+  std::uint32_t* tile_begins;
+  std::uint32_t* tile_cursors;
+  Pair* pairs;
+  Pair* pairs_alt;
+  std::uint32_t slot_capacity, hard_capacity, large_capacity, pair_capacity;
+  std::uint32_t slab;  ///< slots that a warp takes at a time: few cameras leave few to share them
+};
+
+__device__ inline std::uint32_t used(unsigned long long count, std::uint32_t capacity) {
+  return count < capacity ? static_cast<std::uint32_t>(count) : capacity;
+}
+
+__device__ inline SplatGeometry<float> geometry_of(const SplatRecord& r) {
+  return {static_cast<float>(r.ref & 0xffffu) + 0.5f, static_cast<float>(r.ref >> 16) + 0.5f,
+          r.a, r.k, r.b, r.w1, r.w2, r.log2_opacity};
+}
+
+__device__ inline SplatBounds bounds_of(std::uint32_t x, std::uint32_t y) {
+  return {static_cast<std::int32_t>(x & 0xffffu), static_cast<std::int32_t>(y & 0xffffu),
+          static_cast<std::int32_t>(x >> 16), static_cast<std::int32_t>(y >> 16)};
+}
+
+/// The instance, among a camera's, that a source belongs to.
+__device__ inline const BatchInstance& instance_of(const BatchArgs& a, std::uint32_t camera,
+                                                   std::uint32_t source) {
+  std::uint32_t low = a.camera_first[camera], high = a.camera_first[camera + 1];
+  while (high - low > 1) {
+    const std::uint32_t mid = (low + high) / 2;
+    if (a.instances[a.camera_instances[mid]].args.first_rank <= source) {
+      low = mid;
+    } else {
+      high = mid;
+    }
+  }
+  return a.instances[a.camera_instances[low]];
+}
+
+/// What decides between equal keys.
+__device__ inline std::uint32_t rank_of(const BatchArgs& a, std::uint32_t camera, std::uint32_t slot) {
+  const std::uint32_t source = a.sources[slot];
+  const ProjectArgs<float>& args = instance_of(a, camera, source).args;
+  const View<const std::uint32_t>& rows = args.gaussians.row_ids;
+  return rows.empty() ? source : args.first_rank + rows[source - args.first_rank];
+}
+
+// Launches, in the order of a frame. `blocks`: how many keep the device full.
+void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
+void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
+/// `raster`: rules, background and images; `rgb8` may stand beside its rgb.
+void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std::uint8_t* rgb8,
+                     cudaStream_t stream);
+
+}  // namespace gsnav::cuda

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in one row.
+//
+//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [batch sizes...]
+//
+// Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of views
+// repeats them from slightly different places. Times are the device's, between events on the stream.
+#include <cuda_runtime.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
+
+#include "error.hpp"
+#include "gsnav/backends/cuda/batch.hpp"
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "workload.hpp"
+
+using namespace gsnav;
+
+namespace {
+
+constexpr int kSize = 256, kRepeats = 9;
+constexpr std::size_t kReferenceViews = 4;  ///< compared with float64
+
+/// `count` cameras from `first` on: the views, and when they are all taken the views moved by centimetres.
+std::vector<BatchCamera> cameras_of(std::size_t first, std::size_t count) {
+  const std::vector<Camera> views = gsnav_bench::sized(kSize, kSize);
+  std::vector<BatchCamera> batch;
+  for (std::size_t i = first; i < first + count; ++i) {
+    BatchCamera c{views[i % views.size()], {}};
+    c.camera.viewmat.translation.x += 0.02 * static_cast<double>(i / views.size());
+    batch.push_back(c);
+  }
+  return batch;
+}
+
+struct DeviceImages {
+  DeviceImages(CudaBackend& cuda, std::size_t pixels) : memory(cuda) {
+    memory.resize_discard(5 * pixels);
+    images.floats.rgb = memory.data();
+    images.floats.alpha = memory.data() + 3 * pixels;
+    images.floats.median_depth = memory.data() + 4 * pixels;
+  }
+  Buffer<float, CudaBackend> memory;
+  BatchImages images;
+};
+
+double quantile(std::vector<float> ms, double q) {
+  std::sort(ms.begin(), ms.end());
+  return ms[static_cast<std::size_t>(q * static_cast<double>(ms.size() - 1))];
+}
+
+void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Frames<double>& truth,
+         std::size_t count, Profile profile) {
+  RenderConfig config;
+  config.profile = profile;
+  CudaBatchRenderer renderer(cuda, config);
+  const std::size_t pixels = std::size_t{kSize} * kSize;
+  DeviceImages out(cuda, count * pixels);
+  const std::vector<GaussianSet> sets{arrays.set()};
+  cudaEvent_t begin, end;
+  cudaEventCreate(&begin);
+  cudaEventCreate(&end);
+  const std::size_t views = gsnav_bench::workload().cameras.size();
+  const std::size_t batches = std::max<std::size_t>(1, views / count);
+  std::vector<float> ms;
+  double pairs = 0;
+  for (int repeat = -1; repeat < kRepeats; ++repeat) {  // the first finds the scratch it takes
+    for (std::size_t b = 0; b < batches; ++b) {
+      const std::vector<BatchCamera> cameras = cameras_of(b * count, count);
+      cudaEventRecord(begin, cuda.stream());
+      renderer.render(sets, cameras, out.images).throw_if_error();
+      cudaEventRecord(end, cuda.stream());
+      renderer.finish().throw_if_error();
+      if (repeat < 0) continue;
+      float t = 0;
+      cudaEventElapsedTime(&t, begin, end);
+      ms.push_back(t / static_cast<float>(count));
+      pairs += static_cast<double>(renderer.stats().tile_intersections);
+    }
+  }
+  const std::size_t compared = std::min(count, truth.cameras);
+  renderer.render(sets, cameras_of(0, compared), out.images).throw_if_error();
+  renderer.finish().throw_if_error();
+  std::vector<float> rgb(3 * compared * pixels), depth(compared * pixels), depth_seen;
+  std::vector<double> depth_truth;
+  cuda.copy(rgb.data(), out.images.floats.rgb, rgb.size() * sizeof(float), CopyKind::device_to_host);
+  cuda.copy(depth.data(), out.images.floats.median_depth, depth.size() * sizeof(float), CopyKind::device_to_host);
+  cuda.synchronize().throw_if_error();
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    if (truth.alpha[i] <= 0.9) continue;
+    depth_seen.push_back(depth[i]);
+    depth_truth.push_back(truth.median_depth[i]);
+  }
+  const std::vector<double> rgb_truth(truth.rgb.begin(), truth.rgb.begin() + static_cast<std::ptrdiff_t>(rgb.size()));
+  const gsnav_bench::Error e = gsnav_bench::error_of(rgb, rgb_truth);
+  std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f  %.1e  %9.0f  %8.1f\n",
+              profile == Profile::fast ? "fast" : "exact", count, quantile(ms, 0.5), quantile(ms, 0.9),
+              1000.0 / quantile(ms, 0.5), e.max, e.p999, e.psnr,
+              gsnav_bench::error_of(depth_seen, depth_truth).p99,
+              pairs / static_cast<double>(ms.size() * count), static_cast<double>(renderer.stats().scratch_bytes) / 1e6);
+  std::fflush(stdout);
+  cudaEventDestroy(begin);
+  cudaEventDestroy(end);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (CudaBackend::device_count() == 0) {
+    std::fprintf(stderr, "bench_batch: no GPU\n");
+    return 1;
+  }
+  CudaBackend cuda;
+  const GaussianArrays<CudaBackend> arrays(cuda, gsnav_bench::workload().cloud);
+  OpenMPBackend cpu;
+  Renderer<double, OpenMPBackend> reference(cpu);
+  std::vector<Camera> cameras;
+  for (const BatchCamera& c : cameras_of(0, kReferenceViews)) cameras.push_back(c.camera);
+  const std::vector<GaussianSet> sets{gsnav_bench::workload().cloud.set()};
+  const Frames<double> truth = reference.render(sets, cameras).value();
+  std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB + alpha + median depth\n", cuda.device_name().c_str(),
+              gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), kSize, kSize);
+  std::printf("profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  scratch MB\n");
+  std::vector<std::size_t> counts;
+  for (int i = 1; i < argc; ++i) counts.push_back(std::strtoull(argv[i], nullptr, 10));
+  if (counts.empty()) counts = {1, 8, 64, 256, 512};
+  for (const Profile profile : {Profile::fast, Profile::exact}) {
+    for (const std::size_t count : counts) row(cuda, arrays, truth, count, profile);
+  }
+}

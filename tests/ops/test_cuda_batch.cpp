@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+// The batched renderer against one camera at a time: the same bits, whatever the batch.
+#include <doctest/doctest.h>
+
+#include <cstdio>
+
+#include "ops/backends.hpp"
+#include "support/scenes.hpp"
+
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda/batch.hpp"
+#include "gsnav/scene/spatial_order.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+bool no_gpu(const char* what) {
+  if (CudaBackend::device_count() > 0) return false;
+  std::printf("SKIP: %s: no GPU\n", what);
+  return true;
+}
+
+using Lists = std::vector<std::vector<std::uint32_t>>;
+
+/// Images of a batch, fetched. `lists`: the sets of each camera; empty: all.
+struct Batch {
+  Frames<float> frames;
+  std::vector<std::uint8_t> rgb8;
+  BatchStats stats;
+};
+
+Batch draw(CudaBackend& cuda, CudaBatchRenderer& renderer, const std::vector<GaussianSet>& sets,
+           const std::vector<Camera>& cameras, const Lists& lists, unsigned outputs, bool bytes = true) {
+  Batch out;
+  const std::size_t pixels =
+      static_cast<std::size_t>(cameras[0].width) * static_cast<std::size_t>(cameras[0].height) * cameras.size();
+  Buffer<float, CudaBackend> images(cuda);
+  Buffer<std::uint8_t, CudaBackend> rgb8(cuda);
+  images.resize_discard(8 * pixels);
+  rgb8.resize_discard(3 * pixels);
+  cuda.fill(images.data(), 0xa5, 8 * pixels * sizeof(float));  // what is not written is seen
+  cuda.fill(rgb8.data(), 0xa5, 3 * pixels);
+  BatchImages to;
+  const auto at = [&](unsigned output, std::size_t first) {
+    return (outputs & output) != 0 ? images.data() + first * pixels : nullptr;
+  };
+  to.floats = {at(kRgb, 0), at(kAlpha, 3), at(kMedianDepth, 4), at(kExpectedDepth, 5), at(kAccumulatedDepth, 6),
+               at(kFirstHitDepth, 7)};
+  to.rgb8 = bytes ? rgb8.data() : nullptr;
+  std::vector<BatchCamera> batch;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    batch.push_back({cameras[c], lists.empty() ? std::span<const std::uint32_t>() : std::span(lists[c])});
+  }
+  renderer.render(sets, batch, to).throw_if_error();
+  renderer.finish().throw_if_error();
+  out.stats = renderer.stats();
+  const auto fetch = [&](std::vector<float>& image, const float* from, std::size_t channels) {
+    if (from == nullptr) return;
+    image.resize(channels * pixels);
+    cuda.copy(image.data(), from, image.size() * sizeof(float), CopyKind::device_to_host);
+  };
+  fetch(out.frames.rgb, to.floats.rgb, 3);
+  fetch(out.frames.alpha, to.floats.alpha, 1);
+  fetch(out.frames.median_depth, to.floats.median_depth, 1);
+  fetch(out.frames.expected_depth, to.floats.expected_depth, 1);
+  fetch(out.frames.accumulated_depth, to.floats.accumulated_depth, 1);
+  fetch(out.frames.first_hit_depth, to.floats.first_hit_depth, 1);
+  if (bytes) {
+    out.rgb8.resize(3 * pixels);
+    rgb8.download(out.rgb8.data(), out.rgb8.size());
+  }
+  REQUIRE(cuda.synchronize().ok());
+  return out;
+}
+
+/// The same cameras one at a time through the generic path.
+Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& sets, const std::vector<Camera>& cameras,
+                     const Lists& lists, RenderConfig config, unsigned outputs) {
+  config.outputs = outputs;
+  Renderer<float, CudaBackend> renderer(cuda, config);
+  Frames<float> all;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    std::vector<GaussianSet> seen;
+    if (lists.empty() || lists[c].empty()) seen = sets;
+    if (!lists.empty()) {
+      for (const std::uint32_t s : lists[c]) seen.push_back(sets[s]);
+    }
+    const Frames<float> f = renderer.render(seen, std::vector<Camera>{cameras[c]}).value();
+    const auto append = [](std::vector<float>& to, const std::vector<float>& from) {
+      to.insert(to.end(), from.begin(), from.end());
+    };
+    append(all.rgb, f.rgb);
+    append(all.alpha, f.alpha);
+    append(all.median_depth, f.median_depth);
+    append(all.expected_depth, f.expected_depth);
+    append(all.accumulated_depth, f.accumulated_depth);
+    append(all.first_hit_depth, f.first_hit_depth);
+  }
+  return all;
+}
+
+std::size_t differing(const std::vector<float>& a, const std::vector<float>& b) {
+  if (a.size() != b.size()) return a.size() + b.size() + 1;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) n += a[i] == b[i] ? 0u : 1u;
+  return n;
+}
+
+void check_same(const Frames<float>& a, const Frames<float>& b) {
+  CHECK(differing(a.rgb, b.rgb) == 0);
+  CHECK(differing(a.alpha, b.alpha) == 0);
+  CHECK(differing(a.median_depth, b.median_depth) == 0);
+  CHECK(differing(a.expected_depth, b.expected_depth) == 0);
+  CHECK(differing(a.accumulated_depth, b.accumulated_depth) == 0);
+  CHECK(differing(a.first_hit_depth, b.first_hit_depth) == 0);
+}
+
+/// Cameras around the origin that look at the box of `random_cloud`, none like another.
+std::vector<Camera> ring(int count, int width, int height) {
+  std::vector<Camera> cameras;
+  Rng rng(99);
+  for (int c = 0; c < count; ++c) {
+    const Vec3d eye{rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-0.5, 2.5)};
+    Camera camera = Camera::look_at(eye, {0.3 * rng.uniform(-1, 1), 0.1, 4}, {0, -1, 0.1}, width, height,
+                                    rng.uniform(60, 110));
+    camera.cx += rng.uniform(-9, 9);
+    camera.near_sigma = c % 3 == 0 ? 1 : 0;
+    cameras.push_back(camera);
+  }
+  return cameras;
+}
+
+constexpr unsigned kMedianOnly = kRgb | kAlpha | kMedianDepth, kAll = kRgb | kAlpha | kAnyDepth;
+
+}  // namespace
+
+TEST_CASE("cuda batch: every camera has the bits it has alone") {
+  if (no_gpu("cuda batch images")) return;
+  CudaBackend cuda;
+  GaussianCloud a = random_cloud(1, {.count = 9000, .needle = 0.3});
+  const GaussianCloud b = random_cloud(2, {.count = 2500, .sh_degree = 1, .scale = 0.2, .mip = true});
+  const GaussianCloud c = random_cloud(3, {.count = 700, .sh_degree = 0, .scale = 0.02});
+  sort_spatially(a);
+  const GaussianArrays<CudaBackend> on_a(cuda, a), on_b(cuda, b), on_c(cuda, c);
+  Similarity placed;
+  placed.translation = {0.4, -0.2, 0.3};
+  placed.scale = 0.7;
+  const std::vector<GaussianSet> sets{on_a.set(), on_b.set(), on_c.set(placed)};
+  const std::vector<Camera> cameras = ring(37, 149, 101);  // two words of instances, tiles cut by the edge
+  Lists lists;
+  for (std::uint32_t i = 0; i < 37; ++i) {
+    lists.push_back(i % 4 == 0 ? std::vector<std::uint32_t>{2, 0}
+                               : i % 4 == 1 ? std::vector<std::uint32_t>{1}
+                                            : i % 4 == 2 ? std::vector<std::uint32_t>{} : std::vector<std::uint32_t>{0, 1, 2});
+  }
+  for (const Response response : {Response::ewa, Response::tangent_plane, Response::ray}) {
+    for (const SortOrder order : {SortOrder::z_depth, SortOrder::camera_distance}) {
+      RenderConfig config;
+      config.response = response;
+      config.sort_order = order;
+      config.background = {0.25, 0.5, 0.75};
+      CudaBatchRenderer renderer(cuda, config);
+      for (const unsigned outputs : {kMedianOnly, kAll}) {
+        CAPTURE(static_cast<int>(response));
+        CAPTURE(outputs);
+        const Batch got = draw(cuda, renderer, sets, cameras, lists, outputs);
+        const Frames<float> expected = singly(cuda, sets, cameras, lists, config, outputs);
+        check_same(got.frames, expected);
+        std::size_t wrong_bytes = 0;
+        for (std::size_t i = 0; i < got.rgb8.size(); ++i) {
+          const float byte = std::floor(255.0f * std::clamp(expected.rgb[i], 0.0f, 1.0f) + 0.5f);
+          wrong_bytes += static_cast<float>(got.rgb8[i]) == byte ? 0u : 1u;
+        }
+        CHECK(wrong_bytes == 0);
+        CHECK(got.stats.tile_intersections > 10000);
+      }
+    }
+  }
+}
+
+TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
+  if (no_gpu("cuda batch profiles")) return;
+  CudaBackend cuda;
+  SerialBackend serial;
+  const GaussianCloud cloud = random_cloud(7, {.count = 3000});
+  const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+  const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 97, 64, 70);
+  for (const Compat compat : {Compat::none, Compat::inria, Compat::gsplat, Compat::habitat_gs}) {
+    for (const Profile profile : {Profile::exact, Profile::fast}) {
+      RenderConfig config;
+      config.compat = compat;
+      config.profile = profile;
+      CudaBatchRenderer renderer(cuda, config);
+      for (const unsigned outputs : {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth}, kMedianOnly, kAll}) {
+        config.outputs = outputs;
+        const Batch got = draw(cuda, renderer, {arrays.set()}, {camera}, {}, outputs, false);
+        check_same(got.frames, render<float>(serial, {cloud.set()}, camera, config));
+      }
+    }
+  }
+}
+
+TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are in order of rank") {
+  if (no_gpu("cuda batch order")) return;
+  CudaBackend cuda;
+  SerialBackend serial;
+  // A wall across the view: every key is equal, and tiles hold more than fits into shared memory. Faint, so that
+  // pixels stay open to the end.
+  GaussianCloudBuilder builder(0);
+  Rng rng(5);
+  for (int i = 0; i < 30000; ++i) {
+    RawGaussian g;
+    g.mean = {rng.uniform(-0.4, 0.4), rng.uniform(-0.4, 0.4), i < 20000 ? 2.0 : rng.uniform(1, 3)};
+    g.quat = {1, 0, 0, 0};
+    for (int k = 0; k < 3; ++k) g.log_scales[k] = std::log(0.02);
+    g.opacity_logit = -4;
+    for (auto& c : g.sh0) c = static_cast<float>(rng.normal());
+    builder.add(g);
+  }
+  GaussianCloud cloud = builder.cloud();
+  Camera camera;
+  camera.set_hfov(48, 48, 60);
+  camera.cx = camera.cy = 24;
+  for (const bool sorted : {false, true}) {
+    if (sorted) sort_spatially(cloud);
+    const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+    CudaBatchRenderer renderer(cuda);
+    const Batch got = draw(cuda, renderer, {arrays.set()}, {camera, camera}, {}, kAll, false);
+    Frames<float> expected = singly(cuda, {arrays.set()}, {camera, camera}, {}, {}, kAll);
+    check_same(got.frames, expected);
+    RenderConfig config;
+    config.outputs = kRgb;
+    const auto cpu = render<float>(serial, {cloud.set()}, camera, config);
+    expected.rgb.resize(cpu.rgb.size());
+    CHECK(differing(cpu.rgb, expected.rgb) == 0);
+  }
+}
+
+TEST_CASE("cuda batch: scratch that is too small grows, and says so") {
+  if (no_gpu("cuda batch overflow")) return;
+  CudaBackend cuda;
+  const GaussianCloud small = random_cloud(11, {.count = 50});
+  const GaussianCloud big = random_cloud(12, {.count = 60000, .needle = 0.2});
+  const GaussianArrays<CudaBackend> few(cuda, small), many(cuda, big);
+  const std::vector<Camera> cameras = ring(9, 96, 80);
+  CudaBatchRenderer renderer(cuda);
+  CHECK(draw(cuda, renderer, {few.set()}, cameras, {}, kMedianOnly).stats.reruns == 0);
+  const Batch grown = draw(cuda, renderer, {many.set()}, cameras, {}, kMedianOnly);
+  CHECK(grown.stats.reruns > 0);
+  check_same(grown.frames, singly(cuda, {many.set()}, cameras, {}, {}, kMedianOnly));
+  const Batch steady = draw(cuda, renderer, {many.set()}, cameras, {}, kMedianOnly);
+  CHECK(steady.stats.reruns == 0);
+  CHECK(steady.stats.scratch_bytes == grown.stats.scratch_bytes);
+  check_same(steady.frames, grown.frames);
+}
+
+TEST_CASE("cuda batch: an empty view, no sets, and what cannot be drawn") {
+  if (no_gpu("cuda batch states")) return;
+  CudaBackend cuda;
+  const GaussianCloud cloud = random_cloud(8, {.count = 500});
+  const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+  const Camera away = Camera::look_at({0, 0, 0}, {0, 0, -4}, {0, -1, 0}, 40, 30, 70);
+  RenderConfig config;
+  config.background = {0.25, 0.5, 0.75};
+  CudaBatchRenderer renderer(cuda, config);
+  for (const bool empty : {false, true}) {
+    const std::vector<GaussianSet> sets = empty ? std::vector<GaussianSet>{} : std::vector<GaussianSet>{arrays.set()};
+    const Batch f = draw(cuda, renderer, sets, {away, away}, {}, kMedianOnly);
+    CHECK(f.frames.rgb[1] == 0.5f);
+    CHECK(f.frames.alpha.back() == 0.0f);
+    CHECK(f.frames.median_depth.back() == 0.0f);
+    CHECK(f.rgb8[2] == 191);
+  }
+  const std::vector<GaussianSet> sets{arrays.set()};
+  const auto message = [&](const std::vector<BatchCamera>& cameras) {
+    const Status s = renderer.render(sets, cameras, {});
+    CHECK_FALSE(s.ok());
+    return s.message();
+  };
+  Camera wide = away;
+  wide.width = 41;
+  const std::vector<std::uint32_t> beyond{0, 1};
+  CHECK(message({}).find("no camera") != std::string::npos);
+  CHECK(message({{away, {}}, {wide, {}}}).find("cameras[1]") != std::string::npos);
+  CHECK(message({{away, beyond}}).find("sets has 1") != std::string::npos);
+}
+#else
+TEST_CASE("cuda batch") { std::printf("SKIP: cuda batch: built without CUDA\n"); }
+#endif
