@@ -43,7 +43,8 @@ struct alignas(16) SplatRecord {
   std::uint32_t x, y;  ///< bounds: first | end << 16
 };
 
-/// A survivor as binning reads it. `camera` is kNoSlot where a slot was taken and not used.
+/// A survivor as binning reads it: its bounds, as in its record, until its tiles are counted. `camera` is
+/// kNoSlot where a slot was taken and not used.
 struct alignas(16) SplatEntry {
   std::uint32_t key, x, y, camera;
 };

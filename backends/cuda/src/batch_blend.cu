@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "batch_args.cuh"
 #include "batch_order.cuh"
+#include "batch_splat.cuh"
 
 // Blending of a batch, and the median depths of the Gaussians that it found.
 
@@ -9,8 +9,11 @@ namespace gsnav::cuda {
 namespace {
 
 constexpr int kThreads = kBatchTile * kBatchTile;  ///< a pixel each
-constexpr int kBlockWidth = 8, kBlockHeight = 4;   ///< pixels of a warp
-static_assert(kThreads == kOrderThreads && kBlockWidth * kBlockHeight == 32);
+constexpr int kBlock = 4;                          ///< pixels a side of what half a warp blends
+constexpr std::uint32_t kChunk = 256;              ///< splats that a warp lists at a time
+constexpr std::uint32_t kNothing = kOrderBatch;    ///< a staged splat that covers no pixel
+constexpr unsigned kAll = 0xffffffffu;
+static_assert(kThreads == kOrderThreads && 2 * kBlock * kBlock == 32 && kOrderBatch % kChunk == 0);
 
 struct StagedSplat {
   float4 geometry[2];
@@ -19,37 +22,36 @@ struct StagedSplat {
 
 struct BlendShared {
   OrderShared order;
-  alignas(16) StagedSplat splats[kThreads];
-  std::uint8_t masks[kThreads];
+  alignas(16) StagedSplat splats[kOrderBatch + 1];
+  std::uint16_t masks[kOrderBatch];  ///< the blocks that each may reach: bit 4 * row + column
+  alignas(4) std::uint16_t lists[kThreads / 16][kChunk + 2];
 };
 
-/// The blocks of the tile at (tile_x, tile_y) that a footprint may reach: bit 2 * row + column.
+/// The blocks of the tile at (tile_x, tile_y) that a footprint may reach.
 __device__ unsigned reached_blocks(const SplatGeometry<float>& g, const SplatBounds& b, int tile_x, int tile_y,
                                    float log2_alpha_min, bool elliptic) {
   const int x0 = max(b.x0, tile_x), x1 = min(b.x1, tile_x + kBatchTile) - 1;
   const int y0 = max(b.y0, tile_y), y1 = min(b.y1, tile_y + kBatchTile) - 1;
   const auto columns = [&](int first, int last) {
-    const int half = tile_x + kBlockWidth;
-    return (first < half ? 1u : 0u) | (last >= half ? 2u : 0u);
+    return (2u << ((last - tile_x) / kBlock)) - (1u << ((first - tile_x) / kBlock));
   };
   const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
-  const int row0 = (y0 - tile_y) / kBlockHeight, row1 = (y1 - tile_y) / kBlockHeight;
+  const int row0 = (y0 - tile_y) / kBlock, row1 = (y1 - tile_y) / kBlock;
   const unsigned across = columns(x0, x1);
-  if (!elliptic || (row0 == row1 && across != 3u)) {
-    unsigned mask = 0;
-    for (int row = row0; row <= row1; ++row) mask |= across << (2 * row);
+  unsigned mask = 0;
+  if (!elliptic || row0 == row1 || (across & (across - 1)) == 0) {
+    for (int row = row0; row <= row1; ++row) mask |= across << (4 * row);
     return mask;
   }
   const FootprintStrips<float> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0), centre(y1));
-  unsigned mask = 0;
   for (int row = row0; row <= row1; ++row) {
-    const int top = tile_y + row * kBlockHeight;
+    const int top = tile_y + row * kBlock;
     float left, right;
-    if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlockHeight - 1, y1)), left, right)) continue;
+    if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlock - 1, y1)), left, right)) continue;
     // As in for_each_tile: the padding of left and right is more than what rounding to a pixel may lose.
     const int first = static_cast<int>(clamp(left + 0.5f, static_cast<float>(x0), static_cast<float>(x1 + 1)));
     const int last = static_cast<int>(clamp(right + 0.5f, static_cast<float>(x0), static_cast<float>(x1 + 1))) - 1;
-    if (first <= last) mask |= columns(first, last) << (2 * row);
+    if (first <= last) mask |= columns(first, last) << (4 * row);
   }
   return mask;
 }
@@ -90,10 +92,50 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
   }
 }
 
-/// A block a tile, a thread a pixel, a warp a block of 8 x 4 of them. For DepthMode::median the slot of the
-/// median Gaussian is left in the image.
+/// Puts the records of the batch's n splats into shared memory.
+__device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int tile_x, int tile_y) {
+  for (std::uint32_t i = threadIdx.x; i < n; i += kThreads) {
+    const std::uint32_t slot = s.order.slots[i];
+    const SplatRecord r = a.records[slot];
+    const SplatGeometry<float> g = geometry_of(r);
+    StagedSplat& to = s.splats[i];
+    to.geometry[0] = {g.ref_x, g.ref_y, g.a, g.k};
+    to.geometry[1] = {g.b, g.w1, g.w2, g.log2_opacity};
+    to.color = {r.r, r.g, r.blue, __uint_as_float(slot)};
+    s.masks[i] = static_cast<std::uint16_t>(
+        reached_blocks(g, bounds_of(r.x, r.y), tile_x, tile_y, a.log2_alpha_min, a.elliptic));
+  }
+}
+
+/// Lists those of splats [first, last) that reach each half of the warp, and returns the length of the longer
+/// list; the other is filled up. `bit`: of the left half's block; `open`: bit 0 left, bit 1 right.
+__device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t first, std::uint32_t last, unsigned bit,
+                                     unsigned open) {
+  const unsigned lane = threadIdx.x % 32, below = (1u << lane) - 1;
+  std::uint16_t* const left = s.lists[threadIdx.x / 32 * 2];
+  std::uint16_t* const right = s.lists[threadIdx.x / 32 * 2 + 1];
+  std::uint32_t n_left = 0, n_right = 0;
+  __syncwarp();
+  for (std::uint32_t i = first; i < last; i += 32) {
+    const unsigned mask = i + lane < last ? s.masks[i + lane] >> bit & open : 0u;
+    const unsigned to_left = __ballot_sync(kAll, (mask & 1u) != 0), to_right = __ballot_sync(kAll, (mask & 2u) != 0);
+    const std::uint16_t splat = static_cast<std::uint16_t>(i + lane);
+    if ((mask & 1u) != 0) left[n_left + static_cast<std::uint32_t>(__popc(to_left & below))] = splat;
+    if ((mask & 2u) != 0) right[n_right + static_cast<std::uint32_t>(__popc(to_right & below))] = splat;
+    n_left += static_cast<std::uint32_t>(__popc(to_left));
+    n_right += static_cast<std::uint32_t>(__popc(to_right));
+  }
+  const std::uint32_t n = (max(n_left, n_right) + 1) & ~1u;  // they are read in twos
+  for (std::uint32_t i = n_left + lane; i < n; i += 32) left[i] = kNothing;
+  for (std::uint32_t i = n_right + lane; i < n; i += 32) right[i] = kNothing;
+  __syncwarp();
+  return n;
+}
+
+/// A block a tile, a thread a pixel, half a warp a block of 4 x 4 of them. For DepthMode::median the slot of
+/// the median Gaussian is left in the image.
 template <bool Color, DepthMode D, Exp2 M, bool Perspective>
-__global__ void __launch_bounds__(kThreads) blend_kernel(const __grid_constant__ BlendArgs b) {
+__global__ void __launch_bounds__(kThreads, 4) blend_kernel(const __grid_constant__ BlendArgs b) {
   constexpr DepthMode kBlended = D == DepthMode::any ? D : DepthMode::none;
   extern __shared__ __align__(16) unsigned char memory[];
   BlendShared& s = *reinterpret_cast<BlendShared*>(memory);
@@ -102,55 +144,56 @@ __global__ void __launch_bounds__(kThreads) blend_kernel(const __grid_constant__
   const std::uint32_t camera = blockIdx.x / tiles, tile = blockIdx.x % tiles;
   const int tile_x = static_cast<int>(tile) % a.grid.columns * kBatchTile;
   const int tile_y = static_cast<int>(tile) / a.grid.columns * kBatchTile;
-  const unsigned t = threadIdx.x, lane = t % 32, warp = t / 32;
-  const int x = tile_x + static_cast<int>(warp % 2 * kBlockWidth + lane % kBlockWidth);
-  const int y = tile_y + static_cast<int>(warp / 2 * kBlockHeight + lane / kBlockWidth);
+  const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32, half = lane / 16;
+  const unsigned bit = warp / 2 * 4 + warp % 2 * 2;  // of the left half's block
+  const int x = tile_x + static_cast<int>((bit + half) % 4 * kBlock + lane % kBlock);
+  const int y = tile_y + static_cast<int>(bit / 4 * kBlock + lane % 16 / kBlock);
   const bool inside = x < a.grid.width && y < a.grid.height;
   const float px = static_cast<float>(x) + 0.5f, py = static_cast<float>(y) + 0.5f;
+  if (threadIdx.x == 0) {
+    s.splats[kNothing] = {};
+    s.splats[kNothing].geometry[1].w = -1e30f;  // log2 of the opacity
+  }
 
   BlendState<float, kBlended> state;
   state.open = inside;
   std::uint32_t median = kNoSlot;
-  bool warp_open = __any_sync(0xffffffffu, inside);
-  TileOrder order(a, blockIdx.x, camera);
-  for (bool open = true; open;) {
-    const std::uint32_t n = order.next(s.order, a);
-    if (n == 0) break;
-    for (std::uint32_t first = 0; first < n && open; first += kThreads) {
-      if (first + t < n) {
-        const std::uint32_t slot = s.order.slots[first + t];
-        const SplatRecord r = a.records[slot];
-        const SplatGeometry<float> g = geometry_of(r);
-        StagedSplat& to = s.splats[t];
-        to.geometry[0] = {g.ref_x, g.ref_y, g.a, g.k};
-        to.geometry[1] = {g.b, g.w1, g.w2, g.log2_opacity};
-        to.color = {r.r, r.g, r.blue, __uint_as_float(slot)};
-        s.masks[t] = static_cast<std::uint8_t>(
-            reached_blocks(g, bounds_of(r.x, r.y), tile_x, tile_y, a.log2_alpha_min, a.elliptic));
-      } else {
-        s.masks[t] = 0;
-      }
-      __syncthreads();
-      for (unsigned group = 0; group < kThreads && first + group < n && warp_open; group += 32) {
-        unsigned bits = __ballot_sync(0xffffffffu, (s.masks[group + lane] >> warp & 1u) != 0);
-        for (; bits != 0; bits &= bits - 1) {
-          const StagedSplat& from = s.splats[group + static_cast<unsigned>(__ffs(static_cast<int>(bits))) - 1];
-          const float4 g0 = from.geometry[0], g1 = from.geometry[1];
-          const SplatGeometry<float> geometry{g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w};
-          const std::uint32_t slot = __float_as_uint(from.color.pad);
-          const SplatRecords<float> records{&geometry, &from.color, kBlended == DepthMode::any ? a.depths + slot : nullptr,
-                                            Perspective ? a.perspectives + slot : nullptr};
-          const float before = state.transmittance;
-          const bool hit = blend_splat<Color, kBlended, M, Perspective>(state, b.raster.rules, records, px, py);
-          if constexpr (D == DepthMode::median) {
-            // An exclusive stop negates the transmittance and blends nothing.
-            if (hit && before > 0.5f && abs(state.transmittance) <= 0.5f) median = slot;
-          }
-        }
-        warp_open = __any_sync(0xffffffffu, state.open);
-      }
-      open = __syncthreads_or(warp_open ? 1 : 0) != 0;
+  const auto blend = [&](std::uint32_t i) {
+    const StagedSplat& from = s.splats[i];
+    const float4 g0 = from.geometry[0], g1 = from.geometry[1];
+    const SplatGeometry<float> geometry{g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w};
+    SplatRecords<float> records{&geometry, &from.color, nullptr, nullptr};
+    if constexpr (kBlended == DepthMode::any || Perspective) {
+      // The splat that covers nothing has slot 0: any record will do.
+      const std::uint32_t slot = __float_as_uint(from.color.pad);
+      if constexpr (kBlended == DepthMode::any) records.depth = a.depths + slot;
+      if constexpr (Perspective) records.perspective = a.perspectives + slot;
     }
+    const float before = state.transmittance;
+    const bool hit = blend_splat<Color, kBlended, M, Perspective>(state, b.raster.rules, records, px, py);
+    if constexpr (D == DepthMode::median) {
+      // An exclusive stop negates the transmittance and blends nothing.
+      if (hit && before > 0.5f && abs(state.transmittance) <= 0.5f) median = __float_as_uint(from.color.pad);
+    }
+  };
+  TileOrder order(a, blockIdx.x, camera);
+  unsigned open = __ballot_sync(kAll, inside);
+  while (const std::uint32_t n = order.next(s.order, a)) {
+    stage(s, a, n, tile_x, tile_y);
+    __syncthreads();
+    for (std::uint32_t first = 0; first < n && open != 0; first += kChunk) {
+      const unsigned halves = ((open & 0xffffu) != 0 ? 1u : 0u) | (open >> 16 != 0 ? 2u : 0u);
+      const std::uint32_t length = list_blocks(s, first, min(first + kChunk, n), bit, halves);
+      const std::uint32_t* const list = reinterpret_cast<const std::uint32_t*>(s.lists[2 * warp + half]);
+      for (std::uint32_t i = 0; i < length / 2; ++i) {
+        const std::uint32_t two = list[i];
+        blend(two & 0xffffu);
+        blend(two >> 16);
+        if (i % 8 == 7 && __all_sync(kAll, !state.open)) break;
+      }
+      open = __ballot_sync(kAll, state.open);
+    }
+    if (__syncthreads_or(open != 0 ? 1 : 0) == 0) break;
   }
   if (inside) {
     const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
@@ -158,18 +201,26 @@ __global__ void __launch_bounds__(kThreads) blend_kernel(const __grid_constant__
   }
 }
 
-/// A thread a pixel: slots become depths.
+/// Out of line: few need it, and all would pay for its registers.
+__device__ __noinline__ void depth_record64(const ProjectArgs<float>& args, std::size_t row, float key,
+                                            const Vec3<float>& mean, std::size_t origin, SplatDepth<float>& depth) {
+  Splat splat;
+  make_splat64(args, true, row, key, mean, origin, splat);
+  depth = splat.depth;
+}
+
+/// A thread a pixel of camera blockIdx.y: slots become depths.
 __global__ void __launch_bounds__(128) depth_kernel(const BatchArgs a, float* images) {
-  const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
-  const std::size_t pixel = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
-  if (pixel >= a.cameras * width * height) return;
-  const std::uint32_t slot = __float_as_uint(images[pixel]);
+  const std::uint32_t width = static_cast<std::uint32_t>(a.grid.width);
+  const std::uint32_t pixels = width * static_cast<std::uint32_t>(a.grid.height);
+  const std::uint32_t camera = blockIdx.y, pixel = blockIdx.x * blockDim.x + threadIdx.x;
+  if (pixel >= pixels) return;
+  float& to = images[std::size_t{camera} * pixels + pixel];
+  const std::uint32_t slot = __float_as_uint(to);
   if (slot == kNoSlot) {
-    images[pixel] = 0;
+    to = 0;
     return;
   }
-  const std::uint32_t camera = static_cast<std::uint32_t>(pixel / (width * height));
-  const std::size_t y = pixel / width % height, x = pixel % width;
   const std::uint32_t source = a.sources[slot];
   const ProjectArgs<float>& args = instance_of(a, camera, source).args;
   const GaussianView& gs = args.gaussians;
@@ -178,30 +229,15 @@ __global__ void __launch_bounds__(128) depth_kernel(const BatchArgs a, float* im
   const Vec3<float> mean{gs.means[0][row], gs.means[1][row], gs.means[2][row]};
   const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
   const SplatAxes<float> axes =
-      detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), row);
+      gsnav::detail::load_axes(gs, args.camera, gsnav::detail::camera_delta(args, mean, origin), row);
   const Projected<float> p = project<float, float>(args.camera, axes, z, gs.opacities[row]);
-  const float key = args.camera.sort_order == SortOrder::z_depth
-                        ? z
-                        : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
-  SplatGeometry<float> geometry;
-  SplatBounds bounds;
   SplatDepth<float> depth;
-  SplatPerspective<float> perspective;
-  std::uint32_t code;
-  ProjectArgs<float> to;
-  to.gaussians = gs;
-  to.camera = args.camera;
-  to.camera64 = args.camera64;
-  to.offsets = args.offsets;
-  to.offsets_f = args.offsets_f;
-  to.color = false;
-  to.geometry = {&geometry, 1};
-  to.bounds = {&bounds, 1};
-  to.depths = {&depth, 1};
-  to.perspectives = {&perspective, 1};
-  to.keys = {&code, 1};
-  write_splat(to, 0, row, key, mean, origin, p, axes);
-  images[pixel] = ray_depth(depth, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+  if (gsnav::detail::needs_double(args.camera, p)) {
+    depth_record64(args, row, key_of(args, z, mean, origin), mean, origin, depth);
+  } else {
+    depth = make_splat_depth(args.camera, axes, p);
+  }
+  to = ray_depth(depth, static_cast<float>(pixel % width) + 0.5f, static_cast<float>(pixel / width) + 0.5f);
 }
 
 }  // namespace
@@ -216,10 +252,8 @@ void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std
     kernel<<<args.tiles, kThreads, sizeof(BlendShared), stream>>>(b);
   });
   if (raster.depth_mode() == DepthMode::median) {
-    const std::size_t pixels = std::size_t{args.cameras} * static_cast<std::size_t>(args.grid.width) *
-                               static_cast<std::size_t>(args.grid.height);
-    depth_kernel<<<static_cast<unsigned>((pixels + 127) / 128), 128, 0, stream>>>(
-        args, raster.images.median_depth);
+    const unsigned pixels = static_cast<unsigned>(args.grid.width) * static_cast<unsigned>(args.grid.height);
+    depth_kernel<<<dim3((pixels + 127) / 128, args.cameras), 128, 0, stream>>>(args, raster.images.median_depth);
   }
 }
 

@@ -12,10 +12,13 @@
 namespace gsnav::cuda {
 
 inline constexpr int kOrderThreads = 256;
-inline constexpr int kOrderItems = 4;  ///< a thread
+inline constexpr int kOrderItems = 2;  ///< a thread
 inline constexpr std::uint32_t kOrderBatch = kOrderThreads * kOrderItems;
 inline constexpr int kOrderBins = kOrderThreads;
 inline constexpr int kOrderLevels = 8;  ///< 8 bits of (key, rank) a level
+
+/// Bits of a batch's keys that are sorted by digits; what they leave equal is few, and put in order afterwards.
+inline constexpr int kOrderBits = 12;
 
 template <int Items>
 using OrderSort = cub::BlockRadixSort<std::uint32_t, kOrderThreads, Items, std::uint32_t>;
@@ -25,7 +28,6 @@ struct OrderShared {
   union Scratch {
     typename OrderSort<1>::TempStorage sort1;
     typename OrderSort<2>::TempStorage sort2;
-    typename OrderSort<4>::TempStorage sort4;
     typename OrderScan::TempStorage scan;
   } scratch;
   std::uint32_t keys[kOrderBatch], slots[kOrderBatch];  ///< the batch, in order
@@ -33,6 +35,7 @@ struct OrderShared {
   std::uint32_t next_bin[kOrderLevels];
   std::uint32_t cursors[kOrderBins];
   std::uint32_t low, high;
+  int shift;  ///< of the batch: keys that differ only below it may not be in order yet
   int long_run;
 };
 
@@ -63,20 +66,18 @@ template <int Items>
 __device__ auto& sort_storage(OrderShared& s) {
   if constexpr (Items == 1) {
     return s.scratch.sort1;
-  } else if constexpr (Items == 2) {
-    return s.scratch.sort2;
   } else {
-    return s.scratch.sort4;
+    return s.scratch.sort2;
   }
 }
 
-/// Sorts n pairs from `pairs` into s.keys and s.slots, by key.
+/// Sorts n pairs from `pairs` into s.keys and s.slots, by the highest kOrderBits of their range.
 template <int Items>
-__device__ __noinline__ void sort_by_key(OrderShared& s, const Pair* pairs, std::uint32_t n) {
+__device__ __noinline__ void sort_coarsely(OrderShared& s, const Pair* pairs, std::uint32_t n) {
   std::uint32_t key[Items], slot[Items], low = 0xffffffffu, high = 0;
   for (int j = 0; j < Items; ++j) {
     const std::uint32_t i = threadIdx.x * Items + static_cast<std::uint32_t>(j);
-    key[j] = 0;
+    key[j] = 0xffffffffu;  // what is no pair comes last: the sort is stable
     slot[j] = 0;
     if (i >= n) continue;
     const Pair p = pairs[i];
@@ -87,14 +88,13 @@ __device__ __noinline__ void sort_by_key(OrderShared& s, const Pair* pairs, std:
   }
   block_range(s, low, high);
   const std::uint32_t base = s.low;
-  const int bits = bits_for(s.high - base);
-  if (bits > 0) {
-    for (int j = 0; j < Items; ++j) {
-      const bool real = threadIdx.x * Items + static_cast<std::uint32_t>(j) < n;
-      key[j] = real ? key[j] - base : 0xffffffffu;  // what is no pair comes last: the sort is stable
-    }
-    OrderSort<Items>(sort_storage<Items>(s)).Sort(key, slot, 0, bits);
+  const int bits = bits_for(s.high - base), shift = max(0, bits - kOrderBits);
+  if (threadIdx.x == 0) s.shift = shift;
+  for (int j = 0; j < Items; ++j) {
+    const bool real = threadIdx.x * Items + static_cast<std::uint32_t>(j) < n;
+    key[j] = real ? key[j] - base : 0xffffffffu;
   }
+  if (bits > 0) OrderSort<Items>(sort_storage<Items>(s)).Sort(key, slot, shift, bits);
   for (int j = 0; j < Items; ++j) {
     const std::uint32_t i = threadIdx.x * Items + static_cast<std::uint32_t>(j);
     s.keys[i] = key[j];
@@ -112,55 +112,56 @@ __device__ __noinline__ void sort_by_rank(OrderShared& s, const BatchArgs& a, st
     index[j] = threadIdx.x * kItems + static_cast<std::uint32_t>(j);
     rank[j] = index[j] < n ? rank_of(a, camera, s.slots[index[j]]) : 0xffffffffu;
   }
-  OrderSort<kItems>(s.scratch.sort4).Sort(rank, index, 0, 32);
+  OrderSort<kItems>(s.scratch.sort2).Sort(rank, index, 0, 32);
+  for (int j = 0; j < kItems; ++j) key[j] = index[j] < n ? s.keys[index[j]] : 0xffffffffu;
   __syncthreads();
-  std::uint32_t low = 0xffffffffu, high = 0;
-  for (int j = 0; j < kItems; ++j) {
-    key[j] = s.keys[index[j]];
-    if (index[j] < n) {
-      low = min(low, key[j]);
-      high = max(high, key[j]);
-    }
-  }
-  block_range(s, low, high);
-  const std::uint32_t base = s.low;
-  for (int j = 0; j < kItems; ++j) key[j] = index[j] < n ? key[j] - base : 0xffffffffu;
-  const int bits = bits_for(s.high - base);
-  if (bits > 0) OrderSort<kItems>(s.scratch.sort4).Sort(key, index, 0, bits);
+  OrderSort<kItems>(s.scratch.sort2).Sort(key, index, 0, 32);
   for (int j = 0; j < kItems; ++j) slot[j] = s.slots[index[j]];
   __syncthreads();
   for (int j = 0; j < kItems; ++j) s.slots[threadIdx.x * kItems + static_cast<std::uint32_t>(j)] = slot[j];
   __syncthreads();
 }
 
-/// Puts runs of equal keys in order of rank; s.long_run where one is too long for a thread.
-__device__ __noinline__ void order_ties(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
+/// Puts runs that the coarse sort left equal in order of (key, rank): insertion by the thread at which a run
+/// starts, or where one is too long the whole batch again.
+__device__ __noinline__ void order_runs(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
                                         std::uint32_t n) {
-  constexpr std::uint32_t kLongest = 8;
+  constexpr std::uint32_t kLongest = 24;
+  const int shift = s.shift;
   if (threadIdx.x == 0) s.long_run = 0;
   __syncthreads();
-  for (std::uint32_t i = threadIdx.x; i + 1 < n; i += kOrderThreads) {
-    if (s.keys[i + 1] != s.keys[i] || (i > 0 && s.keys[i - 1] == s.keys[i])) continue;
+  // Found before any is changed: keys move within runs only, but others look at their neighbours.
+  std::uint32_t ends[kOrderItems];
+  for (int k = 0; k < kOrderItems; ++k) {
+    const std::uint32_t i = threadIdx.x + static_cast<std::uint32_t>(k) * kOrderThreads;
+    ends[k] = 0;
+    if (i + 1 >= n) continue;
+    const std::uint32_t digit = s.keys[i] >> shift;
+    if (s.keys[i + 1] >> shift != digit || (i > 0 && s.keys[i - 1] >> shift == digit)) continue;
     std::uint32_t end = i + 2;
-    while (end < n && end - i <= kLongest && s.keys[end] == s.keys[i]) ++end;
-    if (end - i > kLongest) {
-      s.long_run = 1;
-      continue;
-    }
-    std::uint32_t ranks[kLongest];
-    for (std::uint32_t j = i; j < end; ++j) {
-      const std::uint32_t slot = s.slots[j], rank = rank_of(a, camera, slot);
+    while (end < n && end - i <= kLongest && s.keys[end] >> shift == digit) ++end;
+    ends[k] = end;
+    if (end - i > kLongest) s.long_run = 1;
+  }
+  __syncthreads();
+  if (s.long_run != 0) return sort_by_rank(s, a, camera, n);
+  for (int k = 0; k < kOrderItems; ++k) {
+    const std::uint32_t begin = threadIdx.x + static_cast<std::uint32_t>(k) * kOrderThreads;
+    for (std::uint32_t j = begin + 1; j < ends[k]; ++j) {
+      const std::uint32_t key = s.keys[j], slot = s.slots[j];
       std::uint32_t to = j;
-      for (; to > i && ranks[to - 1 - i] > rank; --to) {
-        ranks[to - i] = ranks[to - 1 - i];
+      for (; to > begin; --to) {
+        const std::uint32_t before = s.keys[to - 1];
+        if (before < key) break;
+        if (before == key && rank_of(a, camera, s.slots[to - 1]) < rank_of(a, camera, slot)) break;
+        s.keys[to] = before;
         s.slots[to] = s.slots[to - 1];
       }
-      ranks[to - i] = rank;
+      s.keys[to] = key;
       s.slots[to] = slot;
     }
   }
   __syncthreads();
-  if (s.long_run != 0) sort_by_rank(s, a, camera, n);
 }
 
 /// Moves [begin, begin + n) from one array of pairs to the other, into bins of ascending (key, rank).
@@ -234,8 +235,16 @@ class TileOrder {
         level_ = level_ == 0 ? kDone : level_ - 1;
         continue;
       }
-      std::uint32_t end = bin + 1;
-      while (end < kOrderBins && begins[end + 1] - begins[bin] <= kOrderBatch) ++end;
+      // As many bins as fit, but at least one.
+      std::uint32_t end = bin + 1, beyond = kOrderBins + 1;
+      while (beyond - end > 1) {
+        const std::uint32_t mid = (end + beyond) / 2;
+        if (begins[mid] - begins[bin] <= kOrderBatch) {
+          end = mid;
+        } else {
+          beyond = mid;
+        }
+      }
       const std::uint32_t begin = begins[bin], n = begins[end] - begin;
       __syncthreads();
       if (threadIdx.x == 0) s.next_bin[level_] = end;
@@ -253,13 +262,11 @@ class TileOrder {
 
   __device__ std::uint32_t load(OrderShared& s, const BatchArgs& a, const Pair* pairs, std::uint32_t n) {
     if (n <= kOrderThreads) {
-      ordering::sort_by_key<1>(s, pairs, n);
-    } else if (n <= 2 * kOrderThreads) {
-      ordering::sort_by_key<2>(s, pairs, n);
+      ordering::sort_coarsely<1>(s, pairs, n);
     } else {
-      ordering::sort_by_key<4>(s, pairs, n);
+      ordering::sort_coarsely<2>(s, pairs, n);
     }
-    ordering::order_ties(s, a, camera_, n);
+    ordering::order_runs(s, a, camera_, n);
     return n;
   }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "batch_args.cuh"
+#include "batch_splat.cuh"
 
 // Culling and projection of a batch: what CPU backends do one camera at a time, by the same formulas.
 
@@ -8,6 +8,7 @@ namespace gsnav::cuda {
 namespace {
 
 constexpr unsigned kThreads = 256, kWarps = kThreads / 32;
+constexpr unsigned kProjectWarps = 4;
 constexpr unsigned kWarpsPerChunk = kProjectChunk / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
@@ -35,26 +36,6 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
   }
 }
 
-struct Splat {
-  SplatGeometry<float> geometry;
-  SplatBounds bounds;
-  SplatDepth<float> depth;
-  SplatPerspective<float> perspective;
-};
-
-/// `store_splat` into registers. False where no pixel centre lies in the bounds.
-template <class T, class U>
-__device__ bool make_splat(const ProjectionCamera<T>& camera, bool depth, const Projected<T>& p,
-                           const SplatAxes<T>& axes, U mean_x, U mean_y, Splat& out) {
-  ProjectArgs<float> to;
-  to.depth = depth;
-  to.geometry = {&out.geometry, 1};
-  to.bounds = {&out.bounds, 1};
-  to.depths = {&out.depth, 1};
-  to.perspectives = {&out.perspective, 1};
-  return detail::store_splat(to, 0, camera, p, axes, mean_x, mean_y);
-}
-
 __device__ void write_record(const BatchArgs& a, std::uint32_t slot, const BatchInstance& instance, float key,
                              std::size_t row, const Splat& s, const SplatColor<float>& c) {
   const SplatGeometry<float>& g = s.geometry;
@@ -67,18 +48,6 @@ __device__ void write_record(const BatchArgs& a, std::uint32_t slot, const Batch
   a.sources[slot] = instance.args.first_rank + static_cast<std::uint32_t>(row);
   if (a.depths != nullptr) a.depths[slot] = s.depth;
   if (a.perspectives != nullptr) a.perspectives[slot] = s.perspective;
-}
-
-__device__ SplatColor<float> color_of(const ProjectArgs<float>& args, std::size_t row, const Vec3<float>& mean,
-                                      std::size_t origin) {
-  if (!args.color) return {};
-  return gaussian_color<float>(args.gaussians, args.sh_degree, row, detail::camera_delta(args, mean, origin));
-}
-
-__device__ float key_of(const ProjectArgs<float>& args, float z, const Vec3<float>& mean, std::size_t origin) {
-  return args.camera.sort_order == SortOrder::z_depth
-             ? z
-             : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
 }
 
 /// Slots that a warp holds; what it has not used when it ends is marked.
@@ -120,42 +89,92 @@ class WarpSlots {
   unsigned lane_;
 };
 
-/// A warp an eighth of an item: Gaussians are read once and projected for each camera of the mask.
-__global__ void __launch_bounds__(kThreads) project_kernel(const BatchArgs a) {
+/// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
+struct WarpRows {
+  float mean[3][32], quat[4][32], scales[3][32], opacity[32];
+  /// [32][rest]: from memory a warp would read 32 lines a coefficient.
+  float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
+};
+
+__device__ void load_rows(const GaussianView& gs, std::size_t row, WarpRows& to) {
   const unsigned lane = threadIdx.x % 32;
+  __syncwarp();
+  if (row < gs.size) {
+    for (int k = 0; k < 3; ++k) to.mean[k][lane] = gs.means[k][row];
+    to.opacity[lane] = gs.opacities[row];
+    if (gs.axes[0].empty()) {
+      for (int k = 0; k < 4; ++k) to.quat[k][lane] = gs.quats[k][row];
+      for (int k = 0; k < 3; ++k) to.scales[k][lane] = gs.scales[k][row];
+    }
+  }
+  __syncwarp();
+}
+
+/// `first`: row of lane 0.
+__device__ void load_sh(const GaussianView& gs, std::size_t first, WarpRows& to) {
+  const std::size_t rest = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  const std::size_t rows = gs.size - first < 32 ? gs.size - first : 32;
+  const float* from = gs.shN.data + rest * first;
+  __syncwarp();
+  for (std::size_t i = threadIdx.x % 32; i < rest * rows; i += 32) to.sh[i] = from[i];
+  __syncwarp();
+}
+
+/// Colour of a lane's row after load_sh.
+__device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t row, const WarpRows& rows,
+                                       const Vec3<float>& delta) {
+  const std::size_t lane = threadIdx.x % 32, first = row - lane;
+  GaussianView v;  // of the warp's rows
+  v.sh_degree = gs.sh_degree;
+  v.sh0 = {gs.sh0.data + 3 * first, 3 * 32};
+  v.shN = {rows.sh, 1};
+  if (!gs.sh_rotations[0].empty()) {
+    for (int k = 0; k < 4; ++k) v.sh_rotations[k] = {gs.sh_rotations[k].data + first, 32};
+  }
+  return gaussian_color<float>(v, degree, lane, delta);
+}
+
+/// A warp an eighth of an item: Gaussians are read once and projected for each camera of the mask.
+__global__ void __launch_bounds__(32 * kProjectWarps, 6) project_kernel(const BatchArgs a) {
+  __shared__ WarpRows shared[kProjectWarps];
+  const unsigned lane = threadIdx.x % 32;
+  WarpRows& rows = shared[threadIdx.x / 32];
   const std::uint32_t parts = a.counters->items * kWarpsPerChunk;
   WarpSlots slots(a);
-  for (std::uint32_t part = blockIdx.x * kWarps + threadIdx.x / 32; part < parts; part += gridDim.x * kWarps) {
+  for (std::uint32_t part = blockIdx.x * kProjectWarps + threadIdx.x / 32; part < parts;
+       part += gridDim.x * kProjectWarps) {
     const BatchItem item = a.items[part / kWarpsPerChunk];
     const GaussianView& gs = a.instances[item.first_instance].args.gaussians;
     const std::size_t row = item.chunk * kProjectChunk + part % kWarpsPerChunk * 32 + lane;
     const bool exists = row < gs.size;
-    Vec3<float> mean;
-    float opacity = 0;
-    std::size_t origin = 0;
-    if (exists) {
-      mean = {gs.means[0][row], gs.means[1][row], gs.means[2][row]};
-      opacity = gs.opacities[row];
-      if (!gs.origin_ids.empty()) origin = gs.origin_ids[row];
-    }
+    const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
+    bool has_sh = false;
+    load_rows(gs, row, rows);
     for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
-      const std::uint32_t index = item.first_instance + static_cast<std::uint32_t>(__ffs(mask)) - 1;
+      const std::uint32_t index = item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1;
       const BatchInstance& instance = a.instances[index];
       const ProjectArgs<float>& args = instance.args;
       bool drawn = false, hard = false;
       float key = 0;
       Splat splat;
+      const Vec3<float> mean{rows.mean[0][lane], rows.mean[1][lane], rows.mean[2][lane]};
+      const Vec3<float> delta = gsnav::detail::camera_delta(args, mean, origin);
       const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
       if (exists && z > args.camera.near_plane) {
         const SplatAxes<float> axes =
-            detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), row);
-        const Projected<float> p = project<float, float>(args.camera, axes, z, opacity);
+            gs.axes[0].empty()
+                ? splat_axes(args.camera.rotation, delta,
+                             Quat<float>{rows.quat[0][lane], rows.quat[1][lane], rows.quat[2][lane], rows.quat[3][lane]},
+                             Vec3<float>{rows.scales[0][lane], rows.scales[1][lane], rows.scales[2][lane]})
+                : gsnav::detail::load_axes(gs, args.camera, delta, row);
+        const Projected<float> p = project<float, float>(args.camera, axes, z, rows.opacity[lane]);
         if (p.visible) {
           key = key_of(args, z, mean, origin);
-          hard = detail::needs_double(args.camera, p);
+          hard = gsnav::detail::needs_double(args.camera, p);
           if (!hard) {
             double mean_x, mean_y;
-            detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin], mean_x, mean_y);
+            gsnav::detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin], mean_x,
+                                        mean_y);
             drawn = make_splat(args.camera, a.depths != nullptr, p, axes, mean_x, mean_y, splat);
           }
         }
@@ -165,8 +184,14 @@ __global__ void __launch_bounds__(kThreads) project_kernel(const BatchArgs a) {
         const unsigned long long at = atomicAdd(&a.counters->hard, 1ull);
         if (slot != kNoSlot) a.entries[slot].camera = kNoSlot;  // until it has a record
         if (at < a.hard_capacity) a.hard[at] = {slot, index, static_cast<std::uint32_t>(row)};
-      } else if (slot != kNoSlot) {
-        write_record(a, slot, instance, key, row, splat, color_of(args, row, mean, origin));
+      }
+      if (args.color && !has_sh && __any_sync(kAll, drawn)) {
+        load_sh(gs, row - lane, rows);
+        has_sh = true;
+      }
+      if (drawn && slot != kNoSlot) {
+        write_record(a, slot, instance, key, row, splat,
+                     args.color ? row_color(gs, args.sh_degree, row, rows, delta) : SplatColor<float>{});
       }
     }
   }
@@ -185,11 +210,13 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
     const Vec3<float> mean{gs.means[0][h.row], gs.means[1][h.row], gs.means[2][h.row]};
     const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
     const float key = key_of(args, z, mean, origin);
-    SplatAxes<double> axes;
-    const Projected<double> p = detail::project64(args, h.row, key, mean, origin, axes);
     Splat splat;
-    if (make_splat(args.camera64, a.depths != nullptr, p, axes, p.mean_x, p.mean_y, splat)) {
-      write_record(a, h.slot, instance, key, h.row, splat, color_of(args, h.row, mean, origin));
+    if (make_splat64(args, a.depths != nullptr, h.row, key, mean, origin, splat)) {
+      SplatColor<float> color;
+      if (args.color) {
+        color = gaussian_color<float>(gs, args.sh_degree, h.row, gsnav::detail::camera_delta(args, mean, origin));
+      }
+      write_record(a, h.slot, instance, key, h.row, splat, color);
     }
   }
 }
@@ -199,7 +226,7 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
 void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
   const unsigned blocks = static_cast<unsigned>(multiprocessors) * 8;
   cull_kernel<<<blocks, kThreads, 0, stream>>>(args);
-  project_kernel<<<blocks, kThreads, 0, stream>>>(args);
+  project_kernel<<<static_cast<unsigned>(multiprocessors) * 6, 32 * kProjectWarps, 0, stream>>>(args);
   project_hard_kernel<<<blocks, 128, 0, stream>>>(args);
 }
 

@@ -130,6 +130,10 @@ namespace {
 
 Status check_cameras(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras) {
   if (cameras.empty()) return {Errc::invalid_argument, "CudaBatchRenderer: no camera to render from"};
+  if (cameras.size() > 65535) {
+    return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(cameras.size()) +
+                                   " cameras: at most 65535 a call"};
+  }
   for (std::size_t i = 0; i < sets.size(); ++i) {
     if (Status s = validate(sets[i]); !s) {
       return {s.code(), "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + s.message()};

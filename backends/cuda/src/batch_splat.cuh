@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "batch_args.cuh"
+
+// A projected Gaussian in registers.
+
+namespace gsnav::cuda {
+
+struct Splat {
+  SplatGeometry<float> geometry;
+  SplatBounds bounds;
+  SplatDepth<float> depth;
+  SplatPerspective<float> perspective;
+};
+
+/// `store_splat` into registers. False where no pixel centre lies in the bounds.
+template <class T, class U>
+__device__ inline bool make_splat(const ProjectionCamera<T>& camera, bool depth, const Projected<T>& p,
+                           const SplatAxes<T>& axes, U mean_x, U mean_y, Splat& out) {
+  ProjectArgs<float> to;
+  to.depth = depth;
+  to.geometry = {&out.geometry, 1};
+  to.bounds = {&out.bounds, 1};
+  to.depths = {&out.depth, 1};
+  to.perspectives = {&out.perspective, 1};
+  return gsnav::detail::store_splat(to, 0, camera, p, axes, mean_x, mean_y);
+}
+
+__device__ inline float key_of(const ProjectArgs<float>& args, float z, const Vec3<float>& mean, std::size_t origin) {
+  return args.camera.sort_order == SortOrder::z_depth
+             ? z
+             : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
+}
+
+/// The same in double, for Gaussians whose geometry float cannot hold.
+__device__ inline bool make_splat64(const ProjectArgs<float>& args, bool depth, std::size_t row, float key,
+                                    const Vec3<float>& mean, std::size_t origin, Splat& out) {
+  SplatAxes<double> axes;
+  const Projected<double> p = gsnav::detail::project64(args, row, key, mean, origin, axes);
+  return make_splat(args.camera64, depth, p, axes, p.mean_x, p.mean_y, out);
+}
+
+}  // namespace gsnav::cuda
