@@ -9,7 +9,7 @@ namespace gsnav::cuda {
 
 namespace {
 
-constexpr unsigned kThreads = 256;
+constexpr unsigned kThreads = 128;
 constexpr unsigned kSlots = 4;  ///< a thread
 
 /// The tiles that a splat may touch, where they lie in a window of 4 x 4.
@@ -183,7 +183,7 @@ __global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
 }  // namespace
 
 void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
-  const unsigned blocks = static_cast<unsigned>(multiprocessors) * 8;
+  const unsigned blocks = static_cast<unsigned>(multiprocessors) * 16;
   count_kernel<<<blocks, kThreads, 0, stream>>>(args);
   bin_large_kernel<false><<<blocks, kThreads, 0, stream>>>(args);
   place_kernel<<<(args.tiles + kThreads - 1) / kThreads, kThreads, 0, stream>>>(args);

@@ -9,9 +9,11 @@ namespace gsnav::cuda {
 namespace {
 
 constexpr int kThreads = kBatchTile * kBatchTile;  ///< a pixel each
+constexpr int kBlocksPerProcessor = 5;
 constexpr int kBlock = 4;                          ///< pixels a side of what half a warp blends
 constexpr std::uint32_t kChunk = 256;              ///< splats that a warp lists at a time
 constexpr std::uint32_t kNothing = kOrderBatch;    ///< a staged splat that covers no pixel
+constexpr std::uint32_t kListStep = 4;             ///< lists are read by so many
 constexpr unsigned kAll = 0xffffffffu;
 static_assert(kThreads == kOrderThreads && 2 * kBlock * kBlock == 32 && kOrderBatch % kChunk == 0);
 
@@ -20,41 +22,58 @@ struct StagedSplat {
   SplatColor<float> color;  ///< pad: the slot's bits
 };
 
+static_assert((kOrderBatch + 1) * sizeof(StagedSplat) <= kOrderLent && kOrderLent <= 0xffff);
+
 struct BlendShared {
-  OrderShared order;
-  alignas(16) StagedSplat splats[kOrderBatch + 1];
-  std::uint16_t masks[kOrderBatch];  ///< the blocks that each may reach: bit 4 * row + column
-  alignas(4) std::uint16_t lists[kThreads / 16][kChunk + 2];
+  alignas(16) OrderShared order;
+  std::uint16_t masks[kOrderBatch];  ///< the blocks that each splat may reach: bit 4 * row + column
+  union {
+    /// Of the half-warps: places of splats in `lent`, in bytes. A splat that covers nothing fills them up.
+    alignas(8) std::uint16_t lists[kThreads / 16][kChunk + kListStep];
+    std::uint16_t queue[kOrderBatch];
+  };
+  std::uint32_t queued;
+
+  __device__ StagedSplat& splat(std::uint32_t i) { return reinterpret_cast<StagedSplat*>(order.lent)[i]; }
 };
 
-/// The blocks of the tile at (tile_x, tile_y) that a footprint may reach.
-__device__ unsigned reached_blocks(const SplatGeometry<float>& g, const SplatBounds& b, int tile_x, int tile_y,
-                                   float log2_alpha_min, bool elliptic) {
-  const int x0 = max(b.x0, tile_x), x1 = min(b.x1, tile_x + kBatchTile) - 1;
-  const int y0 = max(b.y0, tile_y), y1 = min(b.y1, tile_y + kBatchTile) - 1;
-  const auto columns = [&](int first, int last) {
-    return (2u << ((last - tile_x) / kBlock)) - (1u << ((first - tile_x) / kBlock));
-  };
-  const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
-  const int row0 = (y0 - tile_y) / kBlock, row1 = (y1 - tile_y) / kBlock;
-  const unsigned across = columns(x0, x1);
-  unsigned mask = 0;
-  if (!elliptic || row0 == row1 || (across & (across - 1)) == 0) {
-    for (int row = row0; row <= row1; ++row) mask |= across << (4 * row);
+/// The blocks of the tile at (x, y) that a footprint may reach.
+struct ReachedBlocks {
+  int x, y;                 ///< of the tile
+  int x0, x1, y0, y1;       ///< pixels of the bounds in it, inclusive
+  __device__ ReachedBlocks(const SplatBounds& b, int tile_x, int tile_y)
+      : x(tile_x), y(tile_y), x0(max(b.x0, x)), x1(min(b.x1, x + kBatchTile) - 1), y0(max(b.y0, y)),
+        y1(min(b.y1, y + kBatchTile) - 1) {}
+  __device__ unsigned columns(int first, int last) const {
+    return (2u << ((last - x) / kBlock)) - (1u << ((first - x) / kBlock));
+  }
+  __device__ int first_row() const { return (y0 - y) / kBlock; }
+  __device__ int last_row() const { return (y1 - y) / kBlock; }
+  /// More than one row and column: the ellipse may leave out some of them.
+  __device__ bool many() const { return first_row() != last_row() && (x0 - x) / kBlock != (x1 - x) / kBlock; }
+  __device__ unsigned of_bounds() const {
+    const unsigned across = columns(x0, x1);
+    unsigned mask = 0;
+    for (int row = first_row(); row <= last_row(); ++row) mask |= across << (4 * row);
     return mask;
   }
-  const FootprintStrips<float> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0), centre(y1));
-  for (int row = row0; row <= row1; ++row) {
-    const int top = tile_y + row * kBlock;
-    float left, right;
-    if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlock - 1, y1)), left, right)) continue;
-    // As in for_each_tile: the padding of left and right is more than what rounding to a pixel may lose.
-    const int first = static_cast<int>(clamp(left + 0.5f, static_cast<float>(x0), static_cast<float>(x1 + 1)));
-    const int last = static_cast<int>(clamp(right + 0.5f, static_cast<float>(x0), static_cast<float>(x1 + 1))) - 1;
-    if (first <= last) mask |= columns(first, last) << (4 * row);
+  __device__ unsigned of_ellipse(const SplatGeometry<float>& g, float log2_alpha_min) const {
+    const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
+    const FootprintStrips<float> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0), centre(y1));
+    unsigned mask = 0;
+    for (int row = first_row(); row <= last_row(); ++row) {
+      const int top = y + row * kBlock;
+      float left, right;
+      if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlock - 1, y1)), left, right)) continue;
+      // As in for_each_tile: the padding of left and right is more than what rounding to a pixel may lose.
+      const float low = static_cast<float>(x0), high = static_cast<float>(x1 + 1);
+      const int first = static_cast<int>(clamp(left + 0.5f, low, high));
+      const int last = static_cast<int>(clamp(right + 0.5f, low, high)) - 1;
+      if (first <= last) mask |= columns(first, last) << (4 * row);
+    }
+    return mask;
   }
-  return mask;
-}
+};
 
 struct BlendArgs {
   BatchArgs batch;
@@ -92,19 +111,40 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
   }
 }
 
-/// Puts the records of the batch's n splats into shared memory.
+/// Puts the records of the batch's n splats into shared memory, and what they may reach.
 __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int tile_x, int tile_y) {
+  if (threadIdx.x == 0) {
+    StagedSplat& nothing = s.splat(kNothing);
+    nothing = {};
+    nothing.geometry[1].w = -1e30f;  // log2 of the opacity
+    s.queued = 0;
+  }
+  __syncthreads();
   for (std::uint32_t i = threadIdx.x; i < n; i += kThreads) {
     const std::uint32_t slot = s.order.slots[i];
     const SplatRecord r = a.records[slot];
     const SplatGeometry<float> g = geometry_of(r);
-    StagedSplat& to = s.splats[i];
+    StagedSplat& to = s.splat(i);
     to.geometry[0] = {g.ref_x, g.ref_y, g.a, g.k};
     to.geometry[1] = {g.b, g.w1, g.w2, g.log2_opacity};
     to.color = {r.r, r.g, r.blue, __uint_as_float(slot)};
-    s.masks[i] = static_cast<std::uint16_t>(
-        reached_blocks(g, bounds_of(r.x, r.y), tile_x, tile_y, a.log2_alpha_min, a.elliptic));
+    const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
+    if (a.elliptic && blocks.many()) {
+      s.queue[atomicAdd(&s.queued, 1u)] = static_cast<std::uint16_t>(i);  // so that no lane waits for another's
+    } else {
+      s.masks[i] = static_cast<std::uint16_t>(blocks.of_bounds());
+    }
   }
+  __syncthreads();
+  for (std::uint32_t q = threadIdx.x; q < s.queued; q += kThreads) {
+    const std::uint32_t i = s.queue[q];
+    const float4 g0 = s.splat(i).geometry[0], g1 = s.splat(i).geometry[1];
+    const SplatRecord& r = a.records[s.order.slots[i]];
+    const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
+    s.masks[i] = static_cast<std::uint16_t>(
+        blocks.of_ellipse({g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w}, a.log2_alpha_min));
+  }
+  __syncthreads();
 }
 
 /// Lists those of splats [first, last) that reach each half of the warp, and returns the length of the longer
@@ -115,27 +155,30 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t first, std::u
   std::uint16_t* const left = s.lists[threadIdx.x / 32 * 2];
   std::uint16_t* const right = s.lists[threadIdx.x / 32 * 2 + 1];
   std::uint32_t n_left = 0, n_right = 0;
+  const auto place = [](std::uint32_t i) { return static_cast<std::uint16_t>(i * sizeof(StagedSplat)); };
   __syncwarp();
   for (std::uint32_t i = first; i < last; i += 32) {
     const unsigned mask = i + lane < last ? s.masks[i + lane] >> bit & open : 0u;
     const unsigned to_left = __ballot_sync(kAll, (mask & 1u) != 0), to_right = __ballot_sync(kAll, (mask & 2u) != 0);
-    const std::uint16_t splat = static_cast<std::uint16_t>(i + lane);
-    if ((mask & 1u) != 0) left[n_left + static_cast<std::uint32_t>(__popc(to_left & below))] = splat;
-    if ((mask & 2u) != 0) right[n_right + static_cast<std::uint32_t>(__popc(to_right & below))] = splat;
+    if ((mask & 1u) != 0) left[n_left + static_cast<std::uint32_t>(__popc(to_left & below))] = place(i + lane);
+    if ((mask & 2u) != 0) right[n_right + static_cast<std::uint32_t>(__popc(to_right & below))] = place(i + lane);
     n_left += static_cast<std::uint32_t>(__popc(to_left));
     n_right += static_cast<std::uint32_t>(__popc(to_right));
   }
-  const std::uint32_t n = (max(n_left, n_right) + 1) & ~1u;  // they are read in twos
-  for (std::uint32_t i = n_left + lane; i < n; i += 32) left[i] = kNothing;
-  for (std::uint32_t i = n_right + lane; i < n; i += 32) right[i] = kNothing;
+  const std::uint32_t n = (max(n_left, n_right) + kListStep - 1) / kListStep * kListStep;
+  for (std::uint32_t i = n_left + lane; i < n; i += 32) left[i] = place(kNothing);
+  for (std::uint32_t i = n_right + lane; i < n; i += 32) right[i] = place(kNothing);
   __syncwarp();
   return n;
 }
 
+/// What RasterArgs decide at run time and the inner loop must not.
+enum class Form { plain, exclusive_stop, perspective };
+
 /// A block a tile, a thread a pixel, half a warp a block of 4 x 4 of them. For DepthMode::median the slot of
 /// the median Gaussian is left in the image.
-template <bool Color, DepthMode D, Exp2 M, bool Perspective>
-__global__ void __launch_bounds__(kThreads, 4) blend_kernel(const __grid_constant__ BlendArgs b) {
+template <bool Color, DepthMode D, Exp2 M, Form F>
+__global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(const __grid_constant__ BlendArgs b) {
   constexpr DepthMode kBlended = D == DepthMode::any ? D : DepthMode::none;
   extern __shared__ __align__(16) unsigned char memory[];
   BlendShared& s = *reinterpret_cast<BlendShared*>(memory);
@@ -149,49 +192,53 @@ __global__ void __launch_bounds__(kThreads, 4) blend_kernel(const __grid_constan
   const int x = tile_x + static_cast<int>((bit + half) % 4 * kBlock + lane % kBlock);
   const int y = tile_y + static_cast<int>(bit / 4 * kBlock + lane % 16 / kBlock);
   const bool inside = x < a.grid.width && y < a.grid.height;
-  const float px = static_cast<float>(x) + 0.5f, py = static_cast<float>(y) + 0.5f;
-  if (threadIdx.x == 0) {
-    s.splats[kNothing] = {};
-    s.splats[kNothing].geometry[1].w = -1e30f;  // log2 of the opacity
-  }
+  BlendRules<float> rules = b.raster.rules;
+  rules.exclusive_stop = F == Form::exclusive_stop;
 
   BlendState<float, kBlended> state;
-  state.open = inside;
   std::uint32_t median = kNoSlot;
-  const auto blend = [&](std::uint32_t i) {
-    const StagedSplat& from = s.splats[i];
+  // A pixel is open while it has a place: no footprint holds NaN, so that closed pixels need no test of their own.
+  const float nowhere = __int_as_float(0x7fffffff);
+  float px = inside ? static_cast<float>(x) + 0.5f : nowhere;
+  const float py = static_cast<float>(y) + 0.5f;
+  const auto blend = [&](std::uint32_t place) {
+    const StagedSplat& from = *reinterpret_cast<const StagedSplat*>(s.order.lent + place);
     const float4 g0 = from.geometry[0], g1 = from.geometry[1];
     const SplatGeometry<float> geometry{g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w};
     SplatRecords<float> records{&geometry, &from.color, nullptr, nullptr};
-    if constexpr (kBlended == DepthMode::any || Perspective) {
+    if constexpr (kBlended == DepthMode::any || F == Form::perspective) {
       // The splat that covers nothing has slot 0: any record will do.
       const std::uint32_t slot = __float_as_uint(from.color.pad);
       if constexpr (kBlended == DepthMode::any) records.depth = a.depths + slot;
-      if constexpr (Perspective) records.perspective = a.perspectives + slot;
+      if constexpr (F == Form::perspective) records.perspective = a.perspectives + slot;
     }
     const float before = state.transmittance;
-    const bool hit = blend_splat<Color, kBlended, M, Perspective>(state, b.raster.rules, records, px, py);
+    state.open = true;
+    const bool hit = blend_splat<Color, kBlended, M, F == Form::perspective>(state, rules, records, px, py);
     if constexpr (D == DepthMode::median) {
       // An exclusive stop negates the transmittance and blends nothing.
       if (hit && before > 0.5f && abs(state.transmittance) <= 0.5f) median = __float_as_uint(from.color.pad);
     }
+    px = state.open ? px : nowhere;
   };
+  const auto is_open = [&] { return px == px; };
   TileOrder order(a, blockIdx.x, camera);
   unsigned open = __ballot_sync(kAll, inside);
   while (const std::uint32_t n = order.next(s.order, a)) {
     stage(s, a, n, tile_x, tile_y);
-    __syncthreads();
     for (std::uint32_t first = 0; first < n && open != 0; first += kChunk) {
       const unsigned halves = ((open & 0xffffu) != 0 ? 1u : 0u) | (open >> 16 != 0 ? 2u : 0u);
       const std::uint32_t length = list_blocks(s, first, min(first + kChunk, n), bit, halves);
-      const std::uint32_t* const list = reinterpret_cast<const std::uint32_t*>(s.lists[2 * warp + half]);
-      for (std::uint32_t i = 0; i < length / 2; ++i) {
-        const std::uint32_t two = list[i];
-        blend(two & 0xffffu);
-        blend(two >> 16);
-        if (i % 8 == 7 && __all_sync(kAll, !state.open)) break;
+      const std::uint16_t* const list = s.lists[2 * warp + half];
+      for (std::uint32_t i = 0; i < length; i += kListStep) {
+        const uint2 places = *reinterpret_cast<const uint2*>(list + i);
+        blend(places.x & 0xffffu);
+        blend(places.x >> 16);
+        blend(places.y & 0xffffu);
+        blend(places.y >> 16);
+        if (i % 16 == 12 && __all_sync(kAll, !is_open())) break;
       }
-      open = __ballot_sync(kAll, state.open);
+      open = __ballot_sync(kAll, is_open());
     }
     if (__syncthreads_or(open != 0 ? 1 : 0) == 0) break;
   }
@@ -246,10 +293,18 @@ void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std
                      cudaStream_t stream) {
   BlendArgs b{args, raster, raster.images.rgb, rgb8};
   if (rgb8 != nullptr && b.rgb == nullptr) b.raster.images.rgb = reinterpret_cast<float*>(rgb8);
-  dispatch_raster(b.raster, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
-    const auto kernel = blend_kernel<C, D, M, P>;
+  const auto launch = [&](auto kernel) {
     cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, sizeof(BlendShared));
     kernel<<<args.tiles, kThreads, sizeof(BlendShared), stream>>>(b);
+  };
+  dispatch_raster(b.raster, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
+    if (P) {
+      launch(blend_kernel<C, D, M, Form::perspective>);
+    } else if (b.raster.rules.exclusive_stop) {
+      launch(blend_kernel<C, D, M, Form::exclusive_stop>);
+    } else {
+      launch(blend_kernel<C, D, M, Form::plain>);
+    }
   });
   if (raster.depth_mode() == DepthMode::median) {
     const unsigned pixels = static_cast<unsigned>(args.grid.width) * static_cast<unsigned>(args.grid.height);

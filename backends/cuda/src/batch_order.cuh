@@ -7,15 +7,16 @@
 #include "batch_args.cuh"
 
 // The order of a tile's list, found as far as it is read (docs/cuda.md). All threads of a block call every
-// function together, and between calls none of them changes what the others read.
+// function together; before a call they are done with what they were lent.
 
 namespace gsnav::cuda {
 
 inline constexpr int kOrderThreads = 256;
 inline constexpr int kOrderItems = 2;  ///< a thread
 inline constexpr std::uint32_t kOrderBatch = kOrderThreads * kOrderItems;
-inline constexpr int kOrderBins = kOrderThreads;
-inline constexpr int kOrderLevels = 8;  ///< 8 bits of (key, rank) a level
+inline constexpr int kOrderBinBits = 7, kOrderBins = 1 << kOrderBinBits;
+inline constexpr int kOrderLevels = 10;  ///< of 7 bits: five for the key, five for the rank
+inline constexpr std::size_t kOrderLent = 25 * 1024;
 
 /// Bits of a batch's keys that are sorted by digits; what they leave equal is few, and put in order afterwards.
 inline constexpr int kOrderBits = 12;
@@ -25,13 +26,20 @@ using OrderSort = cub::BlockRadixSort<std::uint32_t, kOrderThreads, Items, std::
 using OrderScan = cub::BlockScan<std::uint32_t, kOrderThreads>;
 
 struct OrderShared {
-  union Scratch {
-    typename OrderSort<1>::TempStorage sort1;
-    typename OrderSort<2>::TempStorage sort2;
-    typename OrderScan::TempStorage scan;
-  } scratch;
-  std::uint32_t keys[kOrderBatch], slots[kOrderBatch];  ///< the batch, in order
-  std::uint32_t begins[kOrderLevels][kOrderBins + 1];   ///< of bins, into the pairs
+  struct Sorting {
+    union {
+      typename OrderSort<1>::TempStorage sort1;
+      typename OrderSort<2>::TempStorage sort2;
+      typename OrderScan::TempStorage scan;
+    };
+    std::uint32_t keys[kOrderBatch];
+  };
+  union {
+    Sorting sorting;
+    unsigned char lent[kOrderLent];  ///< the caller's between calls
+  };
+  std::uint32_t slots[kOrderBatch];  ///< the batch, in order
+  std::uint32_t begins[kOrderLevels][kOrderBins + 1];  ///< of bins, into the pairs
   std::uint32_t next_bin[kOrderLevels];
   std::uint32_t cursors[kOrderBins];
   std::uint32_t low, high;
@@ -65,13 +73,13 @@ __device__ inline int bits_for(std::uint32_t range) { return 32 - __clz(static_c
 template <int Items>
 __device__ auto& sort_storage(OrderShared& s) {
   if constexpr (Items == 1) {
-    return s.scratch.sort1;
+    return s.sorting.sort1;
   } else {
-    return s.scratch.sort2;
+    return s.sorting.sort2;
   }
 }
 
-/// Sorts n pairs from `pairs` into s.keys and s.slots, by the highest kOrderBits of their range.
+/// Sorts n pairs from `pairs` into s.sorting.keys and s.slots, by the highest kOrderBits of their range.
 template <int Items>
 __device__ __noinline__ void sort_coarsely(OrderShared& s, const Pair* pairs, std::uint32_t n) {
   std::uint32_t key[Items], slot[Items], low = 0xffffffffu, high = 0;
@@ -97,7 +105,7 @@ __device__ __noinline__ void sort_coarsely(OrderShared& s, const Pair* pairs, st
   if (bits > 0) OrderSort<Items>(sort_storage<Items>(s)).Sort(key, slot, shift, bits);
   for (int j = 0; j < Items; ++j) {
     const std::uint32_t i = threadIdx.x * Items + static_cast<std::uint32_t>(j);
-    s.keys[i] = key[j];
+    s.sorting.keys[i] = key[j];
     s.slots[i] = slot[j];
   }
   __syncthreads();
@@ -112,10 +120,10 @@ __device__ __noinline__ void sort_by_rank(OrderShared& s, const BatchArgs& a, st
     index[j] = threadIdx.x * kItems + static_cast<std::uint32_t>(j);
     rank[j] = index[j] < n ? rank_of(a, camera, s.slots[index[j]]) : 0xffffffffu;
   }
-  OrderSort<kItems>(s.scratch.sort2).Sort(rank, index, 0, 32);
-  for (int j = 0; j < kItems; ++j) key[j] = index[j] < n ? s.keys[index[j]] : 0xffffffffu;
+  OrderSort<kItems>(s.sorting.sort2).Sort(rank, index, 0, 32);
+  for (int j = 0; j < kItems; ++j) key[j] = index[j] < n ? s.sorting.keys[index[j]] : 0xffffffffu;
   __syncthreads();
-  OrderSort<kItems>(s.scratch.sort2).Sort(key, index, 0, 32);
+  OrderSort<kItems>(s.sorting.sort2).Sort(key, index, 0, 32);
   for (int j = 0; j < kItems; ++j) slot[j] = s.slots[index[j]];
   __syncthreads();
   for (int j = 0; j < kItems; ++j) s.slots[threadIdx.x * kItems + static_cast<std::uint32_t>(j)] = slot[j];
@@ -136,10 +144,10 @@ __device__ __noinline__ void order_runs(OrderShared& s, const BatchArgs& a, std:
     const std::uint32_t i = threadIdx.x + static_cast<std::uint32_t>(k) * kOrderThreads;
     ends[k] = 0;
     if (i + 1 >= n) continue;
-    const std::uint32_t digit = s.keys[i] >> shift;
-    if (s.keys[i + 1] >> shift != digit || (i > 0 && s.keys[i - 1] >> shift == digit)) continue;
+    const std::uint32_t digit = s.sorting.keys[i] >> shift;
+    if (s.sorting.keys[i + 1] >> shift != digit || (i > 0 && s.sorting.keys[i - 1] >> shift == digit)) continue;
     std::uint32_t end = i + 2;
-    while (end < n && end - i <= kLongest && s.keys[end] >> shift == digit) ++end;
+    while (end < n && end - i <= kLongest && s.sorting.keys[end] >> shift == digit) ++end;
     ends[k] = end;
     if (end - i > kLongest) s.long_run = 1;
   }
@@ -148,16 +156,16 @@ __device__ __noinline__ void order_runs(OrderShared& s, const BatchArgs& a, std:
   for (int k = 0; k < kOrderItems; ++k) {
     const std::uint32_t begin = threadIdx.x + static_cast<std::uint32_t>(k) * kOrderThreads;
     for (std::uint32_t j = begin + 1; j < ends[k]; ++j) {
-      const std::uint32_t key = s.keys[j], slot = s.slots[j];
+      const std::uint32_t key = s.sorting.keys[j], slot = s.slots[j];
       std::uint32_t to = j;
       for (; to > begin; --to) {
-        const std::uint32_t before = s.keys[to - 1];
+        const std::uint32_t before = s.sorting.keys[to - 1];
         if (before < key) break;
         if (before == key && rank_of(a, camera, s.slots[to - 1]) < rank_of(a, camera, slot)) break;
-        s.keys[to] = before;
+        s.sorting.keys[to] = before;
         s.slots[to] = s.slots[to - 1];
       }
-      s.keys[to] = key;
+      s.sorting.keys[to] = key;
       s.slots[to] = slot;
     }
   }
@@ -178,17 +186,18 @@ __device__ __noinline__ void partition(OrderShared& s, const BatchArgs& a, std::
   };
   const auto split = [&](auto value) {
     const std::uint32_t base = s.low;
-    const int shift = max(0, bits_for(s.high - base) - 8);
-    s.cursors[threadIdx.x] = 0;
+    const int shift = max(0, bits_for(s.high - base) - kOrderBinBits);
+    const bool bin = threadIdx.x < kOrderBins;
+    if (bin) s.cursors[threadIdx.x] = 0;
     __syncthreads();
     for (std::uint32_t i = begin + threadIdx.x; i < begin + n; i += kOrderThreads) {
       atomicAdd(&s.cursors[(value(from[i]) - base) >> shift], 1u);
     }
     __syncthreads();
     std::uint32_t at = 0;
-    OrderScan(s.scratch.scan).ExclusiveSum(s.cursors[threadIdx.x], at);
+    OrderScan(s.sorting.scan).ExclusiveSum(bin ? s.cursors[threadIdx.x] : 0u, at);
     __syncthreads();
-    s.begins[level][threadIdx.x] = s.cursors[threadIdx.x] = begin + at;
+    if (bin) s.begins[level][threadIdx.x] = s.cursors[threadIdx.x] = begin + at;
     if (threadIdx.x == 0) {
       s.begins[level][kOrderBins] = begin + n;
       s.next_bin[level] = 0;

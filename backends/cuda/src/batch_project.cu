@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cuda_pipeline.h>
+
 #include "batch_splat.cuh"
 
 // Culling and projection of a batch: what CPU backends do one camera at a time, by the same formulas.
@@ -8,7 +10,7 @@ namespace gsnav::cuda {
 namespace {
 
 constexpr unsigned kThreads = 256, kWarps = kThreads / 32;
-constexpr unsigned kProjectWarps = 4;
+constexpr unsigned kProjectWarps = 4, kProjectBlocks = 6;  ///< of a block; of a multiprocessor
 constexpr unsigned kWarpsPerChunk = kProjectChunk / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
@@ -36,6 +38,7 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
   }
 }
 
+template <bool Plain>
 __device__ void write_record(const BatchArgs& a, std::uint32_t slot, const BatchInstance& instance, float key,
                              std::size_t row, const Splat& s, const SplatColor<float>& c) {
   const SplatGeometry<float>& g = s.geometry;
@@ -46,6 +49,7 @@ __device__ void write_record(const BatchArgs& a, std::uint32_t slot, const Batch
                      g.a, g.k, g.b, g.w1, g.w2, g.log2_opacity, c.r, c.g, c.b, x, y};
   a.entries[slot] = {instance.args.camera.key_code(key), x, y, instance.camera};
   a.sources[slot] = instance.args.first_rank + static_cast<std::uint32_t>(row);
+  if (Plain) return;
   if (a.depths != nullptr) a.depths[slot] = s.depth;
   if (a.perspectives != nullptr) a.perspectives[slot] = s.perspective;
 }
@@ -90,7 +94,7 @@ class WarpSlots {
 };
 
 /// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
-struct WarpRows {
+struct alignas(16) WarpRows {
   float mean[3][32], quat[4][32], scales[3][32], opacity[32];
   /// [32][rest]: from memory a warp would read 32 lines a coefficient.
   float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
@@ -110,17 +114,26 @@ __device__ void load_rows(const GaussianView& gs, std::size_t row, WarpRows& to)
   __syncwarp();
 }
 
-/// `first`: row of lane 0.
-__device__ void load_sh(const GaussianView& gs, std::size_t first, WarpRows& to) {
+/// Asks for the coefficients of rows `first` (lane 0) on; they are there after wait_for_sh.
+__device__ void ask_for_sh(const GaussianView& gs, std::size_t first, WarpRows& to) {
   const std::size_t rest = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
   const std::size_t rows = gs.size - first < 32 ? gs.size - first : 32;
   const float* from = gs.shN.data + rest * first;
-  __syncwarp();
-  for (std::size_t i = threadIdx.x % 32; i < rest * rows; i += 32) to.sh[i] = from[i];
+  const unsigned n = static_cast<unsigned>(rest * rows), lane = threadIdx.x % 32;
+  if (n % 4 == 0 && reinterpret_cast<std::uintptr_t>(from) % 16 == 0) {
+    for (unsigned i = 4 * lane; i < n; i += 128) __pipeline_memcpy_async(to.sh + i, from + i, 16);
+  } else {
+    for (unsigned i = lane; i < n; i += 32) __pipeline_memcpy_async(to.sh + i, from + i, 4);
+  }
+  __pipeline_commit();
+}
+
+__device__ void wait_for_sh() {
+  __pipeline_wait_prior(0);
   __syncwarp();
 }
 
-/// Colour of a lane's row after load_sh.
+/// Colour of a lane's row after wait_for_sh.
 __device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t row, const WarpRows& rows,
                                        const Vec3<float>& delta) {
   const std::size_t lane = threadIdx.x % 32, first = row - lane;
@@ -135,7 +148,9 @@ __device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::
 }
 
 /// A warp an eighth of an item: Gaussians are read once and projected for each camera of the mask.
-__global__ void __launch_bounds__(32 * kProjectWarps, 6) project_kernel(const BatchArgs a) {
+/// `Plain`: records of neither depth nor perspective are asked for.
+template <bool Plain>
+__global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_kernel(const BatchArgs a) {
   __shared__ WarpRows shared[kProjectWarps];
   const unsigned lane = threadIdx.x % 32;
   WarpRows& rows = shared[threadIdx.x / 32];
@@ -148,8 +163,9 @@ __global__ void __launch_bounds__(32 * kProjectWarps, 6) project_kernel(const Ba
     const std::size_t row = item.chunk * kProjectChunk + part % kWarpsPerChunk * 32 + lane;
     const bool exists = row < gs.size;
     const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
-    bool has_sh = false;
     load_rows(gs, row, rows);
+    bool has_sh = !a.instances[item.first_instance].args.color || row - lane >= gs.size;
+    if (!has_sh) ask_for_sh(gs, row - lane, rows);
     for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
       const std::uint32_t index = item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1;
       const BatchInstance& instance = a.instances[index];
@@ -175,7 +191,7 @@ __global__ void __launch_bounds__(32 * kProjectWarps, 6) project_kernel(const Ba
             double mean_x, mean_y;
             gsnav::detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin], mean_x,
                                         mean_y);
-            drawn = make_splat(args.camera, a.depths != nullptr, p, axes, mean_x, mean_y, splat);
+            drawn = make_splat<Plain>(args.camera, a.depths != nullptr, p, axes, mean_x, mean_y, splat);
           }
         }
       }
@@ -185,15 +201,16 @@ __global__ void __launch_bounds__(32 * kProjectWarps, 6) project_kernel(const Ba
         if (slot != kNoSlot) a.entries[slot].camera = kNoSlot;  // until it has a record
         if (at < a.hard_capacity) a.hard[at] = {slot, index, static_cast<std::uint32_t>(row)};
       }
-      if (args.color && !has_sh && __any_sync(kAll, drawn)) {
-        load_sh(gs, row - lane, rows);
+      if (!has_sh && __any_sync(kAll, drawn)) {
+        wait_for_sh();
         has_sh = true;
       }
       if (drawn && slot != kNoSlot) {
-        write_record(a, slot, instance, key, row, splat,
+        write_record<Plain>(a, slot, instance, key, row, splat,
                      args.color ? row_color(gs, args.sh_degree, row, rows, delta) : SplatColor<float>{});
       }
     }
+    if (!has_sh) wait_for_sh();
   }
   slots.finish();
 }
@@ -216,7 +233,7 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
       if (args.color) {
         color = gaussian_color<float>(gs, args.sh_degree, h.row, gsnav::detail::camera_delta(args, mean, origin));
       }
-      write_record(a, h.slot, instance, key, h.row, splat, color);
+      write_record<false>(a, h.slot, instance, key, h.row, splat, color);
     }
   }
 }
@@ -226,7 +243,9 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
 void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
   const unsigned blocks = static_cast<unsigned>(multiprocessors) * 8;
   cull_kernel<<<blocks, kThreads, 0, stream>>>(args);
-  project_kernel<<<static_cast<unsigned>(multiprocessors) * 6, 32 * kProjectWarps, 0, stream>>>(args);
+  const bool plain = args.depths == nullptr && args.perspectives == nullptr;
+  (plain ? project_kernel<true> : project_kernel<false>)<<<static_cast<unsigned>(multiprocessors) * kProjectBlocks,
+                                                           32 * kProjectWarps, 0, stream>>>(args);
   project_hard_kernel<<<blocks, 128, 0, stream>>>(args);
 }
 

@@ -15,11 +15,12 @@ struct Splat {
 };
 
 /// `store_splat` into registers. False where no pixel centre lies in the bounds.
-template <class T, class U>
+/// `Plain`: neither depth nor perspective is asked for.
+template <bool Plain, class T, class U>
 __device__ inline bool make_splat(const ProjectionCamera<T>& camera, bool depth, const Projected<T>& p,
                            const SplatAxes<T>& axes, U mean_x, U mean_y, Splat& out) {
   ProjectArgs<float> to;
-  to.depth = depth;
+  to.depth = !Plain && depth;
   to.geometry = {&out.geometry, 1};
   to.bounds = {&out.bounds, 1};
   to.depths = {&out.depth, 1};
@@ -38,7 +39,7 @@ __device__ inline bool make_splat64(const ProjectArgs<float>& args, bool depth, 
                                     const Vec3<float>& mean, std::size_t origin, Splat& out) {
   SplatAxes<double> axes;
   const Projected<double> p = gsnav::detail::project64(args, row, key, mean, origin, axes);
-  return make_splat(args.camera64, depth, p, axes, p.mean_x, p.mean_y, out);
+  return make_splat<false>(args.camera64, depth, p, axes, p.mean_x, p.mean_y, out);
 }
 
 }  // namespace gsnav::cuda
