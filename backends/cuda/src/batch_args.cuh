@@ -43,10 +43,9 @@ struct alignas(16) SplatRecord {
   std::uint32_t x, y;  ///< bounds: first | end << 16
 };
 
-/// A survivor as binning reads it: its bounds, as in its record, until its tiles are counted. `camera` is
-/// kNoSlot where a slot was taken and not used.
+/// A survivor as binning reads it: a TileWindow of `tiles` at `corner`, none where it has a warp of its own. `camera` is kNoSlot where a slot was taken and not used.
 struct alignas(16) SplatEntry {
-  std::uint32_t key, x, y, camera;
+  std::uint32_t key, corner, tiles, camera;
 };
 
 /// A slot whose record is still to be computed, in double, from row `row` of an instance.
@@ -61,7 +60,7 @@ struct Pair {
 
 /// Counts go on where capacities end, so that they say what would have been needed.
 struct BatchCounters {
-  unsigned long long slots, hard, large, pairs;
+  unsigned long long slots, hard, several, large, pairs;
   std::uint32_t items;
 };
 
@@ -85,13 +84,14 @@ struct BatchArgs {
   SplatDepth<float>* depths;              ///< null: no image sums depths
   SplatPerspective<float>* perspectives;  ///< null: Response::ewa
   HardSplat* hard;
-  std::uint32_t* large;
+  std::uint32_t* several;  ///< slots whose tiles are still to be found; kNoSlot: none
+  std::uint32_t* large;    ///< slots of very many tiles
   std::uint32_t* tile_counts;
   std::uint32_t* tile_begins;
   std::uint32_t* tile_cursors;
   Pair* pairs;
   Pair* pairs_alt;
-  std::uint32_t slot_capacity, hard_capacity, large_capacity, pair_capacity;
+  std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity;
   std::uint32_t slab;  ///< slots that a warp takes at a time: few cameras leave few to share them
 };
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cub/block/block_scan.cuh>
 
-#include "batch_args.cuh"
+#include "batch_tiles.cuh"
 
-// Tile lists of a batch: counted, placed, written. Their order is decided where they are read.
+// Tile lists of a batch: placed and written. Their order is decided where they are read.
 
 namespace gsnav::cuda {
 
@@ -12,116 +12,42 @@ namespace {
 constexpr unsigned kThreads = 128;
 constexpr unsigned kSlots = 4;  ///< a thread
 
-/// The tiles that a splat may touch, where they lie in a window of 4 x 4.
-struct TileWindow {
-  static constexpr int kSide = 4;  ///< a splat that needs more gets a warp
-  std::uint32_t corner;            ///< column | row << 16
-  std::uint32_t tiles;             ///< bit kSide * row + column
-  __device__ std::uint32_t column() const { return corner & 0xffffu; }
-  __device__ std::uint32_t row() const { return corner >> 16; }
-  /// Of the lowest of `bits` from the corner.
-  __device__ static std::uint32_t offset(std::uint32_t bits, std::uint32_t columns) {
-    const std::uint32_t bit = static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
-    return bit / kSide * columns + bit % kSide;
-  }
-};
-
-/// Counts a pair of tile `tile` (of all cameras), or writes it.
-template <bool Emit>
-__device__ void put(const BatchArgs& a, std::uint32_t tile, std::uint32_t key, std::uint32_t slot) {
-  if constexpr (Emit) {
-    const std::uint32_t at = atomicAdd(a.tile_cursors + tile, 1u);
-    if (at < a.pair_capacity) a.pairs[at] = {key, slot};
-  } else {
-    atomicAdd(a.tile_counts + tile, 1u);
-  }
-}
-
-/// The same for lanes that often share a tile: one atomic operation a tile. `wanted`: this lane takes part.
-template <bool Emit>
-__device__ void put_together(const BatchArgs& a, bool wanted, std::uint32_t tile, std::uint32_t key,
-                             std::uint32_t slot) {
-  const unsigned takers = __ballot_sync(0xffffffffu, wanted);
-  if (!wanted) return;
-  const unsigned lane = threadIdx.x % 32, peers = __match_any_sync(takers, tile);
-  const int leader = __ffs(static_cast<int>(peers)) - 1;
-  const std::uint32_t count = static_cast<std::uint32_t>(__popc(peers));
-  std::uint32_t at = 0;
-  if (static_cast<int>(lane) == leader) at = atomicAdd((Emit ? a.tile_cursors : a.tile_counts) + tile, count);
-  if constexpr (Emit) {
-    at = __shfl_sync(peers, at, leader) + static_cast<std::uint32_t>(__popc(peers & ((1u << lane) - 1)));
-    if (at < a.pair_capacity) a.pairs[at] = {key, slot};
-  }
-}
-
-__device__ std::uint32_t first_tile(const BatchArgs& a, std::uint32_t camera) {
-  return camera * static_cast<std::uint32_t>(a.grid.count());
-}
-
-/// A thread four slots. Splats of several tiles are few and slow: they go through a queue, so that no lane
-/// waits for another's. What emit_kernel needs stands in the entry's bounds afterwards.
+/// A thread a splat of several tiles.
 __global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
-  __shared__ std::uint32_t queue[kThreads * kSlots], queued;
-  const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
-  const int shift = a.grid.tile_shift();
-  const std::uint32_t columns = static_cast<std::uint32_t>(a.grid.columns);
-  for (std::uint64_t first = blockIdx.x * std::uint64_t{kThreads * kSlots}; first < slots;
-       first += gridDim.x * std::uint64_t{kThreads * kSlots}) {
-    if (threadIdx.x == 0) queued = 0;
-    __syncthreads();
-    SplatEntry entries[kSlots];
-    for (unsigned j = 0; j < kSlots; ++j) {
-      const std::uint64_t at = first + j * kThreads + threadIdx.x;
-      entries[j].camera = kNoSlot;
-      if (at < slots) entries[j] = a.entries[at];
-    }
-    for (unsigned j = 0; j < kSlots; ++j) {
-      const SplatEntry& e = entries[j];
-      const std::uint32_t slot = static_cast<std::uint32_t>(first + j * kThreads + threadIdx.x);
-      const SplatBounds b = bounds_of(e.x, e.y);
-      const int tx = b.x0 >> shift, ty = b.y0 >> shift;
-      const int right = (b.x1 - 1) >> shift, bottom = (b.y1 - 1) >> shift;
-      const bool live = e.camera != kNoSlot, single = live && right == tx && bottom == ty;
-      const TileWindow window{static_cast<std::uint32_t>(tx) | static_cast<std::uint32_t>(ty) << 16, single ? 1u : 0u};
-      put_together<false>(a, single, first_tile(a, e.camera) + window.row() * columns + window.column(), e.key, slot);
-      if (!live) continue;
-      if (right - tx >= TileWindow::kSide || bottom - ty >= TileWindow::kSide) {
+  const std::uint32_t n = used(a.counters->several, a.several_capacity);
+  const std::uint32_t end = (n + 31) / 32 * 32;
+  for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < end; i += gridDim.x * kThreads) {
+    const std::uint32_t slot = i < n ? a.several[i] : kNoSlot;
+    TileWindow window{0, 0};
+    std::uint32_t camera = 0;
+    if (slot != kNoSlot) {
+      const SplatRecord& r = a.records[slot];
+      const SplatBounds b = bounds_of(r.x, r.y);
+      window = window_of(a, b);
+      camera = a.entries[slot].camera;
+      if (is_large(a, b)) {
         const unsigned long long place = atomicAdd(&a.counters->large, 1ull);
         if (place < a.large_capacity) a.large[place] = slot;
-      } else if (!single) {
-        queue[atomicAdd(&queued, 1u)] = slot;
-        continue;
-      }
-      a.entries[slot].x = window.corner;
-      a.entries[slot].y = window.tiles;
-    }
-    __syncthreads();
-    for (std::uint32_t i = threadIdx.x; i < queued; i += kThreads) {
-      const std::uint32_t slot = queue[i];
-      const SplatEntry e = a.entries[slot];
-      const SplatBounds b = bounds_of(e.x, e.y);
-      TileWindow window{static_cast<std::uint32_t>(b.x0 >> shift) | static_cast<std::uint32_t>(b.y0 >> shift) << 16, 0};
-      // Tiles of a grid as wide as the window are numbered as its bits are.
-      TileGrid grid = a.grid;
-      grid.columns = TileWindow::kSide;
-      const std::size_t corner = window.row() * TileWindow::kSide + window.column();
-      for_each_tile(grid, geometry_of(a.records[slot]), b, a.log2_alpha_min, a.elliptic,
-                    [&](std::size_t tile) { window.tiles |= 1u << (tile - corner); });
-      a.entries[slot].x = window.corner;
-      a.entries[slot].y = window.tiles;
-      const std::uint32_t from = first_tile(a, e.camera) + window.row() * columns + window.column();
-      for (std::uint32_t bits = window.tiles; bits != 0; bits &= bits - 1) {
-        put<false>(a, from + TileWindow::offset(bits, columns), e.key, slot);
+      } else {
+        // Tiles of a grid as wide as the window are numbered as its bits are.
+        TileGrid grid = a.grid;
+        grid.columns = TileWindow::kSide;
+        const std::size_t corner = window.row() * TileWindow::kSide + window.column();
+        window.tiles = 0;
+        for_each_tile(grid, geometry_of(r), b, a.log2_alpha_min, a.elliptic,
+                      [&](std::size_t tile) { window.tiles |= 1u << (tile - corner); });
+        a.entries[slot].tiles = window.tiles;
       }
     }
-    __syncthreads();
+    for (std::uint32_t bits = window.tiles; __any_sync(0xffffffffu, bits != 0); bits &= bits - 1) {
+      add_together<false>(a.tile_counts, bits != 0, tile_of(a, camera, window, bits));
+    }
   }
 }
 
-/// A thread four slots, after count_kernel.
+/// A thread four slots.
 __global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
   const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
-  const std::uint32_t columns = static_cast<std::uint32_t>(a.grid.columns);
   for (std::uint64_t first = blockIdx.x * std::uint64_t{kThreads * kSlots}; first < slots;
        first += gridDim.x * std::uint64_t{kThreads * kSlots}) {
     SplatEntry entries[kSlots];
@@ -133,11 +59,12 @@ __global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
     for (unsigned j = 0; j < kSlots; ++j) {
       const SplatEntry& e = entries[j];
       const std::uint32_t slot = static_cast<std::uint32_t>(first + j * kThreads + threadIdx.x);
-      const TileWindow window{e.x, e.y};
-      const std::uint32_t from = first_tile(a, e.camera) + window.row() * columns + window.column();
+      const TileWindow window{e.corner, e.tiles};
       std::uint32_t bits = e.camera != kNoSlot ? window.tiles : 0;
       for (; __any_sync(0xffffffffu, bits != 0); bits &= bits - 1) {
-        put_together<true>(a, bits != 0, from + TileWindow::offset(bits, columns), e.key, slot);
+        const std::uint32_t at =
+            add_together<true>(a.tile_cursors, bits != 0, tile_of(a, e.camera, window, bits));
+        if (bits != 0 && at < a.pair_capacity) a.pairs[at] = {e.key, slot};
       }
     }
   }
@@ -157,7 +84,8 @@ __global__ void __launch_bounds__(kThreads) bin_large_kernel(const BatchArgs a) 
       const SplatBounds row{all.x0, max(all.y0, y), all.x1, min(all.y1, y + ts)};
       const std::uint32_t first = first_tile(a, e.camera);
       for_each_tile(a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](std::size_t tile) {
-        put<Emit>(a, first + static_cast<std::uint32_t>(tile), e.key, slot);
+        const std::uint32_t at = atomicAdd((Emit ? a.tile_cursors : a.tile_counts) + first + tile, 1u);
+        if (Emit && at < a.pair_capacity) a.pairs[at] = {e.key, slot};
       });
     }
   }

@@ -18,19 +18,21 @@ inline constexpr int kOrderBinBits = 7, kOrderBins = 1 << kOrderBinBits;
 inline constexpr int kOrderLevels = 10;  ///< of 7 bits: five for the key, five for the rank
 inline constexpr std::size_t kOrderLent = 25 * 1024;
 
-/// Bits of a batch's keys that are sorted by digits; what they leave equal is few, and put in order afterwards.
-inline constexpr int kOrderBits = 12;
+/// A batch is scattered into so many buckets by key; what shares one is put in order afterwards.
+inline constexpr int kBucketBits = 11, kBuckets = 1 << kBucketBits;
+inline constexpr int kThreadBuckets = kBuckets / kOrderThreads;
 
-template <int Items>
-using OrderSort = cub::BlockRadixSort<std::uint32_t, kOrderThreads, Items, std::uint32_t>;
+using OrderSort = cub::BlockRadixSort<std::uint32_t, kOrderThreads, kOrderItems, std::uint32_t>;
 using OrderScan = cub::BlockScan<std::uint32_t, kOrderThreads>;
 
 struct OrderShared {
   struct Sorting {
     union {
-      typename OrderSort<1>::TempStorage sort1;
-      typename OrderSort<2>::TempStorage sort2;
-      typename OrderScan::TempStorage scan;
+      typename OrderSort::TempStorage sort;
+      struct {
+        typename OrderScan::TempStorage scan;
+        alignas(16) std::uint32_t buckets[kBuckets + 1];
+      };
     };
     std::uint32_t keys[kOrderBatch];
   };
@@ -40,12 +42,14 @@ struct OrderShared {
   };
   std::uint32_t slots[kOrderBatch];  ///< the batch, in order
   std::uint32_t begins[kOrderLevels][kOrderBins + 1];  ///< of bins, into the pairs
+  std::uint32_t bases[kOrderLevels];                   ///< the smallest key of the level
+  int shifts[kOrderLevels];                            ///< a bin is 2^shift keys; kByRank where keys are equal
   std::uint32_t next_bin[kOrderLevels];
   std::uint32_t cursors[kOrderBins];
   std::uint32_t low, high;
-  int shift;  ///< of the batch: keys that differ only below it may not be in order yet
   int long_run;
 };
+inline constexpr int kByRank = -1;
 
 namespace ordering {
 
@@ -70,47 +74,6 @@ __device__ inline void block_range(OrderShared& s, std::uint32_t low, std::uint3
 
 __device__ inline int bits_for(std::uint32_t range) { return 32 - __clz(static_cast<int>(range)); }
 
-template <int Items>
-__device__ auto& sort_storage(OrderShared& s) {
-  if constexpr (Items == 1) {
-    return s.sorting.sort1;
-  } else {
-    return s.sorting.sort2;
-  }
-}
-
-/// Sorts n pairs from `pairs` into s.sorting.keys and s.slots, by the highest kOrderBits of their range.
-template <int Items>
-__device__ __noinline__ void sort_coarsely(OrderShared& s, const Pair* pairs, std::uint32_t n) {
-  std::uint32_t key[Items], slot[Items], low = 0xffffffffu, high = 0;
-  for (int j = 0; j < Items; ++j) {
-    const std::uint32_t i = threadIdx.x * Items + static_cast<std::uint32_t>(j);
-    key[j] = 0xffffffffu;  // what is no pair comes last: the sort is stable
-    slot[j] = 0;
-    if (i >= n) continue;
-    const Pair p = pairs[i];
-    key[j] = p.key;
-    slot[j] = p.slot;
-    low = min(low, p.key);
-    high = max(high, p.key);
-  }
-  block_range(s, low, high);
-  const std::uint32_t base = s.low;
-  const int bits = bits_for(s.high - base), shift = max(0, bits - kOrderBits);
-  if (threadIdx.x == 0) s.shift = shift;
-  for (int j = 0; j < Items; ++j) {
-    const bool real = threadIdx.x * Items + static_cast<std::uint32_t>(j) < n;
-    key[j] = real ? key[j] - base : 0xffffffffu;
-  }
-  if (bits > 0) OrderSort<Items>(sort_storage<Items>(s)).Sort(key, slot, shift, bits);
-  for (int j = 0; j < Items; ++j) {
-    const std::uint32_t i = threadIdx.x * Items + static_cast<std::uint32_t>(j);
-    s.sorting.keys[i] = key[j];
-    s.slots[i] = slot[j];
-  }
-  __syncthreads();
-}
-
 /// Sorts a batch in which many keys are equal, by (key, rank).
 __device__ __noinline__ void sort_by_rank(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
                                           std::uint32_t n) {
@@ -120,54 +83,104 @@ __device__ __noinline__ void sort_by_rank(OrderShared& s, const BatchArgs& a, st
     index[j] = threadIdx.x * kItems + static_cast<std::uint32_t>(j);
     rank[j] = index[j] < n ? rank_of(a, camera, s.slots[index[j]]) : 0xffffffffu;
   }
-  OrderSort<kItems>(s.sorting.sort2).Sort(rank, index, 0, 32);
+  OrderSort(s.sorting.sort).Sort(rank, index, 0, 32);
+  // What is no pair comes last: both sorts are stable.
   for (int j = 0; j < kItems; ++j) key[j] = index[j] < n ? s.sorting.keys[index[j]] : 0xffffffffu;
   __syncthreads();
-  OrderSort<kItems>(s.sorting.sort2).Sort(key, index, 0, 32);
+  OrderSort(s.sorting.sort).Sort(key, index, 0, 32);
   for (int j = 0; j < kItems; ++j) slot[j] = s.slots[index[j]];
   __syncthreads();
   for (int j = 0; j < kItems; ++j) s.slots[threadIdx.x * kItems + static_cast<std::uint32_t>(j)] = slot[j];
   __syncthreads();
 }
 
-/// Puts runs that the coarse sort left equal in order of (key, rank): insertion by the thread at which a run
-/// starts, or where one is too long the whole batch again.
-__device__ __noinline__ void order_runs(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
-                                        std::uint32_t n) {
-  constexpr std::uint32_t kLongest = 24;
-  const int shift = s.shift;
+/// Where the splat at `at` belongs among those of its bucket, [begin, end), by (key, rank).
+__device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const BatchArgs& a, std::uint32_t camera,
+                                                std::uint32_t begin, std::uint32_t end, std::uint32_t at) {
+  const std::uint32_t key = s.sorting.keys[at];
+  std::uint32_t before = 0;
+  for (std::uint32_t i = begin; i < end; ++i) {
+    const std::uint32_t other = s.sorting.keys[i];
+    if (other < key) {
+      ++before;
+    } else if (other == key && i != at) {
+      before += rank_of(a, camera, s.slots[i]) < rank_of(a, camera, s.slots[at]) ? 1u : 0u;
+    }
+  }
+  return begin + before;
+}
+
+/// Sorts n pairs into s.slots. All keys lie in [low, high]; low > high: not known.
+__device__ __noinline__ void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
+                                        const Pair* pairs, std::uint32_t n, std::uint32_t low,
+                                        std::uint32_t high) {
+  constexpr std::uint32_t kLongest = 64;  // bucket that is put in order by comparing all with all
+  Pair pair[kOrderItems];
+  std::uint32_t place[kOrderItems];
+  for (unsigned j = 0; j < kOrderItems; ++j) {
+    const std::uint32_t i = threadIdx.x + j * kOrderThreads;
+    if (i < n) pair[j] = pairs[i];
+  }
+  if (low > high) {
+    for (unsigned j = 0; j < kOrderItems; ++j) {
+      if (threadIdx.x + j * kOrderThreads >= n) continue;
+      low = min(low, pair[j].key);
+      high = max(high, pair[j].key);
+    }
+    block_range(s, low, high);
+    low = s.low;
+    high = s.high;
+  } else {
+    __syncthreads();
+  }
+  const int shift = max(0, bits_for(high - low) - kBucketBits);
+  auto* const mine = reinterpret_cast<uint4*>(s.sorting.buckets + threadIdx.x * kThreadBuckets);
+  for (int k = 0; k < kThreadBuckets / 4; ++k) mine[k] = {0, 0, 0, 0};
   if (threadIdx.x == 0) s.long_run = 0;
   __syncthreads();
-  // Found before any is changed: keys move within runs only, but others look at their neighbours.
-  std::uint32_t ends[kOrderItems];
-  for (int k = 0; k < kOrderItems; ++k) {
-    const std::uint32_t i = threadIdx.x + static_cast<std::uint32_t>(k) * kOrderThreads;
-    ends[k] = 0;
-    if (i + 1 >= n) continue;
-    const std::uint32_t digit = s.sorting.keys[i] >> shift;
-    if (s.sorting.keys[i + 1] >> shift != digit || (i > 0 && s.sorting.keys[i - 1] >> shift == digit)) continue;
-    std::uint32_t end = i + 2;
-    while (end < n && end - i <= kLongest && s.sorting.keys[end] >> shift == digit) ++end;
-    ends[k] = end;
-    if (end - i > kLongest) s.long_run = 1;
+  for (unsigned j = 0; j < kOrderItems; ++j) {
+    if (threadIdx.x + j * kOrderThreads >= n) continue;
+    pair[j].key -= low;
+    place[j] = atomicAdd(&s.sorting.buckets[pair[j].key >> shift], 1u);
+  }
+  __syncthreads();
+  std::uint32_t total = 0, largest = 0, begin;
+  for (int k = 0; k < kThreadBuckets / 4; ++k) {
+    const uint4 four = mine[k];
+    total += four.x + four.y + four.z + four.w;
+    largest = max(largest, max(max(four.x, four.y), max(four.z, four.w)));
+  }
+  if (largest > kLongest) s.long_run = 1;
+  OrderScan(s.sorting.scan).ExclusiveSum(total, begin);
+  for (int k = 0; k < kThreadBuckets / 4; ++k) {
+    uint4 four = mine[k];
+    const uint4 counts = four;
+    four.x = begin;
+    four.y = four.x + counts.x;
+    four.z = four.y + counts.y;
+    four.w = four.z + counts.z;
+    begin = four.w + counts.w;
+    mine[k] = four;
+  }
+  if (threadIdx.x == 0) s.sorting.buckets[kBuckets] = n;
+  __syncthreads();
+  for (unsigned j = 0; j < kOrderItems; ++j) {
+    if (threadIdx.x + j * kOrderThreads >= n) continue;
+    place[j] += s.sorting.buckets[pair[j].key >> shift];
+    s.sorting.keys[place[j]] = pair[j].key;
+    s.slots[place[j]] = pair[j].slot;
   }
   __syncthreads();
   if (s.long_run != 0) return sort_by_rank(s, a, camera, n);
-  for (int k = 0; k < kOrderItems; ++k) {
-    const std::uint32_t begin = threadIdx.x + static_cast<std::uint32_t>(k) * kOrderThreads;
-    for (std::uint32_t j = begin + 1; j < ends[k]; ++j) {
-      const std::uint32_t key = s.sorting.keys[j], slot = s.slots[j];
-      std::uint32_t to = j;
-      for (; to > begin; --to) {
-        const std::uint32_t before = s.sorting.keys[to - 1];
-        if (before < key) break;
-        if (before == key && rank_of(a, camera, s.slots[to - 1]) < rank_of(a, camera, slot)) break;
-        s.sorting.keys[to] = before;
-        s.slots[to] = s.slots[to - 1];
-      }
-      s.sorting.keys[to] = key;
-      s.slots[to] = slot;
-    }
+  for (unsigned j = 0; j < kOrderItems; ++j) {
+    if (threadIdx.x + j * kOrderThreads >= n) continue;
+    const std::uint32_t bucket = pair[j].key >> shift;
+    const std::uint32_t first = s.sorting.buckets[bucket], last = s.sorting.buckets[bucket + 1];
+    if (last - first > 1) place[j] = place_in_bucket(s, a, camera, first, last, place[j]);
+  }
+  __syncthreads();
+  for (unsigned j = 0; j < kOrderItems; ++j) {
+    if (threadIdx.x + j * kOrderThreads < n) s.slots[place[j]] = pair[j].slot;
   }
   __syncthreads();
 }
@@ -184,7 +197,7 @@ __device__ __noinline__ void partition(OrderShared& s, const BatchArgs& a, std::
     }
     block_range(s, low, high);
   };
-  const auto split = [&](auto value) {
+  const auto split = [&](auto value, bool by_rank) {
     const std::uint32_t base = s.low;
     const int shift = max(0, bits_for(s.high - base) - kOrderBinBits);
     const bool bin = threadIdx.x < kOrderBins;
@@ -201,6 +214,8 @@ __device__ __noinline__ void partition(OrderShared& s, const BatchArgs& a, std::
     if (threadIdx.x == 0) {
       s.begins[level][kOrderBins] = begin + n;
       s.next_bin[level] = 0;
+      s.bases[level] = base;
+      s.shifts[level] = by_rank ? kByRank : shift;
     }
     __syncthreads();
     for (std::uint32_t i = begin + threadIdx.x; i < begin + n; i += kOrderThreads) {
@@ -211,10 +226,10 @@ __device__ __noinline__ void partition(OrderShared& s, const BatchArgs& a, std::
   };
   const auto key = [](const Pair& p) { return p.key; };
   range(key);
-  if (s.low != s.high) return split(key);
+  if (s.low != s.high) return split(key, false);
   const auto rank = [&](const Pair& p) { return rank_of(a, camera, p.slot); };
   range(rank);
-  split(rank);
+  split(rank, true);
 }
 
 }  // namespace ordering
@@ -231,7 +246,8 @@ class TileOrder {
       if (count_ == 0) return 0;
       if (count_ <= kOrderBatch) {
         level_ = kDone;
-        return load(s, a, a.pairs + begin_, count_);
+        ordering::sort_batch(s, a, camera_, a.pairs + begin_, count_, 0xffffffffu, 0);
+        return count_;
       }
       level_ = 0;
       ordering::partition(s, a, camera_, a.pairs, a.pairs_alt, begin_, count_, 0);
@@ -259,7 +275,16 @@ class TileOrder {
       if (threadIdx.x == 0) s.next_bin[level_] = end;
       Pair* const here = level_ % 2 == 0 ? a.pairs_alt : a.pairs;
       Pair* const there = level_ % 2 == 0 ? a.pairs : a.pairs_alt;
-      if (n <= kOrderBatch) return load(s, a, here + begin, n);
+      if (n <= kOrderBatch) {
+        const int shift = s.shifts[level_];
+        std::uint32_t low = 0xffffffffu, high = 0;
+        if (shift != kByRank) {
+          low = s.bases[level_] + (bin << shift);
+          high = s.bases[level_] + (end << shift) - 1;
+        }
+        ordering::sort_batch(s, a, camera_, here + begin, n, low, high);
+        return n;
+      }
       ++level_;
       ordering::partition(s, a, camera_, here, there, begin, n, level_);
     }
@@ -268,16 +293,6 @@ class TileOrder {
 
  private:
   static constexpr int kNotStarted = -2, kDone = -1;
-
-  __device__ std::uint32_t load(OrderShared& s, const BatchArgs& a, const Pair* pairs, std::uint32_t n) {
-    if (n <= kOrderThreads) {
-      ordering::sort_coarsely<1>(s, pairs, n);
-    } else {
-      ordering::sort_coarsely<2>(s, pairs, n);
-    }
-    ordering::order_runs(s, a, camera_, n);
-    return n;
-  }
 
   std::uint32_t camera_, begin_, count_;
   int level_ = kNotStarted;

@@ -2,6 +2,7 @@
 #include <cuda_pipeline.h>
 
 #include "batch_splat.cuh"
+#include "batch_tiles.cuh"
 
 // Culling and projection of a batch: what CPU backends do one camera at a time, by the same formulas.
 
@@ -47,51 +48,13 @@ __device__ void write_record(const BatchArgs& a, std::uint32_t slot, const Batch
   const std::uint32_t y = pack(static_cast<std::uint32_t>(s.bounds.y0), static_cast<std::uint32_t>(s.bounds.y1));
   a.records[slot] = {pack(static_cast<std::uint32_t>(g.ref_x), static_cast<std::uint32_t>(g.ref_y)),
                      g.a, g.k, g.b, g.w1, g.w2, g.log2_opacity, c.r, c.g, c.b, x, y};
-  a.entries[slot] = {instance.args.camera.key_code(key), x, y, instance.camera};
+  const TileWindow window = window_of(a, s.bounds);
+  a.entries[slot] = {instance.args.camera.key_code(key), window.corner, window.tiles, instance.camera};
   a.sources[slot] = instance.args.first_rank + static_cast<std::uint32_t>(row);
   if (Plain) return;
   if (a.depths != nullptr) a.depths[slot] = s.depth;
   if (a.perspectives != nullptr) a.perspectives[slot] = s.perspective;
 }
-
-/// Slots that a warp holds; what it has not used when it ends is marked.
-class WarpSlots {
- public:
-  explicit __device__ WarpSlots(const BatchArgs& a) : a_(a), lane_(threadIdx.x % 32) {}
-
-  /// The slot of each lane that wants one; kNoSlot past the capacity. All lanes call it.
-  __device__ std::uint32_t take(bool wanted) {
-    const unsigned votes = __ballot_sync(kAll, wanted);
-    if (votes == 0) return kNoSlot;
-    const std::uint32_t count = static_cast<std::uint32_t>(__popc(votes));
-    const std::uint32_t place = static_cast<std::uint32_t>(__popc(votes & ((1u << lane_) - 1)));
-    std::uint64_t slot = next_ + place;
-    if (count > left_) {
-      unsigned long long slab = 0;
-      if (lane_ == 0) slab = atomicAdd(&a_.counters->slots, static_cast<unsigned long long>(a_.slab));
-      slab = __shfl_sync(kAll, slab, 0);
-      if (place >= left_) slot = slab + place - left_;
-      next_ = slab + count - left_;
-      left_ = a_.slab - (count - left_);
-    } else {
-      next_ += count;
-      left_ -= count;
-    }
-    return wanted && slot < a_.slot_capacity ? static_cast<std::uint32_t>(slot) : kNoSlot;
-  }
-
-  __device__ void finish() const {
-    for (std::uint32_t i = lane_; i < left_; i += 32) {
-      if (next_ + i < a_.slot_capacity) a_.entries[next_ + i].camera = kNoSlot;
-    }
-  }
-
- private:
-  const BatchArgs& a_;
-  std::uint64_t next_ = 0;
-  std::uint32_t left_ = 0;
-  unsigned lane_;
-};
 
 /// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
 struct alignas(16) WarpRows {
@@ -155,7 +118,7 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
   const unsigned lane = threadIdx.x % 32;
   WarpRows& rows = shared[threadIdx.x / 32];
   const std::uint32_t parts = a.counters->items * kWarpsPerChunk;
-  WarpSlots slots(a);
+  WarpSlab slots(&a.counters->slots, a.slab), several(&a.counters->several, a.slab);
   for (std::uint32_t part = blockIdx.x * kProjectWarps + threadIdx.x / 32; part < parts;
        part += gridDim.x * kProjectWarps) {
     const BatchItem item = a.items[part / kWarpsPerChunk];
@@ -195,7 +158,9 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
           }
         }
       }
-      const std::uint32_t slot = slots.take(drawn || hard);
+      const bool wanted = drawn || hard;
+      const std::uint64_t taken = slots.take(wanted);
+      const std::uint32_t slot = wanted && taken < a.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
       if (hard) {
         const unsigned long long at = atomicAdd(&a.counters->hard, 1ull);
         if (slot != kNoSlot) a.entries[slot].camera = kNoSlot;  // until it has a record
@@ -209,10 +174,20 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
         write_record<Plain>(a, slot, instance, key, row, splat,
                      args.color ? row_color(gs, args.sh_degree, row, rows, delta) : SplatColor<float>{});
       }
+      const TileWindow window = drawn && slot != kNoSlot ? window_of(a, splat.bounds) : TileWindow{0, 0};
+      add_together<false>(a.tile_counts, window.tiles != 0, tile_of(a, instance.camera, window, 1));
+      const bool queued = drawn && slot != kNoSlot && window.tiles == 0;
+      const std::uint64_t place = several.take(queued);
+      if (queued && place < a.several_capacity) a.several[place] = slot;
     }
     if (!has_sh) wait_for_sh();
   }
-  slots.finish();
+  slots.rest([&](std::uint64_t slot) {
+    if (slot < a.slot_capacity) a.entries[slot].camera = kNoSlot;
+  });
+  several.rest([&](std::uint64_t place) {
+    if (place < a.several_capacity) a.several[place] = kNoSlot;
+  });
 }
 
 __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
@@ -234,6 +209,13 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
         color = gaussian_color<float>(gs, args.sh_degree, h.row, gsnav::detail::camera_delta(args, mean, origin));
       }
       write_record<false>(a, h.slot, instance, key, h.row, splat, color);
+      const TileWindow window = window_of(a, splat.bounds);
+      if (window.tiles != 0) {
+        atomicAdd(a.tile_counts + tile_of(a, instance.camera, window, 1), 1u);
+      } else {
+        const unsigned long long place = atomicAdd(&a.counters->several, 1ull);
+        if (place < a.several_capacity) a.several[place] = h.slot;
+      }
     }
   }
 }

@@ -72,7 +72,7 @@ struct CudaBatchRenderer::State {
   using Array = Buffer<T, CudaBackend>;
 
   State(CudaBackend& b, const RenderConfig& c)
-      : backend(b), config(c), inputs(b), items(b), counters(b), records(b), entries(b), sources(b), large(b),
+      : backend(b), config(c), inputs(b), items(b), counters(b), records(b), entries(b), sources(b), several(b), large(b),
         tile_counts(b), tile_begins(b), tile_cursors(b), depths(b), perspectives(b), hard(b), pairs(b),
         pairs_alt(b) {
     int device = 0;
@@ -107,7 +107,7 @@ struct CudaBatchRenderer::State {
   Array<BatchCounters> counters;
   Array<cuda::SplatRecord> records;
   Array<cuda::SplatEntry> entries;
-  Array<std::uint32_t> sources, large, tile_counts, tile_begins, tile_cursors;
+  Array<std::uint32_t> sources, several, large, tile_counts, tile_begins, tile_cursors;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
   Array<cuda::HardSplat> hard;
@@ -115,7 +115,7 @@ struct CudaBatchRenderer::State {
   BatchArgs args{};
   RasterArgs<float> raster;
   std::uint8_t* rgb8 = nullptr;
-  std::uint32_t slot_capacity = 0, hard_capacity = 0, large_capacity = 0, pair_capacity = 0;
+  std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0, pair_capacity = 0;
   BatchStats stats;
 
   // Reused by every call.
@@ -286,6 +286,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
     for (const Seen& v : seen) total += sets[v.set].gaussians.size;
     slot_capacity = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(total / 4, 1u << 16, 1u << 26));
     pair_capacity = 2 * slot_capacity;
+    several_capacity = slot_capacity;
     hard_capacity = large_capacity = slot_capacity / 16;
   }
   backend.copy(inputs.data(), flight.inputs, layout.bytes(), CopyKind::host_to_device);
@@ -303,6 +304,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.entries = size(entries, slot_capacity);
   args.sources = size(sources, slot_capacity);
   args.hard = size(hard, hard_capacity);
+  args.several = size(several, several_capacity);
   args.large = size(large, large_capacity);
   args.tile_counts = size(tile_counts, args.tiles);
   args.tile_begins = size(tile_begins, args.tiles);
@@ -316,11 +318,12 @@ void CudaBatchRenderer::State::size_scratch() {
   raster.perspectives = {args.perspectives, perspective ? slot_capacity : 0};
   args.slot_capacity = slot_capacity;
   args.hard_capacity = hard_capacity;
+  args.several_capacity = several_capacity;
   args.large_capacity = large_capacity;
   args.pair_capacity = pair_capacity;
   stats.scratch_bytes = inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
                         entries.capacity_bytes() + sources.capacity_bytes() + hard.capacity_bytes() +
-                        large.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
+                        several.capacity_bytes() + large.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
                         pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes();
 }
 
@@ -384,6 +387,7 @@ Status CudaBatchRenderer::finish() {
     };
     fit(s.slot_capacity, n.slots);
     fit(s.hard_capacity, n.hard);
+    fit(s.several_capacity, n.several);
     fit(s.large_capacity, n.large);
     fit(s.pair_capacity, n.pairs);
     s.stats.tile_intersections = n.pairs;
