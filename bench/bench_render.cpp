@@ -12,6 +12,7 @@
 // smallest ones (floor.hpp).
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
