@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frame's time while other threads keep every core busy: what is left of the speed, against a fair
-// share.
+// A frame's time beside threads that do nothing but keep cores busy, one and as many as there are cores:
+// what is left of the speed, against a fair share.
 //
 //   [OMP_WAIT_POLICY=active|passive] [GOMP_SPINCOUNT=n] bench_contention [WIDTHxHEIGHT]
 //   GSNAV_BENCH_SCENE and GSNAV_BENCH_CAMERAS as for bench_render
 //
-// With T rendering and C busy threads on C cores, whoever schedules fairly gives the frame T / (T + C)
+// With T rendering and L busy threads on C cores, whoever schedules fairly gives the frame T / (T + L)
 // of the cores; alone it had as many as it has threads, at most all. From that follows its fair time,
-// and `of fair share` is the measured time over it: 1 is what can be had, and a renderer whose threads
-// wait for each other by spinning, or whose barriers each cost a slice of the scheduler, is far above
-// it. `empty region` is a parallel region that does nothing.
+// and `of fair share` is the measured time over it: 1 is what can be had. A renderer whose threads wait
+// for each other by spinning, or whose barriers each cost a slice of the scheduler, is far above it, and
+// worst beside one busy thread: two threads that spin on one core look to the scheduler as if they had
+// work. `empty region` is a parallel region that does nothing.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -31,7 +32,7 @@ namespace {
 
 constexpr int kFrames = 60;
 
-/// As many threads as there are cores that do nothing but add.
+/// Threads that do nothing but add.
 class BusyLoad {
  public:
   explicit BusyLoad(unsigned threads) {
@@ -110,23 +111,22 @@ int main(int argc, char** argv) {
   std::printf("%zu Gaussians, %dx%d, rgb fast, %u cores, OMP_WAIT_POLICY=%s GOMP_SPINCOUNT=%s; ms\n",
               gsnav_bench::workload().cloud.size(), width, height, cores,
               policy != nullptr ? policy : "(unset)", spins != nullptr ? spins : "(unset)");
-  std::printf("%8s | %9s %9s %9s | %9s %9s %9s | %13s | %13s\n", "", "alone", "", "empty", "loaded", "",
-              "empty", "of fair share", "of fair share");
-  std::printf("%8s | %9s %9s %9s | %9s %9s %9s | %13s | %13s\n", "threads", "median", "p99", "region",
-              "median", "p99", "region", "median", "p99");
+  std::printf("%7s %4s | %8s %8s %8s | %s\n", "threads", "load", "median", "p99", "region",
+              "of fair share: median, p99");
   for (const int threads : {1, 2, static_cast<int>(2 * cores)}) {
-    const Times alone = measure(threads, cameras);
-    const BusyLoad load(cores);
-    const Times loaded = measure(threads, cameras);
-    const double t = threads, c = cores, fair = std::min(t, c) * (t + c) / (t * c);
-    const auto row = [](const Times& times) {
-      std::printf(" %9.3f %9.3f %9.4f |", quantile(times.frames, 0.5), quantile(times.frames, 0.99),
-                  quantile(times.regions, 0.5));
-    };
-    std::printf("%8d |", threads);
-    row(alone);
-    row(loaded);
-    std::printf(" %13.2f | %13.2f\n", quantile(loaded.frames, 0.5) / quantile(alone.frames, 0.5) / fair,
-                quantile(loaded.frames, 0.99) / quantile(alone.frames, 0.99) / fair);
+    Times alone;
+    for (const unsigned load : {0u, 1u, cores}) {
+      const BusyLoad busy(load);
+      const Times times = measure(threads, cameras);
+      if (load == 0) alone = times;
+      const double t = threads, l = load, c = cores;
+      const double fair = t + l <= c ? 1.0 : std::min(t, c) * (t + l) / (t * c);
+      const auto slower = [&](double q) {
+        return quantile(times.frames, q) / quantile(alone.frames, q) / fair;
+      };
+      std::printf("%7d %4u | %8.3f %8.3f %8.4f | %.2f, %.2f\n", threads, load,
+                  quantile(times.frames, 0.5), quantile(times.frames, 0.99),
+                  quantile(times.regions, 0.5), slower(0.5), slower(0.99));
+    }
   }
 }
