@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shows that the tests would notice: puts naive formulas back, one at a time, and runs what must fail.
 
-    tools/planted_regressions.py [--list] [--only NAME ...] [--scratch DIR] [--cxx COMPILER] [--jobs N]
+    tools/planted_regressions.py [--list | --check] [--only NAME ...] [--scratch DIR] [--cxx COMPILER] [--jobs N]
 
 The tree is copied; the original is never touched. A plant needs one translation unit of tests, header-only
 with OpenMP, and of the libraries at most the few files that it names, so nothing is built before. First every
 test case named must pass as the source is; then each plant's must fail. Exit status: 0 all caught, 1 one
 missed, 2 nothing could be said (a text to replace is not there once, a plant does not compile, a case fails
-unplanted).
+unplanted). --check only sees to it that every text to replace is there once.
 """
 import argparse
 import concurrent.futures
@@ -96,6 +96,17 @@ def apply(tree, plant):
     return ""
 
 
+def misplaced(plant):
+    """What `apply` would say, without a copy of the tree."""
+    texts = {}
+    for e in plant.edits:
+        text = texts.setdefault(e.file, (ROOT / e.file).read_text())
+        if text.count(e.old) != 1:
+            return f"{plant.name}: {e.file} holds {text.count(e.old)} times: {e.old.strip().splitlines()[0]}"
+        texts[e.file] = text.replace(e.old, e.new)
+    return ""
+
+
 def check_plant(bench, plant, scratch):
     """Returns (verdict, remark)."""
     tree = scratch / plant.name
@@ -133,6 +144,7 @@ def check_unplanted(bench, plants, scratch, pool):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--list", action="store_true")
+    parser.add_argument("--check", action="store_true")
     parser.add_argument("--only", nargs="+", metavar="NAME")
     parser.add_argument("--scratch", type=pathlib.Path)
     parser.add_argument("--cxx", default=os.environ.get("CXX", "c++"))
@@ -145,6 +157,10 @@ def main():
         return 0
     if not plants:
         parser.error("no plant of that name")
+    if args.check:
+        wrong = [w for p in plants if (w := misplaced(p))]
+        print("\n".join(wrong or [f"the texts of {len(plants)} plants are in their places"]))
+        return 2 if wrong else 0
 
     verdicts = []
     with tempfile.TemporaryDirectory(dir=args.scratch) as folder, \
