@@ -238,6 +238,21 @@ TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are 
   }
 }
 
+TEST_CASE("cuda batch: the same bits on every run, in any company") {
+  if (no_gpu("cuda batch runs")) return;
+  CudaBackend cuda;
+  const GaussianCloud cloud = random_cloud(21, {.count = 1500, .needle = 0.2});
+  const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+  const std::vector<Camera> cameras = ring(3, 40, 36);
+  CudaBatchRenderer renderer(cuda);
+  const Batch all = draw(cuda, renderer, {arrays.set()}, cameras, {}, kMedianOnly);
+  check_same(draw(cuda, renderer, {arrays.set()}, cameras, {}, kMedianOnly).frames, all.frames);
+  const std::vector<Camera> last{cameras[2]};
+  const Batch alone = draw(cuda, renderer, {arrays.set()}, last, {}, kMedianOnly);
+  const std::vector<float> third(all.frames.rgb.end() - 3 * 40 * 36, all.frames.rgb.end());
+  CHECK(differing(alone.frames.rgb, third) == 0);
+}
+
 TEST_CASE("cuda batch: scratch that is too small grows, and says so") {
   if (no_gpu("cuda batch overflow")) return;
   CudaBackend cuda;

@@ -9,7 +9,11 @@ namespace gsnav::cuda {
 namespace {
 
 constexpr int kThreads = kBatchTile * kBatchTile;  ///< a pixel each
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+constexpr int kBlocksPerProcessor = 4;
+#else
 constexpr int kBlocksPerProcessor = 5;
+#endif
 constexpr int kBlock = 4;                          ///< pixels a side of what half a warp blends
 constexpr std::uint32_t kChunk = 256;              ///< splats that a warp lists at a time
 constexpr std::uint32_t kNothing = kOrderBatch;    ///< a staged splat that covers no pixel
