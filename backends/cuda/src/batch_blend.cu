@@ -261,7 +261,7 @@ __device__ __noinline__ void depth_record64(const ProjectArgs<float>& args, std:
 }
 
 /// A thread a pixel of camera blockIdx.y: slots become depths.
-__global__ void __launch_bounds__(128) depth_kernel(const BatchArgs a, float* images) {
+__global__ void __launch_bounds__(128, 6) depth_kernel(const BatchArgs a, float* images) {
   const std::uint32_t width = static_cast<std::uint32_t>(a.grid.width);
   const std::uint32_t pixels = width * static_cast<std::uint32_t>(a.grid.height);
   const std::uint32_t camera = blockIdx.y, pixel = blockIdx.x * blockDim.x + threadIdx.x;

@@ -163,7 +163,7 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
       const std::uint32_t slot = wanted && taken < a.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
       if (hard) {
         const unsigned long long at = atomicAdd(&a.counters->hard, 1ull);
-        if (slot != kNoSlot) a.entries[slot].camera = kNoSlot;  // until it has a record
+        if (slot != kNoSlot) a.entries[slot] = {0, 0, 0, kNoSlot};  // until it has a record
         if (at < a.hard_capacity) a.hard[at] = {slot, index, static_cast<std::uint32_t>(row)};
       }
       if (!has_sh && __any_sync(kAll, drawn)) {
@@ -183,7 +183,7 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
     if (!has_sh) wait_for_sh();
   }
   slots.rest([&](std::uint64_t slot) {
-    if (slot < a.slot_capacity) a.entries[slot].camera = kNoSlot;
+    if (slot < a.slot_capacity) a.entries[slot] = {0, 0, 0, kNoSlot};
   });
   several.rest([&](std::uint64_t place) {
     if (place < a.several_capacity) a.several[place] = kNoSlot;

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "batch_state.cuh"
+
+// What the host computes for a batch.
+
+namespace gsnav {
+
+namespace cuda {
+
+Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras) {
+  if (cameras.empty()) return {Errc::invalid_argument, "CudaBatchRenderer: no camera to render from"};
+  if (cameras.size() > 65535) {
+    return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(cameras.size()) +
+                                   " cameras: at most 65535 a call"};
+  }
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    if (Status s = validate(sets[i]); !s) {
+      return {s.code(), "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + s.message()};
+    }
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const auto bad = [&](Errc code, const std::string& what) {
+      return Status(code, "CudaBatchRenderer: cameras[" + std::to_string(c) + "]: " + what);
+    };
+    const Camera& camera = cameras[c].camera;
+    if (Status s = validate(camera); !s) return bad(s.code(), s.message());
+    if (camera.width != cameras[0].camera.width || camera.height != cameras[0].camera.height) {
+      return bad(Errc::invalid_argument, "its size is not that of cameras[0]; a batch has one size");
+    }
+    std::uint64_t gaussians = 0;
+    const auto count = [&](std::size_t s) { gaussians += sets[s].gaussians.size; };
+    for (const std::uint32_t s : cameras[c].sets) {
+      if (s >= sets.size()) {
+        return bad(Errc::invalid_argument, "sets has " + std::to_string(s) + ", but there are " +
+                                               std::to_string(sets.size()) + " sets");
+      }
+      count(s);
+    }
+    if (cameras[c].sets.empty()) {
+      for (std::size_t s = 0; s < sets.size(); ++s) count(s);
+    }
+    if (gaussians > std::numeric_limits<std::uint32_t>::max()) {
+      return bad(Errc::unsupported, "it sees more than 2^32 Gaussians");
+    }
+  }
+  return {};
+}
+
+}  // namespace cuda
+
+namespace {
+
+using cuda::BatchInstance;
+using cuda::BatchSet;
+
+/// Arrays laid one after the other into one block, so that one copy takes them to the device.
+class Layout {
+ public:
+  template <class T>
+  std::size_t add(std::size_t count) {
+    const std::size_t at = bytes_;
+    bytes_ = (at + count * sizeof(T) + 15) / 16 * 16;
+    return at;
+  }
+  std::size_t bytes() const noexcept { return bytes_; }
+
+ private:
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace
+
+/// Everything of a call that the host computes, into one pinned block and on to the device.
+Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+                                         const BatchImages& images) {
+  // ---- who sees what
+  seen.clear();
+  set_begins.assign(sets.size() + 1, 0);
+  std::size_t origins = 0;
+  for (std::uint32_t c = 0; c < cameras.size(); ++c) {
+    std::uint32_t rank = 0;
+    const auto see = [&](std::uint32_t s) {
+      seen.push_back({s, c, rank});
+      rank += static_cast<std::uint32_t>(sets[s].gaussians.size);
+      ++set_begins[s + 1];
+      origins += std::max<std::size_t>(1, sets[s].gaussians.origins.size);
+    };
+    for (const std::uint32_t s : cameras[c].sets) see(s);
+    if (cameras[c].sets.empty()) {
+      for (std::uint32_t s = 0; s < sets.size(); ++s) see(s);
+    }
+  }
+  for (std::size_t s = 0; s < sets.size(); ++s) set_begins[s + 1] += set_begins[s];
+  cursors.assign(set_begins.begin(), set_begins.end() - 1);
+
+  Layout layout;
+  const std::size_t at_sets = layout.add<BatchSet>(sets.size());
+  const std::size_t at_instances = layout.add<BatchInstance>(seen.size());
+  const std::size_t at_first = layout.add<std::uint32_t>(cameras.size() + 1);
+  const std::size_t at_list = layout.add<std::uint32_t>(seen.size());
+  const std::size_t at_offsets = layout.add<Vec3d>(origins);
+  const std::size_t at_offsets_f = layout.add<Vec3<float>>(origins);
+  cuda::Flight& flight = flights[calls % cuda::kInFlight];
+  cuda::need(cudaEventSynchronize(flight.done), "waiting for an earlier batch");
+  flight.reserve(layout.bytes());
+  inputs.resize_discard(layout.bytes());
+  const auto host = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(flight.inputs + at); };
+  const auto device = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(inputs.data() + at); };
+
+  // ---- instances, neighbours where they are of one set
+  const bool color = images.floats.rgb != nullptr || images.rgb8 != nullptr;
+  const ProjectionRules rules = projection_rules(config);
+  auto* const instances = host(static_cast<BatchInstance*>(nullptr), at_instances);
+  auto* const first = host(static_cast<std::uint32_t*>(nullptr), at_first);
+  auto* const list = host(static_cast<std::uint32_t*>(nullptr), at_list);
+  auto* const offsets = host(static_cast<Vec3d*>(nullptr), at_offsets);
+  auto* const offsets_f = host(static_cast<Vec3<float>*>(nullptr), at_offsets_f);
+  std::size_t origin = 0;
+  std::fill(first, first + cameras.size() + 1, 0u);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const GaussianSet& set = sets[seen[i].set];
+    const Camera& camera = cameras[seen[i].camera].camera;
+    const std::uint32_t index = cursors[seen[i].set]++;
+    list[i] = index;
+    ++first[seen[i].camera + 1];
+    BatchInstance instance{};
+    instance.camera = seen[i].camera;
+    ProjectArgs<float>& to = instance.args;
+    to.gaussians = set.gaussians;
+    to.camera = make_projection_camera<float>(camera, set, rules);
+    to.camera64 = make_projection_camera<double>(camera, set, rules);
+    to.sh_degree = std::min(set.gaussians.sh_degree, config.max_sh_degree);
+    to.color = color;
+    to.first_rank = seen[i].first_rank;
+    const View<const Vec3d> table = set.gaussians.origins;
+    const std::size_t n = std::max<std::size_t>(1, table.size);
+    to.offsets = {device(static_cast<Vec3d*>(nullptr), at_offsets) + origin, n};
+    to.offsets_f = {device(static_cast<Vec3<float>*>(nullptr), at_offsets_f) + origin, n};
+    const Vec3d eye = inverse(set.world_from_asset) * camera.position();
+    for (std::size_t o = 0; o < n; ++o, ++origin) {
+      offsets[origin] = (table.empty() ? Vec3d{} : table[o]) - eye;
+      offsets_f[origin] = vec_cast<float>(offsets[origin]);
+    }
+    std::memcpy(instances + index, &instance, sizeof instance);
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c) first[c + 1] += first[c];
+
+  // ---- units of culling
+  auto* const units = host(static_cast<BatchSet*>(nullptr), at_sets);
+  args = {};
+  for (std::size_t s = 0; s < sets.size(); ++s) {
+    BatchSet& u = units[s];
+    u = {args.units, set_begins[s], set_begins[s + 1] - set_begins[s],
+         static_cast<std::uint32_t>(sets[s].gaussians.chunk_count())};
+    args.units += std::uint64_t{(u.instances + 31) / 32} * u.chunks;
+  }
+  if (args.units > std::numeric_limits<std::uint32_t>::max() / 8) {
+    return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(args.units) +
+                                   " chunks times words of cameras in one batch: draw fewer cameras a call"};
+  }
+
+  args.sets = device(static_cast<BatchSet*>(nullptr), at_sets);
+  args.instances = device(static_cast<BatchInstance*>(nullptr), at_instances);
+  args.camera_first = device(static_cast<std::uint32_t*>(nullptr), at_first);
+  args.camera_instances = device(static_cast<std::uint32_t*>(nullptr), at_list);
+  args.set_count = static_cast<std::uint32_t>(sets.size());
+  args.cameras = static_cast<std::uint32_t>(cameras.size());
+  args.grid = TileGrid::of(cameras[0].camera.width, cameras[0].camera.height, cuda::kBatchTile);
+  const std::uint64_t tiles = args.cameras * std::uint64_t{args.grid.count()};
+  if (tiles > 0x7fffffffu) return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
+  args.tiles = static_cast<std::uint32_t>(tiles);
+  args.log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
+  args.elliptic = config.response == Response::ewa;
+  args.slab = args.cameras < 8 ? 32 : 256;
+
+  raster = {};
+  raster.grid = args.grid;
+  raster.rules = blend_rules<float>(config);
+  raster.background = vec_cast<float>(config.background);
+  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree6;
+  raster.images = images.floats;
+  rgb8 = images.rgb8;
+
+  if (slot_capacity == 0) {
+    // A guess; the first calls find out.
+    std::uint64_t total = 0;
+    for (const Seen& v : seen) total += sets[v.set].gaussians.size;
+    slot_capacity = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(total / 4, 1u << 16, 1u << 26));
+    pair_capacity = 2 * slot_capacity;
+    several_capacity = slot_capacity;
+    hard_capacity = large_capacity = slot_capacity / 16;
+  }
+  backend.copy(inputs.data(), flight.inputs, layout.bytes(), CopyKind::host_to_device);
+  return {};
+}
+
+}  // namespace gsnav

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "batch_args.cuh"
+#include "gsnav/backends/cuda/batch.hpp"
+#include "gsnav/core/buffer.hpp"
+
+// What a CudaBatchRenderer keeps between calls.
+
+namespace gsnav {
+
+namespace cuda {
+
+inline constexpr int kInFlight = 3;  ///< calls that may be under way before one is waited for
+
+inline void need(cudaError_t e, const char* what) {
+  if (e != cudaSuccess) {
+    detail::fail(e == cudaErrorMemoryAllocation ? Errc::out_of_memory : Errc::backend_failure,
+                 std::string("CudaBatchRenderer: ") + what + " failed: " + cudaGetErrorString(e));
+  }
+}
+
+/// Pinned memory of one call under way: what is copied to the device, and the counts that come back.
+struct Flight {
+  unsigned char* inputs = nullptr;
+  std::size_t capacity = 0;
+  BatchCounters* counters = nullptr;
+  cudaEvent_t done = nullptr;
+
+  void reserve(std::size_t bytes) {
+    if (bytes <= capacity) return;
+    if (inputs != nullptr) cudaFreeHost(inputs);
+    inputs = nullptr;
+    capacity = 0;
+    need(cudaMallocHost(&inputs, bytes + bytes / 8), "cudaMallocHost of cameras");
+    capacity = bytes + bytes / 8;
+  }
+};
+
+/// Names the camera, set or field that cannot be, or ok.
+Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras);
+
+}  // namespace cuda
+
+struct CudaBatchRenderer::State {
+  template <class T>
+  using Array = Buffer<T, CudaBackend>;
+
+  State(CudaBackend& b, const RenderConfig& c)
+      : backend(b), config(c), inputs(b), items(b), counters(b), records(b), entries(b), sources(b), several(b), large(b),
+        tile_counts(b), tile_begins(b), tile_cursors(b), depths(b), perspectives(b), hard(b), pairs(b),
+        pairs_alt(b) {
+    int device = 0;
+    cuda::need(cudaGetDevice(&device), "cudaGetDevice");
+    cuda::need(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
+    for (cuda::Flight& f : flights) {
+      cuda::need(cudaMallocHost(&f.counters, sizeof(cuda::BatchCounters)), "cudaMallocHost");
+      cuda::need(cudaEventCreateWithFlags(&f.done, cudaEventDisableTiming), "cudaEventCreate");
+    }
+  }
+  ~State() {
+    cudaStreamSynchronize(backend.stream());
+    for (cuda::Flight& f : flights) {
+      if (f.inputs != nullptr) cudaFreeHost(f.inputs);
+      if (f.counters != nullptr) cudaFreeHost(f.counters);
+      if (f.done != nullptr) cudaEventDestroy(f.done);
+    }
+  }
+
+  Status prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+                 const BatchImages& images);
+  void size_scratch();
+  Status launch();
+
+  CudaBackend& backend;
+  RenderConfig config;
+  int multiprocessors = 0;
+  std::array<cuda::Flight, cuda::kInFlight> flights;
+  std::size_t calls = 0, finished = 0;  ///< calls made; calls whose counts have been looked at
+  Array<unsigned char> inputs;
+  Array<cuda::BatchItem> items;
+  Array<cuda::BatchCounters> counters;
+  Array<cuda::SplatRecord> records;
+  Array<cuda::SplatEntry> entries;
+  Array<std::uint32_t> sources, several, large, tile_counts, tile_begins, tile_cursors;
+  Array<SplatDepth<float>> depths;
+  Array<SplatPerspective<float>> perspectives;
+  Array<cuda::HardSplat> hard;
+  Array<cuda::Pair> pairs, pairs_alt;
+  cuda::BatchArgs args{};
+  RasterArgs<float> raster;
+  std::uint8_t* rgb8 = nullptr;
+  std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0, pair_capacity = 0;
+  BatchStats stats;
+
+  // Reused by every call.
+  struct Seen {
+    std::uint32_t set, camera, first_rank;
+  };
+  std::vector<Seen> seen;  ///< camera by camera
+  std::vector<std::uint32_t> set_begins, cursors;
+};
+
+}  // namespace gsnav
