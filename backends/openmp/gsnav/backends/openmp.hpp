@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <thread>
 
 #if defined(_OPENMP)
 #include <omp.h>
@@ -9,6 +13,7 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/host_memory.hpp"
+#include "gsnav/core/thread_pool.hpp"
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/lbs.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
@@ -49,38 +54,31 @@ inline const LaneKernels& lane_kernels() noexcept { return lanes::native_kernels
 #endif
 
 /// Runs on the processor's cores. float32 frames go through lane kernels; every other scalar through
-/// the generic ones. Results do not depend on the number of threads.
+/// the generic ones. Results do not depend on the number of threads. The threads are a pool of the backend's
+/// own, which copies share (core/thread_pool.hpp says what holds for them): OpenMP only tells how many.
 class OpenMPBackend : public HostMemory {
  public:
-  /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS).
-  explicit OpenMPBackend(int threads = 0) noexcept : threads_(threads) {
-#if defined(_OPENMP)
-    if (threads_ <= 0) threads_ = omp_get_max_threads();
-#else
-    threads_ = 1;
-#endif
-  }
+  /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS), without OpenMP the number of cores.
+  explicit OpenMPBackend(int threads = 0)
+      : threads_(threads > 0 ? threads : default_threads()),
+        pool_(threads_ > 1 ? std::make_shared<ThreadPool>(threads_) : nullptr) {}
 
   int threads() const noexcept { return threads_; }
   std::size_t concurrency() const noexcept { return static_cast<std::size_t>(threads_); }
 
+  /// An exception that leaves f on more than one thread ends the process.
   template <class F>
   void parallel_for(std::size_t n, const F& f) {
-#if defined(_OPENMP)
-    if (threads_ > 1 && n > 1) {
-      // Pieces are handed out as threads come free: work items differ in cost.
-      const std::size_t piece = n / (static_cast<std::size_t>(threads_) * 32) + 1;
-      const std::ptrdiff_t pieces = static_cast<std::ptrdiff_t>((n + piece - 1) / piece);
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_)
-      for (std::ptrdiff_t p = 0; p < pieces; ++p) {
-        const std::size_t begin = static_cast<std::size_t>(p) * piece;
-        const std::size_t end = begin + piece < n ? begin + piece : n;
-        for (std::size_t i = begin; i < end; ++i) f(i);
-      }
+    if (threads_ < 2 || n < 2) {
+      for (std::size_t i = 0; i < n; ++i) f(i);
       return;
     }
-#endif
-    for (std::size_t i = 0; i < n; ++i) f(i);
+    // Pieces are handed out as threads come free: work items differ in cost.
+    const std::size_t piece = n / (concurrency() * 32) + 1;
+    pool_->run(static_cast<std::uint32_t>((n + piece - 1) / piece), [&f, n, piece](std::uint32_t p) {
+      const std::size_t begin = p * piece, end = std::min(n, begin + piece);
+      for (std::size_t i = begin; i < end; ++i) f(i);
+    });
   }
   Status synchronize() { return {}; }
 
@@ -115,7 +113,16 @@ class OpenMPBackend : public HostMemory {
   }
 
  private:
+  static int default_threads() noexcept {
+#if defined(_OPENMP)
+    return omp_get_max_threads();
+#else
+    return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+#endif
+  }
+
   int threads_;
+  std::shared_ptr<ThreadPool> pool_;
 };
 
 static_assert(Backend<OpenMPBackend>);
