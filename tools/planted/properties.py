@@ -25,8 +25,8 @@ PLANTS = [
     plant("sets_one_after_the_other", CHUNK, "args.keys[slot] = args.camera.key_code(key);",
           "args.keys[slot] = (args.camera.key_code(key) >> 1) | (args.first_chunk == 0 ? 0u : 0x80000000u);",
           TEST, "property_union_is_the_merged_list", why="Habitat-GS: bodies in front of or behind a whole scene"),
-    plant("depth_in_asset_units", PROJECTION, "d.z = axes.position.z * camera.scale;", "d.z = axes.position.z;",
+    plant("depth_in_asset_units", PROJECTION, "d.z = axes.position.z * L(camera.scale);", "d.z = axes.position.z;",
           TEST, "property_placement"),
-    plant("reach_in_asset_units", PROJECTION, "* norm(axes.factor.row[2]) * camera.scale;",
+    plant("reach_in_asset_units", PROJECTION, "* norm(axes.factor.row[2]) * L(camera.scale);",
           "* norm(axes.factor.row[2]);", TEST, "property_placement"),
 ]

@@ -49,6 +49,10 @@ GSNAV_HD double abs(double a) noexcept { return __builtin_fabs(a); }
 GSNAV_HD long double abs(long double a) noexcept { return __builtin_fabsl(a); }
 #endif
 
+/// x without its fraction, |x| < 2^31.
+GSNAV_HD float truncated(float a) noexcept { return static_cast<float>(static_cast<std::int32_t>(a)); }
+GSNAV_HD double truncated(double a) noexcept { return static_cast<double>(static_cast<std::int32_t>(a)); }
+
 GSNAV_HD float sin(float a) noexcept { return ::sinf(a); }
 GSNAV_HD double sin(double a) noexcept { return ::sin(a); }
 GSNAV_HD float cos(float a) noexcept { return ::cosf(a); }
