@@ -125,7 +125,6 @@ class OpenMPBackend : public HostMemory {
     });
   }
 
- private:
   static int default_threads() noexcept {
 #if defined(_OPENMP)
     return omp_get_max_threads();
