@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shows that the tests would notice: puts naive formulas back, one at a time, and runs what must fail.
 
-    tools/planted_regressions.py [--list] [--only NAME ...] [--scratch DIR] [--cxx COMPILER] [--jobs N]
+    tools/planted_regressions.py [--list | --check] [--only NAME ...] [--scratch DIR] [--cxx COMPILER] [--jobs N]
 
 The tree is copied; the original is never touched. A plant needs one translation unit of tests, header-only
 with OpenMP, and of the libraries at most the few files that it names, so nothing is built before. First every
 test case named must pass as the source is; then each plant's must fail. Exit status: 0 all caught, 1 one
 missed, 2 nothing could be said (a text to replace is not there once, a plant does not compile, a case fails
-unplanted).
+unplanted). --check only looks whether each text to replace is there once: a second, and a test of every build.
 """
 import argparse
 import concurrent.futures
@@ -86,13 +86,21 @@ class Bench:
         return "failed" if done.returncode == 1 else f"ended by {done.returncode}"
 
 
+def misplaced(tree, plant):
+    """A text of the plant that is not there once, or nothing."""
+    for e in plant.edits:
+        found = (tree / e.file).read_text().count(e.old)
+        if found != 1:
+            return f"{e.file} holds {found} times: {e.old.strip().splitlines()[0]}"
+    return ""
+
+
 def apply(tree, plant):
+    if wrong := misplaced(tree, plant):
+        return wrong
     for e in plant.edits:
         path = tree / e.file
-        text = path.read_text()
-        if text.count(e.old) != 1:
-            return f"{e.file} holds {text.count(e.old)} times: {e.old.strip().splitlines()[0]}"
-        path.write_text(text.replace(e.old, e.new))
+        path.write_text(path.read_text().replace(e.old, e.new))
     return ""
 
 
@@ -133,6 +141,7 @@ def check_unplanted(bench, plants, scratch, pool):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--list", action="store_true")
+    parser.add_argument("--check", action="store_true")
     parser.add_argument("--only", nargs="+", metavar="NAME")
     parser.add_argument("--scratch", type=pathlib.Path)
     parser.add_argument("--cxx", default=os.environ.get("CXX", "c++"))
@@ -143,6 +152,10 @@ def main():
         for p in plants:
             print(f"{p.name:32} {p.source}: {', '.join(p.cases)}")
         return 0
+    if args.check:
+        wrong = [f"{p.name}: {w}" for p in plants if (w := misplaced(ROOT, p))]
+        print("\n".join(wrong) or f"{len(plants)} plants have their place")
+        return 2 if wrong else 0
     if not plants:
         parser.error("no plant of that name")
 
