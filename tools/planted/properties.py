@@ -20,7 +20,7 @@ PLANTS = [
           TEST, "property_split_screen", why="what is seen would hang on how large the image is"),
     plant("more_opacity_is_less", BLEND, "  if (rules.exclusive_stop) {", "  if (rules.exclusive_stop || true) {",
           TEST, "property_opacity_monotonicity"),
-    plant("closed_pixel_goes_on", BLEND, "(after >= L(rules.transmittance_min))", "(after >= L(S(0)))",
+    plant("closed_pixel_goes_on", BLEND, "transmittance >= L(rules.transmittance_min)", "transmittance >= L(S(0))",
           TEST, "property_occluded_changes_nothing"),
     plant("sets_one_after_the_other", CHUNK, "args.keys[slot] = args.camera.key_code(key);",
           "args.keys[slot] = (args.camera.key_code(key) >> 1) | (args.first_chunk == 0 ? 0u : 0x80000000u);",
