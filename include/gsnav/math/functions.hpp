@@ -49,6 +49,13 @@ GSNAV_HD double abs(double a) noexcept { return __builtin_fabs(a); }
 GSNAV_HD long double abs(long double a) noexcept { return __builtin_fabsl(a); }
 #endif
 
+/// Not below the square root of a >= 0, and above it by 1e-3 relative (and 1e-15) at most: packs need not take
+/// the time of a correctly rounded one. The bits may differ between processors.
+template <class S>
+GSNAV_HD S sqrt_above(S a) noexcept {
+  return sqrt(a);
+}
+
 GSNAV_HD float sin(float a) noexcept { return ::sinf(a); }
 GSNAV_HD double sin(double a) noexcept { return ::sin(a); }
 GSNAV_HD float cos(float a) noexcept { return ::cosf(a); }
