@@ -13,16 +13,9 @@ using namespace gsnav;
 
 namespace gsnav_bench {
 
-UnitCosts survey_costs(int threads) noexcept {
-  const double n = threads;
-  UnitCosts c;
-  c.bytes_per_ns = threads == 1 ? 22.9 : 31.0;  // of more threads nothing is known
-  c.sort_ns = threads == 1 ? 5.6 * 2 / 3 : 4.4 / n;  // 5.6 ns a key in three passes
-  c.bin_ns = 3.0 / n;
-  c.mask_ns = 3.0 / n;
-  c.fragment_ns = 13.4 / 16 / 3.55 / n;  // cycles of 16 fragments, by the clock
-  c.transmittance_ns = c.fragment_ns;
-  return c;
+double clock_ghz() {
+  static const double clock = measure_clock();
+  return clock;
 }
 
 const UnitCosts& measured_costs(int threads) {
@@ -41,11 +34,26 @@ const UnitCosts& measured_costs(int threads) {
   return entry->second;
 }
 
-UnitCosts floor_costs(int threads) {
-  const UnitCosts a = survey_costs(threads), b = measured_costs(threads);
-  return {std::max(a.bytes_per_ns, b.bytes_per_ns), std::min(a.sort_ns, b.sort_ns),
-          std::min(a.bin_ns, b.bin_ns),             std::min(a.mask_ns, b.mask_ns),
-          std::min(a.fragment_ns, b.fragment_ns),   std::min(a.transmittance_ns, b.transmittance_ns)};
+UnitCosts survey_costs(int threads) {
+  const double n = threads;
+  UnitCosts c;
+  c.bytes_per_ns = measured_costs(threads).bytes_per_ns;
+  c.sort_ns = threads == 1 ? 5.6 * 2 / 3 : 4.4 / n;
+  c.bin_ns = 3.0 / n;
+  c.mask_ns = 3.0 / n;
+  c.fragment_ns = 13.4 / 16 / clock_ghz() / n;
+  c.transmittance_ns = c.fragment_ns;
+  return c;
+}
+
+UnitCosts least_costs(int threads) {
+  const UnitCosts a = survey_costs(threads), &b = measured_costs(threads);
+  return {b.bytes_per_ns,
+          std::min(a.sort_ns, b.sort_ns),
+          std::min(a.bin_ns, b.bin_ns),
+          std::min(a.mask_ns, b.mask_ns),
+          std::min(a.fragment_ns, b.fragment_ns),
+          std::min(a.transmittance_ns, b.transmittance_ns)};
 }
 
 FrameWork count_work(const GaussianCloud& cloud, const Camera& camera, const RenderConfig& config) {
@@ -58,14 +66,16 @@ FrameWork count_work(const GaussianCloud& cloud, const Camera& camera, const Ren
 
   constexpr int kSide = 4;
   const int columns = (camera.width + kSide - 1) / kSide, rows = (camera.height + kSide - 1) / kSide;
-  std::vector<float> open(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) * kSide * kSide);
+  std::vector<float> open(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) * kSide *
+                          kSide);
   for (std::size_t i = 0; i < open.size(); ++i) {
-    const int block = static_cast<int>(i / (kSide * kSide)), lane = static_cast<int>(i % (kSide * kSide));
+    const int block = static_cast<int>(i / (kSide * kSide)),
+              lane = static_cast<int>(i % (kSide * kSide));
     const int x = block % columns * kSide + lane % kSide, y = block / columns * kSide + lane / kSide;
     open[i] = x < camera.width && y < camera.height ? 1.0f : 0.0f;
   }
-  const FragmentCounts fragments =
-      count_fragments(bins.order, bins.geometry, bins.bounds, blend_rules<float>(counted), open.data(), columns);
+  const FragmentCounts fragments = count_fragments(bins.order, bins.geometry, bins.bounds,
+                                                   blend_rules<float>(counted), open.data(), columns);
 
   FrameWork work;
   work.color = (config.outputs & kRgb) != 0;
@@ -74,6 +84,7 @@ FrameWork count_work(const GaussianCloud& cloud, const Camera& camera, const Ren
   work.visible = static_cast<double>(stages.visible());
   work.pairs = static_cast<double>(stages.pairs());
   work.evaluated = static_cast<double>(fragments.evaluated);
+  work.needed = static_cast<double>(fragments.needed);
   work.blended = static_cast<double>(fragments.blended);
   return work;
 }
@@ -85,16 +96,24 @@ double fragment_cost(const FrameWork& work, const UnitCosts& costs) noexcept {
 double read_ns(const FrameWork& work, const UnitCosts& costs) noexcept {
   return work.visible * work.bytes_per_gaussian / costs.bytes_per_ns;
 }
-}  // namespace
-
-double floor_ms(const FrameWork& work, const UnitCosts& costs) noexcept {
+double total_ms(const FrameWork& work, const UnitCosts& costs, double lanes) noexcept {
   const double ns = read_ns(work, costs) + work.visible * costs.sort_ns +
                     (work.visible + work.pairs) * costs.bin_ns + work.pairs * costs.mask_ns +
-                    work.evaluated * fragment_cost(work, costs);
+                    lanes * fragment_cost(work, costs);
   return ns * 1e-6;
 }
+}  // namespace
 
-double hard_floor_ms(const FrameWork& work, const UnitCosts& costs) noexcept {
+double floor_ms(const FrameWork& work, int threads) {
+  return total_ms(work, survey_costs(threads), work.evaluated);
+}
+
+double least_floor_ms(const FrameWork& work, int threads) {
+  return total_ms(work, least_costs(threads), work.needed);
+}
+
+double hard_floor_ms(const FrameWork& work, int threads) {
+  const UnitCosts costs = survey_costs(threads);
   return (read_ns(work, costs) + work.blended * fragment_cost(work, costs)) * 1e-6;
 }
 

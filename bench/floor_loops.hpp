@@ -25,7 +25,8 @@ double measure_mask_ns();
 double measure_fragment_ns(bool color);
 
 struct FragmentCounts {
-  std::uint64_t evaluated = 0;  ///< 16 for each (block, Gaussian) that changed a pixel
+  std::uint64_t evaluated = 0;  ///< 16 for each (block with an open pixel, Gaussian whose ellipse reaches it)
+  std::uint64_t needed = 0;     ///< 16 for those of them in which a pixel changed
   std::uint64_t blended = 0;    ///< pixels changed
 };
 

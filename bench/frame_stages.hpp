@@ -27,7 +27,7 @@ class FrameStages {
     prepare_projection(camera);
     project();
     set_order();
-    prepare_bins(camera);
+    prepare_bins();
     bin();
   }
 
@@ -42,8 +42,6 @@ class FrameStages {
 
   /// Fills tile_offsets and tile_splats.
   void bin() {
-    spans_.resize_discard(bin_.order.size);
-    bin_.spans = spans_.view();
     if constexpr (requires { backend_->list_tiles(bin_); }) {
       backend_->list_tiles(bin_);
     } else {
@@ -132,7 +130,7 @@ class FrameStages {
     project_.gaussians = set.gaussians;
     project_.camera = gsnav::make_projection_camera<S>(camera, set, rules);
     project_.camera64 = gsnav::make_projection_camera<double>(camera, set, rules);
-    project_.sh_degree = std::min(set.gaussians.sh_degree, config_.max_sh_degree);
+    project_.color=(config_.outputs&gsnav::kRgb)!=0; project_.sh_degree = std::min(set.gaussians.sh_degree, config_.max_sh_degree);
     project_.depth = (config_.outputs & gsnav::kAnyDepth) != 0;
     const std::size_t slots = project_.chunk_count() * gsnav::kProjectChunk;
     geometry_.resize_discard(slots);
@@ -147,6 +145,11 @@ class FrameStages {
     project_.bounds = bounds_.view();
     project_.keys = chunk_keys_.view();
     project_.counts = counts_.view();
+    project_.grid = gsnav::TileGrid::of(camera.width, camera.height,
+                                        gsnav::tile_size_of<B>(config_, camera.width, camera.height));
+    constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
+    spans_.resize_discard(kSpans ? slots : 0);
+    project_.spans = spans_.view();
     project_.offsets = offsets_.view();
     project_.offsets_f = offsets_f_.view();
     images_.resize_discard(static_cast<std::size_t>(3 * camera.width) * static_cast<std::size_t>(camera.height));
@@ -166,8 +169,9 @@ class FrameStages {
     order_.upload(order.data(), order.size());
   }
 
-  void prepare_bins(const gsnav::Camera& camera) {
-    bin_.grid = gsnav::TileGrid::of(camera.width, camera.height, config_.tile_size);
+  void prepare_bins() {
+    bin_.grid = project_.grid;
+    bin_.spans = spans_.view();
     bin_.order = order_.view();
     bin_.geometry = geometry_.view();
     bin_.bounds = bounds_.view();

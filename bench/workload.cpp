@@ -30,6 +30,17 @@ const Workload& workload() {
   return w;
 }
 
+const GaussianCloud& base_color_cloud() {
+  static const GaussianCloud cloud = [] {
+    GaussianCloud c = workload().cloud;
+    c.sh_degree = 0;
+    c.shN.clear();
+    c.shN.shrink_to_fit();
+    return c;
+  }();
+  return cloud;
+}
+
 std::vector<Camera> sized(int width, int height) {
   std::vector<Camera> cameras = workload().cameras;
   for (Camera& c : cameras) {

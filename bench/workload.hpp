@@ -17,6 +17,9 @@ struct Workload {
 
 const Workload& workload();
 
+/// Its cloud without the SH bands above degree 0.
+const gsnav::GaussianCloud& base_color_cloud();
+
 /// The cameras at another size: the same horizontal field of view, centred.
 std::vector<gsnav::Camera> sized(int width, int height);
 

@@ -158,7 +158,6 @@ def main():
         return 2 if wrong else 0
     if not plants:
         parser.error("no plant of that name")
-
     verdicts = []
     with tempfile.TemporaryDirectory(dir=args.scratch) as folder, \
             concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:

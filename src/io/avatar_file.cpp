@@ -217,15 +217,15 @@ class AvatarReader {
       out_.report.warnings.push_back("lbs_weights: " + std::to_string(unequal) +
                                      " rows do not sum to 1; they were divided by their sums");
     }
-    const auto dropped = out_.asset.set_weights(joints, indices, weights);
+    const auto dropped = out_.asset.set_weights(joints, indices, weights, options_.influences);
     if (!dropped) return bad("lbs_weights: " + dropped.status().message());
     out_.weights.dropped_mass = *dropped;
     if (Status s = detail::measure_truncation(out_.asset, weights_.values, kept_, options_, out_.weights); !s) {
       return {s.code(), file_.source() + ": " + s.message()};
     }
     if (out_.weights.needs_more != 0) {
-      out_.report.warnings.push_back("lbs_weights: with four weights " + std::to_string(out_.weights.needs_more) +
-                                     " Gaussians are off by up to " +
+      out_.report.warnings.push_back("lbs_weights: with " + std::to_string(options_.influences) + " weights " +
+                                     std::to_string(out_.weights.needs_more) + " Gaussians are off by up to " +
                                      std::to_string(1000 * out_.weights.position_error) + " mm");
     }
     return {};
@@ -247,6 +247,10 @@ class AvatarReader {
 
 Result<LoadedAvatar> load_avatar(const std::filesystem::path& path, const LoadAvatarOptions& options) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedAvatar> {
+    if (options.influences != kInfluences4 && options.influences != kInfluences8) {
+      return {Errc::invalid_argument, path.string() + ": LoadAvatarOptions.influences is " +
+                                          std::to_string(options.influences) + "; 4 or 8 are supported"};
+    }
     const auto file = NpzFile::open(path);
     if (!file) return file.status();
     return AvatarReader(*file, options).run();

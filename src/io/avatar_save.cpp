@@ -40,7 +40,8 @@ Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset) 
                              quats = interleaved(cloud.quats, n);
     std::vector<float> weights(n * joints, 0.0f);
     for (std::size_t k = 0; k < asset.joint_indices.size(); ++k) {
-      weights[k / kInfluences * joints + asset.joint_indices[k]] += asset.skinning_weights[k];
+      weights[k / static_cast<std::size_t>(asset.influences) * joints + asset.joint_indices[k]] +=
+          skinning_weight<float>(asset.skinning_weights[k]);
     }
     std::vector<double> binds;
     for (const Affine3<double>& m : skeleton.bind_inverses()) {

@@ -26,7 +26,7 @@ Vec3d blend(const std::vector<Affine3<double>>& joints, const Influence* begin, 
 Status measure_truncation(const AvatarAsset& asset, const std::vector<double>& weights,
                           const std::vector<std::size_t>& rows, const LoadAvatarOptions& options,
                           WeightReport& report) {
-  constexpr std::size_t kept = kInfluences, more = 8;
+  const std::size_t kept = static_cast<std::size_t>(asset.influences), more = kInfluences8;
   const std::size_t joints = asset.skeleton.size();
   const std::vector<Affine3<double>> binds = asset.skeleton.bind_inverses();
   std::vector<std::vector<Affine3<double>>> poses = options.poses;
@@ -45,16 +45,16 @@ Status measure_truncation(const AvatarAsset& asset, const std::vector<double>& w
       if (weights[rows[i] * joints + j] > 0) all.emplace_back(weights[rows[i] * joints + j], j);
     }
     std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-    Influence four[kept];
+    Influence own[kInfluences8];
     for (std::size_t k = 0; k < kept; ++k) {
-      four[k] = {static_cast<double>(asset.skinning_weights[i * kept + k]), asset.joint_indices[i * kept + k]};
+      own[k] = {weight_of_parts(asset.skinning_weights[i * kept + k]), asset.joint_indices[i * kept + k]};
     }
     const Vec3d x = asset.cloud.mean(i);
     double worst = 0.0;
     for (const auto& pose : poses) {
       const Influence* end = all.data() + all.size();
       const Vec3d truth = blend(pose, all.data(), end, x);
-      worst = max(worst, norm(blend(pose, four, four + kept, x) - truth));
+      worst = max(worst, norm(blend(pose, own, own + kept, x) - truth));
       if (all.size() > more) {
         report.position_error_8 =
             max(report.position_error_8, norm(blend(pose, all.data(), all.data() + more, x) - truth));

@@ -61,6 +61,7 @@ SkinnedPlanes<S, Out> skin_all(const gsnav::AvatarAsset& asset, const std::vecto
     args.quats_out[k] = gsnav::view_of(out.quats[k]);
     args.rotations_out[k] = gsnav::view_of(out.rotations[k]);
   }
+  args.influences = asset.influences;
   args.joint_indices = gsnav::view_of(asset.joint_indices);
   args.weights = gsnav::view_of(asset.skinning_weights);
   args.joints = {cast.data(), cast.size()};

@@ -159,7 +159,7 @@ TEST_CASE("the soles of somebody who walks past stay where they touch the floor"
     for (const std::size_t i : which) {
       Vec3d p{};
       for (std::size_t k = 4 * i; k < 4 * i + 4; ++k) {
-        p += (joints[a.joint_indices[k]] * a.cloud.mean(i)) * static_cast<double>(a.skinning_weights[k]);
+        p += (joints[a.joint_indices[k]] * a.cloud.mean(i)) * weight_of_parts(a.skinning_weights[k]);
       }
       out.push_back(world * p);
     }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "avatar/support.hpp"
@@ -38,7 +39,7 @@ TEST_CASE("unusable weights are refused by name") {
   CHECK(asset.set_weights(1, std::vector<std::uint16_t>(n, 55), ones).message().find("joint 55 of 55") != std::string::npos);
   CHECK_FALSE(asset.set_weights(2, zeros, ones).ok());
   CHECK(asset.set_weights(1, zeros, ones).ok());
-  asset.skinning_weights[4] = 0.9f;
+  asset.skinning_weights[4] -= 1;
   CHECK(asset.validate().message().find("Gaussian 1") != std::string::npos);
 }
 
@@ -54,7 +55,51 @@ TEST_CASE("dense weights keep the four greatest and say what was lost") {
   const std::vector<std::uint16_t> j{0, 1, 2, 3, 4, 5};
   CHECK(asset.set_weights(6, j, w).value() == doctest::Approx(0.07));
   CHECK(asset.joint_indices == std::vector<std::uint16_t>{1, 5, 3, 2});
-  CHECK(static_cast<double>(asset.skinning_weights[0]) == doctest::Approx(0.30 / 0.93));
+  CHECK(weight_of_parts(asset.skinning_weights[0]) == doctest::Approx(0.30 / 0.93).epsilon(1e-4));
+}
+
+TEST_CASE("rounded weights make 1 and move a point by at most K / 4 parts of its joints' distance") {
+  Rng rng(21);
+  for (const std::size_t k : {4u, 8u}) {
+    double worst = 0;
+    for (int i = 0; i < 20000; ++i) {
+      std::vector<double> weights(k);
+      for (double& w : weights) w = rng.below(5) == 0 ? 0.0 : rng.uniform();
+      weights[0] += 0.01;
+      // Every second row is the worst there is: each weight half a part from the next whole number.
+      if (i % 2 == 0) {
+        double left = kWeightParts;
+        for (std::size_t j = k; j-- > 1;) left -= weights[j] = static_cast<double>(rng.below(4000)) + 0.5;
+        weights[0] = left;
+      }
+      std::sort(weights.begin(), weights.end(), std::greater<>());
+      std::vector<std::uint16_t> parts(k);
+      round_weights(weights.data(), k, parts.data());
+      CHECK(std::is_sorted(parts.begin(), parts.end(), std::greater<>()));
+      double sum = 0, reach = 0;
+      int all = 0;
+      std::vector<Vec3d> places(k);  // where each joint alone puts the point
+      Vec3d exact{}, rounded{};
+      for (std::size_t j = 0; j < k; ++j) {
+        // Two clusters of joints, a metre apart, are what the bound is about.
+        places[j] = i % 4 < 2 ? Vec3d{rng.below(2) == 0 ? 0.0 : 1.0, 0, 0} : Vec3d{rng.uniform(), rng.uniform(), rng.uniform()};
+        for (std::size_t n = 0; n < j; ++n) reach = std::max(reach, norm(places[j] - places[n]));
+        sum += weights[j];
+        all += parts[j];
+      }
+      REQUIRE(all == kWeightParts);
+      for (std::size_t j = 0; j < k; ++j) {
+        exact += places[j] * (weights[j] / sum);
+        rounded += places[j] * (static_cast<double>(parts[j]) / kWeightParts);
+      }
+      if (reach == 0) continue;
+      worst = std::max(worst, norm(rounded - exact) / reach);
+    }
+    const double bound = static_cast<double>(k) / (4.0 * kWeightParts);
+    MESSAGE("K = " << k << ": " << 1e6 * worst << " um a metre, bound " << 1e6 * bound);
+    CHECK(worst <= bound * (1 + 1e-9));
+    CHECK(worst > 0.9 * bound);
+  }
 }
 
 TEST_CASE("float against double over a walk, 0 to 5 m from the root") {
@@ -85,7 +130,7 @@ TEST_CASE("float against double over a walk, 0 to 5 m from the root") {
 TEST_CASE("skinning refuses arrays that do not fit") {
   SerialBackend backend;
   std::vector<float> values(8, 0.5f), out(8);
-  std::vector<std::uint16_t> indices(8, 0);
+  std::vector<std::uint16_t> indices(8, 0), weights(8, kWeightParts / 4);
   std::vector<Affine3<float>> joints(1);
   SkinningArgs<float> args;
   for (auto& v : args.means) v = {values.data(), 2};
@@ -93,12 +138,15 @@ TEST_CASE("skinning refuses arrays that do not fit") {
   for (auto& v : args.means_out) v = {out.data(), 2};
   for (auto& v : args.quats_out) v = {out.data(), 2};
   args.joint_indices = view_of(indices);
-  args.weights = view_of(values);
+  args.weights = view_of(weights);
   args.joints = view_of(joints);
   CHECK(skin_gaussians<float>(backend, args).ok());
   SkinningArgs<float> bad = args;
   bad.weights.size = 7;
   CHECK(skin_gaussians<float>(backend, bad).message().find("weights") != std::string::npos);
+  bad = args;
+  bad.influences = 5;
+  CHECK(skin_gaussians<float>(backend, bad).message().find("influences is 5") != std::string::npos);
   bad = args;
   bad.rotations_out[0] = {out.data(), 2};
   CHECK(skin_gaussians<float>(backend, bad).message().find("rotations_out") != std::string::npos);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -16,19 +15,23 @@
 
 namespace gsnav_test {
 
-/// Gaussians with four joints each, as skinning is given them.
+/// Gaussians with K joints each, as skinning is given them.
 struct SkinCase {
-  std::vector<float> means[3], quats[4], weights;
-  std::vector<std::uint16_t> joints;          // [N][4]
+  int influences = 4;                             // K
+  std::vector<float> means[3], quats[4];
+  std::vector<std::uint16_t> joints, weights;     // [N][K]
   std::vector<gsnav::Affine3<double>> matrices;
 
   std::size_t size() const { return means[0].size(); }
-  void add(const gsnav::Vec3d& mean, const gsnav::Quatd& quat, const std::array<double, 4>& w,
-           const std::array<std::uint16_t, 4>& j) {
+  std::size_t row() const { return static_cast<std::size_t>(influences); }
+  /// `w` and `j` have K values.
+  void add(const gsnav::Vec3d& mean, const gsnav::Quatd& quat, const std::vector<double>& w,
+           const std::vector<std::uint16_t>& j) {
     for (int k = 0; k < 3; ++k) means[k].push_back(static_cast<float>(mean[k]));
     const double q[4] = {quat.w, quat.x, quat.y, quat.z};
     for (int k = 0; k < 4; ++k) quats[k].push_back(static_cast<float>(q[k]));
-    for (const double v : w) weights.push_back(static_cast<float>(v));
+    weights.resize(weights.size() + row());
+    gsnav::round_weights(w.data(), row(), weights.data() + weights.size() - row());
     joints.insert(joints.end(), j.begin(), j.end());
   }
   gsnav::Vec3d mean(std::size_t i) const { return {means[0][i], means[1][i], means[2][i]}; }
@@ -40,9 +43,9 @@ struct SkinCase {
       shift[r] = 0;
       for (int c = 0; c < 3; ++c) linear[r][c] = 0;
     }
-    for (std::size_t k = 0; k < 4; ++k) {
-      const Real w = weights[4 * i + k];
-      const gsnav::Affine3<double>& m = matrices[joints[4 * i + k]];
+    for (std::size_t k = row() * i; k < row() * (i + 1); ++k) {
+      const Real w = weights[k] / Real(gsnav::kWeightParts);
+      const gsnav::Affine3<double>& m = matrices[joints[k]];
       for (int r = 0; r < 3; ++r) {
         shift[r] += w * static_cast<Real>(static_cast<S>(m.translation[r]));
         for (int c = 0; c < 3; ++c) linear[r][c] += w * static_cast<Real>(static_cast<S>(m.linear(r, c)));
@@ -74,6 +77,7 @@ SkinResult skin_on(R& renderer, const SkinCase& c) {
     args.quats_out[k] = arrays.template out<S>(c.size());
     args.rotations_out[k] = arrays.template out<S>(c.size());
   }
+  args.influences = c.influences;
   args.joint_indices = arrays.in(c.joints);
   args.weights = arrays.in(c.weights);
   args.joints = arrays.in(matrices);
@@ -114,28 +118,26 @@ void skin_everywhere(const SkinCase& c, const F& check) {
   });
 }
 
-/// 2 to 4 joints at most `degrees` from the first, weights sorted and summing to 1; each row its own joints.
-inline SkinCase random_case(std::uint64_t seed, std::size_t count, double degrees) {
+/// 2 to `influences` joints at most `degrees` from the first, weights sorted; each row its own joints.
+inline SkinCase random_case(std::uint64_t seed, std::size_t count, double degrees, int influences = 4) {
   gsnav::Rng rng(seed);
   SkinCase c;
+  c.influences = influences;
+  const std::size_t row = c.row(), distinct = 64000 / row;  // joint indices have 16 bits: rows far apart share
   for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t n = 2 + rng.below(3);
-    std::array<double, 4> w{};
-    double sum = 0;
-    for (std::size_t k = 0; k < n; ++k) sum += w[k] = rng.uniform(0.02, 1.0);
+    const std::size_t n = 2 + rng.below(row - 1);
+    std::vector<double> w(row, 0.0);
+    for (std::size_t k = 0; k < n; ++k) w[k] = rng.uniform(0.02, 1.0);
     std::sort(w.begin(), w.end(), std::greater<>());
-    for (double& v : w) v /= sum;
     const gsnav::Quatd base = random_rotation(rng);
-    // Joint indices have 16 bits: matrices are used again by rows far apart.
-    const std::uint16_t first = static_cast<std::uint16_t>(4 * (i % 16000));
-    for (std::size_t k = 0; k < 4; ++k) {
-      if (i >= 16000) continue;
+    std::vector<std::uint16_t> j(row);
+    for (std::size_t k = 0; k < row; ++k) {
+      j[k] = static_cast<std::uint16_t>(row * (i % distinct) + k);
+      if (i >= distinct) continue;
       const gsnav::Quatd q = k == 0 ? base : rotation_within(rng, degrees) * base;
       c.matrices.push_back({gsnav::rotation_matrix(q), {rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)}});
     }
-    c.add({rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}, random_rotation(rng), w,
-          {first, static_cast<std::uint16_t>(first + 1), static_cast<std::uint16_t>(first + 2),
-           static_cast<std::uint16_t>(first + 3)});
+    c.add({rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}, random_rotation(rng), w, j);
   }
   return c;
 }

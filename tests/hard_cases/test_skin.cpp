@@ -2,6 +2,7 @@
 // N54 to N58: linear blend skinning.
 #include <doctest/doctest.h>
 
+#include <array>
 #include <memory>
 
 #include "hard_cases/skin_case.hpp"
@@ -60,7 +61,8 @@ double angle_to(const Real want[3][3], const Quatd& q) {
   const Mat3d r = rotation_matrix(q);
   Real d2 = 0;
   for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) d2 += (want[i][k] - static_cast<Real>(r(i, k))) * (want[i][k] - static_cast<Real>(r(i, k)));
+    for (int k = 0; k < 3; ++k)
+      d2 += (want[i][k] - static_cast<Real>(r(i, k))) * (want[i][k] - static_cast<Real>(r(i, k)));
   }
   return static_cast<double>(2 * std::asin(std::min<Real>(1, std::sqrt(d2 / 8)))) * 57.29577951308232;
 }
@@ -77,21 +79,24 @@ Mat3d covariance(const Quatd& q, const Vec3d& s) {
 
 TEST_CASE("N54_lbs_identity") {
   double worst = 0, worst_angle = 0;
-  SkinCase c = random_case(54, 3000, 90);
-  for (auto& m : c.matrices) m = {};
-  skin_everywhere(c, [&](const SkinResult& s, const auto& renderer) {
-    double distance = 0, angle = 0, turn = 0;
-    for (std::size_t i = 0; i < c.size(); ++i) {
-      distance = std::max(distance, norm(s.means[i] - c.mean(i)));
-      angle = std::max(angle, angle_between(s.quats[i], c.quat(i)));
-      turn = std::max(turn, angle_between(s.rotations[i], {}));
-    }
-    CHECK(distance <= renderer.bound(1e-6, 1e-6));  // weights are float32 and sum to 1 within 1.2e-7
-    CHECK(angle <= 1e-4);
-    CHECK(turn <= 1e-4);
-    worst = std::max(worst, distance);
-    worst_angle = std::max({worst_angle, angle, turn});
-  });
+  for (const int influences : {4, 8}) {
+    SkinCase c = random_case(54, 3000, 90, influences);
+    for (auto& m : c.matrices) m = {};
+    skin_everywhere(c, [&](const SkinResult& s, const auto& renderer) {
+      double distance = 0, angle = 0, turn = 0;
+      for (std::size_t i = 0; i < c.size(); ++i) {
+        distance = std::max(distance, norm(s.means[i] - c.mean(i)));
+        angle = std::max(angle, angle_between(s.quats[i], c.quat(i)));
+        turn = std::max(turn, angle_between(s.rotations[i], {}));
+      }
+      CHECK(distance <=
+            renderer.bound(1e-6, 1e-6));  // the weights in float32 sum to 1 within a few roundings
+      CHECK(angle <= 1e-4);
+      CHECK(turn <= 1e-4);
+      worst = std::max(worst, distance);
+      worst_angle = std::max({worst_angle, angle, turn});
+    });
+  }
   MESSAGE("off by " << worst << " m and " << worst_angle << " degrees");
 }
 
@@ -119,13 +124,11 @@ TEST_CASE("N55_lbs_rigid_far") {
   asset.cloud = builder.cloud();
   CHECK(asset.set_weights(3, indices, weights).value() < 1e-9);
   CHECK(asset.validate().ok());
-  double sum_error = 0;
   for (std::size_t i = 0; i < asset.size(); ++i) {
-    double sum = 0;
-    for (std::size_t k = 0; k < 4; ++k) sum += static_cast<double>(asset.skinning_weights[4 * i + k]);
-    sum_error = std::max(sum_error, std::abs(sum - 1));
+    int sum = 0;
+    for (std::size_t k = 0; k < 4; ++k) sum += asset.skinning_weights[4 * i + k];
+    REQUIRE(sum == kWeightParts);
   }
-  CHECK(sum_error < 1.2e-7);
   // Far by the motion's root path, and by where the actor stands.
   double largest = 0;
   for (const bool by_root : {true, false}) {
@@ -245,41 +248,48 @@ TEST_CASE("N57_polar_equivariance") {
 }
 
 TEST_CASE("N58_polar_vs_svd") {
-  const SkinCase c = random_case(58, sample_count(30000), 120);
-  skin_everywhere(c, [&](const SkinResult& s, const auto& renderer) {
-    using S = typename std::remove_cvref_t<decltype(renderer)>::scalar;
-    if (renderer.name() != "serial float" && renderer.name() != "serial double") return;  // the same bits
-    double worst = 0, worst_mean = 0, worst_fallback = 0;
-    std::size_t tested = 0, fallback = 0;
-    for (std::size_t i = 0; i < c.size(); ++i) {
-      Real b[3][3], t[3], want[3][3];
-      c.blend<S>(i, b, t);
-      const Vec3d m = c.mean(i);
-      for (int k = 0; k < 3; ++k) {
-        const Real at = b[k][0] * static_cast<Real>(m.x) + b[k][1] * static_cast<Real>(m.y) +
-                        b[k][2] * static_cast<Real>(m.z) + t[k];
-        worst_mean = std::max(worst_mean, static_cast<double>(std::abs(at - static_cast<Real>(s.means[i][k]))));
-      }
-      const Real det = determinant3(b);
-      if (std::abs(det - 0.1L) < 1e-5L) continue;  // which branch is a matter of rounding
-      if (det > 0.1L) {
-        ++tested;
-        svd_rotation(b, want);
-        worst = std::max(worst, angle_to(want, s.rotations[i]));
-      } else {
-        ++fallback;
-        const Mat3d& first = c.matrices[c.joints[4 * i]].linear;
-        for (int r = 0; r < 3; ++r) {
-          for (int k = 0; k < 3; ++k) want[r][k] = first(r, k);
+  // Few joints turned far, and many turned less: with eight at 120 degrees most blends have no
+  // orientation.
+  for (const int influences : {4, 8}) {
+    const SkinCase c = random_case(58, sample_count(30000), influences == 4 ? 120 : 60, influences);
+    skin_everywhere(c, [&](const SkinResult& s, const auto& renderer) {
+      using S = typename std::remove_cvref_t<decltype(renderer)>::scalar;
+      if (renderer.name() != "serial float" && renderer.name() != "serial double")
+        return;  // the same bits
+      double worst = 0, worst_mean = 0, worst_fallback = 0;
+      std::size_t tested = 0, fallback = 0;
+      for (std::size_t i = 0; i < c.size(); ++i) {
+        Real b[3][3], t[3], want[3][3];
+        c.blend<S>(i, b, t);
+        const Vec3d m = c.mean(i);
+        for (int k = 0; k < 3; ++k) {
+          const Real at = b[k][0] * static_cast<Real>(m.x) + b[k][1] * static_cast<Real>(m.y) +
+                          b[k][2] * static_cast<Real>(m.z) + t[k];
+          worst_mean =
+              std::max(worst_mean, static_cast<double>(std::abs(at - static_cast<Real>(s.means[i][k]))));
         }
-        worst_fallback = std::max(worst_fallback, angle_to(want, s.rotations[i]));
+        const Real det = determinant3(b);
+        if (std::abs(det - 0.1L) < 1e-5L) continue;  // which branch is a matter of rounding
+        if (det > 0.1L) {
+          ++tested;
+          svd_rotation(b, want);
+          worst = std::max(worst, angle_to(want, s.rotations[i]));
+        } else {
+          ++fallback;
+          const Mat3d& first = c.matrices[c.joints[c.row() * i]].linear;
+          for (int r = 0; r < 3; ++r) {
+            for (int k = 0; k < 3; ++k) want[r][k] = first(r, k);
+          }
+          worst_fallback = std::max(worst_fallback, angle_to(want, s.rotations[i]));
+        }
       }
-    }
-    MESSAGE(renderer.name() << ": " << tested << " blends " << worst << " degrees, " << fallback
-                            << " without orientation " << worst_fallback << " degrees, mean " << 1e3 * worst_mean << " mm");
-    CHECK(tested > c.size() * 8 / 10);
-    CHECK(worst <= renderer.bound(1e-3, 1e-6));  // the budget is 0.01
-    CHECK(worst_fallback <= renderer.bound(1e-4, 1e-6));
-    CHECK(worst_mean <= renderer.bound(1e-6, 1e-14));
-  });
+      MESSAGE(renderer.name() << ", K = " << influences << ": " << tested << " blends " << worst
+                              << " degrees, " << fallback << " without orientation " << worst_fallback
+                              << " degrees, mean " << 1e3 * worst_mean << " mm");
+      CHECK(tested > c.size() * 8 / 10);
+      CHECK(worst <= renderer.bound(1e-3, 1e-6));  // the budget is 0.01
+      CHECK(worst_fallback <= renderer.bound(1e-4, 1e-6));
+      CHECK(worst_mean <= renderer.bound(1e-6, 1e-14));
+    });
+  }
 }

@@ -168,7 +168,7 @@ Status float_rows(B& backend, Row base, const AvatarAsset& sampled, const Avatar
     for (std::size_t i = 0; i < sampled.size(); ++i) {
       std::fill(weights.begin(), weights.end(), 0.0);
       for (std::size_t k = 4 * i; k < 4 * i + 4; ++k) {
-        weights[sampled.joint_indices[k]] += static_cast<double>(sampled.skinning_weights[k]);
+        weights[sampled.joint_indices[k]] += weight_of_parts(sampled.skinning_weights[k]);
       }
       const Posed truth = blend(pose, weights.data(), sampled.cloud.mean(i));
       const Vec3d mean{small.means[0][i], small.means[1][i], small.means[2][i]};
@@ -187,7 +187,7 @@ Status float_rows(B& backend, Row base, const AvatarAsset& sampled, const Avatar
       },
       o.runs, 5.0);
   const double per = 100000.0 / static_cast<double>(timed.size());
-  base.set("influences", kInfluences).set("gaussians", static_cast<std::uint64_t>(timed.size()));
+  base.set("influences", timed.influences).set("gaussians", static_cast<std::uint64_t>(timed.size()));
   base.set("time_p50_ms", t.p50_ms * per).set("time_p99_ms", t.p99_ms * per);
   base.set("items_per_second", 1e3 * static_cast<double>(timed.size()) / t.p50_ms);
   base.set("note", "float32 against float64 with the same weights; time for 100000 Gaussians");

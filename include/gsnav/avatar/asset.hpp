@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gsnav/avatar/skeleton.hpp"
+#include "gsnav/avatar/skinning_weights.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/lbs.hpp"
@@ -28,29 +29,34 @@ struct AvatarAsset {
   std::string name;
   Skeleton skeleton;
   GaussianCloud cloud;                       ///< canonical pose, root frame (Y up, facing -Z), metres
-  std::vector<std::uint16_t> joint_indices;  ///< [N][4], the greatest weight first
-  std::vector<float> skinning_weights;       ///< [N][4], each row sums to 1
+  int influences = kInfluences4;                ///< K: joints that move one Gaussian, 4 or 8
+  std::vector<std::uint16_t> joint_indices;     ///< [N][K], the greatest weight first
+  std::vector<std::uint16_t> skinning_weights;  ///< [N][K] parts of kWeightParts, which is the sum of each row
   std::vector<ProxyCapsule> capsules;
   LocalPose idle;                            ///< how it stands without a motion; empty: the rest pose
 
   std::size_t size() const noexcept { return cloud.size(); }
 
-  /// Takes any K weights a Gaussian ([N][K], joint indices alongside; K = J with all joints for dense
-  /// weights): keeps the four greatest, sorts them, and divides by their sum in double, the last being
-  /// what is missing to 1, so that a body far from the root does not drift. Returns the greatest mass
+  /// Takes any k weights a Gaussian ([N][k], joint indices alongside; k = J with all joints for dense
+  /// weights): keeps the `keep` greatest (4 or 8), sorts them, and rounds them to parts that make 1 exactly
+  /// (round_weights), so that a body far from the root does not drift. Returns the greatest mass
   /// that was left out of a row. Errors: invalid_argument (sizes, a joint that does not exist, a weight
   /// that is negative or not finite, a Gaussian without weight), naming the Gaussian.
   Result<double> set_weights(std::size_t k, const std::vector<std::uint16_t>& indices,
-                             const std::vector<float>& weights) {
+                             const std::vector<float>& weights, int keep = kInfluences4) {
     const std::size_t n = size();
+    if (keep != kInfluences4 && keep != kInfluences8) {
+      return {Errc::invalid_argument, "AvatarAsset: " + std::to_string(keep) + " influences; 4 or 8 are supported"};
+    }
     if (k == 0 || indices.size() != n * k || weights.size() != n * k) {
       return {Errc::invalid_argument, "AvatarAsset: " + std::to_string(weights.size()) + " weights and " +
                                           std::to_string(indices.size()) + " joint indices for " +
                                           std::to_string(n) + " Gaussians of " + std::to_string(k)};
     }
-    std::vector<std::uint16_t> joint_out(n * kInfluences, 0);
-    std::vector<float> weight_out(n * kInfluences, 0.0f);
+    const std::size_t row = static_cast<std::size_t>(keep), used = min(k, row);
+    std::vector<std::uint16_t> joint_out(n * row, 0), weight_out(n * row, 0);
     std::vector<std::size_t> order(k);
+    std::vector<double> sorted(used);
     double dropped = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
       const auto bad = [&](const std::string& what) {
@@ -70,19 +76,14 @@ struct AvatarAsset {
       std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
         return weights[i * k + a] > weights[i * k + b];
       });
-      const std::size_t used = min(k, static_cast<std::size_t>(kInfluences));
-      for (std::size_t j = 0; j < used; ++j) kept += static_cast<double>(weights[i * k + order[j]]);
-      dropped = max(dropped, 1.0 - kept / all);
-      double rest = 1.0;
-      for (std::size_t j = used; j-- > 0;) {
-        const std::size_t at = i * kInfluences + j;
-        joint_out[at] = indices[i * k + order[j]];
-        // The first, greatest one takes what rounding has left.
-        weight_out[at] = static_cast<float>(j == 0 ? rest : static_cast<double>(weights[i * k + order[j]]) / kept);
-        rest -= static_cast<double>(weight_out[at]);
+      for (std::size_t j = 0; j < row; ++j) {
+        joint_out[i * row + j] = indices[i * k + order[j < used ? j : 0]];
+        if (j < used) kept += sorted[j] = static_cast<double>(weights[i * k + order[j]]);
       }
-      for (std::size_t j = used; j < kInfluences; ++j) joint_out[i * kInfluences + j] = joint_out[i * kInfluences];
+      dropped = max(dropped, 1.0 - kept / all);
+      round_weights(sorted.data(), used, weight_out.data() + i * row);
     }
+    influences = keep;
     joint_indices = std::move(joint_out);
     skinning_weights = std::move(weight_out);
     return dropped;
@@ -100,25 +101,29 @@ struct AvatarAsset {
     if (!cloud.origins.empty()) {
       return {Errc::unsupported, "AvatarAsset: a canonical Gaussian lies more than 32 m from the root"};
     }
-    if (joint_indices.size() != n * kInfluences || skinning_weights.size() != n * kInfluences) {
-      return bad("joint_indices and skinning_weights need 4 values a Gaussian (set_weights makes them)");
+    if (influences != kInfluences4 && influences != kInfluences8) {
+      return bad("influences is " + std::to_string(influences) + "; 4 or 8 are supported");
+    }
+    const std::size_t row = static_cast<std::size_t>(influences);
+    if (joint_indices.size() != n * row || skinning_weights.size() != n * row) {
+      return bad("joint_indices and skinning_weights need " + std::to_string(row) +
+                 " values a Gaussian (set_weights makes them)");
     }
     for (std::size_t i = 0; i < n; ++i) {
-      double sum = 0.0;
-      for (std::size_t k = i * kInfluences; k < (i + 1) * kInfluences; ++k) {
+      int sum = 0;
+      for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
         if (joint_indices[k] >= joints) {
           return bad("Gaussian " + std::to_string(i) + " names joint " + std::to_string(joint_indices[k]) +
                      " of " + std::to_string(joints));
         }
-        const float w = skinning_weights[k];
-        // Rounding may put two equal weights in either order.
-        if (!(w >= 0) || w > skinning_weights[i * kInfluences] + 1e-6f) {
-          return bad("Gaussian " + std::to_string(i) + " has a negative weight or not the greatest first");
+        if (skinning_weights[k] > skinning_weights[i * row]) {
+          return bad("Gaussian " + std::to_string(i) + " does not have its greatest weight first");
         }
-        sum += static_cast<double>(w);
+        sum += skinning_weights[k];
       }
-      if (!(abs(sum - 1.0) < 1e-6)) {
-        return bad("weights of Gaussian " + std::to_string(i) + " sum to " + std::to_string(sum));
+      if (sum != kWeightParts) {
+        return bad("weights of Gaussian " + std::to_string(i) + " sum to " + std::to_string(sum) + " parts of " +
+                   std::to_string(kWeightParts));
       }
     }
     for (std::size_t c = 0; c < capsules.size(); ++c) {

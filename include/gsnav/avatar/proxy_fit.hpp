@@ -26,11 +26,12 @@ inline double segment_distance2(const Vec3d& a, const Vec3d& b, const Vec3d& p) 
 /// Canonical Gaussian centres after skinning by joint matrices (double, root frame, metres).
 inline std::vector<Vec3d> skinned_centers(const AvatarAsset& asset, const std::vector<Affine3<double>>& joints) {
   std::vector<Vec3d> out(asset.size());
+  const std::size_t row = static_cast<std::size_t>(asset.influences);
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Vec3d p = asset.cloud.mean(i);
-    for (std::size_t k = i * kInfluences; k < (i + 1) * kInfluences; ++k) {
+    for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
       if (asset.skinning_weights[k] > 0) {
-        out[i] += (joints[asset.joint_indices[k]] * p) * static_cast<double>(asset.skinning_weights[k]);
+        out[i] += (joints[asset.joint_indices[k]] * p) * weight_of_parts(asset.skinning_weights[k]);
       }
     }
   }

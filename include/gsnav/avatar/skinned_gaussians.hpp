@@ -27,8 +27,9 @@ template <Backend B>
 class SkinnedGaussians {
  public:
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarAsset> asset)
-      : backend_(&backend), asset_(std::move(asset)), joints_(backend), indices_(backend) {
+      : backend_(&backend), asset_(std::move(asset)), joints_(backend), indices_(backend), weights_(backend) {
     GaussianView v = asset_->cloud.view();
+    args_.influences = asset_->influences;
     args_.joint_indices = view_of(asset_->joint_indices);
     args_.weights = view_of(asset_->skinning_weights);
     if constexpr (!is_host_backend<B>) {
@@ -38,9 +39,10 @@ class SkinnedGaussians {
       to_device(v.opacities);
       to_device(v.sh0);
       to_device(v.shN);
-      to_device(args_.weights);
       indices_.upload(args_.joint_indices.data, args_.joint_indices.size);
       args_.joint_indices = std::as_const(indices_).view();
+      weights_.upload(args_.weights.data, args_.weights.size);
+      args_.weights = std::as_const(weights_).view();
     }
     for (std::size_t k = 0; k < 3; ++k) args_.means[k] = v.means[k];
     for (std::size_t k = 0; k < 4; ++k) args_.quats[k] = v.quats[k];
@@ -102,7 +104,7 @@ class SkinnedGaussians {
   SkinningArgs<float> args_;
   GaussianSet set_;
   Buffer<Affine3<float>, B> joints_;
-  Buffer<std::uint16_t, B> indices_;
+  Buffer<std::uint16_t, B> indices_, weights_;
   std::vector<Buffer<float, B>> floats_;  // a Buffer's memory stays where it is when the vector grows
   std::vector<Affine3<double>> matrices_;
   std::vector<Affine3<float>> host_joints_;

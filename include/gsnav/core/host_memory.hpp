@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "gsnav/core/backend.hpp"
+#include "gsnav/core/huge_pages.hpp"
 
 namespace gsnav {
 
@@ -14,7 +15,10 @@ struct HostMemory {
   using memory_space = HostSpace;
 
   void* allocate(std::size_t bytes, std::size_t align) noexcept {
-    return std::aligned_alloc(align, (bytes + align - 1) / align * align);
+    const std::size_t fit = bytes >= 2 * kHugePage && align < kHugePage ? kHugePage : align;
+    void* p = std::aligned_alloc(fit, (bytes + fit - 1) / fit * fit);
+    if (p != nullptr && fit == kHugePage) advise_huge_pages(p, bytes);
+    return p;
   }
   void deallocate(void* p, std::size_t) noexcept { std::free(p); }
   void copy(void* dst, const void* src, std::size_t bytes, CopyKind) noexcept {

@@ -64,9 +64,14 @@ struct OracleSet {
 /// Pixels whose centre lies within the half sizes of the centre, in the image.
 inline PixelRect pixels_within(const ProjectionCamera<double>& camera, double center_x, double half_x,
                                double center_y, double half_y) noexcept {
+  double x0, x1, y0, y1;
+  gsnav::detail::pixel_range(center_x, half_x, camera.width, x0, x1);
+  gsnav::detail::pixel_range(center_y, half_y, camera.height, y0, y1);
   PixelRect r;
-  gsnav::detail::pixel_range(center_x, half_x, camera.width, r.x0, r.x1);
-  gsnav::detail::pixel_range(center_y, half_y, camera.height, r.y0, r.y1);
+  r.x0 = static_cast<std::int32_t>(x0);
+  r.x1 = static_cast<std::int32_t>(x1);
+  r.y0 = static_cast<std::int32_t>(y0);
+  r.y1 = static_cast<std::int32_t>(y1);
   return r;
 }
 

@@ -10,6 +10,7 @@
 #include "gsnav/kernels/projection.hpp"
 #include "gsnav/kernels/sh.hpp"
 #include "gsnav/kernels/splat.hpp"
+#include "gsnav/kernels/tiles.hpp"
 
 namespace gsnav {
 
@@ -36,6 +37,8 @@ struct ProjectArgs {
   View<std::uint32_t> keys;     ///< camera.key_code of the float32 key
   View<std::uint32_t> ranks;    ///< what decides between equal keys; empty: the slot does
   View<std::uint32_t> counts;
+  TileGrid grid;               ///< read where `spans` is not empty
+  View<TileSpans> spans;       ///< tiles of each slot's splat, for backends that find them here; else empty
 
   GSNAV_HD std::size_t chunk_count() const noexcept { return gaussians.chunk_count(); }
 };
@@ -61,16 +64,15 @@ GSNAV_HD Vec3<S> camera_delta(const ProjectArgs<S>& args, const Vec3<float>& mea
 }
 
 /// Pixels whose centre lies within [center - half, center + half], clipped to [0, size): half-open.
-template <class S>
-GSNAV_HD void pixel_range(S center, S half, int size, std::int32_t& low, std::int32_t& high) noexcept {
-  const S first = clamp(center - half - S(0.5), S(-1), S(size));
-  const S last = clamp(center + half - S(0.5), S(-1), S(size));
-  low = static_cast<std::int32_t>(first);        // truncation: first >= -1 ...
-  if (S(low) < first) ++low;                     // ... made a ceiling
-  high = static_cast<std::int32_t>(last);
-  if (S(high) > last) --high;                    // floor
-  low = low < 0 ? 0 : low;
-  high = high >= size ? size : high + 1;
+template <class L>
+GSNAV_HD void pixel_range(L center, L half, int size, L& low, L& high) noexcept {
+  using S = scalar_of<L>;
+  const L one(S(1)), end(static_cast<S>(size));
+  const L first = clamp(center - half - L(S(0.5)), -one, end);
+  const L last = clamp(center + half - L(S(0.5)), -one, end);
+  const L f = truncated(first), l = truncated(last);  // towards zero: made a ceiling, and a floor
+  low = max(select(f < first, f + one, f), L(S(0)));
+  high = min(select(l > last, l - one, l) + one, end);
 }
 
 /// The pixels of the 16-pixel tiles that [center - radius, center + radius] reaches, in a compat mode's
@@ -117,17 +119,21 @@ GSNAV_HD void narrow_to_compat(const ProjectionCamera<S>& camera, const Projecte
 }
 
 /// Centre of the pixel of [0, size) that is nearest to x.
-template <class S>
-GSNAV_HD S reference_pixel(S x, int size) noexcept {
-  return S(static_cast<std::int32_t>(clamp(x, S(0), S(size - 1)))) + S(0.5);
+template <class L>
+GSNAV_HD L reference_pixel(L x, int size) noexcept {
+  using S = scalar_of<L>;
+  return truncated(clamp(x, L(S(0)), L(static_cast<S>(size - 1)))) + L(S(0.5));
 }
 
 /// The pixels that a footprint may cover. Returns false where there are none.
 template <class T>
 GSNAV_HD bool splat_bounds(const ProjectionCamera<T>& camera, const Projected<T>& p,
                            SplatBounds& b) noexcept {
-  pixel_range(p.center_x, p.half_width, camera.width, b.x0, b.x1);
-  pixel_range(p.center_y, p.half_height, camera.height, b.y0, b.y1);
+  T x0, x1, y0, y1;
+  pixel_range(p.center_x, p.half_width, camera.width, x0, x1);
+  pixel_range(p.center_y, p.half_height, camera.height, y0, y1);
+  b = {static_cast<std::int32_t>(x0), static_cast<std::int32_t>(y0), static_cast<std::int32_t>(x1),
+       static_cast<std::int32_t>(y1)};
   if (camera.compat != Compat::none) narrow_to_compat(camera, p, b);
   return b.x0 < b.x1 && b.y0 < b.y1;
 }
@@ -176,23 +182,28 @@ GSNAV_HD bool store_splat(const ProjectArgs<S>& args, std::size_t slot,
 }
 
 /// The mean alone, in double.
-GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3d& delta, double& mean_x,
-                           double& mean_y) noexcept {
-  const Vec3d t = camera.rotation * delta;
-  const double inv_z = 1.0 / t.z;
-  mean_x = fma(camera.fx, t.x * inv_z, camera.cx);
-  mean_y = fma(camera.fy, t.y * inv_z, camera.cy);
+template <class L>
+GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3<L>& delta, L& mean_x,
+                           L& mean_y) noexcept {
+  const auto row = [&](int r) {
+    return Vec3<L>{L(camera.rotation(r, 0)), L(camera.rotation(r, 1)), L(camera.rotation(r, 2))};
+  };
+  const L inv_z = L(1.0) / dot(row(2), delta);
+  mean_x = fma(L(camera.fx), dot(row(0), delta) * inv_z, L(camera.cx));
+  mean_y = fma(L(camera.fy), dot(row(1), delta) * inv_z, L(camera.cy));
 }
 
 /// Whether the whitened form loses too much in float: k dx + b dy cancels over a long needle's visible
 /// length, or between a far mean and the image.
-template <class S>
-GSNAV_HD bool needs_double(const ProjectionCamera<S>& camera, const Projected<S>& p) noexcept {
-  const S ox = reference_pixel(p.mean_x, camera.width) - p.mean_x;
-  const S oy = reference_pixel(p.mean_y, camera.height) - p.mean_y;
-  const S length_x = min(p.half_width, S(camera.width)), length_y = min(p.half_height, S(camera.height));
-  return fma(abs(p.k), length_x, p.b * length_y) > S(512) ||
-         fma(abs(p.k), abs(ox), p.b * abs(oy)) > S(16);
+template <class L>
+GSNAV_HD mask_of<L> needs_double(const ProjectionCamera<scalar_of<L>>& camera, const Projected<L>& p) noexcept {
+  using S = scalar_of<L>;
+  const L ox = reference_pixel(p.mean_x, camera.width) - p.mean_x;
+  const L oy = reference_pixel(p.mean_y, camera.height) - p.mean_y;
+  const L length_x = min(p.half_width, L(static_cast<S>(camera.width)));
+  const L length_y = min(p.half_height, L(static_cast<S>(camera.height)));
+  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(512))) ||
+         (fma(abs(p.k), abs(ox), p.b * abs(oy)) > L(S(16)));
 }
 
 /// Row i of the set's shape in camera axes.
@@ -215,14 +226,23 @@ GSNAV_HD SplatAxes<S> load_axes(const GaussianView& gs, const ProjectionCamera<S
 
 }  // namespace detail
 
+/// Unit vector along `delta` (mean - camera, asset frame), the direction that SH is evaluated in.
+template <class L>
+GSNAV_HD Vec3<L> view_direction(const Vec3<L>& delta) noexcept {
+  using S = scalar_of<L>;
+  const L n = norm(delta);
+  // A camera at the mean sees no direction; z stands in, so that the colour is finite.
+  const auto defined = n > L(S(1e-12));
+  const Vec3<L> unit = delta * (L(S(1)) / n);
+  return {select(defined, unit.x, L(S(0))), select(defined, unit.y, L(S(0))), select(defined, unit.z, L(S(1)))};
+}
+
 /// Colour of Gaussian i seen along `delta` (mean - camera, asset frame, any length), SH to `degree`.
 template <class S>
 GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::size_t i,
                                       Vec3<S> delta) noexcept {
   if (degree > 0) {
-    const S n = norm(delta);
-    // A camera at the mean sees no direction; z stands in, so that the colour is finite.
-    delta = n > S(1e-12) ? delta * (S(1) / n) : Vec3<S>{S(0), S(0), S(1)};
+    delta = view_direction(delta);
     if (!gs.sh_rotations[0].empty()) {
       const Quat<S> q{S(gs.sh_rotations[0][i]), S(gs.sh_rotations[1][i]), S(gs.sh_rotations[2][i]),
                       S(gs.sh_rotations[3][i])};
@@ -272,6 +292,7 @@ GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::siz
     written = detail::store_splat(args, slot, args.camera, p, axes, p.mean_x, p.mean_y);
   }
   if (!written) return false;
+  if (!args.spans.empty()) args.spans[slot].rows = TileSpans::kLarge;
   args.keys[slot] = args.camera.key_code(key);
   if (!args.ranks.empty()) {
     const std::uint32_t row = gs.row_ids.empty() ? static_cast<std::uint32_t>(i) : gs.row_ids[i];
@@ -284,32 +305,36 @@ GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::siz
   return true;
 }
 
+/// Projects Gaussian i to `slot`. Returns whether it may be seen.
+template <class S>
+GSNAV_HD bool project_gaussian(const ProjectArgs<S>& args, std::size_t slot, std::size_t i) noexcept {
+  const GaussianView& gs = args.gaussians;
+  const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
+  const Vec3<float> mean{gs.means[0][i], gs.means[1][i], gs.means[2][i]};
+  const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
+  if (!(z > args.camera.near_plane)) return false;
+  const SplatAxes<S> axes = detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), i);
+  const Projected<S> p = project<S, float>(args.camera, axes, z, S(gs.opacities[i]));
+  if (!p.visible) return false;
+  const float key = args.camera.sort_order == SortOrder::z_depth
+                        ? z
+                        : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
+  return write_splat(args, slot, i, key, mean, origin, p, axes);
+}
+
 /// Projects chunk `c` of a set, one Gaussian after the other.
 template <class S>
 struct ProjectChunk {
   ProjectArgs<S> args;
 
   GSNAV_HD void operator()(std::size_t c) const noexcept {
-    const GaussianView& gs = args.gaussians;
-    const bool candidate = chunk_is_candidate(args, c);
-    const std::size_t begin = c * kProjectChunk;
-    const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
+    const std::size_t begin = c * kProjectChunk, size = args.gaussians.size;
+    const std::size_t end = begin + kProjectChunk < size ? begin + kProjectChunk : size;
     const std::size_t base = (args.first_chunk + c) * kProjectChunk;
+    const bool candidate = chunk_is_candidate(args, c);
     std::uint32_t written = 0;
     for (std::size_t i = begin; i < end && candidate; ++i) {
-      const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
-      const Vec3<float> mean{gs.means[0][i], gs.means[1][i], gs.means[2][i]};
-      const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean,
-                                args.offsets_f[origin]);
-      if (!(z > args.camera.near_plane)) continue;
-      const SplatAxes<S> axes =
-          detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), i);
-      const Projected<S> p = project<S, float>(args.camera, axes, z, S(gs.opacities[i]));
-      if (!p.visible) continue;
-      const float key = args.camera.sort_order == SortOrder::z_depth
-                            ? z
-                            : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
-      if (write_splat(args, base + written, i, key, mean, origin, p, axes)) ++written;
+      if (project_gaussian(args, base + written, i)) ++written;
     }
     args.counts[args.first_chunk + c] = written;
   }

@@ -220,29 +220,30 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
 
 /// The per-ray depth record of a projected Gaussian (kernels/depth.hpp). Compat modes know the depth of
 /// the centre only.
-template <class S>
-GSNAV_HD SplatDepth<S> make_splat_depth(const ProjectionCamera<S>& camera, const SplatAxes<S>& axes,
-                                        const Projected<S>& p) noexcept {
-  SplatDepth<S> d;
+template <class L>
+GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& camera, const SplatAxes<L>& axes,
+                                        const Projected<L>& p) noexcept {
+  using S = scalar_of<L>;
+  SplatDepth<L> d;
   d.mean_x = p.mean_x;
   d.mean_y = p.mean_y;
-  d.z = axes.position.z * camera.scale;
+  d.z = axes.position.z * L(camera.scale);
   if (camera.compat != Compat::none) return d;
   // Cofactors relative to the largest entry, so that their products stay away from underflow.
-  S largest(0);
+  L largest(S(0));
   for (int i = 0; i < 3; ++i) {
-    const Vec3<S>& c = axes.cofactors.row[i];
+    const Vec3<L>& c = axes.cofactors.row[i];
     largest = max(largest, max(abs(c.x), max(abs(c.y), abs(c.z))));
   }
-  const S unit = largest > S(1e-37) ? S(1) / largest : S(0);
-  const S u = axes.position.x / axes.position.z, v = axes.position.y / axes.position.z;
+  const L unit = select(largest > L(S(1e-37)), L(S(1)) / largest, L(S(0)));
+  const L u = axes.position.x / axes.position.z, v = axes.position.y / axes.position.z;
   for (int i = 0; i < 3; ++i) {
-    const Vec3<S> c = axes.cofactors.column(i) * unit;
+    const Vec3<L> c = axes.cofactors.column(i) * unit;
     d.g[i] = fma(u, c.x, fma(v, c.y, c.z));
-    d.gx[i] = c.x / camera.fx;
-    d.gy[i] = c.y / camera.fy;
+    d.gx[i] = c.x / L(camera.fx);
+    d.gy[i] = c.y / L(camera.fy);
   }
-  d.reach = sqrt(S(2 * kLn2) * p.s_max) * norm(axes.factor.row[2]) * camera.scale;
+  d.reach = sqrt(L(S(2 * kLn2)) * p.s_max) * norm(axes.factor.row[2]) * L(camera.scale);
   return d;
 }
 

@@ -63,14 +63,14 @@ GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, con
   }
 }
 
-/// The tiles of a splat that covers few: columns first[r] to end[r] - 1 of each of its rows of tiles, from
-/// `tile` on.
+/// The tiles of a splat that covers few: from `tile` on, columns [columns[r][0], columns[r][1]) of row r; none of
+/// rows that it does not have.
 struct TileSpans {
   static constexpr int kRows = 5, kColumns = 255;
-  static constexpr std::uint8_t kLarge = 255;  ///< in `rows`: too many to be kept
+  static constexpr std::uint8_t kLarge = 255;  ///< in `rows`: not kept here
   std::uint32_t tile;
   std::uint8_t rows;
-  std::uint8_t first[kRows], end[kRows];
+  std::uint8_t columns[kRows][2];
 };
 
 /// Arguments of binning: `order` lists visible splats front to back.
@@ -86,7 +86,7 @@ struct BinArgs {
   View<std::uint64_t> cursors;           ///< [blocks][tiles]: counts, then write positions
   View<std::uint64_t> tile_offsets;      ///< [tiles + 1]
   View<std::uint32_t> tile_splats;       ///< splats of all tiles, each tile's in order
-  View<TileSpans> spans;                 ///< [order] scratch of backends that bin in lanes; else empty
+  View<TileSpans> spans;                 ///< [slots], found by the projection of such backends; else empty
 };
 
 namespace detail {

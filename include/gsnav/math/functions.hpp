@@ -55,6 +55,9 @@ template <class S>
 GSNAV_HD S sqrt_above(S a) noexcept {
   return sqrt(a);
 }
+/// x without its fraction, |x| < 2^31.
+GSNAV_HD float truncated(float a) noexcept { return static_cast<float>(static_cast<std::int32_t>(a)); }
+GSNAV_HD double truncated(double a) noexcept { return static_cast<double>(static_cast<std::int32_t>(a)); }
 
 GSNAV_HD float sin(float a) noexcept { return ::sinf(a); }
 GSNAV_HD double sin(double a) noexcept { return ::sin(a); }

@@ -210,6 +210,12 @@ GSNAV_HD Pack<float, N> abs(Pack<float, N> a) noexcept {
   return Pack<float, N>(detail::floats<N>(detail::bits<N>(a.v) & 0x7fffffff));
 }
 
+template <int N>
+GSNAV_HD Pack<float, N> truncated(Pack<float, N> a) noexcept {
+  using P = Pack<float, N>;
+  return P(__builtin_convertvector(__builtin_convertvector(a.v, typename P::ints), typename P::vector));
+}
+
 /// Bit i is set where lane i is.
 template <int N>
 GSNAV_HD std::uint32_t lane_bits(Mask<N> m) noexcept {

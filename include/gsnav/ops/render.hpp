@@ -248,6 +248,9 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.depths.resize_discard(depth ? slots : 0);
   ws.perspectives.resize_discard(config.response != Response::ewa ? slots : 0);
   ws.counts.resize_discard(chunks);
+  constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
+  ws.spans.resize_discard(kSpans ? slots : 0);
+  const TileGrid grid = TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
 
   const ProjectionRules rules = projection_rules(config);
   ws.host_offsets.clear();
@@ -286,6 +289,8 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
     args.keys = ws.chunk_keys.view();
     args.ranks = ws.ranks.view();
     args.counts = ws.counts.view();
+    args.grid = grid;
+    args.spans = ws.spans.view();
     if constexpr (requires { backend.project(args); }) {
       backend.project(args);
     } else {
@@ -323,7 +328,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
 
   // ---- bin
   BinArgs<S> bin;
-  bin.grid = TileGrid::of(camera.width, camera.height, config.tile_size);
+  bin.grid = grid;
   bin.order = ws.order.view();
   bin.geometry = ws.geometry.view();
   bin.bounds = ws.bounds.view();
@@ -334,10 +339,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.tile_offsets.resize_discard(bin.grid.count() + 1);
   bin.cursors = ws.cursors.view();
   bin.tile_offsets = ws.tile_offsets.view();
-  if constexpr (sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; }) {
-    ws.spans.resize_discard(visible);
-    bin.spans = ws.spans.view();
-  }
+  bin.spans = ws.spans.view();
   if constexpr (requires { backend.list_tiles(bin); }) {
     backend.list_tiles(bin);
   } else {

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
+#include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/camera.hpp"
@@ -26,7 +28,7 @@ struct RenderConfig {
   SortOrder sort_order = SortOrder::z_depth;
   Response response = Response::ewa;
   Compat compat = Compat::none;
-  int tile_size = 16;                  ///< 8, 16 or 32; the image does not depend on it
+  int tile_size = 0;                   ///< 8, 16 or 32, or 0: what is fast; the image does not depend on it
   int max_sh_degree = kMaxShDegree;    ///< in [0, 3]: bands above it are left out
   int key_bits = 32;                   ///< in [8, 32]: how much of the sort key is compared
   double alpha_min = 1.0 / 255;        ///< in (0, 1): a Gaussian is not blended where alpha is below
@@ -35,6 +37,16 @@ struct RenderConfig {
   double first_hit_tau = 0.5;          ///< in (0, 1): first-hit depth is where alpha reaches this
   Vec3d background{0, 0, 0};           ///< display-referred
 };
+
+/// Side of the tiles that an image is rendered in. On a processor large images have tiles of 32 pixels: their
+/// footprints are large too, and take fewer of those.
+template <Backend B>
+int tile_size_of(const RenderConfig& c, int width, int height) noexcept {
+  if (c.tile_size != 0) return c.tile_size;
+  constexpr std::int64_t kLarge = 1000000;
+  const bool large = std::int64_t{width} * height >= kLarge;
+  return is_host_backend<B> && large && c.compat == Compat::none ? 32 : 16;
+}
 
 /// Names the field that cannot be, or ok.
 inline Status validate(const RenderConfig& c) {
@@ -45,8 +57,8 @@ inline Status validate(const RenderConfig& c) {
   if (c.outputs == 0 || (c.outputs & ~(kRgb | kAlpha | kAnyDepth)) != 0) {
     return bad("outputs", std::to_string(c.outputs), "name at least one known output");
   }
-  if (c.tile_size != 8 && c.tile_size != 16 && c.tile_size != 32) {
-    return bad("tile_size", std::to_string(c.tile_size), "must be 8, 16 or 32");
+  if (c.tile_size != 0 && c.tile_size != 8 && c.tile_size != 16 && c.tile_size != 32) {
+    return bad("tile_size", std::to_string(c.tile_size), "must be 8, 16 or 32, or 0 for what is fast");
   }
   if (c.compat != Compat::none && c.tile_size == 32) {
     return bad("tile_size", "32", "compat modes have tiles of 16 pixels: use 8 or 16");

@@ -23,13 +23,18 @@ Status validate(const SkinningArgs<S, Out>& args) {
                                             std::to_string(want) + " are needed"};
     }
   };
-  if (n > std::numeric_limits<std::size_t>::max() / kInfluences) {
+  if (args.influences != kInfluences4 && args.influences != kInfluences8) {
+    return {Errc::invalid_argument,
+            "SkinningArgs.influences is " + std::to_string(args.influences) + "; 4 or 8 are supported"};
+  }
+  const std::size_t row = static_cast<std::size_t>(args.influences);
+  if (n > std::numeric_limits<std::size_t>::max() / row) {
     return {Errc::invalid_argument, "SkinningArgs.means: too many Gaussians"};
   }
   for (const auto& v : args.means) sized(v, n, "means");
   for (const auto& v : args.quats) sized(v, n, "quats");
-  sized(args.joint_indices, kInfluences * n, "joint_indices");
-  sized(args.weights, kInfluences * n, "weights");
+  sized(args.joint_indices, row * n, "joint_indices");
+  sized(args.weights, row * n, "weights");
   for (const auto& v : args.means_out) sized(v, n, "means_out");
   for (const auto& v : args.quats_out) sized(v, n, "quats_out");
   const std::size_t rotations = args.rotations_out[0].empty() ? 0 : n;

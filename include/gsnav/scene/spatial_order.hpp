@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "gsnav/core/huge_pages.hpp"
 #include "gsnav/kernels/gaussians.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
@@ -27,7 +28,7 @@ inline std::uint64_t spread_bits(std::uint64_t x) noexcept {
 /// Rows of `values`, `stride` floats each, in a new order.
 inline void permute_rows(std::vector<float>& values, const std::vector<std::uint32_t>& order,
                          std::size_t stride) {
-  std::vector<float> out(values.size());
+  std::vector<float> out = huge_vector<float>(values.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     std::copy_n(values.data() + stride * order[i], stride, out.data() + stride * i);
   }

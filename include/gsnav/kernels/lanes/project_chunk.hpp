@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "gsnav/kernels/lanes/isa.hpp"
+#include "gsnav/kernels/lanes/write_splats.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 
 namespace gsnav::lanes {
@@ -13,12 +14,17 @@ inline namespace GSNAV_LANES_TAG {
 inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcept {
   const GaussianView& gs = args.gaussians;
   const ProjectionCamera<float>& camera = args.camera;
+  if (camera.response != Response::ewa || camera.compat != Compat::none) {
+    ProjectChunk<float>{args}(c);  // not worth lanes of its own
+    return;
+  }
   const std::size_t begin = c * kProjectChunk;
   const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
   const std::size_t base = (args.first_chunk + c) * kProjectChunk;
   const std::size_t step = static_cast<std::size_t>(kWidth);
-  std::uint32_t written = 0;
   const bool candidate = chunk_is_candidate(args, c);
+  std::uint32_t written = 0;
+  Survivors survivors;
   for (std::size_t i = begin; i < end && candidate; i += step) {
     const std::size_t count = end - i < step ? end - i : step;
     float tail[step];
@@ -58,52 +64,13 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
       }
       axes = splat_axes(camera.rotation, delta, factor);
     }
-    const Projected<F> p = project<F, F>(camera, axes, z, load(gs.opacities));
-    std::uint32_t bits = lane_bits(p.visible) & ((1u << count) - 1u);
+    const Projected<F> splat = project<F, F>(camera, axes, z, load(gs.opacities));
+    const std::uint32_t bits = lane_bits(splat.visible) & ((1u << count) - 1u);
     if (bits == 0) continue;
-    const F key = camera.sort_order == SortOrder::z_depth
-                      ? z
-                      : distance_key(camera.key_scale, mean, offset);
-    for (; bits != 0; bits &= bits - 1) {
-      const int lane = std::countr_zero(bits);
-      Projected<float> one;
-      one.visible = true;
-      one.mean_x = p.mean_x[lane];
-      one.mean_y = p.mean_y[lane];
-      one.a = p.a[lane];
-      one.k = p.k[lane];
-      one.b = p.b[lane];
-      one.log2_opacity = p.log2_opacity[lane];
-      one.s_max = p.s_max[lane];
-      one.variance_x = p.variance_x[lane];
-      one.variance_y = p.variance_y[lane];
-      one.center_x = p.center_x[lane];
-      one.center_y = p.center_y[lane];
-      one.half_width = p.half_width[lane];
-      one.half_height = p.half_height[lane];
-      if (camera.response != Response::ewa) {
-        one.slope_x = p.slope_x[lane];
-        one.slope_y = p.slope_y[lane];
-        one.bend = p.bend[lane];
-      }
-      SplatAxes<float> own;
-      if (args.depth) {
-        for (int r = 0; r < 3; ++r) {
-          const Vec3<F>& f = axes.factor.row[r];
-          const Vec3<F>& q = axes.cofactors.row[r];
-          own.factor.row[r] = {f.x[lane], f.y[lane], f.z[lane]};
-          own.cofactors.row[r] = {q.x[lane], q.y[lane], q.z[lane]};
-        }
-        own.position = {axes.position.x[lane], axes.position.y[lane], axes.position.z[lane]};
-      }
-      const std::size_t row = i + static_cast<std::size_t>(lane);
-      const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[row];
-      if (write_splat(args, base + written, row, key[lane], {mean.x[lane], mean.y[lane], mean.z[lane]},
-                      origin, one, own)) {
-        ++written;
-      }
-    }
+    const F key = camera.sort_order == SortOrder::z_depth ? z : distance_key(camera.key_scale, mean, offset);
+    written += write_splats(args, base, written, {i, mean, delta, key, axes, splat}, bits, survivors);
   }
+  if (args.color) color_survivors(gs, args.sh_degree, survivors, written, args.colors.data + base);
   args.counts[args.first_chunk + c] = written;
 }
 

@@ -7,58 +7,164 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// SkinGaussian<float> for the Gaussians [begin, end), kWidth side by side; the same bits.
-inline void skin_range(const SkinningArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
-  constexpr std::size_t step = static_cast<std::size_t>(kWidth);
-  for (std::size_t first = begin; first < end; first += step) {
-    const std::size_t count = end - first < step ? end - first : step;
-    // The last pack repeats its last Gaussian; only `count` lanes are written.
-    const auto row = [&](std::size_t lane) { return first + (lane < count ? lane : count - 1); };
-    const auto gather = [&](const auto& value) {
-      float v[step];
-      for (std::size_t l = 0; l < step; ++l) v[l] = value(row(l));
-      return F::load(v);
-    };
-    const auto plane = [&](const View<const float>& p) {
-      return count == step ? F::load(p.data + first) : gather([&](std::size_t i) { return p[i]; });
-    };
-    Affine3<F> joints[kInfluences];
-    F weights[kInfluences];
-    for (std::size_t k = 0; k < static_cast<std::size_t>(kInfluences); ++k) {
-      weights[k] = gather([&](std::size_t i) { return args.weights[4 * i + k]; });
-      float m[12][step];
-      for (std::size_t l = 0; l < step; ++l) {
-        const Affine3<float>& j = args.joints[args.joint_indices[4 * row(l) + k]];
-        for (int r = 0; r < 3; ++r) {
-          m[4 * r][l] = j.linear.row[r].x;
-          m[4 * r + 1][l] = j.linear.row[r].y;
-          m[4 * r + 2][l] = j.linear.row[r].z;
-          m[4 * r + 3][l] = j.translation[r];
-        }
-      }
-      for (int r = 0; r < 3; ++r) {
-        joints[k].linear.row[r] = {F::load(m[4 * r]), F::load(m[4 * r + 1]), F::load(m[4 * r + 2])};
-        joints[k].translation[r] = F::load(m[4 * r + 3]);
-      }
-    }
-    const Vec3<F> mean{plane(args.means[0]), plane(args.means[1]), plane(args.means[2])};
-    const Quat<F> quat{plane(args.quats[0]), plane(args.quats[1]), plane(args.quats[2]), plane(args.quats[3])};
-    const Skinned<F> s = skin<F>(joints, weights, mean, quat);
-    const auto write = [&](const View<float>& out, const F& v) {
-      if (count == step) {
-        v.store(out.data + first);
-      } else {
-        for (std::size_t l = 0; l < count; ++l) out[first + l] = v[static_cast<int>(l)];
-      }
-    };
-    for (int k = 0; k < 3; ++k) write(args.means_out[k], s.mean[k]);
-    const F quats[4] = {s.quat.w, s.quat.x, s.quat.y, s.quat.z};
-    const F rotations[4] = {s.rotation.w, s.rotation.x, s.rotation.y, s.rotation.z};
-    for (int k = 0; k < 4; ++k) {
-      write(args.quats_out[k], quats[k]);
-      if (!args.rotations_out[k].empty()) write(args.rotations_out[k], rotations[k]);
+// One Gaussian's matrix is blended element beside element, as its joints lie in memory: twelve floats, linear part
+// by rows, then translation. The matrices of a pack are then put side by side, in registers.
+static_assert(sizeof(Affine3<float>) == 12 * sizeof(float));
+
+/// One Gaussian's blended matrix.
+struct BlendedRow {
+#if GSNAV_PACK_WIDTH >= 8
+  Pack<float, 8> low;
+  Pack<float, 4> high;
+#else
+  Pack<float, 4> parts[3];
+#endif
+};
+
+template <int K>
+GSNAV_HD BlendedRow blend_row(const float* joints, const std::uint16_t* indices, const float* weights) noexcept {
+  using P4 = Pack<float, 4>;
+  const auto joint = [&](int k) noexcept { return joints + std::size_t{12} * indices[k]; };
+#if GSNAV_PACK_WIDTH >= 8
+  using P8 = Pack<float, 8>;
+  const auto half = [](const P8& p) noexcept { return P4(__builtin_shufflevector(p.v, p.v, 0, 1, 2, 3)); };
+  const P8 first(weights[0]);
+  BlendedRow r{P8::load(joint(0)) * first, P4::load(joint(0) + 8) * half(first)};
+  for (int k = 1; k < K; ++k) {
+    const P8 w(weights[k]);
+    r.low = fma(w, P8::load(joint(k)), r.low);
+    r.high = fma(half(w), P4::load(joint(k) + 8), r.high);
+  }
+#else
+  BlendedRow r;
+  for (int p = 0; p < 3; ++p) {
+    r.parts[p] = P4::load(joint(0) + 4 * p) * P4(weights[0]);
+    for (int k = 1; k < K; ++k) r.parts[p] = fma(P4(weights[k]), P4::load(joint(k) + 4 * p), r.parts[p]);
+  }
+#endif
+  return r;
+}
+
+/// The three parts of the rows of every fourth Gaussian, each in a 128-bit part of its pack.
+struct BlendedRows {
+  F::vector parts[3];
+};
+
+template <int K>
+GSNAV_HD BlendedRows blend_every_fourth(const float* joints, const std::uint16_t* indices,
+                                        const float* weights) noexcept {
+  const auto row = [&](int l) noexcept { return blend_row<K>(joints, indices + 4 * K * l, weights + 4 * K * l); };
+  const BlendedRow r0 = row(0);
+#if GSNAV_PACK_WIDTH == 16
+  const BlendedRow r1 = row(1), r2 = row(2), r3 = row(3);
+  const auto pair = [](const Pack<float, 8>& a, const Pack<float, 8>& b) noexcept {
+    return __builtin_shufflevector(a.v, b.v, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  };
+  const auto x = pair(r0.low, r1.low), y = pair(r2.low, r3.low);
+  const auto h = __builtin_shufflevector(r0.high.v, r1.high.v, 0, 1, 2, 3, 4, 5, 6, 7);
+  const auto i = __builtin_shufflevector(r2.high.v, r3.high.v, 0, 1, 2, 3, 4, 5, 6, 7);
+  return {{__builtin_shufflevector(x, y, 0, 1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19, 24, 25, 26, 27),
+           __builtin_shufflevector(x, y, 4, 5, 6, 7, 12, 13, 14, 15, 20, 21, 22, 23, 28, 29, 30, 31),
+           __builtin_shufflevector(h, i, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)}};
+#elif GSNAV_PACK_WIDTH == 8
+  const BlendedRow r1 = row(1);
+  return {{__builtin_shufflevector(r0.low.v, r1.low.v, 0, 1, 2, 3, 8, 9, 10, 11),
+           __builtin_shufflevector(r0.low.v, r1.low.v, 4, 5, 6, 7, 12, 13, 14, 15),
+           __builtin_shufflevector(r0.high.v, r1.high.v, 0, 1, 2, 3, 4, 5, 6, 7)}};
+#else
+  return {{r0.parts[0].v, r0.parts[1].v, r0.parts[2].v}};
+#endif
+}
+
+/// Transposes the 4x4 blocks in the 128-bit parts of four packs.
+struct Columns {
+  F c[4];
+
+  GSNAV_HD Columns(F::vector a, F::vector b, F::vector c_, F::vector d) noexcept {
+    constexpr int w = kWidth;
+#if GSNAV_PACK_WIDTH == 16
+#define GSNAV_PARTS(x, y, i, j, k, l)                                                                           \
+  __builtin_shufflevector(x, y, i, j, k, l, i + 4, j + 4, k + 4, l + 4, i + 8, j + 8, k + 8, l + 8, i + 12, j + 12, \
+                          k + 12, l + 12)
+#elif GSNAV_PACK_WIDTH == 8
+#define GSNAV_PARTS(x, y, i, j, k, l) __builtin_shufflevector(x, y, i, j, k, l, i + 4, j + 4, k + 4, l + 4)
+#else
+#define GSNAV_PARTS(x, y, i, j, k, l) __builtin_shufflevector(x, y, i, j, k, l)
+#endif
+    const auto ab_low = GSNAV_PARTS(a, b, 0, w, 1, w + 1), ab_high = GSNAV_PARTS(a, b, 2, w + 2, 3, w + 3);
+    const auto cd_low = GSNAV_PARTS(c_, d, 0, w, 1, w + 1), cd_high = GSNAV_PARTS(c_, d, 2, w + 2, 3, w + 3);
+    c[0].v = GSNAV_PARTS(ab_low, cd_low, 0, 1, w, w + 1);
+    c[1].v = GSNAV_PARTS(ab_low, cd_low, 2, 3, w + 2, w + 3);
+    c[2].v = GSNAV_PARTS(ab_high, cd_high, 0, 1, w, w + 1);
+    c[3].v = GSNAV_PARTS(ab_high, cd_high, 2, 3, w + 2, w + 3);
+#undef GSNAV_PARTS
+  }
+};
+
+/// Blended matrices of the kWidth Gaussians from `first` on.
+template <int K>
+GSNAV_HD Affine3<F> blend_joints(const SkinningArgs<float>& args, std::size_t first) noexcept {
+  constexpr int step = K * kWidth;
+  const std::uint16_t* const indices = args.joint_indices.data + K * first;
+  const std::uint16_t* const parts = args.weights.data + K * first;
+  const float* const joints = reinterpret_cast<const float*>(args.joints.data);
+  float weights[step];
+  for (int k = 0; k < step; ++k) weights[k] = skinning_weight<float>(parts[k]);
+  const BlendedRows a = blend_every_fourth<K>(joints, indices, weights),
+                    b = blend_every_fourth<K>(joints, indices + K, weights + K),
+                    c = blend_every_fourth<K>(joints, indices + 2 * K, weights + 2 * K),
+                    d = blend_every_fourth<K>(joints, indices + 3 * K, weights + 3 * K);
+  const Columns m0(a.parts[0], b.parts[0], c.parts[0], d.parts[0]), m1(a.parts[1], b.parts[1], c.parts[1], d.parts[1]),
+      m2(a.parts[2], b.parts[2], c.parts[2], d.parts[2]);
+  return {{{{m0.c[0], m0.c[1], m0.c[2]}, {m0.c[3], m1.c[0], m1.c[1]}, {m1.c[2], m1.c[3], m2.c[0]}}},
+          {m2.c[1], m2.c[2], m2.c[3]}};
+}
+
+/// Linear parts of the joints of the greatest weights of the pack that begins at `first`. Rarely called, and
+/// apart, for its loads to take no registers from skin_packs.
+template <int K>
+[[gnu::noinline, gnu::cold]] Mat3<F> greatest_joints(const SkinningArgs<float>& args, std::size_t first) noexcept {
+  Mat3<F> out;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      float v[kWidth];
+      for (std::size_t l = 0; l < kWidth; ++l) v[l] = args.joints[args.joint_indices[K * (first + l)]].linear(i, j);
+      out(i, j) = F::load(v);
     }
   }
+  return out;
+}
+
+/// SkinGaussian<float> for the Gaussians [begin, end), whole packs; the same bits.
+template <int K>
+GSNAV_HD void skin_packs(const SkinningArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
+  for (std::size_t first = begin; first < end; first += kWidth) {
+    const auto at = [first](const View<const float>& plane) noexcept { return F::load(plane.data + first); };
+    const Affine3<F> blend = blend_joints<K>(args, first);
+    const Vec3<F> mean{at(args.means[0]), at(args.means[1]), at(args.means[2])};
+    const Quat<F> quat{at(args.quats[0]), at(args.quats[1]), at(args.quats[2]), at(args.quats[3])};
+    const auto greatest = [&]() noexcept { return greatest_joints<K>(args, first); };
+    const Skinned<F> s = skin<F>(blend, greatest, mean, quat);
+    for (int k = 0; k < 3; ++k) s.mean[k].store(args.means_out[k].data + first);
+    const F quats[4] = {s.quat.w, s.quat.x, s.quat.y, s.quat.z};
+    for (int k = 0; k < 4; ++k) quats[k].store(args.quats_out[k].data + first);
+    if (!args.rotations_out[0].empty()) {
+      const F rotations[4] = {s.rotation.w, s.rotation.x, s.rotation.y, s.rotation.z};
+      for (int k = 0; k < 4; ++k) rotations[k].store(args.rotations_out[k].data + first);
+    }
+  }
+}
+
+/// SkinGaussian<float> for the Gaussians [begin, end), kWidth side by side; the same bits.
+inline void skin_range(const SkinningArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
+  const std::size_t packs = begin + (end - begin) / kWidth * kWidth;
+  if (args.influences == kInfluences8) {
+    skin_packs<kInfluences8>(args, begin, packs);
+  } else {
+    skin_packs<kInfluences4>(args, begin, packs);
+  }
+  const SkinGaussian<float> one{args};
+  for (std::size_t i = packs; i < end; ++i) one(i);
 }
 
 }  // namespace GSNAV_LANES_TAG

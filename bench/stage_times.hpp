@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "gsnav/ops/render.hpp"
+
+namespace gsnav_bench {
+
+/// Where a frame's time goes. `other`: what the calling thread does between kernels (validation,
+/// uploads, sums).
+enum class Stage { project, sort, bin, blend, other };
+inline constexpr std::size_t kStages = 5;
+inline constexpr const char* kStageNames[kStages] = {"project", "sort", "bin", "blend", "other"};
+
+/// Milliseconds by stage.
+using StageTimes = std::array<double, kStages>;
+
+inline double sum_of(const StageTimes& t) noexcept { return t[0] + t[1] + t[2] + t[3] + t[4]; }
+
+/// A host backend whose calls are timed: what `render_camera` does is measured as it is, call by call,
+/// so that the stages with `other` are the whole frame. A new optional member of backends needs a line
+/// here, or is `other`.
+template <gsnav::Backend Base>
+class TimedBackend : public Base {
+ public:
+  using Base::Base;
+
+  /// Begins a frame.
+  void begin() noexcept {
+    times_ = {};
+    mark_ = Clock::now();
+  }
+  /// Ends it: milliseconds by stage since begin().
+  StageTimes end() noexcept {
+    add(Stage::other);
+    return times_;
+  }
+
+  template <class F>
+  void parallel_for(std::size_t n, const F& f) {
+    timed(stage_of<F>(), [&] { Base::parallel_for(n, f); });
+  }
+  template <class A>
+  void project(const A& args) requires requires(Base& b) {
+    b.project(args);
+  }
+  {
+    timed(Stage::project, [&] { Base::project(args); });
+  }
+  template <class A>
+  void count_tiles(const A& args) requires requires(Base& b) {
+    b.count_tiles(args);
+  }
+  {
+    timed(Stage::bin, [&] { Base::count_tiles(args); });
+  }
+  template <class A>
+  void list_tiles(const A& args) requires requires(Base& b) {
+    b.list_tiles(args);
+  }
+  {
+    timed(Stage::bin, [&] { Base::list_tiles(args); });
+  }
+  template <class A>
+  void scatter_tiles(const A& args) requires requires(Base& b) {
+    b.scatter_tiles(args);
+  }
+  {
+    timed(Stage::bin, [&] { Base::scatter_tiles(args); });
+  }
+  template <class A>
+  void rasterize_tiles(const A& args) requires requires(Base& b) {
+    b.rasterize_tiles(args);
+  }
+  {
+    timed(Stage::blend, [&] { Base::rasterize_tiles(args); });
+  }
+  template <class P>
+  bool sort_pairs(P* keys, P* values, P* keys_alt, P* values_alt, std::size_t n, int bits) requires
+      requires(Base& b) {
+    b.sort_pairs(keys, values, keys_alt, values_alt, n, bits);
+  }
+  {
+    bool in_alt = false;
+    timed(Stage::sort, [&] { in_alt = Base::sort_pairs(keys, values, keys_alt, values_alt, n, bits); });
+    return in_alt;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// The stage of a functor that a generic fallback launches.
+  template <class F>
+  static constexpr Stage stage_of() noexcept {
+    using S = float;
+    if constexpr (std::is_same_v<F, gsnav::ProjectChunk<S>>) {
+      return Stage::project;
+    } else if constexpr (std::is_same_v<F, gsnav::CountTileIntersections<S>> ||
+                         std::is_same_v<F, gsnav::ScanTileIntersections<S>> ||
+                         std::is_same_v<F, gsnav::ScatterTileIntersections<S>>) {
+      return Stage::bin;
+    } else if constexpr (std::is_same_v<F, gsnav::detail::RadixHistogram> ||
+                         std::is_same_v<F, gsnav::detail::RadixOffsets> ||
+                         std::is_same_v<F, gsnav::detail::RadixScatter> ||
+                         std::is_same_v<F, gsnav::detail::GatherVisible> ||
+                         std::is_same_v<F, gsnav::detail::RankTies>) {
+      return Stage::sort;
+    } else {
+      return Stage::other;
+    }
+  }
+
+  void add(Stage stage) noexcept {
+    const Clock::time_point now = Clock::now();
+    times_[static_cast<std::size_t>(stage)] +=
+        std::chrono::duration<double, std::milli>(now - mark_).count();
+    mark_ = now;
+  }
+  template <class Run>
+  void timed(Stage stage, const Run& run) {
+    add(Stage::other);
+    run();
+    add(stage);
+  }
+
+  StageTimes times_{};
+  Clock::time_point mark_{};
+};
+
+}  // namespace gsnav_bench

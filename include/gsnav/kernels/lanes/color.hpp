@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "gsnav/kernels/lanes/isa.hpp"
+#include "gsnav/kernels/project_chunk.hpp"
+
+namespace gsnav::lanes {
+inline namespace GSNAV_LANES_TAG {
+
+/// The Gaussians of a chunk that are seen, in row order: row and mean - camera, asset frame.
+struct Survivors {
+  static constexpr std::size_t kRoom = kProjectChunk + static_cast<std::size_t>(kWidth);
+  std::uint32_t rows[kRoom];
+  std::uint32_t delta[3][kRoom];  ///< bits of floats
+};
+
+/// gaussian_color of kWidth Gaussians side by side, the same bits: lane l is row rows[l]. The coefficients
+/// lie row by row; each group of 8 columns is transposed into lanes on its way to the registers.
+GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const std::uint32_t* rows,
+                                     Vec3<F> delta) noexcept {
+  constexpr int kGroup = 8;
+  if (degree > 0) {
+    delta = view_direction(delta);
+    if (!gs.sh_rotations[0].empty()) {
+      float q[4][kWidth];
+      for (int k = 0; k < 4; ++k) {
+        for (int l = 0; l < kWidth; ++l) q[k][l] = gs.sh_rotations[k][rows[l]];
+      }
+      const Quat<F> turned{F::load(q[0]), F::load(q[1]), F::load(q[2]), F::load(q[3])};
+      delta = rotate(conjugate(turned), delta);
+    }
+  }
+  // Bare vectors: they need no value before they get theirs.
+  typename F::vector c[3 * sh_coefficient_count(kMaxShDegree)];
+  const float* at[kWidth];
+  for (int l = 0; l < kWidth; ++l) at[l] = gs.sh0.data + 3 * static_cast<std::size_t>(rows[l]);
+  F dc[3];
+  load_columns<3>(at, dc);
+  for (int k = 0; k < 3; ++k) c[k] = dc[k].v;
+  const std::size_t stride = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  const int columns = 3 * (sh_coefficient_count(degree) - 1);  // 0, 9, 24 or 45
+  for (int first = 0; first < columns; first += kGroup) {
+    const int from = first + kGroup <= columns ? first : columns - kGroup;
+    for (int l = 0; l < kWidth; ++l) at[l] = gs.shN.data + stride * rows[l] + from;
+    F group[kGroup];
+    load_columns<kGroup>(at, group);
+    for (int k = 0; k < kGroup; ++k) c[3 + from + k] = group[k].v;
+  }
+  const Vec3<F> color = sh_color<F>(degree, delta, [&c](int k) noexcept {
+    return Vec3<F>{F(c[3 * k]), F(c[3 * k + 1]), F(c[3 * k + 2])};
+  });
+  return {color.x, color.y, color.z, F(0.0f)};
+}
+
+/// Asks for the coefficients of rows [first, first + kWidth), which color_survivors will read.
+GSNAV_HD void prefetch_colors(const GaussianView& gs, int degree, std::size_t first) noexcept {
+  constexpr std::size_t kLine = 64 / sizeof(float);
+  if (degree == 0) return;
+  const std::size_t stride = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  const std::size_t begin = stride * first, room = gs.shN.size - begin;
+  const std::size_t rows = stride * static_cast<std::size_t>(kWidth), end = begin + (rows < room ? rows : room);
+  for (std::size_t i = begin; i < end; i += kLine) __builtin_prefetch(gs.shN.data + i, 0, 2);
+}
+
+/// Colours of the `count` survivors of a chunk, to out[0] on. They are read when all of the chunk's geometry has
+/// been written: coefficients are most of what a frame reads, and come fastest as one stream.
+GSNAV_HD void color_survivors(const GaussianView& gs, int degree, Survivors& s, std::size_t count,
+                              SplatColor<float>* out) noexcept {
+  constexpr std::size_t step = static_cast<std::size_t>(kWidth);
+  if (count == 0) return;
+  for (std::size_t i = count; i % step != 0; ++i) s.rows[i] = s.rows[count - 1];
+  for (std::size_t i = 0; i < count; i += step) {
+    float delta[3][step];
+    std::memcpy(delta[0], s.delta[0] + i, sizeof delta[0]);
+    std::memcpy(delta[1], s.delta[1] + i, sizeof delta[1]);
+    std::memcpy(delta[2], s.delta[2] + i, sizeof delta[2]);
+    const SplatColor<F> c =
+        gaussian_colors(gs, degree, s.rows + i, {F::load(delta[0]), F::load(delta[1]), F::load(delta[2])});
+    const F columns[4] = {c.r, c.g, c.b, c.pad};
+    float rows[4 * kWidth];
+    store_columns<4>(columns, rows);
+    const std::size_t n = count - i < step ? count - i : step;
+    std::memcpy(static_cast<void*>(out + i), rows, n * sizeof(SplatColor<float>));
+  }
+}
+
+}  // namespace GSNAV_LANES_TAG
+}  // namespace gsnav::lanes

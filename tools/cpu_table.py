@@ -1,0 +1,338 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Makes the README's table of CPU renderers: gsnav and the baselines, timed in one run, with error and memory.
+
+    tools/cpu_table.py --build build/dev            # what there is beside the data: flats, LaCadiere, two baselines
+    tools/cpu_table.py --build build/dev --readme   # and puts it into README.md
+    tools/cpu_table.py --build build/dev --scene flat=flat.ply:cameras.json --baseline NAME=BINARY
+
+A scene is what gsnav-convert reads; all renderers get the same PLY. A baseline is a binary, or a C++ source that is
+compiled, called as `CAMERAS=cameras.json BINARY SCENE.ply WIDTH HEIGHT THREADS REPEATS`, which prints `total X ms` (a
+median over views) and `RSS X MB`. Baselines and gsnav take turns, size by size. Scenes, binaries and float64
+references stay in --cache. Times are medians over all views, of the fastest of the turns; errors the worst of
+four views.
+"""
+import argparse
+import collections
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import textwrap
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROFILES = ("exact", "fast")
+Baseline = collections.namedtuple("Baseline", "source least_gain")
+BASELINES = {"prototype": Baseline("proto.cpp", 2), "row renderer": Baseline("surrogate.cpp", 4)}
+FLATS = {"flat 100K": 100_000, "flat 300K": 300_000, "flat 1M": 1_000_000}
+SHOWROOMS = {"LaCadiere 3": "3_0,3_1", "LaCadiere 2": "2_0,2_1,2_2"}
+MARKS = ("<!-- cpu-table: begin -->", "<!-- cpu-table: end -->")
+TIMEOUT_S = 900
+# Of GNU's OpenMP, for all renderers alike: without a bound a waiting thread may keep the core that the working one
+# needs, for 8 ms at every barrier.
+SPIN_BOUND = {"GOMP_SPINCOUNT": os.environ.get("GOMP_SPINCOUNT", "20000")}
+
+
+def stop(message):
+    sys.exit(f"cpu_table.py: {message}")
+
+
+def run(command, env=None, **kwargs):
+    """Standard output of a command; ends the program with its last words where it fails."""
+    try:
+        done = subprocess.run([str(c) for c in command], env={**os.environ, **SPIN_BOUND, **(env or {})}, text=True,
+                              capture_output=True, timeout=TIMEOUT_S, **kwargs)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        stop(f"{command[0]}: {error}")
+    if done.returncode != 0:
+        said = (done.stderr or done.stdout)[-600:].strip()
+        stop(f"{' '.join(map(str, command))} ended with {done.returncode}: {said}")
+    return done.stdout
+
+
+def busy_share(seconds):
+    """Of all cores."""
+    def ticks():
+        fields = [int(f) for f in pathlib.Path("/proc/stat").read_text().split("\n")[0].split()[1:]]
+        return sum(fields), fields[3] + fields[4]
+    total, idle = ticks()
+    time.sleep(seconds)
+    total2, idle2 = ticks()
+    return 1 - (idle2 - idle) / max(1, total2 - total)
+
+
+def wait_until_quiet(limit_s, what):
+    """Other programs' work would be measured too. Returns the share of the cores that they still take."""
+    end = time.monotonic() + limit_s
+    while (busy := busy_share(0.5)) > 0.1 and time.monotonic() < end:
+        pass
+    if busy > 0.1:
+        print(f"cpu_table.py: warning: {what}: {busy:.0%} of the processor is busy with something else", file=sys.stderr)
+    return busy
+
+
+def program(build, name):
+    for path in (build / "bench" / name, build / "tools" / name):
+        if path.is_file():
+            return path
+    stop(f"{name} is not in {build}: cmake --build {build} --target {name}")
+
+
+def compiled(source, cache, flags):
+    """The binary of a C++ source, built once."""
+    binary = cache / source.stem
+    if not binary.exists() or binary.stat().st_mtime < source.stat().st_mtime:
+        run(["g++", "-O3", "-fopenmp", "-std=c++17", "-w", *flags, source, "-o", binary])
+    return binary
+
+
+def data_folder(build):
+    found = re.search(r"^GSNAV_DATA_DIR:\w+=(.*)$", (build / "CMakeCache.txt").read_text(), re.M)
+    return pathlib.Path(found.group(1)) if found else pathlib.Path()
+
+
+def default_scenes(data, cache):
+    """(name, PLY, cameras) of the benchmark flats and the showroom, where they are there."""
+    scenes = []
+    generator = data.parent / "bench_scene" / "make_bench_scene.cpp"
+    if generator.exists():
+        make, cameras = compiled(generator, cache, []), cache / "flat_cameras.json"
+        run([make, "cameras", 64, 256, 256, cameras])
+        for name, count in FLATS.items():
+            ply = cache / f"flat_{count}.ply"
+            if not ply.exists():
+                run([make, "ply", count, ply])
+            scenes.append((name, str(ply), str(cameras)))
+    showroom, cameras = data / "splats/lacadiere_showroom", data / "cameras/lacadiere_eye_level.json"
+    for name, tiles in SHOWROOMS.items():
+        if all((showroom / t).exists() for t in tiles.split(",")) and cameras.exists():
+            scenes.append((name, str(showroom / tiles), str(cameras)))
+    return scenes
+
+
+def parse_scene(text):
+    found = re.fullmatch(r"([^=]+)=(.+):(.+\.json)", text)
+    if not found:
+        stop(f"--scene {text}: use NAME=PATH:CAMERAS.json")
+    return found.groups()
+
+
+def as_ply(build, name, path, cache):
+    if path.endswith(".ply") and "," not in path:
+        return path
+    ply = cache / (re.sub(r"\W+", "_", name) + ".ply")
+    if not ply.exists():
+        run([program(build, "gsnav-convert"), path, ply])
+    return str(ply)
+
+
+def parse_baseline(text, cache):
+    name, _, path = text.partition("=")
+    if not path or not pathlib.Path(path).is_file():
+        stop(f"--baseline {text}: use NAME=BINARY or NAME=SOURCE.cpp")
+    path = pathlib.Path(path)
+    return name, compiled(path, cache, ["-march=native"]) if path.suffix == ".cpp" else path.resolve()
+
+
+def time_baseline(binary, ply, cameras, size, threads, repeats):
+    out = run([binary, ply, *size, threads, repeats], env={"CAMERAS": cameras})
+    total, memory = re.search(r"total ([\d.]+) ms", out), re.search(r"RSS (\d+) MB", out)
+    if not total:
+        stop(f"{binary} printed no `total X ms`: {out[-300:]}")
+    return {"ms": float(total.group(1)), "MB": float(memory.group(1)) if memory else None}
+
+
+def time_gsnav(bench, ply, cameras, size, threads, repeats, cache, judged):
+    """Rows of bench_render by profile and threads, and the batch's of the most threads at 256x256."""
+    shape = f"{size[0]}x{size[1]}"
+    names = "|".join(f"openmp{t}/rgb/({'|'.join(PROFILES)})/{shape}/" for t in threads)
+    if judged and size == (256, 256):
+        names += f"|openmp{threads[-1]}/batch64/rgb/fast/{shape}/"
+    out = run([bench, f"--benchmark_filter=^({names})", "--benchmark_format=json"],
+              env={"GSNAV_BENCH_SCENE": ply, "GSNAV_BENCH_CAMERAS": cameras, "GSNAV_BENCH_REPEATS": str(repeats),
+                   "GSNAV_BENCH_REFERENCES": str(cache / "references"),
+                   **({} if judged else {"GSNAV_BENCH_TIMES_ONLY": "1"})})
+    rows = {}
+    for row in json.loads(out)["benchmarks"]:
+        backend, sensor, profile = row["name"].split("/")[:3]
+        key = "batch" if sensor == "batch64" else f"{profile} {backend.removeprefix('openmp')}"
+        rows[key] = {k: v for k, v in row.items() if isinstance(v, (int, float))}
+    return rows
+
+
+def best(rounds):
+    """Of rounds of one measurement the fastest: what disturbs only slows down. Only the first counts floor and error."""
+    first, fastest = rounds[0], min(rounds, key=lambda r: r.get("median_ms", r.get("ms", 0)))
+    out = {**first, **fastest}
+    for ratio in {"floor_ratio", "floor_ratio_best"} & first.keys():
+        out[ratio] = first[ratio] * fastest["median_ms"] / first["median_ms"]
+    return out
+
+
+def measure(options, scenes, baselines):
+    bench, rows = program(options.build, "bench_render"), []
+    for name, path, cameras in scenes:
+        ply = as_ply(options.build, name, path, options.cache)
+        for size in options.sizes:
+            busy = wait_until_quiet(options.quiet, f"{name} {size[0]}x{size[1]}")
+            begin, ours, theirs = time.monotonic(), {}, {}
+            for number in range(options.rounds):
+                turns = [*baselines, None]
+                turns = turns[number % len(turns):] + turns[:number % len(turns)]
+                for turn in turns:
+                    if turn is None:
+                        for k, v in time_gsnav(bench, ply, cameras, size, options.threads, options.repeats,
+                                               options.cache, number == 0).items():
+                            ours.setdefault(k, []).append(v)
+                    else:
+                        theirs.setdefault(turn[0], []).append(
+                            time_baseline(turn[1], ply, cameras, size, options.threads[-1], options.repeats))
+            rows.append({"scene": name, "size": f"{size[0]}x{size[1]}", "busy_before": busy,
+                         "gsnav": {k: best(v) for k, v in ours.items()},
+                         "baselines": {k: best(v) for k, v in theirs.items()}})
+            print(f"{name} {rows[-1]['size']}: {time.monotonic() - begin:.0f} s", file=sys.stderr, flush=True)
+    return rows
+
+
+def number(value, digits=3):
+    """Three significant digits, without an exponent."""
+    decimals = max(0, digits - len(str(int(abs(value)))))
+    return f"{value:.{min(decimals, 2)}f}"
+
+
+def table(rows, threads, baselines):
+    most = threads[-1]
+
+    def pair(row, key):
+        return " / ".join(number(row["gsnav"][f"{p} {most}"][key]) for p in PROFILES)
+
+    counts = " / ".join(map(str, threads))
+    head = ["scene", "size", *(f"{p}, ms on {counts} threads" for p in PROFILES), "times the floor",
+            *(f"{b}, ms (times gsnav's)" for b in baselines), "PSNR, dB", "memory, MB"]
+    lines = [" | ".join(head), "|".join(["---"] * 2 + ["---:"] * (len(head) - 2))]
+    for row in rows:
+        ours = row["gsnav"]
+        cells = [row["scene"], row["size"]]
+        cells += [" / ".join(number(ours[f"{p} {t}"]["median_ms"]) for t in threads) for p in PROFILES]
+        cells.append(pair(row, "floor_ratio"))
+        for b in baselines:
+            ms = row["baselines"][b]["ms"]
+            ratios = " / ".join(number(ms / ours[f"{p} {most}"]["median_ms"]) for p in PROFILES)
+            cells.append(f"{number(ms)} ({ratios})")
+        cells.append(" / ".join(f"{ours[f'{p} {most}']['rgb_psnr']:.0f}" for p in PROFILES))
+        fast = ours[f"fast {most}"]
+        cells.append(f"{fast['scene_MB'] + fast['scratch_MB']:.0f}")
+        lines.append(" | ".join(cells))
+    return "\n".join(f"| {line} |" if "---" not in line else f"|{line}|" for line in lines)
+
+
+def caption(options, baselines):
+    model = re.search(r"model name\s*: (.*)", pathlib.Path("/proc/cpuinfo").read_text())
+    text = (f"RGB, medians over all views, on {options.threads[-1]} cores of {model.group(1) if model else 'a processor'}"
+            f" where nothing else is said; of two numbers the first is `{PROFILES[0]}`, the second `{PROFILES[1]}`."
+            " The floor is what a frame's work would take at the measured bandwidth and clock and the best unit costs"
+            " known (`bench/floor.hpp`). PSNR: the worst of four views, against float64. Memory: scene and scratch.")
+    if baselines:
+        text += (f" {' and '.join(baselines).capitalize()}: throwaway AVX-512 baselines with the same near plane,"
+                 " guard band, cuts and stop.")
+    return "\n".join(textwrap.wrap(text, 110))
+
+
+def summary(rows, threads, baselines):
+    """What every row must hold, by the row that holds it least."""
+    most, lines = threads[-1], []
+
+    def worst(title, value, limit, at_most):
+        values = [(v, f"{r['scene']} {r['size']}") for r in rows if (v := value(r)) is not None]
+        if values:
+            v, where = (max if at_most else min)(values)
+            held, sign = (v <= limit, "<=") if at_most else (v >= limit, ">=")
+            lines.append(f"{'ok  ' if held else 'MISS'} {title}: {number(v)} ({where}), wanted {sign} {limit}")
+
+    def of(row, profile, key, t=most):
+        return row["gsnav"][f"{profile} {t}"][key]
+
+    for p in PROFILES:
+        worst(f"{p}, times the floor", lambda r: of(r, p, "floor_ratio"), 1.5, True)
+    worst("fast, PSNR", lambda r: of(r, "fast", "rgb_psnr"), 60, False)
+    worst("exact over fast", lambda r: of(r, "exact", "median_ms") / of(r, "fast", "median_ms"), 1.6, True)
+    worst(f"{threads[0]} to {most} threads, fast", lambda r: of(r, "fast", "median_ms", threads[0]) /
+          of(r, "fast", "median_ms"), 1.8, False)
+    for b in baselines:
+        if b in BASELINES:
+            worst(f"{b} over fast", lambda r: r["baselines"][b]["ms"] / of(r, "fast", "median_ms"),
+                  BASELINES[b].least_gain, False)
+    worst("batch of 64, frames a second", lambda r: r["gsnav"].get("batch", {}).get("gain"), 1.3, False)
+    worst("batch of 64, bits that differ", lambda r: r["gsnav"].get("batch", {}).get("bits_differ"), 0, True)
+    for size in dict.fromkeys(r["size"] for r in rows):
+        unit = [f"{r['scene']} {1e6 * of(r, 'fast', 'median_ms') / of(r, 'fast', 'visible+fragments'):.3f}"
+                for r in rows if r["size"] == size]
+        lines.append(f"ns a visible Gaussian or evaluated fragment at {size}: {', '.join(unit)}")
+    return "\n".join(lines)
+
+
+def put_into_readme(text):
+    readme = ROOT / "README.md"
+    old = readme.read_text()
+    if old.count(MARKS[0]) != 1 or old.count(MARKS[1]) != 1:
+        stop(f"README.md lacks the lines {MARKS[0]} and {MARKS[1]}")
+    head, rest = old.split(MARKS[0])
+    readme.write_text(head + MARKS[0] + "\n" + text + "\n" + MARKS[1] + rest.split(MARKS[1])[1])
+
+
+def parse_options():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, required=True,
+                        help="build folder with bench_render and gsnav-convert")
+    parser.add_argument("--scene", action="append", default=[], metavar="NAME=PATH:CAMERAS.json")
+    parser.add_argument("--only", default="", metavar="TEXT", help="only scenes with this in their name")
+    parser.add_argument("--baseline", action="append", default=[], metavar="NAME=BINARY",
+                        help="or NAME=SOURCE.cpp")
+    parser.add_argument("--no-baselines", action="store_true")
+    parser.add_argument("--sizes", default="256x256,640x480,1920x1080", help="of those that bench_render has")
+    parser.add_argument("--threads", default="1,2", help="of those that bench_render has")
+    parser.add_argument("--repeats", type=int, default=1, help="frames of each view")
+    parser.add_argument("--rounds", type=int, default=2, help="turns of all renderers, of which the fastest count")
+    parser.add_argument("--quiet", type=float, default=30, metavar="S",
+                        help="wait so long, size by size, for other programs to end")
+    parser.add_argument("--cache", type=pathlib.Path, help="default: BUILD/cpu_table")
+    parser.add_argument("--out", type=pathlib.Path, help="Markdown file; JSON beside it; default: CACHE/table.md")
+    parser.add_argument("--readme", action="store_true", help="replace the marked block of README.md")
+    options = parser.parse_args()
+    options.build = options.build.resolve()
+    if not (options.build / "CMakeCache.txt").exists():
+        stop(f"--build {options.build}: no build folder")
+    options.cache = (options.cache or options.build / "cpu_table").resolve()
+    options.cache.mkdir(parents=True, exist_ok=True)
+    options.out = options.out or options.cache / "table.md"
+    options.threads = sorted(int(t) for t in options.threads.split(","))
+    options.sizes = [tuple(int(n) for n in s.split("x")) for s in options.sizes.split(",")]
+    return options
+
+
+def main():
+    options = parse_options()
+    data = data_folder(options.build)
+    scenes = [parse_scene(s) for s in options.scene] or default_scenes(data, options.cache)
+    scenes = [s for s in scenes if options.only in s[0]]
+    if not scenes:
+        stop(f"no scene: {data} has none named so; name some by --scene")
+    folder = data.parent / "bench_scene" / "cpu_baseline"
+    there = [f"{n}={folder / b.source}" for n, b in BASELINES.items() if (folder / b.source).exists()]
+    named = options.baseline or there
+    baselines = [] if options.no_baselines else [parse_baseline(b, options.cache) for b in named]
+    rows = measure(options, scenes, baselines)
+    names = [b[0] for b in baselines]
+    text = caption(options, names) + "\n\n" + table(rows, options.threads, names)
+    options.out.write_text(text + "\n")
+    options.out.with_suffix(".json").write_text(json.dumps(rows, indent=1) + "\n")
+    print(text + "\n\n" + summary(rows, options.threads, names))
+    if options.readme:
+        put_into_readme(text)
+
+
+if __name__ == "__main__":
+    main()
