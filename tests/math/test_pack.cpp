@@ -126,7 +126,7 @@ TEST_CASE("packs go through memory in order") {
   check_memory<GSNAV_PACK_WIDTH>();
 }
 TEST_CASE("packs side by side are the packs") {
-  check_side_by_side<Exp2::degree6>();
+  check_side_by_side<Exp2::degree5>();
   check_side_by_side<Exp2::degree3>();
 }
 

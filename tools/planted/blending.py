@@ -40,7 +40,7 @@ PLANTS = [
     plant("alpha_not_limited", BLEND, "min(exp2_in_range<M>(exponent), L(rules.max_alpha))", "exp2_in_range<M>(exponent)",
           STACK_TEST, "N41_single_opaque"),
     plant("exp2_cubic", "include/gsnav/ops/render.hpp",
-          "config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree6", "Exp2::degree3",
+          "config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5", "Exp2::degree3",
           "tests/hard_cases/test_response.cpp", "N01_ewa_offaxis_grid", why="off by 1e-4 of alpha"),
     plant("color_summed_in_half", BLEND, "    state.r = fma(weight, L(color->r), state.r);\n",
           "    state.r = fma(weight, L(color->r), state.r);\n"

@@ -203,7 +203,7 @@ struct RasterArgs {
   View<const SplatPerspective<S>> perspectives;  ///< empty: Response::ewa
   BlendRules<S> rules;
   Vec3<S> background;
-  Exp2 exp2_method = Exp2::degree6;
+  Exp2 exp2_method = Exp2::degree5;
   FrameImages<S> images;
 
   GSNAV_HD DepthMode depth_mode() const noexcept {
@@ -291,11 +291,11 @@ template <class S, class F>
 void dispatch_raster(const RasterArgs<S>& args, const F& f) {
   const auto with_exp2 = [&]<bool C, DepthMode D>() {
     if (!args.perspectives.empty() || args.rules.exclusive_stop) {
-      f.template operator()<C, D, Exp2::degree6, true>();
+      f.template operator()<C, D, Exp2::degree5, true>();
     } else if (std::is_same_v<S, float> && args.exp2_method == Exp2::degree3) {
       f.template operator()<C, D, Exp2::degree3, false>();
     } else {
-      f.template operator()<C, D, Exp2::degree6, false>();
+      f.template operator()<C, D, Exp2::degree5, false>();
     }
   };
   const auto with_depth = [&]<bool C>() {

@@ -389,12 +389,12 @@ GSNAV_HD Pack<float, N> scale_by_rounded(Pack<float, N> p, Pack<float, N> t) noe
 }
 
 /// 2^x for x in [-126, 126], lane by lane the bits of the scalar exp2; of any other x: anything.
-template <Exp2 M = Exp2::degree6, int N>
+template <Exp2 M = Exp2::degree5, int N>
 GSNAV_HD Pack<float, N> exp2_in_range(Pack<float, N> x) noexcept {
   return detail::exp2_by_polynomial<M>(x);
 }
 /// 2^x, lane by lane the bits of the scalar exp2.
-template <Exp2 M = Exp2::degree6, int N>
+template <Exp2 M = Exp2::degree5, int N>
 GSNAV_HD Pack<float, N> exp2(Pack<float, N> x) noexcept {
   return exp2_in_range<M>(clamp(x, Pack<float, N>(-126.0f), Pack<float, N>(126.0f)));
 }
