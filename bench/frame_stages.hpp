@@ -74,7 +74,7 @@ class FrameStages {
     raster.colors = colors_.view();
     raster.rules = gsnav::blend_rules<S>(config_);
     raster.exp2_method =
-        config_.profile == gsnav::Profile::fast ? gsnav::Exp2::degree3 : gsnav::Exp2::degree6;
+        config_.profile == gsnav::Profile::fast ? gsnav::Exp2::degree3 : gsnav::Exp2::degree5;
     raster.images.rgb = images_.data();
     gsnav::detail::rasterize(*backend_, raster);
     sync();

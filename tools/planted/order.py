@@ -78,7 +78,6 @@ PLANTS = [
           "tx1 = (b.x1 - 1) >> shift", "tx1 = (b.x1 - 2) >> shift",
           FOOTPRINT, "N11_tile_cover_conservative"),
     plant("background_forgotten", "include/gsnav/kernels/blend.hpp",
-          "    out.r = fma(t, L(args.background.x), state.r);",
-          "    out.r = state.r;",
+          "return {fma(t, L(args.background.x), state.r),", "return {state.r,",
           KEYS, "N26_pair_count_zero"),
 ]

@@ -202,7 +202,7 @@ struct RasterArgs {
   View<const SplatPerspective<S>> perspectives;  ///< empty: Response::ewa
   BlendRules<S> rules;
   Vec3<S> background;
-  Exp2 exp2_method = Exp2::degree6;
+  Exp2 exp2_method = Exp2::degree5;
   FrameImages<S> images;
 
   GSNAV_HD DepthMode depth_mode() const noexcept {
@@ -219,31 +219,26 @@ struct RasterArgs {
   }
 };
 
-/// What a pixel (or a pack of them) ends as; the values of images that were not asked for mean nothing.
+/// What a pixel (or a pack of them) ends as.
+template <class S, class L>
+GSNAV_HD Vec3<L> pixel_color(const RasterArgs<S>& args, const BlendColor<L>& state) noexcept {
+  const L t = abs(state.transmittance);
+  return {fma(t, L(args.background.x), state.r), fma(t, L(args.background.y), state.g),
+          fma(t, L(args.background.z), state.b)};
+}
 template <class L>
-struct FinishedPixel {
-  L r{}, g{}, b{}, alpha{}, median{}, expected{}, accumulated{}, first_hit{};
-};
-
-template <class S, DepthMode D, class L>
-GSNAV_HD FinishedPixel<L> finish_pixel(const RasterArgs<S>& args, const BlendState<L, D>& state) noexcept {
-  FinishedPixel<L> out;
-  const L t = abs(state.transmittance), zero(S(0));
-  out.alpha = L(S(1)) - t;
-  if (args.images.rgb != nullptr) {
-    out.r = fma(t, L(args.background.x), state.r);
-    out.g = fma(t, L(args.background.y), state.g);
-    out.b = fma(t, L(args.background.z), state.b);
-  }
-  if constexpr (D != DepthMode::none) out.median = state.median;
-  if constexpr (D == DepthMode::any) {
-    const auto returned = out.alpha > L(args.rules.return_alpha);
-    out.expected =
-        select(returned, state.accumulated / select(returned, out.alpha, L(S(1))) + state.z_ref, zero);
-    out.accumulated = fma(out.alpha, state.z_ref, state.accumulated);
-    out.first_hit = state.first_hit;
-  }
-  return out;
+GSNAV_HD L pixel_alpha(const BlendColor<L>& state) noexcept {
+  return L(scalar_of<L>(1)) - abs(state.transmittance);
+}
+template <class S, class L>
+GSNAV_HD L pixel_expected_depth(const RasterArgs<S>& args, const BlendState<L, DepthMode::any>& state) noexcept {
+  const L alpha = pixel_alpha(state), one(S(1)), zero(S(0));
+  const auto returned = alpha > L(args.rules.return_alpha);
+  return select(returned, state.accumulated / select(returned, alpha, one) + state.z_ref, zero);
+}
+template <class L>
+GSNAV_HD L pixel_accumulated_depth(const BlendState<L, DepthMode::any>& state) noexcept {
+  return fma(pixel_alpha(state), state.z_ref, state.accumulated);
 }
 
 /// Writes a finished pixel.
@@ -251,17 +246,21 @@ template <class S, DepthMode D>
 GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
                           const BlendState<S, D>& state) noexcept {
   const FrameImages<S>& out = args.images;
-  const FinishedPixel<S> p = finish_pixel(args, state);
   if (out.rgb != nullptr) {
-    out.rgb[3 * pixel] = p.r;
-    out.rgb[3 * pixel + 1] = p.g;
-    out.rgb[3 * pixel + 2] = p.b;
+    const Vec3<S> color = pixel_color(args, state);
+    out.rgb[3 * pixel] = color.x;
+    out.rgb[3 * pixel + 1] = color.y;
+    out.rgb[3 * pixel + 2] = color.z;
   }
-  if (out.alpha != nullptr) out.alpha[pixel] = p.alpha;
-  if (out.median_depth != nullptr) out.median_depth[pixel] = p.median;
-  if (out.expected_depth != nullptr) out.expected_depth[pixel] = p.expected;
-  if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = p.accumulated;
-  if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = p.first_hit;
+  if (out.alpha != nullptr) out.alpha[pixel] = pixel_alpha(state);
+  if constexpr (D != DepthMode::none) {
+    if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
+  }
+  if constexpr (D == DepthMode::any) {
+    if (out.expected_depth != nullptr) out.expected_depth[pixel] = pixel_expected_depth(args, state);
+    if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = pixel_accumulated_depth(state);
+    if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
+  }
 }
 
 /// Blends one pixel: the generic fallback, one work item a pixel, on any backend and scalar.
@@ -291,11 +290,11 @@ template <class S, class F>
 void dispatch_raster(const RasterArgs<S>& args, const F& f) {
   const auto with_exp2 = [&]<bool C, DepthMode D>() {
     if (!args.perspectives.empty() || args.rules.exclusive_stop) {
-      f.template operator()<C, D, Exp2::degree6, true>();
+      f.template operator()<C, D, Exp2::degree5, true>();
     } else if (std::is_same_v<S, float> && args.exp2_method == Exp2::degree3) {
       f.template operator()<C, D, Exp2::degree3, false>();
     } else {
-      f.template operator()<C, D, Exp2::degree6, false>();
+      f.template operator()<C, D, Exp2::degree5, false>();
     }
   };
   const auto with_depth = [&]<bool C>() {

@@ -291,7 +291,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   raster.perspectives = ws.perspectives.view();
   raster.rules = blend_rules<S>(config);
   raster.background = vec_cast<S>(config.background);
-  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree6;
+  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
   raster.images = images;
   detail::rasterize(backend, raster);
 

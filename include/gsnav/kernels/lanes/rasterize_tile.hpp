@@ -73,7 +73,9 @@ class TileBlender {
   }
 
   void blend() noexcept {
+    prefetch_images();
     open_blocks();
+    for (int j = 0; j < kStride; ++j) rows_[j].number = static_cast<float>(j);
     rows_[kNothing] = {};
     const std::uint64_t end = args_.tile_offsets[tile_ + 1];
     for (std::uint64_t first = args_.tile_offsets[tile_]; first < end && open_count_ > 0; first += kBatch) {
@@ -101,6 +103,26 @@ class TileBlender {
   F pixel_x(int x) const noexcept { return lane_x_ + F(static_cast<float>(tile_x_ + x)); }
   F pixel_y(int y) const noexcept { return lane_y_ + F(static_cast<float>(tile_y_ + y)); }
 
+  /// The tile's rows are far apart in an image, and come in while it is blended.
+  void prefetch_images() const noexcept {
+    const FrameImages<float>& out = args_.images;
+    const auto prefetch = [this](const float* image, std::size_t values) {
+      if (image == nullptr) return;
+      for (int y = tile_y_; y < tile_y_ + tile_size_ && y < args_.grid.height; ++y) {
+        const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(args_.grid.width) +
+                                  static_cast<std::size_t>(tile_x_);
+        constexpr std::size_t kLine = 16;
+        for (std::size_t x = 0; x < values * static_cast<std::size_t>(tile_size_); x += kLine) {
+          __builtin_prefetch(image + values * first + x, 0, 2);
+        }
+      }
+    };
+    prefetch(out.rgb, 3);
+    for (const float* image : {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth, out.first_hit_depth}) {
+      prefetch(image, 1);
+    }
+  }
+
   void open_blocks() noexcept {
     for_each_block([this](int block, int x, int y) {
       const auto inside = (pixel_x(x) < F(static_cast<float>(args_.grid.width))) &&
@@ -118,35 +140,31 @@ class TileBlender {
   void load_batch(std::uint64_t first, int n) noexcept {
     const std::uint32_t* ids = args_.tile_splats.data + first;
     // Records lie in file order, not in the tile's: asked for early, they are there when needed.
-    constexpr int kAhead = 8;
+    constexpr std::uint64_t kAhead = 16;
+    const std::uint64_t left = args_.tile_splats.size - first;
     for (int j = 0; j < n; ++j) {
-      if (j + kAhead < n) {
-        __builtin_prefetch(&args_.geometry[ids[j + kAhead]]);
-        if constexpr (Color) __builtin_prefetch(&args_.colors[ids[j + kAhead]]);
+      if (static_cast<std::uint64_t>(j) + kAhead < left) {
+        const std::uint32_t next = ids[static_cast<std::uint64_t>(j) + kAhead];
+        __builtin_prefetch(&args_.geometry[next]);
+        if constexpr (Color) __builtin_prefetch(&args_.colors[next]);
       }
-      const SplatGeometry<float> g = geometry_[j] = args_.geometry[ids[j]];
-      Row& row = rows_[j];
-      row.ref_y = g.ref_y;
-      row.b = g.b;
-      if constexpr (Color) row.color = args_.colors[ids[j]];
-      row.number = static_cast<float>(j);
+      const SplatGeometry<float>& g = args_.geometry[ids[j]];
+      geometry_[j] = g;
+      rows_[j].ref_y = g.ref_y;
+      rows_[j].b = g.b;
+      if constexpr (Color) rows_[j].color = args_.colors[ids[j]];
       if constexpr (kNeedsId) ids_[j] = ids[j];
     }
-    for (int j = n; j % kWidth != 0; ++j) geometry_[j] = {};  // lanes that are left out
     if constexpr (kNeedsId) ids_[kNothing] = ids[0];           // any depth will do
-    std::memset(lists_.counts, 0, sizeof lists_.counts);
     if (General && !args_.perspectives.empty()) {  // the footprint is no ellipse: every open block
       for_each_block([&](int block, int, int) {
-        for (int j = 0; open_[block] && j < n; ++j) {
-          lists_.splats[block][lists_.counts[block]++] = static_cast<std::uint8_t>(j);
-        }
+        lists_.counts[block] = open_[block] ? n : 0;
+        for (int j = 0; j < lists_.counts[block]; ++j) lists_.splats[block][j] = static_cast<std::uint8_t>(j);
       });
       return;
     }
-    for (int j = 0; j < n; j += kWidth) {
-      const std::uint32_t lanes = n - j >= kWidth ? ~0u : (1u << (n - j)) - 1u;
-      list_blocks(&geometry_[0], j, lanes, args_.rules.log2_alpha_min, tile_x_, tile_y_, tile_size_, open_, lists_);
-    }
+    for (int j = n; j % kWidth != 0; ++j) geometry_[j] = {};  // lanes that are left out
+    list_blocks(&geometry_[0], n, args_.rules.log2_alpha_min, tile_x_, tile_y_, tile_size_, open_, lists_);
     if constexpr (General) return;
     float x[kWidth];
     for (int l = 0; l < kWidth; ++l) x[l] = static_cast<float>(l) + 0.5f;
@@ -197,8 +215,8 @@ class TileBlender {
         using Group = Packs<F, kGroup>;
         const std::uint8_t* const j = list + i;
         const auto gather = [&](const auto& value) { return Group::of([&](int k) { return value(j[k]); }); };
-        const ColumnTerms<Group> terms{gather([&](int s) { return F::load_repeated<kBlockWidth>(columns[s].column + at); }),
-                                       gather([&](int s) { return F::load_repeated<kBlockWidth>(columns[s].w2 + at); })};
+        const ColumnTerms<Group> terms{gather([&](int s) { return load_repeated<kBlockWidth, kWidth>(columns[s].column + at); }),
+                                       gather([&](int s) { return load_repeated<kBlockWidth, kWidth>(columns[s].w2 + at); })};
         const Group alpha = footprint_alpha<M>(
             rules, column_exponent(terms, gather([&](int s) { return F(rows[s].ref_y); }),
                                    gather([&](int s) { return F(rows[s].b); }), Group(py)));
@@ -225,18 +243,27 @@ class TileBlender {
   }
 
   void write() noexcept {
+    const FrameImages<float>& out = args_.images;
     const int blocks = tile_size_ / kBlockWidth;
-    for (int y = 0, first = 0; y < tile_size_ && tile_y_ + y < args_.grid.height; y += kBlockHeight, first += blocks) {
-      write_block_row(args_, tile_x_, tile_y_ + y, [this, first](int block) {
-        if constexpr (D == DepthMode::median) {
-          BlendState<F, D> state;
-          static_cast<BlendColor<F>&>(state) = states_[first + block];
-          state.median = medians_[first + block];
-          return state;
-        } else {
-          return states_[first + block];
+    for (int y = 0, row = 0; y < tile_size_ && tile_y_ + y < args_.grid.height; y += kBlockHeight, row += blocks) {
+      for (int x = 0; x < tile_size_ && tile_x_ + x < args_.grid.width; x += kWidth) {
+        const BlockRow place(args_.grid, tile_x_ + x, tile_y_ + y, tile_x_ + tile_size_);
+        // A small tile's rows are filled up with any block.
+        const auto block = [&](int i) { return row + (x / kBlockWidth + i) % blocks; };
+        if constexpr (Color) {
+          write_color(place, out.rgb, [&](int i) { return pixel_color(args_, states_[block(i)]); });
         }
-      });
+        write_plane(place, out.alpha, [&](int i) { return pixel_alpha(states_[block(i)]); });
+        if constexpr (D == DepthMode::median) {
+          write_plane(place, out.median_depth, [&](int i) { return medians_[block(i)]; });
+        }
+        if constexpr (D == DepthMode::any) {
+          write_plane(place, out.median_depth, [&](int i) { return states_[block(i)].median; });
+          write_plane(place, out.expected_depth, [&](int i) { return pixel_expected_depth(args_, states_[block(i)]); });
+          write_plane(place, out.accumulated_depth, [&](int i) { return pixel_accumulated_depth(states_[block(i)]); });
+          write_plane(place, out.first_hit_depth, [&](int i) { return states_[block(i)].first_hit; });
+        }
+      }
     }
   }
 
