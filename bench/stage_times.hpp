@@ -104,11 +104,8 @@ class TimedBackend : public Base {
                          std::is_same_v<F, gsnav::ScanTileIntersections<S>> ||
                          std::is_same_v<F, gsnav::ScatterTileIntersections<S>>) {
       return Stage::bin;
-    } else if constexpr (std::is_same_v<F, gsnav::detail::RadixHistogram> ||
-                         std::is_same_v<F, gsnav::detail::RadixOffsets> ||
-                         std::is_same_v<F, gsnav::detail::RadixScatter> ||
-                         std::is_same_v<F, gsnav::detail::GatherVisible> ||
-                         std::is_same_v<F, gsnav::detail::RankTies>) {
+    } else if constexpr (requires(const F& f) { f.digit; } ||
+                         std::is_same_v<F, gsnav::detail::RankTiesOfRange>) {  // passes of the radix sort
       return Stage::sort;
     } else {
       return Stage::other;

@@ -16,6 +16,7 @@
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/order_visible.hpp"
 #include "gsnav/ops/render_config.hpp"
 
 namespace gsnav {
@@ -32,8 +33,7 @@ template <class S, Backend B>
 struct RenderWorkspace {
   explicit RenderWorkspace(B& b)
       : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
-        chunk_keys(b), ranks(b), counts(b), keys(b), order(b), sort(b), cursors(b), tile_offsets(b),
-        tile_splats(b), spans(b) {}
+        visible(b), cursors(b), tile_offsets(b), tile_splats(b), spans(b) {}
 
   Buffer<Vec3<float>, B> offsets_f;
   Buffer<Vec3d, B> offsets;
@@ -42,87 +42,22 @@ struct RenderWorkspace {
   Buffer<SplatDepth<S>, B> depths;
   Buffer<SplatPerspective<S>, B> perspectives;
   Buffer<SplatBounds, B> bounds;
-  Buffer<std::uint32_t, B> chunk_keys, ranks, counts, keys, order;
-  SortScratch<B> sort;
+  VisibleOrder<B> visible;
   Buffer<std::uint64_t, B> cursors, tile_offsets;
   Buffer<std::uint32_t, B> tile_splats;
   Buffer<TileSpans, B> spans;
-  std::vector<std::uint32_t> host_counts;
-  std::vector<std::uint64_t> host_chunk_offsets;
   std::vector<Vec3<float>> host_offsets_f;
   std::vector<Vec3d> host_offsets;
 
   std::size_t bytes() const noexcept {
     return offsets_f.capacity_bytes() + offsets.capacity_bytes() + geometry.capacity_bytes() +
            colors.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
-           bounds.capacity_bytes() +
-           chunk_keys.capacity_bytes() + ranks.capacity_bytes() + counts.capacity_bytes() + keys.capacity_bytes() +
-           order.capacity_bytes() + sort.bytes() + cursors.capacity_bytes() +
+           bounds.capacity_bytes() + visible.bytes() + cursors.capacity_bytes() +
            tile_offsets.capacity_bytes() + tile_splats.capacity_bytes() + spans.capacity_bytes();
   }
 };
 
 namespace detail {
-
-/// Moves the survivors of the chunks into one list: (key, slot) pairs in stable id order.
-struct GatherVisible {
-  View<const std::uint32_t> chunk_keys, counts;
-  View<const std::uint64_t> chunk_offsets;
-  View<std::uint32_t> keys, order;
-  GSNAV_HD void operator()(std::size_t chunk) const noexcept {
-    const std::size_t from = chunk * kProjectChunk, to = chunk_offsets[chunk];
-    for (std::size_t i = 0; i < counts[chunk]; ++i) {
-      keys[to + i] = chunk_keys[from + i];
-      order[to + i] = static_cast<std::uint32_t>(from + i);
-    }
-  }
-};
-
-/// The same with one work item a slot, for backends of very many threads.
-struct GatherSlot {
-  GatherVisible gather;
-  GSNAV_HD void operator()(std::size_t slot) const noexcept {
-    const std::size_t chunk = slot / kProjectChunk, i = slot % kProjectChunk;
-    if (i >= gather.counts[chunk]) return;
-    const std::size_t to = gather.chunk_offsets[chunk] + i;
-    gather.keys[to] = gather.chunk_keys[slot];
-    gather.order[to] = static_cast<std::uint32_t>(slot);
-  }
-};
-
-/// Sorts the slots of equal keys by rank: work item i does the run that starts at i.
-struct RankTies {
-  View<const std::uint32_t> keys, ranks;
-  View<std::uint32_t> order;
-  GSNAV_HD void operator()(std::size_t i) const noexcept {
-    const std::size_t n = keys.size;
-    if (i + 1 >= n || keys[i + 1] != keys[i] || (i > 0 && keys[i - 1] == keys[i])) return;
-    std::size_t end = i + 2;
-    while (end < n && keys[end] == keys[i]) ++end;
-    heap_sort(order.data + i, end - i);
-  }
-
- private:
-  /// Ties are few, but a wall across the view may be one: n log n, in place, and no recursion.
-  GSNAV_HD void heap_sort(std::uint32_t* slots, std::size_t n) const noexcept {
-    for (std::size_t root = n / 2; root-- > 0;) sift_down(slots, root, n);
-    for (std::size_t end = n; end-- > 1;) {
-      const std::uint32_t last = slots[end];
-      slots[end] = slots[0];
-      slots[0] = last;
-      sift_down(slots, 0, end);
-    }
-  }
-  GSNAV_HD void sift_down(std::uint32_t* slots, std::size_t root, std::size_t n) const noexcept {
-    const std::uint32_t slot = slots[root];
-    for (std::size_t child; (child = 2 * root + 1) < n; root = child) {
-      if (child + 1 < n && ranks[slots[child + 1]] > ranks[slots[child]]) ++child;
-      if (ranks[slots[child]] <= ranks[slot]) break;
-      slots[root] = slots[child];
-    }
-    slots[root] = slot;
-  }
-};
 
 /// One work item per row of pixels: enough parallelism on a CPU at little overhead.
 template <class S, class PixelKernel>
@@ -242,12 +177,12 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   // ---- project
   ws.geometry.resize_discard(slots);
   ws.bounds.resize_discard(slots);
-  ws.chunk_keys.resize_discard(slots);
-  ws.ranks.resize_discard(ranked ? slots : 0);
+  ws.visible.chunk_keys.resize_discard(slots);
+  ws.visible.ranks.resize_discard(ranked ? slots : 0);
   ws.colors.resize_discard(color ? slots : 0);
   ws.depths.resize_discard(depth ? slots : 0);
   ws.perspectives.resize_discard(config.response != Response::ewa ? slots : 0);
-  ws.counts.resize_discard(chunks);
+  ws.visible.counts.resize_discard(chunks);
   constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
   ws.spans.resize_discard(kSpans ? slots : 0);
   const TileGrid grid = TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
@@ -268,6 +203,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.offsets_f.upload(ws.host_offsets_f.data(), origins);
 
   std::size_t first_chunk = 0, first_origin = 0, first_rank = 0;
+  float near_plane = 0;
   for (std::size_t i = 0; i < sets.size(); ++i) {
     const std::size_t n = sets[i].gaussians.origins.empty() ? 1 : sets[i].gaussians.origins.size;
     ProjectArgs<S> args;
@@ -286,9 +222,9 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
     args.depths = ws.depths.view();
     args.perspectives = ws.perspectives.view();
     args.bounds = ws.bounds.view();
-    args.keys = ws.chunk_keys.view();
-    args.ranks = ws.ranks.view();
-    args.counts = ws.counts.view();
+    args.keys = ws.visible.chunk_keys.view();
+    args.ranks = ws.visible.ranks.view();
+    args.counts = ws.visible.counts.view();
     args.grid = grid;
     args.spans = ws.spans.view();
     if constexpr (requires { backend.project(args); }) {
@@ -296,40 +232,23 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
     } else {
       backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
     }
+    near_plane = args.camera.near_plane;  // the same for all sets
     first_chunk += args.chunk_count();
     first_rank += args.gaussians.size;
     first_origin += n;
   }
 
-  // ---- compact and sort
-  ws.host_counts.resize(chunks);
-  ws.counts.download(ws.host_counts.data(), chunks);
-  if (Status s = backend.synchronize(); !s) return s;
-  ws.host_chunk_offsets.resize(chunks);
-  std::uint64_t visible = 0;
-  for (std::size_t c = 0; c < chunks; ++c) {
-    ws.host_chunk_offsets[c] = visible;
-    visible += ws.host_counts[c];
-  }
-  ws.keys.resize_discard(visible);
-  ws.order.resize_discard(visible);
-  ws.cursors.upload(ws.host_chunk_offsets.data(), chunks);
-  const detail::GatherVisible gather{ws.chunk_keys.view(), ws.counts.view(), ws.cursors.view(),
-                                     ws.keys.view(), ws.order.view()};
-  if constexpr (is_host_backend<B>) {
-    backend.parallel_for(chunks, gather);
-  } else {
-    backend.parallel_for(slots, detail::GatherSlot{gather});
-  }
-  sort_pairs(backend, ws.keys, ws.order, ws.sort, config.key_bits);
-  if (ranked) {
-    backend.parallel_for(visible, detail::RankTies{ws.keys.view(), ws.ranks.view(), ws.order.view()});
-  }
+  // ---- sort
+  // Distances may round to below the near plane that their z is beyond, but not to half of it.
+  const std::uint32_t base = config.key_bits < 32 ? 0 : bits_of(0.5f * near_plane);
+  const Result<std::size_t> ordered = order_visible(backend, ws.visible, base, config.key_bits);
+  if (!ordered) return ordered.status();
+  const std::size_t visible = ordered.value();
 
   // ---- bin
   BinArgs<S> bin;
   bin.grid = grid;
-  bin.order = ws.order.view();
+  bin.order = ws.visible.order.view();
   bin.geometry = ws.geometry.view();
   bin.bounds = ws.bounds.view();
   bin.log2_alpha_min = static_cast<S>(std::log2(config.alpha_min));
