@@ -15,6 +15,7 @@
 #include "gsnav/core/host_memory.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/capsule_batch.hpp"
 #include "gsnav/kernels/lbs.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
@@ -33,6 +34,8 @@ struct LaneKernels {
   void (*scatter_tiles)(const BinArgs<float>&, std::size_t block) noexcept;
   void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
   void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  void (*gap_range)(const CapsuleGapArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  void (*sweep_range)(const SweepArgs<float>&, std::size_t begin, std::size_t end) noexcept;
 };
 
 #if defined(GSNAV_OPENMP_COMPILED)
@@ -44,7 +47,8 @@ namespace lanes {
 inline namespace GSNAV_LANES_TAG {
 inline const LaneKernels& native_kernels() noexcept {
   static const LaneKernels k{"native",      kWidth,         &project_chunk,
-                             &count_tiles,  &scatter_tiles, &rasterize_tile_any, &skin_range};
+                             &count_tiles,  &scatter_tiles, &rasterize_tile_any, &skin_range,
+                             &gap_range,    &sweep_range};
   return k;
 }
 }  // namespace GSNAV_LANES_TAG
@@ -114,15 +118,23 @@ class OpenMPBackend : public HostMemory {
   }
   /// Optional member: skinning in lanes.
   void skin(const SkinningArgs<float>& args) {
+    in_ranges(args, lane_kernels().skin_range);
+  }
+  /// Optional members: gaps and sweeps of capsules in lanes.
+  void capsule_gaps(const CapsuleGapArgs<float>& args) { in_ranges(args, lane_kernels().gap_range); }
+  void sweep_capsules(const SweepArgs<float>& args) { in_ranges(args, lane_kernels().sweep_range); }
+
+ private:
+  /// kernel(args, begin, end) over all of args.size().
+  template <class Args>
+  void in_ranges(const Args& args, void (*kernel)(const Args&, std::size_t, std::size_t) noexcept) {
     constexpr std::size_t kRange = 1024;
-    const auto kernel = lane_kernels().skin_range;
     const std::size_t n = args.size();
     parallel_for((n + kRange - 1) / kRange, [&args, kernel, n](std::size_t r) {
       kernel(args, r * kRange, (r + 1) * kRange < n ? (r + 1) * kRange : n);
     });
   }
 
- private:
   static int default_threads() noexcept {
 #if defined(_OPENMP)
     return omp_get_max_threads();
