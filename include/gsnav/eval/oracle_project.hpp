@@ -73,10 +73,10 @@ inline PixelRect pixels_within(const ProjectionCamera<double>& camera, double ce
   gsnav::detail::pixel_range(center_x, half_x, camera.width, x0, x1);
   gsnav::detail::pixel_range(center_y, half_y, camera.height, y0, y1);
   PixelRect r;
-  r.x0 = static_cast<int>(x0);
-  r.x1 = static_cast<int>(x1);
-  r.y0 = static_cast<int>(y0);
-  r.y1 = static_cast<int>(y1);
+  r.x0 = static_cast<std::int32_t>(x0);
+  r.x1 = static_cast<std::int32_t>(x1);
+  r.y0 = static_cast<std::int32_t>(y0);
+  r.y1 = static_cast<std::int32_t>(y1);
   return r;
 }
 

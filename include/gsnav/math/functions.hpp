@@ -129,28 +129,37 @@ inline constexpr float kRoundMagic = 12582912.0f;
 
 }  // namespace detail
 
+/// p 2^n for a positive p and the t = n + detail::kRoundMagic of an integer n; no check for overflow.
+GSNAV_HD float scale_by_rounded(float p, float t) noexcept { return float_of_bits(bits_of(p) + (bits_of(t) << 23)); }
+
+namespace detail {
+template <Exp2 M, class L>
+GSNAV_HD L exp2_by_polynomial(L x) noexcept {
+  const L t = x + L(kRoundMagic);
+  const L f = x - (t - L(kRoundMagic));
+  if constexpr (M == Exp2::degree6) return scale_by_rounded(exp2_degree6(f), t);
+  return scale_by_rounded(exp2_degree3(f), t);
+}
+}  // namespace detail
+
+/// 2^x for x in [-126, 126], without the clamp of exp2; of any other x in float: anything.
+template <Exp2 M = Exp2::degree6>
+GSNAV_HD float exp2_in_range(float x) noexcept {
+  return detail::exp2_by_polynomial<M>(x);
+}
 /// 2^x. In float: x is clamped to [-126, 126], the integer part goes into the exponent and a
 /// polynomial does the rest; every step is a correctly rounded operation, so all backends agree on
 /// the bits. In double and long double: the platform's.
-/// The same bits for x <= 126, without the clamp that such x do not need.
-template <Exp2 M = Exp2::degree6>
-GSNAV_HD float exp2_of_nonpositive(float x) noexcept {
-  x = max(x, -126.0f);
-  const float t = x + detail::kRoundMagic;
-  const float f = x - (t - detail::kRoundMagic);
-  const float p = M == Exp2::degree6 ? detail::exp2_degree6(f) : detail::exp2_degree3(f);
-  return float_of_bits(bits_of(p) + (bits_of(t) << 23));
-}
 template <Exp2 M = Exp2::degree6>
 GSNAV_HD float exp2(float x) noexcept {
-  return exp2_of_nonpositive<M>(min(x, 126.0f));
+  return exp2_in_range<M>(clamp(x, -126.0f, 126.0f));
 }
 template <Exp2 = Exp2::degree6>
 GSNAV_HD double exp2(double x) noexcept {
   return ::exp2(x);
 }
 template <Exp2 = Exp2::degree6>
-GSNAV_HD double exp2_of_nonpositive(double x) noexcept {
+GSNAV_HD double exp2_in_range(double x) noexcept {
   return ::exp2(x);
 }
 #if !defined(__CUDACC__)
@@ -159,7 +168,7 @@ GSNAV_HD long double exp2(long double x) noexcept {
   return ::exp2l(x);
 }
 template <Exp2 = Exp2::degree6>
-GSNAV_HD long double exp2_of_nonpositive(long double x) noexcept {
+GSNAV_HD long double exp2_in_range(long double x) noexcept {
   return ::exp2l(x);
 }
 #endif

@@ -5,8 +5,10 @@
 #error "math/pack.hpp is host code: nvcc has no vector types in device functions"
 #endif
 
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 #if defined(__SSE2__)
 #include <immintrin.h>
@@ -123,6 +125,24 @@ struct Pack<float, N> {
     Pack r;
     std::memcpy(&r.v, p, sizeof r.v);
     return r;
+  }
+  /// Reads K floats from any address, and repeats them: lane i holds p[i % K].
+  template <int K>
+  GSNAV_HD static Pack load_repeated(const float* p) noexcept {
+    if constexpr (K == N) return load(p);
+#if defined(__AVX512F__)
+    if constexpr (N == 16 && K == 4) {
+      return Pack(reinterpret_cast<vector>(_mm512_maskz_broadcast_f32x4(static_cast<__mmask16>(-1), _mm_loadu_ps(p))));
+    }
+#endif
+#if defined(__AVX__)
+    if constexpr (N == 8 && K == 4) {
+      return Pack(reinterpret_cast<vector>(_mm256_broadcast_ps(reinterpret_cast<const __m128*>(p))));
+    }
+#endif
+    float lanes[N];
+    for (int i = 0; i < N; ++i) lanes[i] = p[i % K];
+    return load(lanes);
   }
   GSNAV_HD void store(float* p) const noexcept { std::memcpy(p, &v, sizeof v); }
   GSNAV_HD float operator[](int i) const noexcept { return v[i]; }
@@ -357,20 +377,20 @@ GSNAV_HD Pack<float, N> fma(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c
   return r;
 }
 
-/// 2^x for x <= 126, lane by lane the bits of the scalar exp2.
+template <int N>
+GSNAV_HD Pack<float, N> scale_by_rounded(Pack<float, N> p, Pack<float, N> t) noexcept {
+  return Pack<float, N>(detail::floats<N>(detail::bits<N>(p.v) + (detail::bits<N>(t.v) << 23)));
+}
+
+/// 2^x for x in [-126, 126], lane by lane the bits of the scalar exp2; of any other x: anything.
 template <Exp2 M = Exp2::degree6, int N>
-GSNAV_HD Pack<float, N> exp2_of_nonpositive(Pack<float, N> x) noexcept {
-  using P = Pack<float, N>;
-  x = max(x, P(-126.0f));
-  const P t = x + P(detail::kRoundMagic);
-  const P f = x - (t - P(detail::kRoundMagic));
-  const P p = M == Exp2::degree6 ? detail::exp2_degree6(f) : detail::exp2_degree3(f);
-  return P(detail::floats<N>(detail::bits<N>(p.v) + (detail::bits<N>(t.v) << 23)));
+GSNAV_HD Pack<float, N> exp2_in_range(Pack<float, N> x) noexcept {
+  return detail::exp2_by_polynomial<M>(x);
 }
 /// 2^x, lane by lane the bits of the scalar exp2.
 template <Exp2 M = Exp2::degree6, int N>
 GSNAV_HD Pack<float, N> exp2(Pack<float, N> x) noexcept {
-  return exp2_of_nonpositive<M>(min(x, Pack<float, N>(126.0f)));
+  return exp2_in_range<M>(clamp(x, Pack<float, N>(-126.0f), Pack<float, N>(126.0f)));
 }
 
 /// log2(x), lane by lane the bits of the scalar log2.
@@ -384,6 +404,32 @@ GSNAV_HD Pack<float, N> log2(Pack<float, N> x) noexcept {
   P exponent;
   exponent.v = __builtin_convertvector(e, typename P::vector);
   return detail::log2_from_ratio(t, exponent);
+}
+
+namespace detail {
+/// Lane l of the K-th pack of interleaved triples comes from pixel (K N + l) / 3. Step 0 places the first and
+/// second of each triple, step 1 the third.
+template <int N, int K, int Step>
+constexpr int interleaved_lane(int l) noexcept {
+  const int pixel = (K * N + l) / 3, component = (K * N + l) % 3;
+  if (Step == 0) return component == 1 ? N + pixel : pixel;
+  return component == 2 ? N + pixel : l;
+}
+template <int K, int N, std::size_t... Lane>
+GSNAV_HD Pack<float, N> interleaved(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c,
+                                    std::index_sequence<Lane...>) noexcept {
+  const auto ab = __builtin_shufflevector(a.v, b.v, interleaved_lane<N, K, 0>(static_cast<int>(Lane))...);
+  return Pack<float, N>(__builtin_shufflevector(ab, c.v, interleaved_lane<N, K, 1>(static_cast<int>(Lane))...));
+}
+}  // namespace detail
+
+/// Writes a[0], b[0], c[0], a[1], ...: 3 N floats.
+template <int N>
+GSNAV_HD void store_interleaved(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c, float* out) noexcept {
+  constexpr auto lanes = std::make_index_sequence<static_cast<std::size_t>(N)>{};
+  detail::interleaved<0>(a, b, c, lanes).store(out);
+  detail::interleaved<1>(a, b, c, lanes).store(out + N);
+  detail::interleaved<2>(a, b, c, lanes).store(out + 2 * N);
 }
 
 /// Writes first + l for each lane l of `bits`, in order, and returns how many. Up to N bytes from `out` on

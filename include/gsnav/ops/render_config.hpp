@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -99,7 +100,8 @@ BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
   r.max_alpha = static_cast<S>(c.max_alpha);
   r.transmittance_min = static_cast<S>(c.transmittance_min);
   r.first_hit_tau = static_cast<S>(c.first_hit_tau);
-  r.log2_alpha_min = static_cast<S>(std::log2(c.alpha_min));
+  // What float's exp2 reaches.
+  r.log2_alpha_min = static_cast<S>(std::max(std::log2(c.alpha_min), -126.0));
   r.exclusive_stop = c.compat != Compat::none;
   // gsplat stops at T <= T_min where INRIA stops at T < T_min.
   if (c.compat == Compat::gsplat) r.transmittance_min = std::nextafter(r.transmittance_min, S(1));

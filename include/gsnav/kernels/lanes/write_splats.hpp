@@ -100,10 +100,12 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
       F left, right;
       const auto covered = footprint.columns(max(top, y0) + half, (min(next, y1) - one) + half, left, right);
       // The padding of left and right is more than what rounding to a pixel may lose.
-      const F first = tile_of(clamp(left + half, x0, x1)), last = truncated(clamp(right + half, x0, x1)) - one;
-      const auto none = !(covered && (last >= x0) && (F(static_cast<float>(r)) < rows));
+      const F first = tile_of(clamp(left + half, x0, x1)), edge = truncated(clamp(right + half, x0, x1)) - one;
+      const F last = tile_of(edge);
+      // Between two columns of centres a strip may have none: edge < x0, or first behind last.
+      const auto none = !(covered && (edge >= x0) && (first <= last) && (F(static_cast<float>(r)) < rows));
       begin = select(none, zero, first - tx0);
-      end = select(none, zero, (tile_of(last) - tx0) + one);
+      end = select(none, zero, (last - tx0) + one);
       if (r == 0) {
         begin = select(single, zero, begin);
         end = select(single, one, end);
