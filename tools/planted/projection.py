@@ -91,7 +91,7 @@ PLANTS = [
           "    slope_u = L(S(0)) * inv;\n",
           RESPONSE, "N02_exact_ray_grid"),
     plant("ray_drawn_behind", BLEND,
-          "return select(f > L(S(0)), exponent, L(-std::numeric_limits<S>::infinity()));", "return exponent;",
+          "return select(f > L(S(0)), exponent, L(S(-1e30)));", "return exponent;",
           FOOTPRINT, "N11_tile_cover_conservative"),
     Plant("near_inclusive",
           (Edit(PROJECTION, "(key_z > F(camera.near_plane)) &&", "(key_z >= F(camera.near_plane)) &&"),

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/depth.hpp"
@@ -100,7 +99,7 @@ GSNAV_HD L column_exponent(const ColumnTerms<L>& terms, L ref_y, L b, L py) noex
   return fma(-w2, w2, terms.column);
 }
 
-/// log2 alpha where the response is not linearised (Response): -infinity behind the camera.
+/// log2 alpha where the response is not linearised (Response): far below any that is drawn behind the camera.
 template <class L, class S>
 GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspective<S>& v, L px, L py) noexcept {
   const L dx = px - L(g.ref_x), dy = py - L(g.ref_y);
@@ -109,7 +108,7 @@ GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspectiv
   const L s = fma(w2, w2, w1 * w1);
   const L f = fma(dx, L(v.fx), fma(dy, L(v.fy), L(v.f0)));
   const L exponent = L(g.log2_opacity) - s / fma(f, f, L(v.c) * s);
-  return select(f > L(S(0)), exponent, L(-std::numeric_limits<S>::infinity()));
+  return select(f > L(S(0)), exponent, L(S(-1e30)));
 }
 
 /// Alpha of log2 alpha: 0 outside the footprint, which is alpha >= 2^log2_alpha_min. The exponent decides it,

@@ -172,6 +172,20 @@ struct SweepResult {
 
 namespace detail {
 
+/// When the first of four separations, each closing at its own speed, is down to `to`; `never` where none closes.
+template <class L>
+GSNAV_HD L time_to_gap(const L (&sep)[4], const L (&closing)[4], L to, L never) noexcept {
+  using S = scalar_of<L>;
+  const L zero(S(0)), one(S(1));
+  L dt = never;
+  for (int k = 0; k < 4; ++k) {
+    const auto nears = closing[k] > zero;
+    const L q = max(sep[k] - to, zero) / select(nears, closing[k], one);
+    dt = min(dt, select(nears, q, never));
+  }
+  return dt;
+}
+
 /// `sweep`, up to `steps` evaluations of it: lanes that are not in `unfinished` have their result.
 template <class L, class S = scalar_of<L>>
 GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
@@ -215,16 +229,7 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
       closing[k] = na[ia] - nb[ib] + growth;
       fastest = max(fastest, closing[k]);
     }
-    const auto advance = [&](L to) {
-      L dt = never;
-      for (int k = 0; k < 4; ++k) {
-        const auto nears = closing[k] > zero;
-        const L q = max(sep[k] - to, zero) / select(nears, closing[k], one);
-        dt = min(dt, select(nears, q, never));
-      }
-      return dt;
-    };
-    L dt = advance(floor);
+    L dt = detail::time_to_gap(sep, closing, floor, never);
     const auto done = t + dt >= one;
     const auto arrived = active && !done && (gap - floor <= tolerance);
     const auto agent_closes = max(na[0], na[1]) + agent_growth > slack;
@@ -252,7 +257,7 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
     out.pushed = out.pushed || pushed;
     if (any(pushed)) {
       floor = select(pushed, gap - max(skin, abs(gap) * L(S(0.25))), floor);
-      dt = select(pushed, advance(floor), dt);
+      dt = select(pushed, detail::time_to_gap(sep, closing, floor, never), dt);
     }
     const auto finished = active && (done || last || (t + dt >= one));
     out.gap = select(finished && !out.hit, gap, out.gap);

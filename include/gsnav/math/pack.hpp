@@ -40,16 +40,19 @@ template <>
 struct PackTypes<4> {
   typedef float f __attribute__((vector_size(16)));
   typedef std::int32_t i __attribute__((vector_size(16)));
+  typedef std::uint32_t u __attribute__((vector_size(16)));
 };
 template <>
 struct PackTypes<8> {
   typedef float f __attribute__((vector_size(32)));
   typedef std::int32_t i __attribute__((vector_size(32)));
+  typedef std::uint32_t u __attribute__((vector_size(32)));
 };
 template <>
 struct PackTypes<16> {
   typedef float f __attribute__((vector_size(64)));
   typedef std::int32_t i __attribute__((vector_size(64)));
+  typedef std::uint32_t u __attribute__((vector_size(64)));
 };
 
 }  // namespace detail
@@ -379,7 +382,14 @@ GSNAV_HD Pack<float, N> fma(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c
 
 template <int N>
 GSNAV_HD Pack<float, N> scale_by_rounded(Pack<float, N> p, Pack<float, N> t) noexcept {
-  return Pack<float, N>(detail::floats<N>(detail::bits<N>(p.v) + (detail::bits<N>(t.v) << 23)));
+  // Without a sign: lanes that nobody will read may hold anything, and their sums wrap.
+  typename detail::PackTypes<N>::u a, b;
+  std::memcpy(&a, &p.v, sizeof a);
+  std::memcpy(&b, &t.v, sizeof b);
+  a += b << 23;
+  Pack<float, N> r;
+  std::memcpy(&r.v, &a, sizeof a);
+  return r;
 }
 
 /// 2^x for x in [-126, 126], lane by lane the bits of the scalar exp2; of any other x: anything.
