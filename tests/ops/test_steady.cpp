@@ -82,7 +82,7 @@ TEST_CASE(
     "and in a batch") {
   if (!heap_is_watched()) return;
   for (const int threads : {1, 2, 4}) {
-    for (const std::size_t batch : {std::size_t{1}, std::size_t{5}}) {
+    for (const std::size_t batch : {std::size_t{1}, std::size_t{5}, std::size_t{13}}) {
       for (const Profile profile : {Profile::exact, Profile::fast}) {
         for (const unsigned outputs : {+kRgb, +kMedianDepth, kRgb | kAlpha | kAnyDepth}) {
           RenderConfig config;

@@ -171,9 +171,12 @@ struct SortScratch {
   Buffer<std::uint32_t, B> keys, values;     ///< where sort_pairs puts the result before it swaps
   Buffer<std::uint64_t, B> first, second;    ///< records between passes
   Buffer<std::uint32_t, B> counts, cursors, used;
-  std::size_t bytes() const noexcept {
-    return keys.capacity_bytes() + values.capacity_bytes() + first.capacity_bytes() + second.capacity_bytes() +
-           counts.capacity_bytes() + cursors.capacity_bytes() + used.capacity_bytes();
+
+  /// f(a.member, b.member) for each buffer.
+  template <class A, class C, class F>
+  static void for_each(A& a, C& b, const F& f) {
+    f(a.keys, b.keys), f(a.values, b.values), f(a.first, b.first), f(a.second, b.second);
+    f(a.counts, b.counts), f(a.cursors, b.cursors), f(a.used, b.used);
   }
 };
 

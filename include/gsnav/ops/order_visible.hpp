@@ -28,9 +28,13 @@ struct VisibleOrder {
   std::vector<std::uint32_t> host_counts;
   std::vector<std::uint64_t> host_offsets;
 
-  std::size_t bytes() const noexcept {
-    return chunk_keys.capacity_bytes() + ranks.capacity_bytes() + counts.capacity_bytes() +
-           keys.capacity_bytes() + order.capacity_bytes() + offsets.capacity_bytes() + sort.bytes();
+  /// f(a.member, b.member) for each buffer and vector.
+  template <class A, class C, class F>
+  static void for_each(A& a, C& b, const F& f) {
+    f(a.chunk_keys, b.chunk_keys), f(a.ranks, b.ranks), f(a.counts, b.counts), f(a.keys, b.keys);
+    f(a.order, b.order), f(a.offsets, b.offsets);
+    f(a.host_counts, b.host_counts), f(a.host_offsets, b.host_offsets);
+    SortScratch<B>::for_each(a.sort, b.sort, f);
   }
 };
 

@@ -18,46 +18,16 @@
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/order_visible.hpp"
 #include "gsnav/ops/render_config.hpp"
+#include "gsnav/ops/render_workspace.hpp"
 
 namespace gsnav {
 
-/// What one camera's frame was made of.
-struct RenderStats {
-  std::uint64_t gaussians = 0;           ///< in all sets
-  std::uint64_t visible = 0;             ///< whose footprint bounds reach the image
-  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs
-};
-
-/// Scratch of `render_camera`; grows to the largest frame and is then reused.
-template <class S, Backend B>
-struct RenderWorkspace {
-  explicit RenderWorkspace(B& b)
-      : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
-        visible(b), cursors(b), tile_offsets(b), tile_splats(b), spans(b) {}
-
-  Buffer<Vec3<float>, B> offsets_f;
-  Buffer<Vec3d, B> offsets;
-  Buffer<SplatGeometry<S>, B> geometry;
-  Buffer<SplatColor<S>, B> colors;
-  Buffer<SplatDepth<S>, B> depths;
-  Buffer<SplatPerspective<S>, B> perspectives;
-  Buffer<SplatBounds, B> bounds;
-  VisibleOrder<B> visible;
-  Buffer<std::uint64_t, B> cursors, tile_offsets;
-  Buffer<std::uint32_t, B> tile_splats;
-  Buffer<TileSpans, B> spans;
-  std::vector<Vec3<float>> host_offsets_f;
-  std::vector<Vec3d> host_offsets;
-
-  std::size_t bytes() const noexcept {
-    return offsets_f.capacity_bytes() + offsets.capacity_bytes() + geometry.capacity_bytes() +
-           colors.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
-           bounds.capacity_bytes() + visible.bytes() + cursors.capacity_bytes() +
-           tile_offsets.capacity_bytes() + tile_splats.capacity_bytes() + spans.capacity_bytes();
-  }
-};
-
 namespace detail {
+
+template <Backend B>
+TileGrid grid_of(const RenderConfig& config, const Camera& camera) noexcept {
+  return TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
+}
 
 /// One work item per row of pixels: enough parallelism on a CPU at little overhead.
 template <class S, class PixelKernel>
@@ -145,36 +115,25 @@ inline Status validate(const GaussianSet& set) {
   return {};
 }
 
-/// Renders sets of Gaussians as one sorted list into the images of one camera: project, sort by
-/// (float32 key, set, row), bin into tiles, blend. Arrays of `sets` and pointers of `images` are in the
-/// backend's memory ([H][W] row-major). Fills `stats` when given. The result is there after
-/// `backend.synchronize()`.
-///
-/// Errors: invalid_argument naming the field; out_of_memory is thrown by the workspace.
+namespace detail {
+
+/// Sizes the scratch of one camera's frame and writes the projection's arguments: of set i to args[i * stride].
 template <class S, Backend B>
-Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
-                     const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
-                     RenderStats* stats = nullptr) {
-  if (Status s = validate(config); !s) return s;
-  if (Status s = validate(camera); !s) return s;
-  std::size_t chunks = 0, total = 0, origins = 0;
+void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
+                        const RenderConfig& config, const FrameImages<S>& images, ProjectArgs<S>* args,
+                        std::size_t stride) {
+  std::size_t chunks = 0, origins = 0;
   bool ranked = false;
   for (const GaussianSet& set : sets) {
-    if (Status s = validate(set); !s) return s;
     chunks += set.gaussians.chunk_count();
     ranked = ranked || !set.gaussians.row_ids.empty();
-    total += set.gaussians.size;
     origins += set.gaussians.origins.empty() ? 1 : set.gaussians.origins.size;
   }
   const std::size_t slots = chunks * kProjectChunk;
-  if (slots > std::numeric_limits<std::uint32_t>::max()) {
-    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
-  }
   const bool color = images.rgb != nullptr;
   const bool depth = images.median_depth != nullptr || images.expected_depth != nullptr ||
                      images.accumulated_depth != nullptr || images.first_hit_depth != nullptr;
 
-  // ---- project
   ws.geometry.resize_discard(slots);
   ws.bounds.resize_discard(slots);
   ws.visible.chunk_keys.resize_discard(slots);
@@ -185,7 +144,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.visible.counts.resize_discard(chunks);
   constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
   ws.spans.resize_discard(kSpans ? slots : 0);
-  const TileGrid grid = TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
+  const TileGrid grid = grid_of<B>(config, camera);
 
   const ProjectionRules rules = projection_rules(config);
   ws.host_offsets.clear();
@@ -203,41 +162,55 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   ws.offsets_f.upload(ws.host_offsets_f.data(), origins);
 
   std::size_t first_chunk = 0, first_origin = 0, first_rank = 0;
-  float near_plane = 0;
   for (std::size_t i = 0; i < sets.size(); ++i) {
     const std::size_t n = sets[i].gaussians.origins.empty() ? 1 : sets[i].gaussians.origins.size;
-    ProjectArgs<S> args;
-    args.gaussians = sets[i].gaussians;
-    args.camera = make_projection_camera<S>(camera, sets[i], rules);
-    args.camera64 = make_projection_camera<double>(camera, sets[i], rules);
-    args.offsets = {ws.offsets.data() + first_origin, n};
-    args.offsets_f = {ws.offsets_f.data() + first_origin, n};
-    args.sh_degree = std::min(sets[i].gaussians.sh_degree, config.max_sh_degree);
-    args.color = color;
-    args.depth = depth;
-    args.first_chunk = first_chunk;
-    args.first_rank = static_cast<std::uint32_t>(first_rank);
-    args.geometry = ws.geometry.view();
-    args.colors = ws.colors.view();
-    args.depths = ws.depths.view();
-    args.perspectives = ws.perspectives.view();
-    args.bounds = ws.bounds.view();
-    args.keys = ws.visible.chunk_keys.view();
-    args.ranks = ws.visible.ranks.view();
-    args.counts = ws.visible.counts.view();
-    args.grid = grid;
-    args.spans = ws.spans.view();
+    ProjectArgs<S>& a = args[i * stride];
+    a = {};
+    a.gaussians = sets[i].gaussians;
+    a.camera = make_projection_camera<S>(camera, sets[i], rules);
+    a.camera64 = make_projection_camera<double>(camera, sets[i], rules);
+    a.offsets = {ws.offsets.data() + first_origin, n};
+    a.offsets_f = {ws.offsets_f.data() + first_origin, n};
+    a.sh_degree = std::min(sets[i].gaussians.sh_degree, config.max_sh_degree);
+    a.color = color;
+    a.depth = depth;
+    a.first_chunk = first_chunk;
+    a.first_rank = static_cast<std::uint32_t>(first_rank);
+    a.geometry = ws.geometry.view();
+    a.colors = ws.colors.view();
+    a.depths = ws.depths.view();
+    a.perspectives = ws.perspectives.view();
+    a.bounds = ws.bounds.view();
+    a.keys = ws.visible.chunk_keys.view();
+    a.ranks = ws.visible.ranks.view();
+    a.counts = ws.visible.counts.view();
+    a.grid = grid;
+    a.spans = ws.spans.view();
+    first_chunk += a.chunk_count();
+    first_rank += a.gaussians.size;
+    first_origin += n;
+  }
+}
+
+/// Projects one set for several cameras.
+template <class S, Backend B>
+void project_set(B& backend, View<const ProjectArgs<S>> cameras) {
+  if constexpr (requires { backend.project_together(cameras); }) {
+    if (cameras.size > 1) return backend.project_together(cameras);
+  }
+  for (const ProjectArgs<S>& args : cameras) {
     if constexpr (requires { backend.project(args); }) {
       backend.project(args);
     } else {
       backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
     }
-    near_plane = args.camera.near_plane;  // the same for all sets
-    first_chunk += args.chunk_count();
-    first_rank += args.gaussians.size;
-    first_origin += n;
   }
+}
 
+/// What comes after the projection of one camera: sort, bin, blend. `near_plane`: of the projection.
+template <class S, Backend B>
+Status finish_frame(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera, const RenderConfig& config,
+                    float near_plane, const FrameImages<S>& images, RenderStats& stats) {
   // ---- sort
   // Distances may round to below the near plane that their z is beyond, but not to half of it.
   const std::uint32_t base = config.key_bits < 32 ? 0 : bits_of(0.5f * near_plane);
@@ -247,7 +220,7 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
 
   // ---- bin
   BinArgs<S> bin;
-  bin.grid = grid;
+  bin.grid = grid_of<B>(config, camera);
   bin.order = ws.visible.order.view();
   bin.geometry = ws.geometry.view();
   bin.bounds = ws.bounds.view();
@@ -295,8 +268,65 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   raster.images = images;
   detail::rasterize(backend, raster);
 
-  if (stats != nullptr) *stats = {total, visible, intersections};
+  stats.visible = visible;
+  stats.tile_intersections = intersections;
   return {};
+}
+
+}  // namespace detail
+
+/// Renders sets of Gaussians as one sorted list into the images of some cameras: project, sort by
+/// (float32 key, set, row), bin into tiles, blend. Each camera has a workspace, images and statistics; a
+/// chunk of Gaussians is projected for all of them before the next is read. Arrays of `sets` and pointers of
+/// `images` are in the backend's memory ([H][W] row-major). The result is there after
+/// `backend.synchronize()`.
+///
+/// Errors: invalid_argument naming the field; out_of_memory is thrown by the workspaces.
+template <class S, Backend B>
+Status render_cameras(B& backend, std::span<RenderWorkspace<S, B>> workspaces, std::span<const GaussianSet> sets,
+                      std::span<const Camera> cameras, const RenderConfig& config,
+                      std::span<const FrameImages<S>> images, std::span<RenderStats> stats) {
+  if (Status s = validate(config); !s) return s;
+  for (const Camera& camera : cameras) {
+    if (Status s = validate(camera); !s) return s;
+  }
+  std::size_t slots = 0, total = 0;
+  for (const GaussianSet& set : sets) {
+    if (Status s = validate(set); !s) return s;
+    slots += set.gaussians.chunk_count() * kProjectChunk;
+    total += set.gaussians.size;
+  }
+  if (slots > std::numeric_limits<std::uint32_t>::max()) {
+    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
+  }
+  const std::size_t n = cameras.size();
+  std::vector<ProjectArgs<S>>& projections = workspaces[0].projections;
+  projections.resize(sets.size() * n);
+  for (std::size_t c = 0; c < n; ++c) {
+    detail::prepare_projection(workspaces[c], sets, cameras[c], config, images[c], projections.data() + c, n);
+  }
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    detail::project_set<S>(backend, {projections.data() + i * n, n});
+  }
+  for (std::size_t c = 0; c < n; ++c) {
+    const float near_plane = sets.empty() ? 0 : projections[c].camera.near_plane;  // the same for all sets
+    stats[c].gaussians = total;
+    if (Status s = detail::finish_frame(backend, workspaces[c], cameras[c], config, near_plane, images[c], stats[c]);
+        !s) {
+      return s;
+    }
+  }
+  return {};
+}
+
+/// The same for one camera. Fills `stats` when given.
+template <class S, Backend B>
+Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
+                     const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
+                     RenderStats* stats = nullptr) {
+  RenderStats own;
+  return render_cameras<S, B>(backend, {&ws, 1}, sets, {&camera, 1}, config, {&images, 1},
+                              {stats != nullptr ? stats : &own, 1});
 }
 
 }  // namespace gsnav

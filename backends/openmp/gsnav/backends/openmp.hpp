@@ -70,6 +70,9 @@ class OpenMPBackend : public HostMemory {
   int threads() const noexcept { return threads_; }
   std::size_t concurrency() const noexcept { return static_cast<std::size_t>(threads_); }
 
+  /// Optional member: batches of cameras go by whole frames, each on one thread.
+  OpenMPBackend one_thread() const { return OpenMPBackend(1); }
+
   /// An exception that leaves f on more than one thread ends the process.
   template <class F>
   void parallel_for(std::size_t n, const F& f) {
@@ -90,6 +93,13 @@ class OpenMPBackend : public HostMemory {
   void project(const ProjectArgs<float>& args) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, kernel](std::size_t c) { kernel(args, c); });
+  }
+  /// Optional member: the same set for several cameras, chunk by chunk: it comes from memory once.
+  void project_together(View<const ProjectArgs<float>> cameras) {
+    const auto kernel = lane_kernels().project_chunk;
+    parallel_for(cameras[0].chunk_count(), [cameras, kernel](std::size_t c) {
+      for (const ProjectArgs<float>& args : cameras) kernel(args, c);
+    });
   }
   /// Optional members: binning in lanes, which keeps what it counted in BinArgs::spans.
   static constexpr bool bins_in_lanes = true;
