@@ -130,7 +130,8 @@ class FrameStages {
     project_.gaussians = set.gaussians;
     project_.camera = gsnav::make_projection_camera<S>(camera, set, rules);
     project_.camera64 = gsnav::make_projection_camera<double>(camera, set, rules);
-    project_.color=(config_.outputs&gsnav::kRgb)!=0; project_.sh_degree = std::min(set.gaussians.sh_degree, config_.max_sh_degree);
+    project_.sh_degree = std::min(set.gaussians.sh_degree, config_.max_sh_degree);
+    project_.color = (config_.outputs & gsnav::kRgb) != 0;
     project_.depth = (config_.outputs & gsnav::kAnyDepth) != 0;
     const std::size_t slots = project_.chunk_count() * gsnav::kProjectChunk;
     geometry_.resize_discard(slots);

@@ -53,6 +53,13 @@ class TimedBackend : public Base {
     timed(Stage::project, [&] { Base::project(args); });
   }
   template <class A>
+  void project(const A& args, gsnav::View<const std::uint32_t> chunks) requires requires(Base& b) {
+    b.project(args, chunks);
+  }
+  {
+    timed(Stage::project, [&] { Base::project(args, chunks); });
+  }
+  template <class A>
   void count_tiles(const A& args) requires requires(Base& b) {
     b.count_tiles(args);
   }

@@ -188,7 +188,26 @@ struct FrameImages {
   S* expected_depth = nullptr;
   S* accumulated_depth = nullptr;
   S* first_hit_depth = nullptr;
+
+  GSNAV_HD DepthMode depth_mode() const noexcept {
+    if (expected_depth != nullptr || accumulated_depth != nullptr || first_hit_depth != nullptr) return DepthMode::any;
+    return median_depth != nullptr ? DepthMode::median : DepthMode::none;
+  }
 };
+
+/// Where tiles are kept between the slices of depth that a frame is blended in.
+template <class S>
+struct TileProgress {
+  View<std::uint64_t> open;  ///< [tiles]: bits of cells (OpenCells) in row order; 0 where the pixels are written. Empty:
+                             ///< one slice is all
+  View<S> states;            ///< [tiles][blend_state_values * pixels of a tile]
+  bool first = true, last = true;
+};
+
+/// Values of a pixel that a slice leaves to the next.
+GSNAV_HD constexpr std::size_t blend_state_values(DepthMode mode) noexcept {
+  return mode == DepthMode::none ? 4 : mode == DepthMode::median ? 5 : 8;
+}
 
 /// Arguments of blending the tiles of one camera.
 template <class S>
@@ -204,14 +223,9 @@ struct RasterArgs {
   Vec3<S> background;
   Exp2 exp2_method = Exp2::degree5;
   FrameImages<S> images;
+  TileProgress<S> progress;
 
-  GSNAV_HD DepthMode depth_mode() const noexcept {
-    if (images.expected_depth != nullptr || images.accumulated_depth != nullptr ||
-        images.first_hit_depth != nullptr) {
-      return DepthMode::any;
-    }
-    return images.median_depth != nullptr ? DepthMode::median : DepthMode::none;
-  }
+  GSNAV_HD DepthMode depth_mode() const noexcept { return images.depth_mode(); }
   GSNAV_HD SplatRecords<S> records(std::size_t splat) const noexcept {
     return {geometry.data + splat, colors.empty() ? nullptr : colors.data + splat,
             depths.empty() ? nullptr : depths.data + splat,

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <concepts>
 #include <cstddef>
@@ -26,9 +25,9 @@ concept LaneBackend = Backend<B> && is_host_backend<B> && requires(const B& b) {
   { b.one_thread() } -> std::same_as<B>;
 };
 
-/// Renders batches with one lane a thread: no thread waits for another within a frame, and the cameras of a
-/// lane share what the projection reads. Scratch grows with threads, not with cameras, and is the same for all
-/// lanes, so that a batch like one before it allocates nothing, whichever lane takes which camera.
+/// Renders batches with one lane a thread: no thread waits for another within a frame. Scratch grows with
+/// threads, not with cameras, and is the same for all lanes, so that a batch like one before it allocates
+/// nothing, whichever lane takes which camera.
 template <class S, LaneBackend B>
 class FrameLanes {
  public:
@@ -37,34 +36,25 @@ class FrameLanes {
     return cameras > 1 && cameras >= 2 * concurrency_of(backend);
   }
 
-  /// render_cameras() for any number of cameras; images_of(c) gives the FrameImages of camera c. The first
+  /// render_camera() for each of the cameras; images_of(c) gives the FrameImages of camera c. The first
   /// camera's error, by number, is returned; out_of_memory too.
   template <class ImagesOf>
   Status render(B& backend, std::span<const GaussianSet> sets, std::span<const Camera> cameras,
                 const RenderConfig& config, const ImagesOf& images_of, std::span<RenderStats> stats) {
     while (lanes_.size() < concurrency_of(backend)) lanes_.push_back(std::make_unique<Lane>(backend));
-    // Fewer at a time where threads would be left over.
-    const std::size_t share = std::max<std::size_t>(1, cameras.size() / (2 * concurrency_of(backend)));
-    const std::size_t together = std::min(kTogether, share);
-    const std::size_t groups = (cameras.size() + together - 1) / together;
     std::mutex mutex;
-    std::size_t failed = groups;
+    std::size_t failed = cameras.size();
     Status result;
-    backend.parallel_for(groups, [&](std::size_t g) {
-      const std::size_t first = g * together, n = std::min(together, cameras.size() - first);
-      std::array<FrameImages<S>, kTogether> images;
-      for (std::size_t c = 0; c < n; ++c) images[c] = images_of(first + c);
+    backend.parallel_for(cameras.size(), [&](std::size_t c) {
       Lane& lane = take();
       Status s = guarded([&] {
-        return render_cameras<S, B>(lane.backend, std::span(lane.workspaces).first(n), sets,
-                                    cameras.subspan(first, n), config,
-                                    std::span<const FrameImages<S>>(images).first(n), stats.subspan(first, n));
+        return render_camera<S, B>(lane.backend, lane.workspace, sets, cameras[c], config, images_of(c), &stats[c]);
       });
       lane.taken.store(false, std::memory_order_release);
       if (s.ok()) return;
       const std::lock_guard lock(mutex);
-      if (g < failed) {
-        failed = g;
+      if (c < failed) {
+        failed = c;
         result = std::move(s);
       }
     });
@@ -74,26 +64,15 @@ class FrameLanes {
 
   std::size_t bytes() const noexcept {
     std::size_t sum = 0;
-    for (const auto& lane : lanes_) {
-      for (const auto& w : lane->workspaces) sum += w.bytes();
-    }
+    for (const auto& lane : lanes_) sum += lane->workspace.bytes();
     return sum;
   }
 
  private:
-  /// More share more of what is read, but have to lie in the caches together.
-#if defined(TOGETHER)
-  static constexpr std::size_t kTogether = TOGETHER;
-#else
-  static constexpr std::size_t kTogether = 2;
-#endif
-
   struct Lane {
-    explicit Lane(const B& b) : backend(b.one_thread()) {
-      for (std::size_t c = 0; c < kTogether; ++c) workspaces.emplace_back(backend);
-    }
+    explicit Lane(const B& b) : backend(b.one_thread()), workspace(backend) {}
     B backend;
-    std::vector<RenderWorkspace<S, B>> workspaces;
+    RenderWorkspace<S, B> workspace;
     std::atomic<bool> taken{false};
   };
 
@@ -108,12 +87,9 @@ class FrameLanes {
   }
 
   Status even_out() {
-    RenderWorkspace<S, B>& most = lanes_.front()->workspaces.front();
-    for (int turn = 0; turn < 2; ++turn) {
-      for (const auto& lane : lanes_) {
-        for (auto& w : lane->workspaces) turn == 0 ? most.grow_to(w) : w.grow_to(most);
-      }
-    }
+    RenderWorkspace<S, B>& most = lanes_.front()->workspace;
+    for (const auto& lane : lanes_) most.grow_to(lane->workspace);
+    for (const auto& lane : lanes_) lane->workspace.grow_to(most);
     return {};
   }
 

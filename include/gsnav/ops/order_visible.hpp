@@ -16,12 +16,20 @@
 
 namespace gsnav {
 
+/// The sort keys of one slice of depth.
+struct KeyRange {
+  std::uint32_t low = 0, last = 0xffffffffu;
+  GSNAV_HD bool whole() const noexcept { return low == 0 && last == 0xffffffffu; }
+  GSNAV_HD bool contains(std::uint32_t key) const noexcept { return key - low <= last - low; }
+};
+
 /// What the projection left in its chunks, and room for what orders it.
 template <Backend B>
 struct VisibleOrder {
   explicit VisibleOrder(B& b)
-      : chunk_keys(b), ranks(b), counts(b), keys(b), order(b), offsets(b), sort(b) {}
+      : chunk_keys(b), ranks(b), counts(b), taken(b), keys(b), order(b), offsets(b), sort(b) {}
   Buffer<std::uint32_t, B> chunk_keys, ranks, counts;  ///< [slots], [slots] or none, [chunks]
+  Buffer<std::uint32_t, B> taken;                      ///< [chunks]: how many are in a range of keys
   Buffer<std::uint32_t, B> keys, order;                ///< of the visible, front to back
   Buffer<std::uint64_t, B> offsets;                    ///< of chunks, where the host cannot read `counts`
   SortScratch<B> sort;
@@ -31,7 +39,8 @@ struct VisibleOrder {
   /// f(a.member, b.member) for each buffer and vector.
   template <class A, class C, class F>
   static void for_each(A& a, C& b, const F& f) {
-    f(a.chunk_keys, b.chunk_keys), f(a.ranks, b.ranks), f(a.counts, b.counts), f(a.keys, b.keys);
+    f(a.chunk_keys, b.chunk_keys), f(a.ranks, b.ranks), f(a.counts, b.counts), f(a.taken, b.taken);
+    f(a.keys, b.keys);
     f(a.order, b.order), f(a.offsets, b.offsets);
     f(a.host_counts, b.host_counts), f(a.host_offsets, b.host_offsets);
     SortScratch<B>::for_each(a.sort, b.sort, f);
@@ -54,30 +63,49 @@ struct GatherSlot {
   }
 };
 
+/// Counts the survivors of a chunk that are in a range of keys.
+struct CountInRange {
+  View<const std::uint32_t> chunk_keys, counts;
+  KeyRange range;
+  View<std::uint32_t> taken;
+  GSNAV_HD void operator()(std::size_t c) const noexcept {
+    const std::uint32_t* const k = chunk_keys.data + c * kProjectChunk;
+    std::uint32_t n = 0;
+    for (std::uint32_t i = 0; i < counts[c]; ++i) n += range.contains(k[i]) ? 1u : 0u;
+    taken[c] = n;
+  }
+};
+
 /// The same list without making it: a sort reads it from the chunks, in blocks of as many survivors.
 struct VisibleSource {
   static constexpr std::size_t kMostBlocks = 64;
-  View<const std::uint32_t> chunk_keys, counts;
+  View<const std::uint32_t> chunk_keys, counts, taken;
+  KeyRange range;
   std::uint32_t base;  ///< subtracted from keys: none is below
   std::array<std::size_t, kMostBlocks + 1> first_chunk;
 
-  static VisibleSource of(View<const std::uint32_t> chunk_keys, View<const std::uint32_t> counts,
-                          std::uint32_t base, const SortBlocks& cut) noexcept {
-    VisibleSource s{chunk_keys, counts, base, {}};
+  /// Cuts the chunks so that each block has about as many.
+  void cut_by(const SortBlocks& cut) noexcept {
+    first_chunk[0] = 0;
     std::size_t block = 1, seen = 0;
-    for (std::size_t c = 0; c < counts.size && block < cut.blocks; ++c) {
-      while (block < cut.blocks && seen >= cut.begin(block)) s.first_chunk[block++] = c;
-      seen += counts[c];
+    for (std::size_t c = 0; c < taken.size && block < cut.blocks; ++c) {
+      while (block < cut.blocks && seen >= cut.begin(block)) first_chunk[block++] = c;
+      seen += taken[c];
     }
-    for (; block <= cut.blocks; ++block) s.first_chunk[block] = counts.size;
-    return s;
+    for (; block <= cut.blocks; ++block) first_chunk[block] = taken.size;
   }
   template <class F>
   GSNAV_HD void for_each(std::size_t block, const F& f) const noexcept {
     for (std::size_t c = first_chunk[block]; c < first_chunk[block + 1]; ++c) {
       const std::uint32_t* const k = chunk_keys.data + c * kProjectChunk;
       const std::uint32_t n = counts[c], slot = static_cast<std::uint32_t>(c * kProjectChunk);
-      for (std::uint32_t i = 0; i < n; ++i) f(k[i] - base, slot + i);
+      if (taken[c] == n) {
+        for (std::uint32_t i = 0; i < n; ++i) f(k[i] - base, slot + i);
+      } else if (taken[c] != 0) {
+        for (std::uint32_t i = 0; i < n; ++i) {
+          if (range.contains(k[i])) f(k[i] - base, slot + i);
+        }
+      }
     }
   }
 };
@@ -137,9 +165,11 @@ struct RankTiesOfRange {
 }  // namespace detail
 
 /// Lists the visible slots front to back in `v.order`: by the lowest `bits` of the key, ties by rank or, where
-/// there are no ranks, by slot. No key is below `base`. Returns how many there are.
+/// there are no ranks, by slot; those of a range of keys on the host alone. No key is below `base`. Returns how many
+/// there are.
 template <Backend B>
-Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t base, int bits) {
+Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t base, int bits,
+                                  const KeyRange& range = {}) {
   const std::size_t chunks = v.counts.size(), slots = v.chunk_keys.size();
   View<const std::uint32_t> counts{v.counts.data(), chunks};
   if constexpr (!is_host_backend<B>) {
@@ -148,16 +178,25 @@ Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t 
     counts = view_of(std::as_const(v.host_counts));
   }
   if (Status s = backend.synchronize(); !s) return s;
+  View<const std::uint32_t> taken = counts;
+  if constexpr (is_host_backend<B>) {
+    if (!range.whole()) {
+      v.taken.resize_discard(chunks);
+      backend.parallel_for(chunks, detail::CountInRange{v.chunk_keys.view(), counts, range, v.taken.view()});
+      taken = v.taken.view();
+    }
+  }
   std::size_t visible = 0;
-  for (std::size_t c = 0; c < chunks; ++c) visible += counts[c];
+  for (std::size_t c = 0; c < chunks; ++c) visible += taken[c];
   v.keys.resize_discard(visible);
   v.order.resize_discard(visible);
   if (visible == 0) return visible;
 
   if constexpr (is_host_backend<B>) {
     const auto cut = detail::SortBlocks::of(visible, sort_blocks(backend, visible));
-    sort_from(backend, detail::VisibleSource::of(v.chunk_keys.view(), counts, base, cut), cut, bits, v.sort,
-              v.keys.view(), v.order.view());
+    detail::VisibleSource source{v.chunk_keys.view(), counts, taken, range, base, {}};
+    source.cut_by(cut);
+    sort_from(backend, source, cut, bits, v.sort, v.keys.view(), v.order.view());
   } else {
     v.host_offsets.resize(chunks);
     std::uint64_t sum = 0;

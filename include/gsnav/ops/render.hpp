@@ -117,11 +117,11 @@ inline Status validate(const GaussianSet& set) {
 
 namespace detail {
 
-/// Sizes the scratch of one camera's frame and writes the projection's arguments: of set i to args[i * stride].
+/// Sizes the scratch of one camera's frame and writes the projection's arguments.
 template <class S, Backend B>
 void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
-                        const RenderConfig& config, const FrameImages<S>& images, ProjectArgs<S>* args,
-                        std::size_t stride) {
+                        const RenderConfig& config, const FrameImages<S>& images) {
+  ws.projections.resize(sets.size());
   std::size_t chunks = 0, origins = 0;
   bool ranked = false;
   for (const GaussianSet& set : sets) {
@@ -164,7 +164,7 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   std::size_t first_chunk = 0, first_origin = 0, first_rank = 0;
   for (std::size_t i = 0; i < sets.size(); ++i) {
     const std::size_t n = sets[i].gaussians.origins.empty() ? 1 : sets[i].gaussians.origins.size;
-    ProjectArgs<S>& a = args[i * stride];
+    ProjectArgs<S>& a = ws.projections[i];
     a = {};
     a.gaussians = sets[i].gaussians;
     a.camera = make_projection_camera<S>(camera, sets[i], rules);
@@ -192,29 +192,26 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   }
 }
 
-/// Projects one set for several cameras.
+/// Projects one set.
 template <class S, Backend B>
-void project_set(B& backend, View<const ProjectArgs<S>> cameras) {
-  if constexpr (requires { backend.project_together(cameras); }) {
-    if (cameras.size > 1) return backend.project_together(cameras);
-  }
-  for (const ProjectArgs<S>& args : cameras) {
-    if constexpr (requires { backend.project(args); }) {
-      backend.project(args);
-    } else {
-      backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
-    }
+void project_set(B& backend, const ProjectArgs<S>& args) {
+  if constexpr (requires { backend.project(args); }) {
+    backend.project(args);
+  } else {
+    backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
   }
 }
 
-/// What comes after the projection of one camera: sort, bin, blend. `near_plane`: of the projection.
+/// What comes after the projection of one camera: sort, bin, blend, of the keys in `range`. Adds to `stats`.
 template <class S, Backend B>
-Status finish_frame(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera, const RenderConfig& config,
-                    float near_plane, const FrameImages<S>& images, RenderStats& stats) {
+Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera, const RenderConfig& config,
+                      const KeyRange& range, const TileProgress<S>& progress, const FrameImages<S>& images,
+                      RenderStats& stats) {
   // ---- sort
   // Distances may round to below the near plane that their z is beyond, but not to half of it.
-  const std::uint32_t base = config.key_bits < 32 ? 0 : bits_of(0.5f * near_plane);
-  const Result<std::size_t> ordered = order_visible(backend, ws.visible, base, config.key_bits);
+  const float near_plane = ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // of all sets
+  const std::uint32_t base = config.key_bits < 32 ? 0 : std::max(bits_of(0.5f * near_plane), range.low);
+  const Result<std::size_t> ordered = order_visible(backend, ws.visible, base, config.key_bits, range);
   if (!ordered) return ordered.status();
   const std::size_t visible = ordered.value();
 
@@ -266,67 +263,93 @@ Status finish_frame(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera,
   raster.background = vec_cast<S>(config.background);
   raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
   raster.images = images;
+  raster.progress = progress;
   detail::rasterize(backend, raster);
 
-  stats.visible = visible;
-  stats.tile_intersections = intersections;
+  stats.visible += visible;
+  stats.tile_intersections += intersections;
   return {};
+}
+
+/// Slices that a frame is drawn in.
+inline int depth_slices_of(const RenderConfig& config, std::size_t candidates, const Camera& camera) noexcept {
+  if (config.response != Response::ewa || config.compat != Compat::none || config.key_bits < 32) return 1;
+  if (config.depth_slices != 0) return config.depth_slices;
+  // Where few Gaussians are for a pixel, projecting them is a small part of the frame.
+  constexpr std::size_t kFew = 131072;
+  const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  return candidates < kFew || candidates < pixels / 2 ? 1 : 4;
+}
+
+/// Projects and draws a frame, front to back, in slices of depth; false where one is as good.
+template <class B>
+Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Camera& camera,
+                            const RenderConfig& config, const FrameImages<float>& images, RenderStats& stats) {
+  DepthSlices& slices = ws.slices;
+  const View<ProjectArgs<float>> sets = view_of(ws.projections);
+  slices.plan(backend, sets);
+  const int count = depth_slices_of(config, slices.candidates(), camera);
+  if (count < 2) return false;
+  slices.cut(count);
+  const int last = slices.count() - 1;
+
+  const TileGrid grid = grid_of<B>(config, camera);
+  const std::size_t pixels = static_cast<std::size_t>(grid.tile_size) * static_cast<std::size_t>(grid.tile_size);
+  ws.open.resize_discard(grid.count());
+  ws.states.resize_discard(grid.count() * pixels * blend_state_values(images.depth_mode()));
+  std::fill(ws.visible.counts.data(), ws.visible.counts.data() + ws.visible.counts.size(), 0u);
+  for (int s = 0; s <= last; ++s) {
+    for (ProjectArgs<float>& args : sets) {
+      const View<const std::uint32_t> chunks = slices.chunks(s, args);
+      if (!chunks.empty()) backend.project(args, chunks);
+    }
+    const TileProgress<float> progress{ws.open.view(), ws.states.view(), s == 0, s == last};
+    if (Status e = draw_projected(backend, ws, camera, config, slices.keys(s), progress, images, stats); !e) return e;
+    if (s == last) break;
+    const OpenCells open = slices.open_cells(grid, ws.open.view());
+    if (open.sums[open.sums.size - 1] == 0) break;
+    for (ProjectArgs<float>& args : sets) args.open = open;
+  }
+  return true;
 }
 
 }  // namespace detail
 
-/// Renders sets of Gaussians as one sorted list into the images of some cameras: project, sort by
-/// (float32 key, set, row), bin into tiles, blend. Each camera has a workspace, images and statistics; a
-/// chunk of Gaussians is projected for all of them before the next is read. Arrays of `sets` and pointers of
-/// `images` are in the backend's memory ([H][W] row-major). The result is there after
+/// Renders sets of Gaussians as one sorted list into the images of one camera: project, sort by
+/// (float32 key, set, row), bin into tiles, blend. Arrays of `sets` and pointers of `images` are in the
+/// backend's memory ([H][W] row-major). Fills `stats` when given. The result is there after
 /// `backend.synchronize()`.
 ///
-/// Errors: invalid_argument naming the field; out_of_memory is thrown by the workspaces.
-template <class S, Backend B>
-Status render_cameras(B& backend, std::span<RenderWorkspace<S, B>> workspaces, std::span<const GaussianSet> sets,
-                      std::span<const Camera> cameras, const RenderConfig& config,
-                      std::span<const FrameImages<S>> images, std::span<RenderStats> stats) {
-  if (Status s = validate(config); !s) return s;
-  for (const Camera& camera : cameras) {
-    if (Status s = validate(camera); !s) return s;
-  }
-  std::size_t slots = 0, total = 0;
-  for (const GaussianSet& set : sets) {
-    if (Status s = validate(set); !s) return s;
-    slots += set.gaussians.chunk_count() * kProjectChunk;
-    total += set.gaussians.size;
-  }
-  if (slots > std::numeric_limits<std::uint32_t>::max()) {
-    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
-  }
-  const std::size_t n = cameras.size();
-  std::vector<ProjectArgs<S>>& projections = workspaces[0].projections;
-  projections.resize(sets.size() * n);
-  for (std::size_t c = 0; c < n; ++c) {
-    detail::prepare_projection(workspaces[c], sets, cameras[c], config, images[c], projections.data() + c, n);
-  }
-  for (std::size_t i = 0; i < sets.size(); ++i) {
-    detail::project_set<S>(backend, {projections.data() + i * n, n});
-  }
-  for (std::size_t c = 0; c < n; ++c) {
-    const float near_plane = sets.empty() ? 0 : projections[c].camera.near_plane;  // the same for all sets
-    stats[c].gaussians = total;
-    if (Status s = detail::finish_frame(backend, workspaces[c], cameras[c], config, near_plane, images[c], stats[c]);
-        !s) {
-      return s;
-    }
-  }
-  return {};
-}
-
-/// The same for one camera. Fills `stats` when given.
+/// Errors: invalid_argument naming the field; out_of_memory is thrown by the workspace.
 template <class S, Backend B>
 Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
                      const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
                      RenderStats* stats = nullptr) {
-  RenderStats own;
-  return render_cameras<S, B>(backend, {&ws, 1}, sets, {&camera, 1}, config, {&images, 1},
-                              {stats != nullptr ? stats : &own, 1});
+  if (Status s = validate(config); !s) return s;
+  if (Status s = validate(camera); !s) return s;
+  std::size_t slots = 0;
+  RenderStats counted;
+  for (const GaussianSet& set : sets) {
+    if (Status s = validate(set); !s) return s;
+    slots += set.gaussians.chunk_count() * kProjectChunk;
+    counted.gaussians += set.gaussians.size;
+  }
+  if (slots > std::numeric_limits<std::uint32_t>::max()) {
+    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
+  }
+  detail::prepare_projection(ws, sets, camera, config, images);
+  bool drawn = false;
+  if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
+    const Result<bool> sliced = detail::draw_in_slices(backend, ws, camera, config, images, counted);
+    if (!sliced) return sliced.status();
+    drawn = sliced.value();
+  }
+  if (!drawn) {
+    for (const ProjectArgs<S>& args : ws.projections) detail::project_set(backend, args);
+    if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, images, counted); !s) return s;
+  }
+  if (stats != nullptr) *stats = counted;
+  return {};
 }
 
 }  // namespace gsnav

@@ -94,12 +94,11 @@ class OpenMPBackend : public HostMemory {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, kernel](std::size_t c) { kernel(args, c); });
   }
-  /// Optional member: the same set for several cameras, chunk by chunk: it comes from memory once.
-  void project_together(View<const ProjectArgs<float>> cameras) {
+  /// Optional member: the same of some chunks. What reaches no open cell (ProjectArgs::open) is left out, and tiles
+  /// are blended in slices (RasterArgs::progress).
+  void project(const ProjectArgs<float>& args, View<const std::uint32_t> chunks) {
     const auto kernel = lane_kernels().project_chunk;
-    parallel_for(cameras[0].chunk_count(), [cameras, kernel](std::size_t c) {
-      for (const ProjectArgs<float>& args : cameras) kernel(args, c);
-    });
+    parallel_for(chunks.size, [&args, chunks, kernel](std::size_t i) { kernel(args, chunks[i]); });
   }
   /// Optional members: binning in lanes, which keeps what it counted in BinArgs::spans.
   static constexpr bool bins_in_lanes = true;

@@ -22,6 +22,7 @@ class Unset {
 
  public:
   T& operator[](int i) noexcept { return *std::launder(reinterpret_cast<T*>(bytes_) + i); }
+  std::byte* bytes() noexcept { return bytes_; }
 
  private:
   alignas(T) std::byte bytes_[sizeof(T) * static_cast<std::size_t>(N)];
@@ -73,12 +74,18 @@ class TileBlender {
   }
 
   void blend() noexcept {
-    prefetch_images();
-    open_blocks();
+    const TileProgress<float>& progress = args_.progress;
+    const std::uint64_t begin = args_.tile_offsets[tile_], end = args_.tile_offsets[tile_ + 1];
+    if (progress.first) {
+      open_blocks();
+    } else {
+      if (progress.open[tile_] == 0 || (begin == end && !progress.last)) return;
+      resume();
+    }
+    if (progress.last) prefetch_images();
     for (int j = 0; j < kStride; ++j) rows_[j].number = static_cast<float>(j);
     rows_[kNothing] = {};
-    const std::uint64_t end = args_.tile_offsets[tile_ + 1];
-    for (std::uint64_t first = args_.tile_offsets[tile_]; first < end && open_count_ > 0; first += kBatch) {
+    for (std::uint64_t first = begin; first < end && open_count_ > 0; first += kBatch) {
       load_batch(first, static_cast<int>(end - first < kBatch ? end - first : std::uint64_t{kBatch}));
       for_each_block([this](int block, int x, int y) {
         if (lists_.counts[block] == 0) return;
@@ -89,13 +96,19 @@ class TileBlender {
         }
       });
     }
-    write();
+    const bool done = progress.last || open_count_ == 0;
+    if (done) {
+      write();
+    } else {
+      keep();
+    }
+    if (!progress.open.empty()) progress.open[tile_] = done ? 0 : open_cells();
   }
 
  private:
   /// Calls f(block, x, y) with the place of each block in the tile.
   template <class Func>
-  void for_each_block(const Func& f) noexcept {
+  void for_each_block(const Func& f) const noexcept {
     for (int y = 0, block = 0; y < tile_size_; y += kBlockHeight) {
       for (int x = 0; x < tile_size_; x += kBlockWidth, ++block) f(block, x, y);
     }
@@ -132,6 +145,41 @@ class TileBlender {
       states_[block].transmittance = select(inside, F(1.0f), F(-1.0f));
       if constexpr (D == DepthMode::median) medians_[block] = F(0.0f);
       open_[block] = any(inside);
+      open_count_ += open_[block] ? 1 : 0;
+    });
+  }
+
+  std::uint64_t open_cells() const noexcept {
+    constexpr int kCell = OpenCells::kSize;
+    static_assert(kCell % kBlockWidth == 0 && kCell % kBlockHeight == 0);
+    std::uint64_t cells = 0;
+    for_each_block([&](int block, int x, int y) {
+      if (open_[block]) cells |= std::uint64_t{1} << (y / kCell * (tile_size_ / kCell) + x / kCell);
+    });
+    return cells;
+  }
+
+  /// The tile's place among the kept.
+  float* kept() const noexcept {
+    const std::size_t pixels = static_cast<std::size_t>(tile_size_) * static_cast<std::size_t>(tile_size_);
+    return args_.progress.states.data + tile_ * blend_state_values(D) * pixels;
+  }
+  std::size_t state_bytes() const noexcept {
+    static_assert(sizeof(BlendState<F, kLoop>) == blend_state_values(kLoop) * sizeof(F));
+    return sizeof(BlendState<F, kLoop>) * static_cast<std::size_t>(tile_size_ * tile_size_ / kWidth);
+  }
+  std::size_t median_bytes() const noexcept {
+    return D == DepthMode::median ? sizeof(float) * static_cast<std::size_t>(tile_size_ * tile_size_) : 0;
+  }
+  void keep() noexcept {
+    std::memcpy(kept(), states_.bytes(), state_bytes());
+    std::memcpy(kept() + state_bytes() / sizeof(float), medians_.bytes(), median_bytes());
+  }
+  void resume() noexcept {
+    std::memcpy(states_.bytes(), kept(), state_bytes());
+    std::memcpy(medians_.bytes(), kept() + state_bytes() / sizeof(float), median_bytes());
+    for_each_block([this](int block, int, int) {
+      open_[block] = any(states_[block].open(args_.rules));
       open_count_ += open_[block] ? 1 : 0;
     });
   }
