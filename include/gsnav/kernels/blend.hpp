@@ -198,8 +198,8 @@ struct FrameImages {
 /// Where tiles are kept between the slices of depth that a frame is blended in.
 template <class S>
 struct TileProgress {
-  View<std::uint64_t> open;  ///< [tiles]: bits of cells (OpenCells) in row order; 0 where the pixels are written. Empty:
-                             ///< one slice is all
+  View<std::uint64_t> open;  ///< [tiles]: bits of cells (OpenCells) in row order, 0 where the pixels are written.
+                             ///< Empty: one slice is all
   View<S> states;            ///< [tiles][blend_state_values * pixels of a tile]
   bool first = true, last = true;
 };

@@ -87,8 +87,10 @@ GSNAV_HD void transpose_chunks(Pack<float, N>* v) noexcept {
     v[1] = detail::chunks<W, 1, 1>(a, b, lanes);
   } else {
     static_assert(H == 4);
-    const Pack<float, N> top_a = detail::chunks<W, 0, 1>(v[0], v[1], lanes), top_b = detail::chunks<W, 0, 1>(v[2], v[3], lanes);
-    const Pack<float, N> low_a = detail::chunks<W, 2, 1>(v[0], v[1], lanes), low_b = detail::chunks<W, 2, 1>(v[2], v[3], lanes);
+    const Pack<float, N> top_a = detail::chunks<W, 0, 1>(v[0], v[1], lanes),
+                         top_b = detail::chunks<W, 0, 1>(v[2], v[3], lanes);
+    const Pack<float, N> low_a = detail::chunks<W, 2, 1>(v[0], v[1], lanes),
+                         low_b = detail::chunks<W, 2, 1>(v[2], v[3], lanes);
     v[0] = detail::chunks<W, 0, 2>(top_a, top_b, lanes);
     v[1] = detail::chunks<W, 1, 2>(top_a, top_b, lanes);
     v[2] = detail::chunks<W, 0, 2>(low_a, low_b, lanes);

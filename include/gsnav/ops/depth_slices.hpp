@@ -80,7 +80,8 @@ class DepthSlices {
   }
   /// The chunks of one set that slice s projects: those that may reach an open cell.
   View<const std::uint32_t> chunks(int s, const ProjectArgs<float>& args) {
-    const std::size_t begin = s == 0 ? 0 : ends_[static_cast<std::size_t>(s - 1)], end = ends_[static_cast<std::size_t>(s)];
+    const std::size_t begin = s == 0 ? 0 : ends_[static_cast<std::size_t>(s - 1)];
+    const std::size_t end = ends_[static_cast<std::size_t>(s)];
     list_.clear();
     for (std::size_t c = 0; c < args.chunk_count(); ++c) {
       const Place& place = chunks_[args.first_chunk + c];

@@ -131,7 +131,8 @@ class TileBlender {
       }
     };
     prefetch(out.rgb, 3);
-    for (const float* image : {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth, out.first_hit_depth}) {
+    for (const float* image : {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth,
+                               out.first_hit_depth}) {
       prefetch(image, 1);
     }
   }
@@ -263,8 +264,9 @@ class TileBlender {
         using Group = Packs<F, kGroup>;
         const std::uint8_t* const j = list + i;
         const auto gather = [&](const auto& value) { return Group::of([&](int k) { return value(j[k]); }); };
-        const ColumnTerms<Group> terms{gather([&](int s) { return load_repeated<kBlockWidth, kWidth>(columns[s].column + at); }),
-                                       gather([&](int s) { return load_repeated<kBlockWidth, kWidth>(columns[s].w2 + at); })};
+        const auto repeated = [](const float* p) { return load_repeated<kBlockWidth, kWidth>(p); };
+        const ColumnTerms<Group> terms{gather([&](int s) { return repeated(columns[s].column + at); }),
+                                       gather([&](int s) { return repeated(columns[s].w2 + at); })};
         const Group alpha = footprint_alpha<M>(
             rules, column_exponent(terms, gather([&](int s) { return F(rows[s].ref_y); }),
                                    gather([&](int s) { return F(rows[s].b); }), Group(py)));
