@@ -39,9 +39,10 @@ GeodesicSearch& thread_search() {
   return search;
 }
 
-void GeodesicSearch::begin(const UnfoldedMesh& mesh) {
+void GeodesicSearch::begin(const UnfoldedMesh& mesh, double bound) {
   mesh_ = &mesh;
-  best_ = kInfinity;
+  best_ = bound;
+  found_ = false;
   best_node_ = kNone;
   nodes_.clear();
   heap_.clear();
@@ -52,30 +53,74 @@ void GeodesicSearch::begin(const UnfoldedMesh& mesh) {
   ++round_;
 }
 
-double GeodesicSearch::run(const UnfoldedMesh& mesh, const Site& start, const Site& goal) {
+double GeodesicSearch::run(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound) {
   start_ = start;
   goal_ = goal;
   has_goal_ = true;
+  straight_ = false;
   if (start.face == goal.face) {
     begin(mesh);
-    return best_ = length(goal.at - start.at);
+    return length(goal.at - start.at);
   }
   for (const bool every : {false, true}) {
     every_vertex_ = every;
-    begin(mesh);
+    begin(mesh, bound);
     leave(start);
     settle();
-    if (best_ < kInfinity) break;
+    if (found_) return best_;
   }
-  return best_;
+  return kInfinity;
+}
+
+double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound,
+                                    const GoalBound* least) {
+  start_ = start;
+  goal_ = goal;
+  has_goal_ = straight_ = true;
+  every_vertex_ = false;
+  if (start.face == goal.face) return length(goal.at - start.at);
+  begin(mesh, bound);
+  least_ = least;
+  leave(start);
+  // There are few, so that their order saves nothing.
+  constexpr std::size_t kMost = 1 << 14;
+  while (!heap_.empty() && nodes_.size() < kMost) {
+    const std::uint32_t node = heap_.back().second;
+    heap_.pop_back();
+    spread_window(node);
+  }
+  least_ = nullptr;
+  if (!heap_.empty()) return run(mesh, start, goal, bound);
+  return found_ ? best_ : kInfinity;
 }
 
 void GeodesicSearch::flood(const UnfoldedMesh& mesh, const std::vector<Site>& starts) {
-  has_goal_ = false;
-  every_vertex_ = false;
+  has_goal_ = every_vertex_ = straight_ = false;
   begin(mesh);
   for (const Site& s : starts) leave(s);
   settle();
+}
+
+std::size_t GeodesicSearch::look_around(const UnfoldedMesh& mesh, std::uint32_t vertex) {
+  has_goal_ = every_vertex_ = false;
+  straight_ = true;
+  begin(mesh);
+  const UnfoldedMesh::Vertex& v = mesh.vertices[vertex];
+  seen_[vertex] = round_;
+  distance_[vertex] = 0;
+  if (v.closed || v.total > 2 * kPi - kRounding) {
+    leave_vertex(vertex, 0.0, kNone, 0.0, v.total);
+    settle();
+    return nodes_.size();
+  }
+  // Half a turn or more away from another way between the walls.
+  leave_vertex(vertex, 0.0, kNone, 0.0, v.total - kPi + kRounding);
+  leave_vertex(vertex, 0.0, kNone, kPi - kRounding, v.total);
+  settle();
+  const std::size_t bending = nodes_.size();
+  leave_vertex(vertex, 0.0, kNone, v.total - kPi, kPi);
+  settle();
+  return bending;
 }
 
 void GeodesicSearch::settle() {
@@ -103,6 +148,7 @@ void GeodesicSearch::push(double f, const Node& node) {
 
 void GeodesicSearch::offer_goal(double total, std::uint32_t node) {
   if (total >= best_) return;
+  found_ = true;
   best_ = total;
   best_node_ = node;
 }
@@ -127,6 +173,7 @@ void GeodesicSearch::leave(const Site& start) {
 }
 
 void GeodesicSearch::reach(std::uint32_t edge, const Flat& root, double g, std::uint32_t parent) {
+  if (straight_ && has_goal_) return;
   const UnfoldedMesh::Edge& e = mesh_->edges[edge];
   const double d = g + length(e.at - root);
   double& known = distance_[e.vertex];
@@ -140,7 +187,11 @@ void GeodesicSearch::reach(std::uint32_t edge, const Flat& root, double g, std::
   n.edge = edge;
   n.parent = parent;
   n.is_vertex = true;
-  push(has_goal_ ? d + norm(goal_.position - e.corner) : d, n);
+  if (!straight_) {
+    push(has_goal_ ? d + distance(goal_.position, e.corner) : d, n);
+  } else if (!has_goal_) {
+    nodes_.push_back(n);
+  }
 }
 
 void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left, double g,
@@ -150,6 +201,10 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
   const Flat extent = left - right;
   if (!(dot(extent, extent) > kPoint * kPoint)) return;
   const UnfoldedMesh::Edge& there = mesh_->edges[here.twin];
+  if (straight_ && has_goal_) {
+    open_straight(edge, root, right, left, parent);
+    return;
+  }
   // A way along the edge from one of its ends may be shorter for all of the window.
   const double dr = vertex_distance(here.vertex), dl = vertex_distance(there.vertex);
   if (dr < kInfinity && dr + length(left - here.at) + kRounding < g + length(left - root)) return;
@@ -187,6 +242,47 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
   const double tt = to.x * to.x + to.y * to.y + to.z * to.z, along = te / std::sqrt(ee);
   const double beyond = std::sqrt(max(tt - along * along, 0.0));
   push(g + length_through(root, right, left, along - length(right - here.at), beyond), n);
+}
+
+void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left,
+                                   std::uint32_t parent) {
+  const UnfoldedMesh::Edge &here = mesh_->edges[edge], &there = mesh_->edges[here.twin],
+                           &after = mesh_->edges[mesh_->next(edge)];
+  const double to_right = length(right - root), to_left = length(left - root);
+  // Where there are many: moving off a corner, what is left may shrink by as much, the way there grows by less, so that
+  // the far end is the least.
+  constexpr std::size_t kMany = 24;
+  if (least_ != nullptr && nodes_.size() > kMany) {
+    if (to_left + least_->from(here.vertex) - length(left - here.at) >= best_ ||
+        to_right + least_->from(there.vertex) - length(right - after.at) >= best_) {
+      return;
+    }
+  }
+  Node n;
+  n.root = UnfoldedMesh::across(here, root);
+  n.right = UnfoldedMesh::across(here, right);
+  n.left = UnfoldedMesh::across(here, left);
+  n.edge = here.twin;
+  n.parent = parent;
+  const Flat e = left - right;
+  const double width = length(e);
+  if (there.face == goal_.face) {
+    const Flat to = goal_.at - n.right, along = n.left - n.right;
+    const double f = length_through(n.root, n.right, n.left, dot(to, along) / width, std::abs(cross(along, to)) / width);
+    if (f >= best_) return;
+    nodes_.push_back(n);
+    offer_goal(f, static_cast<std::uint32_t>(nodes_.size() - 1));
+    return;
+  }
+  // From the middle of the window no end is farther than half of it.
+  const Flat side = after.at - here.at;
+  const double at = dot((left + right) * 0.5 - here.at, side) / dot(side, side);
+  const Vec3d &a = here.corner, &b = after.corner;
+  const Vec3d middle{a.x + at * (b.x - a.x), a.y + at * (b.y - a.y), a.z + at * (b.z - a.z)};
+  const double beyond = distance(goal_.position, middle);
+  if (0.5 * (to_right + to_left) + beyond - width >= best_) return;
+  heap_.emplace_back(0.0, static_cast<std::uint32_t>(nodes_.size()));
+  nodes_.push_back(n);
 }
 
 void GeodesicSearch::spread(std::uint32_t face, std::uint32_t first, std::uint32_t count, const Flat& root,

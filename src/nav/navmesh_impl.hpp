@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gsnav/nav/navmesh.hpp"
+#include "corner_hubs.hpp"
 #include "geodesic_search.hpp"
 #include "poly_mesh.hpp"
 
@@ -85,11 +86,16 @@ struct NavMesh::Impl {
   detail::NavMeshPtr mesh;
   detail::PolyMesh polys;
   std::shared_ptr<const detail::UnfoldedMesh> unfolded;  ///< shared with geodesic fields
+  std::unique_ptr<const detail::CornerHubs> hubs;
   Aabb<double> bounds;  ///< world
   std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon
   std::vector<PolyId> first_poly;   ///< of each of Detour's tiles
 
   detail::Site site(const NavPoint& p) const noexcept;
+  /// Length of the shortest path; infinity where there is none.
+  double distance(const detail::Site& start, const detail::Site& goal) const;
+  /// The shortest path, relative to the mesh's origin; no points where there is none.
+  NavPath path(const detail::Site& start, const detail::Site& goal) const;
 
   dtPolyRef ref_of(PolyId id) const noexcept { return refs[id]; }
   PolyId id_of(dtPolyRef ref) const noexcept {

@@ -20,6 +20,13 @@ struct PolyMesh {
     std::uint32_t island = 0;
     double area = 0.0;
     bool planar = false;  ///< corners and height triangles lie in one plane
+    double rise_x = 0, rise_z = 0;  ///< of that plane, a metre along x and z
+  };
+  /// A height triangle as what it takes to find a point in it: shares of corners 1 and 2 are linear on the ground.
+  struct Height {
+    double x = 0, y = 0, z = 0;  ///< corner 0
+    double ux = 0, uz = 0, vx = 0, vz = 0;
+    double rise_u = 0, rise_v = 0;  ///< of corners 1 and 2 above corner 0
   };
   struct Island {
     std::uint32_t first = 0, count = 0;  ///< in `by_island`
@@ -30,6 +37,7 @@ struct PolyMesh {
   std::vector<Vec3d> corners;               ///< edge k of a polygon runs from corner k to the next
   std::vector<PolyId> neighbours;           ///< across each edge; kNoPoly at a wall
   std::vector<std::array<Vec3d, 3>> tris;   ///< height triangles, by polygon
+  std::vector<Height> heights;              ///< of `tris`; zero shares where they have no area on the ground
   std::vector<Island> islands;              ///< by falling area
   std::vector<PolyId> by_island;            ///< polygons, island after island
   double total_area = 0.0;
@@ -57,6 +65,7 @@ struct PolyMesh {
             SurfaceWalk& out) const;
 
  private:
+  void prepare_heights();
   void prepare_sampling();
 };
 
