@@ -154,6 +154,26 @@ void PolyMesh::finish() {
   grid.build(*this);
 }
 
+/// Height triangles where they tile the polygon, else its fan.
+void PolyMesh::add_pieces(PolyId id) {
+  const Poly& p = polys[id];
+  constexpr double kOff = 1e-6;  // metres, square metres
+  double area = 0, covered = 0;
+  for (std::uint32_t k = 1; k + 1 < p.count; ++k) area += cross_xz(corner(p, 0), corner(p, k), corner(p, k + 1));
+  bool tiled = !p.planar;
+  const std::size_t first = pieces.size();
+  for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count && tiled; ++t) {
+    covered += std::abs(cross_xz(tris[t][0], tris[t][1], tris[t][2]));
+    for (const Vec3d& q : tris[t]) tiled = tiled && holds(id, q, kOff);
+    pieces.push_back({tris[t][0], tris[t][1], tris[t][2], id, true});
+  }
+  if (tiled && std::abs(covered - area) <= kOff) return;
+  pieces.resize(first);
+  for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
+    pieces.push_back({corner(p, 0), corner(p, k), corner(p, k + 1), id, p.planar});
+  }
+}
+
 void PolyMesh::prepare_sampling() {
   std::vector<double> weights;
   std::vector<std::vector<double>> weights_in(islands.size());
@@ -162,14 +182,7 @@ void PolyMesh::prepare_sampling() {
     Poly& p = polys[i];
     const Vec3d& o = corner(p, 0);
     Vec3d normal{};
-    for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
-      const Vec3d twice = cross(corner(p, k + 1) - o, corner(p, k) - o);
-      normal += twice;
-      weights_in[p.island].push_back(0.5 * norm(twice));
-      pieces_in[p.island].push_back(static_cast<std::uint32_t>(pieces.size()));
-      weights.push_back(weights_in[p.island].back());
-      pieces.push_back({i, k});
-    }
+    for (std::uint32_t k = 1; k + 1 < p.count; ++k) normal += cross(corner(p, k + 1) - o, corner(p, k) - o);
     const double scale = norm(normal);
     const auto off = [&](const Vec3d& q) { return !(std::abs(dot(normal, q - o)) <= 1e-6 * scale); };
     p.planar = std::abs(normal.y) > 1e-3 * scale;
@@ -179,23 +192,28 @@ void PolyMesh::prepare_sampling() {
     for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
       p.planar = p.planar && !std::any_of(tris[t].begin(), tris[t].end(), off);
     }
+    const std::size_t first = pieces.size();
+    add_pieces(i);
+    for (std::size_t k = first; k < pieces.size(); ++k) {
+      weights.push_back(0.5 * norm(cross(pieces[k].a - pieces[k].o, pieces[k].b - pieces[k].o)));
+      weights_in[p.island].push_back(weights.back());
+      pieces_in[p.island].push_back(static_cast<std::uint32_t>(k));
+    }
   }
   by_area = AliasTable(weights, {});
   for (std::size_t i = 0; i < islands.size(); ++i) by_area_in.emplace_back(weights_in[i], pieces_in[i]);
 }
 
-Vec3d PolyMesh::point_in(const std::array<std::uint32_t, 2>& piece, Rng& rng) const noexcept {
-  const Poly& p = polys[piece[0]];
-  const Vec3d& o = corner(p, 0);
+Vec3d PolyMesh::point_in(const Piece& piece, Rng& rng) const noexcept {
+  const auto &[o, a, b, poly, on_surface] = piece;
   double u = rng.uniform(), v = rng.uniform();
   if (u + v > 1) {  // the other half of the parallelogram
     u = 1 - u;
     v = 1 - v;
   }
-  const Vec3d &a = corner(p, piece[1]), &b = corner(p, piece[1] + 1);
   Vec3d q{o.x + u * (a.x - o.x) + v * (b.x - o.x), o.y + u * (a.y - o.y) + v * (b.y - o.y),
           o.z + u * (a.z - o.z) + v * (b.z - o.z)};
-  if (!p.planar) q.y = height(piece[0], q);
+  if (!on_surface) q.y = height(poly, q);
   return q;
 }
 

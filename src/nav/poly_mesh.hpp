@@ -41,7 +41,13 @@ struct PolyMesh {
   std::vector<Island> islands;              ///< by falling area
   std::vector<PolyId> by_island;            ///< polygons, island after island
   double total_area = 0.0;
-  std::vector<std::array<std::uint32_t, 2>> pieces;  ///< polygon and middle corner of fan triangles
+  /// A triangle to draw points from.
+  struct Piece {
+    Vec3d o{}, a{}, b{};
+    PolyId poly = 0;
+    bool on_surface = false;  ///< else its points have the height of the polygon there
+  };
+  std::vector<Piece> pieces;                         ///< together the whole surface
   AliasTable by_area;                                ///< of `pieces`
   std::vector<AliasTable> by_area_in;                ///< the same, by island
   PolyGrid grid;
@@ -59,7 +65,7 @@ struct PolyMesh {
   /// Height of the surface at (x, z) of q.
   double height(PolyId id, const Vec3d& q) const noexcept;
   /// A point of a piece, uniform.
-  Vec3d point_in(const std::array<std::uint32_t, 2>& piece, Rng& rng) const noexcept;
+  Vec3d point_in(const Piece& piece, Rng& rng) const noexcept;
   /// See NavMesh::walk; positions relative to the mesh's origin.
   void walk(PolyId start_poly, const Vec3d& start, double dx, double dz, bool slide,
             SurfaceWalk& out) const;
@@ -67,6 +73,7 @@ struct PolyMesh {
  private:
   void prepare_heights();
   void prepare_sampling();
+  void add_pieces(PolyId id);
 };
 
 }  // namespace gsnav::detail
