@@ -48,6 +48,16 @@ class RecastLog : public rcContext {
   std::string error_;
 };
 
+/// Cosine of agent_max_slope: triangles that face up more than that can be walked on.
+double slope_cosine(const NavMeshSettings& settings) noexcept;
+
+/// Box of the vertices. Errors: invalid_argument naming a vertex or index.
+Result<Aabb<double>> check_triangles(std::span<const Vec3d> vertices, std::span<const NavMesh::Triangle> triangles);
+
+/// Adds triangles to a heightfield whose frame lies at `origin`. Errors: out_of_memory.
+Status rasterise(RecastLog& log, const NavMeshSettings& settings, std::span<const Vec3d> vertices,
+                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin, rcHeightfield& field);
+
 /// An empty heightfield over a box (relative to the mesh's origin). Errors: the grid exceeds
 /// `settings.max_cells` or the height what Recast can number.
 Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshSettings& settings,
