@@ -16,12 +16,12 @@ constexpr double kRounding = 1e-9;  // metres, or square metres: sights that onl
 
 CornerHubs::CornerHubs(const UnfoldedMesh& mesh) {
   std::vector<std::vector<Link>> links;
-  if (look(mesh, links)) {
-    rank(links);
-    label(links);
-  } else {
+  const bool seen = look(mesh, links);
+  if (seen) rank(links);
+  if (!seen || !label(links)) {
     corners_.clear();
     sights_.clear();
+    sights_.shrink_to_fit();
     first_sight_.clear();
   }
 }
@@ -130,12 +130,13 @@ void CornerHubs::rank(const std::vector<std::vector<Link>>& links) {
                    [&](std::uint32_t a, std::uint32_t b) { return score[a] > score[b]; });
 }
 
-void CornerHubs::label(const std::vector<std::vector<Link>>& links) {
+bool CornerHubs::label(const std::vector<std::vector<Link>>& links) {
   std::vector<std::vector<Label>> labels(corners_.size());
   std::vector<double> to_hub(corners_.size(), kInfinity), best(corners_.size(), kInfinity);
   std::vector<std::uint32_t> next(corners_.size(), 0), touched;
   using Entry = std::pair<double, std::uint32_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  std::size_t work = 0;
   for (std::uint32_t rank = 0; rank < hub_corner_.size(); ++rank) {
     const std::uint32_t hub = hub_corner_[rank];
     for (const Label& l : labels[hub]) to_hub[l.hub] = l.length;
@@ -147,6 +148,8 @@ void CornerHubs::label(const std::vector<std::vector<Link>>& links) {
       const auto [length, c] = queue.top();
       queue.pop();
       if (length > best[c]) continue;
+      work += labels[c].size() + links[c].size();
+      if (work > kMostWork) return false;
       const bool known = std::any_of(labels[c].begin(), labels[c].end(),
                                      [&](const Label& l) { return l.length + to_hub[l.hub] <= length; });
       if (known) continue;
@@ -168,6 +171,7 @@ void CornerHubs::label(const std::vector<std::vector<Link>>& links) {
     labels_.insert(labels_.end(), of_corner.begin(), of_corner.end());
   }
   first_label_.push_back(static_cast<std::uint32_t>(labels_.size()));
+  return true;
 }
 
 void CornerHubs::look_from(const Site& from, const Site& to, std::vector<Seen>& out) const {

@@ -17,9 +17,10 @@ namespace gsnav::detail {
 /// labels, Du, Shen and Cui 2023), on unfolded faces as well as on level ones.
 class CornerHubs {
  public:
-  /// Makes nothing, so that empty() holds, for a mesh of more corners or sights than these: a hall of thousands of
-  /// pillars, each of which sees most others.
-  static constexpr std::size_t kMostCorners = std::size_t{1} << 14, kMostSights = std::size_t{1} << 19;
+  /// Makes nothing, so that empty() holds, for a mesh of more corners or sights than these, or whose labels take more
+  /// comparisons (a tenth of a second): a hall of thousands of pillars, each of which sees many others.
+  static constexpr std::size_t kMostCorners = std::size_t{1} << 12, kMostSights = std::size_t{1} << 19,
+                               kMostWork = std::size_t{1} << 26;
   explicit CornerHubs(const UnfoldedMesh& mesh);
 
   bool empty() const noexcept { return first_sight_.empty(); }
@@ -78,9 +79,10 @@ class CornerHubs {
     std::uint32_t corner = 0;
   };
 
+  /// False where there is too much of it.
   bool look(const UnfoldedMesh& mesh, std::vector<std::vector<Link>>& links);
   void rank(const std::vector<std::vector<Link>>& links);
-  void label(const std::vector<std::vector<Link>>& links);
+  bool label(const std::vector<std::vector<Link>>& links);
   /// The corners that a site sees; the one that leads most nearly to the other site first.
   void look_from(const Site& from, const Site& to, std::vector<Seen>& out) const;
   /// Makes `best` the way by way of two corners where that is shorter.

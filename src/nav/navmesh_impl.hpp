@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -96,7 +97,13 @@ struct NavMesh::Impl {
   detail::NavMeshPtr mesh;
   detail::PolyMesh polys;
   std::shared_ptr<const detail::UnfoldedMesh> unfolded;  ///< shared with geodesic fields
-  std::unique_ptr<const detail::CornerHubs> hubs;
+  /// Made when first asked for: who never asks for a distance pays nothing.
+  const detail::CornerHubs& hubs() const {
+    std::call_once(hubs_once, [&] { made_hubs = std::make_unique<const detail::CornerHubs>(*unfolded); });
+    return *made_hubs;
+  }
+  mutable std::once_flag hubs_once;
+  mutable std::unique_ptr<const detail::CornerHubs> made_hubs;
   Aabb<double> bounds;  ///< world
   std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon
   std::vector<PolyId> first_poly;   ///< of each of Detour's tiles

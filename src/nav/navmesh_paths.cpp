@@ -34,9 +34,9 @@ detail::Site NavMesh::Impl::site(const NavPoint& p) const noexcept {
 
 double NavMesh::Impl::distance(const detail::Site& start, const detail::Site& goal) const {
   detail::GeodesicSearch& search = detail::thread_search();
-  if (hubs->empty() || start.face == goal.face) return search.run(*unfolded, start, goal);
-  const detail::CornerHubs::Way way = hubs->shortest(start, goal);
-  const detail::CornerHubs::LeastToGoal least(*hubs, way);
+  if (hubs().empty() || start.face == goal.face) return search.run(*unfolded, start, goal);
+  const detail::CornerHubs::Way way = hubs().shortest(start, goal);
+  const detail::CornerHubs::LeastToGoal least(hubs(), way);
   const double d = min(way.length, search.run_straight(*unfolded, start, goal, way.length, &least));
   return d < kInfinity ? d : search.run(*unfolded, start, goal);
 }
@@ -49,10 +49,10 @@ NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal)
     if (path.length < kInfinity) path.points = search.path();
     return path;
   };
-  if (hubs->empty() || start.face == goal.face) return searched();
-  const detail::CornerHubs::Way way = hubs->shortest(start, goal);
+  if (hubs().empty() || start.face == goal.face) return searched();
+  const detail::CornerHubs::Way way = hubs().shortest(start, goal);
   NavPath path;
-  const detail::CornerHubs::LeastToGoal least(*hubs, way);
+  const detail::CornerHubs::LeastToGoal least(hubs(), way);
   path.length = search.run_straight(*unfolded, start, goal, way.length, &least);
   if (path.length < kInfinity) {
     path.points = search.path();
@@ -61,7 +61,7 @@ NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal)
   if (!(way.length < kInfinity)) return searched();
   path.length = way.length;
   double done = 0;
-  std::vector<detail::Site> sites = hubs->bends(way);
+  std::vector<detail::Site> sites = hubs().bends(way);
   sites.insert(sites.begin(), start);
   sites.push_back(goal);
   // Leg by leg; its length is known.
