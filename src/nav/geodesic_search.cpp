@@ -17,8 +17,8 @@ Flat turned(const Flat& d, double angle) noexcept {
   return {c * d.x - s * d.y, s * d.x + c * d.y};
 }
 
-/// Shortest way from the window's root through it to a point at `along` the edge from its right end and
-/// `beyond` it (its mirror image where it lies on this side): a lower bound wherever that point is.
+}  // namespace
+
 double length_through(const Flat& root, const Flat& right, const Flat& left, double along, double beyond) noexcept {
   const Flat e = left - right;
   const double width = length(e), inverse = 1.0 / width;
@@ -31,8 +31,6 @@ double length_through(const Flat& root, const Flat& right, const Flat& left, dou
   return std::sqrt((x - rx) * (x - rx) + ry * ry) +
          std::sqrt((along - x) * (along - x) + beyond * beyond);
 }
-
-}  // namespace
 
 GeodesicSearch& thread_search() {
   thread_local GeodesicSearch search;
@@ -72,55 +70,11 @@ double GeodesicSearch::run(const UnfoldedMesh& mesh, const Site& start, const Si
   return kInfinity;
 }
 
-double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound,
-                                    const GoalBound* least) {
-  start_ = start;
-  goal_ = goal;
-  has_goal_ = straight_ = true;
-  every_vertex_ = false;
-  if (start.face == goal.face) return length(goal.at - start.at);
-  begin(mesh, bound);
-  least_ = least;
-  leave(start);
-  // There are few, so that their order saves nothing.
-  constexpr std::size_t kMost = 1 << 14;
-  while (!heap_.empty() && nodes_.size() < kMost) {
-    const std::uint32_t node = heap_.back().second;
-    heap_.pop_back();
-    spread_window(node);
-  }
-  least_ = nullptr;
-  if (!heap_.empty()) return run(mesh, start, goal, bound);
-  return found_ ? best_ : kInfinity;
-}
-
 void GeodesicSearch::flood(const UnfoldedMesh& mesh, const std::vector<Site>& starts) {
   has_goal_ = every_vertex_ = straight_ = false;
   begin(mesh);
   for (const Site& s : starts) leave(s);
   settle();
-}
-
-std::size_t GeodesicSearch::look_around(const UnfoldedMesh& mesh, std::uint32_t vertex) {
-  has_goal_ = every_vertex_ = false;
-  straight_ = true;
-  begin(mesh);
-  const UnfoldedMesh::Vertex& v = mesh.vertices[vertex];
-  seen_[vertex] = round_;
-  distance_[vertex] = 0;
-  if (v.closed || v.total > 2 * kPi - kRounding) {
-    leave_vertex(vertex, 0.0, kNone, 0.0, v.total);
-    settle();
-    return nodes_.size();
-  }
-  // Half a turn or more away from another way between the walls.
-  leave_vertex(vertex, 0.0, kNone, 0.0, v.total - kPi + kRounding);
-  leave_vertex(vertex, 0.0, kNone, kPi - kRounding, v.total);
-  settle();
-  const std::size_t bending = nodes_.size();
-  leave_vertex(vertex, 0.0, kNone, v.total - kPi, kPi);
-  settle();
-  return bending;
 }
 
 void GeodesicSearch::settle() {
@@ -242,47 +196,6 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
   const double tt = to.x * to.x + to.y * to.y + to.z * to.z, along = te / std::sqrt(ee);
   const double beyond = std::sqrt(max(tt - along * along, 0.0));
   push(g + length_through(root, right, left, along - length(right - here.at), beyond), n);
-}
-
-void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left,
-                                   std::uint32_t parent) {
-  const UnfoldedMesh::Edge &here = mesh_->edges[edge], &there = mesh_->edges[here.twin],
-                           &after = mesh_->edges[mesh_->next(edge)];
-  const double to_right = length(right - root), to_left = length(left - root);
-  // Where there are many: moving off a corner, what is left may shrink by as much, the way there grows by less, so that
-  // the far end is the least.
-  constexpr std::size_t kMany = 24;
-  if (least_ != nullptr && nodes_.size() > kMany) {
-    if (to_left + least_->from(here.vertex) - length(left - here.at) >= best_ ||
-        to_right + least_->from(there.vertex) - length(right - after.at) >= best_) {
-      return;
-    }
-  }
-  Node n;
-  n.root = UnfoldedMesh::across(here, root);
-  n.right = UnfoldedMesh::across(here, right);
-  n.left = UnfoldedMesh::across(here, left);
-  n.edge = here.twin;
-  n.parent = parent;
-  const Flat e = left - right;
-  const double width = length(e);
-  if (there.face == goal_.face) {
-    const Flat to = goal_.at - n.right, along = n.left - n.right;
-    const double f = length_through(n.root, n.right, n.left, dot(to, along) / width, std::abs(cross(along, to)) / width);
-    if (f >= best_) return;
-    nodes_.push_back(n);
-    offer_goal(f, static_cast<std::uint32_t>(nodes_.size() - 1));
-    return;
-  }
-  // From the middle of the window no end is farther than half of it.
-  const Flat side = after.at - here.at;
-  const double at = dot((left + right) * 0.5 - here.at, side) / dot(side, side);
-  const Vec3d &a = here.corner, &b = after.corner;
-  const Vec3d middle{a.x + at * (b.x - a.x), a.y + at * (b.y - a.y), a.z + at * (b.z - a.z)};
-  const double beyond = distance(goal_.position, middle);
-  if (0.5 * (to_right + to_left) + beyond - width >= best_) return;
-  heap_.emplace_back(0.0, static_cast<std::uint32_t>(nodes_.size()));
-  nodes_.push_back(n);
 }
 
 void GeodesicSearch::spread(std::uint32_t face, std::uint32_t first, std::uint32_t count, const Flat& root,

@@ -108,6 +108,10 @@ class GeodesicSearch {
   std::uint64_t round_ = 0;
 };
 
+/// Shortest way from the window's root through it to a point at `along` the edge from its right end and
+/// `beyond` it (its mirror image where it lies on this side): a lower bound wherever that point is.
+double length_through(const Flat& root, const Flat& right, const Flat& left, double along, double beyond) noexcept;
+
 /// A search to use until the thread's next one.
 GeodesicSearch& thread_search();
 
