@@ -110,6 +110,20 @@ TEST_CASE("navmesh tool: from Gaussians") {
   const NavMesh mesh = load_navmesh(folder / "g.navmesh").value();
   CHECK(mesh.settings().cell_height == doctest::Approx(0.05));
   CHECK(mesh.navigable_area() > 0.8 * 6 * 4);
+  // A box of triangles on it.
+  write_file(folder / "box.obj",
+             "v 2 0 1\nv 4 0 1\nv 4 0 3\nv 2 0 3\nv 2 1 1\nv 4 1 1\nv 4 1 3\nv 2 1 3\n"
+             "f 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\nf 5 8 7 6\n");
+  const Outcome both = run(folder, quoted(folder / "floor.ply") + " --mesh " + quoted(folder / "box.obj") + " --out " +
+                                       quoted(folder / "b.navmesh"));
+  INFO(both.text);
+  REQUIRE(both.ok);
+  CHECK(both.says("10 triangles"));
+  CHECK(mesh.is_navigable({3, 0, 2}));
+  CHECK_FALSE(load_navmesh(folder / "b.navmesh")->is_navigable({3, 0, 2}));
+  const Outcome wrong = run(folder, quoted(folder / "box.obj") + " --mesh " + quoted(folder / "box.obj"));
+  CHECK_FALSE(wrong.ok);
+  CHECK(wrong.says("has no Gaussians"));
 }
 
 TEST_CASE("navmesh tool: what is wrong is said on one line") {
