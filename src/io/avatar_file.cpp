@@ -11,7 +11,6 @@
 #include "gsnav/io/npz_file.hpp"
 #include "gsnav/kernels/sh.hpp"
 #include "npz_arrays.hpp"
-#include "weight_truncation.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -202,29 +201,23 @@ class AvatarReader {
     for (const std::size_t i : kept_) {
       const double* row = &weights_.values[i * joints];
       double sum = 0.0;
-      std::size_t used = 0;
       for (std::size_t j = 0; j < joints; ++j) {
         indices.push_back(static_cast<std::uint16_t>(j));
         weights.push_back(static_cast<float>(row[j]));
         sum += row[j];
-        used += row[j] > 0 ? 1 : 0;
       }
       if (!(sum > 0)) return bad("lbs_weights: row " + std::to_string(i) + " is all zero");
       unequal += std::fabs(sum - 1.0) > 1e-3 ? 1 : 0;
-      out_.weights.most_weights = std::max(out_.weights.most_weights, used);
     }
     if (unequal != 0) {
       out_.report.warnings.push_back("lbs_weights: " + std::to_string(unequal) +
                                      " rows do not sum to 1; they were divided by their sums");
     }
-    const auto dropped = out_.asset.set_weights(joints, indices, weights, options_.influences);
-    if (!dropped) return bad("lbs_weights: " + dropped.status().message());
-    out_.weights.dropped_mass = *dropped;
-    if (Status s = detail::measure_truncation(out_.asset, weights_.values, kept_, options_, out_.weights); !s) {
-      return {s.code(), file_.source() + ": " + s.message()};
-    }
+    const auto report = choose_weights(out_.asset, joints, indices, weights, options_.weights);
+    if (!report) return {report.code(), file_.source() + ": lbs_weights: " + report.message()};
+    out_.weights = *report;
     if (out_.weights.needs_more != 0) {
-      out_.report.warnings.push_back("lbs_weights: with " + std::to_string(options_.influences) + " weights " +
+      out_.report.warnings.push_back("lbs_weights: with " + std::to_string(out_.weights.influences) + " weights " +
                                      std::to_string(out_.weights.needs_more) + " Gaussians are off by up to " +
                                      std::to_string(1000 * out_.weights.position_error) + " mm");
     }
@@ -247,9 +240,10 @@ class AvatarReader {
 
 Result<LoadedAvatar> load_avatar(const std::filesystem::path& path, const LoadAvatarOptions& options) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedAvatar> {
-    if (options.influences != kInfluences4 && options.influences != kInfluences8) {
-      return {Errc::invalid_argument, path.string() + ": LoadAvatarOptions.influences is " +
-                                          std::to_string(options.influences) + "; 4 or 8 are supported"};
+    const int influences = options.weights.influences;
+    if (influences != 0 && influences != kInfluences4 && influences != kInfluences8) {
+      return {Errc::invalid_argument, path.string() + ": LoadAvatarOptions.weights.influences is " +
+                                          std::to_string(influences) + "; 4, 8 or 0 are supported"};
     }
     const auto file = NpzFile::open(path);
     if (!file) return file.status();
