@@ -20,7 +20,7 @@ struct Component {
   std::size_t bytes;
   double greatest;  // of a normalised integer; 0: float
 };
-constexpr Component kComponents[] = {{5120, 1, 127}, {5121, 1, 255},        {5122, 2, 32767},
+constexpr Component kComponents[] = {{5120, 1, 127},   {5121, 1, 255},          {5122, 2, 32767},
                                      {5123, 2, 65535}, {5125, 4, 4294967295.0}, {5126, 4, 0}};
 
 const Component* component_of(std::int64_t type) {
@@ -32,12 +32,18 @@ const Component* component_of(std::int64_t type) {
 
 double number_at(const std::byte* p, int type) {
   switch (type) {
-    case 5120: return load_le<std::int8_t>(p);
-    case 5121: return load_le<std::uint8_t>(p);
-    case 5122: return load_le<std::int16_t>(p);
-    case 5123: return load_le<std::uint16_t>(p);
-    case 5125: return load_le<std::uint32_t>(p);
-    default: return static_cast<double>(load_le<float>(p));
+    case 5120:
+      return load_le<std::int8_t>(p);
+    case 5121:
+      return load_le<std::uint8_t>(p);
+    case 5122:
+      return load_le<std::int16_t>(p);
+    case 5123:
+      return load_le<std::uint16_t>(p);
+    case 5125:
+      return load_le<std::uint32_t>(p);
+    default:
+      return static_cast<double>(load_le<float>(p));
   }
 }
 
@@ -56,12 +62,18 @@ bool decode_base64(std::string_view text, std::vector<std::byte>& out) {
   out.reserve(text.size() / 4 * 3 + 3);
   for (const char c : text) {
     std::uint32_t v = 0;
-    if (c >= 'A' && c <= 'Z') v = static_cast<std::uint32_t>(c - 'A');
-    else if (c >= 'a' && c <= 'z') v = static_cast<std::uint32_t>(c - 'a') + 26;
-    else if (c >= '0' && c <= '9') v = static_cast<std::uint32_t>(c - '0') + 52;
-    else if (c == '+' || c == '-') v = 62;
-    else if (c == '/' || c == '_') v = 63;
-    else return false;
+    if (c >= 'A' && c <= 'Z')
+      v = static_cast<std::uint32_t>(c - 'A');
+    else if (c >= 'a' && c <= 'z')
+      v = static_cast<std::uint32_t>(c - 'a') + 26;
+    else if (c >= '0' && c <= '9')
+      v = static_cast<std::uint32_t>(c - '0') + 52;
+    else if (c == '+' || c == '-')
+      v = 62;
+    else if (c == '/' || c == '_')
+      v = 63;
+    else
+      return false;
     bits = bits << 6 | v;
     have += 6;
     if (have >= 8) {
@@ -92,7 +104,8 @@ Result<const Json*> GltfDocument::entry(const char* name, std::size_t index) con
   return &e;
 }
 
-Result<std::size_t> GltfDocument::index(const Json& object, const char* key, const char* array, const std::string& at) const {
+Result<std::size_t> GltfDocument::index(const Json& object, const char* key, const char* array,
+                                        const std::string& at) const {
   if (count(array) == 0) return {Errc::invalid_file, at + ": '" + key + "' names one of no " + array};
   const auto v = get_integer(object, key, 0, static_cast<std::int64_t>(count(array)) - 1, at);
   if (!v) return v.status();
@@ -109,7 +122,8 @@ Result<GltfDocument> GltfDocument::open(const std::filesystem::path& path) {
   std::span<const std::byte> text = file->span();
   if (text.size() >= 12 && load_le<std::uint32_t>(text.data()) == kGlbMagic) {
     const std::uint32_t version = load_le<std::uint32_t>(text.data() + 4);
-    if (version != 2) return {Errc::unsupported, out.source_ + ": GLB version " + std::to_string(version) + "; 2 is read"};
+    if (version != 2)
+      return {Errc::unsupported, out.source_ + ": GLB version " + std::to_string(version) + "; 2 is read"};
     std::span<const std::byte> rest = text.subspan(12);
     text = {};
     while (rest.size() >= 8) {
@@ -155,7 +169,9 @@ Result<std::vector<std::byte>> GltfDocument::uri_bytes(const std::string& uri, c
   }
   std::string name;
   for (std::size_t i = 0; i < uri.size(); ++i) {
-    const auto hex = [](char c) { return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1; };
+    const auto hex = [](char c) {
+      return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
+    };
     if (uri[i] == '%' && i + 2 < uri.size() && hex(uri[i + 1]) >= 0 && hex(uri[i + 2]) >= 0) {
       name += static_cast<char>(16 * hex(uri[i + 1]) + hex(uri[i + 2]));
       i += 2;
@@ -220,7 +236,8 @@ Status GltfDocument::fill(const Json& accessor, std::size_t view_index, std::siz
   if (!bytes) return {bytes.code(), at + ": " + bytes.message()};
   std::size_t stride = c.bytes * width;
   if (const Json* e = *entry("bufferViews", view_index); &accessor != e && member(*e, "byteStride") != nullptr) {
-    const auto s = get_integer(*e, "byteStride", static_cast<std::int64_t>(stride), 252, where("bufferViews", view_index));
+    const auto s =
+        get_integer(*e, "byteStride", static_cast<std::int64_t>(stride), 252, where("bufferViews", view_index));
     if (!s) return s.status();
     stride = static_cast<std::size_t>(*s);
   }
@@ -233,7 +250,8 @@ Status GltfDocument::fill(const Json& accessor, std::size_t view_index, std::siz
     const std::byte* p = bytes->data() + offset + i * stride;
     for (std::size_t k = 0; k < width; ++k) {
       double v = number_at(p + k * c.bytes, type);
-      if (!std::isfinite(v)) return {Errc::invalid_file, at + ": element " + std::to_string(i) + " is " + std::to_string(v)};
+      if (!std::isfinite(v))
+        return {Errc::invalid_file, at + ": element " + std::to_string(i) + " is " + std::to_string(v)};
       if (normalized && c.greatest > 0) v = std::max(v / c.greatest, -1.0);
       *out++ = v;
     }
@@ -241,7 +259,8 @@ Status GltfDocument::fill(const Json& accessor, std::size_t view_index, std::siz
   return {};
 }
 
-Status GltfDocument::fill_sparse(const Json& sparse, int type, bool normalized, const std::string& at, GltfNumbers& out) {
+Status GltfDocument::fill_sparse(const Json& sparse, int type, bool normalized, const std::string& at,
+                                 GltfNumbers& out) {
   const std::string here = at + ": sparse";
   const auto many = get_integer(sparse, "count", 0, static_cast<std::int64_t>(out.count), here);
   if (!many) return many.status();
@@ -262,14 +281,16 @@ Status GltfDocument::fill_sparse(const Json& sparse, int type, bool normalized, 
   };
   const auto kind = get_integer(*indices, "componentType", 5121, 5125, here);
   if (!kind) return kind.status();
-  if (component_of(*kind) == nullptr) return {Errc::invalid_file, here + ": 'componentType' is " + std::to_string(*kind)};
+  if (component_of(*kind) == nullptr)
+    return {Errc::invalid_file, here + ": 'componentType' is " + std::to_string(*kind)};
   if (Status s = part(*indices, 1, rows.data(), static_cast<int>(*kind), false); !s) return s;
   if (Status s = part(*values, out.width, data.data(), type, normalized); !s) return s;
   for (std::size_t i = 0; i < n; ++i) {
     if (!(rows[i] >= 0 && rows[i] < static_cast<double>(out.count))) {
       return {Errc::invalid_file, here + ": index " + std::to_string(rows[i]) + " of " + std::to_string(out.count)};
     }
-    std::copy_n(data.data() + i * out.width, out.width, out.values.data() + static_cast<std::size_t>(rows[i]) * out.width);
+    std::copy_n(data.data() + i * out.width, out.width,
+                out.values.data() + static_cast<std::size_t>(rows[i]) * out.width);
   }
   return {};
 }

@@ -85,7 +85,8 @@ Result<std::vector<Channel>> read_channels(GltfDocument& file, const Json& anima
     }
     if (blend != nullptr && *blend == "STEP") c.blend = Blend::step;
     if (blend != nullptr && *blend == "CUBICSPLINE") c.blend = Blend::cubic;
-    const auto input = file.index(sampler, "input", "accessors", here), output = file.index(sampler, "output", "accessors", here);
+    const auto input = file.index(sampler, "input", "accessors", here),
+               output = file.index(sampler, "output", "accessors", here);
     if (!input) return input.status();
     if (!output) return output.status();
     auto times = file.read(*input, "SCALAR");
@@ -93,11 +94,13 @@ Result<std::vector<Channel>> read_channels(GltfDocument& file, const Json& anima
     auto values = file.read(*output, c.width == 4 ? "VEC4" : "VEC3");
     if (!values) return values.status();
     if (values->count != times->count * (c.blend == Blend::cubic ? 3 : 1)) {
-      return {Errc::invalid_file, here + ": " + std::to_string(values->count) + " values for " + std::to_string(times->count) + " keys"};
+      return {Errc::invalid_file,
+              here + ": " + std::to_string(values->count) + " values for " + std::to_string(times->count) + " keys"};
     }
     for (std::size_t k = 0; k < times->count; ++k) {
       if (!(times->values[k] >= 0) || (k > 0 && !(times->values[k] > times->values[k - 1]))) {
-        return {Errc::invalid_file, here + ": key " + std::to_string(k) + " is at " + std::to_string(times->values[k]) + " s"};
+        return {Errc::invalid_file,
+                here + ": key " + std::to_string(k) + " is at " + std::to_string(times->values[k]) + " s"};
       }
     }
     c.times = std::move(times->values);
@@ -157,7 +160,8 @@ Status read_clips(GltfDocument& file, const GltfSkin& skin, const GltfNodes& nod
     const Grid grid = grid_of(*channels, frame_rate);
     constexpr std::size_t kMostMatrices = std::size_t{1} << 22;
     if (grid.keys > kMostMatrices / skin.nodes.size()) {
-      return {Errc::unsupported, at + ": " + std::to_string(grid.keys) + " keys at " + std::to_string(grid.rate) + " a second"};
+      return {Errc::unsupported,
+              at + ": " + std::to_string(grid.keys) + " keys at " + std::to_string(grid.rate) + " a second"};
     }
     std::vector<Affine3<double>> matrices;
     for (std::size_t k = 0; k < grid.keys; ++k) {

@@ -35,8 +35,8 @@ ScaledLinear scaled_rotation_of(const Mat3d& m) {
   return out;
 }
 
-/// The rotation of multiples of 90 degrees that is within 30 degrees of `m`, else `m`. Meshes are bound upright, whatever
-/// the pose that the file shows.
+/// The rotation of multiples of 90 degrees that is within 30 degrees of `m`, else `m`. Meshes are bound upright,
+/// whatever the pose that the file shows.
 Mat3d squared(const Mat3d& m) {
   Mat3d out;
   for (int i = 0; i < 3; ++i) {
@@ -53,21 +53,25 @@ std::vector<double> joint_loads(GltfDocument& file, std::size_t skin, std::size_
   for (std::size_t n = 0; n < file.count("nodes"); ++n) {
     const Json& node = **file.entry("nodes", n);
     const Json *which = member(node, "skin"), *mesh = member(node, "mesh");
-    if (mesh == nullptr || which == nullptr || !which->is_number() || which->get<double>() != static_cast<double>(skin)) continue;
+    if (mesh == nullptr || which == nullptr || !which->is_number() || which->get<double>() != static_cast<double>(skin))
+      continue;
     const auto m = file.index(node, "mesh", "meshes", "");
     const auto entry = m ? file.entry("meshes", *m) : Result<const Json*>(m.status());
     const Json* primitives = entry ? member(**entry, "primitives") : nullptr;
     if (primitives == nullptr || !primitives->is_array()) continue;
     for (const Json& p : *primitives) {
       const Json* attributes = member(p, "attributes");
-      const auto j = attributes == nullptr ? Result<std::size_t>(Errc::invalid_file, "") : file.index(*attributes, "JOINTS_0", "accessors", "");
-      const auto w = attributes == nullptr ? Result<std::size_t>(Errc::invalid_file, "") : file.index(*attributes, "WEIGHTS_0", "accessors", "");
+      const auto j = attributes == nullptr ? Result<std::size_t>(Errc::invalid_file, "")
+                                           : file.index(*attributes, "JOINTS_0", "accessors", "");
+      const auto w = attributes == nullptr ? Result<std::size_t>(Errc::invalid_file, "")
+                                           : file.index(*attributes, "WEIGHTS_0", "accessors", "");
       if (!j || !w) continue;
       const auto indices = file.read(*j, "VEC4"), weights = file.read(*w, "VEC4");
       if (!indices || !weights) continue;
       for (std::size_t i = 0; i < std::min(indices->values.size(), weights->values.size()); ++i) {
         const double joint = indices->values[i];
-        if (joint >= 0 && joint < static_cast<double>(joints)) out[static_cast<std::size_t>(joint)] += std::max(0.0, weights->values[i]);
+        if (joint >= 0 && joint < static_cast<double>(joints))
+          out[static_cast<std::size_t>(joint)] += std::max(0.0, weights->values[i]);
       }
     }
   }
@@ -151,7 +155,8 @@ Result<GltfSkin> read_skin(GltfDocument& file, const GltfNodes& nodes, std::size
     const double n = (*list)[j].is_number() ? (*list)[j].get<double>() : -1.0;
     if (!(n >= 0 && n < static_cast<double>(nodes.nodes.size())) || n != std::floor(n) ||
         place[static_cast<std::size_t>(n)] != none) {
-      return {Errc::invalid_file, at + ": 'joints[" + std::to_string(j) + "]' is " + shown((*list)[j]) + ": no node, or one twice"};
+      return {Errc::invalid_file,
+              at + ": 'joints[" + std::to_string(j) + "]' is " + shown((*list)[j]) + ": no node, or one twice"};
     }
     place[static_cast<std::size_t>(n)] = j;
   }
@@ -161,7 +166,9 @@ Result<GltfSkin> read_skin(GltfDocument& file, const GltfNodes& nodes, std::size
     if (!a) return a.status();
     const auto m = file.read(*a, "MAT4");
     if (!m) return m.status();
-    if (m->count < count) return {Errc::invalid_file, at + ": " + std::to_string(m->count) + " inverse binds for " + std::to_string(count) + " joints"};
+    if (m->count < count)
+      return {Errc::invalid_file,
+              at + ": " + std::to_string(m->count) + " inverse binds for " + std::to_string(count) + " joints"};
     for (std::size_t j = 0; j < count; ++j) {
       for (int i = 0; i < 3; ++i) {
         for (int k = 0; k < 3; ++k) binds[j].linear(i, k) = m->row(j)[4 * k + i];
@@ -186,7 +193,8 @@ Result<GltfSkin> read_skin(GltfDocument& file, const GltfNodes& nodes, std::size
   const Affine3<double> placed_by = globals[out.nodes[most]] * out.inverse_binds[most];
   const ScaledLinear placed = scaled_rotation_of(placed_by.linear);
   constexpr double kShear = 0.02;
-  if (placed.off > kShear) return {Errc::invalid_file, at + ": the bind of joint " + std::to_string(most) + " is not rigid times a scale"};
+  if (placed.off > kShear)
+    return {Errc::invalid_file, at + ": the bind of joint " + std::to_string(most) + " is not rigid times a scale"};
   const Mat3d upright = rotation_matrix(out.canonical_from_scene) * squared(placed.rotation), back = transpose(upright);
   out.canonical_from_mesh = {upright * placed.scale, {}};
   Skeleton& skeleton = out.skeleton;
@@ -194,12 +202,15 @@ Result<GltfSkin> read_skin(GltfDocument& file, const GltfNodes& nodes, std::size
   for (std::size_t j = 0; j < out.nodes.size(); ++j) {
     std::int64_t up = nodes.parents[out.nodes[j]];
     while (up >= 0 && place[static_cast<std::size_t>(up)] == none) up = nodes.parents[static_cast<std::size_t>(up)];
-    skeleton.parents.push_back(up < 0 ? -1 : static_cast<std::int32_t>(out.joint_of[place[static_cast<std::size_t>(up)]]));
+    skeleton.parents.push_back(up < 0 ? -1
+                                      : static_cast<std::int32_t>(out.joint_of[place[static_cast<std::size_t>(up)]]));
     const ScaledLinear b = scaled_rotation_of(out.inverse_binds[j].linear);
     if (load[j] > 0 && (b.off > kShear || !is_finite(out.inverse_binds[j].translation))) {
-      return {Errc::invalid_file, at + ": the inverse bind of joint \"" + skeleton.names[j] + "\" is not rigid times a scale"};
+      return {Errc::invalid_file,
+              at + ": the inverse bind of joint \"" + skeleton.names[j] + "\" is not rigid times a scale"};
     }
-    skeleton.inverse_binds.push_back({b.rotation * back, out.inverse_binds[j].translation * (placed.scale / std::max(b.scale, 1e-12))});
+    skeleton.inverse_binds.push_back(
+        {b.rotation * back, out.inverse_binds[j].translation * (placed.scale / std::max(b.scale, 1e-12))});
   }
   // Joints that move nothing may have any bind: they keep the place that the file shows them in beside one that does.
   const std::vector<Affine3<double>> shown_at = rigid_joints(out, globals);
@@ -217,7 +228,8 @@ Result<GltfSkin> read_skin(GltfDocument& file, const GltfNodes& nodes, std::size
   for (std::size_t j = 0; j < out.nodes.size(); ++j) {
     const Affine3<double> global = rigid_inverse(skeleton.inverse_binds[j]);
     const std::int32_t parent = skeleton.parents[j];
-    skeleton.rest_local.push_back(parent < 0 ? global : skeleton.inverse_binds[static_cast<std::size_t>(parent)] * global);
+    skeleton.rest_local.push_back(parent < 0 ? global
+                                             : skeleton.inverse_binds[static_cast<std::size_t>(parent)] * global);
   }
   if (Status s = skeleton.validate(); !s) return {Errc::invalid_file, at + ": " + s.message()};
   return out;

@@ -11,11 +11,11 @@ namespace gsnav::io::detail {
 
 /// A skin: the file's own matrices, and the rigid skeleton made of them.
 struct GltfSkin {
-  std::vector<std::size_t> nodes;             ///< [J] of the skeleton's joints
-  std::vector<std::size_t> joint_of;          ///< the skeleton's joint of each entry of the file's list
-  std::vector<Affine3<double>> inverse_binds; ///< [J] the file's
-  Affine3<double> canonical_from_mesh{};      ///< a rotation times a scale, and a translation
-  Quatd canonical_from_scene{0, 0, 1, 0};     ///< by 180 degrees about Y: glTF faces +Z
+  std::vector<std::size_t> nodes;              ///< [J] of the skeleton's joints
+  std::vector<std::size_t> joint_of;           ///< the skeleton's joint of each entry of the file's list
+  std::vector<Affine3<double>> inverse_binds;  ///< [J] the file's
+  Affine3<double> canonical_from_mesh{};       ///< a rotation times a scale, and a translation
+  Quatd canonical_from_scene{0, 0, 1, 0};      ///< by 180 degrees about Y: glTF faces +Z
   Skeleton skeleton;
 };
 

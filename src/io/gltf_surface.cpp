@@ -45,7 +45,8 @@ class SurfaceReader {
     const auto mesh = file_.entry("meshes", index);
     if (!mesh) return mesh.status();
     const Json* primitives = member(**mesh, "primitives");
-    if (primitives == nullptr || !primitives->is_array()) return {Errc::invalid_file, file_.where("meshes", index) + " has no primitives"};
+    if (primitives == nullptr || !primitives->is_array())
+      return {Errc::invalid_file, file_.where("meshes", index) + " has no primitives"};
     for (std::size_t p = 0; p < primitives->size(); ++p) {
       const std::string at = file_.where("meshes", index) + ".primitives[" + std::to_string(p) + "]";
       if (Status s = read_primitive((*primitives)[p], at); !s) return s;
@@ -54,7 +55,8 @@ class SurfaceReader {
   }
 
   /// Reads attribute `name`, [count][width], or nothing where it is not there.
-  Result<GltfNumbers> attribute(const Json& attributes, const std::string& name, const std::string& types, const std::string& at) {
+  Result<GltfNumbers> attribute(const Json& attributes, const std::string& name, const std::string& types,
+                                const std::string& at) {
     if (member(attributes, name.c_str()) == nullptr) return GltfNumbers{};
     const auto a = file_.index(attributes, name.c_str(), "accessors", at);
     if (!a) return a.status();
@@ -84,14 +86,17 @@ class SurfaceReader {
       mesh_.positions.push_back(skin_.canonical_from_mesh * Vec3d{p[0], p[1], p[2]});
     }
     if (Status s = read_weights(*attributes, at); !s) return s;
-    const auto uv = attribute(*attributes, "TEXCOORD_0", "VEC2", at), color = attribute(*attributes, "COLOR_0", "VEC3 VEC4", at);
+    const auto uv = attribute(*attributes, "TEXCOORD_0", "VEC2", at),
+               color = attribute(*attributes, "COLOR_0", "VEC3 VEC4", at);
     if (!uv) return uv.status();
     if (!color) return color.status();
     uvs_.resize(first, {0, 0});
     colors_.resize(first, {1, 1, 1});
     for (std::size_t v = 0; v < vertices_; ++v) {
-      uvs_.push_back(uv->count == 0 ? std::array<double, 2>{0, 0} : std::array<double, 2>{uv->row(v)[0], uv->row(v)[1]});
-      colors_.push_back(color->count == 0 ? Vec3d{1, 1, 1} : Vec3d{color->row(v)[0], color->row(v)[1], color->row(v)[2]});
+      uvs_.push_back(uv->count == 0 ? std::array<double, 2>{0, 0}
+                                    : std::array<double, 2>{uv->row(v)[0], uv->row(v)[1]});
+      colors_.push_back(color->count == 0 ? Vec3d{1, 1, 1}
+                                          : Vec3d{color->row(v)[0], color->row(v)[1], color->row(v)[2]});
     }
     has_uvs_ = has_uvs_ || uv->count != 0;
     has_colors_ = has_colors_ || color->count != 0;
@@ -108,7 +113,8 @@ class SurfaceReader {
       if (!j) return j.status();
       if (!w) return w.status();
       if (j->count == 0 && w->count == 0) break;
-      if (j->count == 0 || w->count == 0) return {Errc::invalid_file, at + ": JOINTS and WEIGHTS " + std::to_string(set) + " must come together"};
+      if (j->count == 0 || w->count == 0)
+        return {Errc::invalid_file, at + ": JOINTS and WEIGHTS " + std::to_string(set) + " must come together"};
       joints.push_back(std::move(*j));
       weights.push_back(std::move(*w));
     }
@@ -119,17 +125,19 @@ class SurfaceReader {
       for (std::size_t set = 0; set < joints.size(); ++set) {
         for (std::size_t k = 0; k < 4; ++k) {
           const double w = weights[set].row(v)[k], j = joints[set].row(v)[k];
-          if (!(w >= 0)) return {Errc::invalid_file, at + ": vertex " + std::to_string(v) + " has weight " + std::to_string(w)};
+          if (!(w >= 0))
+            return {Errc::invalid_file, at + ": vertex " + std::to_string(v) + " has weight " + std::to_string(w)};
           if (!(w > 0)) continue;
           if (!(j >= 0 && j < static_cast<double>(skin_.joint_of.size())) || j != std::floor(j)) {
-            return {Errc::invalid_file, at + ": vertex " + std::to_string(v) + " names joint " + std::to_string(j) + " of " +
-                                            std::to_string(skin_.joint_of.size())};
+            return {Errc::invalid_file, at + ": vertex " + std::to_string(v) + " names joint " + std::to_string(j) +
+                                            " of " + std::to_string(skin_.joint_of.size())};
           }
           row.emplace_back(skin_.joint_of[static_cast<std::size_t>(j)], w);
           sum += w;
         }
       }
-      if (!(sum > 0)) return {Errc::invalid_file, at + ": the weights of vertex " + std::to_string(v) + " are all zero"};
+      if (!(sum > 0))
+        return {Errc::invalid_file, at + ": the weights of vertex " + std::to_string(v) + " are all zero"};
       SkinnedMeshReport& report = out_.report;
       report.unequal_weights += std::fabs(sum - 1.0) > 1e-3 ? 1 : 0;
       report.least_weight_sum = std::min(report.least_weight_sum, sum);
@@ -155,7 +163,8 @@ class SurfaceReader {
       for (std::size_t k = 0; k < 3; ++k) {
         const double c = corners[t + k];
         if (!(c >= 0 && c < static_cast<double>(vertices_)) || c != std::floor(c)) {
-          return {Errc::invalid_file, at + ": index " + std::to_string(c) + " of " + std::to_string(vertices_) + " vertices"};
+          return {Errc::invalid_file,
+                  at + ": index " + std::to_string(c) + " of " + std::to_string(vertices_) + " vertices"};
         }
         triangle[k] = static_cast<std::uint32_t>(first + static_cast<std::size_t>(c));
       }
@@ -276,7 +285,8 @@ class SurfaceReader {
     report.vertices = mesh_.positions.size();
     report.triangles = mesh_.triangles.size();
     if (report.unequal_weights != 0) {
-      warn("the weights of " + std::to_string(report.unequal_weights) + " vertices do not sum to 1; they were divided by their sums");
+      warn("the weights of " + std::to_string(report.unequal_weights) +
+           " vertices do not sum to 1; they were divided by their sums");
     }
     if (others_ != 0) warn(std::to_string(others_) + " meshes are not moved by this skin and are left out");
   }

@@ -21,9 +21,7 @@ struct ErrorHandler {
   std::jmp_buf jump{};
 };
 
-[[noreturn]] void on_error(j_common_ptr info) {
-  std::longjmp(reinterpret_cast<ErrorHandler*>(info->err)->jump, 1);
-}
+[[noreturn]] void on_error(j_common_ptr info) { std::longjmp(reinterpret_cast<ErrorHandler*>(info->err)->jump, 1); }
 void on_message(j_common_ptr, int) {}
 void print_message(j_common_ptr) {}
 
@@ -43,7 +41,8 @@ class JpegDecoder {
   bool read_header(std::span<const std::byte> bytes) {
     if (setjmp(error_.jump) != 0) return false;
     jpeg_create_decompress(&info_);
-    jpeg_mem_src(&info_, reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<unsigned long>(bytes.size()));
+    jpeg_mem_src(&info_, reinterpret_cast<const unsigned char*>(bytes.data()),
+                 static_cast<unsigned long>(bytes.size()));
     if (jpeg_read_header(&info_, TRUE) != JPEG_HEADER_OK) return false;
     if (info_.image_width > kLargestSide || info_.image_height > kLargestSide) return false;
     info_.out_color_space = JCS_RGB;
@@ -75,8 +74,9 @@ Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string
   }
   // An 8 x 8 block of three planes takes a bit of the file each at least.
   if (decoder.width() * decoder.height() / 512 > bytes.size()) {
-    return {Errc::invalid_file, name + ": " + std::to_string(decoder.width()) + " x " + std::to_string(decoder.height()) +
-                                    " pixels cannot be in " + std::to_string(bytes.size()) + " bytes"};
+    return {Errc::invalid_file, name + ": " + std::to_string(decoder.width()) + " x " +
+                                    std::to_string(decoder.height()) + " pixels cannot be in " +
+                                    std::to_string(bytes.size()) + " bytes"};
   }
   std::vector<unsigned char> pixels(3 * decoder.width() * decoder.height());
   if (!decoder.read_rows(pixels.data())) return {Errc::invalid_file, name + ": damaged or truncated JPEG data"};

@@ -28,9 +28,7 @@ Result<Json> read_json(const fs::path& path) {
   return detail::parse_json(file->span(), path.string());
 }
 
-std::string_view text_of(const detail::FileBytes& f) {
-  return {reinterpret_cast<const char*>(f.data.get()), f.size};
-}
+std::string_view text_of(const detail::FileBytes& f) { return {reinterpret_cast<const char*>(f.data.get()), f.size}; }
 
 /// All vertices of the file, in its units, and the faces of one group.
 struct BaseMesh {
@@ -66,17 +64,20 @@ Result<BaseMesh> read_base(const fs::path& path, const std::string& group) {
         corners.push_back(static_cast<std::uint32_t>(index) - 1);
       }
       if (corners.size() < 3) return lines.bad("a face of " + std::to_string(corners.size()) + " corners");
-      for (std::size_t k = 2; k < corners.size(); ++k) out.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+      for (std::size_t k = 2; k < corners.size(); ++k)
+        out.triangles.push_back({corners[0], corners[k - 1], corners[k]});
     }
   }
-  if (out.triangles.empty()) return {Errc::invalid_file, source + ": there are no faces in the group " + in_quotes(group)};
+  if (out.triangles.empty())
+    return {Errc::invalid_file, source + ": there are no faces in the group " + in_quotes(group)};
   return out;
 }
 
 /// Moves the vertices by `amount` of a target's offsets.
 Status apply_target(const fs::path& path, double amount, BaseMesh& mesh) {
   const std::string source = path.string();
-  if (!std::isfinite(amount)) return {Errc::invalid_argument, source + ": MakeHumanOptions.targets: the amount is not finite"};
+  if (!std::isfinite(amount))
+    return {Errc::invalid_argument, source + ": MakeHumanOptions.targets: the amount is not finite"};
   const auto file = detail::read_file(path);
   if (!file) return file.status();
   TextLines lines(text_of(*file), source);
@@ -114,13 +115,15 @@ Status read_skeleton(const Json& json, const std::string& source, const BaseMesh
     for (const Json& v : *vertices) {
       const double i = v.is_number() ? v.get<double>() : -1.0;
       if (!(i >= 0 && i < static_cast<double>(mesh.vertices.size())) || i != std::floor(i)) {
-        return bad("joint " + shown(*head) + " names vertex " + shown(v) + " of " + std::to_string(mesh.vertices.size()));
+        return bad("joint " + shown(*head) + " names vertex " + shown(v) + " of " +
+                   std::to_string(mesh.vertices.size()));
       }
       sum += mesh.vertices[static_cast<std::size_t>(i)];
     }
     heads[name] = sum * (1.0 / static_cast<double>(vertices->size()));
     const std::string above = parent != nullptr && parent->is_string() ? parent->get<std::string>() : std::string();
-    if (!above.empty() && !bones->contains(above)) return bad("bone " + in_quotes(name) + " has the parent " + in_quotes(above) + ", which is no bone");
+    if (!above.empty() && !bones->contains(above))
+      return bad("bone " + in_quotes(name) + " has the parent " + in_quotes(above) + ", which is no bone");
     children[above].push_back(name);
   }
   std::vector<std::pair<std::string, std::int32_t>> open;
@@ -153,7 +156,8 @@ class WeightReader {
       for (const Json& pair : list) {
         const bool two = pair.is_array() && pair.size() == 2 && pair[0].is_number() && pair[1].is_number();
         const double v = two ? pair[0].get<double>() : -1, w = two ? pair[1].get<double>() : -1;
-        if (!(v >= 0 && v < static_cast<double>(rows_.size())) || v != std::floor(v) || !(w >= 0) || !std::isfinite(w)) {
+        if (!(v >= 0 && v < static_cast<double>(rows_.size())) || v != std::floor(v) || !(w >= 0) ||
+            !std::isfinite(w)) {
           return {Errc::invalid_file, at + ": " + pair.dump().substr(0, 60) + " is no vertex with a weight"};
         }
         if (w > 0) rows_[static_cast<std::size_t>(v)].emplace_back(static_cast<std::uint16_t>(joint), w);
@@ -245,7 +249,8 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
   fs::path weights_path = options.weights;
   if (weights_path.empty()) {
     const Json* name = member(*bones, "weights_file");
-    if (name == nullptr || !name->is_string()) return {Errc::invalid_file, source + ": no 'weights_file', and MakeHumanOptions.weights is empty"};
+    if (name == nullptr || !name->is_string())
+      return {Errc::invalid_file, source + ": no 'weights_file', and MakeHumanOptions.weights is empty"};
     weights_path = options.skeleton.parent_path() / fs::path(name->get<std::string>()).filename();
   }
   const auto weights = read_json(weights_path);
@@ -267,7 +272,8 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
                               " vertices do not sum to 1; they were divided by their sums");
   }
   if (report.without_weights != 0) {
-    report.warnings.push_back(std::to_string(report.without_weights) + " vertices without weights take those of the nearest");
+    report.warnings.push_back(std::to_string(report.without_weights) +
+                              " vertices without weights take those of the nearest");
   }
   if (Status s = mesh.validate(); !s) return {Errc::invalid_file, path.string() + ": " + s.message()};
   return out;

@@ -15,8 +15,8 @@
 namespace gsnav::io {
 namespace {
 
-using detail::TextLines;
 using detail::in_quotes;
+using detail::TextLines;
 
 constexpr double kRadians = 3.14159265358979323846 / 180.0;
 constexpr std::size_t kMostBones = 1024;
@@ -24,9 +24,9 @@ constexpr std::size_t kMostBones = 1024;
 struct Bone {
   std::string name;
   Vec3d direction{};
-  double length = 0.0;      // in the file's units
-  Quatd axis{};             // C
-  std::vector<int> turns;   // axes of its rotations as they are listed: 0 x, 1 y, 2 z
+  double length = 0.0;     // in the file's units
+  Quatd axis{};            // C
+  std::vector<int> turns;  // axes of its rotations as they are listed: 0 x, 1 y, 2 z
   std::vector<std::size_t> children;
 };
 
@@ -102,7 +102,8 @@ class AsfReader {
       if (!(out_.length_unit > 0)) return lines_.bad("length is not positive");
     }
     if (lines_.word(0) == "angle") {
-      if (lines_.word(1) != "deg" && lines_.word(1) != "rad") return lines_.bad(in_quotes(lines_.word(1)) + " is no unit of angles");
+      if (lines_.word(1) != "deg" && lines_.word(1) != "rad")
+        return lines_.bad(in_quotes(lines_.word(1)) + " is no unit of angles");
       out_.angle_unit = lines_.word(1) == "deg" ? kRadians : 1.0;
     }
     return {};
@@ -133,7 +134,8 @@ class AsfReader {
       for (std::size_t k = 1; k < lines_.words().size(); ++k) {
         const std::string_view w = lines_.word(k);
         const char kind = static_cast<char>(std::toupper(static_cast<unsigned char>(w.front())));
-        if (w.size() != 2 || (kind != 'T' && kind != 'R') || axis_of(w[1]) < 0) return lines_.bad(in_quotes(w) + " is no channel");
+        if (w.size() != 2 || (kind != 'T' && kind != 'R') || axis_of(w[1]) < 0)
+          return lines_.bad(in_quotes(w) + " is no channel");
         out_.root_order.emplace_back(kind == 'R', axis_of(w[1]));
       }
     }
@@ -241,7 +243,11 @@ class AmcReader {
     rest_ = skeleton.rest_local[0].translation;
     std::size_t given = 0, wanted = 1;
     for (const Bone& b : file_.bones) wanted += b.turns.empty() ? 0 : 1;
-    const auto whole = [&] { return given == wanted ? Status() : lines_.bad("a frame of " + std::to_string(given) + " bones, must be " + std::to_string(wanted)); };
+    const auto whole = [&] {
+      return given == wanted
+                 ? Status()
+                 : lines_.bad("a frame of " + std::to_string(given) + " bones, must be " + std::to_string(wanted));
+    };
     std::vector<bool> seen(file_.bones.size());
     while (lines_.next()) {
       const std::string_view word = lines_.word(0);
@@ -321,20 +327,26 @@ Result<LoadedMotion> load_amc(const std::filesystem::path& skeleton, const std::
   return detail::guarded(motion.string(), [&]() -> Result<LoadedMotion> {
     const std::string name = skeleton.string(), clip_name = motion.string();
     const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
-    if (!positive(options.frame_rate)) return {Errc::invalid_argument, clip_name + ": AmcOptions.frame_rate must be positive"};
-    if (options.scale != 0 && !positive(options.scale)) return {Errc::invalid_argument, clip_name + ": AmcOptions.scale must be positive"};
+    if (!positive(options.frame_rate))
+      return {Errc::invalid_argument, clip_name + ": AmcOptions.frame_rate must be positive"};
+    if (options.scale != 0 && !positive(options.scale))
+      return {Errc::invalid_argument, clip_name + ": AmcOptions.scale must be positive"};
     const auto asf = detail::read_file(skeleton), amc = detail::read_file(motion);
     if (!asf) return asf.status();
     if (!amc) return amc.status();
-    const auto text = [](const detail::FileBytes& f) { return std::string_view(reinterpret_cast<const char*>(f.data.get()), f.size); };
+    const auto text = [](const detail::FileBytes& f) {
+      return std::string_view(reinterpret_cast<const char*>(f.data.get()), f.size);
+    };
     const auto file = AsfReader(text(*asf), name).run();
     if (!file) return file.status();
     const double scale = options.scale > 0 ? options.scale : 0.0254 / file->length_unit;
     LoadedMotion out;
     std::vector<std::size_t> joints;
-    if (Status s = build_skeleton(*file, scale, name, out.skeleton, joints); !s) return {Errc::invalid_file, s.message()};
+    if (Status s = build_skeleton(*file, scale, name, out.skeleton, joints); !s)
+      return {Errc::invalid_file, s.message()};
     out.clip.frame_rate = options.frame_rate;
-    if (Status s = AmcReader(text(*amc), clip_name, *file, scale, options.z_up).run(joints, out.skeleton, out.clip); !s) {
+    if (Status s = AmcReader(text(*amc), clip_name, *file, scale, options.z_up).run(joints, out.skeleton, out.clip);
+        !s) {
       return {Errc::invalid_file, s.message()};
     }
     return out;

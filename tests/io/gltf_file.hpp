@@ -19,8 +19,8 @@ using nlohmann::json;
 
 /// A glTF file in the making: arrays go into one buffer.
 struct TestGltf {
-  json doc = {{"asset", {{"version", "2.0"}}}, {"buffers", json::array()},  {"bufferViews", json::array()},
-              {"accessors", json::array()},    {"nodes", json::array()},    {"meshes", json::array()},
+  json doc = {{"asset", {{"version", "2.0"}}}, {"buffers", json::array()}, {"bufferViews", json::array()},
+              {"accessors", json::array()},    {"nodes", json::array()},   {"meshes", json::array()},
               {"skins", json::array()},        {"scenes", json::array()}};
   std::string bytes;
 
@@ -31,8 +31,10 @@ struct TestGltf {
     json view = {{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", values.size() * sizeof(T)}};
     doc["bufferViews"].push_back(view);
     bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
-    json accessor = {{"bufferView", doc["bufferViews"].size() - 1}, {"componentType", component},
-                     {"count", values.size() / widths.at(type)},    {"type", type}};
+    json accessor = {{"bufferView", doc["bufferViews"].size() - 1},
+                     {"componentType", component},
+                     {"count", values.size() / widths.at(type)},
+                     {"type", type}};
     if (normalized) accessor["normalized"] = true;
     doc["accessors"].push_back(accessor);
     return doc["accessors"].size() - 1;
@@ -107,7 +109,10 @@ class GltfTruth {
         const char* p = bytes_.data() + v.value("byteOffset", 0u) + a.value("byteOffset", 0u) + i * stride + k * size;
         float f = 0;
         std::uint32_t u = 0;
-        if (kind == 5126) std::memcpy(&f, p, 4); else std::memcpy(&u, p, size);
+        if (kind == 5126)
+          std::memcpy(&f, p, 4);
+        else
+          std::memcpy(&u, p, size);
         const Real scale = a.value("normalized", false) ? (size == 1 ? 255 : 65535) : 1;
         out.push_back(kind == 5126 ? static_cast<Real>(f) : static_cast<Real>(u) / scale);
       }
@@ -125,7 +130,8 @@ class GltfTruth {
         bool any = false;
         for (const json& c : doc_["animations"][static_cast<std::size_t>(animation)]["channels"]) {
           if (c["target"]["node"] != n || c["target"]["path"] == "weights") continue;
-          const json& s = doc_["animations"][static_cast<std::size_t>(animation)]["samplers"][c["sampler"].get<std::size_t>()];
+          const json& s =
+              doc_["animations"][static_cast<std::size_t>(animation)]["samplers"][c["sampler"].get<std::size_t>()];
           changed[c["target"]["path"].get<std::string>()] = value(s, time, c["target"]["path"] == "rotation" ? 4 : 3);
           any = true;
         }
@@ -160,10 +166,12 @@ class GltfTruth {
             const Matrix& m = joints[static_cast<std::size_t>(j[4 * v + k])];
             all += w[4 * v + k];
             for (std::size_t i = 0; i < 3; ++i) {
-              sum[i] += w[4 * v + k] * (m[i][0] * at[3 * v] + m[i][1] * at[3 * v + 1] + m[i][2] * at[3 * v + 2] + m[i][3]);
+              sum[i] +=
+                  w[4 * v + k] * (m[i][0] * at[3 * v] + m[i][1] * at[3 * v + 1] + m[i][2] * at[3 * v + 2] + m[i][3]);
             }
           }
-          out.push_back({static_cast<double>(-sum[0] / all), static_cast<double>(sum[1] / all), static_cast<double>(-sum[2] / all)});
+          out.push_back({static_cast<double>(-sum[0] / all), static_cast<double>(sum[1] / all),
+                         static_cast<double>(-sum[2] / all)});
         }
       }
     }

@@ -234,3 +234,45 @@ TEST_CASE("avatar file: rigs with names of their own") {
   options.joint_parents.pop_back();
   CHECK(folder.load(arrays, options).code() == Errc::invalid_argument);
 }
+
+TEST_CASE("avatar file: GART's parameters become the same avatar as activated ones") {
+  const AvatarFolder folder;
+  TestArrays plain = avatar_arrays(30, 24, 4), gart;
+  gart["joints_inv_bind_matrix"] = plain["joints_inv_bind_matrix"];
+  gart["lbs_weights"] = plain["lbs_weights"];
+  gart["lbs_weights"].values[5] = -1e-3;  // corrections may go below zero
+  gart["_xyz"] = plain["means"];
+  gart["_rotation"] = plain["quats"];
+  const auto logit = [](double p) { return std::log(p / (1 - p)); };
+  for (double& v : plain["scales"].values) v = 0.005 + 0.4 * v;
+  gart["_scaling"] = plain["scales"];
+  for (double& v : gart["_scaling"].values) v = logit(v / 0.1);
+  for (double& v : plain["opacities"].values) v = 0.25 + 0.5 * v;
+  gart["_opacity"] = plain["opacities"];
+  for (double& v : gart["_opacity"].values) v = logit(v);
+  TestArray dc{{30, 3}, {}}, rest{{30, 9}, {}};
+  for (std::size_t i = 0; i < 30; ++i) {
+    const auto row = plain["shs"].values.begin() + static_cast<std::ptrdiff_t>(12 * i);
+    dc.values.insert(dc.values.end(), row, row + 3);
+    rest.values.insert(rest.values.end(), row + 3, row + 12);
+  }
+  gart["_features_dc"] = dc;
+  gart["_features_rest"] = rest;
+  const auto a = folder.load(plain).value().asset, b = folder.load(gart).value().asset;
+  REQUIRE(a.size() == b.size());
+  CHECK(a.joint_indices == b.joint_indices);
+  CHECK(a.cloud.sh_degree == 1);
+  CHECK(a.cloud.sh0 == b.cloud.sh0);
+  CHECK(a.cloud.shN == b.cloud.shN);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    CHECK(a.cloud.mean(i) == b.cloud.mean(i));
+    CHECK(a.cloud.opacities[i] == doctest::Approx(b.cloud.opacities[i]).epsilon(1e-5));
+    for (std::size_t k = 0; k < 3; ++k) CHECK(a.cloud.scales[k][i] == doctest::Approx(b.cloud.scales[k][i]).epsilon(1e-5));
+  }
+  gart["max_scale"] = {{1}, {0.2}};
+  CHECK(folder.load(gart).value().asset.cloud.scales[0][3] == doctest::Approx(2 * a.cloud.scales[0][3]).epsilon(1e-5));
+  gart["_features_rest"] = {{30, 6}, std::vector<double>(180, 0.0)};
+  CHECK(contains(folder.load(gart).status().message(), "_features_rest has 3 coefficients"));
+  gart.erase("_opacity");
+  CHECK(contains(folder.load(gart).status().message(), "_opacity"));
+}

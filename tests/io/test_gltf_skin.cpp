@@ -48,7 +48,9 @@ TestGltf tube() {
                      {"TEXCOORD_0", g.add(uvs, "VEC2", 5126)},
                      {"COLOR_0", g.add(colors, "VEC3", 5123, true)}};
   g.doc["materials"] = json::array({{{"pbrMetallicRoughness", {{"baseColorFactor", {0.5, 0.25, 1.0, 1.0}}}}}});
-  g.doc["meshes"].push_back({{"primitives", json::array({{{"attributes", attributes}, {"indices", g.add(triangles, "SCALAR", 5123)}, {"material", 0}}})}});
+  g.doc["meshes"].push_back(
+      {{"primitives",
+        json::array({{{"attributes", attributes}, {"indices", g.add(triangles, "SCALAR", 5123)}, {"material", 0}}})}});
   const double h = std::sqrt(0.5);
   g.doc["nodes"] = json::array(
       {{{"name", "scene"}, {"scale", {0.01, 0.01, 0.01}}, {"rotation", {-h, 0, 0, h}}, {"children", {1, 4}}},
@@ -62,8 +64,9 @@ TestGltf tube() {
   const float s = static_cast<float>(h);
   const std::size_t turns = g.add(std::vector<float>{0, 0, 0, 1, s, 0, 0, s, 0, -1, 0, 0}, "VEC4", 5126);
   const std::size_t ways = g.add(std::vector<float>{0, 0, 30, 0, 5, 30, 10, 0, 30}, "VEC3", 5126);
-  const std::size_t cubic = g.add(std::vector<float>{0, 0, 0, 1, 2, 3, 9, 0, -9, 1, 1, 1, 4, 5, 6, -7, 2, 0, 3, 3, 3, 0, 0, 9, 0, 0, 0},
-                                  "VEC3", 5126);
+  const std::size_t cubic =
+      g.add(std::vector<float>{0, 0, 0, 1, 2, 3, 9, 0, -9, 1, 1, 1, 4, 5, 6, -7, 2, 0, 3, 3, 3, 0, 0, 9, 0, 0, 0},
+            "VEC3", 5126);
   const auto channel = [](int sampler, int node, const char* path) {
     return json{{"sampler", sampler}, {"target", {{"node", node}, {"path", path}}}};
   };
@@ -71,7 +74,8 @@ TestGltf tube() {
       {{{"name", "even"},
         {"channels", json::array({channel(0, 1, "rotation"), channel(0, 3, "rotation"), channel(1, 3, "translation")})},
         {"samplers", json::array({{{"input", even}, {"output", turns}}, {{"input", even}, {"output", ways}}})}},
-       {{"channels", json::array({channel(0, 1, "translation"), channel(1, 3, "rotation"), channel(2, 2, "translation")})},
+       {{"channels",
+         json::array({channel(0, 1, "translation"), channel(1, 3, "rotation"), channel(2, 2, "translation")})},
         {"samplers", json::array({{{"input", uneven}, {"output", cubic}, {"interpolation", "CUBICSPLINE"}},
                                   {{"input", uneven}, {"output", turns}},
                                   {{"input", uneven}, {"output", ways}, {"interpolation", "STEP"}}})}}});
@@ -156,12 +160,14 @@ TEST_CASE("gltf skin: what is wrong is named") {
   const Errc bad = Errc::invalid_file, no = Errc::unsupported;
   fails([](auto& g) { g.doc["asset"]["version"] = "1.0"; }, no, "version '\"1.0\"'");
   fails([](auto& g) { g.doc.erase("asset"); }, bad, "asset.version");
-  fails([](auto& g) { g.doc["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }, no, "KHR_draco_mesh_compression");
+  fails([](auto& g) { g.doc["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }, no,
+        "KHR_draco_mesh_compression");
   fails([](auto& g) { g.doc.erase("skins"); }, no, "no skin");
   fails([](auto& g) { g.doc["skins"][0]["joints"] = {3, 3}; }, bad, "joints[1]");
   fails([](auto& g) { g.doc["skins"][0]["joints"] = {3, 9}; }, bad, "joints[1]");
   fails([](auto& g) { g.doc["nodes"][3]["children"] = {1}; }, bad, "nodes[1] hangs on two nodes");
-  fails([](auto& g) { g.doc["nodes"][0]["children"] = {4}, g.doc["nodes"][3]["children"] = {1}; }, bad, "its own ancestor");
+  fails([](auto& g) { g.doc["nodes"][0]["children"] = {4}, g.doc["nodes"][3]["children"] = {1}; }, bad,
+        "its own ancestor");
   fails([](auto& g) { g.doc["nodes"][1]["rotation"] = {0, 0, 0, 0}; }, bad, "nodes[1]: 'rotation' is zero");
   fails([](auto& g) { g.doc["nodes"][1]["scale"] = {1, 1}; }, bad, "nodes[1]: 'scale' is 2 values");
   fails([](auto& g) { g.doc["accessors"][0]["count"] = 25; }, bad, "accessors[0]: 25 elements end behind");
@@ -170,7 +176,8 @@ TEST_CASE("gltf skin: what is wrong is named") {
   fails([](auto& g) { g.doc["accessors"][0]["componentType"] = 5124; }, bad, "'componentType' is 5124");
   fails([](auto& g) { g.doc["bufferViews"][0]["byteLength"] = 1 << 30; }, bad, "bufferViews[0] ends behind");
   fails([](auto& g) { g.doc["meshes"][0]["primitives"][0]["mode"] = 1; }, no, "'mode' is '1'");
-  fails([](auto& g) { g.doc["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0"); }, bad, "must come together");
+  fails([](auto& g) { g.doc["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0"); }, bad,
+        "must come together");
   const auto put = [](TestGltf& g, std::size_t accessor, std::size_t at, auto value) {
     const std::size_t offset = g.doc["bufferViews"][accessor]["byteOffset"];
     std::memcpy(g.bytes.data() + offset + at * sizeof value, &value, sizeof value);
@@ -208,8 +215,10 @@ TEST_CASE("gltf skin: damaged files are refused or read, and take no memory that
     std::string text = whole;
     for (int k = 0; k < 1 + i % 3; ++k) {
       const std::size_t at = generator() % text.size();
-      if (i % 10 == 0) text.resize(std::max<std::size_t>(at, 1));
-      else text[at] = i % 2 == 0 ? "0123456789-.e,[]"[generator() % 16] : static_cast<char>(generator());
+      if (i % 10 == 0)
+        text.resize(std::max<std::size_t>(at, 1));
+      else
+        text[at] = i % 2 == 0 ? "0123456789-.e,[]"[generator() % 16] : static_cast<char>(generator());
     }
     write_file(folder / "some.glb", text);
     reset_largest_allocation();

@@ -69,7 +69,8 @@ TEST_CASE("makehuman: a body by hand") {
 }
 
 TEST_CASE("makehuman: what is wrong is named") {
-  const auto fails = [](std::string Files::*which, const std::string& from, const std::string& to, const std::string& part) {
+  const auto fails = [](std::string Files::*which, const std::string& from, const std::string& to,
+                        const std::string& part) {
     Files files;
     std::string& text = files.*which;
     text.replace(text.find(from), from.size(), to);

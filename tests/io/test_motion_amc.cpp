@@ -29,7 +29,8 @@ const char* const kMotion =
     "#!OML:ASF test\n:FULLY-SPECIFIED\n:DEGREES\n1\nroot 5 6 7 10 20 30\narm 40 50 60\nhand 70 -80\n"
     "2\nhand 1 2\nroot -1 0 1 -170 3 4e1\narm 0 +5 -5.5\n";
 
-Result<io::LoadedMotion> load(const std::string& skeleton, const std::string& motion, const io::AmcOptions& options = {}) {
+Result<io::LoadedMotion> load(const std::string& skeleton, const std::string& motion,
+                              const io::AmcOptions& options = {}) {
   TempFolder folder("amc");
   write_file(folder / "some.asf", skeleton);
   write_file(folder / "some.amc", motion);
@@ -97,7 +98,8 @@ TEST_CASE("amc: kinematics against matrices in long double") {
     const Matrix arm =
         root * arm_axis * (about('Z', f[t][8]) * about('Y', f[t][7]) * about('X', f[t][6])) * transposed(arm_axis);
     const Matrix hand = arm * hand_axis * (about('X', f[t][10]) * about('Z', f[t][9])) * transposed(hand_axis);
-    const Vec3d place{static_cast<double>(1 + f[t][0]), static_cast<double>(2 + f[t][1]), static_cast<double>(3 + f[t][2])};
+    const Vec3d place{static_cast<double>(1 + f[t][0]), static_cast<double>(2 + f[t][1]),
+                      static_cast<double>(3 + f[t][2])};
     const Vec3d elbow = place + at(arm, {0, 4, 0}), tip = elbow + at(hand, Vec3d{0.6, 0, 0.8} * 2.0);
     const auto globals = pose_at(m, static_cast<double>(t) / 120);
     const auto joint = [&](const char* name) { return globals[static_cast<std::size_t>(m.skeleton.find(name))]; };
@@ -122,7 +124,8 @@ TEST_CASE("amc: kinematics against matrices in long double") {
 }
 
 TEST_CASE("amc: what is wrong is named with its file and line") {
-  const auto fails = [](const std::string& from, const std::string& to, const std::string& part, Errc code = Errc::invalid_file) {
+  const auto fails = [](const std::string& from, const std::string& to, const std::string& part,
+                        Errc code = Errc::invalid_file) {
     std::string skeleton = kSkeleton, motion = kMotion;
     const bool first = skeleton.find(from) != skeleton.npos;
     std::string& text = first ? skeleton : motion;
@@ -180,7 +183,9 @@ TEST_CASE("amc: somebody walks on two feet") {
   const auto m = io::load_amc(asf, amc);
   CAPTURE(m.status().message());
   REQUIRE(m.ok());
-  const auto joint = [&](const auto& g, const char* name) { return g[static_cast<std::size_t>(m->skeleton.find(name))].translation; };
+  const auto joint = [&](const auto& g, const char* name) {
+    return g[static_cast<std::size_t>(m->skeleton.find(name))].translation;
+  };
   double lowest = 9, highest = -9, head = 9;
   for (std::size_t t = 0; t < m->clip.frames(); ++t) {
     const auto g = pose_at(*m, static_cast<double>(t) / 120);
@@ -190,8 +195,9 @@ TEST_CASE("amc: somebody walks on two feet") {
     head = std::min(head, joint(g, "head_end").y);
   }
   const Vec3d way = m->clip.root_translation.back() - m->clip.root_translation.front();
-  std::printf("11_01: %zu frames, %.2f m, the lower tip of the toes is %.3f to %.3f m high, the head's top at least %.2f m\n",
-              m->clip.frames(), norm(way), lowest, highest, head);
+  std::printf(
+      "11_01: %zu frames, %.2f m, the lower tip of the toes is %.3f to %.3f m high, the head's top at least %.2f m\n",
+      m->clip.frames(), norm(way), lowest, highest, head);
   // The floor of the recording is y = 0; one foot is always down.
   CHECK(lowest > -0.05);
   CHECK(highest < 0.14);  // between two steps one foot is on its heel, the other on its toes

@@ -21,9 +21,9 @@ struct Texture {
 
 /// How a part of a surface is coloured: its texture, or white, times a factor in linear light.
 struct SurfaceMaterial {
-  Vec3d factor{1, 1, 1};       ///< linear light
-  double alpha_cutoff = 0.0;   ///< texels with less alpha are holes
-  std::int32_t texture = -1;   ///< index into SkinnedMesh::textures, or -1
+  Vec3d factor{1, 1, 1};      ///< linear light
+  double alpha_cutoff = 0.0;  ///< texels with less alpha are holes
+  std::int32_t texture = -1;  ///< index into SkinnedMesh::textures, or -1
 };
 
 /// A rigged surface in its bind pose: what an avatar of Gaussians is made of.
@@ -59,17 +59,21 @@ struct SkinnedMesh {
     }
     for (std::size_t t = 0; t < triangles.size(); ++t) {
       for (const std::uint32_t v : triangles[t]) {
-        if (v >= n) return bad("triangle " + std::to_string(t) + " names vertex " + std::to_string(v) + " of " + std::to_string(n));
+        if (v >= n)
+          return bad("triangle " + std::to_string(t) + " names vertex " + std::to_string(v) + " of " +
+                     std::to_string(n));
       }
     }
     for (const std::uint32_t m : materials_of) {
       if (m >= materials.size()) return bad("materials_of names material " + std::to_string(m));
     }
     for (const SurfaceMaterial& m : materials) {
-      if (m.texture >= static_cast<std::int32_t>(textures.size())) return bad("a material names texture " + std::to_string(m.texture));
+      if (m.texture >= static_cast<std::int32_t>(textures.size()))
+        return bad("a material names texture " + std::to_string(m.texture));
     }
     for (const Texture& t : textures) {
-      if (t.width == 0 || t.height == 0 || t.rgba.size() != 4 * t.width * t.height) return bad("a texture has another size than it says");
+      if (t.width == 0 || t.height == 0 || t.rgba.size() != 4 * t.width * t.height)
+        return bad("a texture has another size than it says");
     }
     for (std::size_t v = 0; v < n; ++v) {
       if (!is_finite(positions[v])) return bad("vertex " + std::to_string(v) + " is not finite");
@@ -82,7 +86,8 @@ struct SkinnedMesh {
         if (!(weights[k] >= 0)) return bad("vertex " + std::to_string(v) + " has weight " + std::to_string(weights[k]));
         sum += static_cast<double>(weights[k]);
       }
-      if (!(sum > 0.999 && sum < 1.001)) return bad("weights of vertex " + std::to_string(v) + " sum to " + std::to_string(sum));
+      if (!(sum > 0.999 && sum < 1.001))
+        return bad("weights of vertex " + std::to_string(v) + " sum to " + std::to_string(sum));
     }
     return {};
   }
@@ -91,9 +96,9 @@ struct SkinnedMesh {
 /// What reading a rigged surface did to it; nothing is repaired without being counted here.
 struct SkinnedMeshReport {
   std::size_t vertices = 0, triangles = 0;
-  std::size_t unequal_weights = 0;         ///< vertices whose weights did not sum to 1 (1e-3): divided by the sum
+  std::size_t unequal_weights = 0;  ///< vertices whose weights did not sum to 1 (1e-3): divided by the sum
   double least_weight_sum = 1.0, greatest_weight_sum = 1.0;
-  std::size_t without_weights = 0;         ///< vertices with none: moved by the nearest weighted vertex's joints
+  std::size_t without_weights = 0;  ///< vertices with none: moved by the nearest weighted vertex's joints
   /// Greatest distance, metres, between a vertex posed by the file's own matrices and by rigid joints (scales of joints
   /// are not kept), over the poses looked at.
   double rigid_error = 0.0;

@@ -15,8 +15,8 @@ namespace gsnav {
 
 /// How many weights of a Gaussian are kept, and by what that is judged.
 struct WeightOptions {
-  int influences = 0;        ///< 4 or 8; 0: 4 where that moves no Gaussian by more than `tolerance` in `poses`, else 8
-  double tolerance = 2e-4;   ///< metres
+  int influences = 0;       ///< 4 or 8; 0: 4 where that moves no Gaussian by more than `tolerance` in `poses`, else 8
+  double tolerance = 2e-4;  ///< metres
   /// [pose][J] joint to root frame, metres. None: unknown, and 0 above means 8 where any Gaussian has more than 4.
   std::vector<std::vector<Affine3<double>>> poses;
 };
@@ -24,13 +24,13 @@ struct WeightOptions {
 /// What keeping the greatest weights of each Gaussian has done to it, against all of its weights divided
 /// by their sum in double.
 struct WeightReport {
-  int influences = kInfluences4;   ///< weights kept
-  std::size_t most_weights = 0;    ///< that any Gaussian has above zero
-  double dropped_mass = 0.0;       ///< greatest share of a Gaussian's weight that was dropped
-  std::size_t poses = 0;           ///< in which the following are measured; 0: unknown
-  double position_error = 0.0;     ///< metres, greatest, with the weights kept and rounded
-  double position_error_8 = 0.0;   ///< metres, greatest, had eight been kept
-  std::size_t needs_more = 0;      ///< Gaussians off by more than the tolerance with the weights kept
+  int influences = kInfluences4;  ///< weights kept
+  std::size_t most_weights = 0;   ///< that any Gaussian has above zero
+  double dropped_mass = 0.0;      ///< greatest share of a Gaussian's weight that was dropped
+  std::size_t poses = 0;          ///< in which the following are measured; 0: unknown
+  double position_error = 0.0;    ///< metres, greatest, with the weights kept and rounded
+  double position_error_8 = 0.0;  ///< metres, greatest, had eight been kept
+  std::size_t needs_more = 0;     ///< Gaussians off by more than the tolerance with the weights kept
 };
 
 namespace detail {
@@ -51,8 +51,9 @@ inline Vec3d blended_place(const std::vector<Affine3<double>>& joints, const Inf
 
 /// Fills the position errors of `report` for the weights that the asset has now; `poses` are joint matrices.
 inline void measure_truncation(const AvatarAsset& asset, std::size_t k, const std::vector<std::uint16_t>& indices,
-                               const std::vector<float>& weights, const std::vector<std::vector<Affine3<double>>>& poses,
-                               double tolerance, WeightReport& report) {
+                               const std::vector<float>& weights,
+                               const std::vector<std::vector<Affine3<double>>>& poses, double tolerance,
+                               WeightReport& report) {
   const std::size_t kept = static_cast<std::size_t>(asset.influences), more = kInfluences8;
   report.poses = poses.size();
   report.most_weights = report.needs_more = 0;

@@ -49,6 +49,13 @@ struct LoadedAvatar {
 ///
 /// Four or eight weights a Gaussian are kept as `options.weights` say; what that costs is in `weights`.
 ///
+/// A file of GART's parameters is read as well (docs/avatars.md): _xyz, _rotation (w, x, y, z), _scaling (scale =
+/// min_scale + sigmoid (max_scale - min_scale), 0 to 0.1 where the file does not say), _opacity (logit), _features_dc
+/// [N,3], _features_rest [N,3(K-1)] (coefficient, then colour), beside lbs_weights and joints_inv_bind_matrix.
+///
+/// gsnav's own files may add `capsules` [C,7] (both ends in the bind frame of a joint and the radius, metres) and
+/// `capsule_joints` [C]; a driver's `proxy_capsules` become such by capsules_from_track (avatar/capsule_track.hpp).
+///
 /// Errors name the file, the array, the row and the value: file_not_found; invalid_file (an array is
 /// missing or has another shape, a value is not finite, an opacity outside [0, 1], a negative scale or
 /// weight, weights all zero, an inverse bind that is not rigid); unsupported (joints that are neither
@@ -57,7 +64,7 @@ struct LoadedAvatar {
 Result<LoadedAvatar> load_avatar(const std::filesystem::path& path, const LoadAvatarOptions& options = {});
 
 /// Writes the same arrays, float32 except for the inverse binds (float64), weights dense. Joints that are
-/// not SMPL's or SMPL-X's add `joint_names` and `joint_parents`. SH of degree 0 that Habitat-GS's rule
+/// not SMPL's or SMPL-X's add `joint_names` and `joint_parents`, capsules `capsules` and `capsule_joints`. SH of degree 0 that Habitat-GS's rule
 /// would take for RGB is written as RGB (float64, so that it comes back the same).
 /// Errors: what AvatarAsset::validate reports; file_not_found; unsupported (4 GiB or more).
 Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset);

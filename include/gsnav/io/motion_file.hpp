@@ -72,6 +72,18 @@ struct LoadedDriver {
 /// or version); out_of_memory. Never throws.
 Result<LoadedDriver> load_driver(const std::filesystem::path& path, const Skeleton& skeleton);
 
+/// A driver about to be written.
+struct DriverFrames {
+  double frame_rate = 40.0;                            ///< frames a second, > 0 (Habitat-GS plays 40 whatever is said)
+  std::size_t joints = 0;                              ///< J
+  std::vector<Affine3<double>> matrices;               ///< [T][J] joint to the driver's frame, metres, rigid
+  std::vector<std::vector<Capsule<double>>> capsules;  ///< [T][C] in the same frame, or empty
+};
+
+/// Writes `driver.npz` with Habitat-GS's keys (float32), as load_driver reads it.
+/// Errors: invalid_argument naming the field; file_not_found; unsupported (4 GiB or more); out_of_memory.
+Status save_driver(const std::filesystem::path& path, const DriverFrames& frames);
+
 struct SmplMotionOptions {
   bool z_up = true;  ///< the motion's Z is up, as in AMASS: turned by -90 degrees about X
 };

@@ -23,14 +23,14 @@ struct NamedClip {
 /// A rigged surface with what its file can make it do.
 struct LoadedSkinnedMesh {
   SkinnedMesh mesh;
-  LocalPose pose;                ///< how the file shows it where nothing moves
+  LocalPose pose;  ///< how the file shows it where nothing moves
   std::vector<NamedClip> clips;
   SkinnedMeshReport report;
 };
 
 struct GltfOptions {
-  std::size_t skin = 0;      ///< which of the file's skins
-  double frame_rate = 0.0;   ///< keys a second of clips whose keys are not at equal times; 0: 60
+  std::size_t skin = 0;     ///< which of the file's skins
+  double frame_rate = 0.0;  ///< keys a second of clips whose keys are not at equal times; 0: 60
 };
 
 /// Reads the meshes of one skin of a glTF 2.0 file (`.gltf` with buffers in it or beside it, or `.glb`): positions,
@@ -39,12 +39,12 @@ struct GltfOptions {
 /// (step, linear, cubic spline) of nodes. Morph targets, other textures and meshes without this skin are passed over
 /// with a warning.
 ///
-/// glTF's scene has Y up, metres, and faces +Z; the mesh is turned upright, in steps of 90 degrees where that does it, to
-/// face -Z. Joints become rigid: a scale common to all (a file in centimetres, say) goes into the
-/// positions; other scales of joints are left out, and `report.rigid_error` says what that costs. A joint that moves
-/// no vertex gets the place that the file shows it in as its bind. A joint without a name
-/// is called "node<n>"; of two with one name the second gets "#<n>" behind it. Keys at equal times keep their
-/// rate; others are sampled at `frame_rate`, translations and scales of nodes that are no joints included.
+/// glTF's scene has Y up, metres, and faces +Z; the mesh is turned upright, in steps of 90 degrees where that does it,
+/// to face -Z. Joints become rigid: a scale common to all (a file in centimetres, say) goes into the positions; other
+/// scales of joints are left out, and `report.rigid_error` says what that costs. A joint that moves no vertex gets the
+/// place that the file shows it in as its bind. A joint without a name is called "node<n>"; of two with one name the
+/// second gets "#<n>" behind it. Keys at equal times keep their rate; others are sampled at `frame_rate`, translations
+/// and scales of nodes that are no joints included.
 ///
 /// Errors name the file, the element and the value: file_not_found; invalid_file (JSON, an index out of range, data
 /// behind its buffer, a node cycle, weights that are negative or all zero, an inverse bind that is not rigid times a
@@ -53,12 +53,12 @@ struct GltfOptions {
 Result<LoadedSkinnedMesh> load_gltf_skin(const std::filesystem::path& path, const GltfOptions& options = {});
 
 struct MakeHumanOptions {
-  std::filesystem::path skeleton;                                  ///< `.mhskel`
-  std::filesystem::path weights;                                   ///< `.mhw`; empty: the one that the skeleton names
-  std::vector<std::pair<std::filesystem::path, double>> targets;   ///< `.target` files and how far to go to each
-  std::string group = "body";                                      ///< faces of this group are the surface
-  Vec3d color{0.80, 0.62, 0.52};                                   ///< of the surface, display-referred
-  double scale = 0.1;                                              ///< metres a unit of the file
+  std::filesystem::path skeleton;                                 ///< `.mhskel`
+  std::filesystem::path weights;                                  ///< `.mhw`; empty: the one that the skeleton names
+  std::vector<std::pair<std::filesystem::path, double>> targets;  ///< `.target` files and how far to go to each
+  std::string group = "body";                                     ///< faces of this group are the surface
+  Vec3d color{0.80, 0.62, 0.52};                                  ///< of the surface, display-referred
+  double scale = 0.1;                                             ///< metres a unit of the file
 };
 
 /// Reads a MakeHuman base mesh (`.obj`) with its skeleton, weights and shape targets. The body is turned to face -Z
