@@ -163,6 +163,7 @@ class GltfTruth {
           std::array<Real, 3> sum{};
           Real all = 0;
           for (std::size_t k = 0; k < 4; ++k) {
+            if (!(w[4 * v + k] > 0)) continue;  // may name any joint
             const Matrix& m = joints[static_cast<std::size_t>(j[4 * v + k])];
             all += w[4 * v + k];
             for (std::size_t i = 0; i < 3; ++i) {
