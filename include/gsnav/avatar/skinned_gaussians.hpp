@@ -4,13 +4,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "gsnav/avatar/actor.hpp"
+#include "gsnav/avatar/body_bounds.hpp"
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/kernels/cull.hpp"
+#include "gsnav/ops/render_config.hpp"
 #include "gsnav/ops/skin.hpp"
 
 namespace gsnav {
@@ -27,7 +31,7 @@ template <Backend B>
 class SkinnedGaussians {
  public:
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarAsset> asset)
-      : backend_(&backend), asset_(std::move(asset)), joints_(backend), indices_(backend), weights_(backend) {
+      : backend_(&backend), asset_(std::move(asset)), bounds_(*asset_), joints_(backend), indices_(backend), weights_(backend) {
     GaussianView v = asset_->cloud.view();
     args_.influences = asset_->influences;
     args_.joint_indices = view_of(asset_->joint_indices);
@@ -73,11 +77,23 @@ class SkinnedGaussians {
     if (!visible_) return {};
     set_.world_from_asset = actor.placement(t);
     actor.joint_matrices(t, matrices_);
-    host_joints_.clear();
-    for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
-    joints_.upload(host_joints_.data(), host_joints_.size());
-    args_.joints = std::as_const(joints_).view();
-    return skin_gaussians<float>(*backend_, args_);
+    return skin();
+  }
+
+  /// The same for what these cameras see by `config`: an actor that none of them can see leaves an empty set and costs its
+  /// forward kinematics, no more. No pixel of theirs changes by it.
+  Status pose(const AvatarActor& actor, double t, std::span<const Camera> cameras, const RenderConfig& config) {
+    if (actor.asset() != asset_ || !actor.active(t)) return pose(actor, t);
+    set_.world_from_asset = actor.placement(t);
+    actor.joint_globals(t, matrices_);
+    const ChunkBounds bounds = bounds_.at(matrices_);
+    visible_ = false;
+    for (const Camera& c : cameras) {
+      visible_ = visible_ || may_be_visible(make_projection_camera<double>(c, set_, projection_rules(config)), bounds);
+    }
+    if (!visible_) return {};
+    actor.joint_matrices(t, matrices_);
+    return skin();
   }
 
   /// The posed Gaussians where the actor stands; empty before the first `pose`. Valid until the next.
@@ -90,6 +106,14 @@ class SkinnedGaussians {
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
 
  private:
+  Status skin() {
+    host_joints_.clear();
+    for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
+    joints_.upload(host_joints_.data(), host_joints_.size());
+    args_.joints = std::as_const(joints_).view();
+    return skin_gaussians<float>(*backend_, args_);
+  }
+
   void to_device(View<const float>& v) {
     floats_.emplace_back(*backend_).upload(v.data, v.size);
     v = {floats_.back().data(), v.size};
@@ -101,6 +125,7 @@ class SkinnedGaussians {
 
   B* backend_;
   std::shared_ptr<const AvatarAsset> asset_;
+  BodyBounds bounds_;
   SkinningArgs<float> args_;
   GaussianSet set_;
   Buffer<Affine3<float>, B> joints_;
