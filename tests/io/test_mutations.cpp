@@ -155,6 +155,26 @@ TEST_CASE("mutations: spz, as it is and inside of its gzip stream") {
   }
 }
 
+TEST_CASE("mutations: spz 4") {
+  SpzFile file;
+  file.version = 4;
+  file.degree = 1;
+  file.flags = 2;
+  file.rows = random_rows(6, 9, 2);
+  std::string extension;
+  put(extension, std::uint32_t{7});
+  put(extension, std::uint32_t{3});
+  const std::string text = file.plain(extension + "abc"), rest = text.substr(32);
+  const auto load = [](const std::string& bytes) {
+    return check_cloud(io::parse_spz(bytes_of(bytes), "some.spz"));
+  };
+  const Tally t = feed(text, 4000, 17, "some.spz", load);
+  CHECK(t.ok > 100);
+  CHECK(t.failed > 1000);
+  feed(text.substr(0, 32), 2000, 18, "some.spz",
+       [&](const std::string& header) { return load(header + rest); });
+}
+
 TEST_CASE("mutations: ksplat") {
   for (const int level : {0, 1, 2}) {
     KsplatFile file;
