@@ -8,6 +8,7 @@
 #include "file.hpp"
 #include "quantised.hpp"
 #include "sog_meta.hpp"
+#include "sog_rows.hpp"
 #include "webp.hpp"
 #include "zip.hpp"
 
@@ -109,17 +110,31 @@ class SogReader {
  public:
   SogReader(const SogFiles& files, SogMeta meta) : files_(files), meta_(std::move(meta)) {}
 
-  Result<LoadedCloud> run(const std::string& source) {
+  /// All rows, or those of `ranges` where it is given.
+  Result<LoadedCloud> run(const std::string& source, const std::vector<detail::RowRange>* ranges) {
+    const std::vector<detail::RowRange> all = {{0, meta_.count}};
+    if (ranges == nullptr) ranges = &all;
+    std::uint64_t total = 0;
+    for (const detail::RowRange& r : *ranges) {
+      if (r.first > meta_.count || r.count > meta_.count - r.first) {
+        return {Errc::invalid_file,
+                source + ": rows " + std::to_string(r.first) + " and " + std::to_string(r.count) +
+                    " from there on are asked for, it has " + std::to_string(meta_.count)};
+      }
+      total += r.count;
+    }
     if (Status s = read_planes(); !s) return s;
     GaussianCloudBuilder builder(meta_.degree, source);
     builder.cloud().filter = meta_.antialias ? Filter::mip : Filter::classic;
-    builder.reserve(meta_.count);
+    builder.reserve(static_cast<std::size_t>(total));
     RawGaussian raw;
     std::array<float, 45> rest;
     raw.shN = rest.data();
-    for (std::size_t i = 0; i < meta_.count; ++i) {
-      if (Status s = gaussian(i, raw, rest); !s) return s;
-      builder.add(raw);
+    for (const detail::RowRange& r : *ranges) {
+      for (std::uint64_t i = r.first; i < r.first + r.count; ++i) {
+        if (Status s = gaussian(static_cast<std::size_t>(i), raw, rest); !s) return s;
+        builder.add(raw);
+      }
     }
     return LoadedCloud{std::move(builder.cloud()), std::move(builder.report())};
   }
@@ -237,9 +252,8 @@ class SogReader {
   Plane low_, high_, scales_, quats_, sh0_, labels_, centroids_;
 };
 
-}  // namespace
-
-Result<LoadedCloud> load_sog(const std::filesystem::path& path) {
+Result<LoadedCloud> load(const std::filesystem::path& path,
+                         const std::vector<detail::RowRange>* ranges) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
     SogFiles files;
     if (Status s = files.open(path); !s) return s;
@@ -247,8 +261,17 @@ Result<LoadedCloud> load_sog(const std::filesystem::path& path) {
     if (!text) return text.status();
     auto meta = detail::parse_sog_meta(*text, files.label(files.meta()));
     if (!meta) return meta.status();
-    return SogReader(files, std::move(*meta)).run(path.string());
+    return SogReader(files, std::move(*meta)).run(path.string(), ranges);
   });
+}
+
+}  // namespace
+
+Result<LoadedCloud> load_sog(const std::filesystem::path& path) { return load(path, nullptr); }
+
+Result<LoadedCloud> detail::load_sog_rows(const std::filesystem::path& path,
+                                          const std::vector<RowRange>& ranges) {
+  return load(path, &ranges);
 }
 
 }  // namespace gsnav::io
