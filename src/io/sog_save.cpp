@@ -142,7 +142,7 @@ class SogWriter {
   Status bands() {
     if (cloud_.sh_degree == 0 || cloud_.size() == 0) return {};
     const std::size_t width = detail::rest_width(cloud_);
-    const std::size_t most = std::clamp(cloud_.size() / 4, kSmallPalette, kLargestPalette);
+    const std::size_t most = std::clamp(cloud_.size() / 2, kSmallPalette, kLargestPalette);
     const detail::VectorPalette palette = detail::make_palette(cloud_.shN, width, most);
     const detail::ScalarCodebook book(palette.entries);
     const std::size_t rows = (palette.size + kEntriesPerRow - 1) / kEntriesPerRow;

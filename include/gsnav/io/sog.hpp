@@ -26,7 +26,7 @@ Result<LoadedCloud> load_sog(const std::filesystem::path& path);
 /// Read back: a mean v is within (1 + |v|) r / 131070, r being the range of log(1 + |v|) of its axis;
 /// the quaternion's smaller components within 0.0028, opacities within 1/510; log-scales (-infinity is
 /// written as -20) and degree-0 coefficients within 1/255 of their range, exact where there are at most
-/// 256 different values. Higher SH bands share a palette of N/4 entries, at least 1024 and at most
+/// 256 different values. Higher SH bands share a palette of N/2 entries, at least 1024 and at most
 /// 65536; up to that many different ones are kept but for the codebook's 1/255 of the range. Errors:
 /// file_not_found (the folder is missing, or a file cannot be written); invalid_argument (arrays of
 /// different lengths, another name); unsupported (more than 268 million Gaussians, a bundle of 4 GiB);
