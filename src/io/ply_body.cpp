@@ -82,14 +82,19 @@ std::uint64_t PlyBody::available(const PlyElement& e) const noexcept {
   return (left() + (format_ == PlyFormat::ascii ? 1 : 0)) / row;
 }
 
+void unpack_ply_rows(PlyFormat format, const PlyElement& e,
+                     std::span<const PlyProperty* const> properties, const std::byte* rows,
+                     std::size_t n, double* block) {
+  for (std::size_t c = 0; c < properties.size(); ++c) {
+    const PlyProperty& p = *properties[c];
+    unpack(p.type, rows + p.offset, n, e.stride, format == PlyFormat::big, block + c * kPlyBlock);
+  }
+}
+
 std::size_t PlyBody::read(const PlyElement& e, std::span<const PlyProperty* const> properties,
                           std::size_t n, double* block) {
   if (format_ == PlyFormat::ascii) return read_text(e, properties, n, block);
-  const std::byte* rows = bytes_.data() + at_;
-  for (std::size_t c = 0; c < properties.size(); ++c) {
-    const PlyProperty& p = *properties[c];
-    unpack(p.type, rows + p.offset, n, e.stride, format_ == PlyFormat::big, block + c * kPlyBlock);
-  }
+  unpack_ply_rows(format_, e, properties, here(), n, block);
   at_ += n * e.stride;
   return n;
 }

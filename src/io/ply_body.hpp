@@ -12,6 +12,12 @@ namespace gsnav::io::detail {
 
 inline constexpr std::size_t kPlyBlock = 256;  // rows unpacked at a time: the columns stay in the cache
 
+/// Unpacks n rows, at most kPlyBlock, that lie at `rows`, of an element without lists in a binary PLY:
+/// column c, which is properties[c], goes to block[c * kPlyBlock ...].
+void unpack_ply_rows(PlyFormat format, const PlyElement& e,
+                     std::span<const PlyProperty* const> properties, const std::byte* rows,
+                     std::size_t n, double* block);
+
 /// The rows behind a PLY's header, in any of its formats. What the header promises is checked against
 /// the bytes there are.
 class PlyBody {
@@ -20,6 +26,8 @@ class PlyBody {
       : bytes_(bytes), at_(header.size), format_(header.format) {}
 
   std::size_t left() const noexcept { return bytes_.size() - at_; }
+  /// The next row's first byte.
+  const std::byte* here() const noexcept { return bytes_.data() + at_; }
 
   /// Moves past up to `e.count` rows; returns how many there were.
   std::uint64_t skip(const PlyElement& e);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/io/sog.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
 
+#include "cloud_fill.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 #include "sog_meta.hpp"
@@ -21,8 +23,8 @@ using detail::SogMeta;
 
 // A constant plane of 16383 x 16383 pixels fits in some bytes of WebP. Real planes hold about one
 // Gaussian a byte of all files; what claims many times that is refused before memory is asked for.
-constexpr std::size_t kMostGaussiansPerByte = 32;
-constexpr std::size_t kGaussianSlack = std::size_t{1} << 20;
+constexpr std::size_t kMostGaussiansPerByte = 8;
+constexpr std::size_t kGaussianSlack = std::size_t{1} << 18;
 
 /// The files of a SOG, whether in a folder or in a bundle.
 class SogFiles {
@@ -124,19 +126,26 @@ class SogReader {
       total += r.count;
     }
     if (Status s = read_planes(); !s) return s;
-    GaussianCloudBuilder builder(meta_.degree, source);
-    builder.cloud().filter = meta_.antialias ? Filter::mip : Filter::classic;
-    builder.reserve(static_cast<std::size_t>(total));
-    RawGaussian raw;
-    std::array<float, 45> rest;
-    raw.shN = rest.data();
-    for (const detail::RowRange& r : *ranges) {
-      for (std::uint64_t i = r.first; i < r.first + r.count; ++i) {
-        if (Status s = gaussian(static_cast<std::size_t>(i), raw, rest); !s) return s;
-        builder.add(raw);
+    const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+      RawGaussian raw;
+      std::array<float, 45> rest;
+      raw.shN = rest.data();
+      std::uint64_t before = 0;  // rows of the ranges so far
+      for (const detail::RowRange& r : *ranges) {
+        const std::uint64_t from = std::max<std::uint64_t>(first, before);
+        const std::uint64_t to = std::min<std::uint64_t>(last, before + r.count);
+        for (std::uint64_t i = from; i < to; ++i) {
+          if (Status s = gaussian(static_cast<std::size_t>(r.first + i - before), raw, rest); !s)
+            return s;
+          sink.add(raw);
+        }
+        before += r.count;
       }
-    }
-    return LoadedCloud{std::move(builder.cloud()), std::move(builder.report())};
+      return {};
+    };
+    auto out = detail::fill_cloud(static_cast<std::size_t>(total), meta_.degree, source, decode);
+    if (out) out->cloud.filter = meta_.antialias ? Filter::mip : Filter::classic;
+    return out;
   }
 
  private:

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
 
+#include "cloud_fill.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 #include "spz_planes.hpp"
@@ -20,24 +20,26 @@ class SpzDecoder {
   SpzDecoder(const detail::SpzPlanes& planes, bool turn)
       : planes_(planes), header_(planes.header), turn_(turn) {}
 
-  LoadedCloud run(const std::string& source) const {
-    GaussianCloudBuilder builder(std::min(header_.degree, kMaxShDegree), source);
-    builder.cloud().filter =
-        (header_.flags & detail::kSpzAntialiased) != 0 ? Filter::mip : Filter::classic;
-    builder.reserve(header_.count);
-    for (std::size_t i = 0; i < header_.count; ++i) add(i, builder);
-    auto& warnings = builder.report().warnings;
-    warnings = planes_.warnings;
+  Result<LoadedCloud> run(const std::string& source) const {
+    const auto decode = [this](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+      for (std::size_t i = first; i < last; ++i) add(i, sink);
+      return {};
+    };
+    auto out = detail::fill_cloud(header_.count, std::min(header_.degree, kMaxShDegree), source, decode);
+    if (!out) return out;
+    const bool mip = (header_.flags & detail::kSpzAntialiased) != 0;
+    out->cloud.filter = mip ? Filter::mip : Filter::classic;
+    out->report.warnings = planes_.warnings;
     if (header_.degree > kMaxShDegree) {
-      warnings.push_back("SH degree 4 in the file: bands up to degree 3 are read");
+      out->report.warnings.push_back("SH degree 4 in the file: bands up to degree 3 are read");
     }
-    return LoadedCloud{std::move(builder.cloud()), std::move(builder.report())};
+    return out;
   }
 
  private:
   static double number(std::byte b) noexcept { return static_cast<double>(std::to_integer<int>(b)); }
 
-  void add(std::size_t i, GaussianCloudBuilder& builder) const {
+  void add(std::size_t i, detail::CloudSink& sink) const {
     RawGaussian raw;
     const std::byte *colour = planes_.at(2, i, 3), *scale = planes_.at(3, i, 3);
     for (std::size_t k = 0; k < 3; ++k) {
@@ -60,7 +62,7 @@ class SpzDecoder {
       const float sign = turn_ ? detail::kHalfTurnAboutX[k / 3] : 1.0f;
       rest[k] = static_cast<float>((number(bands[k]) - 128) / 128) * sign;
     }
-    builder.add(raw);
+    sink.add(raw);
   }
 
   double position(std::size_t i, std::size_t axis) const {
