@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "cloud_fill.hpp"
 #include "gltf_file.hpp"
 #include "gsnav/io/spz.hpp"
 #include "gsnav/scene/edit_cloud.hpp"
@@ -16,6 +17,7 @@ namespace {
 
 using detail::GltfFile;
 using detail::GltfInstance;
+using detail::GltfValues;
 using detail::Json;
 using detail::member;
 
@@ -134,27 +136,26 @@ class SplatReader {
 
   /// Attribute `name` as [count][components]; the first one read says how many there are.
   Status read(const Json& attributes, const std::string& name, std::size_t components,
-              const std::string& where, std::vector<float>& out) {
+              const std::string& where, GltfValues& out) {
     const auto index = detail::get_index(attributes, name.c_str(), detail::kNoIndex, where);
     if (!index) return index.status();
     if (*index == detail::kNoIndex) return {Errc::invalid_file, where + ": no attribute '" + name + "'"};
-    const auto count = file_.count(*index);
-    if (!count) return count.status();
+    const auto values = file_.values(*index, components);
+    if (!values) return {values.code(), where + ": attribute '" + name + "': " + values.message()};
     if (name == "POSITION") {
-      count_ = *count;
+      count_ = values->size();
       total_ += count_;
       // Nodes may share a mesh: a small file could ask for any number of copies.
       if (total_ > file_.size()) {
         return {Errc::invalid_file, where + ": more Gaussians than the file has bytes"};
       }
     }
-    if (*count != count_) {
-      return {Errc::invalid_file, where + ": attribute '" + name + "' has " + std::to_string(*count) +
-                                      " elements, POSITION has " + std::to_string(count_)};
+    if (values->size() != count_) {
+      return {Errc::invalid_file, where + ": attribute '" + name + "' has " +
+                                      std::to_string(values->size()) + " elements, POSITION has " +
+                                      std::to_string(count_)};
     }
-    auto values = file_.floats(*index, components);
-    if (!values) return {values.code(), where + ": attribute '" + name + "': " + values.message()};
-    out = std::move(*values);
+    out = *values;
     return {};
   }
 
@@ -162,7 +163,7 @@ class SplatReader {
     const Json* attributes = member(primitive, "attributes");
     if (attributes == nullptr) return {Errc::invalid_file, where + ": a primitive without 'attributes'"};
     const std::string prefix = std::string(kExtension) + ":";
-    std::vector<float> means, quats, scales, opacities;
+    GltfValues means, quats, scales, opacities;
     if (Status s = read(*attributes, "POSITION", 3, where, means); !s) return s;
     if (Status s = read(*attributes, prefix + "ROTATION", 4, where, quats); !s) return s;
     if (Status s = read(*attributes, prefix + "SCALE", 3, where, scales); !s) return s;
@@ -172,33 +173,35 @@ class SplatReader {
       return prefix + "SH_DEGREE_" + std::to_string(band) + "_COEF_" + std::to_string(coefficient);
     };
     while (degree < kMaxShDegree && member(*attributes, sh(degree + 1, 0).c_str()) != nullptr) ++degree;
-    std::vector<std::vector<float>> bands;
+    std::vector<GltfValues> bands;
     for (int band = 0; band <= degree; ++band) {
       for (int k = 0; k <= 2 * band; ++k) {
         bands.emplace_back();
         if (Status s = read(*attributes, sh(band, k), 3, where, bands.back()); !s) return s;
       }
     }
-    GaussianCloudBuilder builder(degree, where);
-    builder.reserve(count_);
-    std::array<float, 45> rest;
-    for (std::size_t i = 0; i < count_; ++i) {
+    const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+      std::array<float, 45> rest;
       RawGaussian raw;
       raw.shN = rest.data();
-      for (std::size_t k = 0; k < 3; ++k) {
-        const int axis = static_cast<int>(k);
-        raw.mean[axis] = static_cast<double>(means[3 * i + k]);
-        raw.log_scales[axis] = std::log(static_cast<double>(scales[3 * i + k]));
-        raw.sh0[k] = bands[0][3 * i + k];
-        for (std::size_t b = 1; b < bands.size(); ++b) rest[3 * (b - 1) + k] = bands[b][3 * i + k];
+      for (std::size_t i = first; i < last; ++i) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          const int axis = static_cast<int>(k);
+          raw.mean[axis] = means.at(i, k);
+          raw.log_scales[axis] = std::log(scales.at(i, k));
+          raw.sh0[k] = static_cast<float>(bands[0].at(i, k));
+          for (std::size_t b = 1; b < bands.size(); ++b) {
+            rest[3 * (b - 1) + k] = static_cast<float>(bands[b].at(i, k));
+          }
+        }
+        const double opacity = opacities.at(i, 0);  // outside of [0, 1]: NaN, dropped
+        raw.opacity_logit = std::log(opacity / (1 - opacity));
+        raw.quat = {quats.at(i, 3), quats.at(i, 0), quats.at(i, 1), quats.at(i, 2)};
+        sink.add(raw);
       }
-      const double opacity = static_cast<double>(opacities[i]);  // outside of [0, 1]: NaN, dropped
-      raw.opacity_logit = std::log(opacity / (1 - opacity));
-      const auto part = [&](std::size_t k) { return static_cast<double>(quats[4 * i + k]); };
-      raw.quat = {part(3), part(0), part(1), part(2)};
-      builder.add(raw);
-    }
-    return LoadedCloud{std::move(builder.cloud()), std::move(builder.report())};
+      return {};
+    };
+    return detail::fill_cloud(count_, degree, where, decode);
   }
 
   const GltfFile& file_;

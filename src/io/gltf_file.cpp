@@ -215,7 +215,7 @@ Result<std::span<const std::byte>> GltfFile::view(std::size_t index) const {
   return buffers_[*buffer].subspan(*offset, size);
 }
 
-Result<GltfFile::Accessor> GltfFile::accessor(std::size_t index) const {
+Result<GltfValues> GltfFile::accessor(std::size_t index) const {
   const auto found = item("accessors", index);
   if (!found) return found.status();
   const Json& json = **found;
@@ -230,71 +230,64 @@ Result<GltfFile::Accessor> GltfFile::accessor(std::size_t index) const {
   if (member(json, "sparse") != nullptr || *view_index == kNoIndex) {
     return {Errc::unsupported, where + ": sparse, or without a buffer view: not read"};
   }
-  Accessor a;
-  a.count = static_cast<std::size_t>(*count);
-  a.type = static_cast<int>(*type);
+  GltfValues a;
+  a.count_ = static_cast<std::size_t>(*count);
+  a.type_ = static_cast<int>(*type);
   const Json* normalized = member(json, "normalized");
-  a.normalized = normalized != nullptr && *normalized == true;
+  a.normalized_ = normalized != nullptr && *normalized == true;
   const Json* shape = member(json, "type");
   const std::string name = shape != nullptr && shape->is_string() ? shape->get<std::string>() : "";
-  a.components = name == "SCALAR" ? 1 : name == "VEC2" ? 2 : name == "VEC3" ? 3 : name == "VEC4" ? 4 : 0;
-  const std::size_t element = a.components * component_size(a.type);
+  a.components_ = name == "SCALAR" ? 1
+                  : name == "VEC2" ? 2
+                  : name == "VEC3" ? 3
+                  : name == "VEC4" ? 4
+                                   : 0;
+  const std::size_t element = a.components_ * component_size(a.type_);
   if (element == 0) {
     return {Errc::invalid_file, where + ": type " + in_quotes(name) + " of component type " +
-                                    std::to_string(a.type) + " is not read"};
+                                    std::to_string(a.type_) + " is not read"};
   }
   const auto bytes = view(*view_index);
   if (!bytes) return bytes.status();
   const auto stride = get_index(**item("bufferViews", *view_index), "byteStride", element, where);
   if (!stride) return stride.status();
-  a.stride = *stride;
+  a.stride_ = *stride;
   const std::size_t size = bytes->size();
-  if (a.stride < element || *offset > size ||
-      (a.count != 0 &&
-       (size - *offset < element || (size - *offset - element) / a.stride < a.count - 1))) {
-    return {Errc::invalid_file, where + ": " + std::to_string(a.count) + " elements " +
-                                    std::to_string(a.stride) + " bytes apart from " +
+  if (a.stride_ < element || *offset > size ||
+      (a.count_ != 0 &&
+       (size - *offset < element || (size - *offset - element) / a.stride_ < a.count_ - 1))) {
+    return {Errc::invalid_file, where + ": " + std::to_string(a.count_) + " elements " +
+                                    std::to_string(a.stride_) + " bytes apart from " +
                                     std::to_string(*offset) + " on, its buffer view has " +
                                     std::to_string(size) + " bytes"};
   }
-  a.data = bytes->data() + *offset;
+  a.data_ = bytes->data() + *offset;
   return a;
 }
 
-Result<std::size_t> GltfFile::count(std::size_t index) const {
-  const auto a = accessor(index);
-  if (!a) return a.status();
-  return a->count;
+double GltfValues::at(std::size_t i, std::size_t k) const noexcept {
+  return component(data_ + i * stride_ + k * component_size(type_), type_, normalized_);
 }
 
-Result<std::vector<float>> GltfFile::floats(std::size_t index, std::size_t components) const {
+Result<GltfValues> GltfFile::values(std::size_t index, std::size_t components) const {
   const auto a = accessor(index);
-  if (!a) return a.status();
-  if (a->components != components) {
-    return fail("accessor " + std::to_string(index) + " has " + std::to_string(a->components) +
+  if (a && a->components_ != components) {
+    return fail("accessor " + std::to_string(index) + " has " + std::to_string(a->components_) +
                 " components, must be " + std::to_string(components));
   }
-  std::vector<float> out;
-  out.reserve(a->count * components);
-  for (std::size_t i = 0; i < a->count; ++i) {
-    for (std::size_t k = 0; k < components; ++k) {
-      const std::byte* p = a->data + i * a->stride + k * component_size(a->type);
-      out.push_back(static_cast<float>(component(p, a->type, a->normalized)));
-    }
-  }
-  return out;
+  return a;
 }
 
 Result<std::vector<std::uint32_t>> GltfFile::indices(std::size_t index) const {
   const auto a = accessor(index);
   if (!a) return a.status();
-  if (a->components != 1 || (a->type != 5121 && a->type != 5123 && a->type != 5125)) {
+  if (a->components_ != 1 || (a->type_ != 5121 && a->type_ != 5123 && a->type_ != 5125)) {
     return fail("accessor " + std::to_string(index) + " holds no indices");
   }
   std::vector<std::uint32_t> out;
-  out.reserve(a->count);
-  for (std::size_t i = 0; i < a->count; ++i) {
-    out.push_back(static_cast<std::uint32_t>(component(a->data + i * a->stride, a->type, false)));
+  out.reserve(a->count_);
+  for (std::size_t i = 0; i < a->count_; ++i) {
+    out.push_back(static_cast<std::uint32_t>(component(a->data_ + i * a->stride_, a->type_, false)));
   }
   return out;
 }

@@ -21,6 +21,21 @@ struct GltfInstance {
   Affine3<double> world_from_mesh;
 };
 
+/// The values of an accessor where they lie; normalised integers become fractions.
+class GltfValues {
+ public:
+  std::size_t size() const noexcept { return count_; }
+  /// Component k of element i.
+  double at(std::size_t i, std::size_t k) const noexcept;
+
+ private:
+  friend class GltfFile;
+  std::size_t count_ = 0, components_ = 1, stride_ = 0;
+  int type_ = 0;
+  bool normalized_ = false;
+  const std::byte* data_ = nullptr;
+};
+
 /// A glTF 2.0 file with its buffers: GLB, or JSON with buffers inside of it or beside it. Every index,
 /// offset and size is checked against the bytes there are.
 class GltfFile {
@@ -39,28 +54,19 @@ class GltfFile {
   Result<const Json*> item(const char* list, std::size_t index) const;
   /// Bytes of a buffer view.
   Result<std::span<const std::byte>> view(std::size_t index) const;
-  /// Values of an accessor, [count][components]; normalised integers become fractions.
+  /// Values of an accessor with so many components, valid while the file is there.
   /// Errors: invalid_file; unsupported (sparse accessors, or one without a buffer view).
-  Result<std::vector<float>> floats(std::size_t accessor, std::size_t components) const;
+  Result<GltfValues> values(std::size_t accessor, std::size_t components) const;
   /// Values of an unsigned integer accessor of one component.
   Result<std::vector<std::uint32_t>> indices(std::size_t accessor) const;
-  /// Number of elements of an accessor, which are in the file.
-  Result<std::size_t> count(std::size_t accessor) const;
   /// All meshes of the scene that the file shows first, or of all nodes where it has no scene.
   Result<std::vector<GltfInstance>> instances() const;
 
  private:
-  struct Accessor {
-    std::size_t count = 0, components = 1, stride = 0;
-    int type = 0;
-    bool normalized = false;
-    const std::byte* data = nullptr;
-  };
-
   Status fail(const std::string& what) const { return {Errc::invalid_file, source_ + ": " + what}; }
   Status read_chunks(std::span<const std::byte> bytes, std::span<const std::byte>& binary);
   Status read_buffers(std::span<const std::byte> binary, const std::filesystem::path& folder);
-  Result<Accessor> accessor(std::size_t index) const;
+  Result<GltfValues> accessor(std::size_t index) const;
   Result<Affine3<double>> local_transform(const Json& node, const std::string& where) const;
 
   std::string source_;

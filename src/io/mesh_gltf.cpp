@@ -12,6 +12,7 @@ namespace {
 
 using detail::GltfFile;
 using detail::GltfInstance;
+using detail::GltfValues;
 using detail::Json;
 using detail::member;
 
@@ -61,22 +62,21 @@ class MeshReader {
     if (*position == detail::kNoIndex) {
       return {Errc::invalid_file, at + ": a primitive without attribute POSITION"};
     }
-    const auto count = file_.count(*position);
-    if (!count) return count.status();
+    const auto points = file_.values(*position, 3);
+    if (!points) return points.status();
+    const std::size_t count = points->size();
     // Nodes may share a mesh: a small file could ask for any number of copies.
-    if (mesh_.vertices.size() + *count > file_.size() || *count > 0xffffffff - mesh_.vertices.size()) {
+    if (mesh_.vertices.size() + count > file_.size() || count > 0xffffffff - mesh_.vertices.size()) {
       return {Errc::invalid_file, at + ": more vertices than the file has bytes"};
     }
-    const auto points = file_.floats(*position, 3);
-    if (!points) return points.status();
     std::vector<std::uint32_t> corners;
     if (*list == detail::kNoIndex) {
-      corners.resize(*count);
+      corners.resize(count);
       std::iota(corners.begin(), corners.end(), 0u);
     } else {
-      const auto corner_count = file_.count(*list);
-      if (!corner_count) return corner_count.status();
-      if (mesh_.triangles.size() + *corner_count > file_.size()) {
+      const auto held = file_.values(*list, 1);
+      if (!held) return held.status();
+      if (mesh_.triangles.size() + held->size() > file_.size()) {
         return {Errc::invalid_file, at + ": more triangles than the file has bytes"};
       }
       auto read = file_.indices(*list);
@@ -84,24 +84,23 @@ class MeshReader {
       corners = std::move(*read);
     }
     for (const std::uint32_t c : corners) {
-      if (c >= *count) {
+      if (c >= count) {
         return {Errc::invalid_file,
-                at + ": corner " + std::to_string(c) + " of " + std::to_string(*count) + " vertices"};
+                at + ": corner " + std::to_string(c) + " of " + std::to_string(count) + " vertices"};
       }
     }
     return place(*points, corners, *mode, instance);
   }
 
-  Status place(const std::vector<float>& points, const std::vector<std::uint32_t>& corners,
-               std::size_t mode, const GltfInstance& instance) {
+  Status place(const GltfValues& points, const std::vector<std::uint32_t>& corners, std::size_t mode,
+               const GltfInstance& instance) {
     const std::uint32_t first = static_cast<std::uint32_t>(mesh_.vertices.size());
-    for (std::size_t i = 0; i < points.size(); i += 3) {
-      const Vec3d p{static_cast<double>(points[i]), static_cast<double>(points[i + 1]),
-                    static_cast<double>(points[i + 2])};
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Vec3d p{points.at(i, 0), points.at(i, 1), points.at(i, 2)};
       const Vec3f v = vec_cast<float>(instance.world_from_mesh * p);
       if (!is_finite(v)) {
         return {Errc::invalid_file,
-                where(instance) + ": vertex " + std::to_string(i / 3) + " is not finite"};
+                where(instance) + ": vertex " + std::to_string(i) + " is not finite"};
       }
       mesh_.vertices.push_back(v);
     }

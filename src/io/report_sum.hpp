@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
@@ -15,6 +16,10 @@ inline Status merge_loaded(LoadedCloud& scene, Result<LoadedCloud> part, const s
   LoadReport& sum = scene.report;
   sum.add_counts(part->report);
   for (const std::string& w : part->report.warnings) sum.warnings.push_back(name + ": " + w);
+  if (scene.cloud.size() == 0) {
+    scene.cloud = std::move(part->cloud);
+    return {};
+  }
   if (Status s = append(scene.cloud, part->cloud); !s) return {s.code(), name + ": " + s.message()};
   return {};
 }
