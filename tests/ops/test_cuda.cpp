@@ -117,10 +117,13 @@ TEST_CASE("N64_cpu_cuda_keys") {
       buffer.download(host.data(), host.size());
     };
     fetch(images, frames.rgb);
-    fetch(workspace.keys, keys);
+    std::vector<std::uint32_t> by_slot, order;
+    fetch(workspace.visible.chunk_keys, by_slot);
+    fetch(workspace.visible.order, order);
     fetch(workspace.tile_offsets, offsets);
     fetch(workspace.tile_splats, splats);
     REQUIRE(backend.synchronize().ok());
+    for (const std::uint32_t slot : order) keys.push_back(by_slot[slot]);
   };
   CudaBackend cuda;
   SerialBackend serial;
