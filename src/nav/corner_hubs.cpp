@@ -145,7 +145,8 @@ bool CornerHubs::label(const std::vector<std::vector<Link>>& links) {
     touched.assign(1, hub);
     queue.emplace(0.0, hub);
     while (!queue.empty()) {
-      const auto [length, c] = queue.top();
+      const double length = queue.top().first;
+      const std::uint32_t c = queue.top().second;
       queue.pop();
       if (length > best[c]) continue;
       work += labels[c].size() + links[c].size();
