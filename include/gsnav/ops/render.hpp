@@ -271,7 +271,7 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   return {};
 }
 
-/// Slices that a frame is drawn in.
+/// Slices that a frame is drawn in, of which so many Gaussians at most may be visible.
 inline int depth_slices_of(const RenderConfig& config, std::size_t candidates, const Camera& camera) noexcept {
   if (config.response != Response::ewa || config.compat != Compat::none || config.key_bits < 32) return 1;
   if (config.depth_slices != 0) return config.depth_slices;
@@ -285,6 +285,7 @@ inline int depth_slices_of(const RenderConfig& config, std::size_t candidates, c
 template <class B>
 Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Camera& camera,
                             const RenderConfig& config, const FrameImages<float>& images, RenderStats& stats) {
+  if (depth_slices_of(config, stats.gaussians, camera) < 2) return false;  // nothing needs to be planned
   DepthSlices& slices = ws.slices;
   const View<ProjectArgs<float>> sets = view_of(ws.projections);
   slices.plan(backend, sets);
