@@ -3,7 +3,6 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -13,32 +12,21 @@
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "io/files.hpp"
+#include "support/command.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;
 using gsnav_test::data_file;
-using gsnav_test::read_file;
+using gsnav_test::Outcome;
+using gsnav_test::quoted;
+using gsnav_test::run_command;
 using gsnav_test::TempFolder;
 
 namespace {
 
-struct Outcome {
-  bool ok = false;
-  std::string text;
-  bool says(const char* part) const { return text.find(part) != std::string::npos; }
-};
-
 Outcome run(const TempFolder& folder, const std::string& arguments) {
-  const std::string log = (folder / "log").string();
-  Outcome out;
-  std::string command("\"" GSNAV_AVATAR "\" ");
-  command.append(arguments).append(" > \"").append(log).append("\" 2>&1");
-  out.ok = std::system(command.c_str()) == 0;
-  out.text = read_file(log);
-  return out;
+  return run_command(GSNAV_AVATAR, arguments, folder.path());
 }
-
-std::string quoted(const std::filesystem::path& p) { return std::string(1, '"').append(p.string()).append("\""); }
 
 /// A floor of 10 m by 10 m with a wall in it that leaves a passage at one end.
 void write_floor(const std::filesystem::path& path) {

@@ -12,25 +12,15 @@
 #include "gsnav/scene/edit_cloud.hpp"
 #include "io/check_turned.hpp"
 #include "io/ply_file.hpp"
+#include "support/command.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
 
 namespace {
 
-struct Outcome {
-  bool ok = false;
-  std::string text;
-};
-
 Outcome run(const TempFolder& folder, const std::string& arguments) {
-  const std::string log = (folder / "log").string();
-  std::string command = "cd \"" + folder.path().string();
-  command += "\" && \"" GSNAV_CONVERT "\" " + arguments + " > log 2>&1";
-  Outcome out;
-  out.ok = std::system(command.c_str()) == 0;
-  out.text = read_file(log);
-  return out;
+  return run_command(GSNAV_CONVERT, arguments, folder.path());
 }
 
 GaussianCloud cloud_of(const std::vector<PlyRow>& rows, int rest) {

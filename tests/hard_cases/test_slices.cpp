@@ -18,11 +18,6 @@ using namespace gsnav_test;
 
 namespace {
 
-GaussianCloud sorted(GaussianCloud cloud) {
-  sort_spatially(cloud);
-  return cloud;
-}
-
 /// Opaque disks facing z on a wall at depth z, far larger than the view.
 GaussianCloud wall(std::uint64_t seed, double z, int count) {
   Rng rng(seed);

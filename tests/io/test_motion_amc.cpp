@@ -10,6 +10,7 @@
 #include "allocations.hpp"
 #include "files.hpp"
 #include "gsnav/io/motion_file.hpp"
+#include "pose_at.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;
@@ -69,15 +70,6 @@ Vec3d at(const Matrix& m, const Vec3d& v) {
                                                    m[i][2] * static_cast<Real>(v.z));
   }
   return out;
-}
-
-std::vector<Affine3<double>> pose_at(const io::LoadedMotion& m, double time) {
-  LocalPose pose;
-  m.clip.pose({time}, pose);
-  std::vector<Affine3<double>> globals;
-  forward_kinematics(m.skeleton, pose, globals);
-  for (auto& g : globals) g.translation += pose.root;
-  return globals;
 }
 
 }  // namespace

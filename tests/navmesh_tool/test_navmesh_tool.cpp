@@ -3,7 +3,6 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -12,33 +11,20 @@
 #include "gsnav/io/ply.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "io/files.hpp"
+#include "support/command.hpp"
 
 using namespace gsnav;
+using gsnav_test::Outcome;
+using gsnav_test::quoted;
 using gsnav_test::read_file;
+using gsnav_test::run_command;
 using gsnav_test::TempFolder;
 using gsnav_test::write_file;
 
 namespace {
 
-struct Outcome {
-  bool ok = false;
-  std::string text;
-
-  bool says(const char* part) const { return text.find(part) != std::string::npos; }
-};
-
 Outcome run(const TempFolder& folder, const std::string& arguments) {
-  const std::string log = (folder / "log").string();
-  Outcome out;
-  std::string command("\"" GSNAV_NAVMESH "\" ");
-  command.append(arguments).append(" > \"").append(log).append("\" 2>&1");
-  out.ok = std::system(command.c_str()) == 0;
-  out.text = read_file(log);
-  return out;
-}
-
-std::string quoted(const std::filesystem::path& p) {
-  return std::string(1, '"').append(p.string()).append("\"");
+  return run_command(GSNAV_NAVMESH, arguments, folder.path());
 }
 
 /// Two floors of 8 m by 5 m, the upper one 3 m up and 10 m along x; z up, in centimetres.
