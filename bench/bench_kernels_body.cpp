@@ -91,6 +91,7 @@ class Skinning {
     skin_gaussians(*backend_, args_).throw_if_error();
     backend_->synchronize().throw_if_error();
   }
+  const SkinningArgs<S, Out>& args() const noexcept { return args_; }
   /// Plane k: x y z of the means, then w x y z of the quaternions.
   std::vector<Out> plane(std::size_t k) const {
     std::vector<Out> values(out_[k].size());
@@ -159,6 +160,41 @@ struct SkinBody {
       state.counters["x_stream"] =
           benchmark::Counter(seconds, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
     }
+  }
+};
+
+/// Ten people in one call, the time of all together.
+struct CrowdBody {
+  SkinWork work;
+  template <class S, class B>
+  void operator()(benchmark::State& state, B& backend) const {
+    constexpr std::size_t kPeople = 10;
+    const GaussianCloud cloud = wall(200000, 0);
+    std::vector<std::unique_ptr<Skinning<S, float, B>>> people;
+    std::vector<SkinningArgs<S>> args;
+    for (std::size_t p = 0; p < kPeople; ++p) {
+      people.push_back(std::make_unique<Skinning<S, float, B>>(backend, cloud, work));
+      args.push_back(people.back()->args());
+    }
+    const auto run = [&] {
+      skin_all<S, B, float>(backend, args).throw_if_error();
+      backend.synchronize().throw_if_error();
+    };
+    run();
+    for (auto _ : state) run();
+    SerialBackend serial;
+    Skinning<double, double, SerialBackend> truth(serial, cloud, work);
+    truth.run();
+    double worst[2] = {0, 0};  // means, quaternions
+    for (const auto& person : people) {
+      for (std::size_t k = 0; k < 7; ++k) {
+        double& w = worst[k < 3 ? 0 : 1];
+        w = std::max(w, error_of(person->plane(k), truth.plane(k)).max);
+      }
+    }
+    state.counters["mean_max_m"] = worst[0];
+    state.counters["quat_max"] = worst[1];
+    count(state, kPeople * cloud.size(), work.bytes());
   }
 };
 
@@ -310,6 +346,7 @@ void register_body_kernels() {
     const std::string variant = "influences:" + std::to_string(work.influences) + (work.rotations ? "/rotations" : "");
     add_cpu_rows("skin", variant, SkinBody{work});
     add_cuda_row("skin", variant, SkinBody{work});
+    add_cuda_row("skin_crowd", "people:10/" + variant, CrowdBody{work});
   }
   add_cpu_rows("polar", "", PolarBody{});
   add_openmp_rows("polar", "", "float x" + std::to_string(native_width()), PolarLanesBody{});

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kernels of agents among people: capsule distance, time of impact.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <string>
 #include <vector>
 
-#include "gsnav/kernels/capsule.hpp"
+#if defined(GSNAV_HAS_FCL)
+#include "fcl_capsules.hpp"
+#endif
 #include "gsnav/ops/sweep.hpp"
 #include "kernel_bench.hpp"
-#include "native_lanes.hpp"
 
 using namespace gsnav;
 
@@ -16,23 +17,48 @@ namespace gsnav_bench {
 
 namespace {
 
-constexpr std::size_t kPairs = 4096;
+constexpr std::size_t kPairs = 100000;
 
-/// Agents and limbs within two metres, both moving for one step.
+/// An agent's step of 0.25 m and a limb that translates by up to 0.3 m meanwhile.
 struct CapsulePairs {
   std::vector<MovingCapsule<double>> agents, bodies;
-  CapsulePairs() {
+
+  /// Mixed: limbs anywhere within 3 m to each side; one pair in some hundred that start apart meets. Or all of those
+  /// that meet on a step of 1 m.
+  static const CapsulePairs& mixed() {
+    static const CapsulePairs pairs(3.0, 0.25, false);
+    return pairs;
+  }
+  static const CapsulePairs& meeting() {
+    static const CapsulePairs pairs(1.5, 1.0, true);
+    return pairs;
+  }
+
+ private:
+  CapsulePairs(double size, double step, bool all_meet) {
     Rng rng(5);
-    for (std::size_t i = 0; i < kPairs; ++i) {
-      const Vec3d base{rng.uniform(-1, 1), 0, rng.uniform(-1, 1)};
-      const double yaw = rng.uniform(0, 6.28);
-      const Vec3d move{0.25 * std::cos(yaw), 0, 0.25 * std::sin(yaw)};
-      const Capsule<double> a{base + Vec3d{0, 0.1, 0}, base + Vec3d{0, 1.4, 0}, 0.1};
-      agents.push_back({a, {a.p0 + move, a.p1 + move, 0.1}});
-      const Vec3d p{rng.uniform(-1, 1), rng.uniform(0, 1.7), rng.uniform(-1, 1)};
-      const Vec3d q = p + Vec3d{0.3 * rng.normal(), 0.3 * rng.normal(), 0.3 * rng.normal()};
-      const Vec3d v{0.2 * rng.normal(), 0, 0.2 * rng.normal()};
-      bodies.push_back({{p, q, 0.08}, {p + v, q + v, 0.08}});
+    // What a float holds: every scalar gets the same pairs.
+    const auto near_float = [](const Vec3d& v) { return vec_cast<double>(vec_cast<float>(v)); };
+    const auto motion = [&](const Vec3d& p, const Vec3d& q, double r, const Vec3d& move) {
+      const auto capsule = [&](const Vec3d& by) {
+        return Capsule<double>{near_float(p + by), near_float(q + by), static_cast<double>(static_cast<float>(r))};
+      };
+      return MovingCapsule<double>{capsule({}), capsule(move)};
+    };
+    while (agents.size() < kPairs) {
+      const double yaw = rng.uniform(0, 6.28), radius = rng.uniform(0.1, 0.3);
+      const Vec3d up{0, rng.uniform(0.6, 1.8) - 2 * radius, 0}, base{0, radius, 0};
+      const auto a = motion(base, base + up, radius, Vec3d{std::cos(yaw), 0, std::sin(yaw)} * step);
+      const Vec3d at{rng.uniform(-size, size), rng.uniform(0, 1.7), rng.uniform(-size, size)};
+      const Vec3d limb{0.2 * rng.normal(), 0.2 * rng.normal(), 0.2 * rng.normal()};
+      const Vec3d drift = normalized(Vec3d{rng.normal(), rng.normal(), rng.normal()}) * rng.uniform(0, 0.3);
+      const auto b = motion(at, at + limb, rng.uniform(0.03, 0.15), drift);
+      if (all_meet) {
+        const SweepResult<double> r = sweep(a, b, SweepRules<double>{});
+        if (!r.hit || r.start_gap < 1e-3) continue;
+      }
+      agents.push_back(a);
+      bodies.push_back(b);
     }
   }
 };
@@ -47,18 +73,15 @@ std::vector<MovingCapsule<S>> converted(const std::vector<MovingCapsule<double>>
   return out;
 }
 
-/// The pairs in float, by planes.
-struct PairPlanes {
-  std::vector<float> values;
-  const float* planes[kCapsulePlanes];
-
-  explicit PairPlanes(const CapsulePairs& pairs) : values(kCapsulePlanes * kPairs) {
-    for (std::size_t k = 0; k < kCapsulePlanes; ++k) planes[k] = values.data() + k * kPairs;
-    for (std::size_t i = 0; i < kPairs; ++i) {
-      const MovingCapsule<double>&a = pairs.agents[i], &b = pairs.bodies[i];
+/// Moving capsules by planes.
+template <class S>
+class MotionPlanes {
+ public:
+  explicit MotionPlanes(const std::vector<MovingCapsule<double>>& m) : n_(m.size()), values_(14 * n_) {
+    for (std::size_t i = 0; i < n_; ++i) {
       std::size_t k = 0;
-      const auto put = [&](double v) { values[k++ * kPairs + i] = static_cast<float>(v); };
-      for (const Capsule<double>* c : {&a.begin, &a.end, &b.begin, &b.end}) {
+      const auto put = [&](double v) { values_[k++ * n_ + i] = static_cast<S>(v); };
+      for (const Capsule<double>* c : {&m[i].begin, &m[i].end}) {
         for (const Vec3d* p : {&c->p0, &c->p1}) {
           put(p->x);
           put(p->y);
@@ -68,76 +91,147 @@ struct PairPlanes {
       }
     }
   }
-};
+  MovingCapsulePlanes<S> view() const { return {capsules(0), capsules(7)}; }
 
-/// Distance or time of impact in lanes; counts the pairs whose bits are not those of one pair alone.
-struct LanesBody {
-  bool moving;
-  template <class S, class B>
-  void operator()(benchmark::State& state, B& backend) const {
-    const CapsulePairs pairs;
-    const PairPlanes input(pairs);
-    std::vector<float> out(kPairs);
-    constexpr std::size_t kPiece = 128;
-    for (auto _ : state) {
-      backend.parallel_for(kPairs / kPiece, [&](std::size_t p) {
-        const auto kernel = moving ? native_sweep : native_gap;
-        kernel(input.planes, out.data(), p * kPiece, (p + 1) * kPiece);
-      });
-      benchmark::ClobberMemory();
-    }
-    count(state, kPairs);
-    const auto a = converted<float>(pairs.agents), b = converted<float>(pairs.bodies);
-    double differ = 0;
-    for (std::size_t i = 0; i < kPairs; ++i) {
-      const float one = moving ? sweep(a[i], b[i], SweepRules<float>{}).time : capsule_gap(a[i].begin, b[i].begin).gap;
-      differ += bits_of(out[i]) != bits_of(one) ? 1 : 0;
-    }
-    state.counters["lanes_differ"] = differ;
+ private:
+  View<const S> plane(std::size_t k) const { return {values_.data() + k * n_, n_}; }
+  CapsulePlanes<S> capsules(std::size_t k) const {
+    return {{plane(k), plane(k + 1), plane(k + 2)}, {plane(k + 3), plane(k + 4), plane(k + 5)}, plane(k + 6)};
   }
+  std::size_t n_;
+  std::vector<S> values_;
 };
 
+/// Nanoseconds a pair that FCL takes on one thread: the median of some runs over a part of the pairs, measured in the
+/// process that measures the row beside it; 0 without FCL.
+[[maybe_unused]] double fcl_ns([[maybe_unused]] const CapsulePairs& pairs, [[maybe_unused]] bool moving) {
+#if defined(GSNAV_HAS_FCL)
+  constexpr std::size_t kSome = 10000;
+  const FclPairs fcl(pairs.agents, pairs.bodies);
+  std::vector<double> times;
+  for (int run = 0; run < 9; ++run) {
+    const auto begin = std::chrono::steady_clock::now();
+    double sum = 0;
+    for (std::size_t i = 0; i < kSome; ++i) sum += moving ? fcl.contact(i) : fcl.distance(i);
+    benchmark::DoNotOptimize(sum);
+    times.push_back(std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin).count());
+  }
+  std::nth_element(times.begin(), times.begin() + 4, times.end());
+  return times[4] / kSome;
+#else
+  return 0;
+#endif
+}
+
+/// FCL's time, and how many times as fast the row is: of one thread, a pair.
+void compare_with_fcl(benchmark::State& state, const CapsulePairs& pairs, bool moving) {
+  const double ns = fcl_ns(pairs, moving);
+  if (ns == 0) return;
+  state.counters["fcl_ns"] = ns;
+  state.counters["x_fcl"] = benchmark::Counter(ns * 1e-9 * kPairs, benchmark::Counter::kIsIterationInvariantRate);
+}
+
+/// Gaps of a batch, with their errors against double: absolute, and of the distance of the axes relative to at least
+/// 1 cm.
 struct DistanceBody {
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
-    const CapsulePairs pairs;
-    const auto a = converted<S>(pairs.agents), b = converted<S>(pairs.bodies);
+    const CapsulePairs& pairs = CapsulePairs::mixed();
+    const MotionPlanes<S> a(pairs.agents), b(pairs.bodies);
     std::vector<S> gaps(kPairs);
-    time_items(state, backend, kPairs, [a = a.data(), b = b.data(), out = gaps.data()](std::size_t i) {
-      out[i] = capsule_gap(a[i].begin, b[i].begin).gap;
-    });
-    std::vector<double> truth;
-    for (std::size_t i = 0; i < kPairs; ++i) {
-      truth.push_back(capsule_gap(pairs.agents[i].begin, pairs.bodies[i].begin).gap);
+    CapsuleGapArgs<S> args;
+    args.a = a.view().begin;
+    args.b = b.view().begin;
+    args.gap = view_of(gaps);
+    for (auto _ : state) {
+      capsule_gaps(backend, args).throw_if_error();
+      benchmark::ClobberMemory();
     }
-    state.counters["gap_max_m"] = error_of(gaps, truth).max;
+    count(state, kPairs);
+    double absolute = 0, relative = 0, differ = 0;
+    const auto alone_a = converted<S>(pairs.agents), alone_b = converted<S>(pairs.bodies);
+    for (std::size_t i = 0; i < kPairs; ++i) {
+      const Capsule<double>&u = pairs.agents[i].begin, &v = pairs.bodies[i].begin;
+      const double distance = segment_distance(u.p0, u.p1, v.p0, v.p1).distance;
+      const double error = std::abs(static_cast<double>(gaps[i]) - (distance - u.radius - v.radius));
+      absolute = std::max(absolute, error);
+      relative = std::max(relative, error / std::max(distance, 0.01));
+      differ += gaps[i] == capsule_gap(alone_a[i].begin, alone_b[i].begin).gap ? 0 : 1;
+    }
+    state.counters["gap_max_m"] = absolute;
+    state.counters["gap_rel_max"] = relative;
+    state.counters["differ"] = differ;  // from one pair alone
+    compare_with_fcl(state, pairs, false);
   }
 };
 
+/// Sweeps of a batch. Errors in double: how deep an agent that started free gets by the reported time, and how many
+/// pairs are called otherwise than in double.
 struct SweepBody {
+  bool all_meet;
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
-    const CapsulePairs pairs;
-    const auto a = converted<S>(pairs.agents), b = converted<S>(pairs.bodies);
-    std::vector<S> times(kPairs);
-    time_items(state, backend, kPairs, [a = a.data(), b = b.data(), out = times.data()](std::size_t i) {
-      out[i] = sweep(a[i], b[i], SweepRules<S>{}).time;
-    });
-    // What the agent reaches by the reported time, in double: an overlap that was not there before, and how
-    // far it rests from where the sweep in double leaves it.
-    double deepest = 0, travel = 0;
-    for (std::size_t i = 0; i < kPairs; ++i) {
-      const double time = static_cast<double>(times[i]);
-      const auto at = [&](const MovingCapsule<double>& m) { return lerp(m.begin, m.end, time); };
-      if (capsule_gap(pairs.agents[i].begin, pairs.bodies[i].begin).gap < 1e-4) continue;
-      deepest = std::max(deepest, -capsule_gap(at(pairs.agents[i]), at(pairs.bodies[i])).gap);
-      const double truth = sweep(pairs.agents[i], pairs.bodies[i], SweepRules<double>{}).time;
-      travel = std::max(travel, std::abs(time - truth) * 0.25);
+    const CapsulePairs& pairs = all_meet ? CapsulePairs::meeting() : CapsulePairs::mixed();
+    const MotionPlanes<S> a(pairs.agents), b(pairs.bodies);
+    std::vector<S> times(kPairs), start_gaps(kPairs);
+    std::vector<std::uint8_t> outcomes(kPairs);
+    SweepArgs<S> args;
+    args.agents = a.view();
+    args.bodies = b.view();
+    args.time = view_of(times);
+    args.start_gap = view_of(start_gaps);
+    args.outcome = view_of(outcomes);
+    for (auto _ : state) {
+      sweep_capsules(backend, args).throw_if_error();
+      benchmark::ClobberMemory();
     }
+    count(state, kPairs);
+    double deepest = -1, hits = 0, other_class = 0, differ = 0;
+    const auto alone_a = converted<S>(pairs.agents), alone_b = converted<S>(pairs.bodies);
+    for (std::size_t i = 0; i < kPairs; ++i) {
+      const MovingCapsule<double>&u = pairs.agents[i], &v = pairs.bodies[i];
+      const bool hit = (outcomes[i] & kSweepHit) != 0;
+      differ += times[i] == sweep(alone_a[i], alone_b[i], SweepRules<S>{}).time ? 0 : 1;
+      hits += hit ? 1 : 0;
+      other_class += hit == sweep(u, v, SweepRules<double>{}).hit ? 0 : 1;
+      if (capsule_gap(u.begin, v.begin).gap < 1e-4) continue;
+      const double t = static_cast<double>(times[i]);
+      deepest = std::max(deepest, -capsule_gap(lerp(u.begin, u.end, t), lerp(v.begin, v.end, t)).gap);
+    }
+    state.counters["hits"] = hits;
+    state.counters["other_class"] = other_class;
     state.counters["overlap_max_m"] = deepest;
-    state.counters["travel_max_m"] = travel;
+    state.counters["differ"] = differ;
+    compare_with_fcl(state, pairs, true);
   }
 };
+
+#if defined(GSNAV_HAS_FCL)
+/// What FCL makes of the mixed pairs: its distance against ours in double, and the contacts that it misses.
+void fcl_row(benchmark::State& state, bool moving, bool all_meet) {
+  const CapsulePairs& pairs = all_meet ? CapsulePairs::meeting() : CapsulePairs::mixed();
+  constexpr std::size_t kSome = 20000;
+  const FclPairs fcl(pairs.agents, pairs.bodies);
+  for (auto _ : state) {
+    double sum = 0;
+    for (std::size_t i = 0; i < kSome; ++i) sum += moving ? fcl.contact(i) : fcl.distance(i);
+    benchmark::DoNotOptimize(sum);
+  }
+  count(state, kSome);
+  double error = 0, other_class = 0;
+  for (std::size_t i = 0; i < kSome; ++i) {
+    const double gap = capsule_gap(pairs.agents[i].begin, pairs.bodies[i].begin).gap;
+    if (gap < 1e-4) continue;
+    if (moving) {
+      const bool hit = sweep(pairs.agents[i], pairs.bodies[i], SweepRules<double>{}).hit;
+      other_class += hit == (fcl.contact(i) <= 1) ? 0 : 1;
+    } else {
+      error = std::max(error, std::abs(fcl.distance(i) - gap));
+    }
+  }
+  state.counters[moving ? "other_class" : "gap_max_m"] = moving ? other_class : error;
+}
+#endif
 
 /// One agent's step against all limbs of a crowd, as an environment does it. Items are limbs.
 struct CrowdBody {
@@ -145,7 +239,7 @@ struct CrowdBody {
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
     constexpr std::size_t kBones = 20, kAgents = 64;
-    const CapsulePairs pairs;
+    const CapsulePairs& pairs = CapsulePairs::mixed();
     std::vector<DynamicCapsule> limbs;
     Rng rng(17);
     for (std::size_t p = 0; p < people; ++p) {
@@ -179,11 +273,19 @@ struct CrowdBody {
 }  // namespace
 
 void register_capsule_kernels() {
-  const std::string lanes = "float x" + std::to_string(native_width());
+#if defined(GSNAV_HAS_FCL)
+  const auto fcl = [](const char* name, bool moving, bool all_meet) {
+    benchmark::RegisterBenchmark(name, [=](benchmark::State& state) { fcl_row(state, moving, all_meet); })
+        ->Unit(benchmark::kMicrosecond)
+        ->UseRealTime();
+  };
+  fcl("capsule_distance<double, FCL>", false, false);
+  fcl("capsule_sweep<double, FCL>/mixed", true, false);
+  fcl("capsule_sweep<double, FCL>/meeting", true, true);
+#endif
   add_cpu_rows("capsule_distance", "", DistanceBody{});
-  add_openmp_rows("capsule_distance", "", lanes, LanesBody{false});
-  add_cpu_rows("capsule_sweep", "", SweepBody{});
-  add_openmp_rows("capsule_sweep", "", lanes, LanesBody{true});
+  add_cpu_rows("capsule_sweep", "mixed", SweepBody{false});
+  add_cpu_rows("capsule_sweep", "meeting", SweepBody{true});
   add_cpu_rows("first_impact", "people:10", CrowdBody{10});
 }
 

@@ -12,6 +12,7 @@
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/nav/geodesic_field.hpp"
 #include "gsnav/nav/step.hpp"
+#include "gsnav/nav/time_planner.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "navmesh_impl.hpp"
 
@@ -182,6 +183,47 @@ void steps(benchmark::State& state, const Scene* (*make)()) {
   }
 }
 
+/// Plans of 10 s, in ticks of 0.25 s, among walkers of 20 capsules that go to and fro on the mesh.
+void plan_in_time_among(benchmark::State& state, const Scene* (*make)()) {
+  const auto avatars = static_cast<std::size_t>(state.range(0));
+  const Scene* scene = make();
+  if (scene == nullptr) return state.SkipWithError("the mesh is not in GSNAV_DATA_DIR");
+  constexpr int kTicks = 40;
+  constexpr double kTick = 0.25;
+  std::vector<CapsuleSet> ticks;
+  for (int k = 0; k < kTicks; ++k) {
+    std::vector<DynamicCapsule> list;
+    for (std::size_t a = 0; a < avatars; ++a) {
+      const Vec3d from = scene->positions[4095 - 2 * a], way = scene->positions[4094 - 2 * a] - from;
+      const auto at = [&](double t) {
+        const double u = 0.5 - 0.5 * std::cos(t / max(norm(way), 1.0) + static_cast<double>(a));
+        return from + way * u;
+      };
+      Rng rng(a);
+      for (std::uint32_t bone = 0; bone < 20; ++bone) {
+        const Vec3d p{rng.uniform(-0.2, 0.2), rng.uniform(0.1, 1.6), rng.uniform(-0.2, 0.2)};
+        const Vec3d q{rng.uniform(-0.2, 0.2), rng.uniform(0.1, 1.6), rng.uniform(-0.2, 0.2)};
+        const Vec3d a0 = at(k * kTick), a1 = at((k + 1) * kTick);
+        list.push_back({{{a0 + p, a0 + q, 0.06}, {a1 + p, a1 + q, 0.06}}, static_cast<std::uint32_t>(a), bone});
+      }
+    }
+    ticks.push_back(CapsuleSet::create(std::move(list), k * kTick, (k + 1) * kTick).value());
+  }
+  std::size_t i = 0, states = 0, reached = 0, slowest = 0;
+  for (auto _ : state) {
+    const NavPoint& p = scene->points[i & 1023u];
+    const TimedPlan plan =
+        plan_in_time(*scene->mesh, {p.position, 0.1, 1.5, p.poly}, scene->positions[(i + 1) & 1023u], ticks);
+    states += plan.states;
+    reached += plan.status == TimedPlanStatus::reached ? 1 : 0;
+    slowest = max(slowest, plan.states);
+    ++i;
+  }
+  state.counters["states"] = static_cast<double>(states) / static_cast<double>(i);
+  state.counters["reached"] = static_cast<double>(reached) / static_cast<double>(i);
+  state.counters["most_states"] = static_cast<double>(slowest);
+}
+
 #define GSNAV_NAV_BENCH(name)                  \
   BENCHMARK_CAPTURE(name, flat, flat);         \
   BENCHMARK_CAPTURE(name, nav_test, nav_test); \
@@ -197,6 +239,7 @@ GSNAV_NAV_BENCH(snap);
 GSNAV_NAV_BENCH(detour_snap);
 GSNAV_NAV_BENCH(obstacle);
 BENCHMARK_CAPTURE(steps, flat, flat)->Arg(0)->Arg(3)->Arg(100);
+BENCHMARK_CAPTURE(plan_in_time_among, flat, flat)->Arg(0)->Arg(3)->Arg(10)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 

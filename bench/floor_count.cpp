@@ -75,12 +75,11 @@ FragmentCounts count_fragments(gsnav::View<const std::uint32_t> order,
           float* at = block + part * kLanes;
           gsnav::BlendState<F, gsnav::DepthMode::none> state;
           state.transmittance = F::load(at);
-          state.open = state.transmittance >= F(rules.transmittance_min);
-          open += std::popcount(gsnav::lane_bits(state.open));
+          open += std::popcount(gsnav::lane_bits(state.open(rules)));
           const F x = F(static_cast<float>(4 * bx)) + F::load(lane_x + part * kLanes);
           const F y = F(static_cast<float>(4 * by)) + F::load(lane_y + part * kLanes);
           const auto hit =
-              gsnav::blend_splat<false, gsnav::DepthMode::none, gsnav::Exp2::degree6, false>(
+              gsnav::blend_splat<false, gsnav::DepthMode::none, gsnav::Exp2::degree5, false>(
                   state, rules, splat, x, y);
           state.transmittance.store(at);
           changed += std::popcount(gsnav::lane_bits(hit));

@@ -74,7 +74,7 @@ class FrameStages {
     raster.colors = colors_.view();
     raster.rules = gsnav::blend_rules<S>(config_);
     raster.exp2_method =
-        config_.profile == gsnav::Profile::fast ? gsnav::Exp2::degree3 : gsnav::Exp2::degree6;
+        config_.profile == gsnav::Profile::fast ? gsnav::Exp2::degree3 : gsnav::Exp2::degree5;
     raster.images.rgb = images_.data();
     gsnav::detail::rasterize(*backend_, raster);
     sync();
@@ -130,7 +130,8 @@ class FrameStages {
     project_.gaussians = set.gaussians;
     project_.camera = gsnav::make_projection_camera<S>(camera, set, rules);
     project_.camera64 = gsnav::make_projection_camera<double>(camera, set, rules);
-    project_.color=(config_.outputs&gsnav::kRgb)!=0; project_.sh_degree = std::min(set.gaussians.sh_degree, config_.max_sh_degree);
+    project_.sh_degree = std::min(set.gaussians.sh_degree, config_.max_sh_degree);
+    project_.color = (config_.outputs & gsnav::kRgb) != 0;
     project_.depth = (config_.outputs & gsnav::kAnyDepth) != 0;
     const std::size_t slots = project_.chunk_count() * gsnav::kProjectChunk;
     geometry_.resize_discard(slots);

@@ -3,7 +3,6 @@
 // up code of this one's instruction set.
 #include "native_lanes.hpp"
 
-#include "gsnav/kernels/capsule.hpp"
 #include "gsnav/kernels/lbs.hpp"
 #include "gsnav/kernels/sh.hpp"
 #include "gsnav/math/pack.hpp"
@@ -44,34 +43,6 @@ void native_polar(const float* const (&in)[9], float* const (&out)[9], std::size
     for (int k = 0; k < 9; ++k) m(k / 3, k % 3) = F::load(in[k] + i);
     const gsnav::Mat3<F> r = gsnav::polar_rotation(m);
     for (int k = 0; k < 9; ++k) r(k / 3, k % 3).store(out[k] + i);
-  }
-}
-
-namespace {
-
-using gsnav::Capsule;
-using gsnav::MovingCapsule;
-
-GSNAV_HD Capsule<F> load_capsule(const float* const* planes, std::size_t i) noexcept {
-  const auto at = [&](int k) noexcept { return F::load(planes[k] + i); };
-  return {{at(0), at(1), at(2)}, {at(3), at(4), at(5)}, at(6)};
-}
-
-}  // namespace
-
-void native_gap(const float* const (&planes)[kCapsulePlanes], float* gaps, std::size_t begin,
-                std::size_t end) noexcept {
-  for (std::size_t i = begin; i < end; i += kStep) {
-    gsnav::capsule_gap(load_capsule(planes, i), load_capsule(planes + 14, i)).gap.store(gaps + i);
-  }
-}
-
-void native_sweep(const float* const (&planes)[kCapsulePlanes], float* times, std::size_t begin,
-                  std::size_t end) noexcept {
-  for (std::size_t i = begin; i < end; i += kStep) {
-    const MovingCapsule<F> agent{load_capsule(planes, i), load_capsule(planes + 7, i)};
-    const MovingCapsule<F> body{load_capsule(planes + 14, i), load_capsule(planes + 21, i)};
-    gsnav::sweep(agent, body, gsnav::SweepRules<float>{}).time.store(times + i);
   }
 }
 

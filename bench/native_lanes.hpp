@@ -27,15 +27,4 @@ void native_sh(const ShPlanes& planes, int degree, std::size_t begin, std::size_
 void native_polar(const float* const (&in)[9], float* const (&out)[9], std::size_t begin,
                   std::size_t end) noexcept;
 
-/// Pairs of moving capsules by planes: agent then body, each begin then end, each p0, p1 (x, y, z) and radius.
-inline constexpr std::size_t kCapsulePlanes = 28;
-
-/// Gaps at the begin of the pairs [begin, end), both multiples of native_width(): the bits of capsule_gap.
-void native_gap(const float* const (&planes)[kCapsulePlanes], float* gaps, std::size_t begin,
-                std::size_t end) noexcept;
-
-/// Times at which the agents rest: the bits of sweep.
-void native_sweep(const float* const (&planes)[kCapsulePlanes], float* times, std::size_t begin,
-                  std::size_t end) noexcept;
-
 }  // namespace gsnav_bench

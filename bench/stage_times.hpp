@@ -53,6 +53,13 @@ class TimedBackend : public Base {
     timed(Stage::project, [&] { Base::project(args); });
   }
   template <class A>
+  void project(const A& args, gsnav::View<const std::uint32_t> chunks) requires requires(Base& b) {
+    b.project(args, chunks);
+  }
+  {
+    timed(Stage::project, [&] { Base::project(args, chunks); });
+  }
+  template <class A>
   void count_tiles(const A& args) requires requires(Base& b) {
     b.count_tiles(args);
   }
@@ -104,11 +111,8 @@ class TimedBackend : public Base {
                          std::is_same_v<F, gsnav::ScanTileIntersections<S>> ||
                          std::is_same_v<F, gsnav::ScatterTileIntersections<S>>) {
       return Stage::bin;
-    } else if constexpr (std::is_same_v<F, gsnav::detail::RadixHistogram> ||
-                         std::is_same_v<F, gsnav::detail::RadixOffsets> ||
-                         std::is_same_v<F, gsnav::detail::RadixScatter> ||
-                         std::is_same_v<F, gsnav::detail::GatherVisible> ||
-                         std::is_same_v<F, gsnav::detail::RankTies>) {
+    } else if constexpr (requires(const F& f) { f.digit; } ||
+                         std::is_same_v<F, gsnav::detail::RankTiesOfRange>) {  // passes of the radix sort
       return Stage::sort;
     } else {
       return Stage::other;

@@ -8,7 +8,7 @@ The tree is copied; the original is never touched. A plant needs one translation
 with OpenMP, and of the libraries at most the few files that it names, so nothing is built before. First every
 test case named must pass as the source is; then each plant's must fail. Exit status: 0 all caught, 1 one
 missed, 2 nothing could be said (a text to replace is not there once, a plant does not compile, a case fails
-unplanted). --check only sees to it that every text to replace is there once.
+unplanted). --check only looks whether each text to replace is there once: a second, and a test of every build.
 """
 import argparse
 import concurrent.futures
@@ -86,24 +86,21 @@ class Bench:
         return "failed" if done.returncode == 1 else f"ended by {done.returncode}"
 
 
-def apply(tree, plant):
+def misplaced(tree, plant):
+    """A text of the plant that is not there once, or nothing."""
     for e in plant.edits:
-        path = tree / e.file
-        text = path.read_text()
-        if text.count(e.old) != 1:
-            return f"{e.file} holds {text.count(e.old)} times: {e.old.strip().splitlines()[0]}"
-        path.write_text(text.replace(e.old, e.new))
+        found = (tree / e.file).read_text().count(e.old)
+        if found != 1:
+            return f"{e.file} holds {found} times: {e.old.strip().splitlines()[0]}"
     return ""
 
 
-def misplaced(plant):
-    """What `apply` would say, without a copy of the tree."""
-    texts = {}
+def apply(tree, plant):
+    if wrong := misplaced(tree, plant):
+        return wrong
     for e in plant.edits:
-        text = texts.setdefault(e.file, (ROOT / e.file).read_text())
-        if text.count(e.old) != 1:
-            return f"{plant.name}: {e.file} holds {text.count(e.old)} times: {e.old.strip().splitlines()[0]}"
-        texts[e.file] = text.replace(e.old, e.new)
+        path = tree / e.file
+        path.write_text(path.read_text().replace(e.old, e.new))
     return ""
 
 
@@ -155,13 +152,12 @@ def main():
         for p in plants:
             print(f"{p.name:32} {p.source}: {', '.join(p.cases)}")
         return 0
+    if args.check:
+        wrong = [f"{p.name}: {w}" for p in plants if (w := misplaced(ROOT, p))]
+        print("\n".join(wrong) or f"{len(plants)} plants have their place")
+        return 2 if wrong else 0
     if not plants:
         parser.error("no plant of that name")
-    if args.check:
-        wrong = [w for p in plants if (w := misplaced(p))]
-        print("\n".join(wrong or [f"the texts of {len(plants)} plants are in their places"]))
-        return 2 if wrong else 0
-
     verdicts = []
     with tempfile.TemporaryDirectory(dir=args.scratch) as folder, \
             concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:

@@ -22,6 +22,7 @@
 #include "gsnav/ops/render_config.hpp"
 #include "gsnav/ops/skin.hpp"
 #include "gsnav/ops/sweep.hpp"
+#include "gsnav/scene/edit_cloud.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/load_report.hpp"
 #include "gsnav/scene/renderer.hpp"

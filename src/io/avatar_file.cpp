@@ -11,7 +11,6 @@
 #include "gsnav/io/npz_file.hpp"
 #include "gsnav/kernels/sh.hpp"
 #include "npz_arrays.hpp"
-#include "weight_truncation.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -26,7 +25,7 @@ class AvatarReader {
 
   Result<LoadedAvatar> run() {
     for (const auto& step : {&AvatarReader::read_joints, &AvatarReader::read_arrays,
-                             &AvatarReader::read_cloud, &AvatarReader::read_weights}) {
+                             &AvatarReader::read_cloud, &AvatarReader::read_weights, &AvatarReader::read_capsules}) {
       if (Status s = (this->*step)(); !s) return s;
     }
     out_.asset.name = std::filesystem::path(file_.source()).stem().string();
@@ -115,6 +114,7 @@ class AvatarReader {
       return Status();
     };
     constexpr std::size_t any = NpzArrays::kAny;
+    if (!file_.contains("means") && file_.contains("_xyz")) return read_gart();
     if (Status s = take(means_, "means", {any, 3}); !s) return s;
     count_ = means_.shape[0];
     if (count_ == 0) return bad("means has no Gaussians");
@@ -122,6 +122,59 @@ class AvatarReader {
     if (Status s = take(quats_, "quats", {count_, 4}); !s) return s;
     if (Status s = take(opacities_, "opacities", {count_, 1}); !s) return s;
     if (Status s = take(weights_, "lbs_weights", {count_, out_.asset.skeleton.size()}); !s) return s;
+    if (Status s = check_ranges(); !s) return s;
+    return read_sh();
+  }
+
+  /// GART's parameters before their activations, as its model names them.
+  Status read_gart() {
+    constexpr std::size_t any = NpzArrays::kAny;
+    const auto take = [&](NpyArray& to, const char* key, const std::vector<std::size_t>& shape) {
+      auto a = arrays_.read(key, shape);
+      if (a) to = std::move(*a);
+      return a.status();
+    };
+    if (Status s = take(means_, "_xyz", {any, 3}); !s) return s;
+    count_ = means_.shape[0];
+    if (count_ == 0) return bad("_xyz has no Gaussians");
+    if (Status s = take(scales_, "_scaling", {count_, 3}); !s) return s;
+    if (Status s = take(quats_, "_rotation", {count_, 4}); !s) return s;
+    if (Status s = take(opacities_, "_opacity", {count_, 1}); !s) return s;
+    if (Status s = take(weights_, "lbs_weights", {count_, out_.asset.skeleton.size()}); !s) return s;
+    double limits[2] = {0.0, 0.1};
+    for (std::size_t k = 0; k < 2; ++k) {
+      const char* key = k == 0 ? "min_scale" : "max_scale";
+      if (!file_.contains(key)) continue;
+      const auto v = arrays_.number(key);
+      if (!v) return v.status();
+      limits[k] = *v;
+    }
+    const auto sigmoid = [](double x) { return 1.0 / (1.0 + std::exp(-x)); };
+    for (double& v : scales_.values) v = limits[0] + sigmoid(v) * (limits[1] - limits[0]);
+    for (double& v : opacities_.values) v = sigmoid(v);
+    // Weights are trilinear samples and corrections on top of them, which may be a little below zero.
+    for (double& v : weights_.values) v = std::max(v, 0.0);
+    if (Status s = check_ranges(); !s) return s;
+    NpyArray dc, rest;
+    if (Status s = take(dc, "_features_dc", {count_, 3}); !s) return s;
+    if (file_.contains("_features_rest")) {
+      auto a = arrays_.read("_features_rest", {});
+      if (!a) return a.status();
+      if (a->values.size() % (3 * count_) != 0) return bad("_features_rest has the shape " + detail::shape_text(a->shape));
+      rest = std::move(*a);
+    }
+    const std::size_t more = rest.values.size() / count_;
+    shs_.shape = {count_, 1 + more / 3, 3};
+    for (std::size_t i = 0; i < count_; ++i) {
+      shs_.values.insert(shs_.values.end(), dc.values.begin() + static_cast<std::ptrdiff_t>(3 * i),
+                         dc.values.begin() + static_cast<std::ptrdiff_t>(3 * i + 3));
+      shs_.values.insert(shs_.values.end(), rest.values.begin() + static_cast<std::ptrdiff_t>(more * i),
+                         rest.values.begin() + static_cast<std::ptrdiff_t>(more * (i + 1)));
+    }
+    return find_degree("_features_rest");
+  }
+
+  Status check_ranges() const {
     for (const auto& [array, name, most] :
          {std::tuple{&scales_, "scales", HUGE_VAL}, std::tuple{&opacities_, "opacities", 1.0},
           std::tuple{&weights_, "lbs_weights", HUGE_VAL}}) {
@@ -133,7 +186,16 @@ class AvatarReader {
         }
       }
     }
-    return read_sh();
+    return {};
+  }
+
+  /// The degree of `shs_`; `name` is the array's that says how many coefficients there are.
+  Status find_degree(const char* name) {
+    const std::size_t k = shs_.shape[1];
+    degree_ = 0;
+    while (static_cast<std::size_t>(sh_coefficient_count(degree_)) < k && degree_ < kMaxShDegree) ++degree_;
+    if (static_cast<std::size_t>(sh_coefficient_count(degree_)) == k) return {};
+    return {Errc::unsupported, file_.source() + ": " + name + " has " + std::to_string(k) + " coefficients, must be 1, 4, 9 or 16"};
   }
 
   Status read_sh() {
@@ -145,13 +207,9 @@ class AvatarReader {
       return bad("shs has the shape " + detail::shape_text(shape) + ", must be [" + std::to_string(count_) +
                  ", 3] or [" + std::to_string(count_) + ", K, 3]");
     }
-    degree_ = 0;
-    while (static_cast<std::size_t>(sh_coefficient_count(degree_)) < k && degree_ < kMaxShDegree) ++degree_;
-    if (static_cast<std::size_t>(sh_coefficient_count(degree_)) != k) {
-      return {Errc::unsupported,
-              file_.source() + ": shs has " + std::to_string(k) + " coefficients, must be 1, 4, 9 or 16"};
-    }
     shs_ = std::move(*a);
+    shs_.shape = {count_, k, 3};
+    if (Status s = find_degree("shs"); !s) return s;
     const bool could_be_rgb =
         k == 1 && std::all_of(shs_.values.begin(), shs_.values.end(), [](double v) { return v >= 0 && v <= 1; });
     if (k == 1 && (options_.colors == AvatarColors::rgb ||
@@ -202,31 +260,45 @@ class AvatarReader {
     for (const std::size_t i : kept_) {
       const double* row = &weights_.values[i * joints];
       double sum = 0.0;
-      std::size_t used = 0;
       for (std::size_t j = 0; j < joints; ++j) {
         indices.push_back(static_cast<std::uint16_t>(j));
         weights.push_back(static_cast<float>(row[j]));
         sum += row[j];
-        used += row[j] > 0 ? 1 : 0;
       }
       if (!(sum > 0)) return bad("lbs_weights: row " + std::to_string(i) + " is all zero");
       unequal += std::fabs(sum - 1.0) > 1e-3 ? 1 : 0;
-      out_.weights.most_weights = std::max(out_.weights.most_weights, used);
     }
     if (unequal != 0) {
       out_.report.warnings.push_back("lbs_weights: " + std::to_string(unequal) +
                                      " rows do not sum to 1; they were divided by their sums");
     }
-    const auto dropped = out_.asset.set_weights(joints, indices, weights, options_.influences);
-    if (!dropped) return bad("lbs_weights: " + dropped.status().message());
-    out_.weights.dropped_mass = *dropped;
-    if (Status s = detail::measure_truncation(out_.asset, weights_.values, kept_, options_, out_.weights); !s) {
-      return {s.code(), file_.source() + ": " + s.message()};
-    }
+    const auto report = choose_weights(out_.asset, joints, indices, weights, options_.weights);
+    if (!report) return {report.code(), file_.source() + ": lbs_weights: " + report.message()};
+    out_.weights = *report;
     if (out_.weights.needs_more != 0) {
-      out_.report.warnings.push_back("lbs_weights: with " + std::to_string(options_.influences) + " weights " +
+      out_.report.warnings.push_back("lbs_weights: with " + std::to_string(out_.weights.influences) + " weights " +
                                      std::to_string(out_.weights.needs_more) + " Gaussians are off by up to " +
                                      std::to_string(1000 * out_.weights.position_error) + " mm");
+    }
+    return {};
+  }
+
+  /// Capsules fixed to joints, where the file has some.
+  Status read_capsules() {
+    if (!file_.contains("capsules")) return {};
+    const auto capsules = arrays_.read("capsules", {NpzArrays::kAny, 7});
+    if (!capsules) return capsules.status();
+    const std::size_t count = capsules->values.size() / 7;
+    const auto joints = arrays_.read("capsule_joints", {count});
+    if (!joints) return joints.status();
+    for (std::size_t c = 0; c < count; ++c) {
+      const double* v = &capsules->values[7 * c];
+      const double j = joints->values[c];
+      if (!(j >= 0 && j < static_cast<double>(out_.asset.skeleton.size())) || j != std::floor(j)) {
+        return bad("capsule_joints[" + std::to_string(c) + "] is " + std::to_string(j));
+      }
+      if (!(v[6] >= 0)) return bad("capsules: capsule " + std::to_string(c) + " has the radius " + std::to_string(v[6]));
+      out_.asset.capsules.push_back({static_cast<std::uint16_t>(j), {v[0], v[1], v[2]}, {v[3], v[4], v[5]}, v[6]});
     }
     return {};
   }
@@ -247,9 +319,10 @@ class AvatarReader {
 
 Result<LoadedAvatar> load_avatar(const std::filesystem::path& path, const LoadAvatarOptions& options) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedAvatar> {
-    if (options.influences != kInfluences4 && options.influences != kInfluences8) {
-      return {Errc::invalid_argument, path.string() + ": LoadAvatarOptions.influences is " +
-                                          std::to_string(options.influences) + "; 4 or 8 are supported"};
+    const int influences = options.weights.influences;
+    if (influences != 0 && influences != kInfluences4 && influences != kInfluences8) {
+      return {Errc::invalid_argument, path.string() + ": LoadAvatarOptions.weights.influences is " +
+                                          std::to_string(influences) + "; 4, 8 or 0 are supported"};
     }
     const auto file = NpzFile::open(path);
     if (!file) return file.status();

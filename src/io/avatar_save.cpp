@@ -83,6 +83,16 @@ Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset) 
       entries.push_back({"joint_names", {}, names});
       entries.push_back({"joint_parents", {joints}, parents});
     }
+    std::vector<std::int64_t> capsule_joints;
+    std::vector<double> capsules;
+    for (const ProxyCapsule& c : asset.capsules) {
+      capsule_joints.push_back(c.joint);
+      capsules.insert(capsules.end(), {c.p0.x, c.p0.y, c.p0.z, c.p1.x, c.p1.y, c.p1.z, c.radius});
+    }
+    if (!capsules.empty()) {
+      entries.push_back({"capsule_joints", {capsule_joints.size()}, capsule_joints});
+      entries.push_back({"capsules", {capsule_joints.size(), 7}, capsules});
+    }
     return save_npz(path, entries);
   });
 }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "file.hpp"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <bit>
 #include <cerrno>
 #include <system_error>
@@ -10,7 +13,11 @@ namespace gsnav::io::detail {
 // Every binary format here is little-endian and read by memcpy.
 static_assert(std::endian::native == std::endian::little, "gsnav::io needs a little-endian machine");
 
-Result<FileBytes> read_file(const std::filesystem::path& path) {
+RandomFile::~RandomFile() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+Status RandomFile::open(const std::filesystem::path& path) {
   const std::string name = path.string();
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
@@ -18,19 +25,35 @@ Result<FileBytes> read_file(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(status)) {
     return {Errc::file_not_found, name + ": not a regular file"};
   }
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  size_ = std::filesystem::file_size(path, error);
   if (error) return {Errc::file_not_found, name + ": " + error.message()};
-  if (size > PTRDIFF_MAX) return {Errc::out_of_memory, name + ": too large"};
-  std::FILE* file = std::fopen(path.c_str(), "rb");
-  if (file == nullptr) {
-    return {Errc::file_not_found, name + ": " + std::generic_category().message(errno)};
+  if (size_ > PTRDIFF_MAX) return {Errc::out_of_memory, name + ": too large"};
+  fd_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd_ < 0) return {Errc::file_not_found, name + ": " + std::generic_category().message(errno)};
+  return {};
+}
+
+bool RandomFile::read(std::uint64_t offset, std::span<std::byte> out) const {
+  while (!out.empty()) {
+    const ::ssize_t n = ::pread(fd_, out.data(), out.size(), static_cast<::off_t>(offset));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    offset += static_cast<std::uint64_t>(n);
+    out = out.subspan(static_cast<std::size_t>(n));
   }
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> closer(file, &std::fclose);
+  return true;
+}
+
+Result<FileBytes> read_file(const std::filesystem::path& path) {
+  RandomFile file;
+  if (Status s = file.open(path); !s) return s;
   FileBytes bytes;
-  bytes.data.reset(new (std::nothrow) std::byte[static_cast<std::size_t>(size) + 1]);
-  if (!bytes.data) return {Errc::out_of_memory, name + ": not enough memory"};
-  bytes.size = std::fread(bytes.data.get(), 1, static_cast<std::size_t>(size), file);
-  if (std::ferror(file) != 0) return {Errc::invalid_file, name + ": reading failed"};
+  bytes.size = static_cast<std::size_t>(file.size());
+  bytes.data.reset(new (std::nothrow) std::byte[bytes.size + 1]);
+  if (!bytes.data) return {Errc::out_of_memory, path.string() + ": not enough memory"};
+  if (!file.read(0, {bytes.data.get(), bytes.size})) {
+    return {Errc::invalid_file, path.string() + ": reading failed, or the file became shorter"};
+  }
   return bytes;
 }
 

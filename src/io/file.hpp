@@ -27,6 +27,25 @@ struct FileBytes {
 /// Reads a regular file. Folders, pipes and devices are refused: reading one could wait for ever.
 Result<FileBytes> read_file(const std::filesystem::path& path);
 
+/// A regular file of which pieces are read, by any number of threads.
+class RandomFile {
+ public:
+  RandomFile() = default;
+  RandomFile(const RandomFile&) = delete;
+  RandomFile& operator=(const RandomFile&) = delete;
+  ~RandomFile();
+
+  /// Errors as of read_file.
+  Status open(const std::filesystem::path& path);
+  std::uint64_t size() const noexcept { return size_; }
+  /// Fills `out` from `offset` on; false where the file ends before or cannot be read.
+  bool read(std::uint64_t offset, std::span<std::byte> out) const;
+
+ private:
+  int fd_ = -1;
+  std::uint64_t size_ = 0;
+};
+
 /// A file being written; what goes wrong is kept until close().
 class OutFile {
  public:

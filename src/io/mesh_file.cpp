@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/io/mesh_file.hpp"
 
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string_view>
@@ -104,6 +105,16 @@ Result<TriangleMesh> load_obj(const std::filesystem::path& path) {
     if (!file) return file.status();
     return ObjParser(source).run({reinterpret_cast<const char*>(file->data.get()), file->size});
   });
+}
+
+Result<TriangleMesh> load_mesh(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (extension == ".obj") return load_obj(path);
+  if (extension == ".ply") return load_ply_mesh(path);
+  if (extension == ".glb" || extension == ".gltf") return load_gltf_mesh(path);
+  return {Errc::unsupported,
+          path.string() + ": not a mesh that is read here: .obj, .ply, .glb or .gltf"};
 }
 
 }  // namespace gsnav::io

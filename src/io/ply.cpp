@@ -3,27 +3,25 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <limits>
-#include <string_view>
 #include <vector>
 
+#include "cloud_fill.hpp"
 #include "file.hpp"
+#include "ply_body.hpp"
 #include "ply_compressed.hpp"
 #include "ply_header.hpp"
 
 namespace gsnav::io {
 namespace {
 
+using detail::kPlyBlock;
 using detail::ply_rows_missing;
+using detail::PlyBody;
 using detail::PlyElement;
-using detail::PlyFormat;
 using detail::PlyHeader;
 using detail::PlyProperty;
-using detail::PlyType;
 
-constexpr std::size_t kBlock = 256;  // rows unpacked at a time: the columns stay in the cache
-constexpr std::size_t kFixed = 14;   // x y z, f_dc 3, opacity, scale 3, rot 4
+constexpr std::size_t kFixed = 14;  // x y z, f_dc 3, opacity, scale 3, rot 4
 
 /// The vertex properties that are read, in the order of a block's columns.
 struct Columns {
@@ -71,222 +69,151 @@ Result<Columns> choose_columns(const PlyElement& vertex, const std::string& sour
   return c;
 }
 
-template <class T>
-void unpack(const std::byte* rows, std::size_t n, std::size_t stride, bool swap, double* out) {
-  for (std::size_t i = 0; i < n; ++i) {
-    std::byte raw[sizeof(T)];
-    std::memcpy(raw, rows + i * stride, sizeof(T));
-    if (swap) std::reverse(raw, raw + sizeof(T));
-    out[i] = static_cast<double>(detail::load_le<T>(raw));
-  }
-}
-
-void unpack(PlyType type, const std::byte* rows, std::size_t n, std::size_t stride, bool swap,
-            double* out) {
-  switch (type) {
-    case PlyType::i8:
-      return unpack<std::int8_t>(rows, n, stride, swap, out);
-    case PlyType::u8:
-      return unpack<std::uint8_t>(rows, n, stride, swap, out);
-    case PlyType::i16:
-      return unpack<std::int16_t>(rows, n, stride, swap, out);
-    case PlyType::u16:
-      return unpack<std::uint16_t>(rows, n, stride, swap, out);
-    case PlyType::i32:
-      return unpack<std::int32_t>(rows, n, stride, swap, out);
-    case PlyType::u32:
-      return unpack<std::uint32_t>(rows, n, stride, swap, out);
-    case PlyType::f32:
-      return unpack<float>(rows, n, stride, swap, out);
-    case PlyType::f64:
-      return unpack<double>(rows, n, stride, swap, out);
-  }
-}
-
-/// The rows behind the header: skips elements and unpacks blocks of the vertex element.
-class Body {
- public:
-  Body(std::span<const std::byte> bytes, const PlyHeader& header)
-      : bytes_(bytes), at_(header.size), format_(header.format) {}
-
-  std::size_t left() const noexcept { return bytes_.size() - at_; }
-
-  /// Moves past up to `e.count` rows; returns how many there were.
-  std::uint64_t skip(const PlyElement& e) {
-    if (e.properties.empty()) return e.count;
-    if (format_ == PlyFormat::ascii) return skip_text(e);
-    if (!e.has_list) {
-      const std::uint64_t rows = std::min<std::uint64_t>(e.count, left() / e.stride);
-      at_ += static_cast<std::size_t>(rows) * e.stride;
-      return rows;
-    }
-    // A list takes a byte at least, so the file's size bounds this loop whatever the count says.
-    for (std::uint64_t row = 0; row < e.count; ++row) {
-      for (const PlyProperty& p : e.properties) {
-        std::uint64_t items = 1;
-        if (p.is_list) {
-          double length = 0;
-          if (left() < size_of(p.count_type)) return row;
-          unpack(p.count_type, bytes_.data() + at_, 1, 0, format_ == PlyFormat::big, &length);
-          at_ += size_of(p.count_type);
-          if (length < 0) return row;
-          items = static_cast<std::uint64_t>(length);
-        }
-        if (items > left() / size_of(p.type)) return row;
-        at_ += static_cast<std::size_t>(items) * size_of(p.type);
-      }
-    }
-    return e.count;
-  }
-
-  /// Whole rows of `e` that the remaining bytes hold (in text: at most so many).
-  std::uint64_t available(const PlyElement& e) const noexcept {
-    // A number in text is a digit and a separator; the last may lack the separator.
-    const std::size_t row = format_ == PlyFormat::ascii ? 2 * e.properties.size() : e.stride;
-    return (left() + (format_ == PlyFormat::ascii ? 1 : 0)) / row;
-  }
-
-  /// Unpacks n rows: column c goes to block[c * kBlock ...]. Returns the rows that were there.
-  std::size_t read(const PlyElement& e, const Columns& columns, std::size_t n, double* block) {
-    if (format_ == PlyFormat::ascii) return read_text(e, columns, n, block);
-    const std::byte* rows = bytes_.data() + at_;
-    for (std::size_t c = 0; c < columns.properties.size(); ++c) {
-      const PlyProperty& p = *columns.properties[c];
-      unpack(p.type, rows + p.offset, n, e.stride, format_ == PlyFormat::big, block + c * kBlock);
-    }
-    at_ += n * e.stride;
-    return n;
-  }
-
-  /// Moves past blanks, which a text file may end with.
-  void skip_blanks() {
-    while (format_ == PlyFormat::ascii && at_ < bytes_.size() && is_blank(bytes_[at_])) ++at_;
-  }
-
- private:
-  static bool is_blank(std::byte b) noexcept {
-    return b == std::byte{' '} || b == std::byte{'\t'} || b == std::byte{'\r'} || b == std::byte{'\n'};
-  }
-
-  bool next_number(double& value) {
-    skip_blanks();
-    const std::size_t from = at_;
-    while (at_ < bytes_.size() && !is_blank(bytes_[at_])) ++at_;
-    const char* first = reinterpret_cast<const char*>(bytes_.data()) + from;
-    const char* last = reinterpret_cast<const char*>(bytes_.data()) + at_;
-    if (first != last && *first == '+') ++first;
-    const auto [end, error] = std::from_chars(first, last, value);
-    if (error == std::errc::result_out_of_range) {
-      // from_chars does not say on which side of the range.
-      const bool tiny = std::string_view(first, last).find("e-") != std::string_view::npos ||
-                        std::string_view(first, last).find("E-") != std::string_view::npos;
-      value = tiny ? 0.0 : std::numeric_limits<double>::infinity();
-      return end == last;
-    }
-    return error == std::errc{} && end == last;
-  }
-
-  std::uint64_t skip_text(const PlyElement& e) {
-    for (std::uint64_t row = 0; row < e.count; ++row) {
-      for (const PlyProperty& p : e.properties) {
-        double value = 1;
-        if (p.is_list && !(next_number(value) && value >= 0)) return row;
-        const double items = value;
-        for (double i = 0; i < items; ++i) {
-          if (!next_number(value)) return row;
-        }
-      }
-    }
-    return e.count;
-  }
-
-  std::size_t read_text(const PlyElement& e, const Columns& columns, std::size_t n, double* block) {
-    std::vector<double> row(e.properties.size());
-    for (std::size_t i = 0; i < n; ++i) {
-      for (double& value : row) {
-        if (!next_number(value)) return i;
-      }
-      for (std::size_t c = 0; c < columns.properties.size(); ++c) {
-        block[c * kBlock + i] =
-            row[static_cast<std::size_t>(columns.properties[c] - e.properties.data())];
-      }
-    }
-    return n;
-  }
-
-  std::span<const std::byte> bytes_;
-  std::size_t at_;
-  PlyFormat format_;
-};
-
-void add_block(GaussianCloudBuilder& builder, const Columns& columns, const double* block,
-               std::size_t n) {
+void add_block(detail::CloudSink& sink, const Columns& columns, const double* block, std::size_t n) {
   std::array<float, 45> rest;
   RawGaussian raw;
   raw.shN = columns.rest != 0 ? rest.data() : nullptr;
   for (std::size_t i = 0; i < n; ++i) {
-    const auto at = [&](std::size_t column) { return block[column * kBlock + i]; };
+    const auto at = [&](std::size_t column) { return block[column * kPlyBlock + i]; };
     raw.mean = {at(0), at(1), at(2)};
     for (std::size_t k = 0; k < 3; ++k) raw.sh0[k] = static_cast<float>(at(3 + k));
     raw.opacity_logit = at(6);
     raw.log_scales = {at(7), at(8), at(9)};
     raw.quat = {at(10), at(11), at(12), at(13)};
     for (std::size_t k = 0; k < columns.rest; ++k) rest[k] = static_cast<float>(at(kFixed + k));
-    builder.add(raw);
+    sink.add(raw);
   }
+}
+
+/// What a header says about the Gaussians.
+struct Vertices {
+  std::vector<PlyElement>::const_iterator element;
+  Columns columns;
+};
+
+Result<Vertices> find_vertices(const PlyHeader& header, const std::string& source) {
+  Vertices v;
+  v.element = std::find_if(header.elements.begin(), header.elements.end(),
+                           [](const PlyElement& e) { return e.name == "vertex"; });
+  if (v.element == header.elements.end()) {
+    return {Errc::invalid_file, source + ": no element 'vertex'"};
+  }
+  if (detail::is_compressed_ply(header)) return v;
+  if (v.element->has_list) {
+    return {Errc::unsupported, source + ": element 'vertex' has a list property"};
+  }
+  auto chosen = choose_columns(*v.element, source);
+  if (!chosen) return chosen.status();
+  v.columns = std::move(*chosen);
+  return v;
+}
+
+/// Fills a cloud from blocks of rows: `unpack(first, n, block)` returns how many of them there were.
+template <class Unpack>
+Result<LoadedCloud> fill(const PlyHeader& header, const Vertices& v, const std::string& source,
+                         const Unpack& unpack) {
+  const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+    std::vector<double> block(v.columns.properties.size() * kPlyBlock);
+    for (std::size_t row = first; row < last; row += kPlyBlock) {
+      const std::size_t n = std::min(kPlyBlock, last - row);
+      const std::size_t there = unpack(row, n, block.data());
+      if (there != n) return ply_rows_missing(source, *v.element, row + there);
+      add_block(sink, v.columns, block.data(), n);
+    }
+    return {};
+  };
+  auto out = detail::fill_cloud(static_cast<std::size_t>(v.element->count), v.columns.degree, source,
+                                decode, header.format != detail::PlyFormat::ascii);
+  if (!out) return out;
+  out->cloud.filter = header.mip ? Filter::mip : Filter::classic;
+  if (v.columns.rest_in_file == 72) {
+    out->report.warnings.push_back("SH degree 4 in the file: bands up to degree 3 are read");
+  }
+  return out;
+}
+
+void warn_of_stray_bytes(LoadReport& report, std::uint64_t bytes, std::uint64_t rows) {
+  if (bytes == 0) return;
+  report.warnings.push_back(std::to_string(bytes) + " stray bytes follow the " + std::to_string(rows) +
+                            " rows that the header promises");
 }
 
 Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source) {
   auto parsed = detail::parse_ply_header(bytes, source);
   if (!parsed) return parsed.status();
   const PlyHeader& header = *parsed;
-  const auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
-                                   [](const PlyElement& e) { return e.name == "vertex"; });
-  if (vertex == header.elements.end()) return {Errc::invalid_file, source + ": no element 'vertex'"};
+  const auto found = find_vertices(header, source);
+  if (!found) return found.status();
   if (detail::is_compressed_ply(header)) return detail::parse_compressed_ply(bytes, header, source);
-  if (vertex->has_list) {
-    return {Errc::unsupported, source + ": element 'vertex' has a list property"};
+  const PlyElement& vertex = *found->element;
+  PlyBody body(bytes, header);
+  for (auto e = header.elements.begin(); e != found->element; ++e) {
+    if (const std::uint64_t rows = body.skip(*e); rows != e->count)
+      return ply_rows_missing(source, *e, rows);
   }
-  auto chosen = choose_columns(*vertex, source);
-  if (!chosen) return chosen.status();
-  const Columns& columns = *chosen;
-
-  Body body(bytes, header);
-  for (auto e = header.elements.begin(); e != vertex; ++e) {
-    if (const std::uint64_t rows = body.skip(*e); rows != e->count) return ply_rows_missing(source, *e, rows);
+  if (const std::uint64_t rows = body.available(vertex); rows < vertex.count) {
+    return ply_rows_missing(source, vertex, rows);
   }
-  if (const std::uint64_t rows = body.available(*vertex); rows < vertex->count) {
-    return ply_rows_missing(source, *vertex, rows);
-  }
-  const std::size_t count = static_cast<std::size_t>(vertex->count);
-
-  GaussianCloudBuilder builder(columns.degree, source);
-  builder.cloud().filter = header.mip ? Filter::mip : Filter::classic;
-  builder.reserve(count);
-  std::vector<double> block(columns.properties.size() * kBlock);
-  for (std::size_t row = 0; row < count; row += kBlock) {
-    const std::size_t n = std::min(kBlock, count - row);
-    const std::size_t there = body.read(*vertex, columns, n, block.data());
-    if (there != n) return ply_rows_missing(source, *vertex, row + there);
-    add_block(builder, columns, block.data(), n);
-  }
-
-  LoadReport& report = builder.report();
-  if (columns.rest_in_file == 72) {
-    report.warnings.push_back("SH degree 4 in the file: bands up to degree 3 are read");
-  }
-  for (auto e = vertex + 1; e != header.elements.end(); ++e) {
-    if (const std::uint64_t rows = body.skip(*e); rows != e->count) {
-      report.warnings.push_back(ply_rows_missing(source, *e, rows).message());
-      return LoadedCloud{std::move(builder.cloud()), std::move(report)};
+  const auto& properties = found->columns.properties;
+  const bool text = header.format == detail::PlyFormat::ascii;
+  const std::byte* const rows = body.here();
+  auto out = fill(header, *found, source, [&](std::size_t first, std::size_t n, double* block) {
+    if (text) return body.read(vertex, properties, n, block);
+    detail::unpack_ply_rows(header.format, vertex, properties, rows + first * vertex.stride, n, block);
+    return n;
+  });
+  if (!out) return out;
+  if (!text) body.skip(vertex);
+  for (auto e = found->element + 1; e != header.elements.end(); ++e) {
+    if (const std::uint64_t there = body.skip(*e); there != e->count) {
+      out->report.warnings.push_back(ply_rows_missing(source, *e, there).message());
+      return out;
     }
   }
   body.skip_blanks();
-  if (body.left() != 0) {
-    report.warnings.push_back(std::to_string(body.left()) + " stray bytes follow the " +
-                              std::to_string(count) + " rows that the header promises");
+  warn_of_stray_bytes(out->report, body.left(), vertex.count);
+  return out;
+}
+
+/// Whether all rows lie where the header alone says.
+bool has_fixed_rows(const PlyHeader& header) {
+  return header.format != detail::PlyFormat::ascii &&
+         std::none_of(header.elements.begin(), header.elements.end(),
+                      [](const PlyElement& e) { return e.has_list; });
+}
+
+/// Reads the rows piece by piece, so that there is never more in memory than the cloud.
+Result<LoadedCloud> load_rows(const detail::RandomFile& file, const PlyHeader& header, const Vertices& v,
+                              const std::string& source) {
+  std::uint64_t left = file.size() - header.size, start = header.size, others_short = 0;
+  const PlyElement* cut = nullptr;
+  for (const PlyElement& e : header.elements) {
+    const std::uint64_t there = e.stride == 0 ? e.count : std::min(e.count, left / e.stride);
+    if (there < e.count && cut == nullptr) {
+      cut = &e;
+      others_short = there;
+    }
+    if (cut != nullptr) continue;
+    if (&e < &*v.element) start += there * e.stride;
+    left -= there * e.stride;
   }
-  return LoadedCloud{std::move(builder.cloud()), std::move(report)};
+  if (cut != nullptr && cut <= &*v.element) return ply_rows_missing(source, *cut, others_short);
+  const PlyElement& vertex = *v.element;
+  auto out =
+      fill(header, v, source, [&](std::size_t first, std::size_t n, double* block) -> std::size_t {
+        thread_local std::vector<std::byte> rows;
+        rows.resize(n * vertex.stride);
+        if (!file.read(start + std::uint64_t{first} * vertex.stride, rows)) return 0;
+        detail::unpack_ply_rows(header.format, vertex, v.columns.properties, rows.data(), n, block);
+        return n;
+      });
+  if (!out) return out;
+  if (cut != nullptr) {
+    out->report.warnings.push_back(ply_rows_missing(source, *cut, others_short).message());
+  } else {
+    warn_of_stray_bytes(out->report, left, vertex.count);
+  }
+  return out;
 }
 
 }  // namespace
@@ -296,10 +223,23 @@ Result<LoadedCloud> parse_ply(std::span<const std::byte> bytes, std::string sour
 }
 
 Result<LoadedCloud> load_ply(const std::filesystem::path& path) {
-  return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
-    auto file = detail::read_file(path);
-    if (!file) return file.status();
-    return parse(file->span(), path.string());
+  const std::string source = path.string();
+  return detail::guarded(source, [&]() -> Result<LoadedCloud> {
+    detail::RandomFile file;
+    if (Status s = file.open(path); !s) return s;
+    std::vector<std::byte> top(
+        static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), detail::kLargestPlyHeader + 1)));
+    if (!file.read(0, top)) return {Errc::invalid_file, source + ": reading failed"};
+    const auto header = detail::parse_ply_header(top, source);
+    if (!header) return header.status();
+    const auto found = find_vertices(*header, source);
+    if (!found) return found.status();
+    if (has_fixed_rows(*header) && !detail::is_compressed_ply(*header)) {
+      return load_rows(file, *header, *found, source);
+    }
+    const auto bytes = detail::read_file(path);
+    if (!bytes) return bytes.status();
+    return parse(bytes->span(), source);
   });
 }
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
 #include <vector>
 
+#include "cloud_fill.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 
@@ -39,19 +39,21 @@ class CompressedPlyReader {
     }
     if (Status s = find_rows(); !s) return s;
     if (Status s = find_columns(); !s) return s;
-    GaussianCloudBuilder builder(degree_, source_);
-    builder.cloud().filter = header_.mip ? Filter::mip : Filter::classic;
-    const std::size_t count = static_cast<std::size_t>(vertex_.element->count);
-    builder.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) add(i, builder);
-    LoadReport& report = builder.report();
+    const auto decode = [this](std::size_t first, std::size_t last, CloudSink& sink) -> Status {
+      for (std::size_t i = first; i < last; ++i) add(i, sink);
+      return {};
+    };
+    auto out = fill_cloud(static_cast<std::size_t>(vertex_.element->count), degree_, source_, decode);
+    if (!out) return out;
+    out->cloud.filter = header_.mip ? Filter::mip : Filter::classic;
+    LoadReport& report = out->report;
     if (sh_in_file_ == kMostSh) {
       report.warnings.push_back("SH degree 4 in the file: bands up to degree 3 are read");
     }
     if (stray_ != 0) {
       report.warnings.push_back(std::to_string(stray_) + " stray bytes follow the last element");
     }
-    return LoadedCloud{std::move(builder.cloud()), std::move(report)};
+    return out;
   }
 
  private:
@@ -149,7 +151,7 @@ class CompressedPlyReader {
     return static_cast<double>((packed >> shift) & most) / static_cast<double>(most);
   }
 
-  void add(std::size_t i, GaussianCloudBuilder& builder) const {
+  void add(std::size_t i, CloudSink& sink) const {
     const std::size_t chunk = i / kChunk;
     const std::uint32_t position = vertex_.at<std::uint32_t>(i, 0),
                         rotation = vertex_.at<std::uint32_t>(i, 1),
@@ -176,7 +178,7 @@ class CompressedPlyReader {
       const double value = byte == 0 ? 0 : byte == 255 ? 1 : (byte + 0.5) / 256;
       rest[k] = static_cast<float>(8 * (value - 0.5));
     }
-    builder.add(raw);
+    sink.add(raw);
   }
 
   static constexpr std::size_t kMostSh = 72;

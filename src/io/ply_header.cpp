@@ -12,9 +12,6 @@
 namespace gsnav::io::detail {
 namespace {
 
-// No writer comes near it; it keeps a file of property lines from becoming a search of hours.
-constexpr std::size_t kLargestHeader = std::size_t{1} << 20;
-
 std::optional<PlyType> type_of(std::string_view word) {
   constexpr std::string_view names[][2] = {
       {"char", "int8"}, {"uchar", "uint8"}, {"short", "int16"},   {"ushort", "uint16"},
@@ -72,7 +69,7 @@ class HeaderParser {
       }
       if (!s) return s;
     }
-    return fail(text_.size() > kLargestHeader ? "the header is longer than 1 MiB" : "no end_header");
+    return fail(text_.size() > kLargestPlyHeader ? "the header is longer than 1 MiB" : "no end_header");
   }
 
  private:
@@ -83,7 +80,7 @@ class HeaderParser {
   bool next_line(std::string_view& line) {
     ++line_number_;
     const std::size_t end = text_.find('\n', at_);
-    if (end == std::string_view::npos || end >= kLargestHeader) return false;
+    if (end == std::string_view::npos || end >= kLargestPlyHeader) return false;
     line = text_.substr(at_, end - at_);
     at_ = end + 1;
     if (!line.empty() && line.back() == '\r') line.remove_suffix(1);

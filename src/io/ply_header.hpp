@@ -11,6 +11,9 @@
 
 namespace gsnav::io::detail {
 
+/// No writer comes near it; it keeps a file of property lines from becoming a search of hours.
+inline constexpr std::size_t kLargestPlyHeader = std::size_t{1} << 20;
+
 enum class PlyFormat { ascii, little, big };
 enum class PlyType : std::uint8_t { i8, u8, i16, u16, i32, u32, f32, f64 };
 

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <vector>
 
+#include "cloud_check.hpp"
 #include "file.hpp"
 #include "gsnav/io/ply.hpp"
 
@@ -44,27 +45,13 @@ float logit_of(float opacity) {
   return logit;
 }
 
-bool consistent(const GaussianCloud& c, std::size_t rest) {
-  const std::size_t n = c.size();
-  bool ok = c.sh_degree >= 0 && c.sh_degree <= kMaxShDegree && c.sh0.size() == 3 * n &&
-            c.shN.size() == rest * n && (c.origin_ids.empty() || c.origin_ids.size() == n);
-  for (std::size_t k = 0; k < 3; ++k) ok = ok && c.means[k].size() == n && c.scales[k].size() == n;
-  for (std::size_t k = 0; k < 4; ++k) ok = ok && c.quats[k].size() == n;
-  for (const std::uint32_t id : c.origin_ids) ok = ok && id < c.origins.size();
-  return ok;
-}
-
 }  // namespace
 
 Status save_ply(const std::filesystem::path& path, const GaussianCloud& cloud,
                 const SavePlyOptions& options) {
   return detail::guarded(path.string(), [&]() -> Status {
-    const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
-    if (!consistent(cloud, rest)) {
-      return {Errc::invalid_argument, path.string() + ": the cloud's arrays do not fit its size " +
-                                          std::to_string(cloud.size()) + " and SH degree " +
-                                          std::to_string(cloud.sh_degree)};
-    }
+    if (Status s = detail::check_arrays(path, cloud); !s) return s;
+    const std::size_t rest = detail::rest_width(cloud);
     detail::OutFile out;
     if (Status s = out.open(path); !s) return s;
     const std::string header = header_of(cloud, rest, options);

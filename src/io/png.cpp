@@ -7,6 +7,7 @@
 
 #include "file.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "picture.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -113,7 +114,9 @@ class Decoder {
   Source source_{};
 };
 
-Result<PngImage> decode(std::span<const std::byte> bytes, const std::string& name) {
+}  // namespace
+
+Result<PngImage> detail::decode_png(std::span<const std::byte> bytes, const std::string& name) {
   Decoder decoder;
   if (!decoder.read_header(bytes))
     return {Errc::invalid_file, name + ": not a PNG, or its header is damaged"};
@@ -143,8 +146,6 @@ Result<PngImage> decode(std::span<const std::byte> bytes, const std::string& nam
   return image;
 }
 
-}  // namespace
-
 Status save_png_rgb(const std::filesystem::path& path, std::span<const float> rgb, int width,
                     int height) {
   return detail::guarded(path.string(), [&]() -> Status {
@@ -173,7 +174,7 @@ Result<PngImage> load_png(const std::filesystem::path& path) {
   return detail::guarded(path.string(), [&]() -> Result<PngImage> {
     const auto file = detail::read_file(path);
     if (!file) return file.status();
-    return decode(file->span(), path.string());
+    return detail::decode_png(file->span(), path.string());
   });
 }
 

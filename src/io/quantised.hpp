@@ -20,6 +20,26 @@ inline double opacity_logit(unsigned byte) noexcept {
 /// The SH coefficient of degree 0 that is drawn as a colour in [0, 1].
 inline float sh0_of_colour(double colour) noexcept { return static_cast<float>((colour - 0.5) / kSh0); }
 
+/// The nearest of the `bits`-bit steps over [0, 1]; what lies outside becomes the nearer end.
+inline std::uint32_t nearest_step(double t, int bits) noexcept {
+  const double most = static_cast<double>((std::uint32_t{1} << bits) - 1);
+  return static_cast<std::uint32_t>(std::nearbyint(std::fmax(0.0, std::fmin(t, 1.0)) * most));
+}
+
+/// A unit quaternion as its three smaller components, the largest being positive: quat_without's
+/// other way. Returns which one is left out.
+inline std::size_t smallest_three(const double (&q)[4], double (&others)[3]) noexcept {
+  std::size_t largest = 0;
+  for (std::size_t k = 1; k < 4; ++k) {
+    if (std::fabs(q[k]) > std::fabs(q[largest])) largest = k;
+  }
+  const double sign = q[largest] < 0 ? -1 : 1;
+  for (std::size_t k = 0, stored = 0; k < 4; ++k) {
+    if (k != largest) others[stored++] = sign * q[k];
+  }
+  return largest;
+}
+
 /// Three components of a unit quaternion (w, x, y, z without the one at `largest`); the fourth, the
 /// largest, is what unit length leaves, and positive.
 inline Quatd quat_without(std::size_t largest, const double (&others)[3]) noexcept {

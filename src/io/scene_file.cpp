@@ -7,12 +7,15 @@
 #include <vector>
 
 #include "file.hpp"
+#include "gsnav/io/gltf.hpp"
 #include "gsnav/io/ksplat.hpp"
+#include "gsnav/io/lod_set.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
 #include "gsnav/io/spz.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "report_sum.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -20,18 +23,16 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kSupported =
-    "a .ply, .splat, .ksplat, .spz or .sog, a meta.json or a folder with a meta.json";
+    "a .ply, .splat, .ksplat, .spz, .sog, .glb or .gltf, a meta.json, a lod-meta.json or a folder with "
+    "one of the two";
 
-Result<LoadedCloud> load_one(const fs::path& path) {
+Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& options) {
   std::error_code ignored;
   const std::string name = path.string();
   if (fs::is_directory(path, ignored)) {
     if (fs::exists(path / "meta.json", ignored)) return load_sog(path);
-    std::string hint;
-    if (fs::exists(path / "lod-meta.json", ignored)) {
-      hint = "; it is a streamed set: name its tiles instead, as in " + (path / "2_0,2_1").string();
-    }
-    return {Errc::file_not_found, name + ": the folder has no meta.json" + hint};
+    if (fs::exists(path / "lod-meta.json", ignored)) return load_lod_set(path, {.level = options.level});
+    return {Errc::file_not_found, name + ": the folder has no meta.json and no lod-meta.json"};
   }
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
@@ -41,7 +42,9 @@ Result<LoadedCloud> load_one(const fs::path& path) {
   if (extension == ".splat") return load_splat(path);
   if (extension == ".ksplat") return load_ksplat(path);
   if (extension == ".spz") return load_spz(path);
+  if (extension == ".glb" || extension == ".gltf") return load_gltf(path);
   if (path.filename() == "meta.json") return load_sog(path);
+  if (path.filename() == "lod-meta.json") return load_lod_set(path, {.level = options.level});
   if (!fs::exists(path, ignored))
     return {Errc::file_not_found, name + ": no such file or folder; supported: " + kSupported};
   return {Errc::unsupported, name + ": not a scene that is read here; supported: " + kSupported};
@@ -74,37 +77,20 @@ Result<LoadedCloud> sorted(Result<LoadedCloud> scene) {
   return scene;
 }
 
-void add_report(LoadReport& sum, const LoadReport& tile, const std::string& name) {
-  sum.read += tile.read;
-  sum.kept += tile.kept;
-  sum.dropped_non_finite += tile.dropped_non_finite;
-  sum.dropped_zero_quat += tile.dropped_zero_quat;
-  sum.dropped_transparent += tile.dropped_transparent;
-  sum.clamped_scales += tile.clamped_scales;
-  sum.sh_degree = std::max(sum.sh_degree, tile.sh_degree);
-  sum.bounds.add(tile.bounds);
-  for (const std::string& w : tile.warnings) sum.warnings.push_back(name + ": " + w);
-}
-
 }  // namespace
 
-Result<LoadedCloud> load_scene(const std::string& spec) {
+Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options) {
   return detail::guarded(spec, [&]() -> Result<LoadedCloud> {
     std::error_code ignored;
     // A file's own name may hold a comma.
-    if (fs::exists(spec, ignored)) return sorted(load_one(spec));
+    if (fs::exists(spec, ignored)) return sorted(load_one(spec, options));
     const auto tiles = tiles_of(spec);
     if (!tiles) return tiles.status();
-    if (tiles->size() == 1) return sorted(load_one(tiles->front()));
+    if (tiles->size() == 1) return sorted(load_one(tiles->front(), options));
     LoadedCloud scene;
     scene.report.source = spec;
     for (const fs::path& path : *tiles) {
-      auto tile = load_one(path);
-      if (!tile) return tile.status();
-      add_report(scene.report, tile->report, path.string());
-      if (Status s = append(scene.cloud, tile->cloud); !s) {
-        return {s.code(), path.string() + ": " + s.message()};
-      }
+      if (Status s = detail::merge_loaded(scene, load_one(path, options), path.string()); !s) return s;
     }
     return sorted(std::move(scene));
   });

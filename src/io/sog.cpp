@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/io/sog.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
 
+#include "cloud_fill.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 #include "sog_meta.hpp"
+#include "sog_rows.hpp"
 #include "webp.hpp"
 #include "zip.hpp"
 
@@ -20,8 +23,8 @@ using detail::SogMeta;
 
 // A constant plane of 16383 x 16383 pixels fits in some bytes of WebP. Real planes hold about one
 // Gaussian a byte of all files; what claims many times that is refused before memory is asked for.
-constexpr std::size_t kMostGaussiansPerByte = 32;
-constexpr std::size_t kGaussianSlack = std::size_t{1} << 20;
+constexpr std::size_t kMostGaussiansPerByte = 8;
+constexpr std::size_t kGaussianSlack = std::size_t{1} << 18;
 
 /// The files of a SOG, whether in a folder or in a bundle.
 class SogFiles {
@@ -109,19 +112,40 @@ class SogReader {
  public:
   SogReader(const SogFiles& files, SogMeta meta) : files_(files), meta_(std::move(meta)) {}
 
-  Result<LoadedCloud> run(const std::string& source) {
-    if (Status s = read_planes(); !s) return s;
-    GaussianCloudBuilder builder(meta_.degree, source);
-    builder.cloud().filter = meta_.antialias ? Filter::mip : Filter::classic;
-    builder.reserve(meta_.count);
-    RawGaussian raw;
-    std::array<float, 45> rest;
-    raw.shN = rest.data();
-    for (std::size_t i = 0; i < meta_.count; ++i) {
-      if (Status s = gaussian(i, raw, rest); !s) return s;
-      builder.add(raw);
+  /// All rows, or those of `ranges` where it is given.
+  Result<LoadedCloud> run(const std::string& source, const std::vector<detail::RowRange>* ranges) {
+    const std::vector<detail::RowRange> all = {{0, meta_.count}};
+    if (ranges == nullptr) ranges = &all;
+    std::uint64_t total = 0;
+    for (const detail::RowRange& r : *ranges) {
+      if (r.first > meta_.count || r.count > meta_.count - r.first) {
+        return {Errc::invalid_file,
+                source + ": rows " + std::to_string(r.first) + " and " + std::to_string(r.count) +
+                    " from there on are asked for, it has " + std::to_string(meta_.count)};
+      }
+      total += r.count;
     }
-    return LoadedCloud{std::move(builder.cloud()), std::move(builder.report())};
+    if (Status s = read_planes(); !s) return s;
+    const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+      RawGaussian raw;
+      std::array<float, 45> rest;
+      raw.shN = rest.data();
+      std::uint64_t before = 0;  // rows of the ranges so far
+      for (const detail::RowRange& r : *ranges) {
+        const std::uint64_t from = std::max<std::uint64_t>(first, before);
+        const std::uint64_t to = std::min<std::uint64_t>(last, before + r.count);
+        for (std::uint64_t i = from; i < to; ++i) {
+          if (Status s = gaussian(static_cast<std::size_t>(r.first + i - before), raw, rest); !s)
+            return s;
+          sink.add(raw);
+        }
+        before += r.count;
+      }
+      return {};
+    };
+    auto out = detail::fill_cloud(static_cast<std::size_t>(total), meta_.degree, source, decode);
+    if (out) out->cloud.filter = meta_.antialias ? Filter::mip : Filter::classic;
+    return out;
   }
 
  private:
@@ -237,9 +261,8 @@ class SogReader {
   Plane low_, high_, scales_, quats_, sh0_, labels_, centroids_;
 };
 
-}  // namespace
-
-Result<LoadedCloud> load_sog(const std::filesystem::path& path) {
+Result<LoadedCloud> load(const std::filesystem::path& path,
+                         const std::vector<detail::RowRange>* ranges) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
     SogFiles files;
     if (Status s = files.open(path); !s) return s;
@@ -247,8 +270,17 @@ Result<LoadedCloud> load_sog(const std::filesystem::path& path) {
     if (!text) return text.status();
     auto meta = detail::parse_sog_meta(*text, files.label(files.meta()));
     if (!meta) return meta.status();
-    return SogReader(files, std::move(*meta)).run(path.string());
+    return SogReader(files, std::move(*meta)).run(path.string(), ranges);
   });
+}
+
+}  // namespace
+
+Result<LoadedCloud> load_sog(const std::filesystem::path& path) { return load(path, nullptr); }
+
+Result<LoadedCloud> detail::load_sog_rows(const std::filesystem::path& path,
+                                          const std::vector<RowRange>& ranges) {
+  return load(path, &ranges);
 }
 
 }  // namespace gsnav::io

@@ -2,8 +2,8 @@
 #include "gsnav/io/splat.hpp"
 
 #include <cmath>
-#include <utility>
 
+#include "cloud_fill.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 
@@ -12,32 +12,34 @@ namespace {
 
 constexpr std::size_t kRecord = 32, kScales = 12, kColour = 24, kQuat = 28;
 
+RawGaussian gaussian(const std::byte* p) {
+  const auto number = [p](std::size_t offset) {
+    return static_cast<double>(detail::load_le<float>(p + offset));
+  };
+  RawGaussian raw;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const int axis = static_cast<int>(k);
+    raw.mean[axis] = number(4 * k);
+    raw.log_scales[axis] = std::log(number(kScales + 4 * k));
+    raw.sh0[k] = detail::sh0_of_colour(std::to_integer<unsigned>(p[kColour + k]) / 255.0);
+  }
+  raw.opacity_logit = detail::opacity_logit(std::to_integer<unsigned>(p[kColour + 3]));
+  double q[4];
+  for (std::size_t k = 0; k < 4; ++k) q[k] = std::to_integer<unsigned>(p[kQuat + k]) - 128.0;
+  raw.quat = {q[0], q[1], q[2], q[3]};
+  return raw;
+}
+
 Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source) {
   if (bytes.empty() || bytes.size() % kRecord != 0) {
     return {Errc::invalid_file, source + ": " + std::to_string(bytes.size()) +
                                     " bytes, must be records of 32 bytes, at least one"};
   }
-  GaussianCloudBuilder builder(0, source);
-  builder.reserve(bytes.size() / kRecord);
-  for (std::size_t at = 0; at < bytes.size(); at += kRecord) {
-    const std::byte* p = bytes.data() + at;
-    const auto number = [p](std::size_t offset) {
-      return static_cast<double>(detail::load_le<float>(p + offset));
-    };
-    RawGaussian raw;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const int axis = static_cast<int>(k);
-      raw.mean[axis] = number(4 * k);
-      raw.log_scales[axis] = std::log(number(kScales + 4 * k));
-      raw.sh0[k] = detail::sh0_of_colour(std::to_integer<unsigned>(p[kColour + k]) / 255.0);
-    }
-    raw.opacity_logit = detail::opacity_logit(std::to_integer<unsigned>(p[kColour + 3]));
-    double q[4];
-    for (std::size_t k = 0; k < 4; ++k) q[k] = std::to_integer<unsigned>(p[kQuat + k]) - 128.0;
-    raw.quat = {q[0], q[1], q[2], q[3]};
-    builder.add(raw);
-  }
-  return LoadedCloud{std::move(builder.cloud()), std::move(builder.report())};
+  const auto decode = [bytes](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+    for (std::size_t i = first; i < last; ++i) sink.add(gaussian(bytes.data() + i * kRecord));
+    return {};
+  };
+  return detail::fill_cloud(bytes.size() / kRecord, 0, source, decode);
 }
 
 }  // namespace

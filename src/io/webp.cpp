@@ -2,6 +2,7 @@
 #include "webp.hpp"
 
 #include <webp/decode.h>
+#include <webp/encode.h>
 
 namespace gsnav::io::detail {
 namespace {
@@ -39,6 +40,33 @@ Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::strin
     return {Errc::invalid_file, what + ": damaged WebP data"};
   }
   return image;
+}
+
+Result<std::string> encode_webp(const RgbaImage& image, const std::string& what) {
+  constexpr int kLevel = 4;  // of 9: beyond it the time grows faster than the files shrink
+  WebPConfig config;
+  WebPPicture picture;
+  if (WebPConfigInit(&config) == 0 || WebPConfigLosslessPreset(&config, kLevel) == 0 ||
+      WebPPictureInit(&picture) == 0) {
+    return {Errc::unsupported, what + ": libwebp is another version than this was built for"};
+  }
+  config.exact = 1;
+  picture.use_argb = 1;
+  picture.width = static_cast<int>(image.width);
+  picture.height = static_cast<int>(image.height);
+  WebPMemoryWriter writer;
+  WebPMemoryWriterInit(&writer);
+  picture.writer = WebPMemoryWrite;
+  picture.custom_ptr = &writer;
+  const bool ok = WebPPictureImportRGBA(&picture, image.pixels.data(), 4 * picture.width) != 0 &&
+                  WebPEncode(&config, &picture) != 0;
+  Result<std::string> out =
+      Status(picture.error_code == VP8_ENC_ERROR_BAD_DIMENSION ? Errc::unsupported : Errc::out_of_memory,
+             what + ": libwebp error " + std::to_string(static_cast<int>(picture.error_code)));
+  if (ok) out = std::string(reinterpret_cast<const char*>(writer.mem), writer.size);
+  WebPMemoryWriterClear(&writer);
+  WebPPictureFree(&picture);
+  return out;
 }
 
 }  // namespace gsnav::io::detail

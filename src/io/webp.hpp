@@ -29,4 +29,8 @@ Result<WebpSize> webp_size(std::span<const std::byte> bytes, const std::string& 
 /// Decodes a lossless WebP; alpha is left as stored, not multiplied into the colours.
 Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::string& what);
 
+/// Encodes pixels losslessly, colours under alpha 0 too. Errors: out_of_memory, unsupported (a side
+/// beyond 16383).
+Result<std::string> encode_webp(const RgbaImage& image, const std::string& what);
+
 }  // namespace gsnav::io::detail

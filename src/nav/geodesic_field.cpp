@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/nav/geodesic_field.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -19,7 +20,14 @@ struct GeodesicField::Impl {
   struct Source {
     Flat root, right, left;
     double g = 0;
+    double least = 0;  ///< no point of the face is nearer
   };
+
+  static Source seen_through(const GeodesicSearch::Node& n) noexcept {
+    const Flat e = n.left - n.right;
+    const double t = clamp(detail::dot(n.root - n.right, e) / detail::dot(e, e), 0.0, 1.0);
+    return {n.root, n.right, n.left, n.g, n.g + detail::length(n.right + e * t - n.root)};
+  }
 
   const NavMesh::Impl* mesh = nullptr;
   std::shared_ptr<const detail::UnfoldedMesh> unfolded;
@@ -52,16 +60,20 @@ Result<GeodesicField> GeodesicField::make(const NavMesh& mesh, std::span<const V
   search.flood(m, sites);
 
   std::vector<std::vector<Impl::Source>> by_face(m.faces.size());
-  for (const Site& s : sites) by_face[s.face].push_back({s.at, s.at, s.at, 0.0});
+  for (const Site& s : sites) by_face[s.face].push_back({s.at, s.at, s.at, 0.0, 0.0});
   for (const GeodesicSearch::Node& n : search.nodes()) {
-    if (!n.is_vertex) by_face[m.edges[n.edge].face].push_back({n.root, n.right, n.left, n.g});
+    if (!n.is_vertex) by_face[m.edges[n.edge].face].push_back(Impl::seen_through(n));
   }
   for (std::uint32_t f = 0; f < m.faces.size(); ++f) {
     for (std::uint32_t k = 0; k < m.faces[f].count; ++k) {
       const auto& e = m.edges[m.faces[f].first + k];
       const double d = search.vertex_distance(e.vertex);
-      if (d < std::numeric_limits<double>::infinity()) by_face[f].push_back({e.at, e.at, e.at, d});
+      // Through a vertex that no path bends at windows lead beside it.
+      const bool needed = m.vertices[e.vertex].turning || d <= 0 || by_face[f].empty();
+      if (needed && d < std::numeric_limits<double>::infinity()) by_face[f].push_back({e.at, e.at, e.at, d, d});
     }
+    std::stable_sort(by_face[f].begin(), by_face[f].end(),
+                     [](const Impl::Source& a, const Impl::Source& b) { return a.least < b.least; });
     impl->first.push_back(static_cast<std::uint32_t>(impl->sources.size()));
     impl->sources.insert(impl->sources.end(), by_face[f].begin(), by_face[f].end());
   }
@@ -75,6 +87,7 @@ double GeodesicField::distance(const NavPoint& p) const noexcept {
   const Site at = impl_->mesh->site(p);
   for (std::uint32_t i = impl_->first[at.face]; i < impl_->first[at.face + 1]; ++i) {
     const Impl::Source& s = impl_->sources[i];
+    if (s.least >= best) break;
     const Flat d = at.at - s.root;
     const double straight = s.g + detail::length(d);
     if (straight >= best) continue;

@@ -17,8 +17,8 @@ Flat turned(const Flat& d, double angle) noexcept {
   return {c * d.x - s * d.y, s * d.x + c * d.y};
 }
 
-/// Shortest way from the window's root through it to a point at `along` the edge from its right end and
-/// `beyond` it (its mirror image where it lies on this side): a lower bound wherever that point is.
+}  // namespace
+
 double length_through(const Flat& root, const Flat& right, const Flat& left, double along, double beyond) noexcept {
   const Flat e = left - right;
   const double width = length(e), inverse = 1.0 / width;
@@ -32,16 +32,15 @@ double length_through(const Flat& root, const Flat& right, const Flat& left, dou
          std::sqrt((along - x) * (along - x) + beyond * beyond);
 }
 
-}  // namespace
-
 GeodesicSearch& thread_search() {
   thread_local GeodesicSearch search;
   return search;
 }
 
-void GeodesicSearch::begin(const UnfoldedMesh& mesh) {
+void GeodesicSearch::begin(const UnfoldedMesh& mesh, double bound) {
   mesh_ = &mesh;
-  best_ = kInfinity;
+  best_ = bound;
+  found_ = false;
   best_node_ = kNone;
   nodes_.clear();
   heap_.clear();
@@ -52,27 +51,27 @@ void GeodesicSearch::begin(const UnfoldedMesh& mesh) {
   ++round_;
 }
 
-double GeodesicSearch::run(const UnfoldedMesh& mesh, const Site& start, const Site& goal) {
+double GeodesicSearch::run(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound) {
   start_ = start;
   goal_ = goal;
   has_goal_ = true;
+  straight_ = false;
   if (start.face == goal.face) {
     begin(mesh);
-    return best_ = length(goal.at - start.at);
+    return length(goal.at - start.at);
   }
   for (const bool every : {false, true}) {
     every_vertex_ = every;
-    begin(mesh);
+    begin(mesh, bound);
     leave(start);
     settle();
-    if (best_ < kInfinity) break;
+    if (found_) return best_;
   }
-  return best_;
+  return kInfinity;
 }
 
 void GeodesicSearch::flood(const UnfoldedMesh& mesh, const std::vector<Site>& starts) {
-  has_goal_ = false;
-  every_vertex_ = false;
+  has_goal_ = every_vertex_ = straight_ = false;
   begin(mesh);
   for (const Site& s : starts) leave(s);
   settle();
@@ -103,6 +102,7 @@ void GeodesicSearch::push(double f, const Node& node) {
 
 void GeodesicSearch::offer_goal(double total, std::uint32_t node) {
   if (total >= best_) return;
+  found_ = true;
   best_ = total;
   best_node_ = node;
 }
@@ -127,6 +127,7 @@ void GeodesicSearch::leave(const Site& start) {
 }
 
 void GeodesicSearch::reach(std::uint32_t edge, const Flat& root, double g, std::uint32_t parent) {
+  if (straight_ && has_goal_) return;
   const UnfoldedMesh::Edge& e = mesh_->edges[edge];
   const double d = g + length(e.at - root);
   double& known = distance_[e.vertex];
@@ -140,7 +141,11 @@ void GeodesicSearch::reach(std::uint32_t edge, const Flat& root, double g, std::
   n.edge = edge;
   n.parent = parent;
   n.is_vertex = true;
-  push(has_goal_ ? d + norm(goal_.position - e.corner) : d, n);
+  if (!straight_) {
+    push(has_goal_ ? d + distance(goal_.position, e.corner) : d, n);
+  } else if (!has_goal_) {
+    nodes_.push_back(n);
+  }
 }
 
 void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left, double g,
@@ -150,6 +155,10 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
   const Flat extent = left - right;
   if (!(dot(extent, extent) > kPoint * kPoint)) return;
   const UnfoldedMesh::Edge& there = mesh_->edges[here.twin];
+  if (straight_ && has_goal_) {
+    open_straight(edge, root, right, left, parent);
+    return;
+  }
   // A way along the edge from one of its ends may be shorter for all of the window.
   const double dr = vertex_distance(here.vertex), dl = vertex_distance(there.vertex);
   if (dr < kInfinity && dr + length(left - here.at) + kRounding < g + length(left - root)) return;

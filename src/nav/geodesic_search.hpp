@@ -17,6 +17,16 @@ struct Site {
   Vec3d position{};
 };
 
+/// What is known of distances to the goal.
+class GoalBound {
+ public:
+  /// No way from the vertex to the goal is shorter; 0 where nothing is known.
+  virtual double from(std::uint32_t vertex) const noexcept = 0;
+
+ protected:
+  ~GoalBound() = default;
+};
+
 /// Exact shortest paths on an UnfoldedMesh: windows (stretches of edges with the point that sees all of
 /// them) spread from face to face, best first. On a level mesh this is Polyanya (Cui, Harabor and
 /// Grastien 2017); over slopes the point is unfolded with the faces and windows that a known vertex
@@ -38,13 +48,21 @@ class GeodesicSearch {
     bool is_vertex = false;
   };
 
-  /// Distance between two sites, infinity where the search cannot reach the goal.
-  double run(const UnfoldedMesh& mesh, const Site& start, const Site& goal);
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
+
+  /// Distance between two sites, infinity where the search cannot reach the goal within less than `bound`.
+  double run(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar);
+  /// The same over paths that do not bend.
+  double run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar,
+                      const GoalBound* least = nullptr);
   /// Corners of the last run's path from start to goal; between them points where the surface leaves the straight
   /// line by more than a centimetre.
   std::vector<Vec3d> path() const;
   /// Spreads over everything that can be reached from `starts`.
   void flood(const UnfoldedMesh& mesh, const std::vector<Site>& starts);
+  /// Spreads straight ways from a vertex: nodes() are the windows, and turning vertices as they were reached. Returns
+  /// how many of them come first in whose directions a path that bends there may leave.
+  std::size_t look_around(const UnfoldedMesh& mesh, std::uint32_t vertex);
 
   const std::vector<Node>& nodes() const noexcept { return nodes_; }
   /// Distance of a vertex as far as the last search knows it; infinity where it was not seen.
@@ -57,7 +75,7 @@ class GeodesicSearch {
     Flat right, left;  ///< directions of its sides
   };
 
-  void begin(const UnfoldedMesh& mesh);
+  void begin(const UnfoldedMesh& mesh, double bound = kFar);
   void leave(const Site& start);
   void leave_vertex(std::uint32_t vertex, double g, std::uint32_t parent, double low, double high);
   void spread_window(std::uint32_t node);
@@ -67,6 +85,8 @@ class GeodesicSearch {
               const Cone& cone, double g, std::uint32_t parent);
   void open(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left, double g,
             std::uint32_t parent);
+  /// The same for the straight way to a goal.
+  void open_straight(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left, std::uint32_t parent);
   void reach(std::uint32_t edge, const Flat& root, double g, std::uint32_t parent);
   void offer_goal(double length, std::uint32_t node);
   void push(double f, const Node& node);
@@ -76,6 +96,9 @@ class GeodesicSearch {
   Site start_, goal_;
   bool has_goal_ = false;
   bool every_vertex_ = false;  ///< bend at every vertex: where rounding hid the way
+  bool straight_ = false;      ///< bend nowhere
+  bool found_ = false;         ///< the goal
+  const GoalBound* least_ = nullptr;
   double best_ = 0;
   std::uint32_t best_node_ = kNone;
   std::vector<Node> nodes_;
@@ -84,6 +107,10 @@ class GeodesicSearch {
   std::vector<std::uint64_t> seen_;
   std::uint64_t round_ = 0;
 };
+
+/// Shortest way from the window's root through it to a point at `along` the edge from its right end and
+/// `beyond` it (its mirror image where it lies on this side): a lower bound wherever that point is.
+double length_through(const Flat& root, const Flat& right, const Flat& left, double along, double beyond) noexcept;
 
 /// A search to use until the thread's next one.
 GeodesicSearch& thread_search();

@@ -46,6 +46,48 @@ VoxelSettings::VoxelSettings(const NavMeshSettings& s) noexcept
       climb(clamp_cells(std::floor(s.agent_max_climb / s.cell_height + kEdge))),
       radius(clamp_cells(std::ceil(s.agent_radius / s.cell_size - kEdge))) {}
 
+double slope_cosine(const NavMeshSettings& s) noexcept {
+  return std::cos(s.agent_max_slope * 3.14159265358979323846 / 180.0);
+}
+
+Result<Aabb<double>> check_triangles(std::span<const Vec3d> vertices, std::span<const NavMesh::Triangle> triangles) {
+  Aabb<double> box;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (!is_finite(vertices[i])) {
+      return Status(Errc::invalid_argument, "NavMesh: vertex " + std::to_string(i) + " is not finite");
+    }
+    box.add(vertices[i]);
+  }
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    for (const std::uint32_t v : triangles[i]) {
+      if (v >= vertices.size()) {
+        return Status(Errc::invalid_argument, "NavMesh: triangle " + std::to_string(i) + " names vertex " +
+                                                  std::to_string(v) + " of " +
+                                                  std::to_string(vertices.size()));
+      }
+    }
+  }
+  return box;
+}
+
+Status rasterise(RecastLog& log, const NavMeshSettings& settings, std::span<const Vec3d> vertices,
+                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin, rcHeightfield& field) {
+  const int climb = VoxelSettings(settings).climb;
+  const double cos_slope = slope_cosine(settings);
+  for (const NavMesh::Triangle& t : triangles) {
+    float v[9];
+    Vec3d p[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      p[k] = vertices[t[k]] - origin;
+      for (int c = 0; c < 3; ++c) v[3 * k + static_cast<std::size_t>(c)] = static_cast<float>(p[k][c]);
+    }
+    const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
+    const unsigned char area = n.y > cos_slope * norm(n) ? RC_WALKABLE_AREA : RC_NULL_AREA;
+    if (!rcRasterizeTriangle(&log, v, v + 3, v + 6, area, field, climb)) return stage("rasterising triangles", log);
+  }
+  return {};
+}
+
 Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshSettings& settings,
                                                   const Vec3d& low, const Vec3d& high) {
   const double cs = settings.cell_size, ch = settings.cell_height;
@@ -174,45 +216,18 @@ Result<NavMesh> NavMesh::build(const NavMeshSettings& settings, std::span<const 
   if (vertices.empty() || triangles.empty()) {
     return Status(Errc::nothing_navigable, "NavMesh: there are no triangles to build from");
   }
-  Aabb<double> box;
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    if (!is_finite(vertices[i])) {
-      return Status(Errc::invalid_argument, "NavMesh: vertex " + std::to_string(i) + " is not finite");
-    }
-    box.add(vertices[i]);
-  }
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    for (const std::uint32_t v : triangles[i]) {
-      if (v >= vertices.size()) {
-        return Status(Errc::invalid_argument, "NavMesh: triangle " + std::to_string(i) + " names vertex " +
-                                                  std::to_string(v) + " of " +
-                                                  std::to_string(vertices.size()));
-      }
-    }
-  }
+  auto checked = detail::check_triangles(vertices, triangles);
+  if (!checked.ok()) return checked.status();
+  const Aabb<double> box = *checked;
   // Recast computes in float: its zero goes near the mesh, on whole metres.
   const Vec3d middle = (box.low + box.high) * 0.5;
   const Vec3d origin{std::floor(middle.x), std::floor(middle.y), std::floor(middle.z)};
   detail::RecastLog log;
   auto field = detail::make_heightfield(log, settings, box.low - origin, box.high - origin);
   if (!field.ok()) return field.status();
-  const int climb = detail::VoxelSettings(settings).climb;
-  const double cos_slope = std::cos(settings.agent_max_slope * 3.14159265358979323846 / 180.0);
-  for (const Triangle& t : triangles) {
-    float v[9];
-    Vec3d p[3];
-    for (std::size_t k = 0; k < 3; ++k) {
-      p[k] = vertices[t[k]] - origin;
-      for (int c = 0; c < 3; ++c) v[3 * k + static_cast<std::size_t>(c)] = static_cast<float>(p[k][c]);
-    }
-    const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
-    const unsigned char area = n.y > cos_slope * norm(n) ? RC_WALKABLE_AREA : RC_NULL_AREA;
-    if (!rcRasterizeTriangle(&log, v, v + 3, v + 6, area, **field, climb)) {
-      return detail::stage("rasterising triangles", log);
-    }
-  }
+  if (Status s = detail::rasterise(log, settings, vertices, triangles, origin, **field); !s.ok()) return s;
   const detail::TriangleHeights heights(vertices, triangles, origin, {box.low - origin, box.high - origin});
-  const double ch = settings.cell_height;
+  const double ch = settings.cell_height, cos_slope = detail::slope_cosine(settings);
   // A span's top is the highest point of the surface within its cell, rounded up.
   const double below = 1.01 * ch + settings.cell_size * (cos_slope > 0.1 ? 1.0 / cos_slope : 10.0);
   return detail::finish_navmesh(

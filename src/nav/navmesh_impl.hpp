@@ -6,10 +6,12 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
 #include "gsnav/nav/navmesh.hpp"
+#include "corner_hubs.hpp"
 #include "geodesic_search.hpp"
 #include "poly_mesh.hpp"
 
@@ -46,6 +48,16 @@ class RecastLog : public rcContext {
  private:
   std::string error_;
 };
+
+/// Cosine of agent_max_slope: triangles that face up more than that can be walked on.
+double slope_cosine(const NavMeshSettings& settings) noexcept;
+
+/// Box of the vertices. Errors: invalid_argument naming a vertex or index.
+Result<Aabb<double>> check_triangles(std::span<const Vec3d> vertices, std::span<const NavMesh::Triangle> triangles);
+
+/// Adds triangles to a heightfield whose frame lies at `origin`. Errors: out_of_memory.
+Status rasterise(RecastLog& log, const NavMeshSettings& settings, std::span<const Vec3d> vertices,
+                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin, rcHeightfield& field);
 
 /// An empty heightfield over a box (relative to the mesh's origin). Errors: the grid exceeds
 /// `settings.max_cells` or the height what Recast can number.
@@ -85,11 +97,22 @@ struct NavMesh::Impl {
   detail::NavMeshPtr mesh;
   detail::PolyMesh polys;
   std::shared_ptr<const detail::UnfoldedMesh> unfolded;  ///< shared with geodesic fields
+  /// Made when first asked for: who never asks for a distance pays nothing.
+  const detail::CornerHubs& hubs() const {
+    std::call_once(hubs_once, [&] { made_hubs = std::make_unique<const detail::CornerHubs>(*unfolded); });
+    return *made_hubs;
+  }
+  mutable std::once_flag hubs_once;
+  mutable std::unique_ptr<const detail::CornerHubs> made_hubs;
   Aabb<double> bounds;  ///< world
   std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon
   std::vector<PolyId> first_poly;   ///< of each of Detour's tiles
 
   detail::Site site(const NavPoint& p) const noexcept;
+  /// Length of the shortest path; infinity where there is none.
+  double distance(const detail::Site& start, const detail::Site& goal) const;
+  /// The shortest path, relative to the mesh's origin; no points where there is none.
+  NavPath path(const detail::Site& start, const detail::Site& goal) const;
 
   dtPolyRef ref_of(PolyId id) const noexcept { return refs[id]; }
   PolyId id_of(dtPolyRef ref) const noexcept {

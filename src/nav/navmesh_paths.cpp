@@ -10,6 +10,7 @@ namespace gsnav {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kSame = 1e-9;  // metres
 
 std::string text(const Vec3d& p) {
   char buffer[96];
@@ -31,11 +32,56 @@ detail::Site NavMesh::Impl::site(const NavPoint& p) const noexcept {
   return {face, unfolded->flat(unfolded->faces[face], local), local};
 }
 
+double NavMesh::Impl::distance(const detail::Site& start, const detail::Site& goal) const {
+  detail::GeodesicSearch& search = detail::thread_search();
+  if (hubs().empty() || start.face == goal.face) return search.run(*unfolded, start, goal);
+  const detail::CornerHubs::Way way = hubs().shortest(start, goal);
+  const detail::CornerHubs::LeastToGoal least(hubs(), way);
+  const double d = min(way.length, search.run_straight(*unfolded, start, goal, way.length, &least));
+  return d < kInfinity ? d : search.run(*unfolded, start, goal);
+}
+
+NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal) const {
+  detail::GeodesicSearch& search = detail::thread_search();
+  const auto searched = [&] {
+    NavPath path;
+    path.length = search.run(*unfolded, start, goal);
+    if (path.length < kInfinity) path.points = search.path();
+    return path;
+  };
+  if (hubs().empty() || start.face == goal.face) return searched();
+  const detail::CornerHubs::Way way = hubs().shortest(start, goal);
+  NavPath path;
+  const detail::CornerHubs::LeastToGoal least(hubs(), way);
+  path.length = search.run_straight(*unfolded, start, goal, way.length, &least);
+  if (path.length < kInfinity) {
+    path.points = search.path();
+    return path;
+  }
+  if (!(way.length < kInfinity)) return searched();
+  path.length = way.length;
+  double done = 0;
+  std::vector<detail::Site> sites = hubs().bends(way);
+  sites.insert(sites.begin(), start);
+  sites.push_back(goal);
+  // Leg by leg; its length is known.
+  for (std::size_t i = 1; i < sites.size(); ++i) {
+    const double leg = search.run(*unfolded, sites[i - 1], sites[i], way.length - done + 1e-6);
+    if (!(leg < kInfinity)) return searched();
+    done += leg;
+    for (const Vec3d& p : search.path()) {
+      if (path.points.empty() || norm(p - path.points.back()) > kSame) path.points.push_back(p);
+    }
+  }
+  if (path.points.size() == 1) path.points.push_back(goal.position);
+  return path;
+}
+
 double NavMesh::distance_between(const NavPoint& start, const NavPoint& goal) const {
   if (start.poly >= polygon_count() || goal.poly >= polygon_count()) return kInfinity;
   if (!is_finite(start.position) || !is_finite(goal.position)) return kInfinity;
   if (island_of(start.poly) != island_of(goal.poly)) return kInfinity;
-  return detail::thread_search().run(*impl_->unfolded, impl_->site(start), impl_->site(goal));
+  return impl_->distance(impl_->site(start), impl_->site(goal));
 }
 
 Result<NavPath> NavMesh::path_between(const NavPoint& start, const NavPoint& goal) const {
@@ -51,13 +97,10 @@ Result<NavPath> NavMesh::path_between(const NavPoint& start, const NavPoint& goa
     return Status(Errc::nothing_navigable, "no path: start is on island " + std::to_string(ia) +
                                                ", goal on " + std::to_string(ib));
   }
-  detail::GeodesicSearch& search = detail::thread_search();
-  NavPath path;
-  path.length = search.run(*impl_->unfolded, impl_->site(start), impl_->site(goal));
-  if (!(path.length < kInfinity)) {
+  NavPath path = impl_->path(impl_->site(start), impl_->site(goal));
+  if (path.points.empty()) {
     return Status(Errc::nothing_navigable, "no path: the search did not reach the goal");
   }
-  path.points = search.path();
   for (Vec3d& p : path.points) p += impl_->origin;
   return path;
 }

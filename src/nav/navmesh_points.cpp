@@ -103,7 +103,7 @@ NavPoint NavMesh::random_point(Rng& rng, std::optional<std::size_t> island) cons
   const PolyMesh& m = impl_->polys;
   if (island && *island >= m.islands.size()) return {};
   const auto& piece = m.pieces[(island ? m.by_area_in[*island] : m.by_area).draw(rng)];
-  return {m.point_in(piece, rng) + impl_->origin, piece[0]};
+  return {m.point_in(piece, rng) + impl_->origin, piece.poly};
 }
 
 std::optional<NavPoint> NavMesh::random_point_near(Rng& rng, const Vec3d& p, double radius,
@@ -117,18 +117,17 @@ std::optional<NavPoint> NavMesh::random_point_near(Rng& rng, const Vec3d& p, dou
   };
   std::vector<Piece> near;
   std::vector<double> areas;
-  for (const auto& [id, k] : m.pieces) {
-    const PolyMesh::Poly& poly = m.polys[id];
-    if (island && poly.island != *island) continue;
+  for (const PolyMesh::Piece& whole : m.pieces) {
+    if (island && m.polys[whole.poly].island != *island) continue;
     Clipped part;
-    part.p = {m.corner(poly, 0), m.corner(poly, k), m.corner(poly, k + 1)};
+    part.p = {whole.o, whole.a, whole.b};
     part.count = 3;
     for (const int axis : {0, 2}) {
       part.cut(axis, c[axis] + radius, 1);
       part.cut(axis, c[axis] - radius, -1);
     }
     for (std::size_t i = 1; i + 1 < part.count; ++i) {
-      near.push_back({id, {part.p[0], part.p[i], part.p[i + 1]}});
+      near.push_back({whole.poly, {part.p[0], part.p[i], part.p[i + 1]}});
       areas.push_back(0.5 * norm(cross(part.p[i] - part.p[0], part.p[i + 1] - part.p[0])));
     }
   }

@@ -38,38 +38,50 @@ bool PolyMesh::holds(PolyId id, const Vec3d& q, double margin) const noexcept {
 Vec3d PolyMesh::clamped(PolyId id, const Vec3d& q) const noexcept {
   const Poly& p = polys[id];
   bool inside = true;
+  for (std::uint32_t k = 0; k < p.count && inside; ++k) inside = !(cross_xz(corner(p, k), corner(p, k + 1), q) < 0);
+  if (inside) return q;
   double best = std::numeric_limits<double>::max();
   Vec3d nearest = q;
   for (std::uint32_t k = 0; k < p.count; ++k) {
-    const Vec3d &a = corner(p, k), &b = corner(p, k + 1);
-    if (cross_xz(a, b, q) < 0) inside = false;
-    const Vec3d n = nearest_on_edge_xz(a, b, q);
+    const Vec3d n = nearest_on_edge_xz(corner(p, k), corner(p, k + 1), q);
     const double d2 = distance2_xz(n, q);
     if (d2 < best) {
       best = d2;
       nearest = {n.x, q.y, n.z};
     }
   }
-  return inside ? q : nearest;
+  return nearest;
 }
 
 double PolyMesh::height(PolyId id, const Vec3d& q) const noexcept {
   const Poly& p = polys[id];
+  if (p.count == 0) return q.y;
+  const Vec3d& o = corners[p.first];
+  if (p.planar) return o.y + p.rise_x * (q.x - o.x) + p.rise_z * (q.z - o.z);
   // The triangle that q is in, or is least outside of: points on edges always find one.
-  double best = -std::numeric_limits<double>::max(), y = p.count != 0 ? corner(p, 0).y : q.y;
+  double best = -std::numeric_limits<double>::max(), y = o.y;
   for (std::uint32_t i = p.tri_first; i < p.tri_first + p.tri_count; ++i) {
-    const auto& t = tris[i];
-    const double area = cross_xz(t[0], t[1], t[2]);
-    if (!(std::abs(area) > 1e-12)) continue;
-    const double u = cross_xz(t[1], t[2], q) / area, v = cross_xz(t[2], t[0], q) / area;
+    const Height& t = heights[i];
+    const double dx = q.x - t.x, dz = q.z - t.z, u = t.ux * dx + t.uz * dz, v = t.vx * dx + t.vz * dz;
     const double w = 1.0 - u - v, least = min(u, min(v, w));
-    if (least <= best) continue;
+    if (least <= best || (t.ux == 0 && t.uz == 0)) continue;
     best = least;
-    const double cu = max(u, 0.0), cv = max(v, 0.0), cw = max(w, 0.0), sum = cu + cv + cw;
-    y = (cu * t[0].y + cv * t[1].y + cw * t[2].y) / sum;
-    if (least >= 0) break;
+    if (least >= 0) return t.y + u * t.rise_u + v * t.rise_v;
+    const double cu = max(u, 0.0), cv = max(v, 0.0);
+    y = t.y + (cu * t.rise_u + cv * t.rise_v) / (cu + cv + max(w, 0.0));
   }
   return y;
+}
+
+void PolyMesh::prepare_heights() {
+  heights.assign(tris.size(), {});
+  for (std::size_t i = 0; i < tris.size(); ++i) {
+    const auto& [a, b, c] = tris[i];
+    const double area = cross_xz(a, b, c);
+    if (!(std::abs(area) > 1e-12)) continue;
+    heights[i] = {a.x, a.y, a.z, (c.z - a.z) / area, (a.x - c.x) / area, (a.z - b.z) / area, (b.x - a.x) / area,
+                  b.y - a.y, c.y - a.y};
+  }
 }
 
 void PolyMesh::finish() {
@@ -137,8 +149,29 @@ void PolyMesh::finish() {
     }
     island.radius = std::sqrt(r2);
   }
+  prepare_heights();
   prepare_sampling();
   grid.build(*this);
+}
+
+/// Height triangles where they tile the polygon, else its fan.
+void PolyMesh::add_pieces(PolyId id) {
+  const Poly& p = polys[id];
+  constexpr double kOff = 1e-6;  // metres, square metres
+  double area = 0, covered = 0;
+  for (std::uint32_t k = 1; k + 1 < p.count; ++k) area += cross_xz(corner(p, 0), corner(p, k), corner(p, k + 1));
+  bool tiled = !p.planar;
+  const std::size_t first = pieces.size();
+  for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count && tiled; ++t) {
+    covered += std::abs(cross_xz(tris[t][0], tris[t][1], tris[t][2]));
+    for (const Vec3d& q : tris[t]) tiled = tiled && holds(id, q, kOff);
+    pieces.push_back({tris[t][0], tris[t][1], tris[t][2], id, true});
+  }
+  if (tiled && std::abs(covered - area) <= kOff) return;
+  pieces.resize(first);
+  for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
+    pieces.push_back({corner(p, 0), corner(p, k), corner(p, k + 1), id, p.planar});
+  }
 }
 
 void PolyMesh::prepare_sampling() {
@@ -149,38 +182,38 @@ void PolyMesh::prepare_sampling() {
     Poly& p = polys[i];
     const Vec3d& o = corner(p, 0);
     Vec3d normal{};
-    for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
-      const Vec3d twice = cross(corner(p, k + 1) - o, corner(p, k) - o);
-      normal += twice;
-      weights_in[p.island].push_back(0.5 * norm(twice));
-      pieces_in[p.island].push_back(static_cast<std::uint32_t>(pieces.size()));
-      weights.push_back(weights_in[p.island].back());
-      pieces.push_back({i, k});
-    }
+    for (std::uint32_t k = 1; k + 1 < p.count; ++k) normal += cross(corner(p, k + 1) - o, corner(p, k) - o);
     const double scale = norm(normal);
     const auto off = [&](const Vec3d& q) { return !(std::abs(dot(normal, q - o)) <= 1e-6 * scale); };
-    p.planar = true;
+    p.planar = std::abs(normal.y) > 1e-3 * scale;
+    p.rise_x = p.planar ? -normal.x / normal.y : 0.0;
+    p.rise_z = p.planar ? -normal.z / normal.y : 0.0;
     for (std::uint32_t k = 1; k < p.count; ++k) p.planar = p.planar && !off(corner(p, k));
     for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
       p.planar = p.planar && !std::any_of(tris[t].begin(), tris[t].end(), off);
+    }
+    const std::size_t first = pieces.size();
+    add_pieces(i);
+    for (std::size_t k = first; k < pieces.size(); ++k) {
+      weights.push_back(0.5 * norm(cross(pieces[k].a - pieces[k].o, pieces[k].b - pieces[k].o)));
+      weights_in[p.island].push_back(weights.back());
+      pieces_in[p.island].push_back(static_cast<std::uint32_t>(k));
     }
   }
   by_area = AliasTable(weights, {});
   for (std::size_t i = 0; i < islands.size(); ++i) by_area_in.emplace_back(weights_in[i], pieces_in[i]);
 }
 
-Vec3d PolyMesh::point_in(const std::array<std::uint32_t, 2>& piece, Rng& rng) const noexcept {
-  const Poly& p = polys[piece[0]];
-  const Vec3d& o = corner(p, 0);
+Vec3d PolyMesh::point_in(const Piece& piece, Rng& rng) const noexcept {
+  const auto &[o, a, b, poly, on_surface] = piece;
   double u = rng.uniform(), v = rng.uniform();
   if (u + v > 1) {  // the other half of the parallelogram
     u = 1 - u;
     v = 1 - v;
   }
-  const Vec3d &a = corner(p, piece[1]), &b = corner(p, piece[1] + 1);
   Vec3d q{o.x + u * (a.x - o.x) + v * (b.x - o.x), o.y + u * (a.y - o.y) + v * (b.y - o.y),
           o.z + u * (a.z - o.z) + v * (b.z - o.z)};
-  if (!p.planar) q.y = height(piece[0], q);
+  if (!on_surface) q.y = height(poly, q);
   return q;
 }
 

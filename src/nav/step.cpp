@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "step_compat.hpp"
+
 namespace gsnav {
 namespace {
 
@@ -131,6 +133,7 @@ StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& desir
     out.blocked_by = BlockedBy::invalid;
     return out;
   }
+  if (options.compat == StepCompat::habitat_gs) return detail::step_as_habitat_gs(mesh, agent, desired, bodies, options);
   SweepRules<double> rules;
   rules.skin = options.skin;
   const Stepper stepper{agent, bodies, rules, out};

@@ -29,13 +29,13 @@ struct Direction {
 
 Exit exit_of(const PolyMesh& m, PolyId id, const Vec3d& p, const Direction& d) noexcept {
   const PolyMesh::Poly& poly = m.polys[id];
-  const double dl = d.length();
+  const double least = kParallel * kParallel * (d.x * d.x + d.z * d.z);
   Exit best;
   for (std::uint32_t k = 0; k < poly.count; ++k) {
     const Vec3d &a = m.corner(poly, k), &b = m.corner(poly, k + 1);
     const double nx = b.z - a.z, nz = a.x - b.x;  // outward: corners run counter-clockwise
-    const double rate = d.x * nx + d.z * nz, nl = std::sqrt(nx * nx + nz * nz);
-    if (!(rate > kParallel * dl * nl)) continue;
+    const double rate = d.x * nx + d.z * nz;
+    if (!(rate > 0 && rate * rate > least * (nx * nx + nz * nz))) continue;
     const double t = max(((a.x - p.x) * nx + (a.z - p.z) * nz) / rate, 0.0);
     if (t < best.t) best = {t, k, true};
   }

@@ -331,21 +331,4 @@ void UnfoldedMesh::fan_out() {
   }
 }
 
-std::uint32_t UnfoldedMesh::face_at(PolyId poly, const Vec3d& p) const noexcept {
-  std::uint32_t best = first_face[poly];
-  double best_inside = -std::numeric_limits<double>::max();
-  for (std::uint32_t f = best; f < first_face[poly + 1] && first_face[poly + 1] - first_face[poly] > 1; ++f) {
-    double inside = std::numeric_limits<double>::max();
-    for (std::uint32_t k = 0; k < faces[f].count; ++k) {
-      const std::uint32_t e = faces[f].first + k;
-      const Vec3d &a = edges[e].corner, &b = edges[next(e)].corner;
-      inside = min(inside, area_xz(a, b, p) / max(std::hypot(b.x - a.x, b.z - a.z), 1e-12));
-    }
-    if (inside <= best_inside) continue;
-    best_inside = inside;
-    best = f;
-  }
-  return best;
-}
-
 }  // namespace gsnav::detail

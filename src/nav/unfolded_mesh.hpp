@@ -19,6 +19,11 @@ inline Flat operator*(const Flat& a, double s) noexcept { return {a.x * s, a.y *
 inline double cross(const Flat& a, const Flat& b) noexcept { return a.x * b.y - a.y * b.x; }
 inline double dot(const Flat& a, const Flat& b) noexcept { return a.x * b.x + a.y * b.y; }
 inline double length(const Flat& a) noexcept { return std::sqrt(dot(a, a)); }
+/// Straight through space, without fused steps, which are calls where the processor is not known to have them.
+inline double distance(const Vec3d& a, const Vec3d& b) noexcept {
+  const double x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
+  return std::sqrt(x * x + y * y + z * z);
+}
 
 /// The surface of a NavMesh as flat convex faces, each with plane coordinates of its own, and the turn that
 /// lays a face's neighbour into its plane. A level polygon is one face; a polygon whose height triangles leave its

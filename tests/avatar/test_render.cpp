@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "avatar/support.hpp"
+#include "gsnav/avatar/body_bounds.hpp"
+#include "gsnav/avatar/proxy_fit.hpp"
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
 
@@ -151,4 +153,42 @@ TEST_CASE("a person seen from the front is opaque: no holes at joints") {
     CHECK(inside > 3000);
     CHECK(holes < inside / 500);
   }
+}
+
+TEST_CASE("an actor that no camera sees is not skinned, and no pixel changes by it") {
+  SerialBackend backend;
+  auto rest = person();
+  const WalkMotion walk = WalkMotion::create(rest->skeleton).value();
+  LocalPose pose;
+  walk.pose(0.2, 1, 0, pose);
+  SkinnedGaussians<SerialBackend> all(backend, rest), seen(backend, rest);
+  const BodyBounds bounds(*rest);
+  std::vector<Affine3<double>> joints;
+  forward_kinematics(rest->skeleton, pose, joints);
+  const ChunkBounds box = bounds.at(joints);
+  const auto binds = rest->skeleton.bind_inverses();
+  for (std::size_t j = 0; j < joints.size(); ++j) joints[j] = joints[j] * binds[j];
+  for (const Vec3d& p : skinned_centers(*rest, joints)) {
+    for (int k = 0; k < 3; ++k) {
+      CHECK(p[k] > box.low[k]);
+      CHECK(p[k] < box.high[k]);
+    }
+  }
+  RenderConfig config;
+  int skipped = 0;
+  for (int step = 0; step < 24; ++step) {
+    const double a = 6.283185307179586 * step / 24;
+    const AvatarActor actor = AvatarActor::create(rest, std::make_shared<const FixedPose>(pose),
+                                                  std::make_shared<const StandingTrajectory>(Vec3d{2.5 * std::sin(a), 0, 2.5 * std::cos(a)}, a))
+                                  .value();
+    const Camera camera = Camera::look_at({0, 1, 0}, {0, 1, 1}, {0, 1, 0}, 48, 48, 60);
+    all.pose(actor, 0).throw_if_error();
+    seen.pose(actor, 0, std::span(&camera, 1), config).throw_if_error();
+    const auto x = gsnav_test::render<float>(backend, {all.set()}, camera, config).rgb;
+    const auto y = gsnav_test::render<float>(backend, {seen.set()}, camera, config).rgb;
+    CHECK(x == y);
+    skipped += seen.set().gaussians.size == 0 ? 1 : 0;
+  }
+  CHECK(skipped >= 14);  // of the 20 that stand more than 30 degrees off; a body is wide
+  CHECK(skipped <= 20);
 }

@@ -8,6 +8,7 @@
 
 #include "eval/oracle_support.hpp"
 #include "gsnav/kernels/sh.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/brush.hpp"
 #include "support/oracle.hpp"
@@ -155,6 +156,31 @@ TEST_CASE("oracle: keys that tie in float32 and not in float64") {
             static_cast<std::uint64_t>(std::count(f.order_flip.begin(), f.order_flip.end(), 1)));
       CHECK(f.order_flip[0] == 0);  // nothing reaches the corner
     }
+  }
+}
+
+TEST_CASE("oracle: ties go by the file's order, however rows lie in memory") {
+  // Layers that face the camera, in two sets: runs of equal depth.
+  Rng rng(212);
+  std::vector<RawGaussian> front, back;
+  for (int i = 0; i < 600; ++i) {
+    RawGaussian g = gaussian({rng.uniform(-1, 1), rng.uniform(-1, 1), 2.0 + 0.5 * (i % 2)}, {0.2, 0.2, 0.01}, 0.7,
+                             {0, 0, 0});
+    for (float& c : g.sh0) c = static_cast<float>(rng.normal());
+    (i % 3 == 0 ? back : front).push_back(g);
+  }
+  const GaussianCloud a = cloud_of(front), b = cloud_of(back);
+  GaussianCloud a_sorted = a, b_sorted = b;
+  sort_spatially(a_sorted);
+  sort_spatially(b_sorted);
+  REQUIRE(!std::is_sorted(a_sorted.row_ids.begin(), a_sorted.row_ids.end()));
+  for (const OracleOrder order : {OracleOrder::float32_key, OracleOrder::float64, OracleOrder::per_ray}) {
+    OracleConfig config;
+    config.order = order;
+    const OracleFrames f = oracle({a.set(), b.set()}, axis_camera(), config);
+    CHECK(same_images(f, oracle({a_sorted.set(), b_sorted.set()}, axis_camera(), config)));
+    CHECK(same_images(f, oracle({a.set(), b_sorted.set()}, axis_camera(), config)));
+    CHECK(!same_images(f, oracle({b.set(), a.set()}, axis_camera(), config)));
   }
 }
 

@@ -15,6 +15,7 @@
 #include "gsnav/ops/render_config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 
 // Inputs that several hard cases share.
 
@@ -72,6 +73,12 @@ inline gsnav::GaussianCloud needle_cloud(std::uint64_t seed, std::size_t count) 
     g.quat = random_rotation(rng);
   }
   return cloud_of(gaussians);
+}
+
+/// The cloud in chunks, as it is when it is loaded.
+inline gsnav::GaussianCloud sorted(gsnav::GaussianCloud cloud) {
+  gsnav::sort_spatially(cloud);
+  return cloud;
 }
 
 /// Every image there is.

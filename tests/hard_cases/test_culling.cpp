@@ -17,11 +17,6 @@ using namespace gsnav_test;
 
 namespace {
 
-GaussianCloud sorted(GaussianCloud cloud) {
-  sort_spatially(cloud);
-  return cloud;
-}
-
 Camera random_camera(Rng& rng) {
   const auto in = [&](double r) { return Vec3d{rng.uniform(-r, r), rng.uniform(-r, r), rng.uniform(-r, r)}; };
   const Vec3d eye = in(6), target = eye + in(1) + Vec3d{0, 0, 0.1};

@@ -2,6 +2,7 @@
 // N11, N18, N19: which pixels a Gaussian covers.
 #include <doctest/doctest.h>
 
+#include "gsnav/math/pack_layout.hpp"
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/records.hpp"
@@ -91,8 +92,8 @@ void count_errors(const std::vector<int>& covered, bool drawn, const RecordMaker
       const S px = S(x) + S(0.5), py = S(y) + S(0.5);
       BlendState<S, DepthMode::none> state;
       const bool hit =
-          elliptic ? blend_splat<false, DepthMode::none, Exp2::degree6, false>(state, rules, records, px, py)
-                   : blend_splat<false, DepthMode::none, Exp2::degree6, true>(state, rules, records, px, py);
+          elliptic ? blend_splat<false, DepthMode::none, Exp2::degree5, false>(state, rules, records, px, py)
+                   : blend_splat<false, DepthMode::none, Exp2::degree5, true>(state, rules, records, px, py);
       const int truth = covered[static_cast<std::size_t>(y * kWidth + x)];
       counts.pixels += truth == 1 && !hit ? 1 : 0;
       counts.extra_pixels += truth == 0 && hit ? 1 : 0;

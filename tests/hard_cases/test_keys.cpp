@@ -21,7 +21,7 @@ static_assert(sizeof(Cursor) == 8 && std::is_unsigned_v<Cursor>);
 static_assert(std::is_same_v<decltype(RenderStats::tile_intersections), std::uint64_t>);
 // Tiles are lists, not bits of a key: a key is the depth alone.
 static_assert(std::is_same_v<decltype(RenderWorkspace<float, SerialBackend>{
-                                 std::declval<SerialBackend&>()}.keys.data()), std::uint32_t*>);
+                                 std::declval<SerialBackend&>()}.visible.keys.data()), std::uint32_t*>);
 
 /// A disk facing the camera that covers little more than pixel (x, y) at depth z.
 RawGaussian dot_at(const Camera& c, double x, double y, double z, const std::array<float, 3>& sh0) {

@@ -19,7 +19,7 @@ ROOT = pathlib.Path(__file__).parents[2]
 BACKENDS = [ROOT / "backends" / name for name in ("serial", "openmp", "cuda")]
 NEEDS = {"gsnav/interop/eigen.hpp": "eigen", "gsnav/interop/glm.hpp": "glm"}
 DEVICE_LAYERS = ("math", "core", "kernels", "ops")
-HOST_ONLY = ("gsnav/math/pack.hpp", "gsnav/kernels/lanes/")  # lanes are host vectors
+HOST_ONLY = ("gsnav/math/pack", "gsnav/kernels/lanes/")  # lanes are host vectors
 WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow"]
 
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <zlib.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <array>
@@ -30,6 +31,13 @@ inline std::string gzip(const std::string& text) {
   return out;
 }
 
+/// Compresses as a zstd frame.
+inline std::string zstd(const std::string& text) {
+  std::string out(ZSTD_compressBound(text.size()), '\0');
+  out.resize(ZSTD_compress(out.data(), out.size(), text.data(), text.size(), 3));
+  return out;
+}
+
 /// A binary16 of a value that is neither tiny, huge nor NaN.
 inline std::uint16_t half_of(float v) {
   const std::uint32_t bits = std::bit_cast<std::uint32_t>(v) + 0x1000;  // rounded, ties away
@@ -47,7 +55,8 @@ struct SpzFile {
 
   int rest() const { return 3 * ((degree + 1) * (degree + 1) - 1); }
 
-  std::string payload() const {
+  /// The first 16 bytes, which all versions share.
+  std::string head(std::uint8_t last = 0) const {
     std::string out = "NGSP";
     put(out, version);
     if (count.empty()) put(out, static_cast<std::uint32_t>(rows.size()));
@@ -55,33 +64,57 @@ struct SpzFile {
     put(out, static_cast<std::uint8_t>(degree));
     put(out, static_cast<std::uint8_t>(fractional_bits));
     put(out, flags);
-    put(out, std::uint8_t{0});
+    put(out, last);
+    return out;
+  }
+
+  /// Positions, opacities, colours, scales, quaternions, SH bands.
+  std::array<std::string, 6> planes() const {
+    std::array<std::string, 6> out;
     // y and z point the other way.
     static constexpr double kTurn[] = {1, -1, -1};
     static constexpr const char* kAxes[] = {"x", "y", "z"};
     for (const PlyRow& r : rows) {
-      for (std::size_t k = 0; k < 3; ++k) put_position(out, kTurn[k] * r.at(kAxes[k]));
-    }
-    for (const PlyRow& r : rows) put(out, unit_byte(static_cast<double>(ExpectedGaussian(r).opacity)));
-    for (const PlyRow& r : rows) {
-      for (int k = 0; k < 3; ++k) put(out, unit_byte(r.at("f_dc_" + std::to_string(k)) * 0.15 + 0.5));
-    }
-    for (const PlyRow& r : rows) {
+      for (std::size_t k = 0; k < 3; ++k) put_position(out[0], kTurn[k] * r.at(kAxes[k]));
+      put(out[1], unit_byte(static_cast<double>(ExpectedGaussian(r).opacity)));
       for (int k = 0; k < 3; ++k) {
-        put(out, unit_byte((r.at("scale_" + std::to_string(k)) + 10) * 16 / 255));
+        put(out[2], unit_byte(r.at("f_dc_" + std::to_string(k)) * 0.15 + 0.5));
+        put(out[3], unit_byte((r.at("scale_" + std::to_string(k)) + 10) * 16 / 255));
       }
-    }
-    for (const PlyRow& r : rows) put_quat(out, r);
-    for (const PlyRow& r : rows) {
+      put_quat(out[4], r);
       for (int k = 0; k < rest(); ++k) {
         const double v = sign(k / 3) * r.at("f_rest_" + std::to_string(k % 3 * (rest() / 3) + k / 3));
-        put(out, static_cast<std::uint8_t>(std::clamp(std::lround(128 * v) + 128, 0L, 255L)));
+        put(out[5], static_cast<std::uint8_t>(std::clamp(std::lround(128 * v) + 128, 0L, 255L)));
       }
     }
     return out;
   }
 
-  std::string text() const { return gzip(payload()); }
+  /// Versions 1 to 3 before they are compressed.
+  std::string payload() const {
+    std::string out = head();
+    for (const std::string& plane : planes()) out += plane;
+    return out;
+  }
+
+  /// Version 4: `sizes` instead of the planes' own, `extensions` behind the header, where given.
+  std::string plain(const std::string& extensions = {}, std::vector<std::uint64_t> sizes = {}) const {
+    std::string toc, streams;
+    std::uint8_t n = 0;
+    for (const std::string& plane : planes()) {
+      if (n == 5 && degree == 0) break;
+      const std::string packed = zstd(plane);
+      put(toc, static_cast<std::uint64_t>(packed.size()));
+      put(toc, n < sizes.size() ? sizes[n] : static_cast<std::uint64_t>(plane.size()));
+      streams += packed;
+      ++n;
+    }
+    std::string out = head(n);
+    put(out, static_cast<std::uint32_t>(32 + extensions.size()));
+    return out + std::string(12, '\0') + extensions + toc + streams;
+  }
+
+  std::string text() const { return version < 4 ? gzip(payload()) : plain(); }
 
  private:
   /// The sign that coefficient k takes when y and z do: from a monomial of its basis function.

@@ -123,32 +123,39 @@ TEST_CASE("avatar file: what dropping weights costs, against sums by hand") {
     eight += j < 8 ? term / 0.96 : 0;
   }
   io::LoadAvatarOptions options;
-  options.poses = {std::vector<Affine3<double>>(24, {Mat3d::identity(), {}}), pose};
+  options.weights.influences = 4;
+  options.weights.poses = {std::vector<Affine3<double>>(24, {Mat3d::identity(), {}}), pose};
   const auto loaded = folder.load(arrays, options).value();
   CHECK(loaded.weights.most_weights == 10);
   CHECK(loaded.weights.poses == 2);
   CHECK(loaded.weights.dropped_mass == doctest::Approx(0.25).epsilon(1e-6));
   // The four that are kept are up to 3 m apart; their weights are rounded.
   CHECK(std::abs(loaded.weights.position_error - std::abs(four - all)) < 3 * 4.0 / (4 * kWeightParts));
-  CHECK(loaded.weights.position_error_8 == doctest::Approx(std::abs(eight - all)).epsilon(1e-6));
+  CHECK(loaded.weights.position_error_8 == doctest::Approx(std::abs(eight - all)).epsilon(1e-5));  // weights are float
   CHECK(loaded.weights.needs_more == 1);
   REQUIRE(loaded.report.warnings.size() == 2);
   CHECK(contains(loaded.report.warnings[0], "1 rows do not sum to 1"));
   CHECK(contains(loaded.report.warnings[1], "1 Gaussians are off by up to"));
   CHECK(weight_of_parts(loaded.asset.skinning_weights[0]) == doctest::Approx(0.30 / 0.75).epsilon(1e-4));
   CHECK(loaded.asset.joint_indices[0] == 9);
-  options.influences = 8;
+  options.weights.influences = 8;
   const auto loaded8 = folder.load(arrays, options).value();
   CHECK(loaded8.asset.influences == 8);
   CHECK(loaded8.asset.joint_indices[7] == 2);
   CHECK(loaded8.weights.dropped_mass == doctest::Approx(0.04).epsilon(1e-6));
   CHECK(std::abs(loaded8.weights.position_error - std::abs(eight - all)) < 7 * 8.0 / (4 * kWeightParts));
-  options.influences = 6;
+  options.weights.influences = 6;
   CHECK(folder.load(arrays, options).code() == Errc::invalid_argument);
-  options.influences = 4;
-  options.weight_tolerance = 10;
+  options.weights.influences = 4;
+  options.weights.tolerance = 10;
   CHECK(folder.load(arrays, options).value().weights.needs_more == 0);
-  options.poses[1].pop_back();
+  // Left to choose, it keeps four where that is within the bound, and eight where it is not or nobody knows.
+  options.weights.influences = 0;
+  CHECK(folder.load(arrays, options).value().weights.influences == 4);
+  options.weights.tolerance = 0.5 * std::abs(four - all);
+  CHECK(folder.load(arrays, options).value().asset.influences == 8);
+  CHECK(folder.load(arrays).value().asset.influences == 8);
+  options.weights.poses[1].pop_back();
   CHECK(folder.load(arrays, options).code() == Errc::invalid_argument);
 }
 
@@ -226,4 +233,46 @@ TEST_CASE("avatar file: rigs with names of their own") {
   CHECK(contains(folder.load(arrays, options).status().message(), "is its own ancestor"));
   options.joint_parents.pop_back();
   CHECK(folder.load(arrays, options).code() == Errc::invalid_argument);
+}
+
+TEST_CASE("avatar file: GART's parameters become the same avatar as activated ones") {
+  const AvatarFolder folder;
+  TestArrays plain = avatar_arrays(30, 24, 4), gart;
+  gart["joints_inv_bind_matrix"] = plain["joints_inv_bind_matrix"];
+  gart["lbs_weights"] = plain["lbs_weights"];
+  gart["lbs_weights"].values[5] = -1e-3;  // corrections may go below zero
+  gart["_xyz"] = plain["means"];
+  gart["_rotation"] = plain["quats"];
+  const auto logit = [](double p) { return std::log(p / (1 - p)); };
+  for (double& v : plain["scales"].values) v = 0.005 + 0.4 * v;
+  gart["_scaling"] = plain["scales"];
+  for (double& v : gart["_scaling"].values) v = logit(v / 0.1);
+  for (double& v : plain["opacities"].values) v = 0.25 + 0.5 * v;
+  gart["_opacity"] = plain["opacities"];
+  for (double& v : gart["_opacity"].values) v = logit(v);
+  TestArray dc{{30, 3}, {}}, rest{{30, 9}, {}};
+  for (std::size_t i = 0; i < 30; ++i) {
+    const auto row = plain["shs"].values.begin() + static_cast<std::ptrdiff_t>(12 * i);
+    dc.values.insert(dc.values.end(), row, row + 3);
+    rest.values.insert(rest.values.end(), row + 3, row + 12);
+  }
+  gart["_features_dc"] = dc;
+  gart["_features_rest"] = rest;
+  const auto a = folder.load(plain).value().asset, b = folder.load(gart).value().asset;
+  REQUIRE(a.size() == b.size());
+  CHECK(a.joint_indices == b.joint_indices);
+  CHECK(a.cloud.sh_degree == 1);
+  CHECK(a.cloud.sh0 == b.cloud.sh0);
+  CHECK(a.cloud.shN == b.cloud.shN);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    CHECK(a.cloud.mean(i) == b.cloud.mean(i));
+    CHECK(a.cloud.opacities[i] == doctest::Approx(b.cloud.opacities[i]).epsilon(1e-5));
+    for (std::size_t k = 0; k < 3; ++k) CHECK(a.cloud.scales[k][i] == doctest::Approx(b.cloud.scales[k][i]).epsilon(1e-5));
+  }
+  gart["max_scale"] = {{1}, {0.2}};
+  CHECK(folder.load(gart).value().asset.cloud.scales[0][3] == doctest::Approx(2 * a.cloud.scales[0][3]).epsilon(1e-5));
+  gart["_features_rest"] = {{30, 6}, std::vector<double>(180, 0.0)};
+  CHECK(contains(folder.load(gart).status().message(), "_features_rest has 3 coefficients"));
+  gart.erase("_opacity");
+  CHECK(contains(folder.load(gart).status().message(), "_opacity"));
 }

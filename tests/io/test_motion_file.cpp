@@ -14,6 +14,7 @@
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/avatar/retarget.hpp"
 #include "gsnav/io/motion_file.hpp"
+#include "pose_at.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;
@@ -55,15 +56,6 @@ Matrix turned(char axis, Real degrees) {
   if (axis == 'X') return {{{1, 0, 0, 0}, {0, c, -s, 0}, {0, s, c, 0}, {0, 0, 0, 1}}};
   if (axis == 'Y') return {{{c, 0, s, 0}, {0, 1, 0, 0}, {-s, 0, c, 0}, {0, 0, 0, 1}}};
   return {{{c, -s, 0, 0}, {s, c, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
-}
-
-std::vector<Affine3<double>> pose_at(const io::LoadedMotion& m, double time) {
-  LocalPose pose;
-  m.clip.pose({time}, pose);
-  std::vector<Affine3<double>> globals;
-  forward_kinematics(m.skeleton, pose, globals);
-  for (auto& g : globals) g.translation += pose.root;
-  return globals;
 }
 
 }  // namespace

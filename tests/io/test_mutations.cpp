@@ -7,7 +7,9 @@
 
 #include "allocations.hpp"
 #include "check_cloud.hpp"
+#include "glb_file.hpp"
 #include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io/gltf.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/ksplat.hpp"
 #include "gsnav/io/mesh_file.hpp"
@@ -153,6 +155,43 @@ TEST_CASE("mutations: spz, as it is and inside of its gzip stream") {
     feed(file.payload().substr(0, 16), 2000, 14, "some.spz",
          [&](const std::string& header) { return load(gzip(header + rest)); });
   }
+}
+
+TEST_CASE("mutations: spz 4") {
+  SpzFile file;
+  file.version = 4;
+  file.degree = 1;
+  file.flags = 2;
+  file.rows = random_rows(6, 9, 2);
+  std::string extension;
+  put(extension, std::uint32_t{7});
+  put(extension, std::uint32_t{3});
+  const std::string text = file.plain(extension + "abc"), rest = text.substr(32);
+  const auto load = [](const std::string& bytes) {
+    return check_cloud(io::parse_spz(bytes_of(bytes), "some.spz"));
+  };
+  const Tally t = feed(text, 4000, 17, "some.spz", load);
+  CHECK(t.ok > 100);
+  CHECK(t.failed > 1000);
+  feed(text.substr(0, 32), 2000, 18, "some.spz",
+       [&](const std::string& header) { return load(header + rest); });
+}
+
+TEST_CASE("mutations: gltf") {
+  GlbFile file;
+  file.degree = 1;
+  file.rows = random_rows(3, 9, 2);
+  file.nodes = R"([{"children":[1],"scale":[2,2,2]},{"mesh":0,"rotation":[0,0,1,0]}])";
+  const std::string json = file.json(), binary = file.binary();
+  const Tally t = feed(json, 6000, 19, "some.glb", [&](const std::string& text) {
+    const std::string glb = GlbFile::glb(text, binary);
+    return check_cloud(io::parse_gltf(bytes_of(glb), "some.glb"));
+  });
+  CHECK(t.ok > 100);
+  CHECK(t.failed > 1000);
+  feed(file.text(), 3000, 20, "some.glb", [&](const std::string& text) {
+    return check_cloud(io::parse_gltf(bytes_of(text), "some.glb"));
+  });
 }
 
 TEST_CASE("mutations: ksplat") {

@@ -109,7 +109,7 @@ TEST_CASE("scene: what cannot be read") {
   check_fails(at + "none.lcc", Errc::file_not_found, "a .ply, ");
   check_fails(at + "none.ply", Errc::file_not_found, "none.ply");
   check_fails(at + "empty", Errc::file_not_found, "no meta.json");
-  check_fails(at + "streamed", Errc::file_not_found, "tiles");
+  check_fails(at + "streamed", Errc::invalid_file, "lodLevels");
   check_fails(at + "a.ply,b.ply", Errc::file_not_found, "b.ply");
   check_fails(at + "a.ply,", Errc::invalid_argument, "empty name");
   check_fails(at + "a.ply,a.ply", Errc::invalid_argument, "twice");

@@ -42,7 +42,7 @@ std::vector<PlyRow> spz_rows(std::size_t n, int rest, unsigned seed) {
 }  // namespace
 
 TEST_CASE("spz: every field within half a step of what was packed") {
-  for (const std::uint32_t version : {1u, 2u, 3u}) {
+  for (const std::uint32_t version : {1u, 2u, 3u, 4u}) {
     for (const int degree : {0, 1, 2, 3, 4}) {
       CAPTURE(version);
       CAPTURE(degree);
@@ -70,18 +70,46 @@ TEST_CASE("spz: every field within half a step of what was packed") {
   }
 }
 
-TEST_CASE("spz: bytes that Niantic's library wrote") {
-  // spz 3, in the build that @playcanvas/splat-transform 2.7.1 carries, of the three rows below.
-  const std::string hex =
-      "1f8b0800000000000003358c210fc23010852fc14082a840202b10c8ca09c41c4b48964b30939508c414c17124fc"
-      "80929939aa16648344f52754202610d5a84a50633441dcbd9777efbb7cb9c60100c419f76b0ad0cbb383f9df2700"
-      "338005d0e55e5153ed9a6adb9405c982b0a0c3f1b33a9f26b7fcf518bdebc4caf7be4d31a88046a8a053af3b295c"
-      "c94a6765206e2d2766309edacd50bba40e4aa061e4113d05696357c84e0b2b3979137f659ed8358b94d3acf4a98e"
-      "14276eac50ac4f7f542a83f268bec3ca354ad3000000";
+namespace {
+
+// Niantic's library, in the build that @playcanvas/splat-transform 2.7.1 carries, wrote both of the
+// three rows below.
+constexpr const char* kVersion3 =
+    "1f8b0800000000000003358c210fc23010852fc14082a840202b10c8ca09c41c4b48964b30939508c414c17124fc8092993"
+    "9"
+    "aa16648344f52754202610d5a84a50633441dcbd9777efbb7cb9c60100c419f76b0ad0cbb383f9df2700338005d0e55e515"
+    "3"
+    "ed9a6adb9405c982b0a0c3f1b33a9f26b7fcf518bdebc4caf7be4d31a88046a8a053af3b295cc94a6765206e2d2766309ed"
+    "a"
+    "cd50bba40e4aa061e4113d05696357c84e0b2b3979137f659ed8358b94d3acf4a98e14276eac50ac4f7f542a83f268bec3c"
+    "a"
+    "354ad3000000";
+constexpr const char* kVersion4 =
+    "4e4753500400000003000000030c00062000000000000000000000000000000024000000000000001b000000000000000c0"
+    "0"
+    "000000000000030000000000000012000000000000000900000000000000120000000000000009000000000000001500000"
+    "0"
+    "000000000c000000000000007300000000000000870000000000000028b52ffd201bd90000001800000c0000dcff0028000"
+    "0"
+    "1800000c00003800002400003c0028b52ffd2003190000809fba28b52ffd20094900009380a69376a6936ca628b52ffd200"
+    "9"
+    "49000070588060588050588028b52ffd200c6100007f81f94b918414b24eead40928b52ffd208755030022481819c02507a"
+    "e"
+    "b7267a6b47224bf4d644669875247aaab7fa4fe45c6b9e7f553a49bc04c91ae56b7919edd24f1a06833ed8e7db3a9263d2e"
+    "3"
+    "a8cb94e67b7433c759a37c426805048ad24fb21d24cc04ffb8cb94a63bd44b3f69edf3ad0a81712c104601007b165414";
+
+std::string unhex(const std::string& hex) {
   std::string text;
   for (std::size_t i = 0; i < hex.size(); i += 2) {
     text += static_cast<char>(std::stoi(hex.substr(i, 2), nullptr, 16));
   }
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("spz: bytes that Niantic's library wrote") {
   static constexpr double kQuats[3][4] = {
       {0.5, 0.25, -0.75, 0.125}, {-0.25, 0.5, 0.5, 1.0}, {0.125, -1.0, 0.25, 0.5}};
   SpzFile file;
@@ -97,15 +125,18 @@ TEST_CASE("spz: bytes that Niantic's library wrote") {
     }
     file.rows.push_back(row);
   }
-  const LoadedCloud loaded = io::parse_spz(bytes_of(text), "some.spz").value();
-  check_consistent(loaded);
-  REQUIRE(loaded.cloud.size() == 3);
-  REQUIRE(loaded.cloud.sh_degree == 3);
-  CHECK(loaded.report.warnings.empty());
-  for (std::size_t i = 0; i < 3; ++i) {
-    QuantisedBounds b = spz_bounds(file, file.rows[i]);
-    b.rest = 8.5 / 128;  // the library keeps 5 bits of the first band and 4 of the others
-    check_quantised(loaded.cloud, i, file.rows[i], 45, b);
+  for (const char* hex : {kVersion3, kVersion4}) {
+    const std::string text = unhex(hex);
+    const LoadedCloud loaded = io::parse_spz(bytes_of(text), "some.spz").value();
+    check_consistent(loaded);
+    REQUIRE(loaded.cloud.size() == 3);
+    REQUIRE(loaded.cloud.sh_degree == 3);
+    CHECK(loaded.report.warnings.empty());
+    for (std::size_t i = 0; i < 3; ++i) {
+      QuantisedBounds b = spz_bounds(file, file.rows[i]);
+      b.rest = 8.5 / 128;  // the library keeps 5 bits of the first band and 4 of the others
+      check_quantised(loaded.cloud, i, file.rows[i], 45, b);
+    }
   }
 }
 

@@ -67,11 +67,14 @@ TEST_CASE("spz: headers that make no sense") {
   for (const std::uint32_t version : {0u, 4u, 0xffffffffu}) {
     SpzFile file = small_file();
     file.version = version;
-    check_fails(file.text(), Errc::unsupported, "version " + std::to_string(version) + " in gzip");
+    check_fails(gzip(file.payload()), Errc::unsupported,
+                "version " + std::to_string(version) + " in gzip");
   }
-  SpzFile plain = small_file();
-  plain.version = 4;
-  check_fails(plain.payload(), Errc::unsupported, "version 4 without gzip");
+  for (const std::uint32_t version : {0u, 3u, 5u, 0xffffffffu}) {
+    SpzFile file = small_file();
+    file.version = version;
+    check_fails(file.plain(), Errc::unsupported, "version " + std::to_string(version) + " without gzip");
+  }
   payload = small_file().payload();
   payload[12] = 5;
   check_fails(gzip(payload), Errc::invalid_file, "SH degree 5");
@@ -134,4 +137,112 @@ TEST_CASE("spz: what is no drawable Gaussian is counted") {
   CHECK(loaded.report.dropped_non_finite == 1);
   file.rows.clear();
   CHECK(io::parse_spz(bytes_of(file.text()), "a.spz").value().cloud.size() == 0);
+}
+
+namespace {
+
+SpzFile small_v4(int degree = 1) {
+  SpzFile file = small_file(degree);
+  file.version = 4;
+  return file;
+}
+
+std::string with(std::string text, std::size_t at, const std::string& bytes) {
+  return text.replace(at, bytes.size(), bytes);
+}
+
+std::string bytes8(std::uint64_t v) {
+  std::string out;
+  put(out, v);
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("spz 4: cut off anywhere") {
+  const std::string text = small_v4().text();
+  for (std::size_t n = 0; n < text.size(); ++n) {
+    REQUIRE(io::parse_spz(bytes_of(text.substr(0, n)), "some.spz").code() == Errc::invalid_file);
+  }
+}
+
+TEST_CASE("spz 4: a table that makes no sense") {
+  const std::string text = small_v4().text();
+  check_fails(with(text, 15, "\5"), Errc::invalid_file, "5 streams, must be 6 for SH degree 1");
+  check_fails(with(small_v4(0).text(), 15, "\6"), Errc::invalid_file, "6 streams, must be 5");
+  for (const std::uint32_t toc : {0u, 31u, static_cast<std::uint32_t>(text.size()), 0xffffffffu}) {
+    check_fails(with(text, 16, bytes4(toc)), Errc::invalid_file,
+                "begins at byte " + std::to_string(toc));
+  }
+  for (const std::uint64_t size : {std::uint64_t{44}, std::uint64_t{46}, ~std::uint64_t{0}}) {
+    check_fails(small_v4().plain("", {size}), Errc::invalid_file,
+                "positions has " + std::to_string(size) + " bytes unpacked, 5 Gaussians need 45");
+  }
+  for (const std::uint64_t size : {std::uint64_t{text.size()}, ~std::uint64_t{0}}) {
+    check_fails(with(text, 32, bytes8(size)), Errc::invalid_file,
+                "positions has " + std::to_string(size) + " bytes, ");
+  }
+}
+
+TEST_CASE("spz 4: a stream that holds something else") {
+  SpzFile file = small_v4();
+  const std::string text = file.text();
+  const std::size_t first = 32 + 6 * 16;
+  check_fails(with(text, first, "XXXX"), Errc::invalid_file, "stream of positions cannot be unpacked");
+  // Streams of fewer and of more bytes than the table says.
+  for (const std::size_t rows : {4u, 6u}) {
+    SpzFile other = file;
+    other.rows = random_rows(rows, file.rest(), 41);
+    const std::string from = other.text();
+    const std::uint64_t sizes[] = {45, 5, 15, 15, 20, 45};
+    std::string mixed = from;
+    mixed.replace(8, 4, bytes4(5));
+    for (std::size_t k = 0; k < 6; ++k) mixed.replace(32 + 16 * k + 8, 8, bytes8(sizes[k]));
+    check_fails(mixed, Errc::invalid_file, "stream of positions");
+  }
+}
+
+TEST_CASE("spz 4: neither count nor streams are trusted with memory") {
+  for (const std::uint32_t count : {0x7fffffffu, 0xffffffffu}) {
+    SpzFile file = small_v4(3);
+    file.count = bytes4(count);
+    const std::uint64_t n = count;
+    const std::string text = file.plain("", {9 * n, n, 3 * n, 3 * n, 4 * n, 45 * n});
+    reset_largest_allocation();
+    check_fails(text, Errc::invalid_file, "not believed");
+    CHECK(largest_allocation() < 300000);
+  }
+  // A million Gaussians of zeros, which zstd takes down to some hundred bytes each plane.
+  SpzFile bomb = small_v4(0);
+  bomb.rows.clear();
+  std::string toc, streams;
+  for (const std::size_t width : {9u, 1u, 3u, 3u, 4u}) {
+    const std::string packed = zstd(std::string(width * 1000000, '\0'));
+    toc += bytes8(packed.size()) + bytes8(width * 1000000);
+    streams += packed;
+  }
+  bomb.count = bytes4(1000000);
+  const std::string text = bomb.head(5) + bytes4(32) + std::string(12, '\0') + toc + streams;
+  reset_largest_allocation();
+  check_fails(text, Errc::invalid_file, "not believed");
+  CHECK(largest_allocation() < 300000);
+}
+
+TEST_CASE("spz 4: extensions and stray bytes are told") {
+  SpzFile file = small_v4();
+  const std::string stray = file.plain() + "stray";
+  const LoadedCloud a = io::parse_spz(bytes_of(stray), "a.spz").value();
+  CHECK(a.cloud.size() == 5);
+  REQUIRE(a.report.warnings.size() == 1);
+  CHECK(contains(a.report.warnings[0], "stray bytes follow the 5 Gaussians"));
+  file.flags = 2;
+  const std::string known = bytes4(0xadbe0003) + bytes4(4) + bytes4(5);
+  const std::string text = file.plain(bytes4(7) + bytes4(3) + "abc" + known);
+  const LoadedCloud b = io::parse_spz(bytes_of(text), "a.spz").value();
+  CHECK(b.cloud.size() == 5);
+  REQUIRE(b.report.warnings.size() == 2);
+  CHECK(contains(b.report.warnings[0], "extensions"));
+  CHECK(contains(b.report.warnings[1], "other axes"));
+  check_fails(file.plain(bytes4(7) + bytes4(4) + "abc"), Errc::invalid_file,
+              "an extension of 4 bytes, 3");
 }

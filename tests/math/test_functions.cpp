@@ -14,14 +14,14 @@ using namespace gsnav;
 
 TEST_CASE("exp2 in float against long double") {
   Rng rng(1);
-  double worst6 = 0, worst3 = 0;
+  double worst5 = 0, worst3 = 0;
   for (int i = 0; i < 1000000; ++i) {
     const float x = static_cast<float>(rng.uniform(-126, 126));
     const long double truth = std::exp2(static_cast<long double>(x));
-    worst6 = std::max(worst6, static_cast<double>(std::abs(gsnav::exp2(x) / truth - 1)));
+    worst5 = std::max(worst5, static_cast<double>(std::abs(gsnav::exp2(x) / truth - 1)));
     worst3 = std::max(worst3, static_cast<double>(std::abs(gsnav::exp2<Exp2::degree3>(x) / truth - 1)));
   }
-  CHECK(worst6 < 1.2e-7);
+  CHECK(worst5 < 1.8e-7);
   CHECK(worst3 < 1.0e-4);
   CHECK(worst3 > 1e-5);  // else degree 3 would not be what it says
   CHECK(gsnav::exp2(0.0f) == 1.0f);

@@ -7,6 +7,8 @@
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/math/pack.hpp"
+#include "gsnav/math/pack_layout.hpp"
+#include "gsnav/math/packs.hpp"
 #include "gsnav/math/quat.hpp"
 
 using namespace gsnav;
@@ -56,10 +58,77 @@ void check_lanes() {
   }
 }
 
+template <int N>
+void check_memory() {
+  using P = Pack<float, N>;
+  constexpr int kRepeated = N >= 8 ? 4 : 2;
+  float a[N], b[N], c[N], mixed[3 * N], repeated[N];
+  for (int i = 0; i < N; ++i) {
+    a[i] = static_cast<float>(i) + 0.25f;
+    b[i] = static_cast<float>(i) + 0.5f;
+    c[i] = static_cast<float>(i) + 0.75f;
+  }
+  store_interleaved(P::load(a), P::load(b), P::load(c), mixed);
+  load_repeated<kRepeated, N>(a + 1).store(repeated);
+  for (int i = 0; i < N; ++i) {
+    CHECK(mixed[3 * i] == a[i]);
+    CHECK(mixed[3 * i + 1] == b[i]);
+    CHECK(mixed[3 * i + 2] == c[i]);
+    CHECK(repeated[i] == a[1 + i % kRepeated]);
+  }
+  constexpr int kHigh = N == 16 ? 4 : 2, kWide = N / kHigh;
+  P blocks[kHigh];
+  for (int k = 0; k < kHigh; ++k) blocks[k] = P::load(a) + P(static_cast<float>(100 * k));
+  transpose_chunks<kHigh>(blocks);
+  for (int k = 0; k < kHigh; ++k) {
+    for (int i = 0; i < N; ++i) {
+      CHECK(blocks[k][i] == a[k * kWide + i % kWide] + static_cast<float>(100 * (i / kWide)));
+    }
+  }
+  std::uint8_t indices[N];
+  const int listed = store_lane_indices(P::load(c) > P(2.0f), 7, indices);
+  REQUIRE(listed == N - 2);
+  for (int i = 0; i < listed; ++i) CHECK(indices[i] == 7 + 2 + i);
+}
+
+/// Packs side by side are the packs.
+template <Exp2 M>
+void check_side_by_side() {
+  using P = Pack<float, GSNAV_PACK_WIDTH>;
+  using Group = Packs<P, 3>;
+  Rng rng(9);
+  for (int round = 0; round < 1000; ++round) {
+    float v[3][GSNAV_PACK_WIDTH];
+    for (auto& lanes : v) {
+      for (float& x : lanes) x = static_cast<float>(rng.uniform(-126, 126));
+    }
+    const Group x = Group::of([&](int g) { return P::load(v[g]); });
+    const Group power = exp2_in_range<M>(x), chosen = select(x >= Group(1.0f), min(x, Group(2.0f)), -x);
+    const Group sum = fma(x, x, power) - chosen;
+    for (int g = 0; g < 3; ++g) {
+      for (int i = 0; i < GSNAV_PACK_WIDTH; ++i) {
+        const float s = v[g][i], p = gsnav::exp2<M>(s), c = s >= 1 ? gsnav::min(s, 2.0f) : -s;
+        REQUIRE(bits_of(power.v[g][i]) == bits_of(p));
+        REQUIRE(bits_of(chosen.v[g][i]) == bits_of(c));
+        REQUIRE(bits_of(sum.v[g][i]) == bits_of(gsnav::fma(s, s, p) - c));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 TEST_CASE("packs of the natural width are their lanes") { check_lanes<GSNAV_PACK_WIDTH>(); }
 TEST_CASE("packs of four are their lanes") { check_lanes<4>(); }
+
+TEST_CASE("packs go through memory in order") {
+  check_memory<4>();
+  check_memory<GSNAV_PACK_WIDTH>();
+}
+TEST_CASE("packs side by side are the packs") {
+  check_side_by_side<Exp2::degree5>();
+  check_side_by_side<Exp2::degree3>();
+}
 
 TEST_CASE("vector code over packs is its lanes") {
   using P = Pack<float, GSNAV_PACK_WIDTH>;

@@ -7,7 +7,6 @@
 
 #include "capsule_oracle.hpp"
 #include "gsnav/kernels/capsule.hpp"
-#include "gsnav/math/pack.hpp"
 #include "gsnav/ops/sweep.hpp"
 
 using namespace gsnav;
@@ -175,50 +174,6 @@ TEST_CASE("sweep: a growing radius is met like motion") {
   CHECK(sweep(agent, body, rules).contact_time == doctest::Approx(0.8).epsilon(1e-5));
   body.end.radius = 0.85;
   CHECK_FALSE(sweep(agent, body, rules).hit);
-}
-
-TEST_CASE("sweep and gap: lanes compute the bits of the scalar") {
-  static constexpr int kLanes = GSNAV_PACK_WIDTH;
-  using P = Pack<float, kLanes>;
-  const auto pack = [](const auto& get) {
-    float v[kLanes];
-    for (int i = 0; i < kLanes; ++i) v[i] = get(i);
-    return P::load(v);
-  };
-  Rng rng(11);
-  for (int k = 0; k < 8000 / kLanes; ++k) {
-    MovingCapsule<float> a[kLanes], b[kLanes];
-    for (int i = 0; i < kLanes; ++i) moving_pair(rng, k % 3 == 0 ? 50 : 1, 1, a[i], b[i]);
-    const auto gather = [&](const MovingCapsule<float>(&m)[kLanes]) {
-      MovingCapsule<P> out;
-      const auto vec = [&](const auto& field) {
-        return Vec3<P>{pack([&](int i) { return field(m[i]).x; }), pack([&](int i) { return field(m[i]).y; }),
-                       pack([&](int i) { return field(m[i]).z; })};
-      };
-      out.begin = {vec([](const auto& c) { return c.begin.p0; }), vec([](const auto& c) { return c.begin.p1; }),
-                   pack([&](int i) { return m[i].begin.radius; })};
-      out.end = {vec([](const auto& c) { return c.end.p0; }), vec([](const auto& c) { return c.end.p1; }),
-                 pack([&](int i) { return m[i].end.radius; })};
-      return out;
-    };
-    const auto lanes = sweep(gather(a), gather(b), SweepRules<float>{});
-    const auto gaps = capsule_gap(gather(a).begin, gather(b).begin);
-    for (int i = 0; i < kLanes; ++i) {
-      const auto gap = capsule_gap(a[i].begin, b[i].begin);
-      REQUIRE(gaps.gap[i] == gap.gap);
-      for (int d = 0; d < 3; ++d) {
-        REQUIRE(gaps.normal[d][i] == gap.normal[d]);
-        REQUIRE(gaps.on_a[d][i] == gap.on_a[d]);
-        REQUIRE(gaps.on_b[d][i] == gap.on_b[d]);
-      }
-      const auto one = sweep(a[i], b[i], SweepRules<float>{});
-      REQUIRE(((lane_bits(lanes.hit) >> i) & 1u) == (one.hit ? 1u : 0u));
-      REQUIRE(lanes.time[i] == one.time);
-      REQUIRE(lanes.contact_time[i] == one.contact_time);
-      REQUIRE(lanes.gap[i] == one.gap);
-      REQUIRE(lanes.start_gap[i] == one.start_gap);
-    }
-  }
 }
 
 TEST_CASE("sweep: from overlap, out is free and in is not") {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "gsnav/nav/gaussian_navmesh.hpp"
+#include "meshes.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 using namespace gsnav;
@@ -241,4 +242,41 @@ TEST_CASE("gaussian navmesh: what cannot be is refused with reasons") {
   const auto wide = build_navmesh(s, {&set, 1});
   CHECK(wide.code() == Errc::nothing_navigable);
   CHECK(wide.message().find("floor found at y = ") != std::string::npos);
+}
+
+TEST_CASE("gaussian navmesh: with triangles: furniture in a mesh, a wall in a scan") {
+  // A room that is a mesh, with a table of Gaussians, which have no floor.
+  gsnav_test::Soup room;
+  room.floor(-3, -2, 5, 3, 0);
+  Painter table;
+  table.box(1, 1, 2.2, 1.8, 0.75);
+  NavMeshSettings s = gaussian_navmesh_settings();
+  s.filter_ledge_spans = false;
+  const GaussianCloud furniture = table.cloud();
+  const GaussianSet set = furniture.set(Similarity{});
+  const auto furnished = build_navmesh(s, {&set, 1}, room.vertices, room.triangles);
+  INFO(furnished.message());
+  REQUIRE(furnished.ok());
+  CHECK(furnished->mesh.navigable_area() == doctest::Approx(7.8 * 4.8 - 1.4 * 1.0).epsilon(0.03));
+  CHECK_FALSE(furnished->mesh.is_navigable({1.6, 0, 1.4}));
+  CHECK(furnished->mesh.is_navigable({-2.5, 0, -1.5}));  // outside the Gaussians' own box
+  Rng rng(4);
+  for (int i = 0; i < 1000; ++i) REQUIRE(std::abs(furnished->mesh.random_point(rng).position.y) < 1e-3);
+
+  // A scanned flat, with its door walled up by triangles.
+  gsnav_test::Soup wall;
+  wall.box(3.9, kDoorLow - 0.1, 4.1, kDoorHigh + 0.1, 0, 2.5);
+  const GaussianCloud scan = flat().cloud();
+  const GaussianSet rooms = scan.set(Similarity{});
+  const auto closed = build_navmesh(gaussian_navmesh_settings(), {&rooms, 1}, wall.vertices, wall.triangles);
+  INFO(closed.message());
+  REQUIRE(closed.ok());
+  CHECK(closed->mesh.find_path({1, 0, 3}, {7, 0, 0.6}).code() == Errc::nothing_navigable);
+  // Less the box of 0.2 x 1.2 m and the radius around it, where there was no wall before.
+  const double open_area = build(flat())->mesh.navigable_area();
+  CHECK(std::abs(closed->mesh.navigable_area() - (open_area - (0.4 * 1.4 - 0.2 * 0.6))) < 0.3);
+
+  wall.triangles.push_back({0, 1, 99});
+  CHECK(build_navmesh(s, {&rooms, 1}, wall.vertices, wall.triangles).message().find("names vertex 99") !=
+        std::string::npos);
 }

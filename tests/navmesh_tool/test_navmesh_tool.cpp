@@ -3,7 +3,6 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -12,33 +11,20 @@
 #include "gsnav/io/ply.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "io/files.hpp"
+#include "support/command.hpp"
 
 using namespace gsnav;
+using gsnav_test::Outcome;
+using gsnav_test::quoted;
 using gsnav_test::read_file;
+using gsnav_test::run_command;
 using gsnav_test::TempFolder;
 using gsnav_test::write_file;
 
 namespace {
 
-struct Outcome {
-  bool ok = false;
-  std::string text;
-
-  bool says(const char* part) const { return text.find(part) != std::string::npos; }
-};
-
 Outcome run(const TempFolder& folder, const std::string& arguments) {
-  const std::string log = (folder / "log").string();
-  Outcome out;
-  std::string command("\"" GSNAV_NAVMESH "\" ");
-  command.append(arguments).append(" > \"").append(log).append("\" 2>&1");
-  out.ok = std::system(command.c_str()) == 0;
-  out.text = read_file(log);
-  return out;
-}
-
-std::string quoted(const std::filesystem::path& p) {
-  return std::string(1, '"').append(p.string()).append("\"");
+  return run_command(GSNAV_NAVMESH, arguments, folder.path());
 }
 
 /// Two floors of 8 m by 5 m, the upper one 3 m up and 10 m along x; z up, in centimetres.
@@ -110,6 +96,20 @@ TEST_CASE("navmesh tool: from Gaussians") {
   const NavMesh mesh = load_navmesh(folder / "g.navmesh").value();
   CHECK(mesh.settings().cell_height == doctest::Approx(0.05));
   CHECK(mesh.navigable_area() > 0.8 * 6 * 4);
+  // A box of triangles on it.
+  write_file(folder / "box.obj",
+             "v 2 0 1\nv 4 0 1\nv 4 0 3\nv 2 0 3\nv 2 1 1\nv 4 1 1\nv 4 1 3\nv 2 1 3\n"
+             "f 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\nf 5 8 7 6\n");
+  const Outcome both = run(folder, quoted(folder / "floor.ply") + " --mesh " + quoted(folder / "box.obj") + " --out " +
+                                       quoted(folder / "b.navmesh"));
+  INFO(both.text);
+  REQUIRE(both.ok);
+  CHECK(both.says("10 triangles"));
+  CHECK(mesh.is_navigable({3, 0, 2}));
+  CHECK_FALSE(load_navmesh(folder / "b.navmesh")->is_navigable({3, 0, 2}));
+  const Outcome wrong = run(folder, quoted(folder / "box.obj") + " --mesh " + quoted(folder / "box.obj"));
+  CHECK_FALSE(wrong.ok);
+  CHECK(wrong.says("has no Gaussians"));
 }
 
 TEST_CASE("navmesh tool: what is wrong is said on one line") {

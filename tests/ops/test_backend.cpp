@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <type_traits>
+
 #include "gsnav/core/parallel.hpp"
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
@@ -36,23 +39,50 @@ TEST_CASE("a third-party backend of six members runs the whole pipeline") {
   }
 }
 
-TEST_CASE("sort_pairs is a stable sort") {
+TEST_CASE("sort_pairs is a stable sort, for any keys, in any number of blocks") {
   Rng rng(3);
-  SerialBackend serial;
-  for (const std::size_t n : {0u, 1u, 2u, 100u, 20000u}) {
-    std::vector<std::uint32_t> keys(n), values(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      keys[i] = static_cast<std::uint32_t>(rng.next()) & (i % 2 == 0 ? 0xffu : 0xffffffffu);
-      values[i] = static_cast<std::uint32_t>(i);
-    }
-    std::vector<std::uint32_t> expected = values;
+  const auto check = [](auto& backend, const std::vector<std::uint32_t>& keys, int bits) {
+    using B = std::remove_reference_t<decltype(backend)>;
+    const std::size_t n = keys.size();
+    std::vector<std::uint32_t> values(n), expected(n), sorted(n), sorted_keys(n);
+    for (std::size_t i = 0; i < n; ++i) values[i] = expected[i] = static_cast<std::uint32_t>(i);
     std::stable_sort(expected.begin(), expected.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
-    Buffer<std::uint32_t, SerialBackend> k(serial), v(serial);
-    SortScratch<SerialBackend> scratch(serial);
-    k.upload(keys.data(), n);
-    v.upload(values.data(), n);
-    sort_pairs(serial, k, v, scratch);
-    CHECK(std::equal(expected.begin(), expected.end(), v.data()));
+    Buffer<std::uint32_t, B> k(backend), v(backend);
+    SortScratch<B> scratch(backend);
+    for (int round = 0; round < 2; ++round) {  // the second with scratch that has been used
+      k.upload(keys.data(), n);
+      v.upload(values.data(), n);
+      sort_pairs(backend, k, v, scratch, bits);
+      v.download(sorted.data(), n);
+      k.download(sorted_keys.data(), n);
+      CHECK(sorted == expected);
+      CHECK(std::is_sorted(sorted_keys.begin(), sorted_keys.end()));
+    }
+  };
+  SerialBackend serial;
+  ToyBackend toy;
+  for (const std::size_t n : {0u, 1u, 2u, 100u, 8191u, 8192u, 20000u, 70001u}) {
+    CAPTURE(n);
+    for (const int bits : {1, 8, 16, 22, 23, 27, 28, 32}) {
+      CAPTURE(bits);
+      const std::uint32_t mask = 0xffffffffu >> (32 - bits);
+      std::vector<std::uint32_t> keys(n), equal(n, mask), high(n), few(n);
+      for (std::size_t i = 0; i < n; ++i) {
+        keys[i] = static_cast<std::uint32_t>(rng.next()) & (i % 2 == 0 ? 0xffu & mask : mask);
+        high[i] = mask - (static_cast<std::uint32_t>(rng.next()) & mask & 0xfu);  // no low digit decides
+        few[i] = static_cast<std::uint32_t>(rng.next()) & mask & 0x3ffu;          // fewer bits than said
+      }
+      for (const auto& k : {keys, equal, high, few}) {
+        check(serial, k, bits);
+        if (bits == 32) check(toy, k, bits);
+#if defined(_OPENMP)
+        for (const int threads : {2, 3, 9}) {
+          OpenMPBackend openmp(threads);
+          check(openmp, k, bits);
+        }
+#endif
+      }
+    }
   }
 }

@@ -2,6 +2,8 @@
 // The GPU against the CPU: the same kernels must give the same bits.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "ops/backends.hpp"
@@ -29,6 +31,13 @@ Frames<float> on_gpu(CudaBackend& cuda, const std::vector<const GaussianCloud*>&
   for (const GaussianCloud* c : clouds) sets.push_back(arrays.emplace_back(cuda, *c).set());
   Renderer<float, CudaBackend> renderer(cuda, config);
   return renderer.render(sets, std::vector<Camera>{camera}).value();
+}
+
+double largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
+  REQUIRE(a.size() == b.size());
+  double worst = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(double{a[i]} - double{b[i]}));
+  return worst;
 }
 
 }  // namespace
@@ -77,10 +86,20 @@ TEST_CASE("cuda: outputs asked for alone, profiles and compat modes") {
       config.profile = profile;
       const auto gpu = on_gpu(cuda, {&cloud}, camera, config);
       const auto cpu = render<float>(serial, {cloud.set()}, camera, config);
-      CHECK(gpu.rgb == cpu.rgb);
-      CHECK(gpu.alpha == cpu.alpha);
-      CHECK(gpu.median_depth == cpu.median_depth);
-      CHECK(gpu.expected_depth == cpu.expected_depth);
+      if (profile == Profile::exact) {
+        CHECK(gpu.rgb == cpu.rgb);
+        CHECK(gpu.alpha == cpu.alpha);
+        CHECK(gpu.median_depth == cpu.median_depth);
+        CHECK(gpu.expected_depth == cpu.expected_depth);
+      } else {
+        // On the GPU `fast` has the exponential of the hardware, on the CPU a cubic, off by 1e-4 of alpha.
+        CHECK(largest_difference(gpu.rgb, cpu.rgb) < 3e-4);
+        CHECK(largest_difference(gpu.alpha, cpu.alpha) < 3e-4);
+        config.profile = Profile::exact;
+        const auto exact = on_gpu(cuda, {&cloud}, camera, config);
+        CHECK(largest_difference(gpu.rgb, exact.rgb) < 2e-6);
+        CHECK(largest_difference(gpu.alpha, exact.alpha) < 2e-6);
+      }
     }
   }
   for (const Compat compat : {Compat::inria, Compat::gsplat, Compat::habitat_gs}) {
@@ -117,10 +136,13 @@ TEST_CASE("N64_cpu_cuda_keys") {
       buffer.download(host.data(), host.size());
     };
     fetch(images, frames.rgb);
-    fetch(workspace.keys, keys);
+    std::vector<std::uint32_t> by_slot, order;
+    fetch(workspace.visible.chunk_keys, by_slot);
+    fetch(workspace.visible.order, order);
     fetch(workspace.tile_offsets, offsets);
     fetch(workspace.tile_splats, splats);
     REQUIRE(backend.synchronize().ok());
+    for (const std::uint32_t slot : order) keys.push_back(by_slot[slot]);
   };
   CudaBackend cuda;
   SerialBackend serial;

@@ -196,6 +196,9 @@ TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
       for (const unsigned outputs : {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth}, kMedianOnly, kAll}) {
         config.outputs = outputs;
         const Batch got = draw(cuda, renderer, {arrays.set()}, {camera}, {}, outputs, false);
+        check_same(got.frames, singly(cuda, {arrays.set()}, {camera}, {}, config, outputs));
+        // On the GPU `fast` has the exponential of the hardware.
+        if (profile == Profile::fast) continue;
         check_same(got.frames, render<float>(serial, {cloud.set()}, camera, config));
       }
     }
@@ -251,6 +254,44 @@ TEST_CASE("cuda batch: the same bits on every run, in any company") {
   const Batch alone = draw(cuda, renderer, {arrays.set()}, last, {}, kMedianOnly);
   const std::vector<float> third(all.frames.rgb.end() - 3 * 40 * 36, all.frames.rgb.end());
   CHECK(differing(alone.frames.rgb, third) == 0);
+}
+
+TEST_CASE("cuda batch: calls that differ in their cameras alone are replayed, with the same bits") {
+  if (no_gpu("cuda batch replays")) return;
+  CudaBackend cuda;
+  const GaussianCloud cloud = random_cloud(31, {.count = 2500, .needle = 0.2});
+  const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+  const std::vector<Camera> cameras = ring(12, 72, 50);
+  const std::vector<GaussianSet> sets{arrays.set()};
+  const std::size_t pixels = 72 * 50;
+  const auto frames_of = [&](CudaBatchRenderer& renderer, float* images, const Camera& camera) {
+    BatchImages to;
+    to.floats.rgb = images;
+    to.floats.median_depth = images + 3 * pixels;
+    cuda.fill(images, 0xa5, 4 * pixels * sizeof(float));
+    const std::vector<BatchCamera> one{{camera, {}}};
+    renderer.render(sets, one, to).throw_if_error();
+    renderer.finish().throw_if_error();
+    std::vector<float> out(4 * pixels);
+    cuda.copy(out.data(), images, out.size() * sizeof(float), CopyKind::device_to_host);
+    REQUIRE(cuda.synchronize().ok());
+    return out;
+  };
+  Buffer<float, CudaBackend> images(cuda), elsewhere(cuda);
+  images.resize_discard(4 * pixels);
+  elsewhere.resize_discard(4 * pixels);
+  CudaBatchRenderer renderer(cuda);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const std::vector<float> got = frames_of(renderer, images.data(), cameras[i]);
+    if (i >= 8) CHECK(renderer.stats().replayed);
+    CudaBatchRenderer fresh(cuda);
+    CHECK(differing(got, frames_of(fresh, images.data(), cameras[i])) == 0);
+    CHECK_FALSE(fresh.stats().replayed);
+  }
+  // Other images: not the recorded launches.
+  const std::vector<float> moved = frames_of(renderer, elsewhere.data(), cameras[3]);
+  CHECK_FALSE(renderer.stats().replayed);
+  CHECK(differing(moved, frames_of(renderer, images.data(), cameras[3])) == 0);
 }
 
 TEST_CASE("cuda batch: scratch that is too small grows, and says so") {

@@ -22,6 +22,7 @@ class ScratchFolder {
     std::error_code error;
     std::filesystem::remove_all(path_, error);
   }
+  const std::filesystem::path& path() const { return path_; }
   std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
 
  private:

@@ -2,13 +2,13 @@
 // The program as people run it.
 #include <doctest/doctest.h>
 
-#include <cstdlib>
 #include <string>
 
 #include "csv.hpp"
 #include "files.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/ply.hpp"
+#include "support/command.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -17,18 +17,8 @@ using namespace gsnav_test;
 
 namespace {
 
-struct Outcome {
-  bool ok = false;
-  std::string text;
-};
-
 Outcome run(const ScratchFolder& folder, const std::string& arguments) {
-  const std::string log = (folder / "log").string();
-  const std::string command = std::string("\"") + GSNAV_REPORT + "\" " + arguments + " > \"" + log + "\" 2>&1";
-  Outcome out;
-  out.ok = std::system(command.c_str()) == 0;
-  out.text = read_text(log);
-  return out;
+  return run_command(GSNAV_REPORT, arguments, folder.path());
 }
 
 /// Writes a small cloud and three cameras in front of it; returns the --scene option.

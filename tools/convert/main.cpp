@@ -1,30 +1,176 @@
 // SPDX-License-Identifier: Apache-2.0
-// gsnav-convert SCENE OUT.ply: any scene that the library reads, as an INRIA PLY.
+// gsnav-convert IN... OUT: any scene that the library reads, edited, in any format that it writes.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
-#include "gsnav/io/ply.hpp"
+#include "compare.hpp"
+#include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/edit_cloud.hpp"
+#include "gsnav/scene/spatial_order.hpp"
+
+namespace {
+
+using namespace gsnav;
+
+struct Options {
+  std::vector<std::string> paths;
+  std::vector<double> crop, rotate, translate;
+  std::string cameras;
+  double scale = 1, min_opacity = 0, max_scale = 0;
+  int level = 0, degree = kMaxShDegree, views = 6, width = 640, height = 480;
+};
+
+int fail(const std::string& message) {
+  std::fprintf(stderr, "gsnav-convert: %s\n", message.c_str());
+  return 1;
+}
+
+unsigned long long number(std::uint64_t n) { return static_cast<unsigned long long>(n); }
+
+void print_report(const LoadReport& r) {
+  std::printf("%s: %llu Gaussians of %llu rows, SH degree %d\n", r.source.c_str(), number(r.kept),
+              number(r.read), r.sh_degree);
+  if (r.dropped() != 0) {
+    std::printf("  dropped: %llu not finite, %llu without rotation, %llu transparent\n",
+                number(r.dropped_non_finite), number(r.dropped_zero_quat),
+                number(r.dropped_transparent));
+  }
+  if (r.clamped_scales != 0) std::printf("  %llu with clamped scales\n", number(r.clamped_scales));
+  for (const std::string& w : r.warnings) std::printf("  warning: %s\n", w.c_str());
+}
+
+Result<GaussianCloud> load(const Options& o) {
+  GaussianCloud scene;
+  for (std::size_t k = 0; k + 1 < o.paths.size(); ++k) {
+    auto loaded = io::load_scene(o.paths[k], {.level = o.level});
+    if (!loaded) return loaded.status();
+    print_report(loaded->report);
+    if (Status s = append(scene, loaded->cloud); !s) return {s.code(), o.paths[k] + ": " + s.message()};
+  }
+  return scene;
+}
+
+/// Crops and prunes in the axes of the input, then turns, scales and moves, in this order.
+Status edit(GaussianCloud& cloud, const Options& o) {
+  if (!o.crop.empty()) {
+    Aabb<double> box;
+    box.add(Vec3d{o.crop[0], o.crop[1], o.crop[2]});
+    box.add(Vec3d{o.crop[3], o.crop[4], o.crop[5]});
+    crop(cloud, box);
+  }
+  if (o.min_opacity > 0 || o.max_scale > 0) {
+    filter_rows(cloud, [&](std::size_t i) {
+      bool keep = static_cast<double>(cloud.opacities[i]) >= o.min_opacity;
+      for (const auto& axis : cloud.scales) {
+        keep = keep && (o.max_scale <= 0 || static_cast<double>(axis[i]) <= o.max_scale);
+      }
+      return keep;
+    });
+  }
+  limit_sh_degree(cloud, o.degree);
+  Similarity by;
+  by.scale = o.scale;
+  if (!o.rotate.empty()) {
+    const Vec3d axis{o.rotate[0], o.rotate[1], o.rotate[2]};
+    if (!(norm(axis) > 0)) return {Errc::invalid_argument, "--rotate: the axis is zero"};
+    by.rotation = axis_angle(normalized(axis), o.rotate[3] * 3.14159265358979323846 / 180);
+  }
+  if (!o.translate.empty()) by.translation = {o.translate[0], o.translate[1], o.translate[2]};
+  if (!o.rotate.empty() || !o.translate.empty() || o.scale != 1) transform(cloud, by);
+  if (cloud.size() == 0) return {Errc::invalid_argument, "no Gaussian is left"};
+  sort_spatially(cloud);
+  return {};
+}
+
+std::uintmax_t bytes_of(const std::filesystem::path& out) {
+  std::error_code ignored;
+  if (out.filename() != "meta.json") return std::filesystem::file_size(out, ignored);
+  std::uintmax_t sum = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(out.parent_path(), ignored)) {
+    if (entry.path() == out || entry.path().extension() == ".webp") sum += entry.file_size(ignored);
+  }
+  return sum;
+}
+
+/// Reads the file back and says what became of the cloud.
+Status compare(const GaussianCloud& cloud, const std::string& out, const Options& o) {
+  auto back = io::load_scene(out);
+  if (!back) return back.status();
+  if (back->report.read != cloud.size() || back->cloud.size() != cloud.size()) {
+    return {Errc::invalid_file, out + ": " + std::to_string(back->cloud.size()) + " of " +
+                                    std::to_string(cloud.size()) + " Gaussians were read back"};
+  }
+  // load_scene sorts; row_ids say where each row was in the file.
+  const GaussianCloud& made = back->cloud;
+  const GaussianCloud source = gsnav_convert::in_order(cloud, made.row_ids);
+  if (made.filter != source.filter) std::printf("  the mip filter is lost in this format\n");
+  const gsnav_convert::FieldErrors e = gsnav_convert::largest_field_errors(source, made);
+  std::printf(
+      "  largest errors: mean %.3g m, scale %.3g %%, rotation %.3g deg, opacity %.3g, colour %.3g, SH "
+      "%.3g\n",
+      e.mean, 100 * e.scale, e.rotation * 180 / 3.14159265358979323846, e.opacity, e.colour, e.bands);
+  std::vector<Camera> cameras = gsnav_convert::views_around(cloud, o.views, o.width, o.height);
+  if (!o.cameras.empty()) {
+    auto given = io::load_cameras(o.cameras, o.width, o.height);
+    if (!given) return given.status();
+    cameras = std::move(*given);
+  }
+  if (cameras.empty()) return {};
+  const auto images = gsnav_convert::image_errors(source, made, cameras);
+  if (!images) return images.status();
+  std::printf("  %zu images of %dx%d: PSNR %.2f dB, the worst %.2f dB\n", cameras.size(), o.width,
+              o.height, images->psnr, images->worst);
+  return {};
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
-  std::string scene, out;
-  CLI::App app{"Writes a scene of 3D Gaussians as an INRIA PLY (float32), rows sorted in space."};
-  app.add_option("scene", scene,
-                 "What gsnav-render takes: a file, a SOG folder, or sibling tiles: DIR/2_0,2_1,2_2")
-      ->required();
-  app.add_option("out", out, "The PLY file")->required();
+  Options o;
+  CLI::App app{
+      "Converts scenes of 3D Gaussians. Several inputs are merged. The output's name says its format: "
+      ".ply, "
+      ".compressed.ply, .splat, .spz, .sog, DIR/meta.json or .glb. Prints what was read and, where "
+      "images or fields "
+      "changed, by how much."};
+  app.add_option("paths", o.paths,
+                 "IN... OUT; an input is a file, a folder of a SOG or of a streamed set, or sibling "
+                 "tiles: DIR/2_0,2_1")
+      ->required()
+      ->expected(2, -1);
+  app.add_option("--level", o.level, "Level of streamed LOD sets, 0 is the finest");
+  app.add_option("--crop", o.crop, "Keep means inside X0 Y0 Z0 X1 Y1 Z1, metres, axes of the input")
+      ->expected(6);
+  app.add_option("--min-opacity", o.min_opacity, "Drop Gaussians below this opacity")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_option("--max-scale", o.max_scale, "Drop Gaussians with a larger standard deviation, metres");
+  app.add_option("--sh", o.degree, "Keep SH bands up to this degree")
+      ->check(CLI::Range(0, kMaxShDegree));
+  app.add_option("--rotate", o.rotate, "Turn about the axis X Y Z by DEGREES")->expected(4);
+  app.add_option("--scale", o.scale, "Then scale by this factor")->check(CLI::PositiveNumber);
+  app.add_option("--translate", o.translate, "Then move by X Y Z metres")->expected(3);
+  app.add_option("--cameras", o.cameras,
+                 "INRIA cameras.json for the comparison, instead of views around the scene");
+  app.add_option("--views", o.views, "Number of generated views; 0 leaves the images out")
+      ->check(CLI::Range(0, 1000));
+  app.add_option("--width", o.width, "Pixels of the compared images")->check(CLI::Range(1, 8192));
+  app.add_option("--height", o.height)->check(CLI::Range(1, 8192));
   CLI11_PARSE(app, argc, argv);
-  const auto fail = [](const std::string& message) {
-    std::fprintf(stderr, "gsnav-convert: %s\n", message.c_str());
-    return 1;
-  };
-  const gsnav::Result<gsnav::LoadedCloud> loaded = gsnav::io::load_scene(scene);
-  if (!loaded) return fail(loaded.message());
-  for (const std::string& warning : loaded->report.warnings)
-    std::fprintf(stderr, "warning: %s\n", warning.c_str());
-  if (const gsnav::Status s = gsnav::io::save_ply(out, loaded->cloud); !s) return fail(s.message());
-  std::printf("%s: %zu Gaussians of SH degree %d\n", out.c_str(), loaded->cloud.size(),
-              loaded->cloud.sh_degree);
+
+  auto cloud = load(o);
+  if (!cloud) return fail(cloud.message());
+  if (Status s = edit(*cloud, o); !s) return fail(s.message());
+  const std::string out = o.paths.back();
+  if (Status s = io::save_scene(out, *cloud); !s) return fail(s.message());
+  const std::uintmax_t bytes = bytes_of(out);
+  std::printf("%s: %zu Gaussians of SH degree %d, %.2f MB, %.1f bytes a Gaussian\n", out.c_str(),
+              cloud->size(), cloud->sh_degree, static_cast<double>(bytes) / 1e6,
+              static_cast<double>(bytes) / static_cast<double>(cloud->size()));
+  if (Status s = compare(*cloud, out, o); !s) return fail(s.message());
   return 0;
 }

@@ -28,20 +28,38 @@ Quatd upright(const std::string& up) {
   return turns.at(up);
 }
 
-Result<NavMesh> from_triangles(const Options& o, const Similarity& placed) {
-  auto mesh = io::load_obj(o.input);
-  if (!mesh) return mesh.status();
+struct Triangles {
   std::vector<Vec3d> vertices;
-  for (const Vec3f& v : mesh->vertices) vertices.push_back(placed * vec_cast<double>(v));
-  std::printf("%s: %zu triangles\n", o.input.c_str(), mesh->triangles.size());
-  return NavMesh::build(o.settings, vertices, mesh->triangles);
+  std::vector<NavMesh::Triangle> triangles;
+};
+
+Result<Triangles> load_triangles(const std::string& path, const Similarity& placed) {
+  auto mesh = io::load_obj(path);
+  if (!mesh) return mesh.status();
+  Triangles out;
+  for (const Vec3f& v : mesh->vertices) out.vertices.push_back(placed * vec_cast<double>(v));
+  out.triangles = std::move(mesh->triangles);
+  std::printf("%s: %zu triangles\n", path.c_str(), out.triangles.size());
+  return out;
+}
+
+Result<NavMesh> from_triangles(const Options& o, const Similarity& placed) {
+  auto mesh = load_triangles(o.input, placed);
+  if (!mesh) return mesh.status();
+  return NavMesh::build(o.settings, mesh->vertices, mesh->triangles);
 }
 
 Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
   auto scene = io::load_scene(o.input);
   if (!scene) return scene.status();
   const GaussianSet set = scene->cloud.set(placed);
-  auto built = build_navmesh(o.settings, std::span(&set, 1), o.gaussians);
+  Triangles beside;
+  if (!o.mesh.empty()) {
+    auto loaded = load_triangles(o.mesh, placed);
+    if (!loaded) return loaded.status();
+    beside = std::move(*loaded);
+  }
+  auto built = build_navmesh(o.settings, std::span(&set, 1), beside.vertices, beside.triangles, o.gaussians);
   if (!built) return built.status();
   const GaussianNavReport& r = built->report;
   std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", o.input.c_str(), r.gaussians_used,

@@ -95,6 +95,10 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   const auto option = [&](const char* name, auto& value, const char* text) {
     app.add_option(name, value, text)->capture_default_str()->group(from);
   };
+  auto* mesh = app.add_option("--mesh", o.mesh,
+                              "Triangles (.obj) of the same scene: what stands in either is in the way, the floor of "
+                              "either is walked on")
+                   ->group(from);
   option("--min-opacity", g.min_opacity, "Fainter Gaussians are ignored");
   option("--sigmas", g.sigmas, "How far out a Gaussian is solid, in standard deviations");
   option("--solid-alpha", g.solid_alpha, "Share of light that a solid voxel blocks");
@@ -110,6 +114,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     app.parse(argc, argv);
     if (kind_of(o.input) == InputKind::navmesh && up->count() + scale->count() > 0) {
       throw CLI::ValidationError("--up, --scale", o.input + " is a NavMesh: it stands as it is");
+    }
+    if (kind_of(o.input) != InputKind::gaussians && mesh->count() > 0) {
+      throw CLI::ValidationError("--mesh", o.input + " has no Gaussians to go with " + o.mesh);
     }
   } catch (const CLI::ParseError& error) {
     exit_code = app.exit(error) == 0 ? 0 : 1;

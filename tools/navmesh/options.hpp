@@ -17,6 +17,7 @@ struct Options {
   std::string input;
   std::string up = "y";
   double scale = 1.0;
+  std::string mesh;  ///< triangles beside the Gaussians of the input
   std::string out, obj, png;
   gsnav::NavMeshSettings settings;
   gsnav::GaussianNavOptions gaussians;

@@ -3,6 +3,8 @@
 
 Each module here has a list PLANTS. Edits are exact text that occurs once in its file.
 """
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 

@@ -24,11 +24,11 @@ PLANTS = [
           "const L det0 = max(a0 * c0 - b0 * b0, L(S(0)));",
           DETERMINANT, "N05_comp_factor_needle"),
     plant("conic_exponent", BLEND,
-          "  L s = fma(w2, w2, w1 * w1);\n",
-          """  const L ca = L(g.a) * L(g.a) + L(g.k) * L(g.k), cb = L(g.k) * L(g.b), cc = L(g.b) * L(g.b);
-  const L ox = L(g.w1) / L(g.a), oy = (L(g.w2) - L(g.k) * ox) / L(g.b);
-  const L cx = dx + ox, cy = dy + oy;
-  L s = ca * cx * cx + L(S(2)) * cb * cx * cy + cc * cy * cy;
+          "    exponent = column_exponent(column_terms(g, px), L(g.ref_y), L(g.b), py);\n",
+          """    const L ca = L(g.a) * L(g.a) + L(g.k) * L(g.k), cb = L(g.k) * L(g.b), cc = L(g.b) * L(g.b);
+    const L ox = L(g.w1) / L(g.a), oy = (L(g.w2) - L(g.k) * ox) / L(g.b);
+    const L cx = (px - L(g.ref_x)) + ox, cy = (py - L(g.ref_y)) + oy;
+    exponent = L(g.log2_opacity) - (ca * cx * cx + L(S(2)) * cb * cx * cy + cc * cy * cy);
 """,
           EXPONENT, "N07_alpha_long_needle", "N08_power_sign",
           why="positive powers and holes in long needles"),
@@ -91,7 +91,7 @@ PLANTS = [
           "    slope_u = L(S(0)) * inv;\n",
           RESPONSE, "N02_exact_ray_grid"),
     plant("ray_drawn_behind", BLEND,
-          "    drawn = f > zero;\n", "",
+          "return select(f > L(S(0)), exponent, L(S(-1e30)));", "return exponent;",
           FOOTPRINT, "N11_tile_cover_conservative"),
     Plant("near_inclusive",
           (Edit(PROJECTION, "(key_z > F(camera.near_plane)) &&", "(key_z >= F(camera.near_plane)) &&"),

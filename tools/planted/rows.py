@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rows of a file become, and where in the world they lie."""
-from . import Edit, Plant, plant
+from . import plant
 
 QUAT = "include/gsnav/math/quat.hpp"
 CLOUD = "include/gsnav/scene/gaussian_cloud.hpp"
@@ -8,46 +8,43 @@ PLY = "src/io/ply.cpp"
 ROWS = "tests/hard_cases/test_rows.cpp"
 WORLD = "tests/hard_cases/test_world.cpp"
 PLY_TEST = "tests/io/test_ply.cpp"
-PLY_READER = ("src/io/ply.cpp", "src/io/ply_header.cpp", "src/io/ply_compressed.cpp", "src/io/file.cpp")
+FILL = "src/io/cloud_fill.hpp"
+PLY_READER = ("src/io/ply.cpp", "src/io/ply_body.cpp", "src/io/ply_header.cpp", "src/io/ply_compressed.cpp",
+              "src/io/file.cpp")
 
-FINITE = "    bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);\n"
+FINITE = "  bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);\n"
 UNIT = ("  Quat<S> n{q.w / m, q.x / m, q.y / m, q.z / m};\n"
         "  q = n * (S(1) / sqrt(dot(n, n)));\n")
-ZERO = ("    if (!normalize(quat)) {\n"
-        "      ++report_.dropped_zero_quat;\n"
-        "      return false;\n"
-        "    }\n")
+ZERO = "  if (!normalize(quat)) return RowFate::zero_quat;\n"
 SIGMOID = "1.0 / (1.0 + std::exp(-raw.opacity_logit))"
 LIMITED = "const double limited = std::isinf(s) && s < 0 ? s : clamp(s, -20.0, 20.0);"
-PUSH_REST = "    if (rest_ != 0) cloud_.shN.insert(cloud_.shN.end(), raw.shN, raw.shN + rest_);\n"
 
 PLANTS = [
     plant("quat_unscaled", QUAT, UNIT, "  q = q * (S(1) / sqrt(dot(q, q)));\n",
           ROWS, "N31_quat_tiny", "N32_quat_denormal_nan", why="squares vanish and overflow"),
     plant("quat_epsilon", QUAT, UNIT, "  q = q * (S(1) / sqrt(dot(q, q) + S(1e-8)));\n",
           ROWS, "N31_quat_tiny", why="Habitat-GS: a quaternion of 1e-4 comes out 0.71 long"),
-    plant("quat_as_stored", CLOUD, "    Quatd quat = raw.quat;\n    if (!normalize(quat)) {\n",
-          "    Quatd quat = raw.quat, unit = quat;\n    if (!normalize(unit)) {\n",
+    plant("quat_as_stored", CLOUD, "  Quatd quat = raw.quat;\n  if (!normalize(quat)) return",
+          "  Quatd quat = raw.quat, unit = quat;\n  if (!normalize(unit)) return",
           ROWS, "N31_quat_tiny", why="INRIA's rasteriser does not normalise"),
-    plant("quat_zero_kept", CLOUD, ZERO, "    if (!normalize(quat)) quat = Quatd{};\n",
+    plant("quat_zero_kept", CLOUD, ZERO, "  if (!normalize(quat)) quat = Quatd{};\n",
           ROWS, "N30_quat_zero", "N32_quat_denormal_nan", why="rows never written become blobs"),
     plant("quat_nan_kept", QUAT,
           "if (!(m > S(0)) || !is_finite(q.w) || !is_finite(q.x) || !is_finite(q.y) || !is_finite(q.z)) {",
           "if (!(m > S(0)) || !is_finite(m)) {",
           ROWS, "N32_quat_denormal_nan", why="the largest component of NaN and 1 is 1"),
-    plant("zero_rows_of_a_file_kept", CLOUD, ZERO, "    if (!normalize(quat)) quat = Quatd{};\n",
+    plant("zero_rows_of_a_file_kept", CLOUD, ZERO, "  if (!normalize(quat)) quat = Quatd{};\n",
           PLY_TEST, "N37_truncated_ply_zero_rows", more=PLY_READER),
-    plant("nan_position_kept", CLOUD, FINITE, "    bool finite = !std::isnan(raw.opacity_logit);\n",
+    plant("nan_position_kept", CLOUD, FINITE, "  bool finite = !std::isnan(raw.opacity_logit);\n",
           PLY_TEST, "N35_nan_position_row", more=PLY_READER),
     plant("nan_sh_kept", CLOUD,
-          "    for (std::size_t k = 0; k < rest_; ++k) finite = finite && is_finite(raw.shN[k]);\n", "",
+          "  for (std::size_t k = 0; k < rest; ++k) finite = finite && is_finite(raw.shN[k]);\n", "",
           PLY_TEST, "N35_nan_position_row", why="one NaN poisons every pixel it is blended into",
           more=PLY_READER),
-    Plant("nan_row_out_of_all_but_sh",
-          (Edit(CLOUD, "    ++report_.read;\n", "    ++report_.read;\n" + PUSH_REST),
-           Edit(CLOUD, "raw.sh0.end());\n" + PUSH_REST, "raw.sh0.end());\n")),
-          PLY_TEST, ("N35_nan_position_row",), "openvdb: all rows after it have another row's SH",
-          PLY_READER),
+    plant("nan_row_out_of_all_but_sh", FILL, "cloud_.shN.data() + rest_ * at_);",
+          "cloud_.shN.data() + rest_ * (first_ + report_.read - 1));",
+          PLY_TEST, "N35_nan_position_row", why="openvdb: all rows after it have another row's SH",
+          more=PLY_READER),
     plant("f_rest_colour_inner", PLY,
           'const std::string name = "f_rest_" + std::to_string(channel * (c.rest_in_file / 3) + k);',
           'const std::string name = "f_rest_" + std::to_string(3 * k + channel);',
@@ -64,12 +61,12 @@ PLANTS = [
           "std::exp(raw.opacity_logit) / (1.0 + std::exp(raw.opacity_logit))",
           ROWS, "N34_opacity_inf", why="infinity over infinity"),
     plant("opacity_infinity_dropped", CLOUD, FINITE,
-          "    bool finite = is_finite(raw.mean) && is_finite(raw.opacity_logit);\n",
+          "  bool finite = is_finite(raw.mean) && is_finite(raw.opacity_logit);\n",
           ROWS, "N34_opacity_inf"),
-    plant("opacity_nan_kept", CLOUD, FINITE, "    bool finite = is_finite(raw.mean);\n",
+    plant("opacity_nan_kept", CLOUD, FINITE, "  bool finite = is_finite(raw.mean);\n",
           ROWS, "N34_opacity_inf"),
-    plant("transparent_kept", CLOUD, "if (static_cast<float>(opacity) < 1.0f / 255.0f) {",
-          "if (static_cast<float>(opacity) < 0.0f) {", ROWS, "N34_opacity_inf"),
+    plant("transparent_kept", CLOUD, "if (out.opacity < 1.0f / 255.0f) return",
+          "if (out.opacity < 0.0f) return", ROWS, "N34_opacity_inf"),
     plant("world_in_float", CLOUD,
           "origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);", "origin[k] = 0;",
           WORLD, "N28_world_1e6", why="62 mm at 1000 km"),
@@ -79,8 +76,8 @@ PLANTS = [
           "                                  vec_cast<float>(eye));\n",
           WORLD, "N28_world_1e6", why="a difference of two large floats"),
     plant("cell_of_the_first", CLOUD,
-          "      cloud_.origin_ids.push_back(it->second);\n",
-          "      cloud_.origin_ids.push_back(it->second > 1 ? 1u : it->second);\n",
+          "      cloud.origin_ids.push_back(id);\n",
+          "      cloud.origin_ids.push_back(id > 1 ? 1u : id);\n",
           WORLD, "N29_chunk_boundary"),
     plant("cells_of_the_first_file", CLOUD, "a.origin_ids.push_back(shift + id);", "a.origin_ids.push_back(id);",
           WORLD, "N29_chunk_boundary"),

@@ -42,7 +42,7 @@ std::vector<Row> ledger_rows() {
   std::vector<Row> rows{
       entry("exact", "float32 arithmetic", "", rounding, "relative, a rounding",
             "all kernels; forms that do not cancel, means projected in float64 (docs/accuracy.md)"),
-      entry("exact", "exp2 by a polynomial of degree 6", "", exp2_error<Exp2::degree6>(), "relative, of alpha",
+      entry("exact", "exp2 by a polynomial of degree 5", "", exp2_error<Exp2::degree5>(), "relative, of alpha",
             "rounding; measured over the exponents that pass the alpha cut"),
       entry("exact", "sort by the float32 key", "key_bits", rounding, "relative, of depth",
             "part of the contract: two Gaussians nearer than a rounding may swap against float64 order"),
@@ -51,7 +51,7 @@ std::vector<Row> ledger_rows() {
       entry("exact", "transmittance stop", "transmittance_min", c.transmittance_min, "alpha, a pixel",
             "part of the contract: what lies behind a closed pixel is left out"),
       entry("fast", "exp2 by a cubic", "", exp2_error<Exp2::degree3>(), "relative, of alpha",
-            "in place of degree 6; all else as in exact"),
+            "in place of degree 5; all else as in exact"),
   };
   return rows;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_order.cuh"
 #include "batch_splat.cuh"
+#include "gsnav/backends/cuda.hpp"
 
 // Blending of a batch, and the median depths of the Gaussians that it found.
 
@@ -8,33 +9,35 @@ namespace gsnav::cuda {
 
 namespace {
 
-constexpr int kThreads = kBatchTile * kBatchTile;  ///< a pixel each
+constexpr int kPixels = 2;                         ///< of a thread, one above the other
+constexpr int kThreads = kBatchTile * kBatchTile / kPixels;
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
 constexpr int kBlocksPerProcessor = 4;
 #else
-constexpr int kBlocksPerProcessor = 5;
+constexpr int kBlocksPerProcessor = 7;
 #endif
-constexpr int kBlock = 4;                          ///< pixels a side of what half a warp blends
-constexpr std::uint32_t kChunk = 256;              ///< splats that a warp lists at a time
-constexpr std::uint32_t kNothing = kOrderBatch;    ///< a staged splat that covers no pixel
+constexpr int kBlock = 4;                          ///< pixels a side of what a quarter of a warp blends
+constexpr int kRowsApart = kBlock / kPixels;       ///< of a thread's pixels
+constexpr std::uint32_t kChunk = 256;              ///< splats that are staged at a time
+constexpr std::uint32_t kNothing = kChunk;         ///< a staged splat that covers no pixel
 constexpr std::uint32_t kListStep = 4;             ///< lists are read by so many
 constexpr unsigned kAll = 0xffffffffu;
-static_assert(kThreads == kOrderThreads && 2 * kBlock * kBlock == 32 && kOrderBatch % kChunk == 0);
+static_assert(kThreads == kOrderThreads && 4 * kBlock * kBlock == 32 * kPixels && kOrderBatch % kChunk == 0);
 
 struct StagedSplat {
   float4 geometry[2];
   SplatColor<float> color;  ///< pad: the slot's bits
 };
 
-static_assert((kOrderBatch + 1) * sizeof(StagedSplat) <= kOrderLent && kOrderLent <= 0xffff);
+static_assert((kChunk + 1) * sizeof(StagedSplat) <= kOrderLent && kOrderLent <= 0xffff);
 
 struct BlendShared {
   alignas(16) OrderShared order;
-  std::uint16_t masks[kOrderBatch];  ///< the blocks that each splat may reach: bit 4 * row + column
+  std::uint16_t masks[kChunk];  ///< the blocks that each splat may reach: bit 4 * row + column
   union {
-    /// Of the half-warps: places of splats in `lent`, in bytes. A splat that covers nothing fills them up.
-    alignas(8) std::uint16_t lists[kThreads / 16][kChunk + kListStep];
-    std::uint16_t queue[kOrderBatch];
+    /// Of the quarter-warps: places of splats in `lent`, in bytes. A splat that covers nothing fills them up.
+    alignas(8) std::uint16_t lists[kThreads / 8][kChunk + kListStep];
+    std::uint16_t queue[kChunk];
   };
   std::uint32_t queued;
 
@@ -91,32 +94,29 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
                       const BlendState<float, D == DepthMode::any ? D : DepthMode::none>& state,
                       std::uint32_t median) {
   const FrameImages<float>& out = b.raster.images;
-  const auto p = finish_pixel(b.raster, state);
-  if (b.rgb != nullptr) {
-    b.rgb[3 * pixel] = p.r;
-    b.rgb[3 * pixel + 1] = p.g;
-    b.rgb[3 * pixel + 2] = p.b;
+  if (b.rgb != nullptr || b.rgb8 != nullptr) {
+    const Vec3<float> color = pixel_color(b.raster, state);
+    const float channels[3] = {color.x, color.y, color.z};
+    for (int c = 0; c < 3; ++c) {
+      if (b.rgb != nullptr) b.rgb[3 * pixel + c] = channels[c];
+      if (b.rgb8 != nullptr) {
+        b.rgb8[3 * pixel + c] = static_cast<std::uint8_t>(255.0f * clamp(channels[c], 0.0f, 1.0f) + 0.5f);
+      }
+    }
   }
-  if (b.rgb8 != nullptr) {
-    const auto to_byte = [](float c) {
-      return static_cast<std::uint8_t>(255.0f * clamp(c, 0.0f, 1.0f) + 0.5f);
-    };
-    b.rgb8[3 * pixel] = to_byte(p.r);
-    b.rgb8[3 * pixel + 1] = to_byte(p.g);
-    b.rgb8[3 * pixel + 2] = to_byte(p.b);
-  }
-  if (out.alpha != nullptr) out.alpha[pixel] = p.alpha;
+  if (out.alpha != nullptr) out.alpha[pixel] = pixel_alpha(state);
   if constexpr (D == DepthMode::median) out.median_depth[pixel] = __uint_as_float(median);
   if constexpr (D == DepthMode::any) {
-    if (out.median_depth != nullptr) out.median_depth[pixel] = p.median;
-    if (out.expected_depth != nullptr) out.expected_depth[pixel] = p.expected;
-    if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = p.accumulated;
-    if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = p.first_hit;
+    if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
+    if (out.expected_depth != nullptr) out.expected_depth[pixel] = pixel_expected_depth(b.raster, state);
+    if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = pixel_accumulated_depth(state);
+    if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
   }
 }
 
-/// Puts the records of the batch's n splats into shared memory, and what they may reach.
-__device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int tile_x, int tile_y) {
+/// Puts the records of splats [first, first + n) of the batch into shared memory, and what they may reach.
+__device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, std::uint32_t n, int tile_x,
+                      int tile_y) {
   if (threadIdx.x == 0) {
     StagedSplat& nothing = s.splat(kNothing);
     nothing = {};
@@ -125,7 +125,7 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int t
   }
   __syncthreads();
   for (std::uint32_t i = threadIdx.x; i < n; i += kThreads) {
-    const std::uint32_t slot = s.order.slots[i];
+    const std::uint32_t slot = s.order.slots[first + i];
     const SplatRecord r = a.records[slot];
     const SplatGeometry<float> g = geometry_of(r);
     StagedSplat& to = s.splat(i);
@@ -143,7 +143,7 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int t
   for (std::uint32_t q = threadIdx.x; q < s.queued; q += kThreads) {
     const std::uint32_t i = s.queue[q];
     const float4 g0 = s.splat(i).geometry[0], g1 = s.splat(i).geometry[1];
-    const SplatRecord& r = a.records[s.order.slots[i]];
+    const SplatRecord& r = a.records[s.order.slots[first + i]];
     const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
     s.masks[i] = static_cast<std::uint16_t>(
         blocks.of_ellipse({g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w}, a.log2_alpha_min));
@@ -151,39 +151,44 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int t
   __syncthreads();
 }
 
-/// Lists those of splats [first, last) that reach each half of the warp, and returns the length of the longer
-/// list; the other is filled up. `bit`: of the left half's block; `open`: bit 0 left, bit 1 right.
-__device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t first, std::uint32_t last, unsigned bit,
-                                     unsigned open) {
+/// Lists those of the n staged splats that reach each quarter of the warp, and returns the length of the longest
+/// list; the others are filled up. `bit`: of the first quarter's block; `open`: a bit a quarter.
+__device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned bit, unsigned open) {
   const unsigned lane = threadIdx.x % 32, below = (1u << lane) - 1;
-  std::uint16_t* const left = s.lists[threadIdx.x / 32 * 2];
-  std::uint16_t* const right = s.lists[threadIdx.x / 32 * 2 + 1];
-  std::uint32_t n_left = 0, n_right = 0;
+  std::uint16_t(*const lists)[kChunk + kListStep] = s.lists + threadIdx.x / 32 * 4;
+  std::uint32_t length[4] = {0, 0, 0, 0};
   const auto place = [](std::uint32_t i) { return static_cast<std::uint16_t>(i * sizeof(StagedSplat)); };
   __syncwarp();
-  for (std::uint32_t i = first; i < last; i += 32) {
-    const unsigned mask = i + lane < last ? s.masks[i + lane] >> bit & open : 0u;
-    const unsigned to_left = __ballot_sync(kAll, (mask & 1u) != 0), to_right = __ballot_sync(kAll, (mask & 2u) != 0);
-    if ((mask & 1u) != 0) left[n_left + static_cast<std::uint32_t>(__popc(to_left & below))] = place(i + lane);
-    if ((mask & 2u) != 0) right[n_right + static_cast<std::uint32_t>(__popc(to_right & below))] = place(i + lane);
-    n_left += static_cast<std::uint32_t>(__popc(to_left));
-    n_right += static_cast<std::uint32_t>(__popc(to_right));
+  for (std::uint32_t i = 0; i < n; i += 32) {
+    const unsigned all = i + lane < n ? static_cast<unsigned>(s.masks[i + lane]) >> bit : 0u;
+    const unsigned mask = ((all & 3u) | (all >> 2 & 12u)) & open;
+#pragma unroll
+    for (unsigned q = 0; q < 4; ++q) {
+      const bool mine = (mask >> q & 1u) != 0;
+      const unsigned votes = __ballot_sync(kAll, mine);
+      if (mine) lists[q][length[q] + static_cast<std::uint32_t>(__popc(votes & below))] = place(i + lane);
+      length[q] += static_cast<std::uint32_t>(__popc(votes));
+    }
   }
-  const std::uint32_t n = (max(n_left, n_right) + kListStep - 1) / kListStep * kListStep;
-  for (std::uint32_t i = n_left + lane; i < n; i += 32) left[i] = place(kNothing);
-  for (std::uint32_t i = n_right + lane; i < n; i += 32) right[i] = place(kNothing);
+  const std::uint32_t longest = max(max(length[0], length[1]), max(length[2], length[3]));
+  const std::uint32_t end = (longest + kListStep - 1) / kListStep * kListStep;
+#pragma unroll
+  for (unsigned q = 0; q < 4; ++q) {
+    for (std::uint32_t i = length[q] + lane; i < end; i += 32) lists[q][i] = place(kNothing);
+  }
   __syncwarp();
-  return n;
+  return end;
 }
 
 /// What RasterArgs decide at run time and the inner loop must not.
 enum class Form { plain, exclusive_stop, perspective };
 
-/// A block a tile, a thread a pixel, half a warp a block of 4 x 4 of them. For DepthMode::median the slot of
-/// the median Gaussian is left in the image.
+/// A block a tile, a thread two pixels of a column, a quarter of a warp a block of 4 x 4 of them. For
+/// DepthMode::median the slot of the median Gaussian is left in the image.
 template <bool Color, DepthMode D, Exp2 M, Form F>
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(const __grid_constant__ BlendArgs b) {
   constexpr DepthMode kBlended = D == DepthMode::any ? D : DepthMode::none;
+  constexpr bool kGeneral = F != Form::plain;
   extern __shared__ __align__(16) unsigned char memory[];
   BlendShared& s = *reinterpret_cast<BlendShared*>(memory);
   const BatchArgs& a = b.batch;
@@ -191,64 +196,78 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(co
   const std::uint32_t camera = blockIdx.x / tiles, tile = blockIdx.x % tiles;
   const int tile_x = static_cast<int>(tile) % a.grid.columns * kBatchTile;
   const int tile_y = static_cast<int>(tile) / a.grid.columns * kBatchTile;
-  const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32, half = lane / 16;
-  const unsigned bit = warp / 2 * 4 + warp % 2 * 2;  // of the left half's block
-  const int x = tile_x + static_cast<int>((bit + half) % 4 * kBlock + lane % kBlock);
-  const int y = tile_y + static_cast<int>(bit / 4 * kBlock + lane % 16 / kBlock);
-  const bool inside = x < a.grid.width && y < a.grid.height;
+  // A warp has 2 x 2 blocks of the tile's 4 x 4.
+  const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32, quarter = lane / 8, at = lane % 8;
+  const unsigned column = warp % 2 * 2 + quarter % 2, row = warp / 2 * 2 + quarter / 2;
+  const unsigned bit = warp / 2 * 8 + warp % 2 * 2;  // of the first quarter's block
+  const int x = tile_x + static_cast<int>(column * kBlock + at % kBlock);
+  const int y = tile_y + static_cast<int>(row * kBlock + at / kBlock);
   BlendRules<float> rules = b.raster.rules;
-  rules.exclusive_stop = F == Form::exclusive_stop;
+  if (F == Form::exclusive_stop) rules.exclusive_stop = true;
 
-  BlendState<float, kBlended> state;
-  std::uint32_t median = kNoSlot;
-  // A pixel is open while it has a place: no footprint holds NaN, so that closed pixels need no test of their own.
-  const float nowhere = __int_as_float(0x7fffffff);
-  float px = inside ? static_cast<float>(x) + 0.5f : nowhere;
-  const float py = static_cast<float>(y) + 0.5f;
+  BlendState<float, kBlended> state[kPixels];
+  std::uint32_t median[kPixels];
+  const float px = static_cast<float>(x) + 0.5f;
+  float py[kPixels];
+  bool inside[kPixels];
+  for (int k = 0; k < kPixels; ++k) {
+    median[k] = kNoSlot;
+    inside[k] = x < a.grid.width && y + k * kRowsApart < a.grid.height;
+    py[k] = static_cast<float>(y + k * kRowsApart) + 0.5f;
+    if (!inside[k]) state[k].transmittance = 0;
+  }
+  const auto is_open = [&] { return state[0].open(rules) || state[1].open(rules); };
   const auto blend = [&](std::uint32_t place) {
     const StagedSplat& from = *reinterpret_cast<const StagedSplat*>(s.order.lent + place);
     const float4 g0 = from.geometry[0], g1 = from.geometry[1];
     const SplatGeometry<float> geometry{g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w};
-    SplatRecords<float> records{&geometry, &from.color, nullptr, nullptr};
-    if constexpr (kBlended == DepthMode::any || F == Form::perspective) {
-      // The splat that covers nothing has slot 0: any record will do.
-      const std::uint32_t slot = __float_as_uint(from.color.pad);
-      if constexpr (kBlended == DepthMode::any) records.depth = a.depths + slot;
-      if constexpr (F == Form::perspective) records.perspective = a.perspectives + slot;
-    }
-    const float before = state.transmittance;
-    state.open = true;
-    const bool hit = blend_splat<Color, kBlended, M, F == Form::perspective>(state, rules, records, px, py);
-    if constexpr (D == DepthMode::median) {
-      // An exclusive stop negates the transmittance and blends nothing.
-      if (hit && before > 0.5f && abs(state.transmittance) <= 0.5f) median = __float_as_uint(from.color.pad);
-    }
-    px = state.open ? px : nowhere;
-  };
-  const auto is_open = [&] { return px == px; };
-  TileOrder order(a, blockIdx.x, camera);
-  unsigned open = __ballot_sync(kAll, inside);
-  while (const std::uint32_t n = order.next(s.order, a)) {
-    stage(s, a, n, tile_x, tile_y);
-    for (std::uint32_t first = 0; first < n && open != 0; first += kChunk) {
-      const unsigned halves = ((open & 0xffffu) != 0 ? 1u : 0u) | (open >> 16 != 0 ? 2u : 0u);
-      const std::uint32_t length = list_blocks(s, first, min(first + kChunk, n), bit, halves);
-      const std::uint16_t* const list = s.lists[2 * warp + half];
-      for (std::uint32_t i = 0; i < length; i += kListStep) {
-        const uint2 places = *reinterpret_cast<const uint2*>(list + i);
-        blend(places.x & 0xffffu);
-        blend(places.x >> 16);
-        blend(places.y & 0xffffu);
-        blend(places.y >> 16);
-        if (i % 16 == 12 && __all_sync(kAll, !is_open())) break;
+    const SplatColor<float> color = from.color;
+    const std::uint32_t slot = __float_as_uint(color.pad);  // 0 for the splat that covers nothing: any will do
+    const SplatDepth<float>* const depth = kBlended == DepthMode::any ? a.depths + slot : nullptr;
+    const ColumnTerms<float> terms = column_terms(geometry, px);
+    for (int k = 0; k < kPixels; ++k) {
+      const float exponent = F == Form::perspective
+                                 ? perspective_exponent(geometry, a.perspectives[slot], px, py[k])
+                                 : column_exponent(terms, geometry.ref_y, geometry.b, py[k]);
+      const float before = state[k].transmittance;
+      blend_alpha<Color, kBlended, kGeneral>(state[k], rules, footprint_alpha<M>(rules, exponent), &color, depth, px,
+                                             py[k]);
+      if constexpr (D == DepthMode::median) {
+        // An exclusive stop negates the transmittance and blends nothing.
+        if (before > 0.5f && abs(state[k].transmittance) <= 0.5f) median[k] = slot;
       }
-      open = __ballot_sync(kAll, is_open());
     }
-    if (__syncthreads_or(open != 0 ? 1 : 0) == 0) break;
+  };
+  TileOrder order(a, blockIdx.x, camera);
+  unsigned open = __ballot_sync(kAll, is_open());
+  bool all_closed = false;
+  while (const std::uint32_t n = all_closed ? 0 : order.next(s.order, a)) {
+    for (std::uint32_t first = 0; first < n && !all_closed; first += kChunk) {
+      const std::uint32_t staged = min(kChunk, n - first);
+      stage(s, a, first, staged, tile_x, tile_y);
+      if (open != 0) {
+        unsigned quarters = 0;
+        for (unsigned q = 0; q < 4; ++q) quarters |= (open >> 8 * q & 0xffu) != 0 ? 1u << q : 0u;
+        const std::uint32_t length = list_blocks(s, staged, bit, quarters);
+        const std::uint16_t* const list = s.lists[4 * warp + quarter];
+        for (std::uint32_t i = 0; i < length; i += kListStep) {
+          const uint2 places = *reinterpret_cast<const uint2*>(list + i);
+          blend(places.x & 0xffffu);
+          blend(places.x >> 16);
+          blend(places.y & 0xffffu);
+          blend(places.y >> 16);
+          if (i % 16 == 12 && __all_sync(kAll, !is_open())) break;
+        }
+        open = __ballot_sync(kAll, is_open());
+      }
+      all_closed = __syncthreads_or(open != 0 ? 1 : 0) == 0;
+    }
   }
-  if (inside) {
-    const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
-    write<D>(b, (camera * height + static_cast<std::size_t>(y)) * width + static_cast<std::size_t>(x), state, median);
+  const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
+  for (int k = 0; k < kPixels; ++k) {
+    if (!inside[k]) continue;
+    const std::size_t line = camera * height + static_cast<std::size_t>(y + k * kRowsApart);
+    write<D>(b, line * width + static_cast<std::size_t>(x), state[k], median[k]);
   }
 }
 
@@ -301,13 +320,13 @@ void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std
     cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, sizeof(BlendShared));
     kernel<<<args.tiles, kThreads, sizeof(BlendShared), stream>>>(b);
   };
-  dispatch_raster(b.raster, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
-    if (P) {
+  dispatch_raster(b.raster, [&]<bool C, DepthMode D, Exp2 M, bool General>() {
+    if constexpr (!General) {
+      launch(blend_kernel<C, D, device_exp2(M), Form::plain>);
+    } else if (args.perspectives != nullptr) {
       launch(blend_kernel<C, D, M, Form::perspective>);
-    } else if (b.raster.rules.exclusive_stop) {
-      launch(blend_kernel<C, D, M, Form::exclusive_stop>);
     } else {
-      launch(blend_kernel<C, D, M, Form::plain>);
+      launch(blend_kernel<C, D, M, Form::exclusive_stop>);
     }
   });
   if (raster.depth_mode() == DepthMode::median) {

@@ -11,12 +11,12 @@
 
 namespace gsnav::cuda {
 
-inline constexpr int kOrderThreads = 256;
-inline constexpr int kOrderItems = 2;  ///< a thread
+inline constexpr int kOrderThreads = 128;
+inline constexpr int kOrderItems = 4;  ///< a thread
 inline constexpr std::uint32_t kOrderBatch = kOrderThreads * kOrderItems;
 inline constexpr int kOrderBinBits = 7, kOrderBins = 1 << kOrderBinBits;
 inline constexpr int kOrderLevels = 10;  ///< of 7 bits: five for the key, five for the rank
-inline constexpr std::size_t kOrderLent = 25 * 1024;
+inline constexpr std::size_t kOrderLent = 12800;
 
 /// A batch is scattered into so many buckets by key; what shares one is put in order afterwards.
 inline constexpr int kBucketBits = 11, kBuckets = 1 << kBucketBits;
@@ -185,16 +185,31 @@ __device__ __noinline__ void sort_batch(OrderShared& s, const BatchArgs& a, std:
   __syncthreads();
 }
 
+/// Calls f(pair) for each of [begin, end), many fetched at a time: a long list is one block's work, and waits for memory.
+template <class F>
+__device__ inline void for_each_pair(const Pair* pairs, std::uint32_t begin, std::uint32_t end, const F& f) {
+  constexpr unsigned kFetched = 8;
+  for (std::uint32_t first = begin + threadIdx.x; first < end; first += kFetched * kOrderThreads) {
+    Pair fetched[kFetched];
+    for (unsigned j = 0; j < kFetched; ++j) {
+      if (first + j * kOrderThreads < end) fetched[j] = pairs[first + j * kOrderThreads];
+    }
+    for (unsigned j = 0; j < kFetched; ++j) {
+      if (first + j * kOrderThreads < end) f(fetched[j]);
+    }
+  }
+}
+
 /// Moves [begin, begin + n) from one array of pairs to the other, into bins of ascending (key, rank).
 __device__ __noinline__ void partition(OrderShared& s, const BatchArgs& a, std::uint32_t camera, const Pair* from,
                                        Pair* to, std::uint32_t begin, std::uint32_t n, int level) {
   const auto range = [&](auto value) {
     std::uint32_t low = 0xffffffffu, high = 0;
-    for (std::uint32_t i = begin + threadIdx.x; i < begin + n; i += kOrderThreads) {
-      const std::uint32_t v = value(from[i]);
+    for_each_pair(from, begin, begin + n, [&](const Pair& p) {
+      const std::uint32_t v = value(p);
       low = min(low, v);
       high = max(high, v);
-    }
+    });
     block_range(s, low, high);
   };
   const auto split = [&](auto value, bool by_rank) {
@@ -203,9 +218,8 @@ __device__ __noinline__ void partition(OrderShared& s, const BatchArgs& a, std::
     const bool bin = threadIdx.x < kOrderBins;
     if (bin) s.cursors[threadIdx.x] = 0;
     __syncthreads();
-    for (std::uint32_t i = begin + threadIdx.x; i < begin + n; i += kOrderThreads) {
-      atomicAdd(&s.cursors[(value(from[i]) - base) >> shift], 1u);
-    }
+    for_each_pair(from, begin, begin + n,
+                  [&](const Pair& p) { atomicAdd(&s.cursors[(value(p) - base) >> shift], 1u); });
     __syncthreads();
     std::uint32_t at = 0;
     OrderScan(s.sorting.scan).ExclusiveSum(bin ? s.cursors[threadIdx.x] : 0u, at);
@@ -218,10 +232,8 @@ __device__ __noinline__ void partition(OrderShared& s, const BatchArgs& a, std::
       s.shifts[level] = by_rank ? kByRank : shift;
     }
     __syncthreads();
-    for (std::uint32_t i = begin + threadIdx.x; i < begin + n; i += kOrderThreads) {
-      const Pair p = from[i];
-      to[atomicAdd(&s.cursors[(value(p) - base) >> shift], 1u)] = p;
-    }
+    for_each_pair(from, begin, begin + n,
+                  [&](const Pair& p) { to[atomicAdd(&s.cursors[(value(p) - base) >> shift], 1u)] = p; });
     __syncthreads();
   };
   const auto key = [](const Pair& p) { return p.key; };

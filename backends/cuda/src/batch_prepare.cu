@@ -182,7 +182,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   raster.grid = args.grid;
   raster.rules = blend_rules<float>(config);
   raster.background = vec_cast<float>(config.background);
-  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree6;
+  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
   raster.images = images.floats;
   rgb8 = images.rgb8;
 
@@ -195,7 +195,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
     several_capacity = slot_capacity;
     hard_capacity = large_capacity = slot_capacity / 16;
   }
-  backend.copy(inputs.data(), flight.inputs, layout.bytes(), CopyKind::host_to_device);
+  input_bytes = layout.bytes();
   return {};
 }
 

@@ -49,18 +49,73 @@ void CudaBatchRenderer::State::size_scratch() {
                         pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes();
 }
 
-Status CudaBatchRenderer::State::launch() {
-  size_scratch();
+cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight) const {
+  cuda::LaunchKey key{};
+  std::size_t n = 0;
+  const auto add = [&](auto... values) { ((key.at(n++) = static_cast<std::uint64_t>(values)), ...); };
+  const auto address = [](const void* p) { return reinterpret_cast<std::uintptr_t>(p); };
+  const FrameImages<float>& to = raster.images;
+  add(args.units, args.set_count, args.cameras, args.grid.width, args.grid.height, input_bytes);
+  add(address(args.sets), address(args.instances), address(args.camera_first), address(args.camera_instances),
+      address(flight.inputs));
+  add(address(to.rgb), address(to.alpha), address(to.median_depth), address(to.expected_depth),
+      address(to.accumulated_depth), address(to.first_hit_depth), address(rgb8));
+  // Arrays move when they grow, and only then.
+  add(slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity);
+  add(address(args.items), address(args.tile_counts), address(args.records), address(args.pairs), address(args.depths),
+      address(args.perspectives));
+  return key;
+}
+
+void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
   const cudaStream_t stream = backend.stream();
+  cudaMemcpyAsync(inputs.data(), flight.inputs, input_bytes, cudaMemcpyHostToDevice, stream);
   backend.fill(args.counters, 0, sizeof(cuda::BatchCounters));
   backend.fill(args.tile_counts, 0, args.tiles * sizeof(std::uint32_t));
   cuda::launch_projection(args, multiprocessors, stream);
   cuda::launch_binning(args, multiprocessors, stream);
   cuda::launch_blending(args, raster, rgb8, stream);
-  cuda::Flight& flight = flights[calls % cuda::kInFlight];
   backend.copy(flight.counters, args.counters, sizeof(cuda::BatchCounters), CopyKind::device_to_host);
-  cudaError_t e = cudaGetLastError();
-  if (e == cudaSuccess) e = cudaEventRecord(flight.done, stream);
+}
+
+cudaGraphExec_t CudaBatchRenderer::State::record(const cuda::Flight& flight) {
+  const cudaStream_t stream = backend.stream();
+  if (cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal) != cudaSuccess) {
+    cudaGetLastError();  // the legacy default stream, for one
+    return nullptr;
+  }
+  enqueue(flight);
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t exec = nullptr;
+  if (cudaStreamEndCapture(stream, &graph) == cudaSuccess && graph != nullptr &&
+      cudaGraphInstantiate(&exec, graph, 0) != cudaSuccess) {
+    exec = nullptr;
+  }
+  if (graph != nullptr) cudaGraphDestroy(graph);
+  cudaGetLastError();
+  return exec;
+}
+
+Status CudaBatchRenderer::State::launch() {
+  size_scratch();
+  cuda::Flight& flight = flights[calls % cuda::kInFlight];
+  const cuda::LaunchKey key = launch_key(flight);
+  if (key != flight.key) {
+    flight.forget_recorded();
+    flight.key = key;
+  } else if (flight.recorded == nullptr && recordable) {
+    flight.recorded = record(flight);
+    recordable = flight.recorded != nullptr;
+  }
+  stats.replayed = flight.recorded != nullptr;
+  cudaError_t e = cudaSuccess;
+  if (stats.replayed) {
+    e = cudaGraphLaunch(flight.recorded, backend.stream());
+  } else {
+    enqueue(flight);
+  }
+  if (e == cudaSuccess) e = cudaGetLastError();
+  if (e == cudaSuccess) e = cudaEventRecord(flight.done, backend.stream());
   if (e == cudaSuccess) return {};
   return {Errc::backend_failure, std::string("CudaBatchRenderer: a launch failed: ") + cudaGetErrorString(e)};
 }

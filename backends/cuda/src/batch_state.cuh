@@ -24,13 +24,23 @@ inline void need(cudaError_t e, const char* what) {
   }
 }
 
-/// Pinned memory of one call under way: what is copied to the device, and the counts that come back.
+/// What the launches of a call depend on besides the contents of its inputs: addresses, capacities and counts.
+using LaunchKey = std::array<std::uint64_t, 32>;
+
+/// Pinned memory of one call under way: what is copied to the device, and the counts that come back; and its
+/// launches recorded, to be replayed while their key stays the same.
 struct Flight {
   unsigned char* inputs = nullptr;
   std::size_t capacity = 0;
   BatchCounters* counters = nullptr;
   cudaEvent_t done = nullptr;
+  LaunchKey key{};
+  cudaGraphExec_t recorded = nullptr;
 
+  void forget_recorded() noexcept {
+    if (recorded != nullptr) cudaGraphExecDestroy(recorded);
+    recorded = nullptr;
+  }
   void reserve(std::size_t bytes) {
     if (bytes <= capacity) return;
     if (inputs != nullptr) cudaFreeHost(inputs);
@@ -65,6 +75,7 @@ struct CudaBatchRenderer::State {
   ~State() {
     cudaStreamSynchronize(backend.stream());
     for (cuda::Flight& f : flights) {
+      f.forget_recorded();
       if (f.inputs != nullptr) cudaFreeHost(f.inputs);
       if (f.counters != nullptr) cudaFreeHost(f.counters);
       if (f.done != nullptr) cudaEventDestroy(f.done);
@@ -74,7 +85,12 @@ struct CudaBatchRenderer::State {
   Status prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                  const BatchImages& images);
   void size_scratch();
+  /// Of the call that has been prepared.
   Status launch();
+  cuda::LaunchKey launch_key(const cuda::Flight& flight) const;
+  void enqueue(const cuda::Flight& flight);
+  /// The launches as a graph, or null where the stream cannot be recorded.
+  cudaGraphExec_t record(const cuda::Flight& flight);
 
   CudaBackend& backend;
   RenderConfig config;
@@ -94,6 +110,8 @@ struct CudaBatchRenderer::State {
   cuda::BatchArgs args{};
   RasterArgs<float> raster;
   std::uint8_t* rgb8 = nullptr;
+  std::size_t input_bytes = 0;
+  bool recordable = true;
   std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0, pair_capacity = 0;
   BatchStats stats;
 

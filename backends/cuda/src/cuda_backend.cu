@@ -4,13 +4,11 @@
 #include <cub/device/device_scan.cuh>
 
 #include "gsnav/backends/cuda/device.cuh"
+#include "pinned_ring.cuh"
 
 namespace gsnav {
 
 namespace {
-
-// Scratch that outlives a call, by use.
-enum Slot { kCubTemp, kPerSplat, kPerTile, kSplatOffsets, kPairTiles, kPairSplats };
 
 std::string describe(int device, int error, const char* what) {
   return std::string("CUDA device ") + std::to_string(device) + ": " + what + " failed: " +
@@ -51,6 +49,7 @@ CudaBackend::CudaBackend(int device, CUstream_st* stream) : stream_(stream), dev
   need(cudaDeviceGetDefaultMemPool(&pool, device), "cudaDeviceGetDefaultMemPool");
   std::uint64_t keep = ~std::uint64_t{0};
   need(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &keep), "cudaMemPoolSetAttribute");
+  uploads_ = std::make_unique<cuda::PinnedRing>();
 }
 
 CudaBackend::~CudaBackend() {
@@ -58,6 +57,7 @@ CudaBackend::~CudaBackend() {
     if (b.data != nullptr) cudaFreeAsync(b.data, stream_);
   }
   cudaStreamSynchronize(stream_);
+  if (handed_over_ != nullptr) cudaEventDestroy(handed_over_);
   if (owns_stream_) cudaStreamDestroy(stream_);
 }
 
@@ -86,6 +86,9 @@ void CudaBackend::deallocate(void* p, std::size_t) noexcept { cudaFreeAsync(p, s
 
 void CudaBackend::copy(void* dst, const void* src, std::size_t bytes, CopyKind kind) {
   if (bytes == 0 || !usable()) return;
+  if (kind == CopyKind::host_to_device && bytes <= cuda::PinnedRing::kMaxBytes) {
+    return note(uploads_->send(dst, src, bytes, stream_), "a copy");
+  }
   const cudaMemcpyKind kinds[] = {cudaMemcpyHostToHost, cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost,
                                   cudaMemcpyDeviceToDevice};
   note(cudaMemcpyAsync(dst, src, bytes, kinds[static_cast<int>(kind)], stream_), "a copy");
@@ -99,6 +102,13 @@ Status CudaBackend::synchronize() {
   if (usable()) note(cudaStreamSynchronize(stream_), "work on the stream");
   if (usable()) return {};
   return {Errc::backend_failure, describe(device_, error_, failed_)};
+}
+
+void CudaBackend::hand_over_to(CUstream_st* consumer) {
+  if (!usable()) return;
+  if (handed_over_ == nullptr) note(cudaEventCreateWithFlags(&handed_over_, cudaEventDisableTiming), "an event");
+  if (usable()) note(cudaEventRecord(handed_over_, stream_), "an event");
+  if (usable()) note(cudaStreamWaitEvent(consumer, handed_over_), "a wait between streams");
 }
 
 void* CudaBackend::scratch(int slot, std::size_t bytes) {
@@ -175,7 +185,7 @@ void CudaBackend::rasterize_tiles(const RasterArgs<float>& args) {
   if (!usable()) return;
   const unsigned threads = static_cast<unsigned>(args.grid.tile_size * args.grid.tile_size);
   dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
-    cuda::rasterize_kernel<C, D, M, P>
+    cuda::rasterize_kernel<C, D, cuda::device_exp2(M), P>
         <<<static_cast<unsigned>(args.grid.count()), threads, 0, stream_>>>(args);
   });
   note(cudaGetLastError(), "the blending");
@@ -186,5 +196,6 @@ template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWorkspace<
                                                   const RenderConfig&, const FrameImages<float>&,
                                                   RenderStats*);
 template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
+template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
 
 }  // namespace gsnav

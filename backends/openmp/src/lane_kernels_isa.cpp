@@ -10,7 +10,7 @@ inline namespace GSNAV_LANES_TAG {
 extern const LaneKernels kKernels;
 const LaneKernels kKernels{GSNAV_LANES_NAME, kWidth,         &project_chunk,
                            &count_tiles,     &scatter_tiles, &rasterize_tile_any,
-                           &skin_range};
+                           &skin_range,      &gap_range,     &sweep_range};
 
 }  // namespace GSNAV_LANES_TAG
 }  // namespace gsnav::lanes

@@ -12,6 +12,7 @@
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/avatar/body_shape.hpp"
 #include "gsnav/avatar/humanoid_body.hpp"
+#include "gsnav/avatar/point_grid.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/sh.hpp"
@@ -25,47 +26,6 @@ struct SurfacePoint {
   std::size_t lobe = 0;   // the nearest
 };
 
-/// Points no nearer to each other than their spacing, looked up by cells.
-class PointGrid {
- public:
-  PointGrid(const Vec3d& low, const Vec3d& high, double cell) : low_(low), cell_(cell) {
-    for (int k = 0; k < 3; ++k) size_[k] = static_cast<int>((high[k] - low[k]) / cell) + 3;
-    heads_.assign(static_cast<std::size_t>(size_[0]) * static_cast<std::size_t>(size_[1]) *
-                      static_cast<std::size_t>(size_[2]), -1);
-  }
-  /// Keeps p unless a kept point lies nearer than `spacing`.
-  bool add(const Vec3d& p, double spacing) {
-    int c[3];
-    for (int k = 0; k < 3; ++k) c[k] = std::clamp(static_cast<int>((p[k] - low_[k]) / cell_) + 1, 1, size_[k] - 2);
-    const double limit = spacing * spacing;
-    for (int z = -1; z <= 1; ++z) {
-      for (int y = -1; y <= 1; ++y) {
-        for (int x = -1; x <= 1; ++x) {
-          for (int i = heads_[index(c[0] + x, c[1] + y, c[2] + z)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) {
-            const Vec3d d = points_[static_cast<std::size_t>(i)] - p;
-            if (dot(d, d) < limit) return false;
-          }
-        }
-      }
-    }
-    int& head = heads_[index(c[0], c[1], c[2])];
-    next_.push_back(head);
-    head = static_cast<int>(points_.size());
-    points_.push_back(p);
-    return true;
-  }
-
- private:
-  std::size_t index(int x, int y, int z) const noexcept {
-    return static_cast<std::size_t>((z * size_[1] + y) * size_[0] + x);
-  }
-  Vec3d low_;
-  double cell_;
-  int size_[3] = {};
-  std::vector<int> heads_, next_;
-  std::vector<Vec3d> points_;
-};
-
 /// Spreads points over the surface of the shape: random ones on the lobes, moved to the smooth union,
 /// kept where no other is near (dart throwing).
 inline std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidOptions& o,
@@ -76,7 +36,7 @@ inline std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const Hu
   // Measured: lobes overlap by more than half, and dart throwing gives 0.7 points per square of the spacing.
   const double spacing = std::sqrt(0.285 * weighted / o.gaussians);
   const double scale = o.height / 1.70;
-  PointGrid grid(Vec3d{-1.0, -0.1, -0.4} * scale, Vec3d{1.0, 1.8, 0.4} * scale, spacing);
+  PointGrid grid(spacing, static_cast<std::size_t>(o.gaussians));
   std::vector<SurfacePoint> out;
   std::vector<std::vector<std::size_t>> among;
   std::vector<double> sum{0.0};

@@ -6,12 +6,14 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "gsnav/avatar/skeleton.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/lbs.hpp"
+#include "gsnav/math/screw.hpp"
 
 namespace gsnav {
 
@@ -59,7 +61,9 @@ enum class ClipEnd : std::uint8_t {
 };
 
 /// Key poses at a fixed rate. Between keys rotations are interpolated by slerp in local joint space and
-/// translations linearly: bones keep their length, unlike with interpolated matrices.
+/// translations linearly: bones keep their length, unlike with interpolated matrices. The first joint of a clip
+/// with a path (`root_translation`) is a free body and moves by a screw from key to key, so that it does not matter
+/// which of its points is called the root; across the wrap of a loop it goes straight.
 class MotionClip final : public MotionSource {
  public:
   double frame_rate = 30.0;                ///< keys a second
@@ -69,6 +73,8 @@ class MotionClip final : public MotionSource {
   std::vector<Vec3d> root_translation;     ///< [T] path of the whole avatar in its frame, or empty
   ClipEnd end = ClipEnd::loop;
   double wrap_time = 0.0;                  ///< seconds from last to first key; at least one frame
+  double playback_rate = 1.0;              ///< seconds of the clip that go by in one second, > 0
+  double start = 0.0;                      ///< seconds into the clip (in its own time) at time 0
 
   std::size_t frames() const noexcept { return joints == 0 ? 0 : rotations.size() / joints; }
   /// Seconds from the first key to the last.
@@ -96,6 +102,8 @@ class MotionClip final : public MotionSource {
                  std::to_string(t) + " keys");
     }
     if (!(wrap_time >= 0) || !is_finite(wrap_time)) return bad("wrap_time must be >= 0");
+    if (!(playback_rate > 0) || !is_finite(playback_rate)) return bad("playback_rate must be positive");
+    if (!is_finite(start)) return bad("start must be finite");
     for (std::size_t i = 0; i < rotations.size(); ++i) {
       if (!(abs(dot(rotations[i], rotations[i]) - 1.0) < 1e-4)) {
         return bad("rotations: key " + std::to_string(i / joints) + ", joint " +
@@ -113,7 +121,7 @@ class MotionClip final : public MotionSource {
 
   void pose(const MotionInput& input, LocalPose& out) const override {
     const std::size_t last = frames() - 1;
-    double t = input.time, rounds = 0.0;
+    double t = start + playback_rate * input.time, rounds = 0.0;
     std::size_t a = 0, b = 0;
     double u = 0.0;
     if (end != ClipEnd::hold) {
@@ -142,8 +150,34 @@ class MotionClip final : public MotionSource {
     if (!root_translation.empty()) {
       const Vec3d travel = end == ClipEnd::loop_forward ? root_translation[last] - root_translation[0] : Vec3d{};
       const Vec3d next = root_translation[b] + (a == last && b == 0 ? travel : Vec3d{});
-      out.root = lerp(root_translation[a], next, u) + travel * rounds;
+      if (b == a + 1) {
+        const auto body = [&](std::size_t key) {
+          return RigidPose<double>{rotations[key * joints],
+                                   root_translation[key] + translations[moving ? key * joints : 0]};
+        };
+        out.root = screw_between(body(a), body(b), u).translation - out.translations[0];
+      } else {
+        out.root = lerp(root_translation[a], next, u);
+      }
+      out.root += travel * rounds;
     }
+  }
+
+  /// The keys [first, first + count) as a clip of their own. Errors: invalid_argument (keys that are not there).
+  Result<MotionClip> section(std::size_t first, std::size_t count) const {
+    if (count == 0 || first > frames() || count > frames() - first) {
+      return {Errc::invalid_argument, "MotionClip: keys " + std::to_string(first) + " to " +
+                                          std::to_string(first + count) + " of " + std::to_string(frames())};
+    }
+    const auto cut = [&](const auto& all, std::size_t row) {
+      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(first * row);
+      return std::remove_cvref_t<decltype(all)>(begin, begin + static_cast<std::ptrdiff_t>(count * row));
+    };
+    MotionClip out = *this;
+    out.rotations = cut(rotations, joints);
+    if (translations.size() != joints) out.translations = cut(translations, joints);
+    if (!root_translation.empty()) out.root_translation = cut(root_translation, 1);
+    return out;
   }
 
  private:

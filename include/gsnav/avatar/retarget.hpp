@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -18,6 +19,9 @@ struct RetargetOptions {
   /// Pairs of joint names, (target, source). Target joints without a pair keep their rest rotation.
   std::vector<std::pair<std::string, std::string>> joints;
   double yaw = 0.0;         ///< radians about +Y that turn the source's rest pose to face as the target's does
+  /// Target joints whose rest pose is taken to mean the same as their source's, whatever direction their child lies in: feet
+  /// that stand flat in both.
+  std::vector<std::string> same_rest;
   double root_scale = 0.0;  ///< target metres a source unit; 0: ratio of the roots' heights over the lowest joints
 };
 
@@ -77,19 +81,26 @@ inline Result<MotionClip> retarget(const MotionClip& clip, const Skeleton& sourc
   if (!(scale > 0) || !is_finite(scale) || !is_finite(options.yaw)) return bad("root_scale or yaw is not finite");
   const Mat3d turn = rotation_matrix(axis_angle(Vec3d{0, 1, 0}, options.yaw)), back = transpose(turn);
 
-  // What turns the target's rest pose into the source's, joint by joint: from the one paired child, or,
+  // What turns the target's rest pose into the source's, joint by joint: from the one paired joint next below it, or,
   // without, as the parent.
+  std::vector<std::size_t> paired_above(joints, none);  // the paired joint next paired_above
+  for (std::size_t j = 0; j < joints; ++j) {
+    for (std::int32_t p = target.parents[j]; p >= 0 && paired_above[j] == none; p = target.parents[static_cast<std::size_t>(p)]) {
+      if (from[static_cast<std::size_t>(p)] != none) paired_above[j] = static_cast<std::size_t>(p);
+    }
+  }
   std::vector<Mat3d> align(joints, Mat3d::identity());
   for (std::size_t j = 0; j < joints; ++j) {
     if (from[j] == none) continue;
     std::size_t child = none, children = 0;
     for (std::size_t c = j + 1; c < joints; ++c) {
-      if (target.parents[c] == static_cast<std::int32_t>(j) && from[c] != none) {
+      if (paired_above[c] == j && from[c] != none) {
         child = c;
         ++children;
       }
     }
-    if (children == 0 && target.parents[j] >= 0) align[j] = align[static_cast<std::size_t>(target.parents[j])];
+    if (std::find(options.same_rest.begin(), options.same_rest.end(), target.names[j]) != options.same_rest.end()) continue;
+    if (children == 0 && paired_above[j] != none) align[j] = align[paired_above[j]];
     if (children != 1) continue;
     const Vec3d have = target_rest[child].translation - target_rest[j].translation;
     const Vec3d want = turn * (source_rest[from[child]].translation - source_rest[from[j]].translation);

@@ -4,35 +4,38 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "gsnav/avatar/actor.hpp"
+#include "gsnav/avatar/body_bounds.hpp"
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/kernels/cull.hpp"
+#include "gsnav/ops/render_config.hpp"
 #include "gsnav/ops/skin.hpp"
 
 namespace gsnav {
 
-/// The Gaussians of one actor, posed on a backend and ready to be rendered in one list with the scene.
-/// Only means and orientations (and for SH of degree >= 1 the rotations that colours are turned back by)
-/// are written per frame, into buffers that are used again; all else is the asset's own memory, which on
-/// other than host backends is uploaded once. The backend must outlive it.
-///
-///     SkinnedGaussians skin(backend, actor.asset());
-///     skin.pose(actor, t).throw_if_error();
-///     renderer.render({{cloud.set(), skin.set()}}, cameras);
+/// What all actors of an asset share, in the memory of a backend. On host backends it is the asset's own; others
+/// get a copy. The backend must outlive it.
 template <Backend B>
-class SkinnedGaussians {
+class AvatarArrays {
  public:
-  SkinnedGaussians(B& backend, std::shared_ptr<const AvatarAsset> asset)
-      : backend_(&backend), asset_(std::move(asset)), joints_(backend), indices_(backend), weights_(backend) {
-    GaussianView v = asset_->cloud.view();
+  AvatarArrays(B& backend, std::shared_ptr<const AvatarAsset> asset)
+      : asset_(std::move(asset)), indices_(backend), weights_(backend) {
+    set_ = asset_->cloud.set();
+    GaussianView& v = set_.gaussians;
     args_.influences = asset_->influences;
     args_.joint_indices = view_of(asset_->joint_indices);
     args_.weights = view_of(asset_->skinning_weights);
     if constexpr (!is_host_backend<B>) {
+      const auto to_device = [&](View<const float>& from) {
+        floats_.emplace_back(backend).upload(from.data, from.size);
+        from = {floats_.back().data(), from.size};
+      };
       for (auto& p : v.means) to_device(p);
       for (auto& p : v.quats) to_device(p);
       for (auto& p : v.scales) to_device(p);
@@ -46,19 +49,43 @@ class SkinnedGaussians {
     }
     for (std::size_t k = 0; k < 3; ++k) args_.means[k] = v.means[k];
     for (std::size_t k = 0; k < 4; ++k) args_.quats[k] = v.quats[k];
-    set_ = asset_->cloud.set();
-    set_.gaussians = v;
-    for (std::size_t k = 0; k < 3; ++k) {
-      args_.means_out[k] = output(v.size);
-      set_.gaussians.means[k] = args_.means_out[k];
-    }
+  }
+
+  const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
+  /// The canonical Gaussians.
+  const GaussianSet& set() const noexcept { return set_; }
+  /// Without joints and outputs.
+  const SkinningArgs<float>& skinning() const noexcept { return args_; }
+
+ private:
+  std::shared_ptr<const AvatarAsset> asset_;
+  GaussianSet set_;
+  SkinningArgs<float> args_;
+  Buffer<std::uint16_t, B> indices_, weights_;
+  std::vector<Buffer<float, B>> floats_;  // a Buffer's memory stays where it is when the vector grows
+};
+
+/// The Gaussians of one actor, posed on a backend and ready to be rendered in one list with the scene.
+/// Only means and orientations (and for SH of degree >= 1 the rotations that colours are turned back by)
+/// are written per frame, into buffers that are used again; all else is the asset's own memory, which on
+/// other than host backends is uploaded once. The backend must outlive it.
+///
+///     SkinnedGaussians skin(backend, actor.asset());
+///     skin.pose(actor, t).throw_if_error();
+///     renderer.render({{cloud.set(), skin.set()}}, cameras);
+template <Backend B>
+class SkinnedGaussians {
+ public:
+  SkinnedGaussians(B& backend, std::shared_ptr<const AvatarAsset> asset)
+      : SkinnedGaussians(backend, std::make_shared<const AvatarArrays<B>>(backend, std::move(asset))) {}
+  SkinnedGaussians(B& backend, std::shared_ptr<const AvatarArrays<B>> arrays)
+      : backend_(&backend), arrays_(std::move(arrays)), bounds_(*asset()), args_(arrays_->skinning()),
+        set_(arrays_->set()), joints_(backend) {
+    GaussianView& v = set_.gaussians;
+    for (std::size_t k = 0; k < 3; ++k) v.means[k] = args_.means_out[k] = output(v.size);
     for (std::size_t k = 0; k < 4; ++k) {
-      args_.quats_out[k] = output(v.size);
-      set_.gaussians.quats[k] = args_.quats_out[k];
-      if (v.sh_degree >= 1) {
-        args_.rotations_out[k] = output(v.size);
-        set_.gaussians.sh_rotations[k] = args_.rotations_out[k];
-      }
+      v.quats[k] = args_.quats_out[k] = output(v.size);
+      if (v.sh_degree >= 1) v.sh_rotations[k] = args_.rotations_out[k] = output(v.size);
     }
   }
 
@@ -66,18 +93,24 @@ class SkinnedGaussians {
   /// an empty set. The Gaussians are there after `backend.synchronize()`, which rendering does.
   /// Errors: invalid_argument for an actor with another asset.
   Status pose(const AvatarActor& actor, double t) {
-    if (actor.asset() != asset_) {
-      return {Errc::invalid_argument, "SkinnedGaussians: the actor has another asset than was given at creation"};
-    }
-    visible_ = actor.active(t);
-    if (!visible_) return {};
-    set_.world_from_asset = actor.placement(t);
+    if (Status s = place(actor, t); !s || !visible_) return s;
     actor.joint_matrices(t, matrices_);
-    host_joints_.clear();
-    for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
-    joints_.upload(host_joints_.data(), host_joints_.size());
-    args_.joints = std::as_const(joints_).view();
-    return skin_gaussians<float>(*backend_, args_);
+    return skin();
+  }
+
+  /// The same for what these cameras see by `config`: an actor that none of them can see leaves an empty set and costs its
+  /// forward kinematics, no more. No pixel of theirs changes by it.
+  Status pose(const AvatarActor& actor, double t, std::span<const Camera> cameras, const RenderConfig& config) {
+    if (Status s = place(actor, t); !s || !visible_) return s;
+    actor.joint_globals(t, matrices_);
+    const ChunkBounds bounds = bounds_.at(matrices_);
+    visible_ = false;
+    for (const Camera& c : cameras) {
+      visible_ = visible_ || may_be_visible(make_projection_camera<double>(c, set_, projection_rules(config)), bounds);
+    }
+    if (!visible_) return {};
+    actor.joint_matrices(t, matrices_);
+    return skin();
   }
 
   /// The posed Gaussians where the actor stands; empty before the first `pose`. Valid until the next.
@@ -87,12 +120,27 @@ class SkinnedGaussians {
     return s;
   }
 
-  const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
+  const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return arrays_->asset(); }
 
  private:
-  void to_device(View<const float>& v) {
-    floats_.emplace_back(*backend_).upload(v.data, v.size);
-    v = {floats_.back().data(), v.size};
+  template <Backend>
+  friend class SkinnedCrowd;
+
+  /// Where the actor is, and whether it is in the scene.
+  Status place(const AvatarActor& actor, double t) {
+    if (actor.asset() != asset()) {
+      return {Errc::invalid_argument, "SkinnedGaussians: the actor has another asset than was given at creation"};
+    }
+    visible_ = actor.active(t);
+    if (visible_) set_.world_from_asset = actor.placement(t);
+    return {};
+  }
+  Status skin() {
+    host_joints_.clear();
+    for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
+    joints_.upload(host_joints_.data(), host_joints_.size());
+    args_.joints = std::as_const(joints_).view();
+    return skin_gaussians<float>(*backend_, args_);
   }
   View<float> output(std::size_t n) {
     floats_.emplace_back(*backend_).resize_discard(n);
@@ -100,11 +148,11 @@ class SkinnedGaussians {
   }
 
   B* backend_;
-  std::shared_ptr<const AvatarAsset> asset_;
+  std::shared_ptr<const AvatarArrays<B>> arrays_;
+  BodyBounds bounds_;
   SkinningArgs<float> args_;
   GaussianSet set_;
   Buffer<Affine3<float>, B> joints_;
-  Buffer<std::uint16_t, B> indices_, weights_;
   std::vector<Buffer<float, B>> floats_;  // a Buffer's memory stays where it is when the vector grows
   std::vector<Affine3<double>> matrices_;
   std::vector<Affine3<float>> host_joints_;

@@ -89,6 +89,11 @@ class WalkTrajectory final : public Trajectory {
   double period() const noexcept { return period_; }
   /// Metres of one round.
   double length() const noexcept { return length_; }
+  /// Seconds from the first point to the last of a path that is not closed, turns on the spot between them included;
+  /// the period of one that is, 0 for a walker that stands.
+  double arrival() const noexcept {
+    return one_way_ == 0 ? period_ : legs_[one_way_ - 1].begin + legs_[one_way_ - 1].walk_time;
+  }
 
   TrajectorySample at(double t) const override {
     if (legs_.empty()) return standing_;
@@ -127,6 +132,7 @@ class WalkTrajectory final : public Trajectory {
     } else {
       std::vector<Vec3d> back(path.rbegin(), path.rend());
       cut(path);
+      one_way_ = legs_.size();
       cut(back);
     }
     finish();
@@ -283,6 +289,7 @@ class WalkTrajectory final : public Trajectory {
 
   WalkOptions options_;
   std::vector<Leg> legs_;
+  std::size_t one_way_ = 0;  // legs of a path that is not closed until it is walked back
   TrajectorySample standing_;
   double period_ = 0, length_ = 0, turned_ = 0, loop_turn_ = 0;
   bool endless_ = false;

@@ -35,6 +35,10 @@ struct NoopFunctor {
 /// Members that are used where they exist, with a generic fallback where they do not:
 ///     rasterize_tiles(const RasterArgs<S>&)   blend all tiles (kernels/blend.hpp)
 ///     project(const ProjectArgs<S>&)          project one set of Gaussians (kernels/project_chunk.hpp)
+///     project(const ProjectArgs<S>&, View<const std::uint32_t> chunks)   some of its chunks: frames may then be
+///                                             drawn in slices of depth (ops/depth_slices.hpp)
+///     one_thread() -> B                       a backend of the same kind for the calling thread alone: batches
+///                                             of cameras are then cut by frames (ops/frame_lanes.hpp)
 ///     count_tiles, scatter_tiles(const BinArgs<S>&)   bin (kernels/tiles.hpp)
 ///     bins_in_lanes                           they want BinArgs::spans
 ///     list_tiles(const BinArgs<S>&)           fill tile_offsets at once, in place of count_tiles

@@ -34,17 +34,13 @@ class Buffer {
   /// Makes room for n elements and drops the old content if it has to grow. Throws gsnav::Error
   /// (out_of_memory, naming the bytes) when the backend has no room.
   void resize_discard(std::size_t n) {
-    if (n > capacity_) {
-      release();
-      const std::size_t grown = n + n / 8;
-      if (grown > std::numeric_limits<std::size_t>::max() / sizeof(T) ||
-          (data_ = static_cast<T*>(backend_->allocate(grown * sizeof(T), kAlign))) == nullptr) {
-        detail::fail(Errc::out_of_memory,
-                     "cannot allocate " + std::to_string(n) + " x " + std::to_string(sizeof(T)) + " bytes");
-      }
-      capacity_ = grown;
-    }
+    if (n > capacity_) grow(n, n + n / 8);
     size_ = n;
+  }
+
+  /// Makes room for as many as the other has room for, and drops the content if it has to grow.
+  void grow_to(const Buffer& o) {
+    if (o.capacity_ > capacity_) grow(o.capacity_, o.capacity_);
   }
 
   T* data() noexcept { return data_; }
@@ -72,6 +68,15 @@ class Buffer {
 
  private:
   static constexpr std::size_t kAlign = 64;
+  void grow(std::size_t needed, std::size_t room) {
+    release();
+    if (room > std::numeric_limits<std::size_t>::max() / sizeof(T) ||
+        (data_ = static_cast<T*>(backend_->allocate(room * sizeof(T), kAlign))) == nullptr) {
+      detail::fail(Errc::out_of_memory,
+                   "cannot allocate " + std::to_string(needed) + " x " + std::to_string(sizeof(T)) + " bytes");
+    }
+    capacity_ = room;
+  }
   void release() noexcept {
     if (data_ != nullptr) backend_->deallocate(data_, capacity_ * sizeof(T));
     data_ = nullptr;

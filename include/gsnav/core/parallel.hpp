@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
+#include <utility>
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
@@ -24,94 +27,228 @@ struct BlockRange {
 
 namespace detail {
 
-inline constexpr int kRadixBits = 11;
-inline constexpr std::size_t kRadixSize = std::size_t{1} << kRadixBits;
+/// How n records are cut into blocks such that the block of a place costs one product.
+struct SortBlocks {
+  std::size_t size = 0, blocks = 1;
+  std::uint64_t inverse = 0;  ///< blocks / size in 32 bits of fraction
 
-struct RadixHistogram {
-  View<const std::uint32_t> keys;
-  View<std::uint32_t> histogram;  // [blocks][kRadixSize]
-  std::size_t blocks;
-  int shift;
-  GSNAV_HD void operator()(std::size_t b) const noexcept {
-    std::uint32_t* h = histogram.data + b * kRadixSize;
-    for (std::size_t d = 0; d < kRadixSize; ++d) h[d] = 0;
-    const BlockRange r = BlockRange::of(b, blocks, keys.size);
-    for (std::size_t i = r.begin; i < r.end; ++i) ++h[(keys[i] >> shift) & (kRadixSize - 1)];
+  static SortBlocks of(std::size_t n, std::size_t blocks) noexcept {
+    return {n, blocks, (std::uint64_t{blocks} << 32) / n};
+  }
+  GSNAV_HD std::size_t block_of(std::uint32_t place) const noexcept {
+    return static_cast<std::size_t>((place * inverse) >> 32);
+  }
+  GSNAV_HD std::size_t begin(std::size_t block) const noexcept {
+    return block == blocks ? size : static_cast<std::size_t>(((std::uint64_t{block} << 32) + inverse - 1) / inverse);
   }
 };
 
+/// One digit of all keys.
+struct RadixDigit {
+  int shift = 0, bits = 0;
+  GSNAV_HD std::size_t size() const noexcept { return std::size_t{1} << bits; }
+  GSNAV_HD std::size_t operator()(std::uint32_t key) const noexcept {
+    return (key >> shift) & ((std::uint32_t{1} << bits) - 1);
+  }
+};
+
+/// Keys and values that lie beside each other, as the sort's first source.
+struct PairSource {
+  View<const std::uint32_t> keys, values;
+  SortBlocks cut;
+  template <class F>
+  GSNAV_HD void for_each(std::size_t block, const F& f) const noexcept {
+    const std::size_t end = cut.begin(block + 1);
+    for (std::size_t i = cut.begin(block); i < end; ++i) f(keys[i], values[i]);
+  }
+};
+
+/// What a pass left, as the source of the next: key in the upper half.
+struct RecordSource {
+  View<const std::uint64_t> records;
+  SortBlocks cut;
+  template <class F>
+  GSNAV_HD void for_each(std::size_t block, const F& f) const noexcept {
+    const std::size_t end = cut.begin(block + 1);
+    for (std::size_t i = cut.begin(block); i < end; ++i) {
+      f(static_cast<std::uint32_t>(records[i] >> 32), static_cast<std::uint32_t>(records[i]));
+    }
+  }
+};
+
+/// Counts the first digit of a block's keys, in row [block][block] of `counts`, and ors its keys.
+template <class Source>
+struct RadixCount {
+  Source source;
+  SortBlocks cut;
+  RadixDigit digit;
+  View<std::uint32_t> counts;  ///< [blocks][blocks][digit]
+  View<std::uint32_t> used;    ///< [blocks]
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    const std::size_t row = cut.blocks * digit.size();
+    std::uint32_t* const own = counts.data + block * row;
+    for (std::size_t d = 0; d < row; ++d) own[d] = 0;
+    std::uint32_t* const h = own + block * digit.size();
+    std::uint32_t bits = 0;
+    source.for_each(block, [&bits, h, d = digit](std::uint32_t key, std::uint32_t) {
+      ++h[d(key)];
+      bits |= key;
+    });
+    used[block] = bits;
+  }
+};
+
+/// Turns what each block counted of each block into where that block's records of each digit go.
 struct RadixOffsets {
-  View<std::uint32_t> histogram;
-  std::size_t blocks;
+  SortBlocks cut;
+  RadixDigit digit;
+  View<const std::uint32_t> counts;  ///< [by][of][digit]
+  View<std::uint32_t> cursors;       ///< [of][digit]
   GSNAV_HD void operator()(std::size_t) const noexcept {
+    const std::size_t row = cut.blocks * digit.size();
+    for (std::size_t i = 0; i < row; ++i) cursors[i] = counts[i];
+    for (std::size_t by = 1; by < cut.blocks; ++by) {
+      for (std::size_t i = 0; i < row; ++i) cursors[i] += counts[by * row + i];
+    }
     std::uint32_t sum = 0;
-    for (std::size_t d = 0; d < kRadixSize; ++d) {
-      for (std::size_t b = 0; b < blocks; ++b) {
-        std::uint32_t& h = histogram[b * kRadixSize + d];
-        const std::uint32_t count = h;
-        h = sum;
-        sum += count;
+    for (std::size_t d = 0; d < digit.size(); ++d) {
+      for (std::size_t block = 0; block < cut.blocks; ++block) {
+        std::uint32_t& c = cursors[block * digit.size() + d];
+        const std::uint32_t n = c;
+        c = sum;
+        sum += n;
       }
     }
   }
 };
 
+/// Moves a block's records to their places by one digit, and counts the next digit by the block that a record
+/// comes to lie in: no pass reads its records twice.
+template <class Source>
 struct RadixScatter {
-  View<const std::uint32_t> keys, values;
-  View<std::uint32_t> keys_out, values_out, histogram;
-  std::size_t blocks;
-  int shift;
-  GSNAV_HD void operator()(std::size_t b) const noexcept {
-    std::uint32_t* h = histogram.data + b * kRadixSize;
-    const BlockRange r = BlockRange::of(b, blocks, keys.size);
-    for (std::size_t i = r.begin; i < r.end; ++i) {
-      const std::uint32_t at = h[(keys[i] >> shift) & (kRadixSize - 1)]++;
-      keys_out[at] = keys[i];
-      values_out[at] = values[i];
-    }
+  Source source;
+  SortBlocks cut;
+  RadixDigit digit, next;
+  View<std::uint32_t> cursors, counts;
+  View<std::uint64_t> out;
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    const std::size_t row = cut.blocks * next.size();
+    std::uint32_t* const h = counts.data + block * row;
+    for (std::size_t d = 0; d < row; ++d) h[d] = 0;
+    std::uint32_t* const at = cursors.data + block * digit.size();
+    std::uint64_t* const to = out.data;
+    source.for_each(block, [=, c = cut, d = digit, e = next](std::uint32_t key, std::uint32_t value) {
+      const std::uint32_t place = at[d(key)]++;
+      to[place] = std::uint64_t{key} << 32 | value;
+      ++h[c.block_of(place) * e.size() + e(key)];
+    });
+  }
+};
+
+/// The last pass.
+template <class Source>
+struct RadixFinish {
+  Source source;
+  RadixDigit digit;
+  View<std::uint32_t> cursors, keys, values;
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    std::uint32_t* const at = cursors.data + block * digit.size();
+    std::uint32_t *const to_keys = keys.data, *const to_values = values.data;
+    source.for_each(block, [=, d = digit](std::uint32_t key, std::uint32_t value) {
+      const std::uint32_t place = at[d(key)]++;
+      to_keys[place] = key;
+      to_values[place] = value;
+    });
   }
 };
 
 }  // namespace detail
 
-/// Scratch of `sort_pairs`.
+/// Scratch of sorts.
 template <Backend B>
 struct SortScratch {
-  explicit SortScratch(B& b) : keys(b), values(b), histogram(b) {}
-  Buffer<std::uint32_t, B> keys, values, histogram;
-  std::size_t bytes() const noexcept {
-    return keys.capacity_bytes() + values.capacity_bytes() + histogram.capacity_bytes();
+  explicit SortScratch(B& b) : keys(b), values(b), first(b), second(b), counts(b), cursors(b), used(b) {}
+  Buffer<std::uint32_t, B> keys, values;     ///< where sort_pairs puts the result before it swaps
+  Buffer<std::uint64_t, B> first, second;    ///< records between passes
+  Buffer<std::uint32_t, B> counts, cursors, used;
+
+  /// f(a.member, b.member) for each buffer.
+  template <class A, class C, class F>
+  static void for_each(A& a, C& b, const F& f) {
+    f(a.keys, b.keys), f(a.values, b.values), f(a.first, b.first), f(a.second, b.second);
+    f(a.counts, b.counts), f(a.cursors, b.cursors), f(a.used, b.used);
   }
 };
 
+/// Pieces that a sort of n pairs is cut into: tables grow by their square.
+template <Backend B>
+std::size_t sort_blocks(const B& backend, std::size_t n) noexcept {
+  constexpr std::size_t kMost = 8, kLeast = 8192;
+  const std::size_t blocks = concurrency_of(backend) < kMost ? concurrency_of(backend) : kMost;
+  return n / kLeast + 1 < blocks ? n / kLeast + 1 : blocks;
+}
+
+/// Sorts what `source` gives, cut into the blocks of `cut`, by the lowest `bits` of the key (the others zero),
+/// stably, to `keys` and `values`; 1 to 2^32 - 1 pairs. LSD radix in as many passes as the keys in use need.
+template <class Source, Backend B>
+void sort_from(B& backend, const Source& source, const detail::SortBlocks& cut, int bits, SortScratch<B>& s,
+               View<std::uint32_t> keys, View<std::uint32_t> values) {
+  // Two passes where they do; a digit of 9 bits else, whose 512 write positions stay in the nearest cache.
+  const int digit_bits = bits <= 22 ? (bits + 1) / 2 : 9;
+  const auto digit = [digit_bits](int pass) { return detail::RadixDigit{pass * digit_bits, digit_bits}; };
+  const std::size_t row = cut.blocks * digit(0).size();
+  s.first.resize_discard(cut.size);
+  s.second.resize_discard(cut.size);
+  s.counts.resize_discard(cut.blocks * row);
+  s.cursors.resize_discard(row);
+  s.used.resize_discard(cut.blocks);
+
+  backend.parallel_for(cut.blocks,
+                       detail::RadixCount<Source>{source, cut, digit(0), s.counts.view(), s.used.view()});
+  std::array<std::uint32_t, 64> used{};
+  s.used.download(used.data(), cut.blocks);
+  backend.synchronize().throw_if_error();
+  std::uint32_t all = 0;
+  for (std::size_t block = 0; block < cut.blocks; ++block) all |= used[block];
+  int passes = 1;
+  while (passes * digit_bits < 32 && (all >> (passes * digit_bits)) != 0) ++passes;
+
+  const auto run_pass = [&](const auto& from, int pass) {
+    using From = std::remove_cvref_t<decltype(from)>;
+    backend.parallel_for(1, detail::RadixOffsets{cut, digit(pass), s.counts.view(), s.cursors.view()});
+    if (pass + 1 < passes) {
+      backend.parallel_for(cut.blocks, detail::RadixScatter<From>{from, cut, digit(pass), digit(pass + 1),
+                                                                  s.cursors.view(), s.counts.view(),
+                                                                  s.second.view()});
+      std::swap(s.first, s.second);
+    } else {
+      backend.parallel_for(cut.blocks,
+                           detail::RadixFinish<From>{from, digit(pass), s.cursors.view(), keys, values});
+    }
+  };
+  run_pass(source, 0);
+  for (int pass = 1; pass < passes; ++pass) run_pass(detail::RecordSource{s.first.view(), cut}, pass);
+}
+
 /// Sorts (key, value) pairs by the lowest `bits` of the key (the others zero), stably; fewer than 2^32 of
-/// them. LSD radix, 11 bits a pass.
+/// them.
 template <Backend B>
 void sort_pairs(B& backend, Buffer<std::uint32_t, B>& keys, Buffer<std::uint32_t, B>& values,
                 SortScratch<B>& scratch, int bits = 32) {
   const std::size_t n = keys.size();
   if (n < 2) return;
-  if constexpr (requires(std::uint32_t* p) { backend.sort_pairs(p, p, p, p, n, bits); }) {
-    scratch.keys.resize_discard(n);
-    scratch.values.resize_discard(n);
-    if (backend.sort_pairs(keys.data(), values.data(), scratch.keys.data(), scratch.values.data(), n,
-                           bits)) {
-      std::swap(keys, scratch.keys);
-      std::swap(values, scratch.values);
-    }
-    return;
-  }
-  const std::size_t blocks = n < 8192 ? 1 : concurrency_of(backend);
   scratch.keys.resize_discard(n);
   scratch.values.resize_discard(n);
-  scratch.histogram.resize_discard(blocks * detail::kRadixSize);
-  for (int shift = 0; shift < bits; shift += detail::kRadixBits) {
-    backend.parallel_for(
-        blocks, detail::RadixHistogram{keys.view(), scratch.histogram.view(), blocks, shift});
-    backend.parallel_for(1, detail::RadixOffsets{scratch.histogram.view(), blocks});
-    backend.parallel_for(
-        blocks, detail::RadixScatter{keys.view(), values.view(), scratch.keys.view(),
-                                     scratch.values.view(), scratch.histogram.view(), blocks, shift});
+  bool in_scratch = true;
+  if constexpr (requires(std::uint32_t* p) { backend.sort_pairs(p, p, p, p, n, bits); }) {
+    in_scratch = backend.sort_pairs(keys.data(), values.data(), scratch.keys.data(), scratch.values.data(), n,
+                                    bits);
+  } else {
+    const auto cut = detail::SortBlocks::of(n, sort_blocks(backend, n));
+    sort_from(backend, detail::PairSource{keys.view(), values.view(), cut}, cut, bits, scratch,
+              scratch.keys.view(), scratch.values.view());
+  }
+  if (in_scratch) {
     std::swap(keys, scratch.keys);
     std::swap(values, scratch.values);
   }

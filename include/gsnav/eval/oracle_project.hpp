@@ -28,16 +28,21 @@ struct OracleSet {
   ProjectionCamera<double> camera;
   std::vector<Vec3d> offsets;            ///< origin - camera, asset frame
   std::vector<Vec3<float>> offsets_f;    ///< the same rounded: what keys are made of
-  std::size_t first_id = 0;              ///< stable id of row 0
+  std::size_t first_row = 0;             ///< among the rows of all sets
 
   OracleSet(const GaussianSet& s, const Camera& c, const RenderConfig& rules, std::size_t first)
-      : set(s), camera(make_projection_camera<double>(c, s, projection_rules(rules))), first_id(first) {
+      : set(s), camera(make_projection_camera<double>(c, s, projection_rules(rules))), first_row(first) {
     const Vec3d eye = inverse(s.world_from_asset) * c.position();
     const View<const Vec3d> table = s.gaussians.origins;
     for (std::size_t o = 0; o < (table.empty() ? 1 : table.size); ++o) {
       offsets.push_back((table.empty() ? Vec3d{} : table[o]) - eye);
       offsets_f.push_back(vec_cast<float>(offsets.back()));
     }
+  }
+  /// Stable id: sets one after the other, each in the order it was read in, however its rows lie in memory.
+  std::uint32_t id(std::size_t row) const noexcept {
+    const View<const std::uint32_t> rows = set.gaussians.row_ids;
+    return static_cast<std::uint32_t>(first_row + (rows.empty() ? row : rows[row]));
   }
   std::size_t origin(std::size_t row) const noexcept {
     return set.gaussians.origin_ids.empty() ? 0 : set.gaussians.origin_ids[row];
@@ -64,9 +69,14 @@ struct OracleSet {
 /// Pixels whose centre lies within the half sizes of the centre, in the image.
 inline PixelRect pixels_within(const ProjectionCamera<double>& camera, double center_x, double half_x,
                                double center_y, double half_y) noexcept {
+  double x0, x1, y0, y1;
+  gsnav::detail::pixel_range(center_x, half_x, camera.width, x0, x1);
+  gsnav::detail::pixel_range(center_y, half_y, camera.height, y0, y1);
   PixelRect r;
-  gsnav::detail::pixel_range(center_x, half_x, camera.width, r.x0, r.x1);
-  gsnav::detail::pixel_range(center_y, half_y, camera.height, r.y0, r.y1);
+  r.x0 = static_cast<std::int32_t>(x0);
+  r.x1 = static_cast<std::int32_t>(x1);
+  r.y0 = static_cast<std::int32_t>(y0);
+  r.y1 = static_cast<std::int32_t>(y1);
   return r;
 }
 
@@ -137,12 +147,14 @@ struct OracleScene {
 
 struct OracleCandidate {
   double key64;
-  std::uint32_t code, id;
+  std::uint32_t code;
+  std::uint32_t id;   ///< stable: what decides ties
+  std::uint32_t row;  ///< among the rows of all sets as they lie in memory
 };
 
 inline constexpr std::size_t kOracleChunk = 2048;
 
-/// Candidates of all sets by stable id: what is drawn and, where boxes are used, reaches the crop.
+/// Candidates of all sets: what is drawn and, where boxes are used, reaches the crop.
 template <class Model, Backend B>
 std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const OracleSet> sets,
                                                OracleScene<Model>& scene) {
@@ -164,8 +176,8 @@ std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const Oracl
         const float key = by_z ? s.z_key(row)
                                : distance_key(s.camera.key_scale, s.mean(row), s.offsets_f[s.origin(row)]);
         const double key64 = by_z ? dot(s.camera.rotation.row[2], delta) : norm(delta);
-        found[c].push_back({key64 * s.camera.scale, s.camera.key_code(key),
-                            static_cast<std::uint32_t>(s.first_id + row)});
+        found[c].push_back({key64 * s.camera.scale, s.camera.key_code(key), s.id(row),
+                            static_cast<std::uint32_t>(s.first_row + row)});
       }
     });
     for (std::size_t c = 0; c < chunks; ++c) {
@@ -229,10 +241,10 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
   scene.records.resize(order.size());
   backend.parallel_for((order.size() + kOracleChunk - 1) / kOracleChunk, [&](std::size_t chunk) {
     for (std::size_t i = chunk * kOracleChunk; i < std::min(order.size(), (chunk + 1) * kOracleChunk); ++i) {
-      const auto after = std::upper_bound(sets.begin(), sets.end(), order[i].id,
-                                          [](std::uint32_t id, const OracleSet& s) { return id < s.first_id; });
+      const auto after = std::upper_bound(sets.begin(), sets.end(), order[i].row,
+                                          [](std::uint32_t row, const OracleSet& s) { return row < s.first_row; });
       const OracleSet& s = *std::prev(after);
-      const std::size_t row = order[i].id - s.first_id;
+      const std::size_t row = order[i].row - s.first_row;
       OracleRecord<Model>& record = scene.records[i];
       Model::make(s, row, scene.log2_cut, record.model, record.box);
       record.box = record.box.intersection(scene.rect);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gsnav/avatar/asset.hpp"
+#include "gsnav/avatar/weight_truncation.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/scene/load_report.hpp"
 
@@ -26,21 +27,7 @@ struct LoadAvatarOptions {
   /// for 24 joints and SMPL-X for 55.
   std::vector<std::string> joint_names;
   std::vector<std::int32_t> joint_parents;
-  /// Poses in which the error of dropping weights is measured: [pose][J] joint to root frame, metres.
-  std::vector<std::vector<Affine3<double>>> poses;
-  double weight_tolerance = 2e-4;  ///< metres; a Gaussian that is further off needs more influences
-  int influences = kInfluences4;   ///< weights to keep of each Gaussian, 4 or 8
-};
-
-/// What keeping the greatest weights of each Gaussian has done to it, against all of the file's weights
-/// divided by their sum in double.
-struct WeightReport {
-  std::size_t most_weights = 0;    ///< that any kept Gaussian has above zero
-  double dropped_mass = 0.0;       ///< greatest share of a Gaussian's weight that was dropped
-  std::size_t poses = 0;           ///< in which the following are measured; 0: unknown
-  double position_error = 0.0;     ///< metres, greatest, with the weights kept and rounded
-  double position_error_8 = 0.0;   ///< metres, greatest, had eight been kept
-  std::size_t needs_more = 0;      ///< Gaussians off by more than the tolerance with the weights kept
+  WeightOptions weights;           ///< how many are kept; its poses are where the error of dropping some is measured
 };
 
 /// A body as its file gives it.
@@ -60,7 +47,14 @@ struct LoadedAvatar {
 /// skinning matrices there, whose frames all have their origin at the rest pose's: they fit a driver's
 /// `joint_mats`, but not a motion that knows only rotations.
 ///
-/// `options.influences` weights a Gaussian are kept; what that costs is in `weights`. Capsules are not part of the file.
+/// Four or eight weights a Gaussian are kept as `options.weights` say; what that costs is in `weights`.
+///
+/// A file of GART's parameters is read as well (docs/avatars.md): _xyz, _rotation (w, x, y, z), _scaling (scale =
+/// min_scale + sigmoid (max_scale - min_scale), 0 to 0.1 where the file does not say), _opacity (logit), _features_dc
+/// [N,3], _features_rest [N,3(K-1)] (coefficient, then colour), beside lbs_weights and joints_inv_bind_matrix.
+///
+/// gsnav's own files may add `capsules` [C,7] (both ends in the bind frame of a joint and the radius, metres) and
+/// `capsule_joints` [C]; a driver's `proxy_capsules` become such by capsules_from_track (avatar/capsule_track.hpp).
 ///
 /// Errors name the file, the array, the row and the value: file_not_found; invalid_file (an array is
 /// missing or has another shape, a value is not finite, an opacity outside [0, 1], a negative scale or
@@ -70,7 +64,7 @@ struct LoadedAvatar {
 Result<LoadedAvatar> load_avatar(const std::filesystem::path& path, const LoadAvatarOptions& options = {});
 
 /// Writes the same arrays, float32 except for the inverse binds (float64), weights dense. Joints that are
-/// not SMPL's or SMPL-X's add `joint_names` and `joint_parents`. SH of degree 0 that Habitat-GS's rule
+/// not SMPL's or SMPL-X's add `joint_names` and `joint_parents`, capsules `capsules` and `capsule_joints`. SH of degree 0 that Habitat-GS's rule
 /// would take for RGB is written as RGB (float64, so that it comes back the same).
 /// Errors: what AvatarAsset::validate reports; file_not_found; unsupported (4 GiB or more).
 Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset);

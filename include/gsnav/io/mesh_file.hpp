@@ -15,4 +15,22 @@ namespace gsnav::io {
 /// out_of_memory. Never throws.
 Result<TriangleMesh> load_obj(const std::filesystem::path& path);
 
+/// Reads the vertices (x y z of element `vertex`, any scalar type) and faces (the list `vertex_indices`
+/// or `vertex_index` of element `face`; polygons become fans) of a PLY, text or binary of either byte
+/// order. Errors: file_not_found; invalid_file (malformed header, rows missing, an index outside the
+/// vertices, fewer than three corners, a coordinate that is no finite number); out_of_memory. Never
+/// throws.
+Result<TriangleMesh> load_ply_mesh(const std::filesystem::path& path);
+
+/// Reads the triangles of a glTF 2.0 file, GLB or JSON: every primitive of the scene with mode
+/// TRIANGLES, STRIP or FAN, its node's transform applied (mirrored ones turned round, so that outsides
+/// stay outside); other primitives, skins and morph targets are left out. Axes and units are the file's.
+/// Memory is bounded by 30 bytes for each byte of the file and its buffers.
+/// Errors: file_not_found; invalid_file (indices, offsets and sizes that do not fit each other or the
+/// bytes there are, no triangle primitive); unsupported (sparse accessors); out_of_memory. Never throws.
+Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path);
+
+/// One of the three by its extension. Error beside theirs: unsupported (another extension).
+Result<TriangleMesh> load_mesh(const std::filesystem::path& path);
+
 }  // namespace gsnav::io

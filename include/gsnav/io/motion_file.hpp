@@ -36,6 +36,25 @@ struct BvhOptions {
 /// name); invalid_argument (the options); out_of_memory. Never throws.
 Result<LoadedMotion> load_bvh(const std::filesystem::path& path, const BvhOptions& options = {});
 
+struct AmcOptions {
+  double frame_rate = 120.0;  ///< frames a second, > 0; the files do not say (CMU records at 120 or 60)
+  double scale = 0.0;         ///< metres a unit; 0: the skeleton's `length` is units an inch, as in CMU's
+  bool z_up = false;          ///< the files' Z is up: turned by -90 degrees about X
+};
+
+/// Reads a motion capture in Acclaim's two files: the skeleton (`.asf`) and its motion (`.amc`). A bone becomes
+/// a joint of its name at the bone's near end; a bone without children adds "<name>_end" at its far end. The
+/// rest pose is the skeleton's, all frames turned as the world, so that a bone's turn is C M C^-1 with C from its
+/// `axis` and M from its `dof` (both: the first of the order is applied first). The root's way is the clip's
+/// root_translation. `limits`, `mass` and other sections are skipped.
+///
+/// Errors name the file, the line and the word: file_not_found; invalid_file (syntax, a bone twice, one that
+/// is in no or an unknown place of the hierarchy, a value for an unknown bone or another number of values than
+/// its `dof`, a frame that lacks a bone with `dof`, no frames); unsupported (a `dof` that is no rotation); invalid_argument (the options);
+/// out_of_memory. Never throws.
+Result<LoadedMotion> load_amc(const std::filesystem::path& skeleton, const std::filesystem::path& motion,
+                              const AmcOptions& options = {});
+
 /// A driver: how an avatar moves, and optionally the capsules that go with it.
 struct LoadedDriver {
   MotionClip clip;                             ///< of the skeleton that was given
@@ -52,6 +71,18 @@ struct LoadedDriver {
 /// Errors name the file, the array and the value: file_not_found; invalid_file; unsupported (another space
 /// or version); out_of_memory. Never throws.
 Result<LoadedDriver> load_driver(const std::filesystem::path& path, const Skeleton& skeleton);
+
+/// A driver about to be written.
+struct DriverFrames {
+  double frame_rate = 40.0;                            ///< frames a second, > 0 (Habitat-GS plays 40 whatever is said)
+  std::size_t joints = 0;                              ///< J
+  std::vector<Affine3<double>> matrices;               ///< [T][J] joint to the driver's frame, metres, rigid
+  std::vector<std::vector<Capsule<double>>> capsules;  ///< [T][C] in the same frame, or empty
+};
+
+/// Writes `driver.npz` with Habitat-GS's keys (float32), as load_driver reads it.
+/// Errors: invalid_argument naming the field; file_not_found; unsupported (4 GiB or more); out_of_memory.
+Status save_driver(const std::filesystem::path& path, const DriverFrames& frames);
 
 struct SmplMotionOptions {
   bool z_up = true;  ///< the motion's Z is up, as in AMASS: turned by -90 degrees about X

@@ -47,4 +47,12 @@ struct SavePlyOptions {
 Status save_ply(const std::filesystem::path& path, const GaussianCloud& cloud,
                 const SavePlyOptions& options = {});
 
+/// Writes a cloud as PlayCanvas' compressed PLY with 18 properties a chunk, rows in the cloud's order:
+/// chunks of 256 share their bounds, so sort_spatially first. Read back, a value is within half of its
+/// step: positions and log-scales 1/2047 (y: 1/1023) of the chunk's range, colours and opacities 1/255
+/// of it (opacities: of 1), quaternion components 0.0014, SH coefficients 1/32 (where they are in [-4,
+/// 4]; the outermost cells are read at their ends). Log-scales are clamped to [-20, 20], -infinity too.
+/// Errors: as save_ply.
+Status save_compressed_ply(const std::filesystem::path& path, const GaussianCloud& cloud);
+
 }  // namespace gsnav::io

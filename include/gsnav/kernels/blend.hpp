@@ -38,18 +38,37 @@ struct BlendRules {
 /// Which depth images a compiled blend loop serves; less is cheaper.
 enum class DepthMode { none, median, any };
 
-/// Running state of one pixel (or a pack of them), front to back.
+/// The depths of one pixel (or a pack of them) that a DepthMode keeps.
 template <class L, DepthMode D>
-struct BlendState {
-  L transmittance{scalar_of<L>(1)};
-  L r{scalar_of<L>(0)}, g{scalar_of<L>(0)}, b{scalar_of<L>(0)};
+struct DepthState {};
+template <class L>
+struct DepthState<L, DepthMode::median> {
+  L median{scalar_of<L>(0)};
+};
+template <class L>
+struct DepthState<L, DepthMode::any> {
   L median{scalar_of<L>(0)};
   /// sum w (z - z_ref), z_ref the first depth blended: a far wall's depths lose no digits to their size.
   L accumulated{scalar_of<L>(0)}, z_ref{scalar_of<L>(0)};
   L first_hit{scalar_of<L>(0)};
-  mask_of<L> open{true};  ///< no Gaussian has closed the pixel yet
-  mask_of<L> near{true};  ///< transmittance > 1/2: the median depth is still to come
 };
+
+/// Transmittance and colour so far of one pixel (or a pack of them).
+template <class L>
+struct BlendColor {
+  L transmittance{scalar_of<L>(1)};
+  L r{scalar_of<L>(0)}, g{scalar_of<L>(0)}, b{scalar_of<L>(0)};
+
+  /// No Gaussian has closed the pixel yet.
+  template <class S>
+  GSNAV_HD mask_of<L> open(const BlendRules<S>& rules) const noexcept {
+    return transmittance >= L(rules.transmittance_min);
+  }
+};
+
+/// Running state of one pixel (or a pack of them), front to back.
+template <class L, DepthMode D>
+struct BlendState : BlendColor<L>, DepthState<L, D> {};
 
 /// The records of one splat that blending may read; null where no output needs them.
 template <class S>
@@ -60,73 +79,103 @@ struct SplatRecords {
   const SplatPerspective<S>* perspective;
 };
 
-/// Blends one splat onto pixels. (px, py): pixel centres. Pixels outside the footprint, and closed
-/// pixels, keep their state bit for bit. Returns the pixels that changed. A pixel that an exclusive stop
-/// closed keeps its transmittance, negated.
-///
-/// The footprint is alpha >= 2^log2_alpha_min, decided by the exponent: it does not depend on tiles.
-template <bool Color, DepthMode D, Exp2 M, bool Perspective, class L, class S>
+/// What log2 alpha of a splat is made of in one column of pixels: column - (b dy + w2)^2.
+template <class L>
+struct ColumnTerms {
+  L column, w2;
+};
+
+template <class L, class S>
+GSNAV_HD ColumnTerms<L> column_terms(const SplatGeometry<S>& g, L px) noexcept {
+  const L dx = px - L(g.ref_x);
+  const L w1 = fma(dx, L(g.a), L(g.w1));
+  return {fma(-w1, w1, L(g.log2_opacity)), fma(dx, L(g.k), L(g.w2))};
+}
+
+/// log2 alpha at the pixel centre `py` of a column: never above log2 of the opacity.
+template <class L>
+GSNAV_HD L column_exponent(const ColumnTerms<L>& terms, L ref_y, L b, L py) noexcept {
+  const L w2 = fma(py - ref_y, b, terms.w2);
+  return fma(-w2, w2, terms.column);
+}
+
+/// log2 alpha where the response is not linearised (Response): far below any that is drawn behind the camera.
+template <class L, class S>
+GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspective<S>& v, L px, L py) noexcept {
+  const L dx = px - L(g.ref_x), dy = py - L(g.ref_y);
+  const L w1 = fma(dx, L(g.a), L(g.w1));
+  const L w2 = fma(dy, L(g.b), fma(dx, L(g.k), L(g.w2)));
+  const L s = fma(w2, w2, w1 * w1);
+  const L f = fma(dx, L(v.fx), fma(dy, L(v.fy), L(v.f0)));
+  const L exponent = L(g.log2_opacity) - s / fma(f, f, L(v.c) * s);
+  return select(f > L(S(0)), exponent, L(S(-1e30)));
+}
+
+/// Alpha of log2 alpha: 0 outside the footprint, which is alpha >= 2^log2_alpha_min. The exponent decides it,
+/// so that it does not depend on tiles; and alpha is positive wherever it is drawn.
+template <Exp2 M, class L, class S>
+GSNAV_HD L footprint_alpha(const BlendRules<S>& rules, L exponent) noexcept {
+  const auto drawn = exponent >= L(rules.log2_alpha_min);
+  return select(drawn, min(exp2_in_range<M>(exponent), L(rules.max_alpha)), L(S(0)));
+}
+
+/// Blends one splat onto pixels where it has `alpha`. (px, py): pixel centres. Pixels outside the footprint, and
+/// closed pixels, keep their state bit for bit. `General` obeys rules.exclusive_stop: a pixel that it closed keeps
+/// its transmittance, negated.
+template <bool Color, DepthMode D, bool General, class L, class S>
+GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha, const SplatColor<S>* color,
+                          const SplatDepth<S>* depth, L px, L py) noexcept {
+  const L zero(S(0)), before = state.transmittance;
+  const auto open = state.open(rules);
+  L weight = select(open, alpha * before, zero);
+  L after = before - weight;
+  state.transmittance = after;
+  if constexpr (General) {
+    if (rules.exclusive_stop) {
+      const auto closes = open && (after < L(rules.transmittance_min));
+      weight = select(closes, zero, weight);
+      after = select(closes, before, after);
+      state.transmittance = select(closes, -before, after);
+    }
+  }
+  if constexpr (Color) {
+    state.r = fma(weight, L(color->r), state.r);
+    state.g = fma(weight, L(color->g), state.g);
+    state.b = fma(weight, L(color->b), state.b);
+  }
+  if constexpr (D == DepthMode::median) {
+    const auto crosses = (before > L(S(0.5))) && (after <= L(S(0.5)));
+    if (any(crosses)) state.median = select(crosses, ray_depth(*depth, px, py), state.median);
+  }
+  if constexpr (D == DepthMode::any) {
+    const L half(S(0.5));
+    const L z = ray_depth(*depth, px, py);
+    state.median = select((before > half) && (after <= half), z, state.median);
+    state.z_ref = select((before >= L(S(1))) && (weight > zero), z, state.z_ref);
+    state.accumulated = fma(weight, z - state.z_ref, state.accumulated);
+    const L below(S(1) - rules.first_hit_tau);
+    state.first_hit = select((before > below) && (after <= below), z, state.first_hit);
+  }
+}
+
+/// Blends one splat onto pixels at (px, py): blend_alpha of what its records give. Returns the open pixels of its
+/// footprint.
+template <bool Color, DepthMode D, Exp2 M, bool General, class L, class S>
 GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& rules,
                                 const SplatRecords<S>& splat, L px, L py) noexcept {
   const SplatGeometry<S>& g = *splat.geometry;
-  const L zero(S(0));
-  const L dx = px - L(g.ref_x), dy = py - L(g.ref_y);
-  const L w1 = fma(dx, L(g.a), L(g.w1));
-  const L w2 = fma(dx, L(g.k), fma(dy, L(g.b), L(g.w2)));
-  L s = fma(w2, w2, w1 * w1);
-  mask_of<L> drawn(true);
-  if constexpr (Perspective) {
-    const SplatPerspective<S>& v = *splat.perspective;
-    const L f = fma(dx, L(v.fx), fma(dy, L(v.fy), L(v.f0)));
-    s = s / fma(f, f, L(v.c) * s);
-    drawn = f > zero;
+  L exponent;
+  if (General && splat.perspective != nullptr) {
+    exponent = perspective_exponent(g, *splat.perspective, px, py);
+  } else {
+    exponent = column_exponent(column_terms(g, px), L(g.ref_y), L(g.b), py);
   }
-  const L exponent = L(g.log2_opacity) - s;
-  drawn = drawn && (exponent >= L(rules.log2_alpha_min));
-  const mask_of<L> hit = drawn && state.open;
+  const auto hit = state.open(rules) && (exponent >= L(rules.log2_alpha_min));
   // Lanes are rarely all missed; asking costs them more than it saves.
   if constexpr (LaneTraits<L>::width == 1) {
     if (!hit) return hit;
   }
-  // What does not depend on the pixel's history is computed before what does.
-  const L alpha = select(drawn, min(exp2_of_nonpositive<M>(exponent), L(rules.max_alpha)), zero);
-  const L before = state.transmittance;
-  mask_of<L> blended = state.open;
-  L after = fma(-alpha, before, before);
-  if (rules.exclusive_stop) {
-    const auto closes = hit && (after < L(rules.transmittance_min));
-    blended = blended && !closes;
-    state.transmittance = select(closes, -before, select(blended, after, before));
-    after = select(blended, after, before);
-    state.open = blended;
-  } else {
-    after = select(blended, after, before);
-    state.transmittance = after;
-    state.open = blended && (after >= L(rules.transmittance_min));
-  }
-  const L weight = select(blended, alpha * before, zero);
-  if constexpr (Color) {
-    const SplatColor<S>& c = *splat.color;
-    state.r = fma(weight, L(c.r), state.r);
-    state.g = fma(weight, L(c.g), state.g);
-    state.b = fma(weight, L(c.b), state.b);
-  }
-  if constexpr (D == DepthMode::median) {
-    const auto crosses = state.near && (after <= L(S(0.5)));
-    if (any(crosses)) {
-      state.near = state.near && !crosses;
-      state.median = select(crosses, ray_depth(*splat.depth, px, py), state.median);
-    }
-  }
-  if constexpr (D == DepthMode::any) {
-    const L half(S(0.5));
-    const L z = ray_depth(*splat.depth, px, py);
-    state.median = select((before > half) && (after <= half), z, state.median);
-    state.z_ref = select((before >= L(S(1))) && (weight > zero), z, state.z_ref);
-    state.accumulated = fma(weight, z - state.z_ref, state.accumulated);
-    const L open(S(1) - rules.first_hit_tau);
-    state.first_hit = select((before > open) && (after <= open), z, state.first_hit);
-  }
+  blend_alpha<Color, D, General>(state, rules, footprint_alpha<M>(rules, exponent), splat.color, splat.depth, px, py);
   return hit;
 }
 
@@ -139,7 +188,26 @@ struct FrameImages {
   S* expected_depth = nullptr;
   S* accumulated_depth = nullptr;
   S* first_hit_depth = nullptr;
+
+  GSNAV_HD DepthMode depth_mode() const noexcept {
+    if (expected_depth != nullptr || accumulated_depth != nullptr || first_hit_depth != nullptr) return DepthMode::any;
+    return median_depth != nullptr ? DepthMode::median : DepthMode::none;
+  }
 };
+
+/// Where tiles are kept between the slices of depth that a frame is blended in.
+template <class S>
+struct TileProgress {
+  View<std::uint64_t> open;  ///< [tiles]: bits of cells (OpenCells) in row order, 0 where the pixels are written.
+                             ///< Empty: one slice is all
+  View<S> states;            ///< [tiles][blend_state_values * pixels of a tile]
+  bool first = true, last = true;
+};
+
+/// Values of a pixel that a slice leaves to the next.
+GSNAV_HD constexpr std::size_t blend_state_values(DepthMode mode) noexcept {
+  return mode == DepthMode::none ? 4 : mode == DepthMode::median ? 5 : 8;
+}
 
 /// Arguments of blending the tiles of one camera.
 template <class S>
@@ -153,16 +221,11 @@ struct RasterArgs {
   View<const SplatPerspective<S>> perspectives;  ///< empty: Response::ewa
   BlendRules<S> rules;
   Vec3<S> background;
-  Exp2 exp2_method = Exp2::degree6;
+  Exp2 exp2_method = Exp2::degree5;
   FrameImages<S> images;
+  TileProgress<S> progress;
 
-  GSNAV_HD DepthMode depth_mode() const noexcept {
-    if (images.expected_depth != nullptr || images.accumulated_depth != nullptr ||
-        images.first_hit_depth != nullptr) {
-      return DepthMode::any;
-    }
-    return images.median_depth != nullptr ? DepthMode::median : DepthMode::none;
-  }
+  GSNAV_HD DepthMode depth_mode() const noexcept { return images.depth_mode(); }
   GSNAV_HD SplatRecords<S> records(std::size_t splat) const noexcept {
     return {geometry.data + splat, colors.empty() ? nullptr : colors.data + splat,
             depths.empty() ? nullptr : depths.data + splat,
@@ -170,31 +233,26 @@ struct RasterArgs {
   }
 };
 
-/// What a pixel (or a pack of them) ends as; the values of images that were not asked for mean nothing.
+/// What a pixel (or a pack of them) ends as.
+template <class S, class L>
+GSNAV_HD Vec3<L> pixel_color(const RasterArgs<S>& args, const BlendColor<L>& state) noexcept {
+  const L t = abs(state.transmittance);
+  return {fma(t, L(args.background.x), state.r), fma(t, L(args.background.y), state.g),
+          fma(t, L(args.background.z), state.b)};
+}
 template <class L>
-struct FinishedPixel {
-  L r{}, g{}, b{}, alpha{}, median{}, expected{}, accumulated{}, first_hit{};
-};
-
-template <class S, DepthMode D, class L>
-GSNAV_HD FinishedPixel<L> finish_pixel(const RasterArgs<S>& args, const BlendState<L, D>& state) noexcept {
-  FinishedPixel<L> out;
-  const L t = abs(state.transmittance), zero(S(0));
-  out.alpha = L(S(1)) - t;
-  if (args.images.rgb != nullptr) {
-    out.r = fma(t, L(args.background.x), state.r);
-    out.g = fma(t, L(args.background.y), state.g);
-    out.b = fma(t, L(args.background.z), state.b);
-  }
-  out.median = state.median;
-  if constexpr (D == DepthMode::any) {
-    const auto returned = out.alpha > L(args.rules.return_alpha);
-    out.expected =
-        select(returned, state.accumulated / select(returned, out.alpha, L(S(1))) + state.z_ref, zero);
-    out.accumulated = fma(out.alpha, state.z_ref, state.accumulated);
-    out.first_hit = state.first_hit;
-  }
-  return out;
+GSNAV_HD L pixel_alpha(const BlendColor<L>& state) noexcept {
+  return L(scalar_of<L>(1)) - abs(state.transmittance);
+}
+template <class S, class L>
+GSNAV_HD L pixel_expected_depth(const RasterArgs<S>& args, const BlendState<L, DepthMode::any>& state) noexcept {
+  const L alpha = pixel_alpha(state), one(S(1)), zero(S(0));
+  const auto returned = alpha > L(args.rules.return_alpha);
+  return select(returned, state.accumulated / select(returned, alpha, one) + state.z_ref, zero);
+}
+template <class L>
+GSNAV_HD L pixel_accumulated_depth(const BlendState<L, DepthMode::any>& state) noexcept {
+  return fma(pixel_alpha(state), state.z_ref, state.accumulated);
 }
 
 /// Writes a finished pixel.
@@ -202,21 +260,25 @@ template <class S, DepthMode D>
 GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
                           const BlendState<S, D>& state) noexcept {
   const FrameImages<S>& out = args.images;
-  const FinishedPixel<S> p = finish_pixel(args, state);
   if (out.rgb != nullptr) {
-    out.rgb[3 * pixel] = p.r;
-    out.rgb[3 * pixel + 1] = p.g;
-    out.rgb[3 * pixel + 2] = p.b;
+    const Vec3<S> color = pixel_color(args, state);
+    out.rgb[3 * pixel] = color.x;
+    out.rgb[3 * pixel + 1] = color.y;
+    out.rgb[3 * pixel + 2] = color.z;
   }
-  if (out.alpha != nullptr) out.alpha[pixel] = p.alpha;
-  if (out.median_depth != nullptr) out.median_depth[pixel] = p.median;
-  if (out.expected_depth != nullptr) out.expected_depth[pixel] = p.expected;
-  if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = p.accumulated;
-  if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = p.first_hit;
+  if (out.alpha != nullptr) out.alpha[pixel] = pixel_alpha(state);
+  if constexpr (D != DepthMode::none) {
+    if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
+  }
+  if constexpr (D == DepthMode::any) {
+    if (out.expected_depth != nullptr) out.expected_depth[pixel] = pixel_expected_depth(args, state);
+    if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = pixel_accumulated_depth(state);
+    if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
+  }
 }
 
 /// Blends one pixel: the generic fallback, one work item a pixel, on any backend and scalar.
-template <class S, bool Color, DepthMode D, Exp2 M, bool Perspective>
+template <class S, bool Color, DepthMode D, Exp2 M, bool General>
 struct RasterizePixel {
   RasterArgs<S> args;
 
@@ -229,25 +291,24 @@ struct RasterizePixel {
     const S px = S(x) + S(0.5), py = S(y) + S(0.5);
     BlendState<S, D> state;
     for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {
-      blend_splat<Color, D, M, Perspective>(state, args.rules, args.records(args.tile_splats[i]), px,
-                                            py);
-      if (!state.open) break;
+      blend_splat<Color, D, M, General>(state, args.rules, args.records(args.tile_splats[i]), px, py);
+      if (!state.open(args.rules)) break;
     }
     write_pixel(args, pixel, state);
   }
 };
 
-/// Calls f with compile-time <Color, DepthMode, Exp2, Perspective> for what `args` asks for. The cubic
-/// exp2 serves Response::ewa only.
+/// Calls f with compile-time <Color, DepthMode, Exp2, General> for what `args` asks for. General: a response
+/// other than Response::ewa, or an exclusive stop; the cubic exp2 does not serve these.
 template <class S, class F>
 void dispatch_raster(const RasterArgs<S>& args, const F& f) {
   const auto with_exp2 = [&]<bool C, DepthMode D>() {
-    if (!args.perspectives.empty()) {
-      f.template operator()<C, D, Exp2::degree6, true>();
+    if (!args.perspectives.empty() || args.rules.exclusive_stop) {
+      f.template operator()<C, D, Exp2::degree5, true>();
     } else if (std::is_same_v<S, float> && args.exp2_method == Exp2::degree3) {
       f.template operator()<C, D, Exp2::degree3, false>();
     } else {
-      f.template operator()<C, D, Exp2::degree6, false>();
+      f.template operator()<C, D, Exp2::degree5, false>();
     }
   };
   const auto with_depth = [&]<bool C>() {

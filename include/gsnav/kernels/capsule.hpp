@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <limits>
-
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/math/vec.hpp"
 
@@ -22,6 +20,12 @@ struct SegmentDistance {
 
 namespace detail {
 
+/// Smallest normal number. A literal: numeric_limits' constexpr functions are host code to nvcc.
+template <class S>
+GSNAV_HD constexpr S least_normal() noexcept {
+  return static_cast<S>(sizeof(S) > sizeof(float) ? 2.2250738585072014e-308 : 1.1754943508222875e-38);
+}
+
 template <class L, class M>
 GSNAV_HD Vec3<L> select_vec(const M& m, const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)};
@@ -33,13 +37,24 @@ struct SegmentCandidate {
   L s, t, distance2;
   Vec3<L> delta;
 
+  GSNAV_HD void offer(L s2, L t2, const Vec3<L>& d) noexcept {
+    const L d2 = dot(d, d);
+    take(d2 < distance2, s2, t2, d);
+    distance2 = min(d2, distance2);
+  }
   template <class M>
   GSNAV_HD void offer(const M& valid, L s2, L t2, const Vec3<L>& d) noexcept {
     const L d2 = dot(d, d);
     const auto better = valid && (d2 < distance2);
+    take(better, s2, t2, d);
+    distance2 = select(better, d2, distance2);
+  }
+
+ private:
+  template <class M>
+  GSNAV_HD void take(const M& better, L s2, L t2, const Vec3<L>& d) noexcept {
     s = select(better, s2, s);
     t = select(better, t2, t);
-    distance2 = select(better, d2, distance2);
     delta = select_vec(better, d, delta);
   }
 };
@@ -55,7 +70,7 @@ GSNAV_HD Vec3<L> any_perpendicular(const Vec3<L>& v) noexcept {
                                   select_vec(y_least, Vec3<L>{zero, one, zero}, {zero, zero, one}));
   const Vec3<L> c = cross(v, axis);
   const L n2 = dot(c, c);
-  const auto ok = n2 > L(std::numeric_limits<S>::min());
+  const auto ok = n2 > L(detail::least_normal<S>());
   return select_vec(ok, c * (one / sqrt(select(ok, n2, one))), {one, zero, zero});
 }
 
@@ -72,29 +87,29 @@ template <class L>
 GSNAV_HD SegmentDistance<L> segment_distance(const Vec3<L>& a0, const Vec3<L>& a1, const Vec3<L>& b0,
                                              const Vec3<L>& b1) noexcept {
   using S = scalar_of<L>;
-  const L zero(S(0)), one(S(1)), tiny(std::numeric_limits<S>::min());
+  const L zero(S(0)), one(S(1)), tiny(detail::least_normal<S>());
   const Vec3<L> u = a1 - a0, v = b1 - b0;
   const Vec3<L> w00 = b0 - a0, w01 = b1 - a0, w10 = b0 - a1;
-  const L uu = max(dot(u, u), tiny), vv = max(dot(v, v), tiny);
-  const auto always = zero < one;
+  const L by_uu = one / max(dot(u, u), tiny), minus_by_vv = -one / max(dot(v, v), tiny);
 
-  const L ta0 = clamp(-dot(w00, v) / vv, zero, one);  // a0 against b
+  const L ta0 = clamp(dot(w00, v) * minus_by_vv, zero, one);  // a0 against b
   detail::SegmentCandidate<L> best{zero, ta0, zero, fma(ta0, v, w00)};
   best.distance2 = dot(best.delta, best.delta);
-  const L ta1 = clamp(-dot(w10, v) / vv, zero, one);  // a1 against b
-  best.offer(always, one, ta1, fma(ta1, v, w10));
-  const L sb0 = clamp(dot(w00, u) / uu, zero, one);  // b0 against a
-  best.offer(always, sb0, zero, fma(-sb0, u, w00));
-  const L sb1 = clamp(dot(w01, u) / uu, zero, one);  // b1 against a
-  best.offer(always, sb1, one, fma(-sb1, u, w01));
+  const L ta1 = clamp(dot(w10, v) * minus_by_vv, zero, one);  // a1 against b
+  best.offer(one, ta1, fma(ta1, v, w10));
+  const L sb0 = clamp(dot(w00, u) * by_uu, zero, one);  // b0 against a
+  best.offer(sb0, zero, fma(-sb0, u, w00));
+  const L sb1 = clamp(dot(w01, u) * by_uu, zero, one);  // b1 against a
+  best.offer(sb1, one, fma(-sb1, u, w01));
 
   const Vec3<L> n = cross(u, v);
   const L den = dot(n, n);
-  const L s_num = dot(cross(w00, v), n), t_num = dot(cross(w00, u), n);
-  const auto inside = (den > tiny) && (s_num >= zero) && (s_num <= den) && (t_num >= zero) &&
-                      (t_num <= den);
+  // Where the lines are nearly parallel, an error along them costs second order only.
+  const L s_num = dot(rough_cross(w00, v), n), t_num = dot(rough_cross(w00, u), n);
+  const auto inside = (den > tiny) && (min(s_num, t_num) >= zero) && (max(s_num, t_num) <= den);
   const L safe_den = select(den > tiny, den, one);
-  const L s = clamp(s_num / safe_den, zero, one), t = clamp(t_num / safe_den, zero, one);
+  const L by_den = one / safe_den;
+  const L s = min(s_num * by_den, one), t = min(t_num * by_den, one);
   best.offer(inside, s, t, fma(t, v, fma(-s, u, w00)));
 
   SegmentDistance<L> out;
@@ -155,19 +170,26 @@ struct SweepResult {
   mask_of<L> agent_closing;  ///< at contact the agent itself moved towards the body
 };
 
-/// First time at which `agent`, moving linearly, would come within half a skin of `body`, moving
-/// linearly in endpoints and radius, over a common interval mapped to [0, 1].
-///
-/// Directional conservative advancement: along the normal n of the closest points each of the four
-/// endpoint pairs separates at a constant rate, so the first time at which any of them reaches the
-/// target is a time before which the plane still separates the two. An advance cannot overshoot, at
-/// any speed. `time` is at or before `contact_time`, and every earlier time is free.
-///
-/// A start closer than skin/4 (overlap included) is judged by what the agent itself adds: motion that
-/// does not deepen, or that only the body deepens, goes on; `pushed` reports the latter.
+namespace detail {
+
+/// When the first of four separations, each closing at its own speed, is down to `to`; `never` where none closes.
+template <class L>
+GSNAV_HD L time_to_gap(const L (&sep)[4], const L (&closing)[4], L to, L never) noexcept {
+  using S = scalar_of<L>;
+  const L zero(S(0)), one(S(1));
+  L dt = never;
+  for (int k = 0; k < 4; ++k) {
+    const auto nears = closing[k] > zero;
+    const L q = max(sep[k] - to, zero) / select(nears, closing[k], one);
+    dt = min(dt, select(nears, q, never));
+  }
+  return dt;
+}
+
+/// `sweep`, up to `steps` evaluations of it: lanes that are not in `unfinished` have their result.
 template <class L, class S = scalar_of<L>>
-GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
-                              const SweepRules<S>& rules) noexcept {
+GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
+                                    const SweepRules<S>& rules, int steps, mask_of<L>& unfinished) noexcept {
   const L zero(S(0)), one(S(1)), never(S(4));
   const L skin(rules.skin), target(rules.skin * S(0.5)), tolerance(rules.tolerance), slack(rules.slack);
   const Vec3<L> va[2] = {agent.end.p0 - agent.begin.p0, agent.end.p1 - agent.begin.p1};
@@ -181,7 +203,7 @@ GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule
   out.time = out.contact_time = one;
   L t = zero, floor = zero;
   auto strict = active;
-  for (int i = 0; i < rules.max_iterations; ++i) {
+  for (int i = 0; i < steps; ++i) {
     const Capsule<L> a = lerp(agent.begin, agent.end, t), b = lerp(body.begin, body.end, t);
     const SegmentDistance<L> d = segment_distance(a.p0, a.p1, b.p0, b.p1);
     const L radii = a.radius + b.radius;
@@ -207,16 +229,7 @@ GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule
       closing[k] = na[ia] - nb[ib] + growth;
       fastest = max(fastest, closing[k]);
     }
-    const auto advance = [&](L to) {
-      L dt = never;
-      for (int k = 0; k < 4; ++k) {
-        const auto nears = closing[k] > zero;
-        const L q = max(sep[k] - to, zero) / select(nears, closing[k], one);
-        dt = min(dt, select(nears, q, never));
-      }
-      return dt;
-    };
-    L dt = advance(floor);
+    L dt = detail::time_to_gap(sep, closing, floor, never);
     const auto done = t + dt >= one;
     const auto arrived = active && !done && (gap - floor <= tolerance);
     const auto agent_closes = max(na[0], na[1]) + agent_growth > slack;
@@ -231,20 +244,20 @@ GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule
         const Vec3<L> r = va[k >> 1] - vb[k & 1];
         speed2 = max(speed2, dot(r, r));
       }
-      const L tiny(std::numeric_limits<S>::min());
+      const L tiny(detail::least_normal<S>());
       const L back = min(target / max(fastest, tiny), (skin + skin) / sqrt(max(speed2, tiny)));
       out.hit = out.hit || last;
       out.time = select(last, max(t - select(strict, back, zero), zero), out.time);
       out.contact_time = select(last, t, out.contact_time);
       out.gap = select(last, gap, out.gap);
-      out.normal = detail::select_vec(last, -d.normal, out.normal);
-      out.point = detail::select_vec(last, fma(-b.radius, d.normal, d.on_b), out.point);
+      out.normal = select_vec(last, -d.normal, out.normal);
+      out.point = select_vec(last, fma(-b.radius, d.normal, d.on_b), out.point);
       out.agent_closing = out.agent_closing || (last && agent_closes);
     }
     out.pushed = out.pushed || pushed;
     if (any(pushed)) {
       floor = select(pushed, gap - max(skin, abs(gap) * L(S(0.25))), floor);
-      dt = select(pushed, advance(floor), dt);
+      dt = select(pushed, detail::time_to_gap(sep, closing, floor, never), dt);
     }
     const auto finished = active && (done || last || (t + dt >= one));
     out.gap = select(finished && !out.hit, gap, out.gap);
@@ -252,7 +265,27 @@ GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule
     if (!any(active)) break;
     t = select(active, t + dt, t);
   }
+  unfinished = active;
   return out;
+}
+
+}  // namespace detail
+
+/// First time at which `agent`, moving linearly, would come within half a skin of `body`, moving
+/// linearly in endpoints and radius, over a common interval mapped to [0, 1].
+///
+/// Directional conservative advancement: along the normal n of the closest points each of the four
+/// endpoint pairs separates at a constant rate, so the first time at which any of them reaches the
+/// target is a time before which the plane still separates the two. An advance cannot overshoot, at
+/// any speed. `time` is at or before `contact_time`, and every earlier time is free.
+///
+/// A start closer than skin/4 (overlap included) is judged by what the agent itself adds: motion that
+/// does not deepen, or that only the body deepens, goes on; `pushed` reports the latter.
+template <class L, class S = scalar_of<L>>
+GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
+                              const SweepRules<S>& rules) noexcept {
+  mask_of<L> unfinished;
+  return detail::sweep_steps(agent, body, rules, rules.max_iterations, unfinished);
 }
 
 }  // namespace gsnav

@@ -15,7 +15,9 @@ namespace gsnav {
 /// X(Y) = -s Y + sqrt((r^2 - (beta Y)^2) / alpha^2), alpha^2 = a^2 + k^2, s = k b / alpha^2, beta = a b / alpha:
 /// concave, with its maximum at Y* = -k r / (a b). So a strip's rightmost point is at Y* limited to the
 /// strip, and its leftmost at -Y*.
-template <class L>
+///
+/// `Rough` takes sqrt_above for roots: an ellipse up to 3e-3 larger, in less time.
+template <class L, bool Rough = false>
 class FootprintStrips {
   using S = scalar_of<L>;
 
@@ -27,23 +29,28 @@ class FootprintStrips {
     const L mean_x = -(g.w1 * inv_a);
     const L pulled = g.k * mean_x;
     const L mean_y = -((pulled + g.w2) * inv_b);
-    const L inv_aa = one / fma(g.a, g.a, g.k * g.k);
+    const L aa = fma(g.a, g.a, g.k * g.k);
+    const L inv_aa = one / aa;
     slope_ = (g.k * g.b) * inv_aa;
     const L beta = g.a * g.b;
     beta2_ = (beta * beta) * inv_aa;
-    inv_alpha_ = sqrt(inv_aa);
+    inv_alpha_ = root(inv_aa);
 
     // What one w of the pixel test, or the centre here, may be off by is a few roundings of this.
     const L far_x = max(abs(x0 - g.ref_x), abs(x1 - g.ref_x));
     const L far_y = max(abs(y0 - g.ref_y), abs(y1 - g.ref_y));
     const L k = abs(g.k);
     const L size = fma(g.a + k, far_x, fma(g.b, far_y, abs(g.w1) + abs(g.w2) + abs(pulled)));
-    const L edge = sqrt(max(g.log2_opacity - L(log2_alpha_min), zero));
+    const L edge = root(max(g.log2_opacity - L(log2_alpha_min), zero));
     const L r = fma(size, L(S(2e-6)), edge * L(S(1.000002)));
     r2_ = r * r;
     turn_y_ = ((k * r) * inv_a) * inv_b;
     negative_k_ = g.k < zero;
-    half_height_ = r / sqrt(beta2_);
+    if constexpr (Rough) {
+      half_height_ = (r * root(aa)) * (abs(inv_a) * inv_b);
+    } else {
+      half_height_ = r / sqrt(beta2_);
+    }
     center_x_ = g.ref_x + mean_x;
     center_y_ = g.ref_y + mean_y;
     pad_x_ = fma(fma(abs(slope_), far_y + abs(mean_y), abs(g.ref_x) + abs(mean_x)), L(S(1e-6)), L(S(1e-3)));
@@ -58,14 +65,19 @@ class FootprintStrips {
     const L y_right = select(negative_k_, at_k, against_k);
     const L y_left = select(negative_k_, against_k, at_k);
     const L zero(S(0));
-    const L reach_right = sqrt(max(fma(-beta2_ * y_right, y_right, r2_), zero));
-    const L reach_left = sqrt(max(fma(-beta2_ * y_left, y_left, r2_), zero));
+    const L reach_right = root(max(fma(-beta2_ * y_right, y_right, r2_), zero));
+    const L reach_left = root(max(fma(-beta2_ * y_left, y_left, r2_), zero));
     right = center_x_ + (fma(reach_right, inv_alpha_, pad_x_) - slope_ * y_right);
     left = center_x_ - (fma(reach_left, inv_alpha_, pad_x_) + slope_ * y_left);
     return low <= high;
   }
 
  private:
+  GSNAV_HD static L root(L a) noexcept {
+    if constexpr (Rough) return sqrt_above(a);
+    return sqrt(a);
+  }
+
   L center_x_{}, center_y_{}, pad_x_{}, pad_y_{};
   L slope_{}, beta2_{}, inv_alpha_{}, r2_{};
   L half_height_{};

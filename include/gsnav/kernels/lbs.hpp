@@ -28,10 +28,7 @@ namespace detail {
 /// for the polar factor of what has det > 0.1, not for needles (cross() has what they need).
 template <class L>
 GSNAV_HD Mat3<L> cofactors(const Mat3<L>& m) noexcept {
-  const auto minors = [](const Vec3<L>& a, const Vec3<L>& b) noexcept {
-    return Vec3<L>{fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};
-  };
-  return {{minors(m.row[1], m.row[2]), minors(m.row[2], m.row[0]), minors(m.row[0], m.row[1])}};
+  return {{rough_cross(m.row[1], m.row[2]), rough_cross(m.row[2], m.row[0]), rough_cross(m.row[0], m.row[1])}};
 }
 
 }  // namespace detail

@@ -39,6 +39,7 @@ struct ProjectArgs {
   View<std::uint32_t> counts;
   TileGrid grid;               ///< read where `spans` is not empty
   View<TileSpans> spans;       ///< tiles of each slot's splat, for backends that find them here; else empty
+  OpenCells open;              ///< backends that do may leave out what reaches none of these
 
   GSNAV_HD std::size_t chunk_count() const noexcept { return gaussians.chunk_count(); }
 };

@@ -29,6 +29,22 @@ struct TileGrid {
   }
 };
 
+/// The cells of 4x4 pixels of an image that still take splats, as a summed-area table: what asks for them asks for
+/// rectangles.
+struct OpenCells {
+  static constexpr int kSize = 4;
+  View<const std::uint32_t> sums;  ///< [rows + 1][columns + 1]: open ones above and left of. Empty: all are open
+  std::size_t stride = 0;          ///< columns + 1
+
+  GSNAV_HD bool empty() const noexcept { return sums.empty(); }
+  /// Whether a cell of columns [x0, x1) in rows [y0, y1) is open.
+  GSNAV_HD bool any(std::size_t x0, std::size_t y0, std::size_t x1, std::size_t y1) const noexcept {
+    const std::uint32_t* const top = sums.data + y0 * stride;
+    const std::uint32_t* const bottom = sums.data + y1 * stride;
+    return bottom[x1] - bottom[x0] != top[x1] - top[x0];
+  }
+};
+
 /// Calls f(tile) for each tile, in row order, that a splat may touch. `elliptic`: within its bounds the
 /// footprint is the ellipse of its geometry (not under perspective), so tiles may be left out.
 template <class S, class F>

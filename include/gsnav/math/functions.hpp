@@ -49,6 +49,12 @@ GSNAV_HD double abs(double a) noexcept { return __builtin_fabs(a); }
 GSNAV_HD long double abs(long double a) noexcept { return __builtin_fabsl(a); }
 #endif
 
+/// Not below the square root of a >= 0, and above it by 1e-3 relative (and 1e-15) at most: packs need not take
+/// the time of a correctly rounded one. The bits may differ between processors.
+template <class S>
+GSNAV_HD S sqrt_above(S a) noexcept {
+  return sqrt(a);
+}
 /// x without its fraction, |x| < 2^31.
 GSNAV_HD float truncated(float a) noexcept { return static_cast<float>(static_cast<std::int32_t>(a)); }
 GSNAV_HD double truncated(double a) noexcept { return static_cast<double>(static_cast<std::int32_t>(a)); }
@@ -102,19 +108,20 @@ GSNAV_HD bool is_finite(long double a) noexcept {
 #endif
 
 /// How exp2 is computed in float. Relative error against the true value, over [-126, 126]:
-/// degree 6: 1.2e-7 (rounding); degree 3: 1.0e-4 (the polynomial).
-enum class Exp2 { degree6, degree3 };
+/// degree 5: 1.7e-7 (half of it rounding); degree 3: 1.0e-4 (the polynomial). hardware: a GPU's own instruction,
+/// 1.8e-7 (PTX ISA, ex2.approx); on a CPU it is degree 5.
+enum class Exp2 { degree5, degree3, hardware };
 
 namespace detail {
 
-// Interpolants of 2^f at the Chebyshev nodes of [-1/2, 1/2].
+// 2^f over [-1/2, 1/2]: the least relative error of a degree 5 with 2^0 = 1 (9.1e-8 before rounding), and the
+// interpolant at Chebyshev nodes of degree 3.
 template <class L>
-GSNAV_HD L exp2_degree6(L f) noexcept {
-  L p = fma(f, L(1.546144469856913e-4f), L(1.3400428177615838e-3f));
-  p = fma(f, p, L(9.618056678524637e-3f));
-  p = fma(f, p, L(5.550327226670302e-2f));
-  p = fma(f, p, L(2.4022650922288757e-1f));
-  p = fma(f, p, L(6.931472067028326e-1f));
+GSNAV_HD L exp2_degree5(L f) noexcept {
+  L p = fma(f, L(1.326472539421809e-3f), L(9.671512835181242e-3f));
+  p = fma(f, p, L(5.550733750213024e-2f));
+  p = fma(f, p, L(2.4022242082335424e-1f));
+  p = fma(f, p, L(6.931469775953782e-1f));
   return fma(f, p, L(1.0f));
 }
 template <class L>
@@ -129,37 +136,53 @@ inline constexpr float kRoundMagic = 12582912.0f;
 
 }  // namespace detail
 
+/// p 2^n for a positive p and the t = n + detail::kRoundMagic of an integer n; no check for overflow.
+GSNAV_HD float scale_by_rounded(float p, float t) noexcept { return float_of_bits(bits_of(p) + (bits_of(t) << 23)); }
+
+namespace detail {
+template <Exp2 M, class L>
+GSNAV_HD L exp2_by_polynomial(L x) noexcept {
+  const L t = x + L(kRoundMagic);
+  const L f = x - (t - L(kRoundMagic));
+  if constexpr (M == Exp2::degree3) return scale_by_rounded(exp2_degree3(f), t);
+  return scale_by_rounded(exp2_degree5(f), t);
+}
+}  // namespace detail
+
+/// 2^x for x in [-126, 126], without the clamp of exp2; of any other x in float: anything.
+template <Exp2 M = Exp2::degree5>
+GSNAV_HD float exp2_in_range(float x) noexcept {
+#if defined(__CUDA_ARCH__)
+  if constexpr (M == Exp2::hardware) {
+    float y;
+    asm("ex2.approx.ftz.f32 %0, %1;" : "=f"(y) : "f"(x));
+    return y;
+  }
+#endif
+  return detail::exp2_by_polynomial<M>(x);
+}
 /// 2^x. In float: x is clamped to [-126, 126], the integer part goes into the exponent and a
 /// polynomial does the rest; every step is a correctly rounded operation, so all backends agree on
 /// the bits. In double and long double: the platform's.
-/// The same bits for x <= 126, without the clamp that such x do not need.
-template <Exp2 M = Exp2::degree6>
-GSNAV_HD float exp2_of_nonpositive(float x) noexcept {
-  x = max(x, -126.0f);
-  const float t = x + detail::kRoundMagic;
-  const float f = x - (t - detail::kRoundMagic);
-  const float p = M == Exp2::degree6 ? detail::exp2_degree6(f) : detail::exp2_degree3(f);
-  return float_of_bits(bits_of(p) + (bits_of(t) << 23));
-}
-template <Exp2 M = Exp2::degree6>
+template <Exp2 M = Exp2::degree5>
 GSNAV_HD float exp2(float x) noexcept {
-  return exp2_of_nonpositive<M>(min(x, 126.0f));
+  return exp2_in_range<M>(clamp(x, -126.0f, 126.0f));
 }
-template <Exp2 = Exp2::degree6>
+template <Exp2 = Exp2::degree5>
 GSNAV_HD double exp2(double x) noexcept {
   return ::exp2(x);
 }
-template <Exp2 = Exp2::degree6>
-GSNAV_HD double exp2_of_nonpositive(double x) noexcept {
+template <Exp2 = Exp2::degree5>
+GSNAV_HD double exp2_in_range(double x) noexcept {
   return ::exp2(x);
 }
 #if !defined(__CUDACC__)
-template <Exp2 = Exp2::degree6>
+template <Exp2 = Exp2::degree5>
 GSNAV_HD long double exp2(long double x) noexcept {
   return ::exp2l(x);
 }
-template <Exp2 = Exp2::degree6>
-GSNAV_HD long double exp2_of_nonpositive(long double x) noexcept {
+template <Exp2 = Exp2::degree5>
+GSNAV_HD long double exp2_in_range(long double x) noexcept {
   return ::exp2l(x);
 }
 #endif

@@ -38,16 +38,19 @@ template <>
 struct PackTypes<4> {
   typedef float f __attribute__((vector_size(16)));
   typedef std::int32_t i __attribute__((vector_size(16)));
+  typedef std::uint32_t u __attribute__((vector_size(16)));
 };
 template <>
 struct PackTypes<8> {
   typedef float f __attribute__((vector_size(32)));
   typedef std::int32_t i __attribute__((vector_size(32)));
+  typedef std::uint32_t u __attribute__((vector_size(32)));
 };
 template <>
 struct PackTypes<16> {
   typedef float f __attribute__((vector_size(64)));
   typedef std::int32_t i __attribute__((vector_size(64)));
+  typedef std::uint32_t u __attribute__((vector_size(64)));
 };
 
 }  // namespace detail
@@ -282,6 +285,32 @@ GSNAV_HD Pack<float, N> sqrt(Pack<float, N> a) noexcept {
   return r;
 }
 
+template <int N>
+GSNAV_HD Pack<float, N> sqrt_above(Pack<float, N> a) noexcept {
+  using V = typename Pack<float, N>::vector;
+  const Pack<float, N> positive = max(a, Pack<float, N>(1e-30f));
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {  // 2^-14
+    const Pack<float, N> r(reinterpret_cast<V>(
+        _mm512_maskz_rsqrt14_ps(static_cast<__mmask16>(-1), reinterpret_cast<__m512>(positive.v))));
+    return positive * (r * Pack<float, N>(1.0001f));
+  }
+#endif
+#if defined(__AVX__)
+  if constexpr (N == 8) {  // 1.5 * 2^-12
+    return positive * (Pack<float, N>(reinterpret_cast<V>(_mm256_rsqrt_ps(reinterpret_cast<__m256>(positive.v)))) *
+                       Pack<float, N>(1.0004f));
+  }
+#endif
+#if defined(__SSE2__)
+  if constexpr (N == 4) {
+    return positive * (Pack<float, N>(reinterpret_cast<V>(_mm_rsqrt_ps(reinterpret_cast<__m128>(positive.v)))) *
+                       Pack<float, N>(1.0004f));
+  }
+#endif
+  return sqrt(a);
+}
+
 namespace detail {
 
 /// fma by way of double: the product is exact there, the sum is rounded to odd, and rounding that to
@@ -357,20 +386,27 @@ GSNAV_HD Pack<float, N> fma(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c
   return r;
 }
 
-/// 2^x for x <= 126, lane by lane the bits of the scalar exp2.
-template <Exp2 M = Exp2::degree6, int N>
-GSNAV_HD Pack<float, N> exp2_of_nonpositive(Pack<float, N> x) noexcept {
-  using P = Pack<float, N>;
-  x = max(x, P(-126.0f));
-  const P t = x + P(detail::kRoundMagic);
-  const P f = x - (t - P(detail::kRoundMagic));
-  const P p = M == Exp2::degree6 ? detail::exp2_degree6(f) : detail::exp2_degree3(f);
-  return P(detail::floats<N>(detail::bits<N>(p.v) + (detail::bits<N>(t.v) << 23)));
+template <int N>
+GSNAV_HD Pack<float, N> scale_by_rounded(Pack<float, N> p, Pack<float, N> t) noexcept {
+  // Without a sign: lanes that nobody will read may hold anything, and their sums wrap.
+  typename detail::PackTypes<N>::u a, b;
+  std::memcpy(&a, &p.v, sizeof a);
+  std::memcpy(&b, &t.v, sizeof b);
+  a += b << 23;
+  Pack<float, N> r;
+  std::memcpy(&r.v, &a, sizeof a);
+  return r;
+}
+
+/// 2^x for x in [-126, 126], lane by lane the bits of the scalar exp2; of any other x: anything.
+template <Exp2 M = Exp2::degree5, int N>
+GSNAV_HD Pack<float, N> exp2_in_range(Pack<float, N> x) noexcept {
+  return detail::exp2_by_polynomial<M>(x);
 }
 /// 2^x, lane by lane the bits of the scalar exp2.
-template <Exp2 M = Exp2::degree6, int N>
+template <Exp2 M = Exp2::degree5, int N>
 GSNAV_HD Pack<float, N> exp2(Pack<float, N> x) noexcept {
-  return exp2_of_nonpositive<M>(min(x, Pack<float, N>(126.0f)));
+  return exp2_in_range<M>(clamp(x, Pack<float, N>(-126.0f), Pack<float, N>(126.0f)));
 }
 
 /// log2(x), lane by lane the bits of the scalar log2.
@@ -384,166 +420,6 @@ GSNAV_HD Pack<float, N> log2(Pack<float, N> x) noexcept {
   P exponent;
   exponent.v = __builtin_convertvector(e, typename P::vector);
   return detail::log2_from_ratio(t, exponent);
-}
-
-/// Writes first + l for each lane l of `bits`, in order, and returns how many. Up to N bytes from `out` on
-/// are overwritten.
-template <int N>
-GSNAV_HD int store_lane_indices(std::uint32_t bits, int first, std::uint8_t* out) noexcept {
-#if defined(__AVX512F__)
-  if constexpr (N == 16) {
-    const __m512i lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    const __m512i indices = _mm512_add_epi32(lanes, _mm512_set1_epi32(first));
-    const __m512i packed = _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), indices);
-    const __m128i bytes = _mm512_maskz_cvtepi32_epi8(static_cast<__mmask16>(-1), packed);
-    std::memcpy(out, &bytes, sizeof bytes);
-    return __builtin_popcount(bits);
-  } else
-#endif
-  {
-    int count = 0;
-    for (; bits != 0; bits &= bits - 1) out[count++] = static_cast<std::uint8_t>(first + __builtin_ctz(bits));
-    return count;
-  }
-}
-
-/// Writes the lanes of `bits` to consecutive places from `out` on, nothing else, and returns how many.
-template <int N>
-GSNAV_HD int store_lanes(std::uint32_t bits, const std::uint32_t (&lanes)[N], std::uint32_t* out) noexcept {
-#if defined(__AVX512F__)
-  if constexpr (N == 16) {
-    const int count = __builtin_popcount(bits);
-    const __m512i packed = _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), _mm512_loadu_si512(lanes));
-    _mm512_mask_storeu_epi32(out, static_cast<__mmask16>((1u << count) - 1u), packed);
-    return count;
-  } else
-#endif
-  {
-    int count = 0;
-    for (; bits != 0; bits &= bits - 1) out[count++] = lanes[__builtin_ctz(bits)];
-    return count;
-  }
-}
-
-namespace detail {
-#if defined(__AVX512F__)
-/// Transposes the 8 x 8 matrices in the lower and in the upper halves of 8 registers.
-GSNAV_HD void transpose_halves(PackTypes<16>::f* r) noexcept {
-  using V = PackTypes<16>::f;
-  V t[8];
-  for (int i = 0; i < 8; i += 2) {
-    t[i] = __builtin_shufflevector(r[i], r[i + 1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    t[i + 1] = __builtin_shufflevector(r[i], r[i + 1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-  }
-  for (int i = 0; i < 8; i += 4) {
-    for (int h = 0; h < 2; ++h) {
-      const V a = t[i + h], b = t[i + 2 + h];
-      r[i + 2 * h] = __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-      r[i + 2 * h + 1] = __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
-    }
-  }
-  for (int i = 0; i < 4; ++i) {
-    const V a = r[i], b = r[i + 4];
-    r[i] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 16, 17, 18, 19, 8, 9, 10, 11, 24, 25, 26, 27);
-    r[i + 4] = __builtin_shufflevector(a, b, 4, 5, 6, 7, 20, 21, 22, 23, 12, 13, 14, 15, 28, 29, 30, 31);
-  }
-}
-#endif
-}  // namespace detail
-
-/// Reads K floats from each of N rows (one a lane) as K packs, one a column.
-template <int K, int N>
-GSNAV_HD void load_columns(const float* const (&rows)[N], Pack<float, N>* columns) noexcept {
-#if defined(__AVX512F__)
-  if constexpr (N == 16 && K == 8) {
-    // Rows i and i + 8 share a register: then each half is an 8 x 8 transpose.
-    typename Pack<float, 16>::vector r[8];
-    for (int i = 0; i < 8; ++i) {
-      const Pack<float, 8> a = Pack<float, 8>::load(rows[i]), b = Pack<float, 8>::load(rows[i + 8]);
-      r[i] = __builtin_shufflevector(a.v, b.v, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    }
-    detail::transpose_halves(r);
-    for (int k = 0; k < 8; ++k) columns[k].v = r[k];
-    return;
-  }
-#endif
-#if defined(__AVX512VL__)
-  if constexpr (N == 16 && K == 3) {
-    // Rows i, i + 4, i + 8 and i + 12 share a register.
-    using V = typename Pack<float, 16>::vector;
-    V r[4];
-    const auto row = [&rows](int i) noexcept {
-      return reinterpret_cast<typename Pack<float, 4>::vector>(_mm_maskz_loadu_ps(0x7, rows[i]));
-    };
-    for (int i = 0; i < 4; ++i) {
-      const auto low = __builtin_shufflevector(row(i), row(i + 4), 0, 1, 2, 3, 4, 5, 6, 7);
-      const auto high = __builtin_shufflevector(row(i + 8), row(i + 12), 0, 1, 2, 3, 4, 5, 6, 7);
-      r[i] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    }
-    const V t0 = __builtin_shufflevector(r[0], r[1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V t1 = __builtin_shufflevector(r[0], r[1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const V t2 = __builtin_shufflevector(r[2], r[3], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V t3 = __builtin_shufflevector(r[2], r[3], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    columns[0].v = __builtin_shufflevector(t0, t2, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-    columns[1].v = __builtin_shufflevector(t0, t2, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
-    columns[2].v = __builtin_shufflevector(t1, t3, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-    return;
-  }
-#endif
-  for (int k = 0; k < K; ++k) {
-    float column[N];
-    for (int i = 0; i < N; ++i) column[i] = rows[i][k];
-    columns[k] = Pack<float, N>::load(column);
-  }
-}
-/// The same of a row-major matrix.
-template <int K, int N>
-GSNAV_HD void load_columns(const float* matrix, Pack<float, N>* columns) noexcept {
-  const float* rows[N];
-  for (int i = 0; i < N; ++i) rows[i] = matrix + K * i;
-  load_columns<K>(rows, columns);
-}
-
-/// Writes K packs, one a column, as a row-major matrix of N rows (one a lane) and K floats a row.
-template <int K, int N>
-GSNAV_HD void store_columns(const Pack<float, N>* columns, float* matrix) noexcept {
-#if defined(__AVX512F__)
-  if constexpr (N == 16 && K == 8) {
-    typename Pack<float, 16>::vector r[8];
-    for (int k = 0; k < 8; ++k) r[k] = columns[k].v;
-    detail::transpose_halves(r);
-    for (int i = 0; i < 8; ++i) {
-      Pack<float, 8>(__builtin_shufflevector(r[i], r[i], 0, 1, 2, 3, 4, 5, 6, 7)).store(matrix + 8 * i);
-      Pack<float, 8>(__builtin_shufflevector(r[i], r[i], 8, 9, 10, 11, 12, 13, 14, 15)).store(matrix + 8 * (i + 8));
-    }
-    return;
-  }
-#endif
-#if defined(__AVX512F__)
-  if constexpr (N == 16 && K == 4) {
-    using V = typename Pack<float, 16>::vector;
-    const V a = columns[0].v, b = columns[1].v, c = columns[2].v, d = columns[3].v;
-    const V ab0 = __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V ab1 = __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const V cd0 = __builtin_shufflevector(c, d, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V cd1 = __builtin_shufflevector(c, d, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    // Rows 0, 4, 8 and 12; 1, 5, ...; four floats each.
-    const V r[4] = {__builtin_shufflevector(ab0, cd0, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
-                    __builtin_shufflevector(ab0, cd0, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31),
-                    __builtin_shufflevector(ab1, cd1, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
-                    __builtin_shufflevector(ab1, cd1, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)};
-    for (int i = 0; i < 4; ++i) {
-      Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 0, 1, 2, 3)).store(matrix + 4 * i);
-      Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 4, 5, 6, 7)).store(matrix + 4 * (i + 4));
-      Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 8, 9, 10, 11)).store(matrix + 4 * (i + 8));
-      Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 12, 13, 14, 15)).store(matrix + 4 * (i + 12));
-    }
-    return;
-  }
-#endif
-  for (int k = 0; k < K; ++k) {
-    for (int i = 0; i < N; ++i) matrix[K * i + k] = columns[k][i];
-  }
 }
 
 }  // namespace gsnav

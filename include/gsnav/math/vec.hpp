@@ -79,6 +79,13 @@ GSNAV_HD Vec3<L> cross(const Vec3<L>& a, const Vec3<L>& b) noexcept {
           difference_of_products(a.x, b.y, a.y, b.x)};
 }
 
+/// a x b with an error of a rounding of |a| |b| a component: for vectors that are not nearly parallel, or where that
+/// does no harm.
+template <class L>
+GSNAV_HD Vec3<L> rough_cross(const Vec3<L>& a, const Vec3<L>& b) noexcept {
+  return {fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};
+}
+
 /// a + s * b in one fused step a component.
 template <class L>
 GSNAV_HD Vec3<L> fma(L s, const Vec3<L>& b, const Vec3<L>& a) noexcept {

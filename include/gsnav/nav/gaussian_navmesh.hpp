@@ -67,4 +67,14 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
                                            std::span<const GaussianSet> sets,
                                            const GaussianNavOptions& options = {});
 
+/// The same from Gaussians and triangles of one world together (triangles as NavMesh::build takes them): what stands in
+/// either is in the way, and the floor of either is walked on. Gaussians need no floor of their own then: furniture in
+/// a room that is a mesh. Where both have a floor, its height is that of the triangles.
+///
+/// Errors: as both, naming a vertex or index.
+Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings, std::span<const GaussianSet> sets,
+                                           std::span<const Vec3d> vertices,
+                                           std::span<const NavMesh::Triangle> triangles,
+                                           const GaussianNavOptions& options = {});
+
 }  // namespace gsnav

@@ -16,113 +16,18 @@
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/order_visible.hpp"
 #include "gsnav/ops/render_config.hpp"
+#include "gsnav/ops/render_workspace.hpp"
 
 namespace gsnav {
 
-/// What one camera's frame was made of.
-struct RenderStats {
-  std::uint64_t gaussians = 0;           ///< in all sets
-  std::uint64_t visible = 0;             ///< whose footprint bounds reach the image
-  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs
-};
-
-/// Scratch of `render_camera`; grows to the largest frame and is then reused.
-template <class S, Backend B>
-struct RenderWorkspace {
-  explicit RenderWorkspace(B& b)
-      : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
-        chunk_keys(b), ranks(b), counts(b), keys(b), order(b), sort(b), cursors(b), tile_offsets(b),
-        tile_splats(b), spans(b) {}
-
-  Buffer<Vec3<float>, B> offsets_f;
-  Buffer<Vec3d, B> offsets;
-  Buffer<SplatGeometry<S>, B> geometry;
-  Buffer<SplatColor<S>, B> colors;
-  Buffer<SplatDepth<S>, B> depths;
-  Buffer<SplatPerspective<S>, B> perspectives;
-  Buffer<SplatBounds, B> bounds;
-  Buffer<std::uint32_t, B> chunk_keys, ranks, counts, keys, order;
-  SortScratch<B> sort;
-  Buffer<std::uint64_t, B> cursors, tile_offsets;
-  Buffer<std::uint32_t, B> tile_splats;
-  Buffer<TileSpans, B> spans;
-  std::vector<std::uint32_t> host_counts;
-  std::vector<std::uint64_t> host_chunk_offsets;
-  std::vector<Vec3<float>> host_offsets_f;
-  std::vector<Vec3d> host_offsets;
-
-  std::size_t bytes() const noexcept {
-    return offsets_f.capacity_bytes() + offsets.capacity_bytes() + geometry.capacity_bytes() +
-           colors.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
-           bounds.capacity_bytes() +
-           chunk_keys.capacity_bytes() + ranks.capacity_bytes() + counts.capacity_bytes() + keys.capacity_bytes() +
-           order.capacity_bytes() + sort.bytes() + cursors.capacity_bytes() +
-           tile_offsets.capacity_bytes() + tile_splats.capacity_bytes() + spans.capacity_bytes();
-  }
-};
-
 namespace detail {
 
-/// Moves the survivors of the chunks into one list: (key, slot) pairs in stable id order.
-struct GatherVisible {
-  View<const std::uint32_t> chunk_keys, counts;
-  View<const std::uint64_t> chunk_offsets;
-  View<std::uint32_t> keys, order;
-  GSNAV_HD void operator()(std::size_t chunk) const noexcept {
-    const std::size_t from = chunk * kProjectChunk, to = chunk_offsets[chunk];
-    for (std::size_t i = 0; i < counts[chunk]; ++i) {
-      keys[to + i] = chunk_keys[from + i];
-      order[to + i] = static_cast<std::uint32_t>(from + i);
-    }
-  }
-};
-
-/// The same with one work item a slot, for backends of very many threads.
-struct GatherSlot {
-  GatherVisible gather;
-  GSNAV_HD void operator()(std::size_t slot) const noexcept {
-    const std::size_t chunk = slot / kProjectChunk, i = slot % kProjectChunk;
-    if (i >= gather.counts[chunk]) return;
-    const std::size_t to = gather.chunk_offsets[chunk] + i;
-    gather.keys[to] = gather.chunk_keys[slot];
-    gather.order[to] = static_cast<std::uint32_t>(slot);
-  }
-};
-
-/// Sorts the slots of equal keys by rank: work item i does the run that starts at i.
-struct RankTies {
-  View<const std::uint32_t> keys, ranks;
-  View<std::uint32_t> order;
-  GSNAV_HD void operator()(std::size_t i) const noexcept {
-    const std::size_t n = keys.size;
-    if (i + 1 >= n || keys[i + 1] != keys[i] || (i > 0 && keys[i - 1] == keys[i])) return;
-    std::size_t end = i + 2;
-    while (end < n && keys[end] == keys[i]) ++end;
-    heap_sort(order.data + i, end - i);
-  }
-
- private:
-  /// Ties are few, but a wall across the view may be one: n log n, in place, and no recursion.
-  GSNAV_HD void heap_sort(std::uint32_t* slots, std::size_t n) const noexcept {
-    for (std::size_t root = n / 2; root-- > 0;) sift_down(slots, root, n);
-    for (std::size_t end = n; end-- > 1;) {
-      const std::uint32_t last = slots[end];
-      slots[end] = slots[0];
-      slots[0] = last;
-      sift_down(slots, 0, end);
-    }
-  }
-  GSNAV_HD void sift_down(std::uint32_t* slots, std::size_t root, std::size_t n) const noexcept {
-    const std::uint32_t slot = slots[root];
-    for (std::size_t child; (child = 2 * root + 1) < n; root = child) {
-      if (child + 1 < n && ranks[slots[child + 1]] > ranks[slots[child]]) ++child;
-      if (ranks[slots[child]] <= ranks[slot]) break;
-      slots[root] = slots[child];
-    }
-    slots[root] = slot;
-  }
-};
+template <Backend B>
+TileGrid grid_of(const RenderConfig& config, const Camera& camera) noexcept {
+  return TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
+}
 
 /// One work item per row of pixels: enough parallelism on a CPU at little overhead.
 template <class S, class PixelKernel>
@@ -210,47 +115,36 @@ inline Status validate(const GaussianSet& set) {
   return {};
 }
 
-/// Renders sets of Gaussians as one sorted list into the images of one camera: project, sort by
-/// (float32 key, set, row), bin into tiles, blend. Arrays of `sets` and pointers of `images` are in the
-/// backend's memory ([H][W] row-major). Fills `stats` when given. The result is there after
-/// `backend.synchronize()`.
-///
-/// Errors: invalid_argument naming the field; out_of_memory is thrown by the workspace.
+namespace detail {
+
+/// Sizes the scratch of one camera's frame and writes the projection's arguments.
 template <class S, Backend B>
-Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
-                     const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
-                     RenderStats* stats = nullptr) {
-  if (Status s = validate(config); !s) return s;
-  if (Status s = validate(camera); !s) return s;
-  std::size_t chunks = 0, total = 0, origins = 0;
+void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
+                        const RenderConfig& config, const FrameImages<S>& images) {
+  ws.projections.resize(sets.size());
+  std::size_t chunks = 0, origins = 0;
   bool ranked = false;
   for (const GaussianSet& set : sets) {
-    if (Status s = validate(set); !s) return s;
     chunks += set.gaussians.chunk_count();
     ranked = ranked || !set.gaussians.row_ids.empty();
-    total += set.gaussians.size;
     origins += set.gaussians.origins.empty() ? 1 : set.gaussians.origins.size;
   }
   const std::size_t slots = chunks * kProjectChunk;
-  if (slots > std::numeric_limits<std::uint32_t>::max()) {
-    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
-  }
   const bool color = images.rgb != nullptr;
   const bool depth = images.median_depth != nullptr || images.expected_depth != nullptr ||
                      images.accumulated_depth != nullptr || images.first_hit_depth != nullptr;
 
-  // ---- project
   ws.geometry.resize_discard(slots);
   ws.bounds.resize_discard(slots);
-  ws.chunk_keys.resize_discard(slots);
-  ws.ranks.resize_discard(ranked ? slots : 0);
+  ws.visible.chunk_keys.resize_discard(slots);
+  ws.visible.ranks.resize_discard(ranked ? slots : 0);
   ws.colors.resize_discard(color ? slots : 0);
   ws.depths.resize_discard(depth ? slots : 0);
   ws.perspectives.resize_discard(config.response != Response::ewa ? slots : 0);
-  ws.counts.resize_discard(chunks);
+  ws.visible.counts.resize_discard(chunks);
   constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
   ws.spans.resize_discard(kSpans ? slots : 0);
-  const TileGrid grid = TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
+  const TileGrid grid = grid_of<B>(config, camera);
 
   const ProjectionRules rules = projection_rules(config);
   ws.host_offsets.clear();
@@ -270,66 +164,61 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   std::size_t first_chunk = 0, first_origin = 0, first_rank = 0;
   for (std::size_t i = 0; i < sets.size(); ++i) {
     const std::size_t n = sets[i].gaussians.origins.empty() ? 1 : sets[i].gaussians.origins.size;
-    ProjectArgs<S> args;
-    args.gaussians = sets[i].gaussians;
-    args.camera = make_projection_camera<S>(camera, sets[i], rules);
-    args.camera64 = make_projection_camera<double>(camera, sets[i], rules);
-    args.offsets = {ws.offsets.data() + first_origin, n};
-    args.offsets_f = {ws.offsets_f.data() + first_origin, n};
-    args.sh_degree = std::min(sets[i].gaussians.sh_degree, config.max_sh_degree);
-    args.color = color;
-    args.depth = depth;
-    args.first_chunk = first_chunk;
-    args.first_rank = static_cast<std::uint32_t>(first_rank);
-    args.geometry = ws.geometry.view();
-    args.colors = ws.colors.view();
-    args.depths = ws.depths.view();
-    args.perspectives = ws.perspectives.view();
-    args.bounds = ws.bounds.view();
-    args.keys = ws.chunk_keys.view();
-    args.ranks = ws.ranks.view();
-    args.counts = ws.counts.view();
-    args.grid = grid;
-    args.spans = ws.spans.view();
-    if constexpr (requires { backend.project(args); }) {
-      backend.project(args);
-    } else {
-      backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
-    }
-    first_chunk += args.chunk_count();
-    first_rank += args.gaussians.size;
+    ProjectArgs<S>& a = ws.projections[i];
+    a = {};
+    a.gaussians = sets[i].gaussians;
+    a.camera = make_projection_camera<S>(camera, sets[i], rules);
+    a.camera64 = make_projection_camera<double>(camera, sets[i], rules);
+    a.offsets = {ws.offsets.data() + first_origin, n};
+    a.offsets_f = {ws.offsets_f.data() + first_origin, n};
+    a.sh_degree = std::min(sets[i].gaussians.sh_degree, config.max_sh_degree);
+    a.color = color;
+    a.depth = depth;
+    a.first_chunk = first_chunk;
+    a.first_rank = static_cast<std::uint32_t>(first_rank);
+    a.geometry = ws.geometry.view();
+    a.colors = ws.colors.view();
+    a.depths = ws.depths.view();
+    a.perspectives = ws.perspectives.view();
+    a.bounds = ws.bounds.view();
+    a.keys = ws.visible.chunk_keys.view();
+    a.ranks = ws.visible.ranks.view();
+    a.counts = ws.visible.counts.view();
+    a.grid = grid;
+    a.spans = ws.spans.view();
+    first_chunk += a.chunk_count();
+    first_rank += a.gaussians.size;
     first_origin += n;
   }
+}
 
-  // ---- compact and sort
-  ws.host_counts.resize(chunks);
-  ws.counts.download(ws.host_counts.data(), chunks);
-  if (Status s = backend.synchronize(); !s) return s;
-  ws.host_chunk_offsets.resize(chunks);
-  std::uint64_t visible = 0;
-  for (std::size_t c = 0; c < chunks; ++c) {
-    ws.host_chunk_offsets[c] = visible;
-    visible += ws.host_counts[c];
-  }
-  ws.keys.resize_discard(visible);
-  ws.order.resize_discard(visible);
-  ws.cursors.upload(ws.host_chunk_offsets.data(), chunks);
-  const detail::GatherVisible gather{ws.chunk_keys.view(), ws.counts.view(), ws.cursors.view(),
-                                     ws.keys.view(), ws.order.view()};
-  if constexpr (is_host_backend<B>) {
-    backend.parallel_for(chunks, gather);
+/// Projects one set.
+template <class S, Backend B>
+void project_set(B& backend, const ProjectArgs<S>& args) {
+  if constexpr (requires { backend.project(args); }) {
+    backend.project(args);
   } else {
-    backend.parallel_for(slots, detail::GatherSlot{gather});
+    backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
   }
-  sort_pairs(backend, ws.keys, ws.order, ws.sort, config.key_bits);
-  if (ranked) {
-    backend.parallel_for(visible, detail::RankTies{ws.keys.view(), ws.ranks.view(), ws.order.view()});
-  }
+}
+
+/// What comes after the projection of one camera: sort, bin, blend, of the keys in `range`. Adds to `stats`.
+template <class S, Backend B>
+Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera, const RenderConfig& config,
+                      const KeyRange& range, const TileProgress<S>& progress, const FrameImages<S>& images,
+                      RenderStats& stats) {
+  // ---- sort
+  // Distances may round to below the near plane that their z is beyond, but not to half of it.
+  const float near_plane = ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // of all sets
+  const std::uint32_t base = config.key_bits < 32 ? 0 : std::max(bits_of(0.5f * near_plane), range.low);
+  const Result<std::size_t> ordered = order_visible(backend, ws.visible, base, config.key_bits, range);
+  if (!ordered) return ordered.status();
+  const std::size_t visible = ordered.value();
 
   // ---- bin
   BinArgs<S> bin;
-  bin.grid = grid;
-  bin.order = ws.order.view();
+  bin.grid = grid_of<B>(config, camera);
+  bin.order = ws.visible.order.view();
   bin.geometry = ws.geometry.view();
   bin.bounds = ws.bounds.view();
   bin.log2_alpha_min = static_cast<S>(std::log2(config.alpha_min));
@@ -372,11 +261,95 @@ Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaus
   raster.perspectives = ws.perspectives.view();
   raster.rules = blend_rules<S>(config);
   raster.background = vec_cast<S>(config.background);
-  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree6;
+  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
   raster.images = images;
+  raster.progress = progress;
   detail::rasterize(backend, raster);
 
-  if (stats != nullptr) *stats = {total, visible, intersections};
+  stats.visible += visible;
+  stats.tile_intersections += intersections;
+  return {};
+}
+
+/// Slices that a frame is drawn in, of which so many Gaussians at most may be visible.
+inline int depth_slices_of(const RenderConfig& config, std::size_t candidates, const Camera& camera) noexcept {
+  if (config.response != Response::ewa || config.compat != Compat::none || config.key_bits < 32) return 1;
+  if (config.depth_slices != 0) return config.depth_slices;
+  // Where few Gaussians are for a pixel, projecting them is a small part of the frame.
+  constexpr std::size_t kFew = 131072;
+  const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  return candidates < kFew || candidates < pixels / 2 ? 1 : 4;
+}
+
+/// Projects and draws a frame, front to back, in slices of depth; false where one is as good.
+template <class B>
+Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Camera& camera,
+                            const RenderConfig& config, const FrameImages<float>& images, RenderStats& stats) {
+  if (depth_slices_of(config, stats.gaussians, camera) < 2) return false;  // nothing needs to be planned
+  DepthSlices& slices = ws.slices;
+  const View<ProjectArgs<float>> sets = view_of(ws.projections);
+  slices.plan(backend, sets);
+  const int count = depth_slices_of(config, slices.candidates(), camera);
+  if (count < 2) return false;
+  slices.cut(count);
+  const int last = slices.count() - 1;
+
+  const TileGrid grid = grid_of<B>(config, camera);
+  const std::size_t pixels = static_cast<std::size_t>(grid.tile_size) * static_cast<std::size_t>(grid.tile_size);
+  ws.open.resize_discard(grid.count());
+  ws.states.resize_discard(grid.count() * pixels * blend_state_values(images.depth_mode()));
+  std::fill(ws.visible.counts.data(), ws.visible.counts.data() + ws.visible.counts.size(), 0u);
+  for (int s = 0; s <= last; ++s) {
+    for (ProjectArgs<float>& args : sets) {
+      const View<const std::uint32_t> chunks = slices.chunks(s, args);
+      if (!chunks.empty()) backend.project(args, chunks);
+    }
+    const TileProgress<float> progress{ws.open.view(), ws.states.view(), s == 0, s == last};
+    if (Status e = draw_projected(backend, ws, camera, config, slices.keys(s), progress, images, stats); !e) return e;
+    if (s == last) break;
+    const OpenCells open = slices.open_cells(grid, ws.open.view());
+    if (open.sums[open.sums.size - 1] == 0) break;
+    for (ProjectArgs<float>& args : sets) args.open = open;
+  }
+  return true;
+}
+
+}  // namespace detail
+
+/// Renders sets of Gaussians as one sorted list into the images of one camera: project, sort by
+/// (float32 key, set, row), bin into tiles, blend. Arrays of `sets` and pointers of `images` are in the
+/// backend's memory ([H][W] row-major). Fills `stats` when given. The result is there after
+/// `backend.synchronize()`.
+///
+/// Errors: invalid_argument naming the field; out_of_memory is thrown by the workspace.
+template <class S, Backend B>
+Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
+                     const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
+                     RenderStats* stats = nullptr) {
+  if (Status s = validate(config); !s) return s;
+  if (Status s = validate(camera); !s) return s;
+  std::size_t slots = 0;
+  RenderStats counted;
+  for (const GaussianSet& set : sets) {
+    if (Status s = validate(set); !s) return s;
+    slots += set.gaussians.chunk_count() * kProjectChunk;
+    counted.gaussians += set.gaussians.size;
+  }
+  if (slots > std::numeric_limits<std::uint32_t>::max()) {
+    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
+  }
+  detail::prepare_projection(ws, sets, camera, config, images);
+  bool drawn = false;
+  if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
+    const Result<bool> sliced = detail::draw_in_slices(backend, ws, camera, config, images, counted);
+    if (!sliced) return sliced.status();
+    drawn = sliced.value();
+  }
+  if (!drawn) {
+    for (const ProjectArgs<S>& args : ws.projections) detail::project_set(backend, args);
+    if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, images, counted); !s) return s;
+  }
+  if (stats != nullptr) *stats = counted;
   return {};
 }
 

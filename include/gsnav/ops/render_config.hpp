@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -28,6 +29,8 @@ struct RenderConfig {
   Response response = Response::ewa;
   Compat compat = Compat::none;
   int tile_size = 0;                   ///< 8, 16 or 32, or 0: what is fast; the image does not depend on it
+  int depth_slices = 0;                ///< in [1, 8], or 0: what is fast; the image does not depend on it. Some
+                                       ///< backends draw so many one after the other and skip what earlier ones hide
   int max_sh_degree = kMaxShDegree;    ///< in [0, 3]: bands above it are left out
   int key_bits = 32;                   ///< in [8, 32]: how much of the sort key is compared
   double alpha_min = 1.0 / 255;        ///< in (0, 1): a Gaussian is not blended where alpha is below
@@ -65,6 +68,9 @@ inline Status validate(const RenderConfig& c) {
   if (c.compat != Compat::none && c.response != Response::ewa) {
     return bad("response", std::to_string(static_cast<int>(c.response)), "compat modes know ewa only");
   }
+  if (c.depth_slices < 0 || c.depth_slices > 8) {
+    return bad("depth_slices", std::to_string(c.depth_slices), "must be in [1, 8], or 0 for what is fast");
+  }
   if (c.max_sh_degree < 0 || c.max_sh_degree > kMaxShDegree) {
     return bad("max_sh_degree", std::to_string(c.max_sh_degree), "must be in [0, 3]");
   }
@@ -99,7 +105,8 @@ BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
   r.max_alpha = static_cast<S>(c.max_alpha);
   r.transmittance_min = static_cast<S>(c.transmittance_min);
   r.first_hit_tau = static_cast<S>(c.first_hit_tau);
-  r.log2_alpha_min = static_cast<S>(std::log2(c.alpha_min));
+  // What float's exp2 reaches.
+  r.log2_alpha_min = static_cast<S>(std::max(std::log2(c.alpha_min), -126.0));
   r.exclusive_stop = c.compat != Compat::none;
   // gsplat stops at T <= T_min where INRIA stops at T < T_min.
   if (c.compat == Compat::gsplat) r.transmittance_min = std::nextafter(r.transmittance_min, S(1));

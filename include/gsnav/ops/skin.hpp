@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <string>
 
 #include "gsnav/core/backend.hpp"
@@ -55,6 +56,26 @@ Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
     backend.skin(args);
   } else {
     backend.parallel_for(args.size(), SkinGaussian<S, Out>{args});
+  }
+  return {};
+}
+
+/// The same for many avatars; a member `skin_all(std::span<const SkinningArgs<S, Out>>)` of the backend is used
+/// where there is one (a GPU takes one launch). The bits are those of one avatar at a time. Errors: invalid_argument
+/// naming the avatar by its place and the array; nothing is skinned then.
+template <class S, Backend B, class Out = float>
+Status skin_all(B& backend, std::span<const SkinningArgs<S, Out>> avatars) {
+  for (std::size_t i = 0; i < avatars.size(); ++i) {
+    if (Status s = validate(avatars[i]); !s) {
+      return {s.code(), "avatars[" + std::to_string(i) + "]: " + s.message()};
+    }
+  }
+  if constexpr (requires { backend.skin_all(avatars); }) {
+    backend.skin_all(avatars);
+  } else {
+    for (const SkinningArgs<S, Out>& args : avatars) {
+      if (Status s = skin_gaussians<S>(backend, args); !s) return s;
+    }
   }
   return {};
 }

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string>
 
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
-#include "gsnav/kernels/capsule.hpp"
+#include "gsnav/kernels/capsule_batch.hpp"
 
-// One agent against many capsules. The outcome does not depend on the order of the capsules: equal
-// times and equal gaps are decided by (avatar, bone).
+// One agent against many capsules: the outcome does not depend on the order of the capsules, equal
+// times and equal gaps are decided by (avatar, bone). And many pairs at once, on a backend.
 
 namespace gsnav {
 
@@ -122,6 +126,88 @@ void nearest_body(const Capsule<double>& agent, View<const DynamicCapsule> bodie
               vec_cast<double>(g.normal)};
     }
   }
+}
+
+namespace detail {
+
+/// Notes the first view that has another size than it must.
+class SizeCheck {
+ public:
+  SizeCheck(const char* args, std::size_t want) : args_(args), want_(want) {}
+  template <class T>
+  void operator()(const View<T>& view, const char* name) {
+    if (!status_.ok() || view.size == want_) return;
+    status_ = {Errc::invalid_argument, std::string(args_) + "." + name + " has " + std::to_string(view.size) +
+                                           " values where " + std::to_string(want_) + " are needed"};
+  }
+  template <class T>
+  void operator()(const View<T> (&views)[3], const char* name) {
+    for (const View<T>& v : views) (*this)(v, name);
+  }
+  template <class S>
+  void operator()(const CapsulePlanes<S>& c, const char* name) {
+    (*this)(c.p0, name);
+    (*this)(c.p1, name);
+    (*this)(c.radius, name);
+  }
+  void need(std::size_t want) { want_ = want; }
+  const Status& status() const noexcept { return status_; }
+
+ private:
+  const char* args_;
+  std::size_t want_;
+  Status status_;
+};
+
+}  // namespace detail
+
+/// Gaps of N pairs of capsules on a backend, whose memory the arrays are in; a member
+/// `capsule_gaps(const CapsuleGapArgs<S>&)` of it is used where there is one. The bits are those of capsule_gap. The
+/// result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
+template <Backend B, class S>
+Status capsule_gaps(B& backend, const CapsuleGapArgs<S>& args) {
+  detail::SizeCheck check("CapsuleGapArgs", args.size());
+  check(args.a, "a");
+  check(args.b, "b");
+  check(args.gap, "gap");
+  check.need(args.asks_for_points() ? args.size() : 0);
+  check(args.normal, "normal");
+  check(args.on_a, "on_a");
+  check(args.on_b, "on_b");
+  if (!check.status()) return check.status();
+  if constexpr (requires { backend.capsule_gaps(args); }) {
+    backend.capsule_gaps(args);
+  } else {
+    backend.parallel_for(args.size(), GapOfPair<S>{args});
+  }
+  return {};
+}
+
+/// Sweeps of N pairs of moving capsules on a backend, whose memory the arrays are in; a member
+/// `sweep_capsules(const SweepArgs<S>&)` of it is used where there is one. The bits are those of sweep. The result is
+/// there after `backend.synchronize()`. Errors: invalid_argument naming the array.
+template <Backend B, class S>
+Status sweep_capsules(B& backend, const SweepArgs<S>& args) {
+  detail::SizeCheck check("SweepArgs", args.size());
+  check(args.agents.begin, "agents.begin");
+  check(args.agents.end, "agents.end");
+  check(args.bodies.begin, "bodies.begin");
+  check(args.bodies.end, "bodies.end");
+  check(args.outcome, "outcome");
+  check(args.time, "time");
+  check(args.start_gap, "start_gap");
+  check.need(args.asks_for_contact() ? args.size() : 0);
+  check(args.contact_time, "contact_time");
+  check(args.gap, "gap");
+  check(args.normal, "normal");
+  check(args.point, "point");
+  if (!check.status()) return check.status();
+  if constexpr (requires { backend.sweep_capsules(args); }) {
+    backend.sweep_capsules(args);
+  } else {
+    backend.parallel_for(args.size(), SweepPair<S>{args});
+  }
+  return {};
 }
 
 }  // namespace gsnav

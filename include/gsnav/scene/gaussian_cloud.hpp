@@ -91,10 +91,92 @@ struct GaussianCloud {
 /// Spacing of the lattice that positions are stored relative to, metres.
 inline constexpr double kOriginLattice = 64.0;
 
-/// Fills a GaussianCloud from raw Gaussians by the contract's rules, counting every repair and drop:
-/// quaternions are normalised (largest component first; zero or non-finite: dropped), log-scales are
-/// clamped to [-20, 20] (minus infinity is a legal flat axis), opacities go through the sigmoid, rows
-/// with NaN anywhere are dropped whole, and Gaussians that can never reach 1/255 are left out.
+/// A raw Gaussian after the activations.
+struct ActiveGaussian {
+  Vec3d mean{};
+  std::array<float, 4> quat{};    ///< w, x, y, z, unit
+  std::array<float, 3> scales{};  ///< linear
+  float opacity = 0;
+  bool clamped = false;  ///< a log-scale was outside of [-20, 20]
+};
+
+/// Activates a raw Gaussian with `rest` numbers in shN by the contract's rules: quaternions are
+/// normalised (largest component first; zero or non-finite: dropped), log-scales are clamped to
+/// [-20, 20] (minus infinity is a legal flat axis), opacities go through the sigmoid, rows with NaN
+/// anywhere are dropped whole, and Gaussians that can never reach 1/255 are left out.
+inline RowFate activate(const RawGaussian& raw, std::size_t rest, ActiveGaussian& out) noexcept {
+  bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);
+  for (int k = 0; k < 3; ++k) {
+    finite = finite && !std::isnan(raw.log_scales[k]) && is_finite(raw.sh0[static_cast<std::size_t>(k)]);
+  }
+  for (std::size_t k = 0; k < rest; ++k) finite = finite && is_finite(raw.shN[k]);
+  if (!finite) return RowFate::non_finite;
+  Quatd quat = raw.quat;
+  if (!normalize(quat)) return RowFate::zero_quat;
+  out.opacity = static_cast<float>(1.0 / (1.0 + std::exp(-raw.opacity_logit)));
+  if (out.opacity < 1.0f / 255.0f) return RowFate::transparent;
+  out.clamped = false;
+  for (int k = 0; k < 3; ++k) {
+    const double s = raw.log_scales[k];
+    const double limited = std::isinf(s) && s < 0 ? s : clamp(s, -20.0, 20.0);
+    out.clamped = out.clamped || limited != s;
+    out.scales[static_cast<std::size_t>(k)] = static_cast<float>(std::exp(limited));
+  }
+  out.mean = raw.mean;
+  out.quat = {static_cast<float>(quat.w), static_cast<float>(quat.x), static_cast<float>(quat.y),
+              static_cast<float>(quat.z)};
+  return RowFate::kept;
+}
+
+/// Numbers the lattice points that means lie nearest to, in the order in which they come; 0 is the
+/// origin itself.
+class OriginLattice {
+ public:
+  std::uint32_t id_of(const Vec3d& mean) {
+    Vec3d origin;
+    for (int k = 0; k < 3; ++k) origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);
+    if (origin == origins_[last_]) return last_;
+    return last_ = id_of_point(origin);
+  }
+  std::uint32_t id_of_point(const Vec3d& origin) {
+    const auto [it, added] = index_.emplace(std::make_tuple(origin.x, origin.y, origin.z),
+                                            static_cast<std::uint32_t>(origins_.size()));
+    if (added) origins_.push_back(origin);
+    return it->second;
+  }
+  /// [ids in use].
+  const std::vector<Vec3d>& origins() const noexcept { return origins_; }
+
+ private:
+  std::vector<Vec3d> origins_{Vec3d{}};
+  std::map<std::tuple<double, double, double>, std::uint32_t> index_{{{0.0, 0.0, 0.0}, 0u}};
+  std::uint32_t last_ = 0;
+};
+
+/// Puts means into a cloud, from the first row to the last.
+class MeanWriter {
+ public:
+  void push(GaussianCloud& cloud, const Vec3d& mean) {
+    const std::uint32_t id = lattice_.id_of(mean);
+    if (id != 0 && cloud.origins.empty()) {  // the first Gaussian away from zero
+      cloud.origin_ids.assign(cloud.means[0].size(), 0);
+      cloud.origins.push_back({});
+    }
+    if (!cloud.origins.empty()) {
+      if (id >= cloud.origins.size()) cloud.origins.push_back(lattice_.origins()[id]);
+      cloud.origin_ids.push_back(id);
+    }
+    const Vec3d offset = mean - lattice_.origins()[id];
+    for (std::size_t k = 0; k < 3; ++k) {
+      cloud.means[k].push_back(static_cast<float>(offset[static_cast<int>(k)]));
+    }
+  }
+
+ private:
+  OriginLattice lattice_;
+};
+
+/// Fills a GaussianCloud from raw Gaussians by activate()'s rules, counting every repair and drop.
 class GaussianCloudBuilder {
  public:
   /// `sh_degree` in [0, 3] is what every added Gaussian carries.
@@ -115,48 +197,17 @@ class GaussianCloudBuilder {
 
   /// Adds one Gaussian or counts why not. Returns whether it was kept.
   bool add(const RawGaussian& raw) {
-    ++report_.read;
-    bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);
-    for (int k = 0; k < 3; ++k) {
-      finite = finite && !std::isnan(raw.log_scales[k]) &&
-               is_finite(raw.sh0[static_cast<std::size_t>(k)]);
-    }
-    for (std::size_t k = 0; k < rest_; ++k) finite = finite && is_finite(raw.shN[k]);
-    if (!finite) {
-      ++report_.dropped_non_finite;
-      return false;
-    }
-    Quatd quat = raw.quat;
-    if (!normalize(quat)) {
-      ++report_.dropped_zero_quat;
-      return false;
-    }
-    const double opacity = 1.0 / (1.0 + std::exp(-raw.opacity_logit));
-    if (static_cast<float>(opacity) < 1.0f / 255.0f) {
-      ++report_.dropped_transparent;
-      return false;
-    }
-    Vec3d scales;
-    bool clamped = false;
-    for (int k = 0; k < 3; ++k) {
-      const double s = raw.log_scales[k];
-      const double limited = std::isinf(s) && s < 0 ? s : clamp(s, -20.0, 20.0);
-      clamped = clamped || limited != s;
-      scales[k] = std::exp(limited);
-    }
-    report_.clamped_scales += clamped ? 1 : 0;
-
-    push_mean(raw.mean);
-    const double q[4] = {quat.w, quat.x, quat.y, quat.z};
-    for (std::size_t k = 0; k < 4; ++k) cloud_.quats[k].push_back(static_cast<float>(q[k]));
-    for (std::size_t k = 0; k < 3; ++k) {
-      cloud_.scales[k].push_back(static_cast<float>(scales[static_cast<int>(k)]));
-    }
-    cloud_.opacities.push_back(static_cast<float>(opacity));
+    ActiveGaussian g;
+    const RowFate fate = activate(raw, rest_, g);
+    report_.count(fate, g.clamped);
+    if (fate != RowFate::kept) return false;
+    means_.push(cloud_, g.mean);
+    for (std::size_t k = 0; k < 4; ++k) cloud_.quats[k].push_back(g.quat[k]);
+    for (std::size_t k = 0; k < 3; ++k) cloud_.scales[k].push_back(g.scales[k]);
+    cloud_.opacities.push_back(g.opacity);
     cloud_.sh0.insert(cloud_.sh0.end(), raw.sh0.begin(), raw.sh0.end());
     if (rest_ != 0) cloud_.shN.insert(cloud_.shN.end(), raw.shN, raw.shN + rest_);
     report_.bounds.add(raw.mean);
-    ++report_.kept;
     return true;
   }
 
@@ -164,32 +215,10 @@ class GaussianCloudBuilder {
   GaussianCloud& cloud() noexcept { return cloud_; }
 
  private:
-  void push_mean(const Vec3d& mean) {
-    Vec3d origin;
-    for (int k = 0; k < 3; ++k) origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);
-    const auto key = std::make_tuple(origin.x, origin.y, origin.z);
-    const bool zero = origin == Vec3d{};
-    if (!zero && cloud_.origins.empty()) {  // the first Gaussian away from zero
-      cloud_.origin_ids.assign(cloud_.size(), 0);
-      cloud_.origins.push_back({});
-      origin_index_.emplace(std::make_tuple(0.0, 0.0, 0.0), 0u);
-    }
-    if (!cloud_.origins.empty()) {
-      const auto [it, added] =
-          origin_index_.emplace(key, static_cast<std::uint32_t>(cloud_.origins.size()));
-      if (added) cloud_.origins.push_back(origin);
-      cloud_.origin_ids.push_back(it->second);
-    }
-    for (std::size_t k = 0; k < 3; ++k) {
-      cloud_.means[k].push_back(
-          static_cast<float>(mean[static_cast<int>(k)] - origin[static_cast<int>(k)]));
-    }
-  }
-
   GaussianCloud cloud_;
   LoadReport report_;
   std::size_t rest_ = 0;
-  std::map<std::tuple<double, double, double>, std::uint32_t> origin_index_;
+  MeanWriter means_;
 };
 
 /// A cloud with the report of how it was read.

@@ -9,6 +9,9 @@
 
 namespace gsnav {
 
+/// What becomes of a row of a file.
+enum class RowFate : std::uint8_t { kept, non_finite, zero_quat, transparent };
+
 /// What a loader did to a file: nothing is repaired or dropped without being counted here.
 struct LoadReport {
   std::string source;                     ///< path or description
@@ -19,8 +22,40 @@ struct LoadReport {
   std::uint64_t dropped_transparent = 0;  ///< opacity below 1/255: never drawn (lossless)
   std::uint64_t clamped_scales = 0;       ///< log-scale outside [-20, 20]
   int sh_degree = 0;
-  Aabb<double> bounds{};                  ///< of the kept means, asset frame
-  std::vector<std::string> warnings;      ///< everything else a person should know
+  Aabb<double> bounds{};              ///< of the kept means, asset frame
+  std::vector<std::string> warnings;  ///< everything else a person should know
+
+  /// Counts a row that was read.
+  void count(RowFate fate, bool clamped) noexcept {
+    ++read;
+    switch (fate) {
+      case RowFate::kept:
+        ++kept;
+        clamped_scales += clamped ? 1 : 0;
+        break;
+      case RowFate::non_finite:
+        ++dropped_non_finite;
+        break;
+      case RowFate::zero_quat:
+        ++dropped_zero_quat;
+        break;
+      case RowFate::transparent:
+        ++dropped_transparent;
+        break;
+    }
+  }
+
+  /// Adds the counts of another part of the same scene, and its bounds.
+  void add_counts(const LoadReport& part) noexcept {
+    read += part.read;
+    kept += part.kept;
+    dropped_non_finite += part.dropped_non_finite;
+    dropped_zero_quat += part.dropped_zero_quat;
+    dropped_transparent += part.dropped_transparent;
+    clamped_scales += part.clamped_scales;
+    sh_degree = sh_degree > part.sh_degree ? sh_degree : part.sh_degree;
+    bounds.add(part.bounds);
+  }
 
   std::uint64_t dropped() const noexcept {
     return dropped_non_finite + dropped_zero_quat + dropped_transparent;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/ops/frame_lanes.hpp"
 #include "gsnav/ops/render.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
@@ -115,57 +116,89 @@ class Renderer {
     size_image(out.first_hit_depth, kFirstHitDepth, 1);
     out.stats.assign(cameras.size(), {});
 
-    if constexpr (!is_host_backend<B>) device_images_.resize_discard(8 * pixels);
+    if constexpr (LaneBackend<B>) {
+      if (FrameLanes<S, B>::worth_it(*backend_, cameras.size())) {
+        const auto images_of = [&out](std::size_t c) { return host_images(out, c); };
+        if (Status s = lanes_.render(*backend_, sets, cameras, config_, images_of, out.stats); !s) return s;
+        return backend_->synchronize();
+      }
+    }
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      std::size_t device_offset = 0;
-      const auto image_pointer = [&](std::vector<S>& image, std::size_t channels) -> S* {
-        if (image.empty()) return nullptr;
-        if constexpr (is_host_backend<B>) {
-          return image.data() + c * pixels * channels;
-        } else {
-          S* p = device_images_.data() + device_offset;
-          device_offset += pixels * channels;
-          return p;
-        }
-      };
-      FrameImages<S> images;
-      images.rgb = image_pointer(out.rgb, 3);
-      images.alpha = image_pointer(out.alpha, 1);
-      images.median_depth = image_pointer(out.median_depth, 1);
-      images.expected_depth = image_pointer(out.expected_depth, 1);
-      images.accumulated_depth = image_pointer(out.accumulated_depth, 1);
-      images.first_hit_depth = image_pointer(out.first_hit_depth, 1);
+      FrameImages<S> images = host_images(out, c);
+      if constexpr (!is_host_backend<B>) images = device_images(images, pixels);
       if (Status s = render_camera<S>(*backend_, workspace_, sets, cameras[c], config_, images,
                                       &out.stats[c]);
           !s) {
         return s;
       }
       if constexpr (!is_host_backend<B>) {
-        const auto fetch = [&](std::vector<S>& image, S* device, std::size_t channels) {
-          if (device != nullptr) {
-            backend_->copy(image.data() + c * pixels * channels, device,
-                           pixels * channels * sizeof(S), CopyKind::device_to_host);
-          }
-        };
-        fetch(out.rgb, images.rgb, 3);
-        fetch(out.alpha, images.alpha, 1);
-        fetch(out.median_depth, images.median_depth, 1);
-        fetch(out.expected_depth, images.expected_depth, 1);
-        fetch(out.accumulated_depth, images.accumulated_depth, 1);
-        fetch(out.first_hit_depth, images.first_hit_depth, 1);
+        for_each_image(host_images(out, c), images, [&](S* host, S* device, std::size_t channels) {
+          backend_->copy(host, device, pixels * channels * sizeof(S), CopyKind::device_to_host);
+        });
       }
     }
     return backend_->synchronize();
   }
 
   /// Bytes of scratch held.
-  std::size_t scratch_bytes() const noexcept { return workspace_.bytes(); }
+  std::size_t scratch_bytes() const noexcept {
+    std::size_t sum = workspace_.bytes();
+    if constexpr (LaneBackend<B>) sum += lanes_.bytes();
+    return sum;
+  }
 
  private:
+  struct NoLanes {};
+  template <class T>
+  struct LanesOf {
+    using type = NoLanes;
+  };
+  template <LaneBackend T>
+  struct LanesOf<T> {
+    using type = FrameLanes<S, T>;
+  };
+
+  /// Where the images of camera c lie in `out`.
+  static FrameImages<S> host_images(Frames<S>& out, std::size_t c) noexcept {
+    const auto at = [&out, c](std::vector<S>& image, std::size_t channels) -> S* {
+      return image.empty() ? nullptr : image.data() + c * out.width * out.height * channels;
+    };
+    FrameImages<S> images;
+    images.rgb = at(out.rgb, 3);
+    images.alpha = at(out.alpha, 1);
+    images.median_depth = at(out.median_depth, 1);
+    images.expected_depth = at(out.expected_depth, 1);
+    images.accumulated_depth = at(out.accumulated_depth, 1);
+    images.first_hit_depth = at(out.first_hit_depth, 1);
+    return images;
+  }
+  /// f(image of a, image of b, channels) for each image that `a` has.
+  template <class F>
+  static void for_each_image(FrameImages<S> a, FrameImages<S>& b, const F& f) {
+    if (a.rgb != nullptr) f(a.rgb, b.rgb, 3);
+    if (a.alpha != nullptr) f(a.alpha, b.alpha, 1);
+    if (a.median_depth != nullptr) f(a.median_depth, b.median_depth, 1);
+    if (a.expected_depth != nullptr) f(a.expected_depth, b.expected_depth, 1);
+    if (a.accumulated_depth != nullptr) f(a.accumulated_depth, b.accumulated_depth, 1);
+    if (a.first_hit_depth != nullptr) f(a.first_hit_depth, b.first_hit_depth, 1);
+  }
+  /// Room in the backend's memory for the images that `host` has.
+  FrameImages<S> device_images(const FrameImages<S>& host, std::size_t pixels) {
+    device_images_.resize_discard(8 * pixels);
+    FrameImages<S> images;
+    S* next = device_images_.data();
+    for_each_image(host, images, [&next, pixels](S*, S*& device, std::size_t channels) {
+      device = next;
+      next += pixels * channels;
+    });
+    return images;
+  }
+
   B* backend_;
   RenderConfig config_;
   RenderWorkspace<S, B> workspace_;
   Buffer<S, B> device_images_;
+  [[no_unique_address]] typename LanesOf<B>::type lanes_;
 };
 
 }  // namespace gsnav

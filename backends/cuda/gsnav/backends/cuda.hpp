@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 
@@ -13,9 +14,17 @@
 #include "gsnav/ops/render.hpp"
 #include "gsnav/ops/skin.hpp"
 
+struct CUevent_st;
 struct CUstream_st;
 
 namespace gsnav {
+
+namespace cuda {
+class PinnedRing;
+
+/// The cubic of `fast` saves a CPU work; a GPU has an instruction that is faster yet and as good as degree 5.
+constexpr Exp2 device_exp2(Exp2 asked) noexcept { return asked == Exp2::degree3 ? Exp2::hardware : asked; }
+}  // namespace cuda
 
 /// Device memory of one GPU.
 struct CudaSpace {};
@@ -41,6 +50,8 @@ class CudaBackend {
 
   void* allocate(std::size_t bytes, std::size_t align);
   void deallocate(void* p, std::size_t bytes) noexcept;
+  /// Copies to the device of up to 1 MiB never wait for the stream, and what is copied may change at once. Others
+  /// return early only from and to pinned memory.
   void copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);
   void fill(void* p, unsigned char byte, std::size_t bytes);
   /// Defined where nvcc compiles (backends/cuda/device.cuh).
@@ -50,6 +61,9 @@ class CudaBackend {
 
   std::size_t concurrency() const noexcept { return 1; }
   CUstream_st* stream() const noexcept { return stream_; }
+  /// What the consumer's stream is given from now on waits for what this one has been given so far; the host does
+  /// not wait. For handing images over without a copy.
+  void hand_over_to(CUstream_st* consumer);
   std::string device_name() const;
 
   // Optional members (core/backend.hpp).
@@ -59,13 +73,16 @@ class CudaBackend {
   void list_tiles(const BinArgs<float>& args);
   void scatter_tiles(const BinArgs<float>& args);
   void rasterize_tiles(const RasterArgs<float>& args);
+  /// One launch.
+  void skin_all(std::span<const SkinningArgs<float>> avatars);
 
  private:
   bool usable() const noexcept { return error_ == 0; }
   void note(int error, const char* what) noexcept;
   void* scratch(int slot, std::size_t bytes);
 
-  static constexpr int kScratchSlots = 6;
+  /// Scratch that outlives a call, by use.
+  enum Slot { kCubTemp, kPerSplat, kPerTile, kSplatOffsets, kPairTiles, kPairSplats, kSkinJobs, kScratchSlots };
   struct Block {
     void* data = nullptr;
     std::size_t bytes = 0;
@@ -76,6 +93,8 @@ class CudaBackend {
   int error_ = 0;
   const char* failed_ = "";
   Block scratch_[kScratchSlots];
+  std::unique_ptr<cuda::PinnedRing> uploads_;
+  CUevent_st* handed_over_ = nullptr;
 };
 
 static_assert(Backend<CudaBackend>);
@@ -87,6 +106,7 @@ extern template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWor
                                                          const RenderConfig&, const FrameImages<float>&,
                                                          RenderStats*);
 extern template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
+extern template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
 #endif
 
 }  // namespace gsnav

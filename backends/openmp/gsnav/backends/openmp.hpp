@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <thread>
 
 #if defined(_OPENMP)
 #include <omp.h>
@@ -9,7 +13,9 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/host_memory.hpp"
+#include "gsnav/core/thread_pool.hpp"
 #include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/capsule_batch.hpp"
 #include "gsnav/kernels/lbs.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
@@ -28,6 +34,8 @@ struct LaneKernels {
   void (*scatter_tiles)(const BinArgs<float>&, std::size_t block) noexcept;
   void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
   void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  void (*gap_range)(const CapsuleGapArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  void (*sweep_range)(const SweepArgs<float>&, std::size_t begin, std::size_t end) noexcept;
 };
 
 #if defined(GSNAV_OPENMP_COMPILED)
@@ -39,7 +47,8 @@ namespace lanes {
 inline namespace GSNAV_LANES_TAG {
 inline const LaneKernels& native_kernels() noexcept {
   static const LaneKernels k{"native",      kWidth,         &project_chunk,
-                             &count_tiles,  &scatter_tiles, &rasterize_tile_any, &skin_range};
+                             &count_tiles,  &scatter_tiles, &rasterize_tile_any, &skin_range,
+                             &gap_range,    &sweep_range};
   return k;
 }
 }  // namespace GSNAV_LANES_TAG
@@ -49,38 +58,34 @@ inline const LaneKernels& lane_kernels() noexcept { return lanes::native_kernels
 #endif
 
 /// Runs on the processor's cores. float32 frames go through lane kernels; every other scalar through
-/// the generic ones. Results do not depend on the number of threads.
+/// the generic ones. Results do not depend on the number of threads. The threads are a pool of the backend's
+/// own, which copies share (core/thread_pool.hpp says what holds for them): OpenMP only tells how many.
 class OpenMPBackend : public HostMemory {
  public:
-  /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS).
-  explicit OpenMPBackend(int threads = 0) noexcept : threads_(threads) {
-#if defined(_OPENMP)
-    if (threads_ <= 0) threads_ = omp_get_max_threads();
-#else
-    threads_ = 1;
-#endif
-  }
+  /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS), without OpenMP the number of cores.
+  explicit OpenMPBackend(int threads = 0)
+      : threads_(threads > 0 ? threads : default_threads()),
+        pool_(threads_ > 1 ? std::make_shared<ThreadPool>(threads_) : nullptr) {}
 
   int threads() const noexcept { return threads_; }
   std::size_t concurrency() const noexcept { return static_cast<std::size_t>(threads_); }
 
+  /// Optional member: batches of cameras go by whole frames, each on one thread.
+  OpenMPBackend one_thread() const { return OpenMPBackend(1); }
+
+  /// An exception that leaves f on more than one thread ends the process.
   template <class F>
   void parallel_for(std::size_t n, const F& f) {
-#if defined(_OPENMP)
-    if (threads_ > 1 && n > 1) {
-      // Pieces are handed out as threads come free: work items differ in cost.
-      const std::size_t piece = n / (static_cast<std::size_t>(threads_) * 32) + 1;
-      const std::ptrdiff_t pieces = static_cast<std::ptrdiff_t>((n + piece - 1) / piece);
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_)
-      for (std::ptrdiff_t p = 0; p < pieces; ++p) {
-        const std::size_t begin = static_cast<std::size_t>(p) * piece;
-        const std::size_t end = begin + piece < n ? begin + piece : n;
-        for (std::size_t i = begin; i < end; ++i) f(i);
-      }
+    if (threads_ < 2 || n < 2) {
+      for (std::size_t i = 0; i < n; ++i) f(i);
       return;
     }
-#endif
-    for (std::size_t i = 0; i < n; ++i) f(i);
+    // Pieces are handed out as threads come free: work items differ in cost.
+    const std::size_t piece = n / (concurrency() * 32) + 1;
+    pool_->run(static_cast<std::uint32_t>((n + piece - 1) / piece), [&f, n, piece](std::uint32_t p) {
+      const std::size_t begin = p * piece, end = std::min(n, begin + piece);
+      for (std::size_t i = begin; i < end; ++i) f(i);
+    });
   }
   Status synchronize() { return {}; }
 
@@ -88,6 +93,12 @@ class OpenMPBackend : public HostMemory {
   void project(const ProjectArgs<float>& args) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, kernel](std::size_t c) { kernel(args, c); });
+  }
+  /// Optional member: the same of some chunks. What reaches no open cell (ProjectArgs::open) is left out, and tiles
+  /// are blended in slices (RasterArgs::progress).
+  void project(const ProjectArgs<float>& args, View<const std::uint32_t> chunks) {
+    const auto kernel = lane_kernels().project_chunk;
+    parallel_for(chunks.size, [&args, chunks, kernel](std::size_t i) { kernel(args, chunks[i]); });
   }
   /// Optional members: binning in lanes, which keeps what it counted in BinArgs::spans.
   static constexpr bool bins_in_lanes = true;
@@ -106,16 +117,33 @@ class OpenMPBackend : public HostMemory {
   }
   /// Optional member: skinning in lanes.
   void skin(const SkinningArgs<float>& args) {
+    in_ranges(args, lane_kernels().skin_range);
+  }
+  /// Optional members: gaps and sweeps of capsules in lanes.
+  void capsule_gaps(const CapsuleGapArgs<float>& args) { in_ranges(args, lane_kernels().gap_range); }
+  void sweep_capsules(const SweepArgs<float>& args) { in_ranges(args, lane_kernels().sweep_range); }
+
+ private:
+  /// kernel(args, begin, end) over all of args.size().
+  template <class Args>
+  void in_ranges(const Args& args, void (*kernel)(const Args&, std::size_t, std::size_t) noexcept) {
     constexpr std::size_t kRange = 1024;
-    const auto kernel = lane_kernels().skin_range;
     const std::size_t n = args.size();
     parallel_for((n + kRange - 1) / kRange, [&args, kernel, n](std::size_t r) {
       kernel(args, r * kRange, (r + 1) * kRange < n ? (r + 1) * kRange : n);
     });
   }
 
- private:
+  static int default_threads() noexcept {
+#if defined(_OPENMP)
+    return omp_get_max_threads();
+#else
+    return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+#endif
+  }
+
   int threads_;
+  std::shared_ptr<ThreadPool> pool_;
 };
 
 static_assert(Backend<OpenMPBackend>);

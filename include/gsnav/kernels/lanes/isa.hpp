@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "gsnav/math/pack.hpp"
+#include "gsnav/math/pack_layout.hpp"
 
 // Code over lanes is compiled once per instruction set and chosen at run time, so every function of it
 // lives in a namespace named after the set: no linker can mix two of them up.

@@ -2,24 +2,18 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <new>
 #include <type_traits>
 
 #include "gsnav/kernels/blend.hpp"
-#include "gsnav/kernels/footprint.hpp"
-#include "gsnav/kernels/lanes/isa.hpp"
+#include "gsnav/kernels/lanes/block_lists.hpp"
+#include "gsnav/kernels/lanes/write_tile.hpp"
+#include "gsnav/math/packs.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
-
-/// Pixels side by side form a small block: small Gaussians waste few lanes on it.
-inline constexpr int kBlockWidth = kWidth >= 8 ? 4 : 2;
-inline constexpr int kBlockHeight = kWidth / kBlockWidth;
-inline constexpr int kMaxTile = 32;
-inline constexpr int kMaxBlocks = kMaxTile * kMaxTile / kWidth;
-/// Splats whose blocks are found before any of them is blended; a multiple of kWidth.
-inline constexpr int kBatch = 128;
 
 /// An array whose elements have no value yet: a tile sets few of what the largest may need.
 template <class T, int N>
@@ -28,180 +22,319 @@ class Unset {
 
  public:
   T& operator[](int i) noexcept { return *std::launder(reinterpret_cast<T*>(bytes_) + i); }
+  std::byte* bytes() noexcept { return bytes_; }
 
  private:
   alignas(T) std::byte bytes_[sizeof(T) * static_cast<std::size_t>(N)];
 };
 
-/// The splats that each block of a tile meets, of one batch.
-struct BlockLists {
-  std::uint8_t splats[kMaxBlocks][kBatch + kWidth];  // whole packs are written
-  int counts[kMaxBlocks];
-};
-
-/// Lists splats first to first + kWidth - 1 of a batch, those of `lanes`, in the blocks of an image's tile
-/// at (tile_x, tile_y) that their ellipses reach and that are open.
-inline void list_blocks(const SplatGeometry<float>* batch, int first, std::uint32_t lanes,
-                        float log2_alpha_min, int tile_x, int tile_y, int tile_size, const bool* open,
-                        BlockLists& lists) noexcept {
-  static_assert(sizeof(SplatGeometry<float>) == 8 * sizeof(float));
-  F c[8];
-  load_columns<8>(&batch[first].ref_x, c);
-  const SplatGeometry<F> g{c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]};
-  const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
-  const FootprintStrips<F> footprint(g, log2_alpha_min, F(centre(tile_x)), F(centre(tile_x + tile_size - 1)),
-                                     F(centre(tile_y)), F(centre(tile_y + tile_size - 1)));
-  for (int y = 0, block = 0; y < tile_size; y += kBlockHeight) {
-    F left, right;
-    const auto in_strip = footprint.columns(F(centre(tile_y + y)), F(centre(tile_y + y + kBlockHeight - 1)),
-                                            left, right);
-    const std::uint32_t strip = lane_bits(in_strip) & lanes;
-    for (int x = 0; x < tile_size; x += kBlockWidth, ++block) {
-      if (strip == 0 || !open[block]) continue;
-      const auto reached = (right >= F(centre(tile_x + x))) && (left <= F(centre(tile_x + x + kBlockWidth - 1)));
-      int& count = lists.counts[block];
-      count += store_lane_indices<kWidth>(lane_bits(reached) & strip, first, lists.splats[block] + count);
-    }
-  }
-}
-
-/// Writes the finished pixels of a block that lie in the image.
-template <DepthMode D>
-void write_block(const RasterArgs<float>& args, int x0, int y0, const BlendState<F, D>& state) noexcept {
-  const FinishedPixel<F> p = finish_pixel(args, state);
-  const int columns = args.grid.width - x0 < kBlockWidth ? args.grid.width - x0 : kBlockWidth;
-  const int rows = args.grid.height - y0 < kBlockHeight ? args.grid.height - y0 : kBlockHeight;
-  float values[3][kWidth];
-  const auto each_row = [&](const auto& write) {
-    for (int y = 0; y < rows; ++y) {
-      write(static_cast<std::size_t>(y0 + y) * static_cast<std::size_t>(args.grid.width) +
-                static_cast<std::size_t>(x0), y * kBlockWidth);
-    }
-  };
-  const auto plane = [&](float* image, const F& v) {
-    if (image == nullptr) return;
-    v.store(values[0]);
-    each_row([&](std::size_t pixel, int lane) {
-      for (int x = 0; x < columns; ++x) image[pixel + static_cast<std::size_t>(x)] = values[0][lane + x];
-    });
-  };
-  if (float* rgb = args.images.rgb; rgb != nullptr) {
-    p.r.store(values[0]);
-    p.g.store(values[1]);
-    p.b.store(values[2]);
-    each_row([&](std::size_t pixel, int lane) {
-      float* at = rgb + 3 * pixel;
-      for (int x = 0; x < columns; ++x, at += 3) {
-        for (int c = 0; c < 3; ++c) at[c] = values[c][lane + x];
-      }
-    });
-  }
-  plane(args.images.alpha, p.alpha);
-  plane(args.images.median_depth, p.median);
-  plane(args.images.expected_depth, p.expected);
-  plane(args.images.accumulated_depth, p.accumulated);
-  plane(args.images.first_hit_depth, p.first_hit);
-}
-
 /// Blends one tile. Splats go in batches: the blocks of pixels that their ellipses reach are found for
-/// kWidth of them side by side; then each block runs through its own list with its state in registers. A
-/// closed block takes no more splats, and the tile ends when all are closed. Per pixel the order and the
-/// arithmetic are those of RasterizePixel: the same bits.
-template <bool Color, DepthMode D, Exp2 M, bool Perspective>
-void rasterize_tile(const RasterArgs<float>& args, std::size_t tile) noexcept {
-  const TileGrid& grid = args.grid;
-  const int ts = grid.tile_size;
-  const int columns = grid.columns;
-  const int tile_x = static_cast<int>(tile % static_cast<std::size_t>(columns)) * ts;
-  const int tile_y = static_cast<int>(tile / static_cast<std::size_t>(columns)) * ts;
-  const int blocks_x = ts / kBlockWidth, blocks = blocks_x * (ts / kBlockHeight);
+/// kWidth of them side by side, and what their exponents share in a column of pixels is computed once a tile;
+/// then each block runs through its own list with its state in registers. A closed block takes no more
+/// splats, and the tile ends when all are closed. Per pixel the order and the arithmetic are those of
+/// RasterizePixel: the same bits.
+template <bool Color, DepthMode D, Exp2 M, bool General>
+class TileBlender {
+  /// The median depth is found after a list has run: until then its splat's number does.
+  static constexpr DepthMode kLoop = D == DepthMode::median ? DepthMode::none : D;
+  static constexpr bool kNeedsId = D != DepthMode::none || General;
 
-  Unset<BlendState<F, D>, kMaxBlocks> states;
-  bool open[kMaxBlocks];
-  int open_count = 0;
-  float lane_x[kWidth], lane_y[kWidth];
-  for (int l = 0; l < kWidth; ++l) {
-    lane_x[l] = static_cast<float>(l % kBlockWidth) + 0.5f;
-    lane_y[l] = static_cast<float>(l / kBlockWidth) + 0.5f;
-  }
-  const F pixel_x = F::load(lane_x), pixel_y = F::load(lane_y);
-  for (int b = 0; b < blocks; ++b) {
-    const int x0 = tile_x + (b % blocks_x) * kBlockWidth, y0 = tile_y + (b / blocks_x) * kBlockHeight;
-    const auto inside = (pixel_x + F(static_cast<float>(x0)) < F(static_cast<float>(grid.width))) &&
-                        (pixel_y + F(static_cast<float>(y0)) < F(static_cast<float>(grid.height)));
-    // Closed from the start outside the image.
-    states[b] = {};
-    states[b].transmittance = select(inside, F(1.0f), F(0.0f));
-    states[b].open = states[b].near = inside;
-    open[b] = any(inside);
-    open_count += open[b] ? 1 : 0;
-  }
+  /// What blending reads of a splat beside its column terms.
+  struct Row {
+    float ref_y, b;
+    SplatColor<float> color;
+    float number;  ///< in the batch
+    float pad;
+  };
+  /// ColumnTerms of the columns of half a tile of kMaxTile, or of a whole smaller one.
+  static constexpr int kColumns = 16;
+  struct alignas(64) Columns {
+    float column[kColumns], w2[kColumns];
+  };
+  static constexpr int kParts = kMaxTile / kColumns;
+  /// Splats of a list whose alphas are computed side by side.
+  static constexpr int kGroup = 4;
+  /// A splat that is drawn nowhere fills the last group.
+  static constexpr int kNothing = kBatch, kStride = kBatch + 1;
 
-  Unset<SplatGeometry<float>, kBatch> geometry;
-  Unset<SplatColor<float>, Color ? kBatch : 1> colors;
-  constexpr bool kNeedsId = D != DepthMode::none || Perspective;
-  std::uint32_t ids[kNeedsId ? kBatch : 1];
-  BlockLists lists;
-  const std::uint64_t end = args.tile_offsets[tile + 1];
-  for (std::uint64_t first = args.tile_offsets[tile]; first < end && open_count > 0; first += kBatch) {
-    const int n = static_cast<int>(end - first < kBatch ? end - first : std::uint64_t{kBatch});
-    std::memset(lists.counts, 0, sizeof lists.counts[0] * static_cast<std::size_t>(blocks));
-    // Records lie in file order, not in the tile's: asked for early, they are there when needed.
-    constexpr int kAhead = 8;
-    for (int j = 0; j < n; ++j) {
-      if (j + kAhead < n) {
-        const std::uint32_t next = args.tile_splats[first + static_cast<std::uint64_t>(j + kAhead)];
-        __builtin_prefetch(&args.geometry[next]);
-        if constexpr (Color) __builtin_prefetch(&args.colors[next]);
-      }
-      const std::uint32_t splat = args.tile_splats[first + static_cast<std::uint64_t>(j)];
-      geometry[j] = args.geometry[splat];
-      if constexpr (Color) colors[j] = args.colors[splat];
-      if constexpr (kNeedsId) ids[j] = splat;
+ public:
+  TileBlender(const RasterArgs<float>& args, std::size_t tile) noexcept
+      : args_(args),
+        tile_(tile),
+        tile_size_(args.grid.tile_size),
+        tile_x_(static_cast<int>(tile % static_cast<std::size_t>(args.grid.columns)) * tile_size_),
+        tile_y_(static_cast<int>(tile / static_cast<std::size_t>(args.grid.columns)) * tile_size_) {
+    float x[kWidth], y[kWidth];
+    for (int l = 0; l < kWidth; ++l) {
+      x[l] = static_cast<float>(l % kBlockWidth) + 0.5f;
+      y[l] = static_cast<float>(l / kBlockWidth) + 0.5f;
     }
-    for (int j = n; j % kWidth != 0; ++j) geometry[j] = {};  // lanes that are left out
-    if constexpr (Perspective) {  // the footprint is no ellipse: every open block
-      for (int b = 0; b < blocks; ++b) {
-        for (int j = 0; open[b] && j < n; ++j) lists.splats[b][lists.counts[b]++] = static_cast<std::uint8_t>(j);
-      }
+    lane_x_ = F::load(x);
+    lane_y_ = F::load(y);
+  }
+
+  void blend() noexcept {
+    const TileProgress<float>& progress = args_.progress;
+    const std::uint64_t begin = args_.tile_offsets[tile_], end = args_.tile_offsets[tile_ + 1];
+    if (progress.first) {
+      open_blocks();
     } else {
-      for (int j = 0; j < n; j += kWidth) {
-        const std::uint32_t lanes = n - j >= kWidth ? ~0u : (1u << (n - j)) - 1u;
-        list_blocks(&geometry[0], j, lanes, args.rules.log2_alpha_min, tile_x, tile_y, ts, open, lists);
-      }
+      if (progress.open[tile_] == 0 || (begin == end && !progress.last)) return;
+      resume();
     }
-    for (int b = 0; b < blocks; ++b) {
-      if (lists.counts[b] == 0) continue;
-      BlendState<F, D> state = states[b];
-      const F px = pixel_x + F(static_cast<float>(tile_x + (b % blocks_x) * kBlockWidth));
-      const F py = pixel_y + F(static_cast<float>(tile_y + (b / blocks_x) * kBlockHeight));
-      for (int i = 0; i < lists.counts[b]; ++i) {
-        const int j = lists.splats[b][i];
-        const std::uint32_t id = ids[kNeedsId ? j : 0];
-        const SplatRecords<float> splat{&geometry[j], &colors[Color ? j : 0],
-                                        D == DepthMode::none ? nullptr : &args.depths[id],
-                                        Perspective ? &args.perspectives[id] : nullptr};
-        blend_splat<Color, D, M, Perspective>(state, args.rules, splat, px, py);
-        if (!any(state.open)) {
-          open[b] = false;
-          --open_count;
-          break;
+    if (progress.last) prefetch_images();
+    for (int j = 0; j < kStride; ++j) rows_[j].number = static_cast<float>(j);
+    rows_[kNothing] = {};
+    for (std::uint64_t first = begin; first < end && open_count_ > 0; first += kBatch) {
+      load_batch(first, static_cast<int>(end - first < kBatch ? end - first : std::uint64_t{kBatch}));
+      for_each_block([this](int block, int x, int y) {
+        if (lists_.counts[block] == 0) return;
+        if (D == DepthMode::median && any(states_[block].transmittance > F(0.5f))) {
+          blend_list<true>(block, x, y);
+        } else {
+          blend_list<false>(block, x, y);
+        }
+      });
+    }
+    const bool done = progress.last || open_count_ == 0;
+    if (done) {
+      write();
+    } else {
+      keep();
+    }
+    if (!progress.open.empty()) progress.open[tile_] = done ? 0 : open_cells();
+  }
+
+ private:
+  /// Calls f(block, x, y) with the place of each block in the tile.
+  template <class Func>
+  void for_each_block(const Func& f) const noexcept {
+    for (int y = 0, block = 0; y < tile_size_; y += kBlockHeight) {
+      for (int x = 0; x < tile_size_; x += kBlockWidth, ++block) f(block, x, y);
+    }
+  }
+  F pixel_x(int x) const noexcept { return lane_x_ + F(static_cast<float>(tile_x_ + x)); }
+  F pixel_y(int y) const noexcept { return lane_y_ + F(static_cast<float>(tile_y_ + y)); }
+
+  /// The tile's rows are far apart in an image, and come in while it is blended.
+  void prefetch_images() const noexcept {
+    const FrameImages<float>& out = args_.images;
+    const auto prefetch = [this](const float* image, std::size_t values) {
+      if (image == nullptr) return;
+      for (int y = tile_y_; y < tile_y_ + tile_size_ && y < args_.grid.height; ++y) {
+        const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(args_.grid.width) +
+                                  static_cast<std::size_t>(tile_x_);
+        constexpr std::size_t kLine = 16;
+        for (std::size_t x = 0; x < values * static_cast<std::size_t>(tile_size_); x += kLine) {
+          __builtin_prefetch(image + values * first + x, 0, 2);
         }
       }
-      states[b] = state;
+    };
+    prefetch(out.rgb, 3);
+    for (const float* image : {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth,
+                               out.first_hit_depth}) {
+      prefetch(image, 1);
     }
   }
 
-  for (int b = 0; b < blocks; ++b) {
-    write_block(args, tile_x + (b % blocks_x) * kBlockWidth, tile_y + (b / blocks_x) * kBlockHeight, states[b]);
+  void open_blocks() noexcept {
+    for_each_block([this](int block, int x, int y) {
+      const auto inside = (pixel_x(x) < F(static_cast<float>(args_.grid.width))) &&
+                          (pixel_y(y) < F(static_cast<float>(args_.grid.height)));
+      // Closed from the start outside the image.
+      states_[block] = {};
+      states_[block].transmittance = select(inside, F(1.0f), F(-1.0f));
+      if constexpr (D == DepthMode::median) medians_[block] = F(0.0f);
+      open_[block] = any(inside);
+      open_count_ += open_[block] ? 1 : 0;
+    });
   }
-}
+
+  std::uint64_t open_cells() const noexcept {
+    constexpr int kCell = OpenCells::kSize;
+    static_assert(kCell % kBlockWidth == 0 && kCell % kBlockHeight == 0);
+    std::uint64_t cells = 0;
+    for_each_block([&](int block, int x, int y) {
+      if (open_[block]) cells |= std::uint64_t{1} << (y / kCell * (tile_size_ / kCell) + x / kCell);
+    });
+    return cells;
+  }
+
+  /// The tile's place among the kept.
+  float* kept() const noexcept {
+    const std::size_t pixels = static_cast<std::size_t>(tile_size_) * static_cast<std::size_t>(tile_size_);
+    return args_.progress.states.data + tile_ * blend_state_values(D) * pixels;
+  }
+  std::size_t state_bytes() const noexcept {
+    static_assert(sizeof(BlendState<F, kLoop>) == blend_state_values(kLoop) * sizeof(F));
+    return sizeof(BlendState<F, kLoop>) * static_cast<std::size_t>(tile_size_ * tile_size_ / kWidth);
+  }
+  std::size_t median_bytes() const noexcept {
+    return D == DepthMode::median ? sizeof(float) * static_cast<std::size_t>(tile_size_ * tile_size_) : 0;
+  }
+  void keep() noexcept {
+    std::memcpy(kept(), states_.bytes(), state_bytes());
+    std::memcpy(kept() + state_bytes() / sizeof(float), medians_.bytes(), median_bytes());
+  }
+  void resume() noexcept {
+    std::memcpy(states_.bytes(), kept(), state_bytes());
+    std::memcpy(medians_.bytes(), kept() + state_bytes() / sizeof(float), median_bytes());
+    for_each_block([this](int block, int, int) {
+      open_[block] = any(states_[block].open(args_.rules));
+      open_count_ += open_[block] ? 1 : 0;
+    });
+  }
+
+  /// Reads the n splats from `first` on in the tile's list, and lists them by blocks.
+  void load_batch(std::uint64_t first, int n) noexcept {
+    const std::uint32_t* ids = args_.tile_splats.data + first;
+    // Records lie in file order, not in the tile's: asked for early, they are there when needed.
+    constexpr std::uint64_t kAhead = 16;
+    const std::uint64_t left = args_.tile_splats.size - first;
+    for (int j = 0; j < n; ++j) {
+      if (static_cast<std::uint64_t>(j) + kAhead < left) {
+        const std::uint32_t next = ids[static_cast<std::uint64_t>(j) + kAhead];
+        __builtin_prefetch(&args_.geometry[next]);
+        if constexpr (Color) __builtin_prefetch(&args_.colors[next]);
+      }
+      const SplatGeometry<float>& g = args_.geometry[ids[j]];
+      geometry_[j] = g;
+      rows_[j].ref_y = g.ref_y;
+      rows_[j].b = g.b;
+      if constexpr (Color) rows_[j].color = args_.colors[ids[j]];
+      if constexpr (kNeedsId) ids_[j] = ids[j];
+    }
+    if constexpr (kNeedsId) ids_[kNothing] = ids[0];           // any depth will do
+    if (General && !args_.perspectives.empty()) {  // the footprint is no ellipse: every open block
+      for_each_block([&](int block, int, int) {
+        lists_.counts[block] = open_[block] ? n : 0;
+        for (int j = 0; j < lists_.counts[block]; ++j) lists_.splats[block][j] = static_cast<std::uint8_t>(j);
+      });
+      return;
+    }
+    for (int j = n; j % kWidth != 0; ++j) geometry_[j] = {};  // lanes that are left out
+    list_blocks(&geometry_[0], n, args_.rules.log2_alpha_min, tile_x_, tile_y_, tile_size_, open_, lists_);
+    if constexpr (General) return;
+    float x[kWidth];
+    for (int l = 0; l < kWidth; ++l) x[l] = static_cast<float>(l) + 0.5f;
+    for (int from = 0; from < tile_size_; from += kWidth) {
+      const F px = F::load(x) + F(static_cast<float>(tile_x_ + from));
+      Columns* const columns = &columns_[from / kColumns * kStride];
+      const int at = from % kColumns;
+      for (int j = 0; j < n; ++j) {
+        const ColumnTerms<F> terms = column_terms(geometry_[j], px);
+        terms.column.store(columns[j].column + at);
+        terms.w2.store(columns[j].w2 + at);
+      }
+      F(-1e30f).store(columns[kNothing].column + at);
+      F(0.0f).store(columns[kNothing].w2 + at);
+    }
+  }
+
+  /// Blends the list of one block. `Near`: transmittance is above 1/2 at some pixel.
+  template <bool Near>
+  void blend_list(int block, int x, int y) noexcept {
+    const F px = pixel_x(x), py = pixel_y(y);
+    const BlendRules<float> rules = args_.rules;
+    const Row* const rows = &rows_[0];
+    BlendState<F, kLoop> state = states_[block];
+    [[maybe_unused]] const F before = state.transmittance;
+    [[maybe_unused]] F last(0.0f);  // the last splat met with transmittance above 1/2
+    std::uint8_t* const list = lists_.splats[block];
+    const int n = lists_.counts[block];
+    const auto blend = [&](int j, F alpha) {
+      if constexpr (Near) last = select(state.transmittance > F(0.5f), F(rows[j].number), last);
+      blend_alpha<Color, kLoop, General>(state, rules, alpha, &rows[j].color,
+                                         kLoop == DepthMode::none ? nullptr : &args_.depths[ids_[j]], px, py);
+    };
+    if constexpr (General) {
+      for (int i = 0; i < n; ++i) {
+        const SplatGeometry<float>& g = geometry_[list[i]];
+        const F exponent = args_.perspectives.empty()
+                               ? column_exponent(column_terms(g, px), F(g.ref_y), F(g.b), py)
+                               : perspective_exponent(g, args_.perspectives[ids_[list[i]]], px, py);
+        blend(list[i], footprint_alpha<M>(rules, exponent));
+        if (!any(state.open(rules))) break;
+      }
+    } else {
+      const Columns* const columns = &columns_[x / kColumns * kStride];
+      const int at = x % kColumns;
+      for (int i = n; i % kGroup != 0; ++i) list[i] = kNothing;
+      for (int i = 0; i < n; i += kGroup) {
+        using Group = Packs<F, kGroup>;
+        const std::uint8_t* const j = list + i;
+        const auto gather = [&](const auto& value) { return Group::of([&](int k) { return value(j[k]); }); };
+        const auto repeated = [](const float* p) { return load_repeated<kBlockWidth, kWidth>(p); };
+        const ColumnTerms<Group> terms{gather([&](int s) { return repeated(columns[s].column + at); }),
+                                       gather([&](int s) { return repeated(columns[s].w2 + at); })};
+        const Group alpha = footprint_alpha<M>(
+            rules, column_exponent(terms, gather([&](int s) { return F(rows[s].ref_y); }),
+                                   gather([&](int s) { return F(rows[s].b); }), Group(py)));
+        for (int k = 0; k < kGroup; ++k) blend(j[k], alpha.v[k]);
+        if (!any(state.open(rules))) break;
+      }
+    }
+    if (!any(state.open(rules))) {
+      open_[block] = false;
+      --open_count_;
+    }
+    states_[block] = state;
+    if constexpr (Near) {
+      // The others are closed by now, or their median is still to come.
+      auto crossed = (before > F(0.5f)) && (abs(state.transmittance) <= F(0.5f));
+      F& median = medians_[block];
+      for (std::uint32_t lanes = lane_bits(crossed); lanes != 0;) {
+        const float number = last[__builtin_ctz(lanes)];
+        const auto same = (last <= F(number)) && (last >= F(number)) && crossed;
+        median = select(same, ray_depth(args_.depths[ids_[static_cast<int>(number)]], px, py), median);
+        lanes &= ~lane_bits(same);
+      }
+    }
+  }
+
+  void write() noexcept {
+    const FrameImages<float>& out = args_.images;
+    const int blocks = tile_size_ / kBlockWidth;
+    for (int y = 0, row = 0; y < tile_size_ && tile_y_ + y < args_.grid.height; y += kBlockHeight, row += blocks) {
+      for (int x = 0; x < tile_size_ && tile_x_ + x < args_.grid.width; x += kWidth) {
+        const BlockRow place(args_.grid, tile_x_ + x, tile_y_ + y, tile_x_ + tile_size_);
+        // A small tile's rows are filled up with any block.
+        const auto block = [&](int i) { return row + (x / kBlockWidth + i) % blocks; };
+        if constexpr (Color) {
+          write_color(place, out.rgb, [&](int i) { return pixel_color(args_, states_[block(i)]); });
+        }
+        write_plane(place, out.alpha, [&](int i) { return pixel_alpha(states_[block(i)]); });
+        if constexpr (D == DepthMode::median) {
+          write_plane(place, out.median_depth, [&](int i) { return medians_[block(i)]; });
+        }
+        if constexpr (D == DepthMode::any) {
+          write_plane(place, out.median_depth, [&](int i) { return states_[block(i)].median; });
+          write_plane(place, out.expected_depth, [&](int i) { return pixel_expected_depth(args_, states_[block(i)]); });
+          write_plane(place, out.accumulated_depth, [&](int i) { return pixel_accumulated_depth(states_[block(i)]); });
+          write_plane(place, out.first_hit_depth, [&](int i) { return states_[block(i)].first_hit; });
+        }
+      }
+    }
+  }
+
+  const RasterArgs<float>& args_;
+  std::size_t tile_;
+  int tile_size_, tile_x_, tile_y_;
+  F lane_x_, lane_y_;
+  int open_count_ = 0;
+  bool open_[kMaxBlocks];
+  Unset<BlendState<F, kLoop>, kMaxBlocks> states_;
+  Unset<F, D == DepthMode::median ? kMaxBlocks : 1> medians_;
+  Unset<SplatGeometry<float>, kBatch> geometry_;
+  Unset<Row, kStride> rows_;
+  std::uint32_t ids_[kNeedsId ? kStride : 1];
+  Unset<Columns, General ? 1 : kParts * kStride> columns_;
+  BlockLists lists_;
+};
 
 /// Blends one tile in the variant that `args` asks for.
 inline void rasterize_tile_any(const RasterArgs<float>& args, std::size_t tile) noexcept {
-  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
-    rasterize_tile<C, D, M, P>(args, tile);
-  });
+  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool G>() { TileBlender<C, D, M, G>(args, tile).blend(); });
 }
 
 }  // namespace GSNAV_LANES_TAG

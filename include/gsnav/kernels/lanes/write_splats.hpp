@@ -67,6 +67,23 @@ GSNAV_HD void find_references(const ProjectArgs<float>& args, const ProjectedPac
   }
 }
 
+/// Those of `lanes` whose bounds reach an open cell.
+GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, F x0, F y0, F x1, F y1, std::uint32_t lanes) noexcept {
+  const F inverse(1.0f / OpenCells::kSize), one(1.0f);
+  float bounds[4][kWidth];
+  truncated(x0 * inverse).store(bounds[0]);
+  truncated(y0 * inverse).store(bounds[1]);
+  (truncated((x1 - one) * inverse) + one).store(bounds[2]);
+  (truncated((y1 - one) * inverse) + one).store(bounds[3]);
+  std::uint32_t found = 0;
+  for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
+    const int l = std::countr_zero(left);
+    const auto cell = [&](int k) { return static_cast<std::size_t>(bounds[k][l]); };
+    if (open.any(cell(0), cell(1), cell(2), cell(3))) found |= 1u << l;
+  }
+  return found;
+}
+
 /// A TileSpans a lane, as the four words that it lies in memory as.
 struct SpanWords {
   F::ints word[4]{};
@@ -100,10 +117,12 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
       F left, right;
       const auto covered = footprint.columns(max(top, y0) + half, (min(next, y1) - one) + half, left, right);
       // The padding of left and right is more than what rounding to a pixel may lose.
-      const F first = tile_of(clamp(left + half, x0, x1)), last = truncated(clamp(right + half, x0, x1)) - one;
-      const auto none = !(covered && (last >= x0) && (F(static_cast<float>(r)) < rows));
+      const F first = tile_of(clamp(left + half, x0, x1)), edge = truncated(clamp(right + half, x0, x1)) - one;
+      const F last = tile_of(edge);
+      // Between two columns of centres a strip may have none: edge < x0, or first behind last.
+      const auto none = !(covered && (edge >= x0) && (first <= last) && (F(static_cast<float>(r)) < rows));
       begin = select(none, zero, first - tx0);
-      end = select(none, zero, (tile_of(last) - tx0) + one);
+      end = select(none, zero, (last - tx0) + one);
       if (r == 0) {
         begin = select(single, zero, begin);
         end = select(single, one, end);
@@ -147,6 +166,7 @@ GSNAV_HD std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t 
   // Those whose geometry float cannot hold are few: each goes its own way.
   const std::uint32_t alone = lane_bits(gsnav::detail::needs_double(camera, p)) & bits;
   bits &= lane_bits((x0 < x1) && (y0 < y1)) | alone;
+  if (!args.open.empty()) bits &= detail::reaching_open(args.open, x0, y0, x1, y1, bits) | alone;
   if (bits == 0) return 0;
   if (args.color) prefetch_colors(gs, args.sh_degree, pack.first);
 

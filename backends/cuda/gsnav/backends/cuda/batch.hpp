@@ -30,6 +30,7 @@ struct BatchStats {
   std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, tiles of 16 x 16 pixels
   std::uint64_t scratch_bytes = 0;       ///< held on the device, without scene and images
   int reruns = 0;                        ///< how often the batch was drawn again because scratch had to grow
+  bool replayed = false;                 ///< by a recorded CUDA graph: calls that differ in their cameras alone are
 };
 
 /// Draws many cameras in one call on one GPU; docs/cuda.md says how. Images have the bits that

@@ -107,7 +107,7 @@ struct EmitSplatTiles {
 inline constexpr int kRasterBatch = 64;
 
 /// One block a tile, one thread a pixel; splats come through shared memory in batches.
-template <bool Color, DepthMode D, Exp2 M, bool Perspective>
+template <bool Color, DepthMode D, Exp2 M, bool General>
 __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float> args) {
   __shared__ SplatGeometry<float> geometry[kRasterBatch];
   __shared__ SplatColor<float> colors[Color ? kRasterBatch : 1];
@@ -134,9 +134,9 @@ __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float>
     for (int j = 0; open && j < n; ++j) {
       const SplatRecords<float> splat{geometry + j, Color ? colors + j : nullptr,
                                       D == DepthMode::none ? nullptr : args.depths.data + ids[j],
-                                      Perspective ? args.perspectives.data + ids[j] : nullptr};
-      blend_splat<Color, D, M, Perspective>(state, args.rules, splat, px, py);
-      open = state.open;
+                                      args.perspectives.empty() ? nullptr : args.perspectives.data + ids[j]};
+      blend_splat<Color, D, M, General>(state, args.rules, splat, px, py);
+      open = state.open(args.rules);
     }
   }
   if (inside) {

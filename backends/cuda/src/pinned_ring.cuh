@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cuda_runtime.h>
+
+#include <cstddef>
+#include <cstring>
+
+namespace gsnav::cuda {
+
+/// Pinned blocks that small copies to the device go through, in turn: a copy from pageable memory may wait for
+/// all that the stream has to do. Only a block that is asked for again before its copy is done is waited for.
+class PinnedRing {
+ public:
+  static constexpr std::size_t kMaxBytes = std::size_t{1} << 20;  ///< of one copy
+
+  PinnedRing() = default;
+  PinnedRing(const PinnedRing&) = delete;
+  PinnedRing& operator=(const PinnedRing&) = delete;
+  ~PinnedRing() {
+    for (Block& b : blocks_) {
+      if (b.sent != nullptr) cudaEventDestroy(b.sent);
+      if (b.data != nullptr) cudaFreeHost(b.data);
+    }
+  }
+
+  /// Copies `bytes` <= kMaxBytes; `from` may change when it returns.
+  cudaError_t send(void* to, const void* from, std::size_t bytes, cudaStream_t stream) {
+    Block& b = blocks_[next_];
+    next_ = (next_ + 1) % kBlocks;
+    cudaError_t e = cudaSuccess;
+    if (b.sent == nullptr) {
+      e = cudaEventCreateWithFlags(&b.sent, cudaEventDisableTiming);
+    } else {
+      e = cudaEventSynchronize(b.sent);
+    }
+    if (e == cudaSuccess && bytes > b.capacity) {
+      if (b.data != nullptr) cudaFreeHost(b.data);
+      b.data = nullptr;
+      b.capacity = 0;
+      std::size_t room = 4096;
+      while (room < bytes) room *= 2;
+      e = cudaMallocHost(&b.data, room);
+      if (e == cudaSuccess) b.capacity = room;
+    }
+    if (e != cudaSuccess) return e;
+    std::memcpy(b.data, from, bytes);
+    e = cudaMemcpyAsync(to, b.data, bytes, cudaMemcpyHostToDevice, stream);
+    return e == cudaSuccess ? cudaEventRecord(b.sent, stream) : e;
+  }
+
+ private:
+  static constexpr std::size_t kBlocks = 8;
+  struct Block {
+    void* data = nullptr;
+    std::size_t capacity = 0;
+    cudaEvent_t sent = nullptr;
+  };
+  Block blocks_[kBlocks];
+  std::size_t next_ = 0;
+};
+
+}  // namespace gsnav::cuda

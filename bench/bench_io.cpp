@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// bench_io [--scene FILE] [--markdown] [--folder DIR]: writes a scene in every format, reads it back and
+// prints a row for each: size, speed, peak memory beside what the result takes, and the error that the
+// format adds.
+#include <malloc.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "compare.hpp"
+#include "gsnav/io/gltf.hpp"
+#include "gsnav/io/ply.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/io/sog.hpp"
+#include "gsnav/io/splat.hpp"
+#include "gsnav/io/spz.hpp"
+#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/sim/default_scene.hpp"
+
+namespace {
+
+using namespace gsnav;
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// A line of /proc/self/status, bytes; 0 where there is none.
+double memory(const char* key) {
+  std::ifstream in("/proc/self/status");
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with(key)) return 1024 * std::strtod(line.c_str() + line.find(':') + 1, nullptr);
+  }
+  return 0;
+}
+
+Result<LoadedCloud> read(const std::string& path) {
+  const std::string extension = std::filesystem::path(path).extension().string();
+  if (extension == ".ply") return io::load_ply(path);
+  if (extension == ".splat") return io::load_splat(path);
+  if (extension == ".spz") return io::load_spz(path);
+  if (extension == ".glb") return io::load_gltf(path);
+  return io::load_sog(path);
+}
+
+struct Row {
+  double bytes = 0, write = 0, read = 0, peak = 0, result = 0;
+  gsnav_convert::FieldErrors fields;
+  gsnav_convert::ImageErrors images;
+};
+
+Row measure(const GaussianCloud& source, const std::vector<Camera>& cameras, const std::string& path) {
+  Row row;
+  double start = now();
+  io::save_scene(path, source).throw_if_error();
+  row.write = now() - start;
+  row.bytes = static_cast<double>(std::filesystem::file_size(path));
+  LoadedCloud made = read(path).value();  // from now on the file is in the cache
+  row.read = 1e9;
+  for (int run = 0; run < 3; ++run) {
+    made = {};
+    ::malloc_trim(0);                               // what was freed is no longer counted
+    std::ofstream("/proc/self/clear_refs") << "5";  // the peak counts from here
+    const double before = memory("VmRSS");
+    start = now();
+    made = read(path).value();
+    row.read = std::min(row.read, now() - start);
+    row.peak = memory("VmHWM") - before;
+  }
+  row.result = static_cast<double>(made.cloud.bytes());
+  row.fields = gsnav_convert::largest_field_errors(source, made.cloud);
+  made.cloud.filter = source.filter;
+  if (!cameras.empty()) {
+    GaussianCloud sorted = source;
+    sort_spatially(sorted);
+    sort_spatially(made.cloud);
+    row.images = gsnav_convert::image_errors(sorted, made.cloud, cameras).value();
+  }
+  std::filesystem::remove(path);
+  return row;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::string scene, folder = std::filesystem::temp_directory_path().string();
+  bool markdown = false;
+  int views = 4;
+  CLI::App app{"Speed, memory and error of every format that is written and read."};
+  app.add_option("--scene", scene, "Any scene that can be read; the embedded flat if not given");
+  app.add_option("--folder", folder, "Where the files are written for a while");
+  app.add_option("--views", views, "Images of 640x480 for the PSNR");
+  app.add_flag("--markdown", markdown, "Print the table as docs/formats.md has it");
+  CLI11_PARSE(app, argc, argv);
+  GaussianCloud source;
+  if (scene.empty()) {
+    source = make_default_scene(1.0).value().cloud;
+    sort_spatially(source);
+  } else {
+    auto loaded = io::load_scene(scene);
+    if (!loaded) {
+      std::fprintf(stderr, "bench_io: %s\n", loaded.message().c_str());
+      return 1;
+    }
+    source = std::move(loaded->cloud);
+  }
+  const auto cameras = gsnav_convert::views_around(source, views, 640, 480);
+  const double n = static_cast<double>(source.size());
+  std::printf("%zu Gaussians of SH degree %d, %.1f MB in memory\n\n", source.size(), source.sh_degree,
+              static_cast<double>(source.bytes()) / 1e6);
+  const char* const separator = markdown ? " | " : "  ";
+  const auto line = [&](const std::vector<std::string>& cells) {
+    std::string out = markdown ? "| " : "";
+    for (std::size_t k = 0; k < cells.size(); ++k) {
+      std::string cell = cells[k];
+      if (!markdown) cell.insert(0, std::string(cell.size() < 14 ? 14 - cell.size() : 0, ' '));
+      out += (k == 0 ? "" : separator) + cell;
+    }
+    std::printf("%s%s\n", out.c_str(), markdown ? " |" : "");
+  };
+  const std::vector<std::string> head = {
+      "format", "bytes each", "read MB/s", "read M/s", "write M/s", "peak/result", "mean, m",
+      "scale",  "rotation",   "opacity",   "colour",   "SH",        "PSNR, dB"};
+  line(head);
+  if (markdown) line(std::vector<std::string>(head.size(), "---"));
+  const std::string base = folder + "/gsnav_bench_io_" + std::to_string(::getpid());
+  for (const char* extension : {".ply", ".glb", ".compressed.ply", ".splat", ".spz", ".sog"}) {
+    const Row r = measure(source, cameras, base + extension);
+    const auto number = [](const char* format, double v) {
+      char text[32];
+      std::snprintf(text, sizeof text, format, v);
+      return std::string(text);
+    };
+    line({extension, number("%.1f", r.bytes / n), number("%.0f", r.bytes / r.read / 1e6),
+          number("%.2f", n / r.read / 1e6), number("%.2f", n / r.write / 1e6),
+          number("%.2f", r.peak / r.result), number("%.1e", r.fields.mean),
+          number("%.1e", r.fields.scale), number("%.1e", r.fields.rotation),
+          number("%.1e", r.fields.opacity), number("%.1e", r.fields.colour),
+          number("%.1e", r.fields.bands), number("%.1f", r.images.psnr)});
+  }
+  return 0;
+}

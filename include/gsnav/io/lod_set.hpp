@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav::io {
+
+/// How load_lod_set reads.
+struct LoadLodOptions {
+  int level = 0;            ///< 0 is the finest
+  bool environment = true;  ///< add the far shell, where the set names one
+};
+
+/// Reads PlayCanvas' streamed LOD set: `lod-meta.json`, or its folder, with a tree of nodes each of
+/// which names rows of SOG files for some levels. All nodes are read at one level and merged; where a
+/// node has no such level, or its file is not there, the next coarser one is taken, else the next finer
+/// one, and the report's warnings say so. Rows come by file, as the set lists them.
+///
+/// Errors: as load_sog; file_not_found (no level of a node is there); invalid_argument (a level that the
+/// set does not have, named with those it has); invalid_file (files outside of the folder, rows that two
+/// nodes share or that end behind their file). Never throws.
+Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLodOptions& options = {});
+
+}  // namespace gsnav::io

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/kernels/project_chunk.hpp"
+#include "gsnav/kernels/splat.hpp"
+#include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/depth_slices.hpp"
+#include "gsnav/ops/order_visible.hpp"
+
+namespace gsnav {
+
+/// What one camera's frame was made of.
+struct RenderStats {
+  std::uint64_t gaussians = 0;           ///< in all sets
+  std::uint64_t visible = 0;             ///< whose footprint bounds reach the image, less those found hidden
+  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs
+};
+
+/// Scratch of `render_camera`; grows to the largest frame and is then reused.
+template <class S, Backend B>
+struct RenderWorkspace {
+  explicit RenderWorkspace(B& b)
+      : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
+        visible(b), cursors(b), tile_offsets(b), tile_splats(b), spans(b), open(b), states(b) {}
+
+  Buffer<Vec3<float>, B> offsets_f;
+  Buffer<Vec3d, B> offsets;
+  Buffer<SplatGeometry<S>, B> geometry;
+  Buffer<SplatColor<S>, B> colors;
+  Buffer<SplatDepth<S>, B> depths;
+  Buffer<SplatPerspective<S>, B> perspectives;
+  Buffer<SplatBounds, B> bounds;
+  VisibleOrder<B> visible;
+  Buffer<std::uint64_t, B> cursors, tile_offsets;
+  Buffer<std::uint32_t, B> tile_splats;
+  Buffer<TileSpans, B> spans;
+  Buffer<std::uint64_t, B> open;  ///< of frames in slices: cells of tiles, and the state of their pixels
+  Buffer<S, B> states;
+  DepthSlices slices;
+  std::vector<Vec3<float>> host_offsets_f;
+  std::vector<Vec3d> host_offsets;
+  std::vector<ProjectArgs<S>> projections;  ///< [sets]
+
+  std::size_t bytes() const noexcept {
+    std::size_t sum = 0;
+    for_each(*this, *this, [&sum](const auto& own, const auto&) {
+      if constexpr (requires { own.capacity_bytes(); }) sum += own.capacity_bytes();
+    });
+    return sum;
+  }
+  /// Makes room for what the other has room for, so that a frame of either allocates nothing. Drops the content.
+  void grow_to(const RenderWorkspace& o) {
+    for_each(*this, o, [](auto& own, const auto& other) {
+      if constexpr (requires { own.grow_to(other); }) {
+        own.grow_to(other);
+      } else {
+        own.reserve(other.capacity());
+      }
+    });
+  }
+
+ private:
+  template <class A, class C, class F>
+  static void for_each(A& a, C& b, const F& f) {
+    f(a.offsets_f, b.offsets_f), f(a.offsets, b.offsets), f(a.geometry, b.geometry), f(a.colors, b.colors);
+    f(a.depths, b.depths), f(a.perspectives, b.perspectives), f(a.bounds, b.bounds);
+    f(a.cursors, b.cursors), f(a.tile_offsets, b.tile_offsets), f(a.tile_splats, b.tile_splats);
+    f(a.spans, b.spans), f(a.host_offsets_f, b.host_offsets_f), f(a.host_offsets, b.host_offsets);
+    f(a.projections, b.projections), f(a.open, b.open), f(a.states, b.states), f(a.slices, b.slices);
+    VisibleOrder<B>::for_each(a.visible, b.visible, f);
+  }
+};
+
+}  // namespace gsnav

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "file.hpp"
+#include "gsnav/avatar/capsule_track.hpp"
+#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/io/avatar_scene_file.hpp"
+#include "gsnav/io/motion_file.hpp"
+#include "npz_arrays.hpp"
+
+namespace gsnav::io {
+namespace {
+
+/// Where the clip's root joint goes, on the floor below it: what an avatar is scaled about.
+class ClipPath final : public Trajectory {
+ public:
+  ClipPath(std::shared_ptr<const MotionClip> clip, std::vector<double> floor, double offset_y)
+      : clip_(std::move(clip)), floor_(std::move(floor)), offset_y_(offset_y) {}
+
+  TrajectorySample at(double t) const override {
+    LocalPose pose;
+    MotionInput in;
+    in.time = t;
+    clip_->pose(in, pose);
+    TrajectorySample out;
+    out.position = {pose.translations[0].x + pose.root.x, floor_at(t) + offset_y_,
+                    pose.translations[0].z + pose.root.z};
+    return out;
+  }
+  double floor_at(double t) const {
+    const double k = clamp(t * clip_->frame_rate, 0.0, static_cast<double>(floor_.size() - 1));
+    const std::size_t a = std::min(static_cast<std::size_t>(k), floor_.size() - 1),
+                      b = std::min(a + 1, floor_.size() - 1);
+    return floor_[a] + (floor_[b] - floor_[a]) * (k - static_cast<double>(a));
+  }
+
+ private:
+  std::shared_ptr<const MotionClip> clip_;
+  std::vector<double> floor_;  // [T] metres
+  double offset_y_;
+};
+
+/// The clip without the way that ClipPath has.
+class ClipInPlace final : public MotionSource {
+ public:
+  ClipInPlace(std::shared_ptr<const MotionClip> clip, std::shared_ptr<const ClipPath> path)
+      : clip_(std::move(clip)), path_(std::move(path)) {}
+  void pose(const MotionInput& input, LocalPose& out) const override {
+    clip_->pose(input, out);
+    const Vec3d at{out.translations[0].x + out.root.x, path_->floor_at(input.time), out.translations[0].z + out.root.z};
+    out.root -= at;
+  }
+  std::size_t joint_count() const noexcept override { return clip_->joint_count(); }
+  Status validate() const override { return clip_->validate(); }
+
+ private:
+  std::shared_ptr<const MotionClip> clip_;
+  std::shared_ptr<const ClipPath> path_;
+};
+
+/// Moves the whole clip, and its capsules, by a rigid map of each key.
+void move_clip(LoadedDriver& driver, const std::vector<Affine3<double>>& by) {
+  MotionClip& clip = driver.clip;
+  for (std::size_t t = 0; t < clip.frames(); ++t) {
+    const Affine3<double>& m = by[std::min(t, by.size() - 1)];
+    Quatd& q = clip.rotations[t * clip.joints];
+    q = quat_from_matrix(m.linear) * q;
+    normalize(q);
+    // What is first in the clip is its root's place; the path makes up for the change.
+    const Vec3d place = clip.translations[clip.translations.size() == clip.joints ? 0 : t * clip.joints];
+    clip.root_translation[t] = m * (clip.root_translation[t] + place) - place;
+    if (t < driver.capsules.size()) {
+      for (Capsule<double>& c : driver.capsules[t]) c = {m * c.p0, m * c.p1, c.radius};
+    }
+  }
+}
+
+/// The floor below the clip: the lowest joint within half a second, at each key.
+std::vector<double> floor_of(const Skeleton& skeleton, const MotionClip& clip) {
+  const std::size_t n = clip.frames();
+  std::vector<double> lowest(n), out(n);
+  LocalPose pose;
+  std::vector<Affine3<double>> globals;
+  for (std::size_t t = 0; t < n; ++t) {
+    MotionInput in;
+    in.time = static_cast<double>(t) / clip.frame_rate;
+    clip.pose(in, pose);
+    forward_kinematics(skeleton, pose, globals);
+    lowest[t] = globals[0].translation.y;
+    for (const auto& g : globals) lowest[t] = std::min(lowest[t], g.translation.y);
+    lowest[t] += pose.root.y;
+  }
+  const auto around = static_cast<std::size_t>(std::min(0.5 * clip.frame_rate, 1e9));
+  for (std::size_t t = 0; t < n; ++t) {
+    const std::size_t a = t - std::min(t, around), b = std::min(n, t + around + 1);
+    out[t] = *std::min_element(lowest.begin() + static_cast<std::ptrdiff_t>(a),
+                               lowest.begin() + static_cast<std::ptrdiff_t>(b));
+  }
+  return out;
+}
+
+Result<std::vector<Affine3<double>>> load_trajectory(const std::filesystem::path& path) {
+  const auto file = NpzFile::open(path);
+  if (!file) return file.status();
+  const std::vector<std::string> names = file->names();
+  const std::string name = file->contains("trajectory") ? "trajectory" : names.size() == 1 ? names[0] : "trajectory";
+  const detail::NpzArrays arrays(*file);
+  const auto a = arrays.read(name, {detail::NpzArrays::kAny, 7});
+  if (!a) return a.status();
+  std::vector<Affine3<double>> out;
+  for (std::size_t t = 0; 7 * t < a->values.size(); ++t) {
+    const double* v = &a->values[7 * t];
+    Quatd q{v[6], v[3], v[4], v[5]};
+    if (!normalize(q))
+      return {Errc::invalid_file, path.string() + ": " + name + ": row " + std::to_string(t) + " has no rotation"};
+    out.push_back({rotation_matrix(q), {v[0], v[1], v[2]}});
+  }
+  return out;
+}
+
+Result<AvatarActor> load_actor(const SceneAvatar& a,
+                               std::map<std::string, std::shared_ptr<const AvatarAsset>>& bodies) {
+  std::shared_ptr<const AvatarAsset>& body = bodies[a.canonical.string()];
+  if (body == nullptr) {
+    auto loaded = load_avatar(a.canonical);
+    if (!loaded) return loaded.status();
+    body = std::make_shared<const AvatarAsset>(std::move(loaded->asset));
+  }
+  auto driver = load_driver(a.driver, body->skeleton);
+  if (!driver) return driver.status();
+  driver->clip.end = ClipEnd::hold;
+  if (!a.trajectory.empty()) {
+    const auto path = load_trajectory(a.trajectory);
+    if (!path) return path.status();
+    if (path->empty()) return {Errc::invalid_file, a.trajectory.string() + ": there are no rows"};
+    move_clip(*driver, *path);
+  }
+  Affine3<double> coordinates = a.coordinates;
+  if (a.guess_coordinates) {
+    // Habitat-GS's rule: a root that stands on its head comes from a frame with Y down.
+    const Mat3d first = rotation_matrix(driver->clip.rotations[0]) * transpose(body->skeleton.rest_local[0].linear);
+    if (first(1, 1) < -0.7 && first(2, 2) < -0.7) coordinates.linear = {{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}};
+  }
+  move_clip(*driver, {coordinates});
+  if (body->capsules.empty() && !driver->capsules.empty() && !driver->capsules[0].empty()) {
+    const auto tracked = capsules_from_track(body->skeleton, driver->clip, driver->capsules);
+    if (!tracked) return tracked.status();
+    AvatarAsset with = *body;
+    with.capsules = tracked->capsules;
+    body = std::make_shared<const AvatarAsset>(std::move(with));
+  }
+  ActorOptions options;
+  options.scale = a.scale;
+  options.time_begin = a.time_begin;
+  options.time_end = a.time_end.value_or(a.time_begin + driver->clip.duration());
+  std::vector<double> floor = floor_of(body->skeleton, driver->clip);
+  const auto clip = std::make_shared<const MotionClip>(std::move(driver->clip));
+  const auto path = std::make_shared<const ClipPath>(clip, std::move(floor), a.offset_y);
+  return AvatarActor::create(body, std::make_shared<const ClipInPlace>(clip, path), path, options);
+}
+
+}  // namespace
+
+Result<std::vector<AvatarActor>> load_scene_actors(const AvatarScene& scene) {
+  return detail::guarded("avatars of a scene", [&]() -> Result<std::vector<AvatarActor>> {
+    std::vector<AvatarActor> out;
+    std::map<std::string, std::shared_ptr<const AvatarAsset>> bodies;
+    for (const SceneAvatar& a : scene.avatars) {
+      auto actor = load_actor(a, bodies);
+      if (!actor) {
+        const Status s = actor.status();
+        return {s.code(), (a.name.empty() ? "" : "avatar \"" + a.name + "\": ") + s.message()};
+      }
+      out.push_back(std::move(*actor));
+    }
+    return out;
+  });
+}
+
+}  // namespace gsnav::io

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/huge_pages.hpp"
+#include "gsnav/core/thread_pool.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav::io::detail {
+
+/// Takes consecutive rows of a file into the planes of a cloud, by the rules of activate().
+class CloudSink {
+ public:
+  CloudSink(GaussianCloud& cloud, std::size_t first) : cloud_(cloud), first_(first), at_(first) {
+    rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
+  }
+
+  void add(const RawGaussian& raw) {
+    ActiveGaussian g;
+    const RowFate fate = activate(raw, rest_, g);
+    report_.count(fate, g.clamped);
+    if (fate != RowFate::kept) return;
+    const std::uint32_t id = lattice_.id_of(g.mean);
+    if (id != 0 || !ids_.empty()) {
+      ids_.resize(at_ - first_, 0);
+      ids_.push_back(id);
+    }
+    const Vec3d offset = g.mean - lattice_.origins()[id];
+    for (std::size_t k = 0; k < 3; ++k) {
+      cloud_.means[k][at_] = static_cast<float>(offset[static_cast<int>(k)]);
+      cloud_.scales[k][at_] = g.scales[k];
+      cloud_.sh0[3 * at_ + k] = raw.sh0[k];
+    }
+    for (std::size_t k = 0; k < 4; ++k) cloud_.quats[k][at_] = g.quat[k];
+    cloud_.opacities[at_] = g.opacity;
+    std::copy_n(raw.shN, rest_, cloud_.shN.data() + rest_ * at_);
+    report_.bounds.add(raw.mean);
+    ++at_;
+  }
+
+  std::size_t first() const noexcept { return first_; }
+  std::size_t size() const noexcept { return at_ - first_; }
+  const LoadReport& report() const noexcept { return report_; }
+
+  /// Writes the origin of each row to `to`, numbered by `all`, where any is not zero.
+  void give_origins(OriginLattice& all, std::vector<std::uint32_t>& to, std::size_t at) const {
+    std::vector<std::uint32_t> ids;
+    for (const Vec3d& origin : lattice_.origins()) ids.push_back(all.id_of_point(origin));
+    for (std::size_t i = 0; i < ids_.size(); ++i) to[at + i] = ids[ids_[i]];
+  }
+  bool has_origins() const noexcept { return !ids_.empty(); }
+
+ private:
+  GaussianCloud& cloud_;
+  std::size_t first_, at_, rest_;
+  LoadReport report_;
+  OriginLattice lattice_;
+  std::vector<std::uint32_t> ids_;  ///< of the rows so far, or empty while all are zero
+};
+
+/// Gives the planes of a cloud `n` rows.
+inline void resize_planes(GaussianCloud& cloud, std::size_t n) {
+  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
+  const auto plane = [](std::vector<float>& v, std::size_t size) {
+    if (v.empty()) {
+      v = huge_vector<float>(size);
+    } else {
+      v.resize(size);
+    }
+  };
+  for (auto& v : cloud.means) plane(v, n);
+  for (auto& v : cloud.quats) plane(v, n);
+  for (auto& v : cloud.scales) plane(v, n);
+  plane(cloud.opacities, n);
+  plane(cloud.sh0, 3 * n);
+  plane(cloud.shN, rest * n);
+}
+
+/// Moves n rows of all planes down, from row `from` to row `to`.
+inline void move_rows(GaussianCloud& cloud, std::size_t from, std::size_t to, std::size_t n) {
+  if (from == to || n == 0) return;
+  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
+  const auto plane = [&](std::vector<float>& v, std::size_t stride) {
+    std::copy_n(v.data() + stride * from, stride * n, v.data() + stride * to);
+  };
+  for (auto& v : cloud.means) plane(v, 1);
+  for (auto& v : cloud.quats) plane(v, 1);
+  for (auto& v : cloud.scales) plane(v, 1);
+  plane(cloud.opacities, 1);
+  plane(cloud.sh0, 3);
+  if (rest != 0) plane(cloud.shN, rest);
+}
+
+/// Reads `count` rows into a cloud of SH degree `degree`, in parallel where there are many:
+/// `decode(first, last, sink)` gives the rows [first, last) to the sink, in their order, and returns a
+/// Status. The result does not depend on the number of threads; of several errors the first one's is
+/// returned. No memory beyond the cloud's is asked for. With `parallel` false all rows come by one call.
+template <class Decode>
+Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string& source,
+                               const Decode& decode, bool parallel = true) {
+  constexpr std::size_t kRowsWorthAThread = 1 << 15, kMostThreads = 16;
+  LoadedCloud out;
+  GaussianCloud& cloud = out.cloud;
+  cloud.sh_degree = out.report.sh_degree = degree;
+  out.report.source = source;
+  resize_planes(cloud, count);
+  const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
+  const std::size_t pieces =
+      parallel ? std::clamp(count / kRowsWorthAThread, std::size_t{1}, std::min(cores, kMostThreads))
+               : 1;
+  std::vector<CloudSink> sinks;
+  std::vector<Status> statuses(pieces);
+  for (std::size_t p = 0; p < pieces; ++p) sinks.emplace_back(cloud, count * p / pieces);
+  const auto piece = [&](std::uint32_t p) noexcept {
+    try {
+      statuses[p] = decode(count * p / pieces, count * (p + 1) / pieces, sinks[p]);
+    } catch (const std::bad_alloc&) {
+      statuses[p] = Status(Errc::out_of_memory, std::string());
+    }
+  };
+  if (pieces == 1) {
+    piece(0);
+  } else {
+    ThreadPool(static_cast<int>(pieces)).run(static_cast<std::uint32_t>(pieces), piece);
+  }
+  std::size_t kept = 0;
+  bool far = false;
+  for (std::size_t p = 0; p < pieces; ++p) {
+    if (statuses[p].code() == Errc::out_of_memory) throw std::bad_alloc();
+    if (!statuses[p]) return statuses[p];
+    move_rows(cloud, sinks[p].first(), kept, sinks[p].size());
+    kept += sinks[p].size();
+    far = far || sinks[p].has_origins();
+    out.report.add_counts(sinks[p].report());
+  }
+  resize_planes(cloud, kept);
+  if (far) {
+    OriginLattice lattice;
+    cloud.origin_ids.assign(kept, 0);
+    std::size_t at = 0;
+    for (const CloudSink& sink : sinks) {
+      sink.give_origins(lattice, cloud.origin_ids, at);
+      at += sink.size();
+    }
+    cloud.origins = lattice.origins();
+  }
+  return out;
+}
+
+}  // namespace gsnav::io::detail

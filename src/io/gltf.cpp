@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/io/gltf.hpp"
+
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "cloud_fill.hpp"
+#include "gltf_file.hpp"
+#include "gsnav/io/spz.hpp"
+#include "gsnav/scene/edit_cloud.hpp"
+#include "report_sum.hpp"
+
+namespace gsnav::io {
+namespace {
+
+using detail::GltfFile;
+using detail::GltfInstance;
+using detail::GltfValues;
+using detail::Json;
+using detail::member;
+
+constexpr const char* kExtension = "KHR_gaussian_splatting";
+constexpr const char* kSpzExtension = "KHR_gaussian_splatting_compression_spz_2";
+
+/// The rotation, scale and translation that `a` consists of; false where it is more than these.
+bool as_similarity(const Affine3<double>& a, Similarity& out) {
+  const double scale = std::cbrt(determinant(a.linear));
+  if (!(scale > 0) || !std::isfinite(scale)) return false;
+  const Mat3<double> rotation = a.linear * (1 / scale);
+  const Mat3<double> square = rotation * transpose(rotation);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      if (!(std::fabs(square(i, j) - (i == j ? 1 : 0)) < 1e-4)) return false;
+    }
+  }
+  out.rotation = quat_from_matrix(rotation);
+  out.scale = scale;
+  out.translation = a.translation;
+  return normalize(out.rotation) && is_finite(out.translation);
+}
+
+class SplatReader {
+ public:
+  SplatReader(const GltfFile& file, const LoadGltfOptions& options) : file_(file), options_(options) {}
+
+  Result<LoadedCloud> run() {
+    const auto instances = file_.instances();
+    if (!instances) return instances.status();
+    LoadedCloud out;
+    out.report.source = file_.source();
+    out.cloud.sort_order = SortOrder::camera_distance;
+    for (const GltfInstance& instance : *instances) {
+      if (Status s = read_mesh(instance, out); !s) return s;
+    }
+    if (primitives_ == 0) {
+      return {Errc::invalid_file, file_.source() + ": no primitive with " + kExtension};
+    }
+    return out;
+  }
+
+ private:
+  Status read_mesh(const GltfInstance& instance, LoadedCloud& out) {
+    const auto mesh = file_.item("meshes", instance.mesh);
+    if (!mesh) return mesh.status();
+    const std::string where = file_.source() + ": node " + std::to_string(instance.node);
+    const Json* primitives = member(**mesh, "primitives");
+    if (primitives == nullptr || !primitives->is_array()) {
+      return {Errc::invalid_file, where + ": its mesh has no 'primitives'"};
+    }
+    for (const Json& primitive : *primitives) {
+      const Json* extensions = member(primitive, "extensions");
+      const Json* splats = extensions == nullptr ? nullptr : member(*extensions, kExtension);
+      if (splats == nullptr) continue;
+      ++primitives_;
+      Similarity world;
+      if (!as_similarity(instance.world_from_mesh, world)) {
+        return {Errc::unsupported,
+                where +
+                    ": its transform scales unevenly or mirrors, which SH bands cannot follow; "
+                    "apply it in the program that wrote the file"};
+      }
+      auto part = read_primitive(primitive, *splats, where);
+      if (part) {
+        part->cloud.sort_order = SortOrder::camera_distance;
+        // Half a turn about z.
+        if (!options_.keep_axes) world = Similarity{{0, 0, 0, 1}, {}, 1} * world;
+        move(*part, world);
+        if (primitives_ == 1) out.cloud.filter = part->cloud.filter;
+      }
+      if (Status s = detail::merge_loaded(out, std::move(part), where); !s) return s;
+    }
+    return {};
+  }
+
+  static void move(LoadedCloud& part, const Similarity& world) {
+    if (world.rotation.w == 1 && world.translation == Vec3d{} && world.scale == 1) return;
+    transform(part.cloud, world);
+    part.report.bounds = {};
+    for (std::size_t i = 0; i < part.cloud.size(); ++i) part.report.bounds.add(part.cloud.mean(i));
+  }
+
+  Result<LoadedCloud> read_primitive(const Json& primitive, const Json& splats,
+                                     const std::string& where) {
+    const Json *kernel = member(splats, "kernel"), *space = member(splats, "colorSpace"),
+               *sorting = member(splats, "sortingMethod");
+    if (kernel == nullptr || space == nullptr) {
+      return {Errc::invalid_file, where + ": " + kExtension + " lacks 'kernel' or 'colorSpace'"};
+    }
+    if (*kernel != "ellipse" || (sorting != nullptr && *sorting != "cameraDistance")) {
+      return {Errc::unsupported, where + ": kernel " + detail::shown(*kernel) +
+                                     " or its sorting is not read, only 'ellipse' by 'cameraDistance'"};
+    }
+    const Json* nested = member(splats, "extensions");
+    const Json* spz = nested == nullptr ? nullptr : member(*nested, kSpzExtension);
+    auto out = spz != nullptr ? read_spz(*spz, where) : read_attributes(primitive, where);
+    if (out && *space != "srgb_rec709_display") {
+      out->report.warnings.push_back("colours of space " + detail::shown(*space) +
+                                     " are read as if they were srgb_rec709_display");
+    }
+    return out;
+  }
+
+  Result<LoadedCloud> read_spz(const Json& spz, const std::string& where) const {
+    if (!options_.spz_compression) {
+      return {Errc::unsupported, where + ": compressed by " + kSpzExtension +
+                                     ", a draft; LoadGltfOptions::spz_compression reads it"};
+    }
+    const auto view = detail::get_index(spz, "bufferView", detail::kNoIndex, where);
+    if (!view) return view.status();
+    const auto bytes = file_.view(*view);
+    if (!bytes) return bytes.status();
+    return parse_spz(*bytes, where, {.keep_axes = true});
+  }
+
+  /// Attribute `name` as [count][components]; the first one read says how many there are.
+  Status read(const Json& attributes, const std::string& name, std::size_t components,
+              const std::string& where, GltfValues& out) {
+    const auto index = detail::get_index(attributes, name.c_str(), detail::kNoIndex, where);
+    if (!index) return index.status();
+    if (*index == detail::kNoIndex) return {Errc::invalid_file, where + ": no attribute '" + name + "'"};
+    const auto values = file_.values(*index, components);
+    if (!values) return {values.code(), where + ": attribute '" + name + "': " + values.message()};
+    if (name == "POSITION") {
+      count_ = values->size();
+      total_ += count_;
+      // Nodes may share a mesh: a small file could ask for any number of copies.
+      if (total_ > file_.size()) {
+        return {Errc::invalid_file, where + ": more Gaussians than the file has bytes"};
+      }
+    }
+    if (values->size() != count_) {
+      return {Errc::invalid_file, where + ": attribute '" + name + "' has " +
+                                      std::to_string(values->size()) + " elements, POSITION has " +
+                                      std::to_string(count_)};
+    }
+    out = *values;
+    return {};
+  }
+
+  Result<LoadedCloud> read_attributes(const Json& primitive, const std::string& where) {
+    const Json* attributes = member(primitive, "attributes");
+    if (attributes == nullptr) return {Errc::invalid_file, where + ": a primitive without 'attributes'"};
+    const std::string prefix = std::string(kExtension) + ":";
+    GltfValues means, quats, scales, opacities;
+    if (Status s = read(*attributes, "POSITION", 3, where, means); !s) return s;
+    if (Status s = read(*attributes, prefix + "ROTATION", 4, where, quats); !s) return s;
+    if (Status s = read(*attributes, prefix + "SCALE", 3, where, scales); !s) return s;
+    if (Status s = read(*attributes, prefix + "OPACITY", 1, where, opacities); !s) return s;
+    int degree = 0;
+    const auto sh = [&prefix](int band, int coefficient) {
+      return prefix + "SH_DEGREE_" + std::to_string(band) + "_COEF_" + std::to_string(coefficient);
+    };
+    while (degree < kMaxShDegree && member(*attributes, sh(degree + 1, 0).c_str()) != nullptr) ++degree;
+    std::vector<GltfValues> bands;
+    for (int band = 0; band <= degree; ++band) {
+      for (int k = 0; k <= 2 * band; ++k) {
+        bands.emplace_back();
+        if (Status s = read(*attributes, sh(band, k), 3, where, bands.back()); !s) return s;
+      }
+    }
+    const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+      std::array<float, 45> rest;
+      RawGaussian raw;
+      raw.shN = rest.data();
+      for (std::size_t i = first; i < last; ++i) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          const int axis = static_cast<int>(k);
+          raw.mean[axis] = means.at(i, k);
+          raw.log_scales[axis] = std::log(scales.at(i, k));
+          raw.sh0[k] = static_cast<float>(bands[0].at(i, k));
+          for (std::size_t b = 1; b < bands.size(); ++b) {
+            rest[3 * (b - 1) + k] = static_cast<float>(bands[b].at(i, k));
+          }
+        }
+        const double opacity = opacities.at(i, 0);  // outside of [0, 1]: NaN, dropped
+        raw.opacity_logit = std::log(opacity / (1 - opacity));
+        raw.quat = {quats.at(i, 3), quats.at(i, 0), quats.at(i, 1), quats.at(i, 2)};
+        sink.add(raw);
+      }
+      return {};
+    };
+    return detail::fill_cloud(count_, degree, where, decode);
+  }
+
+  const GltfFile& file_;
+  const LoadGltfOptions& options_;
+  std::size_t primitives_ = 0, count_ = 0, total_ = 0;
+};
+
+}  // namespace
+
+Result<LoadedCloud> load_gltf(const std::filesystem::path& path, const LoadGltfOptions& options) {
+  return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
+    const auto file = GltfFile::open(path);
+    if (!file) return file.status();
+    return SplatReader(*file, options).run();
+  });
+}
+
+Result<LoadedCloud> parse_gltf(std::span<const std::byte> bytes, std::string source,
+                               const LoadGltfOptions& options) {
+  return detail::guarded(source, [&]() -> Result<LoadedCloud> {
+    const auto file = GltfFile::parse(bytes, source, {});
+    if (!file) return file.status();
+    return SplatReader(*file, options).run();
+  });
+}
+
+}  // namespace gsnav::io

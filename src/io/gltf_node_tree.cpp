@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "gltf_document.hpp"
+#include "gsnav/math/quat.hpp"
+
+namespace gsnav::io::detail {
+namespace {
+
+Status read_node(const Json& node, const std::string& at, GltfNode& out) {
+  const auto take = [&](const char* key, std::size_t size, std::vector<double>& values) -> Status {
+    values.clear();
+    if (member(node, key) == nullptr) return {};
+    auto v = get_numbers(node, key, size, at);
+    if (!v) return v.status();
+    values = std::move(*v);
+    return {};
+  };
+  std::vector<double> v;
+  if (Status s = take("matrix", 16, v); !s) return s;
+  if (!v.empty()) {
+    out.has_matrix = true;
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) out.matrix.linear(i, k) = v[static_cast<std::size_t>(4 * k + i)];
+      out.matrix.translation[i] = v[static_cast<std::size_t>(12 + i)];
+    }
+    return {};
+  }
+  if (Status s = take("translation", 3, v); !s) return s;
+  if (!v.empty()) out.translation = {v[0], v[1], v[2]};
+  if (Status s = take("scale", 3, v); !s) return s;
+  if (!v.empty()) out.scale = {v[0], v[1], v[2]};
+  if (Status s = take("rotation", 4, v); !s) return s;
+  if (!v.empty()) {
+    Quatd q{v[3], v[0], v[1], v[2]};
+    if (!normalize(q)) return {Errc::invalid_file, at + ": 'rotation' is zero"};
+    out.rotation = {q.x, q.y, q.z, q.w};
+  }
+  return {};
+}
+
+}  // namespace
+
+Affine3<double> GltfNode::local() const {
+  if (has_matrix) return matrix;
+  Quatd q{rotation[3], rotation[0], rotation[1], rotation[2]};
+  normalize(q);
+  const Mat3d r = rotation_matrix(q);
+  Affine3<double> out{{}, translation};
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) out.linear(i, k) = r(i, k) * scale[k];
+  }
+  return out;
+}
+
+std::vector<Affine3<double>> GltfNodes::globals() const {
+  std::vector<Affine3<double>> out(nodes.size());
+  for (const std::size_t i : order) {
+    out[i] = parents[i] < 0 ? nodes[i].local() : out[static_cast<std::size_t>(parents[i])] * nodes[i].local();
+  }
+  return out;
+}
+
+Result<GltfNodes> read_nodes(const GltfDocument& file) {
+  const std::size_t n = file.count("nodes");
+  GltfNodes out;
+  out.nodes.resize(n);
+  out.parents.assign(n, -1);
+  std::vector<std::vector<std::size_t>> children(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto e = file.entry("nodes", i);
+    if (!e) return e.status();
+    const std::string at = file.where("nodes", i);
+    if (Status s = read_node(**e, at, out.nodes[i]); !s) return s;
+    const Json* name = member(**e, "name");
+    out.names.push_back(name != nullptr && name->is_string() ? name->get<std::string>() : std::string());
+    const Json* list = member(**e, "children");
+    if (list == nullptr) continue;
+    if (!list->is_array()) return {Errc::invalid_file, at + ": 'children' is " + shown(*list)};
+    for (const Json& c : *list) {
+      const double k = c.is_number() ? c.get<double>() : -1.0;
+      if (!(k >= 0 && k < static_cast<double>(n)) || k != std::floor(k)) {
+        return {Errc::invalid_file, at + ": 'children' has " + shown(c) + " of " + std::to_string(n) + " nodes"};
+      }
+      const std::size_t child = static_cast<std::size_t>(k);
+      if (out.parents[child] >= 0) return {Errc::invalid_file, file.where("nodes", child) + " hangs on two nodes"};
+      out.parents[child] = static_cast<std::int64_t>(i);
+      children[i].push_back(child);
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (out.parents[i] < 0) out.order.push_back(i);
+  }
+  for (std::size_t at = 0; at < out.order.size(); ++at) {
+    const std::vector<std::size_t>& below = children[out.order[at]];
+    out.order.insert(out.order.end(), below.begin(), below.end());
+  }
+  if (out.order.size() != n) return {Errc::invalid_file, file.source() + ": a node is its own ancestor"};
+  return out;
+}
+
+}  // namespace gsnav::io::detail

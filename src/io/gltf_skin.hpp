@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "gltf_document.hpp"
+#include "gsnav/io/skinned_mesh_file.hpp"
+
+namespace gsnav::io::detail {
+
+/// A skin: the file's own matrices, and the rigid skeleton made of them.
+struct GltfSkin {
+  std::vector<std::size_t> nodes;              ///< [J] of the skeleton's joints
+  std::vector<std::size_t> joint_of;           ///< the skeleton's joint of each entry of the file's list
+  std::vector<Affine3<double>> inverse_binds;  ///< [J] the file's
+  Affine3<double> canonical_from_mesh{};       ///< a rotation times a scale, and a translation
+  Quatd canonical_from_scene{0, 0, 1, 0};      ///< by 180 degrees about Y: glTF faces +Z
+  Skeleton skeleton;
+};
+
+Result<GltfSkin> read_skin(GltfDocument& file, const GltfNodes& nodes, std::size_t index);
+
+/// Fills the surface of `out.mesh`, whose skeleton is there. Positions are those of the bind pose.
+Status read_surface(GltfDocument& file, const GltfSkin& skin, std::size_t index, LoadedSkinnedMesh& out);
+
+/// Joints without their scales, root frame, for the places of the nodes: [J].
+std::vector<Affine3<double>> rigid_joints(const GltfSkin& skin, const std::vector<Affine3<double>>& globals);
+
+/// Fills `out.clips`; `look` is called with the places of all nodes at every tenth key or so.
+struct PoseObserver {
+  virtual ~PoseObserver() = default;
+  virtual void look(const std::vector<Affine3<double>>& globals) = 0;
+};
+Status read_clips(GltfDocument& file, const GltfSkin& skin, const GltfNodes& nodes, double frame_rate,
+                  PoseObserver& observer, LoadedSkinnedMesh& out);
+
+}  // namespace gsnav::io::detail

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "picture.hpp"
+
+#if defined(GSNAV_HAS_JPEG)
+
+#include <csetjmp>
+#include <cstdio>
+#include <cstring>
+#include <vector>
+
+// After <cstdio>, which it needs and does not include.
+#include <jpeglib.h>
+
+namespace gsnav::io::detail {
+namespace {
+
+constexpr unsigned kLargestSide = 16384;
+
+struct ErrorHandler {
+  jpeg_error_mgr base{};
+  std::jmp_buf jump{};
+};
+
+[[noreturn]] void on_error(j_common_ptr info) { std::longjmp(reinterpret_cast<ErrorHandler*>(info->err)->jump, 1); }
+void on_message(j_common_ptr, int) {}
+void print_message(j_common_ptr) {}
+
+/// Decoder with its own lifetime, so that allocation happens outside of setjmp's reach.
+class JpegDecoder {
+ public:
+  JpegDecoder() {
+    info_.err = jpeg_std_error(&error_.base);
+    error_.base.error_exit = on_error;
+    error_.base.emit_message = on_message;
+    error_.base.output_message = print_message;
+  }
+  JpegDecoder(const JpegDecoder&) = delete;
+  JpegDecoder& operator=(const JpegDecoder&) = delete;
+  ~JpegDecoder() { jpeg_destroy_decompress(&info_); }
+
+  bool read_header(std::span<const std::byte> bytes) {
+    if (setjmp(error_.jump) != 0) return false;
+    jpeg_create_decompress(&info_);
+    jpeg_mem_src(&info_, reinterpret_cast<const unsigned char*>(bytes.data()),
+                 static_cast<unsigned long>(bytes.size()));
+    if (jpeg_read_header(&info_, TRUE) != JPEG_HEADER_OK) return false;
+    if (info_.image_width > kLargestSide || info_.image_height > kLargestSide) return false;
+    info_.out_color_space = JCS_RGB;
+    return jpeg_start_decompress(&info_) != 0;
+  }
+  bool read_rows(unsigned char* to) {
+    if (setjmp(error_.jump) != 0) return false;
+    while (info_.output_scanline < info_.output_height) {
+      JSAMPROW row = to + std::size_t{3} * info_.output_width * info_.output_scanline;
+      if (jpeg_read_scanlines(&info_, &row, 1) != 1) return false;
+    }
+    return true;
+  }
+  std::size_t width() const { return info_.output_width; }
+  std::size_t height() const { return info_.output_height; }
+  bool is_rgb() const { return info_.output_components == 3; }
+
+ private:
+  jpeg_decompress_struct info_{};
+  ErrorHandler error_;
+};
+
+}  // namespace
+
+Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
+  JpegDecoder decoder;
+  if (!decoder.read_header(bytes) || !decoder.is_rgb()) {
+    return {Errc::invalid_file, name + ": not a JPEG of three colours, or its header is damaged"};
+  }
+  // An 8 x 8 block of three planes takes a bit of the file each at least.
+  if (decoder.width() * decoder.height() / 512 > bytes.size()) {
+    return {Errc::invalid_file, name + ": " + std::to_string(decoder.width()) + " x " +
+                                    std::to_string(decoder.height()) + " pixels cannot be in " +
+                                    std::to_string(bytes.size()) + " bytes"};
+  }
+  std::vector<unsigned char> pixels(3 * decoder.width() * decoder.height());
+  if (!decoder.read_rows(pixels.data())) return {Errc::invalid_file, name + ": damaged or truncated JPEG data"};
+  PngImage out;
+  out.width = static_cast<int>(decoder.width());
+  out.height = static_cast<int>(decoder.height());
+  out.channels = 3;
+  out.bits = 8;
+  out.samples.assign(pixels.begin(), pixels.end());
+  return out;
+}
+
+}  // namespace gsnav::io::detail
+
+#else
+
+namespace gsnav::io::detail {
+
+Result<PngImage> decode_jpeg(std::span<const std::byte>, const std::string& name) {
+  return {Errc::unsupported, name + ": this build reads no JPEG (libjpeg was not found)"};
+}
+
+}  // namespace gsnav::io::detail
+
+#endif

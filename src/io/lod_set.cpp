@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/io/lod_set.hpp"
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "file.hpp"
+#include "gsnav/io/sog.hpp"
+#include "json.hpp"
+#include "report_sum.hpp"
+#include "sog_rows.hpp"
+#include "zip.hpp"
+
+namespace gsnav::io {
+namespace {
+
+using detail::Json;
+using detail::RowRange;
+
+constexpr std::int64_t kMostLevels = 64, kMostRows = std::int64_t{16383} * 16383;
+
+/// Rows of a file that a node names for a level.
+struct Rows {
+  std::size_t file = 0;
+  RowRange range;
+};
+
+class LodReader {
+ public:
+  LodReader(std::filesystem::path meta, const LoadLodOptions& options)
+      : path_(std::move(meta)), source_(path_.string()), options_(options) {}
+
+  Result<LoadedCloud> run() {
+    const auto text = detail::read_file(path_);
+    if (!text) return text.status();
+    const auto json = detail::parse_json(text->span(), source_);
+    if (!json) return json.status();
+    if (Status s = read_header(*json); !s) return s;
+    if (Status s = walk(*json); !s) return s;
+    if (Status s = check_overlaps(); !s) return s;
+    return load(*json);
+  }
+
+ private:
+  Status fail(const std::string& what) const { return {Errc::invalid_file, source_ + ": " + what}; }
+  std::filesystem::path place(const std::string& name) const { return path_.parent_path() / name; }
+
+  Status read_header(const Json& json) {
+    const auto levels = detail::get_integer(json, "lodLevels", 1, kMostLevels, source_);
+    if (!levels) return levels.status();
+    levels_ = static_cast<int>(*levels);
+    if (options_.level < 0 || options_.level >= levels_) {
+      return {Errc::invalid_argument, source_ + ": level " + std::to_string(options_.level) +
+                                          " is asked for, the set has 0 to " +
+                                          std::to_string(levels_ - 1)};
+    }
+    const Json* names = detail::member(json, "filenames");
+    if (names == nullptr || !names->is_array()) return fail("'filenames' is missing or no array");
+    for (const Json& name : *names) {
+      if (!name.is_string() || !detail::is_safe_name(name.get<std::string>())) {
+        return fail("'filenames' has " + detail::shown(name) + ", must be files below this folder");
+      }
+      files_.push_back(name.get<std::string>());
+      std::error_code ignored;
+      there_.push_back(std::filesystem::exists(place(files_.back()), ignored));
+    }
+    rows_.resize(files_.size());
+    return {};
+  }
+
+  /// Visits all nodes; the depth of the tree costs no stack.
+  Status walk(const Json& json) {
+    const Json* root = detail::member(json, "tree");
+    if (root == nullptr) return fail("'tree' is missing");
+    std::vector<const Json*> open = {root};
+    while (!open.empty()) {
+      const Json& node = *open.back();
+      open.pop_back();
+      if (!node.is_object()) return fail("a node of the tree is " + detail::shown(node));
+      if (const Json* lods = detail::member(node, "lods"); lods != nullptr) {
+        if (Status s = choose(*lods); !s) return s;
+      }
+      const Json* children = detail::member(node, "children");
+      if (children == nullptr || children->is_null()) continue;
+      if (!children->is_array()) return fail("'children' is " + detail::shown(*children));
+      for (auto child = children->rbegin(); child != children->rend(); ++child) open.push_back(&*child);
+    }
+    return {};
+  }
+
+  Status choose(const Json& lods) {
+    if (!lods.is_object()) return fail("'lods' is " + detail::shown(lods) + ", must be an object");
+    const std::string where = source_ + ": node " + std::to_string(nodes_);
+    std::map<int, Rows> there;
+    std::string missing;
+    for (int level = 0; level < levels_; ++level) {
+      const Json* entry = detail::member(lods, std::to_string(level).c_str());
+      if (entry == nullptr) continue;
+      const std::string at = where + ": level " + std::to_string(level);
+      const auto most = static_cast<std::int64_t>(files_.size()) - 1;
+      const auto file = detail::get_integer(*entry, "file", 0, most, at);
+      const auto first = detail::get_integer(*entry, "offset", 0, kMostRows, at);
+      const auto count = detail::get_integer(*entry, "count", 0, kMostRows, at);
+      for (const Status& s : {file.status(), first.status(), count.status()}) {
+        if (!s) return s;
+      }
+      const auto index = static_cast<std::size_t>(*file);
+      if (there_[index]) {
+        there[level] = {index, {static_cast<std::uint64_t>(*first), static_cast<std::uint64_t>(*count)}};
+      } else if (missing.empty()) {
+        missing = place(files_[index]).string();
+      }
+    }
+    ++nodes_;
+    // Where a level has no entry, nothing of the node is left at that level.
+    if (detail::member(lods, std::to_string(options_.level).c_str()) == nullptr) return {};
+    if (there.empty()) {
+      return {Errc::file_not_found, where + ": no file of any level is there, for instance " + missing};
+    }
+    auto chosen = there.lower_bound(options_.level);
+    if (chosen == there.end()) --chosen;
+    if (chosen->first != options_.level) ++instead_[chosen->first];
+    rows_[chosen->second.file].push_back(chosen->second.range);
+    return {};
+  }
+
+  /// Nodes that share rows would let a small set name any number of Gaussians.
+  Status check_overlaps() {
+    for (std::size_t f = 0; f < rows_.size(); ++f) {
+      auto& ranges = rows_[f];
+      std::sort(ranges.begin(), ranges.end(),
+                [](const RowRange& a, const RowRange& b) { return a.first < b.first; });
+      for (std::size_t k = 1; k < ranges.size(); ++k) {
+        if (ranges[k - 1].first + ranges[k - 1].count > ranges[k].first) {
+          return fail("two nodes share rows of " + files_[f] + " from " +
+                      std::to_string(ranges[k].first));
+        }
+      }
+    }
+    return {};
+  }
+
+  Result<LoadedCloud> load(const Json& json) const {
+    LoadedCloud out;
+    out.report.source = source_;
+    for (const auto& [level, nodes] : instead_) {
+      out.report.warnings.push_back("level " + std::to_string(options_.level) + " of " +
+                                    std::to_string(nodes) + " of " + std::to_string(nodes_) +
+                                    " nodes is not there: level " + std::to_string(level) + " is read");
+    }
+    for (std::size_t f = 0; f < files_.size(); ++f) {
+      if (rows_[f].empty()) continue;
+      auto part = detail::load_sog_rows(place(files_[f]), rows_[f]);
+      if (Status s = detail::merge_loaded(out, std::move(part), place(files_[f]).string()); !s) return s;
+    }
+    const Json* environment = detail::member(json, "environment");
+    if (!options_.environment || environment == nullptr || environment->is_null()) return out;
+    if (!environment->is_string() || !detail::is_safe_name(environment->get<std::string>())) {
+      return fail("'environment' is " + detail::shown(*environment) +
+                  ", must be a file below this folder");
+    }
+    const auto shell = place(environment->get<std::string>());
+    std::error_code ignored;
+    if (!std::filesystem::exists(shell, ignored)) {
+      out.report.warnings.push_back("the environment " + shell.string() + " is not there");
+      return out;
+    }
+    if (Status s = detail::merge_loaded(out, load_sog(shell), shell.string()); !s) return s;
+    return out;
+  }
+
+  std::filesystem::path path_;
+  std::string source_;
+  const LoadLodOptions& options_;
+  int levels_ = 0;
+  std::size_t nodes_ = 0;
+  std::vector<std::string> files_;
+  std::vector<bool> there_;
+  std::vector<std::vector<RowRange>> rows_;  ///< of each file
+  std::map<int, std::size_t> instead_;       ///< nodes read at another level than the one asked for
+};
+
+}  // namespace
+
+Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLodOptions& options) {
+  return detail::guarded(path.string(), [&] {
+    std::error_code ignored;
+    const bool folder = std::filesystem::is_directory(path, ignored);
+    return LodReader(folder ? path / "lod-meta.json" : path, options).run();
+  });
+}
+
+}  // namespace gsnav::io

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cctype>
+
+#include "gsnav/io/gltf.hpp"
+#include "gsnav/io/ply.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/io/sog.hpp"
+#include "gsnav/io/splat.hpp"
+#include "gsnav/io/spz.hpp"
+
+namespace gsnav::io {
+
+Status save_scene(const std::filesystem::path& path, const GaussianCloud& cloud) {
+  std::string name = path.filename().string();
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (name.ends_with(".compressed.ply")) return save_compressed_ply(path, cloud);
+  if (name.ends_with(".ply")) return save_ply(path, cloud);
+  if (name.ends_with(".splat")) return save_splat(path, cloud);
+  if (name.ends_with(".spz")) return save_spz(path, cloud);
+  if (name.ends_with(".sog") || name == "meta.json") return save_sog(path, cloud);
+  if (name.ends_with(".glb")) return save_glb(path, cloud);
+  return {Errc::unsupported,
+          path.string() +
+              ": not a name that is written here: .ply, .compressed.ply, .splat, .spz, .sog, meta.json "
+              "or .glb"};
+}
+
+}  // namespace gsnav::io

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cloud_check.hpp"
+#include "codebook.hpp"
+#include "file.hpp"
+#include "gsnav/io/sog.hpp"
+#include "json.hpp"
+#include "quantised.hpp"
+#include "webp.hpp"
+#include "zip_writer.hpp"
+
+namespace gsnav::io {
+namespace {
+
+using detail::Json;
+using detail::RgbaImage;
+
+constexpr std::size_t kLargestPalette = 65536, kSmallPalette = 1024;  // labels have two bytes
+constexpr std::size_t kEntriesPerRow = 64;
+constexpr std::size_t kMostSide = 16383;  // of a WebP
+constexpr double kLeastLogScale = -20;    // stands for a flat axis, whose logarithm is -infinity
+
+/// The files of a SOG by name, in the order in which they are written.
+using Files = std::vector<std::pair<std::string, std::string>>;
+
+class SogWriter {
+ public:
+  SogWriter(const GaussianCloud& cloud, const std::string& target) : cloud_(cloud), target_(target) {}
+
+  Result<Files> run() {
+    if (Status s = detail::check_arrays(target_, cloud_); !s) return s;
+    const std::size_t n = cloud_.size();
+    width_ = std::max<std::size_t>(
+        4, 4 * static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(n)) / 4)));
+    height_ = std::max<std::size_t>(1, (n + width_ - 1) / width_);
+    if (width_ > kMostSide) {
+      return {Errc::unsupported, target_ + ": " + std::to_string(n) +
+                                     " Gaussians are more than one SOG holds; write tiles"};
+    }
+    meta_ = {{"version", 2}, {"asset", {{"generator", "gsnav"}}}, {"count", n}};
+    meta_["antialias"] = cloud_.filter == Filter::mip;
+    for (const Status& s : {means(), scales(), quats(), colours(), bands()}) {
+      if (!s) return s;
+    }
+    files_.emplace_back("meta.json", meta_.dump());
+    return std::move(files_);
+  }
+
+ private:
+  RgbaImage plane() const {
+    return {width_, height_, std::vector<std::uint8_t>(4 * width_ * height_, 255)};
+  }
+
+  Status add(const std::string& name, const RgbaImage& image) {
+    auto bytes = detail::encode_webp(image, target_ + ": " + name);
+    if (!bytes) return bytes.status();
+    files_.emplace_back(name, std::move(*bytes));
+    return {};
+  }
+
+  /// sign(v) log(1 + |v|), so that far things take fewer of the steps.
+  static double squeezed(double v) { return std::copysign(std::log1p(std::fabs(v)), v); }
+
+  Status means() {
+    double low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
+    for (std::size_t i = 0; i < cloud_.size(); ++i) {
+      const Vec3d m = cloud_.mean(i);
+      for (int k = 0; k < 3; ++k) {
+        const double v = squeezed(m[k]);
+        low[k] = i == 0 ? v : std::min(low[k], v);
+        high[k] = i == 0 ? v : std::max(high[k], v);
+      }
+    }
+    RgbaImage lower = plane(), upper = plane();
+    for (std::size_t i = 0; i < cloud_.size(); ++i) {
+      const Vec3d m = cloud_.mean(i);
+      for (int k = 0; k < 3; ++k) {
+        const double t = high[k] > low[k] ? (squeezed(m[k]) - low[k]) / (high[k] - low[k]) : 0;
+        const std::uint32_t step = detail::nearest_step(t, 16);
+        const std::size_t at = 4 * i + static_cast<std::size_t>(k);
+        lower.pixels[at] = static_cast<std::uint8_t>(step & 255);
+        upper.pixels[at] = static_cast<std::uint8_t>(step >> 8);
+      }
+    }
+    meta_["means"] = {{"mins", low}, {"maxs", high}, {"files", {"means_l.webp", "means_u.webp"}}};
+    if (Status s = add("means_l.webp", lower); !s) return s;
+    return add("means_u.webp", upper);
+  }
+
+  Status scales() {
+    const std::size_t n = cloud_.size();
+    std::vector<float> logs(3 * n);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double log_scale = std::log(static_cast<double>(cloud_.scales[k][i]));
+        logs[3 * i + k] = static_cast<float>(std::max(log_scale, kLeastLogScale));
+      }
+    }
+    const detail::ScalarCodebook book(logs);
+    RgbaImage image = plane();
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) image.pixels[4 * i + k] = book.index(logs[3 * i + k]);
+    }
+    meta_["scales"] = {{"codebook", book.entries()}, {"files", {"scales.webp"}}};
+    return add("scales.webp", image);
+  }
+
+  Status quats() {
+    constexpr std::size_t kFirstMode = 252;
+    RgbaImage image = plane();
+    for (std::size_t i = 0; i < cloud_.size(); ++i) {
+      double q[4], others[3];
+      for (std::size_t k = 0; k < 4; ++k) q[k] = static_cast<double>(cloud_.quats[k][i]);
+      const std::size_t largest = detail::smallest_three(q, others);
+      for (std::size_t k = 0; k < 3; ++k) {
+        image.pixels[4 * i + k] =
+            static_cast<std::uint8_t>(detail::nearest_step(others[k] * std::sqrt(0.5) + 0.5, 8));
+      }
+      image.pixels[4 * i + 3] = static_cast<std::uint8_t>(kFirstMode + largest);
+    }
+    meta_["quats"] = {{"files", {"quats.webp"}}};
+    return add("quats.webp", image);
+  }
+
+  Status colours() {
+    const detail::ScalarCodebook book(cloud_.sh0);
+    RgbaImage image = plane();
+    for (std::size_t i = 0; i < cloud_.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) image.pixels[4 * i + k] = book.index(cloud_.sh0[3 * i + k]);
+      image.pixels[4 * i + 3] =
+          static_cast<std::uint8_t>(detail::nearest_step(static_cast<double>(cloud_.opacities[i]), 8));
+    }
+    meta_["sh0"] = {{"codebook", book.entries()}, {"files", {"sh0.webp"}}};
+    return add("sh0.webp", image);
+  }
+
+  Status bands() {
+    if (cloud_.sh_degree == 0 || cloud_.size() == 0) return {};
+    const std::size_t width = detail::rest_width(cloud_);
+    const std::size_t most = std::clamp(cloud_.size() / 2, kSmallPalette, kLargestPalette);
+    const detail::VectorPalette palette = detail::make_palette(cloud_.shN, width, most);
+    const detail::ScalarCodebook book(palette.entries);
+    const std::size_t rows = (palette.size + kEntriesPerRow - 1) / kEntriesPerRow;
+    RgbaImage centroids{kEntriesPerRow * width / 3, rows, {}};
+    centroids.pixels.assign(4 * centroids.width * rows, 255);
+    for (std::size_t k = 0; k < palette.entries.size(); ++k) {
+      centroids.pixels[k / 3 * 4 + k % 3] = book.index(palette.entries[k]);
+    }
+    RgbaImage labels = plane();
+    for (std::size_t i = 0; i < cloud_.size(); ++i) {
+      labels.pixels[4 * i] = static_cast<std::uint8_t>(palette.labels[i] & 255);
+      labels.pixels[4 * i + 1] = static_cast<std::uint8_t>(palette.labels[i] >> 8);
+      labels.pixels[4 * i + 2] = 0;
+    }
+    meta_["shN"] = {{"count", palette.size},
+                    {"bands", cloud_.sh_degree},
+                    {"codebook", book.entries()},
+                    {"files", {"shN_centroids.webp", "shN_labels.webp"}}};
+    if (Status s = add("shN_centroids.webp", centroids); !s) return s;
+    return add("shN_labels.webp", labels);
+  }
+
+  const GaussianCloud& cloud_;
+  const std::string& target_;
+  std::size_t width_ = 0, height_ = 0;
+  Json meta_;
+  Files files_;
+};
+
+Status write(const std::filesystem::path& path, const std::string& content) {
+  detail::OutFile out;
+  if (Status s = out.open(path); !s) return s;
+  out.write(content.data(), content.size());
+  return out.close();
+}
+
+}  // namespace
+
+Status save_sog(const std::filesystem::path& path, const GaussianCloud& cloud) {
+  const std::string target = path.string();
+  return detail::guarded(target, [&]() -> Status {
+    const bool bundle = path.extension() == ".sog";
+    if (!bundle && path.filename() != "meta.json") {
+      return {Errc::invalid_argument, target + ": a SOG is a file *.sog or a folder's meta.json"};
+    }
+    const auto files = SogWriter(cloud, target).run();
+    if (!files) return files.status();
+    if (!bundle) {
+      for (const auto& [name, content] : *files) {
+        if (Status s = write(path.parent_path() / name, content); !s) return s;
+      }
+      return {};
+    }
+    detail::ZipWriter zip(target);
+    for (const auto& [name, content] : *files) {
+      if (Status s = zip.add(name, content, false); !s) return s;  // WebP is packed already
+    }
+    return write(path, zip.entries() + zip.finish());
+  });
+}
+
+}  // namespace gsnav::io

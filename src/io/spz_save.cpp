@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "cloud_check.hpp"
+#include "file.hpp"
+#include "gsnav/io/spz.hpp"
+#include "quantised.hpp"
+#include "spz_planes.hpp"
+
+namespace gsnav::io {
+namespace {
+
+constexpr int kLevel = 12;  // of zstd: beyond it the files hardly shrink
+constexpr std::uint32_t kTocOffset = 32;
+
+using Plane = std::vector<std::uint8_t>;
+
+class SpzWriter {
+ public:
+  SpzWriter(const GaussianCloud& cloud, const SaveSpzOptions& options, const std::string& target)
+      : cloud_(cloud), options_(options), target_(target), turn_(options.keep_axes ? 1.0 : -1.0) {}
+
+  Status run(const std::filesystem::path& path) {
+    if (Status s = check(); !s) return s;
+    const std::size_t coefficients = header_.coefficients();
+    const auto widths = header_.widths();
+    for (std::size_t k = 0; k < 6; ++k) planes_[k].reserve(widths[k] * cloud_.size());
+    for (std::size_t i = 0; i < cloud_.size(); ++i) add(i, coefficients);
+    std::vector<Plane> streams;
+    std::vector<std::array<std::uint64_t, 2>> toc;
+    for (std::size_t k = 0; k < 6; ++k) {
+      if (widths[k] == 0) continue;
+      Plane packed(ZSTD_compressBound(planes_[k].size()));
+      const std::size_t n =
+          ZSTD_compress(packed.data(), packed.size(), planes_[k].data(), planes_[k].size(), kLevel);
+      if (ZSTD_isError(n) != 0) {
+        return {Errc::out_of_memory, target_ + ": zstd: " + ZSTD_getErrorName(n)};
+      }
+      packed.resize(n);
+      toc.push_back({n, planes_[k].size()});
+      streams.push_back(std::move(packed));
+    }
+    detail::OutFile out;
+    if (Status s = out.open(path); !s) return s;
+    const std::uint32_t head[] = {detail::kSpzMagic, header_.version, header_.count};
+    const std::uint8_t small[] = {
+        static_cast<std::uint8_t>(header_.degree), static_cast<std::uint8_t>(header_.fractional_bits),
+        static_cast<std::uint8_t>(header_.flags), static_cast<std::uint8_t>(streams.size())};
+    const std::uint32_t tail[] = {kTocOffset, 0, 0, 0};
+    out.write(head, sizeof head);
+    out.write(small, sizeof small);
+    out.write(tail, sizeof tail);
+    for (const auto& entry : toc) out.write(entry.data(), sizeof entry);
+    for (const Plane& stream : streams) out.write(stream.data(), stream.size());
+    return out.close();
+  }
+
+ private:
+  Status fail(const std::string& what) const { return {Errc::invalid_argument, target_ + ": " + what}; }
+
+  Status check() {
+    if (Status s = detail::check_arrays(target_, cloud_); !s) return s;
+    if (cloud_.size() > 0xffffffff) return fail("SPZ counts with 32 bits");
+    if (options_.fractional_bits < 0 || options_.fractional_bits > 23) {
+      return fail("fractional_bits is " + std::to_string(options_.fractional_bits) +
+                  ", must be 0 to 23");
+    }
+    for (const int bits : {options_.sh1_bits, options_.sh_rest_bits}) {
+      if (bits < 1 || bits > 8) {
+        return fail(std::to_string(bits) + " bits for SH bands, must be 1 to 8");
+      }
+    }
+    double farthest = 0;
+    for (std::size_t i = 0; i < cloud_.size(); ++i) {
+      const Vec3d m = cloud_.mean(i);
+      for (int k = 0; k < 3; ++k) farthest = std::max(farthest, std::fabs(m[k]));
+    }
+    int bits = options_.fractional_bits;
+    while (bits >= 0 && std::ldexp(farthest, bits) > kMostSteps) --bits;
+    if (bits < 0) {
+      return fail("a mean is " + std::to_string(farthest) + " m out, SPZ reaches 8388607 m");
+    }
+    header_.count = static_cast<std::uint32_t>(cloud_.size());
+    header_.degree = cloud_.sh_degree;
+    header_.fractional_bits = bits;
+    header_.flags = cloud_.filter == Filter::mip ? detail::kSpzAntialiased : 0;
+    return {};
+  }
+
+  void add(std::size_t i, std::size_t coefficients) {
+    const Vec3d m = cloud_.mean(i);
+    const double place[] = {m.x, turn_ * m.y, turn_ * m.z};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto steps =
+          static_cast<std::int32_t>(std::nearbyint(std::ldexp(place[k], header_.fractional_bits)));
+      for (int shift = 0; shift < 24; shift += 8) {
+        planes_[0].push_back(static_cast<std::uint8_t>(static_cast<std::uint32_t>(steps) >> shift));
+      }
+      const double colour = static_cast<double>(cloud_.sh0[3 * i + k]) * 0.15 + 0.5;
+      planes_[2].push_back(static_cast<std::uint8_t>(detail::nearest_step(colour, 8)));
+      const double log_scale = std::log(static_cast<double>(cloud_.scales[k][i]));
+      planes_[3].push_back(
+          static_cast<std::uint8_t>(detail::nearest_step((log_scale + 10) * 16 / 255, 8)));
+    }
+    const double opacity = static_cast<double>(cloud_.opacities[i]);
+    planes_[1].push_back(static_cast<std::uint8_t>(detail::nearest_step(opacity, 8)));
+    add_quaternion(i);
+    for (std::size_t k = 0; k < 3 * coefficients; ++k) {
+      const float sign = options_.keep_axes ? 1.0f : detail::kHalfTurnAboutX[k / 3];
+      const int bits = k < 9 ? options_.sh1_bits : options_.sh_rest_bits;
+      planes_[5].push_back(
+          sh_byte(static_cast<double>(sign * cloud_.shN[3 * coefficients * i + k]), bits));
+    }
+  }
+
+  void add_quaternion(std::size_t i) {
+    const auto part = [&](std::size_t k) { return static_cast<double>(cloud_.quats[k][i]); };
+    const double xyzw[4] = {part(1), turn_ * part(2), turn_ * part(3), part(0)};
+    double others[3];
+    std::uint32_t word = static_cast<std::uint32_t>(detail::smallest_three(xyzw, others));
+    for (const double c : others) {
+      const std::uint32_t magnitude = detail::nearest_step(std::fabs(c) * std::sqrt(2.0), 9);
+      word = word << 10 | (c < 0 ? 512u : 0u) | magnitude;
+    }
+    for (int shift = 0; shift < 32; shift += 8) {
+      planes_[4].push_back(static_cast<std::uint8_t>(word >> shift));
+    }
+  }
+
+  /// The nearest of the 2^bits steps over [-1, 1), of which the middle one is zero.
+  static std::uint8_t sh_byte(double v, int bits) {
+    const double step = std::exp2(8 - bits);
+    const double most = 256 - step;
+    return static_cast<std::uint8_t>(
+        std::clamp(std::nearbyint((v * 128 + 128) / step) * step, 0.0, most));
+  }
+
+  static constexpr double kMostSteps = 8388607;
+
+  const GaussianCloud& cloud_;
+  const SaveSpzOptions& options_;
+  const std::string& target_;
+  double turn_;  ///< of y and z
+  detail::SpzHeader header_;
+  std::array<Plane, 6> planes_;
+};
+
+}  // namespace
+
+Status save_spz(const std::filesystem::path& path, const GaussianCloud& cloud,
+                const SaveSpzOptions& options) {
+  const std::string target = path.string();
+  return detail::guarded(target, [&] { return SpzWriter(cloud, options, target).run(path); });
+}
+
+}  // namespace gsnav::io

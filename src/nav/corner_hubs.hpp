@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "geodesic_search.hpp"
+
+namespace gsnav::detail {
+
+/// Shortest paths by the corners that they bend at, without a search.
+///
+/// Each face keeps which corners its points can see; each corner keeps its distance to some hubs, chosen so that
+/// any two corners have a hub on a shortest path between them (pruned landmark labels, Akiba, Iwata and Yoshida
+/// 2013). The least sum over both ends' corners and a common hub is the shortest path that bends (Euclidean hub
+/// labels, Du, Shen and Cui 2023), on unfolded faces as well as on level ones.
+class CornerHubs {
+ public:
+  /// Makes nothing, so that empty() holds, for a mesh of more corners or sights than these, or whose labels take more
+  /// comparisons (a tenth of a second): a hall of thousands of pillars, each of which sees many others.
+  static constexpr std::size_t kMostCorners = std::size_t{1} << 12, kMostSights = std::size_t{1} << 19,
+                               kMostWork = std::size_t{1} << 26;
+  explicit CornerHubs(const UnfoldedMesh& mesh);
+
+  bool empty() const noexcept { return first_sight_.empty(); }
+  std::size_t corners() const noexcept { return corners_.size(); }
+  std::size_t sights() const noexcept { return sights_.size(); }
+  std::size_t labels() const noexcept { return labels_.size(); }
+
+  /// A path that bends: from the start straight to corner `first`, by way of the hub to `last`, and to the goal.
+  struct Way {
+    double length = std::numeric_limits<double>::infinity();
+    std::uint32_t first = 0, hub = 0, last = 0;
+    std::uint32_t near_goal = UnfoldedMesh::kNone;  ///< the corner nearest to the goal of those that it sees,
+    double to_goal = 0;                             ///< and its distance
+
+    void set(double l, std::uint32_t f, std::uint32_t h, std::uint32_t g) noexcept {
+      length = l;
+      first = f;
+      hub = h;
+      last = g;
+    }
+  };
+  /// Distances to a way's goal from below: by the triangle inequality, with the corner near the goal. Until the
+  /// thread's next one.
+  class LeastToGoal final : public GoalBound {
+   public:
+    LeastToGoal(const CornerHubs& hubs, const Way& way);
+    double from(std::uint32_t vertex) const noexcept override;
+
+   private:
+    const CornerHubs& hubs_;
+    const Way& way_;
+  };
+  /// The shortest path among those that bend; infinite length where there is none.
+  Way shortest(const Site& start, const Site& goal) const;
+  /// All points where the way bends, in order.
+  std::vector<Site> bends(const Way& way) const;
+
+ private:
+  /// A corner and the window of the face's edge that it sees the face through; no width for the face's own corners.
+  struct Sight {
+    Flat root, right, left;
+    std::uint32_t corner = 0;
+  };
+  struct Label {
+    double length = 0;
+    std::uint32_t hub = 0;   ///< its rank: labels of a corner are sorted by it
+    std::uint32_t next = 0;  ///< corner on the way to the hub
+  };
+  struct Link {
+    double length = 0;
+    std::uint32_t corner = 0;
+  };
+
+  struct Seen {
+    double straight = 0, least = 0;  ///< to the corner; no way by it to the other end is shorter
+    std::uint32_t corner = 0;
+  };
+
+  /// False where there is too much of it.
+  bool look(const UnfoldedMesh& mesh, std::vector<std::vector<Link>>& links);
+  void rank(const std::vector<std::vector<Link>>& links);
+  bool label(const std::vector<std::vector<Link>>& links);
+  /// The corners that a site sees; the one that leads most nearly to the other site first.
+  void look_from(const Site& from, const Site& to, std::vector<Seen>& out) const;
+  /// Makes `best` the way by way of two corners where that is shorter.
+  void meet(const Seen& a, const Seen& b, Way& best) const noexcept;
+
+  std::vector<Site> corners_;
+  std::vector<std::uint32_t> corner_of_;    ///< of each vertex; kNone where no path bends
+  std::vector<std::uint32_t> first_sight_;  ///< of each face, and one past the last
+  std::vector<Sight> sights_;
+  std::vector<std::uint32_t> first_label_;  ///< of each corner, and one past the last
+  std::vector<Label> labels_;
+  std::vector<std::uint32_t> hub_corner_;  ///< by rank
+};
+
+}  // namespace gsnav::detail

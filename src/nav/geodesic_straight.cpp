@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "geodesic_search.hpp"
+
+// Paths that do not bend: from a site to a goal, and from a vertex all around.
+
+namespace gsnav::detail {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kRounding = 1e-9;  // radians
+
+}  // namespace
+
+double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound,
+                                    const GoalBound* least) {
+  start_ = start;
+  goal_ = goal;
+  has_goal_ = straight_ = true;
+  every_vertex_ = false;
+  if (start.face == goal.face) return length(goal.at - start.at);
+  begin(mesh, bound);
+  least_ = least;
+  leave(start);
+  // There are few, so that their order saves nothing.
+  constexpr std::size_t kMost = 1 << 14;
+  while (!heap_.empty() && nodes_.size() < kMost) {
+    const std::uint32_t node = heap_.back().second;
+    heap_.pop_back();
+    spread_window(node);
+  }
+  least_ = nullptr;
+  if (!heap_.empty()) return run(mesh, start, goal, bound);
+  return found_ ? best_ : kInfinity;
+}
+
+std::size_t GeodesicSearch::look_around(const UnfoldedMesh& mesh, std::uint32_t vertex) {
+  has_goal_ = every_vertex_ = false;
+  straight_ = true;
+  begin(mesh);
+  const UnfoldedMesh::Vertex& v = mesh.vertices[vertex];
+  seen_[vertex] = round_;
+  distance_[vertex] = 0;
+  if (v.closed || v.total > 2 * kPi - kRounding) {
+    leave_vertex(vertex, 0.0, kNone, 0.0, v.total);
+    settle();
+    return nodes_.size();
+  }
+  // Half a turn or more away from another way between the walls.
+  leave_vertex(vertex, 0.0, kNone, 0.0, v.total - kPi + kRounding);
+  leave_vertex(vertex, 0.0, kNone, kPi - kRounding, v.total);
+  settle();
+  const std::size_t bending = nodes_.size();
+  leave_vertex(vertex, 0.0, kNone, v.total - kPi, kPi);
+  settle();
+  return bending;
+}
+
+void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left,
+                                   std::uint32_t parent) {
+  const UnfoldedMesh::Edge &here = mesh_->edges[edge], &there = mesh_->edges[here.twin],
+                           &after = mesh_->edges[mesh_->next(edge)];
+  const double to_right = length(right - root), to_left = length(left - root);
+  // Where there are many: moving off a corner, what is left may shrink by as much, the way there grows by less, so that
+  // the far end is the least.
+  constexpr std::size_t kMany = 24;
+  if (least_ != nullptr && nodes_.size() > kMany) {
+    if (to_left + least_->from(here.vertex) - length(left - here.at) >= best_ ||
+        to_right + least_->from(there.vertex) - length(right - after.at) >= best_) {
+      return;
+    }
+  }
+  Node n;
+  n.root = UnfoldedMesh::across(here, root);
+  n.right = UnfoldedMesh::across(here, right);
+  n.left = UnfoldedMesh::across(here, left);
+  n.edge = here.twin;
+  n.parent = parent;
+  const Flat e = left - right;
+  const double width = length(e);
+  if (there.face == goal_.face) {
+    const Flat to = goal_.at - n.right, along = n.left - n.right;
+    const double f = length_through(n.root, n.right, n.left, dot(to, along) / width, std::abs(cross(along, to)) / width);
+    if (f >= best_) return;
+    nodes_.push_back(n);
+    offer_goal(f, static_cast<std::uint32_t>(nodes_.size() - 1));
+    return;
+  }
+  // From the middle of the window no end is farther than half of it.
+  const Flat side = after.at - here.at;
+  const double at = dot((left + right) * 0.5 - here.at, side) / dot(side, side);
+  const Vec3d &a = here.corner, &b = after.corner;
+  const Vec3d middle{a.x + at * (b.x - a.x), a.y + at * (b.y - a.y), a.z + at * (b.z - a.z)};
+  const double beyond = distance(goal_.position, middle);
+  if (0.5 * (to_right + to_left) + beyond - width >= best_) return;
+  heap_.emplace_back(0.0, static_cast<std::uint32_t>(nodes_.size()));
+  nodes_.push_back(n);
+}
+
+}  // namespace gsnav::detail

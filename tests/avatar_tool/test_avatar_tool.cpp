@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program as people run it.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "gsnav/avatar/clip_walk.hpp"
+#include "gsnav/avatar/humanoid.hpp"
+#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/io/motion_file.hpp"
+#include "gsnav/nav/navmesh_file.hpp"
+#include "io/files.hpp"
+#include "support/command.hpp"
+#include "support/data.hpp"
+
+using namespace gsnav;
+using gsnav_test::data_file;
+using gsnav_test::Outcome;
+using gsnav_test::quoted;
+using gsnav_test::run_command;
+using gsnav_test::TempFolder;
+
+namespace {
+
+Outcome run(const TempFolder& folder, const std::string& arguments) {
+  return run_command(GSNAV_AVATAR, arguments, folder.path());
+}
+
+/// A floor of 10 m by 10 m with a wall in it that leaves a passage at one end.
+void write_floor(const std::filesystem::path& path) {
+  std::vector<Vec3d> v{{0, 0, 0}, {10, 0, 0}, {10, 0, 10}, {0, 0, 10}, {0, 0, 5}, {7, 0, 5}, {7, 2, 5}, {0, 2, 5}};
+  const std::vector<NavMesh::Triangle> t{{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {4, 6, 5}, {4, 7, 6}};
+  NavMeshSettings settings;
+  settings.agent_radius = 0.25;
+  save_navmesh(NavMesh::build(settings, v, t).value(), path).throw_if_error();
+}
+
+}  // namespace
+
+TEST_CASE("avatar tool: somebody walks around a wall") {
+  const TempFolder folder("avatar_tool_walk");
+  write_floor(folder / "floor.navmesh");
+  const AvatarAsset person = make_humanoid({.gaussians = 4000});
+  io::save_avatar(folder / "person.npz", person).throw_if_error();
+  // A clip of its own walk, two cycles, as a driver.
+  const WalkMotion gait = WalkMotion::create(person.skeleton).value();
+  io::DriverFrames clip;
+  clip.frame_rate = 60;
+  clip.joints = person.skeleton.size();
+  LocalPose pose;
+  std::vector<Affine3<double>> joints;
+  for (int k = 0; k <= 60; ++k) {
+    gait.pose(k / 60.0, 1.0, 0.0, pose);
+    forward_kinematics(person.skeleton, pose, joints);
+    clip.matrices.insert(clip.matrices.end(), joints.begin(), joints.end());
+  }
+  io::save_driver(folder / "clip.npz", clip).throw_if_error();
+  const std::string common = "walk --avatar " + quoted(folder / "person.npz") + " --navmesh " +
+                             quoted(folder / "floor.navmesh") + " --clip " + quoted(folder / "clip.npz") + " --out " +
+                             quoted(folder / "walk.npz");
+  const Outcome made = run(folder, common + " --from 1,0,2 --via 5,0,4 --to 1,0,8 --speed 1.2");
+  INFO(made.text);
+  REQUIRE(made.ok);
+  CHECK(made.says("feet slide"));
+  const auto driver = io::load_driver(folder / "walk.npz", person.skeleton);
+  REQUIRE(driver.ok());
+  const MotionClip& walk = driver->clip;
+  CHECK(walk.frame_rate == 40);
+  REQUIRE(driver->capsules.size() == walk.frames());
+  REQUIRE(driver->capsules[0].size() == person.capsules.size());
+  const auto mesh = load_navmesh(folder / "floor.navmesh").value();
+  double length = 0, turn = 0, off = 0, lowest = 9, highest = -9;
+  Vec3d before{}, heading{};
+  for (std::size_t t = 0; t < walk.frames(); ++t) {
+    MotionInput in;
+    in.time = static_cast<double>(t) / 40;
+    walk.pose(in, pose);
+    forward_kinematics(person.skeleton, pose, joints);
+    const Vec3d root = joints[0].translation + pose.root;
+    double low = 9;
+    for (const auto& j : joints) low = std::min(low, (j.translation + pose.root).y);
+    lowest = std::min(lowest, low);
+    highest = std::max(highest, low);
+    const Vec3d left = joints[1].translation - joints[2].translation, ahead{left.z, 0, -left.x};
+    if (t > 0) {
+      length += std::hypot(root.x - before.x, root.z - before.z);
+      const double c = dot(normalized(ahead), normalized(heading));
+      turn = std::max(turn, std::acos(std::min(1.0, c)) * 40);
+    }
+    before = root;
+    heading = ahead;
+    const auto on = mesh.snap_point({root.x, 0, root.z});
+    REQUIRE(on);
+    off = std::max(off, std::hypot(on->position.x - root.x, on->position.z - root.z));
+  }
+  const double shortest = mesh.geodesic_distance({1, 0, 2}, {5, 0, 4}) + mesh.geodesic_distance({5, 0, 4}, {1, 0, 8});
+  CHECK(length > 0.98 * shortest);
+  CHECK(length < 1.10 * shortest);  // hips sway
+  CHECK(off < 0.06);
+  CHECK(turn < 5.0);  // radians a second: nobody spins round
+  // The root follows the surface, which the mesh keeps to within its cells' height.
+  CHECK(lowest > -0.02);
+  CHECK(highest < 0.35);
+  CHECK(std::hypot(before.x - 1, before.z - 8) < 0.06);
+
+  CHECK(run(folder, common + " --from 1,0,2 --to 30,0,8").says("floor.navmesh"));
+  CHECK(run(folder, common + " --from 1,0 --to 3,0,8").says("'1,0' is no point"));
+  CHECK(run(folder, common + " --from 1,0,2 --to 3,0,8 --first-key 50 --keys 20").says("no cycle"));
+  CHECK(run(folder, "walk --avatar none.npz --navmesh none --clip none.bvh --from 0,0,0 --to 1,0,0 --out x.npz")
+            .says("none.npz"));
+  CHECK_FALSE(run(folder, "").ok);
+  CHECK(run(folder, "--help").ok);
+}
+
+TEST_CASE("avatar tool: from a rigged file to an avatar and its driver") {
+  const TempFolder folder("avatar_tool_mesh");
+  const std::string glb = data_file("avatars/lumberjack.glb");
+  if (glb.empty()) return;
+  const std::string common =
+      "from-gltf " + quoted(std::filesystem::path(glb)) + " --gaussians 5000 --out " + quoted(folder / "a.npz");
+  const Outcome made = run(folder, common + " --clip Walk --driver " + quoted(folder / "d.npz"));
+  INFO(made.text);
+  REQUIRE(made.ok);
+  const auto avatar = io::load_avatar(folder / "a.npz");
+  REQUIRE(avatar.ok());
+  CHECK(avatar->asset.size() > 4500);
+  CHECK(avatar->asset.capsules.size() > 10);
+  const auto driver = io::load_driver(folder / "d.npz", avatar->asset.skeleton);
+  REQUIRE(driver.ok());
+  CHECK(driver->clip.frames() == 41);
+  CHECK(driver->capsules[0].size() == avatar->asset.capsules.size());
+  CHECK(run(folder, common + " --clip Dance").says("there are: Walk, Poses, A-pose"));
+  CHECK(run(folder, common + " --influences 5").says("5"));
+}

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program as people run it, and what it measures.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <string>
+
+#include "compare.hpp"
+#include "gsnav/io/ply.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/edit_cloud.hpp"
+#include "io/check_turned.hpp"
+#include "io/ply_file.hpp"
+#include "support/command.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+Outcome run(const TempFolder& folder, const std::string& arguments) {
+  return run_command(GSNAV_CONVERT, arguments, folder.path());
+}
+
+GaussianCloud cloud_of(const std::vector<PlyRow>& rows, int rest) {
+  PlyFile file;
+  file.properties = inria_properties(rest, "double");
+  file.rows = rows;
+  return io::parse_ply(bytes_of(file.text()), "rows").value().cloud;
+}
+
+GaussianCloud random_cloud(std::size_t n, unsigned seed) {
+  return cloud_of(random_rows(n, 45, seed), 45);
+}
+
+GaussianCloud load(const TempFolder& folder, const char* name) {
+  return io::load_scene((folder / name).string()).value().cloud;
+}
+
+/// The number behind `key` in what the program printed.
+double number_behind(const std::string& text, const std::string& key) {
+  const std::size_t at = text.find(key);
+  REQUIRE(at != std::string::npos);
+  return std::strtod(text.c_str() + at + key.size(), nullptr);
+}
+
+}  // namespace
+
+TEST_CASE("convert: every format, with the error that it adds") {
+  const TempFolder folder("convert");
+  REQUIRE(io::save_ply(folder / "in.ply", random_cloud(800, 3)).ok());
+  const GaussianCloud source = load(folder, "in.ply");
+  struct Target {
+    const char* name;
+    double mean, least_psnr;
+  };
+  // Bounds of the formats: float32, half of 2^-12 m along each axis, 1/2046 of the range in y, ...
+  const Target all[] = {{"a.ply", 1e-5, 100}, {"a.glb", 1e-5, 100},           {"a.splat", 1e-5, 10},
+                        {"a.spz", 3e-4, 25},  {"a.compressed.ply", 0.05, 25}, {"a.sog", 2e-3, 25}};
+  for (const Target& t : all) {
+    CAPTURE(t.name);
+    const Outcome out =
+        run(folder, std::string("in.ply ") + t.name + " --width 64 --height 48 --views 3");
+    CAPTURE(out.text);
+    REQUIRE(out.ok);
+    CHECK(load(folder, t.name).size() == 800);
+    CHECK(number_behind(out.text, "mean ") <= t.mean);
+    CHECK(out.text.find("3 images of 64x48") != std::string::npos);
+    const double psnr = number_behind(out.text, "PSNR ");
+    CHECK(psnr > t.least_psnr);
+    CHECK(number_behind(out.text, "the worst ") <= psnr);
+  }
+}
+
+TEST_CASE("convert: edits, in their order") {
+  const TempFolder folder("convert_edit");
+  REQUIRE(io::save_ply(folder / "in.ply", random_cloud(500, 4)).ok());
+  const GaussianCloud source = load(folder, "in.ply");
+  const Outcome out =
+      run(folder,
+          "in.ply a.ply --views 0 --crop -5 -5 -20 5 5 20 --min-opacity 0.3 --max-scale 0.05 --sh 2 "
+          "--rotate 0 0 -1 90 --scale 2 --translate -1 -2 30");
+  CAPTURE(out.text);
+  REQUIRE(out.ok);
+  GaussianCloud want = source;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    const Vec3d m = source.mean(i);
+    bool keep = std::fabs(m.x) <= 5 && std::fabs(m.y) <= 5 && source.opacities[i] >= 0.3f;
+    for (const auto& axis : source.scales) keep = keep && axis[i] <= 0.05f;
+    if (!keep) continue;
+    // One Gaussian of the source at its place: a quarter turn takes (x, y) to (y, -x).
+    const Vec3d moved{2 * m.y - 1, -2 * m.x - 2, 2 * m.z + 30};
+    const GaussianCloud made = load(folder, "a.ply");
+    std::size_t found = made.size();
+    for (std::size_t k = 0; k < made.size(); ++k) {
+      if (norm(made.mean(k) - moved) < 1e-4) found = k;
+    }
+    REQUIRE(found < made.size());
+    CHECK(made.sh_degree == 2);
+    CHECK(made.opacities[found] == doctest::Approx(source.opacities[i]).epsilon(1e-6));
+    const Vec3d d{0.6, -0.48, 0.64}, turned{d.y, -d.x, d.z};
+    GaussianCloud low = source;
+    limit_sh_degree(low, 2);
+    CHECK(norm(colour_of(made, found, turned) - colour_of(low, i, d)) < 1e-5);
+    if (++kept == 20) break;
+  }
+  CHECK(kept == 20);
+}
+
+TEST_CASE("convert: tiles are merged, levels chosen") {
+  const TempFolder folder("convert_merge");
+  REQUIRE(io::save_ply(folder / "a.ply", random_cloud(30, 5)).ok());
+  REQUIRE(io::save_ply(folder / "b.ply", random_cloud(50, 6)).ok());
+  REQUIRE(run(folder, "a.ply b.ply out.ply --views 0").ok);
+  CHECK(load(folder, "out.ply").size() == 80);
+}
+
+TEST_CASE("convert: what cannot be done is said") {
+  const TempFolder folder("convert_bad");
+  REQUIRE(io::save_ply(folder / "a.ply", random_cloud(10, 7)).ok());
+  const auto says = [&](const std::string& arguments, const std::string& part) {
+    const Outcome out = run(folder, arguments);
+    CAPTURE(out.text);
+    CHECK(!out.ok);
+    CHECK(out.text.find(part) != std::string::npos);
+  };
+  says("none.ply out.ply", "none.ply");
+  says("a.ply out.txt", "not a name that is written here");
+  says("a.ply none/out.ply", "none does not exist");
+  says("a.ply out.ply --crop 100 100 100 101 101 101", "no Gaussian is left");
+  says("a.ply out.ply --rotate 0 0 0 90", "the axis is zero");
+  says("a.ply out.ply --cameras none.json", "none.json");
+  says("a.ply", "paths");
+}
+
+TEST_CASE("largest_field_errors: each field by itself") {
+  const GaussianCloud source = random_cloud(50, 8);
+  const auto errors = [&](const auto& change) {
+    GaussianCloud made = source;
+    change(made);
+    return gsnav_convert::largest_field_errors(source, made);
+  };
+  const auto none = errors([](GaussianCloud&) {});
+  CHECK(none.mean == 0);
+  CHECK(none.bands == 0);
+  CHECK(none.rotation < 1e-6);
+  CHECK(errors([](GaussianCloud& c) { c.means[1][7] += 0.25f; }).mean ==
+        doctest::Approx(0.25).epsilon(1e-5));
+  CHECK(errors([](GaussianCloud& c) { c.scales[2][3] *= 1.5f; }).scale ==
+        doctest::Approx(0.5).epsilon(1e-5));
+  CHECK(errors([](GaussianCloud& c) { c.opacities[3] *= 0.5f; }).opacity ==
+        doctest::Approx(static_cast<double>(source.opacities[3]) / 2));
+  CHECK(errors([](GaussianCloud& c) { c.shN[100] += 0.125f; }).bands ==
+        doctest::Approx(0.125).epsilon(1e-5));
+  CHECK(errors([](GaussianCloud& c) { limit_sh_degree(c, 0); }).bands > 0.3);
+  // A turn by 0.02 rad about z, and the same quaternion with the other sign.
+  const auto turned = errors([](GaussianCloud& c) {
+    const Quatd q{static_cast<double>(c.quats[0][5]), static_cast<double>(c.quats[1][5]),
+                  static_cast<double>(c.quats[2][5]), static_cast<double>(c.quats[3][5])};
+    const Quatd t = q * Quatd{std::cos(0.01), 0, 0, std::sin(0.01)};
+    c.quats[0][5] = -static_cast<float>(t.w);
+    c.quats[1][5] = -static_cast<float>(t.x);
+    c.quats[2][5] = -static_cast<float>(t.y);
+    c.quats[3][5] = -static_cast<float>(t.z);
+  });
+  CHECK(turned.rotation == doctest::Approx(0.02).epsilon(1e-4));
+}

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+// libFuzzer over every reader. GSNAV_FUZZ_READER names the one; tools/fuzz.sh runs them all.
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+
+#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io/gltf.hpp"
+#include "gsnav/io/image_file.hpp"
+#include "gsnav/io/ksplat.hpp"
+#include "gsnav/io/lod_set.hpp"
+#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/io/motion_file.hpp"
+#include "gsnav/io/npz_file.hpp"
+#include "gsnav/io/ply.hpp"
+#include "gsnav/io/sog.hpp"
+#include "gsnav/io/splat.hpp"
+#include "gsnav/io/spz.hpp"
+#include "gsnav/nav/navmesh_file.hpp"
+#include "io/allocations.hpp"
+#include "io/spz_file.hpp"
+#include "readers.hpp"
+
+using namespace gsnav;
+using namespace gsnav_fuzz;
+
+namespace {
+
+[[noreturn]] void stop(const std::string& why) {
+  std::fprintf(stderr, "fuzz: %s\n", why.c_str());
+  std::abort();
+}
+
+/// A file in memory, whose path any reader opens.
+std::filesystem::path file_of(const std::string& content) {
+  static const int fd = memfd_create("fuzz", 0);
+  if (ftruncate(fd, 0) != 0 ||
+      pwrite(fd, content.data(), content.size(), 0) != static_cast<ssize_t>(content.size())) {
+    stop("no file in memory");
+  }
+  return "/proc/self/fd/" + std::to_string(fd);
+}
+
+void check(const Result<LoadedCloud>& loaded) {
+  if (!loaded) {
+    if (loaded.message().empty()) stop("an error without a message");
+    return;
+  }
+  const GaussianCloud& c = loaded->cloud;
+  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(c.sh_degree) - 1);
+  bool ok =
+      loaded->report.kept == c.size() && c.sh0.size() == 3 * c.size() && c.shN.size() == rest * c.size();
+  ok = ok && loaded->report.read == loaded->report.kept + loaded->report.dropped();
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    ok = ok && is_finite(c.mean(i)) && c.opacities[i] >= 1.0f / 255 && c.opacities[i] <= 1 &&
+         std::fabs(c.quats[0][i]) <= 1.0001f && c.scales[0][i] >= 0;
+  }
+  if (!ok) stop("a cloud that does not fit together");
+}
+
+void check(const Result<TriangleMesh>& mesh) {
+  if (!mesh) return;
+  for (const auto& triangle : mesh->triangles) {
+    for (const std::uint32_t corner : triangle) {
+      if (corner >= mesh->vertices.size()) stop("a triangle without its corner");
+    }
+  }
+}
+
+void read_spz(const std::string& input) {
+  // 0 the file, 1 what is in its gzip stream, others version 4 with these 16 bytes and planes in equal
+  // parts.
+  const char kind = input.empty() ? '\0' : input[0];
+  const std::string rest = input.substr(input.empty() ? 0 : 1);
+  if (kind == 0) return check(io::parse_spz(bytes_of(rest), "fuzz"));
+  if (kind == 1) {
+    const std::string packed = gzip(rest);
+    return check(io::parse_spz(bytes_of(packed), "fuzz"));
+  }
+  if (rest.size() < 32) return;
+  const std::size_t streams = static_cast<unsigned char>(rest[15]) % 8u;
+  std::string toc, packed;
+  std::size_t at = 32;
+  const std::size_t widths[] = {9, 1, 3, 3, 4};
+  const std::size_t count = static_cast<unsigned char>(rest[8]);
+  for (std::size_t k = 0; k < streams; ++k) {
+    const std::size_t wanted = k < 5 ? widths[k] * count : rest.size();
+    const std::string plane = rest.substr(std::min(at, rest.size()), wanted);
+    at += plane.size();
+    const std::string stream = zstd(plane);
+    put(toc, std::uint64_t{stream.size()});
+    put(toc, std::uint64_t{plane.size()});
+    packed += stream;
+  }
+  const std::string file = rest.substr(0, 32) + toc + packed;
+  check(io::parse_spz(bytes_of(file), "fuzz"));
+}
+
+void read_gltf(const std::string& input) {
+  // 0 the file, others its JSON in front of a fixed buffer.
+  static const std::string binary = gltf_file().binary();
+  const std::string rest = input.substr(input.empty() ? 0 : 1);
+  const std::string file = input.empty() || input[0] == 0 ? rest : GlbFile::glb(rest, binary);
+  check(io::parse_gltf(bytes_of(file), "fuzz", {.keep_axes = false, .spz_compression = true}));
+  check(io::load_gltf_mesh(file_of(file)));
+}
+
+void read_lod_set(const std::string& input) {
+  static const TempFolder folder("fuzz_lod");
+  static const bool made = [] {
+    write_file(folder / "a.sog", zip_of(sog_parts()));
+    return true;
+  }();
+  (void)made;
+  write_file(folder / "lod-meta.json", input);
+  check(io::load_lod_set(folder.path(), {.level = input.size() % 2 == 0 ? 0 : 1}));
+}
+
+void read_npz(const std::string& input) {
+  static const Parts parts = avatar_parts();
+  const auto path = file_of(zip_of(parts, input));
+  const auto npz = io::NpzFile::open(path);
+  if (npz) {
+    for (const std::string& name : npz->names()) {
+      (void)npz->read(name);
+      (void)npz->read_text(name);
+    }
+  }
+  (void)io::load_avatar(path);
+}
+
+void read_driver(const std::string& input) {
+  static const Parts parts = driver_parts();
+  static const Skeleton skeleton = [] {
+    Skeleton s;
+    s.names = {"a", "b", "c"};
+    s.parents = {-1, 0, 1};
+    s.rest_local.resize(3);
+    return s;
+  }();
+  (void)io::load_driver(file_of(zip_of(parts, input)), skeleton);
+}
+
+void read_navmesh(const std::string& input) {
+  const auto mesh = parse_navmesh(bytes_of(input), "fuzz");
+  if (!mesh) return;
+  Rng rng(1);
+  const NavPoint a = mesh->random_point(rng), b = mesh->random_point(rng);
+  (void)mesh->path_between(a, b);
+  (void)mesh->snap_point(a.position);
+}
+
+struct Reader {
+  std::function<void(const std::string&)> read;
+  std::size_t fixed, multiple;  ///< bytes that one allocation may have: fixed + multiple * the file's
+};
+
+constexpr std::size_t kMiB = std::size_t{1} << 20;
+
+const std::map<std::string, Reader> kReaders = {
+    {"ply", {[](const std::string& s) { check(io::parse_ply(bytes_of(s), "fuzz")); }, kMiB, 64}},
+    {"splat", {[](const std::string& s) { check(io::parse_splat(bytes_of(s), "fuzz")); }, kMiB, 4}},
+    {"ksplat", {[](const std::string& s) { check(io::parse_ksplat(bytes_of(s), "fuzz")); }, kMiB, 64}},
+    {"spz", {read_spz, kMiB, 1000}},
+    {"sog",
+     {[](const std::string& s) {
+        static const Parts parts = sog_parts();
+        check(io::load_sog(file_of(zip_of(parts, s))));
+      },
+      64 * kMiB, 2048}},
+    {"lod_set", {read_lod_set, 64 * kMiB, 2048}},
+    {"gltf", {read_gltf, kMiB, 260}},
+    {"obj", {[](const std::string& s) { check(io::load_obj(file_of(s))); }, kMiB, 64}},
+    {"mesh_ply", {[](const std::string& s) { check(io::load_ply_mesh(file_of(s))); }, kMiB, 64}},
+    {"png", {[](const std::string& s) { (void)io::load_png(file_of(s)); }, 64 * kMiB, 10000}},
+    {"npy", {[](const std::string& s) { (void)io::load_npy(file_of(s)); }, kMiB, 64}},
+    {"npz", {read_npz, 260 * kMiB, 10000}},
+    {"driver", {read_driver, 260 * kMiB, 10000}},
+    {"bvh", {[](const std::string& s) { (void)io::load_bvh(file_of(s)); }, kMiB, 1000}},
+    {"cameras", {[](const std::string& s) { (void)io::load_cameras(file_of(s)); }, kMiB, 1000}},
+    {"navmesh", {read_navmesh, 64 * kMiB, 1000}},
+};
+
+const Reader& chosen() {
+  const char* name = std::getenv("GSNAV_FUZZ_READER");
+  const auto found = kReaders.find(name == nullptr ? "" : name);
+  if (found != kReaders.end()) return found->second;
+  stop("GSNAV_FUZZ_READER names no reader");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const Reader& reader = chosen();
+  const std::string input(reinterpret_cast<const char*>(data), size);
+  static bool first = true;  // seeds' parts are made in the first run
+  reset_largest_allocation();
+  reader.read(input);
+  if (!first && largest_allocation() > reader.fixed + reader.multiple * size) {
+    stop("an allocation of " + std::to_string(largest_allocation()) + " bytes for " +
+         std::to_string(size));
+  }
+  first = false;
+  return 0;
+}

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// fuzz_seeds FOLDER: small valid files for each reader, FOLDER/<reader>/<number>, by the tests' own
+// builders.
+#include <cstdio>
+
+#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io/image_file.hpp"
+#include "gsnav/nav/navmesh_file.hpp"
+#include "io/ksplat_file.hpp"
+#include "io/ply_compressed_file.hpp"
+#include "io/splat_file.hpp"
+#include "nav/meshes.hpp"
+#include "readers.hpp"
+
+using namespace gsnav;
+using namespace gsnav_fuzz;
+
+namespace {
+
+class Seeds {
+ public:
+  explicit Seeds(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  void add(const std::string& reader, const std::string& content) {
+    std::filesystem::create_directories(folder_ / reader);
+    write_file(folder_ / reader / std::to_string(count_++), content);
+  }
+  void add_parts(const std::string& reader, const Parts& parts) {
+    add(reader, '\0' + zip_of(parts));
+    char part = 1;
+    for (const auto& [name, content] : parts) add(reader, part++ + content);
+  }
+
+ private:
+  std::filesystem::path folder_;
+  int count_ = 0;
+};
+
+void add_ply(Seeds& seeds) {
+  for (const char* format : {"binary_little_endian", "binary_big_endian", "ascii"}) {
+    PlyFile file;
+    file.format = format;
+    file.properties = inria_properties(9);
+    file.rows = random_rows(2, 9, 2);
+    file.comments = "comment SplatRenderMode: mip\n";
+    file.before_header = "element face 2\nproperty list uchar short a\n";
+    file.before_rows = file.format == "ascii" ? "1 5\n0\n" : std::string("\1\0\5\0", 4);
+    seeds.add("ply", file.text());
+  }
+  for (const bool ranges : {false, true}) {
+    CompressedPlyFile file;
+    file.colour_ranges = ranges;
+    file.rest = ranges ? 9 : 0;
+    file.rows = random_rows(3, file.rest, 2);
+    seeds.add("ply", file.text());
+  }
+  const std::string head =
+      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  seeds.add("mesh_ply", "ply\nformat ascii 1.0\n" + head + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  std::string binary = "ply\nformat binary_little_endian 1.0\n" + head;
+  for (const float v : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) put(binary, v);
+  binary += '\3';
+  for (const int corner : {0, 1, 2}) put(binary, corner);
+  seeds.add("mesh_ply", binary);
+}
+
+void add_spz(Seeds& seeds) {
+  for (const std::uint32_t version : {1u, 2u, 3u, 4u}) {
+    SpzFile file;
+    file.version = version;
+    file.degree = 1;
+    file.rows = random_rows(3, 9, 2);
+    seeds.add("spz", '\0' + file.text());
+    if (version < 4) seeds.add("spz", '\1' + file.payload());
+    if (version < 4) continue;
+    std::string planes = "\2" + file.head(6);
+    put(planes, std::uint32_t{32});
+    planes += std::string(12, '\0');
+    for (const std::string& plane : file.planes()) planes += plane;
+    seeds.add("spz", planes);
+  }
+}
+
+void add_gltf(Seeds& seeds) {
+  GlbFile file = gltf_file();
+  seeds.add("gltf", '\0' + file.text());
+  seeds.add("gltf", '\1' + file.json());
+  file.nodes = R"([{"children":[1],"scale":[2,2,2]},{"mesh":0,"rotation":[0,0,1,0]}])";
+  seeds.add("gltf", '\1' + file.json());
+  seeds.add("gltf",
+            std::string("\1") +
+                R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"mode":4,)"
+                R"("attributes":{"POSITION":0},"indices":1}]}],"accessors":[{"bufferView":0,)"
+                R"("componentType":5126,"count":3,"type":"VEC3"},{"bufferView":1,"componentType":5121,)"
+                R"("count":3,"type":"SCALAR"}],"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,)"
+                R"("byteOffset":3,"byteLength":3}],"buffers":[{"byteLength":40}]})");
+}
+
+void add_others(Seeds& seeds) {
+  const std::vector<PlyRow> rows = random_rows(3, 0, 2);
+  seeds.add("splat", splat_text(rows));
+  for (const int level : {0, 1, 2}) {
+    KsplatFile file;
+    file.level = level;
+    file.empty_sections = 0;
+    file.sections = {{1, random_rows(5, 9, 2), 0}};
+    seeds.add("ksplat", file.text());
+  }
+  seeds.add_parts("sog", sog_parts());
+  seeds.add_parts("npz", avatar_parts());
+  seeds.add_parts("driver", driver_parts());
+  seeds.add("lod_set",
+            R"({"lodLevels":2,"environment":null,"filenames":["a.sog","b.sog"],"tree":{"bound":{},)"
+            R"("children":[{"lods":{"0":{"file":0,"offset":0,"count":6}}},{"lods":{"0":{"file":0,)"
+            R"("offset":6,"count":4},"1":{"file":1,"offset":0,"count":1}}}]}})");
+  seeds.add("obj", "# a square\nv 0 0 0\nv 1 0 0 1\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nf -1/2/3 -2//4 -3\n");
+  seeds.add("bvh",
+            "HIERARCHY\nROOT a\n{\n OFFSET 1 2 3\n CHANNELS 6 Xposition Zposition Yposition Yrotation "
+            "Xrotation "
+            "Zrotation\n JOINT b\n {\n  OFFSET 0 5 0\n  CHANNELS 1 Zrotation\n  End Site\n  {\n   "
+            "OFFSET 0 1 0\n"
+            "  }\n }\n}\nMOTION\nFrames: 2\nFrame Time: 0.05\n1 2 3 4 5 6 7\n1 2 3 -4 5 6 7e1\n");
+  TempFolder folder("fuzz_seeds");
+  io::save_cameras(folder / "a", std::vector<Camera>(2)).throw_if_error();
+  seeds.add("cameras", read_file(folder / "a"));
+  io::save_png_rgb(folder / "a", std::vector<float>(75, 0.3f), 5, 5).throw_if_error();
+  seeds.add("png", read_file(folder / "a"));
+  io::save_png_gray16(folder / "a", std::vector<std::uint16_t>(6, 300), 2, 3).throw_if_error();
+  seeds.add("png", read_file(folder / "a"));
+  io::save_npy(folder / "a", std::vector<float>(6), std::vector<std::size_t>{2, 3}).throw_if_error();
+  seeds.add("npy", read_file(folder / "a"));
+  Soup soup;
+  soup.floor(0, 0, 3, 3);
+  NavMeshSettings settings;
+  settings.agent_radius = 0.1;
+  save_navmesh(NavMesh::build(settings, soup.vertices, soup.triangles).value(), folder / "a")
+      .throw_if_error();
+  seeds.add("navmesh", read_file(folder / "a"));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: fuzz_seeds FOLDER\n");
+    return 1;
+  }
+  Seeds seeds(argv[1]);
+  add_ply(seeds);
+  add_spz(seeds);
+  add_gltf(seeds);
+  add_others(seeds);
+  return 0;
+}

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "files.hpp"
+#include "gsnav/avatar/humanoid.hpp"
+#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/io/avatar_scene_file.hpp"
+#include "gsnav/io/motion_file.hpp"
+#include "gsnav/io/npz_file.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+/// A walk of 41 frames along -Z, at a height of 3 m, moved by `by` as a whole.
+io::DriverFrames walking(const AvatarAsset& person, const Affine3<double>& by, bool capsules) {
+  const WalkMotion walk = WalkMotion::create(person.skeleton).value();
+  io::DriverFrames frames;
+  frames.joints = person.skeleton.size();
+  LocalPose pose;
+  std::vector<Affine3<double>> joints;
+  for (int t = 0; t <= 40; ++t) {
+    walk.pose(t / 40.0, 1.0, 0.0, pose);
+    forward_kinematics(person.skeleton, pose, joints);
+    for (auto& m : joints) {
+      m.translation += Vec3d{0.5, 3, -0.03 * t};
+      m = by * m;
+    }
+    frames.matrices.insert(frames.matrices.end(), joints.begin(), joints.end());
+    if (!capsules) continue;
+    auto& row = frames.capsules.emplace_back();
+    for (const ProxyCapsule& c : person.capsules)
+      row.push_back({joints[c.joint] * c.p0, joints[c.joint] * c.p1, c.radius});
+  }
+  return frames;
+}
+
+const Affine3<double> kFlipped{{{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}}, {}};
+
+std::vector<Vec3d> places(const AvatarActor& actor, double t) {
+  std::vector<Affine3<double>> joints;
+  actor.joint_globals(t, joints);
+  const Similarity world = actor.placement(t);
+  std::vector<Vec3d> out;
+  for (const auto& m : joints) out.push_back(world * m.translation);
+  return out;
+}
+
+double apart(const std::vector<Vec3d>& a, const std::vector<Vec3d>& b) {
+  double worst = 0;
+  for (std::size_t j = 0; j < a.size(); ++j) worst = std::max(worst, norm(a[j] - b[j]));
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("avatar scene: Habitat-GS's file puts people where its frames say") {
+  const TempFolder folder("avatar_scene");
+  AvatarAsset person = make_humanoid({.gaussians = 2000});
+  AvatarAsset bare = person;
+  bare.capsules.clear();
+  REQUIRE(io::save_avatar(folder / "a.npz", bare).ok());
+  const Affine3<double> moved{rotation_matrix(axis_angle(Vec3d{0, 1, 0}, 0.4)), {1, 0.25, 2}};
+  REQUIRE(io::save_driver(folder / "d.npz", walking(person, {}, true)).ok());
+  REQUIRE(io::save_driver(folder / "down.npz", walking(person, kFlipped, false)).ok());
+  std::vector<float> rows;
+  for (int t = 0; t <= 40; ++t) rows.insert(rows.end(), {1, 0.25f, 2, 0, std::sin(0.2f), 0, std::cos(0.2f)});
+  const std::vector<io::NpzEntry> trajectory{{"trajectory", {41, 7}, rows}};
+  REQUIRE(io::save_npz(folder / "t.npz", trajectory).ok());
+  write_file(folder / "x.scene_instance.json", R"({"time_loop": true, "gaussian_avatars": [
+    {"name": "plain", "canonical_gaussians": "a.npz", "driver": "d.pkl", "smpl_type": "smplx", "fps": 40},
+    {"canonical_gaussians": "a.npz", "driver": "down.npz", "time_begin": 2, "time_end": 9},
+    {"canonical_gaussians": "a.npz", "driver": {"smpl_params": "down.npz", "trajectory": null}, "coord_system": "opencv"},
+    {"canonical_gaussians": "a.npz", "driver": {"smpl_parms": "d.npz", "trajectory": "t.npz"}},
+    {"canonical_gaussians": "a.npz", "driver": "d.npz", "scale": 1.5, "offset_y": 0.1},
+    {"canonical_gaussians": "a.npz", "driver": "d.npz",
+     "coord_transform": [[0, 0, 1, 5], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]]}]})");
+  const auto scene = io::load_avatar_scene(folder / "x.scene_instance.json");
+  CAPTURE(scene.status().message());
+  REQUIRE(scene.ok());
+  REQUIRE(scene->avatars.size() == 6);
+  REQUIRE(scene->warnings.size() == 1);
+  CHECK(contains(scene->warnings[0], "'fps'"));
+  const auto actors = io::load_scene_actors(*scene);
+  CAPTURE(actors.status().message());
+  REQUIRE(actors.ok());
+  const io::DriverFrames truth = walking(person, {}, true);
+  for (const int t : {0, 7, 40}) {
+    std::vector<Vec3d> want;
+    for (std::size_t j = 0; j < 55; ++j)
+      want.push_back(truth.matrices[static_cast<std::size_t>(t) * 55 + j].translation);
+    const double time = t / 40.0;
+    CHECK(apart(places((*actors)[0], time), want) < 1e-5);
+    CHECK(apart(places((*actors)[1], 2 + time), want) < 1e-5);  // guessed to stand on its head
+    CHECK(apart(places((*actors)[2], time), want) < 1e-5);
+    std::vector<Vec3d> turned, far;
+    for (const Vec3d& p : want) {
+      turned.push_back(moved * p);
+      far.push_back({p.z + 5, p.y, -p.x});
+    }
+    CHECK(apart(places((*actors)[3], time), turned) < 1e-5);
+    CHECK(apart(places((*actors)[5], time), far) < 1e-5);
+    // Scaled about the floor below the root: that point stays, so do feet on the floor of 3 m; all distances grow.
+    const auto large = places((*actors)[4], time);
+    CHECK(norm(Vec3d{large[0].x, 0, large[0].z} - Vec3d{want[0].x, 0, want[0].z}) < 1e-5);
+    CHECK(norm(large[15] - large[7]) == doctest::Approx(1.5 * norm(want[15] - want[7])).epsilon(1e-5));
+    double low = 9, least = 9;
+    for (const Vec3d& p : large) low = std::min(low, p.y);
+    for (const Vec3d& p : want) least = std::min(least, p.y);
+    CHECK(low - 0.1 == doctest::Approx(least).epsilon(0.01));
+    CHECK(std::abs((low - 0.1 - 3) - 1.5 * (least - 3)) < 0.02);
+  }
+  CHECK((*actors)[0].asset()->capsules.size() == person.capsules.size());  // from the driver
+  CHECK_FALSE((*actors)[1].active(1.9));
+  CHECK((*actors)[1].active(8.9));
+  CHECK(apart(places((*actors)[1], 8.9), places((*actors)[1], 3.0)) < 1e-9);  // the last pose is held
+  CHECK((*actors)[0].active(0.99));
+  CHECK_FALSE((*actors)[0].active(1.01));
+  CHECK(io::scene_time(*scene, *actors, 9.5) == doctest::Approx(0.5));
+  io::AvatarScene held = *scene;
+  held.time_loop = false;
+  CHECK(io::scene_time(held, *actors, 9.5) == 9.0);
+  held.time_max = 4;
+  CHECK(io::scene_time(held, *actors, 9.5) == 4.0);
+}
+
+TEST_CASE("avatar scene: what is wrong is named with the avatar and the key") {
+  const TempFolder folder("avatar_scene_bad");
+  const auto fails = [&](const std::string& avatar, Errc code, const std::string& part) {
+    write_file(folder / "some.json", "{\"gaussian_avatars\": [" + avatar + "]}");
+    const Status s = io::load_avatar_scene(folder / "some.json").status();
+    CAPTURE(s.message());
+    CHECK(s.code() == code);
+    CHECK(contains(s.message(), "some.json"));
+    CHECK(contains(s.message(), part));
+  };
+  const Errc bad = Errc::invalid_file;
+  const std::string good = R"("canonical_gaussians": "a.npz", "driver": "d.npz")";
+  fails("7", bad, "gaussian_avatars[0] is '7'");
+  fails(R"({"driver": "d.npz"})", bad, "'canonical_gaussians' is missing");
+  fails(R"({"canonical_gaussians": 3, "driver": "d.npz"})", bad, "'canonical_gaussians' is '3'");
+  fails(R"({"canonical_gaussians": "a.npz"})", bad, "'driver' is missing");
+  fails(R"({"canonical_gaussians": "a.npz", "driver": {}})", bad, "'smpl_parms' is missing");
+  fails("{" + good + R"(, "scale": 0})", bad, "'scale' is 0");
+  fails("{" + good + R"(, "scale": "big"})", bad, "'scale'");
+  fails("{" + good + R"(, "time_begin": 3, "time_end": 2})", bad, "'time_end' lies before");
+  fails("{" + good + R"(, "coord_system": "upside"})", bad, "upside");
+  fails("{" + good + R"(, "coord_transform": [1, 2]})", bad, "'coord_transform' is no rigid");
+  fails("{" + good + R"(, "proxy_urdf": "x"})", Errc::unsupported, "proxy_urdf");
+  write_file(folder / "some.json", R"({"time_max": -1})");
+  CHECK(contains(io::load_avatar_scene(folder / "some.json").status().message(), "'time_max' is negative"));
+  write_file(folder / "some.json", R"({"time_loop": 1})");
+  CHECK(contains(io::load_avatar_scene(folder / "some.json").status().message(), "'time_loop'"));
+  write_file(folder / "some.json", R"({"avatars": {}})");
+  CHECK(contains(io::load_avatar_scene(folder / "some.json").status().message(), "must be an array"));
+  write_file(folder / "some.json", "{}");
+  CHECK(io::load_avatar_scene(folder / "some.json").value().avatars.empty());
+  CHECK(io::load_avatar_scene(folder / "none.json").code() == Errc::file_not_found);
+  io::AvatarScene scene;
+  scene.avatars.emplace_back();
+  scene.avatars[0].name = "bob";
+  scene.avatars[0].canonical = folder / "none.npz";
+  const Status s = io::load_scene_actors(scene).status();
+  CHECK(s.code() == Errc::file_not_found);
+  CHECK(contains(s.message(), "bob"));
+}

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include "allocations.hpp"
+#include "check_cloud.hpp"
+#include "check_turned.hpp"
+#include "glb_file.hpp"
+#include "gsnav/io/gltf.hpp"
+#include "gsnav/io/ply.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "spz_file.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+constexpr int kRest[] = {0, 9, 24, 45};
+
+GlbFile small_file(int degree = 1, std::size_t n = 5) {
+  GlbFile file;
+  file.degree = degree;
+  file.rows = random_rows(n, kRest[degree], 71);
+  return file;
+}
+
+GaussianCloud cloud_of(const std::vector<PlyRow>& rows, int rest) {
+  PlyFile file;
+  file.properties = inria_properties(rest, "double");
+  file.rows = rows;
+  return io::parse_ply(bytes_of(file.text()), "rows").value().cloud;
+}
+
+LoadedCloud parse(const GlbFile& file, const io::LoadGltfOptions& options = {}) {
+  const std::string text = file.text();
+  return io::parse_gltf(bytes_of(text), "some.glb", options).value();
+}
+
+void check_fails(const std::string& text, Errc code, const std::string& part) {
+  const auto result = io::parse_gltf(bytes_of(text), "some.glb");
+  CAPTURE(part);
+  CAPTURE(result.message());
+  CHECK(result.code() == code);
+  CHECK(contains(result.message(), "some.glb"));
+  CHECK(contains(result.message(), part));
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+const Quatd kHalfTurn{0, 0, 0, 1};
+
+}  // namespace
+
+TEST_CASE("gltf: the Gaussians of a PLY, in its axes") {
+  for (int degree = 0; degree <= 3; ++degree) {
+    CAPTURE(degree);
+    const GlbFile file = small_file(degree, 60);
+    const LoadedCloud loaded = parse(file);
+    check_consistent(loaded);
+    CHECK(loaded.cloud.sort_order == SortOrder::camera_distance);
+    CHECK(loaded.report.warnings.empty());
+    CHECK(loaded.report.sh_degree == degree);
+    const GaussianCloud want = cloud_of(file.rows, kRest[degree]);
+    REQUIRE(loaded.cloud.size() == 60);
+    for (std::size_t i = 0; i < 60; ++i) {
+      CHECK(near(loaded.cloud.opacities[i], want.opacities[i]));
+    }
+    GaussianCloud copy = loaded.cloud;
+    copy.opacities = want.opacities;
+    check_turned(want, copy, {});
+    // As stored: glTF's own axes.
+    GaussianCloud kept = parse(file, {.keep_axes = true}).cloud;
+    kept.opacities = want.opacities;
+    check_turned(want, kept, {kHalfTurn, {}, 1});
+  }
+}
+
+TEST_CASE("gltf: nodes move, turn and scale what they hold; a mesh may stand twice") {
+  GlbFile file = small_file(3, 20);
+  file.nodes =
+      R"([{"children":[2,1],"rotation":[0.5,0.5,-0.5,0.5],"scale":[2,2,2]},{"mesh":0,"translation":[1,2,3]},)"
+      R"({"mesh":0,"matrix":[0,1.5,0,0,-1.5,0,0,0,0,0,1.5,0,-4,0,100000,1]}])";
+  const LoadedCloud loaded = parse(file, {.keep_axes = true});
+  check_consistent(loaded);
+  REQUIRE(loaded.cloud.size() == 40);
+  GlbFile plain = file;
+  plain.nodes = R"([{"mesh":0}])";
+  const GaussianCloud base = parse(plain, {.keep_axes = true}).cloud;
+  const Similarity parent{{0.5, 0.5, 0.5, -0.5}, {}, 2};
+  const double half = std::sqrt(0.5);
+  const Similarity children[] = {{{half, 0, 0, half}, {-4, 0, 100000}, 1.5}, {{}, {1, 2, 3}, 1}};
+  GaussianCloud want = base;
+  REQUIRE(append(want, base).ok());
+  for (std::size_t child = 0; child < 2; ++child) {
+    const Similarity world = parent * children[child];
+    for (std::size_t i = 0; i < 20; ++i) {
+      const Vec3d mean = world * base.mean(i), got = loaded.cloud.mean(20 * child + i);
+      CHECK(norm(got - mean) <= 2e-6 * (1 + 64));
+      CHECK(loaded.cloud.scales[0][20 * child + i] ==
+            doctest::Approx(static_cast<double>(base.scales[0][i]) * world.scale).epsilon(1e-6));
+      const Vec3d d{0.6, -0.48, 0.64};
+      CHECK(norm(colour_of(loaded.cloud, 20 * child + i, rotate(world.rotation, d)) -
+                 colour_of(base, i, d)) < 1e-5);
+    }
+  }
+  CHECK(norm(loaded.report.bounds.high - loaded.report.bounds.low) > 190000);
+}
+
+TEST_CASE("gltf: bytes, strides, JSON with its buffer beside or inside") {
+  TempFolder folder("gltf");
+  GlbFile file = small_file(1);
+  const GaussianCloud want = parse(file).cloud;
+  file.bytes = true;
+  const GaussianCloud packed = parse(file).cloud;
+  CHECK(packed.scales == want.scales);
+  CHECK(packed.means == want.means);
+  for (std::size_t i = 0; i < 5; ++i)
+    CHECK(std::fabs(packed.opacities[i] - want.opacities[i]) < 0.51 / 255);
+  file.bytes = false;
+  write_file(folder / "a.glb", file.text());
+  write_file(folder / "b.bin", file.binary());
+  file.uri = "b.bin";
+  write_file(folder / "b.gltf", file.json());
+  file.uri = "data:application/octet-stream;base64," + GlbFile::base64(file.binary());
+  write_file(folder / "c.gltf", file.json());
+  for (const char* name : {"a.glb", "b.gltf", "c.gltf"}) {
+    const GaussianCloud c = io::load_gltf(folder / name).value().cloud;
+    CHECK(c.means == want.means);
+    CHECK(c.shN == want.shN);
+    CHECK(io::load_scene((folder / name).string()).value().cloud.size() == 5);
+  }
+  file.uri = "gone.bin";
+  write_file(folder / "d.gltf", file.json());
+  CHECK(io::load_gltf(folder / "d.gltf").code() == Errc::file_not_found);
+  for (const char* uri :
+       {"../b.bin", "/etc/passwd", "http://a/b.bin", "data:x;base64,@@@", "data:x,abc"}) {
+    file.uri = uri;
+    write_file(folder / "e.gltf", file.json());
+    const auto bad = io::load_gltf(folder / "e.gltf");
+    CHECK(bad.code() == Errc::invalid_file);
+    CHECK(contains(bad.message(), "buffer 0"));
+  }
+}
+
+TEST_CASE("save_glb: nothing is lost but the filter and float64") {
+  TempFolder folder("save_glb");
+  for (int degree = 0; degree <= 3; ++degree) {
+    std::vector<PlyRow> rows = random_rows(50, kRest[degree], 72);
+    rows[3]["scale_1"] = -INFINITY;
+    rows[4]["opacity"] = INFINITY;
+    const GaussianCloud cloud = cloud_of(rows, kRest[degree]);
+    for (const bool keep : {false, true}) {
+      REQUIRE(io::save_glb(folder / "a.glb", cloud, {.keep_axes = keep}).ok());
+      const LoadedCloud loaded = io::load_gltf(folder / "a.glb", {.keep_axes = keep}).value();
+      check_consistent(loaded);
+      CHECK(loaded.report.warnings.empty());
+      CHECK(loaded.cloud.means == cloud.means);
+      CHECK(loaded.cloud.opacities == cloud.opacities);
+      check_turned(cloud, loaded.cloud, {}, 2e-7);
+    }
+    REQUIRE(io::save_glb(folder / "a.glb", cloud).ok());
+    check_turned(cloud, io::load_gltf(folder / "a.glb", {.keep_axes = true}).value().cloud,
+                 {kHalfTurn, {}, 1}, 2e-7);
+  }
+  // Far from zero the node carries what float32 cannot.
+  std::vector<PlyRow> rows = random_rows(5, 0, 73);
+  for (PlyRow& row : rows) row["x"] += 1e6;
+  const GaussianCloud far = cloud_of(rows, 0);
+  REQUIRE(io::save_glb(folder / "far.glb", far).ok());
+  const GaussianCloud got = io::load_gltf(folder / "far.glb").value().cloud;
+  for (std::size_t i = 0; i < 5; ++i) CHECK(norm(got.mean(i) - far.mean(i)) < 1e-5);
+  CHECK(io::save_glb(folder / "none/a.glb", far).code() == Errc::file_not_found);
+  CHECK(io::save_glb(folder / "a.glb", GaussianCloud{}).code() == Errc::invalid_argument);
+  GaussianCloud broken = far;
+  broken.sh_degree = 1;
+  CHECK(io::save_glb(folder / "a.glb", broken).code() == Errc::invalid_argument);
+}
+
+TEST_CASE("gltf: what the extension may say") {
+  GlbFile file = small_file();
+  file.splats =
+      R"({"kernel":"ellipse","colorSpace":"lin_rec709_display","sortingMethod":"cameraDistance"})";
+  REQUIRE(parse(file).report.warnings.size() == 1);
+  CHECK(contains(parse(file).report.warnings[0], "lin_rec709_display"));
+  file.splats = R"({"kernel":"box","colorSpace":"srgb_rec709_display"})";
+  check_fails(file.text(), Errc::unsupported, "node 0: kernel '\"box\"'");
+  file.splats = R"({"kernel":"ellipse","colorSpace":"srgb_rec709_display","sortingMethod":"z"})";
+  check_fails(file.text(), Errc::unsupported, "its sorting");
+  file.splats = R"({"kernel":"ellipse"})";
+  check_fails(file.text(), Errc::invalid_file, "colorSpace");
+  file.splats = R"({"kernel":"ellipse","colorSpace":"srgb_rec709_display","extensions":)"
+                R"({"KHR_gaussian_splatting_compression_spz_2":{"bufferView":0}}})";
+  check_fails(file.text(), Errc::unsupported, "a draft");
+  // With an SPZ in its buffer; the axes are the file's.
+  SpzFile spz;
+  spz.rows = random_rows(4, 0, 74);
+  const std::string bytes = spz.text();
+  const std::string json =
+      R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"mode":0,"attributes":{},)"
+      R"("extensions":{"KHR_gaussian_splatting":)" +
+      file.splats + R"(}}]}],"bufferViews":[{"buffer":0,"byteLength":)" + std::to_string(bytes.size()) +
+      R"(}],"buffers":[{"byteLength":)" + std::to_string(bytes.size()) + "}]}";
+  const std::string text = GlbFile::glb(json, bytes);
+  const LoadedCloud loaded =
+      io::parse_gltf(bytes_of(text), "a.glb", {.keep_axes = true, .spz_compression = true}).value();
+  REQUIRE(loaded.cloud.size() == 4);
+  // The builder turned the PLY's y and z for SPZ.
+  CHECK(loaded.cloud.mean(1).y == doctest::Approx(-spz.rows[1]["y"]).epsilon(1e-3));
+}
+
+TEST_CASE("gltf: files that make no sense") {
+  const GlbFile file = small_file();
+  const std::string text = file.text(), json = file.json(), binary = file.binary();
+  check_fails("", Errc::invalid_file, "JSON");
+  check_fails("no glTF", Errc::invalid_file, "JSON");
+  check_fails("{}", Errc::invalid_file, "asset.version");
+  check_fails(R"({"asset":{"version":"1.0"}})", Errc::unsupported, "version");
+  check_fails(R"({"asset":{"version":"2.0"}})", Errc::invalid_file, "no primitive with");
+  for (const char* name :
+       {"POSITION", "ROTATION", "SCALE", "OPACITY", "SH_DEGREE_0_COEF_0", "SH_DEGREE_1_COEF_2"}) {
+    GlbFile broken = file;
+    broken.skip = name;
+    check_fails(broken.text(), Errc::invalid_file, name);
+  }
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return GlbFile::glb(replaced(json, from, to), binary);
+  };
+  check_fails(with("\"count\":5", "\"count\":6"), Errc::invalid_file, "accessor 0: 6 elements");
+  check_fails(with("\"count\":5", "\"count\":4"), Errc::invalid_file, "has 5 elements, POSITION has 4");
+  check_fails(with("\"count\":5", "\"count\":4294967295"), Errc::invalid_file,
+              "accessor 0: 4294967295 elements");
+  check_fails(with("\"count\":5", "\"count\":-1"), Errc::invalid_file, "count");
+  check_fails(with("\"count\":5", "\"count\":1e300"), Errc::invalid_file, "count");
+  check_fails(with("\"componentType\":5126", "\"componentType\":5130"), Errc::invalid_file, "5130");
+  check_fails(with("VEC3", "MAT3"), Errc::invalid_file, "MAT3");
+  check_fails(with("VEC3", "VEC4"), Errc::invalid_file, "");
+  check_fails(with("\"byteOffset\":0", "\"byteOffset\":4294967295"), Errc::invalid_file,
+              "buffer view 0");
+  check_fails(with("\"buffer\":0", "\"buffer\":1"), Errc::invalid_file, "buffer view 0");
+  check_fails(with("\"bufferView\":0,", ""), Errc::unsupported, "without a buffer view");
+  check_fails(with("\"bufferView\":0,", "\"bufferView\":99,"), Errc::invalid_file, "bufferViews");
+  check_fails(with("\"mesh\":0", "\"mesh\":7"), Errc::invalid_file, "meshes");
+  check_fails(with("\"POSITION\":0", "\"POSITION\":77"), Errc::invalid_file, "accessors");
+  check_fails(GlbFile::glb(json, binary.substr(4)), Errc::invalid_file, "byteLength");
+  for (const char* nodes : {R"([{"mesh":0,"children":[0]}])", R"([{"children":[1]},{"children":[0]}])",
+                            R"([{"children":[1,1]},{}])"}) {
+    GlbFile ring = file;
+    ring.nodes = nodes;
+    check_fails(ring.text(), Errc::invalid_file, "named twice");
+  }
+  GlbFile uneven = file;
+  uneven.nodes = R"([{"mesh":0,"scale":[1,2,1]}])";
+  check_fails(uneven.text(), Errc::unsupported, "node 0");
+  uneven.nodes = R"([{"mesh":0,"scale":[-1,1,1]}])";
+  check_fails(uneven.text(), Errc::unsupported, "node 0");
+  uneven.nodes = R"([{"mesh":0,"rotation":[0,0,0,0]}])";
+  check_fails(uneven.text(), Errc::invalid_file, "rotation");
+  uneven.nodes = R"([{"mesh":0,"matrix":[1,2]}])";
+  check_fails(uneven.text(), Errc::invalid_file, "matrix");
+  for (std::size_t n = 0; n < text.size(); ++n) {
+    REQUIRE(io::parse_gltf(bytes_of(text.substr(0, n)), "some.glb").code() == Errc::invalid_file);
+  }
+}
+
+TEST_CASE("gltf: many nodes of one mesh are not trusted with memory") {
+  GlbFile file = small_file(0, 400);
+  std::string nodes = "[", roots;
+  for (int k = 0; k < 3000; ++k) {
+    nodes += k == 0 ? R"({"mesh":0})" : R"(,{"mesh":0})";
+    if (k != 0) roots += ',';
+    roots += std::to_string(k);
+  }
+  file.nodes = nodes + "]";
+  file.scene = R"(,"scenes":[{"nodes":[)" + roots + "]}]";
+  const std::string text = file.text();
+  reset_largest_allocation();
+  check_fails(text, Errc::invalid_file, "more Gaussians than the file has bytes");
+  CHECK(largest_allocation() < 20 * text.size());
+}
+
+TEST_CASE("gltf: what is no drawable Gaussian is counted") {
+  GlbFile file = small_file(0, 4);
+  std::string binary = file.binary();
+  const float nan = NAN, two = 2, minus = -1, zero = 0;
+  const auto put_float = [&binary](std::size_t at, float v) { std::memcpy(binary.data() + at, &v, 4); };
+  put_float(0, nan);             // a position
+  put_float(48 + 16 * 1, zero);  // a quaternion, below
+  for (std::size_t k = 1; k < 4; ++k) put_float(48 + 16 + 4 * k, zero);
+  put_float(48 + 64 + 12 * 2, minus);    // a scale
+  put_float(48 + 64 + 48 + 4 * 3, two);  // an opacity
+  const std::string text = GlbFile::glb(file.json(), binary);
+  const LoadedCloud loaded = io::parse_gltf(bytes_of(text), "a.glb").value();
+  check_consistent(loaded);
+  CHECK(loaded.report.dropped_non_finite == 3);
+  CHECK(loaded.report.dropped_zero_quat == 1);
+}

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include "allocations.hpp"
+#include "check_cloud.hpp"
+#include "gsnav/io/lod_set.hpp"
+#include "gsnav/io/ply.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/io/sog.hpp"
+#include "support/data.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+/// Writes a SOG of n Gaussians whose x says which they are: base, base + 1, ...
+void write_sog(const std::filesystem::path& path, std::size_t n, double base) {
+  PlyFile file;
+  file.properties = inria_properties(0, "double");
+  file.rows = random_rows(n, 0, 91);
+  for (std::size_t i = 0; i < n; ++i) file.rows[i]["x"] = base + static_cast<double>(i);
+  const GaussianCloud cloud = io::parse_ply(bytes_of(file.text()), "rows").value().cloud;
+  std::filesystem::create_directories(path.parent_path());
+  REQUIRE(io::save_sog(path, cloud).ok());
+}
+
+struct LodFolder {
+  TempFolder folder{"lod"};
+  std::string files = R"(["0_0/meta.json","1_0.sog","gone/meta.json"])";
+  std::string first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":0,"count":2}})";
+  std::string second = R"({"0":{"file":0,"offset":6,"count":4},"1":{"file":1,"offset":2,"count":1}})";
+  std::string extra;
+
+  LodFolder() {
+    write_sog(folder / "0_0/meta.json", 10, 0);
+    write_sog(folder / "1_0.sog", 3, 100);
+    write_sog(folder / "far/meta.json", 2, 200);
+  }
+  std::string text() const {
+    return R"({"lodLevels":3,"filenames":)" + files + extra +
+           R"(,"tree":{"bound":{},"children":[{"lods":)" + first + R"(},{"children":[{"lods":)" +
+           second + "}]}]}}";
+  }
+  Result<LoadedCloud> load(const io::LoadLodOptions& options = {}) const {
+    write_file(folder / "lod-meta.json", text());
+    return io::load_lod_set(folder.path(), options);
+  }
+  void fails(Errc code, const std::string& part, const io::LoadLodOptions& options = {}) const {
+    const auto result = load(options);
+    CAPTURE(part);
+    CAPTURE(result.message());
+    CHECK(result.code() == code);
+    CHECK(contains(result.message(), part));
+  }
+};
+
+std::vector<int> which(const GaussianCloud& cloud) {
+  std::vector<int> out;
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    out.push_back(static_cast<int>(std::lround(cloud.mean(i).x)));
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("lod set: each level, and only its rows") {
+  LodFolder set;
+  const LoadedCloud fine = set.load().value();
+  check_consistent(fine);
+  CHECK(which(fine.cloud) == std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
+  CHECK(fine.report.warnings.empty());
+  CHECK(which(set.load({.level = 1}).value().cloud) == std::vector<int>{100, 101, 102});
+  // By the file's name and by its folder, as a scene.
+  const std::string name = (set.folder / "lod-meta.json").string();
+  CHECK(io::load_scene(name).value().cloud.size() == 10);
+  CHECK(io::load_scene(set.folder.path().string(), {.level = 1}).value().cloud.size() == 3);
+  // Rows in the middle of a file.
+  set.first = R"({"0":{"file":0,"offset":2,"count":3}})";
+  CHECK(which(set.load().value().cloud) == std::vector<int>{2, 3, 4, 6, 7, 8, 9});
+}
+
+TEST_CASE("lod set: levels that are not there") {
+  LodFolder set;
+  // The coarser one first, else the finer.
+  set.first = R"({"0":{"file":2,"offset":0,"count":6},"1":{"file":1,"offset":0,"count":2}})";
+  const LoadedCloud mixed = set.load().value();
+  CHECK(which(mixed.cloud) == std::vector<int>{6, 7, 8, 9, 100, 101});
+  REQUIRE(mixed.report.warnings.size() == 1);
+  CHECK(mixed.report.warnings[0] == "level 0 of 1 of 2 nodes is not there: level 1 is read");
+  // No entry is another thing: nothing of the node is left there.
+  CHECK(set.load({.level = 2}).value().cloud.size() == 0);
+  const std::string second = set.second;
+  set.second = R"({"0":{"file":0,"offset":6,"count":4},"2":{"file":2,"offset":0,"count":1}})";
+  CHECK(which(set.load({.level = 2}).value().cloud) == std::vector<int>{6, 7, 8, 9});
+  set.second = second;
+  set.first = R"({"0":{"file":2,"offset":0,"count":6}})";
+  set.fails(Errc::file_not_found, "gone/meta.json");
+  set.first = "{}";
+  CHECK(set.load().value().cloud.size() == 4);
+  set.fails(Errc::invalid_argument, "level 3 is asked for, the set has 0 to 2", {.level = 3});
+  set.fails(Errc::invalid_argument, "level -1", {.level = -1});
+}
+
+TEST_CASE("lod set: the environment") {
+  LodFolder set;
+  set.extra = R"(,"environment":"far/meta.json")";
+  CHECK(set.load().value().cloud.size() == 12);
+  CHECK(set.load({.environment = false}).value().cloud.size() == 10);
+  set.extra = R"(,"environment":null)";
+  CHECK(set.load().value().cloud.size() == 10);
+  set.extra = R"(,"environment":"nowhere.sog")";
+  const LoadedCloud without = set.load().value();
+  REQUIRE(without.report.warnings.size() == 1);
+  CHECK(contains(without.report.warnings[0], "nowhere.sog is not there"));
+  set.extra = R"(,"environment":"../far/meta.json")";
+  set.fails(Errc::invalid_file, "environment");
+}
+
+TEST_CASE("lod set: what makes no sense") {
+  LodFolder set;
+  const std::string first = set.first, files = set.files;
+  for (const char* bad :
+       {R"({"0":{"file":3,"offset":0,"count":1}})", R"({"0":{"file":-1,"offset":0,"count":1}})",
+        R"({"0":{"file":0,"offset":-1,"count":1}})", R"({"0":{"file":0,"offset":0}})",
+        R"({"0":{"file":0,"offset":0,"count":1e300}})", R"({"0":7})", "[]", "7"}) {
+    set.first = bad;
+    set.fails(Errc::invalid_file, "lod-meta.json");
+  }
+  set.first = R"({"0":{"file":0,"offset":0,"count":7}})";
+  set.fails(Errc::invalid_file, "two nodes share rows of 0_0/meta.json from 6");
+  set.first = R"({"0":{"file":0,"offset":10,"count":1}})";
+  set.fails(Errc::invalid_file, "rows 10 and 1 from there on");
+  set.first = first;
+  for (const char* bad :
+       {R"(["../0_0/meta.json","1_0.sog"])", R"(["/etc/passwd","a"])", R"([1,2,3])", "7"}) {
+    set.files = bad;
+    set.fails(Errc::invalid_file, "filenames");
+  }
+  set.files = files;
+  for (const char* text : {"", "{}", "[]", R"({"lodLevels":0})", R"({"lodLevels":1,"filenames":[]})",
+                           R"({"lodLevels":1,"filenames":[],"tree":[]})",
+                           R"({"lodLevels":1,"filenames":[],"tree":{"children":7}})"}) {
+    write_file(set.folder / "lod-meta.json", text);
+    CHECK(io::load_lod_set(set.folder.path()).code() == Errc::invalid_file);
+  }
+  CHECK(io::load_lod_set(set.folder / "none").code() == Errc::file_not_found);
+  // A tree deeper than any stack.
+  std::string deep = R"({"lodLevels":1,"filenames":[],"tree":)";
+  for (int k = 0; k < 100000; ++k) deep += R"({"children":[)";
+  for (int k = 0; k < 100000; ++k) deep += "]}";
+  write_file(set.folder / "lod-meta.json", deep + "}");
+  CHECK(io::load_lod_set(set.folder.path()).value().cloud.size() == 0);
+}
+
+TEST_CASE("lod set: real sets, level by level") {
+  const std::string playbot = data_file("splats/playcanvas/playbot/lod-meta.json");
+  if (!playbot.empty()) {
+    const std::uint64_t counts[] = {250000, 250000, 125000, 31000, 8406, 3000, 1873};  // 0 is not there
+    for (int level = 0; level < 7; ++level) {
+      const LoadedCloud loaded = io::load_lod_set(playbot, {.level = level}).value();
+      check_consistent(loaded);
+      CHECK(loaded.report.read == counts[level]);
+      CHECK(loaded.report.warnings.size() == (level == 0 ? 1 : 0));
+    }
+  }
+  const std::string showroom = data_file("splats/lacadiere_showroom");
+  if (!showroom.empty()) {
+    CHECK(io::load_lod_set(showroom, {.level = 2}).value().report.read == 1495636);
+    CHECK(io::load_lod_set(showroom, {.level = 3}).value().report.read == 746973);
+  }
+}

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+#include <vector>
+
+#include "clips.hpp"
+#include "commands.hpp"
+#include "gsnav/avatar/capsule_fit.hpp"
+#include "gsnav/avatar/mesh_avatar.hpp"
+#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/io/motion_file.hpp"
+#include "gsnav/io/skinned_mesh_file.hpp"
+
+namespace gsnav_avatar {
+
+using namespace gsnav;
+
+namespace {
+
+using Poses = std::vector<std::vector<Affine3<double>>>;
+
+Result<io::LoadedSkinnedMesh> load_mesh(const MeshCommand& c, bool makehuman) {
+  if (!makehuman) return io::load_gltf_skin(c.input);
+  io::MakeHumanOptions options;
+  options.skeleton = c.skeleton;
+  options.weights = c.weights;
+  for (const auto& [file, amount] : c.targets) options.targets.emplace_back(file, amount);
+  return io::load_makehuman(c.input, options);
+}
+
+/// The clip that was asked for: one of the mesh's own, or a file's.
+Result<MotionClip> clip_of(const MeshCommand& c, const io::LoadedSkinnedMesh& mesh) {
+  std::string names;
+  for (const io::NamedClip& n : mesh.clips) {
+    if (n.name == c.clip.clip) return n.clip;
+    names += (names.empty() ? "" : ", ") + n.name;
+  }
+  if (c.clip.clip.find('.') == std::string::npos) {
+    return {Errc::invalid_argument,
+            c.input + ": there is no clip '" + c.clip.clip + "'; there are: " + (names.empty() ? "none" : names)};
+  }
+  return load_clip(c.clip, mesh.mesh.skeleton);
+}
+
+/// Joint to root frame at `count` times of the clip.
+Poses poses_of(const Skeleton& skeleton, const MotionClip& clip, std::size_t count) {
+  Poses out(count);
+  LocalPose pose;
+  for (std::size_t k = 0; k < count; ++k) {
+    MotionInput at;
+    at.time = clip.duration() * static_cast<double>(k) / static_cast<double>(count);
+    clip.pose(at, pose);
+    forward_kinematics(skeleton, pose, out[k]);
+  }
+  return out;
+}
+
+Status write_driver(const MeshCommand& c, const AvatarAsset& asset, const MotionClip& clip) {
+  io::DriverFrames frames;
+  frames.joints = asset.skeleton.size();
+  const auto count = static_cast<std::size_t>(std::floor(clip.duration() * frames.frame_rate)) + 1;
+  LocalPose pose;
+  std::vector<Affine3<double>> globals;
+  for (std::size_t t = 0; t < count; ++t) {
+    MotionInput at;
+    at.time = static_cast<double>(t) / frames.frame_rate;
+    clip.pose(at, pose);
+    forward_kinematics(asset.skeleton, pose, globals);
+    for (auto& m : globals) m.translation += pose.root;
+    frames.matrices.insert(frames.matrices.end(), globals.begin(), globals.end());
+    auto& row = frames.capsules.emplace_back();
+    for (const ProxyCapsule& p : asset.capsules)
+      row.push_back({globals[p.joint] * p.p0, globals[p.joint] * p.p1, p.radius});
+  }
+  if (Status s = io::save_driver(c.driver, frames); !s) return s;
+  std::printf("%s: %zu frames at %g a second, %zu capsules\n", c.driver.c_str(), count, frames.frame_rate,
+              asset.capsules.size());
+  return {};
+}
+
+}  // namespace
+
+Status make_from_mesh(const MeshCommand& c, bool makehuman) {
+  auto loaded = load_mesh(c, makehuman);
+  if (!loaded) return loaded.status();
+  const SkinnedMesh& mesh = loaded->mesh;
+  std::printf("%s: %zu vertices, %zu triangles, %zu joints, %zu clips\n", c.input.c_str(), mesh.positions.size(),
+              mesh.triangles.size(), mesh.skeleton.size(), loaded->clips.size());
+  for (const std::string& w : loaded->report.warnings) std::printf("  %s\n", w.c_str());
+  MotionClip clip;
+  clip.joints = mesh.skeleton.size();
+  clip.rotations = loaded->pose.rotations;
+  clip.translations = loaded->pose.translations;
+  clip.root_translation = {loaded->pose.root};
+  if (!c.clip.clip.empty()) {
+    auto own = clip_of(c, *loaded);
+    if (!own) return own.status();
+    clip = std::move(*own);
+  }
+  constexpr std::size_t kPoses = 24;
+  const Poses poses = poses_of(mesh.skeleton, clip, std::min(kPoses, clip.frames()));
+  MeshAvatarOptions options;
+  options.gaussians = c.gaussians;
+  options.seed = c.seed;
+  options.shade = c.shade;
+  options.weights.influences = c.influences;
+  options.weights.poses.assign(poses.begin(),
+                               poses.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, poses.size())));
+  auto made = make_mesh_avatar(mesh, options);
+  if (!made) return made.status();
+  AvatarAsset& asset = made->asset;
+  asset.idle = loaded->pose;
+  std::printf(
+      "%zu Gaussians on %.2f m2, %.2f mm apart; %d weights each of at most %zu, off by %.3f mm (%zu by more than 0.2 "
+      "mm)\n",
+      asset.size(), made->area, 1e3 * made->spacing, made->weights.influences, made->weights.most_weights,
+      1e3 * made->weights.position_error, made->weights.needs_more);
+  CapsuleFitOptions fit;
+  fit.percentile = c.percentile;
+  const auto capsules = fit_body_capsules(asset, poses, fit);
+  if (!capsules) return capsules.status();
+  const CapsuleReport thin = measure_capsules(asset, habitat_capsules(asset.skeleton), poses);
+  std::printf(
+      "%zu capsules (percentile %.4f) hold %.2f %% of the centres in the worst of %zu poses, the others lie up to %.1f "
+      "cm "
+      "outside; over-cover %.1f cm mean, %.1f cm p99\n",
+      capsules->capsules, capsules->percentile, 100 * capsules->contained_least, capsules->poses,
+      100 * capsules->outside_greatest, 100 * capsules->over_mean, 100 * capsules->over_p99);
+  std::printf("by Habitat-GS's rule: %zu capsules, %.2f %%, up to %.1f cm\n", thin.capsules, 100 * thin.contained_least,
+              100 * thin.outside_greatest);
+  if (Status s = io::save_avatar(c.out, asset); !s) return s;
+  std::printf("%s: written\n", c.out.c_str());
+  return c.driver.empty() ? Status() : write_driver(c, asset, clip);
+}
+
+}  // namespace gsnav_avatar

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
+
+namespace gsnav_avatar {
+namespace {
+
+const char kDescription[] =
+    "Makes Gaussian avatars from rigged meshes and lets them walk. Lengths in metres, Y up. Exit status: 0, or 1 with "
+    "one "
+    "line that says what is wrong.";
+
+bool parse_point(const std::string& text, gsnav::Vec3d& out) {
+  const char *at = text.data(), *end = text.data() + text.size();
+  for (int k = 0; k < 3; ++k) {
+    const auto r = std::from_chars(at, end, out[k]);
+    if (r.ec != std::errc{} || !std::isfinite(out[k])) return false;
+    at = r.ptr;
+    if (k < 2 && (at == end || *at++ != ',')) return false;
+  }
+  return at == end;
+}
+
+/// FILE or FILE=AMOUNT.
+bool parse_target(const std::string& text, std::pair<std::string, double>& out) {
+  const std::size_t equals = text.rfind('=');
+  out = {text.substr(0, equals), 1.0};
+  if (equals == text.npos) return true;
+  const auto r = std::from_chars(text.data() + equals + 1, text.data() + text.size(), out.second);
+  return r.ec == std::errc{} && r.ptr == text.data() + text.size();
+}
+
+void add_clip(CLI::App& app, ClipSource& c) {
+  app.add_option("--clip", c.clip,
+                 "Motion: a .bvh, .amc, .glb or .gltf file or a driver's .npz; or the name of a clip of INPUT itself");
+  app.add_option("--asf", c.asf, "Skeleton of an .amc");
+  app.add_option("--clip-scale", c.scale, "Metres a unit of a .bvh or .amc; 0: 1, or what the .asf says")
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--clip-z-up", c.z_up, "The .bvh's or .amc's Z points up");
+}
+
+void add_mesh(CLI::App& app, MeshCommand& m, bool makehuman) {
+  app.add_option("input", m.input, makehuman ? "MakeHuman base mesh (.obj)" : "Rigged glTF 2.0 (.glb, .gltf)")
+      ->required();
+  app.add_option("--out", m.out, "Avatar to write (.npz, Habitat-GS's keys)")->required();
+  app.add_option("--driver", m.driver, "Driver to write (.npz): the clip at 40 frames a second with its capsules");
+  app.add_option("--gaussians", m.gaussians, "About so many")->capture_default_str();
+  app.add_option("--seed", m.seed, "Of the places")->capture_default_str();
+  app.add_option("--influences", m.influences, "Weights kept a Gaussian: 4, 8 or 0: by their error, 0.2 mm")
+      ->check(CLI::IsMember({0, 4, 8}))
+      ->capture_default_str();
+  app.add_option("--percentile", m.percentile, "Share of a part's Gaussians that its capsule holds")
+      ->capture_default_str();
+  app.add_option("--shade", m.shade, "Share of the light that surfaces lose which look down, 0 to 1")
+      ->capture_default_str();
+  add_clip(app, m.clip);
+}
+
+}  // namespace
+
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
+  Options out;
+  MeshCommand gltf, human;
+  WalkCommand walk;
+  std::vector<std::string> targets, via;
+  std::string from, to;
+  CLI::App app{kDescription};
+  app.require_subcommand(1);
+  CLI::App* from_gltf = app.add_subcommand("from-gltf", "An avatar from a rigged glTF file");
+  add_mesh(*from_gltf, gltf, false);
+  CLI::App* from_makehuman = app.add_subcommand("from-makehuman", "An avatar from MakeHuman's base mesh and rig");
+  add_mesh(*from_makehuman, human, true);
+  from_makehuman->add_option("--skeleton", human.skeleton, "Rig (.mhskel)")->required();
+  from_makehuman->add_option("--weights", human.weights, "Weights (.mhw); by default those that the rig names");
+  from_makehuman->add_option("--target", targets, "Shape (.target), FILE or FILE=AMOUNT; any number");
+  CLI::App* walks = app.add_subcommand("walk", "A driver that walks a path on a NavMesh");
+  walks->add_option("--avatar", walk.avatar, "Avatar (.npz)")->required();
+  walks->add_option("--navmesh", walk.navmesh, "NavMesh (.navmesh, .bin)")->required();
+  walks->add_option("--from", from, "Start: X,Y,Z")->required();
+  walks->add_option("--to", to, "End: X,Y,Z")->required();
+  walks->add_option("--via", via, "On the way, in order: X,Y,Z; any number");
+  walks->add_option("--out", walk.out, "Driver to write (.npz)")->required();
+  walks->add_option("--speed", walk.speed, "Metres a second; 0: the clip's own")->check(CLI::NonNegativeNumber);
+  walks->add_option("--fps", walk.frame_rate, "Frames a second")->check(CLI::PositiveNumber)->capture_default_str();
+  walks->add_option("--first-key", walk.first_key, "Where the clip's cycle of two steps begins");
+  walks->add_option("--keys", walk.keys, "How many keys the cycle has; 0: found");
+  add_clip(*walks, walk.clip);
+  walks->get_option("--clip")->required();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    exit_code = app.exit(e) == 0 ? 0 : 1;
+    return std::nullopt;
+  }
+  const auto bad = [&](const std::string& text, const char* what) {
+    std::fprintf(stderr, "gsnav-avatar: '%s' is no %s\n", text.c_str(), what);
+    exit_code = 1;
+    return std::nullopt;
+  };
+  for (const std::string& t : targets) {
+    if (!parse_target(t, human.targets.emplace_back())) return bad(t, "FILE or FILE=AMOUNT");
+  }
+  for (const std::string& t : via) {
+    if (!parse_point(t, walk.via.emplace_back())) return bad(t, "point X,Y,Z");
+  }
+  if (walks->parsed()) {
+    if (!parse_point(from, walk.from)) return bad(from, "point X,Y,Z");
+    if (!parse_point(to, walk.to)) return bad(to, "point X,Y,Z");
+    out.walk = walk;
+  } else {
+    out.makehuman = from_makehuman->parsed();
+    out.mesh = out.makehuman ? human : gltf;
+  }
+  return out;
+}
+
+}  // namespace gsnav_avatar

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gsnav/math/vec.hpp"
+
+namespace gsnav_avatar {
+
+/// Where a clip comes from.
+struct ClipSource {
+  std::string clip;    ///< a file (.bvh, .amc, .glb, .gltf, a driver's .npz), or a clip's name in the body's own file
+  std::string asf;     ///< skeleton of an .amc
+  double scale = 0.0;  ///< metres a unit of a .bvh or .amc; 0: 1, or what the .asf says
+  bool z_up = false;
+};
+
+/// from-gltf and from-makehuman.
+struct MeshCommand {
+  std::string input, out, driver;
+  std::string skeleton, weights;                        // MakeHuman
+  std::vector<std::pair<std::string, double>> targets;  // MakeHuman
+  ClipSource clip;
+  std::size_t gaussians = 100000;
+  std::uint64_t seed = 1;
+  int influences = 0;
+  double percentile = 0.99;
+  double shade = 0.0;
+};
+
+struct WalkCommand {
+  std::string avatar, navmesh, out;
+  gsnav::Vec3d from{}, to{};
+  std::vector<gsnav::Vec3d> via;
+  ClipSource clip;
+  std::size_t first_key = 0, keys = 0;
+  double speed = 0.0, frame_rate = 40.0;
+};
+
+struct Options {
+  std::optional<MeshCommand> mesh;
+  bool makehuman = false;
+  std::optional<WalkCommand> walk;
+};
+
+/// Reads the command line; prints help or what is wrong and sets `exit_code` where nothing is left to do.
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
+
+}  // namespace gsnav_avatar

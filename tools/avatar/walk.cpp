@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "clips.hpp"
+#include "commands.hpp"
+#include "gsnav/avatar/actor.hpp"
+#include "gsnav/avatar/clip_walk.hpp"
+#include "gsnav/avatar/foot_contact.hpp"
+#include "gsnav/avatar/trajectory.hpp"
+#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/io/motion_file.hpp"
+#include "gsnav/nav/navmesh_file.hpp"
+
+namespace gsnav_avatar {
+
+using namespace gsnav;
+
+namespace {
+
+/// The shortest path through all the points, on the surface.
+Result<std::vector<Vec3d>> lay_path(const NavMesh& mesh, const WalkCommand& c, double& length) {
+  std::vector<Vec3d> stops{c.from};
+  stops.insert(stops.end(), c.via.begin(), c.via.end());
+  stops.push_back(c.to);
+  std::vector<Vec3d> out;
+  length = 0.0;
+  for (std::size_t k = 0; k + 1 < stops.size(); ++k) {
+    const auto path = mesh.find_path(stops[k], stops[k + 1]);
+    if (!path) return {path.code(), c.navmesh + ": " + path.message()};
+    length += path->length;
+    out.insert(out.end(), path->points.begin() + (out.empty() ? 0 : 1), path->points.end());
+  }
+  return out;
+}
+
+void print_slide(const char* when, const FootSlide& s) {
+  std::printf("feet slide %.1f mm a step on average, %.1f mm at most, over %zu steps %s\n", 1e3 * s.mean,
+              1e3 * s.greatest, s.contacts, when);
+}
+
+}  // namespace
+
+Status make_walk(const WalkCommand& c) {
+  auto avatar = io::load_avatar(c.avatar);
+  if (!avatar) return avatar.status();
+  const auto mesh = load_navmesh(c.navmesh);
+  if (!mesh) return mesh.status();
+  auto asset = std::make_shared<const AvatarAsset>(std::move(avatar->asset));
+  const Skeleton& skeleton = asset->skeleton;
+  const auto clip = load_clip(c.clip, skeleton);
+  if (!clip) return clip.status();
+  ClipWalkOptions cycle;
+  cycle.first = c.first_key;
+  cycle.keys = c.keys;
+  cycle.floor = std::numeric_limits<double>::max();
+  for (std::size_t i = 0; i < asset->size(); ++i) cycle.floor = min(cycle.floor, asset->cloud.mean(i).y);
+  auto walk = ClipWalk::create(skeleton, *clip, cycle);
+  if (!walk) return walk.status();
+  std::printf("%s: keys %zu to %zu are a cycle of %.2f m, walked at %.2f m/s\n", c.clip.clip.c_str(), walk->first_key(),
+              walk->first_key() + walk->keys(), walk->stride(), walk->speed());
+  double length = 0.0;
+  const auto points = lay_path(*mesh, c, length);
+  if (!points) return points.status();
+  double clearance = std::numeric_limits<double>::infinity();
+  WalkOptions options;
+  options.speed = c.speed > 0 ? c.speed : walk->speed();
+  const auto path = WalkTrajectory::create(*points, options);
+  if (!path) return path.status();
+  const double stride = walk->stride();
+  const auto actor = AvatarActor::create(asset, std::make_shared<const ClipWalk>(std::move(*walk)),
+                                         std::make_shared<const WalkTrajectory>(*path));
+  if (!actor) return actor.status();
+
+  io::DriverFrames frames;
+  frames.frame_rate = c.frame_rate;
+  frames.joints = skeleton.size();
+  FootSlideMeter feet(find_feet(skeleton, cycle.floor));
+  const auto count = static_cast<std::size_t>(std::ceil(path->arrival() * c.frame_rate)) + 1;
+  std::size_t steady_first = count, steady_last = 0;
+  std::vector<Affine3<double>> globals;
+  double turned = 0.0;
+  for (std::size_t t = 0; t < count; ++t) {
+    const double time = min(static_cast<double>(t) / c.frame_rate, path->arrival());
+    const TrajectorySample at = path->at(time);
+    const Similarity world = actor->placement(time);
+    const Affine3<double> placed{rotation_matrix(world.rotation), world.translation};
+    actor->joint_globals(time, globals);
+    for (auto& m : globals) m = placed * m;
+    feet.add(globals, at.position);
+    frames.matrices.insert(frames.matrices.end(), globals.begin(), globals.end());
+    frames.capsules.push_back(actor->capsules(time));
+    clearance = min(clearance, mesh->distance_to_closest_obstacle(at.position));
+    turned = at.turned;
+    if (at.walking > 0.999) steady_first = min(steady_first, t), steady_last = max(steady_last, t + 1);
+  }
+  if (frames.capsules[0].empty()) frames.capsules.clear();
+  std::printf(
+      "path of %.2f m in %.2f s at %.2f m/s, %.1f steps, turns on the spot of %.0f degrees; walls are at least %.2f m "
+      "away (the mesh leaves out another %.2f m)\n",
+      length, path->arrival(), options.speed, 2 * length / stride, turned * 57.29577951308232, clearance,
+      mesh->settings().agent_radius);
+  print_slide("in all", feet.measure());
+  if (steady_first < steady_last) print_slide("at full speed", feet.measure(steady_first, steady_last));
+  if (Status s = io::save_driver(c.out, frames); !s) return s;
+  std::printf("%s: %zu frames at %g a second\n", c.out.c_str(), count, c.frame_rate);
+  return {};
+}
+
+}  // namespace gsnav_avatar
