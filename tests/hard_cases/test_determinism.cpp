@@ -114,8 +114,12 @@ TEST_CASE("N63_determinism_100 of work that is cut") {
     const auto reference = serial.render({&cloud}, camera, config);
     REQUIRE(reference.stats[0].visible >= 4096);
     for_each_renderer([&](auto& renderer) {
-      if constexpr (std::remove_reference_t<decltype(renderer)>::is_float) {
-        CHECK(same_images(reference, renderer.render({&cloud}, camera, config)));
+      using R = std::remove_reference_t<decltype(renderer)>;
+      if constexpr (R::is_float) {
+        const auto images = renderer.render({&cloud}, camera, config);
+        // A GPU's `fast` has an exponential of its own (Exp2::hardware).
+        const bool own = profile == Profile::fast && !is_host_backend<std::remove_cvref_t<decltype(renderer.backend())>>;
+        CHECK(same_images(own ? renderer.render({&cloud}, camera, config) : reference, images));
       }
     });
 #if defined(_OPENMP)

@@ -180,9 +180,11 @@ TEST_CASE("a crowd is skinned as each of its actors alone, bit for bit") {
     GaussianCloudBuilder builder(1);
     std::vector<std::uint16_t> indices;
     std::vector<float> weights;
+    const float first_band[9] = {};
     for (int i = 0; i < count; ++i) {
       RawGaussian g = gaussian({rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}, {0.1, 0.05, 0.1}, 0.9);
       g.quat = random_rotation(rng);
+      g.shN = first_band;
       builder.add(g);
       for (int k = 0; k < 3; ++k) {
         indices.push_back(static_cast<std::uint16_t>(rng.uniform() * static_cast<double>(joints)));

@@ -11,6 +11,7 @@ namespace {
 
 constexpr unsigned kThreads = 256, kRowsPerBlock = 4 * kThreads;
 constexpr std::size_t kMaxShared = 48 * 1024;
+static_assert(sizeof(Affine3<float>) == 3 * sizeof(float4));
 
 /// An avatar and the first of its blocks.
 struct SkinJob {
@@ -30,18 +31,33 @@ __global__ void __launch_bounds__(kThreads) skin_kernel(const SkinJob* jobs, std
       high = mid;
     }
   }
-  SkinGaussian<float> skin{jobs[low].args};
-  SkinningArgs<float>& args = skin.args;
+  const SkinningArgs<float> args = jobs[low].args;
+  const std::size_t begin = std::size_t{blockIdx.x - jobs[low].first_block} * kRowsPerBlock + threadIdx.x;
+  const std::size_t end = begin + kRowsPerBlock < args.size() ? begin + kRowsPerBlock : args.size();
+  const auto rows = [&](const auto& joint_at) {
+    if (args.influences == kInfluences8) {
+      for (std::size_t i = begin; i < end; i += kThreads) skin_row<kInfluences8>(args, i, joint_at);
+    } else {
+      for (std::size_t i = begin; i < end; i += kThreads) skin_row<kInfluences4>(args, i, joint_at);
+    }
+  };
   const std::size_t bytes = args.joints.size * sizeof(Affine3<float>);
-  if (bytes <= room) {
-    auto* const words = reinterpret_cast<float*>(memory);
-    const auto* const from = reinterpret_cast<const float*>(args.joints.data);
-    for (std::size_t i = threadIdx.x; i < bytes / sizeof(float); i += kThreads) words[i] = from[i];
-    args.joints.data = reinterpret_cast<const Affine3<float>*>(memory);
-    __syncthreads();
-  }
-  const std::size_t first = std::size_t{blockIdx.x - jobs[low].first_block} * kRowsPerBlock;
-  for (std::size_t i = first + threadIdx.x; i < first + kRowsPerBlock && i < args.size(); i += kThreads) skin(i);
+  if (bytes > room) return rows([&](std::uint16_t j) -> const Affine3<float>& { return args.joints[j]; });
+  auto* const words = reinterpret_cast<float*>(memory);
+  const auto* const from = reinterpret_cast<const float*>(args.joints.data);
+  for (std::size_t i = threadIdx.x; i < bytes / sizeof(float); i += kThreads) words[i] = from[i];
+  __syncthreads();
+  // By 16 bytes: lanes have joints of their own, and would wait for each other's banks four times as often.
+  const auto* const quads = reinterpret_cast<const float4*>(memory);
+  rows([&](std::uint16_t j) {
+    const float4 a = quads[3 * j], b = quads[3 * j + 1], c = quads[3 * j + 2];
+    Affine3<float> joint;
+    joint.linear.row[0] = {a.x, a.y, a.z};
+    joint.linear.row[1] = {a.w, b.x, b.y};
+    joint.linear.row[2] = {b.z, b.w, c.x};
+    joint.translation = {c.y, c.z, c.w};
+    return joint;
+  });
 }
 
 }  // namespace

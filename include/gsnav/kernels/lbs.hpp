@@ -174,51 +174,51 @@ GSNAV_HD S skinning_weight(std::uint16_t parts) noexcept {
   return static_cast<S>(parts) * static_cast<S>(1.0 / kWeightParts);
 }
 
+/// Skins Gaussian i, whose K joints `joint_at(index)` gives (an Affine3<S>, or a reference to one).
+template <int K, class S, class Out, class JointAt>
+GSNAV_HD void skin_row(const SkinningArgs<S, Out>& args, std::size_t i, const JointAt& joint_at) noexcept {
+  const std::uint16_t* const indices = args.joint_indices.data + K * i;
+  const std::uint16_t* const parts = args.weights.data + K * i;
+  Affine3<S> blend;
+  for (int k = 0; k < K; ++k) {
+    const Affine3<S>& joint = joint_at(indices[k]);
+    const S weight = skinning_weight<S>(parts[k]);
+    for (int r = 0; r < 3; ++r) {
+      blend.linear.row[r] =
+          k == 0 ? joint.linear.row[r] * weight : fma(weight, joint.linear.row[r], blend.linear.row[r]);
+    }
+    blend.translation = k == 0 ? joint.translation * weight : fma(weight, joint.translation, blend.translation);
+  }
+  const Vec3<S> mean{S(args.means[0][i]), S(args.means[1][i]), S(args.means[2][i])};
+  const Quat<S> quat{S(args.quats[0][i]), S(args.quats[1][i]), S(args.quats[2][i]), S(args.quats[3][i])};
+  const auto first = [&]() noexcept { return joint_at(indices[0]).linear; };
+  const Skinned<S> s = skin<S>(blend, first, mean, quat);
+  args.means_out[0][i] = static_cast<Out>(s.mean.x);
+  args.means_out[1][i] = static_cast<Out>(s.mean.y);
+  args.means_out[2][i] = static_cast<Out>(s.mean.z);
+  args.quats_out[0][i] = static_cast<Out>(s.quat.w);
+  args.quats_out[1][i] = static_cast<Out>(s.quat.x);
+  args.quats_out[2][i] = static_cast<Out>(s.quat.y);
+  args.quats_out[3][i] = static_cast<Out>(s.quat.z);
+  if (!args.rotations_out[0].empty()) {
+    args.rotations_out[0][i] = static_cast<Out>(s.rotation.w);
+    args.rotations_out[1][i] = static_cast<Out>(s.rotation.x);
+    args.rotations_out[2][i] = static_cast<Out>(s.rotation.y);
+    args.rotations_out[3][i] = static_cast<Out>(s.rotation.z);
+  }
+}
+
 /// Skins Gaussian i.
 template <class S, class Out = float>
 struct SkinGaussian {
   SkinningArgs<S, Out> args;
 
   GSNAV_HD void operator()(std::size_t i) const noexcept {
+    const auto joint_at = [this](std::uint16_t j) noexcept -> const Affine3<S>& { return args.joints[j]; };
     if (args.influences == kInfluences8) {
-      skin_row<kInfluences8>(i);
+      skin_row<kInfluences8>(args, i, joint_at);
     } else {
-      skin_row<kInfluences4>(i);
-    }
-  }
-
- private:
-  template <int K>
-  GSNAV_HD void skin_row(std::size_t i) const noexcept {
-    const std::uint16_t* const indices = args.joint_indices.data + K * i;
-    const std::uint16_t* const parts = args.weights.data + K * i;
-    Affine3<S> blend;
-    for (int k = 0; k < K; ++k) {
-      const Affine3<S>& joint = args.joints[indices[k]];
-      const S weight = skinning_weight<S>(parts[k]);
-      for (int r = 0; r < 3; ++r) {
-        blend.linear.row[r] = k == 0 ? joint.linear.row[r] * weight
-                                     : fma(weight, joint.linear.row[r], blend.linear.row[r]);
-      }
-      blend.translation = k == 0 ? joint.translation * weight : fma(weight, joint.translation, blend.translation);
-    }
-    const Vec3<S> mean{S(args.means[0][i]), S(args.means[1][i]), S(args.means[2][i])};
-    const Quat<S> quat{S(args.quats[0][i]), S(args.quats[1][i]), S(args.quats[2][i]),
-                       S(args.quats[3][i])};
-    const auto first = [&]() noexcept { return args.joints[indices[0]].linear; };
-    const Skinned<S> s = skin<S>(blend, first, mean, quat);
-    args.means_out[0][i] = static_cast<Out>(s.mean.x);
-    args.means_out[1][i] = static_cast<Out>(s.mean.y);
-    args.means_out[2][i] = static_cast<Out>(s.mean.z);
-    args.quats_out[0][i] = static_cast<Out>(s.quat.w);
-    args.quats_out[1][i] = static_cast<Out>(s.quat.x);
-    args.quats_out[2][i] = static_cast<Out>(s.quat.y);
-    args.quats_out[3][i] = static_cast<Out>(s.quat.z);
-    if (!args.rotations_out[0].empty()) {
-      args.rotations_out[0][i] = static_cast<Out>(s.rotation.w);
-      args.rotations_out[1][i] = static_cast<Out>(s.rotation.x);
-      args.rotations_out[2][i] = static_cast<Out>(s.rotation.y);
-      args.rotations_out[3][i] = static_cast<Out>(s.rotation.z);
+      skin_row<kInfluences4>(args, i, joint_at);
     }
   }
 };
