@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# gsnav::interop_eigen and gsnav::interop_glm, where the package is found. Their headers are part of
+# gsnav::interop_eigen, interop_glm and interop_dlpack, where the package is found. Their headers are part of
 # gsnav::gsnav; these targets only add the other library's include folder.
 
 # gsnav_interop(name package target)
@@ -15,3 +15,4 @@ endfunction()
 
 gsnav_interop(eigen Eigen3 Eigen3::Eigen)
 gsnav_interop(glm glm glm::glm)
+gsnav_interop(dlpack dlpack dlpack::dlpack)

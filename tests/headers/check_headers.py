@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiles every public header alone, twice included, with warnings as errors.
 
-usage: check_headers.py COMPILER [--nvcc] [--system DIR]... [--have eigen] [--have glm]
+usage: check_headers.py COMPILER [--nvcc] [--system DIR]... [--have eigen|glm|dlpack]...
 
 Headers are found when the check runs, so a new one is covered without a new configure. --system adds
 a folder of third-party headers; an interop header is compiled where --have names its library.
@@ -17,7 +17,8 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).parents[2]
 BACKENDS = [ROOT / "backends" / name for name in ("serial", "openmp", "cuda")]
-NEEDS = {"gsnav/interop/eigen.hpp": "eigen", "gsnav/interop/glm.hpp": "glm"}
+NEEDS = {"gsnav/interop/eigen.hpp": "eigen", "gsnav/interop/glm.hpp": "glm",
+         "gsnav/interop/dlpack.hpp": "dlpack"}
 DEVICE_LAYERS = ("math", "core", "kernels", "ops")
 HOST_ONLY = ("gsnav/math/pack", "gsnav/kernels/lanes/")  # lanes are host vectors
 WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow"]

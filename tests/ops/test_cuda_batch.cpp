@@ -9,6 +9,7 @@
 
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda/batch.hpp"
+#include "gsnav/backends/cuda/pinned.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 
 using namespace gsnav;
@@ -292,6 +293,45 @@ TEST_CASE("cuda batch: calls that differ in their cameras alone are replayed, wi
   const std::vector<float> moved = frames_of(renderer, elsewhere.data(), cameras[3]);
   CHECK_FALSE(renderer.stats().replayed);
   CHECK(differing(moved, frames_of(renderer, images.data(), cameras[3])) == 0);
+}
+
+TEST_CASE("cuda batch: images go to another stream and to pinned memory without the host waiting") {
+  if (no_gpu("cuda batch hand-over")) return;
+  CudaBackend cuda, learner;
+  const GaussianCloud cloud = random_cloud(41, {.count = 20000});
+  const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+  const std::vector<GaussianSet> sets{arrays.set()};
+  const std::vector<Camera> cameras = ring(8, 128, 96);
+  const std::size_t values = 8 * 128 * 96;
+  Buffer<float, CudaBackend> depth(cuda), taken(learner);
+  depth.resize_discard(values);
+  taken.resize_discard(values);
+  PinnedArray<float> here(values), there(values);
+  std::vector<BatchCamera> batch;
+  for (const Camera& c : cameras) batch.push_back({c, {}});
+  BatchImages to;
+  to.floats.median_depth = depth.data();
+  CudaBatchRenderer renderer(cuda);
+  renderer.render(sets, batch, to).throw_if_error();
+  renderer.finish().throw_if_error();  // scratch has grown
+  for (int run = 0; run < 5; ++run) {
+    cuda.fill(depth.data(), 0xa5, values * sizeof(float));
+    renderer.render(sets, batch, to).throw_if_error();
+    cuda.copy(here.data(), depth.data(), values * sizeof(float), CopyKind::device_to_host);
+    cuda.hand_over_to(learner.stream());
+    learner.copy(taken.data(), depth.data(), values * sizeof(float), CopyKind::device_to_device);
+    learner.copy(there.data(), taken.data(), values * sizeof(float), CopyKind::device_to_host);
+    learner.hand_over_to(cuda.stream());  // the next images wait until these are taken
+    renderer.finish().throw_if_error();
+    REQUIRE(learner.synchronize().ok());
+    std::size_t wrong = 0, seen = 0;
+    for (std::size_t i = 0; i < values; ++i) {
+      wrong += here.data()[i] == there.data()[i] ? 0u : 1u;
+      seen += here.data()[i] > 0.1f ? 1u : 0u;
+    }
+    CHECK(wrong == 0);
+    CHECK(seen > values / 4);
+  }
 }
 
 TEST_CASE("cuda batch: scratch that is too small grows, and says so") {

@@ -62,6 +62,8 @@ struct Pair {
 struct BatchCounters {
   unsigned long long slots, hard, several, large, pairs;
   std::uint32_t items;
+  std::uint32_t tiles_of_length[33];    ///< by leading zeros of a tile's count: long lists first
+  std::uint32_t ordered_of_length[33];  ///< of these in tile_order already
 };
 
 /// By value to every kernel.
@@ -89,6 +91,7 @@ struct BatchArgs {
   std::uint32_t* tile_counts;
   std::uint32_t* tile_begins;
   std::uint32_t* tile_cursors;
+  std::uint32_t* tile_order;  ///< the order that tiles are begun in: longest lists first, so that none is waited for
   Pair* pairs;
   Pair* pairs_alt;
   std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity;

@@ -45,8 +45,30 @@ __global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
   }
 }
 
-/// A thread four slots.
+/// Puts the block's share of the tiles into tile_order.
+__device__ void order_tiles(const BatchArgs& a) {
+  __shared__ std::uint32_t taken[33], places[33];
+  for (std::uint32_t first = blockIdx.x * kThreads; first < a.tiles; first += gridDim.x * kThreads) {
+    const std::uint32_t tile = first + threadIdx.x;
+    const int length = tile < a.tiles ? __clz(static_cast<int>(a.tile_counts[tile])) : 0;
+    if (threadIdx.x < 33) taken[threadIdx.x] = 0;
+    __syncthreads();
+    const std::uint32_t at = tile < a.tiles ? atomicAdd(taken + length, 1u) : 0;
+    __syncthreads();
+    if (threadIdx.x < 33 && taken[threadIdx.x] != 0) {
+      std::uint32_t longer = 0;
+      for (unsigned l = 0; l < threadIdx.x; ++l) longer += a.counters->tiles_of_length[l];
+      places[threadIdx.x] = longer + atomicAdd(a.counters->ordered_of_length + threadIdx.x, taken[threadIdx.x]);
+    }
+    __syncthreads();
+    if (tile < a.tiles) a.tile_order[places[length] + at] = tile;
+    __syncthreads();
+  }
+}
+
+/// A thread four slots; and the order of the tiles.
 __global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
+  order_tiles(a);
   const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
   for (std::uint64_t first = blockIdx.x * std::uint64_t{kThreads * kSlots}; first < slots;
        first += gridDim.x * std::uint64_t{kThreads * kSlots}) {
@@ -96,16 +118,27 @@ __global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
   using Scan = cub::BlockScan<unsigned long long, kThreads>;
   __shared__ typename Scan::TempStorage storage;
   __shared__ unsigned long long base;
+  __shared__ std::uint32_t of_length[33];
+  if (threadIdx.x < 33) of_length[threadIdx.x] = 0;
   const std::uint32_t tile = blockIdx.x * kThreads + threadIdx.x;
   const unsigned long long count = tile < a.tiles ? a.tile_counts[tile] : 0;
   unsigned long long before, total;
   Scan(storage).ExclusiveSum(count, before, total);
   if (threadIdx.x == 0) base = atomicAdd(&a.counters->pairs, total);
   __syncthreads();
-  if (tile >= a.tiles) return;
+  // By the count that is left below, which is what order_tiles reads.
   const std::uint32_t begin = used(base + before, a.pair_capacity);
-  a.tile_begins[tile] = a.tile_cursors[tile] = begin;
-  a.tile_counts[tile] = static_cast<std::uint32_t>(min(count, static_cast<unsigned long long>(a.pair_capacity - begin)));
+  const std::uint32_t kept =
+      static_cast<std::uint32_t>(min(count, static_cast<unsigned long long>(a.pair_capacity - begin)));
+  if (tile < a.tiles) {
+    a.tile_begins[tile] = a.tile_cursors[tile] = begin;
+    a.tile_counts[tile] = kept;
+    atomicAdd(of_length + __clz(static_cast<int>(kept)), 1u);
+  }
+  __syncthreads();
+  if (threadIdx.x < 33 && of_length[threadIdx.x] != 0) {
+    atomicAdd(a.counters->tiles_of_length + threadIdx.x, of_length[threadIdx.x]);
+  }
 }
 
 }  // namespace

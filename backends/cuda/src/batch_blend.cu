@@ -193,7 +193,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(co
   BlendShared& s = *reinterpret_cast<BlendShared*>(memory);
   const BatchArgs& a = b.batch;
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
-  const std::uint32_t camera = blockIdx.x / tiles, tile = blockIdx.x % tiles;
+  const std::uint32_t ordered = a.tile_order[blockIdx.x], camera = ordered / tiles, tile = ordered % tiles;
   const int tile_x = static_cast<int>(tile) % a.grid.columns * kBatchTile;
   const int tile_y = static_cast<int>(tile) / a.grid.columns * kBatchTile;
   // A warp has 2 x 2 blocks of the tile's 4 x 4.
@@ -238,7 +238,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(co
       }
     }
   };
-  TileOrder order(a, blockIdx.x, camera);
+  TileOrder order(a, ordered, camera);
   unsigned open = __ballot_sync(kAll, is_open());
   bool all_closed = false;
   while (const std::uint32_t n = all_closed ? 0 : order.next(s.order, a)) {

@@ -31,6 +31,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.tile_counts = size(tile_counts, args.tiles);
   args.tile_begins = size(tile_begins, args.tiles);
   args.tile_cursors = size(tile_cursors, args.tiles);
+  args.tile_order = size(tile_order, args.tiles);
   args.pairs = size(pairs, pair_capacity);
   args.pairs_alt = size(pairs_alt, pair_capacity);
   const bool sums = raster.depth_mode() == DepthMode::any, perspective = config.response != Response::ewa;
@@ -45,7 +46,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.pair_capacity = pair_capacity;
   stats.scratch_bytes = inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
                         entries.capacity_bytes() + sources.capacity_bytes() + hard.capacity_bytes() +
-                        several.capacity_bytes() + large.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
+                        several.capacity_bytes() + large.capacity_bytes() + 4 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
                         pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes();
 }
 

@@ -62,7 +62,7 @@ struct CudaBatchRenderer::State {
 
   State(CudaBackend& b, const RenderConfig& c)
       : backend(b), config(c), inputs(b), items(b), counters(b), records(b), entries(b), sources(b), several(b), large(b),
-        tile_counts(b), tile_begins(b), tile_cursors(b), depths(b), perspectives(b), hard(b), pairs(b),
+        tile_counts(b), tile_begins(b), tile_cursors(b), tile_order(b), depths(b), perspectives(b), hard(b), pairs(b),
         pairs_alt(b) {
     int device = 0;
     cuda::need(cudaGetDevice(&device), "cudaGetDevice");
@@ -102,7 +102,7 @@ struct CudaBatchRenderer::State {
   Array<cuda::BatchCounters> counters;
   Array<cuda::SplatRecord> records;
   Array<cuda::SplatEntry> entries;
-  Array<std::uint32_t> sources, several, large, tile_counts, tile_begins, tile_cursors;
+  Array<std::uint32_t> sources, several, large, tile_counts, tile_begins, tile_cursors, tile_order;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
   Array<cuda::HardSplat> hard;

@@ -4,6 +4,7 @@
 #include <cub/device/device_scan.cuh>
 
 #include "gsnav/backends/cuda/device.cuh"
+#include "gsnav/backends/cuda/pinned.hpp"
 #include "pinned_ring.cuh"
 
 namespace gsnav {
@@ -16,6 +17,14 @@ std::string describe(int device, int error, const char* what) {
 }
 
 }  // namespace
+
+void* cuda::allocate_pinned(std::size_t bytes) noexcept {
+  void* p = nullptr;
+  if (cudaMallocHost(&p, bytes) == cudaSuccess) return p;
+  cudaGetLastError();
+  return nullptr;
+}
+void cuda::free_pinned(void* p) noexcept { cudaFreeHost(p); }
 
 int CudaBackend::device_count() noexcept {
   int n = 0;

@@ -24,6 +24,9 @@
 #if defined(WITH_INTEROP_EIGEN)
 #include <gsnav/interop/eigen.hpp>
 #endif
+#if defined(WITH_INTEROP_DLPACK)
+#include <gsnav/interop/dlpack.hpp>
+#endif
 #if defined(WITH_INTEROP_GLM)
 #include <gsnav/interop/glm.hpp>
 #endif
@@ -79,6 +82,9 @@ int main() {
 #endif
 #if defined(WITH_INTEROP_EIGEN)
   check("interop_eigen", gsnav::interop::to_eigen(gsnav::Quatd{}).w() == 1.0);
+#endif
+#if defined(WITH_INTEROP_DLPACK)
+  check("interop_dlpack", gsnav::interop::dlpack_type<float>().bits == 32);
 #endif
 #if defined(WITH_INTEROP_GLM)
   check("interop_glm", gsnav::interop::to_glm(gsnav::Quatd{}).w == 1.0);

@@ -60,6 +60,7 @@ class CudaBackend {
   Status synchronize();
 
   std::size_t concurrency() const noexcept { return 1; }
+  int device() const noexcept { return device_; }
   CUstream_st* stream() const noexcept { return stream_; }
   /// What the consumer's stream is given from now on waits for what this one has been given so far; the host does
   /// not wait. For handing images over without a copy.
