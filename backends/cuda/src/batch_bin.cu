@@ -66,29 +66,75 @@ __device__ void order_tiles(const BatchArgs& a) {
   }
 }
 
-/// A thread four slots; and the order of the tiles.
-__global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
-  order_tiles(a);
-  const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
-  for (std::uint64_t first = blockIdx.x * std::uint64_t{kThreads * kSlots}; first < slots;
-       first += gridDim.x * std::uint64_t{kThreads * kSlots}) {
-    SplatEntry entries[kSlots];
+/// The slots of a block, four a thread, as binning reads them.
+struct BlockSlots {
+  std::uint32_t first;
+  SplatEntry entries[kSlots];
+
+  __device__ BlockSlots(const BatchArgs& a, std::uint64_t begin, std::uint32_t slots)
+      : first(static_cast<std::uint32_t>(begin) + threadIdx.x) {
     for (unsigned j = 0; j < kSlots; ++j) {
-      const std::uint64_t at = first + j * kThreads + threadIdx.x;
+      const std::uint64_t at = begin + j * kThreads + threadIdx.x;
       entries[j].camera = kNoSlot;
       if (at < slots) entries[j] = a.entries[at];
     }
+  }
+  __device__ std::uint32_t slot(unsigned j) const { return first + j * kThreads; }
+  /// Bits of the entry's window that are tiles of its list.
+  __device__ std::uint32_t bits(unsigned j) const { return entries[j].camera != kNoSlot ? entries[j].tiles : 0; }
+};
+
+__device__ void emit(const BatchArgs& a, std::uint32_t at, const SplatEntry& e, std::uint32_t slot) {
+  if (at < a.pair_capacity) a.pairs[at] = {e.key, slot};
+}
+
+/// Writes the pairs; and the order of the tiles.
+__global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
+  order_tiles(a);
+  const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
+  constexpr std::uint64_t kStep = kThreads * kSlots;
+  for (std::uint64_t begin = blockIdx.x * kStep; begin < slots; begin += gridDim.x * kStep) {
+    const BlockSlots mine(a, begin, slots);
     for (unsigned j = 0; j < kSlots; ++j) {
-      const SplatEntry& e = entries[j];
-      const std::uint32_t slot = static_cast<std::uint32_t>(first + j * kThreads + threadIdx.x);
+      const SplatEntry& e = mine.entries[j];
       const TileWindow window{e.corner, e.tiles};
-      std::uint32_t bits = e.camera != kNoSlot ? window.tiles : 0;
-      for (; __any_sync(0xffffffffu, bits != 0); bits &= bits - 1) {
-        const std::uint32_t at =
-            add_together<true>(a.tile_cursors, bits != 0, tile_of(a, e.camera, window, bits));
-        if (bits != 0 && at < a.pair_capacity) a.pairs[at] = {e.key, slot};
+      for (std::uint32_t bits = mine.bits(j); __any_sync(0xffffffffu, bits != 0); bits &= bits - 1) {
+        const std::uint32_t at = add_together<true>(a.tile_cursors, bits != 0, tile_of(a, e.camera, window, bits));
+        if (bits != 0) emit(a, at, e, mine.slot(j));
       }
     }
+  }
+}
+
+constexpr std::uint32_t kFewTiles = 1024;
+
+/// The same for one camera of few tiles, whose cursors all blocks would wait for: a block takes its places in each
+/// list at once.
+__global__ void __launch_bounds__(kThreads) emit_few_kernel(const BatchArgs a) {
+  __shared__ std::uint32_t places[kFewTiles];
+  order_tiles(a);
+  const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
+  constexpr std::uint64_t kStep = kThreads * kSlots;
+  for (std::uint64_t begin = blockIdx.x * kStep; begin < slots; begin += gridDim.x * kStep) {
+    const BlockSlots mine(a, begin, slots);
+    const auto for_each = [&](const auto& f) {
+      for (unsigned j = 0; j < kSlots; ++j) {
+        const TileWindow window{mine.entries[j].corner, mine.entries[j].tiles};
+        for (std::uint32_t bits = mine.bits(j); bits != 0; bits &= bits - 1) f(j, tile_of(a, 0, window, bits));
+      }
+    };
+    for (std::uint32_t t = threadIdx.x; t < a.tiles; t += kThreads) places[t] = 0;
+    __syncthreads();
+    for_each([&](unsigned, std::uint32_t tile) { atomicAdd(places + tile, 1u); });
+    __syncthreads();
+    for (std::uint32_t t = threadIdx.x; t < a.tiles; t += kThreads) {
+      if (places[t] != 0) places[t] = atomicAdd(a.tile_cursors + t, places[t]);
+    }
+    __syncthreads();
+    for_each([&](unsigned j, std::uint32_t tile) {
+      emit(a, atomicAdd(places + tile, 1u), mine.entries[j], mine.slot(j));
+    });
+    __syncthreads();
   }
 }
 
@@ -148,7 +194,8 @@ void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t str
   count_kernel<<<blocks, kThreads, 0, stream>>>(args);
   bin_large_kernel<false><<<blocks, kThreads, 0, stream>>>(args);
   place_kernel<<<(args.tiles + kThreads - 1) / kThreads, kThreads, 0, stream>>>(args);
-  emit_kernel<<<blocks, kThreads, 0, stream>>>(args);
+  const bool few = args.cameras == 1 && args.tiles <= kFewTiles;
+  (few ? emit_few_kernel : emit_kernel)<<<blocks, kThreads, 0, stream>>>(args);
   bin_large_kernel<true><<<blocks, kThreads, 0, stream>>>(args);
 }
 
