@@ -14,12 +14,7 @@
 #include <string>
 
 #include "compare.hpp"
-#include "gsnav/io/gltf.hpp"
-#include "gsnav/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/sog.hpp"
-#include "gsnav/io/splat.hpp"
-#include "gsnav/io/spz.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
@@ -40,14 +35,7 @@ double memory(const char* key) {
   return 0;
 }
 
-Result<LoadedCloud> read(const std::string& path) {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  if (extension == ".ply") return io::load_ply(path);
-  if (extension == ".splat") return io::load_splat(path);
-  if (extension == ".spz") return io::load_spz(path);
-  if (extension == ".glb") return io::load_gltf(path);
-  return io::load_sog(path);
-}
+LoadedCloud read(const std::string& path) { return io::load_scene(path, {.sort = false}).value(); }
 
 struct Row {
   double bytes = 0, write = 0, read = 0, peak = 0, result = 0;
@@ -61,7 +49,7 @@ Row measure(const GaussianCloud& source, const std::vector<Camera>& cameras, con
   io::save_scene(path, source).throw_if_error();
   row.write = now() - start;
   row.bytes = static_cast<double>(std::filesystem::file_size(path));
-  LoadedCloud made = read(path).value();  // from now on the file is in the cache
+  LoadedCloud made = read(path);  // from now on the file is in the cache
   row.read = 1e9;
   for (int run = 0; run < 3; ++run) {
     made = {};
@@ -69,7 +57,7 @@ Row measure(const GaussianCloud& source, const std::vector<Camera>& cameras, con
     std::ofstream("/proc/self/clear_refs") << "5";  // the peak counts from here
     const double before = memory("VmRSS");
     start = now();
-    made = read(path).value();
+    made = read(path);
     row.read = std::min(row.read, now() - start);
     row.peak = memory("VmHWM") - before;
   }

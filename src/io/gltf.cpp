@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cloud_fill.hpp"
-#include "gltf_file.hpp"
+#include "gltf_nodes.hpp"
 #include "gsnav/io/spz.hpp"
 #include "gsnav/scene/edit_cloud.hpp"
 #include "report_sum.hpp"
@@ -46,7 +46,7 @@ class SplatReader {
   SplatReader(const GltfFile& file, const LoadGltfOptions& options) : file_(file), options_(options) {}
 
   Result<LoadedCloud> run() {
-    const auto instances = file_.instances();
+    const auto instances = detail::read_instances(file_);
     if (!instances) return instances.status();
     LoadedCloud out;
     out.report.source = file_.source();
@@ -134,13 +134,13 @@ class SplatReader {
     return parse_spz(*bytes, where, {.keep_axes = true});
   }
 
-  /// Attribute `name` as [count][components]; the first one read says how many there are.
-  Status read(const Json& attributes, const std::string& name, std::size_t components,
+  /// Attribute `name`; the first one read says how many there are.
+  Status read(const Json& attributes, const std::string& name, const char* type,
               const std::string& where, GltfValues& out) {
     const auto index = detail::get_index(attributes, name.c_str(), detail::kNoIndex, where);
     if (!index) return index.status();
     if (*index == detail::kNoIndex) return {Errc::invalid_file, where + ": no attribute '" + name + "'"};
-    const auto values = file_.values(*index, components);
+    const auto values = file_.values(*index, type);
     if (!values) return {values.code(), where + ": attribute '" + name + "': " + values.message()};
     if (name == "POSITION") {
       count_ = values->size();
@@ -164,10 +164,10 @@ class SplatReader {
     if (attributes == nullptr) return {Errc::invalid_file, where + ": a primitive without 'attributes'"};
     const std::string prefix = std::string(kExtension) + ":";
     GltfValues means, quats, scales, opacities;
-    if (Status s = read(*attributes, "POSITION", 3, where, means); !s) return s;
-    if (Status s = read(*attributes, prefix + "ROTATION", 4, where, quats); !s) return s;
-    if (Status s = read(*attributes, prefix + "SCALE", 3, where, scales); !s) return s;
-    if (Status s = read(*attributes, prefix + "OPACITY", 1, where, opacities); !s) return s;
+    if (Status s = read(*attributes, "POSITION", "VEC3", where, means); !s) return s;
+    if (Status s = read(*attributes, prefix + "ROTATION", "VEC4", where, quats); !s) return s;
+    if (Status s = read(*attributes, prefix + "SCALE", "VEC3", where, scales); !s) return s;
+    if (Status s = read(*attributes, prefix + "OPACITY", "SCALAR", where, opacities); !s) return s;
     int degree = 0;
     const auto sh = [&prefix](int band, int coefficient) {
       return prefix + "SH_DEGREE_" + std::to_string(band) + "_COEF_" + std::to_string(coefficient);
@@ -177,7 +177,7 @@ class SplatReader {
     for (int band = 0; band <= degree; ++band) {
       for (int k = 0; k <= 2 * band; ++k) {
         bands.emplace_back();
-        if (Status s = read(*attributes, sh(band, k), 3, where, bands.back()); !s) return s;
+        if (Status s = read(*attributes, sh(band, k), "VEC3", where, bands.back()); !s) return s;
       }
     }
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {

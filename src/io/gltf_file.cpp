@@ -2,7 +2,6 @@
 #include "gltf_file.hpp"
 
 #include <array>
-#include <cmath>
 #include <utility>
 
 #include "zip.hpp"
@@ -15,39 +14,6 @@ constexpr std::size_t kGlbHeader = 12, kChunkHeader = 8;
 constexpr std::int64_t kMostIndex = 0xffffffff;
 constexpr std::int64_t kMostBytes = std::int64_t{1} << 50;
 
-std::size_t component_size(int type) {
-  switch (type) {
-    case 5120:
-    case 5121:
-      return 1;
-    case 5122:
-    case 5123:
-      return 2;
-    case 5125:
-    case 5126:
-      return 4;
-    default:
-      return 0;
-  }
-}
-
-double component(const std::byte* p, int type, bool normalized) {
-  switch (type) {
-    case 5120:
-      return normalized ? std::fmax(load_le<std::int8_t>(p) / 127.0, -1.0) : load_le<std::int8_t>(p);
-    case 5121:
-      return load_le<std::uint8_t>(p) / (normalized ? 255.0 : 1.0);
-    case 5122:
-      return normalized ? std::fmax(load_le<std::int16_t>(p) / 32767.0, -1.0) : load_le<std::int16_t>(p);
-    case 5123:
-      return load_le<std::uint16_t>(p) / (normalized ? 65535.0 : 1.0);
-    case 5125:
-      return load_le<std::uint32_t>(p);
-    default:
-      return static_cast<double>(load_le<float>(p));
-  }
-}
-
 /// The bytes of base64 text; false where it is none.
 bool decode_base64(std::string_view text, std::vector<std::byte>& out) {
   std::array<std::int8_t, 256> value;
@@ -57,6 +23,8 @@ bool decode_base64(std::string_view text, std::vector<std::byte>& out) {
   for (std::size_t k = 0; k < kDigits.size(); ++k) {
     value[static_cast<unsigned char>(kDigits[k])] = static_cast<std::int8_t>(k);
   }
+  value['-'] = 62;  // as in URLs
+  value['_'] = 63;
   while (!text.empty() && text.back() == '=') text.remove_suffix(1);
   out.reserve(text.size() / 4 * 3 + 3);
   std::uint32_t bits = 0;
@@ -71,6 +39,32 @@ bool decode_base64(std::string_view text, std::vector<std::byte>& out) {
     out.push_back(static_cast<std::byte>(bits >> held & 255));
   }
   return true;
+}
+
+/// Text in which "%20" and the like stand for bytes.
+std::string percent_decoded(const std::string& text) {
+  const auto hex = [](char c) {
+    const int low = c | 32;
+    return c >= '0' && c <= '9' ? c - '0' : low >= 'a' && low <= 'f' ? low - 'a' + 10 : -1;
+  };
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '%' && i + 2 < text.size() && hex(text[i + 1]) >= 0 && hex(text[i + 2]) >= 0) {
+      out += static_cast<char>(16 * hex(text[i + 1]) + hex(text[i + 2]));
+      i += 2;
+    } else {
+      out += text[i];
+    }
+  }
+  return out;
+}
+
+/// Whether an extension leaves arrays and nodes what they are without it.
+bool is_readable_extension(const std::string& name) {
+  for (const char* prefix : {"KHR_materials_", "KHR_gaussian_splatting", "KHR_lights_"}) {
+    if (name.starts_with(prefix)) return true;
+  }
+  return name == "KHR_mesh_quantization" || name == "KHR_xmp_json_ld";
 }
 
 }  // namespace
@@ -95,17 +89,31 @@ Result<GltfFile> GltfFile::parse(std::span<const std::byte> bytes, const std::st
                                  const std::filesystem::path& folder) {
   GltfFile out;
   out.source_ = source;
+  out.folder_ = folder;
   out.size_ = bytes.size();
   std::span<const std::byte> binary;
   if (Status s = out.read_chunks(bytes, binary); !s) return s;
-  const Json* asset = member(out.json_, "asset");
-  const Json* version = asset == nullptr ? nullptr : member(*asset, "version");
-  if (version == nullptr || !version->is_string()) return out.fail("'asset.version' is missing");
-  if (!version->get<std::string>().starts_with("2.")) {
-    return {Errc::unsupported, source + ": glTF version " + shown(*version) + ", 2 is read"};
-  }
-  if (Status s = out.read_buffers(binary, folder); !s) return s;
+  if (Status s = out.check_asset(); !s) return s;
+  if (Status s = out.read_buffers(binary); !s) return s;
   return out;
+}
+
+Status GltfFile::check_asset() const {
+  const Json* asset = member(json_, "asset");
+  const Json* version = asset == nullptr ? nullptr : member(*asset, "version");
+  if (version == nullptr || !version->is_string()) return fail("'asset.version' is missing");
+  if (!version->get<std::string>().starts_with("2.")) {
+    return {Errc::unsupported, source_ + ": glTF version " + shown(*version) + ", 2 is read"};
+  }
+  const Json* required = member(json_, "extensionsRequired");
+  if (required == nullptr || !required->is_array()) return {};
+  for (const Json& name : *required) {
+    if (!name.is_string() || !is_readable_extension(name.get<std::string>())) {
+      return {Errc::unsupported,
+              source_ + ": requires the extension " + shown(name) + ", which is not read"};
+    }
+  }
+  return {};
 }
 
 Status GltfFile::read_chunks(std::span<const std::byte> bytes, std::span<const std::byte>& binary) {
@@ -142,42 +150,48 @@ Status GltfFile::read_chunks(std::span<const std::byte> bytes, std::span<const s
   return {};
 }
 
-Status GltfFile::read_buffers(std::span<const std::byte> binary, const std::filesystem::path& folder) {
-  const Json* list = member(json_, "buffers");
-  if (list == nullptr) return {};
-  if (!list->is_array()) return fail("'buffers' is " + shown(*list));
-  for (std::size_t k = 0; k < list->size(); ++k) {
-    const std::string where = source_ + ": buffer " + std::to_string(k);
-    const auto length = get_integer((*list)[k], "byteLength", 0, kMostBytes, where);
+Result<std::vector<std::byte>> GltfFile::uri_bytes(const std::string& uri, const std::string& at) const {
+  std::vector<std::byte> out;
+  if (uri.starts_with("data:")) {
+    const std::size_t comma = uri.find(";base64,");
+    if (comma == std::string::npos || !decode_base64(std::string_view(uri).substr(comma + 8), out)) {
+      return {Errc::invalid_file, at + ": its data: URI is no base64"};
+    }
+    return out;
+  }
+  const std::string name = percent_decoded(uri);
+  // A file must not name others outside its own folder.
+  if (!is_safe_name(name)) {
+    return {Errc::invalid_file, at + ": 'uri' is " + in_quotes(uri) + ": no file beside it or below"};
+  }
+  const auto file = read_file(folder_ / name);
+  if (!file) return {file.code(), at + ": " + file.message()};
+  out.assign(file->span().begin(), file->span().end());
+  return out;
+}
+
+Status GltfFile::read_buffers(std::span<const std::byte> binary) {
+  for (std::size_t k = 0; k < count("buffers"); ++k) {
+    const auto buffer = item("buffers", k);
+    if (!buffer) return buffer.status();
+    const std::string at = where("buffers", k);
+    const auto length = get_integer(**buffer, "byteLength", 0, kMostBytes, at);
     if (!length) return length.status();
-    const Json* uri = member((*list)[k], "uri");
+    const Json* uri = member(**buffer, "uri");
     std::span<const std::byte> there = binary;
     if (uri != nullptr || k != 0) {
       if (uri == nullptr || !uri->is_string()) {
-        return {Errc::invalid_file, where + ": 'uri' is missing or no text"};
+        return {Errc::invalid_file, at + ": 'uri' is missing or no text"};
       }
       const std::string& text = uri->get_ref<const std::string&>();
-      own_.emplace_back();
-      if (text.starts_with("data:")) {
-        const std::size_t comma = text.find(";base64,");
-        if (comma == std::string::npos ||
-            !decode_base64(std::string_view(text).substr(comma + 8), own_.back())) {
-          return {Errc::invalid_file, where + ": its data: URI is no base64"};
-        }
-      } else {
-        if (!is_safe_name(text)) {
-          return {Errc::invalid_file,
-                  where + ": 'uri' is " + shown(*uri) + ", must be a file below this folder"};
-        }
-        const auto file = read_file(folder / text);
-        if (!file) return file.status();
-        own_.back().assign(file->span().begin(), file->span().end());
-        size_ += file->size;
-      }
+      auto bytes = uri_bytes(text, at);
+      if (!bytes) return bytes.status();
+      own_.push_back(std::move(*bytes));
       there = own_.back();
+      if (!text.starts_with("data:")) size_ += there.size();
     }
     if (static_cast<std::uint64_t>(*length) > there.size()) {
-      return {Errc::invalid_file, where + ": 'byteLength' is " + std::to_string(*length) + ", " +
+      return {Errc::invalid_file, at + ": 'byteLength' is " + std::to_string(*length) + ", " +
                                       std::to_string(there.size()) + " bytes are there"};
     }
     buffers_.push_back(there.first(static_cast<std::size_t>(*length)));
@@ -185,111 +199,50 @@ Status GltfFile::read_buffers(std::span<const std::byte> binary, const std::file
   return {};
 }
 
-Result<const Json*> GltfFile::item(const char* list, std::size_t index) const {
+std::size_t GltfFile::count(const char* list) const {
   const Json* items = member(json_, list);
-  const std::size_t n = items != nullptr && items->is_array() ? items->size() : 0;
-  if (index >= n || !(*items)[index].is_object()) {
+  return items != nullptr && items->is_array() ? items->size() : 0;
+}
+
+std::string GltfFile::where(const char* list, std::size_t index) const {
+  return source_ + ": " + list + "[" + std::to_string(index) + "]";
+}
+
+Result<const Json*> GltfFile::item(const char* list, std::size_t index) const {
+  const std::size_t n = count(list);
+  if (index >= n || !(*member(json_, list))[index].is_object()) {
     return fail(std::string("'") + list + "' has no object " + std::to_string(index) + " among its " +
                 std::to_string(n));
   }
-  return &(*items)[index];
+  return &(*member(json_, list))[index];
 }
 
-Result<std::span<const std::byte>> GltfFile::view(std::size_t index) const {
-  const auto json = item("bufferViews", index);
+Result<std::size_t> GltfFile::index(const Json& object, const char* key, const char* list,
+                                    const std::string& at) const {
+  const std::size_t n = count(list);
+  if (n == 0) return {Errc::invalid_file, at + ": '" + key + "' names one of no " + list};
+  const auto v = get_integer(object, key, 0, static_cast<std::int64_t>(n) - 1, at);
+  if (!v) return v.status();
+  return static_cast<std::size_t>(*v);
+}
+
+Result<std::span<const std::byte>> GltfFile::view(std::size_t view_index) const {
+  const auto json = item("bufferViews", view_index);
   if (!json) return json.status();
-  const std::string where = source_ + ": buffer view " + std::to_string(index);
-  const auto buffer = get_index(**json, "buffer", kNoIndex, where);
-  const auto offset = get_index(**json, "byteOffset", 0, where);
-  const auto length = get_integer(**json, "byteLength", 0, kMostBytes, where);
+  const std::string at = where("bufferViews", view_index);
+  const auto buffer = index(**json, "buffer", "buffers", at);
+  const auto offset = get_index(**json, "byteOffset", 0, at);
+  const auto length = get_integer(**json, "byteLength", 0, kMostBytes, at);
   for (const Status& s : {buffer.status(), offset.status(), length.status()}) {
     if (!s) return s;
   }
-  const std::size_t there = *buffer < buffers_.size() ? buffers_[*buffer].size() : 0;
-  const auto size = static_cast<std::size_t>(*length);
-  if (*buffer >= buffers_.size() || *offset > there || size > there - *offset) {
-    return {Errc::invalid_file, where + ": " + std::to_string(size) + " bytes from " +
+  const std::size_t there = buffers_[*buffer].size(), size = static_cast<std::size_t>(*length);
+  if (*offset > there || size > there - *offset) {
+    return {Errc::invalid_file, at + ": " + std::to_string(size) + " bytes from " +
                                     std::to_string(*offset) + " on, its buffer has " +
                                     std::to_string(there)};
   }
   return buffers_[*buffer].subspan(*offset, size);
-}
-
-Result<GltfValues> GltfFile::accessor(std::size_t index) const {
-  const auto found = item("accessors", index);
-  if (!found) return found.status();
-  const Json& json = **found;
-  const std::string where = source_ + ": accessor " + std::to_string(index);
-  const auto view_index = get_index(json, "bufferView", kNoIndex, where);
-  const auto offset = get_index(json, "byteOffset", 0, where);
-  const auto type = get_index(json, "componentType", 0, where);
-  const auto count = get_integer(json, "count", 0, kMostIndex, where);
-  for (const Status& s : {view_index.status(), offset.status(), type.status(), count.status()}) {
-    if (!s) return s;
-  }
-  if (member(json, "sparse") != nullptr || *view_index == kNoIndex) {
-    return {Errc::unsupported, where + ": sparse, or without a buffer view: not read"};
-  }
-  GltfValues a;
-  a.count_ = static_cast<std::size_t>(*count);
-  a.type_ = static_cast<int>(*type);
-  const Json* normalized = member(json, "normalized");
-  a.normalized_ = normalized != nullptr && *normalized == true;
-  const Json* shape = member(json, "type");
-  const std::string name = shape != nullptr && shape->is_string() ? shape->get<std::string>() : "";
-  a.components_ = name == "SCALAR" ? 1
-                  : name == "VEC2" ? 2
-                  : name == "VEC3" ? 3
-                  : name == "VEC4" ? 4
-                                   : 0;
-  const std::size_t element = a.components_ * component_size(a.type_);
-  if (element == 0) {
-    return {Errc::invalid_file, where + ": type " + in_quotes(name) + " of component type " +
-                                    std::to_string(a.type_) + " is not read"};
-  }
-  const auto bytes = view(*view_index);
-  if (!bytes) return bytes.status();
-  const auto stride = get_index(**item("bufferViews", *view_index), "byteStride", element, where);
-  if (!stride) return stride.status();
-  a.stride_ = *stride;
-  const std::size_t size = bytes->size();
-  if (a.stride_ < element || *offset > size ||
-      (a.count_ != 0 &&
-       (size - *offset < element || (size - *offset - element) / a.stride_ < a.count_ - 1))) {
-    return {Errc::invalid_file, where + ": " + std::to_string(a.count_) + " elements " +
-                                    std::to_string(a.stride_) + " bytes apart from " +
-                                    std::to_string(*offset) + " on, its buffer view has " +
-                                    std::to_string(size) + " bytes"};
-  }
-  a.data_ = bytes->data() + *offset;
-  return a;
-}
-
-double GltfValues::at(std::size_t i, std::size_t k) const noexcept {
-  return component(data_ + i * stride_ + k * component_size(type_), type_, normalized_);
-}
-
-Result<GltfValues> GltfFile::values(std::size_t index, std::size_t components) const {
-  const auto a = accessor(index);
-  if (a && a->components_ != components) {
-    return fail("accessor " + std::to_string(index) + " has " + std::to_string(a->components_) +
-                " components, must be " + std::to_string(components));
-  }
-  return a;
-}
-
-Result<std::vector<std::uint32_t>> GltfFile::indices(std::size_t index) const {
-  const auto a = accessor(index);
-  if (!a) return a.status();
-  if (a->components_ != 1 || (a->type_ != 5121 && a->type_ != 5123 && a->type_ != 5125)) {
-    return fail("accessor " + std::to_string(index) + " holds no indices");
-  }
-  std::vector<std::uint32_t> out;
-  out.reserve(a->count_);
-  for (std::size_t i = 0; i < a->count_; ++i) {
-    out.push_back(static_cast<std::uint32_t>(component(a->data_ + i * a->stride_, a->type_, false)));
-  }
-  return out;
 }
 
 }  // namespace gsnav::io::detail

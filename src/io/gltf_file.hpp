@@ -4,27 +4,22 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "file.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/math/mat.hpp"
 #include "json.hpp"
 
 namespace gsnav::io::detail {
-
-/// Where a mesh of a glTF stands.
-struct GltfInstance {
-  std::size_t node = 0, mesh = 0;
-  Affine3<double> world_from_mesh;
-};
 
 /// The values of an accessor where they lie; normalised integers become fractions.
 class GltfValues {
  public:
   std::size_t size() const noexcept { return count_; }
+  std::size_t components() const noexcept { return components_; }
   /// Component k of element i.
   double at(std::size_t i, std::size_t k) const noexcept;
 
@@ -34,12 +29,22 @@ class GltfValues {
   int type_ = 0;
   bool normalized_ = false;
   const std::byte* data_ = nullptr;
+  std::shared_ptr<std::vector<std::byte>> own_;  ///< what data_ points to where the accessor is sparse
+};
+
+/// Numbers of an accessor, element after element, all finite.
+struct GltfNumbers {
+  std::vector<double> values;  ///< [count][width]; normalised integers as fractions
+  std::size_t count = 0, width = 0;
+  const double* row(std::size_t i) const noexcept { return values.data() + i * width; }
 };
 
 /// A glTF 2.0 file with its buffers: GLB, or JSON with buffers inside of it or beside it. Every index,
 /// offset and size is checked against the bytes there are.
 class GltfFile {
  public:
+  /// Errors: file_not_found, invalid_file, unsupported (another version, a required extension that is
+  /// not read), out_of_memory.
   static Result<GltfFile> open(const std::filesystem::path& path);
   /// The same for a GLB's or JSON's bytes, which must outlive it; `folder` has the other buffers.
   static Result<GltfFile> parse(std::span<const std::byte> bytes, const std::string& source,
@@ -50,25 +55,38 @@ class GltfFile {
   /// Bytes of the file and its buffers: what an importer may multiply by a constant.
   std::size_t size() const noexcept { return size_; }
 
+  /// Length of the array `list` ("nodes", "meshes", ...), 0 where there is none.
+  std::size_t count(const char* list) const;
+  /// How messages name object `index` of it: "a.glb: nodes[3]".
+  std::string where(const char* list, std::size_t index) const;
   /// Object `index` of the array `list`. Error: invalid_file.
   Result<const Json*> item(const char* list, std::size_t index) const;
+  /// Member `key` of `object`, which must be there, as an index below count(list). Error: invalid_file.
+  Result<std::size_t> index(const Json& object, const char* key, const char* list,
+                            const std::string& where) const;
+
   /// Bytes of a buffer view.
   Result<std::span<const std::byte>> view(std::size_t index) const;
-  /// Values of an accessor with so many components, valid while the file is there.
-  /// Errors: invalid_file; unsupported (sparse accessors, or one without a buffer view).
-  Result<GltfValues> values(std::size_t accessor, std::size_t components) const;
+  /// Bytes of a "uri": of a data URI, or of a file in this one's folder. Errors: invalid_file,
+  /// file_not_found.
+  Result<std::vector<std::byte>> uri_bytes(const std::string& uri, const std::string& where) const;
+  /// Values of an accessor whose type is one of `types` ("VEC3 VEC4"), valid while the file is there.
+  /// Errors: invalid_file; unsupported (neither sparse nor with a buffer view).
+  Result<GltfValues> values(std::size_t accessor, const std::string& types) const;
+  /// The same as numbers. Error besides: invalid_file (one that is not finite).
+  Result<GltfNumbers> numbers(std::size_t accessor, const std::string& types) const;
   /// Values of an unsigned integer accessor of one component.
   Result<std::vector<std::uint32_t>> indices(std::size_t accessor) const;
-  /// All meshes of the scene that the file shows first, or of all nodes where it has no scene.
-  Result<std::vector<GltfInstance>> instances() const;
 
  private:
   Status fail(const std::string& what) const { return {Errc::invalid_file, source_ + ": " + what}; }
   Status read_chunks(std::span<const std::byte> bytes, std::span<const std::byte>& binary);
-  Status read_buffers(std::span<const std::byte> binary, const std::filesystem::path& folder);
-  Result<GltfValues> accessor(std::size_t index) const;
-  Result<Affine3<double>> local_transform(const Json& node, const std::string& where) const;
+  Status check_asset() const;
+  Status read_buffers(std::span<const std::byte> binary);
+  Status locate(const Json& part, const std::string& where, GltfValues& values) const;
+  Status apply_sparse(const Json& sparse, const std::string& where, GltfValues& values) const;
 
+  std::filesystem::path folder_;
   std::string source_;
   Json json_;
   FileBytes file_;                           ///< of open()

@@ -55,7 +55,7 @@ std::array<double, 4> sample(const Channel& c, double time) {
   return out;
 }
 
-Result<std::vector<Channel>> read_channels(GltfDocument& file, const Json& animation, const std::string& at) {
+Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& animation, const std::string& at) {
   const Json *channels = member(animation, "channels"), *samplers = member(animation, "samplers");
   if (channels == nullptr || samplers == nullptr || !channels->is_array() || !samplers->is_array()) {
     return {Errc::invalid_file, at + " has no channels or samplers"};
@@ -89,9 +89,9 @@ Result<std::vector<Channel>> read_channels(GltfDocument& file, const Json& anima
                output = file.index(sampler, "output", "accessors", here);
     if (!input) return input.status();
     if (!output) return output.status();
-    auto times = file.read(*input, "SCALAR");
+    auto times = file.numbers(*input, "SCALAR");
     if (!times) return times.status();
-    auto values = file.read(*output, c.width == 4 ? "VEC4" : "VEC3");
+    auto values = file.numbers(*output, c.width == 4 ? "VEC4" : "VEC3");
     if (!values) return values.status();
     if (values->count != times->count * (c.blend == Blend::cubic ? 3 : 1)) {
       return {Errc::invalid_file,
@@ -144,10 +144,10 @@ Grid grid_of(const std::vector<Channel>& channels, double rate) {
 
 }  // namespace
 
-Status read_clips(GltfDocument& file, const GltfSkin& skin, const GltfNodes& nodes, double frame_rate,
+Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& nodes, double frame_rate,
                   PoseObserver& observer, LoadedSkinnedMesh& out) {
   for (std::size_t i = 0; i < file.count("animations"); ++i) {
-    const auto animation = file.entry("animations", i);
+    const auto animation = file.item("animations", i);
     if (!animation) return animation.status();
     const std::string at = file.where("animations", i);
     const auto channels = read_channels(file, **animation, at);

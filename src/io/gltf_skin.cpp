@@ -48,15 +48,15 @@ Mat3d squared(const Mat3d& m) {
 }
 
 /// How much weight each joint of the skin's list has. What is wrong with the arrays is found by read_surface.
-std::vector<double> joint_loads(GltfDocument& file, std::size_t skin, std::size_t joints) {
+std::vector<double> joint_loads(const GltfFile& file, std::size_t skin, std::size_t joints) {
   std::vector<double> out(joints, 0.0);
   for (std::size_t n = 0; n < file.count("nodes"); ++n) {
-    const Json& node = **file.entry("nodes", n);
+    const Json& node = **file.item("nodes", n);
     const Json *which = member(node, "skin"), *mesh = member(node, "mesh");
     if (mesh == nullptr || which == nullptr || !which->is_number() || which->get<double>() != static_cast<double>(skin))
       continue;
     const auto m = file.index(node, "mesh", "meshes", "");
-    const auto entry = m ? file.entry("meshes", *m) : Result<const Json*>(m.status());
+    const auto entry = m ? file.item("meshes", *m) : Result<const Json*>(m.status());
     const Json* primitives = entry ? member(**entry, "primitives") : nullptr;
     if (primitives == nullptr || !primitives->is_array()) continue;
     for (const Json& p : *primitives) {
@@ -66,7 +66,7 @@ std::vector<double> joint_loads(GltfDocument& file, std::size_t skin, std::size_
       const auto w = attributes == nullptr ? Result<std::size_t>(Errc::invalid_file, "")
                                            : file.index(*attributes, "WEIGHTS_0", "accessors", "");
       if (!j || !w) continue;
-      const auto indices = file.read(*j, "VEC4"), weights = file.read(*w, "VEC4");
+      const auto indices = file.numbers(*j, "VEC4"), weights = file.numbers(*w, "VEC4");
       if (!indices || !weights) continue;
       for (std::size_t i = 0; i < std::min(indices->values.size(), weights->values.size()); ++i) {
         const double joint = indices->values[i];
@@ -139,9 +139,9 @@ std::vector<Affine3<double>> rigid_joints(const GltfSkin& skin, const std::vecto
   return out;
 }
 
-Result<GltfSkin> read_skin(GltfDocument& file, const GltfNodes& nodes, std::size_t index) {
+Result<GltfSkin> read_skin(const GltfFile& file, const GltfNodes& nodes, std::size_t index) {
   if (file.count("skins") == 0) return {Errc::unsupported, file.source() + ": there is no skin in it"};
-  const auto entry = file.entry("skins", index);
+  const auto entry = file.item("skins", index);
   if (!entry) return {Errc::invalid_argument, entry.message()};
   const std::string at = file.where("skins", index);
   const Json* list = member(**entry, "joints");
@@ -164,7 +164,7 @@ Result<GltfSkin> read_skin(GltfDocument& file, const GltfNodes& nodes, std::size
   if (member(**entry, "inverseBindMatrices") != nullptr) {
     const auto a = file.index(**entry, "inverseBindMatrices", "accessors", at);
     if (!a) return a.status();
-    const auto m = file.read(*a, "MAT4");
+    const auto m = file.numbers(*a, "MAT4");
     if (!m) return m.status();
     if (m->count < count)
       return {Errc::invalid_file,
@@ -243,7 +243,7 @@ Result<LoadedSkinnedMesh> load_gltf_skin(const std::filesystem::path& path, cons
     if (!(options.frame_rate >= 0) || !std::isfinite(options.frame_rate)) {
       return {Errc::invalid_argument, path.string() + ": GltfOptions.frame_rate must not be negative"};
     }
-    auto file = GltfDocument::open(path);
+    auto file = GltfFile::open(path);
     if (!file) return file.status();
     const auto nodes = read_nodes(*file);
     if (!nodes) return nodes.status();

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "gltf_document.hpp"
+#include "gltf_nodes.hpp"
 #include "gsnav/io/skinned_mesh_file.hpp"
 
 namespace gsnav::io::detail {
@@ -19,10 +19,10 @@ struct GltfSkin {
   Skeleton skeleton;
 };
 
-Result<GltfSkin> read_skin(GltfDocument& file, const GltfNodes& nodes, std::size_t index);
+Result<GltfSkin> read_skin(const GltfFile& file, const GltfNodes& nodes, std::size_t index);
 
 /// Fills the surface of `out.mesh`, whose skeleton is there. Positions are those of the bind pose.
-Status read_surface(GltfDocument& file, const GltfSkin& skin, std::size_t index, LoadedSkinnedMesh& out);
+Status read_surface(const GltfFile& file, const GltfSkin& skin, std::size_t index, LoadedSkinnedMesh& out);
 
 /// Joints without their scales, root frame, for the places of the nodes: [J].
 std::vector<Affine3<double>> rigid_joints(const GltfSkin& skin, const std::vector<Affine3<double>>& globals);
@@ -32,7 +32,7 @@ struct PoseObserver {
   virtual ~PoseObserver() = default;
   virtual void look(const std::vector<Affine3<double>>& globals) = 0;
 };
-Status read_clips(GltfDocument& file, const GltfSkin& skin, const GltfNodes& nodes, double frame_rate,
+Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& nodes, double frame_rate,
                   PoseObserver& observer, LoadedSkinnedMesh& out);
 
 }  // namespace gsnav::io::detail

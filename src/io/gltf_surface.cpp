@@ -15,12 +15,12 @@ namespace {
 
 class SurfaceReader {
  public:
-  SurfaceReader(GltfDocument& file, const GltfSkin& skin, LoadedSkinnedMesh& out)
+  SurfaceReader(const GltfFile& file, const GltfSkin& skin, LoadedSkinnedMesh& out)
       : file_(file), skin_(skin), out_(out), mesh_(out.mesh) {}
 
   Status run(std::size_t skin) {
     for (std::size_t n = 0; n < file_.count("nodes"); ++n) {
-      const Json& node = **file_.entry("nodes", n);
+      const Json& node = **file_.item("nodes", n);
       const Json *which = member(node, "skin"), *mesh = member(node, "mesh");
       if (mesh == nullptr) continue;
       if (which == nullptr || !which->is_number() || which->get<double>() != static_cast<double>(skin)) {
@@ -42,7 +42,7 @@ class SurfaceReader {
   void warn(const std::string& what) { out_.report.warnings.push_back(what); }
 
   Status read_mesh(std::size_t index) {
-    const auto mesh = file_.entry("meshes", index);
+    const auto mesh = file_.item("meshes", index);
     if (!mesh) return mesh.status();
     const Json* primitives = member(**mesh, "primitives");
     if (primitives == nullptr || !primitives->is_array())
@@ -60,7 +60,7 @@ class SurfaceReader {
     if (member(attributes, name.c_str()) == nullptr) return GltfNumbers{};
     const auto a = file_.index(attributes, name.c_str(), "accessors", at);
     if (!a) return a.status();
-    auto v = file_.read(*a, types);
+    auto v = file_.numbers(*a, types);
     if (v && vertices_ != 0 && v->count != vertices_) {
       return {Errc::invalid_file, at + ": " + name + " has " + std::to_string(v->count) + " values for " +
                                       std::to_string(vertices_) + " vertices"};
@@ -152,7 +152,7 @@ class SurfaceReader {
     if (member(primitive, "indices") != nullptr) {
       const auto a = file_.index(primitive, "indices", "accessors", at);
       if (!a) return a.status();
-      auto v = file_.read(*a, "SCALAR");
+      auto v = file_.numbers(*a, "SCALAR");
       if (!v) return v.status();
       corners = std::move(v->values);
     } else {
@@ -182,7 +182,7 @@ class SurfaceReader {
     const auto index = file_.index(primitive, "material", "materials", at);
     if (!index) return index.status();
     if (const auto have = material_of_.find(*index); have != material_of_.end()) return have->second;
-    const Json& material = **file_.entry("materials", *index);
+    const Json& material = **file_.item("materials", *index);
     const std::string where = file_.where("materials", *index);
     SurfaceMaterial out;
     if (const Json* mode = member(material, "alphaMode"); mode != nullptr && *mode == "MASK") {
@@ -215,7 +215,7 @@ class SurfaceReader {
     if (const Json* set = member(info, "texCoord"); set != nullptr && *set != 0) {
       warn(where + ": a texture by TEXCOORD_" + set->dump() + " is taken by TEXCOORD_0");
     }
-    const Json& texture = **file_.entry("textures", *index);
+    const Json& texture = **file_.item("textures", *index);
     if (member(texture, "source") == nullptr) {
       warn(file_.where("textures", *index) + " has no source; the material's colour is taken");
       return -1;
@@ -243,7 +243,7 @@ class SurfaceReader {
   }
 
   Result<PngImage> read_picture(std::size_t index) {
-    const Json& image = **file_.entry("images", index);
+    const Json& image = **file_.item("images", index);
     const std::string where = file_.where("images", index);
     std::vector<std::byte> own;
     std::span<const std::byte> bytes;
@@ -291,7 +291,7 @@ class SurfaceReader {
     if (others_ != 0) warn(std::to_string(others_) + " meshes are not moved by this skin and are left out");
   }
 
-  GltfDocument& file_;
+  const GltfFile& file_;
   const GltfSkin& skin_;
   LoadedSkinnedMesh& out_;
   SkinnedMesh& mesh_;
@@ -306,7 +306,7 @@ class SurfaceReader {
 
 }  // namespace
 
-Status read_surface(GltfDocument& file, const GltfSkin& skin, std::size_t index, LoadedSkinnedMesh& out) {
+Status read_surface(const GltfFile& file, const GltfSkin& skin, std::size_t index, LoadedSkinnedMesh& out) {
   return SurfaceReader(file, skin, out).run(index);
 }
 

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "gltf_file.hpp"
+#include "gltf_nodes.hpp"
 #include "gsnav/io/mesh_file.hpp"
 
 namespace gsnav::io {
@@ -23,7 +23,7 @@ class MeshReader {
   explicit MeshReader(const GltfFile& file) : file_(file) {}
 
   Result<TriangleMesh> run() {
-    const auto instances = file_.instances();
+    const auto instances = detail::read_instances(file_);
     if (!instances) return instances.status();
     for (const GltfInstance& instance : *instances) {
       const auto mesh = file_.item("meshes", instance.mesh);
@@ -62,7 +62,7 @@ class MeshReader {
     if (*position == detail::kNoIndex) {
       return {Errc::invalid_file, at + ": a primitive without attribute POSITION"};
     }
-    const auto points = file_.values(*position, 3);
+    const auto points = file_.values(*position, "VEC3");
     if (!points) return points.status();
     const std::size_t count = points->size();
     // Nodes may share a mesh: a small file could ask for any number of copies.
@@ -74,7 +74,7 @@ class MeshReader {
       corners.resize(count);
       std::iota(corners.begin(), corners.end(), 0u);
     } else {
-      const auto held = file_.values(*list, 1);
+      const auto held = file_.values(*list, "SCALAR");
       if (!held) return held.status();
       if (mesh_.triangles.size() + held->size() > file_.size()) {
         return {Errc::invalid_file, at + ": more triangles than the file has bytes"};

@@ -72,27 +72,29 @@ Result<std::vector<fs::path>> tiles_of(const std::string& spec) {
   return out;
 }
 
-Result<LoadedCloud> sorted(Result<LoadedCloud> scene) {
-  if (scene) sort_spatially(scene->cloud);
+/// What `spec` names, its rows as they were read.
+Result<LoadedCloud> load_named(const std::string& spec, const LoadSceneOptions& options) {
+  std::error_code ignored;
+  // A file's own name may hold a comma.
+  if (fs::exists(spec, ignored)) return load_one(spec, options);
+  const auto tiles = tiles_of(spec);
+  if (!tiles) return tiles.status();
+  if (tiles->size() == 1) return load_one(tiles->front(), options);
+  LoadedCloud scene;
+  scene.report.source = spec;
+  for (const fs::path& path : *tiles) {
+    if (Status s = detail::merge_loaded(scene, load_one(path, options), path.string()); !s) return s;
+  }
   return scene;
 }
 
 }  // namespace
 
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options) {
-  return detail::guarded(spec, [&]() -> Result<LoadedCloud> {
-    std::error_code ignored;
-    // A file's own name may hold a comma.
-    if (fs::exists(spec, ignored)) return sorted(load_one(spec, options));
-    const auto tiles = tiles_of(spec);
-    if (!tiles) return tiles.status();
-    if (tiles->size() == 1) return sorted(load_one(tiles->front(), options));
-    LoadedCloud scene;
-    scene.report.source = spec;
-    for (const fs::path& path : *tiles) {
-      if (Status s = detail::merge_loaded(scene, load_one(path, options), path.string()); !s) return s;
-    }
-    return sorted(std::move(scene));
+  return detail::guarded(spec, [&] {
+    auto scene = load_named(spec, options);
+    if (scene && options.sort) sort_spatially(scene->cloud);
+    return scene;
   });
 }
 

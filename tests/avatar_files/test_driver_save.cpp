@@ -10,7 +10,7 @@
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/motion_file.hpp"
-#include "io/files.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

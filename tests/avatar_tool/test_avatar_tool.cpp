@@ -11,9 +11,9 @@
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
-#include "io/files.hpp"
 #include "support/command.hpp"
 #include "support/data.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using gsnav_test::data_file;

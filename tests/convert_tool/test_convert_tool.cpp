@@ -12,6 +12,7 @@
 #include "gsnav/scene/edit_cloud.hpp"
 #include "io/check_turned.hpp"
 #include "io/ply_file.hpp"
+#include "io/row_clouds.hpp"
 #include "support/command.hpp"
 
 using namespace gsnav;
@@ -21,17 +22,6 @@ namespace {
 
 Outcome run(const TempFolder& folder, const std::string& arguments) {
   return run_command(GSNAV_CONVERT, arguments, folder.path());
-}
-
-GaussianCloud cloud_of(const std::vector<PlyRow>& rows, int rest) {
-  PlyFile file;
-  file.properties = inria_properties(rest, "double");
-  file.rows = rows;
-  return io::parse_ply(bytes_of(file.text()), "rows").value().cloud;
-}
-
-GaussianCloud random_cloud(std::size_t n, unsigned seed) {
-  return cloud_of(random_rows(n, 45, seed), 45);
 }
 
 GaussianCloud load(const TempFolder& folder, const char* name) {
@@ -49,7 +39,7 @@ double number_behind(const std::string& text, const std::string& key) {
 
 TEST_CASE("convert: every format, with the error that it adds") {
   const TempFolder folder("convert");
-  REQUIRE(io::save_ply(folder / "in.ply", random_cloud(800, 3)).ok());
+  REQUIRE(io::save_ply(folder / "in.ply", cloud_of_random_rows(800, 3, 3)).ok());
   const GaussianCloud source = load(folder, "in.ply");
   struct Target {
     const char* name;
@@ -75,7 +65,7 @@ TEST_CASE("convert: every format, with the error that it adds") {
 
 TEST_CASE("convert: edits, in their order") {
   const TempFolder folder("convert_edit");
-  REQUIRE(io::save_ply(folder / "in.ply", random_cloud(500, 4)).ok());
+  REQUIRE(io::save_ply(folder / "in.ply", cloud_of_random_rows(500, 3, 4)).ok());
   const GaussianCloud source = load(folder, "in.ply");
   const Outcome out =
       run(folder,
@@ -111,15 +101,15 @@ TEST_CASE("convert: edits, in their order") {
 
 TEST_CASE("convert: tiles are merged, levels chosen") {
   const TempFolder folder("convert_merge");
-  REQUIRE(io::save_ply(folder / "a.ply", random_cloud(30, 5)).ok());
-  REQUIRE(io::save_ply(folder / "b.ply", random_cloud(50, 6)).ok());
+  REQUIRE(io::save_ply(folder / "a.ply", cloud_of_random_rows(30, 3, 5)).ok());
+  REQUIRE(io::save_ply(folder / "b.ply", cloud_of_random_rows(50, 3, 6)).ok());
   REQUIRE(run(folder, "a.ply b.ply out.ply --views 0").ok);
   CHECK(load(folder, "out.ply").size() == 80);
 }
 
 TEST_CASE("convert: what cannot be done is said") {
   const TempFolder folder("convert_bad");
-  REQUIRE(io::save_ply(folder / "a.ply", random_cloud(10, 7)).ok());
+  REQUIRE(io::save_ply(folder / "a.ply", cloud_of_random_rows(10, 3, 7)).ok());
   const auto says = [&](const std::string& arguments, const std::string& part) {
     const Outcome out = run(folder, arguments);
     CAPTURE(out.text);
@@ -136,7 +126,7 @@ TEST_CASE("convert: what cannot be done is said") {
 }
 
 TEST_CASE("largest_field_errors: each field by itself") {
-  const GaussianCloud source = random_cloud(50, 8);
+  const GaussianCloud source = cloud_of_random_rows(50, 3, 8);
   const auto errors = [&](const auto& change) {
     GaussianCloud made = source;
     change(made);

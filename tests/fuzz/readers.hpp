@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "io/avatar_npz.hpp"
-#include "io/files.hpp"
 #include "io/glb_file.hpp"
 #include "io/sog_file.hpp"
+#include "support/files.hpp"
 #include "zip.hpp"
 
 // What both the fuzzer and the maker of its seeds know: how an input becomes a file. Checksums and

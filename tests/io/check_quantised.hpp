@@ -39,17 +39,7 @@ inline void check_quantised(const gsnav::GaussianCloud& c, std::size_t i, const 
     CHECK(within(c.quats[k][i], dot < 0 ? -e.quat[k] : e.quat[k], 3 * b.quat));
   }
   CHECK(within(c.opacities[i], e.opacity, b.opacity));
-  const int kept = (c.sh_degree + 1) * (c.sh_degree + 1) - 1;
-  bool rest_ok = true;
-  for (int coefficient = 0; coefficient < kept; ++coefficient) {
-    for (int channel = 0; channel < 3; ++channel) {
-      const double want = row.at("f_rest_" + std::to_string(channel * (rest_in_file / 3) + coefficient));
-      const std::size_t at =
-          i * 3 * static_cast<std::size_t>(kept) + static_cast<std::size_t>(3 * coefficient + channel);
-      rest_ok = rest_ok && within(c.shN[at], want, b.rest);
-    }
-  }
-  CHECK(rest_ok);
+  check_rest(c, i, row, rest_in_file, [&](float got, double want) { return within(got, want, b.rest); });
 }
 
 }  // namespace gsnav_test

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "files.hpp"
+#include "support/files.hpp"
 
 namespace gsnav_test {
 

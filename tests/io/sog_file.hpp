@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "files.hpp"
+#include "support/files.hpp"
 #include "zip_file.hpp"
 
 namespace gsnav_test {

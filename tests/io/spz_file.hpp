@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <zlib.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -13,23 +12,11 @@
 #include <vector>
 
 #include "splat_file.hpp"
+#include "zip_file.hpp"
 
 namespace gsnav_test {
 
-/// Compresses as gzip.
-inline std::string gzip(const std::string& text) {
-  z_stream z{};
-  deflateInit2(&z, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + 16, 9, Z_DEFAULT_STRATEGY);
-  std::string out(deflateBound(&z, static_cast<uLong>(text.size())) + 32, '\0');
-  z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
-  z.avail_in = static_cast<uInt>(text.size());
-  z.next_out = reinterpret_cast<Bytef*>(out.data());
-  z.avail_out = static_cast<uInt>(out.size());
-  deflate(&z, Z_FINISH);
-  out.resize(z.total_out);
-  deflateEnd(&z);
-  return out;
-}
+inline std::string gzip(const std::string& text) { return deflated(text, MAX_WBITS + 16); }
 
 /// Compresses as a zstd frame.
 inline std::string zstd(const std::string& text) {

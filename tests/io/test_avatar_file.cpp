@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "avatar_npz.hpp"
-#include "files.hpp"
 #include "gsnav/avatar/avatar.hpp"
 #include "gsnav/io/avatar_file.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "files.hpp"
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/avatar_scene_file.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/io/npz_file.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

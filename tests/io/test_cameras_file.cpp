@@ -4,9 +4,10 @@
 #include <cmath>
 #include <string>
 
-#include "files.hpp"
+#include "check_refused.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "support/data.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -25,15 +26,8 @@ Result<std::vector<Camera>> parse(const std::string& text, int width = 0, int he
 }
 
 void check_fails(const std::string& from, const std::string& to, const std::string& part) {
-  std::string bad = kOne;
-  REQUIRE(contains(bad, from));
-  bad.replace(bad.find(from), from.size(), to);
-  const auto result = parse("[" + kOne + "," + bad + "]");
-  CAPTURE(result.message());
-  CAPTURE(part);
-  CHECK(result.code() == Errc::invalid_file);
-  CHECK(contains(result.message(), "cameras.json: camera 1"));
-  CHECK(contains(result.message(), part));
+  check_refused(parse("[" + kOne + "," + replaced(kOne, from, to) + "]"), Errc::invalid_file, "cameras.json: camera 1",
+                part);
 }
 
 }  // namespace

@@ -8,19 +8,12 @@
 #include "gsnav/scene/edit_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "row_clouds.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
 
 namespace {
-
-GaussianCloud random_cloud(std::size_t n, int degree, unsigned seed) {
-  PlyFile file;
-  const int rest = 3 * ((degree + 1) * (degree + 1) - 1);
-  file.properties = inria_properties(rest, "double");
-  file.rows = random_rows(n, rest, seed);
-  return io::parse_ply(bytes_of(file.text()), "rows").value().cloud;
-}
 
 std::vector<double> image_of(const GaussianCloud& cloud, const Similarity& asset,
                              const Similarity& camera) {
@@ -47,7 +40,7 @@ const Similarity kMoves[] = {{{0.5, 0.5, -0.5, 0.5}, {1, -2, 30}, 1},
 
 TEST_CASE("transform: means, covariances and colours move as a solid body") {
   for (int degree = 0; degree <= 3; ++degree) {
-    const GaussianCloud before = random_cloud(40, degree, 81);
+    const GaussianCloud before = cloud_of_random_rows(40, degree, 81);
     for (Similarity by : kMoves) {
       normalize(by.rotation);
       GaussianCloud after = before;
@@ -58,7 +51,7 @@ TEST_CASE("transform: means, covariances and colours move as a solid body") {
 }
 
 TEST_CASE("transform: a turned scene before a turned camera is the same image") {
-  const GaussianCloud before = random_cloud(200, 3, 82);
+  const GaussianCloud before = cloud_of_random_rows(200, 3, 82);
   const std::vector<double> want = image_of(before, {}, {});
   double sum = 0;
   for (const double v : want) sum += v;
@@ -78,7 +71,7 @@ TEST_CASE("transform: a turned scene before a turned camera is the same image") 
 }
 
 TEST_CASE("transform: there and back") {
-  const GaussianCloud before = random_cloud(100, 3, 83);
+  const GaussianCloud before = cloud_of_random_rows(100, 3, 83);
   GaussianCloud cloud = before;
   sort_spatially(cloud);
   Similarity by{{0.1, -0.7, 0.5, 0.4998}, {-4, 0.5, 2}, 3};
@@ -94,7 +87,7 @@ TEST_CASE("transform: there and back") {
 }
 
 TEST_CASE("crop and filter_rows keep whole rows, in their order") {
-  GaussianCloud cloud = random_cloud(500, 2, 84);
+  GaussianCloud cloud = cloud_of_random_rows(500, 2, 84);
   cloud.means[0][7] = 60;  // a second origin would be needed beyond 32 m; this stays in the first
   const GaussianCloud before = cloud;
   Aabb<double> box;
@@ -121,7 +114,7 @@ TEST_CASE("crop and filter_rows keep whole rows, in their order") {
 }
 
 TEST_CASE("limit_sh_degree keeps the bands below") {
-  const GaussianCloud before = random_cloud(20, 3, 85);
+  const GaussianCloud before = cloud_of_random_rows(20, 3, 85);
   for (int degree = 0; degree <= 3; ++degree) {
     GaussianCloud cloud = before;
     limit_sh_degree(cloud, degree);
@@ -132,7 +125,7 @@ TEST_CASE("limit_sh_degree keeps the bands below") {
       CHECK(cloud.shN[k] == before.shN[45 * (k / rest) + k % rest]);
     }
   }
-  GaussianCloud flat = random_cloud(3, 0, 86);
+  GaussianCloud flat = cloud_of_random_rows(3, 0, 86);
   limit_sh_degree(flat, 2);
   CHECK(flat.sh_degree == 0);
 }

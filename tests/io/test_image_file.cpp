@@ -9,8 +9,8 @@
 #include <string>
 
 #include "allocations.hpp"
-#include "files.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

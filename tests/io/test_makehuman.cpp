@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <string>
 
-#include "files.hpp"
 #include "gsnav/io/skinned_mesh_file.hpp"
 #include "support/data.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

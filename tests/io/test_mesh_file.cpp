@@ -3,9 +3,10 @@
 
 #include <string>
 
-#include "files.hpp"
+#include "check_refused.hpp"
 #include "gsnav/io/mesh_file.hpp"
 #include "support/data.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -22,11 +23,7 @@ Result<TriangleMesh> parse(const std::string& text) {
 const std::string kFour = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
 void check_fails(const std::string& text, const std::string& part) {
-  const auto result = parse(text);
-  CAPTURE(result.message());
-  CAPTURE(part);
-  CHECK(result.code() == Errc::invalid_file);
-  CHECK(contains(result.message(), "a.obj: " + part));
+  check_refused(parse(text), Errc::invalid_file, "a.obj", "a.obj: " + part);
 }
 
 }  // namespace

@@ -8,10 +8,10 @@
 #include <string>
 
 #include "allocations.hpp"
-#include "files.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "pose_at.hpp"
 #include "support/data.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

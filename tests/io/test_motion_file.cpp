@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "allocations.hpp"
-#include "files.hpp"
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/avatar/retarget.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "pose_at.hpp"
 #include "support/data.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

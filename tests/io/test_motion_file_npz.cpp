@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "avatar_npz.hpp"
-#include "files.hpp"
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/motion_file.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -5,9 +5,9 @@
 #include <string>
 
 #include "allocations.hpp"
-#include "files.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "support/data.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include "allocations.hpp"
+#include "check_refused.hpp"
 #include "gsnav/io/ply.hpp"
 #include "ply_file.hpp"
 
@@ -18,14 +19,8 @@ PlyFile small_file(int rest = 0) {
   return file;
 }
 
-/// Expects an error whose message has the source and `part`.
 void check_fails(const std::string& text, Errc code, const std::string& part) {
-  const auto result = io::parse_ply(bytes_of(text), "some.ply");
-  CAPTURE(part);
-  CAPTURE(result.message());
-  CHECK(result.code() == code);
-  CHECK(contains(result.message(), "some.ply"));
-  CHECK(contains(result.message(), part));
+  check_refused(io::parse_ply(bytes_of(text), "some.ply"), code, "some.ply", part);
 }
 
 }  // namespace

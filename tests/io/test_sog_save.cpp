@@ -7,19 +7,13 @@
 #include "codebook.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/sog.hpp"
+#include "row_clouds.hpp"
 #include "sog_file.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
 
 namespace {
-
-GaussianCloud cloud_of(const std::vector<PlyRow>& rows, int rest) {
-  PlyFile file;
-  file.properties = inria_properties(rest, "double");
-  file.rows = rows;
-  return io::parse_ply(bytes_of(file.text()), "rows").value().cloud;
-}
 
 double range_of(const std::vector<PlyRow>& rows, const std::vector<std::string>& names) {
   double low = 1e9, high = -1e9;

@@ -5,12 +5,9 @@
 #include <sstream>
 
 #include "check_cloud.hpp"
-#include "gsnav/io/gltf.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/sog.hpp"
-#include "gsnav/io/splat.hpp"
-#include "gsnav/io/spz.hpp"
+#include "row_clouds.hpp"
 #include "support/data.hpp"
 
 // Another program's eyes on the same files: npm's @playcanvas/splat-transform decodes them to a float32
@@ -125,22 +122,7 @@ void check_same(const GaussianCloud& cloud, const Rows& rows, double rotation = 
   CHECK(cloud.size() > 0);
 }
 
-Result<LoadedCloud> load_in_order(const std::string& path) {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  if (extension == ".ply") return io::load_ply(path);
-  if (extension == ".splat") return io::load_splat(path);
-  if (extension == ".spz") return io::load_spz(path);
-  if (extension == ".glb") return io::load_gltf(path);
-  return io::load_sog(path);
-}
-
-GaussianCloud random_cloud(std::size_t n, int degree, unsigned seed) {
-  PlyFile file;
-  const int rest = 3 * ((degree + 1) * (degree + 1) - 1);
-  file.properties = inria_properties(rest, "double");
-  file.rows = random_rows(n, rest, seed);
-  return io::parse_ply(bytes_of(file.text()), "rows").value().cloud;
-}
+GaussianCloud load_in_order(const std::string& path) { return io::load_scene(path, {.sort = false}).value().cloud; }
 
 }  // namespace
 
@@ -158,7 +140,7 @@ TEST_CASE("splat-transform: real files, field by field") {
     if (path.empty()) continue;
     CAPTURE(name);
     convert(path, (folder / "out.ply").string());
-    check_same(load_in_order(path).value().cloud, rows_of((folder / "out.ply").string()));
+    check_same(load_in_order(path), rows_of((folder / "out.ply").string()));
   }
 }
 
@@ -166,7 +148,7 @@ TEST_CASE("splat-transform: reads what is written here as it is read here") {
   if (!there()) return;
   TempFolder folder("st_written");
   for (const int degree : {0, 2, 3}) {
-    const GaussianCloud cloud = random_cloud(3000, degree, 92);
+    const GaussianCloud cloud = cloud_of_random_rows(3000, degree, 92);
     for (const std::string name :
          {"a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.sog", "meta.json"}) {
       CAPTURE(degree);
@@ -174,7 +156,7 @@ TEST_CASE("splat-transform: reads what is written here as it is read here") {
       const std::string path = (folder / name).string();
       REQUIRE(io::save_scene(path, cloud).ok());
       convert(path, (folder / "out.ply").string());
-      const GaussianCloud read = load_in_order(path).value().cloud;
+      const GaussianCloud read = load_in_order(path);
       CHECK(read.size() == cloud.size());
       // It takes a .splat's quaternion bytes for fractions of 255 around 127.5, not of 128 around 128.
       check_same(read, rows_of((folder / "out.ply").string()), name == "a.splat" ? 1e-4 : 1e-6);
@@ -187,21 +169,21 @@ TEST_CASE("splat-transform: what it writes is read here") {
   TempFolder folder("st_writes");
   for (const int degree : {0, 1, 2, 3}) {
     CAPTURE(degree);
-    REQUIRE(io::save_ply(folder / "in.ply", random_cloud(2000, degree, 93)).ok());
+    REQUIRE(io::save_ply(folder / "in.ply", cloud_of_random_rows(2000, degree, 93)).ok());
     const std::string in = (folder / "in.ply").string();
     convert(in, (folder / "a.glb").string());
-    check_same(io::load_gltf(folder / "a.glb").value().cloud, rows_of(in));
+    check_same(load_in_order((folder / "a.glb").string()), rows_of(in));
     for (const char* version : {"3", "4"}) {
       CAPTURE(version);
       const std::string spz = (folder / "a.spz").string(), back = (folder / "back.ply").string();
       convert(in, spz, std::string("--spz-version ") + version);
       convert(spz, back);
-      check_same(io::load_spz(spz).value().cloud, rows_of(back));
+      check_same(load_in_order(spz), rows_of(back));
     }
     const std::string packed = (folder / "a.compressed.ply").string(),
                       back = (folder / "back.ply").string();
     convert(in, packed);
     convert(packed, back);
-    check_same(io::load_ply(packed).value().cloud, rows_of(back));
+    check_same(load_in_order(packed), rows_of(back));
   }
 }

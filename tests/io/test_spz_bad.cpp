@@ -3,6 +3,7 @@
 
 #include "allocations.hpp"
 #include "check_cloud.hpp"
+#include "check_refused.hpp"
 #include "gsnav/io/spz.hpp"
 #include "spz_file.hpp"
 
@@ -19,12 +20,7 @@ SpzFile small_file(int degree = 0) {
 }
 
 void check_fails(const std::string& text, Errc code, const std::string& part) {
-  const auto result = io::parse_spz(bytes_of(text), "some.spz");
-  CAPTURE(part);
-  CAPTURE(result.message());
-  CHECK(result.code() == code);
-  CHECK(contains(result.message(), "some.spz"));
-  CHECK(contains(result.message(), part));
+  check_refused(io::parse_spz(bytes_of(text), "some.spz"), code, "some.spz", part);
 }
 
 std::string bytes4(std::uint32_t v) {

@@ -6,6 +6,7 @@
 #include "gsnav/io/splat.hpp"
 #include "gsnav/io/spz.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "row_clouds.hpp"
 
 // What is written is read back and compared with the rows that the cloud was made of, within half of
 // the step that the format's description gives.
@@ -26,13 +27,6 @@ std::vector<PlyRow> moderate_rows(std::size_t n, int rest, unsigned seed) {
     }
   }
   return rows;
-}
-
-GaussianCloud cloud_of(const std::vector<PlyRow>& rows, int rest) {
-  PlyFile file;
-  file.properties = inria_properties(rest, "double");
-  file.rows = rows;
-  return io::parse_ply(bytes_of(file.text()), "rows").value().cloud;
 }
 
 constexpr int kRest[] = {0, 9, 24, 45};

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "files.hpp"
+#include "support/files.hpp"
 
 namespace gsnav_test {
 
@@ -22,10 +22,11 @@ struct ZipFileEntry {
   bool bad_crc = false;
 };
 
-inline std::string deflate_raw(const std::string& content) {
-  std::string out(content.size() + 64 + content.size() / 8, '\0');
+/// Deflates; `window` as zlib has it: -MAX_WBITS is a bare stream, MAX_WBITS + 16 a gzip file.
+inline std::string deflated(const std::string& content, int window) {
   z_stream z{};
-  deflateInit2(&z, 9, Z_DEFLATED, -MAX_WBITS, 9, Z_DEFAULT_STRATEGY);
+  deflateInit2(&z, Z_BEST_COMPRESSION, Z_DEFLATED, window, 9, Z_DEFAULT_STRATEGY);
+  std::string out(deflateBound(&z, static_cast<uLong>(content.size())) + 32, '\0');
   z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(content.data()));
   z.avail_in = static_cast<uInt>(content.size());
   z.next_out = reinterpret_cast<Bytef*>(out.data());
@@ -35,6 +36,8 @@ inline std::string deflate_raw(const std::string& content) {
   deflateEnd(&z);
   return out;
 }
+
+inline std::string deflate_raw(const std::string& content) { return deflated(content, -MAX_WBITS); }
 
 /// Writes a zip archive. `streamed` leaves the sizes of the local headers 0, as streaming writers do.
 inline std::string make_zip(const std::vector<ZipFileEntry>& entries, const std::string& comment = "",

@@ -4,15 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "cases.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "meshes.hpp"
 #include "navmesh_impl.hpp"
 #include "support/data.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using gsnav_test::cases;
@@ -20,14 +18,10 @@ using gsnav_test::Soup;
 
 namespace {
 
-std::string temporary(const char* name) { return (std::filesystem::temp_directory_path() / name).string(); }
-
 std::vector<std::byte> bytes_of(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  const std::vector<char> chars{std::istreambuf_iterator<char>(in), {}};
-  std::vector<std::byte> out(chars.size());
-  std::memcpy(out.data(), chars.data(), chars.size());
-  return out;
+  const std::string text = gsnav_test::read_file(path);
+  const auto bytes = gsnav_test::bytes_of(text);
+  return {bytes.begin(), bytes.end()};
 }
 
 NavMesh boxes(const Vec3d& at = {}) {
@@ -43,12 +37,10 @@ NavMesh boxes(const Vec3d& at = {}) {
   return NavMesh::build(s, soup.vertices, soup.triangles).value();
 }
 
-std::vector<std::byte> saved(const NavMesh& mesh, const char* name) {
-  const std::string path = temporary(name);
-  save_navmesh(mesh, path).throw_if_error();
-  auto bytes = bytes_of(path);
-  std::filesystem::remove(path);
-  return bytes;
+std::vector<std::byte> saved(const NavMesh& mesh) {
+  const gsnav_test::TempFolder folder("navmesh_file");
+  save_navmesh(mesh, (folder / "a.navmesh").string()).throw_if_error();
+  return bytes_of((folder / "a.navmesh").string());
 }
 
 void patch(std::vector<std::byte>& b, std::size_t at, std::int32_t v) { std::memcpy(b.data() + at, &v, 4); }
@@ -70,7 +62,7 @@ void use(const NavMesh& mesh) {
 TEST_CASE("navmesh file: a round trip keeps surface, settings and distances") {
   const Vec3d at{120, -7, 33};
   const NavMesh mesh = boxes(at);
-  const auto bytes = saved(mesh, "gsnav_round.navmesh");
+  const auto bytes = saved(mesh);
   const NavMesh back = parse_navmesh(bytes, "round").value();
   CHECK(back.polygon_count() == mesh.polygon_count());
   CHECK(back.navigable_area() == doctest::Approx(mesh.navigable_area()).epsilon(1e-5));
@@ -86,7 +78,7 @@ TEST_CASE("navmesh file: a round trip keeps surface, settings and distances") {
     REQUIRE(std::abs(back.geodesic_distance(a, b) - mesh.geodesic_distance(a, b)) < 1e-3);
     REQUIRE(std::abs(back.snap_point(a)->position.y - a.y) < 1e-4);
   }
-  CHECK(saved(back, "gsnav_again.navmesh") == bytes);
+  CHECK(saved(back) == bytes);
   // The format, byte by byte: Habitat reads raw structs.
   CHECK(std::memcmp(bytes.data(), "TESM\2\0\0\0\1\0\0\0", 12) == 0);
   float cell = 0, radius = 0;
@@ -140,7 +132,7 @@ TEST_CASE("navmesh file: 64-bit references and many tiles") {
     REQUIRE(d >= norm(b.position - a.position) - 1e-3);
     REQUIRE(std::abs(d - mesh.distance_between(b, a)) < 1e-4);
   }
-  const auto again = saved(mesh, "gsnav_tiles.navmesh");
+  const auto again = saved(mesh);
   const NavMesh back = parse_navmesh(again, "tiles").value();
   CHECK(back.polygon_count() == mesh.polygon_count());
   CHECK(back.island_count() == mesh.island_count());
@@ -149,7 +141,7 @@ TEST_CASE("navmesh file: 64-bit references and many tiles") {
 
 TEST_CASE("navmesh file: what is wrong is named") {
   CHECK(load_navmesh("/no/such/file.navmesh").code() == Errc::file_not_found);
-  const auto good = saved(boxes(), "gsnav_bad.navmesh");
+  const auto good = saved(boxes());
   const auto message = [&](std::size_t at, std::int32_t v) {
     auto b = good;
     patch(b, at, v);
@@ -173,7 +165,7 @@ TEST_CASE("navmesh file: what is wrong is named") {
 }
 
 TEST_CASE("navmesh file: mutated and truncated files do no harm") {
-  std::vector<std::vector<std::byte>> seeds{saved(boxes(), "gsnav_fuzz.navmesh")};
+  std::vector<std::vector<std::byte>> seeds{saved(boxes())};
   const std::string tiles = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");
   if (!tiles.empty()) seeds.push_back(bytes_of(tiles));
   Rng rng(11);

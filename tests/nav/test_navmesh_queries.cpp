@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 
@@ -11,6 +10,7 @@
 #include "gsnav/nav/navmesh_file.hpp"
 #include "gsnav/nav/navmesh_levels.hpp"
 #include "meshes.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using gsnav_test::random_boxes;
@@ -160,7 +160,8 @@ TEST_CASE("obj: the file holds the surface, facing up, an island a group") {
   Soup soup = tower();
   for (Vec3d& v : soup.vertices) v += {100, 10, -40};
   const NavMesh mesh = build(soup);
-  const std::string path = (std::filesystem::temp_directory_path() / "gsnav_surface.obj").string();
+  const gsnav_test::TempFolder folder("surface");
+  const std::string path = (folder / "a.obj").string();
   REQUIRE(save_navmesh_obj(mesh, path).ok());
   const Soup back = gsnav_test::read_obj(path);
   double area = 0;
@@ -179,7 +180,5 @@ TEST_CASE("obj: the file holds the surface, facing up, an island a group") {
   std::size_t groups = 0;
   for (std::string line; std::getline(in, line);) groups += line.rfind("g island_", 0) == 0 ? 1 : 0;
   CHECK(groups == mesh.island_count());
-  in.close();
-  std::filesystem::remove(path);
   CHECK(save_navmesh_obj(mesh, "/no/such/folder/x.obj").code() == Errc::file_not_found);
 }

@@ -10,8 +10,8 @@
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
-#include "io/files.hpp"
 #include "support/command.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using gsnav_test::Outcome;

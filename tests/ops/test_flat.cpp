@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The benchmark flat: 300,000 Gaussians, four poses at 256x256, float32 against float64.
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <string>
 
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "ops/backends.hpp"
+#include "support/files.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -37,9 +36,7 @@ TEST_CASE("the benchmark flat at 300K") {
 #if !defined(GSNAV_BENCH_SCENE_GENERATOR)
   std::printf("SKIP: the generator of the benchmark flat is not there\n");
 #else
-  const std::filesystem::path dir = 
-      std::filesystem::temp_directory_path() / ("gsnav_test_flat_" + std::to_string(getpid()));
-  std::filesystem::create_directories(dir);
+  const TempFolder dir("test_flat");
   const std::string ply = (dir / "flat.ply").string(), cameras_path = (dir / "cameras.json").string();
   const std::string generator = GSNAV_BENCH_SCENE_GENERATOR;
   REQUIRE(std::system(("\"" + generator + "\" ply 300000 \"" + ply + "\" 2> /dev/null").c_str()) == 0);
@@ -83,6 +80,5 @@ TEST_CASE("the benchmark flat at 300K") {
     CHECK(e.max <= 6.0 / 255);
 #endif
   }
-  std::filesystem::remove_all(dir);
 #endif
 }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include <filesystem>
-#include <fstream>
 #include <regex>
 
 #include "html.hpp"
+#include "support/files.hpp"
 #include "synthetic.hpp"
 
 using namespace gsnav_report;
@@ -96,24 +95,21 @@ TEST_CASE("html: fields that are no numbers are no numbers, wherever they stand"
 }
 
 TEST_CASE("html: images are embedded; one that is none is named") {
-  const auto folder = std::filesystem::temp_directory_path() / "gsnav_report_html";
-  std::filesystem::create_directories(folder);
-  std::ofstream(folder / "a.png", std::ios::binary) << "\x89PNG\r\n\x1a\nrest";
-  std::ofstream(folder / "b.png", std::ios::binary) << "text";
+  const gsnav_test::TempFolder folder("report_html");
+  gsnav_test::write_file(folder / "a.png", "\x89PNG\r\n\x1a\nrest");
+  gsnav_test::write_file(folder / "b.png", "text");
   std::vector<Row> rows;
   for (const char* image : {"a.png", "b.png", "absent.png", "a.png"}) {
     Row r;
     rows.push_back(
         r.set("kind", "render").set("profile", "exact").set("scene", "s").set("image", image));
   }
-  const Table table(rows, folder);
+  const Table table(rows, folder.path());
   REQUIRE(write_html(table, folder / "page.html").ok());
-  std::ifstream in(folder / "page.html", std::ios::binary);
-  const std::string page((std::istreambuf_iterator<char>(in)), {});
+  const std::string page = gsnav_test::read_file(folder / "page.html");
   CHECK(page == html_page(table));
   CHECK(count(page, "data:image/png;base64,iVBORw0KGgpyZXN0") == 1);
   CHECK(page.find("b.png is no PNG") != std::string::npos);
   CHECK(page.find("absent.png is no PNG") != std::string::npos);
-  CHECK(write_html(table, folder / "no" / "such" / "page.html").code() == gsnav::Errc::file_not_found);
-  std::filesystem::remove_all(folder);
+  CHECK(write_html(table, folder / "no/such/page.html").code() == gsnav::Errc::file_not_found);
 }

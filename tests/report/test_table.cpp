@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include <filesystem>
-#include <fstream>
-
+#include "support/files.hpp"
 #include "synthetic.hpp"
 #include "table.hpp"
 #include "table_budget.hpp"
@@ -34,10 +32,9 @@ const BudgetCheck* find(const std::vector<BudgetCheck>& checks, const std::strin
 }  // namespace
 
 TEST_CASE("table: reads quoted fields, and says which file and record is wrong") {
-  const auto folder = std::filesystem::temp_directory_path() / "gsnav_report_table";
-  std::filesystem::create_directories(folder);
+  const gsnav_test::TempFolder folder("report_table");
   const auto write = [&](const char* text) {
-    std::ofstream(folder / "r.csv", std::ios::binary) << text;
+    gsnav_test::write_file(folder / "r.csv", text);
     return Table::read(folder / "r.csv");
   };
   const auto table = write("kind,name,note\nkernel,\"a, \"\"b\"\"\",\"two\nlines\"\nsweep,c,\n");
@@ -46,14 +43,13 @@ TEST_CASE("table: reads quoted fields, and says which file and record is wrong")
   CHECK(table->of_kind("kernel")[0]->get("name") == "a, \"b\"");
   CHECK(table->of_kind("kernel")[0]->get("note") == "two\nlines");
   CHECK(table->distinct("name") == "a, \"b\", c");
-  CHECK(table->folder() == folder);
+  CHECK(table->folder() == folder.path());
 
   const auto wrong = write("kind,name\nkernel,a\nkernel\n");
   CHECK(wrong.code() == gsnav::Errc::invalid_file);
   CHECK(wrong.message().find("r.csv") != std::string::npos);
   CHECK(wrong.message().find('3') != std::string::npos);
   CHECK(Table::read(folder / "absent.csv").code() == gsnav::Errc::file_not_found);
-  std::filesystem::remove_all(folder);
 }
 
 TEST_CASE("table: means, extremes and the rows they come from; an identical view counts as 140 dB") {

@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "cache.hpp"
-#include "files.hpp"
+#include "support/files.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav_report;
@@ -25,7 +25,7 @@ Reference sample() {
 }  // namespace
 
 TEST_CASE("cache: an entry comes back whole") {
-  const ScratchFolder folder("report_cache");
+  const TempFolder folder("report_cache");
   const ReferenceCache cache(folder / "references");
   std::string warning;
   CHECK_FALSE(cache.load("h", warning));
@@ -47,13 +47,13 @@ TEST_CASE("cache: an entry comes back whole") {
 }
 
 TEST_CASE("cache: any damage is noticed") {
-  const ScratchFolder folder("report_cache_damage");
+  const TempFolder folder("report_cache_damage");
   const ReferenceCache cache(folder / "references");
   REQUIRE(cache.store("h", sample()).ok());
-  const std::string whole = read_text(cache.file("h"));
+  const std::string whole = read_file(cache.file("h"));
   std::string warning;
   const auto rejected = [&](const std::string& text) {
-    write_text(cache.file("h"), text);
+    write_file(cache.file("h"), text);
     return !cache.load("h", warning) && warning.find(cache.file("h").string()) != std::string::npos;
   };
   for (std::size_t at = 0; at < whole.size(); ++at) {
@@ -66,7 +66,7 @@ TEST_CASE("cache: any damage is noticed") {
   }
   for (std::size_t size = 0; size < whole.size(); size += 7) CHECK(rejected(whole.substr(0, size)));
   CHECK(rejected(whole + "x"));
-  write_text(cache.file("h"), whole);
+  write_file(cache.file("h"), whole);
   CHECK(cache.load("h", warning));
 }
 

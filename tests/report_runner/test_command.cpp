@@ -5,10 +5,10 @@
 #include <string>
 
 #include "csv.hpp"
-#include "files.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "support/command.hpp"
+#include "support/files.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -17,12 +17,12 @@ using namespace gsnav_test;
 
 namespace {
 
-Outcome run(const ScratchFolder& folder, const std::string& arguments) {
+Outcome run(const TempFolder& folder, const std::string& arguments) {
   return run_command(GSNAV_REPORT, arguments, folder.path());
 }
 
 /// Writes a small cloud and three cameras in front of it; returns the --scene option.
-std::string tiny_scene(const ScratchFolder& folder) {
+std::string tiny_scene(const TempFolder& folder) {
   const GaussianCloud cloud = random_cloud(3, {.count = 300, .sh_degree = 1});
   io::save_ply(folder / "tiny.ply", cloud).throw_if_error();
   std::vector<Camera> cameras;
@@ -36,7 +36,7 @@ std::string tiny_scene(const ScratchFolder& folder) {
 }  // namespace
 
 TEST_CASE("report: errors name the option and the value") {
-  const ScratchFolder folder("report_errors");
+  const TempFolder folder("report_errors");
   struct Case {
     std::string arguments;
     std::vector<const char*> parts;
@@ -69,14 +69,14 @@ TEST_CASE("report: errors name the option and the value") {
 }
 
 TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed") {
-  const ScratchFolder folder("report_smoke");
+  const TempFolder folder("report_smoke");
   const std::string out = (folder / "out").string();
   const std::string arguments = tiny_scene(folder) + " --views 2 --sizes 48x32 --knob-size 48x32 --runs 1 --kinds " +
                                 "render,ledger --knobs response,storage --threads 2 --commit c1 --out \"" + out + "\"";
   Outcome first = run(folder, arguments);
   CAPTURE(first.text);
   REQUIRE(first.ok);
-  const std::string csv = read_text(folder / "out/report.csv");
+  const std::string csv = read_file(folder / "out/report.csv");
   const std::vector<Row> rows = parse_csv(csv, "report.csv").value();
   int exact = 0, knobs = 0;
   bool picture = false;
@@ -108,19 +108,19 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
 
   // Resumed: nothing is left to do. Cut short: only what is missing is made.
   REQUIRE(run(folder, arguments + " --resume").ok);
-  CHECK(read_text(folder / "out/report.csv") == csv);
-  write_text(folder / "out/report.csv", csv.substr(0, csv.size() / 2));
+  CHECK(read_file(folder / "out/report.csv") == csv);
+  write_file(folder / "out/report.csv", csv.substr(0, csv.size() / 2));
   REQUIRE(run(folder, arguments + " --resume").ok);
-  CHECK(parse_csv(read_text(folder / "out/report.csv"), "report.csv").value().size() == rows.size());
+  CHECK(parse_csv(read_file(folder / "out/report.csv"), "report.csv").value().size() == rows.size());
 
   // A damaged reference is rendered again, with a warning.
   for (const auto& entry : std::filesystem::directory_iterator(folder / "out/references")) {
-    std::string bytes = read_text(entry.path());
+    std::string bytes = read_file(entry.path());
     bytes.back() = static_cast<char>(bytes.back() ^ 1);
-    write_text(entry.path(), bytes);
+    write_file(entry.path(), bytes);
   }
   const Outcome repaired = run(folder, arguments);
   CHECK(repaired.ok);
   CHECK(repaired.text.find("checksum") != std::string::npos);
-  CHECK(parse_csv(read_text(folder / "out/report.csv"), "report.csv").value().size() == rows.size());
+  CHECK(parse_csv(read_file(folder / "out/report.csv"), "report.csv").value().size() == rows.size());
 }

@@ -2,8 +2,8 @@
 #include <doctest/doctest.h>
 
 #include "csv.hpp"
-#include "files.hpp"
 #include "kernels.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav_report;
 using namespace gsnav_test;
@@ -35,39 +35,39 @@ TEST_CASE("csv: what is wrong is named") {
 }
 
 TEST_CASE("csv: every added row is on disk, and a cut-off line is left out") {
-  const ScratchFolder folder("report_csv");
+  const TempFolder folder("report_csv");
   const auto path = folder / "report.csv";
   {
     CsvFile file = CsvFile::open(path, false).value();
     Row row;
     CHECK(file.add(row.set("key", "a")).ok());
     CHECK(file.add(row.set("key", "b").set("note", "x,\ny")).ok());
-    CHECK(parse_csv(read_text(path), "f").value().size() == 2);  // while it is still open
+    CHECK(parse_csv(read_file(path), "f").value().size() == 2);  // while it is still open
   }
-  const std::string whole = read_text(path);
+  const std::string whole = read_file(path);
   for (const std::size_t cut : {whole.size() - 1, whole.size() - 5}) {
-    write_text(path, whole.substr(0, cut));
+    write_file(path, whole.substr(0, cut));
     CsvFile file = CsvFile::open(path, true).value();
     CHECK(file.has("a"));
     CHECK_FALSE(file.has("b"));
     CHECK(file.add(Row().set("key", "c")).ok());
-    CHECK(parse_csv(read_text(path), "f").value().size() == 2);
+    CHECK(parse_csv(read_file(path), "f").value().size() == 2);
   }
   CHECK(CsvFile::open(path, false).value().rows().empty());
-  write_text(path, "not,ours\n1,2\n");
+  write_file(path, "not,ours\n1,2\n");
   CHECK(CsvFile::open(path, true).code() == gsnav::Errc::invalid_file);
   CHECK(CsvFile::open(folder / "none/report.csv", false).code() == gsnav::Errc::file_not_found);
 }
 
 TEST_CASE("csv: rows completed later are saved") {
-  const ScratchFolder folder("report_csv_save");
+  const TempFolder folder("report_csv_save");
   const auto path = folder / "report.csv";
   CsvFile file = CsvFile::open(path, false).value();
   CHECK(file.add(Row().set("key", "a")).ok());
   file.rows()[0].set("image", "images/a.png");
   CHECK(file.save().ok());
   CHECK(file.add(Row().set("key", "b")).ok());
-  const auto rows = parse_csv(read_text(path), "f").value();
+  const auto rows = parse_csv(read_file(path), "f").value();
   REQUIRE(rows.size() == 2);
   CHECK(rows[0].get("image") == "images/a.png");
 }

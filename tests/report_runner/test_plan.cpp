@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <set>
 
-#include "files.hpp"
 #include "jobs.hpp"
 #include "runner_timing.hpp"
 #include "scenes.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_report;
@@ -68,9 +68,9 @@ TEST_CASE("plan: a knob's config differs from exact in that knob") {
 }
 
 TEST_CASE("scenes: what --scene says") {
-  const gsnav_test::ScratchFolder folder("report_scenes");
+  const gsnav_test::TempFolder folder("report_scenes");
   const std::string cameras = (folder / "cameras.json").string();
-  gsnav_test::write_text(cameras, "[]");
+  gsnav_test::write_file(cameras, "[]");
   const SceneSpec plain = parse_scene("flat=/data/2_0,2_1").value();
   CHECK(plain.name == "flat");
   CHECK(plain.path == "/data/2_0,2_1");

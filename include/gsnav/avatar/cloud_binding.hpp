@@ -164,7 +164,6 @@ inline Result<BoundCloud> bind_cloud(const GaussianCloud& cloud, const SkinnedMe
   const detail::NearestTriangle nearest(mesh);
   const std::size_t rest = cloud.shN.size() / max<std::size_t>(1, cloud.size());
   std::vector<std::vector<std::pair<std::uint16_t, double>>> rows;
-  std::size_t most = 1;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     RawGaussian g;
     g.mean = to * cloud.mean(i);
@@ -185,14 +184,9 @@ inline Result<BoundCloud> bind_cloud(const GaussianCloud& cloud, const SkinnedMe
     if (!builder.add(g)) continue;
     out.furthest = max(out.furthest, distance);
     detail::blend_weights(mesh, at, rows.emplace_back());
-    most = std::max(most, rows.back().size());
   }
   if (rows.empty()) return bad("no Gaussian lies within " + std::to_string(options.furthest) + " m of the surface");
-  asset.cloud = std::move(builder.cloud());
-  auto report = detail::set_weight_rows(asset, rows, most, options.weights);
-  if (!report) return report.status();
-  out.weights = *report;
-  if (Status s = asset.validate(); !s) return s;
+  if (Status s = detail::finish_avatar(asset, builder, rows, options.weights, out.weights); !s) return s;
   return out;
 }
 

@@ -96,10 +96,13 @@ inline void blend_weights(const SkinnedMesh& mesh, const MeshSample& p,
   }
 }
 
-/// Gives the asset weights of rows of different lengths, `most` at most.
-inline Result<WeightReport> set_weight_rows(AvatarAsset& asset,
-                                            const std::vector<std::vector<std::pair<std::uint16_t, double>>>& rows,
-                                            std::size_t most, const WeightOptions& options) {
+/// Gives the asset the Gaussians built and their weights, a row of joints and weights each, as many as `options` keep.
+inline Status finish_avatar(AvatarAsset& asset, GaussianCloudBuilder& builder,
+                            const std::vector<std::vector<std::pair<std::uint16_t, double>>>& rows,
+                            const WeightOptions& options, WeightReport& report) {
+  asset.cloud = std::move(builder.cloud());
+  std::size_t most = 1;
+  for (const auto& row : rows) most = std::max(most, row.size());
   std::vector<std::uint16_t> indices;
   std::vector<float> weights;
   indices.reserve(rows.size() * most);
@@ -110,7 +113,10 @@ inline Result<WeightReport> set_weight_rows(AvatarAsset& asset,
       weights.push_back(k < row.size() ? static_cast<float>(row[k].second) : 0.0f);
     }
   }
-  return choose_weights(asset, most, indices, weights, options);
+  const auto chosen = choose_weights(asset, most, indices, weights, options);
+  if (!chosen) return chosen.status();
+  report = *chosen;
+  return asset.validate();
 }
 
 }  // namespace detail
@@ -149,7 +155,6 @@ inline Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAv
   detail::PointGrid grid(out.spacing, options.gaussians);
   std::vector<Vec3d> normals;
   std::vector<std::vector<std::pair<std::uint16_t, double>>> rows;
-  std::size_t most = 1;
   Rng rng(options.seed);
   RawGaussian g;
   const double flat = std::log(options.overlap * out.spacing);
@@ -173,13 +178,8 @@ inline Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAv
     }
     if (!builder.add(g)) continue;
     detail::blend_weights(mesh, p, rows.emplace_back());
-    most = std::max(most, rows.back().size());
   }
-  asset.cloud = std::move(builder.cloud());
-  auto report = detail::set_weight_rows(asset, rows, most, options.weights);
-  if (!report) return report.status();
-  out.weights = *report;
-  if (Status s = asset.validate(); !s) return s;
+  if (Status s = detail::finish_avatar(asset, builder, rows, options.weights, out.weights); !s) return s;
   return out;
 }
 

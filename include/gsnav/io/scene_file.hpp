@@ -11,7 +11,8 @@ namespace gsnav::io {
 
 /// How load_scene reads.
 struct LoadSceneOptions {
-  int level = 0;  ///< of streamed LOD sets, 0 is the finest
+  int level = 0;     ///< of streamed LOD sets, 0 is the finest
+  bool sort = true;  ///< in space, as rendering wants it; false: rows stay as they were read
 };
 
 /// Reads a scene of Gaussians by what its path names: a `.ply`, `.splat`, `.ksplat`, `.spz`, `.sog`,
@@ -20,7 +21,8 @@ struct LoadSceneOptions {
 /// A comma names sibling tiles, which are merged into one cloud: `scenes/flat/2_0,2_1` reads
 /// scenes/flat/2_0 and scenes/flat/2_1. Their reports are summed, their warnings carry the tile's path.
 ///
-/// Rows come sorted in space (scene/spatial_order.hpp); `row_ids` has their places as they were read.
+/// Rows come sorted in space (scene/spatial_order.hpp) unless the options say otherwise; `row_ids` has their places
+/// as they were read.
 /// Errors: what the loaders of these formats return; unsupported (an extension that is not in the list,
 /// named with the list); invalid_argument (an empty name or a tile twice). Never throws.
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options = {});

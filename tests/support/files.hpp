@@ -18,7 +18,7 @@ class TempFolder {
  public:
   explicit TempFolder(const std::string& name)
       : path_(std::filesystem::temp_directory_path() /
-              ("gsnav_io_" + name + "_" + std::to_string(::getpid()))) {
+              ("gsnav_" + name + "_" + std::to_string(::getpid()))) {
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "files.hpp"
 #include "gsnav/math/vec.hpp"
+#include "support/files.hpp"
 
 namespace gsnav_test {
 
