@@ -55,6 +55,9 @@ Status validate(const SensorSpec& s) {
   if (s.cube_size < 0 || s.cube_size > kMaxImageSide - 2) {
     return bad("cube_size", std::to_string(s.cube_size), "must be in [0, 16382]");
   }
+  if (s.kind == SensorKind::semantic && s.model != SensorModel::pinhole) {
+    return bad("model", "not pinhole", "semantic sensors are pinholes");
+  }
   if (Status noise = validate(s.noise, s.uuid.c_str()); !noise) return noise;
   const SensorKind noisy = s.noise.kind == NoiseKind::redwood_depth ? SensorKind::depth : SensorKind::rgb;
   if (s.noise.kind != NoiseKind::none && s.kind != noisy) {

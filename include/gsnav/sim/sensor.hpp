@@ -18,6 +18,7 @@ enum class SensorKind : std::uint8_t {
   rgb,    ///< [H][W][3] float32, display-referred, 0 to 1 and above
   depth,  ///< [H][W] float32, metres (median), 0: no return; planar z, along the ray where not pinhole
   alpha,  ///< [H][W] float32, how much of the pixel is covered
+  semantic,  ///< [H][W] float32, whose most of the pixel is: 1, 2, ... the scene's assets, then its avatars; 0: nobody's
 };
 
 /// How directions become pixels.

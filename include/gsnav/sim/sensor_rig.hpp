@@ -13,6 +13,7 @@
 
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/sim/cube_map.hpp"
+#include "gsnav/sim/semantic.hpp"
 #include "gsnav/sim/sensor.hpp"
 
 namespace gsnav {
@@ -40,7 +41,8 @@ template <Backend B>
 class SensorRig {
  public:
   /// `sensors` are valid.
-  SensorRig(B& backend, std::vector<SensorSpec> sensors) : backend_(&backend), sensors_(std::move(sensors)), renderer_(backend) {
+  SensorRig(B& backend, std::vector<SensorSpec> sensors) 
+      : backend_(&backend), sensors_(std::move(sensors)), renderer_(backend), semantic_(backend) {
     for (std::size_t i = 0; i < sensors_.size(); ++i) {
       Group* group = nullptr;
       for (Group& g : groups_) {
@@ -89,23 +91,27 @@ class SensorRig {
 
   /// Draws all sensors of all views into their rows, in one batch. Errors: what rendering reports.
   Status render(std::span<const SensorView> views, SensorImages& images) {
-    // Faces of cubes are scratch: so many views at a time that it stays small.
-    const bool cubes = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.cube != nullptr; });
-    const std::size_t most = cubes ? kCubeViews : views.size();
+    // Faces of cubes and shares of sets are scratch: so many views at a time that it stays small.
+    const bool scratch = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) {
+      return g.cube != nullptr || g.buffer[kSemantic] != kNone;
+    });
+    const std::size_t most = scratch ? kScratchViews : views.size();
     for (std::size_t first = 0; first < views.size(); first += most) {
       if (Status s = render_some(views.subspan(first, std::min(most, views.size() - first)), images); !s) return s;
     }
     return {};
   }
-  /// Views rendered so far: each counts one for every place with another camera.
+  /// Renders so far: one for each view and camera (a cube counts one), and one for every three sets that a semantic
+  /// sensor tells apart.
   std::size_t render_count() const noexcept { return render_count_; }
   Renderer<float, B>& renderer() noexcept { return renderer_; }
 
  private:
-  static constexpr std::size_t kNone = ~std::size_t{0}, kKinds = 3, kCubeViews = 16;
+  static constexpr std::size_t kNone = ~std::size_t{0}, kScratchViews = 16;
+  static constexpr auto kSemantic = static_cast<std::size_t>(SensorKind::semantic), kKinds = kSemantic + 1;
   struct Group {  // sensors that share a camera
     std::size_t sensor = 0;
-    std::array<std::size_t, kKinds> buffer{kNone, kNone, kNone};
+    std::array<std::size_t, kKinds> buffer{kNone, kNone, kNone, kNone};
     std::shared_ptr<const CubeMap> cube;  // none: a pinhole
   };
   struct Output {
@@ -141,28 +147,59 @@ class SensorRig {
     for (const SensorView& v : views) append_cameras(v.base, v.rotation, v.pitch, cameras_);
     faces_.resize(groups_.size());
     jobs_.clear();
+    prepare_shares(views);
+    std::size_t camera = 0;
     for (std::size_t v = 0; v < views.size(); ++v) {
-      for (std::size_t g = 0; g < groups_.size(); ++g) add_jobs(views, v, g, images);
+      for (std::size_t g = 0; g < groups_.size(); ++g) add_jobs(views, v, g, images, camera);
     }
     stats_.assign(jobs_.size(), {});
     if (Status s = renderer_.render(jobs_, stats_); !s) return s;
-    render_count_ += views.size() * groups_.size();
     for_each(views.size(), [&](std::size_t v) { finish(views[v], v, images); });
+    for (const Shares& s : shares_) {
+      const std::span<float> out(row(images, s.buffer, views[s.view].row), size_[s.buffer]);
+      label_pixels(s.images, views[s.view].sets.size(), out);
+    }
     return {};
   }
 
-  void add_jobs(std::span<const SensorView> views, std::size_t v, std::size_t g, SensorImages& images) {
+  /// Scratch for the passes of semantic sensors.
+  void prepare_shares(std::span<const SensorView> views) {
+    shares_.clear();
+    share_configs_.clear();
+    if (std::none_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.buffer[kSemantic] != kNone; })) return;
+    std::size_t most = 0;
+    for (const SensorView& v : views) {
+      for (const GaussianSet& set : v.sets) most = std::max(most, set.gaussians.size);
+    }
+    semantic_.reserve(most);
+    for (const SensorView& v : views) {
+      share_configs_.push_back(*v.config);
+      share_configs_.back().background = {};
+    }
+  }
+
+  /// Appends what group g of view v needs; `camera` is the place of its first camera, then of the next group's.
+  void add_jobs(std::span<const SensorView> views, std::size_t v, std::size_t g, SensorImages& images, std::size_t& camera) {
     const Group& group = groups_[g];
     const auto add = [&](const std::array<float*, kKinds>& at) {
-      jobs_.push_back({views[v].sets, &cameras_[jobs_.size()], views[v].config, frame_images(at)});
+      jobs_.push_back({views[v].sets, &cameras_[camera++], views[v].config, frame_images(at)});
     };
     std::array<float*, kKinds> at{};
     if (group.cube == nullptr) {
-      for (std::size_t k = 0; k < kKinds; ++k) {
+      bool any = false;
+      for (std::size_t k = 0; k < kSemantic; ++k) {
         if (group.buffer[k] != kNone) at[k] = row(images, group.buffer[k], views[v].row);
+        any = any || at[k] != nullptr;
       }
+      if (group.buffer[kSemantic] != kNone) add_shares(views, v, group, camera);
+      if (!any) {
+        ++camera;
+        return;
+      }
+      ++render_count_;
       return add(at);
     }
+    ++render_count_;
     const std::size_t pixels = face_pixels(*group.cube);
     for (std::size_t k = 0; k < kKinds; ++k) {
       const std::size_t n = group.buffer[k] != kNone ? views.size() * CubeMap::kFaces * pixels * channels(k) : 0;
@@ -176,11 +213,23 @@ class SensorRig {
     }
   }
 
+  void add_shares(std::span<const SensorView> views, std::size_t v, const Group& group, std::size_t camera) {
+    Shares s{v, group.buffer[kSemantic], {}, {}};
+    for (std::size_t pass = 0; pass < SemanticPasses<B>::count(views[v].sets.size()); ++pass) {
+      s.sets.push_back(semantic_.recolored(views[v].sets, pass));
+      FrameImages<float> out;
+      out.rgb = s.images.emplace_back(SemanticPasses<B>::kChannels * size_[s.buffer]).data();
+      jobs_.push_back({s.sets.back(), &cameras_[camera], &share_configs_[v], out});
+      ++render_count_;
+    }
+    shares_.push_back(std::move(s));
+  }
+
   /// What follows rendering, for one view: sampling cubes, cutting depth at the far plane, noise.
   void finish(const SensorView& view, std::size_t v, SensorImages& images) {
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const Group& group = groups_[g];
-      for (std::size_t k = 0; k < kKinds; ++k) {
+      for (std::size_t k = 0; k < kSemantic; ++k) {
         if (group.buffer[k] == kNone) continue;
         const std::span<float> out(row(images, group.buffer[k], view.row), size_[group.buffer[k]]);
         if (group.cube != nullptr) sample(*group.cube, faces_[g][k].data(), v, k, out);
@@ -226,9 +275,19 @@ class SensorRig {
     return static_cast<std::size_t>(cube.side()) * static_cast<std::size_t>(cube.side());
   }
 
+  /// How much each set is of each pixel of one view.
+  struct Shares {
+    std::size_t view, buffer;
+    std::vector<std::vector<GaussianSet>> sets;  // of each pass
+    std::vector<std::vector<float>> images;
+  };
+
   B* backend_;
   std::vector<SensorSpec> sensors_;
   Renderer<float, B> renderer_;
+  SemanticPasses<B> semantic_;
+  std::vector<Shares> shares_;
+  std::vector<RenderConfig> share_configs_;  // of each view
   std::vector<Group> groups_;
   std::vector<Output> outputs_;      // of each sensor
   std::vector<std::size_t> size_;    // values in a row of each buffer

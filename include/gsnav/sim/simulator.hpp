@@ -74,12 +74,15 @@ class Simulator {
   static Result<Simulator> create(B& backend, SimulatorScene scene, SimulatorConfig config) {
     return create(backend, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(config));
   }
-  static Result<Simulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene, SimulatorConfig config) {
+  /// `others` adds bodies to the scene's avatars, numbered behind them.
+  static Result<Simulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene, SimulatorConfig config,
+                                  World::BodySource others = {}) {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
     if (Status s = validate(*scene); !s) return s;
     if (Status s = validate(config); !s) return s;
-    Result<World> world = World::create(scene->navmesh, config.task, [scene](double t0, double t1, auto& out) {
+    Result<World> world = World::create(scene->navmesh, config.task, [scene, others](double t0, double t1, auto& out) {
       append_bodies(*scene, t0, t1, out);
+      if (others) others(t0, t1, out);
     });
     if (!world) return world.status();
     return Simulator(backend, std::move(*world), std::move(config), std::move(scene));
