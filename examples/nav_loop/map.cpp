@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "gsnav/kernels/sh.hpp"
+#include "gsnav/sim/people.hpp"
 
 namespace nav_loop {
 namespace {
@@ -106,9 +107,8 @@ void scale_bar(Canvas& canvas, double scale) {
 }  // namespace
 
 Rgb avatar_color(std::size_t index) {
-  static constexpr Rgb kColors[] = {{0.90f, 0.45f, 0.05f}, {0.55f, 0.15f, 0.65f}, {0.05f, 0.55f, 0.50f},
-                                    {0.75f, 0.10f, 0.40f}, {0.45f, 0.45f, 0.05f}, {0.35f, 0.25f, 0.15f}};
-  return kColors[index % std::size(kColors)];
+  const Vec3d c = gsnav::person_color(index);
+  return {static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(c.z)};
 }
 
 Canvas draw_map(const MapContent& m) {

@@ -2,16 +2,13 @@
 #include "setup.hpp"
 
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <limits>
 #include <optional>
 
-#include "gsnav/avatar/avatar.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/nav/gaussian_navmesh.hpp"
 #include "gsnav/sim/default_scene.hpp"
-#include "map.hpp"
+#include "gsnav/sim/people.hpp"
 
 namespace nav_loop {
 namespace {
@@ -23,91 +20,6 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
-}
-
-constexpr double kRound = 48.0;     // seconds: everybody is back at the start of their way after that
-constexpr double kApart = 0.75;     // metres between two people, root to root, where it can be had
-constexpr double kUsualPace = 1.0;  // metres a second
-
-/// Where somebody goes, and how fast.
-struct Way {
-  std::vector<Vec3d> points;
-  gsnav::WalkOptions walk;
-  gsnav::WalkTrajectory trajectory;
-};
-
-std::optional<Way> make_way(const std::vector<Vec3d>& points, double speed) {
-  gsnav::WalkOptions walk;
-  walk.speed = speed;
-  auto trajectory = gsnav::WalkTrajectory::create(points, walk);
-  if (!trajectory) return {};
-  return Way{points, walk, std::move(*trajectory)};
-}
-
-/// A way through random places, walked back and forth in `kRound` seconds. None where chance gave a way
-/// that would have to be walked too fast or too slowly.
-std::optional<Way> random_way(const gsnav::NavMesh& mesh, gsnav::Rng& rng) {
-  std::vector<Vec3d> points{mesh.random_point(rng, 0).position};
-  double length = 0;
-  for (int tries = 0; tries < 40 && length < 0.40 * kRound * kUsualPace; ++tries) {
-    const auto path = mesh.find_path(points.back(), mesh.random_point(rng, 0).position);
-    if (!path || path->length < 1.0) continue;
-    length += path->length;
-    points.insert(points.end(), path->points.begin() + 1, path->points.end());
-  }
-  double speed = kUsualPace;
-  for (int i = 0; i < 30; ++i) {  // turns on the spot take their own time: the speed is found by trial
-    auto way = make_way(points, speed);
-    if (!way || !(way->trajectory.period() > 0) || speed < 0.6 || speed > 1.4) return {};
-    if (std::abs(way->trajectory.period() - kRound) < 1e-9) return way;
-    speed *= way->trajectory.period() / kRound;
-  }
-  return {};
-}
-
-double closest(const Way& a, const std::vector<Way>& others) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Way& b : others) {
-    for (double t = 0; t < kRound; t += 0.2) {
-      least = std::min(least, gsnav::norm(a.trajectory.at(t).position - b.trajectory.at(t).position));
-    }
-  }
-  return least;
-}
-
-/// People on random ways. Ways are drawn until one keeps apart from those before it: all have one
-/// period, so what holds for one round holds for ever.
-Result<std::vector<gsnav::AvatarActor>> spawn_avatars(const Options& options,
-                                                      const gsnav::NavMesh& mesh) {
-  std::vector<Way> ways;
-  std::vector<gsnav::AvatarActor> people;
-  gsnav::Rng rng(options.seed ^ 0x70656f706c65ull);
-  for (int i = 0; i < options.avatars; ++i) {
-    std::optional<Way> best;
-    double best_distance = -1;
-    for (int tries = 0; tries < 80 && best_distance < kApart; ++tries) {
-      auto way = random_way(mesh, rng);
-      if (!way) continue;
-      const double d = closest(*way, ways);
-      if (d > best_distance) {
-        best_distance = d;
-        best = std::move(way);
-      }
-    }
-    if (!best) best = make_way({mesh.random_point(rng, 0).position}, kUsualPace);
-    if (!best) return {Errc::nothing_navigable, "no place for an avatar"};
-    gsnav::HumanoidOptions look = gsnav::random_person(static_cast<std::uint64_t>(i) + 1);
-    const Rgb color = avatar_color(static_cast<std::size_t>(i));  // as in the map
-    look.top = Vec3d{color.r, color.g, color.b} * 0.72 + Vec3d{0.10, 0.10, 0.10};
-    auto body = gsnav::try_make_humanoid(look);
-    if (!body) return body.status();
-    auto actor = gsnav::make_walker(std::make_shared<const gsnav::AvatarAsset>(std::move(*body)),
-                                    best->points, best->walk);
-    if (!actor) return actor.status();
-    people.push_back(std::move(*actor));
-    ways.push_back(std::move(*best));
-  }
-  return people;
 }
 
 }  // namespace
@@ -173,7 +85,8 @@ Result<Setup> prepare(const Options& options) {
   setup.facts.area = nav.navigable_area();
   setup.facts.island_area = nav.island_count() > 0 ? nav.island_area(0) : 0.0;
   if (options.avatars > 0) {
-    auto people = spawn_avatars(options, walkways ? *walkways : *setup.scene.navmesh);
+    auto people = gsnav::walking_people(walkways ? *walkways : *setup.scene.navmesh,
+                                        static_cast<std::size_t>(options.avatars), options.seed);
     if (!people) return people.status();
     setup.scene.avatars = std::move(*people);
     setup.facts.avatar_gaussians = setup.scene.avatars.front().asset()->size();
@@ -187,23 +100,7 @@ Result<std::vector<gsnav::PointNavEpisode>> make_episodes(const Options& options
   auto episodes =
       gsnav::generate_episodes(*scene.navmesh, static_cast<std::size_t>(options.episodes), options.seed);
   if (!episodes) return episodes;
-  gsnav::Rng rng(options.seed ^ 0x7469636bull);
-  for (gsnav::PointNavEpisode& e : *episodes) {
-    for (int tries = 0; tries < 100; ++tries) {
-      e.start_time = rng.uniform(0.0, 600.0);
-      std::vector<gsnav::DynamicCapsule> now;
-      for (std::size_t i = 0; i < scene.avatars.size(); ++i) {
-        scene.avatars[i].dynamic_capsules(e.start_time, e.start_time, static_cast<std::uint32_t>(i),
-                                          now);
-      }
-      const auto bodies = gsnav::CapsuleSet::create(std::move(now), e.start_time, e.start_time);
-      if (!bodies) return bodies.status();
-      if (gsnav::clearance({e.start_position, task.agent_radius, task.agent_height}, *bodies,
-                           e.start_time)
-              .distance > 0.6)
-        break;
-    }
-  }
+  if (gsnav::Status s = gsnav::draw_start_times(*episodes, scene, task, options.seed); !s) return s;
   return episodes;
 }
 

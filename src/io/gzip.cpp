@@ -38,4 +38,34 @@ std::size_t GzipReader::read(std::span<std::byte> out) {
   return done;
 }
 
+std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
+  z_stream stream{};
+  constexpr int kGzipOnly = 16, kMemory = 8;
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + kGzipOnly, kMemory, Z_DEFAULT_STRATEGY) != Z_OK) {
+    throw std::bad_alloc();
+  }
+  std::vector<std::byte> out;
+  try {
+    out.resize(deflateBound(&stream, static_cast<uLong>(bytes.size())));
+  } catch (...) {
+    deflateEnd(&stream);
+    throw;
+  }
+  std::size_t done = 0;
+  int code = Z_OK;
+  while (code == Z_OK) {
+    const std::size_t n = std::min(bytes.size(), kMostAtOnce), room = std::min(out.size() - done, kMostAtOnce);
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
+    stream.avail_in = static_cast<uInt>(n);
+    stream.next_out = reinterpret_cast<Bytef*>(out.data() + done);
+    stream.avail_out = static_cast<uInt>(room);
+    code = deflate(&stream, n == bytes.size() ? Z_FINISH : Z_NO_FLUSH);
+    bytes = bytes.subspan(n - stream.avail_in);
+    done += room - stream.avail_out;
+  }
+  deflateEnd(&stream);
+  out.resize(done);
+  return out;
+}
+
 }  // namespace gsnav::io::detail

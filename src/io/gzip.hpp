@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 namespace gsnav::io::detail {
 
@@ -30,5 +31,8 @@ class GzipReader {
   int code_ = Z_OK;
   bool open_ = false;
 };
+
+/// A gzip stream of these bytes; the same for the same bytes. Throws std::bad_alloc.
+std::vector<std::byte> gzip(std::span<const std::byte> bytes);
 
 }  // namespace gsnav::io::detail

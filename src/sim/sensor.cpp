@@ -16,6 +16,15 @@ std::vector<SensorSpec> rgbd_sensors(int height, int width, double hfov, const V
   return {rgb, depth};
 }
 
+std::vector<SensorSpec> pointnav_v2_sensors() {
+  std::vector<SensorSpec> out = rgbd_sensors(360, 640, 70.0, {0.0, 0.88, 0.0});
+  for (SensorSpec& s : out) s.far_plane = 10.0;
+  out[0].noise.kind = NoiseKind::gaussian;
+  out[0].noise.intensity = 0.1;
+  out[1].noise.kind = NoiseKind::redwood_depth;
+  return out;
+}
+
 Status validate(const SensorSpec& s) {
   const auto bad = [&](const char* field, const std::string& value, const char* rule) {
     return Status(Errc::invalid_argument,
@@ -26,8 +35,35 @@ Status validate(const SensorSpec& s) {
     if (side < 1 || side > kMaxImageSide)
       return bad("resolution", std::to_string(side), "must be in [1, 16384]");
   }
-  if (!(s.hfov > 0 && s.hfov < 180))
-    return bad("hfov", std::to_string(s.hfov), "must be in (0, 180) degrees");
+  const bool fisheye = s.model == SensorModel::fisheye;
+  if (!(s.hfov > 0 && s.hfov < (fisheye ? 360 : 180))) {
+    return bad("hfov", std::to_string(s.hfov),
+               fisheye ? "must be in (0, 360) degrees" : "must be in (0, 180) degrees");
+  }
+  if (!(s.fisheye.alpha >= 0 && s.fisheye.alpha <= 1)) {
+    return bad("fisheye.alpha", std::to_string(s.fisheye.alpha), "must be in [0, 1]");
+  }
+  if (!(s.fisheye.xi > -1 && s.fisheye.xi < 1)) {
+    return bad("fisheye.xi", std::to_string(s.fisheye.xi), "must be in (-1, 1)");
+  }
+  for (const double f : s.fisheye.focal_length) {
+    if (!(f >= 0 && is_finite(f))) return bad("fisheye.focal_length", std::to_string(f), "must be >= 0");
+  }
+  for (const double f : s.fisheye.principal_point_offset) {
+    if (!is_finite(f)) return bad("fisheye.principal_point_offset", std::to_string(f), "must be finite");
+  }
+  if (s.cube_size < 0 || s.cube_size > kMaxImageSide - 2) {
+    return bad("cube_size", std::to_string(s.cube_size), "must be in [0, 16382]");
+  }
+  if (s.kind == SensorKind::semantic && s.model != SensorModel::pinhole) {
+    return bad("model", "not pinhole", "semantic sensors are pinholes");
+  }
+  if (Status noise = validate(s.noise, s.uuid.c_str()); !noise) return noise;
+  const SensorKind noisy = s.noise.kind == NoiseKind::redwood_depth ? SensorKind::depth : SensorKind::rgb;
+  if (s.noise.kind != NoiseKind::none && s.kind != noisy) {
+    return bad("noise.kind", s.noise.kind == NoiseKind::gaussian ? "gaussian" : "redwood_depth",
+               "gaussian noise is for colour, redwood_depth for depth");
+  }
   if (!is_finite(s.position)) return bad("position", "not finite", "must be finite");
   if (!is_finite(s.orientation)) return bad("orientation", "not finite", "must be finite");
   if (!(s.near_plane > 0 && is_finite(s.near_plane))) {
@@ -42,16 +78,30 @@ Status validate(const SensorSpec& s) {
   return {};
 }
 
+Status validate(std::span<const SensorSpec> sensors) {
+  for (std::size_t i = 0; i < sensors.size(); ++i) {
+    if (Status s = validate(sensors[i]); !s) return s;
+    for (std::size_t j = 0; j < i; ++j) {
+      if (sensors[i].uuid == sensors[j].uuid) {
+        return {Errc::invalid_argument, "SensorSpec.uuid \"" + sensors[i].uuid + "\" is used twice"};
+      }
+    }
+  }
+  return {};
+}
+
 bool same_camera(const SensorSpec& a, const SensorSpec& b) noexcept {
-  return a.resolution == b.resolution && a.hfov == b.hfov && a.position == b.position &&
+  return a.model == b.model && a.cube_size == b.cube_size && a.fisheye.alpha == b.fisheye.alpha &&
+         a.fisheye.xi == b.fisheye.xi && a.fisheye.focal_length == b.fisheye.focal_length &&
+         a.fisheye.principal_point_offset == b.fisheye.principal_point_offset && a.resolution == b.resolution && a.hfov == b.hfov && a.position == b.position &&
          a.orientation == b.orientation && a.near_plane == b.near_plane &&
          a.near_sigma == b.near_sigma && a.far_plane == b.far_plane;
 }
 
-Camera sensor_camera(const SensorSpec& spec, const Vec3d& base, const Quatd& rotation) noexcept {
+Camera sensor_camera(const SensorSpec& spec, const Vec3d& base, const Quatd& rotation, double pitch) noexcept {
   const Vec3d& o = spec.orientation;
   const Quatd local = axis_angle(Vec3d{0, 0, 1}, o.z) * axis_angle(Vec3d{0, 1, 0}, o.y) *
-                      axis_angle(Vec3d{1, 0, 0}, o.x);
+                      axis_angle(Vec3d{1, 0, 0}, o.x + pitch);
   const Mat3d sensor_from_world = transpose(rotation_matrix(rotation * local));
   Camera c;
   c.set_hfov(spec.resolution[1], spec.resolution[0], spec.hfov);

@@ -40,6 +40,12 @@ Status validate(const TaskConfig& c) {
   if (!(c.turn_angle > 0 && c.turn_angle <= 180))
     return bad("turn_angle", c.turn_angle, "must be in (0, 180]");
   if (!positive(c.control_period)) return bad("control_period", c.control_period, "must be positive");
+  if (!(c.tilt_angle > 0 && c.tilt_angle <= 90)) return bad("tilt_angle", c.tilt_angle, "must be in (0, 90]");
+  if (c.substeps < 1 || c.substeps > 1000) return bad("substeps", c.substeps, "must be in [1, 1000]");
+  const RewardConfig& r = c.reward;
+  for (const double w : {r.progress, r.slack, r.success, r.proximity, r.collision, r.wall}) {
+    if (!is_finite(w)) return bad("reward", w, "weights must be finite");
+  }
   if (c.max_steps < 1) return bad("max_steps", c.max_steps, "must be >= 1");
   if (!not_negative(c.success_distance))
     return bad("success_distance", c.success_distance, "must be >= 0");
@@ -61,14 +67,16 @@ Result<CapsuleSet> World::bodies(double t0, double t1) const {
 }
 
 Status World::reset(const PointNavEpisode& episode) {
-  running_ = false;
-  done_ = true;
+  s_.running = false;
+  s_.done = true;
   const auto fail = [&](const char* what) {
     return Status(Errc::nothing_navigable, "episode \"" + episode.id + "\": " + what);
   };
   const auto start = navmesh_->snap_point(episode.start_position, kSnap);
   if (!start) return fail("start_position is off the NavMesh");
-  const double l = navmesh_->geodesic_distance(start->position, episode.goal_position, kSnap);
+  const auto goal = navmesh_->snap_point(episode.goal_position, kSnap);
+  if (!goal) return fail("goal_position is off the NavMesh");
+  const double l = navmesh_->distance_between(*start, *goal);
   if (!is_finite(l)) return fail("goal_position cannot be reached along the NavMesh");
   if (!is_finite(episode.start_time)) {
     return {Errc::invalid_argument, "episode \"" + episode.id + "\": start_time is not finite"};
@@ -76,89 +84,218 @@ Status World::reset(const PointNavEpisode& episode) {
   const Result<CapsuleSet> now = bodies(episode.start_time, episode.start_time);
   if (!now) return now.status();
 
-  episode_ = episode;
-  agent_ = {start->position, yaw_of(episode.start_rotation), start->poly};
-  time_ = start_time_ = episode.start_time;
-  steps_ = 0;
-  stop_called_ = false;
-  last_ = {};
-  last_.avatar_clearance = clearance(agent_state(), *now, time_).distance;
-  tracker_.reset(l);
-  done_ = false;
-  running_ = true;
+  WorldState s;
+  s.episode = episode;
+  s.agent = {start->position, yaw_of(episode.start_rotation), start->poly};
+  s.goal = *goal;
+  s.time = s.start_time = episode.start_time;
+  s.distance_to_goal = l;
+  s.tracker.reset(l, config_.forward_step);
+  s.done = false;
+  s.running = true;
+  s_ = std::move(s);
+  s_.last.avatar_clearance = gsnav::clearance(agent_state(), *now, s_.time).distance;
   return {};
 }
 
-Result<StepInfo> World::step(Action action) {
-  if (!running_) return {Errc::invalid_argument, "step before reset: no episode is running"};
-  if (done_) return {Errc::invalid_argument, "step after the end: call reset"};
-  if (action == Action::stop) {
-    stop_called_ = done_ = true;
-    last_ = {};
-    const Result<CapsuleSet> now = bodies(time_, time_);
-    if (!now) return now.status();
-    last_.avatar_clearance = clearance(agent_state(), *now, time_).distance;
-    return last_;
-  }
-  // Counted from the start, so that long episodes do not drift.
-  const double t1 = start_time_ + (steps_ + 1) * config_.control_period;
-  const Result<CapsuleSet> bodies_now = bodies(time_, t1);
-  if (!bodies_now) return bodies_now.status();
+/// Turns and displacement of one substep, the same in all of them but for the turns at the beginning.
+struct World::Motion {
+  double first_turn = 0.0;  // radians, before the first substep
+  double tilt = 0.0;        // radians
+  double chord = 0.0;       // metres in each substep,
+  double bend = 0.0;        // while turning by this much, radians
+};
 
-  Vec3d displacement{};
-  const double turn = config_.turn_angle * kPi / 180.0;
-  switch (action) {
-    case Action::move_forward:
-      displacement = agent_.forward() * config_.forward_step;
-      break;
-    case Action::turn_left:
-      agent_.yaw = wrapped(agent_.yaw + turn);
-      break;
-    case Action::turn_right:
-      agent_.yaw = wrapped(agent_.yaw - turn);
-      break;
-    default:
-      return {Errc::invalid_argument,
-              "action " + std::to_string(static_cast<int>(action)) + " is unknown"};
-  }
-  const StepOptions options{config_.allow_sliding, config_.skin, StepOptions{}.max_slides};
-  const StepResult r = gsnav::step(*navmesh_, agent_state(), displacement, *bodies_now, options);
-
-  closest_approach(r.path, config_.agent_radius, config_.agent_height, *bodies_now, distances_);
-  last_ = {};
-  for (const double d : distances_) last_.avatar_clearance = min(d, last_.avatar_clearance);
-  last_.moved = norm(r.position - agent_.position);
-  last_.wall_collision = r.hit_wall;
-  last_.capsule_blocked = r.blocked_by == BlockedBy::capsule;
-  last_.pushed_into = r.pushed_into;
-  last_.avatar_contact = last_.capsule_blocked || r.pushed_into || last_.avatar_clearance <= 0.0;
-  last_.collided = r.blocked();
-  tracker_.add(
-      {last_.moved, last_.wall_collision, last_.capsule_blocked, last_.avatar_contact, distances_});
-
-  if (r.blocked_by != BlockedBy::invalid) {
-    agent_.position = r.position;
-    agent_.poly = r.poly;
-  }
-  time_ = t1;
-  done_ = ++steps_ >= config_.max_steps;
-  return last_;
+Status World::ready() const {
+  if (!s_.running) return {Errc::invalid_argument, "step before reset: no episode is running"};
+  if (s_.done) return {Errc::invalid_argument, "step after the end: call reset"};
+  return {};
 }
 
-double World::distance_to_goal() const {
-  if (!running_) return std::numeric_limits<double>::infinity();
-  return navmesh_->geodesic_distance(agent_.position, episode_.goal_position, kSnap);
+Result<World::Motion> World::motion_of(Action action) const {
+  Motion m;
+  switch (action) {
+    case Action::stop:
+      break;
+    case Action::move_forward:
+      m.chord = config_.forward_step / config_.substeps;
+      break;
+    case Action::turn_left:
+      m.first_turn = config_.turn_angle * kPi / 180.0;
+      break;
+    case Action::turn_right:
+      m.first_turn = -config_.turn_angle * kPi / 180.0;
+      break;
+    case Action::look_up:
+      m.tilt = config_.tilt_angle * kPi / 180.0;
+      break;
+    case Action::look_down:
+      m.tilt = -config_.tilt_angle * kPi / 180.0;
+      break;
+    default:
+      return {Errc::invalid_argument, "action " + std::to_string(static_cast<int>(action)) + " is unknown"};
+  }
+  return m;
+}
+
+Result<StepInfo> World::step(Action action) {
+  if (Status s = ready(); !s) return s;
+  if (action == Action::stop) return stop();
+  const Result<Motion> m = motion_of(action);
+  if (!m) return m.status();
+  return make_bodies_and_move(*m);
+}
+
+Result<StepInfo> World::step(const VelocityCommand& command) {
+  if (Status s = ready(); !s) return s;
+  if (command.stop) return stop();
+  if (!is_finite(command.linear) || !is_finite(command.angular)) {
+    return {Errc::invalid_argument, "VelocityCommand: linear and angular must be finite"};
+  }
+  const double dt = config_.control_period / config_.substeps;
+  Motion m;
+  m.bend = command.angular * dt;
+  // The chord of an arc of length v dt that turns by `bend`.
+  const double half = 0.5 * m.bend;
+  m.chord = command.linear * dt * (abs(half) > 1e-9 ? std::sin(half) / half : 1.0);
+  return make_bodies_and_move(m);
+}
+
+Result<StepInfo> World::step(Action action, std::span<const CapsuleSet* const> bodies) {
+  if (Status s = ready(); !s) return s;
+  if (action == Action::stop) return stop();
+  if (bodies.size() != static_cast<std::size_t>(config_.substeps)) {
+    return {Errc::invalid_argument, std::to_string(bodies.size()) + " sets of bodies for " +
+                                        std::to_string(config_.substeps) + " substeps"};
+  }
+  const Result<Motion> m = motion_of(action);
+  if (!m) return m.status();
+  return move(*m, bodies);
+}
+
+Result<StepInfo> World::stop() {
+  const Result<Clearance> now = clearance();
+  if (!now) return now.status();
+  s_.stop_called = s_.done = true;
+  s_.last = {};
+  s_.last.avatar_clearance = now->distance;
+  const double g = s_.distance_to_goal;
+  s_.last.reward = step_reward(config_.reward, {g, g, episode_success(true, g, config_.success_distance),
+                                                now->distance, false, false});
+  return s_.last;
+}
+
+Result<StepInfo> World::make_bodies_and_move(const Motion& motion) {
+  std::vector<CapsuleSet> made;
+  std::vector<const CapsuleSet*> sets;
+  made.reserve(static_cast<std::size_t>(config_.substeps));
+  for (int k = 0; k < config_.substeps; ++k) {
+    Result<CapsuleSet> set = bodies(tick(k), tick(k + 1));
+    if (!set) return set.status();
+    made.push_back(std::move(*set));
+    sets.push_back(&made.back());
+  }
+  return move(motion, sets);
+}
+
+double World::tick(int k) const noexcept {
+  // Counted from the start, so that long episodes do not drift.
+  const double actions = s_.steps + static_cast<double>(k) / config_.substeps;
+  return s_.start_time + actions * config_.control_period;
+}
+
+StepInfo World::move(const Motion& motion, std::span<const CapsuleSet* const> bodies) {
+  const Vec3d from = s_.agent.position;
+  const StepOptions options{config_.allow_sliding, config_.skin, StepOptions{}.max_slides};
+  StepInfo info;
+  s_.agent.yaw = wrapped(s_.agent.yaw + motion.first_turn);
+  s_.agent.pitch = clamp(s_.agent.pitch + motion.tilt, -0.5 * kPi, 0.5 * kPi);
+  distances_.clear();
+  avatars_.clear();
+  for (const CapsuleSet* set : bodies) {
+    AgentPose along;
+    along.yaw = s_.agent.yaw + 0.5 * motion.bend;
+    const StepResult r = gsnav::step(*navmesh_, agent_state(), along.forward() * motion.chord, *set, options);
+    closest_approach(r.path, config_.agent_radius, config_.agent_height, *set, approach_);
+    merge_distances(*set);
+    info.wall_collision = info.wall_collision || r.hit_wall;
+    info.capsule_blocked = info.capsule_blocked || r.blocked_by == BlockedBy::capsule;
+    info.pushed_into = info.pushed_into || r.pushed_into;
+    info.collided = info.collided || r.blocked();
+    if (r.blocked_by != BlockedBy::invalid) {
+      s_.agent.position = r.position;
+      s_.agent.poly = r.poly;
+    }
+    s_.agent.yaw = motion.bend != 0 ? wrapped(s_.agent.yaw + motion.bend) : s_.agent.yaw;
+  }
+  for (const double d : distances_) info.avatar_clearance = min(d, info.avatar_clearance);
+  info.moved = norm(s_.agent.position - from);
+  info.avatar_contact = info.capsule_blocked || info.pushed_into || info.avatar_clearance <= 0.0;
+  s_.tracker.add({info.moved, info.wall_collision, info.capsule_blocked, info.avatar_contact, distances_});
+
+  const double before = s_.distance_to_goal;
+  if (info.moved > 0) measure_distance();
+  info.reward = step_reward(config_.reward, {before, s_.distance_to_goal, false, info.avatar_clearance,
+                                             info.avatar_contact, info.wall_collision});
+  s_.time = tick(config_.substeps);
+  s_.done = ++s_.steps >= config_.max_steps;
+  s_.last = info;
+  return info;
+}
+
+void World::merge_distances(const CapsuleSet& bodies) {
+  for (std::size_t g = 0; g < approach_.size(); ++g) {
+    const std::uint32_t avatar = bodies.capsules_of(bodies.groups()[g])[0].avatar;
+    const auto at = std::lower_bound(avatars_.begin(), avatars_.end(), avatar);
+    const auto i = at - avatars_.begin();
+    if (at != avatars_.end() && *at == avatar) {
+      distances_[static_cast<std::size_t>(i)] = min(distances_[static_cast<std::size_t>(i)], approach_[g]);
+    } else {
+      avatars_.insert(at, avatar);
+      distances_.insert(distances_.begin() + i, approach_[g]);
+    }
+  }
+}
+
+void World::measure_distance() {
+  s_.distance_to_goal = navmesh_->distance_between({s_.agent.position, s_.agent.poly}, s_.goal);
+}
+
+Status World::set_agent(const Vec3d& position, double yaw, double pitch) {
+  if (!s_.running) return {Errc::invalid_argument, "set_agent before reset: no episode is running"};
+  if (!is_finite(position) || !is_finite(yaw) || !is_finite(pitch)) {
+    return {Errc::invalid_argument, "set_agent: position, yaw and pitch must be finite"};
+  }
+  const auto at = navmesh_->snap_point(position, kSnap);
+  if (!at) return {Errc::nothing_navigable, "set_agent: the position is off the NavMesh"};
+  if (!is_finite(navmesh_->distance_between(*at, s_.goal))) {
+    return {Errc::nothing_navigable, "set_agent: the goal cannot be reached from there"};
+  }
+  s_.agent = {at->position, wrapped(yaw), at->poly, clamp(pitch, -0.5 * kPi, 0.5 * kPi)};
+  measure_distance();
+  return {};
+}
+
+Result<Clearance> World::clearance() const {
+  const Result<CapsuleSet> now = bodies(s_.time, s_.time);
+  if (!now) return now.status();
+  return gsnav::clearance(agent_state(), *now, s_.time);
+}
+
+Result<StepInfo> World::probe(Action action) const {
+  World copy(*this);
+  return copy.step(action);
 }
 
 PointGoal World::point_goal() const noexcept {
-  const Vec3d d = episode_.goal_position - agent_.position;
+  const Vec3d d = s_.episode.goal_position - s_.agent.position;
   const double bearing = std::atan2(-d.x, -d.z);
-  return {std::hypot(d.x, d.z), wrapped(bearing - agent_.yaw)};
+  return {std::hypot(d.x, d.z), wrapped(bearing - s_.agent.yaw)};
 }
 
 EpisodeMetrics World::metrics() const {
-  return tracker_.finish(stop_called_, distance_to_goal(),
-                         norm(episode_.goal_position - agent_.position), config_.success_distance);
+  return s_.tracker.finish(s_.stop_called, s_.distance_to_goal,
+                           norm(s_.episode.goal_position - s_.agent.position), config_.success_distance);
 }
 
 }  // namespace gsnav

@@ -43,6 +43,16 @@ TEST_CASE("SoftSPL by hand") {
   CHECK(soft_success_weighted_by_path_length(kInf, kInf, 1.0) == 0.0);
 }
 
+TEST_CASE("STL by hand") {
+  // 4 m in steps of 0.25 m are 16 actions at least; 20 were taken, turns among them.
+  CHECK(success_weighted_by_time(true, 4.0, 0.25, 20) == doctest::Approx(0.8));
+  CHECK(success_weighted_by_time(true, 4.0, 0.25, 15) == 1.0);
+  CHECK(success_weighted_by_time(false, 4.0, 0.25, 16) == 0.0);
+  CHECK(success_weighted_by_time(true, 0.0, 0.25, 0) == 1.0);
+  CHECK(success_weighted_by_time(true, 0.0, 0.25, 3) == 0.0);
+  CHECK(success_weighted_by_time(true, kInf, 0.25, 3) == 0.0);
+}
+
 TEST_CASE("intrusion into personal space") {
   CHECK(intrusion(kInf) == 0.0);
   CHECK(intrusion(1.0) == 0.0);
@@ -65,6 +75,7 @@ TEST_CASE("an episode of four steps by hand") {
   CHECK(m.success);
   CHECK(m.spl == doctest::Approx(1.0));
   CHECK(m.soft_spl == doctest::Approx(0.9));
+  CHECK(m.stl == 1.0);  // 1 m in four actions
   CHECK(m.collision_rate == doctest::Approx(0.5));
   CHECK(m.collision_steps == 2);
   CHECK(m.collisions == 2);

@@ -1,35 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include "flat_world.hpp"
-#include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/sim/simulator.hpp"
+#include "sim_scene.hpp"
 
 using namespace gsnav;
+using namespace gsnav_test;
 
 namespace {
-
-SimulatorScene flat_scene() {
-  static const auto cloud =
-      std::make_shared<const GaussianCloud>(make_default_scene(0.05).value().cloud);
-  SimulatorScene s;
-  s.assets.push_back({cloud, {}});
-  s.navmesh = gsnav_test::flat_navmesh();
-  return s;
-}
 
 SimulatorConfig small_config() {
   SimulatorConfig c;
   c.sensors = rgbd_sensors(48, 64);
   return c;
-}
-
-PointNavEpisode to_kitchen() {
-  PointNavEpisode e;
-  e.start_position = {4.6, 0, 3.6};
-  e.goal_position = {8.8, 0, 3.4};
-  return e;
 }
 
 }  // namespace
@@ -152,21 +136,6 @@ TEST_CASE("impossible configurations name what is wrong") {
   CHECK(has(message([](auto&, auto& c) { c.task.forward_step = 0; }), "forward_step"));
   CHECK(has(message([](auto&, auto& c) { c.render.tile_size = 7; }), "tile_size"));
 }
-
-namespace {
-
-/// Two people who walk to and fro across the living room.
-SimulatorScene peopled_scene() {
-  SimulatorScene s = flat_scene();
-  HumanoidOptions look;
-  look.gaussians = 3000;
-  const auto body = std::make_shared<const AvatarAsset>(make_humanoid(look));
-  s.avatars.push_back(make_walker(body, {{3.4, 0, 3.7}, {5.4, 0, 3.0}}).value());
-  s.avatars.push_back(make_walker(body, {{5.3, 0, 1.6}, {3.6, 0, 2.9}, {4.6, 0, 4.0}}).value());
-  return s;
-}
-
-}  // namespace
 
 TEST_CASE("people are seen, and move while the agent acts") {
   SerialBackend backend;

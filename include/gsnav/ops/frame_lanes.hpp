@@ -25,6 +25,15 @@ concept LaneBackend = Backend<B> && is_host_backend<B> && requires(const B& b) {
   { b.one_thread() } -> std::same_as<B>;
 };
 
+/// One frame of a batch: what it sees, from where, by which rules, and where its images go.
+template <class S>
+struct FrameJob {
+  std::span<const GaussianSet> sets;
+  const Camera* camera = nullptr;
+  const RenderConfig* config = nullptr;
+  FrameImages<S> images;
+};
+
 /// Renders batches with one lane a thread: no thread waits for another within a frame. Scratch grows with
 /// threads, not with cameras, and is the same for all lanes, so that a batch like one before it allocates
 /// nothing, whichever lane takes which camera.
@@ -36,19 +45,20 @@ class FrameLanes {
     return cameras > 1 && cameras >= 2 * concurrency_of(backend);
   }
 
-  /// render_camera() for each of the cameras; images_of(c) gives the FrameImages of camera c. The first
-  /// camera's error, by number, is returned; out_of_memory too.
-  template <class ImagesOf>
-  Status render(B& backend, std::span<const GaussianSet> sets, std::span<const Camera> cameras,
-                const RenderConfig& config, const ImagesOf& images_of, std::span<RenderStats> stats) {
+  /// render_camera() for each of `count` frames; job_of(c) gives the FrameJob of frame c. The first frame's
+  /// error, by number, is returned; out_of_memory too.
+  template <class JobOf>
+  Status render(B& backend, std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
     while (lanes_.size() < concurrency_of(backend)) lanes_.push_back(std::make_unique<Lane>(backend));
     std::mutex mutex;
-    std::size_t failed = cameras.size();
+    std::size_t failed = count;
     Status result;
-    backend.parallel_for(cameras.size(), [&](std::size_t c) {
+    backend.parallel_for(count, [&](std::size_t c) {
       Lane& lane = take();
       Status s = guarded([&] {
-        return render_camera<S, B>(lane.backend, lane.workspace, sets, cameras[c], config, images_of(c), &stats[c]);
+        const FrameJob<S> job = job_of(c);
+        return render_camera<S, B>(lane.backend, lane.workspace, job.sets, *job.camera, *job.config, job.images,
+                                   &stats[c]);
       });
       lane.taken.store(false, std::memory_order_release);
       if (s.ok()) return;

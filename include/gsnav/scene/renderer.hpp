@@ -118,24 +118,31 @@ class Renderer {
 
     if constexpr (LaneBackend<B>) {
       if (FrameLanes<S, B>::worth_it(*backend_, cameras.size())) {
-        const auto images_of = [&out](std::size_t c) { return host_images(out, c); };
-        if (Status s = lanes_.render(*backend_, sets, cameras, config_, images_of, out.stats); !s) return s;
+        const auto job_of = [&](std::size_t c) {
+          return FrameJob<S>{sets, &cameras[c], &config_, host_images(out, c)};
+        };
+        if (Status s = lanes_.render(*backend_, cameras.size(), job_of, out.stats); !s) return s;
         return backend_->synchronize();
       }
     }
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      FrameImages<S> images = host_images(out, c);
-      if constexpr (!is_host_backend<B>) images = device_images(images, pixels);
-      if (Status s = render_camera<S>(*backend_, workspace_, sets, cameras[c], config_, images,
-                                      &out.stats[c]);
-          !s) {
-        return s;
+      if (Status s = render_job({sets, &cameras[c], &config_, host_images(out, c)}, out.stats[c]); !s) return s;
+    }
+    return backend_->synchronize();
+  }
+
+  /// Renders frames that share nothing: each sees its own sets and goes to images in host memory, of its camera's
+  /// size, that its caller has (a null pointer: not made). The same bits as one at a time. `stats` [jobs].
+  Status render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats) {
+    if constexpr (LaneBackend<B>) {
+      if (FrameLanes<S, B>::worth_it(*backend_, jobs.size())) {
+        const auto job_of = [&](std::size_t c) { return jobs[c]; };
+        if (Status s = lanes_.render(*backend_, jobs.size(), job_of, stats); !s) return s;
+        return backend_->synchronize();
       }
-      if constexpr (!is_host_backend<B>) {
-        for_each_image(host_images(out, c), images, [&](S* host, S* device, std::size_t channels) {
-          backend_->copy(host, device, pixels * channels * sizeof(S), CopyKind::device_to_host);
-        });
-      }
+    }
+    for (std::size_t c = 0; c < jobs.size(); ++c) {
+      if (Status s = render_job(jobs[c], stats[c]); !s) return s;
     }
     return backend_->synchronize();
   }
@@ -157,6 +164,23 @@ class Renderer {
   struct LanesOf<T> {
     using type = FrameLanes<S, T>;
   };
+
+  Status render_job(const FrameJob<S>& job, RenderStats& stats) {
+    if constexpr (is_host_backend<B>) {
+      return render_camera<S>(*backend_, workspace_, job.sets, *job.camera, *job.config, job.images, &stats);
+    } else {
+      const std::size_t pixels =
+          static_cast<std::size_t>(job.camera->width) * static_cast<std::size_t>(job.camera->height);
+      FrameImages<S> images = device_images(job.images, pixels);
+      if (Status s = render_camera<S>(*backend_, workspace_, job.sets, *job.camera, *job.config, images, &stats); !s) {
+        return s;
+      }
+      for_each_image(job.images, images, [&](S* host, S* device, std::size_t channels) {
+        backend_->copy(host, device, pixels * channels * sizeof(S), CopyKind::device_to_host);
+      });
+      return {};
+    }
+  }
 
   /// Where the images of camera c lie in `out`.
   static FrameImages<S> host_images(Frames<S>& out, std::size_t c) noexcept {

@@ -6,20 +6,10 @@
 #include <vector>
 
 #include "gsnav/math/quat.hpp"
+#include "gsnav/nav/episode.hpp"
 #include "gsnav/nav/navmesh.hpp"
 
 namespace gsnav {
-
-/// One point-goal task: go from a start to a goal. World frame: metres, Y up; the agent's forward is
-/// -Z turned by `start_rotation`.
-struct PointNavEpisode {
-  std::string id;
-  Vec3d start_position{};
-  Quatd start_rotation{};  ///< w, x, y, z; a turn about +Y
-  Vec3d goal_position{};
-  double geodesic_distance = 0.0;  ///< from start to goal along the surface, metres
-  double start_time = 0.0;         ///< seconds on the avatars' clock when the episode begins
-};
 
 /// Rotation about +Y: positive angles (radians) turn the agent left.
 inline Quatd yaw_rotation(double radians) noexcept {

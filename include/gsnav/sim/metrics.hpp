@@ -39,6 +39,12 @@ inline double soft_success_weighted_by_path_length(double g, double l, double p)
   return is_finite(soft) ? soft : 0.0;
 }
 
+/// STL = S T0 / max(T0, T) with T = steps and T0 = l / forward_step, both in actions: the time of whoever goes the
+/// shortest way at full speed without turning. With l = 0: S where no step was taken, else 0.
+inline double success_weighted_by_time(bool success, double l, double forward_step, std::size_t steps) noexcept {
+  return success ? detail::path_efficiency(l / forward_step, static_cast<double>(steps)) : 0.0;
+}
+
 /// Within this distance of a person the agent intrudes, metres.
 inline constexpr double kPersonalSpace = 1.0;
 
@@ -63,6 +69,7 @@ struct EpisodeMetrics {
   bool success = false;
   double spl = 0.0;
   double soft_spl = 0.0;
+  double stl = 0.0;                         ///< success weighted by time
   double distance_to_goal = 0.0;            ///< geodesic, metres; infinity where cut off
   double euclidean_distance_to_goal = 0.0;  ///< straight, metres
   double collision_rate = 0.0;      ///< CR: steps with avatar contact or a capsule-blocked move / steps
@@ -80,10 +87,12 @@ struct EpisodeMetrics {
 /// Collects the steps of one episode.
 class EpisodeTracker {
  public:
-  /// Begins an episode whose goal is `start_distance` metres away along the surface.
-  void reset(double start_distance) noexcept {
+  /// Begins an episode whose goal is `start_distance` metres away along the surface; an action moves by
+  /// `forward_step` metres at most.
+  void reset(double start_distance, double forward_step = 0.25) noexcept {
     *this = {};
     m_.start_distance = start_distance;
+    forward_step_ = forward_step;
   }
 
   void add(const StepRecord& r) noexcept {
@@ -111,6 +120,7 @@ class EpisodeTracker {
     m.success = episode_success(stop_called, geodesic, success_distance);
     m.spl = success_weighted_by_path_length(m.success, m.start_distance, m.path_length);
     m.soft_spl = soft_success_weighted_by_path_length(geodesic, m.start_distance, m.path_length);
+    m.stl = success_weighted_by_time(m.success, m.start_distance, forward_step_, m.steps);
     m.collision_rate =
         m.steps == 0 ? 0.0 : static_cast<double>(m.collision_steps) / static_cast<double>(m.steps);
     m.psi = pairs_ == 0 ? 0.0 : intrusion_ / static_cast<double>(pairs_);
@@ -119,6 +129,7 @@ class EpisodeTracker {
 
  private:
   EpisodeMetrics m_{};
+  double forward_step_ = 0.25;
   double intrusion_ = 0.0;
   std::size_t pairs_ = 0;
 };
@@ -129,6 +140,7 @@ struct MetricsSummary {
   double success_rate = 0.0;  ///< SR
   double spl = 0.0;
   double soft_spl = 0.0;
+  double stl = 0.0;
   double distance_to_goal = 0.0;  ///< DTG, geodesic, metres
   double euclidean_distance_to_goal = 0.0;
   double collision_rate = 0.0;  ///< CR
@@ -149,6 +161,7 @@ inline MetricsSummary summarize(std::span<const EpisodeMetrics> episodes) noexce
     s.success_rate += e.success ? 1.0 : 0.0;
     s.spl += e.spl;
     s.soft_spl += e.soft_spl;
+    s.stl += e.stl;
     s.distance_to_goal += e.distance_to_goal;
     s.euclidean_distance_to_goal += e.euclidean_distance_to_goal;
     s.collision_rate += e.collision_rate;
@@ -160,7 +173,7 @@ inline MetricsSummary summarize(std::span<const EpisodeMetrics> episodes) noexce
     s.min_clearance = min(e.min_clearance, s.min_clearance);
   }
   const double n = static_cast<double>(episodes.size());
-  for (double* v : {&s.success_rate, &s.spl, &s.soft_spl, &s.distance_to_goal,
+  for (double* v : {&s.success_rate, &s.spl, &s.soft_spl, &s.stl, &s.distance_to_goal,
                     &s.euclidean_distance_to_goal, &s.collision_rate, &s.psi, &s.collisions,
                     &s.human_collision_episode_rate, &s.steps, &s.path_length}) {
     *v /= n;

@@ -10,7 +10,8 @@ namespace gsnav {
 
 /// Smallest distance during a tick from an agent that goes along `path` (StepResult::path; it stands
 /// still after the last point) to each avatar among `bodies`: surface to surface, metres, negative in
-/// overlap. `out[k]` belongs to bodies.groups()[k].
+/// overlap. `out[k]` belongs to bodies.groups()[k]. Of avatars that stay outside the agent's personal space and farther away
+/// than another one it is a lower bound: no metric asks for more.
 ///
 /// The tick is sampled at nine times and at the path's corners; around the least, the time is
 /// narrowed to 1/2000 of the tick. Between samples a capsule can only come nearer by what it moves in

@@ -1,38 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "gsnav/avatar/actor.hpp"
-#include "gsnav/avatar/skinned_gaussians.hpp"
-#include "gsnav/scene/renderer.hpp"
-#include "gsnav/sim/sensor.hpp"
+#include "gsnav/sim/scene_on_backend.hpp"
+#include "gsnav/sim/sensor_rig.hpp"
 #include "gsnav/sim/world.hpp"
 
 namespace gsnav {
-
-/// A cloud and how it stands in the world.
-struct SceneAsset {
-  std::shared_ptr<const GaussianCloud> cloud;
-  Similarity world_from_asset{};
-};
-
-/// What a simulator runs in. Shared, never changed: many simulators may use one.
-struct SimulatorScene {
-  std::vector<SceneAsset> assets;
-  std::shared_ptr<const NavMesh> navmesh;
-  std::vector<AvatarActor> avatars;
-};
 
 struct SimulatorConfig {
   TaskConfig task{};
   std::vector<SensorSpec> sensors;  ///< none: nothing is rendered
   RenderConfig render{};            ///< outputs and sort order are chosen by sensors and scene
   bool rendering = true;            ///< off: physics and metrics only, no image memory
+  std::uint64_t seed = 0;           ///< of the sensors' noise
 };
+
+/// invalid_argument, naming the field, where a value is impossible.
+inline Status validate(const SimulatorConfig& config) {
+  if (Status s = validate(config.task); !s) return s;
+  if (Status s = validate(config.render); !s) return s;
+  return validate(std::span<const SensorSpec>(config.sensors));
+}
+
+/// What the noise of an observation depends on: the seed, the episode and how many actions it has seen.
+std::uint64_t noise_seed(std::uint64_t seed, const WorldState& state) noexcept;
+
+/// Where the camera of an ImageNav goal looks: about +Y by an angle that the episode's id alone decides, so that an
+/// episode has one goal image.
+Quatd goal_rotation(const PointNavEpisode& episode) noexcept;
 
 /// One sensor's image. Valid until the next step or reset of its simulator.
 struct Observation {
@@ -71,18 +72,20 @@ class Simulator {
  public:
   /// Errors: invalid_argument (names the field, sensor or asset).
   static Result<Simulator> create(B& backend, SimulatorScene scene, SimulatorConfig config) {
-    if (Status s = check(scene, config); !s) return s;
-    auto avatars = std::make_shared<const std::vector<AvatarActor>>(std::move(scene.avatars));
-    Result<World> world = World::create(
-        scene.navmesh, config.task, [avatars](double t0, double t1, std::vector<DynamicCapsule>& out) {
-          for (std::size_t i = 0; i < avatars->size(); ++i) {
-            (*avatars)[i].dynamic_capsules(t0, t1, static_cast<std::uint32_t>(i), out);
-          }
-        });
+    return create(backend, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(config));
+  }
+  /// `others` adds bodies to the scene's avatars, numbered behind them.
+  static Result<Simulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene, SimulatorConfig config,
+                                  World::BodySource others = {}) {
+    if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
+    if (Status s = validate(*scene); !s) return s;
+    if (Status s = validate(config); !s) return s;
+    Result<World> world = World::create(scene->navmesh, config.task, [scene, others](double t0, double t1, auto& out) {
+      append_bodies(*scene, t0, t1, out);
+      if (others) others(t0, t1, out);
+    });
     if (!world) return world.status();
-    Simulator sim(backend, std::move(*world), std::move(config), std::move(scene.assets),
-                  std::move(avatars));
-    return sim;
+    return Simulator(backend, std::move(*world), std::move(config), std::move(scene));
   }
 
   /// Begins an episode. Errors: what World::reset reports; rendering.
@@ -97,6 +100,10 @@ class Simulator {
     if (Result<StepInfo> r = world_.step(action); !r) return r.status();
     return observe();
   }
+  Result<Observations> step(const VelocityCommand& command) {
+    if (Result<StepInfo> r = world_.step(command); !r) return r.status();
+    return observe();
+  }
 
   /// Renders what the agent sees now, without acting.
   Result<Observations> observe() {
@@ -104,16 +111,14 @@ class Simulator {
     static_cast<StepInfo&>(obs) = world_.last_step();
     obs.point_goal = world_.point_goal();
     obs.time = world_.time();
-    if (!config_.rendering || groups_.empty()) return obs;
-    if (Status s = pose_avatars(); !s) return s;
-    for (Group& g : groups_) {
-      const SensorSpec& first = config_.sensors[g.sensors.front()];
-      const Camera camera = sensor_camera(first, world_.agent().position, world_.agent().rotation());
-      if (Status s = render_into(camera, g.outputs, g.frames); !s) return s;
-      for (float& z : g.frames.median_depth) z = static_cast<double>(z) > first.far_plane ? 0.0f : z;
-      for (const std::size_t i : g.sensors)
-        images_[i].data = image_of(config_.sensors[i].kind, g.frames);
-    }
+    if (!config_.rendering || images_.empty()) return obs;
+    if (Status s = scene_.pose(0, world_.time()); !s) return s;
+    const AgentPose& agent = world_.agent();
+    const SensorView view{agent.position, agent.rotation(), agent.pitch, noise_seed(config_.seed, world_.state()),
+                          scene_.sets(0), &config_.render, 0};
+    rig_.resize(buffers_, 1);
+    if (Status s = rig_.render(std::span(&view, 1), buffers_); !s) return s;
+    for (std::size_t i = 0; i < images_.size(); ++i) images_[i].data = rig_.image(buffers_, i, 0);
     obs.images = images_;
     return obs;
   }
@@ -124,120 +129,68 @@ class Simulator {
   const AgentPose& agent() const noexcept { return world_.agent(); }
   const World& world() const noexcept { return world_; }
   const SimulatorConfig& config() const noexcept { return config_; }
-  const std::vector<AvatarActor>& avatars() const noexcept { return *avatars_; }
+  const std::vector<AvatarActor>& avatars() const noexcept { return scene_.scene().avatars; }
+
+  /// Everything that changes while it runs, and the way back to it; observe() then sees what was seen there.
+  const WorldState& state() const noexcept { return world_.state(); }
+  void set_state(const WorldState& state) { world_.set_state(state); }
+  /// As World::set_agent.
+  Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0) {
+    return world_.set_agent(position, yaw, pitch);
+  }
+  /// Decides the sensors' noise from here on.
+  void set_seed(std::uint64_t seed) noexcept { config_.seed = seed; }
 
   /// Turns rendering on or off from the next action on.
   void set_rendering(bool on) noexcept { config_.rendering = on; }
   /// Renders made so far: sensors at one place with one field of view count once.
-  std::size_t render_count() const noexcept { return render_count_; }
+  std::size_t render_count() const noexcept { return rig_.render_count() + spectator_count_; }
 
   /// Renders any camera at the present time (a map, a spectator). Images live until the next call.
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) {
-    if (Status s = pose_avatars(); !s) return s;
-    if (Status s = render_into(camera, outputs, spectator_); !s) return s;
+    if (Status s = scene_.pose(0, world_.time()); !s) return s;
+    RenderConfig rc = config_.render;
+    rc.outputs = outputs;
+    rig_.renderer().set_config(rc);
+    ++spectator_count_;
+    if (Status s = rig_.renderer().render(scene_.sets(0), std::span(&camera, 1), spectator_); !s) return s;
     return &spectator_;
   }
 
- private:
-  struct Group {  // sensors that share a camera
-    std::vector<std::size_t> sensors;
-    unsigned outputs = 0;
-    Frames<float> frames;
-  };
+  /// The goal of ImageNav: what an agent at the episode's goal sees, turned by goal_rotation(), with nobody about. The
+  /// images are in the sensors' order and live until the next call. Errors: invalid_argument before reset; rendering.
+  Result<std::span<const Observation>> goal_images() {
+    const WorldState& s = world_.state();
+    if (!s.running) return {Errc::invalid_argument, "goal_images before reset: no episode is running"};
+    const SensorView view{s.goal.position, goal_rotation(s.episode), 0.0, noise_seed(config_.seed, s),
+                          scene_.assets(), &config_.render, 0};
+    rig_.resize(goal_buffers_, 1);
+    if (Status e = rig_.render(std::span(&view, 1), goal_buffers_); !e) return e;
+    goal_images_ = images_;
+    for (std::size_t i = 0; i < images_.size(); ++i) goal_images_[i].data = rig_.image(goal_buffers_, i, 0);
+    return std::span<const Observation>(goal_images_);
+  }
 
-  Simulator(B& backend, World world, SimulatorConfig config, std::vector<SceneAsset> assets,
-            std::shared_ptr<const std::vector<AvatarActor>> avatars)
+ private:
+  Simulator(B& backend, World world, SimulatorConfig config, std::shared_ptr<const SimulatorScene> scene)
       : world_(std::move(world)),
         config_(std::move(config)),
-        assets_(std::move(assets)),
-        avatars_(std::move(avatars)),
-        renderer_(backend) {
-    for (const SceneAsset& a : assets_) {
-      arrays_.emplace_back(backend, *a.cloud);
-      sets_.push_back(arrays_.back().set(a.world_from_asset));
+        scene_(backend, std::move(scene)),
+        rig_(backend, config_.sensors) {
+    config_.render = scene_.render_config(config_.render);
+    for (const SensorSpec& s : config_.sensors) {
+      images_.push_back({s.uuid, s.kind, s.resolution[0], s.resolution[1], channels_of(s.kind), {}});
     }
-    for (const AvatarActor& actor : *avatars_) skins_.emplace_back(backend, actor.asset());
-    if (!assets_.empty()) config_.render.sort_order = assets_.front().cloud->sort_order;
-    for (std::size_t i = 0; i < config_.sensors.size(); ++i) {
-      const SensorSpec& spec = config_.sensors[i];
-      Group* group = nullptr;
-      for (Group& g : groups_) {
-        if (same_camera(config_.sensors[g.sensors.front()], spec)) group = &g;
-      }
-      if (group == nullptr) group = &groups_.emplace_back();
-      group->sensors.push_back(i);
-      group->outputs |= output_of(spec.kind);
-      images_.push_back({config_.sensors[i].uuid,
-                         spec.kind,
-                         spec.resolution[0],
-                         spec.resolution[1],
-                         spec.kind == SensorKind::rgb ? 3 : 1,
-                         {}});
-    }
-  }
-
-  static Status check(const SimulatorScene& scene, const SimulatorConfig& config) {
-    const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, what); };
-    if (scene.navmesh == nullptr) return bad("SimulatorScene.navmesh is null");
-    for (std::size_t i = 0; i < scene.assets.size(); ++i) {
-      if (scene.assets[i].cloud == nullptr)
-        return bad("SimulatorScene.assets[" + std::to_string(i) + "].cloud is null");
-    }
-    if (Status s = validate(config.task); !s) return s;
-    if (Status s = validate(config.render); !s) return s;
-    for (std::size_t i = 0; i < config.sensors.size(); ++i) {
-      if (Status s = validate(config.sensors[i]); !s) return s;
-      for (std::size_t j = 0; j < i; ++j) {
-        if (config.sensors[i].uuid == config.sensors[j].uuid) {
-          return bad("SensorSpec.uuid \"" + config.sensors[i].uuid + "\" is used twice");
-        }
-      }
-    }
-    return {};
-  }
-
-  static unsigned output_of(SensorKind kind) noexcept {
-    return kind == SensorKind::rgb ? kRgb : (kind == SensorKind::depth ? kMedianDepth : kAlpha);
-  }
-
-  static std::span<const float> image_of(SensorKind kind, const Frames<float>& f) noexcept {
-    return kind == SensorKind::rgb ? f.rgb : (kind == SensorKind::depth ? f.median_depth : f.alpha);
-  }
-
-  Status pose_avatars() {
-    if (posed_ && posed_time_ == world_.time()) return {};
-    sets_.resize(assets_.size());
-    for (std::size_t i = 0; i < skins_.size(); ++i) {
-      if (Status s = skins_[i].pose((*avatars_)[i], world_.time()); !s) return s;
-      sets_.push_back(skins_[i].set());
-    }
-    posed_ = true;
-    posed_time_ = world_.time();
-    return {};
-  }
-
-  Status render_into(const Camera& camera, unsigned outputs, Frames<float>& frames) {
-    RenderConfig rc = config_.render;
-    rc.outputs = outputs;
-    renderer_.set_config(rc);
-    ++render_count_;
-    return renderer_.render(sets_, std::span(&camera, 1), frames);
   }
 
   World world_;
   SimulatorConfig config_;
-  std::vector<SceneAsset> assets_;
-  std::shared_ptr<const std::vector<AvatarActor>> avatars_;
-  Renderer<float, B> renderer_;
-  std::vector<GaussianArrays<B>> arrays_;
-  std::vector<SkinnedGaussians<B>> skins_;
-  std::vector<GaussianSet> sets_;  // assets first, then avatars
-  std::vector<Group> groups_;
-  std::vector<Observation> images_;
+  SceneOnBackend<B> scene_;
+  SensorRig<B> rig_;
+  SensorImages buffers_, goal_buffers_;
+  std::vector<Observation> images_, goal_images_;
   Frames<float> spectator_;
-  std::size_t render_count_ = 0;
-  double posed_time_ = 0.0;
-  bool posed_ = false;
+  std::size_t spectator_count_ = 0;
 };
 
 /// Simulator<B>::create with B deduced.

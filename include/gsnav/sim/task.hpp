@@ -4,11 +4,26 @@
 #include <cstdint>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/sim/reward.hpp"
 
 namespace gsnav {
 
 /// What an agent can do in one control period. Numbers are Habitat's.
-enum class Action : std::uint8_t { stop = 0, move_forward = 1, turn_left = 2, turn_right = 3 };
+enum class Action : std::uint8_t {
+  stop = 0,
+  move_forward = 1,
+  turn_left = 2,
+  turn_right = 3,
+  look_up = 4,    ///< tilts the sensors, not the body
+  look_down = 5,
+};
+
+/// The other way to act: velocities held for one control period.
+struct VelocityCommand {
+  double linear = 0.0;   ///< metres a second, forward
+  double angular = 0.0;  ///< radians a second, positive to the left
+  bool stop = false;     ///< ends the episode, as Action::stop does
+};
 
 /// The agent's body and motion, and when an episode ends. Defaults are PointNav v1's.
 struct TaskConfig {
@@ -16,11 +31,14 @@ struct TaskConfig {
   double agent_height = 1.5;      ///< metres
   double forward_step = 0.25;     ///< metres a move_forward
   double turn_angle = 10.0;       ///< degrees a turn
+  double tilt_angle = 15.0;       ///< degrees a look; sensors tilt by 90 degrees at most
   bool allow_sliding = true;      ///< along walls and avatars; otherwise a move stops at the first
   double control_period = 0.25;   ///< seconds an action takes: avatars walk on meanwhile
+  int substeps = 1;               ///< parts of a control period in each of which bodies move along lines
   int max_steps = 500;            ///< actions, stop excluded, after which the episode is cut off
   double success_distance = 0.2;  ///< metres: stop nearer than this succeeds
   double skin = 1e-4;             ///< metres that a stopped move keeps from an avatar
+  RewardConfig reward{};
 
   /// The settings of the PointNav v2 challenge that do not concern noise.
   static TaskConfig pointnav_v2() noexcept {
@@ -28,8 +46,18 @@ struct TaskConfig {
     c.agent_radius = 0.18;
     c.agent_height = 0.88;
     c.turn_angle = 30.0;
+    c.tilt_angle = 30.0;
     c.allow_sliding = false;
     c.success_distance = 0.36;
+    return c;
+  }
+
+  /// PointNav among people: whoever comes near is charged. An action wholly inside somebody's space costs what a step
+  /// forward earns, meeting somebody twice that.
+  static TaskConfig avatar_pointnav() noexcept {
+    TaskConfig c;
+    c.reward.proximity = 0.25;
+    c.reward.collision = 0.5;
     return c;
   }
 };

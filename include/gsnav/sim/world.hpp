@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <memory>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "gsnav/nav/step.hpp"
@@ -19,6 +22,7 @@ struct AgentPose {
   Vec3d position{};
   double yaw = 0.0;
   PolyId poly = kNoPoly;
+  double pitch = 0.0;  ///< of the sensors, radians, positive upwards; the body stays upright
 
   Quatd rotation() const noexcept { return yaw_rotation(yaw); }
   Vec3d forward() const noexcept { return {-std::sin(yaw), 0.0, -std::cos(yaw)}; }
@@ -34,12 +38,26 @@ struct StepInfo {
   double moved = 0.0;            ///< metres, straight
   /// Smallest distance to any avatar during the step, metres; infinity with none.
   double avatar_clearance = std::numeric_limits<double>::infinity();
+  double reward = 0.0;  ///< see RewardConfig
 };
 
 /// The goal as the agent senses it.
 struct PointGoal {
   double distance = 0.0;  ///< straight, on the ground plane, metres
   double angle = 0.0;     ///< radians to the left of forward, in (-pi, pi]
+};
+
+/// All that changes while a World runs. A copy is a place to come back to.
+struct WorldState {
+  PointNavEpisode episode;
+  AgentPose agent;
+  NavPoint goal;  ///< the episode's, on the surface
+  StepInfo last;
+  EpisodeTracker tracker;
+  double time = 0.0, start_time = 0.0;  ///< seconds on the scene's clock
+  double distance_to_goal = std::numeric_limits<double>::infinity();  ///< along the surface, metres
+  int steps = 0;
+  bool done = true, stop_called = false, running = false;
 };
 
 /// The task without pictures: an agent on a NavMesh among moving bodies, one episode after the other.
@@ -61,44 +79,71 @@ class World {
   /// Acts for one control period; `stop` ends the episode and takes no time. Errors: invalid_argument
   /// before reset or after the end; what CapsuleSet::create reports.
   Result<StepInfo> step(Action action);
+  /// The same by velocities: the arc that they describe, its chord taken in each substep.
+  Result<StepInfo> step(const VelocityCommand& command);
+  /// The same among bodies that the caller made for all who share them: [substeps], set k over
+  /// [tick(k), tick(k + 1)]. Errors also: invalid_argument for another number of sets.
+  Result<StepInfo> step(Action action, std::span<const CapsuleSet* const> bodies);
 
-  bool done() const noexcept { return done_; }
+  bool done() const noexcept { return s_.done; }
+  /// The episode is over because stop was called; else, where done, because it was cut off.
+  bool stop_called() const noexcept { return s_.stop_called; }
   /// Metrics as if the episode ended now; final once done().
   EpisodeMetrics metrics() const;
   /// Metres to the goal along the surface; infinity where cut off.
-  double distance_to_goal() const;
+  double distance_to_goal() const noexcept { return s_.distance_to_goal; }
   PointGoal point_goal() const noexcept;
 
-  double time() const noexcept { return time_; }
-  const AgentPose& agent() const noexcept { return agent_; }
-  const StepInfo& last_step() const noexcept { return last_; }
-  const PointNavEpisode& episode() const noexcept { return episode_; }
+  double time() const noexcept { return s_.time; }
+  /// Where substep k of the next action begins, seconds; k = substeps: where the action ends.
+  double tick(int k) const noexcept;
+  const AgentPose& agent() const noexcept { return s_.agent; }
+  const StepInfo& last_step() const noexcept { return s_.last; }
+  const PointNavEpisode& episode() const noexcept { return s_.episode; }
   const TaskConfig& config() const noexcept { return config_; }
   const NavMesh& navmesh() const noexcept { return *navmesh_; }
+
+  /// What is needed to come back here: set_state() makes everything that follows happen again, bit for bit.
+  const WorldState& state() const noexcept { return s_; }
+  /// `state` comes from a World of the same NavMesh, settings and bodies.
+  void set_state(const WorldState& state) { s_ = state; }
+  /// Puts the agent somewhere else on the surface; no time passes and nothing is counted. Errors: nothing_navigable
+  /// off the NavMesh or on an island without the goal; invalid_argument (not finite; no episode is running).
+  Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0);
 
   /// The bodies over [t0, t1]. A policy may look ahead with it; avatars are scripted, so this is what
   /// will happen.
   Result<CapsuleSet> bodies(double t0, double t1) const;
+  /// Query 1: how far the agent is from the nearest body now. Errors: what CapsuleSet::create reports.
+  Result<Clearance> clearance() const;
+  /// Query 2: what the next action would do, without doing it: the code of step() on the same bodies.
+  /// Errors: as step.
+  Result<StepInfo> probe(Action action) const;
   /// The agent as nav::step takes it.
   AgentState agent_state() const noexcept {
-    return {agent_.position, config_.agent_radius, config_.agent_height, agent_.poly};
+    return {s_.agent.position, config_.agent_radius, config_.agent_height, s_.agent.poly};
   }
 
  private:
+  struct Motion;  // what an action asks of the body in a substep
   World(std::shared_ptr<const NavMesh> navmesh, const TaskConfig& config, BodySource bodies)
       : navmesh_(std::move(navmesh)), config_(config), source_(std::move(bodies)) {}
+
+  Status ready() const;
+  Result<Motion> motion_of(Action action) const;
+  Result<StepInfo> stop();
+  Result<StepInfo> make_bodies_and_move(const Motion& motion);
+  StepInfo move(const Motion& motion, std::span<const CapsuleSet* const> bodies);
+  void merge_distances(const CapsuleSet& bodies);
+  void measure_distance();
 
   std::shared_ptr<const NavMesh> navmesh_;
   TaskConfig config_;
   BodySource source_;
-  PointNavEpisode episode_;
-  AgentPose agent_;
-  StepInfo last_;
-  EpisodeTracker tracker_;
-  std::vector<double> distances_;
-  double time_ = 0.0, start_time_ = 0.0;
-  int steps_ = 0;
-  bool done_ = true, stop_called_ = false, running_ = false;
+  WorldState s_;
+  // Least distance to each avatar during the present action, by the avatar's number.
+  std::vector<double> approach_, distances_;
+  std::vector<std::uint32_t> avatars_;
 };
 
 }  // namespace gsnav

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// An evaluation over ranks: mpirun -n 4 nav_eval_mpi --episodes 100. Episodes are scattered, each is journalled to disk
+// as it ends, metrics are gathered in the order of episodes: the same numbers for any number of ranks. Started again,
+// with any number of them, it plays what is missing.
+#include <mpi.h>
+
+#include <cstdio>
+#include <exception>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "../../tools/eval/run.hpp"
+
+namespace {
+
+using gsnav::Status;
+
+/// MPI for as long as it lives.
+struct Ranks {
+  Ranks(int* argc, char*** argv) {
+    MPI_Init(argc, argv);
+    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &count);
+  }
+  ~Ranks() { MPI_Finalize(); }
+  Ranks(const Ranks&) = delete;
+  Ranks& operator=(const Ranks&) = delete;
+
+  /// The first rank's numbers, everywhere.
+  void share(std::vector<unsigned long>& numbers) const {
+    unsigned long n = numbers.size();
+    MPI_Bcast(&n, 1, MPI_UNSIGNED_LONG, 0, MPI_COMM_WORLD);
+    numbers.resize(n);
+    MPI_Bcast(numbers.data(), static_cast<int>(n), MPI_UNSIGNED_LONG, 0, MPI_COMM_WORLD);
+  }
+
+  /// All ranks' text, in their order, at the first.
+  std::string gather(const std::string& own) const {
+    const int size = static_cast<int>(own.size());
+    std::vector<int> sizes(static_cast<std::size_t>(count)), at(static_cast<std::size_t>(count));
+    MPI_Gather(&size, 1, MPI_INT, sizes.data(), 1, MPI_INT, 0, MPI_COMM_WORLD);
+    for (std::size_t i = 1; i < at.size(); ++i) at[i] = at[i - 1] + sizes[i - 1];
+    std::string all(rank == 0 ? static_cast<std::size_t>(at.back() + sizes.back()) : 0, '\0');
+    MPI_Gatherv(own.data(), size, MPI_CHAR, all.data(), sizes.data(), at.data(), MPI_CHAR, 0, MPI_COMM_WORLD);
+    return all;
+  }
+
+  int rank = 0, count = 1;
+};
+
+Status run(const Ranks& ranks, const gsnav_eval::Options& o) {
+  auto journal = gsnav_eval::Journal::open(o.out, o, ranks.rank);
+  if (!journal) return journal.status();
+  const auto stage = gsnav_eval::prepare(o);
+  if (!stage) return stage.status();
+  std::vector<unsigned long> missing;
+  if (ranks.rank == 0) {
+    for (std::size_t i = 0; i < stage->episodes.size(); ++i) {
+      if (!journal->records().contains(i)) missing.push_back(i);
+    }
+  }
+  ranks.share(missing);
+
+  auto world = gsnav::World::create(stage->scene->navmesh, stage->config.task, [&](double t0, double t1, auto& out) {
+    gsnav::append_bodies(*stage->scene, t0, t1, out);
+  });
+  if (!world) return world.status();
+  std::string lines;
+  for (std::size_t k = static_cast<std::size_t>(ranks.rank); k < missing.size(); k += static_cast<std::size_t>(ranks.count)) {
+    auto record = gsnav_eval::play(*world, o, stage->episodes[missing[k]], missing[k]);
+    if (!record) return record.status();
+    lines += gsnav_eval::line_of(*record) + '\n';
+    if (Status s = journal->add(std::move(*record)); !s) return s;
+  }
+  const std::string all = ranks.gather(lines);
+  if (ranks.rank != 0) return {};
+  std::map<std::size_t, gsnav_eval::Record> records = journal->records();
+  for (std::size_t at = 0, end; (end = all.find('\n', at)) != std::string::npos; at = end + 1) {
+    auto record = gsnav_eval::record_of(all.substr(at, end - at));
+    if (!record) return record.status();
+    records.insert_or_assign(record->episode, std::move(*record));
+  }
+  std::vector<gsnav::EpisodeMetrics> metrics;
+  for (const auto& [number, record] : records) metrics.push_back(record.metrics);
+  const gsnav::MetricsSummary s = gsnav::summarize(metrics);
+  std::printf("%zu episodes (%zu played by %d ranks): SR %.17g SPL %.17g SoftSPL %.17g STL %.17g DTG %.17g CR %.17g PSI %.17g\n",
+              s.episodes, missing.size(), ranks.count, s.success_rate, s.spl, s.soft_spl, s.stl, s.distance_to_goal,
+              s.collision_rate, s.psi);
+  return {};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Ranks ranks(&argc, &argv);
+  gsnav_eval::Options o;
+  CLI::App app{"Evaluates a policy over MPI ranks, to the journal of gsnav-eval, which makes the page of it."};
+  gsnav_eval::add_world_options(app, o);
+  CLI11_PARSE(app, argc, argv);
+  Status s;
+  try {
+    s = run(ranks, o);
+  } catch (const std::exception& e) {
+    s = {gsnav::Errc::out_of_memory, e.what()};
+  }
+  if (s) return 0;
+  std::fprintf(stderr, "nav_eval_mpi, rank %d: %s\n", ranks.rank, s.message().c_str());
+  MPI_Abort(MPI_COMM_WORLD, 1);  // the others wait for what this one will not send
+  return 1;
+}

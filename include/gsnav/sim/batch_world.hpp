@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gsnav/sim/world.hpp"
+
+namespace gsnav {
+
+/// What happens to an environment whose episode has ended: Gymnasium's AutoresetMode.
+enum class AutoReset : std::uint8_t {
+  next_step,  ///< the next step ignores its action and begins an episode: reward 0, neither terminated nor truncated
+  same_step,  ///< an episode begins in the step that ended one; BatchInfo::finished has the last metrics
+  disabled,   ///< it waits for reset(mask)
+};
+
+/// An episode and the number of the scene that it takes place in.
+struct BatchEpisode {
+  std::size_t scene = 0;
+  PointNavEpisode episode;
+};
+
+/// Gives environment `environment` its `count`-th episode, from 0. Called by one thread, in order of environments.
+using EpisodeSource = std::function<Result<BatchEpisode>(std::size_t environment, std::size_t count)>;
+
+/// What one step did in all environments, [N] each. Valid until the next call.
+struct BatchInfo {
+  std::span<const double> rewards;
+  std::span<const std::uint8_t> terminated;  ///< stop ended the episode
+  std::span<const std::uint8_t> truncated;   ///< it was cut off
+  std::span<const StepInfo> infos;           ///< of the action; with AutoReset::same_step also where it was the last
+  std::span<const PointGoal> point_goals;    ///< as now observed, so of a new episode where one has begun
+  std::span<const double> times;             ///< seconds on the scenes' clocks
+  std::span<const std::size_t> finished;     ///< environments whose episode ended in this step, rising
+  std::span<const EpisodeMetrics> final_metrics;  ///< of each of `finished`
+};
+
+/// A scene without pictures, shared by environments.
+struct BatchScene {
+  std::shared_ptr<const NavMesh> navmesh;
+  World::BodySource bodies;
+};
+
+/// Worlds that step together. Those in one scene over one interval share the bodies of that interval, which are made
+/// once; all else is what each World does, bit for bit, for any number of threads.
+class BatchWorld {
+ public:
+  /// Runs f(i) for i in [0, n), in any order and by any threads.
+  using ParallelFor = std::function<void(std::size_t n, const std::function<void(std::size_t)>& f)>;
+
+  /// Errors: invalid_argument (a setting; no scene; no environment; no source).
+  static Result<BatchWorld> create(std::vector<BatchScene> scenes, const TaskConfig& config, AutoReset auto_reset,
+                                   std::size_t environments, EpisodeSource next_episode);
+
+  std::size_t size() const noexcept { return environments_.size(); }
+  AutoReset auto_reset() const noexcept { return auto_reset_; }
+  const World& world(std::size_t e) const noexcept { return *environments_[e].world; }
+  std::size_t scene_of(std::size_t e) const noexcept { return environments_[e].scene; }
+  /// Whether the last call stepped or reset environment e.
+  bool moved(std::size_t e) const noexcept { return environments_[e].moved; }
+  const BatchInfo& info() const noexcept { return info_; }
+
+  /// Begins the next episode everywhere or where mask[e] is not 0. Errors name the environment: what the source and
+  /// World::reset report; invalid_argument (a mask of another size, or one before the first reset).
+  Status reset(const ParallelFor& run, std::span<const std::uint8_t> mask = {});
+  /// One action for each. With same_step, `before_reset` is called where episodes ended, when info().finished is
+  /// known and their worlds are still as they ended. Errors name the environment: invalid_argument; what World::step
+  /// reports; what the callback does.
+  Status step(const ParallelFor& run, std::span<const Action> actions, const std::function<Status()>& before_reset = {});
+
+ private:
+  struct Environment {
+    std::optional<World> world;
+    std::size_t scene = 0, episodes = 0;
+    std::vector<const CapsuleSet*> bodies;  // [substeps]
+    Status status;
+    bool moved = false;
+  };
+  /// Bodies that a substep of an environment needs.
+  struct Need {
+    std::size_t scene;
+    double t0, t1;
+    std::size_t environment, substep;
+  };
+
+  BatchWorld() = default;
+  Status begin(const ParallelFor& run, std::span<const std::size_t> which);
+  Status make_bodies(const ParallelFor& run, std::span<const std::size_t> which);
+  Status first_error(std::span<const std::size_t> which) const;
+  void note_observation(std::size_t e);
+  void publish();
+
+  std::vector<BatchScene> scenes_;
+  TaskConfig config_;
+  AutoReset auto_reset_ = AutoReset::next_step;
+  EpisodeSource next_episode_;
+  std::vector<Environment> environments_;
+  bool begun_ = false;
+
+  std::vector<Need> needs_;
+  std::vector<std::size_t> firsts_;  // of each distinct need
+  std::vector<Result<CapsuleSet>> bodies_;
+  std::vector<std::size_t> stepping_, resetting_, finished_;
+  std::vector<BatchEpisode> episodes_;
+  std::vector<EpisodeMetrics> final_metrics_;
+  std::vector<double> rewards_, times_;
+  std::vector<std::uint8_t> terminated_, truncated_;
+  std::vector<StepInfo> infos_;
+  std::vector<PointGoal> point_goals_;
+  BatchInfo info_;
+};
+
+}  // namespace gsnav

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gsnav/scene/renderer.hpp"
+#include "gsnav/sim/cube_map.hpp"
+#include "gsnav/sim/semantic.hpp"
+#include "gsnav/sim/sensor.hpp"
+
+namespace gsnav {
+
+/// One who looks: where it stands, what there is to see, and which row of the images is its own.
+struct SensorView {
+  Vec3d base{};              ///< world, metres
+  Quatd rotation{};
+  double pitch = 0.0;        ///< radians
+  std::uint64_t noise = 0;   ///< decides what noise models draw
+  std::span<const GaussianSet> sets;
+  const RenderConfig* config = nullptr;  ///< outputs are chosen by the sensors
+  std::size_t row = 0;
+};
+
+/// The images of all sensors for a number of rows.
+struct SensorImages {
+  std::size_t rows = 0;
+  std::vector<std::vector<float>> buffers;
+};
+
+/// The sensors of a body. Whoever carries the same sensors can be drawn in one batch; sensors at one place with one field
+/// of view share a render.
+template <Backend B>
+class SensorRig {
+ public:
+  /// `sensors` are valid.
+  SensorRig(B& backend, std::vector<SensorSpec> sensors) 
+      : backend_(&backend), sensors_(std::move(sensors)), renderer_(backend), semantic_(backend) {
+    for (std::size_t i = 0; i < sensors_.size(); ++i) {
+      Group* group = nullptr;
+      for (Group& g : groups_) {
+        if (same_camera(sensors_[g.sensor], sensors_[i])) group = &g;
+      }
+      if (group == nullptr) {
+        group = &groups_.emplace_back();
+        group->sensor = i;
+        if (sensors_[i].model != SensorModel::pinhole) group->cube = std::make_shared<const CubeMap>(sensors_[i]);
+      }
+      const auto kind = static_cast<std::size_t>(sensors_[i].kind);
+      if (group->buffer[kind] == kNone) group->buffer[kind] = add_buffer(i);
+      Output out{group->buffer[kind], group->buffer[kind]};
+      if (sensors_[i].noise.kind != NoiseKind::none) out.noisy = add_buffer(i);
+      outputs_.push_back(out);
+    }
+  }
+
+  const std::vector<SensorSpec>& sensors() const noexcept { return sensors_; }
+  /// The image of a sensor in one row, [height][width][channels].
+  std::span<const float> image(const SensorImages& images, std::size_t sensor, std::size_t row) const noexcept {
+    const std::size_t n = size_[outputs_[sensor].noisy];
+    return std::span(images.buffers[outputs_[sensor].noisy]).subspan(row * n, n);
+  }
+  /// All rows of a sensor, [rows][height][width][channels].
+  std::span<const float> all(const SensorImages& images, std::size_t sensor) const noexcept {
+    return images.buffers[outputs_[sensor].noisy];
+  }
+  void resize(SensorImages& images, std::size_t rows) const {
+    images.rows = rows;
+    images.buffers.resize(size_.size());
+    for (std::size_t b = 0; b < size_.size(); ++b) images.buffers[b].resize(rows * size_[b]);
+  }
+
+  /// Appends every camera that a view from there needs.
+  void append_cameras(const Vec3d& base, const Quatd& rotation, double pitch, std::vector<Camera>& out) const {
+    for (const Group& g : groups_) {
+      const Camera c = sensor_camera(sensors_[g.sensor], base, rotation, pitch);
+      if (g.cube == nullptr) {
+        out.push_back(c);
+        continue;
+      }
+      for (const std::size_t face : g.cube->faces()) out.push_back(g.cube->face_camera(c, face));
+    }
+  }
+
+  /// Draws all sensors of all views into their rows, in one batch. Errors: what rendering reports.
+  Status render(std::span<const SensorView> views, SensorImages& images) {
+    // Faces of cubes and shares of sets are scratch: so many views at a time that it stays small.
+    const bool scratch = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) {
+      return g.cube != nullptr || g.buffer[kSemantic] != kNone;
+    });
+    const std::size_t most = scratch ? kScratchViews : views.size();
+    for (std::size_t first = 0; first < views.size(); first += most) {
+      if (Status s = render_some(views.subspan(first, std::min(most, views.size() - first)), images); !s) return s;
+    }
+    return {};
+  }
+  /// Renders so far: one for each view and camera (a cube counts one), and one for every three sets that a semantic
+  /// sensor tells apart.
+  std::size_t render_count() const noexcept { return render_count_; }
+  Renderer<float, B>& renderer() noexcept { return renderer_; }
+
+ private:
+  static constexpr std::size_t kNone = ~std::size_t{0}, kScratchViews = 16;
+  static constexpr auto kSemantic = static_cast<std::size_t>(SensorKind::semantic), kKinds = kSemantic + 1;
+  struct Group {  // sensors that share a camera
+    std::size_t sensor = 0;
+    std::array<std::size_t, kKinds> buffer{kNone, kNone, kNone, kNone};
+    std::shared_ptr<const CubeMap> cube;  // none: a pinhole
+  };
+  struct Output {
+    std::size_t clean, noisy;  // buffers; the same without noise
+  };
+
+  std::size_t add_buffer(std::size_t sensor) {
+    const SensorSpec& s = sensors_[sensor];
+    size_.push_back(static_cast<std::size_t>(s.resolution[0]) * static_cast<std::size_t>(s.resolution[1]) *
+                    static_cast<std::size_t>(channels_of(s.kind)));
+    return size_.size() - 1;
+  }
+
+  template <class F>
+  void for_each(std::size_t n, const F& f) {
+    if constexpr (is_host_backend<B>) {
+      backend_->parallel_for(n, f);
+    } else {
+      for (std::size_t i = 0; i < n; ++i) f(i);
+    }
+  }
+
+  static FrameImages<float> frame_images(const std::array<float*, kKinds>& at) noexcept {
+    FrameImages<float> out;
+    out.rgb = at[static_cast<std::size_t>(SensorKind::rgb)];
+    out.median_depth = at[static_cast<std::size_t>(SensorKind::depth)];
+    out.alpha = at[static_cast<std::size_t>(SensorKind::alpha)];
+    return out;
+  }
+
+  Status render_some(std::span<const SensorView> views, SensorImages& images) {
+    cameras_.clear();
+    for (const SensorView& v : views) append_cameras(v.base, v.rotation, v.pitch, cameras_);
+    faces_.resize(groups_.size());
+    jobs_.clear();
+    prepare_shares(views);
+    std::size_t camera = 0;
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      for (std::size_t g = 0; g < groups_.size(); ++g) add_jobs(views, v, g, images, camera);
+    }
+    stats_.assign(jobs_.size(), {});
+    if (Status s = renderer_.render(jobs_, stats_); !s) return s;
+    for_each(views.size(), [&](std::size_t v) { finish(views[v], v, images); });
+    for (const Shares& s : shares_) {
+      const std::span<float> out(row(images, s.buffer, views[s.view].row), size_[s.buffer]);
+      label_pixels(s.images, views[s.view].sets.size(), out);
+    }
+    return {};
+  }
+
+  /// Scratch for the passes of semantic sensors.
+  void prepare_shares(std::span<const SensorView> views) {
+    shares_.clear();
+    share_configs_.clear();
+    if (std::none_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.buffer[kSemantic] != kNone; })) return;
+    std::size_t most = 0;
+    for (const SensorView& v : views) {
+      for (const GaussianSet& set : v.sets) most = std::max(most, set.gaussians.size);
+    }
+    semantic_.reserve(most);
+    for (const SensorView& v : views) {
+      share_configs_.push_back(*v.config);
+      share_configs_.back().background = {};
+    }
+  }
+
+  /// Appends what group g of view v needs; `camera` is the place of its first camera, then of the next group's.
+  void add_jobs(std::span<const SensorView> views, std::size_t v, std::size_t g, SensorImages& images, std::size_t& camera) {
+    const Group& group = groups_[g];
+    const auto add = [&](const std::array<float*, kKinds>& at) {
+      jobs_.push_back({views[v].sets, &cameras_[camera++], views[v].config, frame_images(at)});
+    };
+    std::array<float*, kKinds> at{};
+    if (group.cube == nullptr) {
+      bool any = false;
+      for (std::size_t k = 0; k < kSemantic; ++k) {
+        if (group.buffer[k] != kNone) at[k] = row(images, group.buffer[k], views[v].row);
+        any = any || at[k] != nullptr;
+      }
+      if (group.buffer[kSemantic] != kNone) add_shares(views, v, group, camera);
+      if (!any) {
+        ++camera;
+        return;
+      }
+      ++render_count_;
+      return add(at);
+    }
+    ++render_count_;
+    const std::size_t pixels = face_pixels(*group.cube);
+    for (std::size_t k = 0; k < kKinds; ++k) {
+      const std::size_t n = group.buffer[k] != kNone ? views.size() * CubeMap::kFaces * pixels * channels(k) : 0;
+      if (v == 0) faces_[g][k].resize(n);
+    }
+    for (const std::size_t face : group.cube->faces()) {
+      for (std::size_t k = 0; k < kKinds; ++k) {
+        at[k] = group.buffer[k] != kNone ? faces_[g][k].data() + (v * CubeMap::kFaces + face) * pixels * channels(k) : nullptr;
+      }
+      add(at);
+    }
+  }
+
+  void add_shares(std::span<const SensorView> views, std::size_t v, const Group& group, std::size_t camera) {
+    Shares s{v, group.buffer[kSemantic], {}, {}};
+    for (std::size_t pass = 0; pass < SemanticPasses<B>::count(views[v].sets.size()); ++pass) {
+      s.sets.push_back(semantic_.recolored(views[v].sets, pass));
+      FrameImages<float> out;
+      out.rgb = s.images.emplace_back(SemanticPasses<B>::kChannels * size_[s.buffer]).data();
+      jobs_.push_back({s.sets.back(), &cameras_[camera], &share_configs_[v], out});
+      ++render_count_;
+    }
+    shares_.push_back(std::move(s));
+  }
+
+  /// What follows rendering, for one view: sampling cubes, cutting depth at the far plane, noise.
+  void finish(const SensorView& view, std::size_t v, SensorImages& images) {
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const Group& group = groups_[g];
+      for (std::size_t k = 0; k < kSemantic; ++k) {
+        if (group.buffer[k] == kNone) continue;
+        const std::span<float> out(row(images, group.buffer[k], view.row), size_[group.buffer[k]]);
+        if (group.cube != nullptr) sample(*group.cube, faces_[g][k].data(), v, k, out);
+        if (k != static_cast<std::size_t>(SensorKind::depth)) continue;
+        const double far_plane = sensors_[group.sensor].far_plane;
+        for (float& z : out) z = static_cast<double>(z) > far_plane ? 0.0f : z;
+      }
+    }
+    for (std::size_t i = 0; i < sensors_.size(); ++i) {
+      const NoiseModel& noise = sensors_[i].noise;
+      if (noise.kind == NoiseKind::none) continue;
+      const std::size_t n = size_[outputs_[i].clean];
+      const std::span<const float> clean(row(images, outputs_[i].clean, view.row), n);
+      const std::span<float> out(row(images, outputs_[i].noisy, view.row), n);
+      const std::uint64_t seed = view.noise + 0x9e3779b97f4a7c15ull * (i + 1);
+      if (noise.kind == NoiseKind::redwood_depth) {
+        redwood_depth(noise, seed, sensors_[i].resolution[0], sensors_[i].resolution[1], clean, out);
+      } else {
+        std::copy(clean.begin(), clean.end(), out.begin());
+        add_gaussian_noise(noise, seed, out);
+      }
+    }
+  }
+
+  void sample(const CubeMap& cube, const float* faces, std::size_t v, std::size_t kind, std::span<float> out) const {
+    const std::size_t step = face_pixels(cube) * channels(kind);
+    std::array<const float*, CubeMap::kFaces> at{};
+    for (std::size_t f = 0; f < CubeMap::kFaces; ++f) at[f] = faces + (v * CubeMap::kFaces + f) * step;
+    if (kind == static_cast<std::size_t>(SensorKind::depth)) {
+      cube.sample_depth(at, out);
+    } else {
+      cube.sample_color(at, channels(kind), out);
+    }
+  }
+
+  float* row(SensorImages& images, std::size_t buffer, std::size_t r) const noexcept {
+    return images.buffers[buffer].data() + r * size_[buffer];
+  }
+  static std::size_t channels(std::size_t kind) noexcept {
+    return static_cast<std::size_t>(channels_of(static_cast<SensorKind>(kind)));
+  }
+  static std::size_t face_pixels(const CubeMap& cube) noexcept {
+    return static_cast<std::size_t>(cube.side()) * static_cast<std::size_t>(cube.side());
+  }
+
+  /// How much each set is of each pixel of one view.
+  struct Shares {
+    std::size_t view, buffer;
+    std::vector<std::vector<GaussianSet>> sets;  // of each pass
+    std::vector<std::vector<float>> images;
+  };
+
+  B* backend_;
+  std::vector<SensorSpec> sensors_;
+  Renderer<float, B> renderer_;
+  SemanticPasses<B> semantic_;
+  std::vector<Shares> shares_;
+  std::vector<RenderConfig> share_configs_;  // of each view
+  std::vector<Group> groups_;
+  std::vector<Output> outputs_;      // of each sensor
+  std::vector<std::size_t> size_;    // values in a row of each buffer
+  std::vector<Camera> cameras_;
+  std::vector<FrameJob<float>> jobs_;
+  std::vector<RenderStats> stats_;
+  std::vector<std::array<std::vector<float>, kKinds>> faces_;  // [group][kind][view][face]
+  std::size_t render_count_ = 0;
+};
+
+}  // namespace gsnav

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/io/habitat_dataset.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "file.hpp"
+#include "json.hpp"
+
+namespace gsnav::io {
+namespace {
+
+namespace fs = std::filesystem;
+using detail::Json;
+using detail::member;
+using detail::shown;
+
+constexpr const char* kStage = ".stage_config.json";
+constexpr const char* kScene = ".scene_instance.json";
+
+Result<Json> load_object(const fs::path& path) {
+  const auto file = detail::read_file(path);
+  if (!file) return file.status();
+  auto json = detail::parse_json(file->span(), path.string());
+  if (json && !json->is_object()) {
+    return {Errc::invalid_file, path.string() + ": is " + shown(*json) + ", must be an object"};
+  }
+  return json;
+}
+
+/// Keys that change nothing here, each with the file that had it first.
+class LeftOut {
+ public:
+  void add(const Json& object, const std::set<std::string_view>& known, const std::string& at) {
+    for (const auto& [key, value] : object.items()) {
+      if (!known.contains(key)) first_.emplace(key, at);
+    }
+  }
+  void report(std::vector<std::string>& warnings) const {
+    for (const auto& [key, at] : first_) warnings.push_back(at + ": '" + key + "' is left out");
+  }
+
+ private:
+  std::map<std::string, std::string> first_;
+};
+
+/// Text of `key`; empty where it is missing.
+Result<std::string> text(const Json& object, const char* key, const std::string& at) {
+  const Json* v = member(object, key);
+  if (v == nullptr) return std::string();
+  if (!v->is_string()) return {Errc::invalid_file, at + ": '" + key + "' is " + shown(*v) + ", must be a text"};
+  return v->get<std::string>();
+}
+
+Status vec3(const Json& object, const char* key, const std::string& at, Vec3d& out) {
+  if (member(object, key) == nullptr) return {};
+  const auto v = detail::get_numbers(object, key, 3, at);
+  if (!v) return v.status();
+  out = {(*v)[0], (*v)[1], (*v)[2]};
+  return {};
+}
+
+Status read_scale(const Json& object, const std::string& at, double& out) {
+  const Json* v = member(object, "scale");
+  if (v == nullptr) return {};
+  std::vector<double> s;
+  for (const Json& x : v->is_array() ? *v : Json::array({*v})) s.push_back(x.is_number() ? x.get<double>() : NAN);
+  for (const double x : s) {
+    if (!(x > 0) || !std::isfinite(x)) return {Errc::invalid_file, at + ": 'scale' is " + shown(*v) + ", must be positive"};
+    if (x != s[0]) return {Errc::unsupported, at + ": 'scale' differs by axis; one for all is read"};
+  }
+  if (s.size() != 1 && s.size() != 3) return {Errc::invalid_file, at + ": 'scale' must be one number or three"};
+  out = s[0];
+  return {};
+}
+
+/// What `object` says about a stage on top of what `out` has; assets lie beside `folder`.
+Status read_stage(const Json& object, const fs::path& folder, const std::string& at, StageConfig& out, LeftOut& left_out) {
+  for (const auto& [key, to] : {std::pair{"render_asset", &out.render_asset}, std::pair{"collision_asset", &out.collision_asset}}) {
+    const auto name = text(object, key, at);
+    if (!name) return name.status();
+    if (!name->empty()) *to = fs::path(*name).is_absolute() ? fs::path(*name) : (folder / *name).lexically_normal();
+  }
+  for (const auto& [key, to] : {std::pair{"up", &out.up}, std::pair{"front", &out.front}, std::pair{"origin", &out.origin}}) {
+    if (Status s = vec3(object, key, at, *to); !s) return s;
+  }
+  for (const auto& [key, v] : {std::pair{"up", out.up}, std::pair{"front", out.front}}) {
+    if (!(norm(v) > 0)) return {Errc::invalid_file, at + ": '" + key + "' is zero"};
+  }
+  if (std::abs(dot(out.up, out.front)) > 1e-3 * norm(out.up) * norm(out.front)) {
+    return {Errc::invalid_file, at + ": 'up' and 'front' are not at right angles"};
+  }
+  if (member(object, "units_to_meters") != nullptr) {
+    const auto v = detail::get_number(object, "units_to_meters", at);
+    if (!v) return v.status();
+    if (!(*v > 0)) return {Errc::invalid_file, at + ": 'units_to_meters' must be positive"};
+    out.units_to_meters = *v;
+  }
+  if (Status s = read_scale(object, at, out.scale); !s) return s;
+  if (const Json* v = member(object, "norm_quaternion"); v != nullptr) {
+    if (!v->is_boolean()) return {Errc::invalid_file, at + ": 'norm_quaternion' is " + shown(*v) + ", must be true or false"};
+    out.norm_quaternion = v->get<bool>();
+  }
+  left_out.add(object, {"render_asset", "collision_asset", "up", "front", "origin", "units_to_meters", "scale", "norm_quaternion"}, at);
+  return {};
+}
+
+/// `name` matches a pattern in which `*` stands for any text.
+bool matches(std::string_view pattern, std::string_view name) {
+  const std::size_t star = pattern.find('*');
+  if (star == std::string_view::npos) return pattern == name;
+  if (!name.starts_with(pattern.substr(0, star))) return false;
+  for (std::size_t skip = star; skip <= name.size(); ++skip) {
+    if (matches(pattern.substr(star + 1), name.substr(skip))) return true;
+  }
+  return false;
+}
+
+/// Folders and files that a path with patterns stands for, sorted.
+std::vector<fs::path> expanded(const fs::path& folder, const fs::path& pattern) {
+  std::vector<fs::path> found{pattern.is_absolute() ? pattern.root_path() : folder};
+  for (const fs::path& part : pattern.is_absolute() ? pattern.relative_path() : pattern) {
+    std::vector<fs::path> next;
+    for (const fs::path& at : found) {
+      if (part.string().find('*') == std::string::npos) {
+        if (fs::exists(at / part)) next.push_back(at / part);
+        continue;
+      }
+      if (!fs::is_directory(at)) continue;
+      for (const auto& entry : fs::directory_iterator(at)) {
+        if (matches(part.string(), entry.path().filename().string())) next.push_back(entry.path());
+      }
+    }
+    found = std::move(next);
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::string name_of(const fs::path& file, std::string_view ending) {
+  std::string name = file.filename().string();
+  if (name.ends_with(ending)) name.resize(name.size() - ending.size());
+  return name;
+}
+
+class DatasetReader {
+ public:
+  explicit DatasetReader(const fs::path& path) : folder_(path.parent_path()), at_(path.string()), path_(path) {}
+
+  Result<HabitatDataset> run() {
+    const auto json = load_object(path_);
+    if (!json) return json.status();
+    left_out_.add(*json, {"stages", "scene_instances", "navmesh_instances"}, at_);
+    std::vector<fs::path> stages, scenes;
+    if (Status s = files(*json, "stages", kStage, stages); !s) return s;
+    if (Status s = files(*json, "scene_instances", kScene, scenes); !s) return s;
+    if (Status s = read_stages(*json, stages); !s) return s;
+    if (Status s = read_navmeshes(*json); !s) return s;
+    for (const fs::path& file : scenes) {
+      if (Status s = read_scene(file); !s) return s;
+    }
+    if (scenes.empty()) {
+      for (const auto& [name, stage] : stages_) {
+        HabitatScene scene;
+        scene.name = name;
+        scene.file = stage.file;
+        scene.stage = stage;
+        if (const auto found = navmeshes_.find(name); found != navmeshes_.end()) scene.navmesh = found->second;
+        out_.scenes.push_back(std::move(scene));
+      }
+    }
+    std::sort(out_.scenes.begin(), out_.scenes.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+    left_out_.report(out_.warnings);
+    return std::move(out_);
+  }
+
+ private:
+  /// The files that `paths` of a part of the dataset stands for.
+  Status files(const Json& json, const char* part, const std::string& ending, std::vector<fs::path>& out) {
+    const Json* section = member(json, part);
+    if (section == nullptr) return {};
+    const std::string at = at_ + ": " + part;
+    if (!section->is_object()) return {Errc::invalid_file, at + " is " + shown(*section) + ", must be an object"};
+    left_out_.add(*section, {"paths", "default_attributes"}, at);
+    const Json* paths = member(*section, "paths");
+    if (paths == nullptr) return {};
+    if (!paths->is_object()) return {Errc::invalid_file, at + ": 'paths' is " + shown(*paths) + ", must be an object"};
+    const Json* list = member(*paths, ".json");
+    left_out_.add(*paths, {".json"}, at + ": paths");
+    if (list == nullptr) return {};
+    if (!list->is_array()) return {Errc::invalid_file, at + ": paths['.json'] is " + shown(*list) + ", must be an array"};
+    for (const Json& p : *list) {
+      if (!p.is_string()) return {Errc::invalid_file, at + ": paths['.json'] has " + shown(p) + ", must have paths"};
+      for (const fs::path& found : expanded(folder_, p.get<std::string>())) {
+        if (!fs::is_directory(found)) {
+          if (found.filename().string().ends_with(ending)) out.push_back(found);
+          continue;
+        }
+        for (const fs::path& file : expanded(found, "*" + ending)) out.push_back(file);
+      }
+    }
+    return {};
+  }
+
+  Status read_stages(const Json& json, const std::vector<fs::path>& files) {
+    StageConfig defaults;
+    if (const Json* section = member(json, "stages"); section != nullptr && member(*section, "default_attributes") != nullptr) {
+      const std::string at = at_ + ": stages.default_attributes";
+      if (Status s = read_stage(*member(*section, "default_attributes"), folder_, at, defaults, left_out_); !s) return s;
+    }
+    for (const fs::path& file : files) {
+      const auto stage = load_object(file);
+      if (!stage) return stage.status();
+      StageConfig config = defaults;
+      config.file = file;
+      if (Status s = read_stage(*stage, file.parent_path(), file.string(), config, left_out_); !s) return s;
+      if (config.render_asset.empty()) return {Errc::invalid_file, file.string() + ": 'render_asset' is missing"};
+      stages_[name_of(file, kStage)] = std::move(config);
+    }
+    return {};
+  }
+
+  Status read_navmeshes(const Json& json) {
+    const Json* section = member(json, "navmesh_instances");
+    if (section == nullptr) return {};
+    if (!section->is_object()) {
+      return {Errc::invalid_file, at_ + ": 'navmesh_instances' is " + shown(*section) + ", must be an object"};
+    }
+    for (const auto& [name, path] : section->items()) {
+      if (!path.is_string()) {
+        return {Errc::invalid_file, at_ + ": navmesh_instances['" + name + "'] is " + shown(path) + ", must be a path"};
+      }
+      navmeshes_[name] = (folder_ / path.get<std::string>()).lexically_normal();
+    }
+    return {};
+  }
+
+  /// A stage by its handle: a name, maybe with folders before it and an ending.
+  const StageConfig* stage(const std::string& handle) const {
+    const auto found = stages_.find(name_of(fs::path(handle), kStage));
+    return found == stages_.end() ? nullptr : &found->second;
+  }
+
+  Status read_scene(const fs::path& file) {
+    const auto json = load_object(file);
+    if (!json) return json.status();
+    const std::string at = file.string();
+    HabitatScene scene;
+    scene.file = file;
+    scene.name = name_of(file, kScene);
+    const Json* instance = member(*json, "stage_instance");
+    if (instance == nullptr) return {Errc::invalid_file, at + ": 'stage_instance' is missing"};
+    const auto handle = text(*instance, "template_name", at + ": stage_instance");
+    if (!handle) return handle.status();
+    const StageConfig* found = stage(*handle);
+    if (found == nullptr) {
+      return {Errc::file_not_found, at + ": stage_instance.template_name '" + *handle + "': the dataset has no such stage"};
+    }
+    scene.stage = *found;
+    left_out_.add(*instance, {"template_name"}, at + ": stage_instance");
+
+    const auto navmesh = text(*json, "navmesh_instance", at);
+    if (!navmesh) return navmesh.status();
+    if (!navmesh->empty()) {
+      const auto entry = navmeshes_.find(*navmesh);
+      scene.navmesh = entry != navmeshes_.end() ? entry->second : (file.parent_path() / *navmesh).lexically_normal();
+      if (entry == navmeshes_.end() && !fs::exists(scene.navmesh)) {
+        return {Errc::file_not_found, at + ": navmesh_instance '" + *navmesh + "': neither in the dataset's navmesh_instances nor a file"};
+      }
+    }
+    auto avatars = load_avatar_scene(file);
+    if (!avatars) return avatars.status();
+    for (const std::string& w : avatars->warnings) out_.warnings.push_back(w);
+    scene.avatars = std::move(*avatars);
+    left_out_.add(*json, {"stage_instance", "navmesh_instance", "gaussian_avatars", "avatars", "time_max", "time_loop"}, at);
+    out_.scenes.push_back(std::move(scene));
+    return {};
+  }
+
+  fs::path folder_;
+  std::string at_;
+  fs::path path_;
+  HabitatDataset out_;
+  LeftOut left_out_;
+  std::map<std::string, StageConfig> stages_;
+  std::map<std::string, fs::path> navmeshes_;
+};
+
+}  // namespace
+
+Similarity StageConfig::world_from_asset() const noexcept {
+  // The asset's right, up and back become the world's x, y and z.
+  const Vec3d y = normalized(up), z = -normalized(front), x = cross(y, z);
+  Similarity out;
+  out.rotation = quat_from_matrix(Mat3d{{x, y, z}});
+  out.scale = units_to_meters * scale;
+  out.translation = -(rotate(out.rotation, origin) * out.scale);
+  return out;
+}
+
+const HabitatScene* HabitatDataset::find(const std::string& name) const noexcept {
+  const std::string file = fs::path(name).filename().string();
+  for (const HabitatScene& s : scenes) {
+    if (s.name == name || s.file == fs::path(name) || s.name == file || s.file.filename() == file ||
+        s.stage.file.filename() == file || s.stage.render_asset.filename() == file) {
+      return &s;
+    }
+  }
+  return nullptr;
+}
+
+Result<StageConfig> load_stage_config(const fs::path& path) {
+  return detail::guarded(path.string(), [&]() -> Result<StageConfig> {
+    const auto json = load_object(path);
+    if (!json) return json.status();
+    StageConfig out;
+    LeftOut ignored;
+    out.file = path;
+    if (Status s = read_stage(*json, path.parent_path(), path.string(), out, ignored); !s) return s;
+    if (out.render_asset.empty()) return {Errc::invalid_file, path.string() + ": 'render_asset' is missing"};
+    return out;
+  });
+}
+
+Result<HabitatDataset> load_habitat_dataset(const fs::path& path) {
+  return detail::guarded(path.string(), [&] { return DatasetReader(path).run(); });
+}
+
+}  // namespace gsnav::io

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/sim/batch_world.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+namespace gsnav {
+namespace {
+
+Status bad(std::string what) { return {Errc::invalid_argument, std::move(what)}; }
+
+/// No exception may leave a parallel region.
+template <class F>
+Status guarded(const F& f) noexcept {
+  try {
+    return f();
+  } catch (const Error& e) {
+    return {e.code(), e.what()};
+  } catch (const std::exception& e) {
+    return {Errc::out_of_memory, e.what()};
+  }
+}
+
+}  // namespace
+
+Result<BatchWorld> BatchWorld::create(std::vector<BatchScene> scenes, const TaskConfig& config, AutoReset auto_reset,
+                                      std::size_t environments, EpisodeSource next_episode) {
+  if (Status s = validate(config); !s) return s;
+  if (scenes.empty()) return bad("BatchWorld: no scene");
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    if (scenes[i].navmesh == nullptr) return bad("BatchWorld: scene " + std::to_string(i) + " has no NavMesh");
+  }
+  if (environments == 0) return bad("BatchWorld: environments = 0: must be >= 1");
+  if (!next_episode) return bad("BatchWorld: no source of episodes");
+  BatchWorld b;
+  b.scenes_ = std::move(scenes);
+  b.config_ = config;
+  b.auto_reset_ = auto_reset;
+  b.next_episode_ = std::move(next_episode);
+  b.environments_.resize(environments);
+  for (Environment& e : b.environments_) e.bodies.resize(static_cast<std::size_t>(config.substeps));
+  b.rewards_.resize(environments);
+  b.times_.resize(environments);
+  b.terminated_.resize(environments);
+  b.truncated_.resize(environments);
+  b.infos_.resize(environments);
+  b.point_goals_.resize(environments);
+  return b;
+}
+
+Status BatchWorld::first_error(std::span<const std::size_t> which) const {
+  for (const std::size_t e : which) {
+    const Status& s = environments_[e].status;
+    if (!s) return {s.code(), "environment " + std::to_string(e) + ": " + s.message()};
+  }
+  return {};
+}
+
+void BatchWorld::note_observation(std::size_t e) {
+  const World& w = *environments_[e].world;
+  point_goals_[e] = w.point_goal();
+  times_[e] = w.time();
+}
+
+void BatchWorld::publish() {
+  info_ = {rewards_, terminated_, truncated_, infos_, point_goals_, times_, finished_, final_metrics_};
+}
+
+Status BatchWorld::begin(const ParallelFor& run, std::span<const std::size_t> which) {
+  episodes_.resize(environments_.size());
+  for (const std::size_t i : which) {
+    Environment& e = environments_[i];
+    const std::string at = "environment " + std::to_string(i) + ": ";
+    Result<BatchEpisode> next = next_episode_(i, e.episodes);
+    if (!next) return {next.code(), at + next.message()};
+    if (next->scene >= scenes_.size()) {
+      return bad(at + "episode \"" + next->episode.id + "\" is in scene " + std::to_string(next->scene) + " of " +
+                 std::to_string(scenes_.size()));
+    }
+    if (!e.world || e.scene != next->scene) {
+      Result<World> w = World::create(scenes_[next->scene].navmesh, config_, scenes_[next->scene].bodies);
+      if (!w) return w.status();
+      e.world.emplace(std::move(*w));
+    }
+    e.scene = next->scene;
+    ++e.episodes;
+    episodes_[i] = std::move(*next);
+  }
+  run(which.size(), [&](std::size_t k) {
+    Environment& e = environments_[which[k]];
+    e.status = guarded([&] { return e.world->reset(episodes_[which[k]].episode); });
+    e.moved = true;
+    if (e.status.ok()) note_observation(which[k]);
+  });
+  return first_error(which);
+}
+
+Status BatchWorld::reset(const ParallelFor& run, std::span<const std::uint8_t> mask) {
+  if (!mask.empty() && mask.size() != size()) {
+    return bad("reset: a mask of " + std::to_string(mask.size()) + " for " + std::to_string(size()) + " environments");
+  }
+  if (!mask.empty() && !begun_) return bad("reset: the first one is of all environments");
+  begun_ = false;  // until all has gone well
+  finished_.clear();
+  final_metrics_.clear();
+  resetting_.clear();
+  for (std::size_t e = 0; e < size(); ++e) {
+    environments_[e].moved = false;
+    if (mask.empty() || mask[e] != 0) resetting_.push_back(e);
+  }
+  if (Status s = begin(run, resetting_); !s) return s;
+  for (const std::size_t e : resetting_) {
+    rewards_[e] = 0.0;
+    terminated_[e] = truncated_[e] = 0;
+    infos_[e] = environments_[e].world->last_step();
+  }
+  begun_ = true;
+  publish();
+  return {};
+}
+
+Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size_t> which) {
+  static const CapsuleSet nobody;
+  needs_.clear();
+  for (const std::size_t i : which) {
+    Environment& e = environments_[i];
+    for (std::size_t k = 0; k < e.bodies.size(); ++k) {
+      e.bodies[k] = &nobody;
+      const int at = static_cast<int>(k);
+      if (scenes_[e.scene].bodies) needs_.push_back({e.scene, e.world->tick(at), e.world->tick(at + 1), i, k});
+    }
+  }
+  const auto key = [](const Need& n) { return std::tie(n.scene, n.t0, n.t1); };
+  std::sort(needs_.begin(), needs_.end(), [&](const Need& a, const Need& b) { return key(a) < key(b); });
+  firsts_.clear();
+  for (std::size_t n = 0; n < needs_.size(); ++n) {
+    if (n == 0 || key(needs_[n]) != key(needs_[n - 1])) firsts_.push_back(n);
+  }
+  bodies_.assign(firsts_.size(), Status());
+  run(firsts_.size(), [&](std::size_t f) {
+    const Need& n = needs_[firsts_[f]];
+    Status s = guarded([&] {
+      std::vector<DynamicCapsule> capsules;
+      scenes_[n.scene].bodies(n.t0, n.t1, capsules);
+      bodies_[f] = CapsuleSet::create(std::move(capsules), n.t0, n.t1);
+      return bodies_[f].status();
+    });
+    if (!s.ok()) bodies_[f] = std::move(s);
+  });
+  for (std::size_t f = 0; f < firsts_.size(); ++f) {
+    const std::size_t last = f + 1 < firsts_.size() ? firsts_[f + 1] : needs_.size();
+    if (!bodies_[f]) {
+      return {bodies_[f].code(), "scene " + std::to_string(needs_[firsts_[f]].scene) + ": " + bodies_[f].message()};
+    }
+    for (std::size_t n = firsts_[f]; n < last; ++n) {
+      environments_[needs_[n].environment].bodies[needs_[n].substep] = &bodies_[f].value();
+    }
+  }
+  return {};
+}
+
+Status BatchWorld::step(const ParallelFor& run, std::span<const Action> actions,
+                        const std::function<Status()>& before_reset) {
+  if (!begun_) return bad("step before reset: no episodes are running");
+  if (actions.size() != size()) {
+    return bad("step: " + std::to_string(actions.size()) + " actions for " + std::to_string(size()) + " environments");
+  }
+  stepping_.clear();
+  resetting_.clear();
+  for (std::size_t e = 0; e < size(); ++e) {
+    const bool done = environments_[e].world->done();
+    if (done && auto_reset_ == AutoReset::disabled) {
+      return bad("environment " + std::to_string(e) + " is done: reset it first");
+    }
+    (done ? resetting_ : stepping_).push_back(e);
+  }
+  begun_ = false;  // until all has gone well
+  if (Status s = make_bodies(run, stepping_); !s) return s;
+  run(stepping_.size(), [&](std::size_t k) {
+    const std::size_t i = stepping_[k];
+    Environment& e = environments_[i];
+    e.status = guarded([&] { return e.world->step(actions[i], e.bodies).status(); });
+    e.moved = true;
+    infos_[i] = e.world->last_step();
+    rewards_[i] = infos_[i].reward;
+    terminated_[i] = e.world->stop_called() ? 1 : 0;
+    truncated_[i] = e.world->done() && !e.world->stop_called() ? 1 : 0;
+    note_observation(i);
+  });
+  if (Status s = first_error(stepping_); !s) return s;
+  finished_.clear();
+  final_metrics_.clear();
+  for (const std::size_t e : stepping_) {
+    if (!environments_[e].world->done()) continue;
+    finished_.push_back(e);
+    final_metrics_.push_back(environments_[e].world->metrics());
+  }
+  publish();
+  if (Status s = begin(run, resetting_); !s) return s;
+  for (const std::size_t e : resetting_) {
+    rewards_[e] = 0.0;
+    terminated_[e] = truncated_[e] = 0;
+    infos_[e] = environments_[e].world->last_step();
+  }
+  if (auto_reset_ == AutoReset::same_step && !finished_.empty()) {
+    if (before_reset) {
+      if (Status s = before_reset(); !s) return s;
+    }
+    if (Status s = begin(run, finished_); !s) return s;
+  }
+  begun_ = true;
+  return {};
+}
+
+}  // namespace gsnav

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <algorithm>
+
+#include "../io/files.hpp"
+#include "gsnav/io/episode_file.hpp"
+#include "gsnav/io/image_file.hpp"
+#include "gsnav/io/npz_file.hpp"
+#include "support/command.hpp"
+
+using namespace gsnav_test;
+
+namespace {
+
+const std::string kOptions = "--avatars 2 --episodes 3 --max-steps 25 --width 32 --height 24 --out out ";
+
+std::size_t lines(const std::string& text) { return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')); }
+
+}  // namespace
+
+TEST_CASE("an evaluation that was broken off goes on, to the same journal and page") {
+  const TempFolder folder("eval");
+  const auto eval = [&](const std::string& more) { return run_command(GSNAV_EVAL, kOptions + more, folder.path()); };
+  const Outcome whole = eval("--pictures 1");
+  CAPTURE(whole.text);
+  REQUIRE(whole.ok);
+  CHECK(whole.says("3 episodes: SR"));
+  const std::string journal = read_file(folder / "out/journal.jsonl"), page = read_file(folder / "out/index.html");
+  CHECK(lines(journal) == 4);
+  CHECK(contains(page, "data:image/png;base64,"));
+  CHECK(contains(page, "personal space intrusion"));
+  CHECK_FALSE(contains(page, "src=\"http"));
+  CHECK(gsnav::io::load_episodes(folder / "out/episodes.json.gz")->episodes.size() == 3);
+  CHECK(gsnav::io::load_png(folder / "out/episodes/0_strip.png")->width == 4 * 36 + 4);
+
+  // Broken off in the middle of the second episode's line.
+  const std::size_t second = journal.find('\n', journal.find('\n') + 1) + 1;
+  write_file(folder / "out/journal.jsonl", journal.substr(0, second + 20));
+  const Outcome again = eval("--pictures 1");
+  CAPTURE(again.text);
+  REQUIRE(again.ok);
+  CHECK_FALSE(again.says("episode 1/3"));
+  CHECK(again.says("episode 2/3"));
+  CHECK(read_file(folder / "out/journal.jsonl") == journal);
+  CHECK(read_file(folder / "out/index.html") == page);
+
+  const Outcome other = eval("--seed 5");
+  CHECK_FALSE(other.ok);
+  CHECK(other.says("other options"));
+
+  // What was recorded is played again: the agent's own camera, then one that stands.
+  const auto replay = [&](const std::string& more) { return run_command(GSNAV_REPLAY, kOptions + more, folder.path()); };
+  const Outcome own = replay("--episode 0 --frames own --every 5");
+  CAPTURE(own.text);
+  REQUIRE(own.ok);
+  const auto track = gsnav::io::NpzFile::open(folder / "own/track.npz").value();
+  const auto positions = track.read("positions").value();
+  const auto episode = gsnav::io::load_episodes(folder / "out/episodes.json.gz")->episodes[0];
+  CHECK(positions.values[0] == doctest::Approx(episode.start_position.x).epsilon(1e-6));
+  CHECK(positions.values[2] == doctest::Approx(episode.start_position.z).epsilon(1e-6));
+  // The first frame of the strip is what the agent saw at the start.
+  const auto frame = gsnav::io::load_png(folder / "own/00000.png").value();
+  const auto strip = gsnav::io::load_png(folder / "out/episodes/0_strip.png").value();
+  bool same = true;
+  for (std::size_t y = 0; y < 24; ++y) {
+    for (std::size_t x = 0; x < 96; ++x) {
+      same = same && frame.samples[y * 96 + x] == strip.samples[(y + 4) * 3 * static_cast<std::size_t>(strip.width) + 12 + x];
+    }
+  }
+  CHECK(same);
+  CHECK(replay("--episode 0 --frames above --every 10 --eye 5 2.5 4 --target 5 0 4").ok);
+  CHECK(std::filesystem::exists(folder / "above/00010.png"));
+  const Outcome none = replay("--episode 9");
+  CHECK_FALSE(none.ok);
+  CHECK(none.says("--episode 9"));
+}
+
+TEST_CASE("episodes of a file are played by any policy") {
+  const TempFolder folder("eval");
+  std::vector<gsnav::PointNavEpisode> episodes(1);
+  episodes[0].id = "kitchen";
+  episodes[0].start_position = {4.6, 0, 3.6};
+  episodes[0].goal_position = {5.2, 0, 3.2};
+  REQUIRE(gsnav::io::save_episodes(folder / "val.json.gz", episodes).ok());
+  for (const std::string policy : {"greedy", "random"}) {
+    const Outcome out = run_command(GSNAV_EVAL, "--avatars 0 --max-steps 60 --pictures 0 --episode-file val.json.gz --out " +
+                                                    policy + " --policy " + policy, folder.path());
+    CAPTURE(out.text);
+    CHECK(out.ok);
+    CHECK(out.says(policy == "greedy" ? "SR 1.000" : "1 episodes"));
+  }
+  CHECK(run_command(GSNAV_EVAL, "--episode-file none.json --out x", folder.path()).says("none.json"));
+}
+
+#if defined(GSNAV_EVAL_MPI)
+TEST_CASE("any number of ranks gives the same numbers, also where one was killed and the job begins again") {
+  const TempFolder folder("eval");
+  const auto ranks = [&](int n, const std::string& out) {
+    const std::string arguments = "--oversubscribe --allow-run-as-root -n " + std::to_string(n) + " " + quoted(GSNAV_EVAL_MPI) +
+                                  " --avatars 1 --episodes 7 --max-steps 30 --policy random --out " + out;
+    const Outcome run = run_command(GSNAV_MPIEXEC, arguments, folder.path());
+    CAPTURE(run.text);
+    REQUIRE(run.ok);
+    REQUIRE(run.says("7 episodes ("));
+    return run.text.substr(run.text.find("): SR"), run.text.rfind('\n') - run.text.find("): SR"));
+  };
+  const std::string one = ranks(1, "one");
+  CHECK(ranks(4, "four") == one);
+  // As a rank that is killed leaves its journal: its last line cut, and all of it gone that was not yet on disk.
+  const std::string second = read_file(folder / "four/journal.2.jsonl"), third = read_file(folder / "four/journal.3.jsonl");
+  CHECK(lines(second) == 3);  // a header and episodes 2 and 6
+  write_file(folder / "four/journal.2.jsonl", second.substr(0, second.size() - 10));
+  write_file(folder / "four/journal.3.jsonl", third.substr(0, third.find('\n') + 1));
+  CHECK(ranks(3, "four") == one);
+  const Outcome again = run_command(GSNAV_EVAL, "--avatars 1 --episodes 7 --max-steps 30 --policy random --pictures 0 --out four",
+                                    folder.path());
+  CHECK(again.says("7 episodes: SR"));
+  CHECK_FALSE(again.says("episode 1/7"));  // none is missing
+}
+#endif

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+// A batch of environments is its single simulators: the same bits.
+#include <doctest/doctest.h>
+
+#include <cstring>
+
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/sim/batch.hpp"
+#include "sim_scene.hpp"
+
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+BatchConfig small_batch(int height = 16, int width = 24) {
+  BatchConfig c;
+  c.sensors = rgbd_sensors(height, width);
+  c.task.max_steps = 40;
+  return c;
+}
+
+std::vector<std::shared_ptr<const SimulatorScene>> two_scenes() {
+  return {std::make_shared<const SimulatorScene>(peopled_scene(2000)), std::make_shared<const SimulatorScene>(flat_scene())};
+}
+
+/// Episodes that begin anywhere and at different times; every third is in the scene without people.
+Result<BatchEpisode> wandering(std::size_t environment, std::size_t count) {
+  Rng rng(1000 * environment + count);
+  BatchEpisode e;
+  e.scene = (environment + count) % 3 == 2 ? 1 : 0;
+  EpisodeRules rules;
+  rules.max_distance = 8.0;
+  e.episode = generate_episode(*flat_navmesh(), rng, rules).value();
+  e.episode.id = std::to_string(environment) + "/" + std::to_string(count);
+  e.episode.start_time = 0.5 * static_cast<double>(rng.below(8));
+  return e;
+}
+
+Action random_action(Rng& rng) {
+  constexpr Action kActions[] = {Action::move_forward, Action::move_forward, Action::turn_left,
+                                 Action::turn_right,   Action::look_up,      Action::look_down};
+  return rng.below(50) == 0 ? Action::stop : kActions[rng.below(6)];
+}
+
+bool same_bits(std::span<const float> a, std::span<const float> b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+}
+
+bool same_info(const StepInfo& a, const StepInfo& b) {
+  return a.collided == b.collided && a.wall_collision == b.wall_collision && a.capsule_blocked == b.capsule_blocked &&
+         a.avatar_contact == b.avatar_contact && a.pushed_into == b.pushed_into && a.moved == b.moved &&
+         a.avatar_clearance == b.avatar_clearance && a.reward == b.reward;
+}
+
+}  // namespace
+
+TEST_CASE("a batch has the bits of single simulators over 1,000 random steps among people") {
+  const auto scenes = two_scenes();
+  constexpr std::size_t kEnvironments = 4;
+  BatchConfig config = small_batch();
+  config.sensors[0].noise.kind = NoiseKind::gaussian;
+  config.seed = 7;
+  config.pose_slots = 2;  // fewer than there are times
+  OpenMPBackend backend(2), single_backend(1);
+  auto batch = make_batch_simulator(backend, scenes, config, kEnvironments, wandering).value();
+
+  // Each environment by hand: a simulator for each scene.
+  std::vector<std::vector<Simulator<OpenMPBackend>>> single(kEnvironments);
+  std::vector<std::size_t> count(kEnvironments), scene(kEnvironments);
+  for (std::size_t e = 0; e < kEnvironments; ++e) {
+    SimulatorConfig own = config;
+    own.seed = config.seed + e;
+    for (const auto& s : scenes) {
+      single[e].push_back(Simulator<OpenMPBackend>::create(single_backend, s, own).value());
+    }
+  }
+  const auto begin = [&](std::size_t e) {
+    const BatchEpisode next = wandering(e, count[e]++).value();
+    scene[e] = next.scene;
+    return single[e][scene[e]].reset(next.episode).value();
+  };
+  std::size_t wrong = 0, ended = 0, contacts = 0;
+  const auto compare = [&](std::size_t e, const Observations& obs, const BatchStep& out) {
+    wrong += same_bits(obs["rgb"], out.images[0].of(e)) ? 0 : 1;
+    wrong += same_bits(obs["depth"], out.images[1].of(e)) ? 0 : 1;
+    wrong += same_info(obs, out.infos[e]) ? 0 : 1;
+    wrong += obs.time == out.times[e] && obs.point_goal.angle == out.point_goals[e].angle &&
+                     obs.point_goal.distance == out.point_goals[e].distance
+                 ? 0
+                 : 1;
+    contacts += obs.avatar_contact ? 1 : 0;
+  };
+  BatchStep out = batch.reset().value();
+  for (std::size_t e = 0; e < kEnvironments; ++e) compare(e, begin(e), out);
+  Rng rng(5);
+  for (int i = 0; i < 1000; ++i) {
+    std::vector<Action> actions;
+    for (std::size_t e = 0; e < kEnvironments; ++e) actions.push_back(random_action(rng));
+    out = batch.step(actions).value();
+    for (std::size_t e = 0; e < kEnvironments; ++e) {
+      Simulator<OpenMPBackend>& sim = single[e][scene[e]];
+      compare(e, sim.done() ? begin(e) : sim.step(actions[e]).value(), out);
+      const bool done = single[e][scene[e]].done();
+      wrong += done == (out.terminated[e] != 0 || out.truncated[e] != 0) ? 0 : 1;
+    }
+    ended += out.finished.size();
+    REQUIRE(wrong == 0);
+  }
+  CHECK(ended > 60);
+  CHECK(contacts > 0);
+}
+
+namespace {
+
+/// Runs three environments whose episodes are cut off after 2, 3 and 3 actions (the first one stops).
+struct Modes {
+  explicit Modes(AutoReset mode) : config(small_batch(8, 12)) {
+    config.auto_reset = mode;
+    config.task.max_steps = 3;
+    sim.emplace(make_batch_simulator(backend, two_scenes(), config, 3, wandering).value());
+    sim->reset().value();
+  }
+  Result<BatchStep> step(Action first = Action::turn_left) {
+    return sim->step(std::vector<Action>{first, Action::turn_left, Action::turn_left});
+  }
+  OpenMPBackend backend{1};
+  BatchConfig config;
+  std::optional<BatchSimulator<OpenMPBackend>> sim;
+};
+
+}  // namespace
+
+TEST_CASE("next_step: the step after the end ignores its action and begins an episode") {
+  Modes m(AutoReset::next_step);
+  m.step().value();
+  const BatchStep end = m.step(Action::stop).value();
+  CHECK(end.terminated[0] == 1);
+  CHECK(end.truncated[0] == 0);
+  CHECK(end.terminated[1] == 0);
+  REQUIRE(end.finished.size() == 1);
+  CHECK(end.finished[0] == 0);
+  CHECK(end.final_metrics[0].steps == 1);
+  CHECK(end.final_metrics[0].stop_called);
+  CHECK(m.sim->world(0).episode().id == "0/0");
+  const BatchStep next = m.step(Action::move_forward).value();
+  CHECK(m.sim->world(0).episode().id == "0/1");
+  CHECK(next.rewards[0] == 0.0);
+  CHECK(next.terminated[0] == 0);
+  CHECK(next.infos[0].moved == 0.0);
+  CHECK(next.times[0] == m.sim->world(0).episode().start_time);
+  CHECK(next.truncated[1] == 1);
+  CHECK(next.terminated[1] == 0);
+  CHECK(next.finished.size() == 2);
+  CHECK(next.final_images.empty());
+}
+
+TEST_CASE("same_step: an episode begins in the step that ended one, whose last images are kept") {
+  Modes m(AutoReset::same_step);
+  BatchStep last = m.step().value();
+  const std::vector<float> before(last.images[0].of(0).begin(), last.images[0].of(0).end());
+  const double goal_before = last.point_goals[0].distance;
+  const BatchStep end = m.step(Action::stop).value();
+  CHECK(end.terminated[0] == 1);
+  CHECK(m.sim->world(0).episode().id == "0/1");
+  REQUIRE(end.final_images.size() == 2);
+  CHECK(end.final_images[0].environments == 1);
+  CHECK(same_bits(end.final_images[0].of(0), before));  // stop takes no time
+  CHECK_FALSE(same_bits(end.images[0].of(0), before));
+  CHECK(end.point_goals[0].distance != goal_before);
+  CHECK(end.final_metrics[0].euclidean_distance_to_goal >= goal_before);
+  const BatchStep next = m.step().value();
+  CHECK(next.terminated[0] == 0);
+  CHECK(next.finished.size() == 2);
+  CHECK(next.final_images[1].environments == 2);
+  CHECK(m.step().value().final_images.empty());
+}
+
+TEST_CASE("disabled: an environment that is done waits for its reset") {
+  Modes m(AutoReset::disabled);
+  m.step().value();
+  const BatchStep end = m.step(Action::stop).value();
+  CHECK(end.terminated[0] == 1);
+  const auto refused = m.step();
+  CHECK(refused.code() == Errc::invalid_argument);
+  CHECK(refused.message().find("environment 0 is done") != std::string::npos);
+  const std::vector<float> other(end.images[0].of(1).begin(), end.images[0].of(1).end());
+  const BatchStep begun = m.sim->reset(std::vector<std::uint8_t>{1, 0, 0}).value();
+  CHECK(m.sim->world(0).episode().id == "0/1");
+  CHECK(m.sim->world(1).episode().id == "1/0");
+  CHECK(same_bits(begun.images[0].of(1), other));
+  CHECK(begun.terminated[0] == 0);
+  CHECK(m.step().ok());
+}
+
+TEST_CASE("people are skinned once for each time that is looked at, and once for all in a batch") {
+  OpenMPBackend backend(2);
+  const auto together = [](std::size_t e, std::size_t) -> Result<BatchEpisode> {
+    BatchEpisode b;
+    b.episode = to_kitchen();
+    b.episode.start_rotation = yaw_rotation(0.7 * static_cast<double>(e));
+    return b;
+  };
+  const auto apart = [&](std::size_t e, std::size_t count) -> Result<BatchEpisode> {
+    BatchEpisode b = together(e, count).value();
+    b.episode.start_time = 0.25 * static_cast<double>(e / 2);
+    return b;
+  };
+  const auto poses = [&](const EpisodeSource& source) {
+    auto sim = make_batch_simulator(backend, {std::make_shared<const SimulatorScene>(peopled_scene(2000))}, small_batch(),
+                                    10, source)
+                   .value();
+    sim.reset().value();
+    CHECK(sim.render_count() == 10);  // colour and depth share theirs
+    return sim.pose_count();
+  };
+  CHECK(poses(together) == 2);  // two people, one time
+  CHECK(poses(apart) == 10);    // five times
+}
+
+TEST_CASE("what is wrong with a batch is named") {
+  OpenMPBackend backend(1);
+  const auto message = [&](const auto& made) {
+    CHECK(made.code() == Errc::invalid_argument);
+    return made.message();
+  };
+  const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  CHECK(has(message(make_batch_simulator(backend, {}, small_batch(), 2, wandering)), "no scene"));
+  CHECK(has(message(make_batch_simulator(backend, {nullptr}, small_batch(), 2, wandering)), "null"));
+  CHECK(has(message(make_batch_simulator(backend, two_scenes(), small_batch(), 0, wandering)), "environments = 0"));
+  CHECK(has(message(make_batch_simulator(backend, two_scenes(), small_batch(), 2, {})), "source"));
+  BatchConfig config = small_batch();
+  config.pose_slots = 0;
+  CHECK(has(message(make_batch_simulator(backend, two_scenes(), config, 2, wandering)), "pose_slots"));
+
+  auto sim = make_batch_simulator(backend, two_scenes(), small_batch(), 2, wandering).value();
+  CHECK(has(message(sim.step(std::vector<Action>(2, Action::turn_left))), "before reset"));
+  sim.reset().value();
+  CHECK(has(message(sim.step(std::vector<Action>(3, Action::turn_left))), "3 actions for 2"));
+  const std::vector<Action> unknown{Action::turn_left, static_cast<Action>(9)};
+  CHECK(has(message(sim.step(unknown)), "environment 1: action 9"));
+  CHECK(has(message(sim.step(unknown)), "before reset"));
+  CHECK(sim.reset().ok());
+
+  const auto elsewhere = [](std::size_t, std::size_t) -> Result<BatchEpisode> { return BatchEpisode{5, to_kitchen()}; };
+  auto lost = make_batch_simulator(backend, two_scenes(), small_batch(), 1, elsewhere).value();
+  CHECK(has(message(lost.reset()), "scene 5 of 2"));
+}
+
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+TEST_CASE("memory grows with scenes, not with environments") {
+  const auto in_use = [] {
+    const struct mallinfo2 m = mallinfo2();
+    return m.uordblks + m.hblkhd;
+  };
+  OpenMPBackend backend(1);
+  BatchConfig config = small_batch();
+  const auto scene = std::make_shared<const SimulatorScene>(peopled_scene(20000));
+  const auto at_one_time = [](std::size_t, std::size_t) -> Result<BatchEpisode> { return BatchEpisode{0, to_kitchen()}; };
+  const auto bytes = [&](std::size_t environments) {
+    const std::size_t before = in_use();
+    auto sim = make_batch_simulator(backend, {scene}, config, environments, at_one_time).value();
+    sim.reset().value();
+    sim.step(std::vector<Action>(environments, Action::turn_left)).value();
+    return in_use() - before;
+  };
+  bytes(2);
+  const std::size_t few = bytes(8), many = bytes(136);
+  const std::size_t images = 16 * 24 * 4 * sizeof(float);
+  // What 128 more take beyond their images: less than 8 KiB each, where a scene of one's own takes megabytes.
+  CHECK(many - few < 128 * (images + 8192));
+  CHECK(few > 1000000);
+}
+#endif

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// How near avatars come during a tick, against sampling it finely.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "gsnav/core/rng.hpp"
+#include "gsnav/sim/metrics.hpp"
+#include "gsnav/sim/proximity.hpp"
+
+using namespace gsnav;
+
+namespace {
+
+/// Distance of two segments by sampling both: above the truth by half a sample at most.
+double segments(const Vec3d& a0, const Vec3d& a1, const Vec3d& b0, const Vec3d& b1) {
+  double best = 1e30;
+  for (int i = 0; i <= 60; ++i) {
+    const Vec3d p = lerp(a0, a1, i / 60.0);
+    const Vec3d d = b1 - b0;
+    const double t = dot(d, d) > 0 ? std::clamp(dot(p - b0, d) / dot(d, d), 0.0, 1.0) : 0.0;
+    best = std::min(best, norm(p - lerp(b0, b1, t)));
+  }
+  return best;
+}
+
+}  // namespace
+
+TEST_CASE("the least distance to each avatar is that of a fine sampling") {
+  Rng rng(11);
+  const auto somewhere = [&](double spread) {
+    return Vec3d{rng.uniform(-spread, spread), rng.uniform(0.2, 1.7), rng.uniform(-spread, spread)};
+  };
+  int near = 0, bounds = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    std::vector<DynamicCapsule> capsules;
+    for (std::uint32_t avatar = 0; avatar < 3; ++avatar) {
+      const Vec3d base = Vec3d{rng.uniform(-2.5, 2.5), 0, rng.uniform(-2.5, 2.5)};
+      const Vec3d go{rng.uniform(-0.4, 0.4), 0, rng.uniform(-0.4, 0.4)};
+      for (std::uint32_t bone = 0; bone < 6; ++bone) {
+        const Vec3d a = base + somewhere(0.3), b = a + somewhere(0.2) - Vec3d{0, 0.9, 0}, turn = somewhere(0.1) - Vec3d{0, 0.9, 0};
+        capsules.push_back({{{a, b, 0.08}, {a + go, b + go + turn * 0.2, 0.09}}, avatar, bone});
+      }
+    }
+    const CapsuleSet set = CapsuleSet::create(capsules).value();
+    const Vec3d start{0, 0, 0}, corner{rng.uniform(-0.3, 0.3), 0, 0.1}, end = corner + Vec3d{0.1, 0, rng.uniform(-0.2, 0.2)};
+    const std::vector<WalkPoint> path{{start, 0, 0.0}, {corner, 0, 0.4}, {end, 0, 0.9}};
+    std::vector<double> out;
+    closest_approach(path, 0.1, 1.5, set, out);
+    REQUIRE(out.size() == 3);
+    std::vector<double> truth(3, 1e30);
+    for (int i = 0; i <= 400; ++i) {
+      const double u = i / 400.0;
+      const Vec3d at = u < 0.4 ? lerp(start, corner, u / 0.4) : u < 0.9 ? lerp(corner, end, (u - 0.4) / 0.5) : end;
+      for (const DynamicCapsule& c : set.capsules()) {
+        const double r = 0.08 + 0.01 * u;
+        const double d = segments(at + Vec3d{0, 0.1, 0}, at + Vec3d{0, 1.4, 0}, lerp(c.motion.begin.p0, c.motion.end.p0, u),
+                                  lerp(c.motion.begin.p1, c.motion.end.p1, u));
+        truth[c.avatar] = std::min(truth[c.avatar], d - 0.1 - r);
+      }
+    }
+    const double nearest = *std::min_element(truth.begin(), truth.end());
+    for (std::size_t k = 0; k < 3; ++k) {
+      CAPTURE(trial);
+      CAPTURE(k);
+      CHECK(out[k] < truth[k] + 0.01);
+      if (truth[k] < max(kPersonalSpace, nearest + 1e-9)) {
+        CHECK(out[k] > truth[k] - 0.01);
+        ++near;
+      } else {
+        // A bound will do, but it must not come into personal space or before the nearest.
+        CHECK(out[k] >= std::min(kPersonalSpace, truth[k]) - 0.01);
+        CHECK(out[k] >= nearest - 0.01);
+        ++bounds;
+      }
+      CHECK(std::abs(intrusion(out[k]) - intrusion(truth[k])) < 0.011);
+    }
+  }
+  CHECK(near > 30);
+  CHECK(bounds > 30);
+}
+
+TEST_CASE("nobody there") {
+  std::vector<double> out(3);
+  closest_approach({}, 0.1, 1.5, CapsuleSet(), out);
+  CHECK(out.empty());
+}

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// gsnav-replay: an episode of an evaluation once more, from any camera.
+#include <array>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <optional>
+
+#include "gsnav/io/image_file.hpp"
+#include "gsnav/io/npz_file.hpp"
+#include "pictures.hpp"
+
+namespace gsnav_eval {
+namespace {
+
+using gsnav::Errc;
+using gsnav::Status;
+using gsnav::Vec3d;
+namespace fs = std::filesystem;
+
+struct ReplayOptions {
+  std::size_t episode = 0;
+  std::vector<double> eye, target;  // none: the agent's own camera
+  std::string frames = "replay";
+  std::string video;
+  int every = 1;
+};
+
+/// Frames into ffmpeg's standard input.
+class Video {
+ public:
+  Status open(const std::string& path, int width, int height, double rate) {
+    if (path.find_first_of("'\\\n") != std::string::npos) return {Errc::invalid_argument, "--video: quotes in the path"};
+    char command[512];
+    const int n = std::snprintf(command, sizeof command,
+                                "ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s %dx%d -r %g -i - -pix_fmt yuv420p '%s'",
+                                width, height, rate, path.c_str());
+    if (n < 0 || n >= static_cast<int>(sizeof command)) return {Errc::invalid_argument, "--video: the path is too long"};
+    pipe_.reset(popen(command, "w"));
+    if (pipe_ == nullptr) return {Errc::unsupported, "--video: ffmpeg cannot be run"};
+    return {};
+  }
+  Status add(const std::vector<std::uint8_t>& rgb) {
+    if (std::fwrite(rgb.data(), 1, rgb.size(), pipe_.get()) == rgb.size()) return {};
+    return {Errc::unsupported, "--video: ffmpeg takes no frames; is it installed?"};
+  }
+  Status close() {
+    if (pclose(pipe_.release()) == 0) return {};
+    return {Errc::unsupported, "--video: ffmpeg failed; is it installed?"};
+  }
+
+ private:
+  struct Close {
+    void operator()(std::FILE* f) const noexcept { pclose(f); }
+  };
+  std::unique_ptr<std::FILE, Close> pipe_;
+};
+
+/// Where everything was at each step, [T]...
+struct Track {
+  std::vector<double> positions, yaws, times, clearances;
+  Status save(const fs::path& path) const {
+    const std::size_t n = yaws.size();
+    const std::array<gsnav::io::NpzEntry, 4> arrays{{{"positions", {n, 3}, std::span(positions)},
+                                                     {"yaws", {n}, std::span(yaws)},
+                                                     {"times", {n}, std::span(times)},
+                                                     {"avatar_clearance", {n}, std::span(clearances)}}};
+    return gsnav::io::save_npz(path, arrays);
+  }
+};
+
+Status run(const Options& o, const ReplayOptions& r) {
+  const auto journal = Journal::load(o.out, o);
+  if (!journal) return journal.status();
+  const auto found = journal->records().find(r.episode);
+  if (found == journal->records().end()) {
+    return {Errc::invalid_argument, "--episode " + std::to_string(r.episode) + ": the journal has no such episode"};
+  }
+  const auto stage = prepare(o);
+  if (!stage) return stage.status();
+  if (r.episode >= stage->episodes.size()) return {Errc::invalid_argument, "--episode: there are fewer"};
+  std::error_code error;
+  fs::create_directories(r.frames, error);
+  if (error) return {Errc::file_not_found, "--frames " + r.frames + ": " + error.message()};
+  gsnav::OpenMPBackend backend(o.threads);
+  auto sim = Simulator::create(backend, stage->scene, stage->config);
+  if (!sim) return sim.status();
+  std::optional<Video> video;
+  if (!r.video.empty()) {
+    video.emplace();
+    const double rate = 1.0 / (stage->config.task.control_period * r.every);
+    if (Status s = video->open(r.video, o.width, o.height, rate); !s) return s;
+  }
+  Track track;
+  const auto look = [&](Simulator& s, std::size_t step) -> Status {
+    const gsnav::AgentPose& agent = s.agent();
+    track.positions.insert(track.positions.end(), {agent.position.x, agent.position.y, agent.position.z});
+    track.yaws.push_back(agent.yaw);
+    track.times.push_back(s.clock());
+    track.clearances.push_back(s.world().last_step().avatar_clearance);
+    if (step % static_cast<std::size_t>(r.every) != 0) return {};
+    gsnav::Camera camera = gsnav::sensor_camera(stage->config.sensors.front(), agent.position, agent.rotation(), agent.pitch);
+    if (!r.eye.empty()) {
+      const Vec3d eye{r.eye[0], r.eye[1], r.eye[2]}, target{r.target[0], r.target[1], r.target[2]};
+      const Vec3d down = target - eye;
+      const bool steep = std::hypot(down.x, down.z) < 1e-6 * gsnav::norm(down);
+      camera = gsnav::Camera::look_at(eye, target, steep ? Vec3d{0, 0, -1} : Vec3d{0, 1, 0}, o.width, o.height, o.hfov);
+    }
+    const auto frame = s.render(camera);
+    if (!frame) return frame.status();
+    std::vector<std::uint8_t> rgb((*frame)->rgb.size());
+    gsnav::to_bytes((*frame)->rgb, rgb);
+    if (video) return video->add(rgb);
+    char name[32];
+    std::snprintf(name, sizeof name, "%05zu.png", step);
+    return gsnav::io::save_png_rgb8(fs::path(r.frames) / name, rgb, o.width, o.height);
+  };
+  if (Status s = replay(*sim, stage->episodes[r.episode], found->second, look); !s) return s;
+  if (video) {
+    if (Status s = video->close(); !s) return s;
+  }
+  return track.save(fs::path(r.frames) / "track.npz");
+}
+
+}  // namespace
+}  // namespace gsnav_eval
+
+int main(int argc, char** argv) try {
+  gsnav_eval::Options o;
+  gsnav_eval::ReplayOptions r;
+  CLI::App app{
+      "Plays an episode of an evaluation once more, by its recorded actions, and writes what a camera sees as PNG files\n"
+      "and where everything was as track.npz. The options are those that the evaluation was made with."};
+  gsnav_eval::add_world_options(app, o);
+  app.add_option("--episode", r.episode, "its number, from 0")->capture_default_str();
+  app.add_option("--eye", r.eye, "camera that stands, x y z in metres; without: the agent's own")->expected(3);
+  app.add_option("--target", r.target, "where that camera looks")->expected(3)->needs("--eye");
+  app.get_option("--eye")->needs("--target");
+  app.add_option("--frames", r.frames, "folder for pictures and track")->capture_default_str();
+  app.add_option("--video", r.video, "an .mp4 in place of PNG files, by ffmpeg");
+  app.add_option("--every", r.every, "every so many actions a frame")->capture_default_str()->check(CLI::Range(1, 100000));
+  CLI11_PARSE(app, argc, argv);
+  const gsnav::Status s = gsnav_eval::run(o, r);
+  if (!s) std::fprintf(stderr, "gsnav-replay: %s\n", s.message().c_str());
+  return s ? 0 : 1;
+} catch (const std::exception& e) {
+  std::fprintf(stderr, "gsnav-replay: %s\n", e.what());
+  return 1;
+}

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run.hpp"
+
+#include <optional>
+#include <utility>
+
+#include "../../examples/nav_loop/setup.hpp"
+#include "gsnav/io/episode_file.hpp"
+#include "gsnav/sim/follower.hpp"
+#include "gsnav/sim/greedy_follower.hpp"
+#include "gsnav/sim/random_policy.hpp"
+
+namespace gsnav_eval {
+
+using gsnav::Result;
+using gsnav::Status;
+
+Result<Stage> prepare(const Options& o) {
+  auto setup = nav_loop::prepare(o);
+  if (!setup) return setup.status();
+  Stage stage;
+  stage.config.task = o.preset == "v2"       ? gsnav::TaskConfig::pointnav_v2()
+                      : o.preset == "avatar" ? gsnav::TaskConfig::avatar_pointnav()
+                                             : gsnav::TaskConfig{};
+  stage.config.task.max_steps = o.max_steps;
+  stage.config.sensors = gsnav::rgbd_sensors(o.height, o.width, o.hfov, {0, o.eye_height, 0});
+  if (o.episode_file.empty()) {
+    auto made = nav_loop::make_episodes(o, setup->scene, stage.config.task);
+    if (!made) return made.status();
+    stage.episodes = std::move(*made);
+  } else {
+    auto file = gsnav::io::load_episodes(o.episode_file);
+    if (!file) return file.status();
+    for (const std::string& w : file->warnings) std::fprintf(stderr, "%s\n", w.c_str());
+    stage.episodes = std::move(file->episodes);
+  }
+  stage.scene = std::make_shared<const gsnav::SimulatorScene>(std::move(setup->scene));
+  return stage;
+}
+
+Result<Record> play(gsnav::World& world, const Options& o, const gsnav::PointNavEpisode& episode, std::size_t number) {
+  if (Status s = world.reset(episode); !s) return s;
+  Record r;
+  r.episode = number;
+  r.id = episode.id;
+  const gsnav::GeodesicFollower follower;
+  gsnav::RandomPolicy random(o.seed + 0x9e3779b97f4a7c15ull * (number + 1));
+  std::optional<gsnav::GreedyGeodesicFollower> greedy;
+  if (o.policy == "greedy") {
+    gsnav::GreedyFollowerOptions how;
+    how.goal_radius = 0.95 * world.config().success_distance;
+    auto made = gsnav::GreedyGeodesicFollower::make(world.navmesh(), episode.goal_position, world.config(), how);
+    if (!made) return made.status();
+    greedy.emplace(std::move(*made));
+  }
+  while (!world.done()) {
+    gsnav::Action action = gsnav::Action::stop;
+    if (greedy) {
+      const auto next = greedy->next(world.agent());
+      if (!next) return next.status();
+      action = *next;
+    } else {
+      action = o.policy == "random" ? random.next(world) : follower.next(world);
+    }
+    const auto step = world.step(action);
+    if (!step) return step.status();
+    r.reward += step->reward;
+    r.actions.push_back(action);
+  }
+  r.metrics = world.metrics();
+  return r;
+}
+
+}  // namespace gsnav_eval

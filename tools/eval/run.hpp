@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "gsnav/sim/simulator.hpp"
+#include "journal.hpp"
+#include "options.hpp"
+
+namespace gsnav_eval {
+
+/// Where an evaluation takes place.
+struct Stage {
+  std::shared_ptr<const gsnav::SimulatorScene> scene;
+  gsnav::SimulatorConfig config;
+  std::vector<gsnav::PointNavEpisode> episodes;
+};
+
+/// Loads or makes the scene, its NavMesh, people and episodes. Errors name the file or option.
+gsnav::Result<Stage> prepare(const Options& options);
+
+/// Plays episode `number` by the policy, without pictures.
+gsnav::Result<Record> play(gsnav::World& world, const Options& options, const gsnav::PointNavEpisode& episode,
+                           std::size_t number);
+
+}  // namespace gsnav_eval
