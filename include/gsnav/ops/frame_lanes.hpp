@@ -15,7 +15,7 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/ops/render.hpp"
+#include "gsnav/ops/render_composite.hpp"
 
 namespace gsnav {
 
@@ -36,11 +36,11 @@ class FrameLanes {
     return cameras > 1 && cameras >= 2 * concurrency_of(backend);
   }
 
-  /// render_camera() for each of the cameras; images_of(c) gives the FrameImages of camera c. The first
+  /// render_composite() for each of the cameras; images_of(c) gives the FrameImages of camera c. The first
   /// camera's error, by number, is returned; out_of_memory too.
   template <class ImagesOf>
-  Status render(B& backend, std::span<const GaussianSet> sets, std::span<const Camera> cameras,
-                const RenderConfig& config, const ImagesOf& images_of, std::span<RenderStats> stats) {
+  Status render(B& backend, std::span<const GaussianSet> sets, const MeshFrame& meshes,
+                std::span<const Camera> cameras, const RenderConfig& config, const ImagesOf& images_of, std::span<RenderStats> stats) {
     while (lanes_.size() < concurrency_of(backend)) lanes_.push_back(std::make_unique<Lane>(backend));
     std::mutex mutex;
     std::size_t failed = cameras.size();
@@ -48,7 +48,8 @@ class FrameLanes {
     backend.parallel_for(cameras.size(), [&](std::size_t c) {
       Lane& lane = take();
       Status s = guarded([&] {
-        return render_camera<S, B>(lane.backend, lane.workspace, sets, cameras[c], config, images_of(c), &stats[c]);
+        return render_composite<S, B>(lane.backend, lane.workspace, sets, meshes, cameras[c], config, images_of(c),
+                                      &stats[c]);
       });
       lane.taken.store(false, std::memory_order_release);
       if (s.ok()) return;

@@ -7,7 +7,7 @@
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/ops/frame_lanes.hpp"
-#include "gsnav/ops/render.hpp"
+#include "gsnav/ops/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {
@@ -81,6 +81,14 @@ class Renderer {
   const RenderConfig& config() const noexcept { return config_; }
   void set_config(const RenderConfig& config) { config_ = config; }
 
+  /// Meshes that the frames from now on show among the Gaussians (docs/composition.md); none: an empty span. Their
+  /// arrays are in the backend's memory, and must stay there. To move one, set them again: nothing is copied but
+  /// views. On a backend that knows no meshes frames then fail (unsupported).
+  void set_meshes(std::span<const MeshInstance> meshes, const MeshLight& light = {}) {
+    meshes_.assign(meshes.begin(), meshes.end());
+    light_ = light;
+  }
+
   /// Renders all sets, as one sorted list, from each camera; all cameras have one size. `sets` hold
   /// arrays in the backend's memory. Errors: invalid_argument (names the field), backend_failure.
   Result<Frames<S>> render(std::span<const GaussianSet> sets, std::span<const Camera> cameras) {
@@ -119,15 +127,17 @@ class Renderer {
     if constexpr (LaneBackend<B>) {
       if (FrameLanes<S, B>::worth_it(*backend_, cameras.size())) {
         const auto images_of = [&out](std::size_t c) { return host_images(out, c); };
-        if (Status s = lanes_.render(*backend_, sets, cameras, config_, images_of, out.stats); !s) return s;
+        if (Status s = lanes_.render(*backend_, sets, mesh_frame(), cameras, config_, images_of, out.stats); !s) {
+          return s;
+        }
         return backend_->synchronize();
       }
     }
     for (std::size_t c = 0; c < cameras.size(); ++c) {
       FrameImages<S> images = host_images(out, c);
       if constexpr (!is_host_backend<B>) images = device_images(images, pixels);
-      if (Status s = render_camera<S>(*backend_, workspace_, sets, cameras[c], config_, images,
-                                      &out.stats[c]);
+      if (Status s = render_composite<S>(*backend_, workspace_, sets, mesh_frame(), cameras[c], config_, images,
+                                         &out.stats[c]);
           !s) {
         return s;
       }
@@ -157,6 +167,8 @@ class Renderer {
   struct LanesOf<T> {
     using type = FrameLanes<S, T>;
   };
+
+  MeshFrame mesh_frame() const noexcept { return {meshes_, light_}; }
 
   /// Where the images of camera c lie in `out`.
   static FrameImages<S> host_images(Frames<S>& out, std::size_t c) noexcept {
@@ -196,6 +208,8 @@ class Renderer {
 
   B* backend_;
   RenderConfig config_;
+  std::vector<MeshInstance> meshes_;
+  MeshLight light_;
   RenderWorkspace<S, B> workspace_;
   Buffer<S, B> device_images_;
   [[no_unique_address]] typename LanesOf<B>::type lanes_;

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/math/functions.hpp"
+
+namespace gsnav {
+
+/// Checks a set against what kernels assume; names the array that does not fit.
+inline Status validate(const GaussianSet& set) {
+  const GaussianView& g = set.gaussians;
+  const auto bad = [](const std::string& what) {
+    return Status(Errc::invalid_argument, "GaussianSet: " + what);
+  };
+  const auto sized = [&](const View<const float>& v, std::size_t n, const char* name) {
+    return v.size == n ? Status()
+                       : bad(std::string(name) + " has " + std::to_string(v.size) +
+                             " values where " + std::to_string(n) + " are needed");
+  };
+  if (g.sh_degree < 0 || g.sh_degree > kMaxShDegree) {
+    return bad("sh_degree = " + std::to_string(g.sh_degree) + ": must be in [0, 3]");
+  }
+  const bool has_axes = !g.axes[0].empty();
+  for (int k = 0; k < 9 && has_axes; ++k) {
+    if (Status s = sized(g.axes[k], g.size, "axes"); !s) return s;
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (Status s = sized(g.means[k], g.size, "means"); !s) return s;
+    if (has_axes) continue;
+    if (Status s = sized(g.scales[k], g.size, "scales"); !s) return s;
+  }
+  for (int k = 0; k < 4; ++k) {
+    if (!g.sh_rotations[k].empty()) {
+      if (Status s = sized(g.sh_rotations[k], g.size, "sh_rotations"); !s) return s;
+    }
+    if (has_axes) continue;
+    if (Status s = sized(g.quats[k], g.size, "quats"); !s) return s;
+  }
+  if (Status s = sized(g.opacities, g.size, "opacities"); !s) return s;
+  if (Status s = sized(g.sh0, 3 * g.size, "sh0"); !s) return s;
+  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(g.sh_degree) - 1);
+  if (Status s = sized(g.shN, 3 * rest * g.size, "shN"); !s) return s;
+  if (!g.row_ids.empty() && g.row_ids.size != g.size) {
+    return bad("row_ids has " + std::to_string(g.row_ids.size) + " values where " +
+               std::to_string(g.size) + " are needed");
+  }
+  if (!g.chunk_bounds.empty() && g.chunk_bounds.size != g.chunk_count()) {
+    return bad("chunk_bounds has " + std::to_string(g.chunk_bounds.size) + " values where " +
+               std::to_string(g.chunk_count()) + " are needed");
+  }
+  if (!g.origin_ids.empty() && (g.origin_ids.size != g.size || g.origins.empty())) {
+    return bad("origin_ids needs one id per Gaussian and a table of origins");
+  }
+  if (!(set.eps2d > 0) || !is_finite(set.eps2d)) {
+    return bad("eps2d = " + std::to_string(set.eps2d) + ": must be positive");
+  }
+  const Similarity& a = set.world_from_asset;
+  if (!(a.scale > 0) || !is_finite(a.scale) || !is_finite(a.translation) ||
+      !(abs(dot(a.rotation, a.rotation) - 1.0) < 1e-6)) {
+    return bad("world_from_asset must have a unit quaternion, a positive scale and be finite");
+  }
+  return {};
+}
+
+}  // namespace gsnav
