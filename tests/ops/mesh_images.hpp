@@ -42,7 +42,7 @@ MeshPictures<S> draw(B& backend, const std::vector<gsnav::MeshInstance>& meshes,
   instance.resize_discard(pixels);
   triangle.resize_discard(pixels);
   MeshWorkspace<S, B> ws(backend);
-  MeshPictures<S> out;
+  MeshPictures<S> out{};
   const Status s = draw_meshes<S>(backend, ws, std::span<const MeshInstance>(instances), camera, light, tile_size, false,
                                   {color.data(), normal.data(), instance.data(), triangle.data()}, &out.stats);
   s.throw_if_error();

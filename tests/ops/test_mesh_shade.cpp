@@ -26,7 +26,7 @@ double encoded(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-Texture texture(int width, int height, const auto& texel) {
+MeshTexture texture(int width, int height, const auto& texel) {
   std::vector<std::uint8_t> rgba;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -34,7 +34,7 @@ Texture texture(int width, int height, const auto& texel) {
       rgba.push_back(255);
     }
   }
-  return Texture::make(width, height, rgba).value();
+  return MeshTexture::make(width, height, rgba).value();
 }
 
 TEST_CASE("vertex colours are linear in space, not on the screen, and encoded at last") {
@@ -136,7 +136,7 @@ TEST_CASE("what does not fit is named") {
   m.colors.resize(3);
   CHECK(scene.add(m).status().message().find("colors: 3 for 4") != std::string::npos);
   CHECK(scene.size() == 0);
-  CHECK(!Texture::make(2, 2, std::vector<std::uint8_t>(15)));
+  CHECK(!MeshTexture::make(2, 2, std::vector<std::uint8_t>(15)));
   MeshInstance instance;
   instance.world_from_mesh.scale = 0;
   CHECK(validate(instance).message().find("world_from_mesh") != std::string::npos);

@@ -44,6 +44,7 @@ struct MeshWorkspace {
   std::vector<MeshPlacement> host_placements;
   std::vector<MeshChunk> host_vertex_chunks, host_triangle_chunks;
   std::vector<std::uint32_t> host_not_finite;
+  std::vector<std::uint32_t> unhidden;  ///< chunks of Gaussians
 
   std::size_t bytes() const noexcept {
     std::size_t sum = 0;
@@ -73,7 +74,7 @@ struct MeshWorkspace {
     f(a.tile_triangles, b.tile_triangles), f(a.depth, b.depth), f(a.visible, b.visible), f(a.tile_far, b.tile_far);
     f(a.color, b.color), f(a.host_placements, b.host_placements);
     f(a.host_vertex_chunks, b.host_vertex_chunks), f(a.host_triangle_chunks, b.host_triangle_chunks);
-    f(a.host_not_finite, b.host_not_finite);
+    f(a.host_not_finite, b.host_not_finite), f(a.unhidden, b.unhidden);
   }
 };
 

@@ -296,7 +296,16 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
     }
   }
   if (!drawn) {
-    for (const ProjectArgs<S>& args : ws.projections) detail::project_set(backend, args);
+    for (const ProjectArgs<S>& args : ws.projections) {
+      if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
+        if (!mesh.empty()) {
+          std::fill_n(args.counts.data + args.first_chunk, args.chunk_count(), 0u);
+          detail::project_unhidden(backend, args, mesh.tile_far, ws.mesh.unhidden);
+          continue;
+        }
+      }
+      detail::project_set(backend, args);
+    }
     if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, mesh, images, counted); !s) return s;
   }
   stats = counted;

@@ -26,18 +26,18 @@ inline float srgb_decoded(std::uint8_t byte) noexcept {
 }
 
 /// A base-colour texture with its mip chain: each level the mean, in linear light, of what it covers of the finer.
-class Texture {
+class MeshTexture {
  public:
   /// `rgba`: [height][width][4], sRGB-encoded, top row first. Error: invalid_argument (sizes).
-  static Result<Texture> make(int width, int height, std::vector<std::uint8_t> rgba) {
+  static Result<MeshTexture> make(int width, int height, std::vector<std::uint8_t> rgba) {
     constexpr int kLargest = 32768;
     if (width < 1 || height < 1 || width > kLargest || height > kLargest ||
         rgba.size() != 4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
-      return Status(Errc::invalid_argument, "Texture: " + std::to_string(width) + " x " + std::to_string(height) +
+      return Status(Errc::invalid_argument, "MeshTexture: " + std::to_string(width) + " x " + std::to_string(height) +
                                                 " with " + std::to_string(rgba.size()) +
                                                 " bytes: needs four a pixel and sides in [1, 32768]");
     }
-    Texture t;
+    MeshTexture t;
     for (std::size_t i = 0; i < 256; ++i) t.decode_[i] = srgb_decoded(static_cast<std::uint8_t>(i));
     t.width_ = width;
     t.height_ = height;
@@ -95,7 +95,7 @@ struct SurfaceMesh {
   std::vector<Vec3f> normals;   ///< one a vertex, unit; empty: the faces'
   std::vector<Vec3f> colors;    ///< one a vertex, linear RGB; empty: white
   std::vector<Vec2<float>> uvs;  ///< one a vertex, (0, 0) the texture's top left; empty: no texture
-  std::optional<Texture> texture;
+  std::optional<MeshTexture> texture;
   Vec3f base_color{1, 1, 1};    ///< linear RGB
   bool two_sided = false;
 };
