@@ -15,7 +15,7 @@ job=${1:-demo}
 packages=(g++ cmake ninja-build libpng-dev libjpeg-dev libwebp-dev libzstd-dev zlib1g-dev nlohmann-json3-dev
           librecast-dev libcli11-dev)
 if [[ $job == tests || $job == ci ]]; then
-  packages+=(doctest-dev libbenchmark-dev libeigen3-dev libglm-dev libdlpack-dev pkg-config python3)
+  packages+=(doctest-dev libbenchmark-dev libeigen3-dev libglm-dev libdlpack-dev libembree-dev pkg-config python3)
 fi
 if [[ $job == ci ]]; then
   packages+=(clang libomp-dev ccache)

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gsnav/math/pack.hpp"
+#include "gsnav/scene/mesh_scene.hpp"
 #include "ops/backends.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
@@ -36,6 +37,7 @@ class CaseRenderer {
 
   std::string name() const { return name_; }
   static constexpr bool is_float = sizeof(S) == sizeof(float);
+  static constexpr bool composes = gsnav::MeshBackend<B, S>;
   static constexpr double epsilon = is_float ? 0x1p-24 : 0x1p-53;
   /// The bound for the scalar at hand.
   static constexpr double bound(double in_float, double in_double) noexcept {
@@ -45,14 +47,22 @@ class CaseRenderer {
 
   /// Uploads the clouds where the backend has memory of its own, renders, and fetches the images.
   gsnav::Frames<S> render(const std::vector<Placed>& scene, const std::vector<gsnav::Camera>& cameras,
-                          const gsnav::RenderConfig& config) {
+                          const gsnav::RenderConfig& config,
+                          const std::vector<gsnav::MeshInstance>& meshes = {}) {
     std::vector<gsnav::GaussianArrays<B>> arrays;
     std::vector<gsnav::GaussianSet> sets;
     arrays.reserve(scene.size());
     for (const Placed& p : scene) {
       sets.push_back(arrays.emplace_back(*backend_, *p.cloud).set(p.place));
     }
+    std::vector<gsnav::MeshArrays<B>> mesh_arrays;
+    std::vector<gsnav::MeshInstance> instances;
+    mesh_arrays.reserve(meshes.size());
+    for (const gsnav::MeshInstance& m : meshes) {
+      instances.push_back(mesh_arrays.emplace_back(*backend_, m.mesh).instance(m.world_from_mesh, m.id));
+    }
     gsnav::Renderer<S, B> renderer(*backend_, config);
+    renderer.set_meshes(instances);
     return renderer.render(sets, cameras).value();
   }
   gsnav::Frames<S> render(const std::vector<Placed>& scene, const gsnav::Camera& camera,
@@ -90,15 +100,18 @@ void for_each_renderer(const F& f) {
 #endif
 }
 
-/// Renders on every backend; the float32 images must have the serial backend's bits. Calls
-/// check(frames, renderer) for each.
+/// Renders on every backend, with meshes on those that know them; the float32 images must have the serial backend's
+/// bits. Calls check(frames, renderer) for each.
 template <class F>
 void render_everywhere(const std::vector<Placed>& scene, const gsnav::Camera& camera,
-                       const gsnav::RenderConfig& config, const F& check) {
+                       const gsnav::RenderConfig& config, const F& check,
+                       const std::vector<gsnav::MeshInstance>& meshes = {}) {
   gsnav::Frames<float> reference;
   for_each_renderer([&](auto& renderer) {
-    const auto frames = renderer.render(scene, camera, config);
-    if constexpr (std::remove_reference_t<decltype(renderer)>::is_float) {
+    using R = std::remove_reference_t<decltype(renderer)>;
+    if (!R::composes && !meshes.empty()) return;
+    const auto frames = renderer.render(scene, {camera}, config, meshes);
+    if constexpr (R::is_float) {
       if (reference.cameras == 0) reference = frames;
       CHECK(frames.rgb == reference.rgb);
       CHECK(frames.alpha == reference.alpha);

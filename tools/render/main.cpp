@@ -11,6 +11,7 @@
 #include <iterator>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
@@ -20,7 +21,9 @@
 #endif
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/scene/renderer.hpp"
 
 namespace {
@@ -28,7 +31,8 @@ namespace {
 using namespace gsnav;
 
 struct Options {
-  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median";
+  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median", composite = "merged";
+  std::vector<std::string> meshes;
   int width = 0, height = 0, threads = 0;
   double near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0;
   bool npy = false, png = false;
@@ -86,21 +90,32 @@ std::vector<std::uint8_t> depth_picture(const std::vector<float>& metres, const 
 
 template <class S, class B>
 int run(B& backend, const Options& o, const DepthChoice& depth, const GaussianCloud& cloud,
-        const std::vector<Camera>& cameras) {
+        const MeshScene& meshes, const std::vector<Camera>& cameras) {
   RenderConfig config;
   config.outputs = kRgb | kAlpha | depth.output;
   config.profile = o.profile == "fast" ? Profile::fast : Profile::exact;
   config.max_alpha = o.max_alpha;
   config.first_hit_tau = depth.tau;
   config.sort_order = cloud.sort_order;
+  config.composite = o.composite == "merged" ? Composite::merged : Composite::hard_depth;
   Renderer<S, B> renderer(backend, config);
   const GaussianArrays<B> arrays(backend, cloud);
   const std::vector<GaussianSet> sets{arrays.set()};
+  std::vector<MeshArrays<B>> mesh_arrays;
+  std::vector<MeshInstance> instances;
+  mesh_arrays.reserve(meshes.size());
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    instances.push_back(mesh_arrays.emplace_back(backend, meshes.view(i)).instance({}, static_cast<std::uint32_t>(i)));
+  }
+  MeshLight headlight;
+  headlight.unlit = false;
   Frames<S> f;
   double total_ms = 0;
   const bool terminal = isatty(fileno(stdout)) != 0;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const auto start = std::chrono::steady_clock::now();
+    headlight.direction = -cameras[c].viewmat.linear.row[2];
+    renderer.set_meshes(instances, headlight);
     if (const Status s = renderer.render(sets, std::span(&cameras[c], 1), f); !s) {
       std::fprintf(stderr, "gsnav-render: camera %zu: %s\n", c, s.message().c_str());
       return 1;
@@ -176,6 +191,12 @@ int main(int argc, char** argv) {
   app.add_option("--max-alpha", o.max_alpha, "Largest alpha of one Gaussian at a pixel")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
+  app.add_option("--mesh", o.meshes,
+                 "Triangle meshes among the Gaussians (.obj, .ply, .gltf, .glb), in the scene's frame: both sides, grey, "
+                 "lit from the camera (docs/composition.md)");
+  app.add_option("--composite", o.composite, "merged, or hard_depth: Habitat-GS's rule, to compare with")
+      ->check(CLI::IsMember({"merged", "hard_depth"}))
+      ->capture_default_str();
   app.add_option("--threads", o.threads, "Threads of the openmp backend; 0: OMP_NUM_THREADS")
       ->check(CLI::Range(0, 1024));
   app.add_option("--depth-near", o.depth_near, "Depth picture: nearest metre of the colour scale");
@@ -205,6 +226,18 @@ int main(int argc, char** argv) {
   auto scene = io::load_scene(o.scene);
   if (!scene) return fail(scene.message());
   print_report(scene->report);
+  MeshScene meshes;
+  for (const std::string& file : o.meshes) {
+    auto mesh = io::load_mesh(file);
+    if (!mesh) return fail(mesh.message());
+    SurfaceMesh surface;
+    surface.geometry = std::move(*mesh);
+    surface.base_color = {0.5f, 0.5f, 0.5f};
+    surface.two_sided = true;
+    std::printf("%s: %zu triangles\n", file.c_str(), surface.geometry.triangles.size());
+    const auto added = meshes.add(std::move(surface));
+    if (!added) return fail(file + ": " + added.message());
+  }
   auto cameras = io::load_cameras(o.cameras, o.width, o.height);
   if (!cameras) return fail(cameras.message());
   for (Camera& c : *cameras) c.near_plane = o.near_plane;
@@ -213,14 +246,14 @@ int main(int argc, char** argv) {
   if (error) return fail("--out " + o.out + ": " + error.message());
 
   SerialBackend serial;
-  if (o.backend == "serial") return run<float>(serial, o, *depth, scene->cloud, *cameras);
-  if (o.backend == "serial64") return run<double>(serial, o, *depth, scene->cloud, *cameras);
+  if (o.backend == "serial") return run<float>(serial, o, *depth, scene->cloud, meshes, *cameras);
+  if (o.backend == "serial64") return run<double>(serial, o, *depth, scene->cloud, meshes, *cameras);
 #if defined(GSNAV_HAS_CUDA)
   if (o.backend == "cuda") {
     CudaBackend cuda;
-    return run<float>(cuda, o, *depth, scene->cloud, *cameras);
+    return run<float>(cuda, o, *depth, scene->cloud, meshes, *cameras);
   }
 #endif
   OpenMPBackend openmp(o.threads);
-  return run<float>(openmp, o, *depth, scene->cloud, *cameras);
+  return run<float>(openmp, o, *depth, scene->cloud, meshes, *cameras);
 }

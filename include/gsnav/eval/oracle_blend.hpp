@@ -24,11 +24,17 @@ struct OraclePixel {
   std::uint32_t blended = 0, last_rank = 0;
   bool closed = false, undecided = false, undecided_depth = false, order_flip = false;
 
-  /// Blends one Gaussian: 2^log2_alpha is its alpha before max_alpha, depth() its depth along the ray.
+  /// Blends one Gaussian: 2^log2_alpha is its alpha before max_alpha, depth() its depth along the ray, `mesh` how far
+  /// the mesh is.
   template <class Depth>
-  void blend(const OracleRules& rules, double log2_alpha, const Vec3d& c, std::uint32_t rank,
+  void blend(const OracleRules& rules, double log2_alpha, const Vec3d& c, std::uint32_t rank, double mesh,
              const Depth& depth) noexcept {
     const double excess = log2_alpha - rules.log2_alpha_min;
+    if (is_finite(mesh)) {
+      const double beyond = depth() - mesh;
+      if (abs(beyond) < kUndecidedMesh && excess * kLn2 > -kUndecidedRelative) undecided = true;
+      if (beyond > 0) return;
+    }
     if (abs(excess) * kLn2 < kUndecidedRelative) undecided = true;
     if (!(excess >= 0)) return;
     const double alpha = min(rules.max_alpha, std::exp2(log2_alpha));
@@ -49,6 +55,17 @@ struct OraclePixel {
     const double stop = rules.transmittance_min;
     if (abs(transmittance - stop) < kUndecidedRelative * stop) undecided = true;
     closed = transmittance < stop;
+  }
+
+  /// The mesh at depth z takes what is left.
+  void close(const OracleRules& rules, double z, const Vec3d& c) noexcept {
+    const double weight = transmittance;
+    color += c * weight;
+    weights += weight;
+    accumulated += weight * z;
+    if (weight > 0.5) median = z;
+    if (weight > 1 - rules.first_hit_tau) first_hit = z;
+    transmittance = 0;
   }
 
   void write(const OracleRules& rules, OracleFrames& out, std::size_t pixel) const noexcept {
@@ -86,7 +103,8 @@ void blend_in_order(const OracleScene<Model>& scene, View<const std::uint32_t> l
       if (pixel.closed) continue;
       const double px = x + 0.5, py = y + 0.5, log2_alpha = r.model.log2_alpha(px, py);
       if (!(log2_alpha >= scene.log2_cut)) continue;
-      pixel.blend(scene.rules, log2_alpha, r.color, r.rank, [&] { return r.model.depth(px, py); });
+      pixel.blend(scene.rules, log2_alpha, r.color, r.rank, scene.mesh_depth(x, y),
+                  [&] { return r.model.depth(px, py); });
       open -= pixel.closed ? 1 : 0;
     }
   }
@@ -142,7 +160,8 @@ void blend_per_ray(const OracleScene<Model>& scene, View<const std::uint32_t> li
       });
       for (auto f = from; f != to && !pixels[p].closed; ++f) {
         const OracleRecord<Model>& r = scene.records[f->record];
-        pixels[p].blend(scene.rules, f->log2_alpha, r.color, r.rank, [&] { return f->depth; });
+        pixels[p].blend(scene.rules, f->log2_alpha, r.color, r.rank,
+                        scene.mesh_depth(scene.rect.x0 + static_cast<int>(p), y), [&] { return f->depth; });
       }
     }
   }
@@ -164,6 +183,11 @@ OracleCounts blend_row(const OracleScene<Model>& scene, View<const std::uint32_t
     counts.listed += static_cast<std::uint64_t>(span.x1 - span.x0);
   }
   for (std::size_t x = 0; x < pixels.size(); ++x) {
+    const int column = scene.rect.x0 + static_cast<int>(x);
+    if (const double z = scene.mesh_depth(column, y); is_finite(z)) {
+      const double* const c = scene.mesh->rgb.data() + 3 * scene.pixel(column, y);
+      pixels[x].close(scene.rules, z, {c[0], c[1], c[2]});
+    }
     pixels[x].write(scene.rules, out, to * out.width + x);
     counts.evaluations += pixels[x].blended;
     counts.order_flips += pixels[x].order_flip ? 1 : 0;

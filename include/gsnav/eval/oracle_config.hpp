@@ -43,6 +43,12 @@ struct PixelRect {
   }
 };
 
+/// A mesh as an oracle takes it: what each pixel of the camera's image shows of it.
+struct OracleMesh {
+  std::vector<double> depth;  ///< [H][W] planar z, metres; infinity: none
+  std::vector<double> rgb;    ///< [H][W][3], display-referred
+};
+
 /// Which oracle, by which rules.
 struct OracleConfig {
   /// Rules of the image. `outputs`, `profile` and `tile_size` mean nothing here: every image is made, in
@@ -55,6 +61,8 @@ struct OracleConfig {
   /// `untruncated` with boxes leaves alpha < kNegligibleAlpha out.
   bool boxed = true;
   PixelRect crop{};  ///< what to render of the camera's image; all 0: everything
+  /// Hides the Gaussians behind it and closes its pixels (docs/composition.md). Null: none. Must outlive the call.
+  const OracleMesh* mesh = nullptr;
 };
 
 /// Below this the boxes of OracleKind::untruncated leave a Gaussian out. A pixel's colour is linear in each
@@ -67,6 +75,8 @@ inline constexpr double kNegligibleAlpha = 0x1p-40;
 /// from alpha_min and of T from the stop; absolute distance of T from a depth's crossing.
 inline constexpr double kUndecidedRelative = 1e-5;
 inline constexpr double kUndecidedCrossing = 1e-3;
+/// And of a Gaussian's depth along the ray from the mesh's, metres.
+inline constexpr double kUndecidedMesh = 1e-4;
 
 /// What an oracle's image was made of.
 struct OracleCounts {
@@ -96,7 +106,7 @@ struct OracleFrames {
   std::vector<double> accumulated_depth;  ///< [H][W] metres, sum(w z)
   std::vector<double> first_hit_depth;    ///< [H][W] metres, where alpha reaches first_hit_tau; 0: never
   /// A Gaussian met before the stop has alpha within kUndecidedRelative of alpha_min, or one takes T
-  /// within kUndecidedRelative of transmittance_min.
+  /// within kUndecidedRelative of transmittance_min, or one lies within kUndecidedMesh of the mesh.
   std::vector<std::uint8_t> undecided;
   /// A Gaussian takes T within kUndecidedCrossing of 1/2 or of 1 - first_hit_tau.
   std::vector<std::uint8_t> undecided_depth;
@@ -128,6 +138,10 @@ inline Status validate(const OracleConfig& c, const Camera& camera) {
   }
   if (c.rules.compat != Compat::none) {
     return {Errc::unsupported, "OracleConfig.rules.compat: no kind of oracle has other renderers' rules"};
+  }
+  const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  if (c.mesh != nullptr && (c.mesh->depth.size() != pixels || c.mesh->rgb.size() != 3 * pixels)) {
+    return {Errc::invalid_argument, "OracleConfig.mesh: its planes are not of the camera's image"};
   }
   const PixelRect& r = c.crop;
   const bool whole = r.x0 == 0 && r.y0 == 0 && r.x1 == 0 && r.y1 == 0;

@@ -102,6 +102,9 @@ template <Backend B>
 Result<OracleFrames> oracle_photo(B& backend, std::span<const GaussianSet> sets, const Camera& camera, int k,
                                   OracleConfig config = {}) {
   if (Status s = validate(config, camera); !s) return s;
+  if (config.mesh != nullptr) {
+    return Status(Errc::unsupported, "OracleConfig.mesh: its planes have the image's resolution only");
+  }
   if (k < 1 || k > kMaxPhotoFactor || k * std::max(camera.width, camera.height) > kMaxImageSide) {
     return Status(Errc::invalid_argument,
                   std::string("oracle_photo: k = ") + std::to_string(k) +

@@ -142,7 +142,17 @@ struct OracleScene {
   PixelRect rect;
   double log2_cut;  ///< fainter pairs need not be asked
   bool boxed, per_ray;
+  const OracleMesh* mesh;
+  std::size_t image_width;
   OracleCounts counts;
+
+  /// Of the camera's pixel (x, y): the mesh's depth, infinity where there is none.
+  double mesh_depth(int x, int y) const noexcept {
+    return mesh == nullptr ? std::numeric_limits<double>::infinity() : mesh->depth[pixel(x, y)];
+  }
+  std::size_t pixel(int x, int y) const noexcept {
+    return static_cast<std::size_t>(y) * image_width + static_cast<std::size_t>(x);
+  }
 };
 
 struct OracleCandidate {
@@ -202,6 +212,8 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
                  truncated ? c.transmittance_min : 0.0, c.first_hit_tau, c.background};
   scene.rect = oracle_rect(config, camera);
   scene.boxed = config.boxed;
+  scene.mesh = config.mesh;
+  scene.image_width = static_cast<std::size_t>(camera.width);
   scene.per_ray = config.order == OracleOrder::per_ray ||
                   (config.order == OracleOrder::own && config.kind == OracleKind::ray);
   // What falls short of alpha_min by less than the undecided margin has to be seen too.

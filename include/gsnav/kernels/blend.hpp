@@ -6,6 +6,7 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/depth.hpp"
+#include "gsnav/kernels/mesh.hpp"
 #include "gsnav/kernels/splat.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/math/functions.hpp"
@@ -224,6 +225,7 @@ struct RasterArgs {
   Exp2 exp2_method = Exp2::degree5;
   FrameImages<S> images;
   TileProgress<S> progress;
+  MeshLayer<S> mesh;  ///< empty: no meshes (kernels/composite.hpp blends frames that have some)
 
   GSNAV_HD DepthMode depth_mode() const noexcept { return images.depth_mode(); }
   GSNAV_HD SplatRecords<S> records(std::size_t splat) const noexcept {

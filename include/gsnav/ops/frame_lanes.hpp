@@ -15,7 +15,7 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/ops/render.hpp"
+#include "gsnav/ops/render_composite.hpp"
 
 namespace gsnav {
 
@@ -32,6 +32,7 @@ struct FrameJob {
   const Camera* camera = nullptr;
   const RenderConfig* config = nullptr;
   FrameImages<S> images;
+  MeshFrame meshes{};
 };
 
 /// Renders batches with one lane a thread: no thread waits for another within a frame. Scratch grows with
@@ -45,7 +46,7 @@ class FrameLanes {
     return cameras > 1 && cameras >= 2 * concurrency_of(backend);
   }
 
-  /// render_camera() for each of `count` frames; job_of(c) gives the FrameJob of frame c. The first frame's
+  /// render_composite() for each of `count` frames; job_of(c) gives the FrameJob of frame c. The first frame's
   /// error, by number, is returned; out_of_memory too.
   template <class JobOf>
   Status render(B& backend, std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
@@ -57,8 +58,8 @@ class FrameLanes {
       Lane& lane = take();
       Status s = guarded([&] {
         const FrameJob<S> job = job_of(c);
-        return render_camera<S, B>(lane.backend, lane.workspace, job.sets, *job.camera, *job.config, job.images,
-                                   &stats[c]);
+        return render_composite<S, B>(lane.backend, lane.workspace, job.sets, job.meshes, *job.camera, *job.config,
+                                      job.images, &stats[c]);
       });
       lane.taken.store(false, std::memory_order_release);
       if (s.ok()) return;

@@ -16,6 +16,7 @@
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/composite_steps.hpp"
 #include "gsnav/ops/order_visible.hpp"
 #include "gsnav/ops/render_config.hpp"
 #include "gsnav/ops/render_workspace.hpp"
@@ -61,7 +62,7 @@ void rasterize(B& backend, const RasterArgs<S>& args) {
 /// Sizes the scratch of one camera's frame and writes the projection's arguments.
 template <class S, Backend B>
 void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
-                        const RenderConfig& config, const FrameImages<S>& images) {
+                        const RenderConfig& config, const FrameImages<S>& images, bool meshes) {
   ws.projections.resize(sets.size());
   std::size_t chunks = 0, origins = 0;
   bool ranked = false;
@@ -72,8 +73,7 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   }
   const std::size_t slots = chunks * kProjectChunk;
   const bool color = images.rgb != nullptr;
-  const bool depth = images.median_depth != nullptr || images.expected_depth != nullptr ||
-                     images.accumulated_depth != nullptr || images.first_hit_depth != nullptr;
+  const bool depth = meshes || images.depth_mode() != DepthMode::none;
 
   ws.geometry.resize_discard(slots);
   ws.bounds.resize_discard(slots);
@@ -146,8 +146,8 @@ void project_set(B& backend, const ProjectArgs<S>& args) {
 /// What comes after the projection of one camera: sort, bin, blend, of the keys in `range`. Adds to `stats`.
 template <class S, Backend B>
 Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera, const RenderConfig& config,
-                      const KeyRange& range, const TileProgress<S>& progress, const FrameImages<S>& images,
-                      RenderStats& stats) {
+                      const KeyRange& range, const TileProgress<S>& progress, const MeshLayer<S>& mesh,
+                      const FrameImages<S>& images, RenderStats& stats) {
   // ---- sort
   // Distances may round to below the near plane that their z is beyond, but not to half of it.
   const float near_plane = ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // of all sets
@@ -170,7 +170,10 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   bin.cursors = ws.cursors.view();
   bin.tile_offsets = ws.tile_offsets.view();
   bin.spans = ws.spans.view();
-  if constexpr (requires { backend.list_tiles(bin); }) {
+  const MeshCull<S> cull{ws.depths.view(), mesh.tile_far};
+  if (!mesh.empty()) {
+    detail::count_unhidden(backend, bin, cull);
+  } else if constexpr (requires { backend.list_tiles(bin); }) {
     backend.list_tiles(bin);
   } else {
     if constexpr (requires { backend.count_tiles(bin); }) {
@@ -185,7 +188,9 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   if (Status s = backend.synchronize(); !s) return s;
   ws.tile_splats.resize_discard(intersections);
   bin.tile_splats = ws.tile_splats.view();
-  if constexpr (requires { backend.scatter_tiles(bin); }) {
+  if (!mesh.empty()) {
+    detail::scatter_unhidden(backend, bin, cull);
+  } else if constexpr (requires { backend.scatter_tiles(bin); }) {
     backend.scatter_tiles(bin);
   } else {
     backend.parallel_for(bin.blocks, ScatterTileIntersections<S>{bin});
@@ -205,7 +210,12 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
   raster.images = images;
   raster.progress = progress;
-  detail::rasterize(backend, raster);
+  raster.mesh = mesh;
+  if (mesh.empty()) {
+    detail::rasterize(backend, raster);
+  } else {
+    detail::rasterize_composite(backend, raster);
+  }
 
   stats.visible += visible;
   stats.tile_intersections += intersections;
@@ -246,13 +256,59 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
       if (!chunks.empty()) backend.project(args, chunks);
     }
     const TileProgress<float> progress{ws.open.view(), ws.states.view(), s == 0, s == last};
-    if (Status e = draw_projected(backend, ws, camera, config, slices.keys(s), progress, images, stats); !e) return e;
+    if (Status e = draw_projected(backend, ws, camera, config, slices.keys(s), progress, {}, images, stats); !e) {
+      return e;
+    }
     if (s == last) break;
     const OpenCells open = slices.open_cells(grid, ws.open.view());
     if (open.sums[open.sums.size - 1] == 0) break;
     for (ProjectArgs<float>& args : sets) args.open = open;
   }
   return true;
+}
+
+
+/// render_camera, and behind a mesh where there is one.
+template <class S, Backend B>
+Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
+                    const RenderConfig& config, const MeshLayer<S>& mesh, const FrameImages<S>& images,
+                    RenderStats& stats) {
+  if (Status s = validate(config); !s) return s;
+  if (Status s = validate(camera); !s) return s;
+  std::size_t slots = 0;
+  RenderStats counted;
+  for (const GaussianSet& set : sets) {
+    if (Status s = validate(set); !s) return s;
+    slots += set.gaussians.chunk_count() * kProjectChunk;
+    counted.gaussians += set.gaussians.size;
+  }
+  if (slots > std::numeric_limits<std::uint32_t>::max()) {
+    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
+  }
+  detail::prepare_projection(ws, sets, camera, config, images, !mesh.empty());
+  bool drawn = false;
+  if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
+    if (mesh.empty()) {
+      const Result<bool> sliced = detail::draw_in_slices(backend, ws, camera, config, images, counted);
+      if (!sliced) return sliced.status();
+      drawn = sliced.value();
+    }
+  }
+  if (!drawn) {
+    for (const ProjectArgs<S>& args : ws.projections) {
+      if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
+        if (!mesh.empty()) {
+          std::fill_n(args.counts.data + args.first_chunk, args.chunk_count(), 0u);
+          detail::project_unhidden(backend, args, mesh.tile_far, ws.mesh.unhidden);
+          continue;
+        }
+      }
+      detail::project_set(backend, args);
+    }
+    if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, mesh, images, counted); !s) return s;
+  }
+  stats = counted;
+  return {};
 }
 
 }  // namespace detail
@@ -267,31 +323,10 @@ template <class S, Backend B>
 Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
                      const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
                      RenderStats* stats = nullptr) {
-  if (Status s = validate(config); !s) return s;
-  if (Status s = validate(camera); !s) return s;
-  std::size_t slots = 0;
   RenderStats counted;
-  for (const GaussianSet& set : sets) {
-    if (Status s = validate(set); !s) return s;
-    slots += set.gaussians.chunk_count() * kProjectChunk;
-    counted.gaussians += set.gaussians.size;
-  }
-  if (slots > std::numeric_limits<std::uint32_t>::max()) {
-    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
-  }
-  detail::prepare_projection(ws, sets, camera, config, images);
-  bool drawn = false;
-  if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
-    const Result<bool> sliced = detail::draw_in_slices(backend, ws, camera, config, images, counted);
-    if (!sliced) return sliced.status();
-    drawn = sliced.value();
-  }
-  if (!drawn) {
-    for (const ProjectArgs<S>& args : ws.projections) detail::project_set(backend, args);
-    if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, images, counted); !s) return s;
-  }
-  if (stats != nullptr) *stats = counted;
-  return {};
+  Status s = detail::render_frame<S>(backend, ws, sets, camera, config, {}, images, counted);
+  if (s.ok() && stats != nullptr) *stats = counted;
+  return s;
 }
 
 }  // namespace gsnav

@@ -10,6 +10,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/camera.hpp"
+#include "gsnav/kernels/mesh.hpp"
 #include "gsnav/kernels/projection.hpp"
 
 namespace gsnav {
@@ -38,6 +39,7 @@ struct RenderConfig {
   double transmittance_min = 1e-4;     ///< in [0, 1)
   double first_hit_tau = 0.5;          ///< in (0, 1): first-hit depth is where alpha reaches this
   Vec3d background{0, 0, 0};           ///< display-referred
+  Composite composite = Composite::merged;  ///< of Gaussians and meshes, where a frame has both
 };
 
 /// Side of the tiles that an image is rendered in. On a processor large images have tiles of 32 pixels: their

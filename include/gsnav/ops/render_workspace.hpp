@@ -11,6 +11,7 @@
 #include "gsnav/kernels/splat.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/depth_slices.hpp"
+#include "gsnav/ops/mesh_layer.hpp"
 #include "gsnav/ops/order_visible.hpp"
 
 namespace gsnav {
@@ -19,7 +20,8 @@ namespace gsnav {
 struct RenderStats {
   std::uint64_t gaussians = 0;           ///< in all sets
   std::uint64_t visible = 0;             ///< whose footprint bounds reach the image, less those found hidden
-  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs
+  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, less those found hidden by a mesh
+  MeshStats meshes;
 };
 
 /// Scratch of `render_camera`; grows to the largest frame and is then reused.
@@ -27,7 +29,8 @@ template <class S, Backend B>
 struct RenderWorkspace {
   explicit RenderWorkspace(B& b)
       : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
-        visible(b), cursors(b), tile_offsets(b), tile_splats(b), spans(b), open(b), states(b) {}
+        visible(b), cursors(b), tile_offsets(b), tile_splats(b), spans(b), open(b), states(b), mesh(b),
+        composite(b) {}
 
   Buffer<Vec3<float>, B> offsets_f;
   Buffer<Vec3d, B> offsets;
@@ -43,6 +46,8 @@ struct RenderWorkspace {
   Buffer<std::uint64_t, B> open;  ///< of frames in slices: cells of tiles, and the state of their pixels
   Buffer<S, B> states;
   DepthSlices slices;
+  MeshWorkspace<S, B> mesh;
+  Buffer<S, B> composite;  ///< of Composite::hard_depth: what the Gaussians alone have
   std::vector<Vec3<float>> host_offsets_f;
   std::vector<Vec3d> host_offsets;
   std::vector<ProjectArgs<S>> projections;  ///< [sets]
@@ -73,6 +78,7 @@ struct RenderWorkspace {
     f(a.cursors, b.cursors), f(a.tile_offsets, b.tile_offsets), f(a.tile_splats, b.tile_splats);
     f(a.spans, b.spans), f(a.host_offsets_f, b.host_offsets_f), f(a.host_offsets, b.host_offsets);
     f(a.projections, b.projections), f(a.open, b.open), f(a.states, b.states), f(a.slices, b.slices);
+    f(a.mesh, b.mesh), f(a.composite, b.composite);
     VisibleOrder<B>::for_each(a.visible, b.visible, f);
   }
 };

@@ -7,7 +7,7 @@
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/ops/frame_lanes.hpp"
-#include "gsnav/ops/render.hpp"
+#include "gsnav/ops/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {
@@ -81,6 +81,14 @@ class Renderer {
   const RenderConfig& config() const noexcept { return config_; }
   void set_config(const RenderConfig& config) { config_ = config; }
 
+  /// Meshes that the frames from now on show among the Gaussians (docs/composition.md); none: an empty span. Their
+  /// arrays are in the backend's memory, and must stay there. To move one, set them again: nothing is copied but
+  /// views. On a backend that knows no meshes frames then fail (unsupported).
+  void set_meshes(std::span<const MeshInstance> meshes, const MeshLight& light = {}) {
+    meshes_.assign(meshes.begin(), meshes.end());
+    light_ = light;
+  }
+
   /// Renders all sets, as one sorted list, from each camera; all cameras have one size. `sets` hold
   /// arrays in the backend's memory. Errors: invalid_argument (names the field), backend_failure.
   Result<Frames<S>> render(std::span<const GaussianSet> sets, std::span<const Camera> cameras) {
@@ -116,35 +124,16 @@ class Renderer {
     size_image(out.first_hit_depth, kFirstHitDepth, 1);
     out.stats.assign(cameras.size(), {});
 
-    if constexpr (LaneBackend<B>) {
-      if (FrameLanes<S, B>::worth_it(*backend_, cameras.size())) {
-        const auto job_of = [&](std::size_t c) {
-          return FrameJob<S>{sets, &cameras[c], &config_, host_images(out, c)};
-        };
-        if (Status s = lanes_.render(*backend_, cameras.size(), job_of, out.stats); !s) return s;
-        return backend_->synchronize();
-      }
-    }
-    for (std::size_t c = 0; c < cameras.size(); ++c) {
-      if (Status s = render_job({sets, &cameras[c], &config_, host_images(out, c)}, out.stats[c]); !s) return s;
-    }
-    return backend_->synchronize();
+    const auto job_of = [&](std::size_t c) {
+      return FrameJob<S>{sets, &cameras[c], &config_, host_images(out, c), mesh_frame()};
+    };
+    return render_jobs(cameras.size(), job_of, out.stats);
   }
 
   /// Renders frames that share nothing: each sees its own sets and goes to images in host memory, of its camera's
   /// size, that its caller has (a null pointer: not made). The same bits as one at a time. `stats` [jobs].
   Status render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats) {
-    if constexpr (LaneBackend<B>) {
-      if (FrameLanes<S, B>::worth_it(*backend_, jobs.size())) {
-        const auto job_of = [&](std::size_t c) { return jobs[c]; };
-        if (Status s = lanes_.render(*backend_, jobs.size(), job_of, stats); !s) return s;
-        return backend_->synchronize();
-      }
-    }
-    for (std::size_t c = 0; c < jobs.size(); ++c) {
-      if (Status s = render_job(jobs[c], stats[c]); !s) return s;
-    }
-    return backend_->synchronize();
+    return render_jobs(jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
   }
 
   /// Bytes of scratch held.
@@ -165,14 +154,30 @@ class Renderer {
     using type = FrameLanes<S, T>;
   };
 
+  template <class JobOf>
+  Status render_jobs(std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
+    if constexpr (LaneBackend<B>) {
+      if (FrameLanes<S, B>::worth_it(*backend_, count)) {
+        if (Status s = lanes_.render(*backend_, count, job_of, stats); !s) return s;
+        return backend_->synchronize();
+      }
+    }
+    for (std::size_t c = 0; c < count; ++c) {
+      if (Status s = render_job(job_of(c), stats[c]); !s) return s;
+    }
+    return backend_->synchronize();
+  }
   Status render_job(const FrameJob<S>& job, RenderStats& stats) {
     if constexpr (is_host_backend<B>) {
-      return render_camera<S>(*backend_, workspace_, job.sets, *job.camera, *job.config, job.images, &stats);
+      return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, job.images,
+                                 &stats);
     } else {
       const std::size_t pixels =
           static_cast<std::size_t>(job.camera->width) * static_cast<std::size_t>(job.camera->height);
       FrameImages<S> images = device_images(job.images, pixels);
-      if (Status s = render_camera<S>(*backend_, workspace_, job.sets, *job.camera, *job.config, images, &stats); !s) {
+      if (Status s = render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, images,
+                                         &stats);
+          !s) {
         return s;
       }
       for_each_image(job.images, images, [&](S* host, S* device, std::size_t channels) {
@@ -181,6 +186,7 @@ class Renderer {
       return {};
     }
   }
+  MeshFrame mesh_frame() const noexcept { return {meshes_, light_}; }
 
   /// Where the images of camera c lie in `out`.
   static FrameImages<S> host_images(Frames<S>& out, std::size_t c) noexcept {
@@ -220,6 +226,8 @@ class Renderer {
 
   B* backend_;
   RenderConfig config_;
+  std::vector<MeshInstance> meshes_;
+  MeshLight light_;
   RenderWorkspace<S, B> workspace_;
   Buffer<S, B> device_images_;
   [[no_unique_address]] typename LanesOf<B>::type lanes_;

@@ -16,7 +16,9 @@
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/capsule_batch.hpp"
+#include "gsnav/kernels/composite.hpp"
 #include "gsnav/kernels/lbs.hpp"
+#include "gsnav/kernels/mesh_shade.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
@@ -36,6 +38,14 @@ struct LaneKernels {
   void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
   void (*gap_range)(const CapsuleGapArgs<float>&, std::size_t begin, std::size_t end) noexcept;
   void (*sweep_range)(const SweepArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  void (*composite_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  void (*count_unhidden)(const CountUnhidden<float>&, std::size_t block) noexcept;
+  void (*scatter_unhidden)(const ScatterUnhidden<float>&, std::size_t block) noexcept;
+  void (*project_mesh_vertices)(const ProjectMeshVertices<float>&, std::size_t chunk) noexcept;
+  void (*count_mesh_triangles)(const CountMeshTriangles<float>&, std::size_t chunk) noexcept;
+  void (*write_mesh_triangles)(const WriteMeshTriangles<float>&, std::size_t chunk) noexcept;
+  void (*rasterize_mesh_tile)(const RasterizeMeshTile<float>&, std::size_t tile) noexcept;
+  void (*shade_mesh_row)(const ShadeMeshRow<float>&, std::size_t row) noexcept;
 };
 
 #if defined(GSNAV_OPENMP_COMPILED)
@@ -48,7 +58,9 @@ inline namespace GSNAV_LANES_TAG {
 inline const LaneKernels& native_kernels() noexcept {
   static const LaneKernels k{"native",      kWidth,         &project_chunk,
                              &count_tiles,  &scatter_tiles, &rasterize_tile_any, &skin_range,
-                             &gap_range,    &sweep_range};
+                             &gap_range,    &sweep_range,   &composite_tile_any, &count_unhidden,
+                             &scatter_unhidden, &project_mesh_vertices, &count_mesh_triangles,
+                             &write_mesh_triangles, &rasterize_mesh_tile, &shade_mesh_row};
   return k;
 }
 }  // namespace GSNAV_LANES_TAG
@@ -115,6 +127,32 @@ class OpenMPBackend : public HostMemory {
     const auto kernel = lane_kernels().rasterize_tile;
     parallel_for(args.grid.count(), [&args, kernel](std::size_t tile) { kernel(args, tile); });
   }
+  /// Optional members: frames with a mesh in lanes, and the mesh itself.
+  static constexpr bool composes_meshes = true;
+  void composite_tiles(const RasterArgs<float>& args) {
+    parallel_for(args.grid.count(), Compiled{args, lane_kernels().composite_tile});
+  }
+  void parallel_for(std::size_t n, const CountUnhidden<float>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().count_unhidden});
+  }
+  void parallel_for(std::size_t n, const ScatterUnhidden<float>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().scatter_unhidden});
+  }
+  void parallel_for(std::size_t n, const ProjectMeshVertices<float>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().project_mesh_vertices});
+  }
+  void parallel_for(std::size_t n, const CountMeshTriangles<float>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().count_mesh_triangles});
+  }
+  void parallel_for(std::size_t n, const WriteMeshTriangles<float>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().write_mesh_triangles});
+  }
+  void parallel_for(std::size_t n, const RasterizeMeshTile<float>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().rasterize_mesh_tile});
+  }
+  void parallel_for(std::size_t n, const ShadeMeshRow<float>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().shade_mesh_row});
+  }
   /// Optional member: skinning in lanes.
   void skin(const SkinningArgs<float>& args) {
     in_ranges(args, lane_kernels().skin_range);
@@ -124,6 +162,16 @@ class OpenMPBackend : public HostMemory {
   void sweep_capsules(const SweepArgs<float>& args) { in_ranges(args, lane_kernels().sweep_range); }
 
  private:
+  /// A kernel as it was compiled for the processor's lanes.
+  template <class Args>
+  struct Compiled {
+    const Args& args;
+    void (*kernel)(const Args&, std::size_t) noexcept;
+    void operator()(std::size_t i) const noexcept { kernel(args, i); }
+  };
+  template <class Args>
+  Compiled(const Args&, void (*)(const Args&, std::size_t) noexcept) -> Compiled<Args>;
+
   /// kernel(args, begin, end) over all of args.size().
   template <class Args>
   void in_ranges(const Args& args, void (*kernel)(const Args&, std::size_t, std::size_t) noexcept) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "gsnav/core/parallel.hpp"
+#include "gsnav/kernels/composite.hpp"
 #include "gsnav/kernels/lanes/isa.hpp"
 #include "gsnav/kernels/tiles.hpp"
 
@@ -81,6 +82,45 @@ inline void scatter_tiles(const BinArgs<float>& args, std::size_t block) noexcep
         gsnav::for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
                              args.elliptic, [=](std::size_t tile) { out[cursors[tile]++] = splat; });
       });
+}
+
+namespace detail {
+/// Calls f(tile, splat) for the tiles of each splat of a block in which a mesh does not hide it.
+template <class F>
+GSNAV_HD void for_each_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull, std::size_t block,
+                                const F& f) noexcept {
+  const std::size_t columns = static_cast<std::size_t>(args.grid.columns);
+  const auto visit = [&](std::size_t tile, std::uint32_t splat) noexcept {
+    if (!cull.hides(tile, splat)) f(tile, splat);
+  };
+  for_each_splat(
+      args, block,
+      [&](std::uint32_t splat, const TileSpans& s) noexcept {
+        for (std::size_t r = 0; r < s.rows; ++r) {
+          const std::size_t row = s.tile + r * columns;
+          for (std::size_t x = s.columns[r][0]; x < s.columns[r][1]; ++x) visit(row + x, splat);
+        }
+      },
+      [&](std::uint32_t splat) noexcept {
+        gsnav::for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
+                             args.elliptic, [&](std::size_t tile) { visit(tile, splat); });
+      });
+}
+}  // namespace detail
+
+/// CountUnhidden and ScatterUnhidden by what the projection found.
+inline void count_unhidden(const CountUnhidden<float>& kernel, std::size_t block) noexcept {
+  const BinArgs<float>& args = kernel.args;
+  std::uint64_t* counts = args.cursors.data + block * args.grid.count();
+  for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
+  detail::for_each_unhidden(args, kernel.cull, block, [=](std::size_t tile, std::uint32_t) { ++counts[tile]; });
+}
+inline void scatter_unhidden(const ScatterUnhidden<float>& kernel, std::size_t block) noexcept {
+  const BinArgs<float>& args = kernel.args;
+  std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
+  std::uint32_t* out = args.tile_splats.data;
+  detail::for_each_unhidden(args, kernel.cull, block,
+                            [=](std::size_t tile, std::uint32_t splat) { out[cursors[tile]++] = splat; });
 }
 
 }  // namespace GSNAV_LANES_TAG

@@ -7,7 +7,7 @@
 #include <new>
 #include <type_traits>
 
-#include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/composite.hpp"
 #include "gsnav/kernels/lanes/block_lists.hpp"
 #include "gsnav/kernels/lanes/write_tile.hpp"
 #include "gsnav/math/packs.hpp"
@@ -32,19 +32,19 @@ class Unset {
 /// kWidth of them side by side, and what their exponents share in a column of pixels is computed once a tile;
 /// then each block runs through its own list with its state in registers. A closed block takes no more
 /// splats, and the tile ends when all are closed. Per pixel the order and the arithmetic are those of
-/// RasterizePixel: the same bits.
-template <bool Color, DepthMode D, Exp2 M, bool General>
+/// RasterizePixel: the same bits. `Mesh`: those of CompositePixel.
+template <bool Color, DepthMode D, Exp2 M, bool General, bool Mesh = false>
 class TileBlender {
   /// The median depth is found after a list has run: until then its splat's number does.
   static constexpr DepthMode kLoop = D == DepthMode::median ? DepthMode::none : D;
-  static constexpr bool kNeedsId = D != DepthMode::none || General;
+  static constexpr bool kNeedsId = D != DepthMode::none || General || Mesh;
 
   /// What blending reads of a splat beside its column terms.
   struct Row {
     float ref_y, b;
     SplatColor<float> color;
     float number;  ///< in the batch
-    float pad;
+    float far;     ///< with a mesh: no depth of it is beyond
   };
   /// ColumnTerms of the columns of half a tile of kMaxTile, or of a whole smaller one.
   static constexpr int kColumns = 16;
@@ -82,7 +82,7 @@ class TileBlender {
       if (progress.open[tile_] == 0 || (begin == end && !progress.last)) return;
       resume();
     }
-    if (progress.last) prefetch_images();
+    if (progress.last) prefetch_images(args_, tile_x_, tile_y_);
     for (int j = 0; j < kStride; ++j) rows_[j].number = static_cast<float>(j);
     rows_[kNothing] = {};
     for (std::uint64_t first = begin; first < end && open_count_ > 0; first += kBatch) {
@@ -116,27 +116,6 @@ class TileBlender {
   F pixel_x(int x) const noexcept { return lane_x_ + F(static_cast<float>(tile_x_ + x)); }
   F pixel_y(int y) const noexcept { return lane_y_ + F(static_cast<float>(tile_y_ + y)); }
 
-  /// The tile's rows are far apart in an image, and come in while it is blended.
-  void prefetch_images() const noexcept {
-    const FrameImages<float>& out = args_.images;
-    const auto prefetch = [this](const float* image, std::size_t values) {
-      if (image == nullptr) return;
-      for (int y = tile_y_; y < tile_y_ + tile_size_ && y < args_.grid.height; ++y) {
-        const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(args_.grid.width) +
-                                  static_cast<std::size_t>(tile_x_);
-        constexpr std::size_t kLine = 16;
-        for (std::size_t x = 0; x < values * static_cast<std::size_t>(tile_size_); x += kLine) {
-          __builtin_prefetch(image + values * first + x, 0, 2);
-        }
-      }
-    };
-    prefetch(out.rgb, 3);
-    for (const float* image : {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth,
-                               out.first_hit_depth}) {
-      prefetch(image, 1);
-    }
-  }
-
   void open_blocks() noexcept {
     for_each_block([this](int block, int x, int y) {
       const auto inside = (pixel_x(x) < F(static_cast<float>(args_.grid.width))) &&
@@ -145,6 +124,7 @@ class TileBlender {
       states_[block] = {};
       states_[block].transmittance = select(inside, F(1.0f), F(-1.0f));
       if constexpr (D == DepthMode::median) medians_[block] = F(0.0f);
+      if constexpr (Mesh) mesh_[block] = lanes_of(args_.mesh.depth, 1, 0, x, y);
       open_[block] = any(inside);
       open_count_ += open_[block] ? 1 : 0;
     });
@@ -203,6 +183,7 @@ class TileBlender {
       rows_[j].b = g.b;
       if constexpr (Color) rows_[j].color = args_.colors[ids[j]];
       if constexpr (kNeedsId) ids_[j] = ids[j];
+      if constexpr (Mesh) rows_[j].far = args_.depths[ids[j]].z + args_.depths[ids[j]].reach;
     }
     if constexpr (kNeedsId) ids_[kNothing] = ids[0];           // any depth will do
     if (General && !args_.perspectives.empty()) {  // the footprint is no ellipse: every open block
@@ -243,6 +224,11 @@ class TileBlender {
     std::uint8_t* const list = lists_.splats[block];
     const int n = lists_.counts[block];
     const auto blend = [&](int j, F alpha) {
+      if constexpr (Mesh) {
+        if (any((F(rows[j].far) > mesh_[block]) && (alpha > F(0.0f)))) {
+          alpha = alpha_before_mesh(alpha, args_.depths[ids_[j]], mesh_[block], px, py);
+        }
+      }
       if constexpr (Near) last = select(state.transmittance > F(0.5f), F(rows[j].number), last);
       blend_alpha<Color, kLoop, General>(state, rules, alpha, &rows[j].color,
                                          kLoop == DepthMode::none ? nullptr : &args_.depths[ids_[j]], px, py);
@@ -292,7 +278,32 @@ class TileBlender {
     }
   }
 
+  /// Lanes of a block from an image with so many values a pixel; of pixels outside, of some inside.
+  F lanes_of(const float* image, int values, int value, int x, int y) const noexcept {
+    float v[kWidth];
+    for (int l = 0; l < kWidth; ++l) {
+      const int column = min(tile_x_ + x + l % kBlockWidth, args_.grid.width - 1);
+      const int row = min(tile_y_ + y + l / kBlockWidth, args_.grid.height - 1);
+      v[l] = image[static_cast<std::ptrdiff_t>(values) * (static_cast<std::ptrdiff_t>(row) * args_.grid.width + column) + value];
+    }
+    return F::load(v);
+  }
+  void close_blocks() noexcept {
+    for_each_block([this](int block, int x, int y) {
+      Vec3<F> color{};
+      if constexpr (Color) {
+        for (int c = 0; c < 3; ++c) color[c] = lanes_of(args_.mesh.color, 3, c, x, y);
+      }
+      if constexpr (D == DepthMode::median) {
+        const auto shown = has_mesh(mesh_[block]) && (abs(states_[block].transmittance) > F(0.5f));
+        medians_[block] = select(shown, mesh_[block], medians_[block]);
+      }
+      close_by_mesh<Color>(states_[block], args_.rules, mesh_[block], color);
+    });
+  }
+
   void write() noexcept {
+    if constexpr (Mesh) close_blocks();
     const FrameImages<float>& out = args_.images;
     const int blocks = tile_size_ / kBlockWidth;
     for (int y = 0, row = 0; y < tile_size_ && tile_y_ + y < args_.grid.height; y += kBlockHeight, row += blocks) {
@@ -325,17 +336,13 @@ class TileBlender {
   bool open_[kMaxBlocks];
   Unset<BlendState<F, kLoop>, kMaxBlocks> states_;
   Unset<F, D == DepthMode::median ? kMaxBlocks : 1> medians_;
+  Unset<F, Mesh ? kMaxBlocks : 1> mesh_;  ///< its depth
   Unset<SplatGeometry<float>, kBatch> geometry_;
   Unset<Row, kStride> rows_;
   std::uint32_t ids_[kNeedsId ? kStride : 1];
   Unset<Columns, General ? 1 : kParts * kStride> columns_;
   BlockLists lists_;
 };
-
-/// Blends one tile in the variant that `args` asks for.
-inline void rasterize_tile_any(const RasterArgs<float>& args, std::size_t tile) noexcept {
-  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool G>() { TileBlender<C, D, M, G>(args, tile).blend(); });
-}
 
 }  // namespace GSNAV_LANES_TAG
 }  // namespace gsnav::lanes

@@ -77,5 +77,27 @@ void write_color(const BlockRow& row, float* image, const Value& value) noexcept
   }
 }
 
+/// The tile's rows are far apart in an image, and come in while it is blended.
+inline void prefetch_images(const RasterArgs<float>& args, int tile_x, int tile_y) noexcept {
+  const FrameImages<float>& out = args.images;
+  const int tile_size = args.grid.tile_size;
+  const auto prefetch = [=, &args](const float* image, std::size_t values) {
+    if (image == nullptr) return;
+    for (int y = tile_y; y < tile_y + tile_size && y < args.grid.height; ++y) {
+      const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(args.grid.width) +
+                                static_cast<std::size_t>(tile_x);
+      constexpr std::size_t kLine = 16;
+      for (std::size_t x = 0; x < values * static_cast<std::size_t>(tile_size); x += kLine) {
+        __builtin_prefetch(image + values * first + x, 0, 2);
+      }
+    }
+  };
+  prefetch(out.rgb, 3);
+  for (const float* image : {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth,
+                             out.first_hit_depth}) {
+    prefetch(image, 1);
+  }
+}
+
 }  // namespace GSNAV_LANES_TAG
 }  // namespace gsnav::lanes

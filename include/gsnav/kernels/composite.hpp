@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/mesh.hpp"
+#include "gsnav/kernels/tiles.hpp"
+
+// Gaussians and meshes in one image (docs/composition.md). Frames without a mesh run none of this.
+
+namespace gsnav {
+
+/// alpha where a splat lies before the mesh at depth `mesh`, 0 where it lies behind. A splat is looked at closely
+/// only where its reach spans the mesh: its depth along a ray is within it, also when rounded.
+template <class L, class S>
+GSNAV_HD L alpha_before_mesh(L alpha, const SplatDepth<S>& depth, L mesh, L px, L py) noexcept {
+  const auto unsure = L(depth.z + depth.reach) > mesh;
+  if (!any(unsure)) return alpha;
+  return select(unsure && (ray_depth(depth, px, py) > mesh), L(S(0)), alpha);
+}
+
+/// Whether a pixel has a mesh.
+template <class L>
+GSNAV_HD mask_of<L> has_mesh(L depth) noexcept {
+  return depth <= L(scalar_of<L>(3.4e38));
+}
+
+/// The mesh takes what transmittance the Gaussians left.
+template <bool Color, class L, DepthMode D, class S>
+GSNAV_HD void close_by_mesh(BlendState<L, D>& state, const BlendRules<S>& rules, L depth, const Vec3<L>& color) noexcept {
+  const L zero(S(0)), t = abs(state.transmittance);
+  const auto covered = has_mesh(depth);
+  const L weight = select(covered, t, zero);
+  if constexpr (Color) {
+    state.r = fma(weight, color.x, state.r);
+    state.g = fma(weight, color.y, state.g);
+    state.b = fma(weight, color.z, state.b);
+  }
+  if constexpr (D != DepthMode::none) {
+    state.median = select(covered && (t > L(S(0.5))), depth, state.median);
+  }
+  if constexpr (D == DepthMode::any) {
+    const L z = select(covered, depth, zero);
+    state.z_ref = select(covered && (t >= L(S(1))), z, state.z_ref);
+    state.accumulated = fma(weight, z - state.z_ref, state.accumulated);
+    state.first_hit = select(covered && (t > L(S(1) - rules.first_hit_tau)), z, state.first_hit);
+  }
+  state.transmittance = select(covered, zero, state.transmittance);
+}
+
+/// Blends one pixel of a frame with a mesh: RasterizePixel, but for what the mesh hides.
+template <class S, bool Color, DepthMode D, bool General>
+struct CompositePixel {
+  RasterArgs<S> args;
+
+  GSNAV_HD void operator()(std::size_t pixel) const noexcept {
+    const std::size_t width = static_cast<std::size_t>(args.grid.width);
+    const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
+    const std::size_t tile = static_cast<std::size_t>(y / args.grid.tile_size) *
+                                 static_cast<std::size_t>(args.grid.columns) +
+                             static_cast<std::size_t>(x / args.grid.tile_size);
+    const S px = S(x) + S(0.5), py = S(y) + S(0.5), mesh = args.mesh.depth[pixel];
+    BlendState<S, D> state;
+    for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {
+      const SplatRecords<S> splat = args.records(args.tile_splats[i]);
+      const SplatGeometry<S>& g = *splat.geometry;
+      const S exponent = General && splat.perspective != nullptr
+                             ? perspective_exponent(g, *splat.perspective, px, py)
+                             : column_exponent(column_terms(g, px), g.ref_y, g.b, py);
+      if (!(exponent >= args.rules.log2_alpha_min)) continue;
+      const S alpha = alpha_before_mesh(footprint_alpha<Exp2::degree5>(args.rules, exponent), *splat.depth, mesh, px, py);
+      blend_alpha<Color, D, General>(state, args.rules, alpha, splat.color, splat.depth, px, py);
+      if (!state.open(args.rules)) break;
+    }
+    Vec3<S> color{};
+    if constexpr (Color) {
+      const S* const from = args.mesh.color + 3 * pixel;
+      color = {from[0], from[1], from[2]};
+    }
+    close_by_mesh<Color>(state, args.rules, mesh, color);
+    write_pixel(args, pixel, state);
+  }
+};
+
+/// dispatch_raster for frames with a mesh: calls f with compile-time <Color, DepthMode, General>. The cubic exp2 does
+/// not serve these.
+template <class S, class F>
+void dispatch_composite(const RasterArgs<S>& args, const F& f) {
+  const auto with_depth = [&]<bool C, bool G>() {
+    switch (args.depth_mode()) {
+      case DepthMode::none: return f.template operator()<C, DepthMode::none, G>();
+      case DepthMode::median: return f.template operator()<C, DepthMode::median, G>();
+      case DepthMode::any: return f.template operator()<C, DepthMode::any, G>();
+    }
+  };
+  const bool general = !args.perspectives.empty() || args.rules.exclusive_stop, color = args.images.rgb != nullptr;
+  if (color) {
+    general ? with_depth.template operator()<true, true>() : with_depth.template operator()<true, false>();
+  } else {
+    general ? with_depth.template operator()<false, true>() : with_depth.template operator()<false, false>();
+  }
+}
+
+/// Arguments of binning the splats that a mesh does not hide.
+template <class S>
+struct MeshCull {
+  View<const SplatDepth<S>> depths;
+  View<const S> tile_far;  ///< MeshLayer's
+
+  /// Whether every pixel of a tile would skip the splat.
+  GSNAV_HD bool hides(std::size_t tile, std::uint32_t splat) const noexcept {
+    return depths[splat].z - depths[splat].reach > tile_far[tile];
+  }
+};
+
+/// CountTileIntersections, less what is hidden.
+template <class S>
+struct CountUnhidden {
+  BinArgs<S> args;
+  MeshCull<S> cull;
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    std::uint64_t* counts = args.cursors.data + block * args.grid.count();
+    for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
+    const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
+    for (std::size_t i = r.begin; i < r.end; ++i) {
+      const std::uint32_t splat = args.order[i];
+      for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
+                    [=, this](std::size_t tile) { counts[tile] += cull.hides(tile, splat) ? 0 : 1; });
+    }
+  }
+};
+
+/// ScatterTileIntersections, less what is hidden.
+template <class S>
+struct ScatterUnhidden {
+  BinArgs<S> args;
+  MeshCull<S> cull;
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
+    std::uint32_t* out = args.tile_splats.data;
+    const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
+    for (std::size_t i = r.begin; i < r.end; ++i) {
+      const std::uint32_t splat = args.order[i];
+      for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
+                    [=, this](std::size_t tile) {
+                      if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
+                    });
+    }
+  }
+};
+
+/// Composite::hard_depth: the images of Gaussians alone, over black, become those of the frame.
+template <class S>
+struct HardDepthPixel {
+  FrameImages<S> images;     ///< what was asked for; filled by the Gaussians
+  const S* alpha = nullptr;  ///< of the Gaussians
+  const S* expected = nullptr;
+  MeshLayer<S> mesh;
+  Vec3<S> background{};
+
+  GSNAV_HD void operator()(std::size_t pixel) const noexcept {
+    const S a = alpha[pixel], z = mesh.depth[pixel], d = expected[pixel];
+    const bool covered = has_mesh(z), dropped = !(a > S(0.01)), lost = dropped || (covered && d > z);
+    const S t = lost ? S(1) : S(1) - a;
+    if (images.rgb != nullptr) {
+      const S* const k = mesh.color + 3 * pixel;
+      S* const c = images.rgb + 3 * pixel;
+      const Vec3<S> under = covered ? Vec3<S>{k[0], k[1], k[2]} : background;
+      for (int i = 0; i < 3; ++i) c[i] = fma(t, under[i], lost ? S(0) : c[i]);
+    }
+    const auto depth = [&](S* image, S own) {
+      if (image != nullptr) image[pixel] = lost ? (covered ? z : S(0)) : own;
+    };
+    // One depth is written for a pixel, whatever is asked for.
+    depth(images.median_depth, d);
+    depth(images.accumulated_depth, d);
+    depth(images.first_hit_depth, d);
+    depth(images.expected_depth, d);
+    if (images.alpha != nullptr) images.alpha[pixel] = covered ? S(1) : (lost ? S(0) : a);
+  }
+};
+
+}  // namespace gsnav

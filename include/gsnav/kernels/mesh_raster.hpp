@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/kernels/mesh_setup.hpp"
+#include "gsnav/kernels/tiles.hpp"
+
+// Which triangle each pixel shows, and how far it is: the visibility pass. Nothing is shaded here.
+
+namespace gsnav {
+
+/// The three edge functions of a triangle at pixel centres, exactly: all are >= 0 at the pixels that it owns. An
+/// edge owns a centre on it if it is a top or a left one, so that of two triangles that share it one does.
+struct MeshEdges {
+  std::int64_t at[3];      ///< at the centre of the pixel asked for
+  std::int64_t step_x[3], step_y[3];  ///< a pixel right, a pixel down
+
+  template <class S>
+  GSNAV_HD static MeshEdges of(const MeshTriangle<S>& t, const TileGrid& grid, int x, int y) noexcept {
+    constexpr std::int32_t kHalf = 1 << (kMeshSubpixelBits - 1);
+    const std::int64_t px = std::int64_t{2 * x + 1 - grid.width} * kHalf;
+    const std::int64_t py = std::int64_t{2 * y + 1 - grid.height} * kHalf;
+    MeshEdges e;
+    for (int i = 0; i < 3; ++i) {
+      const MeshPoint &p = t.corner[i], &q = t.corner[i == 2 ? 0 : i + 1];
+      const std::int64_t dx = q.x - p.x, dy = q.y - p.y;
+      const bool owns = dy < 0 || (dy == 0 && dx > 0);
+      e.at[i] = dx * (py - p.y) - dy * (px - p.x) - (owns ? 0 : 1);
+      e.step_x[i] = -dy * (2 * kHalf);
+      e.step_y[i] = dx * (2 * kHalf);
+    }
+    return e;
+  }
+  /// Whether some pixel of the w x h from the one asked for on may be inside.
+  GSNAV_HD bool reach(int w, int h) const noexcept {
+    for (int i = 0; i < 3; ++i) {
+      const std::int64_t best = at[i] + (step_x[i] > 0 ? step_x[i] * (w - 1) : 0) +
+                                (step_y[i] > 0 ? step_y[i] * (h - 1) : 0);
+      if (best < 0) return false;
+    }
+    return true;
+  }
+};
+
+/// Arguments of the visibility pass. Binning writes through `bin`, whose tile lists are of triangles.
+template <class S>
+struct MeshRasterArgs {
+  BinArgs<S> bin;  ///< of its arrays: cursors, tile_offsets, tile_splats
+  View<const MeshTriangle<S>> triangles;
+  S* depth = nullptr;              ///< [H][W]
+  std::uint32_t* visible = nullptr;  ///< [H][W], which of `triangles`; kNoTriangle where none
+  View<S> tile_far;                ///< [tiles]
+};
+inline constexpr std::uint32_t kNoTriangle = 0xffffffffu;
+
+namespace detail {
+
+/// Calls f(tile) for the tiles of which a triangle may own a pixel.
+template <class S, class F>
+GSNAV_HD void for_each_mesh_tile(const TileGrid& grid, const MeshTriangle<S>& t, const F& f) noexcept {
+  const int shift = grid.tile_shift(), ts = grid.tile_size;
+  const int tx0 = t.x0 >> shift, tx1 = (t.x1 - 1) >> shift, ty0 = t.y0 >> shift, ty1 = (t.y1 - 1) >> shift;
+  const bool single = tx0 == tx1 && ty0 == ty1;
+  for (int ty = ty0; ty <= ty1; ++ty) {
+    const int y0 = max(ty * ts, int{t.y0}), y1 = min((ty + 1) * ts, int{t.y1});
+    for (int tx = tx0; tx <= tx1; ++tx) {
+      const int x0 = max(tx * ts, int{t.x0}), x1 = min((tx + 1) * ts, int{t.x1});
+      if (!single && !MeshEdges::of(t, grid, x0, y0).reach(x1 - x0, y1 - y0)) continue;
+      f(static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns) + static_cast<std::size_t>(tx));
+    }
+  }
+}
+
+/// The pixels [left, right) of a row of n that one edge leaves: e at the first, `step` to the next. `inverse`:
+/// 1 / |step|, which only guesses; the edge decides.
+GSNAV_HD void clip_span(std::int64_t e, std::int64_t step, double inverse, int n, int& left, int& right) noexcept {
+  if (step > 0) {
+    if (e >= 0) return;
+    const double guess = -static_cast<double>(e) * inverse;
+    if (guess > n + 1) {
+      left = n;
+      return;
+    }
+    int k = static_cast<int>(guess);
+    while (k > 0 && e + step * (k - 1) >= 0) --k;
+    while (k < n && e + step * k < 0) ++k;
+    left = max(left, k);
+  } else if (e < 0) {
+    right = 0;
+  } else if (step < 0) {
+    const double guess = static_cast<double>(e) * inverse;
+    if (guess > n + 1) return;
+    int k = min(static_cast<int>(guess) + 1, n);
+    while (k < n && e + step * k >= 0) ++k;
+    while (k > 0 && e + step * (k - 1) < 0) --k;
+    right = min(right, k);
+  }
+}
+
+}  // namespace detail
+
+/// Counts the tiles of one block of triangles.
+template <class S>
+struct CountMeshTiles {
+  MeshRasterArgs<S> args;
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    const BinArgs<S>& bin = args.bin;
+    std::uint64_t* counts = bin.cursors.data + block * bin.grid.count();
+    for (std::size_t t = 0; t < bin.grid.count(); ++t) counts[t] = 0;
+    const BlockRange r = BlockRange::of(block, bin.blocks, args.triangles.size);
+    for (std::size_t i = r.begin; i < r.end; ++i) {
+      detail::for_each_mesh_tile(bin.grid, args.triangles[i], [=](std::size_t tile) { ++counts[tile]; });
+    }
+  }
+};
+
+/// Writes the triangles of one block into their tiles, in order (after ScanTileIntersections).
+template <class S>
+struct ScatterMeshTiles {
+  MeshRasterArgs<S> args;
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    const BinArgs<S>& bin = args.bin;
+    std::uint64_t* cursors = bin.cursors.data + block * bin.grid.count();
+    std::uint32_t* out = bin.tile_splats.data;
+    const BlockRange r = BlockRange::of(block, bin.blocks, args.triangles.size);
+    for (std::size_t i = r.begin; i < r.end; ++i) {
+      detail::for_each_mesh_tile(bin.grid, args.triangles[i], [=](std::size_t tile) {
+        out[cursors[tile]++] = static_cast<std::uint32_t>(i);
+      });
+    }
+  }
+};
+
+/// Finds the nearest triangle of each pixel of a tile; of equally near ones the first. No pixel's depth depends on
+/// the tile that it is found in.
+template <class S>
+GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t tile) noexcept {
+  const TileGrid& grid = args.bin.grid;
+  const int ts = grid.tile_size;
+  const int tile_x = static_cast<int>(tile % static_cast<std::size_t>(grid.columns)) * ts;
+  const int tile_y = static_cast<int>(tile / static_cast<std::size_t>(grid.columns)) * ts;
+  const int tile_right = min(tile_x + ts, grid.width), tile_bottom = min(tile_y + ts, grid.height);
+  const std::size_t stride = static_cast<std::size_t>(grid.width);
+  const auto row_at = [&](int y) { return static_cast<std::size_t>(y) * stride; };
+  for (int y = tile_y; y < tile_bottom; ++y) {
+    for (int x = tile_x; x < tile_right; ++x) {
+      args.depth[row_at(y) + static_cast<std::size_t>(x)] = S(0);  // 1 / z until the tile is done
+      args.visible[row_at(y) + static_cast<std::size_t>(x)] = kNoTriangle;
+    }
+  }
+  for (std::uint64_t i = args.bin.tile_offsets[tile]; i < args.bin.tile_offsets[tile + 1]; ++i) {
+    const std::uint32_t id = args.bin.tile_splats[i];
+    const MeshTriangle<S>& t = args.triangles[id];
+    const int x0 = max(tile_x, int{t.x0}), x1 = min(tile_right, int{t.x1});
+    const int y0 = max(tile_y, int{t.y0}), y1 = min(tile_bottom, int{t.y1});
+    MeshEdges edges = MeshEdges::of(t, grid, x0, y0);
+    double inverse[3];
+    for (int k = 0; k < 3; ++k) {
+      const double step = static_cast<double>(edges.step_x[k]);
+      inverse[k] = 1.0 / (edges.step_x[k] == 0 ? 1.0 : abs(step));
+    }
+    for (int y = y0; y < y1; ++y) {
+      int left = 0, right = x1 - x0;
+      for (int k = 0; k < 3; ++k) {
+        detail::clip_span(edges.at[k], edges.step_x[k], inverse[k], x1 - x0, left, right);
+        edges.at[k] += edges.step_y[k];
+      }
+      const double row = fma(t.inverse_z.y, static_cast<double>(y - t.y0), t.inverse_z.value);
+      const int offset = x0 - t.x0;
+      S* const nearest = args.depth + row_at(y) + static_cast<std::size_t>(x0);
+      std::uint32_t* const visible = args.visible + row_at(y) + static_cast<std::size_t>(x0);
+      for (int x = left; x < right; ++x) {
+        const S plane = S(fma(t.inverse_z.x, static_cast<double>(offset + x), row));
+        const S inverse_z = clamp(plane, t.inverse_z_min, t.inverse_z_max);
+        const bool nearer = inverse_z > nearest[x];
+        nearest[x] = nearer ? inverse_z : nearest[x];
+        visible[x] = nearer ? id : visible[x];
+      }
+    }
+  }
+  S far(0);
+  for (int y = tile_y; y < tile_bottom; ++y) {
+    for (int x = tile_x; x < tile_right; ++x) {
+      S& depth = args.depth[row_at(y) + static_cast<std::size_t>(x)];
+      depth = S(1) / depth;  // infinity where there is none
+      far = max(far, depth);
+    }
+  }
+  args.tile_far[tile] = far;
+}
+
+template <class S>
+struct RasterizeMeshTile {
+  MeshRasterArgs<S> args;
+  GSNAV_HD void operator()(std::size_t tile) const noexcept { rasterize_mesh_tile(args, tile); }
+};
+
+}  // namespace gsnav

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/kernels/mesh.hpp"
+#include "gsnav/scene/triangle_mesh.hpp"
+
+namespace gsnav {
+
+/// The linear value of an sRGB-encoded byte.
+inline float srgb_decoded(std::uint8_t byte) noexcept {
+  const double v = byte / 255.0;
+  return static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+}
+
+/// A base-colour texture with its mip chain: each level the mean, in linear light, of what it covers of the finer.
+class MeshTexture {
+ public:
+  /// `rgba`: [height][width][4], sRGB-encoded, top row first. Error: invalid_argument (sizes).
+  static Result<MeshTexture> make(int width, int height, std::vector<std::uint8_t> rgba) {
+    constexpr int kLargest = 32768;
+    if (width < 1 || height < 1 || width > kLargest || height > kLargest ||
+        rgba.size() != 4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+      return Status(Errc::invalid_argument, "MeshTexture: " + std::to_string(width) + " x " + std::to_string(height) +
+                                                " with " + std::to_string(rgba.size()) +
+                                                " bytes: needs four a pixel and sides in [1, 32768]");
+    }
+    MeshTexture t;
+    for (std::size_t i = 0; i < 256; ++i) t.decode_[i] = srgb_decoded(static_cast<std::uint8_t>(i));
+    t.width_ = width;
+    t.height_ = height;
+    t.texels_ = std::move(rgba);
+    std::size_t from = 0;
+    for (int w = width, h = height; w > 1 || h > 1; ++t.levels_) {
+      const std::size_t next = t.texels_.size();
+      t.reduce(from, w, h);
+      from = next;
+      w = std::max(w / 2, 1);
+      h = std::max(h / 2, 1);
+    }
+    return t;
+  }
+  TextureView view() const noexcept {
+    return {view_of(texels_), {decode_.data(), decode_.size()}, width_, height_, levels_};
+  }
+
+ private:
+  /// Appends the level below one of w x h pixels at `from`. Of an odd side the last two or three share a pixel.
+  void reduce(std::size_t from, int w, int h) {
+    const int half_w = std::max(w / 2, 1), half_h = std::max(h / 2, 1);
+    for (int y = 0; y < half_h; ++y) {
+      const int y1 = y + 1 == half_h ? h : 2 * y + 2;
+      for (int x = 0; x < half_w; ++x) {
+        const int x1 = x + 1 == half_w ? w : 2 * x + 2;
+        double sum[4] = {};
+        for (int j = 2 * y; j < y1; ++j) {
+          for (int i = 2 * x; i < x1; ++i) {
+            const std::size_t p = from + 4 * (static_cast<std::size_t>(j) * static_cast<std::size_t>(w) +
+                                              static_cast<std::size_t>(i));
+            for (std::size_t c = 0; c < 3; ++c) sum[c] += static_cast<double>(decode_[texels_[p + c]]);
+            sum[3] += texels_[p + 3];
+          }
+        }
+        const double n = (y1 - 2 * y) * (x1 - 2 * x);
+        for (std::size_t c = 0; c < 3; ++c) texels_.push_back(encoded(sum[c] / n));
+        texels_.push_back(static_cast<std::uint8_t>(sum[3] / n + 0.5));
+      }
+    }
+  }
+  static std::uint8_t encoded(double linear) noexcept {
+    const double v = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+    return static_cast<std::uint8_t>(255 * v + 0.5);
+  }
+
+  std::vector<std::uint8_t> texels_;
+  std::array<float, 256> decode_{};
+  int width_ = 0, height_ = 0, levels_ = 1;
+};
+
+/// A mesh and what its surface looks like. What it does not have stays empty, and costs nothing.
+struct SurfaceMesh {
+  TriangleMesh geometry;
+  std::vector<Vec3f> normals;   ///< one a vertex, unit; empty: the faces'
+  std::vector<Vec3f> colors;    ///< one a vertex, linear RGB; empty: white
+  std::vector<Vec2<float>> uvs;  ///< one a vertex, (0, 0) the texture's top left; empty: no texture
+  std::optional<MeshTexture> texture;
+  Vec3f base_color{1, 1, 1};    ///< linear RGB
+  bool two_sided = false;
+};
+
+/// Meshes and where they stand. Moving an instance is setting its transform.
+class MeshScene {
+ public:
+  /// Returns the mesh's number. Errors: invalid_argument naming what does not fit (indices beyond the vertices,
+  /// numbers of normals, colours or coordinates); the scene is then as it was.
+  Result<std::size_t> add(SurfaceMesh mesh) {
+    const std::size_t n = mesh.geometry.vertices.size();
+    const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, "SurfaceMesh: " + what); };
+    for (std::size_t t = 0; t < mesh.geometry.triangles.size(); ++t) {
+      for (const std::uint32_t i : mesh.geometry.triangles[t]) {
+        if (i >= n) {
+          return bad("triangle " + std::to_string(t) + " has vertex " + std::to_string(i) + " of " + std::to_string(n));
+        }
+      }
+    }
+    const auto fits = [n](const auto& v) { return v.empty() || v.size() == n; };
+    if (!fits(mesh.normals)) return bad("normals: " + std::to_string(mesh.normals.size()) + " for " + std::to_string(n) + " vertices");
+    if (!fits(mesh.colors)) return bad("colors: " + std::to_string(mesh.colors.size()) + " for " + std::to_string(n) + " vertices");
+    if (!fits(mesh.uvs)) return bad("uvs: " + std::to_string(mesh.uvs.size()) + " for " + std::to_string(n) + " vertices");
+    meshes_.push_back({std::move(mesh), {}, {}});
+    find_box(meshes_.back());
+    return meshes_.size() - 1;
+  }
+  std::size_t size() const noexcept { return meshes_.size(); }
+  const SurfaceMesh& mesh(std::size_t i) const noexcept { return meshes_[i].surface; }
+
+  /// The arrays of mesh i; good while the scene is, and no mesh is added.
+  MeshView view(std::size_t i) const noexcept {
+    const Held& held = meshes_[i];
+    const SurfaceMesh& m = held.surface;
+    MeshView v;
+    v.vertices = view_of(m.geometry.vertices);
+    if (!m.geometry.triangles.empty()) v.indices = {m.geometry.triangles.front().data(), 3 * m.geometry.triangles.size()};
+    v.normals = view_of(m.normals);
+    v.colors = view_of(m.colors);
+    v.uvs = view_of(m.uvs);
+    if (m.texture) v.texture = m.texture->view();
+    v.base_color = m.base_color;
+    v.two_sided = m.two_sided;
+    v.low = held.low;
+    v.high = held.high;
+    return v;
+  }
+  /// Mesh i standing in the world.
+  MeshInstance instance(std::size_t i, const Similarity& world_from_mesh = {}, std::uint32_t id = 0) const noexcept {
+    return {view(i), world_from_mesh, id};
+  }
+
+ private:
+  struct Held {
+    SurfaceMesh surface;
+    Vec3f low, high;
+  };
+  static void find_box(Held& held) noexcept {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    held.low = {kInfinity, kInfinity, kInfinity};
+    held.high = -held.low;
+    for (const Vec3f& v : held.surface.geometry.vertices) {
+      if (!is_finite(v)) {  // such a mesh is looked at in every frame: what is left out is counted
+        held.low = {1, 1, 1};
+        held.high = {};
+        return;
+      }
+      held.low = {std::min(held.low.x, v.x), std::min(held.low.y, v.y), std::min(held.low.z, v.z)};
+      held.high = {std::max(held.high.x, v.x), std::max(held.high.y, v.y), std::max(held.high.z, v.z)};
+    }
+  }
+  std::vector<Held> meshes_;
+};
+
+/// A mesh's arrays in a backend's own memory. On host backends nothing is copied: what `mesh` views must outlive it.
+template <Backend B>
+class MeshArrays {
+ public:
+  MeshArrays(B& backend, const MeshView& mesh) : mesh_(mesh) {
+    if constexpr (!is_host_backend<B>) {
+      to_device(backend, mesh_.vertices, vectors_);
+      to_device(backend, mesh_.indices, indices_);
+      to_device(backend, mesh_.normals, vectors_);
+      to_device(backend, mesh_.colors, vectors_);
+      to_device(backend, mesh_.uvs, uvs_);
+      to_device(backend, mesh_.texture.texels, bytes_);
+      to_device(backend, mesh_.texture.decode, floats_);
+    }
+  }
+  MeshInstance instance(const Similarity& world_from_mesh = {}, std::uint32_t id = 0) const noexcept {
+    return {mesh_, world_from_mesh, id};
+  }
+
+ private:
+  template <class T>
+  static void to_device(B& backend, View<const T>& v, std::vector<Buffer<T, B>>& held) {
+    if (v.empty()) return;
+    held.emplace_back(backend).upload(v.data, v.size);
+    v = {held.back().data(), v.size};
+  }
+  MeshView mesh_;
+  std::vector<Buffer<Vec3f, B>> vectors_;
+  std::vector<Buffer<std::uint32_t, B>> indices_;
+  std::vector<Buffer<Vec2<float>, B>> uvs_;
+  std::vector<Buffer<std::uint8_t, B>> bytes_;
+  std::vector<Buffer<float, B>> floats_;
+};
+
+}  // namespace gsnav

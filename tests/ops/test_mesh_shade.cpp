@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "ops/mesh_images.hpp"
+
+namespace {
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+Camera lens(int size, double f) {
+  Camera c;
+  c.width = c.height = size;
+  c.fx = c.fy = f;
+  c.cx = c.cy = 0.5 * size;
+  c.near_plane = 0.05;
+  return c;
+}
+
+double encoded(double linear) {
+  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+}
+
+MeshTexture texture(int width, int height, const auto& texel) {
+  std::vector<std::uint8_t> rgba;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (const int c : texel(x, y)) rgba.push_back(static_cast<std::uint8_t>(c));
+      rgba.push_back(255);
+    }
+  }
+  return MeshTexture::make(width, height, rgba).value();
+}
+
+TEST_CASE("vertex colours are linear in space, not on the screen, and encoded at last") {
+  // A floor from 1 m to 9 m: linear red is (z - 1) / 8.
+  SurfaceMesh floor = quad({-4, 1, 1}, {4, 1, 1}, {4, 1, 9}, {-4, 1, 9});
+  floor.colors = {{0, 1, 0.25f}, {0, 1, 0.25f}, {1, 1, 0.25f}, {1, 1, 0.25f}};
+  const OneMesh mesh(floor);
+  SerialBackend serial;
+  const auto f = draw<float>(serial, mesh.instances, lens(64, 30));
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < f.depth.size(); ++i) {
+    const double z = 30 / (static_cast<double>(i / 64) + 0.5 - 32);
+    if (!(f.depth[i] < 100)) continue;
+    ++seen;
+    REQUIRE(std::abs(static_cast<double>(f.color[3 * i]) - encoded((z - 1) / 8)) < 2e-5);
+    REQUIRE(std::abs(static_cast<double>(f.color[3 * i + 1]) - 1) < 1e-6);
+    REQUIRE(std::abs(static_cast<double>(f.color[3 * i + 2]) - encoded(0.25)) < 1e-6);
+  }
+  CHECK(seen > 1000);
+}
+
+TEST_CASE("a base colour in a byte comes back as that byte") {
+  SerialBackend serial;
+  for (int byte = 0; byte < 256; ++byte) {
+    SurfaceMesh wall = quad({-2, -2, 1}, {2, -2, 1}, {2, 2, 1}, {-2, 2, 1});
+    const float v = srgb_decoded(static_cast<std::uint8_t>(byte));
+    wall.base_color = {v, v, v};
+    CHECK(std::abs(draw<float>(serial, OneMesh(wall).instances, lens(4, 4)).color[0] * 255 - static_cast<float>(byte)) < 1e-3f);
+  }
+}
+
+TEST_CASE("textures: perspective-correct, texel centres, repetition") {
+  // A wall across the view: pixel (x, y) is texel (x, y) of a picture that repeats.
+  const auto value = [](int x, int y) { return std::vector<int>{16 * x, 32 * y, 255 - 16 * x}; };
+  SurfaceMesh wall = quad({-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1});
+  wall.texture = texture(16, 8, value);
+  wall.uvs = {{0, 0}, {2, 0}, {2, 4}, {0, 4}};
+  SerialBackend serial;
+  const auto f = draw<float>(serial, OneMesh(wall).instances, lens(32, 16));
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 32; ++x) {
+      const auto expected = value(x % 16, y % 8);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double got = 255 * static_cast<double>(f.color[3 * static_cast<std::size_t>(y * 32 + x) + c]);
+        CAPTURE(x);
+        CAPTURE(y);
+        REQUIRE(std::abs(got - expected[c]) < 0.02);
+      }
+    }
+  }
+  // The floor again: u runs with depth, and red with u within the picture.
+  SurfaceMesh floor = quad({-4, 1, 1}, {4, 1, 1}, {4, 1, 9}, {-4, 1, 9});
+  floor.texture = texture(256, 1, [](int x, int) { return std::vector<int>{x, x, x}; });
+  floor.uvs = {{0.25f, 0}, {0.25f, 0}, {0.75f, 0}, {0.75f, 0}};
+  const auto g = draw<double>(serial, OneMesh(floor).instances, lens(64, 30));
+  for (std::size_t i = 0; i < g.depth.size(); ++i) {
+    const double z = 30 / (static_cast<double>(i / 64) + 0.5 - 32);
+    // Mipmaps of a ramp are the ramp, but for its curvature in linear light and a shift of a texel of theirs.
+    if (g.depth[i] < 5) REQUIRE(std::abs(255 * g.color[3 * i] - (256 * (0.25 + (z - 1) / 16) - 0.5)) < 1.5);
+  }
+}
+
+TEST_CASE("mipmaps: a far checkerboard is its mean in linear light") {
+  SurfaceMesh wall = quad({-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1});
+  wall.texture = texture(64, 64, [](int x, int y) { const int v = (x + y) % 2 * 255; return std::vector<int>{v, v, v}; });
+  wall.uvs = {{0, 0}, {50, 0}, {50, 50}, {0, 50}};
+  SerialBackend serial;
+  const auto f = draw<float>(serial, OneMesh(wall).instances, lens(32, 16));
+  for (const float c : f.color) REQUIRE(std::abs(static_cast<double>(c) - encoded(0.5)) < 2e-3);  // a byte's half
+  // Odd sizes keep their mean too: 3 x 5, one white column of three.
+  wall.texture = texture(3, 5, [](int x, int) { const int v = x == 1 ? 255 : 0; return std::vector<int>{v, v, v}; });
+  const auto g = draw<float>(serial, OneMesh(wall).instances, lens(32, 16));
+  for (const float c : g.color) REQUIRE(std::abs(static_cast<double>(c) - encoded(1.0 / 3)) < 4e-3);
+}
+
+TEST_CASE("light: ambient and one direction, on the side that is seen") {
+  SurfaceMesh wall = quad({-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1});
+  wall.base_color = {0.5f, 0.25f, 1};
+  const OneMesh mesh(wall);
+  MeshLight light;
+  light.unlit = false;
+  light.ambient = {0.1, 0.2, 0.3};
+  light.diffuse = {0.6, 0.5, 0.4};
+  light.direction = {0, 3, -4};  // from before the wall
+  SerialBackend serial;
+  const auto f = draw<double>(serial, mesh.instances, lens(8, 4), light);
+  CHECK(f.color[0] == doctest::Approx(encoded(0.5 * (0.1 + 0.6 * 0.8))).epsilon(1e-7));
+  CHECK(f.color[1] == doctest::Approx(encoded(0.25 * (0.2 + 0.5 * 0.8))).epsilon(1e-7));
+  light.direction = {0, 0, 1};  // from behind
+  CHECK(draw<double>(serial, mesh.instances, lens(8, 4), light).color[2] == doctest::Approx(encoded(0.3)).epsilon(1e-7));
+}
+
+TEST_CASE("what does not fit is named") {
+  MeshScene scene;
+  SurfaceMesh m = quad({0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1});
+  m.geometry.triangles.push_back({0, 1, 4});
+  CHECK(scene.add(m).status().message().find("triangle 2 has vertex 4 of 4") != std::string::npos);
+  m.geometry.triangles.pop_back();
+  m.colors.resize(3);
+  CHECK(scene.add(m).status().message().find("colors: 3 for 4") != std::string::npos);
+  CHECK(scene.size() == 0);
+  CHECK(!MeshTexture::make(2, 2, std::vector<std::uint8_t>(15)));
+  MeshInstance instance;
+  instance.world_from_mesh.scale = 0;
+  CHECK(validate(instance).message().find("world_from_mesh") != std::string::npos);
+}
+
+}  // namespace
