@@ -16,7 +16,9 @@ build=${GSNAV_FUZZ_BUILD:-$root/build/fuzz}
 seconds=${1:-20}
 shift $(($# > 0 ? 1 : 0))
 
-cmake -S "$root" -B "$build" -G Ninja -DCMAKE_CXX_COMPILER="${GSNAV_FUZZ_CXX:-clang++}" -DCMAKE_BUILD_TYPE=None \
+options=()
+if command -v ccache > /dev/null; then options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
+cmake -S "$root" -B "$build" -G Ninja "${options[@]}" -DCMAKE_CXX_COMPILER="${GSNAV_FUZZ_CXX:-clang++}" -DCMAKE_BUILD_TYPE=None \
   -DGSNAV_FUZZ=ON -DGSNAV_CUDA=OFF -DGSNAV_OPENMP=OFF -DGSNAV_SIM=OFF -DGSNAV_EVAL=OFF -DGSNAV_TOOLS=OFF \
   -DGSNAV_EXAMPLES=OFF -DGSNAV_INSTALL=OFF > /dev/null
 cmake --build "$build" -j "${GSNAV_JOBS:-$("$root/tools/build_jobs.sh")}" --target fuzz_readers fuzz_seeds

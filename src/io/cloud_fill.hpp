@@ -16,6 +16,9 @@
 
 namespace gsnav::io::detail {
 
+/// Rows of a file that are read at a time: enough for a call, few enough for the cache.
+inline constexpr std::size_t kRowsAtOnce = 1024;
+
 /// Takes consecutive rows of a file into the planes of a cloud, by the rules of activate().
 class CloudSink {
  public:

@@ -52,7 +52,7 @@ Result<FileBytes> read_file(const std::filesystem::path& path) {
   bytes.data.reset(new (std::nothrow) std::byte[bytes.size + 1]);
   if (!bytes.data) return {Errc::out_of_memory, path.string() + ": not enough memory"};
   if (!file.read(0, {bytes.data.get(), bytes.size})) {
-    return {Errc::invalid_file, path.string() + ": reading failed, or the file became shorter"};
+    return reading_failed(path.string());
   }
   return bytes;
 }

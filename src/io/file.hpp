@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "gsnav/core/status.hpp"
 
@@ -45,6 +46,41 @@ class RandomFile {
   int fd_ = -1;
   std::uint64_t size_ = 0;
 };
+
+/// Bytes to read from: of memory, or of a file, piece by piece, by any number of threads. What it is
+/// made of must outlive it.
+class ByteSource {
+ public:
+  ByteSource() = default;
+  ByteSource(std::span<const std::byte> bytes) : bytes_(bytes.data()), size_(bytes.size()) {}
+  ByteSource(const RandomFile& file) : file_(&file), size_(file.size()) {}
+
+  std::uint64_t size() const noexcept { return size_; }
+  /// The n bytes from `offset` on, which must be inside: where they lie, or read into `room`. Null:
+  /// reading failed.
+  const std::byte* get(std::uint64_t offset, std::size_t n, std::vector<std::byte>& room) const {
+    if (file_ == nullptr) return bytes_ + offset_ + offset;
+    if (room.size() <= n) room.resize(n + 1);  // no bytes lie somewhere too
+    return file_->read(offset_ + offset, {room.data(), n}) ? room.data() : nullptr;
+  }
+  /// Part of it, which must be inside.
+  ByteSource part(std::uint64_t offset, std::uint64_t size) const noexcept {
+    ByteSource out = *this;
+    out.offset_ += offset;
+    out.size_ = size;
+    return out;
+  }
+
+ private:
+  const std::byte* bytes_ = nullptr;
+  const RandomFile* file_ = nullptr;
+  std::uint64_t offset_ = 0, size_ = 0;
+};
+
+/// What is said where ByteSource::get fails.
+inline Status reading_failed(const std::string& source) {
+  return {Errc::invalid_file, source + ": reading failed, or the file became shorter"};
+}
 
 /// A file being written; what goes wrong is kept until close().
 class OutFile {

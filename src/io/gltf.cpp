@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/io/gltf.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -23,23 +24,6 @@ using detail::member;
 
 constexpr const char* kExtension = "KHR_gaussian_splatting";
 constexpr const char* kSpzExtension = "KHR_gaussian_splatting_compression_spz_2";
-
-/// The rotation, scale and translation that `a` consists of; false where it is more than these.
-bool as_similarity(const Affine3<double>& a, Similarity& out) {
-  const double scale = std::cbrt(determinant(a.linear));
-  if (!(scale > 0) || !std::isfinite(scale)) return false;
-  const Mat3<double> rotation = a.linear * (1 / scale);
-  const Mat3<double> square = rotation * transpose(rotation);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      if (!(std::fabs(square(i, j) - (i == j ? 1 : 0)) < 1e-4)) return false;
-    }
-  }
-  out.rotation = quat_from_matrix(rotation);
-  out.scale = scale;
-  out.translation = a.translation;
-  return normalize(out.rotation) && is_finite(out.translation);
-}
 
 class SplatReader {
  public:
@@ -75,7 +59,7 @@ class SplatReader {
       if (splats == nullptr) continue;
       ++primitives_;
       Similarity world;
-      if (!as_similarity(instance.world_from_mesh, world)) {
+      if (!detail::as_similarity(instance.world_from_mesh, world)) {
         return {Errc::unsupported,
                 where +
                     ": its transform scales unevenly or mirrors, which SH bands cannot follow; "
@@ -129,7 +113,8 @@ class SplatReader {
     }
     const auto view = detail::get_index(spz, "bufferView", detail::kNoIndex, where);
     if (!view) return view.status();
-    const auto bytes = file_.view(*view);
+    std::vector<std::byte> room;
+    const auto bytes = file_.view(*view, room);
     if (!bytes) return bytes.status();
     return parse_spz(*bytes, where, {.keep_axes = true});
   }
@@ -180,28 +165,44 @@ class SplatReader {
         if (Status s = read(*attributes, sh(band, k), "VEC3", where, bands.back()); !s) return s;
       }
     }
+    std::vector<const GltfValues*> planes = {&means, &quats, &scales, &opacities};
+    for (const GltfValues& band : bands) planes.push_back(&band);
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
-      std::array<float, 45> rest;
-      RawGaussian raw;
-      raw.shN = rest.data();
-      for (std::size_t i = first; i < last; ++i) {
-        for (std::size_t k = 0; k < 3; ++k) {
-          const int axis = static_cast<int>(k);
-          raw.mean[axis] = means.at(i, k);
-          raw.log_scales[axis] = std::log(scales.at(i, k));
-          raw.sh0[k] = static_cast<float>(bands[0].at(i, k));
-          for (std::size_t b = 1; b < bands.size(); ++b) {
-            rest[3 * (b - 1) + k] = static_cast<float>(bands[b].at(i, k));
-          }
+      std::vector<std::byte> room;
+      std::vector<std::vector<double>> block(planes.size());
+      for (std::size_t row = first; row < last; row += detail::kRowsAtOnce) {
+        const std::size_t n = std::min(detail::kRowsAtOnce, last - row);
+        for (std::size_t p = 0; p < planes.size(); ++p) {
+          block[p].resize(detail::kRowsAtOnce * planes[p]->components());
+          if (!planes[p]->unpack(row, n, room, block[p].data())) return detail::reading_failed(where);
         }
-        const double opacity = opacities.at(i, 0);  // outside of [0, 1]: NaN, dropped
-        raw.opacity_logit = std::log(opacity / (1 - opacity));
-        raw.quat = {quats.at(i, 3), quats.at(i, 0), quats.at(i, 1), quats.at(i, 2)};
-        sink.add(raw);
+        for (std::size_t i = 0; i < n; ++i) add(block, i, sink);
       }
       return {};
     };
     return detail::fill_cloud(count_, degree, where, decode);
+  }
+
+  /// Row i of blocks of means, quaternions (x y z w), scales, opacities and the SH coefficients.
+  static void add(const std::vector<std::vector<double>>& block, std::size_t i,
+                  detail::CloudSink& sink) {
+    std::array<float, 45> rest;
+    RawGaussian raw;
+    raw.shN = rest.data();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int axis = static_cast<int>(k);
+      raw.mean[axis] = block[0][3 * i + k];
+      raw.log_scales[axis] = std::log(block[2][3 * i + k]);
+      raw.sh0[k] = static_cast<float>(block[4][3 * i + k]);
+      for (std::size_t b = 5; b < block.size(); ++b) {
+        rest[3 * (b - 5) + k] = static_cast<float>(block[b][3 * i + k]);
+      }
+    }
+    const double opacity = block[3][i];  // outside of [0, 1]: NaN, dropped
+    raw.opacity_logit = std::log(opacity / (1 - opacity));
+    const double* q = &block[1][4 * i];
+    raw.quat = {q[3], q[0], q[1], q[2]};
+    sink.add(raw);
   }
 
   const GltfFile& file_;

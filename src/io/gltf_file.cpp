@@ -2,6 +2,7 @@
 #include "gltf_file.hpp"
 
 #include <array>
+#include <memory>
 #include <utility>
 
 #include "zip.hpp"
@@ -64,7 +65,8 @@ bool is_readable_extension(const std::string& name) {
   for (const char* prefix : {"KHR_materials_", "KHR_gaussian_splatting", "KHR_lights_"}) {
     if (name.starts_with(prefix)) return true;
   }
-  return name == "KHR_mesh_quantization" || name == "KHR_xmp_json_ld";
+  return name == "KHR_mesh_quantization" || name == "KHR_texture_transform" ||
+         name == "EXT_texture_webp" || name == "KHR_xmp_json_ld";
 }
 
 }  // namespace
@@ -78,24 +80,65 @@ Result<std::size_t> get_index(const Json& object, const char* key, std::size_t a
 }
 
 Result<GltfFile> GltfFile::open(const std::filesystem::path& path) {
-  auto bytes = read_file(path);
-  if (!bytes) return bytes.status();
-  auto out = parse(bytes->span(), path.string(), path.parent_path());
-  if (out) out->file_ = std::move(*bytes);
+  auto file = std::make_unique<RandomFile>();
+  if (Status s = file->open(path); !s) return s;
+  auto out = parse(*file, path.string(), path.parent_path());
+  if (out) out->files_.push_back(std::move(file));
   return out;
 }
 
-Result<GltfFile> GltfFile::parse(std::span<const std::byte> bytes, const std::string& source,
+Result<GltfFile> GltfFile::parse(const ByteSource& bytes, const std::string& source,
                                  const std::filesystem::path& folder) {
   GltfFile out;
   out.source_ = source;
   out.folder_ = folder;
-  out.size_ = bytes.size();
-  std::span<const std::byte> binary;
+  out.size_ = static_cast<std::size_t>(bytes.size());
+  ByteSource binary;
   if (Status s = out.read_chunks(bytes, binary); !s) return s;
   if (Status s = out.check_asset(); !s) return s;
   if (Status s = out.read_buffers(binary); !s) return s;
   return out;
+}
+
+Status GltfFile::read_chunks(const ByteSource& bytes, ByteSource& binary) {
+  std::vector<std::byte> room;
+  ByteSource text = bytes;
+  const std::byte* header = bytes.size() >= kGlbHeader ? bytes.get(0, kGlbHeader, room) : nullptr;
+  if (header == nullptr && bytes.size() >= kGlbHeader) return reading_failed(source_);
+  if (header != nullptr && load_le<std::uint32_t>(header) == kGlbMagic) {
+    const std::uint32_t version = load_le<std::uint32_t>(header + 4);
+    const std::uint32_t length = load_le<std::uint32_t>(header + 8);
+    if (version != 2) {
+      return {Errc::unsupported, source_ + ": GLB version " + std::to_string(version) + ", 2 is read"};
+    }
+    if (length > bytes.size() || length < kGlbHeader) {
+      return fail("the header promises " + std::to_string(length) + " bytes, " +
+                  std::to_string(bytes.size()) + " are there");
+    }
+    text = {};
+    ByteSource left = bytes.part(kGlbHeader, length - kGlbHeader);
+    for (std::size_t chunk = 0; left.size() >= kChunkHeader; ++chunk) {
+      const std::byte* p = left.get(0, kChunkHeader, room);
+      if (p == nullptr) return reading_failed(source_);
+      const std::uint32_t size = load_le<std::uint32_t>(p), type = load_le<std::uint32_t>(p + 4);
+      const std::uint64_t there = left.size() - kChunkHeader;
+      if (size > there) {
+        return fail("chunk " + std::to_string(chunk) + " has " + std::to_string(size) + " bytes, " +
+                    std::to_string(there) + " are there");
+      }
+      if (chunk == 0 && type == kJsonChunk) text = left.part(kChunkHeader, size);
+      if (chunk == 1 && type == kBinaryChunk) binary = left.part(kChunkHeader, size);
+      left = left.part(kChunkHeader + std::uint64_t{size}, there - size);
+    }
+    if (text.size() == 0) return fail("the first chunk is no JSON");
+  }
+  const auto size = static_cast<std::size_t>(text.size());
+  const std::byte* characters = text.get(0, size, room);
+  if (characters == nullptr && size != 0) return reading_failed(source_);
+  auto json = parse_json({characters, size}, source_);
+  if (!json) return json.status();
+  json_ = std::move(*json);
+  return {};
 }
 
 Status GltfFile::check_asset() const {
@@ -116,38 +159,13 @@ Status GltfFile::check_asset() const {
   return {};
 }
 
-Status GltfFile::read_chunks(std::span<const std::byte> bytes, std::span<const std::byte>& binary) {
-  std::span<const std::byte> text = bytes;
-  if (bytes.size() >= kGlbHeader && load_le<std::uint32_t>(bytes.data()) == kGlbMagic) {
-    const std::uint32_t version = load_le<std::uint32_t>(bytes.data() + 4);
-    const std::uint32_t length = load_le<std::uint32_t>(bytes.data() + 8);
-    if (version != 2) {
-      return {Errc::unsupported, source_ + ": GLB version " + std::to_string(version) + ", 2 is read"};
-    }
-    if (length > bytes.size() || length < kGlbHeader) {
-      return fail("the header promises " + std::to_string(length) + " bytes, " +
-                  std::to_string(bytes.size()) + " are there");
-    }
-    text = {};
-    std::span<const std::byte> left = bytes.subspan(kGlbHeader, length - kGlbHeader);
-    for (std::size_t chunk = 0; left.size() >= kChunkHeader; ++chunk) {
-      const std::size_t size = load_le<std::uint32_t>(left.data());
-      const std::uint32_t type = load_le<std::uint32_t>(left.data() + 4);
-      if (size > left.size() - kChunkHeader) {
-        return fail("chunk " + std::to_string(chunk) + " has " + std::to_string(size) + " bytes, " +
-                    std::to_string(left.size() - kChunkHeader) + " are there");
-      }
-      const auto content = left.subspan(kChunkHeader, size);
-      if (chunk == 0 && type == kJsonChunk) text = content;
-      if (chunk == 1 && type == kBinaryChunk) binary = content;
-      left = left.subspan(kChunkHeader + size);
-    }
-    if (text.empty()) return fail("the first chunk is no JSON");
+Result<std::filesystem::path> GltfFile::beside(const std::string& uri, const std::string& at) const {
+  const std::string name = percent_decoded(uri);
+  // A file must not name others outside its own folder.
+  if (!is_safe_name(name)) {
+    return {Errc::invalid_file, at + ": 'uri' is " + in_quotes(uri) + ": no file beside it or below"};
   }
-  auto json = parse_json(text, source_);
-  if (!json) return json.status();
-  json_ = std::move(*json);
-  return {};
+  return folder_ / name;
 }
 
 Result<std::vector<std::byte>> GltfFile::uri_bytes(const std::string& uri, const std::string& at) const {
@@ -159,18 +177,31 @@ Result<std::vector<std::byte>> GltfFile::uri_bytes(const std::string& uri, const
     }
     return out;
   }
-  const std::string name = percent_decoded(uri);
-  // A file must not name others outside its own folder.
-  if (!is_safe_name(name)) {
-    return {Errc::invalid_file, at + ": 'uri' is " + in_quotes(uri) + ": no file beside it or below"};
-  }
-  const auto file = read_file(folder_ / name);
+  const auto path = beside(uri, at);
+  if (!path) return path.status();
+  const auto file = read_file(*path);
   if (!file) return {file.code(), at + ": " + file.message()};
   out.assign(file->span().begin(), file->span().end());
   return out;
 }
 
-Status GltfFile::read_buffers(std::span<const std::byte> binary) {
+Result<ByteSource> GltfFile::external_buffer(const std::string& uri, const std::string& at) {
+  if (uri.starts_with("data:")) {
+    auto bytes = uri_bytes(uri, at);
+    if (!bytes) return bytes.status();
+    own_.push_back(std::move(*bytes));
+    return ByteSource(std::span<const std::byte>(own_.back()));
+  }
+  const auto path = beside(uri, at);
+  if (!path) return path.status();
+  auto file = std::make_unique<RandomFile>();
+  if (Status s = file->open(*path); !s) return {s.code(), at + ": " + s.message()};
+  files_.push_back(std::move(file));
+  size_ += static_cast<std::size_t>(files_.back()->size());
+  return ByteSource(*files_.back());
+}
+
+Status GltfFile::read_buffers(const ByteSource& binary) {
   for (std::size_t k = 0; k < count("buffers"); ++k) {
     const auto buffer = item("buffers", k);
     if (!buffer) return buffer.status();
@@ -178,23 +209,20 @@ Status GltfFile::read_buffers(std::span<const std::byte> binary) {
     const auto length = get_integer(**buffer, "byteLength", 0, kMostBytes, at);
     if (!length) return length.status();
     const Json* uri = member(**buffer, "uri");
-    std::span<const std::byte> there = binary;
+    ByteSource there = binary;
     if (uri != nullptr || k != 0) {
       if (uri == nullptr || !uri->is_string()) {
         return {Errc::invalid_file, at + ": 'uri' is missing or no text"};
       }
-      const std::string& text = uri->get_ref<const std::string&>();
-      auto bytes = uri_bytes(text, at);
-      if (!bytes) return bytes.status();
-      own_.push_back(std::move(*bytes));
-      there = own_.back();
-      if (!text.starts_with("data:")) size_ += there.size();
+      const auto external = external_buffer(uri->get_ref<const std::string&>(), at);
+      if (!external) return external.status();
+      there = *external;
     }
     if (static_cast<std::uint64_t>(*length) > there.size()) {
       return {Errc::invalid_file, at + ": 'byteLength' is " + std::to_string(*length) + ", " +
                                       std::to_string(there.size()) + " bytes are there"};
     }
-    buffers_.push_back(there.first(static_cast<std::size_t>(*length)));
+    buffers_.push_back(there.part(0, static_cast<std::uint64_t>(*length)));
   }
   return {};
 }
@@ -226,7 +254,7 @@ Result<std::size_t> GltfFile::index(const Json& object, const char* key, const c
   return static_cast<std::size_t>(*v);
 }
 
-Result<std::span<const std::byte>> GltfFile::view(std::size_t view_index) const {
+Result<ByteSource> GltfFile::find_view(std::size_t view_index) const {
   const auto json = item("bufferViews", view_index);
   if (!json) return json.status();
   const std::string at = where("bufferViews", view_index);
@@ -236,13 +264,23 @@ Result<std::span<const std::byte>> GltfFile::view(std::size_t view_index) const 
   for (const Status& s : {buffer.status(), offset.status(), length.status()}) {
     if (!s) return s;
   }
-  const std::size_t there = buffers_[*buffer].size(), size = static_cast<std::size_t>(*length);
+  const std::uint64_t there = buffers_[*buffer].size(), size = static_cast<std::uint64_t>(*length);
   if (*offset > there || size > there - *offset) {
     return {Errc::invalid_file, at + ": " + std::to_string(size) + " bytes from " +
                                     std::to_string(*offset) + " on, its buffer has " +
                                     std::to_string(there)};
   }
-  return buffers_[*buffer].subspan(*offset, size);
+  return buffers_[*buffer].part(*offset, size);
+}
+
+Result<std::span<const std::byte>> GltfFile::view(std::size_t view_index,
+                                                  std::vector<std::byte>& room) const {
+  const auto found = find_view(view_index);
+  if (!found) return found.status();
+  const auto size = static_cast<std::size_t>(found->size());
+  const std::byte* p = found->get(0, size, room);
+  if (p == nullptr && size != 0) return reading_failed(where("bufferViews", view_index));
+  return std::span<const std::byte>(p, size);
 }
 
 }  // namespace gsnav::io::detail

@@ -15,21 +15,24 @@
 
 namespace gsnav::io::detail {
 
-/// The values of an accessor where they lie; normalised integers become fractions.
+/// The values of an accessor where they lie, in memory or in a file; normalised integers become fractions.
 class GltfValues {
  public:
   std::size_t size() const noexcept { return count_; }
   std::size_t components() const noexcept { return components_; }
-  /// Component k of element i.
-  double at(std::size_t i, std::size_t k) const noexcept;
+  /// Elements [first, first + n) as [n][components]; `room` is scratch. False where reading failed.
+  bool unpack(std::size_t first, std::size_t n, std::vector<std::byte>& room, double* out) const;
 
  private:
   friend class GltfFile;
+  /// Bytes from the first of n elements to the end of the last.
+  std::size_t extent(std::size_t n) const noexcept;
+
   std::size_t count_ = 0, components_ = 1, stride_ = 0;
   int type_ = 0;
   bool normalized_ = false;
-  const std::byte* data_ = nullptr;
-  std::shared_ptr<std::vector<std::byte>> own_;  ///< what data_ points to where the accessor is sparse
+  ByteSource bytes_;                             ///< from the first element on
+  std::shared_ptr<std::vector<std::byte>> own_;  ///< what they are made of where the accessor is sparse
 };
 
 /// Numbers of an accessor, element after element, all finite.
@@ -39,15 +42,15 @@ struct GltfNumbers {
   const double* row(std::size_t i) const noexcept { return values.data() + i * width; }
 };
 
-/// A glTF 2.0 file with its buffers: GLB, or JSON with buffers inside of it or beside it. Every index,
-/// offset and size is checked against the bytes there are.
+/// A glTF 2.0 file with its buffers: GLB, or JSON with buffers inside of it or beside it. Buffers stay in their files
+/// and are read where they are asked for. Every index, offset and size is checked against the bytes there are.
 class GltfFile {
  public:
   /// Errors: file_not_found, invalid_file, unsupported (another version, a required extension that is
   /// not read), out_of_memory.
   static Result<GltfFile> open(const std::filesystem::path& path);
   /// The same for a GLB's or JSON's bytes, which must outlive it; `folder` has the other buffers.
-  static Result<GltfFile> parse(std::span<const std::byte> bytes, const std::string& source,
+  static Result<GltfFile> parse(const ByteSource& bytes, const std::string& source,
                                 const std::filesystem::path& folder);
 
   const Json& json() const noexcept { return json_; }
@@ -65,8 +68,8 @@ class GltfFile {
   Result<std::size_t> index(const Json& object, const char* key, const char* list,
                             const std::string& where) const;
 
-  /// Bytes of a buffer view.
-  Result<std::span<const std::byte>> view(std::size_t index) const;
+  /// Bytes of a buffer view, in place or read into `room`.
+  Result<std::span<const std::byte>> view(std::size_t index, std::vector<std::byte>& room) const;
   /// Bytes of a "uri": of a data URI, or of a file in this one's folder. Errors: invalid_file,
   /// file_not_found.
   Result<std::vector<std::byte>> uri_bytes(const std::string& uri, const std::string& where) const;
@@ -80,18 +83,21 @@ class GltfFile {
 
  private:
   Status fail(const std::string& what) const { return {Errc::invalid_file, source_ + ": " + what}; }
-  Status read_chunks(std::span<const std::byte> bytes, std::span<const std::byte>& binary);
+  Status read_chunks(const ByteSource& bytes, ByteSource& binary);
   Status check_asset() const;
-  Status read_buffers(std::span<const std::byte> binary);
+  Status read_buffers(const ByteSource& binary);
+  Result<ByteSource> external_buffer(const std::string& uri, const std::string& where);
+  Result<std::filesystem::path> beside(const std::string& uri, const std::string& where) const;
+  Result<ByteSource> find_view(std::size_t index) const;
   Status locate(const Json& part, const std::string& where, GltfValues& values) const;
   Status apply_sparse(const Json& sparse, const std::string& where, GltfValues& values) const;
 
   std::filesystem::path folder_;
   std::string source_;
   Json json_;
-  FileBytes file_;                           ///< of open()
-  std::vector<std::vector<std::byte>> own_;  ///< buffers out of other files or base64
-  std::vector<std::span<const std::byte>> buffers_;
+  std::vector<std::unique_ptr<RandomFile>> files_;  ///< of open(), and those of buffers
+  std::vector<std::vector<std::byte>> own_;         ///< buffers out of base64
+  std::vector<ByteSource> buffers_;
   std::size_t size_ = 0;
 };
 

@@ -9,6 +9,7 @@
 
 #include "gltf_file.hpp"
 #include "gsnav/math/mat.hpp"
+#include "gsnav/math/similarity.hpp"
 
 namespace gsnav::io::detail {
 
@@ -46,5 +47,8 @@ struct GltfInstance {
 /// All meshes of the scene that the file shows first, or of all nodes where it has no scene; a node's
 /// own mesh before those below it. Errors: invalid_file.
 Result<std::vector<GltfInstance>> read_instances(const GltfFile& file);
+
+/// The rotation, scale and translation that `a` consists of; false where it is more than these.
+bool as_similarity(const Affine3<double>& a, Similarity& out);
 
 }  // namespace gsnav::io::detail

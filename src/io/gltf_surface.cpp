@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "file.hpp"
+#include "gltf_material.hpp"
+#include "gltf_primitive.hpp"
 #include "gltf_skin.hpp"
-#include "picture.hpp"
 
 namespace gsnav::io::detail {
 namespace {
@@ -16,7 +15,11 @@ namespace {
 class SurfaceReader {
  public:
   SurfaceReader(const GltfFile& file, const GltfSkin& skin, LoadedSkinnedMesh& out)
-      : file_(file), skin_(skin), out_(out), mesh_(out.mesh) {}
+      : file_(file),
+        skin_(skin),
+        out_(out),
+        mesh_(out.mesh),
+        materials_(file, out.mesh.textures, out.report.warnings) {}
 
   Status run(std::size_t skin) {
     for (std::size_t n = 0; n < file_.count("nodes"); ++n) {
@@ -42,41 +45,29 @@ class SurfaceReader {
   void warn(const std::string& what) { out_.report.warnings.push_back(what); }
 
   Status read_mesh(std::size_t index) {
-    const auto mesh = file_.item("meshes", index);
-    if (!mesh) return mesh.status();
-    const Json* primitives = member(**mesh, "primitives");
-    if (primitives == nullptr || !primitives->is_array())
-      return {Errc::invalid_file, file_.where("meshes", index) + " has no primitives"};
-    for (std::size_t p = 0; p < primitives->size(); ++p) {
+    const auto primitives = primitives_of(file_, index);
+    if (!primitives) return primitives.status();
+    for (std::size_t p = 0; p < (*primitives)->size(); ++p) {
       const std::string at = file_.where("meshes", index) + ".primitives[" + std::to_string(p) + "]";
-      if (Status s = read_primitive((*primitives)[p], at); !s) return s;
+      if (Status s = read_primitive((**primitives)[p], at); !s) return s;
     }
     return {};
   }
 
-  /// Reads attribute `name`, [count][width], or nothing where it is not there.
-  Result<GltfNumbers> attribute(const Json& attributes, const std::string& name, const std::string& types,
-                                const std::string& at) {
-    if (member(attributes, name.c_str()) == nullptr) return GltfNumbers{};
-    const auto a = file_.index(attributes, name.c_str(), "accessors", at);
-    if (!a) return a.status();
-    auto v = file_.numbers(*a, types);
-    if (v && vertices_ != 0 && v->count != vertices_) {
-      return {Errc::invalid_file, at + ": " + name + " has " + std::to_string(v->count) + " values for " +
-                                      std::to_string(vertices_) + " vertices"};
-    }
-    return v;
+  Result<GltfNumbers> attribute(const Json& primitive, const std::string& name, const std::string& types,
+                                const std::string& at) const {
+    return read_attribute(file_, primitive, name, types, vertices_, at);
   }
 
   Status read_primitive(const Json& primitive, const std::string& at) {
-    const Json* attributes = member(primitive, "attributes");
-    if (attributes == nullptr || !attributes->is_object()) return {Errc::invalid_file, at + " has no attributes"};
-    if (const Json* mode = member(primitive, "mode"); mode != nullptr && *mode != 4) {
-      return {Errc::unsupported, at + ": 'mode' is " + shown(*mode) + "; triangles (4) are read"};
+    const auto drawn = has_triangles(primitive, at);
+    if (!drawn) return drawn.status();
+    if (!*drawn) {
+      return {Errc::unsupported, at + ": 'mode' is " + shown(*member(primitive, "mode")) + "; triangles are read"};
     }
     if (member(primitive, "targets") != nullptr) warn(at + ": morph targets are left out");
     vertices_ = 0;
-    const auto positions = attribute(*attributes, "POSITION", "VEC3", at);
+    const auto positions = attribute(primitive, "POSITION", "VEC3", at);
     if (!positions) return positions.status();
     if (positions->count == 0) return {Errc::invalid_file, at + " has no POSITION"};
     vertices_ = positions->count;
@@ -85,31 +76,49 @@ class SurfaceReader {
       const double* p = positions->row(v);
       mesh_.positions.push_back(skin_.canonical_from_mesh * Vec3d{p[0], p[1], p[2]});
     }
-    if (Status s = read_weights(*attributes, at); !s) return s;
-    const auto uv = attribute(*attributes, "TEXCOORD_0", "VEC2", at),
-               color = attribute(*attributes, "COLOR_0", "VEC3 VEC4", at);
+    if (Status s = read_weights(primitive, at); !s) return s;
+    GltfMaterial material;
+    if (Status s = read_material(primitive, at, material); !s) return s;
+    const auto uv = attribute(primitive, "TEXCOORD_" + std::to_string(material.texcoord), "VEC2", at),
+               color = attribute(primitive, "COLOR_0", "VEC3 VEC4", at);
     if (!uv) return uv.status();
     if (!color) return color.status();
     uvs_.resize(first, {0, 0});
     colors_.resize(first, {1, 1, 1});
     for (std::size_t v = 0; v < vertices_; ++v) {
-      uvs_.push_back(uv->count == 0 ? std::array<double, 2>{0, 0}
-                                    : std::array<double, 2>{uv->row(v)[0], uv->row(v)[1]});
+      uvs_.push_back(uv->count == 0 ? std::array<double, 2>{0, 0} : material.uv(uv->row(v)[0], uv->row(v)[1]));
       colors_.push_back(color->count == 0 ? Vec3d{1, 1, 1}
                                           : Vec3d{color->row(v)[0], color->row(v)[1], color->row(v)[2]});
     }
     has_uvs_ = has_uvs_ || uv->count != 0;
     has_colors_ = has_colors_ || color->count != 0;
-    const auto material = read_material(primitive, at);
-    if (!material) return material.status();
-    return read_triangles(primitive, first, *material, at);
+    const auto triangles = read_triangles(file_, primitive, vertices_, at);
+    if (!triangles) return triangles.status();
+    const auto base = static_cast<std::uint32_t>(first);
+    for (const auto& [a, b, c] : *triangles) mesh_.triangles.push_back({base + a, base + b, base + c});
+    mesh_.materials_of.insert(mesh_.materials_of.end(), triangles->size(),
+                              static_cast<std::uint32_t>(mesh_.materials.size() - 1));
+    return {};
   }
 
-  Status read_weights(const Json& attributes, const std::string& at) {
+  /// Appends the primitive's material, white where it names none.
+  Status read_material(const Json& primitive, const std::string& at, GltfMaterial& out) {
+    if (member(primitive, "material") != nullptr) {
+      const auto index = file_.index(primitive, "material", "materials", at);
+      if (!index) return index.status();
+      const auto read = materials_.read(*index);
+      if (!read) return read.status();
+      out = *read;
+    }
+    mesh_.materials.push_back(out.surface);
+    return {};
+  }
+
+  Status read_weights(const Json& primitive, const std::string& at) {
     std::vector<GltfNumbers> joints, weights;
     for (std::size_t set = 0;; ++set) {
-      auto j = attribute(attributes, "JOINTS_" + std::to_string(set), "VEC4", at);
-      auto w = attribute(attributes, "WEIGHTS_" + std::to_string(set), "VEC4", at);
+      auto j = attribute(primitive, "JOINTS_" + std::to_string(set), "VEC4", at);
+      auto w = attribute(primitive, "WEIGHTS_" + std::to_string(set), "VEC4", at);
       if (!j) return j.status();
       if (!w) return w.status();
       if (j->count == 0 && w->count == 0) break;
@@ -147,130 +156,6 @@ class SurfaceReader {
     return {};
   }
 
-  Status read_triangles(const Json& primitive, std::size_t first, std::uint32_t material, const std::string& at) {
-    std::vector<double> corners;
-    if (member(primitive, "indices") != nullptr) {
-      const auto a = file_.index(primitive, "indices", "accessors", at);
-      if (!a) return a.status();
-      auto v = file_.numbers(*a, "SCALAR");
-      if (!v) return v.status();
-      corners = std::move(v->values);
-    } else {
-      for (std::size_t v = 0; v < vertices_; ++v) corners.push_back(static_cast<double>(v));
-    }
-    for (std::size_t t = 0; t + 2 < corners.size(); t += 3) {
-      std::array<std::uint32_t, 3> triangle{};
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double c = corners[t + k];
-        if (!(c >= 0 && c < static_cast<double>(vertices_)) || c != std::floor(c)) {
-          return {Errc::invalid_file,
-                  at + ": index " + std::to_string(c) + " of " + std::to_string(vertices_) + " vertices"};
-        }
-        triangle[k] = static_cast<std::uint32_t>(first + static_cast<std::size_t>(c));
-      }
-      mesh_.triangles.push_back(triangle);
-      mesh_.materials_of.push_back(material);
-    }
-    return {};
-  }
-
-  Result<std::uint32_t> read_material(const Json& primitive, const std::string& at) {
-    if (member(primitive, "material") == nullptr) {
-      mesh_.materials.emplace_back();
-      return static_cast<std::uint32_t>(mesh_.materials.size() - 1);
-    }
-    const auto index = file_.index(primitive, "material", "materials", at);
-    if (!index) return index.status();
-    if (const auto have = material_of_.find(*index); have != material_of_.end()) return have->second;
-    const Json& material = **file_.item("materials", *index);
-    const std::string where = file_.where("materials", *index);
-    SurfaceMaterial out;
-    if (const Json* mode = member(material, "alphaMode"); mode != nullptr && *mode == "MASK") {
-      out.alpha_cutoff = 0.5;
-      if (member(material, "alphaCutoff") != nullptr) {
-        const auto cut = get_number(material, "alphaCutoff", where);
-        if (!cut) return cut.status();
-        out.alpha_cutoff = *cut;
-      }
-    }
-    if (const Json* pbr = member(material, "pbrMetallicRoughness"); pbr != nullptr) {
-      if (member(*pbr, "baseColorFactor") != nullptr) {
-        const auto factor = get_numbers(*pbr, "baseColorFactor", 4, where);
-        if (!factor) return factor.status();
-        out.factor = {(*factor)[0], (*factor)[1], (*factor)[2]};
-      }
-      if (const Json* texture = member(*pbr, "baseColorTexture"); texture != nullptr) {
-        const auto t = read_texture(*texture, where);
-        if (!t) return t.status();
-        out.texture = *t;
-      }
-    }
-    mesh_.materials.push_back(out);
-    return material_of_[*index] = static_cast<std::uint32_t>(mesh_.materials.size() - 1);
-  }
-
-  Result<std::int32_t> read_texture(const Json& info, const std::string& where) {
-    const auto index = file_.index(info, "index", "textures", where);
-    if (!index) return index.status();
-    if (const Json* set = member(info, "texCoord"); set != nullptr && *set != 0) {
-      warn(where + ": a texture by TEXCOORD_" + set->dump() + " is taken by TEXCOORD_0");
-    }
-    const Json& texture = **file_.item("textures", *index);
-    if (member(texture, "source") == nullptr) {
-      warn(file_.where("textures", *index) + " has no source; the material's colour is taken");
-      return -1;
-    }
-    const auto source = file_.index(texture, "source", "images", file_.where("textures", *index));
-    if (!source) return source.status();
-    if (const auto have = texture_of_.find(*source); have != texture_of_.end()) return have->second;
-    const auto picture = read_picture(*source);
-    if (!picture) {
-      if (picture.code() != Errc::unsupported) return picture.status();
-      warn(picture.message() + "; the material's colour is taken");
-      return texture_of_[*source] = -1;
-    }
-    Texture out{static_cast<std::size_t>(picture->width), static_cast<std::size_t>(picture->height), {}};
-    const std::size_t c = static_cast<std::size_t>(picture->channels);
-    const int shift = picture->bits == 16 ? 8 : 0;
-    out.rgba.resize(4 * out.width * out.height);
-    for (std::size_t i = 0; i < out.width * out.height; ++i) {
-      const std::uint16_t* p = picture->samples.data() + i * c;
-      for (std::size_t k = 0; k < 3; ++k) out.rgba[4 * i + k] = static_cast<std::uint8_t>(p[c >= 3 ? k : 0] >> shift);
-      out.rgba[4 * i + 3] = c == 2 || c == 4 ? static_cast<std::uint8_t>(p[c - 1] >> shift) : std::uint8_t{255};
-    }
-    mesh_.textures.push_back(std::move(out));
-    return texture_of_[*source] = static_cast<std::int32_t>(mesh_.textures.size() - 1);
-  }
-
-  Result<PngImage> read_picture(std::size_t index) {
-    const Json& image = **file_.item("images", index);
-    const std::string where = file_.where("images", index);
-    std::vector<std::byte> own;
-    std::span<const std::byte> bytes;
-    if (const Json* uri = member(image, "uri"); uri != nullptr && uri->is_string()) {
-      auto b = file_.uri_bytes(uri->get<std::string>(), where);
-      if (!b) return b.status();
-      own = std::move(*b);
-      bytes = own;
-    } else {
-      const auto view = file_.index(image, "bufferView", "bufferViews", where);
-      if (!view) return view.status();
-      const auto b = file_.view(*view);
-      if (!b) return b.status();
-      bytes = *b;
-    }
-    const auto begins = [&](std::initializer_list<int> magic) {
-      std::size_t k = 0;
-      for (const int m : magic) {
-        if (k >= bytes.size() || std::to_integer<int>(bytes[k++]) != m) return false;
-      }
-      return true;
-    };
-    if (begins({0x89, 'P', 'N', 'G'})) return decode_png(bytes, where);
-    if (begins({0xff, 0xd8})) return decode_jpeg(bytes, where);
-    return {Errc::unsupported, where + ": neither PNG nor JPEG"};
-  }
-
   void finish() {
     if (has_uvs_) mesh_.uvs = std::move(uvs_);
     if (has_colors_) mesh_.colors = std::move(colors_);
@@ -295,13 +180,12 @@ class SurfaceReader {
   const GltfSkin& skin_;
   LoadedSkinnedMesh& out_;
   SkinnedMesh& mesh_;
+  GltfMaterials materials_;
   std::size_t vertices_ = 0, others_ = 0;
   bool has_uvs_ = false, has_colors_ = false;
   std::vector<std::array<double, 2>> uvs_;
   std::vector<Vec3d> colors_;
   std::vector<std::vector<std::pair<std::size_t, double>>> rows_;  // joints and weights of each vertex
-  std::map<std::size_t, std::uint32_t> material_of_;
-  std::map<std::size_t, std::int32_t> texture_of_;
 };
 
 }  // namespace

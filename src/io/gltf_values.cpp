@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Accessors of a glTF: strides, normalised integers, sparse ones.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -36,28 +37,49 @@ std::size_t components_of(const std::string& type) {
   return type == "MAT4" ? 16 : 0;
 }
 
-double component(const std::byte* p, int type, bool normalized) {
-  switch (type) {
-    case 5120:
-      return normalized ? std::fmax(load_le<std::int8_t>(p) / 127.0, -1.0) : load_le<std::int8_t>(p);
-    case 5121:
-      return load_le<std::uint8_t>(p) / (normalized ? 255.0 : 1.0);
-    case 5122:
-      return normalized ? std::fmax(load_le<std::int16_t>(p) / 32767.0, -1.0) : load_le<std::int16_t>(p);
-    case 5123:
-      return load_le<std::uint16_t>(p) / (normalized ? 65535.0 : 1.0);
-    case 5125:
-      return load_le<std::uint32_t>(p) / (normalized ? 4294967295.0 : 1.0);
-    default:
-      return static_cast<double>(load_le<float>(p));
+/// n elements of `width` numbers of type T, each times `scale` and at least -1 where that is not 1.
+template <class T>
+void unpack_as(const std::byte* from, std::size_t n, std::size_t stride, std::size_t width, double scale,
+               double* out) {
+  for (std::size_t i = 0; i < n; ++i, from += stride) {
+    for (std::size_t k = 0; k < width; ++k) {
+      const double v = static_cast<double>(load_le<T>(from + k * sizeof(T)));
+      *out++ = scale == 1 ? v : std::fmax(v / scale, -1.0);
+    }
   }
 }
 
 }  // namespace
 
-double GltfValues::at(std::size_t i, std::size_t k) const noexcept {
-  return component(data_ + i * stride_ + k * component_size(static_cast<std::size_t>(type_)), type_,
-                   normalized_);
+std::size_t GltfValues::extent(std::size_t n) const noexcept {
+  return n == 0 ? 0 : (n - 1) * stride_ + components_ * component_size(static_cast<std::size_t>(type_));
+}
+
+bool GltfValues::unpack(std::size_t first, std::size_t n, std::vector<std::byte>& room,
+                        double* out) const {
+  const std::byte* p = bytes_.get(std::uint64_t{first} * stride_, extent(n), room);
+  if (p == nullptr) return n == 0;
+  const auto scale = [this](double greatest) { return normalized_ ? greatest : 1.0; };
+  switch (type_) {
+    case 5120:
+      unpack_as<std::int8_t>(p, n, stride_, components_, scale(127), out);
+      break;
+    case 5121:
+      unpack_as<std::uint8_t>(p, n, stride_, components_, scale(255), out);
+      break;
+    case 5122:
+      unpack_as<std::int16_t>(p, n, stride_, components_, scale(32767), out);
+      break;
+    case 5123:
+      unpack_as<std::uint16_t>(p, n, stride_, components_, scale(65535), out);
+      break;
+    case 5125:
+      unpack_as<std::uint32_t>(p, n, stride_, components_, scale(4294967295.0), out);
+      break;
+    default:
+      unpack_as<float>(p, n, stride_, components_, 1.0, out);
+  }
+  return true;
 }
 
 /// Finds the bytes of `values`, whose count, type and components are there, by the "bufferView" and
@@ -68,14 +90,14 @@ Status GltfFile::locate(const Json& part, const std::string& where, GltfValues& 
   for (const Status& s : {view_index.status(), offset.status()}) {
     if (!s) return s;
   }
-  const auto bytes = view(*view_index);
+  const auto bytes = find_view(*view_index);
   if (!bytes) return {bytes.code(), where + ": " + bytes.message()};
   const std::size_t element =
       values.components_ * component_size(static_cast<std::size_t>(values.type_));
   const auto stride = get_index(**item("bufferViews", *view_index), "byteStride", element, where);
   if (!stride) return stride.status();
   values.stride_ = *stride;
-  const std::size_t size = bytes->size();
+  const std::uint64_t size = bytes->size();
   if (values.stride_ < element || *offset > size ||
       (values.count_ != 0 &&
        (size - *offset < element || (size - *offset - element) / values.stride_ < values.count_ - 1))) {
@@ -84,7 +106,7 @@ Status GltfFile::locate(const Json& part, const std::string& where, GltfValues& 
                                     std::to_string(*offset) + " on, its buffer view has " +
                                     std::to_string(size) + " bytes"};
   }
-  values.data_ = bytes->data() + *offset;
+  values.bytes_ = bytes->part(*offset, size - *offset);
   return {};
 }
 
@@ -144,22 +166,29 @@ Status GltfFile::apply_sparse(const Json& sparse, const std::string& where, Gltf
   }
   if (Status s = locate(*rows, where, at); !s) return s;
   if (Status s = locate(*replaced, where, to); !s) return s;
-  const std::size_t element =
-      values.components_ * component_size(static_cast<std::size_t>(values.type_));
+  const std::size_t element = values.extent(1), replaced_bytes = to.extent(to.count_);
   auto own = std::make_shared<std::vector<std::byte>>(element * values.count_);
-  for (std::size_t i = 0; values.data_ != nullptr && i < values.count_; ++i) {
-    std::copy_n(values.data_ + i * values.stride_, element, own->data() + i * element);
-  }
-  for (std::size_t i = 0; i < at.count_; ++i) {
-    const double row = at.at(i, 0);
-    if (!(row < static_cast<double>(values.count_))) {
-      return {Errc::invalid_file, where + ": index " + std::to_string(static_cast<std::uint64_t>(row)) +
-                                      " of " + std::to_string(values.count_)};
+  std::vector<std::byte> room;
+  if (values.bytes_.size() != 0) {
+    const std::byte* from = values.bytes_.get(0, values.extent(values.count_), room);
+    if (from == nullptr) return reading_failed(where);
+    for (std::size_t i = 0; i < values.count_; ++i) {
+      std::copy_n(from + i * values.stride_, element, own->data() + i * element);
     }
-    std::copy_n(to.data_ + i * to.stride_, element,
-                own->data() + static_cast<std::size_t>(row) * element);
   }
-  values.data_ = own->data();
+  std::vector<double> places(at.count_);
+  if (!at.unpack(0, at.count_, room, places.data())) return reading_failed(where);
+  const std::byte* from = to.bytes_.get(0, replaced_bytes, room);
+  if (from == nullptr && replaced_bytes != 0) return reading_failed(where);
+  for (std::size_t i = 0; i < at.count_; ++i) {
+    const auto row = static_cast<std::size_t>(places[i]);
+    if (row >= values.count_) {
+      return {Errc::invalid_file,
+              where + ": index " + std::to_string(row) + " of " + std::to_string(values.count_)};
+    }
+    std::copy_n(from + i * to.stride_, element, own->data() + row * element);
+  }
+  values.bytes_ = ByteSource(std::span<const std::byte>(*own));
   values.stride_ = element;
   values.own_ = std::move(own);
   return {};
@@ -174,13 +203,15 @@ Result<GltfNumbers> GltfFile::numbers(std::size_t accessor, const std::string& t
     return Status(Errc::invalid_file, where("accessors", accessor) + " has no elements");
   out.width = held->components();
   out.values.resize(out.count * out.width);
+  std::vector<std::byte> room;
+  if (!held->unpack(0, out.count, room, out.values.data()))
+    return reading_failed(where("accessors", accessor));
   for (std::size_t i = 0; i < out.values.size(); ++i) {
-    const double v = held->at(i / out.width, i % out.width);
-    if (!std::isfinite(v)) {
+    if (!std::isfinite(out.values[i])) {
       return {Errc::invalid_file, where("accessors", accessor) + ": element " +
-                                      std::to_string(i / out.width) + " is " + std::to_string(v)};
+                                      std::to_string(i / out.width) + " is " +
+                                      std::to_string(out.values[i])};
     }
-    out.values[i] = v;
   }
   return out;
 }
@@ -194,8 +225,13 @@ Result<std::vector<std::uint32_t>> GltfFile::indices(std::size_t accessor) const
   }
   std::vector<std::uint32_t> out;
   out.reserve(held->size());
-  for (std::size_t i = 0; i < held->size(); ++i)
-    out.push_back(static_cast<std::uint32_t>(held->at(i, 0)));
+  std::vector<std::byte> room;
+  std::array<double, 1024> block;
+  for (std::size_t first = 0; first < held->size(); first += block.size()) {
+    const std::size_t n = std::min(block.size(), held->size() - first);
+    if (!held->unpack(first, n, room, block.data())) return reading_failed(where("accessors", accessor));
+    for (std::size_t i = 0; i < n; ++i) out.push_back(static_cast<std::uint32_t>(block[i]));
+  }
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "cloud_fill.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 
@@ -31,20 +32,32 @@ struct Section {
   std::size_t record = 0;               ///< bytes
   int degree = 0;
   double range = 0, step = 0;
-  const std::byte *sizes = nullptr, *centres = nullptr, *records = nullptr;
+  std::size_t first = 0;                ///< place of its first Gaussian among all sections'
+  std::vector<std::byte> bucket_bytes;  ///< sizes of its partial buckets, then the centres of all
+  std::vector<std::uint64_t> ends;      ///< of each partial bucket: one past its last Gaussian
+  detail::ByteSource records;
+
+  const std::byte* centre(std::size_t bucket) const {
+    return bucket_bytes.data() + 4 * partial + bucket * kBucketCentre;
+  }
+  /// The bucket of Gaussian i: full ones come first; empty ones hold nothing.
+  std::size_t bucket_of(std::size_t i) const {
+    if (i < full * capacity) return i / capacity;
+    return full + static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), i) - ends.begin());
+  }
 };
 
 class KsplatReader {
  public:
-  KsplatReader(std::span<const std::byte> bytes, const std::string& source)
+  KsplatReader(const detail::ByteSource& bytes, const std::string& source)
       : bytes_(bytes), source_(source) {}
 
   Result<LoadedCloud> run() {
     if (Status s = read_header(); !s) return s;
-    std::size_t data = kHeader + sections_.size() * kSectionHeader;
-    std::uint64_t sum = 0;
+    std::uint64_t data = kHeader + sections_.size() * kSectionHeader, sum = 0;
     int degree = 0;
     for (std::size_t k = 0; k < sections_.size(); ++k) {
+      sections_[k].first = static_cast<std::size_t>(sum);
       if (Status s = read_section(k, data); !s) return s;
       sum += sections_[k].count;
       degree = std::max(degree, sections_[k].count != 0 ? sections_[k].degree : 0);
@@ -53,14 +66,20 @@ class KsplatReader {
       return fail("the header's count is " + std::to_string(count_) + ", its sections have " +
                   std::to_string(sum));
     }
-    GaussianCloudBuilder builder(degree, source_);
-    builder.reserve(static_cast<std::size_t>(sum));
-    for (const Section& s : sections_) add_section(s, builder);
-    if (data != bytes_.size()) {
-      builder.report().warnings.push_back(std::to_string(bytes_.size() - data) +
-                                          " stray bytes follow the last section");
+    const auto decode = [this](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+      for (const Section& s : sections_) {
+        const std::size_t from = std::max(first, s.first), to = std::min(last, s.first + s.count);
+        if (from >= to) continue;
+        if (Status status = add_rows(s, from - s.first, to - s.first, sink); !status) return status;
+      }
+      return {};
+    };
+    auto out = detail::fill_cloud(static_cast<std::size_t>(sum), degree, source_, decode);
+    if (out && data != bytes_.size()) {
+      out->report.warnings.push_back(std::to_string(bytes_.size() - data) +
+                                     " stray bytes follow the last section");
     }
-    return LoadedCloud{std::move(builder.cloud()), std::move(builder.report())};
+    return out;
   }
 
  private:
@@ -70,7 +89,9 @@ class KsplatReader {
     if (bytes_.size() < kHeader) {
       return fail(std::to_string(bytes_.size()) + " bytes, the header alone has 4096");
     }
-    const std::byte* h = bytes_.data();
+    std::vector<std::byte> room;
+    const std::byte* h = bytes_.get(0, kHeader, room);
+    if (h == nullptr) return detail::reading_failed(source_);
     const int major = std::to_integer<int>(h[0]), minor = std::to_integer<int>(h[1]);
     if (major != 0 || minor < 1) {
       return {Errc::unsupported, source_ + ": version " + std::to_string(major) + "." +
@@ -97,8 +118,10 @@ class KsplatReader {
   }
 
   /// Reads section k, whose data begin at `data`, which is moved to their end.
-  Status read_section(std::size_t k, std::size_t& data) {
-    const std::byte* h = bytes_.data() + kHeader + k * kSectionHeader;
+  Status read_section(std::size_t k, std::uint64_t& data) {
+    std::vector<std::byte> room;
+    const std::byte* h = bytes_.get(kHeader + k * kSectionHeader, kSectionHeader, room);
+    if (h == nullptr) return detail::reading_failed(source_);
     const std::string where = "section " + std::to_string(k) + ": ";
     const auto field = [h](std::size_t offset) {
       return std::uint64_t{load_le<std::uint32_t>(h + offset)};
@@ -126,16 +149,22 @@ class KsplatReader {
                   " buckets need " + std::to_string(size) + " bytes, " +
                   std::to_string(bytes_.size() - data) + " are there");
     }
-    s.sizes = bytes_.data() + data;
-    s.centres = s.sizes + 4 * partial;
-    s.records = s.centres + centre * buckets;
-    data += static_cast<std::size_t>(size);
+    const std::uint64_t tables = 4 * partial + centre * buckets, begin = data;
+    s.records = bytes_.part(begin + tables, s.record * most);
+    data += size;
     if (!quantised_ || s.count == 0) return {};
     if (centre != kBucketCentre) {
       return fail(where + std::to_string(centre) + " bytes to a bucket, must be 12");
     }
+    std::vector<std::byte> table_room;
+    const std::byte* table = bytes_.get(begin, static_cast<std::size_t>(tables), table_room);
+    if (table == nullptr && tables != 0) return detail::reading_failed(source_);
+    s.bucket_bytes.assign(table, table + tables);
     std::uint64_t held = full * s.capacity;
-    for (std::size_t b = 0; b < s.partial; ++b) held += load_le<std::uint32_t>(s.sizes + 4 * b);
+    for (std::size_t b = 0; b < s.partial; ++b) {
+      held += load_le<std::uint32_t>(s.bucket_bytes.data() + 4 * b);
+      s.ends.push_back(held);
+    }
     if (full + partial > buckets || held < s.count) {
       return fail(where + std::to_string(full) + " full and " + std::to_string(partial) +
                   " other buckets, of " + std::to_string(buckets) + " in all, hold " +
@@ -159,49 +188,51 @@ class KsplatReader {
     return rest_low_ + std::to_integer<int>(*p) / 255.0 * (rest_high_ - rest_low_);
   }
 
-  void add_section(const Section& s, GaussianCloudBuilder& builder) const {
-    std::size_t bucket = 0, bucket_end = 0;  // one past the last Gaussian of `bucket`
-    for (std::size_t i = 0; i < s.count; ++i) {
-      const std::byte* record = s.records + i * s.record;
-      RawGaussian raw;
-      if (quantised_) {
-        // Full buckets come first; empty ones hold nothing to read.
-        while (i >= bucket_end) bucket_end += bucket_size(s, bucket++);
-        const std::byte* centre = s.centres + (bucket - 1) * kBucketCentre;
-        for (std::size_t k = 0; k < 3; ++k) {
-          const double steps = load_le<std::uint16_t>(record + 2 * k) - s.range;
-          raw.mean[static_cast<int>(k)] =
-              steps * s.step + static_cast<double>(load_le<float>(centre + 4 * k));
-        }
-      } else {
-        raw.mean = {number(record, 0), number(record, 1), number(record, 2)};
-      }
-      const std::byte* colour = record + 10 * level_.number;
-      for (std::size_t k = 0; k < 3; ++k) {
-        raw.log_scales[static_cast<int>(k)] = std::log(number(record, 3 + k));
-        raw.sh0[k] = detail::sh0_of_colour(std::to_integer<int>(colour[k]) / 255.0);
-      }
-      raw.quat = {number(record, 6), number(record, 7), number(record, 8), number(record, 9)};
-      raw.opacity_logit = detail::opacity_logit(std::to_integer<unsigned>(colour[3]));
-      std::array<float, 45> rest{};
-      raw.shN = rest.data();
-      // Band after band; inside of a band channel after channel.
-      const std::byte* p = colour + 4;
-      for (std::size_t band = 1; band <= static_cast<std::size_t>(s.degree); ++band) {
-        const std::size_t first = band * band - 1, width = 2 * band + 1;
-        for (std::size_t k = 0; k < 3 * width; ++k, p += level_.rest) {
-          rest[3 * (first + k % width) + k / width] = static_cast<float>(coefficient(p));
-        }
-      }
-      builder.add(raw);
+  /// Gaussians [from, to) of a section.
+  Status add_rows(const Section& s, std::size_t from, std::size_t to, detail::CloudSink& sink) const {
+    std::vector<std::byte> room;
+    for (std::size_t row = from; row < to; row += detail::kRowsAtOnce) {
+      const std::size_t n = std::min(detail::kRowsAtOnce, to - row);
+      const std::byte* records = s.records.get(std::uint64_t{row} * s.record, n * s.record, room);
+      if (records == nullptr) return detail::reading_failed(source_);
+      for (std::size_t i = 0; i < n; ++i) add(s, row + i, records + i * s.record, sink);
     }
+    return {};
   }
 
-  static std::size_t bucket_size(const Section& s, std::size_t bucket) {
-    return bucket < s.full ? s.capacity : load_le<std::uint32_t>(s.sizes + 4 * (bucket - s.full));
+  void add(const Section& s, std::size_t i, const std::byte* record, detail::CloudSink& sink) const {
+    RawGaussian raw;
+    if (quantised_) {
+      const std::byte* centre = s.centre(s.bucket_of(i));
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double steps = load_le<std::uint16_t>(record + 2 * k) - s.range;
+        raw.mean[static_cast<int>(k)] =
+            steps * s.step + static_cast<double>(load_le<float>(centre + 4 * k));
+      }
+    } else {
+      raw.mean = {number(record, 0), number(record, 1), number(record, 2)};
+    }
+    const std::byte* colour = record + 10 * level_.number;
+    for (std::size_t k = 0; k < 3; ++k) {
+      raw.log_scales[static_cast<int>(k)] = std::log(number(record, 3 + k));
+      raw.sh0[k] = detail::sh0_of_colour(std::to_integer<int>(colour[k]) / 255.0);
+    }
+    raw.quat = {number(record, 6), number(record, 7), number(record, 8), number(record, 9)};
+    raw.opacity_logit = detail::opacity_logit(std::to_integer<unsigned>(colour[3]));
+    std::array<float, 45> rest{};
+    raw.shN = rest.data();
+    // Band after band; inside of a band channel after channel.
+    const std::byte* p = colour + 4;
+    for (std::size_t band = 1; band <= static_cast<std::size_t>(s.degree); ++band) {
+      const std::size_t first = band * band - 1, width = 2 * band + 1;
+      for (std::size_t k = 0; k < 3 * width; ++k, p += level_.rest) {
+        rest[3 * (first + k % width) + k / width] = static_cast<float>(coefficient(p));
+      }
+    }
+    sink.add(raw);
   }
 
-  std::span<const std::byte> bytes_;
+  detail::ByteSource bytes_;
   const std::string& source_;
   std::uint32_t count_ = 0;
   bool quantised_ = false;
@@ -218,9 +249,9 @@ Result<LoadedCloud> parse_ksplat(std::span<const std::byte> bytes, std::string s
 
 Result<LoadedCloud> load_ksplat(const std::filesystem::path& path) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
-    auto file = detail::read_file(path);
-    if (!file) return file.status();
-    return KsplatReader(file->span(), path.string()).run();
+    detail::RandomFile file;
+    if (Status s = file.open(path); !s) return s;
+    return KsplatReader(file, path.string()).run();
   });
 }
 

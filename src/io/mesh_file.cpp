@@ -107,14 +107,35 @@ Result<TriangleMesh> load_obj(const std::filesystem::path& path) {
   });
 }
 
+namespace {
+
+std::string extension_of(const std::filesystem::path& path) {
+  std::string out = path.extension().string();
+  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return out;
+}
+
+bool is_gltf(const std::string& extension) { return extension == ".glb" || extension == ".gltf"; }
+
+}  // namespace
+
 Result<TriangleMesh> load_mesh(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = extension_of(path);
   if (extension == ".obj") return load_obj(path);
   if (extension == ".ply") return load_ply_mesh(path);
-  if (extension == ".glb" || extension == ".gltf") return load_gltf_mesh(path);
+  if (is_gltf(extension)) return load_gltf_mesh(path);
   return {Errc::unsupported,
           path.string() + ": not a mesh that is read here: .obj, .ply, .glb or .gltf"};
+}
+
+Result<TexturedScene> load_textured_scene(const std::filesystem::path& path) {
+  if (is_gltf(extension_of(path))) return load_gltf_scene(path);
+  auto mesh = load_mesh(path);
+  if (!mesh) return mesh.status();
+  TexturedScene out;
+  out.parts.emplace_back().geometry = std::move(*mesh);
+  out.instances.emplace_back();
+  return out;
 }
 
 }  // namespace gsnav::io

@@ -10,6 +10,8 @@
 #include "ply_body.hpp"
 #include "ply_compressed.hpp"
 #include "ply_header.hpp"
+#include "ply_points.hpp"
+#include "quantised.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -29,14 +31,22 @@ struct Columns {
   int degree = 0;
   std::size_t rest = 0;          ///< f_rest columns read: 3 ((degree + 1)^2 - 1)
   std::size_t rest_in_file = 0;  ///< f_rest properties in the file
+  /// Where the file has red, green, blue and no f_dc: what its colours' 1 is. Else 0.
+  double greatest_colour = 0;
 };
 
 Result<Columns> choose_columns(const PlyElement& vertex, const std::string& source) {
   static constexpr std::array<const char*, kFixed> kNames = {
       "x",       "y",       "z",       "f_dc_0", "f_dc_1", "f_dc_2", "opacity",
       "scale_0", "scale_1", "scale_2", "rot_0",  "rot_1",  "rot_2",  "rot_3"};
+  static constexpr std::array<const char*, 3> kColours = {"red", "green", "blue"};
   Columns c;
-  for (const char* name : kNames) {
+  const PlyProperty* red = vertex.find("red");
+  if (vertex.find("f_dc_0") == nullptr && red != nullptr) {
+    c.greatest_colour = detail::greatest_colour(red->type);
+  }
+  for (std::size_t k = 0; k < kFixed; ++k) {
+    const char* name = c.greatest_colour > 0 && k >= 3 && k < 6 ? kColours[k - 3] : kNames[k];
     const PlyProperty* p = vertex.find(name);
     if (p == nullptr) {
       return {Errc::invalid_file, source + ": element 'vertex' has no property '" + name + "'"};
@@ -76,7 +86,11 @@ void add_block(detail::CloudSink& sink, const Columns& columns, const double* bl
   for (std::size_t i = 0; i < n; ++i) {
     const auto at = [&](std::size_t column) { return block[column * kPlyBlock + i]; };
     raw.mean = {at(0), at(1), at(2)};
-    for (std::size_t k = 0; k < 3; ++k) raw.sh0[k] = static_cast<float>(at(3 + k));
+    for (std::size_t k = 0; k < 3; ++k) {
+      raw.sh0[k] = columns.greatest_colour > 0
+                       ? detail::sh0_of_colour(at(3 + k) / columns.greatest_colour)
+                       : static_cast<float>(at(3 + k));
+    }
     raw.opacity_logit = at(6);
     raw.log_scales = {at(7), at(8), at(9)};
     raw.quat = {at(10), at(11), at(12), at(13)};
@@ -89,6 +103,7 @@ void add_block(detail::CloudSink& sink, const Columns& columns, const double* bl
 struct Vertices {
   std::vector<PlyElement>::const_iterator element;
   Columns columns;
+  bool points = false;  ///< with colours and nothing else
 };
 
 Result<Vertices> find_vertices(const PlyHeader& header, const std::string& source) {
@@ -99,6 +114,8 @@ Result<Vertices> find_vertices(const PlyHeader& header, const std::string& sourc
     return {Errc::invalid_file, source + ": no element 'vertex'"};
   }
   if (detail::is_compressed_ply(header)) return v;
+  v.points = !v.element->has_list && detail::is_point_cloud(*v.element);
+  if (v.points) return v;
   if (v.element->has_list) {
     return {Errc::unsupported, source + ": element 'vertex' has a list property"};
   }
@@ -145,6 +162,7 @@ Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& s
   const auto found = find_vertices(header, source);
   if (!found) return found.status();
   if (detail::is_compressed_ply(header)) return detail::parse_compressed_ply(bytes, header, source);
+  if (found->points) return detail::parse_ply_points(bytes, header, source);
   const PlyElement& vertex = *found->element;
   PlyBody body(bytes, header);
   for (auto e = header.elements.begin(); e != found->element; ++e) {
@@ -234,7 +252,8 @@ Result<LoadedCloud> load_ply(const std::filesystem::path& path) {
     if (!header) return header.status();
     const auto found = find_vertices(*header, source);
     if (!found) return found.status();
-    if (has_fixed_rows(*header) && !detail::is_compressed_ply(*header)) {
+    if (detail::is_compressed_ply(*header)) return detail::parse_compressed_ply(file, *header, source);
+    if (has_fixed_rows(*header) && !found->points) {
       return load_rows(file, *header, *found, source);
     }
     const auto bytes = detail::read_file(path);

@@ -15,22 +15,27 @@ namespace {
 
 constexpr std::size_t kChunk = 256;  // Gaussians that share their bounds
 
-/// The rows of an element, all of which are inside the file, and where the values of interest lie.
+/// An element, all of whose rows are inside the file, and where the values of interest lie.
 struct Rows {
   const PlyElement* element = nullptr;
-  const std::byte* first = nullptr;
+  ByteSource bytes;
   std::vector<std::size_t> offsets;
+};
+
+/// Some consecutive rows of an element in memory.
+struct Block {
+  const Rows* rows = nullptr;
+  const std::byte* first = nullptr;
 
   template <class T>
   T at(std::size_t row, std::size_t value) const noexcept {
-    return load_le<T>(first + row * element->stride + offsets[value]);
+    return load_le<T>(first + row * rows->element->stride + rows->offsets[value]);
   }
 };
 
 class CompressedPlyReader {
  public:
-  CompressedPlyReader(std::span<const std::byte> bytes, const PlyHeader& header,
-                      const std::string& source)
+  CompressedPlyReader(const ByteSource& bytes, const PlyHeader& header, const std::string& source)
       : bytes_(bytes), header_(header), source_(source) {}
 
   Result<LoadedCloud> run() {
@@ -39,8 +44,21 @@ class CompressedPlyReader {
     }
     if (Status s = find_rows(); !s) return s;
     if (Status s = find_columns(); !s) return s;
-    const auto decode = [this](std::size_t first, std::size_t last, CloudSink& sink) -> Status {
-      for (std::size_t i = first; i < last; ++i) add(i, sink);
+    std::vector<std::byte> chunk_room;
+    Block chunks;
+    if (Status s = get(chunk_, 0, static_cast<std::size_t>(chunk_.element->count), chunk_room, chunks);
+        !s) {
+      return s;
+    }
+    const auto decode = [&](std::size_t first, std::size_t last, CloudSink& sink) -> Status {
+      std::vector<std::byte> vertex_room, sh_room;
+      Block vertex, sh;
+      for (std::size_t row = first; row < last; row += kRowsAtOnce) {
+        const std::size_t n = std::min(kRowsAtOnce, last - row);
+        if (Status s = get(vertex_, row, n, vertex_room, vertex); !s) return s;
+        if (Status s = get(sh_, row, n, sh_room, sh); !s) return s;
+        for (std::size_t i = 0; i < n; ++i) add(chunks, (row + i) / kChunk, vertex, sh, i, sink);
+      }
       return {};
     };
     auto out = fill_cloud(static_cast<std::size_t>(vertex_.element->count), degree_, source_, decode);
@@ -59,19 +77,29 @@ class CompressedPlyReader {
  private:
   Status fail(const std::string& what) const { return {Errc::invalid_file, source_ + ": " + what}; }
 
+  /// n rows from `row` on, of an element that may not be there.
+  Status get(const Rows& rows, std::size_t row, std::size_t n, std::vector<std::byte>& room,
+             Block& out) const {
+    out.rows = &rows;
+    if (rows.element == nullptr) return {};
+    const std::size_t stride = rows.element->stride;
+    out.first = rows.bytes.get(std::uint64_t{row} * stride, n * stride, room);
+    return out.first != nullptr ? Status() : reading_failed(source_);
+  }
+
   /// Finds the three elements, each of which must be in the file as a whole.
   Status find_rows() {
-    std::size_t at = header_.size;
+    std::uint64_t at = header_.size;
     for (const PlyElement& e : header_.elements) {
       if (e.has_list) {
         return {Errc::unsupported, source_ + ": element " + in_quotes(e.name) + " has a list property"};
       }
       Rows* rows = e.name == "chunk" ? &chunk_ : e.name == "vertex" ? &vertex_ : &sh_;
-      if (rows != &sh_ || e.name == "sh") *rows = {&e, bytes_.data() + at, {}};
+      if (rows != &sh_ || e.name == "sh") *rows = {&e, bytes_.part(at, 0), {}};
       if (e.stride == 0) continue;
       const std::uint64_t there = (bytes_.size() - at) / e.stride;
       if (there < e.count) return ply_rows_missing(source_, e, there);
-      at += static_cast<std::size_t>(e.count) * e.stride;
+      at += e.count * e.stride;
     }
     stray_ = bytes_.size() - at;
     if (chunk_.element == nullptr) return fail("no element 'chunk'");
@@ -139,9 +167,10 @@ class CompressedPlyReader {
 
   /// Where the `bits` from `shift` on lie between a chunk's bounds of value `which` (x y z, scales,
   /// rgb).
-  double between(std::size_t chunk, std::size_t which, std::uint32_t packed, int shift, int bits) const {
-    const double low = static_cast<double>(chunk_.at<float>(chunk, which)),
-                 high = static_cast<double>(chunk_.at<float>(chunk, bounds() + which)),
+  double between(const Block& chunks, std::size_t chunk, std::size_t which, std::uint32_t packed,
+                 int shift, int bits) const {
+    const double low = static_cast<double>(chunks.at<float>(chunk, which)),
+                 high = static_cast<double>(chunks.at<float>(chunk, bounds() + which)),
                  t = fraction(packed, shift, bits);
     return (1 - t) * low + t * high;  // std::lerp may turn a NaN into a number
   }
@@ -151,20 +180,20 @@ class CompressedPlyReader {
     return static_cast<double>((packed >> shift) & most) / static_cast<double>(most);
   }
 
-  void add(std::size_t i, CloudSink& sink) const {
-    const std::size_t chunk = i / kChunk;
-    const std::uint32_t position = vertex_.at<std::uint32_t>(i, 0),
-                        rotation = vertex_.at<std::uint32_t>(i, 1),
-                        scale = vertex_.at<std::uint32_t>(i, 2),
-                        colour = vertex_.at<std::uint32_t>(i, 3);
+  /// Row i of the blocks, which is of `chunk`.
+  void add(const Block& chunks, std::size_t chunk, const Block& vertex, const Block& sh, std::size_t i,
+           CloudSink& sink) const {
+    const std::uint32_t position = vertex.at<std::uint32_t>(i, 0),
+                        rotation = vertex.at<std::uint32_t>(i, 1),
+                        scale = vertex.at<std::uint32_t>(i, 2), colour = vertex.at<std::uint32_t>(i, 3);
     static constexpr int kShift[] = {21, 11, 0}, kBits[] = {11, 10, 11};
     RawGaussian raw;
     double others[3];
     for (std::size_t k = 0; k < 3; ++k) {
       const int axis = static_cast<int>(k);
-      raw.mean[axis] = between(chunk, k, position, kShift[k], kBits[k]);
-      raw.log_scales[axis] = between(chunk, 3 + k, scale, kShift[k], kBits[k]);
-      raw.sh0[k] = sh0_of_colour(has_colours_ ? between(chunk, 6 + k, colour, 24 - 8 * axis, 8)
+      raw.mean[axis] = between(chunks, chunk, k, position, kShift[k], kBits[k]);
+      raw.log_scales[axis] = between(chunks, chunk, 3 + k, scale, kShift[k], kBits[k]);
+      raw.sh0[k] = sh0_of_colour(has_colours_ ? between(chunks, chunk, 6 + k, colour, 24 - 8 * axis, 8)
                                               : fraction(colour, 24 - 8 * axis, 8));
       others[k] = (fraction(rotation, 20 - 10 * axis, 10) - 0.5) * std::sqrt(2.0);
     }
@@ -174,7 +203,7 @@ class CompressedPlyReader {
     raw.shN = rest.data();
     for (std::size_t k = 0; k < sh_.offsets.size(); ++k) {
       // 256 cells over [-4, 4], each read at its middle; the first and the last at their outer end.
-      const double byte = static_cast<double>(sh_.at<std::uint8_t>(i, k));
+      const double byte = static_cast<double>(sh.at<std::uint8_t>(i, k));
       const double value = byte == 0 ? 0 : byte == 255 ? 1 : (byte + 0.5) / 256;
       rest[k] = static_cast<float>(8 * (value - 0.5));
     }
@@ -183,7 +212,7 @@ class CompressedPlyReader {
 
   static constexpr std::size_t kMostSh = 72;
 
-  std::span<const std::byte> bytes_;
+  ByteSource bytes_;
   const PlyHeader& header_;
   const std::string& source_;
   Rows chunk_, vertex_, sh_;
@@ -200,7 +229,7 @@ bool is_compressed_ply(const PlyHeader& header) {
   });
 }
 
-Result<LoadedCloud> parse_compressed_ply(std::span<const std::byte> bytes, const PlyHeader& header,
+Result<LoadedCloud> parse_compressed_ply(const ByteSource& bytes, const PlyHeader& header,
                                          const std::string& source) {
   return CompressedPlyReader(bytes, header, source).run();
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "file.hpp"
 #include "ply_header.hpp"
 
 namespace gsnav::io::detail {
@@ -16,7 +17,7 @@ bool is_compressed_ply(const PlyHeader& header);
 /// Reads PlayCanvas' compressed PLY: 256 Gaussians share a row of `chunk`, the bounds that the packed
 /// integers of `vertex` are fractions of; the optional `sh` has a byte for each f_rest_*.
 /// `bytes` is the whole file. Errors as parse_ply.
-Result<LoadedCloud> parse_compressed_ply(std::span<const std::byte> bytes, const PlyHeader& header,
+Result<LoadedCloud> parse_compressed_ply(const ByteSource& bytes, const PlyHeader& header,
                                          const std::string& source);
 
 }  // namespace gsnav::io::detail

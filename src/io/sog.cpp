@@ -55,6 +55,12 @@ class SogFiles {
     return std::vector<std::byte>(file->span().begin(), file->span().end());
   }
 
+  /// Lets go of a bundle's bytes: nothing is read afterwards.
+  void close() noexcept {
+    zip_.reset();
+    bundle_ = {};
+  }
+
  private:
   Status open_bundle(const std::filesystem::path& path) {
     bundle_name_ = path.string();
@@ -110,7 +116,7 @@ struct Plane {
 
 class SogReader {
  public:
-  SogReader(const SogFiles& files, SogMeta meta) : files_(files), meta_(std::move(meta)) {}
+  SogReader(SogFiles& files, SogMeta meta) : files_(files), meta_(std::move(meta)) {}
 
   /// All rows, or those of `ranges` where it is given.
   Result<LoadedCloud> run(const std::string& source, const std::vector<detail::RowRange>* ranges) {
@@ -126,6 +132,7 @@ class SogReader {
       total += r.count;
     }
     if (Status s = read_planes(); !s) return s;
+    files_.close();
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
       RawGaussian raw;
       std::array<float, 45> rest;
@@ -256,7 +263,7 @@ class SogReader {
   static constexpr int kFirstMode = 252;
   static constexpr std::size_t kEntriesPerRow = 64, kMostRows = 1024;
 
-  const SogFiles& files_;
+  SogFiles& files_;
   SogMeta meta_;
   Plane low_, high_, scales_, quats_, sh0_, labels_, centroids_;
 };

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/io/splat.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "cloud_fill.hpp"
 #include "file.hpp"
@@ -30,16 +32,22 @@ RawGaussian gaussian(const std::byte* p) {
   return raw;
 }
 
-Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source) {
-  if (bytes.empty() || bytes.size() % kRecord != 0) {
+Result<LoadedCloud> parse(const detail::ByteSource& bytes, const std::string& source) {
+  if (bytes.size() == 0 || bytes.size() % kRecord != 0) {
     return {Errc::invalid_file, source + ": " + std::to_string(bytes.size()) +
                                     " bytes, must be records of 32 bytes, at least one"};
   }
-  const auto decode = [bytes](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
-    for (std::size_t i = first; i < last; ++i) sink.add(gaussian(bytes.data() + i * kRecord));
+  const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+    std::vector<std::byte> room;
+    for (std::size_t row = first; row < last; row += detail::kRowsAtOnce) {
+      const std::size_t n = std::min(detail::kRowsAtOnce, last - row);
+      const std::byte* p = bytes.get(std::uint64_t{row} * kRecord, n * kRecord, room);
+      if (p == nullptr) return detail::reading_failed(source);
+      for (std::size_t i = 0; i < n; ++i) sink.add(gaussian(p + i * kRecord));
+    }
     return {};
   };
-  return detail::fill_cloud(bytes.size() / kRecord, 0, source, decode);
+  return detail::fill_cloud(static_cast<std::size_t>(bytes.size() / kRecord), 0, source, decode);
 }
 
 }  // namespace
@@ -50,9 +58,9 @@ Result<LoadedCloud> parse_splat(std::span<const std::byte> bytes, std::string so
 
 Result<LoadedCloud> load_splat(const std::filesystem::path& path) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
-    auto file = detail::read_file(path);
-    if (!file) return file.status();
-    return parse(file->span(), path.string());
+    detail::RandomFile file;
+    if (Status s = file.open(path); !s) return s;
+    return parse(file, path.string());
   });
 }
 

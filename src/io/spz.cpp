@@ -98,9 +98,8 @@ class SpzDecoder {
   bool turn_;
 };
 
-Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source,
-                          const LoadSpzOptions& options) {
-  const auto planes = detail::read_spz_planes(bytes, source);
+Result<LoadedCloud> decode(const Result<detail::SpzPlanes>& planes, const std::string& source,
+                           const LoadSpzOptions& options) {
   if (!planes) return planes.status();
   return SpzDecoder(*planes, !options.keep_axes).run(source);
 }
@@ -109,15 +108,19 @@ Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& s
 
 Result<LoadedCloud> parse_spz(std::span<const std::byte> bytes, std::string source,
                               const LoadSpzOptions& options) {
-  return detail::guarded(source, [&] { return parse(bytes, source, options); });
+  return detail::guarded(
+      source, [&] { return decode(detail::read_spz_planes(bytes, source), source, options); });
 }
 
 Result<LoadedCloud> load_spz(const std::filesystem::path& path, const LoadSpzOptions& options) {
-  return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
-    auto file = detail::read_file(path);
+  const std::string source = path.string();
+  // The packed bytes are gone before the cloud is made.
+  const auto planes = [&]() -> Result<detail::SpzPlanes> {
+    const auto file = detail::read_file(path);
     if (!file) return file.status();
-    return parse(file->span(), path.string(), options);
-  });
+    return detail::read_spz_planes(file->span(), source);
+  };
+  return detail::guarded(source, [&] { return decode(planes(), source, options); });
 }
 
 }  // namespace gsnav::io

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <thread>
 #include <vector>
 
 #include "cloud_check.hpp"
 #include "file.hpp"
+#include "gsnav/core/thread_pool.hpp"
 #include "gsnav/io/spz.hpp"
 #include "quantised.hpp"
 #include "spz_planes.hpp"
@@ -16,9 +19,12 @@ namespace gsnav::io {
 namespace {
 
 constexpr int kLevel = 12;  // of zstd: beyond it the files hardly shrink
+constexpr int kJob = 1 << 20;
 constexpr std::uint32_t kTocOffset = 32;
 
 using Plane = std::vector<std::uint8_t>;
+
+int threads() { return static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 16u)); }
 
 class SpzWriter {
  public:
@@ -29,20 +35,20 @@ class SpzWriter {
     if (Status s = check(); !s) return s;
     const std::size_t coefficients = header_.coefficients();
     const auto widths = header_.widths();
-    for (std::size_t k = 0; k < 6; ++k) planes_[k].reserve(widths[k] * cloud_.size());
-    for (std::size_t i = 0; i < cloud_.size(); ++i) add(i, coefficients);
+    for (std::size_t k = 0; k < 6; ++k) planes_[k].resize(widths[k] * cloud_.size());
+    constexpr std::size_t kPiece = 8192;
+    const std::size_t pieces = (cloud_.size() + kPiece - 1) / kPiece;
+    ThreadPool(threads()).run(static_cast<std::uint32_t>(pieces), [&](std::uint32_t p) {
+      for (std::size_t i = p * kPiece; i < std::min((p + 1) * kPiece, cloud_.size()); ++i)
+        add(i, coefficients);
+    });
     std::vector<Plane> streams;
     std::vector<std::array<std::uint64_t, 2>> toc;
     for (std::size_t k = 0; k < 6; ++k) {
       if (widths[k] == 0) continue;
-      Plane packed(ZSTD_compressBound(planes_[k].size()));
-      const std::size_t n =
-          ZSTD_compress(packed.data(), packed.size(), planes_[k].data(), planes_[k].size(), kLevel);
-      if (ZSTD_isError(n) != 0) {
-        return {Errc::out_of_memory, target_ + ": zstd: " + ZSTD_getErrorName(n)};
-      }
-      packed.resize(n);
-      toc.push_back({n, planes_[k].size()});
+      Plane packed;
+      if (Status s = pack(planes_[k], packed); !s) return s;
+      toc.push_back({packed.size(), planes_[k].size()});
       streams.push_back(std::move(packed));
     }
     detail::OutFile out;
@@ -62,6 +68,24 @@ class SpzWriter {
 
  private:
   Status fail(const std::string& what) const { return {Errc::invalid_argument, target_ + ": " + what}; }
+
+  /// Compresses by zstd's own threads where it has them; the bytes do not depend on their number.
+  Status pack(const Plane& plane, Plane& packed) const {
+    const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(),
+                                                                          ZSTD_freeCCtx);
+    if (!context) return {Errc::out_of_memory, target_ + ": not enough memory"};
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_nbWorkers, threads());  // an error where it has none
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_jobSize, kJob);
+    packed.resize(ZSTD_compressBound(plane.size()));
+    const std::size_t n =
+        ZSTD_compress2(context.get(), packed.data(), packed.size(), plane.data(), plane.size());
+    if (ZSTD_isError(n) != 0) {
+      return {Errc::out_of_memory, target_ + ": zstd: " + ZSTD_getErrorName(n)};
+    }
+    packed.resize(n);
+    return {};
+  }
 
   Status check() {
     if (Status s = detail::check_arrays(target_, cloud_); !s) return s;
@@ -99,22 +123,23 @@ class SpzWriter {
       const auto steps =
           static_cast<std::int32_t>(std::nearbyint(std::ldexp(place[k], header_.fractional_bits)));
       for (int shift = 0; shift < 24; shift += 8) {
-        planes_[0].push_back(static_cast<std::uint8_t>(static_cast<std::uint32_t>(steps) >> shift));
+        planes_[0][9 * i + 3 * k + static_cast<std::size_t>(shift / 8)] =
+            static_cast<std::uint8_t>(static_cast<std::uint32_t>(steps) >> shift);
       }
       const double colour = static_cast<double>(cloud_.sh0[3 * i + k]) * 0.15 + 0.5;
-      planes_[2].push_back(static_cast<std::uint8_t>(detail::nearest_step(colour, 8)));
+      planes_[2][3 * i + k] = static_cast<std::uint8_t>(detail::nearest_step(colour, 8));
       const double log_scale = std::log(static_cast<double>(cloud_.scales[k][i]));
-      planes_[3].push_back(
-          static_cast<std::uint8_t>(detail::nearest_step((log_scale + 10) * 16 / 255, 8)));
+      planes_[3][3 * i + k] =
+          static_cast<std::uint8_t>(detail::nearest_step((log_scale + 10) * 16 / 255, 8));
     }
     const double opacity = static_cast<double>(cloud_.opacities[i]);
-    planes_[1].push_back(static_cast<std::uint8_t>(detail::nearest_step(opacity, 8)));
+    planes_[1][i] = static_cast<std::uint8_t>(detail::nearest_step(opacity, 8));
     add_quaternion(i);
     for (std::size_t k = 0; k < 3 * coefficients; ++k) {
       const float sign = options_.keep_axes ? 1.0f : detail::kHalfTurnAboutX[k / 3];
       const int bits = k < 9 ? options_.sh1_bits : options_.sh_rest_bits;
-      planes_[5].push_back(
-          sh_byte(static_cast<double>(sign * cloud_.shN[3 * coefficients * i + k]), bits));
+      planes_[5][3 * coefficients * i + k] =
+          sh_byte(static_cast<double>(sign * cloud_.shN[3 * coefficients * i + k]), bits);
     }
   }
 
@@ -128,7 +153,7 @@ class SpzWriter {
       word = word << 10 | (c < 0 ? 512u : 0u) | magnitude;
     }
     for (int shift = 0; shift < 32; shift += 8) {
-      planes_[4].push_back(static_cast<std::uint8_t>(word >> shift));
+      planes_[4][4 * i + static_cast<std::size_t>(shift / 8)] = static_cast<std::uint8_t>(word >> shift);
     }
   }
 

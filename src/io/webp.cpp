@@ -13,23 +13,35 @@ const std::uint8_t* data_of(std::span<const std::byte> bytes) {
 
 }  // namespace
 
-Result<WebpSize> webp_size(std::span<const std::byte> bytes, const std::string& what) {
+Result<WebpSize> webp_size(std::span<const std::byte> bytes, const std::string& what, WebpUse use) {
   constexpr int kLossless = 2;
   WebPBitstreamFeatures features;
   if (WebPGetFeatures(data_of(bytes), bytes.size(), &features) != VP8_STATUS_OK || features.width <= 0 ||
       features.height <= 0) {
     return {Errc::invalid_file, what + ": not a WebP image, or truncated"};
   }
+  const auto width = static_cast<std::size_t>(features.width),
+             height = static_cast<std::size_t>(features.height);
+  if (use == WebpUse::picture) {
+    if (features.has_animation != 0) return {Errc::unsupported, what + ": an animated WebP"};
+    // Sets of planes are checked against their counts; a picture of one colour takes next to no bytes.
+    constexpr std::size_t kBelieved = std::size_t{1} << 22;
+    if (width * height > kBelieved && width * height / 512 > bytes.size()) {
+      return {Errc::invalid_file, what + ": " + std::to_string(width) + " x " + std::to_string(height) +
+                                      " pixels in " + std::to_string(bytes.size()) + " bytes"};
+    }
+    return WebpSize{width, height};
+  }
   if (features.has_animation != 0 || features.format != kLossless) {
     return {Errc::unsupported, what +
                                    ": must be a lossless WebP without animation; another one does not "
                                    "keep the numbers that its pixels stand for"};
   }
-  return WebpSize{static_cast<std::size_t>(features.width), static_cast<std::size_t>(features.height)};
+  return WebpSize{width, height};
 }
 
-Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::string& what) {
-  const auto size = webp_size(bytes, what);
+Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::string& what, WebpUse use) {
+  const auto size = webp_size(bytes, what, use);
   if (!size) return size.status();
   RgbaImage image;
   image.width = size->width;

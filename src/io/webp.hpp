@@ -23,11 +23,17 @@ struct WebpSize {
   std::size_t width = 0, height = 0;
 };
 
-/// Errors: invalid_file (no WebP), unsupported (lossy or animated: planes hold numbers, not pictures).
-Result<WebpSize> webp_size(std::span<const std::byte> bytes, const std::string& what);
+/// What pixels stand for: planes of numbers must be lossless, pictures may be lossy.
+enum class WebpUse { numbers, picture };
 
-/// Decodes a lossless WebP; alpha is left as stored, not multiplied into the colours.
-Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::string& what);
+/// Errors: invalid_file (no WebP, or a picture with far more pixels than its bytes can hold),
+/// unsupported (animated; lossy numbers).
+Result<WebpSize> webp_size(std::span<const std::byte> bytes, const std::string& what,
+                           WebpUse use = WebpUse::numbers);
+
+/// Decodes a WebP; alpha is left as stored, not multiplied into the colours.
+Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::string& what,
+                              WebpUse use = WebpUse::numbers);
 
 /// Encodes pixels losslessly, colours under alpha 0 too. Errors: out_of_memory, unsupported (a side
 /// beyond 16383).

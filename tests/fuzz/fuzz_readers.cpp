@@ -18,6 +18,7 @@
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/io/npz_file.hpp"
 #include "gsnav/io/ply.hpp"
+#include "gsnav/io/skinned_mesh_file.hpp"
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
 #include "gsnav/io/spz.hpp"
@@ -107,7 +108,26 @@ void read_gltf(const std::string& input) {
   const std::string rest = input.substr(input.empty() ? 0 : 1);
   const std::string file = input.empty() || input[0] == 0 ? rest : GlbFile::glb(rest, binary);
   check(io::parse_gltf(bytes_of(file), "fuzz", {.keep_axes = false, .spz_compression = true}));
-  check(io::load_gltf_mesh(file_of(file)));
+}
+
+void read_surface(const std::string& input) {
+  // As above.
+  static const std::string binary = surface_file().bytes;
+  const std::string rest = input.substr(input.empty() ? 0 : 1);
+  const auto path = file_of(input.empty() || input[0] == 0 ? rest : GlbFile::glb(rest, binary));
+  check(io::load_gltf_mesh(path));
+  (void)io::load_gltf_skin(path);
+  const auto scene = io::load_gltf_scene(path);
+  if (!scene) return;
+  for (const auto& instance : scene->instances) {
+    if (instance.part >= scene->parts.size()) stop("an instance without its part");
+  }
+  for (const TexturedPart& part : scene->parts) {
+    check(Result<TriangleMesh>(part.geometry));
+    if (part.material.texture >= static_cast<std::int32_t>(scene->textures.size())) {
+      stop("a part without its texture");
+    }
+  }
 }
 
 void read_lod_set(const std::string& input) {
@@ -175,6 +195,7 @@ const std::map<std::string, Reader> kReaders = {
       64 * kMiB, 2048}},
     {"lod_set", {read_lod_set, 64 * kMiB, 2048}},
     {"gltf", {read_gltf, kMiB, 260}},
+    {"surface", {read_surface, 260 * kMiB, 10000}},
     {"obj", {[](const std::string& s) { check(io::load_obj(file_of(s))); }, kMiB, 64}},
     {"mesh_ply", {[](const std::string& s) { check(io::load_ply_mesh(file_of(s))); }, kMiB, 64}},
     {"png", {[](const std::string& s) { (void)io::load_png(file_of(s)); }, 64 * kMiB, 10000}},

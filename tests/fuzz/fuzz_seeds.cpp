@@ -53,6 +53,13 @@ void add_ply(Seeds& seeds) {
     file.rows = random_rows(3, file.rest, 2);
     seeds.add("ply", file.text());
   }
+  PlyFile points;
+  points.properties = {{"x", "float"},   {"y", "float"},     {"z", "float"},
+                       {"red", "uchar"}, {"green", "uchar"}, {"blue", "uchar"}};
+  for (int k = 0; k < 12; ++k) {
+    points.rows.push_back({{"x", k}, {"y", k % 3}, {"z", 0}, {"red", 200}, {"green", k}, {"blue", 0}});
+  }
+  seeds.add("ply", points.text());
   const std::string head =
       "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
       "property list uchar int vertex_indices\nend_header\n";
@@ -87,7 +94,10 @@ void add_gltf(Seeds& seeds) {
   seeds.add("gltf", '\1' + file.json());
   file.nodes = R"([{"children":[1],"scale":[2,2,2]},{"mesh":0,"rotation":[0,0,1,0]}])";
   seeds.add("gltf", '\1' + file.json());
-  seeds.add("gltf",
+  const TestGltf surface = surface_file();
+  seeds.add("surface", '\1' + surface.doc.dump());
+  seeds.add("surface", '\0' + GlbFile::glb(surface.doc.dump(), surface.bytes));
+  seeds.add("surface",
             std::string("\1") +
                 R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"mode":4,)"
                 R"("attributes":{"POSITION":0},"indices":1}]}],"accessors":[{"bufferView":0,)"

@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/io/image_file.hpp"
 #include "io/avatar_npz.hpp"
 #include "io/glb_file.hpp"
+#include "io/gltf_builder.hpp"
 #include "io/sog_file.hpp"
 #include "support/files.hpp"
 #include "zip.hpp"
@@ -77,6 +79,40 @@ inline GlbFile gltf_file() {
   file.degree = 1;
   file.rows = random_rows(3, 9, 2);
   return file;
+}
+
+/// A textured triangle moved by two joints, with a clip: what the seeds of surfaces are made of.
+inline TestGltf surface_file() {
+  TestGltf g;
+  const json attributes = {
+      {"POSITION", g.add(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3", 5126)},
+      {"NORMAL", g.add(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3", 5126)},
+      {"TEXCOORD_0", g.add(std::vector<float>{0, 0, 1, 0, 0, 1}, "VEC2", 5126)},
+      {"COLOR_0", g.add(std::vector<std::uint8_t>(12, 200), "VEC4", 5121, true)},
+      {"JOINTS_0", g.add(std::vector<std::uint8_t>{0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0}, "VEC4", 5121)},
+      {"WEIGHTS_0", g.add(std::vector<float>{0.5f, 0.5f, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4", 5126)}};
+  const std::size_t corners = g.add(std::vector<std::uint16_t>{0, 1, 2}, "SCALAR", 5123);
+  const std::size_t times = g.add(std::vector<float>{0, 0.5f}, "SCALAR", 5126);
+  const std::size_t turns = g.add(std::vector<float>{0, 0, 0, 1, 0, 1, 0, 0}, "VEC4", 5126);
+  const TempFolder folder("fuzz_surface");
+  gsnav::io::save_png_rgb(folder / "a", std::vector<float>(12, 0.3f), 2, 2).throw_if_error();
+  const std::string picture = read_file(folder / "a");
+  g.doc["bufferViews"].push_back(
+      {{"buffer", 0}, {"byteOffset", g.bytes.size()}, {"byteLength", picture.size()}});
+  g.bytes += picture;
+  g.doc["images"] = {{{"bufferView", g.doc["bufferViews"].size() - 1}}};
+  g.doc["textures"] = {{{"source", 0}}};
+  g.doc["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+  const json primitive = {{"attributes", attributes}, {"indices", corners}, {"material", 0}};
+  g.doc["meshes"].push_back({{"primitives", json::array({primitive})}});
+  g.doc["nodes"] =
+      json::array({{{"children", {1}}}, {{"translation", {0, 1, 0}}}, {{"mesh", 0}, {"skin", 0}}});
+  g.doc["skins"].push_back({{"joints", {0, 1}}});
+  const json channel = {{"sampler", 0}, {"target", {{"node", 1}, {"path", "rotation"}}}};
+  g.doc["animations"] = {{{"channels", json::array({channel})},
+                          {"samplers", json::array({{{"input", times}, {"output", turns}}})}}};
+  g.doc["buffers"] = {{{"byteLength", g.bytes.size()}}};
+  return g;
 }
 
 }  // namespace gsnav_fuzz

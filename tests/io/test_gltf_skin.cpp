@@ -186,7 +186,7 @@ TEST_CASE("gltf skin: what is wrong is named") {
   fails([&](auto& g) { put(g, 2, 0, -0.5f); }, bad, "vertex 0 has weight -0.5");
   fails([&](auto& g) { put(g, 2, 0, 0.0f); }, bad, "weights of vertex 0 are all zero");
   fails([&](auto& g) { put(g, 1, 0, std::uint8_t{2}); }, bad, "vertex 0 names joint 2");
-  fails([&](auto& g) { put(g, 5, 0, std::uint16_t{24}); }, bad, "index 24");
+  fails([&](auto& g) { put(g, 5, 0, std::uint16_t{24}); }, bad, "corner 24 of 24");
   fails([&](auto& g) { put(g, 6, 1, 0.5f); }, bad, "inverse bind of joint \"hip#2\" is not rigid times a scale");
   fails([&](auto& g) { put(g, 7, 1, 0.25f); }, bad, "key 1 is at 0.25");
   fails([](auto& g) { g.doc["animations"][0]["samplers"][0]["interpolation"] = "MAGIC"; }, bad, "MAGIC");

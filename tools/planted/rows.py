@@ -10,7 +10,7 @@ WORLD = "tests/hard_cases/test_world.cpp"
 PLY_TEST = "tests/io/test_ply.cpp"
 FILL = "src/io/cloud_fill.hpp"
 PLY_READER = ("src/io/ply.cpp", "src/io/ply_body.cpp", "src/io/ply_header.cpp", "src/io/ply_compressed.cpp",
-              "src/io/file.cpp")
+              "src/io/ply_points.cpp", "src/io/neighbours.cpp", "src/io/file.cpp")
 
 FINITE = "  bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);\n"
 UNIT = ("  Quat<S> n{q.w / m, q.x / m, q.y / m, q.z / m};\n"

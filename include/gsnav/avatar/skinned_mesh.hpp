@@ -10,21 +10,9 @@
 #include "gsnav/avatar/skeleton.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/math/vec.hpp"
+#include "gsnav/scene/surface_material.hpp"
 
 namespace gsnav {
-
-/// A picture that colours a surface. Display-referred (sRGB-encoded), 8 bits.
-struct Texture {
-  std::size_t width = 0, height = 0;
-  std::vector<std::uint8_t> rgba;  ///< [height][width][4], row 0 is v = 0
-};
-
-/// How a part of a surface is coloured: its texture, or white, times a factor in linear light.
-struct SurfaceMaterial {
-  Vec3d factor{1, 1, 1};      ///< linear light
-  double alpha_cutoff = 0.0;  ///< texels with less alpha are holes
-  std::int32_t texture = -1;  ///< index into SkinnedMesh::textures, or -1
-};
 
 /// A rigged surface in its bind pose: what an avatar of Gaussians is made of.
 struct SkinnedMesh {
@@ -39,7 +27,7 @@ struct SkinnedMesh {
   std::vector<Vec3d> colors;                            ///< [V] linear light, or empty: white
   std::vector<std::uint32_t> materials_of;              ///< [T] index into materials, or empty: the first
   std::vector<SurfaceMaterial> materials;               ///< empty: white
-  std::vector<Texture> textures;
+  std::vector<Picture> textures;
 
   /// invalid_argument naming the array and what is wrong with it.
   Status validate() const {
@@ -71,7 +59,7 @@ struct SkinnedMesh {
       if (m.texture >= static_cast<std::int32_t>(textures.size()))
         return bad("a material names texture " + std::to_string(m.texture));
     }
-    for (const Texture& t : textures) {
+    for (const Picture& t : textures) {
       if (t.width == 0 || t.height == 0 || t.rgba.size() != 4 * t.width * t.height)
         return bad("a texture has another size than it says");
     }

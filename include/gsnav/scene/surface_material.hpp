@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gsnav/math/vec.hpp"
+
+namespace gsnav {
+
+/// A picture that colours a surface. Display-referred (sRGB-encoded), 8 bits.
+struct Picture {
+  std::size_t width = 0, height = 0;
+  std::vector<std::uint8_t> rgba;  ///< [height][width][4], row 0 is v = 0
+};
+
+/// How a part of a surface is coloured: its texture, or white, times a factor in linear light.
+struct SurfaceMaterial {
+  Vec3d factor{1, 1, 1};      ///< linear light
+  double alpha_cutoff = 0.0;  ///< texels with less alpha are holes
+  std::int32_t texture = -1;  ///< index into the textures beside it, or -1; it repeats beyond [0, 1]
+  bool double_sided = false;  ///< seen from behind too
+  bool unlit = false;         ///< its colour is what is seen, whatever the light
+};
+
+}  // namespace gsnav

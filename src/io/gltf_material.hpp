@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "gltf_file.hpp"
+#include "gsnav/scene/surface_material.hpp"
+
+namespace gsnav::io::detail {
+
+/// A material's base colour.
+struct GltfMaterial {
+  SurfaceMaterial surface;
+  std::size_t texcoord = 0;                        ///< the TEXCOORD_n that its texture is looked up by
+  std::array<double, 6> uv_map{1, 0, 0, 0, 1, 0};  ///< u' = m0 u + m1 v + m2, v' = m3 u + m4 v + m5
+
+  std::array<double, 2> uv(double u, double v) const noexcept {
+    return {uv_map[0] * u + uv_map[1] * v + uv_map[2], uv_map[3] * u + uv_map[4] * v + uv_map[5]};
+  }
+};
+
+/// Reads materials and their pictures, each picture once: PNG, JPEG or WebP, in the file or beside it.
+class GltfMaterials {
+ public:
+  /// Pictures are put behind `textures`; what is left out or taken otherwise is said in `warnings`.
+  GltfMaterials(const GltfFile& file, std::vector<Picture>& textures, std::vector<std::string>& warnings)
+      : file_(file), textures_(textures), warnings_(warnings) {}
+
+  /// Entry `index` of "materials". Errors: invalid_file, file_not_found.
+  Result<GltfMaterial> read(std::size_t index);
+
+ private:
+  Status read_texture(const Json& info, const std::string& where, GltfMaterial& out);
+  Status read_uv_map(const Json& transform, const std::string& where, GltfMaterial& out) const;
+  Result<std::int32_t> picture(const Json& texture, std::size_t index);
+  Result<Picture> decode(std::size_t image) const;
+
+  const GltfFile& file_;
+  std::vector<Picture>& textures_;
+  std::vector<std::string>& warnings_;
+  std::map<std::size_t, std::int32_t> texture_of_;  ///< of images that were read, -1 where one cannot be
+};
+
+}  // namespace gsnav::io::detail

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "gltf_material.hpp"
+#include "gltf_nodes.hpp"
+#include "gltf_primitive.hpp"
+#include "gsnav/io/mesh_file.hpp"
+
+namespace gsnav::io {
+namespace {
+
+using detail::GltfFile;
+using detail::GltfInstance;
+using detail::GltfMaterial;
+using detail::GltfNumbers;
+using detail::Json;
+
+Vec3f vec3_of(const double* p) { return vec_cast<float>(Vec3d{p[0], p[1], p[2]}); }
+
+Mat3d adjugate_transposed(const Mat3d& m) {
+  Mat3d out;
+  const Vec3d r0{m(0, 0), m(0, 1), m(0, 2)}, r1{m(1, 0), m(1, 1), m(1, 2)},
+      r2{m(2, 0), m(2, 1), m(2, 2)};
+  const Vec3d rows[3] = {cross(r1, r2), cross(r2, r0), cross(r0, r1)};
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) out(i, k) = rows[i][k];
+  }
+  return out;
+}
+
+/// Applies a transform to a part: normals by its cofactors, which keep them upright, triangles turned
+/// round where it mirrors. False where a vertex is then not finite.
+bool transform(TexturedPart& part, const Affine3<double>& a) {
+  const bool mirrored = determinant(a.linear) < 0;
+  const Mat3d cofactors = adjugate_transposed(a.linear) * (mirrored ? -1.0 : 1.0);
+  bool finite = true;
+  for (Vec3f& v : part.geometry.vertices) {
+    v = vec_cast<float>(a * vec_cast<double>(v));
+    finite = finite && is_finite(v);
+  }
+  for (Vec3f& n : part.normals) {
+    const Vec3d turned = cofactors * vec_cast<double>(n);
+    const double length = norm(turned);
+    if (length > 0) n = vec_cast<float>(turned * (1.0 / length));
+  }
+  for (auto& [i, j, k] : part.geometry.triangles) {
+    if (mirrored) std::swap(j, k);
+  }
+  return finite;
+}
+
+constexpr std::size_t kUnused = static_cast<std::size_t>(-1);
+
+class SceneReader {
+ public:
+  explicit SceneReader(const GltfFile& file)
+      : file_(file), materials_(file, out_.textures, out_.warnings) {}
+
+  Result<TexturedScene> run() {
+    const auto instances = detail::read_instances(file_);
+    if (!instances) return instances.status();
+    for (const GltfInstance& instance : *instances) {
+      if (Status s = place(instance); !s) return s;
+    }
+    if (out_.instances.empty()) {
+      return {Errc::invalid_file, file_.source() + ": no triangles in the scene"};
+    }
+    drop_unused();
+    return std::move(out_);
+  }
+
+ private:
+  /// A part that only uneven nodes show is there in their copies.
+  void drop_unused() {
+    std::vector<std::size_t> place(out_.parts.size(), kUnused);
+    for (const auto& instance : out_.instances) place[instance.part] = 0;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < place.size(); ++i) {
+      if (place[i] == kUnused) continue;
+      place[i] = kept++;
+      if (place[i] != i) out_.parts[place[i]] = std::move(out_.parts[i]);
+    }
+    out_.parts.resize(kept);
+    for (auto& instance : out_.instances) instance.part = place[instance.part];
+  }
+
+  Status place(const GltfInstance& instance) {
+    const std::string at = file_.where("nodes", instance.node);
+    if (parts_of_.count(instance.mesh) == 0) {
+      if (Status s = read_mesh(instance.mesh); !s) return s;
+    }
+    Similarity world;
+    const bool similar = detail::as_similarity(instance.world_from_mesh, world);
+    for (const std::size_t part : parts_of_[instance.mesh]) {
+      std::size_t shown = part;
+      if (!similar) {
+        TexturedPart own = out_.parts[part];
+        if (!transform(own, instance.world_from_mesh)) {
+          return {Errc::invalid_file, at + ": a vertex is not finite"};
+        }
+        if (Status s = keep(std::move(own), at); !s) return s;
+        shown = out_.parts.size() - 1;
+        world = {};
+      }
+      out_.instances.push_back({shown, world});
+    }
+    return {};
+  }
+
+  Status read_mesh(std::size_t mesh) {
+    std::vector<std::size_t>& parts = parts_of_[mesh];
+    const auto primitives = detail::primitives_of(file_, mesh);
+    if (!primitives) return primitives.status();
+    for (std::size_t p = 0; p < (*primitives)->size(); ++p) {
+      const std::string at = file_.where("meshes", mesh) + ".primitives[" + std::to_string(p) + "]";
+      const auto drawn = detail::has_triangles((**primitives)[p], at);
+      if (!drawn) return drawn.status();
+      if (!*drawn) continue;
+      auto part = read_part((**primitives)[p], at);
+      if (!part) return part.status();
+      parts.push_back(out_.parts.size());
+      if (Status s = keep(std::move(*part), at); !s) return s;
+    }
+    return {};
+  }
+
+  /// Accessors and meshes may be shared: a small file could ask for any number of copies.
+  Status keep(TexturedPart part, const std::string& at) {
+    held_ += part.geometry.vertices.size() + part.geometry.triangles.size();
+    if (held_ > 2 * file_.size()) {
+      return {Errc::invalid_file, at + ": more vertices or triangles than the file has bytes"};
+    }
+    out_.parts.push_back(std::move(part));
+    return {};
+  }
+
+  Result<GltfMaterial> material_of(const Json& primitive, const std::string& at) {
+    if (detail::member(primitive, "material") == nullptr) return GltfMaterial{};
+    const auto index = file_.index(primitive, "material", "materials", at);
+    if (!index) return index.status();
+    const auto known = material_of_.find(*index);
+    if (known != material_of_.end()) return known->second;
+    auto material = materials_.read(*index);
+    if (material) material_of_.emplace(*index, *material);
+    return material;
+  }
+
+  Result<TexturedPart> read_part(const Json& primitive, const std::string& at) {
+    const auto material = material_of(primitive, at);
+    if (!material) return material.status();
+    TexturedPart out;
+    out.material = material->surface;
+    const auto points = detail::read_attribute(file_, primitive, "POSITION", "VEC3", 0, at);
+    if (!points) return points.status();
+    const std::size_t n = points->count;
+    if (n == 0) return {Errc::invalid_file, at + ": no attribute POSITION"};
+    for (std::size_t i = 0; i < n; ++i) out.geometry.vertices.push_back(vec3_of(points->row(i)));
+    auto triangles = detail::read_triangles(file_, primitive, n, at);
+    if (!triangles) return triangles.status();
+    out.geometry.triangles = std::move(*triangles);
+    const auto read = [&](const std::string& name, const char* types) {
+      return detail::read_attribute(file_, primitive, name, types, n, at);
+    };
+    const auto normals = read("NORMAL", "VEC3"), colors = read("COLOR_0", "VEC3 VEC4"),
+               uvs = read("TEXCOORD_" + std::to_string(material->texcoord), "VEC2");
+    for (const Status& s : {normals.status(), colors.status(), uvs.status()}) {
+      if (!s) return s;
+    }
+    for (std::size_t i = 0; i < normals->count; ++i) {
+      const double* v = normals->row(i);
+      const double length = norm(Vec3d{v[0], v[1], v[2]});
+      if (!(length > 0)) {
+        out_.warnings.push_back(at + ": normal " + std::to_string(i) +
+                                " is zero; those of the faces are taken");
+        out.normals.clear();
+        break;
+      }
+      out.normals.push_back(vec_cast<float>(Vec3d{v[0], v[1], v[2]} * (1.0 / length)));
+    }
+    for (std::size_t i = 0; i < colors->count; ++i) out.colors.push_back(vec3_of(colors->row(i)));
+    for (std::size_t i = 0; i < uvs->count; ++i) {
+      const auto uv = material->uv(uvs->row(i)[0], uvs->row(i)[1]);
+      out.uvs.push_back({static_cast<float>(uv[0]), static_cast<float>(uv[1])});
+    }
+    if (out.material.texture >= 0 && out.uvs.empty()) {
+      out_.warnings.push_back(at + " has a texture and no coordinates; the material's colour is taken");
+      out.material.texture = -1;
+    }
+    return out;
+  }
+
+  const GltfFile& file_;
+  TexturedScene out_;
+  detail::GltfMaterials materials_;
+  std::map<std::size_t, std::vector<std::size_t>> parts_of_;  ///< of each mesh that is shown
+  std::map<std::size_t, GltfMaterial> material_of_;
+  std::size_t held_ = 0;  ///< vertices and triangles of all parts
+};
+
+}  // namespace
+
+Result<TexturedScene> load_gltf_scene(const std::filesystem::path& path) {
+  return detail::guarded(path.string(), [&]() -> Result<TexturedScene> {
+    const auto file = GltfFile::open(path);
+    if (!file) return file.status();
+    return SceneReader(*file).run();
+  });
+}
+
+}  // namespace gsnav::io
