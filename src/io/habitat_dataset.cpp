@@ -109,19 +109,28 @@ Status read_stage(const Json& object, const fs::path& folder, const std::string&
   return {};
 }
 
-/// `name` matches a pattern in which `*` stands for any text.
+/// `name` matches a pattern in which `*` stands for any text. Goes back to the last star only: never long.
 bool matches(std::string_view pattern, std::string_view name) {
-  const std::size_t star = pattern.find('*');
-  if (star == std::string_view::npos) return pattern == name;
-  if (!name.starts_with(pattern.substr(0, star))) return false;
-  for (std::size_t skip = star; skip <= name.size(); ++skip) {
-    if (matches(pattern.substr(star + 1), name.substr(skip))) return true;
+  std::size_t p = 0, n = 0, star = std::string_view::npos, from = 0;
+  while (n < name.size()) {
+    if (p < pattern.size() && pattern[p] == '*') {
+      star = p++;
+      from = n;
+    } else if (p < pattern.size() && pattern[p] == name[n]) {
+      ++p, ++n;
+    } else if (star != std::string_view::npos) {
+      p = star + 1;
+      n = ++from;
+    } else {
+      return false;
+    }
   }
-  return false;
+  return pattern.find_first_not_of('*', p) == std::string_view::npos;
 }
 
-/// Folders and files that a path with patterns stands for, sorted.
-std::vector<fs::path> expanded(const fs::path& folder, const fs::path& pattern) {
+/// Folders and files that a path with patterns stands for, sorted. Errors: unsupported where they are too many to be meant.
+Result<std::vector<fs::path>> expanded(const fs::path& folder, const fs::path& pattern) {
+  constexpr std::size_t kMost = 100000;
   std::vector<fs::path> found{pattern.is_absolute() ? pattern.root_path() : folder};
   for (const fs::path& part : pattern.is_absolute() ? pattern.relative_path() : pattern) {
     std::vector<fs::path> next;
@@ -133,6 +142,9 @@ std::vector<fs::path> expanded(const fs::path& folder, const fs::path& pattern) 
       if (!fs::is_directory(at)) continue;
       for (const auto& entry : fs::directory_iterator(at)) {
         if (matches(part.string(), entry.path().filename().string())) next.push_back(entry.path());
+        if (next.size() > kMost) {
+          return {Errc::unsupported, "the pattern '" + pattern.string() + "' stands for over " + std::to_string(kMost) + " files"};
+        }
       }
     }
     found = std::move(next);
@@ -195,12 +207,16 @@ class DatasetReader {
     if (!list->is_array()) return {Errc::invalid_file, at + ": paths['.json'] is " + shown(*list) + ", must be an array"};
     for (const Json& p : *list) {
       if (!p.is_string()) return {Errc::invalid_file, at + ": paths['.json'] has " + shown(p) + ", must have paths"};
-      for (const fs::path& found : expanded(folder_, p.get<std::string>())) {
+      const auto listed = expanded(folder_, p.get<std::string>());
+      if (!listed) return {listed.code(), at + ": " + listed.message()};
+      for (const fs::path& found : *listed) {
         if (!fs::is_directory(found)) {
           if (found.filename().string().ends_with(ending)) out.push_back(found);
           continue;
         }
-        for (const fs::path& file : expanded(found, "*" + ending)) out.push_back(file);
+        const auto inside = expanded(found, "*" + ending);
+        if (!inside) return {inside.code(), at + ": " + inside.message()};
+        out.insert(out.end(), inside->begin(), inside->end());
       }
     }
     return {};

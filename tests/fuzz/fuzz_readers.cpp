@@ -10,6 +10,7 @@
 
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io/episode_file.hpp"
 #include "gsnav/io/gltf.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/ksplat.hpp"
@@ -204,6 +205,7 @@ const std::map<std::string, Reader> kReaders = {
     {"driver", {read_driver, 260 * kMiB, 10000}},
     {"bvh", {[](const std::string& s) { (void)io::load_bvh(file_of(s)); }, kMiB, 1000}},
     {"cameras", {[](const std::string& s) { (void)io::load_cameras(file_of(s)); }, kMiB, 1000}},
+    {"episodes", {[](const std::string& s) { (void)io::load_episodes(file_of(s)); }, kMiB, 20000}},
     {"navmesh", {read_navmesh, 64 * kMiB, 1000}},
 };
 

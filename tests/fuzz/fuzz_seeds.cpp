@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io/episode_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "io/ksplat_file.hpp"
@@ -133,6 +134,8 @@ void add_others(Seeds& seeds) {
   TempFolder folder("fuzz_seeds");
   io::save_cameras(folder / "a", std::vector<Camera>(2)).throw_if_error();
   seeds.add("cameras", read_file(folder / "a"));
+  io::save_episodes(folder / "a", std::vector<PointNavEpisode>(2)).throw_if_error();
+  seeds.add("episodes", read_file(folder / "a"));
   io::save_png_rgb(folder / "a", std::vector<float>(75, 0.3f), 5, 5).throw_if_error();
   seeds.add("png", read_file(folder / "a"));
   io::save_png_gray16(folder / "a", std::vector<std::uint16_t>(6, 300), 2, 3).throw_if_error();

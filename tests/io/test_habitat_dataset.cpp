@@ -104,6 +104,45 @@ TEST_CASE("what is left out is reported once, with the first file that has it") 
   CHECK(mentions("render_asset") == 0);
 }
 
+TEST_CASE("patterns stand for what they match and are not long about what they do not") {
+  const Dataset d;
+  const auto scenes = [&](const std::string& pattern) {
+    d.write("gs.scene_dataset_config.json", R"({"stages":{"paths":{".json":[")" + pattern + R"("]}}})");
+    return d.load()->scenes.size();
+  };
+  CHECK(scenes("configs/stages") == 2);
+  CHECK(scenes("configs/stages/p*.stage_config.json") == 1);
+  CHECK(scenes("*/stages/*room*") == 1);
+  CHECK(scenes("configs/*/*.json") == 2);
+  CHECK(scenes("nothing/*") == 0);
+  std::string long_one = "configs/stages/";
+  for (int i = 0; i < 40; ++i) long_one += "*a";
+  CHECK(scenes(long_one) == 0);
+}
+
+TEST_CASE("mutated datasets and episodes are read or refused") {
+  const Dataset d;
+  std::uint64_t state = 7;
+  const auto next = [&](std::size_t n) {
+    state = state * 6364136223846793005ull + 1442695040888963407ull;
+    return static_cast<std::size_t>(state >> 33) % n;
+  };
+  const std::string scene = "configs/scenes/playroom_people.scene_instance.json", set = "gs.scene_dataset_config.json";
+  int refused = 0;
+  for (const std::string& name : {scene, set, std::string("configs/stages/playroom.stage_config.json")}) {
+    const std::string whole = read_file(d.folder / name);
+    for (int i = 0; i < 400; ++i) {
+      std::string text = whole;
+      for (std::size_t k = 0; k <= next(3); ++k) text[next(text.size())] = "0{}[]\":,*a.-\\"[next(14)];
+      d.write(name, text);
+      refused += d.load().ok() ? 0 : 1;
+    }
+    d.write(name, whole);
+  }
+  CHECK(refused > 300);
+  CHECK(d.load().ok());
+}
+
 TEST_CASE("bad datasets are named with file and key") {
   const auto message = [](const std::string& file, const std::string& text, Errc code) {
     const Dataset d;

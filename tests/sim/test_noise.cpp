@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/sim/simulator.hpp"
+#include "sim_scene.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+TEST_CASE("Gaussian noise has the mean and the deviation asked for and stays within colours") {
+  NoiseModel m;
+  m.kind = NoiseKind::gaussian;
+  m.intensity = 0.05;
+  m.mean = 0.4;
+  m.sigma = 1.5;
+  std::vector<float> c(200000, 0.5f);
+  add_gaussian_noise(m, 3, c);
+  double sum = 0.0, squares = 0.0;
+  for (const float v : c) {
+    sum += static_cast<double>(v) - 0.5;
+    squares += (static_cast<double>(v) - 0.5) * (static_cast<double>(v) - 0.5);
+  }
+  const double n = static_cast<double>(c.size()), mean = sum / n, deviation = std::sqrt(squares / n - mean * mean);
+  CHECK(mean == doctest::Approx(0.02).epsilon(0.02));         // 0.05 * 0.4; five standard errors are 0.0008
+  CHECK(deviation == doctest::Approx(0.075).epsilon(0.01));   // 0.05 * 1.5
+  std::vector<float> white(1000, 1.0f), again(1000, 1.0f);
+  add_gaussian_noise(m, 4, white);
+  add_gaussian_noise(m, 4, again);
+  CHECK(*std::max_element(white.begin(), white.end()) == 1.0f);
+  CHECK(white == again);
+  add_gaussian_noise(m, 5, again);
+  CHECK(white != again);
+}
+
+TEST_CASE("Redwood depth is quantised in disparity, on every second pixel, with the deviation published") {
+  const int height = 60, width = 80;
+  const std::vector<float> wall(static_cast<std::size_t>(height * width), 4.0f);
+  std::vector<float> out(wall.size());
+  NoiseModel m;
+  m.kind = NoiseKind::redwood_depth;
+  redwood_depth(m, 9, height, width, wall, out);
+  double sum = 0.0, squares = 0.0;
+  for (const float z : out) {
+    const double steps = 281.04 / static_cast<double>(z);
+    CHECK(steps == doctest::Approx(std::round(steps)).epsilon(1e-5));
+    sum += steps;
+    squares += steps * steps;
+  }
+  const double n = static_cast<double>(out.size()), mean = sum / n;
+  // A normal of mean 281.04 / 4 and deviation 8 / 36, rounded: its moments by the error function.
+  double true_mean = 0.0, true_square = 0.0;
+  const auto below = [](double x) { return 0.5 * std::erfc(-(x - 281.04 / 4.0) / (8.0 / 36.0) / std::sqrt(2.0)); };
+  for (int k = 65; k < 76; ++k) {
+    const double p = below(k + 0.5) - below(k - 0.5);
+    true_mean += p * k;
+    true_square += p * k * k;
+  }
+  const double true_deviation = std::sqrt(true_square - true_mean * true_mean);
+  CHECK(std::abs(mean - true_mean) < 5 * true_deviation / std::sqrt(n));
+  CHECK(std::sqrt(squares / n - mean * mean) == doctest::Approx(true_deviation).epsilon(0.06));
+
+  // Without noise: the value of the even pixel, rounded to a step; no return stays none.
+  std::vector<float> ramp(wall.size());
+  for (std::size_t i = 0; i < ramp.size(); ++i) ramp[i] = i % 80 < 40 ? 1.0f + 0.01f * static_cast<float>(i % 80) : 0.0f;
+  m.multiplier = 0.0;
+  redwood_depth(m, 9, height, width, ramp, out);
+  for (std::size_t i = 0; i < ramp.size(); ++i) {
+    const std::size_t x = i % 80 - i % 2, y = i / 80 - i / 80 % 2;
+    const float z = ramp[y * 80 + x];
+    const double truth = z > 0 ? 281.04 / std::round(281.04 / static_cast<double>(z)) : 0.0;
+    CHECK(static_cast<double>(out[i]) == doctest::Approx(truth).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("noise follows the seed, the episode and the action, not who looked before") {
+  SerialBackend backend;
+  SimulatorConfig clean;
+  clean.sensors = rgbd_sensors(24, 32);
+  SimulatorConfig noisy = clean;
+  noisy.sensors[0].noise.kind = NoiseKind::gaussian;
+  noisy.sensors.push_back(clean.sensors[0]);
+  noisy.sensors[2].uuid = "clean";
+  noisy.seed = 3;
+  auto plain = make_simulator(backend, flat_scene(), clean).value();
+  auto sim = make_simulator(backend, flat_scene(), noisy).value();
+  const auto copy = [](std::span<const float> s) { return std::vector<float>(s.begin(), s.end()); };
+  const auto truth = copy(plain.reset(to_kitchen()).value()["rgb"]);
+  const auto first = sim.reset(to_kitchen()).value();
+  CHECK(sim.render_count() == 1);
+  CHECK(copy(first["clean"]) == truth);
+  const auto a = copy(first["rgb"]);
+  CHECK(a != truth);
+  CHECK(copy(sim.observe().value()["rgb"]) == a);
+  sim.step(Action::turn_left).value();
+  const auto turned = copy(sim.step(Action::turn_right).value()["rgb"]);
+  CHECK(turned != a);  // the same view, another draw
+  CHECK(copy(sim.reset(to_kitchen()).value()["rgb"]) == a);
+  sim.set_seed(4);
+  CHECK(copy(sim.observe().value()["rgb"]) != a);
+}
