@@ -32,9 +32,9 @@ double bar_length(double width) {
   return power;
 }
 
-Picture draw(const gsnav::TopDownMap& map, double bar) {
+MapPicture draw(const gsnav::TopDownMap& map, double bar) {
   const std::size_t width = map.columns + 2 * kMargin, height = map.rows + 2 * kMargin + kMargin;
-  Picture out{static_cast<int>(width), static_cast<int>(height), {}};
+  MapPicture out{static_cast<int>(width), static_cast<int>(height), {}};
   out.rgb.resize(3 * width * height);
   const auto put = [&](std::size_t x, std::size_t y, const Rgb& c) {
     std::copy(c.begin(), c.end(), out.rgb.begin() + static_cast<std::ptrdiff_t>(3 * (width * y + x)));

@@ -132,7 +132,7 @@ Status draw_png(const Options& o, const NavMesh& mesh, const std::vector<NavLeve
                                          std::to_string(b.high.y) + " m"};
   }
   const double bar = bar_length(b.high.x - b.low.x);
-  const Picture picture = draw(*map, bar);
+  const MapPicture picture = draw(*map, bar);
   if (Status s = io::save_png_rgb8(o.png, picture.rgb, picture.width, picture.height); !s) return s;
   std::printf("%s: %d x %d pixels, %.4g m each, near height %.2f m; the bar is %g m\n", o.png.c_str(),
               picture.width, picture.height, map->metres_per_cell, height, bar);
