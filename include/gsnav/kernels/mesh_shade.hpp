@@ -118,15 +118,16 @@ GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel) 
     image[3 * pixel + 2] = v.z;
   };
   const std::uint32_t id = args.visible[pixel];
-  const bool covered = id != kNoTriangle;
-  const MeshTriangle<S>& t = args.triangles.data[covered ? id : 0];
-  if (out.triangle != nullptr) out.triangle[pixel] = covered ? t.triangle : kNoInstance;
-  if (out.instance != nullptr) out.instance[pixel] = covered ? args.placements[t.placement].id : kNoInstance;
-  if (!covered) {
+  if (id == kNoTriangle) {
+    if (out.triangle != nullptr) out.triangle[pixel] = kNoInstance;
+    if (out.instance != nullptr) out.instance[pixel] = kNoInstance;
     write(out.color, {});
     write(out.normal, {});
     return;
   }
+  const MeshTriangle<S>& t = args.triangles[id];
+  if (out.triangle != nullptr) out.triangle[pixel] = t.triangle;
+  if (out.instance != nullptr) out.instance[pixel] = args.placements[t.placement].id;
   if (out.color == nullptr && out.normal == nullptr) return;
 
   const MeshPlacement& placement = args.placements[t.placement];
