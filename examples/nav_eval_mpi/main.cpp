@@ -50,10 +50,10 @@ struct Ranks {
 };
 
 Status run(const Ranks& ranks, const gsnav_eval::Options& o) {
-  auto journal = gsnav_eval::Journal::open(o.out, o, ranks.rank);
-  if (!journal) return journal.status();
   const auto stage = gsnav_eval::prepare(o);
   if (!stage) return stage.status();
+  auto journal = gsnav_eval::Journal::open(o.out, o, ranks.rank);
+  if (!journal) return journal.status();
   std::vector<unsigned long> missing;
   if (ranks.rank == 0) {
     for (std::size_t i = 0; i < stage->episodes.size(); ++i) {

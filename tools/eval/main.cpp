@@ -28,10 +28,10 @@ Status write(const fs::path& path, const std::string& text) {
 }
 
 Status run(const Options& o, int pictures) {
-  auto journal = Journal::open(o.out, o);
-  if (!journal) return journal.status();
   const auto stage = prepare(o);
   if (!stage) return stage.status();
+  auto journal = Journal::open(o.out, o);
+  if (!journal) return journal.status();
   if (Status s = gsnav::io::save_episodes(fs::path(o.out) / "episodes.json.gz", stage->episodes); !s) return s;
   gsnav::OpenMPBackend backend(o.threads);
   auto sim = Simulator::create(backend, stage->scene, stage->config);
