@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "gsnav/scene/placed_meshes.hpp"
 #include "ops/mesh_images.hpp"
 
 namespace {
@@ -26,7 +28,7 @@ double encoded(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-MeshTexture texture(int width, int height, const auto& texel) {
+std::vector<std::uint8_t> rgba_of(int width, int height, const auto& texel) {
   std::vector<std::uint8_t> rgba;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -34,7 +36,12 @@ MeshTexture texture(int width, int height, const auto& texel) {
       rgba.push_back(255);
     }
   }
-  return MeshTexture::make(width, height, rgba).value();
+  return rgba;
+}
+
+std::shared_ptr<const MeshTexture> texture(int width, int height, const auto& texel) {
+  return std::make_shared<const MeshTexture>(
+      MeshTexture::make(static_cast<std::size_t>(width), static_cast<std::size_t>(height), rgba_of(width, height, texel)).value());
 }
 
 TEST_CASE("vertex colours are linear in space, not on the screen, and encoded at last") {
@@ -143,3 +150,56 @@ TEST_CASE("what does not fit is named") {
 }
 
 }  // namespace
+
+TEST_CASE("a surface as files give it: parts share textures, stand in several places, and are lit or not") {
+  TexturedScene scene;
+  scene.textures.push_back({4, 1, rgba_of(4, 1, [](int x, int) { return std::vector<int>{60 * x, 200, 10}; })});
+  for (int part = 0; part < 2; ++part) {
+    TexturedPart p;
+    p.geometry = quad({-0.5, -0.5, 0}, {0.5, -0.5, 0}, {0.5, 0.5, 0}, {-0.5, 0.5, 0}).geometry;
+    p.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    p.material.texture = 0;
+    p.material.double_sided = true;
+    p.material.unlit = part == 1;
+    scene.parts.push_back(p);
+  }
+  // Two of the first part beside each other, one of the other above.
+  for (const Vec3d& at : {Vec3d{-0.5, 0.5, 2}, Vec3d{0.5, 0.5, 2}, Vec3d{0, -0.5, 2}}) {
+    scene.instances.push_back({scene.instances.size() == 2 ? std::size_t{1} : std::size_t{0}, {{}, at, 1}});
+  }
+  const PlacedMeshes placed = placed_meshes(scene).value();
+  CHECK(placed.meshes.size() == 2);
+  CHECK(placed.meshes.mesh(0).texture == placed.meshes.mesh(1).texture);
+  CHECK(placed.warnings.empty());
+  // 16 pixels a metre at 2 m: each place is 16 pixels wide, a texel four.
+  MeshLight dark;
+  dark.unlit = false;
+  dark.ambient = {0, 0, 0};
+  dark.diffuse = {0, 0, 0};
+  SerialBackend serial;
+  const auto plain = draw<float>(serial, placed.in_world(), lens(32, 32));
+  const auto lit = draw<float>(serial, placed.in_world(), lens(32, 32), dark);
+  const auto red = [](const auto& f, int x, int y) { return f.color[3 * static_cast<std::size_t>(y * 32 + x)] * 255; };
+  for (int texel = 0; texel < 4; ++texel) {
+    for (const int left : {0, 16}) {
+      CHECK(std::abs(red(plain, left + 4 * texel + 2, 24) - 60.0f * static_cast<float>(texel)) < 25);
+      CHECK(red(lit, left + 4 * texel + 2, 24) == 0);
+    }
+    CHECK(red(lit, 8 + 4 * texel + 2, 8) == red(plain, 8 + 4 * texel + 2, 8));
+  }
+  CHECK(red(plain, 8 + 14, 8) > 150);
+  CHECK(plain.depth[24 * 32 + 3] == 2.0f);
+
+  TexturedScene bad = scene;
+  bad.parts[1].material.texture = 3;
+  CHECK(placed_meshes(bad).status().message().find("parts[1]: texture 3 of 1") != std::string::npos);
+  bad = scene;
+  bad.instances[2].part = 7;
+  CHECK(placed_meshes(bad).status().message().find("instances[2]: part 7 of 2") != std::string::npos);
+  bad = scene;
+  bad.textures[0].width = 5;
+  CHECK(placed_meshes(bad).status().message().find("parts[0]: MeshTexture") != std::string::npos);
+  bad = scene;
+  bad.parts[0].material.alpha_cutoff = 0.5;
+  CHECK(placed_meshes(bad).value().warnings.size() == 1);
+}

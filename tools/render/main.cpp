@@ -23,7 +23,7 @@
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/mesh_scene.hpp"
+#include "gsnav/scene/placed_meshes.hpp"
 #include "gsnav/scene/renderer.hpp"
 
 namespace {
@@ -90,7 +90,7 @@ std::vector<std::uint8_t> depth_picture(const std::vector<float>& metres, const 
 
 template <class S, class B>
 int run(B& backend, const Options& o, const DepthChoice& depth, const GaussianCloud& cloud,
-        const MeshScene& meshes, const std::vector<Camera>& cameras) {
+        const std::vector<PlacedMeshes>& meshes, const std::vector<Camera>& cameras) {
   RenderConfig config;
   config.outputs = kRgb | kAlpha | depth.output;
   config.profile = o.profile == "fast" ? Profile::fast : Profile::exact;
@@ -103,9 +103,16 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const GaussianCl
   const std::vector<GaussianSet> sets{arrays.set()};
   std::vector<MeshArrays<B>> mesh_arrays;
   std::vector<MeshInstance> instances;
-  mesh_arrays.reserve(meshes.size());
-  for (std::size_t i = 0; i < meshes.size(); ++i) {
-    instances.push_back(mesh_arrays.emplace_back(backend, meshes.view(i)).instance({}, static_cast<std::uint32_t>(i)));
+  std::size_t parts = 0;
+  for (const PlacedMeshes& file : meshes) parts += file.meshes.size();
+  mesh_arrays.reserve(parts);
+  for (const PlacedMeshes& file : meshes) {
+    const std::size_t first = mesh_arrays.size();
+    for (std::size_t i = 0; i < file.meshes.size(); ++i) mesh_arrays.emplace_back(backend, file.meshes.view(i));
+    for (const TexturedScene::Instance& i : file.instances) {
+      const auto id = static_cast<std::uint32_t>(instances.size());
+      instances.push_back(mesh_arrays[first + i.part].instance(i.world_from_part, id));
+    }
   }
   MeshLight headlight;
   headlight.unlit = false;
@@ -192,8 +199,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--mesh", o.meshes,
-                 "Triangle meshes among the Gaussians (.obj, .ply, .gltf, .glb), in the scene's frame: both sides, grey, "
-                 "lit from the camera (docs/composition.md)");
+                 "Triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj and .ply grey), in the "
+                 "scene's frame, lit from the camera (docs/composition.md)");
   app.add_option("--composite", o.composite, "merged, or hard_depth: Habitat-GS's rule, to compare with")
       ->check(CLI::IsMember({"merged", "hard_depth"}))
       ->capture_default_str();
@@ -226,17 +233,21 @@ int main(int argc, char** argv) {
   auto scene = io::load_scene(o.scene);
   if (!scene) return fail(scene.message());
   print_report(scene->report);
-  MeshScene meshes;
+  std::vector<PlacedMeshes> meshes;
   for (const std::string& file : o.meshes) {
-    auto mesh = io::load_mesh(file);
-    if (!mesh) return fail(mesh.message());
-    SurfaceMesh surface;
-    surface.geometry = std::move(*mesh);
-    surface.base_color = {0.5f, 0.5f, 0.5f};
-    surface.two_sided = true;
-    std::printf("%s: %zu triangles\n", file.c_str(), surface.geometry.triangles.size());
-    const auto added = meshes.add(std::move(surface));
-    if (!added) return fail(file + ": " + added.message());
+    auto surface = io::load_textured_scene(file);
+    if (!surface) return fail(surface.message());
+    std::size_t triangles = 0;
+    for (TexturedPart& part : surface->parts) {
+      triangles += part.geometry.triangles.size();
+      // What says nothing of its looks is grey.
+      if (file.ends_with(".obj") || file.ends_with(".ply")) part.material = {{0.5, 0.5, 0.5}, 0, -1, true, false};
+    }
+    auto placed = placed_meshes(std::move(*surface));
+    if (!placed) return fail(file + ": " + placed.message());
+    std::printf("%s: %zu triangles in %zu places\n", file.c_str(), triangles, placed->instances.size());
+    for (const std::string& w : placed->warnings) std::printf("%s: %s\n", file.c_str(), w.c_str());
+    meshes.push_back(std::move(*placed));
   }
   auto cameras = io::load_cameras(o.cameras, o.width, o.height);
   if (!cameras) return fail(cameras.message());

@@ -36,6 +36,7 @@ struct MeshView {
   TextureView texture;                ///< repeats; empty: white
   Vec3f base_color{1, 1, 1};          ///< linear RGB, times colours and texture
   bool two_sided = false;             ///< false: what is seen from behind is not drawn
+  bool unlit = false;                 ///< its colour is what is seen, whatever the light
   Vec3f low{}, high{};                ///< box of the finite vertices; low.x > high.x: not known
 
   GSNAV_HD std::size_t triangle_count() const noexcept { return indices.size / 3; }
@@ -51,7 +52,7 @@ inline constexpr std::uint32_t kNoInstance = 0xffffffffu;  ///< pixels without a
 
 /// How meshes are lit; linear RGB.
 struct MeshLight {
-  bool unlit = true;              ///< the base colour as it is
+  bool unlit = true;              ///< all colours as they are
   Vec3d ambient{0.4, 0.4, 0.4};
   Vec3d direction{0.4, 0.8, 0.4};  ///< towards the light, world; need not be of unit length
   Vec3d diffuse{0.6, 0.6, 0.6};   ///< times the cosine to the normal

@@ -138,8 +138,9 @@ GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel) 
   const S z = args.depth[pixel];
   const S b1 = clamp(t.b1.at(dx, dy) * z, S(0), S(1)), b2 = clamp(t.b2.at(dx, dy) * z, S(0), S(1) - b1);
 
+  const bool lit = !args.unlit && !mesh.unlit;
   Vec3<S> normal{};
-  if (out.normal != nullptr || !args.unlit) {
+  if (out.normal != nullptr || lit) {
     if (mesh.normals.empty()) {
       const Vec3f& v0 = mesh.vertices[i0];
       normal = cross(vec_cast<S>(mesh.vertices[i1] - v0), vec_cast<S>(mesh.vertices[i2] - v0));
@@ -175,7 +176,7 @@ GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel) 
                                  max(footprint2(t.b1.x, t.b2.x, S(t.inverse_z.x)),
                                      footprint2(t.b1.y, t.b2.y, S(t.inverse_z.y)))));
   }
-  if (!args.unlit) {
+  if (lit) {
     const S cosine = max(dot(normal, args.light), S(0));
     times({fma(args.diffuse.x, cosine, args.ambient.x), fma(args.diffuse.y, cosine, args.ambient.y),
            fma(args.diffuse.z, cosine, args.ambient.z)});

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,21 +29,20 @@ inline float srgb_decoded(std::uint8_t byte) noexcept {
 class MeshTexture {
  public:
   /// `rgba`: [height][width][4], sRGB-encoded, top row first. Error: invalid_argument (sizes).
-  static Result<MeshTexture> make(int width, int height, std::vector<std::uint8_t> rgba) {
-    constexpr int kLargest = 32768;
-    if (width < 1 || height < 1 || width > kLargest || height > kLargest ||
-        rgba.size() != 4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+  static Result<MeshTexture> make(std::size_t width, std::size_t height, std::vector<std::uint8_t> rgba) {
+    constexpr std::size_t kLargest = 32768;
+    if (width < 1 || height < 1 || width > kLargest || height > kLargest || rgba.size() != 4 * width * height) {
       return Status(Errc::invalid_argument, "MeshTexture: " + std::to_string(width) + " x " + std::to_string(height) +
                                                 " with " + std::to_string(rgba.size()) +
                                                 " bytes: needs four a pixel and sides in [1, 32768]");
     }
     MeshTexture t;
     for (std::size_t i = 0; i < 256; ++i) t.decode_[i] = srgb_decoded(static_cast<std::uint8_t>(i));
-    t.width_ = width;
-    t.height_ = height;
+    t.width_ = static_cast<int>(width);
+    t.height_ = static_cast<int>(height);
     t.texels_ = std::move(rgba);
     std::size_t from = 0;
-    for (int w = width, h = height; w > 1 || h > 1; ++t.levels_) {
+    for (int w = t.width_, h = t.height_; w > 1 || h > 1; ++t.levels_) {
       const std::size_t next = t.texels_.size();
       t.reduce(from, w, h);
       from = next;
@@ -95,9 +94,10 @@ struct SurfaceMesh {
   std::vector<Vec3f> normals;   ///< one a vertex, unit; empty: the faces'
   std::vector<Vec3f> colors;    ///< one a vertex, linear RGB; empty: white
   std::vector<Vec2<float>> uvs;  ///< one a vertex, (0, 0) the texture's top left; empty: no texture
-  std::optional<MeshTexture> texture;
+  std::shared_ptr<const MeshTexture> texture;  ///< null: white
   Vec3f base_color{1, 1, 1};    ///< linear RGB
   bool two_sided = false;
+  bool unlit = false;           ///< its colour is what is seen, whatever the light
 };
 
 /// Meshes and where they stand. Moving an instance is setting its transform.
@@ -136,9 +136,10 @@ class MeshScene {
     v.normals = view_of(m.normals);
     v.colors = view_of(m.colors);
     v.uvs = view_of(m.uvs);
-    if (m.texture) v.texture = m.texture->view();
+    if (m.texture != nullptr) v.texture = m.texture->view();
     v.base_color = m.base_color;
     v.two_sided = m.two_sided;
+    v.unlit = m.unlit;
     v.low = held.low;
     v.high = held.high;
     return v;
