@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "../io/files.hpp"
+#include "support/files.hpp"
 #include "gsnav/io/episode_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/npz_file.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "files.hpp"
+#include "support/files.hpp"
 #include "gsnav/io/episode_file.hpp"
 
 using namespace gsnav;

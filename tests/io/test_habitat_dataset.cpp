@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "files.hpp"
+#include "support/files.hpp"
 #include "gsnav/io/habitat_dataset.hpp"
 
 using namespace gsnav;

@@ -49,3 +49,23 @@ gsnav::Frames<S> render(B& backend, const std::vector<gsnav::GaussianSet>& sets,
 }
 
 }  // namespace gsnav_test
+
+// Compiled once for all tests (support/frames.cpp).
+namespace gsnav {
+using gsnav_test::ToyBackend;
+extern template Status render_camera<float, SerialBackend>(SerialBackend&, RenderWorkspace<float, SerialBackend>&, std::span<const GaussianSet>,
+                       const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status render_composite<float, SerialBackend>(SerialBackend&, RenderWorkspace<float, SerialBackend>&, std::span<const GaussianSet>,
+                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
+                       RenderStats*);
+extern template Status render_camera<double, SerialBackend>(SerialBackend&, RenderWorkspace<double, SerialBackend>&, std::span<const GaussianSet>,
+                       const Camera&, const RenderConfig&, const FrameImages<double>&, RenderStats*);
+extern template Status render_composite<double, SerialBackend>(SerialBackend&, RenderWorkspace<double, SerialBackend>&, std::span<const GaussianSet>,
+                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&,
+                       RenderStats*);
+extern template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>,
+                       const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status render_composite<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>,
+                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
+                       RenderStats*);
+}  // namespace gsnav

@@ -21,6 +21,7 @@
 #include "gsnav/kernels/mesh_shade.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/render_composite.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
 #include "gsnav/kernels/lanes/kernels.hpp"
 #endif
@@ -195,5 +196,19 @@ class OpenMPBackend : public HostMemory {
 };
 
 static_assert(Backend<OpenMPBackend>);
+
+#if defined(GSNAV_OPENMP_COMPILED)
+// Compiled in gsnav::openmp: whoever renders need not.
+extern template Status render_camera<float, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
+                       const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status render_composite<float, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
+                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
+                       RenderStats*);
+extern template Status render_camera<double, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<double, OpenMPBackend>&, std::span<const GaussianSet>,
+                       const Camera&, const RenderConfig&, const FrameImages<double>&, RenderStats*);
+extern template Status render_composite<double, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<double, OpenMPBackend>&, std::span<const GaussianSet>,
+                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&,
+                       RenderStats*);
+#endif
 
 }  // namespace gsnav

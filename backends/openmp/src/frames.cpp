@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/backends/openmp.hpp"
+
+namespace gsnav {
+
+template Status render_camera<float, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
+                const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+template Status render_composite<float, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
+                const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
+                RenderStats*);
+template Status render_camera<double, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<double, OpenMPBackend>&, std::span<const GaussianSet>,
+                const Camera&, const RenderConfig&, const FrameImages<double>&, RenderStats*);
+template Status render_composite<double, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<double, OpenMPBackend>&, std::span<const GaussianSet>,
+                const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&,
+                RenderStats*);
+
+}  // namespace gsnav
