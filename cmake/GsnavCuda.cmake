@@ -45,3 +45,15 @@ if(GSNAV_BUILD_CUDA)
   find_package(CUDAToolkit REQUIRED)
   message(STATUS "gsnav::cuda: CUDA ${_nvcc_version}, architectures ${CMAKE_CUDA_ARCHITECTURES}")
 endif()
+
+# gsnav_cuda_options(target): how device code is compiled.
+function(gsnav_cuda_options target)
+  # No contraction: what the kernels fuse they fuse themselves, and the bits are the CPU's.
+  # -std by hand: CMake 3.25 does not know that nvcc has C++20.
+  # 2810: nvcc takes the assignment of a nodiscard class for a value dropped.
+  target_compile_options(${target} PRIVATE
+    $<$<COMPILE_LANGUAGE:CUDA>:-std=c++20 -fmad=false -diag-suppress=2810 -Xcompiler=-Wall,-Wextra>)
+  if(GSNAV_WERROR)
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings>)
+  endif()
+endfunction()

@@ -18,7 +18,7 @@ if [[ $job == tests || $job == ci ]]; then
   packages+=(doctest-dev libbenchmark-dev libeigen3-dev libglm-dev libdlpack-dev pkg-config python3)
 fi
 if [[ $job == ci ]]; then
-  packages+=(clang libomp-dev ccache)
+  packages+=(clang libomp-dev ccache libegl-dev libopengl-dev)
 fi
 
 if ! command -v apt-get > /dev/null || ! command -v dpkg-query > /dev/null; then
