@@ -57,9 +57,10 @@ PLANTS = [
           "tests/avatar/test_lbs.cpp",
           "rounded weights make 1 and move a point by at most K / 4 parts of its joints' distance"),
     plant("skinned_in_the_world", "include/gsnav/avatar/skinned_gaussians.hpp",
-          "    set_.world_from_asset = actor.placement(t);\n    actor.joint_matrices(t, matrices_);\n",
-          """    const Similarity place = actor.placement(t);
+          "    if (Status s = place(actor, t); !s || !visible_) return s;\n    actor.joint_matrices(t, matrices_);\n",
+          """    if (Status s = this->place(actor, t); !s || !visible_) return s;
     actor.joint_matrices(t, matrices_);
+    const Similarity place = std::exchange(set_.world_from_asset, Similarity{});
     for (auto& m : matrices_) m = Affine3<double>{rotation_matrix(place.rotation), place.translation} * m;
 """,
           SKIN_TEST, "N55_lbs_rigid_far", why="float's step at 1000 m, and the weights' sum times 1000 m"),
