@@ -16,6 +16,7 @@
 #include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/scene/renderer.hpp"
+#include "samples.hpp"
 #include "workload.hpp"
 
 using namespace gsnav;
@@ -48,11 +49,6 @@ struct DeviceImages {
   BatchImages images;
 };
 
-double quantile(std::vector<float> ms, double q) {
-  std::sort(ms.begin(), ms.end());
-  return ms[static_cast<std::size_t>(q * static_cast<double>(ms.size() - 1))];
-}
-
 void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Frames<double>& truth,
          std::size_t count, Profile profile) {
   RenderConfig config;
@@ -66,7 +62,7 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   cudaEventCreate(&end);
   const std::size_t views = gsnav_bench::workload().cameras.size();
   const std::size_t batches = std::max<std::size_t>(1, views / count);
-  std::vector<float> ms;
+  std::vector<double> ms;
   double pairs = 0;
   for (int repeat = -1; repeat < kRepeats; ++repeat) {  // the first finds the scratch it takes
     for (std::size_t b = 0; b < batches; ++b) {
@@ -78,7 +74,7 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
       if (repeat < 0) continue;
       float t = 0;
       cudaEventElapsedTime(&t, begin, end);
-      ms.push_back(t / static_cast<float>(count));
+      ms.push_back(static_cast<double>(t) / static_cast<double>(count));
       pairs += static_cast<double>(renderer.stats().tile_intersections);
     }
   }
@@ -98,8 +94,8 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   const std::vector<double> rgb_truth(truth.rgb.begin(), truth.rgb.begin() + static_cast<std::ptrdiff_t>(rgb.size()));
   const gsnav_bench::Error e = gsnav_bench::error_of(rgb, rgb_truth);
   std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f  %.1e  %9.0f  %8.1f\n",
-              profile == Profile::fast ? "fast" : "exact", count, quantile(ms, 0.5), quantile(ms, 0.9),
-              1000.0 / quantile(ms, 0.5), e.max, e.p999, e.psnr,
+              profile == Profile::fast ? "fast" : "exact", count, gsnav_bench::median(ms), gsnav_bench::quantile(ms, 0.9),
+              1000.0 / gsnav_bench::median(ms), e.max, e.p999, e.psnr,
               gsnav_bench::error_of(depth_seen, depth_truth).p99,
               pairs / static_cast<double>(ms.size() * count), static_cast<double>(renderer.stats().scratch_bytes) / 1e6);
   std::fflush(stdout);

@@ -11,17 +11,12 @@
 
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
+#include "ops/no_gpu.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
 
 namespace {
-
-bool no_gpu(const char* what) {
-  if (CudaBackend::device_count() > 0) return false;
-  std::printf("SKIP: %s: no GPU\n", what);
-  return true;
-}
 
 Frames<float> on_gpu(CudaBackend& cuda, const std::vector<const GaussianCloud*>& clouds,
                      const Camera& camera, const RenderConfig& config) {

@@ -11,17 +11,12 @@
 #include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/backends/cuda/pinned.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "ops/no_gpu.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
 
 namespace {
-
-bool no_gpu(const char* what) {
-  if (CudaBackend::device_count() > 0) return false;
-  std::printf("SKIP: %s: no GPU\n", what);
-  return true;
-}
 
 using Lists = std::vector<std::vector<std::uint32_t>>;
 

@@ -153,7 +153,7 @@ __global__ void __launch_bounds__(kThreads) bin_large_kernel(const BatchArgs a) 
       const std::uint32_t first = first_tile(a, e.camera);
       for_each_tile(a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](std::size_t tile) {
         const std::uint32_t at = atomicAdd((Emit ? a.tile_cursors : a.tile_counts) + first + tile, 1u);
-        if (Emit && at < a.pair_capacity) a.pairs[at] = {e.key, slot};
+        if (Emit) emit(a, at, e, slot);
       });
     }
   }

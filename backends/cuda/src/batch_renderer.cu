@@ -61,9 +61,10 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
       address(flight.inputs));
   add(address(to.rgb), address(to.alpha), address(to.median_depth), address(to.expected_depth),
       address(to.accumulated_depth), address(to.first_hit_depth), address(rgb8));
-  // Arrays move when they grow, and only then.
+  // Arrays move when they grow, and only then. Those of tiles have no capacity of their own here.
   add(slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity);
-  add(address(args.items), address(args.tile_counts), address(args.records), address(args.pairs), address(args.depths),
+  add(address(args.items), address(args.tile_counts), address(args.tile_begins),
+      address(args.tile_cursors), address(args.tile_order), address(args.records), address(args.pairs), address(args.depths),
       address(args.perspectives));
   return key;
 }

@@ -51,8 +51,8 @@ class CudaBatchRenderer {
   CudaBatchRenderer& operator=(const CudaBatchRenderer&) = delete;
 
   /// Draws the sets (arrays on the device) from all cameras, which have one size. Enqueues and returns;
-  /// images are whole once `finish()` has said ok. Errors: invalid_argument naming camera, set or field;
-  /// unsupported; backend_failure. Throws gsnav::Error (out_of_memory) where scratch cannot be allocated.
+  /// images are whole once `finish()` has said ok. Errors: invalid_argument naming camera, set or field, or
+  /// where more than three calls would be under way without `finish()`; unsupported; backend_failure. Throws gsnav::Error (out_of_memory) where scratch cannot be allocated.
   Status render(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                 const BatchImages& images);
 
