@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in one row.
 //
-//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [batch sizes...]
+//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256] [batch sizes...]
 //
 // Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of views
 // repeats them from slightly different places. Times are the device's, between events on the stream.
@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <string>
 #include <vector>
 
 #include "error.hpp"
@@ -23,12 +24,13 @@ using namespace gsnav;
 
 namespace {
 
-constexpr int kSize = 256, kRepeats = 9;
+constexpr int kRepeats = 9;
+int g_width = 256, g_height = 256;
 constexpr std::size_t kReferenceViews = 4;  ///< compared with float64
 
 /// `count` cameras from `first` on: the views, and when they are all taken the views moved by centimetres.
 std::vector<BatchCamera> cameras_of(std::size_t first, std::size_t count) {
-  const std::vector<Camera> views = gsnav_bench::sized(kSize, kSize);
+  const std::vector<Camera> views = gsnav_bench::sized(g_width, g_height);
   std::vector<BatchCamera> batch;
   for (std::size_t i = first; i < first + count; ++i) {
     BatchCamera c{views[i % views.size()], {}};
@@ -54,7 +56,7 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   RenderConfig config;
   config.profile = profile;
   CudaBatchRenderer renderer(cuda, config);
-  const std::size_t pixels = std::size_t{kSize} * kSize;
+  const std::size_t pixels = static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);
   DeviceImages out(cuda, count * pixels);
   const std::vector<GaussianSet> sets{arrays.set()};
   cudaEvent_t begin, end;
@@ -106,6 +108,17 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::vector<std::size_t> counts;
+  for (int i = 1; i < argc; ++i) {
+    if (std::string(argv[i]) == "--size" && i + 1 < argc) {
+      if (std::sscanf(argv[++i], "%dx%d", &g_width, &g_height) == 2 && g_width > 0 && g_height > 0) continue;
+    } else if (const std::size_t count = std::strtoull(argv[i], nullptr, 10); count > 0) {
+      counts.push_back(count);
+      continue;
+    }
+    std::fprintf(stderr, "bench_batch: '%s' is no size (256x256) or batch size\n", argv[i]);
+    return 2;
+  }
   if (CudaBackend::device_count() == 0) {
     std::fprintf(stderr, "bench_batch: no GPU\n");
     return 1;
@@ -119,10 +132,8 @@ int main(int argc, char** argv) {
   const std::vector<GaussianSet> sets{gsnav_bench::workload().cloud.set()};
   const Frames<double> truth = reference.render(sets, cameras).value();
   std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB + alpha + median depth\n", cuda.device_name().c_str(),
-              gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), kSize, kSize);
+              gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), g_width, g_height);
   std::printf("profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  scratch MB\n");
-  std::vector<std::size_t> counts;
-  for (int i = 1; i < argc; ++i) counts.push_back(std::strtoull(argv[i], nullptr, 10));
   if (counts.empty()) counts = {1, 8, 64, 256, 512};
   for (const Profile profile : {Profile::fast, Profile::exact}) {
     for (const std::size_t count : counts) row(cuda, arrays, truth, count, profile);

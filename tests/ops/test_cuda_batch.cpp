@@ -20,6 +20,9 @@ namespace {
 
 using Lists = std::vector<std::vector<std::uint32_t>>;
 
+/// More than eight a multiprocessor of any GPU.
+constexpr int kManyTiles = 9 * 192;
+
 /// Images of a batch, fetched. `lists`: the sets of each camera; empty: all.
 struct Batch {
   Frames<float> frames;
@@ -229,6 +232,14 @@ TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are 
     const Batch got = draw(cuda, renderer, {arrays.set()}, {camera, camera}, {}, kAll, false);
     Frames<float> expected = singly(cuda, {arrays.set()}, {camera, camera}, {}, {}, kAll);
     check_same(got.frames, expected);
+    // Many cameras have lists of other tiles, put in order in another way.
+    const std::vector<Camera> many(static_cast<std::size_t>(kManyTiles / 9), camera);
+    const Batch crowd = draw(cuda, renderer, {arrays.set()}, many, {}, kMedianOnly, false);
+    for (const std::size_t c : {std::size_t{0}, many.size() - 1}) {
+      const auto rgb = crowd.frames.rgb.begin() + static_cast<std::ptrdiff_t>(c * 3 * 48 * 48);
+      const auto one = got.frames.rgb.begin();
+      CHECK(differing(std::vector<float>(rgb, rgb + 3 * 48 * 48), std::vector<float>(one, one + 3 * 48 * 48)) == 0);
+    }
     RenderConfig config;
     config.outputs = kRgb;
     const auto cpu = render<float>(serial, {cloud.set()}, camera, config);
@@ -250,6 +261,17 @@ TEST_CASE("cuda batch: the same bits on every run, in any company") {
   const Batch alone = draw(cuda, renderer, {arrays.set()}, last, {}, kMedianOnly);
   const std::vector<float> third(all.frames.rgb.end() - 3 * 40 * 36, all.frames.rgb.end());
   CHECK(differing(alone.frames.rgb, third) == 0);
+  // In a batch so large that tiles are of 16 pixels and each is one block's.
+  std::vector<Camera> crowd = ring(kManyTiles / 9, 40, 36);
+  crowd[7] = cameras[2];
+  const Batch many = draw(cuda, renderer, {arrays.set()}, crowd, {}, kMedianOnly);
+  const auto seventh = [&](const std::vector<float>& image, std::ptrdiff_t channels) {
+    const auto from = image.begin() + 7 * channels * 40 * 36;
+    return std::vector<float>(from, from + channels * 40 * 36);
+  };
+  CHECK(differing(alone.frames.rgb, seventh(many.frames.rgb, 3)) == 0);
+  CHECK(differing(alone.frames.median_depth, seventh(many.frames.median_depth, 1)) == 0);
+  check_same(draw(cuda, renderer, {arrays.set()}, crowd, {}, kMedianOnly).frames, many.frames);
 }
 
 TEST_CASE("cuda batch: calls that differ in their cameras alone are replayed, with the same bits") {

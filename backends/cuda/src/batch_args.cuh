@@ -13,7 +13,7 @@
 
 namespace gsnav::cuda {
 
-inline constexpr int kBatchTile = 16;  ///< pixels a side
+inline constexpr int kBatchTile = 16, kSmallTile = 8;  ///< pixels a side; small where cameras are few
 inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
 
 /// A set seen by a camera. Instances of a set are neighbours; those of a camera are listed by
@@ -43,7 +43,8 @@ struct alignas(16) SplatRecord {
   std::uint32_t x, y;  ///< bounds: first | end << 16
 };
 
-/// A survivor as binning reads it: a TileWindow of `tiles` at `corner`, none where it has a warp of its own. `camera` is kNoSlot where a slot was taken and not used.
+/// A survivor as binning reads it: a TileWindow, without tiles where a warp of its own bins it. `camera` is kNoSlot
+/// where a slot was taken and not used.
 struct alignas(16) SplatEntry {
   std::uint32_t key, corner, tiles, camera;
 };
@@ -58,10 +59,31 @@ struct Pair {
   std::uint32_t key, slot;
 };
 
+/// A part of a tile's list that is put in order by itself: pairs [begin, end), which are whole bins of depth from `bin` on.
+struct alignas(16) ListPart {
+  std::uint32_t tile, bin, begin, end;
+};
+inline constexpr std::uint32_t kPartLength = 384;  ///< part p has the bins that begin so many pairs apart
+
+inline constexpr int kMinDepthBits = 6, kMaxDepthBits = 9;
+
+/// Where cameras are few, lists are kept in bins of depth, an octave's share each, so that many blocks can put one
+/// in order.
+struct DepthBins {
+  std::uint32_t base;  ///< the key that bin 0 begins at; nearer ones are in it too
+  int shift;           ///< a bin is 2^shift keys
+  int bits;            ///< 2^bits bins: 0, or kMinDepthBits to kMaxDepthBits; the last has all that is farther
+  __host__ __device__ bool many() const { return bits != 0; }
+  __device__ std::uint32_t count() const { return 1u << bits; }
+  __device__ std::uint32_t of(std::uint32_t key) const {
+    return key <= base ? 0 : min((key - base) >> shift, count() - 1);
+  }
+};
+
 /// Counts go on where capacities end, so that they say what would have been needed.
 struct BatchCounters {
   unsigned long long slots, hard, several, large, pairs;
-  std::uint32_t items;
+  std::uint32_t items, parts;
   std::uint32_t tiles_of_length[33];    ///< by leading zeros of a tile's count: long lists first
   std::uint32_t ordered_of_length[33];  ///< of these in tile_order already
 };
@@ -77,6 +99,7 @@ struct BatchArgs {
   TileGrid grid;
   float log2_alpha_min;
   bool elliptic;
+  DepthBins depth_bins;
 
   BatchItem* items;
   BatchCounters* counters;
@@ -88,13 +111,16 @@ struct BatchArgs {
   HardSplat* hard;
   std::uint32_t* several;  ///< slots whose tiles are still to be found; kNoSlot: none
   std::uint32_t* large;    ///< slots of very many tiles
+  /// [tiles << depth_bins.bits]: how many pairs; where the next goes, once lists have their places; where bins
+  /// end, once all are there.
+  std::uint32_t* bins;
   std::uint32_t* tile_counts;
   std::uint32_t* tile_begins;
-  std::uint32_t* tile_cursors;
   std::uint32_t* tile_order;  ///< the order that tiles are begun in: longest lists first, so that none is waited for
-  Pair* pairs;
+  ListPart* parts;  ///< where there are many bins of depth
+  Pair* pairs;      ///< of a tile together: in no order, or in order once order_lists has been there
   Pair* pairs_alt;
-  std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity;
+  std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity, part_capacity;
   std::uint32_t slab;  ///< slots that a warp takes at a time: few cameras leave few to share them
 };
 
@@ -138,6 +164,8 @@ __device__ inline std::uint32_t rank_of(const BatchArgs& a, std::uint32_t camera
 // Launches, in the order of a frame. `blocks`: how many keep the device full.
 void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
 void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
+/// Of lists in bins.
+void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
 /// `raster`: rules, background and images; `rgb8` may stand beside its rgb.
 void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std::uint8_t* rgb8,
                      cudaStream_t stream);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cub/block/block_scan.cuh>
 
 #include "batch_tiles.cuh"
@@ -10,38 +11,86 @@ namespace gsnav::cuda {
 namespace {
 
 constexpr unsigned kThreads = 128;
-constexpr unsigned kSlots = 4;  ///< a thread
 
-/// A thread a splat of several tiles.
+/// Calls f(slot, key, tile, wanted), by all lanes together, for the tiles of the large splats: a warp has so many rows of
+/// one at a time.
+template <class F>
+__device__ void for_each_tile_of_large(const BatchArgs& a, int rows, const F& f) {
+  const std::uint32_t n = used(a.counters->large, a.large_capacity);
+  const int ts = a.grid.tile_size, shift = a.grid.tile_shift();
+  const std::uint32_t parts = static_cast<std::uint32_t>((a.grid.rows + rows - 1) / rows);
+  const int lane = static_cast<int>(threadIdx.x % 32);
+  for (std::uint64_t i = (blockIdx.x * kThreads + threadIdx.x) / 32; i < std::uint64_t{n} * parts;
+       i += gridDim.x * kThreads / 32) {
+    const std::uint32_t slot = a.large[i / parts];
+    const SplatRecord& r = a.records[slot];
+    const SplatBounds b = bounds_of(r.x, r.y);
+    const int top = (b.y0 & -ts) + static_cast<int>(i % parts) * rows * ts;
+    if (top >= b.y1) continue;
+    const SplatEntry e = a.entries[slot];
+    // Lanes find the columns of a row each.
+    const int y = top + lane * ts, ty = y >> shift;
+    int first = 0, end = 0;
+    if (lane < rows && y < b.y1) {
+      const SplatBounds row{b.x0, max(b.y0, y), b.x1, min(b.y1, y + ts)};
+      for_each_tile(a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](std::size_t tile) {
+        const int tx = static_cast<int>(tile) - ty * a.grid.columns;
+        if (end == 0) first = tx;
+        end = tx + 1;
+      });
+    }
+    share_in_warp(static_cast<std::uint32_t>(end - first), [&](unsigned owner, std::uint32_t k) {
+      const int tx = __shfl_sync(0xffffffffu, first, owner % 32) + static_cast<int>(k);
+      const int row = (top >> shift) + static_cast<int>(owner);
+      f(slot, e.key, first_tile(a, e.camera) + static_cast<std::uint32_t>(row * a.grid.columns + tx), owner < 32);
+    });
+  }
+}
+
+/// The same for the windows of a warp's lanes; `slot`: of the lane.
+template <class F>
+__device__ void for_each_tile_of_windows(const BatchArgs& a, std::uint32_t slot, const SplatEntry& e,
+                                         std::uint32_t tiles, const F& f) {
+  constexpr unsigned kAll = 0xffffffffu;
+  share_in_warp(static_cast<std::uint32_t>(__popc(tiles)), [&](unsigned owner, std::uint32_t k) {
+    const unsigned from = owner % 32;
+    const TileWindow window{__shfl_sync(kAll, e.corner, from), __shfl_sync(kAll, tiles, from)};
+    const std::uint32_t camera = __shfl_sync(kAll, e.camera, from);
+    f(__shfl_sync(kAll, slot, from), __shfl_sync(kAll, e.key, from),
+      tile_of(a, camera, window, nth_bit(window.tiles, k)), owner < 32);
+  });
+}
+
+/// Few cameras have few large splats.
+template <bool ManyBins>
+constexpr int kRowsOfLarge = ManyBins ? 8 : 32;
+
+/// Counts the pairs of splats of several tiles: a thread each, or a warp.
+template <bool ManyBins>
 __global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
+  const auto count = [&](std::uint32_t, std::uint32_t key, std::uint32_t tile, bool wanted) {
+    add_pair<ManyBins, false>(a, wanted, tile, key);
+  };
+  for_each_tile_of_large(a, kRowsOfLarge<ManyBins>, count);
   const std::uint32_t n = used(a.counters->several, a.several_capacity);
   const std::uint32_t end = (n + 31) / 32 * 32;
   for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < end; i += gridDim.x * kThreads) {
     const std::uint32_t slot = i < n ? a.several[i] : kNoSlot;
-    TileWindow window{0, 0};
-    std::uint32_t camera = 0;
+    SplatEntry e{0, 0, 0, 0};
+    std::uint32_t tiles = 0;
     if (slot != kNoSlot) {
       const SplatRecord& r = a.records[slot];
-      const SplatBounds b = bounds_of(r.x, r.y);
-      window = window_of(a, b);
-      camera = a.entries[slot].camera;
-      if (is_large(a, b)) {
-        const unsigned long long place = atomicAdd(&a.counters->large, 1ull);
-        if (place < a.large_capacity) a.large[place] = slot;
-      } else {
-        // Tiles of a grid as wide as the window are numbered as its bits are.
-        TileGrid grid = a.grid;
-        grid.columns = TileWindow::kSide;
-        const std::size_t corner = window.row() * TileWindow::kSide + window.column();
-        window.tiles = 0;
-        for_each_tile(grid, geometry_of(r), b, a.log2_alpha_min, a.elliptic,
-                      [&](std::size_t tile) { window.tiles |= 1u << (tile - corner); });
-        a.entries[slot].tiles = window.tiles;
-      }
+      e = a.entries[slot];
+      // Tiles of a grid as wide as the window are numbered as its bits are.
+      TileGrid grid = a.grid;
+      grid.columns = TileWindow::kSide;
+      const TileWindow window{e.corner, 0};
+      const std::size_t corner = window.row() * TileWindow::kSide + window.column();
+      for_each_tile(grid, geometry_of(r), bounds_of(r.x, r.y), a.log2_alpha_min, a.elliptic,
+                    [&](std::size_t tile) { tiles |= 1u << (tile - corner); });
+      a.entries[slot].tiles = tiles;
     }
-    for (std::uint32_t bits = window.tiles; __any_sync(0xffffffffu, bits != 0); bits &= bits - 1) {
-      add_together<false>(a.tile_counts, bits != 0, tile_of(a, camera, window, bits));
-    }
+    for_each_tile_of_windows(a, slot, e, tiles, count);
   }
 }
 
@@ -66,120 +115,142 @@ __device__ void order_tiles(const BatchArgs& a) {
   }
 }
 
-/// The slots of a block, four a thread, as binning reads them.
-struct BlockSlots {
-  std::uint32_t first;
-  SplatEntry entries[kSlots];
-
-  __device__ BlockSlots(const BatchArgs& a, std::uint64_t begin, std::uint32_t slots)
-      : first(static_cast<std::uint32_t>(begin) + threadIdx.x) {
-    for (unsigned j = 0; j < kSlots; ++j) {
-      const std::uint64_t at = begin + j * kThreads + threadIdx.x;
-      entries[j].camera = kNoSlot;
-      if (at < slots) entries[j] = a.entries[at];
-    }
-  }
-  __device__ std::uint32_t slot(unsigned j) const { return first + j * kThreads; }
-  /// Bits of the entry's window that are tiles of its list.
-  __device__ std::uint32_t bits(unsigned j) const { return entries[j].camera != kNoSlot ? entries[j].tiles : 0; }
-};
-
-__device__ void emit(const BatchArgs& a, std::uint32_t at, const SplatEntry& e, std::uint32_t slot) {
-  if (at < a.pair_capacity) a.pairs[at] = {e.key, slot};
-}
-
 /// Writes the pairs; and the order of the tiles.
+template <bool ManyBins>
 __global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
   order_tiles(a);
+  const auto emit = [&](std::uint32_t slot, std::uint32_t key, std::uint32_t tile, bool wanted) {
+    const std::uint32_t at = add_pair<ManyBins, true>(a, wanted, tile, key);
+    if (wanted && at < a.pair_capacity) a.pairs[at] = {key, slot};
+  };
+  for_each_tile_of_large(a, kRowsOfLarge<ManyBins>, emit);
   const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
-  constexpr std::uint64_t kStep = kThreads * kSlots;
-  for (std::uint64_t begin = blockIdx.x * kStep; begin < slots; begin += gridDim.x * kStep) {
-    const BlockSlots mine(a, begin, slots);
-    for (unsigned j = 0; j < kSlots; ++j) {
-      const SplatEntry& e = mine.entries[j];
-      const TileWindow window{e.corner, e.tiles};
-      for (std::uint32_t bits = mine.bits(j); __any_sync(0xffffffffu, bits != 0); bits &= bits - 1) {
-        const std::uint32_t at = add_together<true>(a.tile_cursors, bits != 0, tile_of(a, e.camera, window, bits));
-        if (bits != 0) emit(a, at, e, mine.slot(j));
-      }
-    }
+  const std::uint64_t stride = std::uint64_t{gridDim.x} * kThreads;
+  const auto entry = [&](std::uint64_t slot) {
+    return slot < slots ? a.entries[slot] : SplatEntry{0, 0, 0, kNoSlot};
+  };
+  std::uint64_t slot = blockIdx.x * kThreads + threadIdx.x;
+  SplatEntry next = entry(slot);
+  for (; slot - threadIdx.x % 32 < slots; slot += stride) {
+    const SplatEntry e = next;
+    next = entry(slot + stride);
+    for_each_tile_of_windows(a, static_cast<std::uint32_t>(slot), e, e.camera != kNoSlot ? e.tiles : 0, emit);
   }
 }
 
-constexpr std::uint32_t kFewTiles = 1024;
-
-/// The same for one camera of few tiles, whose cursors all blocks would wait for: a block takes its places in each
-/// list at once.
-__global__ void __launch_bounds__(kThreads) emit_few_kernel(const BatchArgs a) {
-  __shared__ std::uint32_t places[kFewTiles];
-  order_tiles(a);
-  const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
-  constexpr std::uint64_t kStep = kThreads * kSlots;
-  for (std::uint64_t begin = blockIdx.x * kStep; begin < slots; begin += gridDim.x * kStep) {
-    const BlockSlots mine(a, begin, slots);
-    const auto for_each = [&](const auto& f) {
-      for (unsigned j = 0; j < kSlots; ++j) {
-        const TileWindow window{mine.entries[j].corner, mine.entries[j].tiles};
-        for (std::uint32_t bits = mine.bits(j); bits != 0; bits &= bits - 1) f(j, tile_of(a, 0, window, bits));
-      }
-    };
-    for (std::uint32_t t = threadIdx.x; t < a.tiles; t += kThreads) places[t] = 0;
-    __syncthreads();
-    for_each([&](unsigned, std::uint32_t tile) { atomicAdd(places + tile, 1u); });
-    __syncthreads();
-    for (std::uint32_t t = threadIdx.x; t < a.tiles; t += kThreads) {
-      if (places[t] != 0) places[t] = atomicAdd(a.tile_cursors + t, places[t]);
-    }
-    __syncthreads();
-    for_each([&](unsigned j, std::uint32_t tile) {
-      emit(a, atomicAdd(places + tile, 1u), mine.entries[j], mine.slot(j));
-    });
-    __syncthreads();
-  }
+/// Takes the place of a tile's list of `total` pairs, and remembers it. One lane calls it.
+__device__ std::uint32_t place_list(const BatchArgs& a, std::uint32_t tile, std::uint32_t total, unsigned long long base,
+                                    std::uint32_t* of_length) {
+  // By the count that is left below, which is what order_tiles reads.
+  const std::uint32_t begin = used(base, a.pair_capacity), kept = min(total, a.pair_capacity - begin);
+  a.tile_begins[tile] = begin;
+  a.tile_counts[tile] = kept;
+  atomicAdd(of_length + __clz(static_cast<int>(kept)), 1u);
+  return begin;
 }
 
-/// A warp a large splat, a lane a row of tiles.
-template <bool Emit>
-__global__ void __launch_bounds__(kThreads) bin_large_kernel(const BatchArgs a) {
-  const std::uint32_t n = used(a.counters->large, a.large_capacity);
-  const int ts = a.grid.tile_size, lane = static_cast<int>(threadIdx.x % 32);
-  for (std::uint32_t i = (blockIdx.x * kThreads + threadIdx.x) / 32; i < n; i += gridDim.x * kThreads / 32) {
-    const std::uint32_t slot = a.large[i];
-    const SplatEntry e = a.entries[slot];
-    const SplatRecord r = a.records[slot];
-    const SplatBounds all = bounds_of(r.x, r.y);
-    for (int y = (all.y0 & -ts) + lane * ts; y < all.y1; y += 32 * ts) {
-      const SplatBounds row{all.x0, max(all.y0, y), all.x1, min(all.y1, y + ts)};
-      const std::uint32_t first = first_tile(a, e.camera);
-      for_each_tile(a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](std::size_t tile) {
-        const std::uint32_t at = atomicAdd((Emit ? a.tile_cursors : a.tile_counts) + first + tile, 1u);
-        if (Emit) emit(a, at, e, slot);
-      });
-    }
-  }
-}
-
-/// A thread a tile: lists follow one another in no particular order.
-__global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
+/// Lists follow one another in no particular order: a thread a tile.
+__device__ void place_lists(const BatchArgs& a, std::uint32_t* of_length) {
   using Scan = cub::BlockScan<unsigned long long, kThreads>;
   __shared__ typename Scan::TempStorage storage;
   __shared__ unsigned long long base;
+  for (std::uint32_t first = blockIdx.x * kThreads; first < a.tiles; first += gridDim.x * kThreads) {
+    const std::uint32_t tile = first + threadIdx.x;
+    const unsigned long long count = tile < a.tiles ? a.bins[tile] : 0;
+    unsigned long long before, total;
+    Scan(storage).ExclusiveSum(count, before, total);
+    if (threadIdx.x == 0) base = atomicAdd(&a.counters->pairs, total);
+    __syncthreads();
+    if (tile < a.tiles) {
+      a.bins[tile] = place_list(a, tile, static_cast<std::uint32_t>(count), base + before, of_length);
+    }
+    __syncthreads();
+  }
+}
+
+/// The same of lists in bins: a warp a tile. Also what order_kernel has to do.
+__device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
+  constexpr unsigned kAll = 0xffffffffu, kMost = (1u << kMaxDepthBits) / 64;
+  const unsigned lane = threadIdx.x % 32, mine = a.depth_bins.count() / 64;  // of a lane: pairs of bins, neighbours
+  for (std::uint32_t tile = (blockIdx.x * kThreads + threadIdx.x) / 32; tile < a.tiles;
+       tile += gridDim.x * kThreads / 32) {
+    uint2* const bins = reinterpret_cast<uint2*>(a.bins + (std::size_t{tile} << a.depth_bins.bits)) + lane * mine;
+    uint2 counts[kMost];
+    std::uint32_t sum = 0, last = 0;  // of all; in the last bin
+#pragma unroll
+    for (unsigned i = 0; i < kMost; ++i) {
+      if (i < mine) counts[i] = bins[i];
+    }
+#pragma unroll
+    for (unsigned i = 0; i < kMost; ++i) {
+      if (i < mine) {
+        sum += counts[i].x + counts[i].y;
+        last = counts[i].y;
+      }
+    }
+    std::uint32_t next = sum;
+    for (unsigned step = 1; step < 32; step *= 2) {
+      const std::uint32_t other = __shfl_up_sync(kAll, next, step);
+      if (lane >= step) next += other;
+    }
+    const std::uint32_t total = __shfl_sync(kAll, next, 31);
+    const std::uint32_t parts = (total + kPartLength - 1) / kPartLength;
+    std::uint32_t begin = 0, first_part = 0;
+    if (lane == 0) {
+      unsigned long long base = 0;
+      if (total != 0) {
+        base = atomicAdd(&a.counters->pairs, static_cast<unsigned long long>(total));
+        first_part = atomicAdd(&a.counters->parts, parts);
+      }
+      begin = place_list(a, tile, total, base, of_length);
+    }
+    begin = __shfl_sync(kAll, begin, 0);
+    first_part = __shfl_sync(kAll, first_part, 0);
+    // A part begins with the first bin that begins at or after it; `before`: where the bin before begins.
+    const bool fits = first_part + parts <= a.part_capacity;
+    const auto begin_bin = [&](std::uint32_t before, std::uint32_t at, std::uint32_t bin, std::uint32_t last_part) {
+      if (!fits) return;
+      const std::uint32_t pair = min(begin + at, a.pair_capacity);
+      for (std::uint32_t p = before / kPartLength + 1; p <= last_part; ++p) {
+        ListPart* const part = a.parts + first_part + p;
+        part[-1].end = pair;
+        if (p == parts) break;
+        part->tile = tile;
+        part->bin = bin;
+        part->begin = pair;
+      }
+    };
+    if (lane == 0 && parts != 0 && fits) {
+      ListPart& part = a.parts[first_part];
+      part.tile = tile;
+      part.bin = 0;
+      part.begin = begin;
+    }
+    std::uint32_t at = next - sum, before = at - __shfl_up_sync(kAll, last, 1);
+    if (lane == 0) before = 0;
+#pragma unroll
+    for (unsigned i = 0; i < kMost; ++i) {
+      if (i >= mine) continue;
+      const std::uint32_t bin = 2 * (lane * mine + i), middle = at + counts[i].x;
+      bins[i] = {begin + at, begin + middle};
+      if (at != before) begin_bin(before, at, bin, at / kPartLength);
+      if (middle != at) begin_bin(at, middle, bin + 1, middle / kPartLength);
+      before = middle;
+      at = middle + counts[i].y;
+    }
+    if (lane == 31) begin_bin(before, at, a.depth_bins.count(), parts);
+  }
+}
+
+template <bool ManyBins>
+__global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
   __shared__ std::uint32_t of_length[33];
   if (threadIdx.x < 33) of_length[threadIdx.x] = 0;
-  const std::uint32_t tile = blockIdx.x * kThreads + threadIdx.x;
-  const unsigned long long count = tile < a.tiles ? a.tile_counts[tile] : 0;
-  unsigned long long before, total;
-  Scan(storage).ExclusiveSum(count, before, total);
-  if (threadIdx.x == 0) base = atomicAdd(&a.counters->pairs, total);
   __syncthreads();
-  // By the count that is left below, which is what order_tiles reads.
-  const std::uint32_t begin = used(base + before, a.pair_capacity);
-  const std::uint32_t kept =
-      static_cast<std::uint32_t>(min(count, static_cast<unsigned long long>(a.pair_capacity - begin)));
-  if (tile < a.tiles) {
-    a.tile_begins[tile] = a.tile_cursors[tile] = begin;
-    a.tile_counts[tile] = kept;
-    atomicAdd(of_length + __clz(static_cast<int>(kept)), 1u);
+  if constexpr (ManyBins) {
+    place_bins(a, of_length);
+  } else {
+    place_lists(a, of_length);
   }
   __syncthreads();
   if (threadIdx.x < 33 && of_length[threadIdx.x] != 0) {
@@ -187,16 +258,23 @@ __global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
   }
 }
 
+template <bool ManyBins>
+void launch(const BatchArgs& args, unsigned blocks, cudaStream_t stream) {
+  const unsigned at_a_time = ManyBins ? kThreads / 32 : kThreads;
+  count_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args);
+  place_kernel<ManyBins><<<std::min(blocks, (args.tiles + at_a_time - 1) / at_a_time), kThreads, 0, stream>>>(args);
+  emit_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args);
+}
+
 }  // namespace
 
 void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
   const unsigned blocks = static_cast<unsigned>(multiprocessors) * 16;
-  count_kernel<<<blocks, kThreads, 0, stream>>>(args);
-  bin_large_kernel<false><<<blocks, kThreads, 0, stream>>>(args);
-  place_kernel<<<(args.tiles + kThreads - 1) / kThreads, kThreads, 0, stream>>>(args);
-  const bool few = args.cameras == 1 && args.tiles <= kFewTiles;
-  (few ? emit_few_kernel : emit_kernel)<<<blocks, kThreads, 0, stream>>>(args);
-  bin_large_kernel<true><<<blocks, kThreads, 0, stream>>>(args);
+  if (args.depth_bins.many()) {
+    launch<true>(args, blocks, stream);
+  } else {
+    launch<false>(args, blocks, stream);
+  }
 }
 
 }  // namespace gsnav::cuda

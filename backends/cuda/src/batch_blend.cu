@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "batch_blend.cuh"
 #include "batch_order.cuh"
 #include "batch_splat.cuh"
 #include "gsnav/backends/cuda.hpp"
@@ -16,18 +17,12 @@ constexpr int kBlocksPerProcessor = 4;
 #else
 constexpr int kBlocksPerProcessor = 7;
 #endif
-constexpr int kBlock = 4;                          ///< pixels a side of what a quarter of a warp blends
 constexpr int kRowsApart = kBlock / kPixels;       ///< of a thread's pixels
 constexpr std::uint32_t kChunk = 256;              ///< splats that are staged at a time
 constexpr std::uint32_t kNothing = kChunk;         ///< a staged splat that covers no pixel
 constexpr std::uint32_t kListStep = 4;             ///< lists are read by so many
 constexpr unsigned kAll = 0xffffffffu;
 static_assert(kThreads == kOrderThreads && 4 * kBlock * kBlock == 32 * kPixels && kOrderBatch % kChunk == 0);
-
-struct StagedSplat {
-  float4 geometry[2];
-  SplatColor<float> color;  ///< pad: the slot's bits
-};
 
 static_assert((kChunk + 1) * sizeof(StagedSplat) <= kOrderLent && kOrderLent <= 0xffff);
 
@@ -44,94 +39,18 @@ struct BlendShared {
   __device__ StagedSplat& splat(std::uint32_t i) { return reinterpret_cast<StagedSplat*>(order.lent)[i]; }
 };
 
-/// The blocks of the tile at (x, y) that a footprint may reach.
-struct ReachedBlocks {
-  int x, y;                 ///< of the tile
-  int x0, x1, y0, y1;       ///< pixels of the bounds in it, inclusive
-  __device__ ReachedBlocks(const SplatBounds& b, int tile_x, int tile_y)
-      : x(tile_x), y(tile_y), x0(max(b.x0, x)), x1(min(b.x1, x + kBatchTile) - 1), y0(max(b.y0, y)),
-        y1(min(b.y1, y + kBatchTile) - 1) {}
-  __device__ unsigned columns(int first, int last) const {
-    return (2u << ((last - x) / kBlock)) - (1u << ((first - x) / kBlock));
-  }
-  __device__ int first_row() const { return (y0 - y) / kBlock; }
-  __device__ int last_row() const { return (y1 - y) / kBlock; }
-  /// More than one row and column: the ellipse may leave out some of them.
-  __device__ bool many() const { return first_row() != last_row() && (x0 - x) / kBlock != (x1 - x) / kBlock; }
-  __device__ unsigned of_bounds() const {
-    const unsigned across = columns(x0, x1);
-    unsigned mask = 0;
-    for (int row = first_row(); row <= last_row(); ++row) mask |= across << (4 * row);
-    return mask;
-  }
-  __device__ unsigned of_ellipse(const SplatGeometry<float>& g, float log2_alpha_min) const {
-    const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
-    const FootprintStrips<float> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0), centre(y1));
-    unsigned mask = 0;
-    for (int row = first_row(); row <= last_row(); ++row) {
-      const int top = y + row * kBlock;
-      float left, right;
-      if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlock - 1, y1)), left, right)) continue;
-      // As in for_each_tile: the padding of left and right is more than what rounding to a pixel may lose.
-      const float low = static_cast<float>(x0), high = static_cast<float>(x1 + 1);
-      const int first = static_cast<int>(clamp(left + 0.5f, low, high));
-      const int last = static_cast<int>(clamp(right + 0.5f, low, high)) - 1;
-      if (first <= last) mask |= columns(first, last) << (4 * row);
-    }
-    return mask;
-  }
-};
-
-struct BlendArgs {
-  BatchArgs batch;
-  RasterArgs<float> raster;  ///< images.rgb is not written: it says that colour is asked for
-  float* rgb;
-  std::uint8_t* rgb8;
-};
-
-template <DepthMode D>
-__device__ void write(const BlendArgs& b, std::size_t pixel,
-                      const BlendState<float, D == DepthMode::any ? D : DepthMode::none>& state,
-                      std::uint32_t median) {
-  const FrameImages<float>& out = b.raster.images;
-  if (b.rgb != nullptr || b.rgb8 != nullptr) {
-    const Vec3<float> color = pixel_color(b.raster, state);
-    const float channels[3] = {color.x, color.y, color.z};
-    for (int c = 0; c < 3; ++c) {
-      if (b.rgb != nullptr) b.rgb[3 * pixel + c] = channels[c];
-      if (b.rgb8 != nullptr) {
-        b.rgb8[3 * pixel + c] = static_cast<std::uint8_t>(255.0f * clamp(channels[c], 0.0f, 1.0f) + 0.5f);
-      }
-    }
-  }
-  if (out.alpha != nullptr) out.alpha[pixel] = pixel_alpha(state);
-  if constexpr (D == DepthMode::median) out.median_depth[pixel] = __uint_as_float(median);
-  if constexpr (D == DepthMode::any) {
-    if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
-    if (out.expected_depth != nullptr) out.expected_depth[pixel] = pixel_expected_depth(b.raster, state);
-    if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = pixel_accumulated_depth(state);
-    if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
-  }
-}
-
 /// Puts the records of splats [first, first + n) of the batch into shared memory, and what they may reach.
 __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, std::uint32_t n, int tile_x,
                       int tile_y) {
   if (threadIdx.x == 0) {
-    StagedSplat& nothing = s.splat(kNothing);
-    nothing = {};
-    nothing.geometry[1].w = -1e30f;  // log2 of the opacity
+    s.splat(kNothing) = staged_nothing();
     s.queued = 0;
   }
   __syncthreads();
   for (std::uint32_t i = threadIdx.x; i < n; i += kThreads) {
     const std::uint32_t slot = s.order.slots[first + i];
     const SplatRecord r = a.records[slot];
-    const SplatGeometry<float> g = geometry_of(r);
-    StagedSplat& to = s.splat(i);
-    to.geometry[0] = {g.ref_x, g.ref_y, g.a, g.k};
-    to.geometry[1] = {g.b, g.w1, g.w2, g.log2_opacity};
-    to.color = {r.r, r.g, r.blue, __uint_as_float(slot)};
+    s.splat(i) = staged(r, slot);
     const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
     if (a.elliptic && blocks.many()) {
       s.queue[atomicAdd(&s.queued, 1u)] = static_cast<std::uint16_t>(i);  // so that no lane waits for another's
@@ -142,11 +61,10 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, s
   __syncthreads();
   for (std::uint32_t q = threadIdx.x; q < s.queued; q += kThreads) {
     const std::uint32_t i = s.queue[q];
-    const float4 g0 = s.splat(i).geometry[0], g1 = s.splat(i).geometry[1];
     const SplatRecord& r = a.records[s.order.slots[first + i]];
     const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
     s.masks[i] = static_cast<std::uint16_t>(
-        blocks.of_ellipse({g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w}, a.log2_alpha_min));
+        blocks.of_ellipse(geometry_of(s.splat(i)), a.log2_alpha_min));
   }
   __syncthreads();
 }
@@ -180,15 +98,10 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned b
   return end;
 }
 
-/// What RasterArgs decide at run time and the inner loop must not.
-enum class Form { plain, exclusive_stop, perspective };
-
 /// A block a tile, a thread two pixels of a column, a quarter of a warp a block of 4 x 4 of them. For
 /// DepthMode::median the slot of the median Gaussian is left in the image.
 template <bool Color, DepthMode D, Exp2 M, Form F>
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(const __grid_constant__ BlendArgs b) {
-  constexpr DepthMode kBlended = D == DepthMode::any ? D : DepthMode::none;
-  constexpr bool kGeneral = F != Form::plain;
   extern __shared__ __align__(16) unsigned char memory[];
   BlendShared& s = *reinterpret_cast<BlendShared*>(memory);
   const BatchArgs& a = b.batch;
@@ -205,7 +118,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(co
   BlendRules<float> rules = b.raster.rules;
   if (F == Form::exclusive_stop) rules.exclusive_stop = true;
 
-  BlendState<float, kBlended> state[kPixels];
+  BlendState<float, kBlendedDepth<D>> state[kPixels];
   std::uint32_t median[kPixels];
   const float px = static_cast<float>(x) + 0.5f;
   float py[kPixels];
@@ -218,25 +131,8 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(co
   }
   const auto is_open = [&] { return state[0].open(rules) || state[1].open(rules); };
   const auto blend = [&](std::uint32_t place) {
-    const StagedSplat& from = *reinterpret_cast<const StagedSplat*>(s.order.lent + place);
-    const float4 g0 = from.geometry[0], g1 = from.geometry[1];
-    const SplatGeometry<float> geometry{g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w};
-    const SplatColor<float> color = from.color;
-    const std::uint32_t slot = __float_as_uint(color.pad);  // 0 for the splat that covers nothing: any will do
-    const SplatDepth<float>* const depth = kBlended == DepthMode::any ? a.depths + slot : nullptr;
-    const ColumnTerms<float> terms = column_terms(geometry, px);
-    for (int k = 0; k < kPixels; ++k) {
-      const float exponent = F == Form::perspective
-                                 ? perspective_exponent(geometry, a.perspectives[slot], px, py[k])
-                                 : column_exponent(terms, geometry.ref_y, geometry.b, py[k]);
-      const float before = state[k].transmittance;
-      blend_alpha<Color, kBlended, kGeneral>(state[k], rules, footprint_alpha<M>(rules, exponent), &color, depth, px,
-                                             py[k]);
-      if constexpr (D == DepthMode::median) {
-        // An exclusive stop negates the transmittance and blends nothing.
-        if (before > 0.5f && abs(state[k].transmittance) <= 0.5f) median[k] = slot;
-      }
-    }
+    blend_staged<Color, D, M, F>(a, rules, *reinterpret_cast<const StagedSplat*>(s.order.lent + place), px, py, state,
+                                 median);
   };
   TileOrder order(a, ordered, camera);
   unsigned open = __ballot_sync(kAll, is_open());
@@ -316,19 +212,15 @@ void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std
                      cudaStream_t stream) {
   BlendArgs b{args, raster, raster.images.rgb, rgb8};
   if (rgb8 != nullptr && b.rgb == nullptr) b.raster.images.rgb = reinterpret_cast<float*>(rgb8);
-  const auto launch = [&](auto kernel) {
-    cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, sizeof(BlendShared));
-    kernel<<<args.tiles, kThreads, sizeof(BlendShared), stream>>>(b);
-  };
-  dispatch_raster(b.raster, [&]<bool C, DepthMode D, Exp2 M, bool General>() {
-    if constexpr (!General) {
-      launch(blend_kernel<C, D, device_exp2(M), Form::plain>);
-    } else if (args.perspectives != nullptr) {
-      launch(blend_kernel<C, D, M, Form::perspective>);
-    } else {
-      launch(blend_kernel<C, D, M, Form::exclusive_stop>);
-    }
-  });
+  if (args.depth_bins.many()) {
+    launch_blending_small(b, stream);
+  } else {
+    dispatch_blending(b, [&]<bool C, DepthMode D, Exp2 M, Form F>() {
+      const auto kernel = blend_kernel<C, D, M, F>;
+      cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, sizeof(BlendShared));
+      kernel<<<args.tiles, kThreads, sizeof(BlendShared), stream>>>(b);
+    });
+  }
   if (raster.depth_mode() == DepthMode::median) {
     const unsigned pixels = static_cast<unsigned>(args.grid.width) * static_cast<unsigned>(args.grid.height);
     depth_kernel<<<dim3((pixels + 127) / 128, args.cameras), 128, 0, stream>>>(args, raster.images.median_depth);

@@ -75,7 +75,7 @@ __device__ inline void block_range(OrderShared& s, std::uint32_t low, std::uint3
 __device__ inline int bits_for(std::uint32_t range) { return 32 - __clz(static_cast<int>(range)); }
 
 /// Sorts a batch in which many keys are equal, by (key, rank).
-__device__ __noinline__ void sort_by_rank(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
+__device__ __noinline__ inline void sort_by_rank(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
                                           std::uint32_t n) {
   constexpr int kItems = kOrderItems;
   std::uint32_t rank[kItems], index[kItems], key[kItems], slot[kItems];
@@ -111,7 +111,7 @@ __device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const Batc
 }
 
 /// Sorts n pairs into s.slots. All keys lie in [low, high]; low > high: not known.
-__device__ __noinline__ void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
+__device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
                                         const Pair* pairs, std::uint32_t n, std::uint32_t low,
                                         std::uint32_t high) {
   constexpr std::uint32_t kLongest = 64;  // bucket that is put in order by comparing all with all
@@ -201,7 +201,7 @@ __device__ inline void for_each_pair(const Pair* pairs, std::uint32_t begin, std
 }
 
 /// Moves [begin, begin + n) from one array of pairs to the other, into bins of ascending (key, rank).
-__device__ __noinline__ void partition(OrderShared& s, const BatchArgs& a, std::uint32_t camera, const Pair* from,
+__device__ __noinline__ inline void partition(OrderShared& s, const BatchArgs& a, std::uint32_t camera, const Pair* from,
                                        Pair* to, std::uint32_t begin, std::uint32_t n, int level) {
   const auto range = [&](auto value) {
     std::uint32_t low = 0xffffffffu, high = 0;
@@ -250,26 +250,75 @@ __device__ __noinline__ void partition(OrderShared& s, const BatchArgs& a, std::
 class TileOrder {
  public:
   __device__ TileOrder(const BatchArgs& a, std::uint32_t tile, std::uint32_t camera)
-      : camera_(camera), begin_(a.tile_begins[tile]), count_(a.tile_counts[tile]) {}
+      : tile_(tile), camera_(camera), begin_(a.tile_begins[tile]), end_(begin_ + a.tile_counts[tile]) {}
+  __device__ TileOrder(const ListPart& part, std::uint32_t camera)
+      : tile_(part.tile), camera_(camera), begin_(part.begin), end_(part.end), bin_(part.bin) {}
 
   /// Leaves the next splats in s.slots and returns how many; 0: no more.
   __device__ __noinline__ std::uint32_t next(OrderShared& s, const BatchArgs& a) {
-    if (level_ == kNotStarted) {
-      if (count_ == 0) return 0;
-      if (count_ <= kOrderBatch) {
-        level_ = kDone;
-        ordering::sort_batch(s, a, camera_, a.pairs + begin_, count_, 0xffffffffu, 0);
-        return count_;
-      }
-      level_ = 0;
-      ordering::partition(s, a, camera_, a.pairs, a.pairs_alt, begin_, count_, 0);
+    if (level_ >= 0) {
+      const std::uint32_t n = next_of_bin(s, a);
+      if (n != 0) return n;
     }
+    if (begin_ == end_) return 0;
+    const Bins bins = take(a);
+    const std::uint32_t begin = begin_, n = bins.end - begin;
+    begin_ = bins.end;
+    bin_ = bins.next;
+    if (n <= kOrderBatch) {
+      ordering::sort_batch(s, a, camera_, a.pairs + begin, n, bins.low, bins.high);
+      return n;
+    }
+    level_ = 0;
+    ordering::partition(s, a, camera_, a.pairs, a.pairs_alt, begin, n, 0);
+    return next_of_bin(s, a);
+  }
+
+ private:
+  static constexpr int kNone = -1;
+
+  /// Bins of depth that are read together: pairs up to `end`, of keys in [low, high]; low > high: not known.
+  struct Bins {
+    std::uint32_t end, next, low, high;
+  };
+
+  __device__ const std::uint32_t* bin_ends(const BatchArgs& a) const {
+    return a.bins + (std::size_t{tile_} << a.depth_bins.bits);
+  }
+
+  /// As many bins as a batch holds, but one at least. Every warp finds out by itself.
+  __device__ Bins take(const BatchArgs& a) const {
+    constexpr std::uint32_t kNoBin = 0xffffffffu;
+    const DepthBins& bins = a.depth_bins;
+    if (!bins.many() || end_ - begin_ <= kOrderBatch) return {end_, bins.count(), kNoBin, 0};
+    const std::uint32_t* const ends = bin_ends(a);
+    const std::uint32_t lane = threadIdx.x % 32;
+    std::uint32_t bin = bin_, end = begin_;
+    for (;;) {
+      const std::uint32_t mine = bin + lane < bins.count() ? min(ends[bin + lane], end_) : kNoBin;
+      const bool fits = mine != kNoBin && mine - begin_ <= kOrderBatch;
+      const int fitting = __popc(__ballot_sync(0xffffffffu, fits));
+      if (fitting > 0) end = __shfl_sync(0xffffffffu, mine, fitting - 1);
+      if (fitting < 32 && end == begin_) {  // the next by itself is longer
+        end = __shfl_sync(0xffffffffu, mine, fitting);
+        bin += static_cast<std::uint32_t>(fitting) + 1;
+        break;
+      }
+      bin += static_cast<std::uint32_t>(fitting);
+      if (fitting < 32) break;
+    }
+    if (bin_ == 0 || bin == bins.count()) return {end, bin, kNoBin, 0};
+    return {end, bin, bins.base + (bin_ << bins.shift), bins.base + (bin << bins.shift) - 1};
+  }
+
+  /// Of a bin that is longer than a batch.
+  __device__ std::uint32_t next_of_bin(OrderShared& s, const BatchArgs& a) {
     while (level_ >= 0) {
       const std::uint32_t* begins = s.begins[level_];
       std::uint32_t bin = s.next_bin[level_];
       while (bin < kOrderBins && begins[bin + 1] == begins[bin]) ++bin;
       if (bin == kOrderBins) {
-        level_ = level_ == 0 ? kDone : level_ - 1;
+        --level_;
         continue;
       }
       // As many bins as fit, but at least one.
@@ -303,11 +352,9 @@ class TileOrder {
     return 0;
   }
 
- private:
-  static constexpr int kNotStarted = -2, kDone = -1;
-
-  std::uint32_t camera_, begin_, count_;
-  int level_ = kNotStarted;
+  std::uint32_t tile_, camera_, begin_, end_;
+  std::uint32_t bin_ = 0;  ///< the next of depth
+  int level_ = kNone;      ///< of the bin that is being read
 };
 
 }  // namespace gsnav::cuda

@@ -73,6 +73,24 @@ class Layout {
   std::size_t bytes_ = 0;
 };
 
+/// Up to so many tiles of 16 pixels there is a block for each quarter: a batch takes as long as its longest list.
+std::uint64_t few_tiles(int multiprocessors) {
+  return static_cast<std::uint64_t>(multiprocessors) * 8;
+}
+
+/// Eight octaves from the nearest near plane on, as finely as counters in the GPU's cache allow.
+cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits, std::uint32_t tiles) {
+  constexpr std::uint32_t kCounters = 1u << 22;
+  constexpr int kOctaves = 3;  // log2
+  int bits = cuda::kMinDepthBits;
+  while (bits < cuda::kMaxDepthBits && std::uint64_t{tiles} << (bits + 1) <= kCounters) ++bits;
+  double near_plane = cameras[0].camera.near_plane;
+  for (const BatchCamera& c : cameras) near_plane = std::min<double>(near_plane, c.camera.near_plane);
+  const KeyCode code = KeyCode::of(key_bits, static_cast<float>(near_plane));
+  const std::uint32_t base = code.base == 0 ? bits_of(static_cast<float>(near_plane)) : 0;
+  return {base, std::max(0, 23 - code.shift + kOctaves - bits), bits};
+}
+
 }  // namespace
 
 /// Everything of a call that the host computes, into one pinned block and on to the device.
@@ -170,13 +188,17 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   args.camera_instances = device(static_cast<std::uint32_t*>(nullptr), at_list);
   args.set_count = static_cast<std::uint32_t>(sets.size());
   args.cameras = static_cast<std::uint32_t>(cameras.size());
-  args.grid = TileGrid::of(cameras[0].camera.width, cameras[0].camera.height, cuda::kBatchTile);
+  const int width = cameras[0].camera.width, height = cameras[0].camera.height;
+  args.grid = TileGrid::of(width, height, cuda::kBatchTile);
+  const bool few = args.cameras * args.grid.count() <= few_tiles(multiprocessors);
+  if (few) args.grid = TileGrid::of(width, height, cuda::kSmallTile);
   const std::uint64_t tiles = args.cameras * std::uint64_t{args.grid.count()};
   if (tiles > 0x7fffffffu) return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
   args.tiles = static_cast<std::uint32_t>(tiles);
+  args.depth_bins = few ? depth_bins_of(cameras, rules.key_bits, args.tiles) : cuda::DepthBins{};
   args.log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
   args.elliptic = config.response == Response::ewa;
-  args.slab = args.cameras < 8 ? 32 : 256;
+  args.slab = args.cameras < 8 ? 64 : 256;
 
   raster = {};
   raster.grid = args.grid;

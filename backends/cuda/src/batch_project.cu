@@ -56,6 +56,11 @@ __device__ void write_record(const BatchArgs& a, std::uint32_t slot, const Batch
   if (a.perspectives != nullptr) a.perspectives[slot] = s.perspective;
 }
 
+__device__ void queue_large(const BatchArgs& a, std::uint32_t slot) {
+  const unsigned long long place = atomicAdd(&a.counters->large, 1ull);
+  if (place < a.large_capacity) a.large[place] = slot;
+}
+
 /// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
 struct alignas(16) WarpRows {
   float mean[3][32], quat[4][32], scales[3][32], opacity[32];
@@ -175,10 +180,18 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
                      args.color ? row_color(gs, args.sh_degree, row, rows, delta) : SplatColor<float>{});
       }
       const TileWindow window = drawn && slot != kNoSlot ? window_of(a, splat.bounds) : TileWindow{0, 0};
-      add_together<false>(a.tile_counts, window.tiles != 0, tile_of(a, instance.camera, window, 1));
-      const bool queued = drawn && slot != kNoSlot && window.tiles == 0;
-      const std::uint64_t place = several.take(queued);
-      if (queued && place < a.several_capacity) a.several[place] = slot;
+      const bool single = window.tiles != 0;
+      const std::uint32_t tile = tile_of(a, instance.camera, window, 0), code = args.camera.key_code(key);
+      if (a.depth_bins.many()) {
+        add_pair<true, false>(a, single, tile, code);
+      } else {
+        add_pair<false, false>(a, single, tile, code);
+      }
+      const bool queued = drawn && slot != kNoSlot && !single;
+      const bool large = queued && is_large(a, splat.bounds);
+      if (large) queue_large(a, slot);
+      const std::uint64_t place = several.take(queued && !large);
+      if (queued && !large && place < a.several_capacity) a.several[place] = slot;
     }
     if (!has_sh) wait_for_sh();
   }
@@ -211,7 +224,9 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
       write_record<false>(a, h.slot, instance, key, h.row, splat, color);
       const TileWindow window = window_of(a, splat.bounds);
       if (window.tiles != 0) {
-        atomicAdd(a.tile_counts + tile_of(a, instance.camera, window, 1), 1u);
+        atomicAdd(a.bins + bin_of(a, tile_of(a, instance.camera, window, 0), args.camera.key_code(key)), 1u);
+      } else if (is_large(a, splat.bounds)) {
+        queue_large(a, h.slot);
       } else {
         const unsigned long long place = atomicAdd(&a.counters->several, 1ull);
         if (place < a.several_capacity) a.several[place] = h.slot;

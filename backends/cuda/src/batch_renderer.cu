@@ -28,10 +28,12 @@ void CudaBatchRenderer::State::size_scratch() {
   args.hard = size(hard, hard_capacity);
   args.several = size(several, several_capacity);
   args.large = size(large, large_capacity);
+  args.bins = size(bins, std::size_t{args.tiles} << args.depth_bins.bits);
   args.tile_counts = size(tile_counts, args.tiles);
   args.tile_begins = size(tile_begins, args.tiles);
-  args.tile_cursors = size(tile_cursors, args.tiles);
   args.tile_order = size(tile_order, args.tiles);
+  args.part_capacity = args.depth_bins.many() ? args.tiles + pair_capacity / cuda::kPartLength : 0;
+  args.parts = size(parts, args.part_capacity);
   args.pairs = size(pairs, pair_capacity);
   args.pairs_alt = size(pairs_alt, pair_capacity);
   const bool sums = raster.depth_mode() == DepthMode::any, perspective = config.response != Response::ewa;
@@ -46,7 +48,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.pair_capacity = pair_capacity;
   stats.scratch_bytes = inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
                         entries.capacity_bytes() + sources.capacity_bytes() + hard.capacity_bytes() +
-                        several.capacity_bytes() + large.capacity_bytes() + 4 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
+                        several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() + bins.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
                         pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes();
 }
 
@@ -56,15 +58,15 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
   const auto add = [&](auto... values) { ((key.at(n++) = static_cast<std::uint64_t>(values)), ...); };
   const auto address = [](const void* p) { return reinterpret_cast<std::uintptr_t>(p); };
   const FrameImages<float>& to = raster.images;
-  add(args.units, args.set_count, args.cameras, args.grid.width, args.grid.height, input_bytes);
+  add(args.units, args.set_count, args.cameras, args.grid.width, args.grid.height, input_bytes, args.depth_bins.base);
   add(address(args.sets), address(args.instances), address(args.camera_first), address(args.camera_instances),
       address(flight.inputs));
   add(address(to.rgb), address(to.alpha), address(to.median_depth), address(to.expected_depth),
       address(to.accumulated_depth), address(to.first_hit_depth), address(rgb8));
   // Arrays move when they grow, and only then. Those of tiles have no capacity of their own here.
   add(slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity);
-  add(address(args.items), address(args.tile_counts), address(args.tile_begins),
-      address(args.tile_cursors), address(args.tile_order), address(args.records), address(args.pairs), address(args.depths),
+  add(address(args.items), address(args.bins), address(args.tile_counts), address(args.tile_begins),
+      address(args.tile_order), address(args.records), address(args.parts), address(args.pairs), address(args.depths),
       address(args.perspectives));
   return key;
 }
@@ -73,9 +75,10 @@ void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
   const cudaStream_t stream = backend.stream();
   cudaMemcpyAsync(inputs.data(), flight.inputs, input_bytes, cudaMemcpyHostToDevice, stream);
   backend.fill(args.counters, 0, sizeof(cuda::BatchCounters));
-  backend.fill(args.tile_counts, 0, args.tiles * sizeof(std::uint32_t));
+  backend.fill(args.bins, 0, (std::size_t{args.tiles} << args.depth_bins.bits) * sizeof(std::uint32_t));
   cuda::launch_projection(args, multiprocessors, stream);
   cuda::launch_binning(args, multiprocessors, stream);
+  if (args.depth_bins.many()) cuda::launch_ordering(args, multiprocessors, stream);
   cuda::launch_blending(args, raster, rgb8, stream);
   backend.copy(flight.counters, args.counters, sizeof(cuda::BatchCounters), CopyKind::device_to_host);
 }

@@ -25,7 +25,7 @@ inline void need(cudaError_t e, const char* what) {
 }
 
 /// What the launches of a call depend on besides the contents of its inputs: addresses, capacities and counts.
-using LaunchKey = std::array<std::uint64_t, 32>;
+using LaunchKey = std::array<std::uint64_t, 40>;
 
 /// Pinned memory of one call under way: what is copied to the device, and the counts that come back; and its
 /// launches recorded, to be replayed while their key stays the same.
@@ -62,7 +62,7 @@ struct CudaBatchRenderer::State {
 
   State(CudaBackend& b, const RenderConfig& c)
       : backend(b), config(c), inputs(b), items(b), counters(b), records(b), entries(b), sources(b), several(b), large(b),
-        tile_counts(b), tile_begins(b), tile_cursors(b), tile_order(b), depths(b), perspectives(b), hard(b), pairs(b),
+        bins(b), tile_counts(b), tile_begins(b), tile_order(b), depths(b), perspectives(b), hard(b), parts(b), pairs(b),
         pairs_alt(b) {
     int device = 0;
     cuda::need(cudaGetDevice(&device), "cudaGetDevice");
@@ -102,10 +102,11 @@ struct CudaBatchRenderer::State {
   Array<cuda::BatchCounters> counters;
   Array<cuda::SplatRecord> records;
   Array<cuda::SplatEntry> entries;
-  Array<std::uint32_t> sources, several, large, tile_counts, tile_begins, tile_cursors, tile_order;
+  Array<std::uint32_t> sources, several, large, bins, tile_counts, tile_begins, tile_order;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
   Array<cuda::HardSplat> hard;
+  Array<cuda::ListPart> parts;
   Array<cuda::Pair> pairs, pairs_alt;
   cuda::BatchArgs args{};
   RasterArgs<float> raster;

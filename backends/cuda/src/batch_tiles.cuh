@@ -14,19 +14,34 @@ struct TileWindow {
   std::uint32_t tiles;             ///< bit kSide * row + column
   __device__ std::uint32_t column() const { return corner & 0xffffu; }
   __device__ std::uint32_t row() const { return corner >> 16; }
-  /// Of the lowest of `bits` from the corner.
-  __device__ static std::uint32_t offset(std::uint32_t bits, std::uint32_t columns) {
-    const std::uint32_t bit = static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
-    return bit / kSide * columns + bit % kSide;
-  }
 };
+
+/// The counter of a tile's pairs of that key.
+__device__ inline std::uint32_t bin_of(const BatchArgs& a, std::uint32_t tile, std::uint32_t key) {
+  return (tile << a.depth_bins.bits) + a.depth_bins.of(key);
+}
+
+/// Adds one to the counter of each lane that wants it, and returns its place there. All lanes of the warp call it.
+/// Lanes often share a list, and one may be in great demand: one atomic operation a list, unless it has many bins.
+template <bool ManyBins, bool Place>
+__device__ inline std::uint32_t add_pair(const BatchArgs& a, bool wanted, std::uint32_t tile, std::uint32_t key) {
+  if constexpr (ManyBins) return wanted ? atomicAdd(a.bins + bin_of(a, tile, key), 1u) : 0;
+  const unsigned takers = __ballot_sync(0xffffffffu, wanted);
+  if (!wanted) return 0;
+  const unsigned lane = threadIdx.x % 32, peers = __match_any_sync(takers, tile);
+  const int leader = __ffs(static_cast<int>(peers)) - 1;
+  std::uint32_t at = 0;
+  if (static_cast<int>(lane) == leader) at = atomicAdd(a.bins + tile, static_cast<std::uint32_t>(__popc(peers)));
+  if constexpr (!Place) return 0;
+  return __shfl_sync(peers, at, leader) + static_cast<std::uint32_t>(__popc(peers & ((1u << lane) - 1)));
+}
 
 /// The first tile of a camera.
 __device__ inline std::uint32_t first_tile(const BatchArgs& a, std::uint32_t camera) {
   return camera * static_cast<std::uint32_t>(a.grid.count());
 }
 
-/// Of bounds; `tiles` is 1 where they lie in one tile, else 0: still to be found.
+/// Of bounds; with the one tile where they lie in one, else without: still to be found.
 __device__ inline TileWindow window_of(const BatchArgs& a, const SplatBounds& b) {
   const int shift = a.grid.tile_shift();
   const int tx = b.x0 >> shift, ty = b.y0 >> shift;
@@ -41,25 +56,49 @@ __device__ inline bool is_large(const BatchArgs& a, const SplatBounds& b) {
          ((b.y1 - 1) >> shift) - (b.y0 >> shift) >= TileWindow::kSide;
 }
 
-/// The window's tile of the lowest of `bits`, among those of all cameras.
+/// The window's tile of bit `bit`, among those of all cameras.
 __device__ inline std::uint32_t tile_of(const BatchArgs& a, std::uint32_t camera, const TileWindow& window,
-                                        std::uint32_t bits) {
+                                        std::uint32_t bit) {
   const std::uint32_t columns = static_cast<std::uint32_t>(a.grid.columns);
-  return first_tile(a, camera) + window.row() * columns + window.column() + TileWindow::offset(bits, columns);
+  return first_tile(a, camera) + (window.row() + bit / TileWindow::kSide) * columns + window.column() +
+         bit % TileWindow::kSide;
 }
 
-/// Adds one to the counter of `tile` for each lane that wants it, by one atomic operation a tile, since lanes often
-/// share one and a tile may be in great demand. Returns the lane's place. All lanes of the warp call it.
-template <bool Place>
-__device__ inline std::uint32_t add_together(std::uint32_t* counters, bool wanted, std::uint32_t tile) {
-  const unsigned takers = __ballot_sync(0xffffffffu, wanted);
-  if (!wanted) return 0;
-  const unsigned lane = threadIdx.x % 32, peers = __match_any_sync(takers, tile);
-  const int leader = __ffs(static_cast<int>(peers)) - 1;
-  std::uint32_t at = 0;
-  if (static_cast<int>(lane) == leader) at = atomicAdd(counters + tile, static_cast<std::uint32_t>(__popc(peers)));
-  if constexpr (!Place) return 0;
-  return __shfl_sync(peers, at, leader) + static_cast<std::uint32_t>(__popc(peers & ((1u << lane) - 1)));
+/// Calls f(owner, i) for i in [0, count) of each lane `owner`, all of the warp's calls shared evenly by its lanes. All
+/// lanes call it; f is called together, with owner 32 by lanes that have nothing left.
+template <class F>
+__device__ inline void share_in_warp(std::uint32_t count, const F& f) {
+  constexpr unsigned kAll = 0xffffffffu;
+  const unsigned lane = threadIdx.x % 32;
+  std::uint32_t end = count;  // of the lane's calls among the warp's
+  for (unsigned step = 1; step < 32; step *= 2) {
+    const std::uint32_t other = __shfl_up_sync(kAll, end, step);
+    if (lane >= step) end += other;
+  }
+  const std::uint32_t total = __shfl_sync(kAll, end, 31);
+  for (std::uint32_t first = 0; first < total; first += 32) {
+    const std::uint32_t at = first + lane;
+    unsigned owner = 0;  // the first lane whose end is beyond `at`
+    for (unsigned step = 16; step > 0; step /= 2) {
+      if (__shfl_sync(kAll, end, owner + step - 1) <= at) owner += step;
+    }
+    const std::uint32_t begin = __shfl_sync(kAll, end - count, owner);
+    f(at < total ? owner : 32u, at - begin);
+  }
+}
+
+/// The place of the bit that has n set bits below it; bits has 16.
+__device__ inline std::uint32_t nth_bit(std::uint32_t bits, std::uint32_t n) {
+  std::uint32_t place = 0;
+  for (std::uint32_t width = 8; width > 0; width /= 2) {
+    const std::uint32_t below = static_cast<std::uint32_t>(__popc(bits & ((1u << width) - 1)));
+    if (n >= below) {
+      n -= below;
+      bits >>= width;
+      place += width;
+    }
+  }
+  return place;
 }
 
 /// Places that a warp takes from a counter by the slab; those that it has not used are left to the caller.

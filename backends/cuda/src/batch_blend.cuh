@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "batch_args.cuh"
+#include "gsnav/backends/cuda.hpp"
+
+// What the kernels share that blend tiles.
+
+namespace gsnav::cuda {
+
+inline constexpr int kBlock = 4;  ///< pixels a side of what has a list of its own
+
+/// What is summed while blending; of a median the slot is remembered and looked up afterwards.
+template <DepthMode D>
+inline constexpr DepthMode kBlendedDepth = D == DepthMode::any ? D : DepthMode::none;
+
+/// A splat of a list, in shared memory.
+struct StagedSplat {
+  float4 geometry[2];
+  SplatColor<float> color;  ///< pad: the slot's bits
+};
+
+/// The staged form of a record, and of what covers no pixel.
+__device__ inline StagedSplat staged(const SplatRecord& r, std::uint32_t slot) {
+  const SplatGeometry<float> g = geometry_of(r);
+  return {{{g.ref_x, g.ref_y, g.a, g.k}, {g.b, g.w1, g.w2, g.log2_opacity}}, {r.r, r.g, r.blue, __uint_as_float(slot)}};
+}
+__device__ inline StagedSplat staged_nothing() {
+  StagedSplat nothing{};
+  nothing.geometry[1].w = -1e30f;  // log2 of the opacity
+  return nothing;
+}
+__device__ inline SplatGeometry<float> geometry_of(const StagedSplat& s) {
+  const float4 g0 = s.geometry[0], g1 = s.geometry[1];
+  return {g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w};
+}
+
+/// The blocks of the tile at (x, y) that a footprint may reach.
+struct ReachedBlocks {
+  int x, y;                 ///< of the tile
+  int x0, x1, y0, y1;       ///< pixels of the bounds in it, inclusive
+  __device__ ReachedBlocks(const SplatBounds& b, int tile_x, int tile_y, int side = kBatchTile)
+      : x(tile_x), y(tile_y), x0(max(b.x0, x)), x1(min(b.x1, x + side) - 1), y0(max(b.y0, y)),
+        y1(min(b.y1, y + side) - 1) {}
+  __device__ unsigned columns(int first, int last) const {
+    return (2u << ((last - x) / kBlock)) - (1u << ((first - x) / kBlock));
+  }
+  __device__ int first_row() const { return (y0 - y) / kBlock; }
+  __device__ int last_row() const { return (y1 - y) / kBlock; }
+  /// More than one row and column: the ellipse may leave out some of them.
+  __device__ bool many() const { return first_row() != last_row() && (x0 - x) / kBlock != (x1 - x) / kBlock; }
+  __device__ unsigned of_bounds() const {
+    const unsigned across = columns(x0, x1);
+    unsigned mask = 0;
+    for (int row = first_row(); row <= last_row(); ++row) mask |= across << (4 * row);
+    return mask;
+  }
+  __device__ unsigned of_ellipse(const SplatGeometry<float>& g, float log2_alpha_min) const {
+    const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
+    const FootprintStrips<float> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0), centre(y1));
+    unsigned mask = 0;
+    for (int row = first_row(); row <= last_row(); ++row) {
+      const int top = y + row * kBlock;
+      float left, right;
+      if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlock - 1, y1)), left, right)) continue;
+      // As in for_each_tile: the padding of left and right is more than what rounding to a pixel may lose.
+      const float low = static_cast<float>(x0), high = static_cast<float>(x1 + 1);
+      const int first = static_cast<int>(clamp(left + 0.5f, low, high));
+      const int last = static_cast<int>(clamp(right + 0.5f, low, high)) - 1;
+      if (first <= last) mask |= columns(first, last) << (4 * row);
+    }
+    return mask;
+  }
+};
+
+struct BlendArgs {
+  BatchArgs batch;
+  RasterArgs<float> raster;  ///< images.rgb is not written: it says that colour is asked for
+  float* rgb;
+  std::uint8_t* rgb8;
+};
+
+template <DepthMode D>
+__device__ void write(const BlendArgs& b, std::size_t pixel,
+                      const BlendState<float, kBlendedDepth<D>>& state,
+                      std::uint32_t median) {
+  const FrameImages<float>& out = b.raster.images;
+  if (b.rgb != nullptr || b.rgb8 != nullptr) {
+    const Vec3<float> color = pixel_color(b.raster, state);
+    const float channels[3] = {color.x, color.y, color.z};
+    for (int c = 0; c < 3; ++c) {
+      if (b.rgb != nullptr) b.rgb[3 * pixel + c] = channels[c];
+      if (b.rgb8 != nullptr) {
+        b.rgb8[3 * pixel + c] = static_cast<std::uint8_t>(255.0f * clamp(channels[c], 0.0f, 1.0f) + 0.5f);
+      }
+    }
+  }
+  if (out.alpha != nullptr) out.alpha[pixel] = pixel_alpha(state);
+  if constexpr (D == DepthMode::median) out.median_depth[pixel] = __uint_as_float(median);
+  if constexpr (D == DepthMode::any) {
+    if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
+    if (out.expected_depth != nullptr) out.expected_depth[pixel] = pixel_expected_depth(b.raster, state);
+    if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = pixel_accumulated_depth(state);
+    if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
+  }
+}
+
+/// What RasterArgs decide at run time and the inner loop must not.
+enum class Form { plain, exclusive_stop, perspective };
+
+/// Blends a splat into K pixels of a column.
+template <bool Color, DepthMode D, Exp2 M, Form F, int K>
+__device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>& rules, const StagedSplat& from, float px,
+                                    const float (&py)[K], BlendState<float, kBlendedDepth<D>> (&state)[K],
+                                    std::uint32_t (&median)[K]) {
+  const SplatGeometry<float> geometry = geometry_of(from);
+  const SplatColor<float> color = from.color;
+  const std::uint32_t slot = __float_as_uint(color.pad);  // 0 for the splat that covers nothing: any will do
+  const SplatDepth<float>* const depth = kBlendedDepth<D> == DepthMode::any ? a.depths + slot : nullptr;
+  const ColumnTerms<float> terms = column_terms(geometry, px);
+  for (int k = 0; k < K; ++k) {
+    const float exponent = F == Form::perspective
+                               ? perspective_exponent(geometry, a.perspectives[slot], px, py[k])
+                               : column_exponent(terms, geometry.ref_y, geometry.b, py[k]);
+    const float before = state[k].transmittance;
+    blend_alpha<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, footprint_alpha<M>(rules, exponent), &color,
+                                                           depth, px, py[k]);
+    if constexpr (D == DepthMode::median) {
+      // An exclusive stop negates the transmittance and blends nothing.
+      if (before > 0.5f && abs(state[k].transmittance) <= 0.5f) median[k] = slot;
+    }
+  }
+}
+
+/// Calls launch.operator()<Color, DepthMode, Exp2, Form>() with what the call asks for.
+template <class L>
+void dispatch_blending(const BlendArgs& b, const L& launch) {
+  dispatch_raster(b.raster, [&]<bool C, DepthMode D, Exp2 M, bool General>() {
+    if constexpr (!General) {
+      launch.template operator()<C, D, device_exp2(M), Form::plain>();
+    } else if (b.batch.perspectives != nullptr) {
+      launch.template operator()<C, D, M, Form::perspective>();
+    } else {
+      launch.template operator()<C, D, M, Form::exclusive_stop>();
+    }
+  });
+}
+
+/// Of lists that are in order: a block a small tile.
+void launch_blending_small(const BlendArgs& b, cudaStream_t stream);
+
+}  // namespace gsnav::cuda
