@@ -20,8 +20,8 @@ namespace {
 
 using Lists = std::vector<std::vector<std::uint32_t>>;
 
-/// More than eight a multiprocessor of any GPU.
-constexpr int kManyTiles = 9 * 192;
+/// More than sixteen a multiprocessor of any GPU.
+constexpr int kManyTiles = 9 * 384;
 
 /// Images of a batch, fetched. `lists`: the sets of each camera; empty: all.
 struct Batch {

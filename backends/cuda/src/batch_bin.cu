@@ -61,17 +61,13 @@ __device__ void for_each_tile_of_windows(const BatchArgs& a, std::uint32_t slot,
   });
 }
 
-/// Few cameras have few large splats.
-template <bool ManyBins>
-constexpr int kRowsOfLarge = ManyBins ? 8 : 32;
-
 /// Counts the pairs of splats of several tiles: a thread each, or a warp.
 template <bool ManyBins>
-__global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
+__global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a, int rows_of_large) {
   const auto count = [&](std::uint32_t, std::uint32_t key, std::uint32_t tile, bool wanted) {
     add_pair<ManyBins, false>(a, wanted, tile, key);
   };
-  for_each_tile_of_large(a, kRowsOfLarge<ManyBins>, count);
+  for_each_tile_of_large(a, rows_of_large, count);
   const std::uint32_t n = used(a.counters->several, a.several_capacity);
   const std::uint32_t end = (n + 31) / 32 * 32;
   for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < end; i += gridDim.x * kThreads) {
@@ -117,13 +113,13 @@ __device__ void order_tiles(const BatchArgs& a) {
 
 /// Writes the pairs; and the order of the tiles.
 template <bool ManyBins>
-__global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
+__global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a, int rows_of_large) {
   order_tiles(a);
   const auto emit = [&](std::uint32_t slot, std::uint32_t key, std::uint32_t tile, bool wanted) {
     const std::uint32_t at = add_pair<ManyBins, true>(a, wanted, tile, key);
     if (wanted && at < a.pair_capacity) a.pairs[at] = {key, slot};
   };
-  for_each_tile_of_large(a, kRowsOfLarge<ManyBins>, emit);
+  for_each_tile_of_large(a, rows_of_large, emit);
   const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
   const std::uint64_t stride = std::uint64_t{gridDim.x} * kThreads;
   const auto entry = [&](std::uint64_t slot) {
@@ -261,9 +257,10 @@ __global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
 template <bool ManyBins>
 void launch(const BatchArgs& args, unsigned blocks, cudaStream_t stream) {
   const unsigned at_a_time = ManyBins ? kThreads / 32 : kThreads;
-  count_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args);
+  const int rows_of_large = args.cameras < 8 ? 8 : 32;  // few cameras have few large splats
+  count_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args, rows_of_large);
   place_kernel<ManyBins><<<std::min(blocks, (args.tiles + at_a_time - 1) / at_a_time), kThreads, 0, stream>>>(args);
-  emit_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args);
+  emit_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args, rows_of_large);
 }
 
 }  // namespace

@@ -73,9 +73,11 @@ class Layout {
   std::size_t bytes_ = 0;
 };
 
-/// Up to so many tiles of 16 pixels there is a block for each quarter: a batch takes as long as its longest list.
-std::uint64_t few_tiles(int multiprocessors) {
-  return static_cast<std::uint64_t>(multiprocessors) * 8;
+/// Whether a call takes as long as its longest list, so that lists are to be short. `tiles`: of 16 pixels. In larger images
+/// splats are larger too, and small tiles share too many.
+bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, int multiprocessors) {
+  constexpr std::uint64_t kSmallImage = 512;
+  return tiles <= kSmallImage && cameras * tiles <= 16 * static_cast<std::uint64_t>(multiprocessors);
 }
 
 /// Eight octaves from the nearest near plane on, as finely as counters in the GPU's cache allow.
@@ -190,7 +192,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   args.cameras = static_cast<std::uint32_t>(cameras.size());
   const int width = cameras[0].camera.width, height = cameras[0].camera.height;
   args.grid = TileGrid::of(width, height, cuda::kBatchTile);
-  const bool few = args.cameras * args.grid.count() <= few_tiles(multiprocessors);
+  const bool few = is_of_few(args.cameras, args.grid.count(), multiprocessors);
   if (few) args.grid = TileGrid::of(width, height, cuda::kSmallTile);
   const std::uint64_t tiles = args.cameras * std::uint64_t{args.grid.count()};
   if (tiles > 0x7fffffffu) return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
