@@ -26,11 +26,12 @@ class CloudSink {
     rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
   }
 
-  void add(const RawGaussian& raw) {
+  /// Takes a row or counts why not. Returns whether it was kept.
+  bool add(const RawGaussian& raw) {
     ActiveGaussian g;
     const RowFate fate = activate(raw, rest_, g);
     report_.count(fate, g.clamped);
-    if (fate != RowFate::kept) return;
+    if (fate != RowFate::kept) return false;
     const std::uint32_t id = lattice_.id_of(g.mean);
     if (id != 0 || !ids_.empty()) {
       ids_.resize(at_ - first_, 0);
@@ -47,6 +48,7 @@ class CloudSink {
     std::copy_n(raw.shN, rest_, cloud_.shN.data() + rest_ * at_);
     report_.bounds.add(raw.mean);
     ++at_;
+    return true;
   }
 
   std::size_t first() const noexcept { return first_; }

@@ -119,23 +119,26 @@ class Splitter {
  private:
   const float* vector(std::size_t i) const noexcept { return vectors_.data() + order_[i] * width_; }
 
-  /// Leaves the mean in mean_. Two passes: identical vectors have an error of exactly zero.
+  /// Leaves the mean in mean_. Sums are of differences to the first vector, so that identical vectors have an error of
+  /// exactly zero, and in double, where the difference of squares keeps all that matters of floats.
   Group measured(std::size_t first, std::size_t last) {
     Group g{0, first, last, 0, 0};
     std::fill(mean_.begin(), mean_.end(), 0.0);
     std::fill(spread_.begin(), spread_.end(), 0.0);
     const float* origin = vector(first);
-    for (std::size_t i = first; i < last; ++i) {
-      for (std::size_t k = 0; k < width_; ++k) mean_[k] += static_cast<double>(vector(i)[k] - origin[k]);
-    }
-    for (std::size_t k = 0; k < width_; ++k) {
-      mean_[k] = static_cast<double>(origin[k]) + mean_[k] / static_cast<double>(last - first);
-    }
-    for (std::size_t i = first; i < last; ++i) {
+    double *sum = mean_.data(), *squares = spread_.data();
+    for (std::size_t i = first + 1; i < last; ++i) {
+      const float* v = vector(i);
       for (std::size_t k = 0; k < width_; ++k) {
-        const double d = static_cast<double>(vector(i)[k]) - mean_[k];
-        spread_[k] += d * d;
+        const double d = static_cast<double>(v[k] - origin[k]);
+        sum[k] += d;
+        squares[k] += d * d;
       }
+    }
+    const double n = static_cast<double>(last - first);
+    for (std::size_t k = 0; k < width_; ++k) {
+      spread_[k] = std::max(0.0, spread_[k] - mean_[k] * mean_[k] / n);
+      mean_[k] = static_cast<double>(origin[k]) + mean_[k] / n;
     }
     g.error = std::accumulate(spread_.begin(), spread_.end(), 0.0);
     g.axis =

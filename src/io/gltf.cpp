@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cloud_fill.hpp"
+#include "described.hpp"
 #include "gltf_nodes.hpp"
 #include "gsnav/io/spz.hpp"
 #include "gsnav/scene/edit_cloud.hpp"
@@ -216,7 +217,8 @@ Result<LoadedCloud> load_gltf(const std::filesystem::path& path, const LoadGltfO
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
     const auto file = GltfFile::open(path);
     if (!file) return file.status();
-    return SplatReader(*file, options).run();
+    return detail::described(SplatReader(*file, options).run(),
+                             options.keep_axes ? Vec3d{0, 1, 0} : Vec3d{0, -1, 0});
   });
 }
 
@@ -225,7 +227,8 @@ Result<LoadedCloud> parse_gltf(std::span<const std::byte> bytes, std::string sou
   return detail::guarded(source, [&]() -> Result<LoadedCloud> {
     const auto file = GltfFile::parse(bytes, source, {});
     if (!file) return file.status();
-    return SplatReader(*file, options).run();
+    return detail::described(SplatReader(*file, options).run(),
+                             options.keep_axes ? Vec3d{0, 1, 0} : Vec3d{0, -1, 0});
   });
 }
 

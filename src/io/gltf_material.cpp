@@ -27,8 +27,8 @@ bool begins(std::span<const std::byte> bytes, std::initializer_list<int> magic) 
   return true;
 }
 
-Picture picture_of(const PngImage& image) {
-  Picture out{static_cast<std::size_t>(image.width), static_cast<std::size_t>(image.height), {}};
+TextureImage picture_of(const PngImage& image) {
+  TextureImage out{static_cast<std::size_t>(image.width), static_cast<std::size_t>(image.height), {}};
   const std::size_t c = static_cast<std::size_t>(image.channels);
   const int shift = image.bits == 16 ? 8 : 0;
   out.rgba.resize(4 * out.width * out.height);
@@ -150,7 +150,7 @@ Result<std::int32_t> GltfMaterials::picture(const Json& texture, std::size_t ind
   return texture_of_[*source] = static_cast<std::int32_t>(textures_.size() - 1);
 }
 
-Result<Picture> GltfMaterials::decode(std::size_t index) const {
+Result<TextureImage> GltfMaterials::decode(std::size_t index) const {
   const auto image = file_.item("images", index);
   if (!image) return image.status();
   const std::string at = file_.where("images", index);
@@ -171,7 +171,7 @@ Result<Picture> GltfMaterials::decode(std::size_t index) const {
   if (begins(bytes, {'R', 'I', 'F', 'F'})) {
     auto decoded = decode_webp(bytes, at, WebpUse::picture);
     if (!decoded) return decoded.status();
-    return Picture{decoded->width, decoded->height, std::move(decoded->pixels)};
+    return TextureImage{decoded->width, decoded->height, std::move(decoded->pixels)};
   }
   const bool png = begins(bytes, {0x89, 'P', 'N', 'G'});
   if (!png && !begins(bytes, {0xff, 0xd8}))

@@ -27,7 +27,7 @@ struct GltfMaterial {
 class GltfMaterials {
  public:
   /// Pictures are put behind `textures`; what is left out or taken otherwise is said in `warnings`.
-  GltfMaterials(const GltfFile& file, std::vector<Picture>& textures, std::vector<std::string>& warnings)
+  GltfMaterials(const GltfFile& file, std::vector<TextureImage>& textures, std::vector<std::string>& warnings)
       : file_(file), textures_(textures), warnings_(warnings) {}
 
   /// Entry `index` of "materials". Errors: invalid_file, file_not_found.
@@ -37,10 +37,10 @@ class GltfMaterials {
   Status read_texture(const Json& info, const std::string& where, GltfMaterial& out);
   Status read_uv_map(const Json& transform, const std::string& where, GltfMaterial& out) const;
   Result<std::int32_t> picture(const Json& texture, std::size_t index);
-  Result<Picture> decode(std::size_t image) const;
+  Result<TextureImage> decode(std::size_t image) const;
 
   const GltfFile& file_;
-  std::vector<Picture>& textures_;
+  std::vector<TextureImage>& textures_;
   std::vector<std::string>& warnings_;
   std::map<std::size_t, std::int32_t> texture_of_;  ///< of images that were read, -1 where one cannot be
 };

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cloud_fill.hpp"
+#include "described.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 
@@ -244,14 +245,14 @@ class KsplatReader {
 }  // namespace
 
 Result<LoadedCloud> parse_ksplat(std::span<const std::byte> bytes, std::string source) {
-  return detail::guarded(source, [&] { return KsplatReader(bytes, source).run(); });
+  return detail::guarded(source, [&] { return detail::described(KsplatReader(bytes, source).run()); });
 }
 
 Result<LoadedCloud> load_ksplat(const std::filesystem::path& path) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
     detail::RandomFile file;
     if (Status s = file.open(path); !s) return s;
-    return KsplatReader(file, path.string()).run();
+    return detail::described(KsplatReader(file, path.string()).run());
   });
 }
 

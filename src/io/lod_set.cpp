@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "described.hpp"
 #include "file.hpp"
 #include "gsnav/io/sog.hpp"
 #include "json.hpp"
@@ -189,7 +190,7 @@ Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLo
   return detail::guarded(path.string(), [&] {
     std::error_code ignored;
     const bool folder = std::filesystem::is_directory(path, ignored);
-    return LodReader(folder ? path / "lod-meta.json" : path, options).run();
+    return detail::described(LodReader(folder ? path / "lod-meta.json" : path, options).run());
   });
 }
 

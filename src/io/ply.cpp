@@ -3,15 +3,20 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "cloud_fill.hpp"
+#include "described.hpp"
 #include "file.hpp"
 #include "ply_body.hpp"
+#include "ply_columns.hpp"
 #include "ply_compressed.hpp"
 #include "ply_header.hpp"
 #include "ply_points.hpp"
+#include "ply_temporal.hpp"
 #include "quantised.hpp"
+#include "temporal_rows.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -19,67 +24,14 @@ namespace {
 using detail::kPlyBlock;
 using detail::ply_rows_missing;
 using detail::PlyBody;
+using detail::PlyColumns;
 using detail::PlyElement;
 using detail::PlyHeader;
 using detail::PlyProperty;
 
-constexpr std::size_t kFixed = 14;  // x y z, f_dc 3, opacity, scale 3, rot 4
-
-/// The vertex properties that are read, in the order of a block's columns.
-struct Columns {
-  std::vector<const PlyProperty*> properties;
-  int degree = 0;
-  std::size_t rest = 0;          ///< f_rest columns read: 3 ((degree + 1)^2 - 1)
-  std::size_t rest_in_file = 0;  ///< f_rest properties in the file
-  /// Where the file has red, green, blue and no f_dc: what its colours' 1 is. Else 0.
-  double greatest_colour = 0;
-};
-
-Result<Columns> choose_columns(const PlyElement& vertex, const std::string& source) {
-  static constexpr std::array<const char*, kFixed> kNames = {
-      "x",       "y",       "z",       "f_dc_0", "f_dc_1", "f_dc_2", "opacity",
-      "scale_0", "scale_1", "scale_2", "rot_0",  "rot_1",  "rot_2",  "rot_3"};
-  static constexpr std::array<const char*, 3> kColours = {"red", "green", "blue"};
-  Columns c;
-  const PlyProperty* red = vertex.find("red");
-  if (vertex.find("f_dc_0") == nullptr && red != nullptr) {
-    c.greatest_colour = detail::greatest_colour(red->type);
-  }
-  for (std::size_t k = 0; k < kFixed; ++k) {
-    const char* name = c.greatest_colour > 0 && k >= 3 && k < 6 ? kColours[k - 3] : kNames[k];
-    const PlyProperty* p = vertex.find(name);
-    if (p == nullptr) {
-      return {Errc::invalid_file, source + ": element 'vertex' has no property '" + name + "'"};
-    }
-    c.properties.push_back(p);
-  }
-  for (const PlyProperty& p : vertex.properties) {
-    c.rest_in_file += p.name.starts_with("f_rest_") ? 1 : 0;
-  }
-  static constexpr std::array<std::size_t, 5> kCounts = {0, 9, 24, 45, 72};
-  const auto found = std::find(kCounts.begin(), kCounts.end(), c.rest_in_file);
-  if (found == kCounts.end()) {
-    return {Errc::invalid_file, source + ": " + std::to_string(c.rest_in_file) +
-                                    " properties f_rest_*, must be 0, 9, 24, 45 or 72"};
-  }
-  c.degree = std::min(kMaxShDegree, static_cast<int>(found - kCounts.begin()));
-  c.rest = kCounts[static_cast<std::size_t>(c.degree)];
-  // Channel-major in the file; colour inner in the cloud.
-  for (std::size_t k = 0; k < c.rest / 3; ++k) {
-    for (std::size_t channel = 0; channel < 3; ++channel) {
-      const std::string name = "f_rest_" + std::to_string(channel * (c.rest_in_file / 3) + k);
-      const PlyProperty* p = vertex.find(name);
-      if (p == nullptr) {
-        return {Errc::invalid_file, source + ": element 'vertex' has no property '" + name +
-                                        "' among its " + std::to_string(c.rest_in_file) + " f_rest_*"};
-      }
-      c.properties.push_back(p);
-    }
-  }
-  return c;
-}
-
-void add_block(detail::CloudSink& sink, const Columns& columns, const double* block, std::size_t n) {
+/// Gives n rows, from `row` on, to the sink, and their time planes to `moving` where it is given.
+void add_block(detail::CloudSink& sink, detail::TemporalRows* moving, const PlyColumns& columns, const double* block,
+               std::size_t row, std::size_t n) {
   std::array<float, 45> rest;
   RawGaussian raw;
   raw.shN = columns.rest != 0 ? rest.data() : nullptr;
@@ -94,15 +46,23 @@ void add_block(detail::CloudSink& sink, const Columns& columns, const double* bl
     raw.opacity_logit = at(6);
     raw.log_scales = {at(7), at(8), at(9)};
     raw.quat = {at(10), at(11), at(12), at(13)};
-    for (std::size_t k = 0; k < columns.rest; ++k) rest[k] = static_cast<float>(at(kFixed + k));
-    sink.add(raw);
+    for (std::size_t k = 0; k < columns.rest; ++k) rest[k] = static_cast<float>(at(detail::kPlyFixed + k));
+    if (moving == nullptr) {
+      sink.add(raw);
+      continue;
+    }
+    detail::RawTemporal t;
+    if (columns.time != PlyColumns::kNone) t.time = at(columns.time);
+    if (columns.time_scale != PlyColumns::kNone) t.log_sigma = at(columns.time_scale);
+    for (std::size_t k = 0; k < columns.motion_count; ++k) t.motion[k] = at(columns.motion + k);
+    moving->add(row + i, t, raw, sink);
   }
 }
 
 /// What a header says about the Gaussians.
 struct Vertices {
   std::vector<PlyElement>::const_iterator element;
-  Columns columns;
+  PlyColumns columns;
   bool points = false;  ///< with colours and nothing else
 };
 
@@ -119,29 +79,39 @@ Result<Vertices> find_vertices(const PlyHeader& header, const std::string& sourc
   if (v.element->has_list) {
     return {Errc::unsupported, source + ": element 'vertex' has a list property"};
   }
-  auto chosen = choose_columns(*v.element, source);
+  auto chosen = detail::choose_ply_columns(*v.element, source);
   if (!chosen) return chosen.status();
   v.columns = std::move(*chosen);
   return v;
 }
 
-/// Fills a cloud from blocks of rows: `unpack(first, n, block)` returns how many of them there were.
+/// Fills a cloud from blocks of rows: `unpack(first, n, block)` returns how many of them there were. `moving` as in
+/// detail::load_ply.
 template <class Unpack>
-Result<LoadedCloud> fill(const PlyHeader& header, const Vertices& v, const std::string& source,
+Result<LoadedCloud> fill(const PlyHeader& header, const Vertices& v, const std::string& source, TemporalCloud* moving,
                          const Unpack& unpack) {
+  const std::size_t count = static_cast<std::size_t>(v.element->count);
+  std::optional<detail::TemporalRows> planes;
+  if (moving != nullptr && v.columns.moves()) planes.emplace(count, v.columns.motion_count);
   const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
     std::vector<double> block(v.columns.properties.size() * kPlyBlock);
     for (std::size_t row = first; row < last; row += kPlyBlock) {
       const std::size_t n = std::min(kPlyBlock, last - row);
       const std::size_t there = unpack(row, n, block.data());
       if (there != n) return ply_rows_missing(source, *v.element, row + there);
-      add_block(sink, v.columns, block.data(), n);
+      add_block(sink, planes ? &*planes : nullptr, v.columns, block.data(), row, n);
     }
     return {};
   };
-  auto out = detail::fill_cloud(static_cast<std::size_t>(v.element->count), v.columns.degree, source,
-                                decode, header.format != detail::PlyFormat::ascii);
+  auto out =
+      detail::fill_cloud(count, v.columns.degree, source, decode, header.format != detail::PlyFormat::ascii);
   if (!out) return out;
+  if (planes) planes->give(*moving, out->report);
+  if (moving == nullptr && v.columns.moves()) {
+    out->report.warnings.push_back(
+        "Gaussians that move and fade: each is taken at its own time; load_scene with a time, or load_temporal, reads t, "
+        "t_scale and motion_*");
+  }
   out->cloud.filter = header.mip ? Filter::mip : Filter::classic;
   if (v.columns.rest_in_file == 72) {
     out->report.warnings.push_back("SH degree 4 in the file: bands up to degree 3 are read");
@@ -155,7 +125,7 @@ void warn_of_stray_bytes(LoadReport& report, std::uint64_t bytes, std::uint64_t 
                             " rows that the header promises");
 }
 
-Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source) {
+Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source, TemporalCloud* moving) {
   auto parsed = detail::parse_ply_header(bytes, source);
   if (!parsed) return parsed.status();
   const PlyHeader& header = *parsed;
@@ -175,7 +145,7 @@ Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& s
   const auto& properties = found->columns.properties;
   const bool text = header.format == detail::PlyFormat::ascii;
   const std::byte* const rows = body.here();
-  auto out = fill(header, *found, source, [&](std::size_t first, std::size_t n, double* block) {
+  auto out = fill(header, *found, source, moving, [&](std::size_t first, std::size_t n, double* block) {
     if (text) return body.read(vertex, properties, n, block);
     detail::unpack_ply_rows(header.format, vertex, properties, rows + first * vertex.stride, n, block);
     return n;
@@ -202,7 +172,7 @@ bool has_fixed_rows(const PlyHeader& header) {
 
 /// Reads the rows piece by piece, so that there is never more in memory than the cloud.
 Result<LoadedCloud> load_rows(const detail::RandomFile& file, const PlyHeader& header, const Vertices& v,
-                              const std::string& source) {
+                              const std::string& source, TemporalCloud* moving) {
   std::uint64_t left = file.size() - header.size, start = header.size, others_short = 0;
   const PlyElement* cut = nullptr;
   for (const PlyElement& e : header.elements) {
@@ -218,7 +188,7 @@ Result<LoadedCloud> load_rows(const detail::RandomFile& file, const PlyHeader& h
   if (cut != nullptr && cut <= &*v.element) return ply_rows_missing(source, *cut, others_short);
   const PlyElement& vertex = *v.element;
   auto out =
-      fill(header, v, source, [&](std::size_t first, std::size_t n, double* block) -> std::size_t {
+      fill(header, v, source, moving, [&](std::size_t first, std::size_t n, double* block) -> std::size_t {
         thread_local std::vector<std::byte> rows;
         rows.resize(n * vertex.stride);
         if (!file.read(start + std::uint64_t{first} * vertex.stride, rows)) return 0;
@@ -236,30 +206,37 @@ Result<LoadedCloud> load_rows(const detail::RandomFile& file, const PlyHeader& h
 
 }  // namespace
 
-Result<LoadedCloud> parse_ply(std::span<const std::byte> bytes, std::string source) {
-  return detail::guarded(source, [&] { return parse(bytes, source); });
+Result<LoadedCloud> detail::parse_ply(std::span<const std::byte> bytes, const std::string& source,
+                                      TemporalCloud* moving) {
+  return guarded(source, [&] { return described(parse(bytes, source, moving), usual_up(source)); });
 }
 
-Result<LoadedCloud> load_ply(const std::filesystem::path& path) {
+Result<LoadedCloud> detail::load_ply(const std::filesystem::path& path, TemporalCloud* moving) {
   const std::string source = path.string();
-  return detail::guarded(source, [&]() -> Result<LoadedCloud> {
-    detail::RandomFile file;
+  return guarded(source, [&]() -> Result<LoadedCloud> {
+    RandomFile file;
     if (Status s = file.open(path); !s) return s;
     std::vector<std::byte> top(
-        static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), detail::kLargestPlyHeader + 1)));
+        static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), kLargestPlyHeader + 1)));
     if (!file.read(0, top)) return {Errc::invalid_file, source + ": reading failed"};
-    const auto header = detail::parse_ply_header(top, source);
+    const auto header = parse_ply_header(top, source);
     if (!header) return header.status();
     const auto found = find_vertices(*header, source);
     if (!found) return found.status();
-    if (detail::is_compressed_ply(*header)) return detail::parse_compressed_ply(file, *header, source);
+    if (is_compressed_ply(*header)) return described(parse_compressed_ply(file, *header, source), usual_up(source));
     if (has_fixed_rows(*header) && !found->points) {
-      return load_rows(file, *header, *found, source);
+      return described(load_rows(file, *header, *found, source, moving), usual_up(source));
     }
-    const auto bytes = detail::read_file(path);
+    const auto bytes = read_file(path);
     if (!bytes) return bytes.status();
-    return parse(bytes->span(), source);
+    return described(parse(bytes->span(), source, moving), usual_up(source));
   });
 }
+
+Result<LoadedCloud> parse_ply(std::span<const std::byte> bytes, std::string source) {
+  return detail::parse_ply(bytes, source, nullptr);
+}
+
+Result<LoadedCloud> load_ply(const std::filesystem::path& path) { return detail::load_ply(path, nullptr); }
 
 }  // namespace gsnav::io

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "described.hpp"
 #include "file.hpp"
 #include "gsnav/io/gltf.hpp"
 #include "gsnav/io/ksplat.hpp"
@@ -14,7 +15,9 @@
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
 #include "gsnav/io/spz.hpp"
+#include "gsnav/io/temporal_file.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "ply_temporal.hpp"
 #include "report_sum.hpp"
 
 namespace gsnav::io {
@@ -23,8 +26,31 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kSupported =
-    "a .ply, .splat, .ksplat, .spz, .sog, .glb or .gltf, a meta.json, a lod-meta.json or a folder with "
-    "one of the two";
+    "a .ply, .splat, .ksplat, .spz, .sog, .glb, .gltf or .4dgs.npz, a meta.json, a lod-meta.json or a folder "
+    "with one of the two";
+
+/// The moment of a scene that moves.
+LoadedCloud moment_of(const TemporalCloud& scene, LoadReport report, double time) {
+  LoadedCloud out{cloud_at(scene, time), std::move(report)};
+  out.report.warnings.push_back("a moment of a moving scene: " + std::to_string(out.cloud.size()) + " of " +
+                                std::to_string(scene.size()) + " Gaussians are there at " + std::to_string(time) + " s");
+  return out;
+}
+
+/// A PLY, at the time of the options where it moves.
+Result<LoadedCloud> load_ply_at(const fs::path& path, const LoadSceneOptions& options) {
+  TemporalCloud moving;
+  auto loaded = detail::load_ply(path, &moving);
+  if (!loaded || moving.times.empty()) return loaded;
+  moving.cloud = std::move(loaded->cloud);
+  return moment_of(moving, std::move(loaded->report), options.time);
+}
+
+Result<LoadedCloud> load_npz_at(const fs::path& path, const LoadSceneOptions& options) {
+  auto loaded = load_temporal(path);
+  if (!loaded) return loaded.status();
+  return moment_of(loaded->scene, std::move(loaded->report), options.time);
+}
 
 Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& options) {
   std::error_code ignored;
@@ -37,7 +63,8 @@ Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& optio
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".ply") return load_ply(path);
+  if (extension == ".ply") return load_ply_at(path, options);
+  if (extension == ".npz") return load_npz_at(path, options);
   if (extension == ".sog") return load_sog(path);
   if (extension == ".splat") return load_splat(path);
   if (extension == ".ksplat") return load_ksplat(path);
@@ -91,9 +118,26 @@ Result<LoadedCloud> load_named(const std::string& spec, const LoadSceneOptions& 
 }  // namespace
 
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options) {
-  return detail::guarded(spec, [&] {
+  return detail::guarded(spec, [&]() -> Result<LoadedCloud> {
+    if (!is_finite(options.time)) {
+      return {Errc::invalid_argument, spec + ": LoadSceneOptions.time is " + std::to_string(options.time)};
+    }
     auto scene = load_named(spec, options);
-    if (scene && options.sort) sort_spatially(scene->cloud);
+    if (!scene) return scene;
+    if (options.sort) sort_spatially(scene->cloud);
+    LoadReport& report = scene->report;
+    const UpGuess up{report.up, report.up_seen};  // of each reader's own kind of file
+    if (options.storage == Storage::compact) {
+      report.sh_storage_error = half_sh_error(scene->cloud);
+      if (report.sh_storage_error <= options.most_sh_error) {
+        compact_sh(scene->cloud);
+      } else {
+        report.warnings.push_back("kept in float32: as binary16 a coefficient would differ by " +
+                                  std::to_string(report.sh_storage_error) + ", more than " +
+                                  std::to_string(options.most_sh_error));
+      }
+    }
+    describe(scene->cloud, report, norm(up.up) > 0 ? up.up : Vec3d{0, -1, 0});
     return scene;
   });
 }

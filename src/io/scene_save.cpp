@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cctype>
 
+#include "file.hpp"
 #include "gsnav/io/gltf.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
@@ -11,6 +12,13 @@
 namespace gsnav::io {
 
 Status save_scene(const std::filesystem::path& path, const GaussianCloud& cloud) {
+  if (!cloud.shN_half.empty()) {
+    return detail::guarded(path.string(), [&] {
+      GaussianCloud widened = cloud;
+      expand_sh(widened);
+      return save_scene(path, widened);
+    });
+  }
   std::string name = path.filename().string();
   for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (name.ends_with(".compressed.ply")) return save_compressed_ply(path, cloud);

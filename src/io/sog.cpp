@@ -7,8 +7,10 @@
 #include <utility>
 
 #include "cloud_fill.hpp"
+#include "described.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
+#include "release_memory.hpp"
 #include "sog_meta.hpp"
 #include "sog_rows.hpp"
 #include "webp.hpp"
@@ -133,6 +135,7 @@ class SogReader {
     }
     if (Status s = read_planes(); !s) return s;
     files_.close();
+    detail::release_free_memory();
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
       RawGaussian raw;
       std::array<float, 45> rest;
@@ -283,7 +286,7 @@ Result<LoadedCloud> load(const std::filesystem::path& path,
 
 }  // namespace
 
-Result<LoadedCloud> load_sog(const std::filesystem::path& path) { return load(path, nullptr); }
+Result<LoadedCloud> load_sog(const std::filesystem::path& path) { return detail::described(load(path, nullptr)); }
 
 Result<LoadedCloud> detail::load_sog_rows(const std::filesystem::path& path,
                                           const std::vector<RowRange>& ranges) {

@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <new>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "cloud_check.hpp"
 #include "codebook.hpp"
 #include "file.hpp"
+#include "gsnav/core/thread_pool.hpp"
 #include "gsnav/io/sog.hpp"
 #include "json.hpp"
 #include "quantised.hpp"
@@ -44,29 +50,55 @@ class SogWriter {
     }
     meta_ = {{"version", 2}, {"asset", {{"generator", "gsnav"}}}, {"count", n}};
     meta_["antialias"] = cloud_.filter == Filter::mip;
-    for (const Status& s : {means(), scales(), quats(), colours(), bands()}) {
-      if (!s) return s;
+    // What takes longest comes first. Each part is made by one thread, so that any number of them makes the same bytes.
+    Status (SogWriter::*const make[])(Part&) const = {&SogWriter::bands, &SogWriter::means, &SogWriter::scales,
+                                                      &SogWriter::colours, &SogWriter::quats};
+    constexpr std::size_t kParts = std::size(make);
+    std::array<Part, kParts> parts;
+    std::array<Status, kParts> statuses;
+    const auto work = [&](std::uint32_t k) noexcept {
+      try {
+        statuses[k] = (this->*make[k])(parts[k]);
+      } catch (const std::bad_alloc&) {
+        statuses[k] = Status(Errc::out_of_memory, std::string());
+      }
+    };
+    const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
+    ThreadPool(static_cast<int>(std::min(cores, kParts))).run(static_cast<std::uint32_t>(kParts), work);
+    Files files;
+    for (const std::size_t k : {1, 2, 4, 3, 0}) {
+      if (statuses[k].code() == Errc::out_of_memory) throw std::bad_alloc();
+      if (!statuses[k]) return statuses[k];
+      if (!parts[k].meta.is_null()) meta_[parts[k].name] = std::move(parts[k].meta);
+      for (auto& file : parts[k].files) files.push_back(std::move(file));
     }
-    files_.emplace_back("meta.json", meta_.dump());
-    return std::move(files_);
+    files.emplace_back("meta.json", meta_.dump());
+    return files;
   }
 
  private:
+  /// One member of the description and the files that it names.
+  struct Part {
+    std::string name;
+    Json meta;
+    Files files;
+  };
+
   RgbaImage plane() const {
     return {width_, height_, std::vector<std::uint8_t>(4 * width_ * height_, 255)};
   }
 
-  Status add(const std::string& name, const RgbaImage& image) {
+  Status add(Part& part, const std::string& name, const RgbaImage& image) const {
     auto bytes = detail::encode_webp(image, target_ + ": " + name);
     if (!bytes) return bytes.status();
-    files_.emplace_back(name, std::move(*bytes));
+    part.files.emplace_back(name, std::move(*bytes));
     return {};
   }
 
   /// sign(v) log(1 + |v|), so that far things take fewer of the steps.
   static double squeezed(double v) { return std::copysign(std::log1p(std::fabs(v)), v); }
 
-  Status means() {
+  Status means(Part& part) const {
     double low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
       const Vec3d m = cloud_.mean(i);
@@ -87,12 +119,13 @@ class SogWriter {
         upper.pixels[at] = static_cast<std::uint8_t>(step >> 8);
       }
     }
-    meta_["means"] = {{"mins", low}, {"maxs", high}, {"files", {"means_l.webp", "means_u.webp"}}};
-    if (Status s = add("means_l.webp", lower); !s) return s;
-    return add("means_u.webp", upper);
+    part.name = "means";
+    part.meta = {{"mins", low}, {"maxs", high}, {"files", {"means_l.webp", "means_u.webp"}}};
+    if (Status s = add(part, "means_l.webp", lower); !s) return s;
+    return add(part, "means_u.webp", upper);
   }
 
-  Status scales() {
+  Status scales(Part& part) const {
     const std::size_t n = cloud_.size();
     std::vector<float> logs(3 * n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -106,11 +139,12 @@ class SogWriter {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t k = 0; k < 3; ++k) image.pixels[4 * i + k] = book.index(logs[3 * i + k]);
     }
-    meta_["scales"] = {{"codebook", book.entries()}, {"files", {"scales.webp"}}};
-    return add("scales.webp", image);
+    part.name = "scales";
+    part.meta = {{"codebook", book.entries()}, {"files", {"scales.webp"}}};
+    return add(part, "scales.webp", image);
   }
 
-  Status quats() {
+  Status quats(Part& part) const {
     constexpr std::size_t kFirstMode = 252;
     RgbaImage image = plane();
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
@@ -123,11 +157,12 @@ class SogWriter {
       }
       image.pixels[4 * i + 3] = static_cast<std::uint8_t>(kFirstMode + largest);
     }
-    meta_["quats"] = {{"files", {"quats.webp"}}};
-    return add("quats.webp", image);
+    part.name = "quats";
+    part.meta = {{"files", {"quats.webp"}}};
+    return add(part, "quats.webp", image);
   }
 
-  Status colours() {
+  Status colours(Part& part) const {
     const detail::ScalarCodebook book(cloud_.sh0);
     RgbaImage image = plane();
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
@@ -135,11 +170,12 @@ class SogWriter {
       image.pixels[4 * i + 3] =
           static_cast<std::uint8_t>(detail::nearest_step(static_cast<double>(cloud_.opacities[i]), 8));
     }
-    meta_["sh0"] = {{"codebook", book.entries()}, {"files", {"sh0.webp"}}};
-    return add("sh0.webp", image);
+    part.name = "sh0";
+    part.meta = {{"codebook", book.entries()}, {"files", {"sh0.webp"}}};
+    return add(part, "sh0.webp", image);
   }
 
-  Status bands() {
+  Status bands(Part& part) const {
     if (cloud_.sh_degree == 0 || cloud_.size() == 0) return {};
     const std::size_t width = detail::rest_width(cloud_);
     const std::size_t most = std::clamp(cloud_.size() / 2, kSmallPalette, kLargestPalette);
@@ -157,19 +193,19 @@ class SogWriter {
       labels.pixels[4 * i + 1] = static_cast<std::uint8_t>(palette.labels[i] >> 8);
       labels.pixels[4 * i + 2] = 0;
     }
-    meta_["shN"] = {{"count", palette.size},
+    part.name = "shN";
+    part.meta = {{"count", palette.size},
                     {"bands", cloud_.sh_degree},
                     {"codebook", book.entries()},
                     {"files", {"shN_centroids.webp", "shN_labels.webp"}}};
-    if (Status s = add("shN_centroids.webp", centroids); !s) return s;
-    return add("shN_labels.webp", labels);
+    if (Status s = add(part, "shN_centroids.webp", centroids); !s) return s;
+    return add(part, "shN_labels.webp", labels);
   }
 
   const GaussianCloud& cloud_;
   const std::string& target_;
   std::size_t width_ = 0, height_ = 0;
   Json meta_;
-  Files files_;
 };
 
 Status write(const std::filesystem::path& path, const std::string& content) {

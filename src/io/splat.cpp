@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cloud_fill.hpp"
+#include "described.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 
@@ -53,14 +54,14 @@ Result<LoadedCloud> parse(const detail::ByteSource& bytes, const std::string& so
 }  // namespace
 
 Result<LoadedCloud> parse_splat(std::span<const std::byte> bytes, std::string source) {
-  return detail::guarded(source, [&] { return parse(bytes, source); });
+  return detail::guarded(source, [&] { return detail::described(parse(bytes, source)); });
 }
 
 Result<LoadedCloud> load_splat(const std::filesystem::path& path) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
     detail::RandomFile file;
     if (Status s = file.open(path); !s) return s;
-    return parse(file, path.string());
+    return detail::described(parse(file, path.string()));
   });
 }
 

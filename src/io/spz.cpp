@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "cloud_fill.hpp"
+#include "described.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 #include "spz_planes.hpp"
@@ -101,7 +102,8 @@ class SpzDecoder {
 Result<LoadedCloud> decode(const Result<detail::SpzPlanes>& planes, const std::string& source,
                            const LoadSpzOptions& options) {
   if (!planes) return planes.status();
-  return SpzDecoder(*planes, !options.keep_axes).run(source);
+  return detail::described(SpzDecoder(*planes, !options.keep_axes).run(source),
+                           options.keep_axes ? Vec3d{0, 1, 0} : Vec3d{0, -1, 0});
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::strin
 }
 
 Result<std::string> encode_webp(const RgbaImage& image, const std::string& what) {
-  constexpr int kLevel = 4;  // of 9: beyond it the time grows faster than the files shrink
+  constexpr int kLevel = 1;  // of 9: of planes, which look like noise, 4 takes less than 1% more off in two to three times the time
   WebPConfig config;
   WebPPicture picture;
   if (WebPConfigInit(&config) == 0 || WebPConfigLosslessPreset(&config, kLevel) == 0 ||

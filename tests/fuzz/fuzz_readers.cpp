@@ -9,9 +9,11 @@
 #include <functional>
 
 #include "gsnav/io/avatar_file.hpp"
+#include "gsnav/io/avatar_scene_file.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/episode_file.hpp"
 #include "gsnav/io/gltf.hpp"
+#include "gsnav/io/habitat_dataset.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/ksplat.hpp"
 #include "gsnav/io/lod_set.hpp"
@@ -23,6 +25,7 @@
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
 #include "gsnav/io/spz.hpp"
+#include "gsnav/io/temporal_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "io/allocations.hpp"
 #include "io/spz_file.hpp"
@@ -167,6 +170,58 @@ void read_driver(const std::string& input) {
   (void)io::load_driver(file_of(zip_of(parts, input)), skeleton);
 }
 
+void check(const Result<io::LoadedTemporalCloud>& loaded) {
+  if (!loaded) return check(Result<LoadedCloud>(loaded.status()));
+  const TemporalCloud& s = loaded->scene;
+  bool ok = s.times.size() == s.size() && s.sigmas.size() == s.size() && validate(s.view()).ok();
+  for (std::size_t i = 0; i < s.size(); ++i) ok = ok && is_finite(s.times[i]) && s.sigmas[i] > 0;
+  if (!ok) stop("planes that do not fit their cloud");
+  check(Result<LoadedCloud>(LoadedCloud{s.cloud, loaded->report}));
+  for (const double t : {0.0, 1e6}) (void)cloud_at(s, t);
+}
+
+void read_temporal_npz(const std::string& input) {
+  static const Parts parts = temporal_parts();
+  static const TempFolder folder("fuzz_4dgs");
+  write_file(folder / "a.npz", zip_of(parts, input));
+  check(io::load_temporal(folder / "a.npz"));
+}
+
+/// A dataset in whose first file, scene or stage is the input, by its first byte.
+void read_dataset(const std::string& input) {
+  static const Parts parts = dataset_parts();
+  static const TempFolder folder("fuzz_dataset");
+  Parts changed = parts;
+  auto it = changed.begin();
+  std::advance(it, input.empty() ? 0 : static_cast<unsigned char>(input[0]) % parts.size());
+  it->second = input.substr(input.empty() ? 0 : 1);
+  for (const auto& [name, content] : changed) write_file(folder / name, content);
+  (void)io::load_habitat_dataset(folder / "a.scene_dataset_config.json");
+  (void)io::load_stage_config(folder / "a.stage_config.json");
+  (void)io::load_avatar_scene(folder / "a.scene_instance.json");
+}
+
+/// Skeleton and motion, parted by the first zero.
+void read_amc(const std::string& input) {
+  static const TempFolder folder("fuzz_amc");
+  const std::size_t cut = std::min(input.find('\0'), input.size());
+  write_file(folder / "a.asf", input.substr(0, cut));
+  write_file(folder / "a.amc", input.substr(std::min(cut + 1, input.size())));
+  (void)io::load_amc(folder / "a.asf", folder / "a.amc");
+}
+
+/// Rig and weights, parted by the first zero, of a fixed body.
+void read_makehuman(const std::string& input) {
+  static const TempFolder folder("fuzz_makehuman");
+  const std::size_t cut = std::min(input.find('\0'), input.size());
+  write_file(folder / "a.obj", "v 0 0 0\nv 1 0 0\nv 1 2 0\nv 0 2 0\ng body\nf 1 2 3 4\n");
+  write_file(folder / "a.mhskel", input.substr(0, cut));
+  write_file(folder / "w.mhw", input.substr(std::min(cut + 1, input.size())));
+  io::MakeHumanOptions options;
+  options.skeleton = folder / "a.mhskel";
+  (void)io::load_makehuman(folder / "a.obj", options);
+}
+
 void read_navmesh(const std::string& input) {
   const auto mesh = parse_navmesh(bytes_of(input), "fuzz");
   if (!mesh) return;
@@ -185,6 +240,9 @@ constexpr std::size_t kMiB = std::size_t{1} << 20;
 
 const std::map<std::string, Reader> kReaders = {
     {"ply", {[](const std::string& s) { check(io::parse_ply(bytes_of(s), "fuzz")); }, kMiB, 64}},
+    {"4dgs_ply",
+     {[](const std::string& s) { check(io::parse_temporal_ply(bytes_of(s), "fuzz")); }, kMiB, 64}},
+    {"4dgs_npz", {read_temporal_npz, 260 * kMiB, 10000}},
     {"splat", {[](const std::string& s) { check(io::parse_splat(bytes_of(s), "fuzz")); }, kMiB, 4}},
     {"ksplat", {[](const std::string& s) { check(io::parse_ksplat(bytes_of(s), "fuzz")); }, kMiB, 64}},
     {"spz", {read_spz, kMiB, 1000}},
@@ -205,6 +263,9 @@ const std::map<std::string, Reader> kReaders = {
     {"driver", {read_driver, 260 * kMiB, 10000}},
     {"bvh", {[](const std::string& s) { (void)io::load_bvh(file_of(s)); }, kMiB, 1000}},
     {"cameras", {[](const std::string& s) { (void)io::load_cameras(file_of(s)); }, kMiB, 1000}},
+    {"dataset", {read_dataset, kMiB, 1000}},
+    {"amc", {read_amc, kMiB, 1000}},
+    {"makehuman", {read_makehuman, kMiB, 1000}},
     {"episodes", {[](const std::string& s) { (void)io::load_episodes(file_of(s)); }, kMiB, 20000}},
     {"navmesh", {read_navmesh, 64 * kMiB, 1000}},
 };

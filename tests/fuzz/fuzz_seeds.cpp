@@ -120,6 +120,21 @@ void add_others(Seeds& seeds) {
   seeds.add_parts("sog", sog_parts());
   seeds.add_parts("npz", avatar_parts());
   seeds.add_parts("driver", driver_parts());
+  seeds.add_parts("4dgs_npz", temporal_parts());
+  for (const std::size_t motion : {0u, 3u, 9u}) seeds.add("4dgs_ply", temporal_file(3, motion, 2).text());
+  char part = 0;
+  for (const auto& [name, content] : dataset_parts()) seeds.add("dataset", part++ + content);
+  seeds.add("amc",
+            std::string(":units\n  length 0.5\n  angle deg\n:root\n   order TX TY TZ RX RY RZ\n   axis XYZ\n"
+                        "   position 1 2 3\n   orientation 0 0 30\n:bonedata\n  begin\n   id 1\n   name arm\n"
+                        "   direction 0 1 0\n   length 4\n   axis 10 20 30 XYZ\n   dof rx ry rz\n"
+                        "   limits (-160.0 20.0)\n          (-70.0 70.0)\n  end\n:hierarchy\n  begin\n    root arm\n"
+                        "  end\n") +
+                '\0' + ":DEGREES\n1\nroot 5 6 7 10 20 30\narm 40 50 60\n2\nroot -1 0 1 -170 3 4e1\narm 0 +5 -5.5\n");
+  seeds.add("makehuman",
+            std::string(R"({"bones":{"arm":{"head":"a","tail":"b","parent":"base"},"base":{"head":"b","tail":"a",)"
+                        R"("parent":null}},"joints":{"a":[2,3],"b":[1,0]},"weights_file":"w.mhw"})") +
+                '\0' + R"({"weights":{"base":[[0,1],[1,0.5],[2,0.25]],"arm":[[2,0.5],[3,0.3]]}})");
   seeds.add("lod_set",
             R"({"lodLevels":2,"environment":null,"filenames":["a.sog","b.sog"],"tree":{"bound":{},)"
             R"("children":[{"lods":{"0":{"file":0,"offset":0,"count":6}}},{"lods":{"0":{"file":0,)"

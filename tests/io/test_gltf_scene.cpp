@@ -126,7 +126,7 @@ TEST_CASE("gltf scene: every primitive with what the file says of its surface") 
   CHECK(part.material.double_sided);
   CHECK(part.material.unlit);
   REQUIRE(part.material.texture == 0);
-  const Picture& picture = scene.textures.at(0);
+  const TextureImage& picture = scene.textures.at(0);
   REQUIRE(picture.width == 2);
   for (std::size_t i = 0; i < 4; ++i) {
     for (std::size_t k = 0; k < 3; ++k) CHECK(picture.rgba[4 * i + k] == kPixels[3 * i + k]);

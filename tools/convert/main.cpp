@@ -21,7 +21,7 @@ struct Options {
   std::vector<std::string> paths;
   std::vector<double> crop, rotate, translate;
   std::string cameras;
-  double scale = 1, min_opacity = 0, max_scale = 0;
+  double time = 0, scale = 1, min_opacity = 0, max_scale = 0;
   int level = 0, degree = kMaxShDegree, views = 6, width = 640, height = 480;
 };
 
@@ -30,26 +30,12 @@ int fail(const std::string& message) {
   return 1;
 }
 
-unsigned long long number(std::uint64_t n) { return static_cast<unsigned long long>(n); }
-
-void print_report(const LoadReport& r) {
-  std::printf("%s: %llu Gaussians of %llu rows, SH degree %d\n", r.source.c_str(), number(r.kept),
-              number(r.read), r.sh_degree);
-  if (r.dropped() != 0) {
-    std::printf("  dropped: %llu not finite, %llu without rotation, %llu transparent\n",
-                number(r.dropped_non_finite), number(r.dropped_zero_quat),
-                number(r.dropped_transparent));
-  }
-  if (r.clamped_scales != 0) std::printf("  %llu with clamped scales\n", number(r.clamped_scales));
-  for (const std::string& w : r.warnings) std::printf("  warning: %s\n", w.c_str());
-}
-
 Result<GaussianCloud> load(const Options& o) {
   GaussianCloud scene;
   for (std::size_t k = 0; k + 1 < o.paths.size(); ++k) {
-    auto loaded = io::load_scene(o.paths[k], {.level = o.level});
+    auto loaded = io::load_scene(o.paths[k], {.level = o.level, .time = o.time});
     if (!loaded) return loaded.status();
-    print_report(loaded->report);
+    std::fputs(io::report_text(loaded->report).c_str(), stdout);
     if (Status s = append(scene, loaded->cloud); !s) return {s.code(), o.paths[k] + ": " + s.message()};
   }
   return scene;
@@ -144,6 +130,7 @@ int main(int argc, char** argv) {
       ->required()
       ->expected(2, -1);
   app.add_option("--level", o.level, "Level of streamed LOD sets, 0 is the finest");
+  app.add_option("--time", o.time, "Moment of a scene that moves (4D Gaussians), seconds");
   app.add_option("--crop", o.crop, "Keep means inside X0 Y0 Z0 X1 Y1 Z1, metres, axes of the input")
       ->expected(6);
   app.add_option("--min-opacity", o.min_opacity, "Drop Gaussians below this opacity")

@@ -31,10 +31,10 @@ namespace {
 using namespace gsnav;
 
 struct Options {
-  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median", composite = "merged";
+  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median", composite = "merged", storage = "full";
   std::vector<std::string> meshes;
   int width = 0, height = 0, threads = 0;
-  double near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0;
+  double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0;
   bool npy = false, png = false;
 };
 
@@ -58,20 +58,6 @@ std::optional<DepthChoice> parse_depth(const std::string& text) {
     }
   }
   return std::nullopt;
-}
-
-void print_report(const LoadReport& r) {
-  std::printf("%s: %llu Gaussians of %llu rows, SH degree %d\n", r.source.c_str(),
-              static_cast<unsigned long long>(r.kept), static_cast<unsigned long long>(r.read),
-              r.sh_degree);
-  const auto line = [](std::uint64_t n, const char* what) {
-    if (n != 0) std::printf("  %llu %s\n", static_cast<unsigned long long>(n), what);
-  };
-  line(r.dropped_non_finite, "dropped: a value that is not finite");
-  line(r.dropped_zero_quat, "dropped: a zero quaternion");
-  line(r.dropped_transparent, "left out: opacity below 1/255, never visible");
-  line(r.clamped_scales, "repaired: log-scale clamped to [-20, 20]");
-  for (const std::string& w : r.warnings) std::printf("  warning: %s\n", w.c_str());
 }
 
 /// Depth in colours over the range asked for, or over the image's own from its 2nd to 98th percentile.
@@ -175,8 +161,12 @@ int main(int argc, char** argv) {
       "(H, W, 3 float32, unclamped), NNNN.depth.npy and NNNN.alpha.npy (H, W float32; metres, 0 = no "
       "return) and PNG pictures. The scene is used in its own frame: no up axis is applied."};
   app.add_option("--scene", o.scene,
-                 "INRIA .ply, .sog, a SOG folder, or a folder's sibling tiles: DIR/2_0,2_1,2_2")
+                 "Any scene of Gaussians that can be read, or a folder's sibling tiles: DIR/2_0,2_1,2_2")
       ->required();
+  app.add_option("--time", o.time, "Moment of a scene that moves (4D Gaussians), seconds");
+  app.add_option("--storage", o.storage, "full, or compact: SH in half of the memory (docs/formats.md)")
+      ->check(CLI::IsMember({"full", "compact"}))
+      ->capture_default_str();
   app.add_option("--cameras", o.cameras, "INRIA cameras.json (camera-to-world, OpenCV axes)")
       ->required()
       ->check(CLI::ExistingFile);
@@ -230,9 +220,12 @@ int main(int argc, char** argv) {
   if (o.backend == "cuda") return fail("--backend cuda: this build has no CUDA backend; use openmp");
 #endif
 
-  auto scene = io::load_scene(o.scene);
+  io::LoadSceneOptions load;
+  load.time = o.time;
+  load.storage = o.storage == "compact" ? io::Storage::compact : io::Storage::full;
+  auto scene = io::load_scene(o.scene, load);
   if (!scene) return fail(scene.message());
-  print_report(scene->report);
+  std::fputs(io::report_text(scene->report).c_str(), stdout);
   std::vector<PlacedMeshes> meshes;
   for (const std::string& file : o.meshes) {
     auto surface = io::load_textured_scene(file);

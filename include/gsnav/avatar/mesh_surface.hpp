@@ -57,7 +57,7 @@ class MeshColors {
   }
 
  private:
-  std::array<double, 4> sample(const Picture& t, double u, double v) const {
+  std::array<double, 4> sample(const TextureImage& t, double u, double v) const {
     const double x = u * static_cast<double>(t.width) - 0.5, y = v * static_cast<double>(t.height) - 0.5;
     const double fx = x - std::floor(x), fy = y - std::floor(y);
     const auto wrap = [](double i, std::size_t n) {

@@ -27,7 +27,7 @@ struct SkinnedMesh {
   std::vector<Vec3d> colors;                            ///< [V] linear light, or empty: white
   std::vector<std::uint32_t> materials_of;              ///< [T] index into materials, or empty: the first
   std::vector<SurfaceMaterial> materials;               ///< empty: white
-  std::vector<Picture> textures;
+  std::vector<TextureImage> textures;
 
   /// invalid_argument naming the array and what is wrong with it.
   Status validate() const {
@@ -59,7 +59,7 @@ struct SkinnedMesh {
       if (m.texture >= static_cast<std::int32_t>(textures.size()))
         return bad("a material names texture " + std::to_string(m.texture));
     }
-    for (const Picture& t : textures) {
+    for (const TextureImage& t : textures) {
       if (t.width == 0 || t.height == 0 || t.rgba.size() != 4 * t.width * t.height)
         return bad("a texture has another size than it says");
     }

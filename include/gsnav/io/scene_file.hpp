@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -9,14 +10,27 @@
 
 namespace gsnav::io {
 
+/// How a cloud is kept in memory.
+enum class Storage : std::uint8_t {
+  full,     ///< float32
+  compact,  ///< SH bands from 1 on as binary16 (compact_sh): 146 bytes a Gaussian of degree 3 in place of 236
+};
+
 /// How load_scene reads.
 struct LoadSceneOptions {
   int level = 0;     ///< of streamed LOD sets, 0 is the finest
   bool sort = true;  ///< in space, as rendering wants it; false: rows stay as they were read
+  double time = 0;   ///< seconds, of scenes that move (io/temporal_file.hpp)
+  Storage storage = Storage::full;
+  /// What compact storage may change a coefficient by; a cloud that it changes by more stays as it is, with a warning.
+  /// The report has the error. A colour changes by at most 4.3 times that: 15 basis functions whose squares sum to
+  /// 15 / (4 pi).
+  double most_sh_error = 2e-3;
 };
 
 /// Reads a scene of Gaussians by what its path names: a `.ply`, `.splat`, `.ksplat`, `.spz`, `.sog`,
-/// `.glb` or `.gltf`, a `meta.json` or a `lod-meta.json`, or a folder with one of these two.
+/// `.glb` or `.gltf`, a `meta.json` or a `lod-meta.json`, or a folder with one of these two. Of scenes that move
+/// (a `.ply` with t, t_scale or motion_*, a `.4dgs.npz`) it gives the moment `options.time`.
 ///
 /// A comma names sibling tiles, which are merged into one cloud: `scenes/flat/2_0,2_1` reads
 /// scenes/flat/2_0 and scenes/flat/2_1. Their reports are summed, their warnings carry the tile's path.
@@ -27,9 +41,12 @@ struct LoadSceneOptions {
 /// named with the list); invalid_argument (an empty name or a tile twice). Never throws.
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options = {});
 
+/// The report as text for people, a line for each thing there is to say, each ended.
+std::string report_text(const LoadReport& report);
+
 /// Writes a scene by its name: `.compressed.ply`, `.ply` (INRIA's layout), `.splat`, `.spz` (version 4),
 /// `.sog`, a folder's `meta.json` (SOG), `.glb`. What each format loses is said where its writer is
-/// declared. Errors: the writer's; unsupported (another name, with the list). Never throws.
+/// declared. A compact cloud is widened first. Errors: the writer's; unsupported (another name, with the list). Never throws.
 Status save_scene(const std::filesystem::path& path, const GaussianCloud& cloud);
 
 }  // namespace gsnav::io

@@ -44,6 +44,9 @@ struct GaussianView {
   View<const float> opacities;             ///< in [0, 1], [N]
   View<const float> sh0;                   ///< [N][3], the degree-0 coefficients
   View<const float> shN;                   ///< [N][(degree+1)^2 - 1][3], empty for degree 0
+  /// The same as IEEE binary16 (math/half.hpp), in place of shN, which is empty then; half of most of what a Gaussian
+  /// takes. In host memory only: GaussianArrays gives other backends floats.
+  View<const std::uint16_t> shN_half;
   int sh_degree = 0;                       ///< 0 to 3
   View<const std::uint32_t> origin_ids;    ///< [N], or empty: all 0
   View<const Vec3d> origins;               ///< host memory; empty: one origin at zero

@@ -11,6 +11,7 @@
 #include "gsnav/kernels/sh.hpp"
 #include "gsnav/kernels/splat.hpp"
 #include "gsnav/kernels/tiles.hpp"
+#include "gsnav/math/half.hpp"
 
 namespace gsnav {
 
@@ -252,6 +253,15 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
   }
   const float* sh0 = gs.sh0.data + 3 * i;
   const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
+  if (!gs.shN_half.empty()) {
+    const std::uint16_t* halves = gs.shN_half.data + 3 * rest * i;
+    const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) {
+      if (k == 0) return Vec3<S>{S(sh0[0]), S(sh0[1]), S(sh0[2])};
+      const std::uint16_t* p = halves + 3 * (k - 1);
+      return Vec3<S>{S(half_to_float(p[0])), S(half_to_float(p[1])), S(half_to_float(p[2]))};
+    });
+    return {c.x, c.y, c.z, S(0)};
+  }
   const float* shn = gs.shN.data + 3 * rest * i;
   const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) {
     const float* p = k == 0 ? sh0 : shn + 3 * (k - 1);

@@ -44,7 +44,12 @@ inline Status validate(const GaussianSet& set) {
   if (Status s = sized(g.opacities, g.size, "opacities"); !s) return s;
   if (Status s = sized(g.sh0, 3 * g.size, "sh0"); !s) return s;
   const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(g.sh_degree) - 1);
-  if (Status s = sized(g.shN, 3 * rest * g.size, "shN"); !s) return s;
+  if (g.shN_half.empty()) {
+    if (Status s = sized(g.shN, 3 * rest * g.size, "shN"); !s) return s;
+  } else if (g.shN_half.size != 3 * rest * g.size || !g.shN.empty()) {
+    return bad("shN_half has " + std::to_string(g.shN_half.size) + " values where " +
+               std::to_string(3 * rest * g.size) + " are needed, and shN must be empty beside it");
+  }
   if (!g.row_ids.empty() && g.row_ids.size != g.size) {
     return bad("row_ids has " + std::to_string(g.row_ids.size) + " values where " +
                std::to_string(g.size) + " are needed");

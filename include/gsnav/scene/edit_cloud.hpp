@@ -14,8 +14,10 @@
 namespace gsnav {
 
 /// Moves, turns and scales a cloud as a solid body, SH bands included. Chunk bounds are dropped: sort
-/// again. `by.rotation` must be a unit quaternion and `by.scale` positive.
+/// again. `by.rotation` must be a unit quaternion and `by.scale` positive. A compact cloud's bands are rounded again.
 inline void transform(GaussianCloud& cloud, const Similarity& by) {
+  const bool compact = !cloud.shN_half.empty();
+  expand_sh(cloud);
   GaussianCloud moved;
   MeanWriter writer;
   for (auto& plane : moved.means) plane.reserve(cloud.size());
@@ -36,6 +38,7 @@ inline void transform(GaussianCloud& cloud, const Similarity& by) {
       plane[i] = static_cast<float>(static_cast<double>(plane[i]) * by.scale);
     if (rest != 0) bands.apply(cloud.sh_degree, cloud.shN.data() + i * rest);
   }
+  if (compact) compact_sh(cloud);
 }
 
 /// Keeps the rows for which `keep(i)` holds, in their order. What sort_spatially made is dropped: sort again.
@@ -52,13 +55,14 @@ void filter_rows(GaussianCloud& cloud, const Keep& keep) {
     }
     plane.resize(rows.size() * stride);
   };
-  const std::size_t rest = cloud.size() == 0 ? 0 : cloud.shN.size() / cloud.size();
+  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
   for (auto& plane : cloud.means) pick(plane, 1);
   for (auto& plane : cloud.quats) pick(plane, 1);
   for (auto& plane : cloud.scales) pick(plane, 1);
   pick(cloud.opacities, 1);
   pick(cloud.sh0, 3);
   pick(cloud.shN, rest);
+  pick(cloud.shN_half, rest);
   pick(cloud.origin_ids, 1);
   cloud.row_ids.clear();
   cloud.chunk_bounds.clear();
@@ -79,10 +83,15 @@ inline void limit_sh_degree(GaussianCloud& cloud, int degree) {
   if (degree >= cloud.sh_degree) return;
   const std::size_t from = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
   const std::size_t to = 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1);
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    for (std::size_t k = 0; k < to; ++k) cloud.shN[i * to + k] = cloud.shN[i * from + k];
-  }
-  cloud.shN.resize(cloud.size() * to);
+  const auto cut = [&](auto& bands) {
+    if (bands.empty()) return;
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      for (std::size_t k = 0; k < to; ++k) bands[i * to + k] = bands[i * from + k];
+    }
+    bands.resize(cloud.size() * to);
+  };
+  cut(cloud.shN);
+  cut(cloud.shN_half);
   cloud.sh_degree = degree;
 }
 

@@ -11,9 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/core/huge_pages.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/gaussians.hpp"
 #include "gsnav/kernels/projection_camera.hpp"
+#include "gsnav/math/half.hpp"
 #include "gsnav/scene/load_report.hpp"
 
 namespace gsnav {
@@ -36,7 +38,8 @@ struct GaussianCloud {
   std::array<std::vector<float>, 3> scales;  ///< standard deviations, metres, [N] each
   std::vector<float> opacities;              ///< in [0, 1], [N]
   std::vector<float> sh0;                    ///< [N][3]
-  std::vector<float> shN;                    ///< [N][(degree+1)^2 - 1][3]
+  std::vector<float> shN;                    ///< [N][(degree+1)^2 - 1][3], or empty where shN_half has them
+  std::vector<std::uint16_t> shN_half;       ///< the same as binary16 (compact_sh), or empty
   int sh_degree = 0;                         ///< 0 to 3
   std::vector<std::uint32_t> origin_ids;     ///< [N], or empty while every origin is zero
   std::vector<Vec3d> origins;                ///< lattice points in use; empty with origin_ids
@@ -59,7 +62,7 @@ struct GaussianCloud {
 
   /// Bytes held by the arrays.
   std::size_t bytes() const noexcept {
-    return sizeof(float) * (11 * size() + sh0.size() + shN.size()) +
+    return sizeof(float) * (11 * size() + sh0.size() + shN.size()) + sizeof(std::uint16_t) * shN_half.size() +
            sizeof(std::uint32_t) * (origin_ids.size() + row_ids.size()) +
            sizeof(Vec3d) * origins.size() + sizeof(ChunkBounds) * chunk_bounds.size();
   }
@@ -74,6 +77,7 @@ struct GaussianCloud {
     v.opacities = view_of(opacities);
     v.sh0 = view_of(sh0);
     v.shN = view_of(shN);
+    v.shN_half = view_of(shN_half);
     v.sh_degree = sh_degree;
     v.origin_ids = view_of(origin_ids);
     v.origins = view_of(origins);
@@ -221,6 +225,31 @@ class GaussianCloudBuilder {
   MeanWriter means_;
 };
 
+/// The largest difference of a coefficient between shN and the same as binary16.
+inline double half_sh_error(const GaussianCloud& cloud) noexcept {
+  float error = 0;
+  for (const float v : cloud.shN) error = max(error, abs(half_to_float(half_of_float(v)) - v));
+  return static_cast<double>(error);
+}
+
+/// Keeps shN as binary16, which renders in half of the memory. Returns half_sh_error. While it works both are there.
+inline double compact_sh(GaussianCloud& cloud) {
+  const double error = half_sh_error(cloud);
+  if (cloud.shN.empty()) return error;
+  cloud.shN_half = huge_vector<std::uint16_t>(cloud.shN.size());
+  for (std::size_t i = 0; i < cloud.shN.size(); ++i) cloud.shN_half[i] = half_of_float(cloud.shN[i]);
+  cloud.shN = {};
+  return error;
+}
+
+/// Undoes compact_sh but for the rounding.
+inline void expand_sh(GaussianCloud& cloud) {
+  if (cloud.shN_half.empty()) return;
+  cloud.shN = huge_vector<float>(cloud.shN_half.size());
+  for (std::size_t i = 0; i < cloud.shN.size(); ++i) cloud.shN[i] = half_to_float(cloud.shN_half[i]);
+  cloud.shN_half = {};
+}
+
 /// A cloud with the report of how it was read.
 struct LoadedCloud {
   GaussianCloud cloud;
@@ -228,8 +257,12 @@ struct LoadedCloud {
 };
 
 /// Appends `b` to `a`; the SH degree becomes the larger (missing bands are zero). Used to merge the
-/// tiles of one scene. Metadata (filter, order) must agree. Chunks lose their bounds: sort again.
+/// tiles of one scene. Metadata (filter, order) must agree, and neither may be compact (expand_sh). Chunks lose their
+/// bounds: sort again.
 inline Status append(GaussianCloud& a, const GaussianCloud& b) {
+  if (!a.shN_half.empty() || !b.shN_half.empty()) {
+    return {Errc::invalid_argument, "compact clouds cannot be merged: expand_sh first"};
+  }
   if (a.size() == 0) {
     a = b;
     return {};

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/kernels/projection_camera.hpp"
 #include "gsnav/math/aabb.hpp"
 
 namespace gsnav {
@@ -21,7 +23,18 @@ struct LoadReport {
   std::uint64_t dropped_zero_quat = 0;    ///< zero or non-finite quaternion
   std::uint64_t dropped_transparent = 0;  ///< opacity below 1/255: never drawn (lossless)
   std::uint64_t clamped_scales = 0;       ///< log-scale outside [-20, 20]
-  int sh_degree = 0;
+  int sh_degree = 0;                      ///< that the cloud has room for
+  int sh_degree_used = 0;                 ///< highest band with a coefficient that is not zero
+  Filter filter = Filter::classic;        ///< that the file asks for
+  float eps2d = 0.3f;                     ///< its term on the 2D covariance's diagonal, px^2
+  SortOrder sort_order = SortOrder::z_depth;
+  std::uint64_t memory = 0;               ///< bytes of the cloud's arrays
+  Vec3d up{};                             ///< guessed, asset frame: one of +-y, +-z; zero of an empty cloud
+  bool up_seen = false;                   ///< by the cloud's shape (guess_up); false: only by what its kind of file does
+  double sh_storage_error = 0;            ///< largest difference of a coefficient by keeping them as binary16
+  bool compact = false;                   ///< SH is kept as binary16
+  bool moving = false;                    ///< 4D Gaussians; these are the first and the last of their own times, seconds:
+  double first_time = 0, last_time = 0;
   Aabb<double> bounds{};              ///< of the kept means, asset frame
   std::vector<std::string> warnings;  ///< everything else a person should know
 

@@ -50,7 +50,7 @@ inline Result<PlacedMeshes> placed_meshes(TexturedScene scene) {
         return named({Errc::invalid_argument, "texture " + std::to_string(t) + " of " + std::to_string(textures.size())});
       }
       if (textures[t] == nullptr) {
-        const Picture& picture = scene.textures[t];
+        const TextureImage& picture = scene.textures[t];
         auto made = MeshTexture::make(picture.width, picture.height, picture.rgba);
         if (!made) return named(made.status());
         textures[t] = std::make_shared<const MeshTexture>(std::move(*made));

@@ -25,10 +25,10 @@ inline std::uint64_t spread_bits(std::uint64_t x) noexcept {
   return (x | x << 2) & 0x1249249249249249;
 }
 
-/// Rows of `values`, `stride` floats each, in a new order.
-inline void permute_rows(std::vector<float>& values, const std::vector<std::uint32_t>& order,
-                         std::size_t stride) {
-  std::vector<float> out = huge_vector<float>(values.size());
+/// Rows of `values`, `stride` each, in a new order.
+template <class T>
+void permute_rows(std::vector<T>& values, const std::vector<std::uint32_t>& order, std::size_t stride) {
+  std::vector<T> out = huge_vector<T>(values.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     std::copy_n(values.data() + stride * order[i], stride, out.data() + stride * i);
   }
@@ -98,6 +98,7 @@ inline void sort_spatially(GaussianCloud& cloud) {
   detail::permute_rows(cloud.opacities, order, 1);
   detail::permute_rows(cloud.sh0, order, 3);
   detail::permute_rows(cloud.shN, order, cloud.shN.size() / n);
+  detail::permute_rows(cloud.shN_half, order, cloud.shN_half.size() / n);
   const auto permute_ids = [&](std::vector<std::uint32_t>& ids) {
     std::vector<std::uint32_t> out(n);
     for (std::size_t i = 0; i < n; ++i) out[i] = ids[order[i]];

@@ -10,7 +10,7 @@
 namespace gsnav {
 
 /// A picture that colours a surface. Display-referred (sRGB-encoded), 8 bits.
-struct Picture {
+struct TextureImage {
   std::size_t width = 0, height = 0;
   std::vector<std::uint8_t> rgba;  ///< [height][width][4], row 0 is v = 0
 };

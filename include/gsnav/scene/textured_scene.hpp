@@ -28,7 +28,7 @@ struct TexturedScene {
     Similarity world_from_part{};
   };
   std::vector<TexturedPart> parts;
-  std::vector<Picture> textures;
+  std::vector<TextureImage> textures;
   std::vector<Instance> instances;
   std::vector<std::string> warnings;  ///< what was left out or taken otherwise
 };

@@ -42,6 +42,7 @@ class SemanticPasses {
       GaussianView& g = out[i].gaussians;
       g.sh_degree = 0;
       g.shN = {};
+      g.shN_half = {};
       g.sh0 = {shades_[channel].data(), kChannels * g.size};
     }
     return out;

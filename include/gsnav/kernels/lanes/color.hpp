@@ -43,9 +43,18 @@ GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const
   for (int k = 0; k < 3; ++k) c[k] = dc[k].v;
   const std::size_t stride = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
   const int columns = 3 * (sh_coefficient_count(degree) - 1);  // 0, 9, 24 or 45
+  float widened[kWidth][kGroup];
   for (int first = 0; first < columns; first += kGroup) {
     const int from = first + kGroup <= columns ? first : columns - kGroup;
-    for (int l = 0; l < kWidth; ++l) at[l] = gs.shN.data + stride * rows[l] + from;
+    if (gs.shN_half.empty()) {
+      for (int l = 0; l < kWidth; ++l) at[l] = gs.shN.data + stride * rows[l] + from;
+    } else {
+      for (int l = 0; l < kWidth; ++l) {
+        const std::uint16_t* halves = gs.shN_half.data + stride * rows[l] + from;
+        for (int k = 0; k < kGroup; ++k) widened[l][k] = half_to_float(halves[k]);
+        at[l] = widened[l];
+      }
+    }
     F group[kGroup];
     load_columns<kGroup>(at, group);
     for (int k = 0; k < kGroup; ++k) c[3 + from + k] = group[k].v;
@@ -58,12 +67,15 @@ GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const
 
 /// Asks for the coefficients of rows [first, first + kWidth), which color_survivors will read.
 GSNAV_HD void prefetch_colors(const GaussianView& gs, int degree, std::size_t first) noexcept {
-  constexpr std::size_t kLine = 64 / sizeof(float);
+  constexpr std::size_t kLine = 64;
   if (degree == 0) return;
-  const std::size_t stride = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
-  const std::size_t begin = stride * first, room = gs.shN.size - begin;
+  const bool halves = !gs.shN_half.empty();
+  const void* const data = halves ? static_cast<const void*>(gs.shN_half.data) : gs.shN.data;
+  const std::size_t bytes = halves ? sizeof(std::uint16_t) : sizeof(float);
+  const std::size_t stride = bytes * static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  const std::size_t begin = stride * first, room = stride * gs.size - begin;
   const std::size_t rows = stride * static_cast<std::size_t>(kWidth), end = begin + (rows < room ? rows : room);
-  for (std::size_t i = begin; i < end; i += kLine) __builtin_prefetch(gs.shN.data + i, 0, 2);
+  for (std::size_t i = begin; i < end; i += kLine) __builtin_prefetch(static_cast<const char*>(data) + i, 0, 2);
 }
 
 /// Colours of the `count` survivors of a chunk, to out[0] on. They are read when all of the chunk's geometry has

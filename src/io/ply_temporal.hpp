@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/scene/temporal_cloud.hpp"
+
+namespace gsnav::io::detail {
+
+/// io::load_ply and io::parse_ply where `moving` is null. Else the time planes of a file that has any go there; its cloud
+/// is the result's.
+Result<LoadedCloud> load_ply(const std::filesystem::path& path, TemporalCloud* moving);
+Result<LoadedCloud> parse_ply(std::span<const std::byte> bytes, const std::string& source, TemporalCloud* moving);
+
+}  // namespace gsnav::io::detail

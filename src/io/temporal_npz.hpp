@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "gsnav/io/temporal_file.hpp"
+
+namespace gsnav::io::detail {
+
+/// load_temporal of an `.npz`.
+Result<LoadedTemporalCloud> load_temporal_npz(const std::filesystem::path& path);
+
+}  // namespace gsnav::io::detail
