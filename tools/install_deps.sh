@@ -8,6 +8,9 @@
 #   tests  ... and the tests, benchmarks and packaging checks
 #   ci     ... and clang with its OpenMP
 #
+# Not installed, as nothing fails without them: libopenmpi-dev (nav_eval_mpi), ffmpeg (gsnav-replay --video), chromium
+# (the test of gsnav-viewer's page), libfcl-dev (a peer in bench_kernels).
+#
 # GSNAV_NO_APT=1   never call apt-get: name what is missing and go on
 set -euo pipefail
 

@@ -20,13 +20,7 @@ constexpr double kMargin = 0.6;       // metres around the NavMesh
 constexpr double kLeastIsland = 1.5;  // metres: episodes use no smaller ones
 constexpr double kCutHeight = 1.95;   // metres above the floor: what hangs higher would hide the rooms
 
-struct Frame {
-  double x0, z0, scale;
-  double x(const Vec3d& p) const { return (p.x - x0) * scale; }
-  double y(const Vec3d& p) const { return (p.z - z0) * scale; }
-};
-
-void draw_scene(Canvas& canvas, const Frame& f, const MapContent& m, double floor) {
+void draw_scene(Canvas& canvas, const MapFrame& f, const MapContent& m, double floor) {
   const gsnav::GaussianCloud& c = *m.cloud;
   std::vector<Vec3d> at(c.size());
   std::vector<std::uint32_t> order;
@@ -63,15 +57,8 @@ void draw_scene(Canvas& canvas, const Frame& f, const MapContent& m, double floo
   }
 }
 
-void polyline(Canvas& canvas, const Frame& f, const std::vector<Vec3d>& points, double radius, Rgb color,
-              float alpha) {
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    canvas.stroke(f.x(points[i - 1]), f.y(points[i - 1]), f.x(points[i]), f.y(points[i]), radius, color,
-                  alpha);
-  }
-}
-
-void dashed(Canvas& canvas, const Frame& f, const std::vector<Vec3d>& points, double radius, Rgb color) {
+void dashed(Canvas& canvas, const MapFrame& f, const std::vector<Vec3d>& points, double radius,
+            Rgb color) {
   double phase = 0;  // pixels along the whole line
   for (std::size_t i = 1; i < points.size(); ++i) {
     const double ax = f.x(points[i - 1]), ay = f.y(points[i - 1]), bx = f.x(points[i]),
@@ -111,12 +98,29 @@ Rgb avatar_color(std::size_t index) {
   return {static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(c.z)};
 }
 
-Canvas draw_map(const MapContent& m) {
-  const gsnav::Aabb<double> box = m.navmesh->bounds();
+MapFrame fit_map(const gsnav::NavMesh& navmesh, int width, int height) {
+  const gsnav::Aabb<double> box = navmesh.bounds();
   const double w = box.high.x - box.low.x + 2 * kMargin, h = box.high.z - box.low.z + 2 * kMargin;
-  const Frame f{box.low.x - kMargin, box.low.z - kMargin, 1200.0 / std::max(w, h)};
-  Canvas canvas(std::max(1, static_cast<int>(w * f.scale)), std::max(1, static_cast<int>(h * f.scale)),
-                {0.96f, 0.96f, 0.96f});
+  const double scale = std::min(width / w, height / h);
+  return {box.low.x - kMargin - 0.5 * (width / scale - w), box.low.z - kMargin - 0.5 * (height / scale - h), scale};
+}
+
+void draw_polyline(Canvas& canvas, const MapFrame& f, std::span<const Vec3d> points, double radius, Rgb color,
+                   float alpha) {
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    canvas.stroke(f.x(points[i - 1]), f.y(points[i - 1]), f.x(points[i]), f.y(points[i]), radius, color,
+                  alpha);
+  }
+}
+
+void draw_bodies(Canvas& canvas, const MapFrame& f, std::span<const gsnav::DynamicCapsule> bodies, float alpha) {
+  for (const gsnav::DynamicCapsule& body : bodies) {
+    const gsnav::Capsule<double>& c = body.motion.begin;
+    canvas.stroke(f.x(c.p0), f.y(c.p0), f.x(c.p1), f.y(c.p1), c.radius * f.scale, avatar_color(body.avatar), alpha);
+  }
+}
+
+void draw_ground(Canvas& canvas, const MapFrame& f, const MapContent& m) {
   if (m.cloud != nullptr) draw_scene(canvas, f, m, m.start.y);
   canvas.rect(0, 0, canvas.width(), canvas.height(), {1, 1, 1}, 0.30f);
 
@@ -130,19 +134,23 @@ Canvas draw_map(const MapContent& m) {
     for (int i = 0; i < 3; ++i)
       canvas.stroke(p[i].x, p[i].y, p[(i + 1) % 3].x, p[(i + 1) % 3].y, 0.4, kEdge, 0.35f);
   }
+}
+
+Canvas draw_map(const MapContent& m) {
+  const gsnav::Aabb<double> box = m.navmesh->bounds();
+  const double w = box.high.x - box.low.x + 2 * kMargin, h = box.high.z - box.low.z + 2 * kMargin;
+  const double scale = 1200.0 / std::max(w, h);
+  Canvas canvas(std::max(1, static_cast<int>(w * scale)), std::max(1, static_cast<int>(h * scale)),
+                {0.96f, 0.96f, 0.96f});
+  const MapFrame f{box.low.x - kMargin, box.low.z - kMargin, scale};
+  draw_ground(canvas, f, m);
   for (std::size_t i = 0; i < m.avatars.size(); ++i)
-    polyline(canvas, f, m.avatars[i], 1.6, avatar_color(i), 0.75f);
-  for (std::size_t k = 0; k < m.snapshots.size(); ++k) {
-    const bool last = k + 1 == m.snapshots.size();
-    for (const gsnav::DynamicCapsule& body : m.snapshots[k]) {
-      const gsnav::Capsule<double>& c = body.motion.begin;
-      canvas.stroke(f.x(c.p0), f.y(c.p0), f.x(c.p1), f.y(c.p1), c.radius * f.scale,
-                    avatar_color(body.avatar), last ? 0.55f : 0.13f);
-    }
-  }
+    draw_polyline(canvas, f, m.avatars[i], 1.6, avatar_color(i), 0.75f);
+  for (std::size_t k = 0; k < m.snapshots.size(); ++k)
+    draw_bodies(canvas, f, m.snapshots[k], k + 1 == m.snapshots.size() ? 0.55f : 0.13f);
   dashed(canvas, f, m.shortest, 1.8, kShortest);
-  polyline(canvas, f, m.agent, 3.2, {1, 1, 1}, 0.9f);
-  polyline(canvas, f, m.agent, 2.2, kAgent, 1.0f);
+  draw_polyline(canvas, f, m.agent, 3.2, {1, 1, 1}, 0.9f);
+  draw_polyline(canvas, f, m.agent, 2.2, kAgent, 1.0f);
   if (!m.agent.empty()) {
     const Vec3d& end = m.agent.back();
     canvas.disc(f.x(end), f.y(end), std::max(m.agent_radius * f.scale, 4.0), kAgent, 0.9f);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "canvas.hpp"
@@ -24,7 +25,24 @@ struct MapContent {
   double agent_radius = 0.1;
 };
 
-/// The scene from above without its ceiling, washed out, with everything else on top.
+/// Where the world is on a map: x to the right, z downwards.
+struct MapFrame {
+  double x0 = 0, z0 = 0;  ///< of the left and upper edge, metres
+  double scale = 1;       ///< pixels a metre
+  double x(const gsnav::Vec3d& p) const { return (p.x - x0) * scale; }
+  double y(const gsnav::Vec3d& p) const { return (p.z - z0) * scale; }
+};
+
+/// The NavMesh with some room around it, in the middle of a picture of this size.
+MapFrame fit_map(const gsnav::NavMesh& navmesh, int width, int height);
+
+/// The scene from above without its ceiling, washed out, and the NavMesh on it.
+void draw_ground(Canvas& canvas, const MapFrame& frame, const MapContent& content);
+void draw_bodies(Canvas& canvas, const MapFrame& frame, std::span<const gsnav::DynamicCapsule> bodies, float alpha);
+void draw_polyline(Canvas& canvas, const MapFrame& frame, std::span<const gsnav::Vec3d> points, double radius, Rgb color,
+                   float alpha);
+
+/// The ground with everything else on top.
 Canvas draw_map(const MapContent& content);
 
 /// Colour of an avatar in maps.

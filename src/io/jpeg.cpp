@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "picture.hpp"
 
+#include <cstdlib>
+#include <vector>
+
 #if defined(GSNAV_HAS_JPEG)
 
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
-#include <vector>
 
 // After <cstdio>, which it needs and does not include.
 #include <jpeglib.h>
@@ -65,6 +67,62 @@ class JpegDecoder {
   ErrorHandler error_;
 };
 
+/// Encoder with its own lifetime, as the decoder has; what it writes lies in memory that libjpeg allocates.
+class JpegEncoder {
+ public:
+  JpegEncoder() {
+    info_.err = jpeg_std_error(&error_.base);
+    error_.base.error_exit = on_error;
+    error_.base.emit_message = on_message;
+    error_.base.output_message = print_message;
+  }
+  JpegEncoder(const JpegEncoder&) = delete;
+  JpegEncoder& operator=(const JpegEncoder&) = delete;
+  ~JpegEncoder() {
+    jpeg_destroy_compress(&info_);
+    std::free(bytes_);
+  }
+
+  bool write(const std::uint8_t* rgb, int width, int height, int quality) {
+    if (setjmp(error_.jump) != 0) return false;
+    jpeg_create_compress(&info_);
+    jpeg_mem_dest(&info_, &bytes_, &size_);
+    info_.image_width = static_cast<JDIMENSION>(width);
+    info_.image_height = static_cast<JDIMENSION>(height);
+    info_.input_components = 3;
+    info_.in_color_space = JCS_RGB;
+    jpeg_set_defaults(&info_);
+    jpeg_set_quality(&info_, quality, TRUE);
+    jpeg_start_compress(&info_, TRUE);
+    while (info_.next_scanline < info_.image_height) {
+      // libjpeg does not write to the rows that it compresses.
+      JSAMPROW row = const_cast<JSAMPROW>(rgb) + std::size_t{3} * info_.image_width * info_.next_scanline;
+      if (jpeg_write_scanlines(&info_, &row, 1) != 1) return false;
+    }
+    jpeg_finish_compress(&info_);
+    return true;
+  }
+  std::span<const std::byte> bytes() const {
+    return {reinterpret_cast<const std::byte*>(bytes_), static_cast<std::size_t>(size_)};
+  }
+
+ private:
+  jpeg_compress_struct info_{};
+  ErrorHandler error_;
+  unsigned char* bytes_ = nullptr;
+  unsigned long size_ = 0;
+};
+
+Result<std::vector<std::byte>> compress_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality) {
+  if (width > static_cast<int>(kLargestSide) || height > static_cast<int>(kLargestSide)) {
+    return {Errc::invalid_argument, "encode_jpeg: a side is longer than " + std::to_string(kLargestSide) + " pixels"};
+  }
+  JpegEncoder encoder;
+  if (!encoder.write(rgb.data(), width, height, quality)) return {Errc::out_of_memory, "encode_jpeg: libjpeg failed"};
+  const std::span<const std::byte> bytes = encoder.bytes();
+  return std::vector<std::byte>(bytes.begin(), bytes.end());
+}
+
 }  // namespace
 
 Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
@@ -94,6 +152,13 @@ Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string
 #else
 
 namespace gsnav::io::detail {
+namespace {
+
+Result<std::vector<std::byte>> compress_jpeg(std::span<const std::uint8_t>, int, int, int) {
+  return {Errc::unsupported, "encode_jpeg: this build writes no JPEG (libjpeg was not found)"};
+}
+
+}  // namespace
 
 Result<PngImage> decode_jpeg(std::span<const std::byte>, const std::string& name) {
   return {Errc::unsupported, name + ": this build reads no JPEG (libjpeg was not found)"};
@@ -102,3 +167,19 @@ Result<PngImage> decode_jpeg(std::span<const std::byte>, const std::string& name
 }  // namespace gsnav::io::detail
 
 #endif
+
+namespace gsnav::io {
+
+Result<std::vector<std::byte>> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality) {
+  if (width < 1 || height < 1 ||
+      rgb.size() != std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+    return {Errc::invalid_argument, "encode_jpeg: " + std::to_string(rgb.size()) + " bytes for " + std::to_string(width) +
+                                        " x " + std::to_string(height) + " pixels of three"};
+  }
+  if (quality < 1 || quality > 100) {
+    return {Errc::invalid_argument, "encode_jpeg: quality = " + std::to_string(quality) + ": must be in [1, 100]"};
+  }
+  return detail::compress_jpeg(rgb, width, height, quality);
+}
+
+}  // namespace gsnav::io

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <exception>
-#include <numeric>
-#include <tuple>
 #include <utility>
 
 namespace gsnav {
@@ -28,15 +26,23 @@ Status guarded(const F& f) noexcept {
 
 Result<BatchWorld> BatchWorld::create(std::vector<BatchScene> scenes, const TaskConfig& config, AutoReset auto_reset,
                                       std::size_t environments, EpisodeSource next_episode) {
-  if (Status s = validate(config); !s) return s;
-  if (scenes.empty()) return bad("BatchWorld: no scene");
   for (std::size_t i = 0; i < scenes.size(); ++i) {
     if (scenes[i].navmesh == nullptr) return bad("BatchWorld: scene " + std::to_string(i) + " has no NavMesh");
   }
+  BatchPlaces places;
+  places.count = scenes.size();
+  places.get = [held = std::move(scenes)](std::size_t scene) -> Result<BatchScene> { return held[scene]; };
+  return create(std::move(places), config, auto_reset, environments, std::move(next_episode));
+}
+
+Result<BatchWorld> BatchWorld::create(BatchPlaces places, const TaskConfig& config, AutoReset auto_reset,
+                                      std::size_t environments, EpisodeSource next_episode) {
+  if (Status s = validate(config); !s) return s;
+  if (places.count == 0 || !places.get) return bad("BatchWorld: no scene");
   if (environments == 0) return bad("BatchWorld: environments = 0: must be >= 1");
   if (!next_episode) return bad("BatchWorld: no source of episodes");
   BatchWorld b;
-  b.scenes_ = std::move(scenes);
+  b.places_ = std::move(places);
   b.config_ = config;
   b.auto_reset_ = auto_reset;
   b.next_episode_ = std::move(next_episode);
@@ -74,20 +80,33 @@ Status BatchWorld::begin(const ParallelFor& run, std::span<const std::size_t> wh
   for (const std::size_t i : which) {
     Environment& e = environments_[i];
     const std::string at = "environment " + std::to_string(i) + ": ";
-    Result<BatchEpisode> next = next_episode_(i, e.episodes);
+    Result<BatchEpisode> next = e.next ? std::move(*e.next) : next_episode_(i, e.episodes);
+    e.next.reset();
     if (!next) return {next.code(), at + next.message()};
-    if (next->scene >= scenes_.size()) {
+    if (next->scene >= places_.count) {
       return bad(at + "episode \"" + next->episode.id + "\" is in scene " + std::to_string(next->scene) + " of " +
-                 std::to_string(scenes_.size()));
+                 std::to_string(places_.count));
     }
-    if (!e.world || e.scene != next->scene) {
-      Result<World> w = World::create(scenes_[next->scene].navmesh, config_, scenes_[next->scene].bodies);
-      if (!w) return w.status();
-      e.world.emplace(std::move(*w));
-    }
-    e.scene = next->scene;
+    if (places_.prefetch) places_.prefetch(next->scene);
     ++e.episodes;
     episodes_[i] = std::move(*next);
+  }
+  for (const std::size_t i : which) {
+    Environment& e = environments_[i];
+    if (e.world && e.scene == episodes_[i].scene) continue;
+    const auto place = places_.get(episodes_[i].scene);
+    if (!place) return {place.code(), "environment " + std::to_string(i) + ": " + place.message()};
+    Result<World> w = World::create(place->navmesh, config_, place->bodies);
+    if (!w) return w.status();
+    e.world.emplace(std::move(*w));
+    e.source = place->bodies;
+    e.scene = episodes_[i].scene;
+  }
+  for (const std::size_t i : which) {
+    if (!places_.prefetch) break;
+    Environment& e = environments_[i];
+    e.next.emplace(next_episode_(i, e.episodes));
+    if (*e.next && (*e.next)->scene < places_.count) places_.prefetch((*e.next)->scene);
   }
   run(which.size(), [&](std::size_t k) {
     Environment& e = environments_[which[k]];
@@ -124,42 +143,39 @@ Status BatchWorld::reset(const ParallelFor& run, std::span<const std::uint8_t> m
 
 Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size_t> which) {
   static const CapsuleSet nobody;
-  needs_.clear();
+  bodies_.trim(most_bodies_);
+  missing_.clear();
   for (const std::size_t i : which) {
     Environment& e = environments_[i];
     for (std::size_t k = 0; k < e.bodies.size(); ++k) {
       e.bodies[k] = &nobody;
       const int at = static_cast<int>(k);
-      if (scenes_[e.scene].bodies) needs_.push_back({e.scene, e.world->tick(at), e.world->tick(at + 1), i, k});
+      if (!e.source) continue;
+      const BodyCache::Key key{e.scene, e.world->tick(at), e.world->tick(at + 1)};
+      const auto [entry, fresh] = bodies_.find(key);
+      e.bodies[k] = &entry->bodies;
+      if (fresh) missing_.push_back({key, entry, &e.source});
     }
   }
-  const auto key = [](const Need& n) { return std::tie(n.scene, n.t0, n.t1); };
-  std::sort(needs_.begin(), needs_.end(), [&](const Need& a, const Need& b) { return key(a) < key(b); });
-  firsts_.clear();
-  for (std::size_t n = 0; n < needs_.size(); ++n) {
-    if (n == 0 || key(needs_[n]) != key(needs_[n - 1])) firsts_.push_back(n);
-  }
-  bodies_.assign(firsts_.size(), Status());
-  run(firsts_.size(), [&](std::size_t f) {
-    const Need& n = needs_[firsts_[f]];
-    Status s = guarded([&] {
+  made_.assign(missing_.size(), {});
+  run(missing_.size(), [&](std::size_t m) {
+    const BodyCache::Key& key = missing_[m].key;
+    made_[m] = guarded([&] {
       std::vector<DynamicCapsule> capsules;
-      scenes_[n.scene].bodies(n.t0, n.t1, capsules);
-      bodies_[f] = CapsuleSet::create(std::move(capsules), n.t0, n.t1);
-      return bodies_[f].status();
+      (*missing_[m].source)(key.t0, key.t1, capsules);
+      auto set = CapsuleSet::create(std::move(capsules), key.t0, key.t1);
+      if (set) missing_[m].entry->bodies = std::move(*set);
+      return set.status();
     });
-    if (!s.ok()) bodies_[f] = std::move(s);
   });
-  for (std::size_t f = 0; f < firsts_.size(); ++f) {
-    const std::size_t last = f + 1 < firsts_.size() ? firsts_[f + 1] : needs_.size();
-    if (!bodies_[f]) {
-      return {bodies_[f].code(), "scene " + std::to_string(needs_[firsts_[f]].scene) + ": " + bodies_[f].message()};
-    }
-    for (std::size_t n = firsts_[f]; n < last; ++n) {
-      environments_[needs_[n].environment].bodies[needs_[n].substep] = &bodies_[f].value();
-    }
+  Status first;
+  for (std::size_t m = 0; m < missing_.size(); ++m) {
+    if (made_[m].ok()) continue;
+    const BodyCache::Key& key = missing_[m].key;
+    if (first.ok()) first = {made_[m].code(), "scene " + std::to_string(key.scene) + ": " + made_[m].message()};
+    bodies_.erase(key);
   }
-  return {};
+  return first;
 }
 
 Status BatchWorld::step(const ParallelFor& run, std::span<const Action> actions,

@@ -167,8 +167,8 @@ std::array<DefaultView, 4> default_scene_views() noexcept {
 }
 
 Result<DefaultScene> make_default_scene(double density) {
-  if (!(density >= 0.05 && density <= 4.0)) {
-    return {Errc::invalid_argument, "density = " + std::to_string(density) + ": must be in [0.05, 4]"};
+  if (!(density >= 0.05 && density <= 20.0)) {
+    return {Errc::invalid_argument, "density = " + std::to_string(density) + ": must be in [0.05, 20]"};
   }
   flat::Painter painter(density);
   flat::living_room(painter);

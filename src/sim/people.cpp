@@ -107,7 +107,8 @@ Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScen
   Rng rng(seed ^ 0x7469636bull);
   for (PointNavEpisode& e : episodes) {
     for (int tries = 0; tries < 100; ++tries) {
-      e.start_time = rng.uniform(0.0, 600.0);
+      // At a multiple of the control period many episodes meet the same moments, whose bodies are then made once.
+      e.start_time = task.control_period * std::floor(rng.uniform(0.0, 600.0) / task.control_period);
       std::vector<DynamicCapsule> now;
       append_bodies(scene, e.start_time, e.start_time, now);
       const auto bodies = CapsuleSet::create(std::move(now), e.start_time, e.start_time);

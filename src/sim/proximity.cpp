@@ -41,26 +41,55 @@ double least_distance(const Aabb<double>& a, const Aabb<double>& b) {
   return square > 0 ? sqrt(square) - kRounding : -std::numeric_limits<double>::infinity();
 }
 
-/// One avatar's least distance during the tick. Bodies whose boxes stay farther away than what was already found are
-/// not looked at again.
+/// How fast a point of a body moves at most, metres a tick: points between the ends are no faster than those.
+double speed_of(const MovingCapsule<double>& m) {
+  return max(norm(m.end.p0 - m.begin.p0), norm(m.end.p1 - m.begin.p1)) + abs(m.end.radius - m.begin.radius);
+}
+
+/// The same of whoever walks along `path`; infinity where it jumps.
+double speed_of(std::span<const WalkPoint> path) {
+  double speed = 0.0;
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const double length = norm(path[i].position - path[i - 1].position);
+    const double time = path[i].fraction - path[i - 1].fraction;
+    if (length > 0) speed = time > 0 ? max(speed, length / time) : std::numeric_limits<double>::infinity();
+  }
+  return speed;
+}
+
+/// A body, how fast it and the agent approach each other at most, and how near it was at the tick's begin and at the
+/// last look. Metres.
+struct Near {
+  const DynamicCapsule* body;
+  double speed, first, gap;
+};
+
+/// One avatar's least distance during the tick. A gap changes no faster than both move: bodies that cannot come nearer
+/// than what was already found are not looked at again.
 class Approach {
  public:
-  Approach(std::span<const WalkPoint> path, double radius, double height, const Aabb<double>& reach,
-           View<const DynamicCapsule> avatar, std::vector<DynamicCapsule>& near)
-      : path_(path), radius_(radius), height_(height), reach_(reach), avatar_(avatar), near_(near) {}
+  Approach(std::span<const WalkPoint> path, double agent_speed, double radius, double height,
+           View<const DynamicCapsule> avatar, std::vector<Near>& near)
+      : path_(path), radius_(radius), height_(height), near_(near) {
+    near_.clear();
+    for (const DynamicCapsule& c : avatar) {
+      near_.push_back({&c, (agent_speed + speed_of(c.motion)) * (1 + kRounding) + kRounding, 0.0, 0.0});
+    }
+  }
 
   double find() {
     constexpr int kSamples = 8;
-    near_.assign(avatar_.begin(), avatar_.end());
     offer(0.0);
+    for (Near& n : near_) n.first = n.gap;
     offer(1.0);
-    drop_far();
+    drop([](const Near& n) { return 0.5 * (n.first + n.gap - n.speed); });
     for (int i = 1; i < kSamples; ++i) offer(static_cast<double>(i) / kSamples);
     for (const WalkPoint& p : path_) offer(clamp(p.fraction, 0.0, 1.0));
-    drop_far();
     // Golden sections around the best sample.
     constexpr double kGolden = 0.6180339887498949;
     double low = max(best_at_ - 1.0 / kSamples, 0.0), high = min(best_at_ + 1.0 / kSamples, 1.0);
+    gap(best_at_);
+    drop([](const Near& n) { return n.gap - n.speed / kSamples; });
     double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
     double at_a = gap(a), at_b = gap(b);
     for (int i = 0; i < 13; ++i) {
@@ -83,10 +112,18 @@ class Approach {
   }
 
  private:
-  double gap(double u) const {
-    Clearance c;
-    nearest_body(agent_capsule(position_at(path_, u), radius_, height_), {near_.data(), near_.size()}, u, c);
-    return c.distance;
+  double gap(double u) {
+    const Capsule<double> agent = agent_capsule(position_at(path_, u), radius_, height_);
+    const Capsule<double> here{{}, agent.p1 - agent.p0, agent.radius};
+    double least = std::numeric_limits<double>::infinity();
+    for (Near& n : near_) {
+      Capsule<double> body = lerp(n.body->motion.begin, n.body->motion.end, u);
+      body.p0 -= agent.p0;
+      body.p1 -= agent.p0;
+      n.gap = capsule_gap(here, body).gap;
+      least = min(least, n.gap);
+    }
+    return least;
   }
   void offer(double u) {
     const double d = gap(u);
@@ -95,20 +132,15 @@ class Approach {
       best_at_ = u;
     }
   }
-  void drop_far() {
-    std::erase_if(near_, [&](const DynamicCapsule& c) {
-      Aabb<double> box;
-      add_capsule(box, c.motion.begin);
-      add_capsule(box, c.motion.end);
-      return least_distance(reach_, box) > best_;
-    });
+  /// Forgets the bodies that stay farther away than the best, by a lower bound of their gap.
+  template <class Bound>
+  void drop(const Bound& bound) {
+    std::erase_if(near_, [&](const Near& n) { return bound(n) > best_; });
   }
 
   std::span<const WalkPoint> path_;
   double radius_, height_;
-  const Aabb<double>& reach_;
-  View<const DynamicCapsule> avatar_;
-  std::vector<DynamicCapsule>& near_;
+  std::vector<Near>& near_;
   double best_ = std::numeric_limits<double>::infinity(), best_at_ = 0.0;
 };
 
@@ -127,11 +159,12 @@ void closest_approach(std::span<const WalkPoint> path, double radius, double hei
   std::vector<std::size_t> order(groups.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return out[a] < out[b]; });
-  std::vector<DynamicCapsule> near;
+  thread_local std::vector<Near> near;
+  const double speed = speed_of(path);
   double least = std::numeric_limits<double>::infinity();
   for (const std::size_t g : order) {
     if (out[g] > max(least, kPersonalSpace)) break;
-    out[g] = Approach(path, radius, height, reach, bodies.capsules_of(groups[g]), near).find();
+    out[g] = Approach(path, speed, radius, height, bodies.capsules_of(groups[g]), near).find();
     least = min(least, out[g]);
   }
 }

@@ -18,7 +18,10 @@ std::vector<SensorSpec> rgbd_sensors(int height, int width, double hfov, const V
 
 std::vector<SensorSpec> pointnav_v2_sensors() {
   std::vector<SensorSpec> out = rgbd_sensors(360, 640, 70.0, {0.0, 0.88, 0.0});
-  for (SensorSpec& s : out) s.far_plane = 10.0;
+  for (SensorSpec& s : out) {
+    s.orientation = {-0.3490659, 0.0, 0.0};  // 20 degrees down
+    s.far_plane = 10.0;
+  }
   out[0].noise.kind = NoiseKind::gaussian;
   out[0].noise.intensity = 0.1;
   out[1].noise.kind = NoiseKind::redwood_depth;

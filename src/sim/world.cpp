@@ -102,7 +102,8 @@ Status World::reset(const PointNavEpisode& episode) {
 struct World::Motion {
   double first_turn = 0.0;  // radians, before the first substep
   double tilt = 0.0;        // radians
-  double chord = 0.0;       // metres in each substep,
+  double chord = 0.0;       // metres forward in each substep,
+  double side = 0.0;        // and to the left,
   double bend = 0.0;        // while turning by this much, radians
 };
 
@@ -149,15 +150,17 @@ Result<StepInfo> World::step(Action action) {
 Result<StepInfo> World::step(const VelocityCommand& command) {
   if (Status s = ready(); !s) return s;
   if (command.stop) return stop();
-  if (!is_finite(command.linear) || !is_finite(command.angular)) {
-    return {Errc::invalid_argument, "VelocityCommand: linear and angular must be finite"};
+  if (!is_finite(command.linear) || !is_finite(command.angular) || !is_finite(command.lateral)) {
+    return {Errc::invalid_argument, "VelocityCommand: linear, angular and lateral must be finite"};
   }
   const double dt = config_.control_period / config_.substeps;
   Motion m;
   m.bend = command.angular * dt;
   // The chord of an arc of length v dt that turns by `bend`.
   const double half = 0.5 * m.bend;
-  m.chord = command.linear * dt * (abs(half) > 1e-9 ? std::sin(half) / half : 1.0);
+  const double straight = dt * (abs(half) > 1e-9 ? std::sin(half) / half : 1.0);
+  m.chord = command.linear * straight;
+  m.side = command.lateral * straight;
   return make_bodies_and_move(m);
 }
 
@@ -215,7 +218,9 @@ StepInfo World::move(const Motion& motion, std::span<const CapsuleSet* const> bo
   for (const CapsuleSet* set : bodies) {
     AgentPose along;
     along.yaw = s_.agent.yaw + 0.5 * motion.bend;
-    const StepResult r = gsnav::step(*navmesh_, agent_state(), along.forward() * motion.chord, *set, options);
+    Vec3d wish = along.forward() * motion.chord;
+    if (motion.side != 0) wish += Vec3d{-std::cos(along.yaw), 0, std::sin(along.yaw)} * motion.side;
+    const StepResult r = gsnav::step(*navmesh_, agent_state(), wish, *set, options);
     closest_approach(r.path, config_.agent_radius, config_.agent_height, *set, approach_);
     merge_distances(*set);
     info.wall_collision = info.wall_collision || r.hit_wall;

@@ -2,12 +2,14 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "support/files.hpp"
 #include "gsnav/io/episode_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/npz_file.hpp"
 #include "support/command.hpp"
+#include "support/process.hpp"
 
 using namespace gsnav_test;
 
@@ -93,6 +95,36 @@ TEST_CASE("episodes of a file are played by any policy") {
   CHECK(run_command(GSNAV_EVAL, "--episode-file none.json --out x", folder.path()).says("none.json"));
 }
 
+TEST_CASE("a replay becomes a video of any size, and says what is missing where there is no ffmpeg") {
+  const TempFolder folder("video");
+  const std::string options = "--avatars 1 --episodes 1 --max-steps 12 --width 63 --height 47 --out out ";
+  REQUIRE(run_command(GSNAV_EVAL, options + "--pictures 0", folder.path()).ok);
+  const Outcome none = run_command("env", "PATH=/nowhere " + quoted(GSNAV_REPLAY) + " " + options + "--video none.mp4", folder.path());
+  CHECK_FALSE(none.ok);
+  CHECK(none.says("is it installed?"));
+#if defined(GSNAV_FFMPEG)
+  REQUIRE(run_command(GSNAV_REPLAY, options + "--frames still", folder.path()).ok);
+  const Outcome made = run_command(GSNAV_REPLAY, options + "--video walk.mp4", folder.path());
+  CAPTURE(made.text);
+  REQUIRE(made.ok);
+  REQUIRE(run_command(GSNAV_FFMPEG, "-loglevel error -i walk.mp4 again%02d.png", folder.path()).ok);
+  CHECK(std::filesystem::exists(folder / "again13.png"));  // the start and twelve actions
+  CHECK_FALSE(std::filesystem::exists(folder / "again14.png"));
+  const auto still = gsnav::io::load_png(folder / "still/00012.png").value(), frame = gsnav::io::load_png(folder / "again13.png").value();
+  REQUIRE(frame.width == 64);
+  REQUIRE(frame.height == 48);
+  double sum = 0;
+  for (std::size_t y = 0; y < 47; ++y) {
+    for (std::size_t x = 0; x < 63 * 3; ++x) {
+      sum += std::abs(static_cast<double>(still.samples[y * 63 * 3 + x]) - frame.samples[y * 64 * 3 + x]);
+    }
+  }
+  CHECK(sum / (47 * 63 * 3) < 8);  // of 255
+#else
+  MESSAGE("skipped: no ffmpeg here");
+#endif
+}
+
 #if defined(GSNAV_EVAL_MPI)
 TEST_CASE("any number of ranks gives the same numbers, also where one was killed and the job begins again") {
   const TempFolder folder("eval");
@@ -117,5 +149,59 @@ TEST_CASE("any number of ranks gives the same numbers, also where one was killed
                                     folder.path());
   CHECK(again.says("7 episodes: SR"));
   CHECK_FALSE(again.says("episode 1/7"));  // none is missing
+}
+
+namespace {
+
+/// The process of a rank of the job that runs in `folder`; 0 where there is none.
+pid_t process_of_rank(int rank, const std::filesystem::path& folder) {
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    const std::string pid = entry.path().filename().string();
+    if (pid.find_first_not_of("0123456789") != std::string::npos) continue;
+    std::error_code gone;
+    if (std::filesystem::read_symlink(entry.path() / "exe", gone) != std::filesystem::path(GSNAV_EVAL_MPI)) continue;
+    if (std::filesystem::read_symlink(entry.path() / "cwd", gone) != std::filesystem::canonical(folder)) continue;
+    const std::string environment = '\0' + read_file(entry.path() / "environ");
+    const std::string name = std::string(1, '\0') + "OMPI_COMM_WORLD_RANK=" + std::to_string(rank) + std::string(1, '\0');
+    if (contains(environment, name)) return std::stoi(pid);
+  }
+  return 0;
+}
+
+}  // namespace
+
+TEST_CASE("a rank is killed while it plays; the job, begun again with fewer ranks, has the numbers of one that was never stopped") {
+  const TempFolder folder("killed");
+  const std::string options = " --avatars 1 --episodes 120 --max-steps 300 --policy random --out ";
+  const std::vector<std::string> words{GSNAV_MPIEXEC, "--oversubscribe", "--allow-run-as-root", "-n", "3", GSNAV_EVAL_MPI,
+                                       "--avatars", "1", "--episodes", "120", "--max-steps", "300", "--policy", "random",
+                                       "--out", "out"};
+  Process job(words, folder.path());
+  pid_t victim = 0;
+  while (job.runs() && lines(read_file(folder / "out/journal.1.jsonl")) < 4) usleep(1000);
+  victim = process_of_rank(1, folder.path());
+  if (victim == 0) {
+    MESSAGE("skipped: this MPI's ranks are not found by OMPI_COMM_WORLD_RANK");
+    return;
+  }
+  kill(victim, SIGKILL);
+  CHECK(job.wait(60) != 0);
+  std::size_t finished = 0;
+  for (const char* name : {"out/journal.jsonl", "out/journal.1.jsonl", "out/journal.2.jsonl"}) {
+    const std::size_t n = lines(read_file(folder / name));
+    finished += n > 0 ? n - 1 : 0;
+  }
+  CHECK(finished >= 3);
+  REQUIRE(finished < 120);
+  const auto numbers = [&](int n, const std::string& out) {
+    const Outcome run = run_command(GSNAV_MPIEXEC, "--oversubscribe --allow-run-as-root -n " + std::to_string(n) + " " +
+                                                       quoted(GSNAV_EVAL_MPI) + options + out, folder.path());
+    CAPTURE(run.text);
+    REQUIRE(run.ok);
+    REQUIRE(run.says("120 episodes ("));
+    if (out == "out") CHECK(run.says((std::to_string(120 - finished) + " played by 2 ranks").c_str()));
+    return run.text.substr(run.text.find("): SR"), run.text.rfind('\n') - run.text.find("): SR"));
+  };
+  CHECK(numbers(2, "out") == numbers(1, "whole"));
 }
 #endif

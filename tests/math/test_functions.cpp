@@ -62,6 +62,16 @@ TEST_CASE("finiteness and clamp") {
   CHECK(gsnav::clamp(-5.0, 0.0, 2.0) == 0.0);
 }
 
+TEST_CASE("fma is that of the C library, by whatever instruction") {
+  Rng rng(5);
+  for (int i = 0; i < 200000; ++i) {
+    const double a = rng.uniform(-1.0, 1.0), b = rng.uniform(-1e3, 1e3), c = i % 2 == 0 ? -a * b : rng.uniform(-1.0, 1.0);
+    CHECK(gsnav::fma(a, b, c) == std::fma(a, b, c));
+    const auto af = static_cast<float>(a), bf = static_cast<float>(b), cf = i % 2 == 0 ? -af * bf : static_cast<float>(c);
+    CHECK(gsnav::fma(af, bf, cf) == std::fma(af, bf, cf));
+  }
+}
+
 TEST_CASE("the software fma is correctly rounded") {
   Rng rng(4);
   for (int i = 0; i < 1000000; ++i) {

@@ -44,6 +44,23 @@ TEST_CASE("velocities take the agent along the arc that they describe, however m
   }
 }
 
+TEST_CASE("a sideways velocity goes to the left of where the agent looks") {
+  World w = flat_world();
+  REQUIRE(w.reset(in_living_room(0.4)).ok());
+  const Vec3d from = w.agent().position;
+  VelocityCommand c;
+  c.linear = 0.3;
+  c.lateral = 0.4;
+  w.step(c).value();  // 0.25 s
+  const Vec3d went = w.agent().position - from;
+  const Vec3d ahead{-std::sin(0.4), 0, -std::cos(0.4)}, left = cross(Vec3d{0, 1, 0}, ahead);
+  CHECK(dot(went, ahead) == doctest::Approx(0.075).epsilon(1e-9));
+  CHECK(dot(went, left) == doctest::Approx(0.1).epsilon(1e-9));
+  CHECK(w.agent().yaw == doctest::Approx(0.4));
+  c.lateral = std::nan("");
+  CHECK(w.step(c).code() == Errc::invalid_argument);
+}
+
 TEST_CASE("velocities may be straight, backwards or nothing, and can stop") {
   World w = flat_world();
   REQUIRE(w.reset(in_living_room()).ok());

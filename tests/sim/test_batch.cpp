@@ -222,6 +222,39 @@ TEST_CASE("people are skinned once for each time that is looked at, and once for
   CHECK(poses(apart) == 10);    // five times
 }
 
+TEST_CASE("bodies of a moment are made once, also for who comes by there later, and so many are kept") {
+  const auto scene = std::make_shared<const SimulatorScene>(peopled_scene(2000));
+  const auto apart = [](std::size_t e, std::size_t) -> Result<BatchEpisode> {
+    BatchEpisode b;
+    b.episode = to_kitchen();
+    b.episode.start_time = static_cast<double>(e);  // four actions
+    return b;
+  };
+  const BatchWorld::ParallelFor in_turn = [](std::size_t n, const std::function<void(std::size_t)>& f) {
+    for (std::size_t i = 0; i < n; ++i) f(i);
+  };
+  const auto clearances = [&](std::size_t kept, std::size_t& made) {
+    std::vector<double> seen;
+    const auto bodies = [&](double t0, double t1, std::vector<DynamicCapsule>& out) {
+      made += t1 > t0 ? 1 : 0;
+      append_bodies(*scene, t0, t1, out);
+    };
+    auto worlds = BatchWorld::create({{scene->navmesh, bodies}}, {}, AutoReset::disabled, 2, apart).value();
+    worlds.keep_bodies(kept);
+    REQUIRE(worlds.reset(in_turn).ok());
+    for (int i = 0; i < 8; ++i) {
+      REQUIRE(worlds.step(in_turn, std::vector<Action>(2, Action::turn_left)).ok());
+      for (const StepInfo& info : worlds.info().infos) seen.push_back(info.avatar_clearance);
+      CHECK(worlds.held_bodies() <= kept + 2);
+    }
+    return seen;
+  };
+  std::size_t many = 0, few = 0;
+  CHECK(clearances(100, many) == clearances(2, few));
+  CHECK(many == 12);  // 0 to 3 s, four intervals a second
+  CHECK(few == 16);
+}
+
 TEST_CASE("what is wrong with a batch is named") {
   OpenMPBackend backend(1);
   const auto message = [&](const auto& made) {

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/sim/simulator.hpp"
@@ -313,4 +314,14 @@ TEST_CASE("labels by hand") {
   std::vector<float> labels(3);
   label_pixels(shares, 4, labels);
   CHECK(labels == std::vector<float>{0, 2, 4});
+}
+
+TEST_CASE("the cameras of the PointNav v2 challenge look 20 degrees down") {
+  for (const SensorSpec& s : pointnav_v2_sensors()) {
+    const Camera c = sensor_camera(s, {}, {});
+    const Vec3d forward = transpose(c.viewmat.linear) * Vec3d{0, 0, 1};
+    CHECK(forward.y == doctest::Approx(-std::sin(20 * 3.14159265358979 / 180)).epsilon(1e-6));
+    CHECK(forward.z < -0.9);
+    CHECK(c.position().y == doctest::Approx(0.88));
+  }
 }

@@ -3,8 +3,7 @@
 
 namespace gsnav_eval {
 
-void add_world_options(CLI::App& app, Options& o) {
-  o.out = "eval";
+void add_scene_options(CLI::App& app, Options& o) {
   app.add_option("--scene", o.scene, "scene to load; without: the embedded flat");
   app.add_option("--up", o.up, "axis of the scene that points up")->capture_default_str();
   app.add_option("--navmesh", o.navmesh, "built from: gaussians, mesh (the flat only), auto")
@@ -16,14 +15,7 @@ void add_world_options(CLI::App& app, Options& o) {
   app.add_option("--preset", o.preset, "body and rules: v1, v2 (PointNav challenges), avatar (v1 with people charged)")
       ->capture_default_str()
       ->check(CLI::IsMember({"v1", "v2", "avatar"}));
-  app.add_option("--policy", o.policy, "follower (gives way), greedy (sees walls only), random")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"follower", "greedy", "random"}));
-  app.add_option("--max-steps", o.max_steps, "actions after which an episode is cut off")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000000));
   app.add_option("--seed", o.seed, "decides episodes, people and the random policy")->capture_default_str();
-  app.add_option("--out", o.out, "folder of the evaluation")->capture_default_str();
   app.add_option("--width", o.width, "image width, pixels")->capture_default_str()->check(CLI::Range(16, 4096));
   app.add_option("--height", o.height, "image height, pixels")->capture_default_str()->check(CLI::Range(16, 4096));
   app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")->capture_default_str()->check(CLI::Range(10.0, 170.0));
@@ -31,6 +23,18 @@ void add_world_options(CLI::App& app, Options& o) {
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3.0));
   app.add_option("--threads", o.threads, "threads, 0: all")->capture_default_str()->check(CLI::Range(0, 1024));
+}
+
+void add_world_options(CLI::App& app, Options& o) {
+  o.out = "eval";
+  add_scene_options(app, o);
+  app.add_option("--policy", o.policy, "follower (gives way), greedy (sees walls only), random")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"follower", "greedy", "random"}));
+  app.add_option("--max-steps", o.max_steps, "actions after which an episode is cut off")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
+  app.add_option("--out", o.out, "folder of the evaluation")->capture_default_str();
 }
 
 }  // namespace gsnav_eval

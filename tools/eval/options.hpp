@@ -15,7 +15,9 @@ struct Options : nav_loop::Options {
   std::string preset = "avatar";       ///< v1, v2, avatar
 };
 
-/// The options that decide what happens: an evaluation goes on, and is replayed, only with the same ones.
+/// Scene, people, episodes, body and picture.
+void add_scene_options(CLI::App& app, Options& options);
+/// These and the policy: the options that decide what happens: an evaluation goes on, and is replayed, only with the same ones.
 void add_world_options(CLI::App& app, Options& options);
 
 }  // namespace gsnav_eval

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-replay: an episode of an evaluation once more, from any camera.
 #include <array>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -33,9 +34,11 @@ class Video {
     if (path.find_first_of("'\\\n") != std::string::npos) return {Errc::invalid_argument, "--video: quotes in the path"};
     char command[512];
     const int n = std::snprintf(command, sizeof command,
-                                "ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s %dx%d -r %g -i - -pix_fmt yuv420p '%s'",
+                                "ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s %dx%d -r %g -i - "
+                                "-vf 'pad=ceil(iw/2)*2:ceil(ih/2)*2' -pix_fmt yuv420p '%s'",  // its colour is at half the size
                                 width, height, rate, path.c_str());
     if (n < 0 || n >= static_cast<int>(sizeof command)) return {Errc::invalid_argument, "--video: the path is too long"};
+    std::signal(SIGPIPE, SIG_IGN);  // an ffmpeg that ends early is reported, not died of
     pipe_.reset(popen(command, "w"));
     if (pipe_ == nullptr) return {Errc::unsupported, "--video: ffmpeg cannot be run"};
     return {};

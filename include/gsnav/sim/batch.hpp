@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "gsnav/sim/batch_world.hpp"
+#include "gsnav/sim/scene_library.hpp"
 #include "gsnav/sim/simulator.hpp"
 
 namespace gsnav {
@@ -66,15 +67,18 @@ class BatchSimulator {
       if (scene == nullptr) return {Errc::invalid_argument, "BatchSimulator: a scene is null"};
       if (Status s = validate(*scene); !s) return s;
     }
-    if (Status s = validate(static_cast<const SimulatorConfig&>(config)); !s) return s;
-    if (config.pose_slots < 1) return {Errc::invalid_argument, "BatchConfig.pose_slots = 0: must be >= 1"};
-    std::vector<BatchScene> parts;
-    for (const auto& scene : scenes) {
-      parts.push_back({scene->navmesh, [scene](double t0, double t1, auto& out) { append_bodies(*scene, t0, t1, out); }});
-    }
-    auto worlds = BatchWorld::create(std::move(parts), config.task, config.auto_reset, environments, std::move(next_episode));
-    if (!worlds) return worlds.status();
-    return BatchSimulator(backend, std::move(*worlds), std::move(config), std::move(scenes));
+    const std::size_t count = scenes.size();
+    return create(backend, [held = std::move(scenes)](std::size_t i) -> Result<ScenePointer> { return held[i]; }, {}, count,
+                  std::move(config), environments, std::move(next_episode));
+  }
+  /// The same over scenes that are loaded in the background and leave when they are not needed. `next_episode` is asked
+  /// for the next episode of an environment already when one begins, so that its scene can be loaded meanwhile.
+  static Result<BatchSimulator> create_from_library(B& backend, std::shared_ptr<SceneLibrary> library, BatchConfig config,
+                                                    std::size_t environments, EpisodeSource next_episode) {
+    if (library == nullptr) return {Errc::invalid_argument, "BatchSimulator: the library of scenes is null"};
+    return create(backend, [library](std::size_t i) { return library->get(i); },
+                  [library](std::size_t i) { library->prefetch(i); }, library->size(), std::move(config), environments,
+                  std::move(next_episode));
   }
 
   std::size_t environments() const noexcept { return worlds_.size(); }
@@ -85,6 +89,7 @@ class BatchSimulator {
   /// Errors: what the episode source and World::reset report; rendering.
   Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) {
     if (Status s = worlds_.reset(parallel(), mask); !s) return s;
+    let_scenes_go();
     return observe(mask.empty());
   }
 
@@ -93,30 +98,78 @@ class BatchSimulator {
   Result<BatchStep> step(std::span<const Action> actions) {
     const auto draw_final = [this] { return observe_finished(); };
     if (Status s = worlds_.step(parallel(), actions, draw_final); !s) return s;
+    let_scenes_go();
     return observe(false);
   }
 
   /// Renders made so far, and how many times an avatar was skinned for them.
   std::size_t render_count() const noexcept { return rig_.render_count(); }
   std::size_t pose_count() const noexcept {
-    std::size_t sum = 0;
-    for (const auto& s : scenes_) sum += s->pose_count();
+    std::size_t sum = left_poses_;
+    for (const auto& s : scenes_) sum += s != nullptr ? s->pose_count() : 0;
     return sum;
   }
   void set_rendering(bool on) noexcept { config_.rendering = on; }
 
  private:
-  BatchSimulator(B& backend, BatchWorld worlds, BatchConfig config,
-                 std::vector<std::shared_ptr<const SimulatorScene>> scenes)
-      : backend_(&backend), worlds_(std::move(worlds)), config_(std::move(config)), rig_(backend, config_.sensors) {
-    for (auto& scene : scenes) {
-      scenes_.push_back(std::make_unique<SceneOnBackend<B>>(backend, std::move(scene)));
-      render_configs_.push_back(scenes_.back()->render_config(config_.render));
-    }
+  using ScenePointer = std::shared_ptr<const SimulatorScene>;
+  using SceneOf = std::function<Result<ScenePointer>(std::size_t)>;
+
+  static Result<BatchSimulator> create(B& backend, SceneOf scene_of, std::function<void(std::size_t)> prefetch,
+                                       std::size_t scenes, BatchConfig config, std::size_t environments,
+                                       EpisodeSource next_episode) {
+    if (Status s = validate(static_cast<const SimulatorConfig&>(config)); !s) return s;
+    if (config.pose_slots < 1) return {Errc::invalid_argument, "BatchConfig.pose_slots = 0: must be >= 1"};
+    BatchPlaces places;
+    places.count = scenes;
+    places.get = [scene_of](std::size_t i) -> Result<BatchScene> {
+      auto scene = scene_of(i);
+      if (!scene) return scene.status();
+      return BatchScene{(*scene)->navmesh,
+                        [held = *scene](double t0, double t1, auto& out) { append_bodies(*held, t0, t1, out); }};
+    };
+    const bool scenes_leave = prefetch != nullptr;
+    places.prefetch = std::move(prefetch);
+    auto worlds = BatchWorld::create(std::move(places), config.task, config.auto_reset, environments, std::move(next_episode));
+    if (!worlds) return worlds.status();
+    return BatchSimulator(backend, std::move(*worlds), std::move(config), std::move(scene_of), scenes, scenes_leave);
+  }
+
+  BatchSimulator(B& backend, BatchWorld worlds, BatchConfig config, SceneOf scene_of, std::size_t scenes,
+                 bool scenes_leave)
+      : backend_(&backend),
+        worlds_(std::move(worlds)),
+        config_(std::move(config)),
+        rig_(backend, config_.sensors),
+        scene_pointer_(std::move(scene_of)),
+        scenes_leave_(scenes_leave),
+        scenes_(scenes),
+        render_configs_(scenes) {
     for (const SensorSpec& s : config_.sensors) {
       images_.push_back({s.uuid, s.kind, 0, s.resolution[0], s.resolution[1], channels_of(s.kind), {}});
     }
     final_images_ = images_;
+  }
+
+  /// Puts a scene that environments are in into the backend's memory, where it is not there yet.
+  Status place_scene(std::size_t scene) {
+    if (scenes_[scene] != nullptr) return {};
+    auto held = scene_pointer_(scene);
+    if (!held) return held.status();
+    scenes_[scene] = std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held));
+    render_configs_[scene] = scenes_[scene]->render_config(config_.render);
+    return {};
+  }
+  /// Scenes that no environment is in any more.
+  void let_scenes_go() {
+    if (!scenes_leave_) return;
+    in_use_.assign(scenes_.size(), 0);
+    for (std::size_t e = 0; e < environments(); ++e) in_use_[worlds_.scene_of(e)] = 1;
+    for (std::size_t s = 0; s < scenes_.size(); ++s) {
+      if (in_use_[s] != 0 || scenes_[s] == nullptr) continue;
+      left_poses_ += scenes_[s]->pose_count();
+      scenes_[s].reset();
+    }
   }
 
   auto parallel() noexcept {
@@ -170,6 +223,9 @@ class BatchSimulator {
 
   /// Draws `lookers_` into their rows: as many times of the scenes at once as there are slots for.
   Status draw(SensorImages& images) {
+    for (const Looker& l : lookers_) {
+      if (Status s = place_scene(worlds_.scene_of(l.environment)); !s) return s;
+    }
     // Where nobody walks all times are one.
     const auto key = [this](const Looker& l) {
       const std::size_t scene = worlds_.scene_of(l.environment);
@@ -216,8 +272,12 @@ class BatchSimulator {
   BatchWorld worlds_;
   BatchConfig config_;
   SensorRig<B> rig_;
-  std::vector<std::unique_ptr<SceneOnBackend<B>>> scenes_;
+  SceneOf scene_pointer_;
+  bool scenes_leave_;
+  std::vector<std::unique_ptr<SceneOnBackend<B>>> scenes_;  // none where no environment is
   std::vector<RenderConfig> render_configs_;
+  std::vector<std::uint8_t> in_use_;
+  std::size_t left_poses_ = 0;
   SensorImages buffers_, final_buffers_;
   std::vector<BatchObservation> images_, final_images_;
   std::vector<Looker> lookers_;
@@ -225,11 +285,19 @@ class BatchSimulator {
   std::vector<Camera> cameras_;
 };
 
-/// BatchSimulator<B>::create with B deduced.
+/// BatchSimulator<B>::create, and create_from_library, with B deduced.
 template <Backend B>
 Result<BatchSimulator<B>> make_batch_simulator(B& backend, std::vector<std::shared_ptr<const SimulatorScene>> scenes,
                                                BatchConfig config, std::size_t environments, EpisodeSource next_episode) {
   return BatchSimulator<B>::create(backend, std::move(scenes), std::move(config), environments, std::move(next_episode));
+}
+
+template <Backend B>
+Result<BatchSimulator<B>> make_batch_simulator_from_library(B& backend, std::shared_ptr<SceneLibrary> library,
+                                                            BatchConfig config, std::size_t environments,
+                                                            EpisodeSource next_episode) {
+  return BatchSimulator<B>::create_from_library(backend, std::move(library), std::move(config), environments,
+                                                std::move(next_episode));
 }
 
 }  // namespace gsnav

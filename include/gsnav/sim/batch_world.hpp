@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/sim/body_cache.hpp"
 #include "gsnav/sim/world.hpp"
 
 namespace gsnav {
@@ -48,8 +49,17 @@ struct BatchScene {
   World::BodySource bodies;
 };
 
+/// Scenes by number, fetched when an episode begins in them and let go when no environment is in them.
+struct BatchPlaces {
+  std::size_t count = 0;
+  std::function<Result<BatchScene>(std::size_t scene)> get;
+  /// Called for scenes that will be needed; where it is set, the source of episodes is asked for each environment's
+  /// next episode already when one begins.
+  std::function<void(std::size_t scene)> prefetch;
+};
+
 /// Worlds that step together. Those in one scene over one interval share the bodies of that interval, which are made
-/// once; all else is what each World does, bit for bit, for any number of threads.
+/// once and kept for a while; all else is what each World does, bit for bit, for any number of threads.
 class BatchWorld {
  public:
   /// Runs f(i) for i in [0, n), in any order and by any threads.
@@ -58,11 +68,16 @@ class BatchWorld {
   /// Errors: invalid_argument (a setting; no scene; no environment; no source).
   static Result<BatchWorld> create(std::vector<BatchScene> scenes, const TaskConfig& config, AutoReset auto_reset,
                                    std::size_t environments, EpisodeSource next_episode);
+  static Result<BatchWorld> create(BatchPlaces places, const TaskConfig& config, AutoReset auto_reset,
+                                   std::size_t environments, EpisodeSource next_episode);
 
   std::size_t size() const noexcept { return environments_.size(); }
   AutoReset auto_reset() const noexcept { return auto_reset_; }
   const World& world(std::size_t e) const noexcept { return *environments_[e].world; }
   std::size_t scene_of(std::size_t e) const noexcept { return environments_[e].scene; }
+  /// How many intervals' bodies are held for whoever comes by there later; at most `most` after each step.
+  std::size_t held_bodies() const noexcept { return bodies_.size(); }
+  void keep_bodies(std::size_t most) noexcept { most_bodies_ = most; }
   /// Whether the last call stepped or reset environment e.
   bool moved(std::size_t e) const noexcept { return environments_[e].moved; }
   const BatchInfo& info() const noexcept { return info_; }
@@ -79,17 +94,12 @@ class BatchWorld {
   struct Environment {
     std::optional<World> world;
     std::size_t scene = 0, episodes = 0;
+    World::BodySource source;
+    std::optional<Result<BatchEpisode>> next;  // where it was asked for already
     std::vector<const CapsuleSet*> bodies;  // [substeps]
     Status status;
     bool moved = false;
   };
-  /// Bodies that a substep of an environment needs.
-  struct Need {
-    std::size_t scene;
-    double t0, t1;
-    std::size_t environment, substep;
-  };
-
   BatchWorld() = default;
   Status begin(const ParallelFor& run, std::span<const std::size_t> which);
   Status make_bodies(const ParallelFor& run, std::span<const std::size_t> which);
@@ -97,16 +107,22 @@ class BatchWorld {
   void note_observation(std::size_t e);
   void publish();
 
-  std::vector<BatchScene> scenes_;
+  BatchPlaces places_;
   TaskConfig config_;
   AutoReset auto_reset_ = AutoReset::next_step;
   EpisodeSource next_episode_;
   std::vector<Environment> environments_;
   bool begun_ = false;
+  std::size_t most_bodies_ = 2048;
 
-  std::vector<Need> needs_;
-  std::vector<std::size_t> firsts_;  // of each distinct need
-  std::vector<Result<CapsuleSet>> bodies_;
+  BodyCache bodies_;
+  struct Missing {
+    BodyCache::Key key;
+    BodyCache::Entry* entry;
+    const World::BodySource* source;
+  };
+  std::vector<Missing> missing_;
+  std::vector<Status> made_;
   std::vector<std::size_t> stepping_, resetting_, finished_;
   std::vector<BatchEpisode> episodes_;
   std::vector<EpisodeMetrics> final_metrics_;

@@ -33,7 +33,7 @@ std::array<DefaultView, 4> default_scene_views() noexcept;
 
 /// Makes the flat; the same arguments give the same bits. `density` scales the number of Gaussians
 /// (1: about 390,000) and widens them to match, so that surfaces stay closed; the mesh does not
-/// depend on it. Errors: invalid_argument where density is not in [0.05, 4].
+/// depend on it. Errors: invalid_argument where density is not in [0.05, 20].
 Result<DefaultScene> make_default_scene(double density = 1.0);
 
 }  // namespace gsnav

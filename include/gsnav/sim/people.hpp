@@ -21,7 +21,7 @@ Vec3d person_color(std::size_t index) noexcept;
 /// Errors: nothing_navigable where nobody finds a place.
 Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count, std::uint64_t seed);
 
-/// Gives each episode a start time, in [0, 600) s, at which no avatar is within 0.6 m of its start (the last of a hundred
+/// Gives each episode a start time, a multiple of the control period in [0, 600) s, at which no avatar is within 0.6 m of its start (the last of a hundred
 /// tries where there is none). Errors: what CapsuleSet::create reports.
 Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene, const TaskConfig& task,
                         std::uint64_t seed);

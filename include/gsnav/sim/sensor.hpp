@@ -58,7 +58,7 @@ struct SensorSpec {
 std::vector<SensorSpec> rgbd_sensors(int height = 256, int width = 256, double hfov = 90.0,
                                      const Vec3d& position = {0.0, 1.5, 0.0});
 
-/// The sensors of the PointNav v2 challenge: 360x640, 70 degrees, 0.88 m high, with noise.
+/// The sensors of the PointNav v2 challenge: 360x640, 70 degrees, 0.88 m high, looking down by 20 degrees, with noise.
 std::vector<SensorSpec> pointnav_v2_sensors();
 
 /// Channels of a sensor's image.

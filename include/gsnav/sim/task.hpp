@@ -23,6 +23,7 @@ struct VelocityCommand {
   double linear = 0.0;   ///< metres a second, forward
   double angular = 0.0;  ///< radians a second, positive to the left
   bool stop = false;     ///< ends the episode, as Action::stop does
+  double lateral = 0.0;  ///< metres a second, to the left
 };
 
 /// The agent's body and motion, and when an episode ends. Defaults are PointNav v1's.
@@ -40,13 +41,12 @@ struct TaskConfig {
   double skin = 1e-4;             ///< metres that a stopped move keeps from an avatar
   RewardConfig reward{};
 
-  /// The settings of the PointNav v2 challenge that do not concern noise.
+  /// The settings of Habitat's PointNav v2 challenge (2020 to 2021) that do not concern noise of motion.
   static TaskConfig pointnav_v2() noexcept {
     TaskConfig c;
     c.agent_radius = 0.18;
     c.agent_height = 0.88;
     c.turn_angle = 30.0;
-    c.tilt_angle = 30.0;
     c.allow_sliding = false;
     c.success_distance = 0.36;
     return c;

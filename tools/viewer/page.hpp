@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string_view>
+
+namespace gsnav_viewer {
+
+/// The viewer's page: HTML that needs nothing but the streams.
+std::string_view page() noexcept;
+
+}  // namespace gsnav_viewer

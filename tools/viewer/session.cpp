@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "session.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "gsnav/io/image_file.hpp"
+#include "overlay.hpp"
+
+namespace gsnav_viewer {
+namespace {
+
+using gsnav::Errc;
+using gsnav::Result;
+using gsnav::Status;
+using gsnav::Vec3d;
+using std::chrono::duration;
+using std::chrono::milliseconds;
+
+constexpr double kTurnedUp = 1.55;          // radians: as far as one looks up and down
+constexpr auto kHeld = milliseconds(1000);  // a key whose release got lost is let go after that
+constexpr auto kStill = milliseconds(250);  // between frames while nothing moves
+constexpr int kMostActions = 5;             // caught up with in one frame, where drawing is slow
+constexpr double kLeastIsland = 1.5;        // metres: as on maps
+
+std::vector<std::array<Vec3d, 3>> walkable(const gsnav::NavMesh& mesh) {
+  std::vector<std::array<Vec3d, 3>> out = mesh.triangles();
+  std::erase_if(out, [&](const std::array<Vec3d, 3>& t) {
+    const auto on = mesh.snap_point((t[0] + t[1] + t[2]) * (1.0 / 3.0), {{0.1, 0.5, 0.1}});
+    return !on || mesh.island_radius(mesh.island_of(on->poly)) < kLeastIsland;
+  });
+  return out;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& options, gsnav_eval::Stage stage,
+                                                 const SessionOptions& how) {
+  if (stage.episodes.empty()) return {Errc::invalid_argument, "no episode to begin with"};
+  stage.config.task.control_period = 1.0 / how.rate;
+  stage.config.task.max_steps = 1000000000;  // who walks by hand is not cut off
+  auto world = gsnav::World::create(stage.scene->navmesh, stage.config.task, [scene = stage.scene](double t0, double t1, auto& out) {
+    gsnav::append_bodies(*scene, t0, t1, out);
+  });
+  if (!world) return world.status();
+  std::unique_ptr<Session> s(new Session(options, std::move(stage), how, std::move(*world)));
+  if (Status status = s->begin_episode(0); !status) return status;
+  return s;
+}
+
+Session::Session(const gsnav_eval::Options& options, gsnav_eval::Stage stage, const SessionOptions& how, gsnav::World world)
+    : stage_(std::move(stage)),
+      how_(how),
+      scene_name_(options.scene.empty() ? "embedded flat" : options.scene),
+      world_(std::move(world)),
+      backend_(options.threads),
+      scene_(backend_, stage_.scene),
+      renderer_(backend_),
+      walkable_(walkable(*stage_.scene->navmesh)),
+      map_frame_(nav_loop::fit_map(*stage_.scene->navmesh, options.width, options.height)),
+      ground_(options.width, options.height, {0.96f, 0.96f, 0.96f}) {
+  gsnav::RenderConfig config = scene_.render_config(stage_.config.render);
+  config.outputs = gsnav::kRgb | gsnav::kMedianDepth;
+  renderer_.set_config(config);
+  controls_.paused = how.paused;
+  nav_loop::MapContent map;
+  map.navmesh = stage_.scene->navmesh.get();
+  map.start = stage_.episodes.front().start_position;
+  if (!stage_.scene->assets.empty()) {
+    map.cloud = stage_.scene->assets.front().cloud.get();
+    map.world_from_asset = stage_.scene->assets.front().world_from_asset;
+  }
+  nav_loop::draw_ground(ground_, map_frame_, map);
+}
+
+Status Session::begin_episode(std::size_t number) {
+  episode_ = number;
+  const gsnav::PointNavEpisode& e = stage_.episodes[episode_];
+  if (Status s = world_.reset(e); !s) return s;
+  way_ = {world_.agent().position};
+  shortest_.clear();
+  if (const auto path = world_.navmesh().find_path(way_[0], e.goal_position)) shortest_ = path->points;
+  return {};
+}
+
+void Session::put_time(double t) {
+  gsnav::WorldState s = world_.state();
+  s.time = t;
+  s.start_time = t - s.steps * world_.config().control_period;
+  world_.set_state(s);
+}
+
+Status Session::run() {
+  const auto period = std::chrono::duration_cast<Clock::duration>(duration<double>(1.0 / how_.rate));
+  Clock::time_point before = Clock::now() - period;
+  while (true) {
+    Controls c;
+    {
+      std::unique_lock lock(mutex_);
+      news_.wait(lock, [&] { return stopped_ || waiting_ > 0; });
+      news_.wait_until(lock, before + period, [&] { return stopped_; });
+      const auto still = [&] { return controls_.paused && controls_.forward == 0 && controls_.left == 0 && !changed_; };
+      if (still()) news_.wait_until(lock, before + kStill, [&] { return stopped_ || !still(); });
+      if (stopped_) return {};
+      if (Clock::now() - last_message_ > kHeld) controls_.forward = controls_.left = 0;
+      c = controls_;
+      controls_.forget_commands();
+      changed_ = false;
+      ++begun_;
+    }
+    const Clock::time_point now = Clock::now();
+    const double passed = duration<double>(now - before).count();
+    before = now;
+    rate_ += 0.1 * (1.0 / passed - rate_);
+    if (Status s = advance(c, std::clamp(static_cast<int>(std::lround(passed * how_.rate)), 1, kMostActions)); !s) return s;
+    if (Status s = draw(c); !s) return s;
+    frame_seconds_ = duration<double>(Clock::now() - now).count();
+    std::lock_guard lock(mutex_);
+    std::swap(images_, drawn_);
+    state_ = describe(c);
+    published_ = begun_;
+    news_.notify_all();
+  }
+}
+
+void Session::stop() {
+  std::lock_guard lock(mutex_);
+  stopped_ = true;
+  news_.notify_all();
+}
+
+Status Session::advance(const Controls& c, int actions) {
+  if (c.next) {
+    const double now = world_.time();
+    if (Status s = begin_episode((episode_ + 1) % stage_.episodes.size()); !s) return s;
+    put_time(now);  // people walk on
+  }
+  if (c.time) put_time(*c.time);
+  gsnav::WorldState s = world_.state();
+  s.agent.yaw = std::remainder(s.agent.yaw + c.turn, 2 * 3.14159265358979323846);
+  s.agent.pitch = std::clamp(s.agent.pitch + c.tilt, -kTurnedUp, kTurnedUp);
+  world_.set_state(s);
+  if (world_.done()) return {};
+  gsnav::VelocityCommand command;
+  if (c.stop) {
+    command.stop = true;
+    return world_.step(command).status();
+  }
+  command.linear = how_.speed * c.forward;
+  command.lateral = how_.speed * c.left;
+  const bool moving = command.linear != 0 || command.lateral != 0;
+  if (c.paused && !moving) return {};
+  for (int i = 0; i < actions; ++i) {
+    const double t = world_.time();
+    if (const auto r = world_.step(command); !r) return r.status();
+    if (c.paused) put_time(t);
+    if (moving) way_.push_back(world_.agent().position);
+  }
+  return {};
+}
+
+Status Session::draw(const Controls& c) {
+  const auto bodies = world_.bodies(world_.time(), world_.time());
+  if (!bodies) return bodies.status();
+  if (Status s = draw_view(c, *bodies); !s) return s;
+  return draw_map(c, *bodies);
+}
+
+Status Session::draw_view(const Controls& c, const gsnav::CapsuleSet& bodies) {
+  const gsnav::AgentPose& agent = world_.agent();
+  const gsnav::Camera camera =
+      gsnav::sensor_camera(stage_.config.sensors.front(), agent.position, agent.rotation(), agent.pitch);
+  std::span<const gsnav::GaussianSet> sets = scene_.assets();
+  if (c.people) {
+    if (Status s = scene_.pose(0, world_.time(), std::span(&camera, 1), renderer_.config()); !s) return s;
+    sets = scene_.sets(0);
+  }
+  if (Status s = renderer_.render(sets, std::span(&camera, 1), frames_); !s) return s;
+  std::vector<std::uint8_t> rgb(frames_.rgb.size());
+  gsnav::to_bytes(frames_.rgb, rgb);
+  if (c.navmesh || c.capsules) {
+    nav_loop::Canvas canvas(camera.width, camera.height, {});
+    canvas.paste(rgb.data(), camera.width, camera.height, 0, 0);
+    const DrawnView view{canvas, camera, frames_.median_depth};
+    if (c.navmesh) draw_navmesh(view, walkable_);
+    if (c.capsules) draw_capsules(view, bodies.capsules());
+    rgb = canvas.bytes();
+  }
+  if (Status s = publish(Panel::color, rgb); !s) return s;
+  return publish(Panel::depth, gsnav::io::colorize_depth(frames_.median_depth, static_cast<float>(how_.depth_near),
+                                                         static_cast<float>(how_.depth_far)));
+}
+
+Status Session::draw_map(const Controls& c, const gsnav::CapsuleSet& bodies) {
+  constexpr nav_loop::Rgb kAgent{0.05f, 0.30f, 0.85f}, kGoal{0.86f, 0.10f, 0.16f}, kShortest{0.15f, 0.15f, 0.17f};
+  nav_loop::Canvas canvas = ground_;
+  const nav_loop::MapFrame& f = map_frame_;
+  nav_loop::draw_polyline(canvas, f, shortest_, 0.8, kShortest, 0.6f);
+  nav_loop::draw_polyline(canvas, f, way_, 1.4, kAgent, 0.9f);
+  if (c.people) nav_loop::draw_bodies(canvas, f, bodies.capsules(), 0.6f);
+  const Vec3d goal = world_.episode().goal_position;
+  canvas.disc(f.x(goal), f.y(goal), 2.5, kGoal, 1.0f);
+  canvas.ring(f.x(goal), f.y(goal), 6, 2, kGoal, 1.0f);
+  const gsnav::AgentPose& agent = world_.agent();
+  // Where one looks: the edges of the picture, two metres far.
+  const double half = 0.5 * stage_.config.sensors.front().hfov * 3.14159265358979323846 / 180.0;
+  const double x = f.x(agent.position), y = f.y(agent.position);
+  gsnav::Vec2<double> view[3] = {{x, y}, {}, {}};
+  for (int i = 0; i < 2; ++i) {
+    const double yaw = agent.yaw + (i == 0 ? half : -half), far = 2.0 * f.scale;
+    view[i + 1] = {x - far * std::sin(yaw), y - far * std::cos(yaw)};
+  }
+  canvas.triangle(view, kAgent, 0.4f);
+  const double radius = std::max(world_.config().agent_radius * f.scale, 4.0);
+  canvas.disc(x, y, radius + 1.5, {1, 1, 1}, 1.0f);
+  canvas.disc(x, y, radius, kAgent, 1.0f);
+  return publish(Panel::map, canvas.bytes());
+}
+
+Status Session::publish(Panel panel, std::span<const std::uint8_t> rgb) {
+  const gsnav::SensorSpec& s = stage_.config.sensors.front();
+  const auto jpeg = gsnav::io::encode_jpeg(rgb, s.resolution[1], s.resolution[0], how_.quality);
+  if (!jpeg) return jpeg.status();
+  drawn_[static_cast<std::size_t>(panel)].assign(reinterpret_cast<const char*>(jpeg->data()), jpeg->size());
+  return {};
+}
+
+std::string Session::describe(const Controls& c) const {
+  const gsnav::EpisodeMetrics m = world_.metrics();
+  const gsnav::AgentPose& a = world_.agent();
+  return nlohmann::json{
+      {"scene", scene_name_},
+      {"time", world_.time()},
+      {"paused", c.paused},
+      {"position", {a.position.x, a.position.y, a.position.z}},
+      {"yaw", a.yaw},
+      {"pitch", a.pitch},
+      {"episode", world_.episode().id},
+      {"episodes", stage_.episodes.size()},
+      {"done", world_.done()},
+      {"success", m.success},
+      {"visible", frames_.stats.empty() ? 0 : frames_.stats[0].visible},
+      {"rate", rate_},
+      {"frame_ms", 1e3 * frame_seconds_},
+      {"metrics",
+       {{"distance_to_goal", m.distance_to_goal},
+        {"path_length", m.path_length},
+        {"shortest_path", m.start_distance},
+        {"spl", m.spl},
+        {"soft_spl", m.soft_spl},
+        {"steps", m.steps},
+        {"collisions", m.collisions},
+        {"collision_rate", m.collision_rate},
+        {"psi", m.psi},
+        {"clearance", world_.last_step().avatar_clearance}}}}
+      .dump();
+}
+
+Result<std::string> Session::control(std::string_view message) {
+  std::lock_guard lock(mutex_);
+  if (Status s = apply(message, controls_); !s) return s;
+  last_message_ = Clock::now();
+  changed_ = changed_ || !message.empty();
+  news_.notify_all();
+  return state_;
+}
+
+Session::Watcher::Watcher(Session& session, Panel panel) : session_(&session), panel_(panel) {
+  std::lock_guard lock(session.mutex_);
+  seen_ = session.begun_;
+  session.changed_ = true;
+}
+
+std::optional<std::string> Session::Watcher::next() {
+  Session& s = *session_;
+  std::unique_lock lock(s.mutex_);
+  ++s.waiting_;
+  s.news_.notify_all();
+  s.news_.wait_for(lock, milliseconds(500), [&] { return s.stopped_ || s.published_ > seen_; });
+  --s.waiting_;
+  if (s.stopped_) return {};
+  if (s.published_ <= seen_) return std::string();
+  seen_ = s.published_;
+  return s.images_[static_cast<std::size_t>(panel_)];
+}
+
+}  // namespace gsnav_viewer
