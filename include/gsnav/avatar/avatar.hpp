@@ -22,4 +22,5 @@
 #include "gsnav/avatar/skinned_mesh.hpp"
 #include "gsnav/avatar/smpl_joints.hpp"
 #include "gsnav/avatar/trajectory.hpp"
+#include "gsnav/avatar/weight_gradients.hpp"
 #include "gsnav/avatar/weight_truncation.hpp"
