@@ -8,6 +8,7 @@
 
 #include "file.hpp"
 #include "gsnav/avatar/smpl_joints.hpp"
+#include "gsnav/avatar/weight_gradients.hpp"
 #include "gsnav/io/npz_file.hpp"
 #include "gsnav/kernels/sh.hpp"
 #include "npz_arrays.hpp"
@@ -25,7 +26,8 @@ class AvatarReader {
 
   Result<LoadedAvatar> run() {
     for (const auto& step : {&AvatarReader::read_joints, &AvatarReader::read_arrays,
-                             &AvatarReader::read_cloud, &AvatarReader::read_weights, &AvatarReader::read_capsules}) {
+                             &AvatarReader::read_cloud, &AvatarReader::read_weights, &AvatarReader::read_skinning,
+                             &AvatarReader::read_capsules}) {
       if (Status s = (this->*step)(); !s) return s;
     }
     out_.asset.name = std::filesystem::path(file_.source()).stem().string();
@@ -281,6 +283,18 @@ class AvatarReader {
                                      std::to_string(1000 * out_.weights.position_error) + " mm");
     }
     return {};
+  }
+
+  Status read_skinning() {
+    if (!file_.contains("skinning")) return {};
+    const auto mode = arrays_.number("skinning");
+    if (!mode) return mode.status();
+    for (const Skinning known : {Skinning::linear, Skinning::linear_stretched, Skinning::dual_quaternion}) {
+      if (*mode != static_cast<double>(known)) continue;
+      out_.asset.skinning = known;
+      return known == Skinning::linear_stretched ? bake_weight_gradients(out_.asset) : Status();
+    }
+    return bad("skinning is " + std::to_string(*mode) + ", must be 0 (linear), 1 (with stretch) or 2 (dual quaternions)");
   }
 
   /// Capsules fixed to joints, where the file has some.

@@ -93,6 +93,8 @@ Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset) 
       entries.push_back({"capsule_joints", {capsule_joints.size()}, capsule_joints});
       entries.push_back({"capsules", {capsule_joints.size(), 7}, capsules});
     }
+    const std::vector<std::int64_t> skinning{static_cast<std::int64_t>(asset.skinning)};
+    if (asset.skinning != Skinning::linear) entries.push_back({"skinning", {1}, skinning});
     return save_npz(path, entries);
   });
 }

@@ -168,6 +168,7 @@ Result<AvatarScene> load_avatar_scene(const fs::path& path) {
 
 double scene_time(const AvatarScene& scene, const std::vector<AvatarActor>& actors, double seconds) noexcept {
   double last = scene.time_max;
+  if (scene.time_loop && !actors.empty() && actors[0].options().loop_period > 0) last = actors[0].options().loop_period;
   if (!(last > 0)) {
     for (const AvatarActor& a : actors) {
       if (std::isfinite(a.options().time_end)) last = std::max(last, a.options().time_end);

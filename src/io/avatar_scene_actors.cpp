@@ -165,6 +165,29 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
   return AvatarActor::create(body, std::make_shared<const ClipInPlace>(clip, path), path, options);
 }
 
+/// Has actors repeat after `last` seconds and as many more as those who are there at both ends need to get back.
+Status loop_actors(std::vector<AvatarActor>& actors, double last, double least) {
+  constexpr double kSpeed = 1.4;  // metres a second
+  double blend = 0.0;
+  std::vector<Affine3<double>> from, to;
+  for (const AvatarActor& a : actors) {
+    if (!(least > 0) || !a.active(last) || !a.active(0.0)) continue;
+    blend = std::max(blend, least);
+    const Similarity begin = a.placement(0.0), end = a.placement(last);
+    a.joint_globals(last, from);
+    a.joint_globals(0.0, to);
+    for (std::size_t j = 0; j < from.size(); ++j) {
+      blend = std::max(blend, norm(end * from[j].translation - begin * to[j].translation) / kSpeed);
+    }
+  }
+  for (AvatarActor& a : actors) {
+    auto looped = a.looped(last + blend, blend);
+    if (!looped) return looped.status();
+    a = std::move(*looped);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::vector<AvatarActor>> load_scene_actors(const AvatarScene& scene) {
@@ -178,6 +201,13 @@ Result<std::vector<AvatarActor>> load_scene_actors(const AvatarScene& scene) {
         return {s.code(), (a.name.empty() ? "" : "avatar \"" + a.name + "\": ") + s.message()};
       }
       out.push_back(std::move(*actor));
+    }
+    double last = scene.time_max;
+    for (const AvatarActor& a : out) {
+      if (!(scene.time_max > 0) && std::isfinite(a.options().time_end)) last = std::max(last, a.options().time_end);
+    }
+    if (scene.time_loop && last > 0) {
+      if (Status s = loop_actors(out, last, scene.loop_blend); !s) return s;
     }
     return out;
   });

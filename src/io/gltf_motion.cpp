@@ -181,6 +181,7 @@ Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& n
     const Json* name = member(**animation, "name");
     auto clip = clip_from_matrices(skin.skeleton, grid.rate, matrices, false);
     if (!clip) return {Errc::invalid_file, at + ": " + clip.message()};
+    clip->wrap_time = smooth_wrap_time(skin.skeleton, *clip);
     out.clips.push_back({name != nullptr && name->is_string() ? name->get<std::string>() : "clip" + std::to_string(i),
                          std::move(*clip)});
   }

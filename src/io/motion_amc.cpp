@@ -148,6 +148,7 @@ Result<LoadedMotion> load_amc(const std::filesystem::path& skeleton, const std::
         !s) {
       return {Errc::invalid_file, s.message()};
     }
+    out.clip.wrap_time = smooth_wrap_time(out.skeleton, out.clip);
     return out;
   });
 }

@@ -209,6 +209,7 @@ class BvhReader {
     }
     skeleton.rest_local[0] = turn * skeleton.rest_local[0];
     if (Status s = clip.validate(); !s) return {Errc::invalid_file, name_ + ": " + s.message()};
+    clip.wrap_time = smooth_wrap_time(skeleton, clip);
     return {};
   }
 

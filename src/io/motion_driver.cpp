@@ -94,6 +94,7 @@ Result<LoadedDriver> read_driver(const NpzArrays& arrays, const Skeleton& skelet
   auto clip = clip_from_matrices(skeleton, *rate, matrices, false);
   if (!clip) return {clip.code(), source + ": " + clip.status().message()};
   out.clip = std::move(*clip);
+  out.clip.wrap_time = smooth_wrap_time(skeleton, out.clip);
   if (file.contains("proxy_capsules")) {
     if (Status s = read_capsules(arrays, shape[0], out); !s) return s;
   }

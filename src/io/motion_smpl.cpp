@@ -125,6 +125,7 @@ Result<LoadedMotion> read_motion(const NpzArrays& motion, const NpzArrays& model
   for (const Status& s : {out.skeleton.validate(), clip.validate()}) {
     if (!s) return {Errc::invalid_file, source + ": " + s.message()};
   }
+  clip.wrap_time = smooth_wrap_time(out.skeleton, clip);
   return out;
 }
 

@@ -58,6 +58,12 @@ void check_body(const char* name, AvatarAsset asset, const std::vector<std::vect
       "over-cover %.1f mm mean, %.1f mm p99. A tenth of the bones' lengths (%zu capsules): %.4f, %.1f mm outside\n",
       name, r->capsules, r->percentile, r->contained_least, r->poses, 1e3 * r->outside_greatest, 1e3 * r->over_mean,
       1e3 * r->over_p99, thin.capsules, thin.contained_least, 1e3 * thin.outside_greatest);
+  std::printf("  of %.1f l of body %.2f %% uncovered, %.2f %% in the worst pose; %.0f %% of it over-covered. By the bones' "
+              "lengths %.1f %% uncovered\n",
+              1e3 * r->body_volume, 100 * r->uncovered_mean, 100 * r->uncovered_greatest, 100 * r->over_volume,
+              100 * thin.uncovered_mean);
+  CHECK(r->uncovered_greatest < 0.02);
+  CHECK(thin.uncovered_mean > 0.5);
   double least = 1;
   for (const auto& pose : poses) least = std::min(least, held(asset, asset.capsules, pose));
   CHECK(least >= 0.99);
@@ -135,4 +141,25 @@ TEST_CASE("capsules hold people while they walk") {
     check_body(name, make_mesh_avatar(body.loaded.mesh, options).value().asset,
                poses_of(body.loaded.mesh.skeleton, body.loaded.clips[0].clip, 12));
   }
+}
+
+TEST_CASE("volumes of a ball, and of what capsules leave of it and cover beside it") {
+  std::vector<Vec3d> ball;
+  for (int k = 0; k < 40000; ++k) {
+    const double z = -1 + (2.0 * k + 1) / 40000, q = std::sqrt(1 - z * z), a = 2.399963229728653 * k;
+    ball.push_back({0.3 * q * std::cos(a), 1 + 0.3 * z, 0.3 * q * std::sin(a)});
+  }
+  const double volume = 4.0 / 3 * 3.14159265358979 * 0.027;
+  const CapsuleVolume none = measure_capsule_volume(ball, {});
+  CHECK(none.body == doctest::Approx(volume).epsilon(0.02));
+  CHECK(none.uncovered == none.body);
+  CHECK(none.over == 0);
+  const CapsuleVolume small = measure_capsule_volume(ball, {{{0, 1, 0}, {0, 1, 0}, 0.2}});
+  CHECK(small.uncovered == doctest::Approx(volume * 19.0 / 27).epsilon(0.03));
+  CHECK(small.over == 0);
+  // Twice as wide, and one that stands apart.
+  const CapsuleVolume large = measure_capsule_volume(ball, {{{0, 1, 0}, {0, 1, 0}, 0.6}, {{2, 1, 0}, {2, 1.5, 0}, 0.1}});
+  CHECK(large.uncovered == 0);
+  const double apart = 3.14159265358979 * 0.01 * (0.5 + 4.0 / 3 * 0.1);
+  CHECK(large.over == doctest::Approx(7 * volume + apart).epsilon(0.02));
 }

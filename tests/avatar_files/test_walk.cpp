@@ -10,6 +10,7 @@
 #include "avatar_files/bodies.hpp"
 #include "gsnav/avatar/clip_walk.hpp"
 #include "gsnav/avatar/foot_contact.hpp"
+#include "gsnav/avatar/foot_lock.hpp"
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/avatar/joint_match.hpp"
 #include "gsnav/io/motion_file.hpp"
@@ -189,6 +190,70 @@ TEST_CASE("joints are matched by name, between rigs that face different ways") {
     CHECK(walk->stride() < 2.0);  // the recording speeds up to a kick
     CHECK(slide.mean < 0.05);
   }
+}
+
+TEST_CASE("feet that are held stay where they are; what they carry keeps its shape") {
+  const Skeleton s = make_humanoid({.gaussians = 2000}).skeleton;
+  const auto feet = find_feet(s);
+  const auto legs = find_legs(s, feet).value();
+  CHECK(s.names[legs[0].hip].find("hip") != std::string::npos);
+  CHECK(s.names[legs[0].knee].find("knee") != std::string::npos);
+  CHECK(s.names[legs[1].ankle].find("ankle") != std::string::npos);
+  // The recorded walk round a bend of 1 m, on which its feet would slide.
+  const ClipWalk walk = ClipWalk::create(s, recorded(s, 0, false)).value();
+  std::vector<std::vector<Affine3<double>>> frames;
+  std::vector<Vec3d> bodies;
+  FootSlideMeter before(feet), after(feet);
+  for (double t = 0; t < 6; t += 0.025) {
+    LocalPose pose;
+    MotionInput in;
+    in.time = in.distance = t;
+    in.walking = 1;
+    walk.pose(in, pose);
+    auto& globals = frames.emplace_back(joints_at(s, pose));
+    bodies.push_back({1 - std::cos(t), 0, -std::sin(t)});
+    const Affine3<double> placed{rotation_matrix(axis_angle(Vec3d{0, 1, 0}, -t)), bodies.back()};
+    for (auto& g : globals) {
+      g.translation += pose.root;
+      g = placed * g;
+    }
+    before.add(globals, bodies.back());
+  }
+  const auto free = frames;
+  const FootLockReport report = lock_feet(s, feet, 40, bodies, frames).value();
+  for (std::size_t t = 0; t < frames.size(); ++t) after.add(frames[t], bodies[t]);
+  const FootSlide a = before.measure(), b = after.measure();
+  std::printf("round a bend of 1 m: feet slide %.1f mm a step, %.1f at most; held %.1f and %.1f (moved by up to %.1f mm)\n",
+              1e3 * a.mean, 1e3 * a.greatest, 1e3 * b.mean, 1e3 * b.greatest, 1e3 * report.moved);
+  CHECK(a.mean > 0.02);
+  CHECK(b.mean < 0.25 * a.mean);
+  CHECK(report.moved <= 0.1);
+  double stretch = 0, rigid = 0, jump = 0, heading = 0;
+  for (std::size_t t = 0; t < frames.size(); ++t) {
+    for (const Leg& leg : legs) {
+      const auto length = [&](const auto& g, std::size_t i, std::size_t j) { return norm(g[i].translation - g[j].translation); };
+      stretch = std::max(stretch, std::abs(length(frames[t], leg.hip, leg.knee) - length(free[t], leg.hip, leg.knee)));
+      stretch = std::max(stretch, std::abs(length(frames[t], leg.knee, leg.ankle) - length(free[t], leg.knee, leg.ankle)));
+      for (const std::size_t j : leg.foot) {
+        heading = std::max(heading, norm(frames[t][j].linear.row[0] - free[t][j].linear.row[0]));
+        if (t > 0) {
+          const Vec3d moved = frames[t][j].translation - frames[t - 1][j].translation;
+          jump = std::max(jump, norm(moved - (free[t][j].translation - free[t - 1][j].translation)));
+        }
+      }
+    }
+    for (std::size_t j = 0; j < s.size(); ++j) {
+      const Mat3d m = frames[t][j].linear * transpose(frames[t][j].linear);
+      for (int k = 0; k < 9; ++k) rigid = std::max(rigid, std::abs(m(k / 3, k % 3) - (k % 4 == 0 ? 1.0 : 0.0)));
+    }
+  }
+  CHECK(stretch < 1e-9);
+  CHECK(rigid < 1e-9);
+  CHECK(heading < 1e-12);
+  CHECK(jump < 0.03);  // metres a frame on top of the walk's own: nothing snaps
+  bodies.pop_back();
+  CHECK(lock_feet(s, feet, 40, bodies, frames).message().find("bodies") != std::string::npos);
+  CHECK(find_legs(s, {feet[0]}).message().find("1 feet") != std::string::npos);
 }
 
 TEST_CASE("real walks on their own bodies do not slide") {

@@ -9,6 +9,7 @@
 #include "commands.hpp"
 #include "gsnav/avatar/capsule_fit.hpp"
 #include "gsnav/avatar/mesh_avatar.hpp"
+#include "gsnav/avatar/weight_gradients.hpp"
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/io/skinned_mesh_file.hpp"
@@ -112,6 +113,10 @@ Status make_from_mesh(const MeshCommand& c, bool makehuman) {
   if (!made) return made.status();
   AvatarAsset& asset = made->asset;
   asset.idle = loaded->pose;
+  if (c.skinning == "dual-quaternion") asset.skinning = Skinning::dual_quaternion;
+  if (c.skinning == "stretched") {
+    if (Status s = bake_weight_gradients(asset); !s) return s;
+  }
   std::printf(
       "%zu Gaussians on %.2f m2, %.2f mm apart; %d weights each of at most %zu, off by %.3f mm (%zu by more than 0.2 "
       "mm)\n",
@@ -128,8 +133,14 @@ Status make_from_mesh(const MeshCommand& c, bool makehuman) {
       "outside; over-cover %.1f cm mean, %.1f cm p99\n",
       capsules->capsules, capsules->percentile, 100 * capsules->contained_least, capsules->poses,
       100 * capsules->outside_greatest, 100 * capsules->over_mean, 100 * capsules->over_p99);
-  std::printf("by Habitat-GS's rule: %zu capsules, %.2f %%, up to %.1f cm\n", thin.capsules, 100 * thin.contained_least,
-              100 * thin.outside_greatest);
+  std::printf(
+      "of the body's %.1f l they leave %.2f %% uncovered (%.2f %% in the worst pose) and cover %.0f %% as much outside\n",
+      1e3 * capsules->body_volume, 100 * capsules->uncovered_mean, 100 * capsules->uncovered_greatest,
+      100 * capsules->over_volume);
+  std::printf(
+      "by Habitat-GS's rule: %zu capsules hold %.2f %%, the others lie up to %.1f cm outside; %.1f %% of the volume "
+      "uncovered\n",
+      thin.capsules, 100 * thin.contained_least, 100 * thin.outside_greatest, 100 * thin.uncovered_mean);
   if (Status s = io::save_avatar(c.out, asset); !s) return s;
   std::printf("%s: written\n", c.out.c_str());
   return c.driver.empty() ? Status() : write_driver(c, asset, clip);

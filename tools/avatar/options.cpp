@@ -9,7 +9,7 @@ namespace gsnav_avatar {
 namespace {
 
 const char kDescription[] =
-    "Makes Gaussian avatars from rigged meshes and lets them walk. Lengths in metres, Y up. Exit status: 0, or 1 with "
+    "Makes Gaussian avatars from rigged meshes, lets them walk and draws them. Lengths in metres, Y up. Exit status: 0, or 1 with "
     "one "
     "line that says what is wrong.";
 
@@ -56,6 +56,9 @@ void add_mesh(CLI::App& app, MeshCommand& m, bool makehuman) {
       ->capture_default_str();
   app.add_option("--shade", m.shade, "Share of the light that surfaces lose which look down, 0 to 1")
       ->capture_default_str();
+  app.add_option("--skinning", m.skinning, "linear, stretched (shapes follow the skin) or dual-quaternion")
+      ->check(CLI::IsMember({"linear", "stretched", "dual-quaternion"}))
+      ->capture_default_str();
   add_clip(app, m.clip);
 }
 
@@ -66,7 +69,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   MeshCommand gltf, human;
   WalkCommand walk;
   std::vector<std::string> targets, via;
-  std::string from, to;
+  std::string from, to, eye, target;
+  StripCommand strip;
   CLI::App app{kDescription};
   app.require_subcommand(1);
   CLI::App* from_gltf = app.add_subcommand("from-gltf", "An avatar from a rigged glTF file");
@@ -87,8 +91,24 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   walks->add_option("--fps", walk.frame_rate, "Frames a second")->check(CLI::PositiveNumber)->capture_default_str();
   walks->add_option("--first-key", walk.first_key, "Where the clip's cycle of two steps begins");
   walks->add_option("--keys", walk.keys, "How many keys the cycle has; 0: found");
+  walks->add_flag("--lock-feet,!--no-lock-feet", walk.lock_feet, "Hold feet where they come down (default)");
   add_clip(*walks, walk.clip);
   walks->get_option("--clip")->required();
+  CLI::App* strips = app.add_subcommand("strip", "Pictures of a walk from one camera, side by side");
+  strips->add_option("--avatar", strip.avatar, "Avatar (.npz)")->required();
+  strips->add_option("--driver", strip.driver, "Driver (.npz)")->required();
+  CLI::Option* scene = strips->add_option("--scene", strip.scene, "Gaussians around it: .ply, .sog, a SOG folder, DIR/2_0,2_1");
+  strips->add_flag("--flat", strip.flat, "The generated flat around it")->excludes(scene);
+  strips->add_flag("--z-up", strip.z_up, "The scene's Z points up");
+  strips->add_option("--eye", eye, "Camera: X,Y,Z")->required();
+  strips->add_option("--target", target, "What it looks at: X,Y,Z")->required();
+  strips->add_option("--frames", strip.frames, "Pictures")->check(CLI::Range(1, 64))->capture_default_str();
+  strips->add_option("--width", strip.width, "Of a picture")->check(CLI::Range(16, 1024))->capture_default_str();
+  strips->add_option("--height", strip.height, "Of a picture")->check(CLI::Range(16, 4096))->capture_default_str();
+  strips->add_option("--fov", strip.fov, "Degrees across a picture")->check(CLI::Range(5.0, 150.0))->capture_default_str();
+  strips->add_option("--begin", strip.begin, "Seconds into the driver")->check(CLI::NonNegativeNumber);
+  strips->add_option("--end", strip.end, "Seconds; 0: the driver's end")->check(CLI::NonNegativeNumber);
+  strips->add_option("--out", strip.out, "Picture to write (.png)")->required();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -110,6 +130,10 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     if (!parse_point(from, walk.from)) return bad(from, "point X,Y,Z");
     if (!parse_point(to, walk.to)) return bad(to, "point X,Y,Z");
     out.walk = walk;
+  } else if (strips->parsed()) {
+    if (!parse_point(eye, strip.eye)) return bad(eye, "point X,Y,Z");
+    if (!parse_point(target, strip.target)) return bad(target, "point X,Y,Z");
+    out.strip = strip;
   } else {
     out.makehuman = from_makehuman->parsed();
     out.mesh = out.makehuman ? human : gltf;

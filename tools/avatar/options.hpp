@@ -30,6 +30,7 @@ struct MeshCommand {
   int influences = 0;
   double percentile = 0.99;
   double shade = 0.0;
+  std::string skinning = "linear";
 };
 
 struct WalkCommand {
@@ -39,12 +40,22 @@ struct WalkCommand {
   ClipSource clip;
   std::size_t first_key = 0, keys = 0;
   double speed = 0.0, frame_rate = 40.0;
+  bool lock_feet = true;
+};
+
+struct StripCommand {
+  std::string avatar, driver, scene, out;
+  bool flat = false, z_up = false;
+  gsnav::Vec3d eye{}, target{};
+  int frames = 8, width = 240, height = 320;
+  double fov = 50.0, begin = 0.0, end = 0.0;
 };
 
 struct Options {
   std::optional<MeshCommand> mesh;
   bool makehuman = false;
   std::optional<WalkCommand> walk;
+  std::optional<StripCommand> strip;
 };
 
 /// Reads the command line; prints help or what is wrong and sets `exit_code` where nothing is left to do.

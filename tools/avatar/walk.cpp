@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <limits>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/clip_walk.hpp"
 #include "gsnav/avatar/foot_contact.hpp"
+#include "gsnav/avatar/foot_lock.hpp"
 #include "gsnav/avatar/trajectory.hpp"
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/motion_file.hpp"
@@ -39,9 +41,9 @@ Result<std::vector<Vec3d>> lay_path(const NavMesh& mesh, const WalkCommand& c, d
   return out;
 }
 
-void print_slide(const char* when, const FootSlide& s) {
+void print_slide(const std::string& when, const FootSlide& s) {
   std::printf("feet slide %.1f mm a step on average, %.1f mm at most, over %zu steps %s\n", 1e3 * s.mean,
-              1e3 * s.greatest, s.contacts, when);
+              1e3 * s.greatest, s.contacts, when.c_str());
 }
 
 }  // namespace
@@ -80,33 +82,52 @@ Status make_walk(const WalkCommand& c) {
   io::DriverFrames frames;
   frames.frame_rate = c.frame_rate;
   frames.joints = skeleton.size();
-  FootSlideMeter feet(find_feet(skeleton, cycle.floor));
+  const std::vector<Foot> feet = find_feet(skeleton, cycle.floor);
+  std::vector<std::vector<Affine3<double>>> joints;
+  std::vector<Vec3d> bodies;
   const auto count = static_cast<std::size_t>(std::ceil(path->arrival() * c.frame_rate)) + 1;
   std::size_t steady_first = count, steady_last = 0;
-  std::vector<Affine3<double>> globals;
   double turned = 0.0;
   for (std::size_t t = 0; t < count; ++t) {
     const double time = min(static_cast<double>(t) / c.frame_rate, path->arrival());
     const TrajectorySample at = path->at(time);
     const Similarity world = actor->placement(time);
     const Affine3<double> placed{rotation_matrix(world.rotation), world.translation};
+    std::vector<Affine3<double>>& globals = joints.emplace_back();
     actor->joint_globals(time, globals);
     for (auto& m : globals) m = placed * m;
-    feet.add(globals, at.position);
-    frames.matrices.insert(frames.matrices.end(), globals.begin(), globals.end());
-    frames.capsules.push_back(actor->capsules(time));
+    bodies.push_back(at.position);
     clearance = min(clearance, mesh->distance_to_closest_obstacle(at.position));
     turned = at.turned;
     if (at.walking > 0.999) steady_first = min(steady_first, t), steady_last = max(steady_last, t + 1);
   }
-  if (frames.capsules[0].empty()) frames.capsules.clear();
   std::printf(
       "path of %.2f m in %.2f s at %.2f m/s, %.1f steps, turns on the spot of %.0f degrees; walls are at least %.2f m "
       "away (the mesh leaves out another %.2f m)\n",
       length, path->arrival(), options.speed, 2 * length / stride, turned * 57.29577951308232, clearance,
       mesh->settings().agent_radius);
-  print_slide("in all", feet.measure());
-  if (steady_first < steady_last) print_slide("at full speed", feet.measure(steady_first, steady_last));
+  const auto print_slides = [&](const std::string& when) {
+    FootSlideMeter meter(feet);
+    for (std::size_t t = 0; t < count; ++t) meter.add(joints[t], bodies[t]);
+    print_slide("in all" + when, meter.measure());
+    if (steady_first < steady_last) print_slide("at full speed" + when, meter.measure(steady_first, steady_last));
+  };
+  print_slides(c.lock_feet ? " as recorded" : "");
+  if (c.lock_feet) {
+    const auto locked = lock_feet(skeleton, feet, c.frame_rate, bodies, joints);
+    if (!locked) return locked.status();
+    print_slides(" with the feet held");
+    std::printf("feet were moved by up to %.1f mm; legs were up to %.1f mm too short\n", 1e3 * locked->moved,
+                1e3 * locked->out_of_reach);
+  }
+  for (const auto& globals : joints) {
+    frames.matrices.insert(frames.matrices.end(), globals.begin(), globals.end());
+    if (asset->capsules.empty()) continue;
+    auto& row = frames.capsules.emplace_back();
+    for (const ProxyCapsule& p : asset->capsules) {
+      row.push_back({globals[p.joint] * p.p0, globals[p.joint] * p.p1, p.radius});
+    }
+  }
   if (Status s = io::save_driver(c.out, frames); !s) return s;
   std::printf("%s: %zu frames at %g a second\n", c.out.c_str(), count, c.frame_rate);
   return {};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -22,6 +23,9 @@ struct ActorOptions {
   double time_begin = 0.0;                                        ///< seconds on the scene's clock
   double time_end = std::numeric_limits<double>::infinity();      ///< it is gone after this
   double scale = 1.0;                                             ///< uniform, > 0
+  /// Seconds after which the scene's clock begins again; 0: it does not. Over the last `loop_blend` of them whoever is
+  /// there at their begin and at time 0 moves from how it is then to how it is at 0: nobody jumps. Others are gone.
+  double loop_period = 0.0, loop_blend = 0.0;
 };
 
 /// Somebody in the scene: a body, how its joints move, and where it goes. Everything is a function of the
@@ -51,6 +55,10 @@ class AvatarActor {
     if (!is_finite(options.time_begin) || !(options.time_end >= options.time_begin)) {
       return bad("ActorOptions.time_end lies before time_begin");
     }
+    if (!(options.loop_period >= 0) || !is_finite(options.loop_period) || !(options.loop_blend >= 0) ||
+        !(options.loop_blend <= options.loop_period)) {
+      return bad("ActorOptions.loop_blend must be within [0, loop_period]");
+    }
     AvatarActor actor;
     actor.inverse_binds_ = asset->skeleton.bind_inverses();
     actor.asset_ = std::move(asset);
@@ -65,7 +73,17 @@ class AvatarActor {
   const ActorOptions& options() const noexcept { return options_; }
 
   /// Whether it is in the scene at time t (seconds on the scene's clock, as everywhere below).
-  bool active(double t) const noexcept { return t >= options_.time_begin && t <= options_.time_end; }
+  bool active(double t) const noexcept {
+    t = clock(t);
+    return blending(t) ? within(blend_begin()) && within(0.0) : within(t);
+  }
+  /// The same actor in a scene whose clock begins again (ActorOptions). Errors: as for create.
+  Result<AvatarActor> looped(double period, double blend) const {
+    ActorOptions options = options_;
+    options.loop_period = period;
+    options.loop_blend = blend;
+    return create(asset_, motion_, trajectory_, options);
+  }
 
   /// World from the avatar's root frame: Y up, facing -Z, feet on y = 0.
   Similarity placement(double t) const {
@@ -96,7 +114,11 @@ class AvatarActor {
   /// Appends the proxy capsules as they move over [t0, t1], endpoints linear in between, with `avatar` as
   /// the body's number. None unless it is active at some time in between.
   void dynamic_capsules(double t0, double t1, std::uint32_t avatar, std::vector<DynamicCapsule>& out) const {
-    if (t1 < options_.time_begin || t0 > options_.time_end) return;
+    // A window in a clock that begins again is looked for at the ends only: it is longer than a step.
+    if (options_.loop_period > 0 ? !active(t0) && !active(t1)
+                                 : t1 < options_.time_begin || t0 > options_.time_end) {
+      return;
+    }
     std::vector<Capsule<double>> begin, end;
     append_capsules(t0, begin);
     append_capsules(t1, end);
@@ -106,7 +128,28 @@ class AvatarActor {
   }
 
  private:
+  bool within(double t) const noexcept { return t >= options_.time_begin && t <= options_.time_end; }
+  double clock(double t) const noexcept {
+    const double period = options_.loop_period;
+    return period > 0 ? t - std::floor(t / period) * period : t;
+  }
+  double blend_begin() const noexcept { return options_.loop_period - options_.loop_blend; }
+  bool blending(double t) const noexcept { return options_.loop_blend > 0 && t > blend_begin(); }
+
   Similarity placement(double t, LocalPose& pose) const {
+    t = clock(t);
+    if (!blending(t)) return placement_at(t, pose);
+    LocalPose next;
+    const Similarity from = placement_at(blend_begin(), pose), to = placement_at(0.0, next);
+    const double u = (t - blend_begin()) / options_.loop_blend;
+    for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+      pose.rotations[j] = slerp(pose.rotations[j], next.rotations[j], u);
+      pose.translations[j] = lerp(pose.translations[j], next.translations[j], u);
+    }
+    return {slerp(from.rotation, to.rotation, u), lerp(from.translation, to.translation, u), from.scale};
+  }
+
+  Similarity placement_at(double t, LocalPose& pose) const {
     const double local = t - options_.time_begin;
     const TrajectorySample at = trajectory_->at(local);
     const double scale = options_.scale;

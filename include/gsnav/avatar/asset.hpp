@@ -24,6 +24,14 @@ struct ProxyCapsule {
   double radius = 0.0;  ///< metres
 };
 
+/// How a body's Gaussians follow its joints. A captured avatar relies on what it was trained with, which mostly is
+/// `linear`.
+enum class Skinning : std::uint8_t {
+  linear,            ///< linear blend skinning; shapes are turned by the polar factor
+  linear_stretched,  ///< the same places; shapes are stretched as the skin is, by AvatarAsset::weight_gradients
+  dual_quaternion,   ///< dual quaternion blending: twisted limbs keep their width
+};
+
 /// A body: what all actors that look alike share. Immutable once built.
 struct AvatarAsset {
   std::string name;
@@ -32,6 +40,9 @@ struct AvatarAsset {
   int influences = kInfluences4;                ///< K: joints that move one Gaussian, 4 or 8
   std::vector<std::uint16_t> joint_indices;     ///< [N][K], the greatest weight first
   std::vector<std::uint16_t> skinning_weights;  ///< [N][K] parts of kWeightParts, which is the sum of each row
+  Skinning skinning = Skinning::linear;
+  /// For linear_stretched (bake_weight_gradients): [N][K-1][3] of the second to last weight of each row, 1/metres.
+  std::vector<float> weight_gradients;
   std::vector<ProxyCapsule> capsules;
   LocalPose idle;                            ///< how it stands without a motion; empty: the rest pose
 
@@ -40,7 +51,7 @@ struct AvatarAsset {
   /// Takes any k weights a Gaussian ([N][k], joint indices alongside; k = J with all joints for dense
   /// weights): keeps the `keep` greatest (4 or 8), sorts them, and rounds them to parts that make 1 exactly
   /// (round_weights), so that a body far from the root does not drift. Returns the greatest mass
-  /// that was left out of a row. Errors: invalid_argument (sizes, a joint that does not exist, a weight
+  /// that was left out of a row; gradients of the weights before are dropped. Errors: invalid_argument (sizes, a joint that does not exist, a weight
   /// that is negative or not finite, a Gaussian without weight), naming the Gaussian.
   Result<double> set_weights(std::size_t k, const std::vector<std::uint16_t>& indices,
                              const std::vector<float>& weights, int keep = kInfluences4) {
@@ -84,6 +95,7 @@ struct AvatarAsset {
       round_weights(sorted.data(), used, weight_out.data() + i * row);
     }
     influences = keep;
+    weight_gradients.clear();
     joint_indices = std::move(joint_out);
     skinning_weights = std::move(weight_out);
     return dropped;
@@ -125,6 +137,17 @@ struct AvatarAsset {
       if (sum != kWeightParts) {
         return bad("weights of Gaussian " + std::to_string(i) + " sum to " + std::to_string(sum) + " parts of " +
                    std::to_string(kWeightParts));
+      }
+    }
+    if (skinning == Skinning::linear_stretched) {
+      if (weight_gradients.size() != 3 * n * (row - 1)) {
+        return bad("weight_gradients has " + std::to_string(weight_gradients.size()) + " values where " +
+                   std::to_string(3 * n * (row - 1)) + " are needed (bake_weight_gradients makes them)");
+      }
+      for (std::size_t k = 0; k < weight_gradients.size(); ++k) {
+        if (!is_finite(weight_gradients[k])) {
+          return bad("weight_gradients of Gaussian " + std::to_string(k / (3 * (row - 1))) + " are not finite");
+        }
       }
     }
     for (std::size_t c = 0; c < capsules.size(); ++c) {

@@ -11,6 +11,7 @@
 #include "gsnav/avatar/clip_walk.hpp"
 #include "gsnav/avatar/cloud_binding.hpp"
 #include "gsnav/avatar/foot_contact.hpp"
+#include "gsnav/avatar/foot_lock.hpp"
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/avatar/joint_match.hpp"
 #include "gsnav/avatar/mesh_avatar.hpp"
@@ -22,4 +23,5 @@
 #include "gsnav/avatar/skinned_mesh.hpp"
 #include "gsnav/avatar/smpl_joints.hpp"
 #include "gsnav/avatar/trajectory.hpp"
+#include "gsnav/avatar/weight_gradients.hpp"
 #include "gsnav/avatar/weight_truncation.hpp"

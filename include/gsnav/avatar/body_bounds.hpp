@@ -6,6 +6,7 @@
 
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/kernels/skin_modes.hpp"
 
 namespace gsnav {
 
@@ -24,9 +25,14 @@ class BodyBounds {
         double& reach = reach_[asset.joint_indices[k]];
         reach = max(reach, norm(inverse[asset.joint_indices[k]] * p));
       }
+      if (asset.skinning == Skinning::dual_quaternion) {
+        const double first = weight_of_parts(asset.skinning_weights[i * row]);
+        bulge_ = max(bulge_, (1 - first) / first);
+      }
       for (const auto& s : asset.cloud.scales) scale_ = max(scale_, s[i]);
       opacity_ = max(opacity_, asset.cloud.opacities[i]);
     }
+    if (asset.skinning == Skinning::linear_stretched) scale_ *= static_cast<float>(kGreatestStretch * (1 + 1e-5));
   }
 
   /// For joints to root frame, [J], metres.
@@ -43,6 +49,12 @@ class BodyBounds {
       }
       first = false;
     }
+    // Where the joints put a Gaussian apart by d_k from where the first does, the blend q = sum w_k q_k puts it apart by
+    // sum w_k d_k q_k conj(q) / |q|^2: at most sum w_k |d_k| / |q|. |q| is at least the first weight, because no q_k
+    // points away from the first.
+    const Vec3d grow = Vec3d{1, 1, 1} * (bulge_ * norm(out.high - out.low));
+    out.low -= grow;
+    out.high += grow;
     out.scale_max = scale_;
     out.opacity_max = opacity_;
     return out;
@@ -50,6 +62,7 @@ class BodyBounds {
 
  private:
   std::vector<double> reach_;  // [J] metres; negative: moves nothing
+  double bulge_ = 0;           // of dual quaternions: how far out of the box, as a share of its diagonal
   float scale_ = 0, opacity_ = 0;
 };
 

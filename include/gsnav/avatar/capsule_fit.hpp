@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "gsnav/avatar/asset.hpp"
+#include "gsnav/avatar/capsule_volume.hpp"
 #include "gsnav/avatar/proxy_fit.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/capsule.hpp"
@@ -34,6 +35,10 @@ struct CapsuleReport {
   double outside_greatest = 0.0;  ///< how far a centre lies outside of all capsules
   double over_mean = 0.0;         ///< distance of the capsules' outer surface from the nearest centre: mean
   double over_p99 = 0.0;          ///< ... and 99th percentile
+  double body_volume = 0.0;       ///< cubic metres that the body's surface encloses (capsule_volume.hpp), mean
+  double uncovered_mean = 0.0;    ///< share of the body's volume that is in no capsule
+  double uncovered_greatest = 0.0;  ///< ... in the worst pose
+  double over_volume = 0.0;       ///< volume of the capsules outside of the body, as a share of the body's, mean
 };
 
 namespace detail {
@@ -180,9 +185,9 @@ inline std::vector<ProxyCapsule> habitat_capsules(const Skeleton& skeleton) {
   return out;
 }
 
-/// What `capsules` hold of the asset over the poses (joint to root frame each, [J]).
+/// What `capsules` hold of the asset over the poses (joint to root frame each, [J]); without `volumes` those are 0.
 inline CapsuleReport measure_capsules(const AvatarAsset& asset, const std::vector<ProxyCapsule>& capsules,
-                                      const std::vector<std::vector<Affine3<double>>>& poses) {
+                                      const std::vector<std::vector<Affine3<double>>>& poses, bool volumes = true) {
   CapsuleReport report;
   report.capsules = capsules.size();
   report.poses = poses.size();
@@ -204,6 +209,14 @@ inline CapsuleReport measure_capsules(const AvatarAsset& asset, const std::vecto
     const double share = static_cast<double>(inside) / static_cast<double>(max<std::size_t>(1, centers.size()));
     report.contained_least = min(report.contained_least, share);
     sum += share;
+    if (volumes) {
+      const CapsuleVolume volume = measure_capsule_volume(centers, placed);
+      const double part = 1.0 / static_cast<double>(poses.size()), body = max(volume.body, 1e-30);
+      report.body_volume += volume.body * part;
+      report.uncovered_mean += volume.uncovered / body * part;
+      report.uncovered_greatest = max(report.uncovered_greatest, volume.uncovered / body);
+      report.over_volume += volume.over / body * part;
+    }
     if (&pose != &poses.front()) continue;
     // Over-cover, in the first pose: points of each capsule that lie in no other, against the nearest centres.
     for (const Capsule<double>& c : placed) {
@@ -278,10 +291,13 @@ inline Result<CapsuleReport> fit_body_capsules(AvatarAsset& asset,
       for (const Capsule<double>& c : held)
         asset.capsules.push_back({static_cast<std::uint16_t>(j), c.p0, c.p1, c.radius});
     }
-    report = measure_capsules(asset, asset.capsules, poses);
+    report = measure_capsules(asset, asset.capsules, poses, false);
     report.percentile = share;
     if (report.contained_least >= options.contained) break;
   }
+  const double percentile = report.percentile;
+  report = measure_capsules(asset, asset.capsules, poses);
+  report.percentile = percentile;
   return report;
 }
 

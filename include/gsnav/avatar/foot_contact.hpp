@@ -81,10 +81,42 @@ struct FootSlide {
   double total = 0.0;
 };
 
-/// Measures sliding over frames of joints in the world. A foot is down while a point of its sole is within `clearance`
-/// of the lowest that it gets and does not move ahead of the body (a foot that swings past may be as low); what it
-/// slides from one frame to the next is the least that any of these points moves along the ground, so that a foot that
-/// rolls over heel or ball does not count.
+/// What a foot does from one frame to the next.
+struct FootMove {
+  bool down = false;
+  Vec3d way{};  ///< along the floor, of the point of the sole that moves least; metres
+};
+
+/// A foot is down while a point of its sole is within `clearance` of the lowest that it gets and does not move ahead of
+/// the body (a foot that swings past may be as low). The point that moves least counts, so that a foot that rolls over
+/// heel or ball does not slide. `frames`: joints to the world, [T][J], rigid; `bodies`: where the walker is on the floor,
+/// [T]. Returns [T], the last without a move.
+inline std::vector<FootMove> foot_moves(const Foot& foot, const std::vector<std::vector<Affine3<double>>>& frames,
+                                        const std::vector<Vec3d>& bodies, double clearance) {
+  const std::size_t points = foot.sole.size();
+  std::vector<double> lowest(points, std::numeric_limits<double>::max());
+  std::vector<Vec3d> at(points * frames.size());
+  for (std::size_t t = 0; t < frames.size(); ++t) {
+    for (std::size_t k = 0; k < points; ++k) {
+      const SolePoint& p = foot.sole[k];
+      at[t * points + k] = frames[t][p.joint] * p.local - Vec3d{0, bodies[t].y, 0};
+      lowest[k] = min(lowest[k], at[t * points + k].y);
+    }
+  }
+  std::vector<FootMove> out(frames.size());
+  for (std::size_t t = 0; t + 1 < frames.size(); ++t) {
+    for (std::size_t k = 0; k < points; ++k) {
+      const Vec3d &a = at[t * points + k], &b = at[(t + 1) * points + k];
+      if (max(a.y, b.y) > lowest[k] + clearance) continue;
+      const Vec3d body = bodies[t + 1] - bodies[t], moved{b.x - a.x, 0, b.z - a.z};
+      if (dot(moved - body, body) > 1e-9) continue;
+      if (!out[t].down || norm(moved) < norm(out[t].way)) out[t] = {true, moved};
+    }
+  }
+  return out;
+}
+
+/// Measures sliding over frames of joints in the world, by foot_moves.
 class FootSlideMeter {
  public:
   FootSlideMeter(std::vector<Foot> feet, double clearance = 0.02) : feet_(std::move(feet)), clearance_(clearance) {}
@@ -92,23 +124,15 @@ class FootSlideMeter {
   /// `joints`: [J] to the world, rigid; `body`: where the walker is, on the floor.
   void add(const std::vector<Affine3<double>>& joints, const Vec3d& body) {
     bodies_.push_back(body);
-    std::vector<Vec3d>& frame = frames_.emplace_back();
-    for (const Foot& foot : feet_) {
-      for (const SolePoint& p : foot.sole) frame.push_back(joints[p.joint] * p.local - Vec3d{0, body.y, 0});
-    }
+    frames_.push_back(joints);
   }
 
   /// Over the frames [first, last).
   FootSlide measure(std::size_t first = 0, std::size_t last = static_cast<std::size_t>(-1)) const {
     FootSlide out;
     last = std::min(last, frames_.size());
-    std::size_t at = 0;
     for (const Foot& foot : feet_) {
-      const std::size_t points = foot.sole.size();
-      std::vector<double> lowest(points, std::numeric_limits<double>::max());
-      for (const auto& frame : frames_) {
-        for (std::size_t k = 0; k < points; ++k) lowest[k] = min(lowest[k], frame[at + k].y);
-      }
+      const std::vector<FootMove> moves = foot_moves(foot, frames_, bodies_, clearance_);
       bool down = false;
       double slid = 0.0;
       const auto lift = [&] {
@@ -120,23 +144,14 @@ class FootSlideMeter {
         slid = 0.0;
       };
       for (std::size_t t = first; t + 1 < last; ++t) {
-        double least = std::numeric_limits<double>::max();
-        for (std::size_t k = 0; k < points; ++k) {
-          const Vec3d &a = frames_[t][at + k], &b = frames_[t + 1][at + k];
-          if (max(a.y, b.y) > lowest[k] + clearance_) continue;
-          const Vec3d way = bodies_[t + 1] - bodies_[t], moved{b.x - a.x, 0, b.z - a.z};
-          if (dot(moved - way, way) > 1e-9) continue;
-          least = min(least, norm(moved));
-        }
-        if (least == std::numeric_limits<double>::max()) {
+        if (!moves[t].down) {
           lift();
         } else {
           down = true;
-          slid += least;
+          slid += norm(moves[t].way);
         }
       }
       lift();
-      at += points;
     }
     out.mean = out.contacts == 0 ? 0.0 : out.total / static_cast<double>(out.contacts);
     return out;
@@ -146,7 +161,7 @@ class FootSlideMeter {
   std::vector<Foot> feet_;
   double clearance_;
   std::vector<Vec3d> bodies_;
-  std::vector<std::vector<Vec3d>> frames_;  // feet's points one after another
+  std::vector<std::vector<Affine3<double>>> frames_;
 };
 
 }  // namespace gsnav

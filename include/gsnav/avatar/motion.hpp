@@ -72,7 +72,8 @@ class MotionClip final : public MotionSource {
   std::vector<Vec3d> translations;         ///< [T][J] or [J] (the same in all keys), metres
   std::vector<Vec3d> root_translation;     ///< [T] path of the whole avatar in its frame, or empty
   ClipEnd end = ClipEnd::loop;
-  double wrap_time = 0.0;                  ///< seconds from last to first key; at least one frame
+  /// Seconds from last to first key, at least one frame: smooth_wrap_time says how many nobody jumps in.
+  double wrap_time = 0.0;
   double playback_rate = 1.0;              ///< seconds of the clip that go by in one second, > 0
   double start = 0.0;                      ///< seconds into the clip (in its own time) at time 0
 
@@ -183,6 +184,37 @@ class MotionClip final : public MotionSource {
  private:
   double wrap() const noexcept { return max(wrap_time, 1.0 / frame_rate); }
 };
+
+/// Seconds that it takes to get from a clip's last pose to its first (MotionClip::wrap_time of a loop) when no joint is
+/// to move faster than `speed` (metres a second); 0 for a clip that ends as it begins. `forward`: for a loop that goes on
+/// where it has come to. The clip is of the skeleton.
+inline double smooth_wrap_time(const Skeleton& skeleton, const MotionClip& clip, bool forward = false,
+                               double speed = 1.5) {
+  const std::size_t last = clip.frames() - 1;
+  LocalPose pose = skeleton.rest_pose();
+  std::vector<Affine3<double>> globals;
+  std::vector<Vec3d> before(clip.joints);
+  double fastest = 0.0;
+  constexpr int kSteps = 16;
+  const bool moving = clip.translations.size() != clip.joints;
+  for (int k = 0; k <= kSteps; ++k) {
+    const double u = static_cast<double>(k) / kSteps;
+    for (std::size_t j = 0; j < clip.joints; ++j) {
+      pose.rotations[j] = slerp(clip.rotations[last * clip.joints + j], clip.rotations[j], u);
+      pose.translations[j] =
+          moving ? lerp(clip.translations[last * clip.joints + j], clip.translations[j], u) : clip.translations[j];
+    }
+    forward_kinematics(skeleton, pose, globals);
+    Vec3d root{};
+    if (!clip.root_translation.empty() && !forward) root = lerp(clip.root_translation[last], clip.root_translation[0], u);
+    for (std::size_t j = 0; j < clip.joints; ++j) {
+      const Vec3d at = globals[j].translation + root;
+      if (k > 0) fastest = max(fastest, norm(at - before[j]) * kSteps);
+      before[j] = at;
+    }
+  }
+  return fastest / speed;
+}
 
 /// A clip from matrices: `matrices` is [T][J], joint to root frame, or with `skinning` the product of
 /// that and the skeleton's inverse bind. Each is taken apart into a rotation (its polar factor) and a

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "gsnav/avatar/asset.hpp"
-#include "gsnav/kernels/lbs.hpp"
+#include "gsnav/kernels/skin_modes.hpp"
 #include "gsnav/math/capsule.hpp"
 
 namespace gsnav {
@@ -27,6 +27,18 @@ inline double segment_distance2(const Vec3d& a, const Vec3d& b, const Vec3d& p) 
 inline std::vector<Vec3d> skinned_centers(const AvatarAsset& asset, const std::vector<Affine3<double>>& joints) {
   std::vector<Vec3d> out(asset.size());
   const std::size_t row = static_cast<std::size_t>(asset.influences);
+  if (asset.skinning == Skinning::dual_quaternion) {
+    std::vector<DualQuat<double>> duals;
+    for (const Affine3<double>& m : joints) duals.push_back(dual_quat(m));
+    SkinningArgs<double, double> args;
+    args.influences = asset.influences;
+    args.joint_indices = view_of(asset.joint_indices);
+    args.weights = view_of(asset.skinning_weights);
+    args.dual_joints = view_of(duals);
+    const SkinGaussianDual<double, double> kernel{args};
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = skin(kernel.blend(i), asset.cloud.mean(i), Quatd{}).mean;
+    return out;
+  }
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Vec3d p = asset.cloud.mean(i);
     for (std::size_t k = i * row; k < (i + 1) * row; ++k) {

@@ -65,6 +65,7 @@ class SkinnedCrowd {
     for (std::size_t i = 0; i < count; ++i) {
       if (!actors_[i].visible_) continue;
       actor_at(i).joint_matrices(t, matrices_);
+      if (actors_[i].asset()->skinning == Skinning::dual_quaternion) actors_[i].set_dual_joints(matrices_);
       for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
     }
     joints_.upload(host_joints_.data(), host_joints_.size());

@@ -47,6 +47,14 @@ class AvatarArrays {
       weights_.upload(args_.weights.data, args_.weights.size);
       args_.weights = std::as_const(weights_).view();
     }
+    if (asset_->skinning == Skinning::linear_stretched) {
+      args_.weight_gradients = view_of(asset_->weight_gradients);
+      if constexpr (!is_host_backend<B>) {
+        floats_.emplace_back(backend).upload(args_.weight_gradients.data, args_.weight_gradients.size);
+        args_.weight_gradients = {floats_.back().data(), args_.weight_gradients.size};
+      }
+      for (std::size_t k = 0; k < 3; ++k) args_.scales[k] = v.scales[k];
+    }
     for (std::size_t k = 0; k < 3; ++k) args_.means[k] = v.means[k];
     for (std::size_t k = 0; k < 4; ++k) args_.quats[k] = v.quats[k];
   }
@@ -66,8 +74,8 @@ class AvatarArrays {
 };
 
 /// The Gaussians of one actor, posed on a backend and ready to be rendered in one list with the scene.
-/// Only means and orientations (and for SH of degree >= 1 the rotations that colours are turned back by)
-/// are written per frame, into buffers that are used again; all else is the asset's own memory, which on
+/// Only means and orientations (for SH of degree >= 1 also the rotations that colours are turned back by, with stretch
+/// the shapes) are written per frame, into buffers that are used again; all else is the asset's own memory, which on
 /// other than host backends is uploaded once. The backend must outlive it.
 ///
 ///     SkinnedGaussians skin(backend, actor.asset());
@@ -80,12 +88,15 @@ class SkinnedGaussians {
       : SkinnedGaussians(backend, std::make_shared<const AvatarArrays<B>>(backend, std::move(asset))) {}
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarArrays<B>> arrays)
       : backend_(&backend), arrays_(std::move(arrays)), bounds_(*asset()), args_(arrays_->skinning()),
-        set_(arrays_->set()), joints_(backend) {
+        set_(arrays_->set()), joints_(backend), dual_joints_(backend) {
     GaussianView& v = set_.gaussians;
     for (std::size_t k = 0; k < 3; ++k) v.means[k] = args_.means_out[k] = output(v.size);
     for (std::size_t k = 0; k < 4; ++k) {
       v.quats[k] = args_.quats_out[k] = output(v.size);
       if (v.sh_degree >= 1) v.sh_rotations[k] = args_.rotations_out[k] = output(v.size);
+    }
+    if (this->asset()->skinning == Skinning::linear_stretched) {
+      for (std::size_t k = 0; k < 9; ++k) v.axes[k] = args_.axes_out[k] = output(v.size);
     }
   }
 
@@ -136,11 +147,22 @@ class SkinnedGaussians {
     return {};
   }
   Status skin() {
+    if (asset()->skinning == Skinning::dual_quaternion) {
+      set_dual_joints(matrices_);
+      return skin_gaussians<float>(*backend_, args_);
+    }
     host_joints_.clear();
     for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
     joints_.upload(host_joints_.data(), host_joints_.size());
     args_.joints = std::as_const(joints_).view();
     return skin_gaussians<float>(*backend_, args_);
+  }
+  /// The joint matrices as dual quaternions, to the backend.
+  void set_dual_joints(const std::vector<Affine3<double>>& matrices) {
+    host_duals_.clear();
+    for (const auto& m : matrices) host_duals_.push_back(dual_quat_cast<float>(dual_quat(m)));
+    dual_joints_.upload(host_duals_.data(), host_duals_.size());
+    args_.dual_joints = std::as_const(dual_joints_).view();
   }
   View<float> output(std::size_t n) {
     floats_.emplace_back(*backend_).resize_discard(n);
@@ -153,9 +175,11 @@ class SkinnedGaussians {
   SkinningArgs<float> args_;
   GaussianSet set_;
   Buffer<Affine3<float>, B> joints_;
-  std::vector<Buffer<float, B>> floats_;  // a Buffer's memory stays where it is when the vector grows
+  Buffer<DualQuat<float>, B> dual_joints_;  // of these two the one that the asset's skinning reads
+  std::vector<Buffer<float, B>> floats_;    // a Buffer's memory stays where it is when the vector grows
   std::vector<Affine3<double>> matrices_;
   std::vector<Affine3<float>> host_joints_;
+  std::vector<DualQuat<float>> host_duals_;
   bool visible_ = false;
 };
 

@@ -54,7 +54,8 @@ struct LoadedAvatar {
 /// [N,3], _features_rest [N,3(K-1)] (coefficient, then colour), beside lbs_weights and joints_inv_bind_matrix.
 ///
 /// gsnav's own files may add `capsules` [C,7] (both ends in the bind frame of a joint and the radius, metres) and
-/// `capsule_joints` [C]; a driver's `proxy_capsules` become such by capsules_from_track (avatar/capsule_track.hpp).
+/// `capsule_joints` [C], and `skinning` (0 linear, 1 linear with stretch, whose gradients are fitted here, 2 dual
+/// quaternions; Skinning); a driver's `proxy_capsules` become such by capsules_from_track (avatar/capsule_track.hpp).
 ///
 /// Errors name the file, the array, the row and the value: file_not_found; invalid_file (an array is
 /// missing or has another shape, a value is not finite, an opacity outside [0, 1], a negative scale or
@@ -64,7 +65,8 @@ struct LoadedAvatar {
 Result<LoadedAvatar> load_avatar(const std::filesystem::path& path, const LoadAvatarOptions& options = {});
 
 /// Writes the same arrays, float32 except for the inverse binds (float64), weights dense. Joints that are
-/// not SMPL's or SMPL-X's add `joint_names` and `joint_parents`, capsules `capsules` and `capsule_joints`. SH of degree 0 that Habitat-GS's rule
+/// not SMPL's or SMPL-X's add `joint_names` and `joint_parents`, capsules `capsules` and `capsule_joints`, other
+/// than linear skinning `skinning`. SH of degree 0 that Habitat-GS's rule
 /// would take for RGB is written as RGB (float64, so that it comes back the same).
 /// Errors: what AvatarAsset::validate reports; file_not_found; unsupported (4 GiB or more).
 Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset);

@@ -35,6 +35,9 @@ struct AvatarScene {
   std::vector<SceneAvatar> avatars;
   double time_max = 0.0;  ///< 0: when the last avatar has left
   bool time_loop = true;
+  /// Seconds by which a clock that loops goes on after `time_max` for those who are there at its end and at its begin
+  /// to get back, at least; more where they would move faster than 1.4 m/s. 0: they jump, as with Habitat-GS.
+  double loop_blend = 0.5;
   std::vector<std::string> warnings;  ///< keys that change nothing here
 };
 
@@ -51,12 +54,12 @@ Result<AvatarScene> load_avatar_scene(const std::filesystem::path& path);
 
 /// Loads what a scene names, one actor an entry and in its order; entries with the same canonical file share their
 /// body. Frames play at the driver's own rate, by slerp in joint space; where the window is longer the last pose is
-/// held. Capsules are those of the canonical file, else the driver's. Errors: what the loaders report, with the
+/// held. Where the scene's clock loops, actors repeat with it (ActorOptions::loop_period). Capsules are those of the canonical file, else the driver's. Errors: what the loaders report, with the
 /// avatar's name.
 Result<std::vector<AvatarActor>> load_scene_actors(const AvatarScene& scene);
 
-/// The scene's clock at `seconds` since the start: within [0, time_max) where it loops, else held at time_max. `actors`
-/// are the scene's, for a file without a time_max.
+/// The scene's clock at `seconds` since the start: within [0, time_max + what blending takes) where it loops, else held at
+/// time_max. `actors` are the scene's, for a file without a time_max.
 double scene_time(const AvatarScene& scene, const std::vector<AvatarActor>& actors, double seconds) noexcept;
 
 }  // namespace gsnav::io

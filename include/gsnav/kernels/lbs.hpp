@@ -6,6 +6,7 @@
 
 #include "gsnav/config.hpp"
 #include "gsnav/core/view.hpp"
+#include "gsnav/math/dual_quat.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/quat.hpp"
@@ -164,6 +165,13 @@ struct SkinningArgs {
   View<Out> means_out[3];                   ///< [N] each
   View<Out> quats_out[4];                   ///< [N] each
   View<Out> rotations_out[4];               ///< [N] each, or empty: not asked for
+  /// Dual quaternion blending: `joints` as dual quaternions, [J], which are then what is read. Empty: linear blending.
+  View<const DualQuat<S>> dual_joints;
+  /// Linear blending with stretch: gradients of the second to last weight of each Gaussian by its canonical place,
+  /// [N][K-1][3], 1/metres, standard deviations, and where the shapes go. Empty: shapes are turned only.
+  View<const float> weight_gradients;
+  View<const float> scales[3];  ///< canonical, metres, [N] each
+  View<Out> axes_out[9];        ///< [N] each, as GaussianView::axes
 
   GSNAV_HD std::size_t size() const noexcept { return means[0].size; }
 };

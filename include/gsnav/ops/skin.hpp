@@ -5,10 +5,12 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/lbs.hpp"
+#include "gsnav/kernels/skin_modes.hpp"
 
 namespace gsnav {
 
@@ -40,18 +42,44 @@ Status validate(const SkinningArgs<S, Out>& args) {
   for (const auto& v : args.quats_out) sized(v, n, "quats_out");
   const std::size_t rotations = args.rotations_out[0].empty() ? 0 : n;
   for (const auto& v : args.rotations_out) sized(v, rotations, "rotations_out");
-  if (status.ok() && n > 0 && args.joints.empty()) {
+  if (status.ok() && n > 0 && args.joints.empty() && args.dual_joints.empty()) {
     status = {Errc::invalid_argument, "SkinningArgs.joints is empty"};
+  }
+  if (!args.weight_gradients.empty()) {
+    if (!args.dual_joints.empty()) {
+      return {Errc::invalid_argument, "SkinningArgs.weight_gradients: stretch goes with linear blending, not with dual_joints"};
+    }
+    sized(args.weight_gradients, 3 * (row - 1) * n, "weight_gradients");
+    for (const auto& v : args.scales) sized(v, n, "scales");
+    for (const auto& v : args.axes_out) sized(v, n, "axes_out");
   }
   return status;
 }
 
-/// Skins N Gaussians on a backend; a member `skin(const SkinningArgs<S, Out>&)` of it is used where
-/// there is one. Every joint index must be below joints.size (AvatarAsset::validate sees to that).
+namespace detail {
+
+/// Whether another kernel than the usual one is asked for.
+template <class S, class Out>
+bool has_skinning_mode(const SkinningArgs<S, Out>& args) noexcept {
+  return !args.dual_joints.empty() || !args.weight_gradients.empty();
+}
+
+}  // namespace detail
+
+/// Skins N Gaussians on a backend: linearly, by dual quaternions or with stretch, as the arrays that are given say. A
+/// member `skin(const SkinningArgs<S, Out>&)` of the backend is used for the first where there is one. Every joint index must be below joints.size (AvatarAsset::validate sees to that).
 /// The result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
 template <class S, Backend B, class Out>
 Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
   if (Status s = validate(args); !s) return s;
+  if (!args.dual_joints.empty()) {
+    backend.parallel_for(args.size(), SkinGaussianDual<S, Out>{args});
+    return {};
+  }
+  if (!args.weight_gradients.empty()) {
+    backend.parallel_for(args.size(), SkinGaussianStretched<S, Out>{args});
+    return {};
+  }
   if constexpr (requires { backend.skin(args); }) {
     backend.skin(args);
   } else {
@@ -71,7 +99,21 @@ Status skin_all(B& backend, std::span<const SkinningArgs<S, Out>> avatars) {
     }
   }
   if constexpr (requires { backend.skin_all(avatars); }) {
-    backend.skin_all(avatars);
+    std::size_t modes = 0;
+    for (const auto& args : avatars) modes += detail::has_skinning_mode(args) ? 1 : 0;
+    if (modes == 0) {
+      backend.skin_all(avatars);
+      return {};
+    }
+    std::vector<SkinningArgs<S, Out>> usual;
+    for (const auto& args : avatars) {
+      if (!detail::has_skinning_mode(args)) {
+        usual.push_back(args);
+      } else if (Status s = skin_gaussians<S>(backend, args); !s) {
+        return s;
+      }
+    }
+    backend.skin_all(usual);
   } else {
     for (const SkinningArgs<S, Out>& args : avatars) {
       if (Status s = skin_gaussians<S>(backend, args); !s) return s;

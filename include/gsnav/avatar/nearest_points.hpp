@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/vec.hpp"
+
+namespace gsnav::detail {
+
+/// Median distance from a point to its nearest, by a sample of them; 0 for fewer than two.
+inline double typical_spacing(const std::vector<Vec3d>& points) {
+  std::vector<double> apart;
+  for (std::size_t i = 0; points.size() > 1 && i < points.size(); i += points.size() / 64 + 1) {
+    double least = std::numeric_limits<double>::max();
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const Vec3d d = points[k] - points[i];
+      if (k != i) least = min(least, dot(d, d));
+    }
+    apart.push_back(std::sqrt(least));
+  }
+  std::sort(apart.begin(), apart.end());
+  return apart.empty() ? 0.0 : apart[apart.size() / 2];
+}
+
+/// Points by cells, for the nearest of a point.
+class NearestPoints {
+ public:
+  explicit NearestPoints(std::vector<Vec3d> points) : points_(std::move(points)) {
+    cell_ = max(2 * typical_spacing(points_), 1e-6);
+    for (std::size_t i = 0; i < points_.size(); ++i) cells_[key(cell_of(points_[i]))].push_back(i);
+  }
+
+  /// The `count` nearest to point i, itself left out, at most kRings cells away: (squared distance, number).
+  std::vector<std::pair<double, std::size_t>> near(std::size_t i, std::size_t count) const {
+    constexpr std::int64_t kRings = 5;
+    std::vector<std::pair<double, std::size_t>> out;
+    const Cell c = cell_of(points_[i]);
+    for (std::int64_t ring = 0; ring <= kRings; ++ring) {
+      for (std::int64_t z = -ring; z <= ring; ++z) {
+        for (std::int64_t y = -ring; y <= ring; ++y) {
+          const bool shell = std::abs(z) == ring || std::abs(y) == ring;
+          for (std::int64_t x = -ring; x <= ring; x += shell || ring == 0 ? 1 : 2 * ring) {
+            const auto found = cells_.find(key({c[0] + x, c[1] + y, c[2] + z}));
+            if (found == cells_.end()) continue;
+            for (const std::size_t k : found->second) {
+              const Vec3d d = points_[k] - points_[i];
+              // Cells that share a key are looked at more than once.
+              if (k != i && cell_of(points_[k]) == Cell{c[0] + x, c[1] + y, c[2] + z}) out.emplace_back(dot(d, d), k);
+            }
+          }
+        }
+      }
+      // Everything within `ring` cells is there now.
+      const double reach = static_cast<double>(ring) * cell_;
+      if (out.size() < count) continue;
+      std::nth_element(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(count - 1), out.end());
+      if (out[count - 1].first <= reach * reach) break;
+    }
+    std::sort(out.begin(), out.end());
+    if (out.size() > count) out.resize(count);
+    return out;
+  }
+
+ private:
+  using Cell = std::array<std::int64_t, 3>;
+  Cell cell_of(const Vec3d& p) const {
+    Cell c{};
+    for (int k = 0; k < 3; ++k) c[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(std::floor(p[k] / cell_));
+    return c;
+  }
+  static std::uint64_t key(const Cell& c) noexcept {
+    std::uint64_t h = 0;
+    for (const std::int64_t v : c) h = (h ^ static_cast<std::uint64_t>(v)) * 0x9e3779b97f4a7c15ull;
+    return h;
+  }
+  std::vector<Vec3d> points_;
+  double cell_ = 1.0;
+  std::unordered_map<std::uint64_t, std::vector<std::size_t>> cells_;
+};
+
+}  // namespace gsnav::detail

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "gsnav/math/quat.hpp"
+
+namespace gsnav {
+
+/// A rigid map x -> rotate(real, x) + t as a unit dual quaternion, whose dual part is t * real / 2 with t as (0, t).
+/// (real, dual) and (-real, -dual) are the same map.
+template <class L>
+struct DualQuat {
+  Quat<L> real{};
+  Quat<L> dual{L(0), L(0), L(0), L(0)};
+};
+
+/// The dual quaternion of a rigid map.
+template <class S>
+GSNAV_HD DualQuat<S> dual_quat(const Affine3<S>& rigid) noexcept {
+  const Quat<S> real = quat_from_matrix(rigid.linear);
+  const Vec3<S> half = rigid.translation * S(0.5);
+  return {real, Quat<S>{S(0), half.x, half.y, half.z} * real};
+}
+
+template <class T, class U>
+GSNAV_HD constexpr DualQuat<T> dual_quat_cast(const DualQuat<U>& q) noexcept {
+  return {quat_cast<T>(q.real), quat_cast<T>(q.dual)};
+}
+
+/// The translation of the rigid map that a dual quaternion of any length stands for. A part of `dual` along `real`,
+/// which sums of unit dual quaternions have, is left out, as dividing by the dual norm would.
+template <class L>
+GSNAV_HD Vec3<L> translation_of(const DualQuat<L>& q) noexcept {
+  const Quat<L> t = q.dual * conjugate(q.real);
+  const L twice = L(scalar_of<L>(2)) / dot(q.real, q.real);
+  return {t.x * twice, t.y * twice, t.z * twice};
+}
+
+}  // namespace gsnav

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// Nobody jumps where a clip or the scene's clock begins again.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "avatar/support.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+/// A recording of 2 s that goes 3 m ahead, turns, and ends in another pose than it begins in.
+MotionClip wandering() {
+  const Skeleton& skeleton = person()->skeleton;
+  const WalkMotion walk = WalkMotion::create(skeleton).value();
+  MotionClip clip;
+  clip.frame_rate = 30;
+  clip.joints = skeleton.size();
+  for (int t = 0; t <= 60; ++t) {
+    LocalPose pose;
+    walk.pose(t / 25.0, 1, 0, pose);
+    pose.rotations[0] = axis_angle(Vec3d{0, 1, 0}, t / 40.0) * pose.rotations[0];
+    clip.rotations.insert(clip.rotations.end(), pose.rotations.begin(), pose.rotations.end());
+    clip.translations.insert(clip.translations.end(), pose.translations.begin(), pose.translations.end());
+    clip.root_translation.push_back({0.02 * t, 0, -0.05 * t});
+  }
+  return clip;
+}
+
+std::vector<Vec3d> joints_in_world(const AvatarActor& actor, double t) {
+  std::vector<Affine3<double>> globals;
+  actor.joint_globals(t, globals);
+  const Similarity world = actor.placement(t);
+  std::vector<Vec3d> out;
+  for (const auto& g : globals) out.push_back(world * g.translation);
+  return out;
+}
+
+/// The furthest that any joint gets within `step` seconds, over [begin, end].
+double furthest(const AvatarActor& actor, double begin, double end, double step) {
+  double worst = 0;
+  std::vector<Vec3d> before = joints_in_world(actor, begin);
+  for (double t = begin + step; t < end; t += step) {
+    const std::vector<Vec3d> now = joints_in_world(actor, t);
+    for (std::size_t j = 0; j < now.size(); ++j) worst = std::max(worst, norm(now[j] - before[j]));
+    before = now;
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("a clip that loops brings every joint back without a jump, as fast as is allowed") {
+  constexpr double kStep = 1e-3;
+  for (const ClipEnd end : {ClipEnd::loop, ClipEnd::loop_forward}) {
+    MotionClip clip = wandering();
+    clip.end = end;
+    const auto speed_over_wrap = [&](const MotionClip& c) {
+      const AvatarActor actor = AvatarActor::create(person(), std::make_shared<const MotionClip>(c)).value();
+      return furthest(actor, c.duration() - 0.01, c.period() + 0.01, kStep) / kStep;
+    };
+    const double abrupt = speed_over_wrap(clip);
+    CHECK(abrupt > 5);  // what there is to mend
+    clip.wrap_time = smooth_wrap_time(person()->skeleton, clip, end == ClipEnd::loop_forward, 1.5);
+    // At the ends the clip's own motion is in it; a key is 33 ms, the recording's hands are faster.
+    const AvatarActor actor = AvatarActor::create(person(), std::make_shared<const MotionClip>(clip)).value();
+    CHECK(furthest(actor, clip.duration() + kStep, clip.period() - kStep, kStep) <= 1.5 * kStep * 1.02);
+    const double inside = furthest(actor, 0, clip.duration(), kStep);
+    CHECK(furthest(actor, clip.duration() - 0.1, clip.period() + 0.1, kStep) <= std::max(inside, 1.5 * kStep * 1.02));
+    // A thousandth of a second before the wrap's end it is nearly there.
+    const auto a = joints_in_world(actor, clip.period() - 1e-9), b = joints_in_world(actor, clip.period() + 1e-9);
+    for (std::size_t j = 0; j < a.size(); ++j) CHECK(norm(a[j] - b[j]) < 1e-7);
+  }
+  MotionClip closed = wandering();
+  for (std::size_t j = 0; j < closed.joints; ++j) {
+    closed.rotations[60 * closed.joints + j] = closed.rotations[j];
+    closed.translations[60 * closed.joints + j] = closed.translations[j];
+  }
+  closed.root_translation[60] = closed.root_translation[0];
+  CHECK(smooth_wrap_time(person()->skeleton, closed) < 1e-9);
+}
+
+TEST_CASE("where the scene's clock begins again everybody gets back by and by") {
+  MotionClip clip = wandering();
+  clip.end = ClipEnd::hold;
+  const auto motion = std::make_shared<const MotionClip>(clip);
+  const AvatarActor once = AvatarActor::create(person(), motion).value();
+  const AvatarActor actor = once.looped(2.0 + 3.0, 3.0).value();
+  constexpr double kStep = 1e-3;
+  // Without blending the step over the clock's end is the whole way.
+  const AvatarActor jumps = once.looped(2.0, 0.0).value();
+  CHECK(furthest(jumps, 1.9, 2.1, kStep) > 3.0);
+  // No faster than the recording itself, and getting back is 3.2 m in 3 s and the limbs.
+  CHECK(furthest(actor, 0.0, 11.0, kStep) <= furthest(once, 0.0, 2.0, kStep) * 1.001);
+  CHECK(furthest(actor, 2.0 + kStep, 5.0 - kStep, kStep) < 2.5 * kStep);
+  for (const double t : {0.0, 0.7, 1.99}) {
+    const auto a = joints_in_world(actor, t), b = joints_in_world(once, t), c = joints_in_world(actor, t + 15.0);
+    for (std::size_t j = 0; j < a.size(); ++j) {
+      CHECK(norm(a[j] - b[j]) < 1e-12);
+      CHECK(norm(a[j] - c[j]) < 1e-9);
+    }
+  }
+  // Capsules of a step that ends after the wrap.
+  std::vector<DynamicCapsule> moved;
+  actor.dynamic_capsules(4.9, 5.1, 0, moved);
+  REQUIRE(moved.size() == person()->capsules.size());
+  for (const DynamicCapsule& m : moved) CHECK(norm(m.motion.begin.p0 - m.motion.end.p0) < 0.2 * 5);
+}
+
+TEST_CASE("who is not there at both ends of a looping clock is gone while others get back") {
+  ActorOptions options;
+  options.time_begin = 1;
+  options.time_end = 4;
+  options.loop_period = 5;
+  options.loop_blend = 1;
+  const AvatarActor late = AvatarActor::create(person(), nullptr, nullptr, options).value();
+  for (const double t : {1.0, 3.9, 4.0, 6.0, 13.9}) CHECK(late.active(t));
+  for (const double t : {0.5, 4.5, 4.999, 5.5, 9.5}) CHECK_FALSE(late.active(t));
+  std::vector<DynamicCapsule> none;
+  late.dynamic_capsules(4.3, 4.8, 0, none);
+  CHECK(none.empty());
+  late.dynamic_capsules(5.9, 6.1, 0, none);
+  CHECK_FALSE(none.empty());
+  options.loop_blend = 6;
+  CHECK(AvatarActor::create(person(), nullptr, nullptr, options).message().find("loop_blend") != std::string::npos);
+}
