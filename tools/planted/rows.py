@@ -9,7 +9,8 @@ ROWS = "tests/hard_cases/test_rows.cpp"
 WORLD = "tests/hard_cases/test_world.cpp"
 PLY_TEST = "tests/io/test_ply.cpp"
 FILL = "src/io/cloud_fill.hpp"
-PLY_READER = ("src/io/ply.cpp", "src/io/ply_body.cpp", "src/io/ply_header.cpp", "src/io/ply_compressed.cpp",
+PLY_COLUMNS = "src/io/ply_columns.cpp"
+PLY_READER = ("src/io/ply.cpp", PLY_COLUMNS, "src/io/ply_body.cpp", "src/io/ply_header.cpp", "src/io/ply_compressed.cpp",
               "src/io/ply_points.cpp", "src/io/neighbours.cpp", "src/io/file.cpp")
 
 FINITE = "  bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);\n"
@@ -45,7 +46,7 @@ PLANTS = [
           "cloud_.shN.data() + rest_ * (first_ + report_.read - 1));",
           PLY_TEST, "N35_nan_position_row", why="openvdb: all rows after it have another row's SH",
           more=PLY_READER),
-    plant("f_rest_colour_inner", PLY,
+    plant("f_rest_colour_inner", PLY_COLUMNS,
           'const std::string name = "f_rest_" + std::to_string(channel * (c.rest_in_file / 3) + k);',
           'const std::string name = "f_rest_" + std::to_string(3 * k + channel);',
           PLY_TEST, "N36_sh_degree_mismatch", why="INRIA's files hold a channel after the other",
