@@ -10,7 +10,6 @@
 #include "described.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
-#include "release_memory.hpp"
 #include "sog_meta.hpp"
 #include "sog_rows.hpp"
 #include "webp.hpp"
@@ -135,7 +134,6 @@ class SogReader {
     }
     if (Status s = read_planes(); !s) return s;
     files_.close();
-    detail::release_free_memory();
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
       RawGaussian raw;
       std::array<float, 45> rest;

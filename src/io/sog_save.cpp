@@ -66,7 +66,8 @@ class SogWriter {
     const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
     ThreadPool(static_cast<int>(std::min(cores, kParts))).run(static_cast<std::uint32_t>(kParts), work);
     Files files;
-    for (const std::size_t k : {1, 2, 4, 3, 0}) {
+    constexpr std::size_t kInFile[] = {1, 2, 4, 3, 0};  // the order that readers have always seen
+    for (const std::size_t k : kInFile) {
       if (statuses[k].code() == Errc::out_of_memory) throw std::bad_alloc();
       if (!statuses[k]) return statuses[k];
       if (!parts[k].meta.is_null()) meta_[parts[k].name] = std::move(parts[k].meta);

@@ -173,7 +173,9 @@ TEST_CASE("4dgs npz: scale and dilation, and a background that stands") {
   }
   const GaussianCloud late = cloud_at(scene, 1e6);  // only the background is left
   REQUIRE(late.size() == 30);
-  for (std::size_t i = 0; i < 30; ++i) CHECK(late.mean(i).x == doctest::Approx(2.5 * PlyRow(standing.rows[i])["x"]).epsilon(1e-6));
+  for (std::size_t i = 0; i < 30; ++i) {
+    CHECK(late.mean(i).x == doctest::Approx(2.5 * standing.rows[i].at("x")).epsilon(1e-6));
+  }
 }
 
 TEST_CASE("4dgs npz: what does not fit is named") {

@@ -140,7 +140,9 @@ TEST_CASE("describe: bands in use, memory, and which way is up") {
   CHECK(report.memory == cloud.bytes());
   CHECK(report.up.y == -1);
   CHECK_FALSE(report.up_seen);  // a box of Gaussians has no up
-  for (std::size_t i = 0; i < cloud.size(); ++i) std::fill_n(cloud.shN.begin() + static_cast<std::ptrdiff_t>(45 * i + 9), 36, 0.0f);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    std::fill_n(cloud.shN.begin() + static_cast<std::ptrdiff_t>(45 * i + 9), 36, 0.0f);
+  }
   CHECK(sh_degree_in_use(cloud) == 1);
   compact_sh(cloud);
   CHECK(sh_degree_in_use(cloud) == 1);
