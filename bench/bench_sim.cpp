@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the simulator costs beside rendering: one action in many environments, and one in one.
+// What the simulator costs beside rendering: one action in many environments, one in one, and ten people posed.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <memory>
 #include <vector>
 
 #include "gsnav/avatar/humanoid.hpp"
+#include "gsnav/avatar/proxy_fit.hpp"
+#include "gsnav/avatar/skinned_crowd.hpp"
+#include "gsnav/avatar/weight_gradients.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "gsnav/sim/default_scene.hpp"
@@ -108,6 +113,54 @@ void step_one(benchmark::State& state) {
   }
 }
 BENCHMARK(step_one)->ArgNames({"people", "facade"})->ArgsProduct({{0, 5}, {0, 1}})->Unit(benchmark::kMicrosecond);
+
+/// Ten people of one body walk: forward kinematics and skinning of all. Arguments: Gaussians of the body, threads,
+/// Skinning. Counters: error against float64, and memory: what they share, and what each of them has.
+void pose_crowd(benchmark::State& state) {
+  constexpr std::size_t kPeople = 10;
+  HumanoidOptions look;
+  look.gaussians = static_cast<int>(state.range(0));
+  AvatarAsset made = make_humanoid(look);
+  if (state.range(2) == static_cast<int>(Skinning::linear_stretched)) bake_weight_gradients(made).throw_if_error();
+  made.skinning = static_cast<Skinning>(state.range(2));
+  const auto body = std::make_shared<const AvatarAsset>(std::move(made));
+  std::vector<AvatarActor> people;
+  OpenMPBackend backend(static_cast<int>(state.range(1)));
+  SkinnedCrowd<OpenMPBackend> crowd(backend);
+  for (std::size_t i = 0; i < kPeople; ++i) {
+    const double x = static_cast<double>(i);
+    people.push_back(make_walker(body, {{x, 0, 0}, {x, 0, 5.0 + 0.3 * x}}).value());
+    crowd.add(body);
+  }
+  double t = 0.0;
+  for (auto _ : state) {
+    crowd.pose(people, t += 0.05).throw_if_error();
+    backend.synchronize().throw_if_error();
+  }
+  double worst = 0.0;
+  std::vector<Affine3<double>> joints;
+  for (std::size_t i = 0; i < kPeople; ++i) {
+    people[i].joint_matrices(t, joints);
+    const std::vector<Vec3d> centers = skinned_centers(*body, joints);
+    const GaussianView v = crowd.set(i).gaussians;
+    for (std::size_t k = 0; k < centers.size(); ++k) {
+      worst = std::max(worst, norm(vec_cast<double>(Vec3f{v.means[0][k], v.means[1][k], v.means[2][k]}) - centers[k]));
+    }
+  }
+  const double n = static_cast<double>(body->size());
+  const double row = static_cast<double>(body->influences);
+  const bool stretched = body->skinning == Skinning::linear_stretched;
+  state.counters["mean_max_m"] = worst;
+  // Means, quaternions, scales, opacities, colours, joints and weights; means and quaternions of each, or its axes too.
+  state.counters["shared_MB"] = n * 1e-6 * (4 * 14 + 4 * row + (stretched ? 12 * (row - 1) : 0));
+  state.counters["each_MB"] = n * 1e-6 * 4 * (stretched ? 16 : 7);
+  state.counters["Gaussians/s"] = benchmark::Counter(n * kPeople, benchmark::Counter::kIsIterationInvariantRate);
+}
+BENCHMARK(pose_crowd)
+    ->ArgNames({"gaussians", "threads", "skinning"})
+    ->ArgsProduct({{100000}, {1, 2}, {0, 1, 2}})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 }  // namespace
 

@@ -9,6 +9,7 @@
 #include "gsnav/avatar/clip_walk.hpp"
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/io/avatar_file.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "support/command.hpp"
@@ -104,6 +105,35 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
   CHECK(lowest > -0.02);
   CHECK(highest < 0.35);
   CHECK(std::hypot(before.x - 1, before.z - 8) < 0.06);
+
+  // Holding the feet can be left out, and both say how far they slide.
+  CHECK(made.says("as recorded"));
+  CHECK(made.says("with the feet held"));
+  CHECK_FALSE(run(folder, common + " --from 1,0,2 --to 5,0,4 --no-lock-feet").says("feet held"));
+
+  const std::string strip = "strip --avatar " + quoted(folder / "person.npz") + " --driver " + quoted(folder / "walk.npz") +
+                            " --eye 4,1.6,8 --target 3,0.9,3 --out " + quoted(folder / "strip.png");
+  const Outcome drawn = run(folder, strip + " --frames 3 --width 64 --height 48");
+  INFO(drawn.text);
+  REQUIRE(drawn.ok);
+  const auto picture = io::load_png(folder / "strip.png");
+  REQUIRE(picture.ok());
+  CHECK(picture->width == 3 * 64);
+  CHECK(picture->height == 48);
+  const auto lit = [&](int part) {  // pixels of a picture that show somebody
+    int count = 0;
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 64 * part; x < 64 * (part + 1); ++x) {
+        const std::size_t at = 3 * static_cast<std::size_t>(y * 3 * 64 + x);
+        count += picture->samples[at] + picture->samples[at + 1] + picture->samples[at + 2] > 60 ? 1 : 0;
+      }
+    }
+    return count;
+  };
+  CHECK(lit(0) > 20);
+  CHECK(lit(1) > 20);
+  CHECK(run(folder, strip + " --frames 0").says("frames"));
+  CHECK(run(folder, strip + " --flat --scene x.ply").says("--scene"));
 
   CHECK(run(folder, common + " --from 1,0,2 --to 30,0,8").says("floor.navmesh"));
   CHECK(run(folder, common + " --from 1,0 --to 3,0,8").says("'1,0' is no point"));

@@ -105,6 +105,47 @@ TEST_CASE("avatar file: values that cannot be") {
   }
 }
 
+TEST_CASE("avatar file: the kind of skinning comes back; one that there is none of is named") {
+  TempFolder folder("avatar_skinning");
+  for (const Skinning kind : {Skinning::linear, Skinning::linear_stretched, Skinning::dual_quaternion}) {
+    write_npz(folder / "a.npz", changed([kind](TestArrays& a) {
+                a["skinning"].values = {static_cast<double>(kind)};
+                a["skinning"].shape = {1};
+              }));
+    const auto loaded = io::load_avatar(folder / "a.npz");
+    CAPTURE(loaded.status().message());
+    REQUIRE(loaded.ok());
+    CHECK(loaded->asset.skinning == kind);
+    REQUIRE(io::save_avatar(folder / "b.npz", loaded->asset).ok());
+    const auto again = io::load_avatar(folder / "b.npz");
+    REQUIRE(again.ok());
+    CHECK(again->asset.skinning == kind);
+    CHECK(again->asset.weight_gradients.size() == loaded->asset.weight_gradients.size());
+  }
+  check_fails(changed([](TestArrays& a) {
+                a["skinning"].values = {3};
+                a["skinning"].shape = {1};
+              }),
+              Errc::invalid_file, {"skinning is 3"});
+}
+
+TEST_CASE("avatar file: joints that are their own ancestors") {
+  TempFolder folder("avatar_cycle");
+  write_npz(folder / "a.npz", avatar_arrays(30, 24));
+  io::LoadAvatarOptions options;
+  for (int j = 0; j < 24; ++j) {
+    options.joint_names.emplace_back("j").append(std::to_string(j));
+    options.joint_parents.push_back(j - 1);
+  }
+  CHECK(io::load_avatar(folder / "a.npz", options).ok());
+  options.joint_parents[3] = 5;
+  const Status s = io::load_avatar(folder / "a.npz", options).status();
+  CAPTURE(s.message());
+  CHECK(s.code() == Errc::invalid_argument);
+  CHECK(contains(s.message(), "a.npz"));
+  CHECK(contains(s.message(), "joint 3 (\"j3\") is its own ancestor"));
+}
+
 TEST_CASE("avatar file: changed bytes of every array, in an archive whose checksums fit") {
   TempFolder folder("avatar_mutations");
   std::map<std::string, std::string> files;

@@ -15,6 +15,8 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
 #include "runner_timing.hpp"
+#include "skinning_modes.hpp"
+#include "skinning_truth.hpp"
 
 namespace gsnav_report {
 
@@ -22,38 +24,13 @@ using namespace gsnav;
 
 namespace {
 
-using Matrices = std::vector<Affine3<double>>;
-
-/// Weights of all joints for every Gaussian, [N][J]: falling off exponentially, 25 mm a factor e, with the
-/// distance from the joint's capsules beyond the nearest one's.
+/// Weights of all joints for every Gaussian, [N][J].
 std::vector<double> dense_weights(const AvatarAsset& asset) {
-  constexpr double kSoftness = 0.025;
-  const std::size_t joints = asset.skeleton.size();
-  const Matrices rest = asset.skeleton.rest_globals();
-  std::vector<double> out(asset.size() * joints, 0.0), distance(joints);
+  const SoftWeights weights(asset);
+  std::vector<double> out, row;
   for (std::size_t i = 0; i < asset.size(); ++i) {
-    std::fill(distance.begin(), distance.end(), std::numeric_limits<double>::infinity());
-    const Vec3d p = asset.cloud.mean(i);
-    for (const ProxyCapsule& c : asset.capsules) {
-      const Vec3d a = rest[c.joint] * c.p0, d = rest[c.joint] * c.p1 - a;
-      const double s = std::clamp(dot(p - a, d) / std::max(dot(d, d), 1e-12), 0.0, 1.0);
-      distance[c.joint] = std::min(distance[c.joint], std::max(norm(p - a - d * s) - c.radius, 0.0));
-    }
-    const double nearest = *std::min_element(distance.begin(), distance.end());
-    double sum = 0;
-    for (std::size_t j = 0; j < joints; ++j) sum += out[i * joints + j] = std::exp((nearest - distance[j]) / kSoftness);
-    for (std::size_t j = 0; j < joints; ++j) out[i * joints + j] /= sum;
-  }
-  return out;
-}
-
-/// Posed joint * inverse bind for each pose.
-std::vector<Matrices> skinning_matrices(const Skeleton& skeleton, const std::vector<LocalPose>& poses) {
-  const Matrices inverse = skeleton.bind_inverses();
-  std::vector<Matrices> out;
-  for (const LocalPose& pose : poses) {
-    forward_kinematics(skeleton, pose, out.emplace_back());
-    for (std::size_t j = 0; j < inverse.size(); ++j) out.back()[j] = out.back()[j] * inverse[j];
+    weights.at(asset.cloud.mean(i), row);
+    out.insert(out.end(), row.begin(), row.end());
   }
   return out;
 }
@@ -89,13 +66,6 @@ Posed blend(const Matrices& joints, const double* weights, const Vec3d& mean) {
   return {linear * mean + shift, polar_rotation(usable ? linear : joints[heaviest].linear)};
 }
 
-/// Angle between two rotations, degrees; accurate near 0.
-double angle(const Mat3d& a, const Mat3d& b) {
-  const Mat3d d = transpose(a) * b;
-  const Vec3d axis{d(2, 1) - d(1, 2), d(0, 2) - d(2, 0), d(1, 0) - d(0, 1)};
-  return std::atan2(norm(axis), d(0, 0) + d(1, 1) + d(2, 2) - 1) * 57.29577951308232;
-}
-
 /// The k greatest of `dense`, divided by their sum; the rest 0.
 void truncate_weights(const double* dense, std::size_t joints, std::size_t k, std::vector<double>& out) {
   std::vector<std::size_t> order(joints);
@@ -106,21 +76,6 @@ void truncate_weights(const double* dense, std::size_t joints, std::size_t k, st
   double sum = 0;
   for (std::size_t j = 0; j < k; ++j) sum += dense[order[j]];
   for (std::size_t j = 0; j < k; ++j) out[order[j]] = dense[order[j]] / sum;
-}
-
-struct Errors {
-  std::vector<double> position, rotation;
-};
-
-void add_rows(std::vector<Row>& rows, Row base, Errors& e) {
-  const auto add = [&](const char* name, const char* unit, std::vector<double>& values) {
-    Row row = base;
-    const double p99 = percentile(values, 0.99);
-    row.set("name", name).set("error_max", percentile(values, 1.0)).set("error_p99", p99).set("error_unit", unit);
-    rows.push_back(std::move(row));
-  };
-  add("position", "m", e.position);
-  add("rotation", "deg", e.rotation);
 }
 
 /// Arguments and arrays of one skinning in float32.
@@ -159,7 +114,7 @@ template <class B>
 Status float_rows(B& backend, Row base, const AvatarAsset& sampled, const AvatarAsset& timed,
                   const std::vector<Matrices>& poses, const SkinningOptions& o, std::vector<Row>& rows) {
   FloatSkinning small(sampled);
-  Errors e;
+  SkinningErrors e;
   std::vector<double> weights(sampled.skeleton.size());
   for (const Matrices& pose : poses) {
     small.set_pose(pose);
@@ -174,7 +129,7 @@ Status float_rows(B& backend, Row base, const AvatarAsset& sampled, const Avatar
       const Vec3d mean{small.means[0][i], small.means[1][i], small.means[2][i]};
       const Quatd q{small.rotations[0][i], small.rotations[1][i], small.rotations[2][i], small.rotations[3][i]};
       e.position.push_back(norm(mean - truth.mean));
-      e.rotation.push_back(angle(rotation_matrix(q), truth.rotation));
+      e.rotation.push_back(angle_degrees(rotation_matrix(q), truth.rotation));
     }
   }
   FloatSkinning large(timed);
@@ -191,7 +146,7 @@ Status float_rows(B& backend, Row base, const AvatarAsset& sampled, const Avatar
   base.set("time_p50_ms", t.p50_ms * per).set("time_p99_ms", t.p99_ms * per);
   base.set("items_per_second", 1e3 * static_cast<double>(timed.size()) / t.p50_ms);
   base.set("note", "float32 against float64 with the same weights; time for 100000 Gaussians");
-  add_rows(rows, std::move(base), e);
+  add_skinning_rows(rows, std::move(base), e);
   return status;
 }
 
@@ -225,19 +180,19 @@ Result<std::vector<Row>> skinning_rows(const SkinningOptions& o) {
     base.set("kind", "skinning").set("scene", "humanoid").set("knob", "poses").set("knob_value", name);
     std::vector<double> weights;
     for (std::size_t k = 1; k <= 8; ++k) {
-      Errors e;
+      SkinningErrors e;
       for (std::size_t i = 0; i < sampled->size(); ++i) {
         truncate_weights(&dense[i * joints], joints, k, weights);
         for (const Matrices& pose : matrices) {
           const Posed truth = blend(pose, &dense[i * joints], sampled->cloud.mean(i));
           const Posed cut = blend(pose, weights.data(), sampled->cloud.mean(i));
           e.position.push_back(norm(cut.mean - truth.mean));
-          e.rotation.push_back(angle(cut.rotation, truth.rotation));
+          e.rotation.push_back(angle_degrees(cut.rotation, truth.rotation));
         }
       }
       Row row = base;
       row.set("influences", static_cast<int>(k)).set("note", "float64, K greatest weights against all joints");
-      add_rows(rows, std::move(row), e);
+      add_skinning_rows(rows, std::move(row), e);
     }
     base.set("profile", "exact");
     Row by_serial = base, by_openmp = base;
@@ -245,6 +200,7 @@ Result<std::vector<Row>> skinning_rows(const SkinningOptions& o) {
     by_openmp.set("backend", "openmp").set("threads", openmp.threads());
     if (Status s = float_rows(serial, std::move(by_serial), *sampled, *timed, matrices, o, rows); !s) return s;
     if (Status s = float_rows(openmp, std::move(by_openmp), *sampled, *timed, matrices, o, rows); !s) return s;
+    if (Status s = mode_rows(*timed, matrices, name, o, rows); !s) return s;
   }
   return rows;
 }
