@@ -57,11 +57,11 @@ double speed_of(std::span<const WalkPoint> path) {
   return speed;
 }
 
-/// A body, how fast it and the agent approach each other at most, and how near it was at the tick's begin and at the
-/// last look. Metres.
+/// A body, how fast it and the agent approach each other at most, and how near it was at the tick's begin, at its end
+/// and at the last look. Metres.
 struct Near {
   const DynamicCapsule* body;
-  double speed, first, gap;
+  double speed, first, last, gap;
 };
 
 /// One avatar's least distance during the tick. A gap changes no faster than both move: bodies that cannot come nearer
@@ -73,7 +73,7 @@ class Approach {
       : path_(path), radius_(radius), height_(height), near_(near) {
     near_.clear();
     for (const DynamicCapsule& c : avatar) {
-      near_.push_back({&c, (agent_speed + speed_of(c.motion)) * (1 + kRounding) + kRounding, 0.0, 0.0});
+      near_.push_back({&c, (agent_speed + speed_of(c.motion)) * (1 + kRounding) + kRounding, 0.0, 0.0, 0.0});
     }
   }
 
@@ -82,8 +82,13 @@ class Approach {
     offer(0.0);
     for (Near& n : near_) n.first = n.gap;
     offer(1.0);
-    drop([](const Near& n) { return 0.5 * (n.first + n.gap - n.speed); });
-    for (int i = 1; i < kSamples; ++i) offer(static_cast<double>(i) / kSamples);
+    for (Near& n : near_) n.last = n.gap;
+    drop([](const Near& n) { return 0.5 * (n.first + n.last - n.speed); });
+    offer(0.5);
+    drop([](const Near& n) { return 0.5 * (min(n.first, n.last) + n.gap - 0.5 * n.speed); });
+    for (int i = 1; i < kSamples; ++i) {
+      if (2 * i != kSamples) offer(static_cast<double>(i) / kSamples);
+    }
     for (const WalkPoint& p : path_) offer(clamp(p.fraction, 0.0, 1.0));
     // Golden sections around the best sample.
     constexpr double kGolden = 0.6180339887498949;
@@ -94,6 +99,8 @@ class Approach {
     double at_a = gap(a), at_b = gap(b);
     for (int i = 0; i < 13; ++i) {
       best_ = min(best_, min(at_a, at_b));
+      // The last look was between low and high.
+      if (i == 3) drop([&](const Near& n) { return n.gap - n.speed * (high - low); });
       if (at_a < at_b) {
         high = b;
         b = a;
