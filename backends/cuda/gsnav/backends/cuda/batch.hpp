@@ -27,7 +27,7 @@ struct BatchImages {
 
 /// What a batch was made of; all cameras together.
 struct BatchStats {
-  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, tiles of 16 x 16 pixels
+  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs; docs/cuda.md says how large tiles are
   std::uint64_t scratch_bytes = 0;       ///< held on the device, without scene and images
   int reruns = 0;                        ///< how often the batch was drawn again because scratch had to grow
   bool replayed = false;                 ///< by a recorded CUDA graph: calls that differ in their cameras alone are
@@ -41,7 +41,8 @@ struct BatchStats {
 ///     ...                                                      // work on cuda.stream() may follow
 ///     batch.finish().throw_if_error();                         // images are there, and whole
 ///
-/// `RenderConfig::outputs` and `tile_size` are not read: pointers say which images, and tiles are 16 pixels.
+/// `RenderConfig::outputs` and `tile_size` are not read: pointers say which images, and
+/// tiles are of 8 or 16 pixels, as the number of cameras has it.
 class CudaBatchRenderer {
  public:
   /// The backend must outlive it; work goes to its stream.
