@@ -18,24 +18,30 @@ namespace {
 
 constexpr unsigned kLargestSide = 16384;
 
+[[noreturn]] void on_error(j_common_ptr info);
+void on_message(j_common_ptr, int) {}
+void print_message(j_common_ptr) {}
+
+/// Errors jump to where setjmp was called last; messages go nowhere.
 struct ErrorHandler {
   jpeg_error_mgr base{};
   std::jmp_buf jump{};
+
+  jpeg_error_mgr* set_up() {
+    jpeg_error_mgr* const standard = jpeg_std_error(&base);
+    base.error_exit = on_error;
+    base.emit_message = on_message;
+    base.output_message = print_message;
+    return standard;
+  }
 };
 
-[[noreturn]] void on_error(j_common_ptr info) { std::longjmp(reinterpret_cast<ErrorHandler*>(info->err)->jump, 1); }
-void on_message(j_common_ptr, int) {}
-void print_message(j_common_ptr) {}
+void on_error(j_common_ptr info) { std::longjmp(reinterpret_cast<ErrorHandler*>(info->err)->jump, 1); }
 
 /// Decoder with its own lifetime, so that allocation happens outside of setjmp's reach.
 class JpegDecoder {
  public:
-  JpegDecoder() {
-    info_.err = jpeg_std_error(&error_.base);
-    error_.base.error_exit = on_error;
-    error_.base.emit_message = on_message;
-    error_.base.output_message = print_message;
-  }
+  JpegDecoder() { info_.err = error_.set_up(); }
   JpegDecoder(const JpegDecoder&) = delete;
   JpegDecoder& operator=(const JpegDecoder&) = delete;
   ~JpegDecoder() { jpeg_destroy_decompress(&info_); }
@@ -70,12 +76,7 @@ class JpegDecoder {
 /// Encoder with its own lifetime, as the decoder has; what it writes lies in memory that libjpeg allocates.
 class JpegEncoder {
  public:
-  JpegEncoder() {
-    info_.err = jpeg_std_error(&error_.base);
-    error_.base.error_exit = on_error;
-    error_.base.emit_message = on_message;
-    error_.base.output_message = print_message;
-  }
+  JpegEncoder() { info_.err = error_.set_up(); }
   JpegEncoder(const JpegEncoder&) = delete;
   JpegEncoder& operator=(const JpegEncoder&) = delete;
   ~JpegEncoder() {

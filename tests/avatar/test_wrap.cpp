@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "avatar/support.hpp"
+#include "support/joints.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -30,15 +31,6 @@ MotionClip wandering() {
     clip.root_translation.push_back({0.02 * t, 0, -0.05 * t});
   }
   return clip;
-}
-
-std::vector<Vec3d> joints_in_world(const AvatarActor& actor, double t) {
-  std::vector<Affine3<double>> globals;
-  actor.joint_globals(t, globals);
-  const Similarity world = actor.placement(t);
-  std::vector<Vec3d> out;
-  for (const auto& g : globals) out.push_back(world * g.translation);
-  return out;
 }
 
 /// The furthest that any joint gets within `step` seconds, over [begin, end].

@@ -11,6 +11,7 @@
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/io/npz_file.hpp"
 #include "support/files.hpp"
+#include "support/joints.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -41,15 +42,6 @@ io::DriverFrames walking(const AvatarAsset& person, const Affine3<double>& by, b
 }
 
 const Affine3<double> kFlipped{{{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}}, {}};
-
-std::vector<Vec3d> places(const AvatarActor& actor, double t) {
-  std::vector<Affine3<double>> joints;
-  actor.joint_globals(t, joints);
-  const Similarity world = actor.placement(t);
-  std::vector<Vec3d> out;
-  for (const auto& m : joints) out.push_back(world * m.translation);
-  return out;
-}
 
 double apart(const std::vector<Vec3d>& a, const std::vector<Vec3d>& b) {
   double worst = 0;
@@ -95,18 +87,18 @@ TEST_CASE("avatar scene: Habitat-GS's file puts people where its frames say") {
     for (std::size_t j = 0; j < 55; ++j)
       want.push_back(truth.matrices[static_cast<std::size_t>(t) * 55 + j].translation);
     const double time = t / 40.0;
-    CHECK(apart(places((*actors)[0], time), want) < 1e-5);
-    CHECK(apart(places((*actors)[1], 2 + time), want) < 1e-5);  // guessed to stand on its head
-    CHECK(apart(places((*actors)[2], time), want) < 1e-5);
+    CHECK(apart(joints_in_world((*actors)[0], time), want) < 1e-5);
+    CHECK(apart(joints_in_world((*actors)[1], 2 + time), want) < 1e-5);  // guessed to stand on its head
+    CHECK(apart(joints_in_world((*actors)[2], time), want) < 1e-5);
     std::vector<Vec3d> turned, far;
     for (const Vec3d& p : want) {
       turned.push_back(moved * p);
       far.push_back({p.z + 5, p.y, -p.x});
     }
-    CHECK(apart(places((*actors)[3], time), turned) < 1e-5);
-    CHECK(apart(places((*actors)[5], time), far) < 1e-5);
+    CHECK(apart(joints_in_world((*actors)[3], time), turned) < 1e-5);
+    CHECK(apart(joints_in_world((*actors)[5], time), far) < 1e-5);
     // Scaled about the floor below the root: that point stays, so do feet on the floor of 3 m; all distances grow.
-    const auto large = places((*actors)[4], time);
+    const auto large = joints_in_world((*actors)[4], time);
     CHECK(norm(Vec3d{large[0].x, 0, large[0].z} - Vec3d{want[0].x, 0, want[0].z}) < 1e-5);
     CHECK(norm(large[15] - large[7]) == doctest::Approx(1.5 * norm(want[15] - want[7])).epsilon(1e-5));
     double low = 9, least = 9;
@@ -118,7 +110,8 @@ TEST_CASE("avatar scene: Habitat-GS's file puts people where its frames say") {
   CHECK((*actors)[0].asset()->capsules.size() == person.capsules.size());  // from the driver
   CHECK_FALSE((*actors)[1].active(1.9));
   CHECK((*actors)[1].active(8.9));
-  CHECK(apart(places((*actors)[1], 8.9), places((*actors)[1], 3.0)) < 1e-9);  // the last pose is held
+  // The last pose is held.
+  CHECK(apart(joints_in_world((*actors)[1], 8.9), joints_in_world((*actors)[1], 3.0)) < 1e-9);
   CHECK((*actors)[0].active(0.99));
   CHECK_FALSE((*actors)[0].active(1.01));
   CHECK(io::scene_time(*scene, *actors, 9.5) == doctest::Approx(0.5));

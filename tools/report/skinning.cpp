@@ -14,8 +14,8 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
-#include "runner_timing.hpp"
 #include "skinning_modes.hpp"
+#include "skinning_timing.hpp"
 #include "skinning_truth.hpp"
 
 namespace gsnav_report {
@@ -134,17 +134,7 @@ Status float_rows(B& backend, Row base, const AvatarAsset& sampled, const Avatar
   }
   FloatSkinning large(timed);
   large.set_pose(poses.front());
-  Status status;
-  const Timing t = measure(
-      [&] {
-        status = skin_gaussians<float>(backend, large.args);
-        if (status.ok()) status = backend.synchronize();
-      },
-      o.runs, 5.0);
-  const double per = 100000.0 / static_cast<double>(timed.size());
-  base.set("influences", timed.influences).set("gaussians", static_cast<std::uint64_t>(timed.size()));
-  base.set("time_p50_ms", t.p50_ms * per).set("time_p99_ms", t.p99_ms * per);
-  base.set("items_per_second", 1e3 * static_cast<double>(timed.size()) / t.p50_ms);
+  const Status status = time_skinning(backend, timed, large.args, o.runs, base);
   base.set("note", "float32 against float64 with the same weights; time for 100000 Gaussians");
   add_skinning_rows(rows, std::move(base), e);
   return status;

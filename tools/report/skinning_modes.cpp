@@ -10,7 +10,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/ops/skin.hpp"
-#include "runner_timing.hpp"
+#include "skinning_timing.hpp"
 
 namespace gsnav_report {
 
@@ -114,17 +114,7 @@ Status float_rows(B& backend, Row base, const AvatarAsset& asset, const std::vec
       shape.push_back(100 * greatest(f.covariance(i) + want * -1.0) / greatest(want));
     }
   }
-  Status status;
-  const Timing t = measure(
-      [&] {
-        status = skin_gaussians<float>(backend, f.args);
-        if (status.ok()) status = backend.synchronize();
-      },
-      o.runs, 5.0);
-  const double per = 100000.0 / static_cast<double>(asset.size());
-  base.set("influences", asset.influences).set("gaussians", static_cast<std::uint64_t>(asset.size()));
-  base.set("time_p50_ms", t.p50_ms * per).set("time_p99_ms", t.p99_ms * per);
-  base.set("items_per_second", 1e3 * static_cast<double>(asset.size()) / t.p50_ms);
+  const Status status = time_skinning(backend, asset, f.args, o.runs, base);
   add_skinning_rows(rows, base, e);
   if (!shape.empty()) add_error_row(rows, base, "covariance", "%", shape);
   return status;

@@ -287,9 +287,7 @@ struct RasterizePixel {
   GSNAV_HD void operator()(std::size_t pixel) const noexcept {
     const std::size_t width = static_cast<std::size_t>(args.grid.width);
     const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
-    const std::size_t tile = static_cast<std::size_t>(y / args.grid.tile_size) *
-                                 static_cast<std::size_t>(args.grid.columns) +
-                             static_cast<std::size_t>(x / args.grid.tile_size);
+    const std::size_t tile = args.grid.tile_of(x, y);
     const S px = S(x) + S(0.5), py = S(y) + S(0.5);
     BlendState<S, D> state;
     for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {

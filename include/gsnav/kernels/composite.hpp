@@ -58,9 +58,7 @@ struct CompositePixel {
   GSNAV_HD void operator()(std::size_t pixel) const noexcept {
     const std::size_t width = static_cast<std::size_t>(args.grid.width);
     const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
-    const std::size_t tile = static_cast<std::size_t>(y / args.grid.tile_size) *
-                                 static_cast<std::size_t>(args.grid.columns) +
-                             static_cast<std::size_t>(x / args.grid.tile_size);
+    const std::size_t tile = args.grid.tile_of(x, y);
     const S px = S(x) + S(0.5), py = S(y) + S(0.5), mesh = args.mesh.depth[pixel];
     BlendState<S, D> state;
     for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {
@@ -123,12 +121,9 @@ struct CountUnhidden {
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* counts = args.cursors.data + block * args.grid.count();
     for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-    const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
-    for (std::size_t i = r.begin; i < r.end; ++i) {
-      const std::uint32_t splat = args.order[i];
-      for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
-                    [=, this](std::size_t tile) { counts[tile] += cull.hides(tile, splat) ? 0 : 1; });
-    }
+    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) {
+      counts[tile] += cull.hides(tile, splat) ? 0 : 1;
+    });
   }
 };
 
@@ -140,14 +135,9 @@ struct ScatterUnhidden {
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
     std::uint32_t* out = args.tile_splats.data;
-    const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
-    for (std::size_t i = r.begin; i < r.end; ++i) {
-      const std::uint32_t splat = args.order[i];
-      for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
-                    [=, this](std::size_t tile) {
-                      if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
-                    });
-    }
+    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) {
+      if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
+    });
   }
 };
 

@@ -27,6 +27,11 @@ struct TileGrid {
   GSNAV_HD std::size_t count() const noexcept {
     return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   }
+  /// The tile of a pixel of the image.
+  GSNAV_HD std::size_t tile_of(int x, int y) const noexcept {
+    return static_cast<std::size_t>(y / tile_size) * static_cast<std::size_t>(columns) +
+           static_cast<std::size_t>(x / tile_size);
+  }
 };
 
 /// The cells of 4x4 pixels of an image that still take splats, as a summed-area table: what asks for them asks for
@@ -121,6 +126,18 @@ GSNAV_HD void prefetch_splat(const BinArgs<S>& args, std::size_t i) noexcept {
   (void)i;
 #endif
 }
+
+/// Calls f(tile, splat) for the tiles of each splat of one block, in order.
+template <class S, class F>
+GSNAV_HD void for_each_intersection(const BinArgs<S>& args, std::size_t block, const F& f) noexcept {
+  const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
+  for (std::size_t i = r.begin; i < r.end; ++i) {
+    prefetch_splat(args, i);
+    const std::uint32_t splat = args.order[i];
+    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
+                  [&](std::size_t tile) { f(tile, splat); });
+  }
+}
 }  // namespace detail
 
 /// Counts the tile intersections of one block.
@@ -130,13 +147,7 @@ struct CountTileIntersections {
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* counts = args.cursors.data + block * args.grid.count();
     for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-    const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
-    for (std::size_t i = r.begin; i < r.end; ++i) {
-      detail::prefetch_splat(args, i);
-      const std::uint32_t splat = args.order[i];
-      for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
-                    args.elliptic, [=](std::size_t tile) { ++counts[tile]; });
-    }
+    detail::for_each_intersection(args, block, [=](std::size_t tile, std::uint32_t) { ++counts[tile]; });
   }
 };
 
@@ -167,13 +178,8 @@ struct ScatterTileIntersections {
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
     std::uint32_t* out = args.tile_splats.data;
-    const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
-    for (std::size_t i = r.begin; i < r.end; ++i) {
-      detail::prefetch_splat(args, i);
-      const std::uint32_t splat = args.order[i];
-      for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
-                    args.elliptic, [=](std::size_t tile) { out[cursors[tile]++] = splat; });
-    }
+    detail::for_each_intersection(args, block,
+                                  [=](std::size_t tile, std::uint32_t splat) { out[cursors[tile]++] = splat; });
   }
 };
 
