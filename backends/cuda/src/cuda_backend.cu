@@ -153,7 +153,8 @@ void CudaBackend::project(const ProjectArgs<float>& args) {
   note(cudaGetLastError(), "the projection");
 }
 
-void CudaBackend::list_tiles(const BinArgs<float>& args) {
+template <class Cull>
+void CudaBackend::list(const BinArgs<float>& args, const Cull& cull) {
   if (!usable()) return;
   const std::size_t tiles = args.grid.count(), n = args.order.size;
   auto* per_splat = static_cast<std::uint32_t*>(scratch(kPerSplat, (n + 1) * sizeof(std::uint32_t)));
@@ -161,7 +162,7 @@ void CudaBackend::list_tiles(const BinArgs<float>& args) {
   auto* offsets = static_cast<std::uint64_t*>(scratch(kSplatOffsets, (n + 1) * sizeof(std::uint64_t)));
   fill(per_splat + n, 0, sizeof(std::uint32_t));
   fill(per_tile, 0, (tiles + 1) * sizeof(std::uint32_t));
-  parallel_for(n, cuda::CountSplatTiles{args, per_splat, per_tile});
+  parallel_for(n, cuda::CountSplatTiles<Cull>{args, cull, per_splat, per_tile});
   const auto scan = [&](const std::uint32_t* counts, std::uint64_t* out, std::size_t count) {
     std::size_t bytes = 0;
     note(cub::DeviceScan::ExclusiveScan(nullptr, bytes, counts, out, ::cuda::std::plus<>{},
@@ -174,13 +175,14 @@ void CudaBackend::list_tiles(const BinArgs<float>& args) {
   scan(per_tile, args.tile_offsets.data, tiles + 1);
 }
 
-void CudaBackend::scatter_tiles(const BinArgs<float>& args) {
+template <class Cull>
+void CudaBackend::scatter(const BinArgs<float>& args, const Cull& cull) {
   const std::size_t pairs = args.tile_splats.size;
   if (!usable() || pairs == 0) return;
   auto* tiles = static_cast<std::uint32_t*>(scratch(kPairTiles, 2 * pairs * sizeof(std::uint32_t)));
   auto* splats = static_cast<std::uint32_t*>(scratch(kPairSplats, pairs * sizeof(std::uint32_t)));
   const auto* offsets = static_cast<const std::uint64_t*>(scratch_[kSplatOffsets].data);
-  parallel_for(args.order.size, cuda::EmitSplatTiles{args, offsets, tiles, splats});
+  parallel_for(args.order.size, cuda::EmitSplatTiles<Cull>{args, cull, offsets, tiles, splats});
   const int bits = std::bit_width(args.grid.count() - 1) + (args.grid.count() == 1 ? 1 : 0);
   std::size_t bytes = 0;
   note(cub::DeviceRadixSort::SortPairs(nullptr, bytes, tiles, tiles + pairs, splats, args.tile_splats.data,
@@ -190,20 +192,45 @@ void CudaBackend::scatter_tiles(const BinArgs<float>& args) {
                                        pairs, 0, bits, stream_), "a sort");
 }
 
+void CudaBackend::list_tiles(const BinArgs<float>& args) { list(args, cuda::NoCull{}); }
+void CudaBackend::scatter_tiles(const BinArgs<float>& args) { scatter(args, cuda::NoCull{}); }
+void CudaBackend::list_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull) { list(args, cull); }
+void CudaBackend::scatter_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull) { scatter(args, cull); }
+
 void CudaBackend::rasterize_tiles(const RasterArgs<float>& args) {
   if (!usable()) return;
   const unsigned threads = static_cast<unsigned>(args.grid.tile_size * args.grid.tile_size);
   dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
-    cuda::rasterize_kernel<C, D, cuda::device_exp2(M), P>
+    cuda::rasterize_kernel<C, D, cuda::device_exp2(M), P, false>
         <<<static_cast<unsigned>(args.grid.count()), threads, 0, stream_>>>(args);
   });
   note(cudaGetLastError(), "the blending");
+}
+
+void CudaBackend::composite_tiles(const RasterArgs<float>& args) {
+  if (!usable()) return;
+  const unsigned threads = static_cast<unsigned>(args.grid.tile_size * args.grid.tile_size);
+  dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
+    cuda::rasterize_kernel<C, D, Exp2::degree5, G, true>
+        <<<static_cast<unsigned>(args.grid.count()), threads, 0, stream_>>>(args);
+  });
+  note(cudaGetLastError(), "the blending among meshes");
 }
 
 template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
                                                   std::span<const GaussianSet>, const Camera&,
                                                   const RenderConfig&, const FrameImages<float>&,
                                                   RenderStats*);
+template Status render_composite<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+                                                     std::span<const GaussianSet>, const MeshFrame&, const Camera&,
+                                                     const RenderConfig&, const FrameImages<float>&, RenderStats*);
+template Status detail::render_frame<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+                                                         std::span<const GaussianSet>, const Camera&,
+                                                         const RenderConfig&, const MeshLayer<float>&,
+                                                         const FrameImages<float>&, RenderStats&);
+template Status draw_meshes<float, CudaBackend>(CudaBackend&, MeshWorkspace<float, CudaBackend>&,
+                                                std::span<const MeshInstance>, const Camera&, const MeshLight&, int,
+                                                bool, MeshImages<float>, MeshStats*);
 template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
 template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
 

@@ -50,6 +50,31 @@ GSNAV_HD void close_by_mesh(BlendState<L, D>& state, const BlendRules<S>& rules,
   state.transmittance = select(covered, zero, state.transmittance);
 }
 
+/// The same with the layer's depth and colour at a pixel.
+template <bool Color, DepthMode D, class S>
+GSNAV_HD void close_by_mesh(BlendState<S, D>& state, const BlendRules<S>& rules, const MeshLayer<S>& mesh,
+                            std::size_t pixel) noexcept {
+  Vec3<S> color{};
+  if constexpr (Color) {
+    const S* const from = mesh.color + 3 * pixel;
+    color = {from[0], from[1], from[2]};
+  }
+  close_by_mesh<Color>(state, rules, mesh.depth[pixel], color);
+}
+
+/// blend_splat before a mesh at depth `mesh`.
+template <bool Color, DepthMode D, Exp2 M, bool General, class S>
+GSNAV_HD void composite_splat(BlendState<S, D>& state, const BlendRules<S>& rules, const SplatRecords<S>& splat, S mesh,
+                              S px, S py) noexcept {
+  const SplatGeometry<S>& g = *splat.geometry;
+  const S exponent = General && splat.perspective != nullptr
+                         ? perspective_exponent(g, *splat.perspective, px, py)
+                         : column_exponent(column_terms(g, px), g.ref_y, g.b, py);
+  if (!(exponent >= rules.log2_alpha_min)) return;
+  const S alpha = alpha_before_mesh(footprint_alpha<M>(rules, exponent), *splat.depth, mesh, px, py);
+  blend_alpha<Color, D, General>(state, rules, alpha, splat.color, splat.depth, px, py);
+}
+
 /// Blends one pixel of a frame with a mesh: RasterizePixel, but for what the mesh hides.
 template <class S, bool Color, DepthMode D, bool General>
 struct CompositePixel {
@@ -62,22 +87,10 @@ struct CompositePixel {
     const S px = S(x) + S(0.5), py = S(y) + S(0.5), mesh = args.mesh.depth[pixel];
     BlendState<S, D> state;
     for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {
-      const SplatRecords<S> splat = args.records(args.tile_splats[i]);
-      const SplatGeometry<S>& g = *splat.geometry;
-      const S exponent = General && splat.perspective != nullptr
-                             ? perspective_exponent(g, *splat.perspective, px, py)
-                             : column_exponent(column_terms(g, px), g.ref_y, g.b, py);
-      if (!(exponent >= args.rules.log2_alpha_min)) continue;
-      const S alpha = alpha_before_mesh(footprint_alpha<Exp2::degree5>(args.rules, exponent), *splat.depth, mesh, px, py);
-      blend_alpha<Color, D, General>(state, args.rules, alpha, splat.color, splat.depth, px, py);
+      composite_splat<Color, D, Exp2::degree5, General>(state, args.rules, args.records(args.tile_splats[i]), mesh, px, py);
       if (!state.open(args.rules)) break;
     }
-    Vec3<S> color{};
-    if constexpr (Color) {
-      const S* const from = args.mesh.color + 3 * pixel;
-      color = {from[0], from[1], from[2]};
-    }
-    close_by_mesh<Color>(state, args.rules, mesh, color);
+    close_by_mesh<Color>(state, args.rules, args.mesh, pixel);
     write_pixel(args, pixel, state);
   }
 };

@@ -84,10 +84,13 @@ struct MeshPlacement {
   std::size_t first_vertex = 0;  ///< of its vertices among all
 };
 
+inline constexpr std::size_t kMeshChunk = 256;
+
 /// Work items of meshes: kMeshChunk vertices or triangles of one placement, from `begin` on.
 struct MeshChunk {
   std::uint32_t placement = 0, begin = 0;
+  /// Where it ends, of n in all.
+  GSNAV_HD std::size_t end(std::size_t n) const noexcept { return begin + kMeshChunk < n ? begin + kMeshChunk : n; }
 };
-inline constexpr std::size_t kMeshChunk = 256;
 
 }  // namespace gsnav

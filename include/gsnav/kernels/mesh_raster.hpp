@@ -33,6 +33,13 @@ struct MeshEdges {
     }
     return e;
   }
+  GSNAV_HD bool inside() const noexcept { return at[0] >= 0 && at[1] >= 0 && at[2] >= 0; }
+  GSNAV_HD void step_right() noexcept {
+    for (int i = 0; i < 3; ++i) at[i] += step_x[i];
+  }
+  GSNAV_HD void step_down() noexcept {
+    for (int i = 0; i < 3; ++i) at[i] += step_y[i];
+  }
   /// Whether some pixel of the w x h from the one asked for on may be inside.
   GSNAV_HD bool reach(int w, int h) const noexcept {
     for (int i = 0; i < 3; ++i) {
@@ -133,6 +140,27 @@ struct ScatterMeshTiles {
   }
 };
 
+namespace detail {
+
+/// 1 / z of a triangle at the first pixel of row y of its box, before it is limited.
+template <class S>
+GSNAV_HD double inverse_z_row(const MeshTriangle<S>& t, int y) noexcept {
+  return fma(t.inverse_z.y, static_cast<double>(y - t.y0), t.inverse_z.value);
+}
+/// ... and `dx` pixels on.
+template <class S>
+GSNAV_HD S inverse_z_at(const MeshTriangle<S>& t, double row, int dx) noexcept {
+  return clamp(S(fma(t.inverse_z.x, static_cast<double>(dx), row)), t.inverse_z_min, t.inverse_z_max);
+}
+
+}  // namespace detail
+
+/// 1 / z of a triangle at a pixel of its box, 1 / metres.
+template <class S>
+GSNAV_HD S mesh_inverse_z(const MeshTriangle<S>& t, int x, int y) noexcept {
+  return detail::inverse_z_at(t, detail::inverse_z_row(t, y), x - t.x0);
+}
+
 /// Finds the nearest triangle of each pixel of a tile; of equally near ones the first. No pixel's depth depends on
 /// the tile that it is found in.
 template <class S>
@@ -165,15 +193,14 @@ GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t til
       int left = 0, right = x1 - x0;
       for (int k = 0; k < 3; ++k) {
         detail::clip_span(edges.at[k], edges.step_x[k], inverse[k], x1 - x0, left, right);
-        edges.at[k] += edges.step_y[k];
       }
-      const double row = fma(t.inverse_z.y, static_cast<double>(y - t.y0), t.inverse_z.value);
+      edges.step_down();
+      const double row = detail::inverse_z_row(t, y);
       const int offset = x0 - t.x0;
       S* const nearest = args.depth + row_at(y) + static_cast<std::size_t>(x0);
       std::uint32_t* const visible = args.visible + row_at(y) + static_cast<std::size_t>(x0);
       for (int x = left; x < right; ++x) {
-        const S plane = S(fma(t.inverse_z.x, static_cast<double>(offset + x), row));
-        const S inverse_z = clamp(plane, t.inverse_z_min, t.inverse_z_max);
+        const S inverse_z = detail::inverse_z_at(t, row, offset + x);
         const bool nearer = inverse_z > nearest[x];
         nearest[x] = nearer ? inverse_z : nearest[x];
         visible[x] = nearer ? id : visible[x];

@@ -51,21 +51,24 @@ struct MeshSetupArgs {
   View<MeshTriangle<S>> triangles;
 };
 
-/// Takes a chunk of vertices into the camera's axes and onto the lattice.
+/// Takes vertex i of a placement into the camera's axes and onto the lattice.
+template <class S>
+GSNAV_HD void project_mesh_vertex(const MeshSetupArgs<S>& args, const MeshPlacement& placement, std::size_t i) noexcept {
+  MeshVertex& v = args.vertices[placement.first_vertex + i];
+  v.position = placement.linear * vec_cast<double>(placement.mesh.vertices[i]) + placement.translation;
+  v.code = args.camera.outcode(v.position);
+  if ((v.code & (kMeshClipCodes | kMeshNotFinite)) == 0) v.point = project_to_lattice(args.camera, v.position);
+}
+
+/// project_mesh_vertex for a chunk.
 template <class S>
 struct ProjectMeshVertices {
   MeshSetupArgs<S> args;
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     const MeshChunk chunk = args.vertex_chunks[c];
     const MeshPlacement& placement = args.placements[chunk.placement];
-    const View<const Vec3f> in = placement.mesh.vertices;
-    const std::size_t end = chunk.begin + kMeshChunk < in.size ? chunk.begin + kMeshChunk : in.size;
-    for (std::size_t i = chunk.begin; i < end; ++i) {
-      MeshVertex& v = args.vertices[placement.first_vertex + i];
-      v.position = placement.linear * vec_cast<double>(in[i]) + placement.translation;
-      v.code = args.camera.outcode(v.position);
-      if ((v.code & (kMeshClipCodes | kMeshNotFinite)) == 0) v.point = project_to_lattice(args.camera, v.position);
-    }
+    const std::size_t end = chunk.end(placement.mesh.vertices.size);
+    for (std::size_t i = chunk.begin; i < end; ++i) project_mesh_vertex(args, placement, i);
   }
 };
 
@@ -137,56 +140,59 @@ GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, co
   out.b2 = weight(cross(n, e1) * (1.0 / nn));
 }
 
-/// Calls f(triangle) for each piece of the chunk's triangles that may cover a pixel centre; `Full`: with what is
-/// interpolated. Returns how many triangles have a corner that is not finite.
+/// Calls f(piece) for each piece of triangle t of a placement, number `at`, that may cover a pixel centre; `Full`:
+/// with what is interpolated. False where a corner is not finite.
 template <bool Full, class S, class F>
-GSNAV_HD std::uint32_t for_each_piece(const MeshSetupArgs<S>& args, std::size_t c, const F& f) noexcept {
-  const MeshChunk chunk = args.triangle_chunks[c];
-  const MeshPlacement& placement = args.placements[chunk.placement];
+GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std::size_t t, const F& f) noexcept {
+  const MeshPlacement& placement = args.placements[at];
   const MeshVertex* const vertices = args.vertices.data + placement.first_vertex;
-  const std::size_t count = placement.mesh.triangle_count();
-  const std::size_t end = chunk.begin + kMeshChunk < count ? chunk.begin + kMeshChunk : count;
+  const std::uint32_t* const index = placement.mesh.indices.data + 3 * t;
+  const MeshVertex *v[3] = {vertices + index[0], vertices + index[1], vertices + index[2]};
+  const std::uint32_t some = v[0]->code | v[1]->code | v[2]->code;
+  if ((some & kMeshNotFinite) != 0) return false;
+  if ((v[0]->code & v[1]->code & v[2]->code) != 0) return true;
+  MeshTriangle<S> piece;
+  piece.placement = at;
+  piece.triangle = static_cast<std::uint32_t>(t);
+  const auto emit = [&](double z_min, double z_max) {
+    if constexpr (Full) {
+      interpolate_triangle(args.camera, v[0]->position, v[1]->position, v[2]->position, z_min, z_max, piece);
+    }
+    f(piece);
+  };
+  if ((some & kMeshClipCodes) == 0) {
+    const double z0 = v[0]->position.z, z1 = v[1]->position.z, z2 = v[2]->position.z;
+    if (place_triangle(args.camera, placement.mesh.two_sided, v[0]->point, v[1]->point, v[2]->point, piece)) {
+      emit(min(z0, min(z1, z2)), max(z0, max(z1, z2)));
+    }
+    return true;
+  }
+  Vec3d corners[kMeshMostCorners] = {v[0]->position, v[1]->position, v[2]->position};
+  const int n = clip_triangle(args.camera, some & kMeshClipCodes, corners);
+  if (n < 3) return true;
+  double z_min = corners[0].z, z_max = corners[0].z;
+  MeshPoint points[kMeshMostCorners];
+  for (int i = 0; i < n; ++i) {
+    z_min = min(z_min, corners[i].z);
+    z_max = max(z_max, corners[i].z);
+    points[i] = project_to_lattice(args.camera, corners[i]);
+  }
+  for (int i = 2; i < n; ++i) {
+    if (place_triangle(args.camera, placement.mesh.two_sided, points[0], points[i - 1], points[i], piece)) {
+      emit(z_min, z_max);
+    }
+  }
+  return true;
+}
+
+/// The same for a chunk of triangles; returns how many have a corner that is not finite.
+template <bool Full, class S, class F>
+GSNAV_HD std::uint32_t for_each_piece_of_chunk(const MeshSetupArgs<S>& args, std::size_t c, const F& f) noexcept {
+  const MeshChunk chunk = args.triangle_chunks[c];
+  const std::size_t end = chunk.end(args.placements[chunk.placement].mesh.triangle_count());
   std::uint32_t not_finite = 0;
   for (std::size_t t = chunk.begin; t < end; ++t) {
-    const std::uint32_t* const index = placement.mesh.indices.data + 3 * t;
-    const MeshVertex *v[3] = {vertices + index[0], vertices + index[1], vertices + index[2]};
-    const std::uint32_t some = v[0]->code | v[1]->code | v[2]->code;
-    if ((some & kMeshNotFinite) != 0) {
-      ++not_finite;
-      continue;
-    }
-    if ((v[0]->code & v[1]->code & v[2]->code) != 0) continue;
-    MeshTriangle<S> piece;
-    piece.placement = chunk.placement;
-    piece.triangle = static_cast<std::uint32_t>(t);
-    const auto emit = [&](double z_min, double z_max) {
-      if constexpr (Full) {
-        interpolate_triangle(args.camera, v[0]->position, v[1]->position, v[2]->position, z_min, z_max, piece);
-      }
-      f(piece);
-    };
-    if ((some & kMeshClipCodes) == 0) {
-      const double z0 = v[0]->position.z, z1 = v[1]->position.z, z2 = v[2]->position.z;
-      if (place_triangle(args.camera, placement.mesh.two_sided, v[0]->point, v[1]->point, v[2]->point, piece)) {
-        emit(min(z0, min(z1, z2)), max(z0, max(z1, z2)));
-      }
-      continue;
-    }
-    Vec3d corners[kMeshMostCorners] = {v[0]->position, v[1]->position, v[2]->position};
-    const int n = clip_triangle(args.camera, some & kMeshClipCodes, corners);
-    if (n < 3) continue;
-    double z_min = corners[0].z, z_max = corners[0].z;
-    MeshPoint points[kMeshMostCorners];
-    for (int i = 0; i < n; ++i) {
-      z_min = min(z_min, corners[i].z);
-      z_max = max(z_max, corners[i].z);
-      points[i] = project_to_lattice(args.camera, corners[i]);
-    }
-    for (int i = 2; i < n; ++i) {
-      if (place_triangle(args.camera, placement.mesh.two_sided, points[0], points[i - 1], points[i], piece)) {
-        emit(z_min, z_max);
-      }
-    }
+    not_finite += for_each_piece<Full>(args, chunk.placement, t, f) ? 0 : 1;
   }
   return not_finite;
 }
@@ -199,7 +205,7 @@ struct CountMeshTriangles {
   MeshSetupArgs<S> args;
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     std::uint32_t n = 0;
-    args.not_finite[c] = detail::for_each_piece<false>(args, c, [&n](const MeshTriangle<S>&) { ++n; });
+    args.not_finite[c] = detail::for_each_piece_of_chunk<false>(args, c, [&n](const MeshTriangle<S>&) { ++n; });
     args.counts[c] = n;
   }
 };
@@ -225,7 +231,7 @@ struct WriteMeshTriangles {
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     if (args.counts[c] == 0) return;
     MeshTriangle<S>* out = args.triangles.data + args.offsets[c];
-    detail::for_each_piece<true>(args, c, [&out](const MeshTriangle<S>& t) { *out++ = t; });
+    detail::for_each_piece_of_chunk<true>(args, c, [&out](const MeshTriangle<S>& t) { *out++ = t; });
   }
 };
 

@@ -66,7 +66,9 @@ void project_unhidden(B& backend, const ProjectArgs<float>& args, const View<con
 
 template <class S, Backend B>
 void count_unhidden(B& backend, const BinArgs<S>& bin, const MeshCull<S>& cull) {
-  if constexpr (MeshBackend<B, S>) {
+  if constexpr (requires { backend.list_unhidden(bin, cull); }) {
+    backend.list_unhidden(bin, cull);
+  } else if constexpr (MeshBackend<B, S>) {
     backend.parallel_for(bin.blocks, CountUnhidden<S>{bin, cull});
     backend.parallel_for(1, ScanTileIntersections<S>{bin});
   }
@@ -74,7 +76,9 @@ void count_unhidden(B& backend, const BinArgs<S>& bin, const MeshCull<S>& cull) 
 
 template <class S, Backend B>
 void scatter_unhidden(B& backend, const BinArgs<S>& bin, const MeshCull<S>& cull) {
-  if constexpr (MeshBackend<B, S>) {
+  if constexpr (requires { backend.scatter_unhidden(bin, cull); }) {
+    backend.scatter_unhidden(bin, cull);
+  } else if constexpr (MeshBackend<B, S>) {
     backend.parallel_for(bin.blocks, ScatterUnhidden<S>{bin, cull});
   }
 }

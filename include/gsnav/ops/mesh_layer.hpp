@@ -213,34 +213,38 @@ Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInst
   setup.triangles = ws.triangles.view();
   backend.parallel_for(chunks, WriteMeshTriangles<S>{setup});
 
-  // ---- bin
+  // ---- bin and see
   MeshRasterArgs<S> raster;
   BinArgs<S>& bin = raster.bin;
   bin.grid = TileGrid::of(camera.width, camera.height, tile_size);
-  bin.blocks = counted.drawn < 4096 ? 1 : concurrency_of(backend);
   const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-  ws.cursors.resize_discard(bin.blocks * bin.grid.count());
-  ws.tile_offsets.resize_discard(bin.grid.count() + 1);
   ws.depth.resize_discard(pixels);
   ws.visible.resize_discard(pixels);
   ws.tile_far.resize_discard(bin.grid.count());
-  bin.cursors = ws.cursors.view();
-  bin.tile_offsets = ws.tile_offsets.view();
   raster.triangles = std::as_const(ws.triangles).view();
   raster.depth = ws.depth.data();
   raster.visible = ws.visible.data();
   raster.tile_far = ws.tile_far.view();
-  backend.parallel_for(bin.blocks, CountMeshTiles<S>{raster});
-  backend.parallel_for(1, ScanTileIntersections<S>{bin});
-  std::uint64_t intersections = 0;
-  ws.tile_offsets.download(&intersections, 1, bin.grid.count());
-  if (Status s = backend.synchronize(); !s) return s;
-  ws.tile_triangles.resize_discard(intersections);
-  bin.tile_splats = ws.tile_triangles.view();
-  backend.parallel_for(bin.blocks, ScatterMeshTiles<S>{raster});
+  if constexpr (requires { backend.rasterize_mesh(raster); }) {
+    backend.rasterize_mesh(raster);
+  } else {
+    bin.blocks = counted.drawn < 4096 ? 1 : concurrency_of(backend);
+    ws.cursors.resize_discard(bin.blocks * bin.grid.count());
+    ws.tile_offsets.resize_discard(bin.grid.count() + 1);
+    bin.cursors = ws.cursors.view();
+    bin.tile_offsets = ws.tile_offsets.view();
+    backend.parallel_for(bin.blocks, CountMeshTiles<S>{raster});
+    backend.parallel_for(1, ScanTileIntersections<S>{bin});
+    std::uint64_t intersections = 0;
+    ws.tile_offsets.download(&intersections, 1, bin.grid.count());
+    if (Status s = backend.synchronize(); !s) return s;
+    ws.tile_triangles.resize_discard(intersections);
+    bin.tile_splats = ws.tile_triangles.view();
+    backend.parallel_for(bin.blocks, ScatterMeshTiles<S>{raster});
+    backend.parallel_for(bin.grid.count(), RasterizeMeshTile<S>{raster});
+  }
 
-  // ---- see, then shade
-  backend.parallel_for(bin.grid.count(), RasterizeMeshTile<S>{raster});
+  // ---- shade
   if (layer_color) {
     ws.color.resize_discard(3 * pixels);
     images.color = ws.color.data();

@@ -12,6 +12,7 @@
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/render.hpp"
+#include "gsnav/ops/render_composite.hpp"
 #include "gsnav/ops/skin.hpp"
 
 struct CUevent_st;
@@ -75,6 +76,17 @@ class CudaBackend {
   void list_tiles(const BinArgs<float>& args);
   void scatter_tiles(const BinArgs<float>& args);
   void rasterize_tiles(const RasterArgs<float>& args);
+  /// Frames with a mesh (docs/composition.md).
+  static constexpr bool composes_meshes = true;
+  void list_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull);
+  void scatter_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull);
+  void composite_tiles(const RasterArgs<float>& args);
+  void rasterize_mesh(const MeshRasterArgs<float>& args);
+  void parallel_for(std::size_t chunks, const ProjectMeshVertices<float>& k);
+  void parallel_for(std::size_t chunks, const CountMeshTriangles<float>& k);
+  void parallel_for(std::size_t one, const ScanMeshTriangles<float>& k);
+  void parallel_for(std::size_t chunks, const WriteMeshTriangles<float>& k);
+  void parallel_for(std::size_t rows, const ShadeMeshRow<float>& k);
   /// One launch.
   void skin_all(std::span<const SkinningArgs<float>> avatars);
 
@@ -82,9 +94,14 @@ class CudaBackend {
   bool usable() const noexcept { return error_ == 0; }
   void note(int error, const char* what) noexcept;
   void* scratch(int slot, std::size_t bytes);
+  template <class Cull>
+  void list(const BinArgs<float>& args, const Cull& cull);
+  template <class Cull>
+  void scatter(const BinArgs<float>& args, const Cull& cull);
 
   /// Scratch that outlives a call, by use.
-  enum Slot { kCubTemp, kPerSplat, kPerTile, kSplatOffsets, kPairTiles, kPairSplats, kSkinJobs, kScratchSlots };
+  enum Slot { kCubTemp, kPerSplat, kPerTile, kSplatOffsets, kPairTiles, kPairSplats, kSkinJobs, kMeshPixels, kMeshLarge,
+              kScratchSlots };
   struct Block {
     void* data = nullptr;
     std::size_t bytes = 0;
@@ -107,6 +124,17 @@ extern template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWor
                                                          std::span<const GaussianSet>, const Camera&,
                                                          const RenderConfig&, const FrameImages<float>&,
                                                          RenderStats*);
+extern template Status render_composite<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+                                                            std::span<const GaussianSet>, const MeshFrame&,
+                                                            const Camera&, const RenderConfig&,
+                                                            const FrameImages<float>&, RenderStats*);
+extern template Status detail::render_frame<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+                                                                std::span<const GaussianSet>, const Camera&,
+                                                                const RenderConfig&, const MeshLayer<float>&,
+                                                                const FrameImages<float>&, RenderStats&);
+extern template Status draw_meshes<float, CudaBackend>(CudaBackend&, MeshWorkspace<float, CudaBackend>&,
+                                                       std::span<const MeshInstance>, const Camera&, const MeshLight&,
+                                                       int, bool, MeshImages<float>, MeshStats*);
 extern template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
 extern template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
 #endif

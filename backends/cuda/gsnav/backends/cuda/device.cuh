@@ -21,7 +21,7 @@ __global__ void for_each(std::size_t n, const F f) {
 inline constexpr int kProjectThreads = 128;
 
 /// One block a chunk: Gaussians are projected side by side, survivors packed in order by a block scan.
-__global__ void __launch_bounds__(kProjectThreads) project_kernel(const ProjectArgs<float> args) {
+static __global__ void __launch_bounds__(kProjectThreads) project_kernel(const ProjectArgs<float> args) {
   using Scan = cub::BlockScan<std::uint32_t, kProjectThreads>;
   __shared__ typename Scan::TempStorage storage;
   const GaussianView& gs = args.gaussians;
@@ -70,9 +70,16 @@ __global__ void __launch_bounds__(kProjectThreads) project_kernel(const ProjectA
   if (threadIdx.x == 0) args.counts[args.first_chunk + chunk] = written;
 }
 
+/// Hides nothing: the cull of a frame without a mesh.
+struct NoCull {
+  __device__ bool hides(std::size_t, std::uint32_t) const { return false; }
+};
+
 /// Tile intersections of each visible splat, and of each tile.
+template <class Cull>
 struct CountSplatTiles {
   BinArgs<float> args;
+  Cull cull;
   std::uint32_t* per_splat;
   std::uint32_t* per_tile;
   __device__ void operator()(std::size_t i) const {
@@ -80,6 +87,7 @@ struct CountSplatTiles {
     std::uint32_t n = 0;
     for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
                   [&](std::size_t tile) {
+                    if (cull.hides(tile, splat)) return;
                     atomicAdd(per_tile + tile, 1u);  // a sum of ones: the order does not matter
                     ++n;
                   });
@@ -88,8 +96,10 @@ struct CountSplatTiles {
 };
 
 /// (tile, splat) pairs in depth order; a stable sort by tile then makes the lists.
+template <class Cull>
 struct EmitSplatTiles {
   BinArgs<float> args;
+  Cull cull;
   const std::uint64_t* offsets;
   std::uint32_t* tiles;
   std::uint32_t* splats;
@@ -98,6 +108,7 @@ struct EmitSplatTiles {
     std::uint64_t at = offsets[i];
     for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
                   [&](std::size_t tile) {
+                    if (cull.hides(tile, splat)) return;
                     tiles[at] = static_cast<std::uint32_t>(tile);
                     splats[at++] = splat;
                   });
@@ -106,8 +117,8 @@ struct EmitSplatTiles {
 
 inline constexpr int kRasterBatch = 64;
 
-/// One block a tile, one thread a pixel; splats come through shared memory in batches.
-template <bool Color, DepthMode D, Exp2 M, bool General>
+/// One block a tile, one thread a pixel; splats come through shared memory in batches. `Mesh`: the frame has one.
+template <bool Color, DepthMode D, Exp2 M, bool General, bool Mesh>
 __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float> args) {
   __shared__ SplatGeometry<float> geometry[kRasterBatch];
   __shared__ SplatColor<float> colors[Color ? kRasterBatch : 1];
@@ -118,6 +129,9 @@ __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float>
   const int y = static_cast<int>(blockIdx.x) / grid.columns * ts + t / ts;
   const bool inside = x < grid.width && y < grid.height;
   const float px = static_cast<float>(x) + 0.5f, py = static_cast<float>(y) + 0.5f;
+  const std::size_t pixel =
+      static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(x);
+  const float mesh = Mesh && inside ? args.mesh.depth[pixel] : 0;
   BlendState<float, D> state;
   bool open = inside;
   const std::uint64_t end = args.tile_offsets[blockIdx.x + 1];
@@ -133,18 +147,19 @@ __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float>
     __syncthreads();
     for (int j = 0; open && j < n; ++j) {
       const SplatRecords<float> splat{geometry + j, Color ? colors + j : nullptr,
-                                      D == DepthMode::none ? nullptr : args.depths.data + ids[j],
+                                      D == DepthMode::none && !Mesh ? nullptr : args.depths.data + ids[j],
                                       args.perspectives.empty() ? nullptr : args.perspectives.data + ids[j]};
-      blend_splat<Color, D, M, General>(state, args.rules, splat, px, py);
+      if constexpr (Mesh) {
+        composite_splat<Color, D, M, General>(state, args.rules, splat, mesh, px, py);
+      } else {
+        blend_splat<Color, D, M, General>(state, args.rules, splat, px, py);
+      }
       open = state.open(args.rules);
     }
   }
-  if (inside) {
-    write_pixel(args,
-                static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
-                    static_cast<std::size_t>(x),
-                state);
-  }
+  if (!inside) return;
+  if constexpr (Mesh) close_by_mesh<Color>(state, args.rules, args.mesh, pixel);
+  write_pixel(args, pixel, state);
 }
 
 }  // namespace cuda
