@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in one row.
 //
-//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256] [batch sizes...]
+//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256] [--compact] [batch sizes...]
 //
 // Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of views
-// repeats them from slightly different places. Times are the device's, between events on the stream.
+// repeats them from slightly different places. Times are the device's, between events on the stream; `host us` is
+// how long the call takes that asks for them.
 #include <cuda_runtime.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -64,18 +66,21 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   cudaEventCreate(&end);
   const std::size_t views = gsnav_bench::workload().cameras.size();
   const std::size_t batches = std::max<std::size_t>(1, views / count);
-  std::vector<double> ms;
+  std::vector<double> ms, host_us;
   double pairs = 0;
   for (int repeat = -1; repeat < kRepeats; ++repeat) {  // the first finds the scratch it takes
     for (std::size_t b = 0; b < batches; ++b) {
       const std::vector<BatchCamera> cameras = cameras_of(b * count, count);
       cudaEventRecord(begin, cuda.stream());
+      const auto called = std::chrono::steady_clock::now();
       renderer.render(sets, cameras, out.images).throw_if_error();
+      const std::chrono::duration<double, std::micro> host = std::chrono::steady_clock::now() - called;
       cudaEventRecord(end, cuda.stream());
       renderer.finish().throw_if_error();
       if (repeat < 0) continue;
       float t = 0;
       cudaEventElapsedTime(&t, begin, end);
+      host_us.push_back(host.count());
       ms.push_back(static_cast<double>(t) / static_cast<double>(count));
       pairs += static_cast<double>(renderer.stats().tile_intersections);
     }
@@ -95,11 +100,12 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   }
   const std::vector<double> rgb_truth(truth.rgb.begin(), truth.rgb.begin() + static_cast<std::ptrdiff_t>(rgb.size()));
   const gsnav_bench::Error e = gsnav_bench::error_of(rgb, rgb_truth);
-  std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f  %.1e  %9.0f  %8.1f\n",
+  std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f  %.1e  %9.0f  %8.1f  %7.1f\n",
               profile == Profile::fast ? "fast" : "exact", count, gsnav_bench::median(ms), gsnav_bench::quantile(ms, 0.9),
               1000.0 / gsnav_bench::median(ms), e.max, e.p999, e.psnr,
               gsnav_bench::error_of(depth_seen, depth_truth).p99,
-              pairs / static_cast<double>(ms.size() * count), static_cast<double>(renderer.stats().scratch_bytes) / 1e6);
+              pairs / static_cast<double>(ms.size() * count), static_cast<double>(renderer.stats().scratch_bytes) / 1e6,
+              gsnav_bench::median(host_us));
   std::fflush(stdout);
   cudaEventDestroy(begin);
   cudaEventDestroy(end);
@@ -109,14 +115,18 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
 
 int main(int argc, char** argv) {
   std::vector<std::size_t> counts;
+  bool compact = false;
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--size" && i + 1 < argc) {
       if (std::sscanf(argv[++i], "%dx%d", &g_width, &g_height) == 2 && g_width > 0 && g_height > 0) continue;
+    } else if (std::string(argv[i]) == "--compact") {
+      compact = true;
+      continue;
     } else if (const std::size_t count = std::strtoull(argv[i], nullptr, 10); count > 0) {
       counts.push_back(count);
       continue;
     }
-    std::fprintf(stderr, "bench_batch: '%s' is no size (256x256) or batch size\n", argv[i]);
+    std::fprintf(stderr, "bench_batch: '%s' is no size (256x256), batch size or --compact\n", argv[i]);
     return 2;
   }
   if (CudaBackend::device_count() == 0) {
@@ -124,16 +134,19 @@ int main(int argc, char** argv) {
     return 1;
   }
   CudaBackend cuda;
-  const GaussianArrays<CudaBackend> arrays(cuda, gsnav_bench::workload().cloud);
+  GaussianCloud shown = gsnav_bench::workload().cloud;
+  if (compact) compact_sh(shown);
+  const GaussianArrays<CudaBackend> arrays(cuda, shown);
   OpenMPBackend cpu;
   Renderer<double, OpenMPBackend> reference(cpu);
   std::vector<Camera> cameras;
   for (const BatchCamera& c : cameras_of(0, kReferenceViews)) cameras.push_back(c.camera);
   const std::vector<GaussianSet> sets{gsnav_bench::workload().cloud.set()};
   const Frames<double> truth = reference.render(sets, cameras).value();
-  std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB + alpha + median depth\n", cuda.device_name().c_str(),
-              gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), g_width, g_height);
-  std::printf("profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  scratch MB\n");
+  std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB + alpha + median depth%s\n", cuda.device_name().c_str(),
+              gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), g_width, g_height,
+              compact ? ", SH in half precision" : "");
+  std::printf("profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  scratch MB  host us\n");
   if (counts.empty()) counts = {1, 8, 64, 256, 512};
   for (const Profile profile : {Profile::fast, Profile::exact}) {
     for (const std::size_t count : counts) row(cuda, arrays, truth, count, profile);

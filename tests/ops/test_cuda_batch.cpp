@@ -204,6 +204,30 @@ TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
   }
 }
 
+TEST_CASE("cuda batch: images of many pixels, and bands in half precision") {
+  if (no_gpu("cuda batch of large images")) return;
+  CudaBackend cuda;
+  SerialBackend serial;
+  for (const int degree : {1, 2, 3}) {
+    // Splats of all sizes, some of which cover most tiles; rows that no warp has 32 of.
+    GaussianCloud cloud = random_cloud(11, {.count = 4003, .sh_degree = degree, .needle = 0.2, .scale = 0.15});
+    const GaussianCloud full = cloud;
+    compact_sh(cloud);
+    const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+    const std::vector<GaussianSet> sets{arrays.set()};
+    const std::vector<Camera> one = ring(1, 641, 480), many = ring(9, 149, 101);
+    RenderConfig config;
+    config.outputs = kMedianOnly;
+    CudaBatchRenderer renderer(cuda, config);
+    const Batch large = draw(cuda, renderer, sets, one, {}, kMedianOnly, false);
+    check_same(large.frames, render<float>(serial, {cloud.set()}, one[0], config));
+    check_same(draw(cuda, renderer, sets, many, {}, kMedianOnly, false).frames, singly(cuda, sets, many, {}, config, kMedianOnly));
+    const Frames<float> of_floats = render<float>(serial, {full.set()}, one[0], config);
+    CHECK(differing(large.frames.rgb, of_floats.rgb) > 0);
+    CHECK(differing(large.frames.median_depth, of_floats.median_depth) == 0);
+  }
+}
+
 TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are in order of rank") {
   if (no_gpu("cuda batch order")) return;
   CudaBackend cuda;

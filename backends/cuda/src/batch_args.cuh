@@ -59,6 +59,11 @@ struct Pair {
   std::uint32_t key, slot;
 };
 
+/// Rows of tiles of a splat of very many, from `row` on: BatchArgs::rows_of_large, or what is left.
+struct LargeRows {
+  std::uint32_t slot, row;
+};
+
 /// A part of a tile's list that is put in order by itself: pairs [begin, end), which are whole bins of depth from `bin` on.
 struct alignas(16) ListPart {
   std::uint32_t tile, bin, begin, end;
@@ -100,6 +105,7 @@ struct BatchArgs {
   float log2_alpha_min;
   bool elliptic;
   DepthBins depth_bins;
+  int rows_of_large;  ///< that a warp has of a large splat: few cameras have few of these
 
   BatchItem* items;
   BatchCounters* counters;
@@ -110,7 +116,7 @@ struct BatchArgs {
   SplatPerspective<float>* perspectives;  ///< null: Response::ewa
   HardSplat* hard;
   std::uint32_t* several;  ///< slots whose tiles are still to be found; kNoSlot: none
-  std::uint32_t* large;    ///< slots of very many tiles
+  LargeRows* large;        ///< of splats of very many tiles
   /// [tiles << depth_bins.bits]: how many pairs; where the next goes, once lists have their places; where bins
   /// end, once all are there.
   std::uint32_t* bins;

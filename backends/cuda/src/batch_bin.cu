@@ -12,26 +12,24 @@ namespace {
 
 constexpr unsigned kThreads = 128;
 
-/// Calls f(slot, key, tile, wanted), by all lanes together, for the tiles of the large splats: a warp has so many rows of
+/// Calls f(slot, key, tile, wanted), by all lanes together, for the tiles of the large splats: a warp has some rows of
 /// one at a time.
 template <class F>
-__device__ void for_each_tile_of_large(const BatchArgs& a, int rows, const F& f) {
+__device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
   const std::uint32_t n = used(a.counters->large, a.large_capacity);
   const int ts = a.grid.tile_size, shift = a.grid.tile_shift();
-  const std::uint32_t parts = static_cast<std::uint32_t>((a.grid.rows + rows - 1) / rows);
   const int lane = static_cast<int>(threadIdx.x % 32);
-  for (std::uint64_t i = (blockIdx.x * kThreads + threadIdx.x) / 32; i < std::uint64_t{n} * parts;
-       i += gridDim.x * kThreads / 32) {
-    const std::uint32_t slot = a.large[i / parts];
+  for (std::uint32_t i = (blockIdx.x * kThreads + threadIdx.x) / 32; i < n; i += gridDim.x * kThreads / 32) {
+    const LargeRows part = a.large[i];
+    const std::uint32_t slot = part.slot;
     const SplatRecord& r = a.records[slot];
     const SplatBounds b = bounds_of(r.x, r.y);
-    const int top = (b.y0 & -ts) + static_cast<int>(i % parts) * rows * ts;
-    if (top >= b.y1) continue;
+    const int top = static_cast<int>(part.row) * ts;
     const SplatEntry e = a.entries[slot];
     // Lanes find the columns of a row each.
     const int y = top + lane * ts, ty = y >> shift;
     int first = 0, end = 0;
-    if (lane < rows && y < b.y1) {
+    if (lane < a.rows_of_large && y < b.y1) {
       const SplatBounds row{b.x0, max(b.y0, y), b.x1, min(b.y1, y + ts)};
       for_each_tile(a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](std::size_t tile) {
         const int tx = static_cast<int>(tile) - ty * a.grid.columns;
@@ -63,11 +61,11 @@ __device__ void for_each_tile_of_windows(const BatchArgs& a, std::uint32_t slot,
 
 /// Counts the pairs of splats of several tiles: a thread each, or a warp.
 template <bool ManyBins>
-__global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a, int rows_of_large) {
+__global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
   const auto count = [&](std::uint32_t, std::uint32_t key, std::uint32_t tile, bool wanted) {
     add_pair<ManyBins, false>(a, wanted, tile, key);
   };
-  for_each_tile_of_large(a, rows_of_large, count);
+  for_each_tile_of_large(a, count);
   const std::uint32_t n = used(a.counters->several, a.several_capacity);
   const std::uint32_t end = (n + 31) / 32 * 32;
   for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < end; i += gridDim.x * kThreads) {
@@ -113,13 +111,13 @@ __device__ void order_tiles(const BatchArgs& a) {
 
 /// Writes the pairs; and the order of the tiles.
 template <bool ManyBins>
-__global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a, int rows_of_large) {
+__global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
   order_tiles(a);
   const auto emit = [&](std::uint32_t slot, std::uint32_t key, std::uint32_t tile, bool wanted) {
     const std::uint32_t at = add_pair<ManyBins, true>(a, wanted, tile, key);
     if (wanted && at < a.pair_capacity) a.pairs[at] = {key, slot};
   };
-  for_each_tile_of_large(a, rows_of_large, emit);
+  for_each_tile_of_large(a, emit);
   const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
   const std::uint64_t stride = std::uint64_t{gridDim.x} * kThreads;
   const auto entry = [&](std::uint64_t slot) {
@@ -257,10 +255,9 @@ __global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
 template <bool ManyBins>
 void launch(const BatchArgs& args, unsigned blocks, cudaStream_t stream) {
   const unsigned at_a_time = ManyBins ? kThreads / 32 : kThreads;
-  const int rows_of_large = args.cameras < 8 ? 8 : 32;  // few cameras have few large splats
-  count_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args, rows_of_large);
+  count_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args);
   place_kernel<ManyBins><<<std::min(blocks, (args.tiles + at_a_time - 1) / at_a_time), kThreads, 0, stream>>>(args);
-  emit_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args, rows_of_large);
+  emit_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args);
 }
 
 }  // namespace

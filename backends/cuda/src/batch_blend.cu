@@ -175,18 +175,8 @@ __device__ __noinline__ void depth_record64(const ProjectArgs<float>& args, std:
   depth = splat.depth;
 }
 
-/// A thread a pixel of camera blockIdx.y: slots become depths.
-__global__ void __launch_bounds__(128, 6) depth_kernel(const BatchArgs a, float* images) {
-  const std::uint32_t width = static_cast<std::uint32_t>(a.grid.width);
-  const std::uint32_t pixels = width * static_cast<std::uint32_t>(a.grid.height);
-  const std::uint32_t camera = blockIdx.y, pixel = blockIdx.x * blockDim.x + threadIdx.x;
-  if (pixel >= pixels) return;
-  float& to = images[std::size_t{camera} * pixels + pixel];
-  const std::uint32_t slot = __float_as_uint(to);
-  if (slot == kNoSlot) {
-    to = 0;
-    return;
-  }
+/// What the depth of a slot's Gaussian is made of.
+__device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t camera, std::uint32_t slot) {
   const std::uint32_t source = a.sources[slot];
   const ProjectArgs<float>& args = instance_of(a, camera, source).args;
   const GaussianView& gs = args.gaussians;
@@ -197,13 +187,46 @@ __global__ void __launch_bounds__(128, 6) depth_kernel(const BatchArgs a, float*
   const SplatAxes<float> axes =
       gsnav::detail::load_axes(gs, args.camera, gsnav::detail::camera_delta(args, mean, origin), row);
   const Projected<float> p = project<float, float>(args.camera, axes, z, gs.opacities[row]);
+  if (!gsnav::detail::needs_double(args.camera, p)) return make_splat_depth(args.camera, axes, p);
   SplatDepth<float> depth;
-  if (gsnav::detail::needs_double(args.camera, p)) {
-    depth_record64(args, row, key_of(args, z, mean, origin), mean, origin, depth);
-  } else {
-    depth = make_splat_depth(args.camera, axes, p);
+  depth_record64(args, row, key_of(args, z, mean, origin), mean, origin, depth);
+  return depth;
+}
+
+constexpr unsigned kDepthColumns = 16, kDepthRows = 8, kDepthThreads = kDepthColumns * kDepthRows;
+
+/// A thread a pixel of camera blockIdx.z: slots become depths. Neighbours have their Gaussians in common, and each is
+/// projected once a block.
+__global__ void __launch_bounds__(kDepthThreads, 6) depth_kernel(const BatchArgs a, float* images) {
+  constexpr unsigned kPlaces = 2 * kDepthThreads;  // of a hash table; a power of two
+  __shared__ std::uint32_t slots[kPlaces], indices[kPlaces], found[kDepthThreads], count;
+  __shared__ SplatDepth<float> depths[kDepthThreads];
+  const unsigned t = threadIdx.x;
+  const int x = static_cast<int>(blockIdx.x * kDepthColumns + t % kDepthColumns);
+  const int y = static_cast<int>(blockIdx.y * kDepthRows + t / kDepthColumns);
+  const bool inside = x < a.grid.width && y < a.grid.height;
+  const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
+  float* const to = images + (blockIdx.z * height + static_cast<std::size_t>(y)) * width + static_cast<std::size_t>(x);
+  slots[t] = slots[t + kDepthThreads] = kNoSlot;
+  if (t == 0) count = 0;
+  __syncthreads();
+  const std::uint32_t slot = inside ? __float_as_uint(*to) : kNoSlot;
+  unsigned at = slot * 2654435761u % kPlaces;
+  if (slot != kNoSlot) {
+    for (;; at = (at + 1) % kPlaces) {
+      const std::uint32_t there = atomicCAS(slots + at, kNoSlot, slot);
+      if (there == slot) break;
+      if (there != kNoSlot) continue;
+      indices[at] = atomicAdd(&count, 1u);
+      found[indices[at]] = slot;
+      break;
+    }
   }
-  to = ray_depth(depth, static_cast<float>(pixel % width) + 0.5f, static_cast<float>(pixel / width) + 0.5f);
+  __syncthreads();
+  if (t < count) depths[t] = depth_record(a, blockIdx.z, found[t]);
+  __syncthreads();
+  if (!inside) return;
+  *to = slot == kNoSlot ? 0.0f : ray_depth(depths[indices[at]], static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
 }
 
 }  // namespace
@@ -222,8 +245,9 @@ void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std
     });
   }
   if (raster.depth_mode() == DepthMode::median) {
-    const unsigned pixels = static_cast<unsigned>(args.grid.width) * static_cast<unsigned>(args.grid.height);
-    depth_kernel<<<dim3((pixels + 127) / 128, args.cameras), 128, 0, stream>>>(args, raster.images.median_depth);
+    const auto blocks = [](int pixels, unsigned of) { return (static_cast<unsigned>(pixels) + of - 1) / of; };
+    depth_kernel<<<dim3(blocks(args.grid.width, kDepthColumns), blocks(args.grid.height, kDepthRows), args.cameras),
+                   kDepthThreads, 0, stream>>>(args, raster.images.median_depth);
   }
 }
 

@@ -201,6 +201,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   args.log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
   args.elliptic = config.response == Response::ewa;
   args.slab = args.cameras < 8 ? 64 : 256;
+  args.rows_of_large = args.cameras < 8 ? 8 : 32;
 
   raster = {};
   raster.grid = args.grid;

@@ -56,16 +56,25 @@ __device__ void write_record(const BatchArgs& a, std::uint32_t slot, const Batch
   if (a.perspectives != nullptr) a.perspectives[slot] = s.perspective;
 }
 
-__device__ void queue_large(const BatchArgs& a, std::uint32_t slot) {
-  const unsigned long long place = atomicAdd(&a.counters->large, 1ull);
-  if (place < a.large_capacity) a.large[place] = slot;
+__device__ void queue_large(const BatchArgs& a, std::uint32_t slot, const SplatBounds& b) {
+  const int shift = a.grid.tile_shift();
+  const std::uint32_t rows = static_cast<std::uint32_t>(a.rows_of_large);
+  const std::uint32_t first = static_cast<std::uint32_t>(b.y0 >> shift);
+  const std::uint32_t end = static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1;
+  unsigned long long place = atomicAdd(&a.counters->large, static_cast<unsigned long long>((end - first + rows - 1) / rows));
+  for (std::uint32_t row = first; row < end; row += rows, ++place) {
+    if (place < a.large_capacity) a.large[place] = {slot, row};
+  }
 }
 
 /// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
 struct alignas(16) WarpRows {
   float mean[3][32], quat[4][32], scales[3][32], opacity[32];
-  /// [32][rest]: from memory a warp would read 32 lines a coefficient.
-  float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
+  /// [32][rest], floats or halves as they are stored: from memory a warp would read 32 lines a coefficient.
+  union {
+    float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
+    std::uint16_t sh_half[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
+  };
 };
 
 __device__ void load_rows(const GaussianView& gs, std::size_t row, WarpRows& to) {
@@ -82,16 +91,29 @@ __device__ void load_rows(const GaussianView& gs, std::size_t row, WarpRows& to)
   __syncwarp();
 }
 
+/// Copies n values, a whole number of words, behind what the warp does next.
+template <class T>
+__device__ void copy_async(T* to, const T* from, unsigned n) {
+  constexpr unsigned kWord = 4 / sizeof(T);
+  const unsigned lane = threadIdx.x % 32;
+  if (n % (4 * kWord) == 0 && reinterpret_cast<std::uintptr_t>(from) % 16 == 0) {
+    for (unsigned i = 4 * kWord * lane; i < n; i += 128 * kWord) __pipeline_memcpy_async(to + i, from + i, 16);
+  } else {
+    for (unsigned i = kWord * lane; i < n; i += 32 * kWord) __pipeline_memcpy_async(to + i, from + i, 4);
+  }
+}
+
 /// Asks for the coefficients of rows `first` (lane 0) on; they are there after wait_for_sh.
 __device__ void ask_for_sh(const GaussianView& gs, std::size_t first, WarpRows& to) {
   const std::size_t rest = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
   const std::size_t rows = gs.size - first < 32 ? gs.size - first : 32;
-  const float* from = gs.shN.data + rest * first;
-  const unsigned n = static_cast<unsigned>(rest * rows), lane = threadIdx.x % 32;
-  if (n % 4 == 0 && reinterpret_cast<std::uintptr_t>(from) % 16 == 0) {
-    for (unsigned i = 4 * lane; i < n; i += 128) __pipeline_memcpy_async(to.sh + i, from + i, 16);
+  const unsigned n = static_cast<unsigned>(rest * rows);
+  if (gs.shN_half.empty()) {
+    copy_async(to.sh, gs.shN.data + rest * first, n);
   } else {
-    for (unsigned i = lane; i < n; i += 32) __pipeline_memcpy_async(to.sh + i, from + i, 4);
+    const std::uint16_t* const from = gs.shN_half.data + rest * first;
+    copy_async(to.sh_half, from, n & ~1u);
+    if (n % 2 != 0 && threadIdx.x % 32 == 0) to.sh_half[n - 1] = from[n - 1];
   }
   __pipeline_commit();
 }
@@ -108,7 +130,11 @@ __device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::
   GaussianView v;  // of the warp's rows
   v.sh_degree = gs.sh_degree;
   v.sh0 = {gs.sh0.data + 3 * first, 3 * 32};
-  v.shN = {rows.sh, 1};
+  if (gs.shN_half.empty()) {
+    v.shN = {rows.sh, 1};
+  } else {
+    v.shN_half = {rows.sh_half, 1};
+  }
   if (!gs.sh_rotations[0].empty()) {
     for (int k = 0; k < 4; ++k) v.sh_rotations[k] = {gs.sh_rotations[k].data + first, 32};
   }
@@ -189,7 +215,7 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
       }
       const bool queued = drawn && slot != kNoSlot && !single;
       const bool large = queued && is_large(a, splat.bounds);
-      if (large) queue_large(a, slot);
+      if (large) queue_large(a, slot, splat.bounds);
       const std::uint64_t place = several.take(queued && !large);
       if (queued && !large && place < a.several_capacity) a.several[place] = slot;
     }
@@ -226,7 +252,7 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
       if (window.tiles != 0) {
         atomicAdd(a.bins + bin_of(a, tile_of(a, instance.camera, window, 0), args.camera.key_code(key)), 1u);
       } else if (is_large(a, splat.bounds)) {
-        queue_large(a, h.slot);
+        queue_large(a, h.slot, splat.bounds);
       } else {
         const unsigned long long place = atomicAdd(&a.counters->several, 1ull);
         if (place < a.several_capacity) a.several[place] = h.slot;

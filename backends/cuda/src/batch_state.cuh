@@ -102,7 +102,8 @@ struct CudaBatchRenderer::State {
   Array<cuda::BatchCounters> counters;
   Array<cuda::SplatRecord> records;
   Array<cuda::SplatEntry> entries;
-  Array<std::uint32_t> sources, several, large, bins, tile_counts, tile_begins, tile_order;
+  Array<cuda::LargeRows> large;
+  Array<std::uint32_t> sources, several, bins, tile_counts, tile_begins, tile_order;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
   Array<cuda::HardSplat> hard;

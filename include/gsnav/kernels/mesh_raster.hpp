@@ -150,7 +150,8 @@ GSNAV_HD double inverse_z_row(const MeshTriangle<S>& t, int y) noexcept {
 /// ... and `dx` pixels on.
 template <class S>
 GSNAV_HD S inverse_z_at(const MeshTriangle<S>& t, double row, int dx) noexcept {
-  return clamp(S(fma(t.inverse_z.x, static_cast<double>(dx), row)), t.inverse_z_min, t.inverse_z_max);
+  const S plane = S(fma(t.inverse_z.x, static_cast<double>(dx), row));
+  return clamp(plane, t.inverse_z_min, t.inverse_z_max);
 }
 
 }  // namespace detail

@@ -38,11 +38,8 @@ class GaussianArrays {
       for (auto& p : v.scales) to_device(backend, p, floats_);
       to_device(backend, v.opacities, floats_);
       to_device(backend, v.sh0, floats_);
-      std::vector<float> widened(v.shN_half.size);
-      for (std::size_t i = 0; i < widened.size(); ++i) widened[i] = half_to_float(v.shN_half[i]);
-      if (!widened.empty()) v.shN = view_of(std::as_const(widened));
-      v.shN_half = {};
       to_device(backend, v.shN, floats_);
+      to_device(backend, v.shN_half, halves_);
       to_device(backend, v.origin_ids, ids_);
       to_device(backend, v.row_ids, ids_);
       to_device(backend, v.chunk_bounds, bounds_);
@@ -64,6 +61,7 @@ class GaussianArrays {
   }
   GaussianSet set_;
   std::vector<Buffer<float, B>> floats_;
+  std::vector<Buffer<std::uint16_t, B>> halves_;
   std::vector<Buffer<std::uint32_t, B>> ids_;
   std::vector<Buffer<ChunkBounds, B>> bounds_;
   std::vector<Vec3d> origins_;
