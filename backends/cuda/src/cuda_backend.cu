@@ -206,5 +206,6 @@ template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWorkspace<
                                                   RenderStats*);
 template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
 template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
+template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);
 
 }  // namespace gsnav

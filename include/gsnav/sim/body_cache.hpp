@@ -25,6 +25,7 @@ class BodyCache {
   struct Entry {
     CapsuleSet bodies;
     std::uint64_t used = 0;
+    bool made = false;  // set by whoever makes the bodies
   };
 
   /// The entry of `key`, which stays where it is until trim(), and whether its bodies have yet to be made.
@@ -32,6 +33,11 @@ class BodyCache {
     const auto [at, fresh] = entries_.try_emplace(key);
     at->second.used = now_;
     return {&at->second, fresh};
+  }
+  /// The bodies of `key` where they are there and made, else null.
+  const CapsuleSet* peek(const Key& key) const {
+    const auto at = entries_.find(key);
+    return at != entries_.end() && at->second.made ? &at->second.bodies : nullptr;
   }
   void erase(const Key& key) { entries_.erase(key); }
   /// Forgets the oldest entries where there are more than `most`, some at once so that it is seldom done.
