@@ -1,21 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two performance tables of the Habitat-GS paper by this simulator: a PointNav loop with 256 x 256 RGB and depth,
-// frames a second, milliseconds and memory, by the number of Gaussians and by the number of people among 2M. Scenes and
-// people are the project's own: the embedded flat, made as dense as the row says.
+// The two performance tables of the Habitat-GS paper by this simulator: a PointNav loop with 256 x 256
+// RGB and depth, frames a second, milliseconds and memory, by the number of Gaussians and by the number
+// of people among 2M, for each backend. Scenes and people are the project's own: the embedded flat, made
+// as dense as the row says.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <exception>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "../tools/report/runner_system.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/sim/batch.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
 #include "gsnav/sim/scene_library.hpp"
-#include "gsnav/sim/simulator.hpp"
+#if defined(GSNAV_HAS_CUDA)
+#include <cuda_runtime_api.h>
+
+#include "gsnav/backends/cuda.hpp"
+#endif
 
 using namespace gsnav;
 using Clock = std::chrono::steady_clock;
@@ -23,44 +30,51 @@ using Clock = std::chrono::steady_clock;
 namespace {
 
 constexpr double kGaussiansAtOne = 390000;  // of the flat with density 1, about
-constexpr int kSide = 256;
+constexpr int kSide = 256, kWarmUp = 10;
 
 struct Options {
   int steps = 300, threads = 0;
+  std::size_t environments = 1;
   double most = 7;  // millions of Gaussians
+  std::vector<std::string> backends{"openmp"};
+};
+
+/// A scene and its episodes, the same for every backend.
+struct Place {
+  std::shared_ptr<const SimulatorScene> scene;
+  std::vector<PointNavEpisode> episodes;
+  SimulatorConfig config;
 };
 
 struct Row {
-  std::size_t gaussians = 0, people = 0;
-  double ms = 0, rendering = 0, scene_mb = 0, peak_mb = 0;
+  double ms = 0, rendering = 0;  // of a frame; the share of it
 };
 
-double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
+double seconds_since(Clock::time_point t) {
+  return std::chrono::duration<double>(Clock::now() - t).count();
+}
 
-/// Plays episodes by the follower for so many actions; the first ten find the scratch that is taken.
-Row play(const Options& o, double millions, std::size_t people) {
-  gsnav_report::reset_peak_memory();
-  const double before = static_cast<double>(gsnav_report::peak_memory());
-  const TaskConfig task = TaskConfig::avatar_pointnav();
-  auto scene = std::make_shared<const SimulatorScene>(
-      default_simulator_scene(people, 1, millions * 1e6 / kGaussiansAtOne, task).value());
-  Row row;
-  row.gaussians = scene->assets[0].cloud->size();
-  row.people = people;
-  row.scene_mb = static_cast<double>(scene_bytes(*scene)) * 1e-6;
-  auto episodes = generate_episodes(*scene->navmesh, 20, 1).value();
-  draw_start_times(episodes, *scene, task, 1).throw_if_error();
-  OpenMPBackend backend(o.threads);
-  SimulatorConfig config;
-  config.task = task;
-  config.sensors = rgbd_sensors(kSide, kSide);
-  auto sim = Simulator<OpenMPBackend>::create(backend, scene, config).value();
-  gsnav_report::reset_peak_memory();
+Place make_place(double millions, std::size_t people) {
+  Place p;
+  p.config.task = TaskConfig::avatar_pointnav();
+  p.config.sensors = rgbd_sensors(kSide, kSide);
+  p.scene = std::make_shared<const SimulatorScene>(
+      default_simulator_scene(people, 1, millions * 1e6 / kGaussiansAtOne, p.config.task).value());
+  p.episodes = generate_episodes(*p.scene->navmesh, 64, 1).value();
+  draw_start_times(p.episodes, *p.scene, p.config.task, 1).throw_if_error();
+  return p;
+}
+
+/// One simulator plays episodes by the follower; the first actions find the scratch that is taken.
+template <class B>
+Row play_one(B& backend, const Options& o, const Place& place) {
+  auto sim = Simulator<B>::create(backend, place.scene, place.config).value();
   const GeodesicFollower follower;
   std::size_t episode = 0;
   double total = 0, beside = 0;
-  for (int i = -10; i < o.steps; ++i) {
-    if (i == -10 || sim.done()) sim.reset(episodes[episode++ % episodes.size()]).value();
+  for (int i = -kWarmUp; i < o.steps; ++i) {
+    if (i == -kWarmUp || sim.done())
+      sim.reset(place.episodes[episode++ % place.episodes.size()]).value();
     const Action action = follower.next(sim.world());
     const auto begin = Clock::now();
     sim.set_rendering(false);
@@ -72,43 +86,130 @@ Row play(const Options& o, double millions, std::size_t people) {
     total += seconds_since(begin);
     beside += world;
   }
-  row.ms = 1e3 * total / o.steps;
-  row.rendering = 1.0 - beside / total;
-  row.peak_mb = (static_cast<double>(gsnav_report::peak_memory()) - before) * 1e-6;
-  return row;
+  return {1e3 * total / o.steps, 1.0 - beside / total};
+}
+
+/// Many at once, at as many times; their images stay where they were drawn. Every second step draws
+/// nothing: that is what the others take beside drawing.
+template <class B>
+Row play_many(B& backend, const Options& o, const Place& place) {
+  BatchConfig config;
+  static_cast<SimulatorConfig&>(config) = place.config;
+  config.images = ImageMemory::backend;
+  config.pose_slots = o.environments;
+  const auto episode_of = [&](std::size_t e, std::size_t count) -> Result<BatchEpisode> {
+    return BatchEpisode{0, place.episodes[(7 * e + count) % place.episodes.size()]};
+  };
+  auto sim =
+      BatchSimulator<B>::create(backend, {place.scene}, config, o.environments, episode_of).value();
+  sim.reset().value();
+  const GeodesicFollower follower;
+  std::vector<Action> actions(o.environments);
+  double total = 0, beside = 0;
+  for (int i = -kWarmUp; i < 2 * o.steps; ++i) {
+    for (std::size_t e = 0; e < o.environments; ++e) {
+      actions[e] = sim.world(e).done() ? Action::stop : follower.next(sim.world(e));
+    }
+    const bool drawing = i % 2 == 0;
+    sim.set_rendering(drawing);
+    const auto begin = Clock::now();
+    sim.step(actions).value();
+    if (i >= 0) (drawing ? total : beside) += seconds_since(begin);
+  }
+  return {1e3 * total / (o.steps * static_cast<double>(o.environments)), 1.0 - beside / total};
 }
 
 void head(const char* what) {
-  std::printf("\n%s\n%12s %8s %12s %10s %11s %10s %10s\n", what, "Gaussians", "people", "frames/s", "ms", "rendering",
-              "scene, MB", "peak, MB");
+  std::printf("\n%s\n%8s %12s %8s %12s %10s %11s %10s %10s %10s\n", what, "backend", "Gaussians",
+              "people", "frames/s", "ms", "rendering", "scene, MB", "peak, MB", "GPU, MB");
 }
 
-void print(const Row& r) {
-  std::printf("%12zu %8zu %12.1f %10.2f %10.1f%% %10.0f %10.0f\n", r.gaussians, r.people, 1e3 / r.ms, r.ms, 100 * r.rendering,
-              r.scene_mb, r.peak_mb);
+/// `gpu_mb`: what of a GPU's memory is taken while `backend` and what it drew with are there.
+template <class MakeBackend, class GpuBytes>
+void row(const char* name, const Options& o, const Place& place, const MakeBackend& make,
+         const GpuBytes& gpu_bytes) {
+  gsnav_report::reset_peak_memory();
+  const double before = gpu_bytes();
+  double used = 0;
+  Row r;
+  {
+    const auto backend = make();
+    using B = std::remove_reference_t<decltype(*backend)>;
+    r = o.environments > 1 ? play_many<B>(*backend, o, place) : play_one<B>(*backend, o, place);
+    used = gpu_bytes() - before;
+  }
+  std::printf("%8s %12zu %8zu %12.1f %10.3f %10.1f%% %10.0f %10.0f %10.0f\n", name,
+              place.scene->assets[0].cloud->size(), place.scene->avatars.size(), 1e3 / r.ms, r.ms,
+              100 * r.rendering, static_cast<double>(scene_bytes(*place.scene)) * 1e-6,
+              static_cast<double>(gsnav_report::peak_memory()) * 1e-6, used * 1e-6);
   std::fflush(stdout);
+}
+
+void rows(const Options& o, double millions, std::size_t people) {
+  const Place place = make_place(millions, people);
+  for (const std::string& name : o.backends) {
+    if (name == "openmp") {
+      row(
+          "openmp", o, place, [&] { return std::make_unique<OpenMPBackend>(o.threads); },
+          [] { return 0.0; });
+    }
+#if defined(GSNAV_HAS_CUDA)
+    if (name == "cuda") {
+      row(
+          "cuda", o, place, [] { return std::make_unique<CudaBackend>(); },
+          [] {
+            std::size_t left = 0, all = 0;
+            cudaMemGetInfo(&left, &all);
+            return static_cast<double>(all - left);
+          });
+    }
+#endif
+  }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) try {
   Options o;
-  CLI::App app{"A PointNav loop with 256 x 256 RGB and depth: speed and memory by Gaussians and by people."};
-  app.add_option("--steps", o.steps, "actions a row")->capture_default_str()->check(CLI::Range(1, 1000000));
-  app.add_option("--threads", o.threads, "threads, 0: all")->capture_default_str()->check(CLI::Range(0, 1024));
-  app.add_option("--most", o.most, "no row with more millions of Gaussians")->capture_default_str()->check(CLI::Range(0.02, 7.0));
+#if defined(GSNAV_HAS_CUDA)
+  if (CudaBackend::device_count() > 0) o.backends.push_back("cuda");
+#endif
+  CLI::App app{
+      "A PointNav loop with 256 x 256 RGB and depth: speed and memory by Gaussians and by people."};
+  app.add_option("--steps", o.steps, "actions a row")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
+  app.add_option("--threads", o.threads, "threads of openmp, 0: all")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--most", o.most, "no row with more millions of Gaussians")
+      ->capture_default_str()
+      ->check(CLI::Range(0.02, 7.0));
+  app.add_option("--environments", o.environments,
+                 "more than 1: a batch of so many; ms and frames/s are of each frame")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 4096));
+  app.add_option("--backend", o.backends, "openmp, cuda (where there is one), or both")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"openmp", "cuda"}));
   CLI11_PARSE(app, argc, argv);
-  std::printf("OpenMP backend, %zu threads, %s; %d actions a row\n", OpenMPBackend(o.threads).concurrency(),
-              gsnav_report::machine_name().c_str(), o.steps);
+#if defined(GSNAV_HAS_CUDA)
+  const int gpus = CudaBackend::device_count();
+#else
+  const int gpus = 0;
+#endif
+  if (gpus == 0 && std::find(o.backends.begin(), o.backends.end(), "cuda") != o.backends.end()) {
+    std::fprintf(stderr, "bench_paper_table: --backend cuda: no GPU, or a build without CUDA\n");
+    return 1;
+  }
+  std::printf("%s, %zu threads; %d actions a row, %zu at once\n", gsnav_report::machine_name().c_str(),
+              OpenMPBackend(o.threads).concurrency(), o.steps, o.environments);
   head("by Gaussians");
   for (const double millions : {0.3, 0.5, 1.0, 3.0, 5.0, 7.0}) {
-    if (millions <= o.most) print(play(o, millions, 0));
+    if (millions <= o.most) rows(o, millions, 0);
   }
   head("by people among 2M (fewer where --most says so)");
-  for (const std::size_t people : {0, 1, 2, 5, 10}) print(play(o, std::min(2.0, o.most), people));
-#if defined(GSNAV_HAS_CUDA)
-  std::printf("\nCUDA: the simulator's loop renders by host backends; bench_batch has the GPU's frames.\n");
-#endif
+  for (const std::size_t people : {0u, 1u, 2u, 5u, 10u}) rows(o, std::min(2.0, o.most), people);
   return 0;
 } catch (const std::exception& e) {
   std::fprintf(stderr, "bench_paper_table: %s\n", e.what());

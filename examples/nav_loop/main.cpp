@@ -10,6 +10,9 @@
 #if defined(NAV_LOOP_OPENMP)
 #include "gsnav/backends/openmp.hpp"
 #endif
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda.hpp"
+#endif
 #include "gsnav/sim/follower.hpp"
 #include "recorder.hpp"
 #include "setup.hpp"
@@ -108,7 +111,15 @@ Status dispatch(const Options& options) {
             "--backend openmp: this build has none (GSNAV_OPENMP=OFF); use serial"};
 #endif
   }
+#if defined(GSNAV_HAS_CUDA)
+  if (gsnav::CudaBackend::device_count() == 0) {
+    return {gsnav::Errc::unsupported, "--backend cuda: no GPU, or no driver for it; use openmp"};
+  }
+  gsnav::CudaBackend backend;
+  return run(backend, options);
+#else
   return {gsnav::Errc::unsupported, "--backend " + options.backend + ": nav_loop was not built with it"};
+#endif
 }
 
 }  // namespace

@@ -50,11 +50,12 @@ Result<CapsuleSet> CapsuleSet::create(std::vector<DynamicCapsule> capsules, doub
     if (Status s = check(c); !s.ok()) return s;
   }
   // By content after the ids, so that capsules with equal ids have an order of their own too.
-  std::sort(capsules.begin(), capsules.end(), [](const DynamicCapsule& a, const DynamicCapsule& b) {
+  const auto before = [](const DynamicCapsule& a, const DynamicCapsule& b) {
     if (a.avatar != b.avatar) return a.avatar < b.avatar;
     if (a.bone != b.bone) return a.bone < b.bone;
     return numbers_of(a) < numbers_of(b);
-  });
+  };
+  if (!std::is_sorted(capsules.begin(), capsules.end(), before)) std::sort(capsules.begin(), capsules.end(), before);
   CapsuleSet set;
   set.t0_ = t0;
   set.t1_ = t1;

@@ -100,6 +100,7 @@ Status BatchWorld::begin(const ParallelFor& run, std::span<const std::size_t> wh
     if (!w) return w.status();
     e.world.emplace(std::move(*w));
     e.source = place->bodies;
+    e.source_after = place->bodies_after;
     e.scene = episodes_[i].scene;
   }
   for (const std::size_t i : which) {
@@ -154,7 +155,11 @@ Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size
       const BodyCache::Key key{e.scene, e.world->tick(at), e.world->tick(at + 1)};
       const auto [entry, fresh] = bodies_.find(key);
       e.bodies[k] = &entry->bodies;
-      if (fresh) missing_.push_back({key, entry, &e.source});
+      if (fresh) {
+        const bool goes_on = e.last.scene == key.scene && e.last.t1 == key.t0;
+        missing_.push_back({key, entry, &e, goes_on ? bodies_.peek(e.last) : nullptr});
+      }
+      e.last = key;
     }
   }
   made_.assign(missing_.size(), {});
@@ -162,9 +167,15 @@ Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size
     const BodyCache::Key& key = missing_[m].key;
     made_[m] = guarded([&] {
       std::vector<DynamicCapsule> capsules;
-      (*missing_[m].source)(key.t0, key.t1, capsules);
+      const Environment& e = *missing_[m].environment;
+      if (e.source_after) {
+        e.source_after(key.t0, key.t1, missing_[m].before, capsules);
+      } else {
+        e.source(key.t0, key.t1, capsules);
+      }
       auto set = CapsuleSet::create(std::move(capsules), key.t0, key.t1);
       if (set) missing_[m].entry->bodies = std::move(*set);
+      missing_[m].entry->made = set.ok();
       return set.status();
     });
   });
@@ -180,6 +191,15 @@ Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size
 
 Status BatchWorld::step(const ParallelFor& run, std::span<const Action> actions,
                         const std::function<Status()>& before_reset) {
+  return act(run, actions, before_reset);
+}
+Status BatchWorld::step(const ParallelFor& run, std::span<const VelocityCommand> commands,
+                        const std::function<Status()>& before_reset) {
+  return act(run, commands, before_reset);
+}
+
+template <class A>
+Status BatchWorld::act(const ParallelFor& run, std::span<const A> actions, const std::function<Status()>& before_reset) {
   if (!begun_) return bad("step before reset: no episodes are running");
   if (actions.size() != size()) {
     return bad("step: " + std::to_string(actions.size()) + " actions for " + std::to_string(size()) + " environments");

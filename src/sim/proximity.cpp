@@ -64,20 +64,48 @@ struct Near {
   double speed, first, last, gap;
 };
 
+struct Scratch {
+  std::vector<Near> near;
+  std::vector<double> bounds;  // of each of an avatar's capsules
+  std::vector<std::size_t> order;
+};
+
 /// One avatar's least distance during the tick. A gap changes no faster than both move: bodies that cannot come nearer
 /// than what was already found are not looked at again.
 class Approach {
  public:
-  Approach(std::span<const WalkPoint> path, double agent_speed, double radius, double height,
-           View<const DynamicCapsule> avatar, std::vector<Near>& near)
-      : path_(path), radius_(radius), height_(height), near_(near) {
-    near_.clear();
-    for (const DynamicCapsule& c : avatar) {
-      near_.push_back({&c, (agent_speed + speed_of(c.motion)) * (1 + kRounding) + kRounding, 0.0, 0.0, 0.0});
+  Approach(std::span<const WalkPoint> path, double agent_speed, double radius, double height, Scratch& scratch)
+      : path_(path), agent_speed_(agent_speed), radius_(radius), height_(height), scratch_(scratch), near_(scratch.near) {}
+
+  /// Looks at the boxes that the agent (`reach`) and the avatar's capsules sweep; returns a lower bound of find().
+  double look(const Aabb<double>& reach, View<const DynamicCapsule> avatar) {
+    avatar_ = avatar;
+    scratch_.bounds.resize(avatar.size);
+    nearest_ = 0;
+    for (std::size_t c = 0; c < avatar.size; ++c) {
+      Aabb<double> box;
+      add_capsule(box, avatar[c].motion.begin);
+      add_capsule(box, avatar[c].motion.end);
+      scratch_.bounds[c] = least_distance(reach, box);
+      if (scratch_.bounds[c] < scratch_.bounds[nearest_]) nearest_ = c;
     }
+    return scratch_.bounds[nearest_];
   }
 
+  /// After look(): the least distance.
   double find() {
+    // Capsules that stay farther away than one of them is at the begin are not looked at.
+    const auto take = [this](std::size_t c) {
+      const double speed = agent_speed_ + speed_of(avatar_[c].motion);
+      near_.push_back({&avatar_[c], speed * (1 + kRounding) + kRounding, 0.0, 0.0, 0.0});
+    };
+    near_.clear();
+    take(nearest_);
+    const double most = gap(0.0);
+    near_.clear();
+    for (std::size_t c = 0; c < avatar_.size; ++c) {
+      if (scratch_.bounds[c] <= most) take(c);
+    }
     constexpr int kSamples = 8;
     offer(0.0);
     for (Near& n : near_) n.first = n.gap;
@@ -146,8 +174,11 @@ class Approach {
   }
 
   std::span<const WalkPoint> path_;
-  double radius_, height_;
+  double agent_speed_, radius_, height_;
+  Scratch& scratch_;
   std::vector<Near>& near_;
+  View<const DynamicCapsule> avatar_;
+  std::size_t nearest_ = 0;  // by bounds
   double best_ = std::numeric_limits<double>::infinity(), best_at_ = 0.0;
 };
 
@@ -163,15 +194,19 @@ void closest_approach(std::span<const WalkPoint> path, double radius, double hei
   if (path.empty()) add_capsule(reach, agent_capsule({}, radius, height));
   for (std::size_t g = 0; g < groups.size(); ++g) out[g] = least_distance(reach, groups[g].swept);
   // Whoever may be nearest first: the others are then known to be farther.
-  std::vector<std::size_t> order(groups.size());
+  thread_local Scratch scratch;
+  std::vector<std::size_t>& order = scratch.order;
+  order.resize(groups.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return out[a] < out[b]; });
-  thread_local std::vector<Near> near;
   const double speed = speed_of(path);
   double least = std::numeric_limits<double>::infinity();
   for (const std::size_t g : order) {
     if (out[g] > max(least, kPersonalSpace)) break;
-    out[g] = Approach(path, speed, radius, height, bodies.capsules_of(groups[g]), near).find();
+    Approach approach(path, speed, radius, height, scratch);
+    out[g] = max(out[g], approach.look(reach, bodies.capsules_of(groups[g])));
+    if (out[g] > max(least, kPersonalSpace)) continue;
+    out[g] = approach.find();
     least = min(least, out[g]);
   }
 }

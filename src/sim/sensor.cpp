@@ -61,6 +61,9 @@ Status validate(const SensorSpec& s) {
   if (s.kind == SensorKind::semantic && s.model != SensorModel::pinhole) {
     return bad("model", "not pinhole", "semantic sensors are pinholes");
   }
+  if (s.kind == SensorKind::normal && s.model != SensorModel::pinhole) {
+    return bad("model", "not pinhole", "sensors of normals are pinholes");
+  }
   if (Status noise = validate(s.noise, s.uuid.c_str()); !noise) return noise;
   const SensorKind noisy = s.noise.kind == NoiseKind::redwood_depth ? SensorKind::depth : SensorKind::rgb;
   if (s.noise.kind != NoiseKind::none && s.kind != noisy) {

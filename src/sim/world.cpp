@@ -139,17 +139,7 @@ Result<World::Motion> World::motion_of(Action action) const {
   return m;
 }
 
-Result<StepInfo> World::step(Action action) {
-  if (Status s = ready(); !s) return s;
-  if (action == Action::stop) return stop();
-  const Result<Motion> m = motion_of(action);
-  if (!m) return m.status();
-  return make_bodies_and_move(*m);
-}
-
-Result<StepInfo> World::step(const VelocityCommand& command) {
-  if (Status s = ready(); !s) return s;
-  if (command.stop) return stop();
+Result<World::Motion> World::motion_of(const VelocityCommand& command) const {
   if (!is_finite(command.linear) || !is_finite(command.angular) || !is_finite(command.lateral)) {
     return {Errc::invalid_argument, "VelocityCommand: linear, angular and lateral must be finite"};
   }
@@ -161,12 +151,22 @@ Result<StepInfo> World::step(const VelocityCommand& command) {
   const double straight = dt * (abs(half) > 1e-9 ? std::sin(half) / half : 1.0);
   m.chord = command.linear * straight;
   m.side = command.lateral * straight;
-  return make_bodies_and_move(m);
+  return m;
 }
 
-Result<StepInfo> World::step(Action action, std::span<const CapsuleSet* const> bodies) {
+template <class A>
+Result<StepInfo> World::act(const A& action) {
   if (Status s = ready(); !s) return s;
-  if (action == Action::stop) return stop();
+  if (stops(action)) return stop();
+  const Result<Motion> m = motion_of(action);
+  if (!m) return m.status();
+  return make_bodies_and_move(*m);
+}
+
+template <class A>
+Result<StepInfo> World::act(const A& action, std::span<const CapsuleSet* const> bodies) {
+  if (Status s = ready(); !s) return s;
+  if (stops(action)) return stop();
   if (bodies.size() != static_cast<std::size_t>(config_.substeps)) {
     return {Errc::invalid_argument, std::to_string(bodies.size()) + " sets of bodies for " +
                                         std::to_string(config_.substeps) + " substeps"};
@@ -174,6 +174,13 @@ Result<StepInfo> World::step(Action action, std::span<const CapsuleSet* const> b
   const Result<Motion> m = motion_of(action);
   if (!m) return m.status();
   return move(*m, bodies);
+}
+
+Result<StepInfo> World::step(Action action) { return act(action); }
+Result<StepInfo> World::step(const VelocityCommand& command) { return act(command); }
+Result<StepInfo> World::step(Action action, std::span<const CapsuleSet* const> bodies) { return act(action, bodies); }
+Result<StepInfo> World::step(const VelocityCommand& command, std::span<const CapsuleSet* const> bodies) {
+  return act(command, bodies);
 }
 
 Result<StepInfo> World::stop() {

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <cstring>
+#include <limits>
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/sim/batch.hpp"
@@ -113,6 +114,47 @@ TEST_CASE("a batch has the bits of single simulators over 1,000 random steps amo
   }
   CHECK(ended > 60);
   CHECK(contacts > 0);
+}
+
+TEST_CASE("a batch that is steered by velocities has the bits of single simulators") {
+  const auto scene = std::make_shared<const SimulatorScene>(peopled_scene(2000));
+  constexpr std::size_t kEnvironments = 3;
+  BatchConfig config = small_batch(8, 12);
+  config.task.substeps = 2;
+  config.auto_reset = AutoReset::disabled;
+  OpenMPBackend backend(2), single_backend(1);
+  const auto first = [](std::size_t e, std::size_t) -> Result<BatchEpisode> {
+    BatchEpisode b = wandering(e, 0).value();
+    b.scene = 0;
+    return b;
+  };
+  auto batch = make_batch_simulator(backend, {scene}, config, kEnvironments, first).value();
+  std::vector<Simulator<OpenMPBackend>> single;
+  batch.reset().value();
+  for (std::size_t e = 0; e < kEnvironments; ++e) {
+    single.push_back(Simulator<OpenMPBackend>::create(single_backend, scene, config).value());
+    single[e].reset(first(e, 0).value().episode).value();
+  }
+  Rng rng(12);
+  std::size_t wrong = 0;
+  double moved = 0.0;
+  for (int i = 0; i < 20; ++i) {
+    std::vector<VelocityCommand> commands(kEnvironments);
+    for (VelocityCommand& c : commands) c = {rng.uniform(-0.5, 1.5), rng.uniform(-1, 1), i == 19, rng.uniform(-0.3, 0.3)};
+    const BatchStep out = batch.step(commands).value();
+    for (std::size_t e = 0; e < kEnvironments; ++e) {
+      const Observations obs = single[e].step(commands[e]).value();
+      wrong += same_bits(obs["rgb"], out.images[0].of(e)) && same_info(obs, out.infos[e]) ? 0 : 1;
+      wrong += (out.terminated[e] != 0) == (i == 19) ? 0 : 1;
+      moved += obs.moved;
+    }
+  }
+  CHECK(wrong == 0);
+  CHECK(moved > 1.0);
+  CHECK(batch.reset().ok());
+  std::vector<VelocityCommand> bad(kEnvironments);
+  bad[1].linear = std::numeric_limits<double>::quiet_NaN();
+  CHECK(batch.step(bad).message().find("environment 1: VelocityCommand") != std::string::npos);
 }
 
 namespace {

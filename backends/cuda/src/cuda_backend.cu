@@ -233,5 +233,6 @@ template Status draw_meshes<float, CudaBackend>(CudaBackend&, MeshWorkspace<floa
                                                 bool, MeshImages<float>, MeshStats*);
 template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
 template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
+template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);
 
 }  // namespace gsnav

@@ -14,6 +14,7 @@
 #include "gsnav/avatar/motion.hpp"
 #include "gsnav/avatar/trajectory.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/core/view.hpp"
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/math/similarity.hpp"
 
@@ -61,6 +62,12 @@ class AvatarActor {
     }
     AvatarActor actor;
     actor.inverse_binds_ = asset->skeleton.bind_inverses();
+    actor.holds_capsules_.assign(asset->skeleton.size(), 0);
+    for (const ProxyCapsule& c : asset->capsules) {
+      for (std::int32_t j = c.joint; j >= 0; j = asset->skeleton.parents[static_cast<std::size_t>(j)]) {
+        actor.holds_capsules_[static_cast<std::size_t>(j)] = 1;
+      }
+    }
     actor.asset_ = std::move(asset);
     actor.motion_ = std::move(motion);
     actor.trajectory_ = std::move(trajectory);
@@ -107,24 +114,33 @@ class AvatarActor {
   /// The proxy capsules in the world; none while it is not active.
   std::vector<Capsule<double>> capsules(double t) const {
     std::vector<Capsule<double>> out;
-    if (active(t)) append_capsules(t, out);
+    if (active(t)) for_each_capsule(t, [&](std::size_t, const Capsule<double>& c) { out.push_back(c); });
     return out;
   }
 
   /// Appends the proxy capsules as they move over [t0, t1], endpoints linear in between, with `avatar` as
-  /// the body's number. None unless it is active at some time in between.
-  void dynamic_capsules(double t0, double t1, std::uint32_t avatar, std::vector<DynamicCapsule>& out) const {
+  /// the body's number. None unless it is active at some time in between. `before`: what an interval that ended at t0
+  /// had of it, by bone; may be empty. It saves posing the body for t0 once more.
+  void dynamic_capsules(double t0, double t1, std::uint32_t avatar, std::vector<DynamicCapsule>& out,
+                        View<const DynamicCapsule> before = {}) const {
     // A window in a clock that begins again is looked for at the ends only: it is longer than a step.
     if (options_.loop_period > 0 ? !active(t0) && !active(t1)
                                  : t1 < options_.time_begin || t0 > options_.time_end) {
       return;
     }
-    std::vector<Capsule<double>> begin, end;
-    append_capsules(t0, begin);
-    append_capsules(t1, end);
-    for (std::size_t c = 0; c < begin.size(); ++c) {
-      out.push_back({{begin[c], end[c]}, avatar, static_cast<std::uint32_t>(c)});
+    const std::size_t first = out.size(), count = asset_->capsules.size();
+    out.resize(first + count);
+    const bool known = before.size == count;
+    if (!known) {
+      for_each_capsule(t0, [&](std::size_t c, const Capsule<double>& at) { out[first + c].motion.begin = at; });
     }
+    for_each_capsule(t1, [&](std::size_t c, const Capsule<double>& at) {
+      DynamicCapsule& to = out[first + c];
+      if (known) to.motion.begin = before[c].motion.end;
+      to.motion.end = at;
+      to.avatar = avatar;
+      to.bone = static_cast<std::uint32_t>(c);
+    });
   }
 
  private:
@@ -136,11 +152,12 @@ class AvatarActor {
   double blend_begin() const noexcept { return options_.loop_period - options_.loop_blend; }
   bool blending(double t) const noexcept { return options_.loop_blend > 0 && t > blend_begin(); }
 
-  Similarity placement(double t, LocalPose& pose) const {
+  /// `needed`: the joints that are to be posed, null: all.
+  Similarity placement(double t, LocalPose& pose, const std::vector<char>* needed = nullptr) const {
     t = clock(t);
-    if (!blending(t)) return placement_at(t, pose);
+    if (!blending(t)) return placement_at(t, pose, needed);
     LocalPose next;
-    const Similarity from = placement_at(blend_begin(), pose), to = placement_at(0.0, next);
+    const Similarity from = placement_at(blend_begin(), pose, needed), to = placement_at(0.0, next, needed);
     const double u = (t - blend_begin()) / options_.loop_blend;
     for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
       pose.rotations[j] = slerp(pose.rotations[j], next.rotations[j], u);
@@ -149,26 +166,41 @@ class AvatarActor {
     return {slerp(from.rotation, to.rotation, u), lerp(from.translation, to.translation, u), from.scale};
   }
 
-  Similarity placement_at(double t, LocalPose& pose) const {
+  Similarity placement_at(double t, LocalPose& pose, const std::vector<char>* needed) const {
     const double local = t - options_.time_begin;
     const TrajectorySample at = trajectory_->at(local);
     const double scale = options_.scale;
-    motion_->pose({local, at.distance / scale, at.leg_begin / scale, at.leg_end / scale, at.turned, at.walking,
-                   at.turning},
-                  pose);
+    const MotionInput input{local,     at.distance / scale, at.leg_begin / scale, at.leg_end / scale,
+                            at.turned, at.walking,          at.turning};
+    if (needed != nullptr) {
+      motion_->pose_of(input, *needed, pose);
+    } else {
+      motion_->pose(input, pose);
+    }
     // The path of a clip goes into the placement, so that joint matrices stay small numbers.
     const Similarity base{axis_angle(Vec3d{0, 1, 0}, at.yaw), at.position, scale};
     return {base.rotation, base * pose.root, base.scale};
   }
 
-  void append_capsules(double t, std::vector<Capsule<double>>& out) const {
-    LocalPose pose;
-    const Similarity world = placement(t, pose);
-    std::vector<Affine3<double>> globals;
-    forward_kinematics(asset_->skeleton, pose, globals);
-    for (const ProxyCapsule& c : asset_->capsules) {
-      const Affine3<double>& g = globals[c.joint];
-      out.push_back({world * (g * c.p0), world * (g * c.p1), c.radius * world.scale});
+  /// f(number, capsule in the world) for each proxy capsule at time t.
+  template <class F>
+  void for_each_capsule(double t, const F& f) const {
+    thread_local LocalPose pose;
+    thread_local std::vector<Affine3<double>> globals;
+    const Similarity world = placement(t, pose, &holds_capsules_);
+    const Skeleton& skeleton = asset_->skeleton;
+    globals.resize(skeleton.size());
+    // ForwardKinematics, of the joints that hold capsules.
+    for (std::size_t j = 0; j < globals.size(); ++j) {
+      if (holds_capsules_[j] == 0) continue;
+      const Affine3<double> local{rotation_matrix(pose.rotations[j]), pose.translations[j]};
+      const std::int32_t parent = skeleton.parents[j];
+      globals[j] = parent < 0 ? local : globals[static_cast<std::size_t>(parent)] * local;
+    }
+    for (std::size_t c = 0; c < asset_->capsules.size(); ++c) {
+      const ProxyCapsule& proxy = asset_->capsules[c];
+      const Affine3<double>& g = globals[proxy.joint];
+      f(c, Capsule<double>{world * (g * proxy.p0), world * (g * proxy.p1), proxy.radius * world.scale});
     }
   }
 
@@ -177,6 +209,7 @@ class AvatarActor {
   std::shared_ptr<const MotionSource> motion_;
   std::shared_ptr<const Trajectory> trajectory_;
   std::vector<Affine3<double>> inverse_binds_;
+  std::vector<char> holds_capsules_;  // joints of capsules and all above them
   ActorOptions options_;
 };
 

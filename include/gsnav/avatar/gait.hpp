@@ -74,7 +74,9 @@ class WalkMotion final : public MotionSource {
   double stride() const noexcept { return stride_; }
   const GaitOptions& options() const noexcept { return options_; }
 
-  void pose(const MotionInput& input, LocalPose& out) const override {
+  void pose(const MotionInput& input, LocalPose& out) const override { pose_of(input, {}, out); }
+  /// `needed` may be empty: all are.
+  void pose_of(const MotionInput& input, const std::vector<char>& needed, LocalPose& out) const override {
     Steps steps;
     steps.stride = stride_;
     const double length = input.leg_end - input.leg_begin;
@@ -91,7 +93,7 @@ class WalkMotion final : public MotionSource {
     steps.turning = input.turning;
     // The body sways fully already at half the speed: steps are as long as ever.
     const double slow = 1.0 - clamp(input.walking, 0.0, 1.0);
-    pose(steps, 1.0 - slow * slow * slow, input.time, out);
+    pose(steps, 1.0 - slow * slow * slow, input.time, needed, out);
   }
 
   /// The pose at `cycles` of the gait in the middle of a walk (0: the right heel strikes, 0.5: the left).
@@ -100,7 +102,7 @@ class WalkMotion final : public MotionSource {
     Steps steps;
     steps.cycles = cycles;
     steps.stride = walking * stride_;
-    pose(steps, walking, time, out);
+    pose(steps, walking, time, {}, out);
   }
 
  private:
@@ -132,20 +134,22 @@ class WalkMotion final : public MotionSource {
     double stretch;  // of the leg, 1: straight
   };
 
-  void pose(const Steps& steps, double walking, double time, LocalPose& out) const {
+  void pose(const Steps& steps, double walking, double time, const std::vector<char>& needed, LocalPose& out) const {
     const double cycles = steps.cycles;
     const double phase = cycles - std::floor(cycles);
-    std::vector<Quatd> turn(parents_.size());  // of each joint from the bind pose, in the root frame
+    thread_local std::vector<Quatd> turn;  // of each joint from the bind pose, in the root frame
+    thread_local std::vector<char> set;
+    turn.resize(parents_.size());
+    set.assign(parents_.size(), 0);
     const Body b = body(phase, walking, pelvis_drop_);
     out.translations = rest_.translations;
     out.translations[at(kPelvis)] = b.pelvis;
     out.root = {};
 
     // Everything first hangs on its parent as in the bind pose.
-    std::vector<bool> set(parents_.size(), false);
     const auto give = [&](std::size_t joint, const Quatd& q) {
       turn[joint] = q;
-      set[joint] = true;
+      set[joint] = 1;
     };
     give(at(kPelvis), b.rotation);
     const double c = std::cos(kTau * phase), breath = std::sin(1.5 * time);
@@ -180,9 +184,10 @@ class WalkMotion final : public MotionSource {
     }
     out.rotations.resize(parents_.size());
     for (std::size_t j = 0; j < parents_.size(); ++j) {
+      if (!needed.empty() && needed[j] == 0) continue;
       const std::int32_t p = parents_[j];
       const Quatd above = p < 0 ? Quatd{} : turn[static_cast<std::size_t>(p)];
-      if (!set[j]) turn[j] = curl_[j] < 0 || curl_[j] > 0 ? above * about_z(curl_[j]) : above;
+      if (set[j] == 0) turn[j] = curl_[j] < 0 || curl_[j] > 0 ? above * about_z(curl_[j]) : above;
       const Quatd parent = p < 0 ? Quatd{} : above * rest_globals_[static_cast<std::size_t>(p)].rotation;
       out.rotations[j] = conjugate(parent) * (turn[j] * rest_globals_[j].rotation);
       normalize(out.rotations[j]);

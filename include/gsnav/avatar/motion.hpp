@@ -36,6 +36,10 @@ class MotionSource {
   virtual ~MotionSource() = default;
   /// Fills all of `out`. The same input gives the same pose.
   virtual void pose(const MotionInput& input, LocalPose& out) const = 0;
+  /// The same for those joints whose `needed` [J] is not 0; of others `out` has anything. Their ancestors are needed too.
+  virtual void pose_of(const MotionInput& input, [[maybe_unused]] const std::vector<char>& needed, LocalPose& out) const {
+    pose(input, out);
+  }
   /// Number of joints of the poses.
   virtual std::size_t joint_count() const noexcept = 0;
   /// invalid_argument naming what is wrong.
@@ -120,7 +124,9 @@ class MotionClip final : public MotionSource {
     return {};
   }
 
-  void pose(const MotionInput& input, LocalPose& out) const override {
+  void pose(const MotionInput& input, LocalPose& out) const override { pose_of(input, {}, out); }
+  /// `needed` may be empty: all are.
+  void pose_of(const MotionInput& input, const std::vector<char>& needed, LocalPose& out) const override {
     const std::size_t last = frames() - 1;
     double t = start + playback_rate * input.time, rounds = 0.0;
     std::size_t a = 0, b = 0;
@@ -143,6 +149,7 @@ class MotionClip final : public MotionSource {
     out.translations.resize(joints);
     const bool moving = translations.size() != joints;
     for (std::size_t j = 0; j < joints; ++j) {
+      if (!needed.empty() && needed[j] == 0) continue;
       out.rotations[j] = slerp(rotations[a * joints + j], rotations[b * joints + j], u);
       out.translations[j] =
           moving ? lerp(translations[a * joints + j], translations[b * joints + j], u) : translations[j];
@@ -156,7 +163,8 @@ class MotionClip final : public MotionSource {
           return RigidPose<double>{rotations[key * joints],
                                    root_translation[key] + translations[moving ? key * joints : 0]};
         };
-        out.root = screw_between(body(a), body(b), u).translation - out.translations[0];
+        const Vec3d first = moving ? lerp(translations[a * joints], translations[b * joints], u) : translations[0];
+        out.root = screw_between(body(a), body(b), u).translation - first;
       } else {
         out.root = lerp(root_translation[a], next, u);
       }

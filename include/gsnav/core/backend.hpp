@@ -44,6 +44,7 @@ struct NoopFunctor {
 ///     list_tiles(const BinArgs<S>&)           fill tile_offsets at once, in place of count_tiles
 ///     sort_pairs(keys, values, keys_alt, values_alt, n, bits)   stable; true: the result is in *_alt
 ///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)
+///     batch_renderer                          a type that draws many cameras by one call (sim/frame_batch.hpp)
 template <class B>
 concept Backend = requires(B& b, void* p, const void* q, std::size_t n, detail::NoopFunctor f) {
   typename B::memory_space;

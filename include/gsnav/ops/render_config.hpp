@@ -40,6 +40,8 @@ struct RenderConfig {
   double first_hit_tau = 0.5;          ///< in (0, 1): first-hit depth is where alpha reaches this
   Vec3d background{0, 0, 0};           ///< display-referred
   Composite composite = Composite::merged;  ///< of Gaussians and meshes, where a frame has both
+
+  bool operator==(const RenderConfig&) const = default;
 };
 
 /// Side of the tiles that an image is rendered in. On a processor large images have tiles of 32 pixels: their

@@ -8,9 +8,11 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "gsnav/core/thread_pool.hpp"
 #include "gsnav/sim/batch_world.hpp"
 #include "gsnav/sim/scene_library.hpp"
 #include "gsnav/sim/simulator.hpp"
@@ -18,14 +20,16 @@
 namespace gsnav {
 
 /// One sensor's images of all environments, [environments][height][width][channels]. Valid until the next call.
+/// interop/dlpack.hpp makes tensors of them, wherever they are.
 struct BatchObservation {
   std::string_view uuid;
   SensorKind kind = SensorKind::rgb;
   std::size_t environments = 0;
   int height = 0, width = 0, channels = 0;
-  std::span<const float> data;
+  std::span<const float> data;        ///< in host memory; empty where images stay in the backend's
+  const float* on_backend = nullptr;  ///< there (BatchConfig::images), whole when the call that drew them returns
 
-  /// The image of one environment (of a finished one: by its place in BatchStep::finished).
+  /// The image, in host memory, of one environment (of a finished one: by its place in BatchStep::finished).
   std::span<const float> of(std::size_t environment) const noexcept {
     const std::size_t n = data.size() / environments;
     return data.subspan(environment * n, n);
@@ -45,6 +49,8 @@ struct BatchConfig : SimulatorConfig {
   /// Times of a scene for which its avatars are held posed at once; more are drawn one after the other. Memory grows
   /// with it.
   std::size_t pose_slots = 8;
+  /// `backend` leaves images on the GPU that drew them: colour, depth and alpha of pinholes, without noise.
+  ImageMemory images = ImageMemory::host;
 };
 
 /// N environments over M scenes that they share: what N Simulators would do, bit for bit, by one call.
@@ -96,11 +102,10 @@ class BatchSimulator {
   /// One action for each environment, [N]. Errors: invalid_argument (another number of actions; an environment that is
   /// done, with AutoReset::disabled; before reset), with the environment's number; what World::step reports; rendering.
   Result<BatchStep> step(std::span<const Action> actions) {
-    const auto draw_final = [this] { return observe_finished(); };
-    if (Status s = worlds_.step(parallel(), actions, draw_final); !s) return s;
-    let_scenes_go();
-    return observe(false);
+    return act(actions);
   }
+  /// The same by velocities, as Simulator::step(VelocityCommand).
+  Result<BatchStep> step(std::span<const VelocityCommand> commands) { return act(commands); }
 
   /// Renders made so far, and how many times an avatar was skinned for them.
   std::size_t render_count() const noexcept { return rig_.render_count(); }
@@ -120,13 +125,17 @@ class BatchSimulator {
                                        EpisodeSource next_episode) {
     if (Status s = validate(static_cast<const SimulatorConfig&>(config)); !s) return s;
     if (config.pose_slots < 1) return {Errc::invalid_argument, "BatchConfig.pose_slots = 0: must be >= 1"};
+    if (Status s = SensorRig<B>::check_memory(config.sensors, config.images); !s) return s;
     BatchPlaces places;
     places.count = scenes;
     places.get = [scene_of](std::size_t i) -> Result<BatchScene> {
       auto scene = scene_of(i);
       if (!scene) return scene.status();
       return BatchScene{(*scene)->navmesh,
-                        [held = *scene](double t0, double t1, auto& out) { append_bodies(*held, t0, t1, out); }};
+                        [held = *scene](double t0, double t1, auto& out) { append_bodies(*held, t0, t1, out); },
+                        [held = *scene](double t0, double t1, const CapsuleSet* before, auto& out) {
+                          append_bodies(*held, t0, t1, out, before);
+                        }};
     };
     const bool scenes_leave = prefetch != nullptr;
     places.prefetch = std::move(prefetch);
@@ -149,6 +158,10 @@ class BatchSimulator {
       images_.push_back({s.uuid, s.kind, 0, s.resolution[0], s.resolution[1], channels_of(s.kind), {}});
     }
     final_images_ = images_;
+    buffers_.memory = final_buffers_.memory = config_.images;
+    if constexpr (!is_host_backend<B>) {
+      pool_ = std::make_unique<ThreadPool>(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+    }
   }
 
   /// Puts a scene that environments are in into the backend's memory, where it is not there yet.
@@ -177,9 +190,21 @@ class BatchSimulator {
       if constexpr (is_host_backend<B>) {
         backend_->parallel_for(n, f);
       } else {
-        for (std::size_t i = 0; i < n; ++i) f(i);
+        // Worlds step on the host, whatever draws them.
+        const std::size_t piece = n / kPieces + 1;
+        pool_->run(static_cast<std::uint32_t>((n + piece - 1) / piece), [&f, n, piece](std::uint32_t p) {
+          for (std::size_t i = p * piece; i < std::min(n, (p + 1) * piece); ++i) f(i);
+        });
       }
     };
+  }
+
+  template <class A>
+  Result<BatchStep> act(std::span<const A> actions) {
+    const auto draw_final = [this] { return observe_finished(); };
+    if (Status s = worlds_.step(parallel(), actions, draw_final); !s) return s;
+    let_scenes_go();
+    return observe(false);
   }
 
   Result<BatchStep> observe(bool all) {
@@ -210,10 +235,11 @@ class BatchSimulator {
     return {};
   }
 
-  void fill(std::vector<BatchObservation>& images, const SensorImages& buffers) const {
+  void fill(std::vector<BatchObservation>& images, const SensorImages<B>& buffers) const {
     for (std::size_t i = 0; i < images.size(); ++i) {
       images[i].environments = buffers.rows;
       images[i].data = rig_.all(buffers, i);
+      images[i].on_backend = rig_.all_on_backend(buffers, i);
     }
   }
 
@@ -222,7 +248,7 @@ class BatchSimulator {
   };
 
   /// Draws `lookers_` into their rows: as many times of the scenes at once as there are slots for.
-  Status draw(SensorImages& images) {
+  Status draw(SensorImages<B>& images) {
     for (const Looker& l : lookers_) {
       if (Status s = place_scene(worlds_.scene_of(l.environment)); !s) return s;
     }
@@ -263,10 +289,12 @@ class BatchSimulator {
       const std::size_t e = lookers_[i].environment;
       const AgentPose& agent = world(e).agent();
       views_.push_back({agent.position, agent.rotation(), agent.pitch,
-                        noise_seed(config_.seed + e, world(e).state()), posed.sets(slot), &config, lookers_[i].row});
+                        noise_seed(config_.seed + e, world(e).state()), posed.sets(slot), &config, lookers_[i].row, posed.meshes()});
     }
     return {};
   }
+
+  static constexpr std::size_t kPieces = 64;
 
   B* backend_;
   BatchWorld worlds_;
@@ -278,7 +306,8 @@ class BatchSimulator {
   std::vector<RenderConfig> render_configs_;
   std::vector<std::uint8_t> in_use_;
   std::size_t left_poses_ = 0;
-  SensorImages buffers_, final_buffers_;
+  SensorImages<B> buffers_, final_buffers_;
+  std::unique_ptr<ThreadPool> pool_;  // where the backend's own work is not the host's
   std::vector<BatchObservation> images_, final_images_;
   std::vector<Looker> lookers_;
   std::vector<SensorView> views_;

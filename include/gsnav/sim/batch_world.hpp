@@ -45,8 +45,13 @@ struct BatchInfo {
 
 /// A scene without pictures, shared by environments.
 struct BatchScene {
+  /// World::BodySource that is given what an interval that ended at t0 had, or null: nobody need be posed for t0 again.
+  using BodySourceAfter =
+      std::function<void(double t0, double t1, const CapsuleSet* before, std::vector<DynamicCapsule>& out)>;
+
   std::shared_ptr<const NavMesh> navmesh;
   World::BodySource bodies;
+  BodySourceAfter bodies_after{};  ///< where it is set, used in place of `bodies` during steps, and the same
 };
 
 /// Scenes by number, fetched when an episode begins in them and let go when no environment is in them.
@@ -89,18 +94,24 @@ class BatchWorld {
   /// known and their worlds are still as they ended. Errors name the environment: invalid_argument; what World::step
   /// reports; what the callback does.
   Status step(const ParallelFor& run, std::span<const Action> actions, const std::function<Status()>& before_reset = {});
+  Status step(const ParallelFor& run, std::span<const VelocityCommand> commands,
+              const std::function<Status()>& before_reset = {});
 
  private:
   struct Environment {
     std::optional<World> world;
     std::size_t scene = 0, episodes = 0;
     World::BodySource source;
+    BatchScene::BodySourceAfter source_after;
+    BodyCache::Key last;  // the interval of the last substep
     std::optional<Result<BatchEpisode>> next;  // where it was asked for already
     std::vector<const CapsuleSet*> bodies;  // [substeps]
     Status status;
     bool moved = false;
   };
   BatchWorld() = default;
+  template <class A>
+  Status act(const ParallelFor& run, std::span<const A> actions, const std::function<Status()>& before_reset);
   Status begin(const ParallelFor& run, std::span<const std::size_t> which);
   Status make_bodies(const ParallelFor& run, std::span<const std::size_t> which);
   Status first_error(std::span<const std::size_t> which) const;
@@ -119,7 +130,8 @@ class BatchWorld {
   struct Missing {
     BodyCache::Key key;
     BodyCache::Entry* entry;
-    const World::BodySource* source;
+    const Environment* environment;
+    const CapsuleSet* before;
   };
   std::vector<Missing> missing_;
   std::vector<Status> made_;

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
+#include <list>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
 #include "gsnav/nav/obstacles.hpp"
 
@@ -24,25 +22,35 @@ class BodyCache {
   };
   struct Entry {
     CapsuleSet bodies;
-    std::uint64_t used = 0;
+    bool made = false;                ///< set by whoever makes the bodies
+    std::list<Key>::iterator place{};  ///< the cache's own
   };
 
   /// The entry of `key`, which stays where it is until trim(), and whether its bodies have yet to be made.
   std::pair<Entry*, bool> find(const Key& key) {
     const auto [at, fresh] = entries_.try_emplace(key);
-    at->second.used = now_;
-    return {&at->second, fresh};
+    Entry& entry = at->second;
+    if (fresh) {
+      entry.place = order_.insert(order_.end(), key);
+    } else {
+      order_.splice(order_.end(), order_, entry.place);
+    }
+    return {&entry, fresh};
   }
-  void erase(const Key& key) { entries_.erase(key); }
-  /// Forgets the oldest entries where there are more than `most`, some at once so that it is seldom done.
+  /// The bodies of `key` where they are there and made, else null.
+  const CapsuleSet* peek(const Key& key) const {
+    const auto at = entries_.find(key);
+    return at != entries_.end() && at->second.made ? &at->second.bodies : nullptr;
+  }
+  void erase(const Key& key) {
+    const auto at = entries_.find(key);
+    if (at == entries_.end()) return;
+    order_.erase(at->second.place);
+    entries_.erase(at);
+  }
+  /// Forgets the oldest entries where there are more than `most`.
   void trim(std::size_t most) {
-    ++now_;
-    if (entries_.size() <= most) return;
-    ages_.clear();
-    for (const auto& e : entries_) ages_.push_back(e.second.used);
-    const auto keep = static_cast<std::ptrdiff_t>(most - most / 8);
-    std::nth_element(ages_.begin(), ages_.begin() + keep, ages_.end(), std::greater<>());
-    std::erase_if(entries_, [last = ages_[static_cast<std::size_t>(keep)]](const auto& e) { return e.second.used <= last; });
+    while (entries_.size() > most) erase(Key(order_.front()));
   }
   std::size_t size() const noexcept { return entries_.size(); }
 
@@ -54,8 +62,7 @@ class BodyCache {
     }
   };
   std::unordered_map<Key, Entry, Hash> entries_;
-  std::vector<std::uint64_t> ages_;
-  std::uint64_t now_ = 1;
+  std::list<Key> order_;  // the one used last at the end
 };
 
 }  // namespace gsnav

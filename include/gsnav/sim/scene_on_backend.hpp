@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -11,6 +12,8 @@
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/skinned_gaussians.hpp"
 #include "gsnav/nav/navmesh.hpp"
+#include "gsnav/nav/obstacles.hpp"
+#include "gsnav/scene/placed_meshes.hpp"
 #include "gsnav/scene/renderer.hpp"
 
 namespace gsnav {
@@ -21,9 +24,17 @@ struct SceneAsset {
   Similarity world_from_asset{};
 };
 
+/// A surface of triangles and how it stands in the world; seen among the Gaussians (docs/composition.md).
+struct SceneMesh {
+  std::shared_ptr<const PlacedMeshes> surface;
+  Similarity world_from_surface{};
+};
+
 /// What a simulator runs in. Shared, never changed: many simulators may use one.
 struct SimulatorScene {
   std::vector<SceneAsset> assets;
+  std::vector<SceneMesh> meshes;
+  MeshLight light{};  ///< of the meshes
   std::shared_ptr<const NavMesh> navmesh;
   std::vector<AvatarActor> avatars;
 };
@@ -36,13 +47,26 @@ inline Status validate(const SimulatorScene& scene) {
       return {Errc::invalid_argument, "SimulatorScene.assets[" + std::to_string(i) + "].cloud is null"};
     }
   }
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    if (scene.meshes[i].surface == nullptr) {
+      return {Errc::invalid_argument, "SimulatorScene.meshes[" + std::to_string(i) + "].surface is null"};
+    }
+  }
   return {};
 }
 
-/// Appends how the scene's avatars move over [t0, t1], numbered as they stand in the scene.
-inline void append_bodies(const SimulatorScene& scene, double t0, double t1, std::vector<DynamicCapsule>& out) {
+/// Appends how the scene's avatars move over [t0, t1], numbered as they stand in the scene. `before`: what this gave
+/// for an interval that ended at t0, or null; with it the same comes in half the time.
+inline void append_bodies(const SimulatorScene& scene, double t0, double t1, std::vector<DynamicCapsule>& out,
+                          const CapsuleSet* before = nullptr) {
+  std::span<const CapsuleSet::Group> there;  // by avatar
+  if (before != nullptr) there = before->groups();
   for (std::size_t i = 0; i < scene.avatars.size(); ++i) {
-    scene.avatars[i].dynamic_capsules(t0, t1, static_cast<std::uint32_t>(i), out);
+    const auto number = static_cast<std::uint32_t>(i);
+    View<const DynamicCapsule> of_it;
+    while (!there.empty() && before->capsules_of(there.front())[0].avatar < number) there = there.subspan(1);
+    if (!there.empty() && before->capsules_of(there.front())[0].avatar == number) of_it = before->capsules_of(there.front());
+    scene.avatars[i].dynamic_capsules(t0, t1, number, out, of_it);
   }
 }
 
@@ -56,6 +80,13 @@ class SceneOnBackend {
       arrays_.emplace_back(backend, *a.cloud);
       sets_.push_back(arrays_.back().set(a.world_from_asset));
     }
+    for (std::size_t m = 0; m < scene_->meshes.size(); ++m) place(m);
+    // People of one body share it.
+    for (const AvatarActor& actor : scene_->avatars) {
+      std::shared_ptr<const AvatarArrays<B>> body;
+      for (const auto& known : bodies_) body = known->asset() == actor.asset() ? known : body;
+      bodies_.push_back(body != nullptr ? body : std::make_shared<const AvatarArrays<B>>(backend, actor.asset()));
+    }
   }
 
   const SimulatorScene& scene() const noexcept { return *scene_; }
@@ -66,6 +97,8 @@ class SceneOnBackend {
   }
   /// The scene without its avatars.
   std::span<const GaussianSet> assets() const noexcept { return sets_; }
+  /// The scene's meshes; an instance's id is the number of the SceneMesh that it is of.
+  MeshFrame meshes() const noexcept { return {instances_, scene_->light}; }
   /// How many times an avatar was posed so far.
   std::size_t pose_count() const noexcept { return pose_count_; }
 
@@ -94,10 +127,23 @@ class SceneOnBackend {
   Slot& at(std::size_t slot) {
     while (slots_.size() <= slot) {
       auto s = std::make_unique<Slot>();
-      for (const AvatarActor& actor : scene_->avatars) s->skins.emplace_back(*backend_, actor.asset());
+      for (const auto& body : bodies_) s->skins.emplace_back(*backend_, body);
       slots_.push_back(std::move(s));
     }
     return *slots_[slot];
+  }
+
+  void place(std::size_t mesh) {
+    const SceneMesh& m = scene_->meshes[mesh];
+    std::vector<std::size_t> at(m.surface->meshes.size());
+    for (std::size_t part = 0; part < at.size(); ++part) {
+      at[part] = mesh_arrays_.size();
+      mesh_arrays_.emplace_back(*backend_, m.surface->meshes.view(part));
+    }
+    for (const TexturedScene::Instance& i : m.surface->instances) {
+      instances_.push_back(mesh_arrays_[at[i.part]].instance(m.world_from_surface * i.world_from_part,
+                                                             static_cast<std::uint32_t>(mesh)));
+    }
   }
 
   template <class PoseAvatar>
@@ -118,6 +164,9 @@ class SceneOnBackend {
   std::shared_ptr<const SimulatorScene> scene_;
   std::vector<GaussianArrays<B>> arrays_;
   std::vector<GaussianSet> sets_;  // of the assets
+  std::vector<MeshArrays<B>> mesh_arrays_;
+  std::vector<MeshInstance> instances_;
+  std::vector<std::shared_ptr<const AvatarArrays<B>>> bodies_;  // of each avatar
   std::vector<std::unique_ptr<Slot>> slots_;
   std::size_t pose_count_ = 0;
 };

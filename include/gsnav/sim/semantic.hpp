@@ -9,11 +9,13 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/kernels/mesh.hpp"
 
 namespace gsnav {
 
-/// Which set of Gaussians a pixel shows: sets are rendered white in one channel each, three to a render, and black in the
-/// others, so that a channel is how much of the pixel its set is. Exact: the same list, order and alphas as in colour.
+/// Which set of Gaussians, or which of a scene's meshes, a pixel shows: each is rendered white in one channel, three to a
+/// render, and black in the others, so that a channel is how much of the pixel it is. Exact: the same list, order and
+/// alphas as in colour. Meshes are numbered behind the sets, by MeshInstance::id.
 template <Backend B>
 class SemanticPasses {
  public:
@@ -21,7 +23,8 @@ class SemanticPasses {
 
   explicit SemanticPasses(B& backend) : shades_{Floats(backend), Floats(backend), Floats(backend), Floats(backend)} {}
 
-  static std::size_t count(std::size_t sets) noexcept { return (sets + kChannels - 1) / kChannels; }
+  /// Passes for so many sets and meshes.
+  static std::size_t count(std::size_t things) noexcept { return (things + kChannels - 1) / kChannels; }
 
   /// Makes room for sets of so many Gaussians; what recolored() returned before is then void.
   void reserve(std::size_t gaussians) {
@@ -48,6 +51,19 @@ class SemanticPasses {
     return out;
   }
 
+  /// The meshes as pass `pass` draws them, where there are so many sets.
+  static std::vector<MeshInstance> recolored(std::span<const MeshInstance> meshes, std::size_t sets, std::size_t pass) {
+    std::vector<MeshInstance> out(meshes.begin(), meshes.end());
+    for (MeshInstance& m : out) {
+      const std::size_t thing = sets + m.id, channel = thing / kChannels == pass ? thing % kChannels : kChannels;
+      m.mesh.texture = {};
+      m.mesh.colors = {};
+      m.mesh.unlit = true;
+      m.mesh.base_color = {channel == 0 ? 1.0f : 0.0f, channel == 1 ? 1.0f : 0.0f, channel == 2 ? 1.0f : 0.0f};
+    }
+    return out;
+  }
+
  private:
   using Floats = Buffer<float, B>;
   static constexpr float kWhite = 0.5f / 0.28209479177387814f;  // the coefficient whose colour is 1; its negative, 0
@@ -55,13 +71,13 @@ class SemanticPasses {
   std::size_t size_ = 0;
 };
 
-/// One plus the set with the largest share in each pixel, 0 where all together cover less than half of it. `shares[p]` is
+/// One plus the set or mesh with the largest share in each pixel, 0 where all together cover less than half of it. `shares[p]` is
 /// pass p's image, [pixels][3]; of equal sets the first counts.
-inline void label_pixels(std::span<const std::vector<float>> shares, std::size_t sets, std::span<float> labels) noexcept {
+inline void label_pixels(std::span<const std::vector<float>> shares, std::size_t things, std::span<float> labels) noexcept {
   for (std::size_t i = 0; i < labels.size(); ++i) {
     float sum = 0.0f, most = 0.0f;
     std::size_t best = 0;
-    for (std::size_t s = 0; s < sets; ++s) {
+    for (std::size_t s = 0; s < things; ++s) {
       const float share = shares[s / 3][3 * i + s % 3];
       sum += share;
       if (share > most) {

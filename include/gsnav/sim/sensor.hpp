@@ -18,7 +18,11 @@ enum class SensorKind : std::uint8_t {
   rgb,    ///< [H][W][3] float32, display-referred, 0 to 1 and above
   depth,  ///< [H][W] float32, metres (median), 0: no return; planar z, along the ray where not pinhole
   alpha,  ///< [H][W] float32, how much of the pixel is covered
-  semantic,  ///< [H][W] float32, whose most of the pixel is: 1, 2, ... the scene's assets, then its avatars; 0: nobody's
+  /// [H][W] float32, whose most of the pixel is: 1, 2, ... the scene's assets, its avatars, its meshes; 0: nobody's
+  semantic,
+  /// [H][W][3] float32, where the depth sensor would see a mesh that surface's normal, unit, on the camera's side, in
+  /// the sensor's axes (x right, y up, looking along -z); 0 elsewhere. Host backends.
+  normal,
 };
 
 /// How directions become pixels.
@@ -62,7 +66,9 @@ std::vector<SensorSpec> rgbd_sensors(int height = 256, int width = 256, double h
 std::vector<SensorSpec> pointnav_v2_sensors();
 
 /// Channels of a sensor's image.
-inline int channels_of(SensorKind kind) noexcept { return kind == SensorKind::rgb ? 3 : 1; }
+inline int channels_of(SensorKind kind) noexcept {
+  return kind == SensorKind::rgb || kind == SensorKind::normal ? 3 : 1;
+}
 
 /// invalid_argument, naming the sensor and its field, where a value is impossible.
 Status validate(const SensorSpec& spec);

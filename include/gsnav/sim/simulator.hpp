@@ -115,7 +115,7 @@ class Simulator {
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
     const AgentPose& agent = world_.agent();
     const SensorView view{agent.position, agent.rotation(), agent.pitch, noise_seed(config_.seed, world_.state()),
-                          scene_.sets(0), &config_.render, 0};
+                          scene_.sets(0), &config_.render, 0, scene_.meshes()};
     rig_.resize(buffers_, 1);
     if (Status s = rig_.render(std::span(&view, 1), buffers_); !s) return s;
     for (std::size_t i = 0; i < images_.size(); ++i) images_[i].data = rig_.image(buffers_, i, 0);
@@ -152,6 +152,7 @@ class Simulator {
     RenderConfig rc = config_.render;
     rc.outputs = outputs;
     rig_.renderer().set_config(rc);
+    rig_.renderer().set_meshes(scene_.meshes().instances, scene_.scene().light);
     ++spectator_count_;
     if (Status s = rig_.renderer().render(scene_.sets(0), std::span(&camera, 1), spectator_); !s) return s;
     return &spectator_;
@@ -163,7 +164,7 @@ class Simulator {
     const WorldState& s = world_.state();
     if (!s.running) return {Errc::invalid_argument, "goal_images before reset: no episode is running"};
     const SensorView view{s.goal.position, goal_rotation(s.episode), 0.0, noise_seed(config_.seed, s),
-                          scene_.assets(), &config_.render, 0};
+                          scene_.assets(), &config_.render, 0, scene_.meshes()};
     rig_.resize(goal_buffers_, 1);
     if (Status e = rig_.render(std::span(&view, 1), goal_buffers_); !e) return e;
     goal_images_ = images_;
@@ -187,7 +188,7 @@ class Simulator {
   SimulatorConfig config_;
   SceneOnBackend<B> scene_;
   SensorRig<B> rig_;
-  SensorImages buffers_, goal_buffers_;
+  SensorImages<B> buffers_, goal_buffers_;
   std::vector<Observation> images_, goal_images_;
   Frames<float> spectator_;
   std::size_t spectator_count_ = 0;

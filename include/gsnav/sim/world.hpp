@@ -84,6 +84,7 @@ class World {
   /// The same among bodies that the caller made for all who share them: [substeps], set k over
   /// [tick(k), tick(k + 1)]. Errors also: invalid_argument for another number of sets.
   Result<StepInfo> step(Action action, std::span<const CapsuleSet* const> bodies);
+  Result<StepInfo> step(const VelocityCommand& command, std::span<const CapsuleSet* const> bodies);
 
   bool done() const noexcept { return s_.done; }
   /// The episode is over because stop was called; else, where done, because it was cut off.
@@ -131,6 +132,13 @@ class World {
 
   Status ready() const;
   Result<Motion> motion_of(Action action) const;
+  Result<Motion> motion_of(const VelocityCommand& command) const;
+  static bool stops(Action action) noexcept { return action == Action::stop; }
+  static bool stops(const VelocityCommand& command) noexcept { return command.stop; }
+  template <class A>
+  Result<StepInfo> act(const A& action);
+  template <class A>
+  Result<StepInfo> act(const A& action, std::span<const CapsuleSet* const> bodies);
   Result<StepInfo> stop();
   Result<StepInfo> make_bodies_and_move(const Motion& motion);
   StepInfo move(const Motion& motion, std::span<const CapsuleSet* const> bodies);

@@ -9,6 +9,7 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/cut_depth.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/render.hpp"
@@ -27,6 +28,8 @@ class PinnedRing;
 constexpr Exp2 device_exp2(Exp2 asked) noexcept { return asked == Exp2::degree3 ? Exp2::hardware : asked; }
 }  // namespace cuda
 
+class CudaBatchRenderer;
+
 /// Device memory of one GPU.
 struct CudaSpace {};
 
@@ -39,6 +42,8 @@ struct CudaSpace {};
 class CudaBackend {
  public:
   using memory_space = CudaSpace;
+  /// What draws many cameras at once (optional member; gsnav/backends/cuda/batch.hpp, included below).
+  using batch_renderer = CudaBatchRenderer;
 
   /// GPUs that the driver shows; 0 where there is no driver.
   static int device_count() noexcept;
@@ -137,6 +142,9 @@ extern template Status draw_meshes<float, CudaBackend>(CudaBackend&, MeshWorkspa
                                                        int, bool, MeshImages<float>, MeshStats*);
 extern template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
 extern template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
+extern template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);
 #endif
 
 }  // namespace gsnav
+
+#include "gsnav/backends/cuda/batch.hpp"

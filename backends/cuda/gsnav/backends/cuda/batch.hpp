@@ -45,6 +45,9 @@ struct BatchStats {
 /// tiles are of 8 or 16 pixels, as the number of cameras has it.
 class CudaBatchRenderer {
  public:
+  using camera_type = BatchCamera;
+  using images_type = BatchImages;
+
   /// The backend must outlive it; work goes to its stream.
   explicit CudaBatchRenderer(CudaBackend& backend, const RenderConfig& config = {});
   ~CudaBatchRenderer();

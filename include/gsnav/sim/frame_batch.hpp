@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/scene/renderer.hpp"
+
+namespace gsnav {
+
+/// Backends that draw many cameras in one call, each with sets of its own, into images in their own
+/// memory (CudaBatchRenderer says what is asked of it).
+template <class B>
+concept BatchBackend = Backend<B> && !is_host_backend<B> && requires {
+  typename B::batch_renderer;
+};
+
+/// Draws frames that share nothing: by Renderer, or where the backend has a batched renderer by one call
+/// of that for all frames of one size, rules and images. The bits are the same.
+template <Backend B>
+class FrameBatch {
+ public:
+  explicit FrameBatch(B& backend) : renderer_(backend) {}
+
+  /// Images in host memory. Errors: what rendering reports.
+  Status render(std::span<const FrameJob<float>> jobs) {
+    stats_.assign(jobs.size(), {});
+    return renderer_.render(jobs, stats_);
+  }
+  Renderer<float, B>& renderer() noexcept { return renderer_; }
+
+ private:
+  Renderer<float, B> renderer_;
+  std::vector<RenderStats> stats_;
+};
+
+template <BatchBackend B>
+class FrameBatch<B> {
+ public:
+  explicit FrameBatch(B& backend) : backend_(&backend), renderer_(backend), scratch_(backend) {}
+
+  /// Images in host memory. Errors: what rendering reports. Throws gsnav::Error (out_of_memory).
+  Status render(std::span<const FrameJob<float>> jobs) { return render(jobs, CopyKind::device_to_host); }
+  /// The same into the backend's memory.
+  Status render_on_backend(std::span<const FrameJob<float>> jobs) {
+    return render(jobs, CopyKind::device_to_device);
+  }
+  /// For a single frame, with meshes too.
+  Renderer<float, B>& renderer() noexcept { return renderer_; }
+
+ private:
+  using Batch = typename B::batch_renderer;
+  static constexpr std::size_t kImages = 6;
+  static constexpr std::array<std::size_t, kImages> kChannels{3, 1, 1, 1, 1, 1};
+
+  /// What frames of one call have in common.
+  struct Kind {
+    RenderConfig config;
+    int width = 0, height = 0;
+    unsigned images = 0;  // a bit each
+    bool operator==(const Kind&) const = default;
+  };
+  struct Known {
+    Kind kind;
+    std::unique_ptr<Batch> batch;
+    std::vector<std::size_t> jobs;  // of the present call
+  };
+
+  static std::array<float*, kImages> images_of(const FrameImages<float>& i) noexcept {
+    return {i.rgb, i.alpha, i.median_depth, i.expected_depth, i.accumulated_depth, i.first_hit_depth};
+  }
+  static Kind kind_of(const FrameJob<float>& job) noexcept {
+    Kind k{*job.config, job.camera->width, job.camera->height, 0};
+    k.config.outputs = kRgb;  // pointers say which images
+    const auto images = images_of(job.images);
+    for (std::size_t i = 0; i < kImages; ++i) k.images |= images[i] != nullptr ? 1u << i : 0u;
+    return k;
+  }
+
+  Status render(std::span<const FrameJob<float>> jobs, CopyKind to) {
+    for (Known& k : known_) k.jobs.clear();
+    for (std::size_t j = 0; j < jobs.size(); ++j) {
+      if (!jobs[j].meshes.instances.empty()) {
+        return {Errc::unsupported,
+                "batches of this backend know no meshes: draw the scene on another, or without them"};
+      }
+      group(kind_of(jobs[j])).jobs.push_back(j);
+    }
+    for (Known& k : known_) {
+      // By where images go, so that they can be drawn there, or copied, together.
+      const auto first = [&](std::size_t j) {
+        for (float* p : images_of(jobs[j].images)) {
+          if (p != nullptr) return p;
+        }
+        return static_cast<float*>(nullptr);
+      };
+      std::sort(k.jobs.begin(), k.jobs.end(),
+                [&](std::size_t a, std::size_t b) { return std::less<>()(first(a), first(b)); });
+      if (Status s = draw(k, k.jobs, jobs, to); !s) return s;
+    }
+    return backend_->synchronize();
+  }
+
+  Known& group(const Kind& kind) {
+    for (Known& k : known_) {
+      if (k.kind == kind) return k;
+    }
+    return known_.emplace_back(Known{kind, std::make_unique<Batch>(*backend_, kind.config), {}});
+  }
+
+  /// Draws some of a group's frames by one call; by two of half of them where the renderer says that
+  /// they are too many.
+  Status draw(Known& known, std::span<const std::size_t> which, std::span<const FrameJob<float>> jobs,
+              CopyKind to) {
+    if (which.empty()) return {};
+    Status s = draw_at_once(known, which, jobs, to);
+    if (s.ok() || s.code() != Errc::unsupported || which.size() == 1) return s;
+    const std::size_t half = which.size() / 2;
+    if (s = draw(known, which.first(half), jobs, to); !s) return s;
+    return draw(known, which.subspan(half), jobs, to);
+  }
+
+  Status draw_at_once(Known& known, std::span<const std::size_t> which,
+                      std::span<const FrameJob<float>> jobs, CopyKind to) {
+    list_sets(which, jobs);
+    const std::size_t pixels =
+        static_cast<std::size_t>(known.kind.width) * static_cast<std::size_t>(known.kind.height);
+    const bool in_place = to == CopyKind::device_to_device && in_rows(which, jobs, pixels);
+    std::array<float*, kImages> at = images_of(jobs[which.front()].images);
+    if (!in_place) {
+      std::size_t channels = 0;
+      for (std::size_t i = 0; i < kImages; ++i) channels += at[i] != nullptr ? kChannels[i] : 0;
+      scratch_.resize_discard(channels * pixels * which.size());
+      float* next = scratch_.data();
+      for (std::size_t i = 0; i < kImages; ++i) {
+        if (at[i] == nullptr) continue;
+        at[i] = next;
+        next += kChannels[i] * pixels * which.size();
+      }
+    }
+    typename Batch::images_type images;
+    images.floats = {at[0], at[1], at[2], at[3], at[4], at[5]};
+    if (Status s = known.batch->render(sets_, cameras_, images); !s) return s;
+    if (Status s = known.batch->finish(); !s) return s;
+    for (std::size_t i = 0; i < kImages && !in_place; ++i) {
+      if (at[i] != nullptr) copy(i, at[i], which, jobs, pixels * kChannels[i], to);
+    }
+    return {};
+  }
+
+  /// Fills sets_ and cameras_. A set that many look at, a scene's, is listed once.
+  void list_sets(std::span<const std::size_t> which, std::span<const FrameJob<float>> jobs) {
+    sets_.clear();
+    places_.clear();
+    lists_.clear();
+    cameras_.clear();
+    for (const std::size_t j : which) {
+      for (const GaussianSet& set : jobs[j].sets) {
+        if (set.gaussians.size != 0) lists_.push_back(place_of(set));
+      }
+      // A list of no sets stands for all of them.
+      if (lists_.size() == first_of(cameras_.size())) lists_.push_back(place_of(GaussianSet{}));
+      cameras_.push_back({*jobs[j].camera, {}});
+      ends_.resize(cameras_.size());
+      ends_.back() = lists_.size();
+    }
+    for (std::size_t c = 0; c < cameras_.size(); ++c) {
+      cameras_[c].sets = std::span(lists_).subspan(first_of(c), ends_[c] - first_of(c));
+    }
+  }
+  std::size_t first_of(std::size_t camera) const noexcept { return camera == 0 ? 0 : ends_[camera - 1]; }
+
+  std::uint32_t place_of(const GaussianSet& set) {
+    // All of it, bit for bit: where padding differs a set is listed twice, and no image changes.
+    const auto same = [](const GaussianSet& a, const GaussianSet& b) {
+      return std::memcmp(&a, &b, sizeof a) == 0;
+    };
+    auto [at, end] = places_.equal_range(set.gaussians.means[0].data);
+    for (; at != end; ++at) {
+      if (same(sets_[at->second], set)) return at->second;
+    }
+    const auto place = static_cast<std::uint32_t>(sets_.size());
+    sets_.push_back(set);
+    places_.emplace(set.gaussians.means[0].data, place);
+    return place;
+  }
+
+  /// Whether all images lie one behind the other, so that a batch may be drawn where they are.
+  static bool in_rows(std::span<const std::size_t> which, std::span<const FrameJob<float>> jobs,
+                      std::size_t pixels) {
+    const auto first = images_of(jobs[which.front()].images);
+    for (std::size_t c = 1; c < which.size(); ++c) {
+      const auto here = images_of(jobs[which[c]].images);
+      for (std::size_t i = 0; i < kImages; ++i) {
+        if (first[i] != nullptr && here[i] != first[i] + c * pixels * kChannels[i]) return false;
+      }
+    }
+    return true;
+  }
+
+  void copy(std::size_t image, const float* from, std::span<const std::size_t> which,
+            std::span<const FrameJob<float>> jobs, std::size_t size, CopyKind kind) {
+    const auto target = [&](std::size_t c) { return images_of(jobs[which[c]].images)[image]; };
+    for (std::size_t begin = 0, end = 0; begin < which.size(); begin = end) {
+      for (end = begin + 1; end < which.size() && target(end) == target(begin) + (end - begin) * size;)
+        ++end;
+      backend_->copy(target(begin), from + begin * size, (end - begin) * size * sizeof(float), kind);
+    }
+  }
+
+  B* backend_;
+  Renderer<float, B> renderer_;
+  std::vector<Known> known_;
+  Buffer<float, B> scratch_;
+  // Of the present call.
+  std::vector<GaussianSet> sets_;
+  std::unordered_multimap<const float*, std::uint32_t> places_;  // in sets_, by their means
+  std::vector<std::uint32_t> lists_;
+  std::vector<std::size_t> ends_;
+  std::vector<typename Batch::camera_type> cameras_;
+};
+
+}  // namespace gsnav

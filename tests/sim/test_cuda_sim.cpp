@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// Simulators on the GPU against those on the processor: the same world, and images within the contract's
+// bound.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "gsnav/backends/cuda.hpp"
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/sim/batch.hpp"
+#include "ops/no_gpu.hpp"
+#include "sim_scene.hpp"
+#if defined(SIM_TEST_DLPACK)
+#include "gsnav/interop/dlpack.hpp"
+#endif
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+/// How images of the two differ. The contract (CPU against CUDA): 2e-5 but for pixels where
+/// transmittance passes within 1e-5 of where blending stops (2e-4, one in a thousand); a median depth
+/// 1e-5 m but where alpha is within 1e-3 of a half.
+struct Difference {
+  std::size_t values = 0, other_bits = 0, over = 0, far_over = 0;
+  double worst = 0;
+
+  void add(SensorKind kind, std::span<const float> a, std::span<const float> b) {
+    REQUIRE(a.size() == b.size());
+    const double bound = kind == SensorKind::depth ? 1e-5 : 2e-5;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      const double d = std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i]));
+      other_bits += a[i] == b[i] ? 0 : 1;
+      over += d <= bound ? 0 : 1;
+      far_over += d <= 10 * bound ? 0 : 1;
+      worst = std::max(worst, d);
+    }
+    values += a.size();
+  }
+  void check(SensorKind kind) const {
+    MESSAGE(values << " values, " << other_bits << " of other bits, " << over
+                   << " over the bound, largest difference " << worst);
+    CHECK(static_cast<double>(over) <= 1e-3 * static_cast<double>(values));
+    // A depth whose pixel is at a half jumps to the next surface, a label to the next set.
+    if (kind == SensorKind::rgb || kind == SensorKind::alpha) CHECK(far_over == 0);
+  }
+};
+
+Action wandering_action(Rng& rng) {
+  constexpr Action kActions[] = {Action::move_forward, Action::move_forward, Action::turn_left,
+                                 Action::turn_right,   Action::look_up,      Action::look_down};
+  return kActions[rng.below(6)];
+}
+
+Result<BatchEpisode> wandering(std::size_t environment, std::size_t count) {
+  Rng rng(1000 * environment + count);
+  BatchEpisode e;
+  e.scene = (environment + count) % 3 == 2 ? 1 : 0;
+  EpisodeRules rules;
+  rules.max_distance = 8.0;
+  e.episode = generate_episode(*flat_navmesh(), rng, rules).value();
+  e.episode.id = std::to_string(environment) + "/" + std::to_string(count);
+  e.episode.start_time = 0.5 * static_cast<double>(rng.below(8));
+  return e;
+}
+
+std::vector<float> fetched(CudaBackend& cuda, const BatchObservation& o) {
+  std::vector<float> host(o.environments * static_cast<std::size_t>(o.height * o.width * o.channels));
+  const float* from = o.on_backend;
+#if defined(SIM_TEST_DLPACK)
+  // As a learner gets them.
+  DLManagedTensor* const t = interop::to_dlpack(
+      o.on_backend, {static_cast<std::int64_t>(o.environments), o.height, o.width, o.channels},
+      interop::dlpack_device(cuda), nullptr);
+  CHECK(t->dl_tensor.device.device_type == kDLCUDA);
+  CHECK(t->dl_tensor.device.device_id == cuda.device());
+  from = interop::from_dlpack<const float>(t->dl_tensor, interop::dlpack_device(cuda)).value().data;
+  t->deleter(t);
+#endif
+  cuda.copy(host.data(), from, host.size() * sizeof(float), CopyKind::device_to_host);
+  REQUIRE(cuda.synchronize().ok());
+  return host;
+}
+
+}  // namespace
+
+TEST_CASE("cuda: a simulator among people sees what the OpenMP one sees") {
+  if (no_gpu("cuda simulator")) return;
+  SimulatorConfig config;
+  config.sensors = rgbd_sensors(120, 160);
+  for (const auto& [uuid, kind] :
+       {std::pair{"alpha", SensorKind::alpha}, {"who", SensorKind::semantic}}) {
+    config.sensors.push_back(config.sensors[0]);
+    config.sensors.back().uuid = uuid;
+    config.sensors.back().kind = kind;
+  }
+  config.sensors.push_back(config.sensors[0]);
+  config.sensors.back().uuid = "around";
+  config.sensors.back().model = SensorModel::equirectangular;
+  CudaBackend cuda;
+  OpenMPBackend openmp;
+  auto on_gpu = make_simulator(cuda, peopled_scene(4000), config).value();
+  auto on_cpu = make_simulator(openmp, peopled_scene(4000), config).value();
+  std::vector<Difference> differences(config.sensors.size());
+  const auto compare = [&](const Observations& a, const Observations& b) {
+    CHECK(a.moved == b.moved);
+    CHECK(a.reward == b.reward);
+    CHECK(a.avatar_clearance == b.avatar_clearance);
+    for (std::size_t i = 0; i < differences.size(); ++i) {
+      differences[i].add(a.images[i].kind, a.images[i].data, b.images[i].data);
+    }
+  };
+  compare(on_gpu.reset(to_kitchen()).value(), on_cpu.reset(to_kitchen()).value());
+  Rng rng(4);
+  for (int i = 0; i < 30; ++i) {
+    const Action action = wandering_action(rng);
+    compare(on_gpu.step(action).value(), on_cpu.step(action).value());
+  }
+  for (std::size_t i = 0; i < differences.size(); ++i) {
+    CAPTURE(config.sensors[i].uuid);
+    differences[i].check(config.sensors[i].kind);
+  }
+}
+
+TEST_CASE("cuda: a batch sees what the OpenMP one sees, in host memory and on the GPU") {
+  if (no_gpu("cuda batch simulator")) return;
+  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{
+      std::make_shared<const SimulatorScene>(peopled_scene(4000)),
+      std::make_shared<const SimulatorScene>(flat_scene())};
+  BatchConfig config;
+  config.sensors = rgbd_sensors(64, 96);
+  config.sensors[1].far_plane = 5.0;
+  config.task.max_steps = 12;
+  config.auto_reset = AutoReset::same_step;
+  constexpr std::size_t kEnvironments = 12;
+  CudaBackend cuda, other;
+  OpenMPBackend openmp;
+  auto on_cpu = make_batch_simulator(openmp, scenes, config, kEnvironments, wandering).value();
+  config.pose_slots = 3;  // several calls a step
+  auto to_host = make_batch_simulator(cuda, scenes, config, kEnvironments, wandering).value();
+  config.pose_slots = 64;  // one
+  config.images = ImageMemory::backend;
+  auto on_gpu = make_batch_simulator(other, scenes, config, kEnvironments, wandering).value();
+  std::vector<Difference> differences(2);
+  std::size_t wrong = 0, finals = 0;
+  const auto compare = [&](const Result<BatchStep>& a, const Result<BatchStep>& b,
+                           const Result<BatchStep>& c) {
+    const BatchStep host = a.value(), gpu = b.value(), cpu = c.value();
+    const auto images = [&](auto x, auto y, auto z) {
+      REQUIRE(x.size() == z.size());
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        differences[i].add(x[i].kind, x[i].data, z[i].data);
+        const std::vector<float> there = fetched(other, y[i]);
+        REQUIRE(there.size() == x[i].data.size());
+        wrong += std::memcmp(there.data(), x[i].data.data(), x[i].data.size_bytes()) == 0 ? 0 : 1;
+      }
+    };
+    images(host.images, gpu.images, cpu.images);
+    images(host.final_images, gpu.final_images, cpu.final_images);
+    finals += host.finished.size();
+    for (std::size_t e = 0; e < kEnvironments; ++e) {
+      wrong += host.rewards[e] == cpu.rewards[e] && gpu.rewards[e] == cpu.rewards[e] ? 0 : 1;
+    }
+  };
+  compare(to_host.reset(), on_gpu.reset(), on_cpu.reset());
+  Rng rng(6);
+  for (int i = 0; i < 30; ++i) {
+    std::vector<Action> actions;
+    for (std::size_t e = 0; e < kEnvironments; ++e) actions.push_back(wandering_action(rng));
+    compare(to_host.step(actions), on_gpu.step(actions), on_cpu.step(actions));
+  }
+  const std::vector<std::uint8_t> some{1, 0, 0, 1, 1, 0, 1, 0, 0, 0, 0, 1};
+  compare(to_host.reset(some), on_gpu.reset(some), on_cpu.reset(some));
+  CHECK(wrong == 0);
+  CHECK(finals >= 2 * kEnvironments);
+  differences[0].check(SensorKind::rgb);
+  differences[1].check(SensorKind::depth);
+}

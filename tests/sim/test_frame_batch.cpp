@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+// Simulators on a backend with a memory of its own and a renderer of batches, as a GPU's is: the bits of
+// the serial one.
+#include <doctest/doctest.h>
+
+#include <cstring>
+
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/sim/batch.hpp"
+#include "ops/backends.hpp"
+#include "sim_scene.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+int batch_calls = 0;
+std::size_t most_sets = 0, most_cameras = ~std::size_t{0};  // drawn by a call; accepted by one
+
+/// One camera after the other, as CudaBatchRenderer is asked for batches of them.
+class BatchOfToys {
+ public:
+  struct camera_type {
+    Camera camera;
+    std::span<const std::uint32_t> sets;
+  };
+  struct images_type {
+    FrameImages<float> floats;
+  };
+  explicit BatchOfToys(ToyBackend& backend, const RenderConfig& config)
+      : backend_(&backend), workspace_(backend), config_(config) {}
+  Status render(std::span<const GaussianSet> sets, std::span<const camera_type> cameras,
+                const images_type& images) {
+    ++batch_calls;
+    most_sets = std::max(most_sets, sets.size());
+    if (cameras.size() > most_cameras) return {Errc::unsupported, "draw fewer cameras a call"};
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      const Camera& camera = cameras[c].camera;
+      std::vector<GaussianSet> seen;
+      for (const std::uint32_t s : cameras[c].sets) seen.push_back(sets[s]);
+      const std::size_t pixels =
+          static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+      FrameImages<float> to = images.floats;
+      if (to.rgb != nullptr) to.rgb += 3 * c * pixels;
+      if (to.alpha != nullptr) to.alpha += c * pixels;
+      if (to.median_depth != nullptr) to.median_depth += c * pixels;
+      if (Status s = render_camera<float>(*backend_, workspace_, seen, camera, config_, to); !s)
+        return s;
+    }
+    return {};
+  }
+  Status finish() { return {}; }
+
+ private:
+  ToyBackend* backend_;
+  RenderWorkspace<float, ToyBackend> workspace_;
+  RenderConfig config_;
+};
+
+class BatchingBackend : public ToyBackend {
+ public:
+  using batch_renderer = BatchOfToys;
+};
+static_assert(BatchBackend<BatchingBackend>);
+
+std::vector<std::shared_ptr<const SimulatorScene>> two_scenes() {
+  SimulatorScene far = flat_scene();  // another sort order: frames of a call of its own
+  auto cloud = std::make_shared<GaussianCloud>(*far.assets[0].cloud);
+  cloud->sort_order = SortOrder::camera_distance;
+  far.assets[0].cloud = cloud;
+  return {std::make_shared<const SimulatorScene>(peopled_scene(2000)),
+          std::make_shared<const SimulatorScene>(far)};
+}
+
+Result<BatchEpisode> spread(std::size_t environment, std::size_t count) {
+  Rng rng(100 * environment + count);
+  BatchEpisode e;
+  e.scene = environment % 4 == 3 ? 1 : 0;
+  e.episode = generate_episode(*flat_navmesh(), rng).value();
+  e.episode.start_time = 0.5 * static_cast<double>(environment / 2);
+  return e;
+}
+
+/// What a call left, by sensor; images that stayed in the backend's memory are looked at there.
+std::vector<std::vector<float>> images_of(std::span<const BatchObservation> images) {
+  std::vector<std::vector<float>> out;
+  for (const BatchObservation& o : images) {
+    const std::size_t n = o.environments * static_cast<std::size_t>(o.height * o.width * o.channels);
+    const float* const data = o.on_backend != nullptr ? o.on_backend : o.data.data();
+    CHECK((o.on_backend == nullptr) == (o.data.size() == n));
+    out.emplace_back(data, data + n);
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("batches of a backend that draws many cameras at once have the bits of the serial backend") {
+  for (const ImageMemory memory : {ImageMemory::host, ImageMemory::backend}) {
+    for (const std::size_t slots : {std::size_t{2}, std::size_t{64}}) {
+      CAPTURE(slots);
+      BatchConfig config;
+      config.sensors = rgbd_sensors(12, 18);
+      config.sensors[1].far_plane = 4.0;
+      config.sensors.push_back(config.sensors[0]);
+      config.sensors[2].uuid = "low";
+      config.sensors[2].position = {0, 0.4, 0};
+      config.task.max_steps = 5;
+      config.auto_reset = AutoReset::same_step;
+      config.pose_slots = slots;
+      SerialBackend serial;
+      BatchingBackend batching;
+      auto expected = make_batch_simulator(serial, two_scenes(), config, 7, spread).value();
+      config.images = memory;
+      auto sim = make_batch_simulator(batching, two_scenes(), config, 7, spread).value();
+      const auto same = [&](const BatchStep& a, const BatchStep& b) {
+        CHECK(images_of(a.images) == images_of(b.images));
+        CHECK(images_of(a.final_images) == images_of(b.final_images));
+      };
+      batch_calls = 0;
+      most_sets = 0;
+      same(sim.reset().value(), expected.reset().value());
+      // Two scenes of two orders, each with two cameras: one call each, where all times are held posed
+      // at once.
+      if (slots == 64) {
+        CHECK(batch_calls == 4);
+        CHECK(most_sets <= 1 + 3 * 2);  // the flat once, two people at three times
+      }
+      Rng rng(3);
+      bool ended = false;
+      for (int i = 0; i < 7; ++i) {
+        std::vector<Action> actions(7, Action::turn_left);
+        for (Action& a : actions) a = rng.below(2) == 0 ? Action::move_forward : a;
+        const BatchStep got = sim.step(actions).value(), want = expected.step(actions).value();
+        same(got, want);
+        ended = ended || !got.finished.empty();
+      }
+      CHECK(ended);
+      // Rows that lie apart.
+      const std::vector<std::uint8_t> mask{1, 0, 1, 1, 0, 0, 1};
+      same(sim.reset(mask).value(), expected.reset(mask).value());
+    }
+  }
+}
+
+TEST_CASE("a batch that is too large is drawn in halves") {
+  BatchConfig config;
+  config.sensors = rgbd_sensors(8, 8);
+  SerialBackend serial;
+  BatchingBackend batching;
+  auto expected = make_batch_simulator(serial, two_scenes(), config, 7, spread).value();
+  auto sim = make_batch_simulator(batching, two_scenes(), config, 7, spread).value();
+  most_cameras = 2;
+  CHECK(images_of(sim.reset().value().images) == images_of(expected.reset().value().images));
+  most_cameras = 0;
+  CHECK(sim.reset().code() == Errc::unsupported);
+  most_cameras = ~std::size_t{0};
+}
+
+TEST_CASE("one simulator there has the serial one's bits too, with sensors that need scratch") {
+  SimulatorConfig config;
+  config.sensors = rgbd_sensors(16, 24);
+  config.sensors[0].noise.kind = NoiseKind::gaussian;
+  SensorSpec around = config.sensors[0];
+  around.noise = {};
+  around.uuid = "around";
+  around.model = SensorModel::equirectangular;
+  SensorSpec who = config.sensors[1];
+  who.uuid = "who";
+  who.kind = SensorKind::semantic;
+  config.sensors.push_back(around);
+  config.sensors.push_back(who);
+  SerialBackend serial;
+  BatchingBackend batching;
+  auto expected = make_simulator(serial, peopled_scene(2000), config).value();
+  auto sim = make_simulator(batching, peopled_scene(2000), config).value();
+  sim.reset(to_kitchen()).value();
+  expected.reset(to_kitchen()).value();
+  const auto got = sim.step(Action::turn_left).value(), want = expected.step(Action::turn_left).value();
+  for (std::size_t i = 0; i < got.images.size(); ++i) {
+    CAPTURE(i);
+    CHECK(std::equal(got.images[i].data.begin(), got.images[i].data.end(), want.images[i].data.begin()));
+  }
+}
+
+TEST_CASE("images that cannot stay in a backend's memory are named") {
+  BatchingBackend batching;
+  BatchConfig config;
+  config.images = ImageMemory::backend;
+  const auto message = [&](auto change) {
+    config.sensors = rgbd_sensors(8, 8);
+    change(config.sensors);
+    const auto made = make_batch_simulator(batching, two_scenes(), config, 2, spread);
+    CHECK(made.code() == Errc::unsupported);
+    return made.message();
+  };
+  CHECK(message([](auto& s) { s[1].noise.kind = NoiseKind::redwood_depth; }).find("\"depth\"") !=
+        std::string::npos);
+  CHECK(message([](auto& s) { s[0].model = SensorModel::fisheye; }).find("\"rgb\"") !=
+        std::string::npos);
+  CHECK(message([](auto& s) { s[1].kind = SensorKind::semantic; }).find("ImageMemory::host") !=
+        std::string::npos);
+}
