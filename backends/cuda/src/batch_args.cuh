@@ -112,7 +112,7 @@ struct BatchArgs {
   SplatRecord* records;
   SplatEntry* entries;
   std::uint32_t* sources;  ///< per slot: first_rank of its instance + row as stored
-  SplatDepth<float>* depths;              ///< null: no image sums depths
+  SplatDepth<float>* depths;              ///< null: no image sums depths, and medians are few beside survivors
   SplatPerspective<float>* perspectives;  ///< null: Response::ewa
   HardSplat* hard;
   std::uint32_t* several;  ///< slots whose tiles are still to be found; kNoSlot: none

@@ -195,8 +195,8 @@ __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t came
 
 constexpr unsigned kDepthColumns = 16, kDepthRows = 8, kDepthThreads = kDepthColumns * kDepthRows;
 
-/// A thread a pixel of camera blockIdx.z: slots become depths. Neighbours have their Gaussians in common, and each is
-/// projected once a block.
+/// A thread a pixel of camera blockIdx.z: slots become depths, of records where these are. Else neighbours have Gaussians in
+/// common, and each is projected once a block.
 __global__ void __launch_bounds__(kDepthThreads, 6) depth_kernel(const BatchArgs a, float* images) {
   constexpr unsigned kPlaces = 2 * kDepthThreads;  // of a hash table; a power of two
   __shared__ std::uint32_t slots[kPlaces], indices[kPlaces], found[kDepthThreads], count;
@@ -207,10 +207,15 @@ __global__ void __launch_bounds__(kDepthThreads, 6) depth_kernel(const BatchArgs
   const bool inside = x < a.grid.width && y < a.grid.height;
   const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
   float* const to = images + (blockIdx.z * height + static_cast<std::size_t>(y)) * width + static_cast<std::size_t>(x);
+  const float px = static_cast<float>(x) + 0.5f, py = static_cast<float>(y) + 0.5f;
+  const std::uint32_t slot = inside ? __float_as_uint(*to) : kNoSlot;
+  if (a.depths != nullptr) {
+    if (inside) *to = slot == kNoSlot ? 0.0f : ray_depth(a.depths[slot], px, py);
+    return;
+  }
   slots[t] = slots[t + kDepthThreads] = kNoSlot;
   if (t == 0) count = 0;
   __syncthreads();
-  const std::uint32_t slot = inside ? __float_as_uint(*to) : kNoSlot;
   unsigned at = slot * 2654435761u % kPlaces;
   if (slot != kNoSlot) {
     for (;; at = (at + 1) % kPlaces) {
@@ -225,8 +230,7 @@ __global__ void __launch_bounds__(kDepthThreads, 6) depth_kernel(const BatchArgs
   __syncthreads();
   if (t < count) depths[t] = depth_record(a, blockIdx.z, found[t]);
   __syncthreads();
-  if (!inside) return;
-  *to = slot == kNoSlot ? 0.0f : ray_depth(depths[indices[at]], static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+  if (inside) *to = slot == kNoSlot ? 0.0f : ray_depth(depths[indices[at]], px, py);
 }
 
 }  // namespace

@@ -36,10 +36,15 @@ void CudaBatchRenderer::State::size_scratch() {
   args.parts = size(parts, args.part_capacity);
   args.pairs = size(pairs, pair_capacity);
   args.pairs_alt = size(pairs_alt, pair_capacity);
-  const bool sums = raster.depth_mode() == DepthMode::any, perspective = config.response != Response::ewa;
-  args.depths = sums ? size(depths, slot_capacity) : nullptr;
+  // Where pixels are many beside survivors, a record each is less than projecting median Gaussians once more.
+  const DepthMode mode = raster.depth_mode();
+  const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  const bool records_depths =
+      mode == DepthMode::any || (mode == DepthMode::median && pixels >= 4 * std::size_t{slot_capacity});
+  const bool perspective = config.response != Response::ewa;
+  args.depths = records_depths ? size(depths, slot_capacity) : nullptr;
   args.perspectives = perspective ? size(perspectives, slot_capacity) : nullptr;
-  raster.depths = {args.depths, sums ? slot_capacity : 0};
+  raster.depths = {args.depths, records_depths ? slot_capacity : 0};
   raster.perspectives = {args.perspectives, perspective ? slot_capacity : 0};
   args.slot_capacity = slot_capacity;
   args.hard_capacity = hard_capacity;
