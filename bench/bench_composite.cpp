@@ -6,7 +6,8 @@
 //
 // Before each view stands a ball of triangles, 2 m away: what a sensor that meets furniture sees. `alone`: the frame
 // without meshes; `meshes`: without Gaussians; `hard_depth`: Habitat-GS's rule on the same scene. Errors are the
-// worst of the views; median_ms is over views, each by its median; pairs of (tile, Gaussian) are means.
+// worst of the views; median_ms is over views, each by its median, from call to images in host memory; pairs of
+// (tile, Gaussian) are means. On a GPU too, where there is one.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -14,6 +15,7 @@
 #include <cstdio>
 #include <numbers>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
@@ -24,6 +26,9 @@
 #include "gsnav/scene/renderer.hpp"
 #include "samples.hpp"
 #include "workload.hpp"
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda.hpp"
+#endif
 
 using namespace gsnav;
 using gsnav_bench::median;
@@ -60,6 +65,59 @@ struct Row {
   Composite composite;
 };
 
+struct Shown {
+  const GaussianCloud& cloud;
+  const MeshScene& scene;
+  const std::vector<MeshInstance>& instances;  ///< of the scene's first mesh
+  const std::vector<Camera>& cameras;
+  const std::vector<eval::OracleFrames>& truth;  ///< one a camera
+};
+
+template <class B>
+void print_rows(B& backend, const std::string& where, const Shown& shown) {
+  const GaussianArrays<B> arrays(backend, shown.cloud);
+  const GaussianSet set = arrays.set();
+  const MeshArrays<B> mesh(backend, shown.scene.view(0));
+  std::vector<MeshInstance> instances;
+  for (const MeshInstance& i : shown.instances) instances.push_back(mesh.instance(i.world_from_mesh, i.id));
+  for (const Row& row : {Row{"alone", true, false, Composite::merged}, Row{"meshes", false, true, Composite::merged},
+                         Row{"merged", true, true, Composite::merged}, Row{"hard_depth", true, true, Composite::hard_depth}}) {
+    RenderConfig config;
+    config.composite = row.composite;
+    Renderer<float, B> renderer(backend, config);
+    if (row.meshes) renderer.set_meshes(instances);
+    const std::span<const GaussianSet> sets(&set, row.gaussians ? 1 : 0);
+    Frames<float> frames;
+    std::vector<double> view_ms;
+    eval::ImageError worst;
+    worst.psnr = 1e9;
+    double pairs = 0;
+    for (std::size_t v = 0; v < shown.cameras.size(); ++v) {
+      std::vector<double> ms;
+      for (int r = 0; r <= kRepeats; ++r) {
+        const auto begin = std::chrono::steady_clock::now();
+        renderer.render(sets, std::span(&shown.cameras[v], 1), frames).throw_if_error();
+        const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
+        if (r > 0) ms.push_back(took.count());
+      }
+      view_ms.push_back(median(ms));
+      pairs += static_cast<double>(frames.stats[0].tile_intersections) / static_cast<double>(shown.cameras.size());
+      if (!row.gaussians || !row.meshes) continue;
+      const eval::ImageError e = eval::image_error(shown.truth[v].rgb, frames.rgb, 3, shown.truth[v].undecided).value();
+      worst.psnr = std::min(worst.psnr, e.psnr);
+      worst.p999 = std::max(worst.p999, e.p999);
+      worst.max = std::max(worst.max, e.max);
+    }
+    std::printf("%-11s %-11s  %9.2f", row.name, where.c_str(), median(view_ms));
+    if (row.gaussians && row.meshes) {
+      std::printf(" %9.1f %9.1e %9.1e", worst.psnr, worst.p999, worst.max);
+    } else {
+      std::printf(" %9s %9s %9s", "", "", "");
+    }
+    std::printf(" %12.0f\n", pairs);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -92,44 +150,16 @@ int main(int argc, char** argv) {
     truth.push_back(eval::oracle_render(openmp, set, c, config).value());
   }
   std::printf("%-24s %9s %9s %9s %9s %12s\n", "", "median_ms", "rgb_psnr", "rgb_p99.9", "rgb_max", "pairs");
+  const Shown shown{gsnav_bench::workload().cloud, scene, instances, cameras, truth};
   for (const int threads : {1, openmp.threads()}) {
     OpenMPBackend backend(threads);
-    for (const Row& row : {Row{"alone", true, false, Composite::merged}, Row{"meshes", false, true, Composite::merged},
-                           Row{"merged", true, true, Composite::merged}, Row{"hard_depth", true, true, Composite::hard_depth}}) {
-      RenderConfig config;
-      config.composite = row.composite;
-      Renderer<float, OpenMPBackend> renderer(backend, config);
-      if (row.meshes) renderer.set_meshes(instances);
-      const std::span<const GaussianSet> sets(&set, row.gaussians ? 1 : 0);
-      Frames<float> frames;
-      std::vector<double> view_ms;
-      eval::ImageError worst;
-      worst.psnr = 1e9;
-      double pairs = 0;
-      for (std::size_t v = 0; v < cameras.size(); ++v) {
-        std::vector<double> ms;
-        for (int r = 0; r <= kRepeats; ++r) {
-          const auto begin = std::chrono::steady_clock::now();
-          renderer.render(sets, std::span(&cameras[v], 1), frames).throw_if_error();
-          const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
-          if (r > 0) ms.push_back(took.count());
-        }
-        view_ms.push_back(median(ms));
-        pairs += static_cast<double>(frames.stats[0].tile_intersections) / static_cast<double>(cameras.size());
-        if (!row.gaussians || !row.meshes) continue;
-        const eval::ImageError e = eval::image_error(truth[v].rgb, frames.rgb, 3, truth[v].undecided).value();
-        worst.psnr = std::min(worst.psnr, e.psnr);
-        worst.p999 = std::max(worst.p999, e.p999);
-        worst.max = std::max(worst.max, e.max);
-      }
-      std::printf("%-11s %2d thread%s  %9.2f", row.name, threads, threads == 1 ? " " : "s", median(view_ms));
-      if (row.gaussians && row.meshes) {
-        std::printf(" %9.1f %9.1e %9.1e", worst.psnr, worst.p999, worst.max);
-      } else {
-        std::printf(" %9s %9s %9s", "", "", "");
-      }
-      std::printf(" %12.0f\n", pairs);
-    }
+    print_rows(backend, std::to_string(threads) + (threads == 1 ? " thread" : " threads"), shown);
   }
+#if defined(GSNAV_HAS_CUDA)
+  if (CudaBackend::device_count() > 0) {
+    CudaBackend cuda;
+    print_rows(cuda, "cuda", shown);
+  }
+#endif
   return 0;
 }
