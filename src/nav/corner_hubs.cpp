@@ -91,7 +91,36 @@ bool CornerHubs::look(const UnfoldedMesh& mesh, std::vector<std::vector<Link>>& 
   sights_.resize(seen.size());
   std::vector<std::uint32_t> at(first_sight_.begin(), first_sight_.end() - 1);
   for (const Placed& s : seen) sights_[at[s.face]++] = s.sight;
+  draw_sides(mesh);
   return true;
+}
+
+void CornerHubs::draw_sides(const UnfoldedMesh& mesh) {
+  constexpr double kShort = 1e-4;  // metres: sides that begin so near their end are left to the exact test
+  sides_.assign(6 * sights_.size(), 0.0f);
+  for (const Sight& s : sights_) roots_.push_back({s.root, s.corner});
+  for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const Flat origin = mesh.edges[mesh.faces[f].first].at;
+    double size = 0;
+    for (std::uint32_t k = 0; k < mesh.faces[f].count; ++k) {
+      size = max(size, length(mesh.edges[mesh.faces[f].first + k].at - origin));
+    }
+    frames_.push_back({origin, static_cast<float>(1e-3 + 1e-6 * size)});
+    const std::size_t first = first_sight_[f], n = first_sight_[f + 1] - first;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Sight& s = sights_[first + i];
+      const auto draw = [&](const Flat& end, double inside, std::size_t row) {
+        const Flat d = end - s.root;
+        const double l = length(d);
+        if (!(l > kShort)) return;
+        const Flat normal = Flat{-d.y, d.x} * (inside / l);
+        const double number[3] = {normal.x, normal.y, dot(normal, origin - s.root)};
+        for (std::size_t k = 0; k < 3; ++k) sides_[6 * first + (row + k) * n + i] = static_cast<float>(number[k]);
+      };
+      draw(s.right, 1.0, 0);
+      draw(s.left, -1.0, 3);
+    }
+  }
 }
 
 void CornerHubs::rank(const std::vector<std::vector<Link>>& links) {
@@ -175,17 +204,40 @@ bool CornerHubs::label(const std::vector<std::vector<Link>>& links) {
   return true;
 }
 
+namespace {
+
+/// Where the point (x, y) is within both sides of a sight: 0 no, 1 perhaps, 2 yes.
+void inside_sides(const float* __restrict sides, std::size_t n, float x, float y, float margin,
+                  std::uint8_t* __restrict out) noexcept {
+  for (std::size_t i = 0; i < n; ++i) {
+    const float r = sides[i] * x + sides[n + i] * y + sides[2 * n + i];
+    const float l = sides[3 * n + i] * x + sides[4 * n + i] * y + sides[5 * n + i];
+    const float least = min(r, l);
+    out[i] = static_cast<std::uint8_t>((least >= -margin ? 1 : 0) + (least > margin ? 1 : 0));
+  }
+}
+
+}  // namespace
+
 void CornerHubs::look_from(const Site& from, const Site& to, std::vector<Seen>& out) const {
   out.clear();
   std::size_t first = 0;
-  for (std::uint32_t i = first_sight_[from.face]; i < first_sight_[from.face + 1]; ++i) {
-    const Sight& sight = sights_[i];
-    const Flat d = from.at - sight.root;
-    const bool off_right = cross(sight.right - sight.root, d) < -kRounding;
-    const bool off_left = cross(sight.left - sight.root, d) > kRounding;
-    if (static_cast<int>(off_right) + static_cast<int>(off_left) != 0) continue;  // one branch: either is as likely
+  thread_local std::vector<std::uint8_t> within;
+  const std::size_t begin = first_sight_[from.face], n = first_sight_[from.face + 1] - begin;
+  const Frame& frame = frames_[from.face];
+  const float x = static_cast<float>(from.at.x - frame.origin.x), y = static_cast<float>(from.at.y - frame.origin.y);
+  if (within.size() < n) within.resize(n);
+  inside_sides(sides_.data() + std::size_t{6} * begin, n, x, y, frame.margin, within.data());
+  for (std::size_t i = 0; i < n; ++i) {
+    if (within[i] == 0) continue;
+    const Root& root = roots_[begin + i];
+    const Flat d = from.at - root.at;
+    if (within[i] == 1) {
+      const Sight& s = sights_[begin + i];
+      if (cross(s.right - s.root, d) < -kRounding || cross(s.left - s.root, d) > kRounding) continue;
+    }
     const double straight = length(d);
-    out.push_back({straight, straight + distance(corners_[sight.corner].position, to.position), sight.corner});
+    out.push_back({straight, straight + distance(corners_[root.corner].position, to.position), root.corner});
     if (out.back().least < out[first].least) first = out.size() - 1;
   }
   if (!out.empty()) std::swap(out[0], out[first]);

@@ -83,6 +83,8 @@ class CornerHubs {
   bool look(const UnfoldedMesh& mesh, std::vector<std::vector<Link>>& links);
   void rank(const std::vector<std::vector<Link>>& links);
   bool label(const std::vector<std::vector<Link>>& links);
+  /// Both sides of each sight in float, to leave out most of those that a site is not in.
+  void draw_sides(const UnfoldedMesh& mesh);
   /// The corners that a site sees; the one that leads most nearly to the other site first.
   void look_from(const Site& from, const Site& to, std::vector<Seen>& out) const;
   /// Makes `best` the way by way of two corners where that is shorter.
@@ -92,6 +94,20 @@ class CornerHubs {
   std::vector<std::uint32_t> corner_of_;    ///< of each vertex; kNone where no path bends
   std::vector<std::uint32_t> first_sight_;  ///< of each face, and one past the last
   std::vector<Sight> sights_;
+  /// What every query that is within a sight reads, apart from what few read.
+  struct Root {
+    Flat at;
+    std::uint32_t corner = 0;
+  };
+  std::vector<Root> roots_;  ///< of each sight
+  /// A face's sights have a row of each of six numbers: a, b, c of right and left side, where a x + b y + c is the
+  /// distance, metres, to the inside of the point (x, y) from the face's first corner.
+  std::vector<float> sides_;
+  struct Frame {
+    Flat origin;
+    float margin = 0;  ///< metres: no more than that is lost by rounding
+  };
+  std::vector<Frame> frames_;  ///< of each face
   std::vector<std::uint32_t> first_label_;  ///< of each corner, and one past the last
   std::vector<Label> labels_;
   std::vector<std::uint32_t> hub_corner_;  ///< by rank

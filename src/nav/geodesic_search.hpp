@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "face_views.hpp"
 #include "unfolded_mesh.hpp"
 
 namespace gsnav::detail {
@@ -52,9 +53,9 @@ class GeodesicSearch {
 
   /// Distance between two sites, infinity where the search cannot reach the goal within less than `bound`.
   double run(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar);
-  /// The same over paths that do not bend.
+  /// The same over paths that do not bend; what `views` rules out is not looked at.
   double run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar,
-                      const GoalBound* least = nullptr);
+                      const GoalBound* least = nullptr, const FaceViews* views = nullptr);
   /// Corners of the last run's path from start to goal; between them points where the surface leaves the straight
   /// line by more than a centimetre.
   std::vector<Vec3d> path() const;
@@ -99,6 +100,7 @@ class GeodesicSearch {
   bool straight_ = false;      ///< bend nowhere
   bool found_ = false;         ///< the goal
   const GoalBound* least_ = nullptr;
+  const FaceViews* views_ = nullptr;
   double best_ = 0;
   std::uint32_t best_node_ = kNone;
   std::vector<Node> nodes_;

@@ -16,7 +16,7 @@ constexpr double kRounding = 1e-9;  // radians
 }  // namespace
 
 double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound,
-                                    const GoalBound* least) {
+                                    const GoalBound* least, const FaceViews* views) {
   start_ = start;
   goal_ = goal;
   has_goal_ = straight_ = true;
@@ -24,6 +24,7 @@ double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start,
   if (start.face == goal.face) return length(goal.at - start.at);
   begin(mesh, bound);
   least_ = least;
+  views_ = views != nullptr && !views->empty() ? views : nullptr;
   leave(start);
   // There are few, so that their order saves nothing.
   constexpr std::size_t kMost = 1 << 14;
@@ -33,6 +34,7 @@ double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start,
     spread_window(node);
   }
   least_ = nullptr;
+  views_ = nullptr;
   if (!heap_.empty()) return run(mesh, start, goal, bound);
   return found_ ? best_ : kInfinity;
 }
@@ -63,6 +65,7 @@ void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, const F
                                    std::uint32_t parent) {
   const UnfoldedMesh::Edge &here = mesh_->edges[edge], &there = mesh_->edges[here.twin],
                            &after = mesh_->edges[mesh_->next(edge)];
+  if (views_ != nullptr && !views_->may_lead(here.face, edge - mesh_->faces[here.face].first, goal_.face)) return;
   const double to_right = length(right - root), to_left = length(left - root);
   // Where there are many: moving off a corner, what is left may shrink by as much, the way there grows by less, so that
   // the far end is the least.

@@ -1,49 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/nav/local_planner.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "half_planes.hpp"
 #include "navmesh_impl.hpp"
+#include "predicted_bodies.hpp"
 
 namespace gsnav {
 namespace {
 
-using detail::HalfPlane;
+using detail::Disc;
 using detail::Ground;
-
-struct Disc {
-  Ground at, velocity;
-  double radius = 0;
-};
-
-/// The disc around a body's capsules that reach into [low, high]; radius 0 where none does.
-Disc disc_of(View<const DynamicCapsule> capsules, double low, double high, double seconds) noexcept {
-  const auto reaches = [&](const Capsule<double>& c) {
-    return max(c.p0.y, c.p1.y) + c.radius >= low && min(c.p0.y, c.p1.y) - c.radius <= high;
-  };
-  Disc disc;
-  double count = 0;
-  for (const DynamicCapsule& c : capsules) {
-    if (!reaches(c.motion.begin) && !reaches(c.motion.end)) continue;
-    for (const auto& [from, to] :
-         {std::pair{c.motion.begin.p0, c.motion.end.p0}, {c.motion.begin.p1, c.motion.end.p1}}) {
-      disc.at = disc.at + Ground{from.x, from.z};
-      disc.velocity = disc.velocity + Ground{to.x - from.x, to.z - from.z};
-      count += 1;
-    }
-  }
-  if (count <= 0) return disc;
-  disc.at = disc.at * (1 / count);
-  disc.velocity = seconds > 0 ? disc.velocity * (1 / (count * seconds)) : Ground{};
-  for (const DynamicCapsule& c : capsules) {
-    if (!reaches(c.motion.begin) && !reaches(c.motion.end)) continue;
-    for (const Vec3d& p : {c.motion.begin.p0, c.motion.begin.p1}) {
-      disc.radius = max(disc.radius, detail::length(Ground{p.x, p.z} - disc.at) + c.motion.begin.radius);
-    }
-  }
-  return disc;
-}
+using detail::HalfPlane;
 
 /// The tangent of the velocity obstacle nearest to the preferred velocity: `to` leads from the agent to
 /// a disc of radius `reach` (both radii and the margin), which moves at `velocity`.
@@ -68,6 +41,97 @@ HalfPlane avoid(const Ground& to, double reach, const Ground& velocity, const Gr
   return plane(detail::left_of(leg) * side, 0);
 }
 
+/// Tries velocities all around: what comes of each is walked on the mesh and swept against the bodies as they are
+/// expected to move.
+class VelocitySearch {
+ public:
+  VelocitySearch(const NavMesh& mesh, const AgentState& agent, const NavPoint& here, const CapsuleSet& bodies,
+                 const Ground& wanted, const LocalPlannerOptions& o)
+      : mesh_(mesh), agent_(agent), here_(here), wanted_(wanted), o_(o),
+        people_(bodies, agent, o.max_speed, o.horizon), react_(min(max(people_.tick(), kReaction), o.horizon)) {}
+
+  /// The best velocity, `candidate` being one of those tried, and after how many seconds it meets somebody.
+  std::pair<Ground, double> best(const Ground& candidate) const {
+    std::vector<std::pair<double, Ground>> tries;
+    const auto add = [&](const Ground& v) { tries.emplace_back(off(v), v); };
+    add(detail::nearest_in({}, wanted_, o_.max_speed).value_or(Ground{}));
+    add(candidate);
+    add({});
+    const double ahead = std::atan2(wanted_.z, wanted_.x);
+    for (int k = 0; k < kDirections; ++k) {
+      for (const double part : {1.0, 0.5}) add(around(ahead, k, kDirections, part * o_.max_speed));
+    }
+    std::stable_sort(tries.begin(), tries.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    Ground chosen;
+    double least = kNever, contact = 0;
+    for (const auto& [cost, v] : tries) {
+      if (cost >= least) break;
+      const auto [more, meets] = price(v, least - cost);
+      if (cost + more >= least) continue;
+      least = cost + more;
+      chosen = v;
+      contact = meets;
+    }
+    return {chosen, contact};
+  }
+
+ private:
+  static constexpr int kDirections = 24, kWaysOut = 12;
+  static constexpr double kReaction = 0.25;  // seconds before the agent may do otherwise, at least
+  static constexpr double kTight = 0.005;    // metres kept where the margin cannot be
+  static constexpr double kSoonest = 0.1;    // seconds: sooner costs no more
+  static constexpr double kOutWeight = 2.0, kInTick = 1000.0, kNever = 1e30;
+
+  static Ground around(double ahead, int k, int count, double speed) noexcept {
+    constexpr double kTurn = 6.283185307179586;
+    const double a = ahead + k * (kTurn / count);
+    return {speed * std::cos(a), speed * std::sin(a)};
+  }
+  double off(const Ground& v) const noexcept { return detail::length(v - wanted_) / max(o_.max_speed, 1e-9); }
+  double urgency(double seconds) const noexcept { return 1 / max(seconds, kSoonest) - 1 / o_.horizon; }
+
+  SurfaceWalk walk(const NavPoint& from, const Ground& v, double seconds) const {
+    return mesh_.walk(from, {v.x * seconds, 0, v.z * seconds}, true);
+  }
+  double contact(const SurfaceWalk& walk, double margin, double from) const {
+    return people_.first_contact(walk, agent_.radius + margin, agent_.height, from, o_.horizon - from);
+  }
+
+  /// What a velocity costs beside its difference, and after how many seconds somebody is met; costs of `enough` or more
+  /// need not be exact.
+  std::pair<double, double> price(const Ground& v, double enough) const {
+    if (people_.size() == 0) return {0, o_.horizon};
+    const SurfaceWalk way = walk(here_, v, o_.horizon);
+    const double wide = contact(way, max(o_.margin, kTight), 0);
+    if (wide >= o_.horizon) return {0, wide};
+    double cost = urgency(wide);
+    if (cost >= enough) return {cost, wide};
+    const double touched = wide < react_ ? contact(way, kTight, 0) : wide;
+    if (touched < people_.tick()) cost += kInTick * (1 - touched / people_.tick());
+    if (cost >= enough) return {cost, wide};
+    return {cost + kOutWeight * urgency(touched < react_ ? touched : latest(v)), wide};
+  }
+  /// When somebody is met at the latest after `react_` seconds at v, whichever way the agent then goes.
+  double latest(const Ground& v) const {
+    const SurfaceWalk first = walk(here_, v, react_);
+    const NavPoint there{first.points.back().position, first.points.back().poly};
+    double last = 0;
+    for (int k = 0; k <= kWaysOut && last < o_.horizon; ++k) {
+      const Ground u = k == kWaysOut ? Ground{} : around(0, k, kWaysOut, o_.max_speed);
+      last = max(last, contact(walk(there, u, o_.horizon - react_), kTight, react_));
+    }
+    return last;
+  }
+
+  const NavMesh& mesh_;
+  const AgentState& agent_;
+  const NavPoint here_;
+  const Ground wanted_;
+  const LocalPlannerOptions& o_;
+  detail::PredictedBodies people_;
+  double react_;
+};
+
 }  // namespace
 
 PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, const Vec3d& preferred,
@@ -76,21 +140,22 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
   out.safe = false;
   const bool valid = is_finite(agent.position) && is_finite(preferred) && agent.radius >= 0 &&
                      agent.height >= 0 && is_finite(agent.radius) && is_finite(agent.height) &&
-                     o.max_speed >= 0 && o.horizon > 0 && o.wall_horizon > 0 && o.escape_time > 0;
+                     o.max_speed >= 0 && is_finite(o.max_speed) && o.margin >= 0 && is_finite(o.margin) &&
+                     is_finite(o.horizon) && o.horizon > 0 && o.wall_horizon > 0 && o.escape_time > 0;
   if (!valid) return out;
   const SurfaceWalk start = mesh.walk({agent.position, agent.poly}, {}, false);
   if (start.points.empty()) return out;
   const Ground at{agent.position.x, agent.position.z}, wanted{preferred.x, preferred.z};
 
+  const NavPoint here{start.points[0].position, start.points[0].poly};
   std::vector<HalfPlane> planes;
-  for (const ObstacleHit& wall : mesh.obstacles_near({start.points[0].position, start.points[0].poly},
-                                                     o.max_speed * o.wall_horizon)) {
+  for (const ObstacleHit& wall : mesh.obstacles_near(here, o.max_speed * o.wall_horizon)) {
     planes.push_back({{wall.normal.x, wall.normal.z}, -wall.distance / o.wall_horizon, false});
   }
   const double seconds = bodies.t1() - bodies.t0();
   for (const CapsuleSet::Group& g : bodies.groups()) {
     const Disc d =
-        disc_of(bodies.capsules_of(g), agent.position.y, agent.position.y + agent.height, seconds);
+        detail::disc_of(bodies.capsules_of(g), agent.position.y, agent.position.y + agent.height, seconds);
     if (!(d.radius > 0)) continue;
     const double reach = d.radius + agent.radius + o.margin;
     const Ground to = d.at - at;
@@ -100,7 +165,6 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
     ++out.bodies;
   }
   auto v = detail::nearest_in(planes, wanted, o.max_speed);
-  out.safe = v.has_value();
   if (!v) {
     // The least slack that lets something through, by halving; all of it lets everything.
     double low = 0, high = o.max_speed;
@@ -113,9 +177,14 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
       (found ? high : low) = middle;
       if (found) v = found;
     }
-    out.shortfall = high;
   }
-  if (v) out.velocity = {v->x, 0, v->z};
+  Ground chosen = v.value_or(Ground{});
+  out.contact_after = o.horizon;
+  if (out.bodies > 0) {
+    std::tie(chosen, out.contact_after) = VelocitySearch(mesh, agent, here, bodies, wanted, o).best(chosen);
+  }
+  out.velocity = {chosen.x, 0, chosen.z};
+  out.safe = out.contact_after >= o.horizon;
   return out;
 }
 

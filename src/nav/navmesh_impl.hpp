@@ -12,6 +12,7 @@
 
 #include "gsnav/nav/navmesh.hpp"
 #include "corner_hubs.hpp"
+#include "face_views.hpp"
 #include "geodesic_search.hpp"
 #include "poly_mesh.hpp"
 
@@ -99,11 +100,17 @@ struct NavMesh::Impl {
   std::shared_ptr<const detail::UnfoldedMesh> unfolded;  ///< shared with geodesic fields
   /// Made when first asked for: who never asks for a distance pays nothing.
   const detail::CornerHubs& hubs() const {
-    std::call_once(hubs_once, [&] { made_hubs = std::make_unique<const detail::CornerHubs>(*unfolded); });
+    std::call_once(hubs_once, [&] {
+      made_hubs = std::make_unique<const detail::CornerHubs>(*unfolded);
+      if (!made_hubs->empty()) made_views = detail::FaceViews(*unfolded);
+    });
     return *made_hubs;
   }
+  /// Made with the hubs.
+  const detail::FaceViews& views() const noexcept { return made_views; }
   mutable std::once_flag hubs_once;
   mutable std::unique_ptr<const detail::CornerHubs> made_hubs;
+  mutable detail::FaceViews made_views;
   Aabb<double> bounds;  ///< world
   std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon
   std::vector<PolyId> first_poly;   ///< of each of Detour's tiles

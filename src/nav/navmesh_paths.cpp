@@ -37,7 +37,7 @@ double NavMesh::Impl::distance(const detail::Site& start, const detail::Site& go
   if (hubs().empty() || start.face == goal.face) return search.run(*unfolded, start, goal);
   const detail::CornerHubs::Way way = hubs().shortest(start, goal);
   const detail::CornerHubs::LeastToGoal least(hubs(), way);
-  const double d = min(way.length, search.run_straight(*unfolded, start, goal, way.length, &least));
+  const double d = min(way.length, search.run_straight(*unfolded, start, goal, way.length, &least, &views()));
   return d < kInfinity ? d : search.run(*unfolded, start, goal);
 }
 
@@ -53,7 +53,7 @@ NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal)
   const detail::CornerHubs::Way way = hubs().shortest(start, goal);
   NavPath path;
   const detail::CornerHubs::LeastToGoal least(hubs(), way);
-  path.length = search.run_straight(*unfolded, start, goal, way.length, &least);
+  path.length = search.run_straight(*unfolded, start, goal, way.length, &least, &views());
   if (path.length < kInfinity) {
     path.points = search.path();
     return path;

@@ -157,9 +157,10 @@ void PolyMesh::finish() {
 /// Height triangles where they tile the polygon, else its fan.
 void PolyMesh::add_pieces(PolyId id) {
   const Poly& p = polys[id];
-  constexpr double kOff = 1e-6;  // metres, square metres
-  double area = 0, covered = 0;
+  constexpr double kOff = 1e-5;  // metres: what float32 makes of corners some hundred metres from the origin
+  double area = 0, covered = 0, around = 0;
   for (std::uint32_t k = 1; k + 1 < p.count; ++k) area += cross_xz(corner(p, 0), corner(p, k), corner(p, k + 1));
+  for (std::uint32_t k = 0; k < p.count; ++k) around += std::sqrt(distance2_xz(corner(p, k), corner(p, k + 1)));
   bool tiled = !p.planar;
   const std::size_t first = pieces.size();
   for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count && tiled; ++t) {
@@ -167,7 +168,7 @@ void PolyMesh::add_pieces(PolyId id) {
     for (const Vec3d& q : tris[t]) tiled = tiled && holds(id, q, kOff);
     pieces.push_back({tris[t][0], tris[t][1], tris[t][2], id, true});
   }
-  if (tiled && std::abs(covered - area) <= kOff) return;
+  if (tiled && std::abs(covered - std::abs(area)) <= kOff * around) return;
   pieces.resize(first);
   for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
     pieces.push_back({corner(p, 0), corner(p, k), corner(p, k + 1), id, p.planar});
@@ -207,10 +208,9 @@ void PolyMesh::prepare_sampling() {
 Vec3d PolyMesh::point_in(const Piece& piece, Rng& rng) const noexcept {
   const auto &[o, a, b, poly, on_surface] = piece;
   double u = rng.uniform(), v = rng.uniform();
-  if (u + v > 1) {  // the other half of the parallelogram
-    u = 1 - u;
-    v = 1 - v;
-  }
+  const bool beyond = u + v > 1;  // the other half of the parallelogram; selected, for it is as likely as not
+  u = beyond ? 1 - u : u;
+  v = beyond ? 1 - v : v;
   Vec3d q{o.x + u * (a.x - o.x) + v * (b.x - o.x), o.y + u * (a.y - o.y) + v * (b.y - o.y),
           o.z + u * (a.z - o.z) + v * (b.z - o.z)};
   if (!on_surface) q.y = height(poly, q);

@@ -123,7 +123,7 @@ TEST_CASE(
     bool preferred_is_safe = true;
     for (const Body& b : around) {
       if (plan.safe) REQUIRE(least(b, plan.velocity) >= b.reach - 1e-9);
-      preferred_is_safe = preferred_is_safe && least(b, preferred) >= b.reach + 1e-9;
+      preferred_is_safe = preferred_is_safe && least(b, preferred) >= b.reach + 1e-4;  // a skin
     }
     if (preferred_is_safe) {
       REQUIRE(plan.safe);
@@ -131,14 +131,48 @@ TEST_CASE(
       ++free;
     } else {
       ++(plan.safe ? turned : unsafe);
-      if (!plan.safe) REQUIRE(plan.shortfall > 0);
+      REQUIRE((plan.contact_after < o.horizon) == !plan.safe);
     }
   }
   MESSAGE(n << " plans: " << free << " as preferred, " << turned << " turned, " << unsafe
             << " with no safe velocity");
   CHECK(free > n / 5);
-  CHECK(turned > n / 10);
+  CHECK(turned > n / 20);
   CHECK(unsafe > 0);
+}
+
+TEST_CASE("local planner: nobody is touched within the tick whom standing still avoids") {
+  const Soup soup = random_boxes(12, 30, 12);
+  const NavMesh mesh = NavMesh::build({}, soup.vertices, soup.triangles).value();
+  Rng rng(55);
+  const double seconds = 0.25;
+  int touched = 0, others = 0, plans = 0;
+  for (int i = 0; i < cases(20000); ++i) {
+    const NavPoint p = mesh.random_point(rng, 0);
+    const AgentState agent{p.position, 0.15, 1.5, p.poly};
+    std::vector<DynamicCapsule> list;
+    for (std::uint32_t a = 0; a < 4; ++a) {
+      const Vec3d at = p.position + flat(rng.uniform(0.45, 1.2), rng.uniform(0, 2 * kPi));
+      list.push_back(walker(at, flat(rng.uniform(0, 2), rng.uniform(0, 2 * kPi)), seconds, 0.2, a));
+    }
+    const CapsuleSet set = CapsuleSet::create(list, 0, seconds).value();
+    if (clearance(agent, set, 0).distance < 0.01) continue;
+    ++plans;
+    const auto touches = [&](const AgentState& who, const Vec3d& v) {
+      const StepResult r = step(mesh, who, v * seconds, set);
+      return r.blocked_by == BlockedBy::capsule || r.pushed_into;
+    };
+    const PlannedVelocity plan = plan_velocity(mesh, agent, flat(1.0, rng.uniform(0, 2 * kPi)), set);
+    if (!touches(agent, plan.velocity)) continue;
+    ++touched;
+    // With a little more room than the planner keeps.
+    AgentState wide = agent;
+    wide.radius += 0.02;
+    others += touches(wide, {}) ? 0 : 1;
+  }
+  MESSAGE(plans << " plans, " << touched << " touched, of which " << others << " need not have been");
+  CHECK(others == 0);
+  CHECK(plans > cases(10000));
 }
 
 TEST_CASE("local planner: walls are not met within their horizon") {
@@ -174,7 +208,7 @@ TEST_CASE("local planner: what is impossible stands still") {
   CHECK(plan_velocity(mesh, agent_at(0, 0), {1, 0, 0}, above).velocity.x == 1);
 }
 
-TEST_CASE("local planner: through a crossing crowd with a fifth of the contacts of straight on") {
+TEST_CASE("local planner: through a crossing crowd with a twentieth of the contacts of straight on") {
   const NavMesh mesh = room();
   const double dt = 0.1;
   int contacts[2] = {0, 0}, arrived[2] = {0, 0};
@@ -216,6 +250,6 @@ TEST_CASE("local planner: through a crossing crowd with a fifth of the contacts 
   MESSAGE("of " << runs << " runs with contact: straight on " << contacts[0] << ", planned "
                 << contacts[1] << "; arrived " << arrived[0] << " and " << arrived[1]);
   CHECK(contacts[0] > runs / 5);
-  CHECK(contacts[1] * 5 < contacts[0]);
+  CHECK(contacts[1] * 20 < contacts[0]);
   CHECK(arrived[1] >= runs * 95 / 100);
 }
