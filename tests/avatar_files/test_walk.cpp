@@ -192,6 +192,76 @@ TEST_CASE("joints are matched by name, between rigs that face different ways") {
   }
 }
 
+TEST_CASE("MakeHuman walks upright and on the floor, by its own clip and by others'") {
+  const TestBody body = makehuman_body("male");
+  const std::string bvh = data_file("avatars/makehuman_cc0/walk1.bvh"), asf = data_file("avatars/cmu_mocap/11.asf"),
+                    amc = data_file("avatars/cmu_mocap/11_01.amc");
+  if (!body.ok || bvh.empty() || asf.empty()) return;
+  const Skeleton& target = body.loaded.mesh.skeleton;
+  struct Source {
+    const char* name;
+    Skeleton skeleton;
+    MotionClip clip;
+    ClipWalkOptions cycle;
+  };
+  std::vector<Source> sources;
+  {
+    io::LoadedMotion m = io::load_bvh(bvh, {0.1, true}).value();
+    sources.push_back({"walk1.bvh", m.skeleton, m.clip, {}});
+    m = io::load_amc(asf, amc).value();
+    sources.push_back({"11_01.amc, keys 200 to 330", m.skeleton, m.clip, {}});
+    sources.back().cycle.first = 200;
+    sources.back().cycle.keys = 130;
+    const TestBody lumberjack = gltf_body("lumberjack.glb");
+    if (lumberjack.ok)
+      sources.push_back({"lumberjack.glb", lumberjack.loaded.mesh.skeleton, lumberjack.loaded.clips[0].clip, {}});
+  }
+  const auto joints = find_body_joints(target);
+  const double rest_height = target.rest_globals()[static_cast<std::size_t>(joints[5])].translation.y;
+  for (Source& source : sources) {
+    CAPTURE(source.name);
+    const MotionClip clip =
+        retarget(source.clip, source.skeleton, target, match_joints(source.skeleton, target).value()).value();
+    const auto walk = ClipWalk::create(target, clip, source.cycle);
+    CAPTURE(walk.status().message());
+    REQUIRE(walk.ok());
+    const auto feet = find_feet(target);
+    double lean = 0, low = 9, high = -9, head = 0;
+    LocalPose pose;
+    for (int k = 0; k < 100; ++k) {
+      MotionInput in;
+      in.walking = 1;
+      in.distance = 0.01 * k * walk->stride();
+      walk->pose(in, pose);
+      const auto at = joints_at(target, pose);
+      const auto place = [&](std::size_t j) { return at[static_cast<std::size_t>(joints[j])].translation; };
+      const Vec3d trunk = place(4) - place(0);
+      lean = std::max(lean, std::atan2(std::hypot(trunk.x, trunk.z), trunk.y) * 57.29577951308232);
+      double sole = 9;
+      for (const Foot& f : feet) {
+        for (std::size_t i = 0; i < 2; ++i)  // heel and ball; toes bend
+          sole = std::min(sole, (at[f.sole[i].joint] * f.sole[i].local + pose.root).y);
+      }
+      low = std::min(low, sole);
+      high = std::max(high, sole);
+      head = std::max(head, (place(5) + pose.root).y / rest_height);
+    }
+    const FootSlide slide = slide_of(target, *walk, 8.0);
+    std::printf(
+        "MakeHuman by %s: %.2f m a cycle, leans %.0f degrees at most, soles %.0f to %.0f mm over the floor, feet slide "
+        "%.1f mm a step, %.1f at most\n",
+        source.name, walk->stride(), lean, 1e3 * low, 1e3 * high, 1e3 * slide.mean, 1e3 * slide.greatest);
+    CHECK(walk->stride() > 0.6);
+    CHECK(walk->stride() < 2.0);
+    CHECK(lean < 35);
+    CHECK(low > -0.03);
+    CHECK(high < 0.03);
+    CHECK(head > 0.9);
+    CHECK(head < 1.05);
+    CHECK(slide.mean < 0.08);
+  }
+}
+
 TEST_CASE("feet that are held stay where they are; what they carry keeps its shape") {
   const Skeleton s = make_humanoid({.gaussians = 2000}).skeleton;
   const auto feet = find_feet(s);

@@ -82,12 +82,16 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   from_makehuman->add_option("--target", targets, "Shape (.target), FILE or FILE=AMOUNT; any number");
   CLI::App* walks = app.add_subcommand("walk", "A driver that walks a path on a NavMesh");
   walks->add_option("--avatar", walk.avatar, "Avatar (.npz)")->required();
-  walks->add_option("--navmesh", walk.navmesh, "NavMesh (.navmesh, .bin)")->required();
+  CLI::Option* mesh = walks->add_option("--navmesh", walk.navmesh, "NavMesh (.navmesh, .bin)");
+  walks->add_flag("--flat", walk.flat, "The generated flat, for an agent of 0.25 m radius")->excludes(mesh);
   walks->add_option("--from", from, "Start: X,Y,Z")->required();
   walks->add_option("--to", to, "End: X,Y,Z")->required();
   walks->add_option("--via", via, "On the way, in order: X,Y,Z; any number");
   walks->add_option("--out", walk.out, "Driver to write (.npz)")->required();
   walks->add_option("--speed", walk.speed, "Metres a second; 0: the clip's own")->check(CLI::NonNegativeNumber);
+  walks->add_option("--clearance", walk.clearance, "Metres to keep from the NavMesh's edges where there is room; 0: the shortest path")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
   walks->add_option("--fps", walk.frame_rate, "Frames a second")->check(CLI::PositiveNumber)->capture_default_str();
   walks->add_option("--first-key", walk.first_key, "Where the clip's cycle of two steps begins");
   walks->add_option("--keys", walk.keys, "How many keys the cycle has; 0: found");
@@ -127,6 +131,11 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     if (!parse_point(t, walk.via.emplace_back())) return bad(t, "point X,Y,Z");
   }
   if (walks->parsed()) {
+    if (!walk.flat && walk.navmesh.empty()) {
+      std::fprintf(stderr, "gsnav-avatar: walk needs --navmesh or --flat\n");
+      exit_code = 1;
+      return std::nullopt;
+    }
     if (!parse_point(from, walk.from)) return bad(from, "point X,Y,Z");
     if (!parse_point(to, walk.to)) return bad(to, "point X,Y,Z");
     out.walk = walk;

@@ -39,8 +39,8 @@ struct WalkCommand {
   std::vector<gsnav::Vec3d> via;
   ClipSource clip;
   std::size_t first_key = 0, keys = 0;
-  double speed = 0.0, frame_rate = 40.0;
-  bool lock_feet = true;
+  double speed = 0.0, frame_rate = 40.0, clearance = 0.2;
+  bool lock_feet = true, flat = false;
 };
 
 struct StripCommand {

@@ -18,6 +18,8 @@
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/nav/path_clearance.hpp"
+#include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav_avatar {
 
@@ -25,18 +27,39 @@ using namespace gsnav;
 
 namespace {
 
-/// The shortest path through all the points, on the surface.
-Result<std::vector<Vec3d>> lay_path(const NavMesh& mesh, const WalkCommand& c, double& length) {
+Result<NavMesh> find_mesh(const WalkCommand& c) {
+  if (!c.flat) return load_navmesh(c.navmesh);
+  const auto flat = make_default_scene(0.05);  // its mesh does not depend on the density
+  if (!flat) return flat.status();
+  NavMeshSettings settings;
+  settings.agent_radius = 0.25;
+  return NavMesh::build(settings, flat->vertices, flat->triangles);
+}
+
+/// The shortest path through all the points, drawn away from the mesh's edges, on the surface.
+Result<std::vector<Vec3d>> lay_path(const NavMesh& mesh, const WalkCommand& c, double& length, double& clearance) {
   std::vector<Vec3d> stops{c.from};
   stops.insert(stops.end(), c.via.begin(), c.via.end());
   stops.push_back(c.to);
   std::vector<Vec3d> out;
   length = 0.0;
+  clearance = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k + 1 < stops.size(); ++k) {
     const auto path = mesh.find_path(stops[k], stops[k + 1]);
-    if (!path) return {path.code(), c.navmesh + ": " + path.message()};
-    length += path->length;
-    out.insert(out.end(), path->points.begin() + (out.empty() ? 0 : 1), path->points.end());
+    if (!path) return {path.code(), (c.flat ? "the flat" : c.navmesh) + ": " + path.message()};
+    NavPath way = *path;
+    if (c.clearance > 0 && way.length > 0) {
+      ClearanceOptions options;
+      options.clearance = c.clearance;
+      auto clear = keep_clear(mesh, way.points, options);
+      if (!clear) return clear.status();
+      clearance = min(clearance, clear->least);
+      way = std::move(clear->path);
+    } else {
+      for (const Vec3d& p : way.points) clearance = min(clearance, mesh.distance_to_closest_obstacle(p));
+    }
+    length += way.length;
+    out.insert(out.end(), way.points.begin() + (out.empty() ? 0 : 1), way.points.end());
   }
   return out;
 }
@@ -51,7 +74,7 @@ void print_slide(const std::string& when, const FootSlide& s) {
 Status make_walk(const WalkCommand& c) {
   auto avatar = io::load_avatar(c.avatar);
   if (!avatar) return avatar.status();
-  const auto mesh = load_navmesh(c.navmesh);
+  const auto mesh = find_mesh(c);
   if (!mesh) return mesh.status();
   auto asset = std::make_shared<const AvatarAsset>(std::move(avatar->asset));
   const Skeleton& skeleton = asset->skeleton;
@@ -66,10 +89,9 @@ Status make_walk(const WalkCommand& c) {
   if (!walk) return walk.status();
   std::printf("%s: keys %zu to %zu are a cycle of %.2f m, walked at %.2f m/s\n", c.clip.clip.c_str(), walk->first_key(),
               walk->first_key() + walk->keys(), walk->stride(), walk->speed());
-  double length = 0.0;
-  const auto points = lay_path(*mesh, c, length);
+  double length = 0.0, clearance = 0.0;
+  const auto points = lay_path(*mesh, c, length, clearance);
   if (!points) return points.status();
-  double clearance = std::numeric_limits<double>::infinity();
   WalkOptions options;
   options.speed = c.speed > 0 ? c.speed : walk->speed();
   const auto path = WalkTrajectory::create(*points, options);
@@ -97,13 +119,12 @@ Status make_walk(const WalkCommand& c) {
     actor->joint_globals(time, globals);
     for (auto& m : globals) m = placed * m;
     bodies.push_back(at.position);
-    clearance = min(clearance, mesh->distance_to_closest_obstacle(at.position));
     turned = at.turned;
     if (at.walking > 0.999) steady_first = min(steady_first, t), steady_last = max(steady_last, t + 1);
   }
   std::printf(
-      "path of %.2f m in %.2f s at %.2f m/s, %.1f steps, turns on the spot of %.0f degrees; walls are at least %.2f m "
-      "away (the mesh leaves out another %.2f m)\n",
+      "path of %.2f m in %.2f s at %.2f m/s, %.1f steps, turns on the spot of %.0f degrees; between its ends and "
+      "stops the mesh's edges are at least %.2f m away (walls another %.2f m)\n",
       length, path->arrival(), options.speed, 2 * length / stride, turned * 57.29577951308232, clearance,
       mesh->settings().agent_radius);
   const auto print_slides = [&](const std::string& when) {

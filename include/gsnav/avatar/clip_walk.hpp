@@ -22,6 +22,9 @@ struct ClipWalkOptions {
   std::size_t first = 0, keys = 0;
   LocalPose idle;      ///< how the walker stands; empty: the key of the cycle at which the feet are closest together
   double floor = 0.0;  ///< height of the soles in the skeleton's rest pose, metres
+  /// One foot is on the floor at every key, as in a walk: what legs of another length, or a floor that was not level,
+  /// leave of that is made good by the root's height. False keeps the clip's own heights, a run's flight among them.
+  bool grounded = true;
   double turn_per_cycle = 2.1;  ///< radians of a turn on the spot that one cycle of steps goes with, > 0
 };
 
@@ -162,6 +165,22 @@ class ClipWalk final : public MotionSource {
     }
   }
 
+  static double median(std::vector<double> v) {
+    std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
+    return v[v.size() / 2];
+  }
+
+  /// Means over a round's values, `reach` to each side.
+  static std::vector<double> smoothed(const std::vector<double>& v, std::size_t reach) {
+    const std::size_t n = v.size();
+    std::vector<double> out(n, 0.0);
+    for (std::size_t k = 0; k < n; ++k) {
+      for (std::size_t i = 0; i <= 2 * reach; ++i) out[k] += v[(k + n + i - reach) % n];
+      out[k] /= static_cast<double>(2 * reach + 1);
+    }
+    return out;
+  }
+
   /// Turns the cycle to lead to -Z and finds how far each key leads. `ahead`: where the clip went; zero: on the spot.
   Status lead(const Skeleton& skeleton, Vec3d ahead) {
     const std::size_t n = cycle_.size();
@@ -171,6 +190,7 @@ class ClipWalk final : public MotionSource {
     std::vector<double> lowest(points.size(), std::numeric_limits<double>::max());
     std::vector<Affine3<double>> globals;
     double closest = std::numeric_limits<double>::max();
+    std::size_t still = 0;
     for (std::size_t k = 0; k < n; ++k) {
       forward_kinematics(skeleton, cycle_[k], globals);
       for (std::size_t i = 0; i < points.size(); ++i) {
@@ -178,7 +198,7 @@ class ClipWalk final : public MotionSource {
         lowest[i] = min(lowest[i], at[k][i].y);
       }
       const double apart = norm(globals[feet_[0].joints[0]].translation - globals[feet_[1].joints[0]].translation);
-      if (apart < closest) closest = apart, still_ = cycle_[k];
+      if (apart < closest) closest = apart, still = k, still_ = cycle_[k];
     }
     // One foot is on the floor at nearly every key; the tip of the toes may be a little off where it is taken to be.
     std::vector<double> soles;
@@ -188,10 +208,13 @@ class ClipWalk final : public MotionSource {
         if (i % 3 != 2) soles.back() = min(soles.back(), at[k][i].y);
       }
     }
-    std::nth_element(soles.begin(), soles.begin() + static_cast<std::ptrdiff_t>(n / 2), soles.end());
-    const double sunk = soles[n / 2];
-    for (LocalPose& p : cycle_) p.root.y -= sunk;
-    still_.root.y -= sunk;
+    const std::vector<double> sunk = options_.grounded ? smoothed(soles, n / 24) : std::vector(n, median(soles));
+    std::fill(lowest.begin(), lowest.end(), std::numeric_limits<double>::max());
+    for (std::size_t k = 0; k < n; ++k) {
+      cycle_[k].root.y -= sunk[k];
+      for (std::size_t i = 0; i < points.size(); ++i) lowest[i] = min(lowest[i], at[k][i].y -= sunk[k]);
+    }
+    still_.root.y -= sunk[still];
     // The foot that is down is low and moves back against the body: from where the toes point if the clip does not say.
     if (!(norm(ahead) > 0)) {
       for (std::size_t k = 0; k < n; ++k) {
