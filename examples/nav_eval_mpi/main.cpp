@@ -6,11 +6,17 @@
 
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "../../tools/eval/run.hpp"
+#include "gsnav/backends/openmp.hpp"
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda.hpp"
+#endif
 
 namespace {
 
@@ -22,6 +28,10 @@ struct Ranks {
     MPI_Init(argc, argv);
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     MPI_Comm_size(MPI_COMM_WORLD, &count);
+    MPI_Comm node = MPI_COMM_NULL;
+    MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank, MPI_INFO_NULL, &node);
+    MPI_Comm_rank(node, &on_node);
+    MPI_Comm_free(&node);
   }
   ~Ranks() { MPI_Finalize(); }
   Ranks(const Ranks&) = delete;
@@ -46,10 +56,36 @@ struct Ranks {
     return all;
   }
 
-  int rank = 0, count = 1;
+  int rank = 0, count = 1, on_node = 0;  // the last: among those of one machine
 };
 
-Status run(const Ranks& ranks, const gsnav_eval::Options& o) {
+using Look = std::function<Status(const gsnav::World&)>;
+
+/// Draws the agent's sensors, as for a policy that looks. The policies here do not: the numbers are the same.
+template <class B>
+gsnav::Result<Look> looker(std::shared_ptr<B> backend, const gsnav_eval::Stage& stage) {
+  auto made = gsnav::Simulator<B>::create(*backend, stage.scene, stage.config);
+  if (!made) return made.status();
+  auto sim = std::make_shared<gsnav::Simulator<B>>(std::move(*made));
+  return Look([backend, sim](const gsnav::World& world) {
+    sim->set_state(world.state());
+    return sim->observe().status();
+  });
+}
+
+gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o, const gsnav_eval::Stage& stage,
+                           const std::string& backend) {
+  if (backend == "none") return Look{};
+  if (backend == "openmp") return looker(std::make_shared<gsnav::OpenMPBackend>(o.threads), stage);
+#if defined(GSNAV_HAS_CUDA)
+  if (const int gpus = gsnav::CudaBackend::device_count(); gpus > 0) {
+    return looker(std::make_shared<gsnav::CudaBackend>(ranks.on_node % gpus), stage);
+  }
+#endif
+  return Status(gsnav::Errc::unsupported, "--draw cuda: no GPU, or a build without CUDA, for rank " + std::to_string(ranks.rank));
+}
+
+Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& backend) {
   const auto stage = gsnav_eval::prepare(o);
   if (!stage) return stage.status();
   auto journal = gsnav_eval::Journal::open(o.out, o, ranks.rank);
@@ -66,9 +102,11 @@ Status run(const Ranks& ranks, const gsnav_eval::Options& o) {
     gsnav::append_bodies(*stage->scene, t0, t1, out);
   });
   if (!world) return world.status();
+  const auto look = looker(ranks, o, *stage, backend);
+  if (!look) return look.status();
   std::string lines;
   for (std::size_t k = static_cast<std::size_t>(ranks.rank); k < missing.size(); k += static_cast<std::size_t>(ranks.count)) {
-    auto record = gsnav_eval::play(*world, o, stage->episodes[missing[k]], missing[k]);
+    auto record = gsnav_eval::play(*world, o, stage->episodes[missing[k]], missing[k], *look);
     if (!record) return record.status();
     lines += gsnav_eval::line_of(*record) + '\n';
     if (Status s = journal->add(std::move(*record)); !s) return s;
@@ -95,12 +133,16 @@ Status run(const Ranks& ranks, const gsnav_eval::Options& o) {
 int main(int argc, char** argv) {
   const Ranks ranks(&argc, &argv);
   gsnav_eval::Options o;
+  std::string backend = "none";
   CLI::App app{"Evaluates a policy over MPI ranks, to the journal of gsnav-eval, which makes the page of it."};
   gsnav_eval::add_world_options(app, o);
+  app.add_option("--draw", backend, "what the agent sees at each step, by openmp or by cuda (one GPU a rank); none: nothing")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"none", "openmp", "cuda"}));
   CLI11_PARSE(app, argc, argv);
   Status s;
   try {
-    s = run(ranks, o);
+    s = run(ranks, o, backend);
   } catch (const std::exception& e) {
     s = {gsnav::Errc::out_of_memory, e.what()};
   }

@@ -128,9 +128,9 @@ TEST_CASE("a replay becomes a video of any size, and says what is missing where 
 #if defined(GSNAV_EVAL_MPI)
 TEST_CASE("any number of ranks gives the same numbers, also where one was killed and the job begins again") {
   const TempFolder folder("eval");
-  const auto ranks = [&](int n, const std::string& out) {
+  const auto ranks = [&](int n, const std::string& out, const std::string& more = "") {
     const std::string arguments = "--oversubscribe --allow-run-as-root -n " + std::to_string(n) + " " + quoted(GSNAV_EVAL_MPI) +
-                                  " --avatars 1 --episodes 7 --max-steps 30 --policy random --out " + out;
+                                  " --avatars 1 --episodes 7 --max-steps 30 --policy random --out " + out + more;
     const Outcome run = run_command(GSNAV_MPIEXEC, arguments, folder.path());
     CAPTURE(run.text);
     REQUIRE(run.ok);
@@ -139,6 +139,7 @@ TEST_CASE("any number of ranks gives the same numbers, also where one was killed
   };
   const std::string one = ranks(1, "one");
   CHECK(ranks(4, "four") == one);
+  CHECK(ranks(2, "drawn", " --draw openmp --threads 1 --width 24 --height 16") == one);
   // As a rank that is killed leaves its journal: its last line cut, and all of it gone that was not yet on disk.
   const std::string second = read_file(folder / "four/journal.2.jsonl"), third = read_file(folder / "four/journal.3.jsonl");
   CHECK(lines(second) == 3);  // a header and episodes 2 and 6

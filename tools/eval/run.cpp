@@ -38,8 +38,12 @@ Result<Stage> prepare(const Options& o) {
   return stage;
 }
 
-Result<Record> play(gsnav::World& world, const Options& o, const gsnav::PointNavEpisode& episode, std::size_t number) {
+Result<Record> play(gsnav::World& world, const Options& o, const gsnav::PointNavEpisode& episode, std::size_t number,
+                    const std::function<Status(const gsnav::World&)>& look) {
   if (Status s = world.reset(episode); !s) return s;
+  if (look) {
+    if (Status s = look(world); !s) return s;
+  }
   Record r;
   r.episode = number;
   r.id = episode.id;
@@ -64,6 +68,9 @@ Result<Record> play(gsnav::World& world, const Options& o, const gsnav::PointNav
     }
     const auto step = world.step(action);
     if (!step) return step.status();
+    if (look) {
+      if (Status s = look(world); !s) return s;
+    }
     r.reward += step->reward;
     r.actions.push_back(action);
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -20,8 +21,8 @@ struct Stage {
 /// Loads or makes the scene, its NavMesh, people and episodes. Errors name the file or option.
 gsnav::Result<Stage> prepare(const Options& options);
 
-/// Plays episode `number` by the policy, without pictures.
+/// Plays episode `number` by the policy. `look`, where it is given, sees the world after reset and after each action.
 gsnav::Result<Record> play(gsnav::World& world, const Options& options, const gsnav::PointNavEpisode& episode,
-                           std::size_t number);
+                           std::size_t number, const std::function<gsnav::Status(const gsnav::World&)>& look = {});
 
 }  // namespace gsnav_eval

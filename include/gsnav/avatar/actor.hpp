@@ -108,7 +108,11 @@ class AvatarActor {
   /// What skinning reads: joint to root frame times inverse bind, [J].
   void joint_matrices(double t, std::vector<Affine3<double>>& out) const {
     joint_globals(t, out);
-    for (std::size_t j = 0; j < out.size(); ++j) out[j] = out[j] * inverse_binds_[j];
+    to_joint_matrices(out);
+  }
+  /// The same of what joint_globals gave, in place.
+  void to_joint_matrices(std::vector<Affine3<double>>& globals) const {
+    for (std::size_t j = 0; j < globals.size(); ++j) globals[j] = globals[j] * inverse_binds_[j];
   }
 
   /// The proxy capsules in the world; none while it is not active.

@@ -112,6 +112,11 @@ class SkinnedGaussians {
   /// The same for what these cameras see by `config`: an actor that none of them can see leaves an empty set and costs its
   /// forward kinematics, no more. No pixel of theirs changes by it.
   Status pose(const AvatarActor& actor, double t, std::span<const Camera> cameras, const RenderConfig& config) {
+    if (Status s = prepare(actor, t, cameras, config); !s) return s;
+    return skin_prepared();
+  }
+  /// That in two steps. The first is the host's alone: several threads may take it, each for another object.
+  Status prepare(const AvatarActor& actor, double t, std::span<const Camera> cameras, const RenderConfig& config) {
     if (Status s = place(actor, t); !s || !visible_) return s;
     actor.joint_globals(t, matrices_);
     const ChunkBounds bounds = bounds_.at(matrices_);
@@ -119,10 +124,10 @@ class SkinnedGaussians {
     for (const Camera& c : cameras) {
       visible_ = visible_ || may_be_visible(make_projection_camera<double>(c, set_, projection_rules(config)), bounds);
     }
-    if (!visible_) return {};
-    actor.joint_matrices(t, matrices_);
-    return skin();
+    if (visible_) actor.to_joint_matrices(matrices_);
+    return {};
   }
+  Status skin_prepared() { return visible_ ? skin() : Status(); }
 
   /// The posed Gaussians where the actor stands; empty before the first `pose`. Valid until the next.
   GaussianSet set() const noexcept {

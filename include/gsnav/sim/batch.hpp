@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <span>
@@ -258,40 +259,66 @@ class BatchSimulator {
       return std::pair(scene, scenes_[scene]->scene().avatars.empty() ? 0.0 : world(l.environment).time());
     };
     std::stable_sort(lookers_.begin(), lookers_.end(), [&](const Looker& a, const Looker& b) { return key(a) < key(b); });
-    views_.clear();
+    posed_.clear();
     std::vector<std::size_t> used(scenes_.size());  // slots of each scene
-    std::size_t times = 0;
     for (std::size_t first = 0, last = 0; first < lookers_.size(); first = last) {
       const auto here = key(lookers_[first]);
       while (last < lookers_.size() && key(lookers_[last]) == here) ++last;
-      if (Status s = add_views(first, last, used[here.first]++); !s) return s;
-      if (++times < config_.pose_slots && last < lookers_.size()) continue;
-      if (Status s = rig_.render(views_, images); !s) return s;
-      views_.clear();
+      posed_.push_back({first, last, here.first, used[here.first]++, {}, {}});
+      if (posed_.size() < config_.pose_slots && last < lookers_.size()) continue;
+      if (Status s = draw_posed(images); !s) return s;
+      posed_.clear();
       std::fill(used.begin(), used.end(), std::size_t{0});
-      times = 0;
     }
     return {};
   }
 
-  /// Views of lookers that share a scene and a time; its avatars are posed for them.
-  Status add_views(std::size_t first, std::size_t last, std::size_t slot) {
-    const std::size_t scene = worlds_.scene_of(lookers_[first].environment);
-    const RenderConfig& config = render_configs_[scene];
-    cameras_.clear();
-    for (std::size_t i = first; i < last; ++i) {
-      const AgentPose& agent = world(lookers_[i].environment).agent();
-      rig_.append_cameras(agent.position, agent.rotation(), agent.pitch, cameras_);
+  /// Lookers [first, last) share a scene and a time, and so a slot that the scene's avatars are posed in.
+  struct Posed {
+    std::size_t first, last, scene, slot;
+    std::vector<Camera> cameras;
+    Status status;
+  };
+
+  /// Draws posed_ by one batch. Joints are found by all threads, Gaussians skinned by the backend.
+  Status draw_posed(SensorImages<B>& images) {
+    for (const Posed& p : posed_) scenes_[p.scene]->make_slots(p.slot + 1);
+    parallel()(posed_.size(), [this](std::size_t i) {
+      Posed& p = posed_[i];
+      p.status = guarded([&] {
+        for (std::size_t l = p.first; l < p.last; ++l) {
+          const AgentPose& agent = world(lookers_[l].environment).agent();
+          rig_.append_cameras(agent.position, agent.rotation(), agent.pitch, p.cameras);
+        }
+        const double time = world(lookers_[p.first].environment).time();
+        return scenes_[p.scene]->prepare(p.slot, time, p.cameras, render_configs_[p.scene]);
+      });
+    });
+    views_.clear();
+    for (const Posed& p : posed_) {
+      if (!p.status) return p.status;
+      SceneOnBackend<B>& scene = *scenes_[p.scene];
+      if (Status s = scene.pose_prepared(p.slot); !s) return s;
+      for (std::size_t i = p.first; i < p.last; ++i) {
+        const std::size_t e = lookers_[i].environment;
+        const AgentPose& agent = world(e).agent();
+        views_.push_back({agent.position, agent.rotation(), agent.pitch, noise_seed(config_.seed + e, world(e).state()),
+                          scene.sets(p.slot), &render_configs_[p.scene], lookers_[i].row, scene.meshes()});
+      }
     }
-    SceneOnBackend<B>& posed = *scenes_[scene];
-    if (Status s = posed.pose(slot, world(lookers_[first].environment).time(), cameras_, config); !s) return s;
-    for (std::size_t i = first; i < last; ++i) {
-      const std::size_t e = lookers_[i].environment;
-      const AgentPose& agent = world(e).agent();
-      views_.push_back({agent.position, agent.rotation(), agent.pitch,
-                        noise_seed(config_.seed + e, world(e).state()), posed.sets(slot), &config, lookers_[i].row, posed.meshes()});
+    return rig_.render(views_, images);
+  }
+
+  /// No exception may leave a parallel region.
+  template <class F>
+  static Status guarded(const F& f) noexcept {
+    try {
+      return f();
+    } catch (const Error& e) {
+      return {e.code(), e.what()};
+    } catch (const std::exception& e) {
+      return {Errc::out_of_memory, e.what()};
     }
-    return {};
   }
 
   static constexpr std::size_t kPieces = 64;
@@ -310,8 +337,8 @@ class BatchSimulator {
   std::unique_ptr<ThreadPool> pool_;  // where the backend's own work is not the host's
   std::vector<BatchObservation> images_, final_images_;
   std::vector<Looker> lookers_;
+  std::vector<Posed> posed_;
   std::vector<SensorView> views_;
-  std::vector<Camera> cameras_;
 };
 
 /// BatchSimulator<B>::create, and create_from_library, with B deduced.

@@ -108,10 +108,23 @@ class SceneOnBackend {
     if (s.whole && s.time == t) return {};
     return pose(s, t, true, [&](std::size_t i) { return s.skins[i].pose(scene_->avatars[i], t); });
   }
-  /// The same for what these cameras see: avatars that none of them can see cost little.
-  Status pose(std::size_t slot, double t, std::span<const Camera> cameras, const RenderConfig& config) {
-    Slot& s = at(slot);
-    return pose(s, t, false, [&](std::size_t i) { return s.skins[i].pose(scene_->avatars[i], t, cameras, config); });
+  /// The same for what these cameras see, in two steps: avatars that none of them can see cost little. The first is the
+  /// host's alone: several threads may take it, each for another slot, once there are so many (make_slots).
+  Status prepare(std::size_t slot, double t, std::span<const Camera> cameras, const RenderConfig& config) {
+    Slot& s = *slots_[slot];
+    s.whole = false;
+    s.time = t;
+    for (std::size_t i = 0; i < s.skins.size(); ++i) {
+      if (Status e = s.skins[i].prepare(scene_->avatars[i], t, cameras, config); !e) return e;
+    }
+    return {};
+  }
+  Status pose_prepared(std::size_t slot) {
+    Slot& s = *slots_[slot];
+    return pose(s, s.time, false, [&](std::size_t i) { return s.skins[i].skin_prepared(); });
+  }
+  void make_slots(std::size_t count) {
+    if (count > 0) at(count - 1);
   }
   /// Assets, then avatars, as last posed. Valid until the slot is posed again.
   std::span<const GaussianSet> sets(std::size_t slot) const noexcept { return slots_[slot]->sets; }
