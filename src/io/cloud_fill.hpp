@@ -2,17 +2,16 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "gsnav/core/huge_pages.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "threads.hpp"
 
 namespace gsnav::io::detail {
 
@@ -45,11 +44,15 @@ class CloudSink {
     }
     for (std::size_t k = 0; k < 4; ++k) cloud_.quats[k][at_] = g.quat[k];
     cloud_.opacities[at_] = g.opacity;
-    std::copy_n(raw.shN, rest_, cloud_.shN.data() + rest_ * at_);
+    float* const bands = cloud_.shN.data() + rest_ * at_;
+    if (raw.shN != bands) std::copy_n(raw.shN, rest_, bands);
     report_.bounds.add(raw.mean);
     ++at_;
     return true;
   }
+
+  /// The SH bands of the file's row i where fill_cloud was given them.
+  float* bands(std::size_t i) const noexcept { return cloud_.shN.data() + rest_ * i; }
 
   std::size_t first() const noexcept { return first_; }
   std::size_t size() const noexcept { return at_ - first_; }
@@ -104,29 +107,20 @@ inline void move_rows(GaussianCloud& cloud, std::size_t from, std::size_t to, st
   if (rest != 0) plane(cloud.shN, rest);
 }
 
-/// Reads `count` rows into a cloud of SH degree `degree`, in parallel where there are many:
-/// `decode(first, last, sink)` gives the rows [first, last) to the sink, in their order, and returns a
-/// Status. The result does not depend on the number of threads; of several errors the first one's is
-/// returned. No memory beyond the cloud's is asked for. With `parallel` false all rows come by one call.
-template <class Decode>
-Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string& source,
-                               const Decode& decode, bool parallel = true) {
-  constexpr std::size_t kRowsWorthAThread = 1 << 15, kMostThreads = 16;
-  LoadedCloud out;
-  GaussianCloud& cloud = out.cloud;
-  cloud.sh_degree = out.report.sh_degree = degree;
-  out.report.source = source;
-  resize_planes(cloud, count);
-  const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
-  const std::size_t pieces =
-      parallel ? std::clamp(count / kRowsWorthAThread, std::size_t{1}, std::min(cores, kMostThreads))
-               : 1;
-  std::vector<CloudSink> sinks;
+/// How many pieces so many rows are worth being read in.
+inline std::size_t pieces_of(std::size_t count) noexcept {
+  constexpr std::size_t kRowsWorthAThread = 1 << 15;
+  return std::clamp(count / kRowsWorthAThread, std::size_t{1}, io_threads());
+}
+
+/// f(p, first, last), which returns a Status, for the rows [first, last) of each of the pieces, side by side. Of
+/// several errors the first piece's is returned; throws std::bad_alloc where one did.
+template <class F>
+Status for_pieces(std::size_t count, std::size_t pieces, const F& f) {
   std::vector<Status> statuses(pieces);
-  for (std::size_t p = 0; p < pieces; ++p) sinks.emplace_back(cloud, count * p / pieces);
   const auto piece = [&](std::uint32_t p) noexcept {
     try {
-      statuses[p] = decode(count * p / pieces, count * (p + 1) / pieces, sinks[p]);
+      statuses[p] = f(p, count * p / pieces, count * (p + 1) / pieces);
     } catch (const std::bad_alloc&) {
       statuses[p] = Status(Errc::out_of_memory, std::string());
     }
@@ -136,11 +130,38 @@ Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string&
   } else {
     ThreadPool(static_cast<int>(pieces)).run(static_cast<std::uint32_t>(pieces), piece);
   }
+  for (const Status& s : statuses) {
+    if (s.code() == Errc::out_of_memory) throw std::bad_alloc();
+    if (!s) return s;
+  }
+  return {};
+}
+
+/// Reads `count` rows into a cloud of SH degree `degree`, in parallel where there are many:
+/// `decode(first, last, sink)` gives the rows [first, last) to the sink, in their order, and returns a
+/// Status. The result does not depend on the number of threads; of several errors the first one's is
+/// returned. No memory beyond the cloud's is asked for. With `parallel` false all rows come by one call.
+/// `bands`: the SH bands of all rows, where they are there before the rest: [count][(degree+1)^2 - 1][3]. They
+/// become the cloud's, and the shN of row i is then sink.bands(i).
+template <class Decode>
+Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string& source, const Decode& decode,
+                               bool parallel = true, std::vector<float> bands = {}) {
+  LoadedCloud out;
+  GaussianCloud& cloud = out.cloud;
+  cloud.sh_degree = out.report.sh_degree = degree;
+  out.report.source = source;
+  cloud.shN = std::move(bands);
+  resize_planes(cloud, count);
+  const std::size_t pieces = parallel ? pieces_of(count) : 1;
+  std::vector<CloudSink> sinks;
+  for (std::size_t p = 0; p < pieces; ++p) sinks.emplace_back(cloud, count * p / pieces);
+  const Status decoded = for_pieces(count, pieces, [&](std::size_t p, std::size_t first, std::size_t last) -> Status {
+    return decode(first, last, sinks[p]);
+  });
+  if (!decoded) return decoded;
   std::size_t kept = 0;
   bool far = false;
   for (std::size_t p = 0; p < pieces; ++p) {
-    if (statuses[p].code() == Errc::out_of_memory) throw std::bad_alloc();
-    if (!statuses[p]) return statuses[p];
     move_rows(cloud, sinks[p].first(), kept, sinks[p].size());
     kept += sinks[p].size();
     far = far || sinks[p].has_origins();

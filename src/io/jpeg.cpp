@@ -17,6 +17,8 @@ namespace gsnav::io::detail {
 namespace {
 
 constexpr unsigned kLargestSide = 16384;
+// Each scan of a progressive picture goes over all of its blocks; encoders write about ten.
+constexpr int kMostScans = 100;
 
 [[noreturn]] void on_error(j_common_ptr info);
 void on_message(j_common_ptr, int) {}
@@ -38,6 +40,10 @@ struct ErrorHandler {
 
 void on_error(j_common_ptr info) { std::longjmp(reinterpret_cast<ErrorHandler*>(info->err)->jump, 1); }
 
+void on_progress(j_common_ptr info) {
+  if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number > kMostScans) on_error(info);
+}
+
 /// Decoder with its own lifetime, so that allocation happens outside of setjmp's reach.
 class JpegDecoder {
  public:
@@ -46,15 +52,22 @@ class JpegDecoder {
   JpegDecoder& operator=(const JpegDecoder&) = delete;
   ~JpegDecoder() { jpeg_destroy_decompress(&info_); }
 
+  /// Reads what the picture is; nothing of its size is allocated yet.
   bool read_header(std::span<const std::byte> bytes) {
     if (setjmp(error_.jump) != 0) return false;
     jpeg_create_decompress(&info_);
+    progress_.progress_monitor = on_progress;
+    info_.progress = &progress_;
     jpeg_mem_src(&info_, reinterpret_cast<const unsigned char*>(bytes.data()),
                  static_cast<unsigned long>(bytes.size()));
     if (jpeg_read_header(&info_, TRUE) != JPEG_HEADER_OK) return false;
     if (info_.image_width > kLargestSide || info_.image_height > kLargestSide) return false;
     info_.out_color_space = JCS_RGB;
-    return jpeg_start_decompress(&info_) != 0;
+    return true;
+  }
+  bool start() {
+    if (setjmp(error_.jump) != 0) return false;
+    return jpeg_start_decompress(&info_) != 0 && info_.output_components == 3;
   }
   bool read_rows(unsigned char* to) {
     if (setjmp(error_.jump) != 0) return false;
@@ -64,12 +77,12 @@ class JpegDecoder {
     }
     return true;
   }
-  std::size_t width() const { return info_.output_width; }
-  std::size_t height() const { return info_.output_height; }
-  bool is_rgb() const { return info_.output_components == 3; }
+  std::size_t width() const { return info_.image_width; }
+  std::size_t height() const { return info_.image_height; }
 
  private:
   jpeg_decompress_struct info_{};
+  jpeg_progress_mgr progress_{};
   ErrorHandler error_;
 };
 
@@ -128,14 +141,16 @@ Result<std::vector<std::byte>> compress_jpeg(std::span<const std::uint8_t> rgb, 
 
 Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
   JpegDecoder decoder;
-  if (!decoder.read_header(bytes) || !decoder.is_rgb()) {
-    return {Errc::invalid_file, name + ": not a JPEG of three colours, or its header is damaged"};
-  }
+  if (!decoder.read_header(bytes)) return {Errc::invalid_file, name + ": not a JPEG, or its header is damaged"};
   // An 8 x 8 block of three planes takes a bit of the file each at least.
   if (decoder.width() * decoder.height() / 512 > bytes.size()) {
     return {Errc::invalid_file, name + ": " + std::to_string(decoder.width()) + " x " +
                                     std::to_string(decoder.height()) + " pixels cannot be in " +
                                     std::to_string(bytes.size()) + " bytes"};
+  }
+  if (!decoder.start()) {
+    return {Errc::invalid_file, name + ": not of three colours, of more than " + std::to_string(kMostScans) +
+                                    " scans, or damaged JPEG data"};
   }
   std::vector<unsigned char> pixels(3 * decoder.width() * decoder.height());
   if (!decoder.read_rows(pixels.data())) return {Errc::invalid_file, name + ": damaged or truncated JPEG data"};

@@ -18,7 +18,9 @@ std::string report_text(const LoadReport& r) {
   };
   line("%llu Gaussians of %llu rows, SH degree %d (%d in use), %.1f MB%s", static_cast<unsigned long long>(r.kept),
        static_cast<unsigned long long>(r.read), r.sh_degree, r.sh_degree_used, static_cast<double>(r.memory) / 1e6,
-       r.compact ? ", compact" : "");
+       r.packed    ? ", packed"
+       : r.compact ? ", compact"
+                   : "");
   out = r.source + ":" + out.substr(1);
   count(r.dropped_non_finite, "dropped: a value that is not finite");
   count(r.dropped_zero_quat, "dropped: a zero quaternion");
@@ -34,6 +36,15 @@ std::string report_text(const LoadReport& r) {
        static_cast<double>(r.eps2d), r.sort_order == SortOrder::z_depth ? "depth" : "distance");
   if (r.moving) line("moving: own times from %.6g to %.6g s", r.first_time, r.last_time);
   if (r.compact) line("SH as binary16: coefficients differ by up to %.3g", r.sh_storage_error);
+  if (r.packed) {
+    const PackErrors& e = r.packing;
+    line(
+        "packed: means in %d bits, off by up to %.3g m (%.3g deviations), scales by %.3g of the largest, rotations by "
+        "%.3g",
+        e.mean_bits, e.mean, e.mean_deviations, e.scale, e.rotation);
+    line("opacities by %.3g, colours by %.3g; SH in %d bits, off by up to %.3g, root mean square %.3g", e.opacity,
+         e.sh0, e.sh_bits, e.sh, e.sh_rms);
+  }
   for (const std::string& w : r.warnings) out += "  warning: " + w + "\n";
   return out;
 }

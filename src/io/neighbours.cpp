@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <thread>
 
 #include "gsnav/core/thread_pool.hpp"
+#include "threads.hpp"
 
 namespace gsnav::io::detail {
 namespace {
@@ -115,8 +115,7 @@ std::vector<double> neighbour_distances(const std::vector<Vec3d>& points, std::s
       out[tree.order()[i]] = std::sqrt(sum / static_cast<double>(k));
     }
   };
-  const int threads = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 16u));
-  ThreadPool(threads).run(static_cast<std::uint32_t>((n + kPiece - 1) / kPiece), piece);
+  ThreadPool(static_cast<int>(io_threads())).run(static_cast<std::uint32_t>((n + kPiece - 1) / kPiece), piece);
   return out;
 }
 

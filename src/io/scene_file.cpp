@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <utility>
 #include <vector>
 
 #include "described.hpp"
@@ -139,6 +140,22 @@ Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& 
     }
     describe(scene->cloud, report, norm(up.up) > 0 ? up.up : Vec3d{0, -1, 0});
     return scene;
+  });
+}
+
+Result<LoadedPackedCloud> load_packed_scene(const std::string& spec, const LoadSceneOptions& options) {
+  return detail::guarded(spec, [&]() -> Result<LoadedPackedCloud> {
+    if (options.storage != Storage::full) {
+      return {Errc::invalid_argument, spec + ": LoadSceneOptions.storage must be full where a scene is to be packed"};
+    }
+    auto scene = load_scene(spec, options);
+    if (!scene) return scene.status();
+    LoadedPackedCloud out;
+    out.report = std::move(scene->report);
+    out.report.packed = true;
+    out.cloud = pack_cloud(std::move(scene->cloud), options.pack, &out.report.packing);
+    out.report.memory = out.cloud.bytes();
+    return out;
   });
 }
 

@@ -134,29 +134,54 @@ class SogReader {
     }
     if (Status s = read_planes(); !s) return s;
     files_.close();
+    const std::size_t count = static_cast<std::size_t>(total);
+    std::vector<float> bands;
+    if (Status s = look_up_bands(*ranges, count, bands); !s) return s;
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
       RawGaussian raw;
-      std::array<float, 45> rest;
-      raw.shN = rest.data();
-      std::uint64_t before = 0;  // rows of the ranges so far
-      for (const detail::RowRange& r : *ranges) {
-        const std::uint64_t from = std::max<std::uint64_t>(first, before);
-        const std::uint64_t to = std::min<std::uint64_t>(last, before + r.count);
-        for (std::uint64_t i = from; i < to; ++i) {
-          if (Status s = gaussian(static_cast<std::size_t>(r.first + i - before), raw, rest); !s)
-            return s;
-          sink.add(raw);
-        }
-        before += r.count;
-      }
-      return {};
+      return for_rows(*ranges, first, last, [&](std::size_t row, std::size_t i) -> Status {
+        raw.shN = sink.bands(i);
+        Status s = gaussian(row, raw);
+        if (s) sink.add(raw);
+        return s;
+      });
     };
-    auto out = detail::fill_cloud(static_cast<std::size_t>(total), meta_.degree, source, decode);
+    auto out = detail::fill_cloud(count, meta_.degree, source, decode, true, std::move(bands));
     if (out) out->cloud.filter = meta_.antialias ? Filter::mip : Filter::classic;
     return out;
   }
 
  private:
+  /// f(row of the file, i) for those of the ranges' rows that i in [first, last) numbers.
+  template <class F>
+  static Status for_rows(const std::vector<detail::RowRange>& ranges, std::size_t first, std::size_t last, const F& f) {
+    std::uint64_t before = 0;  // rows of the ranges so far
+    for (const detail::RowRange& r : ranges) {
+      const std::uint64_t from = std::max<std::uint64_t>(first, before);
+      const std::uint64_t to = std::min<std::uint64_t>(last, before + r.count);
+      for (std::uint64_t i = from; i < to; ++i) {
+        if (Status s = f(static_cast<std::size_t>(r.first + i - before), static_cast<std::size_t>(i)); !s) return s;
+      }
+      before += r.count;
+    }
+    return {};
+  }
+
+  /// The bands of all rows; their planes are gone then, before there is anything else of the cloud.
+  Status look_up_bands(const std::vector<detail::RowRange>& ranges, std::size_t count, std::vector<float>& bands) {
+    if (meta_.degree == 0) return {};
+    const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(meta_.degree) - 1);
+    bands = huge_vector<float>(rest * count);
+    const Status s = detail::for_pieces(
+        count, detail::pieces_of(count), [&](std::size_t, std::size_t first, std::size_t last) -> Status {
+          return for_rows(ranges, first, last, [&](std::size_t row, std::size_t i) -> Status {
+            return palette_entry(row, bands.data() + rest * i);
+          });
+        });
+    centroids_.image = labels_.image = {};
+    return s;
+  }
+
   Status read_planes() {
     const std::pair<Plane*, const std::string*> wanted[] = {
         {&low_, &meta_.means_low}, {&high_, &meta_.means_high}, {&scales_, &meta_.scales},
@@ -215,7 +240,7 @@ class SogReader {
     return {};
   }
 
-  Status gaussian(std::size_t i, RawGaussian& raw, std::array<float, 45>& rest) const {
+  Status gaussian(std::size_t i, RawGaussian& raw) const {
     for (std::size_t k = 0; k < 3; ++k) {
       const int axis = static_cast<int>(k);
       const unsigned steps = low_.image.pixel(i)[k] + 256u * high_.image.pixel(i)[k];
@@ -227,8 +252,7 @@ class SogReader {
       raw.sh0[k] = static_cast<float>(dc);
     }
     raw.opacity_logit = meta_.opacity_logits[sh0_.image.pixel(i)[3]];
-    if (Status s = quaternion(i, raw.quat); !s) return s;
-    return meta_.degree > 0 ? palette_entry(i, rest) : Status();
+    return quaternion(i, raw.quat);
   }
 
   /// Three components in [-1, 1] / sqrt(2); the fourth, the largest, is what unit length leaves.
@@ -243,7 +267,7 @@ class SogReader {
     return {};
   }
 
-  Status palette_entry(std::size_t i, std::array<float, 45>& rest) const {
+  Status palette_entry(std::size_t i, float* rest) const {
     const std::uint8_t* p = labels_.image.pixel(i);
     const std::size_t label = p[0] + std::size_t{256} * p[1];
     if (label >= meta_.palette) {

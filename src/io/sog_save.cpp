@@ -6,7 +6,6 @@
 #include <iterator>
 #include <new>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -17,6 +16,7 @@
 #include "gsnav/io/sog.hpp"
 #include "json.hpp"
 #include "quantised.hpp"
+#include "threads.hpp"
 #include "webp.hpp"
 #include "zip_writer.hpp"
 
@@ -63,8 +63,7 @@ class SogWriter {
         statuses[k] = Status(Errc::out_of_memory, std::string());
       }
     };
-    const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
-    ThreadPool(static_cast<int>(std::min(cores, kParts))).run(static_cast<std::uint32_t>(kParts), work);
+    ThreadPool(static_cast<int>(std::min(detail::io_threads(), kParts))).run(static_cast<std::uint32_t>(kParts), work);
     Files files;
     constexpr std::size_t kInFile[] = {1, 2, 4, 3, 0};  // the order that readers have always seen
     for (const std::size_t k : kInFile) {

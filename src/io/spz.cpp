@@ -2,14 +2,15 @@
 #include "gsnav/io/spz.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <utility>
 
 #include "cloud_fill.hpp"
 #include "described.hpp"
 #include "file.hpp"
 #include "quantised.hpp"
 #include "spz_planes.hpp"
+#include "widen_rows.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -18,15 +19,17 @@ using detail::load_le;
 
 class SpzDecoder {
  public:
-  SpzDecoder(const detail::SpzPlanes& planes, bool turn)
+  SpzDecoder(detail::SpzPlanes& planes, bool turn)
       : planes_(planes), header_(planes.header), turn_(turn) {}
 
-  Result<LoadedCloud> run(const std::string& source) const {
+  Result<LoadedCloud> run(const std::string& source) {
+    widen_bands();
     const auto decode = [this](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
       for (std::size_t i = first; i < last; ++i) add(i, sink);
       return {};
     };
-    auto out = detail::fill_cloud(header_.count, std::min(header_.degree, kMaxShDegree), source, decode);
+    auto out = detail::fill_cloud(header_.count, std::min(header_.degree, kMaxShDegree), source, decode, true,
+                                  std::move(planes_.bands));
     if (!out) return out;
     const bool mip = (header_.flags & detail::kSpzAntialiased) != 0;
     out->cloud.filter = mip ? Filter::mip : Filter::classic;
@@ -55,15 +58,18 @@ class SpzDecoder {
       raw.mean = {raw.mean.x, -raw.mean.y, -raw.mean.z};
       raw.quat = {raw.quat.w, raw.quat.x, -raw.quat.y, -raw.quat.z};
     }
-    std::array<float, 45> rest;
-    raw.shN = rest.data();
-    const std::size_t in_file = 3 * header_.coefficients();
-    const std::byte* bands = planes_.at(5, i, in_file);
-    for (std::size_t k = 0; k < std::min(rest.size(), in_file); ++k) {
-      const float sign = turn_ ? detail::kHalfTurnAboutX[k / 3] : 1.0f;
-      rest[k] = static_cast<float>((number(bands[k]) - 128) / 128) * sign;
-    }
+    raw.shN = sink.bands(i);
     sink.add(raw);
+  }
+
+  void widen_bands() {
+    const std::size_t in_file = 3 * header_.coefficients(), kept = std::min<std::size_t>(45, in_file);
+    detail::widen_rows<72>(planes_.bands, header_.count, in_file, [&](const std::byte* bands, float* out) {
+      for (std::size_t k = 0; k < kept; ++k) {
+        const float sign = turn_ ? detail::kHalfTurnAboutX[k / 3] : 1.0f;
+        out[k] = static_cast<float>((number(bands[k]) - 128) / 128) * sign;
+      }
+    });
   }
 
   double position(std::size_t i, std::size_t axis) const {
@@ -94,12 +100,12 @@ class SpzDecoder {
     return {xyzw.z, xyzw.w, xyzw.x, xyzw.y};
   }
 
-  const detail::SpzPlanes& planes_;
+  detail::SpzPlanes& planes_;
   const detail::SpzHeader& header_;
   bool turn_;
 };
 
-Result<LoadedCloud> decode(const Result<detail::SpzPlanes>& planes, const std::string& source,
+Result<LoadedCloud> decode(Result<detail::SpzPlanes> planes, const std::string& source,
                            const LoadSpzOptions& options) {
   if (!planes) return planes.status();
   return detail::described(SpzDecoder(*planes, !options.keep_axes).run(source),

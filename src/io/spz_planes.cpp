@@ -3,16 +3,20 @@
 
 #include <zstd.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "file.hpp"
+#include "gsnav/core/huge_pages.hpp"
 #include "gzip.hpp"
+#include "widen_rows.hpp"
 #include "zip.hpp"
 
 namespace gsnav::io::detail {
 namespace {
 
 constexpr std::size_t kGzipHeader = 16, kPlainHeader = 32, kTocEntry = 16;
+constexpr std::size_t kBands = 5;  // the last plane
 constexpr int kMostDegree = 4, kMostFractionalBits = 30;
 constexpr std::uint32_t kAxesExtension = 0xadbe0003;  // SPZ_ADOBE_coordinate_system
 
@@ -38,9 +42,11 @@ class PlanesReader {
     }
     if (Status s = parse_header(header.data(), 1, 3, "in gzip, 1 to 3 are read"); !s) return s;
     if (Status s = make_room(); !s) return s;
-    if (const std::size_t there = gzip.read(planes_.bytes); there != planes_.bytes.size()) {
-      return fail(gaussians() + " need " + std::to_string(planes_.bytes.size()) + " bytes, " +
-                  std::to_string(there) + " are there");
+    const std::span<std::byte> bands = plane(kBands);
+    std::size_t there = gzip.read(planes_.bytes);
+    if (there == planes_.bytes.size()) there += gzip.read(bands);
+    if (const std::size_t wanted = planes_.bytes.size() + bands.size(); there != wanted) {
+      return fail(gaussians() + " need " + std::to_string(wanted) + " bytes, " + std::to_string(there) + " are there");
     }
     // What follows is read no further than it takes to see the checksum.
     std::array<std::byte, 4096> rest;
@@ -82,9 +88,7 @@ class PlanesReader {
     const std::byte* entry = bytes_.data() + toc;
     for (std::size_t k = 0; k < widths.size(); ++k) {
       if (widths[k] == 0) continue;
-      if (Status s = unpack(k, widths[k], load_le<std::uint64_t>(entry),
-                            load_le<std::uint64_t>(entry + 8), left);
-          !s) {
+      if (Status s = unpack(k, load_le<std::uint64_t>(entry), load_le<std::uint64_t>(entry + 8), left); !s) {
         return s;
       }
       entry += kTocEntry;
@@ -94,12 +98,12 @@ class PlanesReader {
   }
 
   /// Takes stream k, `packed` bytes, off the front of `left`.
-  Status unpack(std::size_t k, std::size_t width, std::uint64_t packed, std::uint64_t size,
-                std::span<const std::byte>& left) {
+  Status unpack(std::size_t k, std::uint64_t packed, std::uint64_t size, std::span<const std::byte>& left) {
     static constexpr const char* kNames[] = {"positions", "opacities",   "colours",
                                              "scales",    "quaternions", "SH bands"};
     const std::string stream = std::string("the stream of ") + kNames[k];
-    const std::size_t wanted = width * planes_.header.count;
+    const std::span<std::byte> to = plane(k);
+    const std::size_t wanted = to.size();
     if (size != wanted) {
       return fail(stream + " has " + std::to_string(size) + " bytes unpacked, " + gaussians() +
                   " need " + std::to_string(wanted));
@@ -109,8 +113,7 @@ class PlanesReader {
                   " are there");
     }
     const std::size_t n = static_cast<std::size_t>(packed);
-    const std::size_t got =
-        ZSTD_decompress(planes_.bytes.data() + planes_.starts[k], wanted, left.data(), n);
+    const std::size_t got = ZSTD_decompress(to.data(), wanted, left.data(), n);
     if (ZSTD_isError(got) != 0) {
       return fail(stream + " cannot be unpacked: " + ZSTD_getErrorName(got));
     }
@@ -163,17 +166,25 @@ class PlanesReader {
   }
 
   Status make_room() {
-    const auto widths = planes_.header.widths();
+    const SpzHeader& h = planes_.header;
+    const auto widths = h.widths();
     std::uint64_t total = 0;
-    for (std::size_t k = 0; k < widths.size(); ++k) {
+    for (std::size_t k = 0; k < kBands; ++k) {
       planes_.starts[k] = static_cast<std::size_t>(total);
-      total += std::uint64_t{planes_.header.count} * widths[k];
+      total += std::uint64_t{h.count} * widths[k];
     }
-    if (total > kInflationSlack + kMostInflation * bytes_.size()) {
+    if (total + std::uint64_t{h.count} * widths[kBands] > kInflationSlack + kMostInflation * bytes_.size()) {
       return fail(gaussians() + " from " + std::to_string(bytes_.size()) + " bytes are not believed");
     }
     planes_.bytes.resize(static_cast<std::size_t>(total));
+    planes_.bands = huge_vector<float>(3 * std::min<std::size_t>(15, h.coefficients()) * h.count);
     return {};
+  }
+
+  /// Where plane k is unpacked to.
+  std::span<std::byte> plane(std::size_t k) {
+    const std::size_t size = planes_.header.widths()[k] * planes_.header.count;
+    return k == kBands ? packed_rows(planes_.bands, size) : std::span(planes_.bytes).subspan(planes_.starts[k], size);
   }
 
   void warn_of_stray_bytes() { planes_.warnings.push_back("stray bytes follow the " + gaussians()); }

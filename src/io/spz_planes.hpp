@@ -35,11 +35,13 @@ struct SpzHeader {
   }
 };
 
-/// An SPZ out of its compression: plane after plane.
+/// An SPZ out of its compression: plane after plane, all but the bands one after the other.
 struct SpzPlanes {
   SpzHeader header;
-  std::array<std::size_t, 6> starts{};
+  std::array<std::size_t, 5> starts{};
   std::vector<std::byte> bytes;
+  /// Room for the bands as floats, up to degree 3; the file's bytes lie at its end (widen_rows).
+  std::vector<float> bands;
   std::vector<std::string> warnings;
 
   /// Bytes of Gaussian i in plane k, which has `width` bytes for each.

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <thread>
 #include <vector>
 
 #include "cloud_check.hpp"
@@ -14,6 +13,7 @@
 #include "gsnav/io/spz.hpp"
 #include "quantised.hpp"
 #include "spz_planes.hpp"
+#include "threads.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -23,8 +23,6 @@ constexpr int kJob = 1 << 20;
 constexpr std::uint32_t kTocOffset = 32;
 
 using Plane = std::vector<std::uint8_t>;
-
-int threads() { return static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 16u)); }
 
 class SpzWriter {
  public:
@@ -38,7 +36,7 @@ class SpzWriter {
     for (std::size_t k = 0; k < 6; ++k) planes_[k].resize(widths[k] * cloud_.size());
     constexpr std::size_t kPiece = 8192;
     const std::size_t pieces = (cloud_.size() + kPiece - 1) / kPiece;
-    ThreadPool(threads()).run(static_cast<std::uint32_t>(pieces), [&](std::uint32_t p) {
+    ThreadPool(static_cast<int>(detail::io_threads())).run(static_cast<std::uint32_t>(pieces), [&](std::uint32_t p) {
       for (std::size_t i = p * kPiece; i < std::min((p + 1) * kPiece, cloud_.size()); ++i)
         add(i, coefficients);
     });
@@ -75,7 +73,8 @@ class SpzWriter {
                                                                           ZSTD_freeCCtx);
     if (!context) return {Errc::out_of_memory, target_ + ": not enough memory"};
     ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
-    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_nbWorkers, threads());  // an error where it has none
+    // An error where it has none.
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_nbWorkers, static_cast<int>(detail::io_threads()));
     ZSTD_CCtx_setParameter(context.get(), ZSTD_c_jobSize, kJob);
     packed.resize(ZSTD_compressBound(plane.size()));
     const std::size_t n =

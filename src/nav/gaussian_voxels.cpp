@@ -7,6 +7,8 @@
 #include <map>
 #include <string>
 
+#include "gsnav/kernels/packed_gaussians.hpp"
+
 namespace gsnav::detail {
 namespace {
 
@@ -24,18 +26,18 @@ void for_each_opaque(std::span<const GaussianSet> sets, double min_opacity, std:
     const Mat3d placed = rotation_matrix(set.world_from_asset.rotation) * set.world_from_asset.scale;
     for (std::size_t i = 0; i < g.size; ++i) {
       Solid s;
-      s.opacity = static_cast<double>(g.opacities[i]);
+      s.opacity = static_cast<double>(opacity_of(g, i));
       const Vec3d o = g.origin_ids.empty() ? Vec3d{} : g.origins[g.origin_ids[i]];
-      s.mean = set.world_from_asset *
-               (o + vec_cast<double>(Vec3f{g.means[0][i], g.means[1][i], g.means[2][i]}));
+      s.mean = set.world_from_asset * (o + vec_cast<double>(mean_of(g, i)));
       if (!(s.opacity >= min_opacity) || !is_finite(s.mean)) {
         ++faint;
         continue;
       }
-      const Quatd q = quat_cast<double>(Quatf{g.quats[0][i], g.quats[1][i], g.quats[2][i], g.quats[3][i]});
+      const Quatd q = quat_cast<double>(quat_of(g, i));
+      const Vec3d scales = vec_cast<double>(scales_of(g, i));
       s.axes = placed * rotation_matrix(q);
       for (int k = 0; k < 3; ++k) {
-        for (int r = 0; r < 3; ++r) s.axes(r, k) *= static_cast<double>(g.scales[k][i]);
+        for (int r = 0; r < 3; ++r) s.axes(r, k) *= scales[k];
       }
       f(s);
     }

@@ -168,7 +168,8 @@ void PolyMesh::add_pieces(PolyId id) {
     for (const Vec3d& q : tris[t]) tiled = tiled && holds(id, q, kOff);
     pieces.push_back({tris[t][0], tris[t][1], tris[t][2], id, true});
   }
-  if (tiled && std::abs(covered - std::abs(area)) <= kOff * around) return;
+  // A sliver may have no height triangles; each polygon has a piece.
+  if (tiled && pieces.size() > first && std::abs(covered - std::abs(area)) <= kOff * around) return;
   pieces.resize(first);
   for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
     pieces.push_back({corner(p, 0), corner(p, k), corner(p, k + 1), id, p.planar});

@@ -29,7 +29,9 @@
 #include "gsnav/nav/navmesh_file.hpp"
 #include "io/allocations.hpp"
 #include "io/spz_file.hpp"
+#include "picture.hpp"
 #include "readers.hpp"
+#include "webp.hpp"
 
 using namespace gsnav;
 using namespace gsnav_fuzz;
@@ -41,9 +43,10 @@ namespace {
   std::abort();
 }
 
-/// A file in memory, whose path any reader opens.
-std::filesystem::path file_of(const std::string& content) {
-  static const int fd = memfd_create("fuzz", 0);
+/// A file in memory, whose path any reader opens; one for each `slot`.
+std::filesystem::path file_of(const std::string& content, std::size_t slot = 0) {
+  static const int fds[] = {memfd_create("fuzz", 0), memfd_create("fuzz", 0)};
+  const int fd = fds[slot];
   if (ftruncate(fd, 0) != 0 ||
       pwrite(fd, content.data(), content.size(), 0) != static_cast<ssize_t>(content.size())) {
     stop("no file in memory");
@@ -170,6 +173,35 @@ void read_driver(const std::string& input) {
   (void)io::load_driver(file_of(zip_of(parts, input)), skeleton);
 }
 
+/// A motion and its body model: the first byte names a part of the motion, then of the model.
+void read_smpl_motion(const std::string& input) {
+  static const Parts motion = smpl_motion_parts(), model = smpl_model_parts();
+  const std::size_t part = input.empty() ? 0 : static_cast<unsigned char>(input[0]);
+  const bool of_model = part > motion.size();
+  const std::string fixed = zip_of(of_model ? motion : model);
+  std::string changed = input;
+  if (of_model) changed[0] = static_cast<char>(part - motion.size());
+  changed = zip_of(of_model ? model : motion, changed);
+  const auto loaded =
+      io::load_smpl_motion(file_of(of_model ? fixed : changed, 0), file_of(of_model ? changed : fixed, 1));
+  if (!loaded) return;
+  if (!loaded->skeleton.validate().ok() || !loaded->clip.validate().ok()) stop("a motion that does not fit its joints");
+}
+
+void check(const Result<io::PngImage>& picture) {
+  if (!picture) return;
+  const auto pixels = static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height);
+  if (picture->samples.size() != pixels * static_cast<std::size_t>(picture->channels)) {
+    stop("samples that are not the picture's");
+  }
+}
+
+void read_webp(const std::string& input) {
+  const auto picture = io::detail::decode_webp(bytes_of(input), "fuzz", io::detail::WebpUse::picture);
+  if (picture && picture->pixels.size() != 4 * picture->width * picture->height)
+    stop("pixels that are not the picture's");
+}
+
 void check(const Result<io::LoadedTemporalCloud>& loaded) {
   if (!loaded) return check(Result<LoadedCloud>(loaded.status()));
   const TemporalCloud& s = loaded->scene;
@@ -240,8 +272,7 @@ constexpr std::size_t kMiB = std::size_t{1} << 20;
 
 const std::map<std::string, Reader> kReaders = {
     {"ply", {[](const std::string& s) { check(io::parse_ply(bytes_of(s), "fuzz")); }, kMiB, 64}},
-    {"4dgs_ply",
-     {[](const std::string& s) { check(io::parse_temporal_ply(bytes_of(s), "fuzz")); }, kMiB, 64}},
+    {"4dgs_ply", {[](const std::string& s) { check(io::parse_temporal_ply(bytes_of(s), "fuzz")); }, kMiB, 64}},
     {"4dgs_npz", {read_temporal_npz, 260 * kMiB, 10000}},
     {"splat", {[](const std::string& s) { check(io::parse_splat(bytes_of(s), "fuzz")); }, kMiB, 4}},
     {"ksplat", {[](const std::string& s) { check(io::parse_ksplat(bytes_of(s), "fuzz")); }, kMiB, 64}},
@@ -257,10 +288,13 @@ const std::map<std::string, Reader> kReaders = {
     {"surface", {read_surface, 260 * kMiB, 10000}},
     {"obj", {[](const std::string& s) { check(io::load_obj(file_of(s))); }, kMiB, 64}},
     {"mesh_ply", {[](const std::string& s) { check(io::load_ply_mesh(file_of(s))); }, kMiB, 64}},
-    {"png", {[](const std::string& s) { (void)io::load_png(file_of(s)); }, 64 * kMiB, 10000}},
+    {"png", {[](const std::string& s) { check(io::load_png(file_of(s))); }, 64 * kMiB, 10000}},
+    {"jpeg", {[](const std::string& s) { check(io::detail::decode_jpeg(bytes_of(s), "fuzz")); }, 64 * kMiB, 10000}},
+    {"webp", {read_webp, 64 * kMiB, 10000}},
     {"npy", {[](const std::string& s) { (void)io::load_npy(file_of(s)); }, kMiB, 64}},
     {"npz", {read_npz, 260 * kMiB, 10000}},
     {"driver", {read_driver, 260 * kMiB, 10000}},
+    {"smpl_motion", {read_smpl_motion, 260 * kMiB, 10000}},
     {"bvh", {[](const std::string& s) { (void)io::load_bvh(file_of(s)); }, kMiB, 1000}},
     {"cameras", {[](const std::string& s) { (void)io::load_cameras(file_of(s)); }, kMiB, 1000}},
     {"dataset", {read_dataset, kMiB, 1000}},

@@ -12,6 +12,7 @@
 #include "io/splat_file.hpp"
 #include "nav/meshes.hpp"
 #include "readers.hpp"
+#include "webp.hpp"
 
 using namespace gsnav;
 using namespace gsnav_fuzz;
@@ -121,6 +122,9 @@ void add_others(Seeds& seeds) {
   seeds.add_parts("npz", avatar_parts());
   seeds.add_parts("driver", driver_parts());
   seeds.add_parts("4dgs_npz", temporal_parts());
+  Parts motion = smpl_motion_parts();
+  for (const auto& [name, content] : smpl_model_parts()) motion["~" + name] = content;  // behind the motion's
+  seeds.add_parts("smpl_motion", motion);
   for (const std::size_t motion : {0u, 3u, 9u}) seeds.add("4dgs_ply", temporal_file(3, motion, 2).text());
   char part = 0;
   for (const auto& [name, content] : dataset_parts()) seeds.add("dataset", part++ + content);
@@ -155,6 +159,13 @@ void add_others(Seeds& seeds) {
   seeds.add("png", read_file(folder / "a"));
   io::save_png_gray16(folder / "a", std::vector<std::uint16_t>(6, 300), 2, 3).throw_if_error();
   seeds.add("png", read_file(folder / "a"));
+  std::vector<std::uint8_t> ramp(3 * 20 * 18);
+  for (std::size_t i = 0; i < ramp.size(); ++i) ramp[i] = static_cast<std::uint8_t>(i * i / 97);
+  if (const auto jpeg = io::encode_jpeg(ramp, 20, 18)) {
+    seeds.add("jpeg", {reinterpret_cast<const char*>(jpeg->data()), jpeg->size()});
+  }
+  io::detail::RgbaImage picture{9, 7, std::vector<std::uint8_t>(ramp.begin(), ramp.begin() + 4 * 9 * 7)};
+  seeds.add("webp", io::detail::encode_webp(picture, "seed").value());
   io::save_npy(folder / "a", std::vector<float>(6), std::vector<std::size_t>{2, 3}).throw_if_error();
   seeds.add("npy", read_file(folder / "a"));
   Soup soup;

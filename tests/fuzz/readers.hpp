@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/avatar/smpl_joints.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "io/avatar_npz.hpp"
 #include "io/glb_file.hpp"
@@ -59,6 +60,31 @@ inline Parts driver_parts() {
 
 inline Parts temporal_parts() {
   return npz_parts(temporal_arrays(temporal_file(4, 6, 1).rows, 6, "network.tfgs.fdgs."));
+}
+
+/// A motion of one frame by SMPL's joints, and a body of two vertices for it.
+inline Parts smpl_motion_parts() {
+  TestArrays arrays;
+  arrays["poses"] = {{1, 72}, std::vector<double>(72, 0.1)};
+  arrays["trans"] = {{1, 3}, {1, 2, 3}};
+  arrays["betas"] = {{1}, {0.5}};
+  arrays["mocap_framerate"] = {{}, {60}};
+  return npz_parts(arrays);
+}
+
+inline Parts smpl_model_parts() {
+  TestArrays arrays;
+  arrays["v_template"] = {{2, 3}, {0, 1, 2, 3, 4, 5}};
+  arrays["shapedirs"] = {{2, 3, 1}, {0, 1, 0, 0, 1, 0}};
+  TestArray regressor{{24, 2}, {}}, tree{{2, 24}, {}};
+  for (const std::int32_t parent : gsnav::smpl_joint_parents()) {
+    tree.values.push_back(parent);
+    regressor.values.insert(regressor.values.end(), {0.25 * parent, 1.0});
+  }
+  tree.values.resize(48);
+  arrays["J_regressor"] = regressor;
+  arrays["kintree_table"] = tree;
+  return npz_parts(arrays);
 }
 
 /// The files of a Habitat dataset.

@@ -7,8 +7,8 @@
 #include "check_cloud.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "real_scenes.hpp"
 #include "row_clouds.hpp"
-#include "support/data.hpp"
 
 // Another program's eyes on the same files: npm's @playcanvas/splat-transform decodes them to a float32
 // PLY, whose rows are read here without the library's help. GSNAV_SPLAT_TRANSFORM names its cli.mjs.
@@ -126,19 +126,12 @@ GaussianCloud load_in_order(const std::string& path) { return io::load_scene(pat
 
 }  // namespace
 
-TEST_CASE("splat-transform: real files, field by field") {
+TEST_CASE("splat-transform: every real file, field by field") {
   if (!there()) return;
   TempFolder folder("st_real");
-  for (const std::string name :
-       {"splats/fyoxy_ruin_300k_sh3/meta.json", "splats/lacadiere_showroom/3_1/meta.json",
-        "splats/lacadiere_showroom/environment.sog", "splats/playcanvas/playbot/3_0/meta.json",
-        "splats/playcanvas/playcanvas-logo_sogv1/meta.json", "splats/playcanvas/guitar.compressed.ply",
-        "splats/playcanvas/flipbook/monkey_0025.sog", "splats/playcanvas/wave/wave_0001.sog",
-        "splats/statues/angel.sog", "splats/statues/angel.compressed.ply",
-        "splats/misc/cvlab_pc_short.ply"}) {
-    const std::string path = data_file(name);
-    if (path.empty()) continue;
-    CAPTURE(name);
+  for (const std::string& path : real_scenes()) {
+    if (path.ends_with("lod-meta.json")) continue;  // its levels' files are there by themselves
+    CAPTURE(path);
     convert(path, (folder / "out.ply").string());
     check_same(load_in_order(path), rows_of((folder / "out.ply").string()));
   }

@@ -164,6 +164,32 @@ TEST_CASE("navmesh file: what is wrong is named") {
   }
 }
 
+TEST_CASE("navmesh file: a polygon of no area without height triangles has points to draw") {
+  // Found by fuzzing: four corners, two of them in one place, a record of no triangles.
+  const std::string hex =
+      "5445534d020000000100000000000000000000000000000000004040000040400100000001000000cdcc4c3dcdcc4c3e0000c03f"
+      "cdcccc3dcdcc4c3e000034420000a0410000a041000040416666a63f0000c0400000c0400000803f010101000100000018010000"
+      "56414e44070000000000000000000000000000000000000001000000040000000400000001000000000000000200000002000000"
+      "00000000010000000000c03fcdcccc3dcdcc4c3e00000000000000000000000000004040cdcccc3f000040400000a04198000040"
+      "40000040400100000001003e000000006766364067663640000000006766364067663640000000009899193eff05000000000000"
+      "00000300000000000000000000000000000000000100043f0000000000000000010000000000000000000000020000803f010101"
+      "00010000001801000056414e44070000000000000000000000000000000000000300021100010205020008000200390008003900"
+      "0000000000000000000000000000000000000000";
+  std::vector<std::byte> bytes;
+  for (std::size_t k = 0; k + 1 < hex.size(); k += 2) {
+    bytes.push_back(static_cast<std::byte>(std::stoi(hex.substr(k, 2), nullptr, 16)));
+  }
+  const auto mesh = parse_navmesh(bytes, "sliver");
+  CAPTURE(mesh.message());
+  REQUIRE(mesh.ok());
+  Rng rng(1);
+  for (int n = 0; n < 100; ++n) {
+    const NavPoint p = mesh->random_point(rng);
+    CHECK(is_finite(p.position));
+    CHECK(p.poly == 0);
+  }
+}
+
 TEST_CASE("navmesh file: mutated and truncated files do no harm") {
   std::vector<std::vector<std::byte>> seeds{saved(boxes())};
   const std::string tiles = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");

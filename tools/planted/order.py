@@ -72,9 +72,8 @@ PLANTS = [
           "                depth_key(camera.key_rotation, camera.key_scale, offset, none);\n",
           ORDER, "N22_depth_tie_grid", why="lanes that order by z of the view matrix"),
     plant("visible_by_another_expression", "include/gsnav/kernels/lanes/project_chunk.hpp",
-          "    const Projected<F> splat = project<F, F>(camera, axes, z, load(gs.opacities));\n",
-          "    const Projected<F> splat = project<F, F>(camera, axes, axes.position.z * F(1.0000001f),\n"
-          "                                             load(gs.opacities));\n",
+          "    const Projected<F> splat = project<F, F>(camera, axes, z, opacity);\n",
+          "    const Projected<F> splat = project<F, F>(camera, axes, axes.position.z * F(1.0000001f), opacity);\n",
           "tests/hard_cases/test_near.cpp", "N16_near_plane_cross"),
     plant("key_top_bits", "include/gsnav/kernels/projection_camera.hpp",
           "    const std::uint32_t code = (bits_of(key) - base) >> shift;",

@@ -74,15 +74,16 @@ std::vector<std::uint8_t> depth_picture(const std::vector<float>& metres, const 
   return io::colorize_depth(metres, near, far);
 }
 
-template <class S, class B>
-int run(B& backend, const Options& o, const DepthChoice& depth, const GaussianCloud& cloud,
+/// `Cloud`: GaussianCloud or PackedCloud.
+template <class S, class B, class Cloud>
+int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& cloud, SortOrder order,
         const std::vector<PlacedMeshes>& meshes, const std::vector<Camera>& cameras) {
   RenderConfig config;
   config.outputs = kRgb | kAlpha | depth.output;
   config.profile = o.profile == "fast" ? Profile::fast : Profile::exact;
   config.max_alpha = o.max_alpha;
   config.first_hit_tau = depth.tau;
-  config.sort_order = cloud.sort_order;
+  config.sort_order = order;
   config.composite = o.composite == "merged" ? Composite::merged : Composite::hard_depth;
   Renderer<S, B> renderer(backend, config);
   const GaussianArrays<B> arrays(backend, cloud);
@@ -164,8 +165,8 @@ int main(int argc, char** argv) {
                  "Any scene of Gaussians that can be read, or a folder's sibling tiles: DIR/2_0,2_1,2_2")
       ->required();
   app.add_option("--time", o.time, "Moment of a scene that moves (4D Gaussians), seconds");
-  app.add_option("--storage", o.storage, "full, or compact: SH in half of the memory (docs/formats.md)")
-      ->check(CLI::IsMember({"full", "compact"}))
+  app.add_option("--storage", o.storage, "full; compact: SH in half of the memory; packed: all in a third (docs/formats.md)")
+      ->check(CLI::IsMember({"full", "compact", "packed"}))
       ->capture_default_str();
   app.add_option("--cameras", o.cameras, "INRIA cameras.json (camera-to-world, OpenCV axes)")
       ->required()
@@ -223,9 +224,21 @@ int main(int argc, char** argv) {
   io::LoadSceneOptions load;
   load.time = o.time;
   load.storage = o.storage == "compact" ? io::Storage::compact : io::Storage::full;
-  auto scene = io::load_scene(o.scene, load);
-  if (!scene) return fail(scene.message());
-  std::fputs(io::report_text(scene->report).c_str(), stdout);
+  GaussianCloud full;
+  std::optional<PackedCloud> packed;
+  LoadReport report;
+  if (o.storage == "packed") {
+    auto scene = io::load_packed_scene(o.scene, load);
+    if (!scene) return fail(scene.message());
+    packed = std::move(scene->cloud);
+    report = std::move(scene->report);
+  } else {
+    auto scene = io::load_scene(o.scene, load);
+    if (!scene) return fail(scene.message());
+    full = std::move(scene->cloud);
+    report = std::move(scene->report);
+  }
+  std::fputs(io::report_text(report).c_str(), stdout);
   std::vector<PlacedMeshes> meshes;
   for (const std::string& file : o.meshes) {
     auto surface = io::load_textured_scene(file);
@@ -249,15 +262,19 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(o.out, error);
   if (error) return fail("--out " + o.out + ": " + error.message());
 
+  const auto on = [&]<class S>(auto& backend) {
+    return packed ? run<S>(backend, o, *depth, *packed, report.sort_order, meshes, *cameras)
+                  : run<S>(backend, o, *depth, full, report.sort_order, meshes, *cameras);
+  };
   SerialBackend serial;
-  if (o.backend == "serial") return run<float>(serial, o, *depth, scene->cloud, meshes, *cameras);
-  if (o.backend == "serial64") return run<double>(serial, o, *depth, scene->cloud, meshes, *cameras);
+  if (o.backend == "serial") return on.operator()<float>(serial);
+  if (o.backend == "serial64") return on.operator()<double>(serial);
 #if defined(GSNAV_HAS_CUDA)
   if (o.backend == "cuda") {
     CudaBackend cuda;
-    return run<float>(cuda, o, *depth, scene->cloud, meshes, *cameras);
+    return on.operator()<float>(cuda);
   }
 #endif
   OpenMPBackend openmp(o.threads);
-  return run<float>(openmp, o, *depth, scene->cloud, meshes, *cameras);
+  return on.operator()<float>(openmp);
 }

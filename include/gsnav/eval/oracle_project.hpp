@@ -14,6 +14,7 @@
 #include "gsnav/core/parallel.hpp"
 #include "gsnav/eval/oracle_config.hpp"
 #include "gsnav/kernels/depth.hpp"
+#include "gsnav/kernels/packed_gaussians.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/projection.hpp"
 
@@ -48,8 +49,7 @@ struct OracleSet {
     return set.gaussians.origin_ids.empty() ? 0 : set.gaussians.origin_ids[row];
   }
   Vec3<float> mean(std::size_t row) const noexcept {
-    const GaussianView& g = set.gaussians;
-    return {g.means[0][row], g.means[1][row], g.means[2][row]};
+    return mean_of(set.gaussians, row);
   }
   /// mean - camera position, asset frame.
   Vec3d delta(std::size_t row) const noexcept {
@@ -91,7 +91,7 @@ struct EwaModel {
     const SplatAxes<double> axes =
         gsnav::detail::load_axes(s.set.gaussians, s.camera, s.delta(row), row);
     if (!s.in_front(row, axes)) return false;
-    const float opacity = s.set.gaussians.opacities[row];
+    const float opacity = opacity_of(s.set.gaussians, row);
     Projected<double> p = project<double, float>(s.camera, axes, s.z_key(row),
                                                  static_cast<double>(opacity));
     // What overflows float32 is not drawn, by any backend.

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "gsnav/eval/oracle_project.hpp"
+#include "gsnav/kernels/packed_gaussians.hpp"
 #include "gsnav/math/mat.hpp"
 
 namespace gsnav::eval::detail {
@@ -55,7 +56,7 @@ struct RayModel {
         if (j < 3) area0 += across * across;
       }
     }
-    double opacity = static_cast<double>(s.set.gaussians.opacities[row]);
+    double opacity = static_cast<double>(opacity_of(s.set.gaussians, row));
     if (c.mip) opacity *= sqrt(area0 / area);
     out.log2_opacity = std::log2(opacity);
     if (!(opacity > 0 && out.log2_opacity >= log2_cut && out.z > 0 && is_finite(area))) return false;

@@ -7,6 +7,7 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 
 namespace gsnav::io {
 
@@ -26,6 +27,13 @@ struct LoadSceneOptions {
   /// The report has the error. A colour changes by at most 4.3 times that: 15 basis functions whose squares sum to
   /// 15 / (4 pi).
   double most_sh_error = 2e-3;
+  PackLimits pack;  ///< of load_packed_scene
+};
+
+/// A packed scene with the report of how it was read; `report.packing` has what packing changed.
+struct LoadedPackedCloud {
+  PackedCloud cloud;
+  LoadReport report;
 };
 
 /// Reads a scene of Gaussians by what its path names: a `.ply`, `.splat`, `.ksplat`, `.spz`, `.sog`,
@@ -40,6 +48,10 @@ struct LoadSceneOptions {
 /// Errors: what the loaders of these formats return; unsupported (an extension that is not in the list,
 /// named with the list); invalid_argument (an empty name or a tile twice). Never throws.
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options = {});
+
+/// The same, packed: a third of the memory, to be rendered. While it is packed both are there. `options.storage` must
+/// be full. Errors: load_scene's.
+Result<LoadedPackedCloud> load_packed_scene(const std::string& spec, const LoadSceneOptions& options = {});
 
 /// The report as text for people, a line for each thing there is to say, each ended.
 std::string report_text(const LoadReport& report);

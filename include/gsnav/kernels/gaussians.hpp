@@ -32,6 +32,22 @@ struct ChunkBounds {
   float opacity_max = 0;  ///< in [0, 1]
 };
 
+/// How the rows of a chunk of kProjectChunk are packed (kernels/packed_gaussians.hpp).
+struct PackedChunk {
+  Vec3<float> low{}, step{};  ///< offset of a mean: low + step code, metres
+  float scale_step = 0;       ///< root of a standard deviation: scale_step code
+  float sh_steps[3]{};        ///< coefficient of band 1, 2, 3: step code, where these have 8 bits
+};
+
+/// Read-only packed rows: 20 bytes a Gaussian and its bands.
+struct PackedRows {
+  static constexpr int kScales = 0, kQuats = 3, kOpacity = 6, kMeans = 7, kPlanes = 10;
+  View<const std::uint16_t> codes;  ///< [10][N], planes in that order; [7][N] where means are floats
+  View<const std::uint16_t> sh0;    ///< [N][3], binary16
+  View<const std::int8_t> shN;      ///< [N][(degree+1)^2 - 1][3], or empty: shN or shN_half of the view has them
+  View<const PackedChunk> chunks;   ///< [ceil(N / kProjectChunk)]
+};
+
 /// Read-only arrays of N Gaussians, as kernels see them. Owns nothing.
 ///
 /// Metres in the asset's own frame. A position is `origins[origin_ids[i]] + mean_i`: float32 offsets
@@ -63,6 +79,8 @@ struct GaussianView {
   /// One a chunk of kProjectChunk rows, [ceil(N / kProjectChunk)]: chunks that cannot be seen are not
   /// touched. Empty: all are.
   View<const ChunkBounds> chunk_bounds;
+  /// In place of quats, scales, opacities, sh0 and mostly means and shN, which are empty then. In host memory only.
+  PackedRows packed;
 
   GSNAV_HD std::size_t chunk_count() const noexcept { return (size + kProjectChunk - 1) / kProjectChunk; }
 };

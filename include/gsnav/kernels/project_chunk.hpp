@@ -7,6 +7,7 @@
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/cull.hpp"
 #include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/kernels/packed_gaussians.hpp"
 #include "gsnav/kernels/projection.hpp"
 #include "gsnav/kernels/sh.hpp"
 #include "gsnav/kernels/splat.hpp"
@@ -219,11 +220,10 @@ GSNAV_HD SplatAxes<S> load_axes(const GaussianView& gs, const ProjectionCamera<S
     }
     return splat_axes(camera.rotation, delta, factor);
   }
-  Quat<S> quat{S(gs.quats[0][i]), S(gs.quats[1][i]), S(gs.quats[2][i]), S(gs.quats[3][i])};
+  Quat<S> quat = quat_cast<S>(quat_of(gs, i));
   // Rounded to float a unit quaternion is off by 6e-8: nothing in float, but not in a reference.
   if constexpr (sizeof(S) > sizeof(float)) normalize(quat);
-  return splat_axes(camera.rotation, delta, quat,
-                    Vec3<S>{S(gs.scales[0][i]), S(gs.scales[1][i]), S(gs.scales[2][i])});
+  return splat_axes(camera.rotation, delta, quat, vec_cast<S>(scales_of(gs, i)));
 }
 
 }  // namespace detail
@@ -250,6 +250,10 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
                       S(gs.sh_rotations[3][i])};
       delta = rotate(conjugate(q), delta);
     }
+  }
+  if (has_packed_colors(gs)) {
+    const Vec3<S> c = sh_color<S>(degree, delta, [&](int k) { return vec_cast<S>(packed_coefficient(gs, i, k)); });
+    return {c.x, c.y, c.z, S(0)};
   }
   const float* sh0 = gs.sh0.data + 3 * i;
   const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
@@ -279,7 +283,7 @@ GSNAV_HD Projected<double> project64(const ProjectArgs<S>& args, std::size_t i, 
   const Vec3d delta = vec_cast<double>(mean) + args.offsets[origin];
   axes = load_axes(args.gaussians, args.camera64, delta, i);
   return project<double, float>(args.camera64, axes, key_z,
-                                static_cast<double>(args.gaussians.opacities[i]));
+                                static_cast<double>(opacity_of(args.gaussians, i)));
 }
 }  // namespace detail
 
@@ -321,11 +325,11 @@ template <class S>
 GSNAV_HD bool project_gaussian(const ProjectArgs<S>& args, std::size_t slot, std::size_t i) noexcept {
   const GaussianView& gs = args.gaussians;
   const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
-  const Vec3<float> mean{gs.means[0][i], gs.means[1][i], gs.means[2][i]};
+  const Vec3<float> mean = mean_of(gs, i);
   const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
   if (!(z > args.camera.near_plane)) return false;
   const SplatAxes<S> axes = detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), i);
-  const Projected<S> p = project<S, float>(args.camera, axes, z, S(gs.opacities[i]));
+  const Projected<S> p = project<S, float>(args.camera, axes, z, S(opacity_of(gs, i)));
   if (!p.visible) return false;
   const float key = args.camera.sort_order == SortOrder::z_depth
                         ? z

@@ -11,6 +11,26 @@
 
 namespace gsnav {
 
+/// Packed rows: each plane where it is wanted, and no axes beside them.
+inline Status validate_packed(const GaussianView& g) {
+  const PackedRows& p = g.packed;
+  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(g.sh_degree) - 1);
+  const bool codes = p.codes.size == PackedRows::kPlanes * g.size ||
+                     (p.codes.size == PackedRows::kMeans * g.size && !g.means[0].empty());
+  const char* wrong = !codes                                          ? "codes"
+                      : p.chunks.size != g.chunk_count()              ? "chunks"
+                      : !p.sh0.empty() && p.sh0.size != 3 * g.size    ? "sh0"
+                      : !p.shN.empty() && p.shN.size != rest * g.size ? "shN"
+                      : !p.shN.empty() && p.sh0.empty()               ? "shN (without sh0)"
+                      : !p.shN.empty() && !g.shN_half.empty()         ? "shN (beside shN_half)"
+                      : !g.axes[0].empty()                            ? "codes (beside axes)"
+                                                                      : nullptr;
+  if (wrong == nullptr) return {};
+  return {Errc::invalid_argument, std::string("GaussianSet: packed.") + wrong + " do not fit " +
+                                      std::to_string(g.size) + " Gaussians of SH degree " +
+                                      std::to_string(g.sh_degree)};
+}
+
 /// Checks a set against what kernels assume; names the array that does not fit.
 inline Status validate(const GaussianSet& set) {
   const GaussianView& g = set.gaussians;
@@ -25,27 +45,35 @@ inline Status validate(const GaussianSet& set) {
   if (g.sh_degree < 0 || g.sh_degree > kMaxShDegree) {
     return bad("sh_degree = " + std::to_string(g.sh_degree) + ": must be in [0, 3]");
   }
-  const bool has_axes = !g.axes[0].empty();
+  const bool has_axes = !g.axes[0].empty(), packed = !g.packed.codes.empty();
+  if (packed) {
+    if (Status s = validate_packed(g); !s) return s;
+  }
   for (int k = 0; k < 9 && has_axes; ++k) {
     if (Status s = sized(g.axes[k], g.size, "axes"); !s) return s;
   }
   for (int k = 0; k < 3; ++k) {
-    if (Status s = sized(g.means[k], g.size, "means"); !s) return s;
-    if (has_axes) continue;
+    if (Status s =
+            sized(g.means[k], packed && g.packed.codes.size == PackedRows::kPlanes * g.size ? 0 : g.size, "means");
+        !s) {
+      return s;
+    }
+    if (has_axes || packed) continue;
     if (Status s = sized(g.scales[k], g.size, "scales"); !s) return s;
   }
   for (int k = 0; k < 4; ++k) {
     if (!g.sh_rotations[k].empty()) {
       if (Status s = sized(g.sh_rotations[k], g.size, "sh_rotations"); !s) return s;
     }
-    if (has_axes) continue;
+    if (has_axes || packed) continue;
     if (Status s = sized(g.quats[k], g.size, "quats"); !s) return s;
   }
-  if (Status s = sized(g.opacities, g.size, "opacities"); !s) return s;
-  if (Status s = sized(g.sh0, 3 * g.size, "sh0"); !s) return s;
+  if (Status s = sized(g.opacities, packed ? 0 : g.size, "opacities"); !s) return s;
+  const bool bytes = packed && !g.packed.shN.empty();
+  if (Status s = sized(g.sh0, packed && !g.packed.sh0.empty() ? 0 : 3 * g.size, "sh0"); !s) return s;
   const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(g.sh_degree) - 1);
   if (g.shN_half.empty()) {
-    if (Status s = sized(g.shN, 3 * rest * g.size, "shN"); !s) return s;
+    if (Status s = sized(g.shN, bytes ? 0 : 3 * rest * g.size, "shN"); !s) return s;
   } else if (g.shN_half.size != 3 * rest * g.size || !g.shN.empty()) {
     return bad("shN_half has " + std::to_string(g.shN_half.size) + " values where " +
                std::to_string(3 * rest * g.size) + " are needed, and shN must be empty beside it");

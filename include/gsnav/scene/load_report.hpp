@@ -14,6 +14,19 @@ namespace gsnav {
 /// What becomes of a row of a file.
 enum class RowFate : std::uint8_t { kept, non_finite, zero_quat, transparent };
 
+/// What packing a cloud changed: the largest difference of any row's.
+struct PackErrors {
+  int mean_bits = 16;          ///< 16, or 32: floats
+  int sh_bits = 8;             ///< 8, 16 or 32
+  double mean = 0;             ///< metres
+  double mean_deviations = 0;  ///< the same in the Gaussian's largest standard deviations
+  double scale = 0;            ///< of a standard deviation, in the Gaussian's largest
+  double rotation = 0;         ///< radians
+  double opacity = 0;
+  double sh0 = 0;             ///< of a coefficient of degree 0
+  double sh = 0, sh_rms = 0;  ///< of one from band 1 on: largest, root mean square
+};
+
 /// What a loader did to a file: nothing is repaired or dropped without being counted here.
 struct LoadReport {
   std::string source;                     ///< path or description
@@ -33,6 +46,8 @@ struct LoadReport {
   bool up_seen = false;                   ///< by the cloud's shape (guess_up); false: only by what its kind of file does
   double sh_storage_error = 0;            ///< largest difference of a coefficient by keeping them as binary16
   bool compact = false;                   ///< SH is kept as binary16
+  bool packed = false;                    ///< all is kept in fewer bits (PackedCloud), which changed:
+  PackErrors packing;
   bool moving = false;                    ///< 4D Gaussians; these are the first and the last of their own times, seconds:
   double first_time = 0, last_time = 0;
   Aabb<double> bounds{};              ///< of the kept means, asset frame

@@ -9,6 +9,7 @@
 #include "gsnav/ops/frame_lanes.hpp"
 #include "gsnav/ops/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 
 namespace gsnav {
 
@@ -26,25 +27,18 @@ struct Frames {
 };
 
 /// A cloud's arrays in a backend's own memory. On host backends nothing is copied: the cloud must
-/// outlive it.
+/// outlive it. Packed clouds become floats elsewhere.
 template <Backend B>
 class GaussianArrays {
  public:
   GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
+    if constexpr (!is_host_backend<B>) upload(backend, cloud);
+  }
+  GaussianArrays(B& backend, const PackedCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) {
-      GaussianView& v = set_.gaussians;
-      for (auto& p : v.means) to_device(backend, p, floats_);
-      for (auto& p : v.quats) to_device(backend, p, floats_);
-      for (auto& p : v.scales) to_device(backend, p, floats_);
-      to_device(backend, v.opacities, floats_);
-      to_device(backend, v.sh0, floats_);
-      to_device(backend, v.shN, floats_);
-      to_device(backend, v.shN_half, halves_);
-      to_device(backend, v.origin_ids, ids_);
-      to_device(backend, v.row_ids, ids_);
-      to_device(backend, v.chunk_bounds, bounds_);
-      origins_ = cloud.origins;  // read by the host
-      v.origins = view_of(std::as_const(origins_));
+      const GaussianCloud floats = unpack_cloud(cloud);
+      set_ = floats.set();
+      upload(backend, floats);
     }
   }
   GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
@@ -54,6 +48,21 @@ class GaussianArrays {
   }
 
  private:
+  void upload(B& backend, const GaussianCloud& cloud) {
+    GaussianView& v = set_.gaussians;
+    for (auto& p : v.means) to_device(backend, p, floats_);
+    for (auto& p : v.quats) to_device(backend, p, floats_);
+    for (auto& p : v.scales) to_device(backend, p, floats_);
+    to_device(backend, v.opacities, floats_);
+    to_device(backend, v.sh0, floats_);
+    to_device(backend, v.shN, floats_);
+    to_device(backend, v.shN_half, halves_);
+    to_device(backend, v.origin_ids, ids_);
+    to_device(backend, v.row_ids, ids_);
+    to_device(backend, v.chunk_bounds, bounds_);
+    origins_ = cloud.origins;  // read by the host
+    v.origins = view_of(std::as_const(origins_));
+  }
   template <class T>
   static void to_device(B& backend, View<const T>& v, std::vector<Buffer<T, B>>& held) {
     held.emplace_back(backend).upload(v.data, v.size);

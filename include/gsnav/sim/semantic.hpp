@@ -46,6 +46,8 @@ class SemanticPasses {
       g.sh_degree = 0;
       g.shN = {};
       g.shN_half = {};
+      g.packed.sh0 = {};
+      g.packed.shN = {};
       g.sh0 = {shades_[channel].data(), kChannels * g.size};
     }
     return out;

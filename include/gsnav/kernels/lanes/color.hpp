@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "gsnav/kernels/lanes/isa.hpp"
+#include "gsnav/kernels/packed_gaussians.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 
 namespace gsnav::lanes {
@@ -18,7 +19,7 @@ struct Survivors {
   std::uint32_t delta[3][kRoom];  ///< bits of floats
 };
 
-/// gaussian_color of kWidth Gaussians side by side, the same bits: lane l is row rows[l]. The coefficients
+/// gaussian_color of kWidth Gaussians of one chunk side by side, the same bits: lane l is row rows[l]. The coefficients
 /// lie row by row; each group of 8 columns is transposed into lanes on its way to the registers.
 GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const std::uint32_t* rows,
                                      Vec3<F> delta) noexcept {
@@ -37,16 +38,33 @@ GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const
   // Bare vectors: they need no value before they get theirs.
   typename F::vector c[3 * sh_coefficient_count(kMaxShDegree)];
   const float* at[kWidth];
-  for (int l = 0; l < kWidth; ++l) at[l] = gs.sh0.data + 3 * static_cast<std::size_t>(rows[l]);
+  float widened[kWidth][kGroup];
+  const bool packed = has_packed_colors(gs);
+  for (int l = 0; l < kWidth; ++l) {
+    const std::size_t row = rows[l];
+    if (packed) {
+      for (std::size_t k = 0; k < 3; ++k) widened[l][k] = half_to_float(gs.packed.sh0[3 * row + k]);
+    }
+    at[l] = packed ? widened[l] : gs.sh0.data + 3 * row;
+  }
   F dc[3];
   load_columns<3>(at, dc);
   for (int k = 0; k < 3; ++k) c[k] = dc[k].v;
   const std::size_t stride = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
   const int columns = 3 * (sh_coefficient_count(degree) - 1);  // 0, 9, 24 or 45
-  float widened[kWidth][kGroup];
+  const bool bytes = packed && !gs.packed.shN.empty();
   for (int first = 0; first < columns; first += kGroup) {
     const int from = first + kGroup <= columns ? first : columns - kGroup;
-    if (gs.shN_half.empty()) {
+    if (bytes) {  // all rows are of one chunk
+      float steps[kGroup];
+      const PackedChunk& chunk = gs.packed.chunks[rows[0] / kProjectChunk];
+      for (int k = 0; k < kGroup; ++k) steps[k] = chunk.sh_steps[packed_band(1 + (from + k) / 3)];
+      for (int l = 0; l < kWidth; ++l) {
+        const std::int8_t* codes = gs.packed.shN.data + stride * rows[l] + from;
+        for (int k = 0; k < kGroup; ++k) widened[l][k] = static_cast<float>(codes[k]) * steps[k];
+        at[l] = widened[l];
+      }
+    } else if (gs.shN_half.empty()) {
       for (int l = 0; l < kWidth; ++l) at[l] = gs.shN.data + stride * rows[l] + from;
     } else {
       for (int l = 0; l < kWidth; ++l) {
@@ -69,9 +87,11 @@ GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const
 GSNAV_HD void prefetch_colors(const GaussianView& gs, int degree, std::size_t first) noexcept {
   constexpr std::size_t kLine = 64;
   if (degree == 0) return;
-  const bool halves = !gs.shN_half.empty();
-  const void* const data = halves ? static_cast<const void*>(gs.shN_half.data) : gs.shN.data;
-  const std::size_t bytes = halves ? sizeof(std::uint16_t) : sizeof(float);
+  const bool codes = has_packed_colors(gs) && !gs.packed.shN.empty(), halves = !gs.shN_half.empty();
+  const void* const data = codes    ? static_cast<const void*>(gs.packed.shN.data)
+                           : halves ? static_cast<const void*>(gs.shN_half.data)
+                                    : gs.shN.data;
+  const std::size_t bytes = codes ? 1 : halves ? sizeof(std::uint16_t) : sizeof(float);
   const std::size_t stride = bytes * static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
   const std::size_t begin = stride * first, room = stride * gs.size - begin;
   const std::size_t rows = stride * static_cast<std::size_t>(kWidth), end = begin + (rows < room ? rows : room);

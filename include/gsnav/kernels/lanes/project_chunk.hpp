@@ -5,6 +5,7 @@
 
 #include "gsnav/kernels/lanes/isa.hpp"
 #include "gsnav/kernels/lanes/write_splats.hpp"
+#include "gsnav/kernels/packed_gaussians.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 
 namespace gsnav::lanes {
@@ -22,7 +23,7 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
   const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
   const std::size_t base = (args.first_chunk + c) * kProjectChunk;
   const std::size_t step = static_cast<std::size_t>(kWidth);
-  const bool candidate = chunk_is_candidate(args, c);
+  const bool candidate = chunk_is_candidate(args, c), packed = is_packed(gs);
   std::uint32_t written = 0;
   Survivors survivors;
   for (std::size_t i = begin; i < end && candidate; i += step) {
@@ -48,12 +49,25 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
       }
       offset = {F::load(planes[0]), F::load(planes[1]), F::load(planes[2])};
     }
-    const Vec3<F> mean{load(gs.means[0]), load(gs.means[1]), load(gs.means[2])};
+    const auto codes = [&](int plane) noexcept {
+      const std::uint16_t* from = gs.packed.codes.data + static_cast<std::size_t>(plane) * gs.size + i;
+      for (std::size_t k = 0; k < step && count == step; ++k) tail[k] = static_cast<float>(from[k]);
+      for (std::size_t k = 0; k < step && count != step; ++k)
+        tail[k] = static_cast<float>(from[k < count ? k : count - 1]);
+      return F::load(tail);
+    };
+    const auto codes3 = [&](int plane) noexcept { return Vec3<F>{codes(plane), codes(plane + 1), codes(plane + 2)}; };
+    const Vec3<F> mean = packed && gs.means[0].empty()
+                             ? unpack_mean(gs.packed.chunks[c], codes3(PackedRows::kMeans))
+                             : Vec3<F>{load(gs.means[0]), load(gs.means[1]), load(gs.means[2])};
     const F z = depth_key(camera.key_rotation, camera.key_scale, mean, offset);
     if (!any(z > F(camera.near_plane))) continue;
     const Vec3<F> delta = mean + offset;
     SplatAxes<F> axes;
-    if (gs.axes[0].empty()) {
+    if (packed) {
+      axes = splat_axes(camera.rotation, delta, unpack_quat(codes3(PackedRows::kQuats)),
+                        unpack_scales(gs.packed.chunks[c], codes3(PackedRows::kScales)));
+    } else if (gs.axes[0].empty()) {
       const Quat<F> quat{load(gs.quats[0]), load(gs.quats[1]), load(gs.quats[2]), load(gs.quats[3])};
       axes = splat_axes(camera.rotation, delta, quat,
                         Vec3<F>{load(gs.scales[0]), load(gs.scales[1]), load(gs.scales[2])});
@@ -64,7 +78,8 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
       }
       axes = splat_axes(camera.rotation, delta, factor);
     }
-    const Projected<F> splat = project<F, F>(camera, axes, z, load(gs.opacities));
+    const F opacity = packed ? unpack_opacity(codes(PackedRows::kOpacity)) : load(gs.opacities);
+    const Projected<F> splat = project<F, F>(camera, axes, z, opacity);
     const std::uint32_t bits = lane_bits(splat.visible) & ((1u << count) - 1u);
     if (bits == 0) continue;
     const F key = camera.sort_order == SortOrder::z_depth ? z : distance_key(camera.key_scale, mean, offset);

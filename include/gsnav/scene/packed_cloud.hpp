@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/huge_pages.hpp"
+#include "gsnav/kernels/packed_gaussians.hpp"
+#include "gsnav/math/aabb.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/load_report.hpp"
+
+namespace gsnav {
+
+/// What packing may cost. Beyond a bound the planes stay as exact as it asks for.
+struct PackLimits {
+  double mean = 0.1;     ///< how far any mean may move, in its Gaussian's largest standard deviations; else float32
+  double sh = 2e-3;      ///< root mean square error by 8 bits of a coefficient of bands from 1 on; else binary16
+  double sh_max = 2e-3;  ///< largest error of one by binary16; else float32
+};
+
+/// A GaussianCloud in a third of its memory: 20 bytes a Gaussian for place, shape and opacity, 6 for its colour, 45 for
+/// SH degree 3 by 8 bits. Host backends render it as it is, in the bits of unpack_cloud's floats; others are given
+/// these (GaussianArrays). It can be edited and written only after unpack_cloud. Pack sorted clouds: places are steps
+/// of a chunk's box.
+struct PackedCloud {
+  std::vector<std::uint16_t> codes;  ///< PackedRows::codes
+  std::vector<std::uint16_t> sh0;    ///< [N][3], binary16
+  std::vector<std::int8_t> shN;      ///< [N][(degree+1)^2 - 1][3]; empty where rest has the bands
+  std::vector<PackedChunk> chunks;   ///< [ceil(N / kProjectChunk)]
+  std::size_t count = 0;             ///< N
+  /// What is not packed: ids, origins, chunk bounds, what the asset says, and planes that a limit kept.
+  GaussianCloud rest;
+
+  std::size_t size() const noexcept { return count; }
+  std::size_t bytes() const noexcept {
+    return sizeof(std::uint16_t) * (codes.size() + sh0.size()) + shN.size() + sizeof(PackedChunk) * chunks.size() +
+           rest.bytes() + sizeof(float) * (rest.means[0].empty() ? 0 : 3 * count);
+  }
+  GaussianView view() const noexcept {
+    GaussianView v = rest.view();
+    v.size = count;
+    v.packed = {view_of(codes), view_of(sh0), view_of(shN), view_of(chunks)};
+    return v;
+  }
+  GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
+    return {view(), world_from_asset, rest.filter, rest.eps2d};
+  }
+};
+
+namespace detail {
+
+inline std::uint16_t code_of(double value, double largest) noexcept {
+  return static_cast<std::uint16_t>(std::nearbyint(clamp(value, 0.0, largest)));
+}
+
+/// The three codes that unpack_quat reads.
+inline std::array<std::uint16_t, 3> pack_quat(const Quatd& q) noexcept {
+  const double parts[] = {q.w, q.x, q.y, q.z};
+  std::size_t missing = 0;
+  for (std::size_t k = 1; k < 4; ++k) missing = std::fabs(parts[k]) > std::fabs(parts[missing]) ? k : missing;
+  const double sign = parts[missing] < 0 ? -1 : 1, middle = static_cast<double>(kQuatCodes) / 2;
+  std::array<std::uint16_t, 3> out{};
+  std::size_t to = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (k == missing) continue;
+    const std::uint16_t code =
+        code_of(sign * parts[k] * middle * std::sqrt(2.0) + middle, static_cast<double>(kQuatCodes));
+    const std::uint16_t bit = to < 2 ? static_cast<std::uint16_t>(missing >> to & 1u) : std::uint16_t{0};
+    out[to++] = static_cast<std::uint16_t>(2 * code + bit);
+  }
+  return out;
+}
+
+/// Steps and codes of a cloud's places, shapes and opacities.
+inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
+  const std::size_t n = cloud.size();
+  out.codes = huge_vector<std::uint16_t>(PackedRows::kPlanes * n);
+  out.chunks.resize(cloud.view().chunk_count());
+  const auto plane = [&](std::size_t k) { return out.codes.data() + k * n; };
+  for (std::size_t c = 0; c < out.chunks.size(); ++c) {
+    PackedChunk& chunk = out.chunks[c];
+    const std::size_t first = c * kProjectChunk, last = std::min(n, first + kProjectChunk);
+    float largest = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax_element(cloud.means[k].data() + first, cloud.means[k].data() + last);
+      const int axis = static_cast<int>(k);
+      chunk.low[axis] = *low;
+      chunk.step[axis] = (*high - *low) / 65535.0f;
+      largest = std::max(largest, *std::max_element(cloud.scales[k].data() + first, cloud.scales[k].data() + last));
+    }
+    chunk.scale_step = std::sqrt(largest) / 65535.0f;
+    const auto steps = [](double value, float step) { return step > 0 ? value / static_cast<double>(step) : 0.0; };
+    for (std::size_t i = first; i < last; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const int axis = static_cast<int>(k);
+        const double from_low = static_cast<double>(cloud.means[k][i]) - static_cast<double>(chunk.low[axis]);
+        plane(PackedRows::kMeans + k)[i] = code_of(steps(from_low, chunk.step[axis]), 65535);
+        const double root = std::sqrt(static_cast<double>(cloud.scales[k][i]));
+        plane(PackedRows::kScales + k)[i] = code_of(steps(root, chunk.scale_step), 65535);
+      }
+      const auto part = [&](std::size_t k) { return static_cast<double>(cloud.quats[k][i]); };
+      const auto quat = pack_quat({part(0), part(1), part(2), part(3)});
+      for (std::size_t k = 0; k < 3; ++k) plane(PackedRows::kQuats + k)[i] = quat[k];
+      plane(PackedRows::kOpacity)[i] = code_of(65535.0 * static_cast<double>(cloud.opacities[i]), 65535);
+    }
+  }
+}
+
+/// Compares places, shapes and opacities; `packed` is of `cloud`.
+inline void compare_shapes(const GaussianCloud& cloud, const GaussianView& packed, PackErrors& out) noexcept {
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Vec3d was{static_cast<double>(cloud.means[0][i]), static_cast<double>(cloud.means[1][i]),
+                    static_cast<double>(cloud.means[2][i])};
+    const Vec3f scales = scales_of(packed, i);
+    const Quatd q = quat_cast<double>(quat_of(packed, i));
+    double largest = 0, change = 0, same = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double s = static_cast<double>(cloud.scales[k][i]);
+      largest = std::max(largest, s);
+      change = std::max(change, std::fabs(static_cast<double>(scales[static_cast<int>(k)]) - s));
+    }
+    const double parts[] = {q.w, q.x, q.y, q.z};
+    double sum = 0;  // of squared differences: |q - r| = 2 sin(angle / 4)
+    for (std::size_t k = 0; k < 4; ++k) same += parts[k] * static_cast<double>(cloud.quats[k][i]);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const double d = parts[k] - (same < 0 ? -1.0 : 1.0) * static_cast<double>(cloud.quats[k][i]);
+      sum += d * d;
+    }
+    const double moved = norm(vec_cast<double>(mean_of(packed, i)) - was);
+    out.mean = std::max(out.mean, moved);
+    if (moved > 0) out.mean_deviations = std::max(out.mean_deviations, moved / std::max(largest, 1e-9));
+    if (change > 0) out.scale = std::max(out.scale, change / std::max(largest, 1e-9));
+    out.rotation = std::max(out.rotation, 4 * std::asin(std::min(1.0, std::sqrt(sum) / 2)));
+    out.opacity = std::max(
+        out.opacity, std::fabs(static_cast<double>(opacity_of(packed, i)) - static_cast<double>(cloud.opacities[i])));
+  }
+}
+
+/// Bands by 8 bits, and what that changes; the cloud's other planes may be gone.
+inline void pack_bands(const GaussianCloud& cloud, PackedCloud& out, PackErrors& errors) {
+  const std::size_t n = out.count, rest = n == 0 ? 0 : cloud.shN.size() / n;
+  out.shN = huge_vector<std::int8_t>(cloud.shN.size());
+  double squares = 0;
+  for (std::size_t c = 0; c < out.chunks.size(); ++c) {
+    const std::size_t first = c * kProjectChunk * rest, last = std::min(n, (c + 1) * kProjectChunk) * rest;
+    float(&steps)[3] = out.chunks[c].sh_steps;
+    const auto band = [rest](std::size_t at) { return packed_band(1 + static_cast<int>(at % rest / 3)); };
+    float largest[3]{};
+    for (std::size_t at = first; at < last; ++at) largest[band(at)] = max(largest[band(at)], abs(cloud.shN[at]));
+    for (int b = 0; b < 3; ++b) steps[b] = largest[b] / 127.0f;
+    for (std::size_t at = first; at < last; ++at) {
+      const float step = steps[band(at)];
+      const double code =
+          step > 0 ? clamp(static_cast<double>(cloud.shN[at]) / static_cast<double>(step), -127.0, 127.0) : 0;
+      out.shN[at] = static_cast<std::int8_t>(std::nearbyint(code));
+      const double error = std::fabs(static_cast<double>(static_cast<float>(out.shN[at]) * step - cloud.shN[at]));
+      errors.sh = std::max(errors.sh, error);
+      squares += error * error;
+    }
+  }
+  errors.sh_rms = cloud.shN.empty() ? 0 : std::sqrt(squares / static_cast<double>(cloud.shN.size()));
+}
+
+/// Bounds of what the packed rows stand for.
+inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed) {
+  const GaussianView v = packed.view();
+  std::vector<ChunkBounds> out(v.chunk_count());
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    Aabb<double> box;
+    for (std::size_t i = c * kProjectChunk; i < std::min(v.size, (c + 1) * kProjectChunk); ++i) {
+      const Vec3d origin = v.origin_ids.empty() ? Vec3d{} : v.origins[v.origin_ids[i]];
+      box.add(origin + vec_cast<double>(mean_of(v, i)));
+      const Vec3f s = scales_of(v, i);
+      out[c].scale_max = std::max({out[c].scale_max, s.x, s.y, s.z});
+      out[c].opacity_max = std::max(out[c].opacity_max, opacity_of(v, i));
+    }
+    out[c].low = box.low;
+    out[c].high = box.high;
+  }
+  return out;
+}
+
+}  // namespace detail
+
+/// Packs a cloud, which is used up plane by plane. `errors`: what that changed.
+inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {}, PackErrors* errors = nullptr) {
+  PackErrors found;
+  PackedCloud out;
+  out.count = cloud.size();
+  expand_sh(cloud);
+  detail::pack_shapes(cloud, out);
+  GaussianView v = out.view();
+  detail::compare_shapes(cloud, v, found);
+  if (found.mean_deviations > limits.mean) {
+    found.mean_bits = 32;
+    found.mean = found.mean_deviations = 0;
+    out.codes.resize(PackedRows::kMeans * out.count);
+    out.rest.means = std::move(cloud.means);
+  }
+  cloud.means = {};
+  cloud.scales = {};
+  cloud.quats = {};
+  cloud.opacities = {};
+  out.sh0.resize(cloud.sh0.size());
+  for (std::size_t i = 0; i < out.sh0.size(); ++i) {
+    out.sh0[i] = half_of_float(cloud.sh0[i]);
+    found.sh0 = std::max(found.sh0, static_cast<double>(abs(half_to_float(out.sh0[i]) - cloud.sh0[i])));
+  }
+  cloud.sh0 = {};
+  detail::pack_bands(cloud, out, found);
+  if (found.sh_rms > limits.sh) {
+    out.shN = {};
+    found.sh_rms = 0;
+    found.sh = half_sh_error(cloud);
+    found.sh_bits = found.sh > limits.sh_max ? 32 : 16;
+    if (found.sh_bits == 16) compact_sh(cloud);
+    if (found.sh_bits == 32) found.sh = 0;
+    out.rest.shN = std::move(cloud.shN);
+    out.rest.shN_half = std::move(cloud.shN_half);
+  }
+  cloud.shN = {};
+  out.rest.sh_degree = cloud.sh_degree;
+  out.rest.origin_ids = std::move(cloud.origin_ids);
+  out.rest.origins = std::move(cloud.origins);
+  out.rest.row_ids = std::move(cloud.row_ids);
+  out.rest.filter = cloud.filter;
+  out.rest.eps2d = cloud.eps2d;
+  out.rest.sort_order = cloud.sort_order;
+  if (!cloud.chunk_bounds.empty()) out.rest.chunk_bounds = detail::packed_bounds(out);
+  if (errors != nullptr) *errors = found;
+  return out;
+}
+
+/// The floats that packed rows stand for.
+inline GaussianCloud unpack_cloud(const PackedCloud& packed) {
+  GaussianCloud out = packed.rest;
+  const GaussianView v = packed.view();
+  const std::size_t n = packed.size(), rest = static_cast<std::size_t>(sh_coefficient_count(v.sh_degree) - 1);
+  const auto planes = [n](auto& of) {
+    for (auto& plane : of) plane = huge_vector<float>(n);
+  };
+  planes(out.means);
+  planes(out.scales);
+  planes(out.quats);
+  out.opacities = huge_vector<float>(n);
+  out.sh0 = huge_vector<float>(3 * n);
+  out.shN = huge_vector<float>(3 * rest * n);
+  out.shN_half = {};
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3f mean = mean_of(v, i), scales = scales_of(v, i);
+    const Quatf q = quat_of(v, i);
+    const float parts[] = {q.w, q.x, q.y, q.z};
+    for (std::size_t k = 0; k < 3; ++k) {
+      out.means[k][i] = mean[static_cast<int>(k)];
+      out.scales[k][i] = scales[static_cast<int>(k)];
+    }
+    for (std::size_t k = 0; k < 4; ++k) out.quats[k][i] = parts[k];
+    out.opacities[i] = opacity_of(v, i);
+    for (std::size_t k = 0; k <= rest; ++k) {
+      const Vec3f c = packed_coefficient(v, i, static_cast<int>(k));
+      float* const to = k == 0 ? &out.sh0[3 * i] : &out.shN[3 * (rest * i + k - 1)];
+      for (int channel = 0; channel < 3; ++channel) to[channel] = c[channel];
+    }
+  }
+  return out;
+}
+
+}  // namespace gsnav
