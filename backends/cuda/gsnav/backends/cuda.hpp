@@ -11,6 +11,7 @@
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/first_impacts.hpp"
 #include "gsnav/ops/render.hpp"
 #include "gsnav/ops/skin.hpp"
 
@@ -109,6 +110,12 @@ extern template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWor
                                                          RenderStats*);
 extern template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
 extern template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
+extern template Status capsule_gaps<CudaBackend, float>(CudaBackend&, const CapsuleGapArgs<float>&);
+extern template Status capsule_gaps<CudaBackend, double>(CudaBackend&, const CapsuleGapArgs<double>&);
+extern template Status sweep_capsules<CudaBackend, float>(CudaBackend&, const SweepArgs<float>&);
+extern template Status sweep_capsules<CudaBackend, double>(CudaBackend&, const SweepArgs<double>&);
+extern template Status first_impacts<float, CudaBackend>(CudaBackend&, const FirstImpactArgs<float>&);
+extern template Status first_impacts<double, CudaBackend>(CudaBackend&, const FirstImpactArgs<double>&);
 #endif
 
 }  // namespace gsnav
