@@ -155,10 +155,12 @@ Status check_tile(std::span<const std::byte> tile, const TileLayout& t, const Wh
   }
   // Polygons that share them could ask for a thousand times the file.
   if (detail_verts > static_cast<std::uint64_t>(t.detail_verts)) {
-    return where.bad("detailVertCount", t.detail_verts, "is less than the polygons have, " + std::to_string(detail_verts));
+    return where.bad("detailVertCount", t.detail_verts,
+                     "is less than the polygons have, " + std::to_string(detail_verts));
   }
   if (detail_tris > static_cast<std::uint64_t>(t.detail_tris)) {
-    return where.bad("detailTriCount", t.detail_tris, "is less than the polygons have, " + std::to_string(detail_tris));
+    return where.bad("detailTriCount", t.detail_tris,
+                     "is less than the polygons have, " + std::to_string(detail_tris));
   }
   for (std::int32_t i = 0; i < t.bv_nodes; ++i) {
     const auto v = load<std::int32_t>(tile.data() + t.at_bv + static_cast<std::size_t>(i) * kBvNode + 12);

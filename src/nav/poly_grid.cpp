@@ -50,8 +50,12 @@ void PolyGrid::build(const PolyMesh& mesh) {
   // Never many more cells, and entries of them, than polygons: what overlaps or is thin gets larger cells.
   const double most_side = clamp(2 * count, 8.0, kMaxSideCells);
   side_ = max(max(std::sqrt(width * depth / count), max(width, depth) / most_side), kLeastSide);
-  const auto columns_of = [&](PolyId id) { return cells_of(boxes_[id].low.x - low_.x, boxes_[id].high.x - low_.x, side_, columns_); };
-  const auto rows_of = [&](PolyId id) { return cells_of(boxes_[id].low.z - low_.z, boxes_[id].high.z - low_.z, side_, rows_); };
+  const auto columns_of = [&](PolyId id) {
+    return cells_of(boxes_[id].low.x - low_.x, boxes_[id].high.x - low_.x, side_, columns_);
+  };
+  const auto rows_of = [&](PolyId id) {
+    return cells_of(boxes_[id].low.z - low_.z, boxes_[id].high.z - low_.z, side_, rows_);
+  };
   for (;; side_ *= 2) {
     columns_ = static_cast<std::int64_t>(width / side_) + 1;
     rows_ = static_cast<std::int64_t>(depth / side_) + 1;

@@ -228,8 +228,8 @@ TEST_CASE("navmesh file: no allocation is over four times the file, whatever its
     std::memcpy(&v, shared.data() + k, 4);
     return v;
   };
-  const std::size_t tile = 104, polys = static_cast<std::size_t>(at(tile + 24)), verts = static_cast<std::size_t>(at(tile + 28)),
-                    links = static_cast<std::size_t>(at(tile + 32));
+  const std::size_t tile = 104, polys = static_cast<std::size_t>(at(tile + 24)),
+                    verts = static_cast<std::size_t>(at(tile + 28)), links = static_cast<std::size_t>(at(tile + 32));
   const std::size_t details = tile + 100 + 12 * verts + 32 * polys + 12 * links;
   for (std::size_t i = 0; i < polys; ++i) {
     patch(shared, details + 12 * i + 4, 0);

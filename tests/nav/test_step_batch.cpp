@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Property 5: batches of steps have the bits of one step after the other, on any backend, with any number of threads.
+// Property 5: batches of steps have the bits of one step after the other, on any backend, with any
+// number of threads.
 #include <doctest/doctest.h>
 
 #include <cstring>
@@ -25,11 +26,12 @@ bool same(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 bool same(const Vec3d& a, const Vec3d& b) { return same(a.x, b.x) && same(a.y, b.y) && same(a.z, b.z); }
 bool same(const StepResult& a, const StepResult& b) {
   bool equal = same(a.position, b.position) && a.poly == b.poly && same(a.fraction, b.fraction) &&
-               a.blocked_by == b.blocked_by && a.hit_wall == b.hit_wall && same(a.wall_normal, b.wall_normal) &&
-               same(a.toi, b.toi) && a.avatar == b.avatar && a.bone == b.bone && same(a.contact_point, b.contact_point) &&
-               same(a.normal, b.normal) && a.agent_caused == b.agent_caused &&
-               a.started_overlapping == b.started_overlapping && a.pushed_into == b.pushed_into &&
-               same(a.pushed_toi, b.pushed_toi) && a.pushed_avatar == b.pushed_avatar && a.pushed_bone == b.pushed_bone &&
+               a.blocked_by == b.blocked_by && a.hit_wall == b.hit_wall &&
+               same(a.wall_normal, b.wall_normal) && same(a.toi, b.toi) && a.avatar == b.avatar &&
+               a.bone == b.bone && same(a.contact_point, b.contact_point) && same(a.normal, b.normal) &&
+               a.agent_caused == b.agent_caused && a.started_overlapping == b.started_overlapping &&
+               a.pushed_into == b.pushed_into && same(a.pushed_toi, b.pushed_toi) &&
+               a.pushed_avatar == b.pushed_avatar && a.pushed_bone == b.pushed_bone &&
                a.path.size() == b.path.size();
   for (std::size_t i = 0; equal && i < a.path.size(); ++i) {
     equal = same(a.path[i].position, b.path[i].position) && a.path[i].poly == b.path[i].poly &&
@@ -51,7 +53,8 @@ struct Scene {
     const double inf = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < n; ++i) {
       const NavPoint p = mesh.random_point(rng, 0);
-      AgentState a{p.position, rng.uniform(0, 0.3), rng.uniform(0.2, 1.8), i % 3 == 0 ? kNoPoly : p.poly};
+      AgentState a{p.position, rng.uniform(0, 0.3), rng.uniform(0.2, 1.8),
+                   i % 3 == 0 ? kNoPoly : p.poly};
       if (i % 97 == 5) a.position.x = i % 2 == 0 ? 1e4 : inf;
       agents.push_back(a);
       desired.push_back(heading(rng, i % 11 == 0 ? rng.uniform(0, 20) : rng.uniform(0, 0.5)));
@@ -77,7 +80,8 @@ struct Scene {
   }
   std::vector<StepResult> one_by_one() const {
     std::vector<StepResult> out;
-    for (std::size_t i = 0; i < agents.size(); ++i) out.push_back(step(mesh, agents[i], desired[i], bodies, options));
+    for (std::size_t i = 0; i < agents.size(); ++i)
+      out.push_back(step(mesh, agents[i], desired[i], bodies, options));
     return out;
   }
 };
@@ -94,7 +98,9 @@ std::size_t differing(const Scene& s, const std::vector<StepResult>& expected, c
 
 }  // namespace
 
-TEST_CASE("property 5: batches of steps have the bits of single steps on any number of threads, device or not") {
+TEST_CASE(
+    "property 5: batches of steps have the bits of single steps on any number of threads, device or "
+    "not") {
   std::size_t steps = 0, met = 0, invalid = 0;
   const auto n = static_cast<std::size_t>(cases(25000));
   for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
@@ -107,14 +113,18 @@ TEST_CASE("property 5: batches of steps have the bits of single steps on any num
     }
     SerialBackend serial;
     ToyBackend toy;  // runs backwards, in memory of its own
-    CHECK(differing(s, expected, [&](const StepBatch& b) { return step_all(serial, s.mesh, b, s.bodies, s.options); }) == 0);
-    CHECK(differing(s, expected,
-                    [&](const StepBatch& b) { return step_all(serial, toy, s.mesh, b, s.bodies, s.options); }) == 0);
+    CHECK(differing(s, expected, [&](const StepBatch& b) {
+            return step_all(serial, s.mesh, b, s.bodies, s.options);
+          }) == 0);
+    CHECK(differing(s, expected, [&](const StepBatch& b) {
+            return step_all(serial, toy, s.mesh, b, s.bodies, s.options);
+          }) == 0);
 #if defined(_OPENMP)
     for (const int threads : {1, 2, 5}) {
       OpenMPBackend openmp(threads);
-      CHECK(differing(s, expected,
-                      [&](const StepBatch& b) { return step_all(openmp, s.mesh, b, s.bodies, s.options); }) == 0);
+      CHECK(differing(s, expected, [&](const StepBatch& b) {
+              return step_all(openmp, s.mesh, b, s.bodies, s.options);
+            }) == 0);
       CHECK(differing(s, expected, [&](const StepBatch& b) {
               return step_all(openmp, openmp, s.mesh, b, s.bodies, s.options);
             }) == 0);
@@ -148,7 +158,8 @@ TEST_CASE("batches of steps: spans of other sizes are refused by name") {
   CHECK(few.code() == Errc::invalid_argument);
   CHECK(few.message().find("StepBatch.results has 9 values for 10 agents") != std::string::npos);
   results.resize(10);
-  CHECK(step_all(serial, s.mesh, {s.agents, std::span(s.desired).first(3), results}, s.bodies).message().find("desired") !=
-        std::string::npos);
+  CHECK(step_all(serial, s.mesh, {s.agents, std::span(s.desired).first(3), results}, s.bodies)
+            .message()
+            .find("desired") != std::string::npos);
   CHECK(step_all(serial, s.mesh, {{}, {}, {}}, s.bodies).ok());
 }

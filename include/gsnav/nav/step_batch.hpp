@@ -22,7 +22,8 @@ struct StepBatch {
   std::span<StepResult> results;       ///< [N], written
 
   Status check() const {
-    for (const auto& [size, name] : {std::pair{desired.size(), "desired"}, std::pair{results.size(), "results"}}) {
+    for (const auto& [size, name] :
+         {std::pair{desired.size(), "desired"}, std::pair{results.size(), "results"}}) {
       if (size == agents.size()) continue;
       return {Errc::invalid_argument, std::string("StepBatch.") + name + " has " + std::to_string(size) +
                                           " values for " + std::to_string(agents.size()) + " agents"};
@@ -31,13 +32,12 @@ struct StepBatch {
   }
 };
 
-/// step() of many agents among the same bodies, none of whom meets another agent, on the threads of a host's backend.
-/// The results are those of step(), bit for bit, with any number of threads. Errors: invalid_argument naming the span
-/// of another size than the agents.
+/// step() of many agents among the same bodies, none of whom meets another agent, on the threads of a
+/// host's backend. The results are those of step(), bit for bit, with any number of threads. Errors:
+/// invalid_argument naming the span of another size than the agents.
 template <Backend B>
-  requires is_host_backend<B>
-Status step_all(B& backend, const NavMesh& mesh, const StepBatch& batch, const CapsuleSet& bodies,
-                const StepOptions& options = {}) {
+requires is_host_backend<B> Status step_all(B& backend, const NavMesh& mesh, const StepBatch& batch,
+                                            const CapsuleSet& bodies, const StepOptions& options = {}) {
   if (Status s = batch.check(); !s) return s;
   backend.parallel_for(batch.agents.size(), [&](std::size_t i) {
     batch.results[i] = step(mesh, batch.agents[i], batch.desired[i], bodies, options);
@@ -45,13 +45,15 @@ Status step_all(B& backend, const NavMesh& mesh, const StepBatch& batch, const C
   return backend.synchronize();
 }
 
-/// The same with a device for the bodies: `host` walks the agents, `device` sweeps all legs of their ways against all
-/// bodies by the same kernel, and who meets nobody is done; `host` steps the others. The same bits.
+/// The same with a device for the bodies: `host` walks the agents, `device` sweeps all legs of their
+/// ways against all bodies by the same kernel, and who meets nobody is done; `host` steps the others.
+/// The same bits.
 template <Backend H, Backend D>
-  requires is_host_backend<H>
-Status step_all(H& host, D& device, const NavMesh& mesh, const StepBatch& batch, const CapsuleSet& bodies,
-                const StepOptions& options = {}) {
-  if (options.compat != StepCompat::none || bodies.empty()) return step_all(host, mesh, batch, bodies, options);
+requires is_host_backend<H> Status step_all(H& host, D& device, const NavMesh& mesh,
+                                            const StepBatch& batch, const CapsuleSet& bodies,
+                                            const StepOptions& options = {}) {
+  if (options.compat != StepCompat::none || bodies.empty())
+    return step_all(host, mesh, batch, bodies, options);
   static const CapsuleSet nobody;
   if (Status s = step_all(host, mesh, batch, nobody, options); !s) return s;
 
@@ -63,8 +65,10 @@ Status step_all(H& host, D& device, const NavMesh& mesh, const StepBatch& batch,
     const std::vector<WalkPoint>& path = batch.results[i].path;
     for (std::size_t k = 1; k <= path.size(); ++k) {
       const WalkPoint &from = path[k - 1], &to = path[k < path.size() ? k : k - 1];
-      legs.push_back({{agent_capsule(from.position, a.radius, a.height), agent_capsule(to.position, a.radius, a.height)},
-                      from.fraction, k < path.size() ? to.fraction : 1.0});
+      legs.push_back({{agent_capsule(from.position, a.radius, a.height),
+                       agent_capsule(to.position, a.radius, a.height)},
+                      from.fraction,
+                      k < path.size() ? to.fraction : 1.0});
     }
     first.push_back(legs.size());
   }

@@ -21,10 +21,10 @@ struct SweptLeg {
 /// What N legs run into first, among M bodies. Memory of the backend.
 template <class S>
 struct FirstImpactArgs {
-  View<const SweptLeg> legs;           ///< [N]
-  View<const DynamicCapsule> bodies;   ///< [M]
+  View<const SweptLeg> legs;          ///< [N]
+  View<const DynamicCapsule> bodies;  ///< [M]
   SweepRules<S> rules;
-  View<FirstImpact<S>> impacts;        ///< [N]
+  View<FirstImpact<S>> impacts;  ///< [N]
 };
 
 /// The impact of leg i: first_impact().
