@@ -8,8 +8,9 @@ namespace {
 
 constexpr double kRounding = 1e-8;  // square metres: what only touches a beam is in it
 
-/// The lines across a first edge and all that they crossed since, as they enter a face; in its plane. None is right of the
-/// line from the first edge's left end to `right`, or left of that from its right end to `left`.
+/// The lines across a first edge and all that they crossed since, as they enter a face; in its plane.
+/// None is right of the line from the first edge's left end to `right`, or left of that from its right
+/// end to `left`.
 struct Beam {
   std::uint32_t edge = 0;
   Flat first_right, first_left, right, left;
@@ -60,16 +61,21 @@ bool FaceViews::look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::
     for (std::uint32_t k = 1; k < face.count; ++k, e = mesh.next(e)) {
       if (mesh.edges[e].twin == UnfoldedMesh::kNone) continue;
       const Flat p = mesh.edges[e].at, q = mesh.edges[mesh.next(e)].at;
-      const double right_p = cross(to_right, p - b.first_left), right_q = cross(to_right, q - b.first_left);
-      const double left_p = cross(to_left, p - b.first_right), left_q = cross(to_left, q - b.first_right);
+      const double right_p = cross(to_right, p - b.first_left),
+                   right_q = cross(to_right, q - b.first_left);
+      const double left_p = cross(to_left, p - b.first_right),
+                   left_q = cross(to_left, q - b.first_right);
       if (max(right_p, right_q) < -kRounding || min(left_p, left_q) > kRounding) continue;
-      const auto cut = [&](double at_p, double at_q) { return p + (q - p) * clamp(at_p / (at_p - at_q), 0.0, 1.0); };
+      const auto cut = [&](double at_p, double at_q) {
+        return p + (q - p) * clamp(at_p / (at_p - at_q), 0.0, 1.0);
+      };
       const Flat r = right_p < 0 && right_q > right_p ? cut(right_p, right_q) : p;
       const Flat l = left_q > 0 && left_q > left_p ? cut(left_p, left_q) : q;
       // An end of the first edge that is beyond this one sees it from behind, which limits nothing.
       const bool by_right = cross(r - b.first_left, l - b.first_left) > 0;
       const bool by_left = cross(l - b.first_right, r - b.first_right) < 0;
-      open.push_back(enter(mesh.edges[e], {e, b.first_right, b.first_left, by_right ? r : b.right, by_left ? l : b.left}));
+      open.push_back(enter(mesh.edges[e], {e, b.first_right, b.first_left, by_right ? r : b.right,
+                                           by_left ? l : b.left}));
     }
   }
   return true;

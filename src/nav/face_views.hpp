@@ -9,9 +9,9 @@
 
 namespace gsnav::detail {
 
-/// Which faces can be seen from which along straight ways, and through which edge: a search for such a way need not
-/// look elsewhere. From above: beams of all lines that cross two edges are a little wider than what crosses those
-/// between as well.
+/// Which faces can be seen from which along straight ways, and through which edge: a search for such a
+/// way need not look elsewhere. From above: beams of all lines that cross two edges are a little wider
+/// than what crosses those between as well.
 class FaceViews {
  public:
   /// Nothing is known, so that empty() holds, of a mesh of more faces than this.
@@ -29,12 +29,15 @@ class FaceViews {
   }
 
  private:
-  static std::uint8_t bit(std::uint32_t k) noexcept { return static_cast<std::uint8_t>(1u << (k < 7 ? k : 7)); }
+  static std::uint8_t bit(std::uint32_t k) noexcept {
+    return static_cast<std::uint8_t>(1u << (k < 7 ? k : 7));
+  }
   /// Marks what is seen from the face of `edge` through it; false after `most` beams.
   bool look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::size_t most);
 
   std::size_t faces_ = 0;
-  std::vector<std::uint8_t> through_;  ///< [goal][face]: edges that may lead there, those from the eighth on as one
+  std::vector<std::uint8_t>
+      through_;  ///< [goal][face]: edges that may lead there, those from the eighth on as one
 };
 
 }  // namespace gsnav::detail

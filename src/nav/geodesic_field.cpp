@@ -45,7 +45,7 @@ Result<GeodesicField> GeodesicField::make(const NavMesh& mesh, std::span<const V
   if (goals.empty()) return Status(Errc::invalid_argument, "geodesic field: there are no goals");
   auto impl = std::make_unique<Impl>();
   impl->mesh = &mesh.impl();
-  impl->unfolded = mesh.impl().unfolded;
+  impl->unfolded = mesh.impl().share_unfolded();
   const detail::UnfoldedMesh& m = *impl->unfolded;
   std::vector<Site> sites;
   for (std::size_t i = 0; i < goals.size(); ++i) {

@@ -41,16 +41,22 @@ HalfPlane avoid(const Ground& to, double reach, const Ground& velocity, const Gr
   return plane(detail::left_of(leg) * side, 0);
 }
 
-/// Tries velocities all around: what comes of each is walked on the mesh and swept against the bodies as they are
-/// expected to move.
+/// Tries velocities all around: what comes of each is walked on the mesh and swept against the bodies as
+/// they are expected to move.
 class VelocitySearch {
  public:
-  VelocitySearch(const NavMesh& mesh, const AgentState& agent, const NavPoint& here, const CapsuleSet& bodies,
-                 const Ground& wanted, const LocalPlannerOptions& o)
-      : mesh_(mesh), agent_(agent), here_(here), wanted_(wanted), o_(o),
-        people_(bodies, agent, o.max_speed, o.horizon), react_(min(max(people_.tick(), kReaction), o.horizon)) {}
+  VelocitySearch(const NavMesh& mesh, const AgentState& agent, const NavPoint& here,
+                 const CapsuleSet& bodies, const Ground& wanted, const LocalPlannerOptions& o)
+      : mesh_(mesh),
+        agent_(agent),
+        here_(here),
+        wanted_(wanted),
+        o_(o),
+        people_(bodies, agent, o.max_speed, o.horizon),
+        react_(min(max(people_.tick(), kReaction), o.horizon)) {}
 
-  /// The best velocity, `candidate` being one of those tried, and after how many seconds it meets somebody.
+  /// The best velocity, `candidate` being one of those tried, and after how many seconds it meets
+  /// somebody.
   std::pair<Ground, double> best(const Ground& candidate) const {
     std::vector<std::pair<double, Ground>> tries;
     const auto add = [&](const Ground& v) { tries.emplace_back(off(v), v); };
@@ -61,7 +67,8 @@ class VelocitySearch {
     for (int k = 0; k < kDirections; ++k) {
       for (const double part : {1.0, 0.5}) add(around(ahead, k, kDirections, part * o_.max_speed));
     }
-    std::stable_sort(tries.begin(), tries.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::stable_sort(tries.begin(), tries.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
     Ground chosen;
     double least = kNever, contact = 0;
     for (const auto& [cost, v] : tries) {
@@ -87,7 +94,9 @@ class VelocitySearch {
     const double a = ahead + k * (kTurn / count);
     return {speed * std::cos(a), speed * std::sin(a)};
   }
-  double off(const Ground& v) const noexcept { return detail::length(v - wanted_) / max(o_.max_speed, 1e-9); }
+  double off(const Ground& v) const noexcept {
+    return detail::length(v - wanted_) / max(o_.max_speed, 1e-9);
+  }
   double urgency(double seconds) const noexcept { return 1 / max(seconds, kSoonest) - 1 / o_.horizon; }
 
   SurfaceWalk walk(const NavPoint& from, const Ground& v, double seconds) const {
@@ -97,8 +106,8 @@ class VelocitySearch {
     return people_.first_contact(walk, agent_.radius + margin, agent_.height, from, o_.horizon - from);
   }
 
-  /// What a velocity costs beside its difference, and after how many seconds somebody is met; costs of `enough` or more
-  /// need not be exact.
+  /// What a velocity costs beside its difference, and after how many seconds somebody is met; costs of
+  /// `enough` or more need not be exact.
   std::pair<double, double> price(const Ground& v, double enough) const {
     if (people_.size() == 0) return {0, o_.horizon};
     const SurfaceWalk way = walk(here_, v, o_.horizon);
@@ -140,8 +149,9 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
   out.safe = false;
   const bool valid = is_finite(agent.position) && is_finite(preferred) && agent.radius >= 0 &&
                      agent.height >= 0 && is_finite(agent.radius) && is_finite(agent.height) &&
-                     o.max_speed >= 0 && is_finite(o.max_speed) && o.margin >= 0 && is_finite(o.margin) &&
-                     is_finite(o.horizon) && o.horizon > 0 && o.wall_horizon > 0 && o.escape_time > 0;
+                     o.max_speed >= 0 && is_finite(o.max_speed) && o.margin >= 0 &&
+                     is_finite(o.margin) && is_finite(o.horizon) && o.horizon > 0 &&
+                     o.wall_horizon > 0 && o.escape_time > 0;
   if (!valid) return out;
   const SurfaceWalk start = mesh.walk({agent.position, agent.poly}, {}, false);
   if (start.points.empty()) return out;
@@ -154,8 +164,8 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
   }
   const double seconds = bodies.t1() - bodies.t0();
   for (const CapsuleSet::Group& g : bodies.groups()) {
-    const Disc d =
-        detail::disc_of(bodies.capsules_of(g), agent.position.y, agent.position.y + agent.height, seconds);
+    const Disc d = detail::disc_of(bodies.capsules_of(g), agent.position.y,
+                                   agent.position.y + agent.height, seconds);
     if (!(d.radius > 0)) continue;
     const double reach = d.radius + agent.radius + o.margin;
     const Ground to = d.at - at;
@@ -181,7 +191,8 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
   Ground chosen = v.value_or(Ground{});
   out.contact_after = o.horizon;
   if (out.bodies > 0) {
-    std::tie(chosen, out.contact_after) = VelocitySearch(mesh, agent, here, bodies, wanted, o).best(chosen);
+    std::tie(chosen, out.contact_after) =
+        VelocitySearch(mesh, agent, here, bodies, wanted, o).best(chosen);
   }
   out.velocity = {chosen.x, 0, chosen.z};
   out.safe = out.contact_after >= o.horizon;

@@ -4,6 +4,7 @@
 #include <DetourNavMesh.h>
 #include <Recast.h>
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -97,12 +98,26 @@ struct NavMesh::Impl {
   Vec3d origin{};  ///< world position of the mesh's own zero
   detail::NavMeshPtr mesh;
   detail::PolyMesh polys;
-  std::shared_ptr<const detail::UnfoldedMesh> unfolded;  ///< shared with geodesic fields
+  /// Made when first asked for, so that a file takes no more memory than its queries need; shared with geodesic fields.
+  const detail::UnfoldedMesh& unfolded() const {
+    const detail::UnfoldedMesh* made = unfolded_mesh.load(std::memory_order_acquire);
+    return made != nullptr ? *made : *share_unfolded();
+  }
+  std::shared_ptr<const detail::UnfoldedMesh> share_unfolded() const {
+    std::call_once(unfolded_once, [&] {
+      made_unfolded = std::make_shared<const detail::UnfoldedMesh>(polys);
+      unfolded_mesh.store(made_unfolded.get(), std::memory_order_release);
+    });
+    return made_unfolded;
+  }
+  mutable std::once_flag unfolded_once;
+  mutable std::shared_ptr<const detail::UnfoldedMesh> made_unfolded;
+  mutable std::atomic<const detail::UnfoldedMesh*> unfolded_mesh{nullptr};
   /// Made when first asked for: who never asks for a distance pays nothing.
   const detail::CornerHubs& hubs() const {
     std::call_once(hubs_once, [&] {
-      made_hubs = std::make_unique<const detail::CornerHubs>(*unfolded);
-      if (!made_hubs->empty()) made_views = detail::FaceViews(*unfolded);
+      made_hubs = std::make_unique<const detail::CornerHubs>(unfolded());
+      if (!made_hubs->empty()) made_views = detail::FaceViews(unfolded());
     });
     return *made_hubs;
   }

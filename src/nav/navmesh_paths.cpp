@@ -28,24 +28,25 @@ Status off_mesh(const char* name, const Vec3d& p) {
 detail::Site NavMesh::Impl::site(const NavPoint& p) const noexcept {
   Vec3d local = polys.clamped(p.poly, p.position - origin);
   local.y = polys.height(p.poly, local);
-  const std::uint32_t face = unfolded->face_at(p.poly, local);
-  return {face, unfolded->flat(unfolded->faces[face], local), local};
+  const detail::UnfoldedMesh& m = unfolded();
+  const std::uint32_t face = m.face_at(p.poly, local);
+  return {face, m.flat(m.faces[face], local), local};
 }
 
 double NavMesh::Impl::distance(const detail::Site& start, const detail::Site& goal) const {
   detail::GeodesicSearch& search = detail::thread_search();
-  if (hubs().empty() || start.face == goal.face) return search.run(*unfolded, start, goal);
+  if (hubs().empty() || start.face == goal.face) return search.run(unfolded(), start, goal);
   const detail::CornerHubs::Way way = hubs().shortest(start, goal);
   const detail::CornerHubs::LeastToGoal least(hubs(), way);
-  const double d = min(way.length, search.run_straight(*unfolded, start, goal, way.length, &least, &views()));
-  return d < kInfinity ? d : search.run(*unfolded, start, goal);
+  const double d = min(way.length, search.run_straight(unfolded(), start, goal, way.length, &least, &views()));
+  return d < kInfinity ? d : search.run(unfolded(), start, goal);
 }
 
 NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal) const {
   detail::GeodesicSearch& search = detail::thread_search();
   const auto searched = [&] {
     NavPath path;
-    path.length = search.run(*unfolded, start, goal);
+    path.length = search.run(unfolded(), start, goal);
     if (path.length < kInfinity) path.points = search.path();
     return path;
   };
@@ -53,7 +54,7 @@ NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal)
   const detail::CornerHubs::Way way = hubs().shortest(start, goal);
   NavPath path;
   const detail::CornerHubs::LeastToGoal least(hubs(), way);
-  path.length = search.run_straight(*unfolded, start, goal, way.length, &least, &views());
+  path.length = search.run_straight(unfolded(), start, goal, way.length, &least, &views());
   if (path.length < kInfinity) {
     path.points = search.path();
     return path;
@@ -66,7 +67,7 @@ NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal)
   sites.push_back(goal);
   // Leg by leg; its length is known.
   for (std::size_t i = 1; i < sites.size(); ++i) {
-    const double leg = search.run(*unfolded, sites[i - 1], sites[i], way.length - done + 1e-6);
+    const double leg = search.run(unfolded(), sites[i - 1], sites[i], way.length - done + 1e-6);
     if (!(leg < kInfinity)) return searched();
     done += leg;
     for (const Vec3d& p : search.path()) {

@@ -145,9 +145,22 @@ Status check_tile(std::span<const std::byte> tile, const TileLayout& t, const Wh
       }
     }
   }
+  std::uint64_t detail_verts = 0, detail_tris = 0;
   for (std::int32_t i = 0; i < t.ground; ++i) {
     const Status s = check_poly(tile.data(), t, i, where.in("polygon", static_cast<std::size_t>(i)));
     if (!s.ok()) return s;
+    const std::byte* d = tile.data() + t.at_details + static_cast<std::size_t>(i) * kPolyDetail;
+    detail_verts += static_cast<unsigned>(d[8]);
+    detail_tris += static_cast<unsigned>(d[9]);
+  }
+  // Polygons that share them could ask for a thousand times the file.
+  if (detail_verts > static_cast<std::uint64_t>(t.detail_verts)) {
+    return where.bad("detailVertCount", t.detail_verts,
+                     "is less than the polygons have, " + std::to_string(detail_verts));
+  }
+  if (detail_tris > static_cast<std::uint64_t>(t.detail_tris)) {
+    return where.bad("detailTriCount", t.detail_tris,
+                     "is less than the polygons have, " + std::to_string(detail_tris));
   }
   for (std::int32_t i = 0; i < t.bv_nodes; ++i) {
     const auto v = load<std::int32_t>(tile.data() + t.at_bv + static_cast<std::size_t>(i) * kBvNode + 12);

@@ -147,7 +147,6 @@ NavMesh assemble_navmesh(const NavMeshSettings& settings, const Vec3d& origin, N
   impl->origin = origin;
   impl->mesh = std::move(mesh);
   Extractor(*impl, height).run();
-  impl->unfolded = std::make_shared<const UnfoldedMesh>(impl->polys);
   for (const auto& t : impl->polys.tris) {
     for (const Vec3d& p : t) impl->bounds.add(p + origin);
   }

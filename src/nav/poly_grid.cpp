@@ -13,6 +13,7 @@ constexpr double kRounding = 1e-9;  // metres
 constexpr double kPolygonsPerCell = 1.0;
 constexpr double kLeastSide = 0.25;  // metres
 constexpr double kMaxSideCells = 2048.0;
+constexpr double kMostEntries = 16.0;  // a polygon
 
 /// Cells [low, high] along one axis that reach into an interval; none where high < low.
 struct Cells {
@@ -46,15 +47,29 @@ void PolyGrid::build(const PolyMesh& mesh) {
   low_ = all.low;
   const double width = all.high.x - all.low.x, depth = all.high.z - all.low.z;
   const double count = max(static_cast<double>(mesh.polys.size()) / kPolygonsPerCell, 1.0);
-  side_ = max(max(std::sqrt(width * depth / count), max(width, depth) / kMaxSideCells), kLeastSide);
-  columns_ = static_cast<std::int64_t>(width / side_) + 1;
-  rows_ = static_cast<std::int64_t>(depth / side_) + 1;
+  // Never many more cells, and entries of them, than polygons: what overlaps or is thin gets larger cells.
+  const double most_side = clamp(2 * count, 8.0, kMaxSideCells);
+  side_ = max(max(std::sqrt(width * depth / count), max(width, depth) / most_side), kLeastSide);
+  const auto columns_of = [&](PolyId id) {
+    return cells_of(boxes_[id].low.x - low_.x, boxes_[id].high.x - low_.x, side_, columns_);
+  };
+  const auto rows_of = [&](PolyId id) {
+    return cells_of(boxes_[id].low.z - low_.z, boxes_[id].high.z - low_.z, side_, rows_);
+  };
+  for (;; side_ *= 2) {
+    columns_ = static_cast<std::int64_t>(width / side_) + 1;
+    rows_ = static_cast<std::int64_t>(depth / side_) + 1;
+    double entries = 0;
+    for (PolyId id = 0; id < mesh.polys.size(); ++id) {
+      const Cells x = columns_of(id), z = rows_of(id);
+      entries += static_cast<double>(x.high - x.low + 1) * static_cast<double>(z.high - z.low + 1);
+    }
+    if (columns_ * rows_ == 1 || entries <= kMostEntries * (count + 4)) break;
+  }
   first_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
   // Counted first, then filled.
   const auto each_cell = [&](PolyId id, const auto& f) {
-    const Aabb<double>& b = boxes_[id];
-    const Cells x = cells_of(b.low.x - low_.x, b.high.x - low_.x, side_, columns_);
-    const Cells z = cells_of(b.low.z - low_.z, b.high.z - low_.z, side_, rows_);
+    const Cells x = columns_of(id), z = rows_of(id);
     for (std::int64_t r = z.low; r <= z.high; ++r) {
       for (std::int64_t c = x.low; c <= x.high; ++c) f(static_cast<std::size_t>(columns_ * r + c));
     }

@@ -16,7 +16,8 @@ struct Disc {
 };
 
 /// The disc around a body's capsules that reach into [low, high]; radius 0 where none does.
-inline Disc disc_of(View<const DynamicCapsule> capsules, double low, double high, double seconds) noexcept {
+inline Disc disc_of(View<const DynamicCapsule> capsules, double low, double high,
+                    double seconds) noexcept {
   const auto reaches = [&](const Capsule<double>& c) {
     return max(c.p0.y, c.p1.y) + c.radius >= low && min(c.p0.y, c.p1.y) - c.radius <= high;
   };
@@ -43,8 +44,8 @@ inline Disc disc_of(View<const DynamicCapsule> capsules, double low, double high
   return disc;
 }
 
-/// Bodies as somebody expects them who knows one tick of their motion: as known within the tick, and then in the pose
-/// of its end at their mean velocity.
+/// Bodies as somebody expects them who knows one tick of their motion: as known within the tick, and
+/// then in the pose of its end at their mean velocity.
 class PredictedBodies {
  public:
   /// Those that may be met within `seconds` from the tick's begin by an agent no faster than `speed`.
@@ -52,9 +53,11 @@ class PredictedBodies {
       : tick_(bodies.t1() - bodies.t0()) {
     const Ground at{agent.position.x, agent.position.z};
     for (const CapsuleSet::Group& g : bodies.groups()) {
-      const Disc d = disc_of(bodies.capsules_of(g), agent.position.y, agent.position.y + agent.height, tick_);
+      const Disc d =
+          disc_of(bodies.capsules_of(g), agent.position.y, agent.position.y + agent.height, tick_);
       if (!(d.radius > 0)) continue;
-      if (length(d.at - at) - d.radius - agent.radius > (speed + length(d.velocity)) * seconds + 0.5) continue;
+      if (length(d.at - at) - d.radius - agent.radius > (speed + length(d.velocity)) * seconds + 0.5)
+        continue;
       Body b{d, bodies.capsules_of(g)};
       // Limbs leave the disc of the tick's begin.
       for (const DynamicCapsule& c : b.known) {
@@ -70,9 +73,10 @@ class PredictedBodies {
   std::size_t size() const noexcept { return bodies_.size(); }
   double tick() const noexcept { return tick_; }
 
-  /// When somebody of this size, who walks so within [from, from + seconds] and stands where the walk ends, is first
-  /// touched, in seconds from the tick's begin; `from + seconds` where never.
-  double first_contact(const SurfaceWalk& walk, double radius, double height, double from, double seconds) const {
+  /// When somebody of this size, who walks so within [from, from + seconds] and stands where the walk
+  /// ends, is first touched, in seconds from the tick's begin; `from + seconds` where never.
+  double first_contact(const SurfaceWalk& walk, double radius, double height, double from,
+                       double seconds) const {
     const double end = from + seconds;
     double first = end;
     for (const Body& b : bodies_) {
@@ -97,7 +101,8 @@ class PredictedBodies {
   };
 
   /// When the way from p at time t0 to q at time t1 meets a body; infinity where it does not.
-  double contact(const Body& b, const Vec3d& p, const Vec3d& q, double t0, double t1, double radius, double height) const {
+  double contact(const Body& b, const Vec3d& p, const Vec3d& q, double t0, double t1, double radius,
+                 double height) const {
     const double reach = b.disc.radius + radius + 1e-3;
     const Ground d0 = Ground{p.x, p.z} - b.disc.at - b.disc.velocity * t0;
     const Ground d1 = Ground{q.x, q.z} - b.disc.at - b.disc.velocity * t1;
@@ -130,7 +135,8 @@ class PredictedBodies {
     }
     return kNever;
   }
-  static MovingCapsule<double> solid(const Vec3d& a, const Vec3d& b, double radius, double height) noexcept {
+  static MovingCapsule<double> solid(const Vec3d& a, const Vec3d& b, double radius,
+                                     double height) noexcept {
     return {agent_capsule(a, radius, height), agent_capsule(b, radius, height)};
   }
 

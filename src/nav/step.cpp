@@ -12,6 +12,7 @@ namespace {
 constexpr double kMaxCoordinate = 1e9;
 constexpr double kRounding = 1e-9;  // metres
 constexpr double kShortest = 1e-6;  // metres: a remainder below this is not slid
+constexpr std::size_t kUsualPoints = 8;  // of a way
 
 bool valid(const AgentState& a) noexcept {
   return is_finite(a.position) && is_finite(a.radius) && is_finite(a.height) && a.radius >= 0 &&
@@ -137,6 +138,7 @@ StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& desir
   SweepRules<double> rules;
   rules.skin = options.skin;
   const Stepper stepper{agent, bodies, rules, out};
+  out.path.reserve(kUsualPoints);
   out.path.push_back({agent.position, agent.poly, 0.0});
   const double asked = length_xz(desired);
 

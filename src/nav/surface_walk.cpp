@@ -124,6 +124,8 @@ Way slide_along_wall(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Di
 void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz, bool slide,
                     SurfaceWalk& out) const {
   out = {};
+  constexpr std::size_t kUsual = 8;
+  out.points.reserve(kUsual);
   Vec3d p = clamped(start_poly, start);
   PolyId poly = start_poly;
   p.y = height(poly, p);

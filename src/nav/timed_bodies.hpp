@@ -76,8 +76,10 @@ class TimedBodies {
     WalkPoint from{a, kNoPoly, 0.0};
     for (std::size_t i = 0; i <= path.size(); ++i) {
       const WalkPoint to = i < path.size() ? path[i] : WalkPoint{b, kNoPoly, 1.0};
-      const double x = from.position.x - lerp(d.x0, d.x1, from.fraction), z = from.position.z - lerp(d.z0, d.z1, from.fraction);
-      const double ex = to.position.x - lerp(d.x0, d.x1, to.fraction) - x, ez = to.position.z - lerp(d.z0, d.z1, to.fraction) - z;
+      const double x = from.position.x - lerp(d.x0, d.x1, from.fraction);
+      const double z = from.position.z - lerp(d.z0, d.z1, from.fraction);
+      const double ex = to.position.x - lerp(d.x0, d.x1, to.fraction) - x;
+      const double ez = to.position.z - lerp(d.z0, d.z1, to.fraction) - z;
       const double ee = ex * ex + ez * ez, t = ee > 0 ? clamp(-(x * ex + z * ez) / ee, 0.0, 1.0) : 0.0;
       const double nx = x + t * ex, nz = z + t * ez;
       if (nx * nx + nz * nz <= reach * reach) return false;
@@ -114,7 +116,8 @@ class TimedBodies {
     return true;
   }
   /// Whether first_impact() would have something to report of this body: the first evaluation says so of most.
-  static bool meets(const MovingCapsule<double>& agent, const MovingCapsule<double>& body, double u0, double u1) noexcept {
+  static bool meets(const MovingCapsule<double>& agent, const MovingCapsule<double>& body, double u0,
+                    double u1) noexcept {
     constexpr SweepRules<double> rules;
     if (swept_apart(agent, body, 2 * rules.skin + kRounding)) return false;
     const Vec3d origin = agent.begin.p0;

@@ -32,7 +32,7 @@ void check(const NavMesh& mesh, int pairs, double tolerance) {
   for (int i = 0; i < pairs; ++i) {
     const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
     const double by_hubs = mesh.distance_between(a, b);
-    const double searched = search.run(*impl.unfolded, impl.site(a), impl.site(b));
+    const double searched = search.run(impl.unfolded(), impl.site(a), impl.site(b));
     worst = max(worst, std::abs(by_hubs - searched));
     bent += searched > norm(b.position - a.position) + 0.05 ? 1 : 0;
     if (i % 8 != 0) continue;

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <initializer_list>
 
 #include "cases.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
+#include "io/allocations.hpp"
 #include "meshes.hpp"
 #include "navmesh_impl.hpp"
 #include "support/data.hpp"
@@ -41,6 +43,44 @@ std::vector<std::byte> saved(const NavMesh& mesh) {
   const gsnav_test::TempFolder folder("navmesh_file");
   save_navmesh(mesh, (folder / "a.navmesh").string()).throw_if_error();
   return bytes_of((folder / "a.navmesh").string());
+}
+
+/// A file of `count` triangles that lie on each other, `length` metres long.
+std::vector<std::byte> pile(std::int32_t count, float length) {
+  std::vector<std::byte> b;
+  const auto put = [&](const auto& v) {
+    const auto* p = reinterpret_cast<const std::byte*>(&v);
+    b.insert(b.end(), p, p + sizeof v);
+  };
+  const auto ints = [&](std::initializer_list<std::int32_t> list) {
+    for (const std::int32_t v : list) put(v);
+  };
+  const auto floats = [&](std::initializer_list<float> list) {
+    for (const float v : list) put(v);
+  };
+  ints({'M' << 24 | 'S' << 16 | 'E' << 8 | 'T', 1, 1});
+  floats({0, 0, 0, length, length});
+  ints({1, count});
+  ints({1, 100 + 36 + count * (32 + 12 + 12 + 4)});  // reference and size; counts of the tile
+  ints({'D' << 24 | 'N' << 16 | 'A' << 8 | 'V', 7, 0, 0, 0, 0, count, 3, count, count, 0, count, 0, 0, count});
+  floats({1.5f, 0.1f, 0.2f, 0, 0, 0, length, 1, length, 1});
+  floats({0, 0, 0, 0, 0, 1, length, 0, 1});
+  for (std::int32_t i = 0; i < count; ++i) {
+    ints({-1});
+    for (const int v : {0, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0}) put(static_cast<std::uint16_t>(v));
+    put(std::uint16_t{1});
+    put(std::uint8_t{3});
+    put(std::uint8_t{0});
+  }
+  b.resize(b.size() + 12 * static_cast<std::size_t>(count));
+  for (std::int32_t i = 0; i < count; ++i) {
+    ints({0, i});
+    for (const int v : {0, 1, 0, 0}) put(static_cast<std::uint8_t>(v));
+  }
+  for (std::int32_t i = 0; i < count; ++i) {
+    for (const int v : {0, 1, 2, 0}) put(static_cast<std::uint8_t>(v));
+  }
+  return b;
 }
 
 void patch(std::vector<std::byte>& b, std::size_t at, std::int32_t v) { std::memcpy(b.data() + at, &v, 4); }
@@ -190,12 +230,49 @@ TEST_CASE("navmesh file: a polygon of no area without height triangles has point
   }
 }
 
+TEST_CASE("navmesh file: no allocation is over four times the file, whatever its polygons share or cover") {
+  std::vector<std::vector<std::byte>> files{saved(boxes())};
+  for (const char* name : {"nav/recast/nav_test.obj", "nav/recast/dungeon.obj"}) {
+    const std::string path = gsnav_test::data_file(name);
+    if (path.empty()) continue;
+    const Soup soup = gsnav_test::read_obj(path);
+    files.push_back(saved(NavMesh::build({}, soup.vertices, soup.triangles).value()));
+  }
+  // Ten thousand polygons, each of which covers all of the mesh, and one that is 100 km long.
+  files.push_back(pile(10000, 1.0f));
+  files.push_back(pile(1, 1e5f));
+  for (const auto& file : files) {
+    gsnav_test::reset_largest_allocation();
+    const auto mesh = parse_navmesh(file, "x");
+    CHECK(mesh.ok());
+    CHECK(gsnav_test::largest_allocation() <= 4 * file.size() + 512);
+  }
+  // Polygons that share their height triangles.
+  auto shared = files[0];
+  const auto at = [&](std::size_t k) {
+    std::int32_t v = 0;
+    std::memcpy(&v, shared.data() + k, 4);
+    return v;
+  };
+  const std::size_t tile = 104, polys = static_cast<std::size_t>(at(tile + 24)),
+                    verts = static_cast<std::size_t>(at(tile + 28)), links = static_cast<std::size_t>(at(tile + 32));
+  const std::size_t details = tile + 100 + 12 * verts + 32 * polys + 12 * links;
+  for (std::size_t i = 0; i < polys; ++i) {
+    patch(shared, details + 12 * i + 4, 0);
+    shared[details + 12 * i + 9] = static_cast<std::byte>(min<std::int32_t>(at(tile + 44), 255));
+  }
+  const auto refused = parse_navmesh(shared, "shared.navmesh");
+  REQUIRE_FALSE(refused.ok());
+  CHECK(refused.message().find("shared.navmesh") == 0);
+}
+
 TEST_CASE("navmesh file: mutated and truncated files do no harm") {
   std::vector<std::vector<std::byte>> seeds{saved(boxes())};
   const std::string tiles = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");
   if (!tiles.empty()) seeds.push_back(bytes_of(tiles));
   Rng rng(11);
   int read = 0, refused = 0;
+  double most = 0;
   for (const auto& seed : seeds) {
     const int rounds = seed.size() < 20000 ? cases(100000) : cases(500);
     for (int i = 0; i < rounds; ++i) {
@@ -212,11 +289,15 @@ TEST_CASE("navmesh file: mutated and truncated files do no harm") {
             if (rng.below(8) == 0) b.resize(at + 1);
         }
       }
+      gsnav_test::reset_largest_allocation();
       const auto r = parse_navmesh(b, "fuzz");
+      const auto asked = static_cast<double>(gsnav_test::largest_allocation());
+      REQUIRE(asked <= 4 * static_cast<double>(b.size()) + 512);  // or a line of what is wrong
+      if (r.ok()) most = max(most, asked / static_cast<double>(b.size()));
       (r.ok() ? read : refused) += 1;
       if (r.ok() && (i % 4 == 0)) use(*r);
     }
   }
-  MESSAGE(read << " read, " << refused << " refused");
+  MESSAGE(read << " read, " << refused << " refused; no allocation over " << most << " times the file");
   CHECK(refused > 100);
 }

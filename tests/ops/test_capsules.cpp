@@ -11,6 +11,10 @@
 #include "gsnav/ops/sweep.hpp"
 #include "ops/backends.hpp"
 #include "ops/capsule_pairs.hpp"
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda.hpp"
+#include "ops/no_gpu.hpp"
+#endif
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -205,6 +209,19 @@ TEST_CASE("capsules: batches on every backend compute the bits of one pair") {
 #endif
   }
 }
+
+#if defined(GSNAV_HAS_CUDA)
+TEST_CASE("capsules, cuda: gaps and sweeps have the CPU's bits") {
+  if (no_gpu("capsules on the GPU")) return;
+  CudaBackend cuda;
+  for (const std::size_t n : {0u, 1u, 127u, 129u, 200003u}) {
+    check_batch<float>(cuda, random_pairs(n + 2, n), "cuda float");
+    check_batch<double>(cuda, random_pairs(n + 3, n), "cuda double");
+  }
+  check_batch<float>(cuda, hard_pairs(), "cuda float, hard pairs");
+  check_batch<double>(cuda, hard_pairs(), "cuda double, hard pairs");
+}
+#endif
 
 TEST_CASE("capsules: arrays that do not fit are refused by name") {
   SerialBackend backend;

@@ -31,8 +31,8 @@ struct PlannedVelocity {
 /// Tried are the velocity of optimal reciprocal collision avoidance (van den Berg et al. 2011) with the whole
 /// responsibility on the agent, because scripted avatars take none, among discs around the avatars and the edges of
 /// the NavMesh; `preferred`; standing; and 24 directions at full and half speed. Each is walked on the mesh for the
-/// horizon and swept against the capsules: within the tick [t0, t1] (seconds) of `bodies` as they move, then in the pose
-/// of its end at the avatar's mean velocity. The price of a velocity is its difference from `preferred` and the
+/// horizon and swept against the capsules: within the tick [t0, t1] (seconds) of `bodies` as they move, then in the
+/// pose of its end at the avatar's mean velocity. The price of a velocity is its difference from `preferred` and the
 /// urgency 1 / t of the first contact (as in van den Berg et al. 2008), once with the margin and once, without, for the
 /// best that can be done after it: backing off is tried like all else, before it is too late. A contact within the
 /// tick is taken only where nothing avoids it, the latest first.
@@ -40,8 +40,8 @@ struct PlannedVelocity {
 /// Where nobody is near it is the velocity nearest to `preferred` that meets no wall. Best effort: take the step itself
 /// by step(), which guarantees. No state; constant in its arguments, so that any number of threads may plan.
 ///
-/// Zero velocity, not safe, for an agent that is invalid or off the mesh, a velocity that is not finite or options out of
-/// range.
+/// Zero velocity, not safe, for an agent that is invalid or off the mesh, a velocity that is not finite or
+/// options out of range.
 PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, const Vec3d& preferred,
                               const CapsuleSet& bodies, const LocalPlannerOptions& options = {});
 

@@ -18,19 +18,20 @@ namespace gsnav {
 
 namespace detail {
 
+template <class S>
+GSNAV_HD Capsule<S> local_capsule(const Capsule<double>& c, const Vec3d& origin) noexcept {
+  return {vec_cast<S>(c.p0 - origin), vec_cast<S>(c.p1 - origin), static_cast<S>(c.radius)};
+}
 /// The part [u0, u1] of a body's motion, relative to `origin`, in the sweep's scalar.
 template <class S>
-MovingCapsule<S> local_motion(const MovingCapsule<double>& m, double u0, double u1,
-                              const Vec3d& origin) noexcept {
-  const auto local = [&](const Capsule<double>& c) {
-    return Capsule<S>{vec_cast<S>(c.p0 - origin), vec_cast<S>(c.p1 - origin), static_cast<S>(c.radius)};
-  };
-  return {local(lerp(m.begin, m.end, u0)), local(lerp(m.begin, m.end, u1))};
+GSNAV_HD MovingCapsule<S> local_motion(const MovingCapsule<double>& m, double u0, double u1,
+                                       const Vec3d& origin) noexcept {
+  return {local_capsule<S>(lerp(m.begin, m.end, u0), origin), local_capsule<S>(lerp(m.begin, m.end, u1), origin)};
 }
 
 /// True where the boxes that two motions sweep are further apart than `margin`: they cannot touch.
-inline bool swept_apart(const MovingCapsule<double>& a, const MovingCapsule<double>& b,
-                        double margin) noexcept {
+GSNAV_HD bool swept_apart(const MovingCapsule<double>& a, const MovingCapsule<double>& b,
+                          double margin) noexcept {
   const double reach = margin + max(a.begin.radius, a.end.radius) + max(b.begin.radius, b.end.radius);
   for (int k = 0; k < 3; ++k) {
     const double a_low = min(min(a.begin.p0[k], a.begin.p1[k]), min(a.end.p0[k], a.end.p1[k]));
@@ -42,8 +43,8 @@ inline bool swept_apart(const MovingCapsule<double>& a, const MovingCapsule<doub
   return false;
 }
 
-inline bool id_less(std::uint32_t avatar_a, std::uint32_t bone_a, std::uint32_t avatar_b,
-                    std::uint32_t bone_b) noexcept {
+GSNAV_HD bool id_less(std::uint32_t avatar_a, std::uint32_t bone_a, std::uint32_t avatar_b,
+                      std::uint32_t bone_b) noexcept {
   return avatar_a != avatar_b ? avatar_a < avatar_b : bone_a < bone_b;
 }
 
@@ -63,8 +64,8 @@ struct FirstImpact {
 /// Sweeps `agent` over the part [u0, u1] of the bodies' motion and merges the outcome into `best`.
 /// Positions are made relative to the agent's start in double before they become S.
 template <class S = double>
-void first_impact(const MovingCapsule<double>& agent, View<const DynamicCapsule> bodies, double u0,
-                  double u1, const SweepRules<S>& rules, FirstImpact<S>& best) noexcept {
+GSNAV_HD void first_impact(const MovingCapsule<double>& agent, View<const DynamicCapsule> bodies, double u0,
+                           double u1, const SweepRules<S>& rules, FirstImpact<S>& best) noexcept {
   const Vec3d origin = agent.begin.p0;
   const MovingCapsule<S> a = detail::local_motion<S>(agent, 0.0, 1.0, origin);
   // Wider than any contact by far more than rounding: leaving a body out changes no bit.

@@ -12,6 +12,7 @@
 #include "gsnav/kernels/cut_depth.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/first_impacts.hpp"
 #include "gsnav/ops/render.hpp"
 #include "gsnav/ops/render_composite.hpp"
 #include "gsnav/ops/skin.hpp"
@@ -143,6 +144,12 @@ extern template Status draw_meshes<float, CudaBackend>(CudaBackend&, MeshWorkspa
 extern template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
 extern template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
 extern template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);
+extern template Status capsule_gaps<CudaBackend, float>(CudaBackend&, const CapsuleGapArgs<float>&);
+extern template Status capsule_gaps<CudaBackend, double>(CudaBackend&, const CapsuleGapArgs<double>&);
+extern template Status sweep_capsules<CudaBackend, float>(CudaBackend&, const SweepArgs<float>&);
+extern template Status sweep_capsules<CudaBackend, double>(CudaBackend&, const SweepArgs<double>&);
+extern template Status first_impacts<float, CudaBackend>(CudaBackend&, const FirstImpactArgs<float>&);
+extern template Status first_impacts<double, CudaBackend>(CudaBackend&, const FirstImpactArgs<double>&);
 #endif
 
 }  // namespace gsnav

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/backends/cuda/device.cuh"
+#include "gsnav/ops/first_impacts.hpp"
+
+// Capsules by the library's own kernels, a thread a pair or a leg.
+
+namespace gsnav {
+
+template Status capsule_gaps<CudaBackend, float>(CudaBackend&, const CapsuleGapArgs<float>&);
+template Status capsule_gaps<CudaBackend, double>(CudaBackend&, const CapsuleGapArgs<double>&);
+template Status sweep_capsules<CudaBackend, float>(CudaBackend&, const SweepArgs<float>&);
+template Status sweep_capsules<CudaBackend, double>(CudaBackend&, const SweepArgs<double>&);
+template Status first_impacts<float, CudaBackend>(CudaBackend&, const FirstImpactArgs<float>&);
+template Status first_impacts<double, CudaBackend>(CudaBackend&, const FirstImpactArgs<double>&);
+
+}  // namespace gsnav
