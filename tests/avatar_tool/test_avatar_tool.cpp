@@ -111,26 +111,6 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
   CHECK(made.says("with the feet held"));
   CHECK_FALSE(run(folder, common + " --from 1,0,2 --to 5,0,4 --no-lock-feet").says("feet held"));
 
-  // The shortest path touches the wall's end; by default there is room.
-  const auto clearance = [](const Outcome& o) {
-    const std::string words = "edges are at least ";
-    const std::size_t at = o.text.find(words);
-    return at == std::string::npos ? -1.0 : std::stod(o.text.substr(at + words.size()));
-  };
-  const std::string across = " --from 1,0,2 --to 1,0,8";
-  CHECK(clearance(run(folder, common + across)) >= 0.19);
-  CHECK(clearance(run(folder, common + across + " --clearance 0.4")) >= 0.38);
-  CHECK(clearance(run(folder, common + across + " --clearance 0")) == 0.0);
-  CHECK(run(folder, common + across + " --clearance -1").says("clearance"));
-  // The generated flat needs no file.
-  const std::string clip_of = "walk --avatar " + quoted(folder / "person.npz") + " --clip " + quoted(folder / "clip.npz") +
-                              " --out " + quoted(folder / "flat.npz") + across;
-  CHECK(run(folder, clip_of).says("--navmesh or --flat"));
-  CHECK(run(folder, clip_of + " --flat --navmesh x").says("--navmesh"));
-  CHECK(run(folder, "walk --flat --avatar " + quoted(folder / "person.npz") + " --clip " + quoted(folder / "clip.npz") +
-                        " --out " + quoted(folder / "flat.npz") + " --from 1.7,0,3.3 --to 6.6,0,5.3")
-            .says("walls another 0.25 m"));
-
   const std::string strip = "strip --avatar " + quoted(folder / "person.npz") + " --driver " + quoted(folder / "walk.npz") +
                             " --eye 4,1.6,8 --target 3,0.9,3 --out " + quoted(folder / "strip.png");
   const Outcome drawn = run(folder, strip + " --frames 3 --width 64 --height 48");
@@ -154,6 +134,26 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
   CHECK(lit(1) > 20);
   CHECK(run(folder, strip + " --frames 0").says("frames"));
   CHECK(run(folder, strip + " --flat --scene x.ply").says("--scene"));
+
+  // The shortest path touches the wall's end; by default there is room.
+  const auto clearance = [](const Outcome& o) {
+    const std::string words = "edges are at least ";
+    const std::size_t at = o.text.find(words);
+    return at == std::string::npos ? -1.0 : std::stod(o.text.substr(at + words.size()));
+  };
+  const std::string across = " --from 1,0,2 --to 1,0,8";
+  CHECK(clearance(run(folder, common + across)) >= 0.19);
+  CHECK(clearance(run(folder, common + across + " --clearance 0.4")) >= 0.38);
+  CHECK(clearance(run(folder, common + across + " --clearance 0")) == 0.0);
+  CHECK(run(folder, common + across + " --clearance -1").says("clearance"));
+  // The generated flat needs no file.
+  const std::string clip_of = "walk --avatar " + quoted(folder / "person.npz") + " --clip " + quoted(folder / "clip.npz") +
+                              " --out " + quoted(folder / "flat.npz") + across;
+  CHECK(run(folder, clip_of).says("--navmesh or --flat"));
+  CHECK(run(folder, clip_of + " --flat --navmesh x").says("--navmesh"));
+  CHECK(run(folder, "walk --flat --avatar " + quoted(folder / "person.npz") + " --clip " + quoted(folder / "clip.npz") +
+                        " --out " + quoted(folder / "flat.npz") + " --from 1.7,0,3.3 --to 6.6,0,5.3")
+            .says("walls another 0.25 m"));
 
   CHECK(run(folder, common + " --from 1,0,2 --to 30,0,8").says("floor.navmesh"));
   CHECK(run(folder, common + " --from 1,0 --to 3,0,8").says("'1,0' is no point"));
