@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -49,6 +50,21 @@ struct Place {
 struct Row {
   double ms = 0, rendering = 0;  // of a frame; the share of it
 };
+
+/// Most bytes that a GPU's backends held at once, counted anew by `restart`; 0 without one.
+double peak_gpu_bytes([[maybe_unused]] bool restart) {
+#if defined(GSNAV_HAS_CUDA)
+  cudaMemPool_t pool = nullptr;
+  if (cudaDeviceGetDefaultMemPool(&pool, 0) != cudaSuccess) return 0.0;
+  std::uint64_t bytes = 0;
+  cudaMemPoolGetAttribute(pool, cudaMemPoolAttrUsedMemHigh, &bytes);
+  std::uint64_t zero = 0;
+  if (restart) cudaMemPoolSetAttribute(pool, cudaMemPoolAttrUsedMemHigh, &zero);
+  return static_cast<double>(bytes);
+#else
+  return 0.0;
+#endif
+}
 
 double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
@@ -124,45 +140,24 @@ void head(const char* what) {
               "people", "frames/s", "ms", "rendering", "scene, MB", "peak, MB", "GPU, MB");
 }
 
-/// `gpu_mb`: what of a GPU's memory is taken while `backend` and what it drew with are there.
-template <class MakeBackend, class GpuBytes>
-void row(const char* name, const Options& o, const Place& place, const MakeBackend& make,
-         const GpuBytes& gpu_bytes) {
+template <class B>
+void row(B&& backend, const char* name, const Options& o, const Place& place) {
   gsnav_report::reset_peak_memory();
-  const double before = gpu_bytes();
-  double used = 0;
-  Row r;
-  {
-    const auto backend = make();
-    using B = std::remove_reference_t<decltype(*backend)>;
-    r = o.environments > 1 ? play_many<B>(*backend, o, place) : play_one<B>(*backend, o, place);
-    used = gpu_bytes() - before;
-  }
+  peak_gpu_bytes(true);
+  const Row r = o.environments > 1 ? play_many<B>(backend, o, place) : play_one<B>(backend, o, place);
   std::printf("%8s %12zu %8zu %12.1f %10.3f %10.1f%% %10.0f %10.0f %10.0f\n", name,
               place.scene->assets[0].cloud->size(), place.scene->avatars.size(), 1e3 / r.ms, r.ms,
               100 * r.rendering, static_cast<double>(scene_bytes(*place.scene)) * 1e-6,
-              static_cast<double>(gsnav_report::peak_memory()) * 1e-6, used * 1e-6);
+              static_cast<double>(gsnav_report::peak_memory()) * 1e-6, peak_gpu_bytes(false) * 1e-6);
   std::fflush(stdout);
 }
 
 void rows(const Options& o, double millions, std::size_t people) {
   const Place place = make_place(millions, people);
   for (const std::string& name : o.backends) {
-    if (name == "openmp") {
-      row(
-          "openmp", o, place, [&] { return std::make_unique<OpenMPBackend>(o.threads); },
-          [] { return 0.0; });
-    }
+    if (name == "openmp") row(OpenMPBackend(o.threads), "openmp", o, place);
 #if defined(GSNAV_HAS_CUDA)
-    if (name == "cuda") {
-      row(
-          "cuda", o, place, [] { return std::make_unique<CudaBackend>(); },
-          [] {
-            std::size_t left = 0, all = 0;
-            cudaMemGetInfo(&left, &all);
-            return static_cast<double>(all - left);
-          });
-    }
+    if (name == "cuda") row(CudaBackend(), "cuda", o, place);
 #endif
   }
 }
