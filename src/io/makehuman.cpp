@@ -105,6 +105,8 @@ Status read_skeleton(const Json& json, const std::string& source, const BaseMesh
   std::map<std::string, Vec3d> heads;
   std::map<std::string, std::vector<std::string>> children;
   for (const auto& [name, bone] : bones->items()) {
+    // Roots are the children of no name.
+    if (name.empty()) return bad("a bone has no name");
     const Json *parent = member(bone, "parent"), *head = member(bone, "head");
     if (head == nullptr || !head->is_string()) return bad("bone " + in_quotes(name) + " has no 'head'");
     const Json* vertices = member(*joints, head->get<std::string>().c_str());

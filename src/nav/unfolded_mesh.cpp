@@ -302,6 +302,12 @@ void UnfoldedMesh::unfold() {
 }
 
 void UnfoldedMesh::fan_out() {
+  // Polygons of a file may lie on one another, so that one edge is two others' twin: what is not so both ways is a wall.
+  std::vector<std::uint32_t> twins(edges.size());
+  for (std::uint32_t e = 0; e < edges.size(); ++e) twins[e] = edges[e].twin;
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    if (twins[e] != kNone && twins[twins[e]] != e) edges[e].twin = kNone;
+  }
   for (Edge& e : edges) e.vertex = kNone;
   for (std::uint32_t i = 0; i < edges.size(); ++i) {
     if (edges[i].vertex != kNone) continue;

@@ -27,7 +27,7 @@ struct LoadSceneOptions {
   /// The report has the error. A colour changes by at most 4.3 times that: 15 basis functions whose squares sum to
   /// 15 / (4 pi).
   double most_sh_error = 2e-3;
-  PackLimits pack;  ///< of load_packed_scene
+  PackLimits pack{};  ///< of load_packed_scene
 };
 
 /// A packed scene with the report of how it was read; `report.packing` has what packing changed.
