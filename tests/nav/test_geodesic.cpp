@@ -178,7 +178,7 @@ TEST_CASE("geodesic: symmetric, and no detour is shorter") {
     if (gsnav_test::data_file(file).empty()) continue;
     const NavMesh mesh = demo(file);
     check_metric(mesh, 10000);
-    check_against_detour(mesh, 1000, 2e-3);  // a walk's length cuts bumps of a centimetre
+    check_against_detour(mesh, 1000, 4e-3);  // a walk's length cuts bumps of a centimetre, most of short ways
   }
 }
 
