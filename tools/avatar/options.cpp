@@ -89,7 +89,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   walks->add_option("--via", via, "On the way, in order: X,Y,Z; any number");
   walks->add_option("--out", walk.out, "Driver to write (.npz)")->required();
   walks->add_option("--speed", walk.speed, "Metres a second; 0: the clip's own")->check(CLI::NonNegativeNumber);
-  walks->add_option("--clearance", walk.clearance, "Metres to keep from the NavMesh's edges where there is room; 0: the shortest path")
+  walks
+      ->add_option("--clearance", walk.clearance,
+                   "Metres to keep from the NavMesh's edges where there is room; 0: the shortest path")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
   walks->add_option("--fps", walk.frame_rate, "Frames a second")->check(CLI::PositiveNumber)->capture_default_str();
