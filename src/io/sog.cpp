@@ -6,6 +6,10 @@
 #include <optional>
 #include <utility>
 
+#if __has_include(<malloc.h>)
+#include <malloc.h>
+#endif
+
 #include "cloud_fill.hpp"
 #include "described.hpp"
 #include "file.hpp"
@@ -26,6 +30,13 @@ using detail::SogMeta;
 // Gaussian a byte of all files; what claims many times that is refused before memory is asked for.
 constexpr std::size_t kMostGaussiansPerByte = 8;
 constexpr std::size_t kGaussianSlack = std::size_t{1} << 18;
+
+/// Hands what decoders freed back to the system: glibc keeps it, and large planes are never made of it.
+void give_back() noexcept {
+#if defined(__GLIBC__)
+  ::malloc_trim(0);
+#endif
+}
 
 /// The files of a SOG, whether in a folder or in a bundle.
 class SogFiles {
@@ -81,29 +92,34 @@ class SogFiles {
   std::optional<detail::ZipReader> zip_;
 };
 
-/// A plane: its bytes first, its pixels once all sizes have been checked.
+/// A plane: its size first, its pixels once all sizes have been checked. Its bytes are read each time, so that those of
+/// one plane alone are there.
 struct Plane {
   std::string name, label;
-  std::vector<std::byte> bytes;
+  std::size_t bytes = 0;  ///< of the file
   detail::WebpSize size;
   RgbaImage image;
 
   Status read(const SogFiles& files, const std::string& file) {
     name = file;
     label = files.label(file);
-    auto content = files.read(file);
+    const auto content = files.read(file);
     if (!content) return content.status();
-    bytes = std::move(*content);
-    const auto found = detail::webp_size(bytes, label);
+    bytes = content->size();
+    const auto found = detail::webp_size(*content, label);
     if (!found) return found.status();
     size = *found;
     return {};
   }
-  Status decode() {
-    auto decoded = detail::decode_webp(bytes, label);
+  Status decode(const SogFiles& files) {
+    const auto content = files.read(name);
+    if (!content) return content.status();
+    auto decoded = detail::decode_webp(*content, label);
     if (!decoded) return decoded.status();
+    if (decoded->width != size.width || decoded->height != size.height) {
+      return {Errc::invalid_file, label + ": has changed while it was read"};
+    }
     image = std::move(*decoded);
-    bytes = {};
     return {};
   }
   std::string dimensions() const {
@@ -132,11 +148,16 @@ class SogReader {
       }
       total += r.count;
     }
-    if (Status s = read_planes(); !s) return s;
-    files_.close();
+    if (Status s = read_sizes(); !s) return s;
     const std::size_t count = static_cast<std::size_t>(total);
     std::vector<float> bands;
+    // The bands are most of the cloud: what they come of is gone before there is anything else.
     if (Status s = look_up_bands(*ranges, count, bands); !s) return s;
+    for (Plane* plane : {&low_, &high_, &scales_, &quats_, &sh0_}) {
+      if (Status s = plane->decode(files_); !s) return s;
+    }
+    files_.close();
+    give_back();
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
       RawGaussian raw;
       return for_rows(*ranges, first, last, [&](std::size_t row, std::size_t i) -> Status {
@@ -167,9 +188,12 @@ class SogReader {
     return {};
   }
 
-  /// The bands of all rows; their planes are gone then, before there is anything else of the cloud.
+  /// The bands of all rows.
   Status look_up_bands(const std::vector<detail::RowRange>& ranges, std::size_t count, std::vector<float>& bands) {
     if (meta_.degree == 0) return {};
+    for (Plane* plane : {&labels_, &centroids_}) {
+      if (Status s = plane->decode(files_); !s) return s;
+    }
     const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(meta_.degree) - 1);
     bands = huge_vector<float>(rest * count);
     const Status s = detail::for_pieces(
@@ -182,7 +206,8 @@ class SogReader {
     return s;
   }
 
-  Status read_planes() {
+  /// Sizes of all planes, which must fit one another, the count and the bytes there are.
+  Status read_sizes() {
     const std::pair<Plane*, const std::string*> wanted[] = {
         {&low_, &meta_.means_low}, {&high_, &meta_.means_high}, {&scales_, &meta_.scales},
         {&quats_, &meta_.quats},   {&sh0_, &meta_.sh0},         {&labels_, &meta_.labels}};
@@ -191,7 +216,7 @@ class SogReader {
     for (std::size_t k = 0; k < planes; ++k) {
       Plane& p = *wanted[k].first;
       if (Status s = p.read(files_, *wanted[k].second); !s) return s;
-      bytes += p.bytes.size();
+      bytes += p.bytes;
       if (p.size.width != low_.size.width || p.size.height != low_.size.height) {
         return {Errc::invalid_file, p.label + ": " + p.dimensions() + " pixels, but " + low_.name +
                                         " has " + low_.dimensions()};
@@ -207,13 +232,10 @@ class SogReader {
       return {Errc::invalid_file, where + " in planes of " + low_.dimensions() + " pixels, which " +
                                       std::to_string(bytes) + " bytes are too few for"};
     }
-    for (std::size_t k = 0; k < planes; ++k) {
-      if (Status s = wanted[k].first->decode(); !s) return s;
-    }
-    return meta_.degree > 0 ? read_palette() : Status();
+    return meta_.degree > 0 ? read_palette_size() : Status();
   }
 
-  Status read_palette() {
+  Status read_palette_size() {
     const std::size_t coefficients = static_cast<std::size_t>(sh_coefficient_count(meta_.degree) - 1);
     if (Status s = centroids_.read(files_, meta_.centroids); !s) return s;
     const std::size_t width = kEntriesPerRow * coefficients;
@@ -226,7 +248,7 @@ class SogReader {
                                       std::to_string(rows) + " for " + std::to_string(meta_.palette) +
                                       " entries of " + std::to_string(meta_.degree) + " bands"};
     }
-    return centroids_.decode();
+    return {};
   }
 
   Status look_up(const Plane& plane, std::size_t pixel, std::size_t channel, const Codebook& book,

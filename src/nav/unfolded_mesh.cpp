@@ -302,7 +302,7 @@ void UnfoldedMesh::unfold() {
 }
 
 void UnfoldedMesh::fan_out() {
-  // Polygons of a file may lie on one another, so that one edge is two others' twin: what is not so both ways is a wall.
+  // Polygons of a file may lie on one another, so that an edge is two others' twin: what is not both ways is a wall.
   std::vector<std::uint32_t> twins(edges.size());
   for (std::uint32_t e = 0; e < edges.size(); ++e) twins[e] = edges[e].twin;
   for (std::uint32_t e = 0; e < edges.size(); ++e) {

@@ -85,6 +85,7 @@ TEST_CASE("makehuman: what is wrong is named") {
   fails(&Files::obj, "g body", "g head", "no faces in the group 'body'");
   fails(&Files::skeleton, "\"base\"}", "\"chest\"}", "has the parent 'chest'");
   fails(&Files::skeleton, "\"parent\": null", "\"parent\": \"arm\"", "its own ancestor");
+  fails(&Files::skeleton, "\"arm\"", "\"\"", "a bone has no name");  // once its own child for ever, found by fuzzing
   fails(&Files::skeleton, "[5, 0]", "[6, 0]", "names vertex '6' of 6");
   fails(&Files::skeleton, "\"head\": \"a\"", "\"head\": \"q\"", "there is no joint");
   fails(&Files::skeleton, "{\"bones\"", "{\"bonez\"", "no 'bones'");
