@@ -18,7 +18,7 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     ProjectChunk<float>{args}(c);  // not worth lanes of its own
     return;
   }
-  const std::size_t begin = c * kProjectChunk;
+  const std::size_t begin = gs.chunk_id(c) * kProjectChunk;
   const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
   const std::size_t base = (args.first_chunk + c) * kProjectChunk;
   const std::size_t step = static_cast<std::size_t>(kWidth);
