@@ -68,6 +68,17 @@ struct GaussianView {
   /// backend, where that is the host's. Empty: all chunks.
   View<const std::uint32_t> drawn_chunks;
 
+  /// Highest SH degree that the Gaussians of a chunk use, one a chunk of all_chunks() (scene/scene_profile.hpp): bands
+  /// above it are not read. In host memory. Empty: sh_degree.
+  View<const std::uint8_t> chunk_sh_degrees;
+
+  /// Degree to which row i is evaluated where `degree` is asked for.
+  GSNAV_HD int degree_of(std::size_t i, int degree) const noexcept {
+    if (chunk_sh_degrees.empty()) return degree;
+    const int used = static_cast<int>(chunk_sh_degrees[i / kProjectChunk]);
+    return used < degree ? used : degree;
+  }
+
   /// Chunks that the rows make.
   GSNAV_HD std::size_t all_chunks() const noexcept { return (size + kProjectChunk - 1) / kProjectChunk; }
   /// Chunks that are drawn.

@@ -311,7 +311,7 @@ GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::siz
   }
   if (args.color) {
     args.colors[slot] =
-        gaussian_color<S>(gs, args.sh_degree, i, detail::camera_delta(args, mean, origin));
+        gaussian_color<S>(gs, gs.degree_of(i, args.sh_degree), i, detail::camera_delta(args, mean, origin));
   }
   return true;
 }

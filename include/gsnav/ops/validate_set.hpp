@@ -58,6 +58,10 @@ inline Status validate(const GaussianSet& set) {
     return bad("chunk_bounds has " + std::to_string(g.chunk_bounds.size) + " values where " +
                std::to_string(g.all_chunks()) + " are needed");
   }
+  if (!g.chunk_sh_degrees.empty() && g.chunk_sh_degrees.size != g.all_chunks()) {
+    return bad("chunk_sh_degrees has " + std::to_string(g.chunk_sh_degrees.size) + " values where " +
+               std::to_string(g.all_chunks()) + " are needed");
+  }
   if (g.drawn_chunks.size > g.all_chunks()) {
     return bad("drawn_chunks has " + std::to_string(g.drawn_chunks.size) + " chunks of " +
                std::to_string(g.all_chunks()));

@@ -45,7 +45,8 @@ inline LodGaussian lod_gaussian(const GaussianCloud& cloud, std::size_t i, doubl
   return g;
 }
 
-/// Puts Gaussians together, two at a time, the cheapest pair of neighbours first, until `target` are left.
+/// Puts Gaussians together, two at a time, the cheapest pair of neighbours first, until `target` are
+/// left.
 class GreedyMerge {
  public:
   explicit GreedyMerge(int neighbours) : k_(static_cast<std::size_t>(neighbours)) {}
@@ -87,7 +88,7 @@ class GreedyMerge {
  private:
   struct Pair {
     double cost;
-    std::uint32_t a, b;  ///< a < b
+    std::uint32_t a, b;                             ///< a < b
     bool operator<(const Pair& o) const noexcept {  // the queue's top is its greatest
       if (cost != o.cost) return cost > o.cost;
       return a != o.a ? a > o.a : b > o.b;
@@ -174,39 +175,47 @@ class GreedyMerge {
   std::priority_queue<Pair> queue_;
 };
 
+/// Gives a tree the size that it has for a cloud in spatial order: levels, nodes, rows; leaves with
+/// their bounds.
+inline void shape_lod(LodTree& out, const GaussianCloud& source, const LodSettings& settings) {
+  if (source.size() == 0) return;
+  GaussianCloud& m = out.merged;
+  m.sh_degree = std::min(settings.sh_degree, source.sh_degree);
+  m.filter = source.filter;
+  m.eps2d = source.eps2d;
+  m.sort_order = source.sort_order;
+  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(m.sh_degree) - 1);
+
+  std::size_t count = source.view().all_chunks(), total = 0;
+  for (bool last = false; !last; count = (count + 1) / 2) {
+    out.level_begin.push_back(static_cast<std::uint32_t>(total));
+    total += count;
+    last = count <= 1;
+  }
+  out.level_begin.push_back(static_cast<std::uint32_t>(total));
+  out.nodes.resize(total);
+  const std::size_t rows = (total - out.leaves()) * kProjectChunk;
+  for (auto& p : m.means) p.resize(rows);
+  for (auto& p : m.quats) p.resize(rows);
+  for (auto& p : m.scales) p.resize(rows);
+  m.opacities.resize(rows);
+  m.sh0.resize(3 * rows);
+  m.shN = huge_vector<float>(rest * rows);
+  m.origins = source.origins;
+  if (!source.origin_ids.empty()) m.origin_ids.resize(rows);
+  m.chunk_bounds.resize(total - out.leaves());
+  for (std::size_t c = 0; c < out.leaves(); ++c) out.nodes[c].reach = source.chunk_bounds[c];
+}
+
 /// Builds the nodes of a tree, one after the other or side by side.
 class LodBuilder {
  public:
   LodBuilder(const GaussianCloud& source, const LodSettings& settings, LodTree& out)
       : source_(source), settings_(settings), out_(out) {
-    GaussianCloud& m = out.merged;
-    m.sh_degree = std::min(settings.sh_degree, source.sh_degree);
-    m.filter = Filter::mip;
-    m.eps2d = source.eps2d;
-    m.sort_order = source.sort_order;
-    rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(m.sh_degree) - 1);
+    shape_lod(out, source, settings);
+    rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(out.merged.sh_degree) - 1);
     source_rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(source.sh_degree) - 1);
-
-    std::size_t count = source.view().all_chunks(), total = 0;
-    for (bool last = false; !last; count = (count + 1) / 2) {
-      out.level_begin.push_back(static_cast<std::uint32_t>(total));
-      total += count;
-      last = count <= 1;
-    }
-    out.level_begin.push_back(static_cast<std::uint32_t>(total));
-    out.nodes.resize(total);
-    const std::size_t rows = (total - out.leaves()) * kProjectChunk;
-    for (auto& p : m.means) p.resize(rows);
-    for (auto& p : m.quats) p.resize(rows);
-    for (auto& p : m.scales) p.resize(rows);
-    m.opacities.resize(rows);
-    m.sh0.resize(3 * rows);
-    m.shN = huge_vector<float>(rest_ * rows);
-    m.origins = source.origins;
-    if (!source.origin_ids.empty()) m.origin_ids.resize(rows);
-    m.chunk_bounds.resize(total - out.leaves());
-    spreads_.resize(rows);
-    for (std::size_t c = 0; c < out.leaves(); ++c) out.nodes[c].reach = source.chunk_bounds[c];
+    spreads_.resize(out.merged.size());
   }
 
   /// Fills node i of level l > 0; its children must be there.
@@ -268,9 +277,11 @@ class LodBuilder {
       const std::size_t to = merge.owner()[i];
       const Row& r = rows[i];
       double* const sums = sh.data() + to * (3 + rest_);
-      for (std::size_t k = 0; k < 3; ++k) sums[k] += r.mass * static_cast<double>(r.cloud->sh0[3 * r.row + k]);
+      for (std::size_t k = 0; k < 3; ++k)
+        sums[k] += r.mass * static_cast<double>(r.cloud->sh0[3 * r.row + k]);
       const std::size_t stride = r.cloud == &m ? rest_ : source_rest_;
-      for (std::size_t k = 0; k < rest_; ++k) sums[3 + k] += r.mass * sh_of(*r.cloud, stride * r.row + k);
+      for (std::size_t k = 0; k < rest_; ++k)
+        sums[3 + k] += r.mass * sh_of(*r.cloud, stride * r.row + k);
       mass[to] += r.mass;
       if (heaviest[to] == rows.size() || r.mass > rows[heaviest[to]].mass) heaviest[to] = i;
     }
@@ -279,14 +290,16 @@ class LodBuilder {
       const std::size_t row = first + g;
       const Row& like = rows[heaviest[g]];
       put(row, merge.left(g), like);
-      for (std::size_t k = 0; k < 3; ++k) m.sh0[3 * row + k] = static_cast<float>(sh[g * (3 + rest_) + k] / mass[g]);
+      for (std::size_t k = 0; k < 3; ++k)
+        m.sh0[3 * row + k] = static_cast<float>(sh[g * (3 + rest_) + k] / mass[g]);
       for (std::size_t k = 0; k < rest_; ++k) {
         m.shN[rest_ * row + k] = static_cast<float>(sh[g * (3 + rest_) + 3 + k] / mass[g]);
       }
       squares += merge.left(g).mass * merge.left(g).spread;
       total += merge.left(g).mass;
     }
-    for (std::size_t row = first + n; row < first + kProjectChunk; ++row) pad(row, n == 0 ? row : first + n - 1);
+    for (std::size_t row = first + n; row < first + kProjectChunk; ++row)
+      pad(row, n == 0 ? row : first + n - 1);
     if (total > 0) node.error = std::max(node.error, static_cast<float>(std::sqrt(squares / total)));
     ChunkBounds& own = m.chunk_bounds[chunk];
     Aabb<double> box;
@@ -349,22 +362,25 @@ class LodBuilder {
 
 }  // namespace detail
 
-/// Builds the tree of a cloud in spatial order (sort_spatially). The same bits on any backend in host memory, for any
-/// number of threads. About 15 s a million Gaussians and core.
-/// Errors: invalid_argument (no chunk bounds: the cloud is not sorted; a setting out of range).
+/// Builds the tree of a cloud in spatial order (sort_spatially). The same bits on any backend in host
+/// memory, for any number of threads. About 15 s a million Gaussians and core. Errors: invalid_argument
+/// (no chunk bounds: the cloud is not sorted; a setting out of range).
 template <Backend B>
-  requires is_host_backend<B>
-Result<LodTree> build_lod(B& backend, const GaussianCloud& cloud, const LodSettings& settings = {}) {
+requires is_host_backend<B> Result<LodTree> build_lod(B& backend, const GaussianCloud& cloud,
+                                                      const LodSettings& settings = {}) {
   if (cloud.chunk_bounds.size() != cloud.view().all_chunks()) {
-    return Status(Errc::invalid_argument, "build_lod: the cloud's rows are not in spatial order: sort_spatially first");
+    return Status(Errc::invalid_argument,
+                  "build_lod: the cloud's rows are not in spatial order: sort_spatially first");
   }
   if (settings.sh_degree < 0 || settings.sh_degree > kMaxShDegree) {
-    return Status(Errc::invalid_argument,
-                  "LodSettings.sh_degree = " + std::to_string(settings.sh_degree) + ": must be in [0, 3]");
+    return Status(
+        Errc::invalid_argument,
+        "LodSettings.sh_degree = " + std::to_string(settings.sh_degree) + ": must be in [0, 3]");
   }
   if (settings.neighbours < 1 || settings.neighbours > 16) {
-    return Status(Errc::invalid_argument,
-                  "LodSettings.neighbours = " + std::to_string(settings.neighbours) + ": must be in [1, 16]");
+    return Status(
+        Errc::invalid_argument,
+        "LodSettings.neighbours = " + std::to_string(settings.neighbours) + ": must be in [1, 16]");
   }
   LodTree tree;
   if (cloud.size() == 0) return tree;

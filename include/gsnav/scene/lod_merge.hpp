@@ -18,7 +18,8 @@ struct Sym3 {
 
   Mat3d matrix() const noexcept { return {{{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}}}; }
   double trace() const noexcept { return xx + yy + zz; }
-  /// Sum of the principal minors: of a covariance, the mean over directions of the projected one's determinant, times 3.
+  /// Sum of the principal minors: of a covariance, 3 times the mean over directions of its projection's
+  /// determinant.
   double minors() const noexcept {
     return (xx * yy - xy * xy) + (xx * zz - xz * xz) + (yy * zz - yz * yz);
   }
@@ -45,19 +46,20 @@ struct Sym3 {
 struct LodGaussian {
   Vec3d mean{};       ///< metres
   Sym3 covariance{};  ///< m^2
-  double mass = 0;    ///< opacity times area, m^2: what it takes from the light behind it, over its image
-  double spread = 0;  ///< mean squared distance of what was merged from this mean, by mass, m^2
-  Vec3d color{};      ///< SH of degree 0 as a colour, for the cost
-  Vec3d normal{};     ///< axis of the least extent, unit
+  double mass = 0;  ///< opacity times area, m^2: what it takes from the light behind it, over its image
+  double spread = 0;    ///< mean squared distance of what was merged from this mean, by mass, m^2
+  Vec3d color{};        ///< SH of degree 0 as a colour, for the cost
+  Vec3d normal{};       ///< axis of the least extent, unit
   double flatness = 0;  ///< 1 - least / middle standard deviation: how much `normal` says
 };
 
-/// Area that a Gaussian covers, averaged over directions: sqrt of the sum of the covariance's principal minors, m^2.
-/// For a disc s1 s2 (its face), for a ball sqrt(3) s^2; areas of one shape compare as their projections do.
+/// Area that a Gaussian covers, averaged over directions: sqrt of the sum of the covariance's principal
+/// minors, m^2. For a disc s1 s2 (its face), for a ball sqrt(3) s^2; areas of one shape compare as their
+/// projections do.
 inline double lod_area(const Sym3& c) noexcept { return std::sqrt(std::max(c.minors(), 0.0)); }
 
-/// The Gaussian of the same mass, mean and covariance as the two together, weighted by mass (moment matching): to
-/// second order in their distance it casts the same image through any pixel filter.
+/// The Gaussian of the same mass, mean and covariance as the two together, weighted by mass (moment
+/// matching): to second order in their distance it casts the same image through any pixel filter.
 inline LodGaussian moment_match(const LodGaussian& a, const LodGaussian& b) noexcept {
   LodGaussian m;
   m.mass = a.mass + b.mass;
@@ -78,31 +80,37 @@ inline LodGaussian moment_match(const LodGaussian& a, const LodGaussian& b) noex
   return m;
 }
 
-/// Integral over space of the product of two Gaussian densities (of integral 1), each blurred by variance / 2:
-/// the density of the difference of their means.
+/// Integral over space of the product of two Gaussian densities (of integral 1), each blurred by
+/// variance / 2: the density of the difference of their means.
 inline double density_product(const LodGaussian& a, const LodGaussian& b, double variance) noexcept {
   Sym3 s = a.covariance;
   s.add(b.covariance, 1);
   s.xx += variance;
   s.yy += variance;
   s.zz += variance;
-  const double cxx = s.yy * s.zz - s.yz * s.yz, cxy = s.xz * s.yz - s.xy * s.zz, cxz = s.xy * s.yz - s.xz * s.yy;
-  const double cyy = s.xx * s.zz - s.xz * s.xz, cyz = s.xy * s.xz - s.xx * s.yz, czz = s.xx * s.yy - s.xy * s.xy;
+  const double cxx = s.yy * s.zz - s.yz * s.yz, cxy = s.xz * s.yz - s.xy * s.zz,
+               cxz = s.xy * s.yz - s.xz * s.yy;
+  const double cyy = s.xx * s.zz - s.xz * s.xz, cyz = s.xy * s.xz - s.xx * s.yz,
+               czz = s.xx * s.yy - s.xy * s.xy;
   const double det = s.xx * cxx + s.xy * cxy + s.xz * cxz;
   if (!(det > 0)) return 0;
   const Vec3d d = a.mean - b.mean;
   const double q = (d.x * (cxx * d.x + 2 * (cxy * d.y + cxz * d.z)) + d.y * (cyy * d.y + 2 * cyz * d.z) +
-                    d.z * czz * d.z) / det;
+                    d.z * czz * d.z) /
+                   det;
   constexpr double kTwoPi = 6.283185307179586;
   return std::exp(-0.5 * q) / (kTwoPi * std::sqrt(kTwoPi * det));
 }
 
-/// What merging costs: the squared L2 distance, over space, of the light that two Gaussians give (colour and coverage,
-/// mass times density, blurred by `variance` m^2: half of it each) from what the merged one gives, closed form. More for faces
-/// that look different ways, so that clusters stay thin along the view.
+/// What merging costs: the squared L2 distance, over space, of the light that two Gaussians give (colour
+/// and coverage, mass times density, blurred by `variance` m^2: half of it each) from what the merged
+/// one gives, closed form. More for faces that look different ways, so that clusters stay thin along the
+/// view.
 inline double merge_cost(const LodGaussian& a, const LodGaussian& b, double variance) noexcept {
   const LodGaussian m = moment_match(a, b);
-  const auto light = [](const LodGaussian& g, const LodGaussian& h) { return dot(g.color, h.color) + 1; };
+  const auto light = [](const LodGaussian& g, const LodGaussian& h) {
+    return dot(g.color, h.color) + 1;
+  };
   const double aa = a.mass * a.mass * light(a, a) * density_product(a, a, variance);
   const double bb = b.mass * b.mass * light(b, b) * density_product(b, b, variance);
   const double mm = m.mass * m.mass * light(m, m) * density_product(m, m, variance);

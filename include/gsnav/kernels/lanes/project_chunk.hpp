@@ -70,7 +70,9 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     const F key = camera.sort_order == SortOrder::z_depth ? z : distance_key(camera.key_scale, mean, offset);
     written += write_splats(args, base, written, {i, mean, delta, key, axes, splat}, bits, survivors);
   }
-  if (args.color) color_survivors(gs, args.sh_degree, survivors, written, args.colors.data + base);
+  if (args.color) {
+    color_survivors(gs, gs.degree_of(begin, args.sh_degree), survivors, written, args.colors.data + base);
+  }
   args.counts[args.first_chunk + c] = written;
 }
 
