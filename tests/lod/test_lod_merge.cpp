@@ -150,3 +150,39 @@ TEST_CASE("lod merge: faces that look different ways cost more") {
   b.normal = {1, 0, 0};
   CHECK(merge_cost(a, b, 0.1) > along);
 }
+
+TEST_CASE("lod merge: two discs that cover one another let through what they do together") {
+  Rng rng(4);
+  for (int run = 0; run < 20; ++run) {
+    // In the plane z = 0, turned in it; alpha = opacity exp(-q / 2).
+    LodGaussian g[2];
+    double opacity[2], sx[2], sy[2], turn[2];
+    for (int k = 0; k < 2; ++k) {
+      opacity[k] = rng.uniform(0.1, 0.95);
+      sx[k] = rng.uniform(0.5, 1.5);
+      sy[k] = rng.uniform(0.5, 1.5);
+      turn[k] = rng.uniform(0, 3);
+      const Vec3d along{std::cos(turn[k]), std::sin(turn[k]), 0}, across{-along.y, along.x, 0};
+      g[k].mean = {rng.uniform(-1, 1), rng.uniform(-1, 1), 0.3 * k};
+      g[k].covariance.add_outer(along, sx[k] * sx[k]);
+      g[k].covariance.add_outer(across, sy[k] * sy[k]);
+      g[k].normal = {0, 0, 1};
+      g[k].mass = opacity[k] * sx[k] * sy[k];
+    }
+    double covered = 0;
+    const double step = 0.02;
+    for (double x = -9; x < 9; x += step) {
+      for (double y = -9; y < 9; y += step) {
+        double through = 1;
+        for (int k = 0; k < 2; ++k) {
+          const double dx = x - g[k].mean.x, dy = y - g[k].mean.y;
+          const double u = (std::cos(turn[k]) * dx + std::sin(turn[k]) * dy) / sx[k];
+          const double v = (-std::sin(turn[k]) * dx + std::cos(turn[k]) * dy) / sy[k];
+          through *= 1 - opacity[k] * std::exp(-0.5 * (u * u + v * v));
+        }
+        covered += (1 - through) * step * step;
+      }
+    }
+    CHECK(merged(g[0], g[1]).mass * 6.283185307179586 == doctest::Approx(covered).epsilon(1e-5));
+  }
+}

@@ -93,6 +93,7 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Scene& sce
   RenderConfig config;
   config.outputs = kRgb | kAlpha | depth.output;
   config.profile = o.profile == "exact" ? Profile::exact : Profile::fast;
+  if (scene.tree != nullptr) config = lod_config(config);
   config.max_alpha = o.max_alpha;
   config.first_hit_tau = depth.tau;
   config.sort_order = cloud.sort_order;

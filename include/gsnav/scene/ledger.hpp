@@ -31,6 +31,8 @@ struct FrameLedger {
   double sh_error = 0;           ///< that changes no colour by more
   std::uint64_t clamped = 0;     ///< Gaussians whose log-scale the reader limited to [-20, 20]
   double sh_storage_error = 0;   ///< largest change of a coefficient by compact storage
+  double alpha_min = 0;          ///< alphas below are not blended
+  double transmittance_min = 0;  ///< light that still comes through where a pixel ends
   double alpha_error = 0;        ///< relative, of the profile's exponential
 };
 
@@ -52,6 +54,8 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
     }
   }
   out.visible = stats.visible;
+  out.alpha_min = config.alpha_min;
+  out.transmittance_min = config.transmittance_min;
   // See Profile: what exp2 by a cubic, and by a quintic, is off by.
   out.alpha_error = config.profile == Profile::exact ? 4e-7 : 1.0e-4;
   if (report != nullptr) {
@@ -102,6 +106,8 @@ inline std::string ledger_text(const FrameLedger& l) {
   }
   if (l.clamped != 0) line("clamped: %llu log-scales to [-20, 20]", count(l.clamped));
   if (l.sh_storage_error > 0) line("quantised: SH coefficients, by %.2g at most", l.sh_storage_error);
+  line("cut: alphas below %.4f, a Gaussian and pixel; %.4f of the light behind a closed pixel",
+       l.alpha_min, l.transmittance_min);
   line("rounded: the exponential of each alpha, by %.1g relative", l.alpha_error);
   return out;
 }

@@ -148,7 +148,7 @@ class GreedyMerge {
   }
   void join(std::uint32_t a, std::uint32_t b) {
     const std::uint32_t id = static_cast<std::uint32_t>(items_.size());
-    items_.push_back(moment_match(items_[a], items_[b]));
+    items_.push_back(merged(items_[a], items_[b]));
     parent_.push_back(id);
     parent_[a] = parent_[b] = id;
     std::vector<std::uint32_t> around;

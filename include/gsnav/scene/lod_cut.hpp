@@ -9,18 +9,29 @@
 
 #include "gsnav/kernels/cull.hpp"
 #include "gsnav/kernels/projection_camera.hpp"
+#include "gsnav/ops/render_config.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 
 namespace gsnav {
 
 /// How LodCut chooses.
 struct LodChoice {
-  double pixels = 0.7;  ///< a node is fine enough where its error is at most so many pixels
+  double pixels = 1.0;  ///< a node is fine enough where its error is at most so many pixels
   double hysteresis =
       0.1;  ///< a node that is drawn stays until its error is beyond (1 + this) of that; one that is
             ///< refined, until it is below (1 - this): levels do not flicker where a camera rests
   int photo = 4;  ///< the images to come near to: at so many times the resolution, averaged (O_photo)
 };
+
+/// The rules of the profile `lod`: those of `fast`, a Gaussian ends where its alpha is below 1/64 and a
+/// pixel where less than 1/250 of the light comes through. Against O_photo either changes an image by
+/// less than merging does.
+inline RenderConfig lod_config(RenderConfig config) noexcept {
+  config.profile = Profile::fast;
+  config.alpha_min = std::max(config.alpha_min, 1.0 / 64);
+  config.transmittance_min = std::max(config.transmittance_min, 0.004);
+  return config;
+}
 
 /// What a cut draws, in Gaussians of the cloud where nothing else is said.
 struct LodStats {

@@ -80,6 +80,44 @@ inline LodGaussian moment_match(const LodGaussian& a, const LodGaussian& b) noex
   return m;
 }
 
+/// What two Gaussians take from the same light, in units of LodGaussian::mass: the integral over the
+/// plane across `n` (unit) of the product of their alphas, exp(-q / 2) with the opacities that their
+/// masses give, over 2 pi.
+inline double lod_overlap(const LodGaussian& a, const LodGaussian& b, const Vec3d& n) noexcept {
+  const Vec3d any = std::abs(n.x) < 0.6 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
+  Vec3d u = cross(n, any);
+  u = u * (1 / norm(u));
+  const Vec3d v = cross(n, u);
+  struct Flat {
+    double xx, xy, yy;
+    double det() const noexcept { return xx * yy - xy * xy; }
+  };
+  const auto across = [&u, &v](const Sym3& s) {
+    const Mat3d c = s.matrix();
+    return Flat{dot(u, c * u), dot(u, c * v), dot(v, c * v)};
+  };
+  const Flat fa = across(a.covariance), fb = across(b.covariance);
+  const Flat sum{fa.xx + fb.xx, fa.xy + fb.xy, fa.yy + fb.yy};
+  const double det = sum.det();
+  if (!(fa.det() > 0 && fb.det() > 0 && det > 0)) return 0;
+  const Vec3d d = a.mean - b.mean;
+  const double x = dot(u, d), y = dot(v, d);
+  const double q = (sum.yy * x * x - 2 * sum.xy * x * y + sum.xx * y * y) / det;
+  const auto opacity = [](const LodGaussian& g) {
+    return std::min(1.0, g.mass / std::max(lod_area(g.covariance), 1e-30));
+  };
+  return opacity(a) * opacity(b) * std::sqrt(fa.det() * fb.det() / det) * std::exp(-0.5 * q);
+}
+
+/// The Gaussian that stands for two: as moment_match, but it lets through what the two let through
+/// together, where they cover one another: the integral of 1 - (1 - alpha_a) (1 - alpha_b), not of
+/// alpha_a + alpha_b.
+inline LodGaussian merged(const LodGaussian& a, const LodGaussian& b) noexcept {
+  LodGaussian m = moment_match(a, b);
+  m.mass = std::max(m.mass - lod_overlap(a, b, m.normal), std::max(a.mass, b.mass));
+  return m;
+}
+
 /// Integral over space of the product of two Gaussian densities (of integral 1), each blurred by
 /// variance / 2: the density of the difference of their means.
 inline double density_product(const LodGaussian& a, const LodGaussian& b, double variance) noexcept {
