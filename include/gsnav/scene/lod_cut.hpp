@@ -23,9 +23,8 @@ struct LodChoice {
   int photo = 4;  ///< the images to come near to: at so many times the resolution, averaged (O_photo)
 };
 
-/// The rules of the profile `lod`: those of `fast`; a Gaussian ends where its alpha is below 1/128, a
-/// pixel where less than 1/500 of the light comes through. On the benchmark flat of 1M that costs 0.7 dB
-/// of 44 and saves a seventh of the time; 1/64 would be worse than direct rendering in some views.
+/// The rules of the profile `lod`: those of `fast`; a Gaussian ends where its alpha is below 1/128, a pixel where less
+/// than 1/500 of the light comes through.
 inline RenderConfig lod_config(RenderConfig config) noexcept {
   config.profile = Profile::fast;
   config.alpha_min = std::max(config.alpha_min, 1.0 / 128);
