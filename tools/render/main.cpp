@@ -10,7 +10,9 @@
 #include <filesystem>
 #include <iterator>
 #include <optional>
+#include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -21,10 +23,14 @@
 #endif
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/io/lod_file.hpp"
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/ledger.hpp"
+#include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/placed_meshes.hpp"
 #include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/scene_profile.hpp"
 
 namespace {
 
@@ -34,8 +40,15 @@ struct Options {
   std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median", composite = "merged", storage = "full";
   std::vector<std::string> meshes;
   int width = 0, height = 0, threads = 0;
-  double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0;
-  bool npy = false, png = false;
+  double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0, lod_pixels = LodChoice{}.pixels;
+  bool npy = false, png = false, ledger = false;
+};
+
+/// What is known of the cloud that is drawn.
+struct Scene {
+  const LoadReport& report;
+  const SceneProfile* profile;  ///< null: packed
+  const LodTree* tree;          ///< where the profile is lod
 };
 
 /// Which image --depth names; first hit may carry its tau.
@@ -76,18 +89,27 @@ std::vector<std::uint8_t> depth_picture(const std::vector<float>& metres, const 
 
 /// `Cloud`: GaussianCloud or PackedCloud.
 template <class S, class B, class Cloud>
-int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& cloud, SortOrder order,
+int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& cloud, const Scene& scene,
         const std::vector<PlacedMeshes>& meshes, const std::vector<Camera>& cameras) {
   RenderConfig config;
   config.outputs = kRgb | kAlpha | depth.output;
-  config.profile = o.profile == "fast" ? Profile::fast : Profile::exact;
+  config.profile = o.profile == "exact" ? Profile::exact : Profile::fast;
+  if (scene.tree != nullptr) config = lod_config(config);
   config.max_alpha = o.max_alpha;
   config.first_hit_tau = depth.tau;
-  config.sort_order = order;
+  config.sort_order = scene.report.sort_order;
   config.composite = o.composite == "merged" ? Composite::merged : Composite::hard_depth;
   Renderer<S, B> renderer(backend, config);
   const GaussianArrays<B> arrays(backend, cloud);
-  const std::vector<GaussianSet> sets{arrays.set()};
+  const bool profiled = is_host_backend<B> && scene.profile != nullptr;
+  const std::vector<GaussianSet> whole{profiled ? scene.profile->applied_to(arrays.set()) : arrays.set()};
+  std::span<const GaussianSet> sets = whole;
+  std::optional<LodCut> cut;
+  if constexpr (std::is_same_v<Cloud, GaussianCloud>) {
+    if (scene.tree != nullptr) cut.emplace(*scene.tree, cloud);
+  }
+  LodChoice choice;
+  choice.pixels = o.lod_pixels;
   std::vector<MeshArrays<B>> mesh_arrays;
   std::vector<MeshInstance> instances;
   std::size_t parts = 0;
@@ -110,11 +132,18 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     const auto start = std::chrono::steady_clock::now();
     headlight.direction = -cameras[c].viewmat.linear.row[2];
     renderer.set_meshes(instances, headlight);
+    if (cut) sets = cut->select(cameras[c], choice);
     if (const Status s = renderer.render(sets, std::span(&cameras[c], 1), f); !s) {
       std::fprintf(stderr, "gsnav-render: camera %zu: %s\n", c, s.message().c_str());
       return 1;
     }
-    total_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    const auto end = std::chrono::steady_clock::now();
+    total_ms += std::chrono::duration<double, std::milli>(end - start).count();
+    if (o.ledger) {
+      const FrameLedger l = frame_ledger(sets, cameras[c], config, f.stats[0], &scene.report,
+                                         profiled && !cut ? scene.profile : nullptr, cut ? &*cut : nullptr);
+      std::printf("camera %zu:\n%s", c, ledger_text(l).c_str());
+    }
     const std::vector<S>& z = depth.output == kMedianDepth        ? f.median_depth
                               : depth.output == kExpectedDepth    ? f.expected_depth
                               : depth.output == kAccumulatedDepth ? f.accumulated_depth
@@ -181,9 +210,13 @@ int main(int argc, char** argv) {
   app.add_option("--backend", o.backend, "serial (float32), serial64 (the float64 reference), openmp, cuda")
       ->check(CLI::IsMember({"serial", "serial64", "openmp", "cuda"}))
       ->capture_default_str();
-  app.add_option("--profile", o.profile, "exact, or fast (docs/accuracy.md)")
-      ->check(CLI::IsMember({"exact", "fast"}))
+  app.add_option("--profile", o.profile, "exact, fast (docs/accuracy.md), or lod: a level of detail for each part of the scene (docs/lod.md)")
+      ->check(CLI::IsMember({"exact", "fast", "lod"}))
       ->capture_default_str();
+  app.add_option("--lod-error", o.lod_pixels, "Of the profile lod: how far merged Gaussians may be off, pixels")
+      ->check(CLI::Range(0.01, 100.0))
+      ->capture_default_str();
+  app.add_flag("--ledger", o.ledger, "Print what each frame skipped, merged, limited and rounded, and by how much");
   app.add_option("--depth", o.depth, "median, expected, accumulated, first or first:TAU")
       ->capture_default_str();
   app.add_option("--max-alpha", o.max_alpha, "Largest alpha of one Gaussian at a pixel")
@@ -262,9 +295,32 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(o.out, error);
   if (error) return fail("--out " + o.out + ": " + error.message());
 
+  // What cannot be seen is not read; in exact, what is zero.
+  std::optional<SceneProfile> profile;
+  if (!packed) profile = profile_scene(full, o.profile == "exact" ? 0 : kUnseenColor);
+  std::optional<io::CachedLod> lod;
+  OpenMPBackend openmp(o.threads);
+  if (o.profile == "lod") {
+    if (o.backend == "cuda") return fail("--profile lod: not on the cuda backend; use openmp");
+    if (packed) return fail("--profile lod: not with --storage packed; use full or compact");
+    LodSettings settings;
+    const bool terminal = isatty(fileno(stdout)) != 0;
+    settings.progress = [terminal](double share) {
+      if (terminal) std::printf("\rbuilding levels of detail: %.0f %%", 100 * share);
+      if (terminal) std::fflush(stdout);
+    };
+    auto made = io::cached_lod(openmp, o.scene, full, settings);
+    if (!made) return fail(made.message());
+    lod = std::move(*made);
+    std::printf("%slevels of detail: %zu, %.1f MB, %s\n", terminal && lod->built ? "\r" : "", lod->tree.levels(),
+                static_cast<double>(lod->tree.bytes()) * 1e-6, lod->built ? "built" : "read");
+    if (!lod->warning.empty()) std::printf("%s\n", lod->warning.c_str());
+  }
+  const Scene drawn{report, profile ? &*profile : nullptr, lod ? &lod->tree : nullptr};
+
   const auto on = [&]<class S>(auto& backend) {
-    return packed ? run<S>(backend, o, *depth, *packed, report.sort_order, meshes, *cameras)
-                  : run<S>(backend, o, *depth, full, report.sort_order, meshes, *cameras);
+    return packed ? run<S>(backend, o, *depth, *packed, drawn, meshes, *cameras)
+                  : run<S>(backend, o, *depth, full, drawn, meshes, *cameras);
   };
   SerialBackend serial;
   if (o.backend == "serial") return on.operator()<float>(serial);
@@ -275,6 +331,5 @@ int main(int argc, char** argv) {
     return on.operator()<float>(cuda);
   }
 #endif
-  OpenMPBackend openmp(o.threads);
   return on.operator()<float>(openmp);
 }

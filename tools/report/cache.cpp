@@ -48,56 +48,6 @@ std::uint64_t checksum(const Reference& r) {
 
 }  // namespace
 
-void Hasher::word(std::uint64_t w) noexcept {
-  for (std::size_t k = 0; k < 2; ++k) {
-    std::uint64_t z = (state_[k] ^ w) + 0x9e3779b97f4a7c15ull * (k + 1);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    state_[k] = z ^ (z >> 31);
-  }
-}
-
-void Hasher::bytes(const void* data, std::size_t size) noexcept {
-  const char* p = static_cast<const char*>(data);
-  std::uint64_t w = 0;
-  for (; size >= 8; size -= 8, p += 8) {
-    std::memcpy(&w, p, 8);
-    word(w);
-  }
-  if (size != 0) {
-    w = 0;
-    std::memcpy(&w, p, size);
-    word(w ^ (static_cast<std::uint64_t>(size) << 56));
-  }
-}
-
-std::string Hasher::hex() const {
-  char text[40];
-  std::snprintf(text, sizeof text, "%016llx%016llx", static_cast<unsigned long long>(state_[0]),
-                static_cast<unsigned long long>(state_[1]));
-  return text;
-}
-
-std::string content_hash(const GaussianCloud& cloud) {
-  Hasher h;
-  for (const auto& v : cloud.means) h.array(v);
-  for (const auto& v : cloud.quats) h.array(v);
-  for (const auto& v : cloud.scales) h.array(v);
-  h.array(cloud.opacities);
-  h.array(cloud.sh0);
-  h.array(cloud.shN);
-  h.array(cloud.origin_ids);
-  h.array(cloud.row_ids);
-  for (const Vec3d& o : cloud.origins) {
-    for (int k = 0; k < 3; ++k) h.value(o[k]);
-  }
-  h.value(cloud.sh_degree);
-  h.value(cloud.filter);
-  h.value(cloud.eps2d);
-  h.value(cloud.sort_order);
-  return h.hex();
-}
-
 void hash_camera(Hasher& h, const Camera& c) {
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) h.value(c.viewmat.linear(i, j));

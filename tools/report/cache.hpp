@@ -14,40 +14,13 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/camera.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/content_hash.hpp"
 
 namespace gsnav_report {
 
-/// 128-bit content hash: two chains of SplitMix64's finaliser over 8-byte words. For telling contents
-/// apart, not against forgery.
-class Hasher {
- public:
-  void bytes(const void* data, std::size_t size) noexcept;
-  template <class T>
-  void value(const T& v) noexcept {
-    static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
-    bytes(&v, sizeof v);
-  }
-  template <class T>
-  void array(const std::vector<T>& v) noexcept {
-    value(v.size());
-    bytes(v.data(), v.size() * sizeof(T));
-  }
-  void text(const std::string& s) noexcept {
-    value(s.size());
-    bytes(s.data(), s.size());
-  }
-  /// 32 hexadecimal digits.
-  std::string hex() const;
-  std::uint64_t low() const noexcept { return state_[0]; }
+using gsnav::content_hash;
+using gsnav::Hasher;
 
- private:
-  void word(std::uint64_t w) noexcept;
-  std::array<std::uint64_t, 2> state_{0x243f6a8885a308d3ull, 0x13198a2e03707344ull};
-};
-
-/// All that an image depends on in a cloud.
-std::string content_hash(const gsnav::GaussianCloud& cloud);
 /// Adds all that an image depends on in a camera.
 void hash_camera(Hasher& hasher, const gsnav::Camera& camera);
 

@@ -13,7 +13,7 @@ namespace gsnav {
 /// The screen-space filter that an asset was trained with.
 enum class Filter : std::uint8_t {
   classic,  ///< eps2d is added to the 2D covariance, opacity stays (INRIA)
-  mip,      ///< ... and opacity is multiplied by sqrt(det0 / det) (Mip-Splatting, antialiased)
+  mip,      ///< ... and opacity is multiplied by sqrt(det0 / det) (Mip-Splatting, antialiased), det0 with base_eps2d
 };
 
 /// Number of SH coefficients per channel up to `degree`.
@@ -82,7 +82,27 @@ struct GaussianView {
   /// In place of quats, scales, opacities, sh0 and mostly means and shN, which are empty then. In host memory only.
   PackedRows packed;
 
-  GSNAV_HD std::size_t chunk_count() const noexcept { return (size + kProjectChunk - 1) / kProjectChunk; }
+  /// Which chunks are drawn, by number, each once: a cut of a level-of-detail tree (scene/lod_cut.hpp). In memory of the
+  /// backend, where that is the host's. Empty: all chunks.
+  View<const std::uint32_t> drawn_chunks;
+
+  /// Highest SH degree that the Gaussians of a chunk use, one a chunk of all_chunks() (scene/scene_profile.hpp): bands
+  /// above it are not read. In host memory. Empty: sh_degree.
+  View<const std::uint8_t> chunk_sh_degrees;
+
+  /// Degree to which row i is evaluated where `degree` is asked for.
+  GSNAV_HD int degree_of(std::size_t i, int degree) const noexcept {
+    if (chunk_sh_degrees.empty()) return degree;
+    const int used = static_cast<int>(chunk_sh_degrees[i / kProjectChunk]);
+    return used < degree ? used : degree;
+  }
+
+  /// Chunks that the rows make.
+  GSNAV_HD std::size_t all_chunks() const noexcept { return (size + kProjectChunk - 1) / kProjectChunk; }
+  /// Chunks that are drawn.
+  GSNAV_HD std::size_t chunk_count() const noexcept { return drawn_chunks.empty() ? all_chunks() : drawn_chunks.size; }
+  /// The chunk that is drawn as the c-th.
+  GSNAV_HD std::size_t chunk_id(std::size_t c) const noexcept { return drawn_chunks.empty() ? c : drawn_chunks[c]; }
 };
 
 /// One set of Gaussians in the world: a scene tile, an avatar, an object.
@@ -91,6 +111,8 @@ struct GaussianSet {
   Similarity world_from_asset{};
   Filter filter = Filter::classic;
   float eps2d = 0.3f;  ///< px^2 added to the diagonal of the 2D covariance
+  /// px^2 that the opacities count with already, in [0, eps2d]: the mip filter makes up for the rest. 0: Mip-Splatting's.
+  float base_eps2d = 0;
 };
 
 }  // namespace gsnav

@@ -50,7 +50,7 @@ struct ProjectArgs {
 template <class S>
 GSNAV_HD bool chunk_is_candidate(const ProjectArgs<S>& args, std::size_t c) noexcept {
   const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
-  return bounds.empty() || may_be_visible(args.camera64, bounds[c]);
+  return bounds.empty() || may_be_visible(args.camera64, bounds[args.gaussians.chunk_id(c)]);
 }
 
 namespace detail {
@@ -315,7 +315,7 @@ GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::siz
   }
   if (args.color) {
     args.colors[slot] =
-        gaussian_color<S>(gs, args.sh_degree, i, detail::camera_delta(args, mean, origin));
+        gaussian_color<S>(gs, gs.degree_of(i, args.sh_degree), i, detail::camera_delta(args, mean, origin));
   }
   return true;
 }
@@ -343,7 +343,7 @@ struct ProjectChunk {
   ProjectArgs<S> args;
 
   GSNAV_HD void operator()(std::size_t c) const noexcept {
-    const std::size_t begin = c * kProjectChunk, size = args.gaussians.size;
+    const std::size_t begin = args.gaussians.chunk_id(c) * kProjectChunk, size = args.gaussians.size;
     const std::size_t end = begin + kProjectChunk < size ? begin + kProjectChunk : size;
     const std::size_t base = (args.first_chunk + c) * kProjectChunk;
     const bool candidate = chunk_is_candidate(args, c);

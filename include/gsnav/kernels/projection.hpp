@@ -185,7 +185,11 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
   out.b = L(S(kWhitenScale)) * a_over_det;
   out.k = -(b0 / big_a) * out.b;
 
-  if (camera.mip) opacity = opacity * max(sqrt(det0 / det), L(camera.min_compensation));
+  if (camera.mip) {
+    const L base(camera.base_eps2d);
+    const L det_base = fma(base, (a0 + c0) + base, det0);
+    opacity = opacity * max(sqrt(det_base / det), L(camera.min_compensation));
+  }
   // The smallest normal number keeps log2 defined; such lanes fail s_max >= 0.
   out.log2_opacity = log2(max(opacity, L(S(1.2e-38))));
   out.s_max = out.log2_opacity - L(camera.log2_alpha_min);

@@ -73,6 +73,7 @@ struct ProjectionCamera {
   float near_plane = 0.2f;
   S near_sigma{0};
   S eps2d{S(0.3)};
+  S base_eps2d{0};          ///< GaussianSet::base_eps2d
   S log2_alpha_min{};       ///< the footprint is alpha >= 2^log2_alpha_min
   S min_compensation{0};    ///< of the mip filter
   bool mip = false;
@@ -109,6 +110,7 @@ ProjectionCamera<S> make_projection_camera(const Camera& camera, const GaussianS
   p.near_plane = habitat ? 0.2f : static_cast<float>(camera.near_plane);
   p.near_sigma = habitat ? S(0) : static_cast<S>(camera.near_sigma);
   p.eps2d = static_cast<S>(set.eps2d);
+  p.base_eps2d = static_cast<S>(set.base_eps2d);
   p.log2_alpha_min = static_cast<S>(std::log2(rules.alpha_min));
   p.min_compensation = habitat ? S(0.005) : S(0);
   p.mip = set.filter == Filter::mip || habitat;

@@ -26,9 +26,10 @@ inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const View<const fl
   const ProjectionCamera<double>& camera = args.camera64;
   const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
   if (bounds.empty() || camera.response != Response::ewa || camera.compat != Compat::none) return false;
-  const ChunkExtent e = chunk_extent(camera, bounds[c]);
-  const double k2 = 2 * kLn2 * (ChunkInView(camera, bounds[c]).s_max() + 1e-5);
-  const double reach = sqrt(max(k2, 0.0)) * static_cast<double>(bounds[c].scale_max) * camera.scale;
+  const ChunkBounds& chunk = bounds[args.gaussians.chunk_id(c)];
+  const ChunkExtent e = chunk_extent(camera, chunk);
+  const double k2 = 2 * kLn2 * (ChunkInView(camera, chunk).s_max() + 1e-5);
+  const double reach = sqrt(max(k2, 0.0)) * static_cast<double>(chunk.scale_max) * camera.scale;
   const double nearest = static_cast<double>(e.nearest) * (1 - 1e-6) - reach * (1 + 1e-5);
   const TileGrid& grid = args.grid;
   const auto tile = [&grid](double pixel, int tiles) {

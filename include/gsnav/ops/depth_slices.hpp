@@ -49,7 +49,8 @@ class DepthSlices {
       for (std::size_t c = 0; c < args.chunk_count(); ++c) {
         const Place& place = chunks_[args.first_chunk + c];
         if (!place.candidate()) continue;
-        const std::size_t n = std::min(kProjectChunk, args.gaussians.size - c * kProjectChunk);
+        const std::size_t first = args.gaussians.chunk_id(c) * kProjectChunk;
+        const std::size_t n = std::min(kProjectChunk, args.gaussians.size - first);
         weights_[place.bucket] += n;
         candidates_ += n;
       }
@@ -147,8 +148,9 @@ class DepthSlices {
     const std::uint16_t columns = cells(width), rows = cells(height);
     const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
     if (bounds.empty()) return {0, 0, 0, columns, rows};
-    if (!may_be_visible(args.camera64, bounds[c])) return {};
-    const ChunkExtent e = chunk_extent(args.camera64, bounds[c]);
+    const ChunkBounds& chunk = bounds[args.gaussians.chunk_id(c)];
+    if (!may_be_visible(args.camera64, chunk)) return {};
+    const ChunkExtent e = chunk_extent(args.camera64, chunk);
     // Of what is not finite nothing is known: it lies nearest, everywhere.
     const auto begin = [](double pixel, int size) {
       return static_cast<std::uint16_t>((pixel > 0 ? std::min(pixel, static_cast<double>(size)) : 0.0) / kSize);

@@ -82,15 +82,26 @@ inline Status validate(const GaussianSet& set) {
     return bad("row_ids has " + std::to_string(g.row_ids.size) + " values where " +
                std::to_string(g.size) + " are needed");
   }
-  if (!g.chunk_bounds.empty() && g.chunk_bounds.size != g.chunk_count()) {
+  if (!g.chunk_bounds.empty() && g.chunk_bounds.size != g.all_chunks()) {
     return bad("chunk_bounds has " + std::to_string(g.chunk_bounds.size) + " values where " +
-               std::to_string(g.chunk_count()) + " are needed");
+               std::to_string(g.all_chunks()) + " are needed");
+  }
+  if (!g.chunk_sh_degrees.empty() && g.chunk_sh_degrees.size != g.all_chunks()) {
+    return bad("chunk_sh_degrees has " + std::to_string(g.chunk_sh_degrees.size) + " values where " +
+               std::to_string(g.all_chunks()) + " are needed");
+  }
+  if (g.drawn_chunks.size > g.all_chunks()) {
+    return bad("drawn_chunks has " + std::to_string(g.drawn_chunks.size) + " chunks of " +
+               std::to_string(g.all_chunks()));
   }
   if (!g.origin_ids.empty() && (g.origin_ids.size != g.size || g.origins.empty())) {
     return bad("origin_ids needs one id per Gaussian and a table of origins");
   }
   if (!(set.eps2d > 0) || !is_finite(set.eps2d)) {
     return bad("eps2d = " + std::to_string(set.eps2d) + ": must be positive");
+  }
+  if (!(set.base_eps2d >= 0 && set.base_eps2d <= set.eps2d)) {
+    return bad("base_eps2d = " + std::to_string(set.base_eps2d) + ": must be in [0, eps2d]");
   }
   const Similarity& a = set.world_from_asset;
   if (!(a.scale > 0) || !is_finite(a.scale) || !is_finite(a.translation) ||

@@ -39,7 +39,7 @@ void permute_rows(std::vector<T>& values, const std::vector<std::uint32_t>& orde
 
 /// Bounds of each chunk of kProjectChunk consecutive rows.
 inline std::vector<ChunkBounds> chunk_bounds_of(const GaussianCloud& cloud) {
-  std::vector<ChunkBounds> out(cloud.view().chunk_count());
+  std::vector<ChunkBounds> out(cloud.view().all_chunks());
   for (std::size_t c = 0; c < out.size(); ++c) {
     Aabb<double> box;
     for (std::size_t i = c * kProjectChunk; i < std::min(cloud.size(), (c + 1) * kProjectChunk); ++i) {

@@ -19,7 +19,7 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     ProjectChunk<float>{args}(c);  // not worth lanes of its own
     return;
   }
-  const std::size_t begin = c * kProjectChunk;
+  const std::size_t begin = gs.chunk_id(c) * kProjectChunk;
   const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
   const std::size_t base = (args.first_chunk + c) * kProjectChunk;
   const std::size_t step = static_cast<std::size_t>(kWidth);
@@ -85,7 +85,9 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     const F key = camera.sort_order == SortOrder::z_depth ? z : distance_key(camera.key_scale, mean, offset);
     written += write_splats(args, base, written, {i, mean, delta, key, axes, splat}, bits, survivors);
   }
-  if (args.color) color_survivors(gs, args.sh_degree, survivors, written, args.colors.data + base);
+  if (args.color) {
+    color_survivors(gs, gs.degree_of(begin, args.sh_degree), survivors, written, args.colors.data + base);
+  }
   args.counts[args.first_chunk + c] = written;
 }
 

@@ -168,7 +168,7 @@ GSNAV_HD std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t 
   bits &= lane_bits((x0 < x1) && (y0 < y1)) | alone;
   if (!args.open.empty()) bits &= detail::reaching_open(args.open, x0, y0, x1, y1, bits) | alone;
   if (bits == 0) return 0;
-  if (args.color) prefetch_colors(gs, args.sh_degree, pack.first);
+  if (args.color) prefetch_colors(gs, gs.degree_of(pack.first, args.sh_degree), pack.first);
 
   detail::References refs;
   detail::find_references(args, pack, refs);

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav {
+
+/// 128-bit content hash: two chains of SplitMix64's finaliser over 8-byte words. For telling contents
+/// apart, not against forgery.
+class Hasher {
+ public:
+  void bytes(const void* data, std::size_t size) noexcept {
+    const char* p = static_cast<const char*>(data);
+    std::uint64_t w = 0;
+    for (; size >= 8; size -= 8, p += 8) {
+      std::memcpy(&w, p, 8);
+      word(w);
+    }
+    if (size != 0) {
+      w = 0;
+      std::memcpy(&w, p, size);
+      word(w ^ (static_cast<std::uint64_t>(size) << 56));
+    }
+  }
+  template <class T>
+  void value(const T& v) noexcept {
+    static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
+    bytes(&v, sizeof v);
+  }
+  template <class T>
+  void array(const std::vector<T>& v) noexcept {
+    value(v.size());
+    bytes(v.data(), v.size() * sizeof(T));
+  }
+  void text(const std::string& s) noexcept {
+    value(s.size());
+    bytes(s.data(), s.size());
+  }
+  /// 32 hexadecimal digits.
+  std::string hex() const {
+    char out[40];
+    std::snprintf(out, sizeof out, "%016llx%016llx", static_cast<unsigned long long>(state_[0]),
+                  static_cast<unsigned long long>(state_[1]));
+    return out;
+  }
+  std::uint64_t low() const noexcept { return state_[0]; }
+  const std::array<std::uint64_t, 2>& state() const noexcept { return state_; }
+
+ private:
+  void word(std::uint64_t w) noexcept {
+    for (std::size_t k = 0; k < 2; ++k) {
+      std::uint64_t z = (state_[k] ^ w) + 0x9e3779b97f4a7c15ull * (k + 1);
+      z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+      z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+      state_[k] = z ^ (z >> 31);
+    }
+  }
+  std::array<std::uint64_t, 2> state_{0x243f6a8885a308d3ull, 0x13198a2e03707344ull};
+};
+
+/// Adds all that an image depends on in a cloud.
+inline void hash_cloud(Hasher& h, const GaussianCloud& cloud) {
+  for (const auto& v : cloud.means) h.array(v);
+  for (const auto& v : cloud.quats) h.array(v);
+  for (const auto& v : cloud.scales) h.array(v);
+  h.array(cloud.opacities);
+  h.array(cloud.sh0);
+  h.array(cloud.shN);
+  if (!cloud.shN_half.empty()) h.array(cloud.shN_half);
+  h.array(cloud.origin_ids);
+  h.array(cloud.row_ids);
+  for (const Vec3d& o : cloud.origins) {
+    for (int k = 0; k < 3; ++k) h.value(o[k]);
+  }
+  h.value(cloud.sh_degree);
+  h.value(cloud.filter);
+  h.value(cloud.eps2d);
+  h.value(cloud.sort_order);
+}
+
+/// All that an image depends on in a cloud: 32 hexadecimal digits.
+inline std::string content_hash(const GaussianCloud& cloud) {
+  Hasher h;
+  hash_cloud(h, cloud);
+  return h.hex();
+}
+
+}  // namespace gsnav

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <span>
+#include <string>
+
+#include "gsnav/kernels/cull.hpp"
+#include "gsnav/kernels/projection_camera.hpp"
+#include "gsnav/ops/render_config.hpp"
+#include "gsnav/ops/render_workspace.hpp"
+#include "gsnav/scene/load_report.hpp"
+#include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/scene_profile.hpp"
+
+namespace gsnav {
+
+/// What a frame left out, put together, limited or rounded, how many, and the bound of each; made when
+/// asked for.
+struct FrameLedger {
+  // Skipped without any change of the image.
+  std::uint64_t gaussians = 0;    ///< in all sets
+  std::uint64_t touched = 0;      ///< in chunks that may be in view and are drawn
+  std::uint64_t visible = 0;      ///< RenderStats::visible
+  std::uint64_t transparent = 0;  ///< left out when the scene was read: below 1/255 everywhere
+  // Changed.
+  LodStats lod;                  ///< zeros where no level of detail was asked for
+  std::uint64_t sh_skipped = 0;  ///< SH coefficients in bands that are not read
+  double sh_error = 0;           ///< that changes no colour by more
+  std::uint64_t clamped = 0;     ///< Gaussians whose log-scale the reader limited to [-20, 20]
+  double sh_storage_error = 0;   ///< largest change of a coefficient by compact storage
+  double alpha_min = 0;          ///< alphas below are not blended
+  double transmittance_min = 0;  ///< light that still comes through where a pixel ends
+  double alpha_error = 0;        ///< relative, of the profile's exponential
+};
+
+/// Fills a ledger for a frame of `sets` from `camera`, whose counts are `stats`.
+/// `report`, `profile`, `lod`: where there are any.
+inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera& camera,
+                                const RenderConfig& config, const RenderStats& stats,
+                                const LoadReport* report = nullptr,
+                                const SceneProfile* profile = nullptr, const LodCut* lod = nullptr) {
+  FrameLedger out;
+  for (const GaussianSet& set : sets) {
+    const GaussianView& g = set.gaussians;
+    out.gaussians += g.size;
+    const auto p = make_projection_camera<double>(camera, set, projection_rules(config));
+    for (std::size_t c = 0; c < g.chunk_count(); ++c) {
+      const std::size_t first = g.chunk_id(c) * kProjectChunk;
+      if (!g.chunk_bounds.empty() && !may_be_visible(p, g.chunk_bounds[g.chunk_id(c)])) continue;
+      out.touched += std::min(kProjectChunk, g.size - first);
+    }
+  }
+  out.visible = stats.visible;
+  out.alpha_min = config.alpha_min;
+  out.transmittance_min = config.transmittance_min;
+  // See Profile: what exp2 by a cubic, and by a quintic, is off by.
+  out.alpha_error = config.profile == Profile::exact ? 4e-7 : 1.0e-4;
+  if (report != nullptr) {
+    out.transparent = report->dropped_transparent;
+    out.clamped = report->clamped_scales;
+    out.sh_storage_error = report->sh_storage_error;
+  }
+  if (profile != nullptr) {
+    out.sh_skipped = profile->sh_numbers - profile->sh_numbers_read;
+    out.sh_error = profile->color_error;
+  }
+  if (lod != nullptr) out.lod = lod->stats();
+  return out;
+}
+
+/// The ledger as text for people, one thing a line, each ended.
+inline std::string ledger_text(const FrameLedger& l) {
+  std::string out;
+  const auto line = [&out](const char* format, auto... values) {
+    char text[200];
+    std::snprintf(text, sizeof text, format, values...);
+    out += text;
+    out += '\n';
+  };
+  const auto count = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
+  const auto share = [](std::uint64_t a, std::uint64_t b) {
+    return b == 0 ? 0.0 : 100.0 * static_cast<double>(a) / static_cast<double>(b);
+  };
+  const std::uint64_t removed = l.gaussians - l.touched,
+                      removable = l.gaussians - std::min(l.visible, l.gaussians);
+  line(
+      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% "
+      "of what could be); "
+      "%llu touched, %llu drawn",
+      count(removed), count(l.gaussians), share(removed, l.gaussians), share(removed, removable),
+      count(l.touched), count(l.visible));
+  if (l.transparent != 0)
+    line("skipped, same bits: %llu Gaussians below 1/255 everywhere", count(l.transparent));
+  if (l.sh_skipped != 0) {
+    line("skipped: %llu SH coefficients; no colour changes by more than %.2g", count(l.sh_skipped),
+         l.sh_error);
+  }
+  if (l.lod.shown != 0) {
+    line(
+        "merged: %llu of %llu Gaussians in view, drawn as %llu in all; off by %.2f px root mean square "
+        "at most",
+        count(l.lod.merged), count(l.lod.shown), count(l.lod.drawn), l.lod.error_px);
+  }
+  if (l.clamped != 0) line("clamped: %llu log-scales to [-20, 20]", count(l.clamped));
+  if (l.sh_storage_error > 0) line("quantised: SH coefficients, by %.2g at most", l.sh_storage_error);
+  line("cut: alphas below %.4f, a Gaussian and pixel; %.4f of the light behind a closed pixel",
+       l.alpha_min, l.transmittance_min);
+  line("rounded: the exponential of each alpha, by %.1g relative", l.alpha_error);
+  return out;
+}
+
+}  // namespace gsnav

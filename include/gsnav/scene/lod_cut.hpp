@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "gsnav/kernels/cull.hpp"
+#include "gsnav/kernels/projection_camera.hpp"
+#include "gsnav/ops/render_config.hpp"
+#include "gsnav/scene/lod_tree.hpp"
+
+namespace gsnav {
+
+/// How LodCut chooses.
+struct LodChoice {
+  double pixels = 1.0;  ///< a node is fine enough where its error is at most so many pixels
+  double hysteresis =
+      0.1;  ///< a node that is drawn stays until its error is beyond (1 + this) of that; one that is
+            ///< refined, until it is below (1 - this): levels do not flicker where a camera rests
+  int photo = 4;  ///< the images to come near to: at so many times the resolution, averaged (O_photo)
+};
+
+/// The rules of the profile `lod`: those of `fast`; a Gaussian ends where its alpha is below 1/128, a pixel where less
+/// than 1/500 of the light comes through.
+inline RenderConfig lod_config(RenderConfig config) noexcept {
+  config.profile = Profile::fast;
+  config.alpha_min = std::max(config.alpha_min, 1.0 / 128);
+  config.transmittance_min = std::max(config.transmittance_min, 0.002);
+  return config;
+}
+
+/// What a cut draws, in Gaussians of the cloud where nothing else is said.
+struct LodStats {
+  std::uint64_t shown = 0;   ///< in chunks that may be in view
+  std::uint64_t merged = 0;  ///< of these, those that merged ones stand for
+  std::uint64_t drawn = 0;   ///< rows drawn for them, merged ones and others
+  double error_px = 0;       ///< the largest error of a node that is drawn (LodNode::error), pixels
+};
+
+/// A cut through a level-of-detail tree, for one sensor: which chunks are drawn. It remembers what it
+/// chose, for hysteresis, and else depends on the camera only: the same calls give the same cuts.
+class LodCut {
+ public:
+  /// The tree, and the cloud that it was built of, must stay.
+  LodCut(const LodTree& tree, const GaussianCloud& cloud)
+      : tree_(&tree), cloud_(&cloud), refined_(tree.nodes.size()) {}
+
+  /// Chooses for a camera; the cloud stands in the world by `world_from_asset`. What to draw then:
+  /// chunks of the cloud, and merged ones, as the pixels of O_photo(choice.photo) see them. Valid until
+  /// the next call.
+  std::span<const GaussianSet> select(const Camera& camera, const LodChoice& choice = {},
+                                      const Similarity& world_from_asset = {}) {
+    leaf_chunks_.clear();
+    merged_chunks_.clear();
+    sets_.clear();
+    stats_ = {};
+    if (tree_->nodes.empty()) return {};
+    const GaussianSet whole = photo_set(*cloud_, choice, world_from_asset);
+    const auto p = make_projection_camera<double>(camera, whole);
+    const double per_metre = std::max(p.fx, p.fy) / choice.pixels;
+    visit(tree_->levels() - 1, tree_->nodes.size() - 1, p, per_metre, choice);
+    add(*cloud_, leaf_chunks_, choice, world_from_asset);
+    add(tree_->merged, merged_chunks_, choice, world_from_asset);
+    return sets_;
+  }
+  /// Forgets what was chosen before.
+  void reset() { std::fill(refined_.begin(), refined_.end(), std::uint8_t{0}); }
+
+  /// What the last select() chose.
+  const LodStats& stats() const noexcept { return stats_; }
+  const std::vector<std::uint32_t>& leaf_chunks() const noexcept { return leaf_chunks_; }
+  const std::vector<std::uint32_t>& merged_chunks() const noexcept { return merged_chunks_; }
+
+  /// A cloud as the pixels of O_photo(k) see it: averaged over k x k samples, each blurred as the
+  /// cloud's filter says; opacities make up for what a pixel blurs more than a sample.
+  static GaussianSet photo_set(const GaussianCloud& cloud, const LodChoice& choice,
+                               const Similarity& world_from_asset = {}) {
+    GaussianSet s = cloud.set(world_from_asset);
+    const double k2 = static_cast<double>(choice.photo) * choice.photo;
+    const double sample = static_cast<double>(cloud.eps2d) / k2;
+    // k points side by side over a pixel have the variance (1 - 1 / k^2) / 12.
+    s.eps2d = static_cast<float>(sample + (1 - 1 / k2) / 12);
+    s.base_eps2d = cloud.filter == Filter::mip ? 0.0f : static_cast<float>(sample);
+    s.filter = Filter::mip;
+    return s;
+  }
+
+ private:
+  void add(const GaussianCloud& cloud, const std::vector<std::uint32_t>& chunks, const LodChoice& choice,
+           const Similarity& world_from_asset) {
+    if (chunks.empty()) return;
+    sets_.push_back(photo_set(cloud, choice, world_from_asset));
+    sets_.back().gaussians.drawn_chunks = {chunks.data(), chunks.size()};
+  }
+  void visit(std::size_t level, std::size_t node, const ProjectionCamera<double>& camera,
+             double per_metre, const LodChoice& choice) {
+    const LodNode& n = tree_->nodes[node];
+    if (!may_be_visible(camera, n.reach)) return;
+    const double error =
+        static_cast<double>(n.error) * per_metre / detail::ChunkInView(camera, n.reach).z_min();
+    bool refine = level > 0;
+    if (refine) {
+      refine = error > (refined_[node] != 0 ? 1 - choice.hysteresis : 1 + choice.hysteresis);
+      refined_[node] = refine ? 1 : 0;
+    }
+    if (!refine) {
+      draw(level, node);
+      stats_.error_px = std::max(stats_.error_px, error * choice.pixels);
+      return;
+    }
+    const std::size_t i = node - tree_->level_begin[level];
+    const std::size_t first = tree_->level_begin[level - 1] + 2 * i;
+    visit(level - 1, first, camera, per_metre, choice);
+    if (first + 1 < tree_->level_begin[level]) visit(level - 1, first + 1, camera, per_metre, choice);
+  }
+
+  void draw(std::size_t level, std::size_t node) {
+    const std::uint64_t first = (node - tree_->level_begin[level]) << level;
+    const std::uint64_t end =
+        std::min<std::uint64_t>(first + (std::uint64_t{1} << level), tree_->leaves());
+    const std::uint64_t shown =
+        std::min<std::uint64_t>(end * kProjectChunk, cloud_->size()) - first * kProjectChunk;
+    stats_.shown += shown;
+    if (level == 0) {
+      leaf_chunks_.push_back(static_cast<std::uint32_t>(node));
+      stats_.drawn += shown;
+      return;
+    }
+    merged_chunks_.push_back(static_cast<std::uint32_t>(node - tree_->leaves()));
+    stats_.merged += shown;
+    stats_.drawn += kProjectChunk;
+  }
+
+  const LodTree* tree_;
+  const GaussianCloud* cloud_;
+  std::vector<std::uint8_t> refined_;
+  std::vector<std::uint32_t> leaf_chunks_, merged_chunks_;
+  std::vector<GaussianSet> sets_;
+  LodStats stats_;
+};
+
+}  // namespace gsnav

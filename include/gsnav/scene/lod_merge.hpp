@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gsnav/math/mat.hpp"
+#include "gsnav/math/vec.hpp"
+
+namespace gsnav {
+
+/// Symmetric 3x3 matrix, in double.
+struct Sym3 {
+  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
+
+  Mat3d matrix() const noexcept { return {{{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}}}; }
+  double trace() const noexcept { return xx + yy + zz; }
+  /// Sum of the principal minors: of a covariance, 3 times the mean over directions of its projection's
+  /// determinant.
+  double minors() const noexcept {
+    return (xx * yy - xy * xy) + (xx * zz - xz * xz) + (yy * zz - yz * yz);
+  }
+  void add(const Sym3& o, double w) noexcept {
+    xx += w * o.xx;
+    xy += w * o.xy;
+    xz += w * o.xz;
+    yy += w * o.yy;
+    yz += w * o.yz;
+    zz += w * o.zz;
+  }
+  /// + w d d^T
+  void add_outer(const Vec3d& d, double w) noexcept {
+    xx += w * d.x * d.x;
+    xy += w * d.x * d.y;
+    xz += w * d.x * d.z;
+    yy += w * d.y * d.y;
+    yz += w * d.y * d.z;
+    zz += w * d.z * d.z;
+  }
+};
+
+/// A Gaussian while clusters are made, in double.
+struct LodGaussian {
+  Vec3d mean{};       ///< metres
+  Sym3 covariance{};  ///< m^2
+  double mass = 0;  ///< opacity times area, m^2: what it takes from the light behind it, over its image
+  double spread = 0;    ///< mean squared distance of what was merged from this mean, by mass, m^2
+  Vec3d color{};        ///< SH of degree 0 as a colour, for the cost
+  Vec3d normal{};       ///< axis of the least extent, unit
+  double flatness = 0;  ///< 1 - least / middle standard deviation: how much `normal` says
+};
+
+/// Area that a Gaussian covers, averaged over directions: sqrt of the sum of the covariance's principal
+/// minors, m^2. For a disc s1 s2 (its face), for a ball sqrt(3) s^2; areas of one shape compare as their
+/// projections do.
+inline double lod_area(const Sym3& c) noexcept { return std::sqrt(std::max(c.minors(), 0.0)); }
+
+/// The Gaussian of the same mass, mean and covariance as the two together, weighted by mass (moment
+/// matching): to second order in their distance it casts the same image through any pixel filter.
+inline LodGaussian moment_match(const LodGaussian& a, const LodGaussian& b) noexcept {
+  LodGaussian m;
+  m.mass = a.mass + b.mass;
+  const double wa = m.mass > 0 ? a.mass / m.mass : 0.5, wb = 1 - wa;
+  m.mean = a.mean * wa + b.mean * wb;
+  const Vec3d da = a.mean - m.mean, db = b.mean - m.mean;
+  m.covariance.add(a.covariance, wa);
+  m.covariance.add(b.covariance, wb);
+  m.covariance.add_outer(da, wa);
+  m.covariance.add_outer(db, wb);
+  m.spread = wa * (a.spread + dot(da, da)) + wb * (b.spread + dot(db, db));
+  m.color = a.color * wa + b.color * wb;
+  const double turned = dot(a.normal, b.normal) < 0 ? -1 : 1;
+  m.normal = a.normal * wa + b.normal * (wb * turned);
+  const double length = norm(m.normal);
+  m.normal = length > 0 ? m.normal * (1 / length) : a.normal;
+  m.flatness = (wa * a.flatness + wb * b.flatness) * length;
+  return m;
+}
+
+/// What two Gaussians take from the same light, in units of LodGaussian::mass: the integral over the
+/// plane across `n` (unit) of the product of their alphas, exp(-q / 2) with the opacities that their
+/// masses give, over 2 pi.
+inline double lod_overlap(const LodGaussian& a, const LodGaussian& b, const Vec3d& n) noexcept {
+  const Vec3d any = std::abs(n.x) < 0.6 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
+  Vec3d u = cross(n, any);
+  u = u * (1 / norm(u));
+  const Vec3d v = cross(n, u);
+  struct Flat {
+    double xx, xy, yy;
+    double det() const noexcept { return xx * yy - xy * xy; }
+  };
+  const auto across = [&u, &v](const Sym3& s) {
+    const Mat3d c = s.matrix();
+    return Flat{dot(u, c * u), dot(u, c * v), dot(v, c * v)};
+  };
+  const Flat fa = across(a.covariance), fb = across(b.covariance);
+  const Flat sum{fa.xx + fb.xx, fa.xy + fb.xy, fa.yy + fb.yy};
+  const double det = sum.det();
+  if (!(fa.det() > 0 && fb.det() > 0 && det > 0)) return 0;
+  const Vec3d d = a.mean - b.mean;
+  const double x = dot(u, d), y = dot(v, d);
+  const double q = (sum.yy * x * x - 2 * sum.xy * x * y + sum.xx * y * y) / det;
+  const auto opacity = [](const LodGaussian& g) {
+    return std::min(1.0, g.mass / std::max(lod_area(g.covariance), 1e-30));
+  };
+  return opacity(a) * opacity(b) * std::sqrt(fa.det() * fb.det() / det) * std::exp(-0.5 * q);
+}
+
+/// The Gaussian that stands for two: as moment_match, but it lets through what the two let through
+/// together, where they cover one another: the integral of 1 - (1 - alpha_a) (1 - alpha_b), not of
+/// alpha_a + alpha_b.
+inline LodGaussian merged(const LodGaussian& a, const LodGaussian& b) noexcept {
+  LodGaussian m = moment_match(a, b);
+  m.mass = std::max(m.mass - lod_overlap(a, b, m.normal), std::max(a.mass, b.mass));
+  return m;
+}
+
+/// Integral over space of the product of two Gaussian densities (of integral 1), each blurred by
+/// variance / 2: the density of the difference of their means.
+inline double density_product(const LodGaussian& a, const LodGaussian& b, double variance) noexcept {
+  Sym3 s = a.covariance;
+  s.add(b.covariance, 1);
+  s.xx += variance;
+  s.yy += variance;
+  s.zz += variance;
+  const double cxx = s.yy * s.zz - s.yz * s.yz, cxy = s.xz * s.yz - s.xy * s.zz,
+               cxz = s.xy * s.yz - s.xz * s.yy;
+  const double cyy = s.xx * s.zz - s.xz * s.xz, cyz = s.xy * s.xz - s.xx * s.yz,
+               czz = s.xx * s.yy - s.xy * s.xy;
+  const double det = s.xx * cxx + s.xy * cxy + s.xz * cxz;
+  if (!(det > 0)) return 0;
+  const Vec3d d = a.mean - b.mean;
+  const double q = (d.x * (cxx * d.x + 2 * (cxy * d.y + cxz * d.z)) + d.y * (cyy * d.y + 2 * cyz * d.z) +
+                    d.z * czz * d.z) /
+                   det;
+  constexpr double kTwoPi = 6.283185307179586;
+  return std::exp(-0.5 * q) / (kTwoPi * std::sqrt(kTwoPi * det));
+}
+
+/// What merging costs: the squared L2 distance, over space, of the light that two Gaussians give (colour
+/// and coverage, mass times density, blurred by `variance` m^2: half of it each) from what the merged
+/// one gives, closed form. More for faces that look different ways, so that clusters stay thin along the
+/// view.
+inline double merge_cost(const LodGaussian& a, const LodGaussian& b, double variance) noexcept {
+  const LodGaussian m = moment_match(a, b);
+  const auto light = [](const LodGaussian& g, const LodGaussian& h) {
+    return dot(g.color, h.color) + 1;
+  };
+  const double aa = a.mass * a.mass * light(a, a) * density_product(a, a, variance);
+  const double bb = b.mass * b.mass * light(b, b) * density_product(b, b, variance);
+  const double mm = m.mass * m.mass * light(m, m) * density_product(m, m, variance);
+  const double ab = a.mass * b.mass * light(a, b) * density_product(a, b, variance);
+  const double am = a.mass * m.mass * light(a, m) * density_product(a, m, variance);
+  const double bm = b.mass * m.mass * light(b, m) * density_product(b, m, variance);
+  const double cost = std::max(aa + bb + mm + 2 * (ab - am - bm), 0.0);
+  const double turn = 1 - std::abs(dot(a.normal, b.normal));
+  return cost + turn * std::min(a.flatness, b.flatness) * std::min(aa, bb);
+}
+
+}  // namespace gsnav

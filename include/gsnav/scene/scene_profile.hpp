@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <vector>
+
+#include "gsnav/math/half.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+
+namespace gsnav {
+
+/// What of a cloud a frame has to read: measured once, when it is loaded (docs/lod.md).
+struct SceneProfile {
+  std::vector<std::uint8_t> chunk_sh_degrees;  ///< what GaussianView::chunk_sh_degrees takes, [chunks]
+  std::uint64_t sh_numbers = 0;  ///< SH coefficients above degree 0, of all channels, that there are
+  std::uint64_t sh_numbers_read = 0;  ///< of these, in the bands that are kept
+  double color_error = 0;             ///< no colour changes by more; 0 where only zeros are left out
+
+  /// The set without the bands that were found to say nothing. The profile must outlive it.
+  GaussianSet applied_to(GaussianSet set) const noexcept {
+    set.gaussians.chunk_sh_degrees = {chunk_sh_degrees.data(), chunk_sh_degrees.size()};
+    return set;
+  }
+};
+
+/// What `fast` and `lod` may leave out of a colour: a quarter of a step of 8 bits.
+inline constexpr double kUnseenColor = 1.0 / 1020;
+
+/// Finds, for each chunk, the SH bands that matter: those above a degree are left out where, for every
+/// Gaussian and channel of the chunk, they change the colour by at most `unseen`, seen from anywhere. By
+/// the addition theorem a band l of coefficients c is at most |c| sqrt((2 l + 1) / (4 pi)). `unseen` = 0
+/// leaves out zeros alone: the same bits.
+inline SceneProfile profile_scene(const GaussianCloud& cloud, double unseen = 0) {
+  SceneProfile out;
+  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
+  out.chunk_sh_degrees.assign(cloud.view().all_chunks(), static_cast<std::uint8_t>(cloud.sh_degree));
+  const auto number = [&](std::size_t at) {
+    return static_cast<double>(cloud.shN_half.empty() ? cloud.shN[at]
+                                                      : half_to_float(cloud.shN_half[at]));
+  };
+  for (std::size_t c = 0; c < out.chunk_sh_degrees.size(); ++c) {
+    const std::size_t first = c * kProjectChunk, end = std::min(cloud.size(), first + kProjectChunk);
+    double left_out[kMaxShDegree + 1] = {};  // largest error where bands above a degree are
+    for (std::size_t i = first; i < end; ++i) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        double error = 0;
+        for (int l = cloud.sh_degree; l > 0; --l) {
+          double squares = 0;
+          for (int k = sh_coefficient_count(l - 1); k < sh_coefficient_count(l); ++k) {
+            const double v = number(rest * i + 3 * static_cast<std::size_t>(k - 1) + channel);
+            squares += v * v;
+          }
+          error += std::sqrt(squares * (2 * l + 1) / (4 * std::numbers::pi));
+          left_out[l - 1] = std::max(left_out[l - 1], error);
+        }
+      }
+    }
+    int degree = cloud.sh_degree;
+    while (degree > 0 && left_out[degree - 1] <= unseen) --degree;
+    out.chunk_sh_degrees[c] = static_cast<std::uint8_t>(degree);
+    out.color_error = std::max(out.color_error, left_out[degree]);
+    out.sh_numbers += rest * (end - first);
+    out.sh_numbers_read +=
+        3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1) * (end - first);
+  }
+  return out;
+}
+
+}  // namespace gsnav

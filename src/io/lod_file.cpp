@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/io/lod_file.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "file.hpp"
+#include "gsnav/scene/content_hash.hpp"
+
+namespace gsnav::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'L', 'O', 'D'};
+/// Grows with every change of what build_lod makes of a cloud.
+constexpr std::uint32_t kVersion = 1;
+
+/// What stands at the front; the arrays of for_each_array follow.
+struct Header {
+  char magic[8];
+  std::uint32_t version, size;
+  std::uint64_t built_of[2];  ///< hash of cloud, settings and version
+  std::uint64_t checksum;     ///< of the arrays
+};
+static_assert(sizeof(Header) == 40);
+
+/// A node without the padding that a struct has.
+struct Node {
+  double low[3], high[3];
+  float error, scale_max, opacity_max, unused;
+};
+static_assert(sizeof(Node) == 64);
+
+Hasher built_of(const GaussianCloud& cloud, const LodSettings& settings) {
+  Hasher h;
+  h.value(kVersion);
+  h.value(settings.sh_degree);
+  h.value(settings.neighbours);
+  hash_cloud(h, cloud);
+  return h;
+}
+
+/// The arrays of a tree that a file has, in its order.
+template <class Tree, class F>
+void for_each_array(Tree& tree, std::vector<Node>& nodes, const F& f) {
+  f(nodes);
+  auto& m = tree.merged;
+  for (auto& p : m.means) f(p);
+  for (auto& p : m.quats) f(p);
+  for (auto& p : m.scales) f(p);
+  f(m.opacities);
+  f(m.sh0);
+  f(m.shN);
+  f(m.origin_ids);
+}
+
+Status invalid(const fs::path& path, const std::string& what) {
+  return {Errc::invalid_file, path.string() + ": " + what};
+}
+
+/// Values that kernels and the cut rely on.
+Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Node>& nodes,
+             std::size_t origins) {
+  const auto finite = [](const std::vector<float>& v) {
+    for (const float x : v) {
+      if (!std::isfinite(x)) return false;
+    }
+    return true;
+  };
+  for (const auto& p : m.means) {
+    if (!finite(p)) return invalid(path, "a mean that is not finite");
+  }
+  for (std::size_t i = 0; i < m.size(); ++i) {
+    double length = 0;
+    for (const auto& p : m.quats) length += static_cast<double>(p[i]) * static_cast<double>(p[i]);
+    const auto row = [&path, i](const std::string& what) {
+      return invalid(path, "row " + std::to_string(i) + ": " + what);
+    };
+    if (!(std::abs(length - 1) < 1e-4)) return row("a quaternion that is not of unit length");
+    for (const auto& p : m.scales) {
+      if (!(p[i] >= 0 && std::isfinite(p[i]))) return row("a scale that cannot be");
+    }
+    if (!(m.opacities[i] >= 0 && m.opacities[i] <= 1)) {
+      return row("opacity " + std::to_string(m.opacities[i]) + ", must be in [0, 1]");
+    }
+  }
+  if (!finite(m.sh0) || !finite(m.shN)) return invalid(path, "an SH coefficient that is not finite");
+  for (const std::uint32_t id : m.origin_ids) {
+    if (id >= origins)
+      return invalid(path, "origin " + std::to_string(id) + " of " + std::to_string(origins));
+  }
+  for (const Node& n : nodes) {
+    bool good = n.error >= 0 && std::isfinite(n.error) && n.scale_max >= 0 && std::isfinite(n.scale_max);
+    for (int k = 0; k < 3; ++k) {
+      good = good && std::isfinite(n.low[k]) && std::isfinite(n.high[k]) && n.low[k] <= n.high[k];
+    }
+    if (!good) return invalid(path, "a node whose error or bounds cannot be");
+  }
+  return {};
+}
+
+std::uint64_t checksum(const LodTree& tree, const std::vector<Node>& nodes) {
+  Hasher h;
+  for_each_array(tree, const_cast<std::vector<Node>&>(nodes), [&h](const auto& v) {
+    h.value(v.size());
+    h.bytes(v.data(), v.size() * sizeof(v[0]));
+  });
+  return h.low();
+}
+
+}  // namespace
+
+Status save_lod(const fs::path& path, const LodTree& tree, const GaussianCloud& cloud,
+                const LodSettings& settings) {
+  return detail::guarded(path.string(), [&]() -> Status {
+    std::vector<Node> nodes(tree.nodes.size());
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const LodNode& n = tree.nodes[i];
+      for (int k = 0; k < 3; ++k) {
+        nodes[i].low[k] = n.reach.low[k];
+        nodes[i].high[k] = n.reach.high[k];
+      }
+      nodes[i].error = n.error;
+      nodes[i].scale_max = n.reach.scale_max;
+      nodes[i].opacity_max = n.reach.opacity_max;
+      nodes[i].unused = 0;
+    }
+    Header header{};
+    std::memcpy(header.magic, kMagic, sizeof kMagic);
+    header.version = kVersion;
+    header.size = sizeof header;
+    const Hasher of = built_of(cloud, settings);
+    for (std::size_t k = 0; k < 2; ++k) header.built_of[k] = of.state()[k];
+    header.checksum = checksum(tree, nodes);
+    // Written aside and then renamed: whoever reads meanwhile sees a whole file or none.
+    const fs::path aside = path.string() + "." + std::to_string(::getpid());
+    detail::OutFile file;
+    if (Status s = file.open(aside); !s) return s;
+    file.write(&header, sizeof header);
+    for_each_array(tree, nodes,
+                   [&file](const auto& v) { file.write(v.data(), v.size() * sizeof(v[0])); });
+    Status s = file.close();
+    std::error_code error;
+    if (s) {
+      fs::rename(aside, path, error);
+      if (error) s = {Errc::file_not_found, path.string() + ": cannot be written: " + error.message()};
+    }
+    if (!s) fs::remove(aside, error);
+    return s;
+  });
+}
+
+Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const LodSettings& settings) {
+  return detail::guarded(path.string(), [&]() -> Result<LodTree> {
+    detail::RandomFile file;
+    if (Status s = file.open(path); !s) return s;
+    Header header{};
+    if (file.size() < sizeof header || !file.read(0, std::as_writable_bytes(std::span(&header, 1)))) {
+      return invalid(path, "shorter than the header of a level-of-detail file");
+    }
+    if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.size != sizeof header) {
+      return invalid(path, "not a level-of-detail file");
+    }
+    const Hasher of = built_of(cloud, settings);
+    if (header.version != kVersion || header.built_of[0] != of.state()[0] ||
+        header.built_of[1] != of.state()[1]) {
+      return Status(
+          Errc::invalid_argument,
+          path.string() + ": was built of another scene, by other settings or by another version");
+    }
+    LodTree tree;
+    if (cloud.size() != 0 && cloud.chunk_bounds.size() != cloud.view().all_chunks()) {
+      return Status(Errc::invalid_argument, path.string() + ": the cloud is not in spatial order");
+    }
+    gsnav::detail::shape_lod(tree, cloud, settings);
+    std::vector<Node> nodes(tree.nodes.size());
+    std::uint64_t wanted = sizeof header;
+    for_each_array(tree, nodes, [&wanted](const auto& v) { wanted += v.size() * sizeof(v[0]); });
+    if (file.size() != wanted) {
+      return invalid(path, "has " + std::to_string(file.size()) + " bytes where " +
+                               std::to_string(wanted) + " are needed");
+    }
+    std::uint64_t at = sizeof header;
+    bool whole = true;
+    for_each_array(tree, nodes, [&](auto& v) {
+      whole = whole && file.read(at, std::as_writable_bytes(std::span(v.data(), v.size())));
+      at += v.size() * sizeof(v[0]);
+    });
+    if (!whole) return detail::reading_failed(path.string());
+    if (header.checksum != checksum(tree, nodes))
+      return invalid(path, "its checksum is another: damaged");
+    if (Status s = check(path, tree.merged, nodes, std::max<std::size_t>(cloud.origins.size(), 1)); !s)
+      return s;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      LodNode& n = tree.nodes[i];
+      for (int k = 0; k < 3; ++k) {
+        n.reach.low[k] = nodes[i].low[k];
+        n.reach.high[k] = nodes[i].high[k];
+      }
+      n.error = nodes[i].error;
+      n.reach.scale_max = nodes[i].scale_max;
+      n.reach.opacity_max = nodes[i].opacity_max;
+    }
+    tree.merged.chunk_bounds = chunk_bounds_of(tree.merged);
+    return tree;
+  });
+}
+
+fs::path lod_path(const std::string& spec, const GaussianCloud& cloud, const LodSettings& settings) {
+  std::error_code ignored;
+  std::string first = spec;
+  if (!fs::exists(spec, ignored)) first = spec.substr(0, spec.find(','));
+  while (first.size() > 1 && first.back() == '/') first.pop_back();
+  return first + "." + built_of(cloud, settings).hex().substr(0, 16) + ".lod";
+}
+
+}  // namespace gsnav::io

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a scene does not need: bands of zeros change no bit, bands too small to be seen no colour by more
+// than they say.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/kernels/project_chunk.hpp"
+#include "gsnav/scene/ledger.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/scene_profile.hpp"
+#include "gsnav/scene/spatial_order.hpp"
+#include "support/scenes.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+/// Chunk c of the cloud gets the bands up to c % 4, all above are zero or at most `small`.
+GaussianCloud banded(double small) {
+  GaussianCloud cloud = random_cloud(12, {.count = 2500});
+  sort_spatially(cloud);
+  Rng rng(13);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const std::size_t kept =
+        3 * static_cast<std::size_t>(sh_coefficient_count(static_cast<int>(i / kProjectChunk % 4)) - 1);
+    for (std::size_t k = kept; k < 45; ++k)
+      cloud.shN[45 * i + k] = static_cast<float>(small * rng.uniform(-1, 1));
+  }
+  return cloud;
+}
+
+}  // namespace
+
+TEST_CASE("scene profile: bands of zeros are not read, and no bit changes") {
+  const GaussianCloud cloud = banded(0);
+  const SceneProfile profile = profile_scene(cloud);
+  REQUIRE(profile.chunk_sh_degrees.size() == 10);
+  for (std::size_t c = 0; c < 10; ++c)
+    CHECK(int{profile.chunk_sh_degrees[c]} == static_cast<int>(c % 4));
+  CHECK(profile.color_error == 0);
+  CHECK(profile.sh_numbers == 45 * cloud.size());
+  CHECK(profile.sh_numbers_read < profile.sh_numbers);
+  const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 96, 64, 70);
+  const auto check = [&](auto& renderer) {
+    const auto a = renderer.render(cloud.set(), camera).value();
+    const auto b = renderer.render(profile.applied_to(cloud.set()), camera).value();
+    CHECK(a.rgb == b.rgb);
+    CHECK(a.median_depth == b.median_depth);
+  };
+  OpenMPBackend openmp(2);
+  SerialBackend serial;
+  Renderer<float, OpenMPBackend> lanes(openmp);
+  Renderer<float, SerialBackend> one(serial);
+  Renderer<double, SerialBackend> reference(serial);
+  check(lanes);
+  check(one);
+  check(reference);
+}
+
+TEST_CASE("scene profile: no colour changes by more than the bound (N69)") {
+  const GaussianCloud cloud = banded(2e-4);
+  const SceneProfile profile = profile_scene(cloud, kUnseenColor);
+  CHECK(profile.color_error > 0);
+  CHECK(profile.color_error <= 1.0 / 1020);
+  for (std::size_t c = 0; c < 10; ++c)
+    CHECK(int{profile.chunk_sh_degrees[c]} <= static_cast<int>(c % 4));
+  CHECK(profile_scene(cloud).sh_numbers_read == profile_scene(cloud).sh_numbers);
+  const GaussianSet set = profile.applied_to(cloud.set());
+  Rng rng(14);
+  double worst = 0;
+  for (int run = 0; run < 20000; ++run) {
+    const std::size_t i = rng.next() % cloud.size();
+    const Vec3d direction{rng.normal(), rng.normal(), rng.normal()};
+    const auto all = gaussian_color<double>(set.gaussians, 3, i, direction);
+    const auto some = gaussian_color<double>(set.gaussians, set.gaussians.degree_of(i, 3), i, direction);
+    worst =
+        std::max({worst, std::abs(all.r - some.r), std::abs(all.g - some.g), std::abs(all.b - some.b)});
+  }
+  CHECK(worst <= profile.color_error * (1 + 1e-9));
+  CHECK(worst > 0.2 * profile.color_error);
+}
+
+TEST_CASE("scene profile: one that does not fit its set is refused") {
+  const GaussianCloud cloud = banded(0);
+  SceneProfile profile = profile_scene(cloud);
+  profile.chunk_sh_degrees.pop_back();
+  CHECK(validate(profile.applied_to(cloud.set())).message().find("chunk_sh_degrees") !=
+        std::string::npos);
+}
+
+TEST_CASE("ledger: its counts are those of the frame") {
+  const GaussianCloud cloud = banded(2e-4);
+  const Camera camera = Camera::look_at({0, 0, 0}, {2, 0, 4}, {0, -1, 0}, 96, 64, 30);
+  const SceneProfile profile = profile_scene(cloud, kUnseenColor);
+  SerialBackend backend;
+  RenderConfig config;
+  config.profile = Profile::fast;
+  Renderer<float, SerialBackend> renderer(backend, config);
+  const GaussianSet set = profile.applied_to(cloud.set());
+  const auto f = renderer.render(set, camera).value();
+  const FrameLedger l = frame_ledger(std::span(&set, 1), camera, config, f.stats[0], nullptr, &profile);
+  CHECK(l.gaussians == cloud.size());
+  CHECK(l.visible == f.stats[0].visible);
+  CHECK(l.touched >= l.visible);
+  CHECK(l.touched <= l.gaussians);
+  CHECK(l.sh_skipped == profile.sh_numbers - profile.sh_numbers_read);
+  const std::string text = ledger_text(l);
+  CHECK(text.find(std::to_string(l.sh_skipped) + " SH coefficients") != std::string::npos);
+  CHECK(text.find(std::to_string(l.touched) + " touched") != std::string::npos);
+}
