@@ -67,12 +67,19 @@ struct GaussianView {
   GSNAV_HD std::size_t chunk_count() const noexcept { return (size + kProjectChunk - 1) / kProjectChunk; }
 };
 
+/// What the numbers of a colour mean.
+enum class ColorSpace : std::uint8_t {
+  display,  ///< sRGB-encoded: what screens take, and nearly all captures are trained in
+  linear,   ///< proportional to light, Rec. 709 primaries
+};
+
 /// One set of Gaussians in the world: a scene tile, an avatar, an object.
 struct GaussianSet {
   GaussianView gaussians;
   Similarity world_from_asset{};
   Filter filter = Filter::classic;
   float eps2d = 0.3f;  ///< px^2 added to the diagonal of the 2D covariance
+  ColorSpace color_space = ColorSpace::display;  ///< of its colours; converted to the frame's after SH
 };
 
 }  // namespace gsnav

@@ -43,7 +43,7 @@ class SemanticPasses {
       g.sh_degree = 0;
       g.shN = {};
       g.shN_half = {};
-      g.sh0 = {shades_[channel].data(), kChannels * g.size};
+      g.sh0 = {shades_[channel].data(), kChannels * g.size};  // 0 and 1 are the same in every colour space
     }
     return out;
   }
