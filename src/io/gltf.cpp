@@ -100,7 +100,10 @@ class SplatReader {
     const Json* nested = member(splats, "extensions");
     const Json* spz = nested == nullptr ? nullptr : member(*nested, kSpzExtension);
     auto out = spz != nullptr ? read_spz(*spz, where) : read_attributes(primitive, where);
-    if (out && *space != "srgb_rec709_display") {
+    if (out && *space == "lin_rec709_display") {
+      out->cloud.color_space = ColorSpace::linear;
+      out->report.warnings.push_back("colours are in linear light (lin_rec709_display), which only .glb can keep");
+    } else if (out && *space != "srgb_rec709_display") {
       out->report.warnings.push_back("colours of space " + detail::shown(*space) +
                                      " are read as if they were srgb_rec709_display");
     }

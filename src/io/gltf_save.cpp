@@ -74,7 +74,7 @@ void add_bounds(Json& accessor, const Attribute& position, std::size_t n) {
   accessor["max"] = high;
 }
 
-Json header_of(const std::vector<Attribute>& attributes, std::size_t n, const Vec3d& t) {
+Json header_of(const std::vector<Attribute>& attributes, std::size_t n, const Vec3d& t, ColorSpace space) {
   Json views = Json::array(), accessors = Json::array(), names = Json::object();
   std::size_t offset = 0;
   for (const Attribute& a : attributes) {
@@ -91,7 +91,7 @@ Json header_of(const std::vector<Attribute>& attributes, std::size_t n, const Ve
     offset += bytes;
   }
   const Json splats = {{"kernel", "ellipse"},
-                       {"colorSpace", "srgb_rec709_display"},
+                       {"colorSpace", space == ColorSpace::linear ? "lin_rec709_display" : "srgb_rec709_display"},
                        {"sortingMethod", "cameraDistance"},
                        {"projection", "perspective"}};
   const Json primitive = {{"mode", 0}, {"attributes", names}, {"extensions", {{kExtension, splats}}}};
@@ -125,7 +125,7 @@ Status save_glb(const std::filesystem::path& path, const GaussianCloud& cloud,
     const bool turned = !options.keep_axes;
     const auto attributes = attributes_of(cloud, origin, turned);
     const Vec3d place = turned ? Vec3d{-origin.x, -origin.y, origin.z} : origin;
-    std::string text = header_of(attributes, n, place).dump();
+    std::string text = header_of(attributes, n, place, cloud.color_space).dump();
     text.resize((text.size() + 3) / 4 * 4, ' ');
     const auto size_of = [](std::size_t bytes) { return static_cast<std::uint32_t>(bytes); };
     const std::size_t binary = n * floats * sizeof(float);

@@ -170,6 +170,19 @@ TEST_CASE("gltf: what the extension may say") {
       R"({"kernel":"ellipse","colorSpace":"lin_rec709_display","sortingMethod":"cameraDistance"})";
   REQUIRE(parse(file).report.warnings.size() == 1);
   CHECK(contains(parse(file).report.warnings[0], "lin_rec709_display"));
+  CHECK(parse(file).cloud.color_space == ColorSpace::linear);
+  CHECK(parse(small_file()).cloud.color_space == ColorSpace::display);
+  {
+    const TempFolder kept("gltf_space");
+    for (const ColorSpace space : {ColorSpace::display, ColorSpace::linear}) {
+      GaussianCloud cloud = parse(small_file()).cloud;
+      cloud.color_space = space;
+      io::save_glb(kept / "a.glb", cloud).throw_if_error();
+      CHECK(io::load_gltf(kept / "a.glb").value().cloud.color_space == space);
+    }
+  }
+  file.splats = R"({"kernel":"ellipse","colorSpace":"custom"})";
+  CHECK(contains(parse(file).report.warnings[0], "as if they were srgb_rec709_display"));
   file.splats = R"({"kernel":"box","colorSpace":"srgb_rec709_display"})";
   check_fails(file.text(), Errc::unsupported, "node 0: kernel '\"box\"'");
   file.splats = R"({"kernel":"ellipse","colorSpace":"srgb_rec709_display","sortingMethod":"z"})";

@@ -12,7 +12,7 @@ namespace gsnav {
 
 namespace cuda {
 
-Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras) {
+Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras, ColorSpace blend_space) {
   if (cameras.empty()) return {Errc::invalid_argument, "CudaBatchRenderer: no camera to render from"};
   if (cameras.size() > 65535) {
     return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(cameras.size()) +
@@ -22,6 +22,13 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
     if (Status s = validate(sets[i]); !s) {
       return {s.code(), "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + s.message()};
     }
+    const GaussianView& g = sets[i].gaussians;
+    const auto unsupported = [&](const char* what) {
+      return Status(Errc::unsupported, "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + what);
+    };
+    if (!g.drawn_chunks.empty()) return unsupported("drawn_chunks: a level of detail; draw it on a host backend");
+    if (!g.chunk_sh_degrees.empty()) return unsupported("chunk_sh_degrees are read in host memory; leave them out");
+    if (sets[i].color_space != blend_space) return unsupported("color_space is not the frame's blend_space");
   }
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const auto bad = [&](Errc code, const std::string& what) {

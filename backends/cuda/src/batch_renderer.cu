@@ -139,7 +139,7 @@ Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<co
                                  const BatchImages& images) {
   State& s = *state_;
   if (Status status = validate(s.config); !status) return status;
-  if (Status status = cuda::check_batch(sets, cameras); !status) return status;
+  if (Status status = cuda::check_batch(sets, cameras, s.config.blend_space); !status) return status;
   if (s.calls - s.finished >= cuda::kInFlight) {
     return {Errc::invalid_argument, "CudaBatchRenderer: call finish() at least once in " +
                                         std::to_string(cuda::kInFlight) + " calls of render()"};

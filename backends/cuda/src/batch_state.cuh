@@ -52,7 +52,7 @@ struct Flight {
 };
 
 /// Names the camera, set or field that cannot be, or ok.
-Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras);
+Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras, ColorSpace blend_space);
 
 }  // namespace cuda
 

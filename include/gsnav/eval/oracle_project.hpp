@@ -13,6 +13,7 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/parallel.hpp"
 #include "gsnav/eval/oracle_config.hpp"
+#include "gsnav/kernels/color_space.hpp"
 #include "gsnav/kernels/depth.hpp"
 #include "gsnav/kernels/packed_gaussians.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
@@ -262,7 +263,8 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
       record.box = record.box.intersection(scene.rect);
       const SplatColor<double> color = gaussian_color<double>(
           s.set.gaussians, min(s.set.gaussians.sh_degree, c.max_sh_degree), row, s.delta(row));
-      record.color = {color.r, color.g, color.b};
+      const auto blended = [&](double v) { return converted(v, s.set.color_space, c.blend_space); };
+      record.color = {blended(color.r), blended(color.g), blended(color.b)};
       record.id = order[i].id;
       record.rank = rank[i];
     }

@@ -105,12 +105,19 @@ struct GaussianView {
   GSNAV_HD std::size_t chunk_id(std::size_t c) const noexcept { return drawn_chunks.empty() ? c : drawn_chunks[c]; }
 };
 
+/// What the numbers of a colour mean.
+enum class ColorSpace : std::uint8_t {
+  display,  ///< sRGB-encoded: what screens take, and nearly all captures are trained in
+  linear,   ///< proportional to light, Rec. 709 primaries
+};
+
 /// One set of Gaussians in the world: a scene tile, an avatar, an object.
 struct GaussianSet {
   GaussianView gaussians;
   Similarity world_from_asset{};
   Filter filter = Filter::classic;
   float eps2d = 0.3f;  ///< px^2 added to the diagonal of the 2D covariance
+  ColorSpace color_space = ColorSpace::display;  ///< of its colours; converted to the frame's after SH
   /// px^2 that the opacities count with already, in [0, eps2d]: the mip filter makes up for the rest. 0: Mip-Splatting's.
   float base_eps2d = 0;
 };

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "gsnav/kernels/color_space.hpp"
 #include "gsnav/kernels/mesh_raster.hpp"
 
 // What the visible triangles look like, one pixel after the other: each is shaded once, however many triangles lie
@@ -35,14 +36,6 @@ struct MeshShadeArgs {
   Vec3<S> ambient{}, light{}, diffuse{};   ///< light: unit, world axes
   MeshImages<S> images;
 };
-
-/// The sRGB-encoded value of a linear one >= 0.
-template <class S>
-GSNAV_HD S srgb_encoded(S linear) noexcept {
-  const S small = S(0.0031308);
-  const S curve = S(1.055) * exp2(log2(max(linear, small)) * S(1 / 2.4)) - S(0.055);
-  return linear > small ? curve : S(12.92) * max(linear, S(0));
-}
 
 namespace detail {
 

@@ -14,6 +14,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/parallel.hpp"
 #include "gsnav/kernels/blend.hpp"
+#include "gsnav/kernels/color_space.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/composite_steps.hpp"
@@ -141,6 +142,19 @@ void project_set(B& backend, const ProjectArgs<S>& args) {
   } else {
     backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
   }
+}
+
+/// Whether colours of a set have to be converted before they are blended.
+inline bool any_other_space(std::span<const GaussianSet> sets, const RenderConfig& config) noexcept {
+  return std::any_of(sets.begin(), sets.end(),
+                     [&](const GaussianSet& s) { return s.color_space != config.blend_space; });
+}
+
+/// Converts the colours of one projected set where its space is not the frame's.
+template <class S, Backend B>
+void convert_set(B& backend, const ProjectArgs<S>& args, ColorSpace from, ColorSpace to) {
+  if (from == to || !args.color) return;
+  backend.parallel_for(args.chunk_count(), ConvertSplatColors<S>{args.colors, args.counts, args.first_chunk, from, to});
 }
 
 /// What comes after the projection of one camera: sort, bin, blend, of the keys in `range`. Adds to `stats`.
@@ -288,22 +302,25 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
   detail::prepare_projection(ws, sets, camera, config, images, !mesh.empty());
   bool drawn = false;
   if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
-    if (mesh.empty()) {
+    if (mesh.empty() && !detail::any_other_space(sets, config)) {
       const Result<bool> sliced = detail::draw_in_slices(backend, ws, camera, config, images, counted);
       if (!sliced) return sliced.status();
       drawn = sliced.value();
     }
   }
   if (!drawn) {
-    for (const ProjectArgs<S>& args : ws.projections) {
+    for (std::size_t i = 0; i < sets.size(); ++i) {
+      const ProjectArgs<S>& args = ws.projections[i];
       if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
         if (!mesh.empty()) {
           std::fill_n(args.counts.data + args.first_chunk, args.chunk_count(), 0u);
           detail::project_unhidden(backend, args, mesh.tile_far, ws.mesh.unhidden);
+          detail::convert_set(backend, args, sets[i].color_space, config.blend_space);
           continue;
         }
       }
       detail::project_set(backend, args);
+      detail::convert_set(backend, args, sets[i].color_space, config.blend_space);
     }
     if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, mesh, images, counted); !s) return s;
   }

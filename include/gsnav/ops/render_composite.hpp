@@ -35,6 +35,9 @@ Status render_composite(B& backend, RenderWorkspace<S, B>& ws, std::span<const G
         !s) {
       return s;
     }
+    if (color && config.blend_space == ColorSpace::linear) {
+      backend.parallel_for(ws.mesh.color.size(), DecodeImage<S>{ws.mesh.color.data()});
+    }
     const MeshLayer<S> layer{ws.mesh.depth.data(), color ? ws.mesh.color.data() : nullptr,
                              std::as_const(ws.mesh.tile_far).view()};
     if (config.composite == Composite::merged) {

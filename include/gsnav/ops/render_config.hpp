@@ -10,6 +10,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/camera.hpp"
+#include "gsnav/kernels/gaussians.hpp"
 #include "gsnav/kernels/mesh.hpp"
 #include "gsnav/kernels/projection.hpp"
 
@@ -38,7 +39,10 @@ struct RenderConfig {
   double max_alpha = 0.99;             ///< in (0, 1]
   double transmittance_min = 1e-4;     ///< in [0, 1)
   double first_hit_tau = 0.5;          ///< in (0, 1): first-hit depth is where alpha reaches this
-  Vec3d background{0, 0, 0};           ///< display-referred
+  /// What colours are blended in, and images and `background` hold: the main asset's space. Sets of the other are
+  /// converted Gaussian by Gaussian, after SH; meshes too. Linear images need encoding to be looked at (srgb_encoded).
+  ColorSpace blend_space = ColorSpace::display;
+  Vec3d background{0, 0, 0};           ///< of blend_space
   Composite composite = Composite::merged;  ///< of Gaussians and meshes, where a frame has both
 
   bool operator==(const RenderConfig&) const = default;

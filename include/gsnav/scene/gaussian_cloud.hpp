@@ -51,6 +51,7 @@ struct GaussianCloud {
   Filter filter = Filter::classic;
   float eps2d = 0.3f;
   SortOrder sort_order = SortOrder::z_depth;
+  ColorSpace color_space = ColorSpace::display;
 
   std::size_t size() const noexcept { return opacities.size(); }
 
@@ -88,7 +89,7 @@ struct GaussianCloud {
 
   /// The cloud placed in the world.
   GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
-    return {view(), world_from_asset, filter, eps2d};
+    return {view(), world_from_asset, filter, eps2d, color_space};
   }
 };
 
@@ -267,8 +268,9 @@ inline Status append(GaussianCloud& a, const GaussianCloud& b) {
     a = b;
     return {};
   }
-  if (a.filter != b.filter || a.eps2d != b.eps2d || a.sort_order != b.sort_order) {
-    return {Errc::invalid_argument, "clouds with different filters or sort orders cannot be merged"};
+  if (a.filter != b.filter || a.eps2d != b.eps2d || a.sort_order != b.sort_order ||
+      a.color_space != b.color_space) {
+    return {Errc::invalid_argument, "clouds with different filters, sort orders or colour spaces cannot be merged"};
   }
   const int degree = max(a.sh_degree, b.sh_degree);
   const auto widen = [degree](const GaussianCloud& c) {

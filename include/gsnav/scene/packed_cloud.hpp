@@ -49,7 +49,7 @@ struct PackedCloud {
     return v;
   }
   GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
-    return {view(), world_from_asset, rest.filter, rest.eps2d};
+    return {view(), world_from_asset, rest.filter, rest.eps2d, rest.color_space};
   }
 };
 

@@ -48,7 +48,7 @@ class SemanticPasses {
       g.shN_half = {};
       g.packed.sh0 = {};
       g.packed.shN = {};
-      g.sh0 = {shades_[channel].data(), kChannels * g.size};
+      g.sh0 = {shades_[channel].data(), kChannels * g.size};  // 0 and 1 are the same in every colour space
     }
     return out;
   }
