@@ -10,18 +10,6 @@ namespace {
 
 Status bad(std::string what) { return {Errc::invalid_argument, std::move(what)}; }
 
-/// No exception may leave a parallel region.
-template <class F>
-Status guarded(const F& f) noexcept {
-  try {
-    return f();
-  } catch (const Error& e) {
-    return {e.code(), e.what()};
-  } catch (const std::exception& e) {
-    return {Errc::out_of_memory, e.what()};
-  }
-}
-
 }  // namespace
 
 Result<BatchWorld> BatchWorld::create(std::vector<BatchScene> scenes, const TaskConfig& config, AutoReset auto_reset,
@@ -111,7 +99,7 @@ Status BatchWorld::begin(const ParallelFor& run, std::span<const std::size_t> wh
   }
   run(which.size(), [&](std::size_t k) {
     Environment& e = environments_[which[k]];
-    e.status = guarded([&] { return e.world->reset(episodes_[which[k]].episode); });
+    e.status = detail::guarded([&] { return e.world->reset(episodes_[which[k]].episode); });
     e.moved = true;
     if (e.status.ok()) note_observation(which[k]);
   });
@@ -165,7 +153,7 @@ Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size
   made_.assign(missing_.size(), {});
   run(missing_.size(), [&](std::size_t m) {
     const BodyCache::Key& key = missing_[m].key;
-    made_[m] = guarded([&] {
+    made_[m] = detail::guarded([&] {
       std::vector<DynamicCapsule> capsules;
       const Environment& e = *missing_[m].environment;
       if (e.source_after) {
@@ -218,7 +206,7 @@ Status BatchWorld::act(const ParallelFor& run, std::span<const A> actions, const
   run(stepping_.size(), [&](std::size_t k) {
     const std::size_t i = stepping_[k];
     Environment& e = environments_[i];
-    e.status = guarded([&] { return e.world->step(actions[i], e.bodies).status(); });
+    e.status = detail::guarded([&] { return e.world->step(actions[i], e.bodies).status(); });
     e.moved = true;
     infos_[i] = e.world->last_step();
     rewards_[i] = infos_[i].reward;

@@ -12,6 +12,18 @@
 
 namespace gsnav_test {
 
+/// A camera at the origin that looks along z.
+inline gsnav::Camera mesh_lens(int width = 64, int height = 48, double f = 40) {
+  gsnav::Camera c;
+  c.width = width;
+  c.height = height;
+  c.fx = c.fy = f;
+  c.cx = 0.5 * width;
+  c.cy = 0.5 * height;
+  c.near_plane = 0.05;
+  return c;
+}
+
 /// Every image of meshes, in host memory.
 template <class S>
 struct MeshPictures {

@@ -22,17 +22,6 @@ namespace {
 using namespace gsnav;
 using namespace gsnav_test;
 
-Camera lens(int width, int height, double f) {
-  Camera c;
-  c.width = width;
-  c.height = height;
-  c.fx = c.fy = f;
-  c.cx = 0.5 * width;
-  c.cy = 0.5 * height;
-  c.near_plane = 0.05;
-  return c;
-}
-
 std::shared_ptr<const MeshTexture> noise(std::uint64_t seed, std::size_t width, std::size_t height) {
   Rng rng(seed);
   std::vector<std::uint8_t> rgba(4 * width * height);
@@ -69,8 +58,8 @@ TEST_CASE("cuda meshes: the bits of the CPU, small triangles and huge ones, clip
     scene.add(sphere(0.7, 200, 100)).value();
     const std::vector<MeshInstance> both{scene.instance(0, {{0.8, 0.6, 0, 0}, {0.1, 0.2, 0.3}, 1.5}, 3),
                                          scene.instance(1, {{}, {0.5, 0, 2}, 1}, 4)};
-    check_same(cuda, both, lens(97, 61, 50), lit);
-    check_same(cuda, both, lens(641, 367, 300), {});
+    check_same(cuda, both, mesh_lens(97, 61, 50), lit);
+    check_same(cuda, both, mesh_lens(641, 367, 300), {});
   }
 }
 
@@ -87,9 +76,9 @@ TEST_CASE("cuda meshes: textures and vertex colours, two-sided, of equal depth")
   floor.two_sided = true;
   scene.add(floor).value();  // where the first lies: the first is seen
   const std::vector<MeshInstance> all{scene.instance(0, {}, 1), scene.instance(1, {}, 2), scene.instance(1, {{}, {0, -2, 0}, 1}, 5)};
-  check_same(cuda, all, lens(320, 240, 160), {});
+  check_same(cuda, all, mesh_lens(320, 240, 160), {});
   SerialBackend serial;
-  const auto seen = draw<float>(serial, all, lens(320, 240, 160));
+  const auto seen = draw<float>(serial, all, mesh_lens(320, 240, 160));
   std::size_t first = 0, second = 0;
   for (const std::uint32_t id : seen.instance) first += id == 1 ? 1 : 0, second += id == 2 ? 1 : 0;
   CHECK(first > 1000);

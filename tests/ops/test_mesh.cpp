@@ -18,17 +18,6 @@ using namespace gsnav_test;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-Camera lens(int width = 64, int height = 48, double f = 40) {
-  Camera c;
-  c.width = width;
-  c.height = height;
-  c.fx = c.fy = f;
-  c.cx = 0.5 * width;
-  c.cy = 0.5 * height;
-  c.near_plane = 0.05;
-  return c;
-}
-
 Quatd turn(const Vec3d& axis, double degrees) {
   const double half = degrees * std::numbers::pi / 360;
   const Vec3d a = normalized(axis) * std::sin(half);
@@ -67,7 +56,7 @@ std::size_t check_truth(const MeshPictures<S>& drawn, const MeshTruth& truth, do
 TEST_CASE("random triangles, also huge ones and behind the camera: what a ray tracer in long double meets") {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     const OneMesh mesh(random_triangles(seed, 60));
-    const Camera camera = lens();
+    const Camera camera = mesh_lens();
     const MeshTruth truth = mesh_truth(mesh.instances, camera);
     SerialBackend serial;
     const auto in_double = draw<double>(serial, mesh.instances, camera);
@@ -85,7 +74,7 @@ TEST_CASE("the same bits on every backend, for any number of threads and any til
   mesh.scene.add(sphere(0.7, 24, 12)).value();
   mesh.instances = {mesh.scene.instance(0, {turn({1, 2, 3}, 20), {0.1, 0.2, 0.3}, 1.5}, 3),
                     mesh.scene.instance(1, {{}, {0.5, 0, 2}, 1}, 4)};
-  const Camera camera = lens(97, 61, 50);
+  const Camera camera = mesh_lens(97, 61, 50);
   MeshLight light;
   light.unlit = false;
   SerialBackend serial;
@@ -116,7 +105,7 @@ TEST_CASE("triangles that share edges own each pixel once") {
   Rng rng(11);
   SerialBackend serial;
   for (int round = 0; round < 12; ++round) {
-    const Camera camera = lens(33, 33, 32);  // (0, 0) is the centre of the middle pixel
+    const Camera camera = mesh_lens(33, 33, 32);  // (0, 0) is the centre of the middle pixel
     const auto on_grid = [&](double v) { return static_cast<float>(round < 6 ? std::round(v * 32) / 32 : v); };
     const Vec3f hub{on_grid(rng.uniform(-0.2, 0.2)), on_grid(rng.uniform(-0.2, 0.2)), 1};
     SurfaceMesh fan;
@@ -158,7 +147,7 @@ TEST_CASE("a closed surface has no holes, however near, far, large or finely cut
   for (const double radius : {0.3, 1.0, 40.0, 3e4}) {
     for (const std::uint32_t around : {5u, 64u, 700u}) {
       const OneMesh ball(sphere(radius, around, around / 2 + 2), {turn({1, 2, 3}, 33), {0, 0, 2.5 * radius}, 1});
-      const auto drawn = draw<float>(serial, ball.instances, lens());
+      const auto drawn = draw<float>(serial, ball.instances, mesh_lens());
       // Inside the silhouette of the polyhedron's inner sphere everything is covered.
       const double inner = radius * std::pow(std::cos(std::numbers::pi / std::min(around, 64u)), 2);
       const double limit = around < 8 ? 0.2 : inner / std::sqrt(6.25 * radius * radius - inner * inner);
@@ -170,16 +159,16 @@ TEST_CASE("a closed surface has no holes, however near, far, large or finely cut
       }
       // From its centre it is not seen, unless both sides are.
       SurfaceMesh both = ball.scene.mesh(0);
-      CHECK(covered(draw<float>(serial, OneMesh(both).instances, lens()).depth) == 0);
+      CHECK(covered(draw<float>(serial, OneMesh(both).instances, mesh_lens()).depth) == 0);
       both.two_sided = true;
-      CHECK(covered(draw<float>(serial, OneMesh(both).instances, lens()).depth) == 64 * 48);
+      CHECK(covered(draw<float>(serial, OneMesh(both).instances, mesh_lens()).depth) == 64 * 48);
     }
   }
 }
 
 TEST_CASE("planes: depth in closed form, from a centimetre to the horizon") {
   SerialBackend serial;
-  const Camera camera = lens(64, 64, 30);
+  const Camera camera = mesh_lens(64, 64, 30);
   for (const double size : {10.1, 1e4, 1e7}) {
     const float s = static_cast<float>(size);
     const OneMesh floor(quad({-s, 1.5f, -s}, {s, 1.5f, -s}, {s, 1.5f, s}, {-s, 1.5f, s}));
@@ -210,7 +199,7 @@ TEST_CASE("slivers and needles keep the depth of their corners") {
     m.geometry.vertices = {point(0.5), point(20), vec_cast<float>(along * 3.0 + Vec3d{rng.normal(), rng.normal(), 0} * 0.02)};
     m.geometry.triangles = {{0, 1, 2}};
     const OneMesh mesh(m);
-    for (const float z : draw<float>(serial, mesh.instances, lens()).depth) {
+    for (const float z : draw<float>(serial, mesh.instances, mesh_lens()).depth) {
       REQUIRE((std::isinf(z) || (z >= 0.4999f && z <= 20.01f)));
     }
   }
@@ -218,7 +207,7 @@ TEST_CASE("slivers and needles keep the depth of their corners") {
 
 TEST_CASE("NaN, infinities, points and numbers near the end of float: left out, counted, nothing else moves") {
   SerialBackend serial;
-  const Camera camera = lens();
+  const Camera camera = mesh_lens();
   const SurfaceMesh good = quad({-1, -1, 3}, {1, -1, 3}, {1, 1, 3}, {-1, 1, 3});
   const auto reference = draw<float>(serial, OneMesh(good).instances, camera);
   CHECK(reference.stats.not_finite == 0);
@@ -248,7 +237,7 @@ TEST_CASE("NaN, infinities, points and numbers near the end of float: left out, 
 TEST_CASE("ids, normals and the side that is seen") {
   SerialBackend serial;
   const OneMesh ball(sphere(1, 48, 24), {turn({0, 1, 1}, 70), {0.2, 0.1, 4}, 1.2}, 21);
-  const auto drawn = draw<double>(serial, ball.instances, lens());
+  const auto drawn = draw<double>(serial, ball.instances, mesh_lens());
   std::size_t seen = 0;
   for (std::size_t i = 0; i < drawn.depth.size(); ++i) {
     const bool hit = !std::isinf(drawn.depth[i]);
@@ -267,9 +256,9 @@ TEST_CASE("ids, normals and the side that is seen") {
 
 TEST_CASE("a mesh without triangles, and one out of view") {
   SerialBackend serial;
-  CHECK(covered(draw<float>(serial, OneMesh(SurfaceMesh{}).instances, lens()).depth) == 0);
+  CHECK(covered(draw<float>(serial, OneMesh(SurfaceMesh{}).instances, mesh_lens()).depth) == 0);
   const OneMesh behind(sphere(1, 8, 4), {{}, {0, 0, -5}, 1});
-  const auto drawn = draw<float>(serial, behind.instances, lens());
+  const auto drawn = draw<float>(serial, behind.instances, mesh_lens());
   CHECK(covered(drawn.depth) == 0);
   CHECK(drawn.stats.drawn == 0);
 }

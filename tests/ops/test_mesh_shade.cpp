@@ -15,14 +15,7 @@ namespace {
 using namespace gsnav;
 using namespace gsnav_test;
 
-Camera lens(int size, double f) {
-  Camera c;
-  c.width = c.height = size;
-  c.fx = c.fy = f;
-  c.cx = c.cy = 0.5 * size;
-  c.near_plane = 0.05;
-  return c;
-}
+Camera lens(int size, double f) { return mesh_lens(size, size, f); }
 
 double encoded(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;

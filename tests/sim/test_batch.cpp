@@ -8,6 +8,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "sim_scene.hpp"
+#include "wandering.hpp"
 
 #if defined(__GLIBC__)
 #include <malloc.h>
@@ -27,25 +28,6 @@ BatchConfig small_batch(int height = 16, int width = 24) {
 
 std::vector<std::shared_ptr<const SimulatorScene>> two_scenes() {
   return {std::make_shared<const SimulatorScene>(peopled_scene(2000)), std::make_shared<const SimulatorScene>(flat_scene())};
-}
-
-/// Episodes that begin anywhere and at different times; every third is in the scene without people.
-Result<BatchEpisode> wandering(std::size_t environment, std::size_t count) {
-  Rng rng(1000 * environment + count);
-  BatchEpisode e;
-  e.scene = (environment + count) % 3 == 2 ? 1 : 0;
-  EpisodeRules rules;
-  rules.max_distance = 8.0;
-  e.episode = generate_episode(*flat_navmesh(), rng, rules).value();
-  e.episode.id = std::to_string(environment) + "/" + std::to_string(count);
-  e.episode.start_time = 0.5 * static_cast<double>(rng.below(8));
-  return e;
-}
-
-Action random_action(Rng& rng) {
-  constexpr Action kActions[] = {Action::move_forward, Action::move_forward, Action::turn_left,
-                                 Action::turn_right,   Action::look_up,      Action::look_down};
-  return rng.below(50) == 0 ? Action::stop : kActions[rng.below(6)];
 }
 
 bool same_bits(std::span<const float> a, std::span<const float> b) {
@@ -101,7 +83,9 @@ TEST_CASE("a batch has the bits of single simulators over 1,000 random steps amo
   Rng rng(5);
   for (int i = 0; i < 1000; ++i) {
     std::vector<Action> actions;
-    for (std::size_t e = 0; e < kEnvironments; ++e) actions.push_back(random_action(rng));
+    for (std::size_t e = 0; e < kEnvironments; ++e) {
+      actions.push_back(rng.below(50) == 0 ? Action::stop : wandering_action(rng));
+    }
     out = batch.step(actions).value();
     for (std::size_t e = 0; e < kEnvironments; ++e) {
       Simulator<OpenMPBackend>& sim = single[e][scene[e]];

@@ -11,6 +11,7 @@
 #include "gsnav/sim/batch.hpp"
 #include "ops/no_gpu.hpp"
 #include "sim_scene.hpp"
+#include "wandering.hpp"
 #if defined(SIM_TEST_DLPACK)
 #include "gsnav/interop/dlpack.hpp"
 #endif
@@ -47,24 +48,6 @@ struct Difference {
     if (kind == SensorKind::rgb || kind == SensorKind::alpha) CHECK(far_over == 0);
   }
 };
-
-Action wandering_action(Rng& rng) {
-  constexpr Action kActions[] = {Action::move_forward, Action::move_forward, Action::turn_left,
-                                 Action::turn_right,   Action::look_up,      Action::look_down};
-  return kActions[rng.below(6)];
-}
-
-Result<BatchEpisode> wandering(std::size_t environment, std::size_t count) {
-  Rng rng(1000 * environment + count);
-  BatchEpisode e;
-  e.scene = (environment + count) % 3 == 2 ? 1 : 0;
-  EpisodeRules rules;
-  rules.max_distance = 8.0;
-  e.episode = generate_episode(*flat_navmesh(), rng, rules).value();
-  e.episode.id = std::to_string(environment) + "/" + std::to_string(count);
-  e.episode.start_time = 0.5 * static_cast<double>(rng.below(8));
-  return e;
-}
 
 std::vector<float> fetched(CudaBackend& cuda, const BatchObservation& o) {
   std::vector<float> host(o.environments * static_cast<std::size_t>(o.height * o.width * o.channels));

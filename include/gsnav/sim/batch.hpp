@@ -285,7 +285,7 @@ class BatchSimulator {
     for (const Posed& p : posed_) scenes_[p.scene]->make_slots(p.slot + 1);
     parallel()(posed_.size(), [this](std::size_t i) {
       Posed& p = posed_[i];
-      p.status = guarded([&] {
+      p.status = detail::guarded([&] {
         for (std::size_t l = p.first; l < p.last; ++l) {
           const AgentPose& agent = world(lookers_[l].environment).agent();
           rig_.append_cameras(agent.position, agent.rotation(), agent.pitch, p.cameras);
@@ -307,18 +307,6 @@ class BatchSimulator {
       }
     }
     return rig_.render(views_, images);
-  }
-
-  /// No exception may leave a parallel region.
-  template <class F>
-  static Status guarded(const F& f) noexcept {
-    try {
-      return f();
-    } catch (const Error& e) {
-      return {e.code(), e.what()};
-    } catch (const std::exception& e) {
-      return {Errc::out_of_memory, e.what()};
-    }
   }
 
   static constexpr std::size_t kPieces = 64;
