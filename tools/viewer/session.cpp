@@ -175,7 +175,9 @@ Status Session::draw_view(const Controls& c, const gsnav::CapsuleSet& bodies) {
       gsnav::sensor_camera(stage_.config.sensors.front(), agent.position, agent.rotation(), agent.pitch);
   std::span<const gsnav::GaussianSet> sets = scene_.assets();
   if (c.people) {
-    if (Status s = scene_.pose(0, world_.time(), std::span(&camera, 1), renderer_.config()); !s) return s;
+    scene_.make_slots(1);
+    if (Status s = scene_.prepare(0, world_.time(), std::span(&camera, 1), renderer_.config()); !s) return s;
+    if (Status s = scene_.pose_prepared(0); !s) return s;
     sets = scene_.sets(0);
   }
   if (Status s = renderer_.render(sets, std::span(&camera, 1), frames_); !s) return s;
