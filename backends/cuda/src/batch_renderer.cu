@@ -40,7 +40,7 @@ void CudaBatchRenderer::State::size_scratch() {
   const DepthMode mode = raster.depth_mode();
   const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
   const bool records_depths =
-      mode == DepthMode::any || (mode == DepthMode::median && pixels >= 3 * std::size_t{slot_capacity});
+      mode == DepthMode::any || (mode == DepthMode::median && 2 * pixels >= 5 * std::size_t{slot_capacity});
   const bool perspective = config.response != Response::ewa;
   args.depths = records_depths ? size(depths, slot_capacity) : nullptr;
   args.perspectives = perspective ? size(perspectives, slot_capacity) : nullptr;
