@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/eval/oracle_photo.hpp"
 #include "gsnav/scene/lod_build.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/renderer.hpp"
@@ -41,14 +42,8 @@ double psnr(const std::vector<float>& a, const std::vector<float>& b) {
   return -10 * std::log10(std::max(sum / static_cast<double>(a.size()), 1e-30));
 }
 
-std::vector<float> photo(Renderer<float, OpenMPBackend>& renderer, const GaussianSet& set, Camera c) {
-  c.fx *= kPhoto;
-  c.fy *= kPhoto;
-  c.cx *= kPhoto;
-  c.cy *= kPhoto;
-  c.width *= kPhoto;
-  c.height *= kPhoto;
-  const Frames<float> fine = renderer.render(set, c).value();
+std::vector<float> photo(Renderer<float, OpenMPBackend>& renderer, const GaussianSet& set, const Camera& c) {
+  const Frames<float> fine = renderer.render(set, eval::detail::magnified(c, kPhoto)).value();
   std::vector<float> out(3 * kSide * kSide);
   for (std::size_t p = 0; p < out.size(); ++p) {
     const std::size_t channel = p % 3, x = p / 3 % kSide, y = p / 3 / kSide;
