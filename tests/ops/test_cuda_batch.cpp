@@ -8,132 +8,13 @@
 #include "support/scenes.hpp"
 
 #if defined(GSNAV_HAS_CUDA)
-#include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/backends/cuda/pinned.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "ops/cuda_batch_images.hpp"
 #include "ops/no_gpu.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
-
-namespace {
-
-using Lists = std::vector<std::vector<std::uint32_t>>;
-
-/// More than sixteen a multiprocessor of any GPU.
-constexpr int kManyTiles = 9 * 384;
-
-/// Images of a batch, fetched. `lists`: the sets of each camera; empty: all.
-struct Batch {
-  Frames<float> frames;
-  std::vector<std::uint8_t> rgb8;
-  BatchStats stats;
-};
-
-Batch draw(CudaBackend& cuda, CudaBatchRenderer& renderer, const std::vector<GaussianSet>& sets,
-           const std::vector<Camera>& cameras, const Lists& lists, unsigned outputs, bool bytes = true) {
-  Batch out;
-  const std::size_t pixels =
-      static_cast<std::size_t>(cameras[0].width) * static_cast<std::size_t>(cameras[0].height) * cameras.size();
-  Buffer<float, CudaBackend> images(cuda);
-  Buffer<std::uint8_t, CudaBackend> rgb8(cuda);
-  images.resize_discard(8 * pixels);
-  rgb8.resize_discard(3 * pixels);
-  cuda.fill(images.data(), 0xa5, 8 * pixels * sizeof(float));  // what is not written is seen
-  cuda.fill(rgb8.data(), 0xa5, 3 * pixels);
-  BatchImages to;
-  const auto at = [&](unsigned output, std::size_t first) {
-    return (outputs & output) != 0 ? images.data() + first * pixels : nullptr;
-  };
-  to.floats = {at(kRgb, 0), at(kAlpha, 3), at(kMedianDepth, 4), at(kExpectedDepth, 5), at(kAccumulatedDepth, 6),
-               at(kFirstHitDepth, 7)};
-  to.rgb8 = bytes ? rgb8.data() : nullptr;
-  std::vector<BatchCamera> batch;
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    batch.push_back({cameras[c], lists.empty() ? std::span<const std::uint32_t>() : std::span(lists[c])});
-  }
-  renderer.render(sets, batch, to).throw_if_error();
-  renderer.finish().throw_if_error();
-  out.stats = renderer.stats();
-  const auto fetch = [&](std::vector<float>& image, const float* from, std::size_t channels) {
-    if (from == nullptr) return;
-    image.resize(channels * pixels);
-    cuda.copy(image.data(), from, image.size() * sizeof(float), CopyKind::device_to_host);
-  };
-  fetch(out.frames.rgb, to.floats.rgb, 3);
-  fetch(out.frames.alpha, to.floats.alpha, 1);
-  fetch(out.frames.median_depth, to.floats.median_depth, 1);
-  fetch(out.frames.expected_depth, to.floats.expected_depth, 1);
-  fetch(out.frames.accumulated_depth, to.floats.accumulated_depth, 1);
-  fetch(out.frames.first_hit_depth, to.floats.first_hit_depth, 1);
-  if (bytes) {
-    out.rgb8.resize(3 * pixels);
-    rgb8.download(out.rgb8.data(), out.rgb8.size());
-  }
-  REQUIRE(cuda.synchronize().ok());
-  return out;
-}
-
-/// The same cameras one at a time through the generic path.
-Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& sets, const std::vector<Camera>& cameras,
-                     const Lists& lists, RenderConfig config, unsigned outputs) {
-  config.outputs = outputs;
-  Renderer<float, CudaBackend> renderer(cuda, config);
-  Frames<float> all;
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    std::vector<GaussianSet> seen;
-    if (lists.empty() || lists[c].empty()) seen = sets;
-    if (!lists.empty()) {
-      for (const std::uint32_t s : lists[c]) seen.push_back(sets[s]);
-    }
-    const Frames<float> f = renderer.render(seen, std::vector<Camera>{cameras[c]}).value();
-    const auto append = [](std::vector<float>& to, const std::vector<float>& from) {
-      to.insert(to.end(), from.begin(), from.end());
-    };
-    append(all.rgb, f.rgb);
-    append(all.alpha, f.alpha);
-    append(all.median_depth, f.median_depth);
-    append(all.expected_depth, f.expected_depth);
-    append(all.accumulated_depth, f.accumulated_depth);
-    append(all.first_hit_depth, f.first_hit_depth);
-  }
-  return all;
-}
-
-std::size_t differing(const std::vector<float>& a, const std::vector<float>& b) {
-  if (a.size() != b.size()) return a.size() + b.size() + 1;
-  std::size_t n = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) n += a[i] == b[i] ? 0u : 1u;
-  return n;
-}
-
-void check_same(const Frames<float>& a, const Frames<float>& b) {
-  CHECK(differing(a.rgb, b.rgb) == 0);
-  CHECK(differing(a.alpha, b.alpha) == 0);
-  CHECK(differing(a.median_depth, b.median_depth) == 0);
-  CHECK(differing(a.expected_depth, b.expected_depth) == 0);
-  CHECK(differing(a.accumulated_depth, b.accumulated_depth) == 0);
-  CHECK(differing(a.first_hit_depth, b.first_hit_depth) == 0);
-}
-
-/// Cameras around the origin that look at the box of `random_cloud`, none like another.
-std::vector<Camera> ring(int count, int width, int height) {
-  std::vector<Camera> cameras;
-  Rng rng(99);
-  for (int c = 0; c < count; ++c) {
-    const Vec3d eye{rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-0.5, 2.5)};
-    Camera camera = Camera::look_at(eye, {0.3 * rng.uniform(-1, 1), 0.1, 4}, {0, -1, 0.1}, width, height,
-                                    rng.uniform(60, 110));
-    camera.cx += rng.uniform(-9, 9);
-    camera.near_sigma = c % 3 == 0 ? 1 : 0;
-    cameras.push_back(camera);
-  }
-  return cameras;
-}
-
-constexpr unsigned kMedianOnly = kRgb | kAlpha | kMedianDepth, kAll = kRgb | kAlpha | kAnyDepth;
-
-}  // namespace
 
 TEST_CASE("cuda batch: every camera has the bits it has alone") {
   if (no_gpu("cuda batch images")) return;
@@ -164,7 +45,7 @@ TEST_CASE("cuda batch: every camera has the bits it has alone") {
       for (const unsigned outputs : {kMedianOnly, kAll}) {
         CAPTURE(static_cast<int>(response));
         CAPTURE(outputs);
-        const Batch got = draw(cuda, renderer, sets, cameras, lists, outputs);
+        const Batch got = draw_batch(cuda, renderer, sets, cameras, lists, outputs);
         const Frames<float> expected = singly(cuda, sets, cameras, lists, config, outputs);
         check_same(got.frames, expected);
         std::size_t wrong_bytes = 0;
@@ -194,7 +75,7 @@ TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
       CudaBatchRenderer renderer(cuda, config);
       for (const unsigned outputs : {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth}, kMedianOnly, kAll}) {
         config.outputs = outputs;
-        const Batch got = draw(cuda, renderer, {arrays.set()}, {camera}, {}, outputs, false);
+        const Batch got = draw_batch(cuda, renderer, {arrays.set()}, {camera}, {}, outputs, false);
         check_same(got.frames, singly(cuda, {arrays.set()}, {camera}, {}, config, outputs));
         // On the GPU `fast` has the exponential of the hardware.
         if (profile == Profile::fast) continue;
@@ -219,9 +100,9 @@ TEST_CASE("cuda batch: images of many pixels, and bands in half precision") {
     RenderConfig config;
     config.outputs = kMedianOnly;
     CudaBatchRenderer renderer(cuda, config);
-    const Batch large = draw(cuda, renderer, sets, one, {}, kMedianOnly, false);
+    const Batch large = draw_batch(cuda, renderer, sets, one, {}, kMedianOnly, false);
     check_same(large.frames, render<float>(serial, {cloud.set()}, one[0], config));
-    check_same(draw(cuda, renderer, sets, many, {}, kMedianOnly, false).frames, singly(cuda, sets, many, {}, config, kMedianOnly));
+    check_same(draw_batch(cuda, renderer, sets, many, {}, kMedianOnly, false).frames, singly(cuda, sets, many, {}, config, kMedianOnly));
     const Frames<float> of_floats = render<float>(serial, {full.set()}, one[0], config);
     CHECK(differing(large.frames.rgb, of_floats.rgb) > 0);
     CHECK(differing(large.frames.median_depth, of_floats.median_depth) == 0);
@@ -253,12 +134,12 @@ TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are 
     if (sorted) sort_spatially(cloud);
     const GaussianArrays<CudaBackend> arrays(cuda, cloud);
     CudaBatchRenderer renderer(cuda);
-    const Batch got = draw(cuda, renderer, {arrays.set()}, {camera, camera}, {}, kAll, false);
+    const Batch got = draw_batch(cuda, renderer, {arrays.set()}, {camera, camera}, {}, kAll, false);
     Frames<float> expected = singly(cuda, {arrays.set()}, {camera, camera}, {}, {}, kAll);
     check_same(got.frames, expected);
     // Many cameras have lists of other tiles, put in order in another way.
     const std::vector<Camera> many(static_cast<std::size_t>(kManyTiles / 9), camera);
-    const Batch crowd = draw(cuda, renderer, {arrays.set()}, many, {}, kMedianOnly, false);
+    const Batch crowd = draw_batch(cuda, renderer, {arrays.set()}, many, {}, kMedianOnly, false);
     for (const std::size_t c : {std::size_t{0}, many.size() - 1}) {
       const auto rgb = crowd.frames.rgb.begin() + static_cast<std::ptrdiff_t>(c * 3 * 48 * 48);
       const auto one = got.frames.rgb.begin();
@@ -279,23 +160,23 @@ TEST_CASE("cuda batch: the same bits on every run, in any company") {
   const GaussianArrays<CudaBackend> arrays(cuda, cloud);
   const std::vector<Camera> cameras = ring(3, 40, 36);
   CudaBatchRenderer renderer(cuda);
-  const Batch all = draw(cuda, renderer, {arrays.set()}, cameras, {}, kMedianOnly);
-  check_same(draw(cuda, renderer, {arrays.set()}, cameras, {}, kMedianOnly).frames, all.frames);
+  const Batch all = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianOnly);
+  check_same(draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianOnly).frames, all.frames);
   const std::vector<Camera> last{cameras[2]};
-  const Batch alone = draw(cuda, renderer, {arrays.set()}, last, {}, kMedianOnly);
+  const Batch alone = draw_batch(cuda, renderer, {arrays.set()}, last, {}, kMedianOnly);
   const std::vector<float> third(all.frames.rgb.end() - 3 * 40 * 36, all.frames.rgb.end());
   CHECK(differing(alone.frames.rgb, third) == 0);
   // In a batch so large that tiles are of 16 pixels and each is one block's.
   std::vector<Camera> crowd = ring(kManyTiles / 9, 40, 36);
   crowd[7] = cameras[2];
-  const Batch many = draw(cuda, renderer, {arrays.set()}, crowd, {}, kMedianOnly);
+  const Batch many = draw_batch(cuda, renderer, {arrays.set()}, crowd, {}, kMedianOnly);
   const auto seventh = [&](const std::vector<float>& image, std::ptrdiff_t channels) {
     const auto from = image.begin() + 7 * channels * 40 * 36;
     return std::vector<float>(from, from + channels * 40 * 36);
   };
   CHECK(differing(alone.frames.rgb, seventh(many.frames.rgb, 3)) == 0);
   CHECK(differing(alone.frames.median_depth, seventh(many.frames.median_depth, 1)) == 0);
-  check_same(draw(cuda, renderer, {arrays.set()}, crowd, {}, kMedianOnly).frames, many.frames);
+  check_same(draw_batch(cuda, renderer, {arrays.set()}, crowd, {}, kMedianOnly).frames, many.frames);
 }
 
 TEST_CASE("cuda batch: calls that differ in their cameras alone are replayed, with the same bits") {
@@ -383,11 +264,11 @@ TEST_CASE("cuda batch: scratch that is too small grows, and says so") {
   const GaussianArrays<CudaBackend> few(cuda, small), many(cuda, big);
   const std::vector<Camera> cameras = ring(9, 96, 80);
   CudaBatchRenderer renderer(cuda);
-  CHECK(draw(cuda, renderer, {few.set()}, cameras, {}, kMedianOnly).stats.reruns == 0);
-  const Batch grown = draw(cuda, renderer, {many.set()}, cameras, {}, kMedianOnly);
+  CHECK(draw_batch(cuda, renderer, {few.set()}, cameras, {}, kMedianOnly).stats.reruns == 0);
+  const Batch grown = draw_batch(cuda, renderer, {many.set()}, cameras, {}, kMedianOnly);
   CHECK(grown.stats.reruns > 0);
   check_same(grown.frames, singly(cuda, {many.set()}, cameras, {}, {}, kMedianOnly));
-  const Batch steady = draw(cuda, renderer, {many.set()}, cameras, {}, kMedianOnly);
+  const Batch steady = draw_batch(cuda, renderer, {many.set()}, cameras, {}, kMedianOnly);
   CHECK(steady.stats.reruns == 0);
   CHECK(steady.stats.scratch_bytes == grown.stats.scratch_bytes);
   check_same(steady.frames, grown.frames);
@@ -404,7 +285,7 @@ TEST_CASE("cuda batch: an empty view, no sets, and what cannot be drawn") {
   CudaBatchRenderer renderer(cuda, config);
   for (const bool empty : {false, true}) {
     const std::vector<GaussianSet> sets = empty ? std::vector<GaussianSet>{} : std::vector<GaussianSet>{arrays.set()};
-    const Batch f = draw(cuda, renderer, sets, {away, away}, {}, kMedianOnly);
+    const Batch f = draw_batch(cuda, renderer, sets, {away, away}, {}, kMedianOnly);
     CHECK(f.frames.rgb[1] == 0.5f);
     CHECK(f.frames.alpha.back() == 0.0f);
     CHECK(f.frames.median_depth.back() == 0.0f);

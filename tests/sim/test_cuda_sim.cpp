@@ -9,6 +9,7 @@
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/sim/batch.hpp"
+#include "mesh_box.hpp"
 #include "ops/no_gpu.hpp"
 #include "sim_scene.hpp"
 #include "wandering.hpp"
@@ -105,6 +106,40 @@ TEST_CASE("cuda: a simulator among people sees what the OpenMP one sees") {
     CAPTURE(config.sensors[i].uuid);
     differences[i].check(config.sensors[i].kind);
   }
+}
+
+TEST_CASE("cuda: meshes, their normals, and batches with them") {
+  if (no_gpu("cuda meshes in a simulator")) return;
+  SimulatorScene furnished = peopled_scene(4000);
+  furnished.meshes.push_back(turned_box(0.3));
+  BatchConfig config;
+  config.sensors = rgbd_sensors(64, 96);
+  config.sensors.push_back(config.sensors[0]);
+  config.sensors[2].uuid = "normal";
+  config.sensors[2].kind = SensorKind::normal;
+  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{
+      std::make_shared<const SimulatorScene>(furnished), std::make_shared<const SimulatorScene>(flat_scene())};
+  const auto facing = [](std::size_t environment, std::size_t) -> Result<BatchEpisode> {
+    return BatchEpisode{environment % 3 == 2 ? 1u : 0u, to_kitchen()};
+  };
+  CudaBackend cuda;
+  OpenMPBackend openmp;
+  auto on_gpu = make_batch_simulator(cuda, scenes, config, 5, facing).value();
+  auto on_cpu = make_batch_simulator(openmp, scenes, config, 5, facing).value();
+  const auto got = on_gpu.reset().value(), want = on_cpu.reset().value();
+  for (std::size_t i = 0; i < 2; ++i) {
+    CAPTURE(config.sensors[i].uuid);
+    Difference d;
+    d.add(config.sensors[i].kind, got.images[i].data, want.images[i].data);
+    d.check(config.sensors[i].kind);
+  }
+  std::size_t normals = 0, other = 0;
+  for (std::size_t i = 0; i < want.images[2].data.size(); ++i) {
+    normals += want.images[2].data[i] != 0 ? 1 : 0;
+    other += std::abs(got.images[2].data[i] - want.images[2].data[i]) < 1e-6f ? 0 : 1;
+  }
+  CHECK(normals > 1000);
+  CHECK(other <= normals / 100);  // where the median depth is the mesh's on one of the two only
 }
 
 TEST_CASE("cuda: a batch sees what the OpenMP one sees, in host memory and on the GPU") {

@@ -6,6 +6,7 @@
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/sim/batch.hpp"
+#include "mesh_box.hpp"
 #include "ops/backends.hpp"
 #include "sim_scene.hpp"
 
@@ -13,26 +14,6 @@ using namespace gsnav;
 using namespace gsnav_test;
 
 namespace {
-
-SurfaceMesh box(const Vec3f& low, const Vec3f& high) {
-  SurfaceMesh m;
-  for (int i = 0; i < 8; ++i) {
-    m.geometry.vertices.push_back(
-        {(i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y, (i & 4) != 0 ? high.z : low.z});
-  }
-  m.geometry.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                          {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  m.base_color = {0.2f, 0.7f, 0.1f};
-  return m;
-}
-
-/// A box of 0.8 m that stands turned before the agent, as a surface of one part.
-SceneMesh turned_box(double yaw) {
-  auto surface = std::make_shared<PlacedMeshes>();
-  surface->instances.push_back(
-      {surface->meshes.add(box({-0.4f, 0, -0.4f}, {0.4f, 0.8f, 0.4f})).value(), {}});
-  return {surface, {yaw_rotation(yaw), {4.6, 0, 1.9}, 1.0}};
-}
 
 std::vector<SensorSpec> sensors(int height = 40, int width = 56) {
   std::vector<SensorSpec> out = rgbd_sensors(height, width);
@@ -193,10 +174,18 @@ TEST_CASE("what is wrong with meshes and their sensors is named") {
   SensorSpec s = sensors()[2];
   s.model = SensorModel::fisheye;
   CHECK(validate(s).message().find("pinholes") != std::string::npos);
-  // A backend with a memory of its own says that it has no normals.
+}
+
+TEST_CASE("a backend with a memory of its own has the bits of the serial one, normals too") {
+  SimulatorScene scene = flat_scene();
+  scene.meshes.push_back(turned_box(0.3));
+  SerialBackend serial;
   ToyBackend toy;
-  SimulatorScene fine = flat_scene();
-  auto sim = make_simulator(toy, fine, config_of({sensors()[2]})).value();
-  const auto refused = sim.reset(to_kitchen());
-  CHECK(refused.code() == Errc::unsupported);
+  auto expected = make_simulator(serial, scene, config_of(sensors())).value();
+  auto sim = make_simulator(toy, scene, config_of(sensors())).value();
+  const auto want = expected.reset(to_kitchen()).value(), got = sim.reset(to_kitchen()).value();
+  for (std::size_t s = 0; s < 4; ++s) {
+    CAPTURE(s);
+    CHECK(std::equal(want.images[s].data.begin(), want.images[s].data.end(), got.images[s].data.begin()));
+  }
 }

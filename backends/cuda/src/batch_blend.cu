@@ -39,9 +39,11 @@ struct BlendShared {
   __device__ StagedSplat& splat(std::uint32_t i) { return reinterpret_cast<StagedSplat*>(order.lent)[i]; }
 };
 
-/// Puts the records of splats [first, first + n) of the batch into shared memory, and what they may reach.
+/// Puts the records of splats [first, first + n) of the batch into shared memory, and what they may reach. `far`: of the
+/// tile's meshes.
+template <bool Mesh>
 __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, std::uint32_t n, int tile_x,
-                      int tile_y) {
+                      int tile_y, float far) {
   if (threadIdx.x == 0) {
     s.splat(kNothing) = staged_nothing();
     s.queued = 0;
@@ -51,6 +53,10 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, s
     const std::uint32_t slot = s.order.slots[first + i];
     const SplatRecord r = a.records[slot];
     s.splat(i) = staged(r, slot);
+    if (Mesh && is_hidden(a, slot, far)) {
+      s.masks[i] = 0;
+      continue;
+    }
     const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
     if (a.elliptic && blocks.many()) {
       s.queue[atomicAdd(&s.queued, 1u)] = static_cast<std::uint16_t>(i);  // so that no lane waits for another's
@@ -100,8 +106,8 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned b
 
 /// A block a tile, a thread two pixels of a column, a quarter of a warp a block of 4 x 4 of them. For
 /// DepthMode::median the slot of the median Gaussian is left in the image.
-template <bool Color, DepthMode D, Exp2 M, Form F>
-__global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(const __grid_constant__ BlendArgs b) {
+template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh>
+__global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor) blend_kernel(const __grid_constant__ BlendArgs b) {
   extern __shared__ __align__(16) unsigned char memory[];
   BlendShared& s = *reinterpret_cast<BlendShared*>(memory);
   const BatchArgs& a = b.batch;
@@ -129,10 +135,21 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(co
     py[k] = static_cast<float>(y + k * kRowsApart) + 0.5f;
     if (!inside[k]) state[k].transmittance = 0;
   }
+  const auto pixel_of = [&](int k) {
+    const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
+    const std::size_t line = camera * height + static_cast<std::size_t>(y + k * kRowsApart);
+    return line * width + static_cast<std::size_t>(x);
+  };
+  float mesh[kPixels]{}, far = 0;
+  if constexpr (Mesh) {
+    std::size_t pixel[kPixels];
+    for (int k = 0; k < kPixels; ++k) pixel[k] = pixel_of(k);
+    far = load_mesh(b, pixel, inside, mesh);
+  }
   const auto is_open = [&] { return state[0].open(rules) || state[1].open(rules); };
   const auto blend = [&](std::uint32_t place) {
-    blend_staged<Color, D, M, F>(a, rules, *reinterpret_cast<const StagedSplat*>(s.order.lent + place), px, py, state,
-                                 median);
+    blend_staged<Color, D, M, F, Mesh>(a, rules, *reinterpret_cast<const StagedSplat*>(s.order.lent + place), px, py,
+                                       mesh, state, median);
   };
   TileOrder order(a, ordered, camera);
   unsigned open = __ballot_sync(kAll, is_open());
@@ -140,7 +157,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(co
   while (const std::uint32_t n = all_closed ? 0 : order.next(s.order, a)) {
     for (std::uint32_t first = 0; first < n && !all_closed; first += kChunk) {
       const std::uint32_t staged = min(kChunk, n - first);
-      stage(s, a, first, staged, tile_x, tile_y);
+      stage<Mesh>(s, a, first, staged, tile_x, tile_y, far);
       if (open != 0) {
         unsigned quarters = 0;
         for (unsigned q = 0; q < 4; ++q) quarters |= (open >> 8 * q & 0xffu) != 0 ? 1u << q : 0u;
@@ -159,11 +176,8 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) blend_kernel(co
       all_closed = __syncthreads_or(open != 0 ? 1 : 0) == 0;
     }
   }
-  const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
   for (int k = 0; k < kPixels; ++k) {
-    if (!inside[k]) continue;
-    const std::size_t line = camera * height + static_cast<std::size_t>(y + k * kRowsApart);
-    write<D>(b, line * width + static_cast<std::size_t>(x), state[k], median[k]);
+    if (inside[k]) write<Color, D, Mesh>(b, pixel_of(k), state[k], median[k], px, py[k]);
   }
 }
 
@@ -242,13 +256,13 @@ void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std
   if (args.depth_bins.many()) {
     launch_blending_small(b, stream);
   } else {
-    dispatch_blending(b, [&]<bool C, DepthMode D, Exp2 M, Form F>() {
-      const auto kernel = blend_kernel<C, D, M, F>;
+    dispatch_blending(b, [&]<bool C, DepthMode D, Exp2 M, Form F, bool Mesh>() {
+      const auto kernel = blend_kernel<C, D, M, F, Mesh>;
       cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, sizeof(BlendShared));
       kernel<<<args.tiles, kThreads, sizeof(BlendShared), stream>>>(b);
     });
   }
-  if (raster.depth_mode() == DepthMode::median) {
+  if (raster.depth_mode() == DepthMode::median && raster.mesh.empty()) {
     const auto blocks = [](int pixels, unsigned of) { return (static_cast<unsigned>(pixels) + of - 1) / of; };
     depth_kernel<<<dim3(blocks(args.grid.width, kDepthColumns), blocks(args.grid.height, kDepthRows), args.cameras),
                    kDepthThreads, 0, stream>>>(args, raster.images.median_depth);

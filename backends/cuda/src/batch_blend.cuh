@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+
 #include "batch_args.cuh"
 #include "gsnav/backends/cuda.hpp"
+#include "gsnav/kernels/composite.hpp"
 
 // What the kernels share that blend tiles.
 
@@ -80,11 +83,25 @@ struct BlendArgs {
   std::uint8_t* rgb8;
 };
 
-template <DepthMode D>
-__device__ void write(const BlendArgs& b, std::size_t pixel,
-                      const BlendState<float, kBlendedDepth<D>>& state,
-                      std::uint32_t median) {
+/// The median depth of a pixel with a mesh, or none, of which `median` is the slot and `state` what Gaussians left.
+template <class State>
+__device__ float median_before_mesh(const BlendArgs& b, std::size_t pixel, const State& state, std::uint32_t median,
+                                    float px, float py) {
+  if (median != kNoSlot) return ray_depth(b.batch.depths[median], px, py);
+  const float mesh = b.raster.mesh.depth[pixel];
+  return has_mesh(mesh) && abs(state.transmittance) > 0.5f ? mesh : 0.0f;
+}
+
+/// Writes a pixel, once its mesh has taken what Gaussians left of it. Without meshes the slot of the median Gaussian is
+/// left in the image.
+template <bool Color, DepthMode D, bool Mesh>
+__device__ void write(const BlendArgs& b, std::size_t pixel, BlendState<float, kBlendedDepth<D>>& state,
+                      std::uint32_t median, float px, float py) {
   const FrameImages<float>& out = b.raster.images;
+  if constexpr (Mesh) {
+    if constexpr (D == DepthMode::median) out.median_depth[pixel] = median_before_mesh(b, pixel, state, median, px, py);
+    close_by_mesh<Color>(state, b.raster.rules, b.raster.mesh, pixel);
+  }
   if (b.rgb != nullptr || b.rgb8 != nullptr) {
     const Vec3<float> color = pixel_color(b.raster, state);
     const float channels[3] = {color.x, color.y, color.z};
@@ -96,7 +113,7 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
     }
   }
   if (out.alpha != nullptr) out.alpha[pixel] = pixel_alpha(state);
-  if constexpr (D == DepthMode::median) out.median_depth[pixel] = __uint_as_float(median);
+  if constexpr (D == DepthMode::median && !Mesh) out.median_depth[pixel] = __uint_as_float(median);
   if constexpr (D == DepthMode::any) {
     if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
     if (out.expected_depth != nullptr) out.expected_depth[pixel] = pixel_expected_depth(b.raster, state);
@@ -108,11 +125,11 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
 /// What RasterArgs decide at run time and the inner loop must not.
 enum class Form { plain, exclusive_stop, perspective };
 
-/// Blends a splat into K pixels of a column.
-template <bool Color, DepthMode D, Exp2 M, Form F, int K>
+/// Blends a splat into K pixels of a column, where `mesh` has the depths of their meshes.
+template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh, int K>
 __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>& rules, const StagedSplat& from, float px,
-                                    const float (&py)[K], BlendState<float, kBlendedDepth<D>> (&state)[K],
-                                    std::uint32_t (&median)[K]) {
+                                    const float (&py)[K], const float (&mesh)[K],
+                                    BlendState<float, kBlendedDepth<D>> (&state)[K], std::uint32_t (&median)[K]) {
   const SplatGeometry<float> geometry = geometry_of(from);
   const SplatColor<float> color = from.color;
   const std::uint32_t slot = __float_as_uint(color.pad);  // 0 for the splat that covers nothing: any will do
@@ -123,8 +140,11 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
                                ? perspective_exponent(geometry, a.perspectives[slot], px, py[k])
                                : column_exponent(terms, geometry.ref_y, geometry.b, py[k]);
     const float before = state[k].transmittance;
-    blend_alpha<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, footprint_alpha<M>(rules, exponent), &color,
-                                                           depth, px, py[k]);
+    float alpha = footprint_alpha<M>(rules, exponent);
+    if constexpr (Mesh) {
+      if (alpha > 0) alpha = alpha_before_mesh(alpha, a.depths[slot], mesh[k], px, py[k]);
+    }
+    blend_alpha<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, alpha, &color, depth, px, py[k]);
     if constexpr (D == DepthMode::median) {
       // An exclusive stop negates the transmittance and blends nothing.
       if (before > 0.5f && abs(state[k].transmittance) <= 0.5f) median[k] = slot;
@@ -132,16 +152,45 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
   }
 }
 
-/// Calls launch.operator()<Color, DepthMode, Exp2, Form>() with what the call asks for.
+/// Depths of the meshes at a thread's pixels, and the farthest of all pixels of the block: what a whole tile hides is
+/// left out of its lists. All threads of the block call it.
+template <int K>
+__device__ inline float load_mesh(const BlendArgs& b, const std::size_t (&pixel)[K], const bool (&inside)[K],
+                                  float (&mesh)[K]) {
+  __shared__ unsigned far;
+  if (threadIdx.x == 0) far = 0;
+  __syncthreads();
+  for (int k = 0; k < K; ++k) {
+    mesh[k] = inside[k] ? b.raster.mesh.depth[pixel[k]] : 0.0f;
+    atomicMax(&far, __float_as_uint(has_mesh(mesh[k]) ? mesh[k] : INFINITY));  // in order, as none is negative
+  }
+  __syncthreads();
+  return __uint_as_float(far);
+}
+
+/// Whether a mesh hides a splat at every pixel of a tile whose farthest is `far`.
+__device__ inline bool is_hidden(const BatchArgs& a, std::uint32_t slot, float far) {
+  const SplatDepth<float>& depth = a.depths[slot];
+  return depth.z - depth.reach > far;
+}
+
+/// Calls launch.operator()<Color, DepthMode, Exp2, Form, Mesh>() with what the call asks for.
 template <class L>
 void dispatch_blending(const BlendArgs& b, const L& launch) {
+  if (!b.raster.mesh.empty()) {
+    dispatch_composite(b.raster, [&]<bool C, DepthMode D, bool General>() {
+      // check_batch refuses what is more general.
+      if constexpr (!General) launch.template operator()<C, D, Exp2::degree5, Form::plain, true>();
+    });
+    return;
+  }
   dispatch_raster(b.raster, [&]<bool C, DepthMode D, Exp2 M, bool General>() {
     if constexpr (!General) {
-      launch.template operator()<C, D, device_exp2(M), Form::plain>();
+      launch.template operator()<C, D, device_exp2(M), Form::plain, false>();
     } else if (b.batch.perspectives != nullptr) {
-      launch.template operator()<C, D, M, Form::perspective>();
+      launch.template operator()<C, D, M, Form::perspective, false>();
     } else {
-      launch.template operator()<C, D, M, Form::exclusive_stop>();
+      launch.template operator()<C, D, M, Form::exclusive_stop, false>();
     }
   });
 }

@@ -60,7 +60,7 @@ __device__ std::uint32_t list_block(const SmallShared& s, std::uint16_t* list, s
 
 /// A block a tile, a warp a block of 4 x 4 pixels of it, which are its first half's. For DepthMode::median the slot of the
 /// median Gaussian is left in the image.
-template <bool Color, DepthMode D, Exp2 M, Form F>
+template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh>
 __global__ void __launch_bounds__(kThreads) blend_small_kernel(const __grid_constant__ BlendArgs b) {
   __shared__ __align__(16) unsigned char memory[sizeof(SmallShared)];
   SmallShared& s = *reinterpret_cast<SmallShared*>(memory);
@@ -82,6 +82,10 @@ __global__ void __launch_bounds__(kThreads) blend_small_kernel(const __grid_cons
   const float px = static_cast<float>(x) + 0.5f, py[1] = {static_cast<float>(y) + 0.5f};
   if (!inside) state[0].transmittance = 0;
   if (threadIdx.x == 0) s.splats[kChunk] = staged_nothing();
+  const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
+  const std::size_t pixel[1] = {(camera * height + static_cast<std::size_t>(y)) * width + static_cast<std::size_t>(x)};
+  float mesh[1]{}, far = 0;
+  if constexpr (Mesh) far = load_mesh(b, pixel, {inside}, mesh);
 
   // Records are asked for while the splats before them are drawn, and their slots before that.
   const std::uint32_t begin = a.tile_begins[ordered], end = begin + a.tile_counts[ordered];
@@ -111,6 +115,10 @@ __global__ void __launch_bounds__(kThreads) blend_small_kernel(const __grid_cons
       const std::uint32_t i = j * kThreads + threadIdx.x;
       if (i >= n) continue;
       s.splats[i] = staged(record[j], slot[j]);
+      if (Mesh && is_hidden(a, slot[j], far)) {
+        s.masks[i] = 0;
+        continue;
+      }
       const ReachedBlocks blocks(bounds_of(record[j].x, record[j].y), tile_x, tile_y, kSmallTile);
       s.masks[i] = static_cast<std::uint8_t>(a.elliptic && blocks.many()
                                                  ? blocks.of_ellipse(geometry_of(record[j]), a.log2_alpha_min)
@@ -124,7 +132,8 @@ __global__ void __launch_bounds__(kThreads) blend_small_kernel(const __grid_cons
     const std::uint32_t length = list_block(s, s.lists[warp], n, bit);
     const auto blend = [&](std::uint32_t place) {
       const auto* const from = reinterpret_cast<const unsigned char*>(s.splats) + place;
-      blend_staged<Color, D, M, F>(a, rules, *reinterpret_cast<const StagedSplat*>(from), px, py, state, median);
+      blend_staged<Color, D, M, F, Mesh>(a, rules, *reinterpret_cast<const StagedSplat*>(from), px, py, mesh, state,
+                                         median);
     };
     for (std::uint32_t i = 0; i < length; i += kListStep) {
       const uint2 places = *reinterpret_cast<const uint2*>(list + i);
@@ -137,9 +146,7 @@ __global__ void __launch_bounds__(kThreads) blend_small_kernel(const __grid_cons
     open = __any_sync(kAll, state[0].open(rules));
   }
   if (!inside) return;
-  const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
-  const std::size_t line = camera * height + static_cast<std::size_t>(y);
-  write<D>(b, line * width + static_cast<std::size_t>(x), state[0], median[0]);
+  write<Color, D, Mesh>(b, pixel[0], state[0], median[0], px, py[0]);
 }
 
 }  // namespace
@@ -149,8 +156,8 @@ void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t st
 }
 
 void launch_blending_small(const BlendArgs& b, cudaStream_t stream) {
-  dispatch_blending(b, [&]<bool C, DepthMode D, Exp2 M, Form F>() {
-    blend_small_kernel<C, D, M, F><<<b.batch.tiles, kThreads, 0, stream>>>(b);
+  dispatch_blending(b, [&]<bool C, DepthMode D, Exp2 M, Form F, bool Mesh>() {
+    blend_small_kernel<C, D, M, F, Mesh><<<b.batch.tiles, kThreads, 0, stream>>>(b);
   });
 }
 

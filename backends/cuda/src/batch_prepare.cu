@@ -12,7 +12,7 @@ namespace gsnav {
 
 namespace cuda {
 
-Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras, ColorSpace blend_space) {
+Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras, const RenderConfig& config) {
   if (cameras.empty()) return {Errc::invalid_argument, "CudaBatchRenderer: no camera to render from"};
   if (cameras.size() > 65535) {
     return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(cameras.size()) +
@@ -28,7 +28,7 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
     };
     if (!g.drawn_chunks.empty()) return unsupported("drawn_chunks: a level of detail; draw it on a host backend");
     if (!g.chunk_sh_degrees.empty()) return unsupported("chunk_sh_degrees are read in host memory; leave them out");
-    if (sets[i].color_space != blend_space) return unsupported("color_space is not the frame's blend_space");
+    if (sets[i].color_space != config.blend_space) return unsupported("color_space is not the frame's blend_space");
   }
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const auto bad = [&](Errc code, const std::string& what) {
@@ -38,6 +38,10 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
     if (Status s = validate(camera); !s) return bad(s.code(), s.message());
     if (camera.width != cameras[0].camera.width || camera.height != cameras[0].camera.height) {
       return bad(Errc::invalid_argument, "its size is not that of cameras[0]; a batch has one size");
+    }
+    if (!cameras[c].meshes.instances.empty() &&
+        (config.composite != Composite::merged || config.response != Response::ewa || config.compat != Compat::none)) {
+      return bad(Errc::unsupported, "meshes: only with Composite::merged, Response::ewa and Compat::none");
     }
     std::uint64_t gaussians = 0;
     const auto count = [&](std::size_t s) { gaussians += sets[s].gaussians.size; };

@@ -39,8 +39,8 @@ void CudaBatchRenderer::State::size_scratch() {
   // Where pixels are many beside survivors, a record each is less than projecting median Gaussians once more.
   const DepthMode mode = raster.depth_mode();
   const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
-  const bool records_depths =
-      mode == DepthMode::any || (mode == DepthMode::median && 2 * pixels >= 5 * std::size_t{slot_capacity});
+  const bool records_depths = mode == DepthMode::any || !raster.mesh.empty() ||
+                              (mode == DepthMode::median && 2 * pixels >= 5 * std::size_t{slot_capacity});
   const bool perspective = config.response != Response::ewa;
   args.depths = records_depths ? size(depths, slot_capacity) : nullptr;
   args.perspectives = perspective ? size(perspectives, slot_capacity) : nullptr;
@@ -54,7 +54,8 @@ void CudaBatchRenderer::State::size_scratch() {
   stats.scratch_bytes = inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
                         entries.capacity_bytes() + sources.capacity_bytes() + hard.capacity_bytes() +
                         several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() + bins.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
-                        pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes();
+                        pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
+                        mesh.bytes() + mesh_depth.capacity_bytes() + mesh_color.capacity_bytes();
 }
 
 cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight) const {
@@ -72,7 +73,7 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
   add(slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity);
   add(address(args.items), address(args.bins), address(args.tile_counts), address(args.tile_begins),
       address(args.tile_order), address(args.records), address(args.parts), address(args.pairs), address(args.depths),
-      address(args.perspectives));
+      address(args.perspectives), address(raster.mesh.depth), address(raster.mesh.color));
   return key;
 }
 
@@ -139,12 +140,13 @@ Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<co
                                  const BatchImages& images) {
   State& s = *state_;
   if (Status status = validate(s.config); !status) return status;
-  if (Status status = cuda::check_batch(sets, cameras, s.config.blend_space); !status) return status;
+  if (Status status = cuda::check_batch(sets, cameras, s.config); !status) return status;
   if (s.calls - s.finished >= cuda::kInFlight) {
     return {Errc::invalid_argument, "CudaBatchRenderer: call finish() at least once in " +
                                         std::to_string(cuda::kInFlight) + " calls of render()"};
   }
   if (Status status = s.prepare(sets, cameras, images); !status) return status;
+  if (Status status = s.draw_layers(cameras); !status) return status;
   if (Status status = s.launch(); !status) return status;
   ++s.calls;
   return {};

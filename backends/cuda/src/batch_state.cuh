@@ -52,7 +52,7 @@ struct Flight {
 };
 
 /// Names the camera, set or field that cannot be, or ok.
-Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras, ColorSpace blend_space);
+Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras, const RenderConfig& config);
 
 }  // namespace cuda
 
@@ -63,7 +63,7 @@ struct CudaBatchRenderer::State {
   State(CudaBackend& b, const RenderConfig& c)
       : backend(b), config(c), inputs(b), items(b), counters(b), records(b), entries(b), sources(b), several(b), large(b),
         bins(b), tile_counts(b), tile_begins(b), tile_order(b), depths(b), perspectives(b), hard(b), parts(b), pairs(b),
-        pairs_alt(b) {
+        pairs_alt(b), mesh(b), mesh_depth(b), mesh_color(b) {
     int device = 0;
     cuda::need(cudaGetDevice(&device), "cudaGetDevice");
     cuda::need(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
@@ -84,6 +84,8 @@ struct CudaBatchRenderer::State {
 
   Status prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                  const BatchImages& images);
+  /// Draws what meshes the prepared cameras see, into a layer for each.
+  Status draw_layers(std::span<const BatchCamera> cameras);
   void size_scratch();
   /// Of the call that has been prepared.
   Status launch();
@@ -109,6 +111,8 @@ struct CudaBatchRenderer::State {
   Array<cuda::HardSplat> hard;
   Array<cuda::ListPart> parts;
   Array<cuda::Pair> pairs, pairs_alt;
+  MeshWorkspace<float, CudaBackend> mesh;  ///< of one camera
+  Array<float> mesh_depth, mesh_color;     ///< [C][H][W] and [C][H][W][3]
   cuda::BatchArgs args{};
   RasterArgs<float> raster;
   std::uint8_t* rgb8 = nullptr;

@@ -147,6 +147,11 @@ class Renderer {
     return render_jobs(jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
   }
 
+  /// One frame into images in the backend's memory, which are there once the backend has been synchronised.
+  Status render_on_backend(const FrameJob<S>& job, RenderStats& stats) {
+    return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, job.images, &stats);
+  }
+
   /// Bytes of scratch held.
   std::size_t scratch_bytes() const noexcept {
     std::size_t sum = workspace_.bytes();
@@ -180,17 +185,14 @@ class Renderer {
   }
   Status render_job(const FrameJob<S>& job, RenderStats& stats) {
     if constexpr (is_host_backend<B>) {
-      return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, job.images,
-                                 &stats);
+      return render_on_backend(job, stats);
     } else {
       const std::size_t pixels =
           static_cast<std::size_t>(job.camera->width) * static_cast<std::size_t>(job.camera->height);
       FrameImages<S> images = device_images(job.images, pixels);
-      if (Status s = render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, images,
-                                         &stats);
-          !s) {
-        return s;
-      }
+      FrameJob<S> there = job;
+      there.images = images;
+      if (Status s = render_on_backend(there, stats); !s) return s;
       for_each_image(job.images, images, [&](S* host, S* device, std::size_t channels) {
         backend_->copy(host, device, pixels * channels * sizeof(S), CopyKind::device_to_host);
       });

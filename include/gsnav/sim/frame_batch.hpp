@@ -20,7 +20,7 @@
 namespace gsnav {
 
 /// Backends that draw many cameras in one call, each with sets of its own, into images in their own
-/// memory (CudaBatchRenderer says what is asked of it).
+/// memory (CudaBatchRenderer says what is asked of it). What one of them refuses as unsupported is drawn by Renderer.
 template <class B>
 concept BatchBackend = Backend<B> && !is_host_backend<B> && requires {
   typename B::batch_renderer;
@@ -56,7 +56,6 @@ class FrameBatch<B> {
   Status render_on_backend(std::span<const FrameJob<float>> jobs) {
     return render(jobs, CopyKind::device_to_device);
   }
-  /// For a single frame, with meshes too.
   Renderer<float, B>& renderer() noexcept { return renderer_; }
 
  private:
@@ -69,6 +68,7 @@ class FrameBatch<B> {
     RenderConfig config;
     int width = 0, height = 0;
     unsigned images = 0;  // a bit each
+    bool meshes = false;  // among which `fast` has the exponential of `exact`
     bool operator==(const Kind&) const = default;
   };
   struct Known {
@@ -81,7 +81,7 @@ class FrameBatch<B> {
     return {i.rgb, i.alpha, i.median_depth, i.expected_depth, i.accumulated_depth, i.first_hit_depth};
   }
   static Kind kind_of(const FrameJob<float>& job) noexcept {
-    Kind k{*job.config, job.camera->width, job.camera->height, 0};
+    Kind k{*job.config, job.camera->width, job.camera->height, 0, !job.meshes.instances.empty()};
     k.config.outputs = kRgb;  // pointers say which images
     const auto images = images_of(job.images);
     for (std::size_t i = 0; i < kImages; ++i) k.images |= images[i] != nullptr ? 1u << i : 0u;
@@ -90,13 +90,7 @@ class FrameBatch<B> {
 
   Status render(std::span<const FrameJob<float>> jobs, CopyKind to) {
     for (Known& k : known_) k.jobs.clear();
-    for (std::size_t j = 0; j < jobs.size(); ++j) {
-      if (!jobs[j].meshes.instances.empty()) {
-        return {Errc::unsupported,
-                "batches of this backend know no meshes: draw the scene on another, or without them"};
-      }
-      group(kind_of(jobs[j])).jobs.push_back(j);
-    }
+    for (std::size_t j = 0; j < jobs.size(); ++j) group(kind_of(jobs[j])).jobs.push_back(j);
     for (Known& k : known_) {
       // By where images go, so that they can be drawn there, or copied, together.
       const auto first = [&](std::size_t j) {
@@ -120,15 +114,22 @@ class FrameBatch<B> {
   }
 
   /// Draws some of a group's frames by one call; by two of half of them where the renderer says that
-  /// they are too many.
+  /// they are too many, and what it refuses alone without it.
   Status draw(Known& known, std::span<const std::size_t> which, std::span<const FrameJob<float>> jobs,
               CopyKind to) {
     if (which.empty()) return {};
     Status s = draw_at_once(known, which, jobs, to);
-    if (s.ok() || s.code() != Errc::unsupported || which.size() == 1) return s;
+    if (s.ok() || s.code() != Errc::unsupported) return s;
+    if (which.size() == 1) return draw_alone(jobs[which.front()], to);
     const std::size_t half = which.size() / 2;
     if (s = draw(known, which.first(half), jobs, to); !s) return s;
     return draw(known, which.subspan(half), jobs, to);
+  }
+
+  Status draw_alone(const FrameJob<float>& job, CopyKind to) {
+    RenderStats stats;
+    return to == CopyKind::device_to_device ? renderer_.render_on_backend(job, stats)
+                                            : renderer_.render(std::span(&job, 1), std::span(&stats, 1));
   }
 
   Status draw_at_once(Known& known, std::span<const std::size_t> which,
@@ -171,7 +172,7 @@ class FrameBatch<B> {
       }
       // A list of no sets stands for all of them.
       if (lists_.size() == first_of(cameras_.size())) lists_.push_back(place_of(GaussianSet{}));
-      cameras_.push_back({*jobs[j].camera, {}});
+      cameras_.push_back({*jobs[j].camera, {}, jobs[j].meshes});
       ends_.resize(cameras_.size());
       ends_.back() = lists_.size();
     }

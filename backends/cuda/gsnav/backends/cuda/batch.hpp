@@ -16,6 +16,8 @@ struct BatchCamera {
   /// Indices into the call's sets, each at most once; blended as one list, ties by place in this list.
   /// Empty: all sets, in order. Read during the call only.
   std::span<const std::uint32_t> sets;
+  /// Meshes among these Gaussians (docs/composition.md), arrays on the device.
+  MeshFrame meshes{};
 };
 
 /// Images of a batch in device memory, [C][H][W] row-major; null: not asked for. They stay on the device: a
@@ -31,6 +33,7 @@ struct BatchStats {
   std::uint64_t scratch_bytes = 0;       ///< held on the device, without scene and images
   int reruns = 0;                        ///< how often the batch was drawn again because scratch had to grow
   bool replayed = false;                 ///< by a recorded CUDA graph: calls that differ in their cameras alone are
+  MeshStats meshes;                      ///< of the last call to render()
 };
 
 /// Draws many cameras in one call on one GPU; docs/cuda.md says how. Images have the bits that
@@ -43,6 +46,10 @@ struct BatchStats {
 ///
 /// `RenderConfig::outputs` and `tile_size` are not read: pointers say which images, and
 /// tiles are of 8 or 16 pixels, as the number of cameras has it.
+///
+/// Meshes are drawn camera by camera into layers that the batch is then blended over; `render` waits for the count of
+/// each camera's triangles. As everywhere, `fast` has the exponential of `exact` where there are meshes: in a call with
+/// any, for all of its cameras. Unsupported among meshes: Composite::hard_depth, Response other than ewa, Compat.
 class CudaBatchRenderer {
  public:
   using camera_type = BatchCamera;

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "gsnav/backends/cuda/batch.hpp"
+#include "ops/backends.hpp"
+#include "support/scenes.hpp"
+
+// Batches of the GPU and the same cameras one at a time.
+
+namespace gsnav_test {
+
+using namespace gsnav;
+
+
+using Lists = std::vector<std::vector<std::uint32_t>>;
+
+/// More than sixteen a multiprocessor of any GPU.
+inline constexpr int kManyTiles = 9 * 384;
+
+/// Images of a batch, fetched. `lists`: the sets of each camera; empty: all. `meshes`: likewise; empty: none.
+struct Batch {
+  Frames<float> frames;
+  std::vector<std::uint8_t> rgb8;
+  BatchStats stats;
+};
+
+inline Batch draw_batch(CudaBackend& cuda, CudaBatchRenderer& renderer, const std::vector<GaussianSet>& sets,
+           const std::vector<Camera>& cameras, const Lists& lists, unsigned outputs, bool bytes = true,
+           const std::vector<MeshFrame>& meshes = {}) {
+  Batch out;
+  const std::size_t pixels =
+      static_cast<std::size_t>(cameras[0].width) * static_cast<std::size_t>(cameras[0].height) * cameras.size();
+  Buffer<float, CudaBackend> images(cuda);
+  Buffer<std::uint8_t, CudaBackend> rgb8(cuda);
+  images.resize_discard(8 * pixels);
+  rgb8.resize_discard(3 * pixels);
+  cuda.fill(images.data(), 0xa5, 8 * pixels * sizeof(float));  // what is not written is seen
+  cuda.fill(rgb8.data(), 0xa5, 3 * pixels);
+  BatchImages to;
+  const auto at = [&](unsigned output, std::size_t first) {
+    return (outputs & output) != 0 ? images.data() + first * pixels : nullptr;
+  };
+  to.floats = {at(kRgb, 0), at(kAlpha, 3), at(kMedianDepth, 4), at(kExpectedDepth, 5), at(kAccumulatedDepth, 6),
+               at(kFirstHitDepth, 7)};
+  to.rgb8 = bytes ? rgb8.data() : nullptr;
+  std::vector<BatchCamera> batch;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    batch.push_back({cameras[c], lists.empty() ? std::span<const std::uint32_t>() : std::span(lists[c]),
+                     meshes.empty() ? MeshFrame{} : meshes[c]});
+  }
+  renderer.render(sets, batch, to).throw_if_error();
+  renderer.finish().throw_if_error();
+  out.stats = renderer.stats();
+  const auto fetch = [&](std::vector<float>& image, const float* from, std::size_t channels) {
+    if (from == nullptr) return;
+    image.resize(channels * pixels);
+    cuda.copy(image.data(), from, image.size() * sizeof(float), CopyKind::device_to_host);
+  };
+  fetch(out.frames.rgb, to.floats.rgb, 3);
+  fetch(out.frames.alpha, to.floats.alpha, 1);
+  fetch(out.frames.median_depth, to.floats.median_depth, 1);
+  fetch(out.frames.expected_depth, to.floats.expected_depth, 1);
+  fetch(out.frames.accumulated_depth, to.floats.accumulated_depth, 1);
+  fetch(out.frames.first_hit_depth, to.floats.first_hit_depth, 1);
+  if (bytes) {
+    out.rgb8.resize(3 * pixels);
+    rgb8.download(out.rgb8.data(), out.rgb8.size());
+  }
+  REQUIRE(cuda.synchronize().ok());
+  return out;
+}
+
+/// The same cameras one at a time through the generic path.
+inline Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& sets, const std::vector<Camera>& cameras,
+                     const Lists& lists, RenderConfig config, unsigned outputs,
+                     const std::vector<MeshFrame>& meshes = {}) {
+  config.outputs = outputs;
+  Renderer<float, CudaBackend> renderer(cuda, config);
+  Frames<float> all;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    std::vector<GaussianSet> seen;
+    if (lists.empty() || lists[c].empty()) seen = sets;
+    if (!lists.empty()) {
+      for (const std::uint32_t s : lists[c]) seen.push_back(sets[s]);
+    }
+    if (!meshes.empty()) renderer.set_meshes(meshes[c].instances, meshes[c].light);
+    const Frames<float> f = renderer.render(seen, std::vector<Camera>{cameras[c]}).value();
+    const auto append = [](std::vector<float>& to, const std::vector<float>& from) {
+      to.insert(to.end(), from.begin(), from.end());
+    };
+    append(all.rgb, f.rgb);
+    append(all.alpha, f.alpha);
+    append(all.median_depth, f.median_depth);
+    append(all.expected_depth, f.expected_depth);
+    append(all.accumulated_depth, f.accumulated_depth);
+    append(all.first_hit_depth, f.first_hit_depth);
+  }
+  return all;
+}
+
+inline std::size_t differing(const std::vector<float>& a, const std::vector<float>& b) {
+  if (a.size() != b.size()) return a.size() + b.size() + 1;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) n += a[i] == b[i] ? 0u : 1u;
+  return n;
+}
+
+inline void check_same(const Frames<float>& a, const Frames<float>& b) {
+  CHECK(differing(a.rgb, b.rgb) == 0);
+  CHECK(differing(a.alpha, b.alpha) == 0);
+  CHECK(differing(a.median_depth, b.median_depth) == 0);
+  CHECK(differing(a.expected_depth, b.expected_depth) == 0);
+  CHECK(differing(a.accumulated_depth, b.accumulated_depth) == 0);
+  CHECK(differing(a.first_hit_depth, b.first_hit_depth) == 0);
+}
+
+/// Cameras around the origin that look at the box of `random_cloud`, none like another.
+inline std::vector<Camera> ring(int count, int width, int height) {
+  std::vector<Camera> cameras;
+  Rng rng(99);
+  for (int c = 0; c < count; ++c) {
+    const Vec3d eye{rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-0.5, 2.5)};
+    Camera camera = Camera::look_at(eye, {0.3 * rng.uniform(-1, 1), 0.1, 4}, {0, -1, 0.1}, width, height,
+                                    rng.uniform(60, 110));
+    camera.cx += rng.uniform(-9, 9);
+    camera.near_sigma = c % 3 == 0 ? 1 : 0;
+    cameras.push_back(camera);
+  }
+  return cameras;
+}
+
+inline constexpr unsigned kMedianOnly = kRgb | kAlpha | kMedianDepth, kAll = kRgb | kAlpha | kAnyDepth;
+
+}  // namespace gsnav_test
