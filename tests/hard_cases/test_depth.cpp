@@ -2,11 +2,13 @@
 // N45 to N48, N70: what depth is.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/truth.hpp"
+#include "ops/mesh_images.hpp"
 #include "support/oracle.hpp"
 #include "support/scenes.hpp"
 
@@ -205,6 +207,39 @@ TEST_CASE("N70_depth_only_equals_rgbd") {
           CHECK(same(f.accumulated_depth, all.accumulated_depth, kAccumulatedDepth));
           CHECK(same(f.first_hit_depth, all.first_hit_depth, kFirstHitDepth));
         }
+      }
+    });
+  }
+}
+
+TEST_CASE("depths alone have the bits that they have beside colour, though pixels close earlier") {
+  GaussianCloud cloud = random_cloud(21, {.count = 6000, .scale = 0.08});
+  for (std::size_t i = 0; i < cloud.size(); i += 7) cloud.opacities[i] = i % 2 == 0 ? 0.5f : 0.99f;  // steps to a half
+  const Camera camera = Camera::look_at({0.1, 0, 0}, {0, 0, 4}, {0, -1, 0}, 97, 64, 70);
+  const MeshScene ball = [] {
+    MeshScene scene;
+    scene.add(sphere(0.8, 24, 16)).value();
+    return scene;
+  }();
+  const std::vector<MeshInstance> instances{ball.instance(0, {{}, {0.2, 0.1, 4}, 1}, 1)};
+  for (const double tau : {0.05, 0.5, 0.99999}) {
+    RenderConfig config = all_outputs();
+    config.first_hit_tau = tau;
+    for_each_renderer([&](auto& renderer) {
+      for (const bool with_mesh : {false, true}) {
+        if (with_mesh && !renderer.composes) continue;
+        const auto draw = [&](unsigned outputs) {
+          RenderConfig c = config;
+          c.outputs = outputs;
+          return renderer.render({{&cloud, {}}}, {camera}, c, with_mesh ? instances : std::vector<MeshInstance>{});
+        };
+        const auto all = draw(config.outputs), median = draw(kMedianDepth), first = draw(kFirstHitDepth),
+                   both = draw(kMedianDepth | kFirstHitDepth);
+        CHECK(median.median_depth == all.median_depth);
+        CHECK(first.first_hit_depth == all.first_hit_depth);
+        CHECK(both.median_depth == all.median_depth);
+        CHECK(both.first_hit_depth == all.first_hit_depth);
+        CHECK(std::count_if(all.median_depth.begin(), all.median_depth.end(), [](auto d) { return d > 0; }) > 1000);
       }
     });
   }

@@ -2,6 +2,7 @@
 // The batched renderer against one camera at a time: the same bits, whatever the batch.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "ops/backends.hpp"
@@ -106,6 +107,38 @@ TEST_CASE("cuda batch: images of many pixels, and bands in half precision") {
     const Frames<float> of_floats = render<float>(serial, {full.set()}, one[0], config);
     CHECK(differing(large.frames.rgb, of_floats.rgb) > 0);
     CHECK(differing(large.frames.median_depth, of_floats.median_depth) == 0);
+  }
+}
+
+TEST_CASE("cuda batch: a list of the chunks to draw is a cloud of those chunks") {
+  if (no_gpu("cuda batch chunks")) return;
+  CudaBackend cuda;
+  GaussianCloud cloud = random_cloud(31, {.count = 20000});
+  sort_spatially(cloud);
+  const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+  std::vector<std::uint32_t> drawn;
+  for (std::uint32_t c = 0; c < cloud.view().all_chunks(); ++c) {
+    if (c % 3 != 1 && c != 5) drawn.push_back(c);
+  }
+  Buffer<std::uint32_t, CudaBackend> list(cuda);
+  list.resize_discard(drawn.size());
+  list.upload(drawn.data(), drawn.size());
+  GaussianSet set = arrays.set();
+  set.gaussians.drawn_chunks = {list.data(), drawn.size()};
+  // By hand: what is not drawn is too faint to be.
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const auto c = static_cast<std::uint32_t>(i / kProjectChunk);
+    if (!std::binary_search(drawn.begin(), drawn.end(), c)) cloud.opacities[i] = 1e-4f;
+  }
+  const GaussianArrays<CudaBackend> faint(cuda, cloud);
+  const GaussianArrays<CudaBackend> other(cuda, random_cloud(32, {.count = 900}));
+  const std::vector<GaussianSet> sets{set, other.set()}, by_hand{faint.set(), other.set()};
+  for (const int count : {3, 60}) {
+    const std::vector<Camera> cameras = ring(count, 149, 101);
+    CudaBatchRenderer renderer(cuda);
+    const Batch got = draw_batch(cuda, renderer, sets, cameras, {}, kAll), want = draw_batch(cuda, renderer, by_hand, cameras, {}, kAll);
+    check_same(got.frames, want.frames);
+    check_same(got.frames, singly(cuda, sets, cameras, {}, {}, kAll));
   }
 }
 

@@ -26,7 +26,6 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
     const auto unsupported = [&](const char* what) {
       return Status(Errc::unsupported, "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + what);
     };
-    if (!g.drawn_chunks.empty()) return unsupported("drawn_chunks: a level of detail; draw it on a host backend");
     if (!g.chunk_sh_degrees.empty()) return unsupported("chunk_sh_degrees are read in host memory; leave them out");
     if (sets[i].color_space != config.blend_space) return unsupported("color_space is not the frame's blend_space");
   }
@@ -216,10 +215,10 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
 
   raster = {};
   raster.grid = args.grid;
-  raster.rules = blend_rules<float>(config);
   raster.background = vec_cast<float>(config.background);
   raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
   raster.images = images.floats;
+  raster.rules = images.rgb8 != nullptr ? blend_rules<float>(config) : blend_rules<float>(config, images.floats);
   rgb8 = images.rgb8;
 
   if (slot_capacity == 0) {

@@ -35,7 +35,11 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
     const std::uint32_t first = set.first_instance + 32 * word, index = 32 * word + lane;
     const bool seen = index < set.instances && chunk_is_candidate(a.instances[first + lane].args, chunk);
     const unsigned mask = __ballot_sync(kAll, seen);
-    if (lane == 0 && mask != 0) a.items[atomicAdd(&a.counters->items, 1u)] = {first, chunk, mask};
+    if (lane == 0 && mask != 0) {
+      // Instances of a set draw the same chunks.
+      const std::size_t drawn = a.instances[set.first_instance].args.gaussians.chunk_id(chunk);
+      a.items[atomicAdd(&a.counters->items, 1u)] = {first, static_cast<std::uint32_t>(drawn), mask};
+    }
   }
 }
 

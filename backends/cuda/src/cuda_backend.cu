@@ -148,8 +148,8 @@ bool CudaBackend::sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::ui
 
 void CudaBackend::project(const ProjectArgs<float>& args) {
   if (!usable() || args.gaussians.size == 0) return;
-  if (!args.gaussians.drawn_chunks.empty() || !args.gaussians.chunk_sh_degrees.empty()) {
-    return note(cudaErrorNotSupported, "a projection with drawn_chunks or chunk_sh_degrees, which host backends know,");
+  if (!args.gaussians.chunk_sh_degrees.empty()) {
+    return note(cudaErrorNotSupported, "a projection with chunk_sh_degrees, which host backends know,");
   }
   cuda::project_kernel<<<static_cast<unsigned>(args.chunk_count()), cuda::kProjectThreads, 0, stream_>>>(
       args);

@@ -82,8 +82,8 @@ struct GaussianView {
   /// In place of quats, scales, opacities, sh0 and mostly means and shN, which are empty then. In host memory only.
   PackedRows packed;
 
-  /// Which chunks are drawn, by number, each once: a cut of a level-of-detail tree (scene/lod_cut.hpp). In memory of the
-  /// backend, where that is the host's. Empty: all chunks.
+  /// Which chunks are drawn, by number, each once: a cut of a level-of-detail tree (scene/lod_cut.hpp). In the backend's
+  /// memory. Empty: all chunks.
   View<const std::uint32_t> drawn_chunks;
 
   /// Highest SH degree that the Gaussians of a chunk use, one a chunk of all_chunks() (scene/scene_profile.hpp): bands

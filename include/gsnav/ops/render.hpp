@@ -219,7 +219,7 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   raster.colors = ws.colors.view();
   raster.depths = ws.depths.view();
   raster.perspectives = ws.perspectives.view();
-  raster.rules = blend_rules<S>(config);
+  raster.rules = blend_rules<S>(config, images);
   raster.background = vec_cast<S>(config.background);
   raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
   raster.images = images;

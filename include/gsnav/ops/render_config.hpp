@@ -122,6 +122,21 @@ BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
   return r;
 }
 
+/// The same for a frame of these images: where no colour and no alpha are asked for, and of depths only those that a
+/// transmittance decides, a pixel is closed once it has them. The images keep their bits.
+template <class S>
+BlendRules<S> blend_rules(const RenderConfig& c, const FrameImages<S>& images) noexcept {
+  BlendRules<S> r = blend_rules<S>(c);
+  const bool sums = images.rgb != nullptr || images.alpha != nullptr || images.expected_depth != nullptr ||
+                    images.accumulated_depth != nullptr;
+  if (sums || c.compat != Compat::none) return r;
+  S needed(1);
+  if (images.median_depth != nullptr) needed = S(0.5);
+  if (images.first_hit_depth != nullptr) needed = std::min(needed, S(1) - r.first_hit_tau);
+  r.transmittance_min = std::max(r.transmittance_min, needed);
+  return r;
+}
+
 /// Largest image side; tile counts and pixel offsets stay well inside their types.
 inline constexpr int kMaxImageSide = 16384;
 

@@ -19,12 +19,14 @@ namespace gsnav {
 
 /// What packing may cost. Beyond a bound the planes stay as exact as it asks for.
 struct PackLimits {
-  double mean = 0.1;     ///< how far any mean may move, in its Gaussian's largest standard deviations; else float32
+  /// How far any mean may move, in its Gaussian's largest standard deviations; else float32. 16 bits of a chunk's box save
+  /// 6 bytes, but Gaussians at nearly one depth may change places: by them a view loses up to 20 dB.
+  double mean = 0;
   double sh = 2e-3;      ///< root mean square error by 8 bits of a coefficient of bands from 1 on; else binary16
   double sh_max = 2e-3;  ///< largest error of one by binary16; else float32
 };
 
-/// A GaussianCloud in a third of its memory: 20 bytes a Gaussian for place, shape and opacity, 6 for its colour, 45 for
+/// A GaussianCloud in a third of its memory: 26 bytes a Gaussian for place, shape and opacity, 6 for its colour, 45 for
 /// SH degree 3 by 8 bits. Host backends render it as it is, in the bits of unpack_cloud's floats; others are given
 /// these (GaussianArrays). It can be edited and written only after unpack_cloud. Pack sorted clouds: places are steps
 /// of a chunk's box.
@@ -201,6 +203,7 @@ inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {}
     found.mean_bits = 32;
     found.mean = found.mean_deviations = 0;
     out.codes.resize(PackedRows::kMeans * out.count);
+    out.codes.shrink_to_fit();
     out.rest.means = std::move(cloud.means);
   }
   cloud.means = {};

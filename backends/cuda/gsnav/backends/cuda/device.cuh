@@ -25,7 +25,7 @@ static __global__ void __launch_bounds__(kProjectThreads) project_kernel(const P
   using Scan = cub::BlockScan<std::uint32_t, kProjectThreads>;
   __shared__ typename Scan::TempStorage storage;
   const GaussianView& gs = args.gaussians;
-  const std::size_t chunk = blockIdx.x, begin = chunk * kProjectChunk;
+  const std::size_t chunk = blockIdx.x, begin = gs.chunk_id(chunk) * kProjectChunk;
   const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
   const std::size_t base = (args.first_chunk + chunk) * kProjectChunk;
   std::uint32_t written = 0;
