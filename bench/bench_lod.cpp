@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Levels of detail at 256x256: time and error against O_photo(4) in one row, beside direct rendering.
 //
-//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_lod [views]
+//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_lod [views [first [each]]]
 //
+// `views` cameras from number `first` on (8 from 0). Behind each row: the view that gains least; with a
+// third argument all views.
 // O_photo is drawn in float32 by the exact profile (118 dB from float64, far above what is measured).
 // Times are of the processor on one thread, the least of five, so that they mean something beside other
 // work.
@@ -65,19 +67,23 @@ struct Bench {
   std::vector<std::vector<float>> truth;
   std::vector<double> direct;
   double direct_ms = 0;
+  std::size_t first = 0;  ///< number of the first camera
+  bool each = false;      ///< print every view
 
-  /// `pixels` = 0: every Gaussian, through the photo's filter; below: by the asset's own.
-  void row(const char* name, double pixels) {
+  /// `pixels` = 0: every Gaussian, through the photo's filter; below: by the asset's own. `fast_cuts`: alphas and
+  /// pixels end where they do in `fast`.
+  void row(const char* name, double pixels, bool fast_cuts = false) {
     RenderConfig config;
     config.outputs = kRgb;
     config.profile = Profile::fast;
-    if (pixels > 0) config = lod_config(config);
+    if (pixels > 0 && !fast_cuts) config = lod_config(config);
     Renderer<float, OpenMPBackend> renderer(one, config);
     LodCut cut(tree, cloud);
     LodChoice choice;
     choice.pixels = pixels;
     Frames<float> frames;
     double mean = 0, worst = 1e9, gain = 1e9, ms = 0, visible = 0, pairs = 0;
+    std::size_t least_view = 0;
     for (std::size_t c = 0; c < cameras.size(); ++c) {
       double least = 1e9;
       for (int repeat = 0; repeat < 5; ++repeat) {
@@ -90,8 +96,10 @@ struct Bench {
       }
       const double quality = psnr(truth[c], frames.rgb);
       if (pixels < 0) direct.push_back(quality);
+      if (each) std::printf("view %zu: %.2f dB, %+.2f, %.2f ms\n", first + c, quality, quality - direct[c], least);
       mean += quality;
       worst = std::min(worst, quality);
+      if (quality - direct[c] < gain) least_view = c;
       gain = std::min(gain, quality - direct[c]);
       ms += least;
       visible += static_cast<double>(frames.stats[0].visible);
@@ -99,8 +107,8 @@ struct Bench {
     }
     const double n = static_cast<double>(cameras.size());
     if (pixels < 0) direct_ms = ms / n;
-    std::printf("%-12s %6.2f %8.2f %8.2f %9.2f %8.2f %7.2f %9.0f %9.0f\n", name, std::max(pixels, 0.0),
-                mean / n, worst, gain, ms / n, direct_ms / (ms / n), visible / n, pairs / n);
+    std::printf("%-12s %6.2f %8.2f %8.2f %9.2f %8.2f %7.2f %9.0f %9.0f %5zu\n", name, std::max(pixels, 0.0),
+                mean / n, worst, gain, ms / n, direct_ms / (ms / n), visible / n, pairs / n, first + least_view);
   }
 };
 
@@ -110,6 +118,9 @@ int main(int argc, char** argv) {
   const GaussianCloud& cloud = gsnav_bench::workload().cloud;
   std::vector<Camera> cameras = gsnav_bench::sized(kSide, kSide);
   const std::size_t views = argc > 1 ? static_cast<std::size_t>(std::max(std::atoi(argv[1]), 1)) : 8;
+  const std::size_t first = std::min(argc > 2 ? static_cast<std::size_t>(std::max(std::atoi(argv[2]), 0)) : 0,
+                                     cameras.size() - 1);
+  cameras.erase(cameras.begin(), cameras.begin() + static_cast<std::ptrdiff_t>(first));
   if (cameras.size() > views) cameras.resize(views);
   OpenMPBackend all;
   const double start = cpu_ms();
@@ -120,12 +131,13 @@ int main(int argc, char** argv) {
   RenderConfig exact;
   exact.outputs = kRgb;
   Renderer<float, OpenMPBackend> renderer(all, exact);
-  Bench bench{OpenMPBackend(1), cloud, tree, cameras, {}, {}, 0};
+  Bench bench{OpenMPBackend(1), cloud, tree, cameras, {}, {}, 0, first, argc > 3};
   for (const Camera& c : cameras) bench.truth.push_back(photo(renderer, cloud.set(), c));
-  std::printf("%-12s %6s %8s %8s %9s %8s %7s %9s %9s\n", "", "pixels", "mean dB", "worst", "least +dB",
-              "ms", "faster", "visible", "pairs");
+  std::printf("%-12s %6s %8s %8s %9s %8s %7s %9s %9s %5s\n", "", "pixels", "mean dB", "worst", "least +dB",
+              "ms", "faster", "visible", "pairs", "view");
   bench.row("direct fast", -1);
   bench.row("photo filter", 0);
   for (const double pixels : {0.35, 0.5, 0.7, 1.0, 1.4, 2.0}) bench.row("lod", pixels);
+  for (const double pixels : {0.5, 1.0}) bench.row("fast's cuts", pixels, true);
   return 0;
 }

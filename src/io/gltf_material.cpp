@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gltf_material.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <utility>
@@ -62,14 +63,14 @@ Result<GltfMaterial> GltfMaterials::read(std::size_t index) {
       out.surface.alpha_cutoff = *cut;
     }
   }
-  if (mode != nullptr && *mode == "BLEND")
-    warnings_.push_back(at + ": a blended surface is taken as opaque");
+  out.surface.blend = mode != nullptr && *mode == "BLEND";
   const Json* pbr = member(material, "pbrMetallicRoughness");
   if (pbr == nullptr) return out;
   if (member(*pbr, "baseColorFactor") != nullptr) {
     const auto factor = get_numbers(*pbr, "baseColorFactor", 4, at);
     if (!factor) return factor.status();
     out.surface.factor = {(*factor)[0], (*factor)[1], (*factor)[2]};
+    out.surface.alpha = std::clamp((*factor)[3], 0.0, 1.0);
   }
   if (const Json* texture = member(*pbr, "baseColorTexture"); texture != nullptr) {
     if (Status s = read_texture(*texture, at, out); !s) return s;

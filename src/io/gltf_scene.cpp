@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <map>
 #include <utility>
 #include <vector>
@@ -180,6 +181,11 @@ class SceneReader {
       out.normals.push_back(vec_cast<float>(Vec3d{v[0], v[1], v[2]} * (1.0 / length)));
     }
     for (std::size_t i = 0; i < colors->count; ++i) out.colors.push_back(vec3_of(colors->row(i)));
+    if (colors->width == 4 && (out.material.blend || out.material.alpha_cutoff > 0)) {
+      for (std::size_t i = 0; i < colors->count; ++i) {
+        out.alphas.push_back(static_cast<float>(std::clamp(colors->row(i)[3], 0.0, 1.0)));
+      }
+    }
     for (std::size_t i = 0; i < uvs->count; ++i) {
       const auto uv = material->uv(uvs->row(i)[0], uvs->row(i)[1]);
       out.uvs.push_back({static_cast<float>(uv[0]), static_cast<float>(uv[1])});

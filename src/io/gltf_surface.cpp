@@ -109,6 +109,7 @@ class SurfaceReader {
       const auto read = materials_.read(*index);
       if (!read) return read.status();
       out = *read;
+      if (out.surface.blend) warn(at + ": a blended surface is taken as opaque");
     }
     mesh_.materials.push_back(out.surface);
     return {};

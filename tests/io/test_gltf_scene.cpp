@@ -50,7 +50,7 @@ TestGltf square() {
   const std::vector<float> corners{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
   const std::vector<float> normals{0, 0, 2, 0, 0, 2, 0, 0, 2, 0, 0, 2}, uvs{0, 1, 1, 1, 1, 0, 0, 0};
   const std::vector<std::uint8_t> colors{255, 0, 51,  255, 0,   255, 0, 255,
-                                         0,   0, 255, 255, 102, 0,   0, 255};
+                                         0,   0, 255, 255, 102, 0,   0, 51};
   const json attributes = {{"POSITION", g.add(corners, "VEC3", 5126)},
                            {"NORMAL", g.add(normals, "VEC3", 5126)},
                            {"TEXCOORD_0", g.add(uvs, "VEC2", 5126)},
@@ -139,6 +139,26 @@ TEST_CASE("gltf scene: every primitive with what the file says of its surface") 
   CHECK(bare.uvs.empty());
   CHECK(bare.material.texture == -1);
   CHECK_FALSE(bare.material.double_sided);
+}
+
+TEST_CASE("gltf scene: alpha modes, and the alphas that each reads") {
+  TestGltf g = square();
+  json& material = g.doc["materials"][0];  // its colour factor's alpha is 0.5
+  const auto part_of = [&] { return load(g).value().parts.at(0); };
+  CHECK_FALSE(part_of().material.blend);  // OPAQUE where nothing is said: alpha says nothing
+  CHECK(part_of().material.alpha_cutoff == 0);
+  CHECK(part_of().alphas.empty());
+  material["alphaMode"] = "BLEND";
+  const TexturedPart through = part_of();
+  CHECK(through.material.blend);
+  CHECK(through.material.alpha == 0.5);
+  REQUIRE(through.alphas.size() == 4);
+  for (std::size_t v = 0; v < 4; ++v) CHECK(through.alphas[v] == (v == 3 ? 0.2f : 1.0f));
+  CHECK(load(g).value().warnings.empty());
+  material["alphaMode"] = "MASK";
+  CHECK_FALSE(part_of().material.blend);
+  CHECK(part_of().material.alpha_cutoff == 0.5);
+  CHECK(part_of().alphas.size() == 4);
 }
 
 TEST_CASE("gltf scene: pictures are PNG or WebP; what cannot be read leaves the colour and a warning") {

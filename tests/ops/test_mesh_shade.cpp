@@ -193,6 +193,18 @@ TEST_CASE("a surface as files give it: parts share textures, stand in several pl
   bad.textures[0].width = 5;
   CHECK(placed_meshes(bad).status().message().find("parts[0]: MeshTexture") != std::string::npos);
   bad = scene;
-  bad.parts[0].material.alpha_cutoff = 0.5;
-  CHECK(placed_meshes(bad).value().warnings.size() == 1);
+  bad.parts[0].material.alpha = 1.5;
+  CHECK(placed_meshes(bad).status().message().find("parts[0]: SurfaceMesh: base_alpha = 1.5") != std::string::npos);
+  bad = scene;
+  bad.parts[1].alphas = {1, 1};
+  CHECK(placed_meshes(bad).status().message().find("parts[1]: SurfaceMesh: alphas: 2 for 4 vertices") != std::string::npos);
+  scene.parts[0].material.alpha_cutoff = 0.25;
+  scene.parts[1].material.blend = true;
+  scene.parts[1].material.alpha = 0.5;
+  const PlacedMeshes through = placed_meshes(scene).value();
+  CHECK(through.meshes.mesh(0).alpha_mode == MeshAlpha::mask);
+  CHECK(through.meshes.mesh(0).alpha_cutoff == 0.25f);
+  CHECK(through.meshes.mesh(1).alpha_mode == MeshAlpha::blend);
+  CHECK(through.meshes.mesh(1).base_alpha == 0.5f);
+  CHECK(through.warnings.empty());
 }

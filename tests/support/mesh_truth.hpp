@@ -22,21 +22,24 @@ struct MeshTruth {
   std::vector<std::uint8_t> undecided;  ///< another triangle, or none, is met 2e-4 px away
 };
 
-/// Nearest hit of a ray (u, v, 1) beyond the near plane.
+/// A point where a ray (u, v, 1) meets a triangle beyond the near plane; z: infinity where it meets none.
 struct MeshHit {
   long double z = std::numeric_limits<long double>::infinity();
   std::uint32_t instance = gsnav::kNoInstance, triangle = gsnav::kNoInstance;
+  std::size_t place = 0;         ///< of the instance among all
+  long double u = 0, v = 0;      ///< weights of corners 1 and 2
 };
 
-inline MeshHit trace(const std::vector<gsnav::MeshInstance>& meshes, const gsnav::Camera& camera, long double px,
-                     long double py) {
+/// Calls f(hit) for all of them, in the order of instances and triangles.
+template <class F>
+void for_each_hit(const std::vector<gsnav::MeshInstance>& meshes, const gsnav::Camera& camera, long double px,
+                  long double py, const F& f) {
   using V = gsnav::Vec3<long double>;
   const V ray{(px - camera.cx) / camera.fx, (py - camera.cy) / camera.fy, 1};
   const auto plain_cross = [](const V& a, const V& b) {
     return V{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
   };
   const auto plain_dot = [](const V& a, const V& b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
-  MeshHit best;
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     const gsnav::MeshView& mesh = meshes[m].mesh;
     for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
@@ -55,10 +58,19 @@ inline MeshHit trace(const std::vector<gsnav::MeshInstance>& meshes, const gsnav
       if (det == 0 || (det < 0 && !mesh.two_sided)) continue;
       const V s = -p[0], r = plain_cross(s, e1);
       const long double u = plain_dot(s, q) / det, v = plain_dot(ray, r) / det, z = plain_dot(e2, r) / det;
-      if (u < 0 || v < 0 || u + v > 1 || z < static_cast<long double>(camera.near_plane) || z >= best.z) continue;
-      best = {z, meshes[m].id, static_cast<std::uint32_t>(t)};
+      if (u < 0 || v < 0 || u + v > 1 || z < static_cast<long double>(camera.near_plane)) continue;
+      f(MeshHit{z, meshes[m].id, static_cast<std::uint32_t>(t), m, u, v});
     }
   }
+}
+
+/// The nearest.
+inline MeshHit trace(const std::vector<gsnav::MeshInstance>& meshes, const gsnav::Camera& camera, long double px,
+                     long double py) {
+  MeshHit best;
+  for_each_hit(meshes, camera, px, py, [&best](const MeshHit& hit) {
+    if (hit.z < best.z) best = hit;
+  });
   return best;
 }
 

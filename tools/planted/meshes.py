@@ -8,6 +8,8 @@ CLIP = "include/gsnav/kernels/mesh_clip.hpp"
 MERGE = "include/gsnav/kernels/composite.hpp"
 MESH = "tests/ops/test_mesh.cpp"
 CASES = "tests/hard_cases/test_composite.cpp"
+PANES = "tests/hard_cases/test_fragments.cpp"
+FRAGMENTS = "include/gsnav/kernels/mesh_fragments.hpp"
 
 PLANTS = [
     plant("mesh_edges_of_both", RASTER, "(owns ? 0 : 1)", "0", MESH, "triangles that share edges own each pixel once",
@@ -24,6 +26,14 @@ PLANTS = [
           CASES, "N49_mesh_between_layers", "N50_mesh_straddle_cloud", why="Gaussians behind a mesh are seen"),
     plant("mesh_by_centres", MERGE, "(ray_depth(depth, px, py) > mesh)", "(L(depth.z) > mesh)", CASES,
           "N50_mesh_straddle_cloud", "N51_avatar_touching_wall", why="one depth a splat, wherever the ray meets it"),
+    plant("fragment_by_centres", MERGE, "if (z > far || z <= near) return;",
+          "if (depth.z > far || depth.z <= near) return;", PANES, "N73_pane_cuts_splats", "N74_panes_any",
+          why="a pane is before or behind a whole splat"),
+    plant("fragments_unsorted", FRAGMENTS, "i > 0 && list[i - 1].depth > f.depth", "false", PANES,
+          "N71_panes_between_layers", "N74_panes_any", "N76_many_panes"),
+    plant("fragments_behind", FRAGMENTS, "z <= args.behind[pixel] && ", "", PANES, "N71_panes_between_layers"),
+    plant("mask_ignored", RASTER, "return t.masked && surface_hole", "return false && surface_hole", PANES,
+          "holes that a mask cuts", "N74_panes_any"),
     plant("mesh_leaves_alpha", MERGE, "state.transmittance = select(covered, zero, state.transmittance);", "", CASES,
           "N49_mesh_between_layers"),
     plant("mesh_cull_by_centre", MERGE, "depths[splat].z - depths[splat].reach > tile_far[tile]",

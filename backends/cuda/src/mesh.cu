@@ -89,7 +89,7 @@ __global__ void __launch_bounds__(kThreads) write_triangles_kernel(const MeshSet
 __device__ void show(const MeshRasterArgs<float>& args, const MeshTriangle<float>& t, std::uint32_t id, int x, int y,
                      PixelWord* pixels) {
   const float inverse_z = mesh_inverse_z(t, x, y);
-  if (!(inverse_z > 0)) return;
+  if (!(inverse_z > 0) || mesh_hole(args, t, x, y, inverse_z)) return;
   // Of equally near ones the first is the largest word.
   const PixelWord word = PixelWord{__float_as_uint(inverse_z)} << 32 | (0xffffffffu - id);
   PixelWord* const at =

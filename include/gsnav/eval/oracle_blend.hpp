@@ -68,6 +68,22 @@ struct OraclePixel {
     transmittance = 0;
   }
 
+  /// A surface that is seen through.
+  void pass(const OracleRules& rules, const OracleFragment& f) noexcept {
+    const double before = transmittance, weight = f.alpha * before, open = 1 - rules.first_hit_tau;
+    const double stop = rules.transmittance_min;
+    transmittance = before * (1 - f.alpha);
+    color += f.rgb * weight;
+    weights += weight;
+    accumulated += weight * f.depth;
+    if (before > 0.5 && transmittance <= 0.5) median = f.depth;
+    if (before > open && transmittance <= open) first_hit = f.depth;
+    for (const double at : {0.5, open}) undecided_depth = undecided_depth || abs(transmittance - at) < kUndecidedCrossing;
+    undecided = undecided || abs(transmittance - stop) < kUndecidedRelative * stop;
+    closed = closed || transmittance < stop;
+    last_rank = 0;  // another list begins
+  }
+
   void write(const OracleRules& rules, OracleFrames& out, std::size_t pixel) const noexcept {
     const Vec3d rgb = color + rules.background * transmittance;
     for (int c = 0; c < 3; ++c) out.rgb[3 * pixel + static_cast<std::size_t>(c)] = rgb[c];
@@ -90,17 +106,68 @@ struct OracleSpan {
       : x0(s.boxed ? r.box.x0 : s.rect.x0), x1(s.boxed ? r.box.x1 : s.rect.x1) {}
 };
 
+/// Blends a pixel that has fragments: each Gaussian lies before, between or behind them by its depth along the ray; of
+/// those between the same two the order of `list` holds.
+template <class Model>
+void blend_among(const OracleScene<Model>& scene, View<const std::uint32_t> list, int x, int y,
+                 const std::vector<OracleFragment>& fragments, OraclePixel& pixel) {
+  struct Met {
+    std::size_t behind;  // so many fragments
+    const OracleRecord<Model>* record;
+    double log2_alpha, depth;
+  };
+  std::vector<Met> met;
+  const double px = x + 0.5, py = y + 0.5;
+  for (std::size_t i = 0; i < list.size; ++i) {
+    const OracleRecord<Model>& r = scene.records[list[i]];
+    const OracleSpan<Model> span(scene, r);
+    if (x < span.x0 || x >= span.x1) continue;
+    Met m{0, &r, r.model.log2_alpha(px, py), 0};
+    if (!(m.log2_alpha >= scene.log2_cut)) continue;
+    m.depth = r.model.depth(px, py);
+    const bool drawn = (m.log2_alpha - scene.rules.log2_alpha_min) * kLn2 > -kUndecidedRelative;
+    for (const OracleFragment& f : fragments) {
+      m.behind += f.depth < m.depth ? 1 : 0;
+      if (drawn && abs(f.depth - m.depth) < kUndecidedMesh) pixel.undecided = true;
+    }
+    met.push_back(m);
+  }
+  std::stable_sort(met.begin(), met.end(), [](const Met& a, const Met& b) { return a.behind < b.behind; });
+  std::size_t next = 0;
+  for (std::size_t k = 0; k <= fragments.size(); ++k) {
+    for (; next < met.size() && met[next].behind == k; ++next) {
+      if (pixel.closed) continue;
+      const Met& m = met[next];
+      pixel.blend(scene.rules, m.log2_alpha, m.record->color, m.record->rank, scene.mesh_depth(x, y),
+                  [&m] { return m.depth; });
+    }
+    if (k < fragments.size()) pixel.pass(scene.rules, fragments[k]);
+  }
+}
+
 /// Blends one row by the order of `list` (indices of records that reach the row).
 template <class Model>
 void blend_in_order(const OracleScene<Model>& scene, View<const std::uint32_t> list, int y,
                     std::vector<OraclePixel>& pixels) {
   std::size_t open = pixels.size();
+  std::vector<std::uint8_t> apart(pixels.size());  // blended by themselves
+  if (scene.mesh != nullptr && !scene.mesh->fragments.empty()) {
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const int x = scene.rect.x0 + static_cast<int>(i);
+      const auto& fragments = scene.mesh->fragments[scene.pixel(x, y)];
+      if (fragments.empty()) continue;
+      apart[i] = 1;
+      --open;
+      blend_among(scene, list, x, y, fragments, pixels[i]);
+    }
+  }
   for (std::size_t i = 0; i < list.size && open > 0; ++i) {
     const OracleRecord<Model>& r = scene.records[list[i]];
     const OracleSpan<Model> span(scene, r);
     for (int x = span.x0; x < span.x1; ++x) {
-      OraclePixel& pixel = pixels[static_cast<std::size_t>(x - scene.rect.x0)];
-      if (pixel.closed) continue;
+      const std::size_t column = static_cast<std::size_t>(x - scene.rect.x0);
+      OraclePixel& pixel = pixels[column];
+      if (pixel.closed || apart[column] != 0) continue;
       const double px = x + 0.5, py = y + 0.5, log2_alpha = r.model.log2_alpha(px, py);
       if (!(log2_alpha >= scene.log2_cut)) continue;
       pixel.blend(scene.rules, log2_alpha, r.color, r.rank, scene.mesh_depth(x, y),

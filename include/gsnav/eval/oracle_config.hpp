@@ -43,10 +43,18 @@ struct PixelRect {
   }
 };
 
+/// A surface that is seen through, at one pixel.
+struct OracleFragment {
+  double depth = 0, alpha = 1;  ///< planar z, metres; in [0, 1]
+  Vec3d rgb{};                  ///< display-referred
+};
+
 /// A mesh as an oracle takes it: what each pixel of the camera's image shows of it.
 struct OracleMesh {
   std::vector<double> depth;  ///< [H][W] planar z, metres; infinity: none
   std::vector<double> rgb;    ///< [H][W][3], display-referred
+  /// [H][W], what is before that, near to far; or empty
+  std::vector<std::vector<OracleFragment>> fragments{};
 };
 
 /// Which oracle, by which rules.
@@ -142,6 +150,14 @@ inline Status validate(const OracleConfig& c, const Camera& camera) {
   const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   if (c.mesh != nullptr && (c.mesh->depth.size() != pixels || c.mesh->rgb.size() != 3 * pixels)) {
     return {Errc::invalid_argument, "OracleConfig.mesh: its planes are not of the camera's image"};
+  }
+  if (c.mesh != nullptr && !c.mesh->fragments.empty()) {
+    if (c.mesh->fragments.size() != pixels) {
+      return {Errc::invalid_argument, "OracleConfig.mesh.fragments: not of the camera's image"};
+    }
+    if (c.kind == OracleKind::ray || c.order == OracleOrder::per_ray) {
+      return {Errc::unsupported, "OracleConfig.mesh.fragments: among Gaussians in the order of keys only"};
+    }
   }
   const PixelRect& r = c.crop;
   const bool whole = r.x0 == 0 && r.y0 == 0 && r.x1 == 0 && r.y1 == 0;

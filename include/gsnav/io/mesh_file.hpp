@@ -33,8 +33,8 @@ Result<TriangleMesh> load_ply_mesh(const std::filesystem::path& path);
 Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path);
 
 /// Reads the same triangles with what they look like: a part for each primitive of a mesh, standing wherever nodes show
-/// it; normals, linear vertex colours (COLOR_0, alpha left out), base colour factor and texture with its coordinates
-/// (KHR_texture_transform applied), cut-off, double-sided and KHR_materials_unlit. Pictures are PNG, JPEG (where the
+/// it; normals, linear vertex colours (COLOR_0), base colour factor and texture with its coordinates
+/// (KHR_texture_transform applied), alpha mode (OPAQUE, MASK with its cut-off, BLEND) with the alphas that it reads, double-sided and KHR_materials_unlit. Pictures are PNG, JPEG (where the
 /// build has libjpeg) or WebP, in the file or beside it; one that cannot be read leaves the factor and a warning. A node
 /// that mirrors or scales unevenly gets a part of its own with its transform applied. Axes and units are the file's.
 /// Errors: as of load_gltf_mesh. Never throws.

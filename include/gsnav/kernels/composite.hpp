@@ -95,6 +95,76 @@ struct CompositePixel {
   }
 };
 
+/// A surface that is seen through takes its share of what transmittance is left, also where too little is left for
+/// Gaussians; with alpha 1 it closes the pixel as a mesh does, bit for bit.
+template <bool Color, DepthMode D, class S>
+GSNAV_HD void blend_fragment(BlendState<S, D>& state, const BlendRules<S>& rules, const MeshFragment<S>& f) noexcept {
+  const S before = abs(state.transmittance), weight = f.alpha * before, after = before - weight;
+  if constexpr (Color) {
+    state.r = fma(weight, f.r, state.r);
+    state.g = fma(weight, f.g, state.g);
+    state.b = fma(weight, f.b, state.b);
+  }
+  if constexpr (D != DepthMode::none) {
+    if (before > S(0.5) && after <= S(0.5)) state.median = f.depth;
+  }
+  if constexpr (D == DepthMode::any) {
+    if (before >= S(1)) state.z_ref = f.depth;
+    state.accumulated = fma(weight, f.depth - state.z_ref, state.accumulated);
+    const S below = S(1) - rules.first_hit_tau;
+    if (before > below && after <= below) state.first_hit = f.depth;
+  }
+  state.transmittance = state.transmittance < S(0) ? -after : after;
+}
+
+/// Blends a pixel that has fragments. They cut it into stretches of depth; in each the list is walked for the splats
+/// whose depths along the ray lie there, as a mesh at its far end would have it walked.
+template <class S, bool Color, DepthMode D, bool General>
+struct FragmentPixel {
+  RasterArgs<S> args;
+
+  GSNAV_HD void operator()(std::size_t pixel) const noexcept {
+    const FragmentRange range = args.mesh.ranges[pixel];
+    if (range.count == 0) return;
+    const std::size_t width = static_cast<std::size_t>(args.grid.width);
+    const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
+    const std::size_t tile = args.grid.tile_of(x, y);
+    const S px = S(x) + S(0.5), py = S(y) + S(0.5);
+    BlendState<S, D> state;
+    S near = S(-3.4e38);
+    for (std::uint32_t k = 0;; ++k) {
+      const MeshFragment<S>* const f = k < range.count ? args.mesh.fragments.data + range.begin + k : nullptr;
+      const S far = f != nullptr ? f->depth : args.mesh.depth[pixel];
+      // Splats were binned by where the opaque mesh is.
+      for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1] && state.open(args.rules); ++i) {
+        blend_within(state, args.records(args.tile_splats[i]), near, far, px, py);
+      }
+      if (f == nullptr) break;
+      blend_fragment<Color>(state, args.rules, *f);
+      near = far;
+    }
+    close_by_mesh<Color>(state, args.rules, args.mesh, pixel);
+    write_pixel(args, pixel, state);
+  }
+
+ private:
+  /// composite_splat where its depth is in (near, far].
+  GSNAV_HD void blend_within(BlendState<S, D>& state, const SplatRecords<S>& splat, S near, S far, S px,
+                             S py) const noexcept {
+    const SplatDepth<S>& depth = *splat.depth;
+    if (depth.z - depth.reach > far || depth.z + depth.reach <= near) return;
+    const SplatGeometry<S>& g = *splat.geometry;
+    const S exponent = General && splat.perspective != nullptr
+                           ? perspective_exponent(g, *splat.perspective, px, py)
+                           : column_exponent(column_terms(g, px), g.ref_y, g.b, py);
+    if (!(exponent >= args.rules.log2_alpha_min)) return;
+    const S z = ray_depth(depth, px, py);
+    if (z > far || z <= near) return;
+    const S alpha = footprint_alpha<Exp2::degree5>(args.rules, exponent);
+    blend_alpha<Color, D, General>(state, args.rules, alpha, splat.color, splat.depth, px, py);
+  }
+};
+
 /// dispatch_raster for frames with a mesh: calls f with compile-time <Color, DepthMode, General>. The cubic exp2 does
 /// not serve these.
 template <class S, class F>

@@ -25,6 +25,13 @@ struct TextureView {
   GSNAV_HD bool empty() const noexcept { return texels.empty(); }
 };
 
+/// What a surface's alpha (base, times that of vertices and of the texture) does.
+enum class MeshAlpha : std::uint8_t {
+  opaque,  ///< nothing
+  mask,    ///< a surface where it is at least alpha_cutoff, a hole elsewhere
+  blend,   ///< what is behind is seen through it
+};
+
 /// Read-only arrays of an indexed triangle mesh. Owns nothing. Metres in the mesh's own frame;
 /// counter-clockwise seen from outside. Every index must be below vertices.size.
 struct MeshView {
@@ -38,6 +45,11 @@ struct MeshView {
   bool two_sided = false;             ///< false: what is seen from behind is not drawn
   bool unlit = false;                 ///< its colour is what is seen, whatever the light
   Vec3f low{}, high{};                ///< box of the finite vertices; low.x > high.x: not known
+  MeshAlpha alpha_mode = MeshAlpha::opaque;
+  float base_alpha = 1;               ///< in [0, 1]
+  float alpha_cutoff = 0.5f;          ///< of MeshAlpha::mask
+  View<const float> alphas;           ///< in [0, 1], one a vertex; empty: 1
+  bool plain = false;                 ///< base_color is what is seen, whatever colours and texture are; alpha stays
 
   GSNAV_HD std::size_t triangle_count() const noexcept { return indices.size / 3; }
 };
@@ -64,12 +76,27 @@ enum class Composite : std::uint8_t {
   hard_depth,  ///< Habitat-GS's: a pixel is the Gaussians' or the mesh's, by their expected depth
 };
 
+/// A surface that is seen through, at one pixel.
+template <class S>
+struct MeshFragment {
+  S depth, alpha;  ///< planar z, metres; alpha in (0, 1]
+  S r, g, b;       ///< display-referred, or linear where the frame is blended so; not times alpha
+};
+
+/// The fragments of a pixel, nearest first.
+struct FragmentRange {
+  std::uint64_t begin = 0;
+  std::uint32_t count = 0;
+};
+
 /// What a mesh leaves of a frame for the Gaussians: planes [H][W] in a backend's memory.
 template <class S>
 struct MeshLayer {
   const S* depth = nullptr;  ///< planar z, metres; infinity where there is no mesh. Null: the frame has none
   const S* color = nullptr;  ///< [H][W][3] display-referred; null: no colour asked for
   View<const S> tile_far;    ///< [tiles], the largest depth of each
+  View<const FragmentRange> ranges{};       ///< [H][W]; empty: nothing is seen through
+  View<const MeshFragment<S>> fragments{};  ///< none behind `depth`
 
   GSNAV_HD bool empty() const noexcept { return depth == nullptr; }
 };

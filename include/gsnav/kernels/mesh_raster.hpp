@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/kernels/mesh_setup.hpp"
+#include "gsnav/kernels/mesh_surface.hpp"
 #include "gsnav/kernels/tiles.hpp"
 
 // Which triangle each pixel shows, and how far it is: the visibility pass. Nothing is shaded here.
@@ -56,6 +56,7 @@ template <class S>
 struct MeshRasterArgs {
   BinArgs<S> bin;  ///< of its arrays: cursors, tile_offsets, tile_splats
   View<const MeshTriangle<S>> triangles;
+  View<const MeshPlacement> placements;
   S* depth = nullptr;              ///< [H][W]
   std::uint32_t* visible = nullptr;  ///< [H][W], which of `triangles`; kNoTriangle where none
   View<S> tile_far;                ///< [tiles]
@@ -162,6 +163,65 @@ GSNAV_HD S mesh_inverse_z(const MeshTriangle<S>& t, int x, int y) noexcept {
   return detail::inverse_z_at(t, detail::inverse_z_row(t, y), x - t.x0);
 }
 
+/// Whether a triangle that owns a pixel has a hole there.
+template <class S>
+GSNAV_HD bool mesh_hole(const MeshRasterArgs<S>& args, const MeshTriangle<S>& t, int x, int y, S inverse_z) noexcept {
+  return t.masked && surface_hole(args.placements[t.placement].mesh, t, x, y, S(1) / inverse_z);
+}
+
+namespace detail {
+
+/// Calls f(y, left, right) for the pixels [left, right) of rows of [x0, x1) x [y0, y1), all in a triangle's box, that
+/// the triangle owns.
+template <class S, class F>
+GSNAV_HD void for_each_span(const TileGrid& grid, const MeshTriangle<S>& t, int x0, int y0, int x1, int y1,
+                            const F& f) noexcept {
+  MeshEdges edges = MeshEdges::of(t, grid, x0, y0);
+  double inverse[3];
+  for (int k = 0; k < 3; ++k) {
+    const double step = static_cast<double>(edges.step_x[k]);
+    inverse[k] = 1.0 / (edges.step_x[k] == 0 ? 1.0 : abs(step));
+  }
+  for (int y = y0; y < y1; ++y) {
+    int left = 0, right = x1 - x0;
+    for (int k = 0; k < 3; ++k) clip_span(edges.at[k], edges.step_x[k], inverse[k], x1 - x0, left, right);
+    edges.step_down();
+    f(y, x0 + left, x0 + right);
+  }
+}
+
+/// Shows a triangle at the pixels of a span where it is the nearest so far.
+template <class S>
+struct ShowSpan {
+  const MeshRasterArgs<S>& args;
+  const MeshTriangle<S>& t;
+  std::uint32_t id;
+
+  GSNAV_HD void operator()(int y, int left, int right) const noexcept {
+    const double row = inverse_z_row(t, y);
+    const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(args.bin.grid.width);
+    S* const nearest = args.depth + first;
+    std::uint32_t* const visible = args.visible + first;
+    if (t.masked) {
+      for (int x = left; x < right; ++x) {
+        const S inverse_z = inverse_z_at(t, row, x - t.x0);
+        if (!(inverse_z > nearest[x]) || mesh_hole(args, t, x, y, inverse_z)) continue;
+        nearest[x] = inverse_z;
+        visible[x] = id;
+      }
+      return;
+    }
+    for (int x = left; x < right; ++x) {
+      const S inverse_z = inverse_z_at(t, row, x - t.x0);
+      const bool nearer = inverse_z > nearest[x];
+      nearest[x] = nearer ? inverse_z : nearest[x];
+      visible[x] = nearer ? id : visible[x];
+    }
+  }
+};
+
+}  // namespace detail
+
 /// Finds the nearest triangle of each pixel of a tile; of equally near ones the first. No pixel's depth depends on
 /// the tile that it is found in.
 template <class S>
@@ -184,29 +244,7 @@ GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t til
     const MeshTriangle<S>& t = args.triangles[id];
     const int x0 = max(tile_x, int{t.x0}), x1 = min(tile_right, int{t.x1});
     const int y0 = max(tile_y, int{t.y0}), y1 = min(tile_bottom, int{t.y1});
-    MeshEdges edges = MeshEdges::of(t, grid, x0, y0);
-    double inverse[3];
-    for (int k = 0; k < 3; ++k) {
-      const double step = static_cast<double>(edges.step_x[k]);
-      inverse[k] = 1.0 / (edges.step_x[k] == 0 ? 1.0 : abs(step));
-    }
-    for (int y = y0; y < y1; ++y) {
-      int left = 0, right = x1 - x0;
-      for (int k = 0; k < 3; ++k) {
-        detail::clip_span(edges.at[k], edges.step_x[k], inverse[k], x1 - x0, left, right);
-      }
-      edges.step_down();
-      const double row = detail::inverse_z_row(t, y);
-      const int offset = x0 - t.x0;
-      S* const nearest = args.depth + row_at(y) + static_cast<std::size_t>(x0);
-      std::uint32_t* const visible = args.visible + row_at(y) + static_cast<std::size_t>(x0);
-      for (int x = left; x < right; ++x) {
-        const S inverse_z = detail::inverse_z_at(t, row, offset + x);
-        const bool nearer = inverse_z > nearest[x];
-        nearest[x] = nearer ? inverse_z : nearest[x];
-        visible[x] = nearer ? id : visible[x];
-      }
-    }
+    detail::for_each_span(grid, t, x0, y0, x1, y1, detail::ShowSpan<S>{args, t, id});
   }
   S far(0);
   for (int y = tile_y; y < tile_bottom; ++y) {

@@ -37,6 +37,7 @@ struct MeshTriangle {
   S inverse_z_min, inverse_z_max;       ///< over the corners: what a sliver's plane gives beyond is not its own
   PixelPlane<S> b1, b2;                 ///< weights of corners 1 and 2 of the mesh's triangle, over z
   bool back;                            ///< seen from behind
+  bool masked;                          ///< MeshAlpha::mask
 };
 
 template <class S>
@@ -154,6 +155,7 @@ GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std
   MeshTriangle<S> piece;
   piece.placement = at;
   piece.triangle = static_cast<std::uint32_t>(t);
+  piece.masked = placement.mesh.alpha_mode == MeshAlpha::mask;
   const auto emit = [&](double z_min, double z_max) {
     if constexpr (Full) {
       interpolate_triangle(args.camera, v[0]->position, v[1]->position, v[2]->position, z_min, z_max, piece);

@@ -87,12 +87,18 @@ void scatter_unhidden(B& backend, const BinArgs<S>& bin, const MeshCull<S>& cull
 template <class S, Backend B>
 void rasterize_composite(B& backend, const RasterArgs<S>& args) {
   if constexpr (MeshBackend<B, S>) {
+    const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
     if constexpr (requires { backend.composite_tiles(args); }) {
       backend.composite_tiles(args);
     } else {
-      const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
       dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
         backend.parallel_for(pixels, CompositePixel<S, C, D, G>{args});
+      });
+    }
+    // Pixels that are seen through something are blended anew.
+    if (!args.mesh.ranges.empty()) {
+      dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
+        backend.parallel_for(pixels, FragmentPixel<S, C, D, G>{args});
       });
     }
   }

@@ -20,6 +20,7 @@ struct MeshStats {
   std::uint64_t triangles = 0;   ///< in all instances
   std::uint64_t not_finite = 0;  ///< of those in view, left out: a corner is NaN or infinite
   std::uint64_t drawn = 0;       ///< that may cover a pixel centre; pieces, where clipped
+  std::uint64_t fragments = 0;   ///< pixels of surfaces that are seen through (MeshAlpha::blend), not behind opaque ones
 };
 
 /// Scratch of `draw_meshes`; grows to the largest frame. Empty while there are no meshes.
@@ -95,6 +96,10 @@ inline Status validate(const MeshInstance& instance) {
   if (Status s = sized(m.normals.size, "normals"); !s) return s;
   if (Status s = sized(m.colors.size, "colors"); !s) return s;
   if (Status s = sized(m.uvs.size, "uvs"); !s) return s;
+  if (Status s = sized(m.alphas.size, "alphas"); !s) return s;
+  if (!(m.base_alpha >= 0 && m.base_alpha <= 1)) {
+    return bad("base_alpha = " + std::to_string(m.base_alpha) + ": must be in [0, 1]");
+  }
   if (!m.texture.empty()) {
     const TextureView& t = m.texture;
     std::size_t texels = 0;
@@ -130,9 +135,12 @@ inline bool box_may_be_visible(const MeshCamera& camera, const MeshPlacement& p)
   return all == 0 || (all & kMeshNotFinite) != 0;
 }
 
-/// Lists the work of the instances in view.
+/// Whether a mesh is drawn as fragments.
+inline bool seen_through(const MeshInstance& m) noexcept { return m.mesh.alpha_mode == MeshAlpha::blend; }
+
+/// Lists the work of the instances in view, of those that are seen through or of the others.
 template <class S, Backend B>
-void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera) {
+void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera, bool through) {
   const MeshCamera lens = MeshCamera::of(camera);
   ws.host_placements.clear();
   ws.host_vertex_chunks.clear();
@@ -152,7 +160,7 @@ void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
     p.rotation = mat_cast<float>(rotation);
     p.id = i.id;
     p.first_vertex = vertices;
-    if (i.mesh.triangle_count() == 0 || !box_may_be_visible(lens, p)) continue;
+    if (seen_through(i) != through || i.mesh.triangle_count() == 0 || !box_may_be_visible(lens, p)) continue;
     cut(ws.host_vertex_chunks, ws.host_placements.size(), i.mesh.vertices.size);
     cut(ws.host_triangle_chunks, ws.host_placements.size(), i.mesh.triangle_count());
     vertices += i.mesh.vertices.size;
@@ -164,29 +172,25 @@ void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
   ws.vertices.resize_discard(vertices);
 }
 
-}  // namespace detail
-
-/// Draws meshes into ws.depth, ws.visible and ws.tile_far (of tiles of `tile_size`), and into `images` what is asked
-/// for; `layer_color`: colour into ws.color. The result is there after `backend.synchronize()`, and good until the
-/// next call. Arrays of `meshes` are in the backend's memory. Fills `stats` when given.
-/// Errors: invalid_argument naming the field; backend_failure.
-template <class S, Backend B>
-Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera,
-                   const MeshLight& light, int tile_size, bool layer_color, MeshImages<S> images = {},
-                   MeshStats* stats = nullptr) {
-  if (Status s = validate(camera); !s) return s;
-  MeshStats counted;
+/// Names what of a frame's meshes cannot be, or ok.
+inline Status validate(std::span<const MeshInstance> meshes, const Camera& camera, const MeshLight& light) {
+  if (Status s = gsnav::validate(camera); !s) return s;
   for (const MeshInstance& m : meshes) {
-    if (Status s = validate(m); !s) return s;
-    counted.triangles += m.mesh.triangle_count();
+    if (Status s = gsnav::validate(m); !s) return s;
   }
   if (!is_finite(light.ambient) || !is_finite(light.diffuse) || !is_finite(light.direction) ||
       !(light.unlit || norm(light.direction) > 0)) {
     return {Errc::invalid_argument, "MeshLight: must be finite, its direction not zero"};
   }
-  detail::place_meshes(ws, meshes, camera);
+  return {};
+}
 
-  // ---- set up
+/// Fills ws.triangles with what may cover a pixel of the instances that are seen through, or of the others; adds to
+/// `stats`.
+template <class S, Backend B>
+Status set_up_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera,
+                     bool through, MeshStats& stats) {
+  place_meshes(ws, meshes, camera, through);
   const std::size_t chunks = ws.host_triangle_chunks.size();
   ws.counts.resize_discard(chunks);
   ws.not_finite.resize_discard(chunks);
@@ -205,61 +209,101 @@ Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInst
   backend.parallel_for(1, ScanMeshTriangles<S>{setup});
   ws.host_not_finite.resize(chunks);
   ws.not_finite.download(ws.host_not_finite.data(), chunks);
-  ws.offsets.download(&counted.drawn, 1, chunks);
+  std::uint64_t drawn = 0;
+  ws.offsets.download(&drawn, 1, chunks);
   if (Status s = backend.synchronize(); !s) return s;
-  for (const std::uint32_t n : ws.host_not_finite) counted.not_finite += n;
-  if (counted.drawn >= kNoTriangle) return {Errc::unsupported, "more than 2^32 triangles in one view"};
-  ws.triangles.resize_discard(counted.drawn);
+  for (const std::uint32_t n : ws.host_not_finite) stats.not_finite += n;
+  if (drawn >= kNoTriangle) return {Errc::unsupported, "more than 2^32 triangles in one view"};
+  stats.drawn += drawn;
+  ws.triangles.resize_discard(drawn);
   setup.triangles = ws.triangles.view();
   backend.parallel_for(chunks, WriteMeshTriangles<S>{setup});
+  return {};
+}
 
-  // ---- bin and see
+/// What rasterising what was set up reads.
+template <class S, Backend B>
+MeshRasterArgs<S> raster_args(MeshWorkspace<S, B>& ws, const Camera& camera, int tile_size) {
   MeshRasterArgs<S> raster;
+  raster.bin.grid = TileGrid::of(camera.width, camera.height, tile_size);
+  raster.triangles = std::as_const(ws.triangles).view();
+  raster.placements = std::as_const(ws.placements).view();
+  return raster;
+}
+
+/// Lists the triangles of each tile.
+template <class S, Backend B>
+Status bin_meshes(B& backend, MeshWorkspace<S, B>& ws, MeshRasterArgs<S>& raster) {
   BinArgs<S>& bin = raster.bin;
-  bin.grid = TileGrid::of(camera.width, camera.height, tile_size);
+  bin.blocks = raster.triangles.size < 4096 ? 1 : concurrency_of(backend);
+  ws.cursors.resize_discard(bin.blocks * bin.grid.count());
+  ws.tile_offsets.resize_discard(bin.grid.count() + 1);
+  bin.cursors = ws.cursors.view();
+  bin.tile_offsets = ws.tile_offsets.view();
+  backend.parallel_for(bin.blocks, CountMeshTiles<S>{raster});
+  backend.parallel_for(1, ScanTileIntersections<S>{bin});
+  std::uint64_t intersections = 0;
+  ws.tile_offsets.download(&intersections, 1, bin.grid.count());
+  if (Status s = backend.synchronize(); !s) return s;
+  ws.tile_triangles.resize_discard(intersections);
+  bin.tile_splats = ws.tile_triangles.view();
+  backend.parallel_for(bin.blocks, ScatterMeshTiles<S>{raster});
+  return {};
+}
+
+/// What shading what was set up reads.
+template <class S, Backend B>
+MeshShadeArgs<S> shade_args(MeshWorkspace<S, B>& ws, const Camera& camera, const MeshLight& light) {
+  MeshShadeArgs<S> shade;
+  shade.placements = std::as_const(ws.placements).view();
+  shade.triangles = std::as_const(ws.triangles).view();
+  shade.width = static_cast<std::size_t>(camera.width);
+  shade.unlit = light.unlit;
+  shade.ambient = vec_cast<S>(light.ambient);
+  shade.diffuse = vec_cast<S>(light.diffuse);
+  shade.light = light.unlit ? Vec3<S>{} : vec_cast<S>(normalized(light.direction));
+  return shade;
+}
+
+}  // namespace detail
+
+/// Draws meshes into ws.depth, ws.visible and ws.tile_far (of tiles of `tile_size`), and into `images` what is asked
+/// for; `layer_color`: colour into ws.color. Those that are seen through (MeshAlpha::blend) are not drawn here
+/// (ops/mesh_fragments.hpp). The result is there after `backend.synchronize()`, and good until the
+/// next call. Arrays of `meshes` are in the backend's memory. Fills `stats` when given.
+/// Errors: invalid_argument naming the field; backend_failure.
+template <class S, Backend B>
+Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera,
+                   const MeshLight& light, int tile_size, bool layer_color, MeshImages<S> images = {},
+                   MeshStats* stats = nullptr) {
+  if (Status s = detail::validate(meshes, camera, light); !s) return s;
+  MeshStats counted;
+  for (const MeshInstance& m : meshes) counted.triangles += m.mesh.triangle_count();
+  if (Status s = detail::set_up_meshes(backend, ws, meshes, camera, false, counted); !s) return s;
+
+  MeshRasterArgs<S> raster = detail::raster_args(ws, camera, tile_size);
   const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   ws.depth.resize_discard(pixels);
   ws.visible.resize_discard(pixels);
-  ws.tile_far.resize_discard(bin.grid.count());
-  raster.triangles = std::as_const(ws.triangles).view();
+  ws.tile_far.resize_discard(raster.bin.grid.count());
   raster.depth = ws.depth.data();
   raster.visible = ws.visible.data();
   raster.tile_far = ws.tile_far.view();
   if constexpr (requires { backend.rasterize_mesh(raster); }) {
     backend.rasterize_mesh(raster);
   } else {
-    bin.blocks = counted.drawn < 4096 ? 1 : concurrency_of(backend);
-    ws.cursors.resize_discard(bin.blocks * bin.grid.count());
-    ws.tile_offsets.resize_discard(bin.grid.count() + 1);
-    bin.cursors = ws.cursors.view();
-    bin.tile_offsets = ws.tile_offsets.view();
-    backend.parallel_for(bin.blocks, CountMeshTiles<S>{raster});
-    backend.parallel_for(1, ScanTileIntersections<S>{bin});
-    std::uint64_t intersections = 0;
-    ws.tile_offsets.download(&intersections, 1, bin.grid.count());
-    if (Status s = backend.synchronize(); !s) return s;
-    ws.tile_triangles.resize_discard(intersections);
-    bin.tile_splats = ws.tile_triangles.view();
-    backend.parallel_for(bin.blocks, ScatterMeshTiles<S>{raster});
-    backend.parallel_for(bin.grid.count(), RasterizeMeshTile<S>{raster});
+    if (Status s = detail::bin_meshes(backend, ws, raster); !s) return s;
+    backend.parallel_for(raster.bin.grid.count(), RasterizeMeshTile<S>{raster});
   }
 
-  // ---- shade
   if (layer_color) {
     ws.color.resize_discard(3 * pixels);
     images.color = ws.color.data();
   }
   if (!images.empty()) {
-    MeshShadeArgs<S> shade;
-    shade.placements = setup.placements;
-    shade.triangles = raster.triangles;
+    MeshShadeArgs<S> shade = detail::shade_args(ws, camera, light);
     shade.depth = raster.depth;
     shade.visible = raster.visible;
-    shade.width = static_cast<std::size_t>(camera.width);
-    shade.unlit = light.unlit;
-    shade.ambient = vec_cast<S>(light.ambient);
-    shade.diffuse = vec_cast<S>(light.diffuse);
-    shade.light = light.unlit ? Vec3<S>{} : vec_cast<S>(normalized(light.direction));
     shade.images = images;
     backend.parallel_for(static_cast<std::size_t>(camera.height), ShadeMeshRow<S>{shade});
   }

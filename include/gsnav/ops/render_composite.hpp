@@ -35,11 +35,20 @@ Status render_composite(B& backend, RenderWorkspace<S, B>& ws, std::span<const G
         !s) {
       return s;
     }
-    if (color && config.blend_space == ColorSpace::linear) {
-      backend.parallel_for(ws.mesh.color.size(), DecodeImage<S>{ws.mesh.color.data()});
+    const bool linear = config.blend_space == ColorSpace::linear;
+    if (color && linear) backend.parallel_for(ws.mesh.color.size(), DecodeImage<S>{ws.mesh.color.data()});
+    MeshLayer<S> layer{ws.mesh.depth.data(), color ? ws.mesh.color.data() : nullptr,
+                             std::as_const(ws.mesh.tile_far).view(), {}, {}};
+    if (any_seen_through(meshes.instances)) {
+      if (config.composite == Composite::hard_depth) {
+        return {Errc::unsupported, "Composite::hard_depth has one layer a pixel: a mesh with MeshAlpha::blend is drawn merged"};
+      }
+      if (Status s = draw_fragments<S>(backend, ws.fragments, meshes.instances, camera, meshes.light, tile_size, color,
+                                       linear, ws.mesh.depth.data(), layer, drawn);
+          !s) {
+        return s;
+      }
     }
-    const MeshLayer<S> layer{ws.mesh.depth.data(), color ? ws.mesh.color.data() : nullptr,
-                             std::as_const(ws.mesh.tile_far).view()};
     if (config.composite == Composite::merged) {
       if (Status s = detail::render_frame<S>(backend, ws, sets, camera, config, layer, images, counted); !s) return s;
     } else {

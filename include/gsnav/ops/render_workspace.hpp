@@ -11,6 +11,7 @@
 #include "gsnav/kernels/splat.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/depth_slices.hpp"
+#include "gsnav/ops/mesh_fragments.hpp"
 #include "gsnav/ops/mesh_layer.hpp"
 #include "gsnav/ops/order_visible.hpp"
 
@@ -30,7 +31,7 @@ struct RenderWorkspace {
   explicit RenderWorkspace(B& b)
       : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
         visible(b), cursors(b), tile_offsets(b), tile_splats(b), spans(b), open(b), states(b), mesh(b),
-        composite(b) {}
+        fragments(b), composite(b) {}
 
   Buffer<Vec3<float>, B> offsets_f;
   Buffer<Vec3d, B> offsets;
@@ -47,6 +48,7 @@ struct RenderWorkspace {
   Buffer<S, B> states;
   DepthSlices slices;
   MeshWorkspace<S, B> mesh;
+  FragmentWorkspace<S, B> fragments;
   Buffer<S, B> composite;  ///< of Composite::hard_depth: what the Gaussians alone have
   std::vector<Vec3<float>> host_offsets_f;
   std::vector<Vec3d> host_offsets;
@@ -78,7 +80,7 @@ struct RenderWorkspace {
     f(a.cursors, b.cursors), f(a.tile_offsets, b.tile_offsets), f(a.tile_splats, b.tile_splats);
     f(a.spans, b.spans), f(a.host_offsets_f, b.host_offsets_f), f(a.host_offsets, b.host_offsets);
     f(a.projections, b.projections), f(a.open, b.open), f(a.states, b.states), f(a.slices, b.slices);
-    f(a.mesh, b.mesh), f(a.composite, b.composite);
+    f(a.mesh, b.mesh), f(a.fragments, b.fragments), f(a.composite, b.composite);
     VisibleOrder<B>::for_each(a.visible, b.visible, f);
   }
 };

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "gsnav/kernels/cull.hpp"
@@ -22,6 +23,17 @@ struct LodChoice {
             ///< refined, until it is below (1 - this): levels do not flicker where a camera rests
   int photo = 4;  ///< the images to come near to: at so many times the resolution, averaged (O_photo)
 };
+
+/// Names the field that cannot be, or ok.
+inline Status validate(const LodChoice& c) {
+  const auto bad = [](const char* field, double value, const char* rule) {
+    return Status(Errc::invalid_argument, std::string("LodChoice.") + field + " = " + std::to_string(value) + ": " + rule);
+  };
+  if (!(c.pixels > 0 && is_finite(c.pixels))) return bad("pixels", c.pixels, "must be positive");
+  if (!(c.hysteresis >= 0 && c.hysteresis < 1)) return bad("hysteresis", c.hysteresis, "must be in [0, 1)");
+  if (c.photo < 1 || c.photo > 16) return bad("photo", c.photo, "must be in [1, 16]");
+  return {};
+}
 
 /// The rules of the profile `lod`: those of `fast`; a Gaussian ends where its alpha is below 1/128, a pixel where less
 /// than 1/500 of the light comes through.

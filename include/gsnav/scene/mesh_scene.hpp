@@ -98,13 +98,17 @@ struct SurfaceMesh {
   Vec3f base_color{1, 1, 1};    ///< linear RGB
   bool two_sided = false;
   bool unlit = false;           ///< its colour is what is seen, whatever the light
+  MeshAlpha alpha_mode = MeshAlpha::opaque;  ///< what alpha does: base_alpha times those of vertices and of the texture
+  float base_alpha = 1;         ///< in [0, 1]
+  float alpha_cutoff = 0.5f;    ///< of MeshAlpha::mask: a hole where alpha is below
+  std::vector<float> alphas;    ///< one a vertex, in [0, 1]; empty: 1
 };
 
 /// Meshes and where they stand. Moving an instance is setting its transform.
 class MeshScene {
  public:
   /// Returns the mesh's number. Errors: invalid_argument naming what does not fit (indices beyond the vertices,
-  /// numbers of normals, colours or coordinates); the scene is then as it was.
+  /// numbers of normals, colours, coordinates or alphas, an alpha out of range); the scene is then as it was.
   Result<std::size_t> add(SurfaceMesh mesh) {
     const std::size_t n = mesh.geometry.vertices.size();
     const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, "SurfaceMesh: " + what); };
@@ -119,6 +123,10 @@ class MeshScene {
     if (!fits(mesh.normals)) return bad("normals: " + std::to_string(mesh.normals.size()) + " for " + std::to_string(n) + " vertices");
     if (!fits(mesh.colors)) return bad("colors: " + std::to_string(mesh.colors.size()) + " for " + std::to_string(n) + " vertices");
     if (!fits(mesh.uvs)) return bad("uvs: " + std::to_string(mesh.uvs.size()) + " for " + std::to_string(n) + " vertices");
+    if (!fits(mesh.alphas)) return bad("alphas: " + std::to_string(mesh.alphas.size()) + " for " + std::to_string(n) + " vertices");
+    if (!(mesh.base_alpha >= 0 && mesh.base_alpha <= 1)) {
+      return bad("base_alpha = " + std::to_string(mesh.base_alpha) + ": must be in [0, 1]");
+    }
     meshes_.push_back({std::move(mesh), {}, {}});
     find_box(meshes_.back());
     return meshes_.size() - 1;
@@ -142,6 +150,10 @@ class MeshScene {
     v.unlit = m.unlit;
     v.low = held.low;
     v.high = held.high;
+    v.alpha_mode = m.alpha_mode;
+    v.base_alpha = m.base_alpha;
+    v.alpha_cutoff = m.alpha_cutoff;
+    v.alphas = view_of(m.alphas);
     return v;
   }
   /// Mesh i standing in the world.
@@ -184,6 +196,7 @@ class MeshArrays {
       to_device(backend, mesh_.uvs, uvs_);
       to_device(backend, mesh_.texture.texels, bytes_);
       to_device(backend, mesh_.texture.decode, floats_);
+      to_device(backend, mesh_.alphas, floats_);
     }
   }
   MeshInstance instance(const Similarity& world_from_mesh = {}, std::uint32_t id = 0) const noexcept {

@@ -36,7 +36,6 @@ inline Result<PlacedMeshes> placed_meshes(TexturedScene scene) {
   PlacedMeshes out;
   out.warnings = std::move(scene.warnings);
   std::vector<std::shared_ptr<const MeshTexture>> textures(scene.textures.size());
-  std::size_t cut_out = 0;
   for (std::size_t p = 0; p < scene.parts.size(); ++p) {
     TexturedPart& part = scene.parts[p];
     const SurfaceMaterial& material = part.material;
@@ -57,7 +56,6 @@ inline Result<PlacedMeshes> placed_meshes(TexturedScene scene) {
       }
       mesh.texture = textures[t];
     }
-    cut_out += material.alpha_cutoff > 0 && material.texture >= 0 ? 1 : 0;
     mesh.geometry = std::move(part.geometry);
     mesh.normals = std::move(part.normals);
     mesh.colors = std::move(part.colors);
@@ -65,6 +63,12 @@ inline Result<PlacedMeshes> placed_meshes(TexturedScene scene) {
     mesh.base_color = vec_cast<float>(material.factor);
     mesh.two_sided = material.double_sided;
     mesh.unlit = material.unlit;
+    mesh.alpha_mode = material.blend              ? MeshAlpha::blend
+                      : material.alpha_cutoff > 0 ? MeshAlpha::mask
+                                                  : MeshAlpha::opaque;
+    mesh.base_alpha = static_cast<float>(material.alpha);
+    mesh.alpha_cutoff = static_cast<float>(material.alpha_cutoff);
+    mesh.alphas = std::move(part.alphas);
     if (auto added = out.meshes.add(std::move(mesh)); !added) return named(added.status());
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
@@ -74,7 +78,6 @@ inline Result<PlacedMeshes> placed_meshes(TexturedScene scene) {
                                                 std::to_string(out.meshes.size()));
     }
   }
-  if (cut_out > 0) out.warnings.push_back("holes that textures cut into " + std::to_string(cut_out) + " parts are drawn closed");
   out.instances = std::move(scene.instances);
   return out;
 }

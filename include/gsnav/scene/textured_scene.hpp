@@ -18,6 +18,7 @@ struct TexturedPart {
   std::vector<Vec3f> normals;    ///< [V] of unit length, or empty: those of the faces
   std::vector<Vec3f> colors;     ///< [V] linear RGB, or empty: white
   std::vector<Vec2<float>> uvs;  ///< [V], (0, 0) is the texture's top left; or empty
+  std::vector<float> alphas;     ///< [V] in [0, 1], or empty: 1; where the material reads alpha
   SurfaceMaterial material;      ///< its texture is one of the scene's
 };
 

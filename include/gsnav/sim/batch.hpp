@@ -73,6 +73,7 @@ class BatchSimulator {
     for (const auto& scene : scenes) {
       if (scene == nullptr) return {Errc::invalid_argument, "BatchSimulator: a scene is null"};
       if (Status s = validate(*scene); !s) return s;
+      if (Status s = validate_detail<B>(*scene, config.lod); !s) return s;
     }
     const std::size_t count = scenes.size();
     return create(backend, [held = std::move(scenes)](std::size_t i) -> Result<ScenePointer> { return held[i]; }, {}, count,
@@ -170,7 +171,8 @@ class BatchSimulator {
     if (scenes_[scene] != nullptr) return {};
     auto held = scene_pointer_(scene);
     if (!held) return held.status();
-    scenes_[scene] = std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held));
+    if (Status s = validate_detail<B>(**held, config_.lod); !s) return s;
+    scenes_[scene] = std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held), config_.lod);
     render_configs_[scene] = scenes_[scene]->render_config(config_.render);
     return {};
   }
@@ -303,7 +305,7 @@ class BatchSimulator {
         const std::size_t e = lookers_[i].environment;
         const AgentPose& agent = world(e).agent();
         views_.push_back({agent.position, agent.rotation(), agent.pitch, noise_seed(config_.seed + e, world(e).state()),
-                          scene.sets(p.slot), &render_configs_[p.scene], lookers_[i].row, scene.meshes()});
+                          scene.sets(p.slot), &render_configs_[p.scene], lookers_[i].row, scene.meshes(), scene.detail()});
       }
     }
     return rig_.render(views_, images);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "gsnav/nav/obstacles.hpp"
 #include "gsnav/scene/placed_meshes.hpp"
 #include "gsnav/scene/renderer.hpp"
+#include "gsnav/sim/scene_detail.hpp"
 
 namespace gsnav {
 
@@ -22,6 +24,8 @@ namespace gsnav {
 struct SceneAsset {
   std::shared_ptr<const GaussianCloud> cloud;
   Similarity world_from_asset{};
+  /// Its levels of detail (build_lod, io::cached_lod); read where SimulatorConfig::lod is set.
+  std::shared_ptr<const LodTree> lod{};
 };
 
 /// A surface of triangles and how it stands in the world; seen among the Gaussians (docs/composition.md).
@@ -55,6 +59,23 @@ inline Status validate(const SimulatorScene& scene) {
   return {};
 }
 
+/// Whether a scene can be drawn so by a backend. invalid_argument, naming what is missing or out of range; unsupported.
+template <Backend B>
+Status validate_detail(const SimulatorScene& scene, const std::optional<LodChoice>& lod) {
+  if (!lod) return {};
+  if (Status s = validate(*lod); !s) return s;
+  if (!is_host_backend<B>) {
+    return {Errc::unsupported, "SimulatorConfig.lod: levels of detail are drawn on host backends only"};
+  }
+  for (std::size_t i = 0; i < scene.assets.size(); ++i) {
+    const SceneAsset& a = scene.assets[i];
+    if (a.lod != nullptr && a.lod->leaves() == a.cloud->view().all_chunks()) continue;
+    return {Errc::invalid_argument, "SimulatorConfig.lod: SimulatorScene.assets[" + std::to_string(i) + "].lod is " +
+                                        (a.lod == nullptr ? "null: build_lod makes it" : "of another cloud")};
+  }
+  return {};
+}
+
 /// Appends how the scene's avatars move over [t0, t1], numbered as they stand in the scene. `before`: what this gave
 /// for an interval that ended at t0, or null; with it the same comes in half the time.
 inline void append_bodies(const SimulatorScene& scene, double t0, double t1, std::vector<DynamicCapsule>& out,
@@ -75,8 +96,12 @@ inline void append_bodies(const SimulatorScene& scene, double t0, double t1, std
 template <Backend B>
 class SceneOnBackend {
  public:
-  SceneOnBackend(B& backend, std::shared_ptr<const SimulatorScene> scene) : backend_(&backend), scene_(std::move(scene)) {
+  /// `lod`: levels of detail, which the scene has (validate_detail).
+  SceneOnBackend(B& backend, std::shared_ptr<const SimulatorScene> scene, const std::optional<LodChoice>& lod = {})
+      : backend_(&backend), scene_(std::move(scene)) {
+    if (lod) detail_.choice = *lod;
     for (const SceneAsset& a : scene_->assets) {
+      if (lod) detail_.assets.push_back({a.lod.get(), a.cloud.get(), a.world_from_asset});
       arrays_.emplace_back(backend, *a.cloud);
       sets_.push_back(arrays_.back().set(a.world_from_asset));
     }
@@ -90,8 +115,9 @@ class SceneOnBackend {
   }
 
   const SimulatorScene& scene() const noexcept { return *scene_; }
-  /// `config` with the sort order of the scene's assets.
+  /// `config` with the sort order of the scene's assets, and the rules of levels of detail where it has them.
   RenderConfig render_config(RenderConfig config) const noexcept {
+    if (detail() != nullptr) config = lod_config(config);
     if (!scene_->assets.empty()) config.sort_order = scene_->assets.front().cloud->sort_order;
     return config;
   }
@@ -99,6 +125,8 @@ class SceneOnBackend {
   std::span<const GaussianSet> assets() const noexcept { return sets_; }
   /// The scene's meshes; an instance's id is the number of the SceneMesh that it is of.
   MeshFrame meshes() const noexcept { return {instances_, scene_->light}; }
+  /// What its assets are drawn by, each camera by its own cut; null: whole.
+  const SceneDetail* detail() const noexcept { return detail_.assets.empty() ? nullptr : &detail_; }
   /// How many times an avatar was posed so far.
   std::size_t pose_count() const noexcept { return pose_count_; }
 
@@ -177,6 +205,7 @@ class SceneOnBackend {
   std::shared_ptr<const SimulatorScene> scene_;
   std::vector<GaussianArrays<B>> arrays_;
   std::vector<GaussianSet> sets_;  // of the assets
+  SceneDetail detail_;
   std::vector<MeshArrays<B>> mesh_arrays_;
   std::vector<MeshInstance> instances_;
   std::vector<std::shared_ptr<const AvatarArrays<B>>> bodies_;  // of each avatar

@@ -58,8 +58,7 @@ class SemanticPasses {
     std::vector<MeshInstance> out(meshes.begin(), meshes.end());
     for (MeshInstance& m : out) {
       const std::size_t thing = sets + m.id, channel = thing / kChannels == pass ? thing % kChannels : kChannels;
-      m.mesh.texture = {};
-      m.mesh.colors = {};
+      m.mesh.plain = true;  // holes and what is seen through stay
       m.mesh.unlit = true;
       m.mesh.base_color = {channel == 0 ? 1.0f : 0.0f, channel == 1 ? 1.0f : 0.0f, channel == 2 ? 1.0f : 0.0f};
     }

@@ -54,14 +54,13 @@ class SemanticFrames {
     rgb_.resize_discard(3 * pixels);
     alpha_.resize_discard(pixels);
 
-    // Black and unlit: what a mesh has of a pixel is what the sets leave of its alpha.
+    // Black and unlit: what an opaque mesh has of a pixel is what the others leave of its alpha. Those that are seen
+    // through are passed like sets, behind them.
     std::vector<MeshInstance> black(meshes.begin(), meshes.end());
     for (std::size_t i = 0; i < black.size(); ++i) {
       if (Status s = validate(black[i]); !s) return s;
       black[i].id = static_cast<std::uint32_t>(i);
-      black[i].mesh.colors = {};
-      black[i].mesh.uvs = {};
-      black[i].mesh.texture = {};
+      black[i].mesh.plain = true;
       black[i].mesh.base_color = {0, 0, 0};
       black[i].mesh.unlit = true;
     }
@@ -85,9 +84,20 @@ class SemanticFrames {
     covered_.assign(pixels, S(0));
     host_alpha_.resize(pixels);
     host_rgb_.resize(3 * pixels);
-    const std::size_t passes = SemanticPasses<B>::count(sets.size());
+    std::vector<std::size_t> through;
+    for (std::size_t i = 0; i < black.size(); ++i) {
+      if (black[i].mesh.alpha_mode == MeshAlpha::blend) through.push_back(i);
+    }
+    const std::size_t things = sets.size() + through.size();
+    const std::size_t passes = SemanticPasses<B>::count(things);
     for (std::size_t pass = 0; pass < (passes > 0 ? passes : 1); ++pass) {
       const std::vector<GaussianSet> colored = passes_.recolored(sets, pass);
+      for (std::size_t i = 0; i < through.size(); ++i) {
+        const std::size_t thing = sets.size() + i, channel = thing % kChannels;
+        Vec3f& color = black[through[i]].mesh.base_color;
+        color = {};
+        if (thing / kChannels == pass) color[static_cast<int>(channel)] = 1;
+      }
       FrameImages<S> images;
       images.rgb = rgb_.data();
       images.alpha = alpha_.data();
@@ -99,10 +109,11 @@ class SemanticFrames {
       if (Status s = backend_->synchronize(); !s) return s;
       rgb_.download(host_rgb_.data(), 3 * pixels);
       alpha_.download(host_alpha_.data(), pixels);
-      const std::size_t first = pass * SemanticPasses<B>::kChannels;
+      const std::size_t first = pass * kChannels;
       for (std::size_t p = 0; p < pixels; ++p) {
-        for (std::size_t k = 0; k < SemanticPasses<B>::kChannels && first + k < sets.size(); ++k) {
-          take(out, p, first + k + 1, host_rgb_[3 * p + k]);
+        for (std::size_t k = 0; k < kChannels && first + k < things; ++k) {
+          const std::size_t thing = first + k, n = sets.size();
+          take(out, p, 1 + (thing < n ? thing : n + through[thing - n]), host_rgb_[3 * p + k]);
         }
       }
     }
@@ -117,6 +128,8 @@ class SemanticFrames {
   }
 
  private:
+  static constexpr std::size_t kChannels = SemanticPasses<B>::kChannels;
+
   void take(SemanticFrame& out, std::size_t pixel, std::size_t label, S weight) {
     covered_[pixel] += weight;
     if (!(static_cast<float>(weight) > out.weights[pixel])) return;

@@ -16,6 +16,7 @@
 #include "gsnav/sim/cube_map.hpp"
 #include "gsnav/sim/frame_batch.hpp"
 #include "gsnav/sim/mesh_normals.hpp"
+#include "gsnav/sim/scene_detail.hpp"
 #include "gsnav/sim/semantic.hpp"
 #include "gsnav/sim/sensor.hpp"
 
@@ -31,6 +32,8 @@ struct SensorView {
   const RenderConfig* config = nullptr;  ///< outputs are chosen by the sensors
   std::size_t row = 0;
   MeshFrame meshes{};  ///< ids are their numbers for semantic sensors
+  const SceneDetail* detail = nullptr;  ///< levels of detail of the first of `sets`; null: whole. Host backends.
+                                        ///< Semantic sensors see all sets whole
 };
 
 /// Where images are.
@@ -185,11 +188,17 @@ class SensorRig {
     for (const SensorView& v : views) append_cameras(v.base, v.rotation, v.pitch, cameras_);
     faces_.resize(groups_.size());
     jobs_.clear();
+    detail_jobs_.clear();
     prepare_shares(views);
     std::size_t camera = 0;
     for (std::size_t v = 0; v < views.size(); ++v) {
       for (std::size_t g = 0; g < groups_.size(); ++g) add_jobs(views, v, g, images, camera);
     }
+    while (cuts_.size() < detail_jobs_.size()) cuts_.emplace_back();
+    for_each(detail_jobs_.size(), [this](std::size_t i) {
+      FrameJob<float>& job = jobs_[detail_jobs_[i].job];
+      job.sets = cuts_[i].select(*detail_jobs_[i].detail, job.sets, *job.camera);
+    });
     if constexpr (BatchBackend<B>) {
       if (!images.in_host_memory()) {
         if (Status s = frames_.render_on_backend(jobs_); !s) return s;
@@ -254,6 +263,7 @@ class SensorRig {
   void add_jobs(std::span<const SensorView> views, std::size_t v, std::size_t g, SensorImages<B>& images, std::size_t& camera) {
     Group& group = groups_[g];
     const auto add = [&](const std::array<float*, kKinds>& at) {
+      if (views[v].detail != nullptr) detail_jobs_.push_back({jobs_.size(), views[v].detail});
       jobs_.push_back({views[v].sets, &cameras_[camera++], views[v].config, frame_images(at), views[v].meshes});
     };
     std::array<float*, kKinds> at{};
@@ -359,6 +369,10 @@ class SensorRig {
     return static_cast<std::size_t>(cube.side()) * static_cast<std::size_t>(cube.side());
   }
 
+  struct DetailJob {
+    std::size_t job;
+    const SceneDetail* detail;
+  };
   struct NormalJob {
     std::size_t view, group, camera;
     const float* seen;
@@ -384,6 +398,8 @@ class SensorRig {
   std::vector<Camera> cameras_;
   std::vector<FrameJob<float>> jobs_;
   std::vector<NormalJob> normal_jobs_;
+  std::vector<DetailJob> detail_jobs_;
+  std::vector<DetailSets> cuts_;  // of each of these
   std::vector<std::size_t> rows_;
   std::vector<std::array<std::vector<float>, kKinds>> faces_;  // [group][kind][view][face]
   std::size_t render_count_ = 0;

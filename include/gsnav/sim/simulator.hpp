@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -17,6 +18,9 @@ struct SimulatorConfig {
   TaskConfig task{};
   std::vector<SensorSpec> sensors;  ///< none: nothing is rendered
   RenderConfig render{};            ///< outputs and sort order are chosen by sensors and scene
+  /// Draws the assets by levels of detail: the profile lod (docs/lod.md), whatever render.profile is. Each needs its
+  /// tree (SceneAsset::lod). No hysteresis: an image depends on its camera, not on what was seen before.
+  std::optional<LodChoice> lod{};
   bool rendering = true;            ///< off: physics and metrics only, no image memory
   std::uint64_t seed = 0;           ///< of the sensors' noise
 };
@@ -80,6 +84,7 @@ class Simulator {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
     if (Status s = validate(*scene); !s) return s;
     if (Status s = validate(config); !s) return s;
+    if (Status s = validate_detail<B>(*scene, config.lod); !s) return s;
     Result<World> world = World::create(scene->navmesh, config.task, [scene, others](double t0, double t1, auto& out) {
       append_bodies(*scene, t0, t1, out);
       if (others) others(t0, t1, out);
@@ -115,7 +120,7 @@ class Simulator {
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
     const AgentPose& agent = world_.agent();
     const SensorView view{agent.position, agent.rotation(), agent.pitch, noise_seed(config_.seed, world_.state()),
-                          scene_.sets(0), &config_.render, 0, scene_.meshes()};
+                          scene_.sets(0), &config_.render, 0, scene_.meshes(), scene_.detail()};
     rig_.resize(buffers_, 1);
     if (Status s = rig_.render(std::span(&view, 1), buffers_); !s) return s;
     for (std::size_t i = 0; i < images_.size(); ++i) images_[i].data = rig_.image(buffers_, i, 0);
@@ -154,7 +159,9 @@ class Simulator {
     rig_.renderer().set_config(rc);
     rig_.renderer().set_meshes(scene_.meshes().instances, scene_.scene().light);
     ++spectator_count_;
-    if (Status s = rig_.renderer().render(scene_.sets(0), std::span(&camera, 1), spectator_); !s) return s;
+    std::span<const GaussianSet> sets = scene_.sets(0);
+    if (scene_.detail() != nullptr) sets = spectator_cut_.select(*scene_.detail(), sets, camera);
+    if (Status s = rig_.renderer().render(sets, std::span(&camera, 1), spectator_); !s) return s;
     return &spectator_;
   }
 
@@ -164,7 +171,7 @@ class Simulator {
     const WorldState& s = world_.state();
     if (!s.running) return {Errc::invalid_argument, "goal_images before reset: no episode is running"};
     const SensorView view{s.goal.position, goal_rotation(s.episode), 0.0, noise_seed(config_.seed, s),
-                          scene_.assets(), &config_.render, 0, scene_.meshes()};
+                          scene_.assets(), &config_.render, 0, scene_.meshes(), scene_.detail()};
     rig_.resize(goal_buffers_, 1);
     if (Status e = rig_.render(std::span(&view, 1), goal_buffers_); !e) return e;
     goal_images_ = images_;
@@ -176,7 +183,7 @@ class Simulator {
   Simulator(B& backend, World world, SimulatorConfig config, std::shared_ptr<const SimulatorScene> scene)
       : world_(std::move(world)),
         config_(std::move(config)),
-        scene_(backend, std::move(scene)),
+        scene_(backend, std::move(scene), config_.lod),
         rig_(backend, config_.sensors) {
     config_.render = scene_.render_config(config_.render);
     for (const SensorSpec& s : config_.sensors) {
@@ -191,6 +198,7 @@ class Simulator {
   SensorImages<B> buffers_, goal_buffers_;
   std::vector<Observation> images_, goal_images_;
   Frames<float> spectator_;
+  DetailSets spectator_cut_;
   std::size_t spectator_count_ = 0;
 };
 
