@@ -47,8 +47,9 @@ TEST_CASE("cuda batch: meshes among the Gaussians have the bits they have one ca
   const Meshes meshes(cuda);
   MeshLight lit;
   lit.unlit = false;
-  for (const auto& [count, width, height] : {std::array{5, 149, 101}, std::array{60, 149, 101}, std::array{2, 640, 352}}) {
-    const std::vector<Camera> cameras = ring(count, width, height);
+  for (const std::array<int, 3>& size : {std::array{5, 149, 101}, std::array{60, 149, 101}, std::array{2, 640, 352}}) {
+    const int count = size[0];
+    const std::vector<Camera> cameras = ring(count, size[1], size[2]);
     for (const bool all : {true, false}) {
       std::vector<MeshFrame> seen;
       for (int c = 0; c < count; ++c) {

@@ -8,6 +8,7 @@
 
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/scene/lod_build.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "mesh_box.hpp"
 #include "ops/no_gpu.hpp"
@@ -140,6 +141,32 @@ TEST_CASE("cuda: meshes, their normals, and batches with them") {
   }
   CHECK(normals > 1000);
   CHECK(other <= normals / 100);  // where the median depth is the mesh's on one of the two only
+}
+
+TEST_CASE("cuda: levels of detail") {
+  if (no_gpu("cuda levels of detail in a simulator")) return;
+  SimulatorScene detailed = peopled_scene(4000);
+  CudaBackend cuda;
+  OpenMPBackend openmp;
+  detailed.assets[0].lod = std::make_shared<const LodTree>(build_lod(openmp, *detailed.assets[0].cloud).value());
+  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{std::make_shared<const SimulatorScene>(detailed)};
+  BatchConfig config;
+  config.sensors = rgbd_sensors(64, 96);
+  config.lod = LodChoice{};
+  const auto there = [](std::size_t environment, std::size_t count) -> Result<BatchEpisode> {
+    BatchEpisode e = wandering(environment, count).value();
+    e.scene = 0;
+    return e;
+  };
+  auto on_gpu = make_batch_simulator(cuda, scenes, config, 3, there).value();
+  auto on_cpu = make_batch_simulator(openmp, scenes, config, 3, there).value();
+  const auto got = on_gpu.reset().value(), want = on_cpu.reset().value();
+  for (std::size_t i = 0; i < 2; ++i) {
+    CAPTURE(config.sensors[i].uuid);
+    Difference d;
+    d.add(config.sensors[i].kind, got.images[i].data, want.images[i].data);
+    d.check(config.sensors[i].kind);
+  }
 }
 
 TEST_CASE("cuda: a batch sees what the OpenMP one sees, in host memory and on the GPU") {

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "gsnav/backends/serial.hpp"
+#include "gsnav/scene/lod_build.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "mesh_box.hpp"
 #include "ops/backends.hpp"
@@ -184,6 +185,36 @@ TEST_CASE("meshes, which its batches do not know, are drawn there with the same 
   }
   const std::size_t row = want[1].size() / 3;  // the second scene lacks the box
   CHECK(!std::equal(want[1].data(), want[1].data() + row, want[1].data() + row));
+}
+
+TEST_CASE("levels of detail are chosen for a backend with a memory of its own as for the serial one") {
+  SimulatorScene detailed = peopled_scene(2000);
+  SerialBackend serial;
+  detailed.assets[0].lod = std::make_shared<const LodTree>(build_lod(serial, *detailed.assets[0].cloud).value());
+  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{std::make_shared<const SimulatorScene>(detailed)};
+  BatchConfig config;
+  config.sensors = rgbd_sensors(24, 36);
+  config.lod = LodChoice{};
+  config.lod->pixels = 2;
+  auto expected = make_batch_simulator(serial, scenes, config, 3, spread).value();
+  const auto want = images_of(expected.reset().value().images);
+  BatchConfig whole = config;
+  whole.lod = {};
+  CHECK(images_of(make_batch_simulator(serial, scenes, whole, 3, spread).value().reset().value().images) != want);
+  for (const ImageMemory memory : {ImageMemory::host, ImageMemory::backend}) {
+    BatchingBackend batching;
+    config.images = memory;
+    auto sim = make_batch_simulator(batching, scenes, config, 3, spread).value();
+    CHECK(images_of(sim.reset().value().images) == want);
+  }
+  // A spectator's camera too.
+  BatchingBackend batching;
+  auto there = make_simulator(batching, detailed, config).value();
+  auto here = make_simulator(serial, detailed, config).value();
+  there.reset(to_kitchen()).value();
+  here.reset(to_kitchen()).value();
+  const Camera camera = sensor_camera(config.sensors[0], here.agent().position, here.agent().rotation());
+  CHECK((*there.render(camera))->rgb == (*here.render(camera))->rgb);
 }
 
 TEST_CASE("one simulator there has the serial one's bits too, with sensors that need scratch") {

@@ -42,6 +42,9 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
         (config.composite != Composite::merged || config.response != Response::ewa || config.compat != Compat::none)) {
       return bad(Errc::unsupported, "meshes: only with Composite::merged, Response::ewa and Compat::none");
     }
+    if (any_seen_through(cameras[c].meshes.instances)) {
+      return bad(Errc::unsupported, "meshes that are seen through (MeshAlpha::blend): draw them one camera at a time");
+    }
     std::uint64_t gaussians = 0;
     const auto count = [&](std::size_t s) { gaussians += sets[s].gaussians.size; };
     for (const std::uint32_t s : cameras[c].sets) {

@@ -73,7 +73,7 @@ class BatchSimulator {
     for (const auto& scene : scenes) {
       if (scene == nullptr) return {Errc::invalid_argument, "BatchSimulator: a scene is null"};
       if (Status s = validate(*scene); !s) return s;
-      if (Status s = validate_detail<B>(*scene, config.lod); !s) return s;
+      if (Status s = validate_detail(*scene, config.lod); !s) return s;
     }
     const std::size_t count = scenes.size();
     return create(backend, [held = std::move(scenes)](std::size_t i) -> Result<ScenePointer> { return held[i]; }, {}, count,
@@ -171,7 +171,7 @@ class BatchSimulator {
     if (scenes_[scene] != nullptr) return {};
     auto held = scene_pointer_(scene);
     if (!held) return held.status();
-    if (Status s = validate_detail<B>(**held, config_.lod); !s) return s;
+    if (Status s = validate_detail(**held, config_.lod); !s) return s;
     scenes_[scene] = std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held), config_.lod);
     render_configs_[scene] = scenes_[scene]->render_config(config_.render);
     return {};

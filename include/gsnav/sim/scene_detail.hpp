@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "gsnav/core/buffer.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 
 namespace gsnav {
@@ -16,6 +18,7 @@ struct SceneDetail {
     const LodTree* tree;
     const GaussianCloud* cloud;
     Similarity world_from_asset;
+    GaussianView cloud_there{}, merged_there{};  ///< cloud's and tree's arrays in a backend's own memory; empty: the host's
   };
   std::vector<Asset> assets;  ///< in the order of the scene's sets; empty: all are drawn whole
   LodChoice choice{};
@@ -32,6 +35,7 @@ class DetailSets {
     choice.hysteresis = 0;
     cuts_.resize(detail.assets.size());
     sets_.clear();
+    chunks_.clear();
     for (std::size_t a = 0; a < detail.assets.size(); ++a) {
       const SceneDetail::Asset& asset = detail.assets[a];
       Cut& cut = cuts_[a];
@@ -39,14 +43,37 @@ class DetailSets {
         cut = {asset.tree, asset.cloud, LodCut(*asset.tree, *asset.cloud)};
       }
       const auto chosen = cut.cut->select(camera, choice, asset.world_from_asset);
-      sets_.insert(sets_.end(), chosen.begin(), chosen.end());
+      for (const GaussianSet& set : chosen) {
+        sets_.push_back(set);
+        if (asset.cloud_there.size != 0) move(asset, sets_.back().gaussians);
+      }
     }
     const auto others = sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
     sets_.insert(sets_.end(), others.begin(), others.end());
     return sets_;
   }
 
+  /// Chunks of the last choice that a backend with a memory of its own has to be given, and where they are there.
+  std::span<const std::uint32_t> chunks() const noexcept { return chunks_; }
+  void place_chunks(const std::uint32_t* there) noexcept {
+    for (GaussianSet& set : sets_) {
+      View<const std::uint32_t>& drawn = set.gaussians.drawn_chunks;
+      if (drawn.empty()) continue;
+      drawn.data = there;
+      there += drawn.size;
+    }
+  }
+
  private:
+  /// From the host's arrays to the backend's.
+  void move(const SceneDetail::Asset& asset, GaussianView& view) {
+    const View<const std::uint32_t> drawn = view.drawn_chunks;
+    chunks_.insert(chunks_.end(), drawn.data, drawn.data + drawn.size);
+    const bool is_cloud = view.means[0].data == asset.cloud->means[0].data();
+    view = is_cloud ? asset.cloud_there : asset.merged_there;
+    view.drawn_chunks = {nullptr, drawn.size};
+  }
+
   struct Cut {
     const LodTree* tree = nullptr;
     const GaussianCloud* cloud = nullptr;
@@ -54,6 +81,33 @@ class DetailSets {
   };
   std::vector<Cut> cuts_;
   std::vector<GaussianSet> sets_;
+  std::vector<std::uint32_t> chunks_;
+};
+
+/// Takes what cuts chose to where a backend reads it: for a memory of its own, in one copy.
+template <Backend B>
+class ChosenChunks {
+ public:
+  explicit ChosenChunks(B& backend) : there_(backend) {}
+
+  /// The sets of these cuts can be drawn until the next call.
+  void place(std::span<DetailSets> cuts) {
+    if constexpr (!is_host_backend<B>) {
+      all_.clear();
+      for (const DetailSets& cut : cuts) all_.insert(all_.end(), cut.chunks().begin(), cut.chunks().end());
+      there_.resize_discard(all_.size());
+      there_.upload(all_.data(), all_.size());
+      const std::uint32_t* at = there_.data();
+      for (DetailSets& cut : cuts) {
+        cut.place_chunks(at);
+        at += cut.chunks().size();
+      }
+    }
+  }
+
+ private:
+  std::vector<std::uint32_t> all_;
+  Buffer<std::uint32_t, B> there_;
 };
 
 }  // namespace gsnav

@@ -59,14 +59,10 @@ inline Status validate(const SimulatorScene& scene) {
   return {};
 }
 
-/// Whether a scene can be drawn so by a backend. invalid_argument, naming what is missing or out of range; unsupported.
-template <Backend B>
-Status validate_detail(const SimulatorScene& scene, const std::optional<LodChoice>& lod) {
+/// Whether a scene can be drawn so. invalid_argument, naming what is missing or out of range.
+inline Status validate_detail(const SimulatorScene& scene, const std::optional<LodChoice>& lod) {
   if (!lod) return {};
   if (Status s = validate(*lod); !s) return s;
-  if (!is_host_backend<B>) {
-    return {Errc::unsupported, "SimulatorConfig.lod: levels of detail are drawn on host backends only"};
-  }
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
     const SceneAsset& a = scene.assets[i];
     if (a.lod != nullptr && a.lod->leaves() == a.cloud->view().all_chunks()) continue;
@@ -101,9 +97,14 @@ class SceneOnBackend {
       : backend_(&backend), scene_(std::move(scene)) {
     if (lod) detail_.choice = *lod;
     for (const SceneAsset& a : scene_->assets) {
-      if (lod) detail_.assets.push_back({a.lod.get(), a.cloud.get(), a.world_from_asset});
-      arrays_.emplace_back(backend, *a.cloud);
-      sets_.push_back(arrays_.back().set(a.world_from_asset));
+      sets_.push_back(arrays_.emplace_back(backend, *a.cloud).set(a.world_from_asset));
+      if (!lod) continue;
+      detail_.assets.push_back({a.lod.get(), a.cloud.get(), a.world_from_asset});
+      if constexpr (!is_host_backend<B>) {
+        detail_.assets.back().cloud_there = sets_.back().gaussians;
+        if (a.lod->merged.size() == 0) continue;
+        detail_.assets.back().merged_there = merged_.emplace_back(backend, a.lod->merged).set().gaussians;
+      }
     }
     for (std::size_t m = 0; m < scene_->meshes.size(); ++m) place(m);
     // People of one body share it.
@@ -205,6 +206,7 @@ class SceneOnBackend {
   std::shared_ptr<const SimulatorScene> scene_;
   std::vector<GaussianArrays<B>> arrays_;
   std::vector<GaussianSet> sets_;  // of the assets
+  std::vector<GaussianArrays<B>> merged_;  // of their trees, where the backend has a memory of its own
   SceneDetail detail_;
   std::vector<MeshArrays<B>> mesh_arrays_;
   std::vector<MeshInstance> instances_;

@@ -32,7 +32,7 @@ struct SensorView {
   const RenderConfig* config = nullptr;  ///< outputs are chosen by the sensors
   std::size_t row = 0;
   MeshFrame meshes{};  ///< ids are their numbers for semantic sensors
-  const SceneDetail* detail = nullptr;  ///< levels of detail of the first of `sets`; null: whole. Host backends.
+  const SceneDetail* detail = nullptr;  ///< levels of detail of the first of `sets`; null: whole.
                                         ///< Semantic sensors see all sets whole
 };
 
@@ -60,7 +60,7 @@ class SensorRig {
  public:
   /// `sensors` are valid.
   SensorRig(B& backend, std::vector<SensorSpec> sensors)
-      : backend_(&backend), sensors_(std::move(sensors)), frames_(backend), semantic_(backend), normals_(backend) {
+      : backend_(&backend), sensors_(std::move(sensors)), frames_(backend), semantic_(backend), normals_(backend), chosen_(backend) {
     for (std::size_t i = 0; i < sensors_.size(); ++i) {
       Group* group = nullptr;
       for (Group& g : groups_) {
@@ -199,6 +199,7 @@ class SensorRig {
       FrameJob<float>& job = jobs_[detail_jobs_[i].job];
       job.sets = cuts_[i].select(*detail_jobs_[i].detail, job.sets, *job.camera);
     });
+    chosen_.place(std::span(cuts_).first(detail_jobs_.size()));
     if constexpr (BatchBackend<B>) {
       if (!images.in_host_memory()) {
         if (Status s = frames_.render_on_backend(jobs_); !s) return s;
@@ -399,6 +400,7 @@ class SensorRig {
   std::vector<FrameJob<float>> jobs_;
   std::vector<NormalJob> normal_jobs_;
   std::vector<DetailJob> detail_jobs_;
+  ChosenChunks<B> chosen_;
   std::vector<DetailSets> cuts_;  // of each of these
   std::vector<std::size_t> rows_;
   std::vector<std::array<std::vector<float>, kKinds>> faces_;  // [group][kind][view][face]

@@ -84,7 +84,7 @@ class Simulator {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
     if (Status s = validate(*scene); !s) return s;
     if (Status s = validate(config); !s) return s;
-    if (Status s = validate_detail<B>(*scene, config.lod); !s) return s;
+    if (Status s = validate_detail(*scene, config.lod); !s) return s;
     Result<World> world = World::create(scene->navmesh, config.task, [scene, others](double t0, double t1, auto& out) {
       append_bodies(*scene, t0, t1, out);
       if (others) others(t0, t1, out);
@@ -160,7 +160,10 @@ class Simulator {
     rig_.renderer().set_meshes(scene_.meshes().instances, scene_.scene().light);
     ++spectator_count_;
     std::span<const GaussianSet> sets = scene_.sets(0);
-    if (scene_.detail() != nullptr) sets = spectator_cut_.select(*scene_.detail(), sets, camera);
+    if (scene_.detail() != nullptr) {
+      sets = spectator_cut_.select(*scene_.detail(), sets, camera);
+      spectator_chunks_.place(std::span(&spectator_cut_, 1));
+    }
     if (Status s = rig_.renderer().render(sets, std::span(&camera, 1), spectator_); !s) return s;
     return &spectator_;
   }
@@ -184,7 +187,8 @@ class Simulator {
       : world_(std::move(world)),
         config_(std::move(config)),
         scene_(backend, std::move(scene), config_.lod),
-        rig_(backend, config_.sensors) {
+        rig_(backend, config_.sensors),
+        spectator_chunks_(backend) {
     config_.render = scene_.render_config(config_.render);
     for (const SensorSpec& s : config_.sensors) {
       images_.push_back({s.uuid, s.kind, s.resolution[0], s.resolution[1], channels_of(s.kind), {}});
@@ -199,6 +203,7 @@ class Simulator {
   std::vector<Observation> images_, goal_images_;
   Frames<float> spectator_;
   DetailSets spectator_cut_;
+  ChosenChunks<B> spectator_chunks_;
   std::size_t spectator_count_ = 0;
 };
 
