@@ -15,11 +15,6 @@ namespace {
 using gsnav::Status;
 namespace fs = std::filesystem;
 
-std::string bytes_of(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 Status write(const fs::path& path, const std::string& text) {
   std::ofstream out(path, std::ios::binary);
   out << text;
@@ -61,8 +56,11 @@ Status run(const Options& o, int pictures) {
       if (!fs::exists(strip) || !fs::exists(map)) {
         if (Status s = draw(*sim, *stage, record, strip, map); !s) return s;
       }
-      e.strip = bytes_of(strip);
-      e.map = bytes_of(map);
+      for (const auto& [file, picture] : {std::pair{strip, &e.strip}, {map, &e.map}}) {
+        auto read = page_picture(file.string());
+        if (!read) return read.status();
+        *picture = std::move(*read);
+      }
     }
     entries.push_back(std::move(e));
   }

@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "page.hpp"
 
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
 #include "../report/html_text.hpp"
+#include "gsnav/io/image_file.hpp"
 
 namespace gsnav_eval {
 namespace {
@@ -21,12 +27,23 @@ void row(std::string& out, const char* name, const char* unit, double value) {
   out += "<tr><td>" + std::string(name) + "</td><td>" + format(value) + "</td><td>" + unit + "</td></tr>\n";
 }
 
-std::string picture(const std::string& png, const std::string& what) {
-  if (png.empty()) return {};
-  return "<p><img alt=\"" + escape(what) + "\" src=\"data:image/png;base64," + base64(png) + "\"/></p>\n";
+std::string picture(const Picture& p, const std::string& what) {
+  if (p.bytes.empty()) return {};
+  return "<p><img alt=\"" + escape(what) + "\" loading=\"lazy\" src=\"data:image/" + p.type + ";base64," +
+         base64(p.bytes) + "\"/></p>\n";
 }
 
 }  // namespace
+
+gsnav::Result<Picture> page_picture(const std::string& png_file) {
+  const auto png = gsnav::io::load_png(png_file);
+  if (!png) return png.status();
+  const std::vector<std::uint8_t> rgb(png->samples.begin(), png->samples.end());
+  const auto jpeg = gsnav::io::encode_jpeg(rgb, png->width, png->height, 80);
+  if (jpeg) return Picture{"jpeg", {reinterpret_cast<const char*>(jpeg->data()), jpeg->size()}};
+  std::ifstream in(png_file, std::ios::binary);
+  return Picture{"png", {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}};
+}
 
 std::string page(const Options& o, const gsnav::MetricsSummary& s, const std::vector<Entry>& entries) {
   std::string out = "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><title>Evaluation</title><style>";

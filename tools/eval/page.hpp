@@ -8,10 +8,18 @@
 
 namespace gsnav_eval {
 
-/// An episode on the page; pictures are PNG files' bytes, empty where there is none.
+/// A picture inside the page; no bytes: there is none.
+struct Picture {
+  const char* type = "png";
+  std::string bytes;
+};
+/// A PNG file for the page: as a JPEG, a tenth as large, where the build has libjpeg. Errors: those of reading it.
+gsnav::Result<Picture> page_picture(const std::string& png_file);
+
+/// An episode on the page.
 struct Entry {
   const Record* record = nullptr;
-  std::string strip, map;
+  Picture strip, map;
 };
 
 /// The evaluation as one HTML page that needs nothing else.
