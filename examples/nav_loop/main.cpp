@@ -37,7 +37,11 @@ Status run(B& backend, const Options& options) {
   config.task.max_steps = options.max_steps;
   config.sensors =
       gsnav::rgbd_sensors(options.height, options.width, options.hfov, {0, options.eye_height, 0});
-  config.render.profile = options.profile;
+  config.render.profile = options.profile == "exact" ? gsnav::Profile::exact : gsnav::Profile::fast;
+  if (options.profile == "lod") {
+    config.lod = gsnav::LodChoice{};
+    config.lod->pixels = options.lod_error;
+  }
   const auto episodes = make_episodes(options, setup.scene, config.task);
   if (!episodes) return episodes.status();
   auto made = gsnav::make_simulator(backend, setup.scene, config);
@@ -167,10 +171,14 @@ int main(int argc, char** argv) try {
   app.add_option("--eye-height", o.eye_height, "camera above the floor, metres")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3.0));
-  app.add_option("--profile", o.profile, "accuracy: exact, or fast (a cheaper exponential)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, gsnav::Profile>{
-          {"exact", gsnav::Profile::exact}, {"fast", gsnav::Profile::fast}}))
-      ->default_str("exact");
+  app.add_option("--profile", o.profile,
+                 "accuracy: exact, fast (a cheaper exponential), or lod: a level of detail for each part of the scene, kept "
+                 "beside its file")
+      ->check(CLI::IsMember({"exact", "fast", "lod"}))
+      ->capture_default_str();
+  app.add_option("--lod-error", o.lod_error, "of the profile lod: how far merged Gaussians may be off, pixels")
+      ->check(CLI::Range(0.01, 100.0))
+      ->capture_default_str();
   app.add_option("--navmesh", o.navmesh,
                  "built from: gaussians, mesh (the flat only), auto (the mesh where there is one)")
       ->capture_default_str()

@@ -6,7 +6,7 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/math/similarity.hpp"
-#include "gsnav/ops/render_config.hpp"
+#include "gsnav/scene/lod_cut.hpp"
 
 namespace nav_loop {
 
@@ -23,7 +23,8 @@ struct Options {
   int width = 256, height = 256;
   double hfov = 90.0;
   double eye_height = 1.5;
-  gsnav::Profile profile = gsnav::Profile::exact;
+  std::string profile = "exact";  ///< exact, fast, lod
+  double lod_error = gsnav::LodChoice{}.pixels;
   std::string navmesh = "auto";  ///< auto, mesh, gaussians
   int frame_every = 10;          ///< 0: no frames
   int shown_episode = -1;        ///< of strip and map; -1: the one that met people most closely

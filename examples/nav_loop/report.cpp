@@ -94,7 +94,7 @@ gsnav::Status write_json(const std::string& path, const Options& o, const SceneF
                  {"height", o.height},
                  {"hfov", o.hfov},
                  {"eye_height", o.eye_height},
-                 {"profile", o.profile == gsnav::Profile::exact ? "exact" : "fast"},
+                 {"profile", o.profile},
                  {"max_steps", o.max_steps}};
   j["scene"] = {{"gaussians", f.gaussians},
                 {"avatar_gaussians", f.avatar_gaussians},

@@ -5,6 +5,12 @@
 #include <cstdio>
 #include <optional>
 
+#if defined(NAV_LOOP_OPENMP)
+#include "gsnav/backends/openmp.hpp"
+#else
+#include "gsnav/backends/serial.hpp"
+#endif
+#include "gsnav/io/lod_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/nav/gaussian_navmesh.hpp"
 #include "gsnav/sim/default_scene.hpp"
@@ -20,6 +26,20 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
+}
+
+/// Levels of detail: those beside the scene's file, or built; the embedded flat's are built.
+Result<gsnav::LodTree> levels_of(const Options& options, const gsnav::GaussianCloud& cloud) {
+#if defined(NAV_LOOP_OPENMP)
+  gsnav::OpenMPBackend backend(options.threads);
+#else
+  gsnav::SerialBackend backend;
+#endif
+  if (options.scene.empty()) return gsnav::build_lod(backend, cloud);
+  auto cached = gsnav::io::cached_lod(backend, options.scene, cloud);
+  if (!cached) return cached.status();
+  if (!cached->warning.empty()) std::fprintf(stderr, "%s\n", cached->warning.c_str());
+  return std::move(cached->tree);
 }
 
 }  // namespace
@@ -47,6 +67,11 @@ Result<Setup> prepare(const Options& options) {
     const auto up = upright(options.up);
     if (!up) return up.status();
     asset.world_from_asset = *up;
+  }
+  if (options.profile == "lod") {
+    auto tree = levels_of(options, *asset.cloud);
+    if (!tree) return tree.status();
+    asset.lod = std::make_shared<const gsnav::LodTree>(std::move(*tree));
   }
   setup.timings.load = seconds_since(from);
   setup.facts.gaussians = asset.cloud->size();

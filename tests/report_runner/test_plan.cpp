@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <set>
+#include <vector>
 
+#include "gsnav/scene/lod_cut.hpp"
 #include "jobs.hpp"
 #include "runner_timing.hpp"
 #include "scenes.hpp"
@@ -95,4 +97,26 @@ TEST_CASE("timing: percentiles are of values that were seen") {
   int calls = 0;
   CHECK(measure([&] { ++calls; }, 7, 10.0).runs == 7);
   CHECK(calls == 9);
+}
+
+TEST_CASE("levels of detail are judged by the photo, beside fast, and drawn by its rules") {
+  PlanOptions o = small_plan();
+  o.profiles = {"exact", "fast", "lod"};
+  std::size_t lod = 0, fast = 0;
+  for (const Setting& s : plan(o)) {
+    if (s.knob != "none") continue;
+    if (s.profile == "lod") {
+      ++lod;
+      CHECK(s.oracles == std::vector<Oracle>{Oracle::photo4});
+      const RenderConfig c = render_config(s, SortOrder::z_depth), own = lod_config(c);
+      CHECK(c == own);
+      CHECK(c.profile == Profile::fast);
+    }
+    const bool judged = std::find(s.oracles.begin(), s.oracles.end(), Oracle::photo4) != s.oracles.end();
+    fast += s.profile == "fast" && judged ? 1 : 0;
+  }
+  CHECK(lod == 2 * 2 * (3 + 1));
+  CHECK(fast == 2 * 2);
+  o.backends = {"cuda"};
+  for (const Setting& s : plan(o)) CHECK(s.profile != "lod");
 }

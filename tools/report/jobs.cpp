@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "gsnav/scene/lod_cut.hpp"
 #include "storage.hpp"
 
 namespace gsnav_report {
@@ -54,9 +55,16 @@ void add_profiles(const PlanOptions& o, std::size_t view, const ImageSize& size,
       for (const std::string& profile : o.profiles) {
         Setting s{view, size, sensor, backend, profile, "none", {}, {}};
         // Other judges where nothing but the profile differs, once.
-        const bool others = first && sensor == o.sensors.front() && profile == o.profiles.front();
+        const bool first_sensor = first && sensor == o.sensors.front();
+        const bool others = first_sensor && profile == o.profiles.front();
+        const bool lod = profile == "lod";
+        if (lod && backend == "cuda") continue;  // drawn on the host only
         for (const Oracle q : o.oracles) {
-          if (q == Oracle::contract || (others && (q == Oracle::contract_f64 || q == Oracle::photo4))) {
+          if (q == Oracle::photo4 && (lod || (first_sensor && profile == "fast" && contains<std::string>(o.profiles, "lod")))) {
+            s.oracles.push_back(q);  // what levels of detail are judged by, and what they stand beside
+          } else if (lod) {
+            continue;
+          } else if (q == Oracle::contract || (others && (q == Oracle::contract_f64 || q == Oracle::photo4))) {
             s.oracles.push_back(q);
           }
         }
@@ -119,7 +127,8 @@ std::vector<Setting> plan(const PlanOptions& o) {
 RenderConfig render_config(const Setting& s, SortOrder order) {
   RenderConfig c;
   c.outputs = s.sensor == "depth" ? kAlpha | kMedianDepth : s.sensor == "rgb" ? kRgb | kAlpha : kRgb | kAlpha | kMedianDepth;
-  c.profile = s.profile == "fast" ? Profile::fast : Profile::exact;
+  c.profile = s.profile != "exact" ? Profile::fast : Profile::exact;
+  if (s.profile == "lod") c = lod_config(c);
   c.sort_order = order;
   const double number = std::strtod(s.knob_value.c_str(), nullptr);
   if (s.knob == "alpha_min") c.alpha_min = number;

@@ -68,7 +68,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   app.add_option("--near", o.near_plane, "Near plane, metres")->check(CLI::PositiveNumber)->capture_default_str();
   list("--kinds", o.kinds, {"render", "ledger", "skinning", "sweep", "kernel"}, "Kinds of rows");
   list("--sensors", o.sensors, {"rgbd", "rgb", "depth"}, "What is rendered");
-  list("--profiles", o.profiles, {"exact", "fast"}, "Profiles");
+  list("--profiles", o.profiles, {"exact", "fast", "lod"},
+       "Profiles; lod is judged by photo4, and its tree is kept beside the scene's file");
   list("--backends", o.backends, {"openmp", "serial", "cuda"},
        "Backends; all but the first with the first sensor only");
   std::vector<std::string> known_knobs = knob_names();

@@ -19,7 +19,7 @@ struct Options {
   ImageSize knob_size{256, 256};
   double hfov = 90, near_plane = 0.2;
   std::vector<std::string> kinds{"render", "ledger", "skinning", "sweep", "kernel"};
-  std::vector<std::string> sensors{"rgbd", "rgb", "depth"}, profiles{"exact", "fast"},
+  std::vector<std::string> sensors{"rgbd", "rgb", "depth"}, profiles{"exact", "fast", "lod"},
       backends{"openmp", "serial"}, knobs = knob_names();
   std::vector<Oracle> oracles{Oracle::contract, Oracle::contract_f64, Oracle::photo4, Oracle::ray,
                               Oracle::ray_key, Oracle::untruncated};

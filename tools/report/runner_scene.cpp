@@ -9,6 +9,8 @@
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
+#include "gsnav/io/lod_file.hpp"
+#include "gsnav/scene/lod_cut.hpp"
 #include "runner_images.hpp"
 #include "runner_reference.hpp"
 #include "runner_system.hpp"
@@ -44,9 +46,14 @@ Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s
   const GaussianSet set = arrays.set();
   const Camera c = camera(s);
   Renderer<float, B> renderer(backend, render_config(s, cloud.sort_order));
+  const Result<const LodTree*> tree = tree_of(s);
+  if (!tree) return tree.status();
+  std::optional<LodCut> cut;
+  if (*tree != nullptr) cut.emplace(**tree, cloud);
   Status status;
   const auto draw = [&] {
-    if (Status next = renderer.render(std::span(&set, 1), std::span(&c, 1), out.frames); !next) status = next;
+    const std::span<const GaussianSet> sets = cut ? cut->select(c) : std::span(&set, 1);
+    if (Status next = renderer.render(sets, std::span(&c, 1), out.frames); !next) status = next;
   };
   reset_peak_memory();
   if (runs > 0) {
@@ -58,6 +65,23 @@ Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s
   out.scratch_bytes = renderer.scratch_bytes();
   if (!status) return status;
   return out;
+}
+
+Result<const LodTree*> SceneRunner::tree_of(const Setting& s) {
+  if (s.profile != "lod") return static_cast<const LodTree*>(nullptr);
+  if (!tree_) {
+    if (scene_.path.empty()) {
+      Result<LodTree> built = build_lod(openmp_, scene_.cloud);
+      if (!built) return built.status();
+      tree_ = std::move(*built);
+    } else {
+      Result<io::CachedLod> cached = io::cached_lod(openmp_, scene_.path, scene_.cloud);
+      if (!cached) return cached.status();
+      if (!cached->warning.empty()) std::fprintf(stderr, "\ngsnav-report: warning: %s\n", cached->warning.c_str());
+      tree_ = std::move(cached->tree);
+    }
+  }
+  return &*tree_;
 }
 
 Result<SceneRunner::Outcome> SceneRunner::render(const Setting& s, const GaussianCloud& cloud, int runs) {
@@ -113,6 +137,7 @@ Status SceneRunner::run(const Setting& s) {
   }
   const Result<Outcome> outcome = render(s, *cloud, options_.runs);
   if (!outcome) return outcome.status();
+  if (s.profile == "lod") cloud_bytes += tree_->bytes();
   for (const Oracle q : missing) {
     const Result<Named> named = reference(s, q);
     if (!named) return named.status();

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "options.hpp"
 #include "runner_metrics.hpp"
@@ -49,6 +51,8 @@ class SceneRunner {
   gsnav::Camera camera(const Setting& s) const;
   int threads(const Setting& s) const;
   std::string key(const Setting& s, Oracle oracle) const;
+  /// The scene's levels of detail: read from beside its file, or built. Null: the setting does not ask for them.
+  gsnav::Result<const gsnav::LodTree*> tree_of(const Setting& s);
   gsnav::Result<Outcome> render(const Setting& s, const gsnav::GaussianCloud& cloud, int runs);
   template <class B>
   gsnav::Result<Outcome> render_on(B& backend, const Setting& s, const gsnav::GaussianCloud& cloud, int runs);
@@ -63,6 +67,7 @@ class SceneRunner {
   gsnav::OpenMPBackend openmp_;
   gsnav::SerialBackend serial_;
   Judge judge_;
+  std::optional<gsnav::LodTree> tree_;
   std::deque<Named> recent_;  // references of the view at hand
 };
 

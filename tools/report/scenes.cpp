@@ -130,6 +130,7 @@ Result<Scene> load(const SceneSpec& spec, int views) {
     if (!loaded) return Status(loaded.code(), "scene " + spec.name + ": " + loaded.message());
     scene.cloud = std::move(loaded->cloud);
   }
+  scene.path = spec.path;
   scene.hash = content_hash(scene.cloud);
   if (all.empty()) all = orbit(scene.cloud);
   const std::size_t wanted = std::min(all.size(), static_cast<std::size_t>(std::max(views, 1)));

@@ -28,6 +28,7 @@ struct SceneSpec {
 struct Scene {
   std::string name;
   gsnav::GaussianCloud cloud;
+  std::string path;              ///< its spec's
   std::string hash;              ///< content_hash of the cloud
   std::vector<ViewPoint> views;
 };

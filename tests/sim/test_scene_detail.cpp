@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// Simulators that draw levels of detail.
+#include <doctest/doctest.h>
+
+#include <cstring>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/scene/lod_build.hpp"
+#include "gsnav/sim/batch.hpp"
+#include "sim_scene.hpp"
+#include "wandering.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+/// The flat with its levels of detail, and two people.
+SimulatorScene detailed_scene() {
+  static const auto tree = [] {
+    OpenMPBackend backend(2);
+    return std::make_shared<const LodTree>(build_lod(backend, *flat_scene().assets[0].cloud).value());
+  }();
+  SimulatorScene s = peopled_scene(2000);
+  s.assets[0].lod = tree;
+  return s;
+}
+
+LodChoice coarse() {
+  LodChoice c;
+  c.pixels = 2;
+  return c;
+}
+
+bool same_bits(std::span<const float> a, std::span<const float> b) {
+  return a.size() == b.size() && !a.empty() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+}
+
+}  // namespace
+
+TEST_CASE("a simulator with levels of detail sees what the cut of its camera draws, people as they are") {
+  OpenMPBackend backend(2);
+  const SimulatorScene scene = detailed_scene();
+  SimulatorConfig config;
+  config.sensors = rgbd_sensors(40, 56);
+  const PointNavEpisode episode = to_kitchen();
+  auto whole = make_simulator(backend, scene, config).value();
+  const auto plain = whole.reset(episode).value();
+  const std::vector<float> plain_rgb(plain["rgb"].begin(), plain["rgb"].end());
+  config.lod = coarse();
+  auto sim = make_simulator(backend, scene, config).value();
+  const auto obs = sim.reset(episode).value();
+  CHECK_FALSE(same_bits(obs["rgb"], plain_rgb));
+
+  SceneOnBackend<OpenMPBackend> by_hand(backend, std::make_shared<const SimulatorScene>(scene));
+  REQUIRE(by_hand.pose(0, sim.clock()).ok());
+  const Camera camera = sensor_camera(config.sensors[0], sim.agent().position, sim.agent().rotation());
+  LodCut cut(*scene.assets[0].lod, *scene.assets[0].cloud);
+  LodChoice choice = coarse();
+  choice.hysteresis = 0;
+  const auto chosen = cut.select(camera, choice);
+  CHECK(cut.stats().merged > 0);
+  std::vector<GaussianSet> sets(chosen.begin(), chosen.end());
+  for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
+  RenderConfig rules = lod_config({});
+  rules.outputs = kRgb | kMedianDepth;
+  Renderer<float, OpenMPBackend> renderer(backend, rules);
+  const auto frames = renderer.render(sets, std::span(&camera, 1)).value();
+  CHECK(same_bits(obs["rgb"], frames.rgb));
+  // A spectator at the same place too.
+  CHECK(same_bits((*sim.render(camera))->rgb, frames.rgb));
+}
+
+TEST_CASE("levels of detail: a batch has the bits of single simulators, and a state those it was saved with") {
+  constexpr std::size_t kEnvironments = 3;
+  SimulatorScene empty = detailed_scene();
+  empty.avatars.clear();
+  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{
+      std::make_shared<const SimulatorScene>(detailed_scene()), std::make_shared<const SimulatorScene>(empty)};
+  BatchConfig config;
+  config.sensors = rgbd_sensors(16, 24);
+  config.sensors.push_back(config.sensors[0]);
+  config.sensors[2].uuid = "who";
+  config.sensors[2].kind = SensorKind::semantic;
+  config.task.max_steps = 30;
+  config.lod = coarse();
+  OpenMPBackend backend(2), single_backend(1);
+  auto batch = make_batch_simulator(backend, scenes, config, kEnvironments, wandering).value();
+  std::vector<Simulator<OpenMPBackend>> single;
+  for (const auto& scene : scenes) {
+    single.push_back(Simulator<OpenMPBackend>::create(single_backend, scene, config).value());
+  }
+  auto out = batch.reset().value();
+  Rng rng(31);
+  for (int step = 0; step < 40; ++step) {
+    for (std::size_t e = 0; e < kEnvironments; ++e) {
+      // One simulator, brought from state to state.
+      Simulator<OpenMPBackend>& alone = single[batch.scene_of(e)];
+      alone.set_state(batch.world(e).state());
+      const auto seen = alone.observe().value();
+      for (std::size_t i = 0; i < config.sensors.size(); ++i) {
+        REQUIRE(same_bits(out.images[i].of(e), seen.images[i].data));
+      }
+    }
+    std::vector<Action> actions;
+    for (std::size_t e = 0; e < kEnvironments; ++e) actions.push_back(wandering_action(rng));
+    out = batch.step(actions).value();
+  }
+}
+
+TEST_CASE("levels of detail that a scene does not have are refused, by name") {
+  OpenMPBackend backend(1);
+  SimulatorConfig config;
+  config.sensors = rgbd_sensors(16, 24);
+  config.lod = LodChoice{};
+  const auto refused = [&](const SimulatorScene& scene) { return make_simulator(backend, scene, config).status(); };
+  CHECK(refused(flat_scene()).code() == Errc::invalid_argument);
+  CHECK(refused(flat_scene()).message().find("assets[0].lod is null") != std::string::npos);
+  SimulatorScene other = detailed_scene();
+  auto more = std::make_shared<LodTree>();
+  other.assets[0].lod = more;
+  CHECK(refused(other).message().find("of another cloud") != std::string::npos);
+  config.lod->pixels = 0;
+  CHECK(refused(detailed_scene()).message().find("LodChoice.pixels = 0") != std::string::npos);
+  config.lod->pixels = 1;
+  CHECK(refused(detailed_scene()).ok());
+  const auto batch = make_batch_simulator(backend, std::vector<std::shared_ptr<const SimulatorScene>>(
+                                              2, std::make_shared<const SimulatorScene>(flat_scene())),
+                                          [&] {
+                                            BatchConfig c;
+                                            c.sensors = config.sensors;
+                                            c.lod = config.lod;
+                                            return c;
+                                          }(),
+                                          2, wandering);
+  CHECK(batch.status().message().find("assets[0].lod is null") != std::string::npos);
+}
