@@ -53,6 +53,8 @@ class CloudSink {
 
   /// The SH bands of the file's row i where fill_cloud was given them.
   float* bands(std::size_t i) const noexcept { return cloud_.shN.data() + rest_ * i; }
+  /// Whose planes they are: of a row that was not yet added, what fill_cloud was given.
+  const GaussianCloud& cloud() const noexcept { return cloud_; }
 
   std::size_t first() const noexcept { return first_; }
   std::size_t size() const noexcept { return at_ - first_; }
@@ -141,16 +143,17 @@ Status for_pieces(std::size_t count, std::size_t pieces, const F& f) {
 /// `decode(first, last, sink)` gives the rows [first, last) to the sink, in their order, and returns a
 /// Status. The result does not depend on the number of threads; of several errors the first one's is
 /// returned. No memory beyond the cloud's is asked for. With `parallel` false all rows come by one call.
-/// `bands`: the SH bands of all rows, where they are there before the rest: [count][(degree+1)^2 - 1][3]. They
-/// become the cloud's, and the shN of row i is then sink.bands(i).
+/// `planes`: those that are there before the rest, of `count` rows. They become the cloud's. Where shN is among them,
+/// the shN of row i is sink.bands(i); the others may have whatever `decode` makes row i of (sink.cloud()) before it adds
+/// the row or a later one.
 template <class Decode>
 Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string& source, const Decode& decode,
-                               bool parallel = true, std::vector<float> bands = {}) {
+                               bool parallel = true, GaussianCloud planes = {}) {
   LoadedCloud out;
+  out.cloud = std::move(planes);
   GaussianCloud& cloud = out.cloud;
   cloud.sh_degree = out.report.sh_degree = degree;
   out.report.source = source;
-  cloud.shN = std::move(bands);
   resize_planes(cloud, count);
   const std::size_t pieces = parallel ? pieces_of(count) : 1;
   std::vector<CloudSink> sinks;

@@ -119,6 +119,9 @@ auto guarded(const std::string& what, F&& f) -> decltype(f()) {
   }
 }
 
+/// Hands what was freed back to the system: glibc keeps it, and large arrays are never made of it.
+void give_back_memory() noexcept;
+
 /// Reads a little-endian value at `p`, which need not be aligned.
 template <class T>
 T load_le(const std::byte* p) noexcept {
