@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench_io [--scene FILE] [--markdown] [--folder DIR]: writes a scene in every format, reads it back and
-// prints a row for each: size, speed, peak memory beside what the result takes, and the error that the
-// format adds.
+// bench_io [--scene FILE] [--formats ply,spz] [--load] [--markdown] [--folder DIR]: writes a scene in
+// every format, reads it back and prints a row for each: size, speed, peak memory beside what the result
+// takes, and the error that the format adds.
 #include <malloc.h>
 #include <unistd.h>
 
@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "compare.hpp"
 #include "gsnav/io/scene_file.hpp"
@@ -35,32 +36,51 @@ double memory(const char* key) {
   return 0;
 }
 
-LoadedCloud read(const std::string& path) { return io::load_scene(path, {.sort = false}).value(); }
+struct Reading {
+  LoadedCloud made;
+  double seconds = 1e9, peak = 0;  ///< the least, the last
+};
+
+/// Loads a scene three times. `sort`: in spatial order, as it is rendered.
+Reading read(const std::string& path, bool sort) {
+  Reading out;
+  out.made = io::load_scene(path, {.sort = sort}).value();  // from now on the file is in the cache
+  for (int run = 0; run < 3; ++run) {
+    out.made = {};
+    ::malloc_trim(0);                               // what was freed is no longer counted
+    std::ofstream("/proc/self/clear_refs") << "5";  // the peak counts from here
+    const double before = memory("VmRSS"), start = now();
+    out.made = io::load_scene(path, {.sort = sort}).value();
+    out.seconds = std::min(out.seconds, now() - start);
+    out.peak = memory("VmHWM") - before;
+  }
+  return out;
+}
 
 struct Row {
   double bytes = 0, write = 0, read = 0, peak = 0, result = 0;
+  double load = 0, load_peak = 0, loaded = 0;  ///< of the scene in spatial order
   gsnav_convert::FieldErrors fields;
   gsnav_convert::ImageErrors images;
 };
 
-Row measure(const GaussianCloud& source, const std::vector<Camera>& cameras, const std::string& path) {
+Row measure(const GaussianCloud& source, const std::vector<Camera>& cameras, const std::string& path,
+            bool load) {
   Row row;
-  double start = now();
+  const double start = now();
   io::save_scene(path, source).throw_if_error();
   row.write = now() - start;
   row.bytes = static_cast<double>(std::filesystem::file_size(path));
-  LoadedCloud made = read(path);  // from now on the file is in the cache
-  row.read = 1e9;
-  for (int run = 0; run < 3; ++run) {
-    made = {};
-    ::malloc_trim(0);                               // what was freed is no longer counted
-    std::ofstream("/proc/self/clear_refs") << "5";  // the peak counts from here
-    const double before = memory("VmRSS");
-    start = now();
-    made = read(path);
-    row.read = std::min(row.read, now() - start);
-    row.peak = memory("VmHWM") - before;
+  if (load) {
+    const Reading sorted = read(path, true);
+    row.load = sorted.seconds;
+    row.load_peak = sorted.peak;
+    row.loaded = static_cast<double>(sorted.made.cloud.bytes());
   }
+  Reading reading = read(path, false);
+  LoadedCloud& made = reading.made;
+  row.read = reading.seconds;
+  row.peak = reading.peak;
   row.result = static_cast<double>(made.cloud.bytes());
   row.fields = gsnav_convert::largest_field_errors(source, made.cloud);
   made.cloud.filter = source.filter;
@@ -78,11 +98,17 @@ Row measure(const GaussianCloud& source, const std::vector<Camera>& cameras, con
 
 int main(int argc, char** argv) {
   std::string scene, folder = std::filesystem::temp_directory_path().string();
-  bool markdown = false;
+  std::vector<std::string> formats = {"ply", "glb", "compressed.ply", "splat", "spz", "sog"};
+  bool markdown = false, load = false;
   int views = 4;
   CLI::App app{"Speed, memory and error of every format that is written and read."};
   app.add_option("--scene", scene, "Any scene that can be read; the embedded flat if not given");
   app.add_option("--folder", folder, "Where the files are written for a while");
+  app.add_option("--formats", formats, "Those to measure")
+      ->delimiter(',')
+      ->check(CLI::IsMember(formats))
+      ->capture_default_str();
+  app.add_flag("--load", load, "Also time loading in spatial order, as scenes are rendered");
   app.add_option("--views", views, "Images of 640x480 for the PSNR");
   app.add_flag("--markdown", markdown, "Print the table as docs/formats.md has it");
   CLI11_PARSE(app, argc, argv);
@@ -118,8 +144,10 @@ int main(int argc, char** argv) {
   line(head);
   if (markdown) line(std::vector<std::string>(head.size(), "---"));
   const std::string base = folder + "/gsnav_bench_io_" + std::to_string(::getpid());
-  for (const char* extension : {".ply", ".glb", ".compressed.ply", ".splat", ".spz", ".sog"}) {
-    const Row r = measure(source, cameras, base + extension);
+  std::string loads;
+  for (const std::string& format : formats) {
+    const std::string extension = "." + format;
+    const Row r = measure(source, cameras, base + extension, load);
     const auto number = [](const char* format, double v) {
       char text[32];
       std::snprintf(text, sizeof text, format, v);
@@ -131,6 +159,12 @@ int main(int argc, char** argv) {
           number("%.1e", r.fields.scale), number("%.1e", r.fields.rotation),
           number("%.1e", r.fields.opacity), number("%.1e", r.fields.colour),
           number("%.1e", r.fields.bands), number("%.1f", r.images.psnr)});
+    if (load) {
+      loads += extension + ": read in " + number("%.2f s", r.read) + ", loaded in spatial order in " +
+               number("%.2f s", r.load) + ", peak/result " + number("%.2f", r.load_peak / r.loaded) +
+               "\n";
+    }
   }
+  if (load) std::printf("\n%s", loads.c_str());
   return 0;
 }

@@ -11,6 +11,7 @@
 #include "gsnav/core/huge_pages.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "populate_pages.hpp"
 #include "threads.hpp"
 
 namespace gsnav::io::detail {
@@ -53,6 +54,8 @@ class CloudSink {
 
   /// The SH bands of the file's row i where fill_cloud was given them.
   float* bands(std::size_t i) const noexcept { return cloud_.shN.data() + rest_ * i; }
+  /// Whose planes they are: of a row that was not yet added, what fill_cloud was given.
+  const GaussianCloud& cloud() const noexcept { return cloud_; }
 
   std::size_t first() const noexcept { return first_; }
   std::size_t size() const noexcept { return at_ - first_; }
@@ -73,24 +76,6 @@ class CloudSink {
   OriginLattice lattice_;
   std::vector<std::uint32_t> ids_;  ///< of the rows so far, or empty while all are zero
 };
-
-/// Gives the planes of a cloud `n` rows.
-inline void resize_planes(GaussianCloud& cloud, std::size_t n) {
-  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
-  const auto plane = [](std::vector<float>& v, std::size_t size) {
-    if (v.empty()) {
-      v = huge_vector<float>(size);
-    } else {
-      v.resize(size);
-    }
-  };
-  for (auto& v : cloud.means) plane(v, n);
-  for (auto& v : cloud.quats) plane(v, n);
-  for (auto& v : cloud.scales) plane(v, n);
-  plane(cloud.opacities, n);
-  plane(cloud.sh0, 3 * n);
-  plane(cloud.shN, rest * n);
-}
 
 /// Moves n rows of all planes down, from row `from` to row `to`.
 inline void move_rows(GaussianCloud& cloud, std::size_t from, std::size_t to, std::size_t n) {
@@ -113,8 +98,8 @@ inline std::size_t pieces_of(std::size_t count) noexcept {
   return std::clamp(count / kRowsWorthAThread, std::size_t{1}, io_threads());
 }
 
-/// f(p, first, last), which returns a Status, for the rows [first, last) of each of the pieces, side by side. Of
-/// several errors the first piece's is returned; throws std::bad_alloc where one did.
+/// f(p, first, last), which returns a Status, for the rows [first, last) of each of the pieces, side by
+/// side. Of several errors the first piece's is returned; throws std::bad_alloc where one did.
 template <class F>
 Status for_pieces(std::size_t count, std::size_t pieces, const F& f) {
   std::vector<Status> statuses(pieces);
@@ -137,27 +122,69 @@ Status for_pieces(std::size_t count, std::size_t pieces, const F& f) {
   return {};
 }
 
+/// Gives the planes of a cloud `n` rows. Memory of new ones is asked for by all threads.
+inline void resize_planes(GaussianCloud& cloud, std::size_t n) {
+  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
+  const auto for_planes = [&](const auto& f) {
+    for (auto& v : cloud.means) f(v, n);
+    for (auto& v : cloud.quats) f(v, n);
+    for (auto& v : cloud.scales) f(v, n);
+    f(cloud.opacities, n);
+    f(cloud.sh0, 3 * n);
+    f(cloud.shN, rest * n);
+  };
+  struct Piece {
+    float* data;
+    std::size_t size;
+  };
+  std::vector<Piece> fresh;
+  for_planes([&](std::vector<float>& v, std::size_t size) {
+    constexpr std::size_t kPiece = std::size_t{1} << 22;
+    if (!v.empty() || size < kPiece) return;
+    v.reserve(size);
+    advise_huge_pages(v.data(), size * sizeof(float));
+    for (std::size_t at = 0; at < size; at += kPiece)
+      fresh.push_back({v.data() + at, std::min(kPiece, size - at)});
+  });
+  for_pieces(fresh.size(), std::min(fresh.size(), io_threads()),
+             [&](std::size_t, std::size_t first, std::size_t last) -> Status {
+               for (std::size_t k = first; k < last; ++k)
+                 populate_pages(fresh[k].data, fresh[k].size * sizeof(float));
+               return {};
+             })
+      .throw_if_error();
+  for_planes([](std::vector<float>& v, std::size_t size) {
+    if (v.capacity() == 0) {
+      v = huge_vector<float>(size);
+    } else {
+      v.resize(size);
+    }
+  });
+}
+
 /// Reads `count` rows into a cloud of SH degree `degree`, in parallel where there are many:
 /// `decode(first, last, sink)` gives the rows [first, last) to the sink, in their order, and returns a
 /// Status. The result does not depend on the number of threads; of several errors the first one's is
 /// returned. No memory beyond the cloud's is asked for. With `parallel` false all rows come by one call.
-/// `bands`: the SH bands of all rows, where they are there before the rest: [count][(degree+1)^2 - 1][3]. They
-/// become the cloud's, and the shN of row i is then sink.bands(i).
+/// `planes`: those that are there before the rest, of `count` rows. They become the cloud's. Where shN
+/// is among them, the shN of row i is sink.bands(i); the others may have whatever `decode` makes row i
+/// of (sink.cloud()) before it adds the row or a later one.
 template <class Decode>
-Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string& source, const Decode& decode,
-                               bool parallel = true, std::vector<float> bands = {}) {
+Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string& source,
+                               const Decode& decode, bool parallel = true, GaussianCloud planes = {}) {
   LoadedCloud out;
+  out.cloud = std::move(planes);
   GaussianCloud& cloud = out.cloud;
   cloud.sh_degree = out.report.sh_degree = degree;
   out.report.source = source;
-  cloud.shN = std::move(bands);
   resize_planes(cloud, count);
   const std::size_t pieces = parallel ? pieces_of(count) : 1;
   std::vector<CloudSink> sinks;
   for (std::size_t p = 0; p < pieces; ++p) sinks.emplace_back(cloud, count * p / pieces);
-  const Status decoded = for_pieces(count, pieces, [&](std::size_t p, std::size_t first, std::size_t last) -> Status {
-    return decode(first, last, sinks[p]);
-  });
+  const Status decoded =
+      for_pieces(count, pieces, [&](std::size_t p, std::size_t first, std::size_t last) -> Status {
+        return decode(first, last, sinks[p]);
+      });
   if (!decoded) return decoded;
   std::size_t kept = 0;
   bool far = false;

@@ -8,6 +8,10 @@
 #include <cerrno>
 #include <system_error>
 
+#if __has_include(<malloc.h>)
+#include <malloc.h>
+#endif
+
 namespace gsnav::io::detail {
 
 // Every binary format here is little-endian and read by memcpy.
@@ -82,6 +86,12 @@ Status OutFile::close() {
   file_ = nullptr;
   if (bad || bad_close) return {Errc::file_not_found, path_.string() + ": writing failed"};
   return {};
+}
+
+void give_back_memory() noexcept {
+#if defined(__GLIBC__)
+  ::malloc_trim(0);
+#endif
 }
 
 std::string in_quotes(std::string_view text) {

@@ -112,12 +112,17 @@ auto guarded(const std::string& what, F&& f) -> decltype(f()) {
     return f();
   } catch (const std::bad_alloc&) {
     return Status(Errc::out_of_memory, what + ": not enough memory");
+  } catch (const Error& e) {
+    return Status(e.code(), what + ": " + e.what());
   } catch (const std::length_error&) {
     return Status(Errc::out_of_memory, what + ": not enough memory");
   } catch (const std::filesystem::filesystem_error& e) {
     return Status(Errc::file_not_found, what + ": " + e.what());
   }
 }
+
+/// Hands what was freed back to the system: glibc keeps it, and large arrays are never made of it.
+void give_back_memory() noexcept;
 
 /// Reads a little-endian value at `p`, which need not be aligned.
 template <class T>

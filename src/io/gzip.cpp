@@ -2,14 +2,16 @@
 #include "gzip.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <new>
 
 namespace gsnav::io::detail {
 namespace {
 constexpr std::size_t kMostAtOnce = std::size_t{1} << 30;  // zlib's counters are 32-bit
+constexpr std::size_t kReadAtOnce = std::size_t{1} << 18;
 }
 
-GzipReader::GzipReader(std::span<const std::byte> packed) : left_(packed) {
+GzipReader::GzipReader(const ByteSource& packed) : left_(packed) {
   constexpr int kGzipOnly = 16;
   code_ = inflateInit2(&stream_, MAX_WBITS + kGzipOnly);
   if (code_ == Z_MEM_ERROR) throw std::bad_alloc();
@@ -24,10 +26,15 @@ std::size_t GzipReader::read(std::span<std::byte> out) {
   std::size_t done = 0;
   while (done < out.size() && code_ == Z_OK) {
     if (stream_.avail_in == 0) {
-      const std::size_t n = std::min(left_.size(), kMostAtOnce);
-      stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(left_.data()));
+      const auto n = static_cast<std::size_t>(std::min<std::uint64_t>(left_.size(), kReadAtOnce));
+      const std::byte* const piece = left_.get(0, n, room_);
+      if (piece == nullptr) {
+        code_ = Z_DATA_ERROR;
+        break;
+      }
+      stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(piece));
       stream_.avail_in = static_cast<uInt>(n);
-      left_ = left_.subspan(n);
+      left_ = left_.part(n, left_.size() - n);
     }
     const std::size_t room = std::min(out.size() - done, kMostAtOnce);
     stream_.next_out = reinterpret_cast<Bytef*>(out.data() + done);

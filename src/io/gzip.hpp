@@ -7,13 +7,15 @@
 #include <span>
 #include <vector>
 
+#include "file.hpp"
+
 namespace gsnav::io::detail {
 
-/// Decompresses a gzip stream in memory, piece by piece: who reads says how much is believed.
+/// Decompresses a gzip stream in memory or in a file, piece by piece: who reads says how much is believed.
 class GzipReader {
  public:
-  /// The bytes must outlive the reader.
-  explicit GzipReader(std::span<const std::byte> packed);
+  /// What the bytes lie in must outlive the reader.
+  explicit GzipReader(const ByteSource& packed);
   GzipReader(const GzipReader&) = delete;
   GzipReader& operator=(const GzipReader&) = delete;
   ~GzipReader();
@@ -26,7 +28,8 @@ class GzipReader {
   bool at_end() const noexcept { return code_ == Z_STREAM_END; }
 
  private:
-  std::span<const std::byte> left_;  ///< not yet given to zlib
+  ByteSource left_;              ///< not yet given to zlib
+  std::vector<std::byte> room_;  ///< what zlib has, of a file
   z_stream stream_{};
   int code_ = Z_OK;
   bool open_ = false;

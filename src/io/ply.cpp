@@ -30,8 +30,8 @@ using detail::PlyHeader;
 using detail::PlyProperty;
 
 /// Gives n rows, from `row` on, to the sink, and their time planes to `moving` where it is given.
-void add_block(detail::CloudSink& sink, detail::TemporalRows* moving, const PlyColumns& columns, const double* block,
-               std::size_t row, std::size_t n) {
+void add_block(detail::CloudSink& sink, detail::TemporalRows* moving, const PlyColumns& columns,
+               const double* block, std::size_t row, std::size_t n) {
   std::array<float, 45> rest;
   RawGaussian raw;
   raw.shN = columns.rest != 0 ? rest.data() : nullptr;
@@ -46,7 +46,8 @@ void add_block(detail::CloudSink& sink, detail::TemporalRows* moving, const PlyC
     raw.opacity_logit = at(6);
     raw.log_scales = {at(7), at(8), at(9)};
     raw.quat = {at(10), at(11), at(12), at(13)};
-    for (std::size_t k = 0; k < columns.rest; ++k) rest[k] = static_cast<float>(at(detail::kPlyFixed + k));
+    for (std::size_t k = 0; k < columns.rest; ++k)
+      rest[k] = static_cast<float>(at(detail::kPlyFixed + k));
     if (moving == nullptr) {
       sink.add(raw);
       continue;
@@ -57,6 +58,35 @@ void add_block(detail::CloudSink& sink, detail::TemporalRows* moving, const PlyC
     for (std::size_t k = 0; k < columns.motion_count; ++k) t.motion[k] = at(columns.motion + k);
     moving->add(row + i, t, raw, sink);
   }
+}
+
+/// Gives n rows to the sink where all that is read of them is float32 in this machine's order.
+void add_float_rows(detail::CloudSink& sink, const PlyColumns& columns, std::size_t stride,
+                    const std::byte* rows, std::size_t n) {
+  std::array<std::size_t, detail::kPlyFixed + 45> offsets{};
+  for (std::size_t k = 0; k < columns.properties.size(); ++k) offsets[k] = columns.properties[k]->offset;
+  std::array<float, 45> rest;
+  RawGaussian raw;
+  raw.shN = columns.rest != 0 ? rest.data() : nullptr;
+  for (std::size_t i = 0; i < n; ++i, rows += stride) {
+    const auto single = [&](std::size_t column) {
+      return detail::load_le<float>(rows + offsets[column]);
+    };
+    const auto at = [&](std::size_t column) { return static_cast<double>(single(column)); };
+    raw.mean = {at(0), at(1), at(2)};
+    for (std::size_t k = 0; k < 3; ++k) raw.sh0[k] = single(3 + k);
+    raw.opacity_logit = at(6);
+    raw.log_scales = {at(7), at(8), at(9)};
+    raw.quat = {at(10), at(11), at(12), at(13)};
+    for (std::size_t k = 0; k < columns.rest; ++k) rest[k] = single(detail::kPlyFixed + k);
+    sink.add(raw);
+  }
+}
+
+bool are_floats(const PlyHeader& header, const PlyColumns& columns) {
+  return header.format == detail::PlyFormat::little && columns.greatest_colour == 0 &&
+         std::all_of(columns.properties.begin(), columns.properties.end(),
+                     [](const PlyProperty* p) { return p->type == detail::PlyType::f32; });
 }
 
 /// What a header says about the Gaussians.
@@ -85,31 +115,43 @@ Result<Vertices> find_vertices(const PlyHeader& header, const std::string& sourc
   return v;
 }
 
-/// Fills a cloud from blocks of rows: `unpack(first, n, block)` returns how many of them there were. `moving` as in
-/// detail::load_ply.
-template <class Unpack>
-Result<LoadedCloud> fill(const PlyHeader& header, const Vertices& v, const std::string& source, TemporalCloud* moving,
-                         const Unpack& unpack) {
+/// Fills a cloud from blocks of rows: `rows_at(first, n)` is where n of them lie, null where they are
+/// not there; `moving` as in detail::load_ply. Of text, `body` reads them.
+template <class RowsAt>
+Result<LoadedCloud> fill(const PlyHeader& header, const Vertices& v, const std::string& source,
+                         TemporalCloud* moving, PlyBody* body, const RowsAt& rows_at) {
   const std::size_t count = static_cast<std::size_t>(v.element->count);
   std::optional<detail::TemporalRows> planes;
   if (moving != nullptr && v.columns.moves()) planes.emplace(count, v.columns.motion_count);
+  const bool floats = are_floats(header, v.columns) && !planes;
   const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
-    std::vector<double> block(v.columns.properties.size() * kPlyBlock);
+    std::vector<double> block(floats ? 0 : v.columns.properties.size() * kPlyBlock);
     for (std::size_t row = first; row < last; row += kPlyBlock) {
       const std::size_t n = std::min(kPlyBlock, last - row);
-      const std::size_t there = unpack(row, n, block.data());
-      if (there != n) return ply_rows_missing(source, *v.element, row + there);
+      if (body != nullptr) {
+        const std::size_t there = body->read(*v.element, v.columns.properties, n, block.data());
+        if (there != n) return ply_rows_missing(source, *v.element, row + there);
+      } else {
+        const std::byte* const rows = rows_at(row, n);
+        if (rows == nullptr) return ply_rows_missing(source, *v.element, row);
+        if (floats) {
+          add_float_rows(sink, v.columns, v.element->stride, rows, n);
+          continue;
+        }
+        detail::unpack_ply_rows(header.format, *v.element, v.columns.properties, rows, n, block.data());
+      }
       add_block(sink, planes ? &*planes : nullptr, v.columns, block.data(), row, n);
     }
     return {};
   };
-  auto out =
-      detail::fill_cloud(count, v.columns.degree, source, decode, header.format != detail::PlyFormat::ascii);
+  auto out = detail::fill_cloud(count, v.columns.degree, source, decode,
+                                header.format != detail::PlyFormat::ascii);
   if (!out) return out;
   if (planes) planes->give(*moving, out->report);
   if (moving == nullptr && v.columns.moves()) {
     out->report.warnings.push_back(
-        "Gaussians that move and fade: each is taken at its own time; load_scene with a time, or load_temporal, reads t, "
+        "Gaussians that move and fade: each is taken at its own time; load_scene with a time, or "
+        "load_temporal, reads t, "
         "t_scale and motion_*");
   }
   out->cloud.filter = header.mip ? Filter::mip : Filter::classic;
@@ -125,7 +167,8 @@ void warn_of_stray_bytes(LoadReport& report, std::uint64_t bytes, std::uint64_t 
                             " rows that the header promises");
 }
 
-Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source, TemporalCloud* moving) {
+Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source,
+                          TemporalCloud* moving) {
   auto parsed = detail::parse_ply_header(bytes, source);
   if (!parsed) return parsed.status();
   const PlyHeader& header = *parsed;
@@ -142,14 +185,10 @@ Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& s
   if (const std::uint64_t rows = body.available(vertex); rows < vertex.count) {
     return ply_rows_missing(source, vertex, rows);
   }
-  const auto& properties = found->columns.properties;
   const bool text = header.format == detail::PlyFormat::ascii;
   const std::byte* const rows = body.here();
-  auto out = fill(header, *found, source, moving, [&](std::size_t first, std::size_t n, double* block) {
-    if (text) return body.read(vertex, properties, n, block);
-    detail::unpack_ply_rows(header.format, vertex, properties, rows + first * vertex.stride, n, block);
-    return n;
-  });
+  auto out = fill(header, *found, source, moving, text ? &body : nullptr,
+                  [&](std::size_t first, std::size_t) { return rows + first * vertex.stride; });
   if (!out) return out;
   if (!text) body.skip(vertex);
   for (auto e = found->element + 1; e != header.elements.end(); ++e) {
@@ -187,13 +226,11 @@ Result<LoadedCloud> load_rows(const detail::RandomFile& file, const PlyHeader& h
   }
   if (cut != nullptr && cut <= &*v.element) return ply_rows_missing(source, *cut, others_short);
   const PlyElement& vertex = *v.element;
-  auto out =
-      fill(header, v, source, moving, [&](std::size_t first, std::size_t n, double* block) -> std::size_t {
+  auto out = fill(
+      header, v, source, moving, nullptr, [&](std::size_t first, std::size_t n) -> const std::byte* {
         thread_local std::vector<std::byte> rows;
         rows.resize(n * vertex.stride);
-        if (!file.read(start + std::uint64_t{first} * vertex.stride, rows)) return 0;
-        detail::unpack_ply_rows(header.format, vertex, v.columns.properties, rows.data(), n, block);
-        return n;
+        return file.read(start + std::uint64_t{first} * vertex.stride, rows) ? rows.data() : nullptr;
       });
   if (!out) return out;
   if (cut != nullptr) {
@@ -223,7 +260,8 @@ Result<LoadedCloud> detail::load_ply(const std::filesystem::path& path, Temporal
     if (!header) return header.status();
     const auto found = find_vertices(*header, source);
     if (!found) return found.status();
-    if (is_compressed_ply(*header)) return described(parse_compressed_ply(file, *header, source), usual_up(source));
+    if (is_compressed_ply(*header))
+      return described(parse_compressed_ply(file, *header, source), usual_up(source));
     if (has_fixed_rows(*header) && !found->points) {
       return described(load_rows(file, *header, *found, source, moving), usual_up(source));
     }
@@ -237,6 +275,8 @@ Result<LoadedCloud> parse_ply(std::span<const std::byte> bytes, std::string sour
   return detail::parse_ply(bytes, source, nullptr);
 }
 
-Result<LoadedCloud> load_ply(const std::filesystem::path& path) { return detail::load_ply(path, nullptr); }
+Result<LoadedCloud> load_ply(const std::filesystem::path& path) {
+  return detail::load_ply(path, nullptr);
+}
 
 }  // namespace gsnav::io

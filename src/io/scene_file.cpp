@@ -20,6 +20,7 @@
 #include "gsnav/scene/spatial_order.hpp"
 #include "ply_temporal.hpp"
 #include "report_sum.hpp"
+#include "threads.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -125,7 +126,10 @@ Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& 
     }
     auto scene = load_named(spec, options);
     if (!scene) return scene;
-    if (options.sort) sort_spatially(scene->cloud);
+    if (options.sort) {
+      PoolBackend backend(threads_for(scene->cloud.size()) == 1 ? 1 : detail::io_threads());
+      sort_spatially(backend, scene->cloud);
+    }
     LoadReport& report = scene->report;
     const UpGuess up{report.up, report.up_seen};  // of each reader's own kind of file
     if (options.storage == Storage::compact) {

@@ -6,10 +6,6 @@
 #include <optional>
 #include <utility>
 
-#if __has_include(<malloc.h>)
-#include <malloc.h>
-#endif
-
 #include "cloud_fill.hpp"
 #include "described.hpp"
 #include "file.hpp"
@@ -30,13 +26,6 @@ using detail::SogMeta;
 // Gaussian a byte of all files; what claims many times that is refused before memory is asked for.
 constexpr std::size_t kMostGaussiansPerByte = 8;
 constexpr std::size_t kGaussianSlack = std::size_t{1} << 18;
-
-/// Hands what decoders freed back to the system: glibc keeps it, and large planes are never made of it.
-void give_back() noexcept {
-#if defined(__GLIBC__)
-  ::malloc_trim(0);
-#endif
-}
 
 /// The files of a SOG, whether in a folder or in a bundle.
 class SogFiles {
@@ -150,14 +139,14 @@ class SogReader {
     }
     if (Status s = read_sizes(); !s) return s;
     const std::size_t count = static_cast<std::size_t>(total);
-    std::vector<float> bands;
+    GaussianCloud planes;
     // The bands are most of the cloud: what they come of is gone before there is anything else.
-    if (Status s = look_up_bands(*ranges, count, bands); !s) return s;
+    if (Status s = look_up_bands(*ranges, count, planes.shN); !s) return s;
     for (Plane* plane : {&low_, &high_, &scales_, &quats_, &sh0_}) {
       if (Status s = plane->decode(files_); !s) return s;
     }
     files_.close();
-    give_back();
+    detail::give_back_memory();
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
       RawGaussian raw;
       return for_rows(*ranges, first, last, [&](std::size_t row, std::size_t i) -> Status {
@@ -167,7 +156,7 @@ class SogReader {
         return s;
       });
     };
-    auto out = detail::fill_cloud(count, meta_.degree, source, decode, true, std::move(bands));
+    auto out = detail::fill_cloud(count, meta_.degree, source, decode, true, std::move(planes));
     if (out) out->cloud.filter = meta_.antialias ? Filter::mip : Filter::classic;
     return out;
   }

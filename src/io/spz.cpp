@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "cloud_fill.hpp"
@@ -10,7 +11,6 @@
 #include "file.hpp"
 #include "quantised.hpp"
 #include "spz_planes.hpp"
-#include "widen_rows.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -19,78 +19,33 @@ using detail::load_le;
 
 class SpzDecoder {
  public:
-  SpzDecoder(detail::SpzPlanes& planes, bool turn)
-      : planes_(planes), header_(planes.header), turn_(turn) {}
-
-  Result<LoadedCloud> run(const std::string& source) {
-    widen_bands();
-    const auto decode = [this](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
-      for (std::size_t i = first; i < last; ++i) add(i, sink);
-      return {};
-    };
-    auto out = detail::fill_cloud(header_.count, std::min(header_.degree, kMaxShDegree), source, decode, true,
-                                  std::move(planes_.bands));
-    if (!out) return out;
-    const bool mip = (header_.flags & detail::kSpzAntialiased) != 0;
-    out->cloud.filter = mip ? Filter::mip : Filter::classic;
-    out->report.warnings = planes_.warnings;
-    if (header_.degree > kMaxShDegree) {
-      out->report.warnings.push_back("SH degree 4 in the file: bands up to degree 3 are read");
-    }
-    return out;
-  }
-
- private:
-  static double number(std::byte b) noexcept { return static_cast<double>(std::to_integer<int>(b)); }
+  SpzDecoder(const detail::SpzHeader& header, bool turn) : header_(header), turn_(turn) {}
 
   void add(std::size_t i, detail::CloudSink& sink) const {
+    const GaussianCloud& planes = sink.cloud();
     RawGaussian raw;
-    const std::byte *colour = planes_.at(2, i, 3), *scale = planes_.at(3, i, 3);
     for (std::size_t k = 0; k < 3; ++k) {
       const int axis = static_cast<int>(k);
-      raw.mean[axis] = position(i, k);
-      raw.sh0[k] = static_cast<float>((number(colour[k]) / 255 - 0.5) / 0.15);
-      raw.log_scales[axis] = number(scale[k]) / 16 - 10;
+      raw.mean[axis] = static_cast<double>(planes.means[k][i]);
+      raw.sh0[k] = planes.sh0[3 * i + k];
+      raw.log_scales[axis] = static_cast<double>(planes.scales[k][i]);
     }
-    raw.opacity_logit = detail::opacity_logit(std::to_integer<unsigned>(*planes_.at(1, i, 1)));
-    raw.quat = quaternion(i);
-    if (turn_) {
-      raw.mean = {raw.mean.x, -raw.mean.y, -raw.mean.z};
-      raw.quat = {raw.quat.w, raw.quat.x, -raw.quat.y, -raw.quat.z};
-    }
+    raw.opacity_logit = detail::opacity_logit(static_cast<unsigned>(planes.opacities[i]));
+    raw.quat = quaternion(std::as_bytes(std::span(planes.quats[0])).data() + 4 * i);
+    if (turn_) raw.quat = {raw.quat.w, raw.quat.x, -raw.quat.y, -raw.quat.z};
     raw.shN = sink.bands(i);
     sink.add(raw);
   }
 
-  void widen_bands() {
-    const std::size_t in_file = 3 * header_.coefficients(), kept = std::min<std::size_t>(45, in_file);
-    detail::widen_rows<72>(planes_.bands, header_.count, in_file, [&](const std::byte* bands, float* out) {
-      for (std::size_t k = 0; k < kept; ++k) {
-        const float sign = turn_ ? detail::kHalfTurnAboutX[k / 3] : 1.0f;
-        out[k] = static_cast<float>((number(bands[k]) - 128) / 128) * sign;
-      }
-    });
-  }
-
-  double position(std::size_t i, std::size_t axis) const {
-    if (header_.version == 1) {
-      return detail::half_to_double(load_le<std::uint16_t>(planes_.at(0, i, 6) + 2 * axis));
-    }
-    const std::byte* p = planes_.at(0, i, 9) + 3 * axis;
-    const int low = std::to_integer<int>(p[0]) | std::to_integer<int>(p[1]) << 8;
-    const int high = static_cast<std::int8_t>(std::to_integer<int>(p[2]));
-    return std::ldexp(high * 65536 + low, -header_.fractional_bits);
-  }
-
-  Quatd quaternion(std::size_t i) const {
+ private:
+  Quatd quaternion(const std::byte* p) const {
     double others[3];
     if (header_.version < 3) {  // x, y and z of a quaternion whose w is positive
-      const std::byte* p = planes_.at(4, i, 3);
-      for (std::size_t k = 0; k < 3; ++k) others[k] = number(p[k]) / 127.5 - 1;
+      for (std::size_t k = 0; k < 3; ++k) others[k] = std::to_integer<int>(p[k]) / 127.5 - 1;
       return detail::quat_without(0, others);
     }
     // Three signs and magnitudes, the last in the lowest bits, of x, y, z, w without the largest.
-    const std::uint32_t packed = load_le<std::uint32_t>(planes_.at(4, i, 4));
+    const std::uint32_t packed = load_le<std::uint32_t>(p);
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t bits = packed >> (20 - 10 * k);
       const double magnitude = static_cast<double>(bits & 511) / 511 * std::sqrt(0.5);
@@ -100,35 +55,45 @@ class SpzDecoder {
     return {xyzw.z, xyzw.w, xyzw.x, xyzw.y};
   }
 
-  detail::SpzPlanes& planes_;
   const detail::SpzHeader& header_;
-  bool turn_;
+  const bool turn_;
 };
 
-Result<LoadedCloud> decode(Result<detail::SpzPlanes> planes, const std::string& source,
-                           const LoadSpzOptions& options) {
+Result<LoadedCloud> load(const detail::ByteSource& bytes, const std::string& source,
+                         const LoadSpzOptions& options) {
+  auto planes = detail::read_spz_planes(bytes, source, !options.keep_axes);
   if (!planes) return planes.status();
-  return detail::described(SpzDecoder(*planes, !options.keep_axes).run(source),
-                           options.keep_axes ? Vec3d{0, 1, 0} : Vec3d{0, -1, 0});
+  const detail::SpzHeader& header = planes->header;
+  const SpzDecoder decoder(header, !options.keep_axes);
+  const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
+    for (std::size_t i = first; i < last; ++i) decoder.add(i, sink);
+    return {};
+  };
+  const int degree = planes->cloud.sh_degree;
+  auto out = detail::fill_cloud(header.count, degree, source, decode, true, std::move(planes->cloud));
+  if (!out) return out;
+  out->cloud.filter = (header.flags & detail::kSpzAntialiased) != 0 ? Filter::mip : Filter::classic;
+  out->report.warnings = std::move(planes->warnings);
+  if (header.degree > kMaxShDegree) {
+    out->report.warnings.push_back("SH degree 4 in the file: bands up to degree 3 are read");
+  }
+  return detail::described(std::move(out), options.keep_axes ? Vec3d{0, 1, 0} : Vec3d{0, -1, 0});
 }
 
 }  // namespace
 
 Result<LoadedCloud> parse_spz(std::span<const std::byte> bytes, std::string source,
                               const LoadSpzOptions& options) {
-  return detail::guarded(
-      source, [&] { return decode(detail::read_spz_planes(bytes, source), source, options); });
+  return detail::guarded(source, [&] { return load(bytes, source, options); });
 }
 
 Result<LoadedCloud> load_spz(const std::filesystem::path& path, const LoadSpzOptions& options) {
   const std::string source = path.string();
-  // The packed bytes are gone before the cloud is made.
-  const auto planes = [&]() -> Result<detail::SpzPlanes> {
-    const auto file = detail::read_file(path);
-    if (!file) return file.status();
-    return detail::read_spz_planes(file->span(), source);
-  };
-  return detail::guarded(source, [&] { return decode(planes(), source, options); });
+  return detail::guarded(source, [&]() -> Result<LoadedCloud> {
+    detail::RandomFile file;
+    if (Status s = file.open(path); !s) return s;
+    return load(file, source, options);
+  });
 }
 
 }  // namespace gsnav::io

@@ -4,11 +4,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <vector>
 
+#include "file.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav::io::detail {
 
@@ -35,23 +36,21 @@ struct SpzHeader {
   }
 };
 
-/// An SPZ out of its compression: plane after plane, all but the bands one after the other.
+/// An SPZ out of its compression, in the planes of the cloud that comes of it, so that no other memory is held: sh0 and
+/// shN (bands up to degree 3) as they are, the rest as stored, row i of which is
+///   means       x, y, z in the reader's axes, the origin being zero, no float being more than the file has
+///   opacities   the byte, 0 to 255
+///   scales      natural logarithms
+///   quats[0]    the file's 3 or 4 bytes, no number
 struct SpzPlanes {
   SpzHeader header;
-  std::array<std::size_t, 5> starts{};
-  std::vector<std::byte> bytes;
-  /// Room for the bands as floats, up to degree 3; the file's bytes lie at its end (widen_rows).
-  std::vector<float> bands;
+  GaussianCloud cloud;
   std::vector<std::string> warnings;
-
-  /// Bytes of Gaussian i in plane k, which has `width` bytes for each.
-  const std::byte* at(std::size_t k, std::size_t i, std::size_t width) const noexcept {
-    return bytes.data() + starts[k] + i * width;
-  }
 };
 
-/// Unpacks versions 1 to 3 (one gzip stream) and 4 (a zstd stream for each plane). Sizes are checked
-/// against the header, the header's count against the bytes there are, before memory is asked for.
-Result<SpzPlanes> read_spz_planes(std::span<const std::byte> bytes, const std::string& source);
+/// Unpacks versions 1 to 3 (one gzip stream) and 4 (a zstd stream for each plane); `turn`: half a turn about x. Sizes are
+/// checked against the header, the header's count against the bytes there are, before memory is asked for. Of the file
+/// there is one stream at a time in memory, of gzip a piece.
+Result<SpzPlanes> read_spz_planes(const ByteSource& bytes, const std::string& source, bool turn);
 
 }  // namespace gsnav::io::detail

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include "allocations.hpp"
 #include "check_quantised.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/io/spz.hpp"
@@ -203,4 +204,32 @@ TEST_CASE("spz: from a file, by its extension") {
   CHECK(io::load_spz(folder / "a.spz").value().cloud.size() == 6);
   CHECK(io::load_scene((folder / "a.spz").string()).value().cloud.size() == 6);
   CHECK(io::load_spz(folder / "none.spz").code() == Errc::file_not_found);
+}
+
+TEST_CASE("spz: a file becomes a cloud in the cloud's own memory") {
+  TempFolder folder("spz_memory");
+  for (const int degree : {0, 3}) {
+    CAPTURE(degree);
+    SpzFile file;
+    file.degree = degree;
+    file.rows = random_rows(40000, file.rest(), 44);
+    for (const std::uint32_t version : {3u, 4u}) {
+      CAPTURE(version);
+      file.version = version;
+      const std::string text = file.text();
+      write_file(folder / "a.spz", text);
+      const LoadedCloud from_bytes = io::parse_spz(bytes_of(text), "a.spz").value();
+      reset_largest_allocation();
+      const LoadedCloud loaded = io::load_spz(folder / "a.spz").value();
+      // The cloud's largest plane; of what is packed a stream, or a piece of it, is no larger.
+      CHECK(largest_allocation() <= 4 * 40000 * (degree == 0 ? 3u : 45u));
+      CHECK(loaded.cloud.size() > 10000);
+      CHECK(loaded.cloud.means == from_bytes.cloud.means);
+      CHECK(loaded.cloud.quats == from_bytes.cloud.quats);
+      CHECK(loaded.cloud.scales == from_bytes.cloud.scales);
+      CHECK(loaded.cloud.opacities == from_bytes.cloud.opacities);
+      CHECK(loaded.cloud.sh0 == from_bytes.cloud.sh0);
+      CHECK(loaded.cloud.shN == from_bytes.cloud.shN);
+    }
+  }
 }

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "gsnav/core/pool_backend.hpp"
 #include "gsnav/math/half.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
@@ -42,7 +43,9 @@ inline SceneProfile profile_scene(const GaussianCloud& cloud, double unseen = 0)
     return static_cast<double>(cloud.shN_half.empty() ? cloud.shN[at]
                                                       : half_to_float(cloud.shN_half[at]));
   };
-  for (std::size_t c = 0; c < out.chunk_sh_degrees.size(); ++c) {
+  std::vector<double> errors(out.chunk_sh_degrees.size());
+  PoolBackend backend(threads_for(cloud.size()));
+  backend.parallel_for(errors.size(), [&](std::size_t c) {
     const std::size_t first = c * kProjectChunk, end = std::min(cloud.size(), first + kProjectChunk);
     double left_out[kMaxShDegree + 1] = {};  // largest error where bands above a degree are
     for (std::size_t i = first; i < end; ++i) {
@@ -62,10 +65,15 @@ inline SceneProfile profile_scene(const GaussianCloud& cloud, double unseen = 0)
     int degree = cloud.sh_degree;
     while (degree > 0 && left_out[degree - 1] <= unseen) --degree;
     out.chunk_sh_degrees[c] = static_cast<std::uint8_t>(degree);
-    out.color_error = std::max(out.color_error, left_out[degree]);
-    out.sh_numbers += rest * (end - first);
+    errors[c] = left_out[degree];
+  });
+  backend.synchronize().throw_if_error();
+  for (std::size_t c = 0; c < errors.size(); ++c) {
+    const std::size_t n = std::min(cloud.size() - c * kProjectChunk, std::size_t{kProjectChunk});
+    out.color_error = std::max(out.color_error, errors[c]);
+    out.sh_numbers += rest * n;
     out.sh_numbers_read +=
-        3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1) * (end - first);
+        3 * static_cast<std::size_t>(sh_coefficient_count(out.chunk_sh_degrees[c]) - 1) * n;
   }
   return out;
 }

@@ -2,11 +2,17 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
+#include "gsnav/core/buffer.hpp"
 #include "gsnav/core/huge_pages.hpp"
+#include "gsnav/core/parallel.hpp"
+#include "gsnav/core/permute.hpp"
+#include "gsnav/core/pool_backend.hpp"
 #include "gsnav/kernels/gaussians.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
@@ -25,22 +31,59 @@ inline std::uint64_t spread_bits(std::uint64_t x) noexcept {
   return (x | x << 2) & 0x1249249249249249;
 }
 
-/// Rows of `values`, `stride` each, in a new order.
-template <class T>
-void permute_rows(std::vector<T>& values, const std::vector<std::uint32_t>& order, std::size_t stride) {
-  std::vector<T> out = huge_vector<T>(values.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    std::copy_n(values.data() + stride * order[i], stride, out.data() + stride * i);
+/// Floats as numbers in the same order.
+inline std::uint32_t ordered_bits(float v) noexcept {
+  const auto bits = std::bit_cast<std::uint32_t>(v);
+  return bits ^ ((bits >> 31) != 0 ? 0xffffffffu : 0x80000000u);
+}
+
+/// The value that `rank` of the others are not greater than, of values without NaN: counted by halves of
+/// their bits.
+inline float value_of_rank(const std::vector<float>& values, std::size_t rank) {
+  std::vector<std::size_t> counts(1 << 16);
+  const auto find = [&] {
+    std::uint32_t bin = 0;
+    for (; rank >= counts[bin]; ++bin) rank -= counts[bin];
+    return bin;
+  };
+  for (const float v : values) ++counts[ordered_bits(v) >> 16];
+  const std::uint32_t high = find();
+  counts.assign(counts.size(), 0);
+  for (const float v : values) {
+    if (ordered_bits(v) >> 16 == high) ++counts[ordered_bits(v) & 0xffff];
   }
-  values.swap(out);
+  const std::uint32_t bits = high << 16 | find();
+  return std::bit_cast<float>(bits ^ ((bits >> 31) != 0 ? 0x80000000u : 0xffffffffu));
+}
+
+/// Rows by their code in 63 bits, and of equal codes by their number. `code(i)`: of row i.
+template <Backend B, class Code>
+std::vector<std::uint32_t> rows_by_code(B& backend, std::size_t n, const Code& code) {
+  Buffer<std::uint32_t, B> keys(backend), rows(backend), high(backend);
+  SortScratch<B> scratch(backend);
+  for (auto* b : {&keys, &rows, &high}) b->resize_discard(n);
+  backend.parallel_for(n, [&](std::size_t i) {
+    const std::uint64_t c = code(i);
+    keys.data()[i] = static_cast<std::uint32_t>(c);
+    high.data()[i] = static_cast<std::uint32_t>(c >> 32);
+    rows.data()[i] = static_cast<std::uint32_t>(i);
+  });
+  sort_pairs(backend, keys, rows, scratch);
+  backend.parallel_for(n, [&](std::size_t i) { keys.data()[i] = high.data()[rows.data()[i]]; });
+  sort_pairs(backend, keys, rows, scratch);
+  backend.synchronize().throw_if_error();
+  std::vector<std::uint32_t> order = huge_vector<std::uint32_t>(n);
+  std::copy_n(rows.data(), n, order.data());
+  return order;
 }
 
 }  // namespace detail
 
 /// Bounds of each chunk of kProjectChunk consecutive rows.
-inline std::vector<ChunkBounds> chunk_bounds_of(const GaussianCloud& cloud) {
+template <Backend B>
+std::vector<ChunkBounds> chunk_bounds_of(B& backend, const GaussianCloud& cloud) {
   std::vector<ChunkBounds> out(cloud.view().all_chunks());
-  for (std::size_t c = 0; c < out.size(); ++c) {
+  backend.parallel_for(out.size(), [&](std::size_t c) {
     Aabb<double> box;
     for (std::size_t i = c * kProjectChunk; i < std::min(cloud.size(), (c + 1) * kProjectChunk); ++i) {
       box.add(cloud.mean(i));
@@ -49,68 +92,73 @@ inline std::vector<ChunkBounds> chunk_bounds_of(const GaussianCloud& cloud) {
     }
     out[c].low = box.low;
     out[c].high = box.high;
-  }
+  });
+  backend.synchronize().throw_if_error();
   return out;
+}
+inline std::vector<ChunkBounds> chunk_bounds_of(const GaussianCloud& cloud) {
+  PoolBackend backend(threads_for(cloud.size()));
+  return chunk_bounds_of(backend, cloud);
 }
 
 /// Brings the rows into Morton order of their means and bounds each chunk of them, so that a renderer
 /// touches what is near the view only, and neighbours lie together in memory. `row_ids` keeps each row's
 /// place, so that images stay the same, bit for bit. Large Gaussians go together behind the others: one
-/// among small ones would open its whole chunk's bounds.
-inline void sort_spatially(GaussianCloud& cloud) {
+/// among small ones would open its whole chunk's bounds. The order is the
+/// same for any number of threads.
+template <Backend B>
+void sort_spatially(B& backend, GaussianCloud& cloud) {
+  static_assert(is_host_backend<B>);
   const std::size_t n = cloud.size();
   cloud.chunk_bounds.clear();
   if (n == 0) return;
+  std::vector<Aabb<double>> boxes(concurrency_of(backend));
+  std::vector<float> largest = huge_vector<float>(n);
+  backend.parallel_for(boxes.size(), [&](std::size_t b) {
+    Aabb<double> box;
+    for (std::size_t i = n * b / boxes.size(); i < n * (b + 1) / boxes.size(); ++i) {
+      box.add(cloud.mean(i));
+      largest[i] = std::max({cloud.scales[0][i], cloud.scales[1][i], cloud.scales[2][i]});
+    }
+    boxes[b] = box;
+  });
+  backend.synchronize().throw_if_error();
   Aabb<double> box;
-  for (std::size_t i = 0; i < n; ++i) box.add(cloud.mean(i));
+  for (const Aabb<double>& b : boxes) box.add(b);
   const Vec3d size = box.high - box.low;
   const double cell = std::max({size.x, size.y, size.z, 1e-9}) / 2097151.0;
-
-  std::vector<float> largest(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    largest[i] = std::max({cloud.scales[0][i], cloud.scales[1][i], cloud.scales[2][i]});
-  }
-  std::vector<float> sorted = largest;
-  const auto quantile = sorted.begin() + static_cast<std::ptrdiff_t>(n - 1 - (n - 1) / 64);
-  std::nth_element(sorted.begin(), quantile, sorted.end());
-  const float large = *quantile;
-
-  struct Row {
-    std::uint64_t code;
-    std::uint32_t row;
-  };
-  std::vector<Row> rows(n);
-  for (std::size_t i = 0; i < n; ++i) {
+  const float large = detail::value_of_rank(largest, n - 1 - (n - 1) / 64);
+  std::vector<std::uint32_t> order = detail::rows_by_code(backend, n, [&](std::size_t i) {
     const Vec3d p = (cloud.mean(i) - box.low) * (1.0 / cell);
     const auto along = [](double x) { return detail::spread_bits(static_cast<std::uint64_t>(x)); };
     const std::uint64_t code = along(p.x) | along(p.y) << 1 | along(p.z) << 2;
-    rows[i] = {code | (largest[i] > large ? std::uint64_t{1} << 63 : 0), static_cast<std::uint32_t>(i)};
-  }
-  std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
-    return a.code != b.code ? a.code < b.code : a.row < b.row;
+    return code | (largest[i] > large ? std::uint64_t{1} << 63 : 0);
   });
-  std::vector<std::uint32_t> order(n);
-  for (std::size_t i = 0; i < n; ++i) order[i] = rows[i].row;
-
-  for (auto& plane : cloud.means) detail::permute_rows(plane, order, 1);
-  for (auto& plane : cloud.quats) detail::permute_rows(plane, order, 1);
-  for (auto& plane : cloud.scales) detail::permute_rows(plane, order, 1);
-  detail::permute_rows(cloud.opacities, order, 1);
-  detail::permute_rows(cloud.sh0, order, 3);
-  detail::permute_rows(cloud.shN, order, cloud.shN.size() / n);
-  detail::permute_rows(cloud.shN_half, order, cloud.shN_half.size() / n);
-  const auto permute_ids = [&](std::vector<std::uint32_t>& ids) {
-    std::vector<std::uint32_t> out(n);
-    for (std::size_t i = 0; i < n; ++i) out[i] = ids[order[i]];
-    ids.swap(out);
+  std::vector<float> room = std::move(largest);
+  const auto move = [&](std::vector<float>& plane, std::size_t stride) {
+    permute_rows(backend, order, stride, plane, room);
   };
-  if (!cloud.origin_ids.empty()) permute_ids(cloud.origin_ids);
+  for (auto& plane : cloud.means) move(plane, 1);
+  for (auto& plane : cloud.quats) move(plane, 1);
+  for (auto& plane : cloud.scales) move(plane, 1);
+  move(cloud.opacities, 1);
+  room = {};
+  move(cloud.sh0, 3);
+  room = {};
+  move(cloud.shN, cloud.shN.size() / n);
+  room = {};
+  permute_rows(backend, order, cloud.shN_half.size() / n, cloud.shN_half);
+  permute_rows(backend, order, 1, cloud.origin_ids);
   if (cloud.row_ids.empty()) {
     cloud.row_ids = std::move(order);
   } else {
-    permute_ids(cloud.row_ids);
+    permute_rows(backend, order, 1, cloud.row_ids);
   }
-  cloud.chunk_bounds = chunk_bounds_of(cloud);
+  cloud.chunk_bounds = chunk_bounds_of(backend, cloud);
+}
+inline void sort_spatially(GaussianCloud& cloud) {
+  PoolBackend backend(threads_for(cloud.size()));
+  sort_spatially(backend, cloud);
 }
 
 }  // namespace gsnav

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -50,12 +51,12 @@ inline void stand_still(TemporalCloud& scene) {
 /// Sorts the rows in space by their means at their own times. A scene is sorted once, as it was read.
 inline void sort_spatially(TemporalCloud& scene) {
   scene.cloud.row_ids.clear();
-  sort_spatially(scene.cloud);
-  detail::permute_rows(scene.times, scene.cloud.row_ids, 1);
-  detail::permute_rows(scene.sigmas, scene.cloud.row_ids, 1);
-  for (auto& plane : scene.motion) {
-    if (!plane.empty()) detail::permute_rows(plane, scene.cloud.row_ids, 1);
-  }
+  PoolBackend backend(threads_for(scene.size()));
+  sort_spatially(backend, scene.cloud);
+  const std::vector<std::uint32_t>& order = scene.cloud.row_ids;
+  permute_rows(backend, order, 1, scene.times);
+  permute_rows(backend, order, 1, scene.sigmas);
+  for (auto& plane : scene.motion) permute_rows(backend, order, 1, plane);
 }
 
 /// The scene at a finite time `t`, seconds, as a cloud that stands: computed in double, Gaussians below 1/255 left out.
