@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <exception>
 #include <fstream>
-#include <iterator>
 
 #include "gsnav/io/episode_file.hpp"
 #include "page.hpp"

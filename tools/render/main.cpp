@@ -31,6 +31,7 @@
 #include "gsnav/scene/placed_meshes.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/scene_profile.hpp"
+#include "gsnav/sim/scene_detail.hpp"
 
 namespace {
 
@@ -103,13 +104,22 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
   const GaussianArrays<B> arrays(backend, cloud);
   const bool profiled = is_host_backend<B> && scene.profile != nullptr;
   const std::vector<GaussianSet> whole{profiled ? scene.profile->applied_to(arrays.set()) : arrays.set()};
-  std::span<const GaussianSet> sets = whole;
-  std::optional<LodCut> cut;
+  const GaussianSet whole_here = cloud.set();  // in host memory, as cuts are
+  std::span<const GaussianSet> sets = whole, here = is_host_backend<B> ? sets : std::span(&whole_here, 1);
+  SceneDetail detail;
+  detail.choice.pixels = o.lod_pixels;
+  std::optional<GaussianArrays<B>> merged;
   if constexpr (std::is_same_v<Cloud, GaussianCloud>) {
-    if (scene.tree != nullptr) cut.emplace(*scene.tree, cloud);
+    if (scene.tree != nullptr) {
+      detail.assets.push_back({scene.tree, &cloud, {}});
+      if constexpr (!is_host_backend<B>) {
+        detail.assets[0].cloud_there = whole[0].gaussians;
+        detail.assets[0].merged_there = merged.emplace(backend, scene.tree->merged).set().gaussians;
+      }
+    }
   }
-  LodChoice choice;
-  choice.pixels = o.lod_pixels;
+  DetailSets details;
+  ChosenChunks<B> chosen(backend);
   std::vector<MeshArrays<B>> mesh_arrays;
   std::vector<MeshInstance> instances;
   std::size_t parts = 0;
@@ -132,7 +142,13 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     const auto start = std::chrono::steady_clock::now();
     headlight.direction = -cameras[c].viewmat.linear.row[2];
     renderer.set_meshes(instances, headlight);
-    if (cut) sets = cut->select(cameras[c], choice);
+    const LodCut* cut = nullptr;
+    if (!detail.assets.empty()) {
+      sets = details.select(detail, {}, cameras[c]);
+      chosen.place(std::span(&details, 1));
+      cut = &details.cut(0);
+      here = cut->sets();
+    }
     if (const Status s = renderer.render(sets, std::span(&cameras[c], 1), f); !s) {
       std::fprintf(stderr, "gsnav-render: camera %zu: %s\n", c, s.message().c_str());
       return 1;
@@ -140,8 +156,8 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     const auto end = std::chrono::steady_clock::now();
     total_ms += std::chrono::duration<double, std::milli>(end - start).count();
     if (o.ledger) {
-      const FrameLedger l = frame_ledger(sets, cameras[c], config, f.stats[0], &scene.report,
-                                         profiled && !cut ? scene.profile : nullptr, cut ? &*cut : nullptr);
+      const FrameLedger l = frame_ledger(here, cameras[c], config, f.stats[0], &scene.report,
+                                         profiled && cut == nullptr ? scene.profile : nullptr, cut);
       std::printf("camera %zu:\n%s", c, ledger_text(l).c_str());
     }
     const std::vector<S>& z = depth.output == kMedianDepth        ? f.median_depth
@@ -301,7 +317,6 @@ int main(int argc, char** argv) {
   std::optional<io::CachedLod> lod;
   OpenMPBackend openmp(o.threads);
   if (o.profile == "lod") {
-    if (o.backend == "cuda") return fail("--profile lod: not on the cuda backend; use openmp");
     if (packed) return fail("--profile lod: not with --storage packed; use full or compact");
     LodSettings settings;
     const bool terminal = isatty(fileno(stdout)) != 0;

@@ -83,6 +83,7 @@ class LodCut {
 
   /// What the last select() chose.
   const LodStats& stats() const noexcept { return stats_; }
+  std::span<const GaussianSet> sets() const noexcept { return sets_; }
   const std::vector<std::uint32_t>& leaf_chunks() const noexcept { return leaf_chunks_; }
   const std::vector<std::uint32_t>& merged_chunks() const noexcept { return merged_chunks_; }
 

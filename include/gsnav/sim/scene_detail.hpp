@@ -53,6 +53,9 @@ class DetailSets {
     return sets_;
   }
 
+  /// How asset `a` was cut by the last choice; its sets are of the host's arrays.
+  const LodCut& cut(std::size_t a) const noexcept { return *cuts_[a].cut; }
+
   /// Chunks of the last choice that a backend with a memory of its own has to be given, and where they are there.
   std::span<const std::uint32_t> chunks() const noexcept { return chunks_; }
   void place_chunks(const std::uint32_t* there) noexcept {
