@@ -5,7 +5,7 @@
 //   GSNAV_BENCH_SCENE and GSNAV_BENCH_CAMERAS as for bench_render
 //
 // Before each view stands a ball of triangles, 2 m away: what a sensor that meets furniture sees. `alone`: the frame
-// without meshes; `meshes`: without Gaussians; `hard_depth`: Habitat-GS's rule on the same scene. Errors are the
+// without meshes; `meshes`: without Gaussians; `glass`: the balls seen through, front and back; `hard_depth`: Habitat-GS's rule on the same scene. Errors are the
 // worst of the views; median_ms is over views, each by its median, from call to images in host memory; pairs of
 // (tile, Gaussian) are means. On a GPU too, where there is one.
 #include <algorithm>
@@ -63,6 +63,7 @@ struct Row {
   const char* name;
   bool gaussians, meshes;
   Composite composite;
+  bool through = false;  ///< balls of glass, front and back
 };
 
 struct Shown {
@@ -81,11 +82,17 @@ void print_rows(B& backend, const std::string& where, const Shown& shown) {
   std::vector<MeshInstance> instances;
   for (const MeshInstance& i : shown.instances) instances.push_back(mesh.instance(i.world_from_mesh, i.id));
   for (const Row& row : {Row{"alone", true, false, Composite::merged}, Row{"meshes", false, true, Composite::merged},
-                         Row{"merged", true, true, Composite::merged}, Row{"hard_depth", true, true, Composite::hard_depth}}) {
+                         Row{"merged", true, true, Composite::merged}, Row{"glass", true, true, Composite::merged, true}, Row{"hard_depth", true, true, Composite::hard_depth}}) {
     RenderConfig config;
     config.composite = row.composite;
     Renderer<float, B> renderer(backend, config);
-    if (row.meshes) renderer.set_meshes(instances);
+    std::vector<MeshInstance> seen = instances;
+    for (MeshInstance& i : seen) {
+      i.mesh.two_sided = row.through;
+      i.mesh.base_alpha = row.through ? 0.5f : 1.0f;
+      i.mesh.alpha_mode = row.through ? MeshAlpha::blend : MeshAlpha::opaque;
+    }
+    if (row.meshes) renderer.set_meshes(seen);
     const std::span<const GaussianSet> sets(&set, row.gaussians ? 1 : 0);
     Frames<float> frames;
     std::vector<double> view_ms;
@@ -102,14 +109,14 @@ void print_rows(B& backend, const std::string& where, const Shown& shown) {
       }
       view_ms.push_back(median(ms));
       pairs += static_cast<double>(frames.stats[0].tile_intersections) / static_cast<double>(shown.cameras.size());
-      if (!row.gaussians || !row.meshes) continue;
+      if (!row.gaussians || !row.meshes || row.through) continue;
       const eval::ImageError e = eval::image_error(shown.truth[v].rgb, frames.rgb, 3, shown.truth[v].undecided).value();
       worst.psnr = std::min(worst.psnr, e.psnr);
       worst.p999 = std::max(worst.p999, e.p999);
       worst.max = std::max(worst.max, e.max);
     }
     std::printf("%-11s %-11s  %9.2f", row.name, where.c_str(), median(view_ms));
-    if (row.gaussians && row.meshes) {
+    if (row.gaussians && row.meshes && !row.through) {
       std::printf(" %9.1f %9.1e %9.1e", worst.psnr, worst.p999, worst.max);
     } else {
       std::printf(" %9s %9s %9s", "", "", "");

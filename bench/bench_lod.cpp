@@ -70,13 +70,12 @@ struct Bench {
   std::size_t first = 0;  ///< number of the first camera
   bool each = false;      ///< print every view
 
-  /// `pixels` = 0: every Gaussian, through the photo's filter; below: by the asset's own. `fast_cuts`: alphas and
-  /// pixels end where they do in `fast`.
-  void row(const char* name, double pixels, bool fast_cuts = false) {
+  /// `pixels` = 0: every Gaussian, through the photo's filter; below: by the asset's own.
+  void row(const char* name, double pixels) {
     RenderConfig config;
     config.outputs = kRgb;
     config.profile = Profile::fast;
-    if (pixels > 0 && !fast_cuts) config = lod_config(config);
+    if (pixels > 0) config = lod_config(config);
     Renderer<float, OpenMPBackend> renderer(one, config);
     LodCut cut(tree, cloud);
     LodChoice choice;
@@ -137,7 +136,6 @@ int main(int argc, char** argv) {
               "ms", "faster", "visible", "pairs", "view");
   bench.row("direct fast", -1);
   bench.row("photo filter", 0);
-  for (const double pixels : {0.35, 0.5, 0.7, 1.0, 1.4, 2.0}) bench.row("lod", pixels);
-  for (const double pixels : {0.5, 1.0}) bench.row("fast's cuts", pixels, true);
+  for (const double pixels : {0.35, 0.5, 0.7, 0.8, 1.0, 1.4, 2.0}) bench.row("lod", pixels);
   return 0;
 }
