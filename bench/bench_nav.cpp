@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
@@ -56,9 +57,7 @@ const Scene* data(const char* name) {
   const auto mesh = io::load_obj(std::string(GSNAV_DATA_DIR "/nav/recast/") + name);
   if (!mesh) return nullptr;
   std::vector<Vec3d> vertices;
-  for (const Vec3f& v : mesh->vertices) {
-    vertices.push_back({static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)});
-  }
+  for (const Vec3f& v : mesh->vertices) vertices.push_back(vec_cast<double>(v));
   return new Scene(NavMesh::build({}, vertices, mesh->triangles).value());
 }
 const Scene* nav_test() {
@@ -271,6 +270,56 @@ void plan_in_time_among(benchmark::State& state, const Scene* (*make)()) {
   state.counters["longest_ms"] = 1e3 * longest;
 }
 
+struct Triangles {
+  std::vector<Vec3d> vertices;
+  std::vector<NavMesh::Triangle> triangles;
+};
+Triangles flat_triangles() {
+  DefaultScene s = make_default_scene(0.1).value();
+  return {std::move(s.vertices), std::move(s.triangles)};
+}
+Triangles data_triangles(const char* name) {
+  Triangles out;
+  auto mesh = io::load_obj(std::string(GSNAV_DATA_DIR "/nav/recast/") + name);
+  if (!mesh) return out;
+  for (const Vec3f& v : mesh->vertices) out.vertices.push_back(vec_cast<double>(v));
+  out.triangles = std::move(mesh->triangles);
+  return out;
+}
+Triangles nav_test_triangles() { return data_triangles("nav_test.obj"); }
+Triangles dungeon_triangles() { return data_triangles("dungeon.obj"); }
+
+/// A build of one tile and one of tiles of 128 cells by some threads, in turns, at Habitat's settings; `ratio` is of
+/// wall time, `cpu_ratio` of the time of all processors.
+void build(benchmark::State& state, Triangles (*make)()) {
+  const auto threads = static_cast<int>(state.range(0));
+  const Triangles soup = make();
+  if (soup.triangles.empty()) return state.SkipWithError("the mesh is not in GSNAV_DATA_DIR");
+  NavMeshSettings tiled;
+  tiled.tile_size = 128;
+  using Clock = std::chrono::steady_clock;
+  double one = 0, many = 0, cpu_one = 0, cpu_many = 0;
+  std::size_t polygons = 0;
+  const auto timed = [&](const NavMeshSettings& s, double& wall, double& cpu) {
+    const auto begin = Clock::now();
+    const std::clock_t cpu_begin = std::clock();
+    const NavMesh mesh = NavMesh::build(s, soup.vertices, soup.triangles, threads).value();
+    cpu += static_cast<double>(std::clock() - cpu_begin) / CLOCKS_PER_SEC;
+    wall += std::chrono::duration<double>(Clock::now() - begin).count();
+    return mesh.polygon_count();
+  };
+  for (auto _ : state) {
+    timed({}, one, cpu_one);
+    polygons = timed(tiled, many, cpu_many);
+  }
+  const double each = 1e3 / static_cast<double>(state.iterations());
+  state.counters["one_tile_ms"] = one * each;
+  state.counters["tiles_ms"] = many * each;
+  state.counters["ratio"] = one / many;
+  state.counters["cpu_ratio"] = cpu_one / cpu_many;
+  state.counters["polygons"] = static_cast<double>(polygons);
+}
+
 #define GSNAV_NAV_BENCH(name)                  \
   BENCHMARK_CAPTURE(name, flat, flat);         \
   BENCHMARK_CAPTURE(name, nav_test, nav_test); \
@@ -285,6 +334,12 @@ GSNAV_NAV_BENCH(random_point);
 GSNAV_NAV_BENCH(snap);
 GSNAV_NAV_BENCH(detour_snap);
 GSNAV_NAV_BENCH(obstacle);
+#define GSNAV_BUILD_BENCH(scene) \
+  BENCHMARK_CAPTURE(build, scene, scene##_triangles) \
+      ->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime()
+GSNAV_BUILD_BENCH(flat);
+GSNAV_BUILD_BENCH(nav_test);
+GSNAV_BUILD_BENCH(dungeon);
 BENCHMARK_CAPTURE(steps, flat, flat)->Arg(0)->Arg(3)->Arg(100);
 BENCHMARK_CAPTURE(thousand_agents, flat, flat)->Arg(3)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(local_plan, flat, flat)->Arg(3)->Arg(10)->Arg(30)->Unit(benchmark::kMicrosecond);

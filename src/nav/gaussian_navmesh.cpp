@@ -7,7 +7,7 @@
 #include <string>
 
 #include "gaussian_floor.hpp"
-#include "navmesh_impl.hpp"
+#include "navmesh_stages.hpp"
 #include "triangle_heights.hpp"
 
 namespace gsnav {
@@ -137,6 +137,10 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings, std:
                                            const GaussianNavOptions& options) {
   if (Status s = settings.validate(); !s.ok()) return s;
   if (Status s = validate(options); !s.ok()) return s;
+  if (settings.tile_size != 0) {
+    return Status(Errc::invalid_argument, "NavMeshSettings.tile_size = " + std::to_string(settings.tile_size) +
+                                              ": a NavMesh from Gaussians is one tile (0)");
+  }
   auto box = detail::check_triangles(vertices, triangles);
   if (!box.ok()) return box.status();
   GaussianNavReport report;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <DetourNavMesh.h>
-#include <Recast.h>
 
 #include <atomic>
 #include <functional>
@@ -26,70 +25,9 @@ struct DetourDeleter {
 };
 using NavMeshPtr = std::unique_ptr<dtNavMesh, DetourDeleter>;
 
-struct RecastDeleter {
-  void operator()(rcHeightfield* p) const noexcept { rcFreeHeightField(p); }
-  void operator()(rcCompactHeightfield* p) const noexcept { rcFreeCompactHeightfield(p); }
-  void operator()(rcContourSet* p) const noexcept { rcFreeContourSet(p); }
-  void operator()(rcPolyMesh* p) const noexcept { rcFreePolyMesh(p); }
-  void operator()(rcPolyMeshDetail* p) const noexcept { rcFreePolyMeshDetail(p); }
-};
-template <class T>
-using RecastPtr = std::unique_ptr<T, RecastDeleter>;
-
-/// Keeps Recast's last error line.
-class RecastLog : public rcContext {
- public:
-  RecastLog() : rcContext(true) {}
-  const std::string& last_error() const noexcept { return error_; }
-
- protected:
-  void doLog(rcLogCategory category, const char* message, int length) override {
-    if (category == RC_LOG_ERROR) error_.assign(message, static_cast<std::size_t>(length));
-  }
-
- private:
-  std::string error_;
-};
-
-/// Cosine of agent_max_slope: triangles that face up more than that can be walked on.
-double slope_cosine(const NavMeshSettings& settings) noexcept;
-
-/// Box of the vertices. Errors: invalid_argument naming a vertex or index.
-Result<Aabb<double>> check_triangles(std::span<const Vec3d> vertices, std::span<const NavMesh::Triangle> triangles);
-
-/// Adds triangles to a heightfield whose frame lies at `origin`. Errors: out_of_memory.
-Status rasterise(RecastLog& log, const NavMeshSettings& settings, std::span<const Vec3d> vertices,
-                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin, rcHeightfield& field);
-
-/// An empty heightfield over a box (relative to the mesh's origin). Errors: the grid exceeds
-/// `settings.max_cells` or the height what Recast can number.
-Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshSettings& settings,
-                                                  const Vec3d& low, const Vec3d& high);
-
-/// What a source of voxels may add to the build.
-struct BuildHooks {
-  std::function<void(rcCompactHeightfield&)> prune;  ///< takes areas away after erosion
-  std::function<double(const Vec3d&)> height;        ///< true height of a vertex of the surface
-};
-
-/// Everything after voxelisation: filters, erosion, regions, contours, polygons, Detour. `origin` is
-/// where the heightfield's frame lies in the world. nothing_navigable, naming the areas left at each
-/// stage, where no polygon comes out.
-Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& settings, rcHeightfield& field,
-                               const Vec3d& origin, const BuildHooks& hooks = {});
-
 /// A NavMesh of the tiles that Detour holds; `height` moves its vertices to the true floor.
 NavMesh assemble_navmesh(const NavMeshSettings& settings, const Vec3d& origin, NavMeshPtr mesh,
                          const std::function<double(const Vec3d&)>& height = {});
-
-/// An error of a stage of the build, with Recast's own words.
-Status stage(const char* what, const RecastLog& log);
-
-/// Settings in voxels, rounded as NavMeshSettings says.
-struct VoxelSettings {
-  int height = 0, climb = 0, radius = 0;
-  explicit VoxelSettings(const NavMeshSettings& s) noexcept;
-};
 
 }  // namespace detail
 

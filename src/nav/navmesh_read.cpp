@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <DetourAlloc.h>
-
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -8,7 +6,7 @@
 
 #include "gsnav/nav/navmesh_file.hpp"
 #include "navmesh_format.hpp"
-#include "navmesh_impl.hpp"
+#include "navmesh_stages.hpp"
 
 namespace gsnav {
 namespace detail {
@@ -16,11 +14,6 @@ namespace {
 
 constexpr double kMaxCoordinate = 1e6;  // metres: float32 has centimetres no more
 constexpr std::int32_t kMaxTileCoordinate = 1 << 24;
-
-struct DetourFree {
-  void operator()(unsigned char* p) const noexcept { dtFree(p); }
-};
-using DetourBytes = std::unique_ptr<unsigned char, DetourFree>;
 
 /// What a message starts with, and how it ends.
 struct Where {
@@ -266,6 +259,10 @@ Result<NavMesh> parse(std::span<const std::byte> file, const Where& where) {
   }
   if (tiles.empty()) return Status(Errc::nothing_navigable, where.text + ": there are no polygons");
   params.maxTiles = static_cast<int>(tiles.size());
+  if (version == 2 && tiles.size() > 1) {
+    const double cells = static_cast<double>(params.tileWidth) / settings.cell_size;
+    settings.tile_size = cells > 15.5 && cells < 16384.5 ? static_cast<int>(std::lround(cells)) : 0;
+  }
 
   NavMeshPtr mesh(dtAllocNavMesh());
   if (mesh == nullptr) return Status(Errc::out_of_memory, where.text + ": not enough memory");

@@ -36,6 +36,10 @@ Status NavMeshSettings::validate() const {
                                           std::to_string(f.low) + ", " + std::to_string(f.high) + "]"};
     }
   }
+  if (tile_size != 0 && (tile_size < 16 || tile_size > 16384)) {
+    return {Errc::invalid_argument,
+            "NavMeshSettings.tile_size = " + std::to_string(tile_size) + " is not 0 or in [16, 16384]"};
+  }
   if (max_cells == 0) return {Errc::invalid_argument, "NavMeshSettings.max_cells is 0"};
   return {};
 }

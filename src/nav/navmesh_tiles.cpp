@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "navmesh_impl.hpp"
+#include "tile_seams.hpp"
 
 namespace gsnav::detail {
 namespace {
@@ -36,11 +37,14 @@ class Extractor {
       const dtPolyRef base = mesh_.getPolyRefBase(&tile);
       for (int i = 0; i < tile.header->polyCount; ++i) impl_.refs.push_back(base | static_cast<dtPolyRef>(i));
     }
+    std::vector<std::uint32_t> tile_of;
     for (int t = 0; t < mesh_.getMaxTiles(); ++t) {
       const dtMeshTile& tile = *mesh_.getTile(t);
       if (tile.header == nullptr) continue;
       for (int i = 0; i < tile.header->polyCount; ++i) add(t, tile, i);
+      tile_of.resize(impl_.polys.polys.size(), static_cast<std::uint32_t>(t));
     }
+    if (!tile_of.empty() && tile_of.front() != tile_of.back()) close_seams(impl_.polys, tile_of);
     impl_.polys.finish();
   }
 

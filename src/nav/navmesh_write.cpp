@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <cstring>
 #include <fstream>
 
@@ -23,6 +24,22 @@ void shift(float* p, const Vec3d& d) noexcept {
   for (int c = 0; c < 3; ++c) p[c] = static_cast<float>(static_cast<double>(p[c]) + d[c]);
 }
 
+/// The height of corner k of a polygon's height triangle t, which stands at v. On the border of a tile triangles
+/// may have been split: there it is that of the nearest corner.
+double height_of(const detail::PolyMesh& m, PolyId id, unsigned t, std::size_t k, const float* v) noexcept {
+  const detail::PolyMesh::Poly& poly = m.polys[id];
+  const auto apart = [&](const Vec3d& p) {
+    return std::hypot(p.x - static_cast<double>(v[0]), p.z - static_cast<double>(v[2]));
+  };
+  const Vec3d* best = &m.tris[poly.tri_first + t][k];
+  if (apart(*best) > 0) {
+    for (std::uint32_t i = poly.tri_first; i < poly.tri_first + poly.tri_count; ++i) {
+      for (const Vec3d& p : m.tris[i]) best = apart(p) < apart(*best) ? &p : best;
+    }
+  }
+  return best->y;
+}
+
 /// A tile's bytes in world coordinates with the true heights of the floor, which Detour's own does not have.
 std::vector<unsigned char> world_tile(const NavMesh::Impl& impl, const dtMeshTile& tile, PolyId first) {
   std::vector<unsigned char> data(tile.data, tile.data + tile.dataSize);
@@ -34,12 +51,11 @@ std::vector<unsigned char> world_tile(const NavMesh::Impl& impl, const dtMeshTil
   for (int i = 0; i < tile.header->polyCount; ++i) {
     const dtPoly& p = tile.polys[i];
     const dtPolyDetail& d = tile.detailMeshes[i];
-    const detail::PolyMesh::Poly& poly = impl.polys.polys[first + static_cast<PolyId>(i)];
     for (unsigned t = 0; t < d.triCount; ++t) {
       for (std::size_t k = 0; k < 3; ++k) {
         const unsigned id = tile.detailTris[4 * (d.triBase + t) + k];
         float* v = id < p.vertCount ? verts + 3 * p.verts[id] : detail_verts + 3 * (d.vertBase + id - p.vertCount);
-        v[1] = static_cast<float>(impl.polys.tris[poly.tri_first + t][k].y);
+        v[1] = static_cast<float>(height_of(impl.polys, first + static_cast<PolyId>(i), t, k, v));
       }
     }
   }

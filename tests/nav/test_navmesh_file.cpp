@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <DetourAlloc.h>
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <initializer_list>
+#include <new>
 
 #include "cases.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
@@ -19,6 +21,13 @@ using gsnav_test::cases;
 using gsnav_test::Soup;
 
 namespace {
+
+/// Detour's own allocations are counted with the others', from before the first.
+[[maybe_unused]] const bool counted = [] {
+  dtAllocSetCustom([](std::size_t size, dtAllocHint) { return ::operator new(size, std::nothrow); },
+                   [](void* p) { ::operator delete(p); });
+  return true;
+}();
 
 std::vector<std::byte> bytes_of(const std::string& path) {
   const std::string text = gsnav_test::read_file(path);
@@ -43,6 +52,16 @@ std::vector<std::byte> saved(const NavMesh& mesh) {
   const gsnav_test::TempFolder folder("navmesh_file");
   save_navmesh(mesh, (folder / "a.navmesh").string()).throw_if_error();
   return bytes_of((folder / "a.navmesh").string());
+}
+
+/// Boxes on a floor with a ramp, in tiles of 16 cells.
+std::vector<std::byte> tiled() {
+  Soup soup = gsnav_test::random_boxes(6, 12, 10);
+  soup.quad({10, 0, 2}, {10, 0, 6}, {13, 1, 6}, {13, 1, 2});
+  NavMeshSettings s;
+  s.cell_size = 0.1;
+  s.tile_size = 16;
+  return saved(NavMesh::build(s, soup.vertices, soup.triangles).value());
 }
 
 /// A file of `count` triangles that lie on each other, `length` metres long.
@@ -242,6 +261,8 @@ TEST_CASE("navmesh file: no allocation is over four times the file, whatever its
     const Soup soup = gsnav_test::read_obj(path);
     files.push_back(saved(NavMesh::build({}, soup.vertices, soup.triangles).value()));
   }
+  // Tiles, of which each has its own copy in Detour, as small as they may be.
+  files.push_back(tiled());
   // Ten thousand polygons, each of which covers all of the mesh, and one that is 100 km long.
   files.push_back(pile(10000, 1.0f));
   files.push_back(pile(1, 1e5f));
@@ -293,7 +314,7 @@ TEST_CASE("navmesh file: polygons that lie on one another have paths, each edge 
 }
 
 TEST_CASE("navmesh file: mutated and truncated files do no harm") {
-  std::vector<std::vector<std::byte>> seeds{saved(boxes())};
+  std::vector<std::vector<std::byte>> seeds{saved(boxes()), tiled()};
   const std::string tiles = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");
   if (!tiles.empty()) seeds.push_back(bytes_of(tiles));
   Rng rng(11);

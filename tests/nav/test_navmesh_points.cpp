@@ -20,7 +20,7 @@ namespace {
 
 /// Two islands; on the first boxes (their tops too small to stand on), a ramp of 30 degrees and a floor
 /// above part of it.
-NavMesh house() {
+NavMesh house(int tile_size = 0) {
   Soup soup;
   soup.floor(0, 0, 16, 10);
   soup.box(2, 6, 3.4, 7, 0, 1.4);
@@ -32,6 +32,7 @@ NavMesh house() {
   soup.floor(0, 30, 6, 34, 0.5);
   NavMeshSettings s;
   s.cell_height = 0.05;
+  s.tile_size = tile_size;
   return NavMesh::build(s, soup.vertices, soup.triangles).value();
 }
 
@@ -111,8 +112,11 @@ TEST_CASE("alias table: draws in proportion to the weights, and nothing of weigh
   CHECK(detail::AliasTable({}, {}).empty());
 }
 
-TEST_CASE("points: random ones are uniform over the surface, on slopes and on an island too") {
-  const NavMesh mesh = house();
+namespace {
+
+constexpr int kPoints = 400000;
+
+void check_uniform(const NavMesh& mesh) {
   REQUIRE(mesh.island_count() == 2);
   const std::vector<double> areas = areas_of(mesh);
   double area = 0;
@@ -120,7 +124,6 @@ TEST_CASE("points: random ones are uniform over the surface, on slopes and on an
   CHECK(mesh.navigable_area() == doctest::Approx(area).epsilon(1e-3));
   std::vector<double> seen(areas.size(), 0.0), of_island = seen, areas_of_island = seen;
   Rng rng(2);
-  constexpr int kPoints = 400000;
   for (int i = 0; i < kPoints; ++i) {
     const NavPoint p = mesh.random_point(rng);
     seen[p.poly] += 1;
@@ -138,11 +141,19 @@ TEST_CASE("points: random ones are uniform over the surface, on slopes and on an
     CHECK(std::abs(chi_square(of_island, areas_of_island)) < 5);
   }
   CHECK(mesh.random_point(rng, 2).poly == kNoPoly);
+}
+
+}  // namespace
+
+TEST_CASE("points: random ones are uniform over the surface, on slopes and on an island too") {
+  check_uniform(house());
+  check_uniform(house(48));
 
   // Within a polygon: cells of equal area of a plain floor.
   Soup plain;
   plain.floor(0, 0, 9, 6);
   const NavMesh flat = NavMesh::build({}, plain.vertices, plain.triangles).value();
+  Rng rng(3);
   const Aabb<double> box = flat.bounds();
   constexpr std::size_t kSide = 24;
   std::vector<double> cells(kSide * kSide, 0.0);
@@ -221,7 +232,9 @@ TEST_CASE("points: the closest obstacle is the nearest of all boundary edges") {
       const double x = rng.uniform(0.5, 12), z = rng.uniform(0.5, 9);
       soup.box(x, z, x + rng.uniform(0.2, 2), z + rng.uniform(0.2, 2), 0, 1.4);
     }
-    const NavMesh mesh = NavMesh::build({}, soup.vertices, soup.triangles).value();
+    NavMeshSettings settings;
+    settings.tile_size = round < 2 ? 0 : 40;
+    const NavMesh mesh = NavMesh::build(settings, soup.vertices, soup.triangles).value();
     const auto edges = boundary_of(mesh);
     for (int i = 0; i < 2000; ++i) {
       const NavPoint p = mesh.random_point(rng);

@@ -75,6 +75,33 @@ TEST_CASE("navmesh tool: builds, inspects, converts and draws") {
   CHECK(read_file(folder / "a.navmesh") == read_file(folder / "b.navmesh"));
 }
 
+TEST_CASE("navmesh tool: in tiles, whatever the number of threads") {
+  const TempFolder folder("navmesh_tool_tiles");
+  write_file(folder / "floors.obj", two_floors_z_up());
+  const auto build = [&](const std::string& more, const char* out) {
+    const Outcome made = run(folder, quoted(folder / "floors.obj") + " --up z --scale 0.01 " + kPlain + " " + more +
+                                         " --out " + quoted(folder / out));
+    INFO(made.text);
+    REQUIRE(made.ok);
+    CHECK(made.says("level 1: at 3.00 m, 40"));
+    return made;
+  };
+  build("", "one.navmesh");
+  CHECK(build("--tile-size 48 --threads 1", "a.navmesh").says("tiles of 48 x 48 cells"));
+  build("--tile-size 48 --threads 3", "b.navmesh");
+  CHECK(read_file(folder / "a.navmesh") == read_file(folder / "b.navmesh"));
+  const NavMesh one = load_navmesh(folder / "one.navmesh").value(), tiled = load_navmesh(folder / "a.navmesh").value();
+  CHECK(tiled.polygon_count() > one.polygon_count());
+  CHECK(tiled.island_count() == one.island_count());
+  CHECK(tiled.settings().tile_size == 48);
+  const Outcome again = run(folder, quoted(folder / "a.navmesh") + " --out " + quoted(folder / "c.navmesh"));
+  REQUIRE(again.ok);
+  CHECK(read_file(folder / "a.navmesh") == read_file(folder / "c.navmesh"));
+  const Outcome refused = run(folder, quoted(folder / "a.navmesh") + " --tile-size 48");
+  CHECK_FALSE(refused.ok);
+  CHECK(refused.says("--tile-size"));
+}
+
 TEST_CASE("navmesh tool: from Gaussians") {
   const TempFolder folder("navmesh_tool_gaussians");
   GaussianCloudBuilder builder(0);

@@ -46,7 +46,7 @@ Result<Triangles> load_triangles(const std::string& path, const Similarity& plac
 Result<NavMesh> from_triangles(const Options& o, const Similarity& placed) {
   auto mesh = load_triangles(o.input, placed);
   if (!mesh) return mesh.status();
-  return NavMesh::build(o.settings, mesh->vertices, mesh->triangles);
+  return NavMesh::build(o.settings, mesh->vertices, mesh->triangles, o.threads);
 }
 
 Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
@@ -92,6 +92,7 @@ void print(const NavMesh& mesh, const std::vector<NavLevel>& levels) {
   std::printf("agent: height %g, radius %g, climb %g m, slope %g degrees; cells %g x %g m\n",
               s.agent_height, s.agent_radius, s.agent_max_climb, s.agent_max_slope, s.cell_size,
               s.cell_height);
+  if (s.tile_size > 0) std::printf("tiles of %d x %d cells\n", s.tile_size, s.tile_size);
   constexpr std::size_t kShown = 10;
   for (std::size_t i = 0; i < std::min(mesh.island_count(), kShown); ++i) {
     std::printf("island %zu: %.2f m2, radius %.2f m\n", i, mesh.island_area(i), mesh.island_radius(i));

@@ -79,6 +79,14 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
          "Spacing of height samples, in cells; below 0.9: none");
   number("--detail-sample-max-error", s.detail_sample_max_error,
          "Height error of the surface, in cell heights");
+  auto* tile_size = app.add_option("--tile-size", s.tile_size,
+                                   "Build in tiles of so many cells a side, in parallel; 0: one tile, as Habitat does")
+                        ->capture_default_str()
+                        ->group(build);
+  app.add_option("--threads", o.threads, "That share out the tiles; 0: one a core")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(build);
   const auto without = [&](const char* name, bool& filter, const char* text) {
     app.add_flag_callback(
            name, [&filter] { filter = false; }, text)
@@ -114,6 +122,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     app.parse(argc, argv);
     if (kind_of(o.input) == InputKind::navmesh && up->count() + scale->count() > 0) {
       throw CLI::ValidationError("--up, --scale", o.input + " is a NavMesh: it stands as it is");
+    }
+    if (kind_of(o.input) != InputKind::mesh && tile_size->count() > 0) {
+      throw CLI::ValidationError("--tile-size", o.input + ": only a NavMesh of triangles is built in tiles");
     }
     if (kind_of(o.input) != InputKind::gaussians && mesh->count() > 0) {
       throw CLI::ValidationError("--mesh", o.input + " has no Gaussians to go with " + o.mesh);

@@ -20,6 +20,7 @@ struct Options {
   std::string mesh;  ///< triangles beside the Gaussians of the input
   std::string out, obj, png;
   gsnav::NavMeshSettings settings;
+  int threads = 0;  ///< that share out the tiles; 0: one a core
   gsnav::GaussianNavOptions gaussians;
   std::optional<double> height;  ///< of the picture; a level's where it is not given
   std::optional<std::size_t> level;

@@ -97,9 +97,11 @@ class NavMesh {
 
   /// Builds from triangles (counter-clockwise seen from above is walkable; Y up, metres), at any
   /// distance from the world's origin. Errors: invalid_argument naming the setting, vertex or index
-  /// at fault or the size of a grid beyond `max_cells`; nothing_navigable where no surface is left.
+  /// at fault or the size of a grid beyond `max_cells`; nothing_navigable where no surface is left; unsupported
+  /// where Detour cannot number the polygons. With `settings.tile_size`, `threads` share out the tiles (0: one a
+  /// core, at most 16); the mesh is the same, bit for bit, for any number of them.
   static Result<NavMesh> build(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
-                               std::span<const Triangle> triangles);
+                               std::span<const Triangle> triangles, int threads = 0);
 
   NavMesh(NavMesh&&) noexcept;
   NavMesh& operator=(NavMesh&&) noexcept;

@@ -28,6 +28,9 @@ struct NavMeshSettings {
   bool filter_low_hanging_obstacles = true;
   bool filter_ledge_spans = true;
   bool filter_walkable_low_height_spans = true;
+  /// Side of the tiles that a mesh of triangles is built in, cells: 0 for a single one, as Habitat's is, else 16 to
+  /// 16384. Tiles are built in parallel; what can be walked on is the same, its polygons are cut at the tiles' borders.
+  int tile_size = 0;
   std::size_t max_cells = std::size_t{1} << 28;  ///< refuse a ground grid larger than this
 
   /// invalid_argument, naming the field, where a value is impossible.

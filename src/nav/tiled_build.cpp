@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+// The build in tiles. Each looks at a border of the agent's radius and three cells around it, so that
+// erosion and filters see what they would see in one tile: the same cells can be walked on.
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "gsnav/core/thread_pool.hpp"
+#include "navmesh_stages.hpp"
+#include "tile_islands.hpp"
+#include "triangle_heights.hpp"
+
+namespace gsnav::detail {
+namespace {
+
+constexpr int kBesideRadius = 3;  // cells that the border has beyond the agent's radius
+
+/// Tiles over a box, on one lattice of cells.
+struct TileGrid {
+  const NavMeshSettings& settings;
+  Aabb<double> box;
+  int border = 0, nx = 0, nz = 0;  ///< tiles
+  int width = 0, depth = 0;        ///< cells of the box
+
+  TileGrid(const NavMeshSettings& s, const Aabb<double>& b)
+      : settings(s), box(b), border(VoxelSettings(s).radius + kBesideRadius) {
+    width = max(1, cells_up(b.high.x - b.low.x, s.cell_size));
+    depth = max(1, cells_up(b.high.z - b.low.z, s.cell_size));
+    nx = (width + s.tile_size - 1) / s.tile_size;
+    nz = (depth + s.tile_size - 1) / s.tile_size;
+  }
+  std::size_t count() const noexcept {
+    return static_cast<std::size_t>(nx) * static_cast<std::size_t>(nz);
+  }
+  double side() const noexcept { return settings.tile_size * settings.cell_size; }
+  /// The tile's own box, `cells` wider on each side.
+  Aabb<double> box_of(std::size_t tile, int cells) const noexcept {
+    const auto columns = static_cast<std::size_t>(nx);
+    const double x = static_cast<double>(tile % columns), z = static_cast<double>(tile / columns);
+    const double rim = cells * settings.cell_size;
+    return {{box.low.x + x * side() - rim, box.low.y, box.low.z + z * side() - rim},
+            {box.low.x + (x + 1) * side() + rim, box.high.y, box.low.z + (z + 1) * side() + rim}};
+  }
+  /// Takes what lies beyond the box's cells out of a tile with its border: a triangle that ends with the
+  /// box touches one cell more.
+  void clip(std::size_t tile, rcHeightfield& field) const noexcept {
+    const auto columns = static_cast<std::size_t>(nx);
+    const int x0 = static_cast<int>(tile % columns) * settings.tile_size - border;
+    const int z0 = static_cast<int>(tile / columns) * settings.tile_size - border;
+    for (int z = 0; z < field.height; ++z) {
+      for (int x = 0; x < field.width; ++x) {
+        const bool inside = x0 + x >= 0 && z0 + z >= 0 && x0 + x < width && z0 + z < depth;
+        if (!inside) field.spans[x + z * field.width] = nullptr;  // the field keeps its pools
+      }
+    }
+  }
+  TilePlace place_of(std::size_t tile) const noexcept {
+    TilePlace out{static_cast<int>(tile % static_cast<std::size_t>(nx)),
+                  static_cast<int>(tile / static_cast<std::size_t>(nx)),
+                  {},
+                  {}};
+    const Aabb<double> own = box_of(tile, 0);
+    for (int k = 0; k < 3; ++k) {
+      out.low[k] = static_cast<float>(own.low[k]);
+      out.high[k] = static_cast<float>(own.high[k]);
+    }
+    return out;
+  }
+};
+
+/// Triangles of each tile with its border, in the order of the input: on that depends what a span is.
+struct TriangleLists {
+  std::vector<std::size_t> first;
+  std::vector<std::uint32_t> triangles;
+
+  TriangleLists(const TileGrid& grid, std::span<const Vec3d> vertices,
+                std::span<const NavMesh::Triangle> triangles_in, const Vec3d& origin)
+      : first(grid.count() + 1, 0) {
+    const double rim = (grid.border + 1) * grid.settings.cell_size;
+    const auto index = [&](double v, int n) {
+      return static_cast<std::size_t>(
+          clamp(std::floor(v / grid.side()), 0.0, static_cast<double>(n - 1)));
+    };
+    const auto each_tile = [&](const NavMesh::Triangle& t, const auto& f) {
+      Aabb<double> b;
+      for (const std::uint32_t v : t) b.add(vertices[v] - origin);
+      const Vec3d low = b.low - grid.box.low, high = b.high - grid.box.low;
+      for (std::size_t z = index(low.z - rim, grid.nz); z <= index(high.z + rim, grid.nz); ++z) {
+        for (std::size_t x = index(low.x - rim, grid.nx); x <= index(high.x + rim, grid.nx); ++x) {
+          f(x + static_cast<std::size_t>(grid.nx) * z);
+        }
+      }
+    };
+    for (const NavMesh::Triangle& t : triangles_in)
+      each_tile(t, [&](std::size_t tile) { ++first[tile + 1]; });
+    for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+    triangles.resize(first.back());
+    std::vector<std::size_t> at(first.begin(), first.end() - 1);
+    for (std::uint32_t i = 0; i < triangles_in.size(); ++i) {
+      each_tile(triangles_in[i], [&](std::size_t tile) { triangles[at[tile]++] = i; });
+    }
+  }
+};
+
+/// Detour's mesh of the tiles that have polygons, in order.
+Result<NavMeshPtr> link_tiles(const TileGrid& grid, std::span<const TilePolygons> tiles) {
+  const auto no_memory = [] {
+    return Status(Errc::out_of_memory, "NavMesh: not enough memory for the tiles");
+  };
+  dtNavMeshParams params{};
+  for (const TilePolygons& t : tiles) {
+    if (t.empty()) continue;
+    ++params.maxTiles;
+    params.maxPolys = max(params.maxPolys, t.polys->npolys);
+  }
+  for (int k = 0; k < 3; ++k) params.orig[k] = static_cast<float>(grid.box.low[k]);
+  params.tileWidth = params.tileHeight = static_cast<float>(grid.side());
+  NavMeshPtr mesh(dtAllocNavMesh());
+  if (mesh == nullptr) return no_memory();
+  if (dtStatusFailed(mesh->init(&params))) {
+    return Status(Errc::unsupported, "NavMesh: " + std::to_string(params.maxTiles) + " tiles of up to " +
+                                         std::to_string(params.maxPolys) +
+                                         " polygons are more than Detour can number; raise tile_size");
+  }
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (tiles[i].empty()) continue;
+    int size = 0;
+    auto tile = make_tile(grid.settings, tiles[i], grid.place_of(i), size);
+    if (!tile.ok()) return tile.status();
+    if (dtStatusFailed(mesh->addTile(tile->get(), size, DT_TILE_FREE_DATA, 0, nullptr)))
+      return no_memory();
+    (void)tile->release();  // NOLINT: Detour frees it
+  }
+  // Detour reckons with three neighbours an edge of a border and leaves out silently what is more.
+  for (int t = 0; t < params.maxTiles; ++t) {
+    const dtMeshTile& tile = *std::as_const(*mesh).getTile(t);
+    if (tile.linksFreeList != DT_NULL_LINK) continue;
+    return Status(Errc::unsupported, "NavMesh: tile " + std::to_string(tile.header->x) + ", " +
+                                         std::to_string(tile.header->y) +
+                                         " touches more polygons than Detour links");
+  }
+  return mesh;
+}
+
+/// Polygons of one tile.
+Result<TilePolygons> build_tile(const TileGrid& grid, const TriangleLists& lists, std::size_t tile,
+                                std::span<const Vec3d> vertices,
+                                std::span<const NavMesh::Triangle> triangles, const Vec3d& origin) {
+  std::vector<NavMesh::Triangle> own;
+  for (std::size_t i = lists.first[tile]; i < lists.first[tile + 1]; ++i)
+    own.push_back(triangles[lists.triangles[i]]);
+  if (own.empty()) return TilePolygons{};
+  RecastLog log;
+  const Aabb<double> wide = grid.box_of(tile, grid.border);
+  auto field = make_heightfield(log, grid.settings, wide.low, wide.high);
+  if (!field.ok()) return field.status();
+  if (Status s = rasterise(log, grid.settings, vertices, own, origin, **field); !s.ok()) return s;
+  grid.clip(tile, **field);
+  return build_polygons(log, grid.settings, **field, grid.border);
+}
+
+}  // namespace
+
+Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
+                               std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
+                               const Aabb<double>& box, int threads) {
+  if (Status s = check_grid(settings, box.low, box.high); !s.ok()) return s;
+  const TileGrid grid(settings, box);
+  const TriangleLists lists(grid, vertices, triangles, origin);
+  std::vector<TilePolygons> tiles(grid.count());
+  std::vector<Status> failed(tiles.size() + 1);
+  std::optional<TriangleHeights> heights;
+  const auto piece = [&](std::uint32_t i) noexcept {
+    try {
+      if (i == 0) {
+        heights.emplace(vertices, triangles, origin, box);
+        return;
+      }
+      auto made = build_tile(grid, lists, i - 1, vertices, triangles, origin);
+      if (made.ok()) {
+        tiles[i - 1] = std::move(*made);
+      } else {
+        failed[i] = made.status();
+      }
+    } catch (const std::bad_alloc&) {
+      failed[i] = Status(Errc::out_of_memory, "NavMesh: not enough memory for the tiles");
+    }
+  };
+  const int most = static_cast<int>(std::clamp<unsigned>(std::thread::hardware_concurrency(), 1, 16));
+  ThreadPool(threads > 0 ? threads : most).run(static_cast<std::uint32_t>(tiles.size() + 1), piece);
+  WalkableAreas areas;
+  for (const Status& s : failed) {
+    if (!s.ok()) return s;
+  }
+  for (const TilePolygons& t : tiles) areas.add(t.areas);
+  if (!(areas.eroded > 0)) return nothing_navigable("no walkable cell is left", settings, areas);
+
+  const auto some = [&] {
+    return std::any_of(tiles.begin(), tiles.end(), [](const auto& t) { return !t.empty(); });
+  };
+  const auto too_small = [&] {
+    return nothing_navigable("every region is smaller than region_min_size", settings, areas);
+  };
+  if (!some()) return too_small();
+  auto mesh = link_tiles(grid, tiles);
+  if (!mesh.ok()) return mesh.status();
+  if (drop_small_islands(**mesh, settings.region_min_size * settings.region_min_size, tiles)) {
+    if (!some()) return too_small();
+    mesh = link_tiles(grid, tiles);
+    if (!mesh.ok()) return mesh.status();
+  }
+  return assemble_navmesh(settings, origin, std::move(*mesh),
+                          [&](const Vec3d& p) { return floor_below(*heights, settings, p); });
+}
+
+}  // namespace gsnav::detail
