@@ -32,18 +32,19 @@ function(gsnav_executable name)
   target_link_libraries(${name} PRIVATE gsnav ${ARG_LIBS})
 endfunction()
 
-# gsnav_test(name SOURCES ... LIBS ...): a doctest executable that ctest runs. tests/support holds the
-# shared main() and helpers; GSNAV_DATA_DIR reaches the tests as a definition.
+# gsnav_test(name SOURCES ... LIBS ...): a doctest executable that ctest runs. tests/support has main(), helpers and
+# what all tests render with, compiled once; GSNAV_DATA_DIR reaches the tests as a definition.
 function(gsnav_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
-  if(NOT TARGET gsnav_test_frames)
-    add_library(gsnav_test_frames STATIC ${PROJECT_SOURCE_DIR}/tests/support/frames.cpp)
-    gsnav_private_options(gsnav_test_frames)
-    target_link_libraries(gsnav_test_frames PRIVATE gsnav $<TARGET_NAME_IF_EXISTS:gsnav_openmp>)
-    target_include_directories(gsnav_test_frames PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  if(NOT TARGET gsnav_test_support)
+    add_library(gsnav_test_support STATIC ${PROJECT_SOURCE_DIR}/tests/support/frames.cpp
+                                          ${PROJECT_SOURCE_DIR}/tests/support/main.cpp)
+    gsnav_private_options(gsnav_test_support)
+    set_target_properties(gsnav_test_support PROPERTIES UNITY_BUILD OFF)
+    target_link_libraries(gsnav_test_support PRIVATE gsnav doctest::doctest $<TARGET_NAME_IF_EXISTS:gsnav_openmp>)
+    target_include_directories(gsnav_test_support PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   endif()
-  gsnav_executable(test_${name} SOURCES ${ARG_SOURCES} ${PROJECT_SOURCE_DIR}/tests/support/main.cpp
-                   LIBS gsnav_test_frames ${ARG_LIBS} doctest::doctest)
+  gsnav_executable(test_${name} SOURCES ${ARG_SOURCES} LIBS gsnav_test_support ${ARG_LIBS} doctest::doctest)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_compile_definitions(test_${name} PRIVATE GSNAV_DATA_DIR="${GSNAV_DATA_DIR}")
   add_test(NAME ${name} COMMAND test_${name})

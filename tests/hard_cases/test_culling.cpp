@@ -17,7 +17,7 @@ using namespace gsnav_test;
 
 namespace {
 
-Camera random_camera(Rng& rng) {
+Camera camera_anywhere(Rng& rng) {
   const auto in = [&](double r) { return Vec3d{rng.uniform(-r, r), rng.uniform(-r, r), rng.uniform(-r, r)}; };
   const Vec3d eye = in(6), target = eye + in(1) + Vec3d{0, 0, 0.1};
   Camera c = Camera::look_at(eye, target, {0.1, 1, 0.05}, 48, 40, rng.uniform(20, 120));
@@ -43,7 +43,7 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
     std::size_t left_out = 0, chunks = 0;
     Rng rng(653);
     for (int i = 0; i < 12; ++i) {
-      const Camera camera = random_camera(rng);
+      const Camera camera = camera_anywhere(rng);
       RenderConfig config = all_outputs();
       config.response = static_cast<Response>(i % 3);
       config.sort_order = i % 2 == 0 ? SortOrder::z_depth : SortOrder::camera_distance;

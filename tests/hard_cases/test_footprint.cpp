@@ -14,12 +14,12 @@ using namespace gsnav_test;
 
 namespace {
 
-constexpr int kWidth = 61, kHeight = 47;  // no multiple of a tile
+constexpr int kColumns = 61, kRows = 47;  // no multiple of a tile
 
 Camera footprint_camera() {
-  Camera c = axis_camera(kWidth, 40);
-  c.height = kHeight;
-  c.cy = 0.4 * kHeight;
+  Camera c = axis_camera(kColumns, 40);
+  c.height = kRows;
+  c.cy = 0.4 * kRows;
   return c;
 }
 
@@ -27,14 +27,14 @@ Camera footprint_camera() {
 /// an exact response goes behind the camera.
 template <class Truth>
 std::vector<int> covered_pixels(const Truth& truth, Real opacity) {
-  std::vector<int> covered(kWidth * kHeight, 0);
+  std::vector<int> covered(kColumns * kRows, 0);
   const Real low = opacity * 255 / 0.9999L, high = opacity * 255 / 1.0001L;
   if (low < 1) return covered;
   const Real q_low = 2 * std::log(low), q_high = high < 1 ? -1 : 2 * std::log(high);
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < kRows; ++y) {
+    for (int x = 0; x < kColumns; ++x) {
       const Real q = truth.q(x + 0.5L, y + 0.5L);
-      int& c = covered[static_cast<std::size_t>(y * kWidth + x)];
+      int& c = covered[static_cast<std::size_t>(y * kColumns + x)];
       if (q >= 0 && q <= q_low) c = q <= q_high ? 1 : -1;
       if constexpr (requires { truth.at_horizon(Real(), Real()); }) {
         if (truth.at_horizon(x + 0.5L, y + 0.5L)) c = -1;
@@ -47,9 +47,9 @@ std::vector<int> covered_pixels(const Truth& truth, Real opacity) {
 /// Pixels of [x0, x1) x [y0, y1) that are surely covered.
 std::size_t count_covered(const std::vector<int>& covered, int x0, int y0, int x1, int y1) {
   std::size_t n = 0;
-  for (int y = y0; y < std::min(y1, kHeight); ++y) {
-    for (int x = x0; x < std::min(x1, kWidth); ++x) {
-      n += covered[static_cast<std::size_t>(y * kWidth + x)] == 1 ? 1 : 0;
+  for (int y = y0; y < std::min(y1, kRows); ++y) {
+    for (int x = x0; x < std::min(x1, kColumns); ++x) {
+      n += covered[static_cast<std::size_t>(y * kColumns + x)] == 1 ? 1 : 0;
     }
   }
   return n;
@@ -65,7 +65,7 @@ struct CoverCounts {
 template <class S>
 void count_errors(const std::vector<int>& covered, bool drawn, const RecordMaker<S>& r,
                   const RenderConfig& config, CoverCounts& counts) {
-  const std::size_t total = count_covered(covered, 0, 0, kWidth, kHeight);
+  const std::size_t total = count_covered(covered, 0, 0, kColumns, kRows);
   if (!drawn) {
     counts.tiles += total;
     counts.pixels += total;
@@ -74,7 +74,7 @@ void count_errors(const std::vector<int>& covered, bool drawn, const RecordMaker
   const BlendRules<S> rules = blend_rules<S>(config);
   const bool elliptic = config.response == Response::ewa;
   for (const int size : {8, 16, 32}) {
-    const TileGrid grid = TileGrid::of(kWidth, kHeight, size);
+    const TileGrid grid = TileGrid::of(kColumns, kRows, size);
     std::size_t inside = 0;
     for_each_tile(grid, r.geometry(), r.bounds(), rules.log2_alpha_min, elliptic, [&](std::size_t tile) {
       const int x = static_cast<int>(tile) % grid.columns * size;
@@ -87,14 +87,14 @@ void count_errors(const std::vector<int>& covered, bool drawn, const RecordMaker
     counts.tiles += total - inside;
   }
   const SplatRecords<S> records{&r.geometry(), nullptr, nullptr, &r.perspective()};
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < kRows; ++y) {
+    for (int x = 0; x < kColumns; ++x) {
       const S px = S(x) + S(0.5), py = S(y) + S(0.5);
       BlendState<S, DepthMode::none> state;
       const bool hit =
           elliptic ? blend_splat<false, DepthMode::none, Exp2::degree5, false>(state, rules, records, px, py)
                    : blend_splat<false, DepthMode::none, Exp2::degree5, true>(state, rules, records, px, py);
-      const int truth = covered[static_cast<std::size_t>(y * kWidth + x)];
+      const int truth = covered[static_cast<std::size_t>(y * kColumns + x)];
       counts.pixels += truth == 1 && !hit ? 1 : 0;
       counts.extra_pixels += truth == 0 && hit ? 1 : 0;
     }
@@ -158,8 +158,8 @@ TEST_CASE("N11_tile_cover_conservative") {
       if (maker.project(i)) splats.push_back(maker.geometry());
     }
     for (std::size_t first = 0; first + 16 <= splats.size(); first += 16) {
-      const float x0 = static_cast<float>(rng.below(kWidth - 16)) + 0.5f, x1 = x0 + 15;
-      const float y0 = static_cast<float>(rng.below(kHeight - 16)) + 0.5f, y1 = y0 + 15;
+      const float x0 = static_cast<float>(rng.below(kColumns - 16)) + 0.5f, x1 = x0 + 15;
+      const float y0 = static_cast<float>(rng.below(kRows - 16)) + 0.5f, y1 = y0 + 15;
       const float low = y0 + static_cast<float>(rng.below(12)), high = low + static_cast<float>(rng.below(4));
       const auto compare = [&]<int N>() {
         using P = Pack<float, N>;

@@ -55,7 +55,7 @@ double alpha_error(const Frames<S>& f, const Truth& truth) {
 }
 
 /// Largest errors over the grid, by precision.
-struct Worst {
+struct LargestErrors {
   double in_float = 0, in_double = 0;
   template <class R>
   void add(const R&, double e) {
@@ -68,7 +68,7 @@ struct Worst {
 
 TEST_CASE("N01_ewa_offaxis_grid") {
   const Camera camera = wide_camera();
-  Worst worst;
+  LargestErrors worst;
   for (const Sphere& s : sphere_grid()) {
     CAPTURE(s.rho);
     CAPTURE(s.theta);
@@ -84,7 +84,7 @@ TEST_CASE("N01_ewa_offaxis_grid") {
 
 TEST_CASE("N02_exact_ray_grid") {
   const Camera camera = wide_camera();
-  Worst worst_ray, worst_tangent;
+  LargestErrors worst_ray, worst_tangent;
   for (const Sphere& s : sphere_grid()) {
     CAPTURE(s.rho);
     CAPTURE(s.theta);

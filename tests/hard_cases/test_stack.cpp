@@ -14,7 +14,7 @@ using namespace gsnav_test;
 namespace {
 
 constexpr int kSize = 9;
-constexpr std::size_t kCenter = kSize * kSize / 2;
+constexpr std::size_t kMiddle = kSize * kSize / 2;
 
 /// Wide layers across the view axis, one millimetre apart, the nearest last in the file.
 GaussianCloud layers(const std::vector<double>& opacities, std::uint64_t seed = 0) {
@@ -50,7 +50,7 @@ struct Blend {
 template <class F>
 void on_axis(const GaussianCloud& cloud, const RenderConfig& config, const F& check) {
   render_everywhere({&cloud}, axis_camera(kSize, 64), config, [&](const auto& f, const auto& renderer) {
-    check(static_cast<double>(f.alpha[kCenter]), static_cast<double>(f.rgb[3 * kCenter]), renderer);
+    check(static_cast<double>(f.alpha[kMiddle]), static_cast<double>(f.rgb[3 * kMiddle]), renderer);
   });
 }
 
@@ -170,11 +170,11 @@ TEST_CASE("N44_deep_stack") {
     const Blend truth(cloud, 0.99, stop, false);
     double worst = 0, worst_depth = 0;
     render_everywhere({&cloud}, axis_camera(kSize, 64), config, [&](const auto& f, const auto&) {
-      const double alpha = static_cast<double>(f.alpha[kCenter]), red = static_cast<double>(f.rgb[3 * kCenter]);
+      const double alpha = static_cast<double>(f.alpha[kMiddle]), red = static_cast<double>(f.rgb[3 * kMiddle]);
       worst = std::max(worst, std::abs(alpha - static_cast<double>(1 - truth.transmittance)));
       worst = std::max(worst, std::abs(red - static_cast<double>(truth.red)));
       const double expected = static_cast<double>(truth.depth / (1 - truth.transmittance));
-      worst_depth = std::max(worst_depth, std::abs(static_cast<double>(f.expected_depth[kCenter]) - expected));
+      worst_depth = std::max(worst_depth, std::abs(static_cast<double>(f.expected_depth[kMiddle]) - expected));
     });
     MESSAGE("stop at " << stop << ": colour and transmittance " << worst << ", depth " << worst_depth << " m");
     CHECK(worst < 5e-6);

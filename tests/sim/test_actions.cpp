@@ -2,6 +2,8 @@
 // Actions beside the four of PointNav, the clock's substeps, places to come back to, and the reward.
 #include <doctest/doctest.h>
 
+#include <numbers>
+
 #include "flat_world.hpp"
 
 using namespace gsnav;
@@ -9,7 +11,6 @@ using namespace gsnav_test;
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
 PointNavEpisode in_living_room(double yaw = 0.0) {
@@ -80,9 +81,9 @@ TEST_CASE("looking tilts the sensors by 90 degrees at most and moves nothing") {
   REQUIRE(w.reset(in_living_room()).ok());
   const Vec3d at = w.agent().position;
   w.step(Action::look_up).value();
-  CHECK(w.agent().pitch == doctest::Approx(15 * kPi / 180));
+  CHECK(w.agent().pitch == doctest::Approx(15 * std::numbers::pi / 180));
   for (int i = 0; i < 10; ++i) w.step(Action::look_down).value();
-  CHECK(w.agent().pitch == doctest::Approx(-0.5 * kPi));
+  CHECK(w.agent().pitch == doctest::Approx(-0.5 * std::numbers::pi));
   CHECK(w.agent().position == at);
   CHECK(w.agent().yaw == 0.0);
   CHECK(w.time() == doctest::Approx(11 * 0.25));

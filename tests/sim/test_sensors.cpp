@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/sim/simulator.hpp"
@@ -14,7 +15,6 @@ using namespace gsnav_test;
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 
 SensorSpec sensor(SensorModel model, int height, int width, double hfov = 90.0) {
   SensorSpec s;
@@ -109,7 +109,7 @@ TEST_CASE("a fisheye without a focal length spans its field of view") {
     const SensorSpec s = sensor(SensorModel::fisheye, 100, 100, hfov);
     for (const double u : {0.0, 100.0}) {
       const Vec3d d = *sensor_ray(s, u, 50);
-      CHECK(std::atan2(std::abs(d.x), d.z) == doctest::Approx(0.5 * hfov * kPi / 180));
+      CHECK(std::atan2(std::abs(d.x), d.z) == doctest::Approx(0.5 * hfov * std::numbers::pi / 180));
       CHECK(std::abs(d.y) < 1e-12);
     }
   }
@@ -178,7 +178,7 @@ TEST_CASE("an equirectangular render is, pixel for pixel, what pinholes that loo
       const Vec3d d = transpose(middle.viewmat.linear) * *sensor_ray(config.sensors[0], column + 0.5, row + 0.5);
       // A pinhole of as many pixels to the radian as the faces have in their middle.
       Camera look = Camera::look_at(eye, eye + d, std::abs(d.y) > 0.99 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0}, 9, 9,
-                                    2 * std::atan(4.5 / 24.0) * 180 / kPi);
+                                    2 * std::atan(4.5 / 24.0) * 180 / std::numbers::pi);
       look.near_plane = middle.near_plane;
       look.near_sigma = middle.near_sigma;
       const Frames<float>* truth = sim.render(look, kRgb | kMedianDepth).value();
@@ -277,7 +277,7 @@ TEST_CASE("a semantic sensor says whose each pixel is") {
   auto sim = make_simulator(backend, scene, config).value();
   PointNavEpisode e = to_kitchen();
   e.start_position = {4.6, 0, 1.6};
-  e.start_rotation = yaw_rotation(kPi);
+  e.start_rotation = yaw_rotation(std::numbers::pi);
   const auto obs = sim.reset(e).value();
   // Each person by itself in the empty scene: where it changes the picture's depth, it is what is seen.
   SimulatorConfig plain = config;

@@ -2,6 +2,8 @@
 // Several agents in one scene.
 #include <doctest/doctest.h>
 
+#include <numbers>
+
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/sim/random_policy.hpp"
 #include "gsnav/sim/team.hpp"
@@ -12,7 +14,6 @@ using namespace gsnav_test;
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 
 PointNavEpisode at(const Vec3d& start, double yaw) {
   PointNavEpisode e;
@@ -41,7 +42,7 @@ double gap(const Simulator<SerialBackend>& a, const Simulator<SerialBackend>& b)
 TEST_CASE("two agents that walk at each other meet, and neither enters the other") {
   SerialBackend backend;
   auto team = Team<SerialBackend>::create(backend, flat_scene(), {body(0.1, 1.5), body(0.3, 0.9)}).value();
-  const std::vector<PointNavEpisode> episodes{at({3.4, 0, 3.8}, 0.0), at({3.4, 0, 2.3}, kPi)};  // face to face
+  const std::vector<PointNavEpisode> episodes{at({3.4, 0, 3.8}, 0.0), at({3.4, 0, 2.3}, std::numbers::pi)};  // face to face
   const auto begun = team.reset(episodes).value();
   // 1.5 m between them, less both radii: before anybody moves and seen from either side.
   CHECK(begun[0].avatar_clearance == doctest::Approx(1.1).epsilon(1e-3));

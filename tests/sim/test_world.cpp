@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <numbers>
+
 #include "flat_world.hpp"
 #include "gsnav/sim/follower.hpp"
 
@@ -10,7 +12,6 @@ using gsnav_test::flat_navmesh;
 using gsnav_test::flat_world;
 
 namespace {
-constexpr double kPi = 3.14159265358979323846;
 
 PointNavEpisode open_floor(double yaw = 0.0) {
   PointNavEpisode e;
@@ -33,13 +34,13 @@ TEST_CASE("forward is -Z, left is towards -X, as in Habitat") {
   CHECK(w.time() == 0.25);
 
   for (int i = 0; i < 9; ++i) w.step(Action::turn_left).value();
-  CHECK(w.agent().yaw == doctest::Approx(kPi / 2));
+  CHECK(w.agent().yaw == doctest::Approx(std::numbers::pi / 2));
   const Vec3d before = w.agent().position;
   w.step(Action::move_forward).value();
   CHECK(w.agent().position.x == doctest::Approx(before.x - 0.25));
   CHECK(w.agent().position.z == doctest::Approx(before.z));
   for (int i = 0; i < 27; ++i) w.step(Action::turn_right).value();
-  CHECK(std::remainder(w.agent().yaw + kPi, 2 * kPi) == doctest::Approx(0.0));
+  CHECK(std::remainder(w.agent().yaw + std::numbers::pi, 2 * std::numbers::pi) == doctest::Approx(0.0));
   CHECK(w.time() == doctest::Approx(0.25 * 38));
 }
 
@@ -49,7 +50,7 @@ TEST_CASE("the goal in polar coordinates, positive to the left") {
   e.goal_position = e.start_position + Vec3d{-1.0, 0, 0};
   REQUIRE(w.reset(e).ok());
   CHECK(w.point_goal().distance == doctest::Approx(1.0).epsilon(0.01));
-  CHECK(w.point_goal().angle == doctest::Approx(kPi / 2).epsilon(0.02));
+  CHECK(w.point_goal().angle == doctest::Approx(std::numbers::pi / 2).epsilon(0.02));
   for (int i = 0; i < 9; ++i) w.step(Action::turn_left).value();
   CHECK(abs(w.point_goal().angle) < 0.03);
 }
@@ -95,7 +96,7 @@ TEST_CASE("a wall stops or turns the agent and counts as a collision, not as con
   TaskConfig c;
   c.allow_sliding = false;
   World w = flat_world(c);
-  REQUIRE(w.reset(open_floor(kPi)).ok());  // towards the wall at z = 4.54
+  REQUIRE(w.reset(open_floor(std::numbers::pi)).ok());  // towards the wall at z = 4.54
   bool hit = false;
   for (int i = 0; i < 8; ++i) hit = w.step(Action::move_forward)->wall_collision || hit;
   CHECK(hit);
@@ -111,7 +112,7 @@ TEST_CASE("random actions among moving bodies never penetrate by the agent's doi
   Rng rng(5);
   int contacts = 0, forced = 0;
   for (int episode = 0; episode < 12; ++episode) {
-    PointNavEpisode e = open_floor(rng.uniform(0.0, 2 * kPi));
+    PointNavEpisode e = open_floor(rng.uniform(0.0, 2 * std::numbers::pi));
     e.start_time = 40.0 * episode;
     REQUIRE(w.reset(e).ok());
     double before = w.last_step().avatar_clearance;
