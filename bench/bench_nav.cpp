@@ -289,14 +289,14 @@ Triangles data_triangles(const char* name) {
 Triangles nav_test_triangles() { return data_triangles("nav_test.obj"); }
 Triangles dungeon_triangles() { return data_triangles("dungeon.obj"); }
 
-/// A build of one tile and one of tiles of 128 cells by some threads, in turns, at Habitat's settings; `ratio` is of
+/// A build of one tile and one of tiles of so many cells by some threads, in turns, at Habitat's settings; `ratio` is of
 /// wall time, `cpu_ratio` of the time of all processors.
 void build(benchmark::State& state, Triangles (*make)()) {
   const auto threads = static_cast<int>(state.range(0));
   const Triangles soup = make();
   if (soup.triangles.empty()) return state.SkipWithError("the mesh is not in GSNAV_DATA_DIR");
   NavMeshSettings tiled;
-  tiled.tile_size = 128;
+  tiled.tile_size = static_cast<int>(state.range(1));
   using Clock = std::chrono::steady_clock;
   double one = 0, many = 0, cpu_one = 0, cpu_many = 0;
   std::size_t polygons = 0;
@@ -336,7 +336,7 @@ GSNAV_NAV_BENCH(detour_snap);
 GSNAV_NAV_BENCH(obstacle);
 #define GSNAV_BUILD_BENCH(scene) \
   BENCHMARK_CAPTURE(build, scene, scene##_triangles) \
-      ->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime()
+      ->ArgNames({"threads", "tile"})->ArgsProduct({{1, 2}, {64, 128}})->Unit(benchmark::kMillisecond)->UseRealTime()
 GSNAV_BUILD_BENCH(flat);
 GSNAV_BUILD_BENCH(nav_test);
 GSNAV_BUILD_BENCH(dungeon);

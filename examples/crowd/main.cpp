@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // crowd: four ways through a crowd in the embedded flat, as a table and as pictures.
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -91,8 +92,11 @@ int main(int argc, char** argv) {
   std::vector<int> people{10, 30, 100};
   std::string out;
   bool frames = false;
+  std::uint64_t seed = 1000000;
   app.add_option("--episodes", episodes, "For each number of people")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--people", people, "How many walk there")->check(CLI::NonNegativeNumber)->capture_default_str();
+  app.add_option("--seed", seed, "Of the first episode; the local planner's weights were chosen on those from 0")
+      ->capture_default_str();
   app.add_option("--out", out, "Folder for the pictures");
   app.add_flag("--frames", frames, "A picture for each tick, too");
   CLI11_PARSE(app, argc, argv);
@@ -105,7 +109,7 @@ int main(int argc, char** argv) {
   for (const int n : people) {
     std::vector<crowd::Episode> list;
     for (int i = 0; i < episodes; ++i) {
-      list.push_back(crowd::make_episode(mesh, static_cast<std::uint64_t>(1000 * n + i), n));
+      list.push_back(crowd::make_episode(mesh, seed + static_cast<std::uint64_t>(1000 * n + i), n));
     }
     std::vector<crowd::Outcome> first;
     for (const crowd::Policy policy : crowd::kPolicies) {

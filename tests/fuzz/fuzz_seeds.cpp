@@ -175,6 +175,9 @@ void add_others(Seeds& seeds) {
   save_navmesh(NavMesh::build(settings, soup.vertices, soup.triangles).value(), folder / "a")
       .throw_if_error();
   seeds.add("navmesh", read_file(folder / "a"));
+  settings.tile_size = 32;
+  save_navmesh(NavMesh::build(settings, soup.vertices, soup.triangles).value(), folder / "a").throw_if_error();
+  seeds.add("navmesh", read_file(folder / "a"));
 }
 
 }  // namespace

@@ -138,7 +138,10 @@ TEST_CASE(
   MESSAGE(n << " plans: " << free << " as preferred, " << turned << " turned, " << unsafe
             << " with no safe velocity");
   CHECK(free > n / 5);
-  CHECK(turned > n / 20);
+  // What is preferred is not safe in one case of eight, whoever plans. Most of those are turned into a safe
+  // velocity; in the others there is none among those tried, or it costs more than a contact some seconds ahead.
+  CHECK(turned + unsafe > n / 10);
+  CHECK(turned > unsafe);
   CHECK(unsafe > 0);
 }
 
