@@ -125,7 +125,7 @@ void add_others(Seeds& seeds) {
   Parts motion = smpl_motion_parts();
   for (const auto& [name, content] : smpl_model_parts()) motion["~" + name] = content;  // behind the motion's
   seeds.add_parts("smpl_motion", motion);
-  for (const std::size_t motion : {0u, 3u, 9u}) seeds.add("4dgs_ply", temporal_file(3, motion, 2).text());
+  for (const std::size_t degree : {0u, 3u, 9u}) seeds.add("4dgs_ply", temporal_file(3, degree, 2).text());
   char part = 0;
   for (const auto& [name, content] : dataset_parts()) seeds.add("dataset", part++ + content);
   seeds.add("amc",
