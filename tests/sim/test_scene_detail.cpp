@@ -65,7 +65,7 @@ TEST_CASE("a simulator with levels of detail sees what the cut of its camera dra
   CHECK(cut.stats().merged > 0);
   std::vector<GaussianSet> sets(chosen.begin(), chosen.end());
   for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
-  RenderConfig rules = lod_config({});
+  RenderConfig rules = lod_config({}, cut.stats());
   rules.outputs = kRgb | kMedianDepth;
   Renderer<float, OpenMPBackend> renderer(backend, rules);
   const auto frames = renderer.render(sets, std::span(&camera, 1)).value();

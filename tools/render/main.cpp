@@ -132,7 +132,10 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     const auto start = std::chrono::steady_clock::now();
     headlight.direction = -cameras[c].viewmat.linear.row[2];
     renderer.set_meshes(instances, headlight);
-    if (cut) sets = cut->select(cameras[c], choice);
+    if (cut) {
+      sets = cut->select(cameras[c], choice);
+      renderer.set_config(lod_config(config, cut->stats()));
+    }
     if (const Status s = renderer.render(sets, std::span(&cameras[c], 1), f); !s) {
       std::fprintf(stderr, "gsnav-render: camera %zu: %s\n", c, s.message().c_str());
       return 1;
@@ -140,7 +143,7 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     const auto end = std::chrono::steady_clock::now();
     total_ms += std::chrono::duration<double, std::milli>(end - start).count();
     if (o.ledger) {
-      const FrameLedger l = frame_ledger(sets, cameras[c], config, f.stats[0], &scene.report,
+      const FrameLedger l = frame_ledger(sets, cameras[c], renderer.config(), f.stats[0], &scene.report,
                                          profiled && !cut ? scene.profile : nullptr, cut ? &*cut : nullptr);
       std::printf("camera %zu:\n%s", c, ledger_text(l).c_str());
     }

@@ -32,6 +32,7 @@ class DetailSets {
     choice.hysteresis = 0;
     cuts_.resize(detail.assets.size());
     sets_.clear();
+    stats_ = {};
     for (std::size_t a = 0; a < detail.assets.size(); ++a) {
       const SceneDetail::Asset& asset = detail.assets[a];
       Cut& cut = cuts_[a];
@@ -40,10 +41,18 @@ class DetailSets {
       }
       const auto chosen = cut.cut->select(camera, choice, asset.world_from_asset);
       sets_.insert(sets_.end(), chosen.begin(), chosen.end());
+      stats_.shown += cut.cut->stats().shown;
+      stats_.merged += cut.cut->stats().merged;
     }
     const auto others = sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
     sets_.insert(sets_.end(), others.begin(), others.end());
     return sets_;
+  }
+
+  /// The rules by which to draw them; valid until the next call.
+  const RenderConfig& rules(const RenderConfig& config) {
+    rules_ = lod_config(config, stats_);
+    return rules_;
   }
 
  private:
@@ -54,6 +63,8 @@ class DetailSets {
   };
   std::vector<Cut> cuts_;
   std::vector<GaussianSet> sets_;
+  LodStats stats_;  // shown and merged of all
+  RenderConfig rules_;
 };
 
 }  // namespace gsnav

@@ -198,6 +198,7 @@ class SensorRig {
     for_each(detail_jobs_.size(), [this](std::size_t i) {
       FrameJob<float>& job = jobs_[detail_jobs_[i].job];
       job.sets = cuts_[i].select(*detail_jobs_[i].detail, job.sets, *job.camera);
+      job.config = &cuts_[i].rules(*job.config);
     });
     if constexpr (BatchBackend<B>) {
       if (!images.in_host_memory()) {
