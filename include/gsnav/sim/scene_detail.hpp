@@ -21,8 +21,8 @@ struct SceneDetail {
   LodChoice choice{};
 };
 
-/// What one camera draws of a scene by levels of detail. It depends on the camera alone, not on what was seen before:
-/// a simulator that is set back to a state, or is one of a batch, sees the same bits.
+/// What one camera draws of a scene by levels of detail. It depends on the camera alone, not on what was
+/// seen before: a simulator that is set back to a state, or is one of a batch, sees the same bits.
 class DetailSets {
  public:
   /// `sets`: the scene's, assets first, then avatars, which stay as they are. Valid until the next call.
@@ -44,7 +44,8 @@ class DetailSets {
       stats_.shown += cut.cut->stats().shown;
       stats_.merged += cut.cut->stats().merged;
     }
-    const auto others = sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
+    const auto others =
+        sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
     sets_.insert(sets_.end(), others.begin(), others.end());
     return sets_;
   }
