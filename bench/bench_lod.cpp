@@ -75,7 +75,6 @@ struct Bench {
     RenderConfig config;
     config.outputs = kRgb;
     config.profile = Profile::fast;
-    if (pixels > 0) config = lod_config(config);
     Renderer<float, OpenMPBackend> renderer(one, config);
     LodCut cut(tree, cloud);
     LodChoice choice;
@@ -90,6 +89,7 @@ struct Bench {
         const GaussianSet whole = pixels < 0 ? cloud.set() : LodCut::photo_set(cloud, choice);
         const std::span<const GaussianSet> sets =
             pixels > 0 ? cut.select(cameras[c], choice) : std::span(&whole, 1);
+        if (pixels > 0) renderer.set_config(lod_config(config, cut.stats()));
         renderer.render(sets, std::span(&cameras[c], 1), frames).throw_if_error();
         least = std::min(least, cpu_ms() - start);
       }

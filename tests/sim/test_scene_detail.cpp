@@ -41,7 +41,8 @@ bool same_bits(std::span<const float> a, std::span<const float> b) {
 
 }  // namespace
 
-TEST_CASE("a simulator with levels of detail sees what the cut of its camera draws, people as they are") {
+TEST_CASE(
+    "a simulator with levels of detail sees what the cut of its camera draws, people as they are") {
   OpenMPBackend backend(2);
   const SimulatorScene scene = detailed_scene();
   SimulatorConfig config;
@@ -65,7 +66,7 @@ TEST_CASE("a simulator with levels of detail sees what the cut of its camera dra
   CHECK(cut.stats().merged > 0);
   std::vector<GaussianSet> sets(chosen.begin(), chosen.end());
   for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
-  RenderConfig rules = lod_config({});
+  RenderConfig rules = lod_config({}, cut.stats());
   rules.outputs = kRgb | kMedianDepth;
   Renderer<float, OpenMPBackend> renderer(backend, rules);
   const auto frames = renderer.render(sets, std::span(&camera, 1)).value();
@@ -74,12 +75,14 @@ TEST_CASE("a simulator with levels of detail sees what the cut of its camera dra
   CHECK(same_bits((*sim.render(camera))->rgb, frames.rgb));
 }
 
-TEST_CASE("levels of detail: a batch has the bits of single simulators, and a state those it was saved with") {
+TEST_CASE(
+    "levels of detail: a batch has the bits of single simulators, and a state those it was saved with") {
   constexpr std::size_t kEnvironments = 3;
   SimulatorScene empty = detailed_scene();
   empty.avatars.clear();
   const std::vector<std::shared_ptr<const SimulatorScene>> scenes{
-      std::make_shared<const SimulatorScene>(detailed_scene()), std::make_shared<const SimulatorScene>(empty)};
+      std::make_shared<const SimulatorScene>(detailed_scene()),
+      std::make_shared<const SimulatorScene>(empty)};
   BatchConfig config;
   config.sensors = rgbd_sensors(16, 24);
   config.sensors.push_back(config.sensors[0]);
@@ -116,7 +119,9 @@ TEST_CASE("levels of detail that a scene does not have are refused, by name") {
   SimulatorConfig config;
   config.sensors = rgbd_sensors(16, 24);
   config.lod = LodChoice{};
-  const auto refused = [&](const SimulatorScene& scene) { return make_simulator(backend, scene, config).status(); };
+  const auto refused = [&](const SimulatorScene& scene) {
+    return make_simulator(backend, scene, config).status();
+  };
   CHECK(refused(flat_scene()).code() == Errc::invalid_argument);
   CHECK(refused(flat_scene()).message().find("assets[0].lod is null") != std::string::npos);
   SimulatorScene other = detailed_scene();
@@ -127,14 +132,16 @@ TEST_CASE("levels of detail that a scene does not have are refused, by name") {
   CHECK(refused(detailed_scene()).message().find("LodChoice.pixels = 0") != std::string::npos);
   config.lod->pixels = 1;
   CHECK(refused(detailed_scene()).ok());
-  const auto batch = make_batch_simulator(backend, std::vector<std::shared_ptr<const SimulatorScene>>(
-                                              2, std::make_shared<const SimulatorScene>(flat_scene())),
-                                          [&] {
-                                            BatchConfig c;
-                                            c.sensors = config.sensors;
-                                            c.lod = config.lod;
-                                            return c;
-                                          }(),
-                                          2, wandering);
+  const auto batch = make_batch_simulator(
+      backend,
+      std::vector<std::shared_ptr<const SimulatorScene>>(
+          2, std::make_shared<const SimulatorScene>(flat_scene())),
+      [&] {
+        BatchConfig c;
+        c.sensors = config.sensors;
+        c.lod = config.lod;
+        return c;
+      }(),
+      2, wandering);
   CHECK(batch.status().message().find("assets[0].lod is null") != std::string::npos);
 }

@@ -12,22 +12,25 @@
 #include "gsnav/eval/oracle_config.hpp"
 #include "support/mesh_truth.hpp"
 
-// What the pixels of an image see of meshes, some of them seen through, from rays in long double. It shares no formula
-// with the rasteriser; surfaces have vertex colours and alphas, no textures and no light.
+// What the pixels of an image see of meshes, some of them seen through, from rays in long double. It
+// shares no formula with the rasteriser; surfaces have vertex colours and alphas, no textures and no
+// light.
 
 namespace gsnav_test {
 
 struct FragmentTruth {
   gsnav::eval::OracleMesh mesh;
-  std::vector<std::uint8_t> undecided;  ///< other triangles are met 2e-4 px away, or two 1e-6 m from one another
-  std::size_t most = 0;                 ///< fragments of a pixel
+  std::vector<std::uint8_t>
+      undecided;         ///< other triangles are met 2e-4 px away, or two 1e-6 m from one another
+  std::size_t most = 0;  ///< fragments of a pixel
 };
 
 inline double encoded_truth(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-inline FragmentTruth fragment_truth(const std::vector<gsnav::MeshInstance>& meshes, const gsnav::Camera& camera) {
+inline FragmentTruth fragment_truth(const std::vector<gsnav::MeshInstance>& meshes,
+                                    const gsnav::Camera& camera) {
   using namespace gsnav;
   const auto weighted = [](const MeshHit& h, double a, double b, double c) {
     return (1 - static_cast<double>(h.u) - static_cast<double>(h.v)) * a + static_cast<double>(h.u) * b +
@@ -54,7 +57,8 @@ inline FragmentTruth fragment_truth(const std::vector<gsnav::MeshInstance>& mesh
   const auto all_hits = [&](long double px, long double py) {
     std::vector<MeshHit> hits;
     for_each_hit(meshes, camera, px, py, [&hits](const MeshHit& h) { hits.push_back(h); });
-    std::stable_sort(hits.begin(), hits.end(), [](const MeshHit& a, const MeshHit& b) { return a.z < b.z; });
+    std::stable_sort(hits.begin(), hits.end(),
+                     [](const MeshHit& a, const MeshHit& b) { return a.z < b.z; });
     return hits;
   };
   FragmentTruth out;
@@ -64,7 +68,8 @@ inline FragmentTruth fragment_truth(const std::vector<gsnav::MeshInstance>& mesh
       const std::vector<MeshHit> hits = all_hits(px, py);
       bool undecided = false;
       for (int k = 0; k < 4; ++k) {
-        const auto near = all_hits(px + (k < 2 ? (2 * k - 1) * step : 0), py + (k < 2 ? 0 : (2 * k - 5) * step));
+        const auto near =
+            all_hits(px + (k < 2 ? (2 * k - 1) * step : 0), py + (k < 2 ? 0 : (2 * k - 5) * step));
         undecided = undecided || !std::equal(near.begin(), near.end(), hits.begin(), hits.end(),
                                              [](const MeshHit& a, const MeshHit& b) {
                                                return a.place == b.place && a.triangle == b.triangle;

@@ -148,6 +148,7 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
       chosen.place(std::span(&details, 1));
       cut = &details.cut(0);
       here = cut->sets();
+      renderer.set_config(lod_config(config, cut->stats()));
     }
     if (const Status s = renderer.render(sets, std::span(&cameras[c], 1), f); !s) {
       std::fprintf(stderr, "gsnav-render: camera %zu: %s\n", c, s.message().c_str());
@@ -156,7 +157,7 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     const auto end = std::chrono::steady_clock::now();
     total_ms += std::chrono::duration<double, std::milli>(end - start).count();
     if (o.ledger) {
-      const FrameLedger l = frame_ledger(here, cameras[c], config, f.stats[0], &scene.report,
+      const FrameLedger l = frame_ledger(here, cameras[c], renderer.config(), f.stats[0], &scene.report,
                                          profiled && cut == nullptr ? scene.profile : nullptr, cut);
       std::printf("camera %zu:\n%s", c, ledger_text(l).c_str());
     }

@@ -50,8 +50,8 @@ namespace detail {
 
 /// One level at (u, v), bilinear; `texels`: the level's first.
 template <Texel What, class S>
-GSNAV_HD Vec3<S> sample_level(const TextureView& t, const std::uint8_t* texels, int width, int height, S u,
-                              S v) noexcept {
+GSNAV_HD Vec3<S> sample_level(const TextureView& t, const std::uint8_t* texels, int width, int height,
+                              S u, S v) noexcept {
   const S x = u * S(width) - S(0.5), y = v * S(height) - S(0.5);
   const std::int32_t x0 = floor_of(x), y0 = floor_of(y);
   const S fx = x - S(x0), fy = y - S(y0);
@@ -88,7 +88,8 @@ GSNAV_HD Vec3<S> sample_texture(const TextureView& t, S u, S v, S footprint2) no
   if (!(f > S(0))) return fine;
   texels += 4 * (std::size_t(w) * std::size_t(h));
   const Vec3<S> coarse = sample_level<What>(t, texels, max(w / 2, 1), max(h / 2, 1), u, v);
-  return {fma(f, coarse.x - fine.x, fine.x), fma(f, coarse.y - fine.y, fine.y), fma(f, coarse.z - fine.z, fine.z)};
+  return {fma(f, coarse.x - fine.x, fine.x), fma(f, coarse.y - fine.y, fine.y),
+          fma(f, coarse.z - fine.z, fine.z)};
 }
 
 }  // namespace detail
@@ -103,7 +104,8 @@ struct SurfacePoint {
 
 /// Of the pixel (x, y) of a triangle's box, where it is at depth z.
 template <class S>
-GSNAV_HD SurfacePoint<S> surface_point(const MeshView& mesh, const MeshTriangle<S>& t, int x, int y, S z) noexcept {
+GSNAV_HD SurfacePoint<S> surface_point(const MeshView& mesh, const MeshTriangle<S>& t, int x, int y,
+                                       S z) noexcept {
   const std::uint32_t* const index = mesh.indices.data + 3 * std::size_t{t.triangle};
   const S dx = S(x - t.x0), dy = S(y - t.y0);
   const S b1 = clamp(t.b1.at(dx, dy) * z, S(0), S(1));
@@ -112,30 +114,39 @@ GSNAV_HD SurfacePoint<S> surface_point(const MeshView& mesh, const MeshTriangle<
 
 /// The texture there, which there is.
 template <Texel What, class S>
-GSNAV_HD Vec3<S> surface_texel(const MeshView& mesh, const MeshTriangle<S>& t, const SurfacePoint<S>& at) noexcept {
-  const Vec2<float> uv0 = mesh.uvs[at.corner[0]], uv1 = mesh.uvs[at.corner[1]], uv2 = mesh.uvs[at.corner[2]];
-  const Vec2<S> e1{S(uv1.x) - S(uv0.x), S(uv1.y) - S(uv0.y)}, e2{S(uv2.x) - S(uv0.x), S(uv2.y) - S(uv0.y)};
-  const S u = fma(e1.x, at.b1, fma(e2.x, at.b2, S(uv0.x))), v = fma(e1.y, at.b1, fma(e2.y, at.b2, S(uv0.y)));
+GSNAV_HD Vec3<S> surface_texel(const MeshView& mesh, const MeshTriangle<S>& t,
+                               const SurfacePoint<S>& at) noexcept {
+  const Vec2<float> uv0 = mesh.uvs[at.corner[0]], uv1 = mesh.uvs[at.corner[1]],
+                    uv2 = mesh.uvs[at.corner[2]];
+  const Vec2<S> e1{S(uv1.x) - S(uv0.x), S(uv1.y) - S(uv0.y)},
+      e2{S(uv2.x) - S(uv0.x), S(uv2.y) - S(uv0.y)};
+  const S u = fma(e1.x, at.b1, fma(e2.x, at.b2, S(uv0.x))),
+          v = fma(e1.y, at.b1, fma(e2.y, at.b2, S(uv0.y)));
   // A weight is its plane over that of 1 / z.
   const auto footprint2 = [&](S b1_step, S b2_step, S inverse_z_step) {
-    const S d1 = fma(-at.b1, inverse_z_step, b1_step) * at.z, d2 = fma(-at.b2, inverse_z_step, b2_step) * at.z;
+    const S d1 = fma(-at.b1, inverse_z_step, b1_step) * at.z,
+            d2 = fma(-at.b2, inverse_z_step, b2_step) * at.z;
     const S du = fma(e1.x, d1, e2.x * d2) * S(mesh.texture.width);
     const S dv = fma(e1.y, d1, e2.y * d2) * S(mesh.texture.height);
     return fma(du, du, dv * dv);
   };
-  return detail::sample_texture<What>(mesh.texture, u, v,
-                                      max(footprint2(t.b1.x, t.b2.x, S(t.inverse_z.x)),
-                                          footprint2(t.b1.y, t.b2.y, S(t.inverse_z.y))));
+  return detail::sample_texture<What>(
+      mesh.texture, u, v,
+      max(footprint2(t.b1.x, t.b2.x, S(t.inverse_z.x)), footprint2(t.b1.y, t.b2.y, S(t.inverse_z.y))));
 }
 
 /// Linear RGB before light.
 template <class S>
-GSNAV_HD Vec3<S> surface_color(const MeshView& mesh, const MeshTriangle<S>& t, const SurfacePoint<S>& at) noexcept {
+GSNAV_HD Vec3<S> surface_color(const MeshView& mesh, const MeshTriangle<S>& t,
+                               const SurfacePoint<S>& at) noexcept {
   Vec3<S> color = vec_cast<S>(mesh.base_color);
   if (mesh.plain) return color;
-  const auto times = [&color](const Vec3<S>& c) { color = {color.x * c.x, color.y * c.y, color.z * c.z}; };
+  const auto times = [&color](const Vec3<S>& c) {
+    color = {color.x * c.x, color.y * c.y, color.z * c.z};
+  };
   if (!mesh.colors.empty()) {
-    times(detail::mixed(mesh.colors[at.corner[0]], mesh.colors[at.corner[1]], mesh.colors[at.corner[2]], at.b1, at.b2));
+    times(detail::mixed(mesh.colors[at.corner[0]], mesh.colors[at.corner[1]], mesh.colors[at.corner[2]],
+                        at.b1, at.b2));
   }
   if (!mesh.texture.empty() && !mesh.uvs.empty()) times(surface_texel<Texel::color>(mesh, t, at));
   return color;
@@ -143,7 +154,8 @@ GSNAV_HD Vec3<S> surface_color(const MeshView& mesh, const MeshTriangle<S>& t, c
 
 /// Alpha, in [0, 1]; 0 where it is not a number.
 template <class S>
-GSNAV_HD S surface_alpha(const MeshView& mesh, const MeshTriangle<S>& t, const SurfacePoint<S>& at) noexcept {
+GSNAV_HD S surface_alpha(const MeshView& mesh, const MeshTriangle<S>& t,
+                         const SurfacePoint<S>& at) noexcept {
   S alpha = S(mesh.base_alpha);
   if (!mesh.alphas.empty()) {
     const S wa = S(1) - at.b1 - at.b2;
@@ -170,10 +182,11 @@ GSNAV_HD Vec3<S> surface_normal(const MeshPlacement& placement, const MeshTriang
   Vec3<S> normal;
   if (mesh.normals.empty()) {
     const Vec3f& v0 = mesh.vertices[at.corner[0]];
-    normal = cross(vec_cast<S>(mesh.vertices[at.corner[1]] - v0), vec_cast<S>(mesh.vertices[at.corner[2]] - v0));
+    normal = cross(vec_cast<S>(mesh.vertices[at.corner[1]] - v0),
+                   vec_cast<S>(mesh.vertices[at.corner[2]] - v0));
   } else {
-    normal = detail::mixed(mesh.normals[at.corner[0]], mesh.normals[at.corner[1]], mesh.normals[at.corner[2]], at.b1,
-                           at.b2);
+    normal = detail::mixed(mesh.normals[at.corner[0]], mesh.normals[at.corner[1]],
+                           mesh.normals[at.corner[2]], at.b1, at.b2);
   }
   normal = mat_cast<S>(placement.rotation) * normal;
   // Relative to the largest entry, so that a small face's is not lost.

@@ -25,7 +25,8 @@ struct FragmentWorkspace {
   Buffer<MeshFragment<S>, B> fragments;
 
   std::size_t bytes() const noexcept {
-    return mesh.bytes() + ranges.capacity_bytes() + tile_begin.capacity_bytes() + fragments.capacity_bytes();
+    return mesh.bytes() + ranges.capacity_bytes() + tile_begin.capacity_bytes() +
+           fragments.capacity_bytes();
   }
   std::size_t capacity_bytes() const noexcept { return bytes(); }
   /// As RenderWorkspace::grow_to.
@@ -42,22 +43,23 @@ inline bool any_seen_through(std::span<const MeshInstance> meshes) noexcept {
   return std::any_of(meshes.begin(), meshes.end(), detail::seen_through);
 }
 
-/// Lists at each pixel the surfaces that are seen through (MeshAlpha::blend), as many as there are, near to far, up to
-/// the opaque depth `behind` [H][W]. `color`: with their colours, lit as draw_meshes does, linear where `linear`.
-/// Gives the lists to `layer`; they are good until the next call. Adds to `stats`. `meshes` are those of draw_meshes,
-/// which has found them valid.
-/// Errors: unsupported (2^32 triangles); backend_failure; out_of_memory is thrown by the workspace.
+/// Lists at each pixel the surfaces that are seen through (MeshAlpha::blend), as many as there are, near
+/// to far, up to the opaque depth `behind` [H][W]. `color`: with their colours, lit as draw_meshes does,
+/// linear where `linear`. Gives the lists to `layer`; they are good until the next call. Adds to
+/// `stats`. `meshes` are those of draw_meshes, which has found them valid. Errors: unsupported (2^32
+/// triangles); backend_failure; out_of_memory is thrown by the workspace.
 template <class S, Backend B>
 Status draw_fragments(B& backend, FragmentWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
-                      const Camera& camera, const MeshLight& light, int tile_size, bool color, bool linear,
-                      const S* behind, MeshLayer<S>& layer, MeshStats& stats) {
+                      const Camera& camera, const MeshLight& light, int tile_size, bool color,
+                      bool linear, const S* behind, MeshLayer<S>& layer, MeshStats& stats) {
   if (Status s = detail::set_up_meshes(backend, ws.mesh, meshes, camera, true, stats); !s) return s;
   if (ws.mesh.triangles.size() == 0) return {};
   FragmentArgs<S> args;
   args.raster = detail::raster_args(ws.mesh, camera, tile_size);
   if (Status s = detail::bin_meshes(backend, ws.mesh, args.raster); !s) return s;
   const std::size_t tiles = args.raster.bin.grid.count();
-  ws.ranges.resize_discard(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
+  ws.ranges.resize_discard(static_cast<std::size_t>(camera.width) *
+                           static_cast<std::size_t>(camera.height));
   ws.tile_begin.resize_discard(tiles + 1);
   args.shade = detail::shade_args(ws.mesh, camera, light);
   args.behind = behind;

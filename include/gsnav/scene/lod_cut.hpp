@@ -35,15 +35,6 @@ inline Status validate(const LodChoice& c) {
   return {};
 }
 
-/// The rules of the profile `lod`: those of `fast`; a pixel ends where less than 1/1000 of the light comes through.
-/// (Alphas are cut where they are in `fast`: a cut at 1/128 is worth 5 % of a frame, and lies 5 dB below direct rendering
-/// where a view is of few and large Gaussians.)
-inline RenderConfig lod_config(RenderConfig config) noexcept {
-  config.profile = Profile::fast;
-  config.transmittance_min = std::max(config.transmittance_min, 0.001);
-  return config;
-}
-
 /// What a cut draws, in Gaussians of the cloud where nothing else is said.
 struct LodStats {
   std::uint64_t shown = 0;   ///< in chunks that may be in view
@@ -51,6 +42,17 @@ struct LodStats {
   std::uint64_t drawn = 0;   ///< rows drawn for them, merged ones and others
   double error_px = 0;       ///< the largest error of a node that is drawn (LodNode::error), pixels
 };
+
+/// The rules of the profile `lod`: those of `fast`; and where at least half of what a cut shows is merged, a pixel ends
+/// where less than 1/1000 of the light comes through. (Where little is merged Gaussians are large and direct rendering is
+/// 60 dB and more from the photo: an earlier end would be what is seen of the error.)
+inline RenderConfig lod_config(RenderConfig config, const LodStats& stats = {}) noexcept {
+  config.profile = Profile::fast;
+  if (stats.shown > 0 && 2 * stats.merged >= stats.shown) {
+    config.transmittance_min = std::max(config.transmittance_min, 0.001);
+  }
+  return config;
+}
 
 /// A cut through a level-of-detail tree, for one sensor: which chunks are drawn. It remembers what it
 /// chose, for hysteresis, and else depends on the camera only: the same calls give the same cuts.

@@ -24,8 +24,8 @@ struct SceneDetail {
   LodChoice choice{};
 };
 
-/// What one camera draws of a scene by levels of detail. It depends on the camera alone, not on what was seen before:
-/// a simulator that is set back to a state, or is one of a batch, sees the same bits.
+/// What one camera draws of a scene by levels of detail. It depends on the camera alone, not on what was
+/// seen before: a simulator that is set back to a state, or is one of a batch, sees the same bits.
 class DetailSets {
  public:
   /// `sets`: the scene's, assets first, then avatars, which stay as they are. Valid until the next call.
@@ -36,6 +36,7 @@ class DetailSets {
     cuts_.resize(detail.assets.size());
     sets_.clear();
     chunks_.clear();
+    stats_ = {};
     for (std::size_t a = 0; a < detail.assets.size(); ++a) {
       const SceneDetail::Asset& asset = detail.assets[a];
       Cut& cut = cuts_[a];
@@ -47,10 +48,19 @@ class DetailSets {
         sets_.push_back(set);
         if (asset.cloud_there.size != 0) move(asset, sets_.back().gaussians);
       }
+      stats_.shown += cut.cut->stats().shown;
+      stats_.merged += cut.cut->stats().merged;
     }
-    const auto others = sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
+    const auto others =
+        sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
     sets_.insert(sets_.end(), others.begin(), others.end());
     return sets_;
+  }
+
+  /// The rules by which to draw them; valid until the next call.
+  const RenderConfig& rules(const RenderConfig& config) {
+    rules_ = lod_config(config, stats_);
+    return rules_;
   }
 
   /// How asset `a` was cut by the last choice; its sets are of the host's arrays.
@@ -85,6 +95,8 @@ class DetailSets {
   std::vector<Cut> cuts_;
   std::vector<GaussianSet> sets_;
   std::vector<std::uint32_t> chunks_;
+  LodStats stats_;  // shown and merged of all
+  RenderConfig rules_;
 };
 
 /// Takes what cuts chose to where a backend reads it: for a memory of its own, in one copy.

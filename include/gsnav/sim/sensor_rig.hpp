@@ -198,6 +198,7 @@ class SensorRig {
     for_each(detail_jobs_.size(), [this](std::size_t i) {
       FrameJob<float>& job = jobs_[detail_jobs_[i].job];
       job.sets = cuts_[i].select(*detail_jobs_[i].detail, job.sets, *job.camera);
+      job.config = &cuts_[i].rules(*job.config);
     });
     chosen_.place(std::span(cuts_).first(detail_jobs_.size()));
     if constexpr (BatchBackend<B>) {

@@ -156,14 +156,15 @@ class Simulator {
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
     RenderConfig rc = config_.render;
     rc.outputs = outputs;
-    rig_.renderer().set_config(rc);
     rig_.renderer().set_meshes(scene_.meshes().instances, scene_.scene().light);
     ++spectator_count_;
     std::span<const GaussianSet> sets = scene_.sets(0);
     if (scene_.detail() != nullptr) {
       sets = spectator_cut_.select(*scene_.detail(), sets, camera);
       spectator_chunks_.place(std::span(&spectator_cut_, 1));
+      rc = spectator_cut_.rules(rc);
     }
+    rig_.renderer().set_config(rc);
     if (Status s = rig_.renderer().render(sets, std::span(&camera, 1), spectator_); !s) return s;
     return &spectator_;
   }
