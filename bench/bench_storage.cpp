@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // bench_storage [--scene FILE] [--cameras FILE] [--threads N]: a scene in each way of keeping it in memory: what that
-// takes, what it changes, and the time of a frame (RGB, median over views and repeats), one row each, as in
-// docs/formats.md.
+// takes, what it changes, and the time of a frame (RGB, median over views and repeats), one row each, and what each
+// packed plane changes by itself, as in docs/formats.md.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -126,5 +126,19 @@ int main(int argc, char** argv) {
       "%.2g)\n",
       errors.mean, errors.mean_deviations, errors.scale, errors.rotation, errors.opacity, errors.sh0, errors.sh,
       errors.sh_rms);
+  std::printf("\n| packed alone | PSNR, dB | worst view, dB |\n| --- | --- | --- |\n");
+  const auto alone = [&](const char* name, const auto& replace) {
+    GaussianCloud one = full;
+    replace(one);
+    one.chunk_bounds.clear();  // they are those of the planes together
+    const auto images = gsnav_convert::image_errors(full, one, resized(cameras, kSizes[1])).value();
+    std::printf("| %s | %.1f | %.1f |\n", name, images.psnr, images.worst);
+  };
+  alone("means", [&](GaussianCloud& c) { c.means = unpacked.means; });
+  alone("scales", [&](GaussianCloud& c) { c.scales = unpacked.scales; });
+  alone("rotations", [&](GaussianCloud& c) { c.quats = unpacked.quats; });
+  alone("opacities", [&](GaussianCloud& c) { c.opacities = unpacked.opacities; });
+  alone("colours of degree 0", [&](GaussianCloud& c) { c.sh0 = unpacked.sh0; });
+  alone("SH bands", [&](GaussianCloud& c) { c.shN = unpacked.shN; });
   return 0;
 }

@@ -24,6 +24,10 @@ cmake -S "$root" -B "$build" -G Ninja "${options[@]}" -DCMAKE_CXX_COMPILER="${GS
 cmake --build "$build" -j "${GSNAV_JOBS:-$("$root/tools/build_jobs.sh")}" --target fuzz_readers fuzz_seeds
 fuzzer=$build/tests/fuzz/fuzz_readers
 "$build/tests/fuzz/fuzz_seeds" "$build/seeds"
+# What was found of earlier runs, smallest first; all of it was grown from the seeds.
+mkdir -p "$build/corpus"
+tar --skip-old-files -xJf "$root/tests/fuzz/corpora.tar.xz" -C "$build/corpus" ||
+  echo "tests/fuzz/corpora.tar.xz was not unpacked (is xz there?): from the seeds alone"
 
 readers=("$@")
 if [[ ${#readers[@]} -eq 0 ]]; then

@@ -112,8 +112,6 @@ auto guarded(const std::string& what, F&& f) -> decltype(f()) {
     return f();
   } catch (const std::bad_alloc&) {
     return Status(Errc::out_of_memory, what + ": not enough memory");
-  } catch (const Error& e) {
-    return Status(e.code(), what + ": " + e.what());
   } catch (const std::length_error&) {
     return Status(Errc::out_of_memory, what + ": not enough memory");
   } catch (const std::filesystem::filesystem_error& e) {

@@ -128,7 +128,11 @@ Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& 
     if (!scene) return scene;
     if (options.sort) {
       PoolBackend backend(threads_for(scene->cloud.size()) == 1 ? 1 : detail::io_threads());
-      sort_spatially(backend, scene->cloud);
+      try {
+        sort_spatially(backend, scene->cloud);
+      } catch (const Error& e) {  // no memory for a backend's arrays
+        return {e.code(), spec + ": " + e.what()};
+      }
     }
     LoadReport& report = scene->report;
     const UpGuess up{report.up, report.up_seen};  // of each reader's own kind of file
