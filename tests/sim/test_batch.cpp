@@ -7,6 +7,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/sim/batch.hpp"
+#include "same_bits.hpp"
 #include "sim_scene.hpp"
 #include "wandering.hpp"
 
@@ -28,10 +29,6 @@ BatchConfig small_batch(int height = 16, int width = 24) {
 
 std::vector<std::shared_ptr<const SimulatorScene>> two_scenes() {
   return {std::make_shared<const SimulatorScene>(peopled_scene(2000)), std::make_shared<const SimulatorScene>(flat_scene())};
-}
-
-bool same_bits(std::span<const float> a, std::span<const float> b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
 }
 
 bool same_info(const StepInfo& a, const StepInfo& b) {

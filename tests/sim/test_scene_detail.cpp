@@ -2,7 +2,6 @@
 // Simulators that draw levels of detail.
 #include <doctest/doctest.h>
 
-#include <cstring>
 #include <memory>
 #include <span>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/scene/lod_build.hpp"
 #include "gsnav/sim/batch.hpp"
+#include "same_bits.hpp"
 #include "sim_scene.hpp"
 #include "wandering.hpp"
 
@@ -33,10 +33,6 @@ LodChoice coarse() {
   LodChoice c;
   c.pixels = 2;
   return c;
-}
-
-bool same_bits(std::span<const float> a, std::span<const float> b) {
-  return a.size() == b.size() && !a.empty() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
 }
 
 }  // namespace
