@@ -148,9 +148,9 @@ int main(int argc, char** argv) {
   for (const std::string& format : formats) {
     const std::string extension = "." + format;
     const Row r = measure(source, cameras, base + extension, load);
-    const auto number = [](const char* format, double v) {
+    const auto number = [](const char* form, double v) {
       char text[32];
-      std::snprintf(text, sizeof text, format, v);
+      std::snprintf(text, sizeof text, form, v);
       return std::string(text);
     };
     line({extension, number("%.1f", r.bytes / n), number("%.0f", r.bytes / r.read / 1e6),

@@ -2,7 +2,6 @@
 // A batch of environments is its single simulators: the same bits.
 #include <doctest/doctest.h>
 
-#include <cstring>
 #include <limits>
 
 #include "gsnav/backends/openmp.hpp"
