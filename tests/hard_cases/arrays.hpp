@@ -76,9 +76,9 @@ auto render_with(R& renderer, const gsnav::GaussianCloud& cloud, const SetExtras
 /// Every image has the same bits.
 template <class S>
 bool same_images(const gsnav::Frames<S>& a, const gsnav::Frames<S>& b) {
-  return a.rgb == b.rgb && a.alpha == b.alpha && a.median_depth == b.median_depth &&
-         a.expected_depth == b.expected_depth && a.accumulated_depth == b.accumulated_depth &&
-         a.first_hit_depth == b.first_hit_depth;
+  bool same = true;
+  for_each_image(a, b, [&same](const auto& x, const auto& y) { same = same && x == y; });
+  return same;
 }
 
 /// Pixels whose content hangs on less than `relative` of a threshold (1/255, the stop): the reference

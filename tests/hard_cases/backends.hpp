@@ -11,6 +11,7 @@
 #include "gsnav/math/pack.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
 #include "ops/backends.hpp"
+#include "support/frame_images.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
@@ -113,12 +114,7 @@ void render_everywhere(const std::vector<Placed>& scene, const gsnav::Camera& ca
     const auto frames = renderer.render(scene, {camera}, config, meshes);
     if constexpr (R::is_float) {
       if (reference.cameras == 0) reference = frames;
-      CHECK(frames.rgb == reference.rgb);
-      CHECK(frames.alpha == reference.alpha);
-      CHECK(frames.median_depth == reference.median_depth);
-      CHECK(frames.expected_depth == reference.expected_depth);
-      CHECK(frames.accumulated_depth == reference.accumulated_depth);
-      CHECK(frames.first_hit_depth == reference.first_hit_depth);
+      for_each_image(frames, reference, [](const auto& a, const auto& b) { CHECK(a == b); });
     }
     check(frames, renderer);
   });

@@ -89,12 +89,7 @@ void check_centre(const F& f, const std::vector<Layer>& layers, double tolerance
 
 template <class S>
 void check_same(const Frames<S>& a, const Frames<S>& b) {
-  CHECK(a.rgb == b.rgb);
-  CHECK(a.alpha == b.alpha);
-  CHECK(a.median_depth == b.median_depth);
-  CHECK(a.expected_depth == b.expected_depth);
-  CHECK(a.accumulated_depth == b.accumulated_depth);
-  CHECK(a.first_hit_depth == b.first_hit_depth);
+  for_each_image(a, b, [](const auto& x, const auto& y) { CHECK(x == y); });
 }
 
 /// Holds the frames of every backend against the float64 oracle with fragments of traced rays.
@@ -342,13 +337,7 @@ TEST_CASE("panes: every output alone, batches, and what the frame does not have 
             RenderConfig alone = config;
             alone.outputs = output;
             const auto f = renderer.render({&cloud}, {axis_camera(83)}, alone, panes.instances);
-            const auto same = [&](const auto& a, const auto& b) { CHECK((a.empty() || a == b)); };
-            same(f.rgb, all.rgb);
-            same(f.alpha, all.alpha);
-            same(f.median_depth, all.median_depth);
-            same(f.expected_depth, all.expected_depth);
-            same(f.accumulated_depth, all.accumulated_depth);
-            same(f.first_hit_depth, all.first_hit_depth);
+            for_each_image(f, all, [](const auto& a, const auto& b) { CHECK((a.empty() || a == b)); });
           }
           std::vector<Camera> batch(5, axis_camera(83));
           for (std::size_t i = 0; i < batch.size(); ++i) batch[i].cx += static_cast<double>(i) - 2;

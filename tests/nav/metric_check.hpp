@@ -4,10 +4,41 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
+#include "geodesic_oracle.hpp"
 #include "gsnav/nav/navmesh.hpp"
 
 namespace gsnav_test {
+
+inline double sum_of(const std::vector<gsnav::Vec3d>& points) {
+  double sum = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) sum += norm(points[i] - points[i - 1]);
+  return sum;
+}
+
+inline constexpr int kPathsOfAFloor = 60;
+
+/// So many paths between random points against brute force; returns how far the worst length is off, metres.
+inline double check_brute_force(const gsnav::NavMesh& mesh, const VisibilityGraph& graph, std::uint64_t seed) {
+  using namespace gsnav;
+  Rng rng(seed);
+  double worst = 0;
+  for (int i = 0; i < kPathsOfAFloor; ++i) {
+    const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
+    const auto expected = static_cast<double>(graph.distance(a.position, b.position));
+    const auto path = mesh.path_between(a, b);
+    REQUIRE(path.ok());
+    worst = max(worst, std::abs(path->length - expected));
+    REQUIRE(path->length == doctest::Approx(expected).epsilon(1e-9));
+    REQUIRE(sum_of(path->points) == doctest::Approx(expected).epsilon(1e-7));
+    REQUIRE(norm(path->points.front() - a.position) < 1e-9);
+    REQUIRE(norm(path->points.back() - b.position) < 1e-9);
+  }
+  return worst;
+}
 
 /// Symmetry, the triangle inequality, the straight line as lower bound, and the path's own length.
 inline void check_metric(const gsnav::NavMesh& mesh, int pairs) {

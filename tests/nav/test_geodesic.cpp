@@ -35,12 +35,6 @@ NavMesh build(const Soup& soup, double cell = 0.1) {
   return NavMesh::build(s, soup.vertices, soup.triangles).value();
 }
 
-double sum_of(const std::vector<Vec3d>& points) {
-  double sum = 0;
-  for (std::size_t i = 1; i < points.size(); ++i) sum += norm(points[i] - points[i - 1]);
-  return sum;
-}
-
 /// Detour's path, each leg laid on the surface in steps so short that no bump is cut; infinity where a leg does not stay
 /// on it.
 double detour_length(const NavMesh& mesh, const dtNavMeshQuery* query, const NavPoint& a, const NavPoint& b) {
@@ -117,20 +111,10 @@ TEST_CASE("geodesic: equals brute force on the visibility graph of random floors
     const NavMesh mesh = build(random_boxes(seed, 6 + 2 * static_cast<int>(seed), 12));
     const gsnav_test::VisibilityGraph graph(mesh);
     corners += graph.corner_count();
-    Rng rng(seed);
-    for (int i = 0; i < 60; ++i) {
-      const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
-      const auto expected = static_cast<double>(graph.distance(a.position, b.position));
-      const auto path = mesh.path_between(a, b);
-      REQUIRE(path.ok());
-      worst = max(worst, std::abs(path->length - expected));
-      REQUIRE(path->length == doctest::Approx(expected).epsilon(1e-9));
-      REQUIRE(sum_of(path->points) == doctest::Approx(expected).epsilon(1e-7));
-      REQUIRE(norm(path->points.front() - a.position) < 1e-9);
-      REQUIRE(norm(path->points.back() - b.position) < 1e-9);
-    }
+    worst = max(worst, gsnav_test::check_brute_force(mesh, graph, seed));
   }
-  MESSAGE("360 paths among " << corners << " corners: at most " << worst << " m from the truth");
+  MESSAGE(6 * gsnav_test::kPathsOfAFloor << " paths among " << corners << " corners: at most " << worst
+                                         << " m from the truth");
 }
 
 TEST_CASE("geodesic: closed forms") {
@@ -162,7 +146,7 @@ TEST_CASE("geodesic: closed forms") {
   const double expected = 3 + std::hypot(4, rise) + 3;
   CHECK(hill.geodesic_distance({1, 0, 1}, {11, rise, 1}) == doctest::Approx(expected).epsilon(0.002));
   const auto up = hill.find_path({1, 0, 1}, {11, rise, 1});
-  CHECK(sum_of(up->points) == doctest::Approx(up->length).epsilon(1e-3));
+  CHECK(gsnav_test::sum_of(up->points) == doctest::Approx(up->length).epsilon(1e-3));
 }
 
 TEST_CASE("geodesic: one floor above another is a floor of its own") {

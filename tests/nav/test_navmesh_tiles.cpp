@@ -138,6 +138,17 @@ void compare_distances(const NavMesh& one, const NavMesh& tiled, int pairs, doub
   CHECK(sum <= within * length);
 }
 
+/// The floor of one tile, its islands and area, and no step at a border. `reach`: as check_within has it, metres.
+Borders check_same_floor(const NavMesh& one, const NavMesh& tiled, double area, double reach) {
+  const Borders borders = borders_of(tiled);
+  CHECK(borders.step < kPlanar);
+  CHECK(tiled.island_count() == one.island_count());
+  CHECK(tiled.navigable_area() == doctest::Approx(one.navigable_area()).epsilon(area));
+  check_within(one, tiled, 20000, reach);
+  check_within(tiled, one, 20000, reach);
+  return borders;
+}
+
 }  // namespace
 
 TEST_CASE("tiles: the same bits for any number of threads") {
@@ -157,13 +168,7 @@ TEST_CASE("tiles: the surface and the islands of one tile, without a gap or step
     const NavMesh one = build(soup, settings_of(0));
     for (const int size : {16, 37, 100}) {
       const NavMesh tiled = build(soup, settings_of(size));
-      const Borders borders = borders_of(tiled);
-      CHECK(borders.edges > 10);
-      CHECK(borders.step < kPlanar);
-      CHECK(tiled.island_count() == one.island_count());
-      CHECK(tiled.navigable_area() == doctest::Approx(one.navigable_area()).epsilon(0.005));
-      check_within(one, tiled, 20000, 0.2);
-      check_within(tiled, one, 20000, 0.2);
+      CHECK(check_same_floor(one, tiled, 0.005, 0.2).edges > 10);
     }
   }
   for (const char* name : {"nav_test.obj", "dungeon.obj"}) {
@@ -171,39 +176,22 @@ TEST_CASE("tiles: the surface and the islands of one tile, without a gap or step
     if (soup.triangles.empty()) continue;
     const NavMesh one = build(soup, demo(0));
     const NavMesh tiled = build(soup, demo(32));
-    const Borders borders = borders_of(tiled);
+    const Borders borders = check_same_floor(one, tiled, 0.02, 1.0);
     MESSAGE(std::string(name) << ": " << one.polygon_count() << " polygons in one tile, "
                               << tiled.polygon_count() << " in many; " << borders.edges
                               << " edges on borders, a step of at most " << borders.step << " m");
     CHECK(borders.edges > 100);
-    CHECK(borders.step < kPlanar);
-    CHECK(tiled.island_count() == one.island_count());
-    CHECK(tiled.navigable_area() == doctest::Approx(one.navigable_area()).epsilon(0.02));
-    check_within(one, tiled, 20000, 1.0);
-    check_within(tiled, one, 20000, 1.0);
   }
 }
 
 TEST_CASE("tiles: shortest paths equal brute force on the visibility graph") {
   double worst = 0;
-  int paths = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const NavMesh mesh = build(random_boxes(seed, 6 + 2 * static_cast<int>(seed), 12),
                                settings_of(16 + 7 * static_cast<int>(seed)));
-    const gsnav_test::VisibilityGraph graph(mesh);
-    Rng rng(seed);
-    for (int i = 0; i < 60; ++i) {
-      const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
-      const auto expected = static_cast<double>(graph.distance(a.position, b.position));
-      const auto path = mesh.path_between(a, b);
-      REQUIRE(path.ok());
-      worst = max(worst, std::abs(path->length - expected));
-      REQUIRE(path->length == doctest::Approx(expected).epsilon(1e-9));
-      REQUIRE(norm(path->points.back() - b.position) < 1e-9);
-      ++paths;
-    }
+    worst = max(worst, gsnav_test::check_brute_force(mesh, gsnav_test::VisibilityGraph(mesh), seed));
   }
-  MESSAGE(paths << " paths: at most " << worst << " m from the truth");
+  MESSAGE(6 * gsnav_test::kPathsOfAFloor << " paths: at most " << worst << " m from the truth");
 }
 
 TEST_CASE("tiles: distances are a metric, and those of one tile up to its contours") {

@@ -5,6 +5,7 @@
 
 #include "gsnav/backends/cuda/batch.hpp"
 #include "ops/backends.hpp"
+#include "support/frame_images.hpp"
 #include "support/scenes.hpp"
 
 // Batches of the GPU and the same cameras one at a time.
@@ -87,15 +88,9 @@ inline Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& s
     }
     if (!meshes.empty()) renderer.set_meshes(meshes[c].instances, meshes[c].light);
     const Frames<float> f = renderer.render(seen, std::vector<Camera>{cameras[c]}).value();
-    const auto append = [](std::vector<float>& to, const std::vector<float>& from) {
+    for_each_image(all, f, [](std::vector<float>& to, const std::vector<float>& from) {
       to.insert(to.end(), from.begin(), from.end());
-    };
-    append(all.rgb, f.rgb);
-    append(all.alpha, f.alpha);
-    append(all.median_depth, f.median_depth);
-    append(all.expected_depth, f.expected_depth);
-    append(all.accumulated_depth, f.accumulated_depth);
-    append(all.first_hit_depth, f.first_hit_depth);
+    });
   }
   return all;
 }
@@ -108,12 +103,7 @@ inline std::size_t differing(const std::vector<float>& a, const std::vector<floa
 }
 
 inline void check_same(const Frames<float>& a, const Frames<float>& b) {
-  CHECK(differing(a.rgb, b.rgb) == 0);
-  CHECK(differing(a.alpha, b.alpha) == 0);
-  CHECK(differing(a.median_depth, b.median_depth) == 0);
-  CHECK(differing(a.expected_depth, b.expected_depth) == 0);
-  CHECK(differing(a.accumulated_depth, b.accumulated_depth) == 0);
-  CHECK(differing(a.first_hit_depth, b.first_hit_depth) == 0);
+  for_each_image(a, b, [](const auto& x, const auto& y) { CHECK(differing(x, y) == 0); });
 }
 
 /// Cameras around the origin that look at the box of `random_cloud`, none like another.

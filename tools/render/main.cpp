@@ -148,7 +148,7 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
       chosen.place(std::span(&details, 1));
       cut = &details.cut(0);
       here = cut->sets();
-      renderer.set_config(lod_config(config, cut->stats()));
+      renderer.set_config(details.rules(config));
     }
     if (const Status s = renderer.render(sets, std::span(&cameras[c], 1), f); !s) {
       std::fprintf(stderr, "gsnav-render: camera %zu: %s\n", c, s.message().c_str());

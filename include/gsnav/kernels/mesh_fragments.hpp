@@ -87,12 +87,7 @@ template <class S>
 struct ScanFragments {
   FragmentArgs<S> args;
   GSNAV_HD void operator()(std::size_t) const noexcept {
-    std::uint64_t sum = 0;
-    for (std::size_t t = 0; t < args.tile_begin.size; ++t) {
-      const std::uint64_t n = t + 1 < args.tile_begin.size ? args.tile_begin[t] : 0;
-      args.tile_begin[t] = sum;
-      sum += n;
-    }
+    detail::exclusive_sums(args.tile_begin.data, args.tile_begin.size - 1, args.tile_begin.data);
   }
 };
 

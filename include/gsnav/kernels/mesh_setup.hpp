@@ -199,6 +199,18 @@ GSNAV_HD std::uint32_t for_each_piece_of_chunk(const MeshSetupArgs<S>& args, std
   return not_finite;
 }
 
+/// offsets[i]: the sum of the counts before i, for i in [0, n]. The two may be one array.
+template <class Count>
+GSNAV_HD void exclusive_sums(const Count* counts, std::size_t n, std::uint64_t* offsets) noexcept {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint64_t count = counts[i];
+    offsets[i] = sum;
+    sum += count;
+  }
+  offsets[n] = sum;
+}
+
 }  // namespace detail
 
 /// Counts the pieces of a chunk.
@@ -217,12 +229,7 @@ template <class S>
 struct ScanMeshTriangles {
   MeshSetupArgs<S> args;
   GSNAV_HD void operator()(std::size_t) const noexcept {
-    std::uint64_t sum = 0;
-    for (std::size_t c = 0; c < args.counts.size; ++c) {
-      args.offsets[c] = sum;
-      sum += args.counts[c];
-    }
-    args.offsets[args.counts.size] = sum;
+    detail::exclusive_sums(args.counts.data, args.counts.size, args.offsets.data);
   }
 };
 

@@ -20,7 +20,7 @@ namespace gsnav {
 /// What packing may cost. Beyond a bound the planes stay as exact as it asks for.
 struct PackLimits {
   /// How far any mean may move, in its Gaussian's largest standard deviations; else float32. 16 bits of a chunk's box save
-  /// 6 bytes, but Gaussians at nearly one depth may change places: by them a view loses up to 20 dB.
+  /// 6 bytes, but Gaussians at nearly one depth may change places (docs/formats.md).
   double mean = 0;
   double sh = 2e-3;      ///< root mean square error by 8 bits of a coefficient of bands from 1 on; else binary16
   double sh_max = 2e-3;  ///< largest error of one by binary16; else float32

@@ -49,7 +49,8 @@ struct BatchStats {
 ///
 /// Meshes are drawn camera by camera into layers that the batch is then blended over; `render` waits for the count of
 /// each camera's triangles. As everywhere, `fast` has the exponential of `exact` where there are meshes: in a call with
-/// any, for all of its cameras. Unsupported among meshes: Composite::hard_depth, Response other than ewa, Compat.
+/// any, for all of its cameras. Unsupported among meshes: Composite::hard_depth, Response other than ewa, Compat, and
+/// meshes that are seen through (MeshAlpha::blend).
 class CudaBatchRenderer {
  public:
   using camera_type = BatchCamera;
