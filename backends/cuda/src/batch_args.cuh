@@ -68,7 +68,7 @@ struct LargeRows {
 struct alignas(16) ListPart {
   std::uint32_t tile, bin, begin, end;
 };
-inline constexpr std::uint32_t kPartLength = 384;  ///< part p has the bins that begin so many pairs apart
+inline constexpr std::uint32_t kPartLength = 128;  ///< part p has the bins that begin so many pairs apart
 
 inline constexpr int kMinDepthBits = 6, kMaxDepthBits = 9;
 
@@ -88,7 +88,7 @@ struct DepthBins {
 /// Counts go on where capacities end, so that they say what would have been needed.
 struct BatchCounters {
   unsigned long long slots, hard, several, large, pairs;
-  std::uint32_t items, parts;
+  std::uint32_t items, parts, long_parts;
   std::uint32_t tiles_of_length[33];    ///< by leading zeros of a tile's count: long lists first
   std::uint32_t ordered_of_length[33];  ///< of these in tile_order already
 };
@@ -123,7 +123,8 @@ struct BatchArgs {
   std::uint32_t* tile_counts;
   std::uint32_t* tile_begins;
   std::uint32_t* tile_order;  ///< the order that tiles are begun in: longest lists first, so that none is waited for
-  ListPart* parts;  ///< where there are many bins of depth
+  ListPart* parts;            ///< where there are many bins of depth
+  std::uint32_t* long_parts;  ///< those that a warp has not put in order
   Pair* pairs;      ///< of a tile together: in no order, or in order once order_lists has been there
   Pair* pairs_alt;
   std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity, part_capacity;

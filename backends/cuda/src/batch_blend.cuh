@@ -162,7 +162,7 @@ __device__ inline float load_mesh(const BlendArgs& b, const std::size_t (&pixel)
   __syncthreads();
   for (int k = 0; k < K; ++k) {
     mesh[k] = inside[k] ? b.raster.mesh.depth[pixel[k]] : 0.0f;
-    atomicMax(&far, __float_as_uint(has_mesh(mesh[k]) ? mesh[k] : INFINITY));  // in order, as none is negative
+    if (inside[k]) atomicMax(&far, __float_as_uint(has_mesh(mesh[k]) ? mesh[k] : INFINITY));  // in order, as none is negative
   }
   __syncthreads();
   return __uint_as_float(far);

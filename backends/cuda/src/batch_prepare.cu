@@ -186,14 +186,17 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   // ---- units of culling
   auto* const units = host(static_cast<BatchSet*>(nullptr), at_sets);
   args = {};
+  item_capacity = 0;
   for (std::size_t s = 0; s < sets.size(); ++s) {
     BatchSet& u = units[s];
     u = {args.units, set_begins[s], set_begins[s + 1] - set_begins[s],
          static_cast<std::uint32_t>(sets[s].gaussians.chunk_count())};
-    args.units += std::uint64_t{(u.instances + 31) / 32} * u.chunks;
+    const std::uint64_t items_of_set = std::uint64_t{(u.instances + 31) / 32} * u.chunks;
+    item_capacity += items_of_set;
+    args.units += u.instances == 1 ? (u.chunks + 31) / 32 : items_of_set;
   }
-  if (args.units > std::numeric_limits<std::uint32_t>::max() / 8) {
-    return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(args.units) +
+  if (item_capacity > std::numeric_limits<std::uint32_t>::max() / 8) {
+    return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(item_capacity) +
                                    " chunks times words of cameras in one batch: draw fewer cameras a call"};
   }
 

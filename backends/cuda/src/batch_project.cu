@@ -15,7 +15,7 @@ constexpr unsigned kProjectWarps = 4, kProjectBlocks = 6;  ///< of a block; of a
 constexpr unsigned kWarpsPerChunk = kProjectChunk / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
-/// A warp a unit: the lanes are instances.
+/// A warp a unit: the lanes are instances, or chunks of the only one.
 __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
   const unsigned lane = threadIdx.x % 32;
   const std::uint64_t stride = std::uint64_t{gridDim.x} * kWarps;
@@ -31,6 +31,21 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
     }
     const BatchSet set = a.sets[low];
     const std::uint32_t at = static_cast<std::uint32_t>(unit - set.first_unit);
+    if (set.instances == 1) {
+      const ProjectArgs<float>& args = a.instances[set.first_instance].args;
+      const std::uint32_t chunk = 32 * at + lane;
+      const bool seen = chunk < set.chunks && chunk_is_candidate(args, chunk);
+      const unsigned votes = __ballot_sync(kAll, seen);
+      std::uint32_t first = 0;
+      if (lane == 0 && votes != 0) first = atomicAdd(&a.counters->items, static_cast<std::uint32_t>(__popc(votes)));
+      first = __shfl_sync(kAll, first, 0);
+      if (seen) {
+        const std::size_t drawn = args.gaussians.chunk_id(chunk);
+        a.items[first + static_cast<std::uint32_t>(__popc(votes & ((1u << lane) - 1)))] = {
+            set.first_instance, static_cast<std::uint32_t>(drawn), 1u};
+      }
+      continue;
+    }
     const std::uint32_t word = at / set.chunks, chunk = at % set.chunks;
     const std::uint32_t first = set.first_instance + 32 * word, index = 32 * word + lane;
     const bool seen = index < set.instances && chunk_is_candidate(a.instances[first + lane].args, chunk);
@@ -81,17 +96,31 @@ struct alignas(16) WarpRows {
   };
 };
 
-__device__ void load_rows(const GaussianView& gs, std::size_t row, WarpRows& to) {
+/// What a lane reads of its row.
+struct LaneRow {
+  float mean[3], quat[4], scales[3], opacity;
+};
+
+/// Of row `row`, or the first where there is none. Nothing is stored in between, nor decided: behind either, reads would
+/// be waited for one after the other.
+__device__ LaneRow read_row(const GaussianView& gs, std::size_t row) {
+  const std::size_t at = row < gs.size ? row : 0;
+  const bool has_axes = !gs.axes[0].empty();
+  const auto of = [&](const View<const float>& plane) { return (has_axes ? gs.means[0].data : plane.data)[at]; };
+  LaneRow r;
+  for (int k = 0; k < 3; ++k) r.mean[k] = gs.means[k].data[at];
+  r.opacity = gs.opacities.data[at];
+  for (int k = 0; k < 4; ++k) r.quat[k] = of(gs.quats[k]);
+  for (int k = 0; k < 3; ++k) r.scales[k] = of(gs.scales[k]);
+  return r;
+}
+
+__device__ void keep_row(const LaneRow& r, WarpRows& to) {
   const unsigned lane = threadIdx.x % 32;
-  __syncwarp();
-  if (row < gs.size) {
-    for (int k = 0; k < 3; ++k) to.mean[k][lane] = gs.means[k][row];
-    to.opacity[lane] = gs.opacities[row];
-    if (gs.axes[0].empty()) {
-      for (int k = 0; k < 4; ++k) to.quat[k][lane] = gs.quats[k][row];
-      for (int k = 0; k < 3; ++k) to.scales[k][lane] = gs.scales[k][row];
-    }
-  }
+  for (int k = 0; k < 3; ++k) to.mean[k][lane] = r.mean[k];
+  to.opacity[lane] = r.opacity;
+  for (int k = 0; k < 4; ++k) to.quat[k][lane] = r.quat[k];
+  for (int k = 0; k < 3; ++k) to.scales[k][lane] = r.scales[k];
   __syncwarp();
 }
 
@@ -154,16 +183,21 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
   WarpRows& rows = shared[threadIdx.x / 32];
   const std::uint32_t parts = a.counters->items * kWarpsPerChunk;
   WarpSlab slots(&a.counters->slots, a.slab), several(&a.counters->several, a.slab);
-  for (std::uint32_t part = blockIdx.x * kProjectWarps + threadIdx.x / 32; part < parts;
-       part += gridDim.x * kProjectWarps) {
-    const BatchItem item = a.items[part / kWarpsPerChunk];
+  const auto item_of = [&](std::uint32_t part) { return part < parts ? a.items[part / kWarpsPerChunk] : BatchItem{}; };
+  std::uint32_t part = blockIdx.x * kProjectWarps + threadIdx.x / 32;
+  BatchItem next = item_of(part);
+  for (; part < parts; part += gridDim.x * kProjectWarps) {
+    const BatchItem item = next;
+    next = item_of(part + gridDim.x * kProjectWarps);
     const GaussianView& gs = a.instances[item.first_instance].args.gaussians;
     const std::size_t row = item.chunk * kProjectChunk + part % kWarpsPerChunk * 32 + lane;
     const bool exists = row < gs.size;
     const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
-    load_rows(gs, row, rows);
     bool has_sh = !a.instances[item.first_instance].args.color || row - lane >= gs.size;
+    const LaneRow read = read_row(gs, row);
+    __syncwarp();  // all lanes are done with the rows before
     if (!has_sh) ask_for_sh(gs, row - lane, rows);
+    keep_row(read, rows);
     for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
       const std::uint32_t index = item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1;
       const BatchInstance& instance = a.instances[index];

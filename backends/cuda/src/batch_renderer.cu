@@ -20,7 +20,7 @@ void CudaBatchRenderer::State::size_scratch() {
     array.resize_discard(n);
     return array.data();
   };
-  args.items = size(items, args.units);
+  args.items = size(items, item_capacity);
   args.counters = size(counters, 1);
   args.records = size(records, slot_capacity);
   args.entries = size(entries, slot_capacity);
@@ -34,6 +34,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.tile_order = size(tile_order, args.tiles);
   args.part_capacity = args.depth_bins.many() ? args.tiles + pair_capacity / cuda::kPartLength : 0;
   args.parts = size(parts, args.part_capacity);
+  args.long_parts = size(long_parts, args.part_capacity);
   args.pairs = size(pairs, pair_capacity);
   args.pairs_alt = size(pairs_alt, pair_capacity);
   // Where pixels are many beside survivors, a record each is less than projecting median Gaussians once more.
@@ -53,7 +54,8 @@ void CudaBatchRenderer::State::size_scratch() {
   args.pair_capacity = pair_capacity;
   stats.scratch_bytes = inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
                         entries.capacity_bytes() + sources.capacity_bytes() + hard.capacity_bytes() +
-                        several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() + bins.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
+                        several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() +
+                        long_parts.capacity_bytes() + bins.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
                         pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
                         mesh.bytes() + mesh_depth.capacity_bytes() + mesh_color.capacity_bytes();
 }
@@ -72,7 +74,7 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
   // Arrays move when they grow, and only then. Those of tiles have no capacity of their own here.
   add(slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity);
   add(address(args.items), address(args.bins), address(args.tile_counts), address(args.tile_begins),
-      address(args.tile_order), address(args.records), address(args.parts), address(args.pairs), address(args.depths),
+      address(args.tile_order), address(args.records), address(args.parts), address(args.long_parts), address(args.pairs), address(args.depths),
       address(args.perspectives), address(raster.mesh.depth), address(raster.mesh.color));
   return key;
 }

@@ -62,7 +62,7 @@ struct CudaBatchRenderer::State {
 
   State(CudaBackend& b, const RenderConfig& c)
       : backend(b), config(c), inputs(b), items(b), counters(b), records(b), entries(b), sources(b), several(b), large(b),
-        bins(b), tile_counts(b), tile_begins(b), tile_order(b), depths(b), perspectives(b), hard(b), parts(b), pairs(b),
+        bins(b), tile_counts(b), tile_begins(b), tile_order(b), long_parts(b), depths(b), perspectives(b), hard(b), parts(b), pairs(b),
         pairs_alt(b), mesh(b), mesh_depth(b), mesh_color(b) {
     int device = 0;
     cuda::need(cudaGetDevice(&device), "cudaGetDevice");
@@ -105,7 +105,7 @@ struct CudaBatchRenderer::State {
   Array<cuda::SplatRecord> records;
   Array<cuda::SplatEntry> entries;
   Array<cuda::LargeRows> large;
-  Array<std::uint32_t> sources, several, bins, tile_counts, tile_begins, tile_order;
+  Array<std::uint32_t> sources, several, bins, tile_counts, tile_begins, tile_order, long_parts;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
   Array<cuda::HardSplat> hard;
@@ -117,6 +117,7 @@ struct CudaBatchRenderer::State {
   RasterArgs<float> raster;
   std::uint8_t* rgb8 = nullptr;
   std::size_t input_bytes = 0;
+  std::uint64_t item_capacity = 0;  ///< of the call
   bool recordable = true;
   std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0, pair_capacity = 0;
   BatchStats stats;

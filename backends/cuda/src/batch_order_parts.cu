@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "batch_order.cuh"
+
+// Few cameras: parts of lists are put in order by themselves, by a warp each, or by a block where they are long.
+
+namespace gsnav::cuda {
+
+namespace {
+
+constexpr unsigned kThreads = kOrderThreads, kWarps = kThreads / 32;
+constexpr unsigned kAll = 0xffffffffu;
+
+/// Puts the first of two before the second, or the other way round.
+__device__ inline void put_in_order(std::uint64_t& first, std::uint64_t& second, bool up) {
+  const bool swap = (second < first) == up;
+  const std::uint64_t was = first;
+  first = swap ? second : first;
+  second = swap ? was : second;
+}
+
+/// Puts the K * 32 values of a warp in ascending order, K neighbours a lane: a bitonic sort (Batcher, Sorting networks
+/// and their applications, 1968). All lanes call it. What is between lanes is a loop: unrolled it is longer than what
+/// instructions are cached in.
+template <int K>
+__device__ void sort_in_warp(std::uint64_t (&v)[K]) {
+  const unsigned lane = threadIdx.x % 32;
+  const auto within_lane = [&](int size, bool up) {
+#pragma unroll
+    for (int stride = K / 2; stride > 0; stride /= 2) {
+      if (stride >= size) continue;
+#pragma unroll
+      for (int k = 0; k < K; ++k) {
+        if ((k & stride) == 0) put_in_order(v[k], v[k + stride], size < K ? (k & size) == 0 : up);
+      }
+    }
+  };
+#pragma unroll
+  for (int size = 2; size < K; size *= 2) within_lane(size, true);
+  within_lane(K, lane % 2 == 0);
+#pragma unroll 1
+  for (unsigned lanes = 2; lanes <= 32; lanes *= 2) {
+    const bool up = (lane & lanes) == 0;
+#pragma unroll 1
+    for (unsigned apart = lanes / 2; apart > 0; apart /= 2) {
+      const bool keep_low = ((lane & apart) == 0) == up;
+#pragma unroll
+      for (int k = 0; k < K; ++k) {
+        const std::uint64_t other = __shfl_xor_sync(kAll, v[k], static_cast<int>(apart));
+        v[k] = (other < v[k]) == keep_low ? other : v[k];
+      }
+    }
+    within_lane(2 * K, up);
+  }
+}
+
+/// Puts neighbours of equal keys in the order of their ranks. Depths that are equal by chance are two; false, and all
+/// is left as it is, where they are many.
+template <int K>
+__device__ bool order_equals(const BatchArgs& a, std::uint32_t camera, std::uint64_t (&v)[K], std::uint32_t n) {
+  constexpr int kMost = 8;
+  const unsigned lane = threadIdx.x % 32;
+  const auto key = [](std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); };
+  std::uint64_t before = __shfl_up_sync(kAll, v[K - 1], 1), after = __shfl_down_sync(kAll, v[0], 1);
+  std::uint32_t rank[K];
+  bool any = false;
+#pragma unroll
+  for (int k = 0; k < K; ++k) {
+    const std::uint32_t i = K * lane + static_cast<unsigned>(k);
+    const bool tied = i < n && ((i > 0 && key(k > 0 ? v[k - 1] : before) == key(v[k])) ||
+                                (i + 1 < n && key(k + 1 < K ? v[k + 1] : after) == key(v[k])));
+    rank[k] = 0;
+    if (tied) rank[k] = rank_of(a, camera, static_cast<std::uint32_t>(v[k]));
+    any = any || tied;
+  }
+  if (!__any_sync(kAll, any)) return true;
+  for (int round = 0; round < kMost; ++round) {
+    bool swapped = false;
+#pragma unroll
+    for (int k = 0; k + 1 < K; ++k) {
+      if (key(v[k]) != key(v[k + 1]) || rank[k] <= rank[k + 1]) continue;
+      const std::uint64_t value = v[k];
+      const std::uint32_t r = rank[k];
+      v[k] = v[k + 1];
+      rank[k] = rank[k + 1];
+      v[k + 1] = value;
+      rank[k + 1] = r;
+      swapped = true;
+    }
+    before = __shfl_up_sync(kAll, v[K - 1], 1);
+    after = __shfl_down_sync(kAll, v[0], 1);
+    const std::uint32_t rank_before = __shfl_up_sync(kAll, rank[K - 1], 1),
+                        rank_after = __shfl_down_sync(kAll, rank[0], 1);
+    if (lane > 0 && key(before) == key(v[0]) && rank_before > rank[0]) {
+      v[0] = before;
+      rank[0] = rank_before;
+      swapped = true;
+    }
+    if (lane < 31 && key(after) == key(v[K - 1]) && rank_after < rank[K - 1]) {
+      v[K - 1] = after;
+      rank[K - 1] = rank_after;
+      swapped = true;
+    }
+    if (!__any_sync(kAll, swapped)) return true;
+  }
+  return false;
+}
+
+/// Puts a part of at most K * 32 pairs in order, or returns false.
+template <int K>
+__device__ bool order_part(const BatchArgs& a, const ListPart& part, std::uint32_t camera) {
+  static_assert(K > 1, "the first and last of a lane are two");
+  const unsigned lane = threadIdx.x % 32;
+  const std::uint32_t n = part.end - part.begin;
+  std::uint64_t v[K];
+#pragma unroll
+  for (unsigned k = 0; k < K; ++k) {
+    const std::uint32_t i = 32 * k + lane;
+    v[k] = ~std::uint64_t{0};  // comes last
+    if (i < n) {
+      const Pair pair = a.pairs[part.begin + i];
+      v[k] = std::uint64_t{pair.key} << 32 | pair.slot;
+    }
+  }
+  sort_in_warp(v);
+  if (!order_equals(a, camera, v, n)) return false;
+#pragma unroll
+  for (unsigned k = 0; k < K; ++k) {
+    const std::uint32_t i = K * lane + k;
+    if (i < n) a.pairs[part.begin + i].slot = static_cast<std::uint32_t>(v[k]);
+  }
+  return true;
+}
+
+/// Whether all parts are there; else the call will be repeated.
+__device__ bool is_whole(const BatchArgs& a) { return a.counters->pairs <= a.pair_capacity; }
+
+/// A warp a part; what is too long for one, or has many equal keys, is left for order_long_kernel.
+__global__ void __launch_bounds__(kThreads) order_kernel(const BatchArgs a) {
+  if (!is_whole(a)) return;
+  const std::uint32_t count = a.counters->parts;
+  const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
+  for (std::uint32_t p = blockIdx.x * kWarps + threadIdx.x / 32; p < count; p += gridDim.x * kWarps) {
+    const ListPart part = a.parts[p];
+    const std::uint32_t n = part.end - part.begin, camera = part.tile / tiles;
+    const bool done = n <= 128 ? order_part<4>(a, part, camera) : n <= 256 && order_part<8>(a, part, camera);
+    if (!done && threadIdx.x % 32 == 0) a.long_parts[atomicAdd(&a.counters->long_parts, 1u)] = p;
+  }
+}
+
+__global__ void __launch_bounds__(kThreads) order_long_kernel(const BatchArgs a) {
+  __shared__ OrderShared s;
+  if (!is_whole(a)) return;
+  const std::uint32_t count = a.counters->long_parts;
+  const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
+  for (std::uint32_t p = blockIdx.x; p < count; p += gridDim.x) {
+    const ListPart part = a.parts[a.long_parts[p]];
+    TileOrder order(part, part.tile / tiles);
+    std::uint32_t at = part.begin;
+    while (const std::uint32_t n = order.next(s, a)) {
+      // In place: the block has read all of what it overwrites.
+      for (std::uint32_t i = threadIdx.x; i < n; i += kThreads) a.pairs[at + i].slot = s.slots[i];
+      at += n;
+    }
+    __syncthreads();
+  }
+}
+
+}  // namespace
+
+void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
+  const unsigned processors = static_cast<unsigned>(multiprocessors);
+  order_kernel<<<processors * 8, kThreads, 0, stream>>>(args);
+  order_long_kernel<<<processors * 6, kThreads, 0, stream>>>(args);
+}
+
+}  // namespace gsnav::cuda
