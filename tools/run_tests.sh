@@ -6,7 +6,7 @@
 # The last lines are ctest's, its exit status is the script's.
 #
 # GSNAV_NO_APT=1      never call apt-get
-# GSNAV_DEPS          set of packages: demo, tests, ci (default: tests); see tools/install_deps.sh
+# GSNAV_DEPS          set of packages: demo, tests, ci (default: what the preset needs); see tools/install_deps.sh
 # GSNAV_PRESET        configure preset (default: dev)
 # GSNAV_JOBS=N        compile N files and run N tests at a time (default: see tools/build_jobs.sh)
 # GSNAV_WERROR=ON     warnings are errors (default: as the preset says)
@@ -18,7 +18,9 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 preset=${GSNAV_PRESET:-dev}
 build=$root/build/$preset
 
-"$root/tools/install_deps.sh" "${GSNAV_DEPS:-tests}"
+deps=tests
+[[ $preset == asan-ubsan ]] && deps=ci
+"$root/tools/install_deps.sh" "${GSNAV_DEPS:-$deps}"
 jobs=${GSNAV_JOBS:-$("$root/tools/build_jobs.sh")}
 
 options=()

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <sstream>
 #include <string>
 
 #include "compare.hpp"
@@ -14,6 +15,7 @@
 #include "io/ply_file.hpp"
 #include "io/row_clouds.hpp"
 #include "support/command.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -97,6 +99,52 @@ TEST_CASE("convert: edits, in their order") {
     if (++kept == 20) break;
   }
   CHECK(kept == 20);
+}
+
+TEST_CASE("convert: what was read, dropped and repaired is said line by line") {
+  const TempFolder folder("convert_report");
+  PlyFile file;
+  file.properties = inria_properties(45);
+  const PlyRow good = {
+      {"opacity", 1.0}, {"scale_0", -4.0}, {"scale_1", -4.5}, {"scale_2", -5.0}, {"rot_0", 1.0}};
+  const auto add = [&](int n, const PlyRow& changed) {
+    for (int i = 0; i < n; ++i) {
+      PlyRow row = good;
+      for (const auto& [name, value] : changed) row[name] = value;
+      file.rows.push_back(row);
+    }
+  };
+  add(1, {{"x", -1}, {"y", -2}, {"z", -3}});
+  add(1, {{"x", 4}, {"y", 5}, {"z", 6}});
+  add(11, {{"f_rest_2", 0.25}});  // of the first band, all that is in use
+  add(5, {{"scale_1", 30}});      // more than any scene has: e^20 m at most
+  add(2, {{"y", std::nan("")}});
+  add(1, {{"x", HUGE_VAL}, {"f_dc_1", std::nan("")}});
+  add(4, {{"rot_0", 0}});
+  add(6, {{"opacity", -5.6}});  // 1 / (1 + e^5.6) = 0.0037 < 1/255
+  write_file(folder / "in.ply", file.text());
+  const Outcome out = run(folder, "in.ply out.ply --views 0");
+  CAPTURE(out.text);
+  REQUIRE(out.ok);
+  std::istringstream printed(out.text);
+  const char* const wanted[] = {"in.ply: 18 Gaussians of 31 rows, SH degree 3 (1 in use), 0.0 MB",
+                                "  3 dropped: a value that is not finite",
+                                "  4 dropped: a zero quaternion",
+                                "  6 left out: opacity below 1/255, never visible",
+                                "  5 repaired: log-scale clamped to [-20, 20]",
+                                "  means from (-1, -2, -3) to (4, 5, 6) m",
+                                "  up: -y, guessed by what is usual in such files",
+                                "  filter classic, eps2d 0.3, sorted by depth"};
+  std::string line;
+  for (const char* want : wanted) {
+    REQUIRE(std::getline(printed, line));
+    CHECK(line == want);
+  }
+  REQUIRE(std::getline(printed, line));
+  CHECK(line.rfind("out.ply: 18 Gaussians of SH degree 3, ", 0) == 0);
+  REQUIRE(std::getline(printed, line));
+  CHECK(line.rfind("  largest errors: mean ", 0) == 0);
+  CHECK_FALSE(std::getline(printed, line));
 }
 
 TEST_CASE("convert: tiles are merged, levels chosen") {

@@ -10,6 +10,7 @@
 #include "eval/oracle_support.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "hard_cases/cases.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/data.hpp"
 #include "support/scenes.hpp"
 

@@ -173,9 +173,9 @@ pid_t process_of_rank(int rank, const std::filesystem::path& folder) {
 
 TEST_CASE("a rank is killed while it plays; the job, begun again with fewer ranks, has the numbers of one that was never stopped") {
   const TempFolder folder("killed");
-  const std::string options = " --avatars 1 --episodes 120 --max-steps 300 --policy random --out ";
+  const std::string options = " --avatars 1 --episodes 60 --max-steps 200 --policy random --out ";
   const std::vector<std::string> words{GSNAV_MPIEXEC, "--oversubscribe", "--allow-run-as-root", "-n", "3", GSNAV_EVAL_MPI,
-                                       "--avatars", "1", "--episodes", "120", "--max-steps", "300", "--policy", "random",
+                                       "--avatars", "1", "--episodes", "60", "--max-steps", "200", "--policy", "random",
                                        "--out", "out"};
   Process job(words, folder.path());
   pid_t victim = 0;
@@ -193,14 +193,14 @@ TEST_CASE("a rank is killed while it plays; the job, begun again with fewer rank
     finished += n > 0 ? n - 1 : 0;
   }
   CHECK(finished >= 3);
-  REQUIRE(finished < 120);
+  REQUIRE(finished < 60);
   const auto numbers = [&](int n, const std::string& out) {
     const Outcome run = run_command(GSNAV_MPIEXEC, "--oversubscribe --allow-run-as-root -n " + std::to_string(n) + " " +
                                                        quoted(GSNAV_EVAL_MPI) + options + out, folder.path());
     CAPTURE(run.text);
     REQUIRE(run.ok);
-    REQUIRE(run.says("120 episodes ("));
-    if (out == "out") CHECK(run.says((std::to_string(120 - finished) + " played by 2 ranks").c_str()));
+    REQUIRE(run.says("60 episodes ("));
+    if (out == "out") CHECK(run.says((std::to_string(60 - finished) + " played by 2 ranks").c_str()));
     return run.text.substr(run.text.find("): SR"), run.text.rfind('\n') - run.text.find("): SR"));
   };
   CHECK(numbers(2, "out") == numbers(1, "whole"));

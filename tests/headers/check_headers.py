@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles every public header alone, twice included, with warnings as errors.
+"""Compiles every public header, alone and twice included, with warnings as errors.
 
-usage: check_headers.py COMPILER [--nvcc] [--system DIR]... [--have eigen|glm|dlpack]...
+usage: check_headers.py COMPILER [--nvcc] [--together] [--system DIR]... [--have eigen|glm|dlpack]...
 
 Headers are found when the check runs, so a new one is covered without a new configure. --system adds
-a folder of third-party headers; an interop header is compiled where --have names its library.
+a folder of third-party headers; an interop header is compiled where --have names its library. With --together all
+that have the same options are first compiled as one, which says what this compiler warns of; each is compiled alone
+only where that fails. Another compiler must then see to it that each header includes what it uses.
 """
 import argparse
 import concurrent.futures
@@ -39,21 +41,25 @@ def headers(args):
     return found
 
 
-def compile_alone(header, args, scratch):
-    """The compiler's output, empty where it accepts the header."""
+def strict(header):
+    return layer(header) in DEVICE_LAYERS
+
+
+def compile_headers(checked, args, scratch):
+    """The compiler's output, empty where it accepts the headers in one file; all need the options of the first."""
     include = [f"-I{d}" for d in [ROOT / "include", *BACKENDS]]
-    if header in NEEDS:
+    if any(h in NEEDS for h in checked):
         include += [f"-isystem{d}" for d in args.system]
-    name = header.replace("/", "_")
+    name = str(len(checked)) + "_" + checked[0].replace("/", "_")
     source = scratch / (name + (".cu" if args.nvcc else ".cpp"))
-    source.write_text(f'#include "{header}"\n#include "{header}"\n', encoding="utf-8")
+    source.write_text("".join(f'#include "{h}"\n' for h in checked) * 2, encoding="utf-8")
     if args.nvcc:
         # 2810: nvcc takes the assignment of a nodiscard class for a value dropped; g++ and clang know.
         command = [args.compiler, "-std=c++20", "-Werror", "all-warnings", "-diag-suppress", "2810",
                    "-Xcompiler", "-Wall,-Wextra", *include, "-c", str(source), "-o", str(scratch / (name + ".o"))]
     else:
         command = [args.compiler, "-std=c++20", "-fsyntax-only", "-Werror", *WARNINGS, *include]
-        if layer(header) in DEVICE_LAYERS:
+        if strict(checked[0]):
             command += ["-fno-exceptions", "-fno-rtti"]
         command.append(str(source))
     run = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
@@ -66,16 +72,28 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("compiler")
     parser.add_argument("--nvcc", action="store_true")
+    parser.add_argument("--together", action="store_true")
     parser.add_argument("--system", action="append", default=[])
     parser.add_argument("--have", action="append", default=[])
     args = parser.parse_args()
     checked = headers(args)
+    groups = [[h] for h in checked]
+    if args.together:
+        groups = [[h for h in checked if strict(h)], [h for h in checked if not strict(h)]]
     with tempfile.TemporaryDirectory() as scratch, \
             concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        outputs = pool.map(lambda h: compile_alone(h, args, pathlib.Path(scratch)), checked)
-        wrong = [f"--- {h}\n{text}" for h, text in zip(checked, outputs) if text]
-    print("\n".join(wrong))
-    print(f"{args.compiler}: {len(checked) - len(wrong)} of {len(checked)} headers compile alone")
+        def outputs(parts):
+            return list(pool.map(lambda part: compile_headers(part, args, pathlib.Path(scratch)), parts))
+        groups = [g for g in groups if g]
+        wrong = [(g, text) for g, text in zip(groups, outputs(groups)) if text]
+        if args.together and wrong:
+            alone = [[h] for g, _ in wrong for h in g]
+            each = [(g, text) for g, text in zip(alone, outputs(alone)) if text]
+            wrong = each or wrong  # of headers that are accepted alone, not beside each other
+    print("\n".join(f"--- {' '.join(g)}\n{text}" for g, text in wrong))
+    refused = sum(len(g) for g, _ in wrong)
+    print(f"{args.compiler}: {len(checked) - refused} of {len(checked)} headers compile "
+          f"{'together' if args.together else 'alone'}")
     sys.exit(1 if wrong or not checked else 0)
 
 

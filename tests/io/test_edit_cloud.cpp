@@ -9,6 +9,7 @@
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 #include "row_clouds.hpp"
+#include "support/compiled_frames.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -7,6 +7,7 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/renderer.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;

@@ -12,6 +12,7 @@
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "lod_support.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

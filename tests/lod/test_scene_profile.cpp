@@ -13,6 +13,7 @@
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/scene_profile.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

@@ -3,12 +3,14 @@
 
 #include <cstdlib>
 
+#include "support/sanitized.hpp"
+
 namespace gsnav_test {
 
 /// How many random cases a property is tried on: n times the number in GSNAV_NAV_CASES (1 where it is
-/// not set; a tenth under the address sanitizer, which is that much slower).
+/// not set; a tenth under a sanitizer, which is that much slower).
 inline int cases(int n) {
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(GSNAV_TEST_SANITIZED)
   double factor = 0.1;
 #else
   double factor = 1.0;

@@ -7,6 +7,7 @@
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/scene/renderer.hpp"
+#include "support/compiled_frames.hpp"
 #if defined(_OPENMP)
 #include "gsnav/backends/openmp.hpp"
 #endif
@@ -50,19 +51,9 @@ gsnav::Frames<S> render(B& backend, const std::vector<gsnav::GaussianSet>& sets,
 
 }  // namespace gsnav_test
 
-// Compiled once for all tests (support/frames.cpp).
+// Compiled once for all tests (support/compiled_frames.cpp).
 namespace gsnav {
 using gsnav_test::ToyBackend;
-extern template Status render_camera<float, SerialBackend>(SerialBackend&, RenderWorkspace<float, SerialBackend>&, std::span<const GaussianSet>,
-                       const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
-extern template Status render_composite<float, SerialBackend>(SerialBackend&, RenderWorkspace<float, SerialBackend>&, std::span<const GaussianSet>,
-                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
-                       RenderStats*);
-extern template Status render_camera<double, SerialBackend>(SerialBackend&, RenderWorkspace<double, SerialBackend>&, std::span<const GaussianSet>,
-                       const Camera&, const RenderConfig&, const FrameImages<double>&, RenderStats*);
-extern template Status render_composite<double, SerialBackend>(SerialBackend&, RenderWorkspace<double, SerialBackend>&, std::span<const GaussianSet>,
-                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&,
-                       RenderStats*);
 extern template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>,
                        const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
 extern template Status render_composite<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>,

@@ -11,6 +11,7 @@
 #include "gsnav/scene/edit_cloud.hpp"
 #include "gsnav/sim/semantic_frame.hpp"
 #include "ops/mesh_images.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

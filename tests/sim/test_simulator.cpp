@@ -4,6 +4,7 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/sim/simulator.hpp"
 #include "sim_scene.hpp"
+#include "support/compiled_frames.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -8,6 +8,7 @@
 #include "gsnav/sim/random_policy.hpp"
 #include "gsnav/sim/team.hpp"
 #include "sim_scene.hpp"
+#include "support/compiled_frames.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -7,14 +7,9 @@
 #include <cerrno>
 #include <cstdlib>
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(memory_sanitizer) || \
-    __has_feature(thread_sanitizer)
-#define GSNAV_TEST_SANITIZED
-#endif
-#endif
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && \
-    !defined(GSNAV_TEST_SANITIZED)
+#include "sanitized.hpp"
+
+#if defined(__GLIBC__) && !defined(GSNAV_TEST_SANITIZED)
 #define GSNAV_TEST_WATCHES_HEAP
 #endif
 

@@ -35,7 +35,7 @@ Reply echo(const Request& r) {
   return {200, "text/plain", r.method + r.body, {}};
 }
 
-std::unique_ptr<HttpServer> server() { return std::move(HttpServer::start(quick(), echo).value()); }
+std::unique_ptr<HttpServer> server() { return HttpServer::start(quick(), echo).value(); }
 
 }  // namespace
 

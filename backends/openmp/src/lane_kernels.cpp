@@ -14,9 +14,11 @@ extern const LaneKernels kKernels;
 namespace avx2 {
 extern const LaneKernels kKernels;
 }
+#if defined(GSNAV_ISA_AVX512)
 namespace avx512 {
 extern const LaneKernels kKernels;
 }
+#endif
 #endif
 }  // namespace lanes
 
@@ -30,10 +32,12 @@ const LaneKernels& choose() noexcept {
            (std::strcmp(limit, "avx512") == 0 && std::strcmp(name, "avx2") == 0);
   };
   __builtin_cpu_init();
+#if defined(GSNAV_ISA_AVX512)
   if (allowed("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
       __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw")) {
     return lanes::avx512::kKernels;
   }
+#endif
   if (allowed("avx2") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
     return lanes::avx2::kKernels;
   }

@@ -22,6 +22,7 @@
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/render_composite.hpp"
+#include "gsnav/ops/skin.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
 #include "gsnav/kernels/lanes/kernels.hpp"
 #endif
@@ -198,7 +199,7 @@ class OpenMPBackend : public HostMemory {
 static_assert(Backend<OpenMPBackend>);
 
 #if defined(GSNAV_OPENMP_COMPILED)
-// Compiled in gsnav::openmp: whoever renders need not.
+// Compiled in gsnav::openmp: whoever renders or skins need not.
 extern template Status render_camera<float, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
                        const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
 extern template Status render_composite<float, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
@@ -209,6 +210,8 @@ extern template Status render_camera<double, OpenMPBackend>(OpenMPBackend&, Rend
 extern template Status render_composite<double, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<double, OpenMPBackend>&, std::span<const GaussianSet>,
                        const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&,
                        RenderStats*);
+extern template Status skin_gaussians<float, OpenMPBackend, float>(OpenMPBackend&, const SkinningArgs<float>&);
+extern template Status skin_all<float, OpenMPBackend, float>(OpenMPBackend&, std::span<const SkinningArgs<float>>);
 #endif
 
 }  // namespace gsnav

@@ -19,5 +19,7 @@ template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorkspace<fl
 template Status render_composite<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>,
                 const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
                 RenderStats*);
+template Status skin_gaussians<float, SerialBackend, float>(SerialBackend&, const SkinningArgs<float>&);
+template Status skin_all<float, SerialBackend, float>(SerialBackend&, std::span<const SkinningArgs<float>>);
 
 }  // namespace gsnav
