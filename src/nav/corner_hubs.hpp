@@ -33,14 +33,9 @@ class CornerHubs {
   struct Way {
     double length = std::numeric_limits<double>::infinity();
     std::uint32_t first = 0, last = 0;
+    double to_first = 0, from_last = 0;  ///< straight, metres
     std::uint32_t near_goal = UnfoldedMesh::kNone;  ///< the corner nearest to the goal of those that it sees,
     double to_goal = 0;                             ///< and its distance
-
-    void set(double l, std::uint32_t f, std::uint32_t g) noexcept {
-      length = l;
-      first = f;
-      last = g;
-    }
   };
   /// Distances to a way's goal from below: by the triangle inequality, with the corner near the goal. Until the
   /// thread's next one.
@@ -56,8 +51,13 @@ class CornerHubs {
   };
   /// The shortest path among those that bend; infinite length where there is none.
   Way shortest(const Site& start, const Site& goal) const;
-  /// All points where the way bends, in order.
-  std::vector<Site> bends(const Way& way) const;
+  /// A straight stretch of a way and where it ends.
+  struct Leg {
+    Site end;
+    double length = 0;
+  };
+  /// All legs of a way from its start to its goal, in order.
+  std::vector<Leg> legs(const Way& way, const Site& goal) const;
 
  private:
   /// A corner and the window of the face's edge that it sees the face through; no width for the face's own corners.
@@ -95,6 +95,15 @@ class CornerHubs {
   /// The corners that a site sees, the nearest first.
   void look_from(const Site& from, std::vector<Seen>& out) const;
   Meeting meet(std::uint32_t a, std::uint32_t b) const noexcept;
+  /// Makes `best` the way by these two where its length is less.
+  static void offer(double length, const Seen& first, const Seen& last, Way& best) noexcept {
+    if (!(length < best.length)) return;
+    best.length = length;
+    best.first = first.corner;
+    best.last = last.corner;
+    best.to_first = first.straight;
+    best.from_last = last.straight;
+  }
   /// Of the corners that both ends see, by the table or by the labels.
   void join_by_table(const Site& start, const Site& goal, std::vector<Seen>& near_start, std::vector<Seen>& near_goal,
                      Way& best) const;

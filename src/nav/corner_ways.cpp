@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "corner_hubs.hpp"
 
@@ -84,12 +86,7 @@ void CornerHubs::join_by_table(const Site& start, const Site& goal, std::vector<
     const double* to = row(nearest.corner);
     for (const Seen& seen : from) {
       const double l = seen.straight + to[seen.corner] + nearest.straight;
-      if (!(l < best.length)) continue;
-      if (forward) {
-        best.set(l, seen.corner, nearest.corner);
-      } else {
-        best.set(l, nearest.corner, seen.corner);
-      }
+      offer(l, forward ? seen : nearest, forward ? nearest : seen, best);
     }
   };
   by_nearest(near_start, near_goal[0], true);
@@ -112,8 +109,7 @@ void CornerHubs::join_by_table(const Site& start, const Site& goal, std::vector<
   for (const Seen& a : near_start) {
     const double* to = row(a.corner);
     for (const Seen& b : near_goal) {
-      const double l = a.straight + to[b.corner] + b.straight;
-      if (l < best.length) best.set(l, a.corner, b.corner);
+      offer(a.straight + to[b.corner] + b.straight, a, b, best);
     }
   }
 }
@@ -122,7 +118,7 @@ void CornerHubs::join_by_labels(const Site& start, const Site& goal, const std::
                                 const std::vector<Seen>& near_goal, Way& best) const {
   struct Entry {
     double length = kInfinity;
-    std::uint32_t corner = 0;
+    Seen first;
     std::uint64_t round = 0;
   };
   thread_local std::vector<Entry> from_start;
@@ -137,8 +133,7 @@ void CornerHubs::join_by_labels(const Site& start, const Site& goal, const std::
                              [&](const Seen& a, const Seen& b) { return least(a, end) < least(b, end); });
   };
   const Seen a0 = first(near_start, goal), b0 = first(near_goal, start);
-  const double good = a0.straight + meet(a0.corner, b0.corner).length + b0.straight;
-  if (good < best.length) best.set(good, a0.corner, b0.corner);
+  offer(a0.straight + meet(a0.corner, b0.corner).length + b0.straight, a0, b0, best);
   if (from_start.size() < corners_.size()) from_start.resize(corners_.size());
   ++round;
   for (const Seen& seen : near_start) {
@@ -147,15 +142,14 @@ void CornerHubs::join_by_labels(const Site& start, const Site& goal, const std::
       Entry& e = from_start[labels_[i].hub];
       const double length = seen.straight + labels_[i].length;
       if (length >= best.length || (e.round == round && e.length <= length)) continue;
-      e = {length, seen.corner, round};
+      e = {length, seen, round};
     }
   }
   for (const Seen& seen : near_goal) {
     if (least(seen, start) >= best.length) continue;
     for (std::uint32_t i = first_label_[seen.corner]; i < first_label_[seen.corner + 1]; ++i) {
       const Entry& e = from_start[labels_[i].hub];
-      const double length = seen.straight + labels_[i].length + e.length;
-      if (e.round == round && length < best.length) best.set(length, e.corner, seen.corner);
+      if (e.round == round) offer(seen.straight + labels_[i].length + e.length, e.first, seen, best);
     }
   }
 }
@@ -215,21 +209,26 @@ double CornerHubs::LeastToGoal::from(std::uint32_t vertex) const noexcept {
   return near.from_corner[c] = less(d);
 }
 
-std::vector<Site> CornerHubs::bends(const Way& way) const {
+std::vector<CornerHubs::Leg> CornerHubs::legs(const Way& way, const Site& goal) const {
   const std::uint32_t hub = meet(way.first, way.last).hub;
+  using Place = std::pair<std::uint32_t, double>;  // a corner, and its distance to the hub
   const auto to_hub = [&](std::uint32_t corner) {
-    std::vector<std::uint32_t> out{corner};
-    while (corner != hub_corner_[hub]) {
+    std::vector<Place> out;
+    for (;;) {
       const auto first = labels_.begin() + first_label_[corner], last = labels_.begin() + first_label_[corner + 1];
-      corner = std::find_if(first, last, [&](const Label& l) { return l.hub == hub; })->next;
-      out.push_back(corner);
+      const Label& l = *std::find_if(first, last, [&](const Label& label) { return label.hub == hub; });
+      out.emplace_back(corner, l.length);
+      if (corner == hub_corner_[hub]) return out;
+      corner = l.next;
     }
-    return out;
   };
-  std::vector<std::uint32_t> order = to_hub(way.first), back = to_hub(way.last);
+  std::vector<Place> order = to_hub(way.first), back = to_hub(way.last);
   order.insert(order.end(), back.rbegin() + 1, back.rend());
-  std::vector<Site> out;
-  for (const std::uint32_t c : order) out.push_back(corners_[c]);
+  std::vector<Leg> out{{corners_[way.first], way.to_first}};
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    out.push_back({corners_[order[i].first], std::abs(order[i].second - order[i - 1].second)});
+  }
+  out.push_back({goal, way.from_last});
   return out;
 }
 

@@ -14,8 +14,8 @@ namespace gsnav::detail {
 /// than what crosses those between as well.
 class FaceViews {
  public:
-  /// Nothing is known, so that empty() holds, of a mesh with more pairs of a face and an edge than this (two bytes each,
-  /// 32 MiB: some 2000 faces).
+  /// Nothing is known, so that empty() holds, of a mesh with more pairs of a face and an edge than this (two bytes
+  /// each, 32 MiB: some 2000 faces).
   static constexpr std::size_t kMostPairs = std::size_t{1} << 24;
   /// Beams followed in all; from an edge with more than its part of them everything is taken to be seen.
   static constexpr std::size_t kMostBeams = std::size_t{1} << 21;
@@ -37,7 +37,7 @@ class FaceViews {
     return ranges_[std::size_t{goal} * edges_ + edge];
   }
   /// Takes what of the window [right, left] of the edge, both as shares of its length, lines from a root reach
-  /// within the range; false where that is nothing. The root lies at `along` the edge, in shares of it, and `inside` it.
+  /// within the range; false where that is nothing. The root lies at `along` the edge and `inside` it, both in shares.
   static bool narrow(Range range, double along, double inside, double& right, double& left) noexcept;
 
  private:
