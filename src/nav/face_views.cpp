@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kRounding = 1e-8;  // square metres: what only touches a beam is in it
 constexpr double kShort = 1e-6;     // metres: the direction between points so near is not known
+constexpr double kPoint = 1e-9;     // metres: edges so short are points
 constexpr double kSame = 1e-7;      // radians: directions so near are one
 constexpr double kSlack = 1e-6;     // of an edge's length: what is left beside a range
 
@@ -120,6 +121,7 @@ bool FaceViews::look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::
   const UnfoldedMesh::Edge& from = mesh.edges[edge];
   if (from.twin == UnfoldedMesh::kNone) return true;
   const Flat right = from.at, left = mesh.edges[mesh.next(edge)].at;
+  if (!(length(left - right) > kPoint)) return false;  // in a file only: it has no direction
   std::vector<Beam> open{enter(from, {edge, right, left, right, left, right - left, left - right})};
   for (std::size_t n = 0; !open.empty(); ++n) {
     if (n == most) return false;
