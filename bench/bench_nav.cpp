@@ -29,6 +29,7 @@ struct Scene {
   std::vector<NavPoint> points;
   std::vector<Vec3d> positions;
   std::unique_ptr<GeodesicField> field;
+  double prepare_ms = 0;  ///< processor time of the first distance
   std::unique_ptr<dtNavMeshQuery, void (*)(dtNavMeshQuery*)> detour{dtAllocNavMeshQuery(), dtFreeNavMeshQuery};
 
   explicit Scene(NavMesh m) : mesh(std::make_unique<NavMesh>(std::move(m))) {
@@ -39,7 +40,9 @@ struct Scene {
     }
     constexpr int kNodes = 65535;
     detour->init(mesh->impl().mesh.get(), kNodes);
+    const std::clock_t begin = std::clock();
     (void)mesh->distance_between(points[0], points[1]);  // prepares all others, once a mesh
+    prepare_ms = 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
     field = std::make_unique<GeodesicField>(GeodesicField::make(*mesh, std::span(positions).first(1)).value());
   }
 };
@@ -106,20 +109,42 @@ void pairs(benchmark::State& state, const Scene* (*make)(), F&& f) {
   state.counters["polygons"] = static_cast<double>(scene->mesh->polygon_count());
 }
 
+/// pairs() of a length, with its error against the search over windows, which needs no tables: `worst_error` in metres,
+/// `mean_error` in parts of the length.
+template <class F>
+void lengths(benchmark::State& state, const Scene* (*make)(), F&& f) {
+  pairs(state, make, f);
+  const Scene* scene = make();
+  if (scene == nullptr) return;
+  const NavMesh::Impl& impl = scene->mesh->impl();
+  detail::GeodesicSearch search;
+  double worst = 0, sum = 0, whole = 0;
+  for (std::size_t i = 0; i < 512; ++i) {
+    const double truth = search.run(impl.unfolded(), impl.site(scene->points[i]), impl.site(scene->points[i + 1]));
+    const double off = std::abs(f(*scene, i, i + 1) - truth);
+    worst = max(worst, off);
+    sum += off;
+    whole += truth;
+  }
+  state.counters["worst_error"] = worst;
+  state.counters["mean_error"] = sum / whole;
+}
+
 void detour(benchmark::State& state, const Scene* (*make)()) {
-  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
+  lengths(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
     return detour_geodesic(s.mesh->impl(), *s.detour, s.positions[a], s.positions[b]);
   });
 }
 void geodesic(benchmark::State& state, const Scene* (*make)()) {
-  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
+  lengths(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
     return s.mesh->geodesic_distance(s.positions[a], s.positions[b]);
   });
 }
 void geodesic_with_handles(benchmark::State& state, const Scene* (*make)()) {
-  pairs(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
+  lengths(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
     return s.mesh->distance_between(s.points[a], s.points[b]);
   });
+  if (const Scene* scene = make()) state.counters["prepare_ms"] = scene->prepare_ms;
 }
 void path_with_handles(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make, [](const Scene& s, std::size_t a, std::size_t b) {
@@ -336,7 +361,7 @@ GSNAV_NAV_BENCH(detour_snap);
 GSNAV_NAV_BENCH(obstacle);
 #define GSNAV_BUILD_BENCH(scene) \
   BENCHMARK_CAPTURE(build, scene, scene##_triangles) \
-      ->ArgNames({"threads", "tile"})->ArgsProduct({{1, 2}, {64, 128}})->Unit(benchmark::kMillisecond)->UseRealTime()
+      ->ArgNames({"threads", "tile"})->ArgsProduct({{1, 2}, {64, 100, 128}})->Unit(benchmark::kMillisecond)->UseRealTime()
 GSNAV_BUILD_BENCH(flat);
 GSNAV_BUILD_BENCH(nav_test);
 GSNAV_BUILD_BENCH(dungeon);

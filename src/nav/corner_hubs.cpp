@@ -23,6 +23,8 @@ CornerHubs::CornerHubs(const UnfoldedMesh& mesh) {
     sights_.clear();
     sights_.shrink_to_fit();
     first_sight_.clear();
+  } else {
+    fill_table();
   }
 }
 
@@ -204,164 +206,22 @@ bool CornerHubs::label(const std::vector<std::vector<Link>>& links) {
   return true;
 }
 
-namespace {
-
-/// Where the point (x, y) is within both sides of a sight: 0 no, 1 perhaps, 2 yes.
-void inside_sides(const float* __restrict sides, std::size_t n, float x, float y, float margin,
-                  std::uint8_t* __restrict out) noexcept {
-  for (std::size_t i = 0; i < n; ++i) {
-    const float r = sides[i] * x + sides[n + i] * y + sides[2 * n + i];
-    const float l = sides[3 * n + i] * x + sides[4 * n + i] * y + sides[5 * n + i];
-    const float least = min(r, l);
-    out[i] = static_cast<std::uint8_t>((least >= -margin ? 1 : 0) + (least > margin ? 1 : 0));
-  }
-}
-
-}  // namespace
-
-void CornerHubs::look_from(const Site& from, const Site& to, std::vector<Seen>& out) const {
-  out.clear();
-  std::size_t first = 0;
-  thread_local std::vector<std::uint8_t> within;
-  const std::size_t begin = first_sight_[from.face], n = first_sight_[from.face + 1] - begin;
-  const Frame& frame = frames_[from.face];
-  const float x = static_cast<float>(from.at.x - frame.origin.x), y = static_cast<float>(from.at.y - frame.origin.y);
-  if (within.size() < n) within.resize(n);
-  inside_sides(sides_.data() + std::size_t{6} * begin, n, x, y, frame.margin, within.data());
-  for (std::size_t i = 0; i < n; ++i) {
-    if (within[i] == 0) continue;
-    const Root& root = roots_[begin + i];
-    const Flat d = from.at - root.at;
-    if (within[i] == 1) {
-      const Sight& s = sights_[begin + i];
-      if (cross(s.right - s.root, d) < -kRounding || cross(s.left - s.root, d) > kRounding) continue;
+void CornerHubs::fill_table() {
+  const std::size_t n = corners_.size();
+  if (n > kMostTable) return;
+  table_.assign(n * n, kInfinity);
+  std::vector<double> to_hub(n, kInfinity);
+  for (std::size_t a = 0; a < n; ++a) {
+    for (std::uint32_t i = first_label_[a]; i < first_label_[a + 1]; ++i) to_hub[labels_[i].hub] = labels_[i].length;
+    for (std::size_t b = 0; b <= a; ++b) {
+      double d = kInfinity;
+      for (std::uint32_t i = first_label_[b]; i < first_label_[b + 1]; ++i) {
+        d = min(d, labels_[i].length + to_hub[labels_[i].hub]);
+      }
+      table_[a * n + b] = table_[b * n + a] = d;
     }
-    const double straight = length(d);
-    out.push_back({straight, straight + distance(corners_[root.corner].position, to.position), root.corner});
-    if (out.back().least < out[first].least) first = out.size() - 1;
+    for (std::uint32_t i = first_label_[a]; i < first_label_[a + 1]; ++i) to_hub[labels_[i].hub] = kInfinity;
   }
-  if (!out.empty()) std::swap(out[0], out[first]);
-}
-
-void CornerHubs::meet(const Seen& a, const Seen& b, Way& best) const noexcept {
-  std::uint32_t i = first_label_[a.corner], j = first_label_[b.corner];
-  while (i < first_label_[a.corner + 1] && j < first_label_[b.corner + 1]) {
-    const Label &x = labels_[i], &y = labels_[j];
-    if (x.hub == y.hub) {
-      const double length = a.straight + x.length + y.length + b.straight;
-      if (length < best.length) best.set(length, a.corner, x.hub, b.corner);
-    }
-    i += x.hub <= y.hub ? 1 : 0;
-    j += y.hub <= x.hub ? 1 : 0;
-  }
-}
-
-CornerHubs::Way CornerHubs::shortest(const Site& start, const Site& goal) const {
-  struct Entry {
-    double length = kInfinity;
-    std::uint32_t corner = 0;
-    std::uint64_t round = 0;
-  };
-  thread_local std::vector<Entry> from_start;
-  thread_local std::vector<Seen> near_start, near_goal;
-  thread_local std::uint64_t round = 0;
-  Way best;
-  look_from(start, goal, near_start);
-  look_from(goal, start, near_goal);
-  for (const Seen& seen : near_goal) {
-    if (best.near_goal != UnfoldedMesh::kNone && seen.straight >= best.to_goal) continue;
-    best.near_goal = seen.corner;
-    best.to_goal = seen.straight;
-  }
-  if (near_start.empty() || near_goal.empty()) return best;
-  // A good way first, by the corners that lead most nearly to the other end: most others are then too far.
-  meet(near_start[0], near_goal[0], best);
-  if (from_start.size() < corners_.size()) from_start.resize(corners_.size());
-  ++round;
-  for (const Seen& seen : near_start) {
-    if (seen.least >= best.length) continue;
-    for (std::uint32_t i = first_label_[seen.corner]; i < first_label_[seen.corner + 1]; ++i) {
-      Entry& e = from_start[labels_[i].hub];
-      const double length = seen.straight + labels_[i].length;
-      if (length >= best.length || (e.round == round && e.length <= length)) continue;
-      e = {length, seen.corner, round};
-    }
-  }
-  for (const Seen& seen : near_goal) {
-    if (seen.least >= best.length) continue;
-    for (std::uint32_t i = first_label_[seen.corner]; i < first_label_[seen.corner + 1]; ++i) {
-      const Entry& e = from_start[labels_[i].hub];
-      const double length = seen.straight + labels_[i].length + e.length;
-      if (e.round == round && length < best.length) best.set(length, e.corner, labels_[i].hub, seen.corner);
-    }
-  }
-  return best;
-}
-
-namespace {
-
-/// Of the corner near a goal, and what came of it.
-struct NearGoal {
-  std::vector<double> to_hub;            ///< infinity where it has no label
-  std::vector<std::uint32_t> set;        ///< the finite ones
-  std::vector<double> from_corner;       ///< where `round_of` is the round
-  std::vector<std::uint64_t> round_of;
-  std::uint64_t round = 0;
-};
-NearGoal& near_goal_of_thread() {
-  thread_local NearGoal n;
-  return n;
-}
-
-}  // namespace
-
-CornerHubs::LeastToGoal::LeastToGoal(const CornerHubs& hubs, const Way& way) : hubs_(hubs), way_(way) {
-  NearGoal& near = near_goal_of_thread();
-  for (const std::uint32_t hub : near.set) near.to_hub[hub] = kInfinity;
-  near.set.clear();
-  ++near.round;
-  const std::size_t n = hubs.corners_.size();
-  if (near.to_hub.size() < n) {
-    near.to_hub.resize(n, kInfinity);
-    near.from_corner.resize(n);
-    near.round_of.resize(n, 0);
-  }
-  if (way.near_goal == UnfoldedMesh::kNone) return;
-  for (std::uint32_t i = hubs.first_label_[way.near_goal]; i < hubs.first_label_[way.near_goal + 1]; ++i) {
-    near.to_hub[hubs.labels_[i].hub] = hubs.labels_[i].length;
-    near.set.push_back(hubs.labels_[i].hub);
-  }
-}
-
-double CornerHubs::LeastToGoal::from(std::uint32_t vertex) const noexcept {
-  const std::uint32_t c = hubs_.corner_of_[vertex];
-  if (c == UnfoldedMesh::kNone || way_.near_goal == UnfoldedMesh::kNone) return 0;
-  NearGoal& near = near_goal_of_thread();
-  if (near.round_of[c] == near.round) return near.from_corner[c];
-  double d = kInfinity;
-  for (std::uint32_t i = hubs_.first_label_[c]; i < hubs_.first_label_[c + 1]; ++i) {
-    d = min(d, hubs_.labels_[i].length + near.to_hub[hubs_.labels_[i].hub]);
-  }
-  near.round_of[c] = near.round;
-  // Less what rounding may have left out.
-  return near.from_corner[c] = d < kInfinity ? max(d - way_.to_goal - kRounding, 0.0) : 0.0;
-}
-
-std::vector<Site> CornerHubs::bends(const Way& way) const {
-  const auto to_hub = [&](std::uint32_t corner) {
-    std::vector<std::uint32_t> out{corner};
-    while (corner != hub_corner_[way.hub]) {
-      const auto first = labels_.begin() + first_label_[corner], last = labels_.begin() + first_label_[corner + 1];
-      corner = std::find_if(first, last, [&](const Label& l) { return l.hub == way.hub; })->next;
-      out.push_back(corner);
-    }
-    return out;
-  };
-  std::vector<std::uint32_t> order = to_hub(way.first), back = to_hub(way.last);
-  order.insert(order.end(), back.rbegin() + 1, back.rend());
-  std::vector<Site> out;
-  for (const std::uint32_t c : order) out.push_back(corners_[c]);
-  return out;
 }
 
 }  // namespace gsnav::detail

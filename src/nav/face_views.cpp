@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "face_views.hpp"
 
+#include <array>
+#include <cmath>
+
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav::detail {
 namespace {
 
 constexpr double kRounding = 1e-8;  // square metres: what only touches a beam is in it
+constexpr double kShort = 1e-6;     // metres: the direction between points so near is not known
+constexpr double kPoint = 1e-9;     // metres: edges so short are points
+constexpr double kSame = 1e-7;      // radians: directions so near are one
+constexpr double kSlack = 1e-6;     // of an edge's length: what is left beside a range
 
 /// The lines across a first edge and all that they crossed since, as they enter a face; in its plane.
 /// None is right of the line from the first edge's left end to `right`, or left of that from its right
@@ -14,47 +21,117 @@ constexpr double kRounding = 1e-8;  // square metres: what only touches a beam i
 struct Beam {
   std::uint32_t edge = 0;
   Flat first_right, first_left, right, left;
+  Flat rightmost, leftmost;  ///< directions that bound theirs, at most half a turn
 };
 
 Beam enter(const UnfoldedMesh::Edge& e, const Beam& b) noexcept {
-  return {e.twin, UnfoldedMesh::across(e, b.first_right), UnfoldedMesh::across(e, b.first_left),
-          UnfoldedMesh::across(e, b.right), UnfoldedMesh::across(e, b.left)};
+  const auto turned = [&](const Flat& d) {
+    return e.same_plane ? d : Flat{e.cosine * d.x - e.sine * d.y, e.sine * d.x + e.cosine * d.y};
+  };
+  return {e.twin,
+          UnfoldedMesh::across(e, b.first_right),
+          UnfoldedMesh::across(e, b.first_left),
+          UnfoldedMesh::across(e, b.right),
+          UnfoldedMesh::across(e, b.left),
+          turned(b.rightmost),
+          turned(b.leftmost)};
 }
+
+/// What a beam's lines have between two directions more, each taken where it is within half a turn and tighter; false
+/// where no line is left.
+bool bound(Beam& b, const Flat& right, const Flat& left) noexcept {
+  if (cross(b.rightmost, right) > 0) b.rightmost = right;
+  if (cross(left, b.leftmost) > 0) b.leftmost = left;
+  const double c = cross(b.rightmost, b.leftmost);
+  return !(c < 0 && c * c > kSame * kSame * dot(b.rightmost, b.rightmost) * dot(b.leftmost, b.leftmost));
+}
+
+/// Directions across an edge; false where no line is left.
+bool cross_edge(Beam& b, const Flat& e) noexcept {
+  const Flat back = e * -1.0;
+  if (cross(b.rightmost, back) > 0) return bound(b, back, b.leftmost);
+  if (cross(b.rightmost, back) < 0) return bound(b, b.rightmost, e);
+  return dot(b.rightmost, back) > 0;
+}
+
+/// Directions between the ends of the first edge and of the last window; false where no line is left.
+bool look_ahead(Beam& b) noexcept {
+  // Lines cross the first edge outwards: what lies elsewhere bounds nothing.
+  const Flat first = b.first_left - b.first_right, right = b.right - b.first_left, left = b.left - b.first_right;
+  const auto bounds = [&](const Flat& d) { return cross(first, d) < 0 && dot(d, d) > kShort * kShort; };
+  return bound(b, bounds(right) ? right : b.rightmost, bounds(left) ? left : b.leftmost);
+}
+
+/// See FaceViews::Range; not rounded.
+double step_of(const Flat& direction, const Flat& edge) noexcept {
+  const double x = dot(direction, edge), y = max(-cross(edge, direction), 0.0), sum = std::abs(x) + y;
+  return (x / sum + 1.0) * (0.5 * FaceViews::kSteps);
+}
+
+constexpr std::array<double, FaceViews::kSteps + 1> kCotangents = [] {
+  std::array<double, FaceViews::kSteps + 1> c{};
+  for (std::size_t k = 1; k < FaceViews::kSteps; ++k) {
+    const double x = 2.0 * static_cast<double>(k) / FaceViews::kSteps - 1.0;
+    c[k] = x / (1.0 - (x < 0 ? -x : x));
+  }
+  return c;
+}();
 
 }  // namespace
 
 FaceViews::FaceViews(const UnfoldedMesh& mesh) {
-  if (mesh.faces.empty() || mesh.faces.size() > kMostFaces) return;
-  faces_ = mesh.faces.size();
-  through_.assign(faces_ * faces_, 0);
-  const std::size_t most = kMostBeams / mesh.edges.size() + 1;
-  for (std::uint32_t f = 0; f < faces_; ++f) {
-    for (std::uint32_t k = 0; k < mesh.faces[f].count; ++k) {
-      if (look_through(mesh, mesh.faces[f].first + k, most)) continue;
-      for (std::size_t goal = 0; goal < faces_; ++goal) through_[goal * faces_ + f] |= bit(k);
-    }
+  const std::size_t faces = mesh.faces.size();
+  if (faces == 0 || mesh.edges.size() > kMostPairs / faces) return;
+  edges_ = mesh.edges.size();
+  ranges_.resize(faces * edges_);
+  const std::size_t most = kMostBeams / edges_ + 1;
+  for (std::uint32_t e = 0; e < edges_; ++e) {
+    if (look_through(mesh, e, most)) continue;
+    for (std::size_t goal = 0; goal < faces; ++goal) ranges_[goal * edges_ + e] = {0, kSteps};
   }
   // Who is not seen does not see.
-  for (std::size_t a = 0; a < faces_; ++a) {
+  const auto sees = [&](std::size_t from, std::size_t goal) {
+    const UnfoldedMesh::Face& f = mesh.faces[from];
+    for (std::size_t e = f.first; e < f.first + f.count; ++e) {
+      if (ranges_[goal * edges_ + e].low <= ranges_[goal * edges_ + e].high) return true;
+    }
+    return false;
+  };
+  const auto forget = [&](std::size_t from, std::size_t goal) {
+    const UnfoldedMesh::Face& f = mesh.faces[from];
+    for (std::size_t e = f.first; e < f.first + f.count; ++e) ranges_[goal * edges_ + e] = {};
+  };
+  for (std::size_t a = 0; a < faces; ++a) {
     for (std::size_t b = 0; b < a; ++b) {
-      std::uint8_t &there = through_[a * faces_ + b], &back = through_[b * faces_ + a];
-      if (there == 0 || back == 0) there = back = 0;
+      const bool there = sees(a, b), back = sees(b, a);
+      if (there && !back) forget(a, b);
+      if (back && !there) forget(b, a);
     }
   }
+}
+
+bool FaceViews::narrow(Range range, double along, double inside, double& right, double& left) noexcept {
+  if (range.low > range.high) return false;
+  if (range.low > 0) right = max(right, along + inside * kCotangents[range.low] - kSlack);
+  if (range.high < kSteps) left = min(left, along + inside * kCotangents[range.high] + kSlack);
+  return right < left;
 }
 
 bool FaceViews::look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::size_t most) {
   const UnfoldedMesh::Edge& from = mesh.edges[edge];
   if (from.twin == UnfoldedMesh::kNone) return true;
-  const std::uint8_t mark = bit(edge - mesh.faces[from.face].first);
   const Flat right = from.at, left = mesh.edges[mesh.next(edge)].at;
-  std::vector<Beam> open{enter(from, {edge, right, left, right, left})};
+  if (!(length(left - right) > kPoint)) return false;  // in a file only: it has no direction
+  std::vector<Beam> open{enter(from, {edge, right, left, right, left, right - left, left - right})};
   for (std::size_t n = 0; !open.empty(); ++n) {
     if (n == most) return false;
     const Beam b = open.back();
     open.pop_back();
     const UnfoldedMesh::Face& face = mesh.faces[mesh.edges[b.edge].face];
-    through_[std::size_t{mesh.edges[b.edge].face} * faces_ + from.face] |= mark;
+    const Flat first = b.first_left - b.first_right;
+    Range& range = ranges_[std::size_t{mesh.edges[b.edge].face} * edges_ + edge];
+    range.low = min(range.low, static_cast<std::uint8_t>(std::floor(step_of(b.rightmost, first))));
+    range.high = max(range.high, static_cast<std::uint8_t>(std::ceil(step_of(b.leftmost, first))));
     // The outermost lines cross between the ends.
     const Flat to_right = b.right - b.first_left, to_left = b.left - b.first_right;
     std::uint32_t e = mesh.next(b.edge);
@@ -74,8 +151,8 @@ bool FaceViews::look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::
       // An end of the first edge that is beyond this one sees it from behind, which limits nothing.
       const bool by_right = cross(r - b.first_left, l - b.first_left) > 0;
       const bool by_left = cross(l - b.first_right, r - b.first_right) < 0;
-      open.push_back(enter(mesh.edges[e], {e, b.first_right, b.first_left, by_right ? r : b.right,
-                                           by_left ? l : b.left}));
+      Beam next{e, b.first_right, b.first_left, by_right ? r : b.right, by_left ? l : b.left, b.rightmost, b.leftmost};
+      if (cross_edge(next, q - p) && look_ahead(next)) open.push_back(enter(mesh.edges[e], next));
     }
   }
   return true;

@@ -87,7 +87,7 @@ class GeodesicSearch {
   void open(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left, double g,
             std::uint32_t parent);
   /// The same for the straight way to a goal.
-  void open_straight(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left, std::uint32_t parent);
+  void open_straight(std::uint32_t edge, const Flat& root, Flat right, Flat left, std::uint32_t parent);
   void reach(std::uint32_t edge, const Flat& root, double g, std::uint32_t parent);
   void offer_goal(double length, std::uint32_t node);
   void push(double f, const Node& node);

@@ -61,11 +61,21 @@ std::size_t GeodesicSearch::look_around(const UnfoldedMesh& mesh, std::uint32_t 
   return bending;
 }
 
-void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left,
-                                   std::uint32_t parent) {
+void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, Flat right, Flat left, std::uint32_t parent) {
   const UnfoldedMesh::Edge &here = mesh_->edges[edge], &there = mesh_->edges[here.twin],
                            &after = mesh_->edges[mesh_->next(edge)];
-  if (views_ != nullptr && !views_->may_lead(here.face, edge - mesh_->faces[here.face].first, goal_.face)) return;
+  if (views_ != nullptr) {
+    const FaceViews::Range range = views_->toward(goal_.face, edge);
+    if (range.low > range.high) return;
+    const Flat side = after.at - here.at;
+    const double inverse = 1.0 / dot(side, side);
+    const auto along = [&](const Flat& p) { return dot(p - here.at, side) * inverse; };
+    const double right_was = along(right), left_was = along(left);
+    double r = right_was, l = left_was;
+    if (!FaceViews::narrow(range, along(root), max(cross(side, root - here.at) * inverse, 0.0), r, l)) return;
+    if (r > right_was) right = here.at + side * r;
+    if (l < left_was) left = here.at + side * l;
+  }
   const double to_right = length(right - root), to_left = length(left - root);
   // Where there are many: moving off a corner, what is left may shrink by as much, the way there grows by less, so that
   // the far end is the least.

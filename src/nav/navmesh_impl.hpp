@@ -53,9 +53,14 @@ struct NavMesh::Impl {
   mutable std::atomic<const detail::UnfoldedMesh*> unfolded_mesh{nullptr};
   /// Made when first asked for: who never asks for a distance pays nothing.
   const detail::CornerHubs& hubs() const {
+    const detail::CornerHubs* made = corner_hubs.load(std::memory_order_acquire);
+    return made != nullptr ? *made : make_hubs();
+  }
+  const detail::CornerHubs& make_hubs() const {
     std::call_once(hubs_once, [&] {
       made_hubs = std::make_unique<const detail::CornerHubs>(unfolded());
       if (!made_hubs->empty()) made_views = detail::FaceViews(unfolded());
+      corner_hubs.store(made_hubs.get(), std::memory_order_release);
     });
     return *made_hubs;
   }
@@ -63,6 +68,7 @@ struct NavMesh::Impl {
   const detail::FaceViews& views() const noexcept { return made_views; }
   mutable std::once_flag hubs_once;
   mutable std::unique_ptr<const detail::CornerHubs> made_hubs;
+  mutable std::atomic<const detail::CornerHubs*> corner_hubs{nullptr};
   mutable detail::FaceViews made_views;
   Aabb<double> bounds;  ///< world
   std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon

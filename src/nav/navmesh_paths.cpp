@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSame = 1e-9;  // metres
+constexpr double kLeg = 1e-6;   // metres: what rounding may add to a leg
 
 std::string text(const Vec3d& p) {
   char buffer[96];
@@ -61,18 +62,14 @@ NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal)
   }
   if (!(way.length < kInfinity)) return searched();
   path.length = way.length;
-  double done = 0;
-  std::vector<detail::Site> sites = hubs().bends(way);
-  sites.insert(sites.begin(), start);
-  sites.push_back(goal);
   // Leg by leg; its length is known.
-  for (std::size_t i = 1; i < sites.size(); ++i) {
-    const double leg = search.run(unfolded(), sites[i - 1], sites[i], way.length - done + 1e-6);
-    if (!(leg < kInfinity)) return searched();
-    done += leg;
+  detail::Site at = start;
+  for (const detail::CornerHubs::Leg& leg : hubs().legs(way, goal)) {
+    if (!(search.run(unfolded(), at, leg.end, leg.length + kLeg) < kInfinity)) return searched();
     for (const Vec3d& p : search.path()) {
       if (path.points.empty() || norm(p - path.points.back()) > kSame) path.points.push_back(p);
     }
+    at = leg.end;
   }
   if (path.points.size() == 1) path.points.push_back(goal.position);
   return path;

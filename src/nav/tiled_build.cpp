@@ -3,6 +3,7 @@
 // erosion and filters see what they would see in one tile: the same cells can be walked on.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <new>
 #include <optional>
 #include <thread>
@@ -81,26 +82,32 @@ struct TriangleLists {
       : first(grid.count() + 1, 0) {
     const double rim = (grid.border + 1) * grid.settings.cell_size;
     const auto index = [&](double v, int n) {
-      return static_cast<std::size_t>(
-          clamp(std::floor(v / grid.side()), 0.0, static_cast<double>(n - 1)));
+      return static_cast<std::uint32_t>(clamp(v / grid.side(), 0.0, static_cast<double>(n - 1)));
     };
-    const auto each_tile = [&](const NavMesh::Triangle& t, const auto& f) {
-      Aabb<double> b;
-      for (const std::uint32_t v : t) b.add(vertices[v] - origin);
-      const Vec3d low = b.low - grid.box.low, high = b.high - grid.box.low;
-      for (std::size_t z = index(low.z - rim, grid.nz); z <= index(high.z + rim, grid.nz); ++z) {
-        for (std::size_t x = index(low.x - rim, grid.nx); x <= index(high.x + rim, grid.nx); ++x) {
-          f(x + static_cast<std::size_t>(grid.nx) * z);
-        }
+    struct Reach {
+      std::uint32_t x0, x1, z0, z1;
+    };
+    std::vector<Reach> reach;
+    reach.reserve(triangles_in.size());
+    const double x = origin.x + grid.box.low.x, z = origin.z + grid.box.low.z;
+    for (const NavMesh::Triangle& t : triangles_in) {
+      const Vec3d &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
+      reach.push_back({index(min(a.x, min(b.x, c.x)) - x - rim, grid.nx),
+                       index(max(a.x, max(b.x, c.x)) - x + rim, grid.nx),
+                       index(min(a.z, min(b.z, c.z)) - z - rim, grid.nz),
+                       index(max(a.z, max(b.z, c.z)) - z + rim, grid.nz)});
+    }
+    const auto each_tile = [&](const Reach& r, const auto& f) {
+      for (std::uint32_t row = r.z0; row <= r.z1; ++row) {
+        for (std::uint32_t column = r.x0; column <= r.x1; ++column) f(column + static_cast<std::size_t>(grid.nx) * row);
       }
     };
-    for (const NavMesh::Triangle& t : triangles_in)
-      each_tile(t, [&](std::size_t tile) { ++first[tile + 1]; });
+    for (const Reach& r : reach) each_tile(r, [&](std::size_t tile) { ++first[tile + 1]; });
     for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
     triangles.resize(first.back());
     std::vector<std::size_t> at(first.begin(), first.end() - 1);
-    for (std::uint32_t i = 0; i < triangles_in.size(); ++i) {
-      each_tile(triangles_in[i], [&](std::size_t tile) { triangles[at[tile]++] = i; });
+    for (std::uint32_t i = 0; i < reach.size(); ++i) {
+      each_tile(reach[i], [&](std::size_t tile) { triangles[at[tile]++] = i; });
     }
   }
 };
@@ -173,7 +180,15 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
   std::vector<TilePolygons> tiles(grid.count());
   std::vector<Status> failed(tiles.size() + 1);
   std::optional<TriangleHeights> heights;
-  const auto piece = [&](std::uint32_t i) noexcept {
+  // The most work first, so that no thread is left with it at the end. Piece 0, the heights, has all triangles but does
+  // an eighth as much with each as a tile.
+  std::vector<std::pair<std::size_t, std::uint32_t>> work{{triangles.size() / 8, 0}};
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    work.emplace_back(lists.first[i + 1] - lists.first[i], static_cast<std::uint32_t>(i + 1));
+  }
+  std::sort(work.begin(), work.end(), std::greater<>());
+  const auto piece = [&](std::uint32_t turn) noexcept {
+    const std::uint32_t i = work[turn].second;
     try {
       if (i == 0) {
         heights.emplace(vertices, triangles, origin, box);

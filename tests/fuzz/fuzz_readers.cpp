@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // libFuzzer over every reader. GSNAV_FUZZ_READER names the one; tools/fuzz.sh runs them all.
+#include <DetourAlloc.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -7,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <new>
 
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/avatar_scene_file.hpp"
@@ -254,13 +256,22 @@ void read_makehuman(const std::string& input) {
   (void)io::load_makehuman(folder / "a.obj", options);
 }
 
+/// Reading may ask for four times the file, Detour's allocations counted; questions for more.
 void read_navmesh(const std::string& input) {
+  reset_largest_allocation();
   const auto mesh = parse_navmesh(bytes_of(input), "fuzz");
+  const std::size_t most = largest_allocation();
+  if (most > 4 * input.size() + 1024) {  // or a line of what is wrong
+    stop("parsing " + std::to_string(input.size()) + " bytes asked for " + std::to_string(most));
+  }
   if (!mesh) return;
   Rng rng(1);
   const NavPoint a = mesh->random_point(rng), b = mesh->random_point(rng);
+  if (!is_finite(a.position) || !is_finite(b.position)) stop("a random point that is nowhere");
   (void)mesh->path_between(a, b);
   (void)mesh->snap_point(a.position);
+  (void)mesh->walk(a, b.position - a.position, true);
+  (void)mesh->distance_to_closest_obstacle(a.position);
 }
 
 struct Reader {
@@ -304,7 +315,10 @@ const std::map<std::string, Reader> kReaders = {
     {"navmesh", {read_navmesh, 64 * kMiB, 1000}},
 };
 
+/// Of GSNAV_FUZZ_READER. Detour's allocations are counted from now on.
 const Reader& chosen() {
+  dtAllocSetCustom([](std::size_t size, dtAllocHint) { return ::operator new(size, std::nothrow); },
+                   [](void* p) { ::operator delete(p); });
   const char* name = std::getenv("GSNAV_FUZZ_READER");
   const auto found = kReaders.find(name == nullptr ? "" : name);
   if (found != kReaders.end()) return found->second;

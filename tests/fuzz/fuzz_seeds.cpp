@@ -168,16 +168,30 @@ void add_others(Seeds& seeds) {
   seeds.add("webp", io::detail::encode_webp(picture, "seed").value());
   io::save_npy(folder / "a", std::vector<float>(6), std::vector<std::size_t>{2, 3}).throw_if_error();
   seeds.add("npy", read_file(folder / "a"));
-  Soup soup;
-  soup.floor(0, 0, 3, 3);
-  NavMeshSettings settings;
-  settings.agent_radius = 0.1;
-  save_navmesh(NavMesh::build(settings, soup.vertices, soup.triangles).value(), folder / "a")
-      .throw_if_error();
-  seeds.add("navmesh", read_file(folder / "a"));
-  settings.tile_size = 32;
-  save_navmesh(NavMesh::build(settings, soup.vertices, soup.triangles).value(), folder / "a").throw_if_error();
-  seeds.add("navmesh", read_file(folder / "a"));
+}
+
+/// One tile and many: a floor, a box that borders cut, a ramp to a storey above, steps between tiles.
+void add_navmesh(Seeds& seeds) {
+  TempFolder folder("fuzz_navmesh");
+  const auto add = [&](const Soup& soup, double cell, int tile_size) {
+    NavMeshSettings settings;
+    settings.agent_radius = 0.1;
+    settings.cell_size = cell;
+    settings.tile_size = tile_size;
+    save_navmesh(NavMesh::build(settings, soup.vertices, soup.triangles).value(), folder / "a").throw_if_error();
+    seeds.add("navmesh", read_file(folder / "a"));
+  };
+  Soup floor;
+  floor.floor(0, 0, 3, 3);
+  for (const int tile_size : {0, 32, 24}) add(floor, 0.05, tile_size);
+  Soup box = floor;
+  box.box(1, 1.2, 2, 1.7, 0, 2);
+  for (const int tile_size : {0, 16}) add(box, 0.1, tile_size);
+  Soup storeys = floor;
+  storeys.quad({3, 0, 1}, {3, 0, 2}, {5, 1, 2}, {5, 1, 1});
+  storeys.floor(5, 1, 6, 2, 1);
+  storeys.floor(2, 0, 5, 0.6, 2);
+  for (const int tile_size : {0, 16, 32}) add(storeys, 0.1, tile_size);
 }
 
 }  // namespace
@@ -192,5 +206,6 @@ int main(int argc, char** argv) {
   add_spz(seeds);
   add_gltf(seeds);
   add_others(seeds);
+  add_navmesh(seeds);
   return 0;
 }

@@ -54,7 +54,7 @@ inline std::vector<gsnav::WalkPoint> straight(const gsnav::AgentState& agent, co
   return {{agent.position, gsnav::kNoPoly, 0.0}, {agent.position + d, gsnav::kNoPoly, 1.0}};
 }
 
-/// A tick with an agent near a few bodies: steps up to 40 m, bodies up to 100 m.
+/// A tick with an agent near a few bodies: steps and bodies of up to 100 m.
 struct Tick {
   std::vector<gsnav::DynamicCapsule> list;
   gsnav::AgentState agent;
@@ -62,7 +62,7 @@ struct Tick {
 };
 
 inline Tick random_tick(gsnav::Rng& rng, int i, double most_speed = 100) {
-  const double speeds[] = {0.0, 0.3, 3.0, most_speed}, lengths[] = {0.25, 1.0, 4.0, 40.0};
+  const double speeds[] = {0.0, 0.3, 3.0, most_speed}, lengths[] = {0.25, 1.0, 4.0, 100.0};
   Tick t;
   t.list = crowd(rng, std::min(speeds[i % 4], most_speed), 1 + i % 2, 3);
   // Beside the first body, and towards where it is for a part of the tick.

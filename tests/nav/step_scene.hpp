@@ -9,12 +9,12 @@
 
 namespace gsnav_test {
 
-/// A room of 100 m by 100 m around the origin.
+/// A room of 220 m by 220 m around the origin.
 inline gsnav::NavMesh room() {
   Soup soup;
-  soup.floor(-50, -50, 50, 50);
+  soup.floor(-110, -110, 110, 110);
   gsnav::NavMeshSettings s;
-  s.cell_size = 0.25;
+  s.cell_size = 0.5;
   return gsnav::NavMesh::build(s, soup.vertices, soup.triangles).value();
 }
 

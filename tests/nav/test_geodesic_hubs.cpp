@@ -15,9 +15,10 @@ using namespace gsnav_test;
 
 namespace {
 
-NavMesh build(const Soup& soup, double cell) {
+NavMesh build(const Soup& soup, double cell, int tile_size = 0) {
   NavMeshSettings s;
   s.cell_size = cell;
+  s.tile_size = tile_size;
   return NavMesh::build(s, soup.vertices, soup.triangles).value();
 }
 
@@ -58,6 +59,43 @@ TEST_CASE("geodesic: by hubs the distances of the search") {
     if (path.empty()) continue;
     const Soup soup = read_obj(path);
     check(build(soup, 0.3), cases(5000), 0.3);
+  }
+}
+
+TEST_CASE("geodesic: by hubs the distances of the search where edges of many tiles lie in line") {
+  for (const std::uint64_t seed : {5u, 6u}) check(build(random_boxes(seed, 12, 12), 0.1, 16), cases(20000), 0.02);
+  Soup slopes = random_boxes(7, 8, 10);
+  slopes.quad({10, 0, 2}, {10, 0, 6}, {14, 1.5, 6}, {14, 1.5, 2});
+  slopes.quad({14, 1.5, 2}, {14, 1.5, 6}, {18, 0.5, 7}, {18, 0.5, 1});
+  slopes.box(14.5, 3.5, 15, 4.5, 0, 4);
+  check(build(slopes, 0.1, 24), cases(20000), 0.02);
+}
+
+TEST_CASE("geodesic: by hubs the distances of the search where corners are too many for a table of all pairs") {
+  const NavMesh mesh = build(random_boxes(8, 300, 45), 0.1);
+  REQUIRE(mesh.impl().hubs().corners() > detail::CornerHubs::kMostTable);
+  check(mesh, cases(5000), 0.02);
+}
+
+TEST_CASE("geodesic: an open floor in tiles is seen from end to end") {
+  // Lines may touch corners where four tiles meet; those that turned around one were followed for ever.
+  Soup soup;
+  soup.floor(0, 0, 6, 6);
+  const NavMesh mesh = build(soup, 0.1, 16);
+  REQUIRE(mesh.impl().hubs().corners() == 0);
+  const detail::UnfoldedMesh& faces = mesh.impl().unfolded();
+  for (std::uint32_t e = 0; e < faces.edges.size(); ++e) {
+    const auto back = mesh.impl().views().toward(faces.edges[e].face, e);
+    REQUIRE(back.low > back.high);  // no straight way returns to a face
+  }
+  Rng rng(34);
+  for (int i = 0; i < cases(20000); ++i) {
+    NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
+    if (i % 4 == 0) b.position.x = a.position.x;  // along the borders of tiles
+    if (i % 8 == 0) a.position.x = b.position.x = 1.6 * (1 + i % 3);
+    a = mesh.snap_point(a.position).value();
+    b = mesh.snap_point(b.position).value();
+    REQUIRE(mesh.distance_between(a, b) == doctest::Approx(norm(b.position - a.position)).epsilon(1e-9));
   }
 }
 
