@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'L', 'O', 'D'};
 /// Grows with every change of what build_lod makes of a cloud.
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 
 /// What stands at the front; the arrays of for_each_array follow.
 struct Header {
@@ -36,7 +36,7 @@ static_assert(sizeof(Header) == 40);
 /// A node without the padding that a struct has.
 struct Node {
   double low[3], high[3];
-  float error, scale_max, opacity_max, unused;
+  float error, scale_max, opacity_max, grain;
 };
 static_assert(sizeof(Node) == 64);
 
@@ -99,7 +99,8 @@ Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Nod
       return invalid(path, "origin " + std::to_string(id) + " of " + std::to_string(origins));
   }
   for (const Node& n : nodes) {
-    bool good = n.error >= 0 && std::isfinite(n.error) && n.scale_max >= 0 && std::isfinite(n.scale_max);
+    bool good = n.error >= 0 && std::isfinite(n.error) && n.grain >= 0 && std::isfinite(n.grain) &&
+                n.scale_max >= 0 && std::isfinite(n.scale_max);
     for (int k = 0; k < 3; ++k) {
       good = good && std::isfinite(n.low[k]) && std::isfinite(n.high[k]) && n.low[k] <= n.high[k];
     }
@@ -132,7 +133,7 @@ Status save_lod(const fs::path& path, const LodTree& tree, const GaussianCloud& 
       nodes[i].error = n.error;
       nodes[i].scale_max = n.reach.scale_max;
       nodes[i].opacity_max = n.reach.opacity_max;
-      nodes[i].unused = 0;
+      nodes[i].grain = n.grain;
     }
     Header header{};
     std::memcpy(header.magic, kMagic, sizeof kMagic);
@@ -207,6 +208,7 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
         n.reach.high[k] = nodes[i].high[k];
       }
       n.error = nodes[i].error;
+      n.grain = nodes[i].grain;
       n.reach.scale_max = nodes[i].scale_max;
       n.reach.opacity_max = nodes[i].opacity_max;
     }

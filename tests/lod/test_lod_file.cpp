@@ -46,6 +46,7 @@ TEST_CASE("lod file: what is read is what was written") {
     REQUIRE(read.nodes.size() == tree.nodes.size());
     for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
       CHECK(read.nodes[i].error == tree.nodes[i].error);
+      CHECK(read.nodes[i].grain == tree.nodes[i].grain);
       CHECK(read.nodes[i].reach.low.x == tree.nodes[i].reach.low.x);
       CHECK(read.nodes[i].reach.scale_max == tree.nodes[i].reach.scale_max);
     }
@@ -122,6 +123,11 @@ TEST_CASE("lod file: values that cannot be are refused though the checksum is ri
   bad = tree;
   bad.nodes.back().error = -1;
   refused(bad, "a node");
+  for (const float grain : {-1.0f, nan}) {
+    bad = tree;
+    bad.nodes[1].grain = grain;
+    refused(bad, "a node");
+  }
 }
 
 TEST_CASE("lod file: cached beside the asset, by its content") {

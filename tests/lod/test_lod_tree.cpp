@@ -51,7 +51,8 @@ bool same(const LodTree& a, const LodTree& b) {
   for (std::size_t k = 0; k < 4; ++k) equal = equal && same(a.merged.quats[k], b.merged.quats[k]);
   equal = equal && same(a.merged.opacities, b.merged.opacities) && same(a.merged.sh0, b.merged.sh0) &&
           same(a.merged.shN, b.merged.shN);
-  for (std::size_t i = 0; equal && i < a.nodes.size(); ++i) equal = a.nodes[i].error == b.nodes[i].error;
+  for (std::size_t i = 0; equal && i < a.nodes.size(); ++i)
+    equal = a.nodes[i].error == b.nodes[i].error && a.nodes[i].grain == b.nodes[i].grain;
   return equal;
 }
 
@@ -119,6 +120,56 @@ TEST_CASE("lod tree: a node has half of its children's Gaussians, errors grow, b
     }
   }
   CHECK(validate(m.set()).ok());
+}
+
+TEST_CASE("lod tree: grain is the geometric mean size of the cloud's Gaussians below a node, by mass") {
+  SerialBackend backend;
+  const GaussianCloud cloud = small_wall(14, 3000);
+  const LodTree tree = build_lod(backend, cloud).value();
+  for (std::size_t l = 0; l < tree.levels(); ++l) {
+    for (std::size_t node = tree.level_begin[l]; node < tree.level_begin[l + 1]; ++node) {
+      const std::size_t first = ((node - tree.level_begin[l]) << l) * kProjectChunk;
+      long double mass = 0, log_size = 0;
+      for (std::size_t i = first; i < std::min(first + (kProjectChunk << l), cloud.size()); ++i) {
+        const Moments m = moments(cloud, i, i + 1);
+        mass += m.mass;
+        log_size += m.mass * 0.5L * std::log(static_cast<long double>(m.mass) / cloud.opacities[i]);
+      }
+      CHECK(tree.nodes[node].grain == doctest::Approx(static_cast<double>(std::exp(log_size / mass))).epsilon(1e-6));
+    }
+  }
+  GaussianCloud empty = small_wall(15, 300);
+  std::fill(empty.opacities.begin(), empty.opacities.end(), 0.0f);
+  for (const LodNode& n : build_lod(backend, empty).value().nodes) CHECK(n.grain == 0);
+}
+
+TEST_CASE("lod cut: the larger Gaussians are for a pixel, the less is merged") {
+  SerialBackend backend;
+  const GaussianCloud cloud = small_wall(16, 20000);
+  const LodTree tree = build_lod(backend, cloud).value();
+  LodChoice choice;
+  choice.hysteresis = 0;
+  for (const int side : {32, 64, 128, 256, 512}) {
+    CAPTURE(side);
+    const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, side, side, 60);
+    LodCut cut(tree, cloud), without(tree, cloud);
+    static_cast<void>(cut.select(camera, choice));
+    LodChoice any = choice;
+    any.grain = 1e9;
+    static_cast<void>(without.select(camera, any));
+    CHECK(cut.stats().merged <= without.stats().merged);
+    // What is drawn, by the definition: its error and its error times grain, in pixels at its nearest.
+    const auto p = make_projection_camera<double>(camera, LodCut::photo_set(cloud, choice));
+    for (const std::uint32_t m : cut.merged_chunks()) {
+      const LodNode& n = tree.nodes[m + tree.leaves()];
+      const double pixels = p.fx / std::max(n.reach.low.z - 1e-4, 0.2);
+      CHECK(static_cast<double>(n.error) * pixels <= choice.pixels * 1.001);
+      const double area = static_cast<double>(n.error) * static_cast<double>(n.grain) * pixels * pixels;
+      CHECK(area <= choice.pixels * choice.grain * 1.001);
+    }
+  }
+  choice.grain = 0;
+  CHECK(validate(choice).message().find("grain") != std::string::npos);
 }
 
 TEST_CASE("lod tree: the same bits for any number of threads") {

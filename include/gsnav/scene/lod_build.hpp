@@ -216,8 +216,19 @@ class LodBuilder {
     rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(out.merged.sh_degree) - 1);
     source_rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(source.sh_degree) - 1);
     spreads_.resize(out.merged.size());
+    grains_.resize(out.nodes.size());
   }
 
+  /// Fills leaf i but for its bounds.
+  void measure(std::size_t i) {
+    Grain& sum = grains_[i];
+    for (std::size_t row = i * kProjectChunk; row < std::min((i + 1) * kProjectChunk, source_.size()); ++row) {
+      const LodGaussian g = lod_gaussian(source_, row, 0);
+      const double area = lod_area(g.covariance);
+      if (g.mass > 0 && area > 0) sum.add({g.mass, g.mass * std::log(area)});
+    }
+    out_.nodes[i].grain = sum.size();
+  }
   /// Fills node i of level l > 0; its children must be there.
   void make(std::size_t l, std::size_t i) {
     const std::uint32_t* const begin = out_.level_begin.data();
@@ -229,8 +240,10 @@ class LodBuilder {
       add_rows(child, rows, gaussians);
       const LodNode& c = out_.nodes[child];
       node.error = std::max(node.error, c.error);
+      grains_[begin[l] + i].add(grains_[child]);
       node.reach = child == first ? c.reach : both(node.reach, c.reach);
     }
+    node.grain = grains_[begin[l] + i].size();
     const std::size_t target = std::min(kProjectChunk, (gaussians.size() + 1) / 2);
     GreedyMerge merge(settings_.neighbours);
     masses_of(gaussians, rows);
@@ -255,6 +268,15 @@ class LodBuilder {
     out.opacity_max = std::max(a.opacity_max, b.opacity_max);
     return out;
   }
+  /// Sum of mass, and of mass times log of area, of a node's leaves.
+  struct Grain {
+    double mass = 0, log_area = 0;
+    void add(const Grain& o) noexcept {
+      mass += o.mass;
+      log_area += o.log_area;
+    }
+    float size() const noexcept { return mass > 0 ? static_cast<float>(std::exp(0.5 * log_area / mass)) : 0.0f; }
+  };
   void add_rows(std::size_t node, std::vector<Row>& rows, std::vector<LodGaussian>& gaussians) const {
     const bool leaf = node < out_.leaves();
     const GaussianCloud& cloud = leaf ? source_ : out_.merged;
@@ -358,6 +380,7 @@ class LodBuilder {
   LodTree& out_;
   std::size_t rest_ = 0, source_rest_ = 0;
   std::vector<float> spreads_;
+  std::vector<Grain> grains_;
 };
 
 }  // namespace detail
@@ -387,6 +410,7 @@ requires is_host_backend<B> Result<LodTree> build_lod(B& backend, const Gaussian
   detail::LodBuilder builder(cloud, settings, tree);
   const double all = static_cast<double>(tree.nodes.size() - tree.leaves());
   std::size_t done = 0;
+  backend.parallel_for(tree.leaves(), [&builder](std::size_t i) { builder.measure(i); });
   for (std::size_t l = 1; l < tree.levels(); ++l) {
     const std::size_t count = tree.level_begin[l + 1] - tree.level_begin[l];
     const std::size_t piece = std::max<std::size_t>(64, static_cast<std::size_t>(all) / 100);

@@ -17,7 +17,10 @@ namespace gsnav {
 
 /// How LodCut chooses.
 struct LodChoice {
-  double pixels = 0.7;  ///< a node is fine enough where its error is at most so many pixels
+  double pixels = 1;  ///< a node is fine enough where its error is at most so many pixels ...
+  /// ... and times its grain at most pixels times this, in square pixels: the larger Gaussians are, the nearer direct
+  /// rendering is to the photo, and the less may be merged.
+  double grain = 0.5;
   double hysteresis =
       0.1;  ///< a node that is drawn stays until its error is beyond (1 + this) of that; one that is
             ///< refined, until it is below (1 - this): levels do not flicker where a camera rests
@@ -30,6 +33,7 @@ inline Status validate(const LodChoice& c) {
     return Status(Errc::invalid_argument, std::string("LodChoice.") + field + " = " + std::to_string(value) + ": " + rule);
   };
   if (!(c.pixels > 0 && is_finite(c.pixels))) return bad("pixels", c.pixels, "must be positive");
+  if (!(c.grain > 0 && is_finite(c.grain))) return bad("grain", c.grain, "must be positive");
   if (!(c.hysteresis >= 0 && c.hysteresis < 1)) return bad("hysteresis", c.hysteresis, "must be in [0, 1)");
   if (c.photo < 1 || c.photo > 16) return bad("photo", c.photo, "must be in [1, 16]");
   return {};
@@ -114,11 +118,12 @@ class LodCut {
              double per_metre, const LodChoice& choice) {
     const LodNode& n = tree_->nodes[node];
     if (!may_be_visible(camera, n.reach)) return;
-    const double error =
-        static_cast<double>(n.error) * per_metre / detail::ChunkInView(camera, n.reach).z_min();
+    const double scale = per_metre / detail::ChunkInView(camera, n.reach).z_min();  // a metre here, of choice.pixels
+    const double grain = static_cast<double>(n.grain) * scale * choice.pixels / choice.grain;
+    const double error = static_cast<double>(n.error) * scale;
     bool refine = level > 0;
     if (refine) {
-      refine = error > (refined_[node] != 0 ? 1 - choice.hysteresis : 1 + choice.hysteresis);
+      refine = error * std::max(grain, 1.0) > (refined_[node] != 0 ? 1 - choice.hysteresis : 1 + choice.hysteresis);
       refined_[node] = refine ? 1 : 0;
     }
     if (!refine) {

@@ -15,6 +15,9 @@ struct LodNode {
   /// How far what the node merged lies from where it shows it: root mean square over its mass, metres; 0
   /// for a leaf. A parent's is not below its children's.
   float error = 0;
+  /// How large the cloud's own Gaussians below it are: root of the area (lod_area), geometric mean over their mass,
+  /// metres; 0 where nothing has mass.
+  float grain = 0;
   ChunkBounds reach;  ///< of its own Gaussians and of all below it
 };
 

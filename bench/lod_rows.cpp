@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lod_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/eval/oracle_photo.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "samples.hpp"
+
+using namespace gsnav;
+
+namespace gsnav_bench {
+
+namespace {
+
+constexpr std::size_t kSide = kLodSide, kPhoto = kLodPhoto, kFine = kSide * kPhoto;
+
+double psnr(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double d = static_cast<double>(std::clamp(a[i], 0.0f, 1.0f) - std::clamp(b[i], 0.0f, 1.0f));
+    sum += d * d;
+  }
+  return -10 * std::log10(std::max(sum / static_cast<double>(a.size()), 1e-30));
+}
+
+/// The k x k rays of pixel p: f(index into a fine image).
+template <class F>
+void for_each_ray(std::size_t p, const F& f) {
+  const std::size_t x = p % kSide, y = p / kSide;
+  for (std::size_t i = 0; i < kPhoto * kPhoto; ++i) f((y * kPhoto + i / kPhoto) * kFine + x * kPhoto + i % kPhoto);
+}
+
+/// How far a depth is, relatively, from the nearest of those that a pixel's rays have: at an edge any of them is
+/// right, and one between them is not. A return where no ray has one, and none where all have: 1.
+double depth_error(float depth, const std::vector<float>& fine, std::size_t pixel) {
+  double least = std::numeric_limits<double>::infinity();
+  for_each_ray(pixel, [&](std::size_t i) {
+    const double a = static_cast<double>(depth), b = static_cast<double>(fine[i]);
+    const double off = (a > 0) != (b > 0) ? 1.0 : b > 0 ? std::abs(a - b) / b : 0.0;
+    least = std::min(least, off);
+  });
+  return least;
+}
+
+}  // namespace
+
+LodViews lod_views(const GaussianCloud& cloud, const std::vector<Camera>& cameras) {
+  OpenMPBackend all;
+  RenderConfig exact;
+  exact.outputs = kRgb | kMedianDepth;
+  Renderer<float, OpenMPBackend> renderer(all, exact);
+  LodViews views;
+  views.cameras = cameras;
+  for (const Camera& camera : cameras) {
+    Frames<float> fine = renderer.render(cloud.set(), eval::detail::magnified(camera, kLodPhoto)).value();
+    std::vector<float>& out = views.rgb.emplace_back(3 * kSide * kSide);
+    for (std::size_t p = 0; p < kSide * kSide; ++p) {
+      double sum[3]{};
+      for_each_ray(p, [&](std::size_t i) {
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += static_cast<double>(fine.rgb[3 * i + c]);
+      });
+      for (std::size_t c = 0; c < 3; ++c) out[3 * p + c] = static_cast<float>(sum[c] / (kPhoto * kPhoto));
+    }
+    views.depths.push_back(std::move(fine.median_depth));
+  }
+  return views;
+}
+
+void LodRow::add(const std::vector<float>& rgb, const std::vector<float>& median_depth, double ms, double visible,
+                 double pairs) {
+  LodViews& views = *views_;
+  const std::size_t view = count_++;
+  const double quality = psnr(views.rgb[view], rgb);
+  if (draw_ == LodDraw::direct && views.direct.size() == view) views.direct.push_back(quality);
+  const double gain = quality - views.direct[view];
+  for (std::size_t p = 0; p < median_depth.size(); ++p) {
+    depth_errors_.push_back(depth_error(median_depth[p], views.depths[view], p));
+  }
+  if (views.each) std::printf("view %zu: %.2f dB, %+.2f, %.3f ms\n", views.first + view, quality, gain, ms);
+  quality_ += quality;
+  worst_ = std::min(worst_, quality);
+  if (gain < gain_) least_view_ = view;
+  gain_ = std::min(gain_, gain);
+  below_ += gain < 0 ? 1 : 0;
+  ms_ += ms;
+  visible_ += visible;
+  pairs_ += pairs;
+}
+
+void LodRow::print_head() {
+  std::printf("%-12s %6s %8s %8s %9s %5s %6s %8s %7s %9s %9s %9s %9s\n", "", "pixels", "mean dB", "worst",
+              "least +dB", "view", "below", "ms", "faster", "visible", "pairs", "z>2 %", "z p99 %");
+}
+
+void LodRow::print(const char* name, double pixels) const {
+  LodViews& views = *views_;
+  const double n = static_cast<double>(count_);
+  if (draw_ == LodDraw::direct) views.direct_ms = ms_ / n;
+  const auto off = std::count_if(depth_errors_.begin(), depth_errors_.end(), [](double e) { return e > 0.02; });
+  std::printf("%-12s %6.2f %8.2f %8.2f %9.2f %5zu %6zu %8.3f %7.2f %9.0f %9.0f %9.3f %9.3f\n", name, pixels,
+              quality_ / n, worst_, gain_, views.first + least_view_, below_, ms_ / n,
+              views.direct_ms / (ms_ / n), visible_ / n, pairs_ / n,
+              100 * static_cast<double>(off) / static_cast<double>(depth_errors_.size()),
+              100 * quantile(depth_errors_, 0.99));
+  std::fflush(stdout);
+}
+
+}  // namespace gsnav_bench

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "gsnav/kernels/camera.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/lod_cut.hpp"
+
+namespace gsnav_bench {
+
+inline constexpr int kLodSide = 256, kLodPhoto = 4;
+
+/// What a row of bench_lod draws.
+enum class LodDraw {
+  direct,  ///< every Gaussian, by the asset's own filter
+  photo,   ///< every Gaussian, by the photo's
+  lod,     ///< a cut
+};
+
+/// Views and what a photo of each would be: O_photo(kLodPhoto).
+struct LodViews {
+  std::vector<gsnav::Camera> cameras;
+  std::vector<std::vector<float>> rgb;     ///< [H][W][3] a view
+  std::vector<std::vector<float>> depths;  ///< [k H][k W] a view: the median depths of the photo's own rays, metres
+  std::vector<double> direct;              ///< PSNR of direct rendering, once its row was drawn
+  double direct_ms = 0;
+  std::size_t first = 0;  ///< number of the first camera
+  bool each = false;      ///< print every view
+};
+
+/// Renders the photos: exactly, on all threads.
+LodViews lod_views(const gsnav::GaussianCloud& cloud, const std::vector<gsnav::Camera>& cameras);
+
+/// One row of the table, view by view.
+class LodRow {
+ public:
+  LodRow(LodViews& views, LodDraw draw) : views_(&views), draw_(draw) {}
+  /// The next view: its images, [H][W][3] and [H][W] metres (0: no return), and milliseconds.
+  void add(const std::vector<float>& rgb, const std::vector<float>& median_depth, double ms, double visible,
+           double pairs);
+  void print(const char* name, double pixels) const;
+  static void print_head();
+
+ private:
+  LodViews* views_;
+  LodDraw draw_;
+  std::size_t count_ = 0, least_view_ = 0, below_ = 0;
+  double quality_ = 0, worst_ = 1e9, gain_ = 1e9, ms_ = 0, visible_ = 0, pairs_ = 0;
+  std::vector<double> depth_errors_;
+};
+
+#if defined(GSNAV_HAS_CUDA)
+/// The table's rows on the first GPU; a line that says so where there is none.
+void lod_rows_on_gpu(LodViews& views, const gsnav::GaussianCloud& cloud, const gsnav::LodTree& tree,
+                     const std::vector<double>& pixels);
+#endif
+
+}  // namespace gsnav_bench

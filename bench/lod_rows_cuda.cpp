@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+// bench_lod on a GPU: one camera a call, milliseconds between events on the stream, the copy of the cut's chunks
+// among them; the cut itself is the host's.
+#include <cuda_runtime.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <optional>
+#include <span>
+
+#include "gsnav/backends/cuda/batch.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "gsnav/sim/scene_detail.hpp"
+#include "lod_rows.hpp"
+
+using namespace gsnav;
+
+namespace gsnav_bench {
+
+namespace {
+
+constexpr std::size_t kPixels = std::size_t{kLodSide} * kLodSide;
+
+class GpuRows {
+ public:
+  GpuRows(CudaBackend& cuda, LodViews& views, const GaussianCloud& cloud, const LodTree& tree)
+      : cuda_(cuda),
+        views_(views),
+        cloud_(cloud),
+        arrays_(cuda, cloud),
+        merged_(cuda, tree.merged),
+        direct_(cuda, fast()),
+        closing_(cuda, closing()),
+        chunks_(cuda),
+        memory_(cuda) {
+    detail_.assets = {{&tree, &cloud, {}, arrays_.set().gaussians, merged_.set().gaussians}};
+    memory_.resize_discard(4 * kPixels);
+    cudaEventCreate(&begin_);
+    cudaEventCreate(&end_);
+  }
+  ~GpuRows() {
+    cudaEventDestroy(begin_);
+    cudaEventDestroy(end_);
+  }
+  GpuRows(const GpuRows&) = delete;
+  GpuRows& operator=(const GpuRows&) = delete;
+
+  void row(const char* name, LodDraw draw, double pixels) {
+    LodRow out(views_, draw);
+    detail_.choice.pixels = std::max(pixels, 1e-3);
+    std::vector<float> rgb(3 * kPixels), depth(kPixels);
+    for (const Camera& camera : views_.cameras) {
+      BatchImages images;
+      images.floats.rgb = memory_.data();
+      double least = 1e9, pairs = 0;
+      for (int repeat = 0; repeat < 9; ++repeat) least = std::min(least, draw_once(draw, camera, images, pairs));
+      cuda_.copy(rgb.data(), images.floats.rgb, rgb.size() * sizeof(float), CopyKind::device_to_host);
+      BatchImages depths;
+      depths.floats.median_depth = memory_.data() + 3 * kPixels;
+      double ignored = 0;
+      draw_once(draw, camera, depths, ignored);
+      cuda_.copy(depth.data(), depths.floats.median_depth, depth.size() * sizeof(float), CopyKind::device_to_host);
+      cuda_.synchronize().throw_if_error();
+      out.add(rgb, depth, least, static_cast<double>(drawn_), pairs);
+    }
+    out.print(name, pixels);
+  }
+
+ private:
+  static RenderConfig fast() {
+    RenderConfig config;
+    config.profile = Profile::fast;
+    return config;
+  }
+  /// lod_config where a cut is mostly of merged ones.
+  static RenderConfig closing() {
+    LodStats merged;
+    merged.shown = merged.merged = 1;
+    return lod_config(fast(), merged);
+  }
+  double draw_once(LodDraw draw, const Camera& camera, const BatchImages& images, double& pairs) {
+    const BatchCamera view{camera, {}, {}};
+    const GaussianSet own = arrays_.set();
+    GaussianSet photo = LodCut::photo_set(cloud_, detail_.choice);
+    photo.gaussians = own.gaussians;
+    std::span<const GaussianSet> sets(draw == LodDraw::direct ? &own : &photo, 1);
+    CudaBatchRenderer* renderer = &direct_;
+    drawn_ = cloud_.size();
+    if (draw == LodDraw::lod) {
+      sets = cut_.select(detail_, {}, camera);
+      renderer = cut_.rules(fast()).transmittance_min > fast().transmittance_min ? &closing_ : &direct_;
+      drawn_ = cut_.cut(0).stats().drawn;
+    }
+    cudaEventRecord(begin_, cuda_.stream());
+    if (draw == LodDraw::lod) chunks_.place(std::span(&cut_, 1));
+    renderer->render(sets, std::span(&view, 1), images).throw_if_error();
+    cudaEventRecord(end_, cuda_.stream());
+    renderer->finish().throw_if_error();
+    float ms = 0;
+    cudaEventElapsedTime(&ms, begin_, end_);
+    pairs = static_cast<double>(renderer->stats().tile_intersections);
+    return static_cast<double>(ms);
+  }
+
+  CudaBackend& cuda_;
+  LodViews& views_;
+  const GaussianCloud& cloud_;
+  GaussianArrays<CudaBackend> arrays_, merged_;
+  CudaBatchRenderer direct_, closing_;
+  ChosenChunks<CudaBackend> chunks_;
+  Buffer<float, CudaBackend> memory_;
+  SceneDetail detail_;
+  DetailSets cut_;
+  std::uint64_t drawn_ = 0;
+  cudaEvent_t begin_{}, end_{};
+};
+
+}  // namespace
+
+void lod_rows_on_gpu(LodViews& views, const GaussianCloud& cloud, const LodTree& tree,
+                     const std::vector<double>& pixels) {
+  if (CudaBackend::device_count() == 0) {
+    std::printf("no GPU\n");
+    return;
+  }
+  CudaBackend cuda;
+  std::printf("\n%s; \"visible\" is what is read, ms is the device's\n", cuda.device_name().c_str());
+  LodRow::print_head();
+  GpuRows rows(cuda, views, cloud, tree);
+  views.direct.clear();
+  rows.row("direct fast", LodDraw::direct, 0);
+  rows.row("photo filter", LodDraw::photo, 0);
+  for (const double p : pixels) rows.row("lod", LodDraw::lod, p);
+}
+
+}  // namespace gsnav_bench
