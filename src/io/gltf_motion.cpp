@@ -44,7 +44,7 @@ std::array<double, 4> sample(const Channel& c, double time) {
     const double u2 = u * u, u3 = u2 * u;
     for (std::size_t k = 0; k < w; ++k) {
       out[k] = (2 * u3 - 3 * u2 + 1) * p[k] + step * (u3 - 2 * u2 + u) * p[w + k] + (3 * u2 - 2 * u3) * q[k] +
-               step * (u3 - u2) * q[k - w];
+               step * (u3 - u2) * (q - w)[k];
     }
   } else if (c.target == 'r') {
     const Quatd r = slerp(Quatd{p[3], p[0], p[1], p[2]}, Quatd{q[3], q[0], q[1], q[2]}, u);

@@ -45,7 +45,9 @@ inline Soup random_boxes(std::uint64_t seed, int count, double side) {
   gsnav::Rng rng(seed);
   for (int i = 0; i < count; ++i) {
     const double x = rng.uniform(0.5, side - 2), z = rng.uniform(0.5, side - 2);
-    soup.box(x, z, x + rng.uniform(0.1, 2.5), z + rng.uniform(0.1, 1.5), 0, 2);
+    // One after the other: the order in which arguments are evaluated is the compiler's.
+    const double depth = rng.uniform(0.1, 1.5), width = rng.uniform(0.1, 2.5);
+    soup.box(x, z, x + width, z + depth, 0, 2);
   }
   return soup;
 }

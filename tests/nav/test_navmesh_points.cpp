@@ -231,7 +231,8 @@ TEST_CASE("points: the closest obstacle is the nearest of all boundary edges") {
     soup.floor(0, 0, 14, 11);
     for (int i = 0; i < 4 + 8 * round; ++i) {
       const double x = rng.uniform(0.5, 12), z = rng.uniform(0.5, 9);
-      soup.box(x, z, x + rng.uniform(0.2, 2), z + rng.uniform(0.2, 2), 0, 1.4);
+      const double depth = rng.uniform(0.2, 2), width = rng.uniform(0.2, 2);  // in this order with any compiler
+      soup.box(x, z, x + width, z + depth, 0, 1.4);
     }
     NavMeshSettings settings;
     settings.tile_size = round < 2 ? 0 : 40;
