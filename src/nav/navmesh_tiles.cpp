@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "height_mending.hpp"
 #include "navmesh_impl.hpp"
 #include "tile_seams.hpp"
 
@@ -38,17 +39,28 @@ class Extractor {
       for (int i = 0; i < tile.header->polyCount; ++i) impl_.refs.push_back(base | static_cast<dtPolyRef>(i));
     }
     std::vector<std::uint32_t> tile_of;
+    impl_.polys.tris.reserve(triangle_count());
     for (int t = 0; t < mesh_.getMaxTiles(); ++t) {
       const dtMeshTile& tile = *mesh_.getTile(t);
       if (tile.header == nullptr) continue;
       for (int i = 0; i < tile.header->polyCount; ++i) add(t, tile, i);
       tile_of.resize(impl_.polys.polys.size(), static_cast<std::uint32_t>(t));
     }
+    mend_heights(impl_.polys);
     if (!tile_of.empty() && tile_of.front() != tile_of.back()) close_seams(impl_.polys, tile_of);
     impl_.polys.finish();
   }
 
  private:
+  std::size_t triangle_count() const {
+    std::size_t count = 0;
+    for (int t = 0; t < mesh_.getMaxTiles(); ++t) {
+      const dtMeshTile& tile = *mesh_.getTile(t);
+      for (int i = 0; tile.header != nullptr && i < tile.header->polyCount; ++i) count += tile.detailMeshes[i].triCount;
+    }
+    return count;
+  }
+
   void add(int tile_index, const dtMeshTile& tile, int i) {
     const dtPoly& p = tile.polys[i];
     std::vector<Vec3d> v;

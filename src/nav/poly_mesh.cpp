@@ -180,6 +180,9 @@ void PolyMesh::prepare_sampling() {
   std::vector<double> weights;
   std::vector<std::vector<double>> weights_in(islands.size());
   std::vector<std::vector<std::uint32_t>> pieces_in(islands.size());
+  std::size_t most = 0;
+  for (const Poly& p : polys) most += max(p.tri_count, max(p.count, 2u) - 2);
+  pieces.reserve(most);
   for (PolyId i = 0; i < polys.size(); ++i) {
     Poly& p = polys[i];
     const Vec3d& o = corner(p, 0);

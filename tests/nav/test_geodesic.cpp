@@ -174,6 +174,29 @@ TEST_CASE("geodesic: symmetric, and no detour is shorter") {
   }
 }
 
+TEST_CASE("geodesic: the surface has no step where Recast's height triangles overlap") {
+  // Delaunay's triangles of samples on one circle: a polygon of each of these had some twice, others not at all.
+  for (const auto& [file, tile_size] : {std::pair{"nav/recast/nav_test.obj", 0}, {"nav/recast/undulating.obj", 128}}) {
+    const std::string path = gsnav_test::data_file(file);
+    if (path.empty()) continue;
+    const Soup soup = gsnav_test::read_obj(path);
+    NavMeshSettings s;
+    s.cell_size = 0.1;
+    s.tile_size = tile_size;
+    const NavMesh mesh = NavMesh::build(s, soup.vertices, soup.triangles).value();
+    const gsnav::detail::UnfoldedMesh& faces = mesh.impl().unfolded();
+    double worst = 0;
+    for (std::uint32_t e = 0; e < faces.edges.size(); ++e) {
+      const std::uint32_t twin = faces.edges[e].twin;
+      if (twin == gsnav::detail::UnfoldedMesh::kNone) continue;
+      worst = max(worst, norm(faces.edges[e].corner - faces.edges[faces.next(twin)].corner));
+    }
+    MESSAGE(faces.faces.size() << " faces: a step of at most " << worst << " m");
+    CHECK(worst < 1e-5);
+    check_metric(mesh, cases(200));
+  }
+}
+
 TEST_CASE("geodesic: RecastDemo's file of paths") {
   const std::string file = gsnav_test::data_file("nav/recast/nav_mesh_test.txt");
   if (file.empty()) return;
