@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numeric>
@@ -42,14 +43,9 @@ Order rotated(std::size_t n, std::size_t by) {
   return order;
 }
 
-/// Every 21 bits of a place become every third of its code, one at a time.
-std::uint64_t morton(const Vec3d& place) {
-  std::uint64_t code = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto steps = static_cast<std::uint64_t>(place[axis]);
-    for (int bit = 0; bit < 21; ++bit) code |= (steps >> bit & 1) << (3 * bit + axis);
-  }
-  return code;
+std::uint64_t code_of(const Vec3d& place) {
+  return detail::hilbert_code({static_cast<std::uint32_t>(place.x), static_cast<std::uint32_t>(place.y),
+                               static_cast<std::uint32_t>(place.z)});
 }
 
 }  // namespace
@@ -91,6 +87,42 @@ TEST_CASE("value_of_rank is what sorting puts there") {
   }
 }
 
+TEST_CASE("hilbert_code: fills each cube of cells, of any size, before the next, in steps of one cell") {
+  Rng rng(41);
+  struct Cell {
+    std::uint64_t code;
+    std::array<std::uint32_t, 3> at;
+    bool operator<(const Cell& o) const { return code < o.code; }
+  };
+  // Cubes of 8 x 8 x 8 parts: of single cells anywhere, of larger parts, and the whole grid.
+  for (int run = 0; run < 40; ++run) {
+    const int level = run < 20 ? 0 : run - 20 < 19 ? run - 20 : 18;
+    CAPTURE(level);
+    std::array<std::uint32_t, 3> corner{};
+    for (auto& c : corner) c = static_cast<std::uint32_t>(rng.uniform() * (1 << (18 - level))) << (3 + level);
+    std::vector<Cell> cells;
+    for (std::uint32_t i = 0; i < 512; ++i) {
+      const std::array<std::uint32_t, 3> at{corner[0] + ((i & 7) << level), corner[1] + ((i >> 3 & 7) << level),
+                                            corner[2] + ((i >> 6) << level)};
+      cells.push_back({detail::hilbert_code(at) >> (3 * level), at});
+    }
+    std::sort(cells.begin(), cells.end());
+    CHECK(cells[0].code % 512 == 0);
+    bool whole = true, steps = true;
+    for (std::size_t i = 1; i < cells.size(); ++i) {
+      whole = whole && cells[i].code == cells[0].code + i;
+      std::uint64_t apart = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t a = cells[i].at[k], b = cells[i - 1].at[k];
+        apart += a > b ? a - b : b - a;
+      }
+      steps = steps && apart == std::uint64_t{1} << level;
+    }
+    CHECK(whole);
+    CHECK(steps);
+  }
+}
+
 TEST_CASE(
     "sort_spatially: the order of codes in 63 bits, then of rows, whatever the number of threads") {
   for (const int count : {1, 2, 300, 100000}) {
@@ -123,7 +155,7 @@ TEST_CASE(
     const float large = sizes[n - 1 - (n - 1) / 64];
     std::vector<std::tuple<bool, std::uint64_t, std::uint32_t>> keys;
     for (std::size_t i = 0; i < n; ++i) {
-      keys.emplace_back(largest[i] > large, morton((cloud.mean(i) - low) * (1.0 / cell)),
+      keys.emplace_back(largest[i] > large, code_of((cloud.mean(i) - low) * (1.0 / cell)),
                         static_cast<std::uint32_t>(i));
     }
     std::sort(keys.begin(), keys.end());

@@ -196,6 +196,7 @@ TEST_CASE("levels of detail are chosen for a backend with a memory of its own as
   config.sensors = rgbd_sensors(24, 36);
   config.lod = LodChoice{};
   config.lod->pixels = 2;
+  config.lod->grain = 1e9;
   auto expected = make_batch_simulator(serial, scenes, config, 3, spread).value();
   const auto want = images_of(expected.reset().value().images);
   BatchConfig whole = config;

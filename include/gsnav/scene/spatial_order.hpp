@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -57,6 +58,31 @@ inline float value_of_rank(const std::vector<float>& values, std::size_t rank) {
 }
 
 /// Rows by their code in 63 bits, and of equal codes by their number. `code(i)`: of row i.
+/// Place of a cell of a 2^21 grid on Hilbert's curve (Skilling, "Programming the Hilbert curve", 2004).
+inline std::uint64_t hilbert_code(std::array<std::uint32_t, 3> x) noexcept {
+  constexpr std::uint32_t kTop = 1u << 20;
+  for (std::uint32_t q = kTop; q > 1; q >>= 1) {
+    const std::uint32_t below = q - 1;
+    for (std::uint32_t& v : x) {
+      if ((v & q) != 0) {
+        x[0] ^= below;
+      } else {
+        const std::uint32_t swapped = (x[0] ^ v) & below;
+        x[0] ^= swapped;
+        v ^= swapped;
+      }
+    }
+  }
+  x[1] ^= x[0];
+  x[2] ^= x[1];
+  std::uint32_t turned = 0;
+  for (std::uint32_t q = kTop; q > 1; q >>= 1) {
+    if ((x[2] & q) != 0) turned ^= q - 1;
+  }
+  for (std::uint32_t& v : x) v ^= turned;
+  return spread_bits(x[0]) << 2 | spread_bits(x[1]) << 1 | spread_bits(x[2]);
+}
+
 template <Backend B, class Code>
 std::vector<std::uint32_t> rows_by_code(B& backend, std::size_t n, const Code& code) {
   Buffer<std::uint32_t, B> keys(backend), rows(backend), high(backend);
@@ -101,8 +127,8 @@ inline std::vector<ChunkBounds> chunk_bounds_of(const GaussianCloud& cloud) {
   return chunk_bounds_of(backend, cloud);
 }
 
-/// Brings the rows into Morton order of their means and bounds each chunk of them, so that a renderer
-/// touches what is near the view only, and neighbours lie together in memory. `row_ids` keeps each row's
+/// Brings the rows into the order of Hilbert's curve through their means and bounds each chunk of them, so that a
+/// renderer touches what is near the view only, and neighbours lie together in memory. `row_ids` keeps each row's
 /// place, so that images stay the same, bit for bit. Large Gaussians go together behind the others: one
 /// among small ones would open its whole chunk's bounds. The order is the
 /// same for any number of threads.
@@ -130,8 +156,8 @@ void sort_spatially(B& backend, GaussianCloud& cloud) {
   const float large = detail::value_of_rank(largest, n - 1 - (n - 1) / 64);
   std::vector<std::uint32_t> order = detail::rows_by_code(backend, n, [&](std::size_t i) {
     const Vec3d p = (cloud.mean(i) - box.low) * (1.0 / cell);
-    const auto along = [](double x) { return detail::spread_bits(static_cast<std::uint64_t>(x)); };
-    const std::uint64_t code = along(p.x) | along(p.y) << 1 | along(p.z) << 2;
+    const std::uint64_t code = detail::hilbert_code(
+        {static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y), static_cast<std::uint32_t>(p.z)});
     return code | (largest[i] > large ? std::uint64_t{1} << 63 : 0);
   });
   std::vector<float> room = std::move(largest);
