@@ -57,7 +57,6 @@ inline float value_of_rank(const std::vector<float>& values, std::size_t rank) {
   return std::bit_cast<float>(bits ^ ((bits >> 31) != 0 ? 0x80000000u : 0xffffffffu));
 }
 
-/// Rows by their code in 63 bits, and of equal codes by their number. `code(i)`: of row i.
 /// Place of a cell of a 2^21 grid on Hilbert's curve (Skilling, "Programming the Hilbert curve", 2004).
 inline std::uint64_t hilbert_code(std::array<std::uint32_t, 3> x) noexcept {
   constexpr std::uint32_t kTop = 1u << 20;
@@ -83,6 +82,7 @@ inline std::uint64_t hilbert_code(std::array<std::uint32_t, 3> x) noexcept {
   return spread_bits(x[0]) << 2 | spread_bits(x[1]) << 1 | spread_bits(x[2]);
 }
 
+/// Rows by their code in 63 bits, and of equal codes by their number. `code(i)`: of row i.
 template <Backend B, class Code>
 std::vector<std::uint32_t> rows_by_code(B& backend, std::size_t n, const Code& code) {
   Buffer<std::uint32_t, B> keys(backend), rows(backend), high(backend);
