@@ -13,7 +13,8 @@
 namespace gsnav_test {
 
 /// Shortest paths on a level NavMesh by brute force in long double: Dijkstra on the visibility graph of the
-/// corners of its boundary. Knows only the triangles.
+/// corners of its boundary. Knows only the triangles. Where parts of the floor touch in a corner alone, no way leads from one
+/// to the other there: each has a corner of its own.
 class VisibilityGraph {
  public:
   using Real = long double;
@@ -35,17 +36,29 @@ class VisibilityGraph {
         ++uses[key];
       }
     }
-    std::map<std::pair<double, double>, bool> corners;
+    std::map<std::pair<double, double>, int> corners;  // and how many walls end there
     for (const auto& [key, count] : uses) {
       if (count != 1) continue;
       walls_.push_back({Point{key[0], key[1]}, Point{key[2], key[3]}});
-      corners[{key[0], key[1]}] = corners[{key[2], key[3]}] = true;
+      ++corners[{key[0], key[1]}];
+      ++corners[{key[2], key[3]}];
     }
-    for (const auto& [c, unused] : corners) corners_.push_back({c.first, c.second});
+    for (const auto& [c, walls] : corners) {
+      const Point at{c.first, c.second};
+      if (walls == 2) {
+        corners_.push_back({at, {}});
+      } else {
+        touched_.push_back(at);
+        add_parts(at);
+      }
+    }
     near_.assign(corners_.size() * corners_.size(), kFar);
     for (std::size_t i = 0; i < corners_.size(); ++i) {
       for (std::size_t j = i + 1; j < corners_.size(); ++j) {
-        near_[i * corners_.size() + j] = near_[j * corners_.size() + i] = direct(corners_[i], corners_[j]);
+        const Corner &a = corners_[i], &b = corners_[j];
+        const bool parted = a.at.x == b.at.x && a.at.z == b.at.z;
+        const bool open = !parted && a.opens_to(b.at) && b.opens_to(a.at);
+        near_[i * corners_.size() + j] = near_[j * corners_.size() + i] = open ? direct(a.at, b.at) : kFar;
       }
     }
   }
@@ -57,8 +70,8 @@ class VisibilityGraph {
     std::vector<Real> d(n), last(n);
     std::vector<bool> done(n, false);
     for (std::size_t i = 0; i < n; ++i) {
-      d[i] = direct(a, corners_[i]);
-      last[i] = direct(corners_[i], b);
+      d[i] = corners_[i].opens_to(a) ? direct(a, corners_[i].at) : kFar;
+      last[i] = corners_[i].opens_to(b) ? direct(corners_[i].at, b) : kFar;
     }
     for (std::size_t round = 0; round < n; ++round) {
       std::size_t u = n;
@@ -73,6 +86,8 @@ class VisibilityGraph {
   }
 
   std::size_t corner_count() const noexcept { return corners_.size(); }
+  /// Corners in which parts of the floor touch that have no edge in common there.
+  std::size_t touched_count() const noexcept { return touched_.size(); }
 
  private:
   static constexpr Real kFar = std::numeric_limits<Real>::infinity();
@@ -80,6 +95,44 @@ class VisibilityGraph {
 
   static Real area(const Point& a, const Point& b, const Point& c) noexcept {
     return (b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z);
+  }
+
+  struct Corner {
+    Point at;
+    std::vector<std::array<Point, 2>> parts;  ///< far sides of its triangles, right to left; empty: all there are
+    bool opens_to(const Point& p) const noexcept {
+      return parts.empty() || std::any_of(parts.begin(), parts.end(), [&](const auto& side) {
+               return area(at, side[0], p) >= -kTouch && area(at, p, side[1]) >= -kTouch;
+             });
+    }
+  };
+
+  /// A corner for each part of the floor that ends at `at`: triangles that follow one another around it.
+  void add_parts(const Point& at) {
+    const auto same = [](const Point& a, const Point& b) { return a.x == b.x && a.z == b.z; };
+    std::vector<std::array<Point, 2>> left;
+    for (const auto& t : triangles_) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (same(t[k], at)) left.push_back({t[(k + 1) % 3], t[(k + 2) % 3]});
+      }
+    }
+    while (!left.empty()) {
+      Corner corner{at, {left.back()}};
+      left.pop_back();
+      for (std::size_t i = 0; i < left.size();) {
+        if (same(left[i][0], corner.parts.back()[1])) {
+          corner.parts.push_back(left[i]);
+        } else if (same(left[i][1], corner.parts.front()[0])) {
+          corner.parts.insert(corner.parts.begin(), left[i]);
+        } else {
+          ++i;
+          continue;
+        }
+        left.erase(left.begin() + static_cast<std::ptrdiff_t>(i));
+        i = 0;
+      }
+      corners_.push_back(corner);
+    }
   }
 
   bool inside(const Point& p) const noexcept {
@@ -92,6 +145,10 @@ class VisibilityGraph {
   Real direct(const Point& a, const Point& b) const {
     std::vector<Real> cuts{0, 1};
     const Real dx = b.x - a.x, dz = b.z - a.z;
+    for (const Point& p : touched_) {
+      const Real t = (p.x - a.x) * dx + (p.z - a.z) * dz;
+      if (std::abs(area(a, b, p)) <= kTouch && t > kTouch && t < dx * dx + dz * dz - kTouch) return kFar;
+    }
     for (const auto& [p, q] : walls_) {
       const Real sp = area(a, b, p), sq = area(a, b, q);
       const Real ta = area(p, q, a), tb = area(p, q, b);
@@ -112,7 +169,8 @@ class VisibilityGraph {
 
   std::vector<std::array<Point, 3>> triangles_;
   std::vector<std::array<Point, 2>> walls_;
-  std::vector<Point> corners_;
+  std::vector<Corner> corners_;
+  std::vector<Point> touched_;
   std::vector<Real> near_;
 };
 

@@ -191,7 +191,7 @@ TEST_CASE("tiles: shortest paths equal brute force on the visibility graph") {
                                settings_of(16 + 7 * static_cast<int>(seed)));
     worst = max(worst, gsnav_test::check_brute_force(mesh, gsnav_test::VisibilityGraph(mesh), seed));
   }
-  MESSAGE(6 * gsnav_test::kPathsOfAFloor << " paths: at most " << worst << " m from the truth");
+  MESSAGE((6 * gsnav_test::kPathsOfAFloor) << " paths: at most " << worst << " m from the truth");
 }
 
 TEST_CASE("tiles: distances are a metric, and those of one tile up to its contours") {
