@@ -38,7 +38,7 @@ struct SnapOptions {
 struct ObstacleHit {
   double distance = 0.0;  ///< on the ground plane, metres
   Vec3d position{};       ///< nearest point of the edge
-  Vec3d normal{};         ///< of the edge, on the ground plane, into the mesh; at a corner of the edge that faces p more
+  Vec3d normal{};         ///< of the edge (at a corner: that which faces p more), on the ground plane, into the mesh
 };
 
 /// The walkable surface near one height, seen from above. Each cell stands for its centre.
