@@ -63,21 +63,16 @@ inline std::uint64_t hilbert_code(std::array<std::uint32_t, 3> x) noexcept {
   for (std::uint32_t q = kTop; q > 1; q >>= 1) {
     const std::uint32_t below = q - 1;
     for (std::uint32_t& v : x) {
-      if ((v & q) != 0) {
-        x[0] ^= below;
-      } else {
-        const std::uint32_t swapped = (x[0] ^ v) & below;
-        x[0] ^= swapped;
-        v ^= swapped;
-      }
+      // Where the bit is set the first coordinate is turned over, else the two change places. Branches would be chance.
+      const std::uint32_t set = (v & q) != 0 ? ~0u : 0u, swapped = (x[0] ^ v) & below & ~set;
+      x[0] ^= swapped | (below & set);
+      v ^= swapped;
     }
   }
   x[1] ^= x[0];
   x[2] ^= x[1];
-  std::uint32_t turned = 0;
-  for (std::uint32_t q = kTop; q > 1; q >>= 1) {
-    if ((x[2] & q) != 0) turned ^= q - 1;
-  }
+  std::uint32_t turned = x[2] >> 1;  // of each bit: the parity of those above it
+  for (int shift = 1; shift < 32; shift *= 2) turned ^= turned >> shift;
   for (std::uint32_t& v : x) v ^= turned;
   return spread_bits(x[0]) << 2 | spread_bits(x[1]) << 1 | spread_bits(x[2]);
 }
