@@ -8,6 +8,8 @@
 #include <tuple>
 #include <utility>
 
+#include "ground_plane.hpp"
+
 namespace gsnav::detail {
 namespace {
 
@@ -16,17 +18,6 @@ constexpr double kOnLine = 1e-4;  // metres: corners that a straight side has be
 constexpr double kSliver = 1e-8;  // square metres
 
 using Triangle = std::array<Vec3d, 3>;
-
-double area_xz(const Vec3d& a, const Vec3d& b, const Vec3d& c) noexcept {
-  return (b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z);
-}
-
-/// Share of the edge a b that p lies at on the ground plane, and how far off it.
-std::pair<double, double> along_xz(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
-  const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
-  const double t = len2 > 0 ? clamp(((p.x - a.x) * ex + (p.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
-  return {t, std::hypot(a.x + t * ex - p.x, a.z + t * ez - p.z)};
-}
 
 /// True where the triangles cover the polygon once: each side of one is another's or lies on the polygon's.
 bool cover_once(std::span<const Vec3d> corners, std::span<const Triangle> triangles) {

@@ -5,12 +5,10 @@
 #include <limits>
 #include <numeric>
 
+#include "ground_plane.hpp"
+
 namespace gsnav::detail {
 namespace {
-
-double cross_xz(const Vec3d& a, const Vec3d& b, const Vec3d& c) noexcept {
-  return (b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z);
-}
 
 Vec3d nearest_on_edge_xz(const Vec3d& a, const Vec3d& b, const Vec3d& q) noexcept {
   const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
@@ -38,7 +36,7 @@ bool PolyMesh::holds(PolyId id, const Vec3d& q, double margin) const noexcept {
 Vec3d PolyMesh::clamped(PolyId id, const Vec3d& q) const noexcept {
   const Poly& p = polys[id];
   bool inside = true;
-  for (std::uint32_t k = 0; k < p.count && inside; ++k) inside = !(cross_xz(corner(p, k), corner(p, k + 1), q) < 0);
+  for (std::uint32_t k = 0; k < p.count && inside; ++k) inside = !(area_xz(corner(p, k), corner(p, k + 1), q) < 0);
   if (inside) return q;
   double best = std::numeric_limits<double>::max();
   Vec3d nearest = q;
@@ -77,7 +75,7 @@ void PolyMesh::prepare_heights() {
   heights.assign(tris.size(), {});
   for (std::size_t i = 0; i < tris.size(); ++i) {
     const auto& [a, b, c] = tris[i];
-    const double area = cross_xz(a, b, c);
+    const double area = area_xz(a, b, c);
     if (!(std::abs(area) > 1e-12)) continue;
     heights[i] = {a.x, a.y, a.z, (c.z - a.z) / area, (a.x - c.x) / area, (a.z - b.z) / area, (b.x - a.x) / area,
                   b.y - a.y, c.y - a.y};
@@ -159,12 +157,12 @@ void PolyMesh::add_pieces(PolyId id) {
   const Poly& p = polys[id];
   constexpr double kOff = 1e-5;  // metres: what float32 makes of corners some hundred metres from the origin
   double area = 0, covered = 0, around = 0;
-  for (std::uint32_t k = 1; k + 1 < p.count; ++k) area += cross_xz(corner(p, 0), corner(p, k), corner(p, k + 1));
+  for (std::uint32_t k = 1; k + 1 < p.count; ++k) area += area_xz(corner(p, 0), corner(p, k), corner(p, k + 1));
   for (std::uint32_t k = 0; k < p.count; ++k) around += std::sqrt(distance2_xz(corner(p, k), corner(p, k + 1)));
   bool tiled = !p.planar;
   const std::size_t first = pieces.size();
   for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count && tiled; ++t) {
-    covered += std::abs(cross_xz(tris[t][0], tris[t][1], tris[t][2]));
+    covered += std::abs(area_xz(tris[t][0], tris[t][1], tris[t][2]));
     for (const Vec3d& q : tris[t]) tiled = tiled && holds(id, q, kOff);
     pieces.push_back({tris[t][0], tris[t][1], tris[t][2], id, true});
   }

@@ -7,6 +7,8 @@
 #include <map>
 #include <utility>
 
+#include "ground_plane.hpp"
+
 namespace gsnav::detail {
 namespace {
 
@@ -37,17 +39,6 @@ Vec3d normal_of(const std::vector<Vec3d>& c) {
   for (std::size_t k = 1; k + 1 < c.size(); ++k) n += gsnav::cross(c[k + 1] - c[0], c[k] - c[0]);
   const double l = norm(n);
   return l > 0 ? n * (1.0 / l) : Vec3d{0, 1, 0};
-}
-
-double area_xz(const Vec3d& a, const Vec3d& b, const Vec3d& c) noexcept {
-  return (b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z);
-}
-
-/// Position of p along the edge a b on the ground plane, and how far off it lies.
-std::pair<double, double> along_xz(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
-  const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
-  const double t = len2 > 0 ? clamp(((p.x - a.x) * ex + (p.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
-  return {t, std::hypot(a.x + t * ex - p.x, a.z + t * ez - p.z)};
 }
 
 class Builder {

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <utility>
+
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/vec.hpp"
+
+namespace gsnav::detail {
+
+/// Twice the area of a triangle on the ground plane, positive where its corners run counter-clockwise in (x, z).
+inline double area_xz(const Vec3d& a, const Vec3d& b, const Vec3d& c) noexcept {
+  return (b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z);
+}
+
+/// Share of the edge a b that p lies at on the ground plane, and how far off it, metres.
+inline std::pair<double, double> along_xz(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
+  const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
+  const double t = len2 > 0 ? clamp(((p.x - a.x) * ex + (p.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
+  return {t, std::hypot(a.x + t * ex - p.x, a.z + t * ez - p.z)};
+}
+
+}  // namespace gsnav::detail
