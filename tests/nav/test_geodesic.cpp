@@ -107,7 +107,7 @@ NavMesh demo(const char* file) {
 TEST_CASE("geodesic: equals brute force on the visibility graph of random floors with holes") {
   double worst = 0;
   std::size_t corners = 0, touched = 0, floors = 0;
-  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6, 12, 19, 20, 22}) {  // parts of the last four touch in corners
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u, 5u, 6u, 12u, 19u, 20u, 22u}) {  // parts of the last touch in corners
     const NavMesh mesh = build(random_boxes(seed, 6 + 2 * static_cast<int>(seed), 12));
     const gsnav_test::VisibilityGraph graph(mesh);
     corners += graph.corner_count();
