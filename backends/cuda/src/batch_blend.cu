@@ -32,9 +32,8 @@ struct BlendShared {
   union {
     /// Of the quarter-warps: places of splats in `lent`, in bytes. A splat that covers nothing fills them up.
     alignas(8) std::uint16_t lists[kThreads / 8][kChunk + kListStep];
-    std::uint16_t queue[kChunk];
+    std::uint16_t queues[kThreads / 32][kChunk / (kThreads / 32)];
   };
-  std::uint32_t queued;
 
   __device__ StagedSplat& splat(std::uint32_t i) { return reinterpret_cast<StagedSplat*>(order.lent)[i]; }
 };
@@ -44,29 +43,29 @@ struct BlendShared {
 template <bool Mesh>
 __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, std::uint32_t n, int tile_x,
                       int tile_y, float far) {
-  if (threadIdx.x == 0) {
-    s.splat(kNothing) = staged_nothing();
-    s.queued = 0;
-  }
-  __syncthreads();
-  for (std::uint32_t i = threadIdx.x; i < n; i += kThreads) {
-    const std::uint32_t slot = s.order.slots[first + i];
-    const SplatRecord r = a.records[slot];
-    s.splat(i) = staged(r, slot);
-    if (Mesh && is_hidden(a, slot, far)) {
-      s.masks[i] = 0;
-      continue;
+  if (threadIdx.x == 0) s.splat(kNothing) = staged_nothing();
+  const unsigned lane = threadIdx.x % 32;
+  std::uint16_t* const queue = s.queues[threadIdx.x / 32];
+  std::uint32_t queued = 0;
+  for (std::uint32_t i = threadIdx.x; i - lane < n; i += kThreads) {
+    bool wide = false;
+    if (i < n) {
+      const std::uint32_t slot = s.order.slots[first + i];
+      const SplatRecord r = a.records[slot];
+      s.splat(i) = staged(r, slot);
+      const bool hidden = Mesh && is_hidden(a, slot, far);
+      const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
+      wide = a.elliptic && !hidden && blocks.wide();
+      if (!wide) s.masks[i] = static_cast<std::uint16_t>(hidden ? 0 : blocks.of_bounds());
     }
-    const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
-    if (a.elliptic && blocks.many()) {
-      s.queue[atomicAdd(&s.queued, 1u)] = static_cast<std::uint16_t>(i);  // so that no lane waits for another's
-    } else {
-      s.masks[i] = static_cast<std::uint16_t>(blocks.of_bounds());
-    }
+    // So that no lane waits for another's ellipse.
+    const unsigned votes = __ballot_sync(kAll, wide);
+    if (wide) queue[queued + static_cast<std::uint32_t>(__popc(votes & ((1u << lane) - 1)))] = static_cast<std::uint16_t>(i);
+    queued += static_cast<std::uint32_t>(__popc(votes));
   }
-  __syncthreads();
-  for (std::uint32_t q = threadIdx.x; q < s.queued; q += kThreads) {
-    const std::uint32_t i = s.queue[q];
+  __syncwarp();
+  for (std::uint32_t q = lane; q < queued; q += 32) {
+    const std::uint32_t i = queue[q];
     const SplatRecord& r = a.records[s.order.slots[first + i]];
     const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
     s.masks[i] = static_cast<std::uint16_t>(
@@ -82,13 +81,16 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned b
   std::uint16_t(*const lists)[kChunk + kListStep] = s.lists + threadIdx.x / 32 * 4;
   std::uint32_t length[4] = {0, 0, 0, 0};
   const auto place = [](std::uint32_t i) { return static_cast<std::uint16_t>(i * sizeof(StagedSplat)); };
-  __syncwarp();
+  const auto bit_of = [](unsigned q) { return 1u << (q % 2 + q / 2 * 4); };
+  unsigned open_bits = 0;
+#pragma unroll
+  for (unsigned q = 0; q < 4; ++q) open_bits |= (open >> q & 1u) != 0 ? bit_of(q) : 0u;
   for (std::uint32_t i = 0; i < n; i += 32) {
     const unsigned all = i + lane < n ? static_cast<unsigned>(s.masks[i + lane]) >> bit : 0u;
-    const unsigned mask = ((all & 3u) | (all >> 2 & 12u)) & open;
+    const unsigned mask = all & open_bits;
 #pragma unroll
     for (unsigned q = 0; q < 4; ++q) {
-      const bool mine = (mask >> q & 1u) != 0;
+      const bool mine = (mask & bit_of(q)) != 0;
       const unsigned votes = __ballot_sync(kAll, mine);
       if (mine) lists[q][length[q] + static_cast<std::uint32_t>(__popc(votes & below))] = place(i + lane);
       length[q] += static_cast<std::uint32_t>(__popc(votes));
@@ -177,7 +179,7 @@ __global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor) blen
     }
   }
   for (int k = 0; k < kPixels; ++k) {
-    if (inside[k]) write<Color, D, Mesh>(b, pixel_of(k), state[k], median[k], px, py[k]);
+    if (inside[k]) write<Color, D, Mesh>(b, pixel_of(k), state[k], median_of(state[k], median[k]), px, py[k]);
   }
 }
 
@@ -209,15 +211,12 @@ __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t came
 
 constexpr unsigned kDepthColumns = 16, kDepthRows = 8, kDepthThreads = kDepthColumns * kDepthRows;
 
-/// A thread a pixel of camera blockIdx.z: slots become depths, of records where these are. Else neighbours have Gaussians in
-/// common, and each is projected once a block.
+/// A thread a pixel of camera blockIdx.z, a warp 8 x 4 of them: slots become depths, of records where these are. Else
+/// neighbours have Gaussians in common, and each is projected once a warp.
 __global__ void __launch_bounds__(kDepthThreads, 6) depth_kernel(const BatchArgs a, float* images) {
-  constexpr unsigned kPlaces = 2 * kDepthThreads;  // of a hash table; a power of two
-  __shared__ std::uint32_t slots[kPlaces], indices[kPlaces], found[kDepthThreads], count;
-  __shared__ SplatDepth<float> depths[kDepthThreads];
-  const unsigned t = threadIdx.x;
-  const int x = static_cast<int>(blockIdx.x * kDepthColumns + t % kDepthColumns);
-  const int y = static_cast<int>(blockIdx.y * kDepthRows + t / kDepthColumns);
+  const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
+  const int x = static_cast<int>(blockIdx.x * kDepthColumns + warp % 2 * 8 + lane % 8);
+  const int y = static_cast<int>(blockIdx.y * kDepthRows + warp / 2 * 4 + lane / 8);
   const bool inside = x < a.grid.width && y < a.grid.height;
   const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
   float* const to = images + (blockIdx.z * height + static_cast<std::size_t>(y)) * width + static_cast<std::size_t>(x);
@@ -227,24 +226,16 @@ __global__ void __launch_bounds__(kDepthThreads, 6) depth_kernel(const BatchArgs
     if (inside) *to = slot == kNoSlot ? 0.0f : ray_depth(a.depths[slot], px, py);
     return;
   }
-  slots[t] = slots[t + kDepthThreads] = kNoSlot;
-  if (t == 0) count = 0;
-  __syncthreads();
-  unsigned at = slot * 2654435761u % kPlaces;
-  if (slot != kNoSlot) {
-    for (;; at = (at + 1) % kPlaces) {
-      const std::uint32_t there = atomicCAS(slots + at, kNoSlot, slot);
-      if (there == slot) break;
-      if (there != kNoSlot) continue;
-      indices[at] = atomicAdd(&count, 1u);
-      found[indices[at]] = slot;
-      break;
-    }
-  }
-  __syncthreads();
-  if (t < count) depths[t] = depth_record(a, blockIdx.z, found[t]);
-  __syncthreads();
-  if (inside) *to = slot == kNoSlot ? 0.0f : ray_depth(depths[indices[at]], px, py);
+  const int first = __ffs(static_cast<int>(__match_any_sync(kAll, slot))) - 1;  // of the lanes with that Gaussian
+  SplatDepth<float> depth{};
+  if (slot != kNoSlot && static_cast<int>(lane) == first) depth = depth_record(a, blockIdx.z, slot);
+  constexpr int kWords = sizeof depth / sizeof(float);
+  float words[kWords];
+  memcpy(words, &depth, sizeof depth);
+#pragma unroll
+  for (int i = 0; i < kWords; ++i) words[i] = __shfl_sync(kAll, words[i], first);
+  memcpy(&depth, words, sizeof depth);
+  if (inside) *to = slot == kNoSlot ? 0.0f : ray_depth(depth, px, py);
 }
 
 }  // namespace

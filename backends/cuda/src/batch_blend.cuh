@@ -52,6 +52,11 @@ struct ReachedBlocks {
   __device__ int last_row() const { return (y1 - y) / kBlock; }
   /// More than one row and column: the ellipse may leave out some of them.
   __device__ bool many() const { return first_row() != last_row() && (x0 - x) / kBlock != (x1 - x) / kBlock; }
+  /// More than 2 x 2: it leaves out enough to be worth its time.
+  __device__ bool wide() const {
+    const int rows = last_row() - first_row(), columns = (x1 - x) / kBlock - (x0 - x) / kBlock;
+    return rows + columns > 2 && rows > 0 && columns > 0;
+  }
   __device__ unsigned of_bounds() const {
     const unsigned across = columns(x0, x1);
     unsigned mask = 0;
@@ -125,7 +130,7 @@ __device__ void write(const BlendArgs& b, std::size_t pixel, BlendState<float, k
 /// What RasterArgs decide at run time and the inner loop must not.
 enum class Form { plain, exclusive_stop, perspective };
 
-/// Blends a splat into K pixels of a column, where `mesh` has the depths of their meshes.
+/// Blends a splat into K pixels of a column, where `mesh` has the depths of their meshes. `median`: see median_of.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh, int K>
 __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>& rules, const StagedSplat& from, float px,
                                     const float (&py)[K], const float (&mesh)[K],
@@ -139,17 +144,24 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
     const float exponent = F == Form::perspective
                                ? perspective_exponent(geometry, a.perspectives[slot], px, py[k])
                                : column_exponent(terms, geometry.ref_y, geometry.b, py[k]);
-    const float before = state[k].transmittance;
-    float alpha = footprint_alpha<M>(rules, exponent);
+    // Decided once, and by the hardware's minimum: a third of the loop were comparisons and selections.
+    bool drawn = exponent >= rules.log2_alpha_min && state[k].open(rules);
+    float alpha = ::fminf(exp2_in_range<M>(exponent), rules.max_alpha);
     if constexpr (Mesh) {
-      if (alpha > 0) alpha = alpha_before_mesh(alpha, a.depths[slot], mesh[k], px, py[k]);
+      if (drawn) {
+        alpha = alpha_before_mesh(alpha, a.depths[slot], mesh[k], px, py[k]);
+        drawn = alpha > 0;
+      }
     }
-    blend_alpha<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, alpha, &color, depth, px, py[k]);
-    if constexpr (D == DepthMode::median) {
-      // An exclusive stop negates the transmittance and blends nothing.
-      if (before > 0.5f && abs(state[k].transmittance) <= 0.5f) median[k] = slot;
-    }
+    if (D == DepthMode::median && state[k].transmittance > 0.5f) median[k] = slot;
+    blend_drawn<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, drawn, alpha, &color, depth, px, py[k]);
   }
+}
+
+/// The slot of the median Gaussian, of the last that blend_staged met while more than half of the light was left.
+template <class State>
+__device__ inline std::uint32_t median_of(const State& state, std::uint32_t last) {
+  return abs(state.transmittance) > 0.5f ? kNoSlot : last;  // an exclusive stop negates it and blends nothing
 }
 
 /// Depths of the meshes at a thread's pixels, and the farthest of all pixels of the block: what a whole tile hides is

@@ -172,7 +172,7 @@ __global__ void __launch_bounds__(2 * kThreads) blend_small_kernel(const __grid_
     if (lane == 0) s.open[chunk][warp] = open;
   }
   if (!inside) return;
-  write<Color, D, Mesh>(b, pixel[0], state[0], median[0], px, py[0]);
+  write<Color, D, Mesh>(b, pixel[0], state[0], median_of(state[0], median[0]), px, py[0]);
 }
 
 }  // namespace

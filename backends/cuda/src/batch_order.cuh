@@ -53,9 +53,8 @@ inline constexpr int kByRank = -1;
 
 namespace ordering {
 
-/// The smallest and largest of the block's values, left in s.low and s.high.
+/// The smallest and largest of the block's values, left in s.low and s.high, which all threads are done with.
 __device__ inline void block_range(OrderShared& s, std::uint32_t low, std::uint32_t high) {
-  __syncthreads();
   if (threadIdx.x == 0) {
     s.low = 0xffffffffu;
     s.high = 0;
@@ -130,8 +129,6 @@ __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& 
     block_range(s, low, high);
     low = s.low;
     high = s.high;
-  } else {
-    __syncthreads();
   }
   const int shift = max(0, bits_for(high - low) - kBucketBits);
   auto* const mine = reinterpret_cast<uint4*>(s.sorting.buckets + threadIdx.x * kThreadBuckets);
@@ -239,6 +236,7 @@ __device__ __noinline__ inline void partition(OrderShared& s, const BatchArgs& a
   const auto key = [](const Pair& p) { return p.key; };
   range(key);
   if (s.low != s.high) return split(key, false);
+  __syncthreads();
   const auto rank = [&](const Pair& p) { return rank_of(a, camera, p.slot); };
   range(rank);
   split(rank, true);

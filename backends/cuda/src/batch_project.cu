@@ -89,6 +89,7 @@ __device__ void queue_large(const BatchArgs& a, std::uint32_t slot, const SplatB
 /// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
 struct alignas(16) WarpRows {
   float mean[3][32], quat[4][32], scales[3][32], opacity[32];
+  float sh0[32 * 3];  ///< [32][3]
   /// [32][rest], floats or halves as they are stored: from memory a warp would read 32 lines a coefficient.
   union {
     float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
@@ -141,6 +142,7 @@ __device__ void ask_for_sh(const GaussianView& gs, std::size_t first, WarpRows& 
   const std::size_t rest = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
   const std::size_t rows = gs.size - first < 32 ? gs.size - first : 32;
   const unsigned n = static_cast<unsigned>(rest * rows);
+  copy_async(to.sh0, gs.sh0.data + 3 * first, static_cast<unsigned>(3 * rows));
   if (gs.shN_half.empty()) {
     copy_async(to.sh, gs.shN.data + rest * first, n);
   } else {
@@ -162,7 +164,7 @@ __device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::
   const std::size_t lane = threadIdx.x % 32, first = row - lane;
   GaussianView v;  // of the warp's rows
   v.sh_degree = gs.sh_degree;
-  v.sh0 = {gs.sh0.data + 3 * first, 3 * 32};
+  v.sh0 = {rows.sh0, 3 * 32};
   if (gs.shN_half.empty()) {
     v.shN = {rows.sh, 1};
   } else {

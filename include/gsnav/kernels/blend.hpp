@@ -120,20 +120,19 @@ GSNAV_HD L footprint_alpha(const BlendRules<S>& rules, L exponent) noexcept {
   return select(drawn, min(exp2_in_range<M>(exponent), L(rules.max_alpha)), L(S(0)));
 }
 
-/// Blends one splat onto pixels where it has `alpha`. (px, py): pixel centres. Pixels outside the footprint, and
-/// closed pixels, keep their state bit for bit. `General` obeys rules.exclusive_stop: a pixel that it closed keeps
-/// its transmittance, negated.
+/// Blends one splat onto the pixels that are `drawn`, open ones of its footprint, where it has `alpha`. (px, py): pixel
+/// centres. Other pixels keep their state bit for bit. `General` obeys rules.exclusive_stop: a pixel that it closed
+/// keeps its transmittance, negated.
 template <bool Color, DepthMode D, bool General, class L, class S>
-GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha, const SplatColor<S>* color,
-                          const SplatDepth<S>* depth, L px, L py) noexcept {
+GSNAV_HD void blend_drawn(BlendState<L, D>& state, const BlendRules<S>& rules, mask_of<L> drawn, L alpha,
+                          const SplatColor<S>* color, const SplatDepth<S>* depth, L px, L py) noexcept {
   const L zero(S(0)), before = state.transmittance;
-  const auto open = state.open(rules);
-  L weight = select(open, alpha * before, zero);
+  L weight = select(drawn, alpha * before, zero);
   L after = before - weight;
   state.transmittance = after;
   if constexpr (General) {
     if (rules.exclusive_stop) {
-      const auto closes = open && (after < L(rules.transmittance_min));
+      const auto closes = drawn && (after < L(rules.transmittance_min));
       weight = select(closes, zero, weight);
       after = select(closes, before, after);
       state.transmittance = select(closes, -before, after);
@@ -157,6 +156,13 @@ GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L
     const L below(S(1) - rules.first_hit_tau);
     state.first_hit = select((before > below) && (after <= below), z, state.first_hit);
   }
+}
+
+/// The same for an alpha that is 0 outside the footprint.
+template <bool Color, DepthMode D, bool General, class L, class S>
+GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha, const SplatColor<S>* color,
+                          const SplatDepth<S>* depth, L px, L py) noexcept {
+  blend_drawn<Color, D, General>(state, rules, state.open(rules), alpha, color, depth, px, py);
 }
 
 /// Blends one splat onto pixels at (px, py): blend_alpha of what its records give. Returns the open pixels of its
