@@ -13,6 +13,14 @@ std::uint32_t grown(unsigned long long needed) {
       std::min<unsigned long long>(needed + needed / 8 + 1024, std::numeric_limits<std::uint32_t>::max() - 1));
 }
 
+/// Of BatchCounters, on whole lines of memory.
+constexpr std::size_t kCounterWords = (sizeof(cuda::BatchCounters) + 255) / 256 * 256 / sizeof(std::uint32_t);
+
+/// Counters of the call and of the bins.
+std::size_t zeroed_words(const cuda::BatchArgs& args) {
+  return kCounterWords + (std::size_t{args.tiles} << args.depth_bins.bits);
+}
+
 }  // namespace
 
 void CudaBatchRenderer::State::size_scratch() {
@@ -21,14 +29,16 @@ void CudaBatchRenderer::State::size_scratch() {
     return array.data();
   };
   args.items = size(items, item_capacity);
-  args.counters = size(counters, 1);
   args.records = size(records, slot_capacity);
   args.entries = size(entries, slot_capacity);
   args.sources = size(sources, slot_capacity);
   args.hard = size(hard, hard_capacity);
   args.several = size(several, several_capacity);
   args.large = size(large, large_capacity);
-  args.bins = size(bins, std::size_t{args.tiles} << args.depth_bins.bits);
+  // Counters of both kinds together, so that one operation clears them.
+  size(zeroed, zeroed_words(args));
+  args.counters = reinterpret_cast<cuda::BatchCounters*>(zeroed.data());
+  args.bins = zeroed.data() + kCounterWords;
   args.tile_counts = size(tile_counts, args.tiles);
   args.tile_begins = size(tile_begins, args.tiles);
   args.tile_order = size(tile_order, args.tiles);
@@ -55,7 +65,7 @@ void CudaBatchRenderer::State::size_scratch() {
   stats.scratch_bytes = inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
                         entries.capacity_bytes() + sources.capacity_bytes() + hard.capacity_bytes() +
                         several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() +
-                        long_parts.capacity_bytes() + bins.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
+                        long_parts.capacity_bytes() + zeroed.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
                         pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
                         mesh.bytes() + mesh_depth.capacity_bytes() + mesh_color.capacity_bytes();
 }
@@ -82,8 +92,7 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
 void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
   const cudaStream_t stream = backend.stream();
   cudaMemcpyAsync(inputs.data(), flight.inputs, input_bytes, cudaMemcpyHostToDevice, stream);
-  backend.fill(args.counters, 0, sizeof(cuda::BatchCounters));
-  backend.fill(args.bins, 0, (std::size_t{args.tiles} << args.depth_bins.bits) * sizeof(std::uint32_t));
+  backend.fill(zeroed.data(), 0, zeroed_words(args) * sizeof(std::uint32_t));
   cuda::launch_projection(args, multiprocessors, stream);
   cuda::launch_binning(args, multiprocessors, stream);
   if (args.depth_bins.many()) cuda::launch_ordering(args, multiprocessors, stream);

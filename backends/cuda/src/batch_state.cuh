@@ -61,8 +61,8 @@ struct CudaBatchRenderer::State {
   using Array = Buffer<T, CudaBackend>;
 
   State(CudaBackend& b, const RenderConfig& c)
-      : backend(b), config(c), inputs(b), items(b), counters(b), records(b), entries(b), sources(b), several(b), large(b),
-        bins(b), tile_counts(b), tile_begins(b), tile_order(b), long_parts(b), depths(b), perspectives(b), hard(b), parts(b), pairs(b),
+      : backend(b), config(c), inputs(b), items(b), records(b), entries(b), sources(b), several(b), large(b),
+        zeroed(b), tile_counts(b), tile_begins(b), tile_order(b), long_parts(b), depths(b), perspectives(b), hard(b), parts(b), pairs(b),
         pairs_alt(b), mesh(b), mesh_depth(b), mesh_color(b) {
     int device = 0;
     cuda::need(cudaGetDevice(&device), "cudaGetDevice");
@@ -101,11 +101,10 @@ struct CudaBatchRenderer::State {
   std::size_t calls = 0, finished = 0;  ///< calls made; calls whose counts have been looked at
   Array<unsigned char> inputs;
   Array<cuda::BatchItem> items;
-  Array<cuda::BatchCounters> counters;
   Array<cuda::SplatRecord> records;
   Array<cuda::SplatEntry> entries;
   Array<cuda::LargeRows> large;
-  Array<std::uint32_t> sources, several, bins, tile_counts, tile_begins, tile_order, long_parts;
+  Array<std::uint32_t> sources, several, zeroed, tile_counts, tile_begins, tile_order, long_parts;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
   Array<cuda::HardSplat> hard;
