@@ -69,21 +69,6 @@ namespace {
 using cuda::BatchInstance;
 using cuda::BatchSet;
 
-/// Arrays laid one after the other into one block, so that one copy takes them to the device.
-class Layout {
- public:
-  template <class T>
-  std::size_t add(std::size_t count) {
-    const std::size_t at = bytes_;
-    bytes_ = (at + count * sizeof(T) + 15) / 16 * 16;
-    return at;
-  }
-  std::size_t bytes() const noexcept { return bytes_; }
-
- private:
-  std::size_t bytes_ = 0;
-};
-
 /// Whether a call takes as long as its longest list, so that lists are to be short. `tiles`: of 16 pixels. In larger images
 /// splats are larger too, and small tiles share too many.
 bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, int multiprocessors) {
@@ -134,7 +119,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   for (std::size_t s = 0; s < sets.size(); ++s) set_begins[s + 1] += set_begins[s];
   cursors.assign(set_begins.begin(), set_begins.end() - 1);
 
-  Layout layout;
+  cuda::Layout layout;
   const std::size_t at_sets = layout.add<BatchSet>(sets.size());
   const std::size_t at_instances = layout.add<BatchInstance>(seen.size());
   const std::size_t at_first = layout.add<std::uint32_t>(cameras.size() + 1);
@@ -143,9 +128,9 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   const std::size_t at_offsets_f = layout.add<Vec3<float>>(origins);
   cuda::Flight& flight = flights[calls % cuda::kInFlight];
   cuda::need(cudaEventSynchronize(flight.done), "waiting for an earlier batch");
-  flight.reserve(layout.bytes());
+  flight.inputs.reserve(layout.bytes());
   inputs.resize_discard(layout.bytes());
-  const auto host = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(flight.inputs + at); };
+  const auto host = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(flight.inputs.data + at); };
   const auto device = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(inputs.data() + at); };
 
   // ---- instances, neighbours where they are of one set
