@@ -4,11 +4,17 @@
 #include <doctest/doctest.h>
 
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <limits>
+#include <thread>
 
 #include "ops/mesh_images.hpp"
 
 #if defined(GSNAV_HAS_CUDA)
+#include <cuda_runtime_api.h>
+
 #include "gsnav/scene/spatial_order.hpp"
 #include "ops/cuda_batch_images.hpp"
 #include "ops/no_gpu.hpp"
@@ -115,6 +121,111 @@ TEST_CASE("cuda batch: meshes alone, meshes that come and go, and rules that bat
     const Status s = other.render(sets, one, to);
     CHECK(s.code() == Errc::unsupported);
     CHECK(s.message().find("cameras[0]: meshes") != std::string::npos);
+  }
+}
+
+TEST_CASE("cuda batch: counts of triangles stay on the device, and what does not fit is drawn again") {
+  if (no_gpu("cuda batches of many triangles")) return;
+  CudaBackend cuda;
+  const GaussianArrays<CudaBackend> arrays(cuda, random_cloud(7, {.count = 2000}));
+  SurfaceMesh ball = sphere(0.4, 16, 10);
+  ball.two_sided = true;  // nearly all of it is drawn: more than is guessed
+  ball.geometry.vertices[70].x = std::numeric_limits<float>::quiet_NaN();
+  MeshScene scene;
+  scene.add(ball).value();
+  const MeshArrays<CudaBackend> there(cuda, scene.instance(0, {}, 0).mesh);
+  std::vector<MeshInstance> balls;
+  for (int i = 0; i < 12; ++i) {
+    const Vec3d at{0.45 * (i % 4 - 1.5), 0.4 * (i / 4 - 1), 3.6 + 0.1 * (i % 5)};
+    balls.push_back(there.instance({{1, 0, 0, 0}, at, 1.0}, static_cast<std::uint32_t>(i)));
+  }
+  // Few cameras; many; and more pixels than one wave has.
+  for (const std::array<int, 3>& size : {std::array{4, 97, 64}, std::array{60, 149, 101}, std::array{76, 640, 352}}) {
+    CAPTURE(size[0]);
+    const std::vector<Camera> cameras = ring(size[0], size[1], size[2]);
+    std::vector<MeshFrame> seen;
+    for (int c = 0; c < size[0]; ++c) {
+      seen.push_back({std::span(balls).first(static_cast<std::size_t>(c % 13)), {}});
+    }
+    MeshStats expected;
+    MeshWorkspace<float, CudaBackend> alone(cuda);
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      MeshStats one;
+      draw_meshes<float>(cuda, alone, seen[c].instances, cameras[c], seen[c].light, 16, false, {}, &one).throw_if_error();
+      expected.triangles += one.triangles;
+      expected.not_finite += one.not_finite;
+      expected.drawn += one.drawn;
+    }
+    CHECK(expected.not_finite > 0);
+    CudaBatchRenderer renderer(cuda);
+    const Frames<float> frames = singly(cuda, {arrays.set()}, cameras, {}, {}, kMedianOnly, seen);
+    for (int call = 0; call < 2; ++call) {
+      const Batch got = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianOnly, false, seen);
+      check_same(got.frames, frames);
+      CHECK(got.stats.meshes.triangles == expected.triangles);
+      CHECK(got.stats.meshes.not_finite == expected.not_finite);
+      CHECK(got.stats.meshes.drawn == expected.drawn);
+      if (call == 1) CHECK(got.stats.reruns == 0);
+      if (call == 0 && size[0] > 4) CHECK(got.stats.reruns > 0);
+    }
+  }
+}
+
+namespace {
+
+/// Holds a stream until it is opened, or gives up.
+struct Gate {
+  std::atomic<bool> open{false}, gave_up{false};
+  static void CUDART_CB wait(void* self) {
+    Gate& g = *static_cast<Gate*>(self);
+    const auto start = std::chrono::steady_clock::now();
+    while (!g.open) {
+      if (std::chrono::steady_clock::now() - start > std::chrono::seconds(20)) {
+        g.gave_up = true;
+        return;
+      }
+      std::this_thread::yield();
+    }
+  }
+};
+
+}  // namespace
+
+TEST_CASE("cuda batch: a steady call returns while the device is busy, with meshes and without") {
+  if (no_gpu("cuda batches that wait for nothing")) return;
+  CudaBackend cuda;
+  const GaussianArrays<CudaBackend> arrays(cuda, random_cloud(8, {.count = 3000}));
+  const std::vector<GaussianSet> sets{arrays.set()};
+  const Meshes meshes(cuda);
+  constexpr std::size_t kPixels = 97 * 64;
+  for (const bool with_meshes : {false, true}) {
+    CAPTURE(with_meshes);
+    std::vector<BatchCamera> cameras;
+    for (const Camera& c : ring(5, 97, 64)) {
+      cameras.push_back({c, {}, with_meshes ? MeshFrame{meshes.both} : MeshFrame{}});
+    }
+    Buffer<float, CudaBackend> images(cuda);
+    images.resize_discard(4 * kPixels * cameras.size());
+    BatchImages to;
+    to.floats.rgb = images.data();
+    to.floats.median_depth = images.data() + 3 * kPixels * cameras.size();
+    CudaBatchRenderer renderer(cuda);
+    for (int i = 0; i < 6; ++i) {  // scratch is found, launches are recorded
+      renderer.render(sets, cameras, to).throw_if_error();
+      renderer.finish().throw_if_error();
+    }
+    for (const double step : {0.0, 0.01}) {  // the same again, and moved
+      for (BatchCamera& c : cameras) c.camera.viewmat.translation.x += step;
+      Gate gate;
+      REQUIRE(cudaLaunchHostFunc(cuda.stream(), Gate::wait, &gate) == cudaSuccess);
+      const Status s = renderer.render(sets, cameras, to);
+      const bool waited = gate.gave_up;
+      gate.open = true;
+      CHECK(s.ok());
+      CHECK(!waited);
+      CHECK(renderer.finish().ok());
+      CHECK(renderer.stats().reruns == 0);
+    }
   }
 }
 #endif

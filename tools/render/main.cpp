@@ -101,9 +101,14 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
   config.sort_order = scene.report.sort_order;
   config.composite = o.composite == "merged" ? Composite::merged : Composite::hard_depth;
   Renderer<S, B> renderer(backend, config);
-  const GaussianArrays<B> arrays(backend, cloud);
-  const bool profiled = is_host_backend<B> && scene.profile != nullptr;
-  const std::vector<GaussianSet> whole{profiled ? scene.profile->applied_to(arrays.set()) : arrays.set()};
+  const bool profiled = scene.profile != nullptr && (is_host_backend<B> || scene.tree == nullptr);
+  const GaussianArrays<B> arrays = [&] {
+    if constexpr (std::is_same_v<Cloud, GaussianCloud>) {
+      if (profiled) return GaussianArrays<B>(backend, cloud, *scene.profile);
+    }
+    return GaussianArrays<B>(backend, cloud);
+  }();
+  const std::vector<GaussianSet> whole{arrays.set()};
   const GaussianSet whole_here = cloud.set();  // in host memory, as cuts are
   std::span<const GaussianSet> sets = whole, here = is_host_backend<B> ? sets : std::span(&whole_here, 1);
   SceneDetail detail;

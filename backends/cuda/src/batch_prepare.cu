@@ -22,11 +22,9 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
     if (Status s = validate(sets[i]); !s) {
       return {s.code(), "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + s.message()};
     }
-    const GaussianView& g = sets[i].gaussians;
     const auto unsupported = [&](const char* what) {
       return Status(Errc::unsupported, "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + what);
     };
-    if (!g.chunk_sh_degrees.empty()) return unsupported("chunk_sh_degrees are read in host memory; leave them out");
     if (sets[i].color_space != config.blend_space) return unsupported("color_space is not the frame's blend_space");
   }
   for (std::size_t c = 0; c < cameras.size(); ++c) {
@@ -71,21 +69,6 @@ namespace {
 using cuda::BatchInstance;
 using cuda::BatchSet;
 
-/// Arrays laid one after the other into one block, so that one copy takes them to the device.
-class Layout {
- public:
-  template <class T>
-  std::size_t add(std::size_t count) {
-    const std::size_t at = bytes_;
-    bytes_ = (at + count * sizeof(T) + 15) / 16 * 16;
-    return at;
-  }
-  std::size_t bytes() const noexcept { return bytes_; }
-
- private:
-  std::size_t bytes_ = 0;
-};
-
 /// Whether a call takes as long as its longest list, so that lists are to be short. `tiles`: of 16 pixels. In larger images
 /// splats are larger too, and small tiles share too many.
 bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, int multiprocessors) {
@@ -93,16 +76,21 @@ bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, int multiprocessors) 
   return tiles <= kSmallImage && cameras * tiles <= 16 * static_cast<std::uint64_t>(multiprocessors);
 }
 
-/// Eight octaves from the nearest near plane on, as finely as counters in the GPU's cache allow.
+/// Eight octaves from the nearest near plane on, or from kNear, as finely as counters in the GPU's cache allow. An agent's
+/// near plane is a centimetre off: octaves up to its body's radius would be spent on nothing, and all that lies beyond 2.5 m
+/// would share the last bin.
 cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits, std::uint32_t tiles) {
   constexpr std::uint32_t kCounters = 1u << 22;
-  constexpr int kOctaves = 3;  // log2
+  constexpr int kOctaves = 3;    // log2
+  constexpr float kNear = 0.125f;  // metres
   int bits = cuda::kMinDepthBits;
   while (bits < cuda::kMaxDepthBits && std::uint64_t{tiles} << (bits + 1) <= kCounters) ++bits;
   double near_plane = cameras[0].camera.near_plane;
   for (const BatchCamera& c : cameras) near_plane = std::min<double>(near_plane, c.camera.near_plane);
   const KeyCode code = KeyCode::of(key_bits, static_cast<float>(near_plane));
-  const std::uint32_t base = code.base == 0 ? bits_of(static_cast<float>(near_plane)) : 0;
+  // Bits of positive floats are in their order; of keys in fewer bits so are the codes, which begin at the near plane.
+  const float first = std::max(static_cast<float>(near_plane), kNear);
+  const std::uint32_t base = code.base == 0 ? bits_of(first) : code(first);
   return {base, std::max(0, 23 - code.shift + kOctaves - bits), bits};
 }
 
@@ -131,7 +119,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   for (std::size_t s = 0; s < sets.size(); ++s) set_begins[s + 1] += set_begins[s];
   cursors.assign(set_begins.begin(), set_begins.end() - 1);
 
-  Layout layout;
+  cuda::Layout layout;
   const std::size_t at_sets = layout.add<BatchSet>(sets.size());
   const std::size_t at_instances = layout.add<BatchInstance>(seen.size());
   const std::size_t at_first = layout.add<std::uint32_t>(cameras.size() + 1);
@@ -140,9 +128,9 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   const std::size_t at_offsets_f = layout.add<Vec3<float>>(origins);
   cuda::Flight& flight = flights[calls % cuda::kInFlight];
   cuda::need(cudaEventSynchronize(flight.done), "waiting for an earlier batch");
-  flight.reserve(layout.bytes());
+  flight.inputs.reserve(layout.bytes());
   inputs.resize_discard(layout.bytes());
-  const auto host = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(flight.inputs + at); };
+  const auto host = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(flight.inputs.data + at); };
   const auto device = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(inputs.data() + at); };
 
   // ---- instances, neighbours where they are of one set

@@ -89,7 +89,6 @@ __device__ void queue_large(const BatchArgs& a, std::uint32_t slot, const SplatB
 /// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
 struct alignas(16) WarpRows {
   float mean[3][32], quat[4][32], scales[3][32], opacity[32];
-  float sh0[32 * 3];  ///< [32][3]
   /// [32][rest], floats or halves as they are stored: from memory a warp would read 32 lines a coefficient.
   union {
     float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
@@ -137,12 +136,29 @@ __device__ void copy_async(T* to, const T* from, unsigned n) {
   }
 }
 
-/// Asks for the coefficients of rows `first` (lane 0) on; they are there after wait_for_sh.
-__device__ void ask_for_sh(const GaussianView& gs, std::size_t first, WarpRows& to) {
+/// ask_for_sh for the bands up to `degree` of each row, `rest` values apart, of which no others are read.
+__device__ __noinline__ void ask_for_bands(const GaussianView& gs, int degree, unsigned rest, std::size_t first, WarpRows& to) {
+  const unsigned rows = static_cast<unsigned>(gs.size - first < 32 ? gs.size - first : 32), lane = threadIdx.x % 32;
+  const unsigned kept = static_cast<unsigned>(3 * (sh_coefficient_count(degree) - 1));
+  const std::size_t begin = rest * first;
+  for (unsigned row = 0; row < rows; ++row) {
+    if (lane >= kept) continue;  // at most 24 of degree 2
+    const std::size_t from = begin + rest * row + lane;
+    if (gs.shN_half.empty()) {
+      __pipeline_memcpy_async(to.sh + kept * row + lane, gs.shN.data + from, sizeof(float));
+    } else {
+      to.sh_half[kept * row + lane] = gs.shN_half.data[from];
+    }
+  }
+  __pipeline_commit();
+}
+
+/// Asks for the coefficients of rows `first` (lane 0) on, up to `degree` >= 1; they are there after wait_for_sh.
+__device__ void ask_for_sh(const GaussianView& gs, int degree, std::size_t first, WarpRows& to) {
   const std::size_t rest = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  if (degree < gs.sh_degree) return ask_for_bands(gs, degree, static_cast<unsigned>(rest), first, to);
   const std::size_t rows = gs.size - first < 32 ? gs.size - first : 32;
   const unsigned n = static_cast<unsigned>(rest * rows);
-  copy_async(to.sh0, gs.sh0.data + 3 * first, static_cast<unsigned>(3 * rows));
   if (gs.shN_half.empty()) {
     copy_async(to.sh, gs.shN.data + rest * first, n);
   } else {
@@ -158,13 +174,13 @@ __device__ void wait_for_sh() {
   __syncwarp();
 }
 
-/// Colour of a lane's row after wait_for_sh.
+/// Colour of a lane's row after wait_for_sh; `degree` as it was asked for.
 __device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t row, const WarpRows& rows,
                                        const Vec3<float>& delta) {
   const std::size_t lane = threadIdx.x % 32, first = row - lane;
   GaussianView v;  // of the warp's rows
-  v.sh_degree = gs.sh_degree;
-  v.sh0 = {rows.sh0, 3 * 32};
+  v.sh_degree = degree;
+  v.sh0 = {gs.sh0.data + 3 * first, 3 * 32};
   if (gs.shN_half.empty()) {
     v.shN = {rows.sh, 1};
   } else {
@@ -195,10 +211,12 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
     const std::size_t row = item.chunk * kProjectChunk + part % kWarpsPerChunk * 32 + lane;
     const bool exists = row < gs.size;
     const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
-    bool has_sh = !a.instances[item.first_instance].args.color || row - lane >= gs.size;
+    // Instances of a set are drawn to one degree.
+    const int degree = gs.degree_of(item.chunk * kProjectChunk, a.instances[item.first_instance].args.sh_degree);
+    bool has_sh = !a.instances[item.first_instance].args.color || degree == 0 || row - lane >= gs.size;
     const LaneRow read = read_row(gs, row);
     __syncwarp();  // all lanes are done with the rows before
-    if (!has_sh) ask_for_sh(gs, row - lane, rows);
+    if (!has_sh) ask_for_sh(gs, degree, row - lane, rows);
     keep_row(read, rows);
     for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
       const std::uint32_t index = item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1;
@@ -243,7 +261,7 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
       }
       if (drawn && slot != kNoSlot) {
         write_record<Plain>(a, slot, instance, key, row, splat,
-                     args.color ? row_color(gs, args.sh_degree, row, rows, delta) : SplatColor<float>{});
+                     args.color ? row_color(gs, degree, row, rows, delta) : SplatColor<float>{});
       }
       const TileWindow window = drawn && slot != kNoSlot ? window_of(a, splat.bounds) : TileWindow{0, 0};
       const bool single = window.tiles != 0;
@@ -285,7 +303,8 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
     if (make_splat64(args, a.depths != nullptr, h.row, key, mean, origin, splat)) {
       SplatColor<float> color;
       if (args.color) {
-        color = gaussian_color<float>(gs, args.sh_degree, h.row, gsnav::detail::camera_delta(args, mean, origin));
+        color = gaussian_color<float>(gs, gs.degree_of(h.row, args.sh_degree), h.row,
+                                      gsnav::detail::camera_delta(args, mean, origin));
       }
       write_record<false>(a, h.slot, instance, key, h.row, splat, color);
       const TileWindow window = window_of(a, splat.bounds);

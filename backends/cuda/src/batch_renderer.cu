@@ -67,7 +67,7 @@ void CudaBatchRenderer::State::size_scratch() {
                         several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() +
                         long_parts.capacity_bytes() + zeroed.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
                         pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
-                        mesh.bytes() + mesh_depth.capacity_bytes() + mesh_color.capacity_bytes();
+                        meshes.bytes();
 }
 
 cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight) const {
@@ -78,7 +78,7 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
   const FrameImages<float>& to = raster.images;
   add(args.units, args.set_count, args.cameras, args.grid.width, args.grid.height, input_bytes, args.depth_bins.base);
   add(address(args.sets), address(args.instances), address(args.camera_first), address(args.camera_instances),
-      address(flight.inputs));
+      address(flight.inputs.data));
   add(address(to.rgb), address(to.alpha), address(to.median_depth), address(to.expected_depth),
       address(to.accumulated_depth), address(to.first_hit_depth), address(rgb8));
   // Arrays move when they grow, and only then. Those of tiles have no capacity of their own here.
@@ -91,7 +91,7 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
 
 void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
   const cudaStream_t stream = backend.stream();
-  cudaMemcpyAsync(inputs.data(), flight.inputs, input_bytes, cudaMemcpyHostToDevice, stream);
+  cudaMemcpyAsync(inputs.data(), flight.inputs.data, input_bytes, cudaMemcpyHostToDevice, stream);
   backend.fill(zeroed.data(), 0, zeroed_words(args) * sizeof(std::uint32_t));
   cuda::launch_projection(args, multiprocessors, stream);
   cuda::launch_binning(args, multiprocessors, stream);
@@ -119,8 +119,9 @@ cudaGraphExec_t CudaBatchRenderer::State::record(const cuda::Flight& flight) {
 }
 
 Status CudaBatchRenderer::State::launch() {
-  size_scratch();
   cuda::Flight& flight = flights[calls % cuda::kInFlight];
+  if (flight.has_meshes) size_layers();
+  size_scratch();
   const cuda::LaunchKey key = launch_key(flight);
   if (key != flight.key) {
     flight.forget_recorded();
@@ -131,6 +132,7 @@ Status CudaBatchRenderer::State::launch() {
   }
   stats.replayed = flight.recorded != nullptr;
   cudaError_t e = cudaSuccess;
+  if (flight.has_meshes) enqueue_layers(flight);  // beside the graph: what is in view makes other launches
   if (stats.replayed) {
     e = cudaGraphLaunch(flight.recorded, backend.stream());
   } else {
@@ -157,7 +159,7 @@ Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<co
                                         std::to_string(cuda::kInFlight) + " calls of render()"};
   }
   if (Status status = s.prepare(sets, cameras, images); !status) return status;
-  if (Status status = s.draw_layers(cameras); !status) return status;
+  if (Status status = s.place_meshes(cameras); !status) return status;
   if (Status status = s.launch(); !status) return status;
   ++s.calls;
   return {};
@@ -175,9 +177,12 @@ Status CudaBatchRenderer::finish() {
               std::string("CudaBatchRenderer: the batch failed on the device: ") + cudaGetErrorString(e)};
     }
     const cuda::BatchCounters& n = *flight.counters;
-    if (std::max(n.slots, n.pairs) >= std::numeric_limits<std::uint32_t>::max()) {
-      return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(n.slots) + " visible Gaussians and " +
-                                     std::to_string(n.pairs) + " tile intersections: draw fewer cameras a call"};
+    const cuda::MeshCounters of_meshes = flight.has_meshes ? *flight.mesh_counters : cuda::MeshCounters{};
+    if (std::max({n.slots, n.pairs, of_meshes.most}) >= std::numeric_limits<std::uint32_t>::max()) {
+      s.finished = s.calls;
+      return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(n.slots) + " visible Gaussians, " +
+                                     std::to_string(n.pairs) + " tile intersections and " +
+                                     std::to_string(of_meshes.most) + " triangles: draw fewer cameras a call"};
     }
     bool fits = true;
     const auto fit = [&](std::uint32_t& capacity, unsigned long long count) {
@@ -190,7 +195,9 @@ Status CudaBatchRenderer::finish() {
     fit(s.several_capacity, n.several);
     fit(s.large_capacity, n.large);
     fit(s.pair_capacity, n.pairs);
+    fit(s.triangle_capacity, of_meshes.most);
     s.stats.tile_intersections = n.pairs;
+    s.stats.meshes = {flight.mesh_triangles, of_meshes.not_finite, of_meshes.drawn, 0};
     if (fits) {
       ++s.finished;
       continue;

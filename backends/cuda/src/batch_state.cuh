@@ -8,6 +8,7 @@
 #include "batch_args.cuh"
 #include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/core/buffer.hpp"
+#include "mesh.cuh"
 
 // What a CudaBatchRenderer keeps between calls.
 
@@ -27,12 +28,46 @@ inline void need(cudaError_t e, const char* what) {
 /// What the launches of a call depend on besides the contents of its inputs: addresses, capacities and counts.
 using LaunchKey = std::array<std::uint64_t, 40>;
 
+/// Arrays laid one after the other into one block, so that one copy takes them to the device.
+class Layout {
+ public:
+  template <class T>
+  std::size_t add(std::size_t count) {
+    const std::size_t at = bytes_;
+    bytes_ = (at + count * sizeof(T) + 15) / 16 * 16;
+    return at;
+  }
+  std::size_t bytes() const noexcept { return bytes_; }
+
+ private:
+  std::size_t bytes_ = 0;
+};
+
+/// Page-locked memory that grows.
+struct PinnedBlock {
+  unsigned char* data = nullptr;
+  std::size_t capacity = 0;
+  void reserve(std::size_t bytes) {
+    if (bytes <= capacity) return;
+    release();
+    need(cudaMallocHost(&data, bytes + bytes / 8), "cudaMallocHost of cameras");
+    capacity = bytes + bytes / 8;
+  }
+  void release() noexcept {
+    if (data != nullptr) cudaFreeHost(data);
+    data = nullptr;
+    capacity = 0;
+  }
+};
+
 /// Pinned memory of one call under way: what is copied to the device, and the counts that come back; and its
 /// launches recorded, to be replayed while their key stays the same.
 struct Flight {
-  unsigned char* inputs = nullptr;
-  std::size_t capacity = 0;
+  PinnedBlock inputs, mesh_inputs;
   BatchCounters* counters = nullptr;
+  MeshCounters* mesh_counters = nullptr;
+  bool has_meshes = false;
+  std::uint64_t mesh_triangles = 0;  ///< of all instances
   cudaEvent_t done = nullptr;
   LaunchKey key{};
   cudaGraphExec_t recorded = nullptr;
@@ -41,14 +76,44 @@ struct Flight {
     if (recorded != nullptr) cudaGraphExecDestroy(recorded);
     recorded = nullptr;
   }
-  void reserve(std::size_t bytes) {
-    if (bytes <= capacity) return;
-    if (inputs != nullptr) cudaFreeHost(inputs);
-    inputs = nullptr;
-    capacity = 0;
-    need(cudaMallocHost(&inputs, bytes + bytes / 8), "cudaMallocHost of cameras");
-    capacity = bytes + bytes / 8;
+};
+
+/// What of a batch's meshes one MeshWave has.
+struct MeshWaveSize {
+  std::uint32_t first_camera, first_placement, first_begin;  ///< the last: in chunk_begins
+  std::uint32_t cameras, placements, vertex_chunks, triangle_chunks;
+  std::size_t vertices;
+};
+
+/// What meshes are drawn with; empty while there are none.
+struct BatchMeshes {
+  template <class T>
+  using Array = Buffer<T, CudaBackend>;
+  explicit BatchMeshes(CudaBackend& b)
+      : inputs(b), vertices(b), counts(b), offsets(b), camera_begins(b), triangles(b), pixels(b), large(b), counters(b),
+        depth(b), color(b) {}
+  std::size_t bytes() const noexcept {
+    return inputs.capacity_bytes() + vertices.capacity_bytes() + counts.capacity_bytes() + offsets.capacity_bytes() +
+           camera_begins.capacity_bytes() + triangles.capacity_bytes() + pixels.capacity_bytes() + large.capacity_bytes() +
+           counters.capacity_bytes() + depth.capacity_bytes() + color.capacity_bytes();
   }
+
+  Array<unsigned char> inputs;
+  Array<MeshVertex> vertices;  // from here on: of a wave
+  Array<std::uint32_t> counts;
+  Array<std::uint64_t> offsets, camera_begins;
+  Array<MeshTriangle<float>> triangles;
+  Array<PixelWord> pixels;
+  Array<unsigned long long> large;
+  Array<MeshCounters> counters;
+  Array<float> depth, color;  ///< [C][H][W] and [C][H][W][3]
+
+  // Of the present call.
+  std::vector<MeshWaveSize> waves;
+  std::vector<MeshPlacement> placements;
+  std::vector<MeshPlace> places;
+  std::vector<std::uint32_t> chunk_begins;  // each wave's cameras', from 0, and one more
+  std::size_t at_placements = 0, at_places = 0, at_cameras = 0, at_lights = 0, at_chunk_begins = 0, input_bytes = 0;
 };
 
 /// Names the camera, set or field that cannot be, or ok.
@@ -63,12 +128,13 @@ struct CudaBatchRenderer::State {
   State(CudaBackend& b, const RenderConfig& c)
       : backend(b), config(c), inputs(b), items(b), records(b), entries(b), sources(b), several(b), large(b),
         zeroed(b), tile_counts(b), tile_begins(b), tile_order(b), long_parts(b), depths(b), perspectives(b), hard(b), parts(b), pairs(b),
-        pairs_alt(b), mesh(b), mesh_depth(b), mesh_color(b) {
+        pairs_alt(b), meshes(b) {
     int device = 0;
     cuda::need(cudaGetDevice(&device), "cudaGetDevice");
     cuda::need(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     for (cuda::Flight& f : flights) {
       cuda::need(cudaMallocHost(&f.counters, sizeof(cuda::BatchCounters)), "cudaMallocHost");
+      cuda::need(cudaMallocHost(&f.mesh_counters, sizeof(cuda::MeshCounters)), "cudaMallocHost");
       cuda::need(cudaEventCreateWithFlags(&f.done, cudaEventDisableTiming), "cudaEventCreate");
     }
   }
@@ -76,17 +142,22 @@ struct CudaBatchRenderer::State {
     cudaStreamSynchronize(backend.stream());
     for (cuda::Flight& f : flights) {
       f.forget_recorded();
-      if (f.inputs != nullptr) cudaFreeHost(f.inputs);
+      f.inputs.release();
+      f.mesh_inputs.release();
       if (f.counters != nullptr) cudaFreeHost(f.counters);
+      if (f.mesh_counters != nullptr) cudaFreeHost(f.mesh_counters);
       if (f.done != nullptr) cudaEventDestroy(f.done);
     }
   }
 
   Status prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                  const BatchImages& images);
-  /// Draws what meshes the prepared cameras see, into a layer for each.
-  Status draw_layers(std::span<const BatchCamera> cameras);
+  /// What meshes the prepared cameras see, into the same call's pinned memory.
+  Status place_meshes(std::span<const BatchCamera> cameras);
   void size_scratch();
+  void size_layers();
+  /// Draws them, into a layer for each camera.
+  void enqueue_layers(const cuda::Flight& flight);
   /// Of the call that has been prepared.
   Status launch();
   cuda::LaunchKey launch_key(const cuda::Flight& flight) const;
@@ -110,8 +181,7 @@ struct CudaBatchRenderer::State {
   Array<cuda::HardSplat> hard;
   Array<cuda::ListPart> parts;
   Array<cuda::Pair> pairs, pairs_alt;
-  MeshWorkspace<float, CudaBackend> mesh;  ///< of one camera
-  Array<float> mesh_depth, mesh_color;     ///< [C][H][W] and [C][H][W][3]
+  cuda::BatchMeshes meshes;
   cuda::BatchArgs args{};
   RasterArgs<float> raster;
   std::uint8_t* rgb8 = nullptr;
@@ -119,6 +189,7 @@ struct CudaBatchRenderer::State {
   std::uint64_t item_capacity = 0;  ///< of the call
   bool recordable = true;
   std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0, pair_capacity = 0;
+  std::uint32_t triangle_capacity = 0;  ///< of meshes, a wave
   BatchStats stats;
 
   // Reused by every call.

@@ -92,6 +92,8 @@ void* CudaBackend::allocate(std::size_t bytes, std::size_t) {
 }
 
 void CudaBackend::deallocate(void* p, std::size_t) noexcept { cudaFreeAsync(p, stream_); }
+void* CudaBackend::allocate_host(std::size_t bytes) noexcept { return cuda::allocate_pinned(bytes); }
+void CudaBackend::deallocate_host(void* p) noexcept { cuda::free_pinned(p); }
 
 void CudaBackend::copy(void* dst, const void* src, std::size_t bytes, CopyKind kind) {
   if (bytes == 0 || !usable()) return;
@@ -148,9 +150,6 @@ bool CudaBackend::sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::ui
 
 void CudaBackend::project(const ProjectArgs<float>& args) {
   if (!usable() || args.gaussians.size == 0) return;
-  if (!args.gaussians.chunk_sh_degrees.empty()) {
-    return note(cudaErrorNotSupported, "a projection with chunk_sh_degrees, which host backends know,");
-  }
   cuda::project_kernel<<<static_cast<unsigned>(args.chunk_count()), cuda::kProjectThreads, 0, stream_>>>(
       args);
   note(cudaGetLastError(), "the projection");

@@ -4,6 +4,7 @@
 #include <cub/block/block_scan.cuh>
 
 #include "gsnav/backends/cuda/device.cuh"
+#include "mesh.cuh"
 
 // Meshes on the device (docs/composition.md): the kernels of the CPU, a vertex, a triangle or a pixel a thread. Which
 // triangle a pixel shows is found without lists of tiles: the largest of (1/z, first triangle) in one atomic word.
@@ -18,71 +19,149 @@ constexpr unsigned kThreads = kMeshChunk;  ///< of a block that takes a chunk
 constexpr unsigned kScanThreads = 1024;
 constexpr int kSmallBox = 8;               ///< a thread draws triangles of up to kSmallBox^2 pixels by itself
 constexpr int kUnit = 32;                  ///< larger ones are drawn in squares of so many pixels, a warp each
-constexpr std::size_t kMostLarge = std::size_t{1} << 24;  ///< triangles a launch
 constexpr unsigned kUnitBits = 40;
 
-using PixelWord = unsigned long long;
-
-/// A triangle drawn in squares, the first of which is number `unit`.
-struct LargeTriangle {
-  std::uint64_t unit;
-  std::uint32_t triangle;
+/// The work of one camera: lists of chunks, and counts that the host has been told.
+struct OneCamera {
+  std::uint32_t triangles = 0;
+  __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>& args) const { return args.vertex_chunks[blockIdx.x]; }
+  __device__ MeshChunk triangle_chunk(const MeshSetupArgs<float>& args) const { return args.triangle_chunks[blockIdx.x]; }
+  __device__ const MeshCamera& lens(const MeshSetupArgs<float>& args, std::uint32_t) const { return args.camera; }
+  __device__ void note(const MeshSetupArgs<float>& args, int not_finite) const {
+    args.not_finite[blockIdx.x] = static_cast<std::uint32_t>(not_finite);
+  }
+  __device__ std::uint64_t first_triangle(const MeshSetupArgs<float>& args, std::uint32_t) const {
+    return args.offsets[blockIdx.x];
+  }
+  __device__ std::uint64_t room() const { return ~std::uint64_t{0}; }
+  __device__ std::uint64_t count() const { return triangles; }
+  __device__ std::size_t camera_of(std::uint32_t) const { return 0; }
 };
 
-__global__ void __launch_bounds__(kThreads) project_vertices_kernel(const MeshSetupArgs<float> args) {
-  const MeshChunk chunk = args.vertex_chunks[blockIdx.x];
-  const MeshPlacement& placement = args.placements[chunk.placement];
-  const std::size_t i = chunk.begin + threadIdx.x;
-  if (i < placement.mesh.vertices.size) project_mesh_vertex(args, placement, i);
+/// That of several: a chunk's placement is searched for, and counts stay here.
+struct ManyCameras {
+  MeshWave wave;
+  __device__ MeshChunk chunk(std::uint32_t MeshPlace::* first) const {
+    std::uint32_t low = 0, high = wave.placements;
+    while (high - low > 1) {
+      const std::uint32_t mid = (low + high) / 2;
+      (wave.places[mid].*first <= blockIdx.x ? low : high) = mid;
+    }
+    return {low, static_cast<std::uint32_t>((blockIdx.x - wave.places[low].*first) * kMeshChunk)};
+  }
+  __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>&) const { return chunk(&MeshPlace::vertex_chunk); }
+  __device__ MeshChunk triangle_chunk(const MeshSetupArgs<float>&) const { return chunk(&MeshPlace::triangle_chunk); }
+  __device__ const MeshCamera& lens(const MeshSetupArgs<float>&, std::uint32_t placement) const {
+    return wave.cameras[wave.places[placement].camera];
+  }
+  __device__ void note(const MeshSetupArgs<float>&, int not_finite) const {
+    if (not_finite != 0) atomicAdd(&wave.counters->not_finite, static_cast<unsigned long long>(not_finite));
+  }
+  __device__ std::uint64_t first_triangle(const MeshSetupArgs<float>& args, std::uint32_t placement) const {
+    return wave.camera_begins[wave.places[placement].camera] + args.offsets[blockIdx.x];
+  }
+  __device__ std::uint64_t room() const { return wave.capacity; }
+  __device__ std::uint64_t count() const {
+    return wave.counters->triangles < wave.capacity ? wave.counters->triangles : wave.capacity;
+  }
+  __device__ std::size_t camera_of(std::uint32_t placement) const { return wave.places[placement].camera; }
+};
+
+/// `args` as the camera of a placement has them.
+template <class Work>
+__device__ MeshSetupArgs<float> seen_by(const MeshSetupArgs<float>& args, const Work& work, std::uint32_t placement) {
+  MeshSetupArgs<float> out = args;
+  out.camera = work.lens(args, placement);
+  return out;
 }
 
-__global__ void __launch_bounds__(kThreads) count_triangles_kernel(const MeshSetupArgs<float> args) {
+template <class Work>
+__global__ void __launch_bounds__(kThreads) project_vertices_kernel(const MeshSetupArgs<float> args, const Work work) {
+  const MeshChunk chunk = work.vertex_chunk(args);
+  const MeshPlacement& placement = args.placements[chunk.placement];
+  const std::size_t i = chunk.begin + threadIdx.x;
+  if (i < placement.mesh.vertices.size) project_mesh_vertex(seen_by(args, work, chunk.placement), placement, i);
+}
+
+template <class Work>
+__global__ void __launch_bounds__(kThreads) count_triangles_kernel(const MeshSetupArgs<float> args, const Work work) {
   using Reduce = cub::BlockReduce<std::uint32_t, kThreads>;
   __shared__ typename Reduce::TempStorage storage;
-  const MeshChunk chunk = args.triangle_chunks[blockIdx.x];
+  const MeshChunk chunk = work.triangle_chunk(args);
   const std::size_t t = chunk.begin + threadIdx.x;
   std::uint32_t n = 0;
   bool finite = true;
   if (t < args.placements[chunk.placement].mesh.triangle_count()) {
-    finite = detail::for_each_piece<false>(args, chunk.placement, t, [&n](const MeshTriangle<float>&) { ++n; });
+    finite = detail::for_each_piece<false>(seen_by(args, work, chunk.placement), chunk.placement, t,
+                                           [&n](const MeshTriangle<float>&) { ++n; });
   }
   const int bad = __syncthreads_count(finite ? 0 : 1);
   n = Reduce(storage).Sum(n);
   if (threadIdx.x != 0) return;
   args.counts[blockIdx.x] = n;
-  args.not_finite[blockIdx.x] = static_cast<std::uint32_t>(bad);
+  work.note(args, bad);
+}
+
+/// Exclusive sums of [begin, end) by one block; returns the sum of all.
+template <class From>
+__device__ std::uint64_t scan_by_block(const From* from, std::size_t begin, std::size_t end, std::uint64_t* to) {
+  using Scan = cub::BlockScan<std::uint64_t, kScanThreads>;
+  __shared__ typename Scan::TempStorage storage;
+  std::uint64_t before = 0;
+  for (std::size_t first = begin; first < end; first += kScanThreads) {
+    const std::size_t c = first + threadIdx.x;
+    std::uint64_t n = c < end ? from[c] : 0, sum = 0;
+    Scan(storage).ExclusiveSum(n, n, sum);
+    if (c < end) to[c] = before + n;
+    before += sum;
+    __syncthreads();
+  }
+  return before;
 }
 
 /// One block.
 __global__ void __launch_bounds__(kScanThreads) scan_triangles_kernel(const MeshSetupArgs<float> args) {
-  using Scan = cub::BlockScan<std::uint64_t, kScanThreads>;
-  __shared__ typename Scan::TempStorage storage;
-  std::uint64_t before = 0;
-  for (std::size_t first = 0; first < args.counts.size; first += kScanThreads) {
-    const std::size_t c = first + threadIdx.x;
-    std::uint64_t n = c < args.counts.size ? args.counts[c] : 0, sum = 0;
-    Scan(storage).ExclusiveSum(n, n, sum);
-    if (c < args.counts.size) args.offsets[c] = before + n;
-    before += sum;
-    __syncthreads();
-  }
-  if (threadIdx.x == 0) args.offsets[args.counts.size] = before;
+  const std::uint64_t sum = scan_by_block(args.counts.data, 0, args.counts.size, args.offsets.data);
+  if (threadIdx.x == 0) args.offsets[args.counts.size] = sum;
 }
 
-__global__ void __launch_bounds__(kThreads) write_triangles_kernel(const MeshSetupArgs<float> args) {
+/// A block a camera: where its chunks' triangles begin among its own, and how many these are.
+__global__ void __launch_bounds__(kScanThreads) scan_cameras_kernel(const MeshSetupArgs<float> args, const MeshWave wave) {
+  const std::uint64_t sum = scan_by_block(args.counts.data, wave.chunk_begins[blockIdx.x],
+                                          wave.chunk_begins[blockIdx.x + 1], args.offsets.data);
+  if (threadIdx.x == 0) wave.camera_begins[blockIdx.x] = sum;
+}
+
+/// One block: from how many triangles a camera has to where they begin.
+__global__ void __launch_bounds__(kScanThreads) begin_cameras_kernel(const MeshWave wave) {
+  const std::uint64_t sum = scan_by_block(wave.camera_begins, 0, wave.camera_count, wave.camera_begins);
+  if (threadIdx.x != 0) return;
+  MeshCounters& n = *wave.counters;
+  n.triangles = sum;
+  n.drawn += sum;
+  if (n.most < sum) n.most = sum;
+}
+
+template <class Work>
+__global__ void __launch_bounds__(kThreads) write_triangles_kernel(const MeshSetupArgs<float> args, const Work work) {
   using Scan = cub::BlockScan<std::uint32_t, kThreads>;
   __shared__ typename Scan::TempStorage storage;
   if (args.counts[blockIdx.x] == 0) return;
-  const MeshChunk chunk = args.triangle_chunks[blockIdx.x];
+  const MeshChunk chunk = work.triangle_chunk(args);
+  const MeshSetupArgs<float> seen = seen_by(args, work, chunk.placement);
   const std::size_t t = chunk.begin + threadIdx.x;
   const bool exists = t < args.placements[chunk.placement].mesh.triangle_count();
   std::uint32_t n = 0;
-  if (exists) detail::for_each_piece<false>(args, chunk.placement, t, [&n](const MeshTriangle<float>&) { ++n; });
+  if (exists) detail::for_each_piece<false>(seen, chunk.placement, t, [&n](const MeshTriangle<float>&) { ++n; });
   std::uint32_t at = 0;
   Scan(storage).ExclusiveSum(n, at);
   if (n == 0) return;
-  MeshTriangle<float>* out = args.triangles.data + args.offsets[blockIdx.x] + at;
-  detail::for_each_piece<true>(args, chunk.placement, t, [&out](const MeshTriangle<float>& piece) { *out++ = piece; });
+  std::uint64_t to = work.first_triangle(args, chunk.placement) + at;
+  const std::uint64_t room = work.room();
+  detail::for_each_piece<true>(seen, chunk.placement, t, [&](const MeshTriangle<float>& piece) {
+    if (to < room) args.triangles.data[to] = piece;
+    ++to;
+  });
 }
 
 /// Shows a triangle at a pixel of its box, if it is inside, and nearer than what is shown there.
@@ -97,12 +176,18 @@ __device__ void show(const MeshRasterArgs<float>& args, const MeshTriangle<float
   if (*at < word) atomicMax(at, word);
 }
 
-/// Draws small triangles and lists the others. `count`: of squares, and of large triangles from bit kUnitBits on.
-__global__ void __launch_bounds__(128) draw_small_kernel(const MeshRasterArgs<float> args, std::uint32_t begin,
-                                                         std::uint32_t end, PixelWord* pixels, LargeTriangle* large,
-                                                         unsigned long long* count) {
-  const std::uint32_t id = begin + blockIdx.x * blockDim.x + threadIdx.x;
-  if (id >= end) return;
+/// Pixels of the camera that a triangle is seen by.
+template <class Work>
+__device__ PixelWord* pixels_of(const MeshRasterArgs<float>& args, const Work& work, const MeshTriangle<float>& t,
+                                PixelWord* pixels) {
+  const TileGrid& grid = args.bin.grid;
+  return pixels + work.camera_of(t.placement) * static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height);
+}
+
+/// Draws a small triangle, or lists it. `count`: of squares, and of large triangles from bit kUnitBits on.
+template <class Work>
+__device__ void draw_small(const MeshRasterArgs<float>& args, const Work& work, std::uint32_t id, PixelWord* all,
+                           LargeTriangle* large, unsigned long long* count) {
   const MeshTriangle<float>& t = args.triangles[id];
   const int width = t.x1 - t.x0, height = t.y1 - t.y0;
   if (width * height > kSmallBox * kSmallBox) {
@@ -112,6 +197,7 @@ __global__ void __launch_bounds__(128) draw_small_kernel(const MeshRasterArgs<fl
     large[before >> kUnitBits] = {before & ((1ull << kUnitBits) - 1), id};
     return;
   }
+  PixelWord* const pixels = pixels_of(args, work, t, all);
   MeshEdges row = MeshEdges::of(t, args.bin.grid, t.x0, t.y0);
   for (int y = t.y0; y < t.y1; ++y) {
     MeshEdges e = row;
@@ -123,8 +209,21 @@ __global__ void __launch_bounds__(128) draw_small_kernel(const MeshRasterArgs<fl
   }
 }
 
+/// A thread a triangle, of the kMostLarge from `begin` on.
+template <class Work>
+__global__ void __launch_bounds__(128) draw_small_kernel(const MeshRasterArgs<float> args, const Work work,
+                                                         std::uint64_t begin, PixelWord* pixels, LargeTriangle* large,
+                                                         unsigned long long* count) {
+  const std::uint64_t n = work.count(), end = begin + kMostLarge < n ? begin + kMostLarge : n;
+  const std::uint64_t stride = std::uint64_t{gridDim.x} * blockDim.x;
+  for (std::uint64_t id = begin + std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; id < end; id += stride) {
+    draw_small(args, work, static_cast<std::uint32_t>(id), pixels, large, count);
+  }
+}
+
 /// A warp a square of a large triangle: a column a lane.
-__global__ void __launch_bounds__(128) draw_large_kernel(const MeshRasterArgs<float> args, PixelWord* pixels,
+template <class Work>
+__global__ void __launch_bounds__(128) draw_large_kernel(const MeshRasterArgs<float> args, const Work work, PixelWord* all,
                                                          const LargeTriangle* large, const unsigned long long* count) {
   const std::uint64_t units = *count & ((1ull << kUnitBits) - 1), triangles = *count >> kUnitBits;
   const int lane = static_cast<int>(threadIdx.x % 32);
@@ -141,12 +240,19 @@ __global__ void __launch_bounds__(128) draw_large_kernel(const MeshRasterArgs<fl
     const int x0 = t.x0 + at % columns * kUnit, y0 = t.y0 + at / columns * kUnit;
     const int width = min(kUnit, t.x1 - x0), height = min(kUnit, t.y1 - y0);
     if (!MeshEdges::of(t, args.bin.grid, x0, y0).reach(width, height) || lane >= width) continue;
+    PixelWord* const pixels = pixels_of(args, work, t, all);
     MeshEdges e = MeshEdges::of(t, args.bin.grid, x0 + lane, y0);
     for (int y = y0; y < y0 + height; ++y) {
       if (e.inside()) show(args, t, id, x0 + lane, y, pixels);
       e.step_down();
     }
   }
+}
+
+/// Infinity where there is no triangle.
+__device__ float depth_of(PixelWord word) { return 1.0f / __uint_as_float(static_cast<unsigned>(word >> 32)); }
+__device__ std::uint32_t triangle_of(PixelWord word) {
+  return word == 0 ? kNoTriangle : 0xffffffffu - static_cast<std::uint32_t>(word);
 }
 
 /// A block a tile: depths, triangles and the tile's farthest from the words of its pixels.
@@ -162,13 +268,31 @@ __global__ void __launch_bounds__(1024) resolve_kernel(const MeshRasterArgs<floa
     const std::size_t pixel =
         static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(x);
     const PixelWord word = pixels[pixel];
-    const float depth = 1.0f / __uint_as_float(static_cast<unsigned>(word >> 32));  // infinity where there is none
+    const float depth = depth_of(word);
     args.depth[pixel] = depth;
-    args.visible[pixel] = word == 0 ? kNoTriangle : 0xffffffffu - static_cast<std::uint32_t>(word);
+    args.visible[pixel] = triangle_of(word);
     atomicMax(&far, __float_as_uint(depth));  // in order, as none is negative
   }
   __syncthreads();
   if (t == 0) args.tile_far[blockIdx.x] = __uint_as_float(far);
+}
+
+/// A thread a pixel of one of the cameras: its depth, and its colour where that is asked for.
+__global__ void __launch_bounds__(128) finish_pixels_kernel(MeshShadeArgs<float> shade, const MeshWave wave,
+                                                            std::size_t pixels) {
+  const std::size_t pixel = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x, at = blockIdx.y * pixels + pixel;
+  if (pixel >= pixels) return;
+  const PixelWord word = wave.pixels[at];
+  const float depth = depth_of(word);
+  wave.depth[at] = depth;
+  if (wave.color == nullptr) return;
+  const MeshShadeArgs<float>& light = wave.lights[blockIdx.y];
+  shade.unlit = light.unlit;
+  shade.ambient = light.ambient;
+  shade.light = light.light;
+  shade.diffuse = light.diffuse;
+  shade.images.color = wave.color + 3 * blockIdx.y * pixels;
+  shade_mesh_pixel(shade, pixel, triangle_of(word), depth);
 }
 
 struct ShadePixel {
@@ -177,17 +301,51 @@ struct ShadePixel {
 };
 
 }  // namespace
+
+void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, const MeshWave& wave, int multiprocessors,
+                      cudaStream_t stream) {
+  const ManyCameras work{wave};
+  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  MeshRasterArgs<float> raster;
+  raster.bin.grid = TileGrid::of(width, height, 16);
+  raster.triangles = setup.triangles;
+  raster.placements = setup.placements;
+  cudaMemsetAsync(wave.pixels, 0, wave.camera_count * pixels * sizeof(PixelWord), stream);
+  if (wave.placements != 0) {
+    if (wave.vertex_chunks != 0) project_vertices_kernel<<<wave.vertex_chunks, kThreads, 0, stream>>>(setup, work);
+    count_triangles_kernel<<<wave.triangle_chunks, kThreads, 0, stream>>>(setup, work);
+    scan_cameras_kernel<<<wave.camera_count, kScanThreads, 0, stream>>>(setup, wave);
+    begin_cameras_kernel<<<1, kScanThreads, 0, stream>>>(wave);
+    write_triangles_kernel<<<wave.triangle_chunks, kThreads, 0, stream>>>(setup, work);
+    auto* const large = reinterpret_cast<LargeTriangle*>(wave.large + 2);
+    for (std::uint64_t begin = 0; begin < wave.capacity; begin += kMostLarge) {
+      const std::uint64_t most = wave.capacity - begin < kMostLarge ? wave.capacity - begin : kMostLarge;
+      const std::uint64_t blocks = (most + 127) / 128, full = static_cast<std::uint64_t>(multiprocessors) * 16;
+      cudaMemsetAsync(wave.large, 0, sizeof *wave.large, stream);
+      draw_small_kernel<<<static_cast<unsigned>(blocks < full ? blocks : full), 128, 0, stream>>>(
+          raster, work, begin, wave.pixels, large, wave.large);
+      draw_large_kernel<<<static_cast<unsigned>(full), 128, 0, stream>>>(raster, work, wave.pixels, large, wave.large);
+    }
+  }
+  MeshShadeArgs<float> shade;
+  shade.placements = setup.placements;
+  shade.triangles = setup.triangles;
+  shade.width = static_cast<std::size_t>(width);
+  const dim3 blocks(static_cast<unsigned>((pixels + 127) / 128), wave.camera_count);
+  finish_pixels_kernel<<<blocks, 128, 0, stream>>>(shade, wave, pixels);
+}
+
 }  // namespace cuda
 
 void CudaBackend::parallel_for(std::size_t chunks, const ProjectMeshVertices<float>& k) {
   if (chunks == 0 || !usable()) return;
-  cuda::project_vertices_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(k.args);
+  cuda::project_vertices_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(k.args, cuda::OneCamera{});
   note(cudaGetLastError(), "the projection of vertices");
 }
 
 void CudaBackend::parallel_for(std::size_t chunks, const CountMeshTriangles<float>& k) {
   if (chunks == 0 || !usable()) return;
-  cuda::count_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(k.args);
+  cuda::count_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(k.args, cuda::OneCamera{});
   note(cudaGetLastError(), "the counting of triangles");
 }
 
@@ -199,7 +357,7 @@ void CudaBackend::parallel_for(std::size_t, const ScanMeshTriangles<float>& k) {
 
 void CudaBackend::parallel_for(std::size_t chunks, const WriteMeshTriangles<float>& k) {
   if (chunks == 0 || !usable()) return;
-  cuda::write_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(k.args);
+  cuda::write_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(k.args, cuda::OneCamera{});
   note(cudaGetLastError(), "the set-up of triangles");
 }
 
@@ -207,19 +365,20 @@ void CudaBackend::rasterize_mesh(const MeshRasterArgs<float>& args) {
   if (!usable()) return;
   using cuda::LargeTriangle;
   const TileGrid& grid = args.bin.grid;
-  const std::size_t n = args.triangles.size, most = std::min(n, cuda::kMostLarge);
+  const std::size_t n = args.triangles.size;
   const std::size_t bytes = static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height) *
                             sizeof(cuda::PixelWord);
   auto* const pixels = static_cast<cuda::PixelWord*>(scratch(kMeshPixels, bytes));
-  auto* const count = static_cast<unsigned long long*>(scratch(kMeshLarge, 16 + most * sizeof(LargeTriangle)));
+  auto* const count = static_cast<unsigned long long*>(scratch(kMeshLarge, cuda::large_bytes(n)));
   auto* const large = reinterpret_cast<LargeTriangle*>(count + 2);
   fill(pixels, 0, bytes);
-  for (std::size_t begin = 0; begin < n; begin += most) {
-    const std::size_t end = std::min(n, begin + most);
+  const cuda::OneCamera work{static_cast<std::uint32_t>(n)};
+  for (std::size_t begin = 0; begin < n; begin += cuda::kMostLarge) {
+    const std::size_t end = std::min(n, begin + cuda::kMostLarge);
     fill(count, 0, sizeof *count);
-    cuda::draw_small_kernel<<<static_cast<unsigned>((end - begin + 127) / 128), 128, 0, stream_>>>(
-        args, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), pixels, large, count);
-    cuda::draw_large_kernel<<<2048, 128, 0, stream_>>>(args, pixels, large, count);
+    cuda::draw_small_kernel<<<static_cast<unsigned>((end - begin + 127) / 128), 128, 0, stream_>>>(args, work, begin, pixels,
+                                                                                                   large, count);
+    cuda::draw_large_kernel<<<2048, 128, 0, stream_>>>(args, work, pixels, large, count);
   }
   const unsigned threads = static_cast<unsigned>(grid.tile_size * grid.tile_size);
   cuda::resolve_kernel<<<static_cast<unsigned>(grid.count()), threads, 0, stream_>>>(args, pixels);

@@ -45,6 +45,8 @@ struct NoopFunctor {
 ///     sort_pairs(keys, values, keys_alt, values_alt, n, bits)   stable; true: the result is in *_alt
 ///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)
 ///     batch_renderer                          a type that draws many cameras by one call (sim/frame_batch.hpp)
+///     static allocate_host(bytes) -> void*, deallocate_host(p)   host memory that it copies to and from by itself
+///                                             (core/host_array.hpp); nullptr where there is none
 template <class B>
 concept Backend = requires(B& b, void* p, const void* q, std::size_t n, detail::NoopFunctor f) {
   typename B::memory_space;

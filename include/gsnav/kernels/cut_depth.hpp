@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 
 #include "gsnav/config.hpp"
@@ -9,12 +10,13 @@ namespace gsnav {
 
 /// What a sensor does not see: a depth (metres) beyond the far plane becomes 0, no return.
 struct CutDepth {
-  float* depth = nullptr;
-  double far_plane = 0.0;
-
-  GSNAV_HD void operator()(std::size_t i) const noexcept {
-    if (static_cast<double>(depth[i]) > far_plane) depth[i] = 0.0f;
+  CutDepth(float* of, double far_plane) noexcept : depth(of), last(static_cast<float>(far_plane)) {
+    if (static_cast<double>(last) > far_plane) last = std::nextafter(last, 0.0f);
   }
+  float* depth;
+  float last;  ///< the largest float that is not beyond the far plane
+
+  GSNAV_HD void operator()(std::size_t i) const noexcept { depth[i] = depth[i] > last ? 0.0f : depth[i]; }
 };
 
 }  // namespace gsnav

@@ -52,9 +52,9 @@ GSNAV_HD Vec3<S> shaded_color(const MeshShadeArgs<S>& args, const MeshView& mesh
   return {srgb_encoded(color.x), srgb_encoded(color.y), srgb_encoded(color.z)};
 }
 
-/// Shades one pixel.
+/// Shades one pixel, which shows triangle `id` (or kNoTriangle) at `depth`.
 template <class S>
-GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel) noexcept {
+GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel, std::uint32_t id, S depth) noexcept {
   const MeshImages<S>& out = args.images;
   const auto write = [pixel](S* image, const Vec3<S>& v) {
     if (image == nullptr) return;
@@ -62,7 +62,6 @@ GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel) 
     image[3 * pixel + 1] = v.y;
     image[3 * pixel + 2] = v.z;
   };
-  const std::uint32_t id = args.visible[pixel];
   if (id == kNoTriangle) {
     if (out.triangle != nullptr) out.triangle[pixel] = kNoInstance;
     if (out.instance != nullptr) out.instance[pixel] = kNoInstance;
@@ -78,13 +77,18 @@ GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel) 
   const MeshPlacement& placement = args.placements[t.placement];
   const MeshView& mesh = placement.mesh;
   const SurfacePoint<S> at =
-      surface_point(mesh, t, static_cast<int>(pixel % args.width), static_cast<int>(pixel / args.width), args.depth[pixel]);
+      surface_point(mesh, t, static_cast<int>(pixel % args.width), static_cast<int>(pixel / args.width), depth);
   Vec3<S> normal{};
   if (out.normal != nullptr || args.lights(mesh)) {
     normal = surface_normal(placement, t, at);
     write(out.normal, normal);
   }
   if (out.color != nullptr) write(out.color, shaded_color(args, mesh, t, at, normal));
+}
+
+template <class S>
+GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel) noexcept {
+  shade_mesh_pixel(args, pixel, args.visible[pixel], args.depth[pixel]);
 }
 
 /// Shades one row of pixels.

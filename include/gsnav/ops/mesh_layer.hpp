@@ -138,6 +138,19 @@ inline bool box_may_be_visible(const MeshCamera& camera, const MeshPlacement& p)
 /// Whether a mesh is drawn as fragments.
 inline bool seen_through(const MeshInstance& m) noexcept { return m.mesh.alpha_mode == MeshAlpha::blend; }
 
+/// An instance as a camera sees it; false where there is nothing to draw of it among those that are seen through, or
+/// among the others.
+inline bool place_mesh(const MeshInstance& i, const Camera& camera, const MeshCamera& lens, bool through,
+                       MeshPlacement& p) noexcept {
+  p.mesh = i.mesh;
+  const Mat3d rotation = rotation_matrix(i.world_from_mesh.rotation);
+  p.linear = camera.viewmat.linear * rotation * i.world_from_mesh.scale;
+  p.translation = camera.viewmat * i.world_from_mesh.translation;
+  p.rotation = mat_cast<float>(rotation);
+  p.id = i.id;
+  return seen_through(i) == through && i.mesh.triangle_count() != 0 && box_may_be_visible(lens, p);
+}
+
 /// Lists the work of the instances in view, of those that are seen through or of the others.
 template <class S, Backend B>
 void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera, bool through) {
@@ -153,14 +166,8 @@ void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
   };
   for (const MeshInstance& i : meshes) {
     MeshPlacement p;
-    p.mesh = i.mesh;
-    const Mat3d rotation = rotation_matrix(i.world_from_mesh.rotation);
-    p.linear = camera.viewmat.linear * rotation * i.world_from_mesh.scale;
-    p.translation = camera.viewmat * i.world_from_mesh.translation;
-    p.rotation = mat_cast<float>(rotation);
-    p.id = i.id;
     p.first_vertex = vertices;
-    if (seen_through(i) != through || i.mesh.triangle_count() == 0 || !box_may_be_visible(lens, p)) continue;
+    if (!place_mesh(i, camera, lens, through, p)) continue;
     cut(ws.host_vertex_chunks, ws.host_placements.size(), i.mesh.vertices.size);
     cut(ws.host_triangle_chunks, ws.host_placements.size(), i.mesh.triangle_count());
     vertices += i.mesh.vertices.size;
@@ -251,6 +258,14 @@ Status bin_meshes(B& backend, MeshWorkspace<S, B>& ws, MeshRasterArgs<S>& raster
   return {};
 }
 
+template <class S>
+void set_light(MeshShadeArgs<S>& shade, const MeshLight& light) noexcept {
+  shade.unlit = light.unlit;
+  shade.ambient = vec_cast<S>(light.ambient);
+  shade.diffuse = vec_cast<S>(light.diffuse);
+  shade.light = light.unlit ? Vec3<S>{} : vec_cast<S>(normalized(light.direction));
+}
+
 /// What shading what was set up reads.
 template <class S, Backend B>
 MeshShadeArgs<S> shade_args(MeshWorkspace<S, B>& ws, const Camera& camera, const MeshLight& light) {
@@ -258,10 +273,7 @@ MeshShadeArgs<S> shade_args(MeshWorkspace<S, B>& ws, const Camera& camera, const
   shade.placements = std::as_const(ws.placements).view();
   shade.triangles = std::as_const(ws.triangles).view();
   shade.width = static_cast<std::size_t>(camera.width);
-  shade.unlit = light.unlit;
-  shade.ambient = vec_cast<S>(light.ambient);
-  shade.diffuse = vec_cast<S>(light.diffuse);
-  shade.light = light.unlit ? Vec3<S>{} : vec_cast<S>(normalized(light.direction));
+  set_light(shade, light);
   return shade;
 }
 

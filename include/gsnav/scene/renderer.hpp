@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
@@ -10,6 +13,7 @@
 #include "gsnav/ops/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
+#include "gsnav/scene/scene_profile.hpp"
 
 namespace gsnav {
 
@@ -34,6 +38,16 @@ class GaussianArrays {
   GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) upload(backend, cloud);
   }
+  /// Without the SH bands that the profile says no chunk needs (scene/scene_profile.hpp): elsewhere than on host backends
+  /// those that none does take no memory, those that a chunk does not are not read. On host backends the profile must
+  /// outlive it too.
+  GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneProfile& profile)
+      : set_(profile.applied_to(cloud.set())) {
+    if constexpr (!is_host_backend<B>) {
+      upload(backend, cloud);
+      to_device(backend, set_.gaussians.chunk_sh_degrees, bytes_);
+    }
+  }
   GaussianArrays(B& backend, const PackedCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) {
       const GaussianCloud floats = unpack_cloud(cloud);
@@ -55,6 +69,9 @@ class GaussianArrays {
     for (auto& p : v.scales) to_device(backend, p, floats_);
     to_device(backend, v.opacities, floats_);
     to_device(backend, v.sh0, floats_);
+    std::vector<float> floats;
+    std::vector<std::uint16_t> halves;
+    drop_bands(v, floats, halves);
     to_device(backend, v.shN, floats_);
     to_device(backend, v.shN_half, halves_);
     to_device(backend, v.origin_ids, ids_);
@@ -62,6 +79,23 @@ class GaussianArrays {
     to_device(backend, v.chunk_bounds, bounds_);
     origins_ = cloud.origins;  // read by the host
     v.origins = view_of(std::as_const(origins_));
+  }
+  /// Leaves out the bands that no chunk has: rows become shorter.
+  static void drop_bands(GaussianView& v, std::vector<float>& floats, std::vector<std::uint16_t>& halves) {
+    int most = v.chunk_sh_degrees.empty() ? v.sh_degree : 0;
+    for (const std::uint8_t degree : v.chunk_sh_degrees) most = std::max(most, std::min(v.sh_degree, int{degree}));
+    if (most == v.sh_degree) return;
+    const auto numbers = [](int degree) { return 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1); };
+    const std::size_t all = numbers(v.sh_degree), kept = numbers(most);
+    const auto drop = [&]<class T>(View<const T>& from, std::vector<T>& to) {
+      if (from.empty()) return;
+      to.resize(kept * v.size);
+      for (std::size_t i = 0; i < v.size; ++i) std::copy_n(from.data + all * i, kept, to.data() + kept * i);
+      from = view_of(std::as_const(to));
+    };
+    drop(v.shN, floats);
+    drop(v.shN_half, halves);
+    v.sh_degree = most;
   }
   template <class T>
   static void to_device(B& backend, View<const T>& v, std::vector<Buffer<T, B>>& held) {
@@ -73,6 +107,7 @@ class GaussianArrays {
   std::vector<Buffer<std::uint16_t, B>> halves_;
   std::vector<Buffer<std::uint32_t, B>> ids_;
   std::vector<Buffer<ChunkBounds, B>> bounds_;
+  std::vector<Buffer<std::uint8_t, B>> bytes_;
   std::vector<Vec3d> origins_;
 };
 

@@ -153,10 +153,19 @@ class FrameBatch<B> {
     typename Batch::images_type images;
     images.floats = {at[0], at[1], at[2], at[3], at[4], at[5]};
     if (Status s = known.batch->render(sets_, cameras_, images); !s) return s;
+    const auto hand_out = [&] {
+      for (std::size_t i = 0; i < kImages && !in_place; ++i) {
+        if (at[i] != nullptr) copy(i, at[i], which, jobs, pixels * kChannels[i], to);
+      }
+    };
+    // At once, so that nothing waits for the host in between; once more where scratch had to grow.
+    constexpr bool kSaysReruns = requires(const Batch& b) { b.stats().reruns; };
+    if constexpr (kSaysReruns) hand_out();
     if (Status s = known.batch->finish(); !s) return s;
-    for (std::size_t i = 0; i < kImages && !in_place; ++i) {
-      if (at[i] != nullptr) copy(i, at[i], which, jobs, pixels * kChannels[i], to);
+    if constexpr (kSaysReruns) {
+      if (known.batch->stats().reruns == 0) return {};
     }
+    hand_out();
     return {};
   }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/core/host_array.hpp"
 #include "gsnav/kernels/cut_depth.hpp"
 #include "gsnav/sim/cube_map.hpp"
 #include "gsnav/sim/frame_batch.hpp"
@@ -47,7 +48,7 @@ template <Backend B>
 struct SensorImages {
   ImageMemory memory = ImageMemory::host;
   std::size_t rows = 0;
-  std::vector<std::vector<float>> buffers;
+  std::vector<HostArray<float, B>> buffers;
   std::vector<Buffer<float, B>> on_backend;  // in place of buffers where images are not in host memory
 
   bool in_host_memory() const noexcept { return is_host_backend<B> || memory == ImageMemory::host; }
@@ -94,11 +95,13 @@ class SensorRig {
   /// The image of a sensor in one row, [height][width][channels], in host memory.
   std::span<const float> image(const SensorImages<B>& images, std::size_t sensor, std::size_t row) const noexcept {
     const std::size_t n = size_[outputs_[sensor].noisy];
-    return std::span(images.buffers[outputs_[sensor].noisy]).subspan(row * n, n);
+    return {images.buffers[outputs_[sensor].noisy].data() + row * n, n};
   }
   /// All rows of a sensor, [rows][height][width][channels], where they are in host memory.
   std::span<const float> all(const SensorImages<B>& images, std::size_t sensor) const noexcept {
-    return images.in_host_memory() ? std::span<const float>(images.buffers[outputs_[sensor].noisy]) : std::span<const float>();
+    if (!images.in_host_memory()) return {};
+    const HostArray<float, B>& buffer = images.buffers[outputs_[sensor].noisy];
+    return {buffer.data(), buffer.size()};
   }
   /// The same where they are in the backend's.
   const float* all_on_backend(const SensorImages<B>& images, std::size_t sensor) const noexcept {
@@ -152,7 +155,7 @@ class SensorRig {
   struct Group {  // sensors that share a camera
     std::size_t sensor = 0;
     std::array<std::size_t, kKinds> buffer{kNone, kNone, kNone, kNone, kNone};
-    std::vector<float> seen;  // [view][pixels], median depths for normals where no sensor has them
+    HostArray<float, B> seen;  // [view][pixels], median depths for normals where no sensor has them
     std::shared_ptr<const CubeMap> cube;  // none: a pinhole
   };
   struct Output {
@@ -232,7 +235,7 @@ class SensorRig {
       for (std::size_t begin = 0, end = 0; begin < rows_.size(); begin = end) {
         for (end = begin + 1; end < rows_.size() && rows_[end] == rows_[begin] + (end - begin);) ++end;
         backend_->parallel_for((end - begin) * size_[group.buffer[kDepth]],
-                               CutDepth{row(images, group.buffer[kDepth], rows_[begin]), sensors_[group.sensor].far_plane});
+                               CutDepth(row(images, group.buffer[kDepth], rows_[begin]), sensors_[group.sensor].far_plane));
       }
     }
     return backend_->synchronize();
@@ -329,7 +332,7 @@ class SensorRig {
         const std::span<float> out(row(images, group.buffer[k], view.row), size_[group.buffer[k]]);
         if (group.cube != nullptr) sample(*group.cube, faces_[g][k].data(), v, k, out);
         if (k != kDepth) continue;
-        const CutDepth cut{out.data(), sensors_[group.sensor].far_plane};
+        const CutDepth cut(out.data(), sensors_[group.sensor].far_plane);
         for (std::size_t i = 0; i < out.size(); ++i) cut(i);
       }
     }
@@ -404,7 +407,7 @@ class SensorRig {
   ChosenChunks<B> chosen_;
   std::vector<DetailSets> cuts_;  // of each of these
   std::vector<std::size_t> rows_;
-  std::vector<std::array<std::vector<float>, kKinds>> faces_;  // [group][kind][view][face]
+  std::vector<std::array<HostArray<float, B>, kKinds>> faces_;  // [group][kind][view][face]
   std::size_t render_count_ = 0;
 };
 

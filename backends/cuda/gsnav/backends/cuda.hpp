@@ -58,6 +58,9 @@ class CudaBackend {
 
   void* allocate(std::size_t bytes, std::size_t align);
   void deallocate(void* p, std::size_t bytes) noexcept;
+  /// Page-locked host memory; null where there is none.
+  static void* allocate_host(std::size_t bytes) noexcept;
+  static void deallocate_host(void* p) noexcept;
   /// Copies to the device of up to 1 MiB never wait for the stream, and what is copied may change at once. Others
   /// return early only from and to pinned memory.
   void copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);

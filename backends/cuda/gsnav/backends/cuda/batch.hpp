@@ -33,7 +33,7 @@ struct BatchStats {
   std::uint64_t scratch_bytes = 0;       ///< held on the device, without scene and images
   int reruns = 0;                        ///< how often the batch was drawn again because scratch had to grow
   bool replayed = false;                 ///< by a recorded CUDA graph: calls that differ in their cameras alone are
-  MeshStats meshes;                      ///< of the last call to render()
+  MeshStats meshes;
 };
 
 /// Draws many cameras in one call on one GPU; docs/cuda.md says how. Images have the bits that
@@ -47,8 +47,7 @@ struct BatchStats {
 /// `RenderConfig::outputs` and `tile_size` are not read: pointers say which images, and
 /// tiles are of 8 or 16 pixels, as the number of cameras has it.
 ///
-/// Meshes are drawn camera by camera into layers that the batch is then blended over; `render` waits for the count of
-/// each camera's triangles. As everywhere, `fast` has the exponential of `exact` where there are meshes: in a call with
+/// Meshes are drawn into a layer for each camera, over which the batch is then blended. As everywhere, `fast` has the exponential of `exact` where there are meshes: in a call with
 /// any, for all of its cameras. Unsupported among meshes: Composite::hard_depth, Response other than ewa, Compat, and
 /// meshes that are seen through (MeshAlpha::blend).
 class CudaBatchRenderer {
