@@ -126,13 +126,17 @@ TEST_CASE("N64_cpu_cuda_keys") {
     const FrameImages<float> out{images.data(), images.data() + 3 * pixels, images.data() + 4 * pixels,
                                  nullptr, nullptr, nullptr};
     REQUIRE(render_camera<float>(backend, workspace, sets, camera, RenderConfig{}, out).ok());
+    // Once more on memory that is written: keys of what was culled are fetched with the others.
+    auto& chunk_keys = workspace.visible.chunk_keys;
+    backend.fill(chunk_keys.data(), 0, chunk_keys.size() * sizeof(std::uint32_t));
+    REQUIRE(render_camera<float>(backend, workspace, sets, camera, RenderConfig{}, out).ok());
     const auto fetch = [](const auto& buffer, auto& host) {
       host.resize(buffer.size());
       buffer.download(host.data(), host.size());
     };
     fetch(images, frames.rgb);
     std::vector<std::uint32_t> by_slot, order;
-    fetch(workspace.visible.chunk_keys, by_slot);
+    fetch(chunk_keys, by_slot);
     fetch(workspace.visible.order, order);
     fetch(workspace.tile_offsets, offsets);
     fetch(workspace.tile_splats, splats);

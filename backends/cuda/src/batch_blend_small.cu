@@ -11,40 +11,24 @@ namespace {
 constexpr int kThreads = 128, kWarps = kThreads / 32;   ///< of half a block
 constexpr std::uint32_t kOfThread = 2;                  ///< splats that a thread stages at a time
 constexpr std::uint32_t kChunk = kOfThread * kThreads;  ///< splats that are staged at a time
+constexpr std::uint32_t kOfWarp = kChunk / kWarps;      ///< of these a warp's, neighbours
 constexpr std::uint32_t kListStep = 4;                  ///< lists are read by so many
+constexpr int kBlocksPerProcessor = 4;
 constexpr unsigned kAll = 0xffffffffu;
 static_assert(kSmallTile == 2 * kBlock && kWarps == 4);
 
 /// A chunk of a list as it is drawn.
 struct DrawnChunk {
   StagedSplat splats[kChunk + 1];  ///< the last covers no pixel
-  /// Of the warps: places of splats, in bytes.
-  alignas(8) std::uint16_t lists[kWarps][kChunk + kListStep];
-  std::uint32_t lengths[kWarps];
+  /// Of the warps that draw, a part by each that stages: places of splats, in bytes.
+  alignas(8) std::uint16_t lists[kWarps][kWarps][kOfWarp + kListStep];
+  std::uint32_t lengths[kWarps][kWarps];
 };
 
 struct SmallShared {
-  DrawnChunk chunks[2];        ///< one is drawn while the next is staged
-  std::uint8_t masks[kChunk];  ///< the blocks that each splat of the next may reach, as ReachedBlocks has them
-  bool open[2][kWarps];        ///< whether any pixel of the block is: one is written while the other is read
+  DrawnChunk chunks[2];  ///< one is drawn while the next is staged
+  bool open[2][kWarps];  ///< whether any pixel of the block is: one is written while the other is read
 };
-
-/// Lists the n staged splats that reach the block of `bit`.
-__device__ void list_block(const SmallShared& s, DrawnChunk& to, unsigned warp, std::uint32_t n, unsigned bit) {
-  const unsigned lane = threadIdx.x % 32, below = (1u << lane) - 1;
-  std::uint16_t* const list = to.lists[warp];
-  const auto place = [](std::uint32_t i) { return static_cast<std::uint16_t>(i * sizeof(StagedSplat)); };
-  std::uint32_t length = 0;
-  for (std::uint32_t i = 0; i < n; i += 32) {
-    const bool mine = i + lane < n && (s.masks[i + lane] >> bit & 1) != 0;
-    const unsigned votes = __ballot_sync(kAll, mine);
-    if (mine) list[length + static_cast<std::uint32_t>(__popc(votes & below))] = place(i + lane);
-    length += static_cast<std::uint32_t>(__popc(votes));
-  }
-  const std::uint32_t end = (length + kListStep - 1) / kListStep * kListStep;
-  if (length + lane < end) list[length + lane] = place(kChunk);
-  if (lane == 0) to.lengths[warp] = end;
-}
 
 /// What the second half of a block does: records are asked for while the splats before them are staged, and their slots
 /// before that.
@@ -60,42 +44,60 @@ class Stager {
   /// Splats [first, first + kChunk), in order: all chunks are asked for. Only blocks that are `open` get a list.
   /// `far`: of the tile's meshes.
   template <bool Mesh>
-  __device__ void stage(SmallShared& s, DrawnChunk& to, const bool (&open)[kWarps], const BatchArgs& a,
-                        std::uint32_t first, int tile_x, int tile_y, float far) {
+  __device__ void stage(DrawnChunk& to, const bool (&open)[kWarps], const BatchArgs& a, std::uint32_t first,
+                        int tile_x, int tile_y, float far) {
+    const unsigned lane = thread_ % 32, warp = thread_ / 32, below = (1u << lane) - 1;
     const std::uint32_t n = min(kChunk, end_ - first);
+    const auto place = [](std::uint32_t i) { return static_cast<std::uint16_t>(i * sizeof(StagedSplat)); };
+    unsigned open_bits = 0;
+#pragma unroll
+    for (unsigned block = 0; block < kWarps; ++block) open_bits |= open[block] ? bit_of(block) : 0u;
+    std::uint32_t length[kWarps] = {};
+#pragma unroll
     for (std::uint32_t j = 0; j < kOfThread; ++j) {
-      const std::uint32_t i = j * kThreads + thread_;
-      if (i >= n) continue;
-      to.splats[i] = staged(record_[j], slot_[j]);
-      if (Mesh && is_hidden(a, slot_[j], far)) {
-        s.masks[i] = 0;
-        continue;
+      const std::uint32_t i = place_of(j);
+      unsigned mask = 0;
+      if (i < n) {
+        to.splats[i] = staged(record_[j], slot_[j]);
+        if (!Mesh || !is_hidden(a, slot_[j], far)) {
+          const ReachedBlocks blocks(bounds_of(record_[j].x, record_[j].y), tile_x, tile_y, kSmallTile);
+          mask = a.elliptic && blocks.many() ? blocks.of_ellipse(geometry_of(record_[j]), a.log2_alpha_min)
+                                             : blocks.of_bounds();
+          mask &= open_bits;
+        }
       }
-      const ReachedBlocks blocks(bounds_of(record_[j].x, record_[j].y), tile_x, tile_y, kSmallTile);
-      s.masks[i] = static_cast<std::uint8_t>(a.elliptic && blocks.many()
-                                                 ? blocks.of_ellipse(geometry_of(record_[j]), a.log2_alpha_min)
-                                                 : blocks.of_bounds());
+#pragma unroll
+      for (unsigned block = 0; block < kWarps; ++block) {
+        const bool reached = (mask & bit_of(block)) != 0;
+        const unsigned votes = __ballot_sync(kAll, reached);
+        if (reached) to.lists[block][warp][length[block] + static_cast<std::uint32_t>(__popc(votes & below))] = place(i);
+        length[block] += static_cast<std::uint32_t>(__popc(votes));
+      }
+    }
+#pragma unroll
+    for (unsigned block = 0; block < kWarps; ++block) {
+      const std::uint32_t end = (length[block] + kListStep - 1) / kListStep * kListStep;
+      if (length[block] + lane < end) to.lists[block][warp][length[block] + lane] = place(kChunk);
+      if (lane == block) to.lengths[block][warp] = end;
     }
     ask_for_records(a, first + kChunk);
     ask_for_slots(a, first + 2 * kChunk);
-    asm volatile("bar.sync 1, %0;" ::"n"(kThreads) : "memory");  // of this half of the block
-    const unsigned warp = thread_ / 32;
-    if (open[warp]) list_block(s, to, warp, n, bit_of(warp));
   }
 
-  /// The bit of a warp's block in a mask.
-  __device__ static unsigned bit_of(unsigned warp) { return warp / 2 * 4 + warp % 2; }
-
  private:
+  /// The bit of a block in a mask of ReachedBlocks.
+  __device__ static constexpr unsigned bit_of(unsigned block) { return 1u << (block / 2 * 4 + block % 2); }
+  /// The thread's splat `j` in a chunk.
+  __device__ std::uint32_t place_of(std::uint32_t j) const { return thread_ / 32 * kOfWarp + j * 32 + thread_ % 32; }
   __device__ void ask_for_slots(const BatchArgs& a, std::uint32_t first) {
     for (std::uint32_t j = 0; j < kOfThread; ++j) {
-      const std::uint32_t i = first + j * kThreads + thread_;
+      const std::uint32_t i = first + place_of(j);
       if (i < end_) slot_after_[j] = a.pairs[i].slot;
     }
   }
   __device__ void ask_for_records(const BatchArgs& a, std::uint32_t first) {
     for (std::uint32_t j = 0; j < kOfThread; ++j) {
-      if (first + j * kThreads + thread_ >= end_) continue;
+      if (first + place_of(j) >= end_) continue;
       slot_[j] = slot_after_[j];
       record_[j] = a.records[slot_[j]];
     }
@@ -109,7 +111,7 @@ class Stager {
 /// A block a tile, of two halves: a warp of the first draws a block of 4 x 4 pixels, which are its first half's; the
 /// second stages what is drawn next. For DepthMode::median the slot of the median Gaussian is left in the image.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh>
-__global__ void __launch_bounds__(2 * kThreads) blend_small_kernel(const __grid_constant__ BlendArgs b) {
+__global__ void __launch_bounds__(2 * kThreads, kBlocksPerProcessor) blend_small_kernel(const __grid_constant__ BlendArgs b) {
   __shared__ __align__(16) unsigned char memory[sizeof(SmallShared)];
   SmallShared& s = *reinterpret_cast<SmallShared*>(memory);
   const BatchArgs& a = b.batch;
@@ -141,7 +143,7 @@ __global__ void __launch_bounds__(2 * kThreads) blend_small_kernel(const __grid_
   __syncthreads();
   Stager stager(a, begin, draws ? begin : end);
   const auto stage = [&](std::uint32_t first, unsigned chunk) {
-    stager.stage<Mesh>(s, s.chunks[chunk], s.open[chunk], a, first, tile_x, tile_y, far);
+    stager.stage<Mesh>(s.chunks[chunk], s.open[chunk], a, first, tile_x, tile_y, far);
   };
   if (!draws && begin < end) stage(begin, 0);
   unsigned chunk = 0;
@@ -158,16 +160,18 @@ __global__ void __launch_bounds__(2 * kThreads) blend_small_kernel(const __grid_
         blend_staged<Color, D, M, F, Mesh>(a, rules, *reinterpret_cast<const StagedSplat*>(from), px, py, mesh, state,
                                            median);
       };
-      const std::uint32_t length = drawn.lengths[warp];
-      for (std::uint32_t i = 0; i < length; i += kListStep) {
-        const uint2 places = *reinterpret_cast<const uint2*>(drawn.lists[warp] + i);
-        blend(places.x & 0xffffu);
-        blend(places.x >> 16);
-        blend(places.y & 0xffffu);
-        blend(places.y >> 16);
-        if (i % 16 == 12 && __all_sync(kAll, !state[0].open(rules))) break;
+      for (unsigned part = 0; part < kWarps && open; ++part) {
+        const std::uint16_t* const list = drawn.lists[warp][part];
+        const std::uint32_t length = drawn.lengths[warp][part];
+        for (std::uint32_t i = 0; i < length; i += kListStep) {
+          const uint2 places = *reinterpret_cast<const uint2*>(list + i);
+          blend(places.x & 0xffffu);
+          blend(places.x >> 16);
+          blend(places.y & 0xffffu);
+          blend(places.y >> 16);
+        }
+        open = __any_sync(kAll, state[0].open(rules));
       }
-      open = __any_sync(kAll, state[0].open(rules));
     }
     if (lane == 0) s.open[chunk][warp] = open;
   }
