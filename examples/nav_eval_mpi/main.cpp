@@ -66,10 +66,14 @@ template <class B>
 gsnav::Result<Look> looker(std::shared_ptr<B> backend, const gsnav_eval::Stage& stage) {
   auto made = gsnav::Simulator<B>::create(*backend, stage.scene, stage.config);
   if (!made) return made.status();
-  auto sim = std::make_shared<gsnav::Simulator<B>>(std::move(*made));
-  return Look([backend, sim](const gsnav::World& world) {
-    sim->set_state(world.state());
-    return sim->observe().status();
+  struct Eye {
+    std::shared_ptr<B> backend;  // outlives what follows
+    gsnav::Simulator<B> sim;
+  };
+  auto eye = std::make_shared<Eye>(Eye{backend, std::move(*made)});
+  return Look([eye](const gsnav::World& world) {
+    eye->sim.set_state(world.state());
+    return eye->sim.observe().status();
   });
 }
 

@@ -31,6 +31,10 @@ class SkinnedCrowd {
       if (known->asset() == asset) arrays = known;
     }
     if (arrays == nullptr) assets_.push_back(arrays = std::make_shared<const AvatarArrays<B>>(*backend_, asset));
+    return add(std::move(arrays));
+  }
+  /// The same of an asset's arrays that others share.
+  std::size_t add(std::shared_ptr<const AvatarArrays<B>> arrays) {
     actors_.emplace_back(*backend_, std::move(arrays));
     return actors_.size() - 1;
   }
@@ -45,28 +49,22 @@ class SkinnedCrowd {
     return pose(actors.size(), [&](std::size_t i) -> const AvatarActor& { return *actors[i]; }, t);
   }
 
-  std::size_t size() const noexcept { return actors_.size(); }
-  /// The posed Gaussians at a place; valid until the next pose().
-  GaussianSet set(std::size_t place) const noexcept { return actors_[place].set(); }
-
- private:
-  template <class ActorAt>
-  Status pose(std::size_t count, const ActorAt& actor_at, double t) {
-    if (count != actors_.size()) {
-      return {Errc::invalid_argument, "SkinnedCrowd: " + std::to_string(count) + " actors for " +
-                                          std::to_string(actors_.size()) + " places; call add() once for each"};
+  /// Poses them for what these cameras see by `config`, in two steps, as SkinnedGaussians::prepare has it: the first is the
+  /// host's alone, and several threads may take it, each for a crowd of its own. Errors as above.
+  Status prepare(std::span<const AvatarActor> actors, double t, std::span<const Camera> cameras,
+                 const RenderConfig& config) {
+    if (Status s = check(actors.size()); !s) return s;
+    for (std::size_t i = 0; i < actors.size(); ++i) {
+      if (Status s = at_place(i, actors_[i].prepare(actors[i], t, cameras, config)); !s) return s;
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      if (Status s = actors_[i].place(actor_at(i), t); !s) {
-        return {s.code(), "SkinnedCrowd: place " + std::to_string(i) + ": " + s.message()};
-      }
-    }
+    return {};
+  }
+  Status skin_prepared() {
     host_joints_.clear();
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!actors_[i].visible_) continue;
-      actor_at(i).joint_matrices(t, matrices_);
-      if (actors_[i].asset()->skinning == Skinning::dual_quaternion) actors_[i].set_dual_joints(matrices_);
-      for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
+    for (SkinnedGaussians<B>& a : actors_) {
+      if (!a.visible_) continue;
+      if (a.asset()->skinning == Skinning::dual_quaternion) a.set_dual_joints(a.matrices_);
+      for (const auto& m : a.matrices_) host_joints_.push_back(affine_cast<float>(m));
     }
     joints_.upload(host_joints_.data(), host_joints_.size());
     jobs_.clear();
@@ -81,12 +79,36 @@ class SkinnedCrowd {
     return skin_all<float, B, float>(*backend_, jobs_);
   }
 
+  std::size_t size() const noexcept { return actors_.size(); }
+  /// The posed Gaussians at a place; valid until the next pose().
+  GaussianSet set(std::size_t place) const noexcept { return actors_[place].set(); }
+
+ private:
+  template <class ActorAt>
+  Status pose(std::size_t count, const ActorAt& actor_at, double t) {
+    if (Status s = check(count); !s) return s;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (Status s = at_place(i, actors_[i].place(actor_at(i), t)); !s) return s;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      if (actors_[i].visible_) actor_at(i).joint_matrices(t, actors_[i].matrices_);
+    }
+    return skin_prepared();
+  }
+  Status check(std::size_t actors) const {
+    if (actors == actors_.size()) return {};
+    return {Errc::invalid_argument, "SkinnedCrowd: " + std::to_string(actors) + " actors for " +
+                                        std::to_string(actors_.size()) + " places; call add() once for each"};
+  }
+  static Status at_place(std::size_t i, const Status& s) {
+    return s ? s : Status(s.code(), "SkinnedCrowd: place " + std::to_string(i) + ": " + s.message());
+  }
+
   B* backend_;
   std::vector<std::shared_ptr<const AvatarArrays<B>>> assets_;
   std::vector<SkinnedGaussians<B>> actors_;
   Buffer<Affine3<float>, B> joints_;
   std::vector<Affine3<float>> host_joints_;
-  std::vector<Affine3<double>> matrices_;
   std::vector<SkinningArgs<float>> jobs_;
 };
 

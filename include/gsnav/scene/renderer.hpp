@@ -12,8 +12,8 @@
 #include "gsnav/ops/frame_lanes.hpp"
 #include "gsnav/ops/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/needed_bands.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/scene_profile.hpp"
 
 namespace gsnav {
 

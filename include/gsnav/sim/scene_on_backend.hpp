@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "gsnav/avatar/actor.hpp"
-#include "gsnav/avatar/skinned_gaussians.hpp"
+#include "gsnav/avatar/skinned_crowd.hpp"
 #include "gsnav/nav/navmesh.hpp"
 #include "gsnav/nav/obstacles.hpp"
 #include "gsnav/scene/placed_meshes.hpp"
@@ -135,7 +135,7 @@ class SceneOnBackend {
   Status pose(std::size_t slot, double t) {
     Slot& s = at(slot);
     if (s.whole && s.time == t) return {};
-    return pose(s, t, true, [&](std::size_t i) { return s.skins[i].pose(scene_->avatars[i], t); });
+    return posed(s, t, true, [&] { return s.people.pose(scene_->avatars, t); });
   }
   /// The same for what these cameras see, in two steps: avatars that none of them can see cost little. The first is the
   /// host's alone: several threads may take it, each for another slot, once there are so many (make_slots).
@@ -143,14 +143,11 @@ class SceneOnBackend {
     Slot& s = *slots_[slot];
     s.whole = false;
     s.time = t;
-    for (std::size_t i = 0; i < s.skins.size(); ++i) {
-      if (Status e = s.skins[i].prepare(scene_->avatars[i], t, cameras, config); !e) return e;
-    }
-    return {};
+    return s.people.prepare(scene_->avatars, t, cameras, config);
   }
   Status pose_prepared(std::size_t slot) {
     Slot& s = *slots_[slot];
-    return pose(s, s.time, false, [&](std::size_t i) { return s.skins[i].skin_prepared(); });
+    return posed(s, s.time, false, [&] { return s.people.skin_prepared(); });
   }
   void make_slots(std::size_t count) {
     if (count > 0) at(count - 1);
@@ -160,7 +157,8 @@ class SceneOnBackend {
 
  private:
   struct Slot {
-    std::vector<SkinnedGaussians<B>> skins;
+    explicit Slot(B& backend) : people(backend) {}
+    SkinnedCrowd<B> people;
     std::vector<GaussianSet> sets;
     double time = 0.0;
     bool whole = false;  // posed for any camera
@@ -168,8 +166,8 @@ class SceneOnBackend {
 
   Slot& at(std::size_t slot) {
     while (slots_.size() <= slot) {
-      auto s = std::make_unique<Slot>();
-      for (const auto& body : bodies_) s->skins.emplace_back(*backend_, body);
+      auto s = std::make_unique<Slot>(*backend_);
+      for (const auto& body : bodies_) s->people.add(body);
       slots_.push_back(std::move(s));
     }
     return *slots_[slot];
@@ -188,15 +186,13 @@ class SceneOnBackend {
     }
   }
 
-  template <class PoseAvatar>
-  Status pose(Slot& s, double t, bool whole, const PoseAvatar& pose_avatar) {
+  template <class PosePeople>
+  Status posed(Slot& s, double t, bool whole, const PosePeople& pose_people) {
     s.whole = false;
+    if (Status e = pose_people(); !e) return e;
+    pose_count_ += s.people.size();
     s.sets = sets_;
-    for (std::size_t i = 0; i < s.skins.size(); ++i) {
-      if (Status e = pose_avatar(i); !e) return e;
-      ++pose_count_;
-      s.sets.push_back(s.skins[i].set());
-    }
+    for (std::size_t i = 0; i < s.people.size(); ++i) s.sets.push_back(s.people.set(i));
     s.time = t;
     s.whole = whole;
     return {};
