@@ -79,20 +79,23 @@ static_assert(BatchBackend<BatchingBackend>);
 int redrawn = 0;
 std::ptrdiff_t host_arrays = 0, host_bytes = 0;
 
-/// One whose scratch is too small every second time: images are whole only after finish(), which says so.
+/// One whose scratch is too small every second time: images are whole only after finish(), which says
+/// so.
 class BatchOfRedrawingToys : public BatchOfToys {
  public:
   using BatchOfToys::BatchOfToys;
   struct Stats {
     int reruns = 0;
   };
-  Status render(std::span<const GaussianSet> sets, std::span<const camera_type> cameras, const images_type& images) {
+  Status render(std::span<const GaussianSet> sets, std::span<const camera_type> cameras,
+                const images_type& images) {
     sets_ = sets;
     cameras_ = cameras;
     images_ = images;
     stats_.reruns = ++calls_ % 2;
     if (stats_.reruns == 0) return BatchOfToys::render(sets, cameras, images);
-    const auto pixels = static_cast<std::size_t>(cameras[0].camera.width * cameras[0].camera.height) * cameras.size();
+    const auto pixels =
+        static_cast<std::size_t>(cameras[0].camera.width * cameras[0].camera.height) * cameras.size();
     if (images.floats.rgb != nullptr) std::fill_n(images.floats.rgb, 3 * pixels, -7.0f);
     if (images.floats.median_depth != nullptr) std::fill_n(images.floats.median_depth, pixels, -7.0f);
     return {};
@@ -126,7 +129,8 @@ class RedrawingBackend : public ToyBackend {
     std::free(p);
   }
 };
-static_assert(BatchBackend<RedrawingBackend> && HasHostMemory<RedrawingBackend> && !HasHostMemory<BatchingBackend>);
+static_assert(BatchBackend<RedrawingBackend> && HasHostMemory<RedrawingBackend> &&
+              !HasHostMemory<BatchingBackend>);
 
 std::vector<std::shared_ptr<const SimulatorScene>> two_scenes() {
   SimulatorScene far = flat_scene();  // another sort order: frames of a call of its own
@@ -208,7 +212,9 @@ TEST_CASE("batches of a backend that draws many cameras at once have the bits of
   }
 }
 
-TEST_CASE("images are those of the last drawing where a batch is drawn again, in whatever host memory there is") {
+TEST_CASE(
+    "images are those of the last drawing where a batch is drawn again, in whatever host memory there "
+    "is") {
   BatchConfig config;
   config.sensors = rgbd_sensors(12, 18);
   config.sensors.push_back(config.sensors[0]);
@@ -222,7 +228,8 @@ TEST_CASE("images are those of the last drawing where a batch is drawn again, in
     CHECK(images_of(sim.reset().value().images) == images_of(expected.reset().value().images));
     const std::vector<Action> actions(7, Action::turn_left);
     for (int i = 0; i < 3; ++i) {
-      CHECK(images_of(sim.step(actions).value().images) == images_of(expected.step(actions).value().images));
+      CHECK(images_of(sim.step(actions).value().images) ==
+            images_of(expected.step(actions).value().images));
     }
     CHECK(redrawn > 3);
     CHECK(host_arrays > 0);
@@ -237,7 +244,8 @@ TEST_CASE("depths are cut at the far plane as doubles compare, whether or not a 
   for (double far_plane : {0.1, 5.0, 1000.0, 1e-42, 1e300, static_cast<double>(inf)}) {
     for (int i = 0; i < 50; ++i, far_plane *= i < 40 && far_plane < 1e30 ? rng.uniform(0.5, 2) : 1) {
       const float near = static_cast<float>(std::min(far_plane, 3e38));
-      std::vector<float> depths{0.0f, near, std::nextafter(near, 0.0f), std::nextafter(near, inf), 2 * near, 1e-45f, inf};
+      std::vector<float> depths{
+          0.0f, near, std::nextafter(near, 0.0f), std::nextafter(near, inf), 2 * near, 1e-45f, inf};
       const std::vector<float> before = depths;
       const CutDepth cut(depths.data(), far_plane);
       for (std::size_t k = 0; k < depths.size(); ++k) {
