@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in one row.
 //
-//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256] [--compact] [batch sizes...]
+//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256] [--compact] [--balls 8]
+//       [batch sizes...]
 //
 // Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of views
 // repeats them from slightly different places. Times are the device's, between events on the stream; `host us` is
-// how long the call takes that asks for them.
+// how long the call takes that asks for them. --balls: so many meshes of 4000 triangles stand before the first cameras,
+// seen by all.
 #include <cuda_runtime.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -18,6 +21,7 @@
 #include "error.hpp"
 #include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "samples.hpp"
 #include "workload.hpp"
@@ -29,6 +33,27 @@ namespace {
 constexpr int kRepeats = 9;
 int g_width = 256, g_height = 256;
 constexpr std::size_t kReferenceViews = 4;  ///< compared with float64
+std::vector<MeshInstance> g_meshes;         ///< on the device
+
+/// A ball of radius 1.
+SurfaceMesh ball() {
+  constexpr std::uint32_t kAround = 64, kDown = 32;
+  constexpr double kPi = 3.14159265358979323846;
+  SurfaceMesh m;
+  for (std::uint32_t i = 0; i <= kDown; ++i) {
+    for (std::uint32_t j = 0; j <= kAround; ++j) {
+      const double polar = kPi * i / kDown, turn = 2 * kPi * j / kAround;
+      const Vec3d at{std::sin(polar) * std::cos(turn), std::cos(polar), std::sin(polar) * std::sin(turn)};
+      m.geometry.vertices.push_back(vec_cast<float>(at));
+      m.normals.push_back(vec_cast<float>(at));
+      if (i == kDown || j == kAround) continue;
+      const std::uint32_t a = i * (kAround + 1) + j, b = a + kAround + 1;
+      m.geometry.triangles.push_back({a, a + 1, b});
+      m.geometry.triangles.push_back({a + 1, b + 1, b});
+    }
+  }
+  return m;
+}
 
 /// `count` cameras from `first` on: the views, and when they are all taken the views moved by centimetres.
 std::vector<BatchCamera> cameras_of(std::size_t first, std::size_t count) {
@@ -37,6 +62,7 @@ std::vector<BatchCamera> cameras_of(std::size_t first, std::size_t count) {
   for (std::size_t i = first; i < first + count; ++i) {
     BatchCamera c{views[i % views.size()], {}};
     c.camera.viewmat.translation.x += 0.02 * static_cast<double>(i / views.size());
+    c.meshes.instances = g_meshes;
     batch.push_back(c);
   }
   return batch;
@@ -116,17 +142,21 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
 int main(int argc, char** argv) {
   std::vector<std::size_t> counts;
   bool compact = false;
+  std::size_t balls = 0;
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--size" && i + 1 < argc) {
       if (std::sscanf(argv[++i], "%dx%d", &g_width, &g_height) == 2 && g_width > 0 && g_height > 0) continue;
     } else if (std::string(argv[i]) == "--compact") {
       compact = true;
       continue;
+    } else if (std::string(argv[i]) == "--balls" && i + 1 < argc) {
+      balls = std::strtoull(argv[++i], nullptr, 10);
+      if (balls > 0) continue;
     } else if (const std::size_t count = std::strtoull(argv[i], nullptr, 10); count > 0) {
       counts.push_back(count);
       continue;
     }
-    std::fprintf(stderr, "bench_batch: '%s' is no size (256x256), batch size or --compact\n", argv[i]);
+    std::fprintf(stderr, "bench_batch: '%s' is no size (256x256), batch size, --compact or --balls\n", argv[i]);
     return 2;
   }
   if (CudaBackend::device_count() == 0) {
@@ -142,10 +172,22 @@ int main(int argc, char** argv) {
   std::vector<Camera> cameras;
   for (const BatchCamera& c : cameras_of(0, kReferenceViews)) cameras.push_back(c.camera);
   const std::vector<GaussianSet> sets{gsnav_bench::workload().cloud.set()};
+  MeshScene scene;
+  scene.add(ball()).value();
+  const MeshArrays<CudaBackend> there(cuda, scene.instance(0, {}, 0).mesh);
+  std::vector<MeshInstance> here;
+  for (const BatchCamera& c : cameras_of(0, balls)) {
+    const Vec3d forward = c.camera.viewmat.linear.row[2];
+    const Similarity at{{1, 0, 0, 0}, c.camera.position() + 1.5 * forward, 0.3};
+    const auto id = static_cast<std::uint32_t>(here.size());
+    here.push_back(scene.instance(0, at, id));
+    g_meshes.push_back(there.instance(at, id));
+  }
+  reference.set_meshes(here);
   const Frames<double> truth = reference.render(sets, cameras).value();
-  std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB + alpha + median depth%s\n", cuda.device_name().c_str(),
+  std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB + alpha + median depth%s, %zu meshes\n", cuda.device_name().c_str(),
               gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), g_width, g_height,
-              compact ? ", SH in half precision" : "");
+              compact ? ", SH in half precision" : "", balls);
   std::printf("profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  scratch MB  host us\n");
   if (counts.empty()) counts = {1, 8, 64, 256, 512};
   for (const Profile profile : {Profile::fast, Profile::exact}) {

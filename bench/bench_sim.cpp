@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the simulator costs beside rendering: one action in many environments, one in one, and ten people posed; and what
-// a frame of it costs on a GPU (bench_sim_cuda.cpp).
+// What the simulator costs beside rendering: one action in many environments, one in one, and ten people
+// posed; and what a frame of it costs on a GPU (bench_sim_cuda.cpp).
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

@@ -52,9 +52,10 @@ class DeviceTime {
   cudaEvent_t begin_ = nullptr, end_ = nullptr;
 };
 
-/// Simulator::observe() of RGB and depth, 256 x 256, along a follower's way; the time is that of the call. Counters, all
-/// medians: draw_us, what the device takes for the scene from the same cameras, without people; copy_us, for their images to page-locked memory; host_us,
-/// what is left of the call; world_us, an action without a picture, outside of it. Arguments: thousands of Gaussians, people.
+/// Simulator::observe() of RGB and depth, 256 x 256, along a follower's way; the time is that of the
+/// call. Counters, all medians: draw_us, what the device takes for the scene from the same cameras,
+/// without people; copy_us, for their images to page-locked memory; host_us, what is left of the call;
+/// world_us, an action without a picture, outside of it. Arguments: thousands of Gaussians, people.
 void observe_cuda(benchmark::State& state) {
   if (CudaBackend::device_count() == 0) {
     state.SkipWithError("no GPU");
@@ -100,8 +101,10 @@ void observe_cuda(benchmark::State& state) {
     const std::chrono::duration<double> took = Clock::now() - begin;
 
     const AgentPose& agent = sim.agent();
-    const BatchCamera camera{sensor_camera(config.sensors[0], agent.position, agent.rotation(), agent.pitch), {}};
-    const double drawn = device.us([&] { renderer.render(sets, std::span(&camera, 1), images).throw_if_error(); });
+    const BatchCamera camera{
+        sensor_camera(config.sensors[0], agent.position, agent.rotation(), agent.pitch), {}};
+    const double drawn =
+        device.us([&] { renderer.render(sets, std::span(&camera, 1), images).throw_if_error(); });
     renderer.finish().throw_if_error();
     const double copied = device.us([&] { there.download(here.data(), here.size()); });
     if (!counts) return took.count();
@@ -113,7 +116,8 @@ void observe_cuda(benchmark::State& state) {
   };
   for (int i = 0; i < 20; ++i) frame(false);  // find the scratch that it takes
   for (auto _ : state) state.SetIterationTime(frame(true));
-  const double median = gsnav_bench::median(wall), device_us = gsnav_bench::median(draw) + gsnav_bench::median(copy);
+  const double median = gsnav_bench::median(wall),
+               device_us = gsnav_bench::median(draw) + gsnav_bench::median(copy);
   state.counters["wall_us"] = median;
   state.counters["wall_p90_us"] = gsnav_bench::quantile(wall, 0.9);
   state.counters["draw_us"] = gsnav_bench::median(draw);

@@ -140,7 +140,8 @@ TEST_CASE("cuda batch: counts of triangles stay on the device, and what does not
     balls.push_back(there.instance({{1, 0, 0, 0}, at, 1.0}, static_cast<std::uint32_t>(i)));
   }
   // Few cameras; many; and more pixels than one wave has.
-  for (const std::array<int, 3>& size : {std::array{4, 97, 64}, std::array{60, 149, 101}, std::array{76, 640, 352}}) {
+  for (const std::array<int, 3>& size :
+       {std::array{4, 97, 64}, std::array{60, 149, 101}, std::array{76, 640, 352}}) {
     CAPTURE(size[0]);
     const std::vector<Camera> cameras = ring(size[0], size[1], size[2]);
     std::vector<MeshFrame> seen;
@@ -151,7 +152,8 @@ TEST_CASE("cuda batch: counts of triangles stay on the device, and what does not
     MeshWorkspace<float, CudaBackend> alone(cuda);
     for (std::size_t c = 0; c < cameras.size(); ++c) {
       MeshStats one;
-      draw_meshes<float>(cuda, alone, seen[c].instances, cameras[c], seen[c].light, 16, false, {}, &one).throw_if_error();
+      draw_meshes<float>(cuda, alone, seen[c].instances, cameras[c], seen[c].light, 16, false, {}, &one)
+          .throw_if_error();
       expected.triangles += one.triangles;
       expected.not_finite += one.not_finite;
       expected.drawn += one.drawn;
@@ -160,7 +162,8 @@ TEST_CASE("cuda batch: counts of triangles stay on the device, and what does not
     CudaBatchRenderer renderer(cuda);
     const Frames<float> frames = singly(cuda, {arrays.set()}, cameras, {}, {}, kMedianOnly, seen);
     for (int call = 0; call < 2; ++call) {
-      const Batch got = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianOnly, false, seen);
+      const Batch got =
+          draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianOnly, false, seen);
       check_same(got.frames, frames);
       CHECK(got.stats.meshes.triangles == expected.triangles);
       CHECK(got.stats.meshes.not_finite == expected.not_finite);

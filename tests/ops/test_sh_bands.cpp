@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// SH bands that a scene does not need, on backends with a memory of their own: not read, and where no chunk has them not
-// held; the images are those of all bands.
+// SH bands that a scene does not need, on backends with a memory of their own: not read, and where no
+// chunk has them not held; the images are those of all bands.
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -20,8 +20,8 @@ using namespace gsnav_test;
 
 namespace {
 
-/// A cloud of degree 3 of which chunk c has the bands up to c % (most + 1), the others zero; its profile; and the same
-/// cloud with NaN in all that is not to be read.
+/// A cloud of degree 3 of which chunk c has the bands up to c % (most + 1), the others zero; its
+/// profile; and the same cloud with NaN in all that is not to be read.
 struct Banded {
   explicit Banded(int most, bool halves = false) {
     cloud = random_cloud(12, {.count = 2500});
@@ -59,7 +59,8 @@ void check_held(const GaussianView& v, int degree) {
 
 }  // namespace
 
-TEST_CASE("SH bands: a memory of its own holds those that some chunk has, and none beyond a chunk's is read") {
+TEST_CASE(
+    "SH bands: a memory of its own holds those that some chunk has, and none beyond a chunk's is read") {
   ToyBackend toy;
   const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 96, 64, 70);
   for (const int most : {3, 2, 1, 0}) {
@@ -69,7 +70,8 @@ TEST_CASE("SH bands: a memory of its own holds those that some chunk has, and no
       const Banded b(most, halves);
       const GaussianArrays<ToyBackend> all(toy, b.cloud), some(toy, b.marked, b.profile);
       check_held(some.set().gaussians, most);
-      const Frames<float> expected = render<float>(toy, {all.set()}, camera), got = render<float>(toy, {some.set()}, camera);
+      const Frames<float> expected = render<float>(toy, {all.set()}, camera),
+                          got = render<float>(toy, {some.set()}, camera);
       CHECK(got.rgb == expected.rgb);
       CHECK(got.median_depth == expected.median_depth);
     }
@@ -96,14 +98,16 @@ TEST_CASE("cuda: SH bands that chunks do not need are not read, in batches and a
           CudaBatchRenderer renderer(cuda, config);
           const std::vector<Camera> cameras = ring(count, 149, 101);
           const Batch got = draw_batch(cuda, renderer, {some.set()}, cameras, {}, kMedianOnly);
-          check_same(got.frames, draw_batch(cuda, renderer, {all.set()}, cameras, {}, kMedianOnly).frames);
+          check_same(got.frames,
+                     draw_batch(cuda, renderer, {all.set()}, cameras, {}, kMedianOnly).frames);
           if (count != 5) continue;
           check_same(got.frames, singly(cuda, {some.set()}, cameras, {}, config, kMedianOnly));
           // The contract's bound between the GPU and the CPU, which reads by the same rule.
           SerialBackend serial;
           Renderer<float, SerialBackend> on_cpu(serial, config);
           const Frames<float> cpu =
-              on_cpu.render(std::vector<GaussianSet>{b.profile.applied_to(b.marked.set())}, cameras).value();
+              on_cpu.render(std::vector<GaussianSet>{b.profile.applied_to(b.marked.set())}, cameras)
+                  .value();
           std::size_t over = 0, far_over = 0;
           for (std::size_t i = 0; i < cpu.rgb.size(); ++i) {
             const float d = std::abs(cpu.rgb[i] - got.frames.rgb[i]);

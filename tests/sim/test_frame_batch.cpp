@@ -3,9 +3,15 @@
 // the serial one.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <limits>
 
 #include "gsnav/backends/serial.hpp"
+#include "gsnav/core/host_array.hpp"
+#include "gsnav/kernels/cut_depth.hpp"
 #include "gsnav/scene/lod_build.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "mesh_box.hpp"
@@ -69,6 +75,62 @@ class BatchingBackend : public ToyBackend {
   using batch_renderer = BatchOfToys;
 };
 static_assert(BatchBackend<BatchingBackend>);
+
+int redrawn = 0;
+std::ptrdiff_t host_arrays = 0, host_bytes = 0;
+
+/// One whose scratch is too small every second time: images are whole only after finish(), which says
+/// so.
+class BatchOfRedrawingToys : public BatchOfToys {
+ public:
+  using BatchOfToys::BatchOfToys;
+  struct Stats {
+    int reruns = 0;
+  };
+  Status render(std::span<const GaussianSet> sets, std::span<const camera_type> cameras,
+                const images_type& images) {
+    sets_ = sets;
+    cameras_ = cameras;
+    images_ = images;
+    stats_.reruns = ++calls_ % 2;
+    if (stats_.reruns == 0) return BatchOfToys::render(sets, cameras, images);
+    const auto pixels =
+        static_cast<std::size_t>(cameras[0].camera.width * cameras[0].camera.height) * cameras.size();
+    if (images.floats.rgb != nullptr) std::fill_n(images.floats.rgb, 3 * pixels, -7.0f);
+    if (images.floats.median_depth != nullptr) std::fill_n(images.floats.median_depth, pixels, -7.0f);
+    return {};
+  }
+  Status finish() {
+    redrawn += stats_.reruns;
+    return stats_.reruns == 0 ? Status() : BatchOfToys::render(sets_, cameras_, images_);
+  }
+  const Stats& stats() const noexcept { return stats_; }
+
+ private:
+  std::span<const GaussianSet> sets_;
+  std::span<const camera_type> cameras_;
+  images_type images_;
+  Stats stats_;
+  int calls_ = 0;
+};
+
+/// With host memory of its own, of which there are 20 kB.
+class RedrawingBackend : public ToyBackend {
+ public:
+  using batch_renderer = BatchOfRedrawingToys;
+  static void* allocate_host(std::size_t bytes) {
+    if (host_bytes + static_cast<std::ptrdiff_t>(bytes) > 20000) return nullptr;
+    host_bytes += static_cast<std::ptrdiff_t>(bytes);
+    ++host_arrays;
+    return std::malloc(bytes);
+  }
+  static void deallocate_host(void* p) {
+    --host_arrays;
+    std::free(p);
+  }
+};
+static_assert(BatchBackend<RedrawingBackend> && HasHostMemory<RedrawingBackend> &&
+              !HasHostMemory<BatchingBackend>);
 
 std::vector<std::shared_ptr<const SimulatorScene>> two_scenes() {
   SimulatorScene far = flat_scene();  // another sort order: frames of a call of its own
@@ -146,6 +208,50 @@ TEST_CASE("batches of a backend that draws many cameras at once have the bits of
       // Rows that lie apart.
       const std::vector<std::uint8_t> mask{1, 0, 1, 1, 0, 0, 1};
       same(sim.reset(mask).value(), expected.reset(mask).value());
+    }
+  }
+}
+
+TEST_CASE(
+    "images are those of the last drawing where a batch is drawn again, in whatever host memory there "
+    "is") {
+  BatchConfig config;
+  config.sensors = rgbd_sensors(12, 18);
+  config.sensors.push_back(config.sensors[0]);
+  config.sensors[2].uuid = "around";
+  config.sensors[2].model = SensorModel::equirectangular;
+  SerialBackend serial;
+  {
+    RedrawingBackend redrawing;
+    auto expected = make_batch_simulator(serial, two_scenes(), config, 7, spread).value();
+    auto sim = make_batch_simulator(redrawing, two_scenes(), config, 7, spread).value();
+    CHECK(images_of(sim.reset().value().images) == images_of(expected.reset().value().images));
+    const std::vector<Action> actions(7, Action::turn_left);
+    for (int i = 0; i < 3; ++i) {
+      CHECK(images_of(sim.step(actions).value().images) ==
+            images_of(expected.step(actions).value().images));
+    }
+    CHECK(redrawn > 3);
+    CHECK(host_arrays > 0);
+    CHECK(host_bytes <= 20000);
+  }
+  CHECK(host_arrays == 0);
+}
+
+TEST_CASE("depths are cut at the far plane as doubles compare, whether or not a float is there") {
+  Rng rng(31);
+  const float inf = std::numeric_limits<float>::infinity();
+  for (double far_plane : {0.1, 5.0, 1000.0, 1e-42, 1e300, static_cast<double>(inf)}) {
+    for (int i = 0; i < 50; ++i, far_plane *= i < 40 && far_plane < 1e30 ? rng.uniform(0.5, 2) : 1) {
+      const float near = static_cast<float>(std::min(far_plane, 3e38));
+      std::vector<float> depths{
+          0.0f, near, std::nextafter(near, 0.0f), std::nextafter(near, inf), 2 * near, 1e-45f, inf};
+      const std::vector<float> before = depths;
+      const CutDepth cut(depths.data(), far_plane);
+      for (std::size_t k = 0; k < depths.size(); ++k) {
+        cut(k);
+        CHECK(depths[k] == (static_cast<double>(before[k]) > far_plane ? 0.0f : before[k]));
+      }
     }
   }
 }

@@ -5,17 +5,21 @@
 #include "batch_state.cuh"
 #include "gsnav/backends/cuda/device.cuh"
 
-// The meshes of a batch: a layer of depth and colour for each camera, over which Gaussians are blended. The host says what
-// instances each camera may see; how many triangles that makes stays on the device, as counts of splats do.
+// The meshes of a batch: a layer of depth and colour for each camera, over which Gaussians are blended.
+// The host says what instances each camera may see; how many triangles that makes stays on the device,
+// as counts of splats do.
 
 namespace gsnav {
 
 namespace {
 
-// What cameras of a wave may take together, where one alone does not take more: 170 MB of vertices, 130 of pixels.
+// What cameras of a wave may take together, where one alone does not take more: 170 MB of vertices, 130
+// of pixels.
 constexpr std::size_t kWaveVertices = std::size_t{1} << 22, kWavePixels = std::size_t{1} << 24;
 
-std::uint32_t chunks_of(std::size_t n) { return static_cast<std::uint32_t>((n + kMeshChunk - 1) / kMeshChunk); }
+std::uint32_t chunks_of(std::size_t n) {
+  return static_cast<std::uint32_t>((n + kMeshChunk - 1) / kMeshChunk);
+}
 
 }  // namespace
 
@@ -24,7 +28,8 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
   flight.mesh_triangles = 0;
   meshes.waves.clear();
   flight.has_meshes = false;
-  for (const BatchCamera& c : cameras) flight.has_meshes = flight.has_meshes || !c.meshes.instances.empty();
+  for (const BatchCamera& c : cameras)
+    flight.has_meshes = flight.has_meshes || !c.meshes.instances.empty();
   if (!flight.has_meshes) return {};
 
   // ---- what each camera sees
@@ -54,8 +59,8 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
     }
     if (meshes.waves.empty() || meshes.waves.back().vertices + vertices > kWaveVertices ||
         (meshes.waves.back().cameras + 1) * pixels > kWavePixels) {
-      meshes.waves.push_back({c, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(meshes.chunk_begins.size()),
-                              0, 0, 0, 0, 0});
+      meshes.waves.push_back({c, static_cast<std::uint32_t>(first),
+                              static_cast<std::uint32_t>(meshes.chunk_begins.size()), 0, 0, 0, 0, 0});
       meshes.chunk_begins.push_back(0);
       triangles = 0;
     }
@@ -90,7 +95,8 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
   put(meshes.at_places, meshes.places);
   put(meshes.at_chunk_begins, meshes.chunk_begins);
   auto* const lenses = reinterpret_cast<MeshCamera*>(flight.mesh_inputs.data + meshes.at_cameras);
-  auto* const lights = reinterpret_cast<MeshShadeArgs<float>*>(flight.mesh_inputs.data + meshes.at_lights);
+  auto* const lights =
+      reinterpret_cast<MeshShadeArgs<float>*>(flight.mesh_inputs.data + meshes.at_lights);
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     lenses[c] = MeshCamera::of(cameras[c].camera);
     lights[c] = {};
@@ -103,8 +109,9 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
   meshes.color.resize_discard(color ? args.cameras * 3 * pixels : 0);
   raster.mesh = {meshes.depth.data(), color ? meshes.color.data() : nullptr, {}};
   raster.exp2_method = Exp2::degree5;  // as frames with meshes have it
-  if (triangle_capacity == 0) {  // a guess, as that of slots
-    triangle_capacity = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(most_triangles / 2, 1u << 14, 1u << 21));
+  if (triangle_capacity == 0) {        // a guess, as that of slots
+    triangle_capacity =
+        static_cast<std::uint32_t>(std::clamp<std::uint64_t>(most_triangles / 2, 1u << 14, 1u << 21));
   }
   return {};
 }
@@ -116,7 +123,8 @@ void CudaBatchRenderer::State::size_layers() {
     chunks = std::max<std::size_t>(chunks, w.triangle_chunks);
     cameras = std::max<std::size_t>(cameras, w.cameras);
   }
-  const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
   meshes.inputs.resize_discard(meshes.input_bytes);
   meshes.vertices.resize_discard(vertices);
   meshes.counts.resize_discard(chunks);
@@ -135,11 +143,14 @@ void CudaBatchRenderer::State::enqueue_layers(const cuda::Flight& flight) {
   const auto there = [&]<class T>(const T*, std::size_t at, std::size_t first) {
     return reinterpret_cast<const T*>(meshes.inputs.data() + at) + first;
   };
-  cudaMemcpyAsync(meshes.inputs.data(), flight.mesh_inputs.data, meshes.input_bytes, cudaMemcpyHostToDevice, stream);
+  cudaMemcpyAsync(meshes.inputs.data(), flight.mesh_inputs.data, meshes.input_bytes,
+                  cudaMemcpyHostToDevice, stream);
   backend.fill(meshes.counters.data(), 0, sizeof(cuda::MeshCounters));
   for (const cuda::MeshWaveSize& w : meshes.waves) {
     MeshSetupArgs<float> setup;
-    setup.placements = {there(static_cast<MeshPlacement*>(nullptr), meshes.at_placements, w.first_placement), w.placements};
+    setup.placements = {
+        there(static_cast<MeshPlacement*>(nullptr), meshes.at_placements, w.first_placement),
+        w.placements};
     setup.vertices = meshes.vertices.view();
     setup.counts = meshes.counts.view();
     setup.offsets = meshes.offsets.view();
@@ -148,7 +159,8 @@ void CudaBatchRenderer::State::enqueue_layers(const cuda::Flight& flight) {
     wave.places = there(static_cast<cuda::MeshPlace*>(nullptr), meshes.at_places, w.first_placement);
     wave.cameras = there(static_cast<MeshCamera*>(nullptr), meshes.at_cameras, w.first_camera);
     wave.lights = there(static_cast<MeshShadeArgs<float>*>(nullptr), meshes.at_lights, w.first_camera);
-    wave.chunk_begins = there(static_cast<std::uint32_t*>(nullptr), meshes.at_chunk_begins, w.first_begin);
+    wave.chunk_begins =
+        there(static_cast<std::uint32_t*>(nullptr), meshes.at_chunk_begins, w.first_begin);
     wave.placements = w.placements;
     wave.camera_count = w.cameras;
     wave.vertex_chunks = w.vertex_chunks;
@@ -159,13 +171,15 @@ void CudaBatchRenderer::State::enqueue_layers(const cuda::Flight& flight) {
     wave.pixels = meshes.pixels.data();
     wave.large = meshes.large.data();
     wave.depth = meshes.depth.data() + w.first_camera * pixels;
-    wave.color = raster.mesh.color == nullptr ? nullptr : meshes.color.data() + 3 * w.first_camera * pixels;
+    wave.color =
+        raster.mesh.color == nullptr ? nullptr : meshes.color.data() + 3 * w.first_camera * pixels;
     cuda::launch_mesh_wave(setup, width, height, wave, multiprocessors, stream);
   }
   if (raster.mesh.color != nullptr && config.blend_space == ColorSpace::linear) {
     backend.parallel_for(meshes.color.size(), DecodeImage<float>{meshes.color.data()});
   }
-  backend.copy(flight.mesh_counters, meshes.counters.data(), sizeof(cuda::MeshCounters), CopyKind::device_to_host);
+  backend.copy(flight.mesh_counters, meshes.counters.data(), sizeof(cuda::MeshCounters),
+               CopyKind::device_to_host);
 }
 
 }  // namespace gsnav

@@ -76,12 +76,12 @@ bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, int multiprocessors) 
   return tiles <= kSmallImage && cameras * tiles <= 16 * static_cast<std::uint64_t>(multiprocessors);
 }
 
-/// Eight octaves from the nearest near plane on, or from kNear, as finely as counters in the GPU's cache allow. An agent's
-/// near plane is a centimetre off: octaves up to its body's radius would be spent on nothing, and all that lies beyond 2.5 m
-/// would share the last bin.
+/// Eight octaves from the nearest near plane on, or from kNear, as finely as counters in the GPU's cache allow. An
+/// agent's near plane is a centimetre off: octaves up to its body's radius would be spent on nothing, and all that
+/// lies beyond 2.5 m would share the last bin.
 cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits, std::uint32_t tiles) {
   constexpr std::uint32_t kCounters = 1u << 22;
-  constexpr int kOctaves = 3;    // log2
+  constexpr int kOctaves = 3;      // log2
   constexpr float kNear = 0.125f;  // metres
   int bits = cuda::kMinDepthBits;
   while (bits < cuda::kMaxDepthBits && std::uint64_t{tiles} << (bits + 1) <= kCounters) ++bits;
@@ -130,7 +130,9 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   cuda::need(cudaEventSynchronize(flight.done), "waiting for an earlier batch");
   flight.inputs.reserve(layout.bytes());
   inputs.resize_discard(layout.bytes());
-  const auto host = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(flight.inputs.data + at); };
+  const auto host = [&](auto* type, std::size_t at) {
+    return reinterpret_cast<decltype(type)>(flight.inputs.data + at);
+  };
   const auto device = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(inputs.data() + at); };
 
   // ---- instances, neighbours where they are of one set

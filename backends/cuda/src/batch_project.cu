@@ -137,7 +137,8 @@ __device__ void copy_async(T* to, const T* from, unsigned n) {
 }
 
 /// ask_for_sh for the bands up to `degree` of each row, `rest` values apart, of which no others are read.
-__device__ __noinline__ void ask_for_bands(const GaussianView& gs, int degree, unsigned rest, std::size_t first, WarpRows& to) {
+__device__ __noinline__ void ask_for_bands(const GaussianView& gs, int degree, unsigned rest, std::size_t first,
+                                           WarpRows& to) {
   const unsigned rows = static_cast<unsigned>(gs.size - first < 32 ? gs.size - first : 32), lane = threadIdx.x % 32;
   const unsigned kept = static_cast<unsigned>(3 * (sh_coefficient_count(degree) - 1));
   const std::size_t begin = rest * first;

@@ -93,9 +93,10 @@ struct BatchMeshes {
       : inputs(b), vertices(b), counts(b), offsets(b), camera_begins(b), triangles(b), pixels(b), large(b), counters(b),
         depth(b), color(b) {}
   std::size_t bytes() const noexcept {
-    return inputs.capacity_bytes() + vertices.capacity_bytes() + counts.capacity_bytes() + offsets.capacity_bytes() +
-           camera_begins.capacity_bytes() + triangles.capacity_bytes() + pixels.capacity_bytes() + large.capacity_bytes() +
-           counters.capacity_bytes() + depth.capacity_bytes() + color.capacity_bytes();
+    return inputs.capacity_bytes() + vertices.capacity_bytes() + counts.capacity_bytes() +
+           offsets.capacity_bytes() + camera_begins.capacity_bytes() + triangles.capacity_bytes() +
+           pixels.capacity_bytes() + large.capacity_bytes() + counters.capacity_bytes() +
+           depth.capacity_bytes() + color.capacity_bytes();
   }
 
   Array<unsigned char> inputs;

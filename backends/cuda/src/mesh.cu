@@ -18,15 +18,21 @@ namespace {
 constexpr unsigned kThreads = kMeshChunk;  ///< of a block that takes a chunk
 constexpr unsigned kScanThreads = 1024;
 constexpr int kSmallBox = 8;               ///< a thread draws triangles of up to kSmallBox^2 pixels by itself
-constexpr int kUnit = 32;                  ///< larger ones are drawn in squares of so many pixels, a warp each
+constexpr int kUnit = 32;  ///< larger ones are drawn in squares of so many pixels, a warp each
 constexpr unsigned kUnitBits = 40;
 
 /// The work of one camera: lists of chunks, and counts that the host has been told.
 struct OneCamera {
   std::uint32_t triangles = 0;
-  __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>& args) const { return args.vertex_chunks[blockIdx.x]; }
-  __device__ MeshChunk triangle_chunk(const MeshSetupArgs<float>& args) const { return args.triangle_chunks[blockIdx.x]; }
-  __device__ const MeshCamera& lens(const MeshSetupArgs<float>& args, std::uint32_t) const { return args.camera; }
+  __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>& args) const {
+    return args.vertex_chunks[blockIdx.x];
+  }
+  __device__ MeshChunk triangle_chunk(const MeshSetupArgs<float>& args) const {
+    return args.triangle_chunks[blockIdx.x];
+  }
+  __device__ const MeshCamera& lens(const MeshSetupArgs<float>& args, std::uint32_t) const {
+    return args.camera;
+  }
   __device__ void note(const MeshSetupArgs<float>& args, int not_finite) const {
     args.not_finite[blockIdx.x] = static_cast<std::uint32_t>(not_finite);
   }
@@ -41,7 +47,7 @@ struct OneCamera {
 /// That of several: a chunk's placement is searched for, and counts stay here.
 struct ManyCameras {
   MeshWave wave;
-  __device__ MeshChunk chunk(std::uint32_t MeshPlace::* first) const {
+  __device__ MeshChunk chunk(std::uint32_t MeshPlace::*first) const {
     std::uint32_t low = 0, high = wave.placements;
     while (high - low > 1) {
       const std::uint32_t mid = (low + high) / 2;
@@ -49,42 +55,54 @@ struct ManyCameras {
     }
     return {low, static_cast<std::uint32_t>((blockIdx.x - wave.places[low].*first) * kMeshChunk)};
   }
-  __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>&) const { return chunk(&MeshPlace::vertex_chunk); }
-  __device__ MeshChunk triangle_chunk(const MeshSetupArgs<float>&) const { return chunk(&MeshPlace::triangle_chunk); }
+  __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>&) const {
+    return chunk(&MeshPlace::vertex_chunk);
+  }
+  __device__ MeshChunk triangle_chunk(const MeshSetupArgs<float>&) const {
+    return chunk(&MeshPlace::triangle_chunk);
+  }
   __device__ const MeshCamera& lens(const MeshSetupArgs<float>&, std::uint32_t placement) const {
     return wave.cameras[wave.places[placement].camera];
   }
   __device__ void note(const MeshSetupArgs<float>&, int not_finite) const {
-    if (not_finite != 0) atomicAdd(&wave.counters->not_finite, static_cast<unsigned long long>(not_finite));
+    if (not_finite != 0)
+      atomicAdd(&wave.counters->not_finite, static_cast<unsigned long long>(not_finite));
   }
-  __device__ std::uint64_t first_triangle(const MeshSetupArgs<float>& args, std::uint32_t placement) const {
+  __device__ std::uint64_t first_triangle(const MeshSetupArgs<float>& args,
+                                          std::uint32_t placement) const {
     return wave.camera_begins[wave.places[placement].camera] + args.offsets[blockIdx.x];
   }
   __device__ std::uint64_t room() const { return wave.capacity; }
   __device__ std::uint64_t count() const {
     return wave.counters->triangles < wave.capacity ? wave.counters->triangles : wave.capacity;
   }
-  __device__ std::size_t camera_of(std::uint32_t placement) const { return wave.places[placement].camera; }
+  __device__ std::size_t camera_of(std::uint32_t placement) const {
+    return wave.places[placement].camera;
+  }
 };
 
 /// `args` as the camera of a placement has them.
 template <class Work>
-__device__ MeshSetupArgs<float> seen_by(const MeshSetupArgs<float>& args, const Work& work, std::uint32_t placement) {
+__device__ MeshSetupArgs<float> seen_by(const MeshSetupArgs<float>& args, const Work& work,
+                                        std::uint32_t placement) {
   MeshSetupArgs<float> out = args;
   out.camera = work.lens(args, placement);
   return out;
 }
 
 template <class Work>
-__global__ void __launch_bounds__(kThreads) project_vertices_kernel(const MeshSetupArgs<float> args, const Work work) {
+__global__ void __launch_bounds__(kThreads)
+    project_vertices_kernel(const MeshSetupArgs<float> args, const Work work) {
   const MeshChunk chunk = work.vertex_chunk(args);
   const MeshPlacement& placement = args.placements[chunk.placement];
   const std::size_t i = chunk.begin + threadIdx.x;
-  if (i < placement.mesh.vertices.size) project_mesh_vertex(seen_by(args, work, chunk.placement), placement, i);
+  if (i < placement.mesh.vertices.size)
+    project_mesh_vertex(seen_by(args, work, chunk.placement), placement, i);
 }
 
 template <class Work>
-__global__ void __launch_bounds__(kThreads) count_triangles_kernel(const MeshSetupArgs<float> args, const Work work) {
+__global__ void __launch_bounds__(kThreads)
+    count_triangles_kernel(const MeshSetupArgs<float> args, const Work work) {
   using Reduce = cub::BlockReduce<std::uint32_t, kThreads>;
   __shared__ typename Reduce::TempStorage storage;
   const MeshChunk chunk = work.triangle_chunk(args);
@@ -104,7 +122,8 @@ __global__ void __launch_bounds__(kThreads) count_triangles_kernel(const MeshSet
 
 /// Exclusive sums of [begin, end) by one block; returns the sum of all.
 template <class From>
-__device__ std::uint64_t scan_by_block(const From* from, std::size_t begin, std::size_t end, std::uint64_t* to) {
+__device__ std::uint64_t scan_by_block(const From* from, std::size_t begin, std::size_t end,
+                                       std::uint64_t* to) {
   using Scan = cub::BlockScan<std::uint64_t, kScanThreads>;
   __shared__ typename Scan::TempStorage storage;
   std::uint64_t before = 0;
@@ -126,7 +145,8 @@ __global__ void __launch_bounds__(kScanThreads) scan_triangles_kernel(const Mesh
 }
 
 /// A block a camera: where its chunks' triangles begin among its own, and how many these are.
-__global__ void __launch_bounds__(kScanThreads) scan_cameras_kernel(const MeshSetupArgs<float> args, const MeshWave wave) {
+__global__ void __launch_bounds__(kScanThreads)
+    scan_cameras_kernel(const MeshSetupArgs<float> args, const MeshWave wave) {
   const std::uint64_t sum = scan_by_block(args.counts.data, wave.chunk_begins[blockIdx.x],
                                           wave.chunk_begins[blockIdx.x + 1], args.offsets.data);
   if (threadIdx.x == 0) wave.camera_begins[blockIdx.x] = sum;
@@ -143,7 +163,8 @@ __global__ void __launch_bounds__(kScanThreads) begin_cameras_kernel(const MeshW
 }
 
 template <class Work>
-__global__ void __launch_bounds__(kThreads) write_triangles_kernel(const MeshSetupArgs<float> args, const Work work) {
+__global__ void __launch_bounds__(kThreads)
+    write_triangles_kernel(const MeshSetupArgs<float> args, const Work work) {
   using Scan = cub::BlockScan<std::uint32_t, kThreads>;
   __shared__ typename Scan::TempStorage storage;
   if (args.counts[blockIdx.x] == 0) return;
@@ -152,7 +173,8 @@ __global__ void __launch_bounds__(kThreads) write_triangles_kernel(const MeshSet
   const std::size_t t = chunk.begin + threadIdx.x;
   const bool exists = t < args.placements[chunk.placement].mesh.triangle_count();
   std::uint32_t n = 0;
-  if (exists) detail::for_each_piece<false>(seen, chunk.placement, t, [&n](const MeshTriangle<float>&) { ++n; });
+  if (exists)
+    detail::for_each_piece<false>(seen, chunk.placement, t, [&n](const MeshTriangle<float>&) { ++n; });
   std::uint32_t at = 0;
   Scan(storage).ExclusiveSum(n, at);
   if (n == 0) return;
@@ -178,16 +200,18 @@ __device__ void show(const MeshRasterArgs<float>& args, const MeshTriangle<float
 
 /// Pixels of the camera that a triangle is seen by.
 template <class Work>
-__device__ PixelWord* pixels_of(const MeshRasterArgs<float>& args, const Work& work, const MeshTriangle<float>& t,
-                                PixelWord* pixels) {
+__device__ PixelWord* pixels_of(const MeshRasterArgs<float>& args, const Work& work,
+                                const MeshTriangle<float>& t, PixelWord* pixels) {
   const TileGrid& grid = args.bin.grid;
-  return pixels + work.camera_of(t.placement) * static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height);
+  return pixels + work.camera_of(t.placement) * static_cast<std::size_t>(grid.width) *
+                      static_cast<std::size_t>(grid.height);
 }
 
-/// Draws a small triangle, or lists it. `count`: of squares, and of large triangles from bit kUnitBits on.
+/// Draws a small triangle, or lists it. `count`: of squares, and of large triangles from bit kUnitBits
+/// on.
 template <class Work>
-__device__ void draw_small(const MeshRasterArgs<float>& args, const Work& work, std::uint32_t id, PixelWord* all,
-                           LargeTriangle* large, unsigned long long* count) {
+__device__ void draw_small(const MeshRasterArgs<float>& args, const Work& work, std::uint32_t id,
+                           PixelWord* all, LargeTriangle* large, unsigned long long* count) {
   const MeshTriangle<float>& t = args.triangles[id];
   const int width = t.x1 - t.x0, height = t.y1 - t.y0;
   if (width * height > kSmallBox * kSmallBox) {
@@ -211,20 +235,22 @@ __device__ void draw_small(const MeshRasterArgs<float>& args, const Work& work, 
 
 /// A thread a triangle, of the kMostLarge from `begin` on.
 template <class Work>
-__global__ void __launch_bounds__(128) draw_small_kernel(const MeshRasterArgs<float> args, const Work work,
-                                                         std::uint64_t begin, PixelWord* pixels, LargeTriangle* large,
-                                                         unsigned long long* count) {
+__global__ void __launch_bounds__(128)
+    draw_small_kernel(const MeshRasterArgs<float> args, const Work work, std::uint64_t begin,
+                      PixelWord* pixels, LargeTriangle* large, unsigned long long* count) {
   const std::uint64_t n = work.count(), end = begin + kMostLarge < n ? begin + kMostLarge : n;
   const std::uint64_t stride = std::uint64_t{gridDim.x} * blockDim.x;
-  for (std::uint64_t id = begin + std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; id < end; id += stride) {
+  for (std::uint64_t id = begin + std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; id < end;
+       id += stride) {
     draw_small(args, work, static_cast<std::uint32_t>(id), pixels, large, count);
   }
 }
 
 /// A warp a square of a large triangle: a column a lane.
 template <class Work>
-__global__ void __launch_bounds__(128) draw_large_kernel(const MeshRasterArgs<float> args, const Work work, PixelWord* all,
-                                                         const LargeTriangle* large, const unsigned long long* count) {
+__global__ void __launch_bounds__(128)
+    draw_large_kernel(const MeshRasterArgs<float> args, const Work work, PixelWord* all,
+                      const LargeTriangle* large, const unsigned long long* count) {
   const std::uint64_t units = *count & ((1ull << kUnitBits) - 1), triangles = *count >> kUnitBits;
   const int lane = static_cast<int>(threadIdx.x % 32);
   const std::uint64_t stride = std::uint64_t{gridDim.x} * (blockDim.x / 32);
@@ -250,7 +276,9 @@ __global__ void __launch_bounds__(128) draw_large_kernel(const MeshRasterArgs<fl
 }
 
 /// Infinity where there is no triangle.
-__device__ float depth_of(PixelWord word) { return 1.0f / __uint_as_float(static_cast<unsigned>(word >> 32)); }
+__device__ float depth_of(PixelWord word) {
+  return 1.0f / __uint_as_float(static_cast<unsigned>(word >> 32));
+}
 __device__ std::uint32_t triangle_of(PixelWord word) {
   return word == 0 ? kNoTriangle : 0xffffffffu - static_cast<std::uint32_t>(word);
 }
@@ -278,9 +306,10 @@ __global__ void __launch_bounds__(1024) resolve_kernel(const MeshRasterArgs<floa
 }
 
 /// A thread a pixel of one of the cameras: its depth, and its colour where that is asked for.
-__global__ void __launch_bounds__(128) finish_pixels_kernel(MeshShadeArgs<float> shade, const MeshWave wave,
-                                                            std::size_t pixels) {
-  const std::size_t pixel = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x, at = blockIdx.y * pixels + pixel;
+__global__ void __launch_bounds__(128)
+    finish_pixels_kernel(MeshShadeArgs<float> shade, const MeshWave wave, std::size_t pixels) {
+  const std::size_t pixel = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x,
+                    at = blockIdx.y * pixels + pixel;
   if (pixel >= pixels) return;
   const PixelWord word = wave.pixels[at];
   const float depth = depth_of(word);
@@ -302,8 +331,8 @@ struct ShadePixel {
 
 }  // namespace
 
-void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, const MeshWave& wave, int multiprocessors,
-                      cudaStream_t stream) {
+void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, const MeshWave& wave,
+                      int multiprocessors, cudaStream_t stream) {
   const ManyCameras work{wave};
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   MeshRasterArgs<float> raster;
@@ -312,7 +341,8 @@ void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, 
   raster.placements = setup.placements;
   cudaMemsetAsync(wave.pixels, 0, wave.camera_count * pixels * sizeof(PixelWord), stream);
   if (wave.placements != 0) {
-    if (wave.vertex_chunks != 0) project_vertices_kernel<<<wave.vertex_chunks, kThreads, 0, stream>>>(setup, work);
+    if (wave.vertex_chunks != 0)
+      project_vertices_kernel<<<wave.vertex_chunks, kThreads, 0, stream>>>(setup, work);
     count_triangles_kernel<<<wave.triangle_chunks, kThreads, 0, stream>>>(setup, work);
     scan_cameras_kernel<<<wave.camera_count, kScanThreads, 0, stream>>>(setup, wave);
     begin_cameras_kernel<<<1, kScanThreads, 0, stream>>>(wave);
@@ -320,11 +350,13 @@ void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, 
     auto* const large = reinterpret_cast<LargeTriangle*>(wave.large + 2);
     for (std::uint64_t begin = 0; begin < wave.capacity; begin += kMostLarge) {
       const std::uint64_t most = wave.capacity - begin < kMostLarge ? wave.capacity - begin : kMostLarge;
-      const std::uint64_t blocks = (most + 127) / 128, full = static_cast<std::uint64_t>(multiprocessors) * 16;
+      const std::uint64_t blocks = (most + 127) / 128,
+                          full = static_cast<std::uint64_t>(multiprocessors) * 16;
       cudaMemsetAsync(wave.large, 0, sizeof *wave.large, stream);
       draw_small_kernel<<<static_cast<unsigned>(blocks < full ? blocks : full), 128, 0, stream>>>(
           raster, work, begin, wave.pixels, large, wave.large);
-      draw_large_kernel<<<static_cast<unsigned>(full), 128, 0, stream>>>(raster, work, wave.pixels, large, wave.large);
+      draw_large_kernel<<<static_cast<unsigned>(full), 128, 0, stream>>>(raster, work, wave.pixels,
+                                                                         large, wave.large);
     }
   }
   MeshShadeArgs<float> shade;
@@ -339,13 +371,15 @@ void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, 
 
 void CudaBackend::parallel_for(std::size_t chunks, const ProjectMeshVertices<float>& k) {
   if (chunks == 0 || !usable()) return;
-  cuda::project_vertices_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(k.args, cuda::OneCamera{});
+  cuda::project_vertices_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(
+      k.args, cuda::OneCamera{});
   note(cudaGetLastError(), "the projection of vertices");
 }
 
 void CudaBackend::parallel_for(std::size_t chunks, const CountMeshTriangles<float>& k) {
   if (chunks == 0 || !usable()) return;
-  cuda::count_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(k.args, cuda::OneCamera{});
+  cuda::count_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(
+      k.args, cuda::OneCamera{});
   note(cudaGetLastError(), "the counting of triangles");
 }
 
@@ -357,7 +391,8 @@ void CudaBackend::parallel_for(std::size_t, const ScanMeshTriangles<float>& k) {
 
 void CudaBackend::parallel_for(std::size_t chunks, const WriteMeshTriangles<float>& k) {
   if (chunks == 0 || !usable()) return;
-  cuda::write_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(k.args, cuda::OneCamera{});
+  cuda::write_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(
+      k.args, cuda::OneCamera{});
   note(cudaGetLastError(), "the set-up of triangles");
 }
 
@@ -376,8 +411,8 @@ void CudaBackend::rasterize_mesh(const MeshRasterArgs<float>& args) {
   for (std::size_t begin = 0; begin < n; begin += cuda::kMostLarge) {
     const std::size_t end = std::min(n, begin + cuda::kMostLarge);
     fill(count, 0, sizeof *count);
-    cuda::draw_small_kernel<<<static_cast<unsigned>((end - begin + 127) / 128), 128, 0, stream_>>>(args, work, begin, pixels,
-                                                                                                   large, count);
+    cuda::draw_small_kernel<<<static_cast<unsigned>((end - begin + 127) / 128), 128, 0, stream_>>>(
+        args, work, begin, pixels, large, count);
     cuda::draw_large_kernel<<<2048, 128, 0, stream_>>>(args, work, pixels, large, count);
   }
   const unsigned threads = static_cast<unsigned>(grid.tile_size * grid.tile_size);

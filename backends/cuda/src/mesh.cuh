@@ -12,8 +12,8 @@
 
 namespace gsnav::cuda {
 
-/// What a pixel shows: 1/z above the complement of the triangle's number, so that the nearest, of equally near ones the
-/// first, is the largest word. 0: nothing.
+/// What a pixel shows: 1/z above the complement of the triangle's number, so that the nearest, of
+/// equally near ones the first, is the largest word. 0: nothing.
 using PixelWord = unsigned long long;
 
 /// A triangle drawn in squares, the first of which is number `unit`.
@@ -39,24 +39,24 @@ struct MeshCounters {
   unsigned long long drawn, not_finite;  ///< of all waves
 };
 
-/// Cameras of a batch whose meshes are drawn together, as many as scratch holds. The host knows the work items, not what
-/// comes of them.
+/// Cameras of a batch whose meshes are drawn together, as many as scratch holds. The host knows the work
+/// items, not what comes of them.
 struct MeshWave {
   const MeshPlace* places;             ///< [placements]
   const MeshCamera* cameras;           ///< [camera_count]
   const MeshShadeArgs<float>* lights;  ///< [camera_count], of which only the light is read
   const std::uint32_t* chunk_begins;   ///< [camera_count + 1] in the triangles' chunks
   std::uint32_t placements, camera_count, vertex_chunks, triangle_chunks;
-  std::uint32_t capacity;              ///< triangles that there is room for
-  std::uint64_t* camera_begins;        ///< [camera_count] in the triangles
+  std::uint32_t capacity;        ///< triangles that there is room for
+  std::uint64_t* camera_begins;  ///< [camera_count] in the triangles
   MeshCounters* counters;
-  PixelWord* pixels;                   ///< [camera_count][H][W]
-  unsigned long long* large;           ///< large_bytes(capacity)
-  float *depth, *color;                ///< [camera_count][H][W], and [3]; no colour: null
+  PixelWord* pixels;          ///< [camera_count][H][W]
+  unsigned long long* large;  ///< large_bytes(capacity)
+  float *depth, *color;       ///< [camera_count][H][W], and [3]; no colour: null
 };
 
 /// Draws a wave. Of `setup` camera and lists of chunks are not read; its arrays have room for the wave.
-void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, const MeshWave& wave, int multiprocessors,
-                      cudaStream_t stream);
+void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, const MeshWave& wave,
+                      int multiprocessors, cudaStream_t stream);
 
 }  // namespace gsnav::cuda

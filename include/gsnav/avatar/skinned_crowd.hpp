@@ -49,8 +49,9 @@ class SkinnedCrowd {
     return pose(actors.size(), [&](std::size_t i) -> const AvatarActor& { return *actors[i]; }, t);
   }
 
-  /// Poses them for what these cameras see by `config`, in two steps, as SkinnedGaussians::prepare has it: the first is the
-  /// host's alone, and several threads may take it, each for a crowd of its own. Errors as above.
+  /// Poses them for what these cameras see by `config`, in two steps, as SkinnedGaussians::prepare has
+  /// it: the first is the host's alone, and several threads may take it, each for a crowd of its own.
+  /// Errors as above.
   Status prepare(std::span<const AvatarActor> actors, double t, std::span<const Camera> cameras,
                  const RenderConfig& config) {
     if (Status s = check(actors.size()); !s) return s;
@@ -98,7 +99,8 @@ class SkinnedCrowd {
   Status check(std::size_t actors) const {
     if (actors == actors_.size()) return {};
     return {Errc::invalid_argument, "SkinnedCrowd: " + std::to_string(actors) + " actors for " +
-                                        std::to_string(actors_.size()) + " places; call add() once for each"};
+                                        std::to_string(actors_.size()) +
+                                        " places; call add() once for each"};
   }
   static Status at_place(std::size_t i, const Status& s) {
     return s ? s : Status(s.code(), "SkinnedCrowd: place " + std::to_string(i) + ": " + s.message());

@@ -22,15 +22,16 @@ concept HasHostMemory = requires(void* p, std::size_t n) {
   B::deallocate_host(p);
 };
 
-/// Array in host memory that results of a backend are copied into: of its own kind where the backend has one and there is
-/// room for it, so that a copy does not wait for the host. It never shrinks, so that a steady frame allocates nothing.
+/// Array in host memory that results of a backend are copied into: of its own kind where the backend has
+/// one and there is room for it, so that a copy does not wait for the host. It never shrinks, so that a
+/// steady frame allocates nothing.
 template <class T, Backend B>
 class HostArray {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
-  /// Makes room for n elements. What was in it stays, but where it has to grow: then all are zero. Throws gsnav::Error
-  /// (out_of_memory, naming the bytes).
+  /// Makes room for n elements. What was in it stays, but where it has to grow: then all are zero.
+  /// Throws gsnav::Error (out_of_memory, naming the bytes).
   void resize(std::size_t n) {
     if (n > capacity_) grow(n);
     size_ = n;
@@ -65,8 +66,8 @@ class HostArray {
     }
     if (data_ == nullptr) data_ = {new (std::nothrow) T[n]{}, Free{}};
     if (data_ == nullptr) {
-      detail::fail(Errc::out_of_memory,
-                   "cannot allocate " + std::to_string(n) + " x " + std::to_string(sizeof(T)) + " bytes of host memory");
+      detail::fail(Errc::out_of_memory, "cannot allocate " + std::to_string(n) + " x " +
+                                            std::to_string(sizeof(T)) + " bytes of host memory");
     }
     capacity_ = n;
   }

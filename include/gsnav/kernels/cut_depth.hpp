@@ -16,7 +16,9 @@ struct CutDepth {
   float* depth;
   float last;  ///< the largest float that is not beyond the far plane
 
-  GSNAV_HD void operator()(std::size_t i) const noexcept { depth[i] = depth[i] > last ? 0.0f : depth[i]; }
+  GSNAV_HD void operator()(std::size_t i) const noexcept {
+    depth[i] = depth[i] > last ? 0.0f : depth[i];
+  }
 };
 
 }  // namespace gsnav

@@ -86,8 +86,9 @@ struct GaussianView {
   /// memory. Empty: all chunks.
   View<const std::uint32_t> drawn_chunks;
 
-  /// Highest SH degree that the Gaussians of a chunk use, one a chunk of all_chunks() (scene/scene_profile.hpp): bands
-  /// above it are not read. In the backend's memory (GaussianArrays puts them there). Empty: sh_degree.
+  /// Highest SH degree that the Gaussians of a chunk use, one a chunk of all_chunks()
+  /// (scene/scene_profile.hpp): bands above it are not read. In the backend's memory (GaussianArrays
+  /// puts them there). Empty: sh_degree.
   View<const std::uint8_t> chunk_sh_degrees;
 
   /// Degree to which row i is evaluated where `degree` is asked for.

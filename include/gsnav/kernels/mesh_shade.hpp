@@ -54,7 +54,8 @@ GSNAV_HD Vec3<S> shaded_color(const MeshShadeArgs<S>& args, const MeshView& mesh
 
 /// Shades one pixel, which shows triangle `id` (or kNoTriangle) at `depth`.
 template <class S>
-GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel, std::uint32_t id, S depth) noexcept {
+GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel, std::uint32_t id,
+                               S depth) noexcept {
   const MeshImages<S>& out = args.images;
   const auto write = [pixel](S* image, const Vec3<S>& v) {
     if (image == nullptr) return;
@@ -76,8 +77,8 @@ GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel, 
 
   const MeshPlacement& placement = args.placements[t.placement];
   const MeshView& mesh = placement.mesh;
-  const SurfacePoint<S> at =
-      surface_point(mesh, t, static_cast<int>(pixel % args.width), static_cast<int>(pixel / args.width), depth);
+  const SurfacePoint<S> at = surface_point(mesh, t, static_cast<int>(pixel % args.width),
+                                           static_cast<int>(pixel / args.width), depth);
   Vec3<S> normal{};
   if (out.normal != nullptr || args.lights(mesh)) {
     normal = surface_normal(placement, t, at);

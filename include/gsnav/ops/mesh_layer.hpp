@@ -138,8 +138,8 @@ inline bool box_may_be_visible(const MeshCamera& camera, const MeshPlacement& p)
 /// Whether a mesh is drawn as fragments.
 inline bool seen_through(const MeshInstance& m) noexcept { return m.mesh.alpha_mode == MeshAlpha::blend; }
 
-/// An instance as a camera sees it; false where there is nothing to draw of it among those that are seen through, or
-/// among the others.
+/// An instance as a camera sees it; false where there is nothing to draw of it among those that are seen
+/// through, or among the others.
 inline bool place_mesh(const MeshInstance& i, const Camera& camera, const MeshCamera& lens, bool through,
                        MeshPlacement& p) noexcept {
   p.mesh = i.mesh;

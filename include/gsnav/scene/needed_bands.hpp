@@ -15,8 +15,8 @@ struct SceneProfile {
   std::uint64_t sh_numbers_read = 0;  ///< of these, in the bands that are kept
   double color_error = 0;             ///< no colour changes by more; 0 where only zeros are left out
 
-  /// The set, of arrays in host memory, without the bands that were found to say nothing. The profile must outlive it.
-  /// For other backends: GaussianArrays.
+  /// The set, of arrays in host memory, without the bands that were found to say nothing. The profile
+  /// must outlive it. For other backends: GaussianArrays.
   GaussianSet applied_to(GaussianSet set) const noexcept {
     set.gaussians.chunk_sh_degrees = {chunk_sh_degrees.data(), chunk_sh_degrees.size()};
     return set;

@@ -38,9 +38,9 @@ class GaussianArrays {
   GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) upload(backend, cloud);
   }
-  /// Without the SH bands that the profile says no chunk needs (scene/scene_profile.hpp): elsewhere than on host backends
-  /// those that none does take no memory, those that a chunk does not are not read. On host backends the profile must
-  /// outlive it too.
+  /// Without the SH bands that the profile says no chunk needs (scene/scene_profile.hpp): elsewhere than
+  /// on host backends those that none does take no memory, those that a chunk does not are not read. On
+  /// host backends the profile must outlive it too.
   GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneProfile& profile)
       : set_(profile.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {
@@ -81,16 +81,21 @@ class GaussianArrays {
     v.origins = view_of(std::as_const(origins_));
   }
   /// Leaves out the bands that no chunk has: rows become shorter.
-  static void drop_bands(GaussianView& v, std::vector<float>& floats, std::vector<std::uint16_t>& halves) {
+  static void drop_bands(GaussianView& v, std::vector<float>& floats,
+                         std::vector<std::uint16_t>& halves) {
     int most = v.chunk_sh_degrees.empty() ? v.sh_degree : 0;
-    for (const std::uint8_t degree : v.chunk_sh_degrees) most = std::max(most, std::min(v.sh_degree, int{degree}));
+    for (const std::uint8_t degree : v.chunk_sh_degrees)
+      most = std::max(most, std::min(v.sh_degree, int{degree}));
     if (most == v.sh_degree) return;
-    const auto numbers = [](int degree) { return 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1); };
+    const auto numbers = [](int degree) {
+      return 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1);
+    };
     const std::size_t all = numbers(v.sh_degree), kept = numbers(most);
     const auto drop = [&]<class T>(View<const T>& from, std::vector<T>& to) {
       if (from.empty()) return;
       to.resize(kept * v.size);
-      for (std::size_t i = 0; i < v.size; ++i) std::copy_n(from.data + all * i, kept, to.data() + kept * i);
+      for (std::size_t i = 0; i < v.size; ++i)
+        std::copy_n(from.data + all * i, kept, to.data() + kept * i);
       from = view_of(std::as_const(to));
     };
     drop(v.shN, floats);

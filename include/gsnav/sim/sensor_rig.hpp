@@ -234,8 +234,9 @@ class SensorRig {
       if (group.buffer[kDepth] == kNone) continue;
       for (std::size_t begin = 0, end = 0; begin < rows_.size(); begin = end) {
         for (end = begin + 1; end < rows_.size() && rows_[end] == rows_[begin] + (end - begin);) ++end;
-        backend_->parallel_for((end - begin) * size_[group.buffer[kDepth]],
-                               CutDepth(row(images, group.buffer[kDepth], rows_[begin]), sensors_[group.sensor].far_plane));
+        backend_->parallel_for(
+            (end - begin) * size_[group.buffer[kDepth]],
+            CutDepth(row(images, group.buffer[kDepth], rows_[begin]), sensors_[group.sensor].far_plane));
       }
     }
     return backend_->synchronize();

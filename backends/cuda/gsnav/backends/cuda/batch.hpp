@@ -47,9 +47,10 @@ struct BatchStats {
 /// `RenderConfig::outputs` and `tile_size` are not read: pointers say which images, and
 /// tiles are of 8 or 16 pixels, as the number of cameras has it.
 ///
-/// Meshes are drawn into a layer for each camera, over which the batch is then blended. As everywhere, `fast` has the exponential of `exact` where there are meshes: in a call with
-/// any, for all of its cameras. Unsupported among meshes: Composite::hard_depth, Response other than ewa, Compat, and
-/// meshes that are seen through (MeshAlpha::blend).
+/// Meshes are drawn into a layer for each camera, over which the batch is then blended. As everywhere,
+/// `fast` has the exponential of `exact` where there are meshes: in a call with any, for all of its
+/// cameras. Unsupported among meshes: Composite::hard_depth, Response other than ewa, Compat, and meshes
+/// that are seen through (MeshAlpha::blend).
 class CudaBatchRenderer {
  public:
   using camera_type = BatchCamera;
