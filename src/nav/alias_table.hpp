@@ -26,6 +26,7 @@ class AliasTable {
       return names.empty() ? static_cast<std::uint32_t>(i) : names[i];
     };
     std::vector<std::size_t> small, large;
+    cells_.reserve(n);
     for (std::size_t i = 0; i < n; ++i) {
       cells_.push_back({1.0, name(i), name(i)});
       (share[i] < 1 ? small : large).push_back(i);

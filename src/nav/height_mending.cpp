@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <span>
-#include <tuple>
 #include <utility>
 
 #include "ground_plane.hpp"
@@ -16,28 +16,59 @@ namespace {
 constexpr double kBeside = 1e-2;  // metres: how far off its edge a polygon's height sample may lie
 constexpr double kOnLine = 1e-4;  // metres: corners that a straight side has besides its ends
 constexpr double kSliver = 1e-8;  // square metres
+constexpr std::uint32_t kNew = ~0u;
 
-using Triangle = std::array<Vec3d, 3>;
+using Triangle = PolyMesh::Corners;
 
-/// True where the triangles cover the polygon once: each side of one is another's or lies on the polygon's.
-bool cover_once(std::span<const Vec3d> corners, std::span<const Triangle> triangles) {
-  using Side = std::tuple<double, double, double, double>;
-  std::vector<Side> sides;
+/// The places on the ground that triangles have corners at: in order, each once.
+class Places {
+ public:
+  Places(std::span<const Vec3d> points, std::span<const Triangle> triangles) : points_(points) {
+    first_.reserve(3 * triangles.size());
+    for (const Triangle& t : triangles) first_.insert(first_.end(), t.begin(), t.end());
+    std::sort(first_.begin(), first_.end(), [&](std::uint32_t a, std::uint32_t b) { return before(a, b); });
+    const auto same = [&](std::uint32_t a, std::uint32_t b) { return !before(a, b); };
+    first_.erase(std::unique(first_.begin(), first_.end(), same), first_.end());
+  }
+  std::uint16_t of(std::uint32_t point) const {
+    const auto at = std::lower_bound(first_.begin(), first_.end(), point,
+                                     [&](std::uint32_t a, std::uint32_t b) { return before(a, b); });
+    return static_cast<std::uint16_t>(at - first_.begin());
+  }
+  const Vec3d& at(std::uint32_t place) const noexcept { return points_[first_[place]]; }
+
+ private:
+  bool before(std::uint32_t a, std::uint32_t b) const noexcept {
+    const Vec3d &p = points_[a], &q = points_[b];
+    return p.x < q.x || (!(q.x < p.x) && p.z < q.z);
+  }
+  std::span<const Vec3d> points_;
+  std::vector<std::uint32_t> first_;  ///< a point of each place
+};
+
+/// True where triangles of `points` cover the polygon once: each side of one is another's or lies on the polygon's.
+bool cover_once(std::span<const Vec3d> corners, std::span<const Vec3d> points, std::span<const Triangle> triangles) {
+  using Side = std::pair<std::uint16_t, std::uint16_t>;  // a polygon has at most 255 triangles
   double covered = 0, whole = 0;
   for (std::size_t k = 1; k + 1 < corners.size(); ++k) whole += area_xz(corners[0], corners[k], corners[k + 1]);
-  for (Triangle t : triangles) {
-    if (area_xz(t[0], t[1], t[2]) < 0) std::swap(t[1], t[2]);
-    const double area = area_xz(t[0], t[1], t[2]);
+  for (const Triangle& t : triangles) {
+    const double area = std::abs(area_xz(points[t[0]], points[t[1]], points[t[2]]));
     if (!(area > kSliver)) return false;
     covered += area;
-    for (std::size_t e = 0; e < 3; ++e) sides.emplace_back(t[e].x, t[e].z, t[(e + 1) % 3].x, t[(e + 1) % 3].z);
   }
   if (std::abs(covered - whole) > 1e-3 * whole + kSliver) return false;
+  const Places places(points, triangles);
+  std::vector<Side> sides;
+  sides.reserve(3 * triangles.size());
+  for (Triangle t : triangles) {
+    if (area_xz(points[t[0]], points[t[1]], points[t[2]]) < 0) std::swap(t[1], t[2]);
+    for (std::size_t e = 0; e < 3; ++e) sides.emplace_back(places.of(t[e]), places.of(t[(e + 1) % 3]));
+  }
   std::sort(sides.begin(), sides.end());
   if (std::adjacent_find(sides.begin(), sides.end()) != sides.end()) return false;
-  for (const auto& [ax, az, bx, bz] : sides) {
-    if (std::binary_search(sides.begin(), sides.end(), Side{bx, bz, ax, az})) continue;
-    const Vec3d a{ax, 0, az}, b{bx, 0, bz};
+  for (const auto& [from, to] : sides) {
+    if (std::binary_search(sides.begin(), sides.end(), Side{to, from})) continue;
+    const Vec3d &a = places.at(from), &b = places.at(to);
     bool outer = false;
     for (std::size_t k = 0; k < corners.size() && !outer; ++k) {
       const Vec3d &u = corners[k], &v = corners[(k + 1) % corners.size()];
@@ -54,7 +85,7 @@ class Delaunay {
   /// Of a convex polygon without corners within its sides.
   explicit Delaunay(std::vector<Vec3d> corners) : points_(std::move(corners)) {
     for (std::uint32_t k = 1; k + 1 < points_.size(); ++k) triangles_.push_back({0, k, k + 1});
-    for (std::size_t t = 0; t < triangles_.size(); ++t) settle({{t, 0}, {t, 1}, {t, 2}});
+    for (std::size_t t = 0; t < triangles_.size(); ++t) settle({side(t, 0), side(t, 1), side(t, 2)});
   }
   void add(const Vec3d& p) {
     for (const Vec3d& q : points_) {
@@ -85,23 +116,24 @@ class Delaunay {
       const std::uint32_t a = t[edge], b = t[(edge + 1) % 3], c = t[(edge + 2) % 3];
       triangles_[best] = {n, c, a};
       triangles_.push_back({n, b, c});
-      settle({{best, 1}, {triangles_.size() - 1, 1}});
+      settle({side(best, 1), side(triangles_.size() - 1, 1)});
     } else {
       triangles_[best] = {n, t[0], t[1]};
       triangles_.push_back({n, t[1], t[2]});
       triangles_.push_back({n, t[2], t[0]});
-      settle({{best, 1}, {triangles_.size() - 2, 1}, {triangles_.size() - 1, 1}});
+      settle({side(best, 1), side(triangles_.size() - 2, 1), side(triangles_.size() - 1, 1)});
     }
   }
-  std::vector<Triangle> triangles() const {
-    std::vector<Triangle> out;
-    for (const auto& t : triangles_) out.push_back({points_[t[0]], points_[t[1]], points_[t[2]]});
-    return out;
-  }
+  const std::vector<Vec3d>& points() const noexcept { return points_; }
+  const std::vector<Triangle>& triangles() const noexcept { return triangles_; }
 
  private:
   static constexpr std::size_t kNone = ~std::size_t{0};
+  using Side = std::pair<std::uint16_t, std::uint16_t>;  // triangle, edge
 
+  static Side side(std::size_t triangle, std::size_t edge) noexcept {
+    return {static_cast<std::uint16_t>(triangle), static_cast<std::uint16_t>(edge)};
+  }
   const Vec3d& at(std::size_t t, std::size_t e) const noexcept { return points_[triangles_[t][e % 3]]; }
   /// The triangle across edge e, and its edge; kNone at the rim.
   std::pair<std::size_t, std::size_t> opposite(std::size_t t, std::size_t e) const noexcept {
@@ -120,8 +152,8 @@ class Delaunay {
     const double det = ax * (bz * cc - cz * bb) - az * (bx * cc - cx * bb) + aa * (bx * cz - cx * bz);
     return det > 1e-9 * max(aa, max(bb, cc)) * max(aa, max(bb, cc));
   }
-  /// Flips these edges (triangle, edge) where that is Delaunay's, and those that it may have made wrong.
-  void settle(std::vector<std::pair<std::size_t, std::size_t>> edges) {
+  /// Flips these edges where that is Delaunay's, and those that it may have made wrong.
+  void settle(std::vector<Side> edges) {
     // Each flip is towards Delaunay's; rounding could turn in circles.
     for (std::size_t left = 8 * triangles_.size() + 16; !edges.empty() && left > 0; --left) {
       const auto [t, e] = edges.back();
@@ -137,18 +169,21 @@ class Delaunay {
       triangles_[t] = {ic, ia, id};
       triangles_[u] = {ic, id, ib};
       for (const std::size_t k : {std::size_t{0}, std::size_t{1}, std::size_t{2}}) {
-        edges.emplace_back(t, k);
-        edges.emplace_back(u, k);
+        edges.push_back(side(t, k));
+        edges.push_back(side(u, k));
       }
     }
   }
 
   std::vector<Vec3d> points_;
-  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::vector<Triangle> triangles_;
 };
 
-/// Empty where it would not do.
-std::vector<Triangle> triangulated(std::span<const Vec3d> corners, std::span<const Triangle> old) {
+/// New triangles of a polygon, empty where they would not do. Corners that no height triangle had get their places in
+/// `added`, which will follow the mesh's points.
+std::vector<Triangle> triangulated(const PolyMesh& mesh, const PolyMesh::Poly& poly, std::vector<Vec3d>& added) {
+  const std::span<const Vec3d> corners = std::span(mesh.corners).subspan(poly.first, poly.count);
+  const std::span<const Triangle> old = std::span(mesh.tris).subspan(poly.tri_first, poly.tri_count);
   std::vector<Vec3d> strict, rest;
   for (std::size_t k = 0; k < corners.size(); ++k) {
     const Vec3d &before = strict.empty() ? corners.back() : strict.back(), &after = corners[(k + 1) % corners.size()];
@@ -156,26 +191,55 @@ std::vector<Triangle> triangulated(std::span<const Vec3d> corners, std::span<con
     (straight ? rest : strict).push_back(corners[k]);
   }
   if (strict.size() < 3) return {};
-  Delaunay mesh(strict);
-  for (const Vec3d& p : rest) mesh.add(p);
+  Delaunay fresh(strict);
+  for (const Vec3d& p : rest) fresh.add(p);
+  const std::size_t own = fresh.points().size();
+  std::vector<std::uint32_t> names, inner;  // of fresh's points from `own`
+  const auto add = [&](std::uint32_t point) {
+    fresh.add(mesh.points[point]);
+    if (own + names.size() < fresh.points().size()) names.push_back(point);
+  };
   // Those on the polygon's sides first: a neighbour has the same.
-  std::vector<Vec3d> inner;
   for (const Triangle& t : old) {
-    for (const Vec3d& p : t) {
+    for (const std::uint32_t point : t) {
+      const Vec3d& p = mesh.points[point];
       bool outer = false;
       for (std::size_t k = 0; k < corners.size() && !outer; ++k) {
         outer = along_xz(corners[k], corners[(k + 1) % corners.size()], p).second < kBeside;
       }
       if (outer) {
-        mesh.add(p);
+        add(point);
       } else {
-        inner.push_back(p);
+        inner.push_back(point);
       }
     }
   }
-  for (const Vec3d& p : inner) mesh.add(p);
-  std::vector<Triangle> made = mesh.triangles();
-  if (made.size() > old.size() + old.size() / 4 + 4 || !cover_once(corners, made)) return {};
+  for (const std::uint32_t point : inner) add(point);
+  std::vector<Triangle> made = fresh.triangles();
+  if (made.size() > old.size() + old.size() / 4 + 4 || !cover_once(corners, fresh.points(), made)) return {};
+
+  std::vector<std::uint32_t> corner_names(own, kNew);
+  for (std::size_t k = 0; k < own; ++k) {
+    for (const Triangle& t : old) {
+      for (const std::uint32_t point : t) {
+        if (mesh.points[point] == fresh.points()[k]) corner_names[k] = point;
+      }
+    }
+  }
+  for (Triangle& t : made) {
+    for (std::uint32_t& v : t) {
+      if (v >= own) {
+        v = names[v - own];
+        continue;
+      }
+      std::uint32_t& name = corner_names[v];
+      if (name == kNew) {
+        name = static_cast<std::uint32_t>(mesh.points.size() + added.size());
+        added.push_back(fresh.points()[v]);
+      }
+      v = name;
+    }
+  }
   return made;
 }
 
@@ -183,13 +247,14 @@ std::vector<Triangle> triangulated(std::span<const Vec3d> corners, std::span<con
 
 void mend_heights(PolyMesh& mesh) {
   std::vector<std::pair<std::size_t, std::vector<Triangle>>> mended;  // polygons and what they get
+  std::vector<Vec3d> added;
   std::size_t count = mesh.tris.size();
   for (std::size_t id = 0; id < mesh.polys.size(); ++id) {
     const PolyMesh::Poly& p = mesh.polys[id];
     const std::span<const Vec3d> corners = std::span(mesh.corners).subspan(p.first, p.count);
     const std::span<const Triangle> old = std::span(mesh.tris).subspan(p.tri_first, p.tri_count);
-    if (old.size() < 3 || cover_once(corners, old)) continue;
-    std::vector<Triangle> made = triangulated(corners, old);
+    if (old.size() < 3 || cover_once(corners, mesh.points, old)) continue;
+    std::vector<Triangle> made = triangulated(mesh, p, added);
     if (made.empty()) continue;
     count = count + made.size() - old.size();
     mended.emplace_back(id, std::move(made));
@@ -212,6 +277,9 @@ void mend_heights(PolyMesh& mesh) {
     p.tri_count = static_cast<std::uint32_t>(all.size()) - first;
   }
   mesh.tris = std::move(all);
+  if (added.empty()) return;
+  mesh.points.reserve(mesh.points.size() + added.size());
+  mesh.points.insert(mesh.points.end(), added.begin(), added.end());
 }
 
 }  // namespace gsnav::detail

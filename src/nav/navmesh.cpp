@@ -16,9 +16,10 @@ std::size_t NavMesh::polygon_count() const noexcept { return impl_->polys.polys.
 double NavMesh::navigable_area() const noexcept { return impl_->polys.total_area; }
 
 std::vector<std::array<Vec3d, 3>> NavMesh::triangles() const {
-  std::vector<std::array<Vec3d, 3>> out = impl_->polys.tris;
-  for (auto& t : out) {
-    for (Vec3d& p : t) p += impl_->origin;
+  std::vector<std::array<Vec3d, 3>> out;
+  out.reserve(impl_->polys.tris.size());
+  for (const auto& t : impl_->polys.tris) {
+    for (Vec3d& p : out.emplace_back(impl_->polys.triangle(t))) p += impl_->origin;
   }
   return out;
 }

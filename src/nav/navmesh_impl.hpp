@@ -73,6 +73,7 @@ struct NavMesh::Impl {
   Aabb<double> bounds;  ///< world
   std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon
   std::vector<PolyId> first_poly;   ///< of each of Detour's tiles
+  std::vector<std::uint32_t> first_point;  ///< the same, of `polys.points`
 
   detail::Site site(const NavPoint& p) const noexcept;
   /// Length of the shortest path; infinity where there is none.

@@ -24,7 +24,7 @@ Status save_navmesh_obj(const NavMesh& mesh, const std::filesystem::path& path) 
       const detail::PolyMesh::Poly& p = m.polys[m.by_island[i]];
       for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
         faces.append("f");
-        std::array<Vec3d, 3> v = m.tris[t];
+        std::array<Vec3d, 3> v = m.triangle(m.tris[t]);
         if (cross(v[1] - v[0], v[2] - v[0]).y < 0) std::swap(v[1], v[2]);  // facing up
         for (const Vec3d& q : v) {
           const auto [it, added] = numbers.try_emplace({q.x, q.y, q.z}, numbers.size() + 1);

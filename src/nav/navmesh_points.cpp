@@ -131,8 +131,7 @@ std::optional<NavPoint> NavMesh::random_point_near(Rng& rng, const Vec3d& p, dou
   for (const PolyMesh::Piece& whole : m.pieces) {
     if (island && m.polys[whole.poly].island != *island) continue;
     Clipped part;
-    part.p = {whole.o, whole.a, whole.b};
-    part.count = 3;
+    for (const Vec3d& corner : m.triangle(whole)) part.p[part.count++] = corner;
     for (const int axis : {0, 2}) {
       part.cut(axis, c[axis] + radius, 1);
       part.cut(axis, c[axis] - radius, -1);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <compare>
 
 #include "height_mending.hpp"
 #include "navmesh_impl.hpp"
@@ -23,7 +24,10 @@ Vec3d corner_of(const dtMeshTile& tile, const dtPoly& p, std::size_t k) noexcept
 struct Portal {
   double from = 0, to = 0;  ///< shares of the edge's length
   PolyId neighbour = kNoPoly;
+  friend auto operator<=>(const Portal&, const Portal&) = default;
 };
+
+bool leads_out(const dtLink& link) noexcept { return link.side != 0xff; }
 
 class Extractor {
  public:
@@ -38,27 +42,51 @@ class Extractor {
       const dtPolyRef base = mesh_.getPolyRefBase(&tile);
       for (int i = 0; i < tile.header->polyCount; ++i) impl_.refs.push_back(base | static_cast<dtPolyRef>(i));
     }
+    reserve();
     std::vector<std::uint32_t> tile_of;
-    impl_.polys.tris.reserve(triangle_count());
     for (int t = 0; t < mesh_.getMaxTiles(); ++t) {
       const dtMeshTile& tile = *mesh_.getTile(t);
+      impl_.first_point.push_back(static_cast<std::uint32_t>(impl_.polys.points.size()));
       if (tile.header == nullptr) continue;
+      add_points(tile.verts, tile.header->vertCount);
+      add_points(tile.detailVerts, tile.header->detailVertCount);
       for (int i = 0; i < tile.header->polyCount; ++i) add(t, tile, i);
       tile_of.resize(impl_.polys.polys.size(), static_cast<std::uint32_t>(t));
     }
     mend_heights(impl_.polys);
     if (!tile_of.empty() && tile_of.front() != tile_of.back()) close_seams(impl_.polys, tile_of);
+    impl_.polys.corners.shrink_to_fit();
+    impl_.polys.neighbours.shrink_to_fit();
     impl_.polys.finish();
   }
 
  private:
-  std::size_t triangle_count() const {
-    std::size_t count = 0;
+  /// Room for what will be added, so that nothing is allocated twice.
+  void reserve() {
+    std::size_t points = 0, tris = 0, corners = 0;
     for (int t = 0; t < mesh_.getMaxTiles(); ++t) {
       const dtMeshTile& tile = *mesh_.getTile(t);
-      for (int i = 0; tile.header != nullptr && i < tile.header->polyCount; ++i) count += tile.detailMeshes[i].triCount;
+      if (tile.header == nullptr) continue;
+      points += static_cast<std::size_t>(tile.header->vertCount + tile.header->detailVertCount);
+      for (int i = 0; i < tile.header->polyCount; ++i) {
+        const dtPoly& p = tile.polys[i];
+        tris += tile.detailMeshes[i].triCount;
+        corners += p.vertCount;
+        // A link to another tile is a stretch with another before it at most.
+        for (unsigned l = p.firstLink; l != DT_NULL_LINK; l = tile.links[l].next) {
+          corners += leads_out(tile.links[l]) ? 2 : 0;
+        }
+      }
     }
-    return count;
+    impl_.polys.polys.reserve(impl_.refs.size());
+    impl_.polys.points.reserve(points);
+    impl_.polys.tris.reserve(tris);
+    impl_.polys.corners.reserve(corners);
+    impl_.polys.neighbours.reserve(corners);
+  }
+
+  void add_points(const float* p, int count) {
+    for (int i = 0; i < count; ++i) impl_.polys.points.push_back(moved(vec3(p + 3 * i)));
   }
 
   void add(int tile_index, const dtMeshTile& tile, int i) {
@@ -101,13 +129,13 @@ class Extractor {
     }
     poly.tri_first = static_cast<std::uint32_t>(out.tris.size());
     const dtPolyDetail& d = tile.detailMeshes[i];
+    const std::uint32_t vertices = impl_.first_point.back();
+    const std::uint32_t samples = vertices + static_cast<std::uint32_t>(tile.header->vertCount) + d.vertBase;
     for (unsigned t = 0; t < d.triCount; ++t) {
       const unsigned char* ids = &tile.detailTris[4 * (d.triBase + t)];
-      std::array<Vec3d, 3> tri;
+      PolyMesh::Corners tri;
       for (std::size_t k = 0; k < 3; ++k) {
-        const unsigned id = ids[k];
-        tri[k] = moved(id < p.vertCount ? corner_of(tile, p, id)
-                                        : vec3(&tile.detailVerts[3 * (d.vertBase + id - p.vertCount)]));
+        tri[k] = ids[k] < p.vertCount ? vertices + p.verts[ids[k]] : samples + ids[k] - p.vertCount;
       }
       out.tris.push_back(tri);
     }
@@ -128,13 +156,15 @@ class Extractor {
     const Vec3d a = corner_of(tile, p, k), b = corner_of(tile, p, k + 1);
     const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
     if (!(len2 > 0)) return out;
+    std::size_t links = 0;
     for (unsigned l = p.firstLink; l != DT_NULL_LINK; l = tile.links[l].next) {
-      if (tile.links[l].edge != k || tile.links[l].side == 0xff) continue;
+      if (tile.links[l].edge != k || !leads_out(tile.links[l])) continue;
+      ++links;
       const dtMeshTile* other = nullptr;
       const dtPoly* q = nullptr;
       mesh_.getTileAndPolyByRefUnsafe(tile.links[l].ref, &other, &q);
       for (unsigned m = q->firstLink; m != DT_NULL_LINK; m = other->links[m].next) {
-        if (other->links[m].ref != self || other->links[m].side == 0xff) continue;
+        if (other->links[m].ref != self || !leads_out(other->links[m])) continue;
         const auto along = [&](const Vec3d& c) {
           return clamp(((c.x - a.x) * ex + (c.z - a.z) * ez) / len2, 0.0, 1.0);
         };
@@ -145,7 +175,10 @@ class Extractor {
         }
       }
     }
-    std::sort(out.begin(), out.end(), [](const Portal& u, const Portal& w) { return u.from < w.from; });
+    // Two edges of one polygon that lie on this one are found by the links of both.
+    std::sort(out.begin(), out.end());
+    out.erase(std::unique(out.begin(), out.end()), out.end());
+    if (out.size() > links) out.resize(links);
     return out;
   }
 
@@ -164,7 +197,7 @@ NavMesh assemble_navmesh(const NavMeshSettings& settings, const Vec3d& origin, N
   impl->mesh = std::move(mesh);
   Extractor(*impl, height).run();
   for (const auto& t : impl->polys.tris) {
-    for (const Vec3d& p : t) impl->bounds.add(p + origin);
+    for (const std::uint32_t p : t) impl->bounds.add(impl->polys.points[p] + origin);
   }
   return NavMesh(std::move(impl));
 }

@@ -39,7 +39,7 @@ void PolyGrid::build(const PolyMesh& mesh) {
     const PolyMesh::Poly& p = mesh.polys[id];
     for (std::uint32_t k = 0; k < p.count; ++k) boxes_[id].add(mesh.corner(p, k));
     for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
-      for (const Vec3d& v : mesh.tris[t]) boxes_[id].add(v);
+      for (const std::uint32_t v : mesh.tris[t]) boxes_[id].add(mesh.points[v]);
     }
     all.add(boxes_[id].low);
     all.add(boxes_[id].high);

@@ -59,26 +59,29 @@ double PolyMesh::height(PolyId id, const Vec3d& q) const noexcept {
   // The triangle that q is in, or is least outside of: points on edges always find one.
   double best = -std::numeric_limits<double>::max(), y = o.y;
   for (std::uint32_t i = p.tri_first; i < p.tri_first + p.tri_count; ++i) {
-    const Height& t = heights[i];
-    const double dx = q.x - t.x, dz = q.z - t.z, u = t.ux * dx + t.uz * dz, v = t.vx * dx + t.vz * dz;
+    const Share &s = share_1[i], &t = share_2[i];
+    const Vec3d& a = points[tris[i][0]];
+    const double dx = q.x - a.x, dz = q.z - a.z, u = s.x * dx + s.z * dz, v = t.x * dx + t.z * dz;
     const double w = 1.0 - u - v, least = min(u, min(v, w));
-    if (least <= best || (t.ux == 0 && t.uz == 0)) continue;
+    if (least <= best || (s.x == 0 && s.z == 0)) continue;
     best = least;
-    if (least >= 0) return t.y + u * t.rise_u + v * t.rise_v;
+    const double rise_u = points[tris[i][1]].y - a.y, rise_v = points[tris[i][2]].y - a.y;
+    if (least >= 0) return a.y + u * rise_u + v * rise_v;
     const double cu = max(u, 0.0), cv = max(v, 0.0);
-    y = t.y + (cu * t.rise_u + cv * t.rise_v) / (cu + cv + max(w, 0.0));
+    y = a.y + (cu * rise_u + cv * rise_v) / (cu + cv + max(w, 0.0));
   }
   return y;
 }
 
 void PolyMesh::prepare_heights() {
-  heights.assign(tris.size(), {});
+  share_1.assign(tris.size(), {});
+  share_2.assign(tris.size(), {});
   for (std::size_t i = 0; i < tris.size(); ++i) {
-    const auto& [a, b, c] = tris[i];
+    const auto [a, b, c] = triangle(tris[i]);
     const double area = area_xz(a, b, c);
     if (!(std::abs(area) > 1e-12)) continue;
-    heights[i] = {a.x, a.y, a.z, (c.z - a.z) / area, (a.x - c.x) / area, (a.z - b.z) / area, (b.x - a.x) / area,
-                  b.y - a.y, c.y - a.y};
+    share_1[i] = {(c.z - a.z) / area, (a.x - c.x) / area};
+    share_2[i] = {(a.z - b.z) / area, (b.x - a.x) / area};
   }
 }
 
@@ -154,7 +157,7 @@ void PolyMesh::finish() {
 
 /// Height triangles where they tile the polygon, else its fan.
 void PolyMesh::add_pieces(PolyId id) {
-  const Poly& p = polys[id];
+  Poly& p = polys[id];
   constexpr double kOff = 1e-5;  // metres: what float32 makes of corners some hundred metres from the origin
   double area = 0, covered = 0, around = 0;
   for (std::uint32_t k = 1; k + 1 < p.count; ++k) area += area_xz(corner(p, 0), corner(p, k), corner(p, k + 1));
@@ -162,16 +165,16 @@ void PolyMesh::add_pieces(PolyId id) {
   bool tiled = !p.planar;
   const std::size_t first = pieces.size();
   for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count && tiled; ++t) {
-    covered += std::abs(area_xz(tris[t][0], tris[t][1], tris[t][2]));
-    for (const Vec3d& q : tris[t]) tiled = tiled && holds(id, q, kOff);
-    pieces.push_back({tris[t][0], tris[t][1], tris[t][2], id, true});
+    const auto [a, b, c] = triangle(tris[t]);
+    covered += std::abs(area_xz(a, b, c));
+    for (const Vec3d& q : {a, b, c}) tiled = tiled && holds(id, q, kOff);
+    pieces.push_back({tris[t], id});
   }
   // A sliver may have no height triangles; each polygon has a piece.
-  if (tiled && pieces.size() > first && std::abs(covered - std::abs(area)) <= kOff * around) return;
+  p.tiled = tiled && pieces.size() > first && std::abs(covered - std::abs(area)) <= kOff * around;
+  if (p.tiled) return;
   pieces.resize(first);
-  for (std::uint32_t k = 1; k + 1 < p.count; ++k) {
-    pieces.push_back({corner(p, 0), corner(p, k), corner(p, k + 1), id, p.planar});
-  }
+  for (std::uint32_t k = 1; k + 1 < p.count; ++k) pieces.push_back({{p.first, p.first + k, p.first + k + 1}, id});
 }
 
 void PolyMesh::prepare_sampling() {
@@ -181,6 +184,7 @@ void PolyMesh::prepare_sampling() {
   std::size_t most = 0;
   for (const Poly& p : polys) most += max(p.tri_count, max(p.count, 2u) - 2);
   pieces.reserve(most);
+  weights.reserve(most);
   for (PolyId i = 0; i < polys.size(); ++i) {
     Poly& p = polys[i];
     const Vec3d& o = corner(p, 0);
@@ -193,12 +197,13 @@ void PolyMesh::prepare_sampling() {
     p.rise_z = p.planar ? -normal.z / normal.y : 0.0;
     for (std::uint32_t k = 1; k < p.count; ++k) p.planar = p.planar && !off(corner(p, k));
     for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
-      p.planar = p.planar && !std::any_of(tris[t].begin(), tris[t].end(), off);
+      for (const std::uint32_t v : tris[t]) p.planar = p.planar && !off(points[v]);
     }
     const std::size_t first = pieces.size();
     add_pieces(i);
     for (std::size_t k = first; k < pieces.size(); ++k) {
-      weights.push_back(0.5 * norm(cross(pieces[k].a - pieces[k].o, pieces[k].b - pieces[k].o)));
+      const auto [o1, a1, b1] = triangle(pieces[k]);
+      weights.push_back(0.5 * norm(cross(a1 - o1, b1 - o1)));
       weights_in[p.island].push_back(weights.back());
       pieces_in[p.island].push_back(static_cast<std::uint32_t>(k));
     }
@@ -208,14 +213,14 @@ void PolyMesh::prepare_sampling() {
 }
 
 Vec3d PolyMesh::point_in(const Piece& piece, Rng& rng) const noexcept {
-  const auto &[o, a, b, poly, on_surface] = piece;
+  const auto [o, a, b] = triangle(piece);
   double u = rng.uniform(), v = rng.uniform();
   const bool beyond = u + v > 1;  // the other half of the parallelogram; selected, for it is as likely as not
   u = beyond ? 1 - u : u;
   v = beyond ? 1 - v : v;
   Vec3d q{o.x + u * (a.x - o.x) + v * (b.x - o.x), o.y + u * (a.y - o.y) + v * (b.y - o.y),
           o.z + u * (a.z - o.z) + v * (b.z - o.z)};
-  if (!on_surface) q.y = height(poly, q);
+  if (const Poly& p = polys[piece.poly]; !p.tiled && !p.planar) q.y = height(piece.poly, q);
   return q;
 }
 

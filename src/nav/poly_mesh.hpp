@@ -20,13 +20,13 @@ struct PolyMesh {
     std::uint32_t island = 0;
     double area = 0.0;
     bool planar = false;  ///< corners and height triangles lie in one plane
+    bool tiled = false;   ///< its pieces are its height triangles
     double rise_x = 0, rise_z = 0;  ///< of that plane, a metre along x and z
   };
-  /// A height triangle as what it takes to find a point in it: shares of corners 1 and 2 are linear on the ground.
-  struct Height {
-    double x = 0, y = 0, z = 0;  ///< corner 0
-    double ux = 0, uz = 0, vx = 0, vz = 0;
-    double rise_u = 0, rise_v = 0;  ///< of corners 1 and 2 above corner 0
+  using Corners = std::array<std::uint32_t, 3>;
+  /// How a corner's share of a height triangle grows, a metre along x and z on the ground.
+  struct Share {
+    double x = 0, z = 0;
   };
   struct Island {
     std::uint32_t first = 0, count = 0;  ///< in `by_island`
@@ -36,27 +36,34 @@ struct PolyMesh {
   std::vector<Poly> polys;
   std::vector<Vec3d> corners;               ///< edge k of a polygon runs from corner k to the next
   std::vector<PolyId> neighbours;           ///< across each edge; kNoPoly at a wall
-  std::vector<std::array<Vec3d, 3>> tris;   ///< height triangles, by polygon
-  std::vector<Height> heights;              ///< of `tris`; zero shares where they have no area on the ground
+  // Small records in arrays of their own: a file has 4 bytes a height triangle, and no array may be over four times it.
+  std::vector<Vec3d> points;         ///< of height triangles: of each of Detour's tiles vertices, then height samples
+  std::vector<Corners> tris;         ///< height triangles, by polygon: which points
+  std::vector<Share> share_1, share_2;  ///< of corners 1 and 2 of `tris`; zero where they have no area on the ground
   std::vector<Island> islands;              ///< by falling area
   std::vector<PolyId> by_island;            ///< polygons, island after island
   double total_area = 0.0;
-  /// A triangle to draw points from.
+  /// A triangle to draw points from; on the surface where its polygon is tiled or planar, else what is drawn has the
+  /// height of the polygon there.
   struct Piece {
-    Vec3d o{}, a{}, b{};
+    Corners at{};  ///< of `points` where its polygon is tiled, else of `corners`
     PolyId poly = 0;
-    bool on_surface = false;  ///< else its points have the height of the polygon there
   };
   std::vector<Piece> pieces;                         ///< together the whole surface
   AliasTable by_area;                                ///< of `pieces`
   std::vector<AliasTable> by_area_in;                ///< the same, by island
   PolyGrid grid;
 
-  /// Fills everything that follows from polys, corners, neighbours and tris.
+  /// Fills everything that follows from polys, corners, neighbours, points and tris.
   void finish();
 
   const Vec3d& corner(const Poly& p, std::uint32_t k) const noexcept {
     return corners[p.first + (k < p.count ? k : k - p.count)];
+  }
+  std::array<Vec3d, 3> triangle(const Corners& t) const noexcept { return {points[t[0]], points[t[1]], points[t[2]]}; }
+  std::array<Vec3d, 3> triangle(const Piece& piece) const noexcept {
+    const std::vector<Vec3d>& from = polys[piece.poly].tiled ? points : corners;
+    return {from[piece.at[0]], from[piece.at[1]], from[piece.at[2]]};
   }
   /// True where (x, z) of q is inside or within `margin` metres of an edge.
   bool holds(PolyId id, const Vec3d& q, double margin) const noexcept;

@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kSame = 1e-3;  // metres: vertices of two tiles that are one
 
-using Triangle = std::array<Vec3d, 3>;
+using Triangle = PolyMesh::Corners;
+using Points = std::vector<std::uint32_t>;  // of the mesh
 
 /// A border's line on the ground plane, in metres from where it begins.
 class Line {
@@ -40,13 +41,13 @@ class Seams {
   void close() {
     weld();
     // Where many polygons lie on one another, as in files that nobody built, no more than half as many
-    // are added.
-    left_ = m_.tris.size() / 2 + 8;
+    // are added, nor more than there are points.
+    left_ = min(m_.tris.size() / 2, m_.points.size()) + 8;
     extra_.resize(m_.polys.size());
     each_seam([&](PolyId p, PolyId q, const Line& line) {
-      const std::vector<Vec3d> of_p = vertices_on(p, line), of_q = vertices_on(q, line);
-      for (const Vec3d& v : of_q) insert(p, v, line);
-      for (const Vec3d& v : of_p) insert(q, v, line);
+      const Points of_p = vertices_on(p, line), of_q = vertices_on(q, line);
+      for (const std::uint32_t v : of_q) insert(p, v, line);
+      for (const std::uint32_t v : of_p) insert(q, v, line);
     });
     put_together();
     each_seam([&](PolyId p, PolyId q, const Line& line) {
@@ -89,14 +90,16 @@ class Seams {
       return at->second;
     };
     each_seam([&](PolyId p, PolyId q, const Line& line) {
-      const std::vector<Vec3d> of_p = vertices_on(p, line);
-      for (const Vec3d& v : vertices_on(q, line)) {
+      const Points of_p = vertices_on(p, line);
+      for (const std::uint32_t point : vertices_on(q, line)) {
+        const Vec3d& v = m_.points[point];
         const Vec3d* near = nearest(v, of_p);
         if (near == nullptr) continue;
         const std::size_t i = root(vertex(p, *near)), k = root(vertex(q, v));
         same[max(i, k)] = min(i, k);
       }
     });
+    std::vector<bool> moved(m_.points.size(), false);
     for (PolyId id = 0; id < m_.polys.size(); ++id) {
       const auto move = [&](Vec3d& v) {
         const auto known = number.find({tile_of_[id], {v.x, v.y, v.z}});
@@ -105,14 +108,17 @@ class Seams {
       const PolyMesh::Poly& poly = m_.polys[id];
       for (std::uint32_t k = 0; k < poly.count; ++k) move(m_.corners[poly.first + k]);
       for (std::uint32_t t = 0; t < poly.tri_count; ++t) {
-        for (Vec3d& v : m_.tris[poly.tri_first + t]) move(v);
+        for (const std::uint32_t v : m_.tris[poly.tri_first + t]) {
+          if (!moved[v]) move(m_.points[v]);
+          moved[v] = true;
+        }
       }
     }
   }
 
   /// Moves a polygon's corners on the border to its height triangles' there.
   void settle(PolyId id, const Line& line) {
-    const std::vector<Vec3d> fixed = vertices_on(id, line);
+    const Points fixed = vertices_on(id, line);
     const PolyMesh::Poly& poly = m_.polys[id];
     for (std::uint32_t k = 0; k < poly.count; ++k) {
       Vec3d& v = m_.corners[poly.first + k];
@@ -122,10 +128,11 @@ class Seams {
   }
 
   /// The nearest on the ground plane of those that are the same as v; null where none is.
-  static const Vec3d* nearest(const Vec3d& v, const std::vector<Vec3d>& list) noexcept {
+  const Vec3d* nearest(const Vec3d& v, const Points& list) const noexcept {
     const Vec3d* best = nullptr;
     double least = kSame;
-    for (const Vec3d& u : list) {
+    for (const std::uint32_t point : list) {
+      const Vec3d& u = m_.points[point];
       const double apart = std::hypot(u.x - v.x, u.z - v.z);
       if (apart > least) continue;
       least = apart;
@@ -135,13 +142,15 @@ class Seams {
   }
 
   /// Vertices of the height triangles of a polygon within the stretch, each once.
-  std::vector<Vec3d> vertices_on(PolyId id, const Line& line) const {
-    std::vector<Vec3d> out;
+  Points vertices_on(PolyId id, const Line& line) const {
+    Points out;
     each_triangle(id, [&](const Triangle& t) {
-      for (const Vec3d& v : t) {
+      for (const std::uint32_t point : t) {
+        const Vec3d& v = m_.points[point];
         const double at = line.along(v);
         if (!line.has(v) || at < -kSame || at > line.length() + kSame) continue;
-        if (std::find(out.begin(), out.end(), v) == out.end()) out.push_back(v);
+        const auto same = [&](std::uint32_t other) { return m_.points[other] == v; };
+        if (std::none_of(out.begin(), out.end(), same)) out.push_back(point);
       }
     });
     return out;
@@ -156,15 +165,15 @@ class Seams {
     }
   }
 
-  /// Splits the height triangle of a polygon that has v inside its side on the border.
-  void insert(PolyId id, const Vec3d& v, const Line& line) {
+  /// Splits the height triangle of a polygon that has point v inside its side on the border.
+  void insert(PolyId id, std::uint32_t v, const Line& line) {
     if (left_ == 0) return;
-    const double at = line.along(v);
+    const double at = line.along(m_.points[v]);
     const auto split = [&](Triangle& t) {
       for (std::size_t e = 0; e < 3; ++e) {
-        const Vec3d &a = t[e], &b = t[(e + 1) % 3];
-        if (!line.has(a) || !line.has(b)) continue;
-        const double s = line.along(a), u = line.along(b);
+        const std::uint32_t a = t[e], b = t[(e + 1) % 3];
+        if (!line.has(m_.points[a]) || !line.has(m_.points[b])) continue;
+        const double s = line.along(m_.points[a]), u = line.along(m_.points[b]);
         if (!(min(s, u) + kSame < at && at < max(s, u) - kSame)) continue;
         const Triangle first{a, v, t[(e + 2) % 3]}, rest{v, b, t[(e + 2) % 3]};
         t = first;

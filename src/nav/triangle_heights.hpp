@@ -26,27 +26,29 @@ class TriangleHeights {
     side_ = max(max(size.x, size.z) / 128.0, 0.25);
     nx_ = static_cast<std::size_t>(size.x / side_) + 1;
     nz_ = static_cast<std::size_t>(size.z / side_) + 1;
-    buckets_.resize(nx_ * nz_);
+    first_.assign(nx_ * nz_ + 1, 0);
     for (const NavMesh::Triangle& t : triangles) {
       const std::array<Vec3d, 3> p{vertices[t[0]] - origin, vertices[t[1]] - origin, vertices[t[2]] - origin};
       const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
       if (!(n.y > 0.1 * norm(n))) continue;
-      Aabb<double> b;
-      for (const Vec3d& v : p) b.add(v);
-      for (std::size_t z = index(b.low.z - low_.z, nz_); z <= index(b.high.z - low_.z, nz_); ++z) {
-        for (std::size_t x = index(b.low.x - low_.x, nx_); x <= index(b.high.x - low_.x, nx_); ++x) {
-          buckets_[x + nx_ * z].push_back(static_cast<std::uint32_t>(faces_.size()));
-        }
-      }
       faces_.push_back({p[0], n});
       corners_.push_back(p);
+      each_cell(p, [&](std::size_t cell) { ++first_[cell + 1]; });
+    }
+    for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
+    in_cells_.resize(first_.back());
+    std::vector<std::uint32_t> at(first_.begin(), first_.end() - 1);
+    for (std::uint32_t i = 0; i < corners_.size(); ++i) {
+      each_cell(corners_[i], [&](std::size_t cell) { in_cells_[at[cell]++] = i; });
     }
   }
 
   /// Highest surface at (x, z) of p within [p.y - below, p.y + above].
   std::optional<double> at(const Vec3d& p, double below, double above) const {
     std::optional<double> best;
-    for (const std::uint32_t i : buckets_[index(p.x - low_.x, nx_) + nx_ * index(p.z - low_.z, nz_)]) {
+    const std::size_t cell = index(p.x - low_.x, nx_) + nx_ * index(p.z - low_.z, nz_);
+    for (std::uint32_t k = first_[cell]; k < first_[cell + 1]; ++k) {
+      const std::uint32_t i = in_cells_[k];
       const Face& f = faces_[i];
       const double y = f.point.y - ((p.x - f.point.x) * f.normal.x + (p.z - f.point.z) * f.normal.z) / f.normal.y;
       if (y < p.y - below || y > p.y + above || (best && y <= *best) || !covers(corners_[i], p)) continue;
@@ -62,6 +64,17 @@ class TriangleHeights {
   std::size_t index(double v, std::size_t n) const noexcept {
     return static_cast<std::size_t>(clamp(v / side_, 0.0, static_cast<double>(n - 1)));
   }
+  /// f(cell) for each that the box of a triangle reaches into.
+  template <class F>
+  void each_cell(const std::array<Vec3d, 3>& p, const F& f) const {
+    const std::size_t x0 = index(min(p[0].x, min(p[1].x, p[2].x)) - low_.x, nx_);
+    const std::size_t x1 = index(max(p[0].x, max(p[1].x, p[2].x)) - low_.x, nx_);
+    const std::size_t z0 = index(min(p[0].z, min(p[1].z, p[2].z)) - low_.z, nz_);
+    const std::size_t z1 = index(max(p[0].z, max(p[1].z, p[2].z)) - low_.z, nz_);
+    for (std::size_t z = z0; z <= z1; ++z) {
+      for (std::size_t x = x0; x <= x1; ++x) f(x + nx_ * z);
+    }
+  }
   static bool covers(const std::array<Vec3d, 3>& t, const Vec3d& p) noexcept {
     constexpr double kRounding = -1e-6;  // square metres: seams between triangles belong to both
     for (std::size_t k = 0; k < 3; ++k) {
@@ -75,7 +88,7 @@ class TriangleHeights {
   Vec3d low_;
   double side_ = 1.0;
   std::size_t nx_ = 1, nz_ = 1;
-  std::vector<std::vector<std::uint32_t>> buckets_;
+  std::vector<std::uint32_t> first_, in_cells_;  ///< of each cell in `in_cells_`, and one past the last; faces
   std::vector<Face> faces_;
   std::vector<std::array<Vec3d, 3>> corners_;
 };

@@ -75,7 +75,8 @@ class Builder {
     const auto off = [&](const Vec3d& q) { return std::abs(gsnav::dot(n, q - corners[0])) > kLevel; };
     if (!(n.y > 0.1) || std::any_of(corners.begin(), corners.end(), off)) return false;
     for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
-      if (std::any_of(m_.tris[t].begin(), m_.tris[t].end(), off)) return false;
+      const std::array<Vec3d, 3> tri = m_.triangle(m_.tris[t]);
+      if (std::any_of(tri.begin(), tri.end(), off)) return false;
     }
     return true;
   }
@@ -85,7 +86,7 @@ class Builder {
     const PolyMesh::Poly& p = m_.polys[id];
     std::vector<double> covered(p.count, 0.0);
     for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
-      std::array<Vec3d, 3> tri = m_.tris[t];
+      std::array<Vec3d, 3> tri = m_.triangle(m_.tris[t]);
       if (area_xz(tri[0], tri[1], tri[2]) < 0) std::swap(tri[1], tri[2]);
       if (!(area_xz(tri[0], tri[1], tri[2]) > kSliver)) return false;
       own.push_back({id, {tri.begin(), tri.end()}, {kInside, kInside, kInside}});

@@ -262,8 +262,7 @@ void read_navmesh(const std::string& input) {
   reset_largest_allocation();
   const auto mesh = parse_navmesh(bytes_of(input), "fuzz");
   const std::size_t most = largest_allocation();
-  const std::size_t least = 4 * input.size() + 1024;  // a line of what is wrong has room
-  if (most > least && !(mesh && most <= 80 * mesh->triangles().size())) {
+  if (most > 4 * input.size() + 1024) {  // a line of what is wrong has room
     stop("parsing " + std::to_string(input.size()) + " bytes asked for " + std::to_string(most));
   }
   if (!mesh) return;

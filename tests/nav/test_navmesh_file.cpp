@@ -48,9 +48,9 @@ NavMesh boxes(const Vec3d& at = {}) {
   return NavMesh::build(s, soup.vertices, soup.triangles).value();
 }
 
-std::vector<std::byte> saved(const NavMesh& mesh) {
+std::vector<std::byte> saved(const NavMesh& mesh, int version = 2) {
   const gsnav_test::TempFolder folder("navmesh_file");
-  save_navmesh(mesh, (folder / "a.navmesh").string()).throw_if_error();
+  save_navmesh(mesh, (folder / "a.navmesh").string(), version).throw_if_error();
   return bytes_of((folder / "a.navmesh").string());
 }
 
@@ -64,8 +64,9 @@ std::vector<std::byte> tiled() {
   return saved(NavMesh::build(s, soup.vertices, soup.triangles).value());
 }
 
-/// A file of `count` triangles that lie on each other, `length` metres long.
-std::vector<std::byte> pile(std::int32_t count, float length) {
+/// A file of `count` polygons that lie on each other, `length` metres long: triangles of so many height triangles, or
+/// the same with each corner twice.
+std::vector<std::byte> pile(std::int32_t count, float length, std::int32_t heights = 1, bool twice = false) {
   std::vector<std::byte> b;
   const auto put = [&](const auto& v) {
     const auto* p = reinterpret_cast<const std::byte*>(&v);
@@ -80,24 +81,25 @@ std::vector<std::byte> pile(std::int32_t count, float length) {
   ints({'M' << 24 | 'S' << 16 | 'E' << 8 | 'T', 1, 1});
   floats({0, 0, 0, length, length});
   ints({1, count});
-  ints({1, 100 + 36 + count * (32 + 12 + 12 + 4)});  // reference and size; counts of the tile
-  ints({'D' << 24 | 'N' << 16 | 'A' << 8 | 'V', 7, 0, 0, 0, 0, count, 3, count, count, 0, count, 0, 0, count});
+  ints({1, 100 + 36 + 12 + count * (32 + 12 + 4 * heights)});  // reference and size; counts of the tile
+  ints({'D' << 24 | 'N' << 16 | 'A' << 8 | 'V', 7, 0, 0, 0, 0, count, 3, 1, count, 0, count * heights, 0, 0, count});
   floats({1.5f, 0.1f, 0.2f, 0, 0, 0, length, 1, length, 1});
   floats({0, 0, 0, 0, 0, 1, length, 0, 1});
   for (std::int32_t i = 0; i < count; ++i) {
     ints({-1});
-    for (const int v : {0, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0}) put(static_cast<std::uint16_t>(v));
+    for (const int k : {0, 1, 2, 3, 4, 5}) put(static_cast<std::uint16_t>(twice ? k / 2 : k % 3));
+    for (int k = 0; k < 6; ++k) put(std::uint16_t{0});
     put(std::uint16_t{1});
-    put(std::uint8_t{3});
+    put(static_cast<std::uint8_t>(twice ? 6 : 3));
     put(std::uint8_t{0});
   }
-  b.resize(b.size() + 12 * static_cast<std::size_t>(count));
+  b.resize(b.size() + 12);  // a link
   for (std::int32_t i = 0; i < count; ++i) {
-    ints({0, i});
-    for (const int v : {0, 1, 0, 0}) put(static_cast<std::uint8_t>(v));
+    ints({0, i * heights});
+    for (const int v : {0, heights, 0, 0}) put(static_cast<std::uint8_t>(v));
   }
-  for (std::int32_t i = 0; i < count; ++i) {
-    for (const int v : {0, 1, 2, 0}) put(static_cast<std::uint8_t>(v));
+  for (std::int32_t i = 0; i < count * heights; ++i) {
+    for (const int v : {0, 1, 2, 0}) put(static_cast<std::uint8_t>(twice ? 2 * v : v));
   }
   return b;
 }
@@ -155,13 +157,72 @@ TEST_CASE("navmesh file: a round trip keeps surface, settings and distances") {
   CHECK(cell == 0.05f);
   CHECK(radius == 0.15f);
   CHECK(std::memcmp(bytes.data() + 104, "VAND\7\0\0\0", 8) == 0);
-  // Version 1 has no settings.
-  auto old = bytes;
-  old.erase(old.begin() + 40, old.begin() + 96);
-  patch(old, 4, 1);
-  const NavMesh v1 = parse_navmesh(old, "old").value();
-  CHECK(v1.polygon_count() == mesh.polygon_count());
-  CHECK(v1.settings().agent_radius == doctest::Approx(0.15));
+}
+
+TEST_CASE("navmesh file: version 1, which has no settings, is written and read") {
+  const Vec3d at{120, -7, 33};
+  const NavMesh mesh = boxes(at);
+  const auto bytes = saved(mesh, 1), second = saved(mesh);
+  // magic, version, numTiles; orig, tileWidth, tileHeight, maxTiles, maxPolys; tileRef, dataSize; magic and version of
+  // the tile, whose agent the settings are taken from.
+  const auto int_at = [&](std::size_t k) {
+    std::int32_t v = 0;
+    std::memcpy(&v, bytes.data() + k, 4);
+    return v;
+  };
+  const auto float_at = [&](std::size_t k) {
+    float v = 0;
+    std::memcpy(&v, bytes.data() + k, 4);
+    return static_cast<double>(v);
+  };
+  CHECK(std::memcmp(bytes.data(), "TESM\1\0\0\0\1\0\0\0", 12) == 0);
+  for (const auto& [k, low] : {std::pair<std::size_t, double>{0, 120}, {4, -7}, {8, 33}}) {
+    CHECK(float_at(12 + k) == doctest::Approx(low));
+    CHECK(float_at(48 + 72 + k) == doctest::Approx(low));  // bmin
+  }
+  CHECK(float_at(24) == doctest::Approx(8));
+  CHECK(float_at(28) == doctest::Approx(6));
+  CHECK(int_at(32) == 1);
+  CHECK(int_at(36) == static_cast<int>(mesh.polygon_count()));
+  CHECK(int_at(40) != 0);
+  CHECK(static_cast<std::size_t>(int_at(44)) == bytes.size() - 48);
+  CHECK(std::memcmp(bytes.data() + 48, "VAND\7\0\0\0", 8) == 0);
+  CHECK(int_at(48 + 24) == static_cast<int>(mesh.polygon_count()));
+  CHECK(float_at(48 + 60) == doctest::Approx(1.5));
+  CHECK(float_at(48 + 64) == doctest::Approx(0.15));
+  CHECK(float_at(48 + 68) == doctest::Approx(0.2));
+  // All else is as in version 2.
+  CHECK(bytes.size() + 56 == second.size());
+  CHECK(std::equal(bytes.begin() + 8, bytes.begin() + 40, second.begin() + 8));
+  CHECK(std::equal(bytes.begin() + 40, bytes.end(), second.begin() + 96));
+
+  const NavMesh back = parse_navmesh(bytes, "v1").value();
+  CHECK(back.polygon_count() == mesh.polygon_count());
+  CHECK(back.settings().agent_height == doctest::Approx(1.5));
+  CHECK(back.settings().agent_radius == doctest::Approx(0.15));
+  CHECK(back.settings().agent_max_climb == doctest::Approx(0.2));
+  CHECK(back.settings().filter_ledge_spans);  // a default: the mesh was built without
+  CHECK(saved(back, 1) == bytes);
+  Rng rng(4);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3d a = mesh.random_point(rng, 0).position, b = mesh.random_point(rng, 0).position;
+    REQUIRE(std::abs(back.geodesic_distance(a, b) - mesh.geodesic_distance(a, b)) < 1e-3);
+  }
+  const gsnav_test::TempFolder folder("navmesh_file");
+  for (const int version : {0, 3}) {
+    const Status refused = save_navmesh(mesh, folder / "c.navmesh", version);
+    CHECK(refused.code() == Errc::invalid_argument);
+    CHECK(refused.message().find("version = " + std::to_string(version)) != std::string::npos);
+  }
+}
+
+TEST_CASE("navmesh file: tiles keep their settings' place in version 1") {
+  const auto second = tiled();
+  const NavMesh mesh = parse_navmesh(second, "tiles").value();
+  const auto bytes = saved(mesh, 1);
+  CHECK(bytes.size() + 56 == second.size());
+  CHECK(std::equal(bytes.begin() + 40, bytes.end(), second.begin() + 96));
+  CHECK(saved(parse_navmesh(bytes, "v1").value(), 1) == bytes);
 }
 
 TEST_CASE("navmesh file: 64-bit references and many tiles") {
@@ -263,15 +324,35 @@ TEST_CASE("navmesh file: no allocation is over four times the file, whatever its
   }
   // Tiles, of which each has its own copy in Detour, as small as they may be.
   files.push_back(tiled());
+  // Many height triangles for their bytes.
+  if (const std::string path = gsnav_test::data_file("nav/recast/undulating.obj"); !path.empty()) {
+    const Soup soup = gsnav_test::read_obj(path);
+    NavMeshSettings s;
+    s.cell_size = 0.1;
+    files.push_back(saved(NavMesh::build(s, soup.vertices, soup.triangles).value()));
+    s.tile_size = 64;
+    files.push_back(saved(NavMesh::build(s, soup.vertices, soup.triangles).value()));
+  }
   // Ten thousand polygons, each of which covers all of the mesh, and one that is 100 km long.
   files.push_back(pile(10000, 1.0f));
   files.push_back(pile(1, 1e5f));
+  // As many corners, then as many height triangles as a polygon can have.
+  for (const std::int32_t count : {1, 5, 1000}) {
+    files.push_back(pile(count, 1.0f, 1, true));
+    files.push_back(pile(count, 1.0f, 0, true));
+    files.push_back(pile(count, 1.0f, 255));
+    files.push_back(pile(count, 1.0f, 255, true));
+  }
+  double most = 0;
   for (const auto& file : files) {
     gsnav_test::reset_largest_allocation();
     const auto mesh = parse_navmesh(file, "x");
+    CAPTURE(mesh.message());
     CHECK(mesh.ok());
     CHECK(gsnav_test::largest_allocation() <= 4 * file.size() + 512);
+    most = max(most, static_cast<double>(gsnav_test::largest_allocation()) / static_cast<double>(file.size()));
   }
+  MESSAGE("at most " << most << " times the file");
   // Polygons that share their height triangles.
   auto shared = files[0];
   const auto at = [&](std::size_t k) {

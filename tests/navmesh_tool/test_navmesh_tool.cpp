@@ -73,6 +73,15 @@ TEST_CASE("navmesh tool: builds, inspects, converts and draws") {
   REQUIRE(again.ok);
   CHECK(again.says("level 1"));
   CHECK(read_file(folder / "a.navmesh") == read_file(folder / "b.navmesh"));
+  // Version 1 has no settings; all else is the same.
+  const std::string old_form = " --mset-version 1 --out " + quoted(folder / "1.navmesh");
+  const Outcome old = run(folder, quoted(folder / "a.navmesh") + old_form);
+  INFO(old.text);
+  REQUIRE(old.ok);
+  std::string without = read_file(folder / "a.navmesh");
+  without.erase(40, 56)[4] = 1;
+  CHECK(read_file(folder / "1.navmesh") == without);
+  CHECK_FALSE(run(folder, quoted(folder / "a.navmesh") + " --mset-version 3 --out " + quoted(folder / "3.navmesh")).ok);
 }
 
 TEST_CASE("navmesh tool: in tiles, whatever the number of threads") {

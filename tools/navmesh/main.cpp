@@ -146,7 +146,7 @@ Status run(const Options& o) {
   const std::vector<NavLevel> levels = find_levels(*mesh);
   print(*mesh, levels);
   if (!o.out.empty()) {
-    if (Status s = save_navmesh(*mesh, o.out); !s) return s;
+    if (Status s = save_navmesh(*mesh, o.out, o.mset_version); !s) return s;
   }
   if (!o.obj.empty()) {
     if (Status s = save_navmesh_obj(*mesh, o.obj); !s) return s;

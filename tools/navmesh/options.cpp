@@ -43,7 +43,12 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
                     ->capture_default_str();
 
   const char* write = "Write";
-  app.add_option("--out", o.out, "NavMesh file (MSET version 2, as Habitat reads it)")->group(write);
+  auto* out = app.add_option("--out", o.out, "NavMesh file (MSET, as Habitat reads it)")->group(write);
+  app.add_option("--mset-version", o.mset_version, "Of --out: 2, or 1, which has no settings")
+      ->check(CLI::IsMember({1, 2}))
+      ->needs(out)
+      ->capture_default_str()
+      ->group(write);
   app.add_option("--obj", o.obj, "The surface as triangles, one group an island")->group(write);
   app.add_option("--png", o.png, "The surface from above, islands by colour")->group(write);
   auto* height =

@@ -19,6 +19,7 @@ struct Options {
   double scale = 1.0;
   std::string mesh;  ///< triangles beside the Gaussians of the input
   std::string out, obj, png;
+  int mset_version = 2;  ///< of `out`
   gsnav::NavMeshSettings settings;
   int threads = 0;  ///< that share out the tiles; 0: one a core
   gsnav::GaussianNavOptions gaussians;
