@@ -161,6 +161,24 @@ TEST_CASE("packed clouds: images of what the codes stand for, bit for bit") {
   }
 }
 
+TEST_CASE("packed clouds: chunks by a list are those of the floats, whatever its order") {
+  const GaussianCloud full = scene_of(1, 3000);
+  const PackedCloud packed = pack_cloud(full, kAnything);
+  const GaussianCloud floats = unpack_cloud(packed);
+  const std::vector<std::uint32_t> list{7, 2, 11, 0};
+  on_backends([&](auto& backend) {
+    const auto drawn = [&](GaussianSet set) {
+      set.gaussians.drawn_chunks = {list.data(), list.size()};
+      return render<float>(backend, {set}, kCamera);
+    };
+    const auto got = drawn(packed.set()), want = drawn(floats.set());
+    CHECK(got.stats[0].visible > 50);
+    CHECK(got.stats[0].visible == want.stats[0].visible);
+    CHECK(got.rgb == want.rgb);
+    CHECK(got.median_depth == want.median_depth);
+  });
+}
+
 TEST_CASE("packed clouds: far places, large and needle-like Gaussians, a last chunk that is not full") {
   // A scene from -300 to 300 m is of many origins; shapes from flat to needles of 1e4 : 1.
   GaussianCloudBuilder builder(1);

@@ -92,7 +92,7 @@ Result<GaussianCloud> through_storage(const GaussianCloud& cloud, std::string_vi
   } else {
     each(name == "opacity_8" ? out.opacities : name == "sh0_8" ? out.sh0 : out.shN, to_grid);
   }
-  if (!out.chunk_bounds.empty()) out.chunk_bounds = chunk_bounds_of(out);
+  if (!out.chunk_bounds.empty()) bound_chunks(out);
   return out;
 }
 

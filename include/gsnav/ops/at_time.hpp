@@ -63,7 +63,7 @@ Status gaussians_at(B& backend, const TemporalView& in, double t, Moment<B>& out
   at.opacities = out.opacities.view();
   out.gaussians.opacities = {out.opacities.data(), n};
   backend.parallel_for(n, at);
-  out.gaussians.chunk_bounds = {};
+  out.gaussians.chunk_bounds = out.gaussians.part_bounds = {};
   if constexpr (is_host_backend<B>) {
     if (!in.base.chunk_bounds.empty()) {
       const std::size_t chunks = in.base.chunk_count();

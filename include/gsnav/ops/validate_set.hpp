@@ -86,6 +86,11 @@ inline Status validate(const GaussianSet& set) {
     return bad("chunk_bounds has " + std::to_string(g.chunk_bounds.size) + " values where " +
                std::to_string(g.all_chunks()) + " are needed");
   }
+  const std::size_t parts = (g.size + kChunkPart - 1) / kChunkPart;
+  if (!g.part_bounds.empty() && g.part_bounds.size != parts) {
+    return bad("part_bounds has " + std::to_string(g.part_bounds.size) + " values where " + std::to_string(parts) +
+               " are needed");
+  }
   if (!g.chunk_sh_degrees.empty() && g.chunk_sh_degrees.size != g.all_chunks()) {
     return bad("chunk_sh_degrees has " + std::to_string(g.chunk_sh_degrees.size) + " values where " +
                std::to_string(g.all_chunks()) + " are needed");
