@@ -64,9 +64,8 @@ TEST_CASE("packed clouds: each field within its steps, which the errors report")
     REQUIRE(got.size() == n);
     CHECK(errors.mean_bits == 16);
     CHECK(errors.sh_bits == 8);
-    // 10 codes, 3 halves and the bands; ids of rows, chunks of 40 and 56 bytes.
-    CHECK(packed.bytes() ==
-          n * (20 + 6 + rest + 4) + full.chunk_bounds.size() * (sizeof(PackedChunk) + sizeof(ChunkBounds)));
+    // 10 codes, 3 halves and the bands; ids of rows, chunks of 40 and 56 bytes, parts of 56.
+    CHECK(packed.bytes() == n * (20 + 6 + rest + 4) + (n + 255) / 256 * (40 + 56) + (n + 63) / 64 * 56);
     PackErrors seen;
     for (std::size_t i = 0; i < n; ++i) {
       long double moved = 0, largest = 0, change = 0;
@@ -210,6 +209,10 @@ TEST_CASE("packed clouds: far places, large and needle-like Gaussians, a last ch
       REQUIRE(floats.mean(i)[k] >= bounds.low[k]);
       REQUIRE(floats.mean(i)[k] <= bounds.high[k]);
       REQUIRE(floats.scales[static_cast<std::size_t>(k)][i] <= bounds.scale_max);
+      const ChunkBounds& part = packed.rest.part_bounds[i / kChunkPart];
+      REQUIRE(floats.mean(i)[k] >= part.low[k]);
+      REQUIRE(floats.mean(i)[k] <= part.high[k]);
+      REQUIRE(floats.scales[static_cast<std::size_t>(k)][i] <= part.scale_max);
     }
   }
   on_backends([&](auto& backend) {
