@@ -64,7 +64,7 @@ class LodReader {
       auto loaded = load(k, level.boxes);
       if (!loaded) return loaded.status();
       if (k == 0) {
-        out.report = described(*loaded);
+        out.report = loaded->report;
       } else {
         dropped += loaded->report.dropped();
       }
@@ -76,22 +76,16 @@ class LodReader {
     }
     PoolBackend backend(threads_for(levels[0].cloud.size()) == 1 ? 1 : detail::io_threads());
     auto joined = join_levels(backend, std::move(levels), nodes_ + 1);
-    if (!joined) return fail(joined.message());
+    if (!joined) return Status(joined.code(), source_ + ": " + joined.message());
     out.cloud = std::move(joined->cloud);
     out.tree = std::move(joined->tree);
-    out.report.memory = out.cloud.bytes();
+    describe(out.cloud, out.report, {0, -1, 0});
     return out;
   }
 
  private:
   /// Rows of one step: index k holds what is drawn k levels above the finest that is there.
   using Step = std::vector<std::vector<NodeRows>>;  ///< of each file
-
-  static LoadReport described(const LoadedCloud& loaded) {
-    LoadReport report = loaded.report;
-    describe(loaded.cloud, report, {0, -1, 0});
-    return report;
-  }
 
   /// Reads what the set says; `coarser`: of all levels.
   Status read(bool coarser) {

@@ -278,6 +278,11 @@ TEST_CASE("lod levels: boxes without a level, and what makes no sense") {
   levels = wall_levels();
   levels[2].cloud.filter = Filter::mip;
   refused(levels, 16, "filters");
+  // 5000 boxes of one row each would be filled up to 256 times their size.
+  LodLevel specks;
+  specks.cloud = random_cloud(33, {.count = 5000, .sh_degree = 0});
+  for (std::uint32_t b = 0; b < specks.cloud.size(); ++b) specks.boxes.push_back(b);
+  CHECK(join_levels(backend, {specks}, specks.boxes.size()).code() == Errc::unsupported);
   const LeveledCloud none = join_levels(backend, std::vector<LodLevel>(2), 0).value();
   CHECK(none.cloud.size() == 0);
   LodCut cut(none.tree, none.cloud);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 
 namespace gsnav_report {
@@ -65,6 +66,13 @@ float round_to_half(float x) noexcept {
   const int exponent = v == 0 ? -14 : std::max(std::ilogb(v), -14);
   const double step = std::ldexp(1.0, exponent - 10);
   return static_cast<float>(std::clamp(std::nearbyint(v / step) * step, -65504.0, 65504.0));
+}
+
+PackedThrough through_packing(const GaussianCloud& cloud) {
+  const PackedCloud packed = pack_cloud(cloud);
+  const GaussianCloud& rest = packed.rest;
+  return {unpack_cloud(packed), packed.bytes(),
+          packed.shN.size() + sizeof(float) * rest.shN.size() + sizeof(std::uint16_t) * rest.shN_half.size()};
 }
 
 Result<GaussianCloud> through_storage(const GaussianCloud& cloud, std::string_view name) {

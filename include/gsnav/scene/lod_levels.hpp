@@ -42,6 +42,18 @@ struct BoxRows {
   std::uint32_t first_chunk = 0, chunks = 0;
 };
 
+/// Rows of all levels once their boxes are in chunks of their own.
+inline std::size_t filled_rows(const std::vector<LodLevel>& levels, std::size_t boxes) {
+  std::size_t chunks = 0;
+  std::vector<std::uint32_t> counts;
+  for (const LodLevel& level : levels) {
+    counts.assign(boxes, 0);
+    for (const std::uint32_t b : level.boxes) ++counts[b];
+    for (const std::uint32_t n : counts) chunks += (n + kProjectChunk - 1) / kProjectChunk;
+  }
+  return chunks * kProjectChunk;
+}
+
 /// Brings the rows of a level together by box, along Hilbert's curve within each, the largest behind the others as in
 /// sort_spatially, and fills up chunks. `row_ids` keeps the places.
 template <Backend B>
@@ -138,7 +150,8 @@ inline double distance_to_level(const GaussianCloud& fine, const BoxRows& in_fin
 /// one, the k-th level that is there; boxes without rows in the first are not shown. A node's error is the root mean
 /// square distance, by mass, from the box's finest Gaussians to the nearest of the node's own, and not below that of a
 /// finer node. The same bits for any number of threads. Levels are used up.
-/// Errors: invalid_argument (no level, compact SH, a box that is not one of `boxes`, levels of different filters).
+/// Errors: invalid_argument (no level, compact SH, a box that is not one of `boxes`, levels of different filters);
+/// unsupported (boxes so small that filling their chunks would take many times the rows).
 template <Backend B>
 requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::vector<LodLevel> levels,
                                                              std::size_t boxes) {
@@ -147,17 +160,23 @@ requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::ve
   };
   if (levels.empty()) return Status(Errc::invalid_argument, "join_levels: there is no level");
   std::vector<std::vector<detail::BoxRows>> rows;
+  std::size_t all = 0;
   for (std::size_t l = 0; l < levels.size(); ++l) {
     const LodLevel& level = levels[l];
     if (level.boxes.size() != level.cloud.size()) {
       return bad(l, std::to_string(level.boxes.size()) + " boxes for " + std::to_string(level.cloud.size()) + " rows");
     }
     if (!level.cloud.shN_half.empty()) return bad(l, "compact: expand_sh first");
+    all += level.cloud.size();
     for (const std::uint32_t b : level.boxes) {
       if (b >= boxes) return bad(l, "box " + std::to_string(b) + " of " + std::to_string(boxes));
     }
-    rows.push_back(detail::sort_boxes(backend, levels[l], boxes));
   }
+  if (detail::filled_rows(levels, boxes) > 4 * all + (std::size_t{1} << 20)) {
+    return Status(Errc::unsupported, "join_levels: " + std::to_string(all) + " rows in so many small boxes that chunks of " +
+                                         std::to_string(kProjectChunk) + " would be mostly empty");
+  }
+  for (LodLevel& level : levels) rows.push_back(detail::sort_boxes(backend, level, boxes));
 
   LeveledCloud out;
   LodTree& tree = out.tree;
