@@ -42,7 +42,7 @@ TEST_CASE("html: a full report is one well-formed page with every section") {
   const std::string page = html_page(Table(gsnav_test::synthetic_rows(), {}));
   CHECK(nesting_error(page) == "");
   CHECK(page.find("Nothing was measured") == std::string::npos);
-  CHECK(count(page, "<section") == 9);
+  CHECK(count(page, "<section") == 10);
   CHECK(page.find("<script") == std::string::npos);
   CHECK(page.find("src=\"http") == std::string::npos);
   CHECK(page.find("href=\"http") == std::string::npos);
