@@ -7,24 +7,32 @@
 #include <vector>
 
 #include "gsnav/backends/serial.hpp"
+#include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/edit_cloud.hpp"
 #include "gsnav/scene/lod_build.hpp"
 #include "gsnav/scene/lod_levels.hpp"
-#include "lod_support.hpp"
+#include "lod/lod_support.hpp"
 
 namespace gsnav_test {
 
-/// Levels of a wall as a set ships them: 4 x 4 boxes along the wall, each halved `coarser` times by a tree of its own.
-/// Rows of a level come box after box, of the finest in a random order.
+/// Levels of a cloud as a set ships them: boxes x boxes over its two longest sides, each halved `coarser` times by a
+/// tree of its own. Rows of the coarser levels come box after box.
 inline std::vector<gsnav::LodLevel> shipped_levels(const gsnav::GaussianCloud& wall, std::size_t coarser,
                                                    std::size_t boxes = 4) {
   using namespace gsnav;
+  Aabb<double> all;
+  for (std::size_t i = 0; i < wall.size(); ++i) all.add(wall.mean(i));
+  const Vec3d size = all.high - all.low;
+  const int shortest = size.x < size.y && size.x < size.z ? 0 : size.y < size.z ? 1 : 2;
   const auto box_of = [&](const Vec3d& p) {
-    const auto along = [&](double v) {
-      return static_cast<std::uint32_t>(
-          clamp((v + 2.5) / 5 * static_cast<double>(boxes), 0.0, static_cast<double>(boxes) - 1));
-    };
-    return along(p.y) * static_cast<std::uint32_t>(boxes) + along(p.x);
+    std::uint32_t box = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (k == shortest) continue;
+      const double most = static_cast<double>(boxes) - 1;
+      const double along = clamp((p[k] - all.low[k]) / size[k] * static_cast<double>(boxes), 0.0, most);
+      box = box * static_cast<std::uint32_t>(boxes) + static_cast<std::uint32_t>(along);
+    }
+    return box;
   };
   std::vector<LodLevel> levels(coarser + 1);
   levels[0].cloud = wall;
