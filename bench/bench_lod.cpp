@@ -6,7 +6,8 @@
 // Without the variables: the embedded flat from its four viewpoints; without a number: 8 views. Processor time of
 // RGB frames on one thread, the least of five runs a view; `least +dB` is the smallest gain of a view, `below` how many
 // views are below direct rendering. Of depths (frames of their own, not timed): pixels that are off by more than 2 %
-// from every median depth of the photo's rays within them, and the 99th percentile. Where there is a GPU, rows of it.
+// from every median depth of the photo's rays within them, and the 99th percentile. A streamed set's own levels have rows
+// beside those of the tree that is built. Where there is a GPU, rows of it.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/lod_build.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/renderer.hpp"
@@ -95,6 +97,11 @@ int main(int argc, char** argv) {
   row(shown, cloud, tree, "direct fast", LodDraw::direct, 0);
   row(shown, cloud, tree, "photo filter", LodDraw::photo, 0);
   for (const double p : pixels) row(shown, cloud, tree, "lod", LodDraw::lod, p);
+  if (const char* scene = std::getenv("GSNAV_BENCH_SCENE"); scene != nullptr) {
+    if (const auto set = io::load_shipped_levels(scene).value(); set) {
+      for (const double p : pixels) row(shown, set->cloud, set->tree, "shipped", LodDraw::lod, p);
+    }
+  }
 #if defined(GSNAV_HAS_CUDA)
   lod_rows_on_gpu(shown, cloud, tree, pixels);
 #endif

@@ -60,15 +60,27 @@ Result<Setup> prepare(const Options& options) {
     vertices = std::move(flat->vertices);
     triangles = std::move(flat->triangles);
   } else {
-    auto loaded = gsnav::io::load_scene(options.scene);
-    if (!loaded) return loaded.status();
-    for (const std::string& w : loaded->report.warnings) std::fprintf(stderr, "%s\n", w.c_str());
-    asset.cloud = std::make_shared<gsnav::GaussianCloud>(std::move(loaded->cloud));
+    std::optional<gsnav::io::LoadedLodSet> shipped;
+    if (options.profile == "lod") {
+      auto set = gsnav::io::load_shipped_levels(options.scene);
+      if (!set) return set.status();
+      shipped = std::move(*set);
+    }
+    if (shipped) {
+      for (const std::string& w : shipped->report.warnings) std::fprintf(stderr, "%s\n", w.c_str());
+      asset.cloud = std::make_shared<gsnav::GaussianCloud>(std::move(shipped->cloud));
+      asset.lod = std::make_shared<const gsnav::LodTree>(std::move(shipped->tree));
+    } else {
+      auto loaded = gsnav::io::load_scene(options.scene);
+      if (!loaded) return loaded.status();
+      for (const std::string& w : loaded->report.warnings) std::fprintf(stderr, "%s\n", w.c_str());
+      asset.cloud = std::make_shared<gsnav::GaussianCloud>(std::move(loaded->cloud));
+    }
     const auto up = upright(options.up);
     if (!up) return up.status();
     asset.world_from_asset = *up;
   }
-  if (options.profile == "lod") {
+  if (options.profile == "lod" && asset.lod == nullptr) {
     auto tree = levels_of(options, *asset.cloud);
     if (!tree) return tree.status();
     asset.lod = std::make_shared<const gsnav::LodTree>(std::move(*tree));

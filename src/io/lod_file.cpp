@@ -13,7 +13,9 @@
 #include <vector>
 
 #include "file.hpp"
+#include "gsnav/core/pool_backend.hpp"
 #include "gsnav/scene/content_hash.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -212,7 +214,8 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
       n.reach.scale_max = nodes[i].scale_max;
       n.reach.opacity_max = nodes[i].opacity_max;
     }
-    tree.merged.chunk_bounds = chunk_bounds_of(tree.merged);
+    PoolBackend pool(threads_for(tree.merged.size()));
+    tree.merged.chunk_bounds = chunk_bounds_of(pool, tree.merged);
     return tree;
   });
 }

@@ -2,6 +2,8 @@
 #include "gsnav/io/lod_set.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <iterator>
 #include <map>
 #include <string>
 #include <utility>
@@ -9,10 +11,13 @@
 
 #include "described.hpp"
 #include "file.hpp"
+#include "gsnav/core/pool_backend.hpp"
 #include "gsnav/io/sog.hpp"
+#include "gsnav/scene/lod_levels.hpp"
 #include "json.hpp"
 #include "report_sum.hpp"
 #include "sog_rows.hpp"
+#include "threads.hpp"
 #include "zip.hpp"
 
 namespace gsnav::io {
@@ -27,6 +32,13 @@ constexpr std::int64_t kMostLevels = 64, kMostRows = std::int64_t{16383} * 16383
 struct Rows {
   std::size_t file = 0;
   RowRange range;
+  bool operator==(const Rows&) const = default;
+};
+
+/// Rows of a node in a file.
+struct NodeRows {
+  RowRange range;
+  std::uint32_t node = 0;
 };
 
 class LodReader {
@@ -35,6 +47,49 @@ class LodReader {
       : path_(std::move(meta)), source_(path_.string()), options_(options) {}
 
   Result<LoadedCloud> run() {
+    std::vector<std::uint32_t> nodes;
+    if (Status s = read(false); !s) return s;
+    auto out = load(0, nodes);
+    if (out) out->report.source = source_;
+    return out;
+  }
+
+  Result<LoadedLodSet> run_levels() {
+    if (Status s = read(true); !s) return s;
+    LoadedLodSet out;
+    std::vector<LodLevel> levels;
+    std::uint64_t dropped = 0;
+    for (std::size_t k = 0; k < steps_.size(); ++k) {
+      LodLevel level;
+      auto loaded = load(k, level.boxes);
+      if (!loaded) return loaded.status();
+      if (k == 0) {
+        out.report = loaded->report;
+      } else {
+        dropped += loaded->report.dropped();
+      }
+      level.cloud = std::move(loaded->cloud);
+      levels.push_back(std::move(level));
+    }
+    if (dropped != 0) {
+      out.report.warnings.push_back(std::to_string(dropped) + " rows of coarser levels are not drawn: transparent or not finite");
+    }
+    PoolBackend backend(threads_for(levels[0].cloud.size()) == 1 ? 1 : detail::io_threads());
+    auto joined = join_levels(backend, std::move(levels), nodes_ + 1);
+    if (!joined) return Status(joined.code(), source_ + ": " + joined.message());
+    out.cloud = std::move(joined->cloud);
+    out.tree = std::move(joined->tree);
+    describe(out.cloud, out.report, {0, -1, 0});
+    return out;
+  }
+
+ private:
+  /// Rows of one step: index k holds what is drawn k levels above the finest that is there.
+  using Step = std::vector<std::vector<NodeRows>>;  ///< of each file
+
+  /// Reads what the set says; `coarser`: of all levels.
+  Status read(bool coarser) {
+    coarser_ = coarser;
     const auto text = detail::read_file(path_);
     if (!text) return text.status();
     const auto json = detail::parse_json(text->span(), source_);
@@ -42,10 +97,9 @@ class LodReader {
     if (Status s = read_header(*json); !s) return s;
     if (Status s = walk(*json); !s) return s;
     if (Status s = check_overlaps(); !s) return s;
-    return load(*json);
+    return read_environment(*json);
   }
 
- private:
   Status fail(const std::string& what) const { return {Errc::invalid_file, source_ + ": " + what}; }
   std::filesystem::path place(const std::string& name) const { return path_.parent_path() / name; }
 
@@ -68,7 +122,7 @@ class LodReader {
       std::error_code ignored;
       there_.push_back(std::filesystem::exists(place(files_.back()), ignored));
     }
-    rows_.resize(files_.size());
+    steps_.emplace_back(files_.size());
     return {};
   }
 
@@ -124,14 +178,28 @@ class LodReader {
     auto chosen = there.lower_bound(options_.level);
     if (chosen == there.end()) --chosen;
     if (chosen->first != options_.level) ++instead_[chosen->first];
-    rows_[chosen->second.file].push_back(chosen->second.range);
+    const auto node = static_cast<std::uint32_t>(nodes_ - 1);
+    steps_[0][chosen->second.file].push_back({chosen->second.range, node});
+    std::size_t step = 0;
+    for (auto next = std::next(chosen); coarser_ && next != there.end(); ++next) {
+      const Rows& rows = next->second;
+      if (rows.range.count == 0 || rows == chosen->second) continue;  // nothing is left, or nothing is coarser
+      if (++step == steps_.size()) steps_.emplace_back(files_.size());
+      steps_[step][rows.file].push_back({rows.range, node});
+      chosen = next;
+    }
     return {};
   }
 
   /// Nodes that share rows would let a small set name any number of Gaussians.
   Status check_overlaps() {
-    for (std::size_t f = 0; f < rows_.size(); ++f) {
-      auto& ranges = rows_[f];
+    for (std::size_t f = 0; f < files_.size(); ++f) {
+      std::vector<RowRange> ranges;
+      for (Step& step : steps_) {
+        std::sort(step[f].begin(), step[f].end(),
+                  [](const NodeRows& a, const NodeRows& b) { return a.range.first < b.range.first; });
+        for (const NodeRows& r : step[f]) ranges.push_back(r.range);
+      }
       std::sort(ranges.begin(), ranges.end(),
                 [](const RowRange& a, const RowRange& b) { return a.first < b.first; });
       for (std::size_t k = 1; k < ranges.size(); ++k) {
@@ -144,32 +212,50 @@ class LodReader {
     return {};
   }
 
-  Result<LoadedCloud> load(const Json& json) const {
-    LoadedCloud out;
-    out.report.source = source_;
-    for (const auto& [level, nodes] : instead_) {
-      out.report.warnings.push_back("level " + std::to_string(options_.level) + " of " +
-                                    std::to_string(nodes) + " of " + std::to_string(nodes_) +
-                                    " nodes is not there: level " + std::to_string(level) + " is read");
-    }
-    for (std::size_t f = 0; f < files_.size(); ++f) {
-      if (rows_[f].empty()) continue;
-      auto part = detail::load_sog_rows(place(files_[f]), rows_[f]);
-      if (Status s = detail::merge_loaded(out, std::move(part), place(files_[f]).string()); !s) return s;
-    }
+  Status read_environment(const Json& json) {
     const Json* environment = detail::member(json, "environment");
-    if (!options_.environment || environment == nullptr || environment->is_null()) return out;
+    if (!options_.environment || environment == nullptr || environment->is_null()) return {};
     if (!environment->is_string() || !detail::is_safe_name(environment->get<std::string>())) {
       return fail("'environment' is " + detail::shown(*environment) +
                   ", must be a file below this folder");
     }
-    const auto shell = place(environment->get<std::string>());
+    environment_ = place(environment->get<std::string>());
+    return {};
+  }
+
+  /// Rows of a step by file, and the node of each; with those of the first comes the environment, as a node behind
+  /// all others.
+  Result<LoadedCloud> load(std::size_t step, std::vector<std::uint32_t>& nodes) const {
+    LoadedCloud out;
+    out.report.source = source_;
+    for (const auto& [level, count] : instead_) {
+      out.report.warnings.push_back("level " + std::to_string(options_.level) + " of " +
+                                    std::to_string(count) + " of " + std::to_string(nodes_) +
+                                    " nodes is not there: level " + std::to_string(level) + " is read");
+    }
+    for (std::size_t f = 0; f < files_.size(); ++f) {
+      const std::vector<NodeRows>& rows = steps_[step][f];
+      if (rows.empty()) continue;
+      std::vector<RowRange> ranges;
+      for (const NodeRows& r : rows) ranges.push_back(r.range);
+      std::vector<std::uint8_t> kept;
+      auto part = detail::load_sog_rows(place(files_[f]), ranges, &kept);
+      if (Status s = detail::merge_loaded(out, std::move(part), place(files_[f]).string()); !s) return s;
+      std::size_t at = 0;
+      for (const NodeRows& r : rows) {
+        for (std::uint64_t k = 0; k < r.range.count; ++k) {
+          if (kept[at++] != 0) nodes.push_back(r.node);
+        }
+      }
+    }
+    if (step != 0 || environment_.empty()) return out;
     std::error_code ignored;
-    if (!std::filesystem::exists(shell, ignored)) {
-      out.report.warnings.push_back("the environment " + shell.string() + " is not there");
+    if (!std::filesystem::exists(environment_, ignored)) {
+      out.report.warnings.push_back("the environment " + environment_.string() + " is not there");
       return out;
     }
-    if (Status s = detail::merge_loaded(out, load_sog(shell), shell.string()); !s) return s;
+    if (Status s = detail::merge_loaded(out, load_sog(environment_), environment_.string()); !s) return s;
+    nodes.resize(out.cloud.size(), static_cast<std::uint32_t>(nodes_));
     return out;
   }
 
@@ -180,7 +266,9 @@ class LodReader {
   std::size_t nodes_ = 0;
   std::vector<std::string> files_;
   std::vector<bool> there_;
-  std::vector<std::vector<RowRange>> rows_;  ///< of each file
+  std::filesystem::path environment_;
+  bool coarser_ = false;
+  std::vector<Step> steps_;
   std::map<int, std::size_t> instead_;       ///< nodes read at another level than the one asked for
 };
 
@@ -191,6 +279,14 @@ Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLo
     std::error_code ignored;
     const bool folder = std::filesystem::is_directory(path, ignored);
     return detail::described(LodReader(folder ? path / "lod-meta.json" : path, options).run());
+  });
+}
+
+Result<LoadedLodSet> load_lod_levels(const std::filesystem::path& path, const LoadLodOptions& options) {
+  return detail::guarded(path.string(), [&] {
+    std::error_code ignored;
+    const bool folder = std::filesystem::is_directory(path, ignored);
+    return LodReader(folder ? path / "lod-meta.json" : path, options).run_levels();
   });
 }
 

@@ -117,6 +117,22 @@ Result<LoadedCloud> load_named(const std::string& spec, const LoadSceneOptions& 
   return scene;
 }
 
+/// Keeps SH as the options say, and completes the report.
+void store(GaussianCloud& cloud, LoadReport& report, const LoadSceneOptions& options) {
+  const UpGuess up{report.up, report.up_seen};  // of each reader's own kind of file
+  if (options.storage == Storage::compact) {
+    report.sh_storage_error = half_sh_error(cloud);
+    if (report.sh_storage_error <= options.most_sh_error) {
+      compact_sh(cloud);
+    } else {
+      report.warnings.push_back("kept in float32: as binary16 a coefficient would differ by " +
+                                std::to_string(report.sh_storage_error) + ", more than " +
+                                std::to_string(options.most_sh_error));
+    }
+  }
+  describe(cloud, report, norm(up.up) > 0 ? up.up : Vec3d{0, -1, 0});
+}
+
 }  // namespace
 
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options) {
@@ -134,20 +150,27 @@ Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& 
         return {e.code(), spec + ": " + e.what()};
       }
     }
-    LoadReport& report = scene->report;
-    const UpGuess up{report.up, report.up_seen};  // of each reader's own kind of file
-    if (options.storage == Storage::compact) {
-      report.sh_storage_error = half_sh_error(scene->cloud);
-      if (report.sh_storage_error <= options.most_sh_error) {
-        compact_sh(scene->cloud);
-      } else {
-        report.warnings.push_back("kept in float32: as binary16 a coefficient would differ by " +
-                                  std::to_string(report.sh_storage_error) + ", more than " +
-                                  std::to_string(options.most_sh_error));
-      }
-    }
-    describe(scene->cloud, report, norm(up.up) > 0 ? up.up : Vec3d{0, -1, 0});
+    store(scene->cloud, scene->report, options);
     return scene;
+  });
+}
+
+Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec, const LoadSceneOptions& options) {
+  return detail::guarded(spec, [&]() -> Result<std::optional<LoadedLodSet>> {
+    std::error_code ignored;
+    const fs::path path(spec);
+    const bool folder = fs::is_directory(path, ignored);
+    const bool set = folder ? !fs::exists(path / "meta.json", ignored) && fs::exists(path / "lod-meta.json", ignored)
+                            : path.filename() == "lod-meta.json" && fs::exists(path, ignored);
+    if (!set) return std::optional<LoadedLodSet>();
+    auto levels = load_lod_levels(path, {.level = options.level});
+    if (levels.code() == Errc::unsupported) return std::optional<LoadedLodSet>();
+    if (!levels) return levels.status();
+    if (levels->tree.merged.size() == 0) return std::optional<LoadedLodSet>();
+    const LoadReport before = levels->report;
+    store(levels->cloud, levels->report, options);
+    levels->report.kept = before.kept;
+    return std::optional<LoadedLodSet>(std::move(*levels));
   });
 }
 

@@ -125,7 +125,8 @@ class SogReader {
   SogReader(SogFiles& files, SogMeta meta) : files_(files), meta_(std::move(meta)) {}
 
   /// All rows, or those of `ranges` where it is given.
-  Result<LoadedCloud> run(const std::string& source, const std::vector<detail::RowRange>* ranges) {
+  Result<LoadedCloud> run(const std::string& source, const std::vector<detail::RowRange>* ranges,
+                          std::vector<std::uint8_t>* kept) {
     const std::vector<detail::RowRange> all = {{0, meta_.count}};
     if (ranges == nullptr) ranges = &all;
     std::uint64_t total = 0;
@@ -139,6 +140,7 @@ class SogReader {
     }
     if (Status s = read_sizes(); !s) return s;
     const std::size_t count = static_cast<std::size_t>(total);
+    if (kept != nullptr) kept->assign(count, 0);
     GaussianCloud planes;
     // The bands are most of the cloud: what they come of is gone before there is anything else.
     if (Status s = look_up_bands(*ranges, count, planes.shN); !s) return s;
@@ -152,7 +154,7 @@ class SogReader {
       return for_rows(*ranges, first, last, [&](std::size_t row, std::size_t i) -> Status {
         raw.shN = sink.bands(i);
         Status s = gaussian(row, raw);
-        if (s) sink.add(raw);
+        if (s && sink.add(raw) && kept != nullptr) (*kept)[i] = 1;
         return s;
       });
     };
@@ -305,7 +307,7 @@ class SogReader {
 };
 
 Result<LoadedCloud> load(const std::filesystem::path& path,
-                         const std::vector<detail::RowRange>* ranges) {
+                         const std::vector<detail::RowRange>* ranges, std::vector<std::uint8_t>* kept = nullptr) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
     SogFiles files;
     if (Status s = files.open(path); !s) return s;
@@ -313,7 +315,7 @@ Result<LoadedCloud> load(const std::filesystem::path& path,
     if (!text) return text.status();
     auto meta = detail::parse_sog_meta(*text, files.label(files.meta()));
     if (!meta) return meta.status();
-    return SogReader(files, std::move(*meta)).run(path.string(), ranges);
+    return SogReader(files, std::move(*meta)).run(path.string(), ranges, kept);
   });
 }
 
@@ -321,9 +323,9 @@ Result<LoadedCloud> load(const std::filesystem::path& path,
 
 Result<LoadedCloud> load_sog(const std::filesystem::path& path) { return detail::described(load(path, nullptr)); }
 
-Result<LoadedCloud> detail::load_sog_rows(const std::filesystem::path& path,
-                                          const std::vector<RowRange>& ranges) {
-  return load(path, &ranges);
+Result<LoadedCloud> detail::load_sog_rows(const std::filesystem::path& path, const std::vector<RowRange>& ranges,
+                                          std::vector<std::uint8_t>* kept) {
+  return load(path, &ranges, kept);
 }
 
 }  // namespace gsnav::io

@@ -29,6 +29,7 @@
 #include "gsnav/io/spz.hpp"
 #include "gsnav/io/temporal_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/ops/validate_set.hpp"
 #include "io/allocations.hpp"
 #include "io/spz_file.hpp"
 #include "picture.hpp"
@@ -148,6 +149,15 @@ void read_lod_set(const std::string& input) {
   (void)made;
   write_file(folder / "lod-meta.json", input);
   check(io::load_lod_set(folder.path(), {.level = input.size() % 2 == 0 ? 0 : 1}));
+  const auto levels = io::load_lod_levels(folder.path());
+  if (!levels) return;
+  bool ok = validate(levels->cloud.set()).ok() && validate(levels->tree.merged.set()).ok();
+  for (const LodPlace& p : levels->tree.places) {
+    const GaussianCloud& of = p.finer == LodPlace::kNone ? levels->cloud : levels->tree.merged;
+    ok = ok && p.first_chunk + p.chunks <= of.view().all_chunks() && p.rows <= p.chunks * kProjectChunk;
+  }
+  for (const LodNode& n : levels->tree.nodes) ok = ok && is_finite(n.error) && n.error >= 0;
+  if (!ok) stop("levels that do not fit their cloud");
 }
 
 void read_npz(const std::string& input) {

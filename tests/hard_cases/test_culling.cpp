@@ -9,6 +9,8 @@
 #include "arrays.hpp"
 #include "backends.hpp"
 #include "cases.hpp"
+#include "gsnav/ops/count_culled.hpp"
+#include "gsnav/scene/edit_cloud.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 #include "support/scenes.hpp"
 
@@ -40,7 +42,8 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
     cloud.filter = mip ? Filter::mip : Filter::classic;
     const GaussianCloud in_chunks = sorted(cloud);
     REQUIRE(in_chunks.chunk_bounds.size() == in_chunks.view().chunk_count());
-    std::size_t left_out = 0, chunks = 0;
+    REQUIRE(in_chunks.part_bounds.size() == (in_chunks.size() + kChunkPart - 1) / kChunkPart);
+    std::size_t left_out = 0, chunks = 0, parts_left_out = 0;
     Rng rng(653);
     for (int i = 0; i < 12; ++i) {
       const Camera camera = camera_anywhere(rng);
@@ -53,6 +56,13 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
       const auto c64 = make_projection_camera<double>(camera, in_chunks.set(place), projection_rules(config));
       for (const ChunkBounds& b : in_chunks.chunk_bounds) left_out += may_be_visible(c64, b) ? 0 : 1;
       chunks += in_chunks.chunk_bounds.size();
+      for (std::size_t p = 0; p < in_chunks.part_bounds.size(); ++p) {
+        const ChunkBounds& chunk = in_chunks.chunk_bounds[p * kChunkPart / kProjectChunk];
+        parts_left_out += may_be_visible(c64, chunk) && !lies_in_view(c64, chunk) &&
+                                  !may_be_visible(c64, in_chunks.part_bounds[p])
+                              ? 1
+                              : 0;
+      }
       for_each_renderer([&](auto& renderer) {
         const auto a = renderer.render({{&cloud, place}}, camera, config);
         const auto b = renderer.render({{&in_chunks, place}}, camera, config);
@@ -64,7 +74,52 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
       });
     }
     CHECK(left_out > chunks / 5);  // or nothing was tested
+    CHECK(parts_left_out > chunks / 20);
   }
+}
+
+TEST_CASE("count_culled: what single Gaussians and boxes say, each by itself") {
+  GaussianCloud cloud = sorted(random_cloud(655, {.count = 1200, .sh_degree = 0, .needle = 0.05, .scale = 0.3,
+                                                  .center = {0, 0, 0}, .extent = 6}));
+  SerialBackend backend;
+  Renderer<float, SerialBackend> renderer(backend);
+  Rng rng(656);
+  std::uint64_t emitting = 0;
+  for (int i = 0; i < 6; ++i) {
+    Camera camera = camera_anywhere(rng);
+    RenderConfig config;
+    config.alpha_min = i % 2 == 0 ? 1.0 / 255 : 0.1;
+    config.tile_size = i % 3 == 0 ? 8 : 16;
+    const GaussianSet set = cloud.set();
+    const CullCounts n = count_culled(backend, std::span(&set, 1), camera, config);
+    renderer.set_config(config);
+    // A frame of each Gaussian alone: its pairs are the frame's.
+    CullCounts want;
+    want.rows = cloud.size();
+    for (std::size_t row = 0; row < cloud.size(); ++row) {
+      GaussianCloud one = cloud;
+      filter_rows(one, [row](std::size_t r) { return r == row; });
+      want.emitting += renderer.render(one.set(), camera).value().stats[0].tile_intersections > 0 ? 1 : 0;
+    }
+    const auto c64 = make_projection_camera<double>(camera, set, projection_rules(config));
+    for (std::size_t row = 0; row < cloud.size(); ++row) {
+      const ChunkBounds& chunk = cloud.chunk_bounds[row / kProjectChunk];
+      const bool whole = lies_in_view(c64, chunk) || may_be_visible(c64, cloud.part_bounds[row / kChunkPart]);
+      want.touched += may_be_visible(c64, chunk) && whole ? 1 : 0;
+    }
+    CAPTURE(i);
+    CHECK(n.rows == want.rows);
+    CHECK(n.emitting == want.emitting);
+    // Parts are tested with their chunk's largest opacity: a few more may be touched.
+    CHECK(n.touched >= want.touched);
+    CHECK(n.touched <= want.touched + 2 * kChunkPart);
+    CHECK(n.removed() + n.touched == n.removable() + n.emitting);
+    emitting += n.emitting;
+  }
+  CHECK(emitting > 80);
+  const CullCounts none = count_culled(backend, {}, axis_camera(), {});
+  CHECK(none.rows == 0);
+  CHECK(none.touched_per_emitting() == 1);
 }
 
 TEST_CASE("N21_depth_ties_keep_file_order when rows are sorted in space") {

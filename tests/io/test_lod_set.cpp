@@ -9,7 +9,12 @@
 #include "gsnav/io/sog.hpp"
 #include "support/data.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 using namespace gsnav;
+using io::LoadedLodSet;
 using namespace gsnav_test;
 
 namespace {
@@ -153,6 +158,84 @@ TEST_CASE("lod set: what makes no sense") {
   CHECK(io::load_lod_set(set.folder.path()).value().cloud.size() == 0);
 }
 
+TEST_CASE("lod set: levels to be drawn by view, each box's own") {
+  LodFolder set;
+  const LoadedLodSet levels = [&] {
+    static_cast<void>(set.load());  // writes the file
+    return io::load_lod_levels(set.folder.path()).value();
+  }();
+  CHECK(levels.report.kept == 10);
+  REQUIRE(levels.tree.roots.size() == 2);
+  REQUIRE(levels.tree.places.size() == 4);
+  const auto rows = [](const GaussianCloud& cloud, const LodPlace& place) {
+    std::vector<int> out;
+    for (std::size_t i = 0; i < place.rows; ++i) {
+      out.push_back(static_cast<int>(std::lround(cloud.mean(place.first_chunk * kProjectChunk + i).x)));
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+  };
+  const std::vector<LodPlace>& places = levels.tree.places;
+  CHECK(rows(levels.cloud, places[0]) == std::vector<int>{0, 1, 2, 3, 4, 5});
+  CHECK(rows(levels.cloud, places[1]) == std::vector<int>{6, 7, 8, 9});
+  CHECK(rows(levels.tree.merged, places[2]) == std::vector<int>{100, 101});
+  CHECK(rows(levels.tree.merged, places[3]) == std::vector<int>{102});
+  CHECK(places[2].finer == 0);
+  CHECK(places[3].finer == 1);
+  // All masses are within one box: the errors are between the least and the largest distance of the two.
+  CHECK(levels.tree.nodes[2].error > 94);
+  CHECK(levels.tree.nodes[2].error < 101);
+  // As a scene; the environment stays whole.
+  set.extra = R"(,"environment":"far/meta.json")";
+  static_cast<void>(set.load());
+  const auto scene = io::load_shipped_levels(set.folder.path().string()).value();
+  REQUIRE(scene.has_value());
+  REQUIRE(scene->tree.roots.size() == 3);
+  CHECK(rows(scene->cloud, scene->tree.places[2]) == std::vector<int>{200, 201});
+  CHECK(scene->tree.places[scene->tree.roots[2]].finer == LodPlace::kNone);
+  // From the coarser level on nothing is above, and what is no set ships nothing.
+  CHECK(!io::load_shipped_levels(set.folder.path().string(), {.level = 1}).value().has_value());
+  CHECK(!io::load_shipped_levels((set.folder / "1_0.sog").string()).value().has_value());
+  CHECK(!io::load_shipped_levels((set.folder / "none").string()).value().has_value());
+}
+
+TEST_CASE("lod set: levels that make no sense, or are not there") {
+  LodFolder set;
+  const auto refused = [&](Errc code, const char* part, const io::LoadLodOptions& options = {}) {
+    write_file(set.folder / "lod-meta.json", set.text());
+    const auto result = io::load_lod_levels(set.folder.path(), options);
+    CAPTURE(result.message());
+    CHECK(result.code() == code);
+    CHECK(contains(result.message(), part));
+    CHECK(contains(result.message(), "lod-meta.json"));
+  };
+  const std::string first = set.first;
+  // Two levels of two nodes share rows; the same rows for both levels of one node are one level.
+  set.first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":0,"offset":5,"count":2}})";
+  refused(Errc::invalid_file, "two nodes share rows of 0_0/meta.json from 5");
+  set.first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":0,"offset":0,"count":6}})";
+  write_file(set.folder / "lod-meta.json", set.text());
+  CHECK(io::load_lod_levels(set.folder.path()).value().tree.places.size() == 3);
+  for (const char* bad : {R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":9,"offset":0,"count":2}})",
+                          R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":-1,"count":2}})",
+                          R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":0}})"}) {
+    set.first = bad;
+    refused(Errc::invalid_file, "level 1");
+  }
+  set.first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":0,"count":9}})";
+  write_file(set.folder / "lod-meta.json", set.text());
+  CHECK(io::load_lod_levels(set.folder.path()).code() == Errc::invalid_file);
+  // A coarser level that is not there is left out.
+  set.first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":2,"offset":0,"count":2}})";
+  write_file(set.folder / "lod-meta.json", set.text());
+  CHECK(io::load_lod_levels(set.folder.path()).value().tree.places.size() == 3);
+  set.first = first;
+  refused(Errc::invalid_argument, "level 3", {.level = 3});
+  write_file(set.folder / "lod-meta.json", "{");
+  CHECK(io::load_lod_levels(set.folder.path()).code() == Errc::invalid_file);
+  CHECK(io::load_lod_levels(set.folder / "none").code() == Errc::file_not_found);
+}
+
 TEST_CASE("lod set: real sets, level by level") {
   const std::string playbot = data_file("splats/playcanvas/playbot/lod-meta.json");
   if (!playbot.empty()) {
@@ -168,5 +251,9 @@ TEST_CASE("lod set: real sets, level by level") {
   if (!showroom.empty()) {
     CHECK(io::load_lod_set(showroom, {.level = 2}).value().report.read == 1495636);
     CHECK(io::load_lod_set(showroom, {.level = 3}).value().report.read == 746973);
+    const LoadedLodSet levels = io::load_lod_levels(showroom).value();
+    CHECK(levels.report.read == 1495636);
+    CHECK(levels.tree.roots.size() == 362);
+    CHECK(levels.tree.places.size() == 362 + 356);
   }
 }

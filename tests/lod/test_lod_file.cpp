@@ -30,7 +30,7 @@ TEST_CASE("lod file: what is read is what was written") {
     if (far) {
       cloud.origins = {{0, 0, 0}, {128, 0, -64}};
       cloud.origin_ids.assign(cloud.size(), 1);
-      cloud.chunk_bounds = chunk_bounds_of(cloud);
+      bound_chunks(cloud);
     }
     const LodTree tree = build_lod(backend, cloud).value();
     REQUIRE(io::save_lod(folder / "a.lod", tree, cloud).ok());

@@ -105,12 +105,14 @@ TEST_CASE("ledger: its counts are those of the frame") {
   const GaussianSet set = profile.applied_to(cloud.set());
   const auto f = renderer.render(set, camera).value();
   const FrameLedger l = frame_ledger(std::span(&set, 1), camera, config, f.stats[0], nullptr, &profile);
-  CHECK(l.gaussians == cloud.size());
+  CHECK(l.culled.rows == cloud.size());
   CHECK(l.visible == f.stats[0].visible);
-  CHECK(l.touched >= l.visible);
-  CHECK(l.touched <= l.gaussians);
+  CHECK(l.culled.emitting > 0);
+  CHECK(l.culled.emitting <= l.visible);
+  CHECK(l.culled.touched >= l.visible);
+  CHECK(l.culled.touched <= l.culled.rows);
   CHECK(l.sh_skipped == profile.sh_numbers - profile.sh_numbers_read);
   const std::string text = ledger_text(l);
   CHECK(text.find(std::to_string(l.sh_skipped) + " SH coefficients") != std::string::npos);
-  CHECK(text.find(std::to_string(l.touched) + " touched") != std::string::npos);
+  CHECK(text.find(std::to_string(l.culled.touched) + " touched") != std::string::npos);
 }

@@ -64,9 +64,8 @@ TEST_CASE("packed clouds: each field within its steps, which the errors report")
     REQUIRE(got.size() == n);
     CHECK(errors.mean_bits == 16);
     CHECK(errors.sh_bits == 8);
-    // 10 codes, 3 halves and the bands; ids of rows, chunks of 40 and 56 bytes.
-    CHECK(packed.bytes() ==
-          n * (20 + 6 + rest + 4) + full.chunk_bounds.size() * (sizeof(PackedChunk) + sizeof(ChunkBounds)));
+    // 10 codes, 3 halves and the bands; ids of rows, chunks of 40 and 56 bytes, parts of 56.
+    CHECK(packed.bytes() == n * (20 + 6 + rest + 4) + (n + 255) / 256 * (40 + 56) + (n + 63) / 64 * 56);
     PackErrors seen;
     for (std::size_t i = 0; i < n; ++i) {
       long double moved = 0, largest = 0, change = 0;
@@ -161,6 +160,24 @@ TEST_CASE("packed clouds: images of what the codes stand for, bit for bit") {
   }
 }
 
+TEST_CASE("packed clouds: chunks by a list are those of the floats, whatever its order") {
+  const GaussianCloud full = scene_of(1, 3000);
+  const PackedCloud packed = pack_cloud(full, kAnything);
+  const GaussianCloud floats = unpack_cloud(packed);
+  const std::vector<std::uint32_t> list{7, 2, 11, 0};
+  on_backends([&](auto& backend) {
+    const auto drawn = [&](GaussianSet set) {
+      set.gaussians.drawn_chunks = {list.data(), list.size()};
+      return render<float>(backend, {set}, kCamera);
+    };
+    const auto got = drawn(packed.set()), want = drawn(floats.set());
+    CHECK(got.stats[0].visible > 50);
+    CHECK(got.stats[0].visible == want.stats[0].visible);
+    CHECK(got.rgb == want.rgb);
+    CHECK(got.median_depth == want.median_depth);
+  });
+}
+
 TEST_CASE("packed clouds: far places, large and needle-like Gaussians, a last chunk that is not full") {
   // A scene from -300 to 300 m is of many origins; shapes from flat to needles of 1e4 : 1.
   GaussianCloudBuilder builder(1);
@@ -192,6 +209,10 @@ TEST_CASE("packed clouds: far places, large and needle-like Gaussians, a last ch
       REQUIRE(floats.mean(i)[k] >= bounds.low[k]);
       REQUIRE(floats.mean(i)[k] <= bounds.high[k]);
       REQUIRE(floats.scales[static_cast<std::size_t>(k)][i] <= bounds.scale_max);
+      const ChunkBounds& part = packed.rest.part_bounds[i / kChunkPart];
+      REQUIRE(floats.mean(i)[k] >= part.low[k]);
+      REQUIRE(floats.mean(i)[k] <= part.high[k]);
+      REQUIRE(floats.scales[static_cast<std::size_t>(k)][i] <= part.scale_max);
     }
   }
   on_backends([&](auto& backend) {

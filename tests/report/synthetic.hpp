@@ -84,7 +84,7 @@ inline std::vector<Row> synthetic_rows() {
                 .set("gaussians", 300000)
                 .set("visible", 120000);
             r.set("pairs", 900000 * s.time).set("evaluations", 3e7 * s.time).set("bytes", 7e7);
-            r.set("peak_rss", 4.2e8);
+            r.set("peak_rss", 4.2e8).set("touched", 150000).set("emitting", 120000);
             if (view == 3 && psnr < 60 && width == 256)
               r.set("image", std::string("diff_") + s.knob + ".png");
             rows.push_back(r);

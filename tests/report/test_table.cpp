@@ -5,6 +5,7 @@
 #include "synthetic.hpp"
 #include "table.hpp"
 #include "table_budget.hpp"
+#include "table_targets.hpp"
 
 using namespace gsnav_report;
 
@@ -139,4 +140,47 @@ TEST_CASE("budgets: an infinite or negative-infinite error is missed, not met") 
   REQUIRE(checks.size() == 2);
   CHECK(!checks[0].met());
   CHECK(!checks[1].met());
+}
+
+TEST_CASE("targets: one setting beside another, over the views that have both") {
+  std::vector<Row> rows;
+  const auto add = [&rows](const char* profile, const char* oracle, const char* sensor, int view, double psnr, double ms) -> Row& {
+    Row r = render(profile, "none", "", view, psnr, ms);
+    r.set("oracle", oracle).set("sensor", sensor).set("width", 256).set("height", 256).set("gaussians", 1000);
+    rows.push_back(r);
+    return rows.back();
+  };
+  add("fast", "photo4", "rgbd", 0, 30, 10);
+  add("fast", "photo4", "rgbd", 1, 40, 30);
+  add("fast", "photo4", "rgbd", 2, 40, 1000);  // no lod row of that view
+  add("lod", "photo4", "rgbd", 0, 37, 4);
+  add("lod", "photo4", "rgbd", 1, 39, 6);
+  add("fast", "contract", "rgbd", 0, 100, 12).set("touched", 300).set("emitting", 200).set("row_bytes", 236);
+  add("fast", "contract", "rgbd", 1, 100, 20).set("touched", 500).set("emitting", 400).set("row_bytes", 236);
+  add("fast", "contract", "depth", 0, 100, 6).set("touched", 999).set("emitting", 1).set("row_bytes", 59);
+  add("fast", "contract", "depth", 1, 100, 10).set("touched", 999).set("emitting", 1).set("row_bytes", 59);
+  add("exact", "contract", "rgbd", 0, 78, 12).set("knob", "storage").set("knob_value", "packed").set("cloud_bytes", 83000).set("band_bytes", 45000);
+  const std::vector<TargetCheck> checks = check_targets(Table(rows, {}));
+  const auto value = [&checks](const std::string& measure) -> const TargetCheck& {
+    const auto it = std::find_if(checks.begin(), checks.end(), [&](const TargetCheck& c) { return c.measure.starts_with(measure); });
+    REQUIRE(it != checks.end());
+    return *it;
+  };
+  CHECK(checks.size() == 7);
+  CHECK(value("lod: times").value == doctest::Approx(40.0 / 10));
+  CHECK(value("lod: times").met());
+  CHECK(value("lod: nearer to the photo than fast, mean").value == doctest::Approx(3));
+  CHECK(value("lod: nearer to the photo than fast, least").value == doctest::Approx(-1));
+  CHECK(!value("lod: nearer to the photo than fast, least").met());
+  CHECK(value("lod: times").views == 2);
+  CHECK(value("culling").value == doctest::Approx(800.0 / 600));
+  CHECK(!value("culling").met());
+  CHECK(value("culling").note == "removed 60.0 % of all, 85.7 % of what could be");
+  CHECK(value("depth alone: times").value == doctest::Approx(2));
+  CHECK(value("depth alone: fewer").value == doctest::Approx(75));
+  CHECK(value("packed").value == doctest::Approx(38));
+  const std::string text = targets_text(checks);
+  CHECK(std::count(text.begin(), text.end(), '\n') == 7);
+  CHECK(text.find("box, 256x256, serial: packed: bytes a Gaussian beside its SH bands: 38") != std::string::npos);
+  CHECK(check_targets(Table({}, {})).empty());
 }

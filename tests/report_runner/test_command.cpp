@@ -86,6 +86,16 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
     picture = picture || std::filesystem::exists(folder / ("out/" + row.get("image")));
     CHECK(*row.number("time_p50_ms") > 0);
     CHECK(*row.number("bytes") > 0);
+    CHECK(*row.number("row_bytes") == (row.get("sensor") == "depth" ? 44 : 92));
+    if (row.get("knob") == "none") {
+      CHECK(*row.number("emitting") > 0);
+      CHECK(*row.number("touched") >= *row.number("emitting"));
+      CHECK(*row.number("gaussians") >= *row.number("touched"));
+    }
+    if (row.get("knob_value") == "packed") {
+      CHECK(*row.number("band_bytes") == 9 * *row.number("gaussians"));
+      CHECK(*row.number("cloud_bytes") - *row.number("band_bytes") < 40 * *row.number("gaussians"));
+    }
     if (row.get("profile") != "exact" || row.get("knob") != "none" || row.get("oracle") != "contract") continue;
     ++exact;
     CAPTURE(row.line());
@@ -102,8 +112,13 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
     }
   }
   CHECK(exact == 2 * (3 + 1));  // views x (openmp by sensor, serial)
-  CHECK(knobs == 2 * (3 * 3 + 8));
+  CHECK(knobs == 2 * (3 * 3 + 9));
   CHECK(picture);
+  for (const char* target : {"culling: Gaussians touched", "depth alone: times faster", "depth alone: fewer bytes",
+                             "packed: bytes a Gaussian"}) {
+    CAPTURE(target);
+    CHECK(first.text.find(std::string("tiny, 48x32, openmp: ") + target) != std::string::npos);
+  }
   CHECK(std::filesystem::exists(folder / "out/report.html"));
 
   // Resumed: nothing is left to do. Cut short: only what is missing is made.

@@ -9,6 +9,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/scene/lod_build.hpp"
 #include "gsnav/sim/batch.hpp"
+#include "lod/level_support.hpp"
 #include "same_bits.hpp"
 #include "sim_scene.hpp"
 #include "wandering.hpp"
@@ -29,6 +30,18 @@ SimulatorScene detailed_scene() {
   return s;
 }
 
+/// The same with levels as a set ships them, in place of a tree.
+SimulatorScene shipped_scene() {
+  static const auto set = [] {
+    OpenMPBackend backend(2);
+    return join_levels(backend, shipped_levels(*flat_scene().assets[0].cloud, 2), 16).value();
+  }();
+  SimulatorScene s = peopled_scene(2000);
+  s.assets[0].cloud = std::make_shared<const GaussianCloud>(set.cloud);
+  s.assets[0].lod = std::make_shared<const LodTree>(set.tree);
+  return s;
+}
+
 LodChoice coarse() {
   LodChoice c;
   c.pixels = 2;
@@ -41,7 +54,10 @@ LodChoice coarse() {
 TEST_CASE(
     "a simulator with levels of detail sees what the cut of its camera draws, people as they are") {
   OpenMPBackend backend(2);
-  const SimulatorScene scene = detailed_scene();
+  bool shipped = false;
+  SUBCASE("built") {}
+  SUBCASE("shipped by a set") { shipped = true; }
+  const SimulatorScene scene = shipped ? shipped_scene() : detailed_scene();
   SimulatorConfig config;
   config.sensors = rgbd_sensors(40, 56);
   const PointNavEpisode episode = to_kitchen();
@@ -124,6 +140,8 @@ TEST_CASE("levels of detail that a scene does not have are refused, by name") {
   SimulatorScene other = detailed_scene();
   auto more = std::make_shared<LodTree>();
   other.assets[0].lod = more;
+  CHECK(refused(other).message().find("of another cloud") != std::string::npos);
+  other.assets[0].lod = shipped_scene().assets[0].lod;
   CHECK(refused(other).message().find("of another cloud") != std::string::npos);
   config.lod->pixels = 0;
   CHECK(refused(detailed_scene()).message().find("LodChoice.pixels = 0") != std::string::npos);

@@ -36,7 +36,7 @@ GaussianCloud in_order(const GaussianCloud& cloud, const std::vector<std::uint32
   permute(out.shN, cloud.shN, cloud.size() == 0 ? 0 : cloud.shN.size() / cloud.size());
   permute(out.origin_ids, cloud.origin_ids, 1);
   out.row_ids = order;
-  out.chunk_bounds = chunk_bounds_of(out);
+  bound_chunks(out);
   return out;
 }
 

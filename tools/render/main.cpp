@@ -38,7 +38,8 @@ namespace {
 using namespace gsnav;
 
 struct Options {
-  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median", composite = "merged", storage = "full";
+  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median", composite = "merged", storage = "full",
+              lod_levels = "shipped";
   std::vector<std::string> meshes;
   int width = 0, height = 0, threads = 0;
   double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0, lod_pixels = LodChoice{}.pixels;
@@ -238,6 +239,10 @@ int main(int argc, char** argv) {
   app.add_option("--lod-error", o.lod_pixels, "Of the profile lod: how far merged Gaussians may be off, pixels")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
+  app.add_option("--lod-levels", o.lod_levels,
+                 "Of the profile lod: shipped, those that a streamed set has, where it has any; built: the tree of its finest")
+      ->check(CLI::IsMember({"shipped", "built"}))
+      ->capture_default_str();
   app.add_flag("--ledger", o.ledger, "Print what each frame skipped, merged, limited and rounded, and by how much");
   app.add_option("--depth", o.depth, "median, expected, accumulated, first or first:TAU")
       ->capture_default_str();
@@ -281,8 +286,24 @@ int main(int argc, char** argv) {
   load.storage = o.storage == "compact" ? io::Storage::compact : io::Storage::full;
   GaussianCloud full;
   std::optional<PackedCloud> packed;
+  std::optional<LodTree> shipped;
   LoadReport report;
-  if (o.storage == "packed") {
+  if (o.profile == "lod" && o.storage == "packed") {
+    return fail("--profile lod: not with --storage packed; use full or compact");
+  }
+  if (o.profile == "lod" && o.lod_levels == "shipped") {
+    auto set = io::load_shipped_levels(o.scene, load);
+    if (!set) return fail(set.message());
+    if (*set) {
+      full = std::move((*set)->cloud);
+      report = std::move((*set)->report);
+      shipped = std::move((*set)->tree);
+    }
+  }
+  if (shipped) {
+    std::printf("levels of detail: %zu, %.1f MB, shipped\n", shipped->levels(),
+                static_cast<double>(shipped->bytes()) * 1e-6);
+  } else if (o.storage == "packed") {
     auto scene = io::load_packed_scene(o.scene, load);
     if (!scene) return fail(scene.message());
     packed = std::move(scene->cloud);
@@ -322,8 +343,7 @@ int main(int argc, char** argv) {
   if (!packed) profile = profile_scene(full, o.profile == "exact" ? 0 : kUnseenColor);
   std::optional<io::CachedLod> lod;
   OpenMPBackend openmp(o.threads);
-  if (o.profile == "lod") {
-    if (packed) return fail("--profile lod: not with --storage packed; use full or compact");
+  if (o.profile == "lod" && !shipped) {
     LodSettings settings;
     const bool terminal = isatty(fileno(stdout)) != 0;
     settings.progress = [terminal](double share) {
@@ -337,7 +357,7 @@ int main(int argc, char** argv) {
                 static_cast<double>(lod->tree.bytes()) * 1e-6, lod->built ? "built" : "read");
     if (!lod->warning.empty()) std::printf("%s\n", lod->warning.c_str());
   }
-  const Scene drawn{report, profile ? &*profile : nullptr, lod ? &lod->tree : nullptr};
+  const Scene drawn{report, profile ? &*profile : nullptr, shipped ? &*shipped : lod ? &lod->tree : nullptr};
 
   const auto on = [&]<class S>(auto& backend) {
     return packed ? run<S>(backend, o, *depth, *packed, drawn, meshes, *cameras)

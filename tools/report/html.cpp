@@ -22,8 +22,9 @@ struct Section {
   std::string (*make)(const Table&);
 };
 
-const std::array<Section, 9> kSections{{
+const std::array<Section, 10> kSections{{
     {"budgets", "Budgets", "The worst row of each profile against what it promises.", budget_section},
+    {"targets", "Targets", "One setting beside another, over all views of a scene.", target_section},
     {"pareto", "Speed against error",
      "Each mark is a setting on one backend: the mean over the views of all scenes, with a whisker to "
      "the "

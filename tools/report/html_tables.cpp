@@ -5,6 +5,7 @@
 #include "html_sections.hpp"
 #include "html_text.hpp"
 #include "table_budget.hpp"
+#include "table_targets.hpp"
 
 namespace gsnav_report {
 namespace {
@@ -36,6 +37,9 @@ constexpr Column kSettingColumns[] = {
     {"visible", "visible", 1, false, false},
     {"pairs", "pairs", 1, false, false},
     {"evaluations", "evaluations", 1, false, false},
+    {"touched", "touched", 1, false, false},
+    {"emitting", "in a tile", 1, false, false},
+    {"row_bytes", "bytes read a Gaussian", 1, false, false},
     {"bytes", "MB of Gaussians", 1e-6, false, false},
     {"peak_rss", "peak memory, MB", 1e-6, false, false},
 };
@@ -120,6 +124,18 @@ std::string budget_section(const Table& table) {
   return out + html_table({"profile", "backend", "measure", "verdict", "oracle", "worst row", "budget",
                            "worst", "rows"},
                           rows, 6);
+}
+
+std::string target_section(const Table& table) {
+  std::vector<std::vector<std::string>> rows;
+  for (const TargetCheck& c : check_targets(table)) {
+    rows.push_back({escape(c.scene), escape(c.size), escape(c.backend), escape(c.measure),
+                    c.met() ? "<span class=\"pass\">reached</span>" : "<span class=\"miss\">not reached</span>",
+                    escape(c.note), (c.at_least ? "\u2265 " : "\u2264 ") + format_round(c.limit), format(c.value, 4),
+                    std::to_string(c.views)});
+  }
+  if (rows.empty()) return {};
+  return html_table({"scene", "size", "backend", "measure", "verdict", "note", "target", "measured", "views"}, rows, 6);
 }
 
 std::string settings_section(const Table& table) {

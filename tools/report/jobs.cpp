@@ -39,6 +39,7 @@ std::vector<Knob> knobs() {
       {"response", {"ewa", "tangent_plane", "ray"}, {Oracle::contract, Oracle::ray_key, Oracle::ray}},
       {"compat", {"inria", "gsplat", "habitat_gs"}, {Oracle::contract}}};
   for (const StorageCodec& c : storage_codecs()) all[4].values.emplace_back(c.name);
+  all[4].values.emplace_back(kPackedStorage);
   return all;
 }
 

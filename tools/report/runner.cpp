@@ -20,6 +20,7 @@
 #include "skinning.hpp"
 #include "sweep.hpp"
 #include "table.hpp"
+#include "table_targets.hpp"
 
 namespace gsnav_report {
 
@@ -140,6 +141,7 @@ Status run_report(const Options& o) {
   if (!o.docs.empty()) {
     if (Status s = write_docs(*table, o.docs); !s) return s;
   }
+  std::fputs(targets_text(check_targets(*table)).c_str(), stdout);
   std::printf("%zu rows in %s\n", csv->rows().size(), path.c_str());
   return {};
 }

@@ -63,6 +63,11 @@ Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s
     draw();
   }
   out.peak_memory = peak_memory();
+  if constexpr (is_host_backend<B>) {
+    if (s.knob == "none") {
+      out.culled = count_culled(backend, cut ? cut->sets() : std::span(&set, 1), c, renderer.config());
+    }
+  }
   out.scratch_bytes = renderer.scratch_bytes();
   if (!status) return status;
   return out;
@@ -83,6 +88,11 @@ Result<const LodTree*> SceneRunner::tree_of(const Setting& s) {
     }
   }
   return &*tree_;
+}
+
+std::uint64_t SceneRunner::row_bytes(const GaussianCloud& cloud, const std::string& sensor) noexcept {
+  const auto colors = static_cast<std::uint64_t>(3 * sh_coefficient_count(cloud.sh_degree));
+  return sizeof(float) * (11 + (sensor == "depth" ? 0 : colors));
 }
 
 Result<SceneRunner::Outcome> SceneRunner::render(const Setting& s, const GaussianCloud& cloud, int runs) {
@@ -126,8 +136,14 @@ Status SceneRunner::run(const Setting& s) {
   if (missing.empty()) return {};
   GaussianCloud encoded;
   const GaussianCloud* cloud = &scene_.cloud;
-  std::size_t cloud_bytes = cloud->bytes();
-  if (s.knob == "storage") {
+  std::size_t cloud_bytes = cloud->bytes(), band_bytes = sizeof(float) * cloud->shN.size();
+  if (s.knob == "storage" && s.knob_value == kPackedStorage) {
+    PackedThrough packed = through_packing(*cloud);
+    encoded = std::move(packed.cloud);
+    cloud_bytes = packed.bytes;
+    band_bytes = packed.band_bytes;
+    cloud = &encoded;
+  } else if (s.knob == "storage") {
     Result<GaussianCloud> stored = through_storage(*cloud, s.knob_value);
     if (!stored) return stored.status();
     encoded = std::move(*stored);
@@ -151,6 +167,9 @@ Status SceneRunner::run(const Setting& s) {
     const RenderStats& stats = outcome->frames.stats[0];
     row.set("time_p50_ms", outcome->timing.p50_ms).set("time_p99_ms", outcome->timing.p99_ms);
     row.set("gaussians", stats.gaussians).set("visible", stats.visible).set("pairs", stats.tile_intersections);
+    if (outcome->culled.rows != 0) row.set("touched", outcome->culled.touched).set("emitting", outcome->culled.emitting);
+    row.set("row_bytes", row_bytes(*cloud, s.sensor)).set("cloud_bytes", std::uint64_t{cloud_bytes});
+    row.set("band_bytes", std::uint64_t{band_bytes});
     // What the contract cannot do without; knobs have other counts of their own.
     if (s.knob == "none" && q == Oracle::contract) row.set("evaluations", named->reference->evaluations);
     row.set("bytes", static_cast<std::uint64_t>(outcome->scratch_bytes + cloud_bytes));

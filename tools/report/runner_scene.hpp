@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/ops/count_culled.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "options.hpp"
@@ -40,6 +42,7 @@ class SceneRunner {
   struct Outcome {
     gsnav::Frames<float> frames;
     Timing timing;
+    gsnav::CullCounts culled;  ///< zeros where a knob is turned, and of arrays that are not the host's
     std::size_t scratch_bytes = 0;
     std::uint64_t peak_memory = 0;
   };
@@ -50,6 +53,8 @@ class SceneRunner {
 
   gsnav::Camera camera(const Setting& s) const;
   int threads(const Setting& s) const;
+  /// What a frame of a sensor reads of one Gaussian.
+  static std::uint64_t row_bytes(const gsnav::GaussianCloud& cloud, const std::string& sensor) noexcept;
   std::string key(const Setting& s, Oracle oracle) const;
   /// The scene's levels of detail: read from beside its file, or built. Null: the setting does not ask for them.
   gsnav::Result<const gsnav::LodTree*> tree_of(const Setting& s);

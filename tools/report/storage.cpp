@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 
 namespace gsnav_report {
@@ -67,6 +68,13 @@ float round_to_half(float x) noexcept {
   return static_cast<float>(std::clamp(std::nearbyint(v / step) * step, -65504.0, 65504.0));
 }
 
+PackedThrough through_packing(const GaussianCloud& cloud) {
+  const PackedCloud packed = pack_cloud(cloud);
+  const GaussianCloud& rest = packed.rest;
+  return {unpack_cloud(packed), packed.bytes(),
+          packed.shN.size() + sizeof(float) * rest.shN.size() + sizeof(std::uint16_t) * rest.shN_half.size()};
+}
+
 Result<GaussianCloud> through_storage(const GaussianCloud& cloud, std::string_view name) {
   const auto codec = std::find_if(kCodecs.begin(), kCodecs.end(), [&](const auto& c) { return c.name == name; });
   if (codec == kCodecs.end()) {
@@ -92,7 +100,7 @@ Result<GaussianCloud> through_storage(const GaussianCloud& cloud, std::string_vi
   } else {
     each(name == "opacity_8" ? out.opacities : name == "sh0_8" ? out.sh0 : out.shN, to_grid);
   }
-  if (!out.chunk_bounds.empty()) out.chunk_bounds = chunk_bounds_of(out);
+  if (!out.chunk_bounds.empty()) bound_chunks(out);
   return out;
 }
 

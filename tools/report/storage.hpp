@@ -23,6 +23,16 @@ struct StorageCodec {
 /// All codecs that the report measures, by name.
 std::span<const StorageCodec> storage_codecs() noexcept;
 
+/// The knob's value that packs all fields at once (scene/packed_cloud.hpp).
+inline constexpr std::string_view kPackedStorage = "packed";
+
+/// A cloud that was packed, in floats again, and the bytes that it had; of these, in SH bands from 1 on.
+struct PackedThrough {
+  gsnav::GaussianCloud cloud;
+  std::size_t bytes = 0, band_bytes = 0;
+};
+PackedThrough through_packing(const gsnav::GaussianCloud& cloud);
+
 /// `cloud` as it comes back from storage by the codec `name`; all other fields keep their bits.
 /// Errors: invalid_argument for an unknown name, with the known ones.
 gsnav::Result<gsnav::GaussianCloud> through_storage(const gsnav::GaussianCloud& cloud, std::string_view name);

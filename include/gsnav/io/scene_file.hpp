@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/io/lod_set.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 
@@ -52,6 +54,11 @@ Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& 
 /// The same, packed: a third of the memory, to be rendered. While it is packed both are there. `options.storage` must
 /// be full. Errors: load_scene's.
 Result<LoadedPackedCloud> load_packed_scene(const std::string& spec, const LoadSceneOptions& options = {});
+
+/// A scene that ships its levels of detail, with them, as load_lod_levels reads it; nothing where `spec` is no streamed
+/// set, where no level above its finest is there, or where its nodes are too small to be drawn one by one. Rows are in chunks whatever `options.sort` says.
+/// Errors: load_lod_levels'.
+Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec, const LoadSceneOptions& options = {});
 
 /// The report as text for people, a line for each thing there is to say, each ended.
 std::string report_text(const LoadReport& report);

@@ -25,6 +25,9 @@ inline constexpr int kMaxShDegree = 3;
 /// How many consecutive Gaussians are culled together and projected as one work item.
 inline constexpr std::size_t kProjectChunk = 256;
 
+/// Of a chunk that is only partly in view so many consecutive rows at a time are tested once more.
+inline constexpr std::size_t kChunkPart = 64;
+
 /// What a chunk of Gaussians may reach: a bound for all of them, in the asset's frame.
 struct ChunkBounds {
   Vec3d low{}, high{};    ///< box of the means, metres
@@ -79,6 +82,9 @@ struct GaussianView {
   /// One a chunk of kProjectChunk rows, [ceil(N / kProjectChunk)]: chunks that cannot be seen are not
   /// touched. Empty: all are.
   View<const ChunkBounds> chunk_bounds;
+  /// One for kChunkPart rows, [ceil(N / kChunkPart)]: of chunks at the edge of the view only the parts that may be seen
+  /// are touched. In host memory. Empty: chunks are taken whole.
+  View<const ChunkBounds> part_bounds;
   /// In place of quats, scales, opacities, sh0 and mostly means and shN, which are empty then. In host memory only.
   PackedRows packed;
 

@@ -53,6 +53,25 @@ GSNAV_HD bool chunk_is_candidate(const ProjectArgs<S>& args, std::size_t c) noex
   return bounds.empty() || may_be_visible(args.camera64, bounds[args.gaussians.chunk_id(c)]);
 }
 
+/// Which parts of chunk c have Gaussians that may be visible: bit p for the kChunkPart rows from p kChunkPart on.
+/// Never without one that is; no bit where chunk_is_candidate says no.
+template <class S>
+GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c) noexcept {
+  static_assert(kProjectChunk / kChunkPart <= 32);
+  const GaussianView& gs = args.gaussians;
+  if (gs.chunk_bounds.empty()) return ~0u;
+  const std::size_t id = gs.chunk_id(c);
+  const double s_max = detail::ChunkInView(args.camera64, gs.chunk_bounds[id]).s_max();
+  if (!may_be_visible(args.camera64, gs.chunk_bounds[id], s_max)) return 0;
+  if (gs.part_bounds.empty() || lies_in_view(args.camera64, gs.chunk_bounds[id])) return ~0u;
+  constexpr std::size_t kParts = kProjectChunk / kChunkPart;
+  std::uint32_t parts = 0;
+  for (std::size_t p = 0; p < kParts && id * kParts + p < gs.part_bounds.size; ++p) {
+    if (may_be_visible(args.camera64, gs.part_bounds[id * kParts + p], s_max)) parts |= 1u << p;
+  }
+  return parts;
+}
+
 namespace detail {
 
 /// mean - camera position, asset frame, in the scalar of the kernel.
@@ -346,10 +365,13 @@ struct ProjectChunk {
     const std::size_t begin = args.gaussians.chunk_id(c) * kProjectChunk, size = args.gaussians.size;
     const std::size_t end = begin + kProjectChunk < size ? begin + kProjectChunk : size;
     const std::size_t base = (args.first_chunk + c) * kProjectChunk;
-    const bool candidate = chunk_is_candidate(args, c);
-    std::uint32_t written = 0;
-    for (std::size_t i = begin; i < end && candidate; ++i) {
-      if (project_gaussian(args, base + written, i)) ++written;
+    std::uint32_t written = 0, parts = candidate_parts(args, c);
+    for (std::size_t first = begin; first < end && parts != 0; first += kChunkPart, parts >>= 1) {
+      if ((parts & 1u) == 0) continue;
+      const std::size_t last = first + kChunkPart < end ? first + kChunkPart : end;
+      for (std::size_t i = first; i < last; ++i) {
+        if (project_gaussian(args, base + written, i)) ++written;
+      }
     }
     args.counts[args.first_chunk + c] = written;
   }

@@ -63,10 +63,10 @@ Status gaussians_at(B& backend, const TemporalView& in, double t, Moment<B>& out
   at.opacities = out.opacities.view();
   out.gaussians.opacities = {out.opacities.data(), n};
   backend.parallel_for(n, at);
-  out.gaussians.chunk_bounds = {};
+  out.gaussians.chunk_bounds = out.gaussians.part_bounds = {};
   if constexpr (is_host_backend<B>) {
     if (!in.base.chunk_bounds.empty()) {
-      const std::size_t chunks = in.base.chunk_count();
+      const std::size_t chunks = in.base.all_chunks();
       out.bounds.resize_discard(chunks);
       backend.parallel_for(chunks, BoundChunkAt{out.gaussians, out.bounds.view()});
       out.gaussians.chunk_bounds = {out.bounds.data(), chunks};

@@ -18,7 +18,7 @@ inline Status validate_packed(const GaussianView& g) {
   const bool codes = p.codes.size == PackedRows::kPlanes * g.size ||
                      (p.codes.size == PackedRows::kMeans * g.size && !g.means[0].empty());
   const char* wrong = !codes                                          ? "codes"
-                      : p.chunks.size != g.chunk_count()              ? "chunks"
+                      : p.chunks.size != g.all_chunks()              ? "chunks"
                       : !p.sh0.empty() && p.sh0.size != 3 * g.size    ? "sh0"
                       : !p.shN.empty() && p.shN.size != rest * g.size ? "shN"
                       : !p.shN.empty() && p.sh0.empty()               ? "shN (without sh0)"
@@ -85,6 +85,11 @@ inline Status validate(const GaussianSet& set) {
   if (!g.chunk_bounds.empty() && g.chunk_bounds.size != g.all_chunks()) {
     return bad("chunk_bounds has " + std::to_string(g.chunk_bounds.size) + " values where " +
                std::to_string(g.all_chunks()) + " are needed");
+  }
+  const std::size_t parts = (g.size + kChunkPart - 1) / kChunkPart;
+  if (!g.part_bounds.empty() && g.part_bounds.size != parts) {
+    return bad("part_bounds has " + std::to_string(g.part_bounds.size) + " values where " + std::to_string(parts) +
+               " are needed");
   }
   if (!g.chunk_sh_degrees.empty() && g.chunk_sh_degrees.size != g.all_chunks()) {
     return bad("chunk_sh_degrees has " + std::to_string(g.chunk_sh_degrees.size) + " values where " +

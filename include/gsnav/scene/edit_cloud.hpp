@@ -26,6 +26,7 @@ inline void transform(GaussianCloud& cloud, const Similarity& by) {
   cloud.origin_ids = std::move(moved.origin_ids);
   cloud.origins = std::move(moved.origins);
   cloud.chunk_bounds.clear();
+  cloud.part_bounds.clear();
   const ShRotation bands(by.rotation);
   const std::size_t rest = cloud.size() == 0 ? 0 : cloud.shN.size() / cloud.size();
   for (std::size_t i = 0; i < cloud.size(); ++i) {
@@ -66,6 +67,7 @@ void filter_rows(GaussianCloud& cloud, const Keep& keep) {
   pick(cloud.origin_ids, 1);
   cloud.row_ids.clear();
   cloud.chunk_bounds.clear();
+  cloud.part_bounds.clear();
 }
 
 /// Keeps the Gaussians whose means lie in the box, bounds included.

@@ -46,6 +46,7 @@ struct GaussianCloud {
   // Filled by sort_spatially (scene/spatial_order.hpp); whoever moves, adds or scales rows clears them.
   std::vector<std::uint32_t> row_ids;        ///< place of each row as it was read, [N], or empty
   std::vector<ChunkBounds> chunk_bounds;     ///< [ceil(N / kProjectChunk)], or empty
+  std::vector<ChunkBounds> part_bounds;      ///< [ceil(N / kChunkPart)], or empty; bound_chunks makes both
 
   // How the asset was trained; copied into each GaussianSet made of the cloud.
   Filter filter = Filter::classic;
@@ -65,7 +66,7 @@ struct GaussianCloud {
   std::size_t bytes() const noexcept {
     return sizeof(float) * (11 * size() + sh0.size() + shN.size()) + sizeof(std::uint16_t) * shN_half.size() +
            sizeof(std::uint32_t) * (origin_ids.size() + row_ids.size()) +
-           sizeof(Vec3d) * origins.size() + sizeof(ChunkBounds) * chunk_bounds.size();
+           sizeof(Vec3d) * origins.size() + sizeof(ChunkBounds) * (chunk_bounds.size() + part_bounds.size());
   }
 
   /// What kernels read; valid while the cloud lives and does not grow.
@@ -84,6 +85,7 @@ struct GaussianCloud {
     v.origins = view_of(origins);
     v.row_ids = view_of(row_ids);
     v.chunk_bounds = view_of(chunk_bounds);
+    v.part_bounds = view_of(part_bounds);
     return v;
   }
 
@@ -302,6 +304,7 @@ inline Status append(GaussianCloud& a, const GaussianCloud& b) {
     }
   }
   a.chunk_bounds.clear();
+  a.part_bounds.clear();
   if (!a.row_ids.empty() || !b.row_ids.empty()) {
     const auto ids = [](const GaussianCloud& c) {
       std::vector<std::uint32_t> out = c.row_ids;

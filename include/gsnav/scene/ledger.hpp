@@ -7,8 +7,9 @@
 #include <span>
 #include <string>
 
-#include "gsnav/kernels/cull.hpp"
-#include "gsnav/kernels/projection_camera.hpp"
+#include "gsnav/core/parallel.hpp"
+#include "gsnav/core/pool_backend.hpp"
+#include "gsnav/ops/count_culled.hpp"
 #include "gsnav/ops/render_config.hpp"
 #include "gsnav/ops/render_workspace.hpp"
 #include "gsnav/scene/load_report.hpp"
@@ -21,8 +22,7 @@ namespace gsnav {
 /// asked for.
 struct FrameLedger {
   // Skipped without any change of the image.
-  std::uint64_t gaussians = 0;    ///< in all sets
-  std::uint64_t touched = 0;      ///< in chunks that may be in view and are drawn
+  CullCounts culled;              ///< by chunks out of view or not in the cut
   std::uint64_t visible = 0;      ///< RenderStats::visible
   std::uint64_t transparent = 0;  ///< left out when the scene was read: below 1/255 everywhere
   // Changed.
@@ -43,16 +43,10 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
                                 const LoadReport* report = nullptr,
                                 const SceneProfile* profile = nullptr, const LodCut* lod = nullptr) {
   FrameLedger out;
-  for (const GaussianSet& set : sets) {
-    const GaussianView& g = set.gaussians;
-    out.gaussians += g.size;
-    const auto p = make_projection_camera<double>(camera, set, projection_rules(config));
-    for (std::size_t c = 0; c < g.chunk_count(); ++c) {
-      const std::size_t first = g.chunk_id(c) * kProjectChunk;
-      if (!g.chunk_bounds.empty() && !may_be_visible(p, g.chunk_bounds[g.chunk_id(c)])) continue;
-      out.touched += std::min(kProjectChunk, g.size - first);
-    }
-  }
+  std::size_t rows = 0;
+  for (const GaussianSet& set : sets) rows += set.gaussians.size;
+  PoolBackend backend(threads_for(rows));
+  out.culled = count_culled(backend, sets, camera, config);
   out.visible = stats.visible;
   out.alpha_min = config.alpha_min;
   out.transmittance_min = config.transmittance_min;
@@ -75,7 +69,7 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
 inline std::string ledger_text(const FrameLedger& l) {
   std::string out;
   const auto line = [&out](const char* format, auto... values) {
-    char text[200];
+    char text[260];
     std::snprintf(text, sizeof text, format, values...);
     out += text;
     out += '\n';
@@ -84,14 +78,12 @@ inline std::string ledger_text(const FrameLedger& l) {
   const auto share = [](std::uint64_t a, std::uint64_t b) {
     return b == 0 ? 0.0 : 100.0 * static_cast<double>(a) / static_cast<double>(b);
   };
-  const std::uint64_t removed = l.gaussians - l.touched,
-                      removable = l.gaussians - std::min(l.visible, l.gaussians);
+  const CullCounts& n = l.culled;
   line(
-      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% "
-      "of what could be); "
-      "%llu touched, %llu drawn",
-      count(removed), count(l.gaussians), share(removed, l.gaussians), share(removed, removable),
-      count(l.touched), count(l.visible));
+      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% of what could be); "
+      "%llu touched, %.2f for each that reaches a tile; %llu drawn",
+      count(n.removed()), count(n.rows), share(n.removed(), n.rows), share(n.removed(), n.removable()),
+      count(n.touched), n.touched_per_emitting(), count(l.visible));
   if (l.transparent != 0)
     line("skipped, same bits: %llu Gaussians below 1/255 everywhere", count(l.transparent));
   if (l.sh_skipped != 0) {

@@ -79,7 +79,11 @@ class LodCut {
     const GaussianSet whole = photo_set(*cloud_, choice, world_from_asset);
     const auto p = make_projection_camera<double>(camera, whole);
     const double per_metre = std::max(p.fx, p.fy) / choice.pixels;
-    visit(tree_->levels() - 1, tree_->nodes.size() - 1, p, per_metre, choice);
+    if (tree_->places.empty()) {
+      visit(tree_->levels() - 1, tree_->nodes.size() - 1, p, per_metre, choice);
+    } else {
+      for (const std::uint32_t root : tree_->roots) descend(root, p, per_metre, choice);
+    }
     add(*cloud_, leaf_chunks_, choice, world_from_asset);
     add(tree_->merged, merged_chunks_, choice, world_from_asset);
     return sets_;
@@ -114,21 +118,51 @@ class LodCut {
     sets_.push_back(photo_set(cloud, choice, world_from_asset));
     sets_.back().gaussians.drawn_chunks = {chunks.data(), chunks.size()};
   }
+  /// What a metre is at the node's nearest depth, in choice.pixels.
+  static double scale_of(const LodNode& n, const ProjectionCamera<double>& camera, double per_metre) noexcept {
+    return per_metre / detail::ChunkInView(camera, n.reach).z_min();
+  }
+  /// Whether what is finer than a node is needed.
+  bool refine(std::size_t node, double scale, const LodChoice& choice) {
+    const LodNode& n = tree_->nodes[node];
+    const double grain = static_cast<double>(n.grain) * scale * choice.pixels / choice.grain;
+    const double error = static_cast<double>(n.error) * scale * std::max(grain, 1.0);
+    const bool finer = error > (refined_[node] != 0 ? 1 - choice.hysteresis : 1 + choice.hysteresis);
+    refined_[node] = finer ? 1 : 0;
+    return finer;
+  }
+  void note_error(const LodNode& n, double scale, const LodChoice& choice) noexcept {
+    stats_.error_px = std::max(stats_.error_px, static_cast<double>(n.error) * scale * choice.pixels);
+  }
+  /// The level of one box of a forest.
+  void descend(std::uint32_t node, const ProjectionCamera<double>& camera, double per_metre, const LodChoice& choice) {
+    for (;;) {
+      const LodNode& n = tree_->nodes[node];
+      const LodPlace& place = tree_->places[node];
+      if (!may_be_visible(camera, n.reach)) return;
+      const double scale = scale_of(n, camera, per_metre);
+      const bool leaf = place.finer == LodPlace::kNone;
+      if (!leaf && refine(node, scale, choice)) {
+        node = place.finer;
+        continue;
+      }
+      std::vector<std::uint32_t>& chunks = leaf ? leaf_chunks_ : merged_chunks_;
+      for (std::uint32_t c = 0; c < place.chunks; ++c) chunks.push_back(place.first_chunk + c);
+      stats_.shown += place.shown;
+      stats_.merged += leaf ? 0 : place.shown;
+      stats_.drawn += place.rows;
+      note_error(n, scale, choice);
+      return;
+    }
+  }
   void visit(std::size_t level, std::size_t node, const ProjectionCamera<double>& camera,
              double per_metre, const LodChoice& choice) {
     const LodNode& n = tree_->nodes[node];
     if (!may_be_visible(camera, n.reach)) return;
-    const double scale = per_metre / detail::ChunkInView(camera, n.reach).z_min();  // a metre here, of choice.pixels
-    const double grain = static_cast<double>(n.grain) * scale * choice.pixels / choice.grain;
-    const double error = static_cast<double>(n.error) * scale;
-    bool refine = level > 0;
-    if (refine) {
-      refine = error * std::max(grain, 1.0) > (refined_[node] != 0 ? 1 - choice.hysteresis : 1 + choice.hysteresis);
-      refined_[node] = refine ? 1 : 0;
-    }
-    if (!refine) {
+    const double scale = scale_of(n, camera, per_metre);
+    if (!(level > 0 && refine(node, scale, choice))) {
       draw(level, node);
-      stats_.error_px = std::max(stats_.error_px, error * choice.pixels);
+      note_error(n, scale, choice);
       return;
     }
     const std::size_t i = node - tree_->level_begin[level];

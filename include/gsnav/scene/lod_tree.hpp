@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -21,10 +22,22 @@ struct LodNode {
   ChunkBounds reach;  ///< of its own Gaussians and of all below it
 };
 
+/// A node of a set that ships its levels (scene/lod_levels.hpp).
+struct LodPlace {
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  std::uint32_t first_chunk = 0, chunks = 0;  ///< of the cloud where nothing is finer, else of `merged`
+  std::uint32_t finer = kNone;                ///< the node that shows the same in more Gaussians
+  std::uint32_t rows = 0;                     ///< Gaussians in its chunks, less those that fill the last one
+  std::uint32_t shown = 0;                    ///< Gaussians of the cloud that it stands for
+};
+
 /// A cloud at every level of detail (docs/lod.md): a binary tree over the chunks of a cloud in spatial
 /// order. Leaves are those chunks, as they are; a node above shows what its two children show in half as
 /// many Gaussians, at most kProjectChunk. Any cut through the tree shows each Gaussian of the cloud
 /// once.
+///
+/// Or a forest of the levels that a set ships: `places` and `roots` are not empty then. Nodes are boxes of the set, each at
+/// one level, and have as many chunks as they need; a cut takes one level of each box.
 struct LodTree {
   GaussianCloud merged;  ///< Gaussians of the nodes above leaves: kProjectChunk rows a node, the last
                          ///< ones transparent where it has fewer
@@ -32,11 +45,37 @@ struct LodTree {
   std::vector<std::uint32_t>
       level_begin;  ///< first node of each level, and behind them the number of nodes
 
+  std::vector<LodPlace> places;      ///< of a forest, one a node
+  std::vector<std::uint32_t> roots;  ///< of a forest: the coarsest node of each box
+
   std::size_t levels() const noexcept { return level_begin.empty() ? 0 : level_begin.size() - 1; }
   std::size_t leaves() const noexcept { return levels() == 0 ? 0 : level_begin[1]; }
+  /// Chunks of the cloud that it was made of.
+  std::size_t cloud_chunks() const noexcept {
+    if (places.empty()) return leaves();
+    std::size_t sum = 0;
+    for (std::size_t i = 0; i < leaves(); ++i) sum += places[i].chunks;
+    return sum;
+  }
   /// Bytes beside those of the cloud.
-  std::size_t bytes() const noexcept { return merged.bytes() + nodes.size() * sizeof(LodNode); }
+  std::size_t bytes() const noexcept { return merged.bytes() + nodes.size() * sizeof(LodNode) + places.size() * sizeof(LodPlace); }
 };
+
+namespace detail {
+
+/// Bounds of both.
+inline ChunkBounds both(const ChunkBounds& a, const ChunkBounds& b) noexcept {
+  ChunkBounds out;
+  for (int k = 0; k < 3; ++k) {
+    out.low[k] = std::min(a.low[k], b.low[k]);
+    out.high[k] = std::max(a.high[k], b.high[k]);
+  }
+  out.scale_max = std::max(a.scale_max, b.scale_max);
+  out.opacity_max = std::max(a.opacity_max, b.opacity_max);
+  return out;
+}
+
+}  // namespace detail
 
 /// How build_lod works.
 struct LodSettings {

@@ -83,7 +83,7 @@ inline std::array<std::uint16_t, 3> pack_quat(const Quatd& q) noexcept {
 inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
   const std::size_t n = cloud.size();
   out.codes = huge_vector<std::uint16_t>(PackedRows::kPlanes * n);
-  out.chunks.resize(cloud.view().chunk_count());
+  out.chunks.resize(cloud.view().all_chunks());
   const auto plane = [&](std::size_t k) { return out.codes.data() + k * n; };
   for (std::size_t c = 0; c < out.chunks.size(); ++c) {
     PackedChunk& chunk = out.chunks[c];
@@ -169,13 +169,13 @@ inline void pack_bands(const GaussianCloud& cloud, PackedCloud& out, PackErrors&
   errors.sh_rms = cloud.shN.empty() ? 0 : std::sqrt(squares / static_cast<double>(cloud.shN.size()));
 }
 
-/// Bounds of what the packed rows stand for.
-inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed) {
+/// Bounds of what each `rows` packed rows stand for.
+inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed, std::size_t rows) {
   const GaussianView v = packed.view();
-  std::vector<ChunkBounds> out(v.chunk_count());
+  std::vector<ChunkBounds> out((v.size + rows - 1) / rows);
   for (std::size_t c = 0; c < out.size(); ++c) {
     Aabb<double> box;
-    for (std::size_t i = c * kProjectChunk; i < std::min(v.size, (c + 1) * kProjectChunk); ++i) {
+    for (std::size_t i = c * rows; i < std::min(v.size, (c + 1) * rows); ++i) {
       const Vec3d origin = v.origin_ids.empty() ? Vec3d{} : v.origins[v.origin_ids[i]];
       box.add(origin + vec_cast<double>(mean_of(v, i)));
       const Vec3f s = scales_of(v, i);
@@ -235,7 +235,10 @@ inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {}
   out.rest.filter = cloud.filter;
   out.rest.eps2d = cloud.eps2d;
   out.rest.sort_order = cloud.sort_order;
-  if (!cloud.chunk_bounds.empty()) out.rest.chunk_bounds = detail::packed_bounds(out);
+  if (!cloud.chunk_bounds.empty()) {
+    out.rest.part_bounds = detail::packed_bounds(out, kChunkPart);
+    out.rest.chunk_bounds = detail::packed_bounds(out, kProjectChunk);
+  }
   if (errors != nullptr) *errors = found;
   return out;
 }

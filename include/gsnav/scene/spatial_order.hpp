@@ -100,13 +100,13 @@ std::vector<std::uint32_t> rows_by_code(B& backend, std::size_t n, const Code& c
 
 }  // namespace detail
 
-/// Bounds of each chunk of kProjectChunk consecutive rows.
+/// Bounds of each `rows` consecutive rows.
 template <Backend B>
-std::vector<ChunkBounds> chunk_bounds_of(B& backend, const GaussianCloud& cloud) {
-  std::vector<ChunkBounds> out(cloud.view().all_chunks());
+std::vector<ChunkBounds> chunk_bounds_of(B& backend, const GaussianCloud& cloud, std::size_t rows = kProjectChunk) {
+  std::vector<ChunkBounds> out((cloud.size() + rows - 1) / rows);
   backend.parallel_for(out.size(), [&](std::size_t c) {
     Aabb<double> box;
-    for (std::size_t i = c * kProjectChunk; i < std::min(cloud.size(), (c + 1) * kProjectChunk); ++i) {
+    for (std::size_t i = c * rows; i < std::min(cloud.size(), (c + 1) * rows); ++i) {
       box.add(cloud.mean(i));
       for (const auto& scale : cloud.scales) out[c].scale_max = std::max(out[c].scale_max, scale[i]);
       out[c].opacity_max = std::max(out[c].opacity_max, cloud.opacities[i]);
@@ -117,9 +117,15 @@ std::vector<ChunkBounds> chunk_bounds_of(B& backend, const GaussianCloud& cloud)
   backend.synchronize().throw_if_error();
   return out;
 }
-inline std::vector<ChunkBounds> chunk_bounds_of(const GaussianCloud& cloud) {
+/// Bounds chunks and their parts; for whoever moved or scaled rows that lie in spatial order.
+template <Backend B>
+void bound_chunks(B& backend, GaussianCloud& cloud) {
+  cloud.chunk_bounds = chunk_bounds_of(backend, cloud);
+  cloud.part_bounds = chunk_bounds_of(backend, cloud, kChunkPart);
+}
+inline void bound_chunks(GaussianCloud& cloud) {
   PoolBackend backend(threads_for(cloud.size()));
-  return chunk_bounds_of(backend, cloud);
+  bound_chunks(backend, cloud);
 }
 
 /// Brings the rows into the order of Hilbert's curve through their means and bounds each chunk of them, so that a
@@ -132,6 +138,7 @@ void sort_spatially(B& backend, GaussianCloud& cloud) {
   static_assert(is_host_backend<B>);
   const std::size_t n = cloud.size();
   cloud.chunk_bounds.clear();
+  cloud.part_bounds.clear();
   if (n == 0) return;
   std::vector<Aabb<double>> boxes(concurrency_of(backend));
   std::vector<float> largest = huge_vector<float>(n);
@@ -175,7 +182,7 @@ void sort_spatially(B& backend, GaussianCloud& cloud) {
   } else {
     permute_rows(backend, order, 1, cloud.row_ids);
   }
-  cloud.chunk_bounds = chunk_bounds_of(backend, cloud);
+  bound_chunks(backend, cloud);
 }
 inline void sort_spatially(GaussianCloud& cloud) {
   PoolBackend backend(threads_for(cloud.size()));

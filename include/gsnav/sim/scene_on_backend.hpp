@@ -65,7 +65,7 @@ inline Status validate_detail(const SimulatorScene& scene, const std::optional<L
   if (Status s = validate(*lod); !s) return s;
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
     const SceneAsset& a = scene.assets[i];
-    if (a.lod != nullptr && a.lod->leaves() == a.cloud->view().all_chunks()) continue;
+    if (a.lod != nullptr && a.lod->cloud_chunks() == a.cloud->view().all_chunks()) continue;
     return {Errc::invalid_argument, "SimulatorConfig.lod: SimulatorScene.assets[" + std::to_string(i) + "].lod is " +
                                         (a.lod == nullptr ? "null: build_lod makes it" : "of another cloud")};
   }

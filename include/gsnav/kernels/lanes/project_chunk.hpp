@@ -23,10 +23,14 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
   const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
   const std::size_t base = (args.first_chunk + c) * kProjectChunk;
   const std::size_t step = static_cast<std::size_t>(kWidth);
-  const bool candidate = chunk_is_candidate(args, c), packed = is_packed(gs);
+  const std::uint32_t parts = candidate_parts(args, c);
+  const bool packed = is_packed(gs);
+  const PackedChunk* const chunk = packed ? &gs.packed.chunks[gs.chunk_id(c)] : nullptr;
   std::uint32_t written = 0;
   Survivors survivors;
-  for (std::size_t i = begin; i < end && candidate; i += step) {
+  static_assert(kChunkPart % step == 0);
+  for (std::size_t i = begin; i < end && parts != 0; i += step) {
+    if ((parts >> ((i - begin) / kChunkPart) & 1u) == 0) continue;
     const std::size_t count = end - i < step ? end - i : step;
     float tail[step];
     // The last pack of a set repeats its last Gaussian; those lanes are masked below.
@@ -58,7 +62,7 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     };
     const auto codes3 = [&](int plane) noexcept { return Vec3<F>{codes(plane), codes(plane + 1), codes(plane + 2)}; };
     const Vec3<F> mean = packed && gs.means[0].empty()
-                             ? unpack_mean(gs.packed.chunks[c], codes3(PackedRows::kMeans))
+                             ? unpack_mean(*chunk, codes3(PackedRows::kMeans))
                              : Vec3<F>{load(gs.means[0]), load(gs.means[1]), load(gs.means[2])};
     const F z = depth_key(camera.key_rotation, camera.key_scale, mean, offset);
     if (!any(z > F(camera.near_plane))) continue;
@@ -66,7 +70,7 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     SplatAxes<F> axes;
     if (packed) {
       axes = splat_axes(camera.rotation, delta, unpack_quat(codes3(PackedRows::kQuats)),
-                        unpack_scales(gs.packed.chunks[c], codes3(PackedRows::kScales)));
+                        unpack_scales(*chunk, codes3(PackedRows::kScales)));
     } else if (gs.axes[0].empty()) {
       const Quat<F> quat{load(gs.quats[0]), load(gs.quats[1]), load(gs.quats[2]), load(gs.quats[3])};
       axes = splat_axes(camera.rotation, delta, quat,
