@@ -10,7 +10,7 @@ DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
 CUT_TEST = "tests/hard_cases/test_determinism.cpp"
 
 OPEN = "transmittance >= L(rules.transmittance_min)"
-WEIGHT = "L weight = select(open, alpha * before, zero);"
+WEIGHT = "L weight = select(drawn, alpha * before, zero);"
 DRAWN = "const auto drawn = exponent >= L(rules.log2_alpha_min);"
 LANES = "include/gsnav/kernels/lanes/rasterize_tile.hpp"
 DELTA = "  const L defined = select(denominator > L(S(0)), delta, L(S(0)));\n"
@@ -21,12 +21,12 @@ RETURNED = "const auto returned = alpha > L(args.rules.return_alpha);"
 
 PLANTS = [
     plant("stop_exclusive", BLEND, WEIGHT,
-          "L weight = select(open && (before - alpha * before >= L(rules.transmittance_min)), alpha * before, zero);",
+          "L weight = select(drawn && (before - alpha * before >= L(rules.transmittance_min)), alpha * before, zero);",
           STACK_TEST, "N42_saturation_stop", why="INRIA, gsplat: up to 0.0099 of what lies behind"),
     plant("stop_dropped", BLEND, OPEN, "transmittance >= L(S(0))",
           STACK_TEST, "N42_saturation_stop", "N44_deep_stack"),
-    plant("stop_by_the_block", BLEND, "const auto open = state.open(rules);",
-          "const mask_of<L> open(any(state.open(rules)));",
+    plant("stop_by_the_block", BLEND, "blend_drawn<Color, D, General>(state, rules, state.open(rules), ",
+          "blend_drawn<Color, D, General>(state, rules, mask_of<L>(any(state.open(rules))), ",
           CUT_TEST, "N63_determinism_100 of work that is cut",
           why="a closed pixel goes on while its neighbours are open"),
     plant("stop_at_a_hundredth", BLEND, OPEN,
