@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 #include "allocations.hpp"
 #include "check_cloud.hpp"
 #include "gsnav/io/lod_set.hpp"
@@ -8,10 +12,6 @@
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/io/sog.hpp"
 #include "support/data.hpp"
-
-#include <algorithm>
-#include <cmath>
-#include <vector>
 
 using namespace gsnav;
 using io::LoadedLodSet;

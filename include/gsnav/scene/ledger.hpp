@@ -86,7 +86,8 @@ inline std::string ledger_text(const FrameLedger& l) {
   };
   const CullCounts& n = l.culled;
   line(
-      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% of what could be); "
+      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% of what could "
+      "be); "
       "%llu touched, %.2f for each that reaches a tile; %llu drawn",
       count(n.removed()), count(n.rows), share(n.removed(), n.rows), share(n.removed(), n.removable()),
       count(n.touched), n.touched_per_emitting(), count(l.visible));
@@ -103,7 +104,8 @@ inline std::string ledger_text(const FrameLedger& l) {
         count(l.lod.merged), count(l.lod.shown), count(l.lod.drawn), l.lod.error_px);
   }
   if (l.converted != 0) line("converted: the colours of %llu Gaussians to the frame's space", count(l.converted));
-  if (l.other_order) line("order: %s", "not the one that the scene's file asks for (depth, or distance from the camera)");
+  if (l.other_order)
+    line("order: %s", "not the one that the scene's file asks for (depth, or distance from the camera)");
   if (l.clamped != 0) line("clamped: %llu log-scales to [-20, 20]", count(l.clamped));
   if (l.sh_storage_error > 0) line("quantised: SH coefficients, by %.2g at most", l.sh_storage_error);
   line("cut: alphas below %.4f, a Gaussian and pixel; %.4f of the light behind a closed pixel",
