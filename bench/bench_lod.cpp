@@ -6,8 +6,8 @@
 // Without the variables: the embedded flat from its four viewpoints; without a number: 8 views. Processor time of
 // RGB frames on one thread, the least of five runs a view; `least +dB` is the smallest gain of a view, `below` how many
 // views are below direct rendering. Of depths (frames of their own, not timed): pixels that are off by more than 2 %
-// from every median depth of the photo's rays within them, and the 99th percentile. A streamed set's own levels have rows
-// beside those of the tree that is built. Where there is a GPU, rows of it.
+// from every median depth of the photo's rays within them, and the 99th percentile. A streamed set's own levels have
+// rows beside those of the tree that is built. Where there is a GPU, rows of it.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

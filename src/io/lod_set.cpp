@@ -72,7 +72,8 @@ class LodReader {
       levels.push_back(std::move(level));
     }
     if (dropped != 0) {
-      out.report.warnings.push_back(std::to_string(dropped) + " rows of coarser levels are not drawn: transparent or not finite");
+      out.report.warnings.push_back(std::to_string(dropped) +
+                                    " rows of coarser levels are not drawn: transparent or not finite");
     }
     PoolBackend backend(threads_for(levels[0].cloud.size()) == 1 ? 1 : detail::io_threads());
     auto joined = join_levels(backend, std::move(levels), nodes_ + 1);
@@ -216,8 +217,7 @@ class LodReader {
     const Json* environment = detail::member(json, "environment");
     if (!options_.environment || environment == nullptr || environment->is_null()) return {};
     if (!environment->is_string() || !detail::is_safe_name(environment->get<std::string>())) {
-      return fail("'environment' is " + detail::shown(*environment) +
-                  ", must be a file below this folder");
+      return fail("'environment' is " + detail::shown(*environment) + ", must be a file below this folder");
     }
     environment_ = place(environment->get<std::string>());
     return {};
@@ -229,9 +229,9 @@ class LodReader {
     LoadedCloud out;
     out.report.source = source_;
     for (const auto& [level, count] : instead_) {
-      out.report.warnings.push_back("level " + std::to_string(options_.level) + " of " +
-                                    std::to_string(count) + " of " + std::to_string(nodes_) +
-                                    " nodes is not there: level " + std::to_string(level) + " is read");
+      out.report.warnings.push_back("level " + std::to_string(options_.level) + " of " + std::to_string(count) +
+                                    " of " + std::to_string(nodes_) + " nodes is not there: level " +
+                                    std::to_string(level) + " is read");
     }
     for (std::size_t f = 0; f < files_.size(); ++f) {
       const std::vector<NodeRows>& rows = steps_[step][f];

@@ -306,8 +306,8 @@ class SogReader {
   Plane low_, high_, scales_, quats_, sh0_, labels_, centroids_;
 };
 
-Result<LoadedCloud> load(const std::filesystem::path& path,
-                         const std::vector<detail::RowRange>* ranges, std::vector<std::uint8_t>* kept = nullptr) {
+Result<LoadedCloud> load(const std::filesystem::path& path, const std::vector<detail::RowRange>* ranges,
+                         std::vector<std::uint8_t>* kept = nullptr) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
     SogFiles files;
     if (Status s = files.open(path); !s) return s;

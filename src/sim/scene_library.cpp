@@ -14,8 +14,8 @@ std::size_t bytes_of(const std::vector<T>& v) noexcept {
 }
 
 std::size_t cloud_bytes(const GaussianCloud& c) noexcept {
-  std::size_t sum = bytes_of(c.opacities) + bytes_of(c.sh0) + bytes_of(c.shN) + bytes_of(c.origin_ids) + bytes_of(c.row_ids) +
-                    bytes_of(c.chunk_bounds) + bytes_of(c.part_bounds);
+  std::size_t sum = bytes_of(c.opacities) + bytes_of(c.sh0) + bytes_of(c.shN) + bytes_of(c.origin_ids) +
+                    bytes_of(c.row_ids) + bytes_of(c.chunk_bounds) + bytes_of(c.part_bounds);
   for (const auto& v : c.means) sum += bytes_of(v);
   for (const auto& v : c.quats) sum += bytes_of(v);
   for (const auto& v : c.scales) sum += bytes_of(v);

@@ -58,10 +58,10 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
       chunks += in_chunks.chunk_bounds.size();
       for (std::size_t p = 0; p < in_chunks.part_bounds.size(); ++p) {
         const ChunkBounds& chunk = in_chunks.chunk_bounds[p * kChunkPart / kProjectChunk];
-        parts_left_out += may_be_visible(c64, chunk) && !lies_in_view(c64, chunk) &&
-                                  !may_be_visible(c64, in_chunks.part_bounds[p])
-                              ? 1
-                              : 0;
+        parts_left_out +=
+            may_be_visible(c64, chunk) && !lies_in_view(c64, chunk) && !may_be_visible(c64, in_chunks.part_bounds[p])
+                ? 1
+                : 0;
       }
       for_each_renderer([&](auto& renderer) {
         const auto a = renderer.render({{&cloud, place}}, camera, config);
@@ -79,8 +79,8 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
 }
 
 TEST_CASE("count_culled: what single Gaussians and boxes say, each by itself") {
-  GaussianCloud cloud = sorted(random_cloud(655, {.count = 1200, .sh_degree = 0, .needle = 0.05, .scale = 0.3,
-                                                  .center = {0, 0, 0}, .extent = 6}));
+  GaussianCloud cloud = sorted(random_cloud(
+      655, {.count = 1200, .sh_degree = 0, .needle = 0.05, .scale = 0.3, .center = {0, 0, 0}, .extent = 6}));
   SerialBackend backend;
   Renderer<float, SerialBackend> renderer(backend);
   Rng rng(656);

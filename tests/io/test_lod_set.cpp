@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 #include "allocations.hpp"
 #include "check_cloud.hpp"
+#include "gsnav/core/rng.hpp"
 #include "gsnav/io/lod_set.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/io/sog.hpp"
 #include "support/data.hpp"
-
-#include <algorithm>
-#include <cmath>
-#include <vector>
 
 using namespace gsnav;
 using io::LoadedLodSet;
@@ -234,6 +235,40 @@ TEST_CASE("lod set: levels that make no sense, or are not there") {
   write_file(set.folder / "lod-meta.json", "{");
   CHECK(io::load_lod_levels(set.folder.path()).code() == Errc::invalid_file);
   CHECK(io::load_lod_levels(set.folder / "none").code() == Errc::file_not_found);
+}
+
+TEST_CASE("lod set: the levels of a damaged set fit their cloud, or it is refused") {
+  LodFolder set;
+  set.extra = R"(,"environment":"far/meta.json")";
+  const std::string text = set.text();
+  Rng rng(77);
+  int taken = 0;
+  const std::string letters = "0123456789{}[],:\"-.eE tf";
+  for (int run = 0; run < 1500; ++run) {
+    std::string bad = text;
+    for (int k = 0; k < 1 + run % 3; ++k) {
+      const std::size_t at = static_cast<std::size_t>(rng.uniform() * static_cast<double>(bad.size()));
+      if (rng.uniform() < 0.2) {
+        bad.erase(at, 1 + static_cast<std::size_t>(rng.uniform() * 20));
+      } else {
+        bad[at] = letters[static_cast<std::size_t>(rng.uniform() * static_cast<double>(letters.size()))];
+      }
+    }
+    write_file(set.folder / "lod-meta.json", bad);
+    const auto got = io::load_lod_levels(set.folder.path());
+    if (!got) {
+      CHECK(!got.message().empty());
+      continue;
+    }
+    ++taken;
+    for (const LodPlace& p : got->tree.places) {
+      const GaussianCloud& of = p.finer == LodPlace::kNone ? got->cloud : got->tree.merged;
+      CHECK(p.first_chunk + p.chunks <= of.view().all_chunks());
+      CHECK(p.rows <= p.chunks * kProjectChunk);
+    }
+    for (const LodNode& n : got->tree.nodes) CHECK((n.error >= 0 && is_finite(n.error)));
+  }
+  CHECK(taken > 50);
 }
 
 TEST_CASE("lod set: real sets, level by level") {

@@ -109,7 +109,8 @@ TEST_CASE("lod levels: a node's error is that of trying all pairs") {
         }
         // These face the camera: sigma_x sigma_y is what they cover, but for what their edges add.
         const auto s = [&](std::size_t axis) { return static_cast<double>(levels[0].cloud.scales[axis][i]); };
-        const double area = std::sqrt(s(0) * s(0) * s(1) * s(1) + s(0) * s(0) * s(2) * s(2) + s(1) * s(1) * s(2) * s(2));
+        const double area =
+            std::sqrt(s(0) * s(0) * s(1) * s(1) + s(0) * s(0) * s(2) * s(2) + s(1) * s(1) * s(2) * s(2));
         const double m = static_cast<double>(levels[0].cloud.opacities[i]) * area;
         squares += m * least;
         mass += m;
@@ -228,7 +229,8 @@ TEST_CASE("lod levels: a cut is never farther from the photo than its coarsest l
         }
         std::vector<std::uint32_t> level;
         for (std::size_t n = set.tree.level_begin[coarsest]; n < set.tree.level_begin[coarsest + 1]; ++n) {
-          for (std::uint32_t c = 0; c < set.tree.places[n].chunks; ++c) level.push_back(set.tree.places[n].first_chunk + c);
+          for (std::uint32_t c = 0; c < set.tree.places[n].chunks; ++c)
+            level.push_back(set.tree.places[n].first_chunk + c);
         }
         GaussianSet one = LodCut::photo_set(coarsest == 0 ? set.cloud : set.tree.merged, choice);
         one.gaussians.drawn_chunks = {level.data(), level.size()};

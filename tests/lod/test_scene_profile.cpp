@@ -115,4 +115,18 @@ TEST_CASE("ledger: its counts are those of the frame") {
   const std::string text = ledger_text(l);
   CHECK(text.find(std::to_string(l.sh_skipped) + " SH coefficients") != std::string::npos);
   CHECK(text.find(std::to_string(l.culled.touched) + " touched") != std::string::npos);
+  CHECK(text.find("converted") == std::string::npos);
+  CHECK(text.find("order:") == std::string::npos);
+  // One frame has one order and one space: what asks for others is written down.
+  GaussianSet linear = set;
+  linear.color_space = ColorSpace::linear;
+  LoadReport report;
+  report.sort_order = SortOrder::camera_distance;
+  const GaussianSet both[] = {set, linear};
+  const FrameLedger other = frame_ledger(both, camera, config, f.stats[0], &report);
+  CHECK(other.converted == cloud.size());
+  CHECK(other.other_order);
+  CHECK(other.culled.emitting == 2 * l.culled.emitting);
+  CHECK(ledger_text(other).find("converted: the colours of " + std::to_string(cloud.size())) != std::string::npos);
+  CHECK(ledger_text(other).find("order: not") != std::string::npos);
 }

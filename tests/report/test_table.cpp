@@ -144,7 +144,8 @@ TEST_CASE("budgets: an infinite or negative-infinite error is missed, not met") 
 
 TEST_CASE("targets: one setting beside another, over the views that have both") {
   std::vector<Row> rows;
-  const auto add = [&rows](const char* profile, const char* oracle, const char* sensor, int view, double psnr, double ms) -> Row& {
+  const auto add = [&rows](const char* profile, const char* oracle, const char* sensor, int view, double psnr,
+                           double ms) -> Row& {
     Row r = render(profile, "none", "", view, psnr, ms);
     r.set("oracle", oracle).set("sensor", sensor).set("width", 256).set("height", 256).set("gaussians", 1000);
     rows.push_back(r);
@@ -159,10 +160,15 @@ TEST_CASE("targets: one setting beside another, over the views that have both") 
   add("fast", "contract", "rgbd", 1, 100, 20).set("touched", 500).set("emitting", 400).set("row_bytes", 236);
   add("fast", "contract", "depth", 0, 100, 6).set("touched", 999).set("emitting", 1).set("row_bytes", 59);
   add("fast", "contract", "depth", 1, 100, 10).set("touched", 999).set("emitting", 1).set("row_bytes", 59);
-  add("exact", "contract", "rgbd", 0, 78, 12).set("knob", "storage").set("knob_value", "packed").set("cloud_bytes", 83000).set("band_bytes", 45000);
+  add("exact", "contract", "rgbd", 0, 78, 12)
+      .set("knob", "storage")
+      .set("knob_value", "packed")
+      .set("cloud_bytes", 83000)
+      .set("band_bytes", 45000);
   const std::vector<TargetCheck> checks = check_targets(Table(rows, {}));
   const auto value = [&checks](const std::string& measure) -> const TargetCheck& {
-    const auto it = std::find_if(checks.begin(), checks.end(), [&](const TargetCheck& c) { return c.measure.starts_with(measure); });
+    const auto it = std::find_if(checks.begin(), checks.end(),
+                                 [&](const TargetCheck& c) { return c.measure.starts_with(measure); });
     REQUIRE(it != checks.end());
     return *it;
   };

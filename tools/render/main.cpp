@@ -38,8 +38,8 @@ namespace {
 using namespace gsnav;
 
 struct Options {
-  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median", composite = "merged", storage = "full",
-              lod_levels = "shipped";
+  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median", composite = "merged",
+                                   storage = "full", lod_levels = "shipped";
   std::vector<std::string> meshes;
   int width = 0, height = 0, threads = 0;
   double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0, lod_pixels = LodChoice{}.pixels;
@@ -239,8 +239,9 @@ int main(int argc, char** argv) {
   app.add_option("--lod-error", o.lod_pixels, "Of the profile lod: how far merged Gaussians may be off, pixels")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
-  app.add_option("--lod-levels", o.lod_levels,
-                 "Of the profile lod: shipped, those that a streamed set has, where it has any; built: the tree of its finest")
+  app.add_option(
+         "--lod-levels", o.lod_levels,
+         "Of the profile lod: shipped, those that a streamed set has, where it has any; built: the tree of its finest")
       ->check(CLI::IsMember({"shipped", "built"}))
       ->capture_default_str();
   app.add_flag("--ledger", o.ledger, "Print what each frame skipped, merged, limited and rounded, and by how much");

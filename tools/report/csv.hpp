@@ -19,14 +19,33 @@ namespace gsnav_report {
 /// Columns of the report in the order they are written; rows of all kinds share them. Lengths are metres,
 /// shares 0 to 1, memory bytes; a field that does not apply is empty. `key` names the measurement
 /// (commit, scene, settings) for --resume.
-inline constexpr std::array<std::string_view, 54> kColumns{
-    "kind", "machine", "commit", "date", "scene", "view", "width", "height", "sensor", "backend", "threads",
-    "profile", "knob", "knob_value", "oracle", "rgb_max", "rgb_p999", "rgb_rmse", "rgb_psnr",
-    "rgb_over_half_lsb", "rgb_over_lsb", "rgb_over_2lsb", "ssim", "flip_mean", "flip_p99", "alpha_max",
-    "depth_p50", "depth_p99", "depth_max", "depth_absrel_p90", "depth_missing", "excluded", "time_p50_ms",
-    "time_p99_ms", "gaussians", "visible", "pairs", "evaluations", "touched", "emitting", "row_bytes", "cloud_bytes", "band_bytes",
-    "bytes", "peak_rss", "image", "name",
-    "influences", "error_max", "error_p99", "error_unit", "items_per_second", "note", "key"};
+inline constexpr std::array<std::string_view, 54> kColumns{"kind",          "machine",
+                                                           "commit",        "date",
+                                                           "scene",         "view",
+                                                           "width",         "height",
+                                                           "sensor",        "backend",
+                                                           "threads",       "profile",
+                                                           "knob",          "knob_value",
+                                                           "oracle",        "rgb_max",
+                                                           "rgb_p999",      "rgb_rmse",
+                                                           "rgb_psnr",      "rgb_over_half_lsb",
+                                                           "rgb_over_lsb",  "rgb_over_2lsb",
+                                                           "ssim",          "flip_mean",
+                                                           "flip_p99",      "alpha_max",
+                                                           "depth_p50",     "depth_p99",
+                                                           "depth_max",     "depth_absrel_p90",
+                                                           "depth_missing", "excluded",
+                                                           "time_p50_ms",   "time_p99_ms",
+                                                           "gaussians",     "visible",
+                                                           "pairs",         "evaluations",
+                                                           "touched",       "emitting",
+                                                           "row_bytes",     "cloud_bytes",
+                                                           "band_bytes",    "bytes",
+                                                           "peak_rss",      "image",
+                                                           "name",          "influences",
+                                                           "error_max",     "error_p99",
+                                                           "error_unit",    "items_per_second",
+                                                           "note",          "key"};
 
 /// One row, by column name. Naming a column that does not exist throws gsnav::Error: a mistake in code.
 class Row {

@@ -167,7 +167,8 @@ Status SceneRunner::run(const Setting& s) {
     const RenderStats& stats = outcome->frames.stats[0];
     row.set("time_p50_ms", outcome->timing.p50_ms).set("time_p99_ms", outcome->timing.p99_ms);
     row.set("gaussians", stats.gaussians).set("visible", stats.visible).set("pairs", stats.tile_intersections);
-    if (outcome->culled.rows != 0) row.set("touched", outcome->culled.touched).set("emitting", outcome->culled.emitting);
+    if (outcome->culled.rows != 0)
+      row.set("touched", outcome->culled.touched).set("emitting", outcome->culled.emitting);
     row.set("row_bytes", row_bytes(*cloud, s.sensor)).set("cloud_bytes", std::uint64_t{cloud_bytes});
     row.set("band_bytes", std::uint64_t{band_bytes});
     // What the contract cannot do without; knobs have other counts of their own.

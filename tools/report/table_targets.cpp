@@ -26,9 +26,8 @@ class Place {
 
  private:
   RowRefs plain(std::string_view profile, std::string_view oracle) const {
-    return select(rows_, [&](const Row& r) {
-      return is_plain(r) && r.get("profile") == profile && r.get("oracle") == oracle;
-    });
+    return select(
+        rows_, [&](const Row& r) { return is_plain(r) && r.get("profile") == profile && r.get("oracle") == oracle; });
   }
   static RowRefs of_sensor(const RowRefs& rows, std::string_view sensor) {
     return select(rows, [&](const Row& r) { return r.get("sensor") == sensor; });
@@ -48,7 +47,8 @@ class Place {
   void add(const char* measure, double limit, double value, bool at_least, std::size_t views, std::string note = {}) {
     if (!std::isfinite(value)) return;
     const Row& r = *rows_.front();
-    out_.push_back({r.get("scene"), resolution(r), r.get("backend"), measure, limit, value, at_least, std::move(note), views});
+    out_.push_back(
+        {r.get("scene"), resolution(r), r.get("backend"), measure, limit, value, at_least, std::move(note), views});
   }
   static std::string percent(double share) {
     char text[32];

@@ -8,11 +8,12 @@
 
 namespace gsnav_report {
 
-/// Something that is to be reached by one setting beside another, of one scene, size and backend: what no row says alone.
+/// Something that is to be reached by one setting beside another, of one scene, size and backend: what no row says
+/// alone.
 struct TargetCheck {
   std::string scene, size, backend;
-  std::string measure;   ///< "lod: times faster than fast"
-  double limit = 0.0;    ///< in the unit that `measure` names
+  std::string measure;  ///< "lod: times faster than fast"
+  double limit = 0.0;   ///< in the unit that `measure` names
   double value = 0.0;
   bool at_least = false;  ///< the limit is a lower one
   std::string note;       ///< what else there is to know

@@ -32,10 +32,10 @@ struct LoadedLodSet {
   LoadReport report;    ///< of the finest level; kept has no rows that fill chunks
 };
 
-/// Reads all levels of a streamed set that are there, from `options.level` on: what load_lod_set gives is the finest, and
-/// each node may be shown by any coarser one. `row_ids` are places in load_lod_set's order. The environment is always
-/// shown whole. Errors: load_lod_set's; invalid_file (rows that two levels share, but where a node names the same rows
-/// twice); unsupported (nodes of so few rows that chunks would be mostly empty). Never throws.
+/// Reads all levels of a streamed set that are there, from `options.level` on: what load_lod_set gives is the finest,
+/// and each node may be shown by any coarser one. `row_ids` are places in load_lod_set's order. The environment is
+/// always shown whole. Errors: load_lod_set's; invalid_file (rows that two levels share, but where a node names the
+/// same rows twice); unsupported (nodes of so few rows that chunks would be mostly empty). Never throws.
 Result<LoadedLodSet> load_lod_levels(const std::filesystem::path& path, const LoadLodOptions& options = {});
 
 }  // namespace gsnav::io

@@ -56,8 +56,8 @@ Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& 
 Result<LoadedPackedCloud> load_packed_scene(const std::string& spec, const LoadSceneOptions& options = {});
 
 /// A scene that ships its levels of detail, with them, as load_lod_levels reads it; nothing where `spec` is no streamed
-/// set, where no level above its finest is there, or where its nodes are too small to be drawn one by one. Rows are in chunks whatever `options.sort` says.
-/// Errors: load_lod_levels'.
+/// set, where no level above its finest is there, or where its nodes are too small to be drawn one by one. Rows are in
+/// chunks whatever `options.sort` says. Errors: load_lod_levels'.
 Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec, const LoadSceneOptions& options = {});
 
 /// The report as text for people, a line for each thing there is to say, each ended.

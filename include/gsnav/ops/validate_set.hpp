@@ -18,7 +18,7 @@ inline Status validate_packed(const GaussianView& g) {
   const bool codes = p.codes.size == PackedRows::kPlanes * g.size ||
                      (p.codes.size == PackedRows::kMeans * g.size && !g.means[0].empty());
   const char* wrong = !codes                                          ? "codes"
-                      : p.chunks.size != g.all_chunks()              ? "chunks"
+                      : p.chunks.size != g.all_chunks()               ? "chunks"
                       : !p.sh0.empty() && p.sh0.size != 3 * g.size    ? "sh0"
                       : !p.shN.empty() && p.shN.size != rest * g.size ? "shN"
                       : !p.shN.empty() && p.sh0.empty()               ? "shN (without sh0)"

@@ -65,8 +65,8 @@ struct GaussianCloud {
   /// Bytes held by the arrays.
   std::size_t bytes() const noexcept {
     return sizeof(float) * (11 * size() + sh0.size() + shN.size()) + sizeof(std::uint16_t) * shN_half.size() +
-           sizeof(std::uint32_t) * (origin_ids.size() + row_ids.size()) +
-           sizeof(Vec3d) * origins.size() + sizeof(ChunkBounds) * (chunk_bounds.size() + part_bounds.size());
+           sizeof(std::uint32_t) * (origin_ids.size() + row_ids.size()) + sizeof(Vec3d) * origins.size() +
+           sizeof(ChunkBounds) * (chunk_bounds.size() + part_bounds.size());
   }
 
   /// What kernels read; valid while the cloud lives and does not grow.

@@ -26,6 +26,8 @@ struct FrameLedger {
   std::uint64_t visible = 0;      ///< RenderStats::visible
   std::uint64_t transparent = 0;  ///< left out when the scene was read: below 1/255 everywhere
   // Changed.
+  std::uint64_t converted = 0;   ///< Gaussians of sets whose colours are of another space than the frame blends in
+  bool other_order = false;      ///< blended in another order than the scene's file asks for
   LodStats lod;                  ///< zeros where no level of detail was asked for
   std::uint64_t sh_skipped = 0;  ///< SH coefficients in bands that are not read
   double sh_error = 0;           ///< that changes no colour by more
@@ -44,7 +46,11 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
                                 const SceneProfile* profile = nullptr, const LodCut* lod = nullptr) {
   FrameLedger out;
   std::size_t rows = 0;
-  for (const GaussianSet& set : sets) rows += set.gaussians.size;
+  for (const GaussianSet& set : sets) {
+    rows += set.gaussians.size;
+    if (set.color_space != config.blend_space) out.converted += set.gaussians.size;
+  }
+  out.other_order = report != nullptr && report->sort_order != config.sort_order;
   PoolBackend backend(threads_for(rows));
   out.culled = count_culled(backend, sets, camera, config);
   out.visible = stats.visible;
@@ -80,7 +86,8 @@ inline std::string ledger_text(const FrameLedger& l) {
   };
   const CullCounts& n = l.culled;
   line(
-      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% of what could be); "
+      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% of what could "
+      "be); "
       "%llu touched, %.2f for each that reaches a tile; %llu drawn",
       count(n.removed()), count(n.rows), share(n.removed(), n.rows), share(n.removed(), n.removable()),
       count(n.touched), n.touched_per_emitting(), count(l.visible));
@@ -96,6 +103,9 @@ inline std::string ledger_text(const FrameLedger& l) {
         "at most",
         count(l.lod.merged), count(l.lod.shown), count(l.lod.drawn), l.lod.error_px);
   }
+  if (l.converted != 0) line("converted: the colours of %llu Gaussians to the frame's space", count(l.converted));
+  if (l.other_order)
+    line("order: %s", "not the one that the scene's file asks for (depth, or distance from the camera)");
   if (l.clamped != 0) line("clamped: %llu log-scales to [-20, 20]", count(l.clamped));
   if (l.sh_storage_error > 0) line("quantised: SH coefficients, by %.2g at most", l.sh_storage_error);
   line("cut: alphas below %.4f, a Gaussian and pixel; %.4f of the light behind a closed pixel",

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -92,9 +93,8 @@ std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) 
   std::vector<std::uint32_t> from(std::size_t{chunks} * kProjectChunk);
   backend.parallel_for(boxes, [&](std::size_t b) {
     const auto begin = order.begin() + static_cast<std::ptrdiff_t>(out[b].first), end = begin + out[b].count;
-    std::sort(begin, end, [&](std::uint32_t x, std::uint32_t y) {
-      return codes[x] != codes[y] ? codes[x] < codes[y] : x < y;
-    });
+    std::sort(begin, end,
+              [&](std::uint32_t x, std::uint32_t y) { return codes[x] != codes[y] ? codes[x] < codes[y] : x < y; });
     for (std::size_t k = 0; k < out[b].chunks * kProjectChunk; ++k) {
       from[out[b].first_chunk * kProjectChunk + k] = order[out[b].first + std::min<std::size_t>(k, out[b].count - 1)];
     }
@@ -146,12 +146,12 @@ inline double distance_to_level(const GaussianCloud& fine, const BoxRows& in_fin
 
 }  // namespace detail
 
-/// Makes a cloud and its levels of detail of the levels that a set ships, finest first. Level k holds, of each box that has
-/// one, the k-th level that is there; boxes without rows in the first are not shown. A node's error is the root mean
-/// square distance, by mass, from the box's finest Gaussians to the nearest of the node's own, and not below that of a
-/// finer node. The same bits for any number of threads. Levels are used up.
-/// Errors: invalid_argument (no level, compact SH, a box that is not one of `boxes`, levels of different filters);
-/// unsupported (boxes so small that filling their chunks would take many times the rows).
+/// Makes a cloud and its levels of detail of the levels that a set ships, finest first. Level k holds, of each box that
+/// has one, the k-th level that is there; boxes without rows in the first are not shown. A node's error is the root
+/// mean square distance, by mass, from the box's finest Gaussians to the nearest of the node's own, and not below that
+/// of a finer node. The same bits for any number of threads. Levels are used up. Errors: invalid_argument (no level,
+/// compact SH, a box that is not one of `boxes`, levels of different filters); unsupported (boxes so small that filling
+/// their chunks would take many times the rows).
 template <Backend B>
 requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::vector<LodLevel> levels,
                                                              std::size_t boxes) {
@@ -173,7 +173,8 @@ requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::ve
     }
   }
   if (detail::filled_rows(levels, boxes) > 4 * all + (std::size_t{1} << 20)) {
-    return Status(Errc::unsupported, "join_levels: " + std::to_string(all) + " rows in so many small boxes that chunks of " +
+    return Status(Errc::unsupported, "join_levels: " + std::to_string(all) +
+                                         " rows in so many small boxes that chunks of " +
                                          std::to_string(kProjectChunk) + " would be mostly empty");
   }
   for (LodLevel& level : levels) rows.push_back(detail::sort_boxes(backend, level, boxes));
@@ -182,7 +183,7 @@ requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::ve
   LodTree& tree = out.tree;
   std::vector<std::uint32_t> node_of(boxes, LodPlace::kNone);  // the coarsest so far
   std::vector<std::uint32_t> box_of;                           // of each node
-  std::uint32_t first_chunk = 0;  // of the level, in merged
+  std::uint32_t first_chunk = 0;                               // of the level, in merged
   for (std::size_t l = 0; l < levels.size(); ++l) {
     tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
     for (std::uint32_t b = 0; b < boxes; ++b) {
@@ -223,7 +224,8 @@ requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::ve
       const LodNode& finer = tree.nodes[tree.places[at].finer];
       node.grain = finer.grain;
       node.reach = detail::both(node.reach, finer.reach);
-      node.error = std::max(finer.error, static_cast<float>(detail::distance_to_level(levels[0].cloud, rows[0][b], own, r)));
+      node.error =
+          std::max(finer.error, static_cast<float>(detail::distance_to_level(levels[0].cloud, rows[0][b], own, r)));
     });
     if (Status s = backend.synchronize(); !s) return s;
   }

@@ -36,8 +36,8 @@ struct LodPlace {
 /// many Gaussians, at most kProjectChunk. Any cut through the tree shows each Gaussian of the cloud
 /// once.
 ///
-/// Or a forest of the levels that a set ships: `places` and `roots` are not empty then. Nodes are boxes of the set, each at
-/// one level, and have as many chunks as they need; a cut takes one level of each box.
+/// Or a forest of the levels that a set ships: `places` and `roots` are not empty then. Nodes are boxes of the set,
+/// each at one level, and have as many chunks as they need; a cut takes one level of each box.
 struct LodTree {
   GaussianCloud merged;  ///< Gaussians of the nodes above leaves: kProjectChunk rows a node, the last
                          ///< ones transparent where it has fewer
@@ -58,7 +58,9 @@ struct LodTree {
     return sum;
   }
   /// Bytes beside those of the cloud.
-  std::size_t bytes() const noexcept { return merged.bytes() + nodes.size() * sizeof(LodNode) + places.size() * sizeof(LodPlace); }
+  std::size_t bytes() const noexcept {
+    return merged.bytes() + nodes.size() * sizeof(LodNode) + places.size() * sizeof(LodPlace);
+  }
 };
 
 namespace detail {

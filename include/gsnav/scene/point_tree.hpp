@@ -60,9 +60,8 @@ class PointTree {
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     const std::size_t middle = first + (last - first) / 2;
     const auto at = [this](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-    std::nth_element(at(first), at(middle), at(last), [&](std::uint32_t a, std::uint32_t b) {
-      return points_[a][axis] < points_[b][axis];
-    });
+    std::nth_element(at(first), at(middle), at(last),
+                     [&](std::uint32_t a, std::uint32_t b) { return points_[a][axis] < points_[b][axis]; });
     axes_[middle] = static_cast<std::uint8_t>(axis);
     split(first, middle);
     split(middle + 1, last);
