@@ -47,6 +47,7 @@ struct Variant {
   unsigned outputs;
   Profile profile;
   bool base_color = false;  ///< of a scene of SH degree 0
+  bool axes = false;        ///< with axes computed beforehand in place of quaternions and scales (processors only)
 
   const GaussianCloud& cloud() const {
     return base_color ? gsnav_bench::base_color_cloud() : workload().cloud;
@@ -64,9 +65,30 @@ constexpr Variant kVariants[] = {{"rgbd/exact", kRgb | kAlpha | kMedianDepth, Pr
                                  {"rgb/exact", kRgb, Profile::exact},
                                  {"rgb/fast", kRgb, Profile::fast},
                                  {"rgb_sh0/fast", kRgb, Profile::fast, true},
+                                 {"rgb_axes/fast", kRgb, Profile::fast, false, true},
                                  {"depth/exact", kMedianDepth, Profile::exact},
                                  {"depth/fast", kMedianDepth, Profile::fast},
                                  {"alpha/fast", kAlpha, Profile::fast}};
+
+/// The workload's axes: what a static scene could keep in place of quaternions and scales.
+const std::vector<float>* axes_of_workload() {
+  static std::vector<float> axes[9];
+  const GaussianCloud& cloud = workload().cloud;
+  if (axes[0].empty()) {
+    for (std::vector<float>& plane : axes) plane.resize(cloud.size());
+    const GaussianView view = cloud.set().gaussians;
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      const Mat3<float> rotation = rotation_matrix(quat_of(view, i));
+      const Vec3<float> scales = scales_of(view, i);
+      for (std::size_t r = 0; r < 3; ++r) {
+        axes[3 * r][i] = rotation.row[r].x * scales.x;
+        axes[3 * r + 1][i] = rotation.row[r].y * scales.y;
+        axes[3 * r + 2][i] = rotation.row[r].z * scales.z;
+      }
+    }
+  }
+  return axes;
+}
 
 double to_ms(std::chrono::steady_clock::duration d) {
   return std::chrono::duration<double, std::milli>(d).count();
@@ -125,7 +147,10 @@ void render_frames(benchmark::State& state, B& backend, const Variant& v, int wi
                    int threads) {
   const std::vector<Camera> cameras = sized(width, height);
   const GaussianArrays<B> arrays(backend, v.cloud());
-  const std::vector<GaussianSet> sets{arrays.set()};
+  std::vector<GaussianSet> sets{arrays.set()};
+  if (v.axes) {
+    for (int k = 0; k < 9; ++k) sets[0].gaussians.axes[k] = {axes_of_workload()[k].data(), axes_of_workload()[k].size()};
+  }
   Renderer<float, B> renderer(backend, v.config());
   Frames<float> frames;
   double visible = 0, pairs = 0, count = 0;
@@ -238,7 +263,7 @@ void register_all() {
           OpenMPBackend backend(threads);
           render_frames(state, backend, v, w, h, threads);
         }));
-        if (w == 256 && v.profile == Profile::fast && !v.base_color) {
+        if (w == 256 && v.profile == Profile::fast && !v.base_color && !v.axes) {
           add_row("openmp" + std::to_string(threads) + "/batch64/" + suffix,
                   [=](benchmark::State& state) {
                     OpenMPBackend backend(threads);
@@ -248,7 +273,7 @@ void register_all() {
         }
       }
 #if defined(GSNAV_HAS_CUDA)
-      if (CudaBackend::device_count() > 0) {
+      if (CudaBackend::device_count() > 0 && !v.axes) {
         timed(add_row("cuda/" + suffix, [=](benchmark::State& state) {
           CudaBackend backend;
           render_frames(state, backend, v, w, h, 0);
