@@ -13,6 +13,7 @@ namespace nav_loop {
 /// What the command line asks for.
 struct Options {
   std::string scene;  ///< empty: the embedded flat
+  double density = 1.0;  ///< of the embedded flat's Gaussians and of people's
   std::string up = "y";
   int avatars = 3;
   int episodes = 10;

@@ -54,7 +54,7 @@ Result<Setup> prepare(const Options& options) {
   auto from = Clock::now();
   gsnav::SceneAsset asset;
   if (options.scene.empty()) {
-    auto flat = gsnav::make_default_scene();
+    auto flat = gsnav::make_default_scene(options.density);
     if (!flat) return flat.status();
     asset.cloud = std::make_shared<gsnav::GaussianCloud>(std::move(flat->cloud));
     vertices = std::move(flat->vertices);
@@ -123,7 +123,7 @@ Result<Setup> prepare(const Options& options) {
   setup.facts.island_area = nav.island_count() > 0 ? nav.island_area(0) : 0.0;
   if (options.avatars > 0) {
     auto people = gsnav::walking_people(walkways ? *walkways : *setup.scene.navmesh,
-                                        static_cast<std::size_t>(options.avatars), options.seed);
+                                        static_cast<std::size_t>(options.avatars), options.seed, options.density);
     if (!people) return people.status();
     setup.scene.avatars = std::move(*people);
     setup.facts.avatar_gaussians = setup.scene.avatars.front().asset()->size();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/sim/people.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -72,7 +73,9 @@ Vec3d person_color(std::size_t index) noexcept {
   return kColors[index % kColors.size()];
 }
 
-Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count, std::uint64_t seed) {
+Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count, std::uint64_t seed,
+                                                double density) {
+  if (!std::isfinite(density)) return {Errc::invalid_argument, "walking_people: density is not finite"};
   std::vector<Way> ways;
   std::vector<AvatarActor> people;
   Rng rng(seed ^ 0x70656f706c65ull);
@@ -91,6 +94,7 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
     if (!best) best = make_way({walkways.random_point(rng, std::size_t{0}).position}, kUsualPace);
     if (!best) return {Errc::nothing_navigable, "no place for an avatar"};
     HumanoidOptions look = random_person(static_cast<std::uint64_t>(i) + 1);
+    look.gaussians = static_cast<int>(std::clamp(density * look.gaussians, 2000.0, 400000.0));
     look.top = person_color(i) * 0.72 + Vec3d{0.10, 0.10, 0.10};
     auto body = try_make_humanoid(look);
     if (!body) return body.status();

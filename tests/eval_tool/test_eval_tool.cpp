@@ -15,7 +15,9 @@ using namespace gsnav_test;
 
 namespace {
 
-const std::string kOptions = "--avatars 2 --episodes 3 --max-steps 25 --width 32 --height 24 --out out ";
+// Programs make the flat anew each time: as few Gaussians as it may have.
+const std::string kSparse = " --density 0.05 ";
+const std::string kOptions = kSparse + "--avatars 2 --episodes 3 --max-steps 25 --width 32 --height 24 --out out ";
 
 std::size_t lines(const std::string& text) { return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')); }
 
@@ -86,8 +88,10 @@ TEST_CASE("episodes of a file are played by any policy") {
   episodes[0].goal_position = {5.2, 0, 3.2};
   REQUIRE(gsnav::io::save_episodes(folder / "val.json.gz", episodes).ok());
   for (const std::string policy : {"greedy", "random"}) {
-    const Outcome out = run_command(GSNAV_EVAL, "--avatars 0 --max-steps 60 --pictures 0 --episode-file val.json.gz --out " +
-                                                    policy + " --policy " + policy, folder.path());
+    const Outcome out = run_command(GSNAV_EVAL,
+                                    kSparse + "--avatars 0 --max-steps 60 --pictures 0 --episode-file val.json.gz --out " +
+                                        policy + " --policy " + policy,
+                                    folder.path());
     CAPTURE(out.text);
     CHECK(out.ok);
     CHECK(out.says(policy == "greedy" ? "SR 1.000" : "1 episodes"));
@@ -97,7 +101,7 @@ TEST_CASE("episodes of a file are played by any policy") {
 
 TEST_CASE("a replay becomes a video of any size, and says what is missing where there is no ffmpeg") {
   const TempFolder folder("video");
-  const std::string options = "--avatars 1 --episodes 1 --max-steps 12 --width 63 --height 47 --out out ";
+  const std::string options = kSparse + "--avatars 1 --episodes 1 --max-steps 12 --width 63 --height 47 --out out ";
   REQUIRE(run_command(GSNAV_EVAL, options + "--pictures 0", folder.path()).ok);
   const Outcome none = run_command("env", "PATH=/nowhere " + quoted(GSNAV_REPLAY) + " " + options + "--video none.mp4", folder.path());
   CHECK_FALSE(none.ok);
@@ -130,7 +134,7 @@ TEST_CASE("any number of ranks gives the same numbers, also where one was killed
   const TempFolder folder("eval");
   const auto ranks = [&](int n, const std::string& out, const std::string& more = "") {
     const std::string arguments = "--oversubscribe --allow-run-as-root -n " + std::to_string(n) + " " + quoted(GSNAV_EVAL_MPI) +
-                                  " --avatars 1 --episodes 7 --max-steps 30 --policy random --out " + out + more;
+                                  kSparse + "--avatars 1 --episodes 7 --max-steps 30 --policy random --out " + out + more;
     const Outcome run = run_command(GSNAV_MPIEXEC, arguments, folder.path());
     CAPTURE(run.text);
     REQUIRE(run.ok);
@@ -146,8 +150,8 @@ TEST_CASE("any number of ranks gives the same numbers, also where one was killed
   write_file(folder / "four/journal.2.jsonl", second.substr(0, second.size() - 10));
   write_file(folder / "four/journal.3.jsonl", third.substr(0, third.find('\n') + 1));
   CHECK(ranks(3, "four") == one);
-  const Outcome again = run_command(GSNAV_EVAL, "--avatars 1 --episodes 7 --max-steps 30 --policy random --pictures 0 --out four",
-                                    folder.path());
+  const std::string same = kSparse + "--avatars 1 --episodes 7 --max-steps 30 --policy random --pictures 0 --out four";
+  const Outcome again = run_command(GSNAV_EVAL, same, folder.path());
   CHECK(again.says("7 episodes: SR"));
   CHECK_FALSE(again.says("episode 1/7"));  // none is missing
 }
@@ -173,10 +177,10 @@ pid_t process_of_rank(int rank, const std::filesystem::path& folder) {
 
 TEST_CASE("a rank is killed while it plays; the job, begun again with fewer ranks, has the numbers of one that was never stopped") {
   const TempFolder folder("killed");
-  const std::string options = " --avatars 1 --episodes 60 --max-steps 200 --policy random --out ";
+  const std::string options = kSparse + "--avatars 1 --episodes 60 --max-steps 200 --policy random --out ";
   const std::vector<std::string> words{GSNAV_MPIEXEC, "--oversubscribe", "--allow-run-as-root", "-n", "3", GSNAV_EVAL_MPI,
-                                       "--avatars", "1", "--episodes", "60", "--max-steps", "200", "--policy", "random",
-                                       "--out", "out"};
+                                       "--density", "0.05", "--avatars", "1", "--episodes", "60", "--max-steps", "200",
+                                       "--policy", "random", "--out", "out"};
   Process job(words, folder.path());
   pid_t victim = 0;
   while (job.runs() && lines(read_file(folder / "out/journal.1.jsonl")) < 4) usleep(1000);

@@ -15,10 +15,11 @@ using gsnav::Status;
 using Json = nlohmann::json;
 
 std::string header_of(const Options& o) {
-  return Json{{"scene", o.scene},     {"up", o.up},           {"navmesh", o.navmesh}, {"avatars", o.avatars},
+  Json header{{"scene", o.scene},       {"up", o.up},           {"navmesh", o.navmesh}, {"avatars", o.avatars},
               {"episodes", o.episodes}, {"episode_file", o.episode_file}, {"preset", o.preset}, {"policy", o.policy},
-              {"max_steps", o.max_steps}, {"seed", o.seed}}
-      .dump();
+              {"max_steps", o.max_steps}, {"seed", o.seed}};
+  if (o.density < 1 || o.density > 1) header["density"] = o.density;  // journals from before there was a choice go on
+  return header.dump();
 }
 
 /// Metrics by name; what is infinite has no number in JSON and is left out.

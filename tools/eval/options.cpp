@@ -5,6 +5,9 @@ namespace gsnav_eval {
 
 void add_scene_options(CLI::App& app, Options& o) {
   app.add_option("--scene", o.scene, "scene to load; without: the embedded flat");
+  app.add_option("--density", o.density, "of the embedded flat's Gaussians and of people's")
+      ->capture_default_str()
+      ->check(CLI::Range(0.05, 20.0));
   app.add_option("--up", o.up, "axis of the scene that points up")->capture_default_str();
   app.add_option("--navmesh", o.navmesh, "built from: gaussians, mesh (the flat only), auto")
       ->capture_default_str()

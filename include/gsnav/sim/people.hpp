@@ -17,9 +17,11 @@ Vec3d person_color(std::size_t index) noexcept;
 
 /// People on random ways over the largest island of `walkways` (a NavMesh for a body wider than the agent's keeps their
 /// shoulders off the furniture). Ways are drawn until one keeps 0.75 m from those before it, where that can be had; all
-/// have one period, so what holds for one round holds for ever. The same arguments give the same people.
-/// Errors: nothing_navigable where nobody finds a place.
-Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count, std::uint64_t seed);
+/// have one period, so what holds for one round holds for ever. The same arguments give the same people; `density` scales
+/// the number of their Gaussians, as far as HumanoidOptions allows.
+/// Errors: nothing_navigable where nobody finds a place; invalid_argument where density is not finite.
+Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count, std::uint64_t seed,
+                                                double density = 1.0);
 
 /// Gives each episode a start time, a multiple of the control period in [0, 600) s, at which no avatar is within 0.6 m of its start (the last of a hundred
 /// tries where there is none). Errors: what CapsuleSet::create reports.
