@@ -10,19 +10,20 @@ namespace gsnav::cuda {
 
 namespace {
 
-constexpr int kPixels = 2;                         ///< of a thread, one above the other
+constexpr int kPixels = 2;  ///< of a thread, one above the other
 constexpr int kThreads = kBatchTile * kBatchTile / kPixels;
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
 constexpr int kBlocksPerProcessor = 4;
 #else
 constexpr int kBlocksPerProcessor = 7;
 #endif
-constexpr int kRowsApart = kBlock / kPixels;       ///< of a thread's pixels
-constexpr std::uint32_t kChunk = 256;              ///< splats that are staged at a time
-constexpr std::uint32_t kNothing = kChunk;         ///< a staged splat that covers no pixel
-constexpr std::uint32_t kListStep = 4;             ///< lists are read by so many
+constexpr int kRowsApart = kBlock / kPixels;  ///< of a thread's pixels
+constexpr std::uint32_t kChunk = 256;         ///< splats that are staged at a time
+constexpr std::uint32_t kNothing = kChunk;    ///< a staged splat that covers no pixel
+constexpr std::uint32_t kListStep = 4;        ///< lists are read by so many
 constexpr unsigned kAll = 0xffffffffu;
-static_assert(kThreads == kOrderThreads && 4 * kBlock * kBlock == 32 * kPixels && kOrderBatch % kChunk == 0);
+static_assert(kThreads == kOrderThreads && 4 * kBlock * kBlock == 32 * kPixels &&
+              kOrderBatch % kChunk == 0);
 
 static_assert((kChunk + 1) * sizeof(StagedSplat) <= kOrderLent && kOrderLent <= 0xffff);
 
@@ -30,19 +31,22 @@ struct BlendShared {
   alignas(16) OrderShared order;
   std::uint16_t masks[kChunk];  ///< the blocks that each splat may reach: bit 4 * row + column
   union {
-    /// Of the quarter-warps: places of splats in `lent`, in bytes. A splat that covers nothing fills them up.
+    /// Of the quarter-warps: places of splats in `lent`, in bytes. A splat that covers nothing fills
+    /// them up.
     alignas(8) std::uint16_t lists[kThreads / 8][kChunk + kListStep];
     std::uint16_t queues[kThreads / 32][kChunk / (kThreads / 32)];
   };
 
-  __device__ StagedSplat& splat(std::uint32_t i) { return reinterpret_cast<StagedSplat*>(order.lent)[i]; }
+  __device__ StagedSplat& splat(std::uint32_t i) {
+    return reinterpret_cast<StagedSplat*>(order.lent)[i];
+  }
 };
 
-/// Puts the records of splats [first, first + n) of the batch into shared memory, and what they may reach. `far`: of the
-/// tile's meshes.
+/// Puts the records of splats [first, first + n) of the batch into shared memory, and what they may
+/// reach. `far`: of the tile's meshes.
 template <bool Mesh>
-__device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, std::uint32_t n, int tile_x,
-                      int tile_y, float far) {
+__device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, std::uint32_t n,
+                      int tile_x, int tile_y, float far) {
   if (threadIdx.x == 0) s.splat(kNothing) = staged_nothing();
   const unsigned lane = threadIdx.x % 32;
   std::uint16_t* const queue = s.queues[threadIdx.x / 32];
@@ -60,7 +64,9 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, s
     }
     // So that no lane waits for another's ellipse.
     const unsigned votes = __ballot_sync(kAll, wide);
-    if (wide) queue[queued + static_cast<std::uint32_t>(__popc(votes & ((1u << lane) - 1)))] = static_cast<std::uint16_t>(i);
+    if (wide)
+      queue[queued + static_cast<std::uint32_t>(__popc(votes & ((1u << lane) - 1)))] =
+          static_cast<std::uint16_t>(i);
     queued += static_cast<std::uint32_t>(__popc(votes));
   }
   __syncwarp();
@@ -68,14 +74,14 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, s
     const std::uint32_t i = queue[q];
     const SplatRecord& r = a.records[s.order.slots[first + i]];
     const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
-    s.masks[i] = static_cast<std::uint16_t>(
-        blocks.of_ellipse(geometry_of(s.splat(i)), a.log2_alpha_min));
+    s.masks[i] =
+        static_cast<std::uint16_t>(blocks.of_ellipse(geometry_of(s.splat(i)), a.log2_alpha_min));
   }
   __syncthreads();
 }
 
-/// Lists those of the n staged splats that reach each quarter of the warp, and returns the length of the longest
-/// list; the others are filled up. `bit`: of the first quarter's block; `open`: a bit a quarter.
+/// Lists those of the n staged splats that reach each quarter of the warp, and returns the length of the
+/// longest list; the others are filled up. `bit`: of the first quarter's block; `open`: a bit a quarter.
 __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned bit, unsigned open) {
   const unsigned lane = threadIdx.x % 32, below = (1u << lane) - 1;
   std::uint16_t(*const lists)[kChunk + kListStep] = s.lists + threadIdx.x / 32 * 4;
@@ -92,7 +98,8 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned b
     for (unsigned q = 0; q < 4; ++q) {
       const bool mine = (mask & bit_of(q)) != 0;
       const unsigned votes = __ballot_sync(kAll, mine);
-      if (mine) lists[q][length[q] + static_cast<std::uint32_t>(__popc(votes & below))] = place(i + lane);
+      if (mine)
+        lists[q][length[q] + static_cast<std::uint32_t>(__popc(votes & below))] = place(i + lane);
       length[q] += static_cast<std::uint32_t>(__popc(votes));
     }
   }
@@ -109,12 +116,14 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned b
 /// A block a tile, a thread two pixels of a column, a quarter of a warp a block of 4 x 4 of them. For
 /// DepthMode::median the slot of the median Gaussian is left in the image.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh>
-__global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor) blend_kernel(const __grid_constant__ BlendArgs b) {
+__global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor)
+    blend_kernel(const __grid_constant__ BlendArgs b) {
   extern __shared__ __align__(16) unsigned char memory[];
   BlendShared& s = *reinterpret_cast<BlendShared*>(memory);
   const BatchArgs& a = b.batch;
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
-  const std::uint32_t ordered = a.tile_order[blockIdx.x], camera = ordered / tiles, tile = ordered % tiles;
+  const std::uint32_t ordered = a.tile_order[blockIdx.x], camera = ordered / tiles,
+                      tile = ordered % tiles;
   const int tile_x = static_cast<int>(tile) % a.grid.columns * kBatchTile;
   const int tile_y = static_cast<int>(tile) / a.grid.columns * kBatchTile;
   // A warp has 2 x 2 blocks of the tile's 4 x 4.
@@ -138,7 +147,8 @@ __global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor) blen
     if (!inside[k]) state[k].transmittance = 0;
   }
   const auto pixel_of = [&](int k) {
-    const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
+    const std::size_t width = static_cast<std::size_t>(a.grid.width),
+                      height = static_cast<std::size_t>(a.grid.height);
     const std::size_t line = camera * height + static_cast<std::size_t>(y + k * kRowsApart);
     return line * width + static_cast<std::size_t>(x);
   };
@@ -150,8 +160,9 @@ __global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor) blen
   }
   const auto is_open = [&] { return state[0].open(rules) || state[1].open(rules); };
   const auto blend = [&](std::uint32_t place) {
-    blend_staged<Color, D, M, F, Mesh>(a, rules, *reinterpret_cast<const StagedSplat*>(s.order.lent + place), px, py,
-                                       mesh, state, median);
+    blend_staged<Color, D, M, F, Mesh>(a, rules,
+                                       *reinterpret_cast<const StagedSplat*>(s.order.lent + place), px,
+                                       py, mesh, state, median);
   };
   TileOrder order(a, ordered, camera);
   unsigned open = __ballot_sync(kAll, is_open());
@@ -179,13 +190,15 @@ __global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor) blen
     }
   }
   for (int k = 0; k < kPixels; ++k) {
-    if (inside[k]) write<Color, D, Mesh>(b, pixel_of(k), state[k], median_of(state[k], median[k]), px, py[k]);
+    if (inside[k])
+      write<Color, D, Mesh>(b, pixel_of(k), state[k], median_of(state[k], median[k]), px, py[k]);
   }
 }
 
 /// Out of line: few need it, and all would pay for its registers.
 __device__ __noinline__ void depth_record64(const ProjectArgs<float>& args, std::size_t row, float key,
-                                            const Vec3<float>& mean, std::size_t origin, SplatDepth<float>& depth) {
+                                            const Vec3<float>& mean, std::size_t origin,
+                                            SplatDepth<float>& depth) {
   Splat splat;
   make_splat64(args, true, row, key, mean, origin, splat);
   depth = splat.depth;
@@ -199,7 +212,8 @@ __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t came
   const std::size_t row = source - args.first_rank;
   const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[row];
   const Vec3<float> mean{gs.means[0][row], gs.means[1][row], gs.means[2][row]};
-  const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
+  const float z =
+      depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
   const SplatAxes<float> axes =
       gsnav::detail::load_axes(gs, args.camera, gsnav::detail::camera_delta(args, mean, origin), row);
   const Projected<float> p = project<float, float>(args.camera, axes, z, gs.opacities[row]);
@@ -211,22 +225,25 @@ __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t came
 
 constexpr unsigned kDepthColumns = 16, kDepthRows = 8, kDepthThreads = kDepthColumns * kDepthRows;
 
-/// A thread a pixel of camera blockIdx.z, a warp 8 x 4 of them: slots become depths, of records where these are. Else
-/// neighbours have Gaussians in common, and each is projected once a warp.
+/// A thread a pixel of camera blockIdx.z, a warp 8 x 4 of them: slots become depths, of records where
+/// these are. Else neighbours have Gaussians in common, and each is projected once a warp.
 __global__ void __launch_bounds__(kDepthThreads, 6) depth_kernel(const BatchArgs a, float* images) {
   const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
   const int x = static_cast<int>(blockIdx.x * kDepthColumns + warp % 2 * 8 + lane % 8);
   const int y = static_cast<int>(blockIdx.y * kDepthRows + warp / 2 * 4 + lane / 8);
   const bool inside = x < a.grid.width && y < a.grid.height;
-  const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
-  float* const to = images + (blockIdx.z * height + static_cast<std::size_t>(y)) * width + static_cast<std::size_t>(x);
+  const std::size_t width = static_cast<std::size_t>(a.grid.width),
+                    height = static_cast<std::size_t>(a.grid.height);
+  float* const to =
+      images + (blockIdx.z * height + static_cast<std::size_t>(y)) * width + static_cast<std::size_t>(x);
   const float px = static_cast<float>(x) + 0.5f, py = static_cast<float>(y) + 0.5f;
   const std::uint32_t slot = inside ? __float_as_uint(*to) : kNoSlot;
   if (a.depths != nullptr) {
     if (inside) *to = slot == kNoSlot ? 0.0f : ray_depth(a.depths[slot], px, py);
     return;
   }
-  const int first = __ffs(static_cast<int>(__match_any_sync(kAll, slot))) - 1;  // of the lanes with that Gaussian
+  const int first =
+      __ffs(static_cast<int>(__match_any_sync(kAll, slot))) - 1;  // of the lanes with that Gaussian
   SplatDepth<float> depth{};
   if (slot != kNoSlot && static_cast<int>(lane) == first) depth = depth_record(a, blockIdx.z, slot);
   constexpr int kWords = sizeof depth / sizeof(float);
@@ -254,8 +271,11 @@ void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std
     });
   }
   if (raster.depth_mode() == DepthMode::median && raster.mesh.empty()) {
-    const auto blocks = [](int pixels, unsigned of) { return (static_cast<unsigned>(pixels) + of - 1) / of; };
-    depth_kernel<<<dim3(blocks(args.grid.width, kDepthColumns), blocks(args.grid.height, kDepthRows), args.cameras),
+    const auto blocks = [](int pixels, unsigned of) {
+      return (static_cast<unsigned>(pixels) + of - 1) / of;
+    };
+    depth_kernel<<<dim3(blocks(args.grid.width, kDepthColumns), blocks(args.grid.height, kDepthRows),
+                        args.cameras),
                    kDepthThreads, 0, stream>>>(args, raster.images.median_depth);
   }
 }

@@ -26,7 +26,8 @@ struct StagedSplat {
 /// The staged form of a record, and of what covers no pixel.
 __device__ inline StagedSplat staged(const SplatRecord& r, std::uint32_t slot) {
   const SplatGeometry<float> g = geometry_of(r);
-  return {{{g.ref_x, g.ref_y, g.a, g.k}, {g.b, g.w1, g.w2, g.log2_opacity}}, {r.r, r.g, r.blue, __uint_as_float(slot)}};
+  return {{{g.ref_x, g.ref_y, g.a, g.k}, {g.b, g.w1, g.w2, g.log2_opacity}},
+          {r.r, r.g, r.blue, __uint_as_float(slot)}};
 }
 __device__ inline StagedSplat staged_nothing() {
   StagedSplat nothing{};
@@ -40,10 +41,14 @@ __device__ inline SplatGeometry<float> geometry_of(const StagedSplat& s) {
 
 /// The blocks of the tile at (x, y) that a footprint may reach.
 struct ReachedBlocks {
-  int x, y;                 ///< of the tile
-  int x0, x1, y0, y1;       ///< pixels of the bounds in it, inclusive
+  int x, y;            ///< of the tile
+  int x0, x1, y0, y1;  ///< pixels of the bounds in it, inclusive
   __device__ ReachedBlocks(const SplatBounds& b, int tile_x, int tile_y, int side = kBatchTile)
-      : x(tile_x), y(tile_y), x0(max(b.x0, x)), x1(min(b.x1, x + side) - 1), y0(max(b.y0, y)),
+      : x(tile_x),
+        y(tile_y),
+        x0(max(b.x0, x)),
+        x1(min(b.x1, x + side) - 1),
+        y0(max(b.y0, y)),
         y1(min(b.y1, y + side) - 1) {}
   __device__ unsigned columns(int first, int last) const {
     return (2u << ((last - x) / kBlock)) - (1u << ((first - x) / kBlock));
@@ -51,7 +56,9 @@ struct ReachedBlocks {
   __device__ int first_row() const { return (y0 - y) / kBlock; }
   __device__ int last_row() const { return (y1 - y) / kBlock; }
   /// More than one row and column: the ellipse may leave out some of them.
-  __device__ bool many() const { return first_row() != last_row() && (x0 - x) / kBlock != (x1 - x) / kBlock; }
+  __device__ bool many() const {
+    return first_row() != last_row() && (x0 - x) / kBlock != (x1 - x) / kBlock;
+  }
   /// More than 2 x 2: it leaves out enough to be worth its time.
   __device__ bool wide() const {
     const int rows = last_row() - first_row(), columns = (x1 - x) / kBlock - (x0 - x) / kBlock;
@@ -65,13 +72,16 @@ struct ReachedBlocks {
   }
   __device__ unsigned of_ellipse(const SplatGeometry<float>& g, float log2_alpha_min) const {
     const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
-    const FootprintStrips<float> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0), centre(y1));
+    const FootprintStrips<float> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0),
+                                        centre(y1));
     unsigned mask = 0;
     for (int row = first_row(); row <= last_row(); ++row) {
       const int top = y + row * kBlock;
       float left, right;
-      if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlock - 1, y1)), left, right)) continue;
-      // As in for_each_tile: the padding of left and right is more than what rounding to a pixel may lose.
+      if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlock - 1, y1)), left, right))
+        continue;
+      // As in for_each_tile: the padding of left and right is more than what rounding to a pixel may
+      // lose.
       const float low = static_cast<float>(x0), high = static_cast<float>(x1 + 1);
       const int first = static_cast<int>(clamp(left + 0.5f, low, high));
       const int last = static_cast<int>(clamp(right + 0.5f, low, high)) - 1;
@@ -88,23 +98,25 @@ struct BlendArgs {
   std::uint8_t* rgb8;
 };
 
-/// The median depth of a pixel with a mesh, or none, of which `median` is the slot and `state` what Gaussians left.
+/// The median depth of a pixel with a mesh, or none, of which `median` is the slot and `state` what
+/// Gaussians left.
 template <class State>
-__device__ float median_before_mesh(const BlendArgs& b, std::size_t pixel, const State& state, std::uint32_t median,
-                                    float px, float py) {
+__device__ float median_before_mesh(const BlendArgs& b, std::size_t pixel, const State& state,
+                                    std::uint32_t median, float px, float py) {
   if (median != kNoSlot) return ray_depth(b.batch.depths[median], px, py);
   const float mesh = b.raster.mesh.depth[pixel];
   return has_mesh(mesh) && abs(state.transmittance) > 0.5f ? mesh : 0.0f;
 }
 
-/// Writes a pixel, once its mesh has taken what Gaussians left of it. Without meshes the slot of the median Gaussian is
-/// left in the image.
+/// Writes a pixel, once its mesh has taken what Gaussians left of it. Without meshes the slot of the
+/// median Gaussian is left in the image.
 template <bool Color, DepthMode D, bool Mesh>
 __device__ void write(const BlendArgs& b, std::size_t pixel, BlendState<float, kBlendedDepth<D>>& state,
                       std::uint32_t median, float px, float py) {
   const FrameImages<float>& out = b.raster.images;
   if constexpr (Mesh) {
-    if constexpr (D == DepthMode::median) out.median_depth[pixel] = median_before_mesh(b, pixel, state, median, px, py);
+    if constexpr (D == DepthMode::median)
+      out.median_depth[pixel] = median_before_mesh(b, pixel, state, median, px, py);
     close_by_mesh<Color>(state, b.raster.rules, b.raster.mesh, pixel);
   }
   if (b.rgb != nullptr || b.rgb8 != nullptr) {
@@ -113,7 +125,8 @@ __device__ void write(const BlendArgs& b, std::size_t pixel, BlendState<float, k
     for (int c = 0; c < 3; ++c) {
       if (b.rgb != nullptr) b.rgb[3 * pixel + c] = channels[c];
       if (b.rgb8 != nullptr) {
-        b.rgb8[3 * pixel + c] = static_cast<std::uint8_t>(255.0f * clamp(channels[c], 0.0f, 1.0f) + 0.5f);
+        b.rgb8[3 * pixel + c] =
+            static_cast<std::uint8_t>(255.0f * clamp(channels[c], 0.0f, 1.0f) + 0.5f);
       }
     }
   }
@@ -130,14 +143,18 @@ __device__ void write(const BlendArgs& b, std::size_t pixel, BlendState<float, k
 /// What RasterArgs decide at run time and the inner loop must not.
 enum class Form { plain, exclusive_stop, perspective };
 
-/// Blends a splat into K pixels of a column, where `mesh` has the depths of their meshes. `median`: see median_of.
+/// Blends a splat into K pixels of a column, where `mesh` has the depths of their meshes. `median`: see
+/// median_of.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh, int K>
-__device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>& rules, const StagedSplat& from, float px,
-                                    const float (&py)[K], const float (&mesh)[K],
-                                    BlendState<float, kBlendedDepth<D>> (&state)[K], std::uint32_t (&median)[K]) {
+__device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>& rules,
+                                    const StagedSplat& from, float px, const float (&py)[K],
+                                    const float (&mesh)[K],
+                                    BlendState<float, kBlendedDepth<D>> (&state)[K],
+                                    std::uint32_t (&median)[K]) {
   const SplatGeometry<float> geometry = geometry_of(from);
   const SplatColor<float> color = from.color;
-  const std::uint32_t slot = __float_as_uint(color.pad);  // 0 for the splat that covers nothing: any will do
+  const std::uint32_t slot =
+      __float_as_uint(color.pad);  // 0 for the splat that covers nothing: any will do
   const SplatDepth<float>* const depth = kBlendedDepth<D> == DepthMode::any ? a.depths + slot : nullptr;
   const ColumnTerms<float> terms = column_terms(geometry, px);
   for (int k = 0; k < K; ++k) {
@@ -154,27 +171,32 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
       }
     }
     if (D == DepthMode::median && state[k].transmittance > 0.5f) median[k] = slot;
-    blend_drawn<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, drawn, alpha, &color, depth, px, py[k]);
+    blend_drawn<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, drawn, alpha, &color, depth,
+                                                           px, py[k]);
   }
 }
 
-/// The slot of the median Gaussian, of the last that blend_staged met while more than half of the light was left.
+/// The slot of the median Gaussian, of the last that blend_staged met while more than half of the light
+/// was left.
 template <class State>
 __device__ inline std::uint32_t median_of(const State& state, std::uint32_t last) {
-  return abs(state.transmittance) > 0.5f ? kNoSlot : last;  // an exclusive stop negates it and blends nothing
+  return abs(state.transmittance) > 0.5f ? kNoSlot
+                                         : last;  // an exclusive stop negates it and blends nothing
 }
 
-/// Depths of the meshes at a thread's pixels, and the farthest of all pixels of the block: what a whole tile hides is
-/// left out of its lists. All threads of the block call it.
+/// Depths of the meshes at a thread's pixels, and the farthest of all pixels of the block: what a whole
+/// tile hides is left out of its lists. All threads of the block call it.
 template <int K>
-__device__ inline float load_mesh(const BlendArgs& b, const std::size_t (&pixel)[K], const bool (&inside)[K],
-                                  float (&mesh)[K]) {
+__device__ inline float load_mesh(const BlendArgs& b, const std::size_t (&pixel)[K],
+                                  const bool (&inside)[K], float (&mesh)[K]) {
   __shared__ unsigned far;
   if (threadIdx.x == 0) far = 0;
   __syncthreads();
   for (int k = 0; k < K; ++k) {
     mesh[k] = inside[k] ? b.raster.mesh.depth[pixel[k]] : 0.0f;
-    if (inside[k]) atomicMax(&far, __float_as_uint(has_mesh(mesh[k]) ? mesh[k] : INFINITY));  // in order, as none is negative
+    if (inside[k])
+      atomicMax(&far, __float_as_uint(has_mesh(mesh[k]) ? mesh[k]
+                                                        : INFINITY));  // in order, as none is negative
   }
   __syncthreads();
   return __uint_as_float(far);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_blend.cuh"
 
-// Few cameras: lists, which are in order already, are blended by a block a small tile, since a call lasts as long as its
-// longest list.
+// Few cameras: lists, which are in order already, are blended by a block a small tile, since a call
+// lasts as long as its longest list.
 
 namespace gsnav::cuda {
 
@@ -13,7 +13,7 @@ constexpr std::uint32_t kOfThread = 2;                  ///< splats that a threa
 constexpr std::uint32_t kChunk = kOfThread * kThreads;  ///< splats that are staged at a time
 constexpr std::uint32_t kOfWarp = kChunk / kWarps;      ///< of these a warp's, neighbours
 constexpr std::uint32_t kListStep = 4;                  ///< lists are read by so many
-constexpr int kBlocksPerProcessor = 3;  ///< four would spill registers: 4 to 8 % slower
+constexpr int kBlocksPerProcessor = 3;                  ///< four would spill registers: 4 to 8 % slower
 constexpr unsigned kAll = 0xffffffffu;
 static_assert(kSmallTile == 2 * kBlock && kWarps == 4);
 
@@ -30,8 +30,8 @@ struct SmallShared {
   bool open[2][kWarps];  ///< whether any pixel of the block is: one is written while the other is read
 };
 
-/// What the second half of a block does: records are asked for while the splats before them are staged, and their slots
-/// before that.
+/// What the second half of a block does: records are asked for while the splats before them are staged,
+/// and their slots before that.
 class Stager {
  public:
   __device__ Stager(const BatchArgs& a, std::uint32_t begin, std::uint32_t end)
@@ -41,14 +41,16 @@ class Stager {
     ask_for_slots(a, begin + kChunk);
   }
 
-  /// Splats [first, first + kChunk), in order: all chunks are asked for. Only blocks that are `open` get a list.
-  /// `far`: of the tile's meshes.
+  /// Splats [first, first + kChunk), in order: all chunks are asked for. Only blocks that are `open` get
+  /// a list. `far`: of the tile's meshes.
   template <bool Mesh>
-  __device__ void stage(DrawnChunk& to, const bool (&open)[kWarps], const BatchArgs& a, std::uint32_t first,
-                        int tile_x, int tile_y, float far) {
+  __device__ void stage(DrawnChunk& to, const bool (&open)[kWarps], const BatchArgs& a,
+                        std::uint32_t first, int tile_x, int tile_y, float far) {
     const unsigned lane = thread_ % 32, warp = thread_ / 32, below = (1u << lane) - 1;
     const std::uint32_t n = min(kChunk, end_ - first);
-    const auto place = [](std::uint32_t i) { return static_cast<std::uint16_t>(i * sizeof(StagedSplat)); };
+    const auto place = [](std::uint32_t i) {
+      return static_cast<std::uint16_t>(i * sizeof(StagedSplat));
+    };
     unsigned open_bits = 0;
 #pragma unroll
     for (unsigned block = 0; block < kWarps; ++block) open_bits |= open[block] ? bit_of(block) : 0u;
@@ -61,8 +63,9 @@ class Stager {
         to.splats[i] = staged(record_[j], slot_[j]);
         if (!Mesh || !is_hidden(a, slot_[j], far)) {
           const ReachedBlocks blocks(bounds_of(record_[j].x, record_[j].y), tile_x, tile_y, kSmallTile);
-          mask = a.elliptic && blocks.many() ? blocks.of_ellipse(geometry_of(record_[j]), a.log2_alpha_min)
-                                             : blocks.of_bounds();
+          mask = a.elliptic && blocks.many()
+                     ? blocks.of_ellipse(geometry_of(record_[j]), a.log2_alpha_min)
+                     : blocks.of_bounds();
           mask &= open_bits;
         }
       }
@@ -70,7 +73,9 @@ class Stager {
       for (unsigned block = 0; block < kWarps; ++block) {
         const bool reached = (mask & bit_of(block)) != 0;
         const unsigned votes = __ballot_sync(kAll, reached);
-        if (reached) to.lists[block][warp][length[block] + static_cast<std::uint32_t>(__popc(votes & below))] = place(i);
+        if (reached)
+          to.lists[block][warp][length[block] + static_cast<std::uint32_t>(__popc(votes & below))] =
+              place(i);
         length[block] += static_cast<std::uint32_t>(__popc(votes));
       }
     }
@@ -86,9 +91,13 @@ class Stager {
 
  private:
   /// The bit of a block in a mask of ReachedBlocks.
-  __device__ static constexpr unsigned bit_of(unsigned block) { return 1u << (block / 2 * 4 + block % 2); }
+  __device__ static constexpr unsigned bit_of(unsigned block) {
+    return 1u << (block / 2 * 4 + block % 2);
+  }
   /// The thread's splat `j` in a chunk.
-  __device__ std::uint32_t place_of(std::uint32_t j) const { return thread_ / 32 * kOfWarp + j * 32 + thread_ % 32; }
+  __device__ std::uint32_t place_of(std::uint32_t j) const {
+    return thread_ / 32 * kOfWarp + j * 32 + thread_ % 32;
+  }
   __device__ void ask_for_slots(const BatchArgs& a, std::uint32_t first) {
     for (std::uint32_t j = 0; j < kOfThread; ++j) {
       const std::uint32_t i = first + place_of(j);
@@ -108,15 +117,18 @@ class Stager {
   SplatRecord record_[kOfThread];
 };
 
-/// A block a tile, of two halves: a warp of the first draws a block of 4 x 4 pixels, which are its first half's; the
-/// second stages what is drawn next. For DepthMode::median the slot of the median Gaussian is left in the image.
+/// A block a tile, of two halves: a warp of the first draws a block of 4 x 4 pixels, which are its first
+/// half's; the second stages what is drawn next. For DepthMode::median the slot of the median Gaussian
+/// is left in the image.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh>
-__global__ void __launch_bounds__(2 * kThreads, kBlocksPerProcessor) blend_small_kernel(const __grid_constant__ BlendArgs b) {
+__global__ void __launch_bounds__(2 * kThreads, kBlocksPerProcessor)
+    blend_small_kernel(const __grid_constant__ BlendArgs b) {
   __shared__ __align__(16) unsigned char memory[sizeof(SmallShared)];
   SmallShared& s = *reinterpret_cast<SmallShared*>(memory);
   const BatchArgs& a = b.batch;
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
-  const std::uint32_t ordered = a.tile_order[blockIdx.x], camera = ordered / tiles, tile = ordered % tiles;
+  const std::uint32_t ordered = a.tile_order[blockIdx.x], camera = ordered / tiles,
+                      tile = ordered % tiles;
   const int tile_x = static_cast<int>(tile) % a.grid.columns * kSmallTile;
   const int tile_y = static_cast<int>(tile) / a.grid.columns * kSmallTile;
   const bool draws = threadIdx.x < kThreads;
@@ -132,8 +144,10 @@ __global__ void __launch_bounds__(2 * kThreads, kBlocksPerProcessor) blend_small
   const float px = static_cast<float>(x) + 0.5f, py[1] = {static_cast<float>(y) + 0.5f};
   if (!inside) state[0].transmittance = 0;
   if (threadIdx.x < 2) s.chunks[threadIdx.x].splats[kChunk] = staged_nothing();
-  const std::size_t width = static_cast<std::size_t>(a.grid.width), height = static_cast<std::size_t>(a.grid.height);
-  const std::size_t pixel[1] = {(camera * height + static_cast<std::size_t>(y)) * width + static_cast<std::size_t>(x)};
+  const std::size_t width = static_cast<std::size_t>(a.grid.width),
+                    height = static_cast<std::size_t>(a.grid.height);
+  const std::size_t pixel[1] = {(camera * height + static_cast<std::size_t>(y)) * width +
+                                static_cast<std::size_t>(x)};
   float mesh[1]{}, far = 0;
   if constexpr (Mesh) far = load_mesh(b, pixel, {inside}, mesh);
 
@@ -157,8 +171,8 @@ __global__ void __launch_bounds__(2 * kThreads, kBlocksPerProcessor) blend_small
       const DrawnChunk& drawn = s.chunks[chunk];
       const auto blend = [&](std::uint32_t place) {
         const auto* const from = reinterpret_cast<const unsigned char*>(drawn.splats) + place;
-        blend_staged<Color, D, M, F, Mesh>(a, rules, *reinterpret_cast<const StagedSplat*>(from), px, py, mesh, state,
-                                           median);
+        blend_staged<Color, D, M, F, Mesh>(a, rules, *reinterpret_cast<const StagedSplat*>(from), px, py,
+                                           mesh, state, median);
       };
       for (unsigned part = 0; part < kWarps && open; ++part) {
         const std::uint16_t* const list = drawn.lists[warp][part];

@@ -6,8 +6,8 @@
 
 #include "batch_args.cuh"
 
-// The order of a tile's list, found as far as it is read (docs/cuda.md). All threads of a block call every
-// function together; before a call they are done with what they were lent.
+// The order of a tile's list, found as far as it is read (docs/cuda.md). All threads of a block call
+// every function together; before a call they are done with what they were lent.
 
 namespace gsnav::cuda {
 
@@ -40,10 +40,10 @@ struct OrderShared {
     Sorting sorting;
     unsigned char lent[kOrderLent];  ///< the caller's between calls
   };
-  std::uint32_t slots[kOrderBatch];  ///< the batch, in order
+  std::uint32_t slots[kOrderBatch];                    ///< the batch, in order
   std::uint32_t begins[kOrderLevels][kOrderBins + 1];  ///< of bins, into the pairs
   std::uint32_t bases[kOrderLevels];                   ///< the smallest key of the level
-  int shifts[kOrderLevels];                            ///< a bin is 2^shift keys; kByRank where keys are equal
+  int shifts[kOrderLevels];  ///< a bin is 2^shift keys; kByRank where keys are equal
   std::uint32_t next_bin[kOrderLevels];
   std::uint32_t cursors[kOrderBins];
   std::uint32_t low, high;
@@ -53,7 +53,8 @@ inline constexpr int kByRank = -1;
 
 namespace ordering {
 
-/// The smallest and largest of the block's values, left in s.low and s.high, which all threads are done with.
+/// The smallest and largest of the block's values, left in s.low and s.high, which all threads are done
+/// with.
 __device__ inline void block_range(OrderShared& s, std::uint32_t low, std::uint32_t high) {
   if (threadIdx.x == 0) {
     s.low = 0xffffffffu;
@@ -74,8 +75,8 @@ __device__ inline void block_range(OrderShared& s, std::uint32_t low, std::uint3
 __device__ inline int bits_for(std::uint32_t range) { return 32 - __clz(static_cast<int>(range)); }
 
 /// Sorts a batch in which many keys are equal, by (key, rank).
-__device__ __noinline__ inline void sort_by_rank(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
-                                          std::uint32_t n) {
+__device__ __noinline__ inline void sort_by_rank(OrderShared& s, const BatchArgs& a,
+                                                 std::uint32_t camera, std::uint32_t n) {
   constexpr int kItems = kOrderItems;
   std::uint32_t rank[kItems], index[kItems], key[kItems], slot[kItems];
   for (int j = 0; j < kItems; ++j) {
@@ -89,13 +90,15 @@ __device__ __noinline__ inline void sort_by_rank(OrderShared& s, const BatchArgs
   OrderSort(s.sorting.sort).Sort(key, index, 0, 32);
   for (int j = 0; j < kItems; ++j) slot[j] = s.slots[index[j]];
   __syncthreads();
-  for (int j = 0; j < kItems; ++j) s.slots[threadIdx.x * kItems + static_cast<std::uint32_t>(j)] = slot[j];
+  for (int j = 0; j < kItems; ++j)
+    s.slots[threadIdx.x * kItems + static_cast<std::uint32_t>(j)] = slot[j];
   __syncthreads();
 }
 
 /// Where the splat at `at` belongs among those of its bucket, [begin, end), by (key, rank).
-__device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const BatchArgs& a, std::uint32_t camera,
-                                                std::uint32_t begin, std::uint32_t end, std::uint32_t at) {
+__device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const BatchArgs& a,
+                                                std::uint32_t camera, std::uint32_t begin,
+                                                std::uint32_t end, std::uint32_t at) {
   const std::uint32_t key = s.sorting.keys[at];
   std::uint32_t before = 0;
   for (std::uint32_t i = begin; i < end; ++i) {
@@ -111,8 +114,8 @@ __device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const Batc
 
 /// Sorts n pairs into s.slots. All keys lie in [low, high]; low > high: not known.
 __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
-                                        const Pair* pairs, std::uint32_t n, std::uint32_t low,
-                                        std::uint32_t high) {
+                                               const Pair* pairs, std::uint32_t n, std::uint32_t low,
+                                               std::uint32_t high) {
   constexpr std::uint32_t kLongest = 64;  // bucket that is put in order by comparing all with all
   Pair pair[kOrderItems];
   std::uint32_t place[kOrderItems];
@@ -182,9 +185,11 @@ __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& 
   __syncthreads();
 }
 
-/// Calls f(pair) for each of [begin, end), many fetched at a time: a long list is one block's work, and waits for memory.
+/// Calls f(pair) for each of [begin, end), many fetched at a time: a long list is one block's work, and
+/// waits for memory.
 template <class F>
-__device__ inline void for_each_pair(const Pair* pairs, std::uint32_t begin, std::uint32_t end, const F& f) {
+__device__ inline void for_each_pair(const Pair* pairs, std::uint32_t begin, std::uint32_t end,
+                                     const F& f) {
   constexpr unsigned kFetched = 8;
   for (std::uint32_t first = begin + threadIdx.x; first < end; first += kFetched * kOrderThreads) {
     Pair fetched[kFetched];
@@ -198,8 +203,9 @@ __device__ inline void for_each_pair(const Pair* pairs, std::uint32_t begin, std
 }
 
 /// Moves [begin, begin + n) from one array of pairs to the other, into bins of ascending (key, rank).
-__device__ __noinline__ inline void partition(OrderShared& s, const BatchArgs& a, std::uint32_t camera, const Pair* from,
-                                       Pair* to, std::uint32_t begin, std::uint32_t n, int level) {
+__device__ __noinline__ inline void partition(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
+                                              const Pair* from, Pair* to, std::uint32_t begin,
+                                              std::uint32_t n, int level) {
   const auto range = [&](auto value) {
     std::uint32_t low = 0xffffffffu, high = 0;
     for_each_pair(from, begin, begin + n, [&](const Pair& p) {
@@ -275,7 +281,8 @@ class TileOrder {
  private:
   static constexpr int kNone = -1;
 
-  /// Bins of depth that are read together: pairs up to `end`, of keys in [low, high]; low > high: not known.
+  /// Bins of depth that are read together: pairs up to `end`, of keys in [low, high]; low > high: not
+  /// known.
   struct Bins {
     std::uint32_t end, next, low, high;
   };

@@ -37,7 +37,8 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
       const bool seen = chunk < set.chunks && chunk_is_candidate(args, chunk);
       const unsigned votes = __ballot_sync(kAll, seen);
       std::uint32_t first = 0;
-      if (lane == 0 && votes != 0) first = atomicAdd(&a.counters->items, static_cast<std::uint32_t>(__popc(votes)));
+      if (lane == 0 && votes != 0)
+        first = atomicAdd(&a.counters->items, static_cast<std::uint32_t>(__popc(votes)));
       first = __shfl_sync(kAll, first, 0);
       if (seen) {
         const std::size_t drawn = args.gaussians.chunk_id(chunk);
@@ -59,14 +60,26 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
 }
 
 template <bool Plain>
-__device__ void write_record(const BatchArgs& a, std::uint32_t slot, const BatchInstance& instance, float key,
-                             std::size_t row, const Splat& s, const SplatColor<float>& c) {
+__device__ void write_record(const BatchArgs& a, std::uint32_t slot, const BatchInstance& instance,
+                             float key, std::size_t row, const Splat& s, const SplatColor<float>& c) {
   const SplatGeometry<float>& g = s.geometry;
   const auto pack = [](std::uint32_t low, std::uint32_t high) { return low | high << 16; };
-  const std::uint32_t x = pack(static_cast<std::uint32_t>(s.bounds.x0), static_cast<std::uint32_t>(s.bounds.x1));
-  const std::uint32_t y = pack(static_cast<std::uint32_t>(s.bounds.y0), static_cast<std::uint32_t>(s.bounds.y1));
+  const std::uint32_t x =
+      pack(static_cast<std::uint32_t>(s.bounds.x0), static_cast<std::uint32_t>(s.bounds.x1));
+  const std::uint32_t y =
+      pack(static_cast<std::uint32_t>(s.bounds.y0), static_cast<std::uint32_t>(s.bounds.y1));
   a.records[slot] = {pack(static_cast<std::uint32_t>(g.ref_x), static_cast<std::uint32_t>(g.ref_y)),
-                     g.a, g.k, g.b, g.w1, g.w2, g.log2_opacity, c.r, c.g, c.b, x, y};
+                     g.a,
+                     g.k,
+                     g.b,
+                     g.w1,
+                     g.w2,
+                     g.log2_opacity,
+                     c.r,
+                     c.g,
+                     c.b,
+                     x,
+                     y};
   const TileWindow window = window_of(a, s.bounds);
   a.entries[slot] = {instance.args.camera.key_code(key), window.corner, window.tiles, instance.camera};
   a.sources[slot] = instance.args.first_rank + static_cast<std::uint32_t>(row);
@@ -80,7 +93,8 @@ __device__ void queue_large(const BatchArgs& a, std::uint32_t slot, const SplatB
   const std::uint32_t rows = static_cast<std::uint32_t>(a.rows_of_large);
   const std::uint32_t first = static_cast<std::uint32_t>(b.y0 >> shift);
   const std::uint32_t end = static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1;
-  unsigned long long place = atomicAdd(&a.counters->large, static_cast<unsigned long long>((end - first + rows - 1) / rows));
+  unsigned long long place =
+      atomicAdd(&a.counters->large, static_cast<unsigned long long>((end - first + rows - 1) / rows));
   for (std::uint32_t row = first; row < end; row += rows, ++place) {
     if (place < a.large_capacity) a.large[place] = {slot, row};
   }
@@ -89,7 +103,8 @@ __device__ void queue_large(const BatchArgs& a, std::uint32_t slot, const SplatB
 /// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
 struct alignas(16) WarpRows {
   float mean[3][32], quat[4][32], scales[3][32], opacity[32];
-  /// [32][rest], floats or halves as they are stored: from memory a warp would read 32 lines a coefficient.
+  /// [32][rest], floats or halves as they are stored: from memory a warp would read 32 lines a
+  /// coefficient.
   union {
     float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
     std::uint16_t sh_half[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
@@ -101,12 +116,14 @@ struct LaneRow {
   float mean[3], quat[4], scales[3], opacity;
 };
 
-/// Of row `row`, or the first where there is none. Nothing is stored in between, nor decided: behind either, reads would
-/// be waited for one after the other.
+/// Of row `row`, or the first where there is none. Nothing is stored in between, nor decided: behind
+/// either, reads would be waited for one after the other.
 __device__ LaneRow read_row(const GaussianView& gs, std::size_t row) {
   const std::size_t at = row < gs.size ? row : 0;
   const bool has_axes = !gs.axes[0].empty();
-  const auto of = [&](const View<const float>& plane) { return (has_axes ? gs.means[0].data : plane.data)[at]; };
+  const auto of = [&](const View<const float>& plane) {
+    return (has_axes ? gs.means[0].data : plane.data)[at];
+  };
   LaneRow r;
   for (int k = 0; k < 3; ++k) r.mean[k] = gs.means[k].data[at];
   r.opacity = gs.opacities.data[at];
@@ -130,16 +147,19 @@ __device__ void copy_async(T* to, const T* from, unsigned n) {
   constexpr unsigned kWord = 4 / sizeof(T);
   const unsigned lane = threadIdx.x % 32;
   if (n % (4 * kWord) == 0 && reinterpret_cast<std::uintptr_t>(from) % 16 == 0) {
-    for (unsigned i = 4 * kWord * lane; i < n; i += 128 * kWord) __pipeline_memcpy_async(to + i, from + i, 16);
+    for (unsigned i = 4 * kWord * lane; i < n; i += 128 * kWord)
+      __pipeline_memcpy_async(to + i, from + i, 16);
   } else {
     for (unsigned i = kWord * lane; i < n; i += 32 * kWord) __pipeline_memcpy_async(to + i, from + i, 4);
   }
 }
 
-/// ask_for_sh for the bands up to `degree` of each row, `rest` values apart, of which no others are read.
-__device__ __noinline__ void ask_for_bands(const GaussianView& gs, int degree, unsigned rest, std::size_t first,
-                                           WarpRows& to) {
-  const unsigned rows = static_cast<unsigned>(gs.size - first < 32 ? gs.size - first : 32), lane = threadIdx.x % 32;
+/// ask_for_sh for the bands up to `degree` of each row, `rest` values apart, of which no others are
+/// read.
+__device__ __noinline__ void ask_for_bands(const GaussianView& gs, int degree, unsigned rest,
+                                           std::size_t first, WarpRows& to) {
+  const unsigned rows = static_cast<unsigned>(gs.size - first < 32 ? gs.size - first : 32),
+                 lane = threadIdx.x % 32;
   const unsigned kept = static_cast<unsigned>(3 * (sh_coefficient_count(degree) - 1));
   const std::size_t begin = rest * first;
   for (unsigned row = 0; row < rows; ++row) {
@@ -154,7 +174,8 @@ __device__ __noinline__ void ask_for_bands(const GaussianView& gs, int degree, u
   __pipeline_commit();
 }
 
-/// Asks for the coefficients of rows `first` (lane 0) on, up to `degree` >= 1; they are there after wait_for_sh.
+/// Asks for the coefficients of rows `first` (lane 0) on, up to `degree` >= 1; they are there after
+/// wait_for_sh.
 __device__ void ask_for_sh(const GaussianView& gs, int degree, std::size_t first, WarpRows& to) {
   const std::size_t rest = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
   if (degree < gs.sh_degree) return ask_for_bands(gs, degree, static_cast<unsigned>(rest), first, to);
@@ -176,8 +197,8 @@ __device__ void wait_for_sh() {
 }
 
 /// Colour of a lane's row after wait_for_sh; `degree` as it was asked for.
-__device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t row, const WarpRows& rows,
-                                       const Vec3<float>& delta) {
+__device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t row,
+                                       const WarpRows& rows, const Vec3<float>& delta) {
   const std::size_t lane = threadIdx.x % 32, first = row - lane;
   GaussianView v;  // of the warp's rows
   v.sh_degree = degree;
@@ -202,7 +223,9 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
   WarpRows& rows = shared[threadIdx.x / 32];
   const std::uint32_t parts = a.counters->items * kWarpsPerChunk;
   WarpSlab slots(&a.counters->slots, a.slab), several(&a.counters->several, a.slab);
-  const auto item_of = [&](std::uint32_t part) { return part < parts ? a.items[part / kWarpsPerChunk] : BatchItem{}; };
+  const auto item_of = [&](std::uint32_t part) {
+    return part < parts ? a.items[part / kWarpsPerChunk] : BatchItem{};
+  };
   std::uint32_t part = blockIdx.x * kProjectWarps + threadIdx.x / 32;
   BatchItem next = item_of(part);
   for (; part < parts; part += gridDim.x * kProjectWarps) {
@@ -213,14 +236,16 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
     const bool exists = row < gs.size;
     const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
     // Instances of a set are drawn to one degree.
-    const int degree = gs.degree_of(item.chunk * kProjectChunk, a.instances[item.first_instance].args.sh_degree);
+    const int degree =
+        gs.degree_of(item.chunk * kProjectChunk, a.instances[item.first_instance].args.sh_degree);
     bool has_sh = !a.instances[item.first_instance].args.color || degree == 0 || row - lane >= gs.size;
     const LaneRow read = read_row(gs, row);
     __syncwarp();  // all lanes are done with the rows before
     if (!has_sh) ask_for_sh(gs, degree, row - lane, rows);
     keep_row(read, rows);
     for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
-      const std::uint32_t index = item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1;
+      const std::uint32_t index =
+          item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1;
       const BatchInstance& instance = a.instances[index];
       const ProjectArgs<float>& args = instance.args;
       bool drawn = false, hard = false;
@@ -228,29 +253,32 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
       Splat splat;
       const Vec3<float> mean{rows.mean[0][lane], rows.mean[1][lane], rows.mean[2][lane]};
       const Vec3<float> delta = gsnav::detail::camera_delta(args, mean, origin);
-      const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
+      const float z =
+          depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
       if (exists && z > args.camera.near_plane) {
         const SplatAxes<float> axes =
-            gs.axes[0].empty()
-                ? splat_axes(args.camera.rotation, delta,
-                             Quat<float>{rows.quat[0][lane], rows.quat[1][lane], rows.quat[2][lane], rows.quat[3][lane]},
-                             Vec3<float>{rows.scales[0][lane], rows.scales[1][lane], rows.scales[2][lane]})
-                : gsnav::detail::load_axes(gs, args.camera, delta, row);
+            gs.axes[0].empty() ? splat_axes(args.camera.rotation, delta,
+                                            Quat<float>{rows.quat[0][lane], rows.quat[1][lane],
+                                                        rows.quat[2][lane], rows.quat[3][lane]},
+                                            Vec3<float>{rows.scales[0][lane], rows.scales[1][lane],
+                                                        rows.scales[2][lane]})
+                               : gsnav::detail::load_axes(gs, args.camera, delta, row);
         const Projected<float> p = project<float, float>(args.camera, axes, z, rows.opacity[lane]);
         if (p.visible) {
           key = key_of(args, z, mean, origin);
           hard = gsnav::detail::needs_double(args.camera, p);
           if (!hard) {
             double mean_x, mean_y;
-            gsnav::detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin], mean_x,
-                                        mean_y);
+            gsnav::detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin],
+                                        mean_x, mean_y);
             drawn = make_splat<Plain>(args.camera, a.depths != nullptr, p, axes, mean_x, mean_y, splat);
           }
         }
       }
       const bool wanted = drawn || hard;
       const std::uint64_t taken = slots.take(wanted);
-      const std::uint32_t slot = wanted && taken < a.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
+      const std::uint32_t slot =
+          wanted && taken < a.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
       if (hard) {
         const unsigned long long at = atomicAdd(&a.counters->hard, 1ull);
         if (slot != kNoSlot) a.entries[slot] = {0, 0, 0, kNoSlot};  // until it has a record
@@ -262,11 +290,12 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
       }
       if (drawn && slot != kNoSlot) {
         write_record<Plain>(a, slot, instance, key, row, splat,
-                     args.color ? row_color(gs, degree, row, rows, delta) : SplatColor<float>{});
+                            args.color ? row_color(gs, degree, row, rows, delta) : SplatColor<float>{});
       }
       const TileWindow window = drawn && slot != kNoSlot ? window_of(a, splat.bounds) : TileWindow{0, 0};
       const bool single = window.tiles != 0;
-      const std::uint32_t tile = tile_of(a, instance.camera, window, 0), code = args.camera.key_code(key);
+      const std::uint32_t tile = tile_of(a, instance.camera, window, 0),
+                          code = args.camera.key_code(key);
       if (a.depth_bins.many()) {
         add_pair<true, false>(a, single, tile, code);
       } else {
@@ -298,7 +327,8 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
     const GaussianView& gs = args.gaussians;
     const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[h.row];
     const Vec3<float> mean{gs.means[0][h.row], gs.means[1][h.row], gs.means[2][h.row]};
-    const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
+    const float z =
+        depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
     const float key = key_of(args, z, mean, origin);
     Splat splat;
     if (make_splat64(args, a.depths != nullptr, h.row, key, mean, origin, splat)) {
@@ -310,7 +340,8 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
       write_record<false>(a, h.slot, instance, key, h.row, splat, color);
       const TileWindow window = window_of(a, splat.bounds);
       if (window.tiles != 0) {
-        atomicAdd(a.bins + bin_of(a, tile_of(a, instance.camera, window, 0), args.camera.key_code(key)), 1u);
+        atomicAdd(a.bins + bin_of(a, tile_of(a, instance.camera, window, 0), args.camera.key_code(key)),
+                  1u);
       } else if (is_large(a, splat.bounds)) {
         queue_large(a, h.slot, splat.bounds);
       } else {
@@ -327,8 +358,9 @@ void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t 
   const unsigned blocks = static_cast<unsigned>(multiprocessors) * 8;
   cull_kernel<<<blocks, kThreads, 0, stream>>>(args);
   const bool plain = args.depths == nullptr && args.perspectives == nullptr;
-  (plain ? project_kernel<true> : project_kernel<false>)<<<static_cast<unsigned>(multiprocessors) * kProjectBlocks,
-                                                           32 * kProjectWarps, 0, stream>>>(args);
+  (plain ? project_kernel<true>
+         : project_kernel<false>)<<<static_cast<unsigned>(multiprocessors) * kProjectBlocks,
+                                    32 * kProjectWarps, 0, stream>>>(args);
   project_hard_kernel<<<blocks, 128, 0, stream>>>(args);
 }
 

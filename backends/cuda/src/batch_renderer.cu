@@ -9,12 +9,13 @@ namespace gsnav {
 namespace {
 
 std::uint32_t grown(unsigned long long needed) {
-  return static_cast<std::uint32_t>(
-      std::min<unsigned long long>(needed + needed / 8 + 1024, std::numeric_limits<std::uint32_t>::max() - 1));
+  return static_cast<std::uint32_t>(std::min<unsigned long long>(
+      needed + needed / 8 + 1024, std::numeric_limits<std::uint32_t>::max() - 1));
 }
 
 /// Of BatchCounters, on whole lines of memory.
-constexpr std::size_t kCounterWords = (sizeof(cuda::BatchCounters) + 255) / 256 * 256 / sizeof(std::uint32_t);
+constexpr std::size_t kCounterWords =
+    (sizeof(cuda::BatchCounters) + 255) / 256 * 256 / sizeof(std::uint32_t);
 
 /// Counters of the call and of the bins.
 std::size_t zeroed_words(const cuda::BatchArgs& args) {
@@ -47,11 +48,14 @@ void CudaBatchRenderer::State::size_scratch() {
   args.long_parts = size(long_parts, args.part_capacity);
   args.pairs = size(pairs, pair_capacity);
   args.pairs_alt = size(pairs_alt, pair_capacity);
-  // Where pixels are many beside survivors, a record each is less than projecting median Gaussians once more.
+  // Where pixels are many beside survivors, a record each is less than projecting median Gaussians once
+  // more.
   const DepthMode mode = raster.depth_mode();
-  const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
-  const bool records_depths = mode == DepthMode::any || !raster.mesh.empty() ||
-                              (mode == DepthMode::median && 2 * pixels >= 5 * std::size_t{slot_capacity});
+  const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) *
+                             static_cast<std::size_t>(args.grid.height);
+  const bool records_depths =
+      mode == DepthMode::any || !raster.mesh.empty() ||
+      (mode == DepthMode::median && 2 * pixels >= 5 * std::size_t{slot_capacity});
   const bool perspective = config.response != Response::ewa;
   args.depths = records_depths ? size(depths, slot_capacity) : nullptr;
   args.perspectives = perspective ? size(perspectives, slot_capacity) : nullptr;
@@ -65,9 +69,10 @@ void CudaBatchRenderer::State::size_scratch() {
   stats.scratch_bytes = inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
                         entries.capacity_bytes() + sources.capacity_bytes() + hard.capacity_bytes() +
                         several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() +
-                        long_parts.capacity_bytes() + zeroed.capacity_bytes() + 3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
-                        pairs_alt.capacity_bytes() + depths.capacity_bytes() + perspectives.capacity_bytes() +
-                        meshes.bytes();
+                        long_parts.capacity_bytes() + zeroed.capacity_bytes() +
+                        3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
+                        pairs_alt.capacity_bytes() + depths.capacity_bytes() +
+                        perspectives.capacity_bytes() + meshes.bytes();
 }
 
 cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight) const {
@@ -76,16 +81,18 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
   const auto add = [&](auto... values) { ((key.at(n++) = static_cast<std::uint64_t>(values)), ...); };
   const auto address = [](const void* p) { return reinterpret_cast<std::uintptr_t>(p); };
   const FrameImages<float>& to = raster.images;
-  add(args.units, args.set_count, args.cameras, args.grid.width, args.grid.height, input_bytes, args.depth_bins.base);
-  add(address(args.sets), address(args.instances), address(args.camera_first), address(args.camera_instances),
-      address(flight.inputs.data));
+  add(args.units, args.set_count, args.cameras, args.grid.width, args.grid.height, input_bytes,
+      args.depth_bins.base);
+  add(address(args.sets), address(args.instances), address(args.camera_first),
+      address(args.camera_instances), address(flight.inputs.data));
   add(address(to.rgb), address(to.alpha), address(to.median_depth), address(to.expected_depth),
       address(to.accumulated_depth), address(to.first_hit_depth), address(rgb8));
   // Arrays move when they grow, and only then. Those of tiles have no capacity of their own here.
   add(slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity);
   add(address(args.items), address(args.bins), address(args.tile_counts), address(args.tile_begins),
-      address(args.tile_order), address(args.records), address(args.parts), address(args.long_parts), address(args.pairs), address(args.depths),
-      address(args.perspectives), address(raster.mesh.depth), address(raster.mesh.color));
+      address(args.tile_order), address(args.records), address(args.parts), address(args.long_parts),
+      address(args.pairs), address(args.depths), address(args.perspectives), address(raster.mesh.depth),
+      address(raster.mesh.color));
   return key;
 }
 
@@ -132,7 +139,8 @@ Status CudaBatchRenderer::State::launch() {
   }
   stats.replayed = flight.recorded != nullptr;
   cudaError_t e = cudaSuccess;
-  if (flight.has_meshes) enqueue_layers(flight);  // beside the graph: what is in view makes other launches
+  if (flight.has_meshes)
+    enqueue_layers(flight);  // beside the graph: what is in view makes other launches
   if (stats.replayed) {
     e = cudaGraphLaunch(flight.recorded, backend.stream());
   } else {
@@ -141,7 +149,8 @@ Status CudaBatchRenderer::State::launch() {
   if (e == cudaSuccess) e = cudaGetLastError();
   if (e == cudaSuccess) e = cudaEventRecord(flight.done, backend.stream());
   if (e == cudaSuccess) return {};
-  return {Errc::backend_failure, std::string("CudaBatchRenderer: a launch failed: ") + cudaGetErrorString(e)};
+  return {Errc::backend_failure,
+          std::string("CudaBatchRenderer: a launch failed: ") + cudaGetErrorString(e)};
 }
 
 CudaBatchRenderer::CudaBatchRenderer(CudaBackend& backend, const RenderConfig& config)
@@ -173,16 +182,18 @@ Status CudaBatchRenderer::finish() {
     const cuda::Flight& flight = s.flights[s.finished % cuda::kInFlight];
     const cudaError_t e = cudaEventSynchronize(flight.done);
     if (e != cudaSuccess) {
-      return {Errc::backend_failure,
-              std::string("CudaBatchRenderer: the batch failed on the device: ") + cudaGetErrorString(e)};
+      return {Errc::backend_failure, std::string("CudaBatchRenderer: the batch failed on the device: ") +
+                                         cudaGetErrorString(e)};
     }
     const cuda::BatchCounters& n = *flight.counters;
-    const cuda::MeshCounters of_meshes = flight.has_meshes ? *flight.mesh_counters : cuda::MeshCounters{};
+    const cuda::MeshCounters of_meshes =
+        flight.has_meshes ? *flight.mesh_counters : cuda::MeshCounters{};
     if (std::max({n.slots, n.pairs, of_meshes.most}) >= std::numeric_limits<std::uint32_t>::max()) {
       s.finished = s.calls;
-      return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(n.slots) + " visible Gaussians, " +
-                                     std::to_string(n.pairs) + " tile intersections and " +
-                                     std::to_string(of_meshes.most) + " triangles: draw fewer cameras a call"};
+      return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(n.slots) +
+                                     " visible Gaussians, " + std::to_string(n.pairs) +
+                                     " tile intersections and " + std::to_string(of_meshes.most) +
+                                     " triangles: draw fewer cameras a call"};
     }
     bool fits = true;
     const auto fit = [&](std::uint32_t& capacity, unsigned long long count) {
@@ -215,7 +226,8 @@ Status CudaBatchRenderer::finish() {
   }
   if (lost) {
     return {Errc::out_of_memory,
-            "CudaBatchRenderer: scratch was too small for a batch that another followed before finish(); its "
+            "CudaBatchRenderer: scratch was too small for a batch that another followed before "
+            "finish(); its "
             "images are not whole. There is room for it now: draw it again"};
   }
   return s.backend.synchronize();

@@ -25,7 +25,8 @@ inline void need(cudaError_t e, const char* what) {
   }
 }
 
-/// What the launches of a call depend on besides the contents of its inputs: addresses, capacities and counts.
+/// What the launches of a call depend on besides the contents of its inputs: addresses, capacities and
+/// counts.
 using LaunchKey = std::array<std::uint64_t, 40>;
 
 /// Arrays laid one after the other into one block, so that one copy takes them to the device.
@@ -60,8 +61,8 @@ struct PinnedBlock {
   }
 };
 
-/// Pinned memory of one call under way: what is copied to the device, and the counts that come back; and its
-/// launches recorded, to be replayed while their key stays the same.
+/// Pinned memory of one call under way: what is copied to the device, and the counts that come back; and
+/// its launches recorded, to be replayed while their key stays the same.
 struct Flight {
   PinnedBlock inputs, mesh_inputs;
   BatchCounters* counters = nullptr;
@@ -90,8 +91,17 @@ struct BatchMeshes {
   template <class T>
   using Array = Buffer<T, CudaBackend>;
   explicit BatchMeshes(CudaBackend& b)
-      : inputs(b), vertices(b), counts(b), offsets(b), camera_begins(b), triangles(b), pixels(b), large(b), counters(b),
-        depth(b), color(b) {}
+      : inputs(b),
+        vertices(b),
+        counts(b),
+        offsets(b),
+        camera_begins(b),
+        triangles(b),
+        pixels(b),
+        large(b),
+        counters(b),
+        depth(b),
+        color(b) {}
   std::size_t bytes() const noexcept {
     return inputs.capacity_bytes() + vertices.capacity_bytes() + counts.capacity_bytes() +
            offsets.capacity_bytes() + camera_begins.capacity_bytes() + triangles.capacity_bytes() +
@@ -114,11 +124,13 @@ struct BatchMeshes {
   std::vector<MeshPlacement> placements;
   std::vector<MeshPlace> places;
   std::vector<std::uint32_t> chunk_begins;  // each wave's cameras', from 0, and one more
-  std::size_t at_placements = 0, at_places = 0, at_cameras = 0, at_lights = 0, at_chunk_begins = 0, input_bytes = 0;
+  std::size_t at_placements = 0, at_places = 0, at_cameras = 0, at_lights = 0, at_chunk_begins = 0,
+              input_bytes = 0;
 };
 
 /// Names the camera, set or field that cannot be, or ok.
-Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras, const RenderConfig& config);
+Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+                   const RenderConfig& config);
 
 }  // namespace cuda
 
@@ -127,12 +139,31 @@ struct CudaBatchRenderer::State {
   using Array = Buffer<T, CudaBackend>;
 
   State(CudaBackend& b, const RenderConfig& c)
-      : backend(b), config(c), inputs(b), items(b), records(b), entries(b), sources(b), several(b), large(b),
-        zeroed(b), tile_counts(b), tile_begins(b), tile_order(b), long_parts(b), depths(b), perspectives(b), hard(b), parts(b), pairs(b),
-        pairs_alt(b), meshes(b) {
+      : backend(b),
+        config(c),
+        inputs(b),
+        items(b),
+        records(b),
+        entries(b),
+        sources(b),
+        several(b),
+        large(b),
+        zeroed(b),
+        tile_counts(b),
+        tile_begins(b),
+        tile_order(b),
+        long_parts(b),
+        depths(b),
+        perspectives(b),
+        hard(b),
+        parts(b),
+        pairs(b),
+        pairs_alt(b),
+        meshes(b) {
     int device = 0;
     cuda::need(cudaGetDevice(&device), "cudaGetDevice");
-    cuda::need(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
+    cuda::need(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
+               "cudaDeviceGetAttribute");
     for (cuda::Flight& f : flights) {
       cuda::need(cudaMallocHost(&f.counters, sizeof(cuda::BatchCounters)), "cudaMallocHost");
       cuda::need(cudaMallocHost(&f.mesh_counters, sizeof(cuda::MeshCounters)), "cudaMallocHost");
@@ -189,7 +220,8 @@ struct CudaBatchRenderer::State {
   std::size_t input_bytes = 0;
   std::uint64_t item_capacity = 0;  ///< of the call
   bool recordable = true;
-  std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0, pair_capacity = 0;
+  std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0,
+                pair_capacity = 0;
   std::uint32_t triangle_capacity = 0;  ///< of meshes, a wave
   BatchStats stats;
 
