@@ -105,7 +105,7 @@ TEST_CASE("N65_cull_invariance behind a wall, and before it") {
 }
 
 TEST_CASE("N65_cull_invariance needs bounds that hold: no footprint or key lies outside a chunk's extent") {
-  GaussianCloud cloud = random_cloud(667, {.count = 15000, .sh_degree = 0, .needle = 0.01, .scale = 0.03,
+  GaussianCloud cloud = random_cloud(667, {.count = 15000, .sh_degree = 0, .needle = 0.01, .scale = 0.06,
                                            .center = {0, 0, 2}, .extent = 4});
   REQUIRE(append(cloud, random_cloud(668, {.count = 3, .sh_degree = 0, .needle = 0.5, .scale = 0.8,
                                            .center = {0, 0, 0}, .extent = 6})).ok());
