@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How much of what is in view lies behind something: the share of the visible Gaussians, and of their chunks, that take
 // part of a pixel's light (alpha times transmittance) somewhere in a 256x256 image. What visible sets could leave out.
+// And what culling leaves out: rows touched for each that reaches a tile (count_culled).
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_hidden [views]
 //
@@ -9,11 +10,13 @@
 #include <cstdio>
 #include <cstdint>
 #include <cstdlib>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "frame_stages.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/ops/count_culled.hpp"
 #include "workload.hpp"
 
 using namespace gsnav;
@@ -26,10 +29,14 @@ constexpr float kParts[] = {1e-4f, 1e-3f, 1.0f / 255};
 
 /// Of one view, or of all.
 struct Shares {
+  CullCounts culled;
   double visible = 0, chunks = 0;          ///< in view
   double seen[3] = {}, seen_chunks[3] = {};  ///< with more than kParts of a pixel
 
   void add(const Shares& other) {
+    culled.rows += other.culled.rows;
+    culled.touched += other.culled.touched;
+    culled.emitting += other.culled.emitting;
     visible += other.visible;
     chunks += other.chunks;
     for (int k = 0; k < 3; ++k) {
@@ -49,6 +56,8 @@ Shares shares_of(OpenMPBackend& backend, const GaussianCloud& cloud, const Camer
   std::vector<BlendState<float, DepthMode::none>> pixels(std::size_t{kSide} * kSide);
   std::vector<float> most_of_chunk(cloud.chunk_bounds.size(), -1.0f);
   Shares out;
+  const GaussianSet set = cloud.set();
+  out.culled = count_culled(backend, std::span(&set, 1), camera, config);
   for (std::size_t i = 0; i < bins.order.size; ++i) {
     const std::uint32_t slot = bins.order[i];  // of a chunk's, as many as it has rows
     const SplatBounds& b = bins.bounds[slot];
@@ -80,7 +89,7 @@ void print(const char* name, const Shares& s) {
   for (const double seen : s.seen) std::printf("  %6.1f", 100 * seen / std::max(s.visible, 1.0));
   std::printf(" %9.0f", s.chunks);
   for (const double seen : s.seen_chunks) std::printf("  %6.1f", 100 * seen / std::max(s.chunks, 1.0));
-  std::printf("\n");
+  std::printf("  %7.3f\n", s.culled.touched_per_emitting());
 }
 
 }  // namespace
@@ -91,7 +100,7 @@ int main(int argc, char** argv) {
   const std::size_t views = static_cast<std::size_t>(std::max(argc > 1 ? std::atoi(argv[1]) : 16, 1));
   const std::size_t step = std::max<std::size_t>(cameras.size() / views, 1);
   std::printf("%zu Gaussians; %% with more than 1e-4, 1e-3, 1/255 of a pixel's light\n", cloud.size());
-  std::printf("view    visible    1e-4    1e-3   1/255    chunks    1e-4    1e-3   1/255\n");
+  std::printf("view    visible    1e-4    1e-3   1/255    chunks    1e-4    1e-3   1/255  touched\n");
   OpenMPBackend backend;
   Shares all;
   for (std::size_t c = 0; c < cameras.size(); c += step) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the time of a simulator's frame on a GPU goes.
 #include <benchmark/benchmark.h>
-#include <cuda_runtime_api.h>
 
 #include <chrono>
 #include <memory>
 #include <vector>
 
+#include "device_time.hpp"
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/cuda/pinned.hpp"
 #include "gsnav/sim/follower.hpp"
@@ -22,35 +22,6 @@ using Clock = std::chrono::steady_clock;
 constexpr double kGaussiansAtOne = 390000;  // of the flat with density 1, about
 constexpr int kSide = 256;
 constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
-
-/// Time between two points of a stream.
-class DeviceTime {
- public:
-  explicit DeviceTime(CudaBackend& cuda) : stream_(cuda.stream()) {
-    cudaEventCreate(&begin_);
-    cudaEventCreate(&end_);
-  }
-  ~DeviceTime() {
-    cudaEventDestroy(begin_);
-    cudaEventDestroy(end_);
-  }
-  DeviceTime(const DeviceTime&) = delete;
-  DeviceTime& operator=(const DeviceTime&) = delete;
-  template <class F>
-  double us(const F& f) {
-    cudaEventRecord(begin_, stream_);
-    f();
-    cudaEventRecord(end_, stream_);
-    cudaEventSynchronize(end_);
-    float ms = 0;
-    cudaEventElapsedTime(&ms, begin_, end_);
-    return 1e3 * static_cast<double>(ms);
-  }
-
- private:
-  cudaStream_t stream_;
-  cudaEvent_t begin_ = nullptr, end_ = nullptr;
-};
 
 /// Simulator::observe() of RGB and depth, 256 x 256, along a follower's way; the time is that of the
 /// call. Counters, all medians: draw_us, what the device takes for the scene from the same cameras,
@@ -84,7 +55,7 @@ void observe_cuda(benchmark::State& state) {
   images.floats.rgb = there.data();
   images.floats.median_depth = there.data() + 3 * kPixels;
   PinnedArray<float> here(4 * kPixels);
-  DeviceTime device(cuda);
+  gsnav_bench::DeviceTime device(cuda);
 
   const GeodesicFollower follower;
   std::size_t episode = 0;

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // bench_lod on a GPU: one camera a call, milliseconds between events on the stream, the copy of the cut's chunks
 // among them; the cut itself is the host's.
-#include <cuda_runtime.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <optional>
 #include <span>
 
+#include "device_time.hpp"
 #include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/sim/scene_detail.hpp"
@@ -32,18 +31,11 @@ class GpuRows {
         direct_(cuda, fast()),
         closing_(cuda, closing()),
         chunks_(cuda),
-        memory_(cuda) {
+        memory_(cuda),
+        time_(cuda) {
     detail_.assets = {{&tree, &cloud, {}, arrays_.set().gaussians, merged_.set().gaussians}};
     memory_.resize_discard(4 * kPixels);
-    cudaEventCreate(&begin_);
-    cudaEventCreate(&end_);
   }
-  ~GpuRows() {
-    cudaEventDestroy(begin_);
-    cudaEventDestroy(end_);
-  }
-  GpuRows(const GpuRows&) = delete;
-  GpuRows& operator=(const GpuRows&) = delete;
 
   void row(const char* name, LodDraw draw, double pixels) {
     LodRow out(views_, draw);
@@ -91,15 +83,13 @@ class GpuRows {
       renderer = cut_.rules(fast()).transmittance_min > fast().transmittance_min ? &closing_ : &direct_;
       drawn_ = cut_.cut(0).stats().drawn;
     }
-    cudaEventRecord(begin_, cuda_.stream());
-    if (draw == LodDraw::lod) chunks_.place(std::span(&cut_, 1));
-    renderer->render(sets, std::span(&view, 1), images).throw_if_error();
-    cudaEventRecord(end_, cuda_.stream());
+    const double us = time_.us([&] {
+      if (draw == LodDraw::lod) chunks_.place(std::span(&cut_, 1));
+      renderer->render(sets, std::span(&view, 1), images).throw_if_error();
+    });
     renderer->finish().throw_if_error();
-    float ms = 0;
-    cudaEventElapsedTime(&ms, begin_, end_);
     pairs = static_cast<double>(renderer->stats().tile_intersections);
-    return static_cast<double>(ms);
+    return us * 1e-3;
   }
 
   CudaBackend& cuda_;
@@ -109,10 +99,10 @@ class GpuRows {
   CudaBatchRenderer direct_, closing_;
   ChosenChunks<CudaBackend> chunks_;
   Buffer<float, CudaBackend> memory_;
+  DeviceTime time_;
   SceneDetail detail_;
   DetailSets cut_;
   std::uint64_t drawn_ = 0;
-  cudaEvent_t begin_{}, end_{};
 };
 
 }  // namespace

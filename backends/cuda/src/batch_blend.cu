@@ -20,7 +20,6 @@ constexpr int kBlocksPerProcessor = 7;
 constexpr int kRowsApart = kBlock / kPixels;  ///< of a thread's pixels
 constexpr std::uint32_t kChunk = 256;         ///< splats that are staged at a time
 constexpr std::uint32_t kNothing = kChunk;    ///< a staged splat that covers no pixel
-constexpr std::uint32_t kListStep = 4;        ///< lists are read by so many
 constexpr unsigned kAll = 0xffffffffu;
 static_assert(kThreads == kOrderThreads && 4 * kBlock * kBlock == 32 * kPixels &&
               kOrderBatch % kChunk == 0);
@@ -177,11 +176,7 @@ __global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor)
         const std::uint32_t length = list_blocks(s, staged, bit, quarters);
         const std::uint16_t* const list = s.lists[4 * warp + quarter];
         for (std::uint32_t i = 0; i < length; i += kListStep) {
-          const uint2 places = *reinterpret_cast<const uint2*>(list + i);
-          blend(places.x & 0xffffu);
-          blend(places.x >> 16);
-          blend(places.y & 0xffffu);
-          blend(places.y >> 16);
+          blend_listed(list + i, blend);
           if (i % 16 == 12 && __all_sync(kAll, !is_open())) break;
         }
         open = __ballot_sync(kAll, is_open());

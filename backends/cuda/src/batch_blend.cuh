@@ -176,6 +176,19 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
   }
 }
 
+inline constexpr std::uint32_t kListStep = 4;  ///< lists are read by so many
+
+/// Calls blend(place) for the kListStep places from `list` on, which is aligned to them, in order.
+template <class F>
+__device__ inline void blend_listed(const std::uint16_t* list, const F& blend) {
+  static_assert(kListStep * sizeof *list == sizeof(uint2));
+  const uint2 places = *reinterpret_cast<const uint2*>(list);
+  blend(places.x & 0xffffu);
+  blend(places.x >> 16);
+  blend(places.y & 0xffffu);
+  blend(places.y >> 16);
+}
+
 /// The slot of the median Gaussian, of the last that blend_staged met while more than half of the light
 /// was left.
 template <class State>

@@ -12,7 +12,6 @@ constexpr int kThreads = 128, kWarps = kThreads / 32;   ///< of half a block
 constexpr std::uint32_t kOfThread = 2;                  ///< splats that a thread stages at a time
 constexpr std::uint32_t kChunk = kOfThread * kThreads;  ///< splats that are staged at a time
 constexpr std::uint32_t kOfWarp = kChunk / kWarps;      ///< of these a warp's, neighbours
-constexpr std::uint32_t kListStep = 4;                  ///< lists are read by so many
 constexpr int kBlocksPerProcessor = 3;                  ///< four would spill registers: 4 to 8 % slower
 constexpr unsigned kAll = 0xffffffffu;
 static_assert(kSmallTile == 2 * kBlock && kWarps == 4);
@@ -177,13 +176,7 @@ __global__ void __launch_bounds__(2 * kThreads, kBlocksPerProcessor)
       for (unsigned part = 0; part < kWarps && open; ++part) {
         const std::uint16_t* const list = drawn.lists[warp][part];
         const std::uint32_t length = drawn.lengths[warp][part];
-        for (std::uint32_t i = 0; i < length; i += kListStep) {
-          const uint2 places = *reinterpret_cast<const uint2*>(list + i);
-          blend(places.x & 0xffffu);
-          blend(places.x >> 16);
-          blend(places.y & 0xffffu);
-          blend(places.y >> 16);
-        }
+        for (std::uint32_t i = 0; i < length; i += kListStep) blend_listed(list + i, blend);
         open = __any_sync(kAll, state[0].open(rules));
       }
     }
