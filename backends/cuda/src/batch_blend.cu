@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cstring>
+
 #include "batch_blend.cuh"
 #include "batch_order.cuh"
 #include "batch_splat.cuh"
@@ -243,10 +245,10 @@ __global__ void __launch_bounds__(kDepthThreads, 6) depth_kernel(const BatchArgs
   if (slot != kNoSlot && static_cast<int>(lane) == first) depth = depth_record(a, blockIdx.z, slot);
   constexpr int kWords = sizeof depth / sizeof(float);
   float words[kWords];
-  memcpy(words, &depth, sizeof depth);
+  std::memcpy(words, &depth, sizeof depth);
 #pragma unroll
   for (int i = 0; i < kWords; ++i) words[i] = __shfl_sync(kAll, words[i], first);
-  memcpy(&depth, words, sizeof depth);
+  std::memcpy(&depth, words, sizeof depth);
   if (inside) *to = slot == kNoSlot ? 0.0f : ray_depth(depth, px, py);
 }
 
