@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in one row.
 //
-//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256] [--compact] [--balls 8]
-//       [batch sizes...]
+//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256]
+//   [--compact] [--balls 8]
+//       [--visible] [batch sizes...]
 //
-// Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of views
-// repeats them from slightly different places. Times are the device's, between events on the stream; `host us` is
-// how long the call takes that asks for them. --balls: so many meshes of 4000 triangles stand before the first cameras,
-// seen by all.
+// Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of
+// views repeats them from slightly different places. Times are the device's, between events on the
+// stream; `host us` is how long the call takes that asks for them. --balls: so many meshes of 4000
+// triangles stand before the first cameras, seen by all. --visible: each camera draws only what is seen
+// from its cell (VisibleSets).
 #include <cuda_runtime.h>
 
 #include <algorithm>
@@ -24,6 +26,7 @@
 #include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "samples.hpp"
+#include "visible_workload.hpp"
 #include "workload.hpp"
 
 using namespace gsnav;
@@ -34,6 +37,7 @@ constexpr int kRepeats = 9;
 int g_width = 256, g_height = 256;
 constexpr std::size_t kReferenceViews = 4;  ///< compared with float64
 std::vector<MeshInstance> g_meshes;         ///< on the device
+VisibleSets g_visible;                      ///< none: all is drawn
 
 /// A ball of radius 1.
 SurfaceMesh ball() {
@@ -68,6 +72,25 @@ std::vector<BatchCamera> cameras_of(std::size_t first, std::size_t count) {
   return batch;
 }
 
+/// What cells see, on the device.
+struct Seen {
+  explicit Seen(CudaBackend& cuda) : bits(cuda) {
+    bits.upload(g_visible.bits.data(), g_visible.bits.size());
+  }
+  /// Has each camera draw what its cell sees, of the call's one set.
+  void choose(std::vector<BatchCamera>& cameras) {
+    if (g_visible.cells() == 0) return;
+    views.assign(cameras.size(), {});
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      if (const auto cell = g_visible.cell_of(cameras[c].camera))
+        views[c] = g_visible.seen_from(*cell, bits.data());
+      cameras[c].seen = std::span(views).subspan(c, 1);
+    }
+  }
+  Buffer<std::uint32_t, CudaBackend> bits;
+  std::vector<View<const std::uint32_t>> views;
+};
+
 struct DeviceImages {
   DeviceImages(CudaBackend& cuda, std::size_t pixels) : memory(cuda) {
     memory.resize_discard(5 * pixels);
@@ -87,6 +110,7 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   const std::size_t pixels = static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);
   DeviceImages out(cuda, count * pixels);
   const std::vector<GaussianSet> sets{arrays.set()};
+  Seen seen(cuda);
   cudaEvent_t begin, end;
   cudaEventCreate(&begin);
   cudaEventCreate(&end);
@@ -96,7 +120,8 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   double pairs = 0;
   for (int repeat = -1; repeat < kRepeats; ++repeat) {  // the first finds the scratch it takes
     for (std::size_t b = 0; b < batches; ++b) {
-      const std::vector<BatchCamera> cameras = cameras_of(b * count, count);
+      std::vector<BatchCamera> cameras = cameras_of(b * count, count);
+      seen.choose(cameras);
       cudaEventRecord(begin, cuda.stream());
       const auto called = std::chrono::steady_clock::now();
       renderer.render(sets, cameras, out.images).throw_if_error();
@@ -112,7 +137,9 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
     }
   }
   const std::size_t compared = std::min(count, truth.cameras);
-  renderer.render(sets, cameras_of(0, compared), out.images).throw_if_error();
+  std::vector<BatchCamera> first = cameras_of(0, compared);
+  seen.choose(first);
+  renderer.render(sets, first, out.images).throw_if_error();
   renderer.finish().throw_if_error();
   std::vector<float> rgb(3 * compared * pixels), depth(compared * pixels), depth_seen;
   std::vector<double> depth_truth;
@@ -141,13 +168,16 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
 
 int main(int argc, char** argv) {
   std::vector<std::size_t> counts;
-  bool compact = false;
+  bool compact = false, visible = false;
   std::size_t balls = 0;
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--size" && i + 1 < argc) {
       if (std::sscanf(argv[++i], "%dx%d", &g_width, &g_height) == 2 && g_width > 0 && g_height > 0) continue;
     } else if (std::string(argv[i]) == "--compact") {
       compact = true;
+      continue;
+    } else if (std::string(argv[i]) == "--visible") {
+      visible = true;
       continue;
     } else if (std::string(argv[i]) == "--balls" && i + 1 < argc) {
       balls = std::strtoull(argv[++i], nullptr, 10);
@@ -156,7 +186,9 @@ int main(int argc, char** argv) {
       counts.push_back(count);
       continue;
     }
-    std::fprintf(stderr, "bench_batch: '%s' is no size (256x256), batch size, --compact or --balls\n", argv[i]);
+    std::fprintf(stderr,
+                 "bench_batch: '%s' is no size (256x256), batch size, --compact, --visible or --balls\n",
+                 argv[i]);
     return 2;
   }
   if (CudaBackend::device_count() == 0) {
@@ -167,6 +199,7 @@ int main(int argc, char** argv) {
   GaussianCloud shown = gsnav_bench::workload().cloud;
   if (compact) compact_sh(shown);
   const GaussianArrays<CudaBackend> arrays(cuda, shown);
+  if (visible) g_visible = gsnav_bench::workload_visible_sets();
   OpenMPBackend cpu;
   Renderer<double, OpenMPBackend> reference(cpu);
   std::vector<Camera> cameras;

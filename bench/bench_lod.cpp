@@ -3,11 +3,12 @@
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_lod [views [first [each]]]
 //
-// Without the variables: the embedded flat from its four viewpoints; without a number: 8 views. Processor time of
-// RGB frames on one thread, the least of five runs a view; `least +dB` is the smallest gain of a view, `below` how many
-// views are below direct rendering. Of depths (frames of their own, not timed): pixels that are off by more than 2 %
-// from every median depth of the photo's rays within them, and the 99th percentile. A streamed set's own levels have
-// rows beside those of the tree that is built. Where there is a GPU, rows of it.
+// Without the variables: the embedded flat from its four viewpoints; without a number: 8 views.
+// Processor time of RGB frames on one thread, the least of five runs a view; `least +dB` is the smallest
+// gain of a view, `below` how many views are below direct rendering. Of depths (frames of their own, not
+// timed): pixels that are off by more than 2 % from every median depth of the photo's rays within them,
+// and the 99th percentile. A streamed set's own levels have rows beside those of the tree that is built.
+// "seen": only what is seen from the camera's cell (VisibleSets). Where there is a GPU, rows of it.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -20,7 +21,9 @@
 #include "gsnav/scene/lod_build.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 #include "lod_rows.hpp"
+#include "visible_workload.hpp"
 #include "workload.hpp"
 
 using namespace gsnav;
@@ -34,8 +37,8 @@ double cpu_ms() {
   return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_nsec) * 1e-6;
 }
 
-void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const char* name, LodDraw draw,
-         double pixels) {
+void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const char* name,
+         LodDraw draw, double pixels, const VisibleSets* visible = nullptr) {
   OpenMPBackend one(1);
   RenderConfig config;
   config.outputs = kRgb;
@@ -50,9 +53,12 @@ void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const
   for (const Camera& camera : views.cameras) {
     double least = 1e9;
     const auto render = [&](unsigned outputs, Frames<float>& into) {
-      const GaussianSet whole = draw == LodDraw::direct ? cloud.set() : LodCut::photo_set(cloud, choice);
+      GaussianSet whole = draw == LodDraw::photo ? LodCut::photo_set(cloud, choice) : cloud.set();
+      const auto cell = visible != nullptr ? visible->cell_of(camera) : std::nullopt;
+      View<const std::uint32_t> seen;
+      if (cell) seen = whole.gaussians.seen_chunks = visible->seen_from(*cell);
       const std::span<const GaussianSet> sets =
-          draw == LodDraw::lod ? cut.select(camera, choice) : std::span(&whole, 1);
+          draw == LodDraw::lod ? cut.select(camera, choice, {}, seen) : std::span(&whole, 1);
       RenderConfig rules = draw == LodDraw::lod ? lod_config(config, cut.stats()) : config;
       rules.outputs = outputs;
       renderer.set_config(rules);
@@ -97,13 +103,16 @@ int main(int argc, char** argv) {
   row(shown, cloud, tree, "direct fast", LodDraw::direct, 0);
   row(shown, cloud, tree, "photo filter", LodDraw::photo, 0);
   for (const double p : pixels) row(shown, cloud, tree, "lod", LodDraw::lod, p);
+  const VisibleSets visible = workload_visible_sets();
+  row(shown, cloud, tree, "fast, seen", LodDraw::seen, 0, &visible);
+  for (const double p : pixels) row(shown, cloud, tree, "lod, seen", LodDraw::lod, p, &visible);
   if (const char* scene = std::getenv("GSNAV_BENCH_SCENE"); scene != nullptr) {
     if (const auto set = io::load_shipped_levels(scene).value(); set) {
       for (const double p : pixels) row(shown, set->cloud, set->tree, "shipped", LodDraw::lod, p);
     }
   }
 #if defined(GSNAV_HAS_CUDA)
-  lod_rows_on_gpu(shown, cloud, tree, pixels);
+  lod_rows_on_gpu(shown, cloud, tree, visible, pixels);
 #endif
   return 0;
 }

@@ -7,6 +7,7 @@
 #include "gsnav/kernels/camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav_bench {
 
@@ -17,6 +18,7 @@ enum class LodDraw {
   direct,  ///< every Gaussian, by the asset's own filter
   photo,   ///< every Gaussian, by the photo's
   lod,     ///< a cut
+  seen,    ///< by the asset's own filter, what is seen from the camera's cell
 };
 
 /// Views and what a photo of each would be: O_photo(kLodPhoto).
@@ -54,7 +56,7 @@ class LodRow {
 #if defined(GSNAV_HAS_CUDA)
 /// The table's rows on the first GPU; a line that says so where there is none.
 void lod_rows_on_gpu(LodViews& views, const gsnav::GaussianCloud& cloud, const gsnav::LodTree& tree,
-                     const std::vector<double>& pixels);
+                     const gsnav::VisibleSets& visible, const std::vector<double>& pixels);
 #endif
 
 }  // namespace gsnav_bench

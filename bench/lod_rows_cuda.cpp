@@ -22,7 +22,8 @@ constexpr std::size_t kPixels = std::size_t{kLodSide} * kLodSide;
 
 class GpuRows {
  public:
-  GpuRows(CudaBackend& cuda, LodViews& views, const GaussianCloud& cloud, const LodTree& tree)
+  GpuRows(CudaBackend& cuda, LodViews& views, const GaussianCloud& cloud, const LodTree& tree,
+          const VisibleSets& visible)
       : cuda_(cuda),
         views_(views),
         cloud_(cloud),
@@ -31,13 +32,21 @@ class GpuRows {
         direct_(cuda, fast()),
         closing_(cuda, closing()),
         chunks_(cuda),
+        tree_(&tree),
+        visible_(&visible),
+        visible_there_(cuda),
         memory_(cuda),
         time_(cuda) {
     detail_.assets = {{&tree, &cloud, {}, arrays_.set().gaussians, merged_.set().gaussians}};
     memory_.resize_discard(4 * kPixels);
+    visible_there_.upload(visible.bits.data(), visible.bits.size());
   }
 
-  void row(const char* name, LodDraw draw, double pixels) {
+  void row(const char* name, LodDraw draw, double pixels, bool seen = false) {
+    SceneDetail::Asset& asset = detail_.assets[0];
+    asset.tree = draw == LodDraw::lod ? tree_ : nullptr;
+    asset.visible = seen ? visible_ : nullptr;
+    asset.visible_there = seen ? visible_there_.data() : nullptr;
     LodRow out(views_, draw);
     detail_.choice.pixels = std::max(pixels, 1e-3);
     std::vector<float> rgb(3 * kPixels), depth(kPixels);
@@ -75,16 +84,20 @@ class GpuRows {
     const GaussianSet own = arrays_.set();
     GaussianSet photo = LodCut::photo_set(cloud_, detail_.choice);
     photo.gaussians = own.gaussians;
-    std::span<const GaussianSet> sets(draw == LodDraw::direct ? &own : &photo, 1);
+    std::span<const GaussianSet> sets(draw == LodDraw::direct || draw == LodDraw::seen ? &own : &photo,
+                                      1);
     CudaBatchRenderer* renderer = &direct_;
     drawn_ = cloud_.size();
+    const bool chosen = draw == LodDraw::lod || detail_.assets[0].visible != nullptr;
+    if (chosen) sets = cut_.select(detail_, sets, camera);
     if (draw == LodDraw::lod) {
-      sets = cut_.select(detail_, {}, camera);
       renderer = cut_.rules(fast()).transmittance_min > fast().transmittance_min ? &closing_ : &direct_;
       drawn_ = cut_.cut(0).stats().drawn;
+    } else if (chosen) {
+      drawn_ -= cut_.unseen();
     }
     const double us = time_.us([&] {
-      if (draw == LodDraw::lod) chunks_.place(std::span(&cut_, 1));
+      if (chosen) chunks_.place(std::span(&cut_, 1));
       renderer->render(sets, std::span(&view, 1), images).throw_if_error();
     });
     renderer->finish().throw_if_error();
@@ -98,6 +111,9 @@ class GpuRows {
   GaussianArrays<CudaBackend> arrays_, merged_;
   CudaBatchRenderer direct_, closing_;
   ChosenChunks<CudaBackend> chunks_;
+  const LodTree* tree_;
+  const VisibleSets* visible_;
+  Buffer<std::uint32_t, CudaBackend> visible_there_;
   Buffer<float, CudaBackend> memory_;
   DeviceTime time_;
   SceneDetail detail_;
@@ -108,7 +124,7 @@ class GpuRows {
 }  // namespace
 
 void lod_rows_on_gpu(LodViews& views, const GaussianCloud& cloud, const LodTree& tree,
-                     const std::vector<double>& pixels) {
+                     const VisibleSets& visible, const std::vector<double>& pixels) {
   if (CudaBackend::device_count() == 0) {
     std::printf("no GPU\n");
     return;
@@ -116,11 +132,13 @@ void lod_rows_on_gpu(LodViews& views, const GaussianCloud& cloud, const LodTree&
   CudaBackend cuda;
   std::printf("\n%s; \"visible\" is what is read, ms is the device's\n", cuda.device_name().c_str());
   LodRow::print_head();
-  GpuRows rows(cuda, views, cloud, tree);
+  GpuRows rows(cuda, views, cloud, tree, visible);
   views.direct.clear();
   rows.row("direct fast", LodDraw::direct, 0);
   rows.row("photo filter", LodDraw::photo, 0);
   for (const double p : pixels) rows.row("lod", LodDraw::lod, p);
+  rows.row("fast, seen", LodDraw::seen, 0, true);
+  for (const double p : pixels) rows.row("lod, seen", LodDraw::lod, p, true);
 }
 
 }  // namespace gsnav_bench

@@ -35,13 +35,13 @@ Status run(B& backend, const Options& options) {
 
   gsnav::SimulatorConfig config;
   config.task.max_steps = options.max_steps;
-  config.sensors =
-      gsnav::rgbd_sensors(options.height, options.width, options.hfov, {0, options.eye_height, 0});
+  config.sensors = sensors_of(options);
   config.render.profile = options.profile == "exact" ? gsnav::Profile::exact : gsnav::Profile::fast;
   if (options.profile == "lod") {
     config.lod = gsnav::LodChoice{};
     config.lod->pixels = options.lod_error;
   }
+  config.visible_sets = options.visible_sets;
   const auto episodes = make_episodes(options, setup.scene, config.task);
   if (!episodes) return episodes.status();
   auto made = gsnav::make_simulator(backend, setup.scene, config);
@@ -179,6 +179,10 @@ int main(int argc, char** argv) try {
   app.add_option("--lod-error", o.lod_error, "of the profile lod: how far merged Gaussians may be off, pixels")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
+  app.add_flag("--visible-sets", o.visible_sets,
+               "of the profiles fast and lod: draw only what is seen from the NavMesh's cell that the "
+               "agent is in; found "
+               "first, and kept beside the scene's file");
   app.add_option("--navmesh", o.navmesh,
                  "built from: gaussians, mesh (the flat only), auto (the mesh where there is one)")
       ->capture_default_str()
@@ -194,6 +198,11 @@ int main(int argc, char** argv) try {
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
   CLI11_PARSE(app, argc, argv);
+  if (o.visible_sets && o.profile == "exact") {
+    std::fprintf(stderr,
+                 "nav_loop: --visible-sets: sampled, so not for --profile exact; use fast or lod\n");
+    return 2;
+  }
 
   const gsnav::Status s = nav_loop::dispatch(o);
   if (!s) std::fprintf(stderr, "nav_loop: %s\n", s.message().c_str());

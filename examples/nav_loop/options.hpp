@@ -26,6 +26,7 @@ struct Options {
   double eye_height = 1.5;
   std::string profile = "exact";  ///< exact, fast, lod
   double lod_error = gsnav::LodChoice{}.pixels;
+  bool visible_sets = false;     ///< of fast and lod: draw only what is seen from where the agent is
   std::string navmesh = "auto";  ///< auto, mesh, gaussians
   int frame_every = 10;          ///< 0: no frames
   int shown_episode = -1;        ///< of strip and map; -1: the one that met people most closely

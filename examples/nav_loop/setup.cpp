@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "setup.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <optional>
 
@@ -12,7 +14,9 @@
 #endif
 #include "gsnav/io/lod_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/io/visible_file.hpp"
 #include "gsnav/nav/gaussian_navmesh.hpp"
+#include "gsnav/nav/viewpoints.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/people.hpp"
 
@@ -28,13 +32,15 @@ double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
 }
 
+#if defined(NAV_LOOP_OPENMP)
+gsnav::OpenMPBackend builder(const Options& options) { return gsnav::OpenMPBackend(options.threads); }
+#else
+gsnav::SerialBackend builder(const Options&) { return {}; }
+#endif
+
 /// Levels of detail: those beside the scene's file, or built; the embedded flat's are built.
 Result<gsnav::LodTree> levels_of(const Options& options, const gsnav::GaussianCloud& cloud) {
-#if defined(NAV_LOOP_OPENMP)
-  gsnav::OpenMPBackend backend(options.threads);
-#else
-  gsnav::SerialBackend backend;
-#endif
+  auto backend = builder(options);
   if (options.scene.empty()) return gsnav::build_lod(backend, cloud);
   auto cached = gsnav::io::cached_lod(backend, options.scene, cloud);
   if (!cached) return cached.status();
@@ -42,7 +48,41 @@ Result<gsnav::LodTree> levels_of(const Options& options, const gsnav::GaussianCl
   return std::move(cached->tree);
 }
 
+/// What is seen from where the agent's eyes can be: read from beside the scene's file, or found; the
+/// embedded flat's is found.
+Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::SceneAsset& asset,
+                                           const gsnav::NavMesh& navmesh) {
+  const gsnav::Camera eye = gsnav::sensor_camera(sensors_of(options)[0], {}, {});
+  gsnav::VisibleSettings settings;
+  settings.face = static_cast<int>(std::ceil(2 * std::max(eye.fx, eye.fy) - 1e-6));
+  settings.near_plane = eye.near_plane;
+  settings.near_sigma = eye.near_sigma;
+  settings.progress = [](double share) {
+    std::fprintf(stderr, "\rfinding visible sets: %.0f %%", 100 * share);
+  };
+  const double heights[] = {options.eye_height};
+  const auto viewpoints = gsnav::navmesh_viewpoints(navmesh, heights, settings.cell);
+  if (!viewpoints) return viewpoints.status();
+  auto backend = builder(options);
+  if (options.scene.empty()) {
+    auto made =
+        gsnav::build_visible_sets(backend, *asset.cloud, *viewpoints, settings, asset.world_from_asset);
+    std::fputs("\n", stderr);
+    return made;
+  }
+  auto cached = gsnav::io::cached_visible_sets(backend, options.scene, *asset.cloud, *viewpoints,
+                                               settings, asset.world_from_asset);
+  if (!cached) return cached.status();
+  if (cached->built) std::fputs("\n", stderr);
+  if (!cached->warning.empty()) std::fprintf(stderr, "%s\n", cached->warning.c_str());
+  return std::move(cached->sets);
+}
+
 }  // namespace
+
+std::vector<gsnav::SensorSpec> sensors_of(const Options& options) {
+  return gsnav::rgbd_sensors(options.height, options.width, options.hfov, {0, options.eye_height, 0});
+}
 
 Result<Setup> prepare(const Options& options) {
   Setup setup;
@@ -110,6 +150,14 @@ Result<Setup> prepare(const Options& options) {
   if (!mesh) return mesh.status();
   setup.scene.navmesh = std::make_shared<const gsnav::NavMesh>(std::move(*mesh));
   setup.timings.navmesh = seconds_since(from);
+  if (options.visible_sets) {
+    auto visible = visible_sets_of(options, setup.scene.assets[0], *setup.scene.navmesh);
+    if (!visible) return visible.status();
+    std::printf("visible sets: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks\n",
+                visible->cells(), visible->viewpoints, 100 * visible->mean_share(),
+                visible->cloud_chunks);
+    setup.scene.assets[0].visible = std::make_shared<const gsnav::VisibleSets>(std::move(*visible));
+  }
   // People are wider than the agent: they keep their shoulders clear of the furniture.
   std::optional<gsnav::NavMesh> walkways;
   if (options.avatars > 0) {

@@ -14,6 +14,9 @@ struct Setup {
   Timings timings;
 };
 
+/// The agent's cameras.
+std::vector<gsnav::SensorSpec> sensors_of(const Options& options);
+
 /// Loads or makes the scene, builds its NavMesh and sends avatars on their ways. Errors name the file
 /// or option.
 gsnav::Result<Setup> prepare(const Options& options);

@@ -88,6 +88,14 @@ Status OutFile::close() {
   return {};
 }
 
+std::string path_beside(const std::string& spec) {
+  std::error_code ignored;
+  std::string first = spec;
+  if (!std::filesystem::exists(spec, ignored)) first = spec.substr(0, spec.find(','));
+  while (first.size() > 1 && first.back() == '/') first.pop_back();
+  return first;
+}
+
 void give_back_memory() noexcept {
 #if defined(__GLIBC__)
   ::malloc_trim(0);

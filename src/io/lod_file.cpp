@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/io/lod_file.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <span>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "file.hpp"
@@ -144,21 +141,11 @@ Status save_lod(const fs::path& path, const LodTree& tree, const GaussianCloud& 
     const Hasher of = built_of(cloud, settings);
     for (std::size_t k = 0; k < 2; ++k) header.built_of[k] = of.state()[k];
     header.checksum = checksum(tree, nodes);
-    // Written aside and then renamed: whoever reads meanwhile sees a whole file or none.
-    const fs::path aside = path.string() + "." + std::to_string(::getpid());
-    detail::OutFile file;
-    if (Status s = file.open(aside); !s) return s;
-    file.write(&header, sizeof header);
-    for_each_array(tree, nodes,
-                   [&file](const auto& v) { file.write(v.data(), v.size() * sizeof(v[0])); });
-    Status s = file.close();
-    std::error_code error;
-    if (s) {
-      fs::rename(aside, path, error);
-      if (error) s = {Errc::file_not_found, path.string() + ": cannot be written: " + error.message()};
-    }
-    if (!s) fs::remove(aside, error);
-    return s;
+    return detail::replace_file(path, [&](detail::OutFile& file) {
+      file.write(&header, sizeof header);
+      for_each_array(tree, nodes,
+                     [&file](const auto& v) { file.write(v.data(), v.size() * sizeof(v[0])); });
+    });
   });
 }
 
@@ -221,11 +208,7 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
 }
 
 fs::path lod_path(const std::string& spec, const GaussianCloud& cloud, const LodSettings& settings) {
-  std::error_code ignored;
-  std::string first = spec;
-  if (!fs::exists(spec, ignored)) first = spec.substr(0, spec.find(','));
-  while (first.size() > 1 && first.back() == '/') first.pop_back();
-  return first + "." + built_of(cloud, settings).hex().substr(0, 16) + ".lod";
+  return detail::path_beside(spec) + "." + built_of(cloud, settings).hex().substr(0, 16) + ".lod";
 }
 
 }  // namespace gsnav::io

@@ -39,7 +39,9 @@ Result<SimulatorScene> load(const SceneEntry& entry) {
 
 std::size_t scene_bytes(const SimulatorScene& scene) noexcept {
   std::size_t sum = 0;
-  for (const SceneAsset& a : scene.assets) sum += cloud_bytes(*a.cloud);
+  for (const SceneAsset& a : scene.assets) {
+    sum += cloud_bytes(*a.cloud) + (a.visible != nullptr ? a.visible->bytes() : 0);
+  }
   const AvatarAsset* last = nullptr;
   for (const AvatarActor& a : scene.avatars) {
     if (a.asset().get() == last) continue;  // a crowd of one body has it once

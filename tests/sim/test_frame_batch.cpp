@@ -33,6 +33,7 @@ class BatchOfToys {
     Camera camera;
     std::span<const std::uint32_t> sets;
     MeshFrame meshes;
+    std::span<const View<const std::uint32_t>> seen{};
   };
   struct images_type {
     FrameImages<float> floats;
@@ -51,6 +52,8 @@ class BatchOfToys {
       const Camera& camera = cameras[c].camera;
       std::vector<GaussianSet> seen;
       for (const std::uint32_t s : cameras[c].sets) seen.push_back(sets[s]);
+      for (std::size_t s = 0; s < cameras[c].seen.size(); ++s)
+        seen[s].gaussians.seen_chunks = cameras[c].seen[s];
       const std::size_t pixels =
           static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
       FrameImages<float> to = images.floats;

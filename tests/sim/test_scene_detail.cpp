@@ -160,3 +160,90 @@ TEST_CASE("levels of detail that a scene does not have are refused, by name") {
       2, wandering);
   CHECK(batch.status().message().find("assets[0].lod is null") != std::string::npos);
 }
+
+TEST_CASE(
+    "a simulator with visible sets draws what is seen from its cell; alone and in a batch the same "
+    "bits") {
+  OpenMPBackend backend(2);
+  SimulatorScene scene = detailed_scene();
+  SimulatorConfig config;
+  config.sensors = rgbd_sensors(40, 56);
+  const PointNavEpisode episode = to_kitchen();
+  VisibleSettings settings;
+  settings.face = 56;
+  settings.near_plane = config.sensors[0].near_plane;
+  settings.near_sigma = config.sensors[0].near_sigma;
+  // Where the episode begins, and a metre on: beyond nothing is known, and all is drawn.
+  const std::vector<Vec3d> eyes{
+      {4.6, 1.5, 3.6}, {4.4, 1.5, 3.4}, {4.9, 1.5, 3.6}, {5.3, 1.5, 3.6}, {4.6, 1.501, 3.3}};
+  const auto visible = std::make_shared<const VisibleSets>(
+      build_visible_sets(backend, *scene.assets[0].cloud, eyes, settings).value());
+  scene.assets[0].visible = visible;
+  config.visible_sets = true;
+  bool levels = false;
+  SUBCASE("of the scene whole") {}
+  SUBCASE("of its levels of detail") { levels = true; }
+  if (levels) config.lod = coarse();
+  auto sim = make_simulator(backend, scene, config).value();
+  const auto obs = sim.reset(episode).value();
+
+  const Camera camera = sensor_camera(config.sensors[0], sim.agent().position, sim.agent().rotation());
+  const auto cell = visible->cell_of(camera);
+  REQUIRE(cell);
+  CHECK(visible->count_seen(*cell) < visible->cloud_chunks);
+  SceneOnBackend<OpenMPBackend> by_hand(backend, std::make_shared<const SimulatorScene>(scene));
+  REQUIRE(by_hand.pose(0, sim.clock()).ok());
+  LodCut cut(*scene.assets[0].lod, *scene.assets[0].cloud);
+  std::vector<GaussianSet> sets;
+  if (levels) {
+    LodChoice choice = coarse();
+    choice.hysteresis = 0;
+    const auto chosen = cut.select(camera, choice, {}, visible->seen_from(*cell));
+    sets.assign(chosen.begin(), chosen.end());
+  } else {
+    sets.push_back(by_hand.sets(0)[0]);
+    sets[0].gaussians.seen_chunks = visible->seen_from(*cell);
+  }
+  for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
+  RenderConfig rules = lod_config({}, levels ? cut.stats() : LodStats{});
+  rules.outputs = kRgb | kMedianDepth;
+  Renderer<float, OpenMPBackend> renderer(backend, rules);
+  const auto frames = renderer.render(sets, std::span(&camera, 1)).value();
+  CHECK(same_bits(obs["rgb"], frames.rgb));
+
+  BatchConfig batched;
+  static_cast<SimulatorConfig&>(batched) = config;
+  batched.task.max_steps = 20;
+  const auto shared = std::make_shared<const SimulatorScene>(scene);
+  auto batch = make_batch_simulator(backend, {shared}, batched, 2, wandering).value();
+  auto alone = Simulator<OpenMPBackend>::create(backend, shared, batched).value();
+  auto out = batch.reset().value();
+  Rng rng(5);
+  for (int step = 0; step < 12; ++step) {
+    for (std::size_t e = 0; e < 2; ++e) {
+      alone.set_state(batch.world(e).state());
+      const auto seen = alone.observe().value();
+      for (std::size_t i = 0; i < config.sensors.size(); ++i)
+        REQUIRE(same_bits(out.images[i].of(e), seen.images[i].data));
+    }
+    const std::vector<Action> actions{wandering_action(rng), wandering_action(rng)};
+    out = batch.step(actions).value();
+  }
+}
+
+TEST_CASE("visible sets that a scene does not have are refused, by name") {
+  OpenMPBackend backend(1);
+  SimulatorConfig config;
+  config.sensors = rgbd_sensors(16, 16);
+  config.visible_sets = true;
+  const auto refused = [&](const SimulatorScene& scene) {
+    return make_simulator(backend, scene, config).status();
+  };
+  CHECK(refused(flat_scene()).message().find("assets[0].visible is null") != std::string::npos);
+  SimulatorScene other = flat_scene();
+  VisibleSets foreign;
+  foreign.cloud_chunks = 3;
+  other.assets[0].visible = std::make_shared<const VisibleSets>(foreign);
+  CHECK(refused(other).message().find("assets[0].visible is of another cloud") != std::string::npos);
+  CHECK(refused(other).code() == Errc::invalid_argument);
+}

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-navmesh: builds, inspects, converts and draws NavMeshes.
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <limits>
@@ -7,11 +9,14 @@
 #include <vector>
 
 #include "draw.hpp"
+#include "gsnav/backends/openmp.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/io/visible_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "gsnav/nav/navmesh_levels.hpp"
+#include "gsnav/nav/viewpoints.hpp"
 #include "options.hpp"
 
 namespace {
@@ -49,6 +54,27 @@ Result<NavMesh> from_triangles(const Options& o, const Similarity& placed) {
   return NavMesh::build(o.settings, mesh->vertices, mesh->triangles, o.threads);
 }
 
+/// Finds what is seen from where on the NavMesh, and writes it.
+Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const NavMesh& mesh,
+                          const Similarity& placed) {
+  const auto viewpoints = navmesh_viewpoints(mesh, o.eye_heights, o.visible.cell);
+  if (!viewpoints) return viewpoints.status();
+  VisibleSettings settings = o.visible;
+  settings.margin = 0.5 * settings.cell;
+  settings.progress = [terminal = isatty(fileno(stdout)) != 0](double share) {
+    if (terminal) std::printf("\rvisible sets: %.0f %%", 100 * share);
+    if (terminal) std::fflush(stdout);
+  };
+  OpenMPBackend backend(o.threads);
+  const auto sets = build_visible_sets(backend, cloud, *viewpoints, settings, placed);
+  if (!sets) return sets.status();
+  if (Status s = io::save_visible_sets(o.visible_sets, *sets, cloud); !s) return s;
+  std::printf("%s%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks\n",
+              isatty(fileno(stdout)) != 0 ? "\r" : "", o.visible_sets.c_str(), sets->cells(),
+              sets->viewpoints, 100 * sets->mean_share(), sets->cloud_chunks);
+  return {};
+}
+
 Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
   auto scene = io::load_scene(o.input);
   if (!scene) return scene.status();
@@ -68,6 +94,9 @@ Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
       "floor at %.3f m; %.0f %% of it under a ceiling; left out: %.2f m2 in small pieces, %.2f m2 "
       "outside\n",
       r.floor_y, 100 * r.ceiling_share, r.dropped_small, r.dropped_uncovered);
+  if (!o.visible_sets.empty()) {
+    if (Status s = write_visible_sets(o, scene->cloud, built->mesh, placed); !s) return s;
+  }
   return std::move(built->mesh);
 }
 

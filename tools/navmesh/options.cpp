@@ -123,8 +123,33 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
          "--keep-uncovered", [&g] { g.drop_uncovered = false; },
          "Keep floor that has no ceiling above it")
       ->group(from);
+  gsnav::VisibleSettings& v = o.visible;
+  const char* seen = "Visible sets of Gaussians";
+  const auto* visible_sets = app.add_option("--visible-sets", o.visible_sets,
+                                            "File to write: what is seen from each cell of the NavMesh "
+                                            "that eyes can be in (gsnav-render reads it)")
+                                 ->group(seen);
+  app.add_option("--eye-heights", o.eye_heights, "Of cameras, metres above the floor")
+      ->capture_default_str()
+      ->group(seen);
+  const auto setting = [&](const char* name, auto& value, const char* text) {
+    app.add_option(name, value, text)->capture_default_str()->group(seen);
+  };
+  setting("--visible-cell", v.cell,
+          "Side of a cell, and distance of the places that are looked from, metres");
+  setting("--visible-weight", v.min_weight,
+          "A chunk of Gaussians is seen where one of them has so much of a pixel");
+  setting("--visible-face", v.face,
+          "Pixels that span 90 degrees: for cameras of no larger focal length");
+  setting("--near-plane", v.near_plane, "Of cameras, at most; metres");
   try {
     app.parse(argc, argv);
+    if (kind_of(o.input) != InputKind::gaussians && visible_sets->count() > 0) {
+      throw CLI::ValidationError("--visible-sets", o.input + " has no Gaussians");
+    }
+    if (o.scale != 1 && visible_sets->count() > 0) {
+      throw CLI::ValidationError("--visible-sets", "not with --scale: gsnav-render knows no scale");
+    }
     if (kind_of(o.input) == InputKind::navmesh && up->count() + scale->count() > 0) {
       throw CLI::ValidationError("--up, --scale", o.input + " is a NavMesh: it stands as it is");
     }

@@ -3,9 +3,11 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "gsnav/nav/gaussian_navmesh.hpp"
 #include "gsnav/nav/navmesh_settings.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav_navmesh {
 
@@ -25,6 +27,9 @@ struct Options {
   gsnav::GaussianNavOptions gaussians;
   std::optional<double> height;  ///< of the picture; a level's where it is not given
   std::optional<std::size_t> level;
+  std::string visible_sets;  ///< file to write; empty: none
+  std::vector<double> eye_heights{1.5};
+  gsnav::VisibleSettings visible;
   double metres_per_pixel = 0;  ///< 0: the longer side gets 1200 pixels
 };
 

@@ -26,6 +26,7 @@
 #include "gsnav/io/lod_file.hpp"
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/io/visible_file.hpp"
 #include "gsnav/scene/ledger.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/placed_meshes.hpp"
@@ -38,8 +39,9 @@ namespace {
 using namespace gsnav;
 
 struct Options {
-  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median", composite = "merged",
-                                   storage = "full", lod_levels = "shipped";
+  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median",
+                                   composite = "merged", storage = "full", lod_levels = "shipped",
+                                   visible_sets;
   std::vector<std::string> meshes;
   int width = 0, height = 0, threads = 0;
   double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0, lod_pixels = LodChoice{}.pixels;
@@ -51,6 +53,7 @@ struct Scene {
   const LoadReport& report;
   const SceneProfile* profile;  ///< null: packed
   const LodTree* tree;          ///< where the profile is lod
+  const VisibleSets* visible;   ///< where some are given
 };
 
 /// Which image --depth names; first hit may carry its tau.
@@ -115,15 +118,25 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
   SceneDetail detail;
   detail.choice.pixels = o.lod_pixels;
   std::optional<GaussianArrays<B>> merged;
+  Buffer<std::uint32_t, B> visible(backend);
   if constexpr (std::is_same_v<Cloud, GaussianCloud>) {
-    if (scene.tree != nullptr) {
+    if (scene.tree != nullptr || scene.visible != nullptr) {
       detail.assets.push_back({scene.tree, &cloud, {}});
+      SceneDetail::Asset& asset = detail.assets[0];
+      asset.visible = scene.visible;
       if constexpr (!is_host_backend<B>) {
-        detail.assets[0].cloud_there = whole[0].gaussians;
-        detail.assets[0].merged_there = merged.emplace(backend, scene.tree->merged).set().gaussians;
+        if (scene.visible != nullptr) {
+          visible.upload(scene.visible->bits.data(), scene.visible->bits.size());
+          asset.visible_there = visible.data();
+        }
+        if (scene.tree != nullptr) {
+          asset.cloud_there = whole[0].gaussians;
+          asset.merged_there = merged.emplace(backend, scene.tree->merged).set().gaussians;
+        }
       }
     }
   }
+  GaussianSet seen_here = whole_here;
   DetailSets details;
   ChosenChunks<B> chosen(backend);
   std::vector<MeshArrays<B>> mesh_arrays;
@@ -150,10 +163,18 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     renderer.set_meshes(instances, headlight);
     const LodCut* cut = nullptr;
     if (!detail.assets.empty()) {
-      sets = details.select(detail, {}, cameras[c]);
+      sets = details.select(detail, whole, cameras[c]);
       chosen.place(std::span(&details, 1));
-      cut = &details.cut(0);
-      here = cut->sets();
+      if (scene.tree != nullptr) {
+        cut = &details.cut(0);
+        here = cut->sets();
+      } else if (is_host_backend<B>) {
+        here = sets;
+      } else if (const auto cell = scene.visible->cell_of(cameras[c])) {
+        seen_here = whole_here;
+        seen_here.gaussians.seen_chunks = scene.visible->seen_from(*cell);
+        here = std::span(&seen_here, 1);
+      }
       renderer.set_config(details.rules(config));
     }
     if (const Status s = renderer.render(sets, std::span(&cameras[c], 1), f); !s) {
@@ -163,8 +184,10 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     const auto end = std::chrono::steady_clock::now();
     total_ms += std::chrono::duration<double, std::milli>(end - start).count();
     if (o.ledger) {
-      const FrameLedger l = frame_ledger(here, cameras[c], renderer.config(), f.stats[0], &scene.report,
-                                         profiled && cut == nullptr ? scene.profile : nullptr, cut);
+      FrameLedger l = frame_ledger(here, cameras[c], renderer.config(), f.stats[0], &scene.report,
+                                   profiled && cut == nullptr ? scene.profile : nullptr, cut);
+      l.unseen = details.unseen();
+      if (scene.visible != nullptr) l.unseen_weight = scene.visible->min_weight;
       std::printf("camera %zu:\n%s", c, ledger_text(l).c_str());
     }
     const std::vector<S>& z = depth.output == kMedianDepth        ? f.median_depth
@@ -244,7 +267,12 @@ int main(int argc, char** argv) {
          "Of the profile lod: shipped, those that a streamed set has, where it has any; built: the tree of its finest")
       ->check(CLI::IsMember({"shipped", "built"}))
       ->capture_default_str();
-  app.add_flag("--ledger", o.ledger, "Print what each frame skipped, merged, limited and rounded, and by how much");
+  app.add_option("--visible-sets", o.visible_sets,
+                 "Of the profiles fast and lod: file of what is seen from where (gsnav-navmesh writes it); the rest is "
+                 "not drawn")
+      ->check(CLI::ExistingFile);
+  app.add_flag("--ledger", o.ledger,
+               "Print what each frame skipped, merged, limited and rounded, and by how much");
   app.add_option("--depth", o.depth, "median, expected, accumulated, first or first:TAU")
       ->capture_default_str();
   app.add_option("--max-alpha", o.max_alpha, "Largest alpha of one Gaussian at a pixel")
@@ -358,7 +386,19 @@ int main(int argc, char** argv) {
                 static_cast<double>(lod->tree.bytes()) * 1e-6, lod->built ? "built" : "read");
     if (!lod->warning.empty()) std::printf("%s\n", lod->warning.c_str());
   }
-  const Scene drawn{report, profile ? &*profile : nullptr, shipped ? &*shipped : lod ? &lod->tree : nullptr};
+  std::optional<VisibleSets> visible;
+  if (!o.visible_sets.empty()) {
+    if (o.profile == "exact")
+      return fail("--visible-sets: sampled, so not for --profile exact; use fast or lod");
+    if (packed) return fail("--visible-sets: not with --storage packed; use full or compact");
+    auto sets = io::load_visible_sets(o.visible_sets, full);
+    if (!sets) return fail(sets.message());
+    std::printf("%s: %zu cells, from %zu viewpoints\n", o.visible_sets.c_str(), sets->cells(),
+                sets->viewpoints);
+    visible = std::move(*sets);
+  }
+  const LodTree* const tree = shipped ? &*shipped : lod ? &lod->tree : nullptr;
+  const Scene drawn{report, profile ? &*profile : nullptr, tree, visible ? &*visible : nullptr};
 
   const auto on = [&]<class S>(auto& backend) {
     return packed ? run<S>(backend, o, *depth, *packed, drawn, meshes, *cameras)

@@ -55,6 +55,20 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
     if (cameras[c].sets.empty()) {
       for (std::size_t s = 0; s < sets.size(); ++s) count(s);
     }
+    const std::span<const View<const std::uint32_t>> seen = cameras[c].seen;
+    const std::size_t listed = cameras[c].sets.empty() ? sets.size() : cameras[c].sets.size();
+    if (!seen.empty() && seen.size() != listed) {
+      return bad(Errc::invalid_argument, "seen has " + std::to_string(seen.size()) + " entries for " +
+                                             std::to_string(listed) + " sets");
+    }
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const GaussianView& g = sets[cameras[c].sets.empty() ? i : cameras[c].sets[i]].gaussians;
+      if (!seen[i].empty() && seen[i].size != (g.all_chunks() + 31) / 32) {
+        return bad(Errc::invalid_argument, "seen[" + std::to_string(i) + "] has " +
+                                               std::to_string(seen[i].size) + " words for " +
+                                               std::to_string(g.all_chunks()) + " chunks");
+      }
+    }
     if (gaussians > std::numeric_limits<std::uint32_t>::max()) {
       return bad(Errc::unsupported, "it sees more than 2^32 Gaussians");
     }
@@ -105,8 +119,11 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   std::size_t origins = 0;
   for (std::uint32_t c = 0; c < cameras.size(); ++c) {
     std::uint32_t rank = 0;
+    std::size_t place = 0;
     const auto see = [&](std::uint32_t s) {
-      seen.push_back({s, c, rank});
+      const auto chunks =
+          cameras[c].seen.empty() ? sets[s].gaussians.seen_chunks : cameras[c].seen[place++];
+      seen.push_back({s, c, rank, chunks});
       rank += static_cast<std::uint32_t>(sets[s].gaussians.size);
       ++set_begins[s + 1];
       origins += std::max<std::size_t>(1, sets[s].gaussians.origins.size);
@@ -155,6 +172,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
     instance.camera = seen[i].camera;
     ProjectArgs<float>& to = instance.args;
     to.gaussians = set.gaussians;
+    to.gaussians.seen_chunks = seen[i].chunks;
     to.camera = make_projection_camera<float>(camera, set, rules);
     to.camera64 = make_projection_camera<double>(camera, set, rules);
     to.sh_degree = std::min(set.gaussians.sh_degree, config.max_sh_degree);

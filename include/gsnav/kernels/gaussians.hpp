@@ -92,6 +92,10 @@ struct GaussianView {
   /// memory. Empty: all chunks.
   View<const std::uint32_t> drawn_chunks;
 
+  /// Which chunks may be seen from where the camera is, bit c % 32 of word c / 32 of all_chunks():
+  /// others are not drawn (scene/visible_sets.hpp). In the backend's memory. Empty: all may.
+  View<const std::uint32_t> seen_chunks;
+
   /// Highest SH degree that the Gaussians of a chunk use, one a chunk of all_chunks()
   /// (scene/scene_profile.hpp): bands above it are not read. In the backend's memory (GaussianArrays
   /// puts them there). Empty: sh_degree.
@@ -104,6 +108,10 @@ struct GaussianView {
     return used < degree ? used : degree;
   }
 
+  /// Whether anything of a chunk, by its number, may be seen from where the camera is.
+  GSNAV_HD bool may_be_seen(std::size_t chunk) const noexcept {
+    return seen_chunks.empty() || (seen_chunks[chunk / 32] >> (chunk % 32) & 1u) != 0;
+  }
   /// Chunks that the rows make.
   GSNAV_HD std::size_t all_chunks() const noexcept { return (size + kProjectChunk - 1) / kProjectChunk; }
   /// Chunks that are drawn.

@@ -50,7 +50,8 @@ struct ProjectArgs {
 template <class S>
 GSNAV_HD bool chunk_is_candidate(const ProjectArgs<S>& args, std::size_t c) noexcept {
   const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
-  return bounds.empty() || may_be_visible(args.camera64, bounds[args.gaussians.chunk_id(c)]);
+  const std::size_t id = args.gaussians.chunk_id(c);
+  return args.gaussians.may_be_seen(id) && (bounds.empty() || may_be_visible(args.camera64, bounds[id]));
 }
 
 /// Which parts of chunk c have Gaussians that may be visible: bit p for the kChunkPart rows from p kChunkPart on.
@@ -59,8 +60,9 @@ template <class S>
 GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c) noexcept {
   static_assert(kProjectChunk / kChunkPart <= 32);
   const GaussianView& gs = args.gaussians;
-  if (gs.chunk_bounds.empty()) return ~0u;
   const std::size_t id = gs.chunk_id(c);
+  if (!gs.may_be_seen(id)) return 0;
+  if (gs.chunk_bounds.empty()) return ~0u;
   const double s_max = detail::ChunkInView(args.camera64, gs.chunk_bounds[id]).s_max();
   if (!may_be_visible(args.camera64, gs.chunk_bounds[id], s_max)) return 0;
   if (gs.part_bounds.empty() || lies_in_view(args.camera64, gs.chunk_bounds[id])) return ~0u;

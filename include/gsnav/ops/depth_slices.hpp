@@ -147,6 +147,7 @@ class DepthSlices {
     const auto cells = [](int size) { return static_cast<std::uint16_t>((size + kSize - 1) / kSize); };
     const std::uint16_t columns = cells(width), rows = cells(height);
     const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
+    if (!args.gaussians.may_be_seen(args.gaussians.chunk_id(c))) return {};
     if (bounds.empty()) return {0, 0, 0, columns, rows};
     const ChunkBounds& chunk = bounds[args.gaussians.chunk_id(c)];
     if (!may_be_visible(args.camera64, chunk)) return {};

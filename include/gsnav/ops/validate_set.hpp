@@ -95,6 +95,10 @@ inline Status validate(const GaussianSet& set) {
     return bad("chunk_sh_degrees has " + std::to_string(g.chunk_sh_degrees.size) + " values where " +
                std::to_string(g.all_chunks()) + " are needed");
   }
+  if (!g.seen_chunks.empty() && g.seen_chunks.size != (g.all_chunks() + 31) / 32) {
+    return bad("seen_chunks has " + std::to_string(g.seen_chunks.size) + " words where " +
+               std::to_string((g.all_chunks() + 31) / 32) + " are needed");
+  }
   if (g.drawn_chunks.size > g.all_chunks()) {
     return bad("drawn_chunks has " + std::to_string(g.drawn_chunks.size) + " chunks of " +
                std::to_string(g.all_chunks()));

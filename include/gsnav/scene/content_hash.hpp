@@ -67,24 +67,29 @@ class Hasher {
   std::array<std::uint64_t, 2> state_{0x243f6a8885a308d3ull, 0x13198a2e03707344ull};
 };
 
-/// Adds all that an image depends on in a cloud.
-inline void hash_cloud(Hasher& h, const GaussianCloud& cloud) {
+/// Adds all that what is seen of a cloud depends on, but for its colours.
+inline void hash_shapes(Hasher& h, const GaussianCloud& cloud) {
   for (const auto& v : cloud.means) h.array(v);
   for (const auto& v : cloud.quats) h.array(v);
   for (const auto& v : cloud.scales) h.array(v);
   h.array(cloud.opacities);
-  h.array(cloud.sh0);
-  h.array(cloud.shN);
-  if (!cloud.shN_half.empty()) h.array(cloud.shN_half);
   h.array(cloud.origin_ids);
   h.array(cloud.row_ids);
   for (const Vec3d& o : cloud.origins) {
     for (int k = 0; k < 3; ++k) h.value(o[k]);
   }
-  h.value(cloud.sh_degree);
   h.value(cloud.filter);
   h.value(cloud.eps2d);
   h.value(cloud.sort_order);
+}
+
+/// Adds all that an image depends on in a cloud.
+inline void hash_cloud(Hasher& h, const GaussianCloud& cloud) {
+  hash_shapes(h, cloud);
+  h.array(cloud.sh0);
+  h.array(cloud.shN);
+  if (!cloud.shN_half.empty()) h.array(cloud.shN_half);
+  h.value(cloud.sh_degree);
 }
 
 /// All that an image depends on in a cloud: 32 hexadecimal digits.

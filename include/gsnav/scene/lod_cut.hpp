@@ -68,9 +68,12 @@ class LodCut {
 
   /// Chooses for a camera; the cloud stands in the world by `world_from_asset`. What to draw then:
   /// chunks of the cloud, and merged ones, as the pixels of O_photo(choice.photo) see them. Valid until
-  /// the next call.
+  /// the next call. `seen`: which of the cloud's chunks may be seen (VisibleSets::seen_from, here): what
+  /// shows none of them is left out; empty: all may be.
   std::span<const GaussianSet> select(const Camera& camera, const LodChoice& choice = {},
-                                      const Similarity& world_from_asset = {}) {
+                                      const Similarity& world_from_asset = {},
+                                      View<const std::uint32_t> seen = {}) {
+    seen_ = seen;
     leaf_chunks_.clear();
     merged_chunks_.clear();
     sets_.clear();
@@ -82,7 +85,9 @@ class LodCut {
     if (tree_->places.empty()) {
       visit(tree_->levels() - 1, tree_->nodes.size() - 1, p, per_metre, choice);
     } else {
-      for (const std::uint32_t root : tree_->roots) descend(root, p, per_metre, choice);
+      for (const std::uint32_t root : tree_->roots) {
+        if (seen_.empty() || shows_seen(root)) descend(root, p, per_metre, choice);
+      }
     }
     add(*cloud_, leaf_chunks_, choice, world_from_asset);
     add(tree_->merged, merged_chunks_, choice, world_from_asset);
@@ -117,6 +122,25 @@ class LodCut {
     if (chunks.empty()) return;
     sets_.push_back(photo_set(cloud, choice, world_from_asset));
     sets_.back().gaussians.drawn_chunks = {chunks.data(), chunks.size()};
+  }
+  /// Whether one of the chunks [first, end), some of which may be beyond the cloud's, is among those
+  /// that are seen.
+  bool any_seen(std::uint64_t first, std::uint64_t end) const noexcept {
+    end = std::min<std::uint64_t>(end, 32 * std::uint64_t{seen_.size});
+    for (std::uint64_t c = first; c < end;) {
+      const std::uint64_t in_word =
+          std::min<std::uint64_t>(end - c / 32 * 32, 32);  // where the range ends in it
+      const std::uint32_t below = in_word == 32 ? ~0u : (1u << in_word) - 1u;
+      if ((seen_[c / 32] & below) >> (c % 32) != 0) return true;
+      c = c / 32 * 32 + 32;
+    }
+    return false;
+  }
+  /// The same of what a box of a forest shows: its finest node has the cloud's chunks.
+  bool shows_seen(std::uint32_t node) const noexcept {
+    while (tree_->places[node].finer != LodPlace::kNone) node = tree_->places[node].finer;
+    const LodPlace& place = tree_->places[node];
+    return any_seen(place.first_chunk, std::uint64_t{place.first_chunk} + place.chunks);
   }
   /// What a metre is at the node's nearest depth, in choice.pixels.
   static double scale_of(const LodNode& n, const ProjectionCamera<double>& camera, double per_metre) noexcept {
@@ -158,6 +182,8 @@ class LodCut {
   void visit(std::size_t level, std::size_t node, const ProjectionCamera<double>& camera,
              double per_metre, const LodChoice& choice) {
     const LodNode& n = tree_->nodes[node];
+    const std::uint64_t place = node - tree_->level_begin[level];
+    if (!seen_.empty() && !any_seen(place << level, (place + 1) << level)) return;
     if (!may_be_visible(camera, n.reach)) return;
     const double scale = scale_of(n, camera, per_metre);
     if (!(level > 0 && refine(node, scale, choice))) {
@@ -165,8 +191,7 @@ class LodCut {
       note_error(n, scale, choice);
       return;
     }
-    const std::size_t i = node - tree_->level_begin[level];
-    const std::size_t first = tree_->level_begin[level - 1] + 2 * i;
+    const std::size_t first = tree_->level_begin[level - 1] + 2 * place;
     visit(level - 1, first, camera, per_metre, choice);
     if (first + 1 < tree_->level_begin[level]) visit(level - 1, first + 1, camera, per_metre, choice);
   }
@@ -190,6 +215,7 @@ class LodCut {
 
   const LodTree* tree_;
   const GaussianCloud* cloud_;
+  View<const std::uint32_t> seen_;
   std::vector<std::uint8_t> refined_;
   std::vector<std::uint32_t> leaf_chunks_, merged_chunks_;
   std::vector<GaussianSet> sets_;

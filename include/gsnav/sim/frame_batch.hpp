@@ -174,23 +174,31 @@ class FrameBatch<B> {
     sets_.clear();
     places_.clear();
     lists_.clear();
+    seen_.clear();
     cameras_.clear();
     for (const std::size_t j : which) {
       for (const GaussianSet& set : jobs[j].sets) {
-        if (set.gaussians.size != 0) lists_.push_back(place_of(set));
+        if (set.gaussians.size != 0) list(set);
       }
       // A list of no sets stands for all of them.
-      if (lists_.size() == first_of(cameras_.size())) lists_.push_back(place_of(GaussianSet{}));
+      if (lists_.size() == first_of(cameras_.size())) list({});
       cameras_.push_back({*jobs[j].camera, {}, jobs[j].meshes});
       ends_.resize(cameras_.size());
       ends_.back() = lists_.size();
     }
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       cameras_[c].sets = std::span(lists_).subspan(first_of(c), ends_[c] - first_of(c));
+      cameras_[c].seen = std::span(seen_).subspan(first_of(c), ends_[c] - first_of(c));
     }
   }
   std::size_t first_of(std::size_t camera) const noexcept { return camera == 0 ? 0 : ends_[camera - 1]; }
 
+  /// Appends to a camera's list: what it sees of the set is its own, the set is all cameras'.
+  void list(GaussianSet set) {
+    seen_.push_back(set.gaussians.seen_chunks);
+    set.gaussians.seen_chunks = {};
+    lists_.push_back(place_of(set));
+  }
   std::uint32_t place_of(const GaussianSet& set) {
     // All of it, bit for bit: where padding differs a set is listed twice, and no image changes.
     const auto same = [](const GaussianSet& a, const GaussianSet& b) {
@@ -237,6 +245,7 @@ class FrameBatch<B> {
   std::vector<GaussianSet> sets_;
   std::unordered_multimap<const float*, std::uint32_t> places_;  // in sets_, by their means
   std::vector<std::uint32_t> lists_;
+  std::vector<View<const std::uint32_t>> seen_;  // of each in these lists
   std::vector<std::size_t> ends_;
   std::vector<typename Batch::camera_type> cameras_;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -9,23 +10,28 @@
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav {
 
-/// How a scene's assets are drawn by levels of detail (docs/lod.md).
+/// How a scene's assets are drawn by levels of detail (docs/lod.md), by what is seen from where the
+/// camera is, or both.
 struct SceneDetail {
   struct Asset {
-    const LodTree* tree;
+    const LodTree* tree;  ///< null: all of the cloud, or what of it is seen
     const GaussianCloud* cloud;
     Similarity world_from_asset;
     GaussianView cloud_there{}, merged_there{};  ///< cloud's and tree's arrays in a backend's own memory; empty: the host's
+    const VisibleSets* visible = nullptr;        ///< null: anything may be seen
+    const std::uint32_t* visible_there = nullptr;  ///< visible->bits in a backend's own memory; null: the host's
   };
   std::vector<Asset> assets;  ///< in the order of the scene's sets; empty: all are drawn whole
   LodChoice choice{};
 };
 
-/// What one camera draws of a scene by levels of detail. It depends on the camera alone, not on what was
-/// seen before: a simulator that is set back to a state, or is one of a batch, sees the same bits.
+/// What one camera draws of a scene by levels of detail and visible sets. It depends on the camera
+/// alone, not on what was seen before: a simulator that is set back to a state, or is one of a batch,
+/// sees the same bits.
 class DetailSets {
  public:
   /// `sets`: the scene's, assets first, then avatars, which stay as they are. Valid until the next call.
@@ -36,17 +42,37 @@ class DetailSets {
     cuts_.resize(detail.assets.size());
     sets_.clear();
     chunks_.clear();
+    to_place_.clear();
     stats_ = {};
+    unseen_ = 0;
     for (std::size_t a = 0; a < detail.assets.size(); ++a) {
       const SceneDetail::Asset& asset = detail.assets[a];
+      const auto cell = asset.visible != nullptr ? asset.visible->cell_of(camera, asset.world_from_asset)
+                                                 : std::nullopt;
+      View<const std::uint32_t> seen;
+      if (cell) {
+        seen = asset.visible->seen_from(*cell);
+        const std::size_t all = asset.cloud->size(),
+                          counted = kProjectChunk * asset.visible->count_seen(*cell);
+        unseen_ += all - std::min(all, counted);
+      }
+      if (asset.tree == nullptr) {
+        sets_.push_back(sets[a]);
+        if (cell)
+          sets_.back().gaussians.seen_chunks = asset.visible->seen_from(*cell, asset.visible_there);
+        continue;
+      }
       Cut& cut = cuts_[a];
       if (cut.tree != asset.tree || cut.cloud != asset.cloud) {
         cut = {asset.tree, asset.cloud, LodCut(*asset.tree, *asset.cloud)};
       }
-      const auto chosen = cut.cut->select(camera, choice, asset.world_from_asset);
+      const auto chosen = cut.cut->select(camera, choice, asset.world_from_asset, seen);
       for (const GaussianSet& set : chosen) {
         sets_.push_back(set);
-        if (asset.cloud_there.size != 0) move(asset, sets_.back().gaussians);
+        if (asset.cloud_there.size != 0) {
+          move(asset, sets_.back().gaussians);
+          to_place_.push_back(sets_.size() - 1);
+        }
       }
       stats_.shown += cut.cut->stats().shown;
       stats_.merged += cut.cut->stats().merged;
@@ -63,15 +89,17 @@ class DetailSets {
     return rules_;
   }
 
-  /// How asset `a` was cut by the last choice; its sets are of the host's arrays.
+  /// How asset `a`, which has a tree, was cut by the last choice; its sets are of the host's arrays.
   const LodCut& cut(std::size_t a) const noexcept { return *cuts_[a].cut; }
+  /// Gaussians of the assets that the last choice left out since nothing of their chunks is seen from
+  /// the camera's cell; less than a chunk too few.
+  std::uint64_t unseen() const noexcept { return unseen_; }
 
   /// Chunks of the last choice that a backend with a memory of its own has to be given, and where they are there.
   std::span<const std::uint32_t> chunks() const noexcept { return chunks_; }
   void place_chunks(const std::uint32_t* there) noexcept {
-    for (GaussianSet& set : sets_) {
-      View<const std::uint32_t>& drawn = set.gaussians.drawn_chunks;
-      if (drawn.empty()) continue;
+    for (const std::size_t s : to_place_) {
+      View<const std::uint32_t>& drawn = sets_[s].gaussians.drawn_chunks;
       drawn.data = there;
       there += drawn.size;
     }
@@ -95,7 +123,9 @@ class DetailSets {
   std::vector<Cut> cuts_;
   std::vector<GaussianSet> sets_;
   std::vector<std::uint32_t> chunks_;
-  LodStats stats_;  // shown and merged of all
+  std::vector<std::size_t> to_place_;  // sets whose chunks these are
+  LodStats stats_;                     // shown and merged of all
+  std::uint64_t unseen_ = 0;
   RenderConfig rules_;
 };
 

@@ -26,6 +26,9 @@ struct SceneAsset {
   Similarity world_from_asset{};
   /// Its levels of detail (build_lod, io::cached_lod); read where SimulatorConfig::lod is set.
   std::shared_ptr<const LodTree> lod{};
+  /// What is seen of it from where agents go (build_visible_sets, io::cached_visible_sets); read where
+  /// SimulatorConfig::visible_sets is set.
+  std::shared_ptr<const VisibleSets> visible{};
 };
 
 /// A surface of triangles and how it stands in the world; seen among the Gaussians (docs/composition.md).
@@ -59,15 +62,33 @@ inline Status validate(const SimulatorScene& scene) {
   return {};
 }
 
+/// What of a scene's assets is drawn.
+struct DetailChoice {
+  std::optional<LodChoice> lod{};  ///< by levels of detail; none: whole
+  bool visible_sets = false;       ///< only what is seen from where the camera is
+};
+
 /// Whether a scene can be drawn so. invalid_argument, naming what is missing or out of range.
-inline Status validate_detail(const SimulatorScene& scene, const std::optional<LodChoice>& lod) {
-  if (!lod) return {};
-  if (Status s = validate(*lod); !s) return s;
+inline Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice) {
+  if (choice.lod) {
+    if (Status s = validate(*choice.lod); !s) return s;
+  }
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
     const SceneAsset& a = scene.assets[i];
+    const auto bad = [i](const std::string& field, const std::string& what) {
+      return Status(Errc::invalid_argument, "SimulatorConfig." + field + ": SimulatorScene.assets[" +
+                                                std::to_string(i) + "]." + what);
+    };
+    if (choice.visible_sets &&
+        (a.visible == nullptr || a.visible->cloud_chunks != a.cloud->view().all_chunks())) {
+      return bad("visible_sets",
+                 std::string("visible is ") +
+                     (a.visible == nullptr ? "null: build_visible_sets makes it" : "of another cloud"));
+    }
+    if (!choice.lod) continue;
     if (a.lod != nullptr && a.lod->cloud_chunks() == a.cloud->view().all_chunks()) continue;
-    return {Errc::invalid_argument, "SimulatorConfig.lod: SimulatorScene.assets[" + std::to_string(i) + "].lod is " +
-                                        (a.lod == nullptr ? "null: build_lod makes it" : "of another cloud")};
+    return bad("lod", std::string("lod is ") +
+                          (a.lod == nullptr ? "null: build_lod makes it" : "of another cloud"));
   }
   return {};
 }
@@ -92,15 +113,22 @@ inline void append_bodies(const SimulatorScene& scene, double t0, double t1, std
 template <Backend B>
 class SceneOnBackend {
  public:
-  /// `lod`: levels of detail, which the scene has (validate_detail).
-  SceneOnBackend(B& backend, std::shared_ptr<const SimulatorScene> scene, const std::optional<LodChoice>& lod = {})
+  /// `choice`: of levels of detail and visible sets, which the scene has (validate_detail).
+  SceneOnBackend(B& backend, std::shared_ptr<const SimulatorScene> scene,
+                 const DetailChoice& choice = {})
       : backend_(&backend), scene_(std::move(scene)) {
-    if (lod) detail_.choice = *lod;
+    if (choice.lod) detail_.choice = *choice.lod;
     for (const SceneAsset& a : scene_->assets) {
       sets_.push_back(arrays_.emplace_back(backend, *a.cloud).set(a.world_from_asset));
-      if (!lod) continue;
-      detail_.assets.push_back({a.lod.get(), a.cloud.get(), a.world_from_asset});
+      if (!choice.lod && !choice.visible_sets) continue;
+      detail_.assets.push_back({choice.lod ? a.lod.get() : nullptr, a.cloud.get(), a.world_from_asset});
+      if (choice.visible_sets) detail_.assets.back().visible = a.visible.get();
       if constexpr (!is_host_backend<B>) {
+        if (choice.visible_sets) {
+          visible_.emplace_back(backend).upload(a.visible->bits.data(), a.visible->bits.size());
+          detail_.assets.back().visible_there = visible_.back().data();
+        }
+        if (!choice.lod) continue;
         detail_.assets.back().cloud_there = sets_.back().gaussians;
         if (a.lod->merged.size() == 0) continue;
         detail_.assets.back().merged_there = merged_.emplace_back(backend, a.lod->merged).set().gaussians;
@@ -116,7 +144,8 @@ class SceneOnBackend {
   }
 
   const SimulatorScene& scene() const noexcept { return *scene_; }
-  /// `config` with the sort order of the scene's assets, and the rules of levels of detail where it has them.
+  /// `config` with the sort order of the scene's assets, and the rules of levels of detail, or of
+  /// visible sets, where it has them.
   RenderConfig render_config(RenderConfig config) const noexcept {
     if (detail() != nullptr) config = lod_config(config);
     if (!scene_->assets.empty()) config.sort_order = scene_->assets.front().cloud->sort_order;
@@ -203,6 +232,7 @@ class SceneOnBackend {
   std::vector<GaussianArrays<B>> arrays_;
   std::vector<GaussianSet> sets_;  // of the assets
   std::vector<GaussianArrays<B>> merged_;  // of their trees, where the backend has a memory of its own
+  std::vector<Buffer<std::uint32_t, B>> visible_;  // their visible sets, likewise
   SceneDetail detail_;
   std::vector<MeshArrays<B>> mesh_arrays_;
   std::vector<MeshInstance> instances_;

@@ -21,8 +21,12 @@ struct SimulatorConfig {
   /// Draws the assets by levels of detail: the profile lod (docs/lod.md), whatever render.profile is. Each needs its
   /// tree (SceneAsset::lod). No hysteresis: an image depends on its camera, not on what was seen before.
   std::optional<LodChoice> lod{};
-  bool rendering = true;            ///< off: physics and metrics only, no image memory
-  std::uint64_t seed = 0;           ///< of the sensors' noise
+  /// Draws of the assets only what is seen from where a camera is, by the rules of the profile fast
+  /// (VisibleSets). Each needs its sets (SceneAsset::visible); from where these know nothing, all is
+  /// drawn.
+  bool visible_sets = false;
+  bool rendering = true;   ///< off: physics and metrics only, no image memory
+  std::uint64_t seed = 0;  ///< of the sensors' noise
 };
 
 /// invalid_argument, naming the field, where a value is impossible.
@@ -84,11 +88,12 @@ class Simulator {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
     if (Status s = validate(*scene); !s) return s;
     if (Status s = validate(config); !s) return s;
-    if (Status s = validate_detail(*scene, config.lod); !s) return s;
-    Result<World> world = World::create(scene->navmesh, config.task, [scene, others](double t0, double t1, auto& out) {
-      append_bodies(*scene, t0, t1, out);
-      if (others) others(t0, t1, out);
-    });
+    if (Status s = validate_detail(*scene, {config.lod, config.visible_sets}); !s) return s;
+    Result<World> world =
+        World::create(scene->navmesh, config.task, [scene, others](double t0, double t1, auto& out) {
+          append_bodies(*scene, t0, t1, out);
+          if (others) others(t0, t1, out);
+        });
     if (!world) return world.status();
     return Simulator(backend, std::move(*world), std::move(config), std::move(scene));
   }
@@ -187,7 +192,7 @@ class Simulator {
   Simulator(B& backend, World world, SimulatorConfig config, std::shared_ptr<const SimulatorScene> scene)
       : world_(std::move(world)),
         config_(std::move(config)),
-        scene_(backend, std::move(scene), config_.lod),
+        scene_(backend, std::move(scene), {config_.lod, config_.visible_sets}),
         rig_(backend, config_.sensors),
         spectator_chunks_(backend) {
     config_.render = scene_.render_config(config_.render);

@@ -18,6 +18,10 @@ struct BatchCamera {
   std::span<const std::uint32_t> sets;
   /// Meshes among these Gaussians (docs/composition.md), arrays on the device.
   MeshFrame meshes{};
+  /// GaussianView::seen_chunks of each of `sets` (of all sets, where that is empty) for this camera:
+  /// cameras that look at one set from several places still share it. Empty: those of the sets. Read
+  /// during the call, the bits by the device.
+  std::span<const View<const std::uint32_t>> seen{};
 };
 
 /// Images of a batch in device memory, [C][H][W] row-major; null: not asked for. They stay on the device: a

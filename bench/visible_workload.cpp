@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visible_workload.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/io/visible_file.hpp"
+#include "gsnav/nav/gaussian_navmesh.hpp"
+#include "gsnav/nav/viewpoints.hpp"
+#include "workload.hpp"
+
+using namespace gsnav;
+
+namespace gsnav_bench {
+
+namespace {
+
+/// Takes the axis that is most upwards in the images to Y.
+Quatd upright(const std::vector<Camera>& cameras) {
+  Vec3d up;
+  for (const Camera& c : cameras) up = up - c.viewmat.linear.row[1];
+  int axis = 0;
+  for (int k = 1; k < 3; ++k) axis = std::abs(up[k]) > std::abs(up[axis]) ? k : axis;
+  const bool down = up[axis] < 0;
+  constexpr double kQuarter = 1.5707963267948966;
+  if (axis == 1) return down ? Quatd{0, 1, 0, 0} : Quatd{};
+  return axis == 2 ? axis_angle(Vec3d{1, 0, 0}, down ? kQuarter : -kQuarter)
+                   : axis_angle(Vec3d{0, 0, 1}, down ? -kQuarter : kQuarter);
+}
+
+}  // namespace
+
+VisibleSets workload_visible_sets() {
+  const GaussianCloud& cloud = workload().cloud;
+  const std::vector<Camera> cameras = sized(256, 256);
+  const Similarity placed{upright(cameras), {}, 1.0};
+  NavMeshSettings mesh = gaussian_navmesh_settings();
+  mesh.agent_radius = 0.3;
+  const GaussianSet set = cloud.set(placed);
+  GaussianNavOptions how;
+  if (std::getenv("GSNAV_BENCH_SCENE") == nullptr)
+    how.solid_alpha = 0.2;  // the flat's surfaces are as thin as paper
+  const NavMeshFromGaussians built = build_navmesh(mesh, std::span(&set, 1), how).value();
+  std::vector<double>
+      heights;  // to the centimetre, each once, and a little above and below: cells have borders
+  for (const Camera& c : cameras) {
+    const double h = std::round(100 * ((placed * c.position()).y - built.report.floor_y)) / 100;
+    for (const double beside : {-0.005, 0.005}) heights.push_back(h + beside);
+  }
+  std::sort(heights.begin(), heights.end());
+  heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
+  VisibleSettings settings;
+  double focal = 0;
+  for (const Camera& c : cameras) {
+    focal = std::max({focal, c.fx, c.fy});
+    settings.near_plane = c.near_plane;
+  }
+  settings.face = static_cast<int>(std::ceil(2 * focal - 1e-6));
+  const std::vector<Vec3d> viewpoints = navmesh_viewpoints(built.mesh, heights, settings.cell).value();
+  OpenMPBackend backend;
+  const auto start = std::chrono::steady_clock::now();
+  const char* scene = std::getenv("GSNAV_BENCH_SCENE");
+  io::CachedVisibleSets found;
+  if (scene != nullptr) {
+    found = io::cached_visible_sets(backend, scene, cloud, viewpoints, settings, placed).value();
+  } else {
+    found.sets = build_visible_sets(backend, cloud, viewpoints, settings, placed).value();
+    found.built = true;
+  }
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  std::printf(
+      "visible sets: %zu cells of %.2f m from %zu viewpoints, %s in %.1f s, %.2f MB; a cell sees %.1f "
+      "%% of %zu chunks\n",
+      found.sets.cells(), found.sets.cell, viewpoints.size(), found.built ? "found" : "read",
+      took.count(), static_cast<double>(found.sets.bytes()) * 1e-6, 100 * found.sets.mean_share(),
+      found.sets.cloud_chunks);
+  return std::move(found.sets);
+}
+
+}  // namespace gsnav_bench

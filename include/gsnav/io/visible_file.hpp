@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/scene/visible_sets.hpp"
+
+namespace gsnav::io {
+
+/// Writes visible sets of a cloud (build_visible_sets), with the hash of the cloud but for its colours
+/// and a checksum. Errors: those of writing a file. Never throws.
+Status save_visible_sets(const std::filesystem::path& path, const VisibleSets& sets,
+                         const GaussianCloud& cloud);
+
+/// Reads what save_visible_sets wrote for `cloud`. Errors: file_not_found; invalid_argument (of another
+/// cloud, or by another version); invalid_file (not such a file, truncated, too long, a checksum or a
+/// value that cannot be; names it). Allocates no more than the file's size. Never throws.
+Result<VisibleSets> load_visible_sets(const std::filesystem::path& path, const GaussianCloud& cloud);
+
+/// Where the visible sets of a scene lie: beside the asset, under a name with the hash of all that they
+/// are made of. `spec` as of load_scene (of tiles, the first one's place).
+std::filesystem::path visible_sets_path(const std::string& spec, const GaussianCloud& cloud,
+                                        std::span<const Vec3d> viewpoints,
+                                        const VisibleSettings& settings = {},
+                                        const Similarity& world_from_asset = {});
+
+/// Visible sets, and what there is to say of where they came from.
+struct CachedVisibleSets {
+  VisibleSets sets;
+  bool built = false;  ///< now; else read
+  std::string
+      warning;  ///< why a file that is there was not taken, or why none could be written; or empty
+};
+
+/// The visible sets of a scene: read where visible_sets_path() has them, else built and written there. A
+/// file that cannot be taken, and a folder that cannot be written, are warnings. Errors: those of
+/// build_visible_sets.
+template <Backend B>
+Result<CachedVisibleSets> cached_visible_sets(B& backend, const std::string& spec,
+                                              const GaussianCloud& cloud,
+                                              std::span<const Vec3d> viewpoints,
+                                              const VisibleSettings& settings = {},
+                                              const Similarity& world_from_asset = {}) {
+  const std::filesystem::path path =
+      visible_sets_path(spec, cloud, viewpoints, settings, world_from_asset);
+  CachedVisibleSets out;
+  Result<VisibleSets> read = load_visible_sets(path, cloud);
+  if (read) {
+    out.sets = std::move(*read);
+    return out;
+  }
+  if (read.code() != Errc::file_not_found) out.warning = read.message();
+  Result<VisibleSets> made = build_visible_sets(backend, cloud, viewpoints, settings, world_from_asset);
+  if (!made) return made.status();
+  out.sets = std::move(*made);
+  out.built = true;
+  if (Status s = save_visible_sets(path, out.sets, cloud); !s) out.warning = s.message();
+  return out;
+}
+
+}  // namespace gsnav::io

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/io/visible_file.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <string>
+
+#include "file.hpp"
+#include "gsnav/scene/content_hash.hpp"
+
+namespace gsnav::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'V', 'I', 'S'};
+/// Grows with every change of what build_visible_sets makes of a cloud.
+constexpr std::uint32_t kVersion = 1;
+
+/// What stands at the front; keys and bits follow.
+struct Header {
+  char magic[8];
+  std::uint32_t version, size;
+  std::uint64_t built_of[2];  ///< hash of the cloud but for its colours, and of the version
+  double cell, focal, near_plane, near_sigma, min_weight;
+  std::uint64_t viewpoints, cells, chunks;  ///< chunks of the cloud
+  std::uint64_t checksum;                   ///< of the numbers above and of the arrays
+};
+static_assert(sizeof(Header) == 104);
+
+Hasher hash_of(const GaussianCloud& cloud) {
+  Hasher h;
+  h.value(kVersion);
+  hash_shapes(h, cloud);
+  return h;
+}
+
+std::uint64_t checksum(const VisibleSets& v) {
+  Hasher h;
+  for (const double x : {v.cell, v.focal, v.near_plane, v.near_sigma, v.min_weight}) h.value(x);
+  h.value(std::uint64_t{v.viewpoints});
+  h.array(v.keys);
+  h.array(v.bits);
+  return h.low();
+}
+
+Status invalid(const fs::path& path, const std::string& what) {
+  return {Errc::invalid_file, path.string() + ": " + what};
+}
+
+/// What lookups and kernels rely on.
+Status check(const fs::path& path, const VisibleSets& v) {
+  if (!(v.cell > 0 && std::isfinite(v.cell))) return invalid(path, "cell = " + std::to_string(v.cell));
+  if (!(v.focal > 0 && std::isfinite(v.focal)))
+    return invalid(path, "focal = " + std::to_string(v.focal));
+  if (!(v.near_plane > 0 && std::isfinite(v.near_plane))) {
+    return invalid(path, "near_plane = " + std::to_string(v.near_plane));
+  }
+  if (!(v.near_sigma >= 0 && std::isfinite(v.near_sigma))) {
+    return invalid(path, "near_sigma = " + std::to_string(v.near_sigma));
+  }
+  if (!(v.min_weight >= 0 && v.min_weight < 1))
+    return invalid(path, "min_weight = " + std::to_string(v.min_weight));
+  const std::uint32_t beyond = v.cloud_chunks % 32 == 0 ? 0 : ~0u << (v.cloud_chunks % 32);
+  for (std::size_t c = 0; c < v.cells(); ++c) {
+    const auto bad = [&path, c](const char* what) {
+      return invalid(path, "cell " + std::to_string(c) + ": " + what);
+    };
+    if (c > 0 && !(v.keys[c - 1] < v.keys[c])) return bad("its place is not behind the one before");
+    if (v.words() > 0 && (v.seen_from(c)[v.words() - 1] & beyond) != 0)
+      return bad("a chunk that the scene does not have");
+  }
+  return {};
+}
+
+}  // namespace
+
+Status save_visible_sets(const fs::path& path, const VisibleSets& sets, const GaussianCloud& cloud) {
+  return detail::guarded(path.string(), [&]() -> Status {
+    Header header{};
+    std::memcpy(header.magic, kMagic, sizeof kMagic);
+    header.version = kVersion;
+    header.size = sizeof header;
+    const Hasher of = hash_of(cloud);
+    for (std::size_t k = 0; k < 2; ++k) header.built_of[k] = of.state()[k];
+    header.cell = sets.cell;
+    header.focal = sets.focal;
+    header.near_plane = sets.near_plane;
+    header.near_sigma = sets.near_sigma;
+    header.min_weight = sets.min_weight;
+    header.viewpoints = sets.viewpoints;
+    header.cells = sets.cells();
+    header.chunks = sets.cloud_chunks;
+    header.checksum = checksum(sets);
+    return detail::replace_file(path, [&](detail::OutFile& file) {
+      file.write(&header, sizeof header);
+      file.write(sets.keys.data(), sets.keys.size() * sizeof(VisibleSets::Key));
+      file.write(sets.bits.data(), sets.bits.size() * sizeof(std::uint32_t));
+    });
+  });
+}
+
+Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud& cloud) {
+  return detail::guarded(path.string(), [&]() -> Result<VisibleSets> {
+    detail::RandomFile file;
+    if (Status s = file.open(path); !s) return s;
+    Header header{};
+    if (file.size() < sizeof header || !file.read(0, std::as_writable_bytes(std::span(&header, 1)))) {
+      return invalid(path, "shorter than the header of a file of visible sets");
+    }
+    if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.size != sizeof header) {
+      return invalid(path, "not a file of visible sets");
+    }
+    const Hasher of = hash_of(cloud);
+    if (header.version != kVersion || header.built_of[0] != of.state()[0] ||
+        header.built_of[1] != of.state()[1]) {
+      return Status(Errc::invalid_argument,
+                    path.string() + ": was built of another scene, or by another version");
+    }
+    // Nothing is allocated that the file does not have.
+    VisibleSets v;
+    v.cloud_chunks = cloud.view().all_chunks();
+    const std::uint64_t cell_bytes = sizeof(VisibleSets::Key) + v.words() * sizeof(std::uint32_t);
+    const std::uint64_t room = file.size() - sizeof header;
+    if (header.chunks != v.cloud_chunks || room % cell_bytes != 0 || header.cells != room / cell_bytes) {
+      return invalid(path, "has " + std::to_string(file.size()) + " bytes, not those of " +
+                               std::to_string(header.cells) + " cells and " +
+                               std::to_string(header.chunks) + " chunks");
+    }
+    v.cell = header.cell;
+    v.focal = header.focal;
+    v.near_plane = header.near_plane;
+    v.near_sigma = header.near_sigma;
+    v.min_weight = header.min_weight;
+    v.viewpoints = header.viewpoints;
+    v.keys.resize(header.cells);
+    v.bits.resize(header.cells * v.words());
+    std::uint64_t at = sizeof header;
+    bool whole = true;
+    const auto read = [&](auto& array) {
+      const auto bytes = std::as_writable_bytes(std::span(array));
+      whole = whole && (bytes.empty() || file.read(at, bytes));
+      at += bytes.size();
+    };
+    read(v.keys);
+    read(v.bits);
+    if (!whole) return detail::reading_failed(path.string());
+    if (header.checksum != checksum(v)) return invalid(path, "its checksum is another: damaged");
+    if (Status s = check(path, v); !s) return s;
+    return v;
+  });
+}
+
+fs::path visible_sets_path(const std::string& spec, const GaussianCloud& cloud,
+                           std::span<const Vec3d> viewpoints, const VisibleSettings& settings,
+                           const Similarity& world_from_asset) {
+  Hasher h = hash_of(cloud);
+  for (const double x :
+       {settings.cell, settings.margin, settings.min_weight, settings.near_plane, settings.near_sigma}) {
+    h.value(x);
+  }
+  h.value(settings.face);
+  const Quatd& q = world_from_asset.rotation;
+  for (const double x : {q.w, q.x, q.y, q.z, world_from_asset.scale}) h.value(x);
+  for (int k = 0; k < 3; ++k) h.value(world_from_asset.translation[k]);
+  h.value(viewpoints.size());
+  for (const Vec3d& v : viewpoints) {
+    for (int k = 0; k < 3; ++k) h.value(v[k]);
+  }
+  return detail::path_beside(spec) + "." + h.hex().substr(0, 16) + ".vis";
+}
+
+}  // namespace gsnav::io

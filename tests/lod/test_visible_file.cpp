@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// The file beside an asset that keeps what is seen from where.
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/io/visible_file.hpp"
+#include "support/files.hpp"
+#include "two_rooms.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+const GaussianCloud& rooms() {
+  static const GaussianCloud cloud = two_rooms(2, 200);
+  return cloud;
+}
+VisibleSettings coarse() {
+  VisibleSettings s;
+  s.face = 24;
+  s.near_sigma = 1;
+  return s;
+}
+const VisibleSets& sets() {
+  static const VisibleSets made = [] {
+    OpenMPBackend backend(2);
+    return build_visible_sets(backend, rooms(), places_in_rooms(), coarse()).value();
+  }();
+  return made;
+}
+
+}  // namespace
+
+TEST_CASE("visible sets file: what is read is what was written, whatever the colours") {
+  const TempFolder folder("visible_file");
+  REQUIRE(io::save_visible_sets(folder / "a.vis", sets(), rooms()).ok());
+  GaussianCloud other_colors = rooms();
+  other_colors.sh0[5] += 1;
+  for (const GaussianCloud* cloud : {&rooms(), &std::as_const(other_colors)}) {
+    const VisibleSets read = io::load_visible_sets(folder / "a.vis", *cloud).value();
+    CHECK(read.cell == sets().cell);
+    CHECK(read.focal == sets().focal);
+    CHECK(read.near_plane == sets().near_plane);
+    CHECK(read.near_sigma == 1);
+    CHECK(read.min_weight == sets().min_weight);
+    CHECK(read.cloud_chunks == sets().cloud_chunks);
+    CHECK(read.viewpoints == places_in_rooms().size());
+    CHECK(read.keys == sets().keys);
+    CHECK(read.bits == sets().bits);
+  }
+}
+
+TEST_CASE("visible sets file: truncated, damaged, too long, foreign: each is refused and says why") {
+  const TempFolder folder("visible_bad");
+  const auto path = folder / "a.vis";
+  REQUIRE(io::save_visible_sets(path, sets(), rooms()).ok());
+  const std::string good = read_file(path);
+  const auto refused = [&](const std::string& content, Errc code) {
+    write_file(path, content);
+    const auto r = io::load_visible_sets(path, rooms());
+    CHECK(r.code() == code);
+    CHECK(contains(r.message(), "a.vis"));
+  };
+  for (std::size_t n = 0; n < good.size(); n += n < 120 ? 1 : good.size() / 50)
+    refused(good.substr(0, n), Errc::invalid_file);
+  refused(good + "x", Errc::invalid_file);
+  refused(std::string(good.size(), '\0'), Errc::invalid_file);
+  for (std::size_t at = 32; at < good.size(); at += at < 104 ? 1 : good.size() / 60) {
+    std::string bad = good;
+    bad[at] = static_cast<char>(bad[at] ^ 0x10);
+    refused(bad, Errc::invalid_file);
+  }
+  std::string other = good;
+  other[8] = 99;  // version
+  refused(other, Errc::invalid_argument);
+  // Counts whose sum of bytes would be right if it were not for its 64 bits.
+  std::string huge = good;
+  for (std::size_t k = 80; k < 96; ++k) huge[k] = '\xff';
+  refused(huge, Errc::invalid_file);
+  write_file(path, good);
+  CHECK(io::load_visible_sets(path, two_rooms(3, 200)).code() == Errc::invalid_argument);
+  CHECK(io::load_visible_sets(folder / "none.vis", rooms()).code() == Errc::file_not_found);
+}
+
+TEST_CASE("visible sets file: values that cannot be are refused though the checksum is right") {
+  const TempFolder folder("visible_hostile");
+  const auto refused = [&](auto change, const char* what) {
+    VisibleSets bad = sets();
+    change(bad);
+    REQUIRE(io::save_visible_sets(folder / "a.vis", bad, rooms()).ok());
+    const auto r = io::load_visible_sets(folder / "a.vis", rooms());
+    CHECK(r.code() == Errc::invalid_file);
+    CHECK(contains(r.message(), what));
+  };
+  refused([](auto& v) { v.cell = -1; }, "cell");
+  refused([](auto& v) { v.focal = 0; }, "focal");
+  refused([](auto& v) { v.near_plane = 0; }, "near_plane");
+  refused([](auto& v) { v.near_sigma = -1; }, "near_sigma");
+  refused([](auto& v) { v.min_weight = 2; }, "min_weight");
+  refused([](auto& v) { std::swap(v.keys[0], v.keys[1]); }, "cell 1");
+  REQUIRE(sets().cloud_chunks % 32 != 0);
+  refused([](auto& v) { v.bits[2 * v.words() - 1] |= 0x80000000u; }, "cell 1: a chunk");
+}
+
+TEST_CASE("visible sets file: cached beside the asset, by all that they are made of") {
+  const TempFolder folder("visible_cache");
+  OpenMPBackend backend(2);
+  const std::string asset = (folder / "scene.ply").string();
+  const auto eyes = places_in_rooms();
+  const auto path = io::visible_sets_path(asset, rooms(), eyes, coarse());
+  CHECK(path.parent_path() == folder.path());
+  VisibleSettings other = coarse();
+  other.min_weight *= 2;
+  CHECK(path != io::visible_sets_path(asset, rooms(), eyes, other));
+  CHECK(path != io::visible_sets_path(asset, rooms(), std::span(eyes).first(9), coarse()));
+  CHECK(path != io::visible_sets_path(asset, rooms(), eyes, coarse(), {{}, {1, 0, 0}, 1}));
+  CHECK(path != io::visible_sets_path(asset, two_rooms(3, 200), eyes, coarse()));
+  CHECK(io::cached_visible_sets(backend, asset, rooms(), eyes, coarse()).value().built);
+  CHECK(std::filesystem::exists(path));
+  CHECK_FALSE(io::cached_visible_sets(backend, asset, rooms(), eyes, coarse()).value().built);
+  write_file(path, read_file(path).substr(0, 500));
+  const auto repaired = io::cached_visible_sets(backend, asset, rooms(), eyes, coarse()).value();
+  CHECK(repaired.built);
+  CHECK(contains(repaired.warning, "bytes"));
+  CHECK_FALSE(io::cached_visible_sets(backend, asset, rooms(), eyes, coarse()).value().built);
+}

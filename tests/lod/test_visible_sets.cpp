@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is seen from where: weights, cells, cuts.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/scene/lod_build.hpp"
+#include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/visible_sets.hpp"
+#include "level_support.hpp"
+#include "lod_support.hpp"
+#include "support/files.hpp"
+#include "two_rooms.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+VisibleSettings coarse() {
+  VisibleSettings s;
+  s.face = 48;
+  return s;
+}
+
+const GaussianCloud& rooms() {
+  static const GaussianCloud cloud = two_rooms(1);
+  return cloud;
+}
+
+const VisibleSets& rooms_sets() {
+  static const VisibleSets sets = [] {
+    OpenMPBackend backend(2);
+    return build_visible_sets(backend, rooms(), places_in_rooms(), coarse()).value();
+  }();
+  return sets;
+}
+
+/// A camera at a random place where viewpoints are, looking anywhere near the horizon.
+Camera random_camera(Rng& rng) {
+  const double left = rng.uniform(0, 1) < 0.5 ? -3.2 : 0.2;
+  const double x = left + rng.uniform(0.5, 2.5), z = rng.uniform(-1, 1);
+  const Vec3d eye{x, 1.3, z};
+  const double yaw = rng.uniform(0, 6.3);
+  return Camera::look_at(eye, eye + Vec3d{std::cos(yaw), rng.uniform(-0.4, 0.4), std::sin(yaw)},
+                         {0, 1, 0}, 48, 48, 90);
+}
+
+GaussianSet seen_set(const GaussianCloud& cloud, const VisibleSets& sets, std::size_t cell) {
+  GaussianSet s = cloud.set();
+  s.gaussians.seen_chunks = sets.seen_from(cell);
+  return s;
+}
+
+double psnr(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    sum += std::pow(static_cast<double>(a[i]) - static_cast<double>(b[i]), 2);
+  return sum == 0 ? 200.0 : -10 * std::log10(sum / static_cast<double>(a.size()));
+}
+
+}  // namespace
+
+TEST_CASE(
+    "chunk weights: of one Gaussian a chunk, what an image of it alone in white shows, in double") {
+  GaussianCloud cloud = small_wall(3, 1500, 0);
+  // One of each chunk stays.
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (i % kProjectChunk == 17) {
+      kept.push_back(i);
+      for (auto& s : cloud.scales) s[i] = 0.4f;
+      cloud.opacities[i] = 0.6f;
+    } else {
+      cloud.opacities[i] = 0;
+    }
+  }
+  bound_chunks(cloud);
+  const Camera camera = Camera::look_at({0.3, -0.2, 0}, {0, 0, 4}, {0, -1, 0}, 50, 40, 80);
+  OpenMPBackend backend(2);
+  ChunkWeightsWorkspace<OpenMPBackend> workspace(backend);
+  std::vector<float> most(cloud.chunk_bounds.size());
+  REQUIRE(add_chunk_weights(backend, workspace, cloud.set(), camera, most).ok());
+
+  SerialBackend serial;
+  RenderConfig config;
+  config.outputs = kRgb;
+  Renderer<double, SerialBackend> renderer(serial, config);
+  REQUIRE(kept.size() == most.size());
+  int seen = 0;
+  for (std::size_t c = 0; c < kept.size(); ++c) {
+    GaussianCloud white = cloud;
+    std::fill(white.sh0.begin(), white.sh0.end(), -0.5f / 0.28209479177387814f);  // black
+    for (std::size_t k = 0; k < 3; ++k) white.sh0[3 * kept[c] + k] = 0.5f / 0.28209479177387814f;
+    const auto image = renderer.render(white.set(), camera).value().rgb;
+    const double expected = *std::max_element(image.begin(), image.end());
+    CHECK(static_cast<double>(most[c]) == doctest::Approx(expected).epsilon(2e-4));
+    seen += expected > 0.01 ? 1 : 0;
+  }
+  CHECK(seen >= 4);
+  // Raised, not set.
+  std::vector<float> above(most.size(), 2.0f);
+  REQUIRE(add_chunk_weights(backend, workspace, cloud.set(), camera, above).ok());
+  CHECK(above == std::vector<float>(most.size(), 2.0f));
+  CHECK(add_chunk_weights(backend, workspace, cloud.set(), camera, std::span(above).first(1)).code() ==
+        Errc::invalid_argument);
+}
+
+TEST_CASE("visible sets: what is behind a wall is left out, and no image shows it") {
+  const VisibleSets& sets = rooms_sets();
+  OpenMPBackend backend(2);
+  RenderConfig config;
+  config.outputs = kRgb;
+  config.profile = Profile::fast;
+  Renderer<float, OpenMPBackend> renderer(backend, config);
+  Rng rng(5);
+  int known = 0, hidden = 0;
+  for (int i = 0; i < 40; ++i) {
+    const Camera camera = random_camera(rng);
+    const auto cell = sets.cell_of(camera);
+    if (!cell) continue;
+    ++known;
+    // Chunks of the other room alone are not seen.
+    const double side = camera.position().x < 0 ? -1 : 1;
+    for (std::size_t c = 0; c < sets.cloud_chunks; ++c) {
+      const ChunkBounds& b = rooms().chunk_bounds[c];
+      if (std::max(side * b.low.x, side * b.high.x) > -0.3) continue;
+      ++hidden;
+      CHECK_FALSE((sets.seen_from(*cell)[c / 32] >> (c % 32) & 1) != 0);
+    }
+    const auto whole = renderer.render(rooms().set(), camera).value().rgb;
+    const auto part = renderer.render(seen_set(rooms(), sets, *cell), camera).value().rgb;
+    CHECK(psnr(whole, part) > 60);
+  }
+  CHECK(known > 25);
+  CHECK(hidden > 5 * known);
+}
+
+TEST_CASE("visible sets: the same bits for any number of threads") {
+  SerialBackend one;
+  const VisibleSets again = build_visible_sets(one, rooms(), places_in_rooms(), coarse()).value();
+  CHECK(again.keys == rooms_sets().keys);
+  CHECK(again.bits == rooms_sets().bits);
+}
+
+TEST_CASE("visible sets: of a placed cloud in its own frame") {
+  const Similarity placed{axis_angle(Vec3d{1, 0, 0}, 0.7), {4, -2, 9}, 2.0};
+  std::vector<Vec3d> viewpoints;
+  for (const Vec3d& v : places_in_rooms()) viewpoints.push_back(placed * v);
+  VisibleSettings settings = coarse();
+  settings.cell *= 2;
+  settings.margin *= 2;
+  settings.near_plane *= 2;
+  OpenMPBackend backend(2);
+  const VisibleSets sets = build_visible_sets(backend, rooms(), viewpoints, settings, placed).value();
+  CHECK(sets.cell == doctest::Approx(0.5));
+  CHECK(sets.cells() >= rooms_sets().cells() - 4);
+  Camera camera = Camera::look_at(viewpoints[7], viewpoints[8], {0, 1, 0}, 48, 48, 90);
+  camera.near_plane = 0.4;
+  const auto cell = sets.cell_of(camera, placed);
+  REQUIRE(cell);
+  RenderConfig config;
+  config.outputs = kRgb;
+  Renderer<float, OpenMPBackend> renderer(backend, config);
+  GaussianSet part = rooms().set(placed);
+  part.gaussians.seen_chunks = sets.seen_from(*cell);
+  CHECK(psnr(renderer.render(rooms().set(placed), camera).value().rgb,
+             renderer.render(part, camera).value().rgb) > 60);
+}
+
+TEST_CASE("visible sets: nothing is known elsewhere, nor of cameras that see more") {
+  const VisibleSets& sets = rooms_sets();
+  const Vec3d eye = places_in_rooms()[10];
+  Camera camera = Camera::look_at(eye, eye + Vec3d{1, 0, 0}, {0, 1, 0}, 48, 48, 90);
+  REQUIRE(sets.cell_of(camera));
+  Camera other = camera;
+  other.fx *= 1.01;
+  CHECK_FALSE(sets.cell_of(other));
+  other = camera;
+  other.near_plane = 0.21;
+  CHECK_FALSE(sets.cell_of(other));
+  other.near_plane = 0.1;
+  CHECK(sets.cell_of(other));
+  other = camera;
+  other.near_sigma = 1;
+  CHECK_FALSE(sets.cell_of(other));
+  for (const Vec3d& far : {Vec3d{0, 1.3, 0}, Vec3d{-2, 9, 0}, Vec3d{1e300, 0, 0}}) {
+    other = Camera::look_at(far, far + Vec3d{1, 0, 0}, {0, 1, 0}, 48, 48, 90);
+    CHECK_FALSE(sets.cell_of(other));
+  }
+}
+
+TEST_CASE("visible sets: what cannot be is refused by name") {
+  SerialBackend backend;
+  const std::vector<Vec3d> eyes{{1, 1, 0}};
+  const auto refused = [&](auto change, const char* name) {
+    VisibleSettings s = coarse();
+    change(s);
+    const auto r = build_visible_sets(backend, rooms(), eyes, s);
+    CHECK(r.code() == Errc::invalid_argument);
+    CHECK(contains(r.message(), name));
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refused([](auto& s) { s.cell = 0; }, "cell");
+  refused([nan](auto& s) { s.margin = nan; }, "margin");
+  refused([](auto& s) { s.min_weight = 1; }, "min_weight");
+  refused([](auto& s) { s.face = 8; }, "face");
+  refused([](auto& s) { s.near_plane = 0; }, "near_plane");
+  refused([](auto& s) { s.near_sigma = -1; }, "near_sigma");
+  CHECK(contains(build_visible_sets(backend, rooms(), {}, coarse()).message(), "no viewpoint"));
+  const std::vector<Vec3d> bad{{1, 1, 0}, {nan, 0, 0}};
+  CHECK(contains(build_visible_sets(backend, rooms(), bad, coarse()).message(), "viewpoint 1"));
+  GaussianCloud unsorted = rooms();
+  unsorted.chunk_bounds.clear();
+  CHECK(contains(build_visible_sets(backend, unsorted, eyes, coarse()).message(), "sort_spatially"));
+}
+
+TEST_CASE("a cut of what is seen: every chunk that is seen once, nothing that shows none of them") {
+  SerialBackend backend;
+  const GaussianCloud& cloud = rooms();
+  bool shipped = false;
+  SUBCASE("built") {}
+  SUBCASE("shipped by a set") { shipped = true; }
+  const LeveledCloud levels =
+      shipped ? join_levels(backend, shipped_levels(cloud, 2), 16).value() : LeveledCloud{};
+  const GaussianCloud& shown = shipped ? levels.cloud : cloud;
+  const LodTree tree = shipped ? levels.tree : build_lod(backend, cloud).value();
+  Rng rng(8);
+  for (int i = 0; i < 20; ++i) {
+    const Camera camera = random_camera(rng);
+    std::vector<std::uint32_t> bits((shown.view().all_chunks() + 31) / 32), list;
+    const double share = i % 2 == 0 ? 0.3 : 0.02;
+    for (std::uint32_t c = 0; c < shown.view().all_chunks(); ++c) {
+      if (rng.uniform(0, 1) >= share) continue;
+      list.push_back(c);
+      bits[c / 32] |= 1u << (c % 32);
+    }
+    const View<const std::uint32_t> seen{bits.data(), bits.size()};
+    LodChoice choice;
+    choice.pixels = 8;
+    choice.grain = 1e9;
+    choice.hysteresis = 0;
+    LodCut all(tree, shown), some(tree, shown);
+    all.select(camera, choice);
+    some.select(camera, choice, {}, seen);
+    // What is drawn is of the whole cut, and of it all that shows something seen: leaves are known by
+    // their number.
+    for (const std::uint32_t c : some.leaf_chunks()) {
+      CHECK(std::binary_search(all.leaf_chunks().begin(), all.leaf_chunks().end(), c));
+      if (!shipped) CHECK(std::binary_search(list.begin(), list.end(), c));
+    }
+    for (const std::uint32_t c : all.leaf_chunks()) {
+      if (!std::binary_search(list.begin(), list.end(), c)) continue;
+      CHECK(std::binary_search(some.leaf_chunks().begin(), some.leaf_chunks().end(), c));
+    }
+    for (const std::uint32_t m : some.merged_chunks()) {
+      CHECK(std::find(all.merged_chunks().begin(), all.merged_chunks().end(), m) !=
+            all.merged_chunks().end());
+    }
+    CHECK(some.stats().shown <= all.stats().shown);
+    std::fill(bits.begin(), bits.end(), 0u);
+    CHECK(some.select(camera, choice, {}, seen).empty());
+  }
+}
