@@ -28,18 +28,31 @@ void register_frame_kernels();    // projection, SH, keys, sort, bin, blend
 void register_body_kernels();     // skinning, polar rotation, forward kinematics
 void register_capsule_kernels();  // distance, time of impact
 
+/// Its time is what the body says (SetIterationTime), or else that of a clock.
+enum class TimedBy { clock, body };
+
+template <class S, class Backend, class Body, class... Args>
+void add_timed_row(TimedBy timed_by, const std::string& kernel, const std::string& variant,
+                   const std::string& scalar, const char* backend_name, const Body& body,
+                   Args... backend_args) {
+  const std::string name =
+      kernel + "<" + scalar + ", " + backend_name + ">" + (variant.empty() ? "" : "/" + variant);
+  auto* const row = benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
+    Backend backend(backend_args...);
+    body.template operator()<S>(state, backend);
+  });
+  row->Unit(benchmark::kMicrosecond);
+  if (timed_by == TimedBy::body) {
+    row->UseManualTime();
+  } else {
+    row->UseRealTime();
+  }
+}
 template <class S, class Backend, class Body, class... Args>
 void add_row(const std::string& kernel, const std::string& variant, const std::string& scalar,
              const char* backend_name, const Body& body, Args... backend_args) {
-  const std::string name =
-      kernel + "<" + scalar + ", " + backend_name + ">" + (variant.empty() ? "" : "/" + variant);
-  benchmark::RegisterBenchmark(name.c_str(),
-                               [=](benchmark::State& state) {
-                                 Backend backend(backend_args...);
-                                 body.template operator()<S>(state, backend);
-                               })
-      ->Unit(benchmark::kMicrosecond)
-      ->UseRealTime();
+  add_timed_row<S, Backend>(TimedBy::clock, kernel, variant, scalar, backend_name, body,
+                            backend_args...);
 }
 
 /// The openmp backend on one thread and on two. `scalar` is what stands in the name.
@@ -56,11 +69,12 @@ void add_openmp_rows(const std::string& kernel, const std::string& variant, cons
 /// The GPU, where the build has the backend and the machine the device. Only for bodies whose work
 /// gsnav::cuda has compiled: a functor of this program's own needs nvcc.
 template <class Body>
-void add_cuda_row([[maybe_unused]] const std::string& kernel, [[maybe_unused]] const std::string& variant,
-                  [[maybe_unused]] const Body& body) {
+void add_cuda_row([[maybe_unused]] const std::string& kernel,
+                  [[maybe_unused]] const std::string& variant, [[maybe_unused]] const Body& body,
+                  [[maybe_unused]] TimedBy timed_by = TimedBy::clock) {
 #if defined(GSNAV_HAS_CUDA)
   if (gsnav::CudaBackend::device_count() > 0) {
-    add_row<float, gsnav::CudaBackend>(kernel, variant, "float", "CudaBackend", body);
+    add_timed_row<float, gsnav::CudaBackend>(timed_by, kernel, variant, "float", "CudaBackend", body);
   }
 #endif
 }
@@ -76,7 +90,8 @@ void add_cpu_rows(const std::string& kernel, const std::string& variant, const B
 
 /// Items (and bytes, where the kernel is bound by them) of all iterations.
 inline void count(benchmark::State& state, std::size_t items, std::size_t bytes_per_item = 0) {
-  const std::int64_t total = static_cast<std::int64_t>(state.iterations()) * static_cast<std::int64_t>(items);
+  const std::int64_t total =
+      static_cast<std::int64_t>(state.iterations()) * static_cast<std::int64_t>(items);
   state.SetItemsProcessed(total);
   if (bytes_per_item > 0) state.SetBytesProcessed(total * static_cast<std::int64_t>(bytes_per_item));
 }

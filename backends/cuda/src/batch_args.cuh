@@ -23,15 +23,27 @@ struct BatchInstance {
   std::uint32_t camera;
 };
 
-/// A set of the call: its units of culling are first_unit + word * chunks + chunk, a word 32 instances.
+inline constexpr std::uint32_t kPartsPerChunk = kProjectChunk / kChunkPart;
+/// Of a set with so few instances a warp tests parts at once, a lane a part and an instance.
+inline constexpr std::uint32_t kFewInstances = 32 / kPartsPerChunk;
+
+/// A set of the call. Of few instances a unit of culling has as many chunks as a warp has room for, seen by all of
+/// them; of more it is one chunk, seen by 32: first_unit + word * chunks + chunk.
 struct BatchSet {
   std::uint64_t first_unit;
   std::uint32_t first_instance, instances, chunks;
+  __host__ __device__ bool has_few() const { return instances <= kFewInstances; }
+  __host__ __device__ std::uint32_t words() const { return (instances + 31) / 32; }
+  /// Of a unit.
+  __host__ __device__ std::uint32_t unit_chunks() const { return has_few() ? kFewInstances / instances : 1; }
+  __host__ __device__ std::uint64_t units() const {
+    return std::uint64_t{words()} * ((chunks + unit_chunks() - 1) / unit_chunks());
+  }
 };
 
-/// A chunk and those of 32 instances that may see it.
+/// kChunkPart rows, from part * kChunkPart on, and those of 32 instances that may see any of them.
 struct BatchItem {
-  std::uint32_t first_instance, chunk, mask;
+  std::uint32_t first_instance, part, mask;
 };
 
 /// A survivor as blending reads it.

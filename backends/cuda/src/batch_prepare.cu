@@ -199,13 +199,14 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
     BatchSet& u = units[s];
     u = {args.units, set_begins[s], set_begins[s + 1] - set_begins[s],
          static_cast<std::uint32_t>(sets[s].gaussians.chunk_count())};
-    const std::uint64_t items_of_set = std::uint64_t{(u.instances + 31) / 32} * u.chunks;
-    item_capacity += items_of_set;
-    args.units += u.instances == 1 ? (u.chunks + 31) / 32 : items_of_set;
+    if (u.instances == 0) continue;
+    item_capacity += std::uint64_t{u.words()} * u.chunks * cuda::kPartsPerChunk;
+    args.units += u.units();
   }
-  if (item_capacity > std::numeric_limits<std::uint32_t>::max() / 8) {
+  // A warp of projection has half of an item.
+  if (item_capacity > std::numeric_limits<std::uint32_t>::max() / 2) {
     return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(item_capacity) +
-                                   " chunks times words of cameras in one batch: draw fewer cameras a call"};
+                                   " parts of chunks times words of cameras in one batch: draw fewer cameras a call"};
   }
 
   args.sets = device(static_cast<BatchSet*>(nullptr), at_sets);

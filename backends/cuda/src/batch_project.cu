@@ -12,10 +12,56 @@ namespace {
 
 constexpr unsigned kThreads = 256, kWarps = kThreads / 32;
 constexpr unsigned kProjectWarps = 4, kProjectBlocks = 6;  ///< of a block; of a multiprocessor
-constexpr unsigned kWarpsPerChunk = kProjectChunk / 32;
+constexpr unsigned kWarpsPerPart = kChunkPart / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
-/// A warp a unit: the lanes are instances, or chunks of the only one.
+/// Whether part `part` of the chunk may have visible Gaussians: by bounds of its own, or by the chunk's.
+__device__ bool part_is_candidate(const ProjectArgs<float>& args, std::size_t chunk, unsigned part) {
+  const GaussianView& gs = args.gaussians;
+  const std::size_t at = chunk * kPartsPerChunk + part;
+  if (at * kChunkPart >= gs.size) return false;
+  if (gs.chunk_bounds.empty()) return true;
+  return may_be_visible(args.camera64,
+                        gs.part_bounds.empty() ? gs.chunk_bounds[chunk] : gs.part_bounds[at]);
+}
+
+/// Parts, a bit each, of a chunk that the lane's instance may see (`seen`): all of them, or where the
+/// chunk is at the edge of its view those that the lanes find together, four for each such instance.
+__device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t chunk, bool seen) {
+  const unsigned lane = threadIdx.x % 32;
+  const GaussianView& gs = instances[0].args.gaussians;
+  const std::size_t rows = gs.size - chunk * kProjectChunk;
+  const unsigned all =
+      (1u << (rows < kProjectChunk ? (rows + kChunkPart - 1) / kChunkPart : kPartsPerChunk)) - 1;
+  unsigned parts = seen ? all : 0;
+  unsigned edges =
+      __ballot_sync(kAll, seen && !gs.part_bounds.empty() &&
+                              !lies_in_view(instances[lane].args.camera64, gs.chunk_bounds[chunk]));
+  while (edges != 0) {
+    unsigned mine = edges, rest = edges;
+    for (unsigned k = 0; k < kFewInstances; ++k) {
+      if (k < lane / kPartsPerChunk) mine &= mine - 1;
+      rest &= rest - 1;
+    }
+    const bool in_view =
+        mine != 0 && part_is_candidate(instances[__ffs(static_cast<int>(mine)) - 1].args, chunk,
+                                       lane % kPartsPerChunk);
+    const unsigned votes = __ballot_sync(kAll, in_view);
+    if (((edges & ~rest) >> lane & 1u) != 0) {
+      const int turn = __popc(edges & ((1u << lane) - 1));
+      parts = votes >> (turn * static_cast<int>(kPartsPerChunk)) & ((1u << kPartsPerChunk) - 1);
+    }
+    edges = rest;
+  }
+  return parts;
+}
+
+/// Chunk c of those that are drawn: the same for all instances of a set.
+__device__ std::uint32_t chunk_of(const BatchInstance& instance, std::uint32_t c) {
+  return static_cast<std::uint32_t>(instance.args.gaussians.chunk_id(c));
+}
+
+/// A warp a unit: the lanes are instances, or where these are few parts and instances.
 __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
   const unsigned lane = threadIdx.x % 32;
   const std::uint64_t stride = std::uint64_t{gridDim.x} * kWarps;
@@ -31,31 +77,38 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
     }
     const BatchSet set = a.sets[low];
     const std::uint32_t at = static_cast<std::uint32_t>(unit - set.first_unit);
-    if (set.instances == 1) {
-      const ProjectArgs<float>& args = a.instances[set.first_instance].args;
-      const std::uint32_t chunk = 32 * at + lane;
-      const bool seen = chunk < set.chunks && chunk_is_candidate(args, chunk);
-      const unsigned votes = __ballot_sync(kAll, seen);
-      std::uint32_t first = 0;
-      if (lane == 0 && votes != 0)
-        first = atomicAdd(&a.counters->items, static_cast<std::uint32_t>(__popc(votes)));
-      first = __shfl_sync(kAll, first, 0);
-      if (seen) {
-        const std::size_t drawn = args.gaussians.chunk_id(chunk);
-        a.items[first + static_cast<std::uint32_t>(__popc(votes & ((1u << lane) - 1)))] = {
-            set.first_instance, static_cast<std::uint32_t>(drawn), 1u};
+    const BatchInstance* instances = a.instances + set.first_instance;
+    std::uint32_t first = set.first_instance, chunk, part, mask;  // the lane's item, if mask is not 0
+    if (set.has_few()) {
+      const std::uint32_t slot = lane % kFewInstances, index = slot % set.instances;
+      part = lane / kFewInstances;
+      chunk = at * set.unit_chunks() + slot / set.instances;
+      const bool exists = slot / set.instances < set.unit_chunks() && chunk < set.chunks;
+      if (exists) chunk = chunk_of(instances[0], chunk);
+      const unsigned votes =
+          __ballot_sync(kAll, exists && part_is_candidate(instances[index].args, chunk, part));
+      mask = index == 0 && exists ? votes >> lane & ((1u << set.instances) - 1) : 0;
+    } else {
+      const std::uint32_t word = at / set.chunks, index = 32 * word + lane;
+      first += 32 * word;
+      instances += 32 * word;
+      const bool seen =
+          index < set.instances && chunk_is_candidate(instances[lane].args, at % set.chunks);
+      chunk = chunk_of(instances[0], at % set.chunks);
+      const unsigned parts = parts_in_view(instances, chunk, seen);
+      part = lane;
+      mask = 0;
+      for (unsigned p = 0; p < kPartsPerChunk; ++p) {
+        const unsigned votes = __ballot_sync(kAll, (parts >> p & 1u) != 0);
+        if (lane == p) mask = votes;
       }
-      continue;
     }
-    const std::uint32_t word = at / set.chunks, chunk = at % set.chunks;
-    const std::uint32_t first = set.first_instance + 32 * word, index = 32 * word + lane;
-    const bool seen = index < set.instances && chunk_is_candidate(a.instances[first + lane].args, chunk);
-    const unsigned mask = __ballot_sync(kAll, seen);
-    if (lane == 0 && mask != 0) {
-      // Instances of a set draw the same chunks.
-      const std::size_t drawn = a.instances[set.first_instance].args.gaussians.chunk_id(chunk);
-      a.items[atomicAdd(&a.counters->items, 1u)] = {first, static_cast<std::uint32_t>(drawn), mask};
-    }
+    const unsigned items = __ballot_sync(kAll, mask != 0);
+    if (items == 0) continue;
+    std::uint32_t place = 0;
+    if (lane == 0) place = atomicAdd(&a.counters->items, static_cast<std::uint32_t>(__popc(items)));
+    place = __shfl_sync(kAll, place, 0) + static_cast<std::uint32_t>(__popc(items & ((1u << lane) - 1)));
+    if (mask != 0) a.items[place] = {first, chunk * kPartsPerChunk + part, mask};
   }
 }
 
@@ -214,30 +267,30 @@ __device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::
   return gaussian_color<float>(v, degree, lane, delta);
 }
 
-/// A warp an eighth of an item: Gaussians are read once and projected for each camera of the mask.
+/// A warp half of an item: Gaussians are read once and projected for each camera of the mask.
 /// `Plain`: records of neither depth nor perspective are asked for.
 template <bool Plain>
 __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_kernel(const BatchArgs a) {
   __shared__ WarpRows shared[kProjectWarps];
   const unsigned lane = threadIdx.x % 32;
   WarpRows& rows = shared[threadIdx.x / 32];
-  const std::uint32_t parts = a.counters->items * kWarpsPerChunk;
+  const std::uint32_t halves = a.counters->items * kWarpsPerPart;
   WarpSlab slots(&a.counters->slots, a.slab), several(&a.counters->several, a.slab);
-  const auto item_of = [&](std::uint32_t part) {
-    return part < parts ? a.items[part / kWarpsPerChunk] : BatchItem{};
+  const auto item_of = [&](std::uint32_t half) {
+    return half < halves ? a.items[half / kWarpsPerPart] : BatchItem{};
   };
-  std::uint32_t part = blockIdx.x * kProjectWarps + threadIdx.x / 32;
-  BatchItem next = item_of(part);
-  for (; part < parts; part += gridDim.x * kProjectWarps) {
+  std::uint32_t half = blockIdx.x * kProjectWarps + threadIdx.x / 32;
+  BatchItem next = item_of(half);
+  for (; half < halves; half += gridDim.x * kProjectWarps) {
     const BatchItem item = next;
-    next = item_of(part + gridDim.x * kProjectWarps);
+    next = item_of(half + gridDim.x * kProjectWarps);
     const GaussianView& gs = a.instances[item.first_instance].args.gaussians;
-    const std::size_t row = item.chunk * kProjectChunk + part % kWarpsPerChunk * 32 + lane;
+    const std::size_t row = item.part * kChunkPart + half % kWarpsPerPart * 32 + lane;
     const bool exists = row < gs.size;
     const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
     // Instances of a set are drawn to one degree.
     const int degree =
-        gs.degree_of(item.chunk * kProjectChunk, a.instances[item.first_instance].args.sh_degree);
+        gs.degree_of(item.part * kChunkPart, a.instances[item.first_instance].args.sh_degree);
     bool has_sh = !a.instances[item.first_instance].args.color || degree == 0 || row - lane >= gs.size;
     const LaneRow read = read_row(gs, row);
     __syncwarp();  // all lanes are done with the rows before

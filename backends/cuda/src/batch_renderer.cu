@@ -208,6 +208,7 @@ Status CudaBatchRenderer::finish() {
     fit(s.pair_capacity, n.pairs);
     fit(s.triangle_capacity, of_meshes.most);
     s.stats.tile_intersections = n.pairs;
+    s.stats.parts_read = n.items;
     s.stats.meshes = {flight.mesh_triangles, of_meshes.not_finite, of_meshes.drawn, 0};
     if (fits) {
       ++s.finished;

@@ -1,84 +1,235 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <type_traits>
 #include <vector>
 
 #include "gsnav/backends/cuda.hpp"
 
-// Skinning of many avatars by one launch.
+// Skinning of many avatars by one launch, or two where some have four influences and some eight.
 
 namespace gsnav {
 
 namespace {
 
-constexpr unsigned kThreads = 256, kRowsPerBlock = 4 * kThreads;
+constexpr unsigned kThreads = 256;
+template <int K>
+constexpr unsigned kBlocks = K == kInfluences4 ? 4 : 3;  ///< of a multiprocessor: what registers allow
 constexpr std::size_t kMaxShared = 48 * 1024;
+constexpr unsigned kMostCopies = 8;
+constexpr std::uint32_t kFewJobs = 20;  ///< whose arrays go with the launch
 static_assert(sizeof(Affine3<float>) == 3 * sizeof(float4));
 
-/// An avatar and the first of its blocks.
+/// An avatar, and the first of the pieces of kThreads Gaussians that it is cut into.
 struct SkinJob {
-  SkinningArgs<float> args;
-  std::uint32_t first_block;
+  const float* means[3];
+  const float* quats[4];
+  const std::uint16_t* joint_indices;
+  const std::uint16_t* weights;
+  const Affine3<float>* joints;
+  float* means_out[3];
+  float* quats_out[4];
+  float* rotations_out[4];  ///< null: not asked for
+  std::uint32_t size, first_piece, joint_count;
+  bool aligned;  ///< indices and weights of a Gaussian, so that one load has them
+
+  __host__ __device__ bool writes_rotations() const { return rotations_out[0] != nullptr; }
 };
 
-/// A block kRowsPerBlock Gaussians of one avatar, with its joints in shared memory where they fit.
-__global__ void __launch_bounds__(kThreads) skin_kernel(const SkinJob* jobs, std::uint32_t count, std::size_t room) {
-  extern __shared__ __align__(16) unsigned char memory[];
-  std::uint32_t low = 0, high = count;
+/// By value to the kernel.
+struct SkinLaunch {
+  const SkinJob* table;  ///< null: `few` has them
+  std::uint32_t count, pieces;
+  unsigned copies;  ///< of each joint in shared memory
+  SkinJob few[kFewJobs];
+};
+static_assert(sizeof(SkinLaunch) <= 4096 - 64);
+
+/// K numbers from `from`, by one load where it is aligned.
+template <int K>
+__device__ void read_numbers(std::uint16_t (&to)[K], const std::uint16_t* from, bool aligned) {
+  if (!aligned) {
+    for (int k = 0; k < K; ++k) to[k] = from[k];
+    return;
+  }
+  using Words = std::conditional_t<K == 4, uint2, uint4>;
+  const Words w = *reinterpret_cast<const Words*>(from);
+  const auto split = [&to](int at, unsigned two) {
+    to[at] = static_cast<std::uint16_t>(two);
+    to[at + 1] = static_cast<std::uint16_t>(two >> 16);
+  };
+  split(0, w.x);
+  split(2, w.y);
+  if constexpr (K == 8) {
+    split(4, w.z);
+    split(6, w.w);
+  }
+}
+
+template <int K>
+__device__ SkinRow<K> read_row(const SkinJob& job, std::uint32_t i) {
+  SkinRow<K> row;
+  read_numbers(row.joints, job.joint_indices + std::size_t{K} * i, job.aligned);
+  read_numbers(row.parts, job.weights + std::size_t{K} * i, job.aligned);
+  row.mean = {job.means[0][i], job.means[1][i], job.means[2][i]};
+  row.quat = {job.quats[0][i], job.quats[1][i], job.quats[2][i], job.quats[3][i]};
+  return row;
+}
+
+/// jobs[index], looked up again: twenty addresses would take forty registers if they were kept.
+__device__ inline const SkinJob& afresh(const SkinJob* jobs, std::uint32_t index) {
+  asm volatile("" : "+r"(index));
+  return jobs[index];
+}
+
+/// Gaussians [begin, end) of jobs[index].
+template <int K, class JointAt>
+__device__ void skin_rows(const SkinJob* jobs, std::uint32_t index, std::uint32_t begin,
+                          std::uint32_t end, const JointAt& joint_at) {
+  for (std::uint32_t i = begin + threadIdx.x; i < end; i += kThreads) {
+    const SkinJob& job = afresh(jobs, index);
+    const Skinned<float> s = skin_row<float>(read_row<K>(job, i), joint_at, job.writes_rotations());
+    store_skinned(afresh(jobs, index), i, s);
+  }
+}
+
+/// A block an even share of all pieces, whose avatars' joints it keeps in shared memory where they fit.
+/// `Few`: the jobs came with the launch.
+template <int K, bool Few>
+__global__ void __launch_bounds__(kThreads, kBlocks<K>)
+    skin_kernel(const __grid_constant__ SkinLaunch launch) {
+  extern __shared__ float4 memory[];
+  __shared__ SkinJob kept;  // of a table's
+  const SkinJob* const jobs = Few ? launch.few : launch.table;
+  const auto share = [&](unsigned block) {
+    return static_cast<std::uint32_t>(std::uint64_t{launch.pieces} * block / gridDim.x);
+  };
+  std::uint32_t piece = share(blockIdx.x), low = 0, high = launch.count;
+  const std::uint32_t end = share(blockIdx.x + 1);
   while (high - low > 1) {
     const std::uint32_t mid = (low + high) / 2;
-    if (jobs[mid].first_block <= blockIdx.x) {
+    if (jobs[mid].first_piece <= piece) {
       low = mid;
     } else {
       high = mid;
     }
   }
-  const SkinningArgs<float> args = jobs[low].args;
-  const std::size_t begin = std::size_t{blockIdx.x - jobs[low].first_block} * kRowsPerBlock + threadIdx.x;
-  const std::size_t end = begin + kRowsPerBlock < args.size() ? begin + kRowsPerBlock : args.size();
-  const auto rows = [&](const auto& joint_at) {
-    if (args.influences == kInfluences8) {
-      for (std::size_t i = begin; i < end; i += kThreads) skin_row<kInfluences8>(args, i, joint_at);
-    } else {
-      for (std::size_t i = begin; i < end; i += kThreads) skin_row<kInfluences4>(args, i, joint_at);
+  for (; piece < end; ++low) {
+    const SkinJob& job = jobs[low];
+    const std::uint32_t after = low + 1 < launch.count ? jobs[low + 1].first_piece : launch.pieces;
+    const std::uint32_t last = min(after, end);
+    const std::uint32_t first_row = (piece - job.first_piece) * kThreads;
+    const std::uint32_t end_row = min((last - job.first_piece) * kThreads, job.size);
+    piece = last;
+    const unsigned copies = launch.copies;
+    const bool fits = job.joint_count * sizeof(Affine3<float>) <= kMaxShared / copies;
+    __syncthreads();  // all are done with the avatar before
+    if (!Few && threadIdx.x == 0) kept = job;
+    if (fits) {
+      constexpr unsigned kWords = sizeof(Affine3<float>) / sizeof(float);
+      auto* const words = reinterpret_cast<float*>(memory);
+      const auto* const from = reinterpret_cast<const float*>(job.joints);
+      for (unsigned i = threadIdx.x; i < kWords * job.joint_count; i += kThreads) {
+        const float word = from[i];
+        float* const to = words + i / kWords * kWords * copies + i % kWords;
+        for (unsigned c = 0; c < copies; ++c) to[c * kWords] = word;
+      }
     }
-  };
-  const std::size_t bytes = args.joints.size * sizeof(Affine3<float>);
-  if (bytes > room) return rows([&](std::uint16_t j) -> const Affine3<float>& { return args.joints[j]; });
-  auto* const words = reinterpret_cast<float*>(memory);
-  const auto* const from = reinterpret_cast<const float*>(args.joints.data);
-  for (std::size_t i = threadIdx.x; i < bytes / sizeof(float); i += kThreads) words[i] = from[i];
-  __syncthreads();
-  // By 16 bytes: lanes have joints of their own, and would wait for each other's banks four times as often.
-  const auto* const quads = reinterpret_cast<const float4*>(memory);
-  rows([&](std::uint16_t j) {
-    const float4 a = quads[3 * j], b = quads[3 * j + 1], c = quads[3 * j + 2];
-    Affine3<float> joint;
-    joint.linear.row[0] = {a.x, a.y, a.z};
-    joint.linear.row[1] = {a.w, b.x, b.y};
-    joint.linear.row[2] = {b.z, b.w, c.x};
-    joint.translation = {c.y, c.z, c.w};
-    return joint;
-  });
+    __syncthreads();
+    const auto rows = [&](const auto& joint_at) {
+      skin_rows<K>(Few ? jobs : &kept, Few ? low : 0, first_row, end_row, joint_at);
+    };
+    if (!fits) {
+      rows([&](std::uint16_t j) -> const Affine3<float>& { return (Few ? job : kept).joints[j]; });
+      continue;
+    }
+    // Eight lanes are served at a time, by 16 bytes. Each has a copy of its own, and with it banks:
+    // whatever joints lanes have, none waits for another.
+    const float4* const own = memory + 3 * (threadIdx.x % copies);
+    rows([&](std::uint16_t j) {
+      const float4* const quads = own + j * (3 * copies);
+      const float4 a = quads[0], b = quads[1], c = quads[2];
+      Affine3<float> joint;
+      joint.linear.row[0] = {a.x, a.y, a.z};
+      joint.linear.row[1] = {a.w, b.x, b.y};
+      joint.linear.row[2] = {b.z, b.w, c.x};
+      joint.translation = {c.y, c.z, c.w};
+      return joint;
+    });
+  }
+}
+
+/// The arrays of an avatar as the kernel takes them.
+SkinJob job_of(const SkinningArgs<float>& args, std::uint32_t first_piece) {
+  SkinJob job{};
+  for (int k = 0; k < 3; ++k) {
+    job.means[k] = args.means[k].data;
+    job.means_out[k] = args.means_out[k].data;
+  }
+  for (int k = 0; k < 4; ++k) {
+    job.quats[k] = args.quats[k].data;
+    job.quats_out[k] = args.quats_out[k].data;
+    if (args.writes_rotations()) job.rotations_out[k] = args.rotations_out[k].data;
+  }
+  job.joint_indices = args.joint_indices.data;
+  job.weights = args.weights.data;
+  job.joints = args.joints.data;
+  job.size = static_cast<std::uint32_t>(args.size());
+  job.first_piece = first_piece;
+  job.joint_count = static_cast<std::uint32_t>(args.joints.size);
+  const auto places = reinterpret_cast<std::uintptr_t>(job.joint_indices) |
+                      reinterpret_cast<std::uintptr_t>(job.weights);
+  job.aligned = places % (sizeof(std::uint16_t) * static_cast<unsigned>(args.influences)) == 0;
+  return job;
+}
+
+template <int K>
+void start(SkinLaunch& launch, std::size_t shared, int multiprocessors, cudaStream_t stream) {
+  const unsigned blocks = std::min(launch.pieces, static_cast<unsigned>(multiprocessors) * kBlocks<K>);
+  if (launch.table == nullptr) {
+    skin_kernel<K, true><<<blocks, kThreads, shared, stream>>>(launch);
+  } else {
+    skin_kernel<K, false><<<blocks, kThreads, shared, stream>>>(launch);
+  }
 }
 
 }  // namespace
 
 void CudaBackend::skin_all(std::span<const SkinningArgs<float>> avatars) {
-  if (!usable()) return;
+  int multiprocessors = 0;
   std::vector<SkinJob> jobs;
-  std::size_t blocks = 0, shared = 0;
-  for (const SkinningArgs<float>& args : avatars) {
-    if (args.size() == 0) continue;
-    jobs.push_back({args, static_cast<std::uint32_t>(blocks)});
-    blocks += (args.size() + kRowsPerBlock - 1) / kRowsPerBlock;
-    const std::size_t bytes = args.joints.size * sizeof(Affine3<float>);
-    if (bytes <= kMaxShared && bytes > shared) shared = bytes;
+  for (const int influences : {kInfluences4, kInfluences8}) {
+    if (!usable()) return;
+    SkinLaunch launch{};
+    std::size_t most = 0;  // joints in shared memory
+    jobs.clear();
+    for (const SkinningArgs<float>& args : avatars) {
+      if (args.size() == 0 || args.influences != influences) continue;
+      jobs.push_back(job_of(args, launch.pieces));
+      launch.pieces += static_cast<std::uint32_t>((args.size() + kThreads - 1) / kThreads);
+      if (args.joints.size * sizeof(Affine3<float>) <= kMaxShared)
+        most = std::max(most, args.joints.size);
+    }
+    if (jobs.empty()) continue;
+    launch.count = static_cast<std::uint32_t>(jobs.size());
+    launch.copies = kMostCopies;
+    while (most * sizeof(Affine3<float>) > kMaxShared / launch.copies) launch.copies /= 2;
+    if (jobs.size() <= kFewJobs) {
+      std::copy(jobs.begin(), jobs.end(), launch.few);
+    } else {
+      auto* const table = static_cast<SkinJob*>(scratch(kSkinJobs, jobs.size() * sizeof(SkinJob)));
+      copy(table, jobs.data(), jobs.size() * sizeof(SkinJob), CopyKind::host_to_device);
+      launch.table = table;
+    }
+    note(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device_),
+         "cudaDeviceGetAttribute");
+    const std::size_t shared = most * launch.copies * sizeof(Affine3<float>);
+    if (influences == kInfluences8) {
+      start<kInfluences8>(launch, shared, multiprocessors, stream_);
+    } else {
+      start<kInfluences4>(launch, shared, multiprocessors, stream_);
+    }
+    note(cudaGetLastError(), "the skinning");
   }
-  if (jobs.empty()) return;
-  auto* const table = static_cast<SkinJob*>(scratch(kSkinJobs, jobs.size() * sizeof(SkinJob)));
-  copy(table, jobs.data(), jobs.size() * sizeof(SkinJob), CopyKind::host_to_device);
-  skin_kernel<<<static_cast<unsigned>(blocks), kThreads, shared, stream_>>>(
-      table, static_cast<std::uint32_t>(jobs.size()), shared);
-  note(cudaGetLastError(), "the skinning");
 }
 
 }  // namespace gsnav

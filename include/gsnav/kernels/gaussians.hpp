@@ -83,7 +83,7 @@ struct GaussianView {
   /// touched. Empty: all are.
   View<const ChunkBounds> chunk_bounds;
   /// One for kChunkPart rows, [ceil(N / kChunkPart)]: of chunks at the edge of the view only the parts that may be seen
-  /// are touched. In host memory. Empty: chunks are taken whole.
+  /// are touched. Empty: chunks are taken whole.
   View<const ChunkBounds> part_bounds;
   /// In place of quats, scales, opacities, sh0 and mostly means and shN, which are empty then. In host memory only.
   PackedRows packed;

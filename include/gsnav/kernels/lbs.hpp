@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "gsnav/config.hpp"
 #include "gsnav/core/view.hpp"
@@ -129,9 +130,10 @@ struct Skinned {
 /// to the actor's root (so that an error of the weights' sum is scaled by the body's size, not by its place in
 /// the world). `first()`: linear part of the joint of the greatest weight; called where a blend has no
 /// orientation. The mean goes through the blended matrix, the orientation through its polar factor, so that the
-/// result does not depend on how the ellipsoid's axes are numbered.
+/// result does not depend on how the ellipsoid's axes are numbered. `rotation`: whether Skinned::rotation is asked for.
 template <class L, class First>
-GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& mean, const Quat<L>& quat) noexcept {
+GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& mean, const Quat<L>& quat,
+                         bool rotation = true) noexcept {
   using S = scalar_of<L>;
   Skinned<L> out;
   for (int i = 0; i < 3; ++i) {
@@ -147,7 +149,7 @@ GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& me
   }
   const Quat<L> turn = quat_direction(scaled_polar_rotation(blend.linear)), turned = turn * quat;
   const L one(S(1));
-  out.rotation = turn * (one / sqrt(dot(turn, turn)));
+  if (rotation) out.rotation = turn * (one / sqrt(dot(turn, turn)));
   out.quat = turned * (one / sqrt(dot(turned, turned)));
   return out;
 }
@@ -174,6 +176,7 @@ struct SkinningArgs {
   View<Out> axes_out[9];        ///< [N] each, as GaussianView::axes
 
   GSNAV_HD std::size_t size() const noexcept { return means[0].size; }
+  GSNAV_HD bool writes_rotations() const noexcept { return !rotations_out[0].empty(); }
 };
 
 /// A skinning weight from its parts. The lanes do the same.
@@ -182,38 +185,54 @@ GSNAV_HD S skinning_weight(std::uint16_t parts) noexcept {
   return static_cast<S>(parts) * static_cast<S>(1.0 / kWeightParts);
 }
 
-/// Skins Gaussian i, whose K joints `joint_at(index)` gives (an Affine3<S>, or a reference to one).
-template <int K, class S, class Out, class JointAt>
-GSNAV_HD void skin_row(const SkinningArgs<S, Out>& args, std::size_t i, const JointAt& joint_at) noexcept {
-  const std::uint16_t* const indices = args.joint_indices.data + K * i;
-  const std::uint16_t* const parts = args.weights.data + K * i;
+/// What skinning reads of a Gaussian.
+template <int K>
+struct SkinRow {
+  std::uint16_t joints[K], parts[K];
+  Vec3<float> mean;
+  Quat<float> quat;
+};
+
+/// Of Gaussian i.
+template <int K, class S, class Out>
+GSNAV_HD SkinRow<K> read_skin_row(const SkinningArgs<S, Out>& args, std::size_t i) noexcept {
+  SkinRow<K> row;
+  for (std::size_t k = 0; k < K; ++k) {
+    row.joints[k] = args.joint_indices[K * i + k];
+    row.parts[k] = args.weights[K * i + k];
+  }
+  row.mean = {args.means[0][i], args.means[1][i], args.means[2][i]};
+  row.quat = {args.quats[0][i], args.quats[1][i], args.quats[2][i], args.quats[3][i]};
+  return row;
+}
+
+/// Skins a Gaussian whose K joints `joint_at(index)` gives (an Affine3<S>, or a reference to one).
+template <class S, int K, class JointAt>
+GSNAV_HD Skinned<S> skin_row(const SkinRow<K>& row, const JointAt& joint_at, bool rotation) noexcept {
   Affine3<S> blend;
   for (int k = 0; k < K; ++k) {
-    const Affine3<S>& joint = joint_at(indices[k]);
-    const S weight = skinning_weight<S>(parts[k]);
+    const Affine3<S>& joint = joint_at(row.joints[k]);
+    const S weight = skinning_weight<S>(row.parts[k]);
     for (int r = 0; r < 3; ++r) {
       blend.linear.row[r] =
           k == 0 ? joint.linear.row[r] * weight : fma(weight, joint.linear.row[r], blend.linear.row[r]);
     }
     blend.translation = k == 0 ? joint.translation * weight : fma(weight, joint.translation, blend.translation);
   }
-  const Vec3<S> mean{S(args.means[0][i]), S(args.means[1][i]), S(args.means[2][i])};
-  const Quat<S> quat{S(args.quats[0][i]), S(args.quats[1][i]), S(args.quats[2][i]), S(args.quats[3][i])};
-  const auto first = [&]() noexcept { return joint_at(indices[0]).linear; };
-  const Skinned<S> s = skin<S>(blend, first, mean, quat);
-  args.means_out[0][i] = static_cast<Out>(s.mean.x);
-  args.means_out[1][i] = static_cast<Out>(s.mean.y);
-  args.means_out[2][i] = static_cast<Out>(s.mean.z);
-  args.quats_out[0][i] = static_cast<Out>(s.quat.w);
-  args.quats_out[1][i] = static_cast<Out>(s.quat.x);
-  args.quats_out[2][i] = static_cast<Out>(s.quat.y);
-  args.quats_out[3][i] = static_cast<Out>(s.quat.z);
-  if (!args.rotations_out[0].empty()) {
-    args.rotations_out[0][i] = static_cast<Out>(s.rotation.w);
-    args.rotations_out[1][i] = static_cast<Out>(s.rotation.x);
-    args.rotations_out[2][i] = static_cast<Out>(s.rotation.y);
-    args.rotations_out[3][i] = static_cast<Out>(s.rotation.z);
-  }
+  const auto first = [&]() noexcept { return joint_at(row.joints[0]).linear; };
+  return skin<S>(blend, first, vec_cast<S>(row.mean), quat_cast<S>(row.quat), rotation);
+}
+
+/// Writes Gaussian i. `Args`: SkinningArgs, or what has its arrays.
+template <class Args, class S>
+GSNAV_HD void store_skinned(const Args& args, std::size_t i, const Skinned<S>& s) noexcept {
+  using Out = std::remove_reference_t<decltype(args.means_out[0][i])>;
+  for (int k = 0; k < 3; ++k) args.means_out[k][i] = static_cast<Out>(s.mean[k]);
+  const S quat[4] = {s.quat.w, s.quat.x, s.quat.y, s.quat.z};
+  for (int k = 0; k < 4; ++k) args.quats_out[k][i] = static_cast<Out>(quat[k]);
+  if (!args.writes_rotations()) return;
+  const S rotation[4] = {s.rotation.w, s.rotation.x, s.rotation.y, s.rotation.z};
+  for (int k = 0; k < 4; ++k) args.rotations_out[k][i] = static_cast<Out>(rotation[k]);
 }
 
 /// Skins Gaussian i.
@@ -224,9 +243,9 @@ struct SkinGaussian {
   GSNAV_HD void operator()(std::size_t i) const noexcept {
     const auto joint_at = [this](std::uint16_t j) noexcept -> const Affine3<S>& { return args.joints[j]; };
     if (args.influences == kInfluences8) {
-      skin_row<kInfluences8>(args, i, joint_at);
+      store_skinned(args, i, skin_row<S>(read_skin_row<kInfluences8>(args, i), joint_at, args.writes_rotations()));
     } else {
-      skin_row<kInfluences4>(args, i, joint_at);
+      store_skinned(args, i, skin_row<S>(read_skin_row<kInfluences4>(args, i), joint_at, args.writes_rotations()));
     }
   }
 };

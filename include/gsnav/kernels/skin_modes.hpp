@@ -62,16 +62,6 @@ GSNAV_HD Mat3<S> clamped_stretch(const Mat3<S>& m) noexcept {
 namespace detail {
 
 template <class S, class Out>
-GSNAV_HD void store_skinned(const SkinningArgs<S, Out>& args, std::size_t i, const Skinned<S>& s) noexcept {
-  for (int k = 0; k < 3; ++k) args.means_out[k][i] = static_cast<Out>(s.mean[k]);
-  const S quat[4] = {s.quat.w, s.quat.x, s.quat.y, s.quat.z};
-  for (int k = 0; k < 4; ++k) args.quats_out[k][i] = static_cast<Out>(quat[k]);
-  if (args.rotations_out[0].empty()) return;
-  const S rotation[4] = {s.rotation.w, s.rotation.x, s.rotation.y, s.rotation.z};
-  for (int k = 0; k < 4; ++k) args.rotations_out[k][i] = static_cast<Out>(rotation[k]);
-}
-
-template <class S, class Out>
 GSNAV_HD Vec3<S> canonical_mean(const SkinningArgs<S, Out>& args, std::size_t i) noexcept {
   return {S(args.means[0][i]), S(args.means[1][i]), S(args.means[2][i])};
 }
@@ -103,7 +93,7 @@ struct SkinGaussianDual {
     return sum;
   }
   GSNAV_HD void operator()(std::size_t i) const noexcept {
-    detail::store_skinned(args, i, skin(blend(i), detail::canonical_mean(args, i), detail::canonical_quat(args, i)));
+    store_skinned(args, i, skin(blend(i), detail::canonical_mean(args, i), detail::canonical_quat(args, i)));
   }
 };
 

@@ -40,7 +40,7 @@ Status validate(const SkinningArgs<S, Out>& args) {
   sized(args.weights, row * n, "weights");
   for (const auto& v : args.means_out) sized(v, n, "means_out");
   for (const auto& v : args.quats_out) sized(v, n, "quats_out");
-  const std::size_t rotations = args.rotations_out[0].empty() ? 0 : n;
+  const std::size_t rotations = args.writes_rotations() ? n : 0;
   for (const auto& v : args.rotations_out) sized(v, rotations, "rotations_out");
   if (status.ok() && n > 0 && args.joints.empty() && args.dual_joints.empty()) {
     status = {Errc::invalid_argument, "SkinningArgs.joints is empty"};

@@ -77,7 +77,7 @@ class GaussianArrays {
     to_device(backend, v.origin_ids, ids_);
     to_device(backend, v.row_ids, ids_);
     to_device(backend, v.chunk_bounds, bounds_);
-    v.part_bounds = {};        // of the host
+    to_device(backend, v.part_bounds, bounds_);
     origins_ = cloud.origins;  // read by the host
     v.origins = view_of(std::as_const(origins_));
   }

@@ -96,7 +96,8 @@ class CudaBackend {
   void parallel_for(std::size_t one, const ScanMeshTriangles<float>& k);
   void parallel_for(std::size_t chunks, const WriteMeshTriangles<float>& k);
   void parallel_for(std::size_t rows, const ShadeMeshRow<float>& k);
-  /// One launch.
+  void skin(const SkinningArgs<float>& args) { skin_all(std::span(&args, 1)); }
+  /// One launch for all of four influences, one for all of eight.
   void skin_all(std::span<const SkinningArgs<float>> avatars);
 
  private:

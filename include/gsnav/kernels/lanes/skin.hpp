@@ -144,11 +144,11 @@ GSNAV_HD void skin_packs(const SkinningArgs<float>& args, std::size_t begin, std
     const Vec3<F> mean{at(args.means[0]), at(args.means[1]), at(args.means[2])};
     const Quat<F> quat{at(args.quats[0]), at(args.quats[1]), at(args.quats[2]), at(args.quats[3])};
     const auto greatest = [&]() noexcept { return greatest_joints<K>(args, first); };
-    const Skinned<F> s = skin<F>(blend, greatest, mean, quat);
+    const Skinned<F> s = skin<F>(blend, greatest, mean, quat, args.writes_rotations());
     for (int k = 0; k < 3; ++k) s.mean[k].store(args.means_out[k].data + first);
     const F quats[4] = {s.quat.w, s.quat.x, s.quat.y, s.quat.z};
     for (int k = 0; k < 4; ++k) quats[k].store(args.quats_out[k].data + first);
-    if (!args.rotations_out[0].empty()) {
+    if (args.writes_rotations()) {
       const F rotations[4] = {s.rotation.w, s.rotation.x, s.rotation.y, s.rotation.z};
       for (int k = 0; k < 4; ++k) rotations[k].store(args.rotations_out[k].data + first);
     }

@@ -34,6 +34,7 @@ struct BatchImages {
 /// What a batch was made of; all cameras together.
 struct BatchStats {
   std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs; docs/cuda.md says how large tiles are
+  std::uint64_t parts_read = 0;          ///< kChunkPart rows each, that may be in view, counted once for 32 cameras
   std::uint64_t scratch_bytes = 0;       ///< held on the device, without scene and images
   int reruns = 0;                        ///< how often the batch was drawn again because scratch had to grow
   bool replayed = false;                 ///< by a recorded CUDA graph: calls that differ in their cameras alone are
