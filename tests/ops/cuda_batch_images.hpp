@@ -20,7 +20,8 @@ using Lists = std::vector<std::vector<std::uint32_t>>;
 /// More than sixteen a multiprocessor of any GPU.
 inline constexpr int kManyTiles = 9 * 384;
 
-/// Images of a batch, fetched. `lists`: the sets of each camera; empty: all. `meshes`: likewise; empty: none.
+/// Images of a batch, fetched. `lists`: the sets of each camera; empty: all. `meshes`: likewise; empty: none. `seen`: of
+/// each camera, BatchCamera::seen.
 struct Batch {
   Frames<float> frames;
   std::vector<std::uint8_t> rgb8;
@@ -29,7 +30,8 @@ struct Batch {
 
 inline Batch draw_batch(CudaBackend& cuda, CudaBatchRenderer& renderer, const std::vector<GaussianSet>& sets,
            const std::vector<Camera>& cameras, const Lists& lists, unsigned outputs, bool bytes = true,
-           const std::vector<MeshFrame>& meshes = {}) {
+           const std::vector<MeshFrame>& meshes = {},
+           const std::vector<std::vector<View<const std::uint32_t>>>& seen = {}) {
   Batch out;
   const std::size_t pixels =
       static_cast<std::size_t>(cameras[0].width) * static_cast<std::size_t>(cameras[0].height) * cameras.size();
@@ -49,7 +51,8 @@ inline Batch draw_batch(CudaBackend& cuda, CudaBatchRenderer& renderer, const st
   std::vector<BatchCamera> batch;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     batch.push_back({cameras[c], lists.empty() ? std::span<const std::uint32_t>() : std::span(lists[c]),
-                     meshes.empty() ? MeshFrame{} : meshes[c]});
+                     meshes.empty() ? MeshFrame{} : meshes[c],
+                     seen.empty() ? std::span<const View<const std::uint32_t>>() : std::span(seen[c])});
   }
   renderer.render(sets, batch, to).throw_if_error();
   renderer.finish().throw_if_error();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <string>
 #include <vector>
 
 #if defined(GSNAV_HAS_CUDA)
@@ -154,6 +155,56 @@ TEST_CASE("cuda batch: bounds of parts do not show") {
     }
   }
   CHECK(parts_read < of_chunks);
+}
+
+TEST_CASE("cuda batch: each camera draws what may be seen from where it is, as if the rest were transparent") {
+  if (no_gpu("cuda batch of visible sets")) return;
+  CudaBackend cuda;
+  GaussianCloud a = random_cloud(
+      65, {.count = 15050, .sh_degree = 1, .needle = 0.02, .scale = 0.03, .center = {0, 0, 0}, .extent = 5});
+  GaussianCloud b = random_cloud(66, {.count = 3001, .sh_degree = 0, .scale = 0.05, .center = {1, 0, 0}, .extent = 4});
+  sort_spatially(a);
+  sort_spatially(b);
+  const GaussianArrays<CudaBackend> on_a(cuda, a), on_b(cuda, b);
+  const std::size_t words = (a.view().all_chunks() + 31) / 32;
+  Rng rng(6);
+  for (const int count : {1, 5, 40}) {
+    CAPTURE(count);
+    const std::vector<Camera> cameras = cameras_within(count);
+    std::vector<std::uint32_t> bits(words * cameras.size());
+    for (std::uint32_t& word : bits) word = static_cast<std::uint32_t>(rng.uniform(0, 4294967295.0));
+    Buffer<std::uint32_t, CudaBackend> there(cuda);
+    there.upload(bits.data(), bits.size());
+    std::vector<std::vector<View<const std::uint32_t>>> seen;
+    Frames<float> want;
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      seen.push_back({{there.data() + c * words, words}, {}});
+      GaussianCloud rest = a;
+      for (std::size_t i = 0; i < rest.size(); ++i) {
+        const std::size_t chunk = i / kProjectChunk;
+        if ((bits[c * words + chunk / 32] >> (chunk % 32) & 1) == 0) rest.opacities[i] = 0;
+      }
+      const GaussianArrays<CudaBackend> on_rest(cuda, rest);
+      const Frames<float> one = singly(cuda, {on_rest.set(), on_b.set()}, {cameras[c]}, {}, {}, kAll);
+      for_each_image(want, one, [](std::vector<float>& to, const std::vector<float>& from) {
+        to.insert(to.end(), from.begin(), from.end());
+      });
+    }
+    CudaBatchRenderer renderer(cuda);
+    const Batch got = draw_batch(cuda, renderer, {on_a.set(), on_b.set()}, cameras, {}, kAll, false, {}, seen);
+    check_same(got.frames, want);
+    // The generic path, of the first camera.
+    GaussianSet alone = on_a.set();
+    alone.gaussians.seen_chunks = seen[0][0];
+    check_same(singly(cuda, {alone, on_b.set()}, {cameras[0]}, {}, {}, kAll),
+               draw_batch(cuda, renderer, {alone, on_b.set()}, {cameras[0]}, {}, kAll, false).frames);
+    const BatchCamera short_list{cameras[0], {}, {}, std::span(seen[0]).first(1)};
+    const GaussianSet sets[] = {on_a.set(), on_b.set()};
+    CHECK(renderer.render(sets, std::span(&short_list, 1), {}).code() == Errc::invalid_argument);
+    const std::vector<View<const std::uint32_t>> wrong{{there.data(), words - 1}, {}};
+    const BatchCamera of_wrong_size{cameras[0], {}, {}, wrong};
+    CHECK(renderer.render(sets, std::span(&of_wrong_size, 1), {}).message().find("seen[0]") != std::string::npos);
+  }
 }
 #else
 TEST_CASE("cuda batch parts") { std::printf("SKIP: cuda batch parts: built without CUDA\n"); }

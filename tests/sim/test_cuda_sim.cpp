@@ -143,21 +143,36 @@ TEST_CASE("cuda: meshes, their normals, and batches with them") {
   CHECK(other <= normals / 100);  // where the median depth is the mesh's on one of the two only
 }
 
-TEST_CASE("cuda: levels of detail") {
+TEST_CASE("cuda: levels of detail, and what is seen from where") {
   if (no_gpu("cuda levels of detail in a simulator")) return;
   SimulatorScene detailed = peopled_scene(4000);
   CudaBackend cuda;
   OpenMPBackend openmp;
   detailed.assets[0].lod = std::make_shared<const LodTree>(build_lod(openmp, *detailed.assets[0].cloud).value());
-  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{std::make_shared<const SimulatorScene>(detailed)};
   BatchConfig config;
   config.sensors = rgbd_sensors(64, 96);
-  config.lod = LodChoice{};
+  bool levels = false, visible = false;
+  SUBCASE("levels of detail") { levels = true; }
+  SUBCASE("visible sets") { visible = true; }
+  SUBCASE("both") { levels = visible = true; }
+  if (levels) config.lod = LodChoice{};
   const auto there = [](std::size_t environment, std::size_t count) -> Result<BatchEpisode> {
     BatchEpisode e = wandering(environment, count).value();
     e.scene = 0;
     return e;
   };
+  if (visible) {
+    VisibleSettings settings;
+    settings.face = 96;
+    settings.near_plane = config.sensors[0].near_plane;
+    settings.near_sigma = config.sensors[0].near_sigma;
+    std::vector<Vec3d> eyes;
+    for (std::size_t e = 0; e < 2; ++e) eyes.push_back(there(e, 0).value().episode.start_position + Vec3d{0, 1.5, 0});  // not the third's
+    detailed.assets[0].visible = std::make_shared<const VisibleSets>(
+        build_visible_sets(openmp, *detailed.assets[0].cloud, eyes, settings).value());
+    config.visible_sets = true;
+  }
+  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{std::make_shared<const SimulatorScene>(detailed)};
   auto on_gpu = make_batch_simulator(cuda, scenes, config, 3, there).value();
   auto on_cpu = make_batch_simulator(openmp, scenes, config, 3, there).value();
   const auto got = on_gpu.reset().value(), want = on_cpu.reset().value();

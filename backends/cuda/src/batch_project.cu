@@ -19,7 +19,7 @@ constexpr unsigned kAll = 0xffffffffu;
 __device__ bool part_is_candidate(const ProjectArgs<float>& args, std::size_t chunk, unsigned part) {
   const GaussianView& gs = args.gaussians;
   const std::size_t at = chunk * kPartsPerChunk + part;
-  if (at * kChunkPart >= gs.size) return false;
+  if (at * kChunkPart >= gs.size || !gs.may_be_seen(chunk)) return false;
   if (gs.chunk_bounds.empty()) return true;
   return may_be_visible(args.camera64,
                         gs.part_bounds.empty() ? gs.chunk_bounds[chunk] : gs.part_bounds[at]);

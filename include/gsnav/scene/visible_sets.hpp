@@ -182,6 +182,7 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   out.min_weight = settings.min_weight;
   out.cloud_chunks = cloud.view().all_chunks();
   out.viewpoints = viewpoints.size();
+  constexpr double kBeside = 0.01;  // metres
   std::vector<Vec3d> eyes;  // in the asset's frame
   for (std::size_t v = 0; v < viewpoints.size(); ++v) {
     eyes.push_back(inverse(world_from_asset) * viewpoints[v]);
@@ -190,7 +191,12 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
       return Status(Errc::invalid_argument,
                     "build_visible_sets: viewpoint " + std::to_string(v) + " is not finite or too far");
     }
-    out.keys.push_back(*key);
+    // Rounding must not take a camera that is where a viewpoint is to a cell that has none.
+    for (int corner = 0; corner < 8; ++corner) {
+      Vec3d beside = eyes.back();
+      for (int k = 0; k < 3; ++k) beside[k] += ((corner >> k & 1) != 0 ? 1 : -1) * kBeside / world_from_asset.scale;
+      out.keys.push_back(VisibleSets::key_of(beside, out.cell).value_or(*key));
+    }
   }
   std::sort(out.keys.begin(), out.keys.end());
   out.keys.erase(std::unique(out.keys.begin(), out.keys.end()), out.keys.end());
