@@ -47,11 +47,9 @@ VisibleSets workload_visible_sets() {
   if (std::getenv("GSNAV_BENCH_SCENE") == nullptr)
     how.solid_alpha = 0.2;  // the flat's surfaces are as thin as paper
   const NavMeshFromGaussians built = build_navmesh(mesh, std::span(&set, 1), how).value();
-  std::vector<double>
-      heights;  // to the centimetre, each once, and a little above and below: cells have borders
+  std::vector<double> heights;  // above the floor, to the millimetre, each once
   for (const Camera& c : cameras) {
-    const double h = std::round(100 * ((placed * c.position()).y - built.report.floor_y)) / 100;
-    for (const double beside : {-0.005, 0.005}) heights.push_back(h + beside);
+    heights.push_back(std::round(1000 * ((placed * c.position()).y - built.report.floor_y)) / 1000);
   }
   std::sort(heights.begin(), heights.end());
   heights.erase(std::unique(heights.begin(), heights.end()), heights.end());

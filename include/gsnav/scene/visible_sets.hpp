@@ -99,9 +99,8 @@ struct VisibleSettings {
   double margin = 0.25;      ///< viewpoints so far outside of a cell count for it too
   double min_weight = 1e-3;  ///< a chunk is seen where one of its Gaussians has so much of a pixel
   int face = 256;            ///< pixels along a face of the cube that is looked at from each viewpoint
-  double near_plane =
-      0.2;  ///< of these images (Camera). What lies nearer to a cell is in its set in any case
-  double near_sigma = 0;  ///< likewise
+  double near_plane = 0.2;   ///< of these images (Camera); what lies nearer to a cell is in its set in any case
+  double near_sigma = 0;     ///< likewise
   /// Told the share of the work that is done, in [0, 1], for each viewpoint, by the calling thread.
   std::function<void(double)> progress;
 };
@@ -157,9 +156,9 @@ inline std::array<Camera, 6> cube_cameras(const Vec3d& eye, std::size_t viewpoin
 
 }  // namespace detail
 
-/// Finds what of a cloud is seen from each cell that has a viewpoint (world, metres; navmesh_viewpoints
-/// makes them): the cloud stands in the world by `world_from_asset`, with bounds of its chunks
-/// (sort_spatially). Each viewpoint costs six frames of settings.face pixels a side. The same bits for
+/// Finds what of a cloud is seen from each cell that has a viewpoint in it or within 5 cm (world, metres;
+/// navmesh_viewpoints makes them): the cloud stands in the world by `world_from_asset`, with bounds of its
+/// chunks (sort_spatially). Each viewpoint costs six frames of settings.face pixels a side. The same bits for
 /// any number of threads.
 ///
 /// Errors: invalid_argument (a setting; no viewpoint, or one that is not finite; a cloud that is not in
@@ -182,7 +181,7 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   out.min_weight = settings.min_weight;
   out.cloud_chunks = cloud.view().all_chunks();
   out.viewpoints = viewpoints.size();
-  constexpr double kBeside = 0.01;  // metres
+  constexpr double kBeside = 0.05;  // metres
   std::vector<Vec3d> eyes;  // in the asset's frame
   for (std::size_t v = 0; v < viewpoints.size(); ++v) {
     eyes.push_back(inverse(world_from_asset) * viewpoints[v]);
@@ -191,7 +190,7 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
       return Status(Errc::invalid_argument,
                     "build_visible_sets: viewpoint " + std::to_string(v) + " is not finite or too far");
     }
-    // Rounding must not take a camera that is where a viewpoint is to a cell that has none.
+    // Rounding, or a step in the floor, must not take a camera that is where a viewpoint is to a cell that has none.
     for (int corner = 0; corner < 8; ++corner) {
       Vec3d beside = eyes.back();
       for (int k = 0; k < 3; ++k) beside[k] += ((corner >> k & 1) != 0 ? 1 : -1) * kBeside / world_from_asset.scale;
