@@ -60,7 +60,7 @@ VisibleSets workload_visible_sets() {
     settings.near_plane = c.near_plane;
   }
   settings.face = static_cast<int>(std::ceil(2 * focal - 1e-6));
-  const std::vector<Vec3d> viewpoints = navmesh_viewpoints(built.mesh, heights, settings.cell).value();
+  const std::vector<Vec3d> viewpoints = navmesh_viewpoints(built.mesh, heights, 0.5 * settings.cell).value();
   OpenMPBackend backend;
   const auto start = std::chrono::steady_clock::now();
   const char* scene = std::getenv("GSNAV_BENCH_SCENE");

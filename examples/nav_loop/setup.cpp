@@ -17,6 +17,8 @@
 #include "gsnav/io/visible_file.hpp"
 #include "gsnav/nav/gaussian_navmesh.hpp"
 #include "gsnav/nav/viewpoints.hpp"
+#include "gsnav/scene/drop_bands.hpp"
+#include "gsnav/scene/scene_profile.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/people.hpp"
 
@@ -61,7 +63,7 @@ Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::
     std::fprintf(stderr, "\rfinding visible sets: %.0f %%", 100 * share);
   };
   const double heights[] = {options.eye_height};
-  const auto viewpoints = gsnav::navmesh_viewpoints(navmesh, heights, settings.cell);
+  const auto viewpoints = gsnav::navmesh_viewpoints(navmesh, heights, 0.5 * settings.cell);
   if (!viewpoints) return viewpoints.status();
   auto backend = builder(options);
   if (options.scene.empty()) {
@@ -76,6 +78,12 @@ Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::
   if (cached->built) std::fputs("\n", stderr);
   if (!cached->warning.empty()) std::fprintf(stderr, "%s\n", cached->warning.c_str());
   return std::move(cached->sets);
+}
+
+/// Lets go of SH bands that cannot be seen.
+void fit_storage(gsnav::GaussianCloud& cloud, double unseen) {
+  gsnav::SceneProfile profile = gsnav::profile_scene(cloud, unseen);
+  gsnav::drop_bands(cloud, profile);
 }
 
 }  // namespace
@@ -93,10 +101,12 @@ Result<Setup> prepare(const Options& options) {
 
   auto from = Clock::now();
   gsnav::SceneAsset asset;
+  gsnav::GaussianCloud cloud;
+  std::optional<gsnav::LodTree> levels;
   if (options.scene.empty()) {
     auto flat = gsnav::make_default_scene(options.density);
     if (!flat) return flat.status();
-    asset.cloud = std::make_shared<gsnav::GaussianCloud>(std::move(flat->cloud));
+    cloud = std::move(flat->cloud);
     vertices = std::move(flat->vertices);
     triangles = std::move(flat->triangles);
   } else {
@@ -108,23 +118,30 @@ Result<Setup> prepare(const Options& options) {
     }
     if (shipped) {
       for (const std::string& w : shipped->report.warnings) std::fprintf(stderr, "%s\n", w.c_str());
-      asset.cloud = std::make_shared<gsnav::GaussianCloud>(std::move(shipped->cloud));
-      asset.lod = std::make_shared<const gsnav::LodTree>(std::move(shipped->tree));
+      cloud = std::move(shipped->cloud);
+      levels = std::move(shipped->tree);
     } else {
       auto loaded = gsnav::io::load_scene(options.scene);
       if (!loaded) return loaded.status();
       for (const std::string& w : loaded->report.warnings) std::fprintf(stderr, "%s\n", w.c_str());
-      asset.cloud = std::make_shared<gsnav::GaussianCloud>(std::move(loaded->cloud));
+      cloud = std::move(loaded->cloud);
     }
     const auto up = upright(options.up);
     if (!up) return up.status();
     asset.world_from_asset = *up;
   }
-  if (options.profile == "lod" && asset.lod == nullptr) {
-    auto tree = levels_of(options, *asset.cloud);
+  if (options.profile == "lod" && !levels) {
+    auto tree = levels_of(options, cloud);
     if (!tree) return tree.status();
-    asset.lod = std::make_shared<const gsnav::LodTree>(std::move(*tree));
+    levels = std::move(*tree);
   }
+  const double unseen = options.profile == "exact" ? 0 : gsnav::kUnseenColor;
+  fit_storage(cloud, unseen);
+  if (levels) {
+    fit_storage(levels->merged, unseen);
+    asset.lod = std::make_shared<const gsnav::LodTree>(std::move(*levels));
+  }
+  asset.cloud = std::make_shared<const gsnav::GaussianCloud>(std::move(cloud));
   setup.timings.load = seconds_since(from);
   setup.facts.gaussians = asset.cloud->size();
   setup.scene.assets.push_back(asset);

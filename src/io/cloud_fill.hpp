@@ -11,6 +11,7 @@
 #include "gsnav/core/huge_pages.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/needed_bands.hpp"
 #include "populate_pages.hpp"
 #include "threads.hpp"
 
@@ -19,19 +20,47 @@ namespace gsnav::io::detail {
 /// Rows of a file that are read at a time: enough for a call, few enough for the cache.
 inline constexpr std::size_t kRowsAtOnce = 1024;
 
-/// Takes consecutive rows of a file into the planes of a cloud, by the rules of activate().
+/// SH bands that are read apart from the rest of a file, a part of the rows each time: floats of them
+/// all would take several times what a packed cloud does. While `out` is null a file is read without its
+/// bands.
+struct BandsApart {
+  std::size_t least_rows = 1 << 16;     ///< files of fewer are read at once
+  int degree = 0;                       ///< of the file, set where its bands were left out; else 0
+  std::vector<std::uint32_t> left_out;  ///< rows of the file that are not in the cloud, ascending
+  // Of the readings that follow:
+  std::vector<std::uint32_t> places;  ///< of each row of the file: where it stands; kNowhere: nowhere
+  std::size_t first = 0, last = 0;    ///< the places that are wanted
+  float* out = nullptr;               ///< [last - first][(degree+1)^2 - 1][3]
+  static constexpr std::uint32_t kNowhere = 0xffffffff;
+
+  std::size_t numbers() const noexcept { return sh_band_numbers(degree); }
+};
+
+/// Takes consecutive rows of a file into the planes of a cloud, by the rules of activate(). Each row
+/// comes once.
 class CloudSink {
  public:
-  CloudSink(GaussianCloud& cloud, std::size_t first) : cloud_(cloud), first_(first), at_(first) {
-    rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
+  CloudSink(GaussianCloud& cloud, std::size_t first, const BandsApart* apart = nullptr)
+      : cloud_(cloud), first_(first), at_(first), row_(first), apart_(apart) {
+    rest_ = apart != nullptr ? apart->numbers() : sh_band_numbers(cloud.sh_degree);
   }
 
   /// Takes a row or counts why not. Returns whether it was kept.
   bool add(const RawGaussian& raw) {
+    const std::size_t row = row_++;
+    if (apart_ != nullptr && apart_->out != nullptr) {
+      const std::size_t place = apart_->places[row];
+      if (place < apart_->first || place >= apart_->last) return false;
+      std::copy_n(raw.shN, rest_, apart_->out + rest_ * (place - apart_->first));
+      return true;
+    }
     ActiveGaussian g;
     const RowFate fate = activate(raw, rest_, g);
     report_.count(fate, g.clamped);
-    if (fate != RowFate::kept) return false;
+    if (fate != RowFate::kept) {
+      if (apart_ != nullptr) left_out_.push_back(static_cast<std::uint32_t>(row));
+      return false;
+    }
     const std::uint32_t id = lattice_.id_of(g.mean);
     if (id != 0 || !ids_.empty()) {
       ids_.resize(at_ - first_, 0);
@@ -45,8 +74,10 @@ class CloudSink {
     }
     for (std::size_t k = 0; k < 4; ++k) cloud_.quats[k][at_] = g.quat[k];
     cloud_.opacities[at_] = g.opacity;
-    float* const bands = cloud_.shN.data() + rest_ * at_;
-    if (raw.shN != bands) std::copy_n(raw.shN, rest_, bands);
+    if (apart_ == nullptr) {
+      float* const bands = cloud_.shN.data() + rest_ * at_;
+      if (raw.shN != bands) std::copy_n(raw.shN, rest_, bands);
+    }
     report_.bounds.add(raw.mean);
     ++at_;
     return true;
@@ -68,10 +99,13 @@ class CloudSink {
     for (std::size_t i = 0; i < ids_.size(); ++i) to[at + i] = ids[ids_[i]];
   }
   bool has_origins() const noexcept { return !ids_.empty(); }
+  const std::vector<std::uint32_t>& left_out() const noexcept { return left_out_; }
 
  private:
   GaussianCloud& cloud_;
-  std::size_t first_, at_, rest_;
+  std::size_t first_, at_, rest_ = 0, row_;
+  const BandsApart* apart_;
+  std::vector<std::uint32_t> left_out_;
   LoadReport report_;
   OriginLattice lattice_;
   std::vector<std::uint32_t> ids_;  ///< of the rows so far, or empty while all are zero
@@ -169,23 +203,29 @@ inline void resize_planes(GaussianCloud& cloud, std::size_t n) {
 /// `planes`: those that are there before the rest, of `count` rows. They become the cloud's. Where shN
 /// is among them, the shN of row i is sink.bands(i); the others may have whatever `decode` makes row i
 /// of (sink.cloud()) before it adds the row or a later one.
+/// `apart`: bands are not for the cloud, whose degree is 0 then; where apart->out is there nothing else
+/// is read.
 template <class Decode>
 Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string& source,
-                               const Decode& decode, bool parallel = true, GaussianCloud planes = {}) {
+                               const Decode& decode, bool parallel = true, GaussianCloud planes = {},
+                               BandsApart* apart = nullptr) {
   LoadedCloud out;
   out.cloud = std::move(planes);
   GaussianCloud& cloud = out.cloud;
-  cloud.sh_degree = out.report.sh_degree = degree;
+  cloud.sh_degree = apart != nullptr ? 0 : degree;
+  out.report.sh_degree = degree;
   out.report.source = source;
-  resize_planes(cloud, count);
+  const bool bands_alone = apart != nullptr && apart->out != nullptr;
+  if (!bands_alone) resize_planes(cloud, count);
   const std::size_t pieces = parallel ? pieces_of(count) : 1;
   std::vector<CloudSink> sinks;
-  for (std::size_t p = 0; p < pieces; ++p) sinks.emplace_back(cloud, count * p / pieces);
+  for (std::size_t p = 0; p < pieces; ++p) sinks.emplace_back(cloud, count * p / pieces, apart);
   const Status decoded =
       for_pieces(count, pieces, [&](std::size_t p, std::size_t first, std::size_t last) -> Status {
         return decode(first, last, sinks[p]);
       });
   if (!decoded) return decoded;
+  if (bands_alone) return out;
   std::size_t kept = 0;
   bool far = false;
   for (std::size_t p = 0; p < pieces; ++p) {
@@ -193,6 +233,9 @@ Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string&
     kept += sinks[p].size();
     far = far || sinks[p].has_origins();
     out.report.add_counts(sinks[p].report());
+    if (apart != nullptr)
+      apart->left_out.insert(apart->left_out.end(), sinks[p].left_out().begin(),
+                             sinks[p].left_out().end());
   }
   resize_planes(cloud, kept);
   if (far) {

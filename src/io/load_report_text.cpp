@@ -35,6 +35,9 @@ std::string report_text(const LoadReport& r) {
   line("filter %s, eps2d %.3g, sorted by %s", r.filter == Filter::mip ? "mip" : "classic",
        static_cast<double>(r.eps2d), r.sort_order == SortOrder::z_depth ? "depth" : "distance");
   if (r.moving) line("moving: own times from %.6g to %.6g s", r.first_time, r.last_time);
+  if (r.sh_bytes_let_go != 0)
+    line("SH bands of zeros alone, not held: %llu bytes",
+         static_cast<unsigned long long>(r.sh_bytes_let_go));
   if (r.compact) line("SH as binary16: coefficients differ by up to %.3g", r.sh_storage_error);
   if (r.packed) {
     const PackErrors& e = r.packing;

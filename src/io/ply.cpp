@@ -119,7 +119,8 @@ Result<Vertices> find_vertices(const PlyHeader& header, const std::string& sourc
 /// not there; `moving` as in detail::load_ply. Of text, `body` reads them.
 template <class RowsAt>
 Result<LoadedCloud> fill(const PlyHeader& header, const Vertices& v, const std::string& source,
-                         TemporalCloud* moving, PlyBody* body, const RowsAt& rows_at) {
+                         TemporalCloud* moving, PlyBody* body, const RowsAt& rows_at,
+                         detail::BandsApart* apart = nullptr) {
   const std::size_t count = static_cast<std::size_t>(v.element->count);
   std::optional<detail::TemporalRows> planes;
   if (moving != nullptr && v.columns.moves()) planes.emplace(count, v.columns.motion_count);
@@ -145,7 +146,7 @@ Result<LoadedCloud> fill(const PlyHeader& header, const Vertices& v, const std::
     return {};
   };
   auto out = detail::fill_cloud(count, v.columns.degree, source, decode,
-                                header.format != detail::PlyFormat::ascii);
+                                header.format != detail::PlyFormat::ascii, {}, apart);
   if (!out) return out;
   if (planes) planes->give(*moving, out->report);
   if (moving == nullptr && v.columns.moves()) {
@@ -211,7 +212,8 @@ bool has_fixed_rows(const PlyHeader& header) {
 
 /// Reads the rows piece by piece, so that there is never more in memory than the cloud.
 Result<LoadedCloud> load_rows(const detail::RandomFile& file, const PlyHeader& header, const Vertices& v,
-                              const std::string& source, TemporalCloud* moving) {
+                              const std::string& source, TemporalCloud* moving,
+                              detail::BandsApart* apart) {
   std::uint64_t left = file.size() - header.size, start = header.size, others_short = 0;
   const PlyElement* cut = nullptr;
   for (const PlyElement& e : header.elements) {
@@ -226,12 +228,24 @@ Result<LoadedCloud> load_rows(const detail::RandomFile& file, const PlyHeader& h
   }
   if (cut != nullptr && cut <= &*v.element) return ply_rows_missing(source, *cut, others_short);
   const PlyElement& vertex = *v.element;
+  if (apart != nullptr && apart->out == nullptr) {
+    if (vertex.count < apart->least_rows || v.columns.moves() || v.columns.degree == 0) {
+      apart = nullptr;
+    } else {
+      apart->degree = v.columns.degree;
+    }
+  } else if (apart != nullptr &&
+             (vertex.count != apart->places.size() || v.columns.degree != apart->degree)) {
+    return {Errc::invalid_file, source + ": the file has changed while it was read"};
+  }
   auto out = fill(
-      header, v, source, moving, nullptr, [&](std::size_t first, std::size_t n) -> const std::byte* {
+      header, v, source, moving, nullptr,
+      [&](std::size_t first, std::size_t n) -> const std::byte* {
         thread_local std::vector<std::byte> rows;
         rows.resize(n * vertex.stride);
         return file.read(start + std::uint64_t{first} * vertex.stride, rows) ? rows.data() : nullptr;
-      });
+      },
+      apart);
   if (!out) return out;
   if (cut != nullptr) {
     out->report.warnings.push_back(ply_rows_missing(source, *cut, others_short).message());
@@ -248,7 +262,8 @@ Result<LoadedCloud> detail::parse_ply(std::span<const std::byte> bytes, const st
   return guarded(source, [&] { return described(parse(bytes, source, moving), usual_up(source)); });
 }
 
-Result<LoadedCloud> detail::load_ply(const std::filesystem::path& path, TemporalCloud* moving) {
+Result<LoadedCloud> detail::load_ply(const std::filesystem::path& path, TemporalCloud* moving,
+                                     BandsApart* apart) {
   const std::string source = path.string();
   return guarded(source, [&]() -> Result<LoadedCloud> {
     RandomFile file;
@@ -263,7 +278,7 @@ Result<LoadedCloud> detail::load_ply(const std::filesystem::path& path, Temporal
     if (is_compressed_ply(*header))
       return described(parse_compressed_ply(file, *header, source), usual_up(source));
     if (has_fixed_rows(*header) && !found->points) {
-      return described(load_rows(file, *header, *found, source, moving), usual_up(source));
+      return described(load_rows(file, *header, *found, source, moving, apart), usual_up(source));
     }
     const auto bytes = read_file(path);
     if (!bytes) return bytes.status();

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "cloud_fill.hpp"
 #include "described.hpp"
 #include "file.hpp"
 #include "gsnav/io/gltf.hpp"
@@ -17,7 +18,11 @@
 #include "gsnav/io/splat.hpp"
 #include "gsnav/io/spz.hpp"
 #include "gsnav/io/temporal_file.hpp"
+#include "gsnav/scene/describe_cloud.hpp"
+#include "gsnav/scene/drop_bands.hpp"
+#include "gsnav/scene/scene_profile.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "packed_file.hpp"
 #include "ply_temporal.hpp"
 #include "report_sum.hpp"
 #include "threads.hpp"
@@ -40,9 +45,10 @@ LoadedCloud moment_of(const TemporalCloud& scene, LoadReport report, double time
 }
 
 /// A PLY, at the time of the options where it moves.
-Result<LoadedCloud> load_ply_at(const fs::path& path, const LoadSceneOptions& options) {
+Result<LoadedCloud> load_ply_at(const fs::path& path, const LoadSceneOptions& options,
+                                detail::BandsApart* apart) {
   TemporalCloud moving;
-  auto loaded = detail::load_ply(path, &moving);
+  auto loaded = detail::load_ply(path, &moving, apart);
   if (!loaded || moving.times.empty()) return loaded;
   moving.cloud = std::move(loaded->cloud);
   return moment_of(moving, std::move(loaded->report), options.time);
@@ -54,7 +60,8 @@ Result<LoadedCloud> load_npz_at(const fs::path& path, const LoadSceneOptions& op
   return moment_of(loaded->scene, std::move(loaded->report), options.time);
 }
 
-Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& options) {
+Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& options,
+                             detail::BandsApart* apart = nullptr) {
   std::error_code ignored;
   const std::string name = path.string();
   if (fs::is_directory(path, ignored)) {
@@ -65,7 +72,7 @@ Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& optio
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".ply") return load_ply_at(path, options);
+  if (extension == ".ply") return load_ply_at(path, options, apart);
   if (extension == ".npz") return load_npz_at(path, options);
   if (extension == ".sog") return load_sog(path);
   if (extension == ".splat") return load_splat(path);
@@ -101,14 +108,15 @@ Result<std::vector<fs::path>> tiles_of(const std::string& spec) {
   return out;
 }
 
-/// What `spec` names, its rows as they were read.
-Result<LoadedCloud> load_named(const std::string& spec, const LoadSceneOptions& options) {
+/// What `spec` names, its rows as they were read. `apart`: as of detail::load_ply.
+Result<LoadedCloud> load_named(const std::string& spec, const LoadSceneOptions& options,
+                               detail::BandsApart* apart) {
   std::error_code ignored;
   // A file's own name may hold a comma.
-  if (fs::exists(spec, ignored)) return load_one(spec, options);
+  if (fs::exists(spec, ignored)) return load_one(spec, options, apart);
   const auto tiles = tiles_of(spec);
   if (!tiles) return tiles.status();
-  if (tiles->size() == 1) return load_one(tiles->front(), options);
+  if (tiles->size() == 1) return load_one(tiles->front(), options, apart);
   LoadedCloud scene;
   scene.report.source = spec;
   for (const fs::path& path : *tiles) {
@@ -120,6 +128,8 @@ Result<LoadedCloud> load_named(const std::string& spec, const LoadSceneOptions& 
 /// Keeps SH as the options say, and completes the report.
 void store(GaussianCloud& cloud, LoadReport& report, const LoadSceneOptions& options) {
   const UpGuess up{report.up, report.up_seen};  // of each reader's own kind of file
+  if (!options.keep_zero_bands)
+    report.sh_bytes_let_go += limit_sh_degree(cloud, sh_degree_in_use(cloud));
   if (options.storage == Storage::compact) {
     report.sh_storage_error = half_sh_error(cloud);
     if (report.sh_storage_error <= options.most_sh_error) {
@@ -133,14 +143,30 @@ void store(GaussianCloud& cloud, LoadReport& report, const LoadSceneOptions& opt
   describe(cloud, report, norm(up.up) > 0 ? up.up : Vec3d{0, -1, 0});
 }
 
-}  // namespace
+/// Of each row of a file, where it stands in a cloud made of it.
+std::vector<std::uint32_t> places_of(const GaussianCloud& cloud,
+                                     const std::vector<std::uint32_t>& left_out) {
+  const std::size_t n = cloud.size();
+  std::vector<std::uint32_t> kept(n);
+  for (std::size_t i = 0; i < n; ++i)
+    kept[cloud.row_ids.empty() ? i : cloud.row_ids[i]] = static_cast<std::uint32_t>(i);
+  if (left_out.empty()) return kept;
+  std::vector<std::uint32_t> out(n + left_out.size(), detail::BandsApart::kNowhere);
+  std::size_t row = 0, next = 0;
+  for (const std::uint32_t place : kept) {
+    for (; next < left_out.size() && left_out[next] == row; ++next) ++row;
+    out[row++] = place;
+  }
+  return out;
+}
 
-Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options) {
+Result<LoadedCloud> load_sorted(const std::string& spec, const LoadSceneOptions& options,
+                                detail::BandsApart* apart) {
   return detail::guarded(spec, [&]() -> Result<LoadedCloud> {
     if (!is_finite(options.time)) {
       return {Errc::invalid_argument, spec + ": LoadSceneOptions.time is " + std::to_string(options.time)};
     }
-    auto scene = load_named(spec, options);
+    auto scene = load_named(spec, options, apart);
     if (!scene) return scene;
     if (options.sort) {
       PoolBackend backend(threads_for(scene->cloud.size()) == 1 ? 1 : detail::io_threads());
@@ -153,6 +179,45 @@ Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& 
     store(scene->cloud, scene->report, options);
     return scene;
   });
+}
+
+/// Packs a cloud whose bands are read only now, a quarter each time, and packed at once: never more than
+/// a quarter of them is there as floats. Nothing where 8 bits are not enough for them.
+Result<std::optional<LoadedPackedCloud>> pack_apart(const std::string& spec, LoadedCloud scene,
+                                                    detail::BandsApart& apart,
+                                                    const LoadSceneOptions& options) {
+  constexpr std::size_t kReadings = 4;
+  apart.places = places_of(scene.cloud, apart.left_out);
+  LoadedPackedCloud out{{}, std::move(scene.report)};
+  out.cloud = gsnav::detail::pack_rows(scene.cloud, options.pack, out.report.packing);
+  gsnav::detail::BandPacker packer(out.cloud, apart.degree);
+  const std::size_t chunks = out.cloud.chunks.size(), each = (chunks + kReadings - 1) / kReadings;
+  std::vector<float> bands =
+      huge_vector<float>(apart.numbers() * std::min(each * kProjectChunk, out.cloud.size()));
+  apart.out = bands.data();
+  for (std::size_t chunk = 0; chunk < chunks; chunk += each) {
+    apart.first = chunk * kProjectChunk;
+    apart.last = std::min(out.cloud.size(), (chunk + each) * kProjectChunk);
+    if (auto read = detail::load_ply(spec, nullptr, &apart); !read) return read.status();
+    packer.add(bands.data(), std::min(each, chunks - chunk));
+  }
+  int used = 0;
+  for (const std::uint8_t degree : profile_scene(out.cloud).chunk_sh_degrees)
+    used = std::max(used, int{degree});
+  const int kept = options.keep_zero_bands ? apart.degree : used;
+  packer.give(out.report.packing, kept);
+  if (out.report.packing.sh_rms > options.pack.sh) return std::optional<LoadedPackedCloud>();
+  limit_sh_degree(out.cloud, kept);
+  out.report.sh_degree_used = used;
+  out.report.sh_bytes_let_go =
+      sizeof(float) * (apart.numbers() - sh_band_numbers(kept)) * out.cloud.size();
+  return std::optional<LoadedPackedCloud>(std::move(out));
+}
+
+}  // namespace
+
+Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options) {
+  return load_sorted(spec, options, nullptr);
 }
 
 Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec, const LoadSceneOptions& options) {
@@ -168,26 +233,46 @@ Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec,
     if (!levels) return levels.status();
     if (levels->tree.merged.size() == 0) return std::optional<LoadedLodSet>();
     const LoadReport before = levels->report;
+    GaussianCloud& merged = levels->tree.merged;
+    if (!options.keep_zero_bands)
+      levels->report.sh_bytes_let_go += limit_sh_degree(merged, sh_degree_in_use(merged));
     store(levels->cloud, levels->report, options);
     levels->report.kept = before.kept;
     return std::optional<LoadedLodSet>(std::move(*levels));
   });
 }
 
-Result<LoadedPackedCloud> load_packed_scene(const std::string& spec, const LoadSceneOptions& options) {
-  return detail::guarded(spec, [&]() -> Result<LoadedPackedCloud> {
+Result<LoadedPackedCloud> detail::load_packed(const std::string& spec, const LoadSceneOptions& options,
+                                              std::size_t least_apart) {
+  return guarded(spec, [&]() -> Result<LoadedPackedCloud> {
     if (options.storage != Storage::full) {
       return {Errc::invalid_argument, spec + ": LoadSceneOptions.storage must be full where a scene is to be packed"};
     }
-    auto scene = load_scene(spec, options);
+    detail::BandsApart apart;
+    apart.least_rows = least_apart;
+    auto scene = load_sorted(spec, options, &apart);
     if (!scene) return scene.status();
-    LoadedPackedCloud out;
-    out.report = std::move(scene->report);
-    out.report.packed = true;
-    out.cloud = pack_cloud(std::move(scene->cloud), options.pack, &out.report.packing);
-    out.report.memory = out.cloud.bytes();
-    return out;
+    std::optional<LoadedPackedCloud> out;
+    if (apart.degree != 0) {
+      auto packed = pack_apart(spec, std::move(*scene), apart, options);
+      if (!packed) return packed.status();
+      out = std::move(*packed);
+      if (!out) scene = load_sorted(spec, options, nullptr);
+      if (!scene) return scene.status();
+    }
+    if (!out) {
+      out.emplace();
+      out->report = std::move(scene->report);
+      out->cloud = pack_cloud(std::move(scene->cloud), options.pack, &out->report.packing);
+    }
+    out->report.packed = true;
+    out->report.memory = out->cloud.bytes();
+    return std::move(*out);
   });
+}
+
+Result<LoadedPackedCloud> load_packed_scene(const std::string& spec, const LoadSceneOptions& options) {
+  return detail::load_packed(spec, options, detail::BandsApart{}.least_rows);
 }
 
 }  // namespace gsnav::io

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "cloud_fill.hpp"
+#include "gsnav/core/huge_pages.hpp"
 #include "gzip.hpp"
 #include "quantised.hpp"
 #include "widen_rows.hpp"
@@ -167,7 +168,7 @@ class PlanesReader {
     const std::byte* const bytes = packed.get(0, n, room_);
     if (bytes == nullptr) return reading_failed(source_);
     const std::size_t got = ZSTD_decompress(to.data(), to.size(), bytes, n);
-    room_ = {};
+    release(room_);
     give_back_memory();
     if (ZSTD_isError(got) != 0) {
       return fail(stream(k) + " cannot be unpacked: " + ZSTD_getErrorName(got));

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <cstddef>
+#include <string>
+
 #include "check_cloud.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "sog_file.hpp"
@@ -42,6 +45,37 @@ TEST_CASE("scene: every kind of path") {
     CAPTURE(name);
     CHECK(io::load_scene(folder.path().string() + "/" + name).value().cloud.size() == 13);
   }
+}
+
+TEST_CASE("scene: SH bands of zeros alone are not held, and how many bytes that is is reported") {
+  TempFolder folder("bands");
+  PlyFile file = ply_of(50, 45, 7);
+  for (auto& row : file.rows) {
+    for (int channel = 0; channel < 3; ++channel) {
+      for (int k = 3; k < 15; ++k)
+        row["f_rest_" + std::to_string(15 * channel + k)] = k == 3 ? -0.0 : 0.0;
+    }
+  }
+  write_file(folder / "a.ply", file.text());
+  const std::string path = (folder / "a.ply").string();
+  const LoadedCloud all = io::load_scene(path, {.keep_zero_bands = true}).value();
+  CHECK(all.cloud.sh_degree == 3);
+  CHECK(all.report.sh_bytes_let_go == 0);
+  const std::size_t n = all.cloud.size();
+  for (const io::Storage storage : {io::Storage::full, io::Storage::compact}) {
+    const LoadedCloud some = io::load_scene(path, {.storage = storage, .most_sh_error = 1e9}).value();
+    CHECK(some.cloud.sh_degree == 1);
+    CHECK(some.report.sh_degree == 3);
+    CHECK(some.report.sh_degree_used == 1);
+    CHECK(some.cloud.shN.size() + some.cloud.shN_half.size() == 9 * n);
+    CHECK(some.report.sh_bytes_let_go == 36 * 4 * n);
+    CHECK(some.report.memory == some.cloud.bytes());
+    CHECK(contains(io::report_text(some.report), std::to_string(36 * 4 * n) + " bytes"));
+    if (storage == io::Storage::compact) continue;
+    for (std::size_t k = 0; k < 9 * n; ++k)
+      CHECK(some.cloud.shN[k] == all.cloud.shN[45 * (k / 9) + k % 9]);
+  }
+  CHECK(io::load_packed_scene(path).value().cloud.rest.sh_degree == 1);
 }
 
 TEST_CASE("scene: a comma list merges siblings and sums their reports") {

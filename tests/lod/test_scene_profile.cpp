@@ -3,13 +3,17 @@
 // than they say.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
+#include "gsnav/scene/drop_bands.hpp"
 #include "gsnav/scene/ledger.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/scene_profile.hpp"
 #include "gsnav/scene/spatial_order.hpp"
@@ -61,6 +65,131 @@ TEST_CASE("scene profile: bands of zeros are not read, and no bit changes") {
   check(lanes);
   check(one);
   check(reference);
+}
+
+namespace {
+
+/// Chunk c of some 2500 Gaussians has the bands up to c % (most + 1); those above `most` are at most
+/// `small` in all.
+GaussianCloud banded_to(int most, double small) {
+  GaussianCloud cloud = random_cloud(12, {.count = 2500});
+  sort_spatially(cloud);
+  Rng rng(13);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const int degree = static_cast<int>(i / kProjectChunk) % (most + 1);
+    for (std::size_t k = static_cast<std::size_t>(3 * ((degree + 1) * (degree + 1) - 1)); k < 45; ++k) {
+      const bool above = k >= static_cast<std::size_t>(3 * ((most + 1) * (most + 1) - 1));
+      cloud.shN[45 * i + k] = above ? static_cast<float>(small * rng.uniform(-1, 1)) : 0.0f;
+    }
+  }
+  return cloud;
+}
+
+/// Largest difference of two images.
+double largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
+  double out = a.size() == b.size() ? 0 : 1e9;
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+    out = std::max(out, std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
+  return out;
+}
+
+enum class Kept { floats, halves, packed };
+
+/// What follows from letting go of the bands above `most` of a cloud of degree 3: bytes counted one by
+/// one, and images.
+template <class Cloud>
+void check_dropped(Cloud cloud, int most, std::size_t bytes_a_number, double unseen) {
+  const Cloud whole = cloud;
+  const std::size_t n = cloud.size();
+  SceneProfile profile = profile_scene(cloud, unseen);
+  drop_bands(cloud, profile);
+  const std::size_t kept = static_cast<std::size_t>(3 * ((most + 1) * (most + 1) - 1));
+  const GaussianView v = cloud.view();
+  CHECK(v.sh_degree == most);
+  CHECK(v.shN.size + v.shN_half.size + v.packed.shN.size == kept * n);
+  CHECK(profile.bytes_let_go == (45 - kept) * n * bytes_a_number);
+  CHECK(whole.bytes() - cloud.bytes() == profile.bytes_let_go);
+  std::size_t unneeded = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const int degree = static_cast<int>(i / kProjectChunk) % (most + 1);
+    unneeded +=
+        bytes_a_number * (kept - static_cast<std::size_t>(3 * ((degree + 1) * (degree + 1) - 1)));
+  }
+  CHECK(profile.bytes_unneeded == unneeded);
+  CHECK((unseen == 0) == (profile.color_error == 0));
+  CHECK(profile.color_error <= unseen);
+  CHECK(validate(profile.applied_to(cloud.set())).ok());
+  const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 96, 64, 70);
+  const auto check = [&](auto& renderer) {
+    const auto before = renderer.render(whole.set(), camera).value();
+    for (const GaussianSet& set : {cloud.set(), profile.applied_to(cloud.set())}) {
+      const auto after = renderer.render(set, camera).value();
+      CHECK(after.median_depth == before.median_depth);
+      if (unseen == 0) CHECK(after.rgb == before.rgb);
+      // A pixel's weights add up to 1 at most; a float's rounding beside what the profile says.
+      if (unseen > 0) CHECK(largest_difference(after.rgb, before.rgb) <= profile.color_error + 1e-6);
+    }
+  };
+  OpenMPBackend openmp(2);
+  SerialBackend serial;
+  Renderer<float, OpenMPBackend> lanes(openmp);
+  Renderer<float, SerialBackend> one(serial);
+  check(lanes);
+  check(one);
+}
+
+}  // namespace
+
+TEST_CASE("scene profile: storage follows, in floats, halves and packed") {
+  for (const int most : {0, 1, 2}) {
+    for (const double small : {0.0, 3e-4}) {
+      for (const Kept how : {Kept::floats, Kept::halves, Kept::packed}) {
+        CAPTURE(most);
+        CAPTURE(small);
+        CAPTURE(static_cast<int>(how));
+        // In each pixel, band l of coefficients below 1e-4 is below 1e-4 (2 l + 1) / sqrt(4 pi): all
+        // three below 1/1020.
+        const double unseen = small > 0 ? kUnseenColor : 0;
+        GaussianCloud cloud = banded_to(most, small / 3);
+        if (how == Kept::packed) {
+          const PackedCloud packed = pack_cloud(std::move(cloud));
+          REQUIRE(packed.shN.size() == 45 * packed.size());
+          check_dropped(packed, most, 1, unseen);
+          continue;
+        }
+        if (how == Kept::halves) compact_sh(cloud);
+        check_dropped(std::move(cloud), most, how == Kept::halves ? 2 : 4, unseen);
+      }
+    }
+  }
+}
+
+TEST_CASE("scene profile: a cloud that needs its bands, or has no row, stays as it is") {
+  GaussianCloud cloud = banded(0);
+  const std::vector<float> before = cloud.shN;
+  SceneProfile profile = profile_scene(cloud);
+  drop_bands(cloud, profile);
+  CHECK(cloud.sh_degree == 3);
+  CHECK(cloud.shN == before);
+  CHECK(profile.bytes_let_go == 0);
+  CHECK(profile.bytes_unneeded == 4 * (profile.sh_numbers - profile.sh_numbers_read));
+  GaussianCloud none;
+  none.sh_degree = 3;
+  profile = profile_scene(none);
+  drop_bands(none, profile);
+  CHECK(profile.bytes_let_go == 0);
+  CHECK(profile.bytes_unneeded == 0);
+}
+
+TEST_CASE("scene profile: what is let go is not held any more") {
+  GaussianCloud cloud = banded_to(1, 0), halves = cloud;
+  compact_sh(halves);
+  CHECK(halves.shN.capacity() == 0);
+  SceneProfile profile = profile_scene(cloud);
+  drop_bands(cloud, profile);
+  CHECK(cloud.shN.capacity() == 9 * cloud.size());
+  expand_sh(halves);
+  CHECK(halves.shN_half.capacity() == 0);
 }
 
 TEST_CASE("scene profile: no colour changes by more than the bound (N69)") {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "gsnav/scene/drop_bands.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/scene_profile.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 #include "ops/backends.hpp"
@@ -75,6 +77,25 @@ TEST_CASE(
       CHECK(got.rgb == expected.rgb);
       CHECK(got.median_depth == expected.median_depth);
     }
+  }
+}
+
+TEST_CASE("SH bands: of packed rows, too, another memory holds those that some chunk has") {
+  ToyBackend toy;
+  const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 96, 64, 70);
+  for (const int most : {3, 1, 0}) {
+    CAPTURE(most);
+    PackedCloud packed = pack_cloud(Banded(most).cloud, {.sh = 1});
+    REQUIRE(packed.shN.size() == 45 * packed.size());
+    SceneProfile profile = profile_scene(packed);
+    const GaussianArrays<ToyBackend> all(toy, packed), some(toy, packed, profile);
+    check_held(some.set().gaussians, most);
+    const Frames<float> expected = render<float>(toy, {all.set()}, camera);
+    CHECK(render<float>(toy, {some.set()}, camera).rgb == expected.rgb);
+    drop_bands(packed, profile);
+    const GaussianArrays<ToyBackend> dropped(toy, packed, profile);
+    check_held(dropped.set().gaussians, most);
+    CHECK(render<float>(toy, {dropped.set()}, camera).rgb == expected.rgb);
   }
 }
 

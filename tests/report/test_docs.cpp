@@ -54,6 +54,32 @@ TEST_CASE("docs: every approximation has its error and what it buys") {
                   "0.500 | 0.100 |") != std::string::npos);
 }
 
+TEST_CASE("docs: targets stand beside what was found, the ledger names what it is of") {
+  Row r;
+  r.set("kind", "render")
+      .set("scene", "box")
+      .set("profile", "fast")
+      .set("backend", "serial")
+      .set("oracle", "contract");
+  r.set("sensor", "rgbd").set("knob", "none").set("width", 64).set("height", 48);
+  r.set("gaussians", 1000).set("touched", 300).set("emitting", 200);
+  Row entry;
+  entry.set("kind", "ledger")
+      .set("profile", "fast")
+      .set("name", "cut")
+      .set("knob", "alpha_min")
+      .set("error_max", 0.25);
+  entry.set("error_unit", "alpha").set("note", "faint");
+  const std::string page = approximations_page(Table({r, entry}, {}), "x");
+  CHECK(page.find("| box | 64x48 | serial | culling: Gaussians touched for each that reaches a tile | "
+                  "<= 1.3 | 1.500 | "
+                  "**missed** | 1 | removed 70.0 % of all, 87.5 % of what could be |") !=
+        std::string::npos);
+  CHECK(page.find("| fast | cut | alpha\\_min | 0.250 | alpha | faint |") != std::string::npos);
+  CHECK(approximations_page(Table({}, {}), "x").find("No row has a target in this report.") !=
+        std::string::npos);
+}
+
 TEST_CASE("docs: tables are whole, whatever the names and the columns that are there") {
   for (const char* odd : {"", "a|b", "`c`\n<d>"}) {
     std::vector<Row> rows = gsnav_test::synthetic_rows();

@@ -163,8 +163,10 @@ TEST_CASE("targets: one setting beside another, over the views that have both") 
   add("exact", "contract", "rgbd", 0, 78, 12)
       .set("knob", "storage")
       .set("knob_value", "packed")
-      .set("cloud_bytes", 83000)
-      .set("band_bytes", 45000);
+      .set("gaussians", 1000000)
+      .set("cloud_bytes", 83000000)
+      .set("band_bytes", 45000000)
+      .set("read_peak", 124500000);
   const std::vector<TargetCheck> checks = check_targets(Table(rows, {}));
   const auto value = [&checks](const std::string& measure) -> const TargetCheck& {
     const auto it = std::find_if(checks.begin(), checks.end(),
@@ -172,7 +174,7 @@ TEST_CASE("targets: one setting beside another, over the views that have both") 
     REQUIRE(it != checks.end());
     return *it;
   };
-  CHECK(checks.size() == 7);
+  CHECK(checks.size() == 8);
   CHECK(value("lod: times").value == doctest::Approx(40.0 / 10));
   CHECK(value("lod: times").met());
   CHECK(value("lod: nearer to the photo than fast, mean").value == doctest::Approx(3));
@@ -184,9 +186,10 @@ TEST_CASE("targets: one setting beside another, over the views that have both") 
   CHECK(value("culling").note == "removed 60.0 % of all, 85.7 % of what could be");
   CHECK(value("depth alone: times").value == doctest::Approx(2));
   CHECK(value("depth alone: fewer").value == doctest::Approx(75));
-  CHECK(value("packed").value == doctest::Approx(38));
+  CHECK(value("packed: bytes").value == doctest::Approx(38));
+  CHECK(value("packed: most memory").value == doctest::Approx(1.5));
   const std::string text = targets_text(checks);
-  CHECK(std::count(text.begin(), text.end(), '\n') == 7);
+  CHECK(std::count(text.begin(), text.end(), '\n') == 8);
   CHECK(text.find("box, 256x256, serial: packed: bytes a Gaussian beside its SH bands: 38") != std::string::npos);
   CHECK(check_targets(Table({}, {})).empty());
 }

@@ -65,6 +65,12 @@ TEST_CASE("plan: a knob's config differs from exact in that knob") {
   PlanOptions o = small_plan();
   o.sh_degree = 0;
   for (const Setting& t : plan(o)) CHECK((t.knob != "max_sh_degree" || t.knob_value == "0"));
+  o = small_plan();
+  o.profiles = {"none"};
+  o.knobs = {"storage", "key_bits"};
+  o.knob_values = {"packed", "24"};
+  CHECK(plan(o).size() == 2 * o.views);
+  for (const Setting& t : plan(o)) CHECK((t.knob_value == "packed" || t.knob_value == "24"));
   CHECK(parse_oracle("photo4").value() == Oracle::photo4);
   CHECK(parse_oracle("truth").message().find("contract_f64") != std::string::npos);
 }

@@ -33,7 +33,8 @@ int fail(const std::string& message) {
 Result<GaussianCloud> load(const Options& o) {
   GaussianCloud scene;
   for (std::size_t k = 0; k + 1 < o.paths.size(); ++k) {
-    auto loaded = io::load_scene(o.paths[k], {.level = o.level, .time = o.time});
+    auto loaded =
+        io::load_scene(o.paths[k], {.level = o.level, .time = o.time, .keep_zero_bands = true});
     if (!loaded) return loaded.status();
     std::fputs(io::report_text(loaded->report).c_str(), stdout);
     if (Status s = append(scene, loaded->cloud); !s) return {s.code(), o.paths[k] + ": " + s.message()};
@@ -85,7 +86,7 @@ std::uintmax_t bytes_of(const std::filesystem::path& out) {
 
 /// Reads the file back and says what became of the cloud.
 Status compare(const GaussianCloud& cloud, const std::string& out, const Options& o) {
-  auto back = io::load_scene(out);
+  auto back = io::load_scene(out, {.keep_zero_bands = true});
   if (!back) return back.status();
   if (back->report.read != cloud.size() || back->cloud.size() != cloud.size()) {
     return {Errc::invalid_file, out + ": " + std::to_string(back->cloud.size()) + " of " +

@@ -136,7 +136,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     app.add_option(name, value, text)->capture_default_str()->group(seen);
   };
   setting("--visible-cell", v.cell,
-          "Side of a cell, and distance of the places that are looked from, metres");
+          "Side of a cell, metres; places that are looked from are half of it apart");
   setting("--visible-weight", v.min_weight,
           "A chunk of Gaussians is seen where one of them has so much of a pixel");
   setting("--visible-face", v.face,

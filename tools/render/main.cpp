@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -27,6 +28,7 @@
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/io/visible_file.hpp"
+#include "gsnav/scene/drop_bands.hpp"
 #include "gsnav/scene/ledger.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/placed_meshes.hpp"
@@ -51,7 +53,7 @@ struct Options {
 /// What is known of the cloud that is drawn.
 struct Scene {
   const LoadReport& report;
-  const SceneProfile* profile;  ///< null: packed
+  const SceneProfile& profile;
   const LodTree* tree;          ///< where the profile is lod
   const VisibleSets* visible;   ///< where some are given
 };
@@ -105,13 +107,9 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
   config.sort_order = scene.report.sort_order;
   config.composite = o.composite == "merged" ? Composite::merged : Composite::hard_depth;
   Renderer<S, B> renderer(backend, config);
-  const bool profiled = scene.profile != nullptr && (is_host_backend<B> || scene.tree == nullptr);
-  const GaussianArrays<B> arrays = [&] {
-    if constexpr (std::is_same_v<Cloud, GaussianCloud>) {
-      if (profiled) return GaussianArrays<B>(backend, cloud, *scene.profile);
-    }
-    return GaussianArrays<B>(backend, cloud);
-  }();
+  const bool profiled = is_host_backend<B> || scene.tree == nullptr;
+  const GaussianArrays<B> arrays =
+      profiled ? GaussianArrays<B>(backend, cloud, scene.profile) : GaussianArrays<B>(backend, cloud);
   const std::vector<GaussianSet> whole{arrays.set()};
   const GaussianSet whole_here = cloud.set();  // in host memory, as cuts are
   std::span<const GaussianSet> sets = whole, here = is_host_backend<B> ? sets : std::span(&whole_here, 1);
@@ -185,7 +183,7 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     total_ms += std::chrono::duration<double, std::milli>(end - start).count();
     if (o.ledger) {
       FrameLedger l = frame_ledger(here, cameras[c], renderer.config(), f.stats[0], &scene.report,
-                                   profiled && cut == nullptr ? scene.profile : nullptr, cut);
+                                         &scene.profile, cut);
       l.unseen = details.unseen();
       if (scene.visible != nullptr) l.unseen_weight = scene.visible->min_weight;
       std::printf("camera %zu:\n%s", c, ledger_text(l).c_str());
@@ -367,9 +365,6 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(o.out, error);
   if (error) return fail("--out " + o.out + ": " + error.message());
 
-  // What cannot be seen is not read; in exact, what is zero.
-  std::optional<SceneProfile> profile;
-  if (!packed) profile = profile_scene(full, o.profile == "exact" ? 0 : kUnseenColor);
   std::optional<io::CachedLod> lod;
   OpenMPBackend openmp(o.threads);
   if (o.profile == "lod" && !shipped) {
@@ -397,8 +392,31 @@ int main(int argc, char** argv) {
                 sets->viewpoints);
     visible = std::move(*sets);
   }
-  const LodTree* const tree = shipped ? &*shipped : lod ? &lod->tree : nullptr;
-  const Scene drawn{report, profile ? &*profile : nullptr, tree, visible ? &*visible : nullptr};
+  // What cannot be seen is not held and not read; in exact, what is zero.
+  const auto fit = [unseen = o.profile == "exact" ? 0 : kUnseenColor](auto& cloud) {
+    SceneProfile made = profile_scene(cloud, unseen);
+    drop_bands(cloud, made);
+    return made;
+  };
+  SceneProfile profile = packed ? fit(*packed) : fit(full);
+  LodTree* const tree = shipped ? &*shipped : lod ? &lod->tree : nullptr;
+  if (tree != nullptr) {
+    const SceneProfile merged = fit(tree->merged);
+    profile.bytes_let_go += merged.bytes_let_go;
+    profile.color_error = std::max(profile.color_error, merged.color_error);
+  }
+  if (profile.sh_numbers != 0) {
+    std::array<std::size_t, kMaxShDegree + 1> chunks{};
+    for (const std::uint8_t degree : profile.chunk_sh_degrees) ++chunks[degree];
+    std::printf(
+        "SH: %zu, %zu, %zu, %zu chunks need degree 0 to 3; %llu bytes let go that none needs, %llu held "
+        "that only others "
+        "need\n",
+        chunks[0], chunks[1], chunks[2], chunks[3],
+        static_cast<unsigned long long>(profile.bytes_let_go),
+        static_cast<unsigned long long>(profile.bytes_unneeded));
+  }
+  const Scene drawn{report, profile, tree, visible ? &*visible : nullptr};
 
   const auto on = [&]<class S>(auto& backend) {
     return packed ? run<S>(backend, o, *depth, *packed, drawn, meshes, *cameras)

@@ -7,6 +7,7 @@
 #include "html.hpp"
 #include "html_text.hpp"
 #include "table_budget.hpp"
+#include "table_targets.hpp"
 
 namespace gsnav_report {
 namespace {
@@ -97,6 +98,19 @@ std::string budget_part(const Table& table) {
   return out;
 }
 
+std::string target_part(const Table& table) {
+  const std::vector<TargetCheck> checks = check_targets(table);
+  if (checks.empty()) return absent("row has a target");
+  std::string out =
+      header({"scene", "size", "backend", "measure", "target", "found", "", "views", "beside it"});
+  for (const TargetCheck& c : checks) {
+    out += line({plain(c.scene), c.size, plain(c.backend), plain(c.measure),
+                 (c.at_least ? ">= " : "<= ") + format_round(c.limit), format(c.value, 4),
+                 c.met() ? "met" : "**missed**", std::to_string(c.views), plain(c.note)});
+  }
+  return out;
+}
+
 std::string knob_part(const Table& table) {
   const RowRefs renders = table.of_kind("render");
   const RowRefs turned = select(renders, [](const Row& r) { return !is_plain(r); });
@@ -117,10 +131,10 @@ std::string knob_part(const Table& table) {
 std::string ledger_part(const Table& table) {
   const RowRefs rows = table.of_kind("ledger");
   if (rows.empty()) return absent("ledger");
-  std::string out = header({"profile", "approximation", "value", "what it does"});
+  std::string out = header({"profile", "approximation", "knob", "at most", "of", "what it does"});
   for (const Row* r : rows) {
-    out += line({plain(r->get("profile")), plain(r->get("knob")), plain(r->get("knob_value")),
-                 plain(r->get("note"))});
+    out += line({plain(r->get("profile")), plain(r->get("name")), plain(r->get("knob")),
+                 format(r->number("error_max")), plain(r->get("error_unit")), plain(r->get("note"))});
   }
   return out;
 }
@@ -156,6 +170,29 @@ std::string approximations_page(const Table& table, const std::string& command) 
       "the same view and backend: below 1 is what the approximation buys. 1 LSB is 1/255.\n\n";
   out += "## Profiles\n\n" + profile_part(table);
   out += "\n## Budgets\n\n" + budget_part(table);
+  out += "\n## Targets\n\n";
+  out +=
+      "What is to be reached on large scenes (docs/lod.md), of each scene, size and backend, over the "
+      "views that have "
+      "both of the rows that are compared.\n\n"
+      "- *lod*: rows of the profile lod beside fast on the same view, both judged by photo4, the image "
+      "of four times the "
+      "resolution averaged. Times are sums of medians over the views; the gain of a view is the "
+      "difference of the two "
+      "PSNR, its mean and its least.\n"
+      "- *culling*: Gaussians touched are those of the chunks, or parts of chunks, that projecting "
+      "reads; those that reach "
+      "a tile have a pair. Removed of all: 1 - touched / Gaussians; removed of what could be: that "
+      "beside "
+      "1 - in a tile / Gaussians. Nothing that is removed changes a bit.\n"
+      "- *depth alone*: frames of the sensor depth beside rgbd, and the bytes of a Gaussian that each "
+      "reads.\n"
+      "- *packed*: bytes of the packed cloud, bounds and ids included, without its SH bands, and its "
+      "PSNR against "
+      "contract; the largest resident memory while the file is read, less what was there before, beside "
+      "what the "
+      "packed cloud takes (files whose cloud takes 16 MB and more).\n\n";
+  out += target_part(table);
   out += "\n## What each profile approximates\n\n" + ledger_part(table);
   out += "\n## One knob at a time\n\n" + knob_part(table);
   out += "\n## Skinning\n\n" + named_part(table, "skinning", "skinning");

@@ -41,6 +41,7 @@ constexpr Column kSettingColumns[] = {
     {"emitting", "in a tile", 1, false, false},
     {"row_bytes", "bytes read a Gaussian", 1, false, false},
     {"bytes", "MB of Gaussians", 1e-6, false, false},
+    {"read_peak", "peak while read, MB", 1e-6, false, false},
     {"peak_rss", "peak memory, MB", 1e-6, false, false},
 };
 

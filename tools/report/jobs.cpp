@@ -54,6 +54,7 @@ void add_profiles(const PlanOptions& o, std::size_t view, const ImageSize& size,
       const bool first = backend == o.backends.front();
       if (!first && sensor != o.sensors.front()) continue;
       for (const std::string& profile : o.profiles) {
+        if (profile == "none") continue;
         Setting s{view, size, sensor, backend, profile, "none", {}, {}};
         // Other judges where nothing but the profile differs, once.
         const bool first_sensor = first && sensor == o.sensors.front();
@@ -81,6 +82,7 @@ void add_knobs(const PlanOptions& o, std::size_t view, std::vector<Setting>& out
     for (const std::string& value : knob.values) {
       if (knob.name == "max_sh_degree" && std::atoi(value.c_str()) > o.sh_degree) continue;
       if (value == "shN_8" && o.sh_degree == 0) continue;
+      if (!o.knob_values.empty() && !contains(o.knob_values, value)) continue;
       Setting s{view, o.knob_size, o.sensors.front(), o.backends.front(), "exact", knob.name, value, {}};
       for (const Oracle q : knob.oracles) {
         if (contains(o.oracles, q)) s.oracles.push_back(q);

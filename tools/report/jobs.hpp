@@ -50,6 +50,7 @@ struct PlanOptions {
   std::vector<Oracle> oracles;
   ImageSize knob_size{256, 256};
   int sh_degree = 3;  ///< of the scene: max_sh_degree above it changes nothing and is left out
+  std::vector<std::string> knob_values{};  ///< of the knobs, only these; empty: all
 };
 
 /// All settings for one scene: profiles by sensor and backend at every size (other backends than the first

@@ -68,13 +68,17 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   app.add_option("--near", o.near_plane, "Near plane, metres")->check(CLI::PositiveNumber)->capture_default_str();
   list("--kinds", o.kinds, {"render", "ledger", "skinning", "sweep", "kernel"}, "Kinds of rows");
   list("--sensors", o.sensors, {"rgbd", "rgb", "depth"}, "What is rendered");
-  list("--profiles", o.profiles, {"exact", "fast", "lod"},
-       "Profiles; lod is judged by photo4, and its tree is kept beside the scene's file");
+  list("--profiles", o.profiles, {"exact", "fast", "lod", "none"},
+       "Profiles; lod is judged by photo4, and its tree is kept beside the scene's file; none: no such "
+       "rows");
   list("--backends", o.backends, {"openmp", "serial", "cuda"},
        "Backends; all but the first with the first sensor only");
   std::vector<std::string> known_knobs = knob_names();
   known_knobs.emplace_back("none");
   list("--knobs", o.knobs, std::move(known_knobs), "Knobs that are turned by themselves; none: no such rows");
+  app.add_option("--knob-values", o.knob_values,
+                 "Only these values of the knobs, as the CSV has them: packed, 1e-3, ...")
+      ->delimiter(',');
   list("--oracles", oracles, oracles, "Judges: contract of all rows, the others of those that they say something of");
   app.add_option("--threads", o.threads, "Threads of the openmp backend and of the oracles; 0: OMP_NUM_THREADS")
       ->check(CLI::Range(0, 1024));

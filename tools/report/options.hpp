@@ -20,7 +20,7 @@ struct Options {
   double hfov = 90, near_plane = 0.2;
   std::vector<std::string> kinds{"render", "ledger", "skinning", "sweep", "kernel"};
   std::vector<std::string> sensors{"rgbd", "rgb", "depth"}, profiles{"exact", "fast", "lod"},
-      backends{"openmp", "serial"}, knobs = knob_names();
+      backends{"openmp", "serial"}, knobs = knob_names(), knob_values;
   std::vector<Oracle> oracles{Oracle::contract, Oracle::contract_f64, Oracle::photo4, Oracle::ray,
                               Oracle::ray_key, Oracle::untruncated};
   int threads = 0, runs = 15;

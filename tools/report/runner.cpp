@@ -53,7 +53,8 @@ Result<std::vector<SceneSpec>> scene_specs(const Options& o) {
 }
 
 PlanOptions plan_options(const Options& o, std::size_t views, int sh_degree) {
-  return {views, o.sizes, o.sensors, o.backends, o.profiles, o.knobs, o.oracles, o.knob_size, sh_degree};
+  return {views,   o.sizes,   o.sensors,   o.backends, o.profiles,
+          o.knobs, o.oracles, o.knob_size, sh_degree,  o.knob_values};
 }
 
 Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {

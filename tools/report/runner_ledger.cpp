@@ -8,6 +8,8 @@
 
 #include "gsnav/math/functions.hpp"
 #include "gsnav/ops/render_config.hpp"
+#include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/scene_profile.hpp"
 
 namespace gsnav_report {
 
@@ -38,12 +40,14 @@ Row entry(const char* profile, const char* name, const char* knob, double error,
 
 std::vector<Row> ledger_rows() {
   const RenderConfig c;
+  LodStats merged;
+  merged.shown = merged.merged = 1;
   const double rounding = static_cast<double>(std::numeric_limits<float>::epsilon()) / 2;
   std::vector<Row> rows{
       entry("exact", "float32 arithmetic", "", rounding, "relative, a rounding",
             "all kernels; forms that do not cancel, means projected in float64 (docs/accuracy.md)"),
-      entry("exact", "exp2 by a polynomial of degree 5", "", exp2_error<Exp2::degree5>(), "relative, of alpha",
-            "rounding; measured over the exponents that pass the alpha cut"),
+      entry("exact", "exp2 by a polynomial of degree 5", "", exp2_error<Exp2::degree5>(),
+            "relative, of alpha", "rounding; measured over the exponents that pass the alpha cut"),
       entry("exact", "sort by the float32 key", "key_bits", rounding, "relative, of depth",
             "part of the contract: two Gaussians nearer than a rounding may swap against float64 order"),
       entry("exact", "alpha cut", "alpha_min", c.alpha_min, "alpha, a Gaussian and pixel",
@@ -52,6 +56,15 @@ std::vector<Row> ledger_rows() {
             "part of the contract: what lies behind a closed pixel is left out"),
       entry("fast", "exp2 by a cubic", "", exp2_error<Exp2::degree3>(), "relative, of alpha",
             "in place of degree 5; all else as in exact"),
+      entry("fast", "SH bands left out", "", kUnseenColor, "colour, a Gaussian",
+            "bands of a chunk that change none of its colours by more, seen from anywhere; in tools "
+            "that profile a "
+            "scene (docs/lod.md)"),
+      entry(
+          "lod", "merged Gaussians", "", LodChoice{}.pixels, "pixels, root mean square",
+          "what was merged lies no farther from where it is shown, on this sensor; all else as in fast"),
+      entry("lod", "transmittance stop", "transmittance_min", lod_config(c, merged).transmittance_min,
+            "alpha, a pixel", "where at least half of what is in view is merged"),
   };
   return rows;
 }

@@ -22,6 +22,7 @@
 #include "runner_metrics.hpp"
 #include "runner_timing.hpp"
 #include "scenes.hpp"
+#include "storage.hpp"
 
 namespace gsnav_report {
 
@@ -73,6 +74,7 @@ class SceneRunner {
   gsnav::SerialBackend serial_;
   Judge judge_;
   std::optional<gsnav::LodTree> tree_;
+  std::optional<PackedThrough> packed_;
   std::deque<Named> recent_;  // references of the view at hand
 };
 

@@ -8,8 +8,10 @@
 #include <limits>
 #include <vector>
 
+#include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "runner_system.hpp"
 
 namespace gsnav_report {
 
@@ -68,11 +70,21 @@ float round_to_half(float x) noexcept {
   return static_cast<float>(std::clamp(std::nearbyint(v / step) * step, -65504.0, 65504.0));
 }
 
-PackedThrough through_packing(const GaussianCloud& cloud) {
-  const PackedCloud packed = pack_cloud(cloud);
+PackedThrough through_packing(const PackedCloud& packed) {
   const GaussianCloud& rest = packed.rest;
   return {unpack_cloud(packed), packed.bytes(),
           packed.shN.size() + sizeof(float) * rest.shN.size() + sizeof(std::uint16_t) * rest.shN_half.size()};
+}
+
+Result<PackedThrough> read_packed(const std::string& path) {
+  reset_peak_memory();
+  const std::uint64_t before = peak_memory();
+  Result<io::LoadedPackedCloud> loaded = io::load_packed_scene(path);
+  if (!loaded) return loaded.status();
+  const std::uint64_t peak = peak_memory() - before;
+  PackedThrough out = through_packing(loaded->cloud);
+  out.read_peak = peak;
+  return out;
 }
 
 Result<GaussianCloud> through_storage(const GaussianCloud& cloud, std::string_view name) {

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 
 namespace gsnav_report {
 
@@ -30,8 +33,11 @@ inline constexpr std::string_view kPackedStorage = "packed";
 struct PackedThrough {
   gsnav::GaussianCloud cloud;
   std::size_t bytes = 0, band_bytes = 0;
+  std::uint64_t read_peak = 0;  ///< most that reading it took; 0: not known
 };
-PackedThrough through_packing(const gsnav::GaussianCloud& cloud);
+PackedThrough through_packing(const gsnav::PackedCloud& packed);
+/// The same of what a path names (io::load_packed_scene). Errors: that function's.
+gsnav::Result<PackedThrough> read_packed(const std::string& path);
 
 /// `cloud` as it comes back from storage by the codec `name`; all other fields keep their bits.
 /// Errors: invalid_argument for an unknown name, with the known ones.

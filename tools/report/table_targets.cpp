@@ -123,6 +123,10 @@ class Place {
     char note[80];
     std::snprintf(note, sizeof note, "and %.1f of SH bands; %.1f dB, least %.1f", *bands / *n, psnr.mean, psnr.min);
     add("packed: bytes a Gaussian beside its SH bands", 40, (*bytes - *bands) / *n, false, packed.size(), note);
+    constexpr double kLeast = 1.6e7;  // of less, what threads and pages take says more
+    if (const auto peak = packed.front()->number("read_peak"); peak && *bytes >= kLeast)
+      add("packed: most memory while it is read, of what stays", 2, *peak / *bytes, false,
+          packed.size());
   }
 
   const RowRefs& rows_;

@@ -25,6 +25,9 @@ struct LoadSceneOptions {
   bool sort = true;  ///< in space, as rendering wants it; false: rows stay as they were read
   double time = 0;   ///< seconds, of scenes that move (io/temporal_file.hpp)
   Storage storage = Storage::full;
+  /// Whether SH bands that are zero in every Gaussian are held. They change no bit of an image; a cloud
+  /// that is written to a file again keeps its degree by them. The report says what was let go.
+  bool keep_zero_bands = false;
   /// What compact storage may change a coefficient by; a cloud that it changes by more stays as it is, with a warning.
   /// The report has the error. A colour changes by at most 4.3 times that: 15 basis functions whose squares sum to
   /// 15 / (4 pi).
@@ -51,8 +54,9 @@ struct LoadedPackedCloud {
 /// named with the list); invalid_argument (an empty name or a tile twice). Never throws.
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options = {});
 
-/// The same, packed: a third of the memory, to be rendered. While it is packed both are there. `options.storage` must
-/// be full. Errors: load_scene's.
+/// The same, packed: a third of the memory, to be rendered. Large binary PLY files are read five times,
+/// so that never more than twice that memory is needed; of others both clouds are there while one is
+/// packed. `options.storage` must be full. Errors: load_scene's.
 Result<LoadedPackedCloud> load_packed_scene(const std::string& spec, const LoadSceneOptions& options = {});
 
 /// A scene that ships its levels of detail, with them, as load_lod_levels reads it; nothing where `spec` is no streamed

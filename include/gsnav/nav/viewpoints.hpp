@@ -14,6 +14,6 @@ namespace gsnav {
 /// nearest to its middle, seen from above. World, metres, in a fixed order. Errors: invalid_argument (a
 /// spacing below 1 cm or not finite; a height that is not finite; none).
 Result<std::vector<Vec3d>> navmesh_viewpoints(const NavMesh& mesh, std::span<const double> heights,
-                                              double spacing = 0.5);
+                                              double spacing = 0.25);
 
 }  // namespace gsnav

@@ -8,6 +8,7 @@
 
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/math/similarity.hpp"
+#include "gsnav/scene/drop_bands.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/sh_rotation.hpp"
 
@@ -78,23 +79,6 @@ inline void crop(GaussianCloud& cloud, const Aabb<double>& box) {
     for (int k = 0; k < 3; ++k) inside = inside && m[k] >= box.low[k] && m[k] <= box.high[k];
     return inside;
   });
-}
-
-/// Drops the SH bands above `degree`; a cloud that has fewer stays as it is.
-inline void limit_sh_degree(GaussianCloud& cloud, int degree) {
-  if (degree >= cloud.sh_degree) return;
-  const std::size_t from = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
-  const std::size_t to = 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1);
-  const auto cut = [&](auto& bands) {
-    if (bands.empty()) return;
-    for (std::size_t i = 0; i < cloud.size(); ++i) {
-      for (std::size_t k = 0; k < to; ++k) bands[i * to + k] = bands[i * from + k];
-    }
-    bands.resize(cloud.size() * to);
-  };
-  cut(cloud.shN);
-  cut(cloud.shN_half);
-  cloud.sh_degree = degree;
 }
 
 }  // namespace gsnav

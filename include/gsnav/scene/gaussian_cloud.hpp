@@ -235,22 +235,20 @@ inline double half_sh_error(const GaussianCloud& cloud) noexcept {
   return static_cast<double>(error);
 }
 
-/// Keeps shN as binary16, which renders in half of the memory. Returns half_sh_error. While it works both are there.
+/// Keeps shN as binary16, which renders in half of the memory. Returns half_sh_error.
 inline double compact_sh(GaussianCloud& cloud) {
   const double error = half_sh_error(cloud);
   if (cloud.shN.empty()) return error;
-  cloud.shN_half = huge_vector<std::uint16_t>(cloud.shN.size());
-  for (std::size_t i = 0; i < cloud.shN.size(); ++i) cloud.shN_half[i] = half_of_float(cloud.shN[i]);
-  cloud.shN = {};
+  cloud.shN_half = moved_through<std::uint16_t>(cloud.shN, cloud.shN.size(),
+                                                [](float v) { return half_of_float(v); });
   return error;
 }
 
 /// Undoes compact_sh but for the rounding.
 inline void expand_sh(GaussianCloud& cloud) {
   if (cloud.shN_half.empty()) return;
-  cloud.shN = huge_vector<float>(cloud.shN_half.size());
-  for (std::size_t i = 0; i < cloud.shN.size(); ++i) cloud.shN[i] = half_to_float(cloud.shN_half[i]);
-  cloud.shN_half = {};
+  cloud.shN = moved_through<float>(cloud.shN_half, cloud.shN_half.size(),
+                                   [](std::uint16_t v) { return half_to_float(v); });
 }
 
 /// A cloud with the report of how it was read.

@@ -31,8 +31,9 @@ struct FrameLedger {
   std::uint64_t unseen = 0;      ///< Gaussians in chunks left out by a visible set (VisibleSets)
   double unseen_weight = 0;      ///< of which no viewpoint saw more than this part of a pixel: sampled, no bound
   LodStats lod;                  ///< zeros where no level of detail was asked for
-  std::uint64_t sh_skipped = 0;  ///< SH coefficients in bands that are not read
+  std::uint64_t sh_skipped = 0;  ///< SH coefficients in bands that are not read, held or not
   double sh_error = 0;           ///< that changes no colour by more
+  std::uint64_t sh_bytes = 0;    ///< what bands that are not held would take
   std::uint64_t clamped = 0;     ///< Gaussians whose log-scale the reader limited to [-20, 20]
   double sh_storage_error = 0;   ///< largest change of a coefficient by compact storage
   double alpha_min = 0;          ///< alphas below are not blended
@@ -41,7 +42,7 @@ struct FrameLedger {
 };
 
 /// Fills a ledger for a frame of `sets` from `camera`, whose counts are `stats`.
-/// `report`, `profile`, `lod`: where there are any.
+/// `report`, `profile`, `lod`: where there are any. Cuts read all bands that are held.
 inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera& camera,
                                 const RenderConfig& config, const RenderStats& stats,
                                 const LoadReport* report = nullptr,
@@ -64,10 +65,12 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
     out.transparent = report->dropped_transparent;
     out.clamped = report->clamped_scales;
     out.sh_storage_error = report->sh_storage_error;
+    out.sh_bytes = report->sh_bytes_let_go;
   }
   if (profile != nullptr) {
-    out.sh_skipped = profile->sh_numbers - profile->sh_numbers_read;
-    out.sh_error = profile->color_error;
+    if (lod == nullptr) out.sh_skipped = profile->sh_numbers - profile->sh_numbers_read;
+    if (out.sh_skipped != 0 || profile->bytes_let_go != 0) out.sh_error = profile->color_error;
+    out.sh_bytes += profile->bytes_let_go;
   }
   if (lod != nullptr) out.lod = lod->stats();
   return out;
@@ -99,12 +102,14 @@ inline std::string ledger_text(const FrameLedger& l) {
     line("skipped: %llu SH coefficients; no colour changes by more than %.2g", count(l.sh_skipped),
          l.sh_error);
   }
+  if (l.sh_bytes != 0) {
+    line("not held: SH bands of %llu bytes; no colour changes by more than %.2g", count(l.sh_bytes),
+         l.sh_error);
+  }
   if (l.unseen != 0) {
-    line(
-        "left out: %llu Gaussians in chunks of which no viewpoint in or near the camera's cell sees "
-        "more than %.1g of a "
-        "pixel; sampled, not proved",
-        count(l.unseen), l.unseen_weight);
+    line("left out: %llu Gaussians in chunks of which no viewpoint in or near the camera's cell sees more than %.1g of a "
+         "pixel; sampled, not proved",
+         count(l.unseen), l.unseen_weight);
   }
   if (l.lod.shown != 0) {
     line(

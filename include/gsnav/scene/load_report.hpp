@@ -36,7 +36,9 @@ struct LoadReport {
   std::uint64_t dropped_zero_quat = 0;    ///< zero or non-finite quaternion
   std::uint64_t dropped_transparent = 0;  ///< opacity below 1/255: never drawn (lossless)
   std::uint64_t clamped_scales = 0;       ///< log-scale outside [-20, 20]
-  int sh_degree = 0;                      ///< that the cloud has room for
+  int sh_degree = 0;                      ///< of the file; the cloud has room for fewer where:
+  std::uint64_t sh_bytes_let_go =
+      0;  ///< what bands of zeros alone would take (LoadSceneOptions::keep_zero_bands)
   int sh_degree_used = 0;                 ///< highest band with a coefficient that is not zero
   Filter filter = Filter::classic;        ///< that the file asks for
   float eps2d = 0.3f;                     ///< its term on the 2D covariance's diagonal, px^2

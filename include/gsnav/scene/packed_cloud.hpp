@@ -14,6 +14,7 @@
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/load_report.hpp"
+#include "gsnav/scene/needed_bands.hpp"
 
 namespace gsnav {
 
@@ -144,30 +145,52 @@ inline void compare_shapes(const GaussianCloud& cloud, const GaussianView& packe
   }
 }
 
-/// Bands by 8 bits, and what that changes; the cloud's other planes may be gone.
-inline void pack_bands(const GaussianCloud& cloud, PackedCloud& out, PackErrors& errors) {
-  const std::size_t n = out.count, rest = n == 0 ? 0 : cloud.shN.size() / n;
-  out.shN = huge_vector<std::int8_t>(cloud.shN.size());
-  double squares = 0;
-  for (std::size_t c = 0; c < out.chunks.size(); ++c) {
-    const std::size_t first = c * kProjectChunk * rest, last = std::min(n, (c + 1) * kProjectChunk) * rest;
-    float(&steps)[3] = out.chunks[c].sh_steps;
-    const auto band = [rest](std::size_t at) { return packed_band(1 + static_cast<int>(at % rest / 3)); };
-    float largest[3]{};
-    for (std::size_t at = first; at < last; ++at) largest[band(at)] = max(largest[band(at)], abs(cloud.shN[at]));
-    for (int b = 0; b < 3; ++b) steps[b] = largest[b] / 127.0f;
-    for (std::size_t at = first; at < last; ++at) {
-      const float step = steps[band(at)];
-      const double code =
-          step > 0 ? clamp(static_cast<double>(cloud.shN[at]) / static_cast<double>(step), -127.0, 127.0) : 0;
-      out.shN[at] = static_cast<std::int8_t>(std::nearbyint(code));
-      const double error = std::fabs(static_cast<double>(static_cast<float>(out.shN[at]) * step - cloud.shN[at]));
-      errors.sh = std::max(errors.sh, error);
-      squares += error * error;
+/// Packs bands by 8 bits, chunk after chunk.
+class BandPacker {
+ public:
+  /// `out`: with its chunks; its shN is made for bands up to `degree`.
+  BandPacker(PackedCloud& out, int degree) : out_(out), rest_(sh_band_numbers(degree)) {
+    out.rest.sh_degree = degree;
+    out.shN = huge_vector<std::int8_t>(rest_ * out.count);
+  }
+  /// The next `chunks` chunks, whose bands are at `bands`.
+  void add(const float* bands, std::size_t chunks) {
+    for (const std::size_t end = chunk_ + chunks; chunk_ < end; ++chunk_) {
+      const std::size_t first = chunk_ * kProjectChunk * rest_;
+      const std::size_t n = std::min(out_.count * rest_, (chunk_ + 1) * kProjectChunk * rest_) - first;
+      float(&steps)[3] = out_.chunks[chunk_].sh_steps;
+      const auto band = [this](std::size_t at) {
+        return packed_band(1 + static_cast<int>(at % rest_ / 3));
+      };
+      float largest[3]{};
+      for (std::size_t at = 0; at < n; ++at) largest[band(at)] = max(largest[band(at)], abs(bands[at]));
+      for (int b = 0; b < 3; ++b) steps[b] = largest[b] / 127.0f;
+      for (std::size_t at = 0; at < n; ++at) {
+        const float step = steps[band(at)];
+        const double code =
+            step > 0 ? clamp(static_cast<double>(bands[at]) / static_cast<double>(step), -127.0, 127.0)
+                     : 0;
+        const std::int8_t kept = static_cast<std::int8_t>(std::nearbyint(code));
+        out_.shN[first + at] = kept;
+        const double error = std::fabs(static_cast<double>(static_cast<float>(kept) * step - bands[at]));
+        largest_ = std::max(largest_, error);
+        squares_ += error * error;
+      }
+      bands += n;
     }
   }
-  errors.sh_rms = cloud.shN.empty() ? 0 : std::sqrt(squares / static_cast<double>(cloud.shN.size()));
-}
+  /// What that changed, of bands up to `degree`; those above are zero.
+  void give(PackErrors& errors, int degree) const noexcept {
+    const std::size_t n = sh_band_numbers(degree) * out_.count;
+    errors.sh = largest_;
+    errors.sh_rms = n == 0 ? 0 : std::sqrt(squares_ / static_cast<double>(n));
+  }
+
+ private:
+  PackedCloud& out_;
+  std::size_t rest_, chunk_ = 0;
+  double largest_ = 0, squares_ = 0;
+};
 
 /// Bounds of what each `rows` packed rows stand for.
 inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed, std::size_t rows) {
@@ -188,17 +211,12 @@ inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed, std::si
   return out;
 }
 
-}  // namespace detail
-
-/// Packs a cloud, which is used up plane by plane. `errors`: what that changed.
-inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {}, PackErrors* errors = nullptr) {
-  PackErrors found;
+/// All but the bands. What is packed of the cloud is used up, what is not moves.
+inline PackedCloud pack_rows(GaussianCloud& cloud, const PackLimits& limits, PackErrors& found) {
   PackedCloud out;
   out.count = cloud.size();
-  expand_sh(cloud);
-  detail::pack_shapes(cloud, out);
-  GaussianView v = out.view();
-  detail::compare_shapes(cloud, v, found);
+  pack_shapes(cloud, out);
+  compare_shapes(cloud, out.view(), found);
   if (found.mean_deviations > limits.mean) {
     found.mean_bits = 32;
     found.mean = found.mean_deviations = 0;
@@ -209,16 +227,40 @@ inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {}
   cloud.means = {};
   cloud.scales = {};
   cloud.quats = {};
-  cloud.opacities = {};
+  release(cloud.opacities);
   out.sh0.resize(cloud.sh0.size());
   for (std::size_t i = 0; i < out.sh0.size(); ++i) {
     out.sh0[i] = half_of_float(cloud.sh0[i]);
     found.sh0 = std::max(found.sh0, static_cast<double>(abs(half_to_float(out.sh0[i]) - cloud.sh0[i])));
   }
-  cloud.sh0 = {};
-  detail::pack_bands(cloud, out, found);
+  release(cloud.sh0);
+  out.rest.origin_ids = std::move(cloud.origin_ids);
+  out.rest.origins = std::move(cloud.origins);
+  out.rest.row_ids = std::move(cloud.row_ids);
+  out.rest.filter = cloud.filter;
+  out.rest.eps2d = cloud.eps2d;
+  out.rest.sort_order = cloud.sort_order;
+  out.rest.color_space = cloud.color_space;
+  if (!cloud.chunk_bounds.empty()) {
+    out.rest.part_bounds = packed_bounds(out, kChunkPart);
+    out.rest.chunk_bounds = packed_bounds(out, kProjectChunk);
+  }
+  return out;
+}
+
+}  // namespace detail
+
+/// Packs a cloud, which is used up plane by plane. `errors`: what that changed.
+inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {},
+                              PackErrors* errors = nullptr) {
+  PackErrors found;
+  expand_sh(cloud);
+  PackedCloud out = detail::pack_rows(cloud, limits, found);
+  detail::BandPacker bands(out, cloud.sh_degree);
+  bands.add(cloud.shN.data(), out.chunks.size());
+  bands.give(found, cloud.sh_degree);
   if (found.sh_rms > limits.sh) {
-    out.shN = {};
+    release(out.shN);
     found.sh_rms = 0;
     found.sh = half_sh_error(cloud);
     found.sh_bits = found.sh > limits.sh_max ? 32 : 16;
@@ -226,18 +268,6 @@ inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {}
     if (found.sh_bits == 32) found.sh = 0;
     out.rest.shN = std::move(cloud.shN);
     out.rest.shN_half = std::move(cloud.shN_half);
-  }
-  cloud.shN = {};
-  out.rest.sh_degree = cloud.sh_degree;
-  out.rest.origin_ids = std::move(cloud.origin_ids);
-  out.rest.origins = std::move(cloud.origins);
-  out.rest.row_ids = std::move(cloud.row_ids);
-  out.rest.filter = cloud.filter;
-  out.rest.eps2d = cloud.eps2d;
-  out.rest.sort_order = cloud.sort_order;
-  if (!cloud.chunk_bounds.empty()) {
-    out.rest.part_bounds = detail::packed_bounds(out, kChunkPart);
-    out.rest.chunk_bounds = detail::packed_bounds(out, kProjectChunk);
   }
   if (errors != nullptr) *errors = found;
   return out;
@@ -257,7 +287,7 @@ inline GaussianCloud unpack_cloud(const PackedCloud& packed) {
   out.opacities = huge_vector<float>(n);
   out.sh0 = huge_vector<float>(3 * n);
   out.shN = huge_vector<float>(3 * rest * n);
-  out.shN_half = {};
+  release(out.shN_half);
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3f mean = mean_of(v, i), scales = scales_of(v, i);
     const Quatf q = quat_of(v, i);

@@ -55,6 +55,15 @@ class GaussianArrays {
       upload(backend, floats);
     }
   }
+  GaussianArrays(B& backend, const PackedCloud& cloud, const SceneProfile& profile)
+      : set_(profile.applied_to(cloud.set())) {
+    if constexpr (!is_host_backend<B>) {
+      const GaussianCloud floats = unpack_cloud(cloud);
+      set_ = profile.applied_to(floats.set());
+      upload(backend, floats);
+      to_device(backend, set_.gaussians.chunk_sh_degrees, bytes_);
+    }
+  }
   GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
     GaussianSet s = set_;
     s.world_from_asset = world_from_asset;
@@ -84,19 +93,12 @@ class GaussianArrays {
   /// Leaves out the bands that no chunk has: rows become shorter.
   static void drop_bands(GaussianView& v, std::vector<float>& floats,
                          std::vector<std::uint16_t>& halves) {
-    int most = v.chunk_sh_degrees.empty() ? v.sh_degree : 0;
-    for (const std::uint8_t degree : v.chunk_sh_degrees)
-      most = std::max(most, std::min(v.sh_degree, int{degree}));
+    const int most = needed_sh_degree(v);
     if (most == v.sh_degree) return;
-    const auto numbers = [](int degree) {
-      return 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1);
-    };
-    const std::size_t all = numbers(v.sh_degree), kept = numbers(most);
     const auto drop = [&]<class T>(View<const T>& from, std::vector<T>& to) {
       if (from.empty()) return;
-      to.resize(kept * v.size);
-      for (std::size_t i = 0; i < v.size; ++i)
-        std::copy_n(from.data + all * i, kept, to.data() + kept * i);
+      to.resize(sh_band_numbers(most) * v.size);
+      cut_rows(from.data, v.size, sh_band_numbers(v.sh_degree), sh_band_numbers(most), to.data());
       from = view_of(std::as_const(to));
     };
     drop(v.shN, floats);

@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "gsnav/core/pool_backend.hpp"
+#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/kernels/packed_gaussians.hpp"
 #include "gsnav/math/half.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/needed_bands.hpp"
 
 namespace gsnav {
@@ -21,19 +22,23 @@ inline constexpr double kUnseenColor = 1.0 / 1020;
 /// Finds, for each chunk, the SH bands that matter: those above a degree are left out where, for every
 /// Gaussian and channel of the chunk, they change the colour by at most `unseen`, seen from anywhere. By
 /// the addition theorem a band l of coefficients c is at most |c| sqrt((2 l + 1) / (4 pi)). `unseen` = 0
-/// leaves out zeros alone: the same bits.
-inline SceneProfile profile_scene(const GaussianCloud& cloud, double unseen = 0) {
+/// leaves out zeros alone: the same bits. `cloud`: arrays in host memory, packed ones too.
+inline SceneProfile profile_scene(const GaussianView& cloud, double unseen = 0) {
   SceneProfile out;
-  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
-  out.chunk_sh_degrees.assign(cloud.view().all_chunks(), static_cast<std::uint8_t>(cloud.sh_degree));
-  const auto number = [&](std::size_t at) {
+  const std::size_t rest = sh_band_numbers(cloud.sh_degree);
+  out.chunk_sh_degrees.assign(cloud.all_chunks(), static_cast<std::uint8_t>(cloud.sh_degree));
+  const auto number = [&](std::size_t at, std::size_t chunk, int k) {
+    if (!cloud.packed.shN.empty()) {
+      const float step = cloud.packed.chunks[chunk].sh_steps[packed_band(k)];
+      return static_cast<double>(static_cast<float>(cloud.packed.shN[at]) * step);
+    }
     return static_cast<double>(cloud.shN_half.empty() ? cloud.shN[at]
                                                       : half_to_float(cloud.shN_half[at]));
   };
   std::vector<double> errors(out.chunk_sh_degrees.size());
-  PoolBackend backend(threads_for(cloud.size()));
+  PoolBackend backend(threads_for(cloud.size));
   backend.parallel_for(errors.size(), [&](std::size_t c) {
-    const std::size_t first = c * kProjectChunk, end = std::min(cloud.size(), first + kProjectChunk);
+    const std::size_t first = c * kProjectChunk, end = std::min(cloud.size, first + kProjectChunk);
     double left_out[kMaxShDegree + 1] = {};  // largest error where bands above a degree are
     for (std::size_t i = first; i < end; ++i) {
       for (std::size_t channel = 0; channel < 3; ++channel) {
@@ -41,7 +46,7 @@ inline SceneProfile profile_scene(const GaussianCloud& cloud, double unseen = 0)
         for (int l = cloud.sh_degree; l > 0; --l) {
           double squares = 0;
           for (int k = sh_coefficient_count(l - 1); k < sh_coefficient_count(l); ++k) {
-            const double v = number(rest * i + 3 * static_cast<std::size_t>(k - 1) + channel);
+            const double v = number(rest * i + 3 * static_cast<std::size_t>(k - 1) + channel, c, k);
             squares += v * v;
           }
           error += std::sqrt(squares * (2 * l + 1) / (4 * std::numbers::pi));
@@ -56,13 +61,18 @@ inline SceneProfile profile_scene(const GaussianCloud& cloud, double unseen = 0)
   });
   backend.synchronize().throw_if_error();
   for (std::size_t c = 0; c < errors.size(); ++c) {
-    const std::size_t n = std::min(cloud.size() - c * kProjectChunk, std::size_t{kProjectChunk});
+    const std::size_t n = std::min(cloud.size - c * kProjectChunk, std::size_t{kProjectChunk});
     out.color_error = std::max(out.color_error, errors[c]);
     out.sh_numbers += rest * n;
-    out.sh_numbers_read +=
-        3 * static_cast<std::size_t>(sh_coefficient_count(out.chunk_sh_degrees[c]) - 1) * n;
+    out.sh_numbers_read += sh_band_numbers(out.chunk_sh_degrees[c]) * n;
   }
   return out;
+}
+/// Of a GaussianCloud or a PackedCloud.
+template <class Cloud>
+requires requires(const Cloud& c) { c.view(); }
+SceneProfile profile_scene(const Cloud& cloud, double unseen = 0) {
+  return profile_scene(cloud.view(), unseen);
 }
 
 }  // namespace gsnav

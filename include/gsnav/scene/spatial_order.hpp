@@ -170,11 +170,11 @@ void sort_spatially(B& backend, GaussianCloud& cloud) {
   for (auto& plane : cloud.quats) move(plane, 1);
   for (auto& plane : cloud.scales) move(plane, 1);
   move(cloud.opacities, 1);
-  room = {};
+  release(room);
   move(cloud.sh0, 3);
-  room = {};
+  release(room);
   move(cloud.shN, cloud.shN.size() / n);
-  room = {};
+  release(room);
   permute_rows(backend, order, cloud.shN_half.size() / n, cloud.shN_half);
   permute_rows(backend, order, 1, cloud.origin_ids);
   if (cloud.row_ids.empty()) {
