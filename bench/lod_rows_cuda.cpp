@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench_lod on a GPU: one camera a call, milliseconds between events on the stream, the copy of the cut's chunks
-// among them; the cut itself is the host's.
+// bench_lod on a GPU: one camera a call, then all views in one, milliseconds a frame between events on the stream, the
+// copy of the cut's chunks among them; the cut itself is the host's.
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "device_time.hpp"
 #include "gsnav/backends/cuda/batch.hpp"
@@ -63,6 +65,73 @@ class GpuRows {
       cuda_.copy(depth.data(), depths.floats.median_depth, depth.size() * sizeof(float), CopyKind::device_to_host);
       cuda_.synchronize().throw_if_error();
       out.add(rgb, depth, least, static_cast<double>(drawn_), pairs);
+    }
+    out.print(name, pixels);
+  }
+
+  /// All views in one call.
+  void batch_row(const char* name, LodDraw draw, double pixels, bool seen = false) {
+    LodRow out(views_, draw);
+    detail_.choice.pixels = std::max(pixels, 1e-3);
+    SceneDetail::Asset& asset = detail_.assets[0];
+    asset.tree = tree_;
+    asset.visible = seen ? visible_ : nullptr;
+    asset.visible_there = seen ? visible_there_.data() : nullptr;
+    const std::size_t n = views_.cameras.size();
+    std::vector<DetailSets> cuts(n);
+    std::vector<GaussianSet> sets{arrays_.set()};
+    std::vector<std::vector<std::uint32_t>> lists(n);
+    std::vector<View<const std::uint32_t>> bits(n);
+    std::vector<BatchCamera> batch;
+    bool closes = draw == LodDraw::lod;
+    std::uint64_t drawn = 0;
+    for (std::size_t c = 0; c < n; ++c) {
+      batch.push_back({views_.cameras[c], {}, {}});
+      if (draw == LodDraw::lod) {
+        cuts[c].select(detail_, {}, views_.cameras[c]);
+        closes = closes && cuts[c].rules(fast()).transmittance_min > fast().transmittance_min;
+        drawn += cuts[c].cut(0).stats().drawn;
+      } else {
+        drawn += cloud_.size();
+        const auto cell = seen ? visible_->cell_of(views_.cameras[c]) : std::nullopt;
+        if (cell) bits[c] = visible_->seen_from(*cell, visible_there_.data());
+        batch[c].seen = std::span(bits).subspan(c, 1);
+      }
+    }
+    if (draw == LodDraw::lod) {
+      sets.clear();
+      chunks_.place(cuts);
+      for (std::size_t c = 0; c < n; ++c) {
+        for (const GaussianSet& set : cuts[c].sets()) {
+          lists[c].push_back(static_cast<std::uint32_t>(sets.size()));
+          sets.push_back(set);
+        }
+        batch[c].sets = lists[c];
+      }
+    }
+    CudaBatchRenderer& renderer = closes ? closing_ : direct_;
+    memory_.resize_discard(4 * n * kPixels);
+    BatchImages images, depths;
+    images.floats.rgb = memory_.data();
+    depths.floats.median_depth = memory_.data() + 3 * n * kPixels;
+    double least = 1e9;
+    for (int repeat = 0; repeat < 9; ++repeat) {
+      least = std::min(least, time_.us([&] {
+        if (draw == LodDraw::lod) chunks_.place(cuts);
+        renderer.render(sets, batch, images).throw_if_error();
+      }));
+      renderer.finish().throw_if_error();
+    }
+    const double pairs = static_cast<double>(renderer.stats().tile_intersections) / static_cast<double>(n);
+    renderer.render(sets, batch, depths).throw_if_error();
+    renderer.finish().throw_if_error();
+    std::vector<float> rgb(3 * kPixels), depth(kPixels);
+    for (std::size_t c = 0; c < n; ++c) {
+      cuda_.copy(rgb.data(), images.floats.rgb + 3 * c * kPixels, rgb.size() * sizeof(float), CopyKind::device_to_host);
+      cuda_.copy(depth.data(), depths.floats.median_depth + c * kPixels, depth.size() * sizeof(float),
+                 CopyKind::device_to_host);
+      cuda_.synchronize().throw_if_error();
+      out.add(rgb, depth, least * 1e-3 / static_cast<double>(n), static_cast<double>(drawn) / static_cast<double>(n), pairs);
     }
     out.print(name, pixels);
   }
@@ -139,6 +208,11 @@ void lod_rows_on_gpu(LodViews& views, const GaussianCloud& cloud, const LodTree&
   for (const double p : pixels) rows.row("lod", LodDraw::lod, p);
   rows.row("fast, seen", LodDraw::seen, 0, true);
   for (const double p : pixels) rows.row("lod, seen", LodDraw::lod, p, true);
+  std::printf("%zu cameras in one call\n", views.cameras.size());
+  rows.batch_row("direct fast", LodDraw::direct, 0);
+  for (const double p : pixels) rows.batch_row("lod", LodDraw::lod, p);
+  rows.batch_row("fast, seen", LodDraw::seen, 0, true);
+  for (const double p : pixels) rows.batch_row("lod, seen", LodDraw::lod, p, true);
 }
 
 }  // namespace gsnav_bench

@@ -83,6 +83,8 @@ class DetailSets {
     return sets_;
   }
 
+  /// The last choice, its chunks where place_chunks() put them.
+  std::span<const GaussianSet> sets() const noexcept { return sets_; }
   /// The rules by which to draw them; valid until the next call.
   const RenderConfig& rules(const RenderConfig& config) {
     rules_ = lod_config(config, stats_);
