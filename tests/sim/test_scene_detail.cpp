@@ -219,7 +219,7 @@ TEST_CASE(
   auto alone = Simulator<OpenMPBackend>::create(backend, shared, batched).value();
   auto out = batch.reset().value();
   Rng rng(5);
-  for (int step = 0; step < 12; ++step) {
+  for (int step = 0; step < 5; ++step) {
     for (std::size_t e = 0; e < 2; ++e) {
       alone.set_state(batch.world(e).state());
       const auto seen = alone.observe().value();
