@@ -119,6 +119,8 @@ TEST_CASE("visible sets: what is behind a wall is left out, and no image shows i
   config.outputs = kRgb;
   config.profile = Profile::fast;
   Renderer<float, OpenMPBackend> renderer(backend, config);
+  config.depth_slices = 3;
+  Renderer<float, OpenMPBackend> sliced(backend, config);
   Rng rng(5);
   int known = 0, hidden = 0;
   for (int i = 0; i < 30; ++i) {
@@ -137,6 +139,7 @@ TEST_CASE("visible sets: what is behind a wall is left out, and no image shows i
     const auto whole = renderer.render(rooms().set(), camera).value().rgb;
     const auto part = renderer.render(seen_set(rooms(), sets, *cell), camera).value().rgb;
     CHECK(psnr(whole, part) > 60);
+    CHECK(sliced.render(seen_set(rooms(), sets, *cell), camera).value().rgb == part);
   }
   CHECK(known > 20);
   CHECK(hidden > 2 * known);

@@ -26,15 +26,15 @@ namespace gsnav {
 
 /// Which chunks of a cloud can be seen from where cameras go: what stands behind walls need not be
 /// looked at. Sampled: chunks of which nobody saw anything from viewpoints in and around a cell are left
-/// out for cameras in it. An approximation, for the profiles `fast` and `lod`; docs/approximations.md
-/// has its error.
+/// out for cameras in it. An approximation, for the profiles `fast` and `lod`; docs/lod.md has its
+/// error.
 struct VisibleSets {
   using Key = std::array<std::int32_t, 3>;
 
-  double cell = 0;  ///< side of the cubic cells, in the asset's frame: cell k spans [k, k + 1) times
-                    ///< this, each axis
-  double focal =
-      0;  ///< pixels: of the viewpoints' images; of cameras with a larger one nothing is known
+  /// Side of the cubic cells, in the asset's frame: cell k spans [k, k + 1) times this along each axis.
+  double cell = 0;
+  /// Focal length of the viewpoints' images, pixels: of cameras with a longer one nothing is known.
+  double focal = 0;
   double near_plane = 0;            ///< metres in the world: nor of those with a farther one
   double near_sigma = 0;            ///< Camera::near_sigma: nor of those with another
   double min_weight = 0;            ///< VisibleSettings::min_weight
