@@ -25,7 +25,7 @@ inline gsnav::GaussianCloud two_rooms(std::uint64_t seed, int per_side = 400) {
         g.mean[side / 2] = (side % 2 == 0 ? low : high)[side / 2];
         g.quat = {1, 0, 0, 0};
         g.log_scales = {std::log(0.16), std::log(0.16), std::log(0.16)};
-        g.log_scales[static_cast<std::size_t>(side / 2)] = std::log(0.004);
+        g.log_scales[side / 2] = std::log(0.004);
         g.opacity_logit = 5;
         for (std::size_t k = 0; k < 3; ++k) g.sh0[k] = static_cast<float>(rng.uniform(-1.5, 1.5));
         builder.add(g);
