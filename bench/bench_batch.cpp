@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in one row.
 //
-//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256]
-//   [--compact] [--balls 8]
+//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256] [--compact] [--balls 8]
 //       [--visible] [batch sizes...]
 //
 // Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of

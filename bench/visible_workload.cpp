@@ -54,13 +54,10 @@ VisibleSets workload_visible_sets() {
   std::sort(heights.begin(), heights.end());
   heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
   VisibleSettings settings;
-  double focal = 0;
-  for (const Camera& c : cameras) {
-    focal = std::max({focal, c.fx, c.fy});
-    settings.near_plane = c.near_plane;
-  }
-  settings.face = static_cast<int>(std::ceil(2 * focal - 1e-6));
-  const std::vector<Vec3d> viewpoints = navmesh_viewpoints(built.mesh, heights, 0.5 * settings.cell).value();
+  settings.serve(*std::max_element(cameras.begin(), cameras.end(), [](const Camera& x, const Camera& y) {
+    return std::max(x.fx, x.fy) < std::max(y.fx, y.fy);
+  }));
+  const std::vector<Vec3d> viewpoints = navmesh_viewpoints(built.mesh, heights, settings.spacing()).value();
   OpenMPBackend backend;
   const auto start = std::chrono::steady_clock::now();
   const char* scene = std::getenv("GSNAV_BENCH_SCENE");

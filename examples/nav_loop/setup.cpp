@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "setup.hpp"
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <optional>
 
@@ -56,14 +54,12 @@ Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::
                                            const gsnav::NavMesh& navmesh) {
   const gsnav::Camera eye = gsnav::sensor_camera(sensors_of(options)[0], {}, {});
   gsnav::VisibleSettings settings;
-  settings.face = static_cast<int>(std::ceil(2 * std::max(eye.fx, eye.fy) - 1e-6));
-  settings.near_plane = eye.near_plane;
-  settings.near_sigma = eye.near_sigma;
+  settings.serve(eye);
   settings.progress = [](double share) {
     std::fprintf(stderr, "\rfinding visible sets: %.0f %%", 100 * share);
   };
   const double heights[] = {options.eye_height};
-  const auto viewpoints = gsnav::navmesh_viewpoints(navmesh, heights, 0.5 * settings.cell);
+  const auto viewpoints = gsnav::navmesh_viewpoints(navmesh, heights, settings.spacing());
   if (!viewpoints) return viewpoints.status();
   auto backend = builder(options);
   if (options.scene.empty()) {

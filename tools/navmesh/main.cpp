@@ -57,10 +57,10 @@ Result<NavMesh> from_triangles(const Options& o, const Similarity& placed) {
 /// Finds what is seen from where on the NavMesh, and writes it.
 Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const NavMesh& mesh,
                           const Similarity& placed) {
-  const auto viewpoints = navmesh_viewpoints(mesh, o.eye_heights, 0.5 * o.visible.cell);
+  const auto viewpoints = navmesh_viewpoints(mesh, o.eye_heights, o.visible.spacing());
   if (!viewpoints) return viewpoints.status();
   VisibleSettings settings = o.visible;
-  settings.margin = 0.5 * settings.cell;
+  settings.margin = settings.spacing();
   settings.progress = [terminal = isatty(fileno(stdout)) != 0](double share) {
     if (terminal) std::printf("\rvisible sets: %.0f %%", 100 * share);
     if (terminal) std::fflush(stdout);

@@ -182,8 +182,7 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     const auto end = std::chrono::steady_clock::now();
     total_ms += std::chrono::duration<double, std::milli>(end - start).count();
     if (o.ledger) {
-      FrameLedger l = frame_ledger(here, cameras[c], renderer.config(), f.stats[0], &scene.report,
-                                         &scene.profile, cut);
+      FrameLedger l = frame_ledger(here, cameras[c], renderer.config(), f.stats[0], &scene.report, &scene.profile, cut);
       l.unseen = details.unseen();
       if (scene.visible != nullptr) l.unseen_weight = scene.visible->min_weight;
       std::printf("camera %zu:\n%s", c, ledger_text(l).c_str());

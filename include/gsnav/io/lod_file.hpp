@@ -3,9 +3,9 @@
 
 #include <filesystem>
 #include <string>
-#include <utility>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/io/read_or_build.hpp"
 #include "gsnav/scene/lod_build.hpp"
 
 namespace gsnav::io {
@@ -40,20 +40,11 @@ struct CachedLod {
 template <Backend B>
 Result<CachedLod> cached_lod(B& backend, const std::string& spec, const GaussianCloud& cloud,
                              const LodSettings& settings = {}) {
-  const std::filesystem::path path = lod_path(spec, cloud, settings);
-  CachedLod out;
-  Result<LodTree> read = load_lod(path, cloud, settings);
-  if (read) {
-    out.tree = std::move(*read);
-    return out;
-  }
-  if (read.code() != Errc::file_not_found) out.warning = read.message();
-  Result<LodTree> made = build_lod(backend, cloud, settings);
-  if (!made) return made.status();
-  out.tree = std::move(*made);
-  out.built = true;
-  if (Status s = save_lod(path, out.tree, cloud, settings); !s) out.warning = s.message();
-  return out;
+  return detail::read_or_build<CachedLod>(
+      lod_path(spec, cloud, settings), &CachedLod::tree,
+      [&](const std::filesystem::path& path) { return load_lod(path, cloud, settings); },
+      [&] { return build_lod(backend, cloud, settings); },
+      [&](const std::filesystem::path& path, const LodTree& tree) { return save_lod(path, tree, cloud, settings); });
 }
 
 }  // namespace gsnav::io

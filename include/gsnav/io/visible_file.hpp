@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <span>
 #include <string>
-#include <utility>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/io/read_or_build.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav::io {
@@ -31,9 +31,8 @@ std::filesystem::path visible_sets_path(const std::string& spec, const GaussianC
 /// Visible sets, and what there is to say of where they came from.
 struct CachedVisibleSets {
   VisibleSets sets;
-  bool built = false;  ///< now; else read
-  std::string
-      warning;  ///< why a file that is there was not taken, or why none could be written; or empty
+  bool built = false;   ///< now; else read
+  std::string warning;  ///< why a file that is there was not taken, or why none could be written; or empty
 };
 
 /// The visible sets of a scene: read where visible_sets_path() has them, else built and written there. A
@@ -45,21 +44,11 @@ Result<CachedVisibleSets> cached_visible_sets(B& backend, const std::string& spe
                                               std::span<const Vec3d> viewpoints,
                                               const VisibleSettings& settings = {},
                                               const Similarity& world_from_asset = {}) {
-  const std::filesystem::path path =
-      visible_sets_path(spec, cloud, viewpoints, settings, world_from_asset);
-  CachedVisibleSets out;
-  Result<VisibleSets> read = load_visible_sets(path, cloud);
-  if (read) {
-    out.sets = std::move(*read);
-    return out;
-  }
-  if (read.code() != Errc::file_not_found) out.warning = read.message();
-  Result<VisibleSets> made = build_visible_sets(backend, cloud, viewpoints, settings, world_from_asset);
-  if (!made) return made.status();
-  out.sets = std::move(*made);
-  out.built = true;
-  if (Status s = save_visible_sets(path, out.sets, cloud); !s) out.warning = s.message();
-  return out;
+  return detail::read_or_build<CachedVisibleSets>(
+      visible_sets_path(spec, cloud, viewpoints, settings, world_from_asset), &CachedVisibleSets::sets,
+      [&](const std::filesystem::path& path) { return load_visible_sets(path, cloud); },
+      [&] { return build_visible_sets(backend, cloud, viewpoints, settings, world_from_asset); },
+      [&](const std::filesystem::path& path, const VisibleSets& sets) { return save_visible_sets(path, sets, cloud); });
 }
 
 }  // namespace gsnav::io

@@ -101,6 +101,16 @@ struct VisibleSettings {
   int face = 256;            ///< pixels along a face of the cube that is looked at from each viewpoint
   double near_plane = 0.2;   ///< of these images (Camera); what lies nearer to a cell is in its set in any case
   double near_sigma = 0;     ///< likewise
+
+  /// How far apart viewpoints should be (navmesh_viewpoints): with a margin of as much every cell has several, each
+  /// with its own directions.
+  double spacing() const noexcept { return 0.5 * cell; }
+  /// Has `face`, `near_plane` and `near_sigma` be such that the sets serve this camera.
+  void serve(const Camera& camera) noexcept {
+    face = static_cast<int>(std::ceil(2 * std::max(camera.fx, camera.fy) - 1e-6));
+    near_plane = camera.near_plane;
+    near_sigma = camera.near_sigma;
+  }
   /// Told the share of the work that is done, in [0, 1], for each viewpoint, by the calling thread.
   std::function<void(double)> progress;
 };

@@ -73,7 +73,7 @@ class BatchSimulator {
     for (const auto& scene : scenes) {
       if (scene == nullptr) return {Errc::invalid_argument, "BatchSimulator: a scene is null"};
       if (Status s = validate(*scene); !s) return s;
-      if (Status s = validate_detail(*scene, {config.lod, config.visible_sets}); !s) return s;
+      if (Status s = validate_detail(*scene, detail_choice(config)); !s) return s;
     }
     const std::size_t count = scenes.size();
     return create(backend, [held = std::move(scenes)](std::size_t i) -> Result<ScenePointer> { return held[i]; }, {}, count,
@@ -166,14 +166,13 @@ class BatchSimulator {
     }
   }
 
-  DetailChoice detail_choice() const { return {config_.lod, config_.visible_sets}; }
   /// Puts a scene that environments are in into the backend's memory, where it is not there yet.
   Status place_scene(std::size_t scene) {
     if (scenes_[scene] != nullptr) return {};
     auto held = scene_pointer_(scene);
     if (!held) return held.status();
-    if (Status s = validate_detail(**held, detail_choice()); !s) return s;
-    scenes_[scene] = std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held), detail_choice());
+    if (Status s = validate_detail(**held, detail_choice(config_)); !s) return s;
+    scenes_[scene] = std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held), detail_choice(config_));
     render_configs_[scene] = scenes_[scene]->render_config(config_.render);
     return {};
   }

@@ -29,6 +29,9 @@ struct SimulatorConfig {
   std::uint64_t seed = 0;  ///< of the sensors' noise
 };
 
+/// What of its assets a simulator draws.
+inline DetailChoice detail_choice(const SimulatorConfig& config) { return {config.lod, config.visible_sets}; }
+
 /// invalid_argument, naming the field, where a value is impossible.
 inline Status validate(const SimulatorConfig& config) {
   if (Status s = validate(config.task); !s) return s;
@@ -88,7 +91,7 @@ class Simulator {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
     if (Status s = validate(*scene); !s) return s;
     if (Status s = validate(config); !s) return s;
-    if (Status s = validate_detail(*scene, {config.lod, config.visible_sets}); !s) return s;
+    if (Status s = validate_detail(*scene, detail_choice(config)); !s) return s;
     Result<World> world =
         World::create(scene->navmesh, config.task, [scene, others](double t0, double t1, auto& out) {
           append_bodies(*scene, t0, t1, out);
@@ -192,7 +195,7 @@ class Simulator {
   Simulator(B& backend, World world, SimulatorConfig config, std::shared_ptr<const SimulatorScene> scene)
       : world_(std::move(world)),
         config_(std::move(config)),
-        scene_(backend, std::move(scene), {config_.lod, config_.visible_sets}),
+        scene_(backend, std::move(scene), detail_choice(config_)),
         rig_(backend, config_.sensors),
         spectator_chunks_(backend) {
     config_.render = scene_.render_config(config_.render);
