@@ -2,13 +2,14 @@
 // Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in one row.
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256] [--compact] [--balls 8]
-//       [--visible] [batch sizes...]
+//       [--rgb] [--visible] [--visible-rows 8] [--visible-weight 0.001] [batch sizes...]
 //
 // Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of
 // views repeats them from slightly different places. Times are the device's, between events on the
 // stream; `host us` is how long the call takes that asks for them. --balls: so many meshes of 4000
-// triangles stand before the first cameras, seen by all. --visible: each camera draws only what is seen
-// from its cell (VisibleSets).
+// triangles stand before the first cameras, seen by all. --rgb: colours alone, as most renderers have them, no depth
+// and no alpha. --visible: each camera draws only what is seen from its cell (VisibleSettings::rows, min_weight); the
+// images of all views are compared with those of all that is there.
 #include <cuda_runtime.h>
 
 #include <algorithm>
@@ -34,6 +35,7 @@ namespace {
 
 constexpr int kRepeats = 9;
 int g_width = 256, g_height = 256;
+bool g_rgb_alone = false;
 constexpr std::size_t kReferenceViews = 4;  ///< compared with float64
 std::vector<MeshInstance> g_meshes;         ///< on the device
 VisibleSets g_visible;                      ///< none: all is drawn
@@ -94,6 +96,7 @@ struct DeviceImages {
   DeviceImages(CudaBackend& cuda, std::size_t pixels) : memory(cuda) {
     memory.resize_discard(5 * pixels);
     images.floats.rgb = memory.data();
+    if (g_rgb_alone) return;
     images.floats.alpha = memory.data() + 3 * pixels;
     images.floats.median_depth = memory.data() + 4 * pixels;
   }
@@ -143,10 +146,11 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   std::vector<float> rgb(3 * compared * pixels), depth(compared * pixels), depth_seen;
   std::vector<double> depth_truth;
   cuda.copy(rgb.data(), out.images.floats.rgb, rgb.size() * sizeof(float), CopyKind::device_to_host);
-  cuda.copy(depth.data(), out.images.floats.median_depth, depth.size() * sizeof(float), CopyKind::device_to_host);
+  if (!g_rgb_alone)
+    cuda.copy(depth.data(), out.images.floats.median_depth, depth.size() * sizeof(float), CopyKind::device_to_host);
   cuda.synchronize().throw_if_error();
   for (std::size_t i = 0; i < depth.size(); ++i) {
-    if (truth.alpha[i] <= 0.9) continue;
+    if (g_rgb_alone || truth.alpha[i] <= 0.9) continue;
     depth_seen.push_back(depth[i]);
     depth_truth.push_back(truth.median_depth[i]);
   }
@@ -163,11 +167,46 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   cudaEventDestroy(end);
 }
 
+/// What sets change: every view with them beside the same without, in `fast`.
+void compare_visible(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays) {
+  const std::size_t views = gsnav_bench::workload().cameras.size();
+  const std::size_t values = 3 * static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);
+  RenderConfig config;
+  config.profile = Profile::fast;
+  CudaBatchRenderer renderer(cuda, config);
+  const std::vector<GaussianSet> sets{arrays.set()};
+  Buffer<float, CudaBackend> there(cuda);
+  there.resize_discard(values);
+  BatchImages images;
+  images.floats.rgb = there.data();
+  Seen seen(cuda);
+  double least = 1e9, worst = 0, sum = 0;
+  for (std::size_t v = 0; v < views; ++v) {
+    std::vector<float> rgb[2];
+    for (const int with : {0, 1}) {
+      std::vector<BatchCamera> camera = cameras_of(v, 1);
+      if (with == 1) seen.choose(camera);
+      renderer.render(sets, camera, images).throw_if_error();
+      renderer.finish().throw_if_error();
+      rgb[with].resize(values);
+      cuda.copy(rgb[with].data(), there.data(), values * sizeof(float), CopyKind::device_to_host);
+      cuda.synchronize().throw_if_error();
+    }
+    const gsnav_bench::Error e = gsnav_bench::error_of(rgb[1], std::vector<double>(rgb[0].begin(), rgb[0].end()));
+    least = std::min(least, e.psnr);
+    worst = std::max(worst, e.max);
+    sum += std::pow(10.0, -0.1 * e.psnr);
+  }
+  std::printf("with visible sets beside without, %zu views: least %.1f dB, of all %.1f dB, largest error %.1e\n", views,
+              least, -10 * std::log10(sum / static_cast<double>(views)), worst);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   std::vector<std::size_t> counts;
   bool compact = false, visible = false;
+  VisibleSettings sets_of;
   std::size_t balls = 0;
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--size" && i + 1 < argc) {
@@ -178,6 +217,15 @@ int main(int argc, char** argv) {
     } else if (std::string(argv[i]) == "--visible") {
       visible = true;
       continue;
+    } else if (std::string(argv[i]) == "--visible-rows" && i + 1 < argc) {
+      sets_of.rows = std::atoi(argv[++i]);
+      continue;
+    } else if (std::string(argv[i]) == "--visible-weight" && i + 1 < argc) {
+      sets_of.min_weight = std::atof(argv[++i]);
+      continue;
+    } else if (std::string(argv[i]) == "--rgb") {
+      g_rgb_alone = true;
+      continue;
     } else if (std::string(argv[i]) == "--balls" && i + 1 < argc) {
       balls = std::strtoull(argv[++i], nullptr, 10);
       if (balls > 0) continue;
@@ -186,7 +234,8 @@ int main(int argc, char** argv) {
       continue;
     }
     std::fprintf(stderr,
-                 "bench_batch: '%s' is no size (256x256), batch size, --compact, --visible or --balls\n",
+                 "bench_batch: '%s' is no size (256x256), batch size, --compact, --rgb, --visible, --visible-rows, "
+                 "--visible-weight or --balls\n",
                  argv[i]);
     return 2;
   }
@@ -198,7 +247,7 @@ int main(int argc, char** argv) {
   GaussianCloud shown = gsnav_bench::workload().cloud;
   if (compact) compact_sh(shown);
   const GaussianArrays<CudaBackend> arrays(cuda, shown);
-  if (visible) g_visible = gsnav_bench::workload_visible_sets();
+  if (visible) g_visible = gsnav_bench::workload_visible_sets(sets_of);
   OpenMPBackend cpu;
   Renderer<double, OpenMPBackend> reference(cpu);
   std::vector<Camera> cameras;
@@ -217,9 +266,10 @@ int main(int argc, char** argv) {
   }
   reference.set_meshes(here);
   const Frames<double> truth = reference.render(sets, cameras).value();
-  std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB + alpha + median depth%s, %zu meshes\n", cuda.device_name().c_str(),
+  std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB%s%s, %zu meshes\n", cuda.device_name().c_str(),
               gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), g_width, g_height,
-              compact ? ", SH in half precision" : "", balls);
+              g_rgb_alone ? "" : " + alpha + median depth", compact ? ", SH in half precision" : "", balls);
+  if (visible) compare_visible(cuda, arrays);
   std::printf("profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  scratch MB  host us\n");
   if (counts.empty()) counts = {1, 8, 64, 256, 512};
   for (const Profile profile : {Profile::fast, Profile::exact}) {

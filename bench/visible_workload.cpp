@@ -36,7 +36,7 @@ Quatd upright(const std::vector<Camera>& cameras) {
 
 }  // namespace
 
-VisibleSets workload_visible_sets() {
+VisibleSets workload_visible_sets(VisibleSettings settings) {
   const GaussianCloud& cloud = workload().cloud;
   const std::vector<Camera> cameras = sized(256, 256);
   const Similarity placed{upright(cameras), {}, 1.0};
@@ -53,7 +53,6 @@ VisibleSets workload_visible_sets() {
   }
   std::sort(heights.begin(), heights.end());
   heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
-  VisibleSettings settings;
   settings.serve(*std::max_element(cameras.begin(), cameras.end(), [](const Camera& x, const Camera& y) {
     return std::max(x.fx, x.fy) < std::max(y.fx, y.fy);
   }));
@@ -71,10 +70,10 @@ VisibleSets workload_visible_sets() {
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   std::printf(
       "visible sets: %zu cells of %.2f m from %zu viewpoints, %s in %.1f s, %.2f MB; a cell sees %.1f "
-      "%% of %zu chunks\n",
+      "%% of %zu chunks, %.1f %% of the Gaussians\n",
       found.sets.cells(), found.sets.cell, viewpoints.size(), found.built ? "found" : "read",
       took.count(), static_cast<double>(found.sets.bytes()) * 1e-6, 100 * found.sets.mean_share(),
-      found.sets.cloud_chunks);
+      found.sets.cloud_chunks, 100 * found.sets.mean_row_share(cloud.size()));
   return std::move(found.sets);
 }
 

@@ -166,9 +166,9 @@ Result<Setup> prepare(const Options& options) {
   if (options.visible_sets) {
     auto visible = visible_sets_of(options, setup.scene.assets[0], *setup.scene.navmesh);
     if (!visible) return visible.status();
-    std::printf("visible sets: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks\n",
+    std::printf("visible sets: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the Gaussians\n",
                 visible->cells(), visible->viewpoints, 100 * visible->mean_share(),
-                visible->cloud_chunks);
+                visible->cloud_chunks, 100 * visible->mean_row_share(setup.scene.assets[0].cloud->size()));
     setup.scene.assets[0].visible = std::make_shared<const gsnav::VisibleSets>(std::move(*visible));
   }
   // People are wider than the agent: they keep their shoulders clear of the furniture.

@@ -16,18 +16,19 @@ namespace fs = std::filesystem;
 
 constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'V', 'I', 'S'};
 /// Grows with every change of what build_visible_sets makes of a cloud.
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 
-/// What stands at the front; keys and bits follow.
+/// What stands at the front; keys, ends and bits follow.
 struct Header {
   char magic[8];
   std::uint32_t version, size;
   std::uint64_t built_of[2];  ///< hash of the cloud but for its colours, and of the version
   double cell, focal, near_plane, near_sigma, min_weight;
   std::uint64_t viewpoints, cells, chunks;  ///< chunks of the cloud
+  std::uint64_t words;                      ///< of all cells' bits
   std::uint64_t checksum;                   ///< of the numbers above and of the arrays
 };
-static_assert(sizeof(Header) == 104);
+static_assert(sizeof(Header) == 112);
 
 Hasher hash_of(const GaussianCloud& cloud) {
   Hasher h;
@@ -41,6 +42,7 @@ std::uint64_t checksum(const VisibleSets& v) {
   for (const double x : {v.cell, v.focal, v.near_plane, v.near_sigma, v.min_weight}) h.value(x);
   h.value(std::uint64_t{v.viewpoints});
   h.array(v.keys);
+  h.array(v.ends);
   h.array(v.bits);
   return h.low();
 }
@@ -49,8 +51,31 @@ Status invalid(const fs::path& path, const std::string& what) {
   return {Errc::invalid_file, path.string() + ": " + what};
 }
 
+/// What is wrong with the words of a cell of a cloud of so many Gaussians, or null.
+const char* flaw_of(const VisibleSets& v, std::size_t cell, std::size_t cloud_rows) {
+  const View<const std::uint32_t> seen = v.seen_from(cell);
+  const std::size_t words = v.words();
+  if (words == 0) return seen.size == 0 ? nullptr : "words of a scene that has no chunk";
+  const std::uint32_t beyond = v.cloud_chunks % 32 == 0 ? 0 : ~0u << (v.cloud_chunks % 32);
+  if (seen.size < words || (seen[words - 1] & beyond) != 0) return "a chunk that the scene does not have";
+  if (seen.size == words) return nullptr;
+  if (seen.size != 2 * words + kSeenRowWords * v.count_seen(cell)) return "not as many rows as chunks";
+  std::size_t place = 0;
+  for (std::size_t c = 0; c < v.cloud_chunks; ++c) {
+    if (c % 32 == 0 && seen[words + c / 32] != place) return "chunks that are not counted right";
+    if ((seen[c / 32] >> (c % 32) & 1u) == 0) continue;
+    const gsnav::detail::RowBits there = gsnav::detail::all_rows(cloud_rows, c);
+    for (std::size_t k = 0; k < kSeenRowWords; ++k) {
+      if ((seen[2 * words + kSeenRowWords * place + k] & ~there[k]) != 0)
+        return "a row that the scene does not have";
+    }
+    ++place;
+  }
+  return nullptr;
+}
+
 /// What lookups and kernels rely on.
-Status check(const fs::path& path, const VisibleSets& v) {
+Status check(const fs::path& path, const VisibleSets& v, std::size_t cloud_rows) {
   if (!(v.cell > 0 && std::isfinite(v.cell))) return invalid(path, "cell = " + std::to_string(v.cell));
   if (!(v.focal > 0 && std::isfinite(v.focal)))
     return invalid(path, "focal = " + std::to_string(v.focal));
@@ -62,15 +87,16 @@ Status check(const fs::path& path, const VisibleSets& v) {
   }
   if (!(v.min_weight >= 0 && v.min_weight < 1))
     return invalid(path, "min_weight = " + std::to_string(v.min_weight));
-  const std::uint32_t beyond = v.cloud_chunks % 32 == 0 ? 0 : ~0u << (v.cloud_chunks % 32);
   for (std::size_t c = 0; c < v.cells(); ++c) {
     const auto bad = [&path, c](const char* what) {
       return invalid(path, "cell " + std::to_string(c) + ": " + what);
     };
     if (c > 0 && !(v.keys[c - 1] < v.keys[c])) return bad("its place is not behind the one before");
-    if (v.words() > 0 && (v.seen_from(c)[v.words() - 1] & beyond) != 0)
-      return bad("a chunk that the scene does not have");
+    if (v.ends[c] < (c == 0 ? 0 : v.ends[c - 1]) || v.ends[c] > v.bits.size())
+      return bad("its words are not behind those before");
+    if (const char* flaw = flaw_of(v, c, cloud_rows)) return bad(flaw);
   }
+  if (v.bits.size() != (v.ends.empty() ? 0 : v.ends.back())) return invalid(path, "words of no cell");
   return {};
 }
 
@@ -92,10 +118,12 @@ Status save_visible_sets(const fs::path& path, const VisibleSets& sets, const Ga
     header.viewpoints = sets.viewpoints;
     header.cells = sets.cells();
     header.chunks = sets.cloud_chunks;
+    header.words = sets.bits.size();
     header.checksum = checksum(sets);
     return detail::replace_file(path, [&](detail::OutFile& file) {
       file.write(&header, sizeof header);
       file.write(sets.keys.data(), sets.keys.size() * sizeof(VisibleSets::Key));
+      file.write(sets.ends.data(), sets.ends.size() * sizeof(std::uint64_t));
       file.write(sets.bits.data(), sets.bits.size() * sizeof(std::uint32_t));
     });
   });
@@ -121,12 +149,14 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
     // Nothing is allocated that the file does not have.
     VisibleSets v;
     v.cloud_chunks = cloud.view().all_chunks();
-    const std::uint64_t cell_bytes = sizeof(VisibleSets::Key) + v.words() * sizeof(std::uint32_t);
+    constexpr std::uint64_t kCell = sizeof(VisibleSets::Key) + sizeof(std::uint64_t);
     const std::uint64_t room = file.size() - sizeof header;
-    if (header.chunks != v.cloud_chunks || room % cell_bytes != 0 || header.cells != room / cell_bytes) {
+    const bool fits = header.cells <= room / kCell && header.words <= room / sizeof(std::uint32_t) &&
+                      header.cells * kCell + header.words * sizeof(std::uint32_t) == room;
+    if (header.chunks != v.cloud_chunks || !fits) {
       return invalid(path, "has " + std::to_string(file.size()) + " bytes, not those of " +
-                               std::to_string(header.cells) + " cells and " +
-                               std::to_string(header.chunks) + " chunks");
+                               std::to_string(header.cells) + " cells, " + std::to_string(header.words) +
+                               " words and " + std::to_string(header.chunks) + " chunks");
     }
     v.cell = header.cell;
     v.focal = header.focal;
@@ -135,7 +165,8 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
     v.min_weight = header.min_weight;
     v.viewpoints = header.viewpoints;
     v.keys.resize(header.cells);
-    v.bits.resize(header.cells * v.words());
+    v.ends.resize(header.cells);
+    v.bits.resize(header.words);
     std::uint64_t at = sizeof header;
     bool whole = true;
     const auto read = [&](auto& array) {
@@ -144,10 +175,11 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
       at += bytes.size();
     };
     read(v.keys);
+    read(v.ends);
     read(v.bits);
     if (!whole) return detail::reading_failed(path.string());
     if (header.checksum != checksum(v)) return invalid(path, "its checksum is another: damaged");
-    if (Status s = check(path, v); !s) return s;
+    if (Status s = check(path, v, cloud.size()); !s) return s;
     return v;
   });
 }
@@ -161,6 +193,7 @@ fs::path visible_sets_path(const std::string& spec, const GaussianCloud& cloud,
     h.value(x);
   }
   h.value(settings.face);
+  h.value(settings.rows);
   const Quatd& q = world_from_asset.rotation;
   for (const double x : {q.w, q.x, q.y, q.z, world_from_asset.scale}) h.value(x);
   for (int k = 0; k < 3; ++k) h.value(world_from_asset.translation[k]);

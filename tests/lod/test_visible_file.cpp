@@ -2,7 +2,9 @@
 // The file beside an asset that keeps what is seen from where.
 #include <doctest/doctest.h>
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -51,6 +53,7 @@ TEST_CASE("visible sets file: what is read is what was written, whatever the col
     CHECK(read.cloud_chunks == sets().cloud_chunks);
     CHECK(read.viewpoints == places_in_rooms().size());
     CHECK(read.keys == sets().keys);
+    CHECK(read.ends == sets().ends);
     CHECK(read.bits == sets().bits);
   }
 }
@@ -66,11 +69,11 @@ TEST_CASE("visible sets file: truncated, damaged, too long, foreign: each is ref
     CHECK(r.code() == code);
     CHECK(contains(r.message(), "a.vis"));
   };
-  for (std::size_t n = 0; n < good.size(); n += n < 120 ? 1 : good.size() / 50)
+  for (std::size_t n = 0; n < good.size(); n += n < 128 ? 1 : good.size() / 50)
     refused(good.substr(0, n), Errc::invalid_file);
   refused(good + "x", Errc::invalid_file);
   refused(std::string(good.size(), '\0'), Errc::invalid_file);
-  for (std::size_t at = 32; at < good.size(); at += at < 104 ? 1 : good.size() / 60) {
+  for (std::size_t at = 32; at < good.size(); at += at < 112 ? 1 : good.size() / 60) {
     std::string bad = good;
     bad[at] = static_cast<char>(bad[at] ^ 0x10);
     refused(bad, Errc::invalid_file);
@@ -80,7 +83,7 @@ TEST_CASE("visible sets file: truncated, damaged, too long, foreign: each is ref
   refused(other, Errc::invalid_argument);
   // Counts whose sum of bytes would be right if it were not for its 64 bits.
   std::string huge = good;
-  for (std::size_t k = 80; k < 96; ++k) huge[k] = '\xff';
+  for (std::size_t k = 80; k < 104; ++k) huge[k] = '\xff';
   refused(huge, Errc::invalid_file);
   write_file(path, good);
   CHECK(io::load_visible_sets(path, two_rooms(3, 200)).code() == Errc::invalid_argument);
@@ -104,7 +107,36 @@ TEST_CASE("visible sets file: values that cannot be are refused though the check
   refused([](auto& v) { v.min_weight = 2; }, "min_weight");
   refused([](auto& v) { std::swap(v.keys[0], v.keys[1]); }, "cell 1");
   REQUIRE(sets().cloud_chunks % 32 != 0);
-  refused([](auto& v) { v.bits[2 * v.words() - 1] |= 0x80000000u; }, "cell 1: a chunk");
+  const auto of_cell = [](auto& v, std::size_t cell) { return v.bits.data() + (cell == 0 ? 0 : v.ends[cell - 1]); };
+  refused([&](auto& v) { of_cell(v, 1)[v.words() - 1] |= 0x80000000u; }, "cell 1: a chunk");
+  refused([&](auto& v) { of_cell(v, 1)[2 * v.words() - 1] += 1; }, "cell 1: chunks that are not counted");
+  refused([](auto& v) { v.ends[1] -= 1; }, "cell 1: not as many rows");
+  refused([](auto& v) { std::swap(v.ends[0], v.ends[1]); }, "cell");
+  refused([](auto& v) { v.ends[2] = ~std::uint64_t{0}; }, "cell 2: its words");
+  refused([](auto& v) { v.bits.push_back(0); }, "words of no cell");
+  refused([](auto& v) { v.ends.back() -= kSeenRowWords; v.bits.resize(v.bits.size() - kSeenRowWords); }, "not as many rows");
+  // The last row of the last chunk that a cell sees there, which has fewer.
+  REQUIRE(rooms().size() % kProjectChunk != 0);
+  for (std::size_t c = 0; c < sets().cells(); ++c) {
+    const std::size_t last = sets().cloud_chunks - 1;
+    if ((sets().seen_from(c)[last / 32] >> (last % 32) & 1) == 0) continue;
+    refused([&](auto& v) { v.bits[v.ends[c] - 1] |= 0x80000000u; }, "a row that the scene");
+    return;
+  }
+  FAIL("no cell sees the last chunk");
+}
+
+TEST_CASE("visible sets file: of chunks alone") {
+  const TempFolder folder("visible_chunks");
+  OpenMPBackend backend(2);
+  VisibleSettings settings = coarse();
+  settings.rows = 0;
+  const std::vector<Vec3d> eyes = places_in_rooms();
+  const VisibleSets made = build_visible_sets(backend, rooms(), std::span(eyes).first(4), settings).value();
+  REQUIRE(io::save_visible_sets(folder / "a.vis", made, rooms()).ok());
+  const VisibleSets read = io::load_visible_sets(folder / "a.vis", rooms()).value();
+  CHECK(read.ends == made.ends);
+  CHECK(read.bits == made.bits);
 }
 
 TEST_CASE("visible sets file: cached beside the asset, by all that they are made of") {
@@ -116,6 +148,9 @@ TEST_CASE("visible sets file: cached beside the asset, by all that they are made
   CHECK(path.parent_path() == folder.path());
   VisibleSettings other = coarse();
   other.min_weight *= 2;
+  CHECK(path != io::visible_sets_path(asset, rooms(), eyes, other));
+  other = coarse();
+  other.rows = 4;
   CHECK(path != io::visible_sets_path(asset, rooms(), eyes, other));
   CHECK(path != io::visible_sets_path(asset, rooms(), std::span(eyes).first(9), coarse()));
   CHECK(path != io::visible_sets_path(asset, rooms(), eyes, coarse(), {{}, {1, 0, 0}, 1}));

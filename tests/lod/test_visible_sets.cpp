@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <type_traits>
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
@@ -16,6 +18,8 @@
 #include "level_support.hpp"
 #include "lod_support.hpp"
 #include "support/files.hpp"
+#include "support/scenes.hpp"
+#include "support/seen_rows.hpp"
 #include "two_rooms.hpp"
 
 using namespace gsnav;
@@ -54,7 +58,7 @@ Camera random_camera(Rng& rng) {
 
 GaussianSet seen_set(const GaussianCloud& cloud, const VisibleSets& sets, std::size_t cell) {
   GaussianSet s = cloud.set();
-  s.gaussians.seen_chunks = sets.seen_from(cell);
+  s.gaussians.seen = sets.seen_from(cell);
   return s;
 }
 
@@ -67,13 +71,11 @@ double psnr(const std::vector<float>& a, const std::vector<float>& b) {
 
 }  // namespace
 
-TEST_CASE(
-    "chunk weights: of one Gaussian a chunk, what an image of it alone in white shows, in double") {
+TEST_CASE("row weights: of a few Gaussians, what an image of each alone in white shows, in double") {
   GaussianCloud cloud = small_wall(3, 1500, 0);
-  // One of each chunk stays.
   std::vector<std::size_t> kept;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    if (i % kProjectChunk == 17) {
+    if (i % 128 == 17) {
       kept.push_back(i);
       for (auto& s : cloud.scales) s[i] = 0.4f;
       cloud.opacities[i] = 0.6f;
@@ -84,32 +86,120 @@ TEST_CASE(
   bound_chunks(cloud);
   const Camera camera = Camera::look_at({0.3, -0.2, 0}, {0, 0, 4}, {0, -1, 0}, 50, 40, 80);
   OpenMPBackend backend(2);
-  ChunkWeightsWorkspace<OpenMPBackend> workspace(backend);
-  std::vector<float> most(cloud.chunk_bounds.size());
-  REQUIRE(add_chunk_weights(backend, workspace, cloud.set(), camera, most).ok());
+  RowWeightsWorkspace<OpenMPBackend> workspace(backend);
+  std::vector<float> most(cloud.size());
+  REQUIRE(add_row_weights(backend, workspace, cloud.set(), camera, most).ok());
 
   SerialBackend serial;
   RenderConfig config;
   config.outputs = kRgb;
   Renderer<double, SerialBackend> renderer(serial, config);
-  REQUIRE(kept.size() == most.size());
   int seen = 0;
-  for (std::size_t c = 0; c < kept.size(); ++c) {
+  for (const std::size_t i : kept) {
     GaussianCloud white = cloud;
     std::fill(white.sh0.begin(), white.sh0.end(), -0.5f / 0.28209479177387814f);  // black
-    for (std::size_t k = 0; k < 3; ++k) white.sh0[3 * kept[c] + k] = 0.5f / 0.28209479177387814f;
+    for (std::size_t k = 0; k < 3; ++k) white.sh0[3 * i + k] = 0.5f / 0.28209479177387814f;
     const auto image = renderer.render(white.set(), camera).value().rgb;
     const double expected = *std::max_element(image.begin(), image.end());
-    CHECK(static_cast<double>(most[c]) == doctest::Approx(expected).epsilon(2e-4));
+    CHECK(static_cast<double>(most[i]) == doctest::Approx(expected).epsilon(2e-4));
     seen += expected > 0.01 ? 1 : 0;
+    most[i] = 0;
   }
-  CHECK(seen >= 4);
+  CHECK(seen >= 6);
+  CHECK(*std::max_element(most.begin(), most.end()) == 0);
   // Raised, not set.
   std::vector<float> above(most.size(), 2.0f);
-  REQUIRE(add_chunk_weights(backend, workspace, cloud.set(), camera, above).ok());
+  REQUIRE(add_row_weights(backend, workspace, cloud.set(), camera, above).ok());
   CHECK(above == std::vector<float>(most.size(), 2.0f));
-  CHECK(add_chunk_weights(backend, workspace, cloud.set(), camera, std::span(above).first(1)).code() ==
+  CHECK(add_row_weights(backend, workspace, cloud.set(), camera, std::span(above).first(1)).code() ==
         Errc::invalid_argument);
+}
+
+TEST_CASE("rows that may be seen are drawn as if the others were transparent: whole, in lanes, in slices, in double") {
+  Rng rng(31);
+  GaussianCloud cloud = random_cloud(
+      71, {.count = 9007, .sh_degree = 1, .needle = 0.02, .scale = 0.03, .center = {0, 0, 0}, .extent = 5});
+  sort_spatially(cloud);
+  OpenMPBackend lanes(2);
+  SerialBackend serial;
+  for (int i = 0; i < 4; ++i) {
+    const std::vector<bool> may = random_rows(rng, cloud.size());
+    const std::vector<std::uint32_t> words = seen_words(may);
+    const GaussianCloud rest = only_seen(cloud, may);
+    GaussianSet set = cloud.set();
+    set.gaussians.seen = {words.data(), words.size()};
+    const double yaw = rng.uniform(0, 6.3);
+    const Camera camera = Camera::look_at({0, 0, 0}, {std::cos(yaw), 0.2, std::sin(yaw)}, {0, 1, 0}, 60, 44, 80);
+    RenderConfig config;
+    config.outputs = kRgb | kAlpha | kMedianDepth;
+    const auto same = [&](auto& backend, auto scalar) {
+      Renderer<decltype(scalar), std::remove_reference_t<decltype(backend)>> renderer(backend, config);
+      const auto part = renderer.render(set, camera).value(), want = renderer.render(rest.set(), camera).value();
+      CHECK(part.rgb == want.rgb);
+      CHECK(part.alpha == want.alpha);
+      CHECK(part.median_depth == want.median_depth);
+      CHECK(*std::max_element(part.alpha.begin(), part.alpha.end()) > 0.3);
+    };
+    for (const int slices : {1, 3}) {
+      config.depth_slices = slices;
+      same(lanes, 0.0f);
+    }
+    config.response = Response::ray;  // without lanes
+    same(lanes, 0.0f);
+    config.response = Response::ewa;
+    same(serial, 0.0f);
+    same(serial, 0.0);
+  }
+  GaussianSet set = cloud.set();
+  const std::vector<std::uint32_t> words = seen_words(std::vector<bool>(cloud.size(), true));
+  const auto render = [&] { return Renderer<float, SerialBackend>(serial, {}).render(set, Camera::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 8, 8, 80)); };
+  set.gaussians.seen = {words.data(), words.size()};
+  CHECK(render().status().ok());
+  set.gaussians.seen.size = words.size() - 1;
+  CHECK(render().code() == Errc::invalid_argument);
+  CHECK(contains(render().message(), "seen"));
+}
+
+TEST_CASE("visible sets: rows in runs hold what single ones do, and chunks are those of both") {
+  OpenMPBackend backend(2);
+  const std::vector<Vec3d> eyes = places_in_rooms();
+  const auto made = [&](int rows) {
+    VisibleSettings s = coarse();
+    s.rows = rows;
+    return build_visible_sets(backend, rooms(), std::span(eyes).first(6), s).value();
+  };
+  const VisibleSets chunks = made(0), ones = made(1), runs = made(8);
+  const std::size_t words = chunks.words();
+  std::size_t some = 0;
+  REQUIRE(ones.keys == chunks.keys);
+  REQUIRE(runs.keys == chunks.keys);
+  for (std::size_t c = 0; c < chunks.cells(); ++c) {
+    REQUIRE(chunks.seen_from(c).size == words);
+    REQUIRE(ones.seen_from(c).size == 2 * words + kSeenRowWords * chunks.count_seen(c));
+    GaussianView a = rooms().view(), b = rooms().view();
+    a.seen = ones.seen_from(c);
+    b.seen = runs.seen_from(c);
+    std::size_t rows = 0;
+    for (std::size_t chunk = 0; chunk < chunks.cloud_chunks; ++chunk) {
+      const bool seen = (chunks.seen_from(c)[chunk / 32] >> (chunk % 32) & 1) != 0;
+      CHECK(a.may_be_seen(chunk) == seen);
+      CHECK(b.may_be_seen(chunk) == seen);
+      if (!seen) continue;
+      const SeenRows of_ones = a.seen_rows(chunk), of_runs = b.seen_rows(chunk);
+      const std::size_t size = std::min(kProjectChunk, rooms().size() - chunk * kProjectChunk);
+      for (std::size_t r = 0; r < kProjectChunk; ++r) {
+        bool any = false;
+        for (std::size_t k = r / 8 * 8; k < r / 8 * 8 + 8; ++k) any = any || of_ones.has(k);
+        CHECK(of_runs.has(r) == (any && r < size));
+        rows += of_ones.has(r) ? 1 : 0;
+      }
+    }
+    CHECK(ones.count_seen_rows(c, rooms().size()) == rows);
+    CHECK(rows <= runs.count_seen_rows(c, rooms().size()));
+    some += rows < runs.count_seen_rows(c, rooms().size()) ? 1 : 0;
+    CHECK(runs.count_seen_rows(c, rooms().size()) < chunks.count_seen_rows(c, rooms().size()));
+  }
+  CHECK(some > 0);
 }
 
 TEST_CASE("visible sets: what is behind a wall is left out, and no image shows it") {
@@ -149,6 +239,7 @@ TEST_CASE("visible sets: the same bits for any number of threads") {
   SerialBackend one;
   const VisibleSets again = build_visible_sets(one, rooms(), places_in_rooms(), coarse()).value();
   CHECK(again.keys == rooms_sets().keys);
+  CHECK(again.ends == rooms_sets().ends);
   CHECK(again.bits == rooms_sets().bits);
 }
 
@@ -172,7 +263,7 @@ TEST_CASE("visible sets: of a placed cloud in its own frame") {
   config.outputs = kRgb;
   Renderer<float, OpenMPBackend> renderer(backend, config);
   GaussianSet part = rooms().set(placed);
-  part.gaussians.seen_chunks = sets.seen_from(*cell);
+  part.gaussians.seen = sets.seen_from(*cell);
   CHECK(psnr(renderer.render(rooms().set(placed), camera).value().rgb,
              renderer.render(part, camera).value().rgb) > 60);
 }
@@ -213,6 +304,8 @@ TEST_CASE("visible sets: what cannot be is refused by name") {
   refused([](auto& s) { s.cell = 0; }, "cell");
   refused([nan](auto& s) { s.margin = nan; }, "margin");
   refused([](auto& s) { s.min_weight = 1; }, "min_weight");
+  refused([](auto& s) { s.rows = 3; }, "rows");
+  refused([](auto& s) { s.rows = 64; }, "rows");
   refused([](auto& s) { s.face = 8; }, "face");
   refused([](auto& s) { s.near_plane = 0; }, "near_plane");
   refused([](auto& s) { s.near_sigma = -1; }, "near_sigma");

@@ -12,6 +12,7 @@
 #include "gsnav/scene/spatial_order.hpp"
 #include "ops/cuda_batch_images.hpp"
 #include "ops/no_gpu.hpp"
+#include "support/seen_rows.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -171,20 +172,32 @@ TEST_CASE("cuda batch: each camera draws what may be seen from where it is, as i
   for (const int count : {1, 5, 40}) {
     CAPTURE(count);
     const std::vector<Camera> cameras = cameras_within(count);
-    std::vector<std::uint32_t> bits(words * cameras.size());
-    for (std::uint32_t& word : bits) word = static_cast<std::uint32_t>(rng.uniform(0, 4294967295.0));
+    // Every third camera knows of chunks alone, every fourth of nothing.
+    std::vector<std::uint32_t> bits;
+    std::vector<std::size_t> begins{0};
+    std::vector<GaussianCloud> rests;
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      std::vector<bool> may = random_rows(rng, a.size());
+      if (c % 3 == 1) {
+        for (std::size_t i = 0; i < may.size(); ++i) may[i] = may[i / kProjectChunk * kProjectChunk];
+      }
+      std::vector<std::uint32_t> of_camera = seen_words(may);
+      if (c % 3 == 1) of_camera.resize(words);
+      if (c % 4 == 3) {
+        of_camera.clear();
+        may.assign(may.size(), true);
+      }
+      rests.push_back(only_seen(a, may));
+      bits.insert(bits.end(), of_camera.begin(), of_camera.end());
+      begins.push_back(bits.size());
+    }
     Buffer<std::uint32_t, CudaBackend> there(cuda);
     there.upload(bits.data(), bits.size());
     std::vector<std::vector<View<const std::uint32_t>>> seen;
     Frames<float> want;
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      seen.push_back({{there.data() + c * words, words}, {}});
-      GaussianCloud rest = a;
-      for (std::size_t i = 0; i < rest.size(); ++i) {
-        const std::size_t chunk = i / kProjectChunk;
-        if ((bits[c * words + chunk / 32] >> (chunk % 32) & 1) == 0) rest.opacities[i] = 0;
-      }
-      const GaussianArrays<CudaBackend> on_rest(cuda, rest);
+      seen.push_back({{there.data() + begins[c], begins[c + 1] - begins[c]}, {}});
+      const GaussianArrays<CudaBackend> on_rest(cuda, rests[c]);
       const Frames<float> one = singly(cuda, {on_rest.set(), on_b.set()}, {cameras[c]}, {}, {}, kAll);
       for_each_image(want, one, [](std::vector<float>& to, const std::vector<float>& from) {
         to.insert(to.end(), from.begin(), from.end());
@@ -195,7 +208,7 @@ TEST_CASE("cuda batch: each camera draws what may be seen from where it is, as i
     check_same(got.frames, want);
     // The generic path, of the first camera.
     GaussianSet alone = on_a.set();
-    alone.gaussians.seen_chunks = seen[0][0];
+    alone.gaussians.seen = seen[0][0];
     check_same(singly(cuda, {alone, on_b.set()}, {cameras[0]}, {}, {}, kAll),
                draw_batch(cuda, renderer, {alone, on_b.set()}, {cameras[0]}, {}, kAll, false).frames);
     const BatchCamera short_list{cameras[0], {}, {}, std::span(seen[0]).first(1)};

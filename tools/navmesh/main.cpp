@@ -69,9 +69,10 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   const auto sets = build_visible_sets(backend, cloud, *viewpoints, settings, placed);
   if (!sets) return sets.status();
   if (Status s = io::save_visible_sets(o.visible_sets, *sets, cloud); !s) return s;
-  std::printf("%s%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks\n",
+  std::printf("%s%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the Gaussians\n",
               isatty(fileno(stdout)) != 0 ? "\r" : "", o.visible_sets.c_str(), sets->cells(),
-              sets->viewpoints, 100 * sets->mean_share(), sets->cloud_chunks);
+              sets->viewpoints, 100 * sets->mean_share(), sets->cloud_chunks,
+              100 * sets->mean_row_share(cloud.size()));
   return {};
 }
 

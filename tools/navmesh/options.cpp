@@ -138,7 +138,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   setting("--visible-cell", v.cell,
           "Side of a cell, metres; places that are looked from are half of it apart");
   setting("--visible-weight", v.min_weight,
-          "A chunk of Gaussians is seen where one of them has so much of a pixel");
+          "Gaussians are seen where one that lies with them has more of a pixel than this");
+  setting("--visible-rows", v.rows,
+          "How many neighbouring Gaussians are seen or not together, up to 32; 0: a whole chunk of 256");
   setting("--visible-face", v.face,
           "Pixels that span 90 degrees: for cameras of no larger focal length");
   setting("--near-plane", v.near_plane, "Of cameras, at most; metres");

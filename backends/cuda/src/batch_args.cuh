@@ -71,8 +71,8 @@ struct Pair {
   std::uint32_t key, slot;
 };
 
-/// Rows of tiles of a splat of very many, from `row` on: BatchArgs::rows_of_large, or what is left.
-struct LargeRows {
+/// A row of tiles of a splat of very many.
+struct LargeRow {
   std::uint32_t slot, row;
 };
 
@@ -116,8 +116,8 @@ struct BatchArgs {
   TileGrid grid;
   float log2_alpha_min;
   bool elliptic;
+  bool seen_rows;  ///< some instance knows of its rows which may be seen
   DepthBins depth_bins;
-  int rows_of_large;  ///< that a warp has of a large splat: few cameras have few of these
 
   BatchItem* items;
   BatchCounters* counters;
@@ -128,7 +128,7 @@ struct BatchArgs {
   SplatPerspective<float>* perspectives;  ///< null: Response::ewa
   HardSplat* hard;
   std::uint32_t* several;  ///< slots whose tiles are still to be found; kNoSlot: none
-  LargeRows* large;        ///< of splats of very many tiles
+  LargeRow* large;        ///< of splats of very many tiles
   /// [tiles << depth_bins.bits]: how many pairs; where the next goes, once lists have their places; where bins
   /// end, once all are there.
   std::uint32_t* bins;

@@ -12,35 +12,35 @@ namespace {
 
 constexpr unsigned kThreads = 128;
 
-/// Calls f(slot, key, tile, wanted), by all lanes together, for the tiles of the large splats: a warp has some rows of
-/// one at a time.
+/// Calls f(slot, key, tile, wanted), by all lanes together, for the tiles of the large splats: a lane finds those of a
+/// row. A warp's rows lie far apart in the queue: neighbours are mostly of one splat, and a warp that has all of the
+/// largest would be waited for.
 template <class F>
 __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
+  constexpr unsigned kAll = 0xffffffffu;
   const std::uint32_t n = used(a.counters->large, a.large_capacity);
-  const int ts = a.grid.tile_size, shift = a.grid.tile_shift();
-  const int lane = static_cast<int>(threadIdx.x % 32);
-  for (std::uint32_t i = (blockIdx.x * kThreads + threadIdx.x) / 32; i < n; i += gridDim.x * kThreads / 32) {
-    const LargeRows part = a.large[i];
-    const std::uint32_t slot = part.slot;
-    const SplatRecord& r = a.records[slot];
-    const SplatBounds b = bounds_of(r.x, r.y);
-    const int top = static_cast<int>(part.row) * ts;
-    const SplatEntry e = a.entries[slot];
-    // Lanes find the columns of a row each.
-    const int y = top + lane * ts, ty = y >> shift;
-    int first = 0, end = 0;
-    if (lane < a.rows_of_large && y < b.y1) {
+  const int ts = a.grid.tile_size;
+  const std::uint32_t warps = gridDim.x * kThreads / 32;
+  for (std::uint32_t i = (blockIdx.x * kThreads + threadIdx.x) / 32; i < n; i += 32 * warps) {
+    std::uint32_t slot = 0, key = 0, begin = 0, count = 0;  // `begin`: the first tile's number
+    const std::uint32_t mine = i + threadIdx.x % 32 * warps;
+    if (mine < n) {
+      const LargeRow part = a.large[mine];
+      const SplatRecord& r = a.records[part.slot];
+      const SplatEntry e = a.entries[part.slot];
+      const SplatBounds b = bounds_of(r.x, r.y);
+      const int y = static_cast<int>(part.row) * ts;
       const SplatBounds row{b.x0, max(b.y0, y), b.x1, min(b.y1, y + ts)};
-      for_each_tile(a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](std::size_t tile) {
-        const int tx = static_cast<int>(tile) - ty * a.grid.columns;
-        if (end == 0) first = tx;
-        end = tx + 1;
+      slot = part.slot;
+      key = e.key;
+      for_each_tile_row(a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](int ty, int first, int last) {
+        begin = first_tile(a, e.camera) + static_cast<std::uint32_t>(ty * a.grid.columns + first);
+        count = static_cast<std::uint32_t>(last - first + 1);
       });
     }
-    share_in_warp(static_cast<std::uint32_t>(end - first), [&](unsigned owner, std::uint32_t k) {
-      const int tx = __shfl_sync(0xffffffffu, first, owner % 32) + static_cast<int>(k);
-      const int row = (top >> shift) + static_cast<int>(owner);
-      f(slot, e.key, first_tile(a, e.camera) + static_cast<std::uint32_t>(row * a.grid.columns + tx), owner < 32);
+    share_in_warp(count, [&](unsigned owner, std::uint32_t k) {
+      const unsigned from = owner % 32;
+      f(__shfl_sync(kAll, slot, from), __shfl_sync(kAll, key, from), __shfl_sync(kAll, begin, from) + k, owner < 32);
     });
   }
 }
@@ -55,7 +55,7 @@ __device__ void for_each_tile_of_windows(const BatchArgs& a, std::uint32_t slot,
     const TileWindow window{__shfl_sync(kAll, e.corner, from), __shfl_sync(kAll, tiles, from)};
     const std::uint32_t camera = __shfl_sync(kAll, e.camera, from);
     f(__shfl_sync(kAll, slot, from), __shfl_sync(kAll, e.key, from),
-      tile_of(a, camera, window, nth_bit(window.tiles, k)), owner < 32);
+      tile_of(a, camera, window, nth_bit<16>(window.tiles, k)), owner < 32);
   });
 }
 
@@ -75,13 +75,13 @@ __global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
     if (slot != kNoSlot) {
       const SplatRecord& r = a.records[slot];
       e = a.entries[slot];
-      // Tiles of a grid as wide as the window are numbered as its bits are.
-      TileGrid grid = a.grid;
-      grid.columns = TileWindow::kSide;
       const TileWindow window{e.corner, 0};
-      const std::size_t corner = window.row() * TileWindow::kSide + window.column();
-      for_each_tile(grid, geometry_of(r), bounds_of(r.x, r.y), a.log2_alpha_min, a.elliptic,
-                    [&](std::size_t tile) { tiles |= 1u << (tile - corner); });
+      for_each_tile_row(a.grid, geometry_of(r), bounds_of(r.x, r.y), a.log2_alpha_min, a.elliptic,
+                        [&](int ty, int first, int last) {
+                          const std::uint32_t row = static_cast<std::uint32_t>(ty) - window.row(),
+                                              column = static_cast<std::uint32_t>(first) - window.column();
+                          tiles |= ((2u << (last - first)) - 1u) << (row * TileWindow::kSide + column);
+                        });
       a.entries[slot].tiles = tiles;
     }
     for_each_tile_of_windows(a, slot, e, tiles, count);

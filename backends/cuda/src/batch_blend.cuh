@@ -72,8 +72,8 @@ struct ReachedBlocks {
   }
   __device__ unsigned of_ellipse(const SplatGeometry<float>& g, float log2_alpha_min) const {
     const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
-    const FootprintStrips<float> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0),
-                                        centre(y1));
+    const FootprintStrips<float, true> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0),
+                                              centre(y1));
     unsigned mask = 0;
     for (int row = first_row(); row <= last_row(); ++row) {
       const int top = y + row * kBlock;

@@ -19,7 +19,7 @@ inline constexpr int kOrderLevels = 10;  ///< of 7 bits: five for the key, five 
 inline constexpr std::size_t kOrderLent = 12800;
 
 /// A batch is scattered into so many buckets by key; what shares one is put in order afterwards.
-inline constexpr int kBucketBits = 11, kBuckets = 1 << kBucketBits;
+inline constexpr int kBucketBits = 10, kBuckets = 1 << kBucketBits;
 inline constexpr int kThreadBuckets = kBuckets / kOrderThreads;
 
 using OrderSort = cub::BlockRadixSort<std::uint32_t, kOrderThreads, kOrderItems, std::uint32_t>;

@@ -63,7 +63,7 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
     }
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const GaussianView& g = sets[cameras[c].sets.empty() ? i : cameras[c].sets[i]].gaussians;
-      if (!seen[i].empty() && seen[i].size != (g.all_chunks() + 31) / 32) {
+      if (!seen[i].empty() && !g.can_be_seen(seen[i].size)) {
         return bad(Errc::invalid_argument, "seen[" + std::to_string(i) + "] has " +
                                                std::to_string(seen[i].size) + " words for " +
                                                std::to_string(g.all_chunks()) + " chunks");
@@ -121,9 +121,8 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
     std::uint32_t rank = 0;
     std::size_t place = 0;
     const auto see = [&](std::uint32_t s) {
-      const auto chunks =
-          cameras[c].seen.empty() ? sets[s].gaussians.seen_chunks : cameras[c].seen[place++];
-      seen.push_back({s, c, rank, chunks});
+      const auto bits = cameras[c].seen.empty() ? sets[s].gaussians.seen : cameras[c].seen[place++];
+      seen.push_back({s, c, rank, bits});
       rank += static_cast<std::uint32_t>(sets[s].gaussians.size);
       ++set_begins[s + 1];
       origins += std::max<std::size_t>(1, sets[s].gaussians.origins.size);
@@ -172,7 +171,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
     instance.camera = seen[i].camera;
     ProjectArgs<float>& to = instance.args;
     to.gaussians = set.gaussians;
-    to.gaussians.seen_chunks = seen[i].chunks;
+    to.gaussians.seen = seen[i].bits;
     to.camera = make_projection_camera<float>(camera, set, rules);
     to.camera64 = make_projection_camera<double>(camera, set, rules);
     to.sh_degree = std::min(set.gaussians.sh_degree, config.max_sh_degree);
@@ -194,6 +193,9 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   // ---- units of culling
   auto* const units = host(static_cast<BatchSet*>(nullptr), at_sets);
   args = {};
+  args.seen_rows = std::any_of(seen.begin(), seen.end(), [&](const Seen& v) {
+    return v.bits.size > sets[v.set].gaussians.seen_words();
+  });
   item_capacity = 0;
   for (std::size_t s = 0; s < sets.size(); ++s) {
     BatchSet& u = units[s];
@@ -226,7 +228,6 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   args.log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
   args.elliptic = config.response == Response::ewa;
   args.slab = args.cameras < 8 ? 64 : 256;
-  args.rows_of_large = args.cameras < 8 ? 8 : 32;
 
   raster = {};
   raster.grid = args.grid;

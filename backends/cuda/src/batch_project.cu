@@ -11,7 +11,7 @@ namespace gsnav::cuda {
 namespace {
 
 constexpr unsigned kThreads = 256, kWarps = kThreads / 32;
-constexpr unsigned kProjectWarps = 4, kProjectBlocks = 6;  ///< of a block; of a multiprocessor
+constexpr unsigned kProjectWarps = 4, kProjectBlocks = 5;  ///< of a block; of a multiprocessor
 constexpr unsigned kWarpsPerPart = kChunkPart / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
@@ -19,7 +19,7 @@ constexpr unsigned kAll = 0xffffffffu;
 __device__ bool part_is_candidate(const ProjectArgs<float>& args, std::size_t chunk, unsigned part) {
   const GaussianView& gs = args.gaussians;
   const std::size_t at = chunk * kPartsPerChunk + part;
-  if (at * kChunkPart >= gs.size || !gs.may_be_seen(chunk)) return false;
+  if (at * kChunkPart >= gs.size || !gs.may_be_seen(chunk) || !gs.seen_rows(chunk).any_of_part(part)) return false;
   if (gs.chunk_bounds.empty()) return true;
   return may_be_visible(args.camera64,
                         gs.part_bounds.empty() ? gs.chunk_bounds[chunk] : gs.part_bounds[at]);
@@ -34,6 +34,10 @@ __device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t ch
   const unsigned all =
       (1u << (rows < kProjectChunk ? (rows + kChunkPart - 1) / kChunkPart : kPartsPerChunk)) - 1;
   unsigned parts = seen ? all : 0;
+  if (seen && instances[lane].args.gaussians.has_seen_rows()) {
+    const SeenRows rows = instances[lane].args.gaussians.seen_rows(chunk);
+    for (unsigned p = 0; p < kPartsPerChunk; ++p) parts &= rows.any_of_part(p) ? ~0u : ~(1u << p);
+  }
   unsigned edges =
       __ballot_sync(kAll, seen && !gs.part_bounds.empty() &&
                               !lies_in_view(instances[lane].args.camera64, gs.chunk_bounds[chunk]));
@@ -143,12 +147,10 @@ __device__ void write_record(const BatchArgs& a, std::uint32_t slot, const Batch
 
 __device__ void queue_large(const BatchArgs& a, std::uint32_t slot, const SplatBounds& b) {
   const int shift = a.grid.tile_shift();
-  const std::uint32_t rows = static_cast<std::uint32_t>(a.rows_of_large);
   const std::uint32_t first = static_cast<std::uint32_t>(b.y0 >> shift);
   const std::uint32_t end = static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1;
-  unsigned long long place =
-      atomicAdd(&a.counters->large, static_cast<unsigned long long>((end - first + rows - 1) / rows));
-  for (std::uint32_t row = first; row < end; row += rows, ++place) {
+  unsigned long long place = atomicAdd(&a.counters->large, static_cast<unsigned long long>(end - first));
+  for (std::uint32_t row = first; row < end; ++row, ++place) {
     if (place < a.large_capacity) a.large[place] = {slot, row};
   }
 }
@@ -249,10 +251,9 @@ __device__ void wait_for_sh() {
   __syncwarp();
 }
 
-/// Colour of a lane's row after wait_for_sh; `degree` as it was asked for.
-__device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t row,
+/// Colour of row first + at after wait_for_sh; `degree` as it was asked for.
+__device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t first, unsigned at,
                                        const WarpRows& rows, const Vec3<float>& delta) {
-  const std::size_t lane = threadIdx.x % 32, first = row - lane;
   GaussianView v;  // of the warp's rows
   v.sh_degree = degree;
   v.sh0 = {gs.sh0.data + 3 * first, 3 * 32};
@@ -264,13 +265,15 @@ __device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::
   if (!gs.sh_rotations[0].empty()) {
     for (int k = 0; k < 4; ++k) v.sh_rotations[k] = {gs.sh_rotations[k].data + first, 32};
   }
-  return gaussian_color<float>(v, degree, lane, delta);
+  return gaussian_color<float>(v, degree, at, delta);
 }
 
-/// A warp half of an item: Gaussians are read once and projected for each camera of the mask.
+/// A warp half of an item: Gaussians are read once and projected for each camera of the mask, or where some of the
+/// cameras see some of the rows only (`SeenRows`) those of all cameras side by side.
 /// `Plain`: records of neither depth nor perspective are asked for.
-template <bool Plain>
-__global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_kernel(const BatchArgs a) {
+template <bool Plain, bool SomeRows>
+__global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
+    project_kernel(const BatchArgs a) {
   __shared__ WarpRows shared[kProjectWarps];
   const unsigned lane = threadIdx.x % 32;
   WarpRows& rows = shared[threadIdx.x / 32];
@@ -285,38 +288,48 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
     const BatchItem item = next;
     next = item_of(half + gridDim.x * kProjectWarps);
     const GaussianView& gs = a.instances[item.first_instance].args.gaussians;
-    const std::size_t row = item.part * kChunkPart + half % kWarpsPerPart * 32 + lane;
-    const bool exists = row < gs.size;
-    const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
+    const std::size_t first = item.part * kChunkPart + half % kWarpsPerPart * 32;  // row of lane 0
+    const unsigned existing =
+        first >= gs.size ? 0u : gs.size - first >= 32 ? kAll : (1u << (gs.size - first)) - 1u;
+    // Of the lane's instance.
+    unsigned mine = 0;
+    if constexpr (SomeRows) {
+      if ((item.mask >> lane & 1u) != 0) {
+        mine = existing & a.instances[item.first_instance + lane].args.gaussians.seen_rows(first / kProjectChunk)
+                              .word(first % kProjectChunk / 32);
+      }
+      if (!__any_sync(kAll, mine != 0)) continue;
+    }
     // Instances of a set are drawn to one degree.
     const int degree =
         gs.degree_of(item.part * kChunkPart, a.instances[item.first_instance].args.sh_degree);
-    bool has_sh = !a.instances[item.first_instance].args.color || degree == 0 || row - lane >= gs.size;
-    const LaneRow read = read_row(gs, row);
+    bool has_sh = !a.instances[item.first_instance].args.color || degree == 0 || existing == 0;
+    const LaneRow read = read_row(gs, first + lane);
     __syncwarp();  // all lanes are done with the rows before
-    if (!has_sh) ask_for_sh(gs, degree, row - lane, rows);
+    if (!has_sh) ask_for_sh(gs, degree, first, rows);
     keep_row(read, rows);
-    for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
-      const std::uint32_t index =
-          item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1;
+    // Of lanes that `exist`: row first + at for an instance. All lanes call it together.
+    const auto project_row = [&](bool exists, std::uint32_t index, unsigned at) {
       const BatchInstance& instance = a.instances[index];
       const ProjectArgs<float>& args = instance.args;
+      const std::size_t row = first + at;
+      const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
       bool drawn = false, hard = false;
       float key = 0;
       Splat splat;
-      const Vec3<float> mean{rows.mean[0][lane], rows.mean[1][lane], rows.mean[2][lane]};
+      const Vec3<float> mean{rows.mean[0][at], rows.mean[1][at], rows.mean[2][at]};
       const Vec3<float> delta = gsnav::detail::camera_delta(args, mean, origin);
       const float z =
           depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
       if (exists && z > args.camera.near_plane) {
         const SplatAxes<float> axes =
             gs.axes[0].empty() ? splat_axes(args.camera.rotation, delta,
-                                            Quat<float>{rows.quat[0][lane], rows.quat[1][lane],
-                                                        rows.quat[2][lane], rows.quat[3][lane]},
-                                            Vec3<float>{rows.scales[0][lane], rows.scales[1][lane],
-                                                        rows.scales[2][lane]})
+                                            Quat<float>{rows.quat[0][at], rows.quat[1][at],
+                                                        rows.quat[2][at], rows.quat[3][at]},
+                                            Vec3<float>{rows.scales[0][at], rows.scales[1][at],
+                                                        rows.scales[2][at]})
                                : gsnav::detail::load_axes(gs, args.camera, delta, row);
-        const Projected<float> p = project<float, float>(args.camera, axes, z, rows.opacity[lane]);
+        const Projected<float> p = project<float, float>(args.camera, axes, z, rows.opacity[at]);
         if (p.visible) {
           key = key_of(args, z, mean, origin);
           hard = gsnav::detail::needs_double(args.camera, p);
@@ -333,9 +346,9 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
       const std::uint32_t slot =
           wanted && taken < a.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
       if (hard) {
-        const unsigned long long at = atomicAdd(&a.counters->hard, 1ull);
+        const unsigned long long place = atomicAdd(&a.counters->hard, 1ull);
         if (slot != kNoSlot) a.entries[slot] = {0, 0, 0, kNoSlot};  // until it has a record
-        if (at < a.hard_capacity) a.hard[at] = {slot, index, static_cast<std::uint32_t>(row)};
+        if (place < a.hard_capacity) a.hard[place] = {slot, index, static_cast<std::uint32_t>(row)};
       }
       if (!has_sh && __any_sync(kAll, drawn)) {
         wait_for_sh();
@@ -343,7 +356,7 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
       }
       if (drawn && slot != kNoSlot) {
         write_record<Plain>(a, slot, instance, key, row, splat,
-                            args.color ? row_color(gs, degree, row, rows, delta) : SplatColor<float>{});
+                            args.color ? row_color(gs, degree, first, at, rows, delta) : SplatColor<float>{});
       }
       const TileWindow window = drawn && slot != kNoSlot ? window_of(a, splat.bounds) : TileWindow{0, 0};
       const bool single = window.tiles != 0;
@@ -359,6 +372,19 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
       if (large) queue_large(a, slot, splat.bounds);
       const std::uint64_t place = several.take(queued && !large);
       if (queued && !large && place < a.several_capacity) a.several[place] = slot;
+    };
+    if constexpr (SomeRows) {
+      share_in_warp(static_cast<std::uint32_t>(__popc(mine)), [&](unsigned owner, std::uint32_t n) {
+        const unsigned from = owner % 32, of_owner = __shfl_sync(kAll, mine, from);
+        // What has nothing left goes with the first instance.
+        project_row(owner < 32, item.first_instance + (owner < 32 ? from : 0u),
+                    owner < 32 ? nth_bit<32>(of_owner, n) : 0u);
+      });
+    } else {
+      for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
+        project_row((existing >> lane & 1u) != 0,
+                    item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1, lane);
+      }
     }
     if (!has_sh) wait_for_sh();
   }
@@ -411,9 +437,14 @@ void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t 
   const unsigned blocks = static_cast<unsigned>(multiprocessors) * 8;
   cull_kernel<<<blocks, kThreads, 0, stream>>>(args);
   const bool plain = args.depths == nullptr && args.perspectives == nullptr;
-  (plain ? project_kernel<true>
-         : project_kernel<false>)<<<static_cast<unsigned>(multiprocessors) * kProjectBlocks,
-                                    32 * kProjectWarps, 0, stream>>>(args);
+  const auto project = [&](auto kernel) {
+    kernel<<<static_cast<unsigned>(multiprocessors) * kProjectBlocks, 32 * kProjectWarps, 0, stream>>>(args);
+  };
+  if (args.seen_rows) {
+    project(plain ? project_kernel<true, true> : project_kernel<false, true>);
+  } else {
+    project(plain ? project_kernel<true, false> : project_kernel<false, false>);
+  }
   project_hard_kernel<<<blocks, 128, 0, stream>>>(args);
 }
 

@@ -206,7 +206,7 @@ struct CudaBatchRenderer::State {
   Array<cuda::BatchItem> items;
   Array<cuda::SplatRecord> records;
   Array<cuda::SplatEntry> entries;
-  Array<cuda::LargeRows> large;
+  Array<cuda::LargeRow> large;
   Array<std::uint32_t> sources, several, zeroed, tile_counts, tile_begins, tile_order, long_parts;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
@@ -228,7 +228,7 @@ struct CudaBatchRenderer::State {
   // Reused by every call.
   struct Seen {
     std::uint32_t set, camera, first_rank;
-    View<const std::uint32_t> chunks;  ///< GaussianView::seen_chunks
+    View<const std::uint32_t> bits;  ///< GaussianView::seen
   };
   std::vector<Seen> seen;  ///< camera by camera
   std::vector<std::uint32_t> set_begins, cursors;

@@ -87,10 +87,12 @@ __device__ inline void share_in_warp(std::uint32_t count, const F& f) {
   }
 }
 
-/// The place of the bit that has n set bits below it; bits has 16.
+/// The place of the bit that has n set bits below it, among the kBits lowest.
+template <std::uint32_t kBits>
 __device__ inline std::uint32_t nth_bit(std::uint32_t bits, std::uint32_t n) {
   std::uint32_t place = 0;
-  for (std::uint32_t width = 8; width > 0; width /= 2) {
+#pragma unroll
+  for (std::uint32_t width = kBits / 2; width > 0; width /= 2) {
     const std::uint32_t below = static_cast<std::uint32_t>(__popc(bits & ((1u << width) - 1)));
     if (n >= below) {
       n -= below;

@@ -51,6 +51,22 @@ struct PackedRows {
   View<const PackedChunk> chunks;   ///< [ceil(N / kProjectChunk)]
 };
 
+/// Words of 32 bits, one a row, that a chunk takes.
+inline constexpr std::size_t kSeenRowWords = kProjectChunk / 32;
+
+/// Which rows of a chunk may be seen: all where there are no words.
+struct SeenRows {
+  const std::uint32_t* words = nullptr;  ///< [kSeenRowWords]
+  /// Of the 32 rows from 32 k on.
+  GSNAV_HD std::uint32_t word(std::size_t k) const noexcept { return words == nullptr ? ~0u : words[k]; }
+  GSNAV_HD bool has(std::size_t row) const noexcept { return (word(row / 32) >> (row % 32) & 1u) != 0; }
+  /// Whether any of the kChunkPart rows of a part.
+  GSNAV_HD bool any_of_part(std::size_t part) const noexcept {
+    static_assert(kChunkPart == 64);
+    return (word(2 * part) | word(2 * part + 1)) != 0;
+  }
+};
+
 /// Read-only arrays of N Gaussians, as kernels see them. Owns nothing.
 ///
 /// Metres in the asset's own frame. A position is `origins[origin_ids[i]] + mean_i`: float32 offsets
@@ -92,9 +108,11 @@ struct GaussianView {
   /// memory. Empty: all chunks.
   View<const std::uint32_t> drawn_chunks;
 
-  /// Which chunks may be seen from where the camera is, bit c % 32 of word c / 32 of all_chunks():
-  /// others are not drawn (scene/visible_sets.hpp). In the backend's memory. Empty: all may.
-  View<const std::uint32_t> seen_chunks;
+  /// What may be seen from where the camera is; the rest is not drawn (scene/visible_sets.hpp). In the backend's
+  /// memory. Empty: all may. First seen_words() words: bit c % 32 of word c / 32 for each chunk c. Where it is longer, as
+  /// many more: how many bits the words before have; then kSeenRowWords words for each chunk with a bit, in their
+  /// order, of which bit r % 32 of word r / 32 is its row r.
+  View<const std::uint32_t> seen;
 
   /// Highest SH degree that the Gaussians of a chunk use, one a chunk of all_chunks()
   /// (scene/scene_profile.hpp): bands above it are not read. In the backend's memory (GaussianArrays
@@ -110,7 +128,22 @@ struct GaussianView {
 
   /// Whether anything of a chunk, by its number, may be seen from where the camera is.
   GSNAV_HD bool may_be_seen(std::size_t chunk) const noexcept {
-    return seen_chunks.empty() || (seen_chunks[chunk / 32] >> (chunk % 32) & 1u) != 0;
+    return seen.empty() || (seen[chunk / 32] >> (chunk % 32) & 1u) != 0;
+  }
+  /// Words of `seen` that chunks take.
+  GSNAV_HD std::size_t seen_words() const noexcept { return (all_chunks() + 31) / 32; }
+  GSNAV_HD bool has_seen_rows() const noexcept { return seen.size > seen_words(); }
+  /// Whether `seen` may have so many words.
+  GSNAV_HD bool can_be_seen(std::size_t words) const noexcept {
+    return words == seen_words() || (words >= 2 * seen_words() && words % kSeenRowWords == 2 * seen_words() % kSeenRowWords);
+  }
+  /// Which rows of a chunk that may be seen may be.
+  GSNAV_HD SeenRows seen_rows(std::size_t chunk) const noexcept {
+    if (!has_seen_rows()) return {};
+    const std::size_t words = seen_words();
+    const std::uint32_t before = seen[chunk / 32] & ((1u << (chunk % 32)) - 1u);
+    const std::size_t place = seen[words + chunk / 32] + static_cast<std::size_t>(count_bits(before));
+    return {seen.data + 2 * words + place * kSeenRowWords};
   }
   /// Chunks that the rows make.
   GSNAV_HD std::size_t all_chunks() const noexcept { return (size + kProjectChunk - 1) / kProjectChunk; }

@@ -55,23 +55,30 @@ GSNAV_HD bool chunk_is_candidate(const ProjectArgs<S>& args, std::size_t c) noex
 }
 
 /// Which parts of chunk c have Gaussians that may be visible: bit p for the kChunkPart rows from p kChunkPart on.
-/// Never without one that is; no bit where chunk_is_candidate says no.
+/// Never without one that is; no bit where chunk_is_candidate says no, or where seen_rows() has none of them.
 template <class S>
 GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c) noexcept {
   static_assert(kProjectChunk / kChunkPart <= 32);
   const GaussianView& gs = args.gaussians;
   const std::size_t id = gs.chunk_id(c);
   if (!gs.may_be_seen(id)) return 0;
-  if (gs.chunk_bounds.empty()) return ~0u;
+  constexpr std::size_t kParts = kProjectChunk / kChunkPart;
+  std::uint32_t parts = ~0u;
+  if (gs.has_seen_rows()) {
+    const SeenRows rows = gs.seen_rows(id);
+    parts = 0;
+    for (std::size_t p = 0; p < kParts; ++p) parts |= rows.any_of_part(p) ? 1u << p : 0u;
+  }
+  if (gs.chunk_bounds.empty()) return parts;
   const double s_max = detail::ChunkInView(args.camera64, gs.chunk_bounds[id]).s_max();
   if (!may_be_visible(args.camera64, gs.chunk_bounds[id], s_max)) return 0;
-  if (gs.part_bounds.empty() || lies_in_view(args.camera64, gs.chunk_bounds[id])) return ~0u;
-  constexpr std::size_t kParts = kProjectChunk / kChunkPart;
-  std::uint32_t parts = 0;
+  if (gs.part_bounds.empty() || lies_in_view(args.camera64, gs.chunk_bounds[id])) return parts;
+  std::uint32_t in_view = 0;
   for (std::size_t p = 0; p < kParts && id * kParts + p < gs.part_bounds.size; ++p) {
-    if (may_be_visible(args.camera64, gs.part_bounds[id * kParts + p], s_max)) parts |= 1u << p;
+    if ((parts >> p & 1u) == 0) continue;
+    if (may_be_visible(args.camera64, gs.part_bounds[id * kParts + p], s_max)) in_view |= 1u << p;
   }
-  return parts;
+  return in_view;
 }
 
 namespace detail {
@@ -368,11 +375,16 @@ struct ProjectChunk {
     const std::size_t end = begin + kProjectChunk < size ? begin + kProjectChunk : size;
     const std::size_t base = (args.first_chunk + c) * kProjectChunk;
     std::uint32_t written = 0, parts = candidate_parts(args, c);
-    for (std::size_t first = begin; first < end && parts != 0; first += kChunkPart, parts >>= 1) {
+    if (parts == 0) {
+      args.counts[args.first_chunk + c] = 0;
+      return;
+    }
+    const SeenRows seen = args.gaussians.seen_rows(args.gaussians.chunk_id(c));
+    for (std::size_t first = begin; first < end; first += kChunkPart, parts >>= 1) {
       if ((parts & 1u) == 0) continue;
       const std::size_t last = first + kChunkPart < end ? first + kChunkPart : end;
       for (std::size_t i = first; i < last; ++i) {
-        if (project_gaussian(args, base + written, i)) ++written;
+        if (seen.has(i - begin) && project_gaussian(args, base + written, i)) ++written;
       }
     }
     args.counts[args.first_chunk + c] = written;

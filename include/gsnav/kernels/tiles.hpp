@@ -50,17 +50,17 @@ struct OpenCells {
   }
 };
 
-/// Calls f(tile) for each tile, in row order, that a splat may touch. `elliptic`: within its bounds the
-/// footprint is the ellipse of its geometry (not under perspective), so tiles may be left out.
+/// Calls f(row, first, last), columns inclusive, for each row of tiles, in order, of which a splat may touch some.
+/// `elliptic`: within its bounds the footprint is the ellipse of its geometry (not under perspective), so tiles may be
+/// left out.
 template <class S, class F>
-GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
-                            S log2_alpha_min, bool elliptic, const F& f) noexcept {
+GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
+                                S log2_alpha_min, bool elliptic, const F& f) noexcept {
   const int shift = grid.tile_shift(), ts = grid.tile_size;
   const int tx0 = b.x0 >> shift, tx1 = (b.x1 - 1) >> shift;
   const int ty0 = b.y0 >> shift, ty1 = (b.y1 - 1) >> shift;
-  const std::size_t columns = static_cast<std::size_t>(grid.columns);
   if (tx0 == tx1 && ty0 == ty1) {
-    f(static_cast<std::size_t>(ty0) * columns + static_cast<std::size_t>(tx0));
+    f(ty0, tx0, tx0);
     return;
   }
   const auto centre = [](int pixel) { return S(pixel) + S(0.5); };
@@ -78,10 +78,18 @@ GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, con
       last = static_cast<int>(clamp(right + S(0.5), S(b.x0), S(b.x1))) - 1;
       last = last < b.x0 ? -1 : last >> shift;
     }
-    for (int tx = first; tx <= last; ++tx) {
-      f(static_cast<std::size_t>(ty) * columns + static_cast<std::size_t>(tx));
-    }
+    if (first <= last) f(ty, first, last);
   }
+}
+
+/// Calls f(tile) for each tile of these, in row order.
+template <class S, class F>
+GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
+                            S log2_alpha_min, bool elliptic, const F& f) noexcept {
+  for_each_tile_row(grid, g, b, log2_alpha_min, elliptic, [&](int ty, int first, int last) {
+    const std::size_t row = static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns);
+    for (int tx = first; tx <= last; ++tx) f(row + static_cast<std::size_t>(tx));
+  });
 }
 
 /// The tiles of a splat that covers few: from `tile` on, columns [columns[r][0], columns[r][1]) of row r; none of

@@ -15,6 +15,15 @@
 
 namespace gsnav {
 
+/// How many bits are set.
+GSNAV_HD int count_bits(std::uint32_t bits) noexcept {
+#if defined(__CUDA_ARCH__)
+  return __popc(bits);
+#else
+  return __builtin_popcount(bits);
+#endif
+}
+
 template <class L>
 struct LaneTraits {
   using scalar = L;   ///< the element type
@@ -70,6 +79,32 @@ template <class S>
 GSNAV_HD S sqrt_above(S a) noexcept {
   return sqrt(a);
 }
+/// 1 / a, on a GPU in float within 1 ulp of it.
+template <class S>
+GSNAV_HD S reciprocal_near(S a) noexcept {
+  return S(1) / a;
+}
+#if defined(__CUDACC__)
+// Of what is approximate the hardware says: 2^-23 for a root, 1 ulp for an inverse (PTX ISA).
+GSNAV_HD float sqrt_above(float a) noexcept {
+#if defined(__CUDA_ARCH__)
+  float y;
+  asm("sqrt.approx.ftz.f32 %0, %1;" : "=f"(y) : "f"(a));
+  return ::fmaf(y, 1.000001f, 2e-19f);  // of numbers below the normal ones it is 0
+#else
+  return sqrt(a);
+#endif
+}
+GSNAV_HD float reciprocal_near(float a) noexcept {
+#if defined(__CUDA_ARCH__)
+  float y;
+  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(y) : "f"(a));
+  return y;
+#else
+  return 1.0f / a;
+#endif
+}
+#endif
 /// x without its fraction, |x| < 2^31.
 GSNAV_HD float truncated(float a) noexcept { return static_cast<float>(static_cast<std::int32_t>(a)); }
 GSNAV_HD double truncated(double a) noexcept { return static_cast<double>(static_cast<std::int32_t>(a)); }

@@ -72,8 +72,10 @@ requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const 
       one.keys = {&key, 1};
       const std::size_t first = gs.chunk_id(c) * kProjectChunk;
       const std::uint32_t parts = candidate_parts(one, c);
+      if (parts == 0) return;
+      const SeenRows seen = gs.seen_rows(gs.chunk_id(c));
       for (std::size_t i = first; i < first + kProjectChunk && i < gs.size; ++i) {
-        if ((parts >> ((i - first) / kChunkPart) & 1u) == 0) continue;
+        if ((parts >> ((i - first) / kChunkPart) & 1u) == 0 || !seen.has(i - first)) continue;
         ++counts[c].touched;
         if (!project_gaussian(one, 0, i)) continue;
         bool any = false;

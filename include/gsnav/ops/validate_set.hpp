@@ -95,9 +95,9 @@ inline Status validate(const GaussianSet& set) {
     return bad("chunk_sh_degrees has " + std::to_string(g.chunk_sh_degrees.size) + " values where " +
                std::to_string(g.all_chunks()) + " are needed");
   }
-  if (!g.seen_chunks.empty() && g.seen_chunks.size != (g.all_chunks() + 31) / 32) {
-    return bad("seen_chunks has " + std::to_string(g.seen_chunks.size) + " words where " +
-               std::to_string((g.all_chunks() + 31) / 32) + " are needed");
+  if (!g.seen.empty() && !g.can_be_seen(g.seen.size)) {
+    return bad("seen has " + std::to_string(g.seen.size) + " words where " + std::to_string(g.seen_words()) +
+               " are needed, or twice as many and " + std::to_string(kSeenRowWords) + " a chunk that is seen");
   }
   if (g.drawn_chunks.size > g.all_chunks()) {
     return bad("drawn_chunks has " + std::to_string(g.drawn_chunks.size) + " chunks of " +

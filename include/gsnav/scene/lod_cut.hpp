@@ -68,12 +68,12 @@ class LodCut {
 
   /// Chooses for a camera; the cloud stands in the world by `world_from_asset`. What to draw then:
   /// chunks of the cloud, and merged ones, as the pixels of O_photo(choice.photo) see them. Valid until
-  /// the next call. `seen`: which of the cloud's chunks may be seen (VisibleSets::seen_from, here): what
-  /// shows none of them is left out; empty: all may be.
+  /// the next call. `seen`: what of the cloud may be seen (VisibleSets::seen_from, here): what shows none
+  /// of its chunks is left out, and of chunks of the cloud its rows; empty: all may be.
   std::span<const GaussianSet> select(const Camera& camera, const LodChoice& choice = {},
                                       const Similarity& world_from_asset = {},
                                       View<const std::uint32_t> seen = {}) {
-    seen_ = seen;
+    seen_ = seen.empty() ? seen : View<const std::uint32_t>{seen.data, cloud_->view().seen_words()};
     leaf_chunks_.clear();
     merged_chunks_.clear();
     sets_.clear();
@@ -89,7 +89,7 @@ class LodCut {
         if (seen_.empty() || shows_seen(root)) descend(root, p, per_metre, choice);
       }
     }
-    add(*cloud_, leaf_chunks_, choice, world_from_asset);
+    add(*cloud_, leaf_chunks_, choice, world_from_asset, seen);
     add(tree_->merged, merged_chunks_, choice, world_from_asset);
     return sets_;
   }
@@ -118,10 +118,11 @@ class LodCut {
 
  private:
   void add(const GaussianCloud& cloud, const std::vector<std::uint32_t>& chunks, const LodChoice& choice,
-           const Similarity& world_from_asset) {
+           const Similarity& world_from_asset, View<const std::uint32_t> seen = {}) {
     if (chunks.empty()) return;
     sets_.push_back(photo_set(cloud, choice, world_from_asset));
     sets_.back().gaussians.drawn_chunks = {chunks.data(), chunks.size()};
+    sets_.back().gaussians.seen = seen;
   }
   /// Whether one of the chunks [first, end), some of which may be beyond the cloud's, is among those
   /// that are seen.

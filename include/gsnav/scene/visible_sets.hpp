@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -19,15 +18,15 @@
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/camera.hpp"
 #include "gsnav/math/similarity.hpp"
-#include "gsnav/ops/chunk_weights.hpp"
+#include "gsnav/ops/row_weights.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {
 
-/// Which chunks of a cloud can be seen from where cameras go: what stands behind walls need not be
-/// looked at. Sampled: chunks of which nobody saw anything from viewpoints in and around a cell are left
-/// out for cameras in it. An approximation, for the profiles `fast` and `lod`; docs/lod.md has its
-/// error.
+/// What of a cloud can be seen from where cameras go: what stands behind walls need not be looked at.
+/// Sampled: chunks, and of these rows, of which nobody saw anything from viewpoints in and around a cell
+/// are left out for cameras in it. An approximation, for the profiles `fast` and `lod`; docs/lod.md has
+/// its error.
 struct VisibleSets {
   using Key = std::array<std::int32_t, 3>;
 
@@ -41,31 +40,45 @@ struct VisibleSets {
   std::size_t cloud_chunks = 0;     ///< of the cloud that these are of
   std::size_t viewpoints = 0;       ///< that were looked from
   std::vector<Key> keys;            ///< of the cells, ascending
-  std::vector<std::uint32_t> bits;  ///< [cells][words()]: GaussianView::seen_chunks of each
+  std::vector<std::uint64_t> ends;  ///< [cells], where the words of each end; those of the first begin at 0
+  std::vector<std::uint32_t> bits;  ///< GaussianView::seen of each cell, one behind the other
 
   std::size_t cells() const noexcept { return keys.size(); }
+  /// Words of a cell that say which chunks it sees.
   std::size_t words() const noexcept { return (cloud_chunks + 31) / 32; }
   std::size_t bytes() const noexcept {
-    return keys.size() * sizeof(Key) + bits.size() * sizeof(std::uint32_t);
+    return keys.size() * sizeof(Key) + ends.size() * sizeof(std::uint64_t) +
+           bits.size() * sizeof(std::uint32_t);
   }
   /// What a cell sees; `there`: `bits` in a backend's memory, null: here.
   View<const std::uint32_t> seen_from(std::size_t cell_index,
                                       const std::uint32_t* there = nullptr) const noexcept {
-    return {(there != nullptr ? there : bits.data()) + cell_index * words(), words()};
+    const std::uint64_t begin = cell_index == 0 ? 0 : ends[cell_index - 1];
+    return {(there != nullptr ? there : bits.data()) + begin,
+            static_cast<std::size_t>(ends[cell_index] - begin)};
   }
   /// How many chunks it sees.
   std::size_t count_seen(std::size_t cell_index) const noexcept {
-    std::size_t sum = 0;
-    for (const std::uint32_t word : seen_from(cell_index))
-      sum += static_cast<std::size_t>(std::popcount(word));
-    return sum;
+    return count_bits_of(seen_from(cell_index), 0, words());
+  }
+  /// How many Gaussians it sees, of a cloud of so many.
+  std::size_t count_seen_rows(std::size_t cell_index, std::size_t cloud_rows) const noexcept {
+    const View<const std::uint32_t> seen = seen_from(cell_index);
+    if (seen.size > words()) return count_bits_of(seen, 2 * words(), seen.size);
+    const std::size_t in_chunks = kProjectChunk * count_seen(cell_index);  // the last may have fewer
+    return in_chunks < cloud_rows ? in_chunks : cloud_rows;
   }
   /// Share of the chunks that a cell sees, on average.
   double mean_share() const noexcept {
-    std::size_t sum = 0;
-    for (const std::uint32_t word : bits) sum += static_cast<std::size_t>(std::popcount(word));
-    return static_cast<double>(sum) /
-           static_cast<double>(std::max<std::size_t>(cells() * cloud_chunks, 1));
+    double sum = 0;
+    for (std::size_t c = 0; c < cells(); ++c) sum += static_cast<double>(count_seen(c));
+    return sum / static_cast<double>(std::max<std::size_t>(cells() * cloud_chunks, 1));
+  }
+  /// The same of the Gaussians of a cloud of so many.
+  double mean_row_share(std::size_t cloud_rows) const noexcept {
+    double sum = 0;
+    for (std::size_t c = 0; c < cells(); ++c) sum += static_cast<double>(count_seen_rows(c, cloud_rows));
+    return sum / static_cast<double>(std::max<std::size_t>(cells() * cloud_rows, 1));
   }
 
   /// The cell of a position in the asset's frame; none where its numbers do not fit.
@@ -91,13 +104,24 @@ struct VisibleSets {
     if (at == keys.end() || *at != *key) return {};
     return static_cast<std::size_t>(at - keys.begin());
   }
+
+ private:
+  static std::size_t count_bits_of(View<const std::uint32_t> words, std::size_t begin,
+                                   std::size_t end) noexcept {
+    std::size_t sum = 0;
+    for (std::size_t i = begin; i < end; ++i) sum += static_cast<std::size_t>(count_bits(words[i]));
+    return sum;
+  }
 };
 
 /// How build_visible_sets works. Lengths in metres in the world.
 struct VisibleSettings {
   double cell = 0.5;         ///< side of a cell
   double margin = 0.25;      ///< viewpoints so far outside of a cell count for it too
-  double min_weight = 1e-3;  ///< a chunk is seen where one of its Gaussians has so much of a pixel
+  double min_weight = 1e-3;  ///< what is seen has more of a pixel than this
+  /// Rows of a chunk that are seen or not together, each a whole share of 32: Gaussians that lie together. 0: all of
+  /// a chunk.
+  int rows = 8;
   int face = 256;            ///< pixels along a face of the cube that is looked at from each viewpoint
   double near_plane = 0.2;   ///< of these images (Camera); what lies nearer to a cell is in its set in any case
   double near_sigma = 0;     ///< likewise
@@ -125,6 +149,10 @@ inline Status validate(const VisibleSettings& s) {
   if (!(s.margin >= 0 && is_finite(s.margin))) return bad("margin", s.margin, "must be >= 0");
   if (!(s.min_weight >= 0 && s.min_weight < 1))
     return bad("min_weight", s.min_weight, "must be in [0, 1)");
+  if (s.rows != 0 && (s.rows < 1 || s.rows > 32 || 32 % s.rows != 0)) {
+    return {Errc::invalid_argument,
+            "VisibleSettings.rows = " + std::to_string(s.rows) + ": must be 0, 1, 2, 4, 8, 16 or 32"};
+  }
   if (s.face < 16 || s.face > 4096) return bad("face", s.face, "must be in [16, 4096]");
   if (!(s.near_plane > 0 && is_finite(s.near_plane)))
     return bad("near_plane", s.near_plane, "must be positive");
@@ -142,6 +170,74 @@ inline double box_distance(const Vec3d& low, const Vec3d& high, const Vec3d& oth
   for (int k = 0; k < 3; ++k) gap[k] = std::max({0.0, other_low[k] - high[k], low[k] - other_high[k]});
   return norm(gap);
 }
+
+/// A bit a row of a chunk.
+using RowBits = std::array<std::uint32_t, kSeenRowWords>;
+
+/// Those of chunk `chunk` that a cloud of so many Gaussians has.
+inline RowBits all_rows(std::size_t size, std::size_t chunk) noexcept {
+  RowBits out{};
+  for (std::size_t k = 0; k < kSeenRowWords; ++k) {
+    const std::size_t first = chunk * kProjectChunk + 32 * k;
+    if (first < size) out[k] = size - first < 32 ? (1u << (size - first)) - 1u : ~0u;
+  }
+  return out;
+}
+
+/// Those that take more of a pixel than min_weight, with all that are seen together with them.
+inline RowBits seen_rows(std::span<const float> most, std::size_t chunk,
+                         const VisibleSettings& settings) noexcept {
+  RowBits out = all_rows(most.size(), chunk);
+  const std::size_t run = settings.rows == 0 ? kProjectChunk : static_cast<std::size_t>(settings.rows);
+  const std::size_t begin = chunk * kProjectChunk;
+  for (std::size_t first = 0; first < kProjectChunk; first += run) {
+    bool any = false;
+    for (std::size_t i = begin + first; i < begin + first + run && i < most.size(); ++i) {
+      any = any || static_cast<double>(most[i]) > settings.min_weight;
+    }
+    if (any) continue;
+    for (std::size_t r = first; r < first + run; ++r) out[r / 32] &= ~(1u << (r % 32));
+  }
+  return out;
+}
+
+/// What a cell sees, as it is found.
+class SeenOfCell {
+ public:
+  explicit SeenOfCell(std::size_t chunks) : places_(chunks, kNone) {}
+
+  void add(std::size_t chunk, const RowBits& rows) {
+    if (places_[chunk] == kNone) {
+      places_[chunk] = static_cast<std::uint32_t>(rows_.size());
+      rows_.push_back(rows);
+      return;
+    }
+    RowBits& to = rows_[places_[chunk]];
+    for (std::size_t k = 0; k < kSeenRowWords; ++k) to[k] |= rows[k];
+  }
+
+  /// As GaussianView::seen has it.
+  void append_to(std::vector<std::uint32_t>& bits, bool with_rows) const {
+    const std::size_t begin = bits.size(), words = (places_.size() + 31) / 32;
+    bits.resize(begin + (with_rows ? 2 : 1) * words);
+    std::uint32_t count = 0;
+    for (std::size_t c = 0; c < places_.size(); ++c) {
+      if (with_rows && c % 32 == 0) bits[begin + words + c / 32] = count;
+      if (places_[c] == kNone) continue;
+      bits[begin + c / 32] |= std::uint32_t{1} << (c % 32);
+      ++count;
+    }
+    for (std::size_t c = 0; with_rows && c < places_.size(); ++c) {
+      if (places_[c] == kNone) continue;
+      bits.insert(bits.end(), rows_[places_[c]].begin(), rows_[places_[c]].end());
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  std::vector<std::uint32_t> places_;  // [chunks] into rows_
+  std::vector<RowBits> rows_;
+};
 
 /// Cameras that look at the six faces of a cube, turned about the world's up (Y) by another angle for
 /// each viewpoint: in what order Gaussians are blended depends on where a camera looks, so that some are
@@ -210,17 +306,13 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   std::sort(out.keys.begin(), out.keys.end());
   out.keys.erase(std::unique(out.keys.begin(), out.keys.end()), out.keys.end());
 
-  const std::size_t words = out.words();
-  out.bits.resize(out.cells() * words);
-  const auto see = [&out, words](std::size_t c, std::size_t chunk) {
-    out.bits[c * words + chunk / 32] |= std::uint32_t{1} << (chunk % 32);
-  };
   const auto box_of = [&out](const VisibleSets::Key& key, Vec3d& low, Vec3d& high) {
     for (int k = 0; k < 3; ++k) {
       low[k] = static_cast<double>(key[static_cast<std::size_t>(k)]) * out.cell;
       high[k] = low[k] + out.cell;
     }
   };
+  std::vector<detail::SeenOfCell> found(out.cells(), detail::SeenOfCell(out.cloud_chunks));
   // What is so near that a camera in the cell may be in front of it and a viewpoint not.
   const double near_distance = settings.near_plane / world_from_asset.scale;
   backend.parallel_for(out.cells(), [&](std::size_t c) {
@@ -228,28 +320,35 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
     box_of(out.keys[c], low, high);
     for (std::size_t i = 0; i < out.cloud_chunks; ++i) {
       const ChunkBounds& b = cloud.chunk_bounds[i];
-      if (detail::box_distance(low, high, b.low, b.high) <= near_distance) see(c, i);
+      if (detail::box_distance(low, high, b.low, b.high) <= near_distance) found[c].add(i, detail::all_rows(cloud.size(), i));
     }
   });
   const double margin = settings.margin / world_from_asset.scale;
   const GaussianSet set = cloud.set(world_from_asset);
-  ChunkWeightsWorkspace<B> workspace(backend);
-  std::vector<float> most(out.cloud_chunks);
+  RowWeightsWorkspace<B> workspace(backend);
+  std::vector<float> most(cloud.size());
+  std::vector<detail::RowBits> rows(out.cloud_chunks);
   for (std::size_t v = 0; v < viewpoints.size(); ++v) {
     std::fill(most.begin(), most.end(), 0.0f);
     for (const Camera& camera : detail::cube_cameras(viewpoints[v], v, settings)) {
-      if (Status s = add_chunk_weights(backend, workspace, set, camera, most); !s) return s;
+      if (Status s = add_row_weights(backend, workspace, set, camera, most); !s) return s;
     }
-    for (std::size_t c = 0; c < out.cells(); ++c) {
+    backend.parallel_for(rows.size(), [&](std::size_t i) { rows[i] = detail::seen_rows(most, i, settings); });
+    backend.parallel_for(out.cells(), [&](std::size_t c) {
       Vec3d low, high;
       box_of(out.keys[c], low, high);
-      if (detail::box_distance(low, high, eyes[v], eyes[v]) > margin) continue;
-      for (std::size_t i = 0; i < out.cloud_chunks; ++i) {
-        if (static_cast<double>(most[i]) > settings.min_weight) see(c, i);
+      if (detail::box_distance(low, high, eyes[v], eyes[v]) > margin) return;
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (rows[i] != detail::RowBits{}) found[c].add(i, rows[i]);
       }
-    }
+    });
     if (settings.progress)
       settings.progress(static_cast<double>(v + 1) / static_cast<double>(viewpoints.size()));
+  }
+  for (detail::SeenOfCell& of_cell : found) {
+    of_cell.append_to(out.bits, settings.rows != 0);
+    out.ends.push_back(out.bits.size());
+    of_cell = detail::SeenOfCell(0);
   }
   return out;
 }

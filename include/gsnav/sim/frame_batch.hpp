@@ -195,8 +195,8 @@ class FrameBatch<B> {
 
   /// Appends to a camera's list: what it sees of the set is its own, the set is all cameras'.
   void list(GaussianSet set) {
-    seen_.push_back(set.gaussians.seen_chunks);
-    set.gaussians.seen_chunks = {};
+    seen_.push_back(set.gaussians.seen);
+    set.gaussians.seen = {};
     lists_.push_back(place_of(set));
   }
   std::uint32_t place_of(const GaussianSet& set) {

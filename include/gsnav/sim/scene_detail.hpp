@@ -52,14 +52,13 @@ class DetailSets {
       View<const std::uint32_t> seen;
       if (cell) {
         seen = asset.visible->seen_from(*cell);
-        const std::size_t all = asset.cloud->size(),
-                          counted = kProjectChunk * asset.visible->count_seen(*cell);
-        unseen_ += all - std::min(all, counted);
+        const std::size_t all = asset.cloud->size();
+        unseen_ += all - asset.visible->count_seen_rows(*cell, all);
       }
       if (asset.tree == nullptr) {
         sets_.push_back(sets[a]);
         if (cell)
-          sets_.back().gaussians.seen_chunks = asset.visible->seen_from(*cell, asset.visible_there);
+          sets_.back().gaussians.seen = asset.visible->seen_from(*cell, asset.visible_there);
         continue;
       }
       Cut& cut = cuts_[a];
@@ -70,7 +69,7 @@ class DetailSets {
       for (const GaussianSet& set : chosen) {
         sets_.push_back(set);
         if (asset.cloud_there.size != 0) {
-          move(asset, sets_.back().gaussians);
+          move(asset, sets_.back().gaussians, cell);
           to_place_.push_back(sets_.size() - 1);
         }
       }
@@ -93,8 +92,8 @@ class DetailSets {
 
   /// How asset `a`, which has a tree, was cut by the last choice; its sets are of the host's arrays.
   const LodCut& cut(std::size_t a) const noexcept { return *cuts_[a].cut; }
-  /// Gaussians of the assets that the last choice left out since nothing of their chunks is seen from
-  /// the camera's cell; less than a chunk too few.
+  /// Gaussians of the assets that the last choice left out since nothing of them is seen from the
+  /// camera's cell; where sets know of whole chunks only, less than a chunk too few.
   std::uint64_t unseen() const noexcept { return unseen_; }
 
   /// Chunks of the last choice that a backend with a memory of its own has to be given, and where they are there.
@@ -109,12 +108,13 @@ class DetailSets {
 
  private:
   /// From the host's arrays to the backend's.
-  void move(const SceneDetail::Asset& asset, GaussianView& view) {
+  void move(const SceneDetail::Asset& asset, GaussianView& view, std::optional<std::size_t> cell) {
     const View<const std::uint32_t> drawn = view.drawn_chunks;
     chunks_.insert(chunks_.end(), drawn.data, drawn.data + drawn.size);
     const bool is_cloud = view.means[0].data == asset.cloud->means[0].data();
     view = is_cloud ? asset.cloud_there : asset.merged_there;
     view.drawn_chunks = {nullptr, drawn.size};
+    if (is_cloud && cell) view.seen = asset.visible->seen_from(*cell, asset.visible_there);
   }
 
   struct Cut {

@@ -24,13 +24,20 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
   const std::size_t base = (args.first_chunk + c) * kProjectChunk;
   const std::size_t step = static_cast<std::size_t>(kWidth);
   const std::uint32_t parts = candidate_parts(args, c);
+  if (parts == 0) {
+    args.counts[args.first_chunk + c] = 0;
+    return;
+  }
+  const SeenRows seen = gs.seen_rows(gs.chunk_id(c));
   const bool packed = is_packed(gs);
   const PackedChunk* const chunk = packed ? &gs.packed.chunks[gs.chunk_id(c)] : nullptr;
   std::uint32_t written = 0;
   Survivors survivors;
-  static_assert(kChunkPart % step == 0);
-  for (std::size_t i = begin; i < end && parts != 0; i += step) {
+  static_assert(kChunkPart % step == 0 && 32 % step == 0);
+  for (std::size_t i = begin; i < end; i += step) {
     if ((parts >> ((i - begin) / kChunkPart) & 1u) == 0) continue;
+    const std::uint32_t wanted = seen.word((i - begin) / 32) >> ((i - begin) % 32);
+    if ((wanted & ((1u << step) - 1u)) == 0) continue;
     const std::size_t count = end - i < step ? end - i : step;
     float tail[step];
     // The last pack of a set repeats its last Gaussian; those lanes are masked below.
@@ -84,7 +91,7 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     }
     const F opacity = packed ? unpack_opacity(codes(PackedRows::kOpacity)) : load(gs.opacities);
     const Projected<F> splat = project<F, F>(camera, axes, z, opacity);
-    const std::uint32_t bits = lane_bits(splat.visible) & ((1u << count) - 1u);
+    const std::uint32_t bits = lane_bits(splat.visible) & wanted & ((1u << count) - 1u);
     if (bits == 0) continue;
     const F key = camera.sort_order == SortOrder::z_depth ? z : distance_key(camera.key_scale, mean, offset);
     written += write_splats(args, base, written, {i, mean, delta, key, axes, splat}, bits, survivors);

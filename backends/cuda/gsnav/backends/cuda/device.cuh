@@ -30,6 +30,7 @@ static __global__ void __launch_bounds__(kProjectThreads) project_kernel(const P
   const std::size_t base = (args.first_chunk + chunk) * kProjectChunk;
   std::uint32_t written = 0;
   const std::uint32_t parts = candidate_parts(args, chunk);
+  const SeenRows seen = parts != 0 ? gs.seen_rows(gs.chunk_id(chunk)) : SeenRows{};
   for (std::size_t first = begin; first < end && parts != 0; first += kProjectThreads) {
     const std::size_t i = first + threadIdx.x;
     std::uint32_t keep = 0;
@@ -38,7 +39,7 @@ static __global__ void __launch_bounds__(kProjectThreads) project_kernel(const P
     float key = 0;
     SplatAxes<float> axes;
     Projected<float> p;
-    if (i < end && (parts >> ((i - begin) / kChunkPart) & 1u) != 0) {
+    if (i < end && (parts >> ((i - begin) / kChunkPart) & 1u) != 0 && seen.has(i - begin)) {
       origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
       mean = {gs.means[0][i], gs.means[1][i], gs.means[2][i]};
       const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean,

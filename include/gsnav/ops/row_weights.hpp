@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <string>
 #include <vector>
@@ -22,7 +23,7 @@ namespace detail {
 /// that it takes.
 struct WeighTile {
   RasterArgs<float> args;
-  std::span<float> most;  ///< [slots / kProjectChunk], raised from many tiles at a time
+  std::span<float> most;  ///< [rows], raised from many tiles at a time
 
   void operator()(std::size_t tile) const noexcept {
     const TileGrid& grid = args.grid;
@@ -51,12 +52,13 @@ struct WeighTile {
           open -= pixel.open(args.rules) ? 0 : 1;
         }
       }
-      if (weight > 0) raise(most[slot / kProjectChunk], weight);
+      if (weight > 0) raise(most[rows[slot]], weight);
     }
   }
 
   static constexpr int kSide = 16;  // of the largest tile
   View<const SplatBounds> bounds;
+  View<const std::uint32_t> rows;  ///< of each slot
 
  private:
   static void raise(float& value, float to) noexcept {
@@ -69,26 +71,25 @@ struct WeighTile {
 
 }  // namespace detail
 
-/// Scratch of add_chunk_weights.
+/// Scratch of add_row_weights.
 template <Backend B>
-struct ChunkWeightsWorkspace {
-  explicit ChunkWeightsWorkspace(B& backend) : render(backend) {}
+struct RowWeightsWorkspace {
+  explicit RowWeightsWorkspace(B& backend) : render(backend) {}
   RenderWorkspace<float, B> render;
   std::vector<float> alpha;
+  std::vector<std::uint32_t> numbers;  ///< 0, 1, ...
 };
 
-/// Draws a set and raises `most` [chunks that are drawn] to the largest part of a pixel's light, alpha
-/// times transmittance, that a Gaussian of each chunk takes anywhere in the image. By the rules of
-/// Profile::fast. The same bits for any number of threads. Errors: those of render_camera; unsupported
-/// (a response other than Response::ewa).
+/// Draws a set and raises `most` [rows] to the largest part of a pixel's light, alpha times
+/// transmittance, that each Gaussian takes anywhere in the image. By the rules of Profile::fast, those
+/// of one depth in row order. The same bits for any number of threads. Errors: those of render_camera;
+/// unsupported (a response other than Response::ewa).
 template <Backend B>
-requires is_host_backend<B> Status add_chunk_weights(B& backend, ChunkWeightsWorkspace<B>& ws,
-                                                     const GaussianSet& set, const Camera& camera,
-                                                     std::span<float> most) {
-  if (most.size() != set.gaussians.chunk_count()) {
-    return {Errc::invalid_argument, "add_chunk_weights: `most` has " + std::to_string(most.size()) +
-                                        " values for " + std::to_string(set.gaussians.chunk_count()) +
-                                        " chunks"};
+requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspace<B>& ws, GaussianSet set,
+                                                   const Camera& camera, std::span<float> most) {
+  if (most.size() != set.gaussians.size) {
+    return {Errc::invalid_argument, "add_row_weights: `most` has " + std::to_string(most.size()) +
+                                        " values for " + std::to_string(set.gaussians.size) + " rows"};
   }
   RenderConfig config;
   config.profile = Profile::fast;
@@ -98,6 +99,12 @@ requires is_host_backend<B> Status add_chunk_weights(B& backend, ChunkWeightsWor
   ws.alpha.resize(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
   FrameImages<float> images;
   images.alpha = ws.alpha.data();
+  // What decides between equal depths is kept of each slot: so that it is the row.
+  if (ws.numbers.size() < most.size()) {
+    ws.numbers.resize(most.size());
+    std::iota(ws.numbers.begin(), ws.numbers.end(), std::uint32_t{0});
+  }
+  set.gaussians.row_ids = {ws.numbers.data(), most.size()};
   if (Status s = render_camera<float>(backend, ws.render, std::span(&set, 1), camera, config, images);
       !s)
     return s;
@@ -109,6 +116,7 @@ requires is_host_backend<B> Status add_chunk_weights(B& backend, ChunkWeightsWor
   weigh.args.geometry = ws.render.geometry.view();
   weigh.args.rules = blend_rules<float>(config);
   weigh.bounds = ws.render.bounds.view();
+  weigh.rows = ws.render.visible.ranks.view();
   weigh.most = most;
   backend.parallel_for(weigh.args.grid.count(), weigh);
   return backend.synchronize();
