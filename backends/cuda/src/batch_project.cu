@@ -269,7 +269,7 @@ __device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::
 }
 
 /// A warp half of an item: Gaussians are read once and projected for each camera of the mask, or where some of the
-/// cameras see some of the rows only (`SeenRows`) those of all cameras side by side.
+/// cameras see some of the rows only (`SomeRows`) those of all cameras side by side.
 /// `Plain`: records of neither depth nor perspective are asked for.
 template <bool Plain, bool SomeRows>
 __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)

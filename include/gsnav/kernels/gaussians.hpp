@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "gsnav/core/view.hpp"
+#include "gsnav/math/functions.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
 

@@ -17,6 +17,8 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/camera.hpp"
+#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/math/functions.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/ops/row_weights.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
