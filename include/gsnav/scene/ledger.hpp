@@ -28,7 +28,7 @@ struct FrameLedger {
   // Changed.
   std::uint64_t converted = 0;   ///< Gaussians of sets whose colours are of another space than the frame blends in
   bool other_order = false;      ///< blended in another order than the scene's file asks for
-  std::uint64_t unseen = 0;      ///< Gaussians in chunks left out by a visible set (VisibleSets)
+  std::uint64_t unseen = 0;      ///< Gaussians left out by a visible set (VisibleSets)
   double unseen_weight = 0;      ///< of which no viewpoint saw more than this part of a pixel: sampled, no bound
   LodStats lod;                  ///< zeros where no level of detail was asked for
   std::uint64_t sh_skipped = 0;  ///< SH coefficients in bands that are not read, held or not
@@ -107,8 +107,8 @@ inline std::string ledger_text(const FrameLedger& l) {
          l.sh_error);
   }
   if (l.unseen != 0) {
-    line("left out: %llu Gaussians in chunks of which no viewpoint in or near the camera's cell sees more than %.1g of a "
-         "pixel; sampled, not proved",
+    line("left out: %llu Gaussians of which, and of those beside them, no viewpoint in or near the camera's cell sees more "
+         "than %.1g of a pixel; sampled, not proved",
          count(l.unseen), l.unseen_weight);
   }
   if (l.lod.shown != 0) {

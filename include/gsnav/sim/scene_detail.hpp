@@ -44,7 +44,7 @@ class DetailSets {
     chunks_.clear();
     to_place_.clear();
     stats_ = {};
-    unseen_ = 0;
+    looked_from_.clear();
     for (std::size_t a = 0; a < detail.assets.size(); ++a) {
       const SceneDetail::Asset& asset = detail.assets[a];
       const auto cell = asset.visible != nullptr ? asset.visible->cell_of(camera, asset.world_from_asset)
@@ -52,8 +52,7 @@ class DetailSets {
       View<const std::uint32_t> seen;
       if (cell) {
         seen = asset.visible->seen_from(*cell);
-        const std::size_t all = asset.cloud->size();
-        unseen_ += all - asset.visible->count_seen_rows(*cell, all);
+        looked_from_.push_back({asset.visible, *cell, asset.cloud->size()});
       }
       if (asset.tree == nullptr) {
         sets_.push_back(sets[a]);
@@ -94,7 +93,11 @@ class DetailSets {
   const LodCut& cut(std::size_t a) const noexcept { return *cuts_[a].cut; }
   /// Gaussians of the assets that the last choice left out since nothing of them is seen from the
   /// camera's cell; where sets know of whole chunks only, less than a chunk too few.
-  std::uint64_t unseen() const noexcept { return unseen_; }
+  std::uint64_t unseen() const noexcept {
+    std::uint64_t sum = 0;
+    for (const auto& [sets, cell, rows] : looked_from_) sum += rows - sets->count_seen_rows(cell, rows);
+    return sum;
+  }
 
   /// Chunks of the last choice that a backend with a memory of its own has to be given, and where they are there.
   std::span<const std::uint32_t> chunks() const noexcept { return chunks_; }
@@ -127,7 +130,11 @@ class DetailSets {
   std::vector<std::uint32_t> chunks_;
   std::vector<std::size_t> to_place_;  // sets whose chunks these are
   LodStats stats_;                     // shown and merged of all
-  std::uint64_t unseen_ = 0;
+  struct LookedFrom {
+    const VisibleSets* sets;
+    std::size_t cell, rows;  // of the asset's cloud
+  };
+  std::vector<LookedFrom> looked_from_;
   RenderConfig rules_;
 };
 
