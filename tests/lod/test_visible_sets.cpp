@@ -235,6 +235,31 @@ TEST_CASE("visible sets: what is behind a wall is left out, and no image shows i
   CHECK(hidden > 2 * known);
 }
 
+TEST_CASE("visible sets: a further viewpoint takes nothing away, and adds") {
+  OpenMPBackend backend(2);
+  VisibleSettings settings = coarse();
+  settings.rows = 1;
+  const std::vector<Vec3d> eyes{{1.1, 1.3, 0.1}, {1.4, 1.3, 0.4}};  // of one cell
+  const VisibleSets one = build_visible_sets(backend, rooms(), std::span(eyes).first(1), settings).value();
+  const VisibleSets both = build_visible_sets(backend, rooms(), eyes, settings).value();
+  const auto at = std::lower_bound(both.keys.begin(), both.keys.end(), one.keys[0]);
+  REQUIRE(at != both.keys.end());
+  REQUIRE(*at == one.keys[0]);
+  const std::size_t cell = static_cast<std::size_t>(at - both.keys.begin());
+  GaussianView a = rooms().view(), b = rooms().view();
+  a.seen = one.seen_from(0);
+  b.seen = both.seen_from(cell);
+  std::size_t more = 0;
+  for (std::size_t i = 0; i < rooms().size(); ++i) {
+    const auto seen = [i](const GaussianView& v) {
+      return v.may_be_seen(i / kProjectChunk) && v.seen_rows(i / kProjectChunk).has(i % kProjectChunk);
+    };
+    if (seen(a)) CHECK(seen(b));
+    more += !seen(a) && seen(b) ? 1 : 0;
+  }
+  CHECK(more > 0);
+}
+
 TEST_CASE("visible sets: the same bits for any number of threads") {
   SerialBackend one;
   const VisibleSets again = build_visible_sets(one, rooms(), places_in_rooms(), coarse()).value();

@@ -22,7 +22,7 @@ PLANTS = [
           "    for (std::size_t r = first; r < first + run; ++r)\n      if (begin + r >= most.size() || "
           "!(static_cast<double>(most[begin + r]) > settings.min_weight)) out",
           VISIBLE_TEST, RUNS, why="what lies together is seen together"),
-    plant("a_chunk_by_its_first_viewpoint", SETS,
+    plant("a_chunk_by_its_last_viewpoint", SETS,
           "    for (std::size_t k = 0; k < kSeenRowWords; ++k) to[k] |= rows[k];\n", "    to = rows;\n",
-          VISIBLE_TEST, "visible sets: what is behind a wall*", why="the last that looked counts alone"),
+          VISIBLE_TEST, "visible sets: a further viewpoint*", why="the last that looked counts alone"),
 ]
