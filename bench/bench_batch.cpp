@@ -8,7 +8,7 @@
 // views repeats them from slightly different places. Times are the device's, between events on the
 // stream; `host us` is how long the call takes that asks for them. --balls: so many meshes of 4000
 // triangles stand before the first cameras, seen by all. --rgb: colours alone, as most renderers have them, no depth
-// and no alpha. --visible: each camera draws only what is seen from its cell (VisibleSettings::rows, min_weight); the
+// (its error is nan) and no alpha. --visible: each camera draws only what is seen from its cell (VisibleSettings::rows, min_weight); the
 // images of all views are compared with those of all that is there.
 #include <cuda_runtime.h>
 
@@ -17,6 +17,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -159,7 +160,7 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f  %.1e  %9.0f  %8.1f  %7.1f\n",
               profile == Profile::fast ? "fast" : "exact", count, gsnav_bench::median(ms), gsnav_bench::quantile(ms, 0.9),
               1000.0 / gsnav_bench::median(ms), e.max, e.p999, e.psnr,
-              gsnav_bench::error_of(depth_seen, depth_truth).p99,
+              g_rgb_alone ? std::numeric_limits<double>::quiet_NaN() : gsnav_bench::error_of(depth_seen, depth_truth).p99,
               pairs / static_cast<double>(ms.size() * count), static_cast<double>(renderer.stats().scratch_bytes) / 1e6,
               gsnav_bench::median(host_us));
   std::fflush(stdout);

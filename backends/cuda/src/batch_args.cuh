@@ -128,7 +128,7 @@ struct BatchArgs {
   SplatPerspective<float>* perspectives;  ///< null: Response::ewa
   HardSplat* hard;
   std::uint32_t* several;  ///< slots whose tiles are still to be found; kNoSlot: none
-  LargeRow* large;        ///< of splats of very many tiles
+  LargeRow* large;         ///< of splats of very many tiles
   /// [tiles << depth_bins.bits]: how many pairs; where the next goes, once lists have their places; where bins
   /// end, once all are there.
   std::uint32_t* bins;

@@ -63,7 +63,7 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
     }
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const GaussianView& g = sets[cameras[c].sets.empty() ? i : cameras[c].sets[i]].gaussians;
-      if (!seen[i].empty() && !g.can_be_seen(seen[i].size)) {
+      if (!seen[i].empty() && !g.seen_may_have(seen[i].size)) {
         return bad(Errc::invalid_argument, "seen[" + std::to_string(i) + "] has " +
                                                std::to_string(seen[i].size) + " words for " +
                                                std::to_string(g.all_chunks()) + " chunks");

@@ -134,9 +134,10 @@ struct GaussianView {
   /// Words of `seen` that chunks take.
   GSNAV_HD std::size_t seen_words() const noexcept { return (all_chunks() + 31) / 32; }
   GSNAV_HD bool has_seen_rows() const noexcept { return seen.size > seen_words(); }
-  /// Whether `seen` may have so many words.
-  GSNAV_HD bool can_be_seen(std::size_t words) const noexcept {
-    return words == seen_words() || (words >= 2 * seen_words() && words % kSeenRowWords == 2 * seen_words() % kSeenRowWords);
+  /// Whether `seen` may have so many words, of chunks alone or of rows too.
+  GSNAV_HD bool seen_may_have(std::size_t words) const noexcept {
+    const std::size_t of_chunks = seen_words();
+    return words == of_chunks || (words >= 2 * of_chunks && (words - 2 * of_chunks) % kSeenRowWords == 0);
   }
   /// Which rows of a chunk that may be seen may be.
   GSNAV_HD SeenRows seen_rows(std::size_t chunk) const noexcept {

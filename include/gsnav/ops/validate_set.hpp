@@ -95,7 +95,7 @@ inline Status validate(const GaussianSet& set) {
     return bad("chunk_sh_degrees has " + std::to_string(g.chunk_sh_degrees.size) + " values where " +
                std::to_string(g.all_chunks()) + " are needed");
   }
-  if (!g.seen.empty() && !g.can_be_seen(g.seen.size)) {
+  if (!g.seen.empty() && !g.seen_may_have(g.seen.size)) {
     return bad("seen has " + std::to_string(g.seen.size) + " words where " + std::to_string(g.seen_words()) +
                " are needed, or twice as many and " + std::to_string(kSeenRowWords) + " a chunk that is seen");
   }
