@@ -186,6 +186,53 @@ TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are 
   }
 }
 
+TEST_CASE("cuda batch: a large image has lists of all lengths, with few and many Gaussians at one depth") {
+  if (no_gpu("cuda batch order of large images")) return;
+  CudaBackend cuda;
+  SerialBackend serial;
+  GaussianCloudBuilder builder(0);
+  Rng rng(7);
+  const auto add = [&](double x, double y, double z, double scale) {
+    RawGaussian g;
+    g.mean = {x, y, z};
+    g.quat = {1, 0, 0, 0};
+    for (int k = 0; k < 3; ++k) g.log_scales[k] = std::log(scale);
+    g.opacity_logit = -3;
+    for (auto& c : g.sh0) c = static_cast<float>(rng.normal());
+    builder.add(g);
+  };
+  // Patches a tile wide, all of one depth or of so many: what a warp puts in order in one way, in the other, and not.
+  constexpr int kLengths[] = {1, 2, 33, 64, 65, 128, 129, 250, 256, 257, 500, 900};
+  int column = 0;
+  for (const int length : kLengths) {
+    int row = 0;
+    for (const int depths : {1, 2, 40, 100000}) {
+      const double x = -1.7 + 0.3 * column, y = -0.9 + 0.5 * row;
+      for (int i = 0; i < length; ++i) {
+        const double z = 2 + 0.001 * static_cast<double>(rng.next() % static_cast<std::uint64_t>(depths)) / depths;
+        add(x + rng.uniform(-0.01, 0.01), y + rng.uniform(-0.01, 0.01), z, 0.003);
+      }
+      ++row;
+    }
+    ++column;
+  }
+  for (int i = 0; i < 3000; ++i) add(rng.uniform(-3, 3), rng.uniform(-2, 2), rng.uniform(1, 4), rng.uniform(0.01, 0.3));
+  GaussianCloud cloud = builder.cloud();
+  Camera camera;
+  camera.set_hfov(1280, 848, 90);
+  REQUIRE(TileGrid::of(camera.width, camera.height, 16).count() > kManyTiles);
+  for (const bool sorted : {false, true}) {
+    if (sorted) sort_spatially(cloud);
+    const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+    RenderConfig config;
+    config.outputs = kAll;
+    CudaBatchRenderer renderer(cuda);
+    const Batch got = draw_batch(cuda, renderer, {arrays.set()}, {camera}, {}, kAll, false);
+    check_same(got.frames, render<float>(serial, {cloud.set()}, camera, config));
+    check_same(got.frames, singly(cuda, {arrays.set()}, {camera}, {}, {}, kAll));
+  }
+}
+
 TEST_CASE("cuda batch: the same bits on every run, in any company") {
   if (no_gpu("cuda batch runs")) return;
   CudaBackend cuda;

@@ -80,6 +80,8 @@ struct LargeRow {
 struct alignas(16) ListPart {
   std::uint32_t tile, bin, begin, end;
 };
+/// Of an entry of tile_order: the tile's list is in order already.
+inline constexpr std::uint32_t kListInOrder = 0x80000000u;
 inline constexpr std::uint32_t kPartLength = 128;  ///< part p has the bins that begin so many pairs apart
 
 inline constexpr int kMinDepthBits = 6, kMaxDepthBits = 9;
@@ -97,12 +99,20 @@ struct DepthBins {
   }
 };
 
-/// Counts go on where capacities end, so that they say what would have been needed.
+/// Counts go on where capacities end, so that they say what would have been needed. Each has a line of memory of its own:
+/// what adds to counters of one line is served one after the other.
 struct BatchCounters {
-  unsigned long long slots, hard, several, large, pairs;
-  std::uint32_t items, parts, long_parts;
-  std::uint32_t tiles_of_length[33];    ///< by leading zeros of a tile's count: long lists first
-  std::uint32_t ordered_of_length[33];  ///< of these in tile_order already
+  static constexpr std::size_t kLine = 256;
+  alignas(kLine) unsigned long long slots;
+  alignas(kLine) unsigned long long hard;
+  alignas(kLine) unsigned long long several;
+  alignas(kLine) unsigned long long large;
+  alignas(kLine) unsigned long long pairs;
+  alignas(kLine) std::uint32_t items;
+  alignas(kLine) std::uint32_t parts;
+  alignas(kLine) std::uint32_t long_parts;
+  alignas(kLine) std::uint32_t tiles_of_length[33];  ///< by leading zeros of a tile's count: long lists first
+  std::uint32_t ordered_of_length[33];               ///< of these in tile_order already
 };
 
 /// By value to every kernel.
@@ -118,6 +128,7 @@ struct BatchArgs {
   bool elliptic;
   bool seen_rows;  ///< some instance knows of its rows which may be seen
   DepthBins depth_bins;
+  bool short_lists;  ///< most lists are short, and put in order by a warp each before they are drawn
 
   BatchItem* items;
   BatchCounters* counters;
@@ -134,7 +145,8 @@ struct BatchArgs {
   std::uint32_t* bins;
   std::uint32_t* tile_counts;
   std::uint32_t* tile_begins;
-  std::uint32_t* tile_order;  ///< the order that tiles are begun in: longest lists first, so that none is waited for
+  /// The order that tiles are begun in: longest lists first, so that none is waited for. With kListInOrder.
+  std::uint32_t* tile_order;
   ListPart* parts;            ///< where there are many bins of depth
   std::uint32_t* long_parts;  ///< those that a warp has not put in order
   Pair* pairs;      ///< of a tile together: in no order, or in order once order_lists has been there
@@ -183,7 +195,7 @@ __device__ inline std::uint32_t rank_of(const BatchArgs& a, std::uint32_t camera
 // Launches, in the order of a frame. `blocks`: how many keep the device full.
 void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
 void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
-/// Of lists in bins.
+/// Of lists in bins, and of short ones.
 void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
 /// `raster`: rules, background and images; `rgb8` may stand beside its rgb.
 void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std::uint8_t* rgb8,

@@ -182,11 +182,7 @@ __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
         last = counts[i].y;
       }
     }
-    std::uint32_t next = sum;
-    for (unsigned step = 1; step < 32; step *= 2) {
-      const std::uint32_t other = __shfl_up_sync(kAll, next, step);
-      if (lane >= step) next += other;
-    }
+    const std::uint32_t next = sum_to_lane(sum);
     const std::uint32_t total = __shfl_sync(kAll, next, 31);
     const std::uint32_t parts = (total + kPartLength - 1) / kPartLength;
     std::uint32_t begin = 0, first_part = 0;

@@ -43,11 +43,11 @@ struct BlendShared {
   }
 };
 
-/// Puts the records of splats [first, first + n) of the batch into shared memory, and what they may
-/// reach. `far`: of the tile's meshes.
-template <bool Mesh>
-__device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, std::uint32_t n,
-                      int tile_x, int tile_y, float far) {
+/// Puts the records of n splats, of which slot_of(i) is the i-th, into shared memory, and what they may reach. `far`:
+/// of the tile's meshes.
+template <bool Mesh, class F>
+__device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int tile_x, int tile_y, float far,
+                      const F& slot_of) {
   if (threadIdx.x == 0) s.splat(kNothing) = staged_nothing();
   const unsigned lane = threadIdx.x % 32;
   std::uint16_t* const queue = s.queues[threadIdx.x / 32];
@@ -55,7 +55,7 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, s
   for (std::uint32_t i = threadIdx.x; i - lane < n; i += kThreads) {
     bool wide = false;
     if (i < n) {
-      const std::uint32_t slot = s.order.slots[first + i];
+      const std::uint32_t slot = slot_of(i);
       const SplatRecord r = a.records[slot];
       s.splat(i) = staged(r, slot);
       const bool hidden = Mesh && is_hidden(a, slot, far);
@@ -73,7 +73,7 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t first, s
   __syncwarp();
   for (std::uint32_t q = lane; q < queued; q += 32) {
     const std::uint32_t i = queue[q];
-    const SplatRecord& r = a.records[s.order.slots[first + i]];
+    const SplatRecord& r = a.records[__float_as_uint(s.splat(i).color.pad)];
     const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
     s.masks[i] =
         static_cast<std::uint16_t>(blocks.of_ellipse(geometry_of(s.splat(i)), a.log2_alpha_min));
@@ -123,8 +123,9 @@ __global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor)
   BlendShared& s = *reinterpret_cast<BlendShared*>(memory);
   const BatchArgs& a = b.batch;
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
-  const std::uint32_t ordered = a.tile_order[blockIdx.x], camera = ordered / tiles,
-                      tile = ordered % tiles;
+  const std::uint32_t entry = a.tile_order[blockIdx.x], ordered = entry & ~kListInOrder,
+                      camera = ordered / tiles, tile = ordered % tiles;
+  const bool in_order = (entry & kListInOrder) != 0;
   const int tile_x = static_cast<int>(tile) % a.grid.columns * kBatchTile;
   const int tile_y = static_cast<int>(tile) / a.grid.columns * kBatchTile;
   // A warp has 2 x 2 blocks of the tile's 4 x 4.
@@ -168,10 +169,14 @@ __global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor)
   TileOrder order(a, ordered, camera);
   unsigned open = __ballot_sync(kAll, is_open());
   bool all_closed = false;
-  while (const std::uint32_t n = all_closed ? 0 : order.next(s.order, a)) {
+  const Pair* const pairs = a.pairs + a.tile_begins[ordered];
+  std::uint32_t n = in_order ? a.tile_counts[ordered] : order.next(s.order, a);
+  for (; n != 0; n = in_order || all_closed ? 0 : order.next(s.order, a)) {
     for (std::uint32_t first = 0; first < n && !all_closed; first += kChunk) {
       const std::uint32_t staged = min(kChunk, n - first);
-      stage<Mesh>(s, a, first, staged, tile_x, tile_y, far);
+      stage<Mesh>(s, a, staged, tile_x, tile_y, far, [&](std::uint32_t i) {
+        return in_order ? pairs[first + i].slot : s.order.slots[first + i];
+      });
       if (open != 0) {
         unsigned quarters = 0;
         for (unsigned q = 0; q < 4; ++q) quarters |= (open >> 8 * q & 0xffu) != 0 ? 1u << q : 0u;

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include "batch_order.cuh"
 
-// Few cameras: parts of lists are put in order by themselves, by a warp each, or by a block where they are long.
+// Few cameras: parts of lists are put in order by themselves, by a warp each, or by a block where they are long. Large
+// images: so are whole lists, where they are short.
 
 namespace gsnav::cuda {
 
@@ -165,10 +168,28 @@ __global__ void __launch_bounds__(kThreads) order_long_kernel(const BatchArgs a)
   }
 }
 
+/// A warp a list; what is too long for one, or has many equal keys, is left to be put in order as it is drawn.
+__global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a) {
+  const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
+  for (std::uint32_t i = blockIdx.x * kWarps + threadIdx.x / 32; i < a.tiles; i += gridDim.x * kWarps) {
+    const std::uint32_t tile = a.tile_order[i], camera = tile / tiles, n = a.tile_counts[tile];
+    const std::uint32_t begin = a.tile_begins[tile];
+    const ListPart list{tile, 0, begin, begin + n};
+    const bool done = n <= 64    ? order_part<2>(a, list, camera)
+                      : n <= 128 ? order_part<4>(a, list, camera)
+                                 : n <= 256 && order_part<8>(a, list, camera);
+    if (done && threadIdx.x % 32 == 0) a.tile_order[i] = tile | kListInOrder;
+  }
+}
+
 }  // namespace
 
 void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
   const unsigned processors = static_cast<unsigned>(multiprocessors);
+  if (args.short_lists) {
+    order_lists_kernel<<<std::min(processors * 16, (args.tiles + kWarps - 1) / kWarps), kThreads, 0, stream>>>(args);
+    return;
+  }
   order_kernel<<<processors * 8, kThreads, 0, stream>>>(args);
   order_long_kernel<<<processors * 6, kThreads, 0, stream>>>(args);
 }

@@ -83,11 +83,19 @@ namespace {
 using cuda::BatchInstance;
 using cuda::BatchSet;
 
-/// Whether a call takes as long as its longest list, so that lists are to be short. `tiles`: of 16 pixels. In larger images
-/// splats are larger too, and small tiles share too many.
-bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, int multiprocessors) {
-  constexpr std::uint64_t kSmallImage = 512;
-  return tiles <= kSmallImage && cameras * tiles <= 16 * static_cast<std::uint64_t>(multiprocessors);
+/// Whether a call takes as long as its longest list, so that lists are to be short. `tiles`: of 16 pixels; `gaussians`: of
+/// all cameras. In larger images splats are larger too, and small tiles share too many; of more Gaussians lists are
+/// longer.
+bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussians, int multiprocessors) {
+  constexpr std::uint64_t kSmallImage = 512, kManyGaussians = 2'500'000;
+  const std::uint64_t at_a_time = gaussians >= kManyGaussians * cameras ? 32 : 16;
+  return tiles <= kSmallImage && cameras * tiles <= at_a_time * static_cast<std::uint64_t>(multiprocessors);
+}
+
+/// Whether lists of an image of so many tiles are short, for the most part: what takes a block long is then not to draw
+/// one but to put it in order.
+bool has_short_lists(std::uint64_t tiles, int multiprocessors) {
+  return tiles > 16 * static_cast<std::uint64_t>(multiprocessors);
 }
 
 /// Eight octaves from the nearest near plane on, or from kNear, as finely as counters in the GPU's cache allow. An
@@ -219,11 +227,14 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   args.cameras = static_cast<std::uint32_t>(cameras.size());
   const int width = cameras[0].camera.width, height = cameras[0].camera.height;
   args.grid = TileGrid::of(width, height, cuda::kBatchTile);
-  const bool few = is_of_few(args.cameras, args.grid.count(), multiprocessors);
+  std::uint64_t gaussians = 0;
+  for (const Seen& v : seen) gaussians += sets[v.set].gaussians.size;
+  const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, multiprocessors);
   if (few) args.grid = TileGrid::of(width, height, cuda::kSmallTile);
   const std::uint64_t tiles = args.cameras * std::uint64_t{args.grid.count()};
   if (tiles > 0x7fffffffu) return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
   args.tiles = static_cast<std::uint32_t>(tiles);
+  args.short_lists = has_short_lists(args.grid.count(), multiprocessors);
   args.depth_bins = few ? depth_bins_of(cameras, rules.key_bits, args.tiles) : cuda::DepthBins{};
   args.log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
   args.elliptic = config.response == Response::ewa;
@@ -239,9 +250,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
 
   if (slot_capacity == 0) {
     // A guess; the first calls find out.
-    std::uint64_t total = 0;
-    for (const Seen& v : seen) total += sets[v.set].gaussians.size;
-    slot_capacity = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(total / 4, 1u << 16, 1u << 26));
+    slot_capacity = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(gaussians / 4, 1u << 16, 1u << 26));
     pair_capacity = 2 * slot_capacity;
     several_capacity = slot_capacity;
     hard_capacity = large_capacity = slot_capacity / 16;

@@ -34,10 +34,7 @@ __device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t ch
   const unsigned all =
       (1u << (rows < kProjectChunk ? (rows + kChunkPart - 1) / kChunkPart : kPartsPerChunk)) - 1;
   unsigned parts = seen ? all : 0;
-  if (seen && instances[lane].args.gaussians.has_seen_rows()) {
-    const SeenRows rows = instances[lane].args.gaussians.seen_rows(chunk);
-    for (unsigned p = 0; p < kPartsPerChunk; ++p) parts &= rows.any_of_part(p) ? ~0u : ~(1u << p);
-  }
+  if (seen) parts &= instances[lane].args.gaussians.seen_rows(chunk).parts();
   unsigned edges =
       __ballot_sync(kAll, seen && !gs.part_bounds.empty() &&
                               !lies_in_view(instances[lane].args.camera64, gs.chunk_bounds[chunk]));
@@ -145,15 +142,48 @@ __device__ void write_record(const BatchArgs& a, std::uint32_t slot, const Batch
   if (a.perspectives != nullptr) a.perspectives[slot] = s.perspective;
 }
 
-__device__ void queue_large(const BatchArgs& a, std::uint32_t slot, const SplatBounds& b) {
+/// The rows of tiles of a splat that binning takes row by row.
+struct LargeRows {
+  std::uint32_t first, count;
+};
+
+__device__ LargeRows large_rows(const BatchArgs& a, const SplatBounds& b) {
   const int shift = a.grid.tile_shift();
   const std::uint32_t first = static_cast<std::uint32_t>(b.y0 >> shift);
-  const std::uint32_t end = static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1;
-  unsigned long long place = atomicAdd(&a.counters->large, static_cast<unsigned long long>(end - first));
-  for (std::uint32_t row = first; row < end; ++row, ++place) {
-    if (place < a.large_capacity) a.large[place] = {slot, row};
-  }
+  return {first, static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1 - first};
 }
+
+__device__ void queue_large_row(const BatchArgs& a, unsigned long long place, std::uint32_t slot, std::uint32_t row) {
+  if (place < a.large_capacity) a.large[place] = {slot, row};
+}
+
+/// Queues the rows of the lanes that have some; all lanes call both, `ask` first, so that nobody waits for the counter
+/// until `put`.
+class LargeQueue {
+ public:
+  __device__ void ask(const BatchArgs& a, const LargeRows& rows) {
+    any_ = __any_sync(kAll, rows.count != 0);
+    if (!any_) return;
+    const std::uint32_t end = sum_to_lane(rows.count);
+    begin_ = end - rows.count;
+    if (threadIdx.x % 32 == 31) base_ = atomicAdd(&a.counters->large, static_cast<unsigned long long>(end));
+  }
+  __device__ void put(const BatchArgs& a, std::uint32_t slot, const LargeRows& rows) const {
+    if (!any_) return;
+    const unsigned long long base = __shfl_sync(kAll, base_, 31);
+    share_in_warp(rows.count, [&](unsigned owner, std::uint32_t k) {
+      const unsigned from = owner % 32;
+      const std::uint32_t place = __shfl_sync(kAll, begin_, from) + k, of = __shfl_sync(kAll, slot, from),
+                          row = __shfl_sync(kAll, rows.first, from) + k;
+      if (owner < 32) queue_large_row(a, base + place, of, row);
+    });
+  }
+
+ private:
+  bool any_ = false;
+  std::uint32_t begin_ = 0;      ///< of the lane's, among the warp's
+  unsigned long long base_ = 0;  ///< of lane 31: where the warp's begin
+};
 
 /// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
 struct alignas(16) WarpRows {
@@ -300,11 +330,11 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
       }
       if (!__any_sync(kAll, mine != 0)) continue;
     }
+    const LaneRow read = read_row(gs, first + lane);
     // Instances of a set are drawn to one degree.
     const int degree =
         gs.degree_of(item.part * kChunkPart, a.instances[item.first_instance].args.sh_degree);
     bool has_sh = !a.instances[item.first_instance].args.color || degree == 0 || existing == 0;
-    const LaneRow read = read_row(gs, first + lane);
     __syncwarp();  // all lanes are done with the rows before
     if (!has_sh) ask_for_sh(gs, degree, first, rows);
     keep_row(read, rows);
@@ -350,6 +380,10 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
         if (slot != kNoSlot) a.entries[slot] = {0, 0, 0, kNoSlot};  // until it has a record
         if (place < a.hard_capacity) a.hard[place] = {slot, index, static_cast<std::uint32_t>(row)};
       }
+      LargeRows large{0, 0};
+      if (drawn && slot != kNoSlot && is_large(a, splat.bounds)) large = large_rows(a, splat.bounds);
+      LargeQueue queue;
+      queue.ask(a, large);
       if (!has_sh && __any_sync(kAll, drawn)) {
         wait_for_sh();
         has_sh = true;
@@ -368,10 +402,10 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
         add_pair<false, false>(a, single, tile, code);
       }
       const bool queued = drawn && slot != kNoSlot && !single;
-      const bool large = queued && is_large(a, splat.bounds);
-      if (large) queue_large(a, slot, splat.bounds);
-      const std::uint64_t place = several.take(queued && !large);
-      if (queued && !large && place < a.several_capacity) a.several[place] = slot;
+      queue.put(a, slot, large);
+      const bool few_tiles = queued && large.count == 0;
+      const std::uint64_t place = several.take(few_tiles);
+      if (few_tiles && place < a.several_capacity) a.several[place] = slot;
     };
     if constexpr (SomeRows) {
       share_in_warp(static_cast<std::uint32_t>(__popc(mine)), [&](unsigned owner, std::uint32_t n) {
@@ -422,7 +456,9 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
         atomicAdd(a.bins + bin_of(a, tile_of(a, instance.camera, window, 0), args.camera.key_code(key)),
                   1u);
       } else if (is_large(a, splat.bounds)) {
-        queue_large(a, h.slot, splat.bounds);
+        const LargeRows rows = large_rows(a, splat.bounds);
+        const unsigned long long place = atomicAdd(&a.counters->large, static_cast<unsigned long long>(rows.count));
+        for (std::uint32_t k = 0; k < rows.count; ++k) queue_large_row(a, place + k, h.slot, rows.first + k);
       } else {
         const unsigned long long place = atomicAdd(&a.counters->several, 1ull);
         if (place < a.several_capacity) a.several[place] = h.slot;

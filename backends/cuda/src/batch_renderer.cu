@@ -82,7 +82,7 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
   const auto address = [](const void* p) { return reinterpret_cast<std::uintptr_t>(p); };
   const FrameImages<float>& to = raster.images;
   add(args.units, args.set_count, args.cameras, args.grid.width, args.grid.height, input_bytes,
-      args.depth_bins.base, args.seen_rows);
+      args.depth_bins.base, args.depth_bins.bits, args.seen_rows);
   add(address(args.sets), address(args.instances), address(args.camera_first),
       address(args.camera_instances), address(flight.inputs.data));
   add(address(to.rgb), address(to.alpha), address(to.median_depth), address(to.expected_depth),
@@ -102,7 +102,7 @@ void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
   backend.fill(zeroed.data(), 0, zeroed_words(args) * sizeof(std::uint32_t));
   cuda::launch_projection(args, multiprocessors, stream);
   cuda::launch_binning(args, multiprocessors, stream);
-  if (args.depth_bins.many()) cuda::launch_ordering(args, multiprocessors, stream);
+  if (args.depth_bins.many() || args.short_lists) cuda::launch_ordering(args, multiprocessors, stream);
   cuda::launch_blending(args, raster, rgb8, stream);
   backend.copy(flight.counters, args.counters, sizeof(cuda::BatchCounters), CopyKind::device_to_host);
 }

@@ -64,17 +64,22 @@ __device__ inline std::uint32_t tile_of(const BatchArgs& a, std::uint32_t camera
          bit % TileWindow::kSide;
 }
 
+/// The sum of `value` over the lanes up to this one. All lanes of the warp call it.
+__device__ inline std::uint32_t sum_to_lane(std::uint32_t value) {
+  for (unsigned step = 1; step < 32; step *= 2) {
+    const std::uint32_t other = __shfl_up_sync(0xffffffffu, value, step);
+    if (threadIdx.x % 32 >= step) value += other;
+  }
+  return value;
+}
+
 /// Calls f(owner, i) for i in [0, count) of each lane `owner`, all of the warp's calls shared evenly by its lanes. All
 /// lanes call it; f is called together, with owner 32 by lanes that have nothing left.
 template <class F>
 __device__ inline void share_in_warp(std::uint32_t count, const F& f) {
   constexpr unsigned kAll = 0xffffffffu;
   const unsigned lane = threadIdx.x % 32;
-  std::uint32_t end = count;  // of the lane's calls among the warp's
-  for (unsigned step = 1; step < 32; step *= 2) {
-    const std::uint32_t other = __shfl_up_sync(kAll, end, step);
-    if (lane >= step) end += other;
-  }
+  const std::uint32_t end = sum_to_lane(count);  // of the lane's calls among the warp's
   const std::uint32_t total = __shfl_sync(kAll, end, 31);
   for (std::uint32_t first = 0; first < total; first += 32) {
     const std::uint32_t at = first + lane;

@@ -66,6 +66,13 @@ struct SeenRows {
     static_assert(kChunkPart == 64);
     return (word(2 * part) | word(2 * part + 1)) != 0;
   }
+  /// The parts with any: a bit each.
+  GSNAV_HD std::uint32_t parts() const noexcept {
+    if (words == nullptr) return ~0u;
+    std::uint32_t bits = 0;
+    for (std::size_t p = 0; p < kProjectChunk / kChunkPart; ++p) bits |= any_of_part(p) ? 1u << p : 0u;
+    return bits;
+  }
 };
 
 /// Read-only arrays of N Gaussians, as kernels see them. Owns nothing.

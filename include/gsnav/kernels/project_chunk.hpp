@@ -63,12 +63,7 @@ GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c
   const std::size_t id = gs.chunk_id(c);
   if (!gs.may_be_seen(id)) return 0;
   constexpr std::size_t kParts = kProjectChunk / kChunkPart;
-  std::uint32_t parts = ~0u;
-  if (gs.has_seen_rows()) {
-    const SeenRows rows = gs.seen_rows(id);
-    parts = 0;
-    for (std::size_t p = 0; p < kParts; ++p) parts |= rows.any_of_part(p) ? 1u << p : 0u;
-  }
+  const std::uint32_t parts = gs.seen_rows(id).parts();
   if (gs.chunk_bounds.empty()) return parts;
   const double s_max = detail::ChunkInView(args.camera64, gs.chunk_bounds[id]).s_max();
   if (!may_be_visible(args.camera64, gs.chunk_bounds[id], s_max)) return 0;
