@@ -198,6 +198,10 @@ int main(int argc, char** argv) try {
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
   CLI11_PARSE(app, argc, argv);
+  if (o.shown_episode >= o.episodes) {
+    std::fprintf(stderr, "nav_loop: --show %d: of %d episodes the last is %d\n", o.shown_episode, o.episodes, o.episodes - 1);
+    return 2;
+  }
   if (o.visible_sets && o.profile == "exact") {
     std::fprintf(stderr,
                  "nav_loop: --visible-sets: sampled, so not for --profile exact; use fast or lod\n");

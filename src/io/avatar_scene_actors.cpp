@@ -118,7 +118,7 @@ Result<std::vector<Affine3<double>>> load_trajectory(const std::filesystem::path
     const double* v = &a->values[7 * t];
     Quatd q{v[6], v[3], v[4], v[5]};
     if (!normalize(q))
-      return {Errc::invalid_file, path.string() + ": " + name + ": row " + std::to_string(t) + " has no rotation"};
+      return detail::invalid_file(path, name + ": row " + std::to_string(t) + " has no rotation");
     out.push_back({rotation_matrix(q), {v[0], v[1], v[2]}});
   }
   return out;
@@ -126,12 +126,13 @@ Result<std::vector<Affine3<double>>> load_trajectory(const std::filesystem::path
 
 Result<AvatarActor> load_actor(const SceneAvatar& a,
                                std::map<std::string, std::shared_ptr<const AvatarAsset>>& bodies) {
-  std::shared_ptr<const AvatarAsset>& body = bodies[a.canonical.string()];
-  if (body == nullptr) {
+  std::shared_ptr<const AvatarAsset>& file_body = bodies[a.canonical.string()];
+  if (file_body == nullptr) {
     auto loaded = load_avatar(a.canonical);
     if (!loaded) return loaded.status();
-    body = std::make_shared<const AvatarAsset>(std::move(loaded->asset));
+    file_body = std::make_shared<const AvatarAsset>(std::move(loaded->asset));
   }
+  std::shared_ptr<const AvatarAsset> body = file_body;
   auto driver = load_driver(a.driver, body->skeleton);
   if (!driver) return driver.status();
   driver->clip.end = ClipEnd::hold;
@@ -149,11 +150,16 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
   }
   move_clip(*driver, {coordinates});
   if (body->capsules.empty() && !driver->capsules.empty() && !driver->capsules[0].empty()) {
-    const auto tracked = capsules_from_track(body->skeleton, driver->clip, driver->capsules);
-    if (!tracked) return tracked.status();
-    AvatarAsset with = *body;
-    with.capsules = tracked->capsules;
-    body = std::make_shared<const AvatarAsset>(std::move(with));
+    // The file's body stays as it is: another entry may have another driver.
+    std::shared_ptr<const AvatarAsset>& of_driver = bodies[a.canonical.string() + '\n' + a.driver.string()];
+    if (of_driver == nullptr) {
+      const auto tracked = capsules_from_track(body->skeleton, driver->clip, driver->capsules);
+      if (!tracked) return tracked.status();
+      AvatarAsset with = *body;
+      with.capsules = tracked->capsules;
+      of_driver = std::make_shared<const AvatarAsset>(std::move(with));
+    }
+    body = of_driver;
   }
   ActorOptions options;
   options.scale = a.scale;

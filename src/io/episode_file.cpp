@@ -39,7 +39,7 @@ Result<std::vector<std::byte>> load_text(const fs::path& path) {
     if (text.size() > kMostText) return {Errc::unsupported, path.string() + ": more than 1 GiB of text"};
     if (got == 0) break;
   }
-  if (!gzip.at_end()) return {Errc::invalid_file, path.string() + ": its gzip stream is cut or damaged"};
+  if (!gzip.at_end()) return detail::invalid_file(path, "its gzip stream is cut or damaged");
   return text;
 }
 

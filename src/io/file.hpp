@@ -85,6 +85,11 @@ inline Status reading_failed(const std::string& source) {
   return {Errc::invalid_file, source + ": reading failed, or the file became shorter"};
 }
 
+/// What is wrong with a file's content.
+inline Status invalid_file(const std::filesystem::path& path, const std::string& what) {
+  return {Errc::invalid_file, path.string() + ": " + what};
+}
+
 /// A file being written; what goes wrong is kept until close().
 class OutFile {
  public:

@@ -253,9 +253,9 @@ Result<LoadedSkinnedMesh> load_gltf_skin(const std::filesystem::path& path, cons
     out.mesh.name = path.stem().string();
     out.mesh.skeleton = skin->skeleton;
     if (Status s = read_surface(*file, *skin, options.skin, out); !s) return s;
-    if (Status s = out.mesh.validate(); !s) return {Errc::invalid_file, path.string() + ": " + s.message()};
+    if (Status s = out.mesh.validate(); !s) return detail::invalid_file(path, s.message());
     const auto still = clip_from_matrices(skin->skeleton, 1.0, rigid_joints(*skin, nodes->globals()), false);
-    if (!still) return {Errc::invalid_file, path.string() + ": " + still.message()};
+    if (!still) return detail::invalid_file(path, still.message());
     still->pose({}, out.pose);
     RigidError error(*skin, out.mesh);
     error.look(nodes->globals());

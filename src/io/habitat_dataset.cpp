@@ -27,7 +27,7 @@ Result<Json> load_object(const fs::path& path) {
   if (!file) return file.status();
   auto json = detail::parse_json(file->span(), path.string());
   if (json && !json->is_object()) {
-    return {Errc::invalid_file, path.string() + ": is " + shown(*json) + ", must be an object"};
+    return detail::invalid_file(path, "is " + shown(*json) + ", must be an object");
   }
   return json;
 }
@@ -337,7 +337,7 @@ Result<StageConfig> load_stage_config(const fs::path& path) {
     LeftOut ignored;
     out.file = path;
     if (Status s = read_stage(*json, path.parent_path(), path.string(), out, ignored); !s) return s;
-    if (out.render_asset.empty()) return {Errc::invalid_file, path.string() + ": 'render_asset' is missing"};
+    if (out.render_asset.empty()) return detail::invalid_file(path, "'render_asset' is missing");
     return out;
   });
 }

@@ -18,6 +18,7 @@ namespace gsnav::io {
 namespace {
 
 namespace fs = std::filesystem;
+using detail::invalid_file;
 
 constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'L', 'O', 'D'};
 /// Grows with every change of what build_lod makes of a cloud.
@@ -62,10 +63,6 @@ void for_each_array(Tree& tree, std::vector<Node>& nodes, const F& f) {
   f(m.origin_ids);
 }
 
-Status invalid(const fs::path& path, const std::string& what) {
-  return {Errc::invalid_file, path.string() + ": " + what};
-}
-
 /// Values that kernels and the cut rely on.
 Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Node>& nodes,
              std::size_t origins) {
@@ -76,13 +73,13 @@ Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Nod
     return true;
   };
   for (const auto& p : m.means) {
-    if (!finite(p)) return invalid(path, "a mean that is not finite");
+    if (!finite(p)) return invalid_file(path, "a mean that is not finite");
   }
   for (std::size_t i = 0; i < m.size(); ++i) {
     double length = 0;
     for (const auto& p : m.quats) length += static_cast<double>(p[i]) * static_cast<double>(p[i]);
     const auto row = [&path, i](const std::string& what) {
-      return invalid(path, "row " + std::to_string(i) + ": " + what);
+      return invalid_file(path, "row " + std::to_string(i) + ": " + what);
     };
     if (!(std::abs(length - 1) < 1e-4)) return row("a quaternion that is not of unit length");
     for (const auto& p : m.scales) {
@@ -92,10 +89,10 @@ Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Nod
       return row("opacity " + std::to_string(m.opacities[i]) + ", must be in [0, 1]");
     }
   }
-  if (!finite(m.sh0) || !finite(m.shN)) return invalid(path, "an SH coefficient that is not finite");
+  if (!finite(m.sh0) || !finite(m.shN)) return invalid_file(path, "an SH coefficient that is not finite");
   for (const std::uint32_t id : m.origin_ids) {
     if (id >= origins)
-      return invalid(path, "origin " + std::to_string(id) + " of " + std::to_string(origins));
+      return invalid_file(path, "origin " + std::to_string(id) + " of " + std::to_string(origins));
   }
   for (const Node& n : nodes) {
     bool good = n.error >= 0 && std::isfinite(n.error) && n.grain >= 0 && std::isfinite(n.grain) &&
@@ -103,7 +100,7 @@ Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Nod
     for (int k = 0; k < 3; ++k) {
       good = good && std::isfinite(n.low[k]) && std::isfinite(n.high[k]) && n.low[k] <= n.high[k];
     }
-    if (!good) return invalid(path, "a node whose error or bounds cannot be");
+    if (!good) return invalid_file(path, "a node whose error or bounds cannot be");
   }
   return {};
 }
@@ -155,10 +152,10 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
     if (Status s = file.open(path); !s) return s;
     Header header{};
     if (file.size() < sizeof header || !file.read(0, std::as_writable_bytes(std::span(&header, 1)))) {
-      return invalid(path, "shorter than the header of a level-of-detail file");
+      return invalid_file(path, "shorter than the header of a level-of-detail file");
     }
     if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.size != sizeof header) {
-      return invalid(path, "not a level-of-detail file");
+      return invalid_file(path, "not a level-of-detail file");
     }
     const Hasher of = built_of(cloud, settings);
     if (header.version != kVersion || header.built_of[0] != of.state()[0] ||
@@ -176,7 +173,7 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
     std::uint64_t wanted = sizeof header;
     for_each_array(tree, nodes, [&wanted](const auto& v) { wanted += v.size() * sizeof(v[0]); });
     if (file.size() != wanted) {
-      return invalid(path, "has " + std::to_string(file.size()) + " bytes where " +
+      return invalid_file(path, "has " + std::to_string(file.size()) + " bytes where " +
                                std::to_string(wanted) + " are needed");
     }
     std::uint64_t at = sizeof header;
@@ -187,7 +184,7 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
     });
     if (!whole) return detail::reading_failed(path.string());
     if (header.checksum != checksum(tree, nodes))
-      return invalid(path, "its checksum is another: damaged");
+      return invalid_file(path, "its checksum is another: damaged");
     if (Status s = check(path, tree.merged, nodes, std::max<std::size_t>(cloud.origins.size(), 1)); !s)
       return s;
     for (std::size_t i = 0; i < nodes.size(); ++i) {

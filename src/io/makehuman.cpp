@@ -277,7 +277,7 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
     report.warnings.push_back(std::to_string(report.without_weights) +
                               " vertices without weights take those of the nearest");
   }
-  if (Status s = mesh.validate(); !s) return {Errc::invalid_file, path.string() + ": " + s.message()};
+  if (Status s = mesh.validate(); !s) return detail::invalid_file(path, s.message());
   return out;
 }
 

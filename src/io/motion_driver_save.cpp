@@ -29,6 +29,14 @@ Status save_driver(const std::filesystem::path& path, const DriverFrames& frames
     mats.reserve(16 * frames.matrices.size());
     for (const Affine3<double>& m : frames.matrices) {
       if (!is_finite(m.translation)) return bad("matrices is not finite");
+      const std::size_t at = static_cast<std::size_t>(&m - frames.matrices.data());
+      const std::string which = "matrices: frame " + std::to_string(at / joints) + ", joint " + std::to_string(at % joints);
+      const Mat3d gram = m.linear * transpose(m.linear);
+      bool rigid = determinant(m.linear) > 0;
+      for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) rigid = rigid && std::fabs(gram(i, k) - (i == k ? 1.0 : 0.0)) < 1e-3;
+      }
+      if (!rigid) return bad(which + " is not rigid");
       for (int i = 0; i < 3; ++i) {
         for (int k = 0; k < 3; ++k) mats.push_back(static_cast<float>(m.linear(i, k)));
         mats.push_back(static_cast<float>(m.translation[i]));
@@ -38,6 +46,9 @@ Status save_driver(const std::filesystem::path& path, const DriverFrames& frames
     for (const auto& row : frames.capsules) {
       if (row.size() != capsules) return bad("capsules has frames of different numbers");
       for (const Capsule<double>& c : row) {
+        if (!is_finite(c.p0) || !is_finite(c.p1) || !(c.radius >= 0) || !is_finite(c.radius)) {
+          return bad("capsules has one that is not finite or of a negative radius");
+        }
         for (const double v : {c.p0.x, c.p0.y, c.p0.z, c.p1.x, c.p1.y, c.p1.z, c.radius})
           proxies.push_back(static_cast<float>(v));
       }

@@ -41,6 +41,14 @@ struct Bounds {
   }
 };
 
+/// The float next to v that is not above it, or not below it where `up`: bounds hold what is far from zero too.
+float float_beyond(double v, bool up) noexcept {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const float f = static_cast<float>(v);
+  const double g = static_cast<double>(f);
+  return up ? (g < v ? std::nextafter(f, kInfinity) : f) : (g > v ? std::nextafter(f, -kInfinity) : f);
+}
+
 Bounds bounds_of(const GaussianCloud& cloud, std::size_t first, std::size_t last) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   Bounds b;
@@ -49,8 +57,8 @@ Bounds bounds_of(const GaussianCloud& cloud, std::size_t first, std::size_t last
   for (std::size_t i = first; i < last; ++i) {
     const Values v = values_of(cloud, i);
     for (std::size_t k = 0; k < v.size(); ++k) {
-      b.low[k] = std::min(b.low[k], static_cast<float>(v[k]));
-      b.high[k] = std::max(b.high[k], static_cast<float>(v[k]));
+      b.low[k] = std::min(b.low[k], float_beyond(v[k], false));
+      b.high[k] = std::max(b.high[k], float_beyond(v[k], true));
     }
   }
   return b;

@@ -13,6 +13,7 @@ namespace gsnav::io {
 namespace {
 
 namespace fs = std::filesystem;
+using detail::invalid_file;
 
 constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'V', 'I', 'S'};
 /// Grows with every change of what build_visible_sets makes of a cloud.
@@ -47,10 +48,6 @@ std::uint64_t checksum(const VisibleSets& v) {
   return h.low();
 }
 
-Status invalid(const fs::path& path, const std::string& what) {
-  return {Errc::invalid_file, path.string() + ": " + what};
-}
-
 /// What is wrong with the words of a cell of a cloud of so many Gaussians, or null.
 const char* flaw_of(const VisibleSets& v, std::size_t cell, std::size_t cloud_rows) {
   const View<const std::uint32_t> seen = v.seen_from(cell);
@@ -76,27 +73,27 @@ const char* flaw_of(const VisibleSets& v, std::size_t cell, std::size_t cloud_ro
 
 /// What lookups and kernels rely on.
 Status check(const fs::path& path, const VisibleSets& v, std::size_t cloud_rows) {
-  if (!(v.cell > 0 && std::isfinite(v.cell))) return invalid(path, "cell = " + std::to_string(v.cell));
+  if (!(v.cell > 0 && std::isfinite(v.cell))) return invalid_file(path, "cell = " + std::to_string(v.cell));
   if (!(v.focal > 0 && std::isfinite(v.focal)))
-    return invalid(path, "focal = " + std::to_string(v.focal));
+    return invalid_file(path, "focal = " + std::to_string(v.focal));
   if (!(v.near_plane > 0 && std::isfinite(v.near_plane))) {
-    return invalid(path, "near_plane = " + std::to_string(v.near_plane));
+    return invalid_file(path, "near_plane = " + std::to_string(v.near_plane));
   }
   if (!(v.near_sigma >= 0 && std::isfinite(v.near_sigma))) {
-    return invalid(path, "near_sigma = " + std::to_string(v.near_sigma));
+    return invalid_file(path, "near_sigma = " + std::to_string(v.near_sigma));
   }
   if (!(v.min_weight >= 0 && v.min_weight < 1))
-    return invalid(path, "min_weight = " + std::to_string(v.min_weight));
+    return invalid_file(path, "min_weight = " + std::to_string(v.min_weight));
   for (std::size_t c = 0; c < v.cells(); ++c) {
     const auto bad = [&path, c](const char* what) {
-      return invalid(path, "cell " + std::to_string(c) + ": " + what);
+      return invalid_file(path, "cell " + std::to_string(c) + ": " + what);
     };
     if (c > 0 && !(v.keys[c - 1] < v.keys[c])) return bad("its place is not behind the one before");
     if (v.ends[c] < (c == 0 ? 0 : v.ends[c - 1]) || v.ends[c] > v.bits.size())
       return bad("its words are not behind those before");
     if (const char* flaw = flaw_of(v, c, cloud_rows)) return bad(flaw);
   }
-  if (v.bits.size() != (v.ends.empty() ? 0 : v.ends.back())) return invalid(path, "words of no cell");
+  if (v.bits.size() != (v.ends.empty() ? 0 : v.ends.back())) return invalid_file(path, "words of no cell");
   return {};
 }
 
@@ -135,10 +132,10 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
     if (Status s = file.open(path); !s) return s;
     Header header{};
     if (file.size() < sizeof header || !file.read(0, std::as_writable_bytes(std::span(&header, 1)))) {
-      return invalid(path, "shorter than the header of a file of visible sets");
+      return invalid_file(path, "shorter than the header of a file of visible sets");
     }
     if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.size != sizeof header) {
-      return invalid(path, "not a file of visible sets");
+      return invalid_file(path, "not a file of visible sets");
     }
     const Hasher of = hash_of(cloud);
     if (header.version != kVersion || header.built_of[0] != of.state()[0] ||
@@ -154,7 +151,7 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
     const bool fits = header.cells <= room / kCell && header.words <= room / sizeof(std::uint32_t) &&
                       header.cells * kCell + header.words * sizeof(std::uint32_t) == room;
     if (header.chunks != v.cloud_chunks || !fits) {
-      return invalid(path, "has " + std::to_string(file.size()) + " bytes, not those of " +
+      return invalid_file(path, "has " + std::to_string(file.size()) + " bytes, not those of " +
                                std::to_string(header.cells) + " cells, " + std::to_string(header.words) +
                                " words and " + std::to_string(header.chunks) + " chunks");
     }
@@ -178,7 +175,7 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
     read(v.ends);
     read(v.bits);
     if (!whole) return detail::reading_failed(path.string());
-    if (header.checksum != checksum(v)) return invalid(path, "its checksum is another: damaged");
+    if (header.checksum != checksum(v)) return invalid_file(path, "its checksum is another: damaged");
     if (Status s = check(path, v, cloud.size()); !s) return s;
     return v;
   });

@@ -9,6 +9,7 @@
 namespace gsnav::detail {
 
 // Sizes and offsets of Habitat's `.navmesh`: little endian, a set header, tiles with a header each.
+inline constexpr double kMaxCoordinate = 1e6;     ///< metres: float32 has centimetres no more
 inline constexpr std::int32_t kSetMagic = 'M' << 24 | 'S' << 16 | 'E' << 8 | 'T';
 inline constexpr std::size_t kSetHeader = 40;     ///< magic, version, tile count, dtNavMeshParams
 inline constexpr std::size_t kSetSettings = 56;   ///< from version 2: 13 floats and 4 flags

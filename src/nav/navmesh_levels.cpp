@@ -11,6 +11,8 @@ namespace {
 constexpr double kLevel = 0.984807753012208;  // cosine of 10 degrees
 constexpr double kLeastArea = 1e-6;           // square metres: below it is rounding
 
+constexpr double kLeastGap = 1e-6;            // metres: what a mean of heights is rounded by
+
 struct Piece {
   double height = 0, area = 0;
 };
@@ -47,7 +49,7 @@ std::vector<NavLevel> find_levels(const NavMesh& mesh, const LevelOptions& optio
     levels.push_back(best);
     std::erase_if(pieces, [&](const Piece& p) {
       const double off = std::abs(p.height - best.height);
-      return off < options.min_gap || off <= options.band;
+      return off < max(options.min_gap, kLeastGap) || off <= options.band;
     });
   }
   std::sort(levels.begin(), levels.end(),

@@ -12,7 +12,6 @@ namespace gsnav {
 namespace detail {
 namespace {
 
-constexpr double kMaxCoordinate = 1e6;  // metres: float32 has centimetres no more
 constexpr std::int32_t kMaxTileCoordinate = 1 << 24;
 
 /// What a message starts with, and how it ends.

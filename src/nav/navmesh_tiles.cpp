@@ -168,9 +168,9 @@ class Extractor {
         const auto along = [&](const Vec3d& c) {
           return clamp(((c.x - a.x) * ex + (c.z - a.z) * ez) / len2, 0.0, 1.0);
         };
-        const double s = along(corner_of(*other, *q, other->links[m].edge));
-        const double e = along(corner_of(*other, *q, other->links[m].edge + 1u));
-        if (std::abs(e - s) * std::sqrt(len2) > kNarrow) {
+        const Vec3d c = corner_of(*other, *q, other->links[m].edge), d = corner_of(*other, *q, other->links[m].edge + 1u);
+        const double s = along(c), e = along(d);
+        if (std::abs(e - s) * std::sqrt(len2) > kNarrow && within_climb(a, b, c, d, min(s, e), max(s, e))) {
           out.push_back({min(s, e), max(s, e), impl_.id_of(tile.links[l].ref)});
         }
       }
@@ -180,6 +180,21 @@ class Extractor {
     out.erase(std::unique(out.begin(), out.end()), out.end());
     if (out.size() > links) out.resize(links);
     return out;
+  }
+
+  /// Whether edge c d of another tile is within a step of the agent from edge a b, between parts `from` and `to` of the
+  /// latter. Detour links what is within twice its climb, a shelf with the floor below it.
+  bool within_climb(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d, double from, double to) const {
+    const NavMeshSettings& s = impl_.settings;
+    const double most = (std::floor(s.agent_max_climb / s.cell_height + 1e-6) + 0.5) * s.cell_height;
+    const double ex = b.x - a.x, ez = b.z - a.z, cd2 = (d.x - c.x) * (d.x - c.x) + (d.z - c.z) * (d.z - c.z);
+    const auto rise = [&](double t) {
+      const double x = a.x + t * ex - c.x, z = a.z + t * ez - c.z;
+      const double u = cd2 > 0 ? clamp((x * (d.x - c.x) + z * (d.z - c.z)) / cd2, 0.0, 1.0) : 0.0;
+      return c.y + u * (d.y - c.y) - (a.y + t * (b.y - a.y));
+    };
+    const double r0 = rise(from), r1 = rise(to);
+    return r0 * r1 < 0 || min(std::abs(r0), std::abs(r1)) <= most;
   }
 
   NavMesh::Impl& impl_;

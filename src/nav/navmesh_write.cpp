@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <string>
@@ -65,6 +66,13 @@ Status save_navmesh(const NavMesh& mesh, const std::filesystem::path& path, int 
     return {Errc::invalid_argument, path.string() + ": version = " + std::to_string(version) + " is not 1 or 2"};
   }
   const NavMesh::Impl& impl = mesh.impl();
+  for (const Vec3d& p : {impl.bounds.low, impl.bounds.high}) {
+    for (int k = 0; k < 3; ++k) {
+      if (std::abs(p[k]) < detail::kMaxCoordinate - impl.settings.cell_size - impl.settings.cell_height) continue;
+      return {Errc::unsupported, path.string() + ": the mesh reaches to " + std::to_string(p[k]) +
+                                     " m: a file's float32 has no centimetres beyond 1e6 m"};
+    }
+  }
   const dtNavMesh& detour = *impl.mesh;
   std::ofstream out(path, std::ios::binary);
   if (!out) return {Errc::file_not_found, path.string() + ": cannot be made"};

@@ -125,8 +125,11 @@ Vec3d along_contacts(const Vec3d& motion, const std::vector<Vec3d>& normals) noe
 
 }  // namespace
 
-StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& desired,
+StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& asked_for,
                 const CapsuleSet& bodies, const StepOptions& options) {
+  // Squares of what is longer overflow; its fractions are zero either way.
+  constexpr double kLongest = 1e100;
+  const Vec3d desired = asked_for * (kLongest / max(max(std::abs(asked_for.x), std::abs(asked_for.z)), kLongest));
   StepResult out;
   out.position = agent.position;
   out.poly = agent.poly;
@@ -136,7 +139,7 @@ StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& desir
   }
   if (options.compat == StepCompat::habitat_gs) return detail::step_as_habitat_gs(mesh, agent, desired, bodies, options);
   SweepRules<double> rules;
-  rules.skin = options.skin;
+  rules.skin = max(options.skin, kRounding);  // points that touch have no direction between them
   const Stepper stepper{agent, bodies, rules, out};
   out.path.reserve(kUsualPoints);
   out.path.push_back({agent.position, agent.poly, 0.0});

@@ -130,7 +130,10 @@ void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz,
   PolyId poly = start_poly;
   p.y = height(poly, p);
   out.points.push_back({p, poly, 0.0});
-  const Direction wanted{dx, dz};
+  // So long that squares overflow: every mesh ends before a fraction of it that a number can tell from zero.
+  constexpr double kLongest = 1e100;
+  const double shorter = kLongest / max(max(std::abs(dx), std::abs(dz)), kLongest);
+  const Direction wanted{dx * shorter, dz * shorter};
   const double wanted_length = wanted.length();
   if (!(wanted_length > 0)) return;
 
@@ -178,11 +181,9 @@ void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz,
     arrive(to, poly, 1.0 - left, ends_here ? 1.0 : 1.0 - (left - t));
     if (ends_here) break;
     left -= t;
+    // The point keeps the polygon of the leg that leads to it: whoever cuts that leg short stands on it.
     const PolyId next = neighbours[polys[poly].first + way.exit.edge];
-    if (next != kNoPoly) {
-      poly = next;
-      out.points.back().poly = poly;
-    }
+    if (next != kNoPoly) poly = next;
   }
 }
 

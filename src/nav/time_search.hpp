@@ -45,6 +45,7 @@ class TimeSearch {
     plan.states = states_.size();
     if (best == kNone) {
       plan.status = open_.empty() ? TimedPlanStatus::caught : TimedPlanStatus::gave_up;
+      if (latest == kNone) latest = 0;  // not even the start was looked at
       trace(latest, plan);
       stay(states_[latest], plan);
       return plan;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/sim/sensor.hpp"
 
+#include <cmath>
+
 #include "gsnav/ops/render_config.hpp"
 
 namespace gsnav {
@@ -34,6 +36,11 @@ Status validate(const SensorSpec& s) {
                   "SensorSpec \"" + s.uuid + "\": " + field + " = " + value + ": " + rule);
   };
   if (s.uuid.empty()) return {Errc::invalid_argument, "SensorSpec.uuid is empty: a sensor needs a name"};
+  if (s.kind > SensorKind::normal) return bad("kind", std::to_string(static_cast<int>(s.kind)), "there is none of this number");
+  if (s.model > SensorModel::fisheye) return bad("model", std::to_string(static_cast<int>(s.model)), "there is none of this number");
+  if (s.noise.kind > NoiseKind::redwood_depth) {
+    return bad("noise.kind", std::to_string(static_cast<int>(s.noise.kind)), "there is none of this number");
+  }
   for (const int side : s.resolution) {
     if (side < 1 || side > kMaxImageSide)
       return bad("resolution", std::to_string(side), "must be in [1, 16384]");
@@ -54,6 +61,14 @@ Status validate(const SensorSpec& s) {
   }
   for (const double f : s.fisheye.principal_point_offset) {
     if (!is_finite(f)) return bad("fisheye.principal_point_offset", std::to_string(f), "must be finite");
+  }
+  if (fisheye && (!(s.fisheye.focal_length[0] > 0) || !(s.fisheye.focal_length[1] > 0))) {
+    // Where the double sphere's projection ends: further off the axis an image point would come twice.
+    const double a = s.fisheye.alpha, z = std::cos(s.hfov * 3.14159265358979323846 / 360.0), shifted = s.fisheye.xi + z;
+    const double w = a > 0.5 ? (1 - a) / a : a / (1 - a);
+    if (!(shifted > -w * std::sqrt(1 - z * z + shifted * shifted))) {
+      return bad("hfov", std::to_string(s.hfov), "is more than a lens of this fisheye.alpha and xi sees");
+    }
   }
   if (s.cube_size < 0 || s.cube_size > kMaxImageSide - 2) {
     return bad("cube_size", std::to_string(s.cube_size), "must be in [0, 16382]");

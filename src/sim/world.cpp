@@ -81,6 +81,10 @@ Status World::reset(const PointNavEpisode& episode) {
   if (!is_finite(episode.start_time)) {
     return {Errc::invalid_argument, "episode \"" + episode.id + "\": start_time is not finite"};
   }
+  const Quatd& q = episode.start_rotation;
+  if (!is_finite(q.w) || !is_finite(q.x) || !is_finite(q.y) || !is_finite(q.z)) {
+    return {Errc::invalid_argument, "episode \"" + episode.id + "\": start_rotation is not finite"};
+  }
   const Result<CapsuleSet> now = bodies(episode.start_time, episode.start_time);
   if (!now) return now.status();
 
@@ -302,7 +306,8 @@ Result<StepInfo> World::probe(Action action) const {
 PointGoal World::point_goal() const noexcept {
   const Vec3d d = s_.episode.goal_position - s_.agent.position;
   const double bearing = std::atan2(-d.x, -d.z);
-  return {std::hypot(d.x, d.z), wrapped(bearing - s_.agent.yaw)};
+  const double angle = wrapped(bearing - s_.agent.yaw);
+  return {std::hypot(d.x, d.z), angle > -kPi ? angle : kPi};
 }
 
 EpisodeMetrics World::metrics() const {

@@ -217,3 +217,33 @@ TEST_CASE("an actor of another scale is larger in every way") {
     CHECK(b[c].radius == doctest::Approx(2 * a[c].radius));
   }
 }
+
+TEST_CASE("a pose that cannot be is refused before anybody stands in it") {
+  const auto refused = [](const LocalPose& p, const char* word) {
+    const auto made = AvatarActor::create(person(), std::make_shared<const FixedPose>(p));
+    CAPTURE(made.status().message());
+    CHECK(made.status().code() == Errc::invalid_argument);
+    CHECK(says(made.status(), word));
+    AvatarAsset asset = *person();
+    asset.idle = p;
+    CHECK_FALSE(asset.validate().ok());
+  };
+  LocalPose p = person()->skeleton.rest_pose();
+  CHECK(AvatarActor::create(person(), std::make_shared<const FixedPose>(p)).ok());
+  p.translations.clear();
+  refused(p, "0 translations");
+  for (const Quatd& q : {Quatd{0, 0, 0, 0}, Quatd{NAN, 0, 0, 0}, Quatd{3, 0, 0, 0}}) {
+    p = person()->skeleton.rest_pose();
+    p.rotations[3] = q;
+    refused(p, "joint 3");
+  }
+  p = person()->skeleton.rest_pose();
+  p.translations[2].y = NAN;
+  refused(p, "joint 2");
+  GaitOptions gait;
+  gait.arm_swing = NAN;
+  CHECK(says(WalkMotion::create(person()->skeleton, gait).status(), "arm_swing"));
+  gait = {};
+  gait.start_phase = INFINITY;
+  CHECK(says(WalkMotion::create(person()->skeleton, gait).status(), "start_phase"));
+}

@@ -121,3 +121,45 @@ TEST_CASE("who is not there at both ends of a looping clock is gone while others
   options.loop_blend = 6;
   CHECK(AvatarActor::create(person(), nullptr, nullptr, options).message().find("loop_blend") != std::string::npos);
 }
+
+TEST_CASE("who leaves or comes while a looping clock's step is taken sweeps through nothing") {
+  /// Walks 6 m in five seconds.
+  struct Line : Trajectory {
+    TrajectorySample at(double t) const override {
+      TrajectorySample s;
+      s.distance = 1.2 * clamp(t, 0.0, 5.0);
+      s.position = {s.distance, 0, 0};
+      return s;
+    }
+  };
+  for (const double blend : {0.0, 0.5}) {
+    for (const double begin : {0.0, 5.0}) {
+      ActorOptions options;
+      options.time_begin = begin;
+      options.time_end = begin + 5;
+      options.loop_period = 10 + blend;
+      options.loop_blend = blend;
+      const AvatarActor actor = AvatarActor::create(person(), nullptr, std::make_shared<Line>(), options).value();
+      for (const double edge : {begin, begin + 5, begin + options.loop_period}) {
+        for (const double before : {0.05, 0.1, 0.2}) {
+          std::vector<DynamicCapsule> moved;
+          actor.dynamic_capsules(edge - before, edge - before + 0.25, 0, moved);
+          CAPTURE(edge - before);
+          for (const DynamicCapsule& m : moved) CHECK(norm(m.motion.begin.p0 - m.motion.end.p0) < 0.25 * 3.5);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("who is always there is there wherever a looping clock's remainder rounds to") {
+  for (int m = 10; m < 100; ++m) {
+    ActorOptions options;
+    options.time_end = options.loop_period = m / 30.0;
+    const AvatarActor actor = AvatarActor::create(person(), nullptr, nullptr, options).value();
+    int gone = 0;
+    for (int n = 0; n < 3000; ++n) gone += actor.active(n / 30.0) ? 0 : 1;
+    CAPTURE(m);
+    CHECK(gone == 0);
+  }
+}

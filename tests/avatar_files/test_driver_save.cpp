@@ -70,6 +70,10 @@ TEST_CASE("a driver and its capsules come back, and the capsules find their join
   fails([](auto& f) { f.matrices.pop_back(); }, "no multiple of 55");
   fails([](auto& f) { f.matrices.clear(); }, "matrices");
   fails([](auto& f) { f.matrices[3].translation.y = NAN; }, "not finite");
+  fails([](auto& f) { f.matrices[58].linear = f.matrices[58].linear * 2.0; }, "frame 1, joint 3 is not rigid");
+  fails([](auto& f) { f.matrices[3].linear(1, 1) = NAN; }, "frame 0, joint 3 is not rigid");
+  fails([](auto& f) { f.capsules[1][0].radius = -1; }, "negative radius");
+  fails([](auto& f) { f.capsules[1][0].p1.x = NAN; }, "not finite");
   fails([](auto& f) { f.capsules.pop_back(); }, "another number of frames");
   fails([](auto& f) { f.capsules[2].pop_back(); }, "different numbers");
   CHECK(io::save_driver("/none/there/d.npz", frames).code() == Errc::file_not_found);

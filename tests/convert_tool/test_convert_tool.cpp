@@ -171,6 +171,15 @@ TEST_CASE("convert: what cannot be done is said") {
   says("a.ply out.ply --rotate 0 0 0 90", "the axis is zero");
   says("a.ply out.ply --cameras none.json", "none.json");
   says("a.ply", "paths");
+  // In place: nothing is written before all is known to be right.
+  const std::string before = read_file(folder / "a.ply");
+  for (const char* edit : {"--scale nan", "--translate nan 0 0", "--rotate 0 0 1 inf", "--rotate nan 0 0 3", "--max-scale nan",
+                           "--max-scale -1", "--min-opacity nan", "--scale 1e40", "--translate 1e39 0 0"}) {
+    const std::string option(edit, std::string(edit).find(' '));
+    CAPTURE(edit);
+    says(std::string("a.ply a.ply ") + edit, option);
+    CHECK(read_file(folder / "a.ply") == before);
+  }
 }
 
 TEST_CASE("largest_field_errors: each field by itself") {

@@ -10,6 +10,7 @@
 #include <functional>
 #include <new>
 
+#include "caches.hpp"
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/avatar_scene_file.hpp"
 #include "gsnav/io/cameras_file.hpp"
@@ -285,6 +286,14 @@ void read_navmesh(const std::string& input) {
   (void)mesh->distance_to_closest_obstacle(a.position);
 }
 
+/// Stops where what was read cannot be.
+template <class F>
+auto stops(const F& read) {
+  return [read](const std::string& input) {
+    if (const char* flaw = read(input)) stop(flaw);
+  };
+}
+
 struct Reader {
   std::function<void(const std::string&)> read;
   std::size_t fixed, multiple;  ///< bytes that one allocation may have: fixed + multiple * the file's
@@ -305,6 +314,8 @@ const std::map<std::string, Reader> kReaders = {
         check(io::load_sog(file_of(zip_of(parts, s))));
       },
       64 * kMiB, 2048}},
+    {"visible", {stops(read_visible), kMiB, 64}},
+    {"lod", {stops(read_lod), kMiB, 64}},
     {"lod_set", {read_lod_set, 64 * kMiB, 2048}},
     {"gltf", {read_gltf, kMiB, 260}},
     {"surface", {read_surface, 260 * kMiB, 10000}},

@@ -3,6 +3,7 @@
 // builders.
 #include <cstdio>
 
+#include "caches.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/episode_file.hpp"
 #include "gsnav/io/image_file.hpp"
@@ -194,6 +195,28 @@ void add_navmesh(Seeds& seeds) {
   for (const int tile_size : {0, 16, 32}) add(storeys, 0.1, tile_size);
 }
 
+/// What is cached beside a scene: of chunks alone, of rows too, and a tree with some values changed.
+void add_caches(Seeds& seeds) {
+  VisibleSets sets;
+  sets.cell = 0.5;
+  sets.focal = 128;
+  sets.near_plane = 0.2;
+  sets.min_weight = 1e-3;
+  sets.cloud_chunks = cached_scene().view().all_chunks();
+  sets.keys = {{-1, 0, 2}, {0, 0, 0}};
+  sets.bits = {5, 3, 0};  // the second cell: chunks 0 and 1, of which rows follow
+  for (std::uint32_t word = 0; word < 2 * kSeenRowWords; ++word) sets.bits.push_back(0xff00ffu << word % 8);
+  sets.ends = {1, sets.bits.size()};
+  TempFolder folder("fuzz_caches");
+  io::save_visible_sets(folder / "a", sets, cached_scene()).throw_if_error();
+  seeds.add("visible", '\0' + read_file(folder / "a"));
+  seeds.add("visible", visible_input(sets));
+  seeds.add("lod", std::string(1, '\1'));
+  for (char array = 0; array < 14; ++array) {
+    seeds.add("lod", std::string{'\1', array, '\5', '\0', '\0', '\0', '\0', '\0'});
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -207,5 +230,6 @@ int main(int argc, char** argv) {
   add_gltf(seeds);
   add_others(seeds);
   add_navmesh(seeds);
+  add_caches(seeds);
   return 0;
 }

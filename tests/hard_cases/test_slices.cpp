@@ -148,3 +148,40 @@ TEST_CASE("N65_cull_invariance needs bounds that hold: no footprint or key lies 
   CHECK(seen > 100000);
   CHECK(area < 0.85 * image);  // or they say nothing
 }
+
+TEST_CASE("slices of depth by distance, where the viewmat is as little rigid as is allowed") {
+  // Small disks a little nearer than where slices may begin: by z, and by a distance that is not quite z, on different sides.
+  for (const double grow : {0.0, 1e-5, 4e-4}) {
+    std::vector<RawGaussian> disks;
+    Rng rng(2);
+    const std::uint32_t base = bits_of(0.001f);
+    for (std::uint32_t k = 160; k < 300; ++k) {
+      const double border = static_cast<double>(float_of_bits(base + (k << 19)));
+      if (!(border > 1 && border < 60)) continue;
+      const double z = border * (1 - (grow > 0 ? grow / 2 : 2e-6));
+      for (int i = 0; i < 256; ++i) {
+        disks.push_back(gaussian({rng.uniform(-0.01, 0.01) * z, rng.uniform(-0.01, 0.01) * z, z}, {1e-4 * z, 1e-4 * z, 0}, 0.12,
+                                 {0.3f, 0.1f, 0.2f}));
+      }
+    }
+    GaussianCloud cloud = cloud_of(disks);
+    bound_chunks(cloud);
+    Camera camera;
+    camera.set_hfov(128, 128, 2);
+    camera.cx = camera.cy = 64;
+    camera.viewmat.linear = camera.viewmat.linear * (1 + grow);
+    RenderConfig config;
+    config.sort_order = SortOrder::camera_distance;
+    OpenMPBackend backend(1);
+    std::vector<float> first;
+    for (const int slices : {1, 4, 8}) {
+      config.depth_slices = slices;
+      Renderer<float, OpenMPBackend> renderer(backend, config);
+      const auto frame = renderer.render(cloud.set(), camera).value();
+      if (slices == 1) first = frame.rgb;
+      CAPTURE(grow);
+      CAPTURE(slices);
+      CHECK(frame.rgb == first);
+    }
+  }
+}

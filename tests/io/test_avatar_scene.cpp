@@ -162,3 +162,39 @@ TEST_CASE("avatar scene: what is wrong is named with the avatar and the key") {
   CHECK(s.code() == Errc::file_not_found);
   CHECK(contains(s.message(), "bob"));
 }
+
+TEST_CASE("avatar scene: each of two drivers of one body gives it its own capsules") {
+  const TempFolder folder("scene_capsules");
+  const AvatarAsset person = make_humanoid({.gaussians = 2000});
+  AvatarAsset bare = person;
+  bare.capsules.clear();
+  io::save_avatar(folder / "a.npz", bare).throw_if_error();
+  for (const auto& [name, wider] : {std::pair{"thin", 0.5}, {"fat", 2.0}, {"none", 0.0}}) {
+    io::DriverFrames frames = walking(person, {}, wider > 0);
+    for (auto& row : frames.capsules) {
+      for (auto& c : row) c.radius *= wider;
+    }
+    io::save_driver(folder / (std::string(name) + ".npz"), frames).throw_if_error();
+  }
+  const auto radii = [&](const std::vector<std::string>& drivers) {
+    std::string entries;
+    for (const std::string& d : drivers)
+      entries += (entries.empty() ? "" : ",") + std::string(R"({"canonical_gaussians":"a.npz","driver":")") + d + ".npz\"}";
+    write_file(folder / "s.json", "{\"gaussian_avatars\":[" + entries + "]}");
+    std::vector<double> out;
+    for (const AvatarActor& actor : io::load_scene_actors(io::load_avatar_scene(folder / "s.json").value()).value()) {
+      const auto capsules = actor.capsules(0.2);
+      out.push_back(capsules.empty() ? 0.0 : capsules[0].radius);
+    }
+    return out;
+  };
+  const double of_person = person.capsules[0].radius;
+  for (const std::vector<std::string>& drivers : {std::vector<std::string>{"thin", "fat", "none"}, {"none", "fat", "thin", "fat"}}) {
+    const std::vector<double> got = radii(drivers);
+    REQUIRE(got.size() == drivers.size());
+    for (std::size_t i = 0; i < got.size(); ++i) {
+      const double wider = drivers[i] == "thin" ? 0.5 : drivers[i] == "fat" ? 2.0 : 0.0;
+      CHECK(got[i] == doctest::Approx(wider * of_person).epsilon(1e-4));
+    }
+  }
+}

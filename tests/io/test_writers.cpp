@@ -163,6 +163,26 @@ TEST_CASE("save_compressed_ply: every field within half a step of its chunk") {
   }
 }
 
+TEST_CASE("save_compressed_ply: means far from zero lie within their chunk's bounds too") {
+  TempFolder folder("save_compressed_far");
+  std::vector<PlyRow> rows = moderate_rows(256, 0, 56);
+  for (PlyRow& row : rows) row["x"] += 1e6;
+  GaussianCloud cloud = cloud_of(rows, 0);
+  double low = 1e9, high = -1e9;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    low = std::min(low, cloud.mean(i).x);
+    high = std::max(high, cloud.mean(i).x);
+  }
+  REQUIRE(io::save_compressed_ply(folder / "a.compressed.ply", cloud).ok());
+  const GaussianCloud back = io::load_ply(folder / "a.compressed.ply").value().cloud;
+  REQUIRE(back.size() == cloud.size());
+  // Bounds are float32, of 1/16 m there, and hold all of it.
+  const double half_step = (high - low + 2 * 0.0625) / 2047 / 2;
+  double worst = 0;
+  for (std::size_t i = 0; i < cloud.size(); ++i) worst = std::max(worst, std::abs(back.mean(i).x - cloud.mean(i).x));
+  CHECK(worst < half_step * 1.001);
+}
+
 TEST_CASE("writers: flat, opaque and nearly transparent Gaussians stay drawable") {
   TempFolder folder("save_extremes");
   std::vector<PlyRow> rows = moderate_rows(4, 0, 56);

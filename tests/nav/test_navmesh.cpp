@@ -228,3 +228,30 @@ TEST_CASE("navmesh: queries from many threads give what one gives") {
   for (std::thread& t : threads) t.join();
   for (const double g : got) CHECK(g == expected);
 }
+
+TEST_CASE("no samples of detail, or as many as one likes") {
+  Soup soup;
+  soup.floor(0, 0, 6, 6);
+  const double area = build(soup).navigable_area();
+  for (const double distance : {0.0, 0.5, 0.89, 0.9, 6.0}) {
+    NavMeshSettings s;
+    s.detail_sample_dist = distance;
+    CHECK(build(soup, s).navigable_area() == doctest::Approx(area).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("more cells than Recast counts in 8 bits are refused by the setting's name") {
+  Soup soup;
+  soup.floor(0, 0, 6, 6);
+  NavMeshSettings s;
+  s.agent_radius = 1.3;
+  s.cell_size = 0.0104;  // 125 cells
+  const double side = 6 - 2 * s.agent_radius;
+  CHECK(build(soup, s).navigable_area() == doctest::Approx(side * side).epsilon(0.02));
+  s.cell_size = 0.0101;
+  const auto message = [&] { return NavMesh::build(s, soup.vertices, soup.triangles).message(); };
+  CHECK(message().find("agent_radius") != std::string::npos);
+  s = {};
+  s.cell_height = 0.005;
+  CHECK(message().find("agent_height") != std::string::npos);
+}

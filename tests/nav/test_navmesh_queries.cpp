@@ -182,3 +182,14 @@ TEST_CASE("obj: the file holds the surface, facing up, an island a group") {
   CHECK(groups == mesh.island_count());
   CHECK(save_navmesh_obj(mesh, "/no/such/folder/x.obj").code() == Errc::file_not_found);
 }
+
+TEST_CASE("levels: bands and gaps of no height end too") {
+  Rng rng(3);
+  for (int i = 0; i < 20; ++i) {
+    Soup soup;
+    const double height = rng.uniform(0, 3);
+    soup.floor(0, 0, rng.uniform(3, 9), rng.uniform(3, 9), height);
+    soup.box(1, 1, 1.5, 1.5, height, height + 2);
+    CHECK(find_levels(build(soup), {0.0, 0.0, 0.1}).size() == 1);
+  }
+}

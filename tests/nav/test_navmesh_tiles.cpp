@@ -333,3 +333,33 @@ TEST_CASE("tiles: what cannot be built is refused by name") {
   CHECK(gaussians.code() == Errc::invalid_argument);
   CHECK(gaussians.message().find("tile_size = 64") != std::string::npos);
 }
+
+TEST_CASE("tiles: a shelf that cannot be climbed stays apart from the floor below it") {
+  // A robot of 0.25 m that climbs 0.2 m fits under it.
+  Soup soup;
+  soup.floor(0, 0, 10, 10);
+  soup.floor(2.37, 2.37, 6.1, 6.1, 0.38);
+  for (const int tile_size : {0, 32, 64}) {
+    NavMeshSettings s;
+    s.agent_height = 0.25;
+    s.agent_max_climb = 0.2;
+    s.cell_height = 0.05;
+    s.tile_size = tile_size;
+    const NavMesh mesh = NavMesh::build(s, soup.vertices, soup.triangles).value();
+    CAPTURE(tile_size);
+    CHECK(mesh.island_count() == 2);
+    Rng rng(1);
+    int off = 0, climbed = 0, apart = 0;
+    for (int k = 0; k < cases(400); ++k) {
+      const NavPoint a = mesh.random_point(rng), b = mesh.random_point(rng, mesh.island_of(a.poly));
+      const bool low = std::abs(a.position.y) < 0.03;
+      off += low || std::abs(a.position.y - 0.38) < 0.03 ? 0 : 1;
+      apart += mesh.distance_between(a, b) < 100 ? 0 : 1;
+      const auto walk = mesh.walk(a, {rng.uniform(-6, 6), 0, rng.uniform(-6, 6)}, false);
+      climbed += low && std::abs(walk.points.back().position.y) > 0.1 ? 1 : 0;
+    }
+    CHECK(off == 0);
+    CHECK(apart == 0);
+    CHECK(climbed == 0);
+  }
+}

@@ -246,3 +246,18 @@ TEST_CASE("time planner: what is impossible is said") {
   const TimedPlan here = plan_in_time(mesh, agent, agent.position, ticks);
   CHECK(here.status == TimedPlanStatus::reached);
 }
+
+TEST_CASE("time planner: with room for next to no states it gives up where it stands") {
+  Soup soup;
+  soup.floor(0, 0, 10, 10);
+  const NavMesh mesh = NavMesh::build({}, soup.vertices, soup.triangles).value();
+  const std::vector<CapsuleSet> ticks = motion({}, 20);
+  for (const std::size_t most : {2u, 1u, 0u}) {
+    TimePlannerOptions options;
+    options.max_states = most;
+    const auto plan = plan_in_time(mesh, {{1, 0, 1}, 0.1, 1.5, kNoPoly}, {8, 0, 8}, ticks, options);
+    CHECK(plan.status == TimedPlanStatus::gave_up);
+    REQUIRE_FALSE(plan.points.empty());
+    CHECK(norm(plan.points.back().position - Vec3d{1, plan.points.back().position.y, 1}) < 1e-9);
+  }
+}

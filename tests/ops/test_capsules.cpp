@@ -11,6 +11,9 @@
 #include "gsnav/ops/sweep.hpp"
 #include "ops/backends.hpp"
 #include "ops/capsule_pairs.hpp"
+#if defined(_OPENMP) && defined(__x86_64__) && defined(__GNUC__)
+#include <cpuid.h>
+#endif
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #include "ops/no_gpu.hpp"
@@ -209,6 +212,50 @@ TEST_CASE("capsules: batches on every backend compute the bits of one pair") {
 #endif
   }
 }
+
+#if defined(_OPENMP) && defined(__x86_64__) && defined(__GNUC__)
+namespace {
+
+/// Whether this processor says which registers are in use (XGETBV of 1).
+bool says_what_is_in_use() {
+  unsigned a = 0, b = 0, c = 0, d = 0;
+  return __builtin_cpu_supports("avx") && __get_cpuid_count(0xd, 1, &a, &b, &c, &d) != 0 && (a & 4u) != 0;
+}
+
+/// Upper halves of vector registers that hold something: of the sixteen that code without AVX uses too.
+unsigned upper_halves_in_use() {
+  unsigned low = 0, high = 0;
+  __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(1));
+  return low & 0x44u;
+}
+
+}  // namespace
+
+TEST_CASE("lanes: leave nothing in the upper halves of registers, which would slow down all that follows") {
+  if (!says_what_is_in_use()) {
+    MESSAGE("SKIP: this processor does not say which registers are in use");
+    return;
+  }
+  __asm__ volatile("vpcmpeqd %%xmm0, %%xmm0, %%xmm0\n\tvinsertf128 $1, %%xmm0, %%ymm0, %%ymm0" ::: "xmm0");
+  const unsigned dirty = upper_halves_in_use();
+  __asm__ volatile("vzeroupper" ::: "memory");
+  if (dirty == 0 || upper_halves_in_use() != 0) {
+    MESSAGE("SKIP: this processor does not tell used registers from others");
+    return;
+  }
+  SerialBackend serial;
+  Planes<float, SerialBackend> p(serial, random_pairs(10, 512));
+  const LaneKernels& kernels = lane_kernels();
+  CAPTURE(std::string(kernels.name));
+  for (const auto& run : {+[](const LaneKernels& k, const Planes<float, SerialBackend>& of) { k.gap_range(of.gaps, 0, 512); },
+                          +[](const LaneKernels& k, const Planes<float, SerialBackend>& of) { k.sweep_range(of.sweeps, 0, 512); }}) {
+    run(kernels, p);
+    const unsigned after = upper_halves_in_use();
+    __asm__ volatile("vzeroupper" ::: "memory");
+    CHECK(after == 0);
+  }
+}
+#endif
 
 #if defined(GSNAV_HAS_CUDA)
 TEST_CASE("capsules, cuda: gaps and sweeps have the CPU's bits") {

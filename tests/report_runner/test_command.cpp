@@ -2,11 +2,18 @@
 // The program as people run it.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "csv.hpp"
+#include "gsnav/backends/openmp.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/ply.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/io/visible_file.hpp"
+#include "lod/two_rooms.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
 #include "support/scenes.hpp"
@@ -52,6 +59,9 @@ TEST_CASE("report: errors name the option and the value") {
       {"--scene nonsense", {"--scene", "nonsense", "NAME=PATH"}},
       {"--scene a=/none.ply", {"/none.ply"}},
       {"--flat /none.ply", {"--flat", "/none.ply"}},
+      {"--default --visible-sets a", {"--visible-sets", "SCENE=FILE", "embedded_flat"}},
+      {"--default --visible-sets b=/none.vis", {"--visible-sets", "b=/none.vis", "embedded_flat"}},
+      {"--default --visible-sets embedded_flat=/none.vis", {"--visible-sets", "/none.vis"}},
       {"--data /none", {"--data", "/none"}},
       {"--kinds kernel --benchmarks /none.json", {"--benchmarks", "/none.json"}}};
   for (const Case& c : cases) {
@@ -138,4 +148,45 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
   CHECK(repaired.ok);
   CHECK(repaired.text.find("checksum") != std::string::npos);
   CHECK(parse_csv(read_file(folder / "out/report.csv"), "report.csv").value().size() == rows.size());
+}
+
+TEST_CASE("report: visible sets are rows beside fast, and say where no set serves") {
+  const TempFolder folder("report_visible");
+  const std::filesystem::path ply = folder / "rooms.ply", cameras = folder / "cameras.json", sets = folder / "rooms.vis";
+  io::save_ply(ply, two_rooms(1)).throw_if_error();
+  const GaussianCloud cloud = io::load_scene(ply.string()).value().cloud;
+  VisibleSettings settings;
+  settings.face = 64;
+  OpenMPBackend backend(2);
+  const VisibleSets seen = build_visible_sets(backend, cloud, places_in_rooms(), settings).value();
+  io::save_visible_sets(sets, seen, cloud).throw_if_error();
+  std::vector<Camera> from;
+  for (const double x : {-1.8, 1.6}) from.push_back(Camera::look_at({x, 1.3, 0.1}, {-x, 1.2, 0.2}, {0, 1, 0}, 48, 32, 90));
+  io::save_cameras(cameras, from).throw_if_error();
+  const std::string arguments = "--scene rooms=\"" + ply.string() + ":" + cameras.string() + "\" --visible-sets rooms=\"" +
+                                sets.string() + "\" --views 2 --sizes 48x32,96x64 --runs 1 --kinds render --knobs none " +
+                                "--profiles fast --sensors rgbd --backends openmp --oracles contract --no-html --out \"" +
+                                (folder / "out").string() + "\"";
+  const Outcome made = run(folder, arguments);
+  CAPTURE(made.text);
+  REQUIRE(made.ok);
+  const std::vector<Row> rows = parse_csv(read_file(folder / "out/report.csv"), "report.csv").value();
+  REQUIRE(rows.size() == 2 * 2 * 2);  // sizes x views x (fast, visible)
+  for (const Row& row : rows) {
+    if (row.get("profile") != "visible") continue;
+    CAPTURE(row.line());
+    const auto fast = std::find_if(rows.begin(), rows.end(), [&](const Row& r) {
+      return r.get("profile") == "fast" && r.get("view") == row.get("view") && r.get("width") == row.get("width");
+    });
+    REQUIRE(fast != rows.end());
+    const bool served = row.get("width") == "48";
+    CHECK((row.get("note").find("no visible set") == std::string::npos) == served);
+    CHECK(*row.number("rgb_psnr") >= 60);
+    CHECK(*row.number("cloud_bytes") == *fast->number("cloud_bytes") + static_cast<double>(seen.bytes()));
+    if (served) {
+      CHECK(*row.number("touched") < 0.7 * *fast->number("touched"));  // the other room is not
+    } else {
+      CHECK(row.get("rgb_psnr") == fast->get("rgb_psnr"));
+    }
+  }
 }

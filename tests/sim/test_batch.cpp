@@ -334,3 +334,29 @@ TEST_CASE("memory grows with scenes, not with environments") {
   CHECK(few > 1000000);
 }
 #endif
+
+TEST_CASE("rendering switched on again: a reset of some environments has the images of all") {
+  OpenMPBackend backend(2);
+  const auto make = [&](bool rendering) {
+    BatchConfig c = small_batch();
+    c.rendering = rendering;
+    return make_batch_simulator(backend, two_scenes(), c, 3, wandering).value();
+  };
+  auto batch = make(true), always = make(true), never = make(false);
+  for (auto* b : {&batch, &always, &never}) b->reset().value();
+  batch.set_rendering(false);
+  Rng rng(4);
+  for (int k = 0; k < 4; ++k) {
+    std::vector<Action> actions;
+    for (int e = 0; e < 3; ++e) actions.push_back(wandering_action(rng));
+    for (auto* b : {&batch, &always, &never}) b->step(actions).value();
+  }
+  batch.set_rendering(true);
+  never.set_rendering(true);
+  const std::uint8_t mask[3] = {1, 0, 0};
+  const auto want = always.reset(mask).value();
+  for (auto* b : {&batch, &never}) {
+    const auto got = b->reset(mask).value();
+    for (std::size_t e = 0; e < 3; ++e) CHECK(same_bits(got.images[0].of(e), want.images[0].of(e)));
+  }
+}

@@ -258,6 +258,17 @@ TEST_CASE("impossible sensors name their field") {
   };
   const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
   CHECK(has(message([](auto& s) { s.hfov = 360; }), "hfov"));
+  for (const double wide : {260.0, 300.0, 340.0}) {  // the default lens sees 253 degrees
+    CHECK(has(message([wide](auto& s) { s.hfov = wide; }), "hfov"));
+  }
+  CHECK(has(message([](auto& s) {
+              s.fisheye.alpha = s.fisheye.xi = 0;
+              s.hfov = 200;
+            }),
+            "hfov"));
+  CHECK(has(message([](auto& s) { s.kind = static_cast<SensorKind>(9); }), "kind"));
+  CHECK(has(message([](auto& s) { s.model = static_cast<SensorModel>(9); }), "model"));
+  CHECK(has(message([](auto& s) { s.noise.kind = static_cast<NoiseKind>(9); }), "noise.kind"));
   CHECK(has(message([](auto& s) { s.fisheye.alpha = 1.5; }), "alpha"));
   CHECK(has(message([](auto& s) { s.fisheye.xi = -1; }), "xi"));
   CHECK(has(message([](auto& s) { s.fisheye.focal_length = {-1, 0}; }), "focal_length"));

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <limits>
 #include <numbers>
+#include <string>
 
 #include "flat_world.hpp"
 #include "gsnav/sim/follower.hpp"
@@ -199,4 +201,21 @@ TEST_CASE("the follower gives way to bodies and still arrives") {
   MESSAGE("SR " << s.success_rate << " SPL " << s.spl << " CR " << s.collision_rate << " PSI " << s.psi);
   CHECK(s.success_rate >= 0.8);
   CHECK(s.collision_rate < 0.1);
+}
+
+TEST_CASE("a goal straight behind is half a turn to the left, and a start that is turned nowhere is refused") {
+  World w = flat_world();
+  PointNavEpisode e = open_floor();
+  e.goal_position = e.start_position + Vec3d{0, 0, 0.5};
+  REQUIRE(w.reset(e).ok());
+  CHECK(w.point_goal().angle == doctest::Approx(std::numbers::pi));
+  for (const double v : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    e.start_rotation = {v, 0, 0, 0};
+    CHECK(w.reset(e).message().find("start_rotation") != std::string::npos);
+  }
+  REQUIRE(w.reset(open_floor()).ok());
+  VelocityCommand far;
+  far.linear = 1e300;
+  const auto step = w.step(far);
+  CHECK((!step.ok() || is_finite(w.agent().position)));
 }

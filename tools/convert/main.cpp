@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-convert IN... OUT: any scene that the library reads, edited, in any format that it writes.
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -42,6 +43,31 @@ Result<GaussianCloud> load(const Options& o) {
   return scene;
 }
 
+/// Names an option whose value no scene can be edited by, or ok.
+Status validate(const Options& o) {
+  const std::pair<const char*, std::vector<double>> all[] = {
+      {"--crop", o.crop},   {"--rotate", o.rotate},           {"--translate", o.translate},
+      {"--scale", {o.scale}}, {"--min-opacity", {o.min_opacity}}, {"--max-scale", {o.max_scale}}};
+  for (const auto& [name, values] : all) {
+    for (const double v : values) {
+      if (!std::isfinite(v)) return {Errc::invalid_argument, std::string(name) + " " + std::to_string(v) + ": must be finite"};
+    }
+  }
+  if (o.max_scale < 0) return {Errc::invalid_argument, "--max-scale " + std::to_string(o.max_scale) + ": must be positive"};
+  return {};
+}
+
+/// Whether all of a cloud is finite: what is edited may have left the range of its numbers.
+bool is_finite(const GaussianCloud& cloud) {
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Vec3d m = cloud.mean(i);
+    bool finite = gsnav::is_finite(vec_cast<float>(m));
+    for (const auto& axis : cloud.scales) finite = finite && std::isfinite(axis[i]);
+    if (!finite) return false;
+  }
+  return true;
+}
+
 /// Crops and prunes in the axes of the input, then turns, scales and moves, in this order.
 Status edit(GaussianCloud& cloud, const Options& o) {
   if (!o.crop.empty()) {
@@ -70,6 +96,7 @@ Status edit(GaussianCloud& cloud, const Options& o) {
   if (!o.translate.empty()) by.translation = {o.translate[0], o.translate[1], o.translate[2]};
   if (!o.rotate.empty() || !o.translate.empty() || o.scale != 1) transform(cloud, by);
   if (cloud.size() == 0) return {Errc::invalid_argument, "no Gaussian is left"};
+  if (!is_finite(cloud)) return {Errc::invalid_argument, "a Gaussian would be moved or scaled beyond float32: --scale, --translate"};
   sort_spatially(cloud);
   return {};
 }
@@ -78,8 +105,8 @@ std::uintmax_t bytes_of(const std::filesystem::path& out) {
   std::error_code ignored;
   if (out.filename() != "meta.json") return std::filesystem::file_size(out, ignored);
   std::uintmax_t sum = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(out.parent_path(), ignored)) {
-    if (entry.path() == out || entry.path().extension() == ".webp") sum += entry.file_size(ignored);
+  for (const auto& entry : std::filesystem::directory_iterator(out.parent_path().empty() ? "." : out.parent_path(), ignored)) {
+    if (entry.path().filename() == out.filename() || entry.path().extension() == ".webp") sum += entry.file_size(ignored);
   }
   return sum;
 }
@@ -150,6 +177,7 @@ int main(int argc, char** argv) {
   app.add_option("--height", o.height)->check(CLI::Range(1, 8192));
   CLI11_PARSE(app, argc, argv);
 
+  if (Status s = validate(o); !s) return fail(s.message());
   auto cloud = load(o);
   if (!cloud) return fail(cloud.message());
   if (Status s = edit(*cloud, o); !s) return fail(s.message());

@@ -60,7 +60,8 @@ void add_profiles(const PlanOptions& o, std::size_t view, const ImageSize& size,
         const bool first_sensor = first && sensor == o.sensors.front();
         const bool others = first_sensor && profile == o.profiles.front();
         const bool lod = profile == "lod";
-        if (lod && backend == "cuda") continue;  // the report cuts in host memory
+        // The report cuts in host memory, and has sets there.
+        if ((lod || profile == "visible") && backend == "cuda") continue;
         for (const Oracle q : o.oracles) {
           if (q == Oracle::photo4 && (lod || (first_sensor && profile == "fast" && contains<std::string>(o.profiles, "lod")))) {
             s.oracles.push_back(q);  // what levels of detail are judged by, and what they stand beside

@@ -37,7 +37,7 @@ struct Setting {
   ImageSize size{};
   std::string sensor = "rgbd";    ///< rgbd, rgb, depth
   std::string backend = "openmp"; ///< openmp, serial, cuda
-  std::string profile = "exact";  ///< exact, fast, lod
+  std::string profile = "exact";  ///< exact, fast, lod, visible: fast of a visible set
   std::string knob = "none", knob_value;
   std::vector<Oracle> oracles;
 };

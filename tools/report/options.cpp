@@ -57,6 +57,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   app.add_option("--data", o.data, "Folder of real scenes (GSNAV_DATA_DIR): those that are there")
       ->check(CLI::ExistingDirectory);
   app.add_option("--flat", o.flats, "Benchmark flats, PLY files with a cameras.json beside them");
+  app.add_option("--visible-sets", o.visible_sets,
+                 "SCENE=FILE: what is seen from where cameras go (gsnav-navmesh --visible-sets writes it); adds the "
+                 "profile visible to that scene: fast, drawing what is in the set of a view's cell. Repeatable");
   app.add_option("--views", o.views, "Views a scene, spread over its cameras")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

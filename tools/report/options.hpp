@@ -12,6 +12,7 @@ namespace gsnav_report {
 /// The command line of gsnav-report, checked.
 struct Options {
   std::vector<std::string> scenes, flats;
+  std::vector<std::string> visible_sets;  ///< SCENE=FILE
   bool default_scene = false;
   std::string data;
   int views = 4;

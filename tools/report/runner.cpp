@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
-#include <set>
+#include <map>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -44,17 +44,29 @@ Result<std::vector<SceneSpec>> scene_specs(const Options& o) {
   if (!o.data.empty()) {
     for (SceneSpec& spec : data_scenes(o.data)) specs.push_back(std::move(spec));
   }
-  std::set<std::string> names;
-  for (const SceneSpec& spec : specs) {
-    if (!names.insert(spec.name).second) return {Errc::invalid_argument, "two scenes are called " + spec.name};
+  std::map<std::string, SceneSpec*> names;
+  for (SceneSpec& spec : specs) {
+    if (!names.emplace(spec.name, &spec).second) return {Errc::invalid_argument, "two scenes are called " + spec.name};
+  }
+  for (const std::string& text : o.visible_sets) {
+    const std::size_t equals = text.find('=');
+    const auto scene = names.find(text.substr(0, equals));
+    if (equals == text.npos || scene == names.end()) {
+      std::string known;
+      for (const auto& [name, spec] : names) known.append(known.empty() ? "" : ", ").append(name);
+      return {Errc::invalid_argument, "--visible-sets " + text + ": use SCENE=FILE; scenes are " + known};
+    }
+    scene->second->visible_sets = text.substr(equals + 1);
   }
   if (specs.empty()) return {Errc::file_not_found, "--data " + o.data + ": none of the known scenes is there"};
   return specs;
 }
 
-PlanOptions plan_options(const Options& o, std::size_t views, int sh_degree) {
-  return {views,   o.sizes,   o.sensors,   o.backends, o.profiles,
-          o.knobs, o.oracles, o.knob_size, sh_degree,  o.knob_values};
+PlanOptions plan_options(const Options& o, std::size_t views, int sh_degree, bool visible) {
+  PlanOptions out{views,   o.sizes,   o.sensors,   o.backends, o.profiles,
+                  o.knobs, o.oracles, o.knob_size, sh_degree,  o.knob_values};
+  if (visible) out.profiles.emplace_back("visible");
+  return out;
 }
 
 Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
@@ -62,13 +74,13 @@ Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
   if (!specs) return specs.status();
   const ReferenceCache cache(o.cache);
   // Until a scene is loaded it counts as one of the largest plan.
-  const std::size_t each = plan(plan_options(o, static_cast<std::size_t>(o.views), 3)).size();
+  const std::size_t each = plan(plan_options(o, static_cast<std::size_t>(o.views), 3, !o.visible_sets.empty())).size();
   std::size_t total = each * specs->size(), done = 0;
   Progress progress(total);
   for (const SceneSpec& spec : *specs) {
     const Result<Scene> scene = load(spec, o.views);
     if (!scene) return scene.status();
-    const std::vector<Setting> settings = plan(plan_options(o, scene->views.size(), scene->cloud.sh_degree));
+    const std::vector<Setting> settings = plan(plan_options(o, scene->views.size(), scene->cloud.sh_degree, scene->visible.has_value()));
     progress.set_total(total -= each - settings.size());
     SceneRunner runner(o, *scene, cache, csv, stamp);
     for (const Setting& s : settings) {

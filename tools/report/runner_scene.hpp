@@ -46,6 +46,7 @@ class SceneRunner {
     gsnav::CullCounts culled;  ///< zeros where a knob is turned, and of arrays that are not the host's
     std::size_t scratch_bytes = 0;
     std::uint64_t peak_memory = 0;
+    bool cell_known = true;  ///< false: of the profile visible, where no cell has what the camera sees
   };
   struct Named {
     std::string hash;

@@ -11,6 +11,7 @@
 #include "cache.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/io/visible_file.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav_report {
@@ -131,6 +132,11 @@ Result<Scene> load(const SceneSpec& spec, int views) {
     scene.cloud = std::move(loaded->cloud);
   }
   scene.path = spec.path;
+  if (!spec.visible_sets.empty()) {
+    Result<VisibleSets> sets = io::load_visible_sets(spec.visible_sets, scene.cloud);
+    if (!sets) return Status(sets.code(), "--visible-sets " + spec.name + "=" + spec.visible_sets + ": " + sets.message());
+    scene.visible = std::move(*sets);
+  }
   scene.hash = content_hash(scene.cloud);
   if (all.empty()) all = orbit(scene.cloud);
   const std::size_t wanted = std::min(all.size(), static_cast<std::size_t>(std::max(views, 1)));

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav_report {
 
@@ -23,12 +25,14 @@ struct SceneSpec {
   std::string path;                 ///< what io::load_scene takes; empty: the embedded flat
   std::string cameras;              ///< INRIA cameras.json; empty: `views`, or views made from the cloud
   std::vector<ViewPoint> views{};
+  std::string visible_sets{};       ///< a file of them; empty: none
 };
 
 struct Scene {
   std::string name;
   gsnav::GaussianCloud cloud;
   std::string path;              ///< its spec's
+  std::optional<gsnav::VisibleSets> visible;
   std::string hash;              ///< content_hash of the cloud
   std::vector<ViewPoint> views;
 };

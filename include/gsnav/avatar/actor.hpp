@@ -134,11 +134,15 @@ class AvatarActor {
     }
     const std::size_t first = out.size(), count = asset_->capsules.size();
     out.resize(first + count);
-    const bool known = before.size == count;
+    // Where a clock begins again, whoever has left or has yet to come stands where it is when it is there: the way between
+    // rounds is nobody's.
+    const bool begins = options_.loop_period > 0;
+    const double from = begins && !active(t0) ? t1 : t0, to_time = begins && !active(t1) ? t0 : t1;
+    const bool known = before.size == count && from == t0;
     if (!known) {
-      for_each_capsule(t0, [&](std::size_t c, const Capsule<double>& at) { out[first + c].motion.begin = at; });
+      for_each_capsule(from, [&](std::size_t c, const Capsule<double>& at) { out[first + c].motion.begin = at; });
     }
-    for_each_capsule(t1, [&](std::size_t c, const Capsule<double>& at) {
+    for_each_capsule(to_time, [&](std::size_t c, const Capsule<double>& at) {
       DynamicCapsule& to = out[first + c];
       if (known) to.motion.begin = before[c].motion.end;
       to.motion.end = at;
@@ -151,7 +155,9 @@ class AvatarActor {
   bool within(double t) const noexcept { return t >= options_.time_begin && t <= options_.time_end; }
   double clock(double t) const noexcept {
     const double period = options_.loop_period;
-    return period > 0 ? t - std::floor(t / period) * period : t;
+    if (!(period > 0)) return t;
+    const double at = t - std::floor(t / period) * period;
+    return at >= 0 && at < period ? at : 0.0;  // rounding at the begin of a round
   }
   double blend_begin() const noexcept { return options_.loop_period - options_.loop_blend; }
   bool blending(double t) const noexcept { return options_.loop_blend > 0 && t > blend_begin(); }

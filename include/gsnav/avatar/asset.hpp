@@ -159,6 +159,9 @@ struct AvatarAsset {
     if (!idle.rotations.empty() && (idle.rotations.size() != joints || idle.translations.size() != joints)) {
       return bad("idle has another number of joints than the skeleton");
     }
+    if (!idle.rotations.empty()) {
+      if (Status s = idle.validate("idle"); !s) return bad(s.message());
+    }
     return {};
   }
 };

@@ -56,6 +56,8 @@ class WalkMotion final : public MotionSource {
     if (!(options.duty > 0.5 && options.duty < 0.75)) return bad("GaitOptions.duty must be in (0.5, 0.75)");
     if (!(options.speed > 0 && is_finite(options.speed))) return bad("GaitOptions.speed must be positive");
     if (!(options.stride >= 0 && is_finite(options.stride))) return bad("GaitOptions.stride must be >= 0");
+    if (!is_finite(options.arm_swing)) return bad("GaitOptions.arm_swing must be finite");
+    if (!is_finite(options.start_phase)) return bad("GaitOptions.start_phase must be finite");
     for (const auto& g : skeleton.rest_globals()) {
       m.rest_globals_.push_back({quat_from_matrix(g.linear), g.translation});
     }

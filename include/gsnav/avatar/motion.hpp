@@ -52,6 +52,7 @@ class FixedPose final : public MotionSource {
   explicit FixedPose(LocalPose pose) : pose_(std::move(pose)) {}
   void pose(const MotionInput&, LocalPose& out) const override { out = pose_; }
   std::size_t joint_count() const noexcept override { return pose_.rotations.size(); }
+  Status validate() const override { return pose_.validate("FixedPose"); }
 
  private:
   LocalPose pose_;

@@ -112,6 +112,8 @@ inline Result<MotionClip> retarget(const MotionClip& clip, const Skeleton& sourc
   out.joints = joints;
   out.end = clip.end;
   out.wrap_time = clip.wrap_time;
+  out.playback_rate = clip.playback_rate;
+  out.start = clip.start;
   const LocalPose rest = target.rest_pose();
   out.translations = rest.translations;
   LocalPose pose;

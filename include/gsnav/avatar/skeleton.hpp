@@ -19,6 +19,21 @@ struct LocalPose {
   std::vector<Quatd> rotations;     ///< [J] joint to parent, unit; replaces the rest rotation
   std::vector<Vec3d> translations;  ///< [J] joint's place in its parent, metres
   Vec3d root{};                     ///< where the whole avatar has gone in its own frame, metres
+
+  /// invalid_argument naming `what` and the joint: arrays that differ in length, no unit quaternion (1e-4), not finite.
+  Status validate(const std::string& what) const {
+    const auto bad = [&](const std::string& why) { return Status(Errc::invalid_argument, what + ": " + why); };
+    if (rotations.size() != translations.size()) {
+      return bad(std::to_string(rotations.size()) + " rotations and " + std::to_string(translations.size()) + " translations");
+    }
+    for (std::size_t j = 0; j < rotations.size(); ++j) {
+      if (!(abs(dot(rotations[j], rotations[j]) - 1.0) < 1e-4)) {
+        return bad("the rotation of joint " + std::to_string(j) + " is no unit quaternion");
+      }
+      if (!is_finite(translations[j])) return bad("the translation of joint " + std::to_string(j) + " is not finite");
+    }
+    return is_finite(root) ? Status() : bad("root is not finite");
+  }
 };
 
 /// A tree of joints. Metres; the root frame is the avatar's: Y up, feet on y = 0, facing -Z.

@@ -107,7 +107,9 @@ GSNAV_HD ChunkExtent chunk_extent(const ProjectionCamera<double>& camera, const 
   const detail::ChunkInView chunk(camera, b);
   const double z_min = chunk.z_min(), z_max = chunk.z_max(), s_max = chunk.s_max();
   ChunkExtent e;
-  e.nearest = static_cast<float>(z_min * camera.scale * (1 - 1e-6));
+  // A distance is z at least only where the view axis has unit length: a viewmat need not be that rigid.
+  const double row = camera.sort_order == SortOrder::z_depth ? 1.0 : max(1.0, norm(camera.rotation.row[2]));
+  e.nearest = static_cast<float>(z_min / row * camera.scale * (1 - 1e-6));
   const auto along = [&](const Vec3d& axis, double f, double c, double limit, double extent, double& low,
                          double& high) {
     const auto [wide, fixed] = chunk.reach(z_min, s_max, f, c, limit, extent);

@@ -14,8 +14,8 @@ namespace gsnav {
 struct NavMeshSettings {
   double cell_size = 0.05;        ///< voxel edge on the ground plane
   double cell_height = 0.2;       ///< voxel height
-  double agent_height = 1.5;      ///< clearance that the agent needs above the floor
-  double agent_radius = 0.1;      ///< the walkable surface ends this far from walls
+  double agent_height = 1.5;      ///< clearance that the agent needs above the floor; up to 255 cell_height
+  double agent_radius = 0.1;      ///< the walkable surface ends this far from walls; up to 127 cell_size
   double agent_max_climb = 0.2;   ///< highest step the agent can take
   double agent_max_slope = 45.0;  ///< steepest walkable triangle, degrees
   double region_min_size = 20.0;  ///< regions below this many cells squared are dropped

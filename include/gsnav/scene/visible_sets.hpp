@@ -67,8 +67,10 @@ struct VisibleSets {
   std::size_t count_seen_rows(std::size_t cell_index, std::size_t cloud_rows) const noexcept {
     const View<const std::uint32_t> seen = seen_from(cell_index);
     if (seen.size > words()) return count_bits_of(seen, 2 * words(), seen.size);
-    const std::size_t in_chunks = kProjectChunk * count_seen(cell_index);  // the last may have fewer
-    return in_chunks < cloud_rows ? in_chunks : cloud_rows;
+    const std::size_t last = cloud_chunks - 1;  // it may have fewer
+    const std::size_t missing =
+        count_seen(cell_index) != 0 && (seen[last / 32] >> (last % 32) & 1u) != 0 ? kProjectChunk * cloud_chunks - cloud_rows : 0;
+    return kProjectChunk * count_seen(cell_index) - missing;
   }
   /// Share of the chunks that a cell sees, on average.
   double mean_share() const noexcept {

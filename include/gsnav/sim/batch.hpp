@@ -213,13 +213,19 @@ class BatchSimulator {
   Result<BatchStep> observe(bool all) {
     BatchStep out;
     static_cast<BatchInfo&>(out) = worlds_.info();
-    if (!config_.rendering || images_.empty()) return out;
+    if (!config_.rendering || images_.empty()) {
+      drawn_ = false;
+      return out;
+    }
     rig_.resize(buffers_, environments());
     lookers_.clear();
+    // Where the last call drew nothing, what has not moved since has no image either.
+    const bool every = all || !std::exchange(drawn_, false);
     for (std::size_t e = 0; e < environments(); ++e) {
-      if (all || worlds_.moved(e)) lookers_.push_back({e, e});
+      if (every || worlds_.moved(e)) lookers_.push_back({e, e});
     }
     if (Status s = draw(buffers_); !s) return s;
+    drawn_ = true;
     fill(images_, buffers_);
     out.images = images_;
     if (worlds_.auto_reset() == AutoReset::same_step && !worlds_.info().finished.empty()) out.final_images = final_images_;
@@ -323,6 +329,7 @@ class BatchSimulator {
   std::vector<RenderConfig> render_configs_;
   std::vector<std::uint8_t> in_use_;
   std::size_t left_poses_ = 0;
+  bool drawn_ = false;  // all rows of buffers_ are of the worlds before the present call
   SensorImages<B> buffers_, final_buffers_;
   std::unique_ptr<ThreadPool> pool_;  // where the backend's own work is not the host's
   std::vector<BatchObservation> images_, final_images_;

@@ -28,7 +28,8 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
 Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene, const TaskConfig& task,
                         std::uint64_t seed);
 
-/// The embedded flat (default_scene.hpp) with its NavMesh for a body as of `task` and people who walk in it.
+/// The embedded flat (default_scene.hpp) with its NavMesh for a body as of `task` and people who walk in it;
+/// `density`: of the flat's Gaussians, not of people's (walking_people).
 /// Errors: what the parts report.
 Result<SimulatorScene> default_simulator_scene(std::size_t people = 3, std::uint64_t seed = 1, double density = 1.0,
                                                const TaskConfig& task = {});

@@ -35,7 +35,7 @@ enum class SensorModel : std::uint8_t {
 /// The double sphere model. The defaults are Habitat's.
 struct FisheyeLens {
   double alpha = 0.59, xi = -0.18;
-  /// Pixels; 0: such that the middle row spans the sensor's hfov.
+  /// Pixels; 0: such that the middle row spans the sensor's hfov, which the lens must see.
   std::array<double, 2> focal_length{0.0, 0.0};
   std::array<double, 2> principal_point_offset{0.0, 0.0};  ///< from the image's centre, pixels
 };

@@ -13,6 +13,7 @@
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/host_array.hpp"
+#include "gsnav/core/rng.hpp"
 #include "gsnav/kernels/cut_depth.hpp"
 #include "gsnav/sim/cube_map.hpp"
 #include "gsnav/sim/frame_batch.hpp"
@@ -343,7 +344,8 @@ class SensorRig {
       const std::size_t n = size_[outputs_[i].clean];
       const std::span<const float> clean(row(images, outputs_[i].clean, view.row), n);
       const std::span<float> out(row(images, outputs_[i].noisy, view.row), n);
-      const std::uint64_t seed = view.noise + 0x9e3779b97f4a7c15ull * (i + 1);
+      // Hashed: seeds a step of the generator apart would give one stream, shifted.
+      const std::uint64_t seed = Rng(view.noise + 0xd6e8feb86659fd93ull * (i + 1)).next();
       if (noise.kind == NoiseKind::redwood_depth) {
         redwood_depth(noise, seed, sensors_[i].resolution[0], sensors_[i].resolution[1], clean, out);
       } else {
