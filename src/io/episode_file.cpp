@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "file.hpp"
@@ -176,6 +177,18 @@ Status save_episodes(const fs::path& path, std::span<const PointNavEpisode> epis
     for (const PointNavEpisode& e : episodes) {
       const Vec3d &s = e.start_position, &g = e.goal_position;
       const Quatd& q = e.start_rotation;
+      const std::pair<const char*, bool> finite[] = {
+          {"start_position", is_finite(s)},
+          {"start_rotation", is_finite(q.w) && is_finite(q.x) && is_finite(q.y) && is_finite(q.z)},
+          {"goal_position", is_finite(g)},
+          {"goal_radius", is_finite(e.goal_radius)},
+          {"geodesic_distance", is_finite(e.geodesic_distance)},
+          {"start_time", is_finite(e.start_time)}};
+      for (const auto& [field, ok] : finite) {  // JSON has no such numbers
+        if (!ok) {
+          return {Errc::invalid_argument, path.string() + ": episode \"" + e.id + "\": " + field + " is not finite"};
+        }
+      }
       Json info{{"geodesic_distance", e.geodesic_distance}};
       if (e.start_time != 0) info["start_time"] = e.start_time;  // a place that Habitat-Lab leaves to everyone
       list.push_back({{"episode_id", e.id},

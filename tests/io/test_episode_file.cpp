@@ -153,3 +153,23 @@ TEST_CASE("bad episodes are named with file, episode and key") {
   CHECK(io::load_episodes("nowhere.json").code() == Errc::file_not_found);
   CHECK(io::save_episodes("no/such/folder/x.json", {}).code() == Errc::file_not_found);
 }
+
+TEST_CASE("episodes: what JSON has no number for is not written") {
+  const TempFolder folder("episodes_finite");
+  const auto refused = [&](auto change, const char* field) {
+    std::vector<PointNavEpisode> list(2);
+    list[1].id = "second";
+    change(list[1]);
+    const Status s = io::save_episodes(folder / "e.json", list);
+    CAPTURE(s.message());
+    CHECK(s.code() == Errc::invalid_argument);
+    CHECK(contains(s.message(), "e.json: episode \"second\": " + std::string(field)));
+    CHECK_FALSE(std::filesystem::exists(folder / "e.json"));
+  };
+  refused([](auto& e) { e.start_position.y = NAN; }, "start_position");
+  refused([](auto& e) { e.start_rotation.w = INFINITY; }, "start_rotation");
+  refused([](auto& e) { e.goal_position.z = -INFINITY; }, "goal_position");
+  refused([](auto& e) { e.goal_radius = NAN; }, "goal_radius");
+  refused([](auto& e) { e.geodesic_distance = INFINITY; }, "geodesic_distance");
+  refused([](auto& e) { e.start_time = NAN; }, "start_time");
+}

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -349,7 +350,9 @@ int main(int argc, char** argv) {
     for (TexturedPart& part : surface->parts) {
       triangles += part.geometry.triangles.size();
       // What says nothing of its looks is grey.
-      if (file.ends_with(".obj") || file.ends_with(".ply")) part.material = {{0.5, 0.5, 0.5}, 0, -1, true, false};
+      std::string kind = std::filesystem::path(file).extension().string();
+      std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+      if (kind == ".obj" || kind == ".ply") part.material = {{0.5, 0.5, 0.5}, 0, -1, true, false};
     }
     auto placed = placed_meshes(std::move(*surface));
     if (!placed) return fail(file + ": " + placed.message());
