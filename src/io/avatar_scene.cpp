@@ -7,6 +7,7 @@
 #include "file.hpp"
 #include "gsnav/io/avatar_scene_file.hpp"
 #include "json.hpp"
+#include "npz_arrays.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -138,12 +139,7 @@ class SceneReader {
         m.translation[i] = v[static_cast<std::size_t>(4 * i + 3)];
       }
     }
-    const Mat3d gram = m.linear * transpose(m.linear);
-    bool rigid = v.size() == 16 && is_finite(m.translation) && determinant(m.linear) > 0;
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) rigid = rigid && std::fabs(gram(i, k) - (i == k ? 1.0 : 0.0)) < 1e-3;
-    }
-    if (!rigid) return {Errc::invalid_file, at + ": 'coord_transform' is no rigid 4x4 matrix"};
+    if (v.size() != 16 || !detail::is_rigid(m)) return {Errc::invalid_file, at + ": 'coord_transform' is no rigid 4x4 matrix"};
     out.coordinates = m;
     return {};
   }

@@ -8,6 +8,7 @@
 #include "file.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/io/npz_file.hpp"
+#include "npz_arrays.hpp"
 
 namespace gsnav::io {
 
@@ -27,16 +28,12 @@ Status save_driver(const std::filesystem::path& path, const DriverFrames& frames
       return bad("capsules has another number of frames than matrices");
     std::vector<float> mats, proxies;
     mats.reserve(16 * frames.matrices.size());
-    for (const Affine3<double>& m : frames.matrices) {
+    for (std::size_t at = 0; at < frames.matrices.size(); ++at) {
+      const Affine3<double>& m = frames.matrices[at];
       if (!is_finite(m.translation)) return bad("matrices is not finite");
-      const std::size_t at = static_cast<std::size_t>(&m - frames.matrices.data());
-      const std::string which = "matrices: frame " + std::to_string(at / joints) + ", joint " + std::to_string(at % joints);
-      const Mat3d gram = m.linear * transpose(m.linear);
-      bool rigid = determinant(m.linear) > 0;
-      for (int i = 0; i < 3; ++i) {
-        for (int k = 0; k < 3; ++k) rigid = rigid && std::fabs(gram(i, k) - (i == k ? 1.0 : 0.0)) < 1e-3;
+      if (!detail::is_rigid(m)) {
+        return bad("matrices: frame " + std::to_string(at / joints) + ", joint " + std::to_string(at % joints) + " is not rigid");
       }
-      if (!rigid) return bad(which + " is not rigid");
       for (int i = 0; i < 3; ++i) {
         for (int k = 0; k < 3; ++k) mats.push_back(static_cast<float>(m.linear(i, k)));
         mats.push_back(static_cast<float>(m.translation[i]));

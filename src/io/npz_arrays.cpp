@@ -54,19 +54,23 @@ Result<double> NpzArrays::number(const std::string& name) const {
   return a->values[0];
 }
 
+bool is_rigid(const Affine3<double>& m) {
+  const Mat3d gram = m.linear * transpose(m.linear);
+  bool ok = determinant(m.linear) > 0 && is_finite(m.translation);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) ok = ok && std::fabs(gram(i, k) - (i == k ? 1.0 : 0.0)) < kRigidTolerance;
+  }
+  return ok;
+}
+
 bool rigid_transform(const double* m, Affine3<double>& out) {
-  constexpr double kTolerance = 1e-3;
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) out.linear(i, k) = m[4 * i + k];
     out.translation[i] = m[4 * i + 3];
   }
-  const Mat3d gram = out.linear * transpose(out.linear);
-  bool ok = determinant(out.linear) > 0 && is_finite(out.translation);
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) ok = ok && std::fabs(gram(i, k) - (i == k ? 1.0 : 0.0)) < kTolerance;
-    ok = ok && std::fabs(m[12 + i]) < kTolerance;
-  }
-  return ok && std::fabs(m[15] - 1.0) < kTolerance;
+  bool ok = is_rigid(out);
+  for (int i = 0; i < 3; ++i) ok = ok && std::fabs(m[12 + i]) < kRigidTolerance;
+  return ok && std::fabs(m[15] - 1.0) < kRigidTolerance;
 }
 
 Result<std::vector<Affine3<double>>> read_transforms(const NpzArrays& arrays, const std::string& name) {

@@ -38,7 +38,12 @@ class NpzArrays {
 /// Errors: invalid_file naming the joint whose matrix is not rigid (1e-3).
 Result<std::vector<Affine3<double>>> read_transforms(const NpzArrays& arrays, const std::string& name);
 
-/// The rigid transform in 16 row-major numbers, or false (1e-3).
+inline constexpr double kRigidTolerance = 1e-3;
+
+/// Whether a map is a rotation and a finite translation (kRigidTolerance).
+bool is_rigid(const Affine3<double>& m);
+
+/// The rigid transform in 16 row-major numbers, or false (kRigidTolerance).
 bool rigid_transform(const double* m, Affine3<double>& out);
 
 }  // namespace gsnav::io::detail

@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kLevel = 0.984807753012208;  // cosine of 10 degrees
 constexpr double kLeastArea = 1e-6;           // square metres: below it is rounding
-
 constexpr double kLeastGap = 1e-6;            // metres: what a mean of heights is rounded by
 
 struct Piece {

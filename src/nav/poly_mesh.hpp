@@ -11,6 +11,13 @@
 
 namespace gsnav::detail {
 
+/// What a displacement over the ground is multiplied by so that its squares do not overflow; 1 up to 1e100 m. Every mesh
+/// ends before a fraction of a longer one that a number can tell from zero.
+inline double shortened(double dx, double dz) noexcept {
+  constexpr double kLongest = 1e100;
+  return kLongest / max(max(abs(dx), abs(dz)), kLongest);
+}
+
 /// The convex polygons of a NavMesh in double, relative to the mesh's origin, counter-clockwise in
 /// (x, z), with the neighbour across each edge. Walking, heights, islands and sampling need no Detour.
 struct PolyMesh {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "poly_mesh.hpp"
 #include "step_compat.hpp"
 
 namespace gsnav {
@@ -127,9 +128,7 @@ Vec3d along_contacts(const Vec3d& motion, const std::vector<Vec3d>& normals) noe
 
 StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& asked_for,
                 const CapsuleSet& bodies, const StepOptions& options) {
-  // Squares of what is longer overflow; its fractions are zero either way.
-  constexpr double kLongest = 1e100;
-  const Vec3d desired = asked_for * (kLongest / max(max(std::abs(asked_for.x), std::abs(asked_for.z)), kLongest));
+  const Vec3d desired = asked_for * detail::shortened(asked_for.x, asked_for.z);
   StepResult out;
   out.position = agent.position;
   out.poly = agent.poly;

@@ -130,9 +130,7 @@ void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz,
   PolyId poly = start_poly;
   p.y = height(poly, p);
   out.points.push_back({p, poly, 0.0});
-  // So long that squares overflow: every mesh ends before a fraction of it that a number can tell from zero.
-  constexpr double kLongest = 1e100;
-  const double shorter = kLongest / max(max(std::abs(dx), std::abs(dz)), kLongest);
+  const double shorter = shortened(dx, dz);
   const Direction wanted{dx * shorter, dz * shorter};
   const double wanted_length = wanted.length();
   if (!(wanted_length > 0)) return;

@@ -2,6 +2,7 @@
 #include "gsnav/sim/sensor.hpp"
 
 #include <cmath>
+#include <numbers>
 
 #include "gsnav/ops/render_config.hpp"
 
@@ -64,7 +65,7 @@ Status validate(const SensorSpec& s) {
   }
   if (fisheye && (!(s.fisheye.focal_length[0] > 0) || !(s.fisheye.focal_length[1] > 0))) {
     // Where the double sphere's projection ends: further off the axis an image point would come twice.
-    const double a = s.fisheye.alpha, z = std::cos(s.hfov * 3.14159265358979323846 / 360.0), shifted = s.fisheye.xi + z;
+    const double a = s.fisheye.alpha, z = std::cos(s.hfov * std::numbers::pi / 360.0), shifted = s.fisheye.xi + z;
     const double w = a > 0.5 ? (1 - a) / a : a / (1 - a);
     if (!(shifted > -w * std::sqrt(1 - z * z + shifted * shifted))) {
       return bad("hfov", std::to_string(s.hfov), "is more than a lens of this fisheye.alpha and xi sees");

@@ -113,6 +113,8 @@ inline const char* read_visible(const std::string& input) {
   return nullptr;
 }
 
+inline constexpr std::size_t kLodArrays = 14;
+
 /// The arrays of a tree that a file keeps.
 template <class F>
 void for_each_lod_array(gsnav::LodTree& tree, const F& f) {
@@ -152,7 +154,7 @@ inline const char* read_lod(const std::string& input) {
       std::size_t n = 0;
       for_each_lod_array(tree, [&](auto& values) {
         const std::size_t words = values.size() * sizeof values[0] / sizeof word;
-        if (n++ != array % 14 || words == 0) return;
+        if (n++ != array % kLodArrays || words == 0) return;
         std::memcpy(reinterpret_cast<unsigned char*>(values.data()) + place % words * sizeof word, &word, sizeof word);
       });
     }

@@ -212,8 +212,8 @@ void add_caches(Seeds& seeds) {
   seeds.add("visible", '\0' + read_file(folder / "a"));
   seeds.add("visible", visible_input(sets));
   seeds.add("lod", std::string(1, '\1'));
-  for (char array = 0; array < 14; ++array) {
-    seeds.add("lod", std::string{'\1', array, '\5', '\0', '\0', '\0', '\0', '\0'});
+  for (std::size_t array = 0; array < kLodArrays; ++array) {
+    seeds.add("lod", std::string{'\1', static_cast<char>(array), '\5', '\0', '\0', '\0', '\0', '\0'});
   }
 }
 

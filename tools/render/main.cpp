@@ -346,12 +346,12 @@ int main(int argc, char** argv) {
   for (const std::string& file : o.meshes) {
     auto surface = io::load_textured_scene(file);
     if (!surface) return fail(surface.message());
+    std::string kind = std::filesystem::path(file).extension().string();
+    std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     std::size_t triangles = 0;
     for (TexturedPart& part : surface->parts) {
       triangles += part.geometry.triangles.size();
       // What says nothing of its looks is grey.
-      std::string kind = std::filesystem::path(file).extension().string();
-      std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
       if (kind == ".obj" || kind == ".ply") part.material = {{0.5, 0.5, 0.5}, 0, -1, true, false};
     }
     auto placed = placed_meshes(std::move(*surface));
