@@ -129,6 +129,25 @@ TEST_CASE("a replay becomes a video of any size, and says what is missing where 
 #endif
 }
 
+#if defined(GSNAV_NAV_LOOP)
+TEST_CASE("the demo draws any episode that it plays, and refuses to draw one beyond the last before it plays") {
+  const TempFolder folder("nav_loop");
+  const auto demo = [&](const std::string& more) {
+    return run_command(GSNAV_NAV_LOOP, "--avatars 0 --episodes 2 --max-steps 3 --width 32 --height 24 --frames-every 0 --out out " + more,
+                       folder.path());
+  };
+  const Outcome beyond = demo("--show 2");
+  CAPTURE(beyond.text);
+  CHECK_FALSE(beyond.ok);
+  CHECK(beyond.says("--show 2: of 2 episodes the last is 1"));
+  CHECK_FALSE(std::filesystem::exists(folder / "out"));
+  const Outcome last = demo("--show 1");
+  CAPTURE(last.text);
+  CHECK(last.ok);
+  CHECK(std::filesystem::exists(folder / "out/map.png"));
+}
+#endif
+
 #if defined(GSNAV_EVAL_MPI)
 TEST_CASE("any number of ranks gives the same numbers, also where one was killed and the job begins again") {
   const TempFolder folder("eval");

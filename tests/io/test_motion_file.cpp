@@ -230,6 +230,26 @@ TEST_CASE("retarget: to itself, to another size, and from a T pose to an A pose"
   CHECK(contains(retarget(m.clip, m.skeleton, target, options).status().message(), "root"));
 }
 
+TEST_CASE("retarget: a clip's own time is kept: its rate, its start, and what comes after its end") {
+  const io::LoadedMotion m = load(kArm).value();  // two keys, 0.05 s apart
+  RetargetOptions options;
+  for (const std::string& name : m.skeleton.names) options.joints.emplace_back(name, name);
+  options.root_scale = 1.0;
+  for (const ClipEnd end : {ClipEnd::hold, ClipEnd::loop, ClipEnd::loop_forward}) {
+    MotionClip clip = m.clip;
+    clip.end = end;
+    clip.playback_rate = 0.4;
+    clip.start = 0.02;
+    clip.wrap_time = 0.13;
+    const MotionClip same = retarget(clip, m.skeleton, m.skeleton, options).value();
+    for (const double time : {0.0, 0.05, 0.11, 0.2, 0.5, 1.3}) {
+      const auto a = pose_at({m.skeleton, clip, {}}, time), b = pose_at({m.skeleton, same, {}}, time);
+      CAPTURE(time);
+      for (std::size_t j = 0; j < 3; ++j) CHECK(norm(a[j].translation - b[j].translation) < 1e-12);
+    }
+  }
+}
+
 TEST_CASE("retarget: a real walk on the humanoid, limb by limb") {
   const std::string path = data_file("avatars/makehuman_cc0/walk1.bvh");
   if (path.empty()) return;
