@@ -64,17 +64,23 @@ class ClipInPlace final : public MotionSource {
   std::shared_ptr<const ClipPath> path_;
 };
 
-/// Moves the whole clip, and its capsules, by a rigid map of each key.
-void move_clip(LoadedDriver& driver, const std::vector<Affine3<double>>& by) {
+/// Moves the whole clip, and its capsules, by a rigid map of each key: every root of the skeleton alike. The clip is as
+/// load_driver makes it, with each joint's place at each key and a path.
+void move_clip(const Skeleton& skeleton, LoadedDriver& driver, const std::vector<Affine3<double>>& by) {
   MotionClip& clip = driver.clip;
   for (std::size_t t = 0; t < clip.frames(); ++t) {
     const Affine3<double>& m = by[std::min(t, by.size() - 1)];
-    Quatd& q = clip.rotations[t * clip.joints];
-    q = quat_from_matrix(m.linear) * q;
-    normalize(q);
-    // What is first in the clip is its root's place; the path makes up for the change.
-    const Vec3d place = clip.translations[clip.translations.size() == clip.joints ? 0 : t * clip.joints];
-    clip.root_translation[t] = m * (clip.root_translation[t] + place) - place;
+    Quatd* rotations = &clip.rotations[t * clip.joints];
+    Vec3d* places = &clip.translations[t * clip.joints];
+    // The first root keeps its place in the clip: the path makes up for the change.
+    const Vec3d before = clip.root_translation[t], after = m * (before + places[0]) - places[0];
+    for (std::size_t j = 0; j < clip.joints; ++j) {
+      if (skeleton.parents[j] >= 0) continue;
+      rotations[j] = quat_from_matrix(m.linear) * rotations[j];
+      normalize(rotations[j]);
+      if (j > 0) places[j] = m * (before + places[j]) - after;
+    }
+    clip.root_translation[t] = after;
     if (t < driver.capsules.size()) {
       for (Capsule<double>& c : driver.capsules[t]) c = {m * c.p0, m * c.p1, c.radius};
     }
@@ -140,7 +146,7 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
     const auto path = load_trajectory(a.trajectory);
     if (!path) return path.status();
     if (path->empty()) return {Errc::invalid_file, a.trajectory.string() + ": there are no rows"};
-    move_clip(*driver, *path);
+    move_clip(body->skeleton, *driver, *path);
   }
   Affine3<double> coordinates = a.coordinates;
   if (a.guess_coordinates) {
@@ -148,7 +154,7 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
     const Mat3d first = rotation_matrix(driver->clip.rotations[0]) * transpose(body->skeleton.rest_local[0].linear);
     if (first(1, 1) < -0.7 && first(2, 2) < -0.7) coordinates.linear = {{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}};
   }
-  move_clip(*driver, {coordinates});
+  move_clip(body->skeleton, *driver, {coordinates});
   if (body->capsules.empty() && !driver->capsules.empty() && !driver->capsules[0].empty()) {
     // The file's body stays as it is: another entry may have another driver.
     std::shared_ptr<const AvatarAsset>& of_driver = bodies[a.canonical.string() + '\n' + a.driver.string()];

@@ -122,6 +122,51 @@ TEST_CASE("avatar scene: Habitat-GS's file puts people where its frames say") {
   CHECK(io::scene_time(held, *actors, 9.5) == 4.0);
 }
 
+TEST_CASE("avatar scene: a body of several roots is moved as one, by a path and by coordinates") {
+  const TempFolder folder("avatar_roots");
+  const AvatarAsset person = make_humanoid({.gaussians = 2000});
+  AvatarAsset cut = person;
+  const auto rest = person.skeleton.rest_globals();
+  for (const std::size_t j : {std::size_t{15}, std::size_t{20}}) {  // the head and a hand hang on nothing
+    cut.skeleton.parents[j] = -1;
+    cut.skeleton.rest_local[j] = rest[j];
+  }
+  REQUIRE(io::save_avatar(folder / "a.npz", cut).ok());
+  const io::DriverFrames truth = walking(person, {}, false);
+  REQUIRE(io::save_driver(folder / "d.npz", truth).ok());
+  const auto place = [](double key) {  // a walk on a circle
+    return Affine3<double>{rotation_matrix(axis_angle(Vec3d{0, 1, 0}, 0.02 * key)), {3 * std::cos(0.02 * key), 0.25, 2}};
+  };
+  std::vector<float> rows;
+  for (int t = 0; t <= 40; ++t) {
+    const Vec3d at = place(t).translation;
+    for (const double v : {at.x, at.y, at.z, 0.0, std::sin(0.01 * t), 0.0, std::cos(0.01 * t)}) rows.push_back(static_cast<float>(v));
+  }
+  const std::vector<io::NpzEntry> trajectory{{"trajectory", {41, 7}, rows}};
+  REQUIRE(io::save_npz(folder / "t.npz", trajectory).ok());
+  write_file(folder / "x.json", R"({"gaussian_avatars": [{"canonical_gaussians": "a.npz",
+    "driver": {"smpl_params": "d.npz", "trajectory": "t.npz"},
+    "coord_transform": [[0, 0, 1, 5], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]]}]})");
+  const auto actors = io::load_scene_actors(io::load_avatar_scene(folder / "x.json").value());
+  CAPTURE(actors.status().message());
+  REQUIRE(actors.ok());
+  REQUIRE((*actors)[0].asset()->skeleton.parents == cut.skeleton.parents);
+  const auto in_world = [&](int t) {
+    std::vector<Vec3d> out;
+    for (std::size_t j = 0; j < 55; ++j) {
+      const Vec3d p = place(t) * truth.matrices[static_cast<std::size_t>(t) * 55 + j].translation;
+      out.push_back({p.z + 5, p.y, -p.x});
+    }
+    return out;
+  };
+  for (const int t : {0, 7, 25, 40}) CHECK(apart(joints_in_world((*actors)[0], t / 40.0), in_world(t)) < 1e-5);
+  // Between two keys nothing comes off either.
+  auto half = in_world(7);
+  const auto next = in_world(8);
+  for (std::size_t j = 0; j < half.size(); ++j) half[j] = (half[j] + next[j]) * 0.5;
+  CHECK(apart(joints_in_world((*actors)[0], 7.5 / 40), half) < 2e-3);
+}
+
 TEST_CASE("avatar scene: what is wrong is named with the avatar and the key") {
   const TempFolder folder("avatar_scene_bad");
   const auto fails = [&](const std::string& avatar, Errc code, const std::string& part) {

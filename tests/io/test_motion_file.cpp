@@ -230,6 +230,47 @@ TEST_CASE("retarget: to itself, to another size, and from a T pose to an A pose"
   CHECK(contains(retarget(m.clip, m.skeleton, target, options).status().message(), "root"));
 }
 
+TEST_CASE("retarget: further roots of the target go with the first one, with a pair or without") {
+  const io::LoadedMotion m = load(kArm).value();
+  Skeleton target;
+  target.names = {"a", "b", "c", "loose", "paired", "finger"};
+  target.parents = {-1, 0, 1, -1, -1, 3};
+  const Mat3d r = rotation_matrix(axis_angle(normalized(Vec3d{1, 2, 3}), 0.7));
+  target.rest_local = {{r, {0, 4, 0}},           {r, {1, 2, -1}},           {transpose(r), {0, 2, 0.5}},
+                       {r * r, {0.5, 5, -0.25}}, {transpose(r), {2, 1, 1}}, {r, {0, 0.5, 0}}};
+  RetargetOptions options;
+  options.joints = {{"a", "hips"}, {"b", "arm"}, {"c", "hand"}};
+  options.yaw = 0.5;
+  options.root_scale = 0.5;
+  const MotionClip without = retarget(m.clip, m.skeleton, target, options).value();
+  options.joints.emplace_back("paired", "arm");
+  const MotionClip with = retarget(m.clip, m.skeleton, target, options).value();
+  const auto rest = target.rest_globals();
+  for (const double time : {0.0, 0.05}) {
+    const auto a = pose_at({target, without, {}}, time), b = pose_at({target, with, {}}, time);
+    const Affine3<double> moved = a[0] * rigid_inverse(rest[0]);
+    const auto differ = [](const Affine3<double>& p, const Affine3<double>& q) {
+      double worst = norm(p.translation - q.translation);
+      for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) worst = std::max(worst, std::abs(p.linear(i, k) - q.linear(i, k)));
+      }
+      return worst;
+    };
+    CHECK(norm(moved.translation) > 0.5);
+    for (const std::size_t j : {0, 3, 4, 5}) {
+      CHECK(differ(a[j], moved * rest[j]) < 1e-12);
+      if (j != 4) CHECK(differ(b[j], moved * rest[j]) < 1e-12);
+    }
+    CHECK(norm(b[4].translation - moved * rest[4].translation) < 1e-12);
+    // A pair turns it as its source has turned.
+    const auto source = pose_at(m, time);
+    const std::size_t arm = static_cast<std::size_t>(m.skeleton.find("arm"));
+    const Mat3d turn = rotation_matrix(axis_angle(Vec3d{0, 1, 0}, 0.5));
+    const Mat3d want = turn * source[arm].linear * transpose(m.skeleton.rest_globals()[arm].linear) * transpose(turn) * rest[4].linear;
+    CHECK(differ(b[4], {want, b[4].translation}) < 1e-12);
+  }
+}
+
 TEST_CASE("retarget: a clip's own time is kept: its rate, its start, and what comes after its end") {
   const io::LoadedMotion m = load(kArm).value();  // two keys, 0.05 s apart
   RetargetOptions options;

@@ -68,7 +68,8 @@ enum class ClipEnd : std::uint8_t {
 /// Key poses at a fixed rate. Between keys rotations are interpolated by slerp in local joint space and
 /// translations linearly: bones keep their length, unlike with interpolated matrices. The first joint of a clip
 /// with a path (`root_translation`) is a free body and moves by a screw from key to key, so that it does not matter
-/// which of its points is called the root; across the wrap of a loop it goes straight.
+/// which of its points is called the root; across the wrap of a loop it goes straight. Further roots go straight as seen from
+/// it.
 class MotionClip final : public MotionSource {
  public:
   double frame_rate = 30.0;                ///< keys a second

@@ -16,7 +16,8 @@
 namespace gsnav {
 
 struct RetargetOptions {
-  /// Pairs of joint names, (target, source). Target joints without a pair keep their rest rotation.
+  /// Pairs of joint names, (target, source). Target joints without a pair keep their rest rotation; a further root without
+  /// one turns as the first root does.
   std::vector<std::pair<std::string, std::string>> joints;
   double yaw = 0.0;         ///< radians about +Y that turn the source's rest pose to face as the target's does
   /// Target joints whose rest pose is taken to mean the same as their source's, whatever direction their child lies in: feet
@@ -50,7 +51,8 @@ inline double height_of(const std::vector<Affine3<double>>& rest, std::size_t jo
 /// A clip of one skeleton played on another. Each paired joint turns in space as its source has turned
 /// since the source's rest pose; where the two rest poses hold a limb differently (a T and an A pose),
 /// the limb's direction is the source's. Bones keep the target's lengths. The root's path is scaled by the
-/// ratio of leg lengths. Both rest poses have Y up.
+/// ratio of leg lengths. Further roots of the target go where the first one carries them, as if they were fixed to it.
+/// Both rest poses have Y up.
 /// Errors: invalid_argument (a skeleton or the clip, a name that is in neither, the target's root without
 /// a pair, a root that is not above the lowest joint where the scale depends on it).
 inline Result<MotionClip> retarget(const MotionClip& clip, const Skeleton& source, const Skeleton& target,
@@ -116,6 +118,9 @@ inline Result<MotionClip> retarget(const MotionClip& clip, const Skeleton& sourc
   out.start = clip.start;
   const LocalPose rest = target.rest_pose();
   out.translations = rest.translations;
+  std::vector<Vec3d> at_key = rest.translations;
+  const bool several_roots = std::count_if(target.parents.begin(), target.parents.end(), [](auto p) { return p < 0; }) > 1;
+  if (several_roots) out.translations.clear();  // then each key has its own
   LocalPose pose;
   std::vector<Affine3<double>> globals;
   std::vector<Mat3d> turned(joints);
@@ -129,15 +134,22 @@ inline Result<MotionClip> retarget(const MotionClip& clip, const Skeleton& sourc
     for (std::size_t j = 0; j < joints; ++j) {
       const std::int32_t parent = target.parents[j];
       const Mat3d above = parent < 0 ? Mat3d::identity() : turned[static_cast<std::size_t>(parent)];
+      const bool further_root = parent < 0 && j > 0;
+      const Mat3d carried = further_root ? turned[0] * transpose(target_rest[0].linear) : Mat3d::identity();
+      if (further_root) {
+        const Vec3d first = target_rest[0].translation;
+        at_key[j] = first + carried * (target_rest[j].translation - first);
+      }
       if (from[j] == none) {
-        turned[j] = above * target.rest_local[j].linear;
-        out.rotations.push_back(rest.rotations[j]);
+        turned[j] = above * carried * target.rest_local[j].linear;
+        out.rotations.push_back(further_root ? quat_from_matrix(turned[j]) : rest.rotations[j]);
         continue;
       }
       const Mat3d moved = globals[from[j]].linear * transpose(source_rest[from[j]].linear);
       turned[j] = polar_rotation(turn * moved * back * align[j] * target_rest[j].linear);
       out.rotations.push_back(quat_from_matrix(transpose(above) * turned[j]));
     }
+    if (several_roots) out.translations.insert(out.translations.end(), at_key.begin(), at_key.end());
     const Vec3d path = clip.root_translation.empty() ? Vec3d{} : clip.root_translation[t];
     out.root_translation.push_back(
         turn * (globals[from[0]].translation + path - source_rest[from[0]].translation) * scale);
