@@ -152,6 +152,56 @@ TEST_CASE("who leaves or comes while a looping clock's step is taken sweeps thro
   }
 }
 
+TEST_CASE("who is there for less than a step of a looping clock is in that step, as it is while it is there") {
+  /// Walks at 1.2 m/s, whatever the time.
+  struct Line : Trajectory {
+    TrajectorySample at(double t) const override {
+      TrajectorySample s;
+      s.position = {1.2 * t, 0, 0};
+      return s;
+    }
+  };
+  constexpr double kStep = 0.25;
+  const auto apart = [](const Capsule<double>& a, const Capsule<double>& b) { return std::max(norm(a.p0 - b.p0), norm(a.p1 - b.p1)); };
+  for (const double blend : {0.0, 0.3}) {
+    for (const double begin : {-0.04, 0.0, 0.6, 0.93, 1.4}) {  // the fourth is cut off by the clock's end, or by its blend
+      for (const double length : {0.02, 0.1}) {
+        ActorOptions options;
+        options.time_begin = begin;
+        options.time_end = begin + length;
+        options.loop_period = 1.0 + blend;
+        options.loop_blend = blend;
+        const AvatarActor actor = AvatarActor::create(person(), nullptr, std::make_shared<Line>(), options).value();
+        const double come = std::max(begin, 0.0), leave = std::min(begin + length, 1.0 - 1e-9);
+        CAPTURE(blend);
+        CAPTURE(begin);
+        CAPTURE(length);
+        for (int k = 0; k < 120; ++k) {
+          const double t0 = 0.0371 * k, t1 = t0 + kStep;
+          // In which rounds it is there within the step, by trying them all.
+          std::vector<double> rounds;
+          for (int n = 0; n < 8 && come <= leave; ++n) {
+            const double at = n * options.loop_period;
+            if (at + come <= t1 && at + leave >= t0) rounds.push_back(at);
+          }
+          std::vector<DynamicCapsule> moved;
+          actor.dynamic_capsules(t0, t1, 0, moved);
+          CAPTURE(t0);
+          REQUIRE(moved.size() == (rounds.empty() ? 0 : person()->capsules.size()));
+          if (rounds.size() != 1) continue;
+          const auto first = actor.capsules(std::max(t0, rounds[0] + come + 1e-9)), last = actor.capsules(std::min(t1, rounds[0] + leave - 1e-9));
+          REQUIRE(first.size() == moved.size());
+          REQUIRE(last.size() == moved.size());
+          for (std::size_t c = 0; c < moved.size(); ++c) {
+            CHECK(apart(moved[c].motion.begin, first[c]) < 1e-7);
+            CHECK(apart(moved[c].motion.end, last[c]) < 1e-7);
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST_CASE("who is always there is there wherever a looping clock's remainder rounds to") {
   for (int m = 10; m < 100; ++m) {
     ActorOptions options;

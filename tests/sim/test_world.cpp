@@ -2,10 +2,13 @@
 #include <doctest/doctest.h>
 
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <string>
 
 #include "flat_world.hpp"
+#include "gsnav/avatar/actor.hpp"
+#include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/sim/follower.hpp"
 
 using namespace gsnav;
@@ -132,6 +135,35 @@ TEST_CASE("random actions among moving bodies never penetrate by the agent's doi
   }
   CHECK(contacts > 4);
   CHECK(forced > 0);
+}
+
+TEST_CASE("a body that a looping clock shows for less than a step is not walked through") {
+  const auto body = std::make_shared<const AvatarAsset>(make_humanoid({.gaussians = 2000}));
+  /// Stands 35 cm ahead of the agent's start.
+  struct Ahead : Trajectory {
+    TrajectorySample at(double) const override {
+      TrajectorySample s;
+      s.position = {4.6, 0, 3.25};
+      return s;
+    }
+  };
+  ActorOptions options;
+  options.time_begin = 0.6;
+  options.time_end = 0.65;
+  options.loop_period = 1.0;
+  const AvatarActor actor = AvatarActor::create(body, nullptr, std::make_shared<Ahead>(), options).value();
+  World w = flat_world({}, [&](double t0, double t1, std::vector<DynamicCapsule>& out) { actor.dynamic_capsules(t0, t1, 0, out); });
+  for (const int round : {0, 3}) {
+    for (const int tick : {0, 1, 2, 3}) {
+      PointNavEpisode e = open_floor();
+      e.start_time = round + 0.25 * tick;
+      REQUIRE(w.reset(e).ok());
+      const StepInfo s = w.step(Action::move_forward).value();
+      CAPTURE(e.start_time);
+      CHECK(s.avatar_contact == (tick == 2));
+      CHECK((s.moved < 0.24) == (tick == 2));
+    }
+  }
 }
 
 TEST_CASE("the same calls give the same bits, whatever ran before") {

@@ -123,21 +123,18 @@ class AvatarActor {
   }
 
   /// Appends the proxy capsules as they move over [t0, t1], endpoints linear in between, with `avatar` as
-  /// the body's number. None unless it is active at some time in between. `before`: what an interval that ended at t0
-  /// had of it, by bone; may be empty. It saves posing the body for t0 once more.
+  /// the body's number. None unless it is active at some time in between, however shortly: then they are there for all of
+  /// [t0, t1]. `before`: what an interval that ended at t0 had of it, by bone; may be empty. It saves posing the body for
+  /// t0 once more.
   void dynamic_capsules(double t0, double t1, std::uint32_t avatar, std::vector<DynamicCapsule>& out,
                         View<const DynamicCapsule> before = {}) const {
-    // A window in a clock that begins again is looked for at the ends only: it is longer than a step.
-    if (options_.loop_period > 0 ? !active(t0) && !active(t1)
+    double from = t0, to_time = t1;
+    if (options_.loop_period > 0 ? !narrow_to_stay(from, to_time)
                                  : t1 < options_.time_begin || t0 > options_.time_end) {
       return;
     }
     const std::size_t first = out.size(), count = asset_->capsules.size();
     out.resize(first + count);
-    // Where a clock begins again, whoever has left or has yet to come stands where it is when it is there: the way between
-    // rounds is nobody's.
-    const bool begins = options_.loop_period > 0;
-    const double from = begins && !active(t0) ? t1 : t0, to_time = begins && !active(t1) ? t0 : t1;
     const bool known = before.size == count && from == t0;
     if (!known) {
       for_each_capsule(from, [&](std::size_t c, const Capsule<double>& at) { out[first + c].motion.begin = at; });
@@ -161,6 +158,25 @@ class AvatarActor {
   }
   double blend_begin() const noexcept { return options_.loop_period - options_.loop_blend; }
   bool blending(double t) const noexcept { return options_.loop_blend > 0 && t > blend_begin(); }
+
+  /// Narrows [from, to] to when it is there, in a clock that begins again: the way between rounds is nobody's. Where it is
+  /// there at neither end, to the first stay in between. False: it is not there at all.
+  bool narrow_to_stay(double& from, double& to) const noexcept {
+    const bool at_begin = active(from), at_end = active(to);
+    if (at_begin && at_end) return true;
+    // Whoever is there while others get back is always there; of others each round has one stay.
+    const double period = options_.loop_period, come = max(options_.time_begin, 0.0);
+    const double leave = min(options_.time_end, options_.loop_blend > 0 ? blend_begin() : std::nextafter(period, 0.0));
+    if (!(come <= leave)) return false;
+    if (!at_begin && !at_end) {
+      double next = std::floor(from / period) * period + come;
+      if (next + (leave - come) < from) next += period;
+      if (next > to) return false;
+    }
+    if (!at_begin) from = come;
+    if (!at_end) to = leave;
+    return true;
+  }
 
   /// `needed`: the joints that are to be posed, null: all.
   Similarity placement(double t, LocalPose& pose, const std::vector<char>* needed = nullptr) const {
