@@ -6,6 +6,7 @@
 #include <iterator>
 #include <new>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -30,6 +31,7 @@ constexpr std::size_t kLargestPalette = 65536, kSmallPalette = 1024;  // labels 
 constexpr std::size_t kEntriesPerRow = 64;
 constexpr std::size_t kMostSide = 16383;  // of a WebP
 constexpr double kLeastLogScale = -20;    // stands for a flat axis, whose logarithm is -infinity
+constexpr const char *kCentroids = "shN_centroids.webp", *kLabels = "shN_labels.webp";
 
 /// The files of a SOG by name, in the order in which they are written.
 using Files = std::vector<std::pair<std::string, std::string>>;
@@ -197,9 +199,9 @@ class SogWriter {
     part.meta = {{"count", palette.size},
                     {"bands", cloud_.sh_degree},
                     {"codebook", book.entries()},
-                    {"files", {"shN_centroids.webp", "shN_labels.webp"}}};
-    if (Status s = add(part, "shN_centroids.webp", centroids); !s) return s;
-    return add(part, "shN_labels.webp", labels);
+                    {"files", {kCentroids, kLabels}}};
+    if (Status s = add(part, kCentroids, centroids); !s) return s;
+    return add(part, kLabels, labels);
   }
 
   const GaussianCloud& cloud_;
@@ -213,6 +215,19 @@ Status write(const std::filesystem::path& path, const std::string& content) {
   if (Status s = out.open(path); !s) return s;
   out.write(content.data(), content.size());
   return out.close();
+}
+
+/// Takes away the bands of a scene that lay in the folder before, where `files` has none: nothing names them any more.
+Status remove_stale_bands(const std::filesystem::path& folder, const Files& files) {
+  for (const char* name : {kCentroids, kLabels}) {
+    if (std::any_of(files.begin(), files.end(), [&](const auto& f) { return f.first == name; })) continue;
+    std::error_code error;
+    std::filesystem::remove(folder / name, error);
+    if (error) {
+      return {Errc::file_not_found, (folder / name).string() + ": of an earlier scene, cannot be removed: " + error.message()};
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -230,7 +245,7 @@ Status save_sog(const std::filesystem::path& path, const GaussianCloud& cloud) {
       for (const auto& [name, content] : *files) {
         if (Status s = write(path.parent_path() / name, content); !s) return s;
       }
-      return {};
+      return remove_stale_bands(path.parent_path(), *files);
     }
     detail::ZipWriter zip(target);
     for (const auto& [name, content] : *files) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <sstream>
 #include <string>
 
@@ -153,6 +154,18 @@ TEST_CASE("convert: tiles are merged, levels chosen") {
   REQUIRE(io::save_ply(folder / "b.ply", cloud_of_random_rows(50, 3, 6)).ok());
   REQUIRE(run(folder, "a.ply b.ply out.ply --views 0").ok);
   CHECK(load(folder, "out.ply").size() == 80);
+}
+
+TEST_CASE("convert: a SOG folder written again has no bands left of the scene before") {
+  const TempFolder folder("convert_again");
+  REQUIRE(io::save_ply(folder / "in.ply", cloud_of_random_rows(60, 3, 9)).ok());
+  std::filesystem::create_directory(folder / "room");
+  REQUIRE(run(folder, "in.ply room/meta.json --views 0").ok);
+  CHECK(std::filesystem::exists(folder / "room/shN_labels.webp"));
+  REQUIRE(run(folder, "room room/meta.json --sh 0 --views 0").ok);
+  CHECK_FALSE(std::filesystem::exists(folder / "room/shN_labels.webp"));
+  CHECK_FALSE(std::filesystem::exists(folder / "room/shN_centroids.webp"));
+  CHECK(load(folder, "room").sh_degree == 0);
 }
 
 TEST_CASE("convert: what cannot be done is said") {

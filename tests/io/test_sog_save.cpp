@@ -2,6 +2,8 @@
 #include <doctest/doctest.h>
 
 #include <filesystem>
+#include <set>
+#include <string>
 
 #include "check_quantised.hpp"
 #include "codebook.hpp"
@@ -68,6 +70,39 @@ TEST_CASE("save_sog: every field within the bound that the header states") {
       }
     }
   }
+}
+
+TEST_CASE("save_sog: a folder has the planes of its last scene, and what else is in it stays") {
+  const TempFolder folder("sog_again");
+  const std::set<std::string> plain{"meta.json", "means_l.webp", "means_u.webp", "scales.webp", "quats.webp", "sh0.webp"};
+  std::set<std::string> banded = plain;
+  banded.insert({"shN_centroids.webp", "shN_labels.webp"});
+  const auto save = [&](int rest) {
+    const GaussianCloud cloud = cloud_of(random_rows(50, rest, 62), rest);
+    REQUIRE(io::save_sog(folder / "meta.json", cloud).ok());
+    CHECK(io::load_sog(folder / "meta.json").value().cloud.sh_degree == cloud.sh_degree);
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path())) names.insert(entry.path().filename().string());
+    return names;
+  };
+  CHECK(save(45) == banded);
+  CHECK(save(0) == plain);
+  CHECK(save(9) == banded);
+  write_file(folder / "thumbnail.webp", "mine");
+  std::set<std::string> with_mine = plain;
+  with_mine.insert("thumbnail.webp");
+  CHECK(save(0) == with_mine);
+  CHECK(read_file(folder / "thumbnail.webp") == "mine");
+  // A bundle beside the folder's files has nothing to do with them.
+  CHECK(save(9).size() == banded.size() + 1);
+  REQUIRE(io::save_sog(folder / "other.sog", cloud_of(random_rows(5, 0, 63), 0)).ok());
+  CHECK(std::filesystem::exists(folder / "shN_labels.webp"));
+  std::filesystem::remove(folder / "shN_labels.webp");
+  std::filesystem::create_directory(folder / "shN_labels.webp");
+  write_file(folder / "shN_labels.webp/inside", "x");
+  const Status s = io::save_sog(folder / "meta.json", cloud_of(random_rows(5, 0, 64), 0));
+  CHECK(s.code() == Errc::file_not_found);
+  CHECK(contains(s.message(), "shN_labels.webp: of an earlier scene"));
 }
 
 TEST_CASE("save_sog: what came out of a SOG goes back without loss") {
