@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-# Decides whether gsnav::cuda is built (GSNAV_CUDA=AUTO|ON|OFF) and enables the language where it is.
+# Decides whether gsnav::cuda is built (GSNAV_CUDA=AUTO|ON|OFF|EMULATED) and enables the language where it is.
 # Inside another project the default is OFF. AUTO wants an nvcc of CUDA 12 or later (C++20); ON stops where there is none.
+# EMULATED runs device code on the host, for tests: a C++ compiler reads it, no toolkit is needed (docs/cuda.md).
 set(_default OFF)
 if(PROJECT_IS_TOP_LEVEL)
   set(_default AUTO)
 endif()
-set(GSNAV_CUDA ${_default} CACHE STRING "Build gsnav::cuda: AUTO, ON or OFF")
-set_property(CACHE GSNAV_CUDA PROPERTY STRINGS AUTO ON OFF)
+set(GSNAV_CUDA ${_default} CACHE STRING "Build gsnav::cuda: AUTO, ON, OFF or EMULATED")
+set_property(CACHE GSNAV_CUDA PROPERTY STRINGS AUTO ON OFF EMULATED)
 set(GSNAV_BUILD_CUDA OFF)
 
-if(GSNAV_CUDA)
+if(GSNAV_CUDA STREQUAL "EMULATED")
+  if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" OR NOT UNIX)
+    message(FATAL_ERROR "GSNAV_CUDA=EMULATED: threads are switched by code for x86-64 and Linux; use OFF here.")
+  endif()
+  if(GSNAV_BENCH)
+    message(FATAL_ERROR "GSNAV_CUDA=EMULATED: what it takes says nothing about a GPU; set GSNAV_BENCH=OFF.")
+  endif()
+elseif(GSNAV_CUDA)
   find_program(GSNAV_NVCC NAMES nvcc HINTS ENV CUDA_PATH PATHS /usr/local/cuda/bin DOC "nvcc")
   mark_as_advanced(GSNAV_NVCC)
   set(_nvcc_version 0)

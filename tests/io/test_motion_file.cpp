@@ -257,7 +257,7 @@ TEST_CASE("retarget: further roots of the target go with the first one, with a p
       return worst;
     };
     CHECK(norm(moved.translation) > 0.5);
-    for (const std::size_t j : {0, 3, 4, 5}) {
+    for (const std::size_t j : {0u, 3u, 4u, 5u}) {
       CHECK(differ(a[j], moved * rest[j]) < 1e-12);
       if (j != 4) CHECK(differ(b[j], moved * rest[j]) < 1e-12);
     }

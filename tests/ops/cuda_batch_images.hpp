@@ -5,6 +5,7 @@
 
 #include "gsnav/backends/cuda/batch.hpp"
 #include "ops/backends.hpp"
+#include "ops/no_gpu.hpp"
 #include "support/frame_images.hpp"
 #include "support/scenes.hpp"
 
@@ -14,11 +15,10 @@ namespace gsnav_test {
 
 using namespace gsnav;
 
-
 using Lists = std::vector<std::vector<std::uint32_t>>;
 
-/// More than sixteen a multiprocessor of any GPU.
-inline constexpr int kManyTiles = 9 * 384;
+/// More than sixteen a multiprocessor, and than that would be few: of any GPU, or of the emulated one.
+inline int many_tiles() { return is_emulated() ? 9 * 16 : 9 * 384; }
 
 /// Images of a batch, fetched. `lists`: the sets of each camera; empty: all. `meshes`: likewise; empty: none. `seen`: of
 /// each camera, BatchCamera::seen.
@@ -123,6 +123,12 @@ inline std::vector<Camera> ring(int count, int width, int height) {
   }
   return cameras;
 }
+
+/// Cameras whose images have more than sixteen tiles a multiprocessor.
+inline int many_cameras() { return is_emulated() ? 8 : 60; }
+
+/// Cameras of `count` in a ring, whose images have tiles cut by the edge.
+inline std::vector<Camera> ring_of(int count) { return is_emulated() ? ring(count, 53, 37) : ring(count, 149, 101); }
 
 inline constexpr unsigned kMedianOnly = kRgb | kAlpha | kMedianDepth, kAll = kRgb | kAlpha | kAnyDepth;
 

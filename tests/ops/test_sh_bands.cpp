@@ -109,7 +109,7 @@ TEST_CASE("cuda: SH bands that chunks do not need are not read, in batches and a
       const GaussianArrays<CudaBackend> all(cuda, b.cloud), some(cuda, b.marked, b.profile);
       check_held(some.set().gaussians, most);
       for (const int limit : {kMaxShDegree, 1}) {
-        for (const int count : {5, 60}) {
+        for (const int count : {5, many_cameras()}) {
           CAPTURE(most);
           CAPTURE(halves);
           CAPTURE(limit);
@@ -117,7 +117,7 @@ TEST_CASE("cuda: SH bands that chunks do not need are not read, in batches and a
           RenderConfig config;
           config.max_sh_degree = limit;
           CudaBatchRenderer renderer(cuda, config);
-          const std::vector<Camera> cameras = ring(count, 149, 101);
+          const std::vector<Camera> cameras = ring_of(count);
           const Batch got = draw_batch(cuda, renderer, {some.set()}, cameras, {}, kMedianOnly);
           check_same(got.frames,
                      draw_batch(cuda, renderer, {all.set()}, cameras, {}, kMedianOnly).frames);

@@ -74,7 +74,7 @@ std::vector<float> fetched(CudaBackend& cuda, const BatchObservation& o) {
 TEST_CASE("cuda: a simulator among people sees what the OpenMP one sees") {
   if (no_gpu("cuda simulator")) return;
   SimulatorConfig config;
-  config.sensors = rgbd_sensors(120, 160);
+  config.sensors = is_emulated() ? rgbd_sensors(60, 80) : rgbd_sensors(120, 160);
   for (const auto& [uuid, kind] :
        {std::pair{"alpha", SensorKind::alpha}, {"who", SensorKind::semantic}}) {
     config.sensors.push_back(config.sensors[0]);
@@ -99,7 +99,7 @@ TEST_CASE("cuda: a simulator among people sees what the OpenMP one sees") {
   };
   compare(on_gpu.reset(to_kitchen()).value(), on_cpu.reset(to_kitchen()).value());
   Rng rng(4);
-  for (int i = 0; i < 30; ++i) {
+  for (int i = 0; i < (is_emulated() ? 10 : 30); ++i) {
     const Action action = wandering_action(rng);
     compare(on_gpu.step(action).value(), on_cpu.step(action).value());
   }
@@ -199,9 +199,10 @@ TEST_CASE("cuda: a batch sees what the OpenMP one sees, in host memory and on th
       std::make_shared<const SimulatorScene>(peopled_scene(4000)),
       std::make_shared<const SimulatorScene>(flat_scene())};
   BatchConfig config;
-  config.sensors = rgbd_sensors(64, 96);
+  config.sensors = is_emulated() ? rgbd_sensors(32, 48) : rgbd_sensors(64, 96);
   config.sensors[1].far_plane = 5.0;
-  config.task.max_steps = 12;
+  const int steps = is_emulated() ? 5 : 30;
+  config.task.max_steps = is_emulated() ? 2 : 12;
   config.auto_reset = AutoReset::same_step;
   constexpr std::size_t kEnvironments = 12;
   CudaBackend cuda, other;
@@ -235,7 +236,7 @@ TEST_CASE("cuda: a batch sees what the OpenMP one sees, in host memory and on th
   };
   compare(to_host.reset(), on_gpu.reset(), on_cpu.reset());
   Rng rng(6);
-  for (int i = 0; i < 30; ++i) {
+  for (int i = 0; i < steps; ++i) {
     std::vector<Action> actions;
     for (std::size_t e = 0; e < kEnvironments; ++e) actions.push_back(wandering_action(rng));
     compare(to_host.step(actions), on_gpu.step(actions), on_cpu.step(actions));

@@ -234,7 +234,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   const std::uint64_t tiles = args.cameras * std::uint64_t{args.grid.count()};
   if (tiles > 0x7fffffffu) return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
   args.tiles = static_cast<std::uint32_t>(tiles);
-  args.short_lists = has_short_lists(args.grid.count(), multiprocessors);
+  args.short_lists = !few && has_short_lists(args.grid.count(), multiprocessors);
   args.depth_bins = few ? depth_bins_of(cameras, rules.key_bits, args.tiles) : cuda::DepthBins{};
   args.log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
   args.elliptic = config.response == Response::ewa;

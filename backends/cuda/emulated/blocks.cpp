@@ -1,0 +1,393 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gsnav_emulated_device.hpp"
+#include "settings.hpp"
+
+#if defined(__SANITIZE_ADDRESS__)
+#define GSNAV_ASAN 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define GSNAV_ASAN 1
+#endif
+#endif
+#if defined(GSNAV_ASAN)
+#include <pthread.h>
+#include <sanitizer/common_interface_defs.h>
+#endif
+
+// Each thread of a block has a stack of its own, and leaves the processor where it waits for others: at a barrier of the
+// block, or at an operation of its warp. One thread of the host runs them all.
+
+namespace gsnav::emulated {
+
+// void gsnav_emulated_switch(void** from, void* to): keeps what a call keeps (System V), leaves its stack in *from and
+// goes on where `to` was left.
+extern "C" void gsnav_emulated_switch(void** from, void* to);
+asm(R"(
+.text
+.globl gsnav_emulated_switch
+.hidden gsnav_emulated_switch
+.type gsnav_emulated_switch, @function
+gsnav_emulated_switch:
+  pushq %rbp
+  pushq %rbx
+  pushq %r12
+  pushq %r13
+  pushq %r14
+  pushq %r15
+  movq %rsp, (%rdi)
+  movq %rsi, %rsp
+  popq %r15
+  popq %r14
+  popq %r13
+  popq %r12
+  popq %rbx
+  popq %rbp
+  ret
+.size gsnav_emulated_switch, .-gsnav_emulated_switch
+)");
+
+namespace {
+
+constexpr unsigned kMostThreads = 1024, kWarp = 32;
+constexpr std::size_t kStackBytes = 256 << 10;
+
+struct Thread {
+  unsigned mask = 0;
+  std::uint64_t value = 0;
+  const char* what = nullptr;
+  Gathered* gathered = nullptr;
+  dim3 index;
+  void* sp = nullptr;
+  char* stack = nullptr;
+  std::vector<std::pair<void*, std::vector<char>>> copies;  // asked for, not waited for yet
+#if defined(GSNAV_ASAN)
+  void* fake_stack = nullptr;
+#endif
+};
+
+/// Which of its threads are where.
+struct Warp {
+  unsigned there = 0, ready = 0, at_warp = 0, at_block = 0, done = 0;
+  std::array<Gathered, kWarp> gathered;
+};
+
+/// Of the lowest bit set.
+unsigned first_of(unsigned bits) { return static_cast<unsigned>(__builtin_ctz(bits)); }
+
+class Block {
+ public:
+  Block() : threads_(kMostThreads), warps_(kMostThreads / kWarp) {
+#if defined(GSNAV_ASAN)
+    pthread_attr_t attributes;
+    void* bottom = nullptr;
+    pthread_getattr_np(pthread_self(), &attributes);
+    pthread_attr_getstack(&attributes, &bottom, &scheduler_bytes_);
+    pthread_attr_destroy(&attributes);
+    scheduler_stack_ = bottom;
+#endif
+    for (Warp& w : warps_) {
+      for (Gathered& g : w.gathered) g.readers = 0;
+    }
+  }
+
+  void run(const Launch& launch, const dim3& at, const char* name, void (*thread)(const void*), const void* arguments);
+  Gathered& gather(unsigned mask, std::uint64_t value, const char* what);
+  int barrier(int number);
+  void interleave();
+  unsigned current() const { return current_; }
+  Thread& self() { return threads_[current_]; }
+  void* shared() { return shared_.data(); }
+
+ private:
+  struct alignas(16) Line {
+    unsigned char bytes[16];
+  };
+
+  static void main();
+  void prepare(Thread& t);
+  void enter(unsigned index);
+  void resume(unsigned index);
+  void leave();
+  void release_barrier();
+  std::string who_waits() const;
+  Warp& warp() { return warps_[current_ / kWarp]; }
+  unsigned bit() const { return 1u << current_ % kWarp; }
+  [[noreturn]] void fail(const std::string& why) const;
+  std::uint64_t random() {
+    random_ ^= random_ << 13;
+    random_ ^= random_ >> 7;
+    return random_ ^= random_ << 17;
+  }
+
+  std::vector<Thread> threads_;
+  std::vector<Warp> warps_;
+  std::vector<Line> shared_;
+  unsigned size_ = 0, current_ = 0, alive_ = 0, waiting_ = 0;
+  int sum_ = 0, result_ = 0;
+  const std::uint64_t seed_ = seed();  ///< of GSNAV_EMULATED_SEED
+  std::uint64_t random_ = 1;
+  void* scheduler_ = nullptr;
+  const char* name_ = "";
+  dim3 at_;
+  void (*thread_)(const void*) = nullptr;
+  const void* arguments_ = nullptr;
+#if defined(GSNAV_ASAN)
+  void* scheduler_fake_stack_ = nullptr;
+  const void* scheduler_stack_ = nullptr;
+  std::size_t scheduler_bytes_ = 0;
+#endif
+};
+
+Block& block() {
+  static thread_local Block b;
+  return b;
+}
+
+void Block::fail(const std::string& why) const {
+  std::fprintf(stderr, "emulated device: %s, block (%u, %u, %u), thread %u: %s\n", name_, at_.x, at_.y, at_.z, current_,
+               why.c_str());
+  std::abort();
+}
+
+/// Where a thread's stack begins; a thread runs one block after the other on it.
+void Block::main() {
+  Block& b = block();
+#if defined(GSNAV_ASAN)
+  __sanitizer_finish_switch_fiber(nullptr, nullptr, nullptr);
+#endif
+  for (;;) {
+    b.thread_(b.arguments_);
+    if (!b.self().copies.empty()) b.fail("ended before its copies into shared memory were waited for");
+    b.warp().done |= b.bit();
+    --b.alive_;
+    if (b.alive_ != 0 && b.waiting_ == b.alive_) b.release_barrier();
+    b.leave();
+  }
+}
+
+void Block::prepare(Thread& t) {
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  void* const memory = mmap(nullptr, kStackBytes + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
+  if (memory == MAP_FAILED || mprotect(memory, page, PROT_NONE) != 0) fail("no memory for its stack");
+  t.stack = static_cast<char*>(memory) + page;
+  // As if main() had been called: its return address, which nobody uses, 8 bytes below a line of 16.
+  auto** top = reinterpret_cast<void**>(t.stack + kStackBytes) - 1;
+  *top = nullptr;
+  *--top = reinterpret_cast<void*>(&Block::main);
+  for (int i = 0; i < 6; ++i) *--top = nullptr;
+  t.sp = top;
+}
+
+void Block::enter(unsigned index) {
+  current_ = index;
+  threadIdx = threads_[index].index;
+}
+
+void Block::resume(unsigned index) {
+  enter(index);
+  Thread& t = threads_[index];
+#if defined(GSNAV_ASAN)
+  __sanitizer_start_switch_fiber(&scheduler_fake_stack_, t.stack, kStackBytes);
+#endif
+  gsnav_emulated_switch(&scheduler_, t.sp);
+#if defined(GSNAV_ASAN)
+  __sanitizer_finish_switch_fiber(scheduler_fake_stack_, nullptr, nullptr);
+#endif
+}
+
+void Block::leave() {
+  Thread& t = self();
+  Warp& w = warp();
+  if (seed_ == 0 && w.ready != 0) {  // another of the warp, without a way through the scheduler
+    const unsigned next = current_ / kWarp * kWarp + first_of(w.ready);
+    w.ready &= w.ready - 1;
+    if (next == current_) return;
+    enter(next);
+#if defined(GSNAV_ASAN)
+    __sanitizer_start_switch_fiber(&t.fake_stack, self().stack, kStackBytes);
+#endif
+    gsnav_emulated_switch(&t.sp, self().sp);
+  } else {
+#if defined(GSNAV_ASAN)
+    __sanitizer_start_switch_fiber(&t.fake_stack, scheduler_stack_, scheduler_bytes_);
+#endif
+    gsnav_emulated_switch(&t.sp, scheduler_);
+  }
+#if defined(GSNAV_ASAN)
+  __sanitizer_finish_switch_fiber(t.fake_stack, nullptr, nullptr);
+#endif
+}
+
+Gathered& Block::gather(unsigned mask, std::uint64_t value, const char* what) {
+  Warp& w = warp();
+  if ((mask & bit()) == 0) fail(std::string(what) + " with a mask that it is not of");
+  if ((mask & ~w.there) != 0) fail(std::string(what) + " waits for threads that the block has not");
+  if ((mask & w.done) != 0) {
+    fail(std::string(what) + " waits for thread " + std::to_string(current_ / kWarp * kWarp + first_of(mask & w.done)) +
+         ", which has ended");
+  }
+  Thread* const lanes = &threads_[current_ / kWarp * kWarp];
+  Thread& t = self();
+  t.mask = mask;
+  t.value = value;
+  t.what = what;
+  w.at_warp |= bit();
+  bool complete = (mask & w.at_warp) == mask;
+  for (unsigned left = complete ? mask : 0; left != 0; left &= left - 1) {
+    const Thread& other = lanes[first_of(left)];
+    complete = complete && other.mask == mask && other.what == what;
+  }
+  if (!complete) {
+    leave();
+    return *t.gathered;
+  }
+  Gathered* g = w.gathered.begin();
+  while (g != w.gathered.end() && g->readers != 0) ++g;
+  if (g == w.gathered.end()) fail("more operations of a warp at once than it has threads");
+  for (unsigned left = mask; left != 0; left &= left - 1) {
+    Thread& other = lanes[first_of(left)];
+    g->value[first_of(left)] = other.value;
+    other.gathered = g;
+    ++g->readers;
+  }
+  w.at_warp &= ~mask;
+  w.ready |= mask & ~bit();
+  return *g;
+}
+
+void Block::release_barrier() {
+  result_ = sum_;
+  sum_ = 0;
+  waiting_ = 0;
+  for (Warp& w : warps_) w.ready |= std::exchange(w.at_block, 0u);
+}
+
+int Block::barrier(int number) {
+  sum_ += number;
+  if (++waiting_ == alive_) {
+    release_barrier();
+  } else {
+    warp().at_block |= bit();
+    leave();
+  }
+  return result_;
+}
+
+void Block::interleave() {
+  if (seed_ == 0 || random() % 8 != 0) return;
+  warp().ready |= bit();
+  leave();
+}
+
+void Block::run(const Launch& launch, const dim3& at, const char* name, void (*thread)(const void*), const void* arguments) {
+  name_ = name;
+  at_ = at;
+  thread_ = thread;
+  arguments_ = arguments;
+  size_ = alive_ = launch.block.x * launch.block.y * launch.block.z;
+  waiting_ = 0;
+  sum_ = 0;
+  random_ = (seed_ * 0x9e3779b97f4a7c15ull + (std::uint64_t{at.x} << 1 | 1)) ^ (std::uint64_t{at.y} << 32);
+  if (random_ == 0) random_ = 1;
+  blockIdx = at;
+  blockDim = launch.block;
+  gridDim = launch.grid;
+  shared_.assign((launch.shared + sizeof(Line) - 1) / sizeof(Line), Line{});
+  if (!shared_.empty()) std::memset(shared_.data(), 0xd7, shared_.size() * sizeof(Line));
+  for (unsigned i = 0; i < size_; ++i) {
+    Thread& t = threads_[i];
+    if (t.stack == nullptr) prepare(t);
+    t.index = dim3(i % launch.block.x, i / launch.block.x % launch.block.y, i / launch.block.x / launch.block.y);
+  }
+  const unsigned count = (size_ + kWarp - 1) / kWarp;
+  for (unsigned i = 0; i < count; ++i) {
+    Warp& w = warps_[i];
+    w.there = w.ready = size_ - i * kWarp >= kWarp ? ~0u : (1u << size_ % kWarp) - 1;
+    w.at_warp = w.at_block = w.done = 0;
+  }
+  while (alive_ != 0) {
+    bool any = false;
+    const unsigned first = seed_ == 0 ? 0 : static_cast<unsigned>(random() % count);
+    for (unsigned i = 0; i < count; ++i) {
+      const unsigned index = (first + i) % count;
+      Warp& w = warps_[index];
+      // As far as it gets; with a seed another warp may go on before that.
+      while (w.ready != 0 && (seed_ == 0 || random() % 64 != 0)) {
+        any = true;
+        const unsigned turn = seed_ == 0 ? 0 : static_cast<unsigned>(random() % kWarp);
+        const unsigned above = w.ready & ~0u << turn, lane = first_of(above != 0 ? above : w.ready);
+        w.ready &= ~(1u << lane);
+        resume(index * kWarp + lane);
+      }
+      any = any || w.ready != 0;
+    }
+    if (!any && alive_ != 0) fail("threads wait for one another:" + who_waits());
+  }
+}
+
+std::string Block::who_waits() const {
+  std::string text;
+  for (unsigned i = 0; i < size_ && text.size() < 600; ++i) {
+    const Warp& w = warps_[i / kWarp];
+    const unsigned mine = 1u << i % kWarp;
+    if ((w.at_block & mine) != 0) text += " " + std::to_string(i) + " at __syncthreads;";
+    if ((w.at_warp & mine) != 0) {
+      char mask[16];
+      std::snprintf(mask, sizeof mask, "%08x", threads_[i].mask);
+      text += " " + std::to_string(i) + " at " + threads_[i].what + "(" + mask + ");";
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+Gathered& gather(unsigned mask, std::uint64_t value, const char* what) { return block().gather(mask, value, what); }
+int block_barrier(int number) { return block().barrier(number); }
+void interleave() { block().interleave(); }
+unsigned lane() { return block().current() % kWarp; }
+unsigned thread_rank() { return block().current(); }
+void* dynamic_shared() { return block().shared(); }
+
+void copy_later(void* to, const void* from, std::size_t bytes) {
+  const char* const first = static_cast<const char*>(from);
+  block().self().copies.emplace_back(to, std::vector<char>(first, first + bytes));
+}
+void finish_copies() {
+  auto& copies = block().self().copies;
+  for (const auto& [to, bytes] : copies) std::memcpy(to, bytes.data(), bytes.size());
+  copies.clear();
+}
+
+void run_grid(const Launch& launch, const char* name, void (*thread)(const void*), const void* arguments) {
+  const dim3& g = launch.grid;
+  const std::uint64_t blocks = std::uint64_t{g.x} * g.y * g.z;
+  // Each once, in an order of its own: a step that shares no divisor with their number.
+  std::uint64_t step = 1, at = 0;
+  if (seed() != 0 && blocks > 2) {
+    step = (seed() * 0x9e3779b97f4a7c15ull >> 16) % blocks | 1;
+    while (std::gcd(step, blocks) != 1) step += 2;
+    at = seed() % blocks;
+    step %= blocks;
+  }
+  for (std::uint64_t i = 0; i < blocks; ++i, at = (at + step) % blocks) {
+    block().run(launch, dim3(static_cast<unsigned>(at % g.x), static_cast<unsigned>(at / g.x % g.y),
+                             static_cast<unsigned>(at / g.x / g.y)), name, thread, arguments);
+  }
+}
+
+}  // namespace gsnav::emulated

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "cub/block/block_scan.cuh"
+
+namespace cub {
+
+template <class T, int Threads>
+class BlockReduce {
+ public:
+  using TempStorage = typename BlockScan<T, Threads>::TempStorage;
+  explicit BlockReduce(TempStorage& storage) : scan_(storage) {}
+  /// The first thread's; others get what they gave.
+  T Sum(T value) {
+    T before, total;
+    scan_.ExclusiveSum(value, before, total);
+    return gsnav::emulated::thread_rank() == 0 ? total : value;
+  }
+
+ private:
+  BlockScan<T, Threads> scan_;
+};
+
+}  // namespace cub

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+// Blocks of threads on the host: what device code finds around it when a C++ compiler has compiled it (docs/cuda.md).
+
+struct CUstream_st;
+
+struct dim3 {
+  unsigned x = 1, y = 1, z = 1;
+  constexpr dim3() = default;
+  constexpr dim3(unsigned columns, unsigned rows = 1, unsigned layers = 1) : x(columns), y(rows), z(layers) {}
+};
+
+namespace gsnav::emulated {
+
+/// What the threads of a warp gave, once all that were to come had come.
+struct Gathered {
+  std::uint64_t value[32];
+  int readers;
+};
+
+/// The calling thread's value among those of `mask`. Returns when all of them have called, for the same `what`. Ends
+/// the program, naming kernel, block and thread, where one of them has ended, is not there or has not named itself.
+Gathered& gather(unsigned mask, std::uint64_t value, const char* what);
+
+/// Every thread of the block that has not ended waits for the others; the sum of their numbers.
+int block_barrier(int number);
+
+/// A place where another thread may go on before this one.
+void interleave();
+
+/// Of the thread in its warp, and in its block.
+unsigned lane();
+unsigned thread_rank();
+
+/// Memory of the block that its launch asked for, on a line of 16 bytes.
+void* dynamic_shared();
+
+struct Launch {
+  dim3 grid, block;
+  std::size_t shared;
+  CUstream_st* stream;
+};
+
+/// Runs every block of a grid, one after the other in an order that GSNAV_EMULATED_SEED decides.
+void run_grid(const Launch& launch, const char* name, void (*thread)(const void*), const void* arguments);
+
+/// False, with the error set that cudaGetLastError returns, where a device would refuse.
+bool accepts(const Launch& launch);
+
+template <class T>
+std::uint64_t bits_of_value(const T& value) {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= sizeof(std::uint64_t));
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof(T));
+  return bits;
+}
+template <class T>
+T value_of_bits(std::uint64_t bits) {
+  T value;
+  std::memcpy(&value, &bits, sizeof(T));
+  return value;
+}
+
+/// Reads of what was gathered, and gives it back.
+class Reading {
+ public:
+  Reading(unsigned mask, std::uint64_t value, const char* what) : g_(gather(mask, value, what)) {}
+  ~Reading() { --g_.readers; }
+  Reading(const Reading&) = delete;
+  Reading& operator=(const Reading&) = delete;
+  std::uint64_t operator[](unsigned lane) const { return g_.value[lane]; }
+
+ private:
+  Gathered& g_;
+};
+
+/// The value of `from`; bits that nobody gave where that thread is not of the mask.
+template <class T>
+T shuffled(unsigned mask, const T& value, unsigned from, const char* what) {
+  const Reading all(mask, bits_of_value(value), what);
+  return (mask >> from & 1u) != 0 ? value_of_bits<T>(all[from]) : value_of_bits<T>(0xdeadbeefdeadbeefull);
+}
+
+}  // namespace gsnav::emulated
+
+inline thread_local constinit dim3 threadIdx, blockIdx, blockDim, gridDim;
+inline constexpr int warpSize = 32;
+
+#define __global__
+#define __device__
+#define __host__
+#define __forceinline__ inline
+#define __noinline__
+#define __constant__ static
+#define __shared__ static thread_local
+#define __grid_constant__
+#define __launch_bounds__(...)
+#define __align__(n) __attribute__((aligned(n)))
+
+#define GSNAV_VECTOR(type, name, bytes)         \
+  struct __attribute__((aligned(bytes))) name { \
+    type x, y, z, w;                            \
+  };
+GSNAV_VECTOR(float, float4, 16)
+GSNAV_VECTOR(unsigned, uint4, 16)
+GSNAV_VECTOR(unsigned char, uchar4, 4)
+#undef GSNAV_VECTOR
+struct __attribute__((aligned(8))) float2 {
+  float x, y;
+};
+struct __attribute__((aligned(8))) uint2 {
+  unsigned x, y;
+};
+inline float4 make_float4(float x, float y, float z, float w) { return {x, y, z, w}; }
+inline float2 make_float2(float x, float y) { return {x, y}; }
+inline uint4 make_uint4(unsigned x, unsigned y, unsigned z, unsigned w) { return {x, y, z, w}; }
+inline uint2 make_uint2(unsigned x, unsigned y) { return {x, y}; }
+
+inline void __syncthreads() { gsnav::emulated::block_barrier(0); }
+inline int __syncthreads_count(int predicate) { return gsnav::emulated::block_barrier(predicate != 0 ? 1 : 0); }
+inline int __syncthreads_or(int predicate) { return __syncthreads_count(predicate) != 0 ? 1 : 0; }
+inline int __syncthreads_and(int predicate) { return __syncthreads_count(!predicate) == 0 ? 1 : 0; }
+
+inline void __syncwarp(unsigned mask = 0xffffffffu) { gsnav::emulated::Reading(mask, 0, "__syncwarp"); }
+template <class T>
+T __shfl_sync(unsigned mask, T value, int from, int width = 32) {
+  const unsigned lane = gsnav::emulated::lane(), w = static_cast<unsigned>(width);
+  return gsnav::emulated::shuffled(mask, value, (lane & ~(w - 1)) | (static_cast<unsigned>(from) & (w - 1)), "__shfl_sync");
+}
+template <class T>
+T __shfl_up_sync(unsigned mask, T value, unsigned delta, int width = 32) {
+  const unsigned lane = gsnav::emulated::lane(), in = lane & (static_cast<unsigned>(width) - 1);
+  return gsnav::emulated::shuffled(mask, value, in >= delta ? lane - delta : lane, "__shfl_up_sync");
+}
+template <class T>
+T __shfl_down_sync(unsigned mask, T value, unsigned delta, int width = 32) {
+  const unsigned lane = gsnav::emulated::lane(), w = static_cast<unsigned>(width), in = lane & (w - 1);
+  return gsnav::emulated::shuffled(mask, value, in + delta < w ? lane + delta : lane, "__shfl_down_sync");
+}
+template <class T>
+T __shfl_xor_sync(unsigned mask, T value, int bits, int width = 32) {
+  const unsigned lane = gsnav::emulated::lane(), w = static_cast<unsigned>(width);
+  const unsigned other = lane ^ static_cast<unsigned>(bits);
+  return gsnav::emulated::shuffled(mask, value, (other & ~(w - 1)) <= lane ? other : lane, "__shfl_xor_sync");
+}
+inline unsigned __ballot_sync(unsigned mask, int predicate) {
+  const gsnav::emulated::Reading all(mask, predicate != 0, "__ballot_sync");
+  unsigned votes = 0;
+  for (unsigned i = 0; i < 32; ++i) votes |= (mask >> i & 1u & static_cast<unsigned>(all[i])) << i;
+  return votes;
+}
+inline int __any_sync(unsigned mask, int predicate) { return __ballot_sync(mask, predicate) != 0; }
+inline int __all_sync(unsigned mask, int predicate) { return __ballot_sync(mask, predicate) == mask; }
+template <class T>
+unsigned __match_any_sync(unsigned mask, T value) {
+  const std::uint64_t mine = gsnav::emulated::bits_of_value(value);
+  const gsnav::emulated::Reading all(mask, mine, "__match_any_sync");
+  unsigned same = 0;
+  for (unsigned i = 0; i < 32; ++i) same |= ((mask >> i & 1u) != 0 && all[i] == mine ? 1u : 0u) << i;
+  return same;
+}
+
+// One thread of the host runs all threads of a grid, so that nothing comes between a read and its write.
+template <class T>
+T atomicAdd(T* to, std::type_identity_t<T> value) {
+  gsnav::emulated::interleave();
+  const T before = *to;
+  *to = static_cast<T>(before + value);
+  return before;
+}
+template <class T>
+T atomicMax(T* to, std::type_identity_t<T> value) {
+  gsnav::emulated::interleave();
+  const T before = *to;
+  if (before < value) *to = value;
+  return before;
+}
+template <class T>
+T atomicMin(T* to, std::type_identity_t<T> value) {
+  gsnav::emulated::interleave();
+  const T before = *to;
+  if (value < before) *to = value;
+  return before;
+}
+template <class T>
+T atomicExch(T* to, std::type_identity_t<T> value) {
+  gsnav::emulated::interleave();
+  return std::exchange(*to, value);
+}
+template <class T>
+T atomicCAS(T* to, std::type_identity_t<T> expected, std::type_identity_t<T> value) {
+  gsnav::emulated::interleave();
+  const T before = *to;
+  if (before == expected) *to = value;
+  return before;
+}
+inline void __threadfence() {}
+inline void __threadfence_block() {}
+inline void __nanosleep(unsigned) { gsnav::emulated::interleave(); }
+
+inline int __popc(unsigned bits) { return __builtin_popcount(bits); }
+inline int __ffs(int bits) { return __builtin_ffs(bits); }
+inline int __clz(int bits) { return bits == 0 ? 32 : __builtin_clz(static_cast<unsigned>(bits)); }
+inline float __uint_as_float(unsigned bits) { return gsnav::emulated::value_of_bits<float>(bits); }
+inline unsigned __float_as_uint(float value) { return static_cast<unsigned>(gsnav::emulated::bits_of_value(value)); }
+template <class T>
+T min(T a, std::type_identity_t<T> b) { return b < a ? b : a; }
+template <class T>
+T max(T a, std::type_identity_t<T> b) { return a < b ? b : a; }
