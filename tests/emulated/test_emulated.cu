@@ -123,6 +123,18 @@ __global__ void every_kernel(unsigned* seen) {
   atomicAdd(&seen[(blockIdx.z * gridDim.y + blockIdx.y) * gridDim.x + blockIdx.x], 1 + threadIdx.x);
 }
 
+/// Each but one waits, in a loop, for the number that the next one writes.
+__global__ void relay_kernel(unsigned* out) {
+  const unsigned t = threadIdx.x, next = (t + 1) % blockDim.x;
+  volatile unsigned* const mine = out + t;
+  if (t == 5) {
+    *mine = 100;
+    return;
+  }
+  while (static_cast<volatile unsigned*>(out)[next] == 0) __nanosleep(20);
+  *mine = out[next] + 1;
+}
+
 // What must not be done.
 __global__ void left_behind_kernel(unsigned* out) {
   if (threadIdx.x == 7) return;
@@ -136,6 +148,10 @@ __global__ void crossed_kernel(unsigned* out) {
   }
 }
 __global__ void not_of_mask_kernel(unsigned* out) { out[threadIdx.x] = __ballot_sync(0xffffu, 1); }
+__global__ void nobody_writes_kernel(unsigned* out) {
+  if (threadIdx.x == 0) return;
+  while (*static_cast<volatile unsigned*>(out) == 0) __nanosleep(20);
+}
 __global__ void absent_kernel(unsigned* out) { out[threadIdx.x] = __ballot_sync(~0u, 1); }
 
 /// What a child process that runs `f` says before it ends by itself; empty where it does not.
@@ -233,6 +249,14 @@ TEST_CASE("emulated: barriers wait for all that are left, whatever their number"
       CHECK(got[2 * t + 1] == sum + odd);
     }
   }
+}
+
+TEST_CASE("emulated: who waits in a loop lets others go on") {
+  constexpr unsigned kThreads = 70;
+  OnDevice<unsigned> out(kThreads);
+  relay_kernel<<<1, kThreads>>>(out.data());
+  const std::vector<unsigned> got = out.fetched();
+  for (unsigned t = 0; t < kThreads; ++t) CHECK(got[t] == 100 + (5 + kThreads - t) % kThreads);
 }
 
 TEST_CASE("emulated: sums and sorts of a block") {
@@ -340,6 +364,8 @@ TEST_CASE("emulated: threads that wait for ever, or for nobody, are named with k
   CHECK(contains(text, "0 at __ballot_sync(ffffffff); 1 at __syncthreads;"));
   text = words([&] { not_of_mask_kernel<<<1, 32>>>(out.data()); });
   CHECK(contains(text, "with a mask that it is not of"));
+  text = words([&] { nobody_writes_kernel<<<1, 4>>>(out.data()); });
+  CHECK(contains(text, "1 in a loop; 2 in a loop; 3 in a loop;"));
   text = words([&] { absent_kernel<<<1, 24>>>(out.data()); });
   CHECK(contains(text, "threads that the block has not"));
 }

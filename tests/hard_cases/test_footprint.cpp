@@ -147,6 +147,44 @@ TEST_CASE("N11_tile_cover_conservative") {
     check_cover<float>(some, Response::ray, "ray float");
     check_cover<double>(some, Response::ray, "ray double");
   }
+  SUBCASE("a principal point far off loses no pixel that passes the test") {
+    const RenderConfig config;
+    const BlendRules<float> rules = blend_rules<float>(config);
+    std::size_t passed = 0, lost = 0;
+    for (const double far_off : {3000.0, -32000.0, 32000.0, 200000.0}) {
+      Camera camera = footprint_camera();
+      camera.fx = camera.fy = std::abs(far_off);  // a part cut out of a large image
+      camera.cx += far_off;
+      camera.cy -= 0.7 * far_off;
+      // From a fraction of a pixel to a few.
+      Rng rng(17);
+      std::vector<RawGaussian> gs;
+      for (int i = 0; i < 600; ++i) {
+        const double x = rng.uniform(0, kColumns), y = rng.uniform(0, kRows), z = rng.uniform(2, 6);
+        const double scale = z / camera.fx * std::exp(rng.uniform(-2, 1.5));
+        gs.push_back(gaussian({(x - camera.cx) / camera.fx * z, (y - camera.cy) / camera.fy * z, z}, {scale, scale, scale}, 0.9));
+      }
+      const GaussianCloud cloud = cloud_of(gs);
+      RecordMaker<float> maker(cloud, camera, config);
+      const TileGrid grid = TileGrid::of(kColumns, kRows, 8);
+      for (std::size_t i = 0; i < cloud.size(); ++i) {
+        if (!maker.project(i)) continue;
+        std::vector<char> listed(grid.count(), 0);
+        for_each_tile(grid, maker.geometry(), maker.bounds(), rules.log2_alpha_min, true, [&](std::size_t tile) { listed[tile] = 1; });
+        const SplatRecords<float> records{&maker.geometry(), nullptr, nullptr, &maker.perspective()};
+        for (int y = 0; y < kRows; ++y) {
+          for (int x = 0; x < kColumns; ++x) {
+            BlendState<float, DepthMode::none> state;
+            if (!blend_splat<false, DepthMode::none, Exp2::degree5, false>(state, rules, records, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f)) continue;
+            ++passed;
+            lost += listed[static_cast<std::size_t>(y / 8 * grid.columns + x / 8)] == 0 ? 1 : 0;
+          }
+        }
+      }
+    }
+    CHECK(passed > 10000);
+    CHECK(lost == 0);
+  }
   SUBCASE("blocks of a tile are found by lanes as by the scalar") {
     const GaussianCloud cloud = needle_cloud(13, 2000);
     RecordMaker<float> maker(cloud, footprint_camera(), {});

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "capsule_oracle.hpp"
@@ -185,6 +186,19 @@ TEST_CASE("sweep: from overlap, out is free and in is not") {
   CHECK(sweep(agent(0.2, -0.1), body, rules).hit);
   CHECK(sweep(agent(0.2, -0.1), body, rules).time == 0);
   CHECK_FALSE(sweep(agent(0.2, 5), body, rules).hit);
+  // From where axes meet every way is a way out: side by side, and across.
+  const MovingCapsule<double> across{{{-1, 0.5, 0}, {1, 0.5, 0}, 0.3}, {{-1, 0.5, 0}, {1, 0.5, 0}, 0.3}};
+  int held = 0;
+  for (int k = 0; k < 64; ++k) {
+    const double heading = 2 * std::numbers::pi * k / 64;
+    const Vec3d step{0.7 * std::cos(heading), 0, 0.7 * std::sin(heading)};
+    MovingCapsule<double> leaves = agent(0, 0);
+    leaves.end.p0 = leaves.end.p0 + step;
+    leaves.end.p1 = leaves.end.p1 + step;
+    held += sweep(leaves, body, rules).hit ? 1 : 0;
+    if (std::abs(step.z) > 0.5) held += sweep(leaves, across, rules).hit ? 1 : 0;
+  }
+  CHECK(held == 0);
   // Out on this side and back in on the next step's long way round is met again.
   MovingCapsule<double> leaving = agent(0.2, 100);
   MovingCapsule<double> chasing = body;

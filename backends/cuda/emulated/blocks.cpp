@@ -64,6 +64,7 @@ namespace {
 
 constexpr unsigned kMostThreads = 1024, kWarp = 32;
 constexpr std::size_t kStackBytes = 256 << 10;
+constexpr unsigned kMostInVain = 10000;
 
 struct Thread {
   unsigned mask = 0;
@@ -81,7 +82,7 @@ struct Thread {
 
 /// Which of its threads are where.
 struct Warp {
-  unsigned there = 0, ready = 0, at_warp = 0, at_block = 0, done = 0;
+  unsigned there = 0, ready = 0, at_warp = 0, at_block = 0, paused = 0, done = 0;
   std::array<Gathered, kWarp> gathered;
 };
 
@@ -108,6 +109,7 @@ class Block {
   Gathered& gather(unsigned mask, std::uint64_t value, const char* what);
   int barrier(int number);
   void interleave();
+  void pause();
   unsigned current() const { return current_; }
   Thread& self() { return threads_[current_]; }
   void* shared() { return shared_.data(); }
@@ -123,6 +125,7 @@ class Block {
   void resume(unsigned index);
   void leave();
   void release_barrier();
+  bool wake_paused();
   std::string who_waits() const;
   Warp& warp() { return warps_[current_ / kWarp]; }
   unsigned bit() const { return 1u << current_ % kWarp; }
@@ -138,6 +141,7 @@ class Block {
   std::vector<Line> shared_;
   unsigned size_ = 0, current_ = 0, alive_ = 0, waiting_ = 0;
   int sum_ = 0, result_ = 0;
+  unsigned in_vain_ = 0;  ///< times that those who pause were asked again, and nobody did anything else
   const std::uint64_t seed_ = seed();  ///< of GSNAV_EMULATED_SEED
   std::uint64_t random_ = 1;
   void* scheduler_ = nullptr;
@@ -173,6 +177,7 @@ void Block::main() {
     b.thread_(b.arguments_);
     if (!b.self().copies.empty()) b.fail("ended before its copies into shared memory were waited for");
     b.warp().done |= b.bit();
+    b.in_vain_ = 0;
     --b.alive_;
     if (b.alive_ != 0 && b.waiting_ == b.alive_) b.release_barrier();
     b.leave();
@@ -234,6 +239,7 @@ void Block::leave() {
 
 Gathered& Block::gather(unsigned mask, std::uint64_t value, const char* what) {
   Warp& w = warp();
+  in_vain_ = 0;
   if ((mask & bit()) == 0) fail(std::string(what) + " with a mask that it is not of");
   if ((mask & ~w.there) != 0) fail(std::string(what) + " waits for threads that the block has not");
   if ((mask & w.done) != 0) {
@@ -277,6 +283,7 @@ void Block::release_barrier() {
 }
 
 int Block::barrier(int number) {
+  in_vain_ = 0;
   sum_ += number;
   if (++waiting_ == alive_) {
     release_barrier();
@@ -288,9 +295,24 @@ int Block::barrier(int number) {
 }
 
 void Block::interleave() {
+  in_vain_ = 0;
   if (seed_ == 0 || random() % 8 != 0) return;
   warp().ready |= bit();
   leave();
+}
+
+void Block::pause() {
+  warp().paused |= bit();
+  leave();
+}
+
+bool Block::wake_paused() {
+  bool any = false;
+  for (Warp& w : warps_) {
+    any = any || w.paused != 0;
+    w.ready |= std::exchange(w.paused, 0u);
+  }
+  return any && ++in_vain_ < kMostInVain;
 }
 
 void Block::run(const Launch& launch, const dim3& at, const char* name, void (*thread)(const void*), const void* arguments) {
@@ -300,6 +322,7 @@ void Block::run(const Launch& launch, const dim3& at, const char* name, void (*t
   arguments_ = arguments;
   size_ = alive_ = launch.block.x * launch.block.y * launch.block.z;
   waiting_ = 0;
+  in_vain_ = 0;
   sum_ = 0;
   random_ = (seed_ * 0x9e3779b97f4a7c15ull + (std::uint64_t{at.x} << 1 | 1)) ^ (std::uint64_t{at.y} << 32);
   if (random_ == 0) random_ = 1;
@@ -317,7 +340,7 @@ void Block::run(const Launch& launch, const dim3& at, const char* name, void (*t
   for (unsigned i = 0; i < count; ++i) {
     Warp& w = warps_[i];
     w.there = w.ready = size_ - i * kWarp >= kWarp ? ~0u : (1u << size_ % kWarp) - 1;
-    w.at_warp = w.at_block = w.done = 0;
+    w.at_warp = w.at_block = w.paused = w.done = 0;
   }
   while (alive_ != 0) {
     bool any = false;
@@ -335,7 +358,7 @@ void Block::run(const Launch& launch, const dim3& at, const char* name, void (*t
       }
       any = any || w.ready != 0;
     }
-    if (!any && alive_ != 0) fail("threads wait for one another:" + who_waits());
+    if (!any && alive_ != 0 && !wake_paused()) fail("threads wait for one another:" + who_waits());
   }
 }
 
@@ -344,6 +367,7 @@ std::string Block::who_waits() const {
   for (unsigned i = 0; i < size_ && text.size() < 600; ++i) {
     const Warp& w = warps_[i / kWarp];
     const unsigned mine = 1u << i % kWarp;
+    if (((w.paused | w.ready) & mine) != 0) text += " " + std::to_string(i) + " in a loop;";
     if ((w.at_block & mine) != 0) text += " " + std::to_string(i) + " at __syncthreads;";
     if ((w.at_warp & mine) != 0) {
       char mask[16];
@@ -359,6 +383,7 @@ std::string Block::who_waits() const {
 Gathered& gather(unsigned mask, std::uint64_t value, const char* what) { return block().gather(mask, value, what); }
 int block_barrier(int number) { return block().barrier(number); }
 void interleave() { block().interleave(); }
+void pause() { block().pause(); }
 unsigned lane() { return block().current() % kWarp; }
 unsigned thread_rank() { return block().current(); }
 void* dynamic_shared() { return block().shared(); }

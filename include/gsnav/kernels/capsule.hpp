@@ -205,7 +205,10 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
   auto strict = active;
   for (int i = 0; i < steps; ++i) {
     const Capsule<L> a = lerp(agent.begin, agent.end, t), b = lerp(body.begin, body.end, t);
-    const SegmentDistance<L> d = segment_distance(a.p0, a.p1, b.p0, b.p1);
+    SegmentDistance<L> d = segment_distance(a.p0, a.p1, b.p0, b.p1);
+    // Where axes meet either side is as near: the agent goes out on the one that it is heading for.
+    const auto other_side = (d.distance <= zero) && (dot(d.normal, va[0] + va[1]) > zero);
+    d.normal = select_vec(other_side, -d.normal, d.normal);
     const L radii = a.radius + b.radius;
     const L gap = d.distance - radii;
     if (i == 0) {

@@ -198,8 +198,9 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
     const L radius = sqrt(max(out.s_max, L(S(0))));
     // In x the test's own rounding cannot pass w1^2; in y it may by the cancellation in k dx + b dy.
     const L aspect = a_over_det * sqrt(big_c);
-    const L pad_x = fma(abs(out.mean_x), L(S(1e-6)), L(S(1e-3)));
-    const L pad_y = fma(abs(out.mean_y), L(S(1e-6)), L(S(1e-3)));
+    // Means are rounded where the principal point is, however near to the image they end up.
+    const L pad_x = fma(abs(out.mean_x) + L(abs(camera.cx)), L(S(1e-6)), L(S(1e-3)));
+    const L pad_y = fma(abs(out.mean_y) + L(abs(camera.cy)), L(S(1e-6)), L(S(1e-3)));
     out.center_x = out.mean_x;
     out.center_y = out.mean_y;
     out.half_width = fma(radius / out.a, L(S(1.00001)), pad_x);

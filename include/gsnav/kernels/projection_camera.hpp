@@ -43,7 +43,9 @@ struct KeyCode {
     return {bits_of(near_plane), (1u << bits) - 1u, bits < 27 ? 27 - bits : 0};
   }
   GSNAV_HD std::uint32_t operator()(float key) const noexcept {
-    const std::uint32_t code = (bits_of(key) - base) >> shift;
+    const std::uint32_t bits = bits_of(key);
+    // A key that is rounded to just below the near plane comes first.
+    const std::uint32_t code = (bits > base ? bits - base : 0u) >> shift;
     return code < largest ? code : largest;
   }
 };

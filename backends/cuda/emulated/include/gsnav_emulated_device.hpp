@@ -36,6 +36,9 @@ int block_barrier(int number);
 /// A place where another thread may go on before this one.
 void interleave();
 
+/// Lets all others go on first, as far as they get. A loop that waits for what another thread writes has to call it.
+void pause();
+
 /// Of the thread in its warp, and in its block.
 unsigned lane();
 unsigned thread_rank();
@@ -204,7 +207,7 @@ T atomicCAS(T* to, std::type_identity_t<T> expected, std::type_identity_t<T> val
 }
 inline void __threadfence() {}
 inline void __threadfence_block() {}
-inline void __nanosleep(unsigned) { gsnav::emulated::interleave(); }
+inline void __nanosleep(unsigned) { gsnav::emulated::pause(); }
 
 inline int __popc(unsigned bits) { return __builtin_popcount(bits); }
 inline int __ffs(int bits) { return __builtin_ffs(bits); }
