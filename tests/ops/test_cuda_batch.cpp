@@ -44,7 +44,7 @@ TEST_CASE("cuda batch: every camera has the bits it has alone") {
       config.background = {0.25, 0.5, 0.75};
       CudaBatchRenderer renderer(cuda, config);
       for (const unsigned outputs : {kMedianOnly, kAll}) {
-        if (is_emulated() && (order == SortOrder::z_depth) != (outputs == kAll)) continue;
+        if (is_emulated() && ((order == SortOrder::z_depth) != (outputs == kAll) || response == Response::tangent_plane)) continue;
         CAPTURE(static_cast<int>(response));
         CAPTURE(outputs);
         const Batch got = draw_batch(cuda, renderer, sets, cameras, lists, outputs);

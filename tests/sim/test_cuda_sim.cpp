@@ -99,7 +99,7 @@ TEST_CASE("cuda: a simulator among people sees what the OpenMP one sees") {
   };
   compare(on_gpu.reset(to_kitchen()).value(), on_cpu.reset(to_kitchen()).value());
   Rng rng(4);
-  for (int i = 0; i < (is_emulated() ? 10 : 30); ++i) {
+  for (int i = 0; i < (is_emulated() ? 5 : 30); ++i) {
     const Action action = wandering_action(rng);
     compare(on_gpu.step(action).value(), on_cpu.step(action).value());
   }
@@ -201,8 +201,8 @@ TEST_CASE("cuda: a batch sees what the OpenMP one sees, in host memory and on th
   BatchConfig config;
   config.sensors = is_emulated() ? rgbd_sensors(32, 48) : rgbd_sensors(64, 96);
   config.sensors[1].far_plane = 5.0;
-  const int steps = is_emulated() ? 5 : 30;
-  config.task.max_steps = is_emulated() ? 2 : 12;
+  const int steps = is_emulated() ? 3 : 30;
+  config.task.max_steps = is_emulated() ? 1 : 12;
   config.auto_reset = AutoReset::same_step;
   constexpr std::size_t kEnvironments = 12;
   CudaBackend cuda, other;
