@@ -15,10 +15,12 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
+#include "support/files.hpp"
 
 namespace {
 
 using gsnav::Rng;
+using gsnav_test::contains;
 
 /// Device memory that a test fills and reads.
 template <class T>
@@ -177,8 +179,6 @@ std::string last_words(F f) {
   REQUIRE(waitpid(child, &status, 0) == child);
   return WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT ? text : std::string();
 }
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 

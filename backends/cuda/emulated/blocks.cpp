@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/core/rng.hpp"
 #include "gsnav_emulated_device.hpp"
 #include "settings.hpp"
 
@@ -130,11 +131,6 @@ class Block {
   Warp& warp() { return warps_[current_ / kWarp]; }
   unsigned bit() const { return 1u << current_ % kWarp; }
   [[noreturn]] void fail(const std::string& why) const;
-  std::uint64_t random() {
-    random_ ^= random_ << 13;
-    random_ ^= random_ >> 7;
-    return random_ ^= random_ << 17;
-  }
 
   std::vector<Thread> threads_;
   std::vector<Warp> warps_;
@@ -143,7 +139,7 @@ class Block {
   int sum_ = 0, result_ = 0;
   unsigned in_vain_ = 0;  ///< times that those who pause were asked again, and nobody did anything else
   const std::uint64_t seed_ = seed();  ///< of GSNAV_EMULATED_SEED
-  std::uint64_t random_ = 1;
+  Rng random_;
   void* scheduler_ = nullptr;
   const char* name_ = "";
   dim3 at_;
@@ -296,7 +292,7 @@ int Block::barrier(int number) {
 
 void Block::interleave() {
   in_vain_ = 0;
-  if (seed_ == 0 || random() % 8 != 0) return;
+  if (seed_ == 0 || random_.below(8) != 0) return;
   warp().ready |= bit();
   leave();
 }
@@ -324,8 +320,7 @@ void Block::run(const Launch& launch, const dim3& at, const char* name, void (*t
   waiting_ = 0;
   in_vain_ = 0;
   sum_ = 0;
-  random_ = (seed_ * 0x9e3779b97f4a7c15ull + (std::uint64_t{at.x} << 1 | 1)) ^ (std::uint64_t{at.y} << 32);
-  if (random_ == 0) random_ = 1;
+  random_ = Rng(seed_ ^ (std::uint64_t{at.y} << 32 | at.x));
   blockIdx = at;
   blockDim = launch.block;
   gridDim = launch.grid;
@@ -344,14 +339,14 @@ void Block::run(const Launch& launch, const dim3& at, const char* name, void (*t
   }
   while (alive_ != 0) {
     bool any = false;
-    const unsigned first = seed_ == 0 ? 0 : static_cast<unsigned>(random() % count);
+    const unsigned first = seed_ == 0 ? 0 : static_cast<unsigned>(random_.below(count));
     for (unsigned i = 0; i < count; ++i) {
       const unsigned index = (first + i) % count;
       Warp& w = warps_[index];
       // As far as it gets; with a seed another warp may go on before that.
-      while (w.ready != 0 && (seed_ == 0 || random() % 64 != 0)) {
+      while (w.ready != 0 && (seed_ == 0 || random_.below(64) != 0)) {
         any = true;
-        const unsigned turn = seed_ == 0 ? 0 : static_cast<unsigned>(random() % kWarp);
+        const unsigned turn = seed_ == 0 ? 0 : static_cast<unsigned>(random_.below(kWarp));
         const unsigned above = w.ready & ~0u << turn, lane = first_of(above != 0 ? above : w.ready);
         w.ready &= ~(1u << lane);
         resume(index * kWarp + lane);
@@ -404,10 +399,11 @@ void run_grid(const Launch& launch, const char* name, void (*thread)(const void*
   // Each once, in an order of its own: a step that shares no divisor with their number.
   std::uint64_t step = 1, at = 0;
   if (seed() != 0 && blocks > 2) {
-    step = (seed() * 0x9e3779b97f4a7c15ull >> 16) % blocks | 1;
-    while (std::gcd(step, blocks) != 1) step += 2;
-    at = seed() % blocks;
-    step %= blocks;
+    Rng rng(seed());
+    do {
+      step = rng.below(blocks);
+    } while (std::gcd(step, blocks) != 1);
+    at = rng.below(blocks);
   }
   for (std::uint64_t i = 0; i < blocks; ++i, at = (at + step) % blocks) {
     block().run(launch, dim3(static_cast<unsigned>(at % g.x), static_cast<unsigned>(at / g.x % g.y),

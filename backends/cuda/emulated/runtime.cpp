@@ -160,9 +160,7 @@ const char* cudaGetErrorString(cudaError_t error) {
     case cudaErrorMemoryAllocation: return "out of memory";
     case cudaErrorInvalidConfiguration: return "invalid configuration argument";
     case cudaErrorInvalidDevice: return "invalid device ordinal";
-    case cudaErrorNotReady: return "device not ready";
-    case cudaErrorStreamCaptureUnsupported:
-    case cudaErrorStreamCaptureInvalidated: return "operation not permitted when stream is capturing";
+    case cudaErrorStreamCaptureUnsupported: return "operation not permitted when stream is capturing";
     default: return "invalid argument";
   }
 }
@@ -223,8 +221,7 @@ cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaM
   bool pinned_from = false, pinned_to = false;
   {
     const std::lock_guard lock(d.mutex);
-    if (kind != cudaMemcpyDefault && ((to_device && !lies_in(d.blocks, to, bytes)) ||
-                                      (from_device && !lies_in(d.blocks, from, bytes)))) {
+    if ((to_device && !lies_in(d.blocks, to, bytes)) || (from_device && !lies_in(d.blocks, from, bytes))) {
       return failed(cudaErrorInvalidValue);
     }
     pinned_from = lies_in(d.pinned, from, bytes);
@@ -253,11 +250,6 @@ cudaError_t cudaMemsetAsync(void* to, int byte, std::size_t bytes, cudaStream_t 
     if (!lies_in(device().blocks, to, bytes)) return failed(cudaErrorInvalidValue);
   }
   return gsnav::emulated::enqueue(stream, [to, byte, bytes] { std::memset(to, byte, bytes); });
-}
-cudaError_t cudaMemset(void* to, int byte, std::size_t bytes) {
-  const cudaError_t e = cudaMemsetAsync(to, byte, bytes, nullptr);
-  work_off(of(nullptr));
-  return e;
 }
 
 cudaError_t cudaStreamCreateWithFlags(cudaStream_t* stream, unsigned) {

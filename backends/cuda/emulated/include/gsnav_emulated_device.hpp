@@ -92,17 +92,29 @@ T shuffled(unsigned mask, const T& value, unsigned from, const char* what) {
   return (mask >> from & 1u) != 0 ? value_of_bits<T>(all[from]) : value_of_bits<T>(0xdeadbeefdeadbeefull);
 }
 
+/// Puts changed(*to) in place of *to, which it returns. One thread of the host runs all threads of a grid, so that nothing
+/// comes in between.
+template <class T, class F>
+T atomically(T* to, F changed) {
+  interleave();
+  return std::exchange(*to, changed(*to));
+}
+
+/// Bits [begin, end) of a key, by which a sort of the toolkit orders; fewer than 64.
+template <class Key>
+std::uint64_t digits_of(Key key, int begin, int end) {
+  return std::uint64_t{key} >> begin & ((std::uint64_t{1} << (end - begin)) - 1);
+}
+
 }  // namespace gsnav::emulated
 
 inline thread_local constinit dim3 threadIdx, blockIdx, blockDim, gridDim;
-inline constexpr int warpSize = 32;
 
 #define __global__
 #define __device__
 #define __host__
 #define __forceinline__ inline
 #define __noinline__
-#define __constant__ static
 #define __shared__ static thread_local
 #define __grid_constant__
 #define __launch_bounds__(...)
@@ -116,21 +128,13 @@ GSNAV_VECTOR(float, float4, 16)
 GSNAV_VECTOR(unsigned, uint4, 16)
 GSNAV_VECTOR(unsigned char, uchar4, 4)
 #undef GSNAV_VECTOR
-struct __attribute__((aligned(8))) float2 {
-  float x, y;
-};
 struct __attribute__((aligned(8))) uint2 {
   unsigned x, y;
 };
-inline float4 make_float4(float x, float y, float z, float w) { return {x, y, z, w}; }
-inline float2 make_float2(float x, float y) { return {x, y}; }
-inline uint4 make_uint4(unsigned x, unsigned y, unsigned z, unsigned w) { return {x, y, z, w}; }
-inline uint2 make_uint2(unsigned x, unsigned y) { return {x, y}; }
 
 inline void __syncthreads() { gsnav::emulated::block_barrier(0); }
 inline int __syncthreads_count(int predicate) { return gsnav::emulated::block_barrier(predicate != 0 ? 1 : 0); }
 inline int __syncthreads_or(int predicate) { return __syncthreads_count(predicate) != 0 ? 1 : 0; }
-inline int __syncthreads_and(int predicate) { return __syncthreads_count(!predicate) == 0 ? 1 : 0; }
 
 inline void __syncwarp(unsigned mask = 0xffffffffu) { gsnav::emulated::Reading(mask, 0, "__syncwarp"); }
 template <class T>
@@ -171,42 +175,18 @@ unsigned __match_any_sync(unsigned mask, T value) {
   return same;
 }
 
-// One thread of the host runs all threads of a grid, so that nothing comes between a read and its write.
 template <class T>
 T atomicAdd(T* to, std::type_identity_t<T> value) {
-  gsnav::emulated::interleave();
-  const T before = *to;
-  *to = static_cast<T>(before + value);
-  return before;
+  return gsnav::emulated::atomically(to, [&](T before) { return static_cast<T>(before + value); });
 }
 template <class T>
 T atomicMax(T* to, std::type_identity_t<T> value) {
-  gsnav::emulated::interleave();
-  const T before = *to;
-  if (before < value) *to = value;
-  return before;
+  return gsnav::emulated::atomically(to, [&](T before) { return before < value ? value : before; });
 }
 template <class T>
 T atomicMin(T* to, std::type_identity_t<T> value) {
-  gsnav::emulated::interleave();
-  const T before = *to;
-  if (value < before) *to = value;
-  return before;
+  return gsnav::emulated::atomically(to, [&](T before) { return value < before ? value : before; });
 }
-template <class T>
-T atomicExch(T* to, std::type_identity_t<T> value) {
-  gsnav::emulated::interleave();
-  return std::exchange(*to, value);
-}
-template <class T>
-T atomicCAS(T* to, std::type_identity_t<T> expected, std::type_identity_t<T> value) {
-  gsnav::emulated::interleave();
-  const T before = *to;
-  if (before == expected) *to = value;
-  return before;
-}
-inline void __threadfence() {}
-inline void __threadfence_block() {}
 inline void __nanosleep(unsigned) { gsnav::emulated::pause(); }
 
 inline int __popc(unsigned bits) { return __builtin_popcount(bits); }

@@ -24,9 +24,7 @@ class BlockRadixSort {
     for (unsigned i = 0; i < Items; ++i) s_.pair[t * Items + i] = {keys[i], values[i]};
     __syncthreads();
     if (t == 0) {
-      const auto digits = [&](const Pair& p) {
-        return (p.key & static_cast<Key>((std::uint64_t{1} << end) - 1)) >> begin;
-      };
+      const auto digits = [&](const Pair& p) { return gsnav::emulated::digits_of(p.key, begin, end); };
       std::stable_sort(s_.pair, s_.pair + Threads * Items,
                        [&](const auto& a, const auto& b) { return digits(a) < digits(b); });
     }

@@ -28,7 +28,7 @@ struct DeviceRadixSort {
     return gsnav::emulated::enqueue(stream, [=] {
       std::vector<std::pair<Key, Value>> pairs(n);
       for (std::size_t i = 0; i < n; ++i) pairs[i] = {keys_in[i], values_in[i]};
-      const auto digits = [&](const auto& p) { return (std::uint64_t{p.first} & ((std::uint64_t{1} << end) - 1)) >> begin; };
+      const auto digits = [&](const auto& p) { return gsnav::emulated::digits_of(p.first, begin, end); };
       std::stable_sort(pairs.begin(), pairs.end(), [&](const auto& a, const auto& b) { return digits(a) < digits(b); });
       for (std::size_t i = 0; i < n; ++i) {
         keys[i] = pairs[i].first;
