@@ -230,9 +230,11 @@ int main(int argc, char** argv) {
     } else if (std::string(argv[i]) == "--balls" && i + 1 < argc) {
       balls = std::strtoull(argv[++i], nullptr, 10);
       if (balls > 0) continue;
-    } else if (const std::size_t count = std::strtoull(argv[i], nullptr, 10); count > 0) {
-      counts.push_back(count);
-      continue;
+    } else if (char* end = nullptr; const std::size_t count = std::strtoull(argv[i], &end, 10)) {
+      if (*end == '\0') {
+        counts.push_back(count);
+        continue;
+      }
     }
     std::fprintf(stderr,
                  "bench_batch: '%s' is no size (256x256), batch size, --compact, --rgb, --visible, --visible-rows, "

@@ -87,6 +87,37 @@ TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
   }
 }
 
+TEST_CASE("cuda batch: what only some sets or cameras have is in images of colours alone") {
+  if (no_gpu("cuda batch rules")) return;
+  CudaBackend cuda;
+  const GaussianCloud cloud = random_cloud(41, {.count = 1500}), filtered = random_cloud(42, {.count = 1500, .mip = true});
+  GaussianCloud far = random_cloud(43, {.count = 1500});
+  far.origins = {{0, 0, 0}, {0.5, 0, 0}};
+  for (std::size_t i = 0; i < far.size(); ++i) far.origin_ids.push_back(i % 2 == 0 ? 1 : 0);
+  const GaussianArrays<CudaBackend> arrays(cuda, cloud), on_mip(cuda, filtered), on_far(cuda, far);
+  // Each Gaussian's bands turned by as much as its shape.
+  GaussianSet turned = arrays.set();
+  for (int k = 0; k < 4; ++k) turned.gaussians.sh_rotations[k] = arrays.set().gaussians.quats[k];
+  enum class Has { nothing, mip, origins, rotations, near_sigma, distance };
+  for (const Has has : {Has::nothing, Has::mip, Has::origins, Has::rotations, Has::near_sigma, Has::distance}) {
+    CAPTURE(static_cast<int>(has));
+    const std::vector<GaussianSet> sets{has == Has::mip         ? on_mip.set()
+                                        : has == Has::origins   ? on_far.set()
+                                        : has == Has::rotations ? turned
+                                                                : arrays.set()};
+    RenderConfig config;
+    if (has == Has::distance) config.sort_order = SortOrder::camera_distance;
+    for (const int count : {3, many_cameras()}) {
+      std::vector<Camera> cameras = ring_of(count);
+      for (Camera& camera : cameras) camera.near_sigma = 0;
+      if (has == Has::near_sigma) cameras[1].near_sigma = 3;
+      CudaBatchRenderer renderer(cuda, config);
+      check_same(draw_batch(cuda, renderer, sets, cameras, {}, kMedianOnly, false).frames,
+                 singly(cuda, sets, cameras, {}, config, kMedianOnly));
+    }
+  }
+}
+
 TEST_CASE("cuda batch: images of many pixels, and bands in half precision") {
   if (no_gpu("cuda batch of large images")) return;
   CudaBackend cuda;

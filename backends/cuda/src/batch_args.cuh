@@ -23,6 +23,29 @@ struct BatchInstance {
   std::uint32_t camera;
 };
 
+/// What projection reads of an instance for each of its rows where rules are plain (BatchArgs::plain_cameras): together what
+/// is read together, in loads of 16 bytes.
+struct PlainCamera {
+  struct alignas(16) Key {
+    float row[3], scale;  ///< of depth_key
+    float offset[3], near_plane;
+  } key;
+  struct alignas(16) Axes {
+    float rotation[9], eps2d, log2_alpha_min, fx;
+    float fy, cx, cy, u_min;
+    float u_max, v_min, v_max;
+    std::uint32_t camera;
+  } axes;
+  struct alignas(16) Mean {
+    double rotation[9], offset[3], fx, fy, cx, cy;
+  } mean;
+  struct alignas(16) Code {
+    KeyCode key;
+    std::uint32_t first_rank;
+  } code;
+};
+static_assert(sizeof(PlainCamera) == 256);
+
 inline constexpr std::uint32_t kPartsPerChunk = kProjectChunk / kChunkPart;
 /// Of a set with so few instances a warp tests parts at once, a lane a part and an instance.
 inline constexpr std::uint32_t kFewInstances = 32 / kPartsPerChunk;
@@ -55,8 +78,8 @@ struct alignas(16) SplatRecord {
   std::uint32_t x, y;  ///< bounds: first | end << 16
 };
 
-/// A survivor as binning reads it: a TileWindow, without tiles where a warp of its own bins it. `camera` is kNoSlot
-/// where a slot was taken and not used.
+/// A survivor as binning reads it where lists are counted first: a TileWindow, without tiles where a warp of its own
+/// bins it. `camera` is kNoSlot where a slot was taken and not used.
 struct alignas(16) SplatEntry {
   std::uint32_t key, corner, tiles, camera;
 };
@@ -71,9 +94,21 @@ struct Pair {
   std::uint32_t key, slot;
 };
 
+/// A survivor whose tiles are still to be found. `camera` is kNoSlot where its place was taken and not used.
+struct SplatKey {
+  std::uint32_t slot, key, camera;
+};
+
+/// A pair beyond its list's room: number `number` of tile `tile`.
+struct alignas(16) BeyondPair {
+  std::uint32_t tile, number;
+  Pair pair;
+};
+
 /// A row of tiles of a splat of very many.
-struct LargeRow {
-  std::uint32_t slot, row;
+struct alignas(16) LargeRow {
+  SplatKey splat;
+  std::uint32_t row;
 };
 
 /// A part of a tile's list that is put in order by itself: pairs [begin, end), which are whole bins of depth from `bin` on.
@@ -82,6 +117,7 @@ struct alignas(16) ListPart {
 };
 /// Of an entry of tile_order: the tile's list is in order already.
 inline constexpr std::uint32_t kListInOrder = 0x80000000u;
+inline constexpr std::uint32_t kOrderBatch = 512;  ///< pairs of a list that a block puts in order at a time
 inline constexpr std::uint32_t kPartLength = 128;  ///< part p has the bins that begin so many pairs apart
 
 inline constexpr int kMinDepthBits = 6, kMaxDepthBits = 9;
@@ -108,6 +144,9 @@ struct BatchCounters {
   alignas(kLine) unsigned long long several;
   alignas(kLine) unsigned long long large;
   alignas(kLine) unsigned long long pairs;
+  alignas(kLine) unsigned long long beyond;
+  alignas(kLine) unsigned long long placed;  ///< of those beyond
+  alignas(kLine) unsigned long long alt;  ///< of lists that may need places in pairs_alt, where lists have room
   alignas(kLine) std::uint32_t items;
   alignas(kLine) std::uint32_t parts;
   alignas(kLine) std::uint32_t long_parts;
@@ -119,6 +158,9 @@ struct BatchCounters {
 struct BatchArgs {
   const BatchSet* sets;
   const BatchInstance* instances;
+  /// One an instance where rules are plain: Response::ewa, Compat::none, SortOrder::z_depth, no mip filter, no near_sigma, no
+  /// set with axes, rotations of SH or origins; else null.
+  const PlainCamera* plain_cameras;
   const std::uint32_t* camera_first;      ///< [cameras + 1] into camera_instances
   const std::uint32_t* camera_instances;
   std::uint64_t units;
@@ -138,20 +180,27 @@ struct BatchArgs {
   SplatDepth<float>* depths;              ///< null: no image sums depths, and medians are few beside survivors
   SplatPerspective<float>* perspectives;  ///< null: Response::ewa
   HardSplat* hard;
-  std::uint32_t* several;  ///< slots whose tiles are still to be found; kNoSlot: none
-  LargeRow* large;         ///< of splats of very many tiles
+  SplatKey* several;
+  LargeRow* large;
   /// [tiles << depth_bins.bits]: how many pairs; where the next goes, once lists have their places; where bins
   /// end, once all are there.
   std::uint32_t* bins;
+  /// Pairs that each list has room for, tile by tile; the rest of longer ones lies behind all of them. 0: lists are counted
+  /// first, and follow one another.
+  std::uint32_t list_room;
   std::uint32_t* tile_counts;
   std::uint32_t* tile_begins;
+  uint2* tile_shifts;  ///< to places of what is beyond the room; to those in pairs_alt. Null: lists are counted first
   /// The order that tiles are begun in: longest lists first, so that none is waited for. With kListInOrder.
   std::uint32_t* tile_order;
   ListPart* parts;            ///< where there are many bins of depth
   std::uint32_t* long_parts;  ///< those that a warp has not put in order
   Pair* pairs;      ///< of a tile together: in no order, or in order once order_lists has been there
   Pair* pairs_alt;
-  std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity, part_capacity;
+  BeyondPair* beyond;
+  std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, part_capacity;
+  std::uint32_t pair_capacity;                                  ///< where lists are counted first
+  std::uint32_t beyond_capacity, alt_capacity;  ///< where they have room
   std::uint32_t slab;  ///< slots that a warp takes at a time: few cameras leave few to share them
 };
 

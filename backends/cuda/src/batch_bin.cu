@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cub/block/block_scan.cuh>
 
-#include "batch_tiles.cuh"
+#include "batch_lists.cuh"
 
-// Tile lists of a batch: placed and written. Their order is decided where they are read.
+// Tile lists of a batch: of few cameras counted, placed and written; of many written at once, into the room that each has,
+// and most of them by projection. Their order is decided where they are read.
 
 namespace gsnav::cuda {
 
@@ -12,7 +12,7 @@ namespace {
 
 constexpr unsigned kThreads = 128;
 
-/// Calls f(slot, key, tile, wanted), by all lanes together, for the tiles of the large splats: a lane finds those of a
+/// Calls f(splat, tile, wanted), by all lanes together, for the tiles of the large splats: a lane finds those of a
 /// row. A warp's rows lie far apart in the queue: neighbours are mostly of one splat, and a warp that has all of the
 /// largest would be waited for.
 template <class F>
@@ -22,70 +22,86 @@ __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
   const int ts = a.grid.tile_size;
   const std::uint32_t warps = gridDim.x * kThreads / 32;
   for (std::uint32_t i = (blockIdx.x * kThreads + threadIdx.x) / 32; i < n; i += 32 * warps) {
-    std::uint32_t slot = 0, key = 0, begin = 0, count = 0;  // `begin`: the first tile's number
+    SplatKey splat{};
+    std::uint32_t begin = 0, count = 0;  // `begin`: the first tile's number
     const std::uint32_t mine = i + threadIdx.x % 32 * warps;
     if (mine < n) {
       const LargeRow part = a.large[mine];
-      const SplatRecord& r = a.records[part.slot];
-      const SplatEntry e = a.entries[part.slot];
+      splat = part.splat;
+      const SplatRecord& r = a.records[splat.slot];
       const SplatBounds b = bounds_of(r.x, r.y);
       const int y = static_cast<int>(part.row) * ts;
       const SplatBounds row{b.x0, max(b.y0, y), b.x1, min(b.y1, y + ts)};
-      slot = part.slot;
-      key = e.key;
       for_each_tile_row(a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](int ty, int first, int last) {
-        begin = first_tile(a, e.camera) + static_cast<std::uint32_t>(ty * a.grid.columns + first);
+        begin = first_tile(a, splat.camera) + static_cast<std::uint32_t>(ty * a.grid.columns + first);
         count = static_cast<std::uint32_t>(last - first + 1);
       });
     }
     share_in_warp(count, [&](unsigned owner, std::uint32_t k) {
       const unsigned from = owner % 32;
-      f(__shfl_sync(kAll, slot, from), __shfl_sync(kAll, key, from), __shfl_sync(kAll, begin, from) + k, owner < 32);
+      f(SplatKey{__shfl_sync(kAll, splat.slot, from), __shfl_sync(kAll, splat.key, from), 0},
+        __shfl_sync(kAll, begin, from) + k, owner < 32);
     });
   }
 }
 
-/// The same for the windows of a warp's lanes; `slot`: of the lane.
+/// The same for the windows of a warp's lanes.
 template <class F>
-__device__ void for_each_tile_of_windows(const BatchArgs& a, std::uint32_t slot, const SplatEntry& e,
-                                         std::uint32_t tiles, const F& f) {
+__device__ void for_each_tile_of_windows(const BatchArgs& a, const SplatKey& splat, const TileWindow& window, const F& f) {
   constexpr unsigned kAll = 0xffffffffu;
-  share_in_warp(static_cast<std::uint32_t>(__popc(tiles)), [&](unsigned owner, std::uint32_t k) {
+  share_in_warp(static_cast<std::uint32_t>(__popc(window.tiles)), [&](unsigned owner, std::uint32_t k) {
     const unsigned from = owner % 32;
-    const TileWindow window{__shfl_sync(kAll, e.corner, from), __shfl_sync(kAll, tiles, from)};
-    const std::uint32_t camera = __shfl_sync(kAll, e.camera, from);
-    f(__shfl_sync(kAll, slot, from), __shfl_sync(kAll, e.key, from),
-      tile_of(a, camera, window, nth_bit<16>(window.tiles, k)), owner < 32);
+    const TileWindow shared{__shfl_sync(kAll, window.corner, from), __shfl_sync(kAll, window.tiles, from)};
+    const std::uint32_t camera = __shfl_sync(kAll, splat.camera, from);
+    f(SplatKey{__shfl_sync(kAll, splat.slot, from), __shfl_sync(kAll, splat.key, from), camera},
+      tile_of(a, camera, shared, nth_bit<16>(shared.tiles, k)), owner < 32);
   });
 }
 
-/// Counts the pairs of splats of several tiles: a thread each, or a warp.
-template <bool ManyBins>
-__global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
-  const auto count = [&](std::uint32_t, std::uint32_t key, std::uint32_t tile, bool wanted) {
-    add_pair<ManyBins, false>(a, wanted, tile, key);
-  };
-  for_each_tile_of_large(a, count);
+/// The same for the splats of several tiles, which are found; known(splat, window) is told which.
+template <class K, class F>
+__device__ void for_each_tile_of_several(const BatchArgs& a, const K& known, const F& f) {
   const std::uint32_t n = used(a.counters->several, a.several_capacity);
   const std::uint32_t end = (n + 31) / 32 * 32;
   for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < end; i += gridDim.x * kThreads) {
-    const std::uint32_t slot = i < n ? a.several[i] : kNoSlot;
-    SplatEntry e{0, 0, 0, 0};
-    std::uint32_t tiles = 0;
-    if (slot != kNoSlot) {
-      const SplatRecord& r = a.records[slot];
-      e = a.entries[slot];
-      const TileWindow window{e.corner, 0};
-      for_each_tile_row(a.grid, geometry_of(r), bounds_of(r.x, r.y), a.log2_alpha_min, a.elliptic,
+    SplatKey splat{0, 0, kNoSlot};
+    if (i < n) splat = a.several[i];
+    TileWindow window{0, 0};
+    if (splat.camera != kNoSlot) {
+      const SplatRecord& r = a.records[splat.slot];
+      const SplatBounds bounds = bounds_of(r.x, r.y);
+      window.corner = window_of(a, bounds).corner;
+      for_each_tile_row(a.grid, geometry_of(r), bounds, a.log2_alpha_min, a.elliptic,
                         [&](int ty, int first, int last) {
                           const std::uint32_t row = static_cast<std::uint32_t>(ty) - window.row(),
                                               column = static_cast<std::uint32_t>(first) - window.column();
-                          tiles |= ((2u << (last - first)) - 1u) << (row * TileWindow::kSide + column);
+                          window.tiles |= ((2u << (last - first)) - 1u) << (row * TileWindow::kSide + column);
                         });
-      a.entries[slot].tiles = tiles;
+      known(splat, window);
     }
-    for_each_tile_of_windows(a, slot, e, tiles, count);
+    for_each_tile_of_windows(a, splat, window, f);
   }
+}
+
+/// Counts the pairs of splats of several tiles.
+__global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
+  const auto count = [&](const SplatKey& splat, std::uint32_t tile, bool wanted) {
+    if (wanted) add_to_bin(a, tile, splat.key);
+  };
+  for_each_tile_of_large(a, count);
+  for_each_tile_of_several(
+      a, [&](const SplatKey& splat, const TileWindow& window) { a.entries[splat.slot].tiles = window.tiles; }, count);
+}
+
+/// Writes the pairs of splats whose tiles projection has not found.
+__global__ void __launch_bounds__(kThreads) list_kernel(const BatchArgs a) {
+  const auto list = [&](const SplatKey& splat, std::uint32_t tile, bool wanted) {
+    WarpPairs pairs;
+    pairs.ask(a, wanted, tile);
+    pairs.put(a, tile, {splat.key, splat.slot});
+  };
+  for_each_tile_of_large(a, list);
+  for_each_tile_of_several(a, [](const SplatKey&, const TileWindow&) {}, list);
 }
 
 /// Puts the block's share of the tiles into tile_order.
@@ -110,12 +126,12 @@ __device__ void order_tiles(const BatchArgs& a) {
 }
 
 /// Writes the pairs; and the order of the tiles.
-template <bool ManyBins>
 __global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
   order_tiles(a);
-  const auto emit = [&](std::uint32_t slot, std::uint32_t key, std::uint32_t tile, bool wanted) {
-    const std::uint32_t at = add_pair<ManyBins, true>(a, wanted, tile, key);
-    if (wanted && at < a.pair_capacity) a.pairs[at] = {key, slot};
+  const auto emit = [&](const SplatKey& splat, std::uint32_t tile, bool wanted) {
+    if (!wanted) return;
+    const std::uint32_t at = add_to_bin(a, tile, splat.key);
+    if (at < a.pair_capacity) a.pairs[at] = {splat.key, splat.slot};
   };
   for_each_tile_of_large(a, emit);
   const std::uint32_t slots = used(a.counters->slots, a.slot_capacity);
@@ -128,7 +144,8 @@ __global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
   for (; slot - threadIdx.x % 32 < slots; slot += stride) {
     const SplatEntry e = next;
     next = entry(slot + stride);
-    for_each_tile_of_windows(a, static_cast<std::uint32_t>(slot), e, e.camera != kNoSlot ? e.tiles : 0, emit);
+    for_each_tile_of_windows(a, {static_cast<std::uint32_t>(slot), e.key, e.camera},
+                             {e.corner, e.camera != kNoSlot ? e.tiles : 0}, emit);
   }
 }
 
@@ -143,26 +160,30 @@ __device__ std::uint32_t place_list(const BatchArgs& a, std::uint32_t tile, std:
   return begin;
 }
 
-/// Lists follow one another in no particular order: a thread a tile.
-__device__ void place_lists(const BatchArgs& a, std::uint32_t* of_length) {
-  using Scan = cub::BlockScan<unsigned long long, kThreads>;
-  __shared__ typename Scan::TempStorage storage;
-  __shared__ unsigned long long base;
-  for (std::uint32_t first = blockIdx.x * kThreads; first < a.tiles; first += gridDim.x * kThreads) {
-    const std::uint32_t tile = first + threadIdx.x;
-    const unsigned long long count = tile < a.tiles ? a.bins[tile] : 0;
-    unsigned long long before, total;
-    Scan(storage).ExclusiveSum(count, before, total);
-    if (threadIdx.x == 0) base = atomicAdd(&a.counters->pairs, total);
-    __syncthreads();
-    if (tile < a.tiles) {
-      a.bins[tile] = place_list(a, tile, static_cast<std::uint32_t>(count), base + before, of_length);
-    }
-    __syncthreads();
+/// What lists with room hold, and where: a thread a tile.
+__device__ void measure_lists(const BatchArgs& a, std::uint32_t* of_length) {
+  const bool whole = a.counters->beyond <= a.beyond_capacity;
+  const std::uint32_t rooms = a.tiles * a.list_room, end = (a.tiles + 31) / 32 * 32;
+  for (std::uint32_t tile = blockIdx.x * kThreads + threadIdx.x; tile < end; tile += gridDim.x * kThreads) {
+    std::uint32_t count = tile < a.tiles ? a.bins[tile] : 0;
+    const std::uint32_t begin = tile * a.list_room, beyond = count > a.list_room ? count - a.list_room : 0,
+                        apart = count > kOrderBatch ? count : 0;
+    take_places(&a.counters->pairs, count);
+    const std::uint32_t rest = rooms + static_cast<std::uint32_t>(take_places(&a.counters->placed, beyond));
+    const unsigned long long alt = take_places(&a.counters->alt, apart);
+    if (tile >= a.tiles) continue;
+    // What has no place is left out: the call will be repeated.
+    if (!whole) count -= beyond;
+    if (alt + apart > a.alt_capacity) count = min(count, kOrderBatch);
+    a.tile_begins[tile] = begin;
+    a.tile_counts[tile] = count;
+    a.tile_shifts[tile] = {rest - (begin + a.list_room), static_cast<std::uint32_t>(alt) - begin};
+    atomicAdd(of_length + __clz(static_cast<int>(count)), 1u);
   }
 }
 
-/// The same of lists in bins: a warp a tile. Also what order_kernel has to do.
+/// Places of lists in bins, which follow one another in no particular order: a warp a tile. Also what order_kernel has
+/// to do.
 __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
   constexpr unsigned kAll = 0xffffffffu, kMost = (1u << kMaxDepthBits) / 64;
   const unsigned lane = threadIdx.x % 32, mine = a.depth_bins.count() / 64;  // of a lane: pairs of bins, neighbours
@@ -232,15 +253,15 @@ __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
   }
 }
 
-template <bool ManyBins>
+template <bool Room>
 __global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
   __shared__ std::uint32_t of_length[33];
   if (threadIdx.x < 33) of_length[threadIdx.x] = 0;
   __syncthreads();
-  if constexpr (ManyBins) {
-    place_bins(a, of_length);
+  if constexpr (Room) {
+    measure_lists(a, of_length);
   } else {
-    place_lists(a, of_length);
+    place_bins(a, of_length);
   }
   __syncthreads();
   if (threadIdx.x < 33 && of_length[threadIdx.x] != 0) {
@@ -248,22 +269,30 @@ __global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
   }
 }
 
-template <bool ManyBins>
-void launch(const BatchArgs& args, unsigned blocks, cudaStream_t stream) {
-  const unsigned at_a_time = ManyBins ? kThreads / 32 : kThreads;
-  count_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args);
-  place_kernel<ManyBins><<<std::min(blocks, (args.tiles + at_a_time - 1) / at_a_time), kThreads, 0, stream>>>(args);
-  emit_kernel<ManyBins><<<blocks, kThreads, 0, stream>>>(args);
+/// Puts pairs beyond the room of their lists into their places; and the order of the tiles.
+__global__ void __launch_bounds__(kThreads) beyond_kernel(const BatchArgs a) {
+  order_tiles(a);
+  if (a.counters->beyond > a.beyond_capacity) return;
+  const std::uint32_t n = static_cast<std::uint32_t>(a.counters->beyond);
+  for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < n; i += gridDim.x * kThreads) {
+    const BeyondPair b = a.beyond[i];
+    a.pairs[b.tile * a.list_room + b.number + a.tile_shifts[b.tile].x] = b.pair;
+  }
 }
 
 }  // namespace
 
 void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
   const unsigned blocks = static_cast<unsigned>(multiprocessors) * 16;
-  if (args.depth_bins.many()) {
-    launch<true>(args, blocks, stream);
+  const auto blocks_of = [&](unsigned tiles) { return std::min(blocks, (args.tiles + tiles - 1) / tiles); };
+  if (args.list_room != 0) {
+    list_kernel<<<blocks, kThreads, 0, stream>>>(args);
+    place_kernel<true><<<blocks_of(kThreads), kThreads, 0, stream>>>(args);
+    beyond_kernel<<<blocks, kThreads, 0, stream>>>(args);
   } else {
-    launch<false>(args, blocks, stream);
+    count_kernel<<<blocks, kThreads, 0, stream>>>(args);
+    place_kernel<false><<<blocks_of(kThreads / 32), kThreads, 0, stream>>>(args);
+    emit_kernel<<<blocks, kThreads, 0, stream>>>(args);
   }
 }
 

@@ -13,7 +13,7 @@ namespace gsnav::cuda {
 
 inline constexpr int kOrderThreads = 128;
 inline constexpr int kOrderItems = 4;  ///< a thread
-inline constexpr std::uint32_t kOrderBatch = kOrderThreads * kOrderItems;
+static_assert(kOrderThreads * kOrderItems == kOrderBatch);
 inline constexpr int kOrderBinBits = 7, kOrderBins = 1 << kOrderBinBits;
 inline constexpr int kOrderLevels = 10;  ///< of 7 bits: five for the key, five for the rank
 inline constexpr std::size_t kOrderLent = 12800;
@@ -112,16 +112,23 @@ __device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const Batc
   return begin + before;
 }
 
-/// Sorts n pairs into s.slots. All keys lie in [low, high]; low > high: not known.
+/// Pairs by places, those from `rest` on `rest_shift` further and those before it `shift`, modulo 2^32.
+struct PairsAt {
+  Pair* pairs;
+  std::uint32_t shift, rest, rest_shift;
+  __device__ Pair& operator[](std::uint32_t place) const { return pairs[place + (place < rest ? shift : rest_shift)]; }
+};
+
+/// Sorts the n pairs from `begin_pair` on into s.slots. All keys lie in [low, high]; low > high: not known.
 __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
-                                               const Pair* pairs, std::uint32_t n, std::uint32_t low,
-                                               std::uint32_t high) {
+                                               const PairsAt pairs, std::uint32_t begin_pair, std::uint32_t n,
+                                               std::uint32_t low, std::uint32_t high) {
   constexpr std::uint32_t kLongest = 64;  // bucket that is put in order by comparing all with all
   Pair pair[kOrderItems];
   std::uint32_t place[kOrderItems];
   for (unsigned j = 0; j < kOrderItems; ++j) {
     const std::uint32_t i = threadIdx.x + j * kOrderThreads;
-    if (i < n) pair[j] = pairs[i];
+    if (i < n) pair[j] = pairs[begin_pair + i];
   }
   if (low > high) {
     for (unsigned j = 0; j < kOrderItems; ++j) {
@@ -188,7 +195,7 @@ __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& 
 /// Calls f(pair) for each of [begin, end), many fetched at a time: a long list is one block's work, and
 /// waits for memory.
 template <class F>
-__device__ inline void for_each_pair(const Pair* pairs, std::uint32_t begin, std::uint32_t end,
+__device__ inline void for_each_pair(const PairsAt& pairs, std::uint32_t begin, std::uint32_t end,
                                      const F& f) {
   constexpr unsigned kFetched = 8;
   for (std::uint32_t first = begin + threadIdx.x; first < end; first += kFetched * kOrderThreads) {
@@ -204,7 +211,7 @@ __device__ inline void for_each_pair(const Pair* pairs, std::uint32_t begin, std
 
 /// Moves [begin, begin + n) from one array of pairs to the other, into bins of ascending (key, rank).
 __device__ __noinline__ inline void partition(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
-                                              const Pair* from, Pair* to, std::uint32_t begin,
+                                              const PairsAt from, const PairsAt to, std::uint32_t begin,
                                               std::uint32_t n, int level) {
   const auto range = [&](auto value) {
     std::uint32_t low = 0xffffffffu, high = 0;
@@ -270,11 +277,11 @@ class TileOrder {
     begin_ = bins.end;
     bin_ = bins.next;
     if (n <= kOrderBatch) {
-      ordering::sort_batch(s, a, camera_, a.pairs + begin, n, bins.low, bins.high);
+      ordering::sort_batch(s, a, camera_, list(a), begin, n, bins.low, bins.high);
       return n;
     }
     level_ = 0;
-    ordering::partition(s, a, camera_, a.pairs, a.pairs_alt, begin, n, 0);
+    ordering::partition(s, a, camera_, list(a), bins_of_list(a), begin, n, 0);
     return next_of_bin(s, a);
   }
 
@@ -339,8 +346,7 @@ class TileOrder {
       const std::uint32_t begin = begins[bin], n = begins[end] - begin;
       __syncthreads();
       if (threadIdx.x == 0) s.next_bin[level_] = end;
-      Pair* const here = level_ % 2 == 0 ? a.pairs_alt : a.pairs;
-      Pair* const there = level_ % 2 == 0 ? a.pairs : a.pairs_alt;
+      const ordering::PairsAt here = level_ % 2 == 0 ? bins_of_list(a) : list(a);
       if (n <= kOrderBatch) {
         const int shift = s.shifts[level_];
         std::uint32_t low = 0xffffffffu, high = 0;
@@ -348,13 +354,23 @@ class TileOrder {
           low = s.bases[level_] + (bin << shift);
           high = s.bases[level_] + (end << shift) - 1;
         }
-        ordering::sort_batch(s, a, camera_, here + begin, n, low, high);
+        ordering::sort_batch(s, a, camera_, here, begin, n, low, high);
         return n;
       }
       ++level_;
-      ordering::partition(s, a, camera_, here, there, begin, n, level_);
+      ordering::partition(s, a, camera_, here, level_ % 2 == 0 ? bins_of_list(a) : list(a), begin, n, level_);
     }
     return 0;
+  }
+
+  static constexpr std::uint32_t kNowhere = 0xffffffffu;
+  __device__ ordering::PairsAt list(const BatchArgs& a) const {
+    if (a.list_room == 0) return {a.pairs, 0, kNowhere, 0};
+    return {a.pairs, 0, (tile_ + 1) * a.list_room, a.tile_shifts[tile_].x};
+  }
+  /// What the bins of every other level are written to.
+  __device__ ordering::PairsAt bins_of_list(const BatchArgs& a) const {
+    return {a.pairs_alt, a.list_room != 0 ? a.tile_shifts[tile_].y : 0, kNowhere, 0};
   }
 
   std::uint32_t tile_, camera_, begin_, end_;

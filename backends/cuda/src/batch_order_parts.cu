@@ -175,7 +175,9 @@ __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a
     const std::uint32_t tile = a.tile_order[i], camera = tile / tiles, n = a.tile_counts[tile];
     const std::uint32_t begin = a.tile_begins[tile];
     const ListPart list{tile, 0, begin, begin + n};
-    const bool done = n <= 64    ? order_part<2>(a, list, camera)
+    const bool together = n <= a.list_room;
+    const bool done = !together ? false
+                      : n <= 64    ? order_part<2>(a, list, camera)
                       : n <= 128 ? order_part<4>(a, list, camera)
                                  : n <= 256 && order_part<8>(a, list, camera);
     if (done && threadIdx.x % 32 == 0) a.tile_order[i] = tile | kListInOrder;

@@ -116,7 +116,51 @@ cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits
   return {base, std::max(0, 23 - code.shift + kOctaves - bits), bits};
 }
 
+cuda::PlainCamera plain_camera(const BatchInstance& instance, const Vec3d& offset) {
+  const ProjectionCamera<float>& c = instance.args.camera;
+  const ProjectionCamera<double>& d = instance.args.camera64;
+  cuda::PlainCamera p{};
+  for (int r = 0; r < 3; ++r) {
+    for (int k = 0; k < 3; ++k) {
+      p.axes.rotation[3 * r + k] = c.rotation(r, k);
+      p.mean.rotation[3 * r + k] = d.rotation(r, k);
+    }
+    p.key.row[r] = c.key_rotation(2, r);
+    p.mean.offset[r] = offset[r];
+    p.key.offset[r] = static_cast<float>(offset[r]);
+  }
+  p.key.scale = c.key_scale;
+  p.key.near_plane = c.near_plane;
+  p.axes.fx = c.fx;
+  p.axes.fy = c.fy;
+  p.axes.cx = c.cx;
+  p.axes.cy = c.cy;
+  p.axes.u_min = c.u_min;
+  p.axes.u_max = c.u_max;
+  p.axes.v_min = c.v_min;
+  p.axes.v_max = c.v_max;
+  p.axes.eps2d = c.eps2d;
+  p.axes.log2_alpha_min = c.log2_alpha_min;
+  p.axes.camera = instance.camera;
+  p.mean.fx = d.fx;
+  p.mean.fy = d.fy;
+  p.mean.cx = d.cx;
+  p.mean.cy = d.cy;
+  p.code.key = c.key_code;
+  p.code.first_rank = instance.args.first_rank;
+  return p;
+}
+
 }  // namespace
+
+/// Of lists of the prepared call that hold so many pairs together: twice the mean. Few lists are much longer, but have much of
+/// the pairs.
+std::uint32_t CudaBatchRenderer::State::room_for(std::uint64_t pairs) const {
+  constexpr std::uint64_t kPairs = 32;
+  const std::uint64_t tiles = args.tiles;
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(
+      (2 * pairs + tiles * kPairs) / (tiles * kPairs) * kPairs, std::numeric_limits<std::uint32_t>::max()));
+}
 
 /// Everything of a call that the host computes, into one pinned block and on to the device.
 Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
@@ -143,9 +187,18 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   for (std::size_t s = 0; s < sets.size(); ++s) set_begins[s + 1] += set_begins[s];
   cursors.assign(set_begins.begin(), set_begins.end() - 1);
 
+  const ProjectionRules rules = projection_rules(config);
   cuda::Layout layout;
   const std::size_t at_sets = layout.add<BatchSet>(sets.size());
   const std::size_t at_instances = layout.add<BatchInstance>(seen.size());
+  const bool plain_rules =
+      config.response == Response::ewa && config.compat == Compat::none && rules.sort_order == SortOrder::z_depth &&
+      std::all_of(cameras.begin(), cameras.end(), [](const BatchCamera& c) { return c.camera.near_sigma == 0; }) &&
+      std::all_of(sets.begin(), sets.end(), [](const GaussianSet& s) {
+        return s.filter == Filter::classic && s.gaussians.axes[0].empty() && s.gaussians.sh_rotations[0].empty() &&
+               s.gaussians.origin_ids.empty();
+      });
+  const std::size_t at_plain = layout.add<cuda::PlainCamera>(plain_rules ? seen.size() : 0);
   const std::size_t at_first = layout.add<std::uint32_t>(cameras.size() + 1);
   const std::size_t at_list = layout.add<std::uint32_t>(seen.size());
   const std::size_t at_offsets = layout.add<Vec3d>(origins);
@@ -161,8 +214,8 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
 
   // ---- instances, neighbours where they are of one set
   const bool color = images.floats.rgb != nullptr || images.rgb8 != nullptr;
-  const ProjectionRules rules = projection_rules(config);
   auto* const instances = host(static_cast<BatchInstance*>(nullptr), at_instances);
+  auto* const plain = host(static_cast<cuda::PlainCamera*>(nullptr), at_plain);
   auto* const first = host(static_cast<std::uint32_t*>(nullptr), at_first);
   auto* const list = host(static_cast<std::uint32_t*>(nullptr), at_list);
   auto* const offsets = host(static_cast<Vec3d*>(nullptr), at_offsets);
@@ -189,12 +242,14 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
     const std::size_t n = std::max<std::size_t>(1, table.size);
     to.offsets = {device(static_cast<Vec3d*>(nullptr), at_offsets) + origin, n};
     to.offsets_f = {device(static_cast<Vec3<float>*>(nullptr), at_offsets_f) + origin, n};
+    const std::size_t first_origin = origin;
     const Vec3d eye = inverse(set.world_from_asset) * camera.position();
     for (std::size_t o = 0; o < n; ++o, ++origin) {
       offsets[origin] = (table.empty() ? Vec3d{} : table[o]) - eye;
       offsets_f[origin] = vec_cast<float>(offsets[origin]);
     }
     std::memcpy(instances + index, &instance, sizeof instance);
+    if (plain_rules) plain[index] = plain_camera(instance, offsets[first_origin]);
   }
   for (std::size_t c = 0; c < cameras.size(); ++c) first[c + 1] += first[c];
 
@@ -221,6 +276,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
 
   args.sets = device(static_cast<BatchSet*>(nullptr), at_sets);
   args.instances = device(static_cast<BatchInstance*>(nullptr), at_instances);
+  args.plain_cameras = plain_rules ? device(static_cast<cuda::PlainCamera*>(nullptr), at_plain) : nullptr;
   args.camera_first = device(static_cast<std::uint32_t*>(nullptr), at_first);
   args.camera_instances = device(static_cast<std::uint32_t*>(nullptr), at_list);
   args.set_count = static_cast<std::uint32_t>(sets.size());
@@ -248,12 +304,26 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   raster.rules = images.rgb8 != nullptr ? blend_rules<float>(config) : blend_rules<float>(config, images.floats);
   rgb8 = images.rgb8;
 
-  if (slot_capacity == 0) {
-    // A guess; the first calls find out.
-    slot_capacity = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(gaussians / 4, 1u << 16, 1u << 26));
-    pair_capacity = 2 * slot_capacity;
-    several_capacity = slot_capacity;
-    hard_capacity = large_capacity = slot_capacity / 16;
+  // Guesses; the first calls find out. Of what is drawn by few cameras and by many there is scratch of its own.
+  const std::uint32_t slots = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(gaussians / 4, 1u << 16, 1u << 26));
+  const auto guess = [](std::uint32_t& capacity, std::uint32_t n) {
+    if (capacity == 0) capacity = n;
+  };
+  guess(slot_capacity, slots);
+  guess(hard_capacity, slots / 32);
+  guess(large_capacity, slots / 32);
+  guess(several_capacity, few ? slots / 4 : slots / 16);
+  if (few) {
+    // Those that are drawn, and what as many warps as a multiprocessor can have may leave of their slabs.
+    entry_capacity = gaussians + std::uint64_t{64} * static_cast<std::uint64_t>(multiprocessors) * args.slab;
+    guess(pair_capacity, 2 * slots);
+  } else {
+    guess(alt_capacity, slots);
+    guess(beyond_capacity, slots / 16);
+    if (args.tiles / 2 > room_tiles || args.tiles < room_tiles / 2) {
+      list_room = room_for(std::uint64_t{2} * slots);
+      room_tiles = args.tiles;
+    }
   }
   input_bytes = layout.bytes();
   return {};

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cuda_pipeline.h>
-
+#include "batch_lists.cuh"
+#include "batch_rows.cuh"
 #include "batch_splat.cuh"
-#include "batch_tiles.cuh"
 
 // Culling and projection of a batch: what CPU backends do one camera at a time, by the same formulas.
 
@@ -113,33 +112,36 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
   }
 }
 
-template <bool Plain>
-__device__ void write_record(const BatchArgs& a, std::uint32_t slot, const BatchInstance& instance,
-                             float key, std::size_t row, const Splat& s, const SplatColor<float>& c) {
+/// `Room`: lists are not counted first.
+template <bool Plain, bool Room>
+__device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32_t source, const Splat& s,
+                             const SplatColor<float>& c) {
   const SplatGeometry<float>& g = s.geometry;
   const auto pack = [](std::uint32_t low, std::uint32_t high) { return low | high << 16; };
   const std::uint32_t x =
       pack(static_cast<std::uint32_t>(s.bounds.x0), static_cast<std::uint32_t>(s.bounds.x1));
   const std::uint32_t y =
       pack(static_cast<std::uint32_t>(s.bounds.y0), static_cast<std::uint32_t>(s.bounds.y1));
-  a.records[slot] = {pack(static_cast<std::uint32_t>(g.ref_x), static_cast<std::uint32_t>(g.ref_y)),
-                     g.a,
-                     g.k,
-                     g.b,
-                     g.w1,
-                     g.w2,
-                     g.log2_opacity,
-                     c.r,
-                     c.g,
-                     c.b,
-                     x,
-                     y};
-  const TileWindow window = window_of(a, s.bounds);
-  a.entries[slot] = {instance.args.camera.key_code(key), window.corner, window.tiles, instance.camera};
-  a.sources[slot] = instance.args.first_rank + static_cast<std::uint32_t>(row);
+  a.records[of.slot] = {pack(static_cast<std::uint32_t>(g.ref_x), static_cast<std::uint32_t>(g.ref_y)),
+                        g.a,
+                        g.k,
+                        g.b,
+                        g.w1,
+                        g.w2,
+                        g.log2_opacity,
+                        c.r,
+                        c.g,
+                        c.b,
+                        x,
+                        y};
+  if constexpr (!Room) {
+    const TileWindow window = window_of(a, s.bounds);
+    a.entries[of.slot] = {of.key, window.corner, window.tiles, of.camera};
+  }
+  a.sources[of.slot] = source;
   if (Plain) return;
-  if (a.depths != nullptr) a.depths[slot] = s.depth;
-  if (a.perspectives != nullptr) a.perspectives[slot] = s.perspective;
+  if (a.depths != nullptr) a.depths[of.slot] = s.depth;
+  if (a.perspectives != nullptr) a.perspectives[of.slot] = s.perspective;
 }
 
 /// The rows of tiles of a splat that binning takes row by row.
@@ -153,8 +155,8 @@ __device__ LargeRows large_rows(const BatchArgs& a, const SplatBounds& b) {
   return {first, static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1 - first};
 }
 
-__device__ void queue_large_row(const BatchArgs& a, unsigned long long place, std::uint32_t slot, std::uint32_t row) {
-  if (place < a.large_capacity) a.large[place] = {slot, row};
+__device__ void queue_large_row(const BatchArgs& a, unsigned long long place, const SplatKey& splat, std::uint32_t row) {
+  if (place < a.large_capacity) a.large[place] = {splat, row};
 }
 
 /// Queues the rows of the lanes that have some; all lanes call both, `ask` first, so that nobody waits for the counter
@@ -168,13 +170,14 @@ class LargeQueue {
     begin_ = end - rows.count;
     if (threadIdx.x % 32 == 31) base_ = atomicAdd(&a.counters->large, static_cast<unsigned long long>(end));
   }
-  __device__ void put(const BatchArgs& a, std::uint32_t slot, const LargeRows& rows) const {
+  __device__ void put(const BatchArgs& a, const SplatKey& splat, const LargeRows& rows) const {
     if (!any_) return;
     const unsigned long long base = __shfl_sync(kAll, base_, 31);
     share_in_warp(rows.count, [&](unsigned owner, std::uint32_t k) {
       const unsigned from = owner % 32;
-      const std::uint32_t place = __shfl_sync(kAll, begin_, from) + k, of = __shfl_sync(kAll, slot, from),
-                          row = __shfl_sync(kAll, rows.first, from) + k;
+      const std::uint32_t place = __shfl_sync(kAll, begin_, from) + k, row = __shfl_sync(kAll, rows.first, from) + k;
+      const SplatKey of{__shfl_sync(kAll, splat.slot, from), __shfl_sync(kAll, splat.key, from),
+                        __shfl_sync(kAll, splat.camera, from)};
       if (owner < 32) queue_large_row(a, base + place, of, row);
     });
   }
@@ -185,123 +188,11 @@ class LargeQueue {
   unsigned long long base_ = 0;  ///< of lane 31: where the warp's begin
 };
 
-/// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
-struct alignas(16) WarpRows {
-  float mean[3][32], quat[4][32], scales[3][32], opacity[32];
-  /// [32][rest], floats or halves as they are stored: from memory a warp would read 32 lines a
-  /// coefficient.
-  union {
-    float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
-    std::uint16_t sh_half[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
-  };
-};
-
-/// What a lane reads of its row.
-struct LaneRow {
-  float mean[3], quat[4], scales[3], opacity;
-};
-
-/// Of row `row`, or the first where there is none. Nothing is stored in between, nor decided: behind
-/// either, reads would be waited for one after the other.
-__device__ LaneRow read_row(const GaussianView& gs, std::size_t row) {
-  const std::size_t at = row < gs.size ? row : 0;
-  const bool has_axes = !gs.axes[0].empty();
-  const auto of = [&](const View<const float>& plane) {
-    return (has_axes ? gs.means[0].data : plane.data)[at];
-  };
-  LaneRow r;
-  for (int k = 0; k < 3; ++k) r.mean[k] = gs.means[k].data[at];
-  r.opacity = gs.opacities.data[at];
-  for (int k = 0; k < 4; ++k) r.quat[k] = of(gs.quats[k]);
-  for (int k = 0; k < 3; ++k) r.scales[k] = of(gs.scales[k]);
-  return r;
-}
-
-__device__ void keep_row(const LaneRow& r, WarpRows& to) {
-  const unsigned lane = threadIdx.x % 32;
-  for (int k = 0; k < 3; ++k) to.mean[k][lane] = r.mean[k];
-  to.opacity[lane] = r.opacity;
-  for (int k = 0; k < 4; ++k) to.quat[k][lane] = r.quat[k];
-  for (int k = 0; k < 3; ++k) to.scales[k][lane] = r.scales[k];
-  __syncwarp();
-}
-
-/// Copies n values, a whole number of words, behind what the warp does next.
-template <class T>
-__device__ void copy_async(T* to, const T* from, unsigned n) {
-  constexpr unsigned kWord = 4 / sizeof(T);
-  const unsigned lane = threadIdx.x % 32;
-  if (n % (4 * kWord) == 0 && reinterpret_cast<std::uintptr_t>(from) % 16 == 0) {
-    for (unsigned i = 4 * kWord * lane; i < n; i += 128 * kWord)
-      __pipeline_memcpy_async(to + i, from + i, 16);
-  } else {
-    for (unsigned i = kWord * lane; i < n; i += 32 * kWord) __pipeline_memcpy_async(to + i, from + i, 4);
-  }
-}
-
-/// ask_for_sh for the bands up to `degree` of each row, `rest` values apart, of which no others are
-/// read.
-__device__ __noinline__ void ask_for_bands(const GaussianView& gs, int degree, unsigned rest,
-                                           std::size_t first, WarpRows& to) {
-  const unsigned rows = static_cast<unsigned>(gs.size - first < 32 ? gs.size - first : 32),
-                 lane = threadIdx.x % 32;
-  const unsigned kept = static_cast<unsigned>(3 * (sh_coefficient_count(degree) - 1));
-  const std::size_t begin = rest * first;
-  for (unsigned row = 0; row < rows; ++row) {
-    if (lane >= kept) continue;  // at most 24 of degree 2
-    const std::size_t from = begin + rest * row + lane;
-    if (gs.shN_half.empty()) {
-      __pipeline_memcpy_async(to.sh + kept * row + lane, gs.shN.data + from, sizeof(float));
-    } else {
-      to.sh_half[kept * row + lane] = gs.shN_half.data[from];
-    }
-  }
-  __pipeline_commit();
-}
-
-/// Asks for the coefficients of rows `first` (lane 0) on, up to `degree` >= 1; they are there after
-/// wait_for_sh.
-__device__ void ask_for_sh(const GaussianView& gs, int degree, std::size_t first, WarpRows& to) {
-  const std::size_t rest = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
-  if (degree < gs.sh_degree) return ask_for_bands(gs, degree, static_cast<unsigned>(rest), first, to);
-  const std::size_t rows = gs.size - first < 32 ? gs.size - first : 32;
-  const unsigned n = static_cast<unsigned>(rest * rows);
-  if (gs.shN_half.empty()) {
-    copy_async(to.sh, gs.shN.data + rest * first, n);
-  } else {
-    const std::uint16_t* const from = gs.shN_half.data + rest * first;
-    copy_async(to.sh_half, from, n & ~1u);
-    if (n % 2 != 0 && threadIdx.x % 32 == 0) to.sh_half[n - 1] = from[n - 1];
-  }
-  __pipeline_commit();
-}
-
-__device__ void wait_for_sh() {
-  __pipeline_wait_prior(0);
-  __syncwarp();
-}
-
-/// Colour of row first + at after wait_for_sh; `degree` as it was asked for.
-__device__ SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t first, unsigned at,
-                                       const WarpRows& rows, const Vec3<float>& delta) {
-  GaussianView v;  // of the warp's rows
-  v.sh_degree = degree;
-  v.sh0 = {gs.sh0.data + 3 * first, 3 * 32};
-  if (gs.shN_half.empty()) {
-    v.shN = {rows.sh, 1};
-  } else {
-    v.shN_half = {rows.sh_half, 1};
-  }
-  if (!gs.sh_rotations[0].empty()) {
-    for (int k = 0; k < 4; ++k) v.sh_rotations[k] = {gs.sh_rotations[k].data + first, 32};
-  }
-  return gaussian_color<float>(v, degree, at, delta);
-}
-
 /// A warp half of an item: Gaussians are read once and projected for each camera of the mask, or where some of the
 /// cameras see some of the rows only (`SomeRows`) those of all cameras side by side.
-/// `Plain`: records of neither depth nor perspective are asked for.
-template <bool Plain, bool SomeRows>
+/// `Plain`: records of neither depth nor perspective are asked for. `PlainRules`: there are plain_cameras. `Room`: lists are not
+/// counted first.
+template <bool PlainRules, bool Plain, bool SomeRows, bool Room>
 __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
     project_kernel(const BatchArgs a) {
   __shared__ WarpRows shared[kProjectWarps];
@@ -330,45 +221,72 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
       }
       if (!__any_sync(kAll, mine != 0)) continue;
     }
-    const LaneRow read = read_row(gs, first + lane);
+    const LaneRow read = read_row<PlainRules>(gs, first + lane);
     // Instances of a set are drawn to one degree.
     const int degree =
         gs.degree_of(item.part * kChunkPart, a.instances[item.first_instance].args.sh_degree);
-    bool has_sh = !a.instances[item.first_instance].args.color || degree == 0 || existing == 0;
+    const bool color = a.instances[item.first_instance].args.color;
+    bool has_sh = !color || degree == 0 || existing == 0;
     __syncwarp();  // all lanes are done with the rows before
     if (!has_sh) ask_for_sh(gs, degree, first, rows);
     keep_row(read, rows);
     // Of lanes that `exist`: row first + at for an instance. All lanes call it together.
     const auto project_row = [&](bool exists, std::uint32_t index, unsigned at) {
-      const BatchInstance& instance = a.instances[index];
-      const ProjectArgs<float>& args = instance.args;
       const std::size_t row = first + at;
-      const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
       bool drawn = false, hard = false;
-      float key = 0;
+      std::uint32_t code = 0, camera_index = 0;
       Splat splat;
+      Vec3<float> delta;
       const Vec3<float> mean{rows.mean[0][at], rows.mean[1][at], rows.mean[2][at]};
-      const Vec3<float> delta = gsnav::detail::camera_delta(args, mean, origin);
-      const float z =
-          depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
-      if (exists && z > args.camera.near_plane) {
-        const SplatAxes<float> axes =
-            gs.axes[0].empty() ? splat_axes(args.camera.rotation, delta,
-                                            Quat<float>{rows.quat[0][at], rows.quat[1][at],
-                                                        rows.quat[2][at], rows.quat[3][at]},
-                                            Vec3<float>{rows.scales[0][at], rows.scales[1][at],
-                                                        rows.scales[2][at]})
-                               : gsnav::detail::load_axes(gs, args.camera, delta, row);
-        const Projected<float> p = project<float, float>(args.camera, axes, z, rows.opacity[at]);
-        if (p.visible) {
-          key = key_of(args, z, mean, origin);
-          hard = gsnav::detail::needs_double(args.camera, p);
-          if (!hard) {
-            double mean_x, mean_y;
-            gsnav::detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin],
-                                        mean_x, mean_y);
-            drawn = make_splat<Plain>(args.camera, a.depths != nullptr, p, axes, mean_x, mean_y, splat);
-          }
+      // Of what may be seen: the splat, or that it is hard.
+      const auto project_seen = [&](const ProjectionCamera<float>& camera, float z, const SplatAxes<float>& axes,
+                                    const auto& mean_of) {
+        const Projected<float> p = project<float, float>(camera, axes, z, rows.opacity[at]);
+        if (!p.visible) return;
+        hard = gsnav::detail::needs_double(camera, p);
+        if (hard) return;
+        double mean_x, mean_y;
+        mean_of(mean_x, mean_y);
+        drawn = make_splat<Plain>(camera, a.depths != nullptr, p, axes, mean_x, mean_y, splat);
+      };
+      const auto axes_of = [&](const Mat3<float>& rotation) {
+        return splat_axes(rotation, delta, Quat<float>{rows.quat[0][at], rows.quat[1][at], rows.quat[2][at], rows.quat[3][at]},
+                          Vec3<float>{rows.scales[0][at], rows.scales[1][at], rows.scales[2][at]});
+      };
+      if constexpr (PlainRules) {
+        const PlainCamera& packed = a.plain_cameras[index];
+        const PlainCamera::Key k = packed.key;
+        Mat3<float> key_rotation;
+        key_rotation.row[2] = {k.row[0], k.row[1], k.row[2]};
+        const Vec3<float> offset{k.offset[0], k.offset[1], k.offset[2]};
+        delta = mean + offset;
+        const float z = depth_key(key_rotation, k.scale, mean, offset);
+        camera_index = packed.axes.camera;
+        if (exists && z > k.near_plane) {
+          ProjectionCamera<float> camera = camera_of(a, packed.axes);
+          camera.near_plane = k.near_plane;
+          code = packed.code.key(z);
+          project_seen(camera, z, axes_of(camera.rotation), [&](double& x, double& y) {
+            const PlainCamera::Mean m = packed.mean;
+            gsnav::detail::project_mean(camera_of(m), vec_cast<double>(mean) + Vec3d{m.offset[0], m.offset[1], m.offset[2]},
+                                        x, y);
+          });
+        }
+      } else {
+        const BatchInstance& instance = a.instances[index];
+        const ProjectArgs<float>& args = instance.args;
+        const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
+        delta = gsnav::detail::camera_delta(args, mean, origin);
+        const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
+        camera_index = instance.camera;
+        if (exists && z > args.camera.near_plane) {
+          code = args.camera.key_code(key_of(args, z, mean, origin));
+          project_seen(args.camera, z,
+                       gs.axes[0].empty() ? axes_of(args.camera.rotation)
+                                          : gsnav::detail::load_axes(gs, args.camera, delta, row),
+                       [&](double& x, double& y) {
+                         gsnav::detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin], x, y);
+                       });
         }
       }
       const bool wanted = drawn || hard;
@@ -377,35 +295,44 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
           wanted && taken < a.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
       if (hard) {
         const unsigned long long place = atomicAdd(&a.counters->hard, 1ull);
-        if (slot != kNoSlot) a.entries[slot] = {0, 0, 0, kNoSlot};  // until it has a record
+        if (!Room && slot != kNoSlot) a.entries[slot] = {0, 0, 0, kNoSlot};  // until it has a record
         if (place < a.hard_capacity) a.hard[place] = {slot, index, static_cast<std::uint32_t>(row)};
       }
+      const SplatKey of{slot, code, camera_index};
+      const bool listed = drawn && slot != kNoSlot;
       LargeRows large{0, 0};
-      if (drawn && slot != kNoSlot && is_large(a, splat.bounds)) large = large_rows(a, splat.bounds);
+      if (listed && is_large(a, splat.bounds)) large = large_rows(a, splat.bounds);
       LargeQueue queue;
       queue.ask(a, large);
+      const bool small = listed && large.count == 0;
+      // Those whose tiles another kernel finds.
+      const bool queued = small && (Room ? is_wide(a, splat.bounds) : window_of(a, splat.bounds).tiles == 0);
+      NearPairs pairs;
+      if constexpr (Room) pairs.ask(a, camera_index, small && !queued, splat.bounds);
       if (!has_sh && __any_sync(kAll, drawn)) {
         wait_for_sh();
         has_sh = true;
       }
-      if (drawn && slot != kNoSlot) {
-        write_record<Plain>(a, slot, instance, key, row, splat,
-                            args.color ? row_color(gs, degree, first, at, rows, delta) : SplatColor<float>{});
+      if (listed) {
+        std::uint32_t first_rank;
+        if constexpr (PlainRules) {
+          first_rank = a.plain_cameras[index].code.first_rank;
+        } else {
+          first_rank = a.instances[index].args.first_rank;
+        }
+        write_record<Plain, Room>(a, of, first_rank + static_cast<std::uint32_t>(row), splat,
+                                  color ? row_color<PlainRules>(gs, degree, first, at, rows, delta) : SplatColor<float>{});
       }
-      const TileWindow window = drawn && slot != kNoSlot ? window_of(a, splat.bounds) : TileWindow{0, 0};
-      const bool single = window.tiles != 0;
-      const std::uint32_t tile = tile_of(a, instance.camera, window, 0),
-                          code = args.camera.key_code(key);
-      if (a.depth_bins.many()) {
-        add_pair<true, false>(a, single, tile, code);
-      } else {
-        add_pair<false, false>(a, single, tile, code);
+      if constexpr (Room) {
+        pairs.put(a, {code, slot});
+      } else if (small && !queued) {
+        add_to_bin(a, tile_of(a, camera_index, window_of(a, splat.bounds), 0), code);
       }
-      const bool queued = drawn && slot != kNoSlot && !single;
-      queue.put(a, slot, large);
-      const bool few_tiles = queued && large.count == 0;
-      const std::uint64_t place = several.take(few_tiles);
-      if (few_tiles && place < a.several_capacity) a.several[place] = slot;
+      queue.put(a, of, large);
+      if (__any_sync(kAll, queued)) {
+        const std::uint64_t place = several.take(queued);
+        if (queued && place < a.several_capacity) a.several[place] = of;
+      }
     };
     if constexpr (SomeRows) {
       share_in_warp(static_cast<std::uint32_t>(__popc(mine)), [&](unsigned owner, std::uint32_t n) {
@@ -422,11 +349,13 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
     }
     if (!has_sh) wait_for_sh();
   }
-  slots.rest([&](std::uint64_t slot) {
-    if (slot < a.slot_capacity) a.entries[slot] = {0, 0, 0, kNoSlot};
-  });
+  if constexpr (!Room) {
+    slots.rest([&](std::uint64_t slot) {
+      if (slot < a.slot_capacity) a.entries[slot] = {0, 0, 0, kNoSlot};
+    });
+  }
   several.rest([&](std::uint64_t place) {
-    if (place < a.several_capacity) a.several[place] = kNoSlot;
+    if (place < a.several_capacity) a.several[place] = {0, 0, kNoSlot};
   });
 }
 
@@ -450,18 +379,24 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
         color = gaussian_color<float>(gs, gs.degree_of(h.row, args.sh_degree), h.row,
                                       gsnav::detail::camera_delta(args, mean, origin));
       }
-      write_record<false>(a, h.slot, instance, key, h.row, splat, color);
+      const SplatKey of{h.slot, args.camera.key_code(key), instance.camera};
+      const std::uint32_t source = args.first_rank + h.row;
+      const bool counted = a.list_room == 0;
+      if (counted) {
+        write_record<false, false>(a, of, source, splat, color);
+      } else {
+        write_record<false, true>(a, of, source, splat, color);
+      }
       const TileWindow window = window_of(a, splat.bounds);
-      if (window.tiles != 0) {
-        atomicAdd(a.bins + bin_of(a, tile_of(a, instance.camera, window, 0), args.camera.key_code(key)),
-                  1u);
+      if (counted && window.tiles != 0) {
+        add_to_bin(a, tile_of(a, of.camera, window, 0), of.key);
       } else if (is_large(a, splat.bounds)) {
         const LargeRows rows = large_rows(a, splat.bounds);
         const unsigned long long place = atomicAdd(&a.counters->large, static_cast<unsigned long long>(rows.count));
-        for (std::uint32_t k = 0; k < rows.count; ++k) queue_large_row(a, place + k, h.slot, rows.first + k);
+        for (std::uint32_t k = 0; k < rows.count; ++k) queue_large_row(a, place + k, of, rows.first + k);
       } else {
         const unsigned long long place = atomicAdd(&a.counters->several, 1ull);
-        if (place < a.several_capacity) a.several[place] = h.slot;
+        if (place < a.several_capacity) a.several[place] = of;
       }
     }
   }
@@ -476,10 +411,14 @@ void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t 
   const auto project = [&](auto kernel) {
     kernel<<<static_cast<unsigned>(multiprocessors) * kProjectBlocks, 32 * kProjectWarps, 0, stream>>>(args);
   };
+  const auto of_lists = [&]<bool SomeRows, bool Room>() {
+    if (plain && args.plain_cameras != nullptr) return project(project_kernel<true, true, SomeRows, Room>);
+    project(plain ? project_kernel<false, true, SomeRows, Room> : project_kernel<false, false, SomeRows, Room>);
+  };
   if (args.seen_rows) {
-    project(plain ? project_kernel<true, true> : project_kernel<false, true>);
+    args.list_room != 0 ? of_lists.template operator()<true, true>() : of_lists.template operator()<true, false>();
   } else {
-    project(plain ? project_kernel<true, false> : project_kernel<false, false>);
+    args.list_room != 0 ? of_lists.template operator()<false, true>() : of_lists.template operator()<false, false>();
   }
   project_hard_kernel<<<blocks, 128, 0, stream>>>(args);
 }

@@ -17,21 +17,25 @@ std::uint32_t grown(unsigned long long needed) {
 constexpr std::size_t kCounterWords =
     (sizeof(cuda::BatchCounters) + 255) / 256 * 256 / sizeof(std::uint32_t);
 
+std::size_t bin_words(const cuda::BatchArgs& args) { return std::size_t{args.tiles} << args.depth_bins.bits; }
+
 /// Counters of the call and of the bins.
-std::size_t zeroed_words(const cuda::BatchArgs& args) {
-  return kCounterWords + (std::size_t{args.tiles} << args.depth_bins.bits);
-}
+std::size_t zeroed_words(const cuda::BatchArgs& args) { return kCounterWords + bin_words(args); }
 
 }  // namespace
 
 void CudaBatchRenderer::State::size_scratch() {
   const auto size = [](auto& array, std::size_t n) {
-    array.resize_discard(n);
+    array.resize_exactly(n);  // capacities have room already
     return array.data();
   };
   args.items = size(items, item_capacity);
   args.records = size(records, slot_capacity);
-  args.entries = size(entries, slot_capacity);
+  const bool counted = args.depth_bins.many();
+  constexpr std::uint64_t kPlaces = std::numeric_limits<std::uint32_t>::max();
+  args.list_room =
+      counted ? 0 : static_cast<std::uint32_t>(std::min<std::uint64_t>(list_room, (kPlaces - beyond_capacity) / args.tiles));
+  args.entries = size(entries, counted ? std::min<std::uint64_t>(slot_capacity, entry_capacity) : 0);
   args.sources = size(sources, slot_capacity);
   args.hard = size(hard, hard_capacity);
   args.several = size(several, several_capacity);
@@ -42,12 +46,14 @@ void CudaBatchRenderer::State::size_scratch() {
   args.bins = zeroed.data() + kCounterWords;
   args.tile_counts = size(tile_counts, args.tiles);
   args.tile_begins = size(tile_begins, args.tiles);
+  args.tile_shifts = counted ? nullptr : size(tile_shifts, args.tiles);
   args.tile_order = size(tile_order, args.tiles);
-  args.part_capacity = args.depth_bins.many() ? args.tiles + pair_capacity / cuda::kPartLength : 0;
+  args.part_capacity = counted ? args.tiles + pair_capacity / cuda::kPartLength : 0;
   args.parts = size(parts, args.part_capacity);
   args.long_parts = size(long_parts, args.part_capacity);
-  args.pairs = size(pairs, pair_capacity);
-  args.pairs_alt = size(pairs_alt, pair_capacity);
+  args.pairs = size(pairs, counted ? pair_capacity : std::size_t{args.tiles} * args.list_room + beyond_capacity);
+  args.pairs_alt = size(pairs_alt, counted ? pair_capacity : alt_capacity);
+  args.beyond = size(beyond, counted ? 0 : beyond_capacity);
   // Where pixels are many beside survivors, a record each is less than projecting median Gaussians once
   // more.
   const DepthMode mode = raster.depth_mode();
@@ -66,13 +72,23 @@ void CudaBatchRenderer::State::size_scratch() {
   args.several_capacity = several_capacity;
   args.large_capacity = large_capacity;
   args.pair_capacity = pair_capacity;
+  args.beyond_capacity = beyond_capacity;
+  args.alt_capacity = alt_capacity;
   stats.scratch_bytes = inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
                         entries.capacity_bytes() + sources.capacity_bytes() + hard.capacity_bytes() +
                         several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() +
                         long_parts.capacity_bytes() + zeroed.capacity_bytes() +
-                        3 * tile_counts.capacity_bytes() + pairs.capacity_bytes() +
-                        pairs_alt.capacity_bytes() + depths.capacity_bytes() +
+                        tile_counts.capacity_bytes() + tile_begins.capacity_bytes() +
+                        tile_shifts.capacity_bytes() + tile_order.capacity_bytes() + pairs.capacity_bytes() +
+                        pairs_alt.capacity_bytes() + beyond.capacity_bytes() + depths.capacity_bytes() +
                         perspectives.capacity_bytes() + meshes.bytes();
+}
+
+void CudaBatchRenderer::State::fit_room(const cuda::BatchCounters& n) {
+  if (args.list_room == 0) return;
+  // Not for little: arrays would move and launches be recorded again.
+  const std::uint32_t wanted = room_for(n.pairs);
+  if (n.beyond > n.pairs / 16 && wanted > list_room + list_room / 8) list_room = wanted;
 }
 
 cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight) const {
@@ -88,11 +104,12 @@ cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight)
   add(address(to.rgb), address(to.alpha), address(to.median_depth), address(to.expected_depth),
       address(to.accumulated_depth), address(to.first_hit_depth), address(rgb8));
   // Arrays move when they grow, and only then. Those of tiles have no capacity of their own here.
-  add(slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity);
+  add(slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity, beyond_capacity,
+      alt_capacity, args.list_room);
   add(address(args.items), address(args.bins), address(args.tile_counts), address(args.tile_begins),
       address(args.tile_order), address(args.records), address(args.parts), address(args.long_parts),
       address(args.pairs), address(args.depths), address(args.perspectives), address(raster.mesh.depth),
-      address(raster.mesh.color));
+      address(raster.mesh.color), address(args.plain_cameras));
   return key;
 }
 
@@ -129,6 +146,7 @@ Status CudaBatchRenderer::State::launch() {
   cuda::Flight& flight = flights[calls % cuda::kInFlight];
   if (flight.has_meshes) size_layers();
   size_scratch();
+  flight.counted = args.list_room == 0;
   const cuda::LaunchKey key = launch_key(flight);
   if (key != flight.key) {
     flight.forget_recorded();
@@ -188,7 +206,9 @@ Status CudaBatchRenderer::finish() {
     const cuda::BatchCounters& n = *flight.counters;
     const cuda::MeshCounters of_meshes =
         flight.has_meshes ? *flight.mesh_counters : cuda::MeshCounters{};
-    if (std::max({n.slots, n.pairs, of_meshes.most}) >= std::numeric_limits<std::uint32_t>::max()) {
+    // Places of pairs have 32 bits, and lists have room for one pair at least.
+    const unsigned long long places = n.pairs + grown(n.beyond) + s.args.tiles;
+    if (std::max({n.slots, places, of_meshes.most}) >= std::numeric_limits<std::uint32_t>::max()) {
       s.finished = s.calls;
       return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(n.slots) +
                                      " visible Gaussians, " + std::to_string(n.pairs) +
@@ -205,8 +225,14 @@ Status CudaBatchRenderer::finish() {
     fit(s.hard_capacity, n.hard);
     fit(s.several_capacity, n.several);
     fit(s.large_capacity, n.large);
-    fit(s.pair_capacity, n.pairs);
+    if (flight.counted) {
+      fit(s.pair_capacity, n.pairs);
+    } else {
+      fit(s.beyond_capacity, n.beyond);
+      fit(s.alt_capacity, n.alt);
+    }
     fit(s.triangle_capacity, of_meshes.most);
+    if (s.finished + 1 == s.calls) s.fit_room(n);
     s.stats.tile_intersections = n.pairs;
     s.stats.parts_read = n.items;
     s.stats.meshes = {flight.mesh_triangles, of_meshes.not_finite, of_meshes.drawn, 0};

@@ -42,4 +42,33 @@ __device__ inline bool make_splat64(const ProjectArgs<float>& args, bool depth, 
   return make_splat<false>(args.camera64, depth, p, axes, p.mean_x, p.mean_y, out);
 }
 
+/// The float camera that `p` packs, but for its key.
+__device__ inline ProjectionCamera<float> camera_of(const BatchArgs& a, const PlainCamera::Axes& p) {
+  ProjectionCamera<float> c;
+  for (int i = 0; i < 9; ++i) c.rotation.row[i / 3][i % 3] = p.rotation[i];
+  c.fx = p.fx;
+  c.fy = p.fy;
+  c.cx = p.cx;
+  c.cy = p.cy;
+  c.u_min = p.u_min;
+  c.u_max = p.u_max;
+  c.v_min = p.v_min;
+  c.v_max = p.v_max;
+  c.width = a.grid.width;
+  c.height = a.grid.height;
+  c.eps2d = p.eps2d;
+  c.log2_alpha_min = p.log2_alpha_min;
+  return c;
+}
+
+__device__ inline ProjectionCamera<double> camera_of(const PlainCamera::Mean& p) {
+  ProjectionCamera<double> c;
+  for (int i = 0; i < 9; ++i) c.rotation.row[i / 3][i % 3] = p.rotation[i];
+  c.fx = p.fx;
+  c.fy = p.fy;
+  c.cx = p.cx;
+  c.cy = p.cy;
+  return c;
+}
+
 }  // namespace gsnav::cuda

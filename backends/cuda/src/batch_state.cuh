@@ -27,7 +27,7 @@ inline void need(cudaError_t e, const char* what) {
 
 /// What the launches of a call depend on besides the contents of its inputs: addresses, capacities and
 /// counts.
-using LaunchKey = std::array<std::uint64_t, 40>;
+using LaunchKey = std::array<std::uint64_t, 44>;
 
 /// Arrays laid one after the other into one block, so that one copy takes them to the device.
 class Layout {
@@ -72,6 +72,7 @@ struct Flight {
   cudaEvent_t done = nullptr;
   LaunchKey key{};
   cudaGraphExec_t recorded = nullptr;
+  bool counted = false;  ///< lists were counted first
 
   void forget_recorded() noexcept {
     if (recorded != nullptr) cudaGraphExecDestroy(recorded);
@@ -146,8 +147,9 @@ struct CudaBatchRenderer::State {
         records(b),
         entries(b),
         large(b),
-        sources(b),
         several(b),
+        tile_shifts(b),
+        sources(b),
         zeroed(b),
         tile_counts(b),
         tile_begins(b),
@@ -159,6 +161,7 @@ struct CudaBatchRenderer::State {
         parts(b),
         pairs(b),
         pairs_alt(b),
+        beyond(b),
         meshes(b) {
     int device = 0;
     cuda::need(cudaGetDevice(&device), "cudaGetDevice");
@@ -186,6 +189,9 @@ struct CudaBatchRenderer::State {
                  const BatchImages& images);
   /// What meshes the prepared cameras see, into the same call's pinned memory.
   Status place_meshes(std::span<const BatchCamera> cameras);
+  std::uint32_t room_for(std::uint64_t pairs) const;
+  /// What lists of the next call have room for, by what those of the last needed.
+  void fit_room(const cuda::BatchCounters& n);
   void size_scratch();
   void size_layers();
   /// Draws them, into a layer for each camera.
@@ -207,21 +213,26 @@ struct CudaBatchRenderer::State {
   Array<cuda::SplatRecord> records;
   Array<cuda::SplatEntry> entries;
   Array<cuda::LargeRow> large;
-  Array<std::uint32_t> sources, several, zeroed, tile_counts, tile_begins, tile_order, long_parts;
+  Array<cuda::SplatKey> several;
+  Array<uint2> tile_shifts;
+  Array<std::uint32_t> sources, zeroed, tile_counts, tile_begins, tile_order, long_parts;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
   Array<cuda::HardSplat> hard;
   Array<cuda::ListPart> parts;
   Array<cuda::Pair> pairs, pairs_alt;
+  Array<cuda::BeyondPair> beyond;
   cuda::BatchMeshes meshes;
   cuda::BatchArgs args{};
   RasterArgs<float> raster;
   std::uint8_t* rgb8 = nullptr;
   std::size_t input_bytes = 0;
-  std::uint64_t item_capacity = 0;  ///< of the call
+  std::uint64_t item_capacity = 0;   ///< of the call
+  std::uint64_t entry_capacity = 0;  ///< slots that the call may take, at most
   bool recordable = true;
   std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0,
-                pair_capacity = 0;
+                pair_capacity = 0, beyond_capacity = 0, alt_capacity = 0;
+  std::uint32_t list_room = 0, room_tiles = 0;  ///< of lists that are not counted first; the tiles that it was chosen for
   std::uint32_t triangle_capacity = 0;  ///< of meshes, a wave
   BatchStats stats;
 

@@ -21,19 +21,9 @@ __device__ inline std::uint32_t bin_of(const BatchArgs& a, std::uint32_t tile, s
   return (tile << a.depth_bins.bits) + a.depth_bins.of(key);
 }
 
-/// Adds one to the counter of each lane that wants it, and returns its place there. All lanes of the warp call it.
-/// Lanes often share a list, and one may be in great demand: one atomic operation a list, unless it has many bins.
-template <bool ManyBins, bool Place>
-__device__ inline std::uint32_t add_pair(const BatchArgs& a, bool wanted, std::uint32_t tile, std::uint32_t key) {
-  if constexpr (ManyBins) return wanted ? atomicAdd(a.bins + bin_of(a, tile, key), 1u) : 0;
-  const unsigned takers = __ballot_sync(0xffffffffu, wanted);
-  if (!wanted) return 0;
-  const unsigned lane = threadIdx.x % 32, peers = __match_any_sync(takers, tile);
-  const int leader = __ffs(static_cast<int>(peers)) - 1;
-  std::uint32_t at = 0;
-  if (static_cast<int>(lane) == leader) at = atomicAdd(a.bins + tile, static_cast<std::uint32_t>(__popc(peers)));
-  if constexpr (!Place) return 0;
-  return __shfl_sync(peers, at, leader) + static_cast<std::uint32_t>(__popc(peers & ((1u << lane) - 1)));
+/// Counts a pair of lists in bins, and returns its place there once these have theirs.
+__device__ inline std::uint32_t add_to_bin(const BatchArgs& a, std::uint32_t tile, std::uint32_t key) {
+  return atomicAdd(a.bins + bin_of(a, tile, key), 1u);
 }
 
 /// The first tile of a camera.
@@ -65,12 +55,21 @@ __device__ inline std::uint32_t tile_of(const BatchArgs& a, std::uint32_t camera
 }
 
 /// The sum of `value` over the lanes up to this one. All lanes of the warp call it.
-__device__ inline std::uint32_t sum_to_lane(std::uint32_t value) {
+template <class T>
+__device__ inline T sum_to_lane(T value) {
   for (unsigned step = 1; step < 32; step *= 2) {
-    const std::uint32_t other = __shfl_up_sync(0xffffffffu, value, step);
+    const T other = __shfl_up_sync(0xffffffffu, value, step);
     if (threadIdx.x % 32 >= step) value += other;
   }
   return value;
+}
+
+/// A warp's share of a counter: the place of each lane that takes `count`, one after the other. All lanes call it.
+__device__ inline unsigned long long take_places(unsigned long long* counter, std::uint32_t count) {
+  const unsigned long long end = sum_to_lane(static_cast<unsigned long long>(count));
+  unsigned long long base = 0;
+  if (threadIdx.x % 32 == 31 && end != 0) base = atomicAdd(counter, end);
+  return __shfl_sync(0xffffffffu, base, 31) + end - count;
 }
 
 /// Calls f(owner, i) for i in [0, count) of each lane `owner`, all of the warp's calls shared evenly by its lanes. All

@@ -38,6 +38,12 @@ class Buffer {
     size_ = n;
   }
 
+  /// The same with no room for more, for sizes that have it already.
+  void resize_exactly(std::size_t n) {
+    if (n > capacity_) grow(n, n);
+    size_ = n;
+  }
+
   /// Makes room for as many as the other has room for, and drops the content if it has to grow.
   void grow_to(const Buffer& o) {
     if (o.capacity_ > capacity_) grow(o.capacity_, o.capacity_);

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "batch_tiles.cuh"
+
+// Pairs as they are found, into lists that have room for so many each: nothing is found twice. What comes beyond is queued.
+
+namespace gsnav::cuda {
+
+/// Pairs of one tile for each lane that wants one: their numbers in their lists are asked for, and used later. Lanes often share a
+/// list, and one may be in great demand: one atomic operation a list. All lanes of the warp call both together.
+class WarpPairs {
+ public:
+  __device__ void ask(const BatchArgs& a, bool wanted, std::uint32_t tile) {
+    takers_ = __ballot_sync(kAll, wanted);
+    if (!wanted) return;
+    const unsigned lane = threadIdx.x % 32, peers = __match_any_sync(takers_, tile);
+    leader_ = __ffs(static_cast<int>(peers)) - 1;
+    before_ = static_cast<std::uint32_t>(__popc(peers & ((1u << lane) - 1)));
+    if (static_cast<int>(lane) == leader_) number_ = atomicAdd(a.bins + tile, static_cast<std::uint32_t>(__popc(peers)));
+  }
+  __device__ void put(const BatchArgs& a, std::uint32_t tile, const Pair& pair) const {
+    if (takers_ == 0) return;
+    const std::uint32_t number = __shfl_sync(kAll, number_, leader_) + before_;
+    const bool wanted = (takers_ >> threadIdx.x % 32 & 1u) != 0, fits = number < a.list_room;
+    if (wanted && fits) a.pairs[std::size_t{tile} * a.list_room + number] = pair;
+    const unsigned late = __ballot_sync(kAll, wanted && !fits);
+    if (late != 0) queue(&a.counters->beyond, a.beyond, a.beyond_capacity, late, {tile, number, pair});
+  }
+
+ private:
+  static constexpr unsigned kAll = 0xffffffffu;
+
+  /// Of the lanes `late`. Rare, and not to weigh on what is not: nor may it be given the address of a kernel's arguments.
+  static __device__ __noinline__ void queue(unsigned long long* counter, BeyondPair* to, std::uint32_t capacity,
+                                            unsigned late, BeyondPair pair) {
+    const unsigned lane = threadIdx.x % 32;
+    unsigned long long place = 0;
+    if (lane == 0) place = atomicAdd(counter, static_cast<unsigned long long>(__popc(late)));
+    place = __shfl_sync(kAll, place, 0) + static_cast<unsigned>(__popc(late & ((1u << lane) - 1)));
+    if ((late >> lane & 1u) != 0 && place < capacity) to[place] = pair;
+  }
+
+  unsigned takers_ = 0;
+  int leader_ = 0;
+  std::uint32_t number_ = 0, before_ = 0;
+};
+
+/// Whether a splat lies in more than 2 x 2 tiles.
+__device__ inline bool is_wide(const BatchArgs& a, const SplatBounds& b) {
+  const int shift = a.grid.tile_shift();
+  return ((b.x1 - 1) >> shift) - (b.x0 >> shift) > 1 || ((b.y1 - 1) >> shift) - (b.y0 >> shift) > 1;
+}
+
+/// The pairs of the lanes' splats that are not wide: of all tiles that bounds reach.
+class NearPairs {
+ public:
+  /// Nobody waits for what is asked until `put`.
+  __device__ void ask(const BatchArgs& a, std::uint32_t camera, bool wanted, const SplatBounds& b) {
+    const int shift = a.grid.tile_shift();
+    const int tx = b.x0 >> shift, ty = b.y0 >> shift;
+    columns_ = static_cast<std::uint32_t>(a.grid.columns);
+    tile_ = first_tile(a, camera) + static_cast<std::uint32_t>(ty) * columns_ + static_cast<std::uint32_t>(tx);
+    const bool right = (b.x1 - 1) >> shift != tx, below = (b.y1 - 1) >> shift != ty;
+    pairs_[0].ask(a, wanted, tile_of(0));
+    pairs_[1].ask(a, wanted && right, tile_of(1));
+    pairs_[2].ask(a, wanted && below, tile_of(2));
+    pairs_[3].ask(a, wanted && right && below, tile_of(3));
+  }
+  __device__ void put(const BatchArgs& a, const Pair& pair) const {
+#pragma unroll
+    for (unsigned i = 0; i < 4; ++i) pairs_[i].put(a, tile_of(i), pair);
+  }
+
+ private:
+  __device__ std::uint32_t tile_of(unsigned i) const { return tile_ + i % 2 + i / 2 * columns_; }
+
+  std::uint32_t tile_ = 0, columns_ = 0;
+  WarpPairs pairs_[4];
+};
+
+}  // namespace gsnav::cuda

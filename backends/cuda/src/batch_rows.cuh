@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cuda_pipeline.h>
+
+#include "batch_args.cuh"
+
+// The rows of a warp of projection: read once, and kept for all cameras of an item.
+
+namespace gsnav::cuda {
+
+/// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
+struct alignas(16) WarpRows {
+  float mean[3][32], quat[4][32], scales[3][32], opacity[32];
+  /// [32][rest], floats or halves as they are stored: from memory a warp would read 32 lines a
+  /// coefficient.
+  union {
+    float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
+    std::uint16_t sh_half[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
+  };
+};
+
+/// What a lane reads of its row.
+struct LaneRow {
+  float mean[3], quat[4], scales[3], opacity;
+};
+
+/// Of row `row`, or the first where there is none. Nothing is stored in between, nor decided: behind
+/// either, reads would be waited for one after the other.
+template <bool PlainRules>
+__device__ inline LaneRow read_row(const GaussianView& gs, std::size_t row) {
+  const std::size_t at = row < gs.size ? row : 0;
+  const bool has_axes = !PlainRules && !gs.axes[0].empty();
+  const auto of = [&](const View<const float>& plane) {
+    return (has_axes ? gs.means[0].data : plane.data)[at];
+  };
+  LaneRow r;
+  for (int k = 0; k < 3; ++k) r.mean[k] = gs.means[k].data[at];
+  r.opacity = gs.opacities.data[at];
+  for (int k = 0; k < 4; ++k) r.quat[k] = of(gs.quats[k]);
+  for (int k = 0; k < 3; ++k) r.scales[k] = of(gs.scales[k]);
+  return r;
+}
+
+__device__ inline void keep_row(const LaneRow& r, WarpRows& to) {
+  const unsigned lane = threadIdx.x % 32;
+  for (int k = 0; k < 3; ++k) to.mean[k][lane] = r.mean[k];
+  to.opacity[lane] = r.opacity;
+  for (int k = 0; k < 4; ++k) to.quat[k][lane] = r.quat[k];
+  for (int k = 0; k < 3; ++k) to.scales[k][lane] = r.scales[k];
+  __syncwarp();
+}
+
+/// Copies n values, a whole number of words, behind what the warp does next.
+template <class T>
+__device__ inline void copy_async(T* to, const T* from, unsigned n) {
+  constexpr unsigned kWord = 4 / sizeof(T);
+  const unsigned lane = threadIdx.x % 32;
+  if (n % (4 * kWord) == 0 && reinterpret_cast<std::uintptr_t>(from) % 16 == 0) {
+    for (unsigned i = 4 * kWord * lane; i < n; i += 128 * kWord)
+      __pipeline_memcpy_async(to + i, from + i, 16);
+  } else {
+    for (unsigned i = kWord * lane; i < n; i += 32 * kWord) __pipeline_memcpy_async(to + i, from + i, 4);
+  }
+}
+
+/// ask_for_sh for the bands up to `degree` of each row, `rest` values apart, of which no others are
+/// read.
+__device__ __noinline__ inline void ask_for_bands(const GaussianView& gs, int degree, unsigned rest,
+                                           std::size_t first, WarpRows& to) {
+  const unsigned rows = static_cast<unsigned>(gs.size - first < 32 ? gs.size - first : 32),
+                 lane = threadIdx.x % 32;
+  const unsigned kept = static_cast<unsigned>(3 * (sh_coefficient_count(degree) - 1));
+  const std::size_t begin = rest * first;
+  for (unsigned row = 0; row < rows; ++row) {
+    if (lane >= kept) continue;  // at most 24 of degree 2
+    const std::size_t from = begin + rest * row + lane;
+    if (gs.shN_half.empty()) {
+      __pipeline_memcpy_async(to.sh + kept * row + lane, gs.shN.data + from, sizeof(float));
+    } else {
+      to.sh_half[kept * row + lane] = gs.shN_half.data[from];
+    }
+  }
+  __pipeline_commit();
+}
+
+/// Asks for the coefficients of rows `first` (lane 0) on, up to `degree` >= 1; they are there after
+/// wait_for_sh.
+__device__ inline void ask_for_sh(const GaussianView& gs, int degree, std::size_t first, WarpRows& to) {
+  const std::size_t rest = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  if (degree < gs.sh_degree) return ask_for_bands(gs, degree, static_cast<unsigned>(rest), first, to);
+  const std::size_t rows = gs.size - first < 32 ? gs.size - first : 32;
+  const unsigned n = static_cast<unsigned>(rest * rows);
+  if (gs.shN_half.empty()) {
+    copy_async(to.sh, gs.shN.data + rest * first, n);
+  } else {
+    const std::uint16_t* const from = gs.shN_half.data + rest * first;
+    copy_async(to.sh_half, from, n & ~1u);
+    if (n % 2 != 0 && threadIdx.x % 32 == 0) to.sh_half[n - 1] = from[n - 1];
+  }
+  __pipeline_commit();
+}
+
+__device__ inline void wait_for_sh() {
+  __pipeline_wait_prior(0);
+  __syncwarp();
+}
+
+/// Colour of row first + at after wait_for_sh; `degree` as it was asked for.
+template <bool PlainRules>
+__device__ inline SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t first, unsigned at,
+                                       const WarpRows& rows, const Vec3<float>& delta) {
+  GaussianView v;  // of the warp's rows
+  v.sh_degree = degree;
+  v.sh0 = {gs.sh0.data + 3 * first, 3 * 32};
+  if (gs.shN_half.empty()) {
+    v.shN = {rows.sh, 1};
+  } else {
+    v.shN_half = {rows.sh_half, 1};
+  }
+  if (!PlainRules && !gs.sh_rotations[0].empty()) {
+    for (int k = 0; k < 4; ++k) v.sh_rotations[k] = {gs.sh_rotations[k].data + first, 32};
+  }
+  return gaussian_color<float>(v, degree, at, delta);
+}
+
+}  // namespace gsnav::cuda
