@@ -9,7 +9,6 @@
 #include "support/scenes.hpp"
 
 #if defined(GSNAV_HAS_CUDA)
-#include "gsnav/backends/cuda/pinned.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 #include "ops/cuda_batch_images.hpp"
 #include "ops/no_gpu.hpp"
@@ -289,101 +288,6 @@ TEST_CASE("cuda batch: the same bits on every run, in any company") {
   CHECK(differing(alone.frames.rgb, seventh(many.frames.rgb, 3)) == 0);
   CHECK(differing(alone.frames.median_depth, seventh(many.frames.median_depth, 1)) == 0);
   check_same(draw_batch(cuda, renderer, {arrays.set()}, crowd, {}, kMedianOnly).frames, many.frames);
-}
-
-TEST_CASE("cuda batch: calls that differ in their cameras alone are replayed, with the same bits") {
-  if (no_gpu("cuda batch replays")) return;
-  CudaBackend cuda;
-  const GaussianCloud cloud = random_cloud(31, {.count = 2500, .needle = 0.2});
-  const GaussianArrays<CudaBackend> arrays(cuda, cloud);
-  const std::vector<Camera> cameras = ring(12, 72, 50);
-  const std::vector<GaussianSet> sets{arrays.set()};
-  const std::size_t pixels = 72 * 50;
-  const auto frames_of = [&](CudaBatchRenderer& renderer, float* images, const Camera& camera) {
-    BatchImages to;
-    to.floats.rgb = images;
-    to.floats.median_depth = images + 3 * pixels;
-    cuda.fill(images, 0xa5, 4 * pixels * sizeof(float));
-    const std::vector<BatchCamera> one{{camera, {}}};
-    renderer.render(sets, one, to).throw_if_error();
-    renderer.finish().throw_if_error();
-    std::vector<float> out(4 * pixels);
-    cuda.copy(out.data(), images, out.size() * sizeof(float), CopyKind::device_to_host);
-    REQUIRE(cuda.synchronize().ok());
-    return out;
-  };
-  Buffer<float, CudaBackend> images(cuda), elsewhere(cuda);
-  images.resize_discard(4 * pixels);
-  elsewhere.resize_discard(4 * pixels);
-  CudaBatchRenderer renderer(cuda);
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const std::vector<float> got = frames_of(renderer, images.data(), cameras[i]);
-    if (i >= 8) CHECK(renderer.stats().replayed);
-    CudaBatchRenderer fresh(cuda);
-    CHECK(differing(got, frames_of(fresh, images.data(), cameras[i])) == 0);
-    CHECK_FALSE(fresh.stats().replayed);
-  }
-  // Other images: not the recorded launches.
-  const std::vector<float> moved = frames_of(renderer, elsewhere.data(), cameras[3]);
-  CHECK_FALSE(renderer.stats().replayed);
-  CHECK(differing(moved, frames_of(renderer, images.data(), cameras[3])) == 0);
-}
-
-TEST_CASE("cuda batch: images go to another stream and to pinned memory without the host waiting") {
-  if (no_gpu("cuda batch hand-over")) return;
-  CudaBackend cuda, learner;
-  const GaussianCloud cloud = random_cloud(41, {.count = 20000});
-  const GaussianArrays<CudaBackend> arrays(cuda, cloud);
-  const std::vector<GaussianSet> sets{arrays.set()};
-  const std::vector<Camera> cameras = ring(8, 128, 96);
-  const std::size_t values = 8 * 128 * 96;
-  Buffer<float, CudaBackend> depth(cuda), taken(learner);
-  depth.resize_discard(values);
-  taken.resize_discard(values);
-  PinnedArray<float> here(values), there(values);
-  std::vector<BatchCamera> batch;
-  for (const Camera& c : cameras) batch.push_back({c, {}});
-  BatchImages to;
-  to.floats.median_depth = depth.data();
-  CudaBatchRenderer renderer(cuda);
-  renderer.render(sets, batch, to).throw_if_error();
-  renderer.finish().throw_if_error();  // scratch has grown
-  for (int run = 0; run < (is_emulated() ? 2 : 5); ++run) {
-    cuda.fill(depth.data(), 0xa5, values * sizeof(float));
-    renderer.render(sets, batch, to).throw_if_error();
-    cuda.copy(here.data(), depth.data(), values * sizeof(float), CopyKind::device_to_host);
-    cuda.hand_over_to(learner.stream());
-    learner.copy(taken.data(), depth.data(), values * sizeof(float), CopyKind::device_to_device);
-    learner.copy(there.data(), taken.data(), values * sizeof(float), CopyKind::device_to_host);
-    learner.hand_over_to(cuda.stream());  // the next images wait until these are taken
-    renderer.finish().throw_if_error();
-    REQUIRE(learner.synchronize().ok());
-    std::size_t wrong = 0, seen = 0;
-    for (std::size_t i = 0; i < values; ++i) {
-      wrong += here.data()[i] == there.data()[i] ? 0u : 1u;
-      seen += here.data()[i] > 0.1f ? 1u : 0u;
-    }
-    CHECK(wrong == 0);
-    CHECK(seen > values / 4);
-  }
-}
-
-TEST_CASE("cuda batch: scratch that is too small grows, and says so") {
-  if (no_gpu("cuda batch overflow")) return;
-  CudaBackend cuda;
-  const GaussianCloud small = random_cloud(11, {.count = 50});
-  const GaussianCloud big = random_cloud(12, {.count = is_emulated() ? 20000 : 60000, .needle = 0.2});
-  const GaussianArrays<CudaBackend> few(cuda, small), many(cuda, big);
-  const std::vector<Camera> cameras = ring(9, 96, 80);
-  CudaBatchRenderer renderer(cuda);
-  CHECK(draw_batch(cuda, renderer, {few.set()}, cameras, {}, kMedianOnly).stats.reruns == 0);
-  const Batch grown = draw_batch(cuda, renderer, {many.set()}, cameras, {}, kMedianOnly);
-  CHECK(grown.stats.reruns > 0);
-  check_same(grown.frames, singly(cuda, {many.set()}, cameras, {}, {}, kMedianOnly));
-  const Batch steady = draw_batch(cuda, renderer, {many.set()}, cameras, {}, kMedianOnly);
-  CHECK(steady.stats.reruns == 0);
-  CHECK(steady.stats.scratch_bytes == grown.stats.scratch_bytes);
-  check_same(steady.frames, grown.frames);
 }
 
 TEST_CASE("cuda batch: an empty view, no sets, and what cannot be drawn") {

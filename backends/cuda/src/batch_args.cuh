@@ -133,6 +133,7 @@ struct DepthBins {
   __device__ std::uint32_t of(std::uint32_t key) const {
     return key <= base ? 0 : min((key - base) >> shift, count() - 1);
   }
+  bool operator==(const DepthBins&) const = default;
 };
 
 /// Counts go on where capacities end, so that they say what would have been needed. Each has a line of memory of its own:
@@ -202,6 +203,7 @@ struct BatchArgs {
   std::uint32_t pair_capacity;                                  ///< where lists are counted first
   std::uint32_t beyond_capacity, alt_capacity;  ///< where they have room
   std::uint32_t slab;  ///< slots that a warp takes at a time: few cameras leave few to share them
+  bool operator==(const BatchArgs&) const = default;
 };
 
 __device__ inline std::uint32_t used(unsigned long long count, std::uint32_t capacity) {

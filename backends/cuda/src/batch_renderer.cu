@@ -25,35 +25,40 @@ std::size_t zeroed_words(const cuda::BatchArgs& args) { return kCounterWords + b
 }  // namespace
 
 void CudaBatchRenderer::State::size_scratch() {
-  const auto size = [](auto& array, std::size_t n) {
-    array.resize_exactly(n);  // capacities have room already
+  const auto exactly = [](auto& array, std::size_t n) {
+    array.resize_exactly(n);
     return array.data();
   };
-  args.items = size(items, item_capacity);
-  args.records = size(records, slot_capacity);
+  // Of sizes that calls give, and not capacities, which have room already.
+  const auto with_room = [](auto& array, std::size_t n) {
+    array.resize_discard(n);
+    return array.data();
+  };
+  args.items = with_room(items, item_capacity);
+  args.records = exactly(records, slot_capacity);
   const bool counted = args.depth_bins.many();
   constexpr std::uint64_t kPlaces = std::numeric_limits<std::uint32_t>::max();
   args.list_room =
       counted ? 0 : static_cast<std::uint32_t>(std::min<std::uint64_t>(list_room, (kPlaces - beyond_capacity) / args.tiles));
-  args.entries = size(entries, counted ? std::min<std::uint64_t>(slot_capacity, entry_capacity) : 0);
-  args.sources = size(sources, slot_capacity);
-  args.hard = size(hard, hard_capacity);
-  args.several = size(several, several_capacity);
-  args.large = size(large, large_capacity);
+  args.entries = with_room(entries, counted ? std::min<std::uint64_t>(slot_capacity, entry_capacity) : 0);
+  args.sources = exactly(sources, slot_capacity);
+  args.hard = exactly(hard, hard_capacity);
+  args.several = exactly(several, several_capacity);
+  args.large = exactly(large, large_capacity);
   // Counters of both kinds together, so that one operation clears them.
-  size(zeroed, zeroed_words(args));
+  with_room(zeroed, zeroed_words(args));
   args.counters = reinterpret_cast<cuda::BatchCounters*>(zeroed.data());
   args.bins = zeroed.data() + kCounterWords;
-  args.tile_counts = size(tile_counts, args.tiles);
-  args.tile_begins = size(tile_begins, args.tiles);
-  args.tile_shifts = counted ? nullptr : size(tile_shifts, args.tiles);
-  args.tile_order = size(tile_order, args.tiles);
+  args.tile_counts = with_room(tile_counts, args.tiles);
+  args.tile_begins = with_room(tile_begins, args.tiles);
+  args.tile_shifts = counted ? nullptr : with_room(tile_shifts, args.tiles);
+  args.tile_order = with_room(tile_order, args.tiles);
   args.part_capacity = counted ? args.tiles + pair_capacity / cuda::kPartLength : 0;
-  args.parts = size(parts, args.part_capacity);
-  args.long_parts = size(long_parts, args.part_capacity);
-  args.pairs = size(pairs, counted ? pair_capacity : std::size_t{args.tiles} * args.list_room + beyond_capacity);
-  args.pairs_alt = size(pairs_alt, counted ? pair_capacity : alt_capacity);
-  args.beyond = size(beyond, counted ? 0 : beyond_capacity);
+  args.parts = exactly(parts, args.part_capacity);
+  args.long_parts = exactly(long_parts, args.part_capacity);
+  args.pairs = exactly(pairs, counted ? pair_capacity : std::size_t{args.tiles} * args.list_room + beyond_capacity);
+  args.pairs_alt = exactly(pairs_alt, counted ? pair_capacity : alt_capacity);
+  args.beyond = exactly(beyond, counted ? 0 : beyond_capacity);
   // Where pixels are many beside survivors, a record each is less than projecting median Gaussians once
   // more.
   const DepthMode mode = raster.depth_mode();
@@ -63,8 +68,8 @@ void CudaBatchRenderer::State::size_scratch() {
       mode == DepthMode::any || !raster.mesh.empty() ||
       (mode == DepthMode::median && 2 * pixels >= 5 * std::size_t{slot_capacity});
   const bool perspective = config.response != Response::ewa;
-  args.depths = records_depths ? size(depths, slot_capacity) : nullptr;
-  args.perspectives = perspective ? size(perspectives, slot_capacity) : nullptr;
+  args.depths = records_depths ? exactly(depths, slot_capacity) : nullptr;
+  args.perspectives = perspective ? exactly(perspectives, slot_capacity) : nullptr;
   raster.depths = {args.depths, records_depths ? slot_capacity : 0};
   raster.perspectives = {args.perspectives, perspective ? slot_capacity : 0};
   args.slot_capacity = slot_capacity;
@@ -89,28 +94,6 @@ void CudaBatchRenderer::State::fit_room(const cuda::BatchCounters& n) {
   // Not for little: arrays would move and launches be recorded again.
   const std::uint32_t wanted = room_for(n.pairs);
   if (n.beyond > n.pairs / 16 && wanted > list_room + list_room / 8) list_room = wanted;
-}
-
-cuda::LaunchKey CudaBatchRenderer::State::launch_key(const cuda::Flight& flight) const {
-  cuda::LaunchKey key{};
-  std::size_t n = 0;
-  const auto add = [&](auto... values) { ((key.at(n++) = static_cast<std::uint64_t>(values)), ...); };
-  const auto address = [](const void* p) { return reinterpret_cast<std::uintptr_t>(p); };
-  const FrameImages<float>& to = raster.images;
-  add(args.units, args.set_count, args.cameras, args.grid.width, args.grid.height, input_bytes,
-      args.depth_bins.base, args.depth_bins.bits, args.seen_rows);
-  add(address(args.sets), address(args.instances), address(args.camera_first),
-      address(args.camera_instances), address(flight.inputs.data));
-  add(address(to.rgb), address(to.alpha), address(to.median_depth), address(to.expected_depth),
-      address(to.accumulated_depth), address(to.first_hit_depth), address(rgb8));
-  // Arrays move when they grow, and only then. Those of tiles have no capacity of their own here.
-  add(slot_capacity, hard_capacity, several_capacity, large_capacity, pair_capacity, beyond_capacity,
-      alt_capacity, args.list_room);
-  add(address(args.items), address(args.bins), address(args.tile_counts), address(args.tile_begins),
-      address(args.tile_order), address(args.records), address(args.parts), address(args.long_parts),
-      address(args.pairs), address(args.depths), address(args.perspectives), address(raster.mesh.depth),
-      address(raster.mesh.color), address(args.plain_cameras));
-  return key;
 }
 
 void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
@@ -145,9 +128,9 @@ cudaGraphExec_t CudaBatchRenderer::State::record(const cuda::Flight& flight) {
 Status CudaBatchRenderer::State::launch() {
   cuda::Flight& flight = flights[calls % cuda::kInFlight];
   if (flight.has_meshes) size_layers();
+  flight.triangle_capacity = triangle_capacity;
   size_scratch();
-  flight.counted = args.list_room == 0;
-  const cuda::LaunchKey key = launch_key(flight);
+  const cuda::LaunchKey key{args, raster.images, rgb8, raster.mesh.depth, raster.mesh.color, flight.inputs.data, input_bytes};
   if (key != flight.key) {
     flight.forget_recorded();
     flight.key = key;
@@ -185,11 +168,37 @@ Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<co
     return {Errc::invalid_argument, "CudaBatchRenderer: call finish() at least once in " +
                                         std::to_string(cuda::kInFlight) + " calls of render()"};
   }
+  s.prepared = false;
   if (Status status = s.prepare(sets, cameras, images); !status) return status;
   if (Status status = s.place_meshes(cameras); !status) return status;
   if (Status status = s.launch(); !status) return status;
+  s.prepared = true;
   ++s.calls;
   return {};
+}
+
+bool CudaBatchRenderer::State::had_room(const cuda::Flight& flight) {
+  const cuda::BatchCounters& n = *flight.counters;
+  const cuda::BatchArgs& was = flight.key.args;
+  bool had = true;
+  // Another call may have grown it since.
+  const auto fit = [&](std::uint32_t& capacity, std::uint32_t then, unsigned long long count) {
+    if (count <= then) return;
+    if (count > capacity) capacity = grown(count);
+    had = false;
+  };
+  fit(slot_capacity, was.slot_capacity, n.slots);
+  fit(hard_capacity, was.hard_capacity, n.hard);
+  fit(several_capacity, was.several_capacity, n.several);
+  fit(large_capacity, was.large_capacity, n.large);
+  if (was.depth_bins.many()) {
+    fit(pair_capacity, was.pair_capacity, n.pairs);
+  } else {
+    fit(beyond_capacity, was.beyond_capacity, n.beyond);
+    fit(alt_capacity, was.alt_capacity, n.alt);
+  }
+  if (flight.has_meshes) fit(triangle_capacity, flight.triangle_capacity, flight.mesh_counters->most);
+  return had;
 }
 
 Status CudaBatchRenderer::finish() {
@@ -207,7 +216,7 @@ Status CudaBatchRenderer::finish() {
     const cuda::MeshCounters of_meshes =
         flight.has_meshes ? *flight.mesh_counters : cuda::MeshCounters{};
     // Places of pairs have 32 bits, and lists have room for one pair at least.
-    const unsigned long long places = n.pairs + grown(n.beyond) + s.args.tiles;
+    const unsigned long long places = n.pairs + grown(n.beyond) + flight.key.args.tiles;
     if (std::max({n.slots, places, of_meshes.most}) >= std::numeric_limits<std::uint32_t>::max()) {
       s.finished = s.calls;
       return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(n.slots) +
@@ -215,47 +224,26 @@ Status CudaBatchRenderer::finish() {
                                      " tile intersections and " + std::to_string(of_meshes.most) +
                                      " triangles: draw fewer cameras a call"};
     }
-    bool fits = true;
-    const auto fit = [&](std::uint32_t& capacity, unsigned long long count) {
-      if (count <= capacity) return;
-      capacity = grown(count);
-      fits = false;
-    };
-    fit(s.slot_capacity, n.slots);
-    fit(s.hard_capacity, n.hard);
-    fit(s.several_capacity, n.several);
-    fit(s.large_capacity, n.large);
-    if (flight.counted) {
-      fit(s.pair_capacity, n.pairs);
-    } else {
-      fit(s.beyond_capacity, n.beyond);
-      fit(s.alt_capacity, n.alt);
-    }
-    fit(s.triangle_capacity, of_meshes.most);
-    if (s.finished + 1 == s.calls) s.fit_room(n);
+    const bool had_room = s.had_room(flight);
+    const bool last = s.finished + 1 == s.calls;
+    if (last && s.prepared) s.fit_room(n);
     s.stats.tile_intersections = n.pairs;
     s.stats.parts_read = n.items;
     s.stats.meshes = {flight.mesh_triangles, of_meshes.not_finite, of_meshes.drawn, 0};
-    if (fits) {
-      ++s.finished;
-      continue;
-    }
-    if (s.finished + 1 < s.calls) {  // what it was to draw has been overwritten
-      lost = true;
+    if (had_room || !last || !s.prepared) {
+      lost = lost || !had_room;  // what another call has overwritten
       ++s.finished;
       continue;
     }
     ++s.stats.reruns;
-    --s.calls;
-    const Status again = s.launch();
+    --s.calls;  // made again, unless that fails
+    if (Status again = s.launch(); !again) return again;
     ++s.calls;
-    if (!again) return again;
   }
   if (lost) {
     return {Errc::out_of_memory,
-            "CudaBatchRenderer: scratch was too small for a batch that another followed before "
-            "finish(); its "
-            "images are not whole. There is room for it now: draw it again"};
+            "CudaBatchRenderer: scratch was too small for a batch that another call of render() followed before "
+            "finish(); its images are not whole. There is room for it now: draw it again"};
   }
   return s.backend.synchronize();
 }

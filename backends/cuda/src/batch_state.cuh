@@ -25,9 +25,16 @@ inline void need(cudaError_t e, const char* what) {
   }
 }
 
-/// What the launches of a call depend on besides the contents of its inputs: addresses, capacities and
-/// counts.
-using LaunchKey = std::array<std::uint64_t, 44>;
+/// What the launches of a call depend on besides the contents of its inputs.
+struct LaunchKey {
+  BatchArgs args;
+  FrameImages<float> images;
+  std::uint8_t* rgb8 = nullptr;
+  const float *mesh_depth = nullptr, *mesh_color = nullptr;
+  const unsigned char* inputs = nullptr;  ///< pinned
+  std::size_t input_bytes = 0;
+  bool operator==(const LaunchKey&) const = default;
+};
 
 /// Arrays laid one after the other into one block, so that one copy takes them to the device.
 class Layout {
@@ -69,10 +76,10 @@ struct Flight {
   MeshCounters* mesh_counters = nullptr;
   bool has_meshes = false;
   std::uint64_t mesh_triangles = 0;  ///< of all instances
+  std::uint32_t triangle_capacity = 0;
   cudaEvent_t done = nullptr;
-  LaunchKey key{};
+  LaunchKey key{};  ///< of the last call
   cudaGraphExec_t recorded = nullptr;
-  bool counted = false;  ///< lists were counted first
 
   void forget_recorded() noexcept {
     if (recorded != nullptr) cudaGraphExecDestroy(recorded);
@@ -198,7 +205,8 @@ struct CudaBatchRenderer::State {
   void enqueue_layers(const cuda::Flight& flight);
   /// Of the call that has been prepared.
   Status launch();
-  cuda::LaunchKey launch_key(const cuda::Flight& flight) const;
+  /// Whether what a call needed was there. Where not, capacities grow.
+  bool had_room(const cuda::Flight& flight);
   void enqueue(const cuda::Flight& flight);
   /// The launches as a graph, or null where the stream cannot be recorded.
   cudaGraphExec_t record(const cuda::Flight& flight);
@@ -230,6 +238,7 @@ struct CudaBatchRenderer::State {
   std::uint64_t item_capacity = 0;   ///< of the call
   std::uint64_t entry_capacity = 0;  ///< slots that the call may take, at most
   bool recordable = true;
+  bool prepared = false;  ///< `args`, `raster` and `meshes` are those of the last call made
   std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0,
                 pair_capacity = 0, beyond_capacity = 0, alt_capacity = 0;
   std::uint32_t list_room = 0, room_tiles = 0;  ///< of lists that are not counted first; the tiles that it was chosen for

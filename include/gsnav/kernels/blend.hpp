@@ -200,6 +200,7 @@ struct FrameImages {
     if (expected_depth != nullptr || accumulated_depth != nullptr || first_hit_depth != nullptr) return DepthMode::any;
     return median_depth != nullptr ? DepthMode::median : DepthMode::none;
   }
+  bool operator==(const FrameImages&) const = default;
 };
 
 /// Where tiles are kept between the slices of depth that a frame is blended in.

@@ -32,6 +32,7 @@ struct TileGrid {
     return static_cast<std::size_t>(y / tile_size) * static_cast<std::size_t>(columns) +
            static_cast<std::size_t>(x / tile_size);
   }
+  bool operator==(const TileGrid&) const = default;
 };
 
 /// The cells of 4x4 pixels of an image that still take splats, as a summed-area table: what asks for them asks for

@@ -73,8 +73,10 @@ class CudaBatchRenderer {
   Status render(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                 const BatchImages& images);
 
-  /// Waits for the last `render`. Where scratch was too small, grows it and draws that batch again.
-  /// Arrays and images of that call must still be there. Errors: backend_failure, unsupported.
+  /// Waits for every `render` since the last `finish`. Where scratch was too small for the last of them, grows it and
+  /// draws that batch again: arrays and images of that call must still be there. Errors: out_of_memory where it was too
+  /// small for an earlier one, or for the last and `render` has failed since: those images are not whole, and there is
+  /// room for them now; backend_failure; unsupported naming counts that 32 bits do not hold. Throws as `render` does.
   Status finish();
 
   /// Of the last batch that `finish()` saw.
