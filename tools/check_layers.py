@@ -15,7 +15,6 @@ RANK = {"base": 0, "math": 1, "core": 2, "kernels": 3, "ops": 4, "scene": 5, "av
 # avatar may include these
 DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface_material.hpp"}
 UMBRELLA = {"math", "core", "kernels", "ops", "scene", "avatar", "base"}
-# Intrinsics that the standard library's headers do not reach.
 # Not standard, but there wherever the code that includes them is compiled.
 PLATFORM_HEADERS = {"immintrin.h", "arm_neon.h", "sys/mman.h", "unistd.h"}
 SOURCES = {".hpp", ".cpp", ".h", ".inl", ".cu", ".cuh"}

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/io/mesh_file.hpp"
 
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string_view>
 
 #include "file.hpp"
+#include "gsnav/core/lower_case.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -109,11 +109,7 @@ Result<TriangleMesh> load_obj(const std::filesystem::path& path) {
 
 namespace {
 
-std::string extension_of(const std::filesystem::path& path) {
-  std::string out = path.extension().string();
-  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return out;
-}
+std::string extension_of(const std::filesystem::path& path) { return lower_case(path.extension().string()); }
 
 bool is_gltf(const std::string& extension) { return extension == ".glb" || extension == ".gltf"; }
 

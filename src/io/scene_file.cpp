@@ -2,7 +2,6 @@
 #include "gsnav/io/scene_file.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <utility>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "cloud_fill.hpp"
 #include "described.hpp"
 #include "file.hpp"
+#include "gsnav/core/lower_case.hpp"
 #include "gsnav/io/gltf.hpp"
 #include "gsnav/io/ksplat.hpp"
 #include "gsnav/io/lod_set.hpp"
@@ -69,9 +69,7 @@ Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& optio
     if (fs::exists(path / "lod-meta.json", ignored)) return load_lod_set(path, {.level = options.level});
     return {Errc::file_not_found, name + ": the folder has no meta.json and no lod-meta.json"};
   }
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(path.extension().string());
   if (extension == ".ply") return load_ply_at(path, options, apart);
   if (extension == ".npz") return load_npz_at(path, options);
   if (extension == ".sog") return load_sog(path);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cctype>
-
 #include "file.hpp"
+#include "gsnav/core/lower_case.hpp"
 #include "gsnav/io/gltf.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
@@ -19,8 +18,7 @@ Status save_scene(const std::filesystem::path& path, const GaussianCloud& cloud)
       return save_scene(path, widened);
     });
   }
-  std::string name = path.filename().string();
-  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string name = lower_case(path.filename().string());
   if (name.ends_with(".compressed.ply")) return save_compressed_ply(path, cloud);
   if (name.ends_with(".ply")) return save_ply(path, cloud);
   if (name.ends_with(".splat")) return save_splat(path, cloud);

@@ -2,8 +2,9 @@
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <filesystem>
+
+#include "gsnav/core/lower_case.hpp"
 
 namespace gsnav_navmesh {
 namespace {
@@ -20,9 +21,7 @@ const char kDescription[] =
 }  // namespace
 
 InputKind kind_of(const std::string& input) {
-  std::string extension = std::filesystem::path(input).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = gsnav::lower_case(std::filesystem::path(input).extension().string());
   if (extension == ".navmesh" || extension == ".bin") return InputKind::navmesh;
   return extension == ".obj" ? InputKind::mesh : InputKind::gaussians;
 }

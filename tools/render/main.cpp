@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -23,6 +22,7 @@
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
+#include "gsnav/core/lower_case.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/lod_file.hpp"
@@ -346,8 +346,7 @@ int main(int argc, char** argv) {
   for (const std::string& file : o.meshes) {
     auto surface = io::load_textured_scene(file);
     if (!surface) return fail(surface.message());
-    std::string kind = std::filesystem::path(file).extension().string();
-    std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const std::string kind = lower_case(std::filesystem::path(file).extension().string());
     std::size_t triangles = 0;
     for (TexturedPart& part : surface->parts) {
       triangles += part.geometry.triangles.size();

@@ -9,7 +9,7 @@ namespace gsnav::emulated {
 /// as it gets.
 std::uint64_t seed();
 
-/// GSNAV_EMULATED_PROCESSORS: multiprocessors that the device says it has, 1 to 1024; 8 unless told.
+/// GSNAV_EMULATED_PROCESSORS: multiprocessors that the device says it has, 1 to 1024; 4 unless told.
 std::uint64_t processors();
 
 }  // namespace gsnav::emulated

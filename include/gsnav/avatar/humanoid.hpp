@@ -153,7 +153,8 @@ inline Result<AvatarActor> make_walker(std::shared_ptr<const AvatarAsset> asset,
                              std::make_shared<const WalkTrajectory>(std::move(*path)), options);
 }
 
-/// Somebody who stands at `position`, turned by `yaw` (radians about +Y), in the asset's idle pose.
+/// Somebody who stands at `position`, turned by `yaw` (radians about +Y), in the asset's idle pose. Metres.
+/// Errors: as of AvatarActor::create.
 inline Result<AvatarActor> make_stander(std::shared_ptr<const AvatarAsset> asset, const Vec3d& position,
                                         double yaw = 0.0, const ActorOptions& options = {}) {
   return AvatarActor::create(std::move(asset), nullptr,

@@ -225,7 +225,7 @@ class HumanoidWeigher {
   std::vector<double> distance_;
 };
 
-/// Fills cloud and weights of `asset` with the surface of `shape`.
+/// Fills cloud and weights of `asset` with the surface of `shape`. Errors: as of AvatarAsset::set_weights.
 inline Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& shape, AvatarAsset& asset) {
   std::vector<double> density;
   for (const Lobe& l : shape.lobes) {

@@ -12,6 +12,7 @@
 
 #include "gsnav/avatar/retarget.hpp"
 #include "gsnav/avatar/skeleton.hpp"
+#include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/status.hpp"
 
 namespace gsnav {
@@ -65,9 +66,7 @@ inline std::string plain_joint_name(std::string_view name) {
     for (const char c : name.substr(bar + 1)) digits = digits && std::isdigit(static_cast<unsigned char>(c)) != 0;
     if (digits) name = name.substr(0, bar);
   }
-  std::string out;
-  for (const char c : name) out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return out;
+  return lower_case(std::string(name));
 }
 
 }  // namespace detail

@@ -55,7 +55,8 @@ struct HabitatDataset {
 /// unsupported (a stage with a scale for each axis); out_of_memory. Never throws.
 Result<HabitatDataset> load_habitat_dataset(const std::filesystem::path& path);
 
-/// Reads one stage.
+/// Reads one stage. Errors name the file and the key: file_not_found; invalid_file (also: no render_asset); unsupported
+/// (a scale for each axis); out_of_memory. Never throws.
 Result<StageConfig> load_stage_config(const std::filesystem::path& path);
 
 }  // namespace gsnav::io

@@ -34,6 +34,7 @@ class NpzFile {
   Result<NpyArray> read(const std::string& name) const;
 
   /// A text array (`<U...` or `|S...`) of a single element. Other characters than ASCII become '?'.
+  /// Errors: as of read; invalid_file too where it is no text, or not one.
   Result<std::string> read_text(const std::string& name) const;
 
  private:

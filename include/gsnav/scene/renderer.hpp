@@ -185,12 +185,13 @@ class Renderer {
   }
 
   /// Renders frames that share nothing: each sees its own sets and goes to images in host memory, of its camera's
-  /// size, that its caller has (a null pointer: not made). The same bits as one at a time. `stats` [jobs].
+  /// size, that its caller has (a null pointer: not made). The same bits as one at a time. `stats` [jobs]. Errors: as of render above.
   Status render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats) {
     return render_jobs(jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
   }
 
   /// One frame into images in the backend's memory, which are there once the backend has been synchronised.
+  /// Errors: as of render above.
   Status render_on_backend(const FrameJob<S>& job, RenderStats& stats) {
     return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, job.images, &stats);
   }

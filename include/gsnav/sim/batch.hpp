@@ -81,6 +81,7 @@ class BatchSimulator {
   }
   /// The same over scenes that are loaded in the background and leave when they are not needed. `next_episode` is asked
   /// for the next episode of an environment already when one begins, so that its scene can be loaded meanwhile.
+  /// Errors: invalid_argument (names the field or sensor).
   static Result<BatchSimulator> create_from_library(B& backend, std::shared_ptr<SceneLibrary> library, BatchConfig config,
                                                     std::size_t environments, EpisodeSource next_episode) {
     if (library == nullptr) return {Errc::invalid_argument, "BatchSimulator: the library of scenes is null"};

@@ -37,7 +37,7 @@ Status validate(const EpisodeRules& rules);
 Result<PointNavEpisode> generate_episode(const NavMesh& navmesh, Rng& rng,
                                          const EpisodeRules& rules = {});
 
-/// Draws `count` episodes with ids "0", "1", ... from one seed.
+/// Draws `count` episodes with ids "0", "1", ... from one seed. Errors: as above.
 Result<std::vector<PointNavEpisode>> generate_episodes(const NavMesh& navmesh, std::size_t count,
                                                        std::uint64_t seed,
                                                        const EpisodeRules& rules = {});

@@ -52,7 +52,7 @@ class FrameBatch<B> {
 
   /// Images in host memory. Errors: what rendering reports. Throws gsnav::Error (out_of_memory).
   Status render(std::span<const FrameJob<float>> jobs) { return render(jobs, CopyKind::device_to_host); }
-  /// The same into the backend's memory.
+  /// The same into the backend's memory, errors too.
   Status render_on_backend(std::span<const FrameJob<float>> jobs) {
     return render(jobs, CopyKind::device_to_device);
   }

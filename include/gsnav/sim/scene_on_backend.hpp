@@ -160,14 +160,16 @@ class SceneOnBackend {
   /// How many times an avatar was posed so far.
   std::size_t pose_count() const noexcept { return pose_count_; }
 
-  /// Poses slot `slot` for time t, for whoever looks; nothing is done where it is so already.
+  /// Poses slot `slot` for time t (seconds on the scene's clock), for whoever looks; nothing is done where it is so
+  /// already. Errors: what skinning reports.
   Status pose(std::size_t slot, double t) {
     Slot& s = at(slot);
     if (s.whole && s.time == t) return {};
     return posed(s, t, true, [&] { return s.people.pose(scene_->avatars, t); });
   }
   /// The same for what these cameras see, in two steps: avatars that none of them can see cost little. The first is the
-  /// host's alone: several threads may take it, each for another slot, once there are so many (make_slots).
+  /// host's alone: several threads may take it, each for another slot, once there are so many (make_slots). Errors: as
+  /// of pose.
   Status prepare(std::size_t slot, double t, std::span<const Camera> cameras, const RenderConfig& config) {
     Slot& s = *slots_[slot];
     s.whole = false;

@@ -85,7 +85,7 @@ class Simulator {
   static Result<Simulator> create(B& backend, SimulatorScene scene, SimulatorConfig config) {
     return create(backend, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(config));
   }
-  /// `others` adds bodies to the scene's avatars, numbered behind them.
+  /// `others` adds bodies to the scene's avatars, numbered behind them. Errors: as above.
   static Result<Simulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene, SimulatorConfig config,
                                   World::BodySource others = {}) {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
@@ -118,7 +118,7 @@ class Simulator {
     return observe();
   }
 
-  /// Renders what the agent sees now, without acting.
+  /// Renders what the agent sees now, without acting. Errors: what rendering reports.
   Result<Observations> observe() {
     Observations obs;
     static_cast<StepInfo&>(obs) = world_.last_step();
@@ -147,7 +147,7 @@ class Simulator {
   /// Everything that changes while it runs, and the way back to it; observe() then sees what was seen there.
   const WorldState& state() const noexcept { return world_.state(); }
   void set_state(const WorldState& state) { world_.set_state(state); }
-  /// As World::set_agent.
+  /// As World::set_agent: metres, radians, its errors.
   Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0) {
     return world_.set_agent(position, yaw, pitch);
   }
@@ -160,6 +160,7 @@ class Simulator {
   std::size_t render_count() const noexcept { return rig_.render_count() + spectator_count_; }
 
   /// Renders any camera at the present time (a map, a spectator). Images live until the next call.
+  /// Errors: what Renderer::render reports.
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) {
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
     RenderConfig rc = config_.render;

@@ -109,13 +109,14 @@ class World {
   /// `state` comes from a World of the same NavMesh, settings and bodies.
   void set_state(const WorldState& state) { s_ = state; }
   /// Puts the agent somewhere else on the surface; no time passes and nothing is counted. Errors: nothing_navigable
-  /// off the NavMesh or on an island without the goal; invalid_argument (not finite; no episode is running).
+  /// off the NavMesh or on an island without the goal; invalid_argument (not finite; no episode is running). Metres in the
+  /// world, yaw and pitch in radians.
   Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0);
 
-  /// The bodies over [t0, t1]. A policy may look ahead with it; avatars are scripted, so this is what
-  /// will happen.
+  /// The bodies over [t0, t1], seconds on the scene's clock. A policy may look ahead with it; avatars are scripted, so
+  /// this is what will happen. Errors: what CapsuleSet::create reports.
   Result<CapsuleSet> bodies(double t0, double t1) const;
-  /// Query 1: how far the agent is from the nearest body now. Errors: what CapsuleSet::create reports.
+  /// Query 1: how far the agent is from the nearest body now, metres. Errors: what CapsuleSet::create reports.
   Result<Clearance> clearance() const;
   /// Query 2: what the next action would do, without doing it: the code of step() on the same bodies.
   /// Errors: as step.
