@@ -41,7 +41,7 @@ Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path);
 Result<TexturedScene> load_gltf_scene(const std::filesystem::path& path);
 
 /// Reads what load_mesh reads with what it looks like: glTF by load_gltf_scene, others as one white part.
-/// Errors: as of load_mesh. Never throws.
+/// Errors: as of load_mesh.
 Result<TexturedScene> load_textured_scene(const std::filesystem::path& path);
 
 /// A mesh by its extension: OBJ, PLY or glTF. Error beside its reader's: unsupported (another extension).

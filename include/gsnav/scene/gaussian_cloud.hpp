@@ -258,8 +258,9 @@ struct LoadedCloud {
 };
 
 /// Appends `b` to `a`; the SH degree becomes the larger (missing bands are zero). Used to merge the
-/// tiles of one scene. Chunks lose their bounds: sort again. Errors, with `a` as it was: invalid_argument where filters,
-/// sort orders or colour spaces differ, or one is compact (expand_sh).
+/// tiles of one scene. Chunks lose their bounds: sort again. An empty `a` becomes `b`.
+/// Errors, with `a` as it was: invalid_argument where filters, sort orders or colour spaces differ, or one is compact
+/// (expand_sh).
 inline Status append(GaussianCloud& a, const GaussianCloud& b) {
   if (!a.shN_half.empty() || !b.shN_half.empty()) {
     return {Errc::invalid_argument, "compact clouds cannot be merged: expand_sh first"};

@@ -144,7 +144,10 @@ class Renderer {
   }
 
   /// Renders all sets, as one sorted list, from each camera; all cameras have one size. `sets` hold
-  /// arrays in the backend's memory. Errors: invalid_argument (names the field), backend_failure.
+  /// arrays in the backend's memory. Errors: invalid_argument (names the field; no camera; cameras of several sizes);
+  /// unsupported (2^32 Gaussians or triangles in a frame; meshes on a backend that knows none, or with MeshAlpha::blend
+  /// under Composite::hard_depth); backend_failure. Throws gsnav::Error (out_of_memory) where scratch cannot be
+  /// allocated; where threads render whole frames of a batch, that is returned.
   Result<Frames<S>> render(std::span<const GaussianSet> sets, std::span<const Camera> cameras) {
     Frames<S> frames;
     if (Status s = render(sets, cameras, frames); !s) return s;
@@ -185,13 +188,14 @@ class Renderer {
   }
 
   /// Renders frames that share nothing: each sees its own sets and goes to images in host memory, of its camera's
-  /// size, that its caller has (a null pointer: not made). The same bits as one at a time. `stats` [jobs]. Errors: as of render above.
+  /// size, that its caller has (a null pointer: not made). The same bits as one at a time. `stats` [jobs].
+  /// Errors: as of render above, of the first job that fails.
   Status render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats) {
     return render_jobs(jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
   }
 
   /// One frame into images in the backend's memory, which are there once the backend has been synchronised.
-  /// Errors: as of render above.
+  /// Errors: as of render above; what fails on a device after the call is for `synchronize()` to report.
   Status render_on_backend(const FrameJob<S>& job, RenderStats& stats) {
     return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, job.images, &stats);
   }

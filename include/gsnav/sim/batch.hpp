@@ -67,7 +67,7 @@ template <Backend B>
 class BatchSimulator {
  public:
   /// `next_episode` is asked for each episode of each environment; see EpisodeSource. Errors: invalid_argument (names
-  /// the field, sensor or scene).
+  /// the field, sensor or scene); unsupported, naming a sensor whose images cannot stay where BatchConfig::images says.
   static Result<BatchSimulator> create(B& backend, std::vector<std::shared_ptr<const SimulatorScene>> scenes,
                                        BatchConfig config, std::size_t environments, EpisodeSource next_episode) {
     for (const auto& scene : scenes) {
@@ -81,7 +81,8 @@ class BatchSimulator {
   }
   /// The same over scenes that are loaded in the background and leave when they are not needed. `next_episode` is asked
   /// for the next episode of an environment already when one begins, so that its scene can be loaded meanwhile.
-  /// Errors: invalid_argument (names the field or sensor).
+  /// Errors: as above; invalid_argument where `library` is null. What loading a scene reports comes from the reset or
+  /// step that needs it.
   static Result<BatchSimulator> create_from_library(B& backend, std::shared_ptr<SceneLibrary> library, BatchConfig config,
                                                     std::size_t environments, EpisodeSource next_episode) {
     if (library == nullptr) return {Errc::invalid_argument, "BatchSimulator: the library of scenes is null"};
