@@ -17,6 +17,13 @@ using namespace gsnav_test;
 
 namespace {
 
+/// That see all sets.
+std::vector<BatchCamera> batch_of(const std::vector<Camera>& cameras) {
+  std::vector<BatchCamera> batch;
+  for (const Camera& c : cameras) batch.push_back({c, {}});
+  return batch;
+}
+
 /// RGB and median depth of all cameras, drawn into `images`: where that stays, launches may be replayed.
 std::vector<float> draw_into(CudaBackend& cuda, CudaBatchRenderer& renderer, float* images,
                              const std::vector<GaussianSet>& sets, const std::vector<Camera>& cameras) {
@@ -26,9 +33,7 @@ std::vector<float> draw_into(CudaBackend& cuda, CudaBatchRenderer& renderer, flo
   to.floats.rgb = images;
   to.floats.median_depth = images + 3 * pixels;
   cuda.fill(images, 0xa5, 4 * pixels * sizeof(float));
-  std::vector<BatchCamera> batch;
-  for (const Camera& c : cameras) batch.push_back({c, {}});
-  renderer.render(sets, batch, to).throw_if_error();
+  renderer.render(sets, batch_of(cameras), to).throw_if_error();
   renderer.finish().throw_if_error();
   std::vector<float> out(4 * pixels);
   cuda.copy(out.data(), images, out.size() * sizeof(float), CopyKind::device_to_host);
@@ -100,8 +105,7 @@ TEST_CASE("cuda batch: images go to another stream and to pinned memory without 
   depth.resize_discard(values);
   taken.resize_discard(values);
   PinnedArray<float> here(values), there(values);
-  std::vector<BatchCamera> batch;
-  for (const Camera& c : cameras) batch.push_back({c, {}});
+  const std::vector<BatchCamera> batch = batch_of(cameras);
   BatchImages to;
   to.floats.median_depth = depth.data();
   CudaBatchRenderer renderer(cuda);
@@ -157,12 +161,10 @@ TEST_CASE("cuda batch: of calls under way that scratch is too small for, the las
   Buffer<float, CudaBackend> images(cuda);
   images.resize_discard(6 * pixels);
   const auto start = [&](CudaBatchRenderer& renderer, std::size_t place) {
-    std::vector<BatchCamera> batch;
-    for (const Camera& c : cameras) batch.push_back({c, {}});
     BatchImages to;
     to.floats.rgb = images.data() + 3 * pixels * place;
     cuda.fill(to.floats.rgb, 0xa5, 3 * pixels * sizeof(float));
-    renderer.render(sets, batch, to).throw_if_error();
+    renderer.render(sets, batch_of(cameras), to).throw_if_error();
   };
   const auto image = [&](std::size_t place) {
     Frames<float> out;

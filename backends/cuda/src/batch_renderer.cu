@@ -177,7 +177,7 @@ Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<co
   return {};
 }
 
-bool CudaBatchRenderer::State::had_room(const cuda::Flight& flight) {
+bool CudaBatchRenderer::State::fit_capacities(const cuda::Flight& flight) {
   const cuda::BatchCounters& n = *flight.counters;
   const cuda::BatchArgs& was = flight.key.args;
   bool had = true;
@@ -224,7 +224,7 @@ Status CudaBatchRenderer::finish() {
                                      " tile intersections and " + std::to_string(of_meshes.most) +
                                      " triangles: draw fewer cameras a call"};
     }
-    const bool had_room = s.had_room(flight);
+    const bool had_room = s.fit_capacities(flight);
     const bool last = s.finished + 1 == s.calls;
     if (last && s.prepared) s.fit_room(n);
     s.stats.tile_intersections = n.pairs;

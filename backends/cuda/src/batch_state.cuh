@@ -205,8 +205,8 @@ struct CudaBatchRenderer::State {
   void enqueue_layers(const cuda::Flight& flight);
   /// Of the call that has been prepared.
   Status launch();
-  /// Whether what a call needed was there. Where not, capacities grow.
-  bool had_room(const cuda::Flight& flight);
+  /// To what a call needed. Whether it had as much.
+  bool fit_capacities(const cuda::Flight& flight);
   void enqueue(const cuda::Flight& flight);
   /// The launches as a graph, or null where the stream cannot be recorded.
   cudaGraphExec_t record(const cuda::Flight& flight);
