@@ -230,7 +230,7 @@ GSNAV_HD bool store_splat(const ProjectArgs<S>& args, std::size_t slot,
 template <class L>
 GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3<L>& delta, L& mean_x,
                            L& mean_y) noexcept {
-  const auto row = [&](int r) {
+  const auto row = [&](int r) GSNAV_INLINED {
     return Vec3<L>{L(camera.rotation(r, 0)), L(camera.rotation(r, 1)), L(camera.rotation(r, 2))};
   };
   const L inv_z = L(1.0) / dot(row(2), delta);
@@ -294,14 +294,14 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
     }
   }
   if (has_packed_colors(gs)) {
-    const Vec3<S> c = sh_color<S>(degree, delta, [&](int k) { return vec_cast<S>(packed_coefficient(gs, i, k)); });
+    const Vec3<S> c = sh_color<S>(degree, delta, [&](int k) GSNAV_INLINED { return vec_cast<S>(packed_coefficient(gs, i, k)); });
     return {c.x, c.y, c.z, S(0)};
   }
   const float* sh0 = gs.sh0.data + 3 * i;
   const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
   if (!gs.shN_half.empty()) {
     const std::uint16_t* halves = gs.shN_half.data + 3 * rest * i;
-    const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) {
+    const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
       if (k == 0) return Vec3<S>{S(sh0[0]), S(sh0[1]), S(sh0[2])};
       const std::uint16_t* p = halves + 3 * (k - 1);
       return Vec3<S>{S(half_to_float(p[0])), S(half_to_float(p[1])), S(half_to_float(p[2]))};
@@ -309,7 +309,7 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
     return {c.x, c.y, c.z, S(0)};
   }
   const float* shn = gs.shN.data + 3 * rest * i;
-  const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) {
+  const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
     const float* p = k == 0 ? sh0 : shn + 3 * (k - 1);
     return Vec3<S>{S(p[0]), S(p[1]), S(p[2])};
   });
