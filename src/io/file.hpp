@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <unistd.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -112,24 +110,6 @@ class OutFile {
   std::FILE* file_ = nullptr;
   bool failed_ = false;
 };
-
-/// Writes a file aside by `write(OutFile&)` and renames it then: whoever reads meanwhile sees a whole
-/// file or none.
-template <class F>
-Status replace_file(const std::filesystem::path& path, const F& write) {
-  const std::filesystem::path aside = path.string() + "." + std::to_string(::getpid());
-  OutFile file;
-  if (Status s = file.open(aside); !s) return s;
-  write(file);
-  Status s = file.close();
-  std::error_code error;
-  if (s) {
-    std::filesystem::rename(aside, path, error);
-    if (error) s = {Errc::file_not_found, path.string() + ": cannot be written: " + error.message()};
-  }
-  if (!s) std::filesystem::remove(aside, error);
-  return s;
-}
 
 /// Beside what files made of a scene lie: its own path; of tiles, the first one's. `spec` as of
 /// load_scene.
