@@ -5,6 +5,7 @@
 
 #include "file.hpp"
 #include "json.hpp"
+#include "gsnav/core/replace_file.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -134,11 +135,7 @@ Status save_cameras(const std::filesystem::path& path, std::span<const Camera> c
       one["fy"] = c.fy;
       out.push_back(std::move(one));
     }
-    const std::string text = out.dump(1) + "\n";
-    detail::OutFile file;
-    if (Status s = file.open(path); !s) return s;
-    file.write(text.data(), text.size());
-    return file.close();
+    return replace_file(path, out.dump(1) + "\n");
   });
 }
 

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -87,29 +86,6 @@ inline Status reading_failed(const std::string& source) {
 inline Status invalid_file(const std::filesystem::path& path, const std::string& what) {
   return {Errc::invalid_file, path.string() + ": " + what};
 }
-
-/// A file being written; what goes wrong is kept until close().
-class OutFile {
- public:
-  OutFile() = default;
-  OutFile(const OutFile&) = delete;
-  OutFile& operator=(const OutFile&) = delete;
-  ~OutFile();
-
-  /// Names the parent folder where that is what is missing.
-  Status open(const std::filesystem::path& path);
-  void write(const void* data, std::size_t size) {
-    // fwrite must not be given a null pointer, not even for no bytes.
-    failed_ = failed_ || (size != 0 && std::fwrite(data, 1, size, file_) != size);
-  }
-  std::FILE* handle() noexcept { return file_; }
-  Status close();
-
- private:
-  std::filesystem::path path_;
-  std::FILE* file_ = nullptr;
-  bool failed_ = false;
-};
 
 /// Beside what files made of a scene lie: its own path; of tiles, the first one's. `spec` as of
 /// load_scene.

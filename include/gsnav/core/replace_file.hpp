@@ -71,6 +71,15 @@ inline Status check_output_path(const std::filesystem::path& path) {
   return {};
 }
 
+/// Makes a folder for files to be written, and those above it, where they are missing. Call it before long work.
+/// @return file_not_found where it cannot be made, is a file or may not be written to.
+inline Status make_output_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return {Errc::file_not_found, folder.string() + ": the folder cannot be made: " + error.message()};
+  return check_output_path(folder / "file");
+}
+
 /// A file being written, which takes its name only when it is whole.
 ///
 /// Bytes go to a nameless file in the target's folder (or, where the file system has none, to one of a unique name

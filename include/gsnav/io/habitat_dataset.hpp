@@ -51,6 +51,10 @@ struct HabitatDataset {
 /// of names to paths). A dataset of stages alone has a scene for each of them. Light setups, objects and semantic
 /// descriptions are left out and said to be.
 ///
+/// Paths in these files may be absolute and may hold `..`, as those of Habitat's own datasets do: what they name is read,
+/// never written. Files outside of the dataset's folder are named in `warnings`; do not read data of strangers as a user
+/// whose other files they must not learn of.
+///
 /// Errors name the file and the key: file_not_found (also: a stage or NavMesh that a scene names); invalid_file;
 /// unsupported (a stage with a scale for each axis); out_of_memory. Never throws.
 Result<HabitatDataset> load_habitat_dataset(const std::filesystem::path& path);

@@ -47,7 +47,7 @@ struct SaveSpzOptions {
   int sh1_bits = 8, sh_rest_bits = 8;
 };
 
-/// Writes a cloud as SPZ version 4, rows in the cloud's order; the mip filter becomes the antialiased
+/// Writes a cloud as SPZ version 4, rows in the order in which they were read; the mip filter becomes the antialiased
 /// flag. Read back, a mean is within half of its step, a log-scale within 1/32 (where it is in [-10,
 /// 5.9]), an opacity within 1/510, a degree-0 SH coefficient within 1/76 (where it is within 3.3 of
 /// zero), another one within 2^-bits (where its magnitude is at most 1 - 2^(1 - bits)), the quaternion's
