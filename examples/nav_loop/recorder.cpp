@@ -22,7 +22,8 @@ std::vector<std::uint8_t> bytes_of(std::span<const float> rgb) {
 }  // namespace
 
 gsnav::Status Recorder::open() {
-  gsnav::Status s = gsnav::make_output_folder(options_.frame_every > 0 ? options_.out + "/frames" : options_.out);
+  gsnav::Status s =
+      gsnav::make_output_folder(options_.frame_every > 0 ? options_.out + "/frames" : options_.out);
   return s ? s : gsnav::Status(s.code(), "--out " + s.message());
 }
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "file.hpp"
-#include "json.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "json.hpp"
 
 namespace gsnav::io {
 namespace {

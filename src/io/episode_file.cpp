@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gzip.hpp"
 #include "json.hpp"
-#include "gsnav/core/replace_file.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -201,7 +201,8 @@ Status save_episodes(const fs::path& path, std::span<const PointNavEpisode> epis
     }
     const std::string text = Json{{"episodes", std::move(list)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (path.extension() != ".gz") return replace_file(path, text);
-    const std::vector<std::byte> packed = detail::gzip(std::as_bytes(std::span(text.data(), text.size())));
+    const std::vector<std::byte> packed =
+        detail::gzip(std::as_bytes(std::span(text.data(), text.size())));
     return replace_file(path, [&](OutputFile& file) { file.write(packed.data(), packed.size()); });
   });
 }

@@ -79,19 +79,24 @@ void remove_stale_caches(const std::filesystem::path& path) noexcept {
     constexpr std::size_t kHash = 17;  // a dot and 16 digits
     if (name.size() <= kHash + ending.size()) return;
     const std::string stem = name.substr(0, name.size() - kHash - ending.size());
-    const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path(), asset = folder / stem;
+    const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path(),
+                   asset = folder / stem;
     std::error_code error;
     fs::file_time_type newest = fs::last_write_time(asset, error);
     if (error) return;
     if (fs::is_directory(asset, error)) {
-      for (const auto& entry : fs::directory_iterator(asset, error)) newest = std::max(newest, entry.last_write_time(error));
+      for (const auto& entry : fs::directory_iterator(asset, error))
+        newest = std::max(newest, entry.last_write_time(error));
     }
     for (const auto& entry : fs::directory_iterator(folder, error)) {
       const std::string other = entry.path().filename().string();
-      const bool cache = other.size() == name.size() && other != name && other.starts_with(stem + ".") &&
-                         other.ends_with(ending) &&
-                         other.substr(stem.size() + 1, kHash - 1).find_first_not_of("0123456789abcdef") == std::string::npos;
-      if (cache && entry.is_regular_file(error) && entry.last_write_time(error) < newest && !error) fs::remove(entry.path(), error);
+      const bool cache =
+          other.size() == name.size() && other != name && other.starts_with(stem + ".") &&
+          other.ends_with(ending) &&
+          other.substr(stem.size() + 1, kHash - 1).find_first_not_of("0123456789abcdef") ==
+              std::string::npos;
+      if (cache && entry.is_regular_file(error) && entry.last_write_time(error) < newest && !error)
+        fs::remove(entry.path(), error);
     }
   } catch (...) {  // no memory, a folder that vanishes: they stay until the next time
   }

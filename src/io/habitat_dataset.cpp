@@ -203,7 +203,8 @@ class DatasetReader {
         const fs::path inside = fs::weakly_canonical(file, error).lexically_relative(root);
         const bool out = inside.empty() || *inside.begin() == "..";
         if (out && said.insert(file).second) {
-          out_.warnings.push_back(at_ + ": " + s.name + " uses " + file.string() + ", outside of the dataset's folder");
+          out_.warnings.push_back(at_ + ": " + s.name + " uses " + file.string() +
+                                  ", outside of the dataset's folder");
         }
       }
     }

@@ -26,7 +26,8 @@ Values values_of(const GaussianCloud& cloud, std::size_t i) {
   for (std::size_t k = 0; k < 3; ++k) {
     v[k] = mean[static_cast<int>(k)];
     const double log_scale = std::log(static_cast<double>(cloud.scales[k][i]));
-    v[3 + k] = std::clamp(log_scale, -detail::kCompressedMostLogScale, detail::kCompressedMostLogScale);  // also minus infinity
+    v[3 + k] = std::clamp(log_scale, -detail::kCompressedMostLogScale,
+                          detail::kCompressedMostLogScale);  // also minus infinity
     v[6 + k] = 0.5 + kSh0 * static_cast<double>(cloud.sh0[3 * i + k]);
   }
   return v;
@@ -133,7 +134,8 @@ Status save_compressed_ply(const std::filesystem::path& path, const GaussianClou
     for (std::size_t i = 0; rest != 0 && i < n; ++i) {
       for (std::size_t k = 0; k < rest; ++k) {
         // 256 cells over [-4, 4]; channel-major in the file, colour inner in the cloud.
-        const double cell = (static_cast<double>(cloud.shN[i * rest + k]) / (2 * detail::kCompressedBands) + 0.5) * 256;
+        const double cell =
+            (static_cast<double>(cloud.shN[i * rest + k]) / (2 * detail::kCompressedBands) + 0.5) * 256;
         row[k % 3 * (rest / 3) + k / 3] =
             static_cast<std::uint8_t>(std::clamp(std::floor(cell), 0.0, 255.0));
       }

@@ -37,10 +37,11 @@ void put(std::vector<std::byte>& to, double value) {
   std::memcpy(to.data() + at, &v, sizeof v);
 }
 
-/// The logit that reads back as this opacity, always finite: trainers take derivatives of what they read. Of opacities
-/// between those of two floats it is the nearest.
+/// The logit that reads back as this opacity, always finite: trainers take derivatives of what they
+/// read. Of opacities between those of two floats it is the nearest.
 float logit_of(float opacity) {
-  // exp(-18) is below half of float32's last place of 1, in float32 as in double; exp(110) is beyond float32.
+  // exp(-18) is below half of float32's last place of 1, in float32 as in double; exp(110) is beyond
+  // float32.
   constexpr float kOpaque = 18, kClear = -110;
   if (opacity >= 1) return kOpaque;
   if (!(opacity > 0)) return kClear;
@@ -59,13 +60,16 @@ using Quad = std::array<float, 4>;
 Quad normalised(const Quad& stored) {
   Quatd q{double{stored[0]}, double{stored[1]}, double{stored[2]}, double{stored[3]}};
   if (!normalize(q)) return stored;
-  return {static_cast<float>(q.w), static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
+  return {static_cast<float>(q.w), static_cast<float>(q.x), static_cast<float>(q.y),
+          static_cast<float>(q.z)};
 }
 
-/// Components that load_ply normalises to `unit` exactly, as a rounded unit quaternion is only in 99 of 100 cases.
+/// Components that load_ply normalises to `unit` exactly, as a rounded unit quaternion is only in 99 of
+/// 100 cases.
 Quad stored_quat(const Quad& unit) {
   if (normalised(unit) == unit) return unit;
-  // The unit length inside of what rounds to `unit`, all components moved by the same share of their half places.
+  // The unit length inside of what rounds to `unit`, all components moved by the same share of their
+  // half places.
   Quad half;
   double square = 0, room = 0;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -75,8 +79,8 @@ Quad stored_quat(const Quad& unit) {
     room += double{v} * double{half[k]};
   }
   const double share = 0.5 * (square - 1) / room;
-  // Its components are no floats: multiples of it are tried until one rounds to what is normalised to `unit`. Of a million
-  // random quaternions the worst takes 11,780.
+  // Its components are no floats: multiples of it are tried until one rounds to what is normalised to
+  // `unit`. Of a million random quaternions the worst takes 11,780.
   constexpr int kMostTries = 100000;
   constexpr double kGolden = 0.61803398874989485;  // visits [1, 2) evenly
   for (int t = 1; t <= kMostTries; ++t) {
@@ -121,7 +125,8 @@ Status save_ply(const std::filesystem::path& path, const GaussianCloud& cloud,
       }
       put<float>(rows, logit_of(cloud.opacities[i]));
       for (const auto& axis : cloud.scales) put<float>(rows, std::log(static_cast<double>(axis[i])));
-      for (const float part : stored_quat({cloud.quats[0][i], cloud.quats[1][i], cloud.quats[2][i], cloud.quats[3][i]})) {
+      for (const float part :
+           stored_quat({cloud.quats[0][i], cloud.quats[1][i], cloud.quats[2][i], cloud.quats[3][i]})) {
         put<float>(rows, double{part});
       }
       if ((row + 1) % kRowsAtATime == 0 || row + 1 == order.size()) {

@@ -34,8 +34,10 @@ std::optional<SceneWriter> writer_of(const std::filesystem::path& path) {
     range.band_high = detail::kCompressedBands;
     return SceneWriter{save_compressed_ply, range};
   }
-  if (name.ends_with(".ply")) return SceneWriter{[](const Path& p, const Cloud& c) { return save_ply(p, c); }, range};
-  if (name.ends_with(".glb")) return SceneWriter{[](const Path& p, const Cloud& c) { return save_glb(p, c); }, range};
+  if (name.ends_with(".ply"))
+    return SceneWriter{[](const Path& p, const Cloud& c) { return save_ply(p, c); }, range};
+  if (name.ends_with(".glb"))
+    return SceneWriter{[](const Path& p, const Cloud& c) { return save_glb(p, c); }, range};
   if (name.ends_with(".splat")) {
     range.colour_low = 0;
     range.colour_high = 1;
@@ -59,8 +61,10 @@ std::optional<SceneWriter> writer_of(const std::filesystem::path& path) {
 }
 
 Status unknown_name(const std::filesystem::path& path) {
-  return {Errc::unsupported, path.string() + ": not a name that is written here: .ply, .compressed.ply, .splat, .spz, "
-                                             ".sog, meta.json or .glb"};
+  return {Errc::unsupported,
+          path.string() +
+              ": not a name that is written here: .ply, .compressed.ply, .splat, .spz, "
+              ".sog, meta.json or .glb"};
 }
 
 }  // namespace
@@ -87,9 +91,11 @@ ClampedValues count_clamped(const std::filesystem::path& path, const GaussianClo
   if (!writer) return count;
   const detail::FormatRange& r = writer->range;
   const auto outside = [](double v, double low, double high) { return v < low || v > high ? 1u : 0u; };
-  for (const float c : cloud.sh0) count.colours += outside(0.5 + kSh0 * double{c}, r.colour_low, r.colour_high);
+  for (const float c : cloud.sh0)
+    count.colours += outside(0.5 + kSh0 * double{c}, r.colour_low, r.colour_high);
   for (const auto& axis : cloud.scales) {
-    for (const float s : axis) count.scales += outside(std::log(double{s}), r.log_scale_low, r.log_scale_high);
+    for (const float s : axis)
+      count.scales += outside(std::log(double{s}), r.log_scale_low, r.log_scale_high);
   }
   for (const float b : cloud.shN) {
     if (r.bands) {

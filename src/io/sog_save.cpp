@@ -35,7 +35,8 @@ constexpr std::size_t kLargestPalette = 65536, kSmallPalette = 1024;  // labels 
 constexpr std::size_t kEntriesPerRow = 64;
 constexpr std::size_t kMostSide = 16383;  // of a WebP
 /// What the images of a SOG are called, without their ending.
-constexpr const char* kStems[] = {"means_l", "means_u", "scales", "quats", "sh0", "shN_centroids", "shN_labels"};
+constexpr const char* kStems[] = {"means_l", "means_u",       "scales",    "quats",
+                                  "sh0",     "shN_centroids", "shN_labels"};
 
 /// The files of a SOG by name, in the order in which they are written.
 using Files = std::vector<std::pair<std::string, std::string>>;
@@ -177,9 +178,10 @@ class SogWriter {
     const detail::ScalarCodebook book(cloud_.sh0);
     RgbaImage image = plane();
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
-      for (std::size_t k = 0; k < 3; ++k) image.pixels[4 * i + k] = book.index(cloud_.sh0[3 * rows_[i] + k]);
-      image.pixels[4 * i + 3] =
-          static_cast<std::uint8_t>(detail::nearest_step(static_cast<double>(cloud_.opacities[rows_[i]]), 8));
+      for (std::size_t k = 0; k < 3; ++k)
+        image.pixels[4 * i + k] = book.index(cloud_.sh0[3 * rows_[i] + k]);
+      image.pixels[4 * i + 3] = static_cast<std::uint8_t>(
+          detail::nearest_step(static_cast<double>(cloud_.opacities[rows_[i]]), 8));
     }
     part.name = "sh0";
     part.meta = {{"codebook", book.entries()}};
@@ -205,9 +207,7 @@ class SogWriter {
       labels.pixels[4 * i + 2] = 0;
     }
     part.name = "shN";
-    part.meta = {{"count", palette.size},
-                    {"bands", cloud_.sh_degree},
-                    {"codebook", book.entries()}};
+    part.meta = {{"count", palette.size}, {"bands", cloud_.sh_degree}, {"codebook", book.entries()}};
     if (Status s = add(part, "shN_centroids", centroids); !s) return s;
     return add(part, "shN_labels", labels);
   }
@@ -223,7 +223,8 @@ class SogWriter {
 /// Whether a file is an image of a SOG by its name: "means_l.webp", "means_l.3.webp".
 bool is_sog_image(const std::string& name) {
   return std::any_of(std::begin(kStems), std::end(kStems), [&](const std::string stem) {
-    if (!name.starts_with(stem) || !name.ends_with(".webp") || name.size() < stem.size() + 5) return false;
+    if (!name.starts_with(stem) || !name.ends_with(".webp") || name.size() < stem.size() + 5)
+      return false;
     const std::string number = name.substr(stem.size(), name.size() - stem.size() - 5);
     return number.empty() || (number.size() > 1 && number[0] == '.' &&
                               number.find_first_not_of("0123456789", 1) == std::string::npos);
@@ -234,14 +235,16 @@ bool is_sog_image(const std::string& name) {
 std::vector<std::string> sog_images_in(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   std::error_code error;
-  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
     const std::string name = it->path().filename().string();
     if (is_sog_image(name)) names.push_back(name);
   }
   return names;
 }
 
-/// An ending that no image in the folder has: the scene that lies there stays whole until meta.json names the new one.
+/// An ending that no image in the folder has: the scene that lies there stays whole until meta.json
+/// names the new one.
 std::string free_ending(const std::vector<std::string>& images) {
   std::string ending = ".webp";
   for (int n = 1;; ++n) {
@@ -254,8 +257,10 @@ std::string free_ending(const std::vector<std::string>& images) {
   }
 }
 
-/// Writes the images, then meta.json, which makes them the folder's scene, and takes away those of the scene before.
-Status write_folder(const std::filesystem::path& folder, const Files& files, const std::vector<std::string>& before) {
+/// Writes the images, then meta.json, which makes them the folder's scene, and takes away those of the
+/// scene before.
+Status write_folder(const std::filesystem::path& folder, const Files& files,
+                    const std::vector<std::string>& before) {
   std::error_code ignored;
   Status status;
   for (const auto& [name, content] : files) {
@@ -263,7 +268,8 @@ Status write_folder(const std::filesystem::path& folder, const Files& files, con
     if (!status) break;
   }
   for (const std::string& name : before) {
-    if (status && std::filesystem::is_regular_file(folder / name, ignored)) std::filesystem::remove(folder / name, ignored);
+    if (status && std::filesystem::is_regular_file(folder / name, ignored))
+      std::filesystem::remove(folder / name, ignored);
   }
   for (const auto& [name, content] : files) {
     if (!status && name != "meta.json") std::filesystem::remove(folder / name, ignored);

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "cloud_check.hpp"
-#include "format_range.hpp"
 #include "file.hpp"
+#include "format_range.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/io/spz.hpp"
@@ -133,8 +133,8 @@ class SpzWriter {
       const double colour = static_cast<double>(cloud_.sh0[3 * row + k]) * detail::kSpzColour + 0.5;
       planes_[2][3 * i + k] = static_cast<std::uint8_t>(detail::nearest_step(colour, 8));
       const double log_scale = std::log(static_cast<double>(cloud_.scales[k][row]));
-      planes_[3][3 * i + k] =
-          static_cast<std::uint8_t>(detail::nearest_step((log_scale - detail::kSpzLeastLogScale) * detail::kSpzLogSteps / 255, 8));
+      planes_[3][3 * i + k] = static_cast<std::uint8_t>(
+          detail::nearest_step((log_scale - detail::kSpzLeastLogScale) * detail::kSpzLogSteps / 255, 8));
     }
     const double opacity = static_cast<double>(cloud_.opacities[row]);
     planes_[1][i] = static_cast<std::uint8_t>(detail::nearest_step(opacity, 8));
@@ -165,8 +165,8 @@ class SpzWriter {
   static std::uint8_t sh_byte(double v, int bits) {
     const double step = std::exp2(8 - bits);
     const double most = 256 - step;
-    return static_cast<std::uint8_t>(
-        std::clamp(std::nearbyint((v * detail::kSpzBandSteps + detail::kSpzBandSteps) / step) * step, 0.0, most));
+    return static_cast<std::uint8_t>(std::clamp(
+        std::nearbyint((v * detail::kSpzBandSteps + detail::kSpzBandSteps) / step) * step, 0.0, most));
   }
 
   static constexpr double kMostSteps = 8388607;

@@ -77,14 +77,17 @@ TEST_CASE("convert: every format, with the error that it adds") {
 
 namespace {
 
-/// Rows on a grid of 1/4 m, so that along each axis hundreds have the same depth, opaque and of random colours.
+/// Rows on a grid of 1/4 m, so that along each axis hundreds have the same depth, opaque and of random
+/// colours.
 PlyFile rows_on_a_grid(std::size_t n, unsigned seed) {
   PlyFile file;
   file.properties = inria_properties(0);
   file.rows = random_rows(n, 0, seed);
   for (PlyRow& row : file.rows) {
-    for (const char* axis : {"x", "y", "z"}) row[axis] = std::nearbyint(4 * std::tanh(row[axis])) / 4 + 0.0;
-    for (const char* axis : {"scale_0", "scale_1", "scale_2"}) row[axis] = -3 + 0.3 * std::sin(row[axis]);
+    for (const char* axis : {"x", "y", "z"})
+      row[axis] = std::nearbyint(4 * std::tanh(row[axis])) / 4 + 0.0;
+    for (const char* axis : {"scale_0", "scale_1", "scale_2"})
+      row[axis] = -3 + 0.3 * std::sin(row[axis]);
     row["opacity"] = 3;
   }
   return file;
@@ -130,7 +133,8 @@ TEST_CASE("convert: from PLY to PLY thousands of ties of depth are drawn the sam
   const std::size_t stride = 4 * 17, header = in.find("end_header\n") + 11;
   REQUIRE(made.size() - (made.find("end_header\n") + 11) == 6000 * stride);
   for (std::size_t row = 0; row < 6000; ++row) {
-    REQUIRE(made.substr(made.size() - (6000 - row) * stride, 12) == in.substr(header + row * stride, 12));
+    REQUIRE(made.substr(made.size() - (6000 - row) * stride, 12) ==
+            in.substr(header + row * stride, 12));
   }
   // And again the same file.
   REQUIRE(run(folder, "a.ply b.ply --views 0").ok);
@@ -140,13 +144,16 @@ TEST_CASE("convert: from PLY to PLY thousands of ties of depth are drawn the sam
   CHECK(out.says("where depths are equal, images differ"));
   CHECK(number_behind(out.text, "PSNR ") < 60);
   CHECK(number_behind(out.text, "largest difference ") > 0.1);
-  CHECK(number_behind(out.text, "largest difference ") == doctest::Approx(difference("s.ply").largest).epsilon(0.01));
+  CHECK(number_behind(out.text, "largest difference ") ==
+        doctest::Approx(difference("s.ply").largest).epsilon(0.01));
   // Cropping and merging keep the order of those that are left.
   out = run(folder, "in.ply c.ply --crop -0.6 -2 -2 2 2 2" + options);
   CHECK(out.says("equal, bit for bit"));
   REQUIRE(run(folder, "in.ply turned.ply both.ply --views 0").ok);
-  const GaussianCloud both = io::load_scene((folder / "both.ply").string(), {.sort = false}).value().cloud;
-  const GaussianCloud unsorted = io::load_scene((folder / "in.ply").string(), {.sort = false}).value().cloud;
+  const GaussianCloud both =
+      io::load_scene((folder / "both.ply").string(), {.sort = false}).value().cloud;
+  const GaussianCloud unsorted =
+      io::load_scene((folder / "in.ply").string(), {.sort = false}).value().cloud;
   for (std::size_t i = 0; i < 6000; ++i) {
     REQUIRE(both.mean(i) == unsorted.mean(i));
     REQUIRE(both.mean(12000 - 1 - i) == unsorted.mean(i));
@@ -165,7 +172,8 @@ TEST_CASE("convert: every format but the one of chunks keeps the order of the ro
     double farthest = 0, colour = 0;
     for (std::size_t i = 0; i < want.size(); ++i) {
       farthest = std::max(farthest, norm(got.mean(i) - want.mean(i)));
-      colour = std::max(colour, std::fabs(static_cast<double>(got.sh0[3 * i]) - static_cast<double>(want.sh0[3 * i])));
+      colour = std::max(
+          colour, std::fabs(static_cast<double>(got.sh0[3 * i]) - static_cast<double>(want.sh0[3 * i])));
     }
     CHECK(farthest < 1e-3);  // neighbours of the grid are 0.25 m apart
     CHECK(colour < 2);
@@ -184,7 +192,8 @@ TEST_CASE("convert: what a format's range clips is counted, and errors are not c
   for (std::size_t i = 0; i < file.rows.size(); ++i) {
     PlyRow& row = file.rows[i];
     for (const char* name : {"f_dc_0", "f_dc_1", "f_dc_2"}) row[name] = std::tanh(row[name]);
-    for (int k = 0; k < 9; ++k) row["f_rest_" + std::to_string(k)] = 0.5 * std::tanh(row["f_rest_" + std::to_string(k)]);
+    for (int k = 0; k < 9; ++k)
+      row["f_rest_" + std::to_string(k)] = 0.5 * std::tanh(row["f_rest_" + std::to_string(k)]);
     for (const char* name : {"scale_0", "scale_1", "scale_2"}) row[name] = -4;
     row["opacity"] = 1;
     if (i % 4 == 0) ++above, row["f_dc_1"] = (3.07 - 0.5) / kBasis;  // a drawn colour of 3.07
@@ -204,7 +213,8 @@ TEST_CASE("convert: what a format's range clips is counted, and errors are not c
   CAPTURE(out.text);
   REQUIRE(out.ok);
   CHECK(number_behind(out.text, "colour ") == doctest::Approx(3.07 - 0.5 - kBasis / 0.3).epsilon(0.01));
-  CHECK(number_behind(out.text.substr(out.text.find("largest")), ", SH ") == doctest::Approx(0.755).epsilon(0.01));
+  CHECK(number_behind(out.text.substr(out.text.find("largest")), ", SH ") ==
+        doctest::Approx(0.755).epsilon(0.01));
   CHECK(number_behind(out.text, "scale ") == doctest::Approx(100 * (std::exp(3) - 1)).epsilon(0.01));
   CHECK(out.says((std::to_string(far_above) + " colours outside of the format's range").c_str()));
   CHECK(out.says((std::to_string(thin) + " scales outside of the format's range").c_str()));

@@ -31,14 +31,20 @@ struct Writer {
 
 std::vector<Writer> all_writers() {
   std::vector<Writer> all;
-  static const GaussianCloud small = cloud_of_random_rows(40, 3, 61), large = cloud_of_random_rows(9000, 3, 62);
-  for (const char* name : {"a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.sog", "a.glb", "meta.json"}) {
-    all.push_back({name, [](const fs::path& p, bool much) { return io::save_scene(p, much ? large : small); }});
+  static const GaussianCloud small = cloud_of_random_rows(40, 3, 61),
+                             large = cloud_of_random_rows(9000, 3, 62);
+  for (const char* name :
+       {"a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.sog", "a.glb", "meta.json"}) {
+    all.push_back(
+        {name, [](const fs::path& p, bool much) { return io::save_scene(p, much ? large : small); }});
   }
   static std::vector<float> noise;
   noise.clear();
-  for (std::uint32_t i = 0, x = 1; i < 300000; ++i) noise.push_back(static_cast<float>((x = x * 1664525 + 1013904223) >> 8) / (1 << 24));
-  const auto some = [](bool much) { return std::span<const float>(noise).first(much ? 3 * 300 * 300 : 3 * 10 * 10); };
+  for (std::uint32_t i = 0, x = 1; i < 300000; ++i)
+    noise.push_back(static_cast<float>((x = x * 1664525 + 1013904223) >> 8) / (1 << 24));
+  const auto some = [](bool much) {
+    return std::span<const float>(noise).first(much ? 3 * 300 * 300 : 3 * 10 * 10);
+  };
   all.push_back({"a.png", [=](const fs::path& p, bool much) {
                    return io::save_png_rgb(p, some(much), much ? 300 : 10, much ? 300 : 10);
                  }});
@@ -54,7 +60,8 @@ std::vector<Writer> all_writers() {
                    return io::save_npz(p, std::span(&entry, 1), false);
                  }});
   all.push_back({"a.json", [](const fs::path& p, bool much) {
-                   const std::vector<Camera> cameras(much ? 3000 : 3, Camera::look_at({1, 2, 3}, {}, {0, 1, 0}, 64, 48, 60));
+                   const std::vector<Camera> cameras(
+                       much ? 3000 : 3, Camera::look_at({1, 2, 3}, {}, {0, 1, 0}, 64, 48, 60));
                    return io::save_cameras(p, cameras);
                  }});
   for (const char* name : {"e.json", "e.json.gz"}) {
@@ -62,7 +69,8 @@ std::vector<Writer> all_writers() {
                      std::vector<PointNavEpisode> episodes(much ? 30000 : 3);
                      for (std::size_t i = 0; i < episodes.size(); ++i) {
                        episodes[i].id = std::to_string(i);
-                       episodes[i].goal_position = {static_cast<double>(noise[i]), 0, static_cast<double>(noise[2 * i])};
+                       episodes[i].goal_position = {static_cast<double>(noise[i]), 0,
+                                                    static_cast<double>(noise[2 * i])};
                      }
                      return io::save_episodes(p, episodes);
                    }});
@@ -112,7 +120,8 @@ TEST_CASE("save_sog: a folder's scene is whole until the new one is") {
   const auto after = contents_of(folder.path());
   CHECK(after.size() == 9);  // nothing of the first is left
   CHECK(io::load_scene(folder.path().string()).value().cloud.size() == 70);
-  // Whenever the second was stopped, meta.json had named what lay there: no image of the first was touched.
+  // Whenever the second was stopped, meta.json had named what lay there: no image of the first was
+  // touched.
   for (const auto& [name, content] : after) {
     for (const auto& [old_name, old_content] : before) {
       if (name != "meta.json" && name != "notes.webp") CHECK(name != old_name);

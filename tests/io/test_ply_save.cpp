@@ -76,7 +76,8 @@ TEST_CASE("save_ply: every logit is finite, and opacity 1 is 1 again in float32 
   GaussianCloudBuilder builder(0);
   RawGaussian raw;
   raw.quat = {1, 0, 0, 0};
-  for (const double logit : {14.0, 16.0, 17.0, 17.5, 25.0, 88.0, std::numeric_limits<double>::infinity()}) {
+  for (const double logit :
+       {14.0, 16.0, 17.0, 17.5, 25.0, 88.0, std::numeric_limits<double>::infinity()}) {
     raw.opacity_logit = logit;
     builder.add(raw);
   }
@@ -119,8 +120,10 @@ TEST_CASE("save_ply: quaternions come back bit for bit, many of them") {
     Quatd q{static_cast<double>(first.quats[0][i]), static_cast<double>(first.quats[1][i]),
             static_cast<double>(first.quats[2][i]), static_cast<double>(first.quats[3][i])};
     normalize(q);
-    changed += static_cast<float>(q.w) != first.quats[0][i] || static_cast<float>(q.x) != first.quats[1][i] ||
-                       static_cast<float>(q.y) != first.quats[2][i] || static_cast<float>(q.z) != first.quats[3][i]
+    changed += static_cast<float>(q.w) != first.quats[0][i] ||
+                       static_cast<float>(q.x) != first.quats[1][i] ||
+                       static_cast<float>(q.y) != first.quats[2][i] ||
+                       static_cast<float>(q.z) != first.quats[3][i]
                    ? 1
                    : 0;
   }

@@ -17,16 +17,23 @@ using namespace gsnav_test;
 namespace fs = std::filesystem;
 
 TEST_CASE("printable: control characters and what is no UTF-8 are written out, all else stays") {
-  for (const char* same : {"", "room.ply", "a b\tc\nd", "Stra\xc3\x9f" "e", "\xe5\xae\xb6.ply", "\xf0\x9f\x8f\xa0"}) {
+  for (const char* same : {"", "room.ply", "a b\tc\nd",
+                           "Stra\xc3\x9f"
+                           "e",
+                           "\xe5\xae\xb6.ply", "\xf0\x9f\x8f\xa0"}) {
     CHECK(printable(same) == same);
   }
   CHECK(printable("a\x1b]0;x\x07") == "a\\x1B]0;x\\x07");
-  CHECK(printable(std::string("a\0b", 3)) == "a\\x00" "b");
+  CHECK(printable(std::string("a\0b", 3)) ==
+        "a\\x00"
+        "b");
   CHECK(printable("\x7f\r") == "\\x7F\\x0D");
-  CHECK(printable("\xc2\x9b" "31m") == "\\xC2\\x9B31m");   // CSI as one character of UTF-8
-  CHECK(printable("\x9b" "31m\xff") == "\\x9B31m\\xFF");   // and as one byte
-  CHECK(printable("\xe5\xae") == "\\xE5\\xAE");            // cut off
-  CHECK(printable("\xc0\xaf") == "\\xC0\\xAF");            // longer than it need be
+  CHECK(printable("\xc2\x9b"
+                  "31m") == "\\xC2\\x9B31m");  // CSI as one character of UTF-8
+  CHECK(printable("\x9b"
+                  "31m\xff") == "\\x9B31m\\xFF");  // and as one byte
+  CHECK(printable("\xe5\xae") == "\\xE5\\xAE");    // cut off
+  CHECK(printable("\xc0\xaf") == "\\xC0\\xAF");    // longer than it need be
   // Every string of two bytes becomes printable, and stays so.
   for (int a = 0; a < 256; ++a) {
     for (int b = 0; b < 256; ++b) {
@@ -48,7 +55,9 @@ TEST_CASE("errors and reports hold no control characters of a file's name") {
   CHECK(io::report_text(report).find('\x1b') == std::string::npos);
 }
 
-TEST_CASE("caches of an asset's former content are removed, those of other settings and of other assets stay") {
+TEST_CASE(
+    "caches of an asset's former content are removed, those of other settings and of other assets "
+    "stay") {
   const TempFolder folder("stale");
   const auto age = [&](const char* name, int hours) {
     write_file(folder / name, "x");

@@ -27,7 +27,8 @@ namespace {
 
 std::set<std::string> names_in(const fs::path& folder) {
   std::set<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
+  for (const auto& entry : fs::directory_iterator(folder))
+    names.insert(entry.path().filename().string());
   return names;
 }
 
@@ -147,6 +148,22 @@ TEST_CASE("check_output_path: what cannot be written is said before anything is 
   }
   CHECK(names_in(folder.path()) == Names{"file", "in"});
   CHECK(fs::is_empty(folder / "in"));
+}
+
+TEST_CASE("make_output_folder: with those above it, whatever is in it") {
+  const TempFolder folder("output_folder");
+  REQUIRE(make_output_folder(folder / "a/b").ok());
+  REQUIRE(fs::is_directory(folder / "a/b"));
+  for (const char* name : {"file", "a/file"}) fs::create_directories(folder / "a/b" / name);
+  CHECK(make_output_folder(folder / "a/b").ok());
+  CHECK(make_output_folder(folder / "a/b/").ok());
+  write_file(folder / "taken", "x");
+  for (const char* name : {"taken", "taken/in"}) {
+    const Status s = make_output_folder(folder / name);
+    CHECK(s.code() == Errc::file_not_found);
+    CHECK(contains(s.message(), (folder / name).string()));
+  }
+  CHECK(read_file(folder / "taken") == "x");
 }
 
 TEST_CASE("replace_file: a full disk leaves what was there and nothing else") {

@@ -85,7 +85,8 @@ TEST_CASE("save_sog: a folder has the planes of its last scene, and what else is
     for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
       // Beside another scene's, images have a number in their names until that scene is gone.
       std::string name = entry.path().filename().string();
-      if (const std::size_t number = name.find(".1.webp"); number != std::string::npos) name.erase(number, 2);
+      if (const std::size_t number = name.find(".1.webp"); number != std::string::npos)
+        name.erase(number, 2);
       CHECK(names.insert(name).second);
     }
     return names;

@@ -37,7 +37,8 @@ class Maker {
     Similarity by;
     const Vec3d y{0, 1, 0};
     if (up.y < 0) by.rotation = axis_angle(Vec3d{1, 0, 0}, 3.14159265358979323846);
-    if (std::fabs(up.y) < 0.5) by.rotation = axis_angle(normalized(cross(y, up)), 0.5 * 3.14159265358979323846);
+    if (std::fabs(up.y) < 0.5)
+      by.rotation = axis_angle(normalized(cross(y, up)), 0.5 * 3.14159265358979323846);
     transform(cloud, by);
     return cloud;
   }
@@ -56,12 +57,16 @@ void add_room(Maker& m) {
   for (int i = 0; i < 2500; ++i) m.disc({m.in(-3, 2), m.in(0, 0.9), m.in(-2, 2)}, i % 3);
 }
 
-/// 170 x 230 m of hilly ground with houses and trees, on a grid of 1/64 m, and a sky 1.3 km away: the sky is a twelfth.
+/// 170 x 230 m of hilly ground with houses and trees, on a grid of 1/64 m, and a sky 1.3 km away: the
+/// sky is a twelfth.
 void add_outdoors(Maker& m) {
   const auto grid = [](const Vec3d& p) {
-    return Vec3d{std::nearbyint(64 * p.x) / 64, std::nearbyint(64 * p.y) / 64, std::nearbyint(64 * p.z) / 64};
+    return Vec3d{std::nearbyint(64 * p.x) / 64, std::nearbyint(64 * p.y) / 64,
+                 std::nearbyint(64 * p.z) / 64};
   };
-  const auto ground = [](double x, double z) { return 1.5 * std::sin(0.03 * x) + 1.0 * std::cos(0.05 * z); };
+  const auto ground = [](double x, double z) {
+    return 1.5 * std::sin(0.03 * x) + 1.0 * std::cos(0.05 * z);
+  };
   for (int i = 0; i < 8000; ++i) {
     const double x = m.in(-85, 85), z = m.in(-115, 115);
     m.disc(grid({x, ground(x, z), z}), 1, 0.2);
@@ -72,14 +77,17 @@ void add_outdoors(Maker& m) {
   }
   for (int i = 0; i < 1000; ++i) {
     const double a = m.in(0, 6.283), h = m.in(0, 1);
-    m.disc(Vec3d{1300 * std::cos(a) * std::sqrt(1 - h * h), 1300 * h, 1300 * std::sin(a) * std::sqrt(1 - h * h)}, 1, 1);
+    m.disc(Vec3d{1300 * std::cos(a) * std::sqrt(1 - h * h), 1300 * h,
+                 1300 * std::sin(a) * std::sqrt(1 - h * h)},
+           1, 1);
   }
 }
 
 }  // namespace
 
 TEST_CASE("guess_up: rooms and landscapes, whichever way they are up") {
-  const std::pair<const char*, std::function<void(Maker&)>> scenes[] = {{"room", add_room}, {"outdoors", add_outdoors}};
+  const std::pair<const char*, std::function<void(Maker&)>> scenes[] = {{"room", add_room},
+                                                                        {"outdoors", add_outdoors}};
   for (const auto& [name, add] : scenes) {
     for (const Vec3d& up : {Vec3d{0, 1, 0}, Vec3d{0, -1, 0}, Vec3d{0, 0, 1}}) {
       CAPTURE(name);

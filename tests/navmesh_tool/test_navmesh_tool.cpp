@@ -190,7 +190,9 @@ TEST_CASE("navmesh tool: what is wrong is said on one line") {
     CHECK(help.says(part));
 }
 
-TEST_CASE("navmesh tool: a full disk leaves the NavMesh, outline and picture of before; names are checked first") {
+TEST_CASE(
+    "navmesh tool: a full disk leaves the NavMesh, outline and picture of before; names are checked "
+    "first") {
   const TempFolder folder("navmesh_full");
   write_file(folder / "floors.obj", two_floors_z_up());
   std::filesystem::create_directory(folder / "disk");
@@ -201,7 +203,8 @@ TEST_CASE("navmesh tool: a full disk leaves the NavMesh, outline and picture of 
       const std::filesystem::path file = folder / std::string(kind).substr(6);
       write_file(file, "before");
       write_file(folder / "disk/filler", std::string(12000, 'x'));
-      const Outcome out = run(folder, std::string("floors.obj --up z --scale 0.01 --tile-size 16 ") + kPlain + " " + kind);
+      const Outcome out = run(
+          folder, std::string("floors.obj --up z --scale 0.01 --tile-size 16 ") + kPlain + " " + kind);
       CAPTURE(out.text);
       CHECK_FALSE(out.ok);
       CHECK(out.says("cannot be written: No space left on device"));

@@ -28,7 +28,9 @@ GaussianCloud field_z_up() {
     const bool ground = i % 2 == 0;
     RawGaussian g;
     g.mean = {rng.uniform(-10, 10), rng.uniform(-10, 10), 0};
-    if (!ground) g.mean = {2.5 * std::floor(rng.uniform(-4, 4)) + 1.25, 2.5 * std::floor(rng.uniform(-4, 4)) + 1.25, rng.uniform(0, 3)};
+    if (!ground)
+      g.mean = {2.5 * std::floor(rng.uniform(-4, 4)) + 1.25, 2.5 * std::floor(rng.uniform(-4, 4)) + 1.25,
+                rng.uniform(0, 3)};
     g.quat = {1, 0, 0, 0};
     g.log_scales = ground ? Vec3d{-1.5, -1.5, -5} : Vec3d{-3, -3, -1.5};
     g.opacity_logit = 6;
@@ -62,7 +64,8 @@ TEST_CASE("render tool: without cameras, views around the scene with its own gro
     CHECK(lower > 2 * upper);
     double left = 0, right = 0;
     for (int y = 0; y < 64; ++y) {
-      for (int x = 0; x < 96; ++x) (x < 48 ? left : right) += image.samples[static_cast<std::size_t>(3 * (y * 96 + x))];
+      for (int x = 0; x < 96; ++x)
+        (x < 48 ? left : right) += image.samples[static_cast<std::size_t>(3 * (y * 96 + x))];
     }
     CHECK(left == doctest::Approx(right).epsilon(0.2));
   }

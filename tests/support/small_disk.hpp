@@ -9,8 +9,9 @@
 
 namespace gsnav_test {
 
-/// A file system of a few hundred kilobytes in a folder that exists; gone with the object. Mounting needs privileges:
-/// without them `mounted` is false, and a line of the test's output says what was skipped.
+/// A file system of a few hundred kilobytes in a folder that exists; gone with the object. Mounting
+/// needs privileges: without them `mounted` is false, and a line of the test's output says what was
+/// skipped.
 class SmallDisk {
  public:
   SmallDisk(std::filesystem::path folder, int kilobytes) : folder_(std::move(folder)) {

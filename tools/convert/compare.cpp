@@ -12,8 +12,10 @@ namespace gsnav_convert {
 
 using namespace gsnav;
 
-FieldErrors largest_field_errors(const GaussianCloud& source, const std::vector<std::uint32_t>& source_rows,
-                                 const GaussianCloud& made, const std::vector<std::uint32_t>& made_rows) {
+FieldErrors largest_field_errors(const GaussianCloud& source,
+                                 const std::vector<std::uint32_t>& source_rows,
+                                 const GaussianCloud& made,
+                                 const std::vector<std::uint32_t>& made_rows) {
   FieldErrors e;
   const std::size_t rest = source.size() == 0 ? 0 : source.shN.size() / source.size();
   const std::size_t rest_made = made.size() == 0 ? 0 : made.shN.size() / made.size();
@@ -27,16 +29,20 @@ FieldErrors largest_field_errors(const GaussianCloud& source, const std::vector<
     const Quatd turn = conjugate(parts(source, i)) * parts(made, j);
     const double sine = std::sqrt(turn.x * turn.x + turn.y * turn.y + turn.z * turn.z);
     e.rotation = std::max(e.rotation, 2 * std::atan2(sine, std::fabs(turn.w)));
-    e.opacity = std::max(e.opacity, std::fabs(static_cast<double>(made.opacities[j]) - static_cast<double>(source.opacities[i])));
+    e.opacity = std::max(e.opacity, std::fabs(static_cast<double>(made.opacities[j]) -
+                                              static_cast<double>(source.opacities[i])));
     for (std::size_t k = 0; k < 3; ++k) {
-      const double a = static_cast<double>(source.scales[k][i]), b = static_cast<double>(made.scales[k][j]);
+      const double a = static_cast<double>(source.scales[k][i]),
+                   b = static_cast<double>(made.scales[k][j]);
       if (a > 0) e.scale = std::max(e.scale, std::fabs(b / a - 1));
       e.scale_metres = std::max(e.scale_metres, std::fabs(b - a));
-      const double change = static_cast<double>(made.sh0[3 * j + k]) - static_cast<double>(source.sh0[3 * i + k]);
+      const double change =
+          static_cast<double>(made.sh0[3 * j + k]) - static_cast<double>(source.sh0[3 * i + k]);
       e.colour = std::max(e.colour, kSh0 * std::fabs(change));
     }
     for (std::size_t k = 0; k < std::max(rest, rest_made); ++k) {
-      const float a = k < rest ? source.shN[i * rest + k] : 0, b = k < rest_made ? made.shN[j * rest_made + k] : 0;
+      const float a = k < rest ? source.shN[i * rest + k] : 0,
+                  b = k < rest_made ? made.shN[j * rest_made + k] : 0;
       e.bands = std::max(e.bands, std::fabs(static_cast<double>(b) - static_cast<double>(a)));
     }
   }

@@ -12,7 +12,8 @@
 
 namespace gsnav_convert {
 
-/// How far a cloud is from the one that it was made of, row by row: the largest of each field. Nothing is clamped.
+/// How far a cloud is from the one that it was made of, row by row: the largest of each field. Nothing
+/// is clamped.
 struct FieldErrors {
   double mean = 0;          ///< metres
   double scale = 0;         ///< ratio minus one, of scales that are not zero
@@ -24,16 +25,19 @@ struct FieldErrors {
 };
 
 /// Row source_rows[i] of the source became row made_rows[i].
-FieldErrors largest_field_errors(const gsnav::GaussianCloud& source, const std::vector<std::uint32_t>& source_rows,
-                                 const gsnav::GaussianCloud& made, const std::vector<std::uint32_t>& made_rows);
+FieldErrors largest_field_errors(const gsnav::GaussianCloud& source,
+                                 const std::vector<std::uint32_t>& source_rows,
+                                 const gsnav::GaussianCloud& made,
+                                 const std::vector<std::uint32_t>& made_rows);
 
 struct ImageErrors {
-  double psnr = 0;    ///< over all images, dB of 1; infinite where they are the same
-  double worst = 0;   ///< of one image
-  double largest = 0; ///< difference of a value
+  double psnr = 0;     ///< over all images, dB of 1; infinite where they are the same
+  double worst = 0;    ///< of one image
+  double largest = 0;  ///< difference of a value
 };
 
-/// Renders both from each camera, ties of depth in the order in which each was read. Values above 1 are compared too.
+/// Renders both from each camera, ties of depth in the order in which each was read. Values above 1 are
+/// compared too.
 gsnav::Result<ImageErrors> image_errors(const gsnav::GaussianCloud& source,
                                         const gsnav::GaussianCloud& made,
                                         const std::vector<gsnav::Camera>& cameras);

@@ -125,9 +125,10 @@ void print_clamped(const io::ClampedValues& c) {
   line(c.lost_bands, "SH coefficients lost: the format has no bands");
 }
 
-/// Reads the file back as anybody would and says what became of the cloud, ties of depth in the order of the rows read
-/// included. `rows`: the cloud's in the file's order.
-Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& rows, const std::string& out, const Options& o) {
+/// Reads the file back as anybody would and says what became of the cloud, ties of depth in the order of
+/// the rows read included. `rows`: the cloud's in the file's order.
+Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& rows,
+               const std::string& out, const Options& o) {
   auto back = io::load_scene(out, {.keep_zero_bands = true});
   if (!back) return back.status();
   const GaussianCloud& made = back->cloud;
@@ -136,9 +137,13 @@ Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& ro
                                     std::to_string(source.size()) + " Gaussians were read back"};
   }
   if (made.filter != source.filter) std::printf("  the mip filter is lost in this format\n");
-  const gsnav_convert::FieldErrors e = gsnav_convert::largest_field_errors(source, rows, made, rows_as_read(made));
-  std::printf("  largest errors: mean %.3g m, scale %.3g %% (%.3g m), rotation %.3g deg, opacity %.3g, colour %.3g, SH %.3g\n",
-              e.mean, 100 * e.scale, e.scale_metres, e.rotation * 180 / 3.14159265358979323846, e.opacity, e.colour, e.bands);
+  const gsnav_convert::FieldErrors e =
+      gsnav_convert::largest_field_errors(source, rows, made, rows_as_read(made));
+  std::printf(
+      "  largest errors: mean %.3g m, scale %.3g %% (%.3g m), rotation %.3g deg, opacity %.3g, colour "
+      "%.3g, SH %.3g\n",
+      e.mean, 100 * e.scale, e.scale_metres, e.rotation * 180 / 3.14159265358979323846, e.opacity,
+      e.colour, e.bands);
   std::vector<Camera> cameras = views_around(source, guess_up(source).up, o.views, o.width, o.height);
   if (!o.cameras.empty()) {
     auto given = io::load_cameras(o.cameras, o.width, o.height);
@@ -152,7 +157,8 @@ Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& ro
   if (images->largest == 0) {
     std::printf("equal, bit for bit\n");
   } else {
-    std::printf("PSNR %.2f dB, the worst %.2f dB, largest difference %.3g\n", images->psnr, images->worst, images->largest);
+    std::printf("PSNR %.2f dB, the worst %.2f dB, largest difference %.3g\n", images->psnr,
+                images->worst, images->largest);
   }
   return {};
 }
@@ -185,7 +191,8 @@ int main(int argc, char** argv) {
   app.add_option("--scale", o.scale, "Then scale by this factor")->check(CLI::PositiveNumber);
   app.add_option("--translate", o.translate, "Then move by X Y Z metres")->expected(3);
   app.add_option("--order", o.order,
-                 "Of the rows in the file: read, as they were read, which decides ties of depth; space, along a curve "
+                 "Of the rows in the file: read, as they were read, which decides ties of depth; space, "
+                 "along a curve "
                  "through space: smaller .sog and .spz files. A .compressed.ply always has the latter")
       ->check(CLI::IsMember({"read", "space"}))
       ->capture_default_str();
@@ -208,15 +215,15 @@ int main(int argc, char** argv) {
   const bool chunks = lower_case(out).ends_with(".compressed.ply");
   if (chunks || o.order == "space") {
     cloud->row_ids.clear();
-    std::printf("%s: rows along a curve through space%s: where depths are equal, images differ\n", printable(out).c_str(),
-                chunks ? ", as the format's chunks need them" : "");
+    std::printf("%s: rows along a curve through space%s: where depths are equal, images differ\n",
+                printable(out).c_str(), chunks ? ", as the format's chunks need them" : "");
   }
   const std::vector<std::uint32_t> rows = rows_as_read(*cloud);
   if (Status s = io::save_scene(out, *cloud); !s) return fail(s.message());
   cloud->row_ids = std::move(as_read);
   const std::uintmax_t bytes = bytes_of(out);
-  std::printf("%s: %zu Gaussians of SH degree %d, %.2f MB, %.1f bytes a Gaussian\n", printable(out).c_str(),
-              cloud->size(), cloud->sh_degree, static_cast<double>(bytes) / 1e6,
+  std::printf("%s: %zu Gaussians of SH degree %d, %.2f MB, %.1f bytes a Gaussian\n",
+              printable(out).c_str(), cloud->size(), cloud->sh_degree, static_cast<double>(bytes) / 1e6,
               static_cast<double>(bytes) / static_cast<double>(cloud->size()));
   print_clamped(io::count_clamped(out, *cloud));
   if (Status s = compare(*cloud, rows, out, o); !s) return fail(s.message());

@@ -233,7 +233,8 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
 int main(int argc, char** argv) {
   Options o;
   CLI::App app{
-      "Renders a scene of 3D Gaussians from the cameras of an INRIA cameras.json or from around it. Writes NNNN.rgb.npy "
+      "Renders a scene of 3D Gaussians from the cameras of an INRIA cameras.json or from around it. "
+      "Writes NNNN.rgb.npy "
       "(H, W, 3 float32, unclamped), NNNN.depth.npy and NNNN.alpha.npy (H, W float32; metres, 0 = no "
       "return) and PNG pictures. The scene is used in its own frame: no up axis is applied."};
   app.add_option("--scene", o.scene,
@@ -244,7 +245,8 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"full", "compact", "packed"}))
       ->capture_default_str();
   app.add_option("--cameras", o.cameras,
-                 "INRIA cameras.json (camera-to-world, OpenCV axes); without it --orbit views around the scene, upright by "
+                 "INRIA cameras.json (camera-to-world, OpenCV axes); without it --orbit views around "
+                 "the scene, upright by "
                  "the guess of which way is up");
   app.add_option("--orbit", o.orbit, "Number of views around the scene where no --cameras are given")
       ->check(CLI::Range(1, 1000))
@@ -361,8 +363,10 @@ int main(int argc, char** argv) {
     }
     auto placed = placed_meshes(std::move(*surface));
     if (!placed) return fail(file + ": " + placed.message());
-    std::printf("%s: %zu triangles in %zu places\n", printable(file).c_str(), triangles, placed->instances.size());
-    for (const std::string& w : placed->warnings) std::printf("%s: %s\n", printable(file).c_str(), printable(w).c_str());
+    std::printf("%s: %zu triangles in %zu places\n", printable(file).c_str(), triangles,
+                placed->instances.size());
+    for (const std::string& w : placed->warnings)
+      std::printf("%s: %s\n", printable(file).c_str(), printable(w).c_str());
     meshes.push_back(std::move(*placed));
   }
   const auto orbit = [&]() -> Result<std::vector<Camera>> {

@@ -120,7 +120,9 @@ Status ReferenceCache::store(const std::string& hash, const Reference& r) const 
   header.checksum = checksum(r);
   return replace_file(file(hash), [&](OutputFile& out) {
     out.write(&header, sizeof header);
-    each_array(r, [&](const auto& v) { out.write(v.data(), v.size() * sizeof(typename std::decay_t<decltype(v)>::value_type)); });
+    each_array(r, [&](const auto& v) {
+      out.write(v.data(), v.size() * sizeof(typename std::decay_t<decltype(v)>::value_type));
+    });
   });
 }
 

@@ -47,8 +47,9 @@ inline std::filesystem::path folder_of(const std::filesystem::path& path) {
 
 }  // namespace detail
 
-/// Checks that a file of this name can be written: the folder exists and may be written to, and what has the name is
-/// no folder and not write-protected. Writes nothing. Call it before long work whose result goes to `path`.
+/// Checks that a file of this name can be written: the folder exists and may be written to, and what has
+/// the name is no folder and not write-protected. Writes nothing. Call it before long work whose result
+/// goes to `path`.
 /// @return file_not_found, naming the path or the folder that is missing.
 inline Status check_output_path(const std::filesystem::path& path) {
   struct ::stat found {};
@@ -64,29 +65,34 @@ inline Status check_output_path(const std::filesystem::path& path) {
   if (::stat(folder.c_str(), &found) != 0 || !S_ISDIR(found.st_mode)) {
     return detail::unwritable(path, "the folder " + folder.string() + " does not exist; make it first");
   }
-  if (path.filename().empty()) return detail::unwritable(path, "the name of a file is missing behind the folder");
+  if (path.filename().empty()) return detail::unwritable(path, "it ends in a slash; name a file");
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
-    return detail::unwritable(path, "in the folder " + folder.string() + ": " + std::generic_category().message(errno));
+    return detail::unwritable(
+        path, "in the folder " + folder.string() + ": " + std::generic_category().message(errno));
   }
   return {};
 }
 
-/// Makes a folder for files to be written, and those above it, where they are missing. Call it before long work.
+/// Makes a folder for files to be written, and those above it, where they are missing. Call it before
+/// long work.
 /// @return file_not_found where it cannot be made, is a file or may not be written to.
 inline Status make_output_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) return {Errc::file_not_found, folder.string() + ": the folder cannot be made: " + error.message()};
-  return check_output_path(folder / "file");
+  if (error) {
+    return {Errc::file_not_found, folder.string() + ": the folder cannot be made: " + error.message()};
+  }
+  return ::access(folder.c_str(), W_OK | X_OK) == 0 ? Status() : detail::unwritable(folder, errno);
 }
 
 /// A file being written, which takes its name only when it is whole.
 ///
-/// Bytes go to a nameless file in the target's folder (or, where the file system has none, to one of a unique name
-/// `NAME.PID-NUMBER.part`). `commit` forces them to the disk and renames. Until then, and after any failure, what had
-/// the name before is untouched and nothing new is left; a process that is killed leaves a `.part` file at most.
-/// An existing file keeps its permissions; a symbolic link stays one, and its target is replaced. Devices and pipes
-/// are written in place. Objects of different threads and processes may write the same name: one of them stays.
+/// Bytes go to a nameless file in the target's folder (or, where the file system has none, to one of a
+/// unique name `NAME.PID-NUMBER.part`). `commit` forces them to the disk and renames. Until then, and
+/// after any failure, what had the name before is untouched and nothing new is left; a process that is
+/// killed leaves a `.part` file at most. An existing file keeps its permissions; a symbolic link stays
+/// one, and its target is replaced. Devices and pipes are written in place. Objects of different threads
+/// and processes may write the same name: one of them stays.
 class OutputFile {
  public:
   OutputFile() = default;
@@ -166,7 +172,8 @@ class OutputFile {
     static std::atomic<unsigned> next{0};
     constexpr std::size_t kLongest = 200;  // of 255, so that the end fits
     const std::string name = target_.filename().string().substr(0, kLongest);
-    return target_.parent_path() / (name + "." + std::to_string(::getpid()) + "-" + std::to_string(next++) + ".part");
+    return target_.parent_path() /
+           (name + "." + std::to_string(::getpid()) + "-" + std::to_string(next++) + ".part");
   }
 
   /// Calls make(name) with unique names until one is free; the last result.
@@ -191,7 +198,8 @@ class OutputFile {
       if (fd >= 0) return fd;
     }
 #endif
-    return with_unique_name([](const char* name) { return ::open(name, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666); });
+    return with_unique_name(
+        [](const char* name) { return ::open(name, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666); });
   }
 
   /// Gives the target's name where it is free, one aside where it is not: a link never replaces a file.
@@ -215,8 +223,8 @@ class OutputFile {
   bool in_place_ = false;
 };
 
-/// Writes a file by `write(OutputFile&)`, which may return a Status. Readers see the file of before or the whole new
-/// one; a failure, an exception too, changes nothing (`OutputFile` says how).
+/// Writes a file by `write(OutputFile&)`, which may return a Status. Readers see the file of before or
+/// the whole new one; a failure, an exception too, changes nothing (`OutputFile` says how).
 /// @return the Status of `write`, or file_not_found where the file cannot be written.
 template <class F>
   requires std::is_invocable_v<const F&, OutputFile&>

@@ -69,14 +69,14 @@ std::string report_text(const LoadReport& report);
 
 /// Writes a scene by its name: `.compressed.ply`, `.ply` (INRIA's layout), `.splat`, `.spz` (version 4),
 /// `.sog`, a folder's `meta.json` (SOG), `.glb`. What each format loses is said where its writer is
-/// declared. Rows are written in the order in which they were read (`row_ids`), by which renderers break ties of depth;
-/// in a `.compressed.ply` in the cloud's own. A compact cloud is widened first. The file is written aside and renamed: a
-/// failure leaves what was there, the cloud's own file too.
-/// Errors: the writer's; check_scene_output's. Never throws.
+/// declared. Rows are written in the order in which they were read (`row_ids`), by which renderers break
+/// ties of depth; in a `.compressed.ply` in the cloud's own. A compact cloud is widened first. The file
+/// is written aside and renamed: a failure leaves what was there, the cloud's own file too. Errors: the
+/// writer's; check_scene_output's. Never throws.
 Status save_scene(const std::filesystem::path& path, const GaussianCloud& cloud);
 
-/// Checks before a scene is loaded or made that save_scene can write it to `path`: unsupported (a name of no format
-/// that is written, with the list), file_not_found (check_output_path).
+/// Checks before a scene is loaded or made that save_scene can write it to `path`: unsupported (a name
+/// of no format that is written, with the list), file_not_found (check_output_path).
 Status check_scene_output(const std::filesystem::path& path);
 
 /// Values of a cloud that a format cannot hold.

@@ -21,11 +21,12 @@ namespace gsnav::io {
 Result<LoadedCloud> load_sog(const std::filesystem::path& path);
 
 /// Writes a cloud as SOG version 2: a bundle where `path` ends in `.sog`, else the files beside
-/// `path`/meta.json, whose folder must exist. Where a scene lies there already the new images get names that it does not
-/// use (means_l.1.webp), meta.json is replaced last and the old images are removed: whenever the writer is stopped, the
-/// folder has one whole scene. Rows are written in the order in which they were read. Planes compress better where
-/// neighbours in space are neighbours there: clear `row_ids` after sort_spatially to have the cloud's own order
-/// written; ties of depth are then drawn in another order.
+/// `path`/meta.json, whose folder must exist. Where a scene lies there already the new images get names
+/// that it does not use (means_l.1.webp), meta.json is replaced last and the old images are removed:
+/// whenever the writer is stopped, the folder has one whole scene. Rows are written in the order in
+/// which they were read. Planes compress better where neighbours in space are neighbours there: clear
+/// `row_ids` after sort_spatially to have the cloud's own order written; ties of depth are then drawn in
+/// another order.
 ///
 /// Read back: a mean v is within (1 + |v|) r / 131070, r being the range of log(1 + |v|) of its axis;
 /// the quaternion's smaller components within 0.0028, opacities within 1/510; log-scales (-infinity is

@@ -37,7 +37,7 @@ inline int sh_degree_in_use(const GaussianCloud& cloud) noexcept {
 struct UpGuess {
   Vec3d up{};             ///< a unit axis of the asset's frame; zero of an empty cloud
   bool seen = false;      ///< the cloud's ground says so; false: `usual` is what it is
-  double confidence = 0;  ///< of a seen one, 0 to 1: how far it is ahead of the other axes and of its opposite
+  double confidence = 0;  ///< of a seen one, 0 to 1: its lead over the other axes and its opposite
 };
 
 namespace detail {
@@ -49,17 +49,18 @@ struct GroundSearch {
   double side = 0;   ///< from 1, all else lies further along the axis than it, to -1
 };
 
-/// `points` are the sampled means, `facing` the unit normals of those that are flat (zero of others, which may face
-/// anywhere), `low` and `high` the box that has most of them.
-inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::vector<Vec3d>& facing, const Vec3d& low,
-                                  const Vec3d& high, int axis) {
-  constexpr std::size_t kCells = 16;      // of a slab on each side
-  constexpr double kAlong = 0.9;          // cosine of 26 degrees
-  constexpr double kBeyond = 0.3;         // of the box's height on each side: the ground may hold the outermost tenth
-  constexpr double kThick = 0.015;        // of the box's shorter side: ground is neither thin nor level
+/// `points` are the sampled means, `facing` the unit normals of those that are flat (zero of others,
+/// which may face anywhere), `low` and `high` the box that has most of them.
+inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::vector<Vec3d>& facing,
+                                  const Vec3d& low, const Vec3d& high, int axis) {
+  constexpr std::size_t kCells = 16;  // of a slab on each side
+  constexpr double kAlong = 0.9;    // cosine of 26 degrees
+  constexpr double kBeyond = 0.3;   // of the box's height, on each side: ground may be its outer tenth
+  constexpr double kThick = 0.015;  // of the box's shorter side: ground is neither thin nor level
   constexpr double kMostSlabs = 512, kLeastSlabs = 8;
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;
-  const double height = (1 + 2 * kBeyond) * (high[axis] - low[axis]), bottom = low[axis] - kBeyond * (high[axis] - low[axis]);
+  const double height = (1 + 2 * kBeyond) * (high[axis] - low[axis]),
+               bottom = low[axis] - kBeyond * (high[axis] - low[axis]);
   const double shorter = std::min(high[b] - low[b], high[c] - low[c]);
   GroundSearch out;
   if (!(height > 0) || !(shorter > 0)) return out;
@@ -70,9 +71,12 @@ inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::v
   std::vector<double> mass(slabs), upright(slabs);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vec3d& p = points[i];
-    const auto cell = [&](int k) { return static_cast<std::size_t>(kCells * (p[k] - low[k]) / (high[k] - low[k])); };
+    const auto cell = [&](int k) {
+      return static_cast<std::size_t>(kCells * (p[k] - low[k]) / (high[k] - low[k]));
+    };
     const double at = (p[axis] - bottom) / slab;
-    if (p[b] < low[b] || p[b] >= high[b] || p[c] < low[c] || p[c] >= high[c] || !(at >= 0) || !(at < static_cast<double>(slabs))) {
+    if (p[b] < low[b] || p[b] >= high[b] || p[c] < low[c] || p[c] >= high[c] || !(at >= 0) ||
+        !(at < static_cast<double>(slabs))) {
       continue;
     }
     const auto s = static_cast<std::size_t>(at);
@@ -86,11 +90,13 @@ inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::v
   for (std::size_t s = 0; s + 1 < slabs; ++s) {
     std::size_t cells = 0;
     for (std::size_t k = 0; k < kCells * kCells; ++k) {
-      cells += covered[s * kCells * kCells + k] != 0 || covered[(s + 1) * kCells * kCells + k] != 0 ? 1 : 0;
+      cells +=
+          covered[s * kCells * kCells + k] != 0 || covered[(s + 1) * kCells * kCells + k] != 0 ? 1 : 0;
     }
     share[s] = static_cast<double>(cells) / (kCells * kCells);
   }
-  const auto best = static_cast<std::size_t>(std::max_element(share.begin(), share.end()) - share.begin());
+  const auto best =
+      static_cast<std::size_t>(std::max_element(share.begin(), share.end()) - share.begin());
   out.share = share[best];
   out.area = share[best] * (high[b] - low[b]) * (high[c] - low[c]);
   std::size_t first = best, last = best;
@@ -116,11 +122,12 @@ inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::v
 
 }  // namespace detail
 
-/// Guesses which way is up from the ground: the largest surface that lies across an axis, of Gaussians that face along
-/// it. Up is the side on which more lies; between a floor and a ceiling, from which more stands than hangs; where that
-/// is undecided, +z or the sign of `usual`. Where there is no such surface (an object) `usual` is returned. A guess for
-/// people to check and for default cameras, one of +y, -y and +z, which are all that tools make. It depends on the
-/// Gaussians alone, not on the order of their rows.
+/// Guesses which way is up from the ground: the largest surface that lies across an axis, of Gaussians
+/// that face along it. Up is the side on which more lies; between a floor and a ceiling, from which more
+/// stands than hangs; where that is undecided, +z or the sign of `usual`. Where there is no such surface
+/// (an object) `usual` is returned. A guess for people to check and for default cameras, one of +y, -y
+/// and +z, which are all that tools make. It depends on the Gaussians alone, not on the order of their
+/// rows.
 inline UpGuess guess_up(const GaussianCloud& cloud, const Vec3d& usual = {0, -1, 0}) {
   constexpr std::size_t kSample = 1 << 14;
   constexpr double kOutliers = 0.1, kFlat = 0.5, kLeastAhead = 0.4, kLeastShare = 0.55, kDecided = 0.1;
@@ -132,7 +139,8 @@ inline UpGuess guess_up(const GaussianCloud& cloud, const Vec3d& usual = {0, -1,
   facing.reserve(kSample + kSample / 8);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     std::uint64_t bits = 0;
-    for (const auto& plane : cloud.means) bits = (bits ^ std::bit_cast<std::uint32_t>(plane[i])) * 0x9e3779b97f4a7c15u;
+    for (const auto& plane : cloud.means)
+      bits = (bits ^ std::bit_cast<std::uint32_t>(plane[i])) * 0x9e3779b97f4a7c15u;
     if ((bits >> 32) % every != 0) continue;
     points.push_back(cloud.mean(i));
     std::array<float, 3> scale{cloud.scales[0][i], cloud.scales[1][i], cloud.scales[2][i]};
@@ -142,14 +150,17 @@ inline UpGuess guess_up(const GaussianCloud& cloud, const Vec3d& usual = {0, -1,
     axis[thin] = 1;
     const Quatd q{static_cast<double>(cloud.quats[0][i]), static_cast<double>(cloud.quats[1][i]),
                   static_cast<double>(cloud.quats[2][i]), static_cast<double>(cloud.quats[3][i])};
-    facing.push_back(static_cast<double>(scale[0]) < kFlat * static_cast<double>(scale[1]) ? rotate(q, axis) : Vec3d{});
+    facing.push_back(static_cast<double>(scale[0]) < kFlat * static_cast<double>(scale[1])
+                         ? rotate(q, axis)
+                         : Vec3d{});
   }
   Vec3d low, high;
   std::vector<double> along(points.size());
   for (int k = 0; k < 3 && !points.empty(); ++k) {
     for (std::size_t i = 0; i < along.size(); ++i) along[i] = points[i][k];
     const auto at = [&](double share) {
-      const auto place = along.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(along.size() - 1));
+      const auto place =
+          along.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(along.size() - 1));
       std::nth_element(along.begin(), place, along.end());
       return *place;
     };
@@ -157,7 +168,8 @@ inline UpGuess guess_up(const GaussianCloud& cloud, const Vec3d& usual = {0, -1,
     high[k] = at(1 - kOutliers);
   }
   std::array<detail::GroundSearch, 3> found;
-  for (int k = 0; k < 3; ++k) found[static_cast<std::size_t>(k)] = detail::search_ground(points, facing, low, high, k);
+  for (int k = 0; k < 3; ++k)
+    found[static_cast<std::size_t>(k)] = detail::search_ground(points, facing, low, high, k);
   std::size_t axis = 0;
   for (std::size_t k = 1; k < 3; ++k) axis = found[k].area > found[axis].area ? k : axis;
   double second = 0;

@@ -12,9 +12,11 @@
 
 namespace gsnav {
 
-/// `count` cameras of 60 degrees on a circle around the middle of a box, slightly above it, that look at the middle.
+/// `count` cameras of 60 degrees on a circle around the middle of a box, slightly above it, that look at
+/// the middle.
 /// @param up  unit axis of the asset's frame that points up (`LoadReport::up`, `guess_up`)
-inline std::vector<Camera> views_around(const Aabb<double>& box, const Vec3d& up, int count, int width, int height) {
+inline std::vector<Camera> views_around(const Aabb<double>& box, const Vec3d& up, int count, int width,
+                                        int height) {
   std::vector<Camera> out;
   const Vec3d middle = (box.low + box.high) * 0.5;
   const double distance = 1.8 * std::max(0.5 * norm(box.high - box.low), 1e-3);
@@ -23,14 +25,17 @@ inline std::vector<Camera> views_around(const Aabb<double>& box, const Vec3d& up
   constexpr double kPi = 3.14159265358979323846;
   for (int v = 0; v < count; ++v) {
     const double angle = 2 * kPi * v / count;
-    const Vec3d eye = middle + (across * std::cos(angle) - other * std::sin(angle) + up * 0.35) * distance;
+    const Vec3d eye =
+        middle + (across * std::cos(angle) - other * std::sin(angle) + up * 0.35) * distance;
     out.push_back(Camera::look_at(eye, middle, up, width, height, 60));
   }
   return out;
 }
 
-/// The same around a scene: its outermost tenth on each side is left out of the box. Empty for an empty cloud.
-inline std::vector<Camera> views_around(const GaussianCloud& cloud, const Vec3d& up, int count, int width, int height) {
+/// The same around a scene: its outermost tenth on each side is left out of the box. Empty for an empty
+/// cloud.
+inline std::vector<Camera> views_around(const GaussianCloud& cloud, const Vec3d& up, int count,
+                                        int width, int height) {
   if (cloud.size() == 0) return {};
   Aabb<double> box;
   std::vector<double> along(cloud.size());
