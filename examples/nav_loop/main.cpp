@@ -29,6 +29,8 @@ double seconds_since(Clock::time_point t) {
 
 template <gsnav::Backend B>
 Status run(B& backend, const Options& options) {
+  Recorder recorder(options);
+  if (Status s = recorder.open(); !s) return s;
   auto prepared = prepare(options);
   if (!prepared) return prepared.status();
   Setup setup = std::move(*prepared);
@@ -48,8 +50,6 @@ Status run(B& backend, const Options& options) {
   if (!made) return made.status();
   auto& sim = *made;
 
-  Recorder recorder(options);
-  if (Status s = recorder.open(); !s) return s;
   Progress progress(options.episodes);
   const gsnav::GeodesicFollower policy;
   std::vector<EpisodeRecord> records;

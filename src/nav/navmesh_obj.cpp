@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <cstdio>
-#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "navmesh_impl.hpp"
 
@@ -39,11 +39,7 @@ Status save_navmesh_obj(const NavMesh& mesh, const std::filesystem::path& path) 
       }
     }
   }
-  std::ofstream out(path, std::ios::binary);
-  out << vertices << faces;
-  out.close();
-  if (!out) return {Errc::file_not_found, path.string() + ": cannot be written"};
-  return {};
+  return replace_file(path, vertices + faces);
 }
 
 }  // namespace gsnav

@@ -3,6 +3,8 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -12,6 +14,7 @@
 #include "gsnav/nav/navmesh_file.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
+#include "support/small_disk.hpp"
 
 using namespace gsnav;
 using gsnav_test::Outcome;
@@ -185,4 +188,33 @@ TEST_CASE("navmesh tool: what is wrong is said on one line") {
   CHECK(help.ok);
   for (const char* part : {"--out", "--png", "--agent-radius", "--solid-alpha", "--up"})
     CHECK(help.says(part));
+}
+
+TEST_CASE(
+    "navmesh tool: a full disk leaves the NavMesh, outline and picture of before; names are checked "
+    "first") {
+  const TempFolder folder("navmesh_full");
+  write_file(folder / "floors.obj", two_floors_z_up());
+  std::filesystem::create_directory(folder / "disk");
+  const gsnav_test::SmallDisk disk(folder / "disk", 16);
+  if (disk.mounted()) {
+    for (const char* kind : {"--out disk/a.navmesh", "--obj disk/a.obj", "--png disk/a.png"}) {
+      CAPTURE(kind);
+      const std::filesystem::path file = folder / std::string(kind).substr(6);
+      write_file(file, "before");
+      write_file(folder / "disk/filler", std::string(12000, 'x'));
+      const Outcome out = run(
+          folder, std::string("floors.obj --up z --scale 0.01 --tile-size 16 ") + kPlain + " " + kind);
+      CAPTURE(out.text);
+      CHECK_FALSE(out.ok);
+      CHECK(out.says("cannot be written: No space left on device"));
+      CHECK(read_file(file) == "before");
+      CHECK(std::distance(std::filesystem::directory_iterator(folder / "disk"), {}) == 2);
+      std::filesystem::remove(file);
+    }
+  }
+  const Outcome out = run(folder, "absent.obj --out none/a.navmesh");
+  CHECK_FALSE(out.ok);
+  CHECK(out.says("none does not exist; make it first"));
+  CHECK_FALSE(out.says("absent.obj"));
 }

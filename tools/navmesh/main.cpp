@@ -10,6 +10,7 @@
 
 #include "draw.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/scene_file.hpp"
@@ -44,7 +45,7 @@ Result<Triangles> load_triangles(const std::string& path, const Similarity& plac
   Triangles out;
   for (const Vec3f& v : mesh->vertices) out.vertices.push_back(placed * vec_cast<double>(v));
   out.triangles = std::move(mesh->triangles);
-  std::printf("%s: %zu triangles\n", path.c_str(), out.triangles.size());
+  std::printf("%s: %zu triangles\n", printable(path).c_str(), out.triangles.size());
   return out;
 }
 
@@ -69,10 +70,12 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   const auto sets = build_visible_sets(backend, cloud, *viewpoints, settings, placed);
   if (!sets) return sets.status();
   if (Status s = io::save_visible_sets(o.visible_sets, *sets, cloud); !s) return s;
-  std::printf("%s%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the Gaussians\n",
-              isatty(fileno(stdout)) != 0 ? "\r" : "", o.visible_sets.c_str(), sets->cells(),
-              sets->viewpoints, 100 * sets->mean_share(), sets->cloud_chunks,
-              100 * sets->mean_row_share(cloud.size()));
+  std::printf(
+      "%s%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the "
+      "Gaussians\n",
+      isatty(fileno(stdout)) != 0 ? "\r" : "", printable(o.visible_sets).c_str(), sets->cells(),
+      sets->viewpoints, 100 * sets->mean_share(), sets->cloud_chunks,
+      100 * sets->mean_row_share(cloud.size()));
   return {};
 }
 
@@ -89,8 +92,8 @@ Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
   auto built = build_navmesh(o.settings, std::span(&set, 1), beside.vertices, beside.triangles, o.gaussians);
   if (!built) return built.status();
   const GaussianNavReport& r = built->report;
-  std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", o.input.c_str(), r.gaussians_used,
-              r.gaussians_faint, r.gaussians_outside);
+  std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", printable(o.input).c_str(),
+              r.gaussians_used, r.gaussians_faint, r.gaussians_outside);
   std::printf(
       "floor at %.3f m; %.0f %% of it under a ceiling; left out: %.2f m2 in small pieces, %.2f m2 "
       "outside\n",
@@ -165,12 +168,17 @@ Status draw_png(const Options& o, const NavMesh& mesh, const std::vector<NavLeve
   const double bar = bar_length(b.high.x - b.low.x);
   const MapPicture picture = draw(*map, bar);
   if (Status s = io::save_png_rgb8(o.png, picture.rgb, picture.width, picture.height); !s) return s;
-  std::printf("%s: %d x %d pixels, %.4g m each, near height %.2f m; the bar is %g m\n", o.png.c_str(),
-              picture.width, picture.height, map->metres_per_cell, height, bar);
+  std::printf("%s: %d x %d pixels, %.4g m each, near height %.2f m; the bar is %g m\n",
+              printable(o.png).c_str(), picture.width, picture.height, map->metres_per_cell, height,
+              bar);
   return {};
 }
 
 Status run(const Options& o) {
+  for (const std::string& out : {o.out, o.obj, o.png, o.visible_sets}) {
+    if (out.empty()) continue;
+    if (Status s = check_output_path(out); !s) return s;
+  }
   auto mesh = make(o);
   if (!mesh) return mesh.status();
   const std::vector<NavLevel> levels = find_levels(*mesh);
