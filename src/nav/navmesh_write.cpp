@@ -28,7 +28,7 @@ void put_settings(std::ofstream& out, const NavMeshSettings& s) {
   for (const bool f : {s.filter_low_hanging_obstacles, s.filter_ledge_spans, s.filter_walkable_low_height_spans}) {
     out.put(f ? 1 : 0);
   }
-  out.put(0);  // includeStaticObjects
+  out.put(s.include_static_objects ? 1 : 0);
 }
 
 /// The floats of a point at p, moved by d.
