@@ -132,7 +132,7 @@ struct Bends {
   Bends(const PolyMesh& m, PolyId id, const Vec3d& a, const Vec3d& b) {
     // A leg along the rim may run outside of all triangles by a rounding, or past a sample that lies beside
     // its side: what is nearly met counts, and costs no more than a look at the height there.
-    constexpr double kInside = -0.1;
+    constexpr double kNearly = -0.1;
     const PolyMesh::Poly& poly = m.polys[id];
     for (std::uint32_t i = poly.tri_first; i < poly.tri_first + poly.tri_count; ++i) {
       const PolyMesh::Share &s = m.share_1[i], &t = m.share_2[i];
@@ -142,13 +142,19 @@ struct Bends {
         return std::array<double, 3>{1.0 - u - v, u, v};
       };
       const std::array<double, 3> from = shares(a), to = shares(b);
+      if (min(min(from[0], from[1]), from[2]) >= 0 && min(min(to[0], to[1]), to[2]) >= 0) {
+        list.clear();  // all of it in one
+        return;
+      }
       for (std::size_t k = 0; k < 3; ++k) {
         if ((from[k] < 0) == (to[k] < 0)) continue;
         const double share = from[k] / (from[k] - to[k]);
         const auto other = [&](std::size_t n) { return from[n] + share * (to[n] - from[n]); };
-        if (min(other((k + 1) % 3), other((k + 2) % 3)) < kInside || !(share > 0 && share < 1)) continue;
+        const double p = other((k + 1) % 3), q = other((k + 2) % 3);
+        if (min(p, q) < kNearly || !(share > 0 && share < 1)) continue;
         Vec3d at = lerp(a, b, share);
-        at.y = m.height(id, at);
+        const auto y = [&](std::size_t n) { return m.points[m.tris[i][n % 3]].y; };
+        at.y = min(p, q) >= 0 ? p * y(k + 1) + q * y(k + 2) : m.height(id, at);
         list.push_back({share, at});
       }
     }
