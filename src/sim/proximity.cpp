@@ -10,6 +10,18 @@
 namespace gsnav {
 namespace {
 
+Vec3d position_at(std::span<const WalkPoint> path, double u) {
+  if (path.empty()) return {};
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    if (u < path[i].fraction) {
+      const double length = path[i].fraction - path[i - 1].fraction;
+      const double k = length > 0 ? (u - path[i - 1].fraction) / length : 1.0;
+      return lerp(path[i - 1].position, path[i].position, clamp(k, 0.0, 1.0));
+    }
+  }
+  return path.back().position;
+}
+
 constexpr double kRounding = 1e-9;
 
 void add_capsule(Aabb<double>& box, const Capsule<double>& c) {
@@ -34,6 +46,18 @@ double speed_of(const MovingCapsule<double>& m) {
   return max(norm(m.end.p0 - m.begin.p0), norm(m.end.p1 - m.begin.p1)) + abs(m.end.radius - m.begin.radius);
 }
 
+/// The same of whoever walks along `path`; infinity where it jumps.
+double speed_of(std::span<const WalkPoint> path) {
+  double speed = 0.0;
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const double length = norm(path[i].position - path[i - 1].position);
+    const double time = path[i].fraction - path[i - 1].fraction;
+    if (length > 0)
+      speed = time > 0 ? max(speed, length / time) : std::numeric_limits<double>::infinity();
+  }
+  return speed;
+}
+
 /// How far whoever walks along `path` goes.
 double length_of(std::span<const WalkPoint> path) {
   double length = 0.0;
@@ -41,48 +65,139 @@ double length_of(std::span<const WalkPoint> path) {
   return length;
 }
 
+/// A body, how fast it and the agent approach each other at most, and how near it was at the tick's
+/// begin, at its end and at the last look. Metres.
+struct Near {
+  const DynamicCapsule* body;
+  double speed, first, last, gap;
+};
+
 struct Scratch {
+  std::vector<Near> near;
   std::vector<double> bounds;  // of each of an avatar's capsules
   std::vector<std::size_t> order;
 };
 
-/// One avatar's least distance during the tick.
+/// One avatar's least distance during the tick. A gap changes no faster than both move: bodies that
+/// cannot come nearer than what was already found are not looked at again.
 class Approach {
  public:
-  Approach(std::span<const WalkPoint> path, double agent_length, double radius, double height,
-           Scratch& scratch)
+  Approach(std::span<const WalkPoint> path, double agent_speed, double agent_length, double radius,
+           double height, Scratch& scratch)
       : path_(path),
+        agent_speed_(agent_speed),
         agent_length_(agent_length),
         radius_(radius),
         height_(height),
-        bounds_(scratch.bounds) {}
+        scratch_(scratch),
+        near_(scratch.near) {}
 
   /// Looks at the boxes that the agent (`reach`) and the avatar's capsules sweep; returns a lower bound of find().
   double look(const Aabb<double>& reach, View<const DynamicCapsule> avatar) {
     avatar_ = avatar;
-    bounds_.resize(avatar.size);
+    scratch_.bounds.resize(avatar.size);
     nearest_ = 0;
     for (std::size_t c = 0; c < avatar.size; ++c) {
       Aabb<double> box;
       add_capsule(box, avatar[c].motion.begin);
       add_capsule(box, avatar[c].motion.end);
-      bounds_[c] = least_distance(reach, box);
-      if (bounds_[c] < bounds_[nearest_]) nearest_ = c;
+      scratch_.bounds[c] = least_distance(reach, box);
+      if (scratch_.bounds[c] < scratch_.bounds[nearest_]) nearest_ = c;
     }
-    return bounds_[nearest_];
+    return scratch_.bounds[nearest_];
   }
 
-  /// After look(): the least distance. Capsules that stay farther away than what was found are not
-  /// looked at.
-  double find() const {
-    double best = pass(avatar_[nearest_].motion, std::numeric_limits<double>::infinity());
+  /// After look(): the least distance. Looks at a few times for a good one; then each leg shows that
+  /// nothing is nearer, or how near it is.
+  double find() {
+    double best = sampled();
     for (std::size_t c = 0; c < avatar_.size; ++c) {
-      if (c != nearest_ && bounds_[c] <= best) best = pass(avatar_[c].motion, best);
+      if (scratch_.bounds[c] <= best) best = pass(avatar_[c].motion, best);
     }
     return best;
   }
 
  private:
+  /// A distance that the avatar comes to, nearly always the least.
+  double sampled() {
+    // Capsules that stay farther away than one of them is at the begin are not looked at.
+    const auto take = [this](std::size_t c) {
+      const double speed = agent_speed_ + speed_of(avatar_[c].motion);
+      near_.push_back({&avatar_[c], speed * (1 + kRounding) + kRounding, 0.0, 0.0, 0.0});
+    };
+    near_.clear();
+    take(nearest_);
+    const double most = gap(0.0);
+    near_.clear();
+    for (std::size_t c = 0; c < avatar_.size; ++c) {
+      if (scratch_.bounds[c] <= most) take(c);
+    }
+    constexpr int kSamples = 8;
+    offer(0.0);
+    for (Near& n : near_) n.first = n.gap;
+    offer(1.0);
+    for (Near& n : near_) n.last = n.gap;
+    drop([](const Near& n) { return 0.5 * (n.first + n.last - n.speed); });
+    offer(0.5);
+    drop([](const Near& n) { return 0.5 * (min(n.first, n.last) + n.gap - 0.5 * n.speed); });
+    for (int i = 1; i < kSamples; ++i) {
+      if (2 * i != kSamples) offer(static_cast<double>(i) / kSamples);
+    }
+    for (const WalkPoint& p : path_) offer(clamp(p.fraction, 0.0, 1.0));
+    // Golden sections around the best sample.
+    constexpr double kGolden = 0.6180339887498949;
+    double low = max(best_at_ - 1.0 / kSamples, 0.0), high = min(best_at_ + 1.0 / kSamples, 1.0);
+    gap(best_at_);
+    drop([](const Near& n) { return n.gap - n.speed / kSamples; });
+    double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
+    double at_a = gap(a), at_b = gap(b);
+    for (int i = 0; i < 13; ++i) {
+      best_ = min(best_, min(at_a, at_b));
+      // The last look was between low and high.
+      if (i == 3) drop([&](const Near& n) { return n.gap - n.speed * (high - low); });
+      if (at_a < at_b) {
+        high = b;
+        b = a;
+        at_b = at_a;
+        a = high - kGolden * (high - low);
+        at_a = gap(a);
+      } else {
+        low = a;
+        a = b;
+        at_a = at_b;
+        b = low + kGolden * (high - low);
+        at_b = gap(b);
+      }
+    }
+    return min(best_, min(at_a, at_b));
+  }
+
+  double gap(double u) {
+    const Capsule<double> agent = agent_capsule(position_at(path_, u), radius_, height_);
+    const Capsule<double> here{{}, agent.p1 - agent.p0, agent.radius};
+    double least = std::numeric_limits<double>::infinity();
+    for (Near& n : near_) {
+      Capsule<double> body = lerp(n.body->motion.begin, n.body->motion.end, u);
+      body.p0 -= agent.p0;
+      body.p1 -= agent.p0;
+      n.gap = capsule_gap(here, body).gap;
+      least = min(least, n.gap);
+    }
+    return least;
+  }
+  void offer(double u) {
+    const double d = gap(u);
+    if (d < best_) {
+      best_ = d;
+      best_at_ = u;
+    }
+  }
+  /// Forgets the bodies that stay farther away than the best, by a lower bound of their gap.
+  template <class Bound>
+  void drop(const Bound& bound) {
+    std::erase_if(near_, [&](const Near& n) { return bound(n) > best_; });
+  }
+
   /// The least of `best` and the gap to one capsule, leg by leg.
   double pass(const MovingCapsule<double>& body, double best) const {
     const double tolerance = kTolerance + kShare * (agent_length_ + speed_of(body));
@@ -114,10 +229,12 @@ class Approach {
   static constexpr double kShare = 1e-4;      // of what both move in a tick
 
   std::span<const WalkPoint> path_;
-  double agent_length_, radius_, height_;
-  std::vector<double>& bounds_;
+  double agent_speed_, agent_length_, radius_, height_;
+  Scratch& scratch_;
+  std::vector<Near>& near_;
   View<const DynamicCapsule> avatar_;
   std::size_t nearest_ = 0;  // by bounds
+  double best_ = std::numeric_limits<double>::infinity(), best_at_ = 0.0;
 };
 
 }  // namespace
@@ -137,11 +254,11 @@ void closest_approach(std::span<const WalkPoint> path, double radius, double hei
   order.resize(groups.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return out[a] < out[b]; });
-  const double length = length_of(path);
+  const double speed = speed_of(path), length = length_of(path);
   double least = std::numeric_limits<double>::infinity();
   for (const std::size_t g : order) {
     if (out[g] > max(least, kPersonalSpace)) break;
-    Approach approach(path, length, radius, height, scratch);
+    Approach approach(path, speed, length, radius, height, scratch);
     out[g] = max(out[g], approach.look(reach, bodies.capsules_of(groups[g])));
     if (out[g] > max(least, kPersonalSpace)) continue;
     out[g] = approach.find();
