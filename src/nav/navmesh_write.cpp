@@ -25,7 +25,7 @@ void put_settings(OutputFile& out, const NavMeshSettings& s) {
   for (const bool f : {s.filter_low_hanging_obstacles, s.filter_ledge_spans, s.filter_walkable_low_height_spans}) {
     out.write(f ? "\1" : "\0", 1);
   }
-  out.write("\0", 1);  // includeStaticObjects
+  out.write(s.include_static_objects ? "\1" : "\0", 1);
 }
 
 /// The floats of a point at p, moved by d.

@@ -13,6 +13,7 @@
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/mesh_file.hpp"
+#include "gsnav/io/navmesh_settings_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/io/visible_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
@@ -34,23 +35,35 @@ Quatd upright(const std::string& up) {
   return turns.at(up);
 }
 
-struct Triangles {
-  std::vector<Vec3d> vertices;
-  std::vector<NavMesh::Triangle> triangles;
-};
-
-Result<Triangles> load_triangles(const std::string& path, const Similarity& placed) {
-  auto mesh = io::load_obj(path);
+/// Adds the triangles of a file to `all`.
+Status add_triangles(const std::string& path, const Similarity& placed, NavMeshTriangles& all) {
+  auto mesh = io::load_mesh(path);
   if (!mesh) return mesh.status();
-  Triangles out;
-  for (const Vec3f& v : mesh->vertices) out.vertices.push_back(placed * vec_cast<double>(v));
-  out.triangles = std::move(mesh->triangles);
-  std::printf("%s: %zu triangles\n", printable(path).c_str(), out.triangles.size());
-  return out;
+  std::printf("%s: %zu triangles\n", printable(path).c_str(), mesh->triangles.size());
+  std::vector<Vec3d> vertices;
+  for (const Vec3f& v : mesh->vertices) vertices.push_back(vec_cast<double>(v));
+  const NavMeshPart parts[] = {{all.vertices, all.triangles, {}}, {vertices, mesh->triangles, placed}};
+  auto joined = gather_parts({}, parts);
+  if (!joined) return joined.status();
+  all = std::move(*joined);
+  return {};
+}
+
+/// The triangles of `path`, where one is given, and of the objects.
+Result<NavMeshTriangles> load_triangles(const Options& o, const std::string& path,
+                                        const Similarity& placed) {
+  NavMeshTriangles all;
+  if (!path.empty()) {
+    if (Status s = add_triangles(path, placed, all); !s) return s;
+  }
+  for (const StaticObject& object : o.objects) {
+    if (Status s = add_triangles(object.file, object.placed, all); !s) return s;
+  }
+  return all;
 }
 
 Result<NavMesh> from_triangles(const Options& o, const Similarity& placed) {
-  auto mesh = load_triangles(o.input, placed);
+  auto mesh = load_triangles(o, o.input, placed);
   if (!mesh) return mesh.status();
   return NavMesh::build(o.settings, mesh->vertices, mesh->triangles, o.threads);
 }
@@ -83,13 +96,10 @@ Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
   auto scene = io::load_scene(o.input);
   if (!scene) return scene.status();
   const GaussianSet set = scene->cloud.set(placed);
-  Triangles beside;
-  if (!o.mesh.empty()) {
-    auto loaded = load_triangles(o.mesh, placed);
-    if (!loaded) return loaded.status();
-    beside = std::move(*loaded);
-  }
-  auto built = build_navmesh(o.settings, std::span(&set, 1), beside.vertices, beside.triangles, o.gaussians);
+  const auto beside = load_triangles(o, o.mesh, placed);
+  if (!beside) return beside.status();
+  auto built =
+      build_navmesh(o.settings, std::span(&set, 1), beside->vertices, beside->triangles, o.gaussians);
   if (!built) return built.status();
   const GaussianNavReport& r = built->report;
   std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", printable(o.input).c_str(),
@@ -185,6 +195,9 @@ Status run(const Options& o) {
   print(*mesh, levels);
   if (!o.out.empty()) {
     if (Status s = save_navmesh(*mesh, o.out, o.mset_version); !s) return s;
+  }
+  if (!o.settings_out.empty()) {
+    if (Status s = io::save_navmesh_settings(mesh->settings(), o.settings_out); !s) return s;
   }
   if (!o.obj.empty()) {
     if (Status s = save_navmesh_obj(*mesh, o.obj); !s) return s;
