@@ -202,7 +202,7 @@ class Floors {
       out.tops.push_back(m.top);
     }
     for (std::size_t c = 1; c < out.first.size(); ++c) out.first[c] += out.first[c - 1];
-    weigh(out, report);
+    weigh(report);
     return out;
   }
 
@@ -745,12 +745,14 @@ class Floors {
     }
   }
 
-  /// Solid voxels above and below the lowest floor of each column, beyond its band.
-  void weigh(const FloorTops& floors, GaussianNavReport& report) const {
+  /// Solid voxels above and below the main floor in its columns and those up to a patch beside it (what stands on a
+  /// floor covers it), beyond its band.
+  void weigh(GaussianNavReport& report) const {
     for (std::size_t c = 0; c < g_.nx * g_.nz; ++c) {
-      if (floors.first[c] == floors.first[c + 1]) continue;
-      const std::size_t top = floors.tops[floors.first[c]];
-      const std::size_t low = top - min(top, 2 * s_.band), high = top + 2 * s_.band;
+      if (g_.first[c] == g_.first[c + 1]) continue;
+      const std::size_t level = at(0, c % g_.nx, c / g_.nx);
+      if (level == kNone) continue;
+      const std::size_t low = level - min(level, 2 * s_.band), high = level + 2 * s_.band;
       for (const SolidRun& r : g_.runs_of(c)) {
         report.solid_below += min<std::size_t>(r.end, low) - min<std::size_t>(r.low, low);
         report.solid_above += max<std::size_t>(r.end, high) - max<std::size_t>(r.low, high);

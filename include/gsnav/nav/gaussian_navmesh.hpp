@@ -48,7 +48,7 @@ struct GaussianNavReport {
   std::vector<Storey> storeys;  ///< upwards, the main floor's among them
   std::size_t stairs = 0;       ///< stairs and ramps between storeys
   double ceiling_share = 0.0;   ///< share of the main floor that has something solid above head height
-  std::size_t solid_above = 0, solid_below = 0;  ///< voxels over and under the lowest floor
+  std::size_t solid_above = 0, solid_below = 0;  ///< voxels over and under the main floor and 1 m beside it
   Aabb<double> bounds{};       ///< box that was voxelised, world
   std::size_t columns = 0, voxels = 0;          ///< of the grid
   std::size_t solid_voxels = 0, floater_voxels = 0;
