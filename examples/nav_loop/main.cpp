@@ -183,10 +183,7 @@ int main(int argc, char** argv) try {
                "of the profiles fast and lod: draw only what is seen from the NavMesh's cell that the "
                "agent is in; found "
                "first, and kept beside the scene's file");
-  app.add_option("--navmesh", o.navmesh,
-                 "built from: gaussians, mesh (the flat only), auto (the mesh where there is one)")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "mesh", "gaussians"}));
+  nav_loop::add_navmesh_options(app, o);
   app.add_option("--frames-every", o.frame_every, "write every k-th RGB and depth frame, 0: none")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));

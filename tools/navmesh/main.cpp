@@ -100,7 +100,7 @@ Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
   if (!beside) return beside.status();
   auto built =
       build_navmesh(o.settings, std::span(&set, 1), beside->vertices, beside->triangles, o.gaussians);
-  if (!built) return built.status();
+  if (!built) return {built.code(), o.input + ": " + built.message()};
   const GaussianNavReport& r = built->report;
   std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", printable(o.input).c_str(),
               r.gaussians_used, r.gaussians_faint, r.gaussians_outside);
@@ -108,6 +108,10 @@ Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
       "floor at %.3f m; %.0f %% of it under a ceiling; left out: %.2f m2 in small pieces, %.2f m2 "
       "outside\n",
       r.floor_y, 100 * r.ceiling_share, r.dropped_small, r.dropped_uncovered);
+  for (const GaussianNavReport::Storey& s : r.storeys) {
+    if (r.storeys.size() > 1) std::printf("storey at %.2f m: %.2f m2\n", s.height, s.area);
+  }
+  if (r.stairs > 0) std::printf("%zu stairs or ramps between storeys\n", r.stairs);
   if (!o.visible_sets.empty()) {
     if (Status s = write_visible_sets(o, scene->cloud, built->mesh, placed); !s) return s;
   }

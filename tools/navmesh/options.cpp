@@ -13,6 +13,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "../../examples/nav_loop/navmesh_options.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/io/navmesh_settings_file.hpp"
 
@@ -140,7 +141,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   const auto number = [&](const char* name, double& value, const char* text) {
     app.add_option(name, value, text)->capture_default_str()->group(build);
   };
-  number("--cell-size", s.cell_size, "Voxel edge on the ground plane");
+  nav_loop::add_voxel_options(app, s.cell_size, o.crop);
   auto* cell_height = app.add_option("--cell-height", s.cell_height, "Voxel height; 0.05 for Gaussians")
                           ->capture_default_str()
                           ->group(build);
@@ -158,7 +159,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   number("--detail-sample-max-error", s.detail_sample_max_error,
          "Height error of the surface, in cell heights");
   auto* tile_size = app.add_option("--tile-size", s.tile_size,
-                                   "Build in tiles of so many cells a side, in parallel; 0: one tile, as Habitat does")
+                                   "Build in tiles of so many cells a side, in parallel; 0: one tile, "
+                                   "as Habitat does (Gaussians "
+                                   "over 2^22 columns: 512)")
                         ->capture_default_str()
                         ->group(build);
   app.add_option("--threads", o.threads, "That share out the tiles; 0: one a core")
@@ -195,7 +198,11 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   option("--min-island-area", g.min_island_area, "Smaller pieces of floor are dropped, square metres");
   app.add_flag_callback(
          "--keep-uncovered", [&g] { g.drop_uncovered = false; },
-         "Keep floor that has no ceiling above it")
+         "Keep floor and storeys that have no ceiling above them")
+      ->group(from);
+  app.add_flag_callback(
+         "--keep-underside", [&g] { g.refuse_underside = false; },
+         "Take open ground for the floor even where nearly everything hangs below it")
       ->group(from);
   gsnav::VisibleSettings& v = o.visible;
   const char* seen = "Visible sets of Gaussians";
@@ -229,8 +236,11 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     if (kind_of(o.input) == InputKind::navmesh && up->count() + scale->count() > 0) {
       throw CLI::ValidationError("--up, --scale", o.input + " is a NavMesh: it stands as it is");
     }
-    if (kind_of(o.input) != InputKind::mesh && tile_size->count() > 0) {
-      throw CLI::ValidationError("--tile-size", o.input + ": only a NavMesh of triangles is built in tiles");
+    if (kind_of(o.input) == InputKind::navmesh && tile_size->count() > 0) {
+      throw CLI::ValidationError("--tile-size", o.input + " is a NavMesh already");
+    }
+    if (kind_of(o.input) != InputKind::gaussians && !o.crop.empty()) {
+      throw CLI::ValidationError("--crop", o.input + " has no Gaussians");
     }
     if (kind_of(o.input) == InputKind::navmesh && object->count() + settings->count() > 0) {
       throw CLI::ValidationError("--object, --settings", o.input + " is a NavMesh: nothing is built");
@@ -248,8 +258,11 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     exit_code = app.exit(error) == 0 ? 0 : 1;
     return std::nullopt;
   }
-  if (kind_of(o.input) == InputKind::gaussians && cell_height->count() + settings->count() == 0) {
-    s.cell_height = gsnav::gaussian_navmesh_settings().cell_height;
+  if (kind_of(o.input) == InputKind::gaussians) {
+    const double given = s.cell_height;
+    nav_loop::apply(s.cell_size, o.crop, s, g);
+    if (cell_height->count() + settings->count() > 0) s.cell_height = given;
+    g.threads = o.threads;
   }
   return o;
 }
