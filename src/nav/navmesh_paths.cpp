@@ -27,10 +27,14 @@ Status off_mesh(const char* name, const Vec3d& p) {
 }  // namespace
 
 detail::Site NavMesh::Impl::site(const NavPoint& p) const noexcept {
-  Vec3d local = polys.clamped(p.poly, p.position - origin);
-  local.y = polys.height(p.poly, local);
+  Vec3d local = p.position - origin;
   const detail::UnfoldedMesh& m = unfolded();
-  const std::uint32_t face = m.face_at(p.poly, local);
+  std::uint32_t face = m.grid.find(p.poly, local);
+  if (face == detail::FaceGrid::kNone) {
+    local = polys.clamped(p.poly, local);
+    local.y = polys.height(p.poly, local);
+    face = m.face_at(p.poly, local);
+  }
   return {face, m.flat(m.faces[face], local), local};
 }
 

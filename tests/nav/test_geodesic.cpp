@@ -284,3 +284,55 @@ TEST_CASE("geodesic: fields over slopes") {
     REQUIRE(field.distance(p) == doctest::Approx(mesh.distance_between(p, goal)).epsilon(1e-5));
   }
 }
+
+TEST_CASE("geodesic: a point's face and height by the grid are those of the height triangle that it is on") {
+  Soup waves;
+  const auto height = [](int x, int z) { return 0.8 * std::sin(0.7 * x) * std::cos(0.6 * z); };
+  for (int x = 0; x < 12; ++x) {
+    for (int z = 0; z < 12; ++z) {
+      const auto at = [&](int i, int k) { return Vec3d{1.0 * i, height(i, k), 1.0 * k}; };
+      waves.quad(at(x, z), at(x, z + 1), at(x + 1, z + 1), at(x + 1, z));
+    }
+  }
+  std::vector<NavMesh> meshes;
+  meshes.push_back(build(waves));
+  for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/undulating.obj"}) {
+    if (!gsnav_test::data_file(file).empty()) meshes.push_back(demo(file));
+  }
+  for (const NavMesh& mesh : meshes) {
+    const NavMesh::Impl& impl = mesh.impl();
+    const detail::UnfoldedMesh& faces = impl.unfolded();
+    Rng rng(41);
+    const int n = cases(20000);
+    int by_grid = 0, off = 0;
+    double worst = 0;
+    for (int i = 0; i < n; ++i) {
+      NavPoint p = mesh.random_point(rng);
+      const detail::Site at = impl.site(p);
+      Vec3d found = p.position - impl.origin;
+      if (faces.grid.find(p.poly, found) != detail::FaceGrid::kNone) ++by_grid;
+      worst = max(worst, norm(at.position + impl.origin - p.position));
+      const detail::UnfoldedMesh::Face& f = faces.faces[at.face];
+      REQUIRE(f.poly == p.poly);
+      long double inside = 1;  // metres
+      for (std::uint32_t k = 0; k < f.count; ++k) {
+        const Vec3d &a = faces.edges[f.first + k].corner, &b = faces.edges[f.first + (k + 1) % f.count].corner;
+        const long double ex = b.x - a.x, ez = b.z - a.z;
+        const long double side = ex * (at.position.z - a.z) - (at.position.x - a.x) * ez;
+        inside = std::min(inside, side / std::max(std::hypot(ex, ez), 1e-12L));
+      }
+      REQUIRE(inside > -1e-9L);
+      // Beside its polygon a point is taken to the polygon's nearest, or to the triangle that stands out there.
+      p.position.x += rng.uniform(-0.5, 0.5);
+      p.position.z += rng.uniform(-0.5, 0.5);
+      const Vec3d beside = impl.site(p).position + impl.origin;
+      const Vec3d nearest = impl.polys.clamped(p.poly, p.position - impl.origin) + impl.origin;
+      if (std::hypot(beside.x - nearest.x, beside.z - nearest.z) > 0.01) ++off;
+    }
+    MESSAGE(faces.faces.size() << " faces, " << by_grid << " of " << n << " points by the grid, at most " << worst
+                               << " m from where they were drawn");
+    CHECK(by_grid > n / 4);
+    CHECK(worst < 1e-9);
+    CHECK(off == 0);
+  }
+}
