@@ -86,6 +86,8 @@ class UnfoldedMesh {
   }
   /// The face of a polygon that (x, z) of p is in, or least outside of.
   std::uint32_t face_at(PolyId poly, const Vec3d& p) const noexcept;
+  /// The point of a face that is nearest to p, in its plane: p itself where it is inside.
+  Flat clamped(std::uint32_t face, const Flat& p) const noexcept;
 
  private:
   void add_faces(const PolyMesh& mesh);

@@ -336,3 +336,33 @@ TEST_CASE("geodesic: a point's face and height by the grid are those of the heig
     CHECK(off == 0);
   }
 }
+
+TEST_CASE("geodesic: as far there as back for points that lie a rounding outside their face") {
+  // Points on edges of polygons, where height triangles end up to a micrometre short of them.
+  const std::string file = "nav/recast/undulating.obj";
+  if (gsnav_test::data_file(file).empty()) return;
+  const NavMesh mesh = demo(file.c_str());
+  const NavMesh::Impl& impl = mesh.impl();
+  Rng rng(42);
+  std::vector<NavPoint> goals;
+  for (int i = 0; i < 3; ++i) goals.push_back(mesh.random_point(rng, 0));
+  double worst = 0, turned = 0;
+  for (PolyId id = 0; id < mesh.polygon_count(); ++id) {
+    if (mesh.island_of(id) != 0) continue;
+    const detail::PolyMesh::Poly& poly = impl.polys.polys[id];
+    const auto k = static_cast<std::uint32_t>(id % poly.count);
+    const NavPoint p{lerp(impl.polys.corner(poly, k), impl.polys.corner(poly, k + 1), 0.25) + impl.origin, id};
+    // A micrometre farther in.
+    Vec3d middle{};
+    for (std::uint32_t c = 0; c < poly.count; ++c) middle += impl.polys.corner(poly, c) * (1.0 / poly.count);
+    middle += impl.origin;
+    const NavPoint q{p.position + (middle - p.position) * (1e-5 / norm(middle - p.position)), id};
+    const NavPoint& goal = goals[id % goals.size()];
+    const double there = mesh.distance_between(p, goal);
+    turned = max(turned, std::abs(there - mesh.distance_between(goal, p)));
+    worst = max(worst, std::abs(there - mesh.distance_between(q, goal)));
+  }
+  MESSAGE("there and back differ by at most " << turned << " m, from 0.01 mm farther in by " << worst << " m");
+  CHECK(turned < 1e-5);
+  CHECK(worst < 1e-3);
+}
