@@ -47,13 +47,16 @@ void FaceGrid::add(const PolyMesh& mesh, PolyId id, bool by_triangle, std::uint3
     const std::uint32_t r0 = g.row(min(a.z, min(b.z, c.z))), r1 = g.row(max(a.z, max(b.z, c.z)));
     for (std::uint32_t row = r0; row <= r1; ++row) {
       for (std::uint32_t column = c0; column <= c1; ++column) {
-        // The corners' greatest shares in the cell: none of its points is inside where one of them is negative.
+        // The corners' greatest shares in the cell: none of its points is inside where one of them is
+        // negative.
         const double x = g.x + column / g.columns_a_metre - a.x, z = g.z + row / g.rows_a_metre - a.z;
         const double w = 1.0 / g.columns_a_metre, d = 1.0 / g.rows_a_metre;
         const auto most = [&](double by_x, double by_z, double constant) {
           return constant + by_x * x + by_z * z + max(by_x * w, 0.0) + max(by_z * d, 0.0);
         };
-        if (min(most(s.x, s.z, 0.0), min(most(t.x, t.z, 0.0), most(-s.x - t.x, -s.z - t.z, 1.0))) < -kSlack) continue;
+        if (min(most(s.x, s.z, 0.0), min(most(t.x, t.z, 0.0), most(-s.x - t.x, -s.z - t.z, 1.0))) <
+            -kSlack)
+          continue;
         cells[std::size_t{row} * g.columns + column].push_back(k);
       }
     }

@@ -8,18 +8,19 @@
 
 namespace gsnav::detail {
 
-/// Finds the face of an UnfoldedMesh that a point of a polygon is on, and its height there, without walking all height
-/// triangles: a grid over each polygon whose faces they are lists the triangles that reach into each cell.
-/// About 110 bytes a face. Constant after add() and so for any number of threads.
+/// Finds the face of an UnfoldedMesh that a point of a polygon is on, and its height there, without
+/// walking all height triangles: a grid over each polygon whose faces they are lists the triangles that
+/// reach into each cell. About 110 bytes a face. Constant after add() and so for any number of threads.
 class FaceGrid {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  /// The next polygon; `by_triangle` where its faces are its height triangles, the first of them `first_face`.
+  /// The next polygon; `by_triangle` where its faces are its height triangles, the first of them
+  /// `first_face`.
   void add(const PolyMesh& mesh, PolyId id, bool by_triangle, std::uint32_t first_face);
 
-  /// The first face of the polygon that (x, z) of p is on, with `p.y` set to its height there; kNone, and p as it was,
-  /// where p is on none or the polygon's faces are not its height triangles.
+  /// The first face of the polygon that (x, z) of p is on, with `p.y` set to its height there; kNone,
+  /// and p as it was, where p is on none or the polygon's faces are not its height triangles.
   std::uint32_t find(PolyId id, Vec3d& p) const noexcept {
     const Grid& g = grids_[id];
     if (g.columns == 0) return kNone;
@@ -42,18 +43,21 @@ class FaceGrid {
     std::uint32_t first = 0;               ///< cell in `first_`
     std::uint32_t triangle = 0, face = 0;  ///< of number 0 in `in_cells_`
     std::uint32_t column(double at) const noexcept {
-      return static_cast<std::uint32_t>(clamp((at - x) * columns_a_metre, 0.0, static_cast<double>(columns - 1)));
+      return static_cast<std::uint32_t>(
+          clamp((at - x) * columns_a_metre, 0.0, static_cast<double>(columns - 1)));
     }
     std::uint32_t row(double at) const noexcept {
-      return static_cast<std::uint32_t>(clamp((at - z) * rows_a_metre, 0.0, static_cast<double>(rows - 1)));
+      return static_cast<std::uint32_t>(
+          clamp((at - z) * rows_a_metre, 0.0, static_cast<double>(rows - 1)));
     }
   };
-  /// What PolyMesh::height() takes from three arrays: a corner, how the shares of the others grow, and their rise.
+  /// What PolyMesh::height() takes from three arrays: a corner, how the shares of the others grow, and
+  /// their rise.
   struct Triangle {
     double x = 0, y = 0, z = 0, u_x = 0, u_z = 0, v_x = 0, v_z = 0, rise_u = 0, rise_v = 0;
   };
 
-  std::vector<Grid> grids_;           ///< of each polygon
+  std::vector<Grid> grids_;  ///< of each polygon
   std::vector<Triangle> triangles_;
   std::vector<std::uint32_t> first_{0};  ///< of each cell in `in_cells_`, and one past the last
   std::vector<std::uint32_t> in_cells_;  ///< triangles of the polygon, ascending in a cell
