@@ -5,6 +5,7 @@
 #include <string>
 
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/navmesh_settings_file.hpp"
 #include "json.hpp"
 
@@ -122,9 +123,7 @@ Status save_navmesh_settings(const NavMeshSettings& settings, const std::filesys
     for (const FlagKey& f : kFlags) json[f.key] = settings.*f.value;
     if (settings.tile_size != usual.tile_size) json[kTileSize] = settings.tile_size;
     if (settings.max_cells != usual.max_cells) json[kMaxCells] = settings.max_cells;
-    const std::string text = json.dump(4) + "\n";
-    return detail::replace_file(path,
-                                [&](detail::OutFile& out) { out.write(text.data(), text.size()); });
+    return replace_file(path, json.dump(4) + "\n");
   });
 }
 
