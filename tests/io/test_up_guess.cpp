@@ -88,12 +88,12 @@ void add_outdoors(Maker& m) {
 TEST_CASE("guess_up: rooms and landscapes, whichever way they are up") {
   const std::pair<const char*, std::function<void(Maker&)>> scenes[] = {{"room", add_room},
                                                                         {"outdoors", add_outdoors}};
-  for (const auto& [name, add] : scenes) {
+  for (const auto& scene : scenes) {
     for (const Vec3d& up : {Vec3d{0, 1, 0}, Vec3d{0, -1, 0}, Vec3d{0, 0, 1}}) {
-      CAPTURE(name);
+      CAPTURE(scene.first);
       CAPTURE(up.y);
       Maker maker(41);
-      add(maker);
+      scene.second(maker);
       const GaussianCloud cloud = maker.turned_to(up);
       for (const Vec3d& usual : {Vec3d{0, -1, 0}, Vec3d{0, 1, 0}}) {
         const UpGuess guess = guess_up(cloud, usual);
