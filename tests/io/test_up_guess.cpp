@@ -134,3 +134,21 @@ TEST_CASE("guess_up: of objects, what is usual") {
   one.disc({1, 2, 3}, 0);
   CHECK_FALSE(guess_up(one.turned_to({0, 1, 0})).seen);
 }
+
+TEST_CASE("guess_up: a box so large that its last points are rounded to its end") {
+  // A sixth lie 1e20 m away: the box that has most reaches there, and what is a metre before its end is its end. Some
+  // lie as far beyond it as is still looked at.
+  GaussianCloudBuilder builder(0);
+  for (int i = 0; i < 1200; ++i) {
+    RawGaussian g;
+    const double s = 0.01 * i;
+    g.mean = {s, std::sin(s), 12 - s};
+    if (i % 6 == 0) g.mean = {-1e20, -1e20, -1e20};
+    if (i % 40 == 1) g.mean[i / 40 % 3] = 2.95e19;
+    g.log_scales = {-3, -3, -6};
+    builder.add(g);
+  }
+  const UpGuess guess = guess_up(builder.cloud());
+  CHECK(norm(guess.up) == 1);
+  CHECK(guess.confidence >= 0);
+}

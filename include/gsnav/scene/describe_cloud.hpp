@@ -72,7 +72,9 @@ inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::v
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vec3d& p = points[i];
     const auto cell = [&](int k) {
-      return static_cast<std::size_t>(kCells * (p[k] - low[k]) / (high[k] - low[k]));
+      // In a box of 1e20 m, p just below `high` is rounded to it.
+      const double at_cell = kCells * (p[k] - low[k]) / (high[k] - low[k]);
+      return std::min(static_cast<std::size_t>(at_cell), kCells - 1);
     };
     const double at = (p[axis] - bottom) / slab;
     if (p[b] < low[b] || p[b] >= high[b] || p[c] < low[c] || p[c] >= high[c] || !(at >= 0) ||
