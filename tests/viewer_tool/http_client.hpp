@@ -62,7 +62,7 @@ inline std::string converse(int port, const std::string& bytes) {
 
 inline std::string request(int port, const std::string& line, const std::string& body = "", const std::string& fields = "") {
   return converse(port, line + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\n" + fields +
-                            "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
+                            "Connection: close\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
 }
 
 inline int status_of(const std::string& answer) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <string>
+#include <vector>
+
 #include "../../tools/viewer/http_request.hpp"
 #include "gsnav/core/rng.hpp"
 
@@ -14,13 +17,13 @@ int status(const std::string& head) { return parse_request(head).status; }
 }  // namespace
 
 TEST_CASE("requests are read as they are meant") {
-  const ParsedRequest get = parse_request("GET /stream/map?x=1 HTTP/1.1\r\nhOsT:  localhost:7007 \r\nAccept: */*\r\n\r\n");
+  const ParsedRequest get = parse_request("GET /frame?x=1 HTTP/1.1\r\nhOsT:  localhost:7007 \r\nAccept: */*\r\n\r\n");
   CHECK(get.status == 200);
   CHECK(get.request.method == "GET");
-  CHECK(get.request.path == "/stream/map");
+  CHECK(get.request.path == "/frame");
   CHECK(get.request.host == "localhost:7007");
   CHECK(get.request.content_length == 0);
-  const ParsedRequest post = parse_request("POST /control HTTP/1.1\r\n" + kHost + "Content-Length: 12\r\nOrigin: http://a\r\n\r\n");
+  const ParsedRequest post = parse_request("POST /frame HTTP/1.1\r\n" + kHost + "Content-Length: 12\r\nOrigin: http://a\r\n\r\n");
   CHECK(post.status == 200);
   CHECK(post.request.content_length == 12);
   CHECK(post.request.origin == "http://a");
@@ -63,7 +66,7 @@ TEST_CASE("what is no request is refused by what is wrong with it") {
 }
 
 TEST_CASE("any bytes are read without harm, and what is cut off is never a request") {
-  const std::string whole = "POST /control HTTP/1.1\r\n" + kHost + "Content-Length: 12\r\n\r\n";
+  const std::string whole = "POST /frame HTTP/1.1\r\n" + kHost + "Content-Length: 12\r\n\r\n";
   for (std::size_t n = 0; n < whole.size(); ++n) CHECK(status(whole.substr(0, n)) != 200);
   gsnav::Rng rng(1);
   for (int i = 0; i < 20000; ++i) {
@@ -76,10 +79,50 @@ TEST_CASE("any bytes are read without harm, and what is cut off is never a reque
   }
 }
 
-TEST_CASE("only loopback's names are loopback") {
-  for (const char* host : {"127.0.0.1:7007", "localhost:7007", "LocalHost:7007", "[::1]:7007"}) CHECK(is_loopback_host(host, 7007));
-  for (const char* host : {"", ":7007", "127.0.0.1", "127.0.0.1:7008", "evil.example:7007", "localhost.evil:7007", "127.0.0.1:70077",
-                           "127.0.0.1.evil.example:7007", "0.0.0.0:7007"}) {
-    CHECK_FALSE(is_loopback_host(host, 7007));
+TEST_CASE("hosts are addresses, localhost and the names that were allowed, with any port") {
+  const std::vector<std::string> none, names{"robot-7.lab"};
+  for (const char* host : {"127.0.0.1:7007", "localhost:7007", "LocalHost", "[::1]:7007", "127.0.0.1", "127.0.0.1:80", "127.9.9.9"}) {
+    CAPTURE(host);
+    CHECK(is_allowed_host(host, true, none));
+    CHECK(is_allowed_host(host, false, none));
   }
+  for (const char* host : {"10.0.0.5:7007", "192.168.1.2", "[fe80::1]:80", "0.0.0.0:7007"}) {
+    CAPTURE(host);
+    CHECK_FALSE(is_allowed_host(host, true, names));
+    CHECK(is_allowed_host(host, false, none));
+  }
+  for (const char* host : {"", ":7007", "evil.example:7007", "evil.example", "localhost.evil:7007", "127.0.0.1.evil.example:7007",
+                           "127.0.0.1:", "127.0.0.1:70 ", "127.0.0.1:700700", "localhost:x", "[::1", "[::1]x", "[]:1", "::1", "robot-7.lab.evil"}) {
+    CAPTURE(host);
+    CHECK_FALSE(is_allowed_host(host, true, names));
+    CHECK_FALSE(is_allowed_host(host, false, names));
+  }
+  CHECK(is_allowed_host("Robot-7.Lab:7007", true, names));
+  CHECK(is_allowed_host("robot-7.lab", false, names));
+  CHECK_FALSE(is_allowed_host("robot-7.lab", false, none));
+}
+
+TEST_CASE("a page of another site is told from the viewer's own and from programs") {
+  const auto from = [](const std::string& fields) {
+    const ParsedRequest r = parse_request("POST /frame HTTP/1.1\r\n" + kHost + fields + "\r\n");
+    REQUIRE(r.status == 200);
+    return is_from_elsewhere(r.request);
+  };
+  CHECK_FALSE(from(""));
+  CHECK_FALSE(from("Origin: http://localhost:7007\r\nSec-Fetch-Site: same-origin\r\n"));
+  CHECK_FALSE(from("Sec-Fetch-Site: none\r\n"));
+  for (const char* fields : {"Origin: http://evil.example\r\n", "Origin: null\r\n", "Origin: http://localhost:8000\r\n",
+                             "Sec-Fetch-Site: cross-site\r\n", "Sec-Fetch-Site: same-site\r\n",
+                             "Origin: http://localhost:7007\r\nSec-Fetch-Site: cross-site\r\n"}) {
+    CAPTURE(fields);
+    CHECK(from(fields));
+  }
+}
+
+TEST_CASE("a connection is kept for the next request unless the client says otherwise") {
+  const auto kept = [](const std::string& head) { return parse_request(head).request.keep_alive; };
+  CHECK(kept("GET / HTTP/1.1\r\n" + kHost + "\r\n"));
+  CHECK(kept("GET / HTTP/1.1\r\n" + kHost + "Connection: keep-alive\r\n\r\n"));
+  CHECK_FALSE(kept("GET / HTTP/1.1\r\n" + kHost + "Connection: Close\r\n\r\n"));
+  CHECK_FALSE(kept("GET / HTTP/1.0\r\n\r\n"));
 }

@@ -2,6 +2,7 @@
 #include "controls.hpp"
 
 #include <charconv>
+#include <cmath>
 
 #include "gsnav/math/functions.hpp"
 
@@ -23,6 +24,8 @@ constexpr double kMostTime = 100000;  // seconds
 
 Status apply(std::string_view message, Controls& controls) {
   Controls c = controls;
+  c.seen.reset();
+  c.steers = false;
   const auto bad = [](std::string_view name, const char* rule) {
     return Status(Errc::invalid_argument, std::string(name.substr(0, 40)).append(": ").append(rule));
   };
@@ -44,6 +47,7 @@ Status apply(std::string_view message, Controls& controls) {
     };
     bool good = false;
     double once = 0;
+    c.steers = c.steers || name != "seen";
     if (name == "forward") {
       good = number(c.forward, 1);
     } else if (name == "left") {
@@ -66,6 +70,9 @@ Status apply(std::string_view message, Controls& controls) {
       good = flag(c.stop);
     } else if (name == "next") {
       good = flag(c.next);
+    } else if (name == "seen") {
+      good = v >= 0 && v <= 9e15 && v == std::floor(v);
+      if (good) c.seen = static_cast<std::uint64_t>(v);
     } else {
       return bad(name, "no such field");
     }

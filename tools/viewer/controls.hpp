@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,6 +18,9 @@ struct Controls {
   bool paused = false, people = true, capsules = false, navmesh = false;
   std::optional<double> time;  ///< seconds of the scene's clock to go to
   bool stop = false, next = false;  ///< ends the episode as the agent's `stop` does; begins the next
+  // Of one message alone:
+  std::optional<std::uint64_t> seen;  ///< number of the newest frame that the page has
+  bool steers = false;                ///< it says more than that
 
   /// Takes what happens once.
   void forget_commands() noexcept {
@@ -27,7 +31,7 @@ struct Controls {
 };
 
 /// Applies a message of `name=number` pairs joined by '&': forward, left, turn, tilt, time; paused, people, capsules,
-/// navmesh, stop and next are 0 or 1. Errors: invalid_argument (names the field), and nothing is changed.
+/// navmesh, stop and next are 0 or 1, seen is a whole number. Errors: invalid_argument (names the field), and nothing is changed.
 gsnav::Status apply(std::string_view message, Controls& controls);
 
 }  // namespace gsnav_viewer

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "http_request.hpp"
 
+#include <arpa/inet.h>
+
 #include <algorithm>
 #include <charconv>
 
@@ -38,6 +40,17 @@ bool same_name(std::string_view a, std::string_view lower) {
   });
 }
 
+/// ":" and digits.
+bool is_port(std::string_view s) {
+  return s.size() > 1 && s.size() < 7 && s.front() == ':' &&
+         std::all_of(s.begin() + 1, s.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+std::string lower(std::string s) {
+  for (char& c : s) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return s;
+}
+
 /// Takes the next line off `text`; false where it has no end.
 bool take_line(std::string_view& text, std::string_view& line) {
   const std::size_t end = text.find(kEnd);
@@ -57,6 +70,7 @@ int parse_line(std::string_view line, Request& r, bool& needs_host) {
   if (version != "HTTP/1.1" && version != "HTTP/1.0") return version.starts_with("HTTP/") ? 505 : 400;
   if (method != "GET" && method != "HEAD" && method != "POST") return 405;
   needs_host = version == "HTTP/1.1";
+  r.keep_alive = needs_host;
   r.method = method;
   r.path = target.substr(0, target.find('?'));
   return 200;
@@ -88,6 +102,10 @@ ParsedRequest parse_request(std::string_view head) {
       out.request.host = value;
     } else if (same_name(name, "origin")) {
       out.request.origin = value;
+    } else if (same_name(name, "sec-fetch-site")) {
+      out.request.site = value;
+    } else if (same_name(name, "connection")) {
+      if (same_name(value, "close")) out.request.keep_alive = false;
     } else if (same_name(name, "transfer-encoding")) {
       return refuse(501);
     } else if (same_name(name, "content-length")) {
@@ -101,11 +119,30 @@ ParsedRequest parse_request(std::string_view head) {
   return refuse(400);
 }
 
-bool is_loopback_host(std::string_view host, int port) {
-  const std::string suffix = std::string(1, ':').append(std::to_string(port));
-  if (!host.ends_with(suffix)) return false;
-  host.remove_suffix(suffix.size());
-  return host == "127.0.0.1" || host == "[::1]" || same_name(host, "localhost");
+bool is_allowed_host(std::string_view host, bool loopback, std::span<const std::string> names) {
+  if (host.starts_with('[')) {
+    const std::size_t end = host.find(']');
+    if (end == std::string_view::npos) return false;
+    const std::string_view rest = host.substr(end + 1);
+    if (!rest.empty() && !is_port(rest)) return false;
+    in6_addr at{};
+    const std::string address(host.substr(1, end - 1));
+    if (inet_pton(AF_INET6, address.c_str(), &at) != 1) return false;
+    return !loopback || IN6_IS_ADDR_LOOPBACK(&at);
+  }
+  const std::size_t colon = host.find(':');
+  if (colon != std::string_view::npos && !is_port(host.substr(colon))) return false;
+  const std::string name(host.substr(0, colon));
+  if (same_name(name, "localhost")) return true;
+  in_addr at{};
+  if (inet_pton(AF_INET, name.c_str(), &at) == 1) return !loopback || (ntohl(at.s_addr) >> 24) == 127;
+  return std::any_of(names.begin(), names.end(), [&](const std::string& n) { return same_name(name, lower(n)); });
+}
+
+bool is_from_elsewhere(const Request& r) {
+  if (!r.site.empty() && r.site != "same-origin" && r.site != "none") return true;
+  // https: behind a proxy that encrypts.
+  return !r.origin.empty() && r.origin != "http://" + r.host && r.origin != "https://" + r.host;
 }
 
 }  // namespace gsnav_viewer

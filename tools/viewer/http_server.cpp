@@ -20,10 +20,8 @@ namespace {
 
 using gsnav::Errc;
 using gsnav::Status;
-using Clock = std::chrono::steady_clock;
 
 constexpr int kTick = 100;  // milliseconds between looks at whether the server stops
-constexpr const char* kBoundary = "frame";
 
 const char* reason_of(int status) {
   switch (status) {
@@ -43,14 +41,16 @@ const char* reason_of(int status) {
   }
 }
 
-Reply plain(int status) { return {status, "text/plain; charset=utf-8", std::string(reason_of(status)) + "\n", {}}; }
+Reply plain(int status) { return {status, "text/plain; charset=utf-8", std::string(reason_of(status)) + "\n"}; }
 
-std::string head_of(const Reply& reply, const std::string& type) {
+std::string head_of(const Reply& reply, bool keep_alive) {
   std::string h = "HTTP/1.1 " + std::to_string(reply.status) + " " + reason_of(reply.status) + "\r\n";
-  h += "Content-Type: " + type + "\r\nConnection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n";
+  h += "Content-Type: " + reply.type + "\r\nContent-Length: " + std::to_string(reply.body.size()) + "\r\n";
+  h += keep_alive ? "" : "Connection: close\r\n";
+  h += "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n";
   h += "Cross-Origin-Resource-Policy: same-origin\r\nX-Frame-Options: DENY\r\n";
   if (reply.status == 405) h += "Allow: GET, HEAD, POST\r\n";
-  return h;
+  return h + "\r\n";
 }
 
 /// Waits until `events` can be done on a socket: 1 they can, 0 not yet, -1 never.
@@ -64,11 +64,15 @@ int wait_for(int socket, short events) {
 
 }  // namespace
 
-gsnav::Result<std::unique_ptr<HttpServer>> HttpServer::start(ServerOptions options, Handler handler) {
-  std::unique_ptr<HttpServer> s(new HttpServer(std::move(options), std::move(handler)));
+gsnav::Result<std::unique_ptr<HttpServer>> HttpServer::bind(ServerOptions options) {
+  std::unique_ptr<HttpServer> s(new HttpServer(std::move(options)));
   if (Status status = s->listen(); !status) return status;
-  s->thread_ = std::thread([p = s.get()] { p->accept_connections(); });
   return s;
+}
+
+void HttpServer::serve(Handler handler) {
+  handler_ = std::move(handler);
+  thread_ = std::thread([this] { accept_connections(); });
 }
 
 HttpServer::~HttpServer() {
@@ -92,7 +96,7 @@ Status HttpServer::listen() {
   if (listener_ < 0) return failed();
   const int on = 1;
   setsockopt(listener_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  if (bind(listener_, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0 || ::listen(listener_, 32) != 0) return failed();
+  if (::bind(listener_, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0 || ::listen(listener_, 32) != 0) return failed();
   socklen_t size = sizeof at;
   if (getsockname(listener_, reinterpret_cast<sockaddr*>(&at), &size) != 0) return failed();
   options_.port = ntohs(at.sin_port);
@@ -103,11 +107,35 @@ void HttpServer::forget_finished() {
   for (auto c = connections_.begin(); c != connections_.end();) {
     if (c->over) {
       c->thread.join();
+      close(c->socket);
       c = connections_.erase(c);
     } else {
       ++c;
     }
   }
+}
+
+/// Whether another connection may be had. Where there are too many, the one that was idle longest is dropped.
+bool HttpServer::make_room() {
+  std::size_t kept = 0;
+  Connection* idle = nullptr;
+  Clock::rep since = 0;
+  for (Connection& c : connections_) {
+    if (c.dropped) continue;
+    ++kept;
+    const Clock::rep t = c.idle_since;
+    if (t != 0 && (idle == nullptr || t < since)) {
+      idle = &c;
+      since = t;
+    }
+  }
+  // Dropped ones take a moment to end.
+  if (connections_.size() >= 2 * options_.most_connections) return false;
+  if (kept < options_.most_connections) return true;
+  if (idle == nullptr) return false;
+  idle->dropped = true;
+  shutdown(idle->socket, SHUT_RDWR);
+  return true;
 }
 
 void HttpServer::accept_connections() {
@@ -122,8 +150,8 @@ void HttpServer::accept_connections() {
     }
     const int on = 1;
     setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    if (connections_.size() >= options_.most_connections) {
-      send_reply(socket, plain(503), true);
+    if (!make_room()) {
+      send_reply(socket, plain(503), true, false);
       close(socket);
       continue;
     }
@@ -132,11 +160,11 @@ void HttpServer::accept_connections() {
     try {
       c.thread = std::thread([this, &c] {
         try {
-          serve(c.socket);
+          talk(c);
         } catch (const std::exception&) {
           // Out of memory for one client: its connection ends, the others go on.
         }
-        close(c.socket);
+        shutdown(c.socket, SHUT_RDWR);
         c.over = true;
       });
     } catch (const std::exception&) {
@@ -144,14 +172,19 @@ void HttpServer::accept_connections() {
       connections_.pop_back();
     }
   }
-  for (Connection& c : connections_) c.thread.join();
+  for (Connection& c : connections_) {
+    c.thread.join();
+    close(c.socket);
+  }
 }
 
-bool HttpServer::read_request(int socket, ParsedRequest& out) const {
+bool HttpServer::read_request(Connection& c, ParsedRequest& out) const {
   const auto deadline = Clock::now() + options_.patience;
-  std::string bytes;
+  std::string& bytes = c.unread;
   std::size_t end = std::string::npos;
   std::array<char, 4096> some{};
+  out = {};
+  c.idle_since = bytes.empty() ? std::max<Clock::rep>(1, Clock::now().time_since_epoch().count()) : 0;
   while (!stopping_) {
     if (end == std::string::npos) {
       end = bytes.find("\r\n\r\n");
@@ -165,82 +198,77 @@ bool HttpServer::read_request(int socket, ParsedRequest& out) const {
     }
     if (end != std::string::npos && bytes.size() >= end + 4 + out.request.content_length) {
       out.request.body = bytes.substr(end + 4, out.request.content_length);
+      bytes.erase(0, end + 4 + out.request.content_length);
       return true;
     }
-    if (Clock::now() > deadline) {
+    const auto now = Clock::now();
+    if (now > deadline) {
       out.status = 408;
       return true;
     }
-    const int ready = wait_for(socket, POLLIN);
+    const int ready = wait_for(c.socket, POLLIN);
     if (ready < 0) return false;
     if (ready == 0) continue;
-    const ssize_t n = recv(socket, some.data(), some.size(), 0);
+    const ssize_t n = recv(c.socket, some.data(), some.size(), 0);
     if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) return false;
-    if (n > 0) bytes.append(some.data(), static_cast<std::size_t>(n));
+    if (n > 0) {
+      bytes.append(some.data(), static_cast<std::size_t>(n));
+      c.idle_since = 0;
+    }
   }
   return false;
 }
 
-void HttpServer::serve(int socket) const {
-  ParsedRequest r;
-  if (!read_request(socket, r)) return;
-  const Reply reply = r.status == 200 ? answer(r.request) : plain(r.status);
-  if (reply.next_part && r.request.method == "GET") {
-    send_stream(socket, reply);
-  } else if (send_reply(socket, reply, r.request.method != "HEAD")) {
-    // What was not read would make the system take the answer back.
-    shutdown(socket, SHUT_WR);
-    std::array<char, 4096> rest{};
-    for (int i = 0; i < 16 && wait_for(socket, POLLIN) == 1 && recv(socket, rest.data(), rest.size(), 0) > 0; ++i) {
-    }
+void HttpServer::talk(Connection& c) const {
+  for (bool first = true, more = true; more; first = false) {
+    ParsedRequest r;
+    if (!read_request(c, r)) return;
+    c.idle_since = 0;
+    if (r.status == 408 && !first && c.unread.empty()) return;  // the client has nothing more to ask
+    const Reply reply = r.status == 200 ? answer(r.request) : plain(r.status);
+    more = r.status == 200 && r.request.keep_alive && !stopping_;
+    if (!send_reply(c.socket, reply, r.request.method != "HEAD", more)) return;
+  }
+  // What was not read would make the system take the answer back.
+  shutdown(c.socket, SHUT_WR);
+  std::array<char, 4096> rest{};
+  for (int i = 0; i < 16 && wait_for(c.socket, POLLIN) == 1 && recv(c.socket, rest.data(), rest.size(), 0) > 0; ++i) {
   }
 }
 
 Reply HttpServer::answer(const Request& request) const {
-  if (loopback_ && !request.host.empty() && !is_loopback_host(request.host, options_.port)) return plain(403);
-  // Pages of other sites may not steer.
-  if (!request.origin.empty() && request.origin != "http://" + request.host) return plain(403);
+  if (!request.host.empty() && !is_allowed_host(request.host, loopback_, options_.allowed_hosts)) {
+    Reply refused = plain(403);
+    refused.body = "The viewer does not know the host name of this address. Start it with --allow-host NAME.\n";
+    return refused;
+  }
+  // Pages of other sites may neither steer nor have anything drawn.
+  if (request.method == "POST" && is_from_elsewhere(request)) return plain(403);
   Reply reply = handler_(request);
   if (reply.status != 200 && reply.body.empty()) reply = plain(reply.status);
   return reply;
 }
 
 bool HttpServer::send(int socket, std::string_view bytes) const {
-  auto deadline = Clock::now() + options_.patience;
+  const auto deadline = Clock::now() + options_.patience;  // for all of it, however slowly it is read
   while (!bytes.empty() && !stopping_) {
     const ssize_t n = ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (n > 0) {
       bytes.remove_prefix(static_cast<std::size_t>(n));
-      deadline = Clock::now() + options_.patience;
     } else if (n < 0 && errno != EAGAIN && errno != EINTR) {
       return false;
-    } else if (Clock::now() > deadline || wait_for(socket, POLLOUT) < 0) {
+    } else if (wait_for(socket, POLLOUT) < 0) {
       return false;
     }
+    if (Clock::now() > deadline) return bytes.empty();
   }
   return bytes.empty();
 }
 
-bool HttpServer::send_reply(int socket, const Reply& reply, bool with_body) const {
-  std::string text = head_of(reply, reply.type) + "Content-Length: " + std::to_string(reply.body.size()) + "\r\n\r\n";
+bool HttpServer::send_reply(int socket, const Reply& reply, bool with_body, bool keep_alive) const {
+  std::string text = head_of(reply, keep_alive);
   if (with_body) text += reply.body;
   return send(socket, text);
-}
-
-void HttpServer::send_stream(int socket, const Reply& reply) const {
-  const std::string line = std::string("--") + kBoundary + "\r\n";
-  if (!send(socket, head_of(reply, std::string("multipart/x-mixed-replace; boundary=") + kBoundary) + "\r\n" + line)) return;
-  while (!stopping_) {
-    const std::optional<std::string> part = reply.next_part();
-    if (!part) return;
-    // A client that has gone is noticed although there is nothing to send.
-    pollfd p{socket, POLLIN, 0};
-    char byte = 0;
-    if (poll(&p, 1, 0) > 0 && recv(socket, &byte, 1, MSG_PEEK) == 0) return;
-    if (part->empty()) continue;
-    const std::string head = "Content-Type: image/jpeg\r\nContent-Length: " + std::to_string(part->size()) + "\r\n\r\n";
-    if (!send(socket, head + *part + "\r\n" + line)) return;
-  }
 }
 
 }  // namespace gsnav_viewer

@@ -6,40 +6,42 @@
 #include <functional>
 #include <list>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "gsnav/core/status.hpp"
 #include "http_request.hpp"
 
 namespace gsnav_viewer {
 
-/// What a request is answered with: one body or, where `next_part` is set, JPEG images without end (MJPEG:
-/// multipart/x-mixed-replace).
+/// What a request is answered with.
 struct Reply {
   int status = 200;
   std::string type = "text/plain; charset=utf-8";
   std::string body;
-  /// Waits for the next image; an empty one means none yet, none at all that the stream is over.
-  std::function<std::optional<std::string>()> next_part;
 };
 
 struct ServerOptions {
-  std::string address = "127.0.0.1";  ///< IPv4; at loopback's, requests must name loopback as their host
+  std::string address = "127.0.0.1";  ///< IPv4 to listen at; at a loopback address hosts must be loopback's too
   int port = 0;                       ///< 0: any that is free
-  std::size_t most_connections = 16;  ///< more are answered 503
-  std::chrono::milliseconds patience{5000};  ///< for a whole request, and for a client that takes no bytes
+  std::vector<std::string> allowed_hosts{};  ///< names that a Host field may have beside addresses and localhost
+  std::size_t most_connections = 16;  ///< more drop the one that was idle longest, or are answered 503
+  std::chrono::milliseconds patience{5000};  ///< for a whole request, a whole reply, and between requests
 };
 
-/// A small HTTP/1.1 server: one request a connection, each answered by `handler` in a thread of its own. Whatever
-/// arrives is answered or dropped; nothing is ever read from disk.
+/// A small HTTP/1.1 server with a thread per connection, whose requests are answered in turn. It reads nothing from
+/// disk. (A library would have to be refused a full queue, drop idle connections and keep one deadline per reply;
+/// Debian 12's cpp-httplib does none of the three and needs OpenSSL and brotli.)
 class HttpServer {
  public:
   using Handler = std::function<Reply(const Request&)>;
 
-  /// Listens at once. Errors: invalid_argument (the address); backend_failure (the port is taken, with the system's words).
-  static gsnav::Result<std::unique_ptr<HttpServer>> start(ServerOptions options, Handler handler);
+  /// Listens; connections wait until serve(). Errors: invalid_argument (the address); backend_failure (the port is
+  /// taken, with the system's words).
+  static gsnav::Result<std::unique_ptr<HttpServer>> bind(ServerOptions options);
+  /// Answers requests from now on, in threads of its own. Once.
+  void serve(Handler handler);
   ~HttpServer();  ///< ends all connections
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
@@ -47,22 +49,27 @@ class HttpServer {
   int port() const noexcept { return options_.port; }
 
  private:
+  using Clock = std::chrono::steady_clock;
+  /// Its socket is closed by the accepting thread alone, so that no number is shut down that has been given anew.
   struct Connection {
     int socket = -1;
+    std::atomic<Clock::rep> idle_since{0};  ///< waits for the first byte of a request; 0: busy
     std::atomic<bool> over{false};
+    bool dropped = false;
+    std::string unread;  ///< received, of the next request
     std::thread thread;
   };
 
-  HttpServer(ServerOptions options, Handler handler) : options_(std::move(options)), handler_(std::move(handler)) {}
+  explicit HttpServer(ServerOptions options) : options_(std::move(options)) {}
   gsnav::Status listen();
   void accept_connections();
   void forget_finished();
-  void serve(int socket) const;
+  bool make_room();
+  void talk(Connection& c) const;
   Reply answer(const Request& request) const;
-  bool read_request(int socket, ParsedRequest& out) const;
+  bool read_request(Connection& c, ParsedRequest& out) const;
   bool send(int socket, std::string_view bytes) const;
-  bool send_reply(int socket, const Reply& reply, bool with_body) const;
-  void send_stream(int socket, const Reply& reply) const;
+  bool send_reply(int socket, const Reply& reply, bool with_body, bool keep_alive) const;
 
   ServerOptions options_;
   Handler handler_;

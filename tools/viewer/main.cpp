@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-viewer: walks a scene in the browser.
+#include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <mutex>
 #include <thread>
 
 #include "http_server.hpp"
@@ -16,47 +19,82 @@ using gsnav::Status;
 
 /// Paths are compared as they are: nothing else is served, whatever a path looks like.
 Reply answer(Session& session, const Request& r) {
-  if (r.path == "/") return {200, "text/html; charset=utf-8", std::string(page()), {}};
-  if (r.path == "/control") {
-    if (r.method != "POST") return {405, "", "", {}};
-    auto state = session.control(r.body);
-    if (!state) return {400, "text/plain; charset=utf-8", state.message() + "\n", {}};
-    return {200, "application/json", std::move(*state), {}};
+  if (r.path == "/") {
+    if (r.method == "POST") return {405, "", ""};
+    return {200, "text/html; charset=utf-8", std::string(page())};
   }
-  const Panel panel = r.path == "/stream/color"   ? Panel::color
-                      : r.path == "/stream/depth" ? Panel::depth
-                                                  : Panel::map;
-  if (panel == Panel::map && r.path != "/stream/map") return {404, "", "", {}};
-  if (r.method == "POST") return {405, "", "", {}};
-  Reply reply{200, "image/jpeg", "", {}};
-  reply.next_part = [watcher = Session::Watcher(session, panel)]() mutable { return watcher.next(); };
-  return reply;
+  if (r.path != "/frame") return {404, "", ""};
+  if (r.method != "POST") return {405, "", ""};  // what other sites' pictures and links ask for
+  auto frame = session.frame(r.body);
+  if (!frame) return {400, "text/plain; charset=utf-8", frame.message() + "\n"};
+  return {200, "application/octet-stream", std::move(*frame)};
 }
 
+/// Waits for SIGINT and SIGTERM in a thread of its own, from its making to its end. Before a session is there, they
+/// end the process: nothing is half written, since files are made aside and renamed.
+class Signals {
+ public:
+  Signals() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);  // threads inherit it
+    thread_ = std::thread([this] { wait(); });
+  }
+  ~Signals() {
+    ended_ = true;
+    pthread_kill(thread_.native_handle(), SIGTERM);  // where it still waits
+    thread_.join();
+  }
+  Signals(const Signals&) = delete;
+  Signals& operator=(const Signals&) = delete;
+
+  /// The session that the first signal stops from now on; null: none.
+  void stop(Session* session) {
+    std::lock_guard lock(mutex_);
+    session_ = session;
+  }
+
+ private:
+  void wait() {
+    for (bool stopped = false; !ended_; stopped = true) {
+      int which = 0;
+      sigwait(&signals_, &which);
+      if (ended_) return;
+      std::lock_guard lock(mutex_);
+      if (session_ == nullptr || stopped) {
+        std::fprintf(stderr, "gsnav-viewer: stopped\n");
+        std::_Exit(128 + which);
+      }
+      session_->stop();
+    }
+  }
+
+  sigset_t signals_;
+  std::atomic<bool> ended_{false};
+  std::mutex mutex_;
+  Session* session_ = nullptr;
+  std::thread thread_;
+};
+
 Status run(const gsnav_eval::Options& o, const SessionOptions& how, const ServerOptions& where) {
-  // Signals are taken by a thread that waits for them.
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  Signals signals;
+  // Before anything is loaded, so that a port that is taken shows at once.
+  auto server = HttpServer::bind(where);
+  if (!server) return server.status();
   auto stage = gsnav_eval::prepare(o);
   if (!stage) return stage.status();
   auto made = Session::create(o, std::move(*stage), how);
   if (!made) return made.status();
   Session& session = **made;
-  auto server = HttpServer::start(where, [&session](const Request& r) { return answer(session, r); });
-  if (!server) return server.status();
+  signals.stop(&session);
+  (*server)->serve([&session](const Request& r) { return answer(session, r); });
   std::printf("http://%s:%d/\n", where.address.c_str(), (*server)->port());
   std::fflush(stdout);
-  std::thread waiter([&session, signals] {
-    int which = 0;
-    sigwait(&signals, &which);
-    session.stop();
-  });
   const Status s = session.run();
-  pthread_kill(waiter.native_handle(), SIGTERM);  // where it still waits
-  waiter.join();
+  session.stop();  // who waits for a frame
+  server->reset();
+  signals.stop(nullptr);
   return s;
 }
 
@@ -77,6 +115,9 @@ int main(int argc, char** argv) try {
   app.add_option("--port", where.port, "port to listen at; 0: any that is free")->capture_default_str()->check(CLI::Range(0, 65535));
   app.add_option("--bind", where.address, "IPv4 address to listen at; whoever reaches it can look and steer")
       ->capture_default_str();
+  app.add_option("--allow-host", where.allowed_hosts,
+                 "host name by which browsers may call the viewer, beside addresses and localhost; may be repeated")
+      ->type_name("NAME");
   app.add_option("--rate", how.rate, "frames a second at most")->capture_default_str()->check(CLI::Range(1.0, 120.0));
   app.add_option("--speed", how.speed, "of walking, m/s")->capture_default_str()->check(CLI::Range(0.05, 20.0));
   app.add_option("--quality", how.quality, "of JPEG images")->capture_default_str()->check(CLI::Range(1, 100));

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
+#include <exception>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -23,8 +26,28 @@ using std::chrono::milliseconds;
 constexpr double kTurnedUp = 1.55;          // radians: as far as one looks up and down
 constexpr auto kHeld = milliseconds(1000);  // a key whose release got lost is let go after that
 constexpr auto kStill = milliseconds(250);  // between frames while nothing moves
+constexpr auto kLinger = milliseconds(100); // the next frame is begun though nobody has asked for it yet
+constexpr auto kAnswer = milliseconds(500); // a request for a frame waits no longer
 constexpr int kMostActions = 5;             // caught up with in one frame, where drawing is slow
 constexpr double kLeastIsland = 1.5;        // metres: as on maps
+
+/// Colours of depth, evenly from near to far, as CSS writes them.
+std::vector<std::string> depth_colors(const SessionOptions& how) {
+  constexpr int kColors = 9;
+  std::vector<float> depth;
+  for (int i = 0; i < kColors; ++i) {
+    depth.push_back(static_cast<float>(how.depth_near + i * (how.depth_far - how.depth_near) / (kColors - 1)));
+  }
+  const std::vector<std::uint8_t> rgb =
+      gsnav::io::colorize_depth(depth, static_cast<float>(how.depth_near), static_cast<float>(how.depth_far));
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    char text[8];
+    std::snprintf(text, sizeof text, "#%02x%02x%02x", rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]);
+    out.emplace_back(text);
+  }
+  return out;
+}
 
 std::vector<std::array<Vec3d, 3>> walkable(const gsnav::NavMesh& mesh) {
   std::vector<std::array<Vec3d, 3>> out = mesh.triangles();
@@ -54,6 +77,7 @@ Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& opti
 Session::Session(const gsnav_eval::Options& options, gsnav_eval::Stage stage, const SessionOptions& how, gsnav::World world)
     : stage_(std::move(stage)),
       how_(how),
+      depth_colors_(depth_colors(how)),
       scene_name_(options.scene.empty() ? "embedded flat" : options.scene),
       world_(std::move(world)),
       backend_(options.threads),
@@ -94,13 +118,26 @@ void Session::put_time(double t) {
 }
 
 Status Session::run() {
+  const auto failed = [](Errc code, const char* what) {
+    return Status(code, std::string("drawing a frame: ") + what);
+  };
+  try {
+    return draw_frames();
+  } catch (const std::bad_alloc&) {
+    return failed(Errc::out_of_memory, "out of memory; a smaller --width and --height or fewer --avatars take less");
+  } catch (const std::exception& e) {
+    return failed(Errc::backend_failure, e.what());
+  }
+}
+
+Status Session::draw_frames() {
   const auto period = std::chrono::duration_cast<Clock::duration>(duration<double>(1.0 / how_.rate));
   Clock::time_point before = Clock::now() - period;
   while (true) {
     Controls c;
     {
       std::unique_lock lock(mutex_);
-      news_.wait(lock, [&] { return stopped_ || waiting_ > 0; });
+      news_.wait(lock, [&] { return stopped_ || waiting_ > 0 || Clock::now() - last_wait_ < kLinger; });
       news_.wait_until(lock, before + period, [&] { return stopped_; });
       const auto still = [&] { return controls_.paused && controls_.forward == 0 && controls_.left == 0 && !changed_; };
       if (still()) news_.wait_until(lock, before + kStill, [&] { return stopped_ || !still(); });
@@ -114,13 +151,15 @@ Status Session::run() {
     const Clock::time_point now = Clock::now();
     const double passed = duration<double>(now - before).count();
     before = now;
-    rate_ += 0.1 * (1.0 / passed - rate_);
+    if (passed > 1.0) rate_ = 0.0;  // nobody looked
+    rate_ += (rate_ == 0.0 ? 1.0 : 0.1) * (1.0 / passed - rate_);
     if (Status s = advance(c, std::clamp(static_cast<int>(std::lround(passed * how_.rate)), 1, kMostActions)); !s) return s;
     if (Status s = draw(c); !s) return s;
     frame_seconds_ = duration<double>(Clock::now() - now).count();
+    std::string made = describe(c, begun_) + '\n';
+    for (const std::string& image : drawn_) made += image;
     std::lock_guard lock(mutex_);
-    std::swap(images_, drawn_);
-    state_ = describe(c);
+    newest_ = std::move(made);
     published_ = begun_;
     news_.notify_all();
   }
@@ -230,10 +269,13 @@ Status Session::publish(Panel panel, std::span<const std::uint8_t> rgb) {
   return {};
 }
 
-std::string Session::describe(const Controls& c) const {
+std::string Session::describe(const Controls& c, std::uint64_t number) const {
   const gsnav::EpisodeMetrics m = world_.metrics();
   const gsnav::AgentPose& a = world_.agent();
   return nlohmann::json{
+      {"frame", number},
+      {"sizes", {drawn_[0].size(), drawn_[1].size(), drawn_[2].size()}},
+      {"depth", {{"near", how_.depth_near}, {"far", how_.depth_far}, {"colors", depth_colors_}}},
       {"scene", scene_name_},
       {"time", world_.time()},
       {"paused", c.paused},
@@ -258,35 +300,24 @@ std::string Session::describe(const Controls& c) const {
         {"collision_rate", m.collision_rate},
         {"psi", m.psi},
         {"clearance", world_.last_step().avatar_clearance}}}}
-      .dump();
+      // File names are bytes: those that are no UTF-8 become U+FFFD.
+      .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-Result<std::string> Session::control(std::string_view message) {
-  std::lock_guard lock(mutex_);
+Result<std::string> Session::frame(std::string_view message) {
+  std::unique_lock lock(mutex_);
   if (Status s = apply(message, controls_); !s) return s;
-  last_message_ = Clock::now();
-  changed_ = changed_ || !message.empty();
+  // A number that is not this process's is as good as none.
+  const bool knows = controls_.seen && *controls_.seen <= begun_;
+  const std::uint64_t seen = knows ? *controls_.seen : begun_;
+  if (controls_.steers) last_message_ = Clock::now();
+  changed_ = changed_ || controls_.steers || !knows;
+  ++waiting_;
   news_.notify_all();
-  return state_;
-}
-
-Session::Watcher::Watcher(Session& session, Panel panel) : session_(&session), panel_(panel) {
-  std::lock_guard lock(session.mutex_);
-  seen_ = session.begun_;
-  session.changed_ = true;
-}
-
-std::optional<std::string> Session::Watcher::next() {
-  Session& s = *session_;
-  std::unique_lock lock(s.mutex_);
-  ++s.waiting_;
-  s.news_.notify_all();
-  s.news_.wait_for(lock, milliseconds(500), [&] { return s.stopped_ || s.published_ > seen_; });
-  --s.waiting_;
-  if (s.stopped_) return {};
-  if (s.published_ <= seen_) return std::string();
-  seen_ = s.published_;
-  return s.images_[static_cast<std::size_t>(panel_)];
+  news_.wait_for(lock, kAnswer, [&] { return stopped_ || published_ > seen; });
+  --waiting_;
+  last_wait_ = Clock::now();
+  return newest_;
 }
 
 }  // namespace gsnav_viewer

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,33 +28,22 @@ struct SessionOptions {
   int quality = 85;          ///< of JPEG
 };
 
-/// Somebody who walks through a scene, and what they see. One thread runs it; any number of others steer and watch.
-/// While nobody watches nothing is drawn and no time passes.
+/// An agent that is steered through a scene by hand, and its pictures. One thread runs it; any number of others ask for
+/// frames and steer by that. Where no frame was asked for within kLinger nothing is drawn and no time passes.
 class Session {
  public:
   /// Errors: what World::create reports; invalid_argument (no episode).
   static gsnav::Result<std::unique_ptr<Session>> create(const gsnav_eval::Options& options, gsnav_eval::Stage stage,
                                                         const SessionOptions& how);
 
-  /// Draws until stop(). Errors: what stepping and rendering report.
+  /// Draws until stop(). Errors: what stepping and rendering report, exceptions among it.
   gsnav::Status run();
   void stop();
 
-  /// Applies a message of the page (controls.hpp) and returns what there is to say, as JSON.
-  gsnav::Result<std::string> control(std::string_view message);
-
-  /// One who watches a panel. Its first frame was begun after it came.
-  class Watcher {
-   public:
-    Watcher(Session& session, Panel panel);
-    /// Waits for a frame newer than the last: a JPEG, empty where there is none yet, nothing at the end.
-    std::optional<std::string> next();
-
-   private:
-    Session* session_;
-    Panel panel_;
-    std::uint64_t seen_;
-  };
+  /// Applies a message of the page (controls.hpp), waits for a frame newer than its `seen`, half a second at most, and
+  /// returns the newest: a line of JSON, which has `frame` (its number, 0: none yet) and `sizes` (bytes of the JPEG
+  /// images of colour, depth and map), then these images. Without `seen` the frame is one that was begun after the call.
+  gsnav::Result<std::string> frame(std::string_view message);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -66,12 +54,14 @@ class Session {
   gsnav::Status draw(const Controls& c);
   gsnav::Status draw_view(const Controls& c, const gsnav::CapsuleSet& bodies);
   gsnav::Status draw_map(const Controls& c, const gsnav::CapsuleSet& bodies);
+  gsnav::Status draw_frames();
   gsnav::Status publish(Panel panel, std::span<const std::uint8_t> rgb);
-  std::string describe(const Controls& c) const;
+  std::string describe(const Controls& c, std::uint64_t number) const;
   void put_time(double t);
 
   gsnav_eval::Stage stage_;
   SessionOptions how_;
+  std::vector<std::string> depth_colors_;
   std::string scene_name_;
   gsnav::World world_;
   gsnav::OpenMPBackend backend_;
@@ -88,12 +78,12 @@ class Session {
   mutable std::mutex mutex_;
   std::condition_variable news_;
   Controls controls_;
-  Clock::time_point last_message_{};
+  Clock::time_point last_message_{}, last_wait_{};
   std::uint64_t begun_ = 0, published_ = 0;
   int waiting_ = 0;
-  bool changed_ = false;  // a message or somebody new came since the last frame began
-  std::array<std::string, 3> images_, drawn_;
-  std::string state_ = "{}";
+  bool changed_ = false;  // a message came since the last frame began, or a request that has seen none
+  std::array<std::string, 3> drawn_;  // JPEG images of the frame at hand
+  std::string newest_ = "{\"frame\":0,\"sizes\":[0,0,0]}\n";  // the last frame, as frame() returns it
   bool stopped_ = false;
 };
 
