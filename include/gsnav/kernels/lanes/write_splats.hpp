@@ -133,14 +133,19 @@ GSNAV_HD void copy_record(T& record, const float* from) noexcept {
 
 GSNAV_HD F as_floats(F::ints x) noexcept { return F(gsnav::detail::floats<kWidth>(x)); }
 
+/// One row by itself, with all that needs double.
+GSNAV_STAGE bool project_alone(const ProjectArgs<float>& args, std::size_t slot, std::size_t row) noexcept {
+  return project_gaussian(args, slot, row);
+}
+
 }  // namespace detail
 
 /// Writes the survivors `bits` of a pack, in row order, behind the `count` that their chunk has from slot
 /// `base` on: the bits of write_splat, but for colours, which `survivors` are left to. Returns how many had a
 /// pixel centre in their bounds. Contract only: Response::ewa, Compat::none.
-GSNAV_HD std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t base, std::size_t count,
-                                    const ProjectedPack& pack, std::uint32_t bits,
-                                    Survivors& survivors) noexcept {
+GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t base, std::size_t count,
+                                       const ProjectedPack& pack, std::uint32_t bits,
+                                       Survivors& survivors) noexcept {
   const std::size_t slot = base + count;
   const GaussianView& gs = args.gaussians;
   const ProjectionCamera<float>& camera = args.camera;
@@ -200,7 +205,7 @@ GSNAV_HD std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t 
   for (std::uint32_t left = bits; left != 0; left &= left - 1) {
     const std::size_t l = static_cast<std::size_t>(std::countr_zero(left)), at = slot + written;
     if ((alone >> l & 1u) != 0) {
-      if (!project_gaussian(args, at, rows[l])) continue;
+      if (!detail::project_alone(args, at, rows[l])) continue;
     } else {
       detail::copy_record<8>(args.geometry[at], geometry + 8 * l);
       detail::copy_record<4>(args.bounds[at], bounds + 8 * l);
