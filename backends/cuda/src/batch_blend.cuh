@@ -71,21 +71,15 @@ struct ReachedBlocks {
     return mask;
   }
   __device__ unsigned of_ellipse(const SplatGeometry<float>& g, float log2_alpha_min) const {
-    const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
-    const FootprintStrips<float, true> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0),
-                                              centre(y1));
+    const PixelBox<float> box = PixelBox<float>::of({x0, y0, x1 + 1, y1 + 1});
+    const FootprintStrips<float, true> strips(g, log2_alpha_min, box);
     unsigned mask = 0;
     for (int row = first_row(); row <= last_row(); ++row) {
       const int top = y + row * kBlock;
-      float left, right;
-      if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlock - 1, y1)), left, right))
-        continue;
-      // As in for_each_tile: the padding of left and right is more than what rounding to a pixel may
-      // lose.
-      const float low = static_cast<float>(x0), high = static_cast<float>(x1 + 1);
-      const int first = static_cast<int>(clamp(left + 0.5f, low, high));
-      const int last = static_cast<int>(clamp(right + 0.5f, low, high)) - 1;
-      if (first <= last) mask |= columns(first, last) << (4 * row);
+      const PixelColumns<float> in_strip =
+          strips.pixels(box, static_cast<float>(top), static_cast<float>(top + kBlock));
+      if (!in_strip.any) continue;
+      mask |= columns(static_cast<int>(in_strip.first), static_cast<int>(in_strip.end) - 1) << (4 * row);
     }
     return mask;
   }

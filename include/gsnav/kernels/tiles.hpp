@@ -64,22 +64,17 @@ GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g,
     f(ty0, tx0, tx0);
     return;
   }
-  const auto centre = [](int pixel) GSNAV_INLINED { return S(pixel) + S(0.5); };
-  const FootprintStrips<S> footprint(g, log2_alpha_min, centre(b.x0), centre(b.x1 - 1), centre(b.y0),
-                                     centre(b.y1 - 1));
+  const PixelBox<S> box = PixelBox<S>::of(b);
+  const FootprintStrips<S> footprint(g, log2_alpha_min, box);
   for (int ty = ty0; ty <= ty1; ++ty) {
     int first = tx0, last = tx1;
     if (elliptic) {
-      S left, right;
-      if (!footprint.columns(centre(max(ty * ts, b.y0)), centre(min((ty + 1) * ts, b.y1) - 1), left, right)) {
-        continue;
-      }
-      // The padding of left and right is more than what rounding to a pixel may lose.
-      first = static_cast<int>(clamp(left + S(0.5), S(b.x0), S(b.x1))) >> shift;
-      last = static_cast<int>(clamp(right + S(0.5), S(b.x0), S(b.x1))) - 1;
-      last = last < b.x0 ? -1 : last >> shift;
+      const PixelColumns<S> columns = footprint.pixels(box, S(ty * ts), S((ty + 1) * ts));
+      if (!columns.any) continue;
+      first = static_cast<int>(columns.first) >> shift;
+      last = (static_cast<int>(columns.end) - 1) >> shift;
     }
-    if (first <= last) f(ty, first, last);
+    f(ty, first, last);
   }
 }
 
