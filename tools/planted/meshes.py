@@ -37,7 +37,7 @@ PLANTS = [
     plant("mesh_leaves_alpha", MERGE, "state.transmittance = select(state.transmittance < L(S(0)), -after, after);", "",
           CASES,
           "N49_mesh_between_layers"),
-    plant("mesh_cull_by_centre", MERGE, "depths[splat].z - depths[splat].reach > tile_far[tile]",
+    plant("mesh_cull_by_centre", "include/gsnav/kernels/tiles.hpp", "depths[splat].z - depths[splat].reach > tile_far[tile]",
           "depths[splat].z > tile_far[tile]", CASES, "N53_tile_max_mesh_cull"),
     plant("mesh_chunk_without_reach", "include/gsnav/ops/composite_steps.hpp", "* (1 - 1e-6) - reach * (1 + 1e-5);",
           "+ reach;", CASES, "N53_tile_max_mesh_cull of chunks, before they are projected"),

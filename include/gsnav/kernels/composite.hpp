@@ -158,46 +158,6 @@ void dispatch_composite(const RasterArgs<S>& args, const F& f) {
   }
 }
 
-/// Arguments of binning the splats that a mesh does not hide.
-template <class S>
-struct MeshCull {
-  View<const SplatDepth<S>> depths;
-  View<const S> tile_far;  ///< MeshLayer's
-
-  /// Whether every pixel of a tile would skip the splat.
-  GSNAV_HD bool hides(std::size_t tile, std::uint32_t splat) const noexcept {
-    return depths[splat].z - depths[splat].reach > tile_far[tile];
-  }
-};
-
-/// CountTileIntersections, less what is hidden.
-template <class S>
-struct CountUnhidden {
-  BinArgs<S> args;
-  MeshCull<S> cull;
-  GSNAV_HD void operator()(std::size_t block) const noexcept {
-    std::uint64_t* counts = args.cursors.data + block * args.grid.count();
-    for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-      counts[tile] += cull.hides(tile, splat) ? 0 : 1;
-    });
-  }
-};
-
-/// ScatterTileIntersections, less what is hidden.
-template <class S>
-struct ScatterUnhidden {
-  BinArgs<S> args;
-  MeshCull<S> cull;
-  GSNAV_HD void operator()(std::size_t block) const noexcept {
-    std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
-    std::uint32_t* out = args.tile_splats.data;
-    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-      if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
-    });
-  }
-};
-
 /// Composite::hard_depth: the images of Gaussians alone, over black, become those of the frame.
 template <class S>
 struct HardDepthPixel {
