@@ -42,25 +42,12 @@ class FrameStages {
 
   /// Fills tile_offsets and tile_splats.
   void bin() {
-    if constexpr (requires { backend_->list_tiles(bin_); }) {
-      backend_->list_tiles(bin_);
-    } else {
-      if constexpr (requires { backend_->count_tiles(bin_); }) {
-        backend_->count_tiles(bin_);
-      } else {
-        backend_->parallel_for(bin_.blocks, gsnav::CountTileIntersections<S>{bin_});
-      }
-      backend_->parallel_for(1, gsnav::ScanTileIntersections<S>{bin_});
-    }
+    gsnav::detail::count_tiles(*backend_, bin_, gsnav::NoCull{});
     tile_offsets_.download(&pairs_, 1, bin_.grid.count());
     sync();
     tile_splats_.resize_discard(pairs_);
     bin_.tile_splats = tile_splats_.view();
-    if constexpr (requires { backend_->scatter_tiles(bin_); }) {
-      backend_->scatter_tiles(bin_);
-    } else {
-      backend_->parallel_for(bin_.blocks, gsnav::ScatterTileIntersections<S>{bin_});
-    }
+    gsnav::detail::scatter_tiles(*backend_, bin_, gsnav::NoCull{});
     sync();
   }
 

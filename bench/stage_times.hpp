@@ -59,26 +59,19 @@ class TimedBackend : public Base {
   {
     timed(Stage::project, [&] { Base::project(args, chunks); });
   }
-  template <class A>
-  void count_tiles(const A& args) requires requires(Base& b) {
-    b.count_tiles(args);
+  template <class A, class Cull>
+  void list_tiles(const A& args, const Cull& cull) requires requires(Base& b) {
+    b.list_tiles(args, cull);
   }
   {
-    timed(Stage::bin, [&] { Base::count_tiles(args); });
+    timed(Stage::bin, [&] { Base::list_tiles(args, cull); });
   }
-  template <class A>
-  void list_tiles(const A& args) requires requires(Base& b) {
-    b.list_tiles(args);
-  }
-  {
-    timed(Stage::bin, [&] { Base::list_tiles(args); });
-  }
-  template <class A>
-  void scatter_tiles(const A& args) requires requires(Base& b) {
-    b.scatter_tiles(args);
+  template <class A, class Cull>
+  void scatter_tiles(const A& args, const Cull& cull) requires requires(Base& b) {
+    b.scatter_tiles(args, cull);
   }
   {
-    timed(Stage::bin, [&] { Base::scatter_tiles(args); });
+    timed(Stage::bin, [&] { Base::scatter_tiles(args, cull); });
   }
   template <class A>
   void rasterize_tiles(const A& args) requires requires(Base& b) {

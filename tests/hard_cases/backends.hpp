@@ -12,6 +12,7 @@
 #include "gsnav/scene/mesh_scene.hpp"
 #include "ops/backends.hpp"
 #include "support/frame_images.hpp"
+#include "support/image_hashes.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
@@ -64,7 +65,9 @@ class CaseRenderer {
     }
     gsnav::Renderer<S, B> renderer(*backend_, config);
     renderer.set_meshes(instances);
-    return renderer.render(sets, cameras).value();
+    gsnav::Frames<S> frames = renderer.render(sets, cameras).value();
+    record_hashes(frames, name());
+    return frames;
   }
   gsnav::Frames<S> render(const std::vector<Placed>& scene, const gsnav::Camera& camera,
                           const gsnav::RenderConfig& config = {}) {

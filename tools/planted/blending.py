@@ -15,8 +15,8 @@ DRAWN = "const auto drawn = exponent >= L(rules.log2_alpha_min);"
 LANES = "include/gsnav/kernels/lanes/rasterize_tile.hpp"
 DELTA = "  const L defined = select(denominator > L(S(0)), delta, L(S(0)));\n"
 CLAMPED = "return L(d.z) + clamp(defined, -reach, reach);"
-CROSSES = "select((before > half) && (after <= half), z, state.median)"
-FIRST = "select((before > below) && (after <= below), z, state.first_hit)"
+CROSSES = "select(falls_through(step.before, step.after, kMedianLevel<S>), z, median)"
+FIRST = "select(falls_through(step.before, step.after, S(1) - first_hit_tau), z, first_hit)"
 RETURNED = "const auto returned = alpha > L(args.rules.return_alpha);"
 
 PLANTS = [
@@ -42,17 +42,17 @@ PLANTS = [
     plant("exp2_cubic", "include/gsnav/ops/render.hpp",
           "config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5", "Exp2::degree3",
           "tests/hard_cases/test_response.cpp", "N01_ewa_offaxis_grid", why="off by 1e-4 of alpha"),
-    plant("color_summed_in_half", BLEND, "    state.r = fma(weight, L(color->r), state.r);\n",
-          "    state.r = fma(weight, L(color->r), state.r);\n"
-          "    const L split = state.r * L(S(8193));\n"
-          "    state.r = split - (split - state.r);\n",
+    plant("color_summed_in_half", BLEND, "      this->r = fma(step.weight, c.x, this->r);\n",
+          "      this->r = fma(step.weight, c.x, this->r);\n"
+          "      const L split = this->r * L(scalar_of<L>(8193));\n"
+          "      this->r = split - (split - this->r);\n",
           STACK_TEST, "N44_deep_stack", why="11 bits of each sum"),
     plant("depth_sum_from_the_camera", BLEND,
-          "    state.z_ref = select((before >= L(S(1))) && (weight > zero), z, state.z_ref);\n", "",
+          "    z_ref = select((step.before >= L(S(1))) && (step.weight > L(S(0))), z, z_ref);\n", "",
           DEPTH_TEST, "N47_depth_far"),
     plant("depth_reference_of_the_last", BLEND,
-          "select((before >= L(S(1))) && (weight > zero), z, state.z_ref)",
-          "select(weight > zero, z, state.z_ref)",
+          "select((step.before >= L(S(1))) && (step.weight > L(S(0))), z, z_ref)",
+          "select(step.weight > L(S(0)), z, z_ref)",
           DEPTH_TEST, "N45_depth_definitions", "N47_depth_far"),
     plant("depth_of_the_centre", PROJECTION, "  if (camera.compat != Compat::none) return d;\n", "  return d;\n",
           DEPTH_TEST, "N46_depth_tilted_disk", "N47_depth_far", why="wrong by decimetres on tilted disks"),
@@ -62,25 +62,26 @@ PLANTS = [
           DEPTH_TEST, "N46_depth_tilted_disk"),
     plant("depth_of_edge_on_divided", DEPTH, DELTA, "  const L defined = delta;\n",
           "tests/hard_cases/test_determinant.cpp", "N06_det_flat_edge_on", why="0 / 0"),
-    plant("median_of_the_last", BLEND, CROSSES, "select(after <= half, z, state.median)",
+    plant("median_of_the_last", BLEND, CROSSES, "select(step.after <= L(kMedianLevel<S>), z, median)",
           DEPTH_TEST, "N45_depth_definitions"),
-    plant("median_before_the_crossing", BLEND, CROSSES, "select(before > half, z, state.median)",
+    plant("median_before_the_crossing", BLEND, CROSSES, "select(step.before > L(kMedianLevel<S>), z, median)",
           DEPTH_TEST, "N48_depth_no_return", why="a pixel that stays half open has no median"),
     plant("median_alone_from_the_centre", BLEND,
-          "state.median = select(crosses, ray_depth(*depth, px, py), state.median);",
-          "state.median = select(crosses, L(depth->z), state.median);",
+          "return ray_depth(*depth, px, py); });",
+          "return D == DepthMode::median ? L(depth->z) : ray_depth(*depth, px, py); });",
           DEPTH_TEST, "N70_depth_only_equals_rgbd"),
     plant("median_alone_at_another_t", BLEND,
-          "const auto crosses = (before > L(S(0.5))) && (after <= L(S(0.5)));",
-          "const auto crosses = (before > L(S(0.49))) && (after <= L(S(0.49)));",
+          "falls_through(step.before, step.after, kMedianLevel<scalar_of<L>>);",
+          "falls_through(step.before, step.after, scalar_of<L>(0.49));",
           DEPTH_TEST, "N70_depth_only_equals_rgbd"),
-    plant("median_at_another_t_in_lanes", LANES, "select(state.transmittance > F(0.5f),", "select(state.transmittance > F(0.49f),",
+    plant("median_by_number_at_another_t", BLEND, "select(before > L(kMedianLevel<scalar_of<L>>), met, last)",
+          "select(before > L(scalar_of<L>(0.49)), met, last)",
           DEPTH_TEST, "N70_depth_only_equals_rgbd"),
     plant("lists_filled_up_with_a_splat", LANES, "list[i] = kNothing;", "list[i] = list[0];",
           CUT_TEST, "N63_determinism_100 of work that is cut"),
-    plant("first_hit_of_the_last", BLEND, FIRST, "select(after <= below, z, state.first_hit)",
+    plant("first_hit_of_the_last", BLEND, FIRST, "select(step.after <= L(S(1) - first_hit_tau), z, first_hit)",
           DEPTH_TEST, "N45_depth_definitions"),
-    plant("first_hit_before_the_crossing", BLEND, FIRST, "select(before > below, z, state.first_hit)",
+    plant("first_hit_before_the_crossing", BLEND, FIRST, "select(step.before > L(S(1) - first_hit_tau), z, first_hit)",
           DEPTH_TEST, "N45_depth_definitions", "N48_depth_no_return"),
     plant("expected_not_divided", BLEND,
           "state.accumulated / select(returned, alpha, one) + state.z_ref",

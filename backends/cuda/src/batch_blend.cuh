@@ -71,21 +71,15 @@ struct ReachedBlocks {
     return mask;
   }
   __device__ unsigned of_ellipse(const SplatGeometry<float>& g, float log2_alpha_min) const {
-    const auto centre = [](int pixel) { return static_cast<float>(pixel) + 0.5f; };
-    const FootprintStrips<float, true> strips(g, log2_alpha_min, centre(x0), centre(x1), centre(y0),
-                                              centre(y1));
+    const PixelBox<float> box = PixelBox<float>::of({x0, y0, x1 + 1, y1 + 1});
+    const FootprintStrips<float, true> strips(g, log2_alpha_min, box);
     unsigned mask = 0;
     for (int row = first_row(); row <= last_row(); ++row) {
       const int top = y + row * kBlock;
-      float left, right;
-      if (!strips.columns(centre(max(top, y0)), centre(min(top + kBlock - 1, y1)), left, right))
-        continue;
-      // As in for_each_tile: the padding of left and right is more than what rounding to a pixel may
-      // lose.
-      const float low = static_cast<float>(x0), high = static_cast<float>(x1 + 1);
-      const int first = static_cast<int>(clamp(left + 0.5f, low, high));
-      const int last = static_cast<int>(clamp(right + 0.5f, low, high)) - 1;
-      if (first <= last) mask |= columns(first, last) << (4 * row);
+      const PixelColumns<float> in_strip =
+          strips.pixels(box, static_cast<float>(top), static_cast<float>(top + kBlock));
+      if (!in_strip.any) continue;
+      mask |= columns(static_cast<int>(in_strip.first), static_cast<int>(in_strip.end) - 1) << (4 * row);
     }
     return mask;
   }
@@ -98,25 +92,18 @@ struct BlendArgs {
   std::uint8_t* rgb8;
 };
 
-/// The median depth of a pixel with a mesh, or none, of which `median` is the slot and `state` what
-/// Gaussians left.
-template <class State>
-__device__ float median_before_mesh(const BlendArgs& b, std::size_t pixel, const State& state,
-                                    std::uint32_t median, float px, float py) {
-  if (median != kNoSlot) return ray_depth(b.batch.depths[median], px, py);
-  const float mesh = b.raster.mesh.depth[pixel];
-  return has_mesh(mesh) && abs(state.transmittance) > 0.5f ? mesh : 0.0f;
-}
-
 /// Writes a pixel, once its mesh has taken what Gaussians left of it. Without meshes the slot of the
 /// median Gaussian is left in the image.
 template <bool Color, DepthMode D, bool Mesh>
 __device__ void write(const BlendArgs& b, std::size_t pixel, BlendState<float, kBlendedDepth<D>>& state,
                       std::uint32_t median, float px, float py) {
   const FrameImages<float>& out = b.raster.images;
-  if constexpr (Mesh) {
-    if constexpr (D == DepthMode::median)
-      out.median_depth[pixel] = median_before_mesh(b, pixel, state, median, px, py);
+  if constexpr (Mesh && D == DepthMode::median) {
+    BlendState<float, D> whole{state, {median == kNoSlot ? 0.0f : ray_depth(b.batch.depths[median], px, py)}};
+    close_by_mesh<Color>(whole, b.raster.rules, b.raster.mesh, pixel);
+    out.median_depth[pixel] = whole.median;
+    static_cast<BlendColor<float>&>(state) = whole;
+  } else if constexpr (Mesh) {
     close_by_mesh<Color>(state, b.raster.rules, b.raster.mesh, pixel);
   }
   if (b.rgb != nullptr || b.rgb8 != nullptr) {
@@ -170,7 +157,7 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
         drawn = alpha > 0;
       }
     }
-    if (D == DepthMode::median && state[k].transmittance > 0.5f) median[k] = slot;
+    if constexpr (D == DepthMode::median) median[k] = last_above_half(state[k].transmittance, slot, median[k]);
     blend_drawn<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, drawn, alpha, &color, depth,
                                                            px, py[k]);
   }
@@ -193,8 +180,8 @@ __device__ inline void blend_listed(const std::uint16_t* list, const F& blend) {
 /// was left.
 template <class State>
 __device__ inline std::uint32_t median_of(const State& state, std::uint32_t last) {
-  return abs(state.transmittance) > 0.5f ? kNoSlot
-                                         : last;  // an exclusive stop negates it and blends nothing
+  // An exclusive stop negates it and blends nothing.
+  return falls_through(1.0f, abs(state.transmittance), kMedianLevel<float>) ? last : kNoSlot;
 }
 
 /// Depths of the meshes at a thread's pixels, and the farthest of all pixels of the block: what a whole

@@ -194,10 +194,10 @@ void CudaBackend::scatter(const BinArgs<float>& args, const Cull& cull) {
                                        pairs, 0, bits, stream_), "a sort");
 }
 
-void CudaBackend::list_tiles(const BinArgs<float>& args) { list(args, cuda::NoCull{}); }
-void CudaBackend::scatter_tiles(const BinArgs<float>& args) { scatter(args, cuda::NoCull{}); }
-void CudaBackend::list_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull) { list(args, cull); }
-void CudaBackend::scatter_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull) { scatter(args, cull); }
+void CudaBackend::list_tiles(const BinArgs<float>& args, const NoCull& cull) { list(args, cull); }
+void CudaBackend::list_tiles(const BinArgs<float>& args, const MeshCull<float>& cull) { list(args, cull); }
+void CudaBackend::scatter_tiles(const BinArgs<float>& args, const NoCull& cull) { scatter(args, cull); }
+void CudaBackend::scatter_tiles(const BinArgs<float>& args, const MeshCull<float>& cull) { scatter(args, cull); }
 
 void CudaBackend::rasterize_tiles(const RasterArgs<float>& args) {
   if (!usable()) return;

@@ -39,9 +39,8 @@ struct NoopFunctor {
 ///                                             drawn in slices of depth (ops/depth_slices.hpp)
 ///     one_thread() -> B                       a backend of the same kind for the calling thread alone: batches
 ///                                             of cameras are then cut by frames (ops/frame_lanes.hpp)
-///     count_tiles, scatter_tiles(const BinArgs<S>&)   bin (kernels/tiles.hpp)
-///     bins_in_lanes                           they want BinArgs::spans
-///     list_tiles(const BinArgs<S>&)           fill tile_offsets at once, in place of count_tiles
+///     list_tiles, scatter_tiles(const BinArgs<S>&, const Cull&)   bin (ops/bin_steps.hpp), for NoCull and MeshCull<S>
+///     bins_in_lanes                           binning wants BinArgs::spans
 ///     sort_pairs(keys, values, keys_alt, values_alt, n, bits)   stable; true: the result is in *_alt
 ///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)
 ///     batch_renderer                          a type that draws many cameras by one call (sim/frame_batch.hpp)

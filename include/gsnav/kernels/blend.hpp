@@ -39,12 +39,39 @@ struct BlendRules {
 /// Which depth images a compiled blend loop serves; less is cheaper.
 enum class DepthMode { none, median, any };
 
-/// The depths of one pixel (or a pack of them) that a DepthMode keeps.
+/// Transmittance of a pixel (or a pack of them) before and after a splat or a surface, and the weight that this
+/// has in the sums: before - after where it is blended, else 0.
+template <class L>
+struct TransmittanceStep {
+  L before, after, weight;
+};
+
+/// Whether transmittance goes from above a level to the level or below it: what decides median and first-hit depth.
+template <class L>
+GSNAV_HD mask_of<L> falls_through(L before, L after, scalar_of<L> level) noexcept {
+  return (before > L(level)) && (after <= L(level));
+}
+
+/// The transmittance whose crossing is the median depth.
+template <class S>
+inline constexpr S kMedianLevel = S(0.5);
+
+/// The depths of one pixel (or a pack of them) that a DepthMode keeps. `accumulate` adds what lies at depth z(),
+/// metres; z is called only where it is needed. Where the weight is 0, z() may be any finite number.
 template <class L, DepthMode D>
-struct DepthState {};
+struct DepthState {
+  template <class Z>
+  GSNAV_HD void accumulate(const TransmittanceStep<L>&, scalar_of<L>, const Z&) noexcept {}
+};
 template <class L>
 struct DepthState<L, DepthMode::median> {
   L median{scalar_of<L>(0)};
+
+  template <class Z>
+  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L>, const Z& z) noexcept {
+    const auto crosses = falls_through(step.before, step.after, kMedianLevel<scalar_of<L>>);
+    if (any(crosses)) median = select(crosses, z(), median);
+  }
 };
 template <class L>
 struct DepthState<L, DepthMode::any> {
@@ -52,7 +79,24 @@ struct DepthState<L, DepthMode::any> {
   /// sum w (z - z_ref), z_ref the first depth blended: a far wall's depths lose no digits to their size.
   L accumulated{scalar_of<L>(0)}, z_ref{scalar_of<L>(0)};
   L first_hit{scalar_of<L>(0)};
+
+  template <class Z>
+  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L> first_hit_tau, const Z& z_of) noexcept {
+    using S = scalar_of<L>;
+    const L z = z_of();
+    median = select(falls_through(step.before, step.after, kMedianLevel<S>), z, median);
+    z_ref = select((step.before >= L(S(1))) && (step.weight > L(S(0))), z, z_ref);
+    accumulated = fma(step.weight, z - z_ref, accumulated);
+    first_hit = select(falls_through(step.before, step.after, S(1) - first_hit_tau), z, first_hit);
+  }
 };
+
+/// The number of the splat that the median depth is of, for loops that compute one depth a pixel: the last one that
+/// is met while transmittance is above kMedianLevel, if transmittance falls through that level at all.
+template <class L, class Id>
+GSNAV_HD Id last_above_half(L before, Id met, Id last) noexcept {
+  return select(before > L(kMedianLevel<scalar_of<L>>), met, last);
+}
 
 /// Transmittance and colour so far of one pixel (or a pack of them).
 template <class L>
@@ -69,7 +113,19 @@ struct BlendColor {
 
 /// Running state of one pixel (or a pack of them), front to back.
 template <class L, DepthMode D>
-struct BlendState : BlendColor<L>, DepthState<L, D> {};
+struct BlendState : BlendColor<L>, DepthState<L, D> {
+  /// Adds what has color() and lies at depth z(); each is called only where it is needed.
+  template <bool Color, class C, class Z>
+  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L> first_hit_tau, const C& color, const Z& z) noexcept {
+    if constexpr (Color) {
+      const Vec3<L> c = color();
+      this->r = fma(step.weight, c.x, this->r);
+      this->g = fma(step.weight, c.y, this->g);
+      this->b = fma(step.weight, c.z, this->b);
+    }
+    DepthState<L, D>::accumulate(step, first_hit_tau, z);
+  }
+};
 
 /// The records of one splat that blending may read; null where no output needs them.
 template <class S>
@@ -138,24 +194,10 @@ GSNAV_HD void blend_drawn(BlendState<L, D>& state, const BlendRules<S>& rules, m
       state.transmittance = select(closes, -before, after);
     }
   }
-  if constexpr (Color) {
-    state.r = fma(weight, L(color->r), state.r);
-    state.g = fma(weight, L(color->g), state.g);
-    state.b = fma(weight, L(color->b), state.b);
-  }
-  if constexpr (D == DepthMode::median) {
-    const auto crosses = (before > L(S(0.5))) && (after <= L(S(0.5)));
-    if (any(crosses)) state.median = select(crosses, ray_depth(*depth, px, py), state.median);
-  }
-  if constexpr (D == DepthMode::any) {
-    const L half(S(0.5));
-    const L z = ray_depth(*depth, px, py);
-    state.median = select((before > half) && (after <= half), z, state.median);
-    state.z_ref = select((before >= L(S(1))) && (weight > zero), z, state.z_ref);
-    state.accumulated = fma(weight, z - state.z_ref, state.accumulated);
-    const L below(S(1) - rules.first_hit_tau);
-    state.first_hit = select((before > below) && (after <= below), z, state.first_hit);
-  }
+  state.template accumulate<Color>(
+      TransmittanceStep<L>{before, after, weight}, rules.first_hit_tau,
+      [&]() GSNAV_INLINED { return Vec3<L>{L(color->r), L(color->g), L(color->b)}; },
+      [&]() GSNAV_INLINED { return ray_depth(*depth, px, py); });
 }
 
 /// The same for an alpha that is 0 outside the footprint.

@@ -27,27 +27,23 @@ GSNAV_HD mask_of<L> has_mesh(L depth) noexcept {
   return depth <= L(scalar_of<L>(3.4e38));
 }
 
+/// Blends a surface of a mesh at depth z, metres, also where too little transmittance is left for Gaussians. Alpha 0:
+/// there is none, z must be finite; 1: transmittance becomes 0.
+template <bool Color, class L, DepthMode D, class S>
+GSNAV_HD void blend_surface(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha, L z,
+                            const Vec3<L>& color) noexcept {
+  const L before = abs(state.transmittance), weight = alpha * before, after = before - weight;
+  state.template accumulate<Color>(TransmittanceStep<L>{before, after, weight}, rules.first_hit_tau,
+                             [&]() GSNAV_INLINED { return color; }, [&]() GSNAV_INLINED { return z; });
+  state.transmittance = select(state.transmittance < L(S(0)), -after, after);
+}
+
 /// The mesh takes what transmittance the Gaussians left.
 template <bool Color, class L, DepthMode D, class S>
 GSNAV_HD void close_by_mesh(BlendState<L, D>& state, const BlendRules<S>& rules, L depth, const Vec3<L>& color) noexcept {
-  const L zero(S(0)), t = abs(state.transmittance);
   const auto covered = has_mesh(depth);
-  const L weight = select(covered, t, zero);
-  if constexpr (Color) {
-    state.r = fma(weight, color.x, state.r);
-    state.g = fma(weight, color.y, state.g);
-    state.b = fma(weight, color.z, state.b);
-  }
-  if constexpr (D != DepthMode::none) {
-    state.median = select(covered && (t > L(S(0.5))), depth, state.median);
-  }
-  if constexpr (D == DepthMode::any) {
-    const L z = select(covered, depth, zero);
-    state.z_ref = select(covered && (t >= L(S(1))), z, state.z_ref);
-    state.accumulated = fma(weight, z - state.z_ref, state.accumulated);
-    state.first_hit = select(covered && (t > L(S(1) - rules.first_hit_tau)), z, state.first_hit);
-  }
-  state.transmittance = select(covered, zero, state.transmittance);
+  const L zero(S(0));
+  blend_surface<Color>(state, rules, select(covered, L(S(1)), zero), select(covered, depth, zero), color);
 }
 
 /// The same with the layer's depth and colour at a pixel.
@@ -95,28 +91,6 @@ struct CompositePixel {
   }
 };
 
-/// A surface that is seen through takes its share of what transmittance is left, also where too little is left for
-/// Gaussians; with alpha 1 it closes the pixel as a mesh does, bit for bit.
-template <bool Color, DepthMode D, class S>
-GSNAV_HD void blend_fragment(BlendState<S, D>& state, const BlendRules<S>& rules, const MeshFragment<S>& f) noexcept {
-  const S before = abs(state.transmittance), weight = f.alpha * before, after = before - weight;
-  if constexpr (Color) {
-    state.r = fma(weight, f.r, state.r);
-    state.g = fma(weight, f.g, state.g);
-    state.b = fma(weight, f.b, state.b);
-  }
-  if constexpr (D != DepthMode::none) {
-    if (before > S(0.5) && after <= S(0.5)) state.median = f.depth;
-  }
-  if constexpr (D == DepthMode::any) {
-    if (before >= S(1)) state.z_ref = f.depth;
-    state.accumulated = fma(weight, f.depth - state.z_ref, state.accumulated);
-    const S below = S(1) - rules.first_hit_tau;
-    if (before > below && after <= below) state.first_hit = f.depth;
-  }
-  state.transmittance = state.transmittance < S(0) ? -after : after;
-}
-
 /// Blends a pixel that has fragments. They cut it into stretches of depth; in each the list is walked for the splats
 /// whose depths along the ray lie there, as a mesh at its far end would have it walked.
 template <class S, bool Color, DepthMode D, bool General>
@@ -140,7 +114,7 @@ struct FragmentPixel {
         blend_within(state, args.records(args.tile_splats[i]), near, far, px, py);
       }
       if (f == nullptr) break;
-      blend_fragment<Color>(state, args.rules, *f);
+      blend_surface<Color>(state, args.rules, f->alpha, f->depth, Vec3<S>{f->r, f->g, f->b});
       near = far;
     }
     close_by_mesh<Color>(state, args.rules, args.mesh, pixel);
@@ -183,46 +157,6 @@ void dispatch_composite(const RasterArgs<S>& args, const F& f) {
     general ? with_depth.template operator()<false, true>() : with_depth.template operator()<false, false>();
   }
 }
-
-/// Arguments of binning the splats that a mesh does not hide.
-template <class S>
-struct MeshCull {
-  View<const SplatDepth<S>> depths;
-  View<const S> tile_far;  ///< MeshLayer's
-
-  /// Whether every pixel of a tile would skip the splat.
-  GSNAV_HD bool hides(std::size_t tile, std::uint32_t splat) const noexcept {
-    return depths[splat].z - depths[splat].reach > tile_far[tile];
-  }
-};
-
-/// CountTileIntersections, less what is hidden.
-template <class S>
-struct CountUnhidden {
-  BinArgs<S> args;
-  MeshCull<S> cull;
-  GSNAV_HD void operator()(std::size_t block) const noexcept {
-    std::uint64_t* counts = args.cursors.data + block * args.grid.count();
-    for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-      counts[tile] += cull.hides(tile, splat) ? 0 : 1;
-    });
-  }
-};
-
-/// ScatterTileIntersections, less what is hidden.
-template <class S>
-struct ScatterUnhidden {
-  BinArgs<S> args;
-  MeshCull<S> cull;
-  GSNAV_HD void operator()(std::size_t block) const noexcept {
-    std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
-    std::uint32_t* out = args.tile_splats.data;
-    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-      if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
-    });
-  }
-};
 
 /// Composite::hard_depth: the images of Gaussians alone, over black, become those of the frame.
 template <class S>

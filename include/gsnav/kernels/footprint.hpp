@@ -6,6 +6,13 @@
 
 namespace gsnav {
 
+/// Pixels of a strip: from the one that holds `first` to the one before `end`, a whole number.
+template <class L>
+struct PixelColumns {
+  mask_of<L> any;
+  L first, end;  ///< where there are any
+};
+
 /// The columns that the ellipse of a splat's footprint covers within horizontal strips of an area: what
 /// tiles, and blocks of a tile, are listed by. L: one splat, or one a lane. Never less than the pixels
 /// that pass the pixel test in scalar_of<L>: the ellipse is enlarged by the rounding of that test, and of
@@ -22,7 +29,11 @@ class FootprintStrips {
   using S = scalar_of<L>;
 
  public:
-  /// Strips will lie within the pixel centres [x0, x1] x [y0, y1].
+  /// Strips will lie within the pixels of the box.
+  GSNAV_HD FootprintStrips(const SplatGeometry<L>& g, S log2_alpha_min, const PixelBox<L>& box) noexcept
+      : FootprintStrips(g, log2_alpha_min, box.x0 + L(S(0.5)), box.x1 - L(S(0.5)), box.y0 + L(S(0.5)),
+                        box.y1 - L(S(0.5))) {}
+  /// ... within the pixel centres [x0, x1] x [y0, y1].
   GSNAV_HD FootprintStrips(const SplatGeometry<L>& g, S log2_alpha_min, L x0, L x1, L y0, L y1) noexcept {
     const L zero(S(0));
     const L inv_a = inverse(g.a), inv_b = inverse(g.b);
@@ -70,6 +81,16 @@ class FootprintStrips {
     right = center_x_ + (fma(reach_right, inv_alpha_, pad_x_) - slope_ * y_right);
     left = center_x_ - (fma(reach_left, inv_alpha_, pad_x_) + slope_ * y_left);
     return low <= high;
+  }
+
+  /// Rows [top, end) of the box: which of its pixels may be covered there.
+  GSNAV_HD PixelColumns<L> pixels(const PixelBox<L>& box, L top, L end) const noexcept {
+    const L half(S(0.5));
+    L left, right;
+    const auto covered = columns(max(top, box.y0) + half, min(end, box.y1) - half, left, right);
+    // The padding of left and right is more than what rounding to a pixel may lose.
+    const L first = clamp(left + half, box.x0, box.x1), behind = truncated(clamp(right + half, box.x0, box.x1));
+    return {covered && (first < behind), first, behind};
   }
 
  private:

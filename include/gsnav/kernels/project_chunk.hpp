@@ -120,6 +120,15 @@ GSNAV_HD void pixel_range(L center, L half, int size, L& low, L& high) noexcept 
   high = min(select(l > last, l - one, l) + one, end);
 }
 
+/// The pixels whose centres lie in the box of a footprint.
+template <class L>
+GSNAV_HD PixelBox<L> pixel_box(const ProjectionCamera<scalar_of<L>>& camera, const Projected<L>& p) noexcept {
+  PixelBox<L> box;
+  pixel_range(p.center_x, p.half_width, camera.width, box.x0, box.x1);
+  pixel_range(p.center_y, p.half_height, camera.height, box.y0, box.y1);
+  return box;
+}
+
 /// The pixels of the 16-pixel tiles that [center - radius, center + radius] reaches, in a compat mode's
 /// own rounding: `slack` is what INRIA adds to the upper end (tile - 1 pixel) where gsplat rounds up.
 template <class S>
@@ -174,11 +183,9 @@ GSNAV_HD L reference_pixel(L x, int size) noexcept {
 template <class T>
 GSNAV_HD bool splat_bounds(const ProjectionCamera<T>& camera, const Projected<T>& p,
                            SplatBounds& b) noexcept {
-  T x0, x1, y0, y1;
-  pixel_range(p.center_x, p.half_width, camera.width, x0, x1);
-  pixel_range(p.center_y, p.half_height, camera.height, y0, y1);
-  b = {static_cast<std::int32_t>(x0), static_cast<std::int32_t>(y0), static_cast<std::int32_t>(x1),
-       static_cast<std::int32_t>(y1)};
+  const PixelBox<T> box = pixel_box(camera, p);
+  b = {static_cast<std::int32_t>(box.x0), static_cast<std::int32_t>(box.y0), static_cast<std::int32_t>(box.x1),
+       static_cast<std::int32_t>(box.y1)};
   if (camera.compat != Compat::none) narrow_to_compat(camera, p, b);
   return b.x0 < b.x1 && b.y0 < b.y1;
 }

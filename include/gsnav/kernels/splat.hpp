@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "gsnav/math/functions.hpp"
 #include "gsnav/math/vec.hpp"
 
 namespace gsnav {
@@ -48,6 +49,18 @@ struct SplatPerspective {
 /// Half-open pixel rectangle [x0, x1) x [y0, y1) that contains a footprint, clipped to the image.
 struct SplatBounds {
   std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
+/// The same as whole numbers in floating point: of one splat, or of one a lane.
+template <class L>
+struct PixelBox {
+  L x0{}, y0{}, x1{}, y1{};
+
+  GSNAV_HD static PixelBox of(const SplatBounds& b) noexcept {
+    using S = scalar_of<L>;
+    return {L(S(b.x0)), L(S(b.y0)), L(S(b.x1)), L(S(b.y1))};
+  }
+  GSNAV_HD mask_of<L> any_pixel() const noexcept { return (x0 < x1) && (y0 < y1); }
 };
 
 }  // namespace gsnav

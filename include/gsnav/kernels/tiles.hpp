@@ -64,22 +64,17 @@ GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g,
     f(ty0, tx0, tx0);
     return;
   }
-  const auto centre = [](int pixel) GSNAV_INLINED { return S(pixel) + S(0.5); };
-  const FootprintStrips<S> footprint(g, log2_alpha_min, centre(b.x0), centre(b.x1 - 1), centre(b.y0),
-                                     centre(b.y1 - 1));
+  const PixelBox<S> box = PixelBox<S>::of(b);
+  const FootprintStrips<S> footprint(g, log2_alpha_min, box);
   for (int ty = ty0; ty <= ty1; ++ty) {
     int first = tx0, last = tx1;
     if (elliptic) {
-      S left, right;
-      if (!footprint.columns(centre(max(ty * ts, b.y0)), centre(min((ty + 1) * ts, b.y1) - 1), left, right)) {
-        continue;
-      }
-      // The padding of left and right is more than what rounding to a pixel may lose.
-      first = static_cast<int>(clamp(left + S(0.5), S(b.x0), S(b.x1))) >> shift;
-      last = static_cast<int>(clamp(right + S(0.5), S(b.x0), S(b.x1))) - 1;
-      last = last < b.x0 ? -1 : last >> shift;
+      const PixelColumns<S> columns = footprint.pixels(box, S(ty * ts), S((ty + 1) * ts));
+      if (!columns.any) continue;
+      first = static_cast<int>(columns.first) >> shift;
+      last = (static_cast<int>(columns.end) - 1) >> shift;
     }
-    if (first <= last) f(ty, first, last);
+    f(ty, first, last);
   }
 }
 
@@ -149,14 +144,34 @@ GSNAV_HD void for_each_intersection(const BinArgs<S>& args, std::size_t block, c
 }
 }  // namespace detail
 
-/// Counts the tile intersections of one block.
+/// Hides no splat: for frames without a mesh.
+struct NoCull {
+  GSNAV_HD bool hides(std::size_t, std::uint32_t) const noexcept { return false; }
+};
+
+/// Hides splats that lie behind a mesh.
 template <class S>
+struct MeshCull {
+  View<const SplatDepth<S>> depths;
+  View<const S> tile_far;  ///< farthest depth of the mesh per tile, metres (MeshLayer)
+
+  /// Whether every pixel of a tile would skip the splat.
+  GSNAV_HD bool hides(std::size_t tile, std::uint32_t splat) const noexcept {
+    return depths[splat].z - depths[splat].reach > tile_far[tile];
+  }
+};
+
+/// Counts the splats of each tile for one block of `order`, less those that `cull` hides.
+template <class S, class Cull = NoCull>
 struct CountTileIntersections {
   BinArgs<S> args;
+  Cull cull{};
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* counts = args.cursors.data + block * args.grid.count();
     for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-    detail::for_each_intersection(args, block, [=](std::size_t tile, std::uint32_t) GSNAV_INLINED { ++counts[tile]; });
+    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
+      if (!cull.hides(tile, splat)) ++counts[tile];
+    });
   }
 };
 
@@ -180,15 +195,17 @@ struct ScanTileIntersections {
   }
 };
 
-/// Writes the splats of one block into their tiles: a stable scatter, so that depth order survives.
-template <class S>
+/// Writes the splats of one block into their tiles, less those that `cull` hides. Keeps their order.
+template <class S, class Cull = NoCull>
 struct ScatterTileIntersections {
   BinArgs<S> args;
+  Cull cull{};
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
     std::uint32_t* out = args.tile_splats.data;
-    detail::for_each_intersection(args, block,
-                                  [=](std::size_t tile, std::uint32_t splat) GSNAV_INLINED { out[cursors[tile]++] = splat; });
+    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
+      if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
+    });
   }
 };
 

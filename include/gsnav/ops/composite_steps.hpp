@@ -63,27 +63,7 @@ void project_unhidden(B& backend, const ProjectArgs<float>& args, const View<con
   backend.project(args, {list.data(), kept});
 }
 
-// The steps of a frame that are others where it has a mesh.
-
-template <class S, Backend B>
-void count_unhidden(B& backend, const BinArgs<S>& bin, const MeshCull<S>& cull) {
-  if constexpr (requires { backend.list_unhidden(bin, cull); }) {
-    backend.list_unhidden(bin, cull);
-  } else if constexpr (MeshBackend<B, S>) {
-    backend.parallel_for(bin.blocks, CountUnhidden<S>{bin, cull});
-    backend.parallel_for(1, ScanTileIntersections<S>{bin});
-  }
-}
-
-template <class S, Backend B>
-void scatter_unhidden(B& backend, const BinArgs<S>& bin, const MeshCull<S>& cull) {
-  if constexpr (requires { backend.scatter_unhidden(bin, cull); }) {
-    backend.scatter_unhidden(bin, cull);
-  } else if constexpr (MeshBackend<B, S>) {
-    backend.parallel_for(bin.blocks, ScatterUnhidden<S>{bin, cull});
-  }
-}
-
+/// Blends frames with a mesh.
 template <class S, Backend B>
 void rasterize_composite(B& backend, const RasterArgs<S>& args) {
   if constexpr (MeshBackend<B, S>) {

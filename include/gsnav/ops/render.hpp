@@ -17,6 +17,7 @@
 #include "gsnav/kernels/color_space.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
+#include "gsnav/ops/bin_steps.hpp"
 #include "gsnav/ops/composite_steps.hpp"
 #include "gsnav/ops/order_visible.hpp"
 #include "gsnav/ops/render_config.hpp"
@@ -185,29 +186,20 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   bin.tile_offsets = ws.tile_offsets.view();
   bin.spans = ws.spans.view();
   const MeshCull<S> cull{ws.depths.view(), mesh.tile_far};
-  if (!mesh.empty()) {
-    detail::count_unhidden(backend, bin, cull);
-  } else if constexpr (requires { backend.list_tiles(bin); }) {
-    backend.list_tiles(bin);
+  if (mesh.empty()) {
+    detail::count_tiles(backend, bin, NoCull{});
   } else {
-    if constexpr (requires { backend.count_tiles(bin); }) {
-      backend.count_tiles(bin);
-    } else {
-      backend.parallel_for(bin.blocks, CountTileIntersections<S>{bin});
-    }
-    backend.parallel_for(1, ScanTileIntersections<S>{bin});
+    detail::count_tiles(backend, bin, cull);
   }
   std::uint64_t intersections = 0;
   ws.tile_offsets.download(&intersections, 1, bin.grid.count());
   if (Status s = backend.synchronize(); !s) return s;
   ws.tile_splats.resize_discard(intersections);
   bin.tile_splats = ws.tile_splats.view();
-  if (!mesh.empty()) {
-    detail::scatter_unhidden(backend, bin, cull);
-  } else if constexpr (requires { backend.scatter_tiles(bin); }) {
-    backend.scatter_tiles(bin);
+  if (mesh.empty()) {
+    detail::scatter_tiles(backend, bin, NoCull{});
   } else {
-    backend.parallel_for(bin.blocks, ScatterTileIntersections<S>{bin});
+    detail::scatter_tiles(backend, bin, cull);
   }
 
   // ---- blend

@@ -82,13 +82,13 @@ class CudaBackend {
   bool sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::uint32_t* keys_alt,
                   std::uint32_t* values_alt, std::size_t n, int bits);
   void project(const ProjectArgs<float>& args);
-  void list_tiles(const BinArgs<float>& args);
-  void scatter_tiles(const BinArgs<float>& args);
+  void list_tiles(const BinArgs<float>& args, const NoCull& cull);
+  void list_tiles(const BinArgs<float>& args, const MeshCull<float>& cull);
+  void scatter_tiles(const BinArgs<float>& args, const NoCull& cull);
+  void scatter_tiles(const BinArgs<float>& args, const MeshCull<float>& cull);
   void rasterize_tiles(const RasterArgs<float>& args);
   /// Frames with a mesh (docs/composition.md).
   static constexpr bool composes_meshes = true;
-  void list_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull);
-  void scatter_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull);
   void composite_tiles(const RasterArgs<float>& args);
   void rasterize_mesh(const MeshRasterArgs<float>& args);
   void parallel_for(std::size_t chunks, const ProjectMeshVertices<float>& k);

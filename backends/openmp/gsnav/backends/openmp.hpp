@@ -34,15 +34,16 @@ struct LaneKernels {
   const char* name;
   int width;
   void (*project_chunk)(const ProjectArgs<float>&, std::size_t chunk) noexcept;
-  void (*count_tiles)(const BinArgs<float>&, std::size_t block) noexcept;
-  void (*scatter_tiles)(const BinArgs<float>&, std::size_t block) noexcept;
+  void (*count_tiles)(const CountTileIntersections<float>&, std::size_t block) noexcept;
+  void (*scatter_tiles)(const ScatterTileIntersections<float>&, std::size_t block) noexcept;
   void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
   void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
   void (*gap_range)(const CapsuleGapArgs<float>&, std::size_t begin, std::size_t end) noexcept;
   void (*sweep_range)(const SweepArgs<float>&, std::size_t begin, std::size_t end) noexcept;
   void (*composite_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
-  void (*count_unhidden)(const CountUnhidden<float>&, std::size_t block) noexcept;
-  void (*scatter_unhidden)(const ScatterUnhidden<float>&, std::size_t block) noexcept;
+  void (*count_tiles_before_mesh)(const CountTileIntersections<float, MeshCull<float>>&, std::size_t block) noexcept;
+  void (*scatter_tiles_before_mesh)(const ScatterTileIntersections<float, MeshCull<float>>&,
+                                    std::size_t block) noexcept;
   void (*project_mesh_vertices)(const ProjectMeshVertices<float>&, std::size_t chunk) noexcept;
   void (*count_mesh_triangles)(const CountMeshTriangles<float>&, std::size_t chunk) noexcept;
   void (*write_mesh_triangles)(const WriteMeshTriangles<float>&, std::size_t chunk) noexcept;
@@ -60,8 +61,8 @@ inline namespace GSNAV_LANES_TAG {
 inline const LaneKernels& native_kernels() noexcept {
   static const LaneKernels k{"native",      kWidth,         &project_chunk,
                              &count_tiles,  &scatter_tiles, &rasterize_tile_any, &skin_range,
-                             &gap_range,    &sweep_range,   &composite_tile_any, &count_unhidden,
-                             &scatter_unhidden, &project_mesh_vertices, &count_mesh_triangles,
+                             &gap_range,    &sweep_range,   &composite_tile_any, &count_tiles_before_mesh,
+                             &scatter_tiles, &project_mesh_vertices, &count_mesh_triangles,
                              &write_mesh_triangles, &rasterize_mesh_tile, &shade_mesh_row};
   return k;
 }
@@ -114,15 +115,19 @@ class OpenMPBackend : public HostMemory {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(chunks.size, [&args, chunks, kernel](std::size_t i) { kernel(args, chunks[i]); });
   }
-  /// Optional members: binning in lanes, which keeps what it counted in BinArgs::spans.
+  /// Optional members: binning in lanes, with the tiles that the projection left in BinArgs::spans.
   static constexpr bool bins_in_lanes = true;
-  void count_tiles(const BinArgs<float>& args) {
-    const auto kernel = lane_kernels().count_tiles;
-    parallel_for(args.blocks, [&args, kernel](std::size_t block) { kernel(args, block); });
+  void parallel_for(std::size_t n, const CountTileIntersections<float>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().count_tiles});
   }
-  void scatter_tiles(const BinArgs<float>& args) {
-    const auto kernel = lane_kernels().scatter_tiles;
-    parallel_for(args.blocks, [&args, kernel](std::size_t block) { kernel(args, block); });
+  void parallel_for(std::size_t n, const CountTileIntersections<float, MeshCull<float>>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().count_tiles_before_mesh});
+  }
+  void parallel_for(std::size_t n, const ScatterTileIntersections<float>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().scatter_tiles});
+  }
+  void parallel_for(std::size_t n, const ScatterTileIntersections<float, MeshCull<float>>& k) {
+    parallel_for(n, Compiled{k, lane_kernels().scatter_tiles_before_mesh});
   }
   /// Optional member: blending in lanes.
   void rasterize_tiles(const RasterArgs<float>& args) {
@@ -133,12 +138,6 @@ class OpenMPBackend : public HostMemory {
   static constexpr bool composes_meshes = true;
   void composite_tiles(const RasterArgs<float>& args) {
     parallel_for(args.grid.count(), Compiled{args, lane_kernels().composite_tile});
-  }
-  void parallel_for(std::size_t n, const CountUnhidden<float>& k) {
-    parallel_for(n, Compiled{k, lane_kernels().count_unhidden});
-  }
-  void parallel_for(std::size_t n, const ScatterUnhidden<float>& k) {
-    parallel_for(n, Compiled{k, lane_kernels().scatter_unhidden});
   }
   void parallel_for(std::size_t n, const ProjectMeshVertices<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().project_mesh_vertices});

@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "gsnav/core/parallel.hpp"
-#include "gsnav/kernels/composite.hpp"
 #include "gsnav/kernels/lanes/isa.hpp"
 #include "gsnav/kernels/tiles.hpp"
 
@@ -32,11 +31,34 @@ GSNAV_HD void for_each_splat(const BinArgs<float>& args, std::size_t block, cons
   }
 }
 
+/// Calls f(tile, splat) for the tiles of each splat of a block, less those that `cull` hides.
+template <class Cull, class F>
+GSNAV_HD void for_each_intersection(const BinArgs<float>& args, const Cull& cull, std::size_t block,
+                                    const F& f) noexcept {
+  const std::size_t columns = static_cast<std::size_t>(args.grid.columns);
+  const auto visit = [=](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
+    if (!cull.hides(tile, splat)) f(tile, splat);
+  };
+  for_each_splat(
+      args, block,
+      [=](std::uint32_t splat, const TileSpans& s) GSNAV_INLINED {
+        for (std::size_t r = 0; r < s.rows; ++r) {
+          const std::size_t row = s.tile + r * columns;
+          for (std::size_t x = s.columns[r][0]; x < s.columns[r][1]; ++x) visit(row + x, splat);
+        }
+      },
+      [&](std::uint32_t splat) GSNAV_INLINED {
+        gsnav::for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
+                             args.elliptic, [&](std::size_t tile) GSNAV_INLINED { visit(tile, splat); });
+      });
+}
+
 }  // namespace detail
 
-/// CountTileIntersections by what the projection found: the same numbers. A row of tiles is noted as where it
-/// begins and where it ends, and summed up at last: how many tiles it has costs nothing.
-inline void count_tiles(const BinArgs<float>& args, std::size_t block) noexcept {
+/// CountTileIntersections with the tiles that the projection found (BinArgs::spans). Notes where each row of tiles
+/// begins and ends and sums up at the end, so that long rows cost no more than short ones.
+inline void count_tiles(const CountTileIntersections<float>& kernel, std::size_t block) noexcept {
+  const BinArgs<float>& args = kernel.args;
   const std::size_t tiles = args.grid.count(), columns = static_cast<std::size_t>(args.grid.columns);
   std::uint64_t* change = args.cursors.data + block * tiles;
   for (std::size_t t = 0; t < tiles; ++t) change[t] = 0;
@@ -64,63 +86,24 @@ inline void count_tiles(const BinArgs<float>& args, std::size_t block) noexcept 
   std::uint64_t count = 0;
   for (std::size_t t = 0; t < tiles; ++t) change[t] = count += change[t];
 }
-
-/// ScatterTileIntersections by what the projection found.
-inline void scatter_tiles(const BinArgs<float>& args, std::size_t block) noexcept {
-  const std::size_t columns = static_cast<std::size_t>(args.grid.columns);
-  std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
-  std::uint32_t* out = args.tile_splats.data;
-  detail::for_each_splat(
-      args, block,
-      [=](std::uint32_t splat, const TileSpans& s) noexcept {
-        for (std::size_t r = 0; r < s.rows; ++r) {
-          const std::size_t row = s.tile + r * columns;
-          for (std::size_t x = s.columns[r][0]; x < s.columns[r][1]; ++x) out[cursors[row + x]++] = splat;
-        }
-      },
-      [&](std::uint32_t splat) noexcept {
-        gsnav::for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
-                             args.elliptic, [=](std::size_t tile) { out[cursors[tile]++] = splat; });
-      });
-}
-
-namespace detail {
-/// Calls f(tile, splat) for the tiles of each splat of a block in which a mesh does not hide it.
-template <class F>
-GSNAV_HD void for_each_unhidden(const BinArgs<float>& args, const MeshCull<float>& cull, std::size_t block,
-                                const F& f) noexcept {
-  const std::size_t columns = static_cast<std::size_t>(args.grid.columns);
-  const auto visit = [&](std::size_t tile, std::uint32_t splat) noexcept {
-    if (!cull.hides(tile, splat)) f(tile, splat);
-  };
-  for_each_splat(
-      args, block,
-      [&](std::uint32_t splat, const TileSpans& s) noexcept {
-        for (std::size_t r = 0; r < s.rows; ++r) {
-          const std::size_t row = s.tile + r * columns;
-          for (std::size_t x = s.columns[r][0]; x < s.columns[r][1]; ++x) visit(row + x, splat);
-        }
-      },
-      [&](std::uint32_t splat) noexcept {
-        gsnav::for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
-                             args.elliptic, [&](std::size_t tile) { visit(tile, splat); });
-      });
-}
-}  // namespace detail
-
-/// CountUnhidden and ScatterUnhidden by what the projection found.
-inline void count_unhidden(const CountUnhidden<float>& kernel, std::size_t block) noexcept {
+/// The same where a mesh hides some: tile by tile.
+inline void count_tiles_before_mesh(const CountTileIntersections<float, MeshCull<float>>& kernel,
+                                    std::size_t block) noexcept {
   const BinArgs<float>& args = kernel.args;
   std::uint64_t* counts = args.cursors.data + block * args.grid.count();
   for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-  detail::for_each_unhidden(args, kernel.cull, block, [=](std::size_t tile, std::uint32_t) { ++counts[tile]; });
+  detail::for_each_intersection(args, kernel.cull, block, [=](std::size_t tile, std::uint32_t) { ++counts[tile]; });
 }
-inline void scatter_unhidden(const ScatterUnhidden<float>& kernel, std::size_t block) noexcept {
+
+/// ScatterTileIntersections with the tiles that the projection found.
+template <class Cull>
+void scatter_tiles(const ScatterTileIntersections<float, Cull>& kernel, std::size_t block) noexcept {
   const BinArgs<float>& args = kernel.args;
   std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
   std::uint32_t* out = args.tile_splats.data;
-  detail::for_each_unhidden(args, kernel.cull, block,
-                            [=](std::size_t tile, std::uint32_t splat) { out[cursors[tile]++] = splat; });
+  detail::for_each_intersection(args, kernel.cull, block, [=](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
+    out[cursors[tile]++] = splat;
+  });
 }
 
 }  // namespace GSNAV_LANES_TAG

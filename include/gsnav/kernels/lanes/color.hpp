@@ -100,8 +100,8 @@ GSNAV_HD void prefetch_colors(const GaussianView& gs, int degree, std::size_t fi
 
 /// Colours of the `count` survivors of a chunk, to out[0] on. They are read when all of the chunk's geometry has
 /// been written: coefficients are most of what a frame reads, and come fastest as one stream.
-GSNAV_HD void color_survivors(const GaussianView& gs, int degree, Survivors& s, std::size_t count,
-                              SplatColor<float>* out) noexcept {
+GSNAV_STAGE void color_survivors(const GaussianView& gs, int degree, Survivors& s, std::size_t count,
+                                 SplatColor<float>* out) noexcept {
   constexpr std::size_t step = static_cast<std::size_t>(kWidth);
   if (count == 0) return;
   for (std::size_t i = count; i % step != 0; ++i) s.rows[i] = s.rows[count - 1];

@@ -11,12 +11,17 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
+/// The chunk by rules that are not worth lanes of their own.
+GSNAV_STAGE void project_chunk_alone(const ProjectArgs<float>& args, std::size_t c) noexcept {
+  ProjectChunk<float>{args}(c);
+}
+
 /// ProjectChunk<float> with kWidth Gaussians side by side; the same bits.
 inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcept {
   const GaussianView& gs = args.gaussians;
   const ProjectionCamera<float>& camera = args.camera;
   if (camera.response != Response::ewa || camera.compat != Compat::none) {
-    ProjectChunk<float>{args}(c);  // not worth lanes of its own
+    project_chunk_alone(args, c);
     return;
   }
   const std::size_t begin = gs.chunk_id(c) * kProjectChunk;

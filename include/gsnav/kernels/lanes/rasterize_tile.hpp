@@ -89,7 +89,7 @@ class TileBlender {
       load_batch(first, static_cast<int>(end - first < kBatch ? end - first : std::uint64_t{kBatch}));
       for_each_block([this](int block, int x, int y) {
         if (lists_.counts[block] == 0) return;
-        if (D == DepthMode::median && any(states_[block].transmittance > F(0.5f))) {
+        if (D == DepthMode::median && any(states_[block].transmittance > F(kMedianLevel<float>))) {
           blend_list<true>(block, x, y);
         } else {
           blend_list<false>(block, x, y);
@@ -229,7 +229,7 @@ class TileBlender {
           alpha = alpha_before_mesh(alpha, args_.depths[ids_[j]], mesh_[block], px, py);
         }
       }
-      if constexpr (Near) last = select(state.transmittance > F(0.5f), F(rows[j].number), last);
+      if constexpr (Near) last = last_above_half(state.transmittance, F(rows[j].number), last);
       blend_alpha<Color, kLoop, General>(state, rules, alpha, &rows[j].color,
                                          kLoop == DepthMode::none ? nullptr : &args_.depths[ids_[j]], px, py);
     };
@@ -267,7 +267,7 @@ class TileBlender {
     states_[block] = state;
     if constexpr (Near) {
       // The others are closed by now, or their median is still to come.
-      auto crossed = (before > F(0.5f)) && (abs(state.transmittance) <= F(0.5f));
+      const auto crossed = falls_through(before, abs(state.transmittance), kMedianLevel<float>);
       F& median = medians_[block];
       for (std::uint32_t lanes = lane_bits(crossed); lanes != 0;) {
         const float number = last[__builtin_ctz(lanes)];
@@ -295,10 +295,13 @@ class TileBlender {
         for (int c = 0; c < 3; ++c) color[c] = lanes_of(args_.mesh.color, 3, c, x, y);
       }
       if constexpr (D == DepthMode::median) {
-        const auto shown = has_mesh(mesh_[block]) && (abs(states_[block].transmittance) > F(0.5f));
-        medians_[block] = select(shown, mesh_[block], medians_[block]);
+        BlendState<F, D> whole{states_[block], {medians_[block]}};
+        close_by_mesh<Color>(whole, args_.rules, mesh_[block], color);
+        static_cast<BlendColor<F>&>(states_[block]) = whole;
+        medians_[block] = whole.median;
+      } else {
+        close_by_mesh<Color>(states_[block], args_.rules, mesh_[block], color);
       }
-      close_by_mesh<Color>(states_[block], args_.rules, mesh_[block], color);
     });
   }
 

@@ -53,13 +53,13 @@ GSNAV_HD void find_references(const ProjectArgs<float>& args, const ProjectedPac
 }
 
 /// Those of `lanes` whose bounds reach an open cell.
-GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, F x0, F y0, F x1, F y1, std::uint32_t lanes) noexcept {
+GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, const PixelBox<F>& box, std::uint32_t lanes) noexcept {
   const F inverse(1.0f / OpenCells::kSize), one(1.0f);
   float bounds[4][kWidth];
-  truncated(x0 * inverse).store(bounds[0]);
-  truncated(y0 * inverse).store(bounds[1]);
-  (truncated((x1 - one) * inverse) + one).store(bounds[2]);
-  (truncated((y1 - one) * inverse) + one).store(bounds[3]);
+  truncated(box.x0 * inverse).store(bounds[0]);
+  truncated(box.y0 * inverse).store(bounds[1]);
+  (truncated((box.x1 - one) * inverse) + one).store(bounds[2]);
+  (truncated((box.y1 - one) * inverse) + one).store(bounds[3]);
   std::uint32_t found = 0;
   for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
     const int l = std::countr_zero(left);
@@ -76,13 +76,13 @@ struct SpanWords {
 static_assert(sizeof(TileSpans) == 4 * sizeof(std::int32_t) && TileSpans::kRows == 5);
 
 /// The tiles of kWidth splats, lane by lane those that for_each_tile finds; `lanes`: which are wanted.
-GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, float log2_alpha_min, F x0, F y0, F x1,
-                              F y1, std::uint32_t lanes) noexcept {
-  const F zero(0.0f), half(0.5f), one(1.0f), size(static_cast<float>(grid.tile_size));
+GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, float log2_alpha_min,
+                              const PixelBox<F>& box, std::uint32_t lanes) noexcept {
+  const F zero(0.0f), one(1.0f), size(static_cast<float>(grid.tile_size));
   const F inverse(1.0f / static_cast<float>(grid.tile_size));  // a power of two: exact
   const auto tile_of = [inverse](F pixel) noexcept { return truncated(pixel * inverse); };
   const auto whole = [](F x) noexcept { return __builtin_convertvector(x.v, F::ints); };
-  const F tx0 = tile_of(x0), tx1 = tile_of(x1 - one), ty0 = tile_of(y0), ty1 = tile_of(y1 - one);
+  const F tx0 = tile_of(box.x0), tx1 = tile_of(box.x1 - one), ty0 = tile_of(box.y0), ty1 = tile_of(box.y1 - one);
   const F rows = (ty1 - ty0) + one;
   const auto large = (rows > F(static_cast<float>(TileSpans::kRows))) ||
                      (tx1 - tx0 >= F(static_cast<float>(TileSpans::kColumns)));
@@ -94,20 +94,15 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
   out.word[1] = whole(select(large, F(static_cast<float>(TileSpans::kLarge)), rows));
   F begin = zero, end = one;  // of a single tile
   if (wanted != 0) {
-    const FootprintStrips<F> footprint(g, log2_alpha_min, x0 + half, x1 - half, y0 + half, y1 - half);
+    const FootprintStrips<F> footprint(g, log2_alpha_min, box);
     F top = ty0 * size;
     for (int r = 0; r < TileSpans::kRows; ++r) {
       if ((lane_bits(F(static_cast<float>(r)) < rows) & wanted) == 0) break;
       const F next = top + size;
-      F left, right;
-      const auto covered = footprint.columns(max(top, y0) + half, (min(next, y1) - one) + half, left, right);
-      // The padding of left and right is more than what rounding to a pixel may lose.
-      const F first = tile_of(clamp(left + half, x0, x1)), edge = truncated(clamp(right + half, x0, x1)) - one;
-      const F last = tile_of(edge);
-      // Between two columns of centres a strip may have none: edge < x0, or first behind last.
-      const auto none = !(covered && (edge >= x0) && (first <= last) && (F(static_cast<float>(r)) < rows));
-      begin = select(none, zero, first - tx0);
-      end = select(none, zero, (last - tx0) + one);
+      const PixelColumns<F> columns = footprint.pixels(box, top, next);
+      const auto has_any = columns.any && (F(static_cast<float>(r)) < rows);
+      begin = select(has_any, tile_of(columns.first) - tx0, zero);
+      end = select(has_any, (tile_of(columns.end - one) - tx0) + one, zero);
       if (r == 0) {
         begin = select(single, zero, begin);
         end = select(single, one, end);
@@ -133,25 +128,28 @@ GSNAV_HD void copy_record(T& record, const float* from) noexcept {
 
 GSNAV_HD F as_floats(F::ints x) noexcept { return F(gsnav::detail::floats<kWidth>(x)); }
 
+/// One row by itself, with all that needs double.
+GSNAV_STAGE bool project_alone(const ProjectArgs<float>& args, std::size_t slot, std::size_t row) noexcept {
+  return project_gaussian(args, slot, row);
+}
+
 }  // namespace detail
 
 /// Writes the survivors `bits` of a pack, in row order, behind the `count` that their chunk has from slot
 /// `base` on: the bits of write_splat, but for colours, which `survivors` are left to. Returns how many had a
 /// pixel centre in their bounds. Contract only: Response::ewa, Compat::none.
-GSNAV_HD std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t base, std::size_t count,
-                                    const ProjectedPack& pack, std::uint32_t bits,
-                                    Survivors& survivors) noexcept {
+GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t base, std::size_t count,
+                                       const ProjectedPack& pack, std::uint32_t bits,
+                                       Survivors& survivors) noexcept {
   const std::size_t slot = base + count;
   const GaussianView& gs = args.gaussians;
   const ProjectionCamera<float>& camera = args.camera;
   const Projected<F>& p = pack.splat;
-  F x0, y0, x1, y1;
-  gsnav::detail::pixel_range(p.center_x, p.half_width, camera.width, x0, x1);
-  gsnav::detail::pixel_range(p.center_y, p.half_height, camera.height, y0, y1);
+  const PixelBox<F> box = gsnav::detail::pixel_box(camera, p);
   // Those whose geometry float cannot hold are few: each goes its own way.
   const std::uint32_t alone = lane_bits(gsnav::detail::needs_double(camera, p)) & bits;
-  bits &= lane_bits((x0 < x1) && (y0 < y1)) | alone;
-  if (!args.open.empty()) bits &= detail::reaching_open(args.open, x0, y0, x1, y1, bits) | alone;
+  bits &= lane_bits(box.any_pixel()) | alone;
+  if (!args.open.empty()) bits &= detail::reaching_open(args.open, box, bits) | alone;
   if (bits == 0) return 0;
   if (args.color) prefetch_colors(gs, gs.degree_of(pack.first, args.sh_degree), pack.first);
 
@@ -171,10 +169,15 @@ GSNAV_HD std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t 
     const auto whole = [](F x) noexcept { return detail::as_floats(__builtin_convertvector(x.v, F::ints)); };
     detail::SpanWords spans;
     if (!args.spans.empty()) {
-      spans = detail::find_tiles(args.grid, g, camera.log2_alpha_min, x0, y0, x1, y1, bits & ~alone);
+      spans = detail::find_tiles(args.grid, g, camera.log2_alpha_min, box, bits & ~alone);
     }
-    const F columns[8] = {whole(x0), whole(y0), whole(x1), whole(y1), detail::as_floats(spans.word[0]),
-                          detail::as_floats(spans.word[1]), detail::as_floats(spans.word[2]),
+    const F columns[8] = {whole(box.x0),
+                          whole(box.y0),
+                          whole(box.x1),
+                          whole(box.y1),
+                          detail::as_floats(spans.word[0]),
+                          detail::as_floats(spans.word[1]),
+                          detail::as_floats(spans.word[2]),
                           detail::as_floats(spans.word[3])};
     store_columns<8>(columns, bounds);
   }
@@ -200,7 +203,7 @@ GSNAV_HD std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t 
   for (std::uint32_t left = bits; left != 0; left &= left - 1) {
     const std::size_t l = static_cast<std::size_t>(std::countr_zero(left)), at = slot + written;
     if ((alone >> l & 1u) != 0) {
-      if (!project_gaussian(args, at, rows[l])) continue;
+      if (!detail::project_alone(args, at, rows[l])) continue;
     } else {
       detail::copy_record<8>(args.geometry[at], geometry + 8 * l);
       detail::copy_record<4>(args.bounds[at], bounds + 8 * l);

@@ -68,11 +68,6 @@ static __global__ void __launch_bounds__(kProjectThreads) project_kernel(const P
   if (threadIdx.x == 0) args.counts[args.first_chunk + chunk] = written;
 }
 
-/// Hides nothing: the cull of a frame without a mesh.
-struct NoCull {
-  __device__ bool hides(std::size_t, std::uint32_t) const { return false; }
-};
-
 /// Tile intersections of each visible splat, and of each tile.
 template <class Cull>
 struct CountSplatTiles {

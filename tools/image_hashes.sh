@@ -1,0 +1,56 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# Hashes of the images that the tests `images` and `hard_cases` draw: on the serial backend, by OpenMP with each
+# instruction set of this machine, and by the CUDA kernels emulated on the host.
+#
+#   tools/image_hashes.sh FILE           builds both tests and writes FILE, a line an image
+#   tools/image_hashes.sh FILE BEFORE    the same, then fails where a line differs from those of the file BEFORE
+#
+# Run it before and after a change that must not change a bit. A first run takes about ten minutes on two cores.
+#
+# GSNAV_JOBS=N   compile N files at a time (default: see tools/build_jobs.sh)
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+case ${1:-} in
+  "" | -*)
+    sed -n '4,14s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+    exit $([[ ${1:-} == --help || ${1:-} == -h ]] && echo 0 || echo 2)
+    ;;
+esac
+out=$(realpath -m "$1")
+before=${2:+$(realpath "$2")}
+build=$root/build/image-hashes
+jobs=${GSNAV_JOBS:-$("$root/tools/build_jobs.sh")}
+
+options=()
+command -v ccache > /dev/null && options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG" \
+  -DGSNAV_CUDA=EMULATED -DGSNAV_TESTS=ON -DGSNAV_TOOLS=OFF -DGSNAV_EXAMPLES=OFF -DGSNAV_BENCH=OFF \
+  -DGSNAV_INSTALL=OFF "${options[@]}" > /dev/null
+cmake --build "$build" -j "$jobs" --target test_images test_hard_cases
+
+lines=$(mktemp)
+trap 'rm -f "$lines" "$lines".*' EXIT
+# GSNAV_ISA lowers the choice only: where a processor has no AVX-512, "avx512" is drawn by the widest that it has.
+for isa in baseline avx2 avx512; do
+  part=$lines.$isa
+  for test in images hard_cases; do
+    echo "Drawing: $test, $isa"
+    GSNAV_ISA=$isa GSNAV_IMAGE_HASHES=$part "$build/tests/$test/test_$test" --no-version --minimal
+  done
+  # What is not drawn by lanes is the same for each: it is kept once.
+  grep -F '| openmp' "$part" | sed "s/| openmp/| $isa openmp/" >> "$lines"
+  [[ $isa == baseline ]] && grep -vF '| openmp' "$part" >> "$lines"
+done
+LC_ALL=C sort "$lines" > "$out.new"
+mv "$out.new" "$out"
+echo "$(wc -l < "$out") images: $out"
+if [[ -n $before ]]; then
+  if ! diff <(LC_ALL=C sort "$before") "$out"; then
+    echo "Images differ from those of $before: the lines above, < before, > now" >&2
+    exit 1
+  fi
+  echo "All are the same as in $before"
+fi
