@@ -68,7 +68,7 @@ class Session {
   gsnav::Status draw_map(const Controls& c, const gsnav::CapsuleSet& bodies);
   gsnav::Status publish(Panel panel, std::span<const std::uint8_t> rgb);
   std::string describe(const Controls& c) const;
-  void put_time(double t);
+  gsnav::Status put_time(double t);
 
   gsnav_eval::Stage stage_;
   SessionOptions how_;
