@@ -72,7 +72,7 @@ gsnav::Result<Look> looker(std::shared_ptr<B> backend, const gsnav_eval::Stage& 
   };
   auto eye = std::make_shared<Eye>(Eye{backend, std::move(*made)});
   return Look([eye](const gsnav::World& world) {
-    eye->sim.set_state(world.state());
+    if (Status s = eye->sim.set_state(world.state()); !s) return s;
     return eye->sim.observe().status();
   });
 }

@@ -7,7 +7,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "navmesh_options.hpp"
+#include "../../tools/common/navmesh_options.hpp"
 
 namespace nav_loop {
 

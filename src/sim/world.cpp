@@ -66,7 +66,43 @@ Result<CapsuleSet> World::bodies(double t0, double t1) const {
   return CapsuleSet::create(std::move(capsules), t0, t1);
 }
 
+namespace {
+Status moved_away() { return {Errc::invalid_argument, "this World or Simulator was moved from: use what it became"}; }
+}  // namespace
+
+Status World::set_state(const WorldState& state) {
+  if (moved_from()) return moved_away();
+  const auto bad = [](const std::string& field, const std::string& rule) {
+    return Status(Errc::invalid_argument, "WorldState." + field + ": " + rule);
+  };
+  const AgentPose& a = state.agent;
+  for (const auto& [field, value] : {std::pair<const char*, double>{"time", state.time},
+                                     {"start_time", state.start_time},
+                                     {"agent.yaw", a.yaw},
+                                     {"agent.pitch", a.pitch}}) {
+    if (!is_finite(value)) return bad(field, "must be finite, is " + std::to_string(value));
+  }
+  if (!is_finite(a.position)) return bad("agent.position", "must be finite");
+  if (!is_finite(state.goal.position)) return bad("goal.position", "must be finite");
+  if (std::isnan(state.distance_to_goal)) return bad("distance_to_goal", "must be a number");
+  if (state.steps < 0) return bad("steps", "must be >= 0, is " + std::to_string(state.steps));
+  if (state.running) {
+    if (navmesh_->island_of(state.goal.poly) == kNoIsland) {
+      return bad("goal.poly", std::to_string(state.goal.poly) + " is no polygon of this NavMesh");
+    }
+    if (a.poly != kNoPoly && navmesh_->island_of(a.poly) == kNoIsland) {  // steps find a place without one
+      return bad("agent.poly", std::to_string(a.poly) + " is no polygon of this NavMesh");
+    }
+    if (!navmesh_->snap_point(a.position, {{0.1, 0.5, 0.1}})) {
+      return {Errc::nothing_navigable, "WorldState.agent.position is off the NavMesh; set_agent finds the nearest place"};
+    }
+  }
+  s_ = state;
+  return {};
+}
+
 Status World::reset(const PointNavEpisode& episode) {
+  if (moved_from()) return moved_away();
   s_.running = false;
   s_.done = true;
   const auto fail = [&](const char* what) {
@@ -112,6 +148,7 @@ struct World::Motion {
 };
 
 Status World::ready() const {
+  if (moved_from()) return moved_away();
   if (!s_.running) return {Errc::invalid_argument, "step before reset: no episode is running"};
   if (s_.done) return {Errc::invalid_argument, "step after the end: call reset"};
   return {};
@@ -278,6 +315,7 @@ void World::measure_distance() {
 }
 
 Status World::set_agent(const Vec3d& position, double yaw, double pitch) {
+  if (moved_from()) return moved_away();
   if (!s_.running) return {Errc::invalid_argument, "set_agent before reset: no episode is running"};
   if (!is_finite(position) || !is_finite(yaw) || !is_finite(pitch)) {
     return {Errc::invalid_argument, "set_agent: position, yaw and pitch must be finite"};
@@ -293,6 +331,7 @@ Status World::set_agent(const Vec3d& position, double yaw, double pitch) {
 }
 
 Result<Clearance> World::clearance() const {
+  if (moved_from()) return moved_away();
   const Result<CapsuleSet> now = bodies(s_.time, s_.time);
   if (!now) return now.status();
   return gsnav::clearance(agent_state(), *now, s_.time);

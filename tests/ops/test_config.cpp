@@ -3,6 +3,13 @@
 #include <doctest/doctest.h>
 
 #include <limits>
+#include <new>
+#include <span>
+#include <utility>
+#include <vector>
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
 
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
@@ -24,7 +31,85 @@ bool names(const std::string& message, const char* field) {
   return message.find(field) != std::string::npos;
 }
 
+/// Runs out of memory: by a null pointer, or as operator new does.
+class FullBackend : public SerialBackend {
+ public:
+  explicit FullBackend(bool throws) : throws_(throws) {}
+  void* allocate(std::size_t, std::size_t) {
+    if (throws_) throw std::bad_alloc();
+    return nullptr;
+  }
+
+ private:
+  bool throws_;
+};
+
 }  // namespace
+
+TEST_CASE("a renderer without memory returns an error that says for what") {
+  const GaussianCloud cloud = random_cloud(1, {.count = 10});
+  Camera camera;
+  camera.set_hfov(320, 240, 90);
+  for (const bool throws : {false, true}) {
+    FullBackend full(throws);
+    Renderer<float, FullBackend> renderer(full);
+    const auto r = renderer.render(cloud.set(), camera);
+    CHECK(r.code() == Errc::out_of_memory);
+    for (const char* part : {"320 x 240", "10 Gaussians", "bytes"}) CHECK(names(r.message(), part));
+    Buffer<double, FullBackend> buffer(full);
+    for (const std::size_t n : {std::size_t{1}, ~std::size_t{0}, ~std::size_t{0} / 9 * 8 + 64}) {
+      CHECK_THROWS_AS(buffer.resize_discard(n), Error);
+      CHECK(buffer.size() == 0);
+    }
+  }
+}
+
+TEST_CASE("images that no machine holds are refused before they are allocated") {
+  const GaussianCloud cloud = random_cloud(1, {.count = 10});
+  Camera camera;
+  camera.set_hfov(16384, 16384, 90);
+  const std::vector<Camera> cameras(20000, camera);  // 100 TB
+  SerialBackend serial;
+  Renderer<float, SerialBackend> renderer(serial);
+  const GaussianSet set = cloud.set();
+  const auto r = renderer.render(std::span(&set, 1), cameras);
+  CHECK(r.code() == Errc::out_of_memory);
+  for (const char* part : {"20000 cameras", "16384 x 16384", "5368709120 bytes"}) CHECK(names(r.message(), part));
+}
+
+TEST_CASE("null spans with a size are refused") {
+  const GaussianCloud cloud = random_cloud(1, {.count = 10});
+  const GaussianSet set = cloud.set();
+  const Camera camera;
+  SerialBackend serial;
+  Renderer<float, SerialBackend> renderer(serial);
+  const std::span<const Camera> no_cameras(static_cast<const Camera*>(nullptr), 1);
+  const std::span<const GaussianSet> no_sets(static_cast<const GaussianSet*>(nullptr), 1);
+  CHECK(renderer.render(std::span(&set, 1), no_cameras).code() == Errc::invalid_argument);
+  CHECK(renderer.render(no_sets, std::span(&camera, 1)).code() == Errc::invalid_argument);
+  const FrameJob<float> job{};
+  std::vector<RenderStats> stats(1);
+  CHECK(renderer.render(std::span(&job, 1), stats).code() == Errc::invalid_argument);
+  CHECK(renderer.render(std::span(&job, 1), std::span<RenderStats>()).code() == Errc::invalid_argument);
+}
+
+TEST_CASE("a renderer that was moved from renders on, and denormals flushed to zero change no bit") {
+  const GaussianCloud cloud = random_cloud(1, {.count = 500});
+  SerialBackend serial;
+  Renderer<float, SerialBackend> renderer(serial);
+  const auto before = renderer.render(cloud.set(), Camera{}).value();
+  Renderer<float, SerialBackend> other(std::move(renderer));
+  CHECK(other.render(cloud.set(), Camera{}).value().rgb == before.rgb);
+  CHECK(renderer.render(cloud.set(), Camera{}).value().rgb == before.rgb);
+#if defined(__SSE2__)
+  const unsigned mode = _mm_getcsr();
+  _mm_setcsr(mode | 0x8040u);  // FTZ and DAZ
+  const auto flushed = other.render(cloud.set(), Camera{});
+  _mm_setcsr(mode);
+  CHECK(flushed.value().rgb == before.rgb);
+  CHECK(flushed.value().median_depth == before.median_depth);
+#endif
+}
 
 TEST_CASE("bad render configurations name their field") {
   const GaussianCloud cloud = random_cloud(1, {.count = 10});
@@ -40,6 +125,13 @@ TEST_CASE("bad render configurations name their field") {
   CHECK(names(message([](RenderConfig& c) { c.transmittance_min = 1; }), "transmittance_min"));
   CHECK(names(message([](RenderConfig& c) { c.first_hit_tau = std::nan(""); }), "first_hit_tau"));
   CHECK(names(message([](RenderConfig& c) { c.background.y = std::nan(""); }), "background"));
+  CHECK(names(message([](RenderConfig& c) { c.profile = static_cast<Profile>(99); }), "profile = 99"));
+  CHECK(names(message([](RenderConfig& c) { c.profile = static_cast<Profile>(-1); }), "profile = -1"));
+  CHECK(names(message([](RenderConfig& c) { c.sort_order = static_cast<SortOrder>(99); }), "sort_order = 99"));
+  CHECK(names(message([](RenderConfig& c) { c.response = static_cast<Response>(99); }), "response = 99"));
+  CHECK(names(message([](RenderConfig& c) { c.compat = static_cast<Compat>(99); }), "compat = 99"));
+  CHECK(names(message([](RenderConfig& c) { c.blend_space = static_cast<ColorSpace>(99); }), "blend_space = 99"));
+  CHECK(names(message([](RenderConfig& c) { c.composite = static_cast<Composite>(99); }), "composite = 99"));
   CHECK(message([](RenderConfig&) {}).empty());
 }
 
@@ -55,6 +147,10 @@ TEST_CASE("bad cameras name their field") {
   CHECK(names(message([](Camera& c) { c.fx = -1; }), "fx"));
   CHECK(names(message([](Camera& c) { c.fy = std::numeric_limits<double>::infinity(); }), "fy"));
   CHECK(names(message([](Camera& c) { c.near_plane = 0; }), "near_plane"));
+  CHECK(names(message([](Camera& c) { c.cx = std::nan(""); }), "cx = nan"));
+  CHECK(names(message([](Camera& c) { c.cy = std::numeric_limits<double>::infinity(); }), "cy = inf"));
+  CHECK(names(message([](Camera& c) { c.viewmat.linear.row[0] = -c.viewmat.linear.row[0]; }), "mirror"));
+  CHECK(names(message([](Camera& c) { std::swap(c.viewmat.linear.row[1], c.viewmat.linear.row[2]); }), "mirror"));
   CHECK(names(message([](Camera& c) { c.viewmat.translation.x = std::nan(""); }), "viewmat"));
   CHECK(names(message([](Camera& c) { c.viewmat.linear(0, 0) = 2; }), "viewmat"));
   CHECK(names(message([](Camera& c) { c.viewmat.linear(1, 2) = std::nan(""); }), "viewmat"));
@@ -72,6 +168,11 @@ TEST_CASE("bad sets name their array") {
   CHECK(names(message([](GaussianSet& s) { s.gaussians.sh_degree = 4; }), "sh_degree"));
   CHECK(names(message([](GaussianSet& s) { s.gaussians.sh_degree = 1; }), "shN"));
   CHECK(names(message([](GaussianSet& s) { s.eps2d = 0; }), "eps2d"));
+  CHECK(names(message([](GaussianSet& s) { s.gaussians.means[1].data = nullptr; }), "means is null"));
+  CHECK(names(message([](GaussianSet& s) { s.gaussians.sh0.data = nullptr; }), "sh0 is null"));
+  CHECK(names(message([](GaussianSet& s) { s.gaussians.row_ids = {nullptr, 10}; }), "row_ids is null"));
+  CHECK(names(message([](GaussianSet& s) { s.filter = static_cast<Filter>(99); }), "filter = 99"));
+  CHECK(names(message([](GaussianSet& s) { s.color_space = static_cast<ColorSpace>(99); }), "color_space = 99"));
   CHECK(names(message([](GaussianSet& s) { s.world_from_asset.scale = -1; }), "world_from_asset"));
 }
 

@@ -130,11 +130,56 @@ TEST_CASE("a state is a place to come back to") {
   go_on(w, 1);
   const WorldState here = w.state();
   const auto first = go_on(w, 2);
-  w.set_state(here);
+  REQUIRE(w.set_state(here).ok());
   CHECK(go_on(w, 2) == first);
   World other = flat_world({}, circling_bodies);
-  other.set_state(here);
+  REQUIRE(other.set_state(here).ok());
   CHECK(go_on(other, 2) == first);
+}
+
+TEST_CASE("a state that cannot be is refused, and nothing is changed") {
+  World w = flat_world();
+  REQUIRE(w.reset(in_living_room()).ok());
+  const WorldState good = w.state();
+  const double nan = std::nan("");
+  const auto refused = [&](Errc code, const char* field, const auto& change) {
+    WorldState s = good;
+    change(s);
+    const Status r = w.set_state(s);
+    INFO(r.message());
+    CHECK(r.code() == code);
+    CHECK(r.message().find(field) != std::string::npos);
+    CHECK(w.time() == good.time);
+    CHECK(w.agent().position == good.agent.position);
+  };
+  const Errc bad = Errc::invalid_argument, off = Errc::nothing_navigable;
+  refused(bad, "time", [&](WorldState& s) { s.time = nan; });
+  refused(bad, "start_time", [&](WorldState& s) { s.start_time = nan; });
+  refused(bad, "agent.yaw", [&](WorldState& s) { s.agent.yaw = nan; });
+  refused(bad, "agent.pitch", [&](WorldState& s) { s.agent.pitch = nan; });
+  refused(bad, "agent.position", [&](WorldState& s) { s.agent.position.y = nan; });
+  refused(bad, "goal.position", [&](WorldState& s) { s.goal.position.x = nan; });
+  refused(bad, "distance_to_goal", [&](WorldState& s) { s.distance_to_goal = nan; });
+  refused(bad, "steps", [&](WorldState& s) { s.steps = -1; });
+  refused(bad, "agent.poly", [&](WorldState& s) { s.agent.poly = 1000000; });
+  refused(bad, "goal.poly", [&](WorldState& s) { s.goal.poly = 1000000; });
+  refused(off, "off the NavMesh", [&](WorldState& s) { s.agent.position.x += 100; });
+  refused(off, "off the NavMesh", [&](WorldState& s) { s.agent.position.y += 1; });
+  CHECK(w.set_state(good).ok());
+}
+
+TEST_CASE("a world that was moved from answers with an error") {
+  World w = flat_world();
+  REQUIRE(w.reset(in_living_room()).ok());
+  const WorldState here = w.state();
+  const World other(std::move(w));
+  CHECK(!other.moved_from());
+  CHECK(w.moved_from());
+  for (const Status& s : {w.reset(in_living_room()), w.step(Action::move_forward).status(), w.set_state(here),
+                          w.set_agent({3, 0, 3}, 0), w.clearance().status(), w.probe(Action::turn_left).status()}) {
+    CHECK(s.code() == Errc::invalid_argument);
+    CHECK(s.message().find("moved from") != std::string::npos);
+  }
 }
 
 TEST_CASE("the agent can be put elsewhere on the surface") {

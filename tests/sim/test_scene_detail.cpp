@@ -115,7 +115,7 @@ TEST_CASE(
     for (std::size_t e = 0; e < kEnvironments; ++e) {
       // One simulator, brought from state to state.
       Simulator<OpenMPBackend>& alone = single[batch.scene_of(e)];
-      alone.set_state(batch.world(e).state());
+      REQUIRE(alone.set_state(batch.world(e).state()).ok());
       const auto seen = alone.observe().value();
       for (std::size_t i = 0; i < config.sensors.size(); ++i) {
         REQUIRE(same_bits(out.images[i].of(e), seen.images[i].data));
@@ -221,7 +221,7 @@ TEST_CASE(
   Rng rng(5);
   for (int step = 0; step < 5; ++step) {
     for (std::size_t e = 0; e < 2; ++e) {
-      alone.set_state(batch.world(e).state());
+      REQUIRE(alone.set_state(batch.world(e).state()).ok());
       const auto seen = alone.observe().value();
       for (std::size_t i = 0; i < config.sensors.size(); ++i)
         REQUIRE(same_bits(out.images[i].of(e), seen.images[i].data));

@@ -213,3 +213,19 @@ TEST_CASE("bytes round and clamp") {
   CHECK(out[4] == 255);
   CHECK(out[5] == 0);
 }
+
+TEST_CASE("a simulator that was moved from answers with an error") {
+  SerialBackend backend;
+  SimulatorConfig config;
+  config.sensors = rgbd_sensors(8, 8);
+  auto sim = make_simulator(backend, flat_scene(), config).value();
+  REQUIRE(sim.reset(to_kitchen()).ok());
+  const WorldState here = sim.state();
+  auto other = std::move(sim);
+  CHECK(other.observe().ok());
+  for (const Status& s : {sim.reset(to_kitchen()).status(), sim.step(Action::turn_left).status(), sim.observe().status(),
+                          sim.set_state(here), sim.render(Camera{}).status(), sim.goal_images().status()}) {
+    CHECK(s.code() == Errc::invalid_argument);
+    CHECK(s.message().find("moved from") != std::string::npos);
+  }
+}

@@ -114,7 +114,7 @@ std::vector<std::uint16_t> truth(const Json& state) {
   at.agent.position = {state["position"][0].get<double>(), state["position"][1].get<double>(), state["position"][2].get<double>()};
   at.agent.yaw = state["yaw"].get<double>();
   at.agent.pitch = state["pitch"].get<double>();
-  sim.set_state(at);
+  REQUIRE(sim.set_state(at).ok());
   const auto rgb = sim.observe().value()["rgb"];
   std::vector<std::uint8_t> bytes(rgb.size());
   gsnav::to_bytes(rgb, bytes);

@@ -13,7 +13,7 @@
 #include <sstream>
 #include <system_error>
 
-#include "../../examples/nav_loop/navmesh_options.hpp"
+#include "../common/navmesh_options.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/io/navmesh_settings_file.hpp"
 

@@ -110,11 +110,11 @@ Status Session::begin_episode(std::size_t number) {
   return {};
 }
 
-void Session::put_time(double t) {
+Status Session::put_time(double t) {
   gsnav::WorldState s = world_.state();
   s.time = t;
   s.start_time = t - s.steps * world_.config().control_period;
-  world_.set_state(s);
+  return world_.set_state(s);
 }
 
 Status Session::run() {
@@ -175,13 +175,15 @@ Status Session::advance(const Controls& c, int actions) {
   if (c.next) {
     const double now = world_.time();
     if (Status s = begin_episode((episode_ + 1) % stage_.episodes.size()); !s) return s;
-    put_time(now);  // people walk on
+    if (Status put = put_time(now); !put) return put;  // people walk on
   }
-  if (c.time) put_time(*c.time);
+  if (c.time) {
+    if (Status put = put_time(*c.time); !put) return put;
+  }
   gsnav::WorldState s = world_.state();
   s.agent.yaw = std::remainder(s.agent.yaw + c.turn, 2 * 3.14159265358979323846);
   s.agent.pitch = std::clamp(s.agent.pitch + c.tilt, -kTurnedUp, kTurnedUp);
-  world_.set_state(s);
+  if (Status put = world_.set_state(s); !put) return put;
   if (world_.done()) return {};
   gsnav::VelocityCommand command;
   if (c.stop) {
@@ -195,7 +197,9 @@ Status Session::advance(const Controls& c, int actions) {
   for (int i = 0; i < actions; ++i) {
     const double t = world_.time();
     if (const auto r = world_.step(command); !r) return r.status();
-    if (c.paused) put_time(t);
+    if (c.paused) {
+      if (Status put = put_time(t); !put) return put;
+    }
     if (moving) way_.push_back(world_.agent().position);
   }
   return {};

@@ -57,7 +57,7 @@ class Session {
   gsnav::Status draw_frames();
   gsnav::Status publish(Panel panel, std::span<const std::uint8_t> rgb);
   std::string describe(const Controls& c, std::uint64_t number) const;
-  void put_time(double t);
+  gsnav::Status put_time(double t);
 
   gsnav_eval::Stage stage_;
   SessionOptions how_;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <new>
 #include <type_traits>
 #include <utility>
 
@@ -34,7 +35,7 @@ class Buffer {
   /// Makes room for n elements and drops the old content if it has to grow. Throws gsnav::Error
   /// (out_of_memory, naming the bytes) when the backend has no room.
   void resize_discard(std::size_t n) {
-    if (n > capacity_) grow(n, n + n / 8);
+    if (n > capacity_) grow(n, n + (n < kMost - n / 8 ? n / 8 : 0));
     size_ = n;
   }
 
@@ -73,15 +74,28 @@ class Buffer {
   }
 
  private:
-  static constexpr std::size_t kAlign = 64;
+  static constexpr std::size_t kAlign = 64, kMost = std::numeric_limits<std::size_t>::max();
   void grow(std::size_t needed, std::size_t room) {
     release();
-    if (room > std::numeric_limits<std::size_t>::max() / sizeof(T) ||
-        (data_ = static_cast<T*>(backend_->allocate(room * sizeof(T), kAlign))) == nullptr) {
+    // Less than all addresses, so that backends may round up.
+    if (room <= kMost / 2 / sizeof(T)) data_ = static_cast<T*>(allocate(room * sizeof(T)));
+    if (data_ == nullptr) {
       detail::fail(Errc::out_of_memory,
                    "cannot allocate " + std::to_string(needed) + " x " + std::to_string(sizeof(T)) + " bytes");
     }
     capacity_ = room;
+  }
+  /// Null where the backend has no room, or throws std::bad_alloc.
+  void* allocate(std::size_t bytes) {
+#if defined(__cpp_exceptions)
+    try {
+      return backend_->allocate(bytes, kAlign);
+    } catch (const std::bad_alloc&) {
+      return nullptr;
+    }
+#else
+    return backend_->allocate(bytes, kAlign);
+#endif
   }
   void release() noexcept {
     if (data_ != nullptr) backend_->deallocate(data_, capacity_ * sizeof(T));

@@ -21,11 +21,12 @@ namespace gsnav {
 namespace detail {
 
 /// Error of an output path: "PATH: cannot be written: WHY".
-inline Status unwritable(const std::filesystem::path& path, const std::string& why) {
-  return {Errc::file_not_found, path.string() + ": cannot be written: " + why};
+inline Status unwritable(const std::filesystem::path& path, const std::string& why,
+                         Errc code = Errc::file_not_found) {
+  return {code, path.string() + ": cannot be written: " + why};
 }
-inline Status unwritable(const std::filesystem::path& path, int error) {
-  return unwritable(path, std::generic_category().message(error));
+inline Status unwritable(const std::filesystem::path& path, int error, Errc code = Errc::file_not_found) {
+  return unwritable(path, std::generic_category().message(error), code);
 }
 
 /// Follows the symbolic links of a path, also where the last one leads to nothing yet.
@@ -142,7 +143,7 @@ class OutputFile {
   bool failed() const noexcept { return error_ != 0; }
 
   /// Forces the bytes to the disk and gives the file its name; the object can then be opened again.
-  /// @return file_not_found with the system's reason. Then what had the name before is unchanged.
+  /// @return write_failed with the system's reason. Then what had the name before is unchanged.
   Status commit() {
     if (file_ == nullptr) return {Errc::invalid_argument, "OutputFile: no file is open"};
     if (error_ == 0 && std::fflush(file_) != 0) error_ = errno;
@@ -156,7 +157,7 @@ class OutputFile {
       return {};
     }
     remove_aside();
-    return detail::unwritable(path_, error_);
+    return detail::unwritable(path_, error_, Errc::write_failed);
   }
 
   /// Gives up: nothing is left of what was written. Does nothing where no file is open.
@@ -225,7 +226,7 @@ class OutputFile {
 
 /// Writes a file by `write(OutputFile&)`, which may return a Status. Readers see the file of before or
 /// the whole new one; a failure, an exception too, changes nothing (`OutputFile` says how).
-/// @return the Status of `write`, or file_not_found where the file cannot be written.
+/// @return the Status of `write`; file_not_found where the file cannot be begun, write_failed where it cannot be finished.
 template <class F>
   requires std::is_invocable_v<const F&, OutputFile&>
 Status replace_file(const std::filesystem::path& path, const F& write) {

@@ -18,11 +18,12 @@ enum class Errc {
   ok = 0,
   invalid_argument,   ///< a value the caller gave is impossible
   invalid_file,       ///< a file's content is malformed, truncated or hostile
-  file_not_found,     ///< a path does not exist or cannot be opened
+  file_not_found,     ///< a path does not exist or cannot be opened, for reading or for writing
   unsupported,        ///< legal, but not handled
   out_of_memory,      ///< an allocation failed
   nothing_navigable,  ///< a NavMesh build found no walkable surface
   backend_failure,    ///< a device or driver reported an error
+  write_failed,       ///< a file was begun and could not be finished: a full disk, a quota, a failing device
 };
 
 /// The exception behind `.value()` and `.throw_if_error()`.

@@ -23,7 +23,7 @@ Result<std::vector<Camera>> load_cameras(const std::filesystem::path& path, int 
                                          int height = 0);
 
 /// Writes the same layout. Off-centre principal points have no place in it: unsupported, naming the
-/// camera. Near planes are not written. Errors otherwise: file_not_found (parent folder, writing).
+/// camera. Near planes are not written. Errors otherwise: file_not_found (parent folder), write_failed.
 Status save_cameras(const std::filesystem::path& path, std::span<const Camera> cameras);
 
 }  // namespace gsnav::io

@@ -26,7 +26,7 @@ struct EpisodeFile {
 Result<EpisodeFile> load_episodes(const std::filesystem::path& path);
 
 /// Writes episodes so that Habitat-Lab reads them; gzip where the name ends in `.gz`. The same episodes give the same
-/// bytes, and read back the same numbers. Errors: file_not_found (parent folder, writing); invalid_argument naming
+/// bytes, and read back the same numbers. Errors: file_not_found (parent folder), write_failed; invalid_argument naming
 /// episode and field (a number that is not finite).
 Status save_episodes(const std::filesystem::path& path, std::span<const PointNavEpisode> episodes);
 

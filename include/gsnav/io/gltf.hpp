@@ -48,7 +48,7 @@ struct SaveGlbOptions {
 /// nothing is quantised. The extension knows one sort order, camera distance, and no filter: the cloud's
 /// own are lost. Positions of a cloud with other origins than zero are relative to the first one that is
 /// used, which becomes the node's translation.
-/// Errors: file_not_found (the parent folder is missing, or the file cannot be written);
+/// Errors: file_not_found (the parent folder is missing), write_failed;
 /// invalid_argument (arrays of different lengths, an empty cloud); unsupported (2 GiB or more);
 /// out_of_memory. Never throws.
 Status save_glb(const std::filesystem::path& path, const GaussianCloud& cloud,

@@ -52,7 +52,7 @@ struct NpzEntry {
 
 /// Writes the arrays as `.npz`, deflated or stored. The same input gives the same bytes.
 /// Errors: invalid_argument (shape and values disagree, an empty name or one twice); unsupported (4 GiB
-/// or more); file_not_found (parent folder, writing).
+/// or more); file_not_found (parent folder), write_failed.
 Status save_npz(const std::filesystem::path& path, std::span<const NpzEntry> entries, bool deflated = true);
 
 }  // namespace gsnav::io

@@ -33,7 +33,7 @@ Result<LoadedCloud> load_sog(const std::filesystem::path& path);
 /// written as -20) and degree-0 coefficients within 1/255 of their range, exact where there are at most
 /// 256 different values. Higher SH bands share a palette of N/2 entries, at least 1024 and at most
 /// 65536; up to that many different ones are kept but for the codebook's 1/255 of the range. Errors:
-/// file_not_found (the folder is missing, or a file cannot be written); invalid_argument (arrays of
+/// file_not_found (the folder is missing), write_failed; invalid_argument (arrays of
 /// different lengths, another name); unsupported (more than 268 million Gaussians, a bundle of 4 GiB);
 /// out_of_memory. Never throws.
 Status save_sog(const std::filesystem::path& path, const GaussianCloud& cloud);

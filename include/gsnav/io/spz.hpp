@@ -52,7 +52,7 @@ struct SaveSpzOptions {
 /// is in [-10, 5.9]), an opacity within 1/510, a degree-0 SH coefficient within 1/76 (where it is
 /// within 3.3 of zero), another one within 2^-bits (where its magnitude is at most 1 - 2^(1 - bits)),
 /// the quaternion's smaller components within 0.0007. What lies outside of these ranges becomes their
-/// nearer end. Errors: file_not_found (the parent folder is missing, or the file cannot be written);
+/// nearer end. Errors: file_not_found (the parent folder is missing), write_failed;
 /// invalid_argument (arrays of different lengths, options out of range, a mean beyond 8388 km);
 /// out_of_memory. Never throws.
 Status save_spz(const std::filesystem::path& path, const GaussianCloud& cloud,

@@ -130,7 +130,8 @@ struct SurfaceWalk {
 };
 
 /// Where agents can walk: a Recast NavMesh with queries. Built once, then constant: every query is
-/// const, changes no flags and may run from any number of threads at the same time.
+/// const, changes no flags and may run from any number of threads at the same time. One that was moved from may only
+/// be assigned to or destroyed.
 class NavMesh {
  public:
   using Triangle = std::array<std::uint32_t, 3>;

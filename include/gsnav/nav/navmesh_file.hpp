@@ -26,11 +26,11 @@ Result<NavMesh> parse_navmesh(std::span<const std::byte> bytes, const std::strin
 
 /// Writes MSET with 32-bit references, which Habitat reads, in world coordinates (float32). Version 2 has the settings;
 /// version 1, which RecastDemo and Habitat's first releases read, has none of them but the agent's size in each tile.
-/// Errors: invalid_argument for another version; file_not_found where the file cannot be made or written.
+/// Errors: invalid_argument for another version; file_not_found where the file cannot be made; write_failed.
 Status save_navmesh(const NavMesh& mesh, const std::filesystem::path& path, int version = 2);
 
 /// Writes the surface as a Wavefront OBJ for viewers: world coordinates, one group an island ("g island_0").
-/// Errors: file_not_found where the file cannot be made or written.
+/// Errors: file_not_found where the file cannot be made; write_failed.
 Status save_navmesh_obj(const NavMesh& mesh, const std::filesystem::path& path);
 
 }  // namespace gsnav

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <concepts>
 #include <cstddef>
-#include <exception>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
+#include "gsnav/core/guarded.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/ops/render_composite.hpp"
 
@@ -56,7 +56,7 @@ class FrameLanes {
     Status result;
     backend.parallel_for(count, [&](std::size_t c) {
       Lane& lane = take();
-      Status s = guarded([&] {
+      Status s = detail::guarded([&] {
         const FrameJob<S> job = job_of(c);
         return render_composite<S, B>(lane.backend, lane.workspace, job.sets, job.meshes, *job.camera, *job.config,
                                       job.images, &stats[c]);
@@ -70,7 +70,7 @@ class FrameLanes {
       }
     });
     if (!result) return result;
-    return guarded([&] { return even_out(); });
+    return detail::guarded([&] { return even_out(); });
   }
 
   std::size_t bytes() const noexcept {
@@ -102,22 +102,6 @@ class FrameLanes {
     for (const auto& lane : lanes_) most.grow_to(lane->workspace);
     for (const auto& lane : lanes_) lane->workspace.grow_to(most);
     return {};
-  }
-
-  /// No exception may leave a parallel region.
-  template <class Run>
-  static Status guarded(const Run& run) noexcept {
-#if defined(__cpp_exceptions)
-    try {
-      return run();
-    } catch (const Error& e) {
-      return {e.code(), e.what()};
-    } catch (const std::exception& e) {
-      return {Errc::out_of_memory, e.what()};
-    }
-#else
-    return run();
-#endif
   }
 
   std::vector<std::unique_ptr<Lane>> lanes_;

@@ -67,6 +67,15 @@ inline Status validate(const RenderConfig& c) {
   if (c.outputs == 0 || (c.outputs & ~(kRgb | kAlpha | kAnyDepth)) != 0) {
     return bad("outputs", std::to_string(c.outputs), "name at least one known output");
   }
+  const auto unknown = [&](const char* field, auto value) {
+    return bad(field, std::to_string(static_cast<int>(value)), "there is none of this number");
+  };
+  if (c.profile != Profile::exact && c.profile != Profile::fast) return unknown("profile", c.profile);
+  if (c.sort_order > SortOrder::camera_distance) return unknown("sort_order", c.sort_order);
+  if (c.response > Response::ray) return unknown("response", c.response);
+  if (c.compat > Compat::habitat_gs) return unknown("compat", c.compat);
+  if (c.blend_space > ColorSpace::linear) return unknown("blend_space", c.blend_space);
+  if (c.composite > Composite::hard_depth) return unknown("composite", c.composite);
   if (c.tile_size != 0 && c.tile_size != 8 && c.tile_size != 16 && c.tile_size != 32) {
     return bad("tile_size", std::to_string(c.tile_size), "must be 8, 16 or 32, or 0 for what is fast");
   }
@@ -153,7 +162,8 @@ inline Status validate(const Camera& c) {
   }
   if (!(c.fx > 0 && is_finite(c.fx))) return bad("fx", std::to_string(c.fx), "must be positive");
   if (!(c.fy > 0 && is_finite(c.fy))) return bad("fy", std::to_string(c.fy), "must be positive");
-  if (!is_finite(c.cx) || !is_finite(c.cy)) return bad("cx, cy", "not finite", "must be finite");
+  if (!is_finite(c.cx)) return bad("cx", std::to_string(c.cx), "must be finite");
+  if (!is_finite(c.cy)) return bad("cy", std::to_string(c.cy), "must be finite");
   if (!(c.near_plane > 0 && is_finite(c.near_plane))) {
     return bad("near_plane", std::to_string(c.near_plane), "must be positive");
   }
@@ -170,6 +180,11 @@ inline Status validate(const Camera& c) {
         return bad("viewmat", "a linear part that is no rotation", "must be rigid (within 1e-3)");
       }
     }
+  }
+  const auto& m = c.viewmat.linear;
+  if (dot(m.row[0], cross(m.row[1], m.row[2])) < 0) {
+    return bad("viewmat", "a linear part with determinant -1",
+               "must not mirror (from OpenGL's axes negate both y and z)");
   }
   return {};
 }

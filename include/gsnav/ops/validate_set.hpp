@@ -38,10 +38,27 @@ inline Status validate(const GaussianSet& set) {
     return Status(Errc::invalid_argument, "GaussianSet: " + what);
   };
   const auto sized = [&](const View<const float>& v, std::size_t n, const char* name) {
+    if (v.data == nullptr && v.size != 0) return bad(std::string(name) + " is null, with a size of " + std::to_string(v.size));
     return v.size == n ? Status()
                        : bad(std::string(name) + " has " + std::to_string(v.size) +
                              " values where " + std::to_string(n) + " are needed");
   };
+  if (set.filter > Filter::mip) return bad("filter = " + std::to_string(static_cast<int>(set.filter)) + ": there is none of this number");
+  if (set.color_space > ColorSpace::linear) {
+    return bad("color_space = " + std::to_string(static_cast<int>(set.color_space)) + ": there is none of this number");
+  }
+  const auto null = [](const auto& v) { return v.data == nullptr && v.size != 0; };
+  const char* nothing = null(g.shN_half)           ? "shN_half"
+                        : null(g.row_ids)          ? "row_ids"
+                        : null(g.origin_ids)       ? "origin_ids"
+                        : null(g.origins)          ? "origins"
+                        : null(g.chunk_bounds)     ? "chunk_bounds"
+                        : null(g.part_bounds)      ? "part_bounds"
+                        : null(g.chunk_sh_degrees) ? "chunk_sh_degrees"
+                        : null(g.drawn_chunks)     ? "drawn_chunks"
+                        : null(g.seen)             ? "seen"
+                                                   : nullptr;
+  if (nothing != nullptr) return bad(std::string(nothing) + " is null, with a size");
   if (g.sh_degree < 0 || g.sh_degree > kMaxShDegree) {
     return bad("sh_degree = " + std::to_string(g.sh_degree) + ": must be in [0, 3]");
   }

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/core/guarded.hpp"
 #include "gsnav/ops/frame_lanes.hpp"
 #include "gsnav/ops/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
@@ -121,7 +126,9 @@ class GaussianArrays {
 
 /// Renders Gaussians on a backend. Keeps its scratch between calls: a steady frame allocates nothing
 /// but what its caller's vectors need. `S` is the scalar of all arithmetic; sort keys are float32 for
-/// every S. The backend must outlive it.
+/// every S. The backend must outlive it. One that was moved from has its settings, no meshes and no scratch, and may
+/// render on. Floating point must round to nearest (fegetround() == FE_TONEAREST, as a program starts): in other modes
+/// images have other bits. Flushing denormals to zero changes none.
 ///
 ///     gsnav::SerialBackend backend;
 ///     gsnav::Renderer<float, gsnav::SerialBackend> renderer(backend);
@@ -146,8 +153,9 @@ class Renderer {
   /// Renders all sets, as one sorted list, from each camera; all cameras have one size. `sets` hold
   /// arrays in the backend's memory. Errors: invalid_argument (names the field; no camera; cameras of several sizes);
   /// unsupported (2^32 Gaussians or triangles in a frame; meshes on a backend that knows none, or with MeshAlpha::blend
-  /// under Composite::hard_depth); backend_failure. Throws gsnav::Error (out_of_memory) where scratch cannot be
-  /// allocated; where threads render whole frames of a batch, that is returned.
+  /// under Composite::hard_depth); backend_failure; out_of_memory, with the frames, their size and their Gaussians, where
+  /// images or scratch cannot be allocated, and before trying where images are larger than the machine's memory.
+  /// Throws nothing.
   Result<Frames<S>> render(std::span<const GaussianSet> sets, std::span<const Camera> cameras) {
     Frames<S> frames;
     if (Status s = render(sets, cameras, frames); !s) return s;
@@ -160,6 +168,7 @@ class Renderer {
   /// The same into images that are used again.
   Status render(std::span<const GaussianSet> sets, std::span<const Camera> cameras, Frames<S>& out) {
     if (cameras.empty()) return {Errc::invalid_argument, "no camera to render from"};
+    if (cameras.data() == nullptr) return {Errc::invalid_argument, "cameras: a null pointer with a size"};
     for (const Camera& c : cameras) {
       if (Status s = validate(c); !s) return s;
       if (c.width != cameras[0].width || c.height != cameras[0].height) {
@@ -170,16 +179,7 @@ class Renderer {
     out.width = static_cast<std::size_t>(cameras[0].width);
     out.height = static_cast<std::size_t>(cameras[0].height);
     const std::size_t pixels = out.width * out.height;
-    const auto size_image = [&](std::vector<S>& image, unsigned output, std::size_t channels) {
-      image.resize((config_.outputs & output) != 0 ? cameras.size() * pixels * channels : 0);
-    };
-    size_image(out.rgb, kRgb, 3);
-    size_image(out.alpha, kAlpha, 1);
-    size_image(out.median_depth, kMedianDepth, 1);
-    size_image(out.expected_depth, kExpectedDepth, 1);
-    size_image(out.accumulated_depth, kAccumulatedDepth, 1);
-    size_image(out.first_hit_depth, kFirstHitDepth, 1);
-    out.stats.assign(cameras.size(), {});
+    if (Status s = size_images(out, cameras.size(), pixels); !s) return s;
 
     const auto job_of = [&](std::size_t c) {
       return FrameJob<S>{sets, &cameras[c], &config_, host_images(out, c), mesh_frame()};
@@ -191,13 +191,29 @@ class Renderer {
   /// size, that its caller has (a null pointer: not made). The same bits as one at a time. `stats` [jobs].
   /// Errors: as of render above, of the first job that fails.
   Status render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats) {
+    if (stats.size() < jobs.size()) {
+      return {Errc::invalid_argument, "stats has room for " + std::to_string(stats.size()) + " of " +
+                                          std::to_string(jobs.size()) + " frames"};
+    }
+    if ((jobs.data() == nullptr || stats.data() == nullptr) && !jobs.empty()) {
+      return {Errc::invalid_argument, "jobs or stats: a null pointer with a size"};
+    }
+    for (const FrameJob<S>& job : jobs) {
+      if (job.camera == nullptr || job.config == nullptr) {
+        return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
+      }
+      if (Status s = validate(*job.camera); !s) return s;  // scratch is sized by it
+    }
     return render_jobs(jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
   }
 
   /// One frame into images in the backend's memory, which are there once the backend has been synchronised.
   /// Errors: as of render above; what fails on a device after the call is for `synchronize()` to report.
   Status render_on_backend(const FrameJob<S>& job, RenderStats& stats) {
-    return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, job.images, &stats);
+    if (job.camera == nullptr || job.config == nullptr) {
+      return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
+    }
+    return with_sizes(1, job, [&] { return draw(job, stats); });
   }
 
   /// Bytes of scratch held.
@@ -218,8 +234,71 @@ class Renderer {
     using type = FrameLanes<S, T>;
   };
 
+  /// Makes `out`'s images as large as `pixels` of each camera need.
+  Status size_images(Frames<S>& out, std::size_t cameras, std::size_t pixels) const {
+    struct Image {
+      std::vector<S>& values;
+      unsigned output;
+      std::size_t channels;
+    };
+    const Image images[] = {{out.rgb, kRgb, 3},
+                            {out.alpha, kAlpha, 1},
+                            {out.median_depth, kMedianDepth, 1},
+                            {out.expected_depth, kExpectedDepth, 1},
+                            {out.accumulated_depth, kAccumulatedDepth, 1},
+                            {out.first_hit_depth, kFirstHitDepth, 1}};
+    std::size_t channels = 0;
+    for (const Image& i : images) channels += (config_.outputs & i.output) != 0 ? i.channels : 0;
+    const std::size_t bytes = pixels * channels * sizeof(S);  // of a camera: at most 2^34
+    const auto refused = [&](const std::string& why) {
+      return Status(Errc::out_of_memory, "Renderer: the images of " + std::to_string(cameras) + " cameras of " +
+                                             std::to_string(out.width) + " x " + std::to_string(out.height) +
+                                             ", " + std::to_string(bytes) + " bytes each, " + why);
+    };
+    constexpr std::size_t kSmall = std::size_t{1} << 30;
+    if (bytes != 0 && cameras > kSmall / bytes) {
+      const long pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGESIZE);
+      const std::size_t memory = pages > 0 && page > 0 ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page)
+                                                       : std::numeric_limits<std::size_t>::max() / 2;
+      if (cameras > memory / bytes) return refused("are more than the machine's memory: render fewer at a time");
+    }
+    Status s = detail::guarded([&] {
+      for (const Image& i : images) {
+        i.values.resize((config_.outputs & i.output) != 0 ? cameras * pixels * i.channels : 0);
+      }
+      out.stats.assign(cameras, {});
+      return Status();
+    });
+    return s.ok() ? s : refused("cannot be allocated: render fewer at a time");
+  }
+
+  Status draw(const FrameJob<S>& job, RenderStats& stats) {
+    return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, job.images, &stats);
+  }
+
+  /// Runs what may throw; where memory was missing the error says for what.
+  template <class Run>
+  static Status with_sizes(std::size_t frames, const FrameJob<S>& first, const Run& run) {
+    if (first.sets.data() == nullptr && !first.sets.empty()) {
+      return {Errc::invalid_argument, "sets: a null pointer with a size"};
+    }
+    Status s = detail::guarded(run);
+    if (s.code() != Errc::out_of_memory) return s;
+    std::size_t gaussians = 0;
+    for (const GaussianSet& set : first.sets) gaussians += set.gaussians.size;
+    return {Errc::out_of_memory, "Renderer: not enough memory to draw " + std::to_string(frames) + " frames of " +
+                                     std::to_string(first.camera->width) + " x " +
+                                     std::to_string(first.camera->height) + " with " + std::to_string(gaussians) +
+                                     " Gaussians: " + s.message()};
+  }
+
   template <class JobOf>
   Status render_jobs(std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
+    if (count == 0) return backend_->synchronize();
+    return with_sizes(count, job_of(0), [&] { return draw_jobs(count, job_of, stats); });
+  }
+  template <class JobOf>
+  Status draw_jobs(std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
     if constexpr (LaneBackend<B>) {
       if (FrameLanes<S, B>::worth_it(*backend_, count)) {
         if (Status s = lanes_.render(*backend_, count, job_of, stats); !s) return s;
@@ -233,14 +312,14 @@ class Renderer {
   }
   Status render_job(const FrameJob<S>& job, RenderStats& stats) {
     if constexpr (is_host_backend<B>) {
-      return render_on_backend(job, stats);
+      return draw(job, stats);
     } else {
       const std::size_t pixels =
           static_cast<std::size_t>(job.camera->width) * static_cast<std::size_t>(job.camera->height);
       FrameImages<S> images = device_images(job.images, pixels);
       FrameJob<S> there = job;
       there.images = images;
-      if (Status s = render_on_backend(there, stats); !s) return s;
+      if (Status s = draw(there, stats); !s) return s;
       for_each_image(job.images, images, [&](S* host, S* device, std::size_t channels) {
         backend_->copy(host, device, pixels * channels * sizeof(S), CopyKind::device_to_host);
       });

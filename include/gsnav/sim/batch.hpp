@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -62,7 +63,8 @@ struct BatchConfig : SimulatorConfig {
 ///
 /// Environment e draws its sensors' noise with seed + e. Environments that are in one scene at one time share its
 /// avatars' capsules and skinned Gaussians. Scenes are held once, however many environments look at them. The backend
-/// must outlive it. After an error reset() begins anew.
+/// must outlive it. After an error reset() begins anew. One that was moved from has no environments and answers with
+/// invalid_argument.
 template <Backend B>
 class BatchSimulator {
  public:
@@ -98,6 +100,7 @@ class BatchSimulator {
   /// Begins the next episode in every environment or, with a mask [N], in those where it is not 0.
   /// Errors: what the episode source and World::reset report; rendering.
   Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) {
+    if (environments() == 0) return moved_away();
     if (Status s = worlds_.reset(parallel(), mask); !s) return s;
     let_scenes_go();
     return observe(mask.empty());
@@ -128,6 +131,14 @@ class BatchSimulator {
                                        std::size_t scenes, BatchConfig config, std::size_t environments,
                                        EpisodeSource next_episode) {
     if (Status s = validate(static_cast<const SimulatorConfig&>(config)); !s) return s;
+    if (config.images > ImageMemory::backend) {
+      return {Errc::invalid_argument, "BatchConfig.images = " + std::to_string(static_cast<int>(config.images)) +
+                                          ": there is none of this number"};
+    }
+    if (config.auto_reset > AutoReset::disabled) {
+      return {Errc::invalid_argument, "BatchConfig.auto_reset = " + std::to_string(static_cast<int>(config.auto_reset)) +
+                                          ": there is none of this number"};
+    }
     if (config.pose_slots < 1) return {Errc::invalid_argument, "BatchConfig.pose_slots = 0: must be >= 1"};
     if (Status s = SensorRig<B>::check_memory(config.sensors, config.images); !s) return s;
     BatchPlaces places;
@@ -168,6 +179,9 @@ class BatchSimulator {
     }
   }
 
+  static Status moved_away() {
+    return {Errc::invalid_argument, "this BatchSimulator was moved from: use what it became"};
+  }
   /// Puts a scene that environments are in into the backend's memory, where it is not there yet.
   Status place_scene(std::size_t scene) {
     if (scenes_[scene] != nullptr) return {};
@@ -206,6 +220,7 @@ class BatchSimulator {
 
   template <class A>
   Result<BatchStep> act(std::span<const A> actions) {
+    if (environments() == 0) return moved_away();
     const auto draw_final = [this] { return observe_finished(); };
     if (Status s = worlds_.step(parallel(), actions, draw_final); !s) return s;
     let_scenes_go();

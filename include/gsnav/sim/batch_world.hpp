@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -11,27 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/core/guarded.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/sim/body_cache.hpp"
 #include "gsnav/sim/world.hpp"
 
 namespace gsnav {
-
-namespace detail {
-
-/// Calls f, which returns a Status. No exception may leave a parallel region.
-template <class F>
-Status guarded(const F& f) noexcept {
-  try {
-    return f();
-  } catch (const Error& e) {
-    return {e.code(), e.what()};
-  } catch (const std::exception& e) {
-    return {Errc::out_of_memory, e.what()};
-  }
-}
-
-}  // namespace detail
 
 /// What happens to an environment whose episode has ended: Gymnasium's AutoresetMode.
 enum class AutoReset : std::uint8_t {

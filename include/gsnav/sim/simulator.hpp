@@ -77,7 +77,9 @@ struct Observations : StepInfo {
 ///     auto metrics = sim.metrics();
 ///
 /// During an action avatars and agent move together over one control period; avatars are skinned only
-/// when a sensor looks. The same calls give the same bits. The backend must outlive it.
+/// when a sensor looks. The same calls give the same bits, where floating point rounds to nearest as a program starts;
+/// flushing denormals to zero changes none. The backend must outlive it. One that was moved from answers whatever can
+/// fail with invalid_argument; world().navmesh() and avatars() must not be asked of it.
 template <Backend B>
 class Simulator {
  public:
@@ -120,6 +122,7 @@ class Simulator {
 
   /// Renders what the agent sees now, without acting. Errors: what rendering reports.
   Result<Observations> observe() {
+    if (Status s = alive(); !s) return s;
     Observations obs;
     static_cast<StepInfo&>(obs) = world_.last_step();
     obs.point_goal = world_.point_goal();
@@ -146,7 +149,8 @@ class Simulator {
 
   /// Everything that changes while it runs, and the way back to it; observe() then sees what was seen there.
   const WorldState& state() const noexcept { return world_.state(); }
-  void set_state(const WorldState& state) { world_.set_state(state); }
+  /// As World::set_state, its errors: nothing is changed by a state that is refused.
+  Status set_state(const WorldState& state) { return world_.set_state(state); }
   /// As World::set_agent: metres, radians, its errors.
   Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0) {
     return world_.set_agent(position, yaw, pitch);
@@ -162,6 +166,7 @@ class Simulator {
   /// Renders any camera at the present time (a map, a spectator). Images live until the next call.
   /// Errors: what Renderer::render reports.
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) {
+    if (Status s = alive(); !s) return s;
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
     RenderConfig rc = config_.render;
     rc.outputs = outputs;
@@ -181,6 +186,7 @@ class Simulator {
   /// The goal of ImageNav: what an agent at the episode's goal sees, turned by goal_rotation(), with nobody about. The
   /// images are in the sensors' order and live until the next call. Errors: invalid_argument before reset; rendering.
   Result<std::span<const Observation>> goal_images() {
+    if (Status s = alive(); !s) return s;
     const WorldState& s = world_.state();
     if (!s.running) return {Errc::invalid_argument, "goal_images before reset: no episode is running"};
     const SensorView view{s.goal.position, goal_rotation(s.episode), 0.0, noise_seed(config_.seed, s),
@@ -193,6 +199,11 @@ class Simulator {
   }
 
  private:
+  Status alive() const {
+    return world_.moved_from() ? Status(Errc::invalid_argument, "this Simulator was moved from: use what it became")
+                               : Status();
+  }
+
   Simulator(B& backend, World world, SimulatorConfig config, std::shared_ptr<const SimulatorScene> scene)
       : world_(std::move(world)),
         config_(std::move(config)),

@@ -106,8 +106,13 @@ class World {
 
   /// What is needed to come back here: set_state() makes everything that follows happen again, bit for bit.
   const WorldState& state() const noexcept { return s_; }
-  /// `state` comes from a World of the same NavMesh, settings and bodies.
-  void set_state(const WorldState& state) { s_ = state; }
+  /// `state` comes from a World of the same NavMesh, settings and bodies. It is taken as it is, never snapped: of a
+  /// running episode the agent must be within 0.1 m of the surface beside it and 0.5 m above or below.
+  /// Errors, which change nothing: invalid_argument, naming the field (a time, place or angle that is not finite, steps
+  /// below 0, a polygon that is none of this NavMesh); nothing_navigable (the agent is off the NavMesh).
+  Status set_state(const WorldState& state);
+  /// Whether it was moved from: all that can fail then returns invalid_argument, and navmesh() must not be asked.
+  bool moved_from() const noexcept { return navmesh_ == nullptr; }
   /// Puts the agent somewhere else on the surface; no time passes and nothing is counted. Errors: nothing_navigable
   /// off the NavMesh or on an island without the goal; invalid_argument (not finite; no episode is running). Metres in the
   /// world, yaw and pitch in radians.

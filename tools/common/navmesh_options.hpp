@@ -61,11 +61,11 @@ inline void add_navmesh_options(CLI::App& app, NavMeshOptions& o) {
 }
 
 /// Prints on stderr what a build is at, from its third second on: a line that is written over on a
-/// terminal, a line every ten seconds elsewhere.
-inline std::function<void(const char*, double)> navmesh_progress() {
+/// terminal, a line every ten seconds elsewhere. `name` says which NavMesh it is: a program may build several.
+inline std::function<void(const char*, double)> navmesh_progress(const std::string& name = "NavMesh") {
   using Clock = std::chrono::steady_clock;
-  return [begin = Clock::now(), shown = Clock::time_point{}, any = false](const char* stage,
-                                                                          double share) mutable {
+  return [name, begin = Clock::now(), shown = Clock::time_point{}, any = false](const char* stage,
+                                                                                double share) mutable {
     const auto now = Clock::now();
     const bool terminal = isatty(fileno(stderr)) != 0;
     const auto since = [&](Clock::time_point t) {
@@ -76,15 +76,15 @@ inline std::function<void(const char*, double)> navmesh_progress() {
       return;
     shown = now;
     any = true;
-    std::fprintf(stderr, terminal ? "\rNavMesh: %s %3.0f %%%s" : "NavMesh: %s %3.0f %%%s", stage,
-                 100 * share, terminal && !last ? "" : "\n");
+    std::fprintf(stderr, "%s%s: %s %3.0f %%%s", terminal ? "\r\x1b[K" : "", name.c_str(), stage, 100 * share,
+                 terminal && !last ? "" : "\n");
     std::fflush(stderr);
   };
 }
 
-/// Puts cell size, crop and progress into what a NavMesh is built with.
+/// Puts cell size, crop and progress, under `name`, into what a NavMesh is built with.
 inline void apply(double cell_size, const std::vector<double>& crop, gsnav::NavMeshSettings& settings,
-                  gsnav::GaussianNavOptions& how) {
+                  gsnav::GaussianNavOptions& how, const std::string& name = "NavMesh") {
   settings.cell_size = cell_size;
   settings.cell_height = std::max(gsnav::gaussian_navmesh_settings().cell_height, cell_size);
   if (crop.size() == 6) {
@@ -92,7 +92,7 @@ inline void apply(double cell_size, const std::vector<double>& crop, gsnav::NavM
         {std::min(crop[0], crop[3]), std::min(crop[1], crop[4]), std::min(crop[2], crop[5])},
         {std::max(crop[0], crop[3]), std::max(crop[1], crop[4]), std::max(crop[2], crop[5])}};
   }
-  how.progress = navmesh_progress();
+  how.progress = navmesh_progress(name);
 }
 
 }  // namespace nav_loop

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <exception>
+
+#include "gsnav/core/status.hpp"
+
+namespace gsnav::detail {
+
+/// Calls f, which returns a Status, and turns what it throws into one: gsnav::Error keeps its code, all else is
+/// out_of_memory. For parallel regions, which no exception may leave, and for calls that promise a Status.
+template <class F>
+Status guarded(const F& f) noexcept {
+#if defined(__cpp_exceptions)
+  try {
+    return f();
+  } catch (const Error& e) {
+    return {e.code(), e.what()};
+  } catch (const std::exception& e) {
+    return {Errc::out_of_memory, e.what()};
+  }
+#else
+  return f();
+#endif
+}
+
+}  // namespace gsnav::detail
