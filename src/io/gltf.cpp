@@ -218,7 +218,7 @@ class SplatReader {
 
 Result<LoadedCloud> load_gltf(const std::filesystem::path& path, const LoadGltfOptions& options) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
-    const auto file = GltfFile::open(path);
+    const auto file = GltfFile::open(path, options.limits);
     if (!file) return file.status();
     return detail::described(SplatReader(*file, options).run(),
                              options.keep_axes ? Vec3d{0, 1, 0} : Vec3d{0, -1, 0});
@@ -228,7 +228,7 @@ Result<LoadedCloud> load_gltf(const std::filesystem::path& path, const LoadGltfO
 Result<LoadedCloud> parse_gltf(std::span<const std::byte> bytes, std::string source,
                                const LoadGltfOptions& options) {
   return detail::guarded(source, [&]() -> Result<LoadedCloud> {
-    const auto file = GltfFile::parse(bytes, source, {});
+    const auto file = GltfFile::parse(bytes, source, {}, options.limits);
     if (!file) return file.status();
     return detail::described(SplatReader(*file, options).run(),
                              options.keep_axes ? Vec3d{0, 1, 0} : Vec3d{0, -1, 0});

@@ -243,7 +243,7 @@ Result<LoadedSkinnedMesh> load_gltf_skin(const std::filesystem::path& path, cons
     if (!(options.frame_rate >= 0) || !std::isfinite(options.frame_rate)) {
       return {Errc::invalid_argument, path.string() + ": GltfOptions.frame_rate must not be negative"};
     }
-    auto file = GltfFile::open(path);
+    auto file = GltfFile::open(path, options.limits);
     if (!file) return file.status();
     const auto nodes = read_nodes(*file);
     if (!nodes) return nodes.status();

@@ -9,13 +9,18 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/io/read_limits.hpp"
 
 namespace gsnav::io::detail {
 
 using Json = nlohmann::json;
 
-/// Parses JSON text; the error says at which byte it stops making sense.
-Result<Json> parse_json(std::span<const std::byte> text, const std::string& source);
+/// Parses JSON text. Errors: invalid_file (the byte at which it stops making sense), unsupported (nested deeper than
+/// `limits.json_depth`), invalid_argument (`limits`).
+Result<Json> parse_json(std::span<const std::byte> text, const std::string& source, const ReadLimits& limits = {});
+
+/// Errors: invalid_argument naming the field of `limits` that is out of its range.
+Status check_limits(const ReadLimits& limits, const std::string& source);
 
 /// A value of a file as it is shown in an error message.
 std::string shown(const Json& value);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/io/read_limits.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav::io {
@@ -19,6 +20,7 @@ struct LoadGltfOptions {
   /// Also read primitives that KHR_gaussian_splatting_compression_spz_2 compresses, a draft: the SPZ's
   /// axes are taken for the file's own. Untested on a real file.
   bool spz_compression = false;
+  ReadLimits limits{};
 };
 
 /// Reads the Gaussians of a glTF 2.0 file, GLB or JSON, by KHR_gaussian_splatting (release candidate):
