@@ -8,15 +8,19 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <numeric>
 #include <string>
 #include <vector>
 
 #include "compare.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/describe_cloud.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/scene/views_around.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace {
@@ -82,7 +86,10 @@ Row measure(const GaussianCloud& source, const std::vector<Camera>& cameras, con
   row.read = reading.seconds;
   row.peak = reading.peak;
   row.result = static_cast<double>(made.cloud.bytes());
-  row.fields = gsnav_convert::largest_field_errors(source, made.cloud);
+  // The format of chunks is written as the rows lie in memory, the others as they were read.
+  std::vector<std::uint32_t> rows = rows_as_read(source);
+  if (path.ends_with(".compressed.ply")) std::iota(rows.begin(), rows.end(), 0u);
+  row.fields = gsnav_convert::largest_field_errors(source, rows, made.cloud, rows_as_read(made.cloud));
   made.cloud.filter = source.filter;
   if (!cameras.empty()) {
     GaussianCloud sorted = source;
@@ -124,7 +131,7 @@ int main(int argc, char** argv) {
     }
     source = std::move(loaded->cloud);
   }
-  const auto cameras = gsnav_convert::views_around(source, views, 640, 480);
+  const auto cameras = views_around(source, guess_up(source).up, views, 640, 480);
   const double n = static_cast<double>(source.size());
   std::printf("%zu Gaussians of SH degree %d, %.1f MB in memory\n\n", source.size(), source.sh_degree,
               static_cast<double>(source.bytes()) / 1e6);

@@ -154,10 +154,8 @@ struct KeyBody {
     const std::size_t n = cloud.size();
     const GaussianView view = cloud.view();
     const Camera camera = Camera::look_at({0.1, 0.2, -1}, {0, 0, 3}, {0, 1, 0}, 256, 256, 90);
-    const auto projection = make_projection_camera<float>(camera, cloud.set());
     const auto projection64 = make_projection_camera<double>(camera, cloud.set());
     const Vec3d offset = (view.origins.empty() ? Vec3d{} : view.origins[0]) - projection64.position;
-    const Vec3<float> offset_f = vec_cast<float>(offset);
     std::vector<S> depths(n);
     std::vector<std::uint32_t> codes(n);
     const auto depth64 = [&](std::size_t i) {
@@ -168,9 +166,9 @@ struct KeyBody {
       if constexpr (std::is_same_v<S, double>) {
         depths[i] = depth64(i);
       } else {
-        const Vec3<float> mean{view.means[0][i], view.means[1][i], view.means[2][i]};
-        depths[i] = depth_key(projection.key_rotation, projection.key_scale, mean, offset_f);
-        codes[i] = projection.key_code(depths[i]);
+        const Vec3d mean{view.means[0][i], view.means[1][i], view.means[2][i]};
+        depths[i] = static_cast<float>(depth_key(projection64, mean + offset));
+        codes[i] = projection64.key_code(depths[i]);
       }
     };
     time_items(state, backend, n, key, 5 * sizeof(float));

@@ -14,8 +14,10 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/describe_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/scene/views_around.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace {
@@ -84,7 +86,7 @@ int main(int argc, char** argv) {
     }
     full = std::move(loaded->cloud);
   }
-  std::vector<Camera> cameras = gsnav_convert::views_around(full, 4, 640, 480);
+  std::vector<Camera> cameras = views_around(full, guess_up(full).up, 4, 640, 480);
   if (!cameras_path.empty()) {
     auto read = io::load_cameras(cameras_path);
     if (!read) {

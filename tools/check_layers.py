@@ -16,7 +16,7 @@ RANK = {"base": 0, "math": 1, "core": 2, "kernels": 3, "ops": 4, "scene": 5, "av
 DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface_material.hpp"}
 UMBRELLA = {"math", "core", "kernels", "ops", "scene", "avatar", "base"}
 # Not standard, but there wherever the code that includes them is compiled.
-PLATFORM_HEADERS = {"immintrin.h", "arm_neon.h", "sys/mman.h", "unistd.h"}
+PLATFORM_HEADERS = {"immintrin.h", "arm_neon.h", "fcntl.h", "sys/mman.h", "sys/stat.h", "unistd.h"}
 SOURCES = {".hpp", ".cpp", ".h", ".inl", ".cu", ".cuh"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 

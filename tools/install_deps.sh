@@ -21,7 +21,7 @@ if [[ $job == tests || $job == ci ]]; then
   packages+=(doctest-dev libbenchmark-dev libeigen3-dev libglm-dev libdlpack-dev libembree-dev pkg-config python3)
 fi
 if [[ $job == ci ]]; then
-  packages+=(clang libomp-dev libclang-rt-dev llvm xz-utils ccache libegl-dev libopengl-dev)
+  packages+=(clang libomp-dev libclang-rt-dev llvm xz-utils ccache libegl-dev libopengl-dev qemu-user)
 fi
 
 if ! command -v apt-get > /dev/null || ! command -v dpkg-query > /dev/null; then

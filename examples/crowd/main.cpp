@@ -8,6 +8,7 @@
 
 #include "../nav_loop/canvas.hpp"
 #include "crowd.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
@@ -100,6 +101,10 @@ int main(int argc, char** argv) {
   app.add_option("--out", out, "Folder for the pictures");
   app.add_flag("--frames", frames, "A picture for each tick, too");
   CLI11_PARSE(app, argc, argv);
+  if (const Status s = out.empty() ? Status() : make_output_folder(out); !s) {
+    std::fprintf(stderr, "crowd: --out %s\n", s.message().c_str());
+    return 1;
+  }
 
   const DefaultScene flat = make_default_scene(0.05).value();
   const NavMesh mesh = NavMesh::build({}, flat.vertices, flat.triangles).value();
@@ -132,8 +137,6 @@ int main(int argc, char** argv) {
     }
     if (drawn) continue;
     drawn = true;
-    std::error_code ignored;
-    std::filesystem::create_directories(out, ignored);
     if (const Status s = pictures(out, mesh, list.front(), first, frames); !s) {
       std::fprintf(stderr, "crowd: %s\n", s.message().c_str());
       return 1;

@@ -29,6 +29,8 @@ double seconds_since(Clock::time_point t) {
 
 template <gsnav::Backend B>
 Status run(B& backend, const Options& options) {
+  Recorder recorder(options);
+  if (Status s = recorder.open(); !s) return s;
   auto prepared = prepare(options);
   if (!prepared) return prepared.status();
   Setup setup = std::move(*prepared);
@@ -48,8 +50,6 @@ Status run(B& backend, const Options& options) {
   if (!made) return made.status();
   auto& sim = *made;
 
-  Recorder recorder(options);
-  if (Status s = recorder.open(); !s) return s;
   Progress progress(options.episodes);
   const gsnav::GeodesicFollower policy;
   std::vector<EpisodeRecord> records;
@@ -183,10 +183,7 @@ int main(int argc, char** argv) try {
                "of the profiles fast and lod: draw only what is seen from the NavMesh's cell that the "
                "agent is in; found "
                "first, and kept beside the scene's file");
-  app.add_option("--navmesh", o.navmesh,
-                 "built from: gaussians, mesh (the flat only), auto (the mesh where there is one)")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "mesh", "gaussians"}));
+  nav_loop::add_navmesh_options(app, o);
   app.add_option("--frames-every", o.frame_every, "write every k-th RGB and depth frame, 0: none")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));

@@ -7,11 +7,12 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/scene/lod_cut.hpp"
+#include "navmesh_options.hpp"
 
 namespace nav_loop {
 
 /// What the command line asks for.
-struct Options {
+struct Options : NavMeshOptions {
   std::string scene;  ///< empty: the embedded flat
   double density = 1.0;  ///< of the embedded flat's Gaussians and of people's
   std::string up = "y";
@@ -27,7 +28,6 @@ struct Options {
   std::string profile = "exact";  ///< exact, fast, lod
   double lod_error = gsnav::LodChoice{}.pixels;
   bool visible_sets = false;     ///< of fast and lod: draw only what is seen from where the agent is
-  std::string navmesh = "auto";  ///< auto, mesh, gaussians
   int frame_every = 10;          ///< 0: no frames
   int shown_episode = -1;        ///< of strip and map; -1: the one that met people most closely
   int max_steps = 500;

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 
 namespace nav_loop {
@@ -22,11 +22,9 @@ std::vector<std::uint8_t> bytes_of(std::span<const float> rgb) {
 }  // namespace
 
 gsnav::Status Recorder::open() {
-  std::error_code error;
-  const std::string frames = options_.out + "/frames";
-  std::filesystem::create_directories(options_.frame_every > 0 ? frames : options_.out, error);
-  if (error) return {gsnav::Errc::file_not_found, "--out " + options_.out + ": " + error.message()};
-  return {};
+  gsnav::Status s =
+      gsnav::make_output_folder(options_.frame_every > 0 ? options_.out + "/frames" : options_.out);
+  return s ? s : gsnav::Status(s.code(), "--out " + s.message());
 }
 
 void Recorder::begin(const gsnav::World& world, int episode) {

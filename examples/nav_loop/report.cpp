@@ -4,9 +4,9 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/version.hpp"
 
 namespace nav_loop {
@@ -145,10 +145,7 @@ gsnav::Status write_json(const std::string& path, const Options& o, const SceneF
                   {"render_ms", 1e3 * per(t.render, t.renders)},
                   {"policy_ms_per_step", 1e3 * per(t.policy, t.steps)},
                   {"steps", t.steps}};
-  std::ofstream file(path);
-  file << j.dump(2) << "\n";
-  if (!file) return {gsnav::Errc::file_not_found, path + ": cannot be written"};
-  return {};
+  return gsnav::replace_file(path, j.dump(2) + "\n");
 }
 
 }  // namespace nav_loop

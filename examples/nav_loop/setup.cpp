@@ -143,7 +143,8 @@ Result<Setup> prepare(const Options& options) {
   setup.scene.assets.push_back(asset);
 
   from = Clock::now();
-  const bool from_mesh = !triangles.empty() && options.navmesh != "gaussians";
+  const bool ready = options.ready_made();
+  const bool from_mesh = !ready && !triangles.empty() && options.navmesh != "gaussians";
   if (!from_mesh && options.navmesh == "mesh")
     return {Errc::invalid_argument, "--navmesh mesh: only the embedded flat has a mesh"};
   const auto build = [&](double radius, double height) -> Result<gsnav::NavMesh> {
@@ -151,15 +152,19 @@ Result<Setup> prepare(const Options& options) {
         from_mesh ? gsnav::NavMeshSettings{} : gsnav::gaussian_navmesh_settings();
     settings.agent_radius = radius;
     settings.agent_height = height;
-    if (from_mesh) return gsnav::NavMesh::build(settings, vertices, triangles);
     gsnav::GaussianNavOptions how;
+    if (from_mesh) {
+      settings.cell_size = options.cell_size;
+      return gsnav::NavMesh::build(settings, vertices, triangles);
+    }
+    apply(options.cell_size, options.crop, settings, how);
     if (options.scene.empty()) how.solid_alpha = 0.2;  // the flat's surfaces are as thin as paper
     const gsnav::GaussianSet set = asset.cloud->set(asset.world_from_asset);
     auto built = gsnav::build_navmesh(settings, std::span(&set, 1), how);
-    if (!built) return built.status();
+    if (!built) return {built.code(), setup.facts.name + ": " + built.message()};
     return std::move(built->mesh);
   };
-  auto mesh = build(0.1, 1.5);
+  auto mesh = ready ? gsnav::load_navmesh(options.navmesh) : build(0.1, 1.5);
   if (!mesh) return mesh.status();
   setup.scene.navmesh = std::make_shared<const gsnav::NavMesh>(std::move(*mesh));
   setup.timings.navmesh = seconds_since(from);
@@ -173,11 +178,11 @@ Result<Setup> prepare(const Options& options) {
   }
   // People are wider than the agent: they keep their shoulders clear of the furniture.
   std::optional<gsnav::NavMesh> walkways;
-  if (options.avatars > 0) {
+  if (options.avatars > 0 && !ready) {
     if (auto wide = build(0.3, 1.8); wide) walkways = std::move(*wide);
   }
   const gsnav::NavMesh& nav = *setup.scene.navmesh;
-  setup.facts.navmesh_source = from_mesh ? "from the mesh" : "from the Gaussians";
+  setup.facts.navmesh_source = ready ? "from " + options.navmesh : from_mesh ? "from the mesh" : "from the Gaussians";
   setup.facts.navmesh_polygons = nav.polygon_count();
   setup.facts.islands = nav.island_count();
   setup.facts.area = nav.navigable_area();

@@ -14,6 +14,14 @@
 #define GSNAV_HD inline
 #endif
 
+/// GSNAV_INLINED stands behind the parameters of a lambda in such a function: `[&](int k) GSNAV_INLINED { ... }`. Inlining
+/// the function does not inline its lambdas, and an out-of-line lambda has one name for all instruction sets.
+#if defined(__GNUC__) && !defined(__CUDACC__)
+#define GSNAV_INLINED __attribute__((always_inline))
+#else
+#define GSNAV_INLINED
+#endif
+
 /// True while nvcc compiles device code. Lane packs (SIMD) exist on the host only.
 #if defined(__CUDA_ARCH__)
 #define GSNAV_DEVICE_CODE 1

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "json.hpp"
 
 namespace gsnav::io {
@@ -134,11 +135,7 @@ Status save_cameras(const std::filesystem::path& path, std::span<const Camera> c
       one["fy"] = c.fy;
       out.push_back(std::move(one));
     }
-    const std::string text = out.dump(1) + "\n";
-    detail::OutFile file;
-    if (Status s = file.open(path); !s) return s;
-    file.write(text.data(), text.size());
-    return file.close();
+    return replace_file(path, out.dump(1) + "\n");
   });
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gzip.hpp"
 #include "json.hpp"
 
@@ -210,16 +211,10 @@ Status save_episodes(const fs::path& path, std::span<const PointNavEpisode> epis
                       {"info", std::move(info)}});
     }
     const std::string text = Json{{"episodes", std::move(list)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
-    const std::span<const std::byte> bytes = std::as_bytes(std::span(text.data(), text.size()));
-    detail::OutFile file;
-    if (Status s = file.open(path); !s) return s;
-    if (path.extension() == ".gz") {
-      const std::vector<std::byte> packed = detail::gzip(bytes);
-      file.write(packed.data(), packed.size());
-    } else {
-      file.write(bytes.data(), bytes.size());
-    }
-    return file.close();
+    if (path.extension() != ".gz") return replace_file(path, text);
+    const std::vector<std::byte> packed =
+        detail::gzip(std::as_bytes(std::span(text.data(), text.size())));
+    return replace_file(path, [&](OutputFile& file) { file.write(packed.data(), packed.size()); });
   });
 }
 

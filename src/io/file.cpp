@@ -4,9 +4,12 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <system_error>
+
+#include "gsnav/io/read_or_build.hpp"
 
 #if __has_include(<malloc.h>)
 #include <malloc.h>
@@ -61,39 +64,42 @@ Result<FileBytes> read_file(const std::filesystem::path& path) {
   return bytes;
 }
 
-OutFile::~OutFile() {
-  if (file_ != nullptr) std::fclose(file_);
-}
-
-Status OutFile::open(const std::filesystem::path& path) {
-  path_ = path;
-  std::error_code error;
-  const std::filesystem::path parent = path.parent_path();
-  if (!parent.empty() && !std::filesystem::is_directory(parent, error)) {
-    return {Errc::file_not_found, path.string() + ": the folder " + parent.string() + " does not exist"};
-  }
-  file_ = std::fopen(path.c_str(), "wb");
-  if (file_ == nullptr) {
-    return {Errc::file_not_found,
-            path.string() + ": cannot be written: " + std::generic_category().message(errno)};
-  }
-  return {};
-}
-
-Status OutFile::close() {
-  const bool bad = failed_ || std::ferror(file_) != 0;
-  const bool bad_close = std::fclose(file_) != 0;
-  file_ = nullptr;
-  if (bad || bad_close) return {Errc::file_not_found, path_.string() + ": writing failed"};
-  return {};
-}
-
 std::string path_beside(const std::string& spec) {
   std::error_code ignored;
   std::string first = spec;
   if (!std::filesystem::exists(spec, ignored)) first = spec.substr(0, spec.find(','));
   while (first.size() > 1 && first.back() == '/') first.pop_back();
   return first;
+}
+
+void remove_stale_caches(const std::filesystem::path& path) noexcept {
+  namespace fs = std::filesystem;
+  try {
+    const std::string name = path.filename().string(), ending = path.extension().string();
+    constexpr std::size_t kHash = 17;  // a dot and 16 digits
+    if (name.size() <= kHash + ending.size()) return;
+    const std::string stem = name.substr(0, name.size() - kHash - ending.size());
+    const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path(),
+                   asset = folder / stem;
+    std::error_code error;
+    fs::file_time_type newest = fs::last_write_time(asset, error);
+    if (error) return;
+    if (fs::is_directory(asset, error)) {
+      for (const auto& entry : fs::directory_iterator(asset, error))
+        newest = std::max(newest, entry.last_write_time(error));
+    }
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+      const std::string other = entry.path().filename().string();
+      const bool cache =
+          other.size() == name.size() && other != name && other.starts_with(stem + ".") &&
+          other.ends_with(ending) &&
+          other.substr(stem.size() + 1, kHash - 1).find_first_not_of("0123456789abcdef") ==
+              std::string::npos;
+      if (cache && entry.is_regular_file(error) && entry.last_write_time(error) < newest && !error)
+        fs::remove(entry.path(), error);
+    }
+  } catch (...) {  // no memory, a folder that vanishes: they stay until the next time
+  }
 }
 
 void give_back_memory() noexcept {

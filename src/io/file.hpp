@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <unistd.h>
-
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -88,47 +85,6 @@ inline Status reading_failed(const std::string& source) {
 /// What is wrong with a file's content.
 inline Status invalid_file(const std::filesystem::path& path, const std::string& what) {
   return {Errc::invalid_file, path.string() + ": " + what};
-}
-
-/// A file being written; what goes wrong is kept until close().
-class OutFile {
- public:
-  OutFile() = default;
-  OutFile(const OutFile&) = delete;
-  OutFile& operator=(const OutFile&) = delete;
-  ~OutFile();
-
-  /// Names the parent folder where that is what is missing.
-  Status open(const std::filesystem::path& path);
-  void write(const void* data, std::size_t size) {
-    // fwrite must not be given a null pointer, not even for no bytes.
-    failed_ = failed_ || (size != 0 && std::fwrite(data, 1, size, file_) != size);
-  }
-  std::FILE* handle() noexcept { return file_; }
-  Status close();
-
- private:
-  std::filesystem::path path_;
-  std::FILE* file_ = nullptr;
-  bool failed_ = false;
-};
-
-/// Writes a file aside by `write(OutFile&)` and renames it then: whoever reads meanwhile sees a whole
-/// file or none.
-template <class F>
-Status replace_file(const std::filesystem::path& path, const F& write) {
-  const std::filesystem::path aside = path.string() + "." + std::to_string(::getpid());
-  OutFile file;
-  if (Status s = file.open(aside); !s) return s;
-  write(file);
-  Status s = file.close();
-  std::error_code error;
-  if (s) {
-    std::filesystem::rename(aside, path, error);
-    if (error) s = {Errc::file_not_found, path.string() + ": cannot be written: " + error.message()};
-  }
-  if (!s) std::filesystem::remove(aside, error);
-  return s;
 }
 
 /// Beside what files made of a scene lie: its own path; of tiles, the first one's. `spec` as of

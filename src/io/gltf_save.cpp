@@ -6,7 +6,9 @@
 
 #include "cloud_check.hpp"
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/gltf.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 #include "json.hpp"
 
 namespace gsnav::io {
@@ -132,19 +134,20 @@ Status save_glb(const std::filesystem::path& path, const GaussianCloud& cloud,
     const std::uint32_t head[] = {0x46546c67, 2, size_of(12 + 8 + text.size() + 8 + binary),
                                   size_of(text.size()), 0x4e4f534a};
     const std::uint32_t chunk[] = {size_of(binary), 0x004e4942};
-    detail::OutFile out;
+    OutputFile out;
     if (Status s = out.open(path); !s) return s;
     out.write(head, sizeof head);
     out.write(text.data(), text.size());
     out.write(chunk, sizeof chunk);
+    const std::vector<std::uint32_t> order = rows_as_read(cloud);
     for (const Attribute& a : attributes) {
-      for (std::size_t i = 0; i < n; ++i) {
+      for (const std::size_t i : order) {
         float row[4];
         for (std::size_t k = 0; k < a.components; ++k) row[k] = a.get(i, k);
         out.write(row, a.components * sizeof(float));
       }
     }
-    return out.close();
+    return out.commit();
   });
 }
 

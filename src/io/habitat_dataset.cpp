@@ -186,11 +186,30 @@ class DatasetReader {
       }
     }
     std::sort(out_.scenes.begin(), out_.scenes.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+    warn_of_outside();
     left_out_.report(out_.warnings);
     return std::move(out_);
   }
 
  private:
+  /// Says which files lie outside of the dataset's folder, where an absolute path or `..` led.
+  void warn_of_outside() {
+    std::error_code error;
+    const fs::path root = fs::weakly_canonical(folder_.empty() ? fs::path(".") : folder_, error);
+    std::set<fs::path> said;
+    for (const HabitatScene& s : out_.scenes) {
+      for (const fs::path& file : {s.stage.render_asset, s.stage.collision_asset, s.navmesh}) {
+        if (file.empty()) continue;
+        const fs::path inside = fs::weakly_canonical(file, error).lexically_relative(root);
+        const bool out = inside.empty() || *inside.begin() == "..";
+        if (out && said.insert(file).second) {
+          out_.warnings.push_back(at_ + ": " + s.name + " uses " + file.string() +
+                                  ", outside of the dataset's folder");
+        }
+      }
+    }
+  }
+
   /// The files that `paths` of a part of the dataset stands for.
   Status files(const Json& json, const char* part, const std::string& ending, std::vector<fs::path>& out) {
     const Json* section = member(json, part);

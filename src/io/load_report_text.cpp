@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <string>
 
+#include "gsnav/core/printable.hpp"
 #include "gsnav/io/scene_file.hpp"
 
 namespace gsnav::io {
@@ -30,7 +31,11 @@ std::string report_text(const LoadReport& r) {
     const Vec3d &a = r.bounds.low, &b = r.bounds.high;
     line("means from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g) m", a.x, a.y, a.z, b.x, b.y, b.z);
     const char* axis = r.up.y > 0 ? "+y" : r.up.y < 0 ? "-y" : r.up.z > 0 ? "+z" : "-z";
-    line("up: %s, guessed %s", axis, r.up_seen ? "by its shape" : "by what is usual in such files");
+    if (r.up_seen) {
+      line("up: %s, seen from the ground (confidence %.2f)", axis, r.up_confidence);
+    } else {
+      line("up: %s, guessed by what is usual in such files", axis);
+    }
   }
   line("filter %s, eps2d %.3g, sorted by %s", r.filter == Filter::mip ? "mip" : "classic",
        static_cast<double>(r.eps2d), r.sort_order == SortOrder::z_depth ? "depth" : "distance");
@@ -49,7 +54,7 @@ std::string report_text(const LoadReport& r) {
          e.sh0, e.sh_bits, e.sh, e.sh_rms);
   }
   for (const std::string& w : r.warnings) out += "  warning: " + w + "\n";
-  return out;
+  return printable(out);
 }
 
 }  // namespace gsnav::io

@@ -11,6 +11,7 @@
 
 #include "file.hpp"
 #include "gsnav/core/pool_backend.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/scene/content_hash.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 
@@ -138,7 +139,7 @@ Status save_lod(const fs::path& path, const LodTree& tree, const GaussianCloud& 
     const Hasher of = built_of(cloud, settings);
     for (std::size_t k = 0; k < 2; ++k) header.built_of[k] = of.state()[k];
     header.checksum = checksum(tree, nodes);
-    return detail::replace_file(path, [&](detail::OutFile& file) {
+    return replace_file(path, [&](OutputFile& file) {
       file.write(&header, sizeof header);
       for_each_array(tree, nodes,
                      [&file](const auto& v) { file.write(v.data(), v.size() * sizeof(v[0])); });

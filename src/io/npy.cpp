@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "npy_format.hpp"
 
@@ -13,11 +14,10 @@ Status save(const std::filesystem::path& path, std::span<const T> values,
     const auto header =
         detail::npy_header(sizeof(T) == 4 ? "<f4" : "<f8", shape, values.size(), path.string());
     if (!header) return header.status();
-    detail::OutFile out;
-    if (Status s = out.open(path); !s) return s;
-    out.write(header->data(), header->size());
-    out.write(values.data(), values.size_bytes());
-    return out.close();
+    return replace_file(path, [&](OutputFile& out) {
+      out.write(header->data(), header->size());
+      out.write(values.data(), values.size_bytes());
+    });
   });
 }
 

@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/npz_file.hpp"
 #include "npy_format.hpp"
 #include "zip.hpp"
@@ -129,11 +130,10 @@ Status save_npz(const std::filesystem::path& path, std::span<const NpzEntry> ent
       if (Status s = zip.add(entry.name + std::string(kSuffix), *bytes, deflated); !s) return s;
     }
     const std::string directory = zip.finish();
-    detail::OutFile out;
-    if (Status s = out.open(path); !s) return s;
-    out.write(zip.entries().data(), zip.entries().size());
-    out.write(directory.data(), directory.size());
-    return out.close();
+    return replace_file(path, [&](OutputFile& out) {
+      out.write(zip.entries());
+      out.write(directory);
+    });
   });
 }
 

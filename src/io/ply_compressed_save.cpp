@@ -7,6 +7,8 @@
 
 #include "cloud_check.hpp"
 #include "file.hpp"
+#include "format_range.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "quantised.hpp"
 
@@ -14,7 +16,6 @@ namespace gsnav::io {
 namespace {
 
 constexpr std::size_t kChunk = 256;  // Gaussians that share their bounds
-constexpr double kMostLogScale = 20;
 
 /// x y z, log-scales, colours.
 using Values = std::array<double, 9>;
@@ -25,7 +26,8 @@ Values values_of(const GaussianCloud& cloud, std::size_t i) {
   for (std::size_t k = 0; k < 3; ++k) {
     v[k] = mean[static_cast<int>(k)];
     const double log_scale = std::log(static_cast<double>(cloud.scales[k][i]));
-    v[3 + k] = std::clamp(log_scale, -kMostLogScale, kMostLogScale);  // also minus infinity
+    v[3 + k] = std::clamp(log_scale, -detail::kCompressedMostLogScale,
+                          detail::kCompressedMostLogScale);  // also minus infinity
     v[6 + k] = 0.5 + kSh0 * static_cast<double>(cloud.sh0[3 * i + k]);
   }
   return v;
@@ -114,7 +116,7 @@ Status save_compressed_ply(const std::filesystem::path& path, const GaussianClou
     std::vector<Bounds> chunks;
     for (std::size_t i = 0; i < n; i += kChunk)
       chunks.push_back(bounds_of(cloud, i, std::min(n, i + kChunk)));
-    detail::OutFile out;
+    OutputFile out;
     if (Status s = out.open(path); !s) return s;
     const std::string header = header_of(cloud, chunks.size(), rest);
     out.write(header.data(), header.size());
@@ -132,13 +134,14 @@ Status save_compressed_ply(const std::filesystem::path& path, const GaussianClou
     for (std::size_t i = 0; rest != 0 && i < n; ++i) {
       for (std::size_t k = 0; k < rest; ++k) {
         // 256 cells over [-4, 4]; channel-major in the file, colour inner in the cloud.
-        const double cell = (static_cast<double>(cloud.shN[i * rest + k]) / 8 + 0.5) * 256;
+        const double cell =
+            (static_cast<double>(cloud.shN[i * rest + k]) / (2 * detail::kCompressedBands) + 0.5) * 256;
         row[k % 3 * (rest / 3) + k / 3] =
             static_cast<std::uint8_t>(std::clamp(std::floor(cell), 0.0, 255.0));
       }
       out.write(row.data(), row.size());
     }
-    return out.close();
+    return out.commit();
   });
 }
 

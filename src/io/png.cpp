@@ -6,6 +6,7 @@
 #include <csetjmp>
 
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "picture.hpp"
 
@@ -18,7 +19,12 @@ constexpr std::uint64_t kDeflateRatio = 1032;  // no deflate stream grows more t
 void on_error(png_structp png, png_const_charp) { png_longjmp(png, 1); }
 void on_warning(png_structp, png_const_charp) {}
 
-bool encode(std::FILE* file, png_const_bytep pixels, int width, int height, int bits, int channels) {
+void write_bytes(png_structp png, png_bytep from, std::size_t n) {
+  static_cast<OutputFile*>(png_get_io_ptr(png))->write(from, n);
+}
+void flush_nothing(png_structp) {}
+
+bool encode(OutputFile& file, png_const_bytep pixels, int width, int height, int bits, int channels) {
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, on_error, on_warning);
   if (png == nullptr) return false;
   png_infop info = png_create_info_struct(png);
@@ -26,7 +32,7 @@ bool encode(std::FILE* file, png_const_bytep pixels, int width, int height, int 
     png_destroy_write_struct(&png, &info);
     return false;
   }
-  png_init_io(png, file);
+  png_set_write_fn(png, &file, write_bytes, flush_nothing);
   png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits,
                channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
@@ -50,13 +56,10 @@ Status save(const std::filesystem::path& path, const void* pixels, std::size_t s
                                         std::to_string(width) + " x " + std::to_string(height) +
                                         " image of " + std::to_string(channels) + " channels"};
   }
-  detail::OutFile file;
-  if (Status s = file.open(path); !s) return s;
-  const bool ok =
-      encode(file.handle(), static_cast<png_const_bytep>(pixels), width, height, bits, channels);
-  Status closed = file.close();
-  if (!ok) return {Errc::file_not_found, path.string() + ": writing the PNG failed"};
-  return closed;
+  return replace_file(path, [&](OutputFile& file) -> Status {
+    if (encode(file, static_cast<png_const_bytep>(pixels), width, height, bits, channels)) return {};
+    return {Errc::out_of_memory, path.string() + ": the PNG could not be made: not enough memory"};
+  });
 }
 
 struct Source {

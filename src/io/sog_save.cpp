@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <iterator>
 #include <new>
 #include <string>
@@ -13,8 +14,11 @@
 #include "cloud_check.hpp"
 #include "codebook.hpp"
 #include "file.hpp"
+#include "format_range.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/io/sog.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 #include "json.hpp"
 #include "quantised.hpp"
 #include "threads.hpp"
@@ -30,19 +34,23 @@ using detail::RgbaImage;
 constexpr std::size_t kLargestPalette = 65536, kSmallPalette = 1024;  // labels have two bytes
 constexpr std::size_t kEntriesPerRow = 64;
 constexpr std::size_t kMostSide = 16383;  // of a WebP
-constexpr double kLeastLogScale = -20;    // stands for a flat axis, whose logarithm is -infinity
-constexpr const char *kCentroids = "shN_centroids.webp", *kLabels = "shN_labels.webp";
+/// What the images of a SOG are called, without their ending.
+constexpr const char* kStems[] = {"means_l", "means_u",       "scales",    "quats",
+                                  "sh0",     "shN_centroids", "shN_labels"};
 
 /// The files of a SOG by name, in the order in which they are written.
 using Files = std::vector<std::pair<std::string, std::string>>;
 
 class SogWriter {
  public:
-  SogWriter(const GaussianCloud& cloud, const std::string& target) : cloud_(cloud), target_(target) {}
+  /// `ending`: of the images' names, ".webp" or, beside another scene's, ".1.webp".
+  SogWriter(const GaussianCloud& cloud, const std::string& target, std::string ending = ".webp")
+      : cloud_(cloud), target_(target), ending_(std::move(ending)) {}
 
   Result<Files> run() {
     if (Status s = detail::check_arrays(target_, cloud_); !s) return s;
     const std::size_t n = cloud_.size();
+    rows_ = rows_as_read(cloud_);
     width_ = std::max<std::size_t>(
         4, 4 * static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(n)) / 4)));
     height_ = std::max<std::size_t>(1, (n + width_ - 1) / width_);
@@ -90,9 +98,12 @@ class SogWriter {
     return {width_, height_, std::vector<std::uint8_t>(4 * width_ * height_, 255)};
   }
 
-  Status add(Part& part, const std::string& name, const RgbaImage& image) const {
+  /// Adds an image to a part and its name to the part's description.
+  Status add(Part& part, const char* stem, const RgbaImage& image) const {
+    const std::string name = stem + ending_;
     auto bytes = detail::encode_webp(image, target_ + ": " + name);
     if (!bytes) return bytes.status();
+    part.meta["files"].push_back(name);
     part.files.emplace_back(name, std::move(*bytes));
     return {};
   }
@@ -112,7 +123,7 @@ class SogWriter {
     }
     RgbaImage lower = plane(), upper = plane();
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
-      const Vec3d m = cloud_.mean(i);
+      const Vec3d m = cloud_.mean(rows_[i]);
       for (int k = 0; k < 3; ++k) {
         const double t = high[k] > low[k] ? (squeezed(m[k]) - low[k]) / (high[k] - low[k]) : 0;
         const std::uint32_t step = detail::nearest_step(t, 16);
@@ -122,9 +133,9 @@ class SogWriter {
       }
     }
     part.name = "means";
-    part.meta = {{"mins", low}, {"maxs", high}, {"files", {"means_l.webp", "means_u.webp"}}};
-    if (Status s = add(part, "means_l.webp", lower); !s) return s;
-    return add(part, "means_u.webp", upper);
+    part.meta = {{"mins", low}, {"maxs", high}};
+    if (Status s = add(part, "means_l", lower); !s) return s;
+    return add(part, "means_u", upper);
   }
 
   Status scales(Part& part) const {
@@ -132,8 +143,8 @@ class SogWriter {
     std::vector<float> logs(3 * n);
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t k = 0; k < 3; ++k) {
-        const double log_scale = std::log(static_cast<double>(cloud_.scales[k][i]));
-        logs[3 * i + k] = static_cast<float>(std::max(log_scale, kLeastLogScale));
+        const double log_scale = std::log(static_cast<double>(cloud_.scales[k][rows_[i]]));
+        logs[3 * i + k] = static_cast<float>(std::max(log_scale, detail::kSogLeastLogScale));
       }
     }
     const detail::ScalarCodebook book(logs);
@@ -142,8 +153,8 @@ class SogWriter {
       for (std::size_t k = 0; k < 3; ++k) image.pixels[4 * i + k] = book.index(logs[3 * i + k]);
     }
     part.name = "scales";
-    part.meta = {{"codebook", book.entries()}, {"files", {"scales.webp"}}};
-    return add(part, "scales.webp", image);
+    part.meta = {{"codebook", book.entries()}};
+    return add(part, "scales", image);
   }
 
   Status quats(Part& part) const {
@@ -151,7 +162,7 @@ class SogWriter {
     RgbaImage image = plane();
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
       double q[4], others[3];
-      for (std::size_t k = 0; k < 4; ++k) q[k] = static_cast<double>(cloud_.quats[k][i]);
+      for (std::size_t k = 0; k < 4; ++k) q[k] = static_cast<double>(cloud_.quats[k][rows_[i]]);
       const std::size_t largest = detail::smallest_three(q, others);
       for (std::size_t k = 0; k < 3; ++k) {
         image.pixels[4 * i + k] =
@@ -160,21 +171,21 @@ class SogWriter {
       image.pixels[4 * i + 3] = static_cast<std::uint8_t>(kFirstMode + largest);
     }
     part.name = "quats";
-    part.meta = {{"files", {"quats.webp"}}};
-    return add(part, "quats.webp", image);
+    return add(part, "quats", image);
   }
 
   Status colours(Part& part) const {
     const detail::ScalarCodebook book(cloud_.sh0);
     RgbaImage image = plane();
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
-      for (std::size_t k = 0; k < 3; ++k) image.pixels[4 * i + k] = book.index(cloud_.sh0[3 * i + k]);
-      image.pixels[4 * i + 3] =
-          static_cast<std::uint8_t>(detail::nearest_step(static_cast<double>(cloud_.opacities[i]), 8));
+      for (std::size_t k = 0; k < 3; ++k)
+        image.pixels[4 * i + k] = book.index(cloud_.sh0[3 * rows_[i] + k]);
+      image.pixels[4 * i + 3] = static_cast<std::uint8_t>(
+          detail::nearest_step(static_cast<double>(cloud_.opacities[rows_[i]]), 8));
     }
     part.name = "sh0";
-    part.meta = {{"codebook", book.entries()}, {"files", {"sh0.webp"}}};
-    return add(part, "sh0.webp", image);
+    part.meta = {{"codebook", book.entries()}};
+    return add(part, "sh0", image);
   }
 
   Status bands(Part& part) const {
@@ -191,43 +202,79 @@ class SogWriter {
     }
     RgbaImage labels = plane();
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
-      labels.pixels[4 * i] = static_cast<std::uint8_t>(palette.labels[i] & 255);
-      labels.pixels[4 * i + 1] = static_cast<std::uint8_t>(palette.labels[i] >> 8);
+      labels.pixels[4 * i] = static_cast<std::uint8_t>(palette.labels[rows_[i]] & 255);
+      labels.pixels[4 * i + 1] = static_cast<std::uint8_t>(palette.labels[rows_[i]] >> 8);
       labels.pixels[4 * i + 2] = 0;
     }
     part.name = "shN";
-    part.meta = {{"count", palette.size},
-                    {"bands", cloud_.sh_degree},
-                    {"codebook", book.entries()},
-                    {"files", {kCentroids, kLabels}}};
-    if (Status s = add(part, kCentroids, centroids); !s) return s;
-    return add(part, kLabels, labels);
+    part.meta = {{"count", palette.size}, {"bands", cloud_.sh_degree}, {"codebook", book.entries()}};
+    if (Status s = add(part, "shN_centroids", centroids); !s) return s;
+    return add(part, "shN_labels", labels);
   }
 
   const GaussianCloud& cloud_;
   const std::string& target_;
+  std::string ending_;
+  std::vector<std::uint32_t> rows_;  ///< of the cloud, in the file's order
   std::size_t width_ = 0, height_ = 0;
   Json meta_;
 };
 
-Status write(const std::filesystem::path& path, const std::string& content) {
-  detail::OutFile out;
-  if (Status s = out.open(path); !s) return s;
-  out.write(content.data(), content.size());
-  return out.close();
+/// Whether a file is an image of a SOG by its name: "means_l.webp", "means_l.3.webp".
+bool is_sog_image(const std::string& name) {
+  return std::any_of(std::begin(kStems), std::end(kStems), [&](const std::string stem) {
+    if (!name.starts_with(stem) || !name.ends_with(".webp") || name.size() < stem.size() + 5)
+      return false;
+    const std::string number = name.substr(stem.size(), name.size() - stem.size() - 5);
+    return number.empty() || (number.size() > 1 && number[0] == '.' &&
+                              number.find_first_not_of("0123456789", 1) == std::string::npos);
+  });
 }
 
-/// Takes away the bands of a scene that lay in the folder before, where `files` has none: nothing names them any more.
-Status remove_stale_bands(const std::filesystem::path& folder, const Files& files) {
-  for (const char* name : {kCentroids, kLabels}) {
-    if (std::any_of(files.begin(), files.end(), [&](const auto& f) { return f.first == name; })) continue;
-    std::error_code error;
-    std::filesystem::remove(folder / name, error);
-    if (error) {
-      return {Errc::file_not_found, (folder / name).string() + ": of an earlier scene, cannot be removed: " + error.message()};
-    }
+/// What has such a name in a folder, be it a file or not.
+std::vector<std::string> sog_images_in(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (is_sog_image(name)) names.push_back(name);
   }
-  return {};
+  return names;
+}
+
+/// An ending that no image in the folder has: the scene that lies there stays whole until meta.json
+/// names the new one.
+std::string free_ending(const std::vector<std::string>& images) {
+  std::string ending = ".webp";
+  for (int n = 1;; ++n) {
+    if (std::none_of(images.begin(), images.end(), [&](const std::string& name) {
+          return name.substr(std::min(name.find('.'), name.size())) == ending;
+        })) {
+      return ending;
+    }
+    ending = "." + std::to_string(n) + ".webp";
+  }
+}
+
+/// Writes the images, then meta.json, which makes them the folder's scene, and takes away those of the
+/// scene before.
+Status write_folder(const std::filesystem::path& folder, const Files& files,
+                    const std::vector<std::string>& before) {
+  std::error_code ignored;
+  Status status;
+  for (const auto& [name, content] : files) {
+    status = replace_file(folder / name, content);
+    if (!status) break;
+  }
+  for (const std::string& name : before) {
+    if (status && std::filesystem::is_regular_file(folder / name, ignored))
+      std::filesystem::remove(folder / name, ignored);
+  }
+  for (const auto& [name, content] : files) {
+    if (!status && name != "meta.json") std::filesystem::remove(folder / name, ignored);
+  }
+  return status;
 }
 
 }  // namespace
@@ -239,19 +286,20 @@ Status save_sog(const std::filesystem::path& path, const GaussianCloud& cloud) {
     if (!bundle && path.filename() != "meta.json") {
       return {Errc::invalid_argument, target + ": a SOG is a file *.sog or a folder's meta.json"};
     }
+    if (Status s = check_output_path(path); !s) return s;
+    if (!bundle) {
+      const std::filesystem::path folder = path.parent_path().empty() ? "." : path.parent_path();
+      const std::vector<std::string> before = sog_images_in(folder);
+      const auto files = SogWriter(cloud, target, free_ending(before)).run();
+      return files ? write_folder(folder, *files, before) : files.status();
+    }
     const auto files = SogWriter(cloud, target).run();
     if (!files) return files.status();
-    if (!bundle) {
-      for (const auto& [name, content] : *files) {
-        if (Status s = write(path.parent_path() / name, content); !s) return s;
-      }
-      return remove_stale_bands(path.parent_path(), *files);
-    }
     detail::ZipWriter zip(target);
     for (const auto& [name, content] : *files) {
       if (Status s = zip.add(name, content, false); !s) return s;  // WebP is packed already
     }
-    return write(path, zip.entries() + zip.finish());
+    return replace_file(path, zip.entries() + zip.finish());
   });
 }
 

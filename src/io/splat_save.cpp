@@ -4,7 +4,9 @@
 
 #include "cloud_check.hpp"
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/splat.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 #include "quantised.hpp"
 
 namespace gsnav::io {
@@ -15,9 +17,9 @@ Status save_splat(const std::filesystem::path& path, const GaussianCloud& cloud)
     if (cloud.size() == 0) {
       return {Errc::invalid_argument, path.string() + ": a .splat needs a Gaussian, the cloud has none"};
     }
-    detail::OutFile out;
+    OutputFile out;
     if (Status s = out.open(path); !s) return s;
-    for (std::size_t i = 0; i < cloud.size(); ++i) {
+    for (const std::size_t i : rows_as_read(cloud)) {
       const Vec3d mean = cloud.mean(i);
       float numbers[6];
       std::uint8_t bytes[8];
@@ -36,7 +38,7 @@ Status save_splat(const std::filesystem::path& path, const GaussianCloud& cloud)
       out.write(numbers, sizeof numbers);
       out.write(bytes, sizeof bytes);
     }
-    return out.close();
+    return out.commit();
   });
 }
 

@@ -9,8 +9,11 @@
 
 #include "cloud_check.hpp"
 #include "file.hpp"
+#include "format_range.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/io/spz.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 #include "quantised.hpp"
 #include "spz_planes.hpp"
 #include "threads.hpp"
@@ -34,11 +37,12 @@ class SpzWriter {
     const std::size_t coefficients = header_.coefficients();
     const auto widths = header_.widths();
     for (std::size_t k = 0; k < 6; ++k) planes_[k].resize(widths[k] * cloud_.size());
+    const std::vector<std::uint32_t> order = rows_as_read(cloud_);
     constexpr std::size_t kPiece = 8192;
     const std::size_t pieces = (cloud_.size() + kPiece - 1) / kPiece;
     ThreadPool(static_cast<int>(detail::io_threads())).run(static_cast<std::uint32_t>(pieces), [&](std::uint32_t p) {
       for (std::size_t i = p * kPiece; i < std::min((p + 1) * kPiece, cloud_.size()); ++i)
-        add(i, coefficients);
+        add(i, order[i], coefficients);
     });
     std::vector<Plane> streams;
     std::vector<std::array<std::uint64_t, 2>> toc;
@@ -49,7 +53,7 @@ class SpzWriter {
       toc.push_back({packed.size(), planes_[k].size()});
       streams.push_back(std::move(packed));
     }
-    detail::OutFile out;
+    OutputFile out;
     if (Status s = out.open(path); !s) return s;
     const std::uint32_t head[] = {detail::kSpzMagic, header_.version, header_.count};
     const std::uint8_t small[] = {
@@ -61,7 +65,7 @@ class SpzWriter {
     out.write(tail, sizeof tail);
     for (const auto& entry : toc) out.write(entry.data(), sizeof entry);
     for (const Plane& stream : streams) out.write(stream.data(), stream.size());
-    return out.close();
+    return out.commit();
   }
 
  private:
@@ -115,8 +119,9 @@ class SpzWriter {
     return {};
   }
 
-  void add(std::size_t i, std::size_t coefficients) {
-    const Vec3d m = cloud_.mean(i);
+  /// Makes record i of the cloud's `row`.
+  void add(std::size_t i, std::size_t row, std::size_t coefficients) {
+    const Vec3d m = cloud_.mean(row);
     const double place[] = {m.x, turn_ * m.y, turn_ * m.z};
     for (std::size_t k = 0; k < 3; ++k) {
       const auto steps =
@@ -125,25 +130,25 @@ class SpzWriter {
         planes_[0][9 * i + 3 * k + static_cast<std::size_t>(shift / 8)] =
             static_cast<std::uint8_t>(static_cast<std::uint32_t>(steps) >> shift);
       }
-      const double colour = static_cast<double>(cloud_.sh0[3 * i + k]) * 0.15 + 0.5;
+      const double colour = static_cast<double>(cloud_.sh0[3 * row + k]) * detail::kSpzColour + 0.5;
       planes_[2][3 * i + k] = static_cast<std::uint8_t>(detail::nearest_step(colour, 8));
-      const double log_scale = std::log(static_cast<double>(cloud_.scales[k][i]));
-      planes_[3][3 * i + k] =
-          static_cast<std::uint8_t>(detail::nearest_step((log_scale + 10) * 16 / 255, 8));
+      const double log_scale = std::log(static_cast<double>(cloud_.scales[k][row]));
+      planes_[3][3 * i + k] = static_cast<std::uint8_t>(
+          detail::nearest_step((log_scale - detail::kSpzLeastLogScale) * detail::kSpzLogSteps / 255, 8));
     }
-    const double opacity = static_cast<double>(cloud_.opacities[i]);
+    const double opacity = static_cast<double>(cloud_.opacities[row]);
     planes_[1][i] = static_cast<std::uint8_t>(detail::nearest_step(opacity, 8));
-    add_quaternion(i);
+    add_quaternion(i, row);
     for (std::size_t k = 0; k < 3 * coefficients; ++k) {
       const float sign = options_.keep_axes ? 1.0f : detail::kHalfTurnAboutX[k / 3];
       const int bits = k < 9 ? options_.sh1_bits : options_.sh_rest_bits;
       planes_[5][3 * coefficients * i + k] =
-          sh_byte(static_cast<double>(sign * cloud_.shN[3 * coefficients * i + k]), bits);
+          sh_byte(static_cast<double>(sign * cloud_.shN[3 * coefficients * row + k]), bits);
     }
   }
 
-  void add_quaternion(std::size_t i) {
-    const auto part = [&](std::size_t k) { return static_cast<double>(cloud_.quats[k][i]); };
+  void add_quaternion(std::size_t i, std::size_t row) {
+    const auto part = [&](std::size_t k) { return static_cast<double>(cloud_.quats[k][row]); };
     const double xyzw[4] = {part(1), turn_ * part(2), turn_ * part(3), part(0)};
     double others[3];
     std::uint32_t word = static_cast<std::uint32_t>(detail::smallest_three(xyzw, others));
@@ -160,8 +165,8 @@ class SpzWriter {
   static std::uint8_t sh_byte(double v, int bits) {
     const double step = std::exp2(8 - bits);
     const double most = 256 - step;
-    return static_cast<std::uint8_t>(
-        std::clamp(std::nearbyint((v * 128 + 128) / step) * step, 0.0, most));
+    return static_cast<std::uint8_t>(std::clamp(
+        std::nearbyint((v * detail::kSpzBandSteps + detail::kSpzBandSteps) / step) * step, 0.0, most));
   }
 
   static constexpr double kMostSteps = 8388607;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/scene/content_hash.hpp"
 
 namespace gsnav::io {
@@ -117,7 +118,7 @@ Status save_visible_sets(const fs::path& path, const VisibleSets& sets, const Ga
     header.chunks = sets.cloud_chunks;
     header.words = sets.bits.size();
     header.checksum = checksum(sets);
-    return detail::replace_file(path, [&](detail::OutFile& file) {
+    return replace_file(path, [&](OutputFile& file) {
       file.write(&header, sizeof header);
       file.write(sets.keys.data(), sets.keys.size() * sizeof(VisibleSets::Key));
       file.write(sets.ends.data(), sets.ends.size() * sizeof(std::uint64_t));

@@ -18,7 +18,7 @@ class FaceViews {
   /// each, 32 MiB: some 2000 faces).
   static constexpr std::size_t kMostPairs = std::size_t{1} << 24;
   /// Beams followed in all; from an edge with more than its part of them everything is taken to be seen.
-  static constexpr std::size_t kMostBeams = std::size_t{1} << 21;
+  static constexpr std::size_t kMostBeams = std::size_t{1} << 24;
 
   /// Directions of lines out of a face across its edge, from the left to the right as steps 0 to kSteps of the angle's
   /// cosine over the sum of cosine and sine, against the edge from its first corner to the next. None where

@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "gaussian_floor.hpp"
 #include "navmesh_stages.hpp"
@@ -13,7 +16,6 @@
 namespace gsnav {
 namespace {
 
-using detail::kNone;
 using detail::VoxelGrid;
 
 Status validate(const GaussianNavOptions& o) {
@@ -26,6 +28,19 @@ Status validate(const GaussianNavOptions& o) {
       {"solid_alpha", o.solid_alpha, 0.01, 0.999999}, {"max_hole", o.max_hole, 0.0, 100.0},
       {"floor_band", o.floor_band, 0.0, 1000.0},      {"min_island_area", o.min_island_area, 0.0, 1e9},
   };
+  if (o.crop) {
+    for (int k = 0; k < 3; ++k) {
+      if (!(o.crop->low[k] < o.crop->high[k])) {
+        return {Errc::invalid_argument, "GaussianNavOptions.crop: low " +
+                                            std::to_string(o.crop->low[k]) + " is not below high " +
+                                            std::to_string(o.crop->high[k])};
+      }
+    }
+  }
+  if (o.threads < 0) {
+    return {Errc::invalid_argument,
+            "GaussianNavOptions.threads = " + std::to_string(o.threads) + " is negative"};
+  }
   for (const Field& f : fields) {
     if (!(f.value >= f.low && f.value <= f.high)) {
       return {Errc::invalid_argument, std::string("GaussianNavOptions.") + f.name + " = " +
@@ -75,53 +90,53 @@ struct Pruner {
   }
 };
 
-/// Leaves out floor that has no ceiling where most has one.
-void drop_outside(const VoxelGrid& g, const GaussianNavOptions& options, std::size_t clearance,
-                  std::vector<std::size_t>& tops, GaussianNavReport& report) {
-  const std::vector<std::uint8_t> covered = covered_columns(g, tops, clearance, static_cast<int>(0.6 / g.cell));
-  std::size_t on_floor = 0, below_ceiling = 0;
-  for (std::size_t i = 0; i < tops.size(); ++i) {
-    on_floor += tops[i] != kNone ? 1 : 0;
-    below_ceiling += tops[i] != kNone && covered[i] != 0 ? 1 : 0;
-  }
-  report.ceiling_share = on_floor > 0 ? static_cast<double>(below_ceiling) / static_cast<double>(on_floor) : 0;
-  if (!options.drop_uncovered || report.ceiling_share <= 0.5) return;
-  for (std::size_t i = 0; i < tops.size(); ++i) {
-    if (tops[i] != kNone && covered[i] == 0) tops[i] = kNone;
-  }
-  report.dropped_uncovered = static_cast<double>(on_floor - below_ceiling) * g.cell * g.cell;
-}
-
 /// Cells of the heightfield below the grid's own first ones.
 struct Offset {
   int x = 0, y = 0, z = 0;
 };
 
-Status add_spans(detail::RecastLog& log, const VoxelGrid& g, const std::vector<std::size_t>& tops, int climb,
-                 const Offset& o, rcHeightfield& field) {
-  for (std::size_t z = 0; z < g.nz; ++z) {
-    for (std::size_t x = 0; x < g.nx; ++x) {
-      const std::size_t top = tops[x + g.nx * z];
-      const auto add = [&](std::size_t first, std::size_t end) {
-        const unsigned char area = top != kNone && end == top + 1 ? RC_WALKABLE_AREA : RC_NULL_AREA;
-        return rcAddSpan(&log, field, static_cast<int>(x) + o.x, static_cast<int>(z) + o.z,
-                         static_cast<unsigned short>(first + static_cast<std::size_t>(o.y)),
-                         static_cast<unsigned short>(end + static_cast<std::size_t>(o.y)), area, climb);
-      };
-      const auto solid = [&](std::size_t y) { return g.solid[g.at(x, y, z)] != 0 || y == top; };
-      for (std::size_t y = 0; y < g.ny;) {
-        if (!solid(y)) {
-          ++y;
-          continue;
+/// Adds the solid runs and floors of the grid to a field whose first column is (x0, z0) of the whole
+/// field's.
+Status add_spans(detail::RecastLog& log, const VoxelGrid& g, const detail::FloorTops& floors, int climb,
+                 const Offset& o, int x0, int z0, rcHeightfield& field) {
+  struct Piece {
+    std::size_t low, end;
+    bool floor;
+  };
+  std::vector<Piece> pieces;
+  const int nx = static_cast<int>(g.nx), nz = static_cast<int>(g.nz);
+  for (int fz = max(0, o.z - z0); fz < min(field.height, nz + o.z - z0); ++fz) {
+    for (int fx = max(0, o.x - x0); fx < min(field.width, nx + o.x - x0); ++fx) {
+      const auto c =
+          static_cast<std::size_t>(fx + x0 - o.x) + g.nx * static_cast<std::size_t>(fz + z0 - o.z);
+      pieces.clear();
+      for (const detail::SolidRun& r : g.runs_of(c)) pieces.push_back({r.low, r.end, false});
+      for (std::uint32_t i = floors.first[c]; i < floors.first[c + 1]; ++i) {
+        pieces.push_back({floors.tops[i], floors.tops[i] + std::size_t{1}, true});
+      }
+      std::sort(pieces.begin(), pieces.end(),
+                [](const Piece& a, const Piece& b) { return a.low < b.low; });
+      for (std::size_t i = 0; i < pieces.size();) {
+        const std::size_t low = pieces[i].low, from = i;
+        std::size_t end = pieces[i].end;
+        while (++i < pieces.size() && pieces[i].low <= end) end = max(end, pieces[i].end);
+        bool walkable = false;
+        for (std::size_t k = from; k < i; ++k)
+          walkable = walkable || (pieces[k].floor && pieces[k].end == end);
+        if (!rcAddSpan(&log, field, fx, fz,
+                       static_cast<unsigned short>(low + static_cast<std::size_t>(o.y)),
+                       static_cast<unsigned short>(end + static_cast<std::size_t>(o.y)),
+                       walkable ? RC_WALKABLE_AREA : RC_NULL_AREA, climb)) {
+          return detail::stage("adding spans", log);
         }
-        const std::size_t first = y;
-        while (y < g.ny && solid(y)) ++y;
-        if (!add(first, y)) return detail::stage("adding spans", log);
       }
     }
   }
   return {};
 }
+
+constexpr std::size_t kOneTile = std::size_t{1} << 22;  // columns that are built as one tile
+constexpr int kTileCells = 512;                         // a side, above that
 
 }  // namespace
 
@@ -137,43 +152,46 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings, std:
                                            const GaussianNavOptions& options) {
   if (Status s = settings.validate(); !s.ok()) return s;
   if (Status s = validate(options); !s.ok()) return s;
-  if (settings.tile_size != 0) {
-    return Status(Errc::invalid_argument, "NavMeshSettings.tile_size = " + std::to_string(settings.tile_size) +
-                                              ": a NavMesh from Gaussians is one tile (0)");
-  }
   auto box = detail::check_triangles(vertices, triangles);
   if (!box.ok()) return box.status();
   GaussianNavReport report;
-  auto voxels = detail::voxelise(settings, sets, options, report);
+  const int most = static_cast<int>(std::clamp<unsigned>(std::thread::hardware_concurrency(), 1, 16));
+  ThreadPool pool(options.threads > 0 ? options.threads : most);
+  auto voxels = detail::voxelise(settings, sets, options, pool, report);
   if (!voxels.ok()) return voxels.status();
-  const VoxelGrid& g = *voxels;
+  VoxelGrid& g = *voxels;
   const detail::VoxelSettings cells(settings);
-  const auto levels = [&](double metres) { return static_cast<std::size_t>(std::floor(metres / g.level + 1e-6)); };
-
-  const detail::Floor floor =
-      find_floor(g, static_cast<std::size_t>(cells.height), max<std::size_t>(1, levels(0.08)));
-  const double least_area = max(options.min_island_area, g.cell * g.cell);
-  const bool has_floor = floor.found && floor.best_area >= least_area;
-  if (!has_floor && triangles.empty()) {
-    return Status(Errc::nothing_navigable,
-                  "NavMesh from Gaussians: no floor: at no height does solid ground with " +
-                      std::to_string(settings.agent_height) + " m (agent_height) free above cover " +
-                      std::to_string(least_area) + " m2; the most is " + std::to_string(floor.best_area) +
-                      " m2, of " + std::to_string(report.solid_voxels) + " solid voxels");
+  const detail::FloorSettings look{
+      static_cast<std::size_t>(cells.height), static_cast<std::size_t>(cells.climb),
+      static_cast<std::size_t>(std::floor(options.floor_band / g.level + 1e-6)),
+      std::tan(settings.agent_max_slope * 3.14159265358979323846 / 180.0)};
+  double most_area = 0;
+  detail::FloorTops floors = detail::find_floors(g, look, options, pool, report, most_area);
+  if (floors.first.empty()) {
+    if (triangles.empty()) {
+      return Status(Errc::nothing_navigable,
+                    "NavMesh from Gaussians: no floor: at no height does solid ground with " +
+                        std::to_string(settings.agent_height) + " m (agent_height) free above cover " +
+                        std::to_string(max(options.min_island_area, g.cell * g.cell)) +
+                        " m2; the most is " + std::to_string(most_area) + " m2, of " +
+                        std::to_string(report.solid_voxels) + " solid voxels");
+    }
+    floors.first.assign(g.nx * g.nz + 1, 0);
   }
-  std::vector<std::size_t> tops(g.nx * g.nz, kNone);
-  if (has_floor) {
-    // A floor's voxel holds its surface near the middle.
-    report.floor_y = g.low.y + (static_cast<double>(floor.level) + 0.5) * g.level;
-    const std::size_t band = levels(options.floor_band);
-    const detail::FloorField field_of_floor(g, floor.level, static_cast<std::size_t>(cells.height), band);
-    tops = floor_tops(g, field_of_floor, band);
-    report.holes_filled = close_holes(g, tops, field_of_floor, static_cast<int>(options.max_hole / g.cell + 1e-6));
-    drop_outside(g, options, static_cast<std::size_t>(cells.height), tops, report);
+  // Things stand on the ground; under it there is noise.
+  constexpr double kHanging = 4;
+  if (options.refuse_underside && triangles.empty() && report.ceiling_share <= 0.5 &&
+      static_cast<double>(report.solid_below) > kHanging * static_cast<double>(report.solid_above) &&
+      report.solid_below * 20 > floors.tops.size()) {
+    return Status(Errc::nothing_navigable,
+                  "NavMesh from Gaussians: the ground at y = " + std::to_string(report.floor_y) +
+                      " is seen from below: " + std::to_string(report.solid_below) +
+                      " solid voxels hang under it, " + std::to_string(report.solid_above) +
+                      " stand on it. Give the axis that points up (--up), or clear "
+                      "GaussianNavOptions.refuse_underside");
   }
 
   // The voxels' grid, by whole cells as much larger as the triangles need.
-  detail::RecastLog log;
   Vec3d low = g.low, high = g.low + Vec3d{static_cast<double>(g.nx) * g.cell, static_cast<double>(g.ny) * g.level,
                                           static_cast<double>(g.nz) * g.cell};
   Offset offset;
@@ -186,21 +204,42 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings, std:
     constexpr double kMost = 65000;  // more is refused with the grid
     offset = {static_cast<int>(min(x, kMost)), static_cast<int>(min(y, kMost)), static_cast<int>(min(z, kMost))};
   }
-  auto field = detail::make_heightfield(log, settings, {}, high - low);
-  if (!field.ok()) return field.status();
-  if (Status s = add_spans(log, g, tops, cells.climb, offset, **field); !s.ok()) return s;
   // Tops of voxels stand half a voxel above the surface in them.
   const Vec3d origin = low - Vec3d{0, 0.5 * g.level, 0};
-  detail::BuildHooks hooks{Pruner{options.min_island_area, report}, {}};
   std::optional<detail::TriangleHeights> heights;
+  std::function<double(const Vec3d&)> height;
   if (!triangles.empty()) {
-    if (Status s = detail::rasterise(log, settings, vertices, triangles, origin, **field); !s.ok()) return s;
     heights.emplace(vertices, triangles, origin, Aabb<double>{box->low - origin, box->high - origin});
-    hooks.height = [&](const Vec3d& p) {
+    height = [&](const Vec3d& p) {
       return heights->at(p, 1.01 * settings.cell_height + settings.cell_size, 0.5 * settings.cell_height).value_or(p.y);
     };
   }
-  auto mesh = detail::finish_navmesh(log, settings, **field, origin, hooks);
+  const auto build = [&]() -> Result<NavMesh> {
+    NavMeshSettings made = settings;
+    if (made.tile_size == 0 && g.nx * g.nz > kOneTile) made.tile_size = kTileCells;
+    if (made.tile_size > 0) {
+      detail::TileHooks hooks;
+      hooks.fill = [&](detail::RecastLog& log, int x0, int z0, rcHeightfield& field) {
+        return add_spans(log, g, floors, cells.climb, offset, x0, z0, field);
+      };
+      hooks.height = height ? height : [](const Vec3d& p) { return p.y; };
+      hooks.least_area = options.min_island_area;
+      if (options.progress) hooks.progress = [&](double share) { options.progress("polygons", share); };
+      return detail::build_in_tiles(made, vertices, triangles, origin, {{}, high - low}, options.threads,
+                                    hooks);
+    }
+    detail::RecastLog log;
+    auto field = detail::make_heightfield(log, made, {}, high - low);
+    if (!field.ok()) return field.status();
+    if (Status s = add_spans(log, g, floors, cells.climb, offset, 0, 0, **field); !s.ok()) return s;
+    if (!triangles.empty()) {
+      if (Status s = detail::rasterise(log, made, vertices, triangles, origin, **field); !s.ok())
+        return s;
+    }
+    return detail::finish_navmesh(log, made, **field, origin,
+                                  {Pruner{options.min_island_area, report}, height});
+  };
+  auto mesh = build();
   if (!mesh.ok()) {
     return Status(mesh.code(), mesh.message() + "; floor found at y = " + std::to_string(report.floor_y) +
                                    ", left out as too small " +

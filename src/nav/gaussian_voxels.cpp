@@ -4,10 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <map>
+#include <mutex>
+#include <new>
 #include <string>
 
 #include "gsnav/kernels/packed_gaussians.hpp"
+#include "navmesh_stages.hpp"
 
 namespace gsnav::detail {
 namespace {
@@ -19,29 +24,49 @@ struct Solid {
   double opacity;
 };
 
+/// A set with what placing its Gaussians takes.
+struct PlacedSet {
+  const GaussianSet* set = nullptr;
+  Mat3d placed{};
+  explicit PlacedSet(const GaussianSet& s)
+      : set(&s), placed(rotation_matrix(s.world_from_asset.rotation) * s.world_from_asset.scale) {}
+
+  /// False where the Gaussian is fainter than `min_opacity`, or not finite.
+  bool read(std::size_t i, double min_opacity, Solid& s) const {
+    const GaussianView& g = set->gaussians;
+    s.opacity = static_cast<double>(opacity_of(g, i));
+    const Vec3d o = g.origin_ids.empty() ? Vec3d{} : g.origins[g.origin_ids[i]];
+    s.mean = set->world_from_asset * (o + vec_cast<double>(mean_of(g, i)));
+    if (!(s.opacity >= min_opacity) || !is_finite(s.mean)) return false;
+    const Vec3d scales = vec_cast<double>(scales_of(g, i));
+    s.axes = placed * rotation_matrix(quat_cast<double>(quat_of(g, i)));
+    for (int k = 0; k < 3; ++k) {
+      for (int r = 0; r < 3; ++r) s.axes(r, k) *= scales[k];
+    }
+    return true;
+  }
+};
+
 template <class F>
 void for_each_opaque(std::span<const GaussianSet> sets, double min_opacity, std::size_t& faint, F&& f) {
   for (const GaussianSet& set : sets) {
-    const GaussianView& g = set.gaussians;
-    const Mat3d placed = rotation_matrix(set.world_from_asset.rotation) * set.world_from_asset.scale;
-    for (std::size_t i = 0; i < g.size; ++i) {
-      Solid s;
-      s.opacity = static_cast<double>(opacity_of(g, i));
-      const Vec3d o = g.origin_ids.empty() ? Vec3d{} : g.origins[g.origin_ids[i]];
-      s.mean = set.world_from_asset * (o + vec_cast<double>(mean_of(g, i)));
-      if (!(s.opacity >= min_opacity) || !is_finite(s.mean)) {
+    const PlacedSet placed(set);
+    Solid s;
+    for (std::size_t i = 0; i < set.gaussians.size; ++i) {
+      if (placed.read(i, min_opacity, s)) {
+        f(s);
+      } else {
         ++faint;
-        continue;
       }
-      const Quatd q = quat_cast<double>(quat_of(g, i));
-      const Vec3d scales = vec_cast<double>(scales_of(g, i));
-      s.axes = placed * rotation_matrix(q);
-      for (int k = 0; k < 3; ++k) {
-        for (int r = 0; r < 3; ++r) s.axes(r, k) *= scales[k];
-      }
-      f(s);
     }
   }
+}
+
+bool inside(const Aabb<double>& box, const Vec3d& p) noexcept {
+  for (int k = 0; k < 3; ++k) {
+    if (p[k] < box.low[k] || p[k] > box.high[k]) return false;
+  }
+  return true;
 }
 
 /// Box of the densest connected part of the scene and of every part with a tenth of its mass: outliers
@@ -55,6 +80,7 @@ Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptio
   std::size_t faint = 0;
   for_each_opaque(sets, options.min_opacity, faint, [&](const Solid& s) {
     if (std::abs(s.mean.x) > kFar || std::abs(s.mean.y) > kFar || std::abs(s.mean.z) > kFar) return;
+    if (options.crop && !inside(*options.crop, s.mean)) return;
     Cell c;
     for (int k = 0; k < 3; ++k) {
       c[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(std::floor(s.mean[k] / kCoarse));
@@ -107,105 +133,371 @@ Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptio
   for (const Part& p : parts) {
     if (p.mass >= 0.1 * most) box.add(p.box);
   }
+  if (options.crop && !box.empty()) {
+    for (int k = 0; k < 3; ++k) {
+      box.low[k] = max(box.low[k], options.crop->low[k]);
+      box.high[k] = min(box.high[k], options.crop->high[k]);
+    }
+  }
   return box;
 }
 
-/// Adds -log(1 - alpha) of one Gaussian to the voxels that it reaches.
-class Splatter {
+/// What one Gaussian adds to the voxels that it reaches. Widened by the variance of a voxel, so that a
+/// disk thinner than a voxel still meets its centre.
+class Splat {
  public:
-  Splatter(VoxelGrid& grid, double sigmas) : grid_(grid), cut_(sigmas * sigmas), sigmas_(sigmas) {
-    mass_.assign(grid.nx * grid.ny * grid.nz, 0.0f);
-  }
-
-  bool add(const Solid& s) {
-    // Widened by the variance of a voxel, so that a disk thinner than a voxel still meets its centre.
-    const double vc = grid_.cell * grid_.cell / 12.0, vl = grid_.level * grid_.level / 12.0;
+  /// False where it reaches no voxel of the grid.
+  bool set(const VoxelGrid& g, const Solid& s, double sigmas) {
+    const double vc = g.cell * g.cell / 12.0, vl = g.level * g.level / 12.0;
     Mat3d cov = s.axes * transpose(s.axes);
     cov(0, 0) += vc;
     cov(1, 1) += vl;
     cov(2, 2) += vc;
     const double det = determinant(cov);
     if (!(det > 0) || !is_finite(det)) return false;
-    const Mat3d inv = transpose(Mat3d{{cross(cov.row[1], cov.row[2]), cross(cov.row[2], cov.row[0]),
-                                       cross(cov.row[0], cov.row[1])}}) * (1.0 / det);
-    std::size_t first[3], last[3];
-    const std::size_t n[3] = {grid_.nx, grid_.ny, grid_.nz};
-    const double size[3] = {grid_.cell, grid_.level, grid_.cell};
+    inv_ = transpose(Mat3d{{cross(cov.row[1], cov.row[2]), cross(cov.row[2], cov.row[0]),
+                            cross(cov.row[0], cov.row[1])}}) *
+           (1.0 / det);
+    mean_ = s.mean;
+    opacity_ = s.opacity;
+    const std::size_t n[3] = {g.nx, g.ny, g.nz};
+    const double size[3] = {g.cell, g.level, g.cell};
     for (int k = 0; k < 3; ++k) {
-      const double reach = sigmas_ * std::sqrt(cov(k, k)), c = s.mean[k] - grid_.low[k];
+      const double reach = sigmas * std::sqrt(cov(k, k)), c = s.mean[k] - g.low[k];
       const double a = std::ceil((c - reach) / size[k] - 0.5), b = std::floor((c + reach) / size[k] - 0.5);
       if (b < 0 || a > static_cast<double>(n[k] - 1) || a > b) return false;
       first[k] = static_cast<std::size_t>(max(a, 0.0));
       last[k] = static_cast<std::size_t>(min(b, static_cast<double>(n[k] - 1)));
     }
-    for (std::size_t z = first[2]; z <= last[2]; ++z) {
-      for (std::size_t x = first[0]; x <= last[0]; ++x) {
-        const double dx = grid_.low.x + (static_cast<double>(x) + 0.5) * size[0] - s.mean.x;
-        const double dz = grid_.low.z + (static_cast<double>(z) + 0.5) * size[2] - s.mean.z;
-        float* column = mass_.data() + grid_.at(x, 0, z);
-        for (std::size_t y = first[1]; y <= last[1]; ++y) {
-          const double dy = grid_.low.y + (static_cast<double>(y) + 0.5) * size[1] - s.mean.y;
-          const Vec3d d{dx, dy, dz};
-          const double q = dot(d, inv * d);
-          if (q > cut_) continue;
-          const double alpha = min(s.opacity * std::exp(-0.5 * q), 0.99);
-          column[y] -= static_cast<float>(std::log1p(-alpha));
-        }
-      }
-    }
     return true;
   }
 
-  void threshold(double alpha) {
-    const float least = static_cast<float>(-std::log1p(-alpha));
-    grid_.solid.resize(mass_.size());
-    for (std::size_t i = 0; i < mass_.size(); ++i) grid_.solid[i] = mass_[i] >= least ? 1 : 0;
+  /// Calls f(level, q) for the levels of a column whose squared Mahalanobis distance q is at most `cut`.
+  template <class F>
+  void column(const VoxelGrid& g, std::size_t x, std::size_t z, double cut, F&& f) const {
+    const double dx = g.low.x + (static_cast<double>(x) + 0.5) * g.cell - mean_.x;
+    const double dz = g.low.z + (static_cast<double>(z) + 0.5) * g.cell - mean_.z;
+    // q is a parabola over the level: the levels to look at, one more on each side for rounding.
+    const double side = inv_(1, 0) * dx + inv_(1, 2) * dz, bend = inv_(1, 1);
+    const double least =
+        inv_(0, 0) * dx * dx + 2 * inv_(0, 2) * dx * dz + inv_(2, 2) * dz * dz - side * side / bend;
+    if (least > cut + 1e-6 * (1 + cut)) return;
+    const double half = std::sqrt(max(cut - least, 0.0) / bend) + g.level,
+                 middle = mean_.y - side / bend - g.low.y;
+    const double a = (middle - half) / g.level - 0.5, b = (middle + half) / g.level - 0.5;
+    if (b < 0 || a > static_cast<double>(last[1])) return;
+    const std::size_t y1 = min(last[1], static_cast<std::size_t>(b));
+    for (std::size_t y = max(first[1], static_cast<std::size_t>(max(a, 0.0))); y <= y1; ++y) {
+      const Vec3d d{dx, g.low.y + (static_cast<double>(y) + 0.5) * g.level - mean_.y, dz};
+      const double q = dot(d, inv_ * d);
+      if (q <= cut) f(y, q);
+    }
+  }
+
+  double opacity() const noexcept { return opacity_; }
+  std::size_t first[3] = {}, last[3] = {};  ///< voxels that it may reach, along each axis
+
+ private:
+  Mat3d inv_{};
+  Vec3d mean_{};
+  double opacity_ = 0;
+};
+
+constexpr std::size_t kTile = 64;  // columns a side that one thread rasterises at a time
+constexpr std::size_t kBrick = 8;  // voxels a side that get memory together
+
+/// -log(1 - alpha) of the Gaussians so far, in bricks of 8 x 8 x 8 voxels that one of them has touched.
+class TileMass {
+ public:
+  explicit TileMass(std::size_t levels)
+      : high_((levels + kBrick - 1) / kBrick),
+        table_(kTile / kBrick * (kTile / kBrick) * high_, kNoBrick) {}
+
+  void clear() {
+    std::fill(table_.begin(), table_.end(), kNoBrick);
+    mass_.clear();
+  }
+  /// `x` and `z` within the tile.
+  float& at(std::size_t x, std::size_t y, std::size_t z) {
+    std::uint32_t& brick = table_[(z / kBrick * (kTile / kBrick) + x / kBrick) * high_ + y / kBrick];
+    if (brick == kNoBrick) {
+      brick = static_cast<std::uint32_t>(mass_.size() / kVoxels);
+      mass_.resize(mass_.size() + kVoxels, 0.0f);
+    }
+    return mass_[brick * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick + y % kBrick];
+  }
+  /// Appends the runs of a column of at least `least`. Returns how many.
+  std::uint32_t runs(std::size_t x, std::size_t z, std::size_t levels, float least,
+                     std::vector<SolidRun>& out) const {
+    const std::size_t before = out.size();
+    bool open = false;
+    const std::uint32_t* bricks = table_.data() + (z / kBrick * (kTile / kBrick) + x / kBrick) * high_;
+    for (std::size_t b = 0; b < high_; ++b) {
+      if (bricks[b] == kNoBrick) {
+        open = false;
+        continue;
+      }
+      const float* m = mass_.data() + bricks[b] * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick;
+      for (std::size_t k = 0; k < kBrick && b * kBrick + k < levels; ++k) {
+        const auto y = static_cast<std::uint16_t>(b * kBrick + k);
+        const bool solid = m[k] >= least;
+        if (solid && !open) out.push_back({y, y});
+        if (solid) out.back().end = static_cast<std::uint16_t>(y + 1);
+        open = solid;
+      }
+    }
+    return static_cast<std::uint32_t>(out.size() - before);
   }
 
  private:
-  VoxelGrid& grid_;
-  double cut_, sigmas_;
+  static constexpr std::uint32_t kNoBrick = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::size_t kVoxels = kBrick * kBrick * kBrick;
+  std::size_t high_;
+  std::vector<std::uint32_t> table_;
   std::vector<float> mass_;
 };
 
-/// Clears connected sets (26 neighbours) of fewer than `least` voxels. Returns how many were cleared.
-std::size_t remove_floaters(VoxelGrid& g, std::size_t least) {
-  std::size_t removed = 0;
-  std::vector<std::size_t> part;
-  for (std::size_t start = 0; start < g.solid.size(); ++start) {
-    if (g.solid[start] != 1) continue;
-    part.assign(1, start);
-    g.solid[start] = 2;
-    for (std::size_t k = 0; k < part.size(); ++k) {
-      const std::size_t y = part[k] % g.ny, x = part[k] / g.ny % g.nx, z = part[k] / g.ny / g.nx;
-      for (std::size_t zz = z - min<std::size_t>(z, 1); zz <= min(z + 1, g.nz - 1); ++zz) {
-        for (std::size_t xx = x - min<std::size_t>(x, 1); xx <= min(x + 1, g.nx - 1); ++xx) {
-          for (std::size_t yy = y - min<std::size_t>(y, 1); yy <= min(y + 1, g.ny - 1); ++yy) {
-            std::uint8_t& v = g.solid[g.at(xx, yy, zz)];
-            if (v != 1) continue;
-            v = 2;
-            part.push_back(g.at(xx, yy, zz));
-          }
+/// Gaussians that reach each tile of columns, in their order.
+struct TileLists {
+  struct Reach {
+    std::uint16_t x0 = 1, x1 = 0, z0 = 1, z1 = 0;  // none where x0 > x1
+  };
+  std::size_t nx, nz;
+  std::vector<std::size_t> first;
+  std::vector<std::uint32_t> rows;  // numbered through all sets
+
+  TileLists(const VoxelGrid& g, std::span<const GaussianSet> sets, const GaussianNavOptions& o,
+            GaussianNavReport& report)
+      : nx((g.nx + kTile - 1) / kTile), nz((g.nz + kTile - 1) / kTile), first(nx * nz + 1, 0) {
+    std::vector<Reach> reach;
+    Solid s;
+    Splat splat;
+    for (const GaussianSet& set : sets) {
+      const PlacedSet placed(set);
+      for (std::size_t i = 0; i < set.gaussians.size; ++i) {
+        reach.emplace_back();
+        if (!placed.read(i, o.min_opacity, s)) {
+          ++report.gaussians_faint;
+        } else if (!splat.set(g, s, o.sigmas)) {
+          ++report.gaussians_outside;
+        } else {
+          ++report.gaussians_used;
+          const auto tile = [](std::size_t v) { return static_cast<std::uint16_t>(v / kTile); };
+          reach.back() = {tile(splat.first[0]), tile(splat.last[0]), tile(splat.first[2]),
+                          tile(splat.last[2])};
         }
       }
     }
-    if (part.size() < least) {
-      removed += part.size();
-      for (const std::size_t i : part) g.solid[i] = 0;
+    const auto each = [&](const Reach& r, const auto& f) {
+      if (r.x0 > r.x1) return;
+      for (std::size_t z = r.z0; z <= r.z1; ++z) {
+        for (std::size_t x = r.x0; x <= r.x1; ++x) f(x + nx * z);
+      }
+    };
+    for (const Reach& r : reach) each(r, [&](std::size_t t) { ++first[t + 1]; });
+    for (std::size_t t = 1; t < first.size(); ++t) first[t] += first[t - 1];
+    rows.resize(first.back());
+    std::vector<std::size_t> at(first.begin(), first.end() - 1);
+    for (std::size_t i = 0; i < reach.size(); ++i) {
+      each(reach[i], [&](std::size_t t) { rows[at[t]++] = static_cast<std::uint32_t>(i); });
     }
   }
-  for (std::uint8_t& v : g.solid) v = v != 0 ? 1 : 0;
+};
+
+/// Runs of one tile, column by column.
+struct TileRuns {
+  std::vector<std::uint32_t> counts;
+  std::vector<SolidRun> runs;
+};
+
+/// Fills `g.runs`. Errors: out_of_memory.
+Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const GaussianNavOptions& o,
+                       ThreadPool& pool, GaussianNavReport& report) {
+  const TileLists lists(g, sets, o, report);
+  std::vector<PlacedSet> placed;
+  std::vector<std::size_t> begins;
+  std::size_t total = 0;
+  for (const GaussianSet& set : sets) {
+    placed.emplace_back(set);
+    begins.push_back(total);
+    total += set.gaussians.size;
+  }
+  const double cut = o.sigmas * o.sigmas;
+  const float least = static_cast<float>(-std::log1p(-o.solid_alpha));
+  std::vector<TileRuns> tiles(lists.nx * lists.nz);
+  std::mutex lock;
+  std::size_t done = 0;
+  bool failed = false;
+  const auto tile = [&](std::size_t t) {
+    TileRuns& out = tiles[t];
+    const std::size_t x0 = t % lists.nx * kTile, z0 = t / lists.nx * kTile;
+    const std::size_t x1 = min(x0 + kTile, g.nx), z1 = min(z0 + kTile, g.nz);
+    out.counts.assign((x1 - x0) * (z1 - z0), 0);
+    if (lists.first[t] == lists.first[t + 1]) return;
+    TileMass mass(g.ny);
+    Solid s;
+    Splat splat;
+    for (std::size_t k = lists.first[t]; k < lists.first[t + 1]; ++k) {
+      std::size_t set = 0;
+      while (set + 1 < begins.size() && lists.rows[k] >= begins[set + 1]) ++set;
+      if (!placed[set].read(lists.rows[k] - begins[set], o.min_opacity, s) || !splat.set(g, s, o.sigmas))
+        continue;
+      // Within this, one Gaussian alone makes a voxel solid.
+      const double enough = o.solid_alpha < 0.99 && s.opacity > o.solid_alpha
+                                ? 2 * std::log(s.opacity / o.solid_alpha) - 1e-6
+                                : -1.0;
+      for (std::size_t z = max(z0, splat.first[2]); z <= min(z1 - 1, splat.last[2]); ++z) {
+        for (std::size_t x = max(x0, splat.first[0]); x <= min(x1 - 1, splat.last[0]); ++x) {
+          splat.column(g, x, z, cut, [&](std::size_t y, double q) {
+            float& m = mass.at(x - x0, y, z - z0);
+            if (m >= least) return;
+            if (q < enough) {
+              m = least;
+              return;
+            }
+            m -= static_cast<float>(std::log1p(-min(s.opacity * std::exp(-0.5 * q), 0.99)));
+          });
+        }
+      }
+    }
+    for (std::size_t z = z0; z < z1; ++z) {
+      for (std::size_t x = x0; x < x1; ++x) {
+        out.counts[(z - z0) * (x1 - x0) + x - x0] = mass.runs(x - x0, z - z0, g.ny, least, out.runs);
+      }
+    }
+    out.runs.shrink_to_fit();
+  };
+  pool.run(static_cast<std::uint32_t>(tiles.size()), [&](std::uint32_t t) noexcept {
+    try {
+      tile(t);
+    } catch (const std::bad_alloc&) {
+      const std::lock_guard held(lock);
+      failed = true;
+    }
+    if (!o.progress) return;
+    const std::lock_guard held(lock);
+    ++done;
+    o.progress("voxels", static_cast<double>(done) / static_cast<double>(tiles.size()));
+  });
+  if (failed)
+    return {Errc::out_of_memory, "NavMesh from Gaussians: not enough memory for the solid voxels"};
+  g.first.assign(g.nx * g.nz + 1, 0);
+  const auto columns = [&](std::size_t t, const auto& f) {
+    const std::size_t x0 = t % lists.nx * kTile, z0 = t / lists.nx * kTile,
+                      width = min(kTile, g.nx - x0);
+    for (std::size_t i = 0, k = 0; i < tiles[t].counts.size(); k += tiles[t].counts[i++]) {
+      f(x0 + i % width + g.nx * (z0 + i / width), tiles[t].counts[i], k);
+    }
+  };
+  std::size_t all = 0;
+  for (const TileRuns& t : tiles) all += t.runs.size();
+  if (all >= std::numeric_limits<std::uint32_t>::max()) {
+    return {Errc::out_of_memory,
+            "NavMesh from Gaussians: more than 2^32 runs of solid voxels; raise cell_size or crop "
+            "the scene"};
+  }
+  for (std::size_t t = 0; t < tiles.size(); ++t) {
+    columns(t, [&](std::size_t c, std::uint32_t n, std::size_t) { g.first[c + 1] = n; });
+  }
+  for (std::size_t c = 1; c < g.first.size(); ++c) g.first[c] += g.first[c - 1];
+  g.runs.resize(all);
+  for (std::size_t t = 0; t < tiles.size(); ++t) {
+    columns(t, [&](std::size_t c, std::uint32_t n, std::size_t k) {
+      std::copy_n(tiles[t].runs.begin() + static_cast<std::ptrdiff_t>(k), n,
+                  g.runs.begin() + static_cast<std::ptrdiff_t>(g.first[c]));
+    });
+    tiles[t] = {};
+  }
+  return {};
+}
+
+/// Clears connected sets (26 neighbours) of fewer than `least` voxels. Returns how many were cleared.
+std::size_t remove_floaters(VoxelGrid& g, std::size_t least) {
+  std::vector<std::uint32_t> parent(g.runs.size());
+  for (std::uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
+  const auto root = [&](std::uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  const auto join = [&](std::size_t a, std::size_t b) {  // runs of two neighbouring columns that touch
+    std::uint32_t i = g.first[a], j = g.first[b];
+    while (i < g.first[a + 1] && j < g.first[b + 1]) {
+      if (g.runs[i].low <= g.runs[j].end && g.runs[j].low <= g.runs[i].end) {
+        const std::uint32_t u = root(i), v = root(j);
+        parent[max(u, v)] = min(u, v);
+      }
+      ++(g.runs[i].end < g.runs[j].end ? i : j);
+    }
+  };
+  for (std::size_t z = 0; z < g.nz; ++z) {
+    for (std::size_t x = 0; x < g.nx; ++x) {
+      const std::size_t c = x + g.nx * z;
+      if (g.first[c] == g.first[c + 1]) continue;
+      if (x > 0) join(c, c - 1);
+      if (z == 0) continue;
+      join(c, c - g.nx);
+      if (x > 0) join(c, c - g.nx - 1);
+      if (x + 1 < g.nx) join(c, c - g.nx + 1);
+    }
+  }
+  std::vector<std::uint32_t> size(g.runs.size(), 0);
+  for (std::uint32_t i = 0; i < parent.size(); ++i) {
+    parent[i] = root(i);
+    std::uint32_t& n = size[parent[i]];
+    n +=
+        min<std::uint32_t>(g.runs[i].end - g.runs[i].low, std::numeric_limits<std::uint32_t>::max() - n);
+  }
+  std::size_t removed = 0;
+  std::uint32_t kept = 0, i = 0;
+  for (std::size_t c = 0; c < g.nx * g.nz; ++c) {
+    const std::uint32_t end = g.first[c + 1];
+    g.first[c] = kept;
+    for (; i < end; ++i) {
+      if (size[parent[i]] < least) {
+        removed += static_cast<std::size_t>(g.runs[i].end - g.runs[i].low);
+      } else {
+        g.runs[kept++] = g.runs[i];
+      }
+    }
+  }
+  g.first.back() = kept;
+  g.runs.resize(kept);
   return removed;
+}
+
+/// A length as people write it: 0.05, not 0.050000.
+std::string metres(double v) {
+  std::string s = std::to_string(v);
+  s.erase(s.find_last_not_of('0') + 1);
+  if (s.back() == '.') s.pop_back();
+  return s;
+}
+
+/// What to do where the grid is `times` as large as it may be.
+Status too_large(const VoxelGrid& g, const char* field, std::size_t limit, double times,
+                 double dimensions) {
+  const double cell = g.cell * std::pow(times, 1.0 / dimensions);
+  return {Errc::invalid_argument,
+          "a NavMesh at " + metres(g.cell) + " m needs " + std::to_string(g.nx) + " x " +
+              std::to_string(g.ny) + " x " + std::to_string(g.nz) + " voxels (limit " + field + " = " +
+              std::to_string(limit) + "). Use --cell-size " +
+              metres(std::ceil(cell / 0.05 + 1e-6) * 0.05) +
+              " (NavMeshSettings.cell_size, and cell_height with it), or --crop X0 Y0 Z0 X1 Y1 Z1 "
+              "(GaussianNavOptions.crop)"};
 }
 
 }  // namespace
 
 Result<VoxelGrid> voxelise(const NavMeshSettings& settings, std::span<const GaussianSet> sets,
-                           const GaussianNavOptions& options, GaussianNavReport& report) {
+                           const GaussianNavOptions& options, ThreadPool& pool,
+                           GaussianNavReport& report) {
   Aabb<double> box = scene_box(sets, options);
   if (box.empty()) {
-    return Status(Errc::nothing_navigable, "NavMesh from Gaussians: no part of the scene is opaque enough "
-                                           "(min_opacity " + std::to_string(options.min_opacity) + ")");
+    return Status(Errc::nothing_navigable,
+                  "NavMesh from Gaussians: no part of the scene is opaque enough "
+                  "(min_opacity " +
+                      std::to_string(options.min_opacity) + ")" +
+                      (options.crop ? ", or none lies in the crop" : ""));
   }
   VoxelGrid g;
   g.cell = settings.cell_size;
@@ -217,25 +509,29 @@ Result<VoxelGrid> voxelise(const NavMeshSettings& settings, std::span<const Gaus
   report.bounds = box;
   const Vec3d size = box.high - box.low;
   const double nx = std::ceil(size.x / g.cell), ny = std::ceil(size.y / g.level), nz = std::ceil(size.z / g.cell);
-  if (!(nx * ny * nz <= static_cast<double>(options.max_voxels))) {
-    std::string message = "NavMesh from Gaussians: a grid of ";
-    message += std::to_string(nx) + " x " + std::to_string(ny) + " x " + std::to_string(nz) +
-               " voxels exceeds max_voxels = " + std::to_string(options.max_voxels) +
-               "; raise cell_size or cell_height, or crop the scene";
-    return Status(Errc::invalid_argument, message);
+  constexpr double kLargest = 1e15;  // more cannot be counted
+  if (nx < kLargest && ny < kLargest && nz < kLargest) {
+    g.nx = static_cast<std::size_t>(nx);
+    g.ny = static_cast<std::size_t>(ny);
+    g.nz = static_cast<std::size_t>(nz);
   }
-  g.nx = static_cast<std::size_t>(nx);
-  g.ny = static_cast<std::size_t>(ny);
-  g.nz = static_cast<std::size_t>(nz);
-  Splatter splatter(g, options.sigmas);
-  for_each_opaque(sets, options.min_opacity, report.gaussians_faint, [&](const Solid& s) {
-    (splatter.add(s) ? report.gaussians_used : report.gaussians_outside) += 1;
-  });
-  splatter.threshold(options.solid_alpha);
+  const double voxels = nx * ny * nz / static_cast<double>(options.max_voxels);
+  if (!(voxels <= 1))
+    return too_large(g, "GaussianNavOptions.max_voxels", options.max_voxels, voxels, 3);
+  const double columns = (nx + 1) * (nz + 1) / static_cast<double>(settings.max_cells);
+  if (!(columns <= 1)) return too_large(g, "NavMeshSettings.max_cells", settings.max_cells, columns, 2);
+  if (Status s = check_grid(settings, {}, size); !s.ok()) return s;
+  std::size_t rows = 0;
+  for (const GaussianSet& set : sets) rows += set.gaussians.size;
+  if (rows >= std::numeric_limits<std::uint32_t>::max()) {
+    return Status(Errc::invalid_argument, "NavMesh from Gaussians: " + std::to_string(rows) +
+                                              " Gaussians are more than 2^32; crop the scene");
+  }
+  if (Status s = rasterise_tiles(g, sets, options, pool, report); !s.ok()) return s;
   report.columns = g.nx * g.nz;
-  report.voxels = g.solid.size();
+  report.voxels = g.nx * g.ny * g.nz;
   report.floater_voxels = remove_floaters(g, options.min_support);
-  report.solid_voxels = static_cast<std::size_t>(std::count(g.solid.begin(), g.solid.end(), std::uint8_t{1}));
+  for (const SolidRun& r : g.runs) report.solid_voxels += static_cast<std::size_t>(r.end - r.low);
   return g;
 }
 

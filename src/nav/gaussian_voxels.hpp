@@ -2,26 +2,39 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "gsnav/core/thread_pool.hpp"
 #include "gsnav/nav/gaussian_navmesh.hpp"
 
 namespace gsnav::detail {
 
-/// Solid voxels of a scene. Index: (column x + nx * row z) * ny + level, levels upwards.
+/// Consecutive solid voxels of one column: levels [low, end).
+struct SolidRun {
+  std::uint16_t low = 0, end = 0;
+  std::size_t top() const noexcept { return end - std::size_t{1}; }
+};
+
+/// Solid voxels of a scene as runs: memory grows with the surfaces, not with the box. Column: x + nx *
+/// z.
 struct VoxelGrid {
   Vec3d low{};  ///< world corner
   double cell = 0.05, level = 0.05;
-  std::size_t nx = 0, ny = 0, nz = 0;
-  std::vector<std::uint8_t> solid;
+  std::size_t nx = 0, ny = 0, nz = 0;  ///< columns along x, levels, columns along z
+  std::vector<std::uint32_t> first;    ///< [nx * nz + 1], index into `runs`
+  std::vector<SolidRun> runs;          ///< of each column upwards, with a gap between two
 
-  std::size_t at(std::size_t x, std::size_t y, std::size_t z) const noexcept {
-    return (x + nx * z) * ny + y;
+  std::span<const SolidRun> runs_of(std::size_t column) const noexcept {
+    return {runs.data() + first[column], first[column + 1] - first[column]};
   }
 };
 
-/// Box of the scene, then the voxels in it; fills the counts of the report.
+/// Box of the scene, then the voxels in it; fills the counts of the report. The grid is rasterised in
+/// tiles of columns, each by one thread with the Gaussians in their order: the same bits on any number
+/// of threads.
 Result<VoxelGrid> voxelise(const NavMeshSettings& settings, std::span<const GaussianSet> sets,
-                           const GaussianNavOptions& options, GaussianNavReport& report);
+                           const GaussianNavOptions& options, ThreadPool& pool,
+                           GaussianNavReport& report);
 
 }  // namespace gsnav::detail

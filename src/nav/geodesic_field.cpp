@@ -1,38 +1,59 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/nav/geodesic_field.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include <atomic>
 #include <limits>
+#include <new>
 #include <string>
 
+#include "field_cells.hpp"
 #include "navmesh_impl.hpp"
 
 namespace gsnav {
 
-using detail::Flat;
+using detail::FieldCells;
+using detail::FieldGrid;
+using detail::FieldSource;
 using detail::GeodesicSearch;
 using detail::Site;
 
 struct GeodesicField::Impl {
-  /// A point in the plane of a face with its distance to the goal, and the window of the face's edge that it
-  /// sees the face through; no width where it lies in or on the face.
-  struct Source {
-    Flat root, right, left;
-    double g = 0;
-    double least = 0;  ///< no point of the face is nearer
-  };
+  ~Impl() {
+    if (faces == nullptr) return;
+    for (std::uint32_t f = 0; f + 1 < first.size(); ++f)
+      delete faces[f].cells.load(std::memory_order_relaxed);
+  }
 
-  static Source seen_through(const GeodesicSearch::Node& n) noexcept {
-    const Flat e = n.left - n.right;
-    const double t = clamp(detail::dot(n.root - n.right, e) / detail::dot(e, e), 0.0, 1.0);
-    return {n.root, n.right, n.left, n.g, n.g + detail::length(n.right + e * t - n.root)};
+  /// Made by who first asks; where two do so at once, both make the same and one is kept. Null without
+  /// memory, and for a face of more sources than cells can count.
+  const FieldCells* make_cells(std::uint32_t face) const noexcept {
+    const std::span<const FieldSource> own = sources_of(face);
+    if (own.size() > FieldCells::kMostSources) return nullptr;
+    try {
+      const Face& f = faces[face];
+      auto made = std::make_unique<const FieldCells>(*unfolded, face, f.grid, own, relative_error);
+      const FieldCells* kept = nullptr;
+      if (f.cells.compare_exchange_strong(kept, made.get(), std::memory_order_acq_rel))
+        return made.release();
+      return kept;
+    } catch (const std::bad_alloc&) {
+      return nullptr;
+    }
+  }
+  std::span<const FieldSource> sources_of(std::uint32_t face) const noexcept {
+    return std::span(sources).subspan(first[face], first[face + 1] - first[face]);
   }
 
   const NavMesh::Impl* mesh = nullptr;
   std::shared_ptr<const detail::UnfoldedMesh> unfolded;
+  double relative_error = 0;
   std::vector<std::uint32_t> first;  ///< of each face in `sources`, and one past the last
-  std::vector<Source> sources;
+  std::vector<FieldSource> sources;
+  struct Face {
+    FieldGrid grid;
+    mutable std::atomic<const FieldCells*> cells{nullptr};
+  };
+  std::unique_ptr<Face[]> faces;
 };
 
 GeodesicField::GeodesicField(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
@@ -41,9 +62,15 @@ GeodesicField& GeodesicField::operator=(GeodesicField&&) noexcept = default;
 GeodesicField::~GeodesicField() = default;
 
 Result<GeodesicField> GeodesicField::make(const NavMesh& mesh, std::span<const Vec3d> goals,
-                                          const SnapOptions& options) {
+                                          const SnapOptions& options, double relative_error) {
   if (goals.empty()) return Status(Errc::invalid_argument, "geodesic field: there are no goals");
+  if (!(relative_error >= 0 && relative_error <= 0.1)) {
+    return Status(Errc::invalid_argument, "geodesic field: relative_error is " +
+                                              std::to_string(relative_error) +
+                                              ": give 0 (exact) to 0.1");
+  }
   auto impl = std::make_unique<Impl>();
+  impl->relative_error = relative_error;
   impl->mesh = &mesh.impl();
   impl->unfolded = mesh.impl().share_unfolded();
   const detail::UnfoldedMesh& m = *impl->unfolded;
@@ -59,10 +86,10 @@ Result<GeodesicField> GeodesicField::make(const NavMesh& mesh, std::span<const V
   GeodesicSearch& search = detail::thread_search();
   search.flood(m, sites);
 
-  std::vector<std::vector<Impl::Source>> by_face(m.faces.size());
-  for (const Site& s : sites) by_face[s.face].push_back({s.at, s.at, s.at, 0.0, 0.0});
+  std::vector<std::vector<FieldSource>> by_face(m.faces.size());
+  for (const Site& s : sites) by_face[s.face].push_back({s.at, s.at, s.at, 0.0});
   for (const GeodesicSearch::Node& n : search.nodes()) {
-    if (!n.is_vertex) by_face[m.edges[n.edge].face].push_back(Impl::seen_through(n));
+    if (!n.is_vertex) by_face[m.edges[n.edge].face].push_back({n.root, n.right, n.left, n.g});
   }
   for (std::uint32_t f = 0; f < m.faces.size(); ++f) {
     for (std::uint32_t k = 0; k < m.faces[f].count; ++k) {
@@ -70,14 +97,17 @@ Result<GeodesicField> GeodesicField::make(const NavMesh& mesh, std::span<const V
       const double d = search.vertex_distance(e.vertex);
       // Through a vertex that no path bends at windows lead beside it.
       const bool needed = m.vertices[e.vertex].turning || d <= 0 || by_face[f].empty();
-      if (needed && d < std::numeric_limits<double>::infinity()) by_face[f].push_back({e.at, e.at, e.at, d, d});
+      if (needed && d < std::numeric_limits<double>::infinity())
+        by_face[f].push_back({e.at, e.at, e.at, d});
     }
-    std::stable_sort(by_face[f].begin(), by_face[f].end(),
-                     [](const Impl::Source& a, const Impl::Source& b) { return a.least < b.least; });
     impl->first.push_back(static_cast<std::uint32_t>(impl->sources.size()));
     impl->sources.insert(impl->sources.end(), by_face[f].begin(), by_face[f].end());
   }
   impl->first.push_back(static_cast<std::uint32_t>(impl->sources.size()));
+  impl->sources.shrink_to_fit();
+  impl->faces = std::make_unique<Impl::Face[]>(m.faces.size());
+  for (std::uint32_t f = 0; f < m.faces.size(); ++f)
+    impl->faces[f].grid = FieldGrid(m, f, by_face[f].size());
   return GeodesicField(std::move(impl));
 }
 
@@ -85,21 +115,11 @@ double GeodesicField::distance(const NavPoint& p) const noexcept {
   double best = std::numeric_limits<double>::infinity();
   if (p.poly >= impl_->mesh->polys.polys.size() || !is_finite(p.position)) return best;
   const Site at = impl_->mesh->site(p);
-  for (std::uint32_t i = impl_->first[at.face]; i < impl_->first[at.face + 1]; ++i) {
-    const Impl::Source& s = impl_->sources[i];
-    if (s.least >= best) break;
-    const Flat d = at.at - s.root;
-    const double straight = s.g + detail::length(d);
-    if (straight >= best) continue;
-    // Through the window: the root is on its outer side, the point on its inner side.
-    const double right = detail::cross(s.right - s.root, d), left = detail::cross(s.left - s.root, d);
-    if (right >= 0 && left <= 0) {
-      best = straight;
-    } else {
-      const Flat end = right < 0 ? s.right : s.left;
-      best = min(best, s.g + detail::length(end - s.root) + detail::length(at.at - end));
-    }
-  }
+  const Impl::Face& face = impl_->faces[at.face];
+  const FieldCells* cells = face.cells.load(std::memory_order_acquire);
+  if (cells == nullptr) cells = impl_->make_cells(at.face);
+  if (cells != nullptr) return cells->least(face.grid.cell(at.at), at.at);
+  for (const FieldSource& s : impl_->sources_of(at.face)) best = s.least(at.at, best);
   return best;
 }
 

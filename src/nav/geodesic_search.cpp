@@ -202,6 +202,7 @@ void GeodesicSearch::spread(std::uint32_t face, std::uint32_t first, std::uint32
                             const Cone& cone, double g, std::uint32_t parent) {
   const UnfoldedMesh::Face& f = mesh_->faces[face];
   const auto edge = [&](std::uint32_t k) { return f.first + (k < f.count ? k : k - f.count); };
+  const bool wide = dot(cone.right, cone.left) < 0;
   Flat p = mesh_->edges[edge(first)].at;
   double right_p = cross(cone.right, p - root), left_p = cross(cone.left, p - root);
   for (std::uint32_t k = first; k < first + count; ++k) {
@@ -210,7 +211,9 @@ void GeodesicSearch::spread(std::uint32_t face, std::uint32_t first, std::uint32
     const double right_q = cross(cone.right, q - root), left_q = cross(cone.left, q - root);
     if (k + 1 < first + count && right_q >= -kRounding && left_q <= kRounding) reach(after, root, g, parent);
     if (left_p >= 0 && k != first) break;
-    if (right_q > 0) {
+    // From a root on the edge that it enters by, or at a corner in line with its neighbours, the cone is half a turn wide:
+    // the end of the last edge lies on the line of its right side, or by rounding beyond.
+    if (right_q > 0 || (wide && right_p > 0 && k + 1 == first + count)) {
       const Flat r = right_p >= 0 ? p : p + (q - p) * (right_p / (right_p - right_q));
       const Flat l = left_q <= 0 ? q : p + (q - p) * (left_p / (left_p - left_q));
       if (left_p < 0 || left_q < 0) open(e, root, r, l, g, parent);

@@ -253,7 +253,11 @@ void mend_heights(PolyMesh& mesh) {
     const PolyMesh::Poly& p = mesh.polys[id];
     const std::span<const Vec3d> corners = std::span(mesh.corners).subspan(p.first, p.count);
     const std::span<const Triangle> old = std::span(mesh.tris).subspan(p.tri_first, p.tri_count);
-    if (old.size() < 3 || cover_once(corners, mesh.points, old)) continue;
+    // A fan of two triangles or less over the corners alone has nothing to mend. One of more triangles
+    // than that has samples on a side, which a sliver may leave without effect: a triangle of three
+    // corners and a sample has two.
+    if ((old.size() < 3 && old.size() + 2 <= corners.size()) || cover_once(corners, mesh.points, old))
+      continue;
     std::vector<Triangle> made = triangulated(mesh, p, added);
     if (made.empty()) continue;
     count = count + made.size() - old.size();

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/nav/navmesh.hpp"
 
+#include <limits>
+#include <map>
+#include <utility>
+
 #include "navmesh_impl.hpp"
 
 namespace gsnav {
@@ -24,19 +28,46 @@ std::vector<std::array<Vec3d, 3>> NavMesh::triangles() const {
   return out;
 }
 
+NavMeshTriangles NavMesh::surface(std::optional<std::size_t> island) const {
+  const detail::PolyMesh& m = impl_->polys;
+  NavMeshTriangles out;
+  std::map<std::array<double, 3>, std::uint32_t> numbers;
+  if (island && *island >= m.islands.size()) return out;
+  const std::size_t first = island ? m.islands[*island].first : 0;
+  const std::size_t end = island ? first + m.islands[*island].count : m.by_island.size();
+  for (std::size_t i = first; i < end; ++i) {
+    const detail::PolyMesh::Poly& p = m.polys[m.by_island[i]];
+    for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
+      std::array<Vec3d, 3> v = m.triangle(m.tris[t]);
+      if (cross(v[1] - v[0], v[2] - v[0]).y < 0) std::swap(v[1], v[2]);
+      std::array<std::uint32_t, 3>& triangle = out.triangles.emplace_back();
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto next = static_cast<std::uint32_t>(out.vertices.size());
+        const auto [at, added] = numbers.try_emplace({v[k].x, v[k].y, v[k].z}, next);
+        if (added) out.vertices.push_back(v[k] + impl_->origin);
+        triangle[k] = at->second;
+      }
+    }
+  }
+  return out;
+}
+
 std::size_t NavMesh::island_count() const noexcept { return impl_->polys.islands.size(); }
-std::size_t NavMesh::island_of(PolyId poly) const noexcept { return impl_->polys.polys[poly].island; }
+std::size_t NavMesh::island_of(PolyId poly) const noexcept {
+  return poly < polygon_count() ? impl_->polys.polys[poly].island : kNoIsland;
+}
 double NavMesh::island_area(std::size_t island) const noexcept {
-  return impl_->polys.islands[island].area;
+  return island < island_count() ? impl_->polys.islands[island].area : 0.0;
 }
 double NavMesh::island_radius(std::size_t island) const noexcept {
-  return impl_->polys.islands[island].radius;
+  return island < island_count() ? impl_->polys.islands[island].radius : 0.0;
 }
 
 std::optional<NavPoint> NavMesh::snap_point(const Vec3d& p, const SnapOptions& options) const {
   if (!is_finite(p) || !is_finite(options.half_extents)) return {};
   const detail::PolyMesh& m = impl_->polys;
-  NavPoint at = m.grid.nearest(m, p - impl_->origin, options.half_extents, impl_->settings.agent_max_climb);
+  NavPoint at = m.grid.nearest(m, p - impl_->origin, options.half_extents,
+                               impl_->settings.agent_max_climb, options.island);
   if (at.poly == kNoPoly) return {};
   at.position += impl_->origin;
   return at;
@@ -48,6 +79,7 @@ bool NavMesh::is_navigable(const Vec3d& p, double max_height_delta) const {
 }
 
 double NavMesh::height_at(PolyId poly, const Vec3d& p) const noexcept {
+  if (poly >= polygon_count()) return std::numeric_limits<double>::quiet_NaN();
   return impl_->polys.height(poly, p - impl_->origin) + impl_->origin.y;
 }
 

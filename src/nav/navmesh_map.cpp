@@ -9,6 +9,7 @@ namespace gsnav {
 namespace {
 
 constexpr double kMaxCells = 0x1p28;
+constexpr double kWhole = 1e-6;  // cells: a span this much short of a whole number of them is one
 
 /// Part of the line z = const that lies in a polygon; none where low > high.
 struct Reach {
@@ -34,8 +35,8 @@ Reach reach_at(const detail::PolyMesh& m, const detail::PolyMesh::Poly& poly, do
 
 }  // namespace
 
-Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell,
-                                         double max_height_delta) const {
+Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, double max_height_delta,
+                                         TopDownLayout layout) const {
   const auto bad = [](const char* name, double value, const char* what) {
     return Status(Errc::invalid_argument,
                   std::string("top-down map: ") + name + " = " + std::to_string(value) + " " + what);
@@ -46,10 +47,18 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell,
     return bad("metres_per_cell", metres_per_cell, "must be positive and finite");
   }
   const Aabb<double> box = bounds();
-  const double columns = max(std::ceil((box.high.x - box.low.x) / metres_per_cell), 1.0);
-  const double rows = max(std::ceil((box.high.z - box.low.z) / metres_per_cell), 1.0);
+  const bool corners = layout == TopDownLayout::habitat;
+  const auto cells = [&](double low, double high) {
+    const double n = (high - low) / metres_per_cell;
+    return corners ? std::floor(n + kWhole) : max(std::ceil(n), 1.0);
+  };
+  const double columns = cells(box.low.x, box.high.x), rows = cells(box.low.z, box.high.z);
   if (!(columns * rows <= kMaxCells)) {
     return bad("metres_per_cell", metres_per_cell, "makes more than 2^28 cells; raise it");
+  }
+  if (columns * rows < 1) {
+    return bad("metres_per_cell", metres_per_cell,
+               "is more than the mesh measures; lower it, or use another layout");
   }
   TopDownMap map;
   map.low = box.low;
@@ -57,6 +66,20 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell,
   map.columns = static_cast<std::size_t>(columns);
   map.rows = static_cast<std::size_t>(rows);
   map.islands.assign(map.columns * map.rows, -1);
+  if (corners) {
+    map.at = 0;
+    constexpr double kBeside = 0.01, kFarthest = 1e9;  // metres
+    for (std::size_t r = 0; r < map.rows; ++r) {
+      for (std::size_t c = 0; c < map.columns; ++c) {
+        const Vec3d p{box.low.x + static_cast<double>(c) * metres_per_cell, height,
+                      box.low.z + static_cast<double>(r) * metres_per_cell};
+        const auto there = snap_point(p, {{kBeside, min(max_height_delta, kFarthest), kBeside}});
+        if (!there || std::hypot(there->position.x - p.x, there->position.z - p.z) > kBeside) continue;
+        map.islands[map.columns * r + c] = static_cast<std::int32_t>(island_of(there->poly));
+      }
+    }
+    return map;
+  }
   std::vector<double> off(map.islands.size(), max_height_delta);  // of the surface shown, from `height`
 
   const detail::PolyMesh& m = impl_->polys;

@@ -27,11 +27,17 @@ Status off_mesh(const char* name, const Vec3d& p) {
 }  // namespace
 
 detail::Site NavMesh::Impl::site(const NavPoint& p) const noexcept {
-  Vec3d local = polys.clamped(p.poly, p.position - origin);
-  local.y = polys.height(p.poly, local);
+  Vec3d local = p.position - origin;
   const detail::UnfoldedMesh& m = unfolded();
-  const std::uint32_t face = m.face_at(p.poly, local);
-  return {face, m.flat(m.faces[face], local), local};
+  std::uint32_t face = m.grid.find(p.poly, local);
+  if (face != detail::FaceGrid::kNone) return {face, m.flat(m.faces[face], local), local};
+  local = polys.clamped(p.poly, local);
+  local.y = polys.height(p.poly, local);
+  face = m.face_at(p.poly, local);
+  const detail::Flat at = m.flat(m.faces[face], local);
+  // What lies outside its face, be it by a micrometre, sees the edge there from behind and would not pass it.
+  const bool whole = polys.polys[p.poly].planar && m.first_face[p.poly + 1] - m.first_face[p.poly] == 1;
+  return {face, whole ? at : m.clamped(face, at), local};
 }
 
 double NavMesh::Impl::distance(const detail::Site& start, const detail::Site& goal) const {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -183,9 +184,19 @@ DetourBytes copy_tile(std::span<const std::byte> tile, const TileLayout& t, int&
   return out;
 }
 
+/// The shortest decimal number that is this float32: 0.05 and not 0.0500000007, so that a mesh built
+/// with settings that were loaded is the mesh built with those that were saved.
+double decimal(float v) noexcept {
+  char text[32];
+  const auto written = std::to_chars(text, text + sizeof text, v);
+  double out = static_cast<double>(v);
+  std::from_chars(text, written.ptr, out);
+  return out;
+}
+
 Status read_settings(const std::byte* p, const Where& where, NavMeshSettings& s) {
   for (std::size_t k = 0; k < kSettingCount; ++k) {
-    const auto v = static_cast<double>(load<float>(p + 4 * k));
+    const double v = decimal(load<float>(p + 4 * k));
     if (!std::isfinite(v)) return where.bad(kSettingFields[k].name, v, "is not finite");
     if (kSettingFields[k].value != nullptr) {
       s.*kSettingFields[k].value = v;
@@ -193,10 +204,11 @@ Status read_settings(const std::byte* p, const Where& where, NavMeshSettings& s)
       s.verts_per_poly = static_cast<int>(clamp(v, -1.0, 100.0));
     }
   }
-  // Older files have a byte of padding for the fourth flag, which is not needed here.
+  // Older files have a byte of padding for the fourth flag, of any value.
   s.filter_low_hanging_obstacles = p[52] != std::byte{0};
   s.filter_ledge_spans = p[53] != std::byte{0};
   s.filter_walkable_low_height_spans = p[54] != std::byte{0};
+  s.include_static_objects = p[55] == std::byte{1};
   if (const Status valid = s.validate(); !valid.ok()) return where.bad(valid.message());
   return {};
 }
@@ -280,9 +292,9 @@ Result<NavMesh> parse(std::span<const std::byte> file, const Where& where) {
     (void)data.release();  // NOLINT: Detour frees it
     if (i == 0 && version == 1) {
       const std::byte* h = tiles[0].bytes.data();
-      settings.agent_height = static_cast<double>(load<float>(h + 60));
-      settings.agent_radius = static_cast<double>(load<float>(h + 64));
-      settings.agent_max_climb = static_cast<double>(load<float>(h + 68));
+      settings.agent_height = decimal(load<float>(h + 60));
+      settings.agent_radius = decimal(load<float>(h + 64));
+      settings.agent_max_climb = decimal(load<float>(h + 68));
       if (const Status s = settings.validate(); !s.ok()) return where.bad(s.message());
     }
   }

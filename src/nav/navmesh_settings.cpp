@@ -5,7 +5,21 @@
 #include <limits>
 #include <string>
 
+#include "navmesh_format.hpp"
+
 namespace gsnav {
+
+bool operator==(const NavMeshSettings& a, const NavMeshSettings& b) noexcept {
+  for (const detail::SettingField& f : detail::kSettingFields) {
+    if (f.value != nullptr && static_cast<float>(a.*f.value) != static_cast<float>(b.*f.value))
+      return false;
+  }
+  return a.verts_per_poly == b.verts_per_poly &&
+         a.filter_low_hanging_obstacles == b.filter_low_hanging_obstacles &&
+         a.filter_ledge_spans == b.filter_ledge_spans &&
+         a.filter_walkable_low_height_spans == b.filter_walkable_low_height_spans &&
+         a.include_static_objects == b.include_static_objects;
+}
 
 Status NavMeshSettings::validate() const {
   constexpr double kHuge = 1e6;

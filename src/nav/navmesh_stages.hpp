@@ -134,9 +134,18 @@ class TriangleHeights;
 /// highest point of the surface within its cell, rounded up.
 double floor_below(const TriangleHeights& heights, const NavMeshSettings& settings, const Vec3d& p);
 
+/// What a source of voxels may add to a build in tiles. Called from many threads.
+struct TileHooks {
+  /// Adds spans to a tile's field, whose first column is (x0, z0) of the box's cells (below 0 in the border).
+  std::function<Status(RecastLog&, int x0, int z0, rcHeightfield&)> fill;
+  std::function<double(const Vec3d&)> height;  ///< as BuildHooks::height
+  double least_area = 0;                       ///< islands below this are dropped, square metres
+  std::function<void(double)> progress;        ///< share of the tiles; one call at a time
+};
+
 /// The build in tiles of `settings.tile_size`. `box` holds the triangles, relative to the origin.
 Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
                                std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
-                               const Aabb<double>& box, int threads);
+                               const Aabb<double>& box, int threads, const TileHooks& hooks = {});
 
 }  // namespace gsnav::detail

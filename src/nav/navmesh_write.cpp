@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <string>
 #include <vector>
 
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "navmesh_format.hpp"
 #include "navmesh_impl.hpp"
@@ -12,23 +12,20 @@
 namespace gsnav {
 namespace {
 
-void put(std::ofstream& out, const void* p, std::size_t n) {
-  out.write(static_cast<const char*>(p), static_cast<std::streamsize>(n));
-}
-void put_float(std::ofstream& out, double v) {
+void put_float(OutputFile& out, double v) {
   const auto f = static_cast<float>(v);
-  put(out, &f, 4);
+  out.write(&f, 4);
 }
-void put_int(std::ofstream& out, std::int32_t v) { put(out, &v, 4); }
+void put_int(OutputFile& out, std::int32_t v) { out.write(&v, 4); }
 
-void put_settings(std::ofstream& out, const NavMeshSettings& s) {
+void put_settings(OutputFile& out, const NavMeshSettings& s) {
   for (const detail::SettingField& f : detail::kSettingFields) {
     put_float(out, f.value != nullptr ? s.*f.value : s.verts_per_poly);
   }
   for (const bool f : {s.filter_low_hanging_obstacles, s.filter_ledge_spans, s.filter_walkable_low_height_spans}) {
-    out.put(f ? 1 : 0);
+    out.write(f ? "\1" : "\0", 1);
   }
-  out.put(0);  // includeStaticObjects
+  out.write(s.include_static_objects ? "\1" : "\0", 1);
 }
 
 /// The floats of a point at p, moved by d.
@@ -74,8 +71,8 @@ Status save_navmesh(const NavMesh& mesh, const std::filesystem::path& path, int 
     }
   }
   const dtNavMesh& detour = *impl.mesh;
-  std::ofstream out(path, std::ios::binary);
-  if (!out) return {Errc::file_not_found, path.string() + ": cannot be made"};
+  OutputFile out;
+  if (Status s = out.open(path); !s) return s;
   std::int32_t tiles = 0;
   for (int t = 0; t < detour.getMaxTiles(); ++t) tiles += detour.getTile(t)->header != nullptr ? 1 : 0;
   put_int(out, detail::kSetMagic);
@@ -83,20 +80,18 @@ Status save_navmesh(const NavMesh& mesh, const std::filesystem::path& path, int 
   put_int(out, tiles);
   dtNavMeshParams params = *detour.getParams();
   shift(params.orig, impl.origin);
-  put(out, &params, sizeof params);
+  out.write(&params, sizeof params);
   if (version == 2) put_settings(out, impl.settings);
   for (int t = 0; t < detour.getMaxTiles(); ++t) {
     const dtMeshTile& tile = *detour.getTile(t);
     if (tile.header == nullptr) continue;
     const auto data = world_tile(impl, tile, impl.polys.points.data() + impl.first_point[static_cast<std::size_t>(t)]);
     const dtTileRef ref = detour.getTileRef(&tile);
-    put(out, &ref, 4);
+    out.write(&ref, 4);
     put_int(out, static_cast<std::int32_t>(data.size()));
-    put(out, data.data(), data.size());
+    out.write(data.data(), data.size());
   }
-  out.flush();
-  if (!out) return {Errc::file_not_found, path.string() + ": cannot be written"};
-  return {};
+  return out.commit();
 }
 
 }  // namespace gsnav

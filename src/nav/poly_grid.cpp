@@ -83,8 +83,8 @@ void PolyGrid::build(const PolyMesh& mesh) {
     each_cell(id, [&](std::size_t cell) { polys_[at[cell]++] = id; });
 }
 
-NavPoint PolyGrid::nearest(const PolyMesh& mesh, const Vec3d& q, const Vec3d& half,
-                           double climb) const noexcept {
+NavPoint PolyGrid::nearest(const PolyMesh& mesh, const Vec3d& q, const Vec3d& half, double climb,
+                           std::optional<std::size_t> island) const noexcept {
   const double x = q.x - low_.x, z = q.z - low_.z;
   const Cells columns = cells_of(x - half.x, x + half.x, side_, columns_);
   const Cells rows = cells_of(z - half.z, z + half.z, side_, rows_);
@@ -107,6 +107,7 @@ NavPoint PolyGrid::nearest(const PolyMesh& mesh, const Vec3d& q, const Vec3d& ha
     const auto cell = static_cast<std::size_t>(columns_ * row + column);
     for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
       const PolyId id = polys_[i];
+      if (island && mesh.polys[id].island != *island) continue;
       const Aabb<double>& b = boxes_[id];
       const double ox = outside(q.x, b.low.x, b.high.x), oz = outside(q.z, b.low.z, b.high.z);
       if (ox > half.x + kRounding || oz > half.z + kRounding ||

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "gsnav/math/aabb.hpp"
@@ -19,8 +20,10 @@ class PolyGrid {
 
   /// The nearest point of the surface within the box of half extents around q. Each polygon offers its
   /// point that is nearest on the ground plane; one straight above or below q by at most `climb` counts
-  /// as at q, and of several such the one nearest in height wins, then the least polygon.
-  NavPoint nearest(const PolyMesh& mesh, const Vec3d& q, const Vec3d& half, double climb) const noexcept;
+  /// as at q, and of several such the one nearest in height wins, then the least polygon. Only of
+  /// `island`, where one is named.
+  NavPoint nearest(const PolyMesh& mesh, const Vec3d& q, const Vec3d& half, double climb,
+                   std::optional<std::size_t> island = {}) const noexcept;
 
  private:
   Vec3d low_{};

@@ -13,7 +13,6 @@ namespace {
 constexpr double kMaxCoordinate = 1e9;
 constexpr double kRounding = 1e-9;  // metres
 constexpr double kShortest = 1e-6;  // metres: a remainder below this is not slid
-constexpr std::size_t kUsualPoints = 8;  // of a way
 
 bool valid(const AgentState& a) noexcept {
   return is_finite(a.position) && is_finite(a.radius) && is_finite(a.height) && a.radius >= 0 &&
@@ -38,6 +37,28 @@ struct Stepper {
   const CapsuleSet& bodies;
   SweepRules<double> rules;
   StepResult& out;
+  bool alone = false;  ///< nobody is near the way ahead
+
+  /// What the agent may touch on the way through `places`.
+  void add_reach(Aabb<double>& box, const Vec3d& place) const {
+    const Capsule<double> solid = agent_capsule(place, agent.radius, agent.height);
+    const double reach = solid.radius + 2 * rules.skin + kShortest;
+    for (const Vec3d& p : {solid.p0, solid.p1}) {
+      box.add(p - Vec3d{reach, reach, reach});
+      box.add(p + Vec3d{reach, reach, reach});
+    }
+  }
+
+  /// Looks whether anybody is near the whole of a way that begins where the agent is. A body whose swept
+  /// box stays away cannot be hit, so leaving all of them out changes no bit.
+  void look_around(std::span<const WalkPoint> way) {
+    alone = bodies.empty();
+    if (alone) return;
+    Aabb<double> box;
+    add_reach(box, out.path.back().position);
+    for (const WalkPoint& p : way) add_reach(box, p.position);
+    alone = !bodies.meets(box);
+  }
 
   /// Sweeps the agent from a to b during [ua, ub]. A body whose swept box stays away cannot be hit, so
   /// leaving it out changes no bit.
@@ -46,11 +67,8 @@ struct Stepper {
     const Capsule<double> from = agent_capsule(a, agent.radius, agent.height);
     const Capsule<double> to = agent_capsule(b, agent.radius, agent.height);
     Aabb<double> box;
-    const double reach = from.radius + 2 * rules.skin + kShortest;
-    for (const Vec3d& p : {from.p0, from.p1, to.p0, to.p1}) {
-      box.add(p - Vec3d{reach, reach, reach});
-      box.add(p + Vec3d{reach, reach, reach});
-    }
+    add_reach(box, a);
+    add_reach(box, b);
     bodies.groups_in(box, [&](const CapsuleSet::Group& g) {
       first_impact<double>({from, to}, bodies.capsules_of(g), ua, ub, rules, best);
     });
@@ -81,6 +99,10 @@ struct Stepper {
   /// Goes from the end of the path to `to`, or as far as bodies let it. Returns the impact that stopped
   /// it.
   FirstImpact<double> go(const WalkPoint& to) const {
+    if (alone) {
+      out.path.push_back(to);
+      return {};
+    }
     const WalkPoint from = out.path.back();
     const FirstImpact<double> hit = sweep_leg(from.position, to.position, from.fraction, to.fraction);
     if (out.path.size() == 1 && hit.started_overlapping) out.started_overlapping = true;
@@ -100,6 +122,7 @@ struct Stepper {
 
   /// The agent stands where it is for the rest of the tick.
   void stand() const {
+    if (alone) return;
     const WalkPoint& at = out.path.back();
     const FirstImpact<double> r = sweep_leg(at.position, at.position, at.fraction, 1.0);
     if (out.path.size() == 1 && r.started_overlapping) out.started_overlapping = true;
@@ -112,7 +135,7 @@ struct Stepper {
 
 /// What is left of `motion` (ground plane) after removing what goes against the contact normals met so
 /// far; zero in a corner between two.
-Vec3d along_contacts(const Vec3d& motion, const std::vector<Vec3d>& normals) noexcept {
+Vec3d along_contacts(const Vec3d& motion, const SmallVector<Vec3d, 4>& normals) noexcept {
   Vec3d v = motion;
   for (std::size_t i = normals.size(); i-- > 0;) {
     const double into = dot(v, normals[i]);
@@ -139,13 +162,22 @@ StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& asked
   if (options.compat == StepCompat::habitat_gs) return detail::step_as_habitat_gs(mesh, agent, desired, bodies, options);
   SweepRules<double> rules;
   rules.skin = max(options.skin, kRounding);  // points that touch have no direction between them
-  const Stepper stepper{agent, bodies, rules, out};
-  out.path.reserve(kUsualPoints);
+  Stepper stepper{agent, bodies, rules, out};
   out.path.push_back({agent.position, agent.poly, 0.0});
   const double asked = length_xz(desired);
+  if (!(asked > 0)) {
+    // No way to go: is there a surface to stand on?
+    const SurfaceWalk here = mesh.walk({agent.position, agent.poly}, {}, options.slide);
+    if (here.points.empty()) {
+      out.blocked_by = BlockedBy::invalid;
+      return out;
+    }
+    out.path.back().poly = here.points[0].poly;
+    stepper.look_around({});
+  }
 
   Vec3d motion{desired.x, 0, desired.z};
-  std::vector<Vec3d> normals;
+  SmallVector<Vec3d, 4> normals;
   for (int slides = 0; asked > 0; ++slides) {
     const double begin = out.path.back().fraction, span = 1.0 - begin;
     const SurfaceWalk walk =
@@ -161,14 +193,14 @@ StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& asked
       out.hit_wall = true;
       out.wall_normal = walk.wall_normal;
     }
+    stepper.look_around(walk.points);
     FirstImpact<double> hit;
     double walked = 0;  // fraction of `motion` used up
     // The start may lie off the surface (a centimetre above a bump, or where it was put): that way onto
     // it is swept too.
+    out.path.back().poly = walk.points[0].poly;
     if (norm(walk.points[0].position - out.path.back().position) > kRounding) {
       hit = stepper.go({walk.points[0].position, walk.points[0].poly, begin});
-    } else {
-      out.path.back().poly = walk.points[0].poly;
     }
     bool back = false;
     for (std::size_t i = 1; i < walk.points.size() && !hit.hit; ++i) {

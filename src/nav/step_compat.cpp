@@ -55,7 +55,8 @@ StepResult step_as_habitat_gs(const NavMesh& mesh, const AgentState& agent, cons
       }
       const double kept = max(low - kBack, 0.0);
       out.position = from + chord * kept;
-      out.poly = kNoPoly;
+      // Off the surface, perhaps: the polygon that is nearest.
+      if (const auto near = mesh.snap_point(out.position)) out.poly = near->poly;
       out.blocked_by = BlockedBy::capsule;
       out.toi = kept;
       out.avatar = body->avatar;
@@ -71,7 +72,7 @@ StepResult step_as_habitat_gs(const NavMesh& mesh, const AgentState& agent, cons
   const double asked = std::hypot(desired.x, desired.z);
   const Vec3d moved = out.position - from;
   out.fraction = asked > 0 ? min(std::hypot(moved.x, moved.z) / asked, 1.0) : 1.0;
-  out.path = {{from, agent.poly, 0.0}, {out.position, out.poly, 1.0}};
+  out.path = {{from, walk.points.front().poly, 0.0}, {out.position, out.poly, 1.0}};
   return out;
 }
 

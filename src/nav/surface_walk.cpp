@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "poly_mesh.hpp"
@@ -14,7 +15,7 @@ namespace {
 constexpr double kTouch = 1e-9;      // metres: closer than this is at it
 constexpr double kParallel = 1e-12;  // sine of an angle
 constexpr std::size_t kMaxFan = 64;  // polygons around one point
-constexpr int kDepth = 9;            // of halving a leg that is not straight in height
+constexpr double kOffSurface = 0.01;  // metres: a leg that leaves the surface by more is cut
 
 struct Exit {
   double t = std::numeric_limits<double>::max();  // in units of the direction given
@@ -119,13 +120,72 @@ Way slide_along_wall(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Di
   return best;
 }
 
+/// Where a straight leg within a polygon meets sides of its height triangles: the height of the surface
+/// is straight between.
+struct Bends {
+  struct Bend {
+    double share = 0;  ///< of the leg
+    Vec3d at{};        ///< on the surface
+  };
+  SmallVector<Bend, 16> list;
+
+  Bends(const PolyMesh& m, PolyId id, const Vec3d& a, const Vec3d& b) {
+    // A leg along the rim may run outside of all triangles by a rounding, or past a sample that lies beside
+    // its side: what is nearly met counts, and costs no more than a look at the height there.
+    constexpr double kNearly = -0.1;
+    const PolyMesh::Poly& poly = m.polys[id];
+    for (std::uint32_t i = poly.tri_first; i < poly.tri_first + poly.tri_count; ++i) {
+      const PolyMesh::Share &s = m.share_1[i], &t = m.share_2[i];
+      const Vec3d& o = m.points[m.tris[i][0]];
+      const auto shares = [&](const Vec3d& p) {
+        const double x = p.x - o.x, z = p.z - o.z, u = s.x * x + s.z * z, v = t.x * x + t.z * z;
+        return std::array<double, 3>{1.0 - u - v, u, v};
+      };
+      const std::array<double, 3> from = shares(a), to = shares(b);
+      if (min(min(from[0], from[1]), from[2]) >= 0 && min(min(to[0], to[1]), to[2]) >= 0) {
+        list.clear();  // all of it in one
+        return;
+      }
+      for (std::size_t k = 0; k < 3; ++k) {
+        if ((from[k] < 0) == (to[k] < 0)) continue;
+        const double share = from[k] / (from[k] - to[k]);
+        const auto other = [&](std::size_t n) { return from[n] + share * (to[n] - from[n]); };
+        const double p = other((k + 1) % 3), q = other((k + 2) % 3);
+        if (min(p, q) < kNearly || !(share > 0 && share < 1)) continue;
+        Vec3d at = lerp(a, b, share);
+        const auto y = [&](std::size_t n) { return m.points[m.tris[i][n % 3]].y; };
+        at.y = min(p, q) >= 0 ? p * y(k + 1) + q * y(k + 2) : m.height(id, at);
+        list.push_back({share, at});
+      }
+    }
+    std::sort(list.begin(), list.end(), [](const Bend& p, const Bend& q) { return p.share < q.share; });
+  }
+
+  /// Calls f(bend) for those without which the way over bends [first, end) from a to b would leave the
+  /// surface, in order.
+  template <class F>
+  void each(const Bend& a, const Bend& b, std::size_t first, std::size_t end, const F& f) const {
+    std::size_t worst = end;
+    double most = kOffSurface;
+    for (std::size_t i = first; i < end; ++i) {
+      const double share = (list[i].share - a.share) / (b.share - a.share);
+      const double off = std::abs(a.at.y + share * (b.at.y - a.at.y) - list[i].at.y);
+      if (!(off > most)) continue;
+      most = off;
+      worst = i;
+    }
+    if (worst == end) return;
+    each(a, list[worst], first, worst, f);
+    f(list[worst]);
+    each(list[worst], b, worst + 1, end, f);
+  }
+};
+
 }  // namespace
 
 void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz, bool slide,
                     SurfaceWalk& out) const {
   out = {};
-  constexpr std::size_t kUsual = 8;
-  out.points.reserve(kUsual);
   Vec3d p = clamped(start_poly, start);
   PolyId poly = start_poly;
   p.y = height(poly, p);
@@ -135,25 +195,19 @@ void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz,
   const double wanted_length = wanted.length();
   if (!(wanted_length > 0)) return;
 
-  // Heights between two points of a polygon may leave the straight line: halve until they do not.
   const auto arrive = [&](const Vec3d& to, PolyId on, double from_fraction, double to_fraction) {
-    const auto refine = [&](auto&& self, const Vec3d& a, const Vec3d& b, double fa, double fb,
-                            int depth) -> void {
-      if (depth > 0 && norm(b - a) > 0.2) {
-        Vec3d mid = (a + b) * 0.5;
-        const double straight = mid.y, fm = 0.5 * (fa + fb);
-        mid.y = height(on, mid);
-        if (depth > kDepth - 2 || std::abs(mid.y - straight) > 0.01) {
-          self(self, a, mid, fa, fm, depth - 1);
-          self(self, mid, b, fm, fb, depth - 1);
-          return;
-        }
-      }
-      out.length += norm(b - a);
-      out.points.push_back({b, on, fb});
+    if (!(norm(to - p) > 0)) return;
+    const auto go = [&](const Vec3d& q, double fraction) {
+      out.length += norm(q - out.points.back().position);
+      out.points.push_back({q, on, fraction});
     };
-    const bool curved = polys[on].tri_count + 2 > polys[on].count;
-    if (norm(to - p) > 0) refine(refine, p, to, from_fraction, to_fraction, curved ? kDepth : 0);
+    if (!polys[on].planar) {
+      const Bends bends(*this, on, p, to);
+      bends.each({0.0, p}, {1.0, to}, 0, bends.list.size(), [&](const Bends::Bend& bend) {
+        go(bend.at, from_fraction + bend.share * (to_fraction - from_fraction));
+      });
+    }
+    go(to, to_fraction);
     p = to;
   };
 

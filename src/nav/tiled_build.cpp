@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <mutex>
 #include <new>
 #include <optional>
 #include <thread>
@@ -158,15 +159,21 @@ Result<NavMeshPtr> link_tiles(const TileGrid& grid, std::span<const TilePolygons
 /// Polygons of one tile.
 Result<TilePolygons> build_tile(const TileGrid& grid, const TriangleLists& lists, std::size_t tile,
                                 std::span<const Vec3d> vertices,
-                                std::span<const NavMesh::Triangle> triangles, const Vec3d& origin) {
+                                std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
+                                const TileHooks& hooks) {
   std::vector<NavMesh::Triangle> own;
   for (std::size_t i = lists.first[tile]; i < lists.first[tile + 1]; ++i)
     own.push_back(triangles[lists.triangles[i]]);
-  if (own.empty()) return TilePolygons{};
+  if (own.empty() && !hooks.fill) return TilePolygons{};
   RecastLog log;
   const Aabb<double> wide = grid.box_of(tile, grid.border);
   auto field = make_heightfield(log, grid.settings, wide.low, wide.high);
   if (!field.ok()) return field.status();
+  if (hooks.fill) {
+    const int columns = grid.nx, at = static_cast<int>(tile), side = grid.settings.tile_size;
+    const int x0 = at % columns * side - grid.border, z0 = at / columns * side - grid.border;
+    if (Status s = hooks.fill(log, x0, z0, **field); !s.ok()) return s;
+  }
   if (Status s = rasterise(log, grid.settings, vertices, own, origin, **field); !s.ok()) return s;
   grid.clip(tile, **field);
   return build_polygons(log, grid.settings, **field, grid.border);
@@ -176,7 +183,7 @@ Result<TilePolygons> build_tile(const TileGrid& grid, const TriangleLists& lists
 
 Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
                                std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
-                               const Aabb<double>& box, int threads) {
+                               const Aabb<double>& box, int threads, const TileHooks& hooks) {
   if (Status s = check_grid(settings, box.low, box.high); !s.ok()) return s;
   const TileGrid grid(settings, box);
   const int most = static_cast<int>(std::clamp<unsigned>(std::thread::hardware_concurrency(), 1, 16));
@@ -192,14 +199,16 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
     work.emplace_back(lists.first[i + 1] - lists.first[i], static_cast<std::uint32_t>(i + 1));
   }
   std::sort(work.begin(), work.end(), std::greater<>());
+  std::mutex lock;
+  std::size_t done = 0;
   const auto piece = [&](std::uint32_t turn) noexcept {
     const std::uint32_t i = work[turn].second;
     try {
       if (i == 0) {
-        heights.emplace(vertices, triangles, origin, box);
+        if (!hooks.height) heights.emplace(vertices, triangles, origin, box);
         return;
       }
-      auto made = build_tile(grid, lists, i - 1, vertices, triangles, origin);
+      auto made = build_tile(grid, lists, i - 1, vertices, triangles, origin, hooks);
       if (made.ok()) {
         tiles[i - 1] = std::move(*made);
       } else {
@@ -208,6 +217,9 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
     } catch (const std::bad_alloc&) {
       failed[i] = Status(Errc::out_of_memory, "NavMesh: not enough memory for the tiles");
     }
+    if (!hooks.progress) return;
+    const std::lock_guard held(lock);
+    hooks.progress(static_cast<double>(++done) / static_cast<double>(tiles.size()));
   };
   pool.run(static_cast<std::uint32_t>(tiles.size() + 1), piece);
   WalkableAreas areas;
@@ -226,11 +238,14 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
   if (!some()) return too_small();
   auto mesh = link_tiles(grid, tiles);
   if (!mesh.ok()) return mesh.status();
-  if (drop_small_islands(**mesh, settings.region_min_size * settings.region_min_size, tiles)) {
+  const double least = max(settings.region_min_size * settings.region_min_size,
+                           hooks.least_area / (settings.cell_size * settings.cell_size));
+  if (drop_small_islands(**mesh, least, tiles)) {
     if (!some()) return too_small();
     mesh = link_tiles(grid, tiles);
     if (!mesh.ok()) return mesh.status();
   }
+  if (hooks.height) return assemble_navmesh(settings, origin, std::move(*mesh), hooks.height);
   return assemble_navmesh(settings, origin, std::move(*mesh),
                           [&](const Vec3d& p) { return floor_below(*heights, settings, p); });
 }

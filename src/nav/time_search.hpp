@@ -66,7 +66,7 @@ class TimeSearch {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   /// The way from one place to the next along the surface; no points where a wall is in it.
-  using Leg = std::vector<WalkPoint>;
+  using Leg = WalkPoints;
   /// Ticks [first, last) during which somebody who stands there is clear of all.
   struct Interval {
     std::size_t first = 0, last = 0;
@@ -279,7 +279,7 @@ class TimeSearch {
     Vec3d from = leg.front().position;
     for (std::size_t k = first; k < first + count; ++k) {
       const double u1 = k + 1 == first + count ? 1.0 : (bodies_.begin(k + 1) - begin) / whole;
-      std::vector<WalkPoint> between;
+      WalkPoints between;
       for (const WalkPoint& p : leg) {
         if (p.fraction > u0 && p.fraction < u1) between.push_back({p.position, p.poly, (p.fraction - u0) / (u1 - u0)});
       }

@@ -34,4 +34,22 @@ std::uint32_t UnfoldedMesh::face_at(PolyId poly, const Vec3d& p) const noexcept 
   return best;
 }
 
+Flat UnfoldedMesh::clamped(std::uint32_t face, const Flat& p) const noexcept {
+  const Face& f = faces[face];
+  Flat nearest = p;
+  double best = std::numeric_limits<double>::max();
+  bool inside = true;
+  for (std::uint32_t k = 0; k < f.count; ++k) {
+    const Flat &a = edges[f.first + k].at, &b = edges[f.first + (k + 1 < f.count ? k + 1 : 0)].at;
+    const Flat side = b - a;
+    inside = inside && cross(side, p - a) >= 0;
+    const double t = clamp(dot(p - a, side) / max(dot(side, side), 1e-300), 0.0, 1.0);
+    const Flat q = a + side * t;
+    if (length(p - q) >= best) continue;
+    best = length(p - q);
+    nearest = q;
+  }
+  return inside ? p : nearest;
+}
+
 }  // namespace gsnav::detail

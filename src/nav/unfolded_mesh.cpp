@@ -45,15 +45,18 @@ class Builder {
  public:
   explicit Builder(const PolyMesh& m) : m_(m), parts_(m.corners.size()) {}
 
-  void add(PolyId id, std::vector<Sheet>& sheets) {
+  /// True where the polygon's sheets are its height triangles, in order.
+  bool add(PolyId id, std::vector<Sheet>& sheets) {
     const PolyMesh::Poly& p = m_.polys[id];
+    bool by_triangle = false;
     std::vector<Vec3d> corners(m_.corners.begin() + p.first, m_.corners.begin() + p.first + p.count);
     std::vector<Sheet> own;
     if (level(p, corners)) {
       own.push_back({id, std::move(corners), {}});
       for (std::uint32_t k = 0; k < p.count; ++k) own[0].sides.push_back(k);
-    } else if (!from_heights(id, own)) {
-      own = clipped(id, corners);
+    } else {
+      by_triangle = from_heights(id, own);
+      if (!by_triangle) own = clipped(id, corners);
     }
     for (Sheet& s : own) {
       for (std::size_t e = 0; e < s.sides.size(); ++e) {
@@ -65,6 +68,7 @@ class Builder {
       }
       sheets.push_back(std::move(s));
     }
+    return by_triangle;
   }
 
   const std::vector<Part>& parts(std::uint32_t edge) const { return parts_[edge]; }
@@ -180,7 +184,11 @@ UnfoldedMesh::UnfoldedMesh(const PolyMesh& mesh) {
 void UnfoldedMesh::add_faces(const PolyMesh& mesh) {
   Builder builder(mesh);
   std::vector<Sheet> sheets;
-  for (PolyId id = 0; id < mesh.polys.size(); ++id) builder.add(id, sheets);
+  for (PolyId id = 0; id < mesh.polys.size(); ++id) {
+    const auto first = static_cast<std::uint32_t>(sheets.size());
+    const bool by_triangle = builder.add(id, sheets);
+    grid.add(mesh, id, by_triangle, first);
+  }
 
   // Neighbours may have their corners at different places of a common edge: each side gets all of them,
   // and stretches between the same two are twins.

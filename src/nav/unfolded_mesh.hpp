@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "face_grid.hpp"
 #include "poly_mesh.hpp"
 
 namespace gsnav::detail {
@@ -65,6 +66,7 @@ class UnfoldedMesh {
   std::vector<Vertex> vertices;
   std::vector<std::uint32_t> fans;        ///< edges leaving each vertex
   std::vector<std::uint32_t> first_face;  ///< of each polygon, and one past the last
+  FaceGrid grid;
 
   std::uint32_t next(std::uint32_t e) const noexcept {
     const Face& f = faces[edges[e].face];
@@ -84,6 +86,8 @@ class UnfoldedMesh {
   }
   /// The face of a polygon that (x, z) of p is in, or least outside of.
   std::uint32_t face_at(PolyId poly, const Vec3d& p) const noexcept;
+  /// The point of a face that is nearest to p, in its plane: p itself where it is inside.
+  Flat clamped(std::uint32_t face, const Flat& p) const noexcept;
 
  private:
   void add_faces(const PolyMesh& mesh);

@@ -52,13 +52,21 @@ double speed_of(std::span<const WalkPoint> path) {
   for (std::size_t i = 1; i < path.size(); ++i) {
     const double length = norm(path[i].position - path[i - 1].position);
     const double time = path[i].fraction - path[i - 1].fraction;
-    if (length > 0) speed = time > 0 ? max(speed, length / time) : std::numeric_limits<double>::infinity();
+    if (length > 0)
+      speed = time > 0 ? max(speed, length / time) : std::numeric_limits<double>::infinity();
   }
   return speed;
 }
 
-/// A body, how fast it and the agent approach each other at most, and how near it was at the tick's begin, at its end
-/// and at the last look. Metres.
+/// How far whoever walks along `path` goes.
+double length_of(std::span<const WalkPoint> path) {
+  double length = 0.0;
+  for (std::size_t i = 1; i < path.size(); ++i) length += norm(path[i].position - path[i - 1].position);
+  return length;
+}
+
+/// A body, how fast it and the agent approach each other at most, and how near it was at the tick's
+/// begin, at its end and at the last look. Metres.
 struct Near {
   const DynamicCapsule* body;
   double speed, first, last, gap;
@@ -70,12 +78,19 @@ struct Scratch {
   std::vector<std::size_t> order;
 };
 
-/// One avatar's least distance during the tick. A gap changes no faster than both move: bodies that cannot come nearer
-/// than what was already found are not looked at again.
+/// One avatar's least distance during the tick. A gap changes no faster than both move: bodies that
+/// cannot come nearer than what was already found are not looked at again.
 class Approach {
  public:
-  Approach(std::span<const WalkPoint> path, double agent_speed, double radius, double height, Scratch& scratch)
-      : path_(path), agent_speed_(agent_speed), radius_(radius), height_(height), scratch_(scratch), near_(scratch.near) {}
+  Approach(std::span<const WalkPoint> path, double agent_speed, double agent_length, double radius,
+           double height, Scratch& scratch)
+      : path_(path),
+        agent_speed_(agent_speed),
+        agent_length_(agent_length),
+        radius_(radius),
+        height_(height),
+        scratch_(scratch),
+        near_(scratch.near) {}
 
   /// Looks at the boxes that the agent (`reach`) and the avatar's capsules sweep; returns a lower bound of find().
   double look(const Aabb<double>& reach, View<const DynamicCapsule> avatar) {
@@ -92,8 +107,19 @@ class Approach {
     return scratch_.bounds[nearest_];
   }
 
-  /// After look(): the least distance.
+  /// After look(): the least distance. Looks at a few times for a good one; then each leg shows that
+  /// nothing is nearer, or how near it is.
   double find() {
+    double best = sampled();
+    for (std::size_t c = 0; c < avatar_.size; ++c) {
+      if (scratch_.bounds[c] <= best) best = pass(avatar_[c].motion, best);
+    }
+    return best;
+  }
+
+ private:
+  /// A distance that the avatar comes to, nearly always the least.
+  double sampled() {
     // Capsules that stay farther away than one of them is at the begin are not looked at.
     const auto take = [this](std::size_t c) {
       const double speed = agent_speed_ + speed_of(avatar_[c].motion);
@@ -146,7 +172,6 @@ class Approach {
     return min(best_, min(at_a, at_b));
   }
 
- private:
   double gap(double u) {
     const Capsule<double> agent = agent_capsule(position_at(path_, u), radius_, height_);
     const Capsule<double> here{{}, agent.p1 - agent.p0, agent.radius};
@@ -173,8 +198,38 @@ class Approach {
     std::erase_if(near_, [&](const Near& n) { return bound(n) > best_; });
   }
 
+  /// The least of `best` and the gap to one capsule, leg by leg.
+  double pass(const MovingCapsule<double>& body, double best) const {
+    const double tolerance = kTolerance + kShare * (agent_length_ + speed_of(body));
+    const WalkPoint start{path_.empty() ? Vec3d{} : path_.front().position, kNoPoly, 0.0};
+    WalkPoint from = start;
+    for (std::size_t i = 0; i <= path_.size(); ++i) {
+      // It stands still after the last point.
+      const WalkPoint to = i < path_.size() ? path_[i] : WalkPoint{from.position, kNoPoly, 1.0};
+      if (to.fraction > from.fraction || i == path_.size()) {
+        const double u0 = clamp(from.fraction, 0.0, 1.0), u1 = clamp(to.fraction, 0.0, 1.0);
+        const Vec3d origin = from.position;
+        const auto local = [&](Capsule<double> c) {
+          c.p0 -= origin;
+          c.p1 -= origin;
+          return c;
+        };
+        const MovingCapsule<double> agent{local(agent_capsule(from.position, radius_, height_)),
+                                          local(agent_capsule(to.position, radius_, height_))};
+        best = least_gap<double>(
+            agent, {local(lerp(body.begin, body.end, u0)), local(lerp(body.begin, body.end, u1))}, best,
+            tolerance);
+      }
+      from = to;
+    }
+    return best;
+  }
+
+  static constexpr double kTolerance = 1e-6;  // metres
+  static constexpr double kShare = 1e-4;      // of what both move in a tick
+
   std::span<const WalkPoint> path_;
-  double agent_speed_, radius_, height_;
+  double agent_speed_, agent_length_, radius_, height_;
   Scratch& scratch_;
   std::vector<Near>& near_;
   View<const DynamicCapsule> avatar_;
@@ -199,11 +254,11 @@ void closest_approach(std::span<const WalkPoint> path, double radius, double hei
   order.resize(groups.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return out[a] < out[b]; });
-  const double speed = speed_of(path);
+  const double speed = speed_of(path), length = length_of(path);
   double least = std::numeric_limits<double>::infinity();
   for (const std::size_t g : order) {
     if (out[g] > max(least, kPersonalSpace)) break;
-    Approach approach(path, speed, radius, height, scratch);
+    Approach approach(path, speed, length, radius, height, scratch);
     out[g] = max(out[g], approach.look(reach, bodies.capsules_of(groups[g])));
     if (out[g] > max(least, kPersonalSpace)) continue;
     out[g] = approach.find();

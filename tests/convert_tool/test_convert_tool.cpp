@@ -2,21 +2,28 @@
 // The program as people run it, and what it measures.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "compare.hpp"
+#include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/edit_cloud.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 #include "io/check_turned.hpp"
 #include "io/ply_file.hpp"
 #include "io/row_clouds.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
+#include "support/process.hpp"
+#include "support/small_disk.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -60,10 +67,205 @@ TEST_CASE("convert: every format, with the error that it adds") {
     CHECK(load(folder, t.name).size() == 800);
     CHECK(number_behind(out.text, "mean ") <= t.mean);
     CHECK(out.text.find("3 images of 64x48") != std::string::npos);
+    CHECK((out.says("equal, bit for bit") || t.name != std::string("a.ply")));
+    if (out.says("equal")) continue;
     const double psnr = number_behind(out.text, "PSNR ");
     CHECK(psnr > t.least_psnr);
     CHECK(number_behind(out.text, "the worst ") <= psnr);
   }
+}
+
+namespace {
+
+/// Rows on a grid of 1/4 m, so that along each axis hundreds have the same depth, opaque and of random
+/// colours.
+PlyFile rows_on_a_grid(std::size_t n, unsigned seed) {
+  PlyFile file;
+  file.properties = inria_properties(0);
+  file.rows = random_rows(n, 0, seed);
+  for (PlyRow& row : file.rows) {
+    for (const char* axis : {"x", "y", "z"})
+      row[axis] = std::nearbyint(4 * std::tanh(row[axis])) / 4 + 0.0;
+    for (const char* axis : {"scale_0", "scale_1", "scale_2"})
+      row[axis] = -3 + 0.3 * std::sin(row[axis]);
+    row["opacity"] = 3;
+  }
+  return file;
+}
+
+/// Cameras along the axes, for which a plane of the grid has one depth, and one askew.
+std::string cameras_along_axes() {
+  std::vector<Camera> cameras;
+  for (const Vec3d& eye : {Vec3d{0, 0, -4}, Vec3d{4, 0, 0}, Vec3d{0, 0, 4}, Vec3d{1, -2, 3}}) {
+    cameras.push_back(Camera::look_at(eye, {}, {0, -1, 0}, 96, 64, 60));
+  }
+  const TempFolder folder("convert_cameras");
+  REQUIRE(io::save_cameras(folder / "c.json", cameras).ok());
+  return read_file(folder / "c.json");
+}
+
+}  // namespace
+
+TEST_CASE("convert: from PLY to PLY thousands of ties of depth are drawn the same, bit for bit") {
+  const TempFolder folder("convert_ties");
+  const PlyFile file = rows_on_a_grid(6000, 21);
+  write_file(folder / "in.ply", file.text());
+  write_file(folder / "c.json", cameras_along_axes());
+  const GaussianCloud source = load(folder, "in.ply");
+  // What is drawn depends on who is first: the same rows from last to first are another image.
+  PlyFile turned = file;
+  std::reverse(turned.rows.begin(), turned.rows.end());
+  write_file(folder / "turned.ply", turned.text());
+  const auto cameras = io::load_cameras(folder / "c.json").value();
+  const auto difference = [&](const char* name) {
+    return gsnav_convert::image_errors(source, load(folder, name), cameras).value();
+  };
+  REQUIRE(difference("turned.ply").largest > 0.1);
+
+  const std::string options = " --cameras c.json --width 96 --height 64";
+  Outcome out = run(folder, "in.ply a.ply" + options);
+  CAPTURE(out.text);
+  REQUIRE(out.ok);
+  CHECK(out.says("4 images of 96x64: equal, bit for bit"));
+  CHECK(difference("a.ply").largest == 0);
+  // The file itself: the rows' positions, byte for byte, in their order.
+  const std::string in = read_file(folder / "in.ply"), made = read_file(folder / "a.ply");
+  const std::size_t stride = 4 * 17, header = in.find("end_header\n") + 11;
+  REQUIRE(made.size() - (made.find("end_header\n") + 11) == 6000 * stride);
+  for (std::size_t row = 0; row < 6000; ++row) {
+    REQUIRE(made.substr(made.size() - (6000 - row) * stride, 12) ==
+            in.substr(header + row * stride, 12));
+  }
+  // And again the same file.
+  REQUIRE(run(folder, "a.ply b.ply --views 0").ok);
+  CHECK(read_file(folder / "b.ply") == made);
+  // In another order it is another image, and the tool says so.
+  out = run(folder, "in.ply s.ply --order space" + options);
+  CHECK(out.says("where depths are equal, images differ"));
+  CHECK(number_behind(out.text, "PSNR ") < 60);
+  CHECK(number_behind(out.text, "largest difference ") > 0.1);
+  CHECK(number_behind(out.text, "largest difference ") ==
+        doctest::Approx(difference("s.ply").largest).epsilon(0.01));
+  // Cropping and merging keep the order of those that are left.
+  out = run(folder, "in.ply c.ply --crop -0.6 -2 -2 2 2 2" + options);
+  CHECK(out.says("equal, bit for bit"));
+  REQUIRE(run(folder, "in.ply turned.ply both.ply --views 0").ok);
+  const GaussianCloud both =
+      io::load_scene((folder / "both.ply").string(), {.sort = false}).value().cloud;
+  const GaussianCloud unsorted =
+      io::load_scene((folder / "in.ply").string(), {.sort = false}).value().cloud;
+  for (std::size_t i = 0; i < 6000; ++i) {
+    REQUIRE(both.mean(i) == unsorted.mean(i));
+    REQUIRE(both.mean(12000 - 1 - i) == unsorted.mean(i));
+  }
+}
+
+TEST_CASE("convert: every format but the one of chunks keeps the order of the rows") {
+  const TempFolder folder("convert_order");
+  write_file(folder / "in.ply", rows_on_a_grid(1500, 22).text());
+  const GaussianCloud want = io::load_scene((folder / "in.ply").string(), {.sort = false}).value().cloud;
+  for (const char* name : {"a.splat", "a.spz", "a.sog", "a.glb", "a.ply"}) {
+    CAPTURE(name);
+    REQUIRE(run(folder, std::string("in.ply ") + name + " --views 0").ok);
+    const GaussianCloud got = io::load_scene((folder / name).string(), {.sort = false}).value().cloud;
+    REQUIRE(got.size() == want.size());
+    double farthest = 0, colour = 0;
+    for (std::size_t i = 0; i < want.size(); ++i) {
+      farthest = std::max(farthest, norm(got.mean(i) - want.mean(i)));
+      colour = std::max(
+          colour, std::fabs(static_cast<double>(got.sh0[3 * i]) - static_cast<double>(want.sh0[3 * i])));
+    }
+    CHECK(farthest < 1e-3);  // neighbours of the grid are 0.25 m apart
+    CHECK(colour < 2);
+  }
+  const Outcome out = run(folder, "in.ply a.compressed.ply --views 0");
+  CHECK(out.says("as the format's chunks need them"));
+}
+
+TEST_CASE("convert: what a format's range clips is counted, and errors are not clipped with it") {
+  const TempFolder folder("convert_range");
+  PlyFile file;
+  file.properties = inria_properties(9);
+  file.rows = random_rows(400, 9, 23);
+  constexpr double kBasis = 0.28209479177387814;
+  std::size_t above = 0, far_above = 0, thin = 0, strong = 0;
+  for (std::size_t i = 0; i < file.rows.size(); ++i) {
+    PlyRow& row = file.rows[i];
+    for (const char* name : {"f_dc_0", "f_dc_1", "f_dc_2"}) row[name] = std::tanh(row[name]);
+    for (int k = 0; k < 9; ++k)
+      row["f_rest_" + std::to_string(k)] = 0.5 * std::tanh(row["f_rest_" + std::to_string(k)]);
+    for (const char* name : {"scale_0", "scale_1", "scale_2"}) row[name] = -4;
+    row["opacity"] = 1;
+    if (i % 4 == 0) ++above, row["f_dc_1"] = (3.07 - 0.5) / kBasis;  // a drawn colour of 3.07
+    if (i % 4 == 0) ++far_above;                                     // beyond SPZ's 0.5 +- 0.94 as well
+    if (i % 5 == 0) ++thin, row["scale_2"] = -13;
+    if (i % 8 == 1) ++strong, row["f_rest_4"] = 1.75;
+  }
+  write_file(folder / "in.ply", file.text());
+  Outcome out = run(folder, "in.ply a.splat --views 0");
+  CAPTURE(out.text);
+  REQUIRE(out.ok);
+  CHECK(number_behind(out.text, "colour ") == doctest::Approx(2.07).epsilon(0.01));
+  CHECK(out.says((std::to_string(above) + " colours outside of the format's range").c_str()));
+  CHECK(out.says((std::to_string(9 * 400) + " SH coefficients lost").c_str()));
+  CHECK_FALSE(out.says("scales outside"));
+  out = run(folder, "in.ply a.spz --views 0");
+  CAPTURE(out.text);
+  REQUIRE(out.ok);
+  CHECK(number_behind(out.text, "colour ") == doctest::Approx(3.07 - 0.5 - kBasis / 0.3).epsilon(0.01));
+  CHECK(number_behind(out.text.substr(out.text.find("largest")), ", SH ") ==
+        doctest::Approx(0.755).epsilon(0.01));
+  CHECK(number_behind(out.text, "scale ") == doctest::Approx(100 * (std::exp(3) - 1)).epsilon(0.01));
+  CHECK(out.says((std::to_string(far_above) + " colours outside of the format's range").c_str()));
+  CHECK(out.says((std::to_string(thin) + " scales outside of the format's range").c_str()));
+  CHECK(out.says((std::to_string(strong) + " SH coefficients outside of the format's range").c_str()));
+  out = run(folder, "in.ply a.ply --views 0");
+  CHECK_FALSE(out.says("outside"));
+  CHECK_FALSE(out.says("lost"));
+}
+
+TEST_CASE("convert: a full disk and kill -9 leave the input that is written over") {
+  const TempFolder folder("convert_full");
+  {
+    std::filesystem::create_directory(folder / "disk");
+    const SmallDisk disk(folder / "disk", 700);
+    if (disk.mounted()) {
+      // 472 KB in place: the new file needs as much again.
+      REQUIRE(io::save_ply(folder / "disk/in.ply", cloud_of_random_rows(2000, 3, 24)).ok());
+      const std::string before = read_file(folder / "disk/in.ply");
+      const Outcome out = run(folder, "disk/in.ply disk/in.ply --scale 2 --views 0");
+      CAPTURE(out.text);
+      CHECK_FALSE(out.ok);
+      CHECK(out.says("disk/in.ply: cannot be written: No space left on device"));
+      CHECK(read_file(folder / "disk/in.ply") == before);
+      CHECK(std::distance(std::filesystem::directory_iterator(folder / "disk"), {}) == 1);
+    }
+  }
+  const std::string path = (folder / "in.ply").string();
+  REQUIRE(io::save_ply(path, cloud_of_random_rows(2000, 3, 24)).ok());
+  const std::string before = read_file(path);
+  for (int trial = 0; trial < 12; ++trial) {
+    Process tool({GSNAV_CONVERT, path, path, "--views", "0"}, folder.path());
+    ::usleep(static_cast<unsigned>(4000 * trial));
+    tool.signal(SIGKILL);
+    tool.wait(60);
+    CHECK(read_file(path) == before);  // PLY to PLY gives the same bytes, before or after
+  }
+}
+
+TEST_CASE("convert: a name that cannot be written is said before anything is read") {
+  const TempFolder folder("convert_early");
+  const auto says = [&](const std::string& arguments, const char* part) {
+    const Outcome out = run(folder, arguments);
+    CAPTURE(out.text);
+    CHECK_FALSE(out.ok);
+    CHECK(out.says(part));
+    CHECK_FALSE(out.says("absent.ply"));
+  };
+  says("absent.ply out.txt", "out.txt: not a name that is written here");
+  says("absent.ply none/out.ply", "none does not exist");
+  std::filesystem::create_directory(folder / "folder.ply");
+  says("absent.ply folder.ply", "it is a folder");
 }
 
 TEST_CASE("convert: edits, in their order") {
@@ -200,7 +402,8 @@ TEST_CASE("largest_field_errors: each field by itself") {
   const auto errors = [&](const auto& change) {
     GaussianCloud made = source;
     change(made);
-    return gsnav_convert::largest_field_errors(source, made);
+    const auto rows = rows_as_read(source);
+    return gsnav_convert::largest_field_errors(source, rows, made, rows);
   };
   const auto none = errors([](GaussianCloud&) {});
   CHECK(none.mean == 0);

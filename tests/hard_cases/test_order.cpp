@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// N21 to N24: which Gaussian is in front.
+// N21 to N24, N77 to N79: which Gaussian is in front.
 #include <doctest/doctest.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
 
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
+#include "gsnav/math/pack_double.hpp"
 #include "support/oracle.hpp"
+#include "support/sanitized.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -12,47 +18,118 @@ using namespace gsnav_test;
 
 namespace {
 
-/// depth_key of every Gaussian in lanes of L, bits.
-template <class L>
-std::vector<std::uint32_t> keys_of(const GaussianCloud& cloud, const Camera& camera, const Similarity& place) {
-  constexpr int kLanes = LaneIo<L>::width;
-  const auto p = make_projection_camera<float>(camera, cloud.set(place));
-  const Vec3<float> o = vec_cast<float>(-p.position);
-  const Vec3<L> offset{L(o.x), L(o.y), L(o.z)};
-  std::vector<std::uint32_t> keys;
+/// Keys of one Gaussian as z_depth and camera_distance order it.
+struct Keys {
+  std::vector<std::uint32_t> depth, distance;
+  bool operator==(const Keys&) const = default;
+};
+
+/// origin - camera position of a row, asset frame.
+Vec3d offset_of(const GaussianCloud& cloud, const Vec3d& eye, std::size_t row) {
+  return (cloud.origins.empty() ? Vec3d{} : cloud.origins[cloud.origin_ids.empty() ? 0 : cloud.origin_ids[row]]) - eye;
+}
+
+/// The kernel's keys of every Gaussian, one after the other, bits.
+Keys keys_of(const GaussianCloud& cloud, const Camera& camera, const Similarity& place) {
+  const auto p = make_projection_camera<double>(camera, cloud.set(place));
+  Keys keys;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Vec3d mean{cloud.means[0][i], cloud.means[1][i], cloud.means[2][i]};
+    const Vec3d delta = mean + offset_of(cloud, p.position, i);
+    keys.depth.push_back(bits_of(static_cast<float>(depth_key(p, delta))));
+    keys.distance.push_back(bits_of(static_cast<float>(distance_key(p, delta))));
+  }
+  return keys;
+}
+
+/// The same in N lanes.
+template <int N>
+Keys keys_in_lanes(const GaussianCloud& cloud, const Camera& camera, const Similarity& place) {
+  constexpr std::size_t kLanes = N;
+  using D = Pack<double, N / 2>;
+  const auto p = make_projection_camera<double>(camera, cloud.set(place));
+  Keys keys;
   for (std::size_t i = 0; i < cloud.size(); i += kLanes) {
-    float mean[3][kLanes];
+    Vec3<Pack<float, N>> mean;
+    double offset[3][kLanes];
+    float planes[3][kLanes];
     for (std::size_t l = 0; l < kLanes; ++l) {
       const std::size_t row = std::min(i + l, cloud.size() - 1);
-      for (std::size_t k = 0; k < 3; ++k) mean[k][l] = cloud.means[k][row];
+      const Vec3d o = offset_of(cloud, p.position, row);
+      for (int k = 0; k < 3; ++k) {
+        planes[k][l] = cloud.means[static_cast<std::size_t>(k)][row];
+        offset[k][l] = o[k];
+      }
     }
-    const L key = depth_key(p.key_rotation, p.key_scale,
-                            Vec3<L>{LaneIo<L>::load(mean[0]), LaneIo<L>::load(mean[1]), LaneIo<L>::load(mean[2])},
-                            offset);
-    double out[kLanes];
-    LaneIo<L>::store(key, out);
+    for (int k = 0; k < 3; ++k) mean[k] = Pack<float, N>::load(planes[k]);
+    Vec3<D> low, high;
+    for (int k = 0; k < 3; ++k) {
+      low[k] = widened<0>(mean[k]) + D::load(offset[k]);
+      high[k] = widened<1>(mean[k]) + D::load(offset[k] + kLanes / 2);
+    }
+    float depth[kLanes], distance[kLanes];
+    rounded(depth_key(p, low), depth_key(p, high)).store(depth);
+    rounded(distance_key(p, low), distance_key(p, high)).store(distance);
     for (std::size_t l = 0; l < kLanes && i + l < cloud.size(); ++l) {
-      keys.push_back(bits_of(static_cast<float>(out[l])));
+      keys.depth.push_back(bits_of(depth[l]));
+      keys.distance.push_back(bits_of(distance[l]));
     }
   }
   return keys;
 }
 
-/// The key by hand: the chain of fused operations that every backend shares, written out.
-std::vector<std::uint32_t> keys_by_hand(const GaussianCloud& cloud, const Camera& camera,
-                                        const Similarity& place) {
-  const auto p = make_projection_camera<double>(camera, cloud.set(place));
-  const Mat3d r = camera.viewmat.linear * rotation_matrix(place.rotation);
-  const float rx = static_cast<float>(r(2, 0)), ry = static_cast<float>(r(2, 1)), rz = static_cast<float>(r(2, 2));
-  std::vector<std::uint32_t> keys;
+/// The centre of row i in camera axes, metres, in long double: by the text of the contract.
+std::array<Real, 3> true_center(const GaussianCloud& cloud, const Camera& camera, const Similarity& place,
+                                std::size_t i) {
+  const Real w = place.rotation.w, x = place.rotation.x, y = place.rotation.y, z = place.rotation.z;
+  const Real turn[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+                           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+  const Vec3d origin = offset_of(cloud, {}, i);
+  Real asset[3], world[3];
+  for (int k = 0; k < 3; ++k) asset[k] = Real(cloud.means[static_cast<std::size_t>(k)][i]) + Real(origin[k]);
+  for (int k = 0; k < 3; ++k) {
+    world[k] = place.scale * (turn[k][0] * asset[0] + turn[k][1] * asset[1] + turn[k][2] * asset[2]) +
+               place.translation[k];
+  }
+  std::array<Real, 3> center;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d& row = camera.viewmat.linear.row[k];
+    center[static_cast<std::size_t>(k)] =
+        row.x * world[0] + row.y * world[1] + row.z * world[2] + camera.viewmat.translation[k];
+  }
+  return center;
+}
+
+Keys true_keys(const GaussianCloud& cloud, const Camera& camera, const Similarity& place) {
+  Keys keys;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const float x = cloud.means[0][i] + static_cast<float>(-p.position.x);
-    const float y = cloud.means[1][i] + static_cast<float>(-p.position.y);
-    const float z = cloud.means[2][i] + static_cast<float>(-p.position.z);
-    const float key = std::fma(rz, z, std::fma(ry, y, rx * x)) * static_cast<float>(place.scale);
-    keys.push_back(bits_of(key));
+    const auto c = true_center(cloud, camera, place, i);
+    keys.depth.push_back(bits_of(static_cast<float>(c[2])));
+    keys.distance.push_back(bits_of(static_cast<float>(std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]))));
   }
   return keys;
+}
+
+/// A camera that is turned about no axis of the world's.
+Camera turned_camera(const Vec3d& eye, const Vec3d& target, int size, double hfov) {
+  return Camera::look_at(eye, target, normalized(Vec3d{0.3, 1, -0.2}), size, size, hfov);
+}
+
+/// `count` Gaussians about 100 m in front of `axis_camera`, on the grid of a 16-bit capture (1/256 m): all but
+/// `apart` in one plane, over several of the lattice's origins. `moved` is a multiple of the grid's step.
+GaussianCloud coarse_capture(std::size_t count, std::size_t apart, const Vec3d& moved = {}) {
+  Rng rng(71);
+  std::vector<RawGaussian> gs;
+  const auto grid = [&](double low, double high) { return std::floor(rng.uniform(low, high) * 256) / 256; };
+  for (std::size_t i = 0; i < count; ++i) {
+    const double z = 96 + (i % 6 == 5 && i / 6 < apart ? grid(0, 0.1) : 0.0);
+    const Vec3d at{grid(-45, 45), grid(-45, 45), z};
+    const std::array<float, 3> color{static_cast<float>(rng.normal()), static_cast<float>(rng.normal()),
+                                     static_cast<float>(rng.normal())};
+    gs.push_back(gaussian(at + moved, {2, 2, 0.1}, rng.uniform(0.1, 0.9), color));
+  }
+  return cloud_of(gs);
 }
 
 /// The cloud without rows `dropped`.
@@ -131,15 +208,15 @@ TEST_CASE("N22_depth_tie_grid") {
   place.scale = 1.7;
   for (const Camera& camera : {axis, turned}) {
     for (const Similarity& p : {Similarity{}, place}) {
-      const auto reference = keys_by_hand(cloud, camera, p);
-      CHECK(keys_of<float>(cloud, camera, p) == reference);
-      CHECK(keys_of<Pack<float, 4>>(cloud, camera, p) == reference);
-      CHECK(keys_of<Pack<float, 8>>(cloud, camera, p) == reference);
-      CHECK(keys_of<Pack<float, 16>>(cloud, camera, p) == reference);
+      const Keys reference = true_keys(cloud, camera, p);
+      CHECK(keys_of(cloud, camera, p) == reference);
+      CHECK(keys_in_lanes<4>(cloud, camera, p) == reference);
+      CHECK(keys_in_lanes<8>(cloud, camera, p) == reference);
+      CHECK(keys_in_lanes<16>(cloud, camera, p) == reference);
     }
   }
   // Along the axis the key is the stored z itself: ties are exact, and file order settles them.
-  const auto keys = keys_of<float>(cloud, axis, {});
+  const auto keys = keys_of(cloud, axis, {}).depth;
   std::size_t ties = 0;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     CHECK(keys[i] == bits_of(cloud.means[2][i]));
@@ -150,10 +227,13 @@ TEST_CASE("N22_depth_tie_grid") {
   render_everywhere({&cloud}, axis, all_outputs(), [&](const auto& f, const auto& renderer) {
     CHECK(image_error(f.rgb, truth.rgb, 3, truth.undecided).max < renderer.bound(2e-5, 1e-9));
   });
-  // Tilted a little, the depths of a plane are apart by roundings: the key's are the ones that order.
+  // Tilted a little, the depths of a plane are apart by roundings.
   Camera tilted = turned;
   tilted.viewmat.linear = rotation_matrix(axis_angle(normalized(Vec3d{1, -2, 0.5}), 2e-5));
-  render_everywhere({&cloud}, tilted, all_outputs(), [](const auto& f, const auto&) { CHECK(all_finite(f)); });
+  const OracleImage of_tilted = oracle_render({&cloud}, tilted);
+  render_everywhere({&cloud}, tilted, all_outputs(), [&](const auto& f, const auto& renderer) {
+    CHECK(image_error(f.rgb, of_tilted.rgb, 3, of_tilted.undecided).max < renderer.bound(2e-5, 1e-9));
+  });
 }
 
 TEST_CASE("N23_key_wide_range") {
@@ -226,5 +306,119 @@ TEST_CASE("N24_neg_zero_depth") {
     CHECK(all.rgb == some.rgb);
     CHECK(all.median_depth == some.median_depth);
     CHECK(all.expected_depth == some.expected_depth);
+  });
+}
+
+TEST_CASE("N77_quantised_capture keeps its order at any place") {
+#if defined(GSNAV_TEST_SANITIZED)
+  constexpr std::size_t kRows = 6000;  // such builds run device code on the host too, slowly
+#else
+  constexpr std::size_t kRows = 120000;
+#endif
+  const GaussianCloud cloud = coarse_capture(kRows, kRows / 6);
+  CHECK(cloud.origins.size() > 2);
+  const Camera axis = axis_camera(12, 12);
+  // Nearly level: the plane's depths differ by float32 roundings across the image.
+  Camera tilted = axis;
+  tilted.viewmat.linear = rotation_matrix(axis_angle(normalized(Vec3d{1, -2, 0.5}), 2e-6));
+  tilted.viewmat.translation = {0.1, -0.2, 0.3};
+  {
+    const Keys keys = keys_of(cloud, axis, {});
+    const std::uint32_t plane = bits_of(96.0f);
+    CHECK(std::count(keys.depth.begin(), keys.depth.end(), plane) >= static_cast<std::ptrdiff_t>(kRows / 6 * 5));
+  }
+  for (const Camera& camera : {axis, tilted}) {
+    const OracleImage truth = oracle_render({&cloud}, camera);
+    render_everywhere({&cloud}, camera, {}, [&](const auto& f, const auto& renderer) {
+      const ImageError error = image_error(f.rgb, truth.rgb, 3, truth.undecided);
+      MESSAGE(renderer.name() << ": " << error.psnr << " dB, max " << error.max);
+      CHECK(error.max < renderer.bound(2e-5, 1e-9));
+    });
+    // The same capture elsewhere: a multiple of the lattice, no multiple of it, and off the grid.
+    for (const Vec3d& moved : {Vec3d{64, -128, 64}, Vec3d{1000, 1000, -1000}, Vec3d{0.3, 0.3, 0.3}}) {
+      CAPTURE(moved.x);
+      const bool off_grid = moved.x < 1;
+      const GaussianCloud there = coarse_capture(kRows, kRows / 6, off_grid ? Vec3d{} : moved);
+      Similarity place;
+      if (off_grid) place.translation = moved;
+      Camera from = camera;
+      from.viewmat.translation = camera.viewmat.translation - camera.viewmat.linear * moved;
+      CHECK(keys_of(there, from, place) == keys_of(cloud, camera, {}));
+      render_everywhere({{&there, place}}, from, {}, [&](const auto& f, const auto& renderer) {
+        CHECK(image_error(f.rgb, truth.rgb, 3, truth.undecided).max < renderer.bound(2e-5, 1e-9));
+      });
+    }
+  }
+}
+
+TEST_CASE("N78_moved_world keeps the order of depths that float32 tells apart") {
+  Rng rng(72);
+  std::vector<RawGaussian> here;
+  for (int i = 0; i < 20000; ++i) {
+    here.push_back(gaussian({rng.uniform(-4, 4), rng.uniform(-1.5, 1.5), rng.uniform(-4, 4)}, {0.05, 0.05, 0.05}, 0.5));
+  }
+  const Camera camera = turned_camera({-3.7, 0.4, -3.9}, {1, 0, 1}, 64, 90);
+  for (const double metres : {1000.0, 64.0, 0.3}) {
+    CAPTURE(metres);
+    const Vec3d moved{metres, -metres, metres};
+    std::vector<RawGaussian> there = here;
+    for (RawGaussian& g : there) g.mean += moved;
+    const GaussianCloud cloud = cloud_of(there);
+    Camera from = camera;
+    from.viewmat.translation = camera.viewmat.translation - camera.viewmat.linear * moved;
+    const std::vector<std::uint32_t> keys = keys_of(cloud, from, {}).depth;
+    // Where they stood before, in double, from near to far.
+    std::vector<std::pair<Real, std::size_t>> order;
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      const Vec3d c = camera.viewmat.linear * here[i].mean + camera.viewmat.translation;
+      if (c.z > 0.2) order.push_back({c.z, i});
+    }
+    std::sort(order.begin(), order.end());
+    // Stored offsets are rounded where they lie, up to 32 m from an origin an axis; the key where it is.
+    std::size_t wrong = 0, told_apart = 0;
+    for (std::size_t k = 1; k < order.size(); ++k) {
+      const Real far = order[k].first, gap = far - order[k - 1].first;
+      if (gap <= far * 0x1p-23L + 3.5L * 64 * 0x1p-24L) continue;
+      ++told_apart;
+      wrong += keys[order[k - 1].second] < keys[order[k].second] ? 0 : 1;
+    }
+    CHECK(told_apart > order.size() / 2);
+    CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE("N79_near_ties one step of float32 apart are in order") {
+  // Pairs of dots, the farther one first in the file: red is in front, and its depth is the float before.
+  constexpr int kSide = 16, kPitch = 4;
+  const Camera camera = turned_camera({31.2, 17.3, -33.1}, {0.2, -0.1, 0.3}, kSide * kPitch, 16);
+  Rng rng(73);
+  std::vector<RawGaussian> gs;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const double u = ((i % kSide + 0.5) * kPitch - camera.cx) / camera.fx;
+    const double v = ((i / kSide + 0.5) * kPitch - camera.cy) / camera.fy;
+    const double z = rng.uniform(44, 54);
+    const Vec3d in_camera = Vec3d{u * z, v * z, z} - camera.viewmat.translation;
+    const Vec3d mean = transpose(camera.viewmat.linear) * in_camera;
+    gs.push_back(gaussian(mean, {0.01, 0.01, 0.01}, 0.95, {-1, -1, 3}));
+    gs.push_back(gaussian(mean, {0.01, 0.01, 0.01}, 0.95, {3, -1, -1}));
+  }
+  GaussianCloud cloud = cloud_of(gs);
+  REQUIRE(cloud.origins.size() <= 1);
+  const auto key = [&](std::size_t row) { return static_cast<float>(true_center(cloud, camera, {}, row)[2]); };
+  for (std::size_t i = 0; i < cloud.size(); i += 2) {
+    const float wanted = std::nextafter(key(i), 1e9f);
+    const float away = camera.viewmat.linear(2, 0) > 0 ? 1e9f : -1e9f;
+    while (key(i) < wanted) cloud.means[0][i] = std::nextafter(cloud.means[0][i], away);
+    REQUIRE(key(i) == wanted);
+    REQUIRE(key(i) == std::nextafter(key(i + 1), 1e9f));
+  }
+  render_everywhere({&cloud}, camera, {}, [&](const auto& f, const auto&) {
+    int wrong = 0;
+    for (int i = 0; i < kSide * kSide; ++i) {
+      const int row = i / kSide * kPitch + kPitch / 2, column = i % kSide * kPitch + kPitch / 2;
+      const std::size_t pixel = static_cast<std::size_t>(row * camera.width + column);
+      wrong += f.rgb[3 * pixel] > f.rgb[3 * pixel + 2] ? 0 : 1;
+    }
+    CHECK(wrong == 0);
   });
 }

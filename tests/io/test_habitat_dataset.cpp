@@ -64,6 +64,23 @@ TEST_CASE("a dataset leads to its scenes, their stages, NavMeshes and people") {
   CHECK(data.find("elsewhere") == nullptr);
 }
 
+TEST_CASE("a dataset names the files outside of its folder that it uses") {
+  const Dataset d;
+  CHECK(d.load()->warnings.size() == 4);  // keys that are left out; ../../assets is inside
+  const std::string outside = (d.folder.path().parent_path() / "elsewhere.ply").string();
+  d.write("configs/stages/attic.stage_config.json", R"({"render_asset":")" + outside + R"("})");
+  d.write("configs/stages/playroom.stage_config.json", R"({"render_asset":"../../../beside.ply"})");
+  const auto data = d.load().value();
+  std::size_t said = 0;
+  for (const std::string& w : data.warnings) {
+    if (!contains(w, "outside of the dataset's folder")) continue;
+    ++said;
+    CHECK((contains(w, "attic uses " + outside) || contains(w, "beside.ply")));
+  }
+  CHECK(said == 2);
+  CHECK(data.find("attic")->stage.render_asset == outside);  // it is read: Habitat's own datasets do so
+}
+
 TEST_CASE("a stage's frame by hand: z up and y ahead becomes y up and -z ahead") {
   const Dataset d;
   d.write("configs/stages/playroom.stage_config.json",

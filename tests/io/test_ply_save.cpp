@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <cmath>
+#include <cstring>
+#include <limits>
+
 #include "check_cloud.hpp"
 #include "gsnav/io/ply.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -32,6 +37,10 @@ TEST_CASE("save_ply: what it writes is read back") {
     CHECK(again.cloud.origin_ids == first.origin_ids);
     CHECK(again.cloud.scales[0][4] == 0.0f);
     CHECK(again.cloud.opacities[5] == 1.0f);
+    // Bit for bit, so that images are equal: nothing drifts by being converted.
+    CHECK(again.cloud.opacities == first.opacities);
+    CHECK(again.cloud.scales == first.scales);
+    CHECK(again.cloud.quats == first.quats);
     long double worst = 0;
     for (std::size_t i = 0; i < first.size(); ++i) {
       worst = std::max(worst, std::fabs(1.0L * again.cloud.opacities[i] - first.opacities[i]));
@@ -60,6 +69,70 @@ TEST_CASE("save_ply: INRIA's order and layout, byte by byte") {
   const std::string text = file.text();
   REQUIRE(io::save_ply(folder / "a.ply", io::parse_ply(bytes_of(text), "a").value().cloud).ok());
   CHECK(read_file(folder / "a.ply") == text);
+}
+
+TEST_CASE("save_ply: every logit is finite, and opacity 1 is 1 again in float32 and in double") {
+  TempFolder folder("ply_logits");
+  GaussianCloudBuilder builder(0);
+  RawGaussian raw;
+  raw.quat = {1, 0, 0, 0};
+  for (const double logit :
+       {14.0, 16.0, 17.0, 17.5, 25.0, 88.0, std::numeric_limits<double>::infinity()}) {
+    raw.opacity_logit = logit;
+    builder.add(raw);
+  }
+  GaussianCloud& cloud = builder.cloud();
+  cloud.opacities[0] = 0;  // a writer takes what it is given
+  REQUIRE(io::save_ply(folder / "a.ply", cloud).ok());
+  const std::string text = read_file(folder / "a.ply");
+  const std::size_t header = text.find("end_header\n") + 11;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    float logit = 0;
+    std::memcpy(&logit, text.data() + header + 4 * (17 * i + 9), 4);
+    CAPTURE(logit);
+    CHECK(std::isfinite(logit));
+    CHECK(static_cast<float>(1 / (1 + std::exp(-static_cast<double>(logit)))) == cloud.opacities[i]);
+    if (cloud.opacities[i] == 1) CHECK(1 / (1 + std::exp(-logit)) == 1.0f);
+  }
+}
+
+TEST_CASE("save_ply: rows go out in the order in which they were read") {
+  TempFolder folder("ply_order");
+  PlyFile file;
+  file.properties = inria_properties(0);
+  file.rows = random_rows(3000, 0, 48);
+  GaussianCloud cloud = io::parse_ply(bytes_of(file.text()), "rows").value().cloud;
+  const auto means = cloud.means;
+  sort_spatially(cloud);
+  REQUIRE(cloud.means != means);
+  REQUIRE(io::save_ply(folder / "a.ply", cloud).ok());
+  CHECK(io::load_ply(folder / "a.ply").value().cloud.means == means);
+}
+
+TEST_CASE("save_ply: quaternions come back bit for bit, many of them") {
+  TempFolder folder("ply_quats");
+  PlyFile file;
+  file.properties = inria_properties(0);
+  file.rows = random_rows(60000, 0, 47);
+  const GaussianCloud first = io::parse_ply(bytes_of(file.text()), "first").value().cloud;
+  std::size_t changed = 0;  // by normalising the float32 of a unit quaternion once more
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    Quatd q{static_cast<double>(first.quats[0][i]), static_cast<double>(first.quats[1][i]),
+            static_cast<double>(first.quats[2][i]), static_cast<double>(first.quats[3][i])};
+    normalize(q);
+    changed += static_cast<float>(q.w) != first.quats[0][i] ||
+                       static_cast<float>(q.x) != first.quats[1][i] ||
+                       static_cast<float>(q.y) != first.quats[2][i] ||
+                       static_cast<float>(q.z) != first.quats[3][i]
+                   ? 1
+                   : 0;
+  }
+  CHECK(changed > 100);
+  REQUIRE(io::save_ply(folder / "a.ply", first).ok());
+  const GaussianCloud again = io::load_ply(folder / "a.ply").value().cloud;
+  CHECK(again.quats == first.quats);
+  CHECK(again.opacities == first.opacities);
+  CHECK(again.scales == first.scales);
 }
 
 TEST_CASE("save_ply: opacities at the threshold are not lost") {

@@ -3,10 +3,13 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
+#include "../../bench/large_capture.hpp"
 #include "gsnav/nav/gaussian_navmesh.hpp"
-#include "meshes.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "meshes.hpp"
 
 using namespace gsnav;
 
@@ -279,4 +282,227 @@ TEST_CASE("gaussian navmesh: with triangles: furniture in a mesh, a wall in a sc
   wall.triangles.push_back({0, 1, 99});
   CHECK(build_navmesh(s, {&rooms, 1}, wall.vertices, wall.triangles).message().find("names vertex 99") !=
         std::string::npos);
+}
+
+namespace {
+
+/// Two storeys of 8 x 5 m, 2.8 m apart, in one house with a roof: from x = 2 to 6.2 m a flight of 15
+/// steps of 0.28 m (each 2.8 / 16 m) along the wall z = 5 leads through an opening of the upper floor.
+/// `steps` false: no stairs.
+constexpr double kUp = 2.8, kStep = kUp / 16, kTread = 0.28, kStairX = 1.6, kStairZ = 3.8;
+
+Painter house(bool steps) {
+  Painter p;
+  p.ground(0, 0, 8, 5);
+  p.ground(0, 0, 8, kStairZ, kUp);  // the upper floor, open over the stairs
+  p.ground(0, kStairZ, kStairX, 5, kUp);
+  p.ground(kStairX + 15 * kTread, kStairZ, 8, 5, kUp);
+  p.ground(0, 0, 8, 5, 2 * kUp);  // the roof
+  for (const double z : {0.0, 5.0}) p.wall(0, z, 8, z, 0, 2 * kUp);
+  for (const double x : {0.0, 8.0}) p.wall(x, 0, x, 5, 0, 2 * kUp);
+  for (int i = 0; steps && i < 15; ++i) {
+    const double x = kStairX + i * kTread, y = (i + 1) * kStep;
+    p.ground(x, kStairZ, x + kTread, 5, y);
+    p.wall(x, kStairZ, x, 5, y - kStep, y);
+  }
+  return p;
+}
+
+}  // namespace
+
+TEST_CASE("gaussian navmesh: a house of two storeys is walked by its stairs") {
+  const auto r = build(house(true));
+  INFO(r.message());
+  REQUIRE(r.ok());
+  REQUIRE(r->report.storeys.size() == 2);
+  CHECK(r->report.stairs == 1);
+  CHECK(std::abs(r->report.storeys[0].height) < 0.04);
+  CHECK(std::abs(r->report.storeys[1].height - kUp) < 0.04);
+  const NavMesh& m = r->mesh;
+  // From the middle of the lower floor up the flight to the far corner of the upper one: the flight's
+  // own length on the slope, and the ways to and from it.
+  const double foot = kStairX, head = kStairX + 15 * kTread, z = 0.5 * (kStairZ + 5);
+  const Vec3d below{0.8, 0, z}, above{7.2, kUp, z};
+  const auto path = m.find_path(below, above);
+  INFO(path.message());
+  REQUIRE(path.ok());
+  const double true_length = (foot - below.x) + std::hypot(head - foot, kUp) + (above.x - head);
+  CHECK(path->length == doctest::Approx(true_length).epsilon(0.06));
+  CHECK(m.island_count() == 1);
+  // Nobody stands on the roof, in the walls or in the air.
+  Rng rng(5);
+  int on_lower = 0, on_upper = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Vec3d p = m.random_point(rng).position;
+    REQUIRE(p.x > 0.05);
+    REQUIRE(p.x < 7.95);
+    REQUIRE(p.z > 0.05);
+    REQUIRE(p.z < 4.95);
+    const bool lower = std::abs(p.y) < 0.1, upper = std::abs(p.y - kUp) < 0.1;
+    on_lower += lower ? 1 : 0;
+    on_upper += upper ? 1 : 0;
+    if (lower || upper) continue;
+    // On the stairs, within the agent's climb of the slope through the middles of the treads.
+    REQUIRE(p.z > kStairZ - 0.1);
+    REQUIRE(std::abs(p.y - (p.x - foot + 0.5 * kTread) / kTread * kStep) < 0.2);
+  }
+  CHECK(on_lower > 1500);
+  CHECK(on_upper > 1500);
+}
+
+TEST_CASE(
+    "gaussian navmesh: storeys without stairs are islands, roofs and what noise lies under the ground "
+    "are none") {
+  const auto r = build(house(false));
+  INFO(r.message());
+  REQUIRE(r.ok());
+  REQUIRE(r->report.storeys.size() == 2);
+  CHECK(r->mesh.island_count() == 2);
+  CHECK(r->mesh.navigable_area() == doctest::Approx(7.8 * 4.8 + 7.8 * 4.8 - 4.4 * 1.3).epsilon(0.06));
+
+  // Open ground with a sheet of noise 3 m below it, a crown of a tree over it, and a flat roof.
+  Painter p;
+  p.ground(0, 0, 14, 14);
+  p.missing = 0.6;
+  p.ground(1, 1, 13, 13, -3);
+  p.missing = 0;
+  p.ground(3, 3, 6, 6, 5);
+  p.box(9, 9, 12, 12, 3);
+  const auto open = build(p);
+  INFO(open.message());
+  REQUIRE(open.ok());
+  CHECK(std::abs(open->report.floor_y) < 0.04);
+  CHECK(open->report.storeys.size() == 1);
+  Rng rng(6);
+  for (int i = 0; i < 2000; ++i) REQUIRE(std::abs(open->mesh.random_point(rng).position.y) < 0.1);
+}
+
+TEST_CASE("gaussian navmesh: ground is not a floor from below") {
+  // A street with houses and trees; then the same with its up the other way round.
+  Painter p;
+  p.ground(0, 0, 20, 12);
+  for (double x = 2; x < 18; x += 4) p.box(x, 2, x + 2, 4, 3.0);
+  for (double x = 2; x < 18; x += 3) p.box(x, 8, x + 0.4, 8.4, 2.0);
+  const auto right = build(p);
+  INFO(right.message());
+  REQUIRE(right.ok());
+  CHECK(std::abs(right->report.floor_y) < 0.04);
+  Similarity over;
+  over.rotation = axis_angle(Vec3d{1, 0, 0}, 3.14159265358979323846);
+  const auto wrong = build(p, {}, over);
+  REQUIRE_FALSE(wrong.ok());
+  CHECK(wrong.code() == Errc::nothing_navigable);
+  CHECK(wrong.message().find("seen from below") != std::string::npos);
+  CHECK(wrong.message().find("--up") != std::string::npos);
+}
+
+TEST_CASE("gaussian navmesh: a hill is followed as far as the agent walks") {
+  // Ground that rises by 20 degrees over 10 m, between two level fields 3.2 m apart.
+  Painter p;
+  const double rise = 3.2, run = 9.0;
+  p.ground(0, 0, 5, 6);
+  p.surface({5, 0, 0}, {0, 0, 6}, {run, rise, 0});
+  p.ground(5 + run, 0, 10 + run, 6, rise);
+  const auto r = build(p);
+  INFO(r.message());
+  REQUIRE(r.ok());
+  CHECK(r->mesh.island_count() == 1);
+  const double length = 4 + std::hypot(run, rise) + 4;
+  CHECK(r->mesh.geodesic_distance({1, 0, 3}, {9 + run, rise, 3}) ==
+        doctest::Approx(length).epsilon(0.03));
+}
+
+TEST_CASE("gaussian navmesh: tiles, threads and a crop") {
+  const Painter p = flat();
+  const GaussianSet set = p.cloud().set(Similarity{});
+  // The same bits on any number of threads, the same floor plan in tiles.
+  NavMeshSettings s = gaussian_navmesh_settings();
+  s.tile_size = 48;
+  GaussianNavOptions o;
+  o.threads = 1;
+  const auto one = build_navmesh(s, {&set, 1}, o);
+  o.threads = 5;
+  std::vector<std::string> stages;
+  double last = 0;
+  o.progress = [&](const char* stage, double share) {
+    if (stages.empty() || stages.back() != stage) last = 0;
+    if (stages.empty() || stages.back() != stage) stages.emplace_back(stage);
+    CHECK(share >= last);
+    CHECK(share <= 1 + 1e-9);
+    last = share;
+  };
+  const auto many = build_navmesh(s, {&set, 1}, o);
+  INFO(one.message());
+  REQUIRE(one.ok());
+  REQUIRE(many.ok());
+  CHECK(stages == std::vector<std::string>{"voxels", "floors", "polygons"});
+  check_flat(*one);
+  REQUIRE(one->mesh.polygon_count() == many->mesh.polygon_count());
+  CHECK(one->mesh.navigable_area() == many->mesh.navigable_area());
+  Rng a(9), b(9);
+  for (int i = 0; i < 500; ++i) {
+    const Vec3d u = one->mesh.random_point(a).position, v = many->mesh.random_point(b).position;
+    REQUIRE(u.x == v.x);
+    REQUIRE(u.y == v.y);
+    REQUIRE(u.z == v.z);
+  }
+  // The second room alone.
+  o = {};
+  o.crop = Aabb<double>{{4.1, -1, -1}, {9, 4, 6}};
+  const auto room = build(p, o);
+  INFO(room.message());
+  REQUIRE(room.ok());
+  CHECK(room->mesh.bounds().low.x > 4.0);
+  CHECK(room->mesh.navigable_area() == doctest::Approx(3.8 * 4.8).epsilon(0.08));
+  o.crop->high.x = 4;
+  CHECK(build(p, o).message().find("crop") != std::string::npos);
+}
+
+TEST_CASE("gaussian navmesh: a box too large says which cell size would do") {
+  Painter p;
+  p.ground(0, 0, 40, 4);
+  GaussianNavOptions o;
+  o.max_voxels = 1000000;
+  const auto r = build(p, o);
+  CHECK(r.code() == Errc::invalid_argument);
+  INFO(r.message());
+  CHECK(r.message().find("a NavMesh at 0.05 m needs ") == 0);
+  CHECK(r.message().find("--cell-size 0.1") != std::string::npos);
+  CHECK(r.message().find("--crop X0 Y0 Z0 X1 Y1 Z1") != std::string::npos);
+  // And it does.
+  const GaussianSet set = p.cloud().set(Similarity{});
+  NavMeshSettings s = gaussian_navmesh_settings();
+  const std::size_t at = r.message().find("--cell-size ") + 12;
+  s.cell_size = s.cell_height = std::stod(r.message().substr(at));
+  CHECK(build_navmesh(s, {&set, 1}, o).code() != Errc::invalid_argument);
+}
+
+TEST_CASE("gaussian navmesh: an outdoor capture of 170 x 230 x 110 m is its ground") {
+  // A tenth of the Gaussians at four times the cell size; bench_navmesh_capture has all of them. In
+  // columns and levels of 0.05 m the box would be 33 G voxels.
+  const GaussianCloud cloud = gsnav_bench::large_capture(85000);
+  Similarity upright;
+  upright.rotation = axis_angle(Vec3d{1, 0, 0}, -1.5707963267948966);
+  const GaussianSet set = cloud.set(upright);
+  NavMeshSettings s = gaussian_navmesh_settings();
+  s.cell_size = 0.2;
+  s.cell_height = 0.1;
+  const auto r = build_navmesh(s, {&set, 1});
+  INFO(r.message());
+  REQUIRE(r.ok());
+  const Vec3d size = r->report.bounds.high - r->report.bounds.low;
+  CHECK(size.x == doctest::Approx(170).epsilon(0.03));
+  CHECK(size.z == doctest::Approx(230).epsilon(0.03));
+  CHECK(r->report.gaussians_outside >= 4000);  // the sky
+  // All ground but houses, trunks and what surrounds them; nobody on roofs, in crowns or under the
+  // ground.
+  CHECK(r->mesh.island_area(0) > 0.8 * 170 * 230);
+  CHECK(r->mesh.navigable_area() < 1.02 * 170 * 230);
+  Rng rng(12);
+  int off = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Vec3d p = r->mesh.random_point(rng).position;
+    off += std::abs(p.y - gsnav_bench::ground_height(p.x, -p.z)) > 0.3 ? 1 : 0;
+  }
+  CHECK(off < 10);
 }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <thread>
 
 #include "cases.hpp"
 #include "detour.hpp"
@@ -265,6 +266,12 @@ TEST_CASE("geodesic: many goals, and fields of distance") {
     }
   }
   CHECK(GeodesicField::make(mesh, {}).code() == Errc::invalid_argument);
+  for (const double error : {-1e-3, 0.2, std::nan("")}) {
+    const Vec3d goal = mesh.random_point(rng, 0).position;
+    const auto field = GeodesicField::make(mesh, std::span(&goal, 1), {}, error);
+    CHECK(field.code() == Errc::invalid_argument);
+    CHECK(field.message().find("relative_error") != std::string::npos);
+  }
   const Vec3d off[] = {{3, 0, 3}, {500, 0, 0}};
   CHECK(GeodesicField::make(mesh, off).message().find("goal 1") != std::string::npos);
   CHECK(mesh.find_path_to_any({3, 0, 3}, {}).code() == Errc::invalid_argument);
@@ -283,4 +290,155 @@ TEST_CASE("geodesic: fields over slopes") {
     const NavPoint p = mesh.random_point(rng, 0);
     REQUIRE(field.distance(p) == doctest::Approx(mesh.distance_between(p, goal)).epsilon(1e-5));
   }
+}
+
+TEST_CASE("geodesic: a point's face and height by the grid are those of the height triangle that it is on") {
+  Soup waves;
+  const auto height = [](int x, int z) { return 0.8 * std::sin(0.7 * x) * std::cos(0.6 * z); };
+  for (int x = 0; x < 12; ++x) {
+    for (int z = 0; z < 12; ++z) {
+      const auto at = [&](int i, int k) { return Vec3d{1.0 * i, height(i, k), 1.0 * k}; };
+      waves.quad(at(x, z), at(x, z + 1), at(x + 1, z + 1), at(x + 1, z));
+    }
+  }
+  std::vector<NavMesh> meshes;
+  meshes.push_back(build(waves));
+  for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/undulating.obj"}) {
+    if (!gsnav_test::data_file(file).empty()) meshes.push_back(demo(file));
+  }
+  for (const NavMesh& mesh : meshes) {
+    const NavMesh::Impl& impl = mesh.impl();
+    const detail::UnfoldedMesh& faces = impl.unfolded();
+    Rng rng(41);
+    const int n = cases(20000);
+    int by_grid = 0, off = 0;
+    double worst = 0;
+    for (int i = 0; i < n; ++i) {
+      NavPoint p = mesh.random_point(rng);
+      const detail::Site at = impl.site(p);
+      Vec3d found = p.position - impl.origin;
+      if (faces.grid.find(p.poly, found) != detail::FaceGrid::kNone) ++by_grid;
+      worst = max(worst, norm(at.position + impl.origin - p.position));
+      const detail::UnfoldedMesh::Face& f = faces.faces[at.face];
+      REQUIRE(f.poly == p.poly);
+      long double inside = 1;  // metres
+      for (std::uint32_t k = 0; k < f.count; ++k) {
+        const Vec3d &a = faces.edges[f.first + k].corner, &b = faces.edges[f.first + (k + 1) % f.count].corner;
+        const long double ex = b.x - a.x, ez = b.z - a.z;
+        const long double side = ex * (at.position.z - a.z) - (at.position.x - a.x) * ez;
+        inside = std::min(inside, side / std::max(std::hypot(ex, ez), 1e-12L));
+      }
+      REQUIRE(inside > -1e-9L);
+      // Beside its polygon a point is taken to the polygon's nearest, or to the triangle that stands out there.
+      p.position.x += rng.uniform(-0.5, 0.5);
+      p.position.z += rng.uniform(-0.5, 0.5);
+      const Vec3d beside = impl.site(p).position + impl.origin;
+      const Vec3d nearest = impl.polys.clamped(p.poly, p.position - impl.origin) + impl.origin;
+      if (std::hypot(beside.x - nearest.x, beside.z - nearest.z) > 0.01) ++off;
+    }
+    MESSAGE(faces.faces.size() << " faces, " << by_grid << " of " << n << " points by the grid, at most " << worst
+                               << " m from where they were drawn");
+    CHECK(by_grid > n / 4);
+    CHECK(worst < 1e-9);
+    CHECK(off == 0);
+  }
+}
+
+TEST_CASE("geodesic: as far there as back for points that lie a rounding outside their face") {
+  // Points on edges of polygons, where height triangles end up to a micrometre short of them.
+  const std::string file = "nav/recast/undulating.obj";
+  if (gsnav_test::data_file(file).empty()) return;
+  const NavMesh mesh = demo(file.c_str());
+  const NavMesh::Impl& impl = mesh.impl();
+  Rng rng(42);
+  std::vector<NavPoint> goals;
+  for (int i = 0; i < 3; ++i) goals.push_back(mesh.random_point(rng, 0));
+  double worst = 0, turned = 0;
+  for (PolyId id = 0; id < mesh.polygon_count(); ++id) {
+    if (mesh.island_of(id) != 0) continue;
+    const detail::PolyMesh::Poly& poly = impl.polys.polys[id];
+    const auto k = static_cast<std::uint32_t>(id % poly.count);
+    const NavPoint p{lerp(impl.polys.corner(poly, k), impl.polys.corner(poly, k + 1), 0.25) + impl.origin, id};
+    // A micrometre farther in.
+    Vec3d middle{};
+    for (std::uint32_t c = 0; c < poly.count; ++c) middle += impl.polys.corner(poly, c) * (1.0 / poly.count);
+    middle += impl.origin;
+    const NavPoint q{p.position + (middle - p.position) * (1e-5 / norm(middle - p.position)), id};
+    const NavPoint& goal = goals[id % goals.size()];
+    const double there = mesh.distance_between(p, goal);
+    turned = max(turned, std::abs(there - mesh.distance_between(goal, p)));
+    worst = max(worst, std::abs(there - mesh.distance_between(q, goal)));
+  }
+  MESSAGE("there and back differ by at most " << turned << " m, from 0.01 mm farther in by " << worst << " m");
+  CHECK(turned < 1e-5);
+  CHECK(worst < 1e-3);
+}
+
+TEST_CASE("geodesic: a field's cells hold the least of all ways, on hills, at corners and beside the mesh") {
+  // Against the search over windows from each point, which knows neither fields nor cells.
+  for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/undulating.obj"}) {
+    if (gsnav_test::data_file(file).empty()) continue;
+    const NavMesh mesh = demo(file);
+    const NavMesh::Impl& impl = mesh.impl();
+    Rng rng(42);
+    const std::vector<Vec3d> goals{mesh.random_point(rng, 0).position, mesh.random_point(rng, 0).position};
+    std::vector<detail::Site> ends;
+    for (const Vec3d& g : goals) ends.push_back(impl.site(*mesh.snap_point(g)));
+    std::vector<NavPoint> points;
+    for (int i = 0; i < cases(600); ++i) points.push_back(mesh.random_point(rng, 0));
+    for (std::size_t i = 0; i < points.size(); i += 4) {
+      points[i].position.x += rng.uniform(-0.2, 0.2);
+      points[i].position.z += rng.uniform(-0.2, 0.2);
+      const detail::PolyMesh::Poly& poly = impl.polys.polys[points[i + 1].poly];
+      points[i + 1].position = impl.polys.corner(poly, static_cast<std::uint32_t>(i % poly.count)) + impl.origin;
+      points[i + 2].position = lerp(impl.polys.corner(impl.polys.polys[points[i + 2].poly], 0),
+                                    impl.polys.corner(impl.polys.polys[points[i + 2].poly], 1), 0.25) + impl.origin;
+    }
+    detail::GeodesicSearch search;
+    std::vector<double> truth;
+    for (const NavPoint& p : points) {
+      truth.push_back(kInfinity);
+      for (const detail::Site& end : ends) {
+        truth.back() = min(truth.back(), search.run(impl.unfolded(), impl.site(p), end));
+      }
+    }
+    for (const double error : {0.0, 1e-3, 1e-2}) {
+      const GeodesicField field = GeodesicField::make(mesh, goals, {}, error).value();
+      double above = 0, below = 0;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const double off = field.distance(points[i]) - truth[i];
+        above = max(above, off - error * truth[i]);
+        below = max(below, -off);
+      }
+      MESSAGE(std::string(file) << ", error " << error << ": above by at most " << above << " m more, below by "
+                                << below << " m");
+      CHECK(above < 1e-7);
+      CHECK(below < 1e-7);
+    }
+  }
+}
+
+TEST_CASE("geodesic: a field has the same bits for any number of threads and any order of questions") {
+  const std::string file = gsnav_test::data_file("nav/recast/undulating.obj");
+  const NavMesh mesh = file.empty() ? build(random_boxes(5, 20, 14)) : demo("nav/recast/undulating.obj");
+  Rng rng(43);
+  const Vec3d goal = mesh.random_point(rng, 0).position;
+  std::vector<NavPoint> points;
+  for (int i = 0; i < cases(20000); ++i) points.push_back(mesh.random_point(rng, 0));
+  const auto make = [&] { return GeodesicField::make(mesh, std::span(&goal, 1)).value(); };
+  const GeodesicField one = make(), backwards = make(), shared = make();
+  std::vector<double> truth(points.size()), back(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) truth[i] = one.distance(points[i]);
+  for (std::size_t i = points.size(); i-- > 0;) back[i] = backwards.distance(points[i]);
+  CHECK(back == truth);
+  constexpr std::size_t kThreads = 4;
+  std::vector<std::vector<double>> found(kThreads, std::vector<double>(points.size()));
+  std::vector<std::thread> threads;
+  for (std::size_t t = 0; t < kThreads; ++t) {
+    threads.emplace_back([&, t] {
+      for (std::size_t i = 0; i < points.size(); ++i) found[t][i] = shared.distance(points[i]);
+    });
+  }
+  for (std::thread& t : threads) t.join();
+  for (const auto& f : found) CHECK(f == truth);
 }

@@ -99,6 +99,32 @@ TEST_CASE("geodesic: an open floor in tiles is seen from end to end") {
   }
 }
 
+TEST_CASE("geodesic: few edges of nav_test's hills are taken to see what they do not") {
+  // An edge whose beams were too many to follow is taken to see all faces, those of other islands too.
+  const std::string path = data_file("nav/recast/nav_test.obj");
+  if (path.empty()) return;
+  const Soup soup = read_obj(path);
+  const NavMesh mesh = NavMesh::build({}, soup.vertices, soup.triangles).value();
+  const NavMesh::Impl& impl = mesh.impl();
+  const detail::UnfoldedMesh& faces = impl.unfolded();
+  REQUIRE_FALSE(impl.hubs().empty());
+  REQUIRE(mesh.island_count() > 2);
+  const auto island = [&](std::uint32_t face) { return mesh.island_of(faces.faces[face].poly); };
+  std::size_t blind = 0, on_hills = 0;
+  for (std::uint32_t e = 0; e < faces.edges.size(); ++e) {
+    if (island(faces.edges[e].face) == 0) continue;
+    bool sees_other = false;
+    for (std::uint32_t goal = 0; goal < faces.faces.size() && !sees_other; ++goal) {
+      const auto range = impl.views().toward(goal, e);
+      sees_other = island(goal) != island(faces.edges[e].face) && range.low <= range.high;
+    }
+    blind += sees_other ? 1 : 0;
+    ++on_hills;
+  }
+  MESSAGE(blind << " of " << on_hills << " edges of the smaller islands are taken to see another island");
+  CHECK(blind < on_hills / 5);
+}
+
 TEST_CASE("geodesic: a mesh of too many sights keeps the search") {
   Soup soup;
   soup.floor(0, 0, 36, 36);

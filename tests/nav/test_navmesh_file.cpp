@@ -10,6 +10,7 @@
 
 #include "cases.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
+#include "height_mending.hpp"
 #include "io/allocations.hpp"
 #include "meshes.hpp"
 #include "navmesh_impl.hpp"
@@ -266,6 +267,87 @@ TEST_CASE("navmesh file: 64-bit references and many tiles") {
   CHECK(back.polygon_count() == mesh.polygon_count());
   CHECK(back.island_count() == mesh.island_count());
   CHECK(back.navigable_area() == doctest::Approx(mesh.navigable_area()).epsilon(1e-6));
+}
+
+namespace {
+
+/// The largest difference in height between the two sides of an edge within the mesh.
+double highest_step(const NavMesh& mesh) {
+  const detail::PolyMesh& m = mesh.impl().polys;
+  double most = 0;
+  for (PolyId p = 0; p < m.polys.size(); ++p) {
+    for (std::uint32_t k = 0; k < m.polys[p].count; ++k) {
+      const PolyId q = m.neighbours[m.polys[p].first + k];
+      if (q == kNoPoly) continue;
+      for (int i = 1; i < 64; ++i) {
+        const Vec3d at = lerp(m.corner(m.polys[p], k), m.corner(m.polys[p], k + 1), i / 64.0);
+        most = max(most, std::abs(m.height(p, at) - m.height(q, at)));
+      }
+    }
+  }
+  return most;
+}
+
+/// A file of a ramp that two triangles share, each with a height sample on their common side: one has it
+/// as a corner of its height triangles, the other as a sliver of no area.
+detail::PolyMesh ramp_with_a_sliver() {
+  detail::PolyMesh m;
+  m.points = {{0, 0, 0}, {4, 1, 0}, {4, 1, 4}, {0, 0, 4}, {2, 0.4, 2}};
+  m.corners = {m.points[0], m.points[1], m.points[2], m.points[0], m.points[2], m.points[3]};
+  m.neighbours = {kNoPoly, kNoPoly, 1, 0, kNoPoly, kNoPoly};
+  m.tris = {{0, 1, 4}, {1, 2, 4}, {0, 2, 3}, {0, 4, 2}};
+  m.polys.resize(2);
+  m.polys[0].count = m.polys[1].count = 3;
+  m.polys[1].first = 3;
+  m.polys[0].tri_count = m.polys[1].tri_count = 2;
+  m.polys[1].tri_first = 2;
+  return m;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "navmesh file: a side with a height sample is one, also of a triangle that has the sample in a "
+    "sliver") {
+  detail::PolyMesh m = ramp_with_a_sliver();
+  detail::mend_heights(m);
+  m.finish();
+  for (const double t : {0.1, 0.3, 0.5, 0.8}) {
+    const Vec3d at{4 * t, 0, 4 * t};
+    const double wanted = t < 0.5 ? 0.8 * t : 0.4 + 1.2 * (t - 0.5);
+    CHECK(m.height(0, at) == doctest::Approx(wanted));
+    CHECK(m.height(1, at) == doctest::Approx(wanted));
+  }
+}
+
+TEST_CASE("navmesh file: one path has one length, across the borders of another program's tiles too") {
+  const std::string path = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");
+  if (path.empty()) return;
+  const NavMesh mesh = load_navmesh(path).value();
+  CHECK(highest_step(mesh) < 1e-4);
+  Rng rng(21);
+  double worst = 0, between = 0;
+  const auto check = [&](const NavPoint& a, const NavPoint& b) {
+    const NavPath found = mesh.find_path(a.position, b.position).value();
+    const double d = mesh.geodesic_distance(a.position, b.position);
+    double length = 0;
+    for (std::size_t i = 1; i < found.points.size(); ++i)
+      length += norm(found.points[i] - found.points[i - 1]);
+    worst = max(worst, std::abs(found.length - d));
+    // Its points follow the surface to a centimetre, so that the line through them is hardly shorter.
+    between = max(between, std::abs(length - d) / max(d, 1.0));
+  };
+  for (int i = 0; i < cases(1000); ++i) {
+    const NavPoint a = mesh.random_point(rng);
+    check(a, mesh.random_point(rng, mesh.island_of(a.poly)));
+    // Where a ramp of two polygons once had a step.
+    const auto c = mesh.random_point_near(rng, {32, -1.2, 1}, 4),
+               d = mesh.random_point_near(rng, {32, -1.2, 0.5}, 6);
+    if (c && d && mesh.island_of(c->poly) == mesh.island_of(d->poly)) check(*c, *d);
+  }
+  MESSAGE("path and distance differ by " << worst << " m at most, the line of the path by " << between);
+  CHECK(worst < 1e-9);
+  CHECK(between < 2e-3);
 }
 
 TEST_CASE("navmesh file: what is wrong is named") {

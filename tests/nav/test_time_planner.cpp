@@ -72,7 +72,7 @@ Followed follow(const NavMesh& mesh, AgentState agent, const TimedPlan& plan, co
     REQUIRE(r.blocked_by != BlockedBy::invalid);
     REQUIRE_FALSE(r.pushed_into);
     REQUIRE(norm(r.position - to) < 0.02);
-    std::vector<WalkPoint> path = r.path;
+    WalkPoints path = r.path;
     path.push_back({r.position, r.poly, 1.0});
     REQUIRE(static_cast<double>(least_gap(agent, path, set, static_cast<Real>(least))) >= least);
     out.length += norm(r.position - agent.position);

@@ -3,15 +3,21 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <iterator>
 #include <string>
 #include <vector>
 
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/mesh_file.hpp"
+#include "gsnav/io/navmesh_settings_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
 #include "support/command.hpp"
+#include "support/data.hpp"
 #include "support/files.hpp"
+#include "support/small_disk.hpp"
 
 using namespace gsnav;
 using gsnav_test::Outcome;
@@ -32,6 +38,33 @@ std::string two_floors_z_up() {
   return "v 0 0 0\nv 800 0 0\nv 800 500 0\nv 0 500 0\nv 1000 0 300\nv 1800 0 300\nv 1800 500 300\nv "
          "1000 500 300\n"
          "f 1 2 3 4\nf 5 6 7 8\n";
+}
+
+/// A GLB of one mesh, metres and y up: a floor of 8 m by 5 m at a height.
+std::string floor_glb(float y) {
+  const float v[] = {0, y, 0, 0, y, 5, 8, y, 5, 8, y, 0};
+  const std::uint16_t triangles[] = {0, 1, 2, 0, 2, 3};
+  std::string bin(reinterpret_cast<const char*>(v), sizeof v);
+  bin.append(reinterpret_cast<const char*>(triangles), sizeof triangles);
+  std::string json =
+      R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":60}],"bufferViews":[{"buffer":0,"byteLength":48},)"
+      R"({"buffer":0,"byteOffset":48,"byteLength":12}],"accessors":[{"bufferView":0,"componentType":5126,"count":4,)"
+      R"("type":"VEC3","min":[0,0,0],"max":[8,9,5]},{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}],)"
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"nodes":[{"mesh":0}],)"
+      R"("scenes":[{"nodes":[0]}],"scene":0})";
+  while (json.size() % 4 != 0) json += ' ';
+  std::string out = "glTF";
+  const auto put = [&](std::size_t n) {
+    const auto word = static_cast<std::uint32_t>(n);
+    out.append(reinterpret_cast<const char*>(&word), 4);
+  };
+  put(2);
+  put(12 + 8 + json.size() + 8 + bin.size());
+  put(json.size());
+  out += "JSON" + json;
+  put(bin.size());
+  out += std::string("BIN\0", 4) + bin;
+  return out;
 }
 
 const char* const kPlain = "--no-filter-ledge-spans --agent-radius 0";
@@ -82,6 +115,142 @@ TEST_CASE("navmesh tool: builds, inspects, converts and draws") {
   without.erase(40, 56)[4] = 1;
   CHECK(read_file(folder / "1.navmesh") == without);
   CHECK_FALSE(run(folder, quoted(folder / "a.navmesh") + " --mset-version 3 --out " + quoted(folder / "3.navmesh")).ok);
+}
+
+TEST_CASE("navmesh tool: a stage and objects from glTF") {
+  const TempFolder folder("navmesh_tool_gltf");
+  write_file(folder / "stage.glb", floor_glb(1));
+  // A box of 1 m from the origin.
+  write_file(folder / "box.obj",
+             "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nv 0 1 0\nv 1 1 0\nv 1 1 1\nv 0 1 1\n"
+             "f 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\nf 5 8 7 6\n");
+  const Outcome made =
+      run(folder, quoted(folder / "stage.glb") + " --out " + quoted(folder / "a.navmesh"));
+  INFO(made.text);
+  REQUIRE(made.ok);
+  CHECK(made.says("2 triangles"));
+  const NavMesh empty = load_navmesh(folder / "a.navmesh").value();
+  CHECK(empty.is_navigable({4, 1, 2.5}));
+  CHECK(empty.bounds().low.y == doctest::Approx(1));
+  CHECK_FALSE(empty.settings().include_static_objects);
+  // Turned by a quarter about Y, x becomes -z: the box then stands from z = 2 to 3.
+  const Outcome both =
+      run(folder, quoted(folder / "stage.glb") + " --object " +
+                      quoted(std::filesystem::path((folder / "box.obj").string() + "@4,1,3,90")) +
+                      " --object " +
+                      quoted(std::filesystem::path((folder / "box.obj").string() + "@1,1,1,0,0.5")) +
+                      " --out " + quoted(folder / "b.navmesh"));
+  INFO(both.text);
+  REQUIRE(both.ok);
+  const NavMesh full = load_navmesh(folder / "b.navmesh").value();
+  CHECK(full.settings().include_static_objects);
+  CHECK_FALSE(full.is_navigable({4.5, 1, 2.5}));
+  CHECK(full.is_navigable({4.5, 1, 3.5}));
+  CHECK_FALSE(full.is_navigable({1.25, 1, 1.25}));
+  CHECK(full.is_navigable({1.8, 1, 1.8}));
+  const std::string real = gsnav_test::data_file("nav/habitat/simple_room.glb");
+  if (real.empty()) return;
+  const Outcome room = run(folder, gsnav_test::quoted(std::filesystem::path(real)) + " --out " +
+                                       quoted(folder / "room.navmesh"));
+  INFO(room.text);
+  CHECK(room.ok);
+  CHECK(load_navmesh(folder / "room.navmesh")->navigable_area() > 1);
+}
+
+TEST_CASE("navmesh tool: settings of a file, which options change") {
+  const TempFolder folder("navmesh_tool_settings");
+  write_file(folder / "floors.obj", two_floors_z_up());
+  write_file(
+      folder / "a.json",
+      R"({"cellSize": 0.1, "agentRadius": 0.0, "filterLedgeSpans": false, "agentHeight": 1.2345})");
+  const std::string input = quoted(folder / "floors.obj") + " --up z --scale 0.01 ";
+  const Outcome made =
+      run(folder, input + "--agent-height 1 --settings " + quoted(folder / "a.json") + " --out " +
+                      quoted(folder / "a.navmesh") + " --settings-out " + quoted(folder / "b.json"));
+  INFO(made.text);
+  REQUIRE(made.ok);
+  NavMeshSettings wanted;
+  wanted.cell_size = 0.1;
+  wanted.agent_radius = 0;
+  wanted.filter_ledge_spans = false;
+  wanted.agent_height = 1;
+  CHECK(load_navmesh(folder / "a.navmesh")->settings() == wanted);
+  CHECK(io::load_navmesh_settings(folder / "b.json").value() == wanted);
+  const Outcome again = run(folder, input + "--settings " + quoted(folder / "b.json") + " --out " +
+                                        quoted(folder / "b.navmesh"));
+  INFO(again.text);
+  REQUIRE(again.ok);
+  CHECK(read_file(folder / "a.navmesh") == read_file(folder / "b.navmesh"));
+  const Outcome refused =
+      run(folder, quoted(folder / "a.navmesh") + " --settings " + quoted(folder / "a.json"));
+  CHECK_FALSE(refused.ok);
+  CHECK(refused.says("--settings"));
+}
+
+TEST_CASE("settings file: read and written as Habitat does, equal after a round trip") {
+  const TempFolder folder("navmesh_settings");
+  NavMeshSettings s;
+  s.cell_size = 1.0 / 3;
+  s.agent_radius = 0.1 + 1e-13;
+  s.region_merge_size = 23;
+  s.filter_walkable_low_height_spans = false;
+  s.include_static_objects = true;
+  s.tile_size = 64;
+  s.max_cells = 12345;
+  io::save_navmesh_settings(s, folder / "s.json").throw_if_error();
+  const NavMeshSettings back = io::load_navmesh_settings(folder / "s.json").value();
+  CHECK(back == s);
+  CHECK(back.cell_size == s.cell_size);
+  CHECK(back.agent_radius == s.agent_radius);
+  CHECK(back.tile_size == 64);
+  CHECK(back.max_cells == 12345);
+  // Every key of Habitat's is there once.
+  const std::string text = read_file(folder / "s.json");
+  for (const char* key :
+       {"cellSize", "cellHeight", "agentHeight", "agentRadius", "agentMaxClimb", "agentMaxSlope",
+        "regionMinSize", "regionMergeSize", "edgeMaxLen", "edgeMaxError", "vertsPerPoly",
+        "detailSampleDist", "detailSampleMaxError", "filterLowHangingObstacles", "filterLedgeSpans",
+        "filterWalkableLowHeightSpans", "includeStaticObjects"}) {
+    CAPTURE(key);
+    CHECK(text.find("\"" + std::string(key) + "\":") != std::string::npos);
+  }
+  // What is missing keeps its default, as in Habitat.
+  write_file(folder / "one.json", "{\"agentMaxSlope\": 30}");
+  NavMeshSettings one;
+  one.agent_max_slope = 30;
+  CHECK(io::load_navmesh_settings(folder / "one.json").value() == one);
+  const auto message = [&](const char* content) {
+    write_file(folder / "bad.json", content);
+    const auto r = io::load_navmesh_settings(folder / "bad.json");
+    CHECK(r.code() == Errc::invalid_file);
+    CHECK(r.message().find("bad.json") != std::string::npos);
+    return r.message();
+  };
+  CHECK(message("{\"cellSize\": \"0.1\"}").find("'cellSize' is") != std::string::npos);
+  CHECK(message("{\"cellsize\": 0.1}").find("'cellsize' is no setting") != std::string::npos);
+  CHECK(message("{\"vertsPerPoly\": 5.5}").find("whole number") != std::string::npos);
+  CHECK(message("{\"maxCells\": 1e300}").find("whole number") != std::string::npos);
+  CHECK(message("{\"filterLedgeSpans\": 1}").find("true or false") != std::string::npos);
+  CHECK(message("[1]").find("object") != std::string::npos);
+  CHECK(message("{").find("JSON") != std::string::npos);
+  CHECK(io::load_navmesh_settings(folder / "none.json").code() == Errc::file_not_found);
+  CHECK_FALSE(io::save_navmesh_settings(s, folder / "no" / "s.json").ok());
+  s.cell_size = NAN;
+  CHECK(io::save_navmesh_settings(s, folder / "s.json").code() == Errc::invalid_argument);
+  CHECK(io::load_navmesh_settings(folder / "s.json").value() == back);  // what was there stays
+
+  const std::string habitat = gsnav_test::data_file("nav/habitat/test_navmeshsettings.json");
+  if (habitat.empty()) return;
+  const NavMeshSettings theirs = io::load_navmesh_settings(habitat).value();
+  CHECK(theirs.cell_size == 0.0123);
+  CHECK(theirs.agent_height == 1.2345);
+  CHECK(theirs.edge_max_error == 1.345);
+  CHECK(theirs.verts_per_poly == 9);
+  CHECK_FALSE(theirs.filter_low_hanging_obstacles);
+  CHECK_FALSE(theirs.include_static_objects);
+  CHECK_FALSE(theirs.validate().ok());  // Recast's mesh has at most 6
+  io::save_navmesh_settings(theirs, folder / "h.json").throw_if_error();
+  CHECK(io::load_navmesh_settings(folder / "h.json").value() == theirs);
 }
 
 TEST_CASE("navmesh tool: in tiles, whatever the number of threads") {
@@ -169,6 +338,10 @@ TEST_CASE("navmesh tool: what is wrong is said on one line") {
       {floor + " --region-min-size 1000", {"region_min_size"}},
       {floor + " --cell-size 0", {"cell_size"}},
       {floor + " --up up", {"--up"}},
+      {floor + " --object " + quoted(std::filesystem::path((folder / "floor.obj").string() + "@1,2")),
+       {"--object", "X,Y,Z"}},
+      {floor + " --object " + quoted(folder / "chair.glb"), {"chair.glb"}},
+      {floor + " --settings " + quoted(folder / "none.json"), {"--settings", "none.json"}},
       {floor + " --png " + quoted(folder / "x.png") + " --height 50", {"height 50", "walkable"}},
       {floor + " --png " + quoted(folder / "x.png") + " --level 5", {"--level 5", "1 levels"}},
       {floor + " --out " + quoted(folder / "no" / "x.navmesh"), {"x.navmesh"}},
@@ -185,4 +358,33 @@ TEST_CASE("navmesh tool: what is wrong is said on one line") {
   CHECK(help.ok);
   for (const char* part : {"--out", "--png", "--agent-radius", "--solid-alpha", "--up"})
     CHECK(help.says(part));
+}
+
+TEST_CASE(
+    "navmesh tool: a full disk leaves the NavMesh, outline and picture of before; names are checked "
+    "first") {
+  const TempFolder folder("navmesh_full");
+  write_file(folder / "floors.obj", two_floors_z_up());
+  std::filesystem::create_directory(folder / "disk");
+  const gsnav_test::SmallDisk disk(folder / "disk", 16);
+  if (disk.mounted()) {
+    for (const char* kind : {"--out disk/a.navmesh", "--obj disk/a.obj", "--png disk/a.png"}) {
+      CAPTURE(kind);
+      const std::filesystem::path file = folder / std::string(kind).substr(6);
+      write_file(file, "before");
+      write_file(folder / "disk/filler", std::string(12000, 'x'));
+      const Outcome out = run(
+          folder, std::string("floors.obj --up z --scale 0.01 --tile-size 16 ") + kPlain + " " + kind);
+      CAPTURE(out.text);
+      CHECK_FALSE(out.ok);
+      CHECK(out.says("cannot be written: No space left on device"));
+      CHECK(read_file(file) == "before");
+      CHECK(std::distance(std::filesystem::directory_iterator(folder / "disk"), {}) == 2);
+      std::filesystem::remove(file);
+    }
+  }
+  const Outcome out = run(folder, "absent.obj --out none/a.navmesh");
+  CHECK_FALSE(out.ok);
+  CHECK(out.says("none does not exist; make it first"));
+  CHECK_FALSE(out.says("absent.obj"));
 }

@@ -76,8 +76,8 @@ Status write_driver(const MeshCommand& c, const AvatarAsset& asset, const Motion
       row.push_back({globals[p.joint] * p.p0, globals[p.joint] * p.p1, p.radius});
   }
   if (Status s = io::save_driver(c.driver, frames); !s) return s;
-  std::printf("%s: %zu frames at %g a second, %zu capsules\n", c.driver.c_str(), count, frames.frame_rate,
-              asset.capsules.size());
+  std::printf("%s: %zu frames at %g a second, %zu capsules\n", printable(c.driver).c_str(), count,
+              frames.frame_rate, asset.capsules.size());
   return {};
 }
 
@@ -87,9 +87,9 @@ Status make_from_mesh(const MeshCommand& c, bool makehuman) {
   auto loaded = load_mesh(c, makehuman);
   if (!loaded) return loaded.status();
   const SkinnedMesh& mesh = loaded->mesh;
-  std::printf("%s: %zu vertices, %zu triangles, %zu joints, %zu clips\n", c.input.c_str(), mesh.positions.size(),
-              mesh.triangles.size(), mesh.skeleton.size(), loaded->clips.size());
-  for (const std::string& w : loaded->report.warnings) std::printf("  %s\n", w.c_str());
+  std::printf("%s: %zu vertices, %zu triangles, %zu joints, %zu clips\n", printable(c.input).c_str(),
+              mesh.positions.size(), mesh.triangles.size(), mesh.skeleton.size(), loaded->clips.size());
+  for (const std::string& w : loaded->report.warnings) std::printf("  %s\n", printable(w).c_str());
   MotionClip clip;
   clip.joints = mesh.skeleton.size();
   clip.rotations = loaded->pose.rotations;
@@ -142,7 +142,7 @@ Status make_from_mesh(const MeshCommand& c, bool makehuman) {
       "uncovered\n",
       thin.capsules, 100 * thin.contained_least, 100 * thin.outside_greatest, 100 * thin.uncovered_mean);
   if (Status s = io::save_avatar(c.out, asset); !s) return s;
-  std::printf("%s: written\n", c.out.c_str());
+  std::printf("%s: written\n", printable(c.out).c_str());
   return c.driver.empty() ? Status() : write_driver(c, asset, clip);
 }
 

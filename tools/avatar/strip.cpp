@@ -80,7 +80,7 @@ Status make_strip(const StripCommand& c) {
     }
   }
   if (Status s = io::save_png_rgb(c.out, strip, c.width * c.frames, c.height); !s) return s;
-  std::printf("%s: %d pictures from %.2f to %.2f s\n", c.out.c_str(), c.frames, begin, end);
+  std::printf("%s: %d pictures from %.2f to %.2f s\n", printable(c.out).c_str(), c.frames, begin, end);
   return {};
 }
 

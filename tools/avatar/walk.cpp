@@ -87,8 +87,9 @@ Status make_walk(const WalkCommand& c) {
   for (std::size_t i = 0; i < asset->size(); ++i) cycle.floor = min(cycle.floor, asset->cloud.mean(i).y);
   auto walk = ClipWalk::create(skeleton, *clip, cycle);
   if (!walk) return walk.status();
-  std::printf("%s: keys %zu to %zu are a cycle of %.2f m, walked at %.2f m/s\n", c.clip.clip.c_str(), walk->first_key(),
-              walk->first_key() + walk->keys(), walk->stride(), walk->speed());
+  std::printf("%s: keys %zu to %zu are a cycle of %.2f m, walked at %.2f m/s\n",
+              printable(c.clip.clip).c_str(), walk->first_key(), walk->first_key() + walk->keys(),
+              walk->stride(), walk->speed());
   double length = 0.0, clearance = 0.0;
   const auto points = lay_path(*mesh, c, length, clearance);
   if (!points) return points.status();
@@ -150,7 +151,7 @@ Status make_walk(const WalkCommand& c) {
     }
   }
   if (Status s = io::save_driver(c.out, frames); !s) return s;
-  std::printf("%s: %zu frames at %g a second\n", c.out.c_str(), count, c.frame_rate);
+  std::printf("%s: %zu frames at %g a second\n", printable(c.out).c_str(), count, c.frame_rate);
   return {};
 }
 

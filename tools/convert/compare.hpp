@@ -12,33 +12,32 @@
 
 namespace gsnav_convert {
 
-/// The rows of a cloud in another order: row i of the result is row order[i].
-gsnav::GaussianCloud in_order(const gsnav::GaussianCloud& cloud,
-                              const std::vector<std::uint32_t>& order);
-
-/// How far a cloud is from the one that it was made of, row by row: the largest of each field.
+/// How far a cloud is from the one that it was made of, row by row: the largest of each field. Nothing
+/// is clamped.
 struct FieldErrors {
-  double mean = 0;      ///< metres
-  double scale = 0;     ///< ratio minus one, of scales above 0.1 mm
-  double rotation = 0;  ///< angle between the quaternions, radians
+  double mean = 0;          ///< metres
+  double scale = 0;         ///< ratio minus one, of scales that are not zero
+  double scale_metres = 0;  ///< of all
+  double rotation = 0;      ///< angle between the quaternions, radians
   double opacity = 0;
-  double colour = 0;  ///< of degree 0, as drawn, within [0, 1]
+  double colour = 0;  ///< of degree 0: 0.5 + kSh0 coefficient
   double bands = 0;   ///< of a higher SH coefficient
 };
 
-/// Rows must be in the same order.
-FieldErrors largest_field_errors(const gsnav::GaussianCloud& source, const gsnav::GaussianCloud& made);
-
-/// Views around the middle of a scene, its outliers left out: y down, as in a PLY.
-std::vector<gsnav::Camera> views_around(const gsnav::GaussianCloud& cloud, int count, int width,
-                                        int height);
+/// Row source_rows[i] of the source became row made_rows[i].
+FieldErrors largest_field_errors(const gsnav::GaussianCloud& source,
+                                 const std::vector<std::uint32_t>& source_rows,
+                                 const gsnav::GaussianCloud& made,
+                                 const std::vector<std::uint32_t>& made_rows);
 
 struct ImageErrors {
-  double psnr = 0;   ///< over all images, dB; infinite where they are the same
-  double worst = 0;  ///< of one image
+  double psnr = 0;     ///< over all images, dB of 1; infinite where they are the same
+  double worst = 0;    ///< of one image
+  double largest = 0;  ///< difference of a value
 };
 
-/// Renders both from each camera.
+/// Renders both from each camera, ties of depth in the order in which each was read. Values above 1 are
+/// compared too.
 gsnav::Result<ImageErrors> image_errors(const gsnav::GaussianCloud& source,
                                         const gsnav::GaussianCloud& made,
                                         const std::vector<gsnav::Camera>& cameras);

@@ -9,10 +9,13 @@
 #include <vector>
 
 #include "compare.hpp"
+#include "gsnav/core/lower_case.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/describe_cloud.hpp"
 #include "gsnav/scene/edit_cloud.hpp"
 #include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/scene/views_around.hpp"
 
 namespace {
 
@@ -21,13 +24,13 @@ using namespace gsnav;
 struct Options {
   std::vector<std::string> paths;
   std::vector<double> crop, rotate, translate;
-  std::string cameras;
+  std::string cameras, order = "read";
   double time = 0, scale = 1, min_opacity = 0, max_scale = 0;
   int level = 0, degree = kMaxShDegree, views = 6, width = 640, height = 480;
 };
 
 int fail(const std::string& message) {
-  std::fprintf(stderr, "gsnav-convert: %s\n", message.c_str());
+  std::fprintf(stderr, "gsnav-convert: %s\n", printable(message).c_str());
   return 1;
 }
 
@@ -111,24 +114,37 @@ std::uintmax_t bytes_of(const std::filesystem::path& out) {
   return sum;
 }
 
-/// Reads the file back and says what became of the cloud.
-Status compare(const GaussianCloud& cloud, const std::string& out, const Options& o) {
+/// Says how many values the format could not hold.
+void print_clamped(const io::ClampedValues& c) {
+  const auto line = [](std::uint64_t n, const char* what) {
+    if (n != 0) std::printf("  %llu %s\n", static_cast<unsigned long long>(n), what);
+  };
+  line(c.colours, "colours outside of the format's range, clamped");
+  line(c.scales, "scales outside of the format's range, clamped");
+  line(c.bands, "SH coefficients outside of the format's range, clamped");
+  line(c.lost_bands, "SH coefficients lost: the format has no bands");
+}
+
+/// Reads the file back as anybody would and says what became of the cloud, ties of depth in the order of
+/// the rows read included. `rows`: the cloud's in the file's order.
+Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& rows,
+               const std::string& out, const Options& o) {
   auto back = io::load_scene(out, {.keep_zero_bands = true});
   if (!back) return back.status();
-  if (back->report.read != cloud.size() || back->cloud.size() != cloud.size()) {
-    return {Errc::invalid_file, out + ": " + std::to_string(back->cloud.size()) + " of " +
-                                    std::to_string(cloud.size()) + " Gaussians were read back"};
-  }
-  // load_scene sorts; row_ids say where each row was in the file.
   const GaussianCloud& made = back->cloud;
-  const GaussianCloud source = gsnav_convert::in_order(cloud, made.row_ids);
+  if (back->report.read != source.size() || made.size() != source.size()) {
+    return {Errc::invalid_file, out + ": " + std::to_string(made.size()) + " of " +
+                                    std::to_string(source.size()) + " Gaussians were read back"};
+  }
   if (made.filter != source.filter) std::printf("  the mip filter is lost in this format\n");
-  const gsnav_convert::FieldErrors e = gsnav_convert::largest_field_errors(source, made);
+  const gsnav_convert::FieldErrors e =
+      gsnav_convert::largest_field_errors(source, rows, made, rows_as_read(made));
   std::printf(
-      "  largest errors: mean %.3g m, scale %.3g %%, rotation %.3g deg, opacity %.3g, colour %.3g, SH "
-      "%.3g\n",
-      e.mean, 100 * e.scale, e.rotation * 180 / 3.14159265358979323846, e.opacity, e.colour, e.bands);
-  std::vector<Camera> cameras = gsnav_convert::views_around(cloud, o.views, o.width, o.height);
+      "  largest errors: mean %.3g m, scale %.3g %% (%.3g m), rotation %.3g deg, opacity %.3g, colour "
+      "%.3g, SH %.3g\n",
+      e.mean, 100 * e.scale, e.scale_metres, e.rotation * 180 / 3.14159265358979323846, e.opacity,
+      e.colour, e.bands);
+  std::vector<Camera> cameras = views_around(source, guess_up(source).up, o.views, o.width, o.height);
   if (!o.cameras.empty()) {
     auto given = io::load_cameras(o.cameras, o.width, o.height);
     if (!given) return given.status();
@@ -137,8 +153,13 @@ Status compare(const GaussianCloud& cloud, const std::string& out, const Options
   if (cameras.empty()) return {};
   const auto images = gsnav_convert::image_errors(source, made, cameras);
   if (!images) return images.status();
-  std::printf("  %zu images of %dx%d: PSNR %.2f dB, the worst %.2f dB\n", cameras.size(), o.width,
-              o.height, images->psnr, images->worst);
+  std::printf("  %zu images of %dx%d: ", cameras.size(), o.width, o.height);
+  if (images->largest == 0) {
+    std::printf("equal, bit for bit\n");
+  } else {
+    std::printf("PSNR %.2f dB, the worst %.2f dB, largest difference %.3g\n", images->psnr,
+                images->worst, images->largest);
+  }
   return {};
 }
 
@@ -169,6 +190,12 @@ int main(int argc, char** argv) {
   app.add_option("--rotate", o.rotate, "Turn about the axis X Y Z by DEGREES")->expected(4);
   app.add_option("--scale", o.scale, "Then scale by this factor")->check(CLI::PositiveNumber);
   app.add_option("--translate", o.translate, "Then move by X Y Z metres")->expected(3);
+  app.add_option("--order", o.order,
+                 "Of the rows in the file: read, as they were read, which decides ties of depth; space, "
+                 "along a curve "
+                 "through space: smaller .sog and .spz files. A .compressed.ply always has the latter")
+      ->check(CLI::IsMember({"read", "space"}))
+      ->capture_default_str();
   app.add_option("--cameras", o.cameras,
                  "INRIA cameras.json for the comparison, instead of views around the scene");
   app.add_option("--views", o.views, "Number of generated views; 0 leaves the images out")
@@ -177,16 +204,28 @@ int main(int argc, char** argv) {
   app.add_option("--height", o.height)->check(CLI::Range(1, 8192));
   CLI11_PARSE(app, argc, argv);
 
+  const std::string out = o.paths.back();
   if (Status s = validate(o); !s) return fail(s.message());
+  if (Status s = io::check_scene_output(out); !s) return fail(s.message());
   auto cloud = load(o);
   if (!cloud) return fail(cloud.message());
   if (Status s = edit(*cloud, o); !s) return fail(s.message());
-  const std::string out = o.paths.back();
+  // The source keeps the order in which it was read, whatever the file gets.
+  std::vector<std::uint32_t> as_read = cloud->row_ids;
+  const bool chunks = lower_case(out).ends_with(".compressed.ply");
+  if (chunks || o.order == "space") {
+    cloud->row_ids.clear();
+    std::printf("%s: rows along a curve through space%s: where depths are equal, images differ\n",
+                printable(out).c_str(), chunks ? ", as the format's chunks need them" : "");
+  }
+  const std::vector<std::uint32_t> rows = rows_as_read(*cloud);
   if (Status s = io::save_scene(out, *cloud); !s) return fail(s.message());
+  cloud->row_ids = std::move(as_read);
   const std::uintmax_t bytes = bytes_of(out);
-  std::printf("%s: %zu Gaussians of SH degree %d, %.2f MB, %.1f bytes a Gaussian\n", out.c_str(),
-              cloud->size(), cloud->sh_degree, static_cast<double>(bytes) / 1e6,
+  std::printf("%s: %zu Gaussians of SH degree %d, %.2f MB, %.1f bytes a Gaussian\n",
+              printable(out).c_str(), cloud->size(), cloud->sh_degree, static_cast<double>(bytes) / 1e6,
               static_cast<double>(bytes) / static_cast<double>(cloud->size()));
-  if (Status s = compare(*cloud, out, o); !s) return fail(s.message());
+  print_clamped(io::count_clamped(out, *cloud));
+  if (Status s = compare(*cloud, rows, out, o); !s) return fail(s.message());
   return 0;
 }

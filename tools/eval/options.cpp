@@ -9,9 +9,7 @@ void add_scene_options(CLI::App& app, Options& o) {
       ->capture_default_str()
       ->check(CLI::Range(0.05, 20.0));
   app.add_option("--up", o.up, "axis of the scene that points up")->capture_default_str();
-  app.add_option("--navmesh", o.navmesh, "built from: gaussians, mesh (the flat only), auto")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "mesh", "gaussians"}));
+  nav_loop::add_navmesh_options(app, o);
   app.add_option("--avatars", o.avatars, "people walking about")->capture_default_str()->check(CLI::Range(0, 64));
   app.add_option("--episodes", o.episodes, "episodes to generate")->capture_default_str()->check(CLI::Range(1, 100000));
   app.add_option("--episode-file", o.episode_file, "Habitat-Lab's .json or .json.gz, instead of generated ones");

@@ -10,8 +10,10 @@
 
 #include "draw.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/mesh_file.hpp"
+#include "gsnav/io/navmesh_settings_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/io/visible_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
@@ -33,23 +35,35 @@ Quatd upright(const std::string& up) {
   return turns.at(up);
 }
 
-struct Triangles {
-  std::vector<Vec3d> vertices;
-  std::vector<NavMesh::Triangle> triangles;
-};
-
-Result<Triangles> load_triangles(const std::string& path, const Similarity& placed) {
-  auto mesh = io::load_obj(path);
+/// Adds the triangles of a file to `all`.
+Status add_triangles(const std::string& path, const Similarity& placed, NavMeshTriangles& all) {
+  auto mesh = io::load_mesh(path);
   if (!mesh) return mesh.status();
-  Triangles out;
-  for (const Vec3f& v : mesh->vertices) out.vertices.push_back(placed * vec_cast<double>(v));
-  out.triangles = std::move(mesh->triangles);
-  std::printf("%s: %zu triangles\n", path.c_str(), out.triangles.size());
-  return out;
+  std::printf("%s: %zu triangles\n", printable(path).c_str(), mesh->triangles.size());
+  std::vector<Vec3d> vertices;
+  for (const Vec3f& v : mesh->vertices) vertices.push_back(vec_cast<double>(v));
+  const NavMeshPart parts[] = {{all.vertices, all.triangles, {}}, {vertices, mesh->triangles, placed}};
+  auto joined = gather_parts({}, parts);
+  if (!joined) return joined.status();
+  all = std::move(*joined);
+  return {};
+}
+
+/// The triangles of `path`, where one is given, and of the objects.
+Result<NavMeshTriangles> load_triangles(const Options& o, const std::string& path,
+                                        const Similarity& placed) {
+  NavMeshTriangles all;
+  if (!path.empty()) {
+    if (Status s = add_triangles(path, placed, all); !s) return s;
+  }
+  for (const StaticObject& object : o.objects) {
+    if (Status s = add_triangles(object.file, object.placed, all); !s) return s;
+  }
+  return all;
 }
 
 Result<NavMesh> from_triangles(const Options& o, const Similarity& placed) {
-  auto mesh = load_triangles(o.input, placed);
+  auto mesh = load_triangles(o, o.input, placed);
   if (!mesh) return mesh.status();
   return NavMesh::build(o.settings, mesh->vertices, mesh->triangles, o.threads);
 }
@@ -69,10 +83,12 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   const auto sets = build_visible_sets(backend, cloud, *viewpoints, settings, placed);
   if (!sets) return sets.status();
   if (Status s = io::save_visible_sets(o.visible_sets, *sets, cloud); !s) return s;
-  std::printf("%s%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the Gaussians\n",
-              isatty(fileno(stdout)) != 0 ? "\r" : "", o.visible_sets.c_str(), sets->cells(),
-              sets->viewpoints, 100 * sets->mean_share(), sets->cloud_chunks,
-              100 * sets->mean_row_share(cloud.size()));
+  std::printf(
+      "%s%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the "
+      "Gaussians\n",
+      isatty(fileno(stdout)) != 0 ? "\r" : "", printable(o.visible_sets).c_str(), sets->cells(),
+      sets->viewpoints, 100 * sets->mean_share(), sets->cloud_chunks,
+      100 * sets->mean_row_share(cloud.size()));
   return {};
 }
 
@@ -80,21 +96,22 @@ Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
   auto scene = io::load_scene(o.input);
   if (!scene) return scene.status();
   const GaussianSet set = scene->cloud.set(placed);
-  Triangles beside;
-  if (!o.mesh.empty()) {
-    auto loaded = load_triangles(o.mesh, placed);
-    if (!loaded) return loaded.status();
-    beside = std::move(*loaded);
-  }
-  auto built = build_navmesh(o.settings, std::span(&set, 1), beside.vertices, beside.triangles, o.gaussians);
-  if (!built) return built.status();
+  const auto beside = load_triangles(o, o.mesh, placed);
+  if (!beside) return beside.status();
+  auto built =
+      build_navmesh(o.settings, std::span(&set, 1), beside->vertices, beside->triangles, o.gaussians);
+  if (!built) return {built.code(), o.input + ": " + built.message()};
   const GaussianNavReport& r = built->report;
-  std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", o.input.c_str(), r.gaussians_used,
-              r.gaussians_faint, r.gaussians_outside);
+  std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", printable(o.input).c_str(),
+              r.gaussians_used, r.gaussians_faint, r.gaussians_outside);
   std::printf(
       "floor at %.3f m; %.0f %% of it under a ceiling; left out: %.2f m2 in small pieces, %.2f m2 "
       "outside\n",
       r.floor_y, 100 * r.ceiling_share, r.dropped_small, r.dropped_uncovered);
+  for (const GaussianNavReport::Storey& s : r.storeys) {
+    if (r.storeys.size() > 1) std::printf("storey at %.2f m: %.2f m2\n", s.height, s.area);
+  }
+  if (r.stairs > 0) std::printf("%zu stairs or ramps between storeys\n", r.stairs);
   if (!o.visible_sets.empty()) {
     if (Status s = write_visible_sets(o, scene->cloud, built->mesh, placed); !s) return s;
   }
@@ -165,18 +182,26 @@ Status draw_png(const Options& o, const NavMesh& mesh, const std::vector<NavLeve
   const double bar = bar_length(b.high.x - b.low.x);
   const MapPicture picture = draw(*map, bar);
   if (Status s = io::save_png_rgb8(o.png, picture.rgb, picture.width, picture.height); !s) return s;
-  std::printf("%s: %d x %d pixels, %.4g m each, near height %.2f m; the bar is %g m\n", o.png.c_str(),
-              picture.width, picture.height, map->metres_per_cell, height, bar);
+  std::printf("%s: %d x %d pixels, %.4g m each, near height %.2f m; the bar is %g m\n",
+              printable(o.png).c_str(), picture.width, picture.height, map->metres_per_cell, height,
+              bar);
   return {};
 }
 
 Status run(const Options& o) {
+  for (const std::string& out : {o.out, o.obj, o.png, o.visible_sets}) {
+    if (out.empty()) continue;
+    if (Status s = check_output_path(out); !s) return s;
+  }
   auto mesh = make(o);
   if (!mesh) return mesh.status();
   const std::vector<NavLevel> levels = find_levels(*mesh);
   print(*mesh, levels);
   if (!o.out.empty()) {
     if (Status s = save_navmesh(*mesh, o.out, o.mset_version); !s) return s;
+  }
+  if (!o.settings_out.empty()) {
+    if (Status s = io::save_navmesh_settings(mesh->settings(), o.settings_out); !s) return s;
   }
   if (!o.obj.empty()) {
     if (Status s = save_navmesh_obj(*mesh, o.obj); !s) return s;

@@ -2,9 +2,20 @@
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <system_error>
 
+#include "../../examples/nav_loop/navmesh_options.hpp"
 #include "gsnav/core/lower_case.hpp"
+#include "gsnav/io/navmesh_settings_file.hpp"
 
 namespace gsnav_navmesh {
 namespace {
@@ -13,24 +24,68 @@ const char kDescription[] =
     "Builds, inspects, converts and draws NavMeshes. INPUT is read as a NavMesh where it ends in "
     ".navmesh or .bin "
     "(Habitat's and RecastDemo's MSET files), a NavMesh is built from its triangles where it ends in "
-    ".obj, and from "
+    ".obj, .glb or .gltf (a glTF of Gaussians has those), and from "
     "its Gaussians otherwise. What it is made of is printed; --out, --obj and --png write it. Lengths "
     "in metres, "
     "Y up. Exit status: 0, or 1 with one line that says what is wrong.";
+
+/// Whether a glTF holds Gaussians: its JSON, at the begin of either form, then names the extension.
+bool has_gaussians(const std::string& gltf) {
+  std::ifstream in(gltf, std::ios::binary);
+  std::string text(20, '\0');
+  in.read(text.data(), 20);
+  if (in && text.compare(0, 4, "glTF") == 0) {
+    std::uint32_t length = 0;  // of the JSON
+    std::memcpy(&length, text.data() + 12, 4);
+    std::error_code error;
+    text.resize(std::min<std::uintmax_t>(length, std::filesystem::file_size(gltf, error)));
+    in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  } else {
+    in.clear();
+    in.seekg(0);
+    text.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  return text.find("KHR_gaussian_splatting") != std::string::npos;
+}
+
+/// FILE[@X,Y,Z[,YAW[,SCALE]]]; none where what follows the @ is something else.
+std::optional<StaticObject> parse_object(const std::string& text) {
+  StaticObject out;
+  const std::size_t at = text.rfind('@');
+  out.file = text.substr(0, at);
+  if (at == std::string::npos) return out;
+  std::vector<double> numbers;
+  std::istringstream rest(text.substr(at + 1));
+  for (std::string word; std::getline(rest, word, ',');) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(word.c_str(), &end));
+    if (word.empty() || *end != 0 || !std::isfinite(numbers.back())) return std::nullopt;
+  }
+  if (out.file.empty() || numbers.size() < 3 || numbers.size() > 5) return std::nullopt;
+  out.placed.translation = {numbers[0], numbers[1], numbers[2]};
+  const double half = numbers.size() > 3 ? numbers[3] * 0.5 * 3.14159265358979323846 / 180 : 0.0;
+  out.placed.rotation = {std::cos(half), 0, std::sin(half), 0};
+  if (numbers.size() > 4) out.placed.scale = numbers[4];
+  if (!(out.placed.scale > 0)) return std::nullopt;
+  return out;
+}
 
 }  // namespace
 
 InputKind kind_of(const std::string& input) {
   const std::string extension = gsnav::lower_case(std::filesystem::path(input).extension().string());
   if (extension == ".navmesh" || extension == ".bin") return InputKind::navmesh;
-  return extension == ".obj" ? InputKind::mesh : InputKind::gaussians;
+  if (extension == ".obj") return InputKind::mesh;
+  const bool gltf = extension == ".glb" || extension == ".gltf";
+  return gltf && !has_gaussians(input) ? InputKind::mesh : InputKind::gaussians;
 }
 
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   Options o;
   CLI::App app{kDescription};
   app.add_option("input", o.input,
-                 "NavMesh (.navmesh, .bin), triangles (.obj) or Gaussians (.ply, .sog, .spz, .splat, "
+                 "NavMesh (.navmesh, .bin), triangles (.obj, .glb, .gltf) or Gaussians (.ply, .sog, "
+                 ".spz, .splat, "
                  ".ksplat, a SOG "
                  "folder, or sibling tiles: DIR/2_0,2_1)")
       ->required();
@@ -48,6 +103,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       ->needs(out)
       ->capture_default_str()
       ->group(write);
+  app.add_option("--settings-out", o.settings_out, "Its settings (.json), as Habitat reads them")
+      ->group(write);
   app.add_option("--obj", o.obj, "The surface as triangles, one group an island")->group(write);
   app.add_option("--png", o.png, "The surface from above, islands by colour")->group(write);
   auto* height =
@@ -63,10 +120,28 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
 
   gsnav::NavMeshSettings& s = o.settings;
   const char* build = "Build (names and defaults are Habitat's)";
+  auto* settings = app.add_option_function<std::string>(
+                          "--settings",
+                          [&s](const std::string& file) {
+                            const auto read = gsnav::io::load_navmesh_settings(file);
+                            if (!read) throw CLI::ValidationError("--settings", read.message());
+                            s = *read;
+                          },
+                          "Settings (.json) as Habitat writes them; options beside it come after it")
+                       ->trigger_on_parse()
+                       ->group(build);
+  std::vector<std::string> objects;
+  auto* object =
+      app.add_option(
+             "--object", objects,
+             "Triangles of an object that stands in the scene for good, at X Y Z metres of the world, "
+             "turned by YAW degrees about Y and enlarged by SCALE; for each object once more")
+          ->type_name("FILE[@X,Y,Z[,YAW[,SCALE]]]")
+          ->group(build);
   const auto number = [&](const char* name, double& value, const char* text) {
     app.add_option(name, value, text)->capture_default_str()->group(build);
   };
-  number("--cell-size", s.cell_size, "Voxel edge on the ground plane");
+  nav_loop::add_voxel_options(app, s.cell_size, o.crop);
   auto* cell_height = app.add_option("--cell-height", s.cell_height, "Voxel height; 0.05 for Gaussians")
                           ->capture_default_str()
                           ->group(build);
@@ -84,7 +159,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   number("--detail-sample-max-error", s.detail_sample_max_error,
          "Height error of the surface, in cell heights");
   auto* tile_size = app.add_option("--tile-size", s.tile_size,
-                                   "Build in tiles of so many cells a side, in parallel; 0: one tile, as Habitat does")
+                                   "Build in tiles of so many cells a side, in parallel; 0: one tile, "
+                                   "as Habitat does (Gaussians "
+                                   "over 2^22 columns: 512)")
                         ->capture_default_str()
                         ->group(build);
   app.add_option("--threads", o.threads, "That share out the tiles; 0: one a core")
@@ -108,7 +185,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     app.add_option(name, value, text)->capture_default_str()->group(from);
   };
   auto* mesh = app.add_option("--mesh", o.mesh,
-                              "Triangles (.obj) of the same scene: what stands in either is in the way, the floor of "
+                              "Triangles (.obj, .glb, .gltf) of the same scene: what stands in either "
+                              "is in the way, the floor of "
                               "either is walked on")
                    ->group(from);
   option("--min-opacity", g.min_opacity, "Fainter Gaussians are ignored");
@@ -120,7 +198,11 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   option("--min-island-area", g.min_island_area, "Smaller pieces of floor are dropped, square metres");
   app.add_flag_callback(
          "--keep-uncovered", [&g] { g.drop_uncovered = false; },
-         "Keep floor that has no ceiling above it")
+         "Keep floor and storeys that have no ceiling above them")
+      ->group(from);
+  app.add_flag_callback(
+         "--keep-underside", [&g] { g.refuse_underside = false; },
+         "Take open ground for the floor even where nearly everything hangs below it")
       ->group(from);
   gsnav::VisibleSettings& v = o.visible;
   const char* seen = "Visible sets of Gaussians";
@@ -154,8 +236,20 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     if (kind_of(o.input) == InputKind::navmesh && up->count() + scale->count() > 0) {
       throw CLI::ValidationError("--up, --scale", o.input + " is a NavMesh: it stands as it is");
     }
-    if (kind_of(o.input) != InputKind::mesh && tile_size->count() > 0) {
-      throw CLI::ValidationError("--tile-size", o.input + ": only a NavMesh of triangles is built in tiles");
+    if (kind_of(o.input) == InputKind::navmesh && tile_size->count() > 0) {
+      throw CLI::ValidationError("--tile-size", o.input + " is a NavMesh already");
+    }
+    if (kind_of(o.input) != InputKind::gaussians && !o.crop.empty()) {
+      throw CLI::ValidationError("--crop", o.input + " has no Gaussians");
+    }
+    if (kind_of(o.input) == InputKind::navmesh && object->count() + settings->count() > 0) {
+      throw CLI::ValidationError("--object, --settings", o.input + " is a NavMesh: nothing is built");
+    }
+    for (const std::string& text : objects) {
+      const auto one = parse_object(text);
+      if (!one) throw CLI::ValidationError("--object", text + " is not FILE[@X,Y,Z[,YAW[,SCALE]]]");
+      o.objects.push_back(*one);
+      s.include_static_objects = true;
     }
     if (kind_of(o.input) != InputKind::gaussians && mesh->count() > 0) {
       throw CLI::ValidationError("--mesh", o.input + " has no Gaussians to go with " + o.mesh);
@@ -164,8 +258,11 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     exit_code = app.exit(error) == 0 ? 0 : 1;
     return std::nullopt;
   }
-  if (kind_of(o.input) == InputKind::gaussians && cell_height->count() == 0) {
-    s.cell_height = gsnav::gaussian_navmesh_settings().cell_height;
+  if (kind_of(o.input) == InputKind::gaussians) {
+    const double given = s.cell_height;
+    nav_loop::apply(s.cell_size, o.crop, s, g);
+    if (cell_height->count() + settings->count() > 0) s.cell_height = given;
+    g.threads = o.threads;
   }
   return o;
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/math/similarity.hpp"
 #include "gsnav/nav/gaussian_navmesh.hpp"
 #include "gsnav/nav/navmesh_settings.hpp"
 #include "gsnav/scene/visible_sets.hpp"
@@ -15,16 +16,24 @@ namespace gsnav_navmesh {
 enum class InputKind { navmesh, mesh, gaussians };
 InputKind kind_of(const std::string& input);
 
+/// Triangles that stand in the scene.
+struct StaticObject {
+  std::string file;
+  gsnav::Similarity placed;
+};
+
 struct Options {
   std::string input;
   std::string up = "y";
   double scale = 1.0;
   std::string mesh;  ///< triangles beside the Gaussians of the input
-  std::string out, obj, png;
+  std::vector<StaticObject> objects;
+  std::string out, obj, png, settings_out;
   int mset_version = 2;  ///< of `out`
   gsnav::NavMeshSettings settings;
   int threads = 0;  ///< that share out the tiles; 0: one a core
   gsnav::GaussianNavOptions gaussians;
+  std::vector<double> crop;  ///< x0 y0 z0 x1 y1 z1 in the world; empty: all of the scene
   std::optional<double> height;  ///< of the picture; a level's where it is not given
   std::optional<std::size_t> level;
   std::string visible_sets;  ///< file to write; empty: none

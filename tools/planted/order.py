@@ -3,6 +3,7 @@
 from . import plant
 
 PROJECTION = "include/gsnav/kernels/projection.hpp"
+CHUNK = "include/gsnav/kernels/project_chunk.hpp"
 TILES = "include/gsnav/kernels/tiles.hpp"
 STRIPS = "include/gsnav/kernels/footprint.hpp"
 FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
@@ -60,17 +61,29 @@ PLANTS = [
           "  out.center_y = select(ellipse, out.mean_y, zero);\n",
           FOOTPRINT, "N11_tile_cover_conservative",
           why="under perspective the mean is a focus, not the centre"),
-    plant("key_not_fused", PROJECTION,
-          "  return dot(row, mean + offset) * F(scale);",
-          "  const Vec3<F> t = mean + offset;\n"
-          "  return ((row.x * t.x + row.y * t.y) + row.z * t.z) * F(scale);",
-          ORDER, "N22_depth_tie_grid"),
-    plant("key_of_another_expression", "include/gsnav/kernels/lanes/project_chunk.hpp",
-          "    const F z = depth_key(camera.key_rotation, camera.key_scale, mean, offset);\n",
-          "    const Vec3<F> none{F(0.0f), F(0.0f), F(0.0f)};\n"
-          "    const F z = depth_key(camera.key_rotation, camera.key_scale, mean, none) +\n"
-          "                depth_key(camera.key_rotation, camera.key_scale, offset, none);\n",
-          ORDER, "N22_depth_tie_grid", why="lanes that order by z of the view matrix"),
+    plant("key_rounded_early", PROJECTION,
+          "  return dot(Vec3<D>{D(row.x), D(row.y), D(row.z)}, delta) * D(camera.scale);\n",
+          "  const Mat3<float> r = mat_cast<float>(camera.rotation);\n"
+          "  return dot(Vec3<D>{D(r(2, 0)), D(r(2, 1)), D(r(2, 2))}, delta) * D(camera.scale);\n",
+          ORDER, "N22_depth_tie_grid", why="a float32 rotation moves keys by several of their roundings"),
+    plant("key_in_float", CHUNK,
+          "  return static_cast<float>(depth_key(args.camera64, camera_delta64(args, mean, origin)));\n",
+          "  const Mat3<float> r = mat_cast<float>(args.camera64.rotation);\n"
+          "  return dot(r.row[2], mean + args.offsets_f[origin]) * static_cast<float>(args.camera64.scale);\n",
+          ORDER, "N77_quantised_capture*", why="the chain in float32 swaps near ties"),
+    plant("key_in_float_in_lanes", "include/gsnav/kernels/lanes/project_chunk.hpp",
+          "    const F z = rounded(depth_key(args.camera64, delta64[0]), depth_key(args.camera64, delta64[1]));\n",
+          "    const Mat3<float> r = mat_cast<float>(args.camera64.rotation);\n"
+          "    const Vec3<F> o{rounded(offset[0].x, offset[1].x), rounded(offset[0].y, offset[1].y),\n"
+          "                    rounded(offset[0].z, offset[1].z)};\n"
+          "    const F z = dot(Vec3<F>{F(r(2, 0)), F(r(2, 1)), F(r(2, 2))}, mean + o) *\n"
+          "                F(static_cast<float>(args.camera64.scale));\n",
+          ORDER, "N79_near_ties*"),
+    plant("reference_key_in_float", CHUNK,
+          "  if constexpr (kReference) z = static_cast<float>(axes.position.z * args.camera.scale);\n",
+          "  if constexpr (kReference) z = dot(vec_cast<float>(args.camera.rotation.row[2]), mean + "
+          "args.offsets_f[origin]);\n",
+          ORDER, "N77_quantised_capture*", why="a reference with the kernels' fault would hide it"),
     plant("visible_by_another_expression", "include/gsnav/kernels/lanes/project_chunk.hpp",
           "    const Projected<F> splat = project<F, F>(camera, axes, z, opacity);\n",
           "    const Projected<F> splat = project<F, F>(camera, axes, axes.position.z * F(1.0000001f), opacity);\n",

@@ -23,6 +23,7 @@
 #include "gsnav/backends/cuda.hpp"
 #endif
 #include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/lod_file.hpp"
@@ -35,6 +36,7 @@
 #include "gsnav/scene/placed_meshes.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/scene_profile.hpp"
+#include "gsnav/scene/views_around.hpp"
 #include "gsnav/sim/scene_detail.hpp"
 
 namespace {
@@ -46,7 +48,7 @@ struct Options {
                                    composite = "merged", storage = "full", lod_levels = "shipped",
                                    visible_sets;
   std::vector<std::string> meshes;
-  int width = 0, height = 0, threads = 0;
+  int width = 0, height = 0, threads = 0, orbit = 4;
   double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0, lod_pixels = LodChoice{}.pixels;
   bool npy = false, png = false, ledger = false;
 };
@@ -231,7 +233,8 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
 int main(int argc, char** argv) {
   Options o;
   CLI::App app{
-      "Renders a scene of 3D Gaussians from the cameras of an INRIA cameras.json. Writes NNNN.rgb.npy "
+      "Renders a scene of 3D Gaussians from the cameras of an INRIA cameras.json or from around it. "
+      "Writes NNNN.rgb.npy "
       "(H, W, 3 float32, unclamped), NNNN.depth.npy and NNNN.alpha.npy (H, W float32; metres, 0 = no "
       "return) and PNG pictures. The scene is used in its own frame: no up axis is applied."};
   app.add_option("--scene", o.scene,
@@ -241,9 +244,13 @@ int main(int argc, char** argv) {
   app.add_option("--storage", o.storage, "full; compact: SH in half of the memory; packed: all in a third (docs/formats.md)")
       ->check(CLI::IsMember({"full", "compact", "packed"}))
       ->capture_default_str();
-  app.add_option("--cameras", o.cameras, "INRIA cameras.json (camera-to-world, OpenCV axes)")
-      ->required()
-      ->check(CLI::ExistingFile);
+  app.add_option("--cameras", o.cameras,
+                 "INRIA cameras.json (camera-to-world, OpenCV axes); without it --orbit views around "
+                 "the scene, upright by "
+                 "the guess of which way is up");
+  app.add_option("--orbit", o.orbit, "Number of views around the scene where no --cameras are given")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   app.add_option("--out", o.out, "Folder for the images; made where it does not exist")->required();
   app.add_option("--width", o.width, "Image width; with --height, focal lengths scale by it")
       ->check(CLI::Range(1, kMaxImageSide));
@@ -292,7 +299,7 @@ int main(int argc, char** argv) {
 
   if (!o.npy && !o.png) o.npy = o.png = true;
   const auto fail = [](const std::string& message) {
-    std::fprintf(stderr, "gsnav-render: %s\n", message.c_str());
+    std::fprintf(stderr, "gsnav-render: %s\n", printable(message).c_str());
     return 1;
   };
   const std::optional<DepthChoice> depth = parse_depth(o.depth);
@@ -308,6 +315,7 @@ int main(int argc, char** argv) {
   if (o.backend == "cuda") return fail("--backend cuda: this build has no CUDA backend; use openmp");
 #endif
 
+  if (Status s = make_output_folder(o.out); !s) return fail("--out " + s.message());
   io::LoadSceneOptions load;
   load.time = o.time;
   load.storage = o.storage == "compact" ? io::Storage::compact : io::Storage::full;
@@ -355,17 +363,20 @@ int main(int argc, char** argv) {
     }
     auto placed = placed_meshes(std::move(*surface));
     if (!placed) return fail(file + ": " + placed.message());
-    std::printf("%s: %zu triangles in %zu places\n", file.c_str(), triangles, placed->instances.size());
-    for (const std::string& w : placed->warnings) std::printf("%s: %s\n", file.c_str(), w.c_str());
+    std::printf("%s: %zu triangles in %zu places\n", printable(file).c_str(), triangles,
+                placed->instances.size());
+    for (const std::string& w : placed->warnings)
+      std::printf("%s: %s\n", printable(file).c_str(), printable(w).c_str());
     meshes.push_back(std::move(*placed));
   }
-  auto cameras = io::load_cameras(o.cameras, o.width, o.height);
+  const auto orbit = [&]() -> Result<std::vector<Camera>> {
+    const int w = o.width > 0 ? o.width : 640, h = o.height > 0 ? o.height : 480;
+    if (packed) return views_around(report.bounds, report.up, o.orbit, w, h);
+    return views_around(full, report.up, o.orbit, w, h);
+  };
+  auto cameras = o.cameras.empty() ? orbit() : io::load_cameras(o.cameras, o.width, o.height);
   if (!cameras) return fail(cameras.message());
   for (Camera& c : *cameras) c.near_plane = o.near_plane;
-  std::error_code error;
-  std::filesystem::create_directories(o.out, error);
-  if (error) return fail("--out " + o.out + ": " + error.message());
-
   std::optional<io::CachedLod> lod;
   OpenMPBackend openmp(o.threads);
   if (o.profile == "lod" && !shipped) {
@@ -389,7 +400,7 @@ int main(int argc, char** argv) {
     if (packed) return fail("--visible-sets: not with --storage packed; use full or compact");
     auto sets = io::load_visible_sets(o.visible_sets, full);
     if (!sets) return fail(sets.message());
-    std::printf("%s: %zu cells, from %zu viewpoints\n", o.visible_sets.c_str(), sets->cells(),
+    std::printf("%s: %zu cells, from %zu viewpoints\n", printable(o.visible_sets).c_str(), sets->cells(),
                 sets->viewpoints);
     visible = std::move(*sets);
   }

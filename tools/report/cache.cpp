@@ -6,7 +6,7 @@
 #include <system_error>
 #include <utility>
 
-#include <unistd.h>
+#include "gsnav/core/replace_file.hpp"
 
 namespace gsnav_report {
 
@@ -118,20 +118,12 @@ Status ReferenceCache::store(const std::string& hash, const Reference& r) const 
   each_array(r, [&](const auto& v) { header.counts[k++] = v.size(); });
   header.evaluations = r.evaluations;
   header.checksum = checksum(r);
-  const std::filesystem::path path = file(hash), next = path.string() + "." + std::to_string(getpid()) + ".new";
-  std::ofstream out(next, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(&header), sizeof header);
-  each_array(r, [&](const auto& v) {
-    out.write(reinterpret_cast<const char*>(v.data()),
-              static_cast<std::streamsize>(v.size() * sizeof(typename std::decay_t<decltype(v)>::value_type)));
+  return replace_file(file(hash), [&](OutputFile& out) {
+    out.write(&header, sizeof header);
+    each_array(r, [&](const auto& v) {
+      out.write(v.data(), v.size() * sizeof(typename std::decay_t<decltype(v)>::value_type));
+    });
   });
-  out.close();
-  if (out) std::filesystem::rename(next, path, error);
-  if (!out || error) {
-    std::filesystem::remove(next, error);
-    return {Errc::file_not_found, path.string() + ": cannot be written"};
-  }
-  return {};
 }
 
 }  // namespace gsnav_report

@@ -8,6 +8,8 @@
 #include <system_error>
 #include <utility>
 
+#include "gsnav/core/replace_file.hpp"
+
 namespace gsnav_report {
 
 using gsnav::Errc;
@@ -162,15 +164,12 @@ Status CsvFile::add(Row row) {
 }
 
 Status CsvFile::save() {
-  const std::filesystem::path next = path_.string() + ".new";
   out_.close();
-  std::ofstream out(next, std::ios::binary | std::ios::trunc);
-  out << header_line();
-  for (const Row& r : rows_) out << r.line();
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(next, path_, error);
-  if (!out || error) return {Errc::file_not_found, path_.string() + ": cannot be written"};
+  const Status saved = gsnav::replace_file(path_, [this](gsnav::OutputFile& out) {
+    out.write(header_line());
+    for (const Row& r : rows_) out.write(r.line());
+  });
+  if (!saved) return saved;
   out_.open(path_, std::ios::binary | std::ios::app);
   if (!out_) return {Errc::file_not_found, path_.string() + ": cannot be written"};
   return {};

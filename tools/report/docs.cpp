@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "html.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "html_text.hpp"
 #include "table_budget.hpp"
 #include "table_targets.hpp"
@@ -203,7 +203,7 @@ std::string approximations_page(const Table& table, const std::string& command) 
 
 gsnav::Status write_docs(const Table& table, const std::filesystem::path& path,
                          const std::string& command) {
-  return write_text(approximations_page(table, command), path);
+  return gsnav::replace_file(path, approximations_page(table, command));
 }
 
 }  // namespace gsnav_report

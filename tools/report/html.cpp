@@ -2,9 +2,8 @@
 #include "html.hpp"
 
 #include <array>
-#include <fstream>
-#include <system_error>
 
+#include "gsnav/core/replace_file.hpp"
 #include "html_sections.hpp"
 #include "html_style.hpp"
 #include "html_text.hpp"
@@ -12,7 +11,6 @@
 
 namespace gsnav_report {
 
-using gsnav::Errc;
 using gsnav::Status;
 
 namespace {
@@ -89,19 +87,8 @@ std::string html_page(const Table& table) {
          "</body>\n</html>\n";
 }
 
-Status write_text(const std::string& text, const std::filesystem::path& path) {
-  const std::filesystem::path next = path.string() + ".new";
-  std::ofstream out(next, std::ios::binary | std::ios::trunc);
-  out << text;
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(next, path, error);
-  if (!out || error) return {Errc::file_not_found, path.string() + ": cannot be written"};
-  return {};
-}
-
 Status write_html(const Table& table, const std::filesystem::path& path) {
-  return write_text(html_page(table), path);
+  return gsnav::replace_file(path, html_page(table));
 }
 
 }  // namespace gsnav_report

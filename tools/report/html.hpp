@@ -16,7 +16,4 @@ std::string html_page(const Table& table);
 /// Writes html_page. Errors: file_not_found where the file cannot be written.
 gsnav::Status write_html(const Table& table, const std::filesystem::path& path);
 
-/// Writes text to a file that is whole or not there. Errors: file_not_found.
-gsnav::Status write_text(const std::string& text, const std::filesystem::path& path);
-
 }  // namespace gsnav_report

@@ -12,6 +12,7 @@
 
 #include "csv.hpp"
 #include "docs.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "html.hpp"
 #include "kernels.hpp"
 #include "runner_ledger.hpp"
@@ -121,9 +122,7 @@ Status add_rows(const Options& o, CsvFile& csv, const Row& stamp, const std::str
 }  // namespace
 
 Status run_report(const Options& o) {
-  std::error_code error;
-  std::filesystem::create_directories(o.out, error);
-  if (error) return {Errc::file_not_found, "--out " + o.out + ": " + error.message()};
+  if (Status s = make_output_folder(o.out); !s) return {s.code(), "--out " + s.message()};
   const std::filesystem::path out(o.out), path = out / "report.csv";
   Result<CsvFile> csv = CsvFile::open(path, o.resume);
   if (!csv) return csv.status();

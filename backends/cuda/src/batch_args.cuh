@@ -27,8 +27,8 @@ struct BatchInstance {
 /// is read together, in loads of 16 bytes.
 struct PlainCamera {
   struct alignas(16) Key {
-    float row[3], scale;  ///< of depth_key
     float offset[3], near_plane;
+    double scale;  ///< of depth_key; its row of the rotation and its offset are Mean's
   } key;
   struct alignas(16) Axes {
     float rotation[9], eps2d, log2_alpha_min, fx;

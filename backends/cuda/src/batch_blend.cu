@@ -214,14 +214,13 @@ __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t came
   const std::size_t row = source - args.first_rank;
   const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[row];
   const Vec3<float> mean{gs.means[0][row], gs.means[1][row], gs.means[2][row]};
-  const float z =
-      depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
+  const float z = gsnav::detail::depth_of(args, mean, origin);
   const SplatAxes<float> axes =
       gsnav::detail::load_axes(gs, args.camera, gsnav::detail::camera_delta(args, mean, origin), row);
   const Projected<float> p = project<float, float>(args.camera, axes, z, gs.opacities[row]);
   if (!gsnav::detail::needs_double(args.camera, p)) return make_splat_depth(args.camera, axes, p);
   SplatDepth<float> depth;
-  depth_record64(args, row, key_of(args, z, mean, origin), mean, origin, depth);
+  depth_record64(args, row, gsnav::detail::sort_key(args, z, mean, origin), mean, origin, depth);
   return depth;
 }
 

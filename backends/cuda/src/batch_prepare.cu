@@ -125,11 +125,10 @@ cuda::PlainCamera plain_camera(const BatchInstance& instance, const Vec3d& offse
       p.axes.rotation[3 * r + k] = c.rotation(r, k);
       p.mean.rotation[3 * r + k] = d.rotation(r, k);
     }
-    p.key.row[r] = c.key_rotation(2, r);
     p.mean.offset[r] = offset[r];
     p.key.offset[r] = static_cast<float>(offset[r]);
   }
-  p.key.scale = c.key_scale;
+  p.key.scale = d.scale;
   p.key.near_plane = c.near_plane;
   p.axes.fx = c.fx;
   p.axes.fy = c.fy;

@@ -256,11 +256,12 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
       if constexpr (PlainRules) {
         const PlainCamera& packed = a.plain_cameras[index];
         const PlainCamera::Key k = packed.key;
-        Mat3<float> key_rotation;
-        key_rotation.row[2] = {k.row[0], k.row[1], k.row[2]};
-        const Vec3<float> offset{k.offset[0], k.offset[1], k.offset[2]};
-        delta = mean + offset;
-        const float z = depth_key(key_rotation, k.scale, mean, offset);
+        delta = mean + Vec3<float>{k.offset[0], k.offset[1], k.offset[2]};
+        ProjectionCamera<double> key_camera;
+        key_camera.rotation.row[2] = {packed.mean.rotation[6], packed.mean.rotation[7], packed.mean.rotation[8]};
+        key_camera.scale = k.scale;
+        const Vec3d offset64{packed.mean.offset[0], packed.mean.offset[1], packed.mean.offset[2]};
+        const float z = static_cast<float>(depth_key(key_camera, vec_cast<double>(mean) + offset64));
         camera_index = packed.axes.camera;
         if (exists && z > k.near_plane) {
           ProjectionCamera<float> camera = camera_of(a, packed.axes);
@@ -268,8 +269,7 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
           code = packed.code.key(z);
           project_seen(camera, z, axes_of(camera.rotation), [&](double& x, double& y) {
             const PlainCamera::Mean m = packed.mean;
-            gsnav::detail::project_mean(camera_of(m), vec_cast<double>(mean) + Vec3d{m.offset[0], m.offset[1], m.offset[2]},
-                                        x, y);
+            gsnav::detail::project_mean(camera_of(m), vec_cast<double>(mean) + offset64, x, y);
           });
         }
       } else {
@@ -277,15 +277,15 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
         const ProjectArgs<float>& args = instance.args;
         const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
         delta = gsnav::detail::camera_delta(args, mean, origin);
-        const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
+        const float z = gsnav::detail::depth_of(args, mean, origin);
         camera_index = instance.camera;
         if (exists && z > args.camera.near_plane) {
-          code = args.camera.key_code(key_of(args, z, mean, origin));
+          code = args.camera.key_code(gsnav::detail::sort_key(args, z, mean, origin));
           project_seen(args.camera, z,
                        gs.axes[0].empty() ? axes_of(args.camera.rotation)
                                           : gsnav::detail::load_axes(gs, args.camera, delta, row),
                        [&](double& x, double& y) {
-                         gsnav::detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin], x, y);
+                         gsnav::detail::project_mean(args.camera64, gsnav::detail::camera_delta64(args, mean, origin), x, y);
                        });
         }
       }
@@ -369,9 +369,8 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
     const GaussianView& gs = args.gaussians;
     const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[h.row];
     const Vec3<float> mean{gs.means[0][h.row], gs.means[1][h.row], gs.means[2][h.row]};
-    const float z =
-        depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
-    const float key = key_of(args, z, mean, origin);
+    const float z = gsnav::detail::depth_of(args, mean, origin);
+    const float key = gsnav::detail::sort_key(args, z, mean, origin);
     Splat splat;
     if (make_splat64(args, a.depths != nullptr, h.row, key, mean, origin, splat)) {
       SplatColor<float> color;

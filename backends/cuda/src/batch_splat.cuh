@@ -28,12 +28,6 @@ __device__ inline bool make_splat(const ProjectionCamera<T>& camera, bool depth,
   return gsnav::detail::store_splat(to, 0, camera, p, axes, mean_x, mean_y);
 }
 
-__device__ inline float key_of(const ProjectArgs<float>& args, float z, const Vec3<float>& mean, std::size_t origin) {
-  return args.camera.sort_order == SortOrder::z_depth
-             ? z
-             : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
-}
-
 /// The same in double, for Gaussians whose geometry float cannot hold.
 __device__ inline bool make_splat64(const ProjectArgs<float>& args, bool depth, std::size_t row, float key,
                                     const Vec3<float>& mean, std::size_t origin, Splat& out) {

@@ -9,6 +9,8 @@
 #include <utility>
 #include <variant>
 
+#include "gsnav/core/printable.hpp"
+
 namespace gsnav {
 
 /// What kind of thing went wrong; the message says which file, field and value.
@@ -49,7 +51,8 @@ namespace detail {
 class [[nodiscard]] Status {
  public:
   Status() = default;
-  Status(Errc code, std::string message) : code_(code), message_(std::move(message)) {}
+  /// `message` may hold names of files: it is kept as printable() makes it.
+  Status(Errc code, const std::string& message) : code_(code), message_(printable(message)) {}
 
   bool ok() const noexcept { return code_ == Errc::ok; }
   explicit operator bool() const noexcept { return ok(); }
@@ -71,7 +74,7 @@ class [[nodiscard]] Result {
  public:
   Result(T value) : content_(std::move(value)) {}
   Result(Status status) : content_(std::move(status)) {}
-  Result(Errc code, std::string message) : content_(Status(code, std::move(message))) {}
+  Result(Errc code, const std::string& message) : content_(Status(code, message)) {}
 
   bool ok() const noexcept { return content_.index() == 0; }
   explicit operator bool() const noexcept { return ok(); }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -29,16 +30,29 @@ struct OracleSet {
   GaussianSet set;
   ProjectionCamera<double> camera;
   std::vector<Vec3d> offsets;            ///< origin - camera, asset frame
-  std::vector<Vec3<float>> offsets_f;    ///< the same rounded: what keys are made of
+  std::array<std::array<long double, 4>, 3> camera_from_asset{};
   std::size_t first_row = 0;             ///< among the rows of all sets
 
   OracleSet(const GaussianSet& s, const Camera& c, const RenderConfig& rules, std::size_t first)
       : set(s), camera(make_projection_camera<double>(c, s, projection_rules(rules))), first_row(first) {
-    const Vec3d eye = inverse(s.world_from_asset) * c.position();
+    const Similarity& a = s.world_from_asset;
+    const Vec3d eye = inverse(a) * c.position();
+    const long double w = a.rotation.w, x = a.rotation.x, y = a.rotation.y, z = a.rotation.z;
+    const long double turn[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                                    {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+                                    {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+    for (int r = 0; r < 3; ++r) {
+      std::array<long double, 4>& out = camera_from_asset[static_cast<std::size_t>(r)];
+      out = {0, 0, 0, c.viewmat.translation[r]};
+      for (int i = 0; i < 3; ++i) {
+        const long double view = c.viewmat.linear(r, i);
+        for (std::size_t k = 0; k < 3; ++k) out[k] += view * turn[i][k] * static_cast<long double>(a.scale);
+        out[3] += view * static_cast<long double>(a.translation[i]);
+      }
+    }
     const View<const Vec3d> table = s.gaussians.origins;
     for (std::size_t o = 0; o < (table.empty() ? 1 : table.size); ++o) {
       offsets.push_back((table.empty() ? Vec3d{} : table[o]) - eye);
-      offsets_f.push_back(vec_cast<float>(offsets.back()));
     }
   }
   /// Stable id: sets one after the other, each in the order it was read in, however its rows lie in memory.
@@ -56,10 +70,23 @@ struct OracleSet {
   Vec3d delta(std::size_t row) const noexcept {
     return vec_cast<double>(mean(row)) + offsets[origin(row)];
   }
-  /// Depth of the centre in float32, as every backend culls and sorts by it.
-  float z_key(std::size_t row) const noexcept {
-    return depth_key(camera.key_rotation, camera.key_scale, mean(row), offsets_f[origin(row)]);
+  /// The centre in camera axes, metres: from its place in the asset, in long double, as no kernel computes it.
+  std::array<long double, 3> center(std::size_t row) const noexcept {
+    const View<const Vec3d> table = set.gaussians.origins;
+    const Vec3d from = table.empty() ? Vec3d{} : table[origin(row)];
+    const Vec3<float> offset = mean(row);
+    std::array<long double, 3> out;
+    for (std::size_t r = 0; r < 3; ++r) {
+      out[r] = camera_from_asset[r][3];
+      for (int k = 0; k < 3; ++k) {
+        const long double place = static_cast<long double>(from[k]) + static_cast<long double>(offset[k]);
+        out[r] += camera_from_asset[r][static_cast<std::size_t>(k)] * place;
+      }
+    }
+    return out;
   }
+  /// Depth of the centre along the view axis, rounded to float32 once: what the contract culls by.
+  float z_key(std::size_t row) const noexcept { return static_cast<float>(center(row)[2]); }
   /// The contract's near rules.
   bool in_front(std::size_t row, const SplatAxes<double>& axes) const noexcept {
     return z_key(row) > camera.near_plane &&
@@ -183,11 +210,9 @@ std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const Oracl
         reaching[c] += reaches ? 1 : 0;
         if (scene.boxed && !reaches) continue;
         const bool by_z = s.camera.sort_order == SortOrder::z_depth;
-        const Vec3d delta = s.delta(row);
-        const float key = by_z ? s.z_key(row)
-                               : distance_key(s.camera.key_scale, s.mean(row), s.offsets_f[s.origin(row)]);
-        const double key64 = by_z ? dot(s.camera.rotation.row[2], delta) : norm(delta);
-        found[c].push_back({key64 * s.camera.scale, s.camera.key_code(key), s.id(row),
+        const std::array<long double, 3> at = s.center(row);
+        const long double key = by_z ? at[2] : std::sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
+        found[c].push_back({static_cast<double>(key), s.camera.key_code(static_cast<float>(key)), s.id(row),
                             static_cast<std::uint32_t>(s.first_row + row)});
       }
     });

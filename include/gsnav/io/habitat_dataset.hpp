@@ -46,13 +46,17 @@ struct HabitatDataset {
   const HabitatScene* find(const std::string& name) const noexcept;
 };
 
-/// Reads a dataset with Habitat-GS's additions: stages and scene_instances (`paths` by extension, folders or patterns
-/// with `*` in their last parts, relative to the dataset's file), default_attributes of stages, navmesh_instances (a map
-/// of names to paths). A dataset of stages alone has a scene for each of them. Light setups, objects and semantic
-/// descriptions are left out and said to be.
+/// Reads a dataset with Habitat-GS's additions: stages and scene_instances (`paths` by extension,
+/// folders or patterns with `*` in their last parts, relative to the dataset's file), default_attributes
+/// of stages, navmesh_instances (a map of names to paths). A dataset of stages alone has a scene for
+/// each of them. Light setups, objects and semantic descriptions are left out and said to be.
 ///
-/// Errors name the file and the key: file_not_found (also: a stage or NavMesh that a scene names); invalid_file;
-/// unsupported (a stage with a scale for each axis); out_of_memory. Never throws.
+/// Paths in these files may be absolute and may hold `..`, as those of Habitat's own datasets do: what
+/// they name is read, never written. Files outside of the dataset's folder are named in `warnings`; do
+/// not read data of strangers as a user whose other files they must not learn of.
+///
+/// Errors name the file and the key: file_not_found (also: a stage or NavMesh that a scene names);
+/// invalid_file; unsupported (a stage with a scale for each axis); out_of_memory. Never throws.
 Result<HabitatDataset> load_habitat_dataset(const std::filesystem::path& path);
 
 /// Reads one stage. Errors name the file and the key: file_not_found; invalid_file (also: no render_asset); unsupported

@@ -35,8 +35,9 @@ struct CachedLod {
       warning;  ///< why a file that is there was not taken, or why none could be written; or empty
 };
 
-/// The tree of a scene: read where lod_path() has it, else built and written there. A file that cannot
-/// be taken, and a folder that cannot be written, are warnings. Errors: those of build_lod.
+/// The tree of a scene: read where lod_path() has it, else built and written there; trees of an earlier
+/// content of the scene's file, older than it, are then removed. A file that cannot be taken, and a
+/// folder that cannot be written, are warnings. Errors: those of build_lod.
 template <Backend B>
 Result<CachedLod> cached_lod(B& backend, const std::string& spec, const GaussianCloud& cloud,
                              const LodSettings& settings = {}) {

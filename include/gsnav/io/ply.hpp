@@ -43,20 +43,24 @@ struct SavePlyOptions {
   bool double_positions = false;
 };
 
-/// Writes a cloud in INRIA's layout, little endian, float32, f_rest as the cloud's degree needs. The
-/// mip filter becomes a comment; eps2d and sort_order have no place in the file. An opacity of exactly
-/// 1 is written as +infinity and a scale of 0 as -infinity, which load_ply reads back.
-/// Errors: file_not_found (the parent folder is missing, or the file cannot be written);
-/// invalid_argument (arrays of different lengths).
+/// Writes a cloud in INRIA's layout, little endian, float32, f_rest as the cloud's degree needs, rows in
+/// the order in which they were read (`row_ids`). What was read from such a file is read back bit for
+/// bit, so that images are equal, ties of depth included. Opacities of other origin come back as the
+/// nearest that a float32 logit has. The mip filter becomes a comment; eps2d and sort_order have no
+/// place in the file. Logits are finite: an opacity of 1 is written as 18, which is 1 again in float32.
+/// A scale of 0 is written as -infinity, which load_ply reads back. Errors: file_not_found (the parent
+/// folder is missing, or the file cannot be written: what had its name is unchanged); invalid_argument
+/// (arrays of different lengths).
 Status save_ply(const std::filesystem::path& path, const GaussianCloud& cloud,
                 const SavePlyOptions& options = {});
 
-/// Writes a cloud as PlayCanvas' compressed PLY with 18 properties a chunk, rows in the cloud's order:
-/// chunks of 256 share their bounds, so sort_spatially first. Read back, a value is within half of its
-/// step: positions and log-scales 1/2047 (y: 1/1023) of the chunk's range, colours and opacities 1/255
-/// of it (opacities: of 1), quaternion components 0.0014, SH coefficients 1/32 (where they are in [-4,
-/// 4]; the outermost cells are read at their ends). Log-scales are clamped to [-20, 20], -infinity too.
-/// Errors: as save_ply.
+/// Writes a cloud as PlayCanvas' compressed PLY with 18 properties a chunk, rows in the cloud's order
+/// and not in that in which they were read: chunks of 256 share their bounds, so sort_spatially first.
+/// Ties of depth are therefore drawn in another order. Read back, a value is within half of its step:
+/// positions and log-scales 1/2047 (y: 1/1023) of the chunk's range, colours and opacities 1/255 of it
+/// (opacities: of 1), quaternion components 0.0014, SH coefficients 1/32 (where they are in [-4, 4]; the
+/// outermost cells are read at their ends). Log-scales are clamped to [-20, 20], -infinity too. Errors:
+/// as save_ply.
 Status save_compressed_ply(const std::filesystem::path& path, const GaussianCloud& cloud);
 
 }  // namespace gsnav::io

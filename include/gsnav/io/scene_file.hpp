@@ -71,7 +71,26 @@ std::string report_text(const LoadReport& report);
 
 /// Writes a scene by its name: `.compressed.ply`, `.ply` (INRIA's layout), `.splat`, `.spz` (version 4),
 /// `.sog`, a folder's `meta.json` (SOG), `.glb`. What each format loses is said where its writer is
-/// declared. A compact cloud is widened first. Errors: the writer's; unsupported (another name, with the list). Never throws.
+/// declared. Rows are written in the order in which they were read (`row_ids`), by which renderers break
+/// ties of depth; in a `.compressed.ply` in the cloud's own. A compact cloud is widened first. The file
+/// is written aside and renamed: a failure leaves what was there, the cloud's own file too. Errors: the
+/// writer's; check_scene_output's. Never throws.
 Status save_scene(const std::filesystem::path& path, const GaussianCloud& cloud);
+
+/// Checks before a scene is loaded or made that save_scene can write it to `path`: unsupported (a name
+/// of no format that is written, with the list), file_not_found (check_output_path).
+Status check_scene_output(const std::filesystem::path& path);
+
+/// Values of a cloud that a format cannot hold.
+struct ClampedValues {
+  std::uint64_t colours = 0;     ///< of degree 0, drawn; clamped to the nearer end
+  std::uint64_t scales = 0;      ///< standard deviations; clamped
+  std::uint64_t bands = 0;       ///< SH coefficients from band 1 on; clamped
+  std::uint64_t lost_bands = 0;  ///< of these, such as are not zero, where the format has none
+  std::uint64_t all() const noexcept { return colours + scales + bands + lost_bands; }
+};
+
+/// What save_scene would clamp or leave out. `cloud` must not be compact.
+ClampedValues count_clamped(const std::filesystem::path& path, const GaussianCloud& cloud);
 
 }  // namespace gsnav::io

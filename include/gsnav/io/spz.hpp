@@ -47,14 +47,14 @@ struct SaveSpzOptions {
   int sh1_bits = 8, sh_rest_bits = 8;
 };
 
-/// Writes a cloud as SPZ version 4, rows in the cloud's order; the mip filter becomes the antialiased
-/// flag. Read back, a mean is within half of its step, a log-scale within 1/32 (where it is in [-10,
-/// 5.9]), an opacity within 1/510, a degree-0 SH coefficient within 1/76 (where it is within 3.3 of
-/// zero), another one within 2^-bits (where its magnitude is at most 1 - 2^(1 - bits)), the quaternion's
-/// smaller components within 0.0007. What lies outside of these ranges becomes their nearer end. Errors:
-/// file_not_found (the parent folder is missing, or the file cannot be written); invalid_argument
-/// (arrays of different lengths, options out of range, a mean beyond 8388 km); out_of_memory. Never
-/// throws.
+/// Writes a cloud as SPZ version 4, rows in the order in which they were read; the mip filter becomes
+/// the antialiased flag. Read back, a mean is within half of its step, a log-scale within 1/32 (where it
+/// is in [-10, 5.9]), an opacity within 1/510, a degree-0 SH coefficient within 1/76 (where it is
+/// within 3.3 of zero), another one within 2^-bits (where its magnitude is at most 1 - 2^(1 - bits)),
+/// the quaternion's smaller components within 0.0007. What lies outside of these ranges becomes their
+/// nearer end. Errors: file_not_found (the parent folder is missing, or the file cannot be written);
+/// invalid_argument (arrays of different lengths, options out of range, a mean beyond 8388 km);
+/// out_of_memory. Never throws.
 Status save_spz(const std::filesystem::path& path, const GaussianCloud& cloud,
                 const SaveSpzOptions& options = {});
 

@@ -35,9 +35,9 @@ struct CachedVisibleSets {
   std::string warning;  ///< why a file that is there was not taken, or why none could be written; or empty
 };
 
-/// The visible sets of a scene: read where visible_sets_path() has them, else built and written there. A
-/// file that cannot be taken, and a folder that cannot be written, are warnings. Errors: those of
-/// build_visible_sets.
+/// The visible sets of a scene: read where visible_sets_path() has them, else built and written there;
+/// those of an earlier content of the scene's file, older than it, are then removed. A file that cannot
+/// be taken, and a folder that cannot be written, are warnings. Errors: those of build_visible_sets.
 template <Backend B>
 Result<CachedVisibleSets> cached_visible_sets(B& backend, const std::string& spec,
                                               const GaussianCloud& cloud,

@@ -204,7 +204,7 @@ struct CountUnhidden {
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* counts = args.cursors.data + block * args.grid.count();
     for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) {
+    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
       counts[tile] += cull.hides(tile, splat) ? 0 : 1;
     });
   }
@@ -218,7 +218,7 @@ struct ScatterUnhidden {
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
     std::uint32_t* out = args.tile_splats.data;
-    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) {
+    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
       if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
     });
   }
@@ -243,7 +243,7 @@ struct HardDepthPixel {
       const Vec3<S> under = covered ? Vec3<S>{k[0], k[1], k[2]} : background;
       for (int i = 0; i < 3; ++i) c[i] = fma(t, under[i], lost ? S(0) : c[i]);
     }
-    const auto depth = [&](S* image, S own) {
+    const auto depth = [&](S* image, S own) GSNAV_INLINED {
       if (image != nullptr) image[pixel] = lost ? (covered ? z : S(0)) : own;
     };
     // One depth is written for a pixel, whatever is asked for.

@@ -67,7 +67,7 @@ GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const Chunk
   if (camera.response != Response::ewa) return true;  // those footprints are not bounded by this
   const double z_min = chunk.z_min();
   if (s_max < -1e-5) return false;
-  const auto outside = [&](const Vec3d& axis, double f, double c, double limit, double extent) {
+  const auto outside = [&](const Vec3d& axis, double f, double c, double limit, double extent) GSNAV_INLINED {
     const auto [wide, fixed] = chunk.reach(z_min, s_max, f, c, limit, extent);
     const Vec3d& z = camera.rotation.row[2];
     return chunk.largest(axis * f + z * (c + fixed)) < -wide ||           // below the first pixel
@@ -88,7 +88,7 @@ GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const Chunk
 GSNAV_HD bool lies_in_view(const ProjectionCamera<double>& camera, const ChunkBounds& b) noexcept {
   const detail::ChunkInView chunk(camera, b);
   const Vec3d& z = camera.rotation.row[2];
-  const auto inside = [&](const Vec3d& axis, double f, double c, double extent) {
+  const auto inside = [&](const Vec3d& axis, double f, double c, double extent) GSNAV_INLINED {
     return chunk.largest(axis * -f - z * c) <= 0 && chunk.largest(axis * f + z * (c - extent)) <= 0;
   };
   return -chunk.largest(-z) * camera.scale > camera.near_plane &&
@@ -111,7 +111,7 @@ GSNAV_HD ChunkExtent chunk_extent(const ProjectionCamera<double>& camera, const 
   const double row = camera.sort_order == SortOrder::z_depth ? 1.0 : max(1.0, norm(camera.rotation.row[2]));
   e.nearest = static_cast<float>(z_min / row * camera.scale * (1 - 1e-6));
   const auto along = [&](const Vec3d& axis, double f, double c, double limit, double extent, double& low,
-                         double& high) {
+                         double& high) GSNAV_INLINED {
     const auto [wide, fixed] = chunk.reach(z_min, s_max, f, c, limit, extent);
     const double left = -chunk.largest(axis * -f) - wide, right = chunk.largest(axis * f) + wide;
     low = c - fixed + left / (left < 0 ? z_min : z_max);

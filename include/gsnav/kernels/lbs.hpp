@@ -102,7 +102,7 @@ GSNAV_HD Quat<L> quat_direction(const ScaledRotation<L>& rotation) noexcept {
   const L xy = m(0, 1) + m(1, 0), xz = m(0, 2) + m(2, 0), yz = m(1, 2) + m(2, 1);
   L best = ww;
   Quat<L> q{ww, wx, wy, wz};
-  const auto take = [&](L value, const Quat<L>& other) noexcept {
+  const auto take = [&](L value, const Quat<L>& other) GSNAV_INLINED {
     const mask_of<L> better = value > best;
     q.w = select(better, other.w, q.w);
     q.x = select(better, other.x, q.x);
@@ -219,7 +219,7 @@ GSNAV_HD Skinned<S> skin_row(const SkinRow<K>& row, const JointAt& joint_at, boo
     }
     blend.translation = k == 0 ? joint.translation * weight : fma(weight, joint.translation, blend.translation);
   }
-  const auto first = [&]() noexcept { return joint_at(row.joints[0]).linear; };
+  const auto first = [&]() GSNAV_INLINED { return joint_at(row.joints[0]).linear; };
   return skin<S>(blend, first, vec_cast<S>(row.mean), quat_cast<S>(row.quat), rotation);
 }
 
@@ -241,7 +241,7 @@ struct SkinGaussian {
   SkinningArgs<S, Out> args;
 
   GSNAV_HD void operator()(std::size_t i) const noexcept {
-    const auto joint_at = [this](std::uint16_t j) noexcept -> const Affine3<S>& { return args.joints[j]; };
+    const auto joint_at = [this](std::uint16_t j) GSNAV_INLINED -> const Affine3<S>& { return args.joints[j]; };
     if (args.influences == kInfluences8) {
       store_skinned(args, i, skin_row<S>(read_skin_row<kInfluences8>(args, i), joint_at, args.writes_rotations()));
     } else {

@@ -39,7 +39,7 @@ GSNAV_HD void for_each_fragment(const FragmentArgs<S>& args, std::size_t tile, c
     const MeshTriangle<S>& t = args.raster.triangles[bin.tile_splats[i]];
     for_each_span(grid, t, max(tile_x, int{t.x0}), max(tile_y, int{t.y0}),
                   min(min(tile_x + ts, grid.width), int{t.x1}),
-                  min(min(tile_y + ts, grid.height), int{t.y1}), [&](int y, int left, int right) {
+                  min(min(tile_y + ts, grid.height), int{t.y1}), [&](int y, int left, int right) GSNAV_INLINED {
                     for (int x = left; x < right; ++x) {
                       const std::size_t pixel =
                           static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
@@ -72,9 +72,9 @@ template <class S>
 struct CountFragments {
   FragmentArgs<S> args;
   GSNAV_HD void operator()(std::size_t tile) const noexcept {
-    detail::for_each_tile_pixel(args.raster.bin.grid, tile, [&](std::size_t p) { args.ranges[p] = {}; });
+    detail::for_each_tile_pixel(args.raster.bin.grid, tile, [&](std::size_t p) GSNAV_INLINED { args.ranges[p] = {}; });
     std::uint64_t sum = 0;
-    detail::for_each_fragment(args, tile, [&](std::size_t p, const MeshTriangle<S>&, int, int, S) {
+    detail::for_each_fragment(args, tile, [&](std::size_t p, const MeshTriangle<S>&, int, int, S) GSNAV_INLINED {
       ++args.ranges[p].count;
       ++sum;
     });
@@ -99,14 +99,14 @@ struct FillFragments {
 
   GSNAV_HD void operator()(std::size_t tile) const noexcept {
     std::uint64_t next = args.tile_begin[tile];
-    detail::for_each_tile_pixel(args.raster.bin.grid, tile, [&](std::size_t p) {
+    detail::for_each_tile_pixel(args.raster.bin.grid, tile, [&](std::size_t p) GSNAV_INLINED {
       FragmentRange& r = args.ranges[p];
       r.begin = next;
       next += r.count;
       r.count = 0;
     });
     detail::for_each_fragment(args, tile,
-                              [&](std::size_t p, const MeshTriangle<S>& t, int x, int y, S z) {
+                              [&](std::size_t p, const MeshTriangle<S>& t, int x, int y, S z) GSNAV_INLINED {
                                 const MeshPlacement& placement = args.raster.placements[t.placement];
                                 const SurfacePoint<S> at = surface_point(placement.mesh, t, x, y, z);
                                 const S alpha = surface_alpha(placement.mesh, t, at);

@@ -119,7 +119,7 @@ struct CountMeshTiles {
     for (std::size_t t = 0; t < bin.grid.count(); ++t) counts[t] = 0;
     const BlockRange r = BlockRange::of(block, bin.blocks, args.triangles.size);
     for (std::size_t i = r.begin; i < r.end; ++i) {
-      detail::for_each_mesh_tile(bin.grid, args.triangles[i], [=](std::size_t tile) { ++counts[tile]; });
+      detail::for_each_mesh_tile(bin.grid, args.triangles[i], [=](std::size_t tile) GSNAV_INLINED { ++counts[tile]; });
     }
   }
 };
@@ -134,7 +134,7 @@ struct ScatterMeshTiles {
     std::uint32_t* out = bin.tile_splats.data;
     const BlockRange r = BlockRange::of(block, bin.blocks, args.triangles.size);
     for (std::size_t i = r.begin; i < r.end; ++i) {
-      detail::for_each_mesh_tile(bin.grid, args.triangles[i], [=](std::size_t tile) {
+      detail::for_each_mesh_tile(bin.grid, args.triangles[i], [=](std::size_t tile) GSNAV_INLINED {
         out[cursors[tile]++] = static_cast<std::uint32_t>(i);
       });
     }
@@ -232,7 +232,7 @@ GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t til
   const int tile_y = static_cast<int>(tile / static_cast<std::size_t>(grid.columns)) * ts;
   const int tile_right = min(tile_x + ts, grid.width), tile_bottom = min(tile_y + ts, grid.height);
   const std::size_t stride = static_cast<std::size_t>(grid.width);
-  const auto row_at = [&](int y) { return static_cast<std::size_t>(y) * stride; };
+  const auto row_at = [&](int y) GSNAV_INLINED { return static_cast<std::size_t>(y) * stride; };
   for (int y = tile_y; y < tile_bottom; ++y) {
     for (int x = tile_x; x < tile_right; ++x) {
       args.depth[row_at(y) + static_cast<std::size_t>(x)] = S(0);  // 1 / z until the tile is done

@@ -102,7 +102,7 @@ GSNAV_HD bool place_triangle(const MeshCamera& camera, bool two_sided, const Mes
   out.corner[1] = out.back ? b : c;
   out.corner[2] = out.back ? c : b;
   const auto box = [](std::int32_t p, std::int32_t q, std::int32_t r, int size, std::int16_t& low,
-                      std::int16_t& high) {
+                      std::int16_t& high) GSNAV_INLINED {
     const std::int32_t first = first_centre(min(p, min(q, r)), size);
     const std::int32_t last = last_centre(max(p, max(q, r)), size);
     low = static_cast<std::int16_t>(max(first, 0));
@@ -127,13 +127,13 @@ GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, co
   const double inverse = 1.0 / nv;
   if (!(nn > 0) || !is_finite(inverse)) return;  // edge-on: its nearest depth, its first corner's colour
   const double px = out.x0 + 0.5 - camera.half_width - camera.cx, py = out.y0 + 0.5 - camera.half_height - camera.cy;
-  const auto plane = [&](const Vec3d& c) {
+  const auto plane = [&](const Vec3d& c) GSNAV_INLINED {
     const double x = c.x / camera.fx, y = c.y / camera.fy;
     return PixelPlane<double>{fma(x, px, fma(y, py, c.z)), x, y};
   };
   const Vec3d per_depth = n * inverse;
   out.inverse_z = plane(per_depth);
-  const auto weight = [&](const Vec3d& q) {
+  const auto weight = [&](const Vec3d& q) GSNAV_INLINED {
     const PixelPlane<double> p = plane(q - per_depth * dot(q, v0));
     return PixelPlane<S>{S(p.value), S(p.x), S(p.y)};
   };
@@ -156,7 +156,7 @@ GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std
   piece.placement = at;
   piece.triangle = static_cast<std::uint32_t>(t);
   piece.masked = placement.mesh.alpha_mode == MeshAlpha::mask;
-  const auto emit = [&](double z_min, double z_max) {
+  const auto emit = [&](double z_min, double z_max) GSNAV_INLINED {
     if constexpr (Full) {
       interpolate_triangle(args.camera, v[0]->position, v[1]->position, v[2]->position, z_min, z_max, piece);
     }
@@ -219,7 +219,7 @@ struct CountMeshTriangles {
   MeshSetupArgs<S> args;
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     std::uint32_t n = 0;
-    args.not_finite[c] = detail::for_each_piece_of_chunk<false>(args, c, [&n](const MeshTriangle<S>&) { ++n; });
+    args.not_finite[c] = detail::for_each_piece_of_chunk<false>(args, c, [&n](const MeshTriangle<S>&) GSNAV_INLINED { ++n; });
     args.counts[c] = n;
   }
 };
@@ -240,7 +240,7 @@ struct WriteMeshTriangles {
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     if (args.counts[c] == 0) return;
     MeshTriangle<S>* out = args.triangles.data + args.offsets[c];
-    detail::for_each_piece_of_chunk<true>(args, c, [&out](const MeshTriangle<S>& t) { *out++ = t; });
+    detail::for_each_piece_of_chunk<true>(args, c, [&out](const MeshTriangle<S>& t) GSNAV_INLINED { *out++ = t; });
   }
 };
 

@@ -57,7 +57,7 @@ template <class S>
 GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel, std::uint32_t id,
                                S depth) noexcept {
   const MeshImages<S>& out = args.images;
-  const auto write = [pixel](S* image, const Vec3<S>& v) {
+  const auto write = [pixel](S* image, const Vec3<S>& v) GSNAV_INLINED {
     if (image == nullptr) return;
     image[3 * pixel] = v.x;
     image[3 * pixel + 1] = v.y;

@@ -15,7 +15,7 @@ namespace detail {
 template <class S>
 GSNAV_HD Vec3<S> mixed(const Vec3f& a, const Vec3f& b, const Vec3f& c, S wb, S wc) noexcept {
   const S wa = S(1) - wb - wc;
-  const auto mix = [=](float x, float y, float z) { return fma(S(x), wa, fma(S(y), wb, S(z) * wc)); };
+  const auto mix = [=](float x, float y, float z) GSNAV_INLINED { return fma(S(x), wa, fma(S(y), wb, S(z) * wc)); };
   return {mix(a.x, b.x, c.x), mix(a.y, b.y, c.y), mix(a.z, b.z, c.z)};
 }
 
@@ -55,7 +55,7 @@ GSNAV_HD Vec3<S> sample_level(const TextureView& t, const std::uint8_t* texels, 
   const S x = u * S(width) - S(0.5), y = v * S(height) - S(0.5);
   const std::int32_t x0 = floor_of(x), y0 = floor_of(y);
   const S fx = x - S(x0), fy = y - S(y0);
-  const auto wrap = [](std::int32_t i, int n) { return i < 0 ? i + n : (i >= n ? i - n : i); };
+  const auto wrap = [](std::int32_t i, int n) GSNAV_INLINED { return i < 0 ? i + n : (i >= n ? i - n : i); };
   TexelSum<What, S> sum;
   for (int k = 0; k < 4; ++k) {
     const std::int32_t i = wrap(x0 + (k & 1), width), j = wrap(y0 + (k >> 1), height);
@@ -123,7 +123,7 @@ GSNAV_HD Vec3<S> surface_texel(const MeshView& mesh, const MeshTriangle<S>& t,
   const S u = fma(e1.x, at.b1, fma(e2.x, at.b2, S(uv0.x))),
           v = fma(e1.y, at.b1, fma(e2.y, at.b2, S(uv0.y)));
   // A weight is its plane over that of 1 / z.
-  const auto footprint2 = [&](S b1_step, S b2_step, S inverse_z_step) {
+  const auto footprint2 = [&](S b1_step, S b2_step, S inverse_z_step) GSNAV_INLINED {
     const S d1 = fma(-at.b1, inverse_z_step, b1_step) * at.z,
             d2 = fma(-at.b2, inverse_z_step, b2_step) * at.z;
     const S du = fma(e1.x, d1, e2.x * d2) * S(mesh.texture.width);
@@ -141,7 +141,7 @@ GSNAV_HD Vec3<S> surface_color(const MeshView& mesh, const MeshTriangle<S>& t,
                                const SurfacePoint<S>& at) noexcept {
   Vec3<S> color = vec_cast<S>(mesh.base_color);
   if (mesh.plain) return color;
-  const auto times = [&color](const Vec3<S>& c) {
+  const auto times = [&color](const Vec3<S>& c) GSNAV_INLINED {
     color = {color.x * c.x, color.y * c.y, color.z * c.z};
   };
   if (!mesh.colors.empty()) {

@@ -101,7 +101,7 @@ GSNAV_HD float opacity_of(const GaussianView& gs, std::size_t i) noexcept {
 
 /// Coefficient k of row i of packed colours, whichever way the bands are kept.
 GSNAV_HD Vec3<float> packed_coefficient(const GaussianView& gs, std::size_t i, int k) noexcept {
-  const auto halves = [](const std::uint16_t* p) {
+  const auto halves = [](const std::uint16_t* p) GSNAV_INLINED {
     return Vec3<float>{half_to_float(p[0]), half_to_float(p[1]), half_to_float(p[2])};
   };
   if (k == 0) return halves(gs.packed.sh0.data + 3 * i);

@@ -23,7 +23,7 @@ template <class S>
 struct ProjectArgs {
   GaussianView gaussians;
   ProjectionCamera<S> camera;
-  ProjectionCamera<double> camera64;  ///< for Gaussians whose geometry float cannot hold
+  ProjectionCamera<double> camera64;  ///< for sort keys, and for Gaussians whose geometry float cannot hold
   View<const Vec3<float>> offsets_f;  ///< float(origin - camera), one an origin
   View<const Vec3d> offsets;          ///< the same in double
   int sh_degree = 0;                  ///< highest degree to evaluate, <= gaussians.sh_degree
@@ -78,15 +78,34 @@ GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c
 
 namespace detail {
 
-/// mean - camera position, asset frame, in the scalar of the kernel.
+/// mean - camera position, asset frame, in double.
+template <class S>
+GSNAV_HD Vec3d camera_delta64(const ProjectArgs<S>& args, const Vec3<float>& mean, std::size_t origin) noexcept {
+  return vec_cast<double>(mean) + args.offsets[origin];
+}
+
+/// The same in the scalar of the kernel.
 template <class S>
 GSNAV_HD Vec3<S> camera_delta(const ProjectArgs<S>& args, const Vec3<float>& mean,
                               std::size_t origin) noexcept {
   if constexpr (sizeof(S) == sizeof(float)) {
     return mean + args.offsets_f[origin];
   } else {
-    return vec_cast<S>(vec_cast<double>(mean) + args.offsets[origin]);
+    return vec_cast<S>(camera_delta64(args, mean, origin));
   }
+}
+
+/// Depth of a centre along the view axis as near planes and sort keys take it: float32, metres.
+template <class S>
+GSNAV_HD float depth_of(const ProjectArgs<S>& args, const Vec3<float>& mean, std::size_t origin) noexcept {
+  return static_cast<float>(depth_key(args.camera64, camera_delta64(args, mean, origin)));
+}
+
+/// The float32 sort key of a centre whose `depth_of` is `z`, metres.
+template <class S>
+GSNAV_HD float sort_key(const ProjectArgs<S>& args, float z, const Vec3<float>& mean, std::size_t origin) noexcept {
+  if (args.camera64.sort_order == SortOrder::z_depth) return z;
+  return static_cast<float>(distance_key(args.camera64, camera_delta64(args, mean, origin)));
 }
 
 /// Pixels whose centre lies within [center - half, center + half], clipped to [0, size): half-open.
@@ -211,7 +230,7 @@ GSNAV_HD bool store_splat(const ProjectArgs<S>& args, std::size_t slot,
 template <class L>
 GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3<L>& delta, L& mean_x,
                            L& mean_y) noexcept {
-  const auto row = [&](int r) {
+  const auto row = [&](int r) GSNAV_INLINED {
     return Vec3<L>{L(camera.rotation(r, 0)), L(camera.rotation(r, 1)), L(camera.rotation(r, 2))};
   };
   const L inv_z = L(1.0) / dot(row(2), delta);
@@ -275,14 +294,14 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
     }
   }
   if (has_packed_colors(gs)) {
-    const Vec3<S> c = sh_color<S>(degree, delta, [&](int k) { return vec_cast<S>(packed_coefficient(gs, i, k)); });
+    const Vec3<S> c = sh_color<S>(degree, delta, [&](int k) GSNAV_INLINED { return vec_cast<S>(packed_coefficient(gs, i, k)); });
     return {c.x, c.y, c.z, S(0)};
   }
   const float* sh0 = gs.sh0.data + 3 * i;
   const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
   if (!gs.shN_half.empty()) {
     const std::uint16_t* halves = gs.shN_half.data + 3 * rest * i;
-    const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) {
+    const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
       if (k == 0) return Vec3<S>{S(sh0[0]), S(sh0[1]), S(sh0[2])};
       const std::uint16_t* p = halves + 3 * (k - 1);
       return Vec3<S>{S(half_to_float(p[0])), S(half_to_float(p[1])), S(half_to_float(p[2]))};
@@ -290,7 +309,7 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
     return {c.x, c.y, c.z, S(0)};
   }
   const float* shn = gs.shN.data + 3 * rest * i;
-  const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) {
+  const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
     const float* p = k == 0 ? sh0 : shn + 3 * (k - 1);
     return Vec3<S>{S(p[0]), S(p[1]), S(p[2])};
   });
@@ -303,8 +322,7 @@ template <class S>
 GSNAV_HD Projected<double> project64(const ProjectArgs<S>& args, std::size_t i, float key_z,
                                      const Vec3<float>& mean, std::size_t origin,
                                      SplatAxes<double>& axes) noexcept {
-  const Vec3d delta = vec_cast<double>(mean) + args.offsets[origin];
-  axes = load_axes(args.gaussians, args.camera64, delta, i);
+  axes = load_axes(args.gaussians, args.camera64, camera_delta64(args, mean, origin), i);
   return project<double, float>(args.camera64, axes, key_z,
                                 static_cast<double>(opacity_of(args.gaussians, i)));
 }
@@ -324,7 +342,7 @@ GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::siz
     written = detail::store_splat(args, slot, args.camera64, p64, axes64, p64.mean_x, p64.mean_y);
   } else if (sizeof(S) == sizeof(float)) {
     double mean_x, mean_y;
-    detail::project_mean(args.camera64, vec_cast<double>(mean) + args.offsets[origin], mean_x, mean_y);
+    detail::project_mean(args.camera64, detail::camera_delta64(args, mean, origin), mean_x, mean_y);
     written = detail::store_splat(args, slot, args.camera, p, axes, mean_x, mean_y);
   } else {
     written = detail::store_splat(args, slot, args.camera, p, axes, p.mean_x, p.mean_y);
@@ -349,14 +367,23 @@ GSNAV_HD bool project_gaussian(const ProjectArgs<S>& args, std::size_t slot, std
   const GaussianView& gs = args.gaussians;
   const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
   const Vec3<float> mean = mean_of(gs, i);
-  const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean, args.offsets_f[origin]);
-  if (!(z > args.camera.near_plane)) return false;
+  constexpr bool kReference = sizeof(S) > sizeof(float);
+  float z = 0;
+  if constexpr (!kReference) {
+    z = detail::depth_of(args, mean, origin);
+    if (!(z > args.camera.near_plane)) return false;
+  }
   const SplatAxes<S> axes = detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), i);
+  // The float64 reference takes depths from its own projection, so that a fault of `depth_key` shows beside it.
+  if constexpr (kReference) z = static_cast<float>(axes.position.z * args.camera.scale);
   const Projected<S> p = project<S, float>(args.camera, axes, z, S(opacity_of(gs, i)));
   if (!p.visible) return false;
-  const float key = args.camera.sort_order == SortOrder::z_depth
-                        ? z
-                        : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
+  float key = detail::sort_key(args, z, mean, origin);
+  if constexpr (kReference) {
+    if (args.camera.sort_order == SortOrder::camera_distance) {
+      key = static_cast<float>(norm(axes.position) * args.camera.scale);
+    }
+  }
   return write_splat(args, slot, i, key, mean, origin, p, axes);
 }
 

@@ -150,7 +150,7 @@ GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes
 ///    always and its relative error stays near 1e-6 for needles of 1e4 : 1.
 ///  - The inverse is kept as a Cholesky factor.
 ///
-/// `key_z`: z of the centre in float32, metres, from `depth_key`. `opacity` in [0, 1].
+/// `key_z`: `depth_key` of the centre, rounded to float32, metres. `opacity` in [0, 1].
 template <class L, class F>
 GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, const SplatAxes<L>& axes,
                               F key_z, L opacity) noexcept {
@@ -252,20 +252,22 @@ GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& ca
   return d;
 }
 
-/// The float32 sort key's value, metres: the same bits on every backend and for every S, because it is
-/// one chain of fused operations over the stored float32 offset.
-/// `offset`: float(origin - camera position), asset frame.
-template <class F>
-GSNAV_HD F depth_key(const Mat3<float>& rotation, float scale, const Vec3<F>& mean,
-                     const Vec3<F>& offset) noexcept {
-  const Vec3<F> row{F(rotation(2, 0)), F(rotation(2, 1)), F(rotation(2, 2))};
-  return dot(row, mean + offset) * F(scale);
+/// Sort key for SortOrder::z_depth: the depth of a centre along the view axis, metres, in double. Callers round it to
+/// float32, once. The rounded key has the same bits on every backend and in any float64 renderer (but where two
+/// float64 results lie on different sides of a float32 rounding, about one key in 1e8), and it depends neither on a
+/// set's origins nor on where the world's origin lies.
+/// `delta`: mean - camera position, asset frame, in double. `D`: double, or a pack of them.
+template <class D>
+GSNAV_HD D depth_key(const ProjectionCamera<double>& camera, const Vec3<D>& delta) noexcept {
+  const Vec3d& row = camera.rotation.row[2];
+  return dot(Vec3<D>{D(row.x), D(row.y), D(row.z)}, delta) * D(camera.scale);
 }
 
-/// Sort key for SortOrder::camera_distance, metres.
-template <class F>
-GSNAV_HD F distance_key(float scale, const Vec3<F>& mean, const Vec3<F>& offset) noexcept {
-  return norm(mean + offset) * F(scale);
+/// Sort key for SortOrder::camera_distance: the distance of a centre from the camera, metres, in double. As
+/// `depth_key`, it is rounded to float32 once.
+template <class D>
+GSNAV_HD D distance_key(const ProjectionCamera<double>& camera, const Vec3<D>& delta) noexcept {
+  return norm(delta) * D(camera.scale);
 }
 
 }  // namespace gsnav

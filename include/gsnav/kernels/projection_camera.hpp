@@ -65,10 +65,8 @@ struct ProjectionRules {
 template <class S>
 struct ProjectionCamera {
   Mat3<S> rotation{};       ///< W R, asset axes to camera axes
-  Mat3<float> key_rotation{};  ///< the same in float: keys are float32 for every S
   Vec3d position{};         ///< c, asset frame, double
   S scale{1};               ///< s
-  float key_scale = 1;
   S fx{}, fy{}, cx{}, cy{};
   S u_min{}, u_max{}, v_min{}, v_max{};  ///< limits of x/z and y/z in the Jacobian
   int width = 0, height = 0;
@@ -94,10 +92,8 @@ ProjectionCamera<S> make_projection_camera(const Camera& camera, const GaussianS
   const Similarity& a = set.world_from_asset;
   const Mat3d rotation = camera.viewmat.linear * rotation_matrix(a.rotation);
   p.rotation = mat_cast<S>(rotation);
-  p.key_rotation = mat_cast<float>(rotation);
   p.position = inverse(a) * camera.position();
   p.scale = static_cast<S>(a.scale);
-  p.key_scale = static_cast<float>(a.scale);
   p.fx = static_cast<S>(camera.fx);
   p.fy = static_cast<S>(camera.fy);
   p.cx = static_cast<S>(camera.cx);

@@ -64,7 +64,7 @@ GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g,
     f(ty0, tx0, tx0);
     return;
   }
-  const auto centre = [](int pixel) { return S(pixel) + S(0.5); };
+  const auto centre = [](int pixel) GSNAV_INLINED { return S(pixel) + S(0.5); };
   const FootprintStrips<S> footprint(g, log2_alpha_min, centre(b.x0), centre(b.x1 - 1), centre(b.y0),
                                      centre(b.y1 - 1));
   for (int ty = ty0; ty <= ty1; ++ty) {
@@ -87,7 +87,7 @@ GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g,
 template <class S, class F>
 GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
                             S log2_alpha_min, bool elliptic, const F& f) noexcept {
-  for_each_tile_row(grid, g, b, log2_alpha_min, elliptic, [&](int ty, int first, int last) {
+  for_each_tile_row(grid, g, b, log2_alpha_min, elliptic, [&](int ty, int first, int last) GSNAV_INLINED {
     const std::size_t row = static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns);
     for (int tx = first; tx <= last; ++tx) f(row + static_cast<std::size_t>(tx));
   });
@@ -144,7 +144,7 @@ GSNAV_HD void for_each_intersection(const BinArgs<S>& args, std::size_t block, c
     prefetch_splat(args, i);
     const std::uint32_t splat = args.order[i];
     for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
-                  [&](std::size_t tile) { f(tile, splat); });
+                  [&](std::size_t tile) GSNAV_INLINED { f(tile, splat); });
   }
 }
 }  // namespace detail
@@ -156,7 +156,7 @@ struct CountTileIntersections {
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* counts = args.cursors.data + block * args.grid.count();
     for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-    detail::for_each_intersection(args, block, [=](std::size_t tile, std::uint32_t) { ++counts[tile]; });
+    detail::for_each_intersection(args, block, [=](std::size_t tile, std::uint32_t) GSNAV_INLINED { ++counts[tile]; });
   }
 };
 
@@ -188,7 +188,7 @@ struct ScatterTileIntersections {
     std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
     std::uint32_t* out = args.tile_splats.data;
     detail::for_each_intersection(args, block,
-                                  [=](std::size_t tile, std::uint32_t splat) { out[cursors[tile]++] = splat; });
+                                  [=](std::size_t tile, std::uint32_t splat) GSNAV_INLINED { out[cursors[tile]++] = splat; });
   }
 };
 

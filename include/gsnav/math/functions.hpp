@@ -50,12 +50,13 @@ GSNAV_HD double abs(double a) noexcept { return ::fabs(a); }
 // processors since 2013 have it, and it rounds as libm does: the same bits.
 GSNAV_HD float fma(float a, float b, float c) noexcept {
   if (!__builtin_cpu_supports("fma")) return __builtin_fmaf(a, b, c);
-  __asm__("vfmadd231ss %2, %1, %0" : "+x"(c) : "x"(a), "x"(b));
+  // Not volatile, it may be executed before the test.
+  __asm__ volatile("vfmadd231ss %2, %1, %0" : "+x"(c) : "x"(a), "x"(b));
   return c;
 }
 GSNAV_HD double fma(double a, double b, double c) noexcept {
   if (!__builtin_cpu_supports("fma")) return __builtin_fma(a, b, c);
-  __asm__("vfmadd231sd %2, %1, %0" : "+x"(c) : "x"(a), "x"(b));
+  __asm__ volatile("vfmadd231sd %2, %1, %0" : "+x"(c) : "x"(a), "x"(b));
   return c;
 }
 #else

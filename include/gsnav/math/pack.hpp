@@ -332,7 +332,7 @@ GSNAV_HD float fma_by_double(float a, float b, float c) noexcept {
 #if defined(__SSE2__) && !defined(__FMA__)
 /// The same for two lanes at once.
 GSNAV_HD __m128 fma_by_double(__m128 a, __m128 b, __m128 c) noexcept {
-  const auto half = [](__m128d x, __m128d y, __m128d d) {
+  const auto half = [](__m128d x, __m128d y, __m128d d) GSNAV_INLINED {
     const __m128d p = _mm_mul_pd(x, y), s = _mm_add_pd(p, d), t = _mm_sub_pd(s, p);
     const __m128d error = _mm_add_pd(_mm_sub_pd(p, _mm_sub_pd(s, t)), _mm_sub_pd(d, t));
     const __m128d zero = _mm_setzero_pd();
@@ -348,7 +348,7 @@ GSNAV_HD __m128 fma_by_double(__m128 a, __m128 b, __m128 c) noexcept {
     const __m128i apply = _mm_and_si128(_mm_castpd_si128(inexact), even);
     return _mm_castsi128_pd(_mm_add_epi64(u, _mm_and_si128(move, apply)));
   };
-  const auto high = [](__m128 x) { return _mm_cvtps_pd(_mm_movehl_ps(x, x)); };
+  const auto high = [](__m128 x) GSNAV_INLINED { return _mm_cvtps_pd(_mm_movehl_ps(x, x)); };
   const __m128 low = _mm_cvtpd_ps(half(_mm_cvtps_pd(a), _mm_cvtps_pd(b), _mm_cvtps_pd(c)));
   return _mm_movelh_ps(low, _mm_cvtpd_ps(half(high(a), high(b), high(c))));
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 #include "gsnav/math/pack.hpp"
 
@@ -93,6 +94,42 @@ template <int N>
 GSNAV_HD Pack<double, N> truncated(Pack<double, N> a) noexcept {
   using P = Pack<double, N>;
   return P(__builtin_convertvector(__builtin_convertvector(a.v, typename P::ints), typename P::vector));
+}
+
+template <int N>
+GSNAV_HD Pack<double, N> sqrt(Pack<double, N> a) noexcept {
+  Pack<double, N> r;
+  for (int i = 0; i < N; ++i) r.v[i] = __builtin_sqrt(a.v[i]);
+  return r;
+}
+
+namespace detail {
+template <int Half, int N, std::size_t... Lane>
+GSNAV_HD Pack<double, N / 2> widened(Pack<float, N> a, std::index_sequence<Lane...>) noexcept {
+  using P = Pack<double, N / 2>;
+  const typename P::floats half =
+      __builtin_shufflevector(a.v, a.v, Half * (N / 2) + static_cast<int>(Lane)...);
+  return P(__builtin_convertvector(half, typename P::vector));
+}
+template <int N, std::size_t... Lane>
+GSNAV_HD Pack<float, 2 * N> rounded(Pack<double, N> low, Pack<double, N> high, std::index_sequence<Lane...>) noexcept {
+  using P = Pack<double, N>;
+  const typename P::floats l = __builtin_convertvector(low.v, typename P::floats);
+  const typename P::floats h = __builtin_convertvector(high.v, typename P::floats);
+  return Pack<float, 2 * N>(__builtin_shufflevector(l, h, static_cast<int>(Lane)...));
+}
+}  // namespace detail
+
+/// Half the lanes of a pack of floats in double: the lower ones (0) or the upper ones (1).
+template <int Half, int N>
+GSNAV_HD Pack<double, N / 2> widened(Pack<float, N> a) noexcept {
+  return detail::widened<Half>(a, std::make_index_sequence<static_cast<std::size_t>(N / 2)>{});
+}
+
+/// Two halves rounded to float.
+template <int N>
+GSNAV_HD Pack<float, 2 * N> rounded(Pack<double, N> low, Pack<double, N> high) noexcept {
+  return detail::rounded(low, high, std::make_index_sequence<static_cast<std::size_t>(2 * N)>{});
 }
 
 /// a * b + c with one rounding.

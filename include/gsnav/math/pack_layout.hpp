@@ -184,7 +184,7 @@ GSNAV_HD void load_columns(const float* const (&rows)[N], Pack<float, N>* column
     // Rows i, i + 4, i + 8 and i + 12 share a register.
     using V = typename Pack<float, 16>::vector;
     V r[4];
-    const auto row = [&rows](int i) noexcept {
+    const auto row = [&rows](int i) GSNAV_INLINED {
       return reinterpret_cast<typename Pack<float, 4>::vector>(_mm_maskz_loadu_ps(0x7, rows[i]));
     };
     for (int i = 0; i < 4; ++i) {

@@ -25,13 +25,13 @@ struct Packs {
   }
 
   GSNAV_HD friend Packs operator+(const Packs& a, const Packs& b) noexcept {
-    return of([&](int i) { return a.v[i] + b.v[i]; });
+    return of([&](int i) GSNAV_INLINED { return a.v[i] + b.v[i]; });
   }
   GSNAV_HD friend Packs operator-(const Packs& a, const Packs& b) noexcept {
-    return of([&](int i) { return a.v[i] - b.v[i]; });
+    return of([&](int i) GSNAV_INLINED { return a.v[i] - b.v[i]; });
   }
   GSNAV_HD friend Packs operator-(const Packs& a) noexcept {
-    return of([&](int i) { return -a.v[i]; });
+    return of([&](int i) GSNAV_INLINED { return -a.v[i]; });
   }
 };
 
@@ -56,21 +56,21 @@ GSNAV_HD PackMasks<P, G> operator>=(const Packs<P, G>& a, const Packs<P, G>& b) 
 }
 template <class P, int G>
 GSNAV_HD Packs<P, G> select(const PackMasks<P, G>& m, const Packs<P, G>& a, const Packs<P, G>& b) noexcept {
-  return Packs<P, G>::of([&](int i) { return select(m.v[i], a.v[i], b.v[i]); });
+  return Packs<P, G>::of([&](int i) GSNAV_INLINED { return select(m.v[i], a.v[i], b.v[i]); });
 }
 template <class P, int G>
 GSNAV_HD Packs<P, G> min(const Packs<P, G>& a, const Packs<P, G>& b) noexcept {
-  return Packs<P, G>::of([&](int i) { return min(a.v[i], b.v[i]); });
+  return Packs<P, G>::of([&](int i) GSNAV_INLINED { return min(a.v[i], b.v[i]); });
 }
 /// a * b + c with one rounding.
 template <class P, int G>
 GSNAV_HD Packs<P, G> fma(const Packs<P, G>& a, const Packs<P, G>& b, const Packs<P, G>& c) noexcept {
-  return Packs<P, G>::of([&](int i) { return fma(a.v[i], b.v[i], c.v[i]); });
+  return Packs<P, G>::of([&](int i) GSNAV_INLINED { return fma(a.v[i], b.v[i], c.v[i]); });
 }
 
 template <class P, int G>
 GSNAV_HD Packs<P, G> scale_by_rounded(const Packs<P, G>& p, const Packs<P, G>& t) noexcept {
-  return Packs<P, G>::of([&](int i) { return scale_by_rounded(p.v[i], t.v[i]); });
+  return Packs<P, G>::of([&](int i) GSNAV_INLINED { return scale_by_rounded(p.v[i], t.v[i]); });
 }
 
 /// 2^x for x in [-126, 126], lane by lane the bits of the scalar exp2; of any other x: anything.

@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/core/small_vector.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/math/aabb.hpp"
+#include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
 #include "gsnav/nav/navmesh_settings.hpp"
 
@@ -20,6 +22,8 @@ namespace gsnav {
 /// Index of a polygon of a NavMesh.
 using PolyId = std::uint32_t;
 inline constexpr PolyId kNoPoly = 0xffffffffu;
+/// The island of no polygon.
+inline constexpr std::size_t kNoIsland = static_cast<std::size_t>(-1);
 
 /// A point on the surface of a NavMesh: world position (metres, Y up) and the polygon it lies on.
 /// Kept from one step to the next, the polygon saves the search for it.
@@ -32,7 +36,30 @@ struct NavPoint {
 /// Habitat's, and generous: two metres beside the mesh or four above it still snap.
 struct SnapOptions {
   Vec3d half_extents{2.0, 4.0, 2.0};
+  std::optional<std::size_t> island{};  ///< only to this island, where one is named
 };
+
+/// Triangles by index, metres, Y up; counter-clockwise seen from above can be walked on.
+struct NavMeshTriangles {
+  std::vector<Vec3d> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< three of `vertices` each
+};
+
+/// What a NavMesh is built from: the stage, or an object that stands in it.
+struct NavMeshPart {
+  std::span<const Vec3d> vertices;                          ///< its own coordinates
+  std::span<const std::array<std::uint32_t, 3>> triangles;  ///< three of its own vertices each
+  Similarity world_from_part{};
+  /// An object that never moves. It is part of the mesh only where
+  /// NavMeshSettings::include_static_objects says so.
+  bool static_object = false;
+};
+
+/// The parts that `settings` include as triangles of one world, in the order given. Errors:
+/// invalid_argument naming the part, and its placement, or its triangle that names a vertex it does not
+/// have.
+Result<NavMeshTriangles> gather_parts(const NavMeshSettings& settings,
+                                      std::span<const NavMeshPart> parts);
 
 /// The nearest edge of the mesh.
 struct ObstacleHit {
@@ -41,10 +68,20 @@ struct ObstacleHit {
   Vec3d normal{};         ///< of the edge (at a corner: that which faces p more), on the ground plane, into the mesh
 };
 
-/// The walkable surface near one height, seen from above. Each cell stands for its centre.
+/// How a top-down map is laid out.
+enum class TopDownLayout : std::uint8_t {
+  centres,  ///< enough cells to hold the bounds; a cell is what lies at its centre
+  /// As Habitat's get_topdown_view: no cell for what is left of a row or column at its end, and a cell
+  /// is what lies at its corner of least x and z, or within a centimetre of it on the ground plane.
+  habitat,
+};
+
+/// The walkable surface near one height, seen from above.
 struct TopDownMap {
   Vec3d low{};                        ///< world corner of cell (0, 0)
   double metres_per_cell = 0.0;
+  double at = 0.5;  ///< where in a cell the surface was looked up, in cells from its corner: 0.5 at the
+                    ///< centre, or 0
   std::size_t columns = 0, rows = 0;  ///< along x and z
   std::vector<std::int32_t> islands;  ///< columns * row + column: island, or -1 where nothing is walkable
 
@@ -80,10 +117,13 @@ struct WalkPoint {
   double fraction = 0.0;
 };
 
+/// Points of a walk in order. Those of a usual step lie in the object: it allocates nothing.
+using WalkPoints = SmallVector<WalkPoint, 8>;
+
 /// A straight or sliding walk along the surface. Each leg between consecutive points lies within one
 /// polygon and follows its height to a centimetre. A walk that ends before fraction 1 was stopped.
 struct SurfaceWalk {
-  std::vector<WalkPoint> points;  ///< at least the start
+  WalkPoints points;              ///< at least the start
   double length = 0.0;            ///< metres walked, in three dimensions
   bool hit_wall = false;          ///< an edge of the mesh stopped or turned the walk
   Vec3d wall_normal{};  ///< ground-plane normal of the last wall met, pointing into the mesh
@@ -102,6 +142,9 @@ class NavMesh {
   /// core, at most 16); the mesh is the same, bit for bit, for any number of them.
   static Result<NavMesh> build(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
                                std::span<const Triangle> triangles, int threads = 0);
+  /// The same from a stage and the objects in it (gather_parts). Errors: as both.
+  static Result<NavMesh> build(const NavMeshSettings& settings, std::span<const NavMeshPart> parts,
+                               int threads = 0);
 
   NavMesh(NavMesh&&) noexcept;
   NavMesh& operator=(NavMesh&&) noexcept;
@@ -115,23 +158,32 @@ class NavMesh {
   double navigable_area() const noexcept;
   /// The surface as triangles, for drawing.
   std::vector<std::array<Vec3d, 3>> triangles() const;
+  /// The surface, or one island of it, as vertices and indices: world coordinates, each vertex once,
+  /// triangles island after island and counter-clockwise seen from above. Empty where there is no such
+  /// island.
+  NavMeshTriangles surface(std::optional<std::size_t> island = {}) const;
 
   // ---- islands: connected pieces of the surface, numbered by falling area
   std::size_t island_count() const noexcept;
-  /// Island of a polygon; island 0 is the largest.
+  /// Island of a polygon; island 0 is the largest. kNoIsland for kNoPoly and whatever is no polygon of
+  /// this mesh.
   std::size_t island_of(PolyId poly) const noexcept;
+  /// Square metres; 0 where there is no such island.
   double island_area(std::size_t island) const noexcept;
-  /// Greatest ground-plane distance of a vertex from the island's centroid of area, metres.
+  /// Greatest ground-plane distance of a vertex from the island's centroid of area, metres; 0 where
+  /// there is no such island.
   double island_radius(std::size_t island) const noexcept;
 
   // ---- points
-  /// Nearest point of the surface within the extents; none for NaN or infinite input. Each polygon offers its
-  /// point nearest on the ground plane; surface straight above or below p by no more than the agent's climb
-  /// counts as at p, and of several such the nearest in height is taken.
+  /// Nearest point of the surface, or of the island asked for, within the extents; none for NaN or
+  /// infinite input and where there is no such island. Each polygon offers its point nearest on the
+  /// ground plane; surface straight above or below p by no more than the agent's climb counts as at p,
+  /// and of several such the nearest in height is taken.
   std::optional<NavPoint> snap_point(const Vec3d& p, const SnapOptions& options = {}) const;
   /// True where p lies above or below the surface by at most `max_height_delta` metres.
   bool is_navigable(const Vec3d& p, double max_height_delta = 0.5) const;
-  /// Height of the surface on `poly` at the ground position of p.
+  /// Height of the surface on `poly` at the ground position of p, metres; NaN for kNoPoly and whatever
+  /// is no polygon of this mesh.
   double height_at(PolyId poly, const Vec3d& p) const noexcept;
   /// Uniform over the surface by area (alias table: constant time), from the caller's generator; `island`
   /// restricts it. No polygon where there is no such island.
@@ -150,9 +202,11 @@ class NavMesh {
   /// All edges within `radius` that can be reached on the surface within it, each with its nearest point; the
   /// normal there points to p, or into the mesh where p is on the edge.
   std::vector<ObstacleHit> obstacles_near(const NavPoint& p, double radius) const;
-  /// Which cells of a grid over the bounds are walkable within `max_height_delta` of `height` (world, metres).
-  /// Errors: invalid_argument for a cell that is not positive or a grid of more than 2^28 cells.
-  Result<TopDownMap> top_down_map(double height, double metres_per_cell, double max_height_delta = 0.5) const;
+  /// Which cells of a grid over the bounds are walkable within `max_height_delta` of `height` (world,
+  /// metres). Errors: invalid_argument for a cell that is not positive, a grid of more than 2^28 cells,
+  /// or, in Habitat's layout, a cell larger than the mesh.
+  Result<TopDownMap> top_down_map(double height, double metres_per_cell, double max_height_delta = 0.5,
+                                  TopDownLayout layout = TopDownLayout::centres) const;
 
   // ---- paths: the shortest on the surface, exactly (Polyanya, unfolded over slopes), so that distances
   // are symmetric and obey the triangle inequality. The surface is that of the height triangles; a polygon

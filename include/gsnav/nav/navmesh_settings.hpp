@@ -28,6 +28,8 @@ struct NavMeshSettings {
   bool filter_low_hanging_obstacles = true;
   bool filter_ledge_spans = true;
   bool filter_walkable_low_height_spans = true;
+  bool include_static_objects =
+      false;  ///< objects beside the stage are obstacles too (NavMeshPart::static_object)
   /// Side of the tiles that a mesh of triangles is built in, cells: 0 for a single one, as Habitat's is, else 16 to
   /// 16384. Tiles are built in parallel; what can be walked on is the same, its polygons are cut at the tiles' borders.
   int tile_size = 0;
@@ -36,8 +38,10 @@ struct NavMeshSettings {
   /// invalid_argument, naming the field, where a value is impossible.
   Status validate() const;
 
-  /// Equal in every field.
-  friend bool operator==(const NavMeshSettings&, const NavMeshSettings&) = default;
+  /// Equal as a NavMesh file holds them: numbers rounded to float32, so that settings that were saved
+  /// and loaded are equal to what they were. A file does not hold `tile_size` and `max_cells`, which
+  /// change how a mesh is cut and not what can be walked on: they are not compared.
+  friend bool operator==(const NavMeshSettings& a, const NavMeshSettings& b) noexcept;
 };
 
 }  // namespace gsnav

@@ -66,6 +66,12 @@ class CapsuleSet {
       }
     }
   }
+  /// Whether there is a group whose swept box meets `box`.
+  bool meets(const Aabb<double>& box) const {
+    bool any = false;
+    if (!empty()) groups_in(box, [&](const Group&) { any = true; });
+    return any;
+  }
   View<const DynamicCapsule> capsules_of(const Group& g) const noexcept {
     return {capsules_.data() + g.first, g.count};
   }

@@ -28,11 +28,12 @@ inline Capsule<double> agent_capsule(const Vec3d& base, double radius, double he
 /// Whose semantics a step has.
 enum class StepCompat : std::uint8_t {
   none,  ///< what step() promises
-  /// Habitat-GS's, for comparison, with what it misses: the walk on the NavMesh first, then its straight chord
-  /// tested against bodies frozen where the tick begins, at ten places at most, `max(0.05 m, radius / 2)` apart,
-  /// the first that touches narrowed by six halvings and 1e-4 of the chord kept. The solid is the segment from the
-  /// base to the height above it, inflated by the radius; a radius or height of zero meets nobody, a start in
-  /// overlap may be stuck, and the place reached is not put back onto the surface (`poly` is kNoPoly then).
+  /// Habitat-GS's, for comparison, with what it misses: the walk on the NavMesh first, then its straight
+  /// chord tested against bodies frozen where the tick begins, at ten places at most, `max(0.05 m,
+  /// radius / 2)` apart, the first that touches narrowed by six halvings and 1e-4 of the chord kept. The
+  /// solid is the segment from the base to the height above it, inflated by the radius; a radius or
+  /// height of zero meets nobody, a start in overlap may be stuck, and the place reached is not put back
+  /// onto the surface (`poly` is the nearest then).
   habitat_gs,
 };
 
@@ -53,7 +54,7 @@ enum class BlockedBy : std::uint8_t {
 /// What a step did. Times are fractions of the tick [0, 1].
 struct StepResult {
   Vec3d position{};        ///< where the agent stands at the end
-  PolyId poly = kNoPoly;   ///< for the next AgentState
+  PolyId poly = kNoPoly;   ///< for the next AgentState; kNoPoly only where blocked_by is invalid
   double fraction = 0.0;   ///< ground-plane distance walked / asked for, in [0, 1]; 1 for a zero step
   BlockedBy blocked_by = BlockedBy::none;
   bool hit_wall = false;
@@ -74,7 +75,7 @@ struct StepResult {
   std::uint32_t pushed_avatar = 0, pushed_bone = 0;
 
   /// The way taken; `fraction` here is the time in the tick. The agent stands still after the last.
-  std::vector<WalkPoint> path;
+  WalkPoints path;
 
   bool blocked() const noexcept { return blocked_by != BlockedBy::none; }
 };
@@ -83,9 +84,11 @@ struct StepResult {
 ///
 /// The surface is walked first; every leg of the walk is then swept against the bodies' motion during
 /// its own part of the tick (kernels/capsule.hpp), so that no step is too long and no body too fast. At
-/// contact the agent stops a skin away and, with `slide`, walks on along the body's tangent. From a start
-/// in overlap, motion that does not deepen it is free. The agent's own motion never takes it into a body.
-/// An avatar that walks into the agent is reported as `pushed_into`.
+/// contact the agent stops a skin away and, with `slide`, walks on along the body's tangent. In overlap,
+/// at the start or after a body has pushed into the agent, motion that does not deepen it is free: the
+/// agent stops where it would itself go deeper than the body has. The agent's own motion never takes it
+/// into a body. An avatar that walks into the agent is reported as `pushed_into`. A step of zero length
+/// looks for the surface below the agent, which stays where it is.
 StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& desired,
                 const CapsuleSet& bodies, const StepOptions& options = {});
 

@@ -62,7 +62,7 @@ requires is_host_backend<H> Status step_all(H& host, D& device, const NavMesh& m
   std::vector<std::size_t> first{0};
   for (std::size_t i = 0; i < batch.agents.size(); ++i) {
     const AgentState& a = batch.agents[i];
-    const std::vector<WalkPoint>& path = batch.results[i].path;
+    const WalkPoints& path = batch.results[i].path;
     for (std::size_t k = 1; k <= path.size(); ++k) {
       const WalkPoint &from = path[k - 1], &to = path[k < path.size() ? k : k - 1];
       legs.push_back({{agent_capsule(from.position, a.radius, a.height),

@@ -11,6 +11,7 @@
 #include "gsnav/scene/drop_bands.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/sh_rotation.hpp"
+#include "gsnav/scene/spatial_order.hpp"
 
 namespace gsnav {
 
@@ -43,7 +44,8 @@ inline void transform(GaussianCloud& cloud, const Similarity& by) {
   if (compact) compact_sh(cloud);
 }
 
-/// Keeps the rows for which `keep(i)` holds, in their order. What sort_spatially made is dropped: sort again.
+/// Keeps the rows for which `keep(i)` holds, in their order and with the order in which they were read.
+/// Chunk bounds are dropped: sort again.
 template <class Keep>
 void filter_rows(GaussianCloud& cloud, const Keep& keep) {
   std::vector<std::uint32_t> rows;
@@ -66,7 +68,12 @@ void filter_rows(GaussianCloud& cloud, const Keep& keep) {
   pick(cloud.shN, rest);
   pick(cloud.shN_half, rest);
   pick(cloud.origin_ids, 1);
-  cloud.row_ids.clear();
+  pick(cloud.row_ids, 1);
+  if (!cloud.row_ids.empty()) {  // places among those that are left
+    const std::vector<std::uint32_t> order = rows_as_read(cloud);
+    for (std::size_t i = 0; i < order.size(); ++i)
+      cloud.row_ids[order[i]] = static_cast<std::uint32_t>(i);
+  }
   cloud.chunk_bounds.clear();
   cloud.part_bounds.clear();
 }

@@ -45,7 +45,8 @@ struct LoadReport {
   SortOrder sort_order = SortOrder::z_depth;
   std::uint64_t memory = 0;               ///< bytes of the cloud's arrays
   Vec3d up{};                             ///< guessed, asset frame: one of +-y, +-z; zero of an empty cloud
-  bool up_seen = false;                   ///< by the cloud's shape (guess_up); false: only by what its kind of file does
+  bool up_seen = false;  ///< by the cloud's ground (guess_up); false: only by what its kind of file does
+  double up_confidence = 0;               ///< of a seen one, 0 to 1
   double sh_storage_error = 0;            ///< largest difference of a coefficient by keeping them as binary16
   bool compact = false;                   ///< SH is kept as binary16
   bool packed = false;                    ///< all is kept in fewer bits (PackedCloud), which changed:

@@ -128,6 +128,20 @@ inline void bound_chunks(GaussianCloud& cloud) {
   bound_chunks(backend, cloud);
 }
 
+/// The rows of a cloud in the order in which they were read, by which renderers break ties of depth and
+/// in which writers write: result[i] is the cloud's row that was read as the i-th of those that are
+/// left.
+inline std::vector<std::uint32_t> rows_as_read(const GaussianCloud& cloud) {
+  const std::size_t n = cloud.size();
+  std::vector<std::uint32_t> rows(n);
+  for (std::size_t i = 0; i < n; ++i) rows[i] = static_cast<std::uint32_t>(i);
+  if (cloud.row_ids.size() != n) return rows;
+  std::stable_sort(rows.begin(), rows.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return cloud.row_ids[a] < cloud.row_ids[b];
+  });
+  return rows;
+}
+
 /// Brings the rows into the order of Hilbert's curve through their means and bounds each chunk of them, so that a
 /// renderer touches what is near the view only, and neighbours lie together in memory. `row_ids` keeps each row's
 /// place, so that images stay the same, bit for bit. Large Gaussians go together behind the others: one

@@ -46,19 +46,23 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
       for (std::size_t k = 0; k < step; ++k) tail[k] = plane[i + (k < count ? k : count - 1)];
       return F::load(tail);
     };
-    Vec3<F> offset;
+    // origin - camera, of the lower and of the upper half of the lanes.
+    Vec3<D> offset[2];
     if (gs.origin_ids.empty()) {
-      const Vec3<float>& o = args.offsets_f[0];
-      offset = {F(o.x), F(o.y), F(o.z)};
+      const Vec3d& o = args.offsets[0];
+      offset[0] = offset[1] = {D(o.x), D(o.y), D(o.z)};
     } else {
-      float planes[3][step];
+      double planes[3][step];
       for (std::size_t k = 0; k < step; ++k) {
-        const Vec3<float>& o = args.offsets_f[gs.origin_ids[i + (k < count ? k : count - 1)]];
+        const Vec3d& o = args.offsets[gs.origin_ids[i + (k < count ? k : count - 1)]];
         planes[0][k] = o.x;
         planes[1][k] = o.y;
         planes[2][k] = o.z;
       }
-      offset = {F::load(planes[0]), F::load(planes[1]), F::load(planes[2])};
+      for (std::size_t h = 0; h < 2; ++h) {
+        const std::size_t at = h * step / 2;
+        offset[h] = {D::load(planes[0] + at), D::load(planes[1] + at), D::load(planes[2] + at)};
+      }
     }
     const auto codes = [&](int plane) noexcept {
       const std::uint16_t* from = gs.packed.codes.data + static_cast<std::size_t>(plane) * gs.size + i;
@@ -71,9 +75,13 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     const Vec3<F> mean = packed && gs.means[0].empty()
                              ? unpack_mean(*chunk, codes3(PackedRows::kMeans))
                              : Vec3<F>{load(gs.means[0]), load(gs.means[1]), load(gs.means[2])};
-    const F z = depth_key(camera.key_rotation, camera.key_scale, mean, offset);
+    const Vec3<D> delta64[2] = {
+        Vec3<D>{widened<0>(mean.x), widened<0>(mean.y), widened<0>(mean.z)} + offset[0],
+        Vec3<D>{widened<1>(mean.x), widened<1>(mean.y), widened<1>(mean.z)} + offset[1]};
+    const F z = rounded(depth_key(args.camera64, delta64[0]), depth_key(args.camera64, delta64[1]));
     if (!any(z > F(camera.near_plane))) continue;
-    const Vec3<F> delta = mean + offset;
+    const Vec3<F> delta = mean + Vec3<F>{rounded(offset[0].x, offset[1].x), rounded(offset[0].y, offset[1].y),
+                                         rounded(offset[0].z, offset[1].z)};
     SplatAxes<F> axes;
     if (packed) {
       axes = splat_axes(camera.rotation, delta, unpack_quat(codes3(PackedRows::kQuats)),
@@ -93,8 +101,10 @@ inline void project_chunk(const ProjectArgs<float>& args, std::size_t c) noexcep
     const Projected<F> splat = project<F, F>(camera, axes, z, opacity);
     const std::uint32_t bits = lane_bits(splat.visible) & wanted & ((1u << count) - 1u);
     if (bits == 0) continue;
-    const F key = camera.sort_order == SortOrder::z_depth ? z : distance_key(camera.key_scale, mean, offset);
-    written += write_splats(args, base, written, {i, mean, delta, key, axes, splat}, bits, survivors);
+    const F key = camera.sort_order == SortOrder::z_depth
+                      ? z
+                      : rounded(distance_key(args.camera64, delta64[0]), distance_key(args.camera64, delta64[1]));
+    written += write_splats(args, base, written, {i, delta, delta64, key, axes, splat}, bits, survivors);
   }
   if (args.color) {
     color_survivors(gs, gs.degree_of(begin, args.sh_degree), survivors, written, args.colors.data + base);

@@ -17,11 +17,14 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
+/// Half of the lanes, in double.
+using D = Pack<double, kWidth / 2>;
+
 /// kWidth projected Gaussians: lane l is row `first + l` of the set.
 struct ProjectedPack {
   std::size_t first;
-  const Vec3<F>& mean;   ///< as stored
-  const Vec3<F>& delta;  ///< mean - camera, asset frame
+  const Vec3<F>& delta;       ///< mean - camera, asset frame
+  const Vec3<D> (&delta64)[2];  ///< the same in double, of the lower and of the upper half of the lanes
   F key;
   const SplatAxes<F>& axes;
   const Projected<F>& splat;
@@ -35,35 +38,17 @@ struct References {
 };
 
 GSNAV_HD void find_references(const ProjectArgs<float>& args, const ProjectedPack& pack, References& out) noexcept {
-  constexpr int kHalf = kWidth / 2;
-  using D = Pack<double, kHalf>;
-  const GaussianView& gs = args.gaussians;
   const ProjectionCamera<double>& camera = args.camera64;
-  float mean[3][kWidth];
-  pack.mean.x.store(mean[0]);
-  pack.mean.y.store(mean[1]);
-  pack.mean.z.store(mean[2]);
-  for (int h = 0; h < kWidth; h += kHalf) {
-    const Vec3d& first = args.offsets[0];
-    Vec3<D> origin{D(first.x), D(first.y), D(first.z)};
-    if (!gs.origin_ids.empty()) {
-      double planes[3][kHalf];
-      for (int l = 0; l < kHalf; ++l) {
-        const std::size_t row = pack.first + static_cast<std::size_t>(h + l);
-        const Vec3d& o = args.offsets[gs.origin_ids[row < gs.size ? row : gs.size - 1]];
-        for (int k = 0; k < 3; ++k) planes[k][l] = o[k];
-      }
-      origin = {D::load(planes[0]), D::load(planes[1]), D::load(planes[2])};
-    }
+  for (int h = 0; h < 2; ++h) {
     D x, y;
-    const Vec3<D> delta = Vec3<D>{D::load(mean[0] + h), D::load(mean[1] + h), D::load(mean[2] + h)} + origin;
-    gsnav::detail::project_mean(camera, delta, x, y);
+    gsnav::detail::project_mean(camera, pack.delta64[h], x, y);
     const D ref_x = gsnav::detail::reference_pixel(x, camera.width);
     const D ref_y = gsnav::detail::reference_pixel(y, camera.height);
-    ref_x.store(out.x + h);
-    ref_y.store(out.y + h);
-    (ref_x - x).store(out.ox + h);
-    (ref_y - y).store(out.oy + h);
+    const int first = h * (kWidth / 2);
+    ref_x.store(out.x + first);
+    ref_y.store(out.y + first);
+    (ref_x - x).store(out.ox + first);
+    (ref_y - y).store(out.oy + first);
   }
 }
 

@@ -42,14 +42,11 @@ static __global__ void __launch_bounds__(kProjectThreads) project_kernel(const P
     if (i < end && (parts >> ((i - begin) / kChunkPart) & 1u) != 0 && seen.has(i - begin)) {
       origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
       mean = {gs.means[0][i], gs.means[1][i], gs.means[2][i]};
-      const float z = depth_key(args.camera.key_rotation, args.camera.key_scale, mean,
-                                args.offsets_f[origin]);
+      const float z = detail::depth_of(args, mean, origin);
       if (z > args.camera.near_plane) {
         axes = detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), i);
         p = project<float, float>(args.camera, axes, z, gs.opacities[i]);
-        key = args.camera.sort_order == SortOrder::z_depth
-                  ? z
-                  : distance_key(args.camera.key_scale, mean, args.offsets_f[origin]);
+        key = detail::sort_key(args, z, mean, origin);
         if (p.visible) {
           SplatBounds bounds;
           if (detail::needs_double(args.camera, p)) {

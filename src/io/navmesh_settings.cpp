@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+
+#include "file.hpp"
+#include "gsnav/core/replace_file.hpp"
+#include "gsnav/io/navmesh_settings_file.hpp"
+#include "json.hpp"
+
+namespace gsnav::io {
+namespace {
+
+using detail::Json;
+using detail::shown;
+
+struct NumberKey {
+  const char* key;
+  double NavMeshSettings::*value;
+};
+constexpr NumberKey kNumbers[] = {
+    {"cellSize", &NavMeshSettings::cell_size},
+    {"cellHeight", &NavMeshSettings::cell_height},
+    {"agentHeight", &NavMeshSettings::agent_height},
+    {"agentRadius", &NavMeshSettings::agent_radius},
+    {"agentMaxClimb", &NavMeshSettings::agent_max_climb},
+    {"agentMaxSlope", &NavMeshSettings::agent_max_slope},
+    {"regionMinSize", &NavMeshSettings::region_min_size},
+    {"regionMergeSize", &NavMeshSettings::region_merge_size},
+    {"edgeMaxLen", &NavMeshSettings::edge_max_len},
+    {"edgeMaxError", &NavMeshSettings::edge_max_error},
+    {"detailSampleDist", &NavMeshSettings::detail_sample_dist},
+    {"detailSampleMaxError", &NavMeshSettings::detail_sample_max_error},
+};
+struct FlagKey {
+  const char* key;
+  bool NavMeshSettings::*value;
+};
+constexpr FlagKey kFlags[] = {
+    {"filterLowHangingObstacles", &NavMeshSettings::filter_low_hanging_obstacles},
+    {"filterLedgeSpans", &NavMeshSettings::filter_ledge_spans},
+    {"filterWalkableLowHeightSpans", &NavMeshSettings::filter_walkable_low_height_spans},
+    {"includeStaticObjects", &NavMeshSettings::include_static_objects},
+};
+constexpr const char *kVertsPerPoly = "vertsPerPoly", *kTileSize = "tileSize", *kMaxCells = "maxCells";
+
+/// A whole number of [0, most], which Habitat writes as 6.0.
+Result<std::int64_t> whole(const Json& value, const std::string& what, double most) {
+  const double v = value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
+  if (v >= 0 && v <= most && v == std::floor(v)) return static_cast<std::int64_t>(v);
+  return {Errc::invalid_file, what + " is " + shown(value) + ", must be a whole number, 0 or more"};
+}
+
+Status read_setting(const std::string& key, const Json& value, const std::string& at,
+                    NavMeshSettings& s) {
+  const std::string what = at + ": '" + key + "'";
+  for (const NumberKey& n : kNumbers) {
+    if (key != n.key) continue;
+    if (!value.is_number())
+      return {Errc::invalid_file, what + " is " + shown(value) + ", must be a number"};
+    s.*n.value = value.get<double>();
+    return {};
+  }
+  for (const FlagKey& f : kFlags) {
+    if (key != f.key) continue;
+    if (!value.is_boolean())
+      return {Errc::invalid_file, what + " is " + shown(value) + ", must be true or false"};
+    s.*f.value = value.get<bool>();
+    return {};
+  }
+  constexpr double kInt = 1e9, kMost = 9e15;
+  const bool verts = key == kVertsPerPoly, tile = key == kTileSize;
+  if (!verts && !tile && key != kMaxCells) {
+    return {
+        Errc::invalid_file,
+        what +
+            " is no setting of a NavMesh; they are named as Habitat's are: cellSize, agentRadius, ..."};
+  }
+  const auto v = whole(value, what, verts || tile ? kInt : kMost);
+  if (!v) return v.status();
+  if (verts) {
+    s.verts_per_poly = static_cast<int>(*v);
+  } else if (tile) {
+    s.tile_size = static_cast<int>(*v);
+  } else {
+    s.max_cells = static_cast<std::size_t>(*v);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<NavMeshSettings> load_navmesh_settings(const std::filesystem::path& path) {
+  return detail::guarded(path.string(), [&]() -> Result<NavMeshSettings> {
+    const auto file = detail::read_file(path);
+    if (!file) return file.status();
+    const auto json = detail::parse_json(file->span(), path.string());
+    if (!json) return json.status();
+    if (!json->is_object())
+      return detail::invalid_file(path, "is " + shown(*json) + ", must be an object of settings");
+    NavMeshSettings s;
+    for (const auto& [key, value] : json->items()) {
+      if (Status status = read_setting(key, value, path.string(), s); !status) return status;
+    }
+    return s;
+  });
+}
+
+Status save_navmesh_settings(const NavMeshSettings& settings, const std::filesystem::path& path) {
+  return detail::guarded(path.string(), [&]() -> Status {
+    const NavMeshSettings usual;
+    nlohmann::ordered_json json;
+    for (const NumberKey& n : kNumbers) {
+      const double v = settings.*n.value;
+      if (!std::isfinite(v)) {
+        return {Errc::invalid_argument,
+                path.string() + ": '" + n.key + "' = " + std::to_string(v) + " is not finite"};
+      }
+      json[n.key] = v;
+    }
+    json[kVertsPerPoly] = static_cast<double>(settings.verts_per_poly);
+    for (const FlagKey& f : kFlags) json[f.key] = settings.*f.value;
+    if (settings.tile_size != usual.tile_size) json[kTileSize] = settings.tile_size;
+    if (settings.max_cells != usual.max_cells) json[kMaxCells] = settings.max_cells;
+    return replace_file(path, json.dump(4) + "\n");
+  });
+}
+
+}  // namespace gsnav::io

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "unfolded_mesh.hpp"
+
+namespace gsnav::detail {
+
+/// A point in the plane of a face with its distance to the goal, and the window of the face's edge that
+/// it sees the face through; no width where it lies in or on the face.
+struct FieldSource {
+  Flat root, right, left;
+  double g = 0;
+
+  /// Where the shortest way from the root through the window to p bends last: at the root or an end of
+  /// the window.
+  Flat last_bend(const Flat& p) const noexcept {
+    const Flat d = p - root;
+    const double r = cross(right - root, d), l = cross(left - root, d);
+    return r >= 0 && l <= 0 ? root : r < 0 ? right : left;
+  }
+  /// Length of that way, with the root's own.
+  double length_to(const Flat& p) const noexcept {
+    const Flat end = last_bend(p);
+    const bool bent = end.x != root.x || end.y != root.y;
+    return g + (bent ? length(end - root) : 0.0) + length(p - end);
+  }
+  /// The lesser of `best` and length_to(p).
+  double least(const Flat& p, double best) const noexcept {
+    const Flat d = p - root;
+    const double straight = g + length(d);
+    if (straight >= best) return best;
+    const double r = cross(right - root, d), l = cross(left - root, d);
+    if (r >= 0 && l <= 0) return straight;
+    const Flat end = r < 0 ? right : left;
+    return std::min(best, g + length(end - root) + length(p - end));
+  }
+};
+
+/// The grid that a face is cut into cells by, of so many sources.
+struct FieldGrid {
+  /// A face has about kCellsASource cells a source, none of them below kLeastSide metres, and at most
+  /// kMostAcross of them side by side.
+  static constexpr double kCellsASource = 2.0, kLeastSide = 0.2, kMostAcross = 64;
+
+  Flat low;
+  double columns_a_metre = 0, rows_a_metre = 0;
+  std::uint32_t columns = 1, rows = 1;
+
+  FieldGrid() = default;
+  FieldGrid(const UnfoldedMesh& mesh, std::uint32_t face, std::size_t sources);
+
+  std::size_t cell(const Flat& p) const noexcept {
+    const double x = std::clamp((p.x - low.x) * columns_a_metre, 0.0, static_cast<double>(columns - 1));
+    const double y = std::clamp((p.y - low.y) * rows_a_metre, 0.0, static_cast<double>(rows - 1));
+    return std::size_t{static_cast<std::uint32_t>(y)} * columns + static_cast<std::uint32_t>(x);
+  }
+};
+
+/// The cells of a face, each with the sources that can be least in it, in one piece of memory.
+///
+/// In the part of a cell that is in the face the length of a source's way is convex in its end, so that
+/// it is nowhere below its tangent at a point of that part. Where this tangent is no less than another's
+/// lengths at all corners of the part, it is so everywhere, because their difference is convex: the
+/// source is left out. With a relative error eps the tangent times 1 + eps is taken, and what is found
+/// is at most so much above the least. A source that all of the part is seen from, or that all ways to
+/// the part leave at one end of its window, is kept as a point.
+class FieldCells {
+ public:
+  /// At most so many sources in the cells for each of the face's own; where that is not enough, all
+  /// cells share them all.
+  static constexpr std::size_t kMostCopies = 16;
+  static constexpr std::size_t kMostSources = 0xffff;  ///< of a face
+
+  FieldCells(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
+             std::span<const FieldSource> sources, double relative_error);
+
+  /// Least length to a point of a cell; infinity where there are no sources.
+  double least(std::size_t cell, const Flat& p) const noexcept {
+    const std::uint64_t head = block_[cell];
+    const std::uint64_t* at = block_.get() + (head >> 32);
+    double best = std::numeric_limits<double>::infinity();
+    for (std::uint64_t n = head >> 16 & 0xffffu; n != 0; --n, at += 3) {
+      best = std::min(best, number(at[2]) + length(p - Flat{number(at[0]), number(at[1])}));
+    }
+    for (std::uint64_t n = head & 0xffffu; n != 0; --n, at += 7) {
+      const FieldSource s{{number(at[0]), number(at[1])},
+                          {number(at[2]), number(at[3])},
+                          {number(at[4]), number(at[5])},
+                          number(at[6])};
+      best = s.least(p, best);
+    }
+    return best;
+  }
+
+ private:
+  static double number(std::uint64_t bits) noexcept { return std::bit_cast<double>(bits); }
+
+  /// A head for each cell: where its numbers begin (32 bits), its points and its windows (16 each). Then
+  /// the numbers of points (at, g) and windows (root, right, left, g).
+  std::unique_ptr<std::uint64_t[]> block_;
+};
+
+}  // namespace gsnav::detail
