@@ -38,13 +38,15 @@ Result<std::vector<std::byte>> load_text(const fs::path& path, const ReadLimits&
   std::vector<std::byte> text;
   while (!gzip.at_end()) {
     const std::size_t before = text.size();
-    text.resize(std::min(std::max(2 * before, kLeastText), most + 1));
+    const std::size_t room = std::min(std::max(2 * before, kLeastText), most + 1);
+    text.reserve(room);  // resize() alone may take twice as much
+    text.resize(room);
     const std::size_t got = gzip.read(std::span(text).subspan(before));
     text.resize(before + got);
     if (text.size() > most) {
       return {Errc::unsupported, path.string() + ": its " + std::to_string(bytes.size()) +
                                      " bytes of gzip grow more than " + std::to_string(limits.inflation) +
-                                     " times; ReadLimits::inflation allows more for files that you trust"};
+                                     " times; raise ReadLimits::inflation for a file that you trust"};
     }
     if (text.size() > kMostText) return {Errc::unsupported, path.string() + ": more than 1 GiB of text"};
     if (got == 0) break;

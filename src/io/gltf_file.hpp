@@ -48,7 +48,7 @@ class GltfFile {
  public:
   /// Errors: file_not_found, invalid_file, unsupported (another version, a required extension that is
   /// not read), out_of_memory.
-  static Result<GltfFile> open(const std::filesystem::path& path, const ReadLimits& limits);
+  static Result<GltfFile> open(const std::filesystem::path& path, const ReadLimits& limits = {});
   /// The same for a GLB's or JSON's bytes, which must outlive it; `folder` has the other buffers.
   static Result<GltfFile> parse(const ByteSource& bytes, const std::string& source,
                                 const std::filesystem::path& folder, const ReadLimits& limits);

@@ -25,6 +25,21 @@ std::size_t too_deep_at(std::span<const std::byte> text, int most) {
   return text.size();
 }
 
+Result<Json> parse(std::span<const std::byte> text, const std::string& source, int depth, const char* advice) {
+  if (const std::size_t at = too_deep_at(text, depth); at < text.size()) {
+    return {Errc::unsupported, source + ": JSON nested more than " + std::to_string(depth) + " deep at byte " +
+                                   std::to_string(at) + advice};
+  }
+  const char* first = reinterpret_cast<const char*>(text.data());
+  try {
+    return Json::parse(first, first + text.size());
+  } catch (const Json::parse_error& e) {
+    return {Errc::invalid_file, source + ": not valid JSON at byte " + std::to_string(e.byte)};
+  } catch (const Json::exception&) {
+    return {Errc::invalid_file, source + ": JSON with a number out of range"};
+  }
+}
+
 }  // namespace
 
 Status check_limits(const ReadLimits& limits, const std::string& source) {
@@ -41,21 +56,13 @@ Status check_limits(const ReadLimits& limits, const std::string& source) {
   return {};
 }
 
+Result<Json> parse_json(std::span<const std::byte> text, const std::string& source) {
+  return parse(text, source, ReadLimits{}.json_depth, "");
+}
+
 Result<Json> parse_json(std::span<const std::byte> text, const std::string& source, const ReadLimits& limits) {
   if (Status s = check_limits(limits, source); !s) return s;
-  if (const std::size_t at = too_deep_at(text, limits.json_depth); at < text.size()) {
-    return {Errc::unsupported, source + ": JSON nested more than " + std::to_string(limits.json_depth) +
-                                   " deep at byte " + std::to_string(at) +
-                                   "; ReadLimits::json_depth allows more for files that you trust"};
-  }
-  const char* first = reinterpret_cast<const char*>(text.data());
-  try {
-    return Json::parse(first, first + text.size());
-  } catch (const Json::parse_error& e) {
-    return {Errc::invalid_file, source + ": not valid JSON at byte " + std::to_string(e.byte)};
-  } catch (const Json::exception&) {
-    return {Errc::invalid_file, source + ": JSON with a number out of range"};
-  }
+  return parse(text, source, limits.json_depth, "; raise ReadLimits::json_depth for a file that you trust");
 }
 
 std::string shown(const Json& value) {

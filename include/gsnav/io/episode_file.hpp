@@ -23,9 +23,9 @@ struct EpisodeFile {
 /// start_rotation (x, y, z, w in the file), goals (the first one's position and radius), info.geodesic_distance and,
 /// of files written here, info.start_time.
 ///
-/// Errors name the file, the episode and the key: file_not_found; invalid_file; unsupported (JSON nested deeper, or gzip
-/// that grows more, than `limits` allow; more than 1 GiB of text); invalid_argument (`limits`); out_of_memory. Never
-/// throws.
+/// Errors name the file, the episode and the key: file_not_found; invalid_file; unsupported (JSON nested
+/// deeper, or gzip that grows more, than `limits` allow; more than 1 GiB of text); invalid_argument
+/// (`limits`); out_of_memory. Never throws.
 Result<EpisodeFile> load_episodes(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Writes episodes so that Habitat-Lab reads them; gzip where the name ends in `.gz`. The same episodes give the same

@@ -20,7 +20,7 @@ struct LoadGltfOptions {
   /// Also read primitives that KHR_gaussian_splatting_compression_spz_2 compresses, a draft: the SPZ's
   /// axes are taken for the file's own. Untested on a real file.
   bool spz_compression = false;
-  ReadLimits limits{};
+  ReadLimits limits{};  ///< json_depth is looked at
 };
 
 /// Reads the Gaussians of a glTF 2.0 file, GLB or JSON, by KHR_gaussian_splatting (release candidate):

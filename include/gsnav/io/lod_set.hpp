@@ -23,8 +23,9 @@ struct LoadLodOptions {
 /// one, and the report's warnings say so. Rows come by file, as the set lists them.
 ///
 /// Errors: as load_sog; file_not_found (no level of a node is there); invalid_argument (a level that the
-/// set does not have, named with those it has); unsupported (a tree deeper than `limits` allow); invalid_file (files outside of the folder, rows that two
-/// nodes share or that end behind their file). Never throws.
+/// set does not have, named with those it has); unsupported (a tree deeper than `limits` allow);
+/// invalid_file (files outside of the folder, rows that two nodes share or that end behind their file).
+/// Never throws.
 Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLodOptions& options = {});
 
 /// A streamed set with its levels of detail, to be drawn by a LodCut.

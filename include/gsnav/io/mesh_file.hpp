@@ -30,7 +30,8 @@ Result<TriangleMesh> load_ply_mesh(const std::filesystem::path& path);
 /// Memory is bounded by 30 bytes for each byte of the file and its buffers.
 /// Errors: file_not_found; invalid_file (indices, offsets and sizes that do not fit each other or the
 /// bytes there are, no triangle primitive); unsupported (a required extension that is not read: compressed
-/// geometry, say); out_of_memory. Never throws.
+/// geometry, say; JSON nested deeper than `limits` allow); invalid_argument (`limits`); out_of_memory.
+/// Never throws.
 Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Reads the same triangles with what they look like: a part for each primitive of a mesh, standing wherever nodes show

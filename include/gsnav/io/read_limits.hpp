@@ -3,13 +3,20 @@
 
 namespace gsnav::io {
 
-/// How much work and memory a file may ask of the readers before they refuse it. The defaults are far above what
-/// ordinary files need; raise one where an error names it and you trust the file.
+/// Limits on the work and memory that a file may ask of a reader. A reader refuses a file that exceeds one
+/// with Errc::unsupported (a texture: with a warning) and names the field to raise. The defaults are far
+/// above what ordinary files need. A value out of its range is invalid_argument.
 struct ReadLimits {
-  int json_depth = 64;      ///< Arrays and objects inside each other in JSON text. Range [1, 10000].
-  int inflation = 200;      ///< Bytes of text that a byte of a gzip file may become (64 KiB are always read). Range
-                            ///< [1, 1032]; deflate cannot do more.
-  int texture_side = 8192;  ///< Pixels along each side of a texture of a mesh. Range [1, 65535].
+  /// Arrays and objects inside each other in JSON text. Range [1, 10000]. Readers of JSON that take no
+  /// ReadLimits (SOG, cameras, Habitat's configurations, NavMesh settings, avatar scenes) allow 64.
+  int json_depth = 64;
+  /// Bytes of text per byte of a gzip file; the first 64 KiB are always read. Range [1, 1032], which is the
+  /// most that deflate can do.
+  int inflation = 200;
+  /// Pixels along the longer side of a texture of a glTF file (PNG, JPEG, WebP), looked at before it is
+  /// decoded. Range [1, 65535]; of a JPEG never more than 16384. A larger one is left out, with a warning:
+  /// its material keeps its colour factor.
+  int texture_side = 8192;
 };
 
 }  // namespace gsnav::io

@@ -34,7 +34,7 @@ struct LoadSceneOptions {
   /// 15 / (4 pi).
   double most_sh_error = 2e-3;
   PackLimits pack{};  ///< of load_packed_scene
-  ReadLimits limits{};
+  ReadLimits limits{};  ///< json_depth, of glTF and lod-meta.json
 };
 
 /// A packed scene with the report of how it was read; `report.packing` has what packing changed.

@@ -32,7 +32,7 @@ struct LoadedSkinnedMesh {
 struct GltfOptions {
   std::size_t skin = 0;     ///< which of the file's skins
   double frame_rate = 0.0;  ///< keys a second of clips whose keys are not at equal times; 0: 60
-  ReadLimits limits{};
+  ReadLimits limits{};      ///< json_depth and texture_side
 };
 
 /// Reads the meshes of one skin of a glTF 2.0 file (`.gltf` with buffers in it or beside it, or `.glb`): positions,
@@ -61,7 +61,7 @@ struct MakeHumanOptions {
   std::string group = "body";                                     ///< faces of this group are the surface
   Vec3d color{0.80, 0.62, 0.52};                                  ///< of the surface, display-referred
   double scale = 0.1;                                             ///< metres a unit of the file
-  ReadLimits limits{};
+  ReadLimits limits{};                                            ///< json_depth, of skeleton and weights
 };
 
 /// Reads a MakeHuman base mesh (`.obj`) with its skeleton, weights and shape targets. The body is turned to face -Z
