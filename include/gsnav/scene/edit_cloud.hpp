@@ -80,7 +80,7 @@ inline void orthogonal_columns(Mat3d& a, Mat3d& rotation, Vec3d& lengths) {
     if (lengths[k] <= lengths[shortest]) shortest = k;
   }
   if (!(lengths[longest] > 0) || longest == shortest) {
-    rotation = {};  // a point: no axes; of three equal lengths above 0 the last is the shortest
+    rotation = Mat3d::identity();  // a point: no axes; of three equal lengths above 0 the last is the shortest
     return;
   }
   const int middle = 3 - longest - shortest;
