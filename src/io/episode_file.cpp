@@ -21,23 +21,33 @@ using detail::Json;
 using detail::member;
 using detail::shown;
 
+constexpr std::size_t kLeastText = std::size_t{1} << 16;
 constexpr std::size_t kMostText = std::size_t{1} << 30;  // a million episodes are half of it
 
 /// The text of a file, decompressed where it begins as gzip does.
-Result<std::vector<std::byte>> load_text(const fs::path& path) {
+Result<std::vector<std::byte>> load_text(const fs::path& path, const ReadLimits& limits) {
   const auto file = detail::read_file(path);
   if (!file) return file.status();
   const std::span<const std::byte> bytes = file->span();
   if (bytes.size() < 2 || bytes[0] != std::byte{0x1f} || bytes[1] != std::byte{0x8b}) {
     return std::vector<std::byte>(bytes.begin(), bytes.end());
   }
+  if (Status s = detail::check_limits(limits, path.string()); !s) return s;
+  const std::size_t most = std::max(kLeastText, static_cast<std::size_t>(limits.inflation) * bytes.size());
   detail::GzipReader gzip(bytes);
   std::vector<std::byte> text;
   while (!gzip.at_end()) {
     const std::size_t before = text.size();
-    text.resize(std::max<std::size_t>(2 * before, 65536));
+    const std::size_t room = std::min(std::max(2 * before, kLeastText), most + 1);
+    text.reserve(room);  // resize() alone may take twice as much
+    text.resize(room);
     const std::size_t got = gzip.read(std::span(text).subspan(before));
     text.resize(before + got);
+    if (text.size() > most) {
+      return {Errc::unsupported, path.string() + ": its " + std::to_string(bytes.size()) +
+                                     " bytes of gzip grow more than " + std::to_string(limits.inflation) +
+                                     " times; raise ReadLimits::inflation for a file that you trust"};
+    }
     if (text.size() > kMostText) return {Errc::unsupported, path.string() + ": more than 1 GiB of text"};
     if (got == 0) break;
   }
@@ -47,10 +57,12 @@ Result<std::vector<std::byte>> load_text(const fs::path& path) {
 
 class EpisodeReader {
  public:
+  explicit EpisodeReader(const ReadLimits& limits) : limits_(limits) {}
+
   Status read(const fs::path& path, bool follow) {
-    const auto text = load_text(path);
+    const auto text = load_text(path, limits_);
     if (!text) return text.status();
-    const auto json = detail::parse_json(*text, path.string());
+    const auto json = detail::parse_json(*text, path.string(), limits_);
     if (!json) return json.status();
     source_ = path.string();
     if (!json->is_object()) return {Errc::invalid_file, source_ + ": is " + shown(*json) + ", must be an object"};
@@ -156,6 +168,7 @@ class EpisodeReader {
     return {};
   }
 
+  ReadLimits limits_;
   std::string source_;
   EpisodeFile out_;
   std::set<std::string> unknown_;
@@ -164,9 +177,9 @@ class EpisodeReader {
 
 }  // namespace
 
-Result<EpisodeFile> load_episodes(const fs::path& path) {
+Result<EpisodeFile> load_episodes(const fs::path& path, const ReadLimits& limits) {
   return detail::guarded(path.string(), [&]() -> Result<EpisodeFile> {
-    EpisodeReader reader;
+    EpisodeReader reader(limits);
     if (Status s = reader.read(path, true); !s) return s;
     return reader.take();
   });

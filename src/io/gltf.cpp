@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -49,7 +50,10 @@ class SplatReader {
   Status read_mesh(const GltfInstance& instance, LoadedCloud& out) {
     const auto mesh = file_.item("meshes", instance.mesh);
     if (!mesh) return mesh.status();
-    const std::string where = file_.source() + ": node " + std::to_string(instance.node);
+    const Json& node = **file_.item("nodes", instance.node);
+    const Json* name = member(node, "name");
+    const std::string where = file_.source() + ": node " + std::to_string(instance.node) +
+                              (name != nullptr && name->is_string() ? " " + detail::shown(*name) : std::string());
     const Json* primitives = member(**mesh, "primitives");
     if (primitives == nullptr || !primitives->is_array()) {
       return {Errc::invalid_file, where + ": its mesh has no 'primitives'"};
@@ -59,19 +63,10 @@ class SplatReader {
       const Json* splats = extensions == nullptr ? nullptr : member(*extensions, kExtension);
       if (splats == nullptr) continue;
       ++primitives_;
-      Similarity world;
-      if (!detail::as_similarity(instance.world_from_mesh, world)) {
-        return {Errc::unsupported,
-                where +
-                    ": its transform scales unevenly or mirrors, which SH bands cannot follow; "
-                    "apply it in the program that wrote the file"};
-      }
       auto part = read_primitive(primitive, *splats, where);
       if (part) {
         part->cloud.sort_order = SortOrder::camera_distance;
-        // Half a turn about z.
-        if (!options_.keep_axes) world = Similarity{{0, 0, 0, 1}, {}, 1} * world;
-        move(*part, world);
+        if (Status s = move(*part, instance.world_from_mesh, where); !s) return s;
         if (primitives_ == 1) out.cloud.filter = part->cloud.filter;
       }
       if (Status s = detail::merge_loaded(out, std::move(part), where); !s) return s;
@@ -79,11 +74,23 @@ class SplatReader {
     return {};
   }
 
-  static void move(LoadedCloud& part, const Similarity& world) {
-    if (world.rotation.w == 1 && world.translation == Vec3d{} && world.scale == 1) return;
-    transform(part.cloud, world);
+  Status move(LoadedCloud& part, const Affine3<double>& world_from_mesh, const std::string& where) const {
+    const Similarity axes = options_.keep_axes ? Similarity{} : Similarity{{0, 0, 0, 1}, {}, 1};  // half a turn about z
+    Similarity world;
+    if (detail::as_similarity(world_from_mesh, world)) {
+      world = axes * world;
+      if (world.rotation.w == 1 && world.translation == Vec3d{} && world.scale == 1) return {};
+      transform(part.cloud, world);
+    } else {
+      const Affine3<double> turn{rotation_matrix(axes.rotation), {}};
+      if (Status s = transform(part.cloud, turn * world_from_mesh); !s) {
+        return {Errc::unsupported, where + ": its transform with those above it cannot be applied to Gaussians: " +
+                                       s.message() + "; give its 'scale' or 'matrix' three stretches above 0"};
+      }
+    }
     part.report.bounds = {};
     for (std::size_t i = 0; i < part.cloud.size(); ++i) part.report.bounds.add(part.cloud.mean(i));
+    return {};
   }
 
   Result<LoadedCloud> read_primitive(const Json& primitive, const Json& splats,
@@ -171,6 +178,7 @@ class SplatReader {
     }
     std::vector<const GltfValues*> planes = {&means, &quats, &scales, &opacities};
     for (const GltfValues& band : bands) planes.push_back(&band);
+    std::atomic<std::size_t> negative{0};
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
       std::vector<std::byte> room;
       std::vector<std::vector<double>> block(planes.size());
@@ -181,10 +189,17 @@ class SplatReader {
           if (!planes[p]->unpack(row, n, room, block[p].data())) return detail::reading_failed(where);
         }
         for (std::size_t i = 0; i < n; ++i) add(block, i, sink);
+        const double* const s = block[2].data();
+        for (std::size_t i = 0; i < n; ++i) negative += s[3 * i] < 0 || s[3 * i + 1] < 0 || s[3 * i + 2] < 0 ? 1 : 0;
       }
       return {};
     };
-    return detail::fill_cloud(count_, degree, where, decode);
+    auto out = detail::fill_cloud(count_, degree, where, decode);
+    if (out && negative != 0) {
+      out->report.warnings.push_back(where + ": SCALE of " + std::to_string(negative) +
+                                     " Gaussians is negative; an ellipsoid has no such side, so the sign is left out");
+    }
+    return out;
   }
 
   /// Row i of blocks of means, quaternions (x y z w), scales, opacities and the SH coefficients.
@@ -196,7 +211,7 @@ class SplatReader {
     for (std::size_t k = 0; k < 3; ++k) {
       const int axis = static_cast<int>(k);
       raw.mean[axis] = block[0][3 * i + k];
-      raw.log_scales[axis] = std::log(block[2][3 * i + k]);
+      raw.log_scales[axis] = std::log(std::fabs(block[2][3 * i + k]));
       raw.sh0[k] = static_cast<float>(block[4][3 * i + k]);
       for (std::size_t b = 5; b < block.size(); ++b) {
         rest[3 * (b - 5) + k] = static_cast<float>(block[b][3 * i + k]);
@@ -218,7 +233,7 @@ class SplatReader {
 
 Result<LoadedCloud> load_gltf(const std::filesystem::path& path, const LoadGltfOptions& options) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {
-    const auto file = GltfFile::open(path);
+    const auto file = GltfFile::open(path, options.limits);
     if (!file) return file.status();
     return detail::described(SplatReader(*file, options).run(),
                              options.keep_axes ? Vec3d{0, 1, 0} : Vec3d{0, -1, 0});
@@ -228,7 +243,7 @@ Result<LoadedCloud> load_gltf(const std::filesystem::path& path, const LoadGltfO
 Result<LoadedCloud> parse_gltf(std::span<const std::byte> bytes, std::string source,
                                const LoadGltfOptions& options) {
   return detail::guarded(source, [&]() -> Result<LoadedCloud> {
-    const auto file = GltfFile::parse(bytes, source, {});
+    const auto file = GltfFile::parse(bytes, source, {}, options.limits);
     if (!file) return file.status();
     return detail::described(SplatReader(*file, options).run(),
                              options.keep_axes ? Vec3d{0, 1, 0} : Vec3d{0, -1, 0});

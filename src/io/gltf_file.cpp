@@ -79,17 +79,18 @@ Result<std::size_t> get_index(const Json& object, const char* key, std::size_t a
   return static_cast<std::size_t>(*index);
 }
 
-Result<GltfFile> GltfFile::open(const std::filesystem::path& path) {
+Result<GltfFile> GltfFile::open(const std::filesystem::path& path, const ReadLimits& limits) {
   auto file = std::make_unique<RandomFile>();
   if (Status s = file->open(path); !s) return s;
-  auto out = parse(*file, path.string(), path.parent_path());
+  auto out = parse(*file, path.string(), path.parent_path(), limits);
   if (out) out->files_.push_back(std::move(file));
   return out;
 }
 
 Result<GltfFile> GltfFile::parse(const ByteSource& bytes, const std::string& source,
-                                 const std::filesystem::path& folder) {
+                                 const std::filesystem::path& folder, const ReadLimits& limits) {
   GltfFile out;
+  out.limits_ = limits;
   out.source_ = source;
   out.folder_ = folder;
   out.size_ = static_cast<std::size_t>(bytes.size());
@@ -135,7 +136,7 @@ Status GltfFile::read_chunks(const ByteSource& bytes, ByteSource& binary) {
   const auto size = static_cast<std::size_t>(text.size());
   const std::byte* characters = text.get(0, size, room);
   if (characters == nullptr && size != 0) return reading_failed(source_);
-  auto json = parse_json({characters, size}, source_);
+  auto json = parse_json({characters, size}, source_, limits_);
   if (!json) return json.status();
   json_ = std::move(*json);
   return {};

@@ -48,13 +48,14 @@ class GltfFile {
  public:
   /// Errors: file_not_found, invalid_file, unsupported (another version, a required extension that is
   /// not read), out_of_memory.
-  static Result<GltfFile> open(const std::filesystem::path& path);
+  static Result<GltfFile> open(const std::filesystem::path& path, const ReadLimits& limits = {});
   /// The same for a GLB's or JSON's bytes, which must outlive it; `folder` has the other buffers.
   static Result<GltfFile> parse(const ByteSource& bytes, const std::string& source,
-                                const std::filesystem::path& folder);
+                                const std::filesystem::path& folder, const ReadLimits& limits);
 
   const Json& json() const noexcept { return json_; }
   const std::string& source() const noexcept { return source_; }
+  const ReadLimits& limits() const noexcept { return limits_; }
   /// Bytes of the file and its buffers: what an importer may multiply by a constant.
   std::size_t size() const noexcept { return size_; }
 
@@ -92,6 +93,7 @@ class GltfFile {
   Status locate(const Json& part, const std::string& where, GltfValues& values) const;
   Status apply_sparse(const Json& sparse, const std::string& where, GltfValues& values) const;
 
+  ReadLimits limits_;
   std::filesystem::path folder_;
   std::string source_;
   Json json_;

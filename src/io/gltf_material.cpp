@@ -155,6 +155,7 @@ Result<TextureImage> GltfMaterials::decode(std::size_t index) const {
   const auto image = file_.item("images", index);
   if (!image) return image.status();
   const std::string at = file_.where("images", index);
+  const int most_side = file_.limits().texture_side;
   std::vector<std::byte> own;
   std::span<const std::byte> bytes;
   if (const Json* uri = member(**image, "uri"); uri != nullptr && uri->is_string()) {
@@ -170,6 +171,11 @@ Result<TextureImage> GltfMaterials::decode(std::size_t index) const {
     bytes = *b;
   }
   if (begins(bytes, {'R', 'I', 'F', 'F'})) {
+    const auto size = webp_size(bytes, at, WebpUse::picture);
+    if (!size) return size.status();
+    if (std::max(size->width, size->height) > static_cast<std::size_t>(most_side)) {
+      return too_large(at, size->width, size->height, most_side);
+    }
     auto decoded = decode_webp(bytes, at, WebpUse::picture);
     if (!decoded) return decoded.status();
     return TextureImage{decoded->width, decoded->height, std::move(decoded->pixels)};
@@ -177,7 +183,7 @@ Result<TextureImage> GltfMaterials::decode(std::size_t index) const {
   const bool png = begins(bytes, {0x89, 'P', 'N', 'G'});
   if (!png && !begins(bytes, {0xff, 0xd8}))
     return {Errc::unsupported, at + ": neither PNG, JPEG nor WebP"};
-  const auto decoded = png ? decode_png(bytes, at) : decode_jpeg(bytes, at);
+  const auto decoded = png ? decode_png(bytes, at, most_side) : decode_jpeg(bytes, at, most_side);
   if (!decoded) return decoded.status();
   return picture_of(*decoded);
 }

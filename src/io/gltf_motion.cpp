@@ -110,9 +110,9 @@ Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& ani
   return out;
 }
 
-/// Begin, rate and number of keys: the keys' own where they lie at equal times, else `rate`'s.
+/// Rate and number of keys from time 0 on: the keys' own where they lie at equal times, else `rate`'s.
 struct Grid {
-  double begin = 0.0, rate = 60.0;
+  double first = 0.0, rate = 60.0;  // first: the time of the first key
   std::size_t keys = 1;
 };
 
@@ -125,8 +125,9 @@ Grid grid_of(const std::vector<Channel>& channels, double rate) {
   }
   Grid out;
   if (times.empty()) return out;
-  out.begin = *times.begin();
-  const double length = *times.rbegin() - out.begin;
+  out.first = *times.begin();
+  times.insert(0.0);
+  const double length = *times.rbegin();
   if (!(length > 0)) return out;
   // The least step; sets hold times that differ by a rounding too.
   double step = length;
@@ -136,7 +137,7 @@ Grid grid_of(const std::vector<Channel>& channels, double rate) {
   const double count = std::round(length / step);
   step = length / count;
   uniform = uniform && rate <= 0 && step >= 1.0 / 480;
-  for (const double t : times) uniform = uniform && std::fabs(std::remainder(t - out.begin, step)) < 2e-4;
+  for (const double t : times) uniform = uniform && std::fabs(std::remainder(t, step)) < 2e-4;
   out.rate = uniform ? 1.0 / step : rate > 0 ? rate : 60.0;
   out.keys = static_cast<std::size_t>(std::min(std::round(length * out.rate), 1e9)) + 1;
   return out;
@@ -145,7 +146,7 @@ Grid grid_of(const std::vector<Channel>& channels, double rate) {
 }  // namespace
 
 Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& nodes, double frame_rate,
-                  PoseObserver& observer, LoadedSkinnedMesh& out) {
+                  PoseObserver& observer, std::vector<NamedClip>& out, std::vector<std::string>& warnings) {
   for (std::size_t i = 0; i < file.count("animations"); ++i) {
     const auto animation = file.item("animations", i);
     if (!animation) return animation.status();
@@ -165,7 +166,7 @@ Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& n
     }
     std::vector<Affine3<double>> matrices;
     for (std::size_t k = 0; k < grid.keys; ++k) {
-      const double time = grid.begin + static_cast<double>(k) / grid.rate;
+      const double time = static_cast<double>(k) / grid.rate;
       for (const Channel& c : *channels) {
         GltfNode& node = posed.nodes[c.node];
         const std::array<double, 4> v = sample(c, time);
@@ -178,12 +179,17 @@ Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& n
       const auto rigid = rigid_joints(skin, globals);
       matrices.insert(matrices.end(), rigid.begin(), rigid.end());
     }
-    const Json* name = member(**animation, "name");
+    const Json* title = member(**animation, "name");
+    const std::string name =
+        title != nullptr && title->is_string() ? title->get<std::string>() : "clip" + std::to_string(i);
+    if (grid.first > 1e-6) {
+      warnings.push_back("clip \"" + name + "\": its first key is at " + std::to_string(grid.first) +
+                         " s and holds from 0 s on");
+    }
     auto clip = clip_from_matrices(skin.skeleton, grid.rate, matrices, false);
     if (!clip) return {Errc::invalid_file, at + ": " + clip.message()};
     clip->wrap_time = smooth_wrap_time(skin.skeleton, *clip);
-    out.clips.push_back({name != nullptr && name->is_string() ? name->get<std::string>() : "clip" + std::to_string(i),
-                         std::move(*clip)});
+    out.push_back({name, std::move(*clip)});
   }
   return {};
 }

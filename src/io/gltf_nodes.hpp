@@ -30,8 +30,9 @@ struct GltfNodes {
   std::vector<std::vector<std::size_t>> children;
   std::vector<std::size_t> order;  ///< parents before their children
   std::vector<std::string> names;
+  double unit = 1.0;  ///< metres a unit of the file
 
-  /// Node to scene for each node.
+  /// Node to scene, whose unit is the metre, for each node.
   std::vector<Affine3<double>> globals() const;
 };
 

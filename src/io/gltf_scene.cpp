@@ -207,9 +207,9 @@ class SceneReader {
 
 }  // namespace
 
-Result<TexturedScene> load_gltf_scene(const std::filesystem::path& path) {
+Result<TexturedScene> load_gltf_scene(const std::filesystem::path& path, const ReadLimits& limits) {
   return detail::guarded(path.string(), [&]() -> Result<TexturedScene> {
-    const auto file = GltfFile::open(path);
+    const auto file = GltfFile::open(path, limits);
     if (!file) return file.status();
     return SceneReader(*file).run();
   });

@@ -21,12 +21,16 @@ class SurfaceReader {
         mesh_(out.mesh),
         materials_(file, out.mesh.textures, out.report.warnings) {}
 
-  Status run(std::size_t skin) {
+  Status run() {
     for (std::size_t n = 0; n < file_.count("nodes"); ++n) {
       const Json& node = **file_.item("nodes", n);
       const Json *which = member(node, "skin"), *mesh = member(node, "mesh");
       if (mesh == nullptr) continue;
-      if (which == nullptr || !which->is_number() || which->get<double>() != static_cast<double>(skin)) {
+      part_ = nullptr;
+      for (const GltfSkinPart& p : skin_.parts) {
+        if (which != nullptr && which->is_number() && which->get<double>() == static_cast<double>(p.index)) part_ = &p;
+      }
+      if (part_ == nullptr) {
         ++others_;
         continue;
       }
@@ -35,7 +39,8 @@ class SurfaceReader {
       if (Status s = read_mesh(*m); !s) return s;
     }
     if (mesh_.triangles.empty()) {
-      return {Errc::invalid_file, file_.source() + ": no triangles are moved by skins[" + std::to_string(skin) + "]"};
+      return {Errc::invalid_file,
+              file_.source() + ": no triangles are moved by skins[" + std::to_string(skin_.parts[0].index) + "]"};
     }
     finish();
     return {};
@@ -74,7 +79,7 @@ class SurfaceReader {
     const std::size_t first = mesh_.positions.size();
     for (std::size_t v = 0; v < vertices_; ++v) {
       const double* p = positions->row(v);
-      mesh_.positions.push_back(skin_.canonical_from_mesh * Vec3d{p[0], p[1], p[2]});
+      mesh_.positions.push_back(skin_.canonical_from_mesh * (part_->rig_from_mesh * Vec3d{p[0], p[1], p[2]}));
     }
     if (Status s = read_weights(primitive, at); !s) return s;
     GltfMaterial material;
@@ -138,11 +143,11 @@ class SurfaceReader {
           if (!(w >= 0))
             return {Errc::invalid_file, at + ": vertex " + std::to_string(v) + " has weight " + std::to_string(w)};
           if (!(w > 0)) continue;
-          if (!(j >= 0 && j < static_cast<double>(skin_.joint_of.size())) || j != std::floor(j)) {
+          if (!(j >= 0 && j < static_cast<double>(part_->joint_of.size())) || j != std::floor(j)) {
             return {Errc::invalid_file, at + ": vertex " + std::to_string(v) + " names joint " + std::to_string(j) +
-                                            " of " + std::to_string(skin_.joint_of.size())};
+                                            " of " + std::to_string(part_->joint_of.size())};
           }
-          row.emplace_back(skin_.joint_of[static_cast<std::size_t>(j)], w);
+          row.emplace_back(part_->joint_of[static_cast<std::size_t>(j)], w);
           sum += w;
         }
       }
@@ -170,11 +175,13 @@ class SurfaceReader {
     SkinnedMeshReport& report = out_.report;
     report.vertices = mesh_.positions.size();
     report.triangles = mesh_.triangles.size();
+    report.skins = skin_.parts.size();
+    report.skins_in_file = file_.count("skins");
     if (report.unequal_weights != 0) {
       warn("the weights of " + std::to_string(report.unequal_weights) +
            " vertices do not sum to 1; they were divided by their sums");
     }
-    if (others_ != 0) warn(std::to_string(others_) + " meshes are not moved by this skin and are left out");
+    if (others_ != 0) warn(std::to_string(others_) + " meshes are moved by no skin that is read and are left out");
   }
 
   const GltfFile& file_;
@@ -182,6 +189,7 @@ class SurfaceReader {
   LoadedSkinnedMesh& out_;
   SkinnedMesh& mesh_;
   GltfMaterials materials_;
+  const GltfSkinPart* part_ = nullptr;  // of the mesh that is read
   std::size_t vertices_ = 0, others_ = 0;
   bool has_uvs_ = false, has_colors_ = false;
   std::vector<std::array<double, 2>> uvs_;
@@ -191,8 +199,8 @@ class SurfaceReader {
 
 }  // namespace
 
-Status read_surface(const GltfFile& file, const GltfSkin& skin, std::size_t index, LoadedSkinnedMesh& out) {
-  return SurfaceReader(file, skin, out).run(index);
+Status read_surface(const GltfFile& file, const GltfSkin& skin, LoadedSkinnedMesh& out) {
+  return SurfaceReader(file, skin, out).run();
 }
 
 }  // namespace gsnav::io::detail

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "picture.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <vector>
 
@@ -16,7 +17,7 @@
 namespace gsnav::io::detail {
 namespace {
 
-constexpr unsigned kLargestSide = 16384;
+constexpr unsigned kLargestSide = static_cast<unsigned>(kMostJpegSide);
 // Each scan of a progressive picture goes over all of its blocks; encoders write about ten.
 constexpr int kMostScans = 100;
 
@@ -139,9 +140,12 @@ Result<std::vector<std::byte>> compress_jpeg(std::span<const std::uint8_t> rgb, 
 
 }  // namespace
 
-Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
+Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string& name, int most_side) {
   JpegDecoder decoder;
   if (!decoder.read_header(bytes)) return {Errc::invalid_file, name + ": not a JPEG, or its header is damaged"};
+  if (std::max(decoder.width(), decoder.height()) > static_cast<std::size_t>(most_side)) {
+    return too_large(name, decoder.width(), decoder.height(), most_side);
+  }
   // An 8 x 8 block of three planes takes a bit of the file each at least.
   if (decoder.width() * decoder.height() / 512 > bytes.size()) {
     return {Errc::invalid_file, name + ": " + std::to_string(decoder.width()) + " x " +
@@ -176,7 +180,7 @@ Result<std::vector<std::byte>> compress_jpeg(std::span<const std::uint8_t>, int,
 
 }  // namespace
 
-Result<PngImage> decode_jpeg(std::span<const std::byte>, const std::string& name) {
+Result<PngImage> decode_jpeg(std::span<const std::byte>, const std::string& name, int) {
   return {Errc::unsupported, name + ": this build reads no JPEG (libjpeg was not found)"};
 }
 

@@ -22,10 +22,10 @@ using detail::member;
 using detail::shown;
 using detail::TextLines;
 
-Result<Json> read_json(const fs::path& path) {
+Result<Json> read_json(const fs::path& path, const ReadLimits& limits) {
   const auto file = detail::read_file(path);
   if (!file) return file.status();
-  return detail::parse_json(file->span(), path.string());
+  return detail::parse_json(file->span(), path.string(), limits);
 }
 
 std::string_view text_of(const detail::FileBytes& f) { return {reinterpret_cast<const char*>(f.data.get()), f.size}; }
@@ -244,7 +244,7 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
   LoadedSkinnedMesh out;
   SkinnedMesh& mesh = out.mesh;
   mesh.name = path.stem().string();
-  const auto bones = read_json(options.skeleton);
+  const auto bones = read_json(options.skeleton, options.limits);
   if (!bones) return bones.status();
   const std::string source = options.skeleton.string();
   if (Status s = read_skeleton(*bones, source, *base, mesh.skeleton); !s) return {Errc::invalid_file, s.message()};
@@ -255,7 +255,7 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
       return {Errc::invalid_file, source + ": no 'weights_file', and MakeHumanOptions.weights is empty"};
     weights_path = options.skeleton.parent_path() / fs::path(name->get<std::string>()).filename();
   }
-  const auto weights = read_json(weights_path);
+  const auto weights = read_json(weights_path, options.limits);
   if (!weights) return weights.status();
   const std::string weights_source = weights_path.string();
   WeightReader reader(weights_source, base->vertices.size(), mesh.skeleton);

@@ -115,18 +115,18 @@ bool is_gltf(const std::string& extension) { return extension == ".glb" || exten
 
 }  // namespace
 
-Result<TriangleMesh> load_mesh(const std::filesystem::path& path) {
+Result<TriangleMesh> load_mesh(const std::filesystem::path& path, const ReadLimits& limits) {
   const std::string extension = extension_of(path);
   if (extension == ".obj") return load_obj(path);
   if (extension == ".ply") return load_ply_mesh(path);
-  if (is_gltf(extension)) return load_gltf_mesh(path);
+  if (is_gltf(extension)) return load_gltf_mesh(path, limits);
   return {Errc::unsupported,
           path.string() + ": not a mesh that is read here: .obj, .ply, .glb or .gltf"};
 }
 
-Result<TexturedScene> load_textured_scene(const std::filesystem::path& path) {
-  if (is_gltf(extension_of(path))) return load_gltf_scene(path);
-  auto mesh = load_mesh(path);
+Result<TexturedScene> load_textured_scene(const std::filesystem::path& path, const ReadLimits& limits) {
+  if (is_gltf(extension_of(path))) return load_gltf_scene(path, limits);
+  auto mesh = load_mesh(path, limits);
   if (!mesh) return mesh.status();
   TexturedScene out;
   out.parts.emplace_back().geometry = std::move(*mesh);

@@ -73,9 +73,9 @@ class MeshReader {
 
 }  // namespace
 
-Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path) {
+Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path, const ReadLimits& limits) {
   return detail::guarded(path.string(), [&]() -> Result<TriangleMesh> {
-    const auto file = GltfFile::open(path);
+    const auto file = GltfFile::open(path, limits);
     if (!file) return file.status();
     return MeshReader(*file).run();
   });

@@ -13,7 +13,6 @@
 namespace gsnav::io {
 namespace {
 
-constexpr int kLargestSide = 65535;
 constexpr std::uint64_t kDeflateRatio = 1032;  // no deflate stream grows more than this
 
 // libpng leaves by longjmp, so what it may leave holds no object with a destructor.
@@ -50,7 +49,7 @@ bool encode(OutputFile& file, png_const_bytep pixels, int width, int height, int
 
 Status save(const std::filesystem::path& path, const void* pixels, std::size_t samples, int width,
             int height, int bits, int channels) {
-  if (width <= 0 || height <= 0 || width > kLargestSide || height > kLargestSide ||
+  if (width <= 0 || height <= 0 || width > detail::kMostPngSide || height > detail::kMostPngSide ||
       samples != static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
                      static_cast<std::size_t>(channels)) {
     return {Errc::invalid_argument, path.string() + ": " + std::to_string(samples) + " samples are no " +
@@ -89,7 +88,7 @@ class Decoder {
     png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, on_error, on_warning);
     info_ = png_ != nullptr ? png_create_info_struct(png_) : nullptr;
     if (info_ == nullptr || setjmp(png_jmpbuf(png_)) != 0) return false;
-    png_set_user_limits(png_, kLargestSide, kLargestSide);
+    png_set_user_limits(png_, detail::kMostPngSide, detail::kMostPngSide);
     png_set_read_fn(png_, &source_, read_bytes);
     png_read_info(png_, info_);
     png_set_expand(png_);
@@ -119,10 +118,13 @@ class Decoder {
 
 }  // namespace
 
-Result<PngImage> detail::decode_png(std::span<const std::byte> bytes, const std::string& name) {
+Result<PngImage> detail::decode_png(std::span<const std::byte> bytes, const std::string& name, int most_side) {
   Decoder decoder;
   if (!decoder.read_header(bytes))
     return {Errc::invalid_file, name + ": not a PNG, or its header is damaged"};
+  if (std::max(decoder.width(), decoder.height()) > static_cast<std::size_t>(most_side)) {
+    return too_large(name, decoder.width(), decoder.height(), most_side);
+  }
   const std::size_t size = decoder.stride() * decoder.height();
   // Expanding 1-bit palettes makes at most 32 bits of one.
   if (size / 32 > kDeflateRatio * bytes.size()) {

@@ -64,9 +64,10 @@ Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& optio
                              detail::BandsApart* apart = nullptr) {
   std::error_code ignored;
   const std::string name = path.string();
+  const LoadLodOptions lod{.level = options.level, .limits = options.limits};
   if (fs::is_directory(path, ignored)) {
     if (fs::exists(path / "meta.json", ignored)) return load_sog(path);
-    if (fs::exists(path / "lod-meta.json", ignored)) return load_lod_set(path, {.level = options.level});
+    if (fs::exists(path / "lod-meta.json", ignored)) return load_lod_set(path, lod);
     return {Errc::file_not_found, name + ": the folder has no meta.json and no lod-meta.json"};
   }
   const std::string extension = lower_case(path.extension().string());
@@ -76,9 +77,9 @@ Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& optio
   if (extension == ".splat") return load_splat(path);
   if (extension == ".ksplat") return load_ksplat(path);
   if (extension == ".spz") return load_spz(path);
-  if (extension == ".glb" || extension == ".gltf") return load_gltf(path);
+  if (extension == ".glb" || extension == ".gltf") return load_gltf(path, {.limits = options.limits});
   if (path.filename() == "meta.json") return load_sog(path);
-  if (path.filename() == "lod-meta.json") return load_lod_set(path, {.level = options.level});
+  if (path.filename() == "lod-meta.json") return load_lod_set(path, lod);
   if (!fs::exists(path, ignored))
     return {Errc::file_not_found, name + ": no such file or folder; supported: " + kSupported};
   return {Errc::unsupported, name + ": not a scene that is read here; supported: " + kSupported};

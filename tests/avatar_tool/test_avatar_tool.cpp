@@ -2,6 +2,7 @@
 // The program as people run it.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
+#include "io/gltf_builder.hpp"
 #include "support/command.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"
@@ -183,4 +185,96 @@ TEST_CASE("avatar tool: from a rigged file to an avatar and its driver") {
   CHECK(driver->capsules[0].size() == avatar->asset.capsules.size());
   CHECK(run(folder, common + " --clip Dance").says("there are: Walk, Poses, A-pose"));
   CHECK(run(folder, common + " --influences 5").says("5"));
+}
+
+namespace {
+
+/// A column of 180 x 30 x 30 units that bends at the middle, in three parts of a skin each on one pair of joints, and
+/// a clip whose first key is at 0.5 s.
+gsnav_test::TestGltf column() {
+  using gsnav_test::json;
+  gsnav_test::TestGltf g;
+  const std::size_t binds = g.add(std::vector<float>{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0,   0, 1,
+                                                     1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -90, 0, 1},
+                                  "MAT4", 5126);
+  const char* const names[] = {"legs", "trunk", "head"};
+  for (int part = 0; part < 3; ++part) {
+    std::vector<float> positions, weights;
+    std::vector<std::uint8_t> joints;
+    std::vector<std::uint16_t> triangles;
+    for (int ring = 0; ring < 2; ++ring) {
+      const float y = static_cast<float>(60 * (part + ring));
+      for (int k = 0; k < 4; ++k) {
+        positions.insert(positions.end(), {k == 1 || k == 2 ? 15.0f : -15.0f, y, k >= 2 ? 15.0f : -15.0f});
+        weights.insert(weights.end(), {1 - y / 180, y / 180, 0, 0});
+        joints.insert(joints.end(), {0, 1, 0, 0});
+      }
+    }
+    for (std::uint16_t k = 0; k < 4; ++k) {
+      const auto n = static_cast<std::uint16_t>((k + 1) % 4), up = static_cast<std::uint16_t>(k + 4),
+                 next = static_cast<std::uint16_t>(n + 4);
+      triangles.insert(triangles.end(), {k, up, n, n, up, next});
+    }
+    const json attributes = {{"POSITION", g.add(positions, "VEC3", 5126)},
+                             {"JOINTS_0", g.add(joints, "VEC4", 5121)},
+                             {"WEIGHTS_0", g.add(weights, "VEC4", 5126)}};
+    g.doc["meshes"].push_back(
+        {{"primitives", json::array({{{"attributes", attributes}, {"indices", g.add(triangles, "SCALAR", 5123)}}})}});
+    g.doc["skins"].push_back({{"name", names[part]}, {"joints", {0, 1}}, {"inverseBindMatrices", binds}});
+  }
+  g.doc["nodes"] = json::array({{{"name", "foot"}, {"children", {1}}}, {{"name", "back"}, {"translation", {0, 90, 0}}}});
+  for (int part = 0; part < 3; ++part) g.doc["nodes"].push_back({{"mesh", part}, {"skin", part}});
+  const std::size_t times = g.add(std::vector<float>{0.5f, 1.0f}, "SCALAR", 5126),
+                    turns = g.add(std::vector<float>{0, 0, 0, 1, 0.6f, 0, 0, 0.8f}, "VEC4", 5126);
+  g.doc["animations"] = json::array(
+      {{{"name", "bow"},
+        {"channels", json::array({{{"sampler", 0}, {"target", {{"node", 1}, {"path", "rotation"}}}}})},
+        {"samplers", json::array({{{"input", times}, {"output", turns}}})}}});
+  g.doc.erase("scenes");
+  return g;
+}
+
+}  // namespace
+
+TEST_CASE("avatar tool: skins of one rig in centimetres, and a clip from a file without a skin") {
+  const TempFolder folder("avatar_tool_skins");
+  gsnav_test::TestGltf g = column();
+  g.write(folder / "column.glb");
+  const std::string common = "from-gltf column.glb --gaussians 3000 --out " + quoted(folder / "a.npz");
+  const Outcome large = run(folder, common);
+  CHECK_FALSE(large.ok);
+  CHECK(large.says("more than 32 m from the root (it is 180 m large); --scale sets metres a unit, 0.01 for centimetres"));
+  const Outcome made = run(folder, common + " --scale 0.01 --clip bow --driver " + quoted(folder / "own.npz"));
+  INFO(made.text);
+  REQUIRE(made.ok);
+  CHECK(made.says("24 vertices, 24 triangles, 2 joints, 1 clips; 3 of 3 skins"));
+  CHECK(made.says("clip \"bow\": its first key is at 0.5"));
+  const auto avatar = io::load_avatar(folder / "a.npz");
+  REQUIRE(avatar.ok());
+  double low = 9, high = -9;
+  for (std::size_t i = 0; i < avatar->asset.size(); ++i) {
+    const double y = avatar->asset.cloud.mean(i).y;
+    low = std::min(low, y), high = std::max(high, y);
+  }
+  CHECK(high - low == doctest::Approx(1.8).epsilon(0.02));  // all three parts
+  CHECK(run(folder, common + " --scale 0.01 --skin head").says("8 vertices, 8 triangles, 2 joints, 1 clips; 1 of 3 skins"));
+  CHECK(run(folder, common + " --scale 0.01 --skin 0 --skin trunk").says("2 of 3 skins"));
+  CHECK(run(folder, common + " --scale 0.01 --skin tail").says("no skin is \"tail\"; there are 0 '\"legs\"'"));
+  // The clip alone: nodes, no skin, no mesh. The rig's unit is the body's.
+  g.doc.erase("skins");
+  g.doc.erase("meshes");
+  g.doc["nodes"].erase(g.doc["nodes"].begin() + 2, g.doc["nodes"].end());
+  g.write(folder / "bow.glb");
+  const Outcome apart = run(folder, common + " --scale 0.01 --clip bow.glb:bow --driver " + quoted(folder / "apart.npz"));
+  INFO(apart.text);
+  REQUIRE(apart.ok);
+  const auto a = io::load_driver(folder / "own.npz", avatar->asset.skeleton),
+             b = io::load_driver(folder / "apart.npz", avatar->asset.skeleton);
+  REQUIRE(a.ok());
+  REQUIRE(b.ok());
+  CHECK(a->clip.frames() == 41);  // from 0 to 1 s
+  CHECK(a->clip.rotations.size() == b->clip.rotations.size());
+  for (std::size_t k = 0; k < std::min(a->clip.rotations.size(), b->clip.rotations.size()); ++k) {
+    CHECK(std::fabs(a->clip.rotations[k].x - b->clip.rotations[k].x) < 1e-6);
+  }
 }

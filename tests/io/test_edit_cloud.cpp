@@ -130,3 +130,27 @@ TEST_CASE("limit_sh_degree keeps the bands below") {
   limit_sh_degree(flat, 2);
   CHECK(flat.sh_degree == 0);
 }
+
+TEST_CASE("a cloud that is mirrored and stretched is seen as in the mirror") {
+  const GaussianCloud before = cloud_of(random_rows(30, 45, 91), 45);
+  GaussianCloud after = before;
+  // Mirrored in x, then stretched along z: the stretch leaves colours to their directions.
+  Affine3<double> by;
+  by.linear = Mat3d{{{-1, 0, 0}, {0, 1, 0}, {0, 0, 3}}};
+  by.translation = {0, 5, 0};
+  REQUIRE(transform(after, by).ok());
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const Vec3d m = before.mean(i);
+    CHECK(norm(after.mean(i) - Vec3d{-m.x, m.y + 5, 3 * m.z}) < 1e-5 * (1 + norm(m)));
+    const Mat3d c = covariance_of(before, i), got = covariance_of(after, i);
+    const double size = std::fabs(c(0, 0)) + std::fabs(c(1, 1)) + 9 * std::fabs(c(2, 2));
+    CHECK(std::fabs(got(0, 1) + c(0, 1)) < 1e-5 * size);
+    CHECK(std::fabs(got(0, 2) + 3 * c(0, 2)) < 1e-5 * size);
+    CHECK(std::fabs(got(2, 2) - 9 * c(2, 2)) < 1e-5 * size);
+    for (const Vec3d& d : {Vec3d{0.6, -0.48, 0.64}, Vec3d{-0.36, 0.48, 0.8}}) {
+      CHECK(norm(colour_of(after, i, {-d.x, d.y, d.z}) - colour_of(before, i, d)) < 1e-5);
+    }
+  }
+  by.linear = Mat3d{{{1, 0, 0}, {0, 0, 0}, {0, 0, 1}}};
+  CHECK(transform(after, by).code() == Errc::invalid_argument);
+}

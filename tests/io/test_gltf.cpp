@@ -254,10 +254,8 @@ TEST_CASE("gltf: files that make no sense") {
   ring.scene = R"(,"scenes":[{"nodes":[0,0]}])";
   check_fails(ring.text(), Errc::invalid_file, "nodes[0] comes twice");
   GlbFile uneven = file;
-  uneven.nodes = R"([{"mesh":0,"scale":[1,2,1]}])";
-  check_fails(uneven.text(), Errc::unsupported, "node 0");
-  uneven.nodes = R"([{"mesh":0,"scale":[-1,1,1]}])";
-  check_fails(uneven.text(), Errc::unsupported, "node 0");
+  uneven.nodes = R"([{"mesh":0,"name":"flat","scale":[1,0,1]}])";
+  check_fails(uneven.text(), Errc::unsupported, "node 0 '\"flat\"': its transform");
   uneven.nodes = R"([{"mesh":0,"rotation":[0,0,0,0]}])";
   check_fails(uneven.text(), Errc::invalid_file, "rotation");
   uneven.nodes = R"([{"mesh":0,"matrix":[1,2]}])";
@@ -286,16 +284,98 @@ TEST_CASE("gltf: many nodes of one mesh are not trusted with memory") {
 TEST_CASE("gltf: what is no drawable Gaussian is counted") {
   GlbFile file = small_file(0, 4);
   std::string binary = file.binary();
-  const float nan = NAN, two = 2, minus = -1, zero = 0;
+  const float nan = NAN, two = 2, zero = 0;
   const auto put_float = [&binary](std::size_t at, float v) { std::memcpy(binary.data() + at, &v, 4); };
   put_float(0, nan);             // a position
   put_float(48 + 16 * 1, zero);  // a quaternion, below
   for (std::size_t k = 1; k < 4; ++k) put_float(48 + 16 + 4 * k, zero);
-  put_float(48 + 64 + 12 * 2, minus);    // a scale
+  put_float(48 + 64 + 12 * 2, nan);      // a scale
   put_float(48 + 64 + 48 + 4 * 3, two);  // an opacity
   const std::string text = GlbFile::glb(file.json(), binary);
   const LoadedCloud loaded = io::parse_gltf(bytes_of(text), "a.glb").value();
   check_consistent(loaded);
   CHECK(loaded.report.dropped_non_finite == 3);
   CHECK(loaded.report.dropped_zero_quat == 1);
+}
+
+TEST_CASE("gltf: the sign of a SCALE means nothing, and is told") {
+  GlbFile file = small_file(1, 4);
+  const LoadedCloud plain = parse(file);
+  std::string binary = file.binary();
+  for (const std::size_t k : {std::size_t{0}, std::size_t{4}, std::size_t{5}}) {  // one of row 0, two of row 1
+    float v = 0;
+    std::memcpy(&v, binary.data() + 48 + 64 + 4 * k, 4);
+    v = -v;
+    std::memcpy(binary.data() + 48 + 64 + 4 * k, &v, 4);
+  }
+  const std::string text = GlbFile::glb(file.json(), binary);
+  const LoadedCloud loaded = io::parse_gltf(bytes_of(text), "a.glb").value();
+  CHECK(loaded.report.dropped_non_finite == 0);
+  CHECK(loaded.cloud.scales == plain.cloud.scales);
+  REQUIRE(loaded.report.warnings.size() == 1);
+  CHECK(contains(loaded.report.warnings[0], "a.glb: node 0: SCALE of 2 Gaussians is negative"));
+}
+
+TEST_CASE("gltf: nodes that scale unevenly, shear or mirror, bands included") {
+  struct Case {
+    const char* nodes;
+    Mat3d m;         // by hand, from the node
+    Vec3d t;
+    Mat3d q;         // the orthogonal factor of m, by hand
+  };
+  // One scaled along its own axes; the same under a turn by 90 degrees about z; a mirror; both at once.
+  const Mat3d one{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, turn{{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}},
+      mirror{{{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  const auto diagonal = [](double x, double y, double z) { return Mat3d{{{x, 0, 0}, {0, y, 0}, {0, 0, z}}}; };
+  const std::string h = "0.7071067811865476";
+  const std::string turned = R"([{"mesh":0,"translation":[1,2,3],"rotation":[0,0,)" + h + "," + h + R"(],"scale":[3,0.5,1]}])",
+                    both = R"([{"children":[1],"scale":[-1,1,1]},{"mesh":0,"rotation":[0,0,)" + h + "," + h +
+                           R"(],"scale":[0.001,2,4]}])";
+  const Case cases[] = {{R"([{"mesh":0,"scale":[1,2,0.25]}])", diagonal(1, 2, 0.25), {}, one},
+                        {turned.c_str(), turn * diagonal(3, 0.5, 1), {1, 2, 3}, turn},
+                        {R"([{"mesh":0,"scale":[-1,1,1]}])", mirror, {}, mirror},
+                        {R"([{"mesh":0,"scale":[-2,-2,-2]}])", diagonal(-2, -2, -2), {}, diagonal(-1, -1, -1)},
+                        {both.c_str(), mirror * turn * diagonal(0.001, 2, 4), {}, mirror * turn},
+                        // A shear: x += 0.75 y. Its factor is the turn by -atan(0.375) about z.
+                        {R"([{"mesh":0,"matrix":[1,0,0,0,0.75,1,0,0,0,0,1,0,0,0,0,1]}])",
+                         Mat3d{{{1, 0.75, 0}, {0, 1, 0}, {0, 0, 1}}},
+                         {},
+                         Mat3d{{{std::cos(std::atan(0.375)), std::sin(std::atan(0.375)), 0},
+                                {-std::sin(std::atan(0.375)), std::cos(std::atan(0.375)), 0},
+                                {0, 0, 1}}}}};
+  for (int degree = 0; degree <= 3; ++degree) {
+    GlbFile file = small_file(degree, 40);
+    const GaussianCloud base = parse(file, {.keep_axes = true}).cloud;
+    for (const Case& c : cases) {
+      CAPTURE(c.nodes);
+      file.nodes = c.nodes;
+      const LoadedCloud loaded = parse(file, {.keep_axes = true});
+      check_consistent(loaded);
+      CHECK(loaded.report.warnings.empty());
+      const GaussianCloud& got = loaded.cloud;
+      REQUIRE(got.size() == base.size());
+      for (std::size_t i = 0; i < got.size(); ++i) {
+        const Vec3d mean = c.m * base.mean(i) + c.t;
+        CHECK(norm(got.mean(i) - mean) <= 2e-6 * (1 + norm(mean)));
+        const Mat3d want = c.m * covariance_of(base, i) * transpose(c.m), have = covariance_of(got, i);
+        double largest = 0, error = 0;
+        for (int a = 0; a < 3; ++a) {
+          for (int b = 0; b < 3; ++b) {
+            largest = std::max(largest, std::fabs(want(a, b)));
+            error = std::max(error, std::fabs(want(a, b) - have(a, b)));
+          }
+        }
+        CHECK(error <= 2e-6 * largest);
+        // The volume says that the least scale is right too.
+        double volume = std::fabs(determinant(c.m)), made = 1;
+        for (std::size_t k = 0; k < 3; ++k) {
+          volume *= static_cast<double>(base.scales[k][i]), made *= static_cast<double>(got.scales[k][i]);
+        }
+        CHECK(made == doctest::Approx(volume).epsilon(1e-5));
+        for (const Vec3d& d : {Vec3d{0.6, -0.48, 0.64}, Vec3d{-0.36, 0.48, 0.8}, Vec3d{0, 0, 1}}) {
+          CHECK(norm(colour_of(got, i, c.q * d) - colour_of(base, i, d)) < 1e-5);
+        }
+      }
+    }
+  }
 }

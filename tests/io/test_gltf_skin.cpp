@@ -131,11 +131,11 @@ TEST_CASE("gltf skin: every vertex is where the file's own matrices put it") {
     REQUIRE(m->clips.size() == 2);
     CHECK(m->clips[0].name == "even");
     CHECK(m->clips[0].clip.frame_rate == doctest::Approx(4));
-    CHECK(m->clips[0].clip.frames() == 3);
+    CHECK(m->clips[0].clip.frames() == 5);  // its first key, at 0.5 s, holds from 0 on
     CHECK(m->clips[1].name == "clip1");
     CHECK(m->clips[1].clip.frame_rate == 60);
     CHECK(m->clips[1].clip.frames() == 55);
-    for (const double t : {0.0, 0.25, 0.5}) CHECK(apart(*m, truth, 0, 0.5, t) < 1e-7);
+    for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) CHECK(apart(*m, truth, 0, 0, t) < 1e-7);
     for (int k = 0; k < 55; ++k) CHECK(apart(*m, truth, 1, 0, k / 60.0) < 1e-6);
     // The bind pose stands on the scene's floor: z of the file is up.
     double low = 9, high = -9;
@@ -250,10 +250,8 @@ TEST_CASE("gltf skin: real files, every clip") {
     double worst = apart(*m, truth, -1, 0, 0);
     for (std::size_t k = 0; k < m->clips.size(); ++k) {
       const MotionClip& clip = m->clips[k].clip;
-      const json& animation = truth.doc()["animations"][k];
-      const double begin = static_cast<double>(truth.numbers(animation["samplers"][0]["input"])[0]);
       for (std::size_t f = 0; f < clip.frames(); f += std::max<std::size_t>(1, clip.frames() / 5)) {
-        worst = std::max(worst, apart(*m, truth, static_cast<int>(k), begin, static_cast<double>(f) / clip.frame_rate));
+        worst = std::max(worst, apart(*m, truth, static_cast<int>(k), 0, static_cast<double>(f) / clip.frame_rate));
       }
     }
     double low = 9, high = -9;
@@ -265,4 +263,191 @@ TEST_CASE("gltf skin: real files, every clip") {
     CHECK(high - low > c.height_low);
     CHECK(high - low < c.height_high);
   }
+}
+
+namespace {
+
+/// The tube three times over, each by a skin of its own on the same joints: the second lists them the other way
+/// round, the third is bound in another space (two units a unit, moved and turned).
+TestGltf tube_in_parts() {
+  TestGltf g = tube();
+  const json primitive = g.doc["meshes"][0]["primitives"][0];
+  const auto floats = [&](std::size_t accessor) {
+    const json& view = g.doc["bufferViews"][accessor];
+    std::vector<float> out(view["byteLength"].get<std::size_t>() / 4);
+    std::memcpy(out.data(), g.bytes.data() + view["byteOffset"].get<std::size_t>(), 4 * out.size());
+    return out;
+  };
+  std::vector<std::uint8_t> swapped;
+  for (int v = 0; v < 24; ++v) swapped.insert(swapped.end(), {0, 1, 7, 1});
+  const std::vector<float> binds = floats(6), positions = floats(0);
+  std::vector<float> other_order(binds.begin() + 16, binds.end());
+  other_order.insert(other_order.end(), binds.begin(), binds.begin() + 16);
+  json second = primitive, third = primitive;
+  second["attributes"]["JOINTS_0"] = g.add(swapped, "VEC4", 5121);
+  // By hand: q = (2 y + 1, -2 x, 2 z) takes the third's vertices p' to the tube's own p; p' = (-p.y, p.x - 1, p.z) / 2.
+  std::vector<float> moved, moved_binds;
+  for (std::size_t v = 0; v < positions.size(); v += 3) {
+    moved.insert(moved.end(), {-positions[v + 1] / 2, (positions[v] - 1) / 2, positions[v + 2] / 2});
+  }
+  const float map[4][4] = {{0, 2, 0, 1}, {-2, 0, 0, 0}, {0, 0, 2, 0}, {0, 0, 0, 1}};
+  for (std::size_t joint = 0; joint < 2; ++joint) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      for (std::size_t row = 0; row < 4; ++row) {
+        float sum = 0;
+        for (std::size_t k = 0; k < 4; ++k) sum += binds[16 * joint + 4 * k + row] * map[k][column];
+        moved_binds.push_back(sum);
+      }
+    }
+  }
+  third["attributes"]["POSITION"] = g.add(moved, "VEC3", 5126);
+  g.doc["meshes"].push_back({{"primitives", json::array({second})}});
+  g.doc["meshes"].push_back({{"primitives", json::array({third})}});
+  g.doc["skins"][0]["name"] = "coat";
+  g.doc["skins"].push_back(
+      {{"name", "hat"}, {"joints", {1, 3}}, {"inverseBindMatrices", g.add(other_order, "MAT4", 5126)}});
+  g.doc["skins"].push_back({{"joints", {3, 1}}, {"inverseBindMatrices", g.add(moved_binds, "MAT4", 5126)}});
+  g.doc["nodes"].push_back({{"mesh", 1}, {"skin", 1}});
+  g.doc["nodes"].push_back({{"mesh", 2}, {"skin", 2}});
+  return g;
+}
+
+}  // namespace
+
+TEST_CASE("gltf skin: skins that share joints are one body") {
+  TempFolder folder("gltf_parts");
+  tube_in_parts().write(folder / "parts.glb");
+  tube().write(folder / "tube.glb");
+  const auto m = io::load_gltf_skin(folder / "parts.glb");
+  CAPTURE(m.status().message());
+  REQUIRE(m.ok());
+  CHECK(m->report.skins == 3);
+  CHECK(m->report.skins_in_file == 3);
+  CHECK(m->mesh.skeleton.names == std::vector<std::string>{"hip", "hip#2"});
+  REQUIRE(m->mesh.positions.size() == 72);
+  CHECK(m->report.vertices == 72);
+  const GltfTruth truth(folder / "tube.glb");
+  LocalPose pose;
+  for (const double time : {0.0, 0.6, 1.0}) {
+    m->clips.at(0).clip.pose({time}, pose);
+    const auto got = posed(m->mesh, pose), want = truth.vertices(0, static_cast<long double>(time));
+    for (std::size_t v = 0; v < 72; ++v) CHECK(norm(got[v] - want[v % 24]) < (time == 0.6 ? 2e-3 : 1e-6));
+  }
+  // One or two of them, by name and by index.
+  const auto hat = io::load_gltf_skin(folder / "parts.glb", {.skins = {"hat"}});
+  REQUIRE(hat.ok());
+  CHECK(hat->mesh.positions.size() == 24);
+  CHECK(hat->report.skins == 1);
+  const auto two = io::load_gltf_skin(folder / "parts.glb", {.skins = {"2", "coat"}});
+  REQUIRE(two.ok());
+  CHECK(two->mesh.positions.size() == 48);
+  const Status none = io::load_gltf_skin(folder / "parts.glb", {.skins = {"shoe"}}).status();
+  CHECK(none.code() == Errc::invalid_argument);
+  CHECK(contains(none.message(), "no skin is \"shoe\"; there are 0 '\"coat\"', 1 '\"hat\"', 2"));
+}
+
+TEST_CASE("gltf skin: skins of two rigs are named, and either can be chosen") {
+  TempFolder folder("gltf_rigs");
+  TestGltf g = tube_in_parts();
+  // A joint of its own for the second.
+  g.doc["nodes"].push_back({{"name", "stick"}, {"children", {8}}});
+  g.doc["nodes"].push_back({{"name", "tip"}});
+  g.doc["skins"][1]["joints"] = {7, 8};
+  g.write(folder / "rigs.glb");
+  const Status s = io::load_gltf_skin(folder / "rigs.glb").status();
+  CAPTURE(s.message());
+  CHECK(s.code() == Errc::unsupported);
+  CHECK(contains(s.message(), "rigs.glb: its skins have more than one rig: \"coat\" (skins[0], 24 vertices), (skins[2], 24"));
+  CHECK(contains(s.message(), "on one; \"hat\" (skins[1], 24 vertices) on others. Choose skins of one rig"));
+  CHECK(io::load_gltf_skin(folder / "rigs.glb", {.skins = {"coat", "2"}})->mesh.positions.size() == 48);
+  // Shared joints that a second map would have to take to different places: two rigs as well.
+  TestGltf bent = tube_in_parts();
+  bent.doc["skins"][1]["joints"] = {3, 1};
+  bent.write(folder / "bent.glb");
+  CHECK(io::load_gltf_skin(folder / "bent.glb").code() == Errc::unsupported);
+}
+
+TEST_CASE("gltf skin: a unit of the file may be a centimetre") {
+  TempFolder folder("gltf_scale");
+  TestGltf g = tube();
+  g.write(folder / "a.glb");
+  g.doc["nodes"][0]["scale"] = {1, 1, 1};  // 0.01 before
+  g.write(folder / "b.glb");
+  const auto a = io::load_gltf_skin(folder / "a.glb"), b = io::load_gltf_skin(folder / "b.glb", {.scale = 0.01}),
+             large = io::load_gltf_skin(folder / "b.glb");
+  REQUIRE(a.ok());
+  REQUIRE(b.ok());
+  REQUIRE(large.ok());
+  for (std::size_t clip = 0; clip < 2; ++clip) {
+    LocalPose p, q;
+    for (const double time : {0.0, 0.5}) {
+      a->clips.at(clip).clip.pose({time}, p);
+      b->clips.at(clip).clip.pose({time}, q);
+      const auto want = posed(a->mesh, p), got = posed(b->mesh, q);
+      for (std::size_t v = 0; v < want.size(); ++v) CHECK(norm(want[v] - got[v]) < 1e-7);
+    }
+  }
+  CHECK(norm(large->mesh.positions[5] - b->mesh.positions[5] * 100.0) < 1e-4);
+  for (const double bad : {0.0, -1.0, std::nan("")}) {
+    CHECK(contains(io::load_gltf_skin(folder / "a.glb", {.scale = bad}).status().message(), "GltfOptions.scale"));
+  }
+}
+
+TEST_CASE("gltf skin: a clip begins at 0 with its first key, and says so") {
+  TempFolder folder("gltf_late");
+  tube().write(folder / "a.glb");
+  const auto m = io::load_gltf_skin(folder / "a.glb");
+  REQUIRE(m.ok());
+  CHECK(m->clips.at(0).clip.duration() == doctest::Approx(1.0));
+  LocalPose begin, first;
+  m->clips[0].clip.pose({0.0}, begin);
+  m->clips[0].clip.pose({0.5}, first);
+  const auto a = posed(m->mesh, begin), b = posed(m->mesh, first);
+  for (std::size_t v = 0; v < a.size(); ++v) CHECK(norm(a[v] - b[v]) < 1e-9);
+  std::size_t told = 0;
+  for (const std::string& w : m->report.warnings) {
+    told += contains(w, "clip \"even\": its first key is at 0.500000 s and holds from 0 s on") ? 1 : 0;
+  }
+  CHECK(told == 1);
+}
+
+TEST_CASE("gltf clips: a file without a skin moves joints by the names of its nodes") {
+  TempFolder folder("gltf_clips");
+  TestGltf g = tube();
+  g.write(folder / "a.glb");
+  const auto m = io::load_gltf_skin(folder / "a.glb");
+  REQUIRE(m.ok());
+  g.doc.erase("skins");
+  g.doc.erase("meshes");
+  g.doc["nodes"][4] = {{"name", "lamp"}};
+  g.write(folder / "clips.gltf");
+  const auto clips = io::load_gltf_clips(folder / "clips.gltf", m->mesh.skeleton);
+  CAPTURE(clips.status().message());
+  REQUIRE(clips.ok());
+  REQUIRE(clips->clips.size() == 2);
+  for (std::size_t k = 0; k < 2; ++k) {
+    CHECK(clips->clips[k].name == m->clips[k].name);
+    CHECK(clips->clips[k].clip.root_translation == m->clips[k].clip.root_translation);
+    CHECK(clips->clips[k].clip.translations == m->clips[k].clip.translations);
+    CHECK(clips->clips[k].clip.rotations.size() == m->clips[k].clip.rotations.size());
+    CHECK(clips->clips[k].clip.frame_rate == m->clips[k].clip.frame_rate);
+  }
+  // A joint that no node is called keeps its rest pose on its parent.
+  g.doc["nodes"][3]["name"] = "knee";
+  g.write(folder / "clips.gltf");
+  const auto part = io::load_gltf_clips(folder / "clips.gltf", m->mesh.skeleton);
+  REQUIRE(part.ok());
+  CHECK(contains(part->warnings.at(0), "keep their rest pose: \"hip#2\""));
+  const Affine3<double>& rest = m->mesh.skeleton.rest_local[1];
+  for (std::size_t t = 0; t < 5; ++t) {
+    CHECK(norm(part->clips[0].clip.translations[2 * t + 1] - rest.translation) < 1e-9);
+  }
+  g.doc["nodes"][1]["name"] = "pelvis";
+  g.write(folder / "clips.gltf");
+  const Status none = io::load_gltf_clips(folder / "clips.gltf", m->mesh.skeleton).status();
+  CHECK(none.code() == Errc::invalid_argument);
+  CHECK(contains(none.message(), "clips.gltf: its nodes have not the names of the skeleton's joints: there is no \"hip\""));
+  g.doc.erase("animations");
+  g.write(folder / "clips.gltf");
+  CHECK(contains(io::load_gltf_clips(folder / "clips.gltf", m->mesh.skeleton).status().message(), "no animation"));
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clips.hpp"
 
+#include <cstdio>
 #include <filesystem>
 #include <utility>
+#include <vector>
 
 #include "gsnav/avatar/joint_match.hpp"
 #include "gsnav/avatar/retarget.hpp"
@@ -39,11 +41,22 @@ Result<MotionClip> load_clip(const ClipSource& source, const Skeleton& skeleton)
     if (!m) return m.status();
     motion = std::move(*m);
   } else if (extension == ".glb" || extension == ".gltf") {
-    auto m = io::load_gltf_skin(file);
-    if (!m) return m.status();
-    motion.skeleton = m->mesh.skeleton;
+    io::GltfOptions options;
+    if (source.scale > 0) options.scale = source.scale;
+    auto m = io::load_gltf_skin(file, options);
+    std::vector<io::NamedClip> clips;
+    if (m) {
+      motion.skeleton = m->mesh.skeleton;
+      clips = std::move(m->clips);
+    } else {  // no skin with a mesh, say: motion alone
+      auto bare = io::load_gltf_clips(file, skeleton, options);
+      if (!bare) return bare.status();
+      for (const std::string& w : bare->warnings) std::printf("  %s\n", printable(w).c_str());
+      motion.skeleton = skeleton;
+      clips = std::move(bare->clips);
+    }
     bool found = false;
-    for (io::NamedClip& c : m->clips) {
+    for (io::NamedClip& c : clips) {
       if (found || (!name.empty() && c.name != name)) continue;
       motion.clip = std::move(c.clip);
       found = true;

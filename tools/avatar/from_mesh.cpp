@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/motion_file.hpp"
 #include "gsnav/io/skinned_mesh_file.hpp"
+#include "gsnav/math/aabb.hpp"
 
 namespace gsnav_avatar {
 
@@ -23,8 +25,14 @@ namespace {
 using Poses = std::vector<std::vector<Affine3<double>>>;
 
 Result<io::LoadedSkinnedMesh> load_mesh(const MeshCommand& c, bool makehuman) {
-  if (!makehuman) return io::load_gltf_skin(c.input);
+  if (!makehuman) {
+    io::GltfOptions options;
+    options.skins = c.skins;
+    options.scale = c.scale;
+    return io::load_gltf_skin(c.input, options);
+  }
   io::MakeHumanOptions options;
+  options.scale = c.scale;
   options.skeleton = c.skeleton;
   options.weights = c.weights;
   for (const auto& [file, amount] : c.targets) options.targets.emplace_back(file, amount);
@@ -42,7 +50,18 @@ Result<MotionClip> clip_of(const MeshCommand& c, const io::LoadedSkinnedMesh& me
     return {Errc::invalid_argument,
             c.input + ": there is no clip '" + c.clip.clip + "'; there are: " + (names.empty() ? "none" : names)};
   }
-  return load_clip(c.clip, mesh.mesh.skeleton);
+  ClipSource source = c.clip;
+  const std::string extension = std::filesystem::path(source.clip.substr(0, source.clip.rfind(':'))).extension().string();
+  if (!(source.scale > 0) && (extension == ".glb" || extension == ".gltf")) source.scale = c.scale;
+  return load_clip(source, mesh.mesh.skeleton);
+}
+
+/// Greatest extent along an axis, metres.
+double size_of(const SkinnedMesh& mesh) {
+  Aabb<double> box{};
+  for (const Vec3d& p : mesh.positions) box.add(p);
+  const Vec3d size = box.high - box.low;
+  return max(size.x, max(size.y, size.z));
 }
 
 /// Joint to root frame at `count` times of the clip.
@@ -87,8 +106,11 @@ Status make_from_mesh(const MeshCommand& c, bool makehuman) {
   auto loaded = load_mesh(c, makehuman);
   if (!loaded) return loaded.status();
   const SkinnedMesh& mesh = loaded->mesh;
-  std::printf("%s: %zu vertices, %zu triangles, %zu joints, %zu clips\n", printable(c.input).c_str(),
+  const SkinnedMeshReport& report = loaded->report;
+  std::printf("%s: %zu vertices, %zu triangles, %zu joints, %zu clips", printable(c.input).c_str(),
               mesh.positions.size(), mesh.triangles.size(), mesh.skeleton.size(), loaded->clips.size());
+  if (!makehuman) std::printf("; %zu of %zu skins", report.skins, report.skins_in_file);
+  std::printf("\n");
   for (const std::string& w : loaded->report.warnings) std::printf("  %s\n", printable(w).c_str());
   MotionClip clip;
   clip.joints = mesh.skeleton.size();
@@ -110,6 +132,12 @@ Status make_from_mesh(const MeshCommand& c, bool makehuman) {
   options.weights.poses.assign(poses.begin(),
                                poses.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, poses.size())));
   auto made = make_mesh_avatar(mesh, options);
+  if (made.code() == Errc::unsupported) {
+    char text[200];
+    std::snprintf(text, sizeof text, " (it is %.4g m large); --scale sets metres a unit, %.4g for centimetres",
+                  size_of(mesh), c.scale / 100);
+    return {made.code(), c.input + ": " + made.message() + text};
+  }
   if (!made) return made.status();
   AvatarAsset& asset = made->asset;
   asset.idle = loaded->pose;

@@ -35,9 +35,10 @@ bool parse_target(const std::string& text, std::pair<std::string, double>& out) 
 
 void add_clip(CLI::App& app, ClipSource& c) {
   app.add_option("--clip", c.clip,
-                 "Motion: a .bvh, .amc, .glb or .gltf file or a driver's .npz; or the name of a clip of INPUT itself");
+                 "Motion: a .bvh, .amc, .glb or .gltf file (FILE:NAME for one of its clips; joints are found by the names of "
+                 "nodes where it has no skin) or a driver's .npz; or the name of a clip of INPUT itself");
   app.add_option("--asf", c.asf, "Skeleton of an .amc");
-  app.add_option("--clip-scale", c.scale, "Metres a unit of a .bvh or .amc; 0: 1, or what the .asf says")
+  app.add_option("--clip-scale", c.scale, "Metres a unit of the clip's file; 0: what the .asf says, for glTF --scale, else 1")
       ->check(CLI::NonNegativeNumber);
   app.add_flag("--clip-z-up", c.z_up, "The .bvh's or .amc's Z points up");
 }
@@ -46,6 +47,15 @@ void add_mesh(CLI::App& app, MeshCommand& m, bool makehuman) {
   app.add_option("input", m.input, makehuman ? "MakeHuman base mesh (.obj)" : "Rigged glTF 2.0 (.glb, .gltf)")
       ->required();
   app.add_option("--out", m.out, "Avatar to write (.npz, Habitat-GS's keys)")->required();
+  if (makehuman) m.scale = 0.1;
+  app.add_option("--scale", m.scale, "Metres a unit of INPUT: 0.01 for a rig in centimetres")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  if (!makehuman) {
+    app.add_option("--skin", m.skins,
+                   "Name or index of a skin to read, any number on one rig; by default all (an error where they have "
+                   "several rigs)");
+  }
   app.add_option("--driver", m.driver, "Driver to write (.npz): the clip at 40 frames a second with its capsules");
   app.add_option("--gaussians", m.gaussians, "About so many")->capture_default_str();
   app.add_option("--seed", m.seed, "Of the places")->capture_default_str();

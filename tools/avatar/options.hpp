@@ -15,13 +15,15 @@ namespace gsnav_avatar {
 struct ClipSource {
   std::string clip;    ///< a file (.bvh, .amc, .glb, .gltf, a driver's .npz), or a clip's name in the body's own file
   std::string asf;     ///< skeleton of an .amc
-  double scale = 0.0;  ///< metres a unit of a .bvh or .amc; 0: 1, or what the .asf says
+  double scale = 0.0;  ///< metres a unit of the clip's file; 0: 1, or what the .asf says
   bool z_up = false;
 };
 
 /// from-gltf and from-makehuman.
 struct MeshCommand {
   std::string input, out, driver;
+  std::vector<std::string> skins;  // glTF; empty: all
+  double scale = 1.0;              // metres a unit of the input
   std::string skeleton, weights;                        // MakeHuman
   std::vector<std::pair<std::string, double>> targets;  // MakeHuman
   ClipSource clip;

@@ -84,6 +84,7 @@ struct SkinnedMesh {
 /// What reading a rigged surface did to it; nothing is repaired without being counted here.
 struct SkinnedMeshReport {
   std::size_t vertices = 0, triangles = 0;
+  std::size_t skins = 1, skins_in_file = 1;  ///< whose meshes were read, and all (glTF)
   std::size_t unequal_weights = 0;  ///< vertices whose weights did not sum to 1 (1e-3): divided by the sum
   double least_weight_sum = 1.0, greatest_weight_sum = 1.0;
   std::size_t without_weights = 0;  ///< vertices with none: moved by the nearest weighted vertex's joints

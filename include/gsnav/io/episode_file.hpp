@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/io/read_limits.hpp"
 #include "gsnav/nav/episode.hpp"
 
 namespace gsnav::io {
@@ -22,8 +23,10 @@ struct EpisodeFile {
 /// start_rotation (x, y, z, w in the file), goals (the first one's position and radius), info.geodesic_distance and,
 /// of files written here, info.start_time.
 ///
-/// Errors name the file, the episode and the key: file_not_found; invalid_file; out_of_memory. Never throws.
-Result<EpisodeFile> load_episodes(const std::filesystem::path& path);
+/// Errors name the file, the episode and the key: file_not_found; invalid_file; unsupported (JSON nested
+/// deeper, or gzip that grows more, than `limits` allow; more than 1 GiB of text); invalid_argument
+/// (`limits`); out_of_memory. Never throws.
+Result<EpisodeFile> load_episodes(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Writes episodes so that Habitat-Lab reads them; gzip where the name ends in `.gz`. The same episodes give the same
 /// bytes, and read back the same numbers. Errors: file_not_found (parent folder), write_failed; invalid_argument naming

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/io/read_limits.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav::io {
@@ -19,19 +20,23 @@ struct LoadGltfOptions {
   /// Also read primitives that KHR_gaussian_splatting_compression_spz_2 compresses, a draft: the SPZ's
   /// axes are taken for the file's own. Untested on a real file.
   bool spz_compression = false;
+  ReadLimits limits{};  ///< json_depth is looked at
 };
 
 /// Reads the Gaussians of a glTF 2.0 file, GLB or JSON, by KHR_gaussian_splatting (release candidate):
-/// every primitive of the scene with kernel "ellipse", its node's transform applied (SH bands turned
-/// with it), merged into one cloud. Opacities and scales are linear in the file; the sort order becomes
-/// camera_distance, which is the extension's.
+/// every primitive of the scene with kernel "ellipse", its node's transform applied, merged into one cloud.
+/// Transforms may scale unevenly, shear and mirror: covariances follow exactly, SH bands by the transform's
+/// orthogonal factor (`transform` in scene/edit_cloud.hpp). Opacities and scales are linear in the file; the
+/// sign of a scale, which means nothing, is left out with a warning. The sort order becomes camera_distance,
+/// which is the extension's.
 ///
 /// Rows that hold no drawable Gaussian are dropped and counted in the report; colours of another space
 /// than sRGB are read as they are, with a warning. Memory is bounded by 260 bytes for each byte of the
 /// file and its buffers. Errors name the node or accessor: file_not_found; invalid_file (indices,
 /// offsets and sizes that do not fit each other or the bytes there are, attributes missing or of other
-/// types, no Gaussian primitive); unsupported (other kernels, sparse accessors, nodes that scale
-/// unevenly or mirror, compressed primitives); out_of_memory. Never throws.
+/// types, no Gaussian primitive); unsupported (other kernels, sparse accessors, nodes whose transform is
+/// flat, compressed primitives, JSON nested deeper than `limits` allow); invalid_argument (`limits`);
+/// out_of_memory. Never throws.
 Result<LoadedCloud> load_gltf(const std::filesystem::path& path, const LoadGltfOptions& options = {});
 
 /// The same for a file's bytes, all of whose buffers are inside; `source` names them in messages.

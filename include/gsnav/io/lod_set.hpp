@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/io/read_limits.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 
@@ -13,6 +14,7 @@ namespace gsnav::io {
 struct LoadLodOptions {
   int level = 0;            ///< 0 is the finest
   bool environment = true;  ///< add the far shell, where the set names one
+  ReadLimits limits{};      ///< a tree of n levels is 2 n + 1 deep in JSON
 };
 
 /// Reads PlayCanvas' streamed LOD set: `lod-meta.json`, or its folder, with a tree of nodes each of
@@ -21,8 +23,9 @@ struct LoadLodOptions {
 /// one, and the report's warnings say so. Rows come by file, as the set lists them.
 ///
 /// Errors: as load_sog; file_not_found (no level of a node is there); invalid_argument (a level that the
-/// set does not have, named with those it has); invalid_file (files outside of the folder, rows that two
-/// nodes share or that end behind their file). Never throws.
+/// set does not have, named with those it has); unsupported (a tree deeper than `limits` allow);
+/// invalid_file (files outside of the folder, rows that two nodes share or that end behind their file).
+/// Never throws.
 Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLodOptions& options = {});
 
 /// A streamed set with its levels of detail, to be drawn by a LodCut.

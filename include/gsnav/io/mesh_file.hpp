@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/io/read_limits.hpp"
 #include "gsnav/scene/textured_scene.hpp"
 #include "gsnav/scene/triangle_mesh.hpp"
 
@@ -29,8 +30,9 @@ Result<TriangleMesh> load_ply_mesh(const std::filesystem::path& path);
 /// Memory is bounded by 30 bytes for each byte of the file and its buffers.
 /// Errors: file_not_found; invalid_file (indices, offsets and sizes that do not fit each other or the
 /// bytes there are, no triangle primitive); unsupported (a required extension that is not read: compressed
-/// geometry, say); out_of_memory. Never throws.
-Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path);
+/// geometry, say; JSON nested deeper than `limits` allow); invalid_argument (`limits`); out_of_memory.
+/// Never throws.
+Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Reads the same triangles with what they look like: a part for each primitive of a mesh, standing wherever nodes show
 /// it; normals, linear vertex colours (COLOR_0), base colour factor and texture with its coordinates
@@ -38,13 +40,13 @@ Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path);
 /// build has libjpeg) or WebP, in the file or beside it; one that cannot be read leaves the factor and a warning. A node
 /// that mirrors or scales unevenly gets a part of its own with its transform applied. Axes and units are the file's.
 /// Errors: as of load_gltf_mesh. Never throws.
-Result<TexturedScene> load_gltf_scene(const std::filesystem::path& path);
+Result<TexturedScene> load_gltf_scene(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Reads what load_mesh reads with what it looks like: glTF by load_gltf_scene, others as one white part.
 /// Errors: as of load_mesh.
-Result<TexturedScene> load_textured_scene(const std::filesystem::path& path);
+Result<TexturedScene> load_textured_scene(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// A mesh by its extension: OBJ, PLY or glTF. Error beside its reader's: unsupported (another extension).
-Result<TriangleMesh> load_mesh(const std::filesystem::path& path);
+Result<TriangleMesh> load_mesh(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 }  // namespace gsnav::io

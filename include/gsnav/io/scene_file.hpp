@@ -8,6 +8,7 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/io/lod_set.hpp"
+#include "gsnav/io/read_limits.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 
@@ -33,6 +34,7 @@ struct LoadSceneOptions {
   /// 15 / (4 pi).
   double most_sh_error = 2e-3;
   PackLimits pack{};  ///< of load_packed_scene
+  ReadLimits limits{};  ///< json_depth, of glTF and lod-meta.json
 };
 
 /// A packed scene with the report of how it was read; `report.packing` has what packing changed.
