@@ -174,8 +174,8 @@ Outcome run(const NavMesh& mesh, const Episode& episode, Policy policy) {
     record.moved = norm(agent.state().position - before);
     record.wall_collision = r.hit_wall;
     record.capsule_blocked = r.blocked_by == BlockedBy::capsule;
-    record.avatar_contact = record.capsule_blocked || r.pushed_into ||
-                            std::any_of(distances.begin(), distances.end(), [](double d) { return d <= 0; });
+    record.avatar_contact =
+        r.pushed_into || std::any_of(distances.begin(), distances.end(), [](double d) { return d <= 0; });
     record.avatar_distances = distances;
     tracker.add(record);
     out.track.push_back(agent.state().position);

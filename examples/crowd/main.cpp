@@ -125,7 +125,7 @@ int main(int argc, char** argv) {
         spl += o.metrics.spl;
         cr += o.metrics.collision_rate;
         psi += o.metrics.psi;
-        contact += o.metrics.human_collision ? 1 : 0;
+        contact += o.metrics.collision_steps > 0 ? 1 : 0;
         seconds += o.seconds;
         slowest = max(slowest, o.slowest_plan);
         if (&e == &list.front()) first.push_back(std::move(o));

@@ -14,6 +14,8 @@
 
 #include "../../tools/eval/run.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/core/printable.hpp"
+#include "gsnav/core/replace_file.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
@@ -90,10 +92,15 @@ gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o, con
 }
 
 Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& backend) {
+  if (Status s = gsnav::make_output_folder(o.out); !s) return s;
+  if (Status s = gsnav_eval::Journal::check_options(o.out, o); !s) return s;
   const auto stage = gsnav_eval::prepare(o);
   if (!stage) return stage.status();
-  auto journal = gsnav_eval::Journal::open(o.out, o, ranks.rank);
+  auto journal = gsnav_eval::Journal::open(o.out, o, *stage, ranks.rank);
   if (!journal) return journal.status();
+  for (const std::string& note : journal->notes()) {
+    std::fprintf(stderr, "%s\n", gsnav::printable(note).c_str());
+  }
   std::vector<unsigned long> missing;
   if (ranks.rank == 0) {
     for (std::size_t i = 0; i < stage->episodes.size(); ++i) {
@@ -119,7 +126,7 @@ Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& 
   if (ranks.rank != 0) return {};
   std::map<std::size_t, gsnav_eval::Record> records = journal->records();
   for (std::size_t at = 0, end; (end = all.find('\n', at)) != std::string::npos; at = end + 1) {
-    auto record = gsnav_eval::record_of(all.substr(at, end - at));
+    auto record = gsnav_eval::record_of(all.substr(at, end - at), "a rank's record", *stage);
     if (!record) return record.status();
     records.insert_or_assign(record->episode, std::move(*record));
   }

@@ -95,9 +95,9 @@ Status run(B& backend, const Options& options) {
   }
   if (Status s = recorder.finish(setup.scene); !s) return s;
   print_table(options, setup.facts, records, t);
-  if (Status s = write_json(options.out + "/metrics.json", options, setup.facts, records, t); !s)
-    return s;
-  std::printf("Pictures and metrics.json are in %s\n", options.out.c_str());
+  if (Status s = write_json(options.out + "/metrics.json", options, setup.facts, records); !s) return s;
+  if (Status s = write_timings(options.out + "/timings.json", t); !s) return s;
+  std::printf("Pictures, metrics.json and timings.json are in %s\n", options.out.c_str());
   return {};
 }
 
@@ -137,7 +137,7 @@ int main(int argc, char** argv) try {
   CLI::App app{
       "Runs PointNav episodes in a scene of Gaussians with people walking in it, and writes frames, a "
       "strip, a\n"
-      "map and metrics.json. Without arguments: an embedded furnished flat with three people."};
+      "map, metrics.json and timings.json. Without arguments: an embedded furnished flat with three people."};
   app.add_option("--scene", o.scene,
                  "scene to load: .ply, .sog, meta.json or its folder; a comma joins sibling tiles");
   app.add_option("--up", o.up, "axis of the scene that points up: x, y, z, -x, -y or -z")

@@ -65,7 +65,9 @@ void print_table(const Options& options, const SceneFacts& facts,
   row("DTG (geodesic, m)", s.distance_to_goal);
   row("CR (steps with avatar contact)", s.collision_rate);
   row("PSI", s.psi);
-  row("episodes with avatar contact", s.human_collision_episode_rate);
+  row("PSC", s.psc);
+  row("H-Coll (episodes with a touch)", s.human_collision_episode_rate);
+  row("episodes with avatar contact", s.disturbed_episode_rate);
   row("wall collisions an episode", s.collisions, "%10.1f");
   row("least clearance to an avatar (m)", s.min_clearance);
   row("episodes in which one walked into us", static_cast<double>(pushed), "%10.0f");
@@ -78,7 +80,7 @@ void print_table(const Options& options, const SceneFacts& facts,
 }
 
 gsnav::Status write_json(const std::string& path, const Options& o, const SceneFacts& f,
-                         const std::vector<EpisodeRecord>& records, const Timings& t) {
+                         const std::vector<EpisodeRecord>& records) {
   const auto metrics = metrics_of(records);
   const gsnav::MetricsSummary s = gsnav::summarize(metrics);
   nlohmann::ordered_json j;
@@ -103,48 +105,28 @@ gsnav::Status write_json(const std::string& path, const Options& o, const SceneF
                 {"navmesh_islands", f.islands},
                 {"navmesh_area", f.area},
                 {"largest_island_area", f.island_area}};
-  j["means"] = {{"success_rate", s.success_rate},
-                {"spl", s.spl},
-                {"soft_spl", s.soft_spl},
-                {"distance_to_goal", s.distance_to_goal},
-                {"euclidean_distance_to_goal", s.euclidean_distance_to_goal},
-                {"collision_rate", s.collision_rate},
-                {"psi", s.psi},
-                {"human_collision_episode_rate", s.human_collision_episode_rate},
-                {"collisions", s.collisions},
-                {"steps", s.steps},
-                {"path_length", s.path_length},
-                {"min_clearance", s.min_clearance}};
+  for_each_metric(s, [&](const char* name, const auto& value) { j["means"][name] = value; });
   nlohmann::ordered_json episodes = nlohmann::ordered_json::array();
   for (const EpisodeRecord& r : records) {
     const gsnav::EpisodeMetrics& m = r.metrics;
     episodes.push_back({{"id", r.episode.id},
                         {"start", point(r.episode.start_position)},
                         {"goal", point(r.episode.goal_position)},
-                        {"start_time", r.episode.start_time},
-                        {"success", m.success},
-                        {"spl", m.spl},
-                        {"soft_spl", m.soft_spl},
-                        {"distance_to_goal", m.distance_to_goal},
-                        {"euclidean_distance_to_goal", m.euclidean_distance_to_goal},
-                        {"collision_rate", m.collision_rate},
-                        {"psi", m.psi},
-                        {"human_collision", m.human_collision},
-                        {"collisions", m.collisions},
-                        {"steps", m.steps},
-                        {"start_distance", m.start_distance},
-                        {"path_length", m.path_length},
-                        {"min_clearance", m.min_clearance},
-                        {"pushed_into", r.pushed},
-                        {"stop_called", m.stop_called}});
+                        {"start_time", r.episode.start_time}});
+    for_each_metric(m, [&](const char* name, const auto& value) { episodes.back()[name] = value; });
+    episodes.back()["pushed_into"] = r.pushed;
   }
   j["episodes"] = std::move(episodes);
-  j["timings"] = {{"load_s", t.load},
-                  {"navmesh_s", t.navmesh},
-                  {"physics_ms_per_step", 1e3 * per(t.physics, t.steps)},
-                  {"render_ms", 1e3 * per(t.render, t.renders)},
-                  {"policy_ms_per_step", 1e3 * per(t.policy, t.steps)},
-                  {"steps", t.steps}};
+  return gsnav::replace_file(path, j.dump(2) + "\n");
+}
+
+gsnav::Status write_timings(const std::string& path, const Timings& t) {
+  const nlohmann::ordered_json j{{"load_s", t.load},
+                                 {"navmesh_s", t.navmesh},
+                                 {"physics_ms_per_step", 1e3 * per(t.physics, t.steps)},
+                                 {"render_ms", 1e3 * per(t.render, t.renders)},
+                                 {"policy_ms_per_step", 1e3 * per(t.policy, t.steps)},
+                                 {"steps", t.steps}};
   return gsnav::replace_file(path, j.dump(2) + "\n");
 }
 

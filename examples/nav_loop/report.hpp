@@ -48,8 +48,11 @@ class Progress {
 void print_table(const Options& options, const SceneFacts& facts,
                  const std::vector<EpisodeRecord>& records, const Timings& timings);
 
-/// Writes metrics.json. Errors: file_not_found naming the path.
+/// Writes metrics.json: equal bytes for equal runs, on any number of threads. Errors: file_not_found
+/// naming the path.
 gsnav::Status write_json(const std::string& path, const Options& options, const SceneFacts& facts,
-                         const std::vector<EpisodeRecord>& records, const Timings& timings);
+                         const std::vector<EpisodeRecord>& records);
+/// Writes timings.json: seconds and milliseconds of this run. Errors likewise.
+gsnav::Status write_timings(const std::string& path, const Timings& timings);
 
 }  // namespace nav_loop

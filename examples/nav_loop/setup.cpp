@@ -55,23 +55,17 @@ Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::
   const gsnav::Camera eye = gsnav::sensor_camera(sensors_of(options)[0], {}, {});
   gsnav::VisibleSettings settings;
   settings.serve(eye);
-  settings.progress = [](double share) {
-    std::fprintf(stderr, "\rfinding visible sets: %.0f %%", 100 * share);
-  };
+  settings.progress = visible_progress();
   const double heights[] = {options.eye_height};
   const auto viewpoints = gsnav::navmesh_viewpoints(navmesh, heights, settings.spacing());
   if (!viewpoints) return viewpoints.status();
   auto backend = builder(options);
   if (options.scene.empty()) {
-    auto made =
-        gsnav::build_visible_sets(backend, *asset.cloud, *viewpoints, settings, asset.world_from_asset);
-    std::fputs("\n", stderr);
-    return made;
+    return gsnav::build_visible_sets(backend, *asset.cloud, *viewpoints, settings, asset.world_from_asset);
   }
   auto cached = gsnav::io::cached_visible_sets(backend, options.scene, *asset.cloud, *viewpoints,
                                                settings, asset.world_from_asset);
   if (!cached) return cached.status();
-  if (cached->built) std::fputs("\n", stderr);
   if (!cached->warning.empty()) std::fprintf(stderr, "%s\n", cached->warning.c_str());
   return std::move(cached->sets);
 }
@@ -170,11 +164,12 @@ Result<Setup> prepare(const Options& options) {
   setup.timings.navmesh = seconds_since(from);
   if (options.visible_sets) {
     auto visible = visible_sets_of(options, setup.scene.assets[0], *setup.scene.navmesh);
-    if (!visible) return visible.status();
-    std::printf("visible sets: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the Gaussians\n",
+    if (!visible && visible.code() != Errc::unsupported) return visible.status();
+    if (!visible) std::fprintf(stderr, "%s: drawn without them\n", visible.message().c_str());
+    if (visible) std::printf("visible sets: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the Gaussians\n",
                 visible->cells(), visible->viewpoints, 100 * visible->mean_share(),
                 visible->cloud_chunks, 100 * visible->mean_row_share(setup.scene.assets[0].cloud->size()));
-    setup.scene.assets[0].visible = std::make_shared<const gsnav::VisibleSets>(std::move(*visible));
+    if (visible) setup.scene.assets[0].visible = std::make_shared<const gsnav::VisibleSets>(std::move(*visible));
   }
   // People are wider than the agent: they keep their shoulders clear of the furniture.
   std::optional<gsnav::NavMesh> walkways;

@@ -283,8 +283,9 @@ StepInfo World::move(const Motion& motion, std::span<const CapsuleSet* const> bo
   }
   for (const double d : distances_) info.avatar_clearance = min(d, info.avatar_clearance);
   info.moved = norm(s_.agent.position - from);
-  info.avatar_contact = info.capsule_blocked || info.pushed_into || info.avatar_clearance <= 0.0;
-  s_.tracker.add({info.moved, info.wall_collision, info.capsule_blocked, info.avatar_contact, distances_});
+  info.avatar_touched = info.pushed_into || info.avatar_clearance <= 0.0;
+  info.avatar_contact = info.capsule_blocked || info.avatar_touched;
+  s_.tracker.add({info.moved, info.wall_collision, info.capsule_blocked, info.avatar_touched, distances_});
 
   const double before = s_.distance_to_goal;
   if (info.moved > 0) measure_distance();

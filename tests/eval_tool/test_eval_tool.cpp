@@ -10,6 +10,7 @@
 #include "gsnav/io/npz_file.hpp"
 #include "support/command.hpp"
 #include "support/process.hpp"
+#include "support/small_disk.hpp"
 
 using namespace gsnav_test;
 
@@ -49,12 +50,19 @@ TEST_CASE("an evaluation that was broken off goes on, to the same journal and pa
   CHECK(read_file(folder / "out/journal.jsonl") == journal);
   CHECK(read_file(folder / "out/index.html") == page);
 
+  CHECK(again.says("journal.jsonl: line 3 has no end, as after a kill: 20 bytes are dropped"));
+
   const Outcome other = eval("--seed 5");
   CHECK_FALSE(other.ok);
-  CHECK(other.says("other options"));
+  CHECK(other.says("was recorded with --seed 1, but this run has --seed 5"));
+  CHECK(other.says("--restart"));
 
   // What was recorded is played again: the agent's own camera, then one that stands.
-  const auto replay = [&](const std::string& more) { return run_command(GSNAV_REPLAY, kOptions + more, folder.path()); };
+  // Its options are in the journal.
+  const auto replay = [&](const std::string& more) { return run_command(GSNAV_REPLAY, "--out out " + more, folder.path()); };
+  const Outcome differs = replay("--episode 0 --policy random");
+  CHECK_FALSE(differs.ok);
+  CHECK(differs.says("was recorded with --policy follower, but this run has --policy random"));
   const Outcome own = replay("--episode 0 --frames own --every 5");
   CAPTURE(own.text);
   REQUIRE(own.ok);
@@ -99,6 +107,199 @@ TEST_CASE("episodes of a file are played by any policy") {
   CHECK(run_command(GSNAV_EVAL, "--episode-file none.json --out x", folder.path()).says("none.json"));
 }
 
+TEST_CASE("an evaluation whose episodes, scene or NavMesh changed is refused by name, and begun anew on request") {
+  const TempFolder folder("eval");
+  std::vector<gsnav::PointNavEpisode> episodes(1);
+  episodes[0].id = "kitchen";
+  episodes[0].start_position = {4.6, 0, 3.6};
+  episodes[0].goal_position = {5.2, 0, 3.2};
+  REQUIRE(gsnav::io::save_episodes(folder / "val.json.gz", episodes).ok());
+  const auto eval = [&](const std::string& more = "", const std::string& file = "val.json.gz") {
+    return run_command(GSNAV_EVAL, kSparse + "--avatars 0 --pictures 0 --out out --episode-file " + file + " " + more, folder.path());
+  };
+  REQUIRE(eval().ok);
+  CHECK(eval().says("SR 1.000"));
+  // The same content under another name is the same evaluation.
+  std::filesystem::copy_file(folder / "val.json.gz", folder / "moved.json.gz");
+  CHECK(eval("", "moved.json.gz").says("SR 1.000"));
+  // The same name with another goal is not.
+  episodes[0].goal_position = {5.3, 0, 3.2};
+  REQUIRE(gsnav::io::save_episodes(folder / "val.json.gz", episodes).ok());
+  const std::string before = read_file(folder / "out/metrics.json");
+  const Outcome stale = eval();
+  CAPTURE(stale.text);
+  CHECK_FALSE(stale.ok);
+  CHECK(stale.says("the episodes in val.json.gz have changed"));
+  CHECK(stale.says("--restart"));
+  CHECK(read_file(folder / "out/metrics.json") == before);
+  const Outcome replay = run_command(GSNAV_REPLAY, "--out out", folder.path());
+  CHECK_FALSE(replay.ok);
+  CHECK(replay.says("the episodes in val.json.gz have changed"));
+  // Options that change the world.
+  for (const std::string more : {"--cell-size 0.1", "--crop 0 0 0 9 2 9", "--max-steps 61", "--width 48", "--hfov 60.5"}) {
+    const Outcome differs = eval(more);
+    CAPTURE(differs.text);
+    CHECK_FALSE(differs.ok);
+    CHECK(differs.says(("this run has " + more).c_str()));
+  }
+  const Outcome anew = eval("--restart");
+  CAPTURE(anew.text);
+  CHECK(anew.ok);
+  CHECK(anew.says("episode 1/1"));
+  CHECK(read_file(folder / "out/metrics.json") != before);
+  // A scene whose hash is another: as recorded by somebody else's.
+  const std::string journal = read_file(folder / "out/journal.jsonl");
+  for (const std::string name : {"scene", "navmesh", "people"}) {
+    std::string changed = journal;
+    const std::size_t at = changed.find("\"" + name + "\":\"", changed.find("\"contents\"")) + name.size() + 4;
+    changed[at] = changed[at] == '0' ? '1' : '0';
+    write_file(folder / "out/journal.jsonl", changed);
+    const Outcome out = eval();
+    CAPTURE(out.text);
+    CHECK_FALSE(out.ok);
+    CHECK(out.says(("the " + name + " that gsnav made ha").c_str()));
+  }
+  // The header that gsnav wrote before.
+  write_file(folder / "out/journal.jsonl", "{\"avatars\":0,\"scene\":\"\"}\n" + journal.substr(journal.find('\n') + 1));
+  const Outcome old = eval();
+  CHECK_FALSE(old.ok);
+  CHECK(old.says("line 1: is of an earlier gsnav"));
+}
+
+TEST_CASE("a record that is none of the evaluation is named by file, line, field and value") {
+  const TempFolder folder("eval");
+  const std::string options = kSparse + "--avatars 0 --episodes 2 --max-steps 20 --pictures 0 --out out";
+  REQUIRE(run_command(GSNAV_EVAL, options, folder.path()).ok);
+  const std::string journal = read_file(folder / "out/journal.jsonl");
+  const std::string header = journal.substr(0, journal.find('\n') + 1);
+  const std::string first = journal.substr(header.size(), journal.find('\n', header.size()) + 1 - header.size());
+  const auto with = [&](const std::string& field, const std::string& value) {  // in place of what the first record has
+    std::string line = first;
+    const std::size_t at = line.find("\"" + field + "\":");
+    REQUIRE(at != std::string::npos);
+    const std::size_t begin = at + field.size() + 3, end = line.find_first_of(",}", begin);
+    return line.replace(begin, end - begin, value);
+  };
+  struct Bad {
+    std::string line, says;
+  };
+  std::string short_metrics = first;
+  short_metrics.erase(short_metrics.find("\"spl\":"), short_metrics.find("\"soft_spl\":") - short_metrics.find("\"spl\":"));
+  const std::size_t from = first.find("\"metrics\":{") + 11, to = first.find('}', from);
+  std::string empty = first;
+  empty.erase(from, to - from);
+  const std::vector<Bad> cases{{with("episode", "99"), "episode = 99"},
+                               {with("episode", "-1"), "episode = -1"},
+                               {with("id", "\"other\""), "id = \"other\""},
+                               {with("spl", "1.7"), "metrics.spl = 1.7: must be in [0.0, 1.0]"},
+                               {with("spl", "null"), "metrics.spl = null"},
+                               {with("path_length", "-3"), "metrics.path_length = -3"},
+                               {with("path_length", "1e300"), "metrics.path_length = 1e+300"},
+                               {with("steps", "21"), "metrics.steps = 21"},
+                               {with("success", "3"), "metrics.success = 3"},
+                               {with("collision_rate", "0.5"), "metrics.collision_rate = 0.5"},
+                               {with("reward", "null"), "reward = null"},
+                               {with("actions", "\"19\""), "actions = \"19\""},
+                               {short_metrics, "metrics.spl is missing"},
+                               {empty, "metrics.success is missing"},
+                               {with("reward", "7") + first, "differs from out/journal.jsonl: line 2"},
+                               {"[]\n", "is not an object"},
+                               {"{\n", "is not JSON"}};
+  for (const Bad& bad : cases) {
+    write_file(folder / "out/journal.jsonl", header + bad.line);
+    const Outcome out = run_command(GSNAV_EVAL, options, folder.path());
+    CAPTURE(bad.line);
+    CAPTURE(out.text);
+    CHECK_FALSE(out.ok);
+    CHECK(out.says("out/journal.jsonl: line "));
+    CHECK(out.says(bad.says.c_str()));
+    CHECK(out.says("--restart"));
+  }
+  // The same record twice is one.
+  write_file(folder / "out/journal.jsonl", journal + first);
+  const Outcome twice = run_command(GSNAV_EVAL, options, folder.path());
+  CHECK(twice.says("2 episodes: SR"));
+}
+
+TEST_CASE("equal evaluations write equal bytes, on any number of threads") {
+  const TempFolder folder("eval");
+  const std::string options = kSparse + "--avatars 2 --episodes 3 --max-steps 25 --pictures 0 --policy random ";
+  REQUIRE(run_command(GSNAV_EVAL, options + "--threads 1 --out one", folder.path()).ok);
+  REQUIRE(run_command(GSNAV_EVAL, options + "--threads 3 --out three", folder.path()).ok);
+  const std::string one = read_file(folder / "one/metrics.json");
+  CHECK(one == read_file(folder / "three/metrics.json"));
+  for (const char* name : {"\"psc\":", "\"human_collision_episode_rate\":", "\"human_blocked_episode_rate\":", "\"means\":"}) {
+    CHECK(contains(one, name));
+  }
+  CHECK_FALSE(contains(one, "_s\""));
+  CHECK(contains(read_file(folder / "one/timings.json"), "play_s"));
+}
+
+TEST_CASE("an evaluation that is killed while it plays goes on to the bytes of one that never was") {
+  const TempFolder folder("eval");
+  const std::vector<std::string> common{"--density", "0.05", "--avatars", "1", "--episodes", "12", "--max-steps", "150",
+                                        "--policy", "random", "--pictures", "0", "--out"};
+  const auto words = [&](const std::string& out) {
+    std::vector<std::string> all{GSNAV_EVAL};
+    all.insert(all.end(), common.begin(), common.end());
+    all.push_back(out);
+    return all;
+  };
+  std::size_t kills = 0;
+  for (std::size_t until = 2; until < 8; until += 2) {  // lines
+    Process run(words("killed"), folder.path());
+    while (run.runs() && lines(read_file(folder / "killed/journal.jsonl")) < until) usleep(500);
+    run.signal(SIGKILL);
+    kills += run.wait(60) == -1 ? 1 : 0;
+    CHECK(lines(read_file(folder / "killed/journal.jsonl")) >= until);
+  }
+  CHECK(kills > 0);
+  CHECK(Process(words("killed"), folder.path()).wait(120) == 0);
+  CHECK(Process(words("whole"), folder.path()).wait(120) == 0);
+  for (const char* name : {"journal.jsonl", "metrics.json", "index.html", "episodes.json.gz"}) {
+    CAPTURE(name);
+    CHECK(read_file(folder / ("killed/" + std::string(name))) == read_file(folder / ("whole/" + std::string(name))));
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "killed")) {
+    CHECK(entry.path().extension() != ".part");
+  }
+}
+
+TEST_CASE("a full disk leaves the journal whole and nothing half written") {
+  const TempFolder folder("eval");
+  std::filesystem::create_directories(folder / "disk");
+  const SmallDisk disk(folder / "disk", 24);
+  if (!disk.mounted()) return;
+  const std::string options = kSparse + "--avatars 0 --episodes 40 --max-steps 200 --policy random --pictures 0 --out ";
+  const Outcome out = run_command(GSNAV_EVAL, options + "disk", folder.path());
+  CAPTURE(out.text);
+  CHECK_FALSE(out.ok);
+  CHECK(out.says("cannot be written: No space left on device"));
+  const std::string journal = read_file(folder / "disk/journal.jsonl");
+  REQUIRE(lines(journal) > 1);
+  CHECK(journal.back() == '\n');
+  for (const char* name : {"metrics.json", "index.html", "timings.json"}) CHECK_FALSE(std::filesystem::exists(folder / "disk" / name));
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "disk")) CHECK(entry.path().extension() != ".part");
+  // With room it goes on to what a run that was never stopped has.
+  std::filesystem::create_directories(folder / "room");
+  write_file(folder / "room/journal.jsonl", journal);
+  REQUIRE(run_command(GSNAV_EVAL, options + "room", folder.path()).ok);
+  REQUIRE(run_command(GSNAV_EVAL, options + "whole", folder.path()).ok);
+  CHECK(read_file(folder / "room/metrics.json") == read_file(folder / "whole/metrics.json"));
+}
+
+TEST_CASE("output names that cannot be written are refused before anything is loaded") {
+  const TempFolder folder("eval");
+  write_file(folder / "file", "x");
+  std::filesystem::create_directories(folder / "taken/metrics.json");
+  const auto eval = [&](const std::string& out) {
+    return run_command(GSNAV_EVAL, "--scene none.ply --out " + out, folder.path());
+  };
+  CHECK(eval("file").says("file"));
+  CHECK_FALSE(eval("file").says("none.ply"));
+  CHECK(eval("taken").says("taken/metrics.json: cannot be written: it is a folder"));
+}
+
 TEST_CASE("a replay becomes a video of any size, and says what is missing where there is no ffmpeg") {
   const TempFolder folder("video");
   const std::string options = kSparse + "--avatars 1 --episodes 1 --max-steps 12 --width 63 --height 47 --out out ";
@@ -107,6 +308,7 @@ TEST_CASE("a replay becomes a video of any size, and says what is missing where 
   CHECK_FALSE(none.ok);
   CHECK(none.says("is it installed?"));
 #if defined(GSNAV_FFMPEG)
+  CHECK_FALSE(run_command(GSNAV_REPLAY, options + "--video nowhere/walk.mp4", folder.path()).ok);
   REQUIRE(run_command(GSNAV_REPLAY, options + "--frames still", folder.path()).ok);
   const Outcome made = run_command(GSNAV_REPLAY, options + "--video walk.mp4", folder.path());
   CAPTURE(made.text);

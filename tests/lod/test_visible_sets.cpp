@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -315,6 +316,54 @@ TEST_CASE("visible sets: nothing is known elsewhere, nor of cameras that see mor
   }
 }
 
+TEST_CASE("visible sets: where nearly all is seen a sample says so, and sets that are made do not depend on it") {
+  // In the open: small Gaussians on a ring around the viewpoints, which hide nothing of each other.
+  GaussianCloudBuilder builder(0);
+  Rng rng(3);
+  constexpr std::size_t kOnRing = 1024;
+  for (std::size_t i = 0; i < kOnRing; ++i) {
+    const double angle = 2 * std::numbers::pi * static_cast<double>(i) / kOnRing;
+    RawGaussian g;
+    g.mean = {12 * std::cos(angle), 1.3 + 0.2 * rng.uniform(-1.0, 1.0), 12 * std::sin(angle)};
+    g.quat = {1, 0, 0, 0};
+    g.log_scales = {std::log(0.05), std::log(0.05), std::log(0.05)};
+    g.opacity_logit = 0;
+    builder.add(g);
+  }
+  GaussianCloud ring = builder.cloud();
+  sort_spatially(ring);
+  std::vector<Vec3d> eyes;
+  for (int i = 0; i < 24; ++i) {
+    for (int j = 0; j < 16; ++j) eyes.push_back({0.25 + 0.5 * (i - 12), 1.3, 0.25 + 0.5 * (j - 8)});
+  }
+  std::vector<Vec3d> indoors = places_in_rooms();
+  for (const Vec3d& p : places_in_rooms()) indoors.push_back({p.x, 0.8, p.z});
+  for (const int threads : {1, 3}) {
+    OpenMPBackend backend(threads);
+    VisibleSettings s = coarse();
+    double done = 0;
+    s.progress = [&](double share) { done = share; };
+    const auto stopped = build_visible_sets(backend, ring, eyes, s);
+    CHECK(stopped.code() == Errc::unsupported);
+    CHECK(contains(stopped.message(), "most_share"));
+    CHECK(done > 0);
+    CHECK(done < 0.5);  // most of the viewpoints are not looked from
+    s.most_share = 1;
+    const VisibleSets all = build_visible_sets(backend, ring, eyes, s).value();
+    CHECK(all.mean_row_share(ring.size()) > 0.9);
+    CHECK(done == 1.0);
+    // Behind walls: far more cells than the sample, most of the cloud hidden from each.
+    const VisibleSets asked = build_visible_sets(backend, rooms(), indoors, coarse()).value();
+    VisibleSettings never = coarse();
+    never.most_share = 1;
+    const VisibleSets unasked = build_visible_sets(backend, rooms(), indoors, never).value();
+    CHECK(asked.cells() >= 64);
+    CHECK(asked.keys == unasked.keys);
+    CHECK(asked.ends == unasked.ends);
+    CHECK(asked.bits == unasked.bits);
+  }
+}
+
 TEST_CASE("visible sets: what cannot be is refused by name") {
   SerialBackend backend;
   const std::vector<Vec3d> eyes{{1, 1, 0}};
@@ -334,6 +383,8 @@ TEST_CASE("visible sets: what cannot be is refused by name") {
   refused([](auto& s) { s.face = 8; }, "face");
   refused([](auto& s) { s.near_plane = 0; }, "near_plane");
   refused([](auto& s) { s.near_sigma = -1; }, "near_sigma");
+  refused([](auto& s) { s.most_share = 0; }, "most_share");
+  refused([nan](auto& s) { s.most_share = nan; }, "most_share");
   CHECK(contains(build_visible_sets(backend, rooms(), {}, coarse()).message(), "no viewpoint"));
   const std::vector<Vec3d> bad{{1, 1, 0}, {nan, 0, 0}};
   CHECK(contains(build_visible_sets(backend, rooms(), bad, coarse()).message(), "viewpoint 1"));

@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "gsnav/sim/metrics.hpp"
@@ -81,9 +82,62 @@ TEST_CASE("an episode of four steps by hand") {
   CHECK(m.collisions == 2);
   CHECK(m.psi == doctest::Approx(1.75 / 4.0));
   CHECK(m.human_collision);
+  CHECK(m.human_blocked);
+  CHECK(m.psc == 0.75);  // in the second action one was at 0 m
   CHECK(m.min_clearance == 0.0);
   CHECK(m.distance_to_goal == 0.1);
   CHECK(m.euclidean_distance_to_goal == 0.05);
+}
+
+TEST_CASE("personal space compliance is the share of actions that keep 1 m between centres of Falcon's bodies") {
+  // An agent of radius 0.25 walks past a person of radius 0.3 who stands at the origin, along z = 0.6. Its
+  // centre is within 1 m while |x| < 0.8: of x = -5, -4.75 .. 5 (41 actions) -0.75 .. 0.75 are, 7 of them.
+  EpisodeTracker t;
+  t.reset(10.0);
+  for (int i = 0; i <= 40; ++i) {
+    const double x = -5 + 0.25 * i;
+    const std::array<double, 2> gaps{std::hypot(x, 0.6) - 0.25 - 0.3, 20.0};
+    t.add({0.25, false, false, false, gaps});
+  }
+  const EpisodeMetrics m = t.finish(false, 1.0, 1.0, 0.2);
+  CHECK(m.psc == doctest::Approx(34.0 / 41.0).epsilon(1e-15));
+  CHECK_FALSE(m.human_collision);
+  CHECK(keeps_personal_space(1.0 - 0.25 - 0.3 + 1e-9));
+  CHECK_FALSE(keeps_personal_space(1.0 - 0.25 - 0.3 - 1e-9));
+  CHECK(keeps_personal_space(kInf));
+
+  // Two that intrude at once are one step; nobody there complies.
+  t.reset(1.0);
+  const std::array<double, 2> both{0.1, 0.2};
+  t.add({0.25, false, false, false, both});
+  t.add({0.25, false, false, false, {}});
+  CHECK(t.finish(false, 1.0, 1.0, 0.2).psc == 0.5);
+  t.reset(1.0);
+  CHECK(t.finish(true, 1.0, 1.0, 0.2).psc == 1.0);
+}
+
+TEST_CASE("H-Coll counts episodes in which bodies touched, not moves that were stopped before") {
+  const auto episode = [](bool blocked, bool touched) {
+    EpisodeTracker t;
+    t.reset(1.0);
+    const std::array<double, 1> gap{touched ? -0.01 : 1e-4};
+    t.add({0.1, false, blocked, touched, gap});
+    t.add({0.25, false, false, false, {}});
+    return t.finish(false, 0.5, 0.5, 0.2);
+  };
+  const std::array<EpisodeMetrics, 8> all{episode(false, false), episode(true, false),  episode(true, false),
+                                          episode(true, false),  episode(false, true),  episode(true, true),
+                                          episode(false, false), episode(false, false)};
+  CHECK_FALSE(all[1].human_collision);
+  CHECK(all[1].human_blocked);
+  CHECK(all[1].collision_rate == 0.5);
+  CHECK(all[4].human_collision);
+  CHECK_FALSE(all[4].human_blocked);
+  const MetricsSummary s = summarize(all);
+  CHECK(s.human_collision_episode_rate == 2.0 / 8);
+  CHECK(s.human_blocked_episode_rate == 4.0 / 8);
+  CHECK(s.disturbed_episode_rate == 5.0 / 8);
+  CHECK(s.psc == 0.5);  // each was near for one of two actions
 }
 
 TEST_CASE("an episode that stops at once") {

@@ -82,6 +82,23 @@ inline std::function<void(const char*, double)> navmesh_progress(const std::stri
   };
 }
 
+/// Prints on stderr how far visible sets are and how long the rest will take, from the third second on:
+/// as navmesh_progress does.
+inline std::function<void(double)> visible_progress() {
+  using Clock = std::chrono::steady_clock;
+  return [begin = Clock::now(), shown = Clock::time_point{}](double share) mutable {
+    const auto now = Clock::now();
+    const bool terminal = isatty(fileno(stderr)) != 0, last = share >= 1;
+    const double spent = std::chrono::duration<double>(now - begin).count();
+    const double since = std::chrono::duration<double>(now - shown).count();
+    if (spent < 2 || share <= 0 || (since < (terminal ? 0.2 : 10.0) && !(last && terminal))) return;
+    shown = now;
+    std::fprintf(stderr, terminal ? "\rvisible sets: %3.0f %%, about %.0f s left %s" : "visible sets: %3.0f %%, about %.0f s left%s",
+                 100 * share, spent * (1 - share) / share, terminal && !last ? "" : "\n");
+    std::fflush(stderr);
+  };
+}
+
 /// Puts cell size, crop and progress, under `name`, into what a NavMesh is built with.
 inline void apply(double cell_size, const std::vector<double>& crop, gsnav::NavMeshSettings& settings,
                   gsnav::GaussianNavOptions& how, const std::string& name = "NavMesh") {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gsnav/core/status.hpp"
@@ -12,6 +13,8 @@
 #include "options.hpp"
 
 namespace gsnav_eval {
+
+struct Stage;
 
 /// One finished episode: its metrics and its actions, from which all else follows again.
 struct Record {
@@ -22,28 +25,58 @@ struct Record {
   std::vector<gsnav::Action> actions;
 };
 
-/// A record as one line of JSON, and back (invalid_file).
+/// A record as one line of JSON; an infinite distance is null.
 std::string line_of(const Record& record);
-gsnav::Result<Record> record_of(const std::string& line);
+/// The record of a line, checked against the episodes of `stage`: its number and id are those of an
+/// episode, all metrics are there, in their ranges and fit each other and the actions.
+/// @return invalid_file: "WHERE: FIELD = VALUE: RULE".
+gsnav::Result<Record> record_of(const std::string& line, const std::string& where, const Stage& stage);
 
-/// `journal.jsonl`: the options, then a line for each finished episode in the order that they finished in. A line is
-/// written whole and at once, so that what was begun again goes on behind the last whole one. Of several ranks each but
-/// the first writes a `journal.RANK.jsonl`; all read what all have written, whatever their number was.
+/// What an evaluation is of: name and content hash of the scene's Gaussians, the NavMesh, the people's
+/// bodies and ways, and the episodes, as they were loaded or made.
+using Contents = std::vector<std::pair<std::string, std::string>>;
+Contents contents_of(const Stage& stage);
+
+/// `journal.jsonl`: a header with the format's version, the options and the contents' hashes, then a line
+/// for each finished episode in the order that they finished in. Of several ranks each but the first
+/// writes a `journal.RANK.jsonl`; all read what all have written, whatever their number was.
+///
+/// A line is on the disk (fdatasync) before `add` returns, and one that does not fit leaves nothing. A
+/// last line that a kill cut off is dropped and counted in `notes`; any other line that is no record of
+/// this evaluation is an error, and so are two records of one episode that differ.
 class Journal {
  public:
-  /// Opens or begins the journal of a folder, to be written by `rank`. Errors: invalid_argument where it is of an
-  /// evaluation with other options; invalid_file (names the line); file_not_found.
-  static gsnav::Result<Journal> open(const std::filesystem::path& folder, const Options& options, int rank = 0);
-  /// The same, of a folder that has one, for reading.
-  static gsnav::Result<Journal> load(const std::filesystem::path& folder, const Options& options);
+  /// Compares `options` with those in a folder's journals, before the scene is loaded; those of role
+  /// `view` only where `views`. ok without a journal.
+  /// @return invalid_argument, naming the option; invalid_file, naming file and line.
+  static gsnav::Status check_options(const std::filesystem::path& folder, const Options& options,
+                                     bool views = true);
+  /// The options that a folder's journal was recorded with.
+  static gsnav::Result<std::vector<OptionValue>> recorded_options(const std::filesystem::path& folder);
+  /// Opens or begins the journal of a folder, to be written by `rank`. Pictures of episodes that another
+  /// journal left are removed where one is begun by rank 0.
+  /// @return invalid_argument where its options or contents differ, naming what differs; invalid_file,
+  /// naming file, line, field and value; file_not_found.
+  static gsnav::Result<Journal> open(const std::filesystem::path& folder, const Options& options,
+                                     const Stage& stage, int rank = 0);
+  /// The same, of a folder that has one, for reading. Options of role `view` may differ.
+  static gsnav::Result<Journal> load(const std::filesystem::path& folder, const Options& options,
+                                     const Stage& stage);
+  /// Removes what gsnav-eval writes to a folder, so that it begins anew.
+  static gsnav::Status restart(const std::filesystem::path& folder);
 
   const std::map<std::size_t, Record>& records() const noexcept { return records_; }
+  /// What was dropped, a line each.
+  const std::vector<std::string>& notes() const noexcept { return notes_; }
   gsnav::Status add(Record record);
 
  private:
-  gsnav::Status read(const std::filesystem::path& path, const std::string& header, bool own);
+  gsnav::Status read(const std::filesystem::path& path, const Options& options, const Stage& stage,
+                     const Contents& made_of, bool own, bool views);
   std::filesystem::path path_;
   std::map<std::size_t, Record> records_;
+  std::map<std::size_t, std::string> places_;  // where each was read
+  std::vector<std::string> notes_;
 };
 
 }  // namespace gsnav_eval

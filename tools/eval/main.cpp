@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-eval: plays episodes by a policy, journals each as it ends, and makes a page of them.
+#include <chrono>
 #include <cstdio>
 #include <exception>
-#include <fstream>
+#include <nlohmann/json.hpp>
 
+#include "gsnav/core/printable.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/episode_file.hpp"
 #include "page.hpp"
 #include "pictures.hpp"
@@ -14,23 +17,66 @@ namespace {
 using gsnav::Status;
 namespace fs = std::filesystem;
 
-Status write(const fs::path& path, const std::string& text) {
-  std::ofstream out(path, std::ios::binary);
-  out << text;
-  if (!out.flush()) return {gsnav::Errc::file_not_found, path.string() + ": cannot be written"};
-  return {};
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
+
+double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
+
+/// Seconds of this run.
+struct Timings {
+  double load = 0, play = 0, pictures = 0;
+  std::size_t played = 0;
+};
+
+/// What came out: equal bytes for equal runs, on any number of threads, also where a run was broken off.
+std::string metrics_json(const Options& o, const gsnav::MetricsSummary& means, const Journal& journal, const Stage& stage) {
+  Json j;
+  for (const OptionValue& v : option_values(o)) {
+    if (v.role != OptionRole::view) j["options"][v.flag.substr(2)] = v.value;
+  }
+  for (const auto& [name, hash] : contents_of(stage)) j["contents"][name] = hash;
+  j["means"]["episodes"] = means.episodes;
+  for_each_metric(means, [&](const char* name, const auto& value) { j["means"][name] = value; });
+  j["episodes"] = Json::array();
+  for (const auto& [number, record] : journal.records()) {
+    Json e{{"episode", number}, {"id", record.id}, {"reward", record.reward}};
+    for_each_metric(record.metrics, [&](const char* name, const auto& value) { e[name] = value; });
+    j["episodes"].push_back(std::move(e));
+  }
+  return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-Status run(const Options& o, int pictures) {
+std::string timings_json(const Options& o, const Timings& t) {
+  return Json{{"load_s", t.load},          {"play_s", t.play},       {"pictures_s", t.pictures},
+              {"episodes_played", t.played}, {"threads", o.threads}}
+             .dump(2) +
+         "\n";
+}
+
+Status run(const Options& o, int pictures, bool restart) {
+  const fs::path out(o.out), episode_folder = out / "episodes";
+  for (const fs::path& folder : {out, episode_folder}) {
+    if (Status s = gsnav::make_output_folder(folder); !s) return s;
+  }
+  for (const char* name : {"journal.jsonl", "episodes.json.gz", "index.html", "metrics.json", "timings.json"}) {
+    if (Status s = gsnav::check_output_path(out / name); !s) return s;
+  }
+  if (Status s = restart ? Status() : Journal::check_options(out, o); !s) return s;
+  Timings timings;
+  Clock::time_point from = Clock::now();
   const auto stage = prepare(o);
   if (!stage) return stage.status();
-  auto journal = Journal::open(o.out, o);
+  if (Status s = restart ? Journal::restart(out) : Status(); !s) return s;
+  auto journal = Journal::open(out, o, *stage);
   if (!journal) return journal.status();
-  if (Status s = gsnav::io::save_episodes(fs::path(o.out) / "episodes.json.gz", stage->episodes); !s) return s;
+  for (const std::string& note : journal->notes()) std::fprintf(stderr, "%s\n", gsnav::printable(note).c_str());
+  if (Status s = gsnav::io::save_episodes(out / "episodes.json.gz", stage->episodes); !s) return s;
   gsnav::OpenMPBackend backend(o.threads);
   auto sim = Simulator::create(backend, stage->scene, stage->config);
   if (!sim) return sim.status();
+  timings.load = seconds_since(from);
 
+  from = Clock::now();
   gsnav::World world = sim->world();
   for (std::size_t i = 0; i < stage->episodes.size(); ++i) {
     if (journal->records().contains(i)) continue;
@@ -39,21 +85,23 @@ Status run(const Options& o, int pictures) {
     std::fprintf(stderr, "episode %zu/%zu: %s, SPL %.2f, %zu actions\n", i + 1, stage->episodes.size(),
                  record->metrics.success ? "reached" : "not reached", record->metrics.spl, record->metrics.steps);
     if (Status s = journal->add(std::move(*record)); !s) return s;
+    ++timings.played;
   }
+  timings.play = seconds_since(from);
 
+  from = Clock::now();
   std::vector<gsnav::EpisodeMetrics> metrics;
+  for (const auto& [number, record] : journal->records()) metrics.push_back(record.metrics);
+  const gsnav::MetricsSummary s = gsnav::summarize(metrics);
+  if (Status w = gsnav::replace_file(out / "metrics.json", metrics_json(o, s, *journal, *stage)); !w) return w;
   std::vector<Entry> entries;
-  std::error_code error;
-  fs::create_directories(fs::path(o.out) / "episodes", error);
-  if (error) return {gsnav::Errc::file_not_found, "--out " + o.out + ": " + error.message()};
   for (const auto& [number, record] : journal->records()) {
-    metrics.push_back(record.metrics);
     Entry e{&record, {}, {}};
     if (pictures < 0 || static_cast<std::size_t>(pictures) > number) {
-      const fs::path base = fs::path(o.out) / "episodes" / std::to_string(number);
+      const fs::path base = episode_folder / std::to_string(number);
       const fs::path strip = base.string() + "_strip.png", map = base.string() + "_map.png";
       if (!fs::exists(strip) || !fs::exists(map)) {
-        if (Status s = draw(*sim, *stage, record, strip, map); !s) return s;
+        if (Status w = draw(*sim, *stage, record, strip, map); !w) return w;
       }
       for (const auto& [file, picture] : {std::pair{strip, &e.strip}, {map, &e.map}}) {
         auto read = page_picture(file.string());
@@ -63,10 +111,12 @@ Status run(const Options& o, int pictures) {
     }
     entries.push_back(std::move(e));
   }
-  const gsnav::MetricsSummary s = gsnav::summarize(metrics);
-  std::printf("%zu episodes: SR %.3f  SPL %.3f  SoftSPL %.3f  STL %.3f  DTG %.2f m  CR %.4f  PSI %.4f\n", s.episodes,
-              s.success_rate, s.spl, s.soft_spl, s.stl, s.distance_to_goal, s.collision_rate, s.psi);
-  return write(fs::path(o.out) / "index.html", page(o, s, entries));
+  timings.pictures = seconds_since(from);
+  std::printf("%zu episodes: SR %.3f  SPL %.3f  SoftSPL %.3f  STL %.3f  DTG %.2f m  CR %.4f  H-Coll %.4f  PSI %.4f  PSC %.4f\n",
+              s.episodes, s.success_rate, s.spl, s.soft_spl, s.stl, s.distance_to_goal, s.collision_rate,
+              s.human_collision_episode_rate, s.psi, s.psc);
+  if (Status w = gsnav::replace_file(out / "timings.json", timings_json(o, timings)); !w) return w;
+  return gsnav::replace_file(out / "index.html", page(o, s, entries));
 }
 
 }  // namespace
@@ -76,12 +126,15 @@ int main(int argc, char** argv) try {
   gsnav_eval::Options o;
   int pictures = -1;
   CLI::App app{
-      "Evaluates a policy: episodes.json.gz, journal.jsonl (a line for each episode as it ends, its actions with it) and\n"
-      "index.html, one page with metrics, pictures and maps. Started again it plays what is missing."};
+      "Evaluates a policy and writes episodes.json.gz, journal.jsonl (a line for each episode as it ends, its actions with\n"
+      "it), metrics.json, timings.json and index.html, one page with metrics, pictures and maps. Started again it plays\n"
+      "what is missing, if options and the contents of scene, NavMesh, people and episodes are those of the journal."};
   gsnav_eval::add_world_options(app, o);
   app.add_option("--pictures", pictures, "so many episodes have pictures on the page; -1: all")->capture_default_str();
+  bool restart = false;
+  app.add_flag("--restart", restart, "remove the evaluation that --out has, and begin anew");
   CLI11_PARSE(app, argc, argv);
-  const gsnav::Status s = gsnav_eval::run(o, pictures);
+  const gsnav::Status s = gsnav_eval::run(o, pictures, restart);
   if (!s) std::fprintf(stderr, "gsnav-eval: %s\n", s.message().c_str());
   return s ? 0 : 1;
 } catch (const std::exception& e) {

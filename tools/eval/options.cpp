@@ -1,7 +1,95 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "options.hpp"
 
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <sstream>
+#include <string_view>
+#include <type_traits>
+
 namespace gsnav_eval {
+namespace {
+
+template <class T>
+std::string text_of(const T& value) {
+  if constexpr (std::is_same_v<T, std::string>) {
+    return value;
+  } else if constexpr (std::is_arithmetic_v<T>) {
+    std::array<char, 32> text{};
+    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};  // the shortest that reads back
+  } else {
+    std::string all;
+    for (const auto& v : value) all += (all.empty() ? "" : " ") + text_of(v);
+    return all;
+  }
+}
+
+/// Calls f(flag, value, role, whether the value is a file's name) for each option that decides something.
+template <class O, class F>
+void for_each_option(O& o, const F& f) {
+  using enum OptionRole;
+  f("--scene", o.scene, file, !o.scene.empty());
+  f("--density", o.density, result, false);
+  f("--up", o.up, result, false);
+  f("--navmesh", o.navmesh, file, o.ready_made());
+  f("--cell-size", o.cell_size, result, false);
+  f("--crop", o.crop, result, false);
+  f("--avatars", o.avatars, result, false);
+  f("--episodes", o.episodes, result, false);
+  f("--episode-file", o.episode_file, file, !o.episode_file.empty());
+  f("--preset", o.preset, result, false);
+  f("--policy", o.policy, result, false);
+  f("--seed", o.seed, result, false);
+  f("--max-steps", o.max_steps, result, false);
+  f("--width", o.width, view, false);
+  f("--height", o.height, view, false);
+  f("--hfov", o.hfov, view, false);
+  f("--eye-height", o.eye_height, view, false);
+}
+
+}  // namespace
+
+std::vector<OptionValue> option_values(const Options& o) {
+  std::vector<OptionValue> out;
+  for_each_option(o, [&](const char* flag, const auto& value, OptionRole role, bool names_file) {
+    out.push_back({flag, text_of(value), role, names_file});
+  });
+  return out;
+}
+
+gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& values, Options& options) {
+  std::vector<std::string> words;
+  for (const OptionValue& v : values) {
+    if (v.value.empty() || app.get_option(v.flag)->count() > 0) continue;
+    if (v.flag == "--crop") {
+      words.push_back(v.flag);
+      std::istringstream numbers(v.value);
+      for (std::string one; numbers >> one;) words.push_back(one);
+    } else {
+      words.push_back(v.flag + "=" + v.value);
+    }
+  }
+  std::reverse(words.begin(), words.end());  // as CLI11 wants them
+  CLI::App again;
+  Options read;
+  add_world_options(again, read);
+  try {
+    again.parse(words);
+  } catch (const CLI::ParseError& e) {
+    return {gsnav::Errc::invalid_argument, e.what()};
+  }
+  // What the command line gave stays: it is compared with the journal's later.
+  for_each_option(options, [&](const char* flag, auto& to, OptionRole, bool) {
+    if (app.get_option(flag)->count() > 0) return;
+    for_each_option(read, [&](const char* other, auto& from, OptionRole, bool) {
+      if constexpr (std::is_same_v<decltype(to), decltype(from)>) {
+        if (std::string_view(flag) == other) to = from;
+      }
+    });
+  });
+  return {};
+}
 
 void add_scene_options(CLI::App& app, Options& o) {
   app.add_option("--scene", o.scene, "scene to load; without: the embedded flat");

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
 #include "../../examples/nav_loop/options.hpp"
 
@@ -19,5 +20,24 @@ struct Options : nav_loop::Options {
 void add_scene_options(CLI::App& app, Options& options);
 /// These and the policy: the options that decide what happens: an evaluation goes on, and is replayed, only with the same ones.
 void add_world_options(CLI::App& app, Options& options);
+
+/// What an option of add_world_options decides.
+enum class OptionRole {
+  result,  ///< what happens
+  file,    ///< what happens, by the content of the file that it names
+  view,    ///< the pictures
+};
+/// An option as a command line has it.
+struct OptionValue {
+  std::string flag;   ///< with its dashes
+  std::string value;  ///< several numbers are separated by spaces
+  OptionRole role = OptionRole::result;
+  bool names_file = false;  ///< the value is a file's name
+};
+/// All options that decide something: not --out, and not --threads, which changes no bit.
+std::vector<OptionValue> option_values(const Options& options);
+/// Sets those options that `app` was not given from `values`, by the rules of the command line. Errors:
+/// invalid_argument, naming the option.
+gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& values, Options& options);
 
 }  // namespace gsnav_eval

@@ -59,7 +59,9 @@ std::string page(const Options& o, const gsnav::MetricsSummary& s, const std::ve
   row(out, "distance to goal (DTG)", "m", s.distance_to_goal);
   row(out, "collision rate with people (CR)", "", s.collision_rate);
   row(out, "personal space intrusion (PSI)", "", s.psi);
-  row(out, "episodes that met somebody", "", s.human_collision_episode_rate);
+  row(out, "personal space compliance (PSC)", "", s.psc);
+  row(out, "episodes with somebody touched (H-Coll)", "", s.human_collision_episode_rate);
+  row(out, "episodes with a move stopped by somebody", "", s.human_blocked_episode_rate);
   row(out, "wall collisions an episode", "", s.collisions);
   row(out, "actions an episode", "", s.steps);
   row(out, "path", "m", s.path_length);

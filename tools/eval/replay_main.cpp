@@ -7,6 +7,8 @@
 #include <memory>
 #include <optional>
 
+#include "gsnav/core/printable.hpp"
+#include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/npz_file.hpp"
 #include "pictures.hpp"
@@ -73,18 +75,20 @@ struct Track {
 };
 
 Status run(const Options& o, const ReplayOptions& r) {
-  const auto journal = Journal::load(o.out, o);
+  if (Status s = r.video.empty() ? Status() : gsnav::check_output_path(r.video); !s) return s;
+  if (Status s = gsnav::make_output_folder(r.frames); !s) return s;
+  if (Status s = gsnav::check_output_path(fs::path(r.frames) / "track.npz"); !s) return s;
+  const auto stage = prepare(o);
+  if (!stage) return stage.status();
+  const auto journal = Journal::load(o.out, o, *stage);
   if (!journal) return journal.status();
+  for (const std::string& note : journal->notes()) {
+    std::fprintf(stderr, "%s\n", gsnav::printable(note).c_str());
+  }
   const auto found = journal->records().find(r.episode);
   if (found == journal->records().end()) {
     return {Errc::invalid_argument, "--episode " + std::to_string(r.episode) + ": the journal has no such episode"};
   }
-  const auto stage = prepare(o);
-  if (!stage) return stage.status();
-  if (r.episode >= stage->episodes.size()) return {Errc::invalid_argument, "--episode: there are fewer"};
-  std::error_code error;
-  fs::create_directories(r.frames, error);
-  if (error) return {Errc::file_not_found, "--frames " + r.frames + ": " + error.message()};
   gsnav::OpenMPBackend backend(o.threads);
   auto sim = Simulator::create(backend, stage->scene, stage->config);
   if (!sim) return sim.status();
@@ -133,7 +137,8 @@ int main(int argc, char** argv) try {
   gsnav_eval::ReplayOptions r;
   CLI::App app{
       "Plays an episode of an evaluation once more, by its recorded actions, and writes what a camera sees as PNG files\n"
-      "and where everything was as track.npz. The options are those that the evaluation was made with."};
+      "and where everything was as track.npz. Options of the evaluation come from its journal (--out): what happens\n"
+      "cannot be another; files may be given where they lie now, and the camera's options may differ."};
   gsnav_eval::add_world_options(app, o);
   app.add_option("--episode", r.episode, "its number, from 0")->capture_default_str();
   app.add_option("--eye", r.eye, "camera that stands, x y z in metres; without: the agent's own")->expected(3);
@@ -143,7 +148,14 @@ int main(int argc, char** argv) try {
   app.add_option("--video", r.video, "an .mp4 in place of PNG files, by ffmpeg");
   app.add_option("--every", r.every, "every so many actions a frame")->capture_default_str()->check(CLI::Range(1, 100000));
   CLI11_PARSE(app, argc, argv);
-  const gsnav::Status s = gsnav_eval::run(o, r);
+  gsnav::Status s;
+  if (const auto recorded = gsnav_eval::Journal::recorded_options(o.out); !recorded) {
+    s = recorded.status();
+  } else if (s = gsnav_eval::take_options(app, *recorded, o); !s) {
+    s = {s.code(), o.out + "/journal.jsonl: line 1: " + s.message()};
+  } else if (s = gsnav_eval::Journal::check_options(o.out, o, false); s) {
+    s = gsnav_eval::run(o, r);
+  }
   if (!s) std::fprintf(stderr, "gsnav-replay: %s\n", s.message().c_str());
   return s ? 0 : 1;
 } catch (const std::exception& e) {

@@ -8,6 +8,7 @@
 #include <map>
 #include <vector>
 
+#include "../../examples/nav_loop/navmesh_options.hpp"
 #include "draw.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/replace_file.hpp"
@@ -75,18 +76,20 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   if (!viewpoints) return viewpoints.status();
   VisibleSettings settings = o.visible;
   settings.margin = settings.spacing();
-  settings.progress = [terminal = isatty(fileno(stdout)) != 0](double share) {
-    if (terminal) std::printf("\rvisible sets: %.0f %%", 100 * share);
-    if (terminal) std::fflush(stdout);
-  };
+  settings.progress = nav_loop::visible_progress();
   OpenMPBackend backend(o.threads);
   const auto sets = build_visible_sets(backend, cloud, *viewpoints, settings, placed);
+  if (sets.code() == Errc::unsupported) {
+    std::fprintf(stderr, "%s (--visible-most 1). %s is not written.\n", sets.message().c_str(),
+                 printable(o.visible_sets).c_str());
+    return {};
+  }
   if (!sets) return sets.status();
   if (Status s = io::save_visible_sets(o.visible_sets, *sets, cloud); !s) return s;
   std::printf(
-      "%s%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the "
+      "%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the "
       "Gaussians\n",
-      isatty(fileno(stdout)) != 0 ? "\r" : "", printable(o.visible_sets).c_str(), sets->cells(),
+      printable(o.visible_sets).c_str(), sets->cells(),
       sets->viewpoints, 100 * sets->mean_share(), sets->cloud_chunks,
       100 * sets->mean_row_share(cloud.size()));
   return {};

@@ -224,6 +224,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
           "How many neighbouring Gaussians are seen or not together, up to 32; 0: a whole chunk of 256");
   setting("--visible-face", v.face,
           "Pixels that span 90 degrees: for cameras of no larger focal length");
+  setting("--visible-most", v.most_share,
+          "Write no file where cells of a sample see more than this share: nothing is gained (1: write it)");
   setting("--near-plane", v.near_plane, "Of cameras, at most; metres");
   try {
     app.parse(argc, argv);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -129,6 +130,10 @@ struct VisibleSettings {
   int face = 256;            ///< pixels along a face of the cube that is looked at from each viewpoint
   double near_plane = 0.2;   ///< of these images (Camera); what lies nearer to a cell is in its set in any case
   double near_sigma = 0;     ///< likewise
+  /// Gives up early where sets gain nothing: in the open a cell sees nearly all. 16 cells, spread evenly,
+  /// are finished first; where they see more than this share of the Gaussians on average,
+  /// build_visible_sets returns unsupported. In (0, 1]; 1: never. Fewer than 64 cells are all found.
+  double most_share = 0.9;
 
   /// How far apart viewpoints should be (navmesh_viewpoints): with a margin of as much every cell has several, each
   /// with its own directions.
@@ -162,6 +167,8 @@ inline Status validate(const VisibleSettings& s) {
     return bad("near_plane", s.near_plane, "must be positive");
   if (!(s.near_sigma >= 0 && is_finite(s.near_sigma)))
     return bad("near_sigma", s.near_sigma, "must be >= 0");
+  if (!(s.most_share > 0 && s.most_share <= 1))
+    return bad("most_share", s.most_share, "must be in (0, 1]");
   return {};
 }
 
@@ -220,6 +227,15 @@ class SeenOfCell {
     for (std::size_t k = 0; k < kSeenRowWords; ++k) to[k] |= rows[k];
   }
 
+  /// How many Gaussians.
+  std::size_t count() const noexcept {
+    std::size_t sum = 0;
+    for (const RowBits& r : rows_) {
+      for (const std::uint32_t word : r) sum += static_cast<std::size_t>(count_bits(word));
+    }
+    return sum;
+  }
+
   /// As GaussianView::seen has it.
   void append_to(std::vector<std::uint32_t>& bits, bool with_rows) const {
     const std::size_t begin = bits.size(), words = (places_.size() + 31) / 32;
@@ -242,6 +258,10 @@ class SeenOfCell {
   std::vector<std::uint32_t> places_;  // [chunks] into rows_
   std::vector<RowBits> rows_;
 };
+
+/// Cells that are looked at before it is said whether sets are worth their time, and the least number of
+/// cells for which it is asked.
+inline constexpr std::size_t kSampleCells = 16, kLeastSampled = 64;
 
 /// Cameras that look at the six faces of a cube, turned about the world's up (Y) by another angle for
 /// each viewpoint: in what order Gaussians are blended depends on where a camera looks, so that some are
@@ -272,7 +292,7 @@ inline std::array<Camera, 6> cube_cameras(const Vec3d& eye, std::size_t viewpoin
 /// any number of threads.
 ///
 /// Errors: invalid_argument (a setting; no viewpoint, or one that is not finite; a cloud that is not in
-/// spatial order); those of rendering.
+/// spatial order); unsupported (VisibleSettings::most_share: nothing is gained, draw without sets); those of rendering.
 template <Backend B>
 requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
     B& backend, const GaussianCloud& cloud, std::span<const Vec3d> viewpoints,
@@ -332,22 +352,49 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   RowWeightsWorkspace<B> workspace(backend);
   std::vector<float> most(cloud.size());
   std::vector<detail::RowBits> rows(out.cloud_chunks);
-  for (std::size_t v = 0; v < viewpoints.size(); ++v) {
+  const auto counts_for = [&](std::size_t cell, std::size_t v) {
+    Vec3d low, high;
+    box_of(out.keys[cell], low, high);
+    return detail::box_distance(low, high, eyes[v], eyes[v]) <= margin;
+  };
+  // Viewpoints of the sample come first. What is found does not depend on the order.
+  std::vector<std::size_t> sample, order(viewpoints.size());
+  if (settings.most_share < 1 && out.cells() >= detail::kLeastSampled) {
+    for (std::size_t k = 0; k < detail::kSampleCells; ++k) sample.push_back((2 * k + 1) * out.cells() / (2 * detail::kSampleCells));
+  }
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto rest = std::stable_partition(order.begin(), order.end(), [&](std::size_t v) {
+    return std::any_of(sample.begin(), sample.end(), [&](std::size_t c) { return counts_for(c, v); });
+  });
+  const auto sampled = static_cast<std::size_t>(rest - order.begin());
+  for (std::size_t done = 0; done < order.size(); ++done) {
+    const std::size_t v = order[done];
+    if (done == sampled && !sample.empty()) {
+      double share = 0;
+      for (const std::size_t c : sample) share += static_cast<double>(found[c].count());
+      share /= static_cast<double>(sample.size()) * static_cast<double>(std::max<std::size_t>(cloud.size(), 1));
+      if (share > settings.most_share) {
+        return Status(Errc::unsupported,
+                      "visible sets gain nothing here: " + std::to_string(sample.size()) + " of " +
+                          std::to_string(out.cells()) + " cells see " + std::to_string(std::lround(100 * share)) +
+                          " % of the Gaussians on average, more than most_share = " +
+                          std::to_string(std::lround(100 * settings.most_share)) +
+                          " %. Draw without them, or set most_share = 1");
+      }
+    }
     std::fill(most.begin(), most.end(), 0.0f);
     for (const Camera& camera : detail::cube_cameras(viewpoints[v], v, settings)) {
       if (Status s = add_row_weights(backend, workspace, set, camera, most); !s) return s;
     }
     backend.parallel_for(rows.size(), [&](std::size_t i) { rows[i] = detail::seen_rows(most, i, settings); });
     backend.parallel_for(out.cells(), [&](std::size_t c) {
-      Vec3d low, high;
-      box_of(out.keys[c], low, high);
-      if (detail::box_distance(low, high, eyes[v], eyes[v]) > margin) return;
+      if (!counts_for(c, v)) return;
       for (std::size_t i = 0; i < rows.size(); ++i) {
         if (rows[i] != detail::RowBits{}) found[c].add(i, rows[i]);
       }
     });
     if (settings.progress)
-      settings.progress(static_cast<double>(v + 1) / static_cast<double>(viewpoints.size()));
+      settings.progress(static_cast<double>(done + 1) / static_cast<double>(order.size()));
   }
   for (detail::SeenOfCell& of_cell : found) {
     of_cell.append_to(out.bits, settings.rows != 0);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <type_traits>
 
 #include "gsnav/math/functions.hpp"
 
@@ -54,12 +55,24 @@ inline double intrusion(double d) noexcept {
   return d < kPersonalSpace ? clamp(1.0 - d / kPersonalSpace, 0.0, 1.0) : 0.0;
 }
 
+/// A person's space is kept where the agent's surface is at least this far from the avatar's, metres.
+///
+/// Personal Space Compliance of the SocialNav benchmark (Gong et al. 2024, "From Cognition to
+/// Precognition", Falcon) counts the steps in which no person is nearer than 1.0 m, between the centres
+/// of bodies of 0.25 m (robot) and 0.3 m (person). Here distances are between surfaces, so that agents
+/// and people of any size compare: 1.0 - 0.25 - 0.3 = 0.45 m.
+inline constexpr double kCompliantGap = 0.45;
+
+/// Whether the agent keeps out of a person's space (kCompliantGap). d as of `intrusion`.
+inline bool keeps_personal_space(double d) noexcept { return d >= kCompliantGap; }
+
 /// What one action did, for the metrics. `stop` is no step.
 struct StepRecord {
   double moved = 0.0;            ///< metres from the position before to the one after, straight
   bool wall_collision = false;   ///< an edge of the NavMesh stopped or turned the move
   bool capsule_blocked = false;  ///< an avatar stopped or turned the move
-  bool avatar_contact = false;   ///< touched during the step, whoever's fault
+  bool avatar_contact = false;   ///< bodies touched during the step, whoever's fault; a move that was
+                                 ///< stopped before they did is `capsule_blocked` only
   /// Smallest distance during the step to each avatar that is active, metres; empty with none.
   std::span<const double> avatar_distances{};
 };
@@ -74,7 +87,10 @@ struct EpisodeMetrics {
   double euclidean_distance_to_goal = 0.0;  ///< straight, metres
   double collision_rate = 0.0;      ///< CR: steps with avatar contact or a capsule-blocked move / steps
   double psi = 0.0;                 ///< mean intrusion over steps and avatars active then; 0 with none
-  bool human_collision = false;     ///< any step of the episode counted by CR
+  double psc = 1.0;                 ///< steps in which the agent kept out of everybody's space / steps,
+                                    ///< in [0, 1]; 1 with nobody there or no step
+  bool human_collision = false;     ///< H-Coll: a person was touched in some step, whoever's fault
+  bool human_blocked = false;       ///< a person stopped or turned a move in some step
   std::size_t collisions = 0;       ///< steps that ran into a wall
   std::size_t collision_steps = 0;  ///< steps counted by CR
   std::size_t steps = 0;            ///< actions, stop excluded
@@ -99,15 +115,17 @@ class EpisodeTracker {
     ++m_.steps;
     m_.path_length += r.moved;
     m_.collisions += r.wall_collision ? 1 : 0;
-    if (r.avatar_contact || r.capsule_blocked) {
-      ++m_.collision_steps;
-      m_.human_collision = true;
-    }
+    m_.collision_steps += r.avatar_contact || r.capsule_blocked ? 1 : 0;
+    m_.human_collision = m_.human_collision || r.avatar_contact;
+    m_.human_blocked = m_.human_blocked || r.capsule_blocked;
+    bool compliant = true;
     for (const double d : r.avatar_distances) {
+      compliant = compliant && keeps_personal_space(d);
       intrusion_ += intrusion(d);
       ++pairs_;
       m_.min_clearance = min(d, m_.min_clearance);
     }
+    compliant_ += compliant ? 1 : 0;
   }
 
   /// The metrics if the episode ended here, `geodesic` and `euclidean` metres from the goal.
@@ -124,6 +142,7 @@ class EpisodeTracker {
     m.collision_rate =
         m.steps == 0 ? 0.0 : static_cast<double>(m.collision_steps) / static_cast<double>(m.steps);
     m.psi = pairs_ == 0 ? 0.0 : intrusion_ / static_cast<double>(pairs_);
+    m.psc = m.steps == 0 ? 1.0 : static_cast<double>(compliant_) / static_cast<double>(m.steps);
     return m;
   }
 
@@ -132,6 +151,7 @@ class EpisodeTracker {
   double forward_step_ = 0.25;
   double intrusion_ = 0.0;
   std::size_t pairs_ = 0;
+  std::size_t compliant_ = 0;
 };
 
 /// Means over episodes, each episode counting once.
@@ -145,8 +165,14 @@ struct MetricsSummary {
   double euclidean_distance_to_goal = 0.0;
   double collision_rate = 0.0;  ///< CR
   double psi = 0.0;
-  double collisions = 0.0;                    ///< wall hits an episode
-  double human_collision_episode_rate = 0.0;  ///< episodes with any step counted by CR / episodes
+  double psc = 0.0;
+  double collisions = 0.0;  ///< wall hits an episode
+  /// H-Coll of the SocialNav benchmark (Falcon): episodes in which a person was touched / episodes, in
+  /// [0, 1]. There nothing stops a robot short of a person; here the step filter does, and what it
+  /// stopped is counted by the next two.
+  double human_collision_episode_rate = 0.0;
+  double human_blocked_episode_rate = 0.0;    ///< episodes in which a person stopped a move / episodes
+  double disturbed_episode_rate = 0.0;  ///< episodes with any step counted by CR / episodes: either of both
   double steps = 0.0;
   double path_length = 0.0;
   double min_clearance = std::numeric_limits<double>::infinity();  ///< the least of all episodes
@@ -166,19 +192,51 @@ inline MetricsSummary summarize(std::span<const EpisodeMetrics> episodes) noexce
     s.euclidean_distance_to_goal += e.euclidean_distance_to_goal;
     s.collision_rate += e.collision_rate;
     s.psi += e.psi;
+    s.psc += e.psc;
     s.collisions += static_cast<double>(e.collisions);
     s.human_collision_episode_rate += e.human_collision ? 1.0 : 0.0;
+    s.human_blocked_episode_rate += e.human_blocked ? 1.0 : 0.0;
+    s.disturbed_episode_rate += e.collision_steps > 0 ? 1.0 : 0.0;
     s.steps += static_cast<double>(e.steps);
     s.path_length += e.path_length;
     s.min_clearance = min(e.min_clearance, s.min_clearance);
   }
   const double n = static_cast<double>(episodes.size());
   for (double* v : {&s.success_rate, &s.spl, &s.soft_spl, &s.stl, &s.distance_to_goal,
-                    &s.euclidean_distance_to_goal, &s.collision_rate, &s.psi, &s.collisions,
-                    &s.human_collision_episode_rate, &s.steps, &s.path_length}) {
+                    &s.euclidean_distance_to_goal, &s.collision_rate, &s.psi, &s.psc, &s.collisions,
+                    &s.human_collision_episode_rate, &s.human_blocked_episode_rate,
+                    &s.disturbed_episode_rate, &s.steps, &s.path_length}) {
     *v /= n;
   }
   return s;
+}
+
+/// Calls f(name, value) for each metric of an episode, by the names that files have.
+template <class M, class F>
+  requires std::is_same_v<std::remove_const_t<M>, EpisodeMetrics>
+void for_each_metric(M& m, const F& f) {
+  f("success", m.success), f("spl", m.spl), f("soft_spl", m.soft_spl), f("stl", m.stl);
+  f("distance_to_goal", m.distance_to_goal);
+  f("euclidean_distance_to_goal", m.euclidean_distance_to_goal);
+  f("collision_rate", m.collision_rate), f("psi", m.psi), f("psc", m.psc);
+  f("human_collision", m.human_collision), f("human_blocked", m.human_blocked);
+  f("collisions", m.collisions), f("collision_steps", m.collision_steps), f("steps", m.steps);
+  f("start_distance", m.start_distance), f("path_length", m.path_length);
+  f("min_clearance", m.min_clearance), f("stop_called", m.stop_called);
+}
+/// The same for the means over episodes.
+template <class M, class F>
+  requires std::is_same_v<std::remove_const_t<M>, MetricsSummary>
+void for_each_metric(M& s, const F& f) {
+  f("success_rate", s.success_rate), f("spl", s.spl), f("soft_spl", s.soft_spl), f("stl", s.stl);
+  f("distance_to_goal", s.distance_to_goal);
+  f("euclidean_distance_to_goal", s.euclidean_distance_to_goal);
+  f("collision_rate", s.collision_rate), f("psi", s.psi), f("psc", s.psc);
+  f("human_collision_episode_rate", s.human_collision_episode_rate);
+  f("human_blocked_episode_rate", s.human_blocked_episode_rate);
+  f("disturbed_episode_rate", s.disturbed_episode_rate);
+  f("collisions", s.collisions), f("steps", s.steps), f("path_length", s.path_length);
+  f("min_clearance", s.min_clearance);
 }
 
 }  // namespace gsnav

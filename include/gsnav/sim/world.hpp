@@ -33,7 +33,8 @@ struct StepInfo {
   bool collided = false;  ///< a wall or an avatar stopped or turned the move
   bool wall_collision = false;
   bool capsule_blocked = false;  ///< an avatar stopped or turned the move
-  bool avatar_contact = false;   ///< an avatar was touched, whoever's fault
+  bool avatar_contact = false;   ///< counted by CR: an avatar was touched or stopped the move
+  bool avatar_touched = false;   ///< counted by H-Coll: bodies touched, whoever's fault
   bool pushed_into = false;      ///< an avatar walked into the agent where it stood
   double moved = 0.0;            ///< metres, straight
   /// Smallest distance to any avatar during the step, metres; infinity with none.
