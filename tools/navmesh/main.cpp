@@ -8,7 +8,7 @@
 #include <map>
 #include <vector>
 
-#include "../../examples/nav_loop/navmesh_options.hpp"
+#include "../common/navmesh_options.hpp"
 #include "draw.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/replace_file.hpp"
