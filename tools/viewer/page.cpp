@@ -24,7 +24,7 @@ figcaption{display:flex;gap:.6em;align-items:center;padding:.25em 0;min-height:1
 #bar input[type=range]{flex:1 1 12em;min-width:8em}
 button{background:#262a32;color:inherit;border:1px solid var(--line);border-radius:6px;padding:.3em .9em;font:inherit;cursor:pointer}
 button:hover{background:#323844}:focus-visible{outline:2px solid #7aa7ff;outline-offset:2px}
-dl{display:grid;grid-template-columns:repeat(auto-fit,minmax(8.6em,1fr));gap:.4em;margin:0}
+dl{display:grid;grid-template-columns:repeat(auto-fit,minmax(7.6em,1fr));gap:.4em;margin:0}
 dl div{border:1px solid var(--line);border-radius:6px;padding:.25em .6em}dt{font-size:.85em}
 dd{margin:0;font-variant-numeric:tabular-nums;font-size:1.1em}
 kbd{border:1px solid var(--line);border-radius:4px;padding:0 .35em;font:inherit}
@@ -86,7 +86,7 @@ function show(s) {
     ["distance to goal", number(m.distance_to_goal, 2, " m")], ["path", number(m.path_length, 2, " m")],
     ["shortest way", number(m.shortest_path, 2, " m")], ["SPL", number(m.spl, 3, "")],
     ["SoftSPL", number(m.soft_spl, 3, "")], ["nearest person", number(m.clearance, 2, " m")],
-    ["collisions (CR)", number(m.collision_rate, 3, "")], ["intrusion (PSI)", number(m.psi, 3, "")],
+    ["collisions (CR)", number(m.collision_rate, 3, "")], ["intrusion (PSI)", number(m.psi, 3, "")], ["compliance (PSC)", number(m.psc, 3, "")],
     ["wall collisions", number(m.collisions, 0, "")], ["actions", number(m.steps, 0, "")]];
   $("metrics").replaceChildren(...cards.map(([name, value]) => {
     const card = document.createElement("div"), dt = document.createElement("dt"), dd = document.createElement("dd");

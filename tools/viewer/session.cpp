@@ -303,6 +303,7 @@ std::string Session::describe(const Controls& c, std::uint64_t number) const {
         {"collisions", m.collisions},
         {"collision_rate", m.collision_rate},
         {"psi", m.psi},
+        {"psc", m.psc},
         {"clearance", world_.last_step().avatar_clearance}}}}
       // File names are bytes: those that are no UTF-8 become U+FFFD.
       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
