@@ -157,7 +157,7 @@ Status CsvFile::add(Row row) {
   // One write a line: a run that is cut off leaves whole lines.
   const std::string line = row.line();
   out_.write(line.data(), static_cast<std::streamsize>(line.size())).flush();
-  if (!out_) return {Errc::write_failed, path_.string() + ": cannot be written"};
+  if (!out_) return {Errc::file_not_found, path_.string() + ": cannot be written"};
   keys_.insert(row.get("key"));
   rows_.push_back(std::move(row));
   return {};
@@ -171,7 +171,7 @@ Status CsvFile::save() {
   });
   if (!saved) return saved;
   out_.open(path_, std::ios::binary | std::ios::app);
-  if (!out_) return {Errc::write_failed, path_.string() + ": cannot be written"};
+  if (!out_) return {Errc::file_not_found, path_.string() + ": cannot be written"};
   return {};
 }
 

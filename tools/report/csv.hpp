@@ -108,7 +108,7 @@ gsnav::Result<std::vector<Row>> parse_csv(const std::string& text, const std::st
 /// whenever the run ends.
 class CsvFile {
  public:
-  /// Starts the file, or with `resume` takes up what is there. Errors: write_failed,
+  /// Starts the file, or with `resume` takes up what is there. Errors: file_not_found (cannot be written),
   /// invalid_file (resumed file is none of the report's).
   static gsnav::Result<CsvFile> open(const std::filesystem::path& path, bool resume);
 
