@@ -156,7 +156,9 @@ TEST_CASE("lod set: what makes no sense") {
   for (int k = 0; k < 100000; ++k) deep += R"({"children":[)";
   for (int k = 0; k < 100000; ++k) deep += "]}";
   write_file(set.folder / "lod-meta.json", deep + "}");
-  CHECK(io::load_lod_set(set.folder.path()).value().cloud.size() == 0);
+  const Status refused = io::load_lod_set(set.folder.path()).status();
+  CHECK(refused.code() == Errc::unsupported);
+  CHECK(refused.message().find("json_depth") != std::string::npos);
 }
 
 TEST_CASE("lod set: levels to be drawn by view, each box's own") {
