@@ -51,7 +51,7 @@ struct SplatBounds {
   std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
-/// The same as whole numbers in floating point: of one splat, or of one a lane.
+/// SplatBounds as whole numbers in floating point, for one splat or a pack of splats.
 template <class L>
 struct PixelBox {
   L x0{}, y0{}, x1{}, y1{};

@@ -86,7 +86,7 @@ inline void count_tiles(const CountTileIntersections<float>& kernel, std::size_t
   std::uint64_t count = 0;
   for (std::size_t t = 0; t < tiles; ++t) change[t] = count += change[t];
 }
-/// The same where a mesh hides some: tile by tile.
+/// Counts tile by tile, since a mesh hides splats in some of their tiles.
 inline void count_tiles_before_mesh(const CountTileIntersections<float, MeshCull<float>>& kernel,
                                     std::size_t block) noexcept {
   const BinArgs<float>& args = kernel.args;
