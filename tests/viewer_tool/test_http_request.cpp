@@ -45,6 +45,8 @@ TEST_CASE("what is no request is refused by what is wrong with it") {
   const auto fields = [](const std::string& more) { return status("POST / HTTP/1.1\r\n" + more + "\r\n"); };
   CHECK(fields("") == 400);  // HTTP/1.1 without a host
   CHECK(fields(kHost + kHost) == 400);
+  CHECK(fields(kHost + "Origin: http://a\r\nOrigin: http://b\r\n") == 400);
+  CHECK(fields(kHost + "Sec-Fetch-Site: none\r\nSec-Fetch-Site: cross-site\r\n") == 400);
   CHECK(fields(kHost + "no colon\r\n") == 400);
   CHECK(fields(kHost + "a b: c\r\n") == 400);
   CHECK(fields(kHost + ": c\r\n") == 400);

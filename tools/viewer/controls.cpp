@@ -25,7 +25,7 @@ constexpr double kMostTime = 100000;  // seconds
 Status apply(std::string_view message, Controls& controls) {
   Controls c = controls;
   c.seen.reset();
-  c.steers = false;
+  c.steers = c.walks = false;
   const auto bad = [](std::string_view name, const char* rule) {
     return Status(Errc::invalid_argument, std::string(name.substr(0, 40)).append(": ").append(rule));
   };
@@ -48,6 +48,7 @@ Status apply(std::string_view message, Controls& controls) {
     bool good = false;
     double once = 0;
     c.steers = c.steers || name != "seen";
+    c.walks = c.walks || name == "forward" || name == "left";
     if (name == "forward") {
       good = number(c.forward, 1);
     } else if (name == "left") {

@@ -21,6 +21,7 @@ struct Controls {
   // Of one message alone:
   std::optional<std::uint64_t> seen;  ///< number of the newest frame that the page has
   bool steers = false;                ///< it says more than that
+  bool walks = false;                 ///< it has forward or left
 
   /// Takes what happens once.
   void forget_commands() noexcept {

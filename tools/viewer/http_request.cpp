@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <utility>
 
 namespace gsnav_viewer {
 namespace {
@@ -86,7 +87,7 @@ ParsedRequest parse_request(std::string_view head) {
   bool needs_host = false;
   if (!take_line(head, line)) return refuse(400);
   if (const int status = parse_line(line, out.request, needs_host); status != 200) return refuse(status);
-  bool host = false, length = false;
+  bool host = false, length = false, origin = false, site = false;
   while (take_line(head, line)) {
     if (line.empty()) {
       if (!head.empty()) return refuse(400);
@@ -101,8 +102,10 @@ ParsedRequest parse_request(std::string_view head) {
       host = true;
       out.request.host = value;
     } else if (same_name(name, "origin")) {
+      if (std::exchange(origin, true)) return refuse(400);
       out.request.origin = value;
     } else if (same_name(name, "sec-fetch-site")) {
+      if (std::exchange(site, true)) return refuse(400);
       out.request.site = value;
     } else if (same_name(name, "connection")) {
       if (same_name(value, "close")) out.request.keep_alive = false;

@@ -315,7 +315,7 @@ Result<std::string> Session::frame(std::string_view message) {
   // A number that is not this process's is as good as none.
   const bool knows = controls_.seen && *controls_.seen <= begun_;
   const std::uint64_t seen = knows ? *controls_.seen : begun_;
-  if (controls_.steers) last_message_ = Clock::now();
+  if (controls_.walks) last_message_ = Clock::now();
   changed_ = changed_ || controls_.steers || !knows;
   ++waiting_;
   news_.notify_all();
