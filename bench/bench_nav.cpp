@@ -9,6 +9,7 @@
 #include <ctime>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gsnav/backends/serial.hpp"
@@ -83,22 +84,27 @@ const Scene* flat() {
 
 /// A mesh of the data folder with Habitat's settings; null where it is not there.
 const Scene* data(const char* name) {
-  const auto mesh = io::load_obj(std::string(GSNAV_DATA_DIR "/nav/recast/") + name);
+  const auto mesh = io::load_mesh(std::string(GSNAV_DATA_DIR "/nav/") + name);
   if (!mesh) return nullptr;
   std::vector<Vec3d> vertices;
   for (const Vec3f& v : mesh->vertices) vertices.push_back(vec_cast<double>(v));
   return new Scene(NavMesh::build({}, vertices, mesh->triangles).value());
 }
 const Scene* nav_test() {
-  static const Scene* scene = data("nav_test.obj");
+  static const Scene* scene = data("recast/nav_test.obj");
   return scene;
 }
 const Scene* dungeon() {
-  static const Scene* scene = data("dungeon.obj");
+  static const Scene* scene = data("recast/dungeon.obj");
   return scene;
 }
 const Scene* undulating() {
-  static const Scene* scene = data("undulating.obj");
+  static const Scene* scene = data("recast/undulating.obj");
+  return scene;
+}
+
+const Scene* terrain() {
+  static const Scene* scene = data("glb/terrain.glb");
   return scene;
 }
 
@@ -187,6 +193,48 @@ void detour_near(benchmark::State& state, const Scene* (*make)()) {
 void near_with_handles(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make,
         [](const Scene& s, std::size_t i) { return s.mesh->distance_between(s.near_points[i], s.near_goals[i]); });
+}
+/// Pairs of one island alone, by its number: the smaller ones of nav_test are hills.
+template <class F>
+void island_pairs(benchmark::State& state, const Scene* (*make)(), F&& f) {
+  const Scene* scene = make();
+  if (scene == nullptr) return state.SkipWithError("the mesh is not in GSNAV_DATA_DIR");
+  const auto island = static_cast<std::size_t>(state.range(0));
+  if (island >= scene->mesh->island_count()) return state.SkipWithError("the mesh has fewer islands");
+  Rng rng(4 + island);
+  std::vector<std::pair<NavPoint, NavPoint>> ends;
+  for (int i = 0; i < 1024; ++i) {
+    const NavPoint a = scene->mesh->random_point(rng, island);
+    ends.emplace_back(a, scene->mesh->random_point(rng, island));
+  }
+  std::size_t i = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(f(*scene, ends[i & 1023u].first, ends[i & 1023u].second));
+    ++i;
+  }
+  const NavMesh::Impl& impl = scene->mesh->impl();
+  detail::GeodesicSearch search;
+  double worst = 0, sum = 0, whole = 0;
+  for (std::size_t k = 0; k < 256; ++k) {
+    const auto& [a, b] = ends[k];
+    const double truth = search.run(impl.unfolded(), impl.site(a), impl.site(b));
+    const double off = std::abs(f(*scene, a, b) - truth);
+    worst = max(worst, off);
+    sum += off;
+    whole += truth;
+  }
+  state.counters["worst_error"] = worst;
+  state.counters["mean_error"] = sum / whole;
+}
+void detour_island(benchmark::State& state, const Scene* (*make)()) {
+  island_pairs(state, make, [](const Scene& s, const NavPoint& a, const NavPoint& b) {
+    return detour_geodesic(s.mesh->impl(), *s.detour, a.position, b.position);
+  });
+}
+void geodesic_island(benchmark::State& state, const Scene* (*make)()) {
+  island_pairs(state, make, [](const Scene& s, const NavPoint& a, const NavPoint& b) {
+    return s.mesh->geodesic_distance(a.position, b.position);
+  });
 }
 void path_with_handles(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make,
@@ -396,13 +444,21 @@ void build(benchmark::State& state, Triangles (*make)()) {
   BENCHMARK_CAPTURE(name, dungeon, dungeon);   \
   BENCHMARK_CAPTURE(name, undulating, undulating)
 GSNAV_NAV_BENCH(detour);
+BENCHMARK_CAPTURE(detour, terrain, terrain);
 GSNAV_NAV_BENCH(geodesic);
+BENCHMARK_CAPTURE(geodesic, terrain, terrain);
 GSNAV_NAV_BENCH(geodesic_with_handles);
+BENCHMARK_CAPTURE(geodesic_with_handles, terrain, terrain);
 GSNAV_NAV_BENCH(detour_near);
+BENCHMARK_CAPTURE(detour_near, terrain, terrain);
 GSNAV_NAV_BENCH(near_with_handles);
+BENCHMARK_CAPTURE(near_with_handles, terrain, terrain);
+BENCHMARK_CAPTURE(detour_island, nav_test, nav_test)->DenseRange(0, 2);
+BENCHMARK_CAPTURE(geodesic_island, nav_test, nav_test)->DenseRange(0, 2);
 GSNAV_NAV_BENCH(path_with_handles);
 GSNAV_NAV_BENCH(field_lookup);
 GSNAV_NAV_BENCH(field_on_walks);
+BENCHMARK_CAPTURE(field_on_walks, terrain, terrain);
 GSNAV_NAV_BENCH(field_of_a_goal);
 GSNAV_NAV_BENCH(random_point);
 GSNAV_NAV_BENCH(snap);

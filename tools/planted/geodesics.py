@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shortest ways over unfolded faces: which windows a search may leave out."""
+from . import plant
+
+SEARCH = "src/nav/geodesic_search.cpp"
+TEST = "tests/nav/test_geodesic_windows.cpp"
+CASE = "windows: never longer than over points on the edges*"
+MORE = (SEARCH, "src/nav/geodesic_straight.cpp", "src/nav/unfolded_mesh.cpp", "src/nav/face_grid.cpp",
+        "src/nav/face_views.cpp")
+
+PLANTS = [
+    plant("cone_of_half_a_turn", SEARCH, " || (wide && right_p > 0 && k + 1 == first + count)", "", TEST,
+          CASE, more=MORE, why="from a point on an edge rounding drops the last edge of the face"),
+    plant("window_by_its_near_end", SEARCH,
+          "dr + length(left - here.at) + kRounding < g + length(left - root)",
+          "dr + length(right - here.at) + kRounding < g + length(right - root)", TEST, CASE, more=MORE,
+          why="a way from the edge's corner has to be shorter for all of the window"),
+    plant("closed_corner_on_one_side", SEARCH, "in + v.total - kPi + kRounding);\n  } else",
+          "in + kPi + kRounding);\n  } else", TEST, CASE, more=MORE,
+          why="a path may bend to either side of a corner that is more than a full turn"),
+]
