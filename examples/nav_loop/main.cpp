@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "../../tools/common/parse_options.hpp"
 #include "gsnav/backends/serial.hpp"
 #if defined(NAV_LOOP_OPENMP)
 #include "gsnav/backends/openmp.hpp"
@@ -194,7 +195,7 @@ int main(int argc, char** argv) try {
   app.add_option("--max-steps", o.max_steps, "actions after which an episode is cut off")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
-  CLI11_PARSE(app, argc, argv);
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   if (o.shown_episode >= o.episodes) {
     std::fprintf(stderr, "nav_loop: --show %d: of %d episodes the last is %d\n", o.shown_episode, o.episodes, o.episodes - 1);
     return 2;

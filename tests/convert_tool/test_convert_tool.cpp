@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "compare.hpp"
+#include "gsnav/backends/serial.hpp"
 #include "gsnav/io/cameras_file.hpp"
 #include "gsnav/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
@@ -21,6 +22,7 @@
 #include "io/ply_file.hpp"
 #include "io/row_clouds.hpp"
 #include "support/command.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/files.hpp"
 #include "support/process.hpp"
 #include "support/small_disk.hpp"
@@ -160,6 +162,42 @@ TEST_CASE("convert: from PLY to PLY thousands of ties of depth are drawn the sam
   }
 }
 
+TEST_CASE("convert: a format that is drawn in another order is judged as it is drawn") {
+  const TempFolder folder("convert_order");
+  const PlyFile file = rows_on_a_grid(3000, 23);
+  write_file(folder / "in.ply", file.text());
+  write_file(folder / "c.json", cameras_along_axes());
+  // The truth: each file drawn by its own sort order, which glTF's extension says is the distance.
+  const auto cameras = io::load_cameras(folder / "c.json", 96, 64).value();
+  const auto drawn = [&](const char* name) {
+    const GaussianCloud cloud = load(folder, name);
+    SerialBackend backend;
+    RenderConfig config;
+    config.sort_order = cloud.sort_order;
+    std::vector<float> rgb;
+    Renderer<float, SerialBackend> renderer(backend, config);
+    for (const Camera& c : cameras) {
+      const auto frame = renderer.render(cloud.set(), c).value();
+      rgb.insert(rgb.end(), frame.rgb.begin(), frame.rgb.end());
+    }
+    return rgb;
+  };
+  const auto check = [&](const char* from, const char* to) {
+    const Outcome out = run(folder, std::string(from) + " " + to + " --cameras c.json --width 96 --height 64");
+    CAPTURE(out.text);
+    REQUIRE(out.ok);
+    CHECK(out.says("another order of drawing"));
+    const std::vector<float> a = drawn(from), b = drawn(to);
+    double squares = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) squares += std::pow(static_cast<double>(a[i]) - static_cast<double>(b[i]), 2);
+    const double psnr = -10 * std::log10(squares / static_cast<double>(a.size()));
+    CHECK(psnr < 60);
+    CHECK(number_behind(out.text, "PSNR ") == doctest::Approx(psnr).epsilon(0.001));
+  };
+  check("in.ply", "made.glb");
+  check("made.glb", "back.ply");
+}
+
 TEST_CASE("convert: every format but the one of chunks keeps the order of the rows") {
   const TempFolder folder("convert_order");
   write_file(folder / "in.ply", rows_on_a_grid(1500, 22).text());
@@ -251,6 +289,15 @@ TEST_CASE("convert: a full disk and kill -9 leave the input that is written over
     tool.wait(60);
     CHECK(read_file(path) == before);  // PLY to PLY gives the same bytes, before or after
   }
+}
+
+TEST_CASE("convert: control characters of a file name do not reach the terminal by way of an option's error") {
+  const TempFolder folder("convert_control");
+  const Outcome out = run(folder, "a.ply b.ply --views \"$(printf 'x\\033[31m')\"");
+  CAPTURE(out.text);
+  CHECK_FALSE(out.ok);
+  CHECK(out.text.find('\x1b') == std::string::npos);
+  CHECK(out.says("\\x1B[31m"));
 }
 
 TEST_CASE("convert: a name that cannot be written is said before anything is read") {

@@ -383,8 +383,11 @@ TEST_CASE(
       std::filesystem::remove(file);
     }
   }
-  const Outcome out = run(folder, "absent.obj --out none/a.navmesh");
-  CHECK_FALSE(out.ok);
-  CHECK(out.says("none does not exist; make it first"));
-  CHECK_FALSE(out.says("absent.obj"));
+  for (const char* outputs : {"--out none/a.navmesh", "--out a.navmesh --settings-out none/s.json"}) {
+    const Outcome out = run(folder, std::string("absent.obj ") + outputs);
+    CAPTURE(outputs);
+    CHECK_FALSE(out.ok);
+    CHECK(out.says("none does not exist; make it first"));
+    CHECK_FALSE(out.says("absent.obj"));
+  }
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "../common/parse_options.hpp"
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
@@ -128,7 +129,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    exit_code = app.exit(e) == 0 ? 0 : 1;
+    exit_code = gsnav_tools::print_parse_error(app, e) == 0 ? 0 : 1;
     return std::nullopt;
   }
   const auto bad = [&](const std::string& text, const char* what) {

@@ -52,7 +52,12 @@ FieldErrors largest_field_errors(const GaussianCloud& source,
 Result<ImageErrors> image_errors(const GaussianCloud& source, const GaussianCloud& made,
                                  const std::vector<Camera>& cameras) {
   OpenMPBackend backend;
-  Renderer<float, OpenMPBackend> renderer(backend);
+  const auto renderer_of = [&](const GaussianCloud& cloud) {
+    RenderConfig config;
+    config.sort_order = cloud.sort_order;
+    return Renderer<float, OpenMPBackend>(backend, config);
+  };
+  auto renderer = renderer_of(source), renderer_made = renderer_of(made);
   const auto psnr = [](double squares, double n) {
     return squares == 0 ? std::numeric_limits<double>::infinity() : -10 * std::log10(squares / n);
   };
@@ -60,7 +65,7 @@ Result<ImageErrors> image_errors(const GaussianCloud& source, const GaussianClou
   e.worst = std::numeric_limits<double>::infinity();
   double sum = 0, values = 0;
   for (const Camera& camera : cameras) {
-    const auto want = renderer.render(source.set(), camera), got = renderer.render(made.set(), camera);
+    const auto want = renderer.render(source.set(), camera), got = renderer_made.render(made.set(), camera);
     for (const Status& s : {want.status(), got.status()}) {
       if (!s) return s;
     }

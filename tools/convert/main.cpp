@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "../common/parse_options.hpp"
 #include "compare.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/io/cameras_file.hpp"
@@ -151,6 +152,11 @@ Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& ro
     cameras = std::move(*given);
   }
   if (cameras.empty()) return {};
+  if (source.sort_order != made.sort_order) {
+    const auto by = [](SortOrder order) { return order == SortOrder::z_depth ? "depth" : "distance from the camera"; };
+    std::printf("  the format has another order of drawing: by %s, the source by %s\n", by(made.sort_order),
+                by(source.sort_order));
+  }
   const auto images = gsnav_convert::image_errors(source, made, cameras);
   if (!images) return images.status();
   std::printf("  %zu images of %dx%d: ", cameras.size(), o.width, o.height);
@@ -202,7 +208,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 1000));
   app.add_option("--width", o.width, "Pixels of the compared images")->check(CLI::Range(1, 8192));
   app.add_option("--height", o.height)->check(CLI::Range(1, 8192));
-  CLI11_PARSE(app, argc, argv);
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
 
   const std::string out = o.paths.back();
   if (Status s = validate(o); !s) return fail(s.message());

@@ -5,6 +5,7 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 
+#include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/episode_file.hpp"
@@ -133,7 +134,7 @@ int main(int argc, char** argv) try {
   app.add_option("--pictures", pictures, "so many episodes have pictures on the page; -1: all")->capture_default_str();
   bool restart = false;
   app.add_flag("--restart", restart, "remove the evaluation that --out has, and begin anew");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   const gsnav::Status s = gsnav_eval::run(o, pictures, restart);
   if (!s) std::fprintf(stderr, "gsnav-eval: %s\n", s.message().c_str());
   return s ? 0 : 1;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
@@ -147,7 +148,7 @@ int main(int argc, char** argv) try {
   app.add_option("--frames", r.frames, "folder for pictures and track")->capture_default_str();
   app.add_option("--video", r.video, "an .mp4 in place of PNG files, by ffmpeg");
   app.add_option("--every", r.every, "every so many actions a frame")->capture_default_str()->check(CLI::Range(1, 100000));
-  CLI11_PARSE(app, argc, argv);
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   gsnav::Status s;
   if (const auto recorded = gsnav_eval::Journal::recorded_options(o.out); !recorded) {
     s = recorded.status();

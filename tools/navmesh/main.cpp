@@ -192,7 +192,7 @@ Status draw_png(const Options& o, const NavMesh& mesh, const std::vector<NavLeve
 }
 
 Status run(const Options& o) {
-  for (const std::string& out : {o.out, o.obj, o.png, o.visible_sets}) {
+  for (const std::string& out : {o.out, o.obj, o.png, o.visible_sets, o.settings_out}) {
     if (out.empty()) continue;
     if (Status s = check_output_path(out); !s) return s;
   }

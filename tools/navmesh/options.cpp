@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "../common/parse_options.hpp"
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
@@ -257,7 +258,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       throw CLI::ValidationError("--mesh", o.input + " has no Gaussians to go with " + o.mesh);
     }
   } catch (const CLI::ParseError& error) {
-    exit_code = app.exit(error) == 0 ? 0 : 1;
+    exit_code = gsnav_tools::print_parse_error(app, error) == 0 ? 0 : 1;
     return std::nullopt;
   }
   if (kind_of(o.input) == InputKind::gaussians) {

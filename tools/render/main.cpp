@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "../common/parse_options.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #if defined(GSNAV_HAS_CUDA)
@@ -295,7 +296,7 @@ int main(int argc, char** argv) {
   app.add_option("--depth-far", o.depth_far, "Depth picture: farthest; 0: the image's own range (2nd to 98th percentile)");
   app.add_flag("--npy", o.npy, "Write NPY arrays");
   app.add_flag("--png", o.png, "Write PNG pictures (both are written where neither flag is given)");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
 
   if (!o.npy && !o.png) o.npy = o.png = true;
   const auto fail = [](const std::string& message) {

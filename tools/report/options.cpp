@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "../common/parse_options.hpp"
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
@@ -102,7 +103,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    exit_code = app.exit(e);
+    exit_code = gsnav_tools::print_parse_error(app, e);
     return std::nullopt;
   }
   const auto fail = [&](const std::string& message) {

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <thread>
 
+#include "../common/parse_options.hpp"
 #include "http_server.hpp"
 #include "page.hpp"
 #include "session.hpp"
@@ -122,7 +123,7 @@ int main(int argc, char** argv) try {
   app.add_option("--speed", how.speed, "of walking, m/s")->capture_default_str()->check(CLI::Range(0.05, 20.0));
   app.add_option("--quality", how.quality, "of JPEG images")->capture_default_str()->check(CLI::Range(1, 100));
   app.add_flag("--paused", how.paused, "time stands still at first");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   const gsnav::Status s = gsnav_viewer::run(o, how, where);
   if (!s) std::fprintf(stderr, "gsnav-viewer: %s\n", s.message().c_str());
   return s ? 0 : 1;
