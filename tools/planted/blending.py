@@ -11,7 +11,7 @@ CUT_TEST = "tests/hard_cases/test_determinism.cpp"
 
 OPEN = "transmittance >= L(rules.transmittance_min)"
 WEIGHT = "L weight = select(drawn, alpha * before, zero);"
-DRAWN = "const auto drawn = exponent >= L(rules.log2_alpha_min);"
+DRAWN = "return exponent >= L(rules.log2_alpha_min);"
 LANES = "include/gsnav/kernels/lanes/rasterize_tile.hpp"
 DELTA = "  const L defined = select(denominator > L(S(0)), delta, L(S(0)));\n"
 CLAMPED = "return L(d.z) + clamp(defined, -reach, reach);"
@@ -32,12 +32,12 @@ PLANTS = [
     plant("stop_at_a_hundredth", BLEND, OPEN,
           "transmittance >= L(rules.transmittance_min * S(100))",
           STACK_TEST, "N42_saturation_stop", "N44_deep_stack"),
-    plant("alpha_threshold_skipped", BLEND, DRAWN, "const auto drawn = exponent >= L(S(-120));",
+    plant("alpha_threshold_skipped", BLEND, DRAWN, "return exponent >= L(S(-120));",
           STACK_TEST, "N43_faint_fog", why="training used it: the image has to"),
     plant("alpha_threshold_moved", BLEND, DRAWN,
-          "const auto drawn = exponent >= L(rules.log2_alpha_min + S(0.01));",
+          "return exponent >= L(rules.log2_alpha_min + S(0.01));",
           STACK_TEST, "N43_faint_fog", why="0.7 % above 1/255"),
-    plant("alpha_not_limited", BLEND, "min(exp2_in_range<M>(exponent), L(rules.max_alpha))", "exp2_in_range<M>(exponent)",
+    plant("alpha_not_limited", BLEND, "return min(alpha, largest);", "return alpha;",
           STACK_TEST, "N41_single_opaque"),
     plant("exp2_cubic", "include/gsnav/ops/render.hpp",
           "config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5", "Exp2::degree3",

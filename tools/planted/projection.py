@@ -24,14 +24,19 @@ PLANTS = [
           "const L det0 = max(a0 * c0 - b0 * b0, L(S(0)));",
           DETERMINANT, "N05_comp_factor_needle"),
     plant("conic_exponent", BLEND,
-          "    exponent = column_exponent(column_terms(g, px), L(g.ref_y), L(g.b), py);\n",
-          """    const L ca = L(g.a) * L(g.a) + L(g.k) * L(g.k), cb = L(g.k) * L(g.b), cc = L(g.b) * L(g.b);
-    const L ox = L(g.w1) / L(g.a), oy = (L(g.w2) - L(g.k) * ox) / L(g.b);
-    const L cx = (px - L(g.ref_x)) + ox, cy = (py - L(g.ref_y)) + oy;
-    exponent = L(g.log2_opacity) - (ca * cx * cx + L(S(2)) * cb * cx * cy + cc * cy * cy);
+          "  return column_exponent(column_terms(g, px), L(g.ref_y), L(g.b), py);\n",
+          """  const L ca = L(g.a) * L(g.a) + L(g.k) * L(g.k), cb = L(g.k) * L(g.b), cc = L(g.b) * L(g.b);
+  const L ox = L(g.w1) / L(g.a), oy = (L(g.w2) - L(g.k) * ox) / L(g.b);
+  const L cx = (px - L(g.ref_x)) + ox, cy = (py - L(g.ref_y)) + oy;
+  return L(g.log2_opacity) - (ca * cx * cx + L(S(2)) * cb * cx * cy + cc * cy * cy);
 """,
           EXPONENT, "N07_alpha_long_needle", "N08_power_sign",
           why="positive powers and holes in long needles"),
+    plant("exponent_from_the_corner", BLEND, "const L w2 = fma(py - ref_y, b, terms.w2);",
+          "const L w2 = fma(py, b, fma(-ref_y, b, terms.w2));",
+          EXPONENT, "N07_alpha_long_needle", why="offsets from the image's corner cancel"),
+    plant("response_ignored", BLEND, "if (along_rays) return perspective_exponent", "if (false) return perspective_exponent",
+          RESPONSE, "N02_exact_ray_grid", why="the ellipse of the linearised response"),
     plant("needles_in_float", CHUNK,
           "  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(512))) ||\n"
           "         (fma(abs(p.k), abs(ox), p.b * abs(oy)) > L(S(16)));",

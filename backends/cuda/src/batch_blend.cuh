@@ -143,14 +143,13 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
   const std::uint32_t slot =
       __float_as_uint(color.pad);  // 0 for the splat that covers nothing: any will do
   const SplatDepth<float>* const depth = kBlendedDepth<D> == DepthMode::any ? a.depths + slot : nullptr;
-  const ColumnTerms<float> terms = column_terms(geometry, px);
+  constexpr bool kAlongRays = F == Form::perspective;
+  const SplatPerspective<float>* const perspective = kAlongRays ? a.perspectives + slot : nullptr;
   for (int k = 0; k < K; ++k) {
-    const float exponent = F == Form::perspective
-                               ? perspective_exponent(geometry, a.perspectives[slot], px, py[k])
-                               : column_exponent(terms, geometry.ref_y, geometry.b, py[k]);
-    // Decided once, and by the hardware's minimum: a third of the loop were comparisons and selections.
-    bool drawn = exponent >= rules.log2_alpha_min && state[k].open(rules);
-    float alpha = ::fminf(exp2_in_range<M>(exponent), rules.max_alpha);
+    const float exponent = splat_exponent(kAlongRays, geometry, perspective, px, py[k]);
+    // Decided once: a third of the loop were comparisons and selections.
+    bool drawn = in_footprint(rules, exponent) && state[k].open(rules);
+    float alpha = alpha_in_footprint<M>(rules, exponent);
     if constexpr (Mesh) {
       if (drawn) {
         alpha = alpha_before_mesh(alpha, a.depths[slot], mesh[k], px, py[k]);

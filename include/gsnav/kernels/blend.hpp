@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/depth.hpp"
@@ -168,12 +169,41 @@ GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspectiv
   return select(f > L(S(0)), exponent, L(S(-1e30)));
 }
 
-/// Alpha of log2 alpha: 0 outside the footprint, which is alpha >= 2^log2_alpha_min. The exponent decides it,
-/// so that it does not depend on tiles; and alpha is positive wherever it is drawn.
+/// log2 alpha of a splat at pixel centres: of the response along each ray if `along_rays`, else of the
+/// splat's ellipse. `perspective` is read in the first case only.
+template <class L, class S>
+GSNAV_HD L splat_exponent(bool along_rays, const SplatGeometry<S>& g,
+                          const SplatPerspective<S>* perspective, L px, L py) noexcept {
+  if (along_rays) return perspective_exponent(g, *perspective, px, py);
+  return column_exponent(column_terms(g, px), L(g.ref_y), L(g.b), py);
+}
+
+/// Whether pixels are in the footprint, which is alpha >= 2^log2_alpha_min. The exponent decides it, so
+/// that it does not depend on tiles; and alpha is positive wherever it is drawn.
+template <class L, class S>
+GSNAV_HD mask_of<L> in_footprint(const BlendRules<S>& rules, L exponent) noexcept {
+  return exponent >= L(rules.log2_alpha_min);
+}
+
+/// Alpha of log2 alpha in the footprint. Outside it may be any value, also NaN.
+template <Exp2 M, class L, class S>
+GSNAV_HD L alpha_in_footprint(const BlendRules<S>& rules, L exponent) noexcept {
+  const L alpha = exp2_in_range<M>(exponent), largest(rules.max_alpha);
+#if GSNAV_DEVICE_CODE
+  // The hardware's minimum. `min`, which has a rule for NaN, compares and selects.
+  if constexpr (std::is_same_v<L, float>) {
+    return ::fminf(alpha, largest);
+  } else
+#endif
+  {
+    return min(alpha, largest);
+  }
+}
+
+/// The same with 0 outside the footprint.
 template <Exp2 M, class L, class S>
 GSNAV_HD L footprint_alpha(const BlendRules<S>& rules, L exponent) noexcept {
-  const auto drawn = exponent >= L(rules.log2_alpha_min);
-  return select(drawn, min(exp2_in_range<M>(exponent), L(rules.max_alpha)), L(S(0)));
+  return select(in_footprint(rules, exponent), alpha_in_footprint<M>(rules, exponent), L(S(0)));
 }
 
 /// Blends one splat onto the pixels that are `drawn`, open ones of its footprint, where it has `alpha`. (px, py): pixel
@@ -207,24 +237,28 @@ GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L
   blend_drawn<Color, D, General>(state, rules, state.open(rules), alpha, color, depth, px, py);
 }
 
-/// Blends one splat onto pixels at (px, py): blend_alpha of what its records give. Returns the open pixels of its
-/// footprint.
-template <bool Color, DepthMode D, Exp2 M, bool General, class L, class S>
-GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& rules,
-                                const SplatRecords<S>& splat, L px, L py) noexcept {
-  const SplatGeometry<S>& g = *splat.geometry;
-  L exponent;
-  if (General && splat.perspective != nullptr) {
-    exponent = perspective_exponent(g, *splat.perspective, px, py);
-  } else {
-    exponent = column_exponent(column_terms(g, px), L(g.ref_y), L(g.b), py);
+/// What is drawn of a splat where nothing cuts it: all of its alpha.
+struct WholeSplat {
+  template <class L>
+  GSNAV_HD L operator()(L alpha) const noexcept {
+    return alpha;
   }
-  const auto hit = state.open(rules) && (exponent >= L(rules.log2_alpha_min));
+};
+
+/// Blends one splat onto pixels at (px, py). cut(alpha): what is left of its alpha, 0 where it is not
+/// seen. Returns the open pixels of its footprint.
+template <bool Color, DepthMode D, Exp2 M, bool General, class L, class S, class Cut = WholeSplat>
+GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& rules,
+                                const SplatRecords<S>& splat, L px, L py, const Cut& cut = {}) noexcept {
+  const L exponent = splat_exponent(General && splat.perspective != nullptr, *splat.geometry,
+                                    splat.perspective, px, py);
+  const auto hit = state.open(rules) && in_footprint(rules, exponent);
   // Lanes are rarely all missed; asking costs them more than it saves.
   if constexpr (LaneTraits<L>::width == 1) {
     if (!hit) return hit;
   }
-  blend_alpha<Color, D, General>(state, rules, footprint_alpha<M>(rules, exponent), splat.color, splat.depth, px, py);
+  blend_drawn<Color, D, General>(state, rules, hit, cut(alpha_in_footprint<M>(rules, exponent)),
+                                 splat.color, splat.depth, px, py);
   return hit;
 }
 

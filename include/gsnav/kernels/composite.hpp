@@ -60,15 +60,11 @@ GSNAV_HD void close_by_mesh(BlendState<S, D>& state, const BlendRules<S>& rules,
 
 /// blend_splat before a mesh at depth `mesh`.
 template <bool Color, DepthMode D, Exp2 M, bool General, class S>
-GSNAV_HD void composite_splat(BlendState<S, D>& state, const BlendRules<S>& rules, const SplatRecords<S>& splat, S mesh,
-                              S px, S py) noexcept {
-  const SplatGeometry<S>& g = *splat.geometry;
-  const S exponent = General && splat.perspective != nullptr
-                         ? perspective_exponent(g, *splat.perspective, px, py)
-                         : column_exponent(column_terms(g, px), g.ref_y, g.b, py);
-  if (!(exponent >= rules.log2_alpha_min)) return;
-  const S alpha = alpha_before_mesh(footprint_alpha<M>(rules, exponent), *splat.depth, mesh, px, py);
-  blend_alpha<Color, D, General>(state, rules, alpha, splat.color, splat.depth, px, py);
+GSNAV_HD void composite_splat(BlendState<S, D>& state, const BlendRules<S>& rules,
+                              const SplatRecords<S>& splat, S mesh, S px, S py) noexcept {
+  blend_splat<Color, D, M, General>(state, rules, splat, px, py, [&](S alpha) GSNAV_INLINED {
+    return alpha_before_mesh(alpha, *splat.depth, mesh, px, py);
+  });
 }
 
 /// Blends one pixel of a frame with a mesh: RasterizePixel, but for what the mesh hides.
@@ -122,20 +118,16 @@ struct FragmentPixel {
   }
 
  private:
-  /// composite_splat where its depth is in (near, far].
+  /// blend_splat where its depth is in (near, far].
   GSNAV_HD void blend_within(BlendState<S, D>& state, const SplatRecords<S>& splat, S near, S far, S px,
                              S py) const noexcept {
     const SplatDepth<S>& depth = *splat.depth;
     if (depth.z - depth.reach > far || depth.z + depth.reach <= near) return;
-    const SplatGeometry<S>& g = *splat.geometry;
-    const S exponent = General && splat.perspective != nullptr
-                           ? perspective_exponent(g, *splat.perspective, px, py)
-                           : column_exponent(column_terms(g, px), g.ref_y, g.b, py);
-    if (!(exponent >= args.rules.log2_alpha_min)) return;
-    const S z = ray_depth(depth, px, py);
-    if (z > far || z <= near) return;
-    const S alpha = footprint_alpha<Exp2::degree5>(args.rules, exponent);
-    blend_alpha<Color, D, General>(state, args.rules, alpha, splat.color, splat.depth, px, py);
+    blend_splat<Color, D, Exp2::degree5, General>(state, args.rules, splat, px, py,
+                                                  [&](S alpha) GSNAV_INLINED {
+                                                    const S z = ray_depth(depth, px, py);
+                                                    return z > far || z <= near ? S(0) : alpha;
+                                                  });
   }
 };
 

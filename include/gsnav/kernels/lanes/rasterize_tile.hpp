@@ -235,10 +235,10 @@ class TileBlender {
     };
     if constexpr (General) {
       for (int i = 0; i < n; ++i) {
-        const SplatGeometry<float>& g = geometry_[list[i]];
-        const F exponent = args_.perspectives.empty()
-                               ? column_exponent(column_terms(g, px), F(g.ref_y), F(g.b), py)
-                               : perspective_exponent(g, args_.perspectives[ids_[list[i]]], px, py);
+        const SplatPerspective<float>* const perspective =
+            args_.perspectives.empty() ? nullptr : &args_.perspectives[ids_[list[i]]];
+        const F exponent =
+            splat_exponent(perspective != nullptr, geometry_[list[i]], perspective, px, py);
         blend(list[i], footprint_alpha<M>(rules, exponent));
         if (!any(state.open(rules))) break;
       }
