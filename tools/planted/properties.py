@@ -12,7 +12,7 @@ PLANTS = [
           "const L inv_z = L(S(1)) / t.z;", "const L inv_z = L(S(1)) / (t.z + L(S(1e-7)));",
           TEST, "property_scale_by_power_of_two", why="INRIA: a length that belongs to no scene"),
     plant("pixel_by_its_corner", BLEND,
-          "    const S px = S(x) + S(0.5), py = S(y) + S(0.5);\n", "    const S px = S(x), py = S(y);\n",
+          "    px = S(x) + S(0.5);\n    py = S(y) + S(0.5);\n", "    px = S(x);\n    py = S(y);\n",
           TEST, "property_roll_by_90_degrees", "property_horizontal_mirror"),
     plant("limits_for_every_response", PROJECTION,
           "const L uj = ewa ? clamp(u, L(camera.u_min), L(camera.u_max)) : u;",

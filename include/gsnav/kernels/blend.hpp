@@ -362,21 +362,43 @@ GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
   }
 }
 
+/// A pixel and the list of its tile: how kernels start that have one work item a pixel.
+template <class S>
+struct PixelWalk {
+  S px, py;                  ///< pixel centre
+  std::uint64_t begin, end;  ///< of the list in RasterArgs::tile_splats
+
+  GSNAV_HD PixelWalk(const RasterArgs<S>& args, std::size_t pixel) noexcept {
+    const std::size_t width = static_cast<std::size_t>(args.grid.width);
+    const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
+    const std::size_t tile = args.grid.tile_of(x, y);
+    px = S(x) + S(0.5);
+    py = S(y) + S(0.5);
+    begin = args.tile_offsets[tile];
+    end = args.tile_offsets[tile + 1];
+  }
+
+  /// Calls blend(records) with each splat of the list, front to back, until it has closed the pixel.
+  template <class State, class F>
+  GSNAV_HD void for_each_splat(const RasterArgs<S>& args, const State& state,
+                               const F& blend) const noexcept {
+    for (std::uint64_t i = begin; i < end && state.open(args.rules); ++i) {
+      blend(args.records(args.tile_splats[i]));
+    }
+  }
+};
+
 /// Blends one pixel: the generic fallback, one work item a pixel, on any backend and scalar.
 template <class S, bool Color, DepthMode D, Exp2 M, bool General>
 struct RasterizePixel {
   RasterArgs<S> args;
 
   GSNAV_HD void operator()(std::size_t pixel) const noexcept {
-    const std::size_t width = static_cast<std::size_t>(args.grid.width);
-    const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
-    const std::size_t tile = args.grid.tile_of(x, y);
-    const S px = S(x) + S(0.5), py = S(y) + S(0.5);
+    const PixelWalk<S> walk(args, pixel);
     BlendState<S, D> state;
-    for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {
-      blend_splat<Color, D, M, General>(state, args.rules, args.records(args.tile_splats[i]), px, py);
-      if (!state.open(args.rules)) break;
-    }
+    walk.for_each_splat(args, state, [&](const SplatRecords<S>& splat) GSNAV_INLINED {
+      blend_splat<Color, D, M, General>(state, args.rules, splat, walk.px, walk.py);
+    });
     write_pixel(args, pixel, state);
   }
 };

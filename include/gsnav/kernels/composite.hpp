@@ -73,22 +73,20 @@ struct CompositePixel {
   RasterArgs<S> args;
 
   GSNAV_HD void operator()(std::size_t pixel) const noexcept {
-    const std::size_t width = static_cast<std::size_t>(args.grid.width);
-    const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
-    const std::size_t tile = args.grid.tile_of(x, y);
-    const S px = S(x) + S(0.5), py = S(y) + S(0.5), mesh = args.mesh.depth[pixel];
+    const PixelWalk<S> walk(args, pixel);
+    const S mesh = args.mesh.depth[pixel];
     BlendState<S, D> state;
-    for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1]; ++i) {
-      composite_splat<Color, D, Exp2::degree5, General>(state, args.rules, args.records(args.tile_splats[i]), mesh, px, py);
-      if (!state.open(args.rules)) break;
-    }
+    walk.for_each_splat(args, state, [&](const SplatRecords<S>& splat) GSNAV_INLINED {
+      composite_splat<Color, D, Exp2::degree5, General>(state, args.rules, splat, mesh, walk.px,
+                                                        walk.py);
+    });
     close_by_mesh<Color>(state, args.rules, args.mesh, pixel);
     write_pixel(args, pixel, state);
   }
 };
 
-/// Blends a pixel that has fragments. They cut it into stretches of depth; in each the list is walked for the splats
-/// whose depths along the ray lie there, as a mesh at its far end would have it walked.
+/// Blends a pixel that has fragments. They cut it into stretches of depth; in each the list is walked
+/// for the splats whose depths along the ray lie there, as a mesh at its far end would have it walked.
 template <class S, bool Color, DepthMode D, bool General>
 struct FragmentPixel {
   RasterArgs<S> args;
@@ -96,19 +94,17 @@ struct FragmentPixel {
   GSNAV_HD void operator()(std::size_t pixel) const noexcept {
     const FragmentRange range = args.mesh.ranges[pixel];
     if (range.count == 0) return;
-    const std::size_t width = static_cast<std::size_t>(args.grid.width);
-    const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
-    const std::size_t tile = args.grid.tile_of(x, y);
-    const S px = S(x) + S(0.5), py = S(y) + S(0.5);
+    const PixelWalk<S> walk(args, pixel);
     BlendState<S, D> state;
     S near = S(-3.4e38);
     for (std::uint32_t k = 0;; ++k) {
-      const MeshFragment<S>* const f = k < range.count ? args.mesh.fragments.data + range.begin + k : nullptr;
+      const MeshFragment<S>* const f =
+          k < range.count ? args.mesh.fragments.data + range.begin + k : nullptr;
       const S far = f != nullptr ? f->depth : args.mesh.depth[pixel];
       // Splats were binned by where the opaque mesh is.
-      for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1] && state.open(args.rules); ++i) {
-        blend_within(state, args.records(args.tile_splats[i]), near, far, px, py);
-      }
+      walk.for_each_splat(args, state, [&](const SplatRecords<S>& splat) GSNAV_INLINED {
+        blend_within(state, splat, near, far, walk.px, walk.py);
+      });
       if (f == nullptr) break;
       blend_surface<Color>(state, args.rules, f->alpha, f->depth, Vec3<S>{f->r, f->g, f->b});
       near = far;
