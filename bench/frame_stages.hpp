@@ -32,22 +32,18 @@ class FrameStages {
   }
 
   void project() {
-    if constexpr (requires { backend_->project(project_); }) {
-      backend_->project(project_);
-    } else {
-      backend_->parallel_for(project_.chunk_count(), gsnav::ProjectChunk<S>{project_});
-    }
+    gsnav::run(*backend_, gsnav::stage::Project{}, project_);
     sync();
   }
 
   /// Fills tile_offsets and tile_splats.
   void bin() {
-    gsnav::detail::count_tiles(*backend_, bin_, gsnav::NoCull{});
+    gsnav::run(*backend_, gsnav::stage::CountTiles{}, bin_, gsnav::NoCull{});
     tile_offsets_.download(&pairs_, 1, bin_.grid.count());
     sync();
     tile_splats_.resize_discard(pairs_);
     bin_.tile_splats = tile_splats_.view();
-    gsnav::detail::scatter_tiles(*backend_, bin_, gsnav::NoCull{});
+    gsnav::run(*backend_, gsnav::stage::ScatterTiles{}, bin_, gsnav::NoCull{});
     sync();
   }
 
@@ -63,7 +59,7 @@ class FrameStages {
     raster.exp2_method =
         config_.profile == gsnav::Profile::fast ? gsnav::Exp2::degree3 : gsnav::Exp2::degree5;
     raster.images.rgb = images_.data();
-    gsnav::detail::rasterize(*backend_, raster);
+    gsnav::run(*backend_, gsnav::stage::Blend{}, raster);
     sync();
   }
 

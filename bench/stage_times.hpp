@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <tuple>
 #include <type_traits>
 
 #include "gsnav/ops/render.hpp"
@@ -23,8 +24,8 @@ using StageTimes = std::array<double, kStages>;
 inline double sum_of(const StageTimes& t) noexcept { return t[0] + t[1] + t[2] + t[3] + t[4]; }
 
 /// A host backend whose calls are timed: what `render_camera` does is measured as it is, call by call,
-/// so that the stages with `other` are the whole frame. A new optional member of backends needs a line
-/// here, or is `other`.
+/// so that the stages with `other` are the whole frame. A new stage of the table needs a line in
+/// stage_of_run, or is `other`.
 template <gsnav::Backend Base>
 class TimedBackend : public Base {
  public:
@@ -45,40 +46,9 @@ class TimedBackend : public Base {
   void parallel_for(std::size_t n, const F& f) {
     timed(stage_of<F>(), [&] { Base::parallel_for(n, f); });
   }
-  template <class A>
-  void project(const A& args) requires requires(Base& b) {
-    b.project(args);
-  }
-  {
-    timed(Stage::project, [&] { Base::project(args); });
-  }
-  template <class A>
-  void project(const A& args, gsnav::View<const std::uint32_t> chunks) requires requires(Base& b) {
-    b.project(args, chunks);
-  }
-  {
-    timed(Stage::project, [&] { Base::project(args, chunks); });
-  }
-  template <class A, class Cull>
-  void list_tiles(const A& args, const Cull& cull) requires requires(Base& b) {
-    b.list_tiles(args, cull);
-  }
-  {
-    timed(Stage::bin, [&] { Base::list_tiles(args, cull); });
-  }
-  template <class A, class Cull>
-  void scatter_tiles(const A& args, const Cull& cull) requires requires(Base& b) {
-    b.scatter_tiles(args, cull);
-  }
-  {
-    timed(Stage::bin, [&] { Base::scatter_tiles(args, cull); });
-  }
-  template <class A>
-  void rasterize_tiles(const A& args) requires requires(Base& b) {
-    b.rasterize_tiles(args);
-  }
-  {
-    timed(Stage::blend, [&] { Base::rasterize_tiles(args); });
+  template <class S, class... Args>
+  void run(S stage, const Args&... args) requires gsnav::RunsStage<Base, S, Args...> {
+    timed(stage_of_run<S, Args...>(), [&] { Base::run(stage, args...); });
   }
   template <class P>
   bool sort_pairs(P* keys, P* values, P* keys_alt, P* values_alt, std::size_t n, int bits) requires
@@ -112,16 +82,33 @@ class TimedBackend : public Base {
     }
   }
 
+  /// The stage of a stage that the backend has a form of its own of.
+  template <class S, class... Args>
+  static constexpr Stage stage_of_run() noexcept {
+    namespace stage = gsnav::stage;
+    if constexpr (std::is_same_v<S, stage::Project>) {
+      return Stage::project;
+    } else if constexpr (std::is_same_v<S, stage::CountTiles> || std::is_same_v<S, stage::ScatterTiles>) {
+      return Stage::bin;
+    } else if constexpr (std::is_same_v<S, stage::Blend> || std::is_same_v<S, stage::BlendWithMeshes>) {
+      return Stage::blend;
+    } else if constexpr (std::is_same_v<S, stage::Each>) {
+      return stage_of<std::tuple_element_t<1, std::tuple<Args...>>>();
+    } else {
+      return Stage::other;
+    }
+  }
+
   void add(Stage stage) noexcept {
     const Clock::time_point now = Clock::now();
     times_[static_cast<std::size_t>(stage)] +=
         std::chrono::duration<double, std::milli>(now - mark_).count();
     mark_ = now;
   }
-  template <class Run>
-  void timed(Stage stage, const Run& run) {
+  template <class F>
+  void timed(Stage stage, const F& f) {
     add(Stage::other);
-    run();
+    f();
     add(stage);
   }
 

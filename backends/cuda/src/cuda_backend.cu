@@ -148,7 +148,7 @@ bool CudaBackend::sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::ui
   return k.Current() == keys_alt;
 }
 
-void CudaBackend::project(const ProjectArgs<float>& args) {
+void CudaBackend::run(stage::Project, const ProjectArgs<float>& args) {
   if (!usable() || args.gaussians.size == 0) return;
   cuda::project_kernel<<<static_cast<unsigned>(args.chunk_count()), cuda::kProjectThreads, 0, stream_>>>(
       args);
@@ -194,12 +194,12 @@ void CudaBackend::scatter(const BinArgs<float>& args, const Cull& cull) {
                                        pairs, 0, bits, stream_), "a sort");
 }
 
-void CudaBackend::list_tiles(const BinArgs<float>& args, const NoCull& cull) { list(args, cull); }
-void CudaBackend::list_tiles(const BinArgs<float>& args, const MeshCull<float>& cull) { list(args, cull); }
-void CudaBackend::scatter_tiles(const BinArgs<float>& args, const NoCull& cull) { scatter(args, cull); }
-void CudaBackend::scatter_tiles(const BinArgs<float>& args, const MeshCull<float>& cull) { scatter(args, cull); }
+void CudaBackend::run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull) { list(args, cull); }
+void CudaBackend::run(stage::CountTiles, const BinArgs<float>& args, const MeshCull<float>& cull) { list(args, cull); }
+void CudaBackend::run(stage::ScatterTiles, const BinArgs<float>& args, const NoCull& cull) { scatter(args, cull); }
+void CudaBackend::run(stage::ScatterTiles, const BinArgs<float>& args, const MeshCull<float>& cull) { scatter(args, cull); }
 
-void CudaBackend::rasterize_tiles(const RasterArgs<float>& args) {
+void CudaBackend::run(stage::Blend, const RasterArgs<float>& args) {
   if (!usable()) return;
   const unsigned threads = static_cast<unsigned>(args.grid.tile_size * args.grid.tile_size);
   dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
@@ -209,7 +209,7 @@ void CudaBackend::rasterize_tiles(const RasterArgs<float>& args) {
   note(cudaGetLastError(), "the blending");
 }
 
-void CudaBackend::composite_tiles(const RasterArgs<float>& args) {
+void CudaBackend::run(stage::BlendWithMeshes, const RasterArgs<float>& args) {
   if (!usable()) return;
   const unsigned threads = static_cast<unsigned>(args.grid.tile_size * args.grid.tile_size);
   dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {

@@ -365,34 +365,34 @@ void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, 
 
 }  // namespace cuda
 
-void CudaBackend::parallel_for(std::size_t chunks, const ProjectMeshVertices<float>& k) {
+void CudaBackend::run(stage::Each, std::size_t chunks, const ProjectMeshVertices<float>& k) {
   if (chunks == 0 || !usable()) return;
   cuda::project_vertices_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(
       k.args, cuda::OneCamera{});
   note(cudaGetLastError(), "the projection of vertices");
 }
 
-void CudaBackend::parallel_for(std::size_t chunks, const CountMeshTriangles<float>& k) {
+void CudaBackend::run(stage::Each, std::size_t chunks, const CountMeshTriangles<float>& k) {
   if (chunks == 0 || !usable()) return;
   cuda::count_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(
       k.args, cuda::OneCamera{});
   note(cudaGetLastError(), "the counting of triangles");
 }
 
-void CudaBackend::parallel_for(std::size_t, const ScanMeshTriangles<float>& k) {
+void CudaBackend::run(stage::Each, std::size_t, const ScanMeshTriangles<float>& k) {
   if (!usable()) return;
   cuda::scan_triangles_kernel<<<1, cuda::kScanThreads, 0, stream_>>>(k.args);
   note(cudaGetLastError(), "a scan of triangles");
 }
 
-void CudaBackend::parallel_for(std::size_t chunks, const WriteMeshTriangles<float>& k) {
+void CudaBackend::run(stage::Each, std::size_t chunks, const WriteMeshTriangles<float>& k) {
   if (chunks == 0 || !usable()) return;
   cuda::write_triangles_kernel<<<static_cast<unsigned>(chunks), cuda::kThreads, 0, stream_>>>(
       k.args, cuda::OneCamera{});
   note(cudaGetLastError(), "the set-up of triangles");
 }
 
-void CudaBackend::rasterize_mesh(const MeshRasterArgs<float>& args) {
+void CudaBackend::run(stage::RasterizeMesh, const MeshRasterArgs<float>& args) {
   if (!usable()) return;
   using cuda::LargeTriangle;
   const TileGrid& grid = args.bin.grid;
@@ -416,7 +416,7 @@ void CudaBackend::rasterize_mesh(const MeshRasterArgs<float>& args) {
   note(cudaGetLastError(), "the drawing of triangles");
 }
 
-void CudaBackend::parallel_for(std::size_t rows, const ShadeMeshRow<float>& k) {
+void CudaBackend::run(stage::Each, std::size_t rows, const ShadeMeshRow<float>& k) {
   parallel_for(rows * k.args.width, cuda::ShadePixel{k.args});
 }
 

@@ -189,7 +189,7 @@ void start(SkinLaunch& launch, std::size_t shared, int multiprocessors, cudaStre
 
 }  // namespace
 
-void CudaBackend::skin_all(std::span<const SkinningArgs<float>> avatars) {
+void CudaBackend::run(stage::SkinAll, std::span<const SkinningArgs<float>> avatars) {
   int multiprocessors = 0;
   std::vector<SkinJob> jobs;
   for (const int influences : {kInfluences4, kInfluences8}) {

@@ -32,17 +32,14 @@ struct NoopFunctor {
 ///     template <class F> void parallel_for(std::size_t n, const F& f);   // f(i) for i in [0, n)
 ///     Status synchronize();
 ///
-/// Members that are used where they exist, with a generic fallback where they do not:
-///     rasterize_tiles(const RasterArgs<S>&)   blend all tiles (kernels/blend.hpp)
-///     project(const ProjectArgs<S>&)          project one set of Gaussians (kernels/project_chunk.hpp)
-///     project(const ProjectArgs<S>&, View<const std::uint32_t> chunks)   some of its chunks: frames may then be
-///                                             drawn in slices of depth (ops/depth_slices.hpp)
+/// Optional members. Each has a generic fallback:
+///     run(stage, args...)                     a stage by code of the backend's own; ops/stages.hpp is the table of stages
+///     sort_pairs(keys, values, keys_alt, values_alt, n, bits)   stable sort by the lowest `bits` of the key; returns
+///                                             true where the result is in *_alt
+///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)
 ///     one_thread() -> B                       a backend of the same kind for the calling thread alone: batches
 ///                                             of cameras are then cut by frames (ops/frame_lanes.hpp)
-///     list_tiles, scatter_tiles(const BinArgs<S>&, const Cull&)   bin (ops/bin_steps.hpp), for NoCull and MeshCull<S>
-///     bins_in_lanes                           binning wants BinArgs::spans
-///     sort_pairs(keys, values, keys_alt, values_alt, n, bits)   stable; true: the result is in *_alt
-///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)
+///     static constexpr bool bins_in_lanes     its binning reads BinArgs::spans, which projection then fills
 ///     batch_renderer                          a type that draws many cameras by one call (sim/frame_batch.hpp)
 ///     static allocate_host(bytes) -> void*, deallocate_host(p)   host memory that it copies to and from by itself
 ///                                             (core/host_array.hpp); nullptr where there is none

@@ -9,14 +9,9 @@
 #include "gsnav/kernels/composite.hpp"
 #include "gsnav/kernels/cull.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
+#include "gsnav/ops/stages.hpp"
 
 namespace gsnav {
-
-/// Backends that frames with a mesh can be drawn on: all but those whose own blending knows nothing of meshes. One
-/// that has blending of its own says so by `composes_meshes`, and then blends by composite_tiles.
-template <class B, class S>
-concept MeshBackend = Backend<B> && (!requires(B& b, const RasterArgs<S>& args) { b.rasterize_tiles(args); } ||
-                                     requires { requires B::composes_meshes; });
 
 namespace detail {
 
@@ -60,28 +55,26 @@ void project_unhidden(B& backend, const ProjectArgs<float>& args, const View<con
   for (std::size_t c = 0; c < n; ++c) {
     if (list[c] != 0) list[kept++] = static_cast<std::uint32_t>(c);
   }
-  backend.project(args, {list.data(), kept});
+  run(backend, stage::Project{}, args, View<const std::uint32_t>{list.data(), kept});
 }
 
-/// Blends frames with a mesh.
+template <class S, Backend B>
+void blend_pixels_with_meshes(B& backend, const RasterArgs<S>& args) {
+  const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
+    backend.parallel_for(pixels, CompositePixel<S, C, D, G>{args});
+  });
+}
+
+/// Blends frames with a mesh. Pixels that are seen through something are blended anew.
 template <class S, Backend B>
 void rasterize_composite(B& backend, const RasterArgs<S>& args) {
-  if constexpr (MeshBackend<B, S>) {
-    const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
-    if constexpr (requires { backend.composite_tiles(args); }) {
-      backend.composite_tiles(args);
-    } else {
-      dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
-        backend.parallel_for(pixels, CompositePixel<S, C, D, G>{args});
-      });
-    }
-    // Pixels that are seen through something are blended anew.
-    if (!args.mesh.ranges.empty()) {
-      dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
-        backend.parallel_for(pixels, FragmentPixel<S, C, D, G>{args});
-      });
-    }
-  }
+  run(backend, stage::BlendWithMeshes{}, args);
+  if (args.mesh.ranges.empty()) return;
+  const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
+    backend.parallel_for(pixels, FragmentPixel<S, C, D, G>{args});
+  });
 }
 
 }  // namespace detail

@@ -15,15 +15,14 @@
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/order_visible.hpp"
 #include "gsnav/ops/render_config.hpp"
+#include "gsnav/ops/stages.hpp"
 
 namespace gsnav {
 
 /// Backends that can draw a frame in slices of depth.
 template <class B, class S>
 concept SlicingBackend = Backend<B> && is_host_backend<B> &&
-                         requires(B& b, const ProjectArgs<S>& args, View<const std::uint32_t> chunks) {
-                           b.project(args, chunks);
-                         };
+                         RunsStage<B, stage::Project, ProjectArgs<S>, View<const std::uint32_t>>;
 
 /// A frame in slices of depth, front to back: what a slice leaves closed, the next need not project, colour, sort or
 /// bin. The image is that of one slice, bit for bit: a pixel meets the same splats in the same order, but for those

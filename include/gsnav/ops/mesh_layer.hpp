@@ -12,6 +12,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/kernels/mesh_shade.hpp"
 #include "gsnav/ops/render_config.hpp"
+#include "gsnav/ops/stages.hpp"
 
 namespace gsnav {
 
@@ -211,9 +212,9 @@ Status set_up_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshIn
   setup.counts = ws.counts.view();
   setup.not_finite = ws.not_finite.view();
   setup.offsets = ws.offsets.view();
-  backend.parallel_for(ws.host_vertex_chunks.size(), ProjectMeshVertices<S>{setup});
-  backend.parallel_for(chunks, CountMeshTriangles<S>{setup});
-  backend.parallel_for(1, ScanMeshTriangles<S>{setup});
+  run(backend, stage::Each{}, ws.host_vertex_chunks.size(), ProjectMeshVertices<S>{setup});
+  run(backend, stage::Each{}, chunks, CountMeshTriangles<S>{setup});
+  run(backend, stage::Each{}, std::size_t{1}, ScanMeshTriangles<S>{setup});
   ws.host_not_finite.resize(chunks);
   ws.not_finite.download(ws.host_not_finite.data(), chunks);
   std::uint64_t drawn = 0;
@@ -224,7 +225,7 @@ Status set_up_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshIn
   stats.drawn += drawn;
   ws.triangles.resize_discard(drawn);
   setup.triangles = ws.triangles.view();
-  backend.parallel_for(chunks, WriteMeshTriangles<S>{setup});
+  run(backend, stage::Each{}, chunks, WriteMeshTriangles<S>{setup});
   return {};
 }
 
@@ -301,11 +302,11 @@ Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInst
   raster.depth = ws.depth.data();
   raster.visible = ws.visible.data();
   raster.tile_far = ws.tile_far.view();
-  if constexpr (requires { backend.rasterize_mesh(raster); }) {
-    backend.rasterize_mesh(raster);
+  if constexpr (RunsStage<B, stage::RasterizeMesh, MeshRasterArgs<S>>) {
+    run(backend, stage::RasterizeMesh{}, raster);
   } else {
     if (Status s = detail::bin_meshes(backend, ws, raster); !s) return s;
-    backend.parallel_for(raster.bin.grid.count(), RasterizeMeshTile<S>{raster});
+    run(backend, stage::Each{}, raster.bin.grid.count(), RasterizeMeshTile<S>{raster});
   }
 
   if (layer_color) {
@@ -317,7 +318,7 @@ Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInst
     shade.depth = raster.depth;
     shade.visible = raster.visible;
     shade.images = images;
-    backend.parallel_for(static_cast<std::size_t>(camera.height), ShadeMeshRow<S>{shade});
+    run(backend, stage::Each{}, static_cast<std::size_t>(camera.height), ShadeMeshRow<S>{shade});
   }
   if (stats != nullptr) *stats = counted;
   return {};

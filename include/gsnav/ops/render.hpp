@@ -17,11 +17,11 @@
 #include "gsnav/kernels/color_space.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
-#include "gsnav/ops/bin_steps.hpp"
 #include "gsnav/ops/composite_steps.hpp"
 #include "gsnav/ops/order_visible.hpp"
 #include "gsnav/ops/render_config.hpp"
 #include "gsnav/ops/render_workspace.hpp"
+#include "gsnav/ops/stages.hpp"
 #include "gsnav/ops/validate_set.hpp"
 
 namespace gsnav {
@@ -44,21 +44,17 @@ struct RasterizeRow {
 };
 
 template <class S, Backend B>
-void rasterize(B& backend, const RasterArgs<S>& args) {
-  if constexpr (requires { backend.rasterize_tiles(args); }) {
-    backend.rasterize_tiles(args);
-  } else {
-    const std::size_t width = static_cast<std::size_t>(args.grid.width);
-    const std::size_t height = static_cast<std::size_t>(args.grid.height);
-    dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
-      using Kernel = RasterizePixel<S, C, D, M, P>;
-      if constexpr (is_host_backend<B>) {
-        backend.parallel_for(height, RasterizeRow<S, Kernel>{{args}, width});
-      } else {
-        backend.parallel_for(width * height, Kernel{args});
-      }
-    });
-  }
+void blend_pixels(B& backend, const RasterArgs<S>& args) {
+  const std::size_t width = static_cast<std::size_t>(args.grid.width);
+  const std::size_t height = static_cast<std::size_t>(args.grid.height);
+  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
+    using Kernel = RasterizePixel<S, C, D, M, P>;
+    if constexpr (is_host_backend<B>) {
+      backend.parallel_for(height, RasterizeRow<S, Kernel>{{args}, width});
+    } else {
+      backend.parallel_for(width * height, Kernel{args});
+    }
+  });
 }
 
 /// Sizes the scratch of one camera's frame and writes the projection's arguments.
@@ -135,16 +131,6 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   }
 }
 
-/// Projects one set.
-template <class S, Backend B>
-void project_set(B& backend, const ProjectArgs<S>& args) {
-  if constexpr (requires { backend.project(args); }) {
-    backend.project(args);
-  } else {
-    backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
-  }
-}
-
 /// Whether colours of a set have to be converted before they are blended.
 inline bool any_other_space(std::span<const GaussianSet> sets, const RenderConfig& config) noexcept {
   return std::any_of(sets.begin(), sets.end(),
@@ -187,9 +173,9 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   bin.spans = ws.spans.view();
   const MeshCull<S> cull{ws.depths.view(), mesh.tile_far};
   if (mesh.empty()) {
-    detail::count_tiles(backend, bin, NoCull{});
+    run(backend, stage::CountTiles{}, bin, NoCull{});
   } else {
-    detail::count_tiles(backend, bin, cull);
+    run(backend, stage::CountTiles{}, bin, cull);
   }
   std::uint64_t intersections = 0;
   ws.tile_offsets.download(&intersections, 1, bin.grid.count());
@@ -197,9 +183,9 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   ws.tile_splats.resize_discard(intersections);
   bin.tile_splats = ws.tile_splats.view();
   if (mesh.empty()) {
-    detail::scatter_tiles(backend, bin, NoCull{});
+    run(backend, stage::ScatterTiles{}, bin, NoCull{});
   } else {
-    detail::scatter_tiles(backend, bin, cull);
+    run(backend, stage::ScatterTiles{}, bin, cull);
   }
 
   // ---- blend
@@ -218,7 +204,7 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   raster.progress = progress;
   raster.mesh = mesh;
   if (mesh.empty()) {
-    detail::rasterize(backend, raster);
+    run(backend, stage::Blend{}, raster);
   } else {
     detail::rasterize_composite(backend, raster);
   }
@@ -259,7 +245,7 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
   for (int s = 0; s <= last; ++s) {
     for (ProjectArgs<float>& args : sets) {
       const View<const std::uint32_t> chunks = slices.chunks(s, args);
-      if (!chunks.empty()) backend.project(args, chunks);
+      if (!chunks.empty()) run(backend, stage::Project{}, args, chunks);
     }
     const TileProgress<float> progress{ws.open.view(), ws.states.view(), s == 0, s == last};
     if (Status e = draw_projected(backend, ws, camera, config, slices.keys(s), progress, {}, images, stats); !e) {
@@ -311,7 +297,7 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
           continue;
         }
       }
-      detail::project_set(backend, args);
+      run(backend, stage::Project{}, args);
       detail::convert_set(backend, args, sets[i].color_space, config.blend_space);
     }
     if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, mesh, images, counted); !s) return s;

@@ -11,6 +11,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/lbs.hpp"
 #include "gsnav/kernels/skin_modes.hpp"
+#include "gsnav/ops/stages.hpp"
 
 namespace gsnav {
 
@@ -66,8 +67,8 @@ bool has_skinning_mode(const SkinningArgs<S, Out>& args) noexcept {
 
 }  // namespace detail
 
-/// Skins N Gaussians on a backend: linearly, by dual quaternions or with stretch, as the arrays that are given say. A
-/// member `skin(const SkinningArgs<S, Out>&)` of the backend is used for the first where there is one. Every joint index must be below joints.size (AvatarAsset::validate sees to that).
+/// Skins N Gaussians on a backend: linearly (stage::Skin), by dual quaternions or with stretch, as the arrays that are
+/// given say. Every joint index must be below joints.size (AvatarAsset::validate checks that).
 /// The result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
 template <class S, Backend B, class Out>
 Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
@@ -80,16 +81,12 @@ Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
     backend.parallel_for(args.size(), SkinGaussianStretched<S, Out>{args});
     return {};
   }
-  if constexpr (requires { backend.skin(args); }) {
-    backend.skin(args);
-  } else {
-    backend.parallel_for(args.size(), SkinGaussian<S, Out>{args});
-  }
+  run(backend, stage::Skin{}, args);
   return {};
 }
 
-/// The same for many avatars; a member `skin_all(std::span<const SkinningArgs<S, Out>>)` of the backend is used
-/// where there is one (a GPU takes one launch). The bits are those of one avatar at a time. Errors: invalid_argument
+/// The same for many avatars (stage::SkinAll: a GPU takes one launch). The bits are those of one avatar at a time.
+/// Errors: invalid_argument
 /// naming the avatar by its place and the array; nothing is skinned then.
 template <class S, Backend B, class Out = float>
 Status skin_all(B& backend, std::span<const SkinningArgs<S, Out>> avatars) {
@@ -98,27 +95,21 @@ Status skin_all(B& backend, std::span<const SkinningArgs<S, Out>> avatars) {
       return {s.code(), "avatars[" + std::to_string(i) + "]: " + s.message()};
     }
   }
-  if constexpr (requires { backend.skin_all(avatars); }) {
-    std::size_t modes = 0;
-    for (const auto& args : avatars) modes += detail::has_skinning_mode(args) ? 1 : 0;
-    if (modes == 0) {
-      backend.skin_all(avatars);
-      return {};
-    }
-    std::vector<SkinningArgs<S, Out>> usual;
-    for (const auto& args : avatars) {
-      if (!detail::has_skinning_mode(args)) {
-        usual.push_back(args);
-      } else if (Status s = skin_gaussians<S>(backend, args); !s) {
-        return s;
-      }
-    }
-    backend.skin_all(usual);
-  } else {
-    for (const SkinningArgs<S, Out>& args : avatars) {
-      if (Status s = skin_gaussians<S>(backend, args); !s) return s;
+  std::size_t modes = 0;
+  for (const auto& args : avatars) modes += detail::has_skinning_mode(args) ? 1 : 0;
+  if (modes == 0) {
+    run(backend, stage::SkinAll{}, avatars);
+    return {};
+  }
+  std::vector<SkinningArgs<S, Out>> linear;
+  for (const SkinningArgs<S, Out>& args : avatars) {
+    if (!detail::has_skinning_mode(args)) {
+      linear.push_back(args);
+    } else if (Status s = skin_gaussians<S>(backend, args); !s) {
+      return s;
     }
   }
+  run(backend, stage::SkinAll{}, std::span<const SkinningArgs<S, Out>>(linear));
   return {};
 }
 

@@ -10,6 +10,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/capsule_batch.hpp"
+#include "gsnav/ops/stages.hpp"
 
 // One agent against many capsules: the outcome does not depend on the order of the capsules, equal
 // times and equal gaps are decided by (avatar, bone). And many pairs at once, on a backend.
@@ -162,9 +163,8 @@ class SizeCheck {
 
 }  // namespace detail
 
-/// Gaps of N pairs of capsules on a backend, whose memory the arrays are in; a member
-/// `capsule_gaps(const CapsuleGapArgs<S>&)` of it is used where there is one. The bits are those of capsule_gap. The
-/// result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
+/// Gaps of N pairs of capsules on a backend, whose memory the arrays are in (stage::CapsuleGaps). The bits are those of
+/// capsule_gap. The result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
 template <Backend B, class S>
 Status capsule_gaps(B& backend, const CapsuleGapArgs<S>& args) {
   detail::SizeCheck check("CapsuleGapArgs", args.size());
@@ -176,17 +176,12 @@ Status capsule_gaps(B& backend, const CapsuleGapArgs<S>& args) {
   check(args.on_a, "on_a");
   check(args.on_b, "on_b");
   if (!check.status()) return check.status();
-  if constexpr (requires { backend.capsule_gaps(args); }) {
-    backend.capsule_gaps(args);
-  } else {
-    backend.parallel_for(args.size(), GapOfPair<S>{args});
-  }
+  run(backend, stage::CapsuleGaps{}, args);
   return {};
 }
 
-/// Sweeps of N pairs of moving capsules on a backend, whose memory the arrays are in; a member
-/// `sweep_capsules(const SweepArgs<S>&)` of it is used where there is one. The bits are those of sweep. The result is
-/// there after `backend.synchronize()`. Errors: invalid_argument naming the array.
+/// Sweeps of N pairs of moving capsules on a backend, whose memory the arrays are in (stage::SweepCapsules). The bits
+/// are those of sweep. The result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
 template <Backend B, class S>
 Status sweep_capsules(B& backend, const SweepArgs<S>& args) {
   detail::SizeCheck check("SweepArgs", args.size());
@@ -203,11 +198,7 @@ Status sweep_capsules(B& backend, const SweepArgs<S>& args) {
   check(args.normal, "normal");
   check(args.point, "point");
   if (!check.status()) return check.status();
-  if constexpr (requires { backend.sweep_capsules(args); }) {
-    backend.sweep_capsules(args);
-  } else {
-    backend.parallel_for(args.size(), SweepPair<S>{args});
-  }
+  run(backend, stage::SweepCapsules{}, args);
   return {};
 }
 

@@ -26,7 +26,6 @@ struct SemanticFrame {
 /// and meshes at their places in each, so that the weights are those with which the colours of the same
 /// frame were blended. Ids are never mixed.
 template <class S, Backend B>
-requires MeshBackend<B, S>
 class SemanticFrames {
  public:
   explicit SemanticFrames(B& backend)

@@ -16,6 +16,7 @@
 #include "gsnav/ops/render.hpp"
 #include "gsnav/ops/render_composite.hpp"
 #include "gsnav/ops/skin.hpp"
+#include "gsnav/ops/stages.hpp"
 
 struct CUevent_st;
 struct CUstream_st;
@@ -78,27 +79,26 @@ class CudaBackend {
   void hand_over_to(CUstream_st* consumer);
   std::string device_name() const;
 
-  // Optional members (core/backend.hpp).
   bool sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::uint32_t* keys_alt,
                   std::uint32_t* values_alt, std::size_t n, int bits);
-  void project(const ProjectArgs<float>& args);
-  void list_tiles(const BinArgs<float>& args, const NoCull& cull);
-  void list_tiles(const BinArgs<float>& args, const MeshCull<float>& cull);
-  void scatter_tiles(const BinArgs<float>& args, const NoCull& cull);
-  void scatter_tiles(const BinArgs<float>& args, const MeshCull<float>& cull);
-  void rasterize_tiles(const RasterArgs<float>& args);
-  /// Frames with a mesh (docs/composition.md).
-  static constexpr bool composes_meshes = true;
-  void composite_tiles(const RasterArgs<float>& args);
-  void rasterize_mesh(const MeshRasterArgs<float>& args);
-  void parallel_for(std::size_t chunks, const ProjectMeshVertices<float>& k);
-  void parallel_for(std::size_t chunks, const CountMeshTriangles<float>& k);
-  void parallel_for(std::size_t one, const ScanMeshTriangles<float>& k);
-  void parallel_for(std::size_t chunks, const WriteMeshTriangles<float>& k);
-  void parallel_for(std::size_t rows, const ShadeMeshRow<float>& k);
-  void skin(const SkinningArgs<float>& args) { skin_all(std::span(&args, 1)); }
+
+  // Stages by kernels of its own (ops/stages.hpp).
+  void run(stage::Project, const ProjectArgs<float>& args);
+  void run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull);
+  void run(stage::CountTiles, const BinArgs<float>& args, const MeshCull<float>& cull);
+  void run(stage::ScatterTiles, const BinArgs<float>& args, const NoCull& cull);
+  void run(stage::ScatterTiles, const BinArgs<float>& args, const MeshCull<float>& cull);
+  void run(stage::Blend, const RasterArgs<float>& args);
+  void run(stage::BlendWithMeshes, const RasterArgs<float>& args);
+  void run(stage::RasterizeMesh, const MeshRasterArgs<float>& args);
+  void run(stage::Each, std::size_t chunks, const ProjectMeshVertices<float>& k);
+  void run(stage::Each, std::size_t chunks, const CountMeshTriangles<float>& k);
+  void run(stage::Each, std::size_t one, const ScanMeshTriangles<float>& k);
+  void run(stage::Each, std::size_t chunks, const WriteMeshTriangles<float>& k);
+  void run(stage::Each, std::size_t rows, const ShadeMeshRow<float>& k);
+  void run(stage::Skin, const SkinningArgs<float>& args) { run(stage::SkinAll{}, std::span(&args, 1)); }
   /// One launch for all of four influences, one for all of eight.
-  void skin_all(std::span<const SkinningArgs<float>> avatars);
+  void run(stage::SkinAll, std::span<const SkinningArgs<float>> avatars);
 
  private:
   bool usable() const noexcept { return error_ == 0; }

@@ -23,6 +23,7 @@
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/ops/render_composite.hpp"
 #include "gsnav/ops/skin.hpp"
+#include "gsnav/ops/stages.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
 #include "gsnav/kernels/lanes/kernels.hpp"
 #endif
@@ -97,63 +98,52 @@ class OpenMPBackend : public HostMemory {
   }
   Status synchronize() { return {}; }
 
-  /// Optional member: projection in lanes.
-  void project(const ProjectArgs<float>& args) {
-    const auto kernel = lane_kernels().project_chunk;
-    parallel_for(args.chunk_count(), [&args, kernel](std::size_t c) { kernel(args, c); });
+  // Stages in lanes (ops/stages.hpp).
+  void run(stage::Project, const ProjectArgs<float>& args) {
+    parallel_for(args.chunk_count(), Compiled{args, lane_kernels().project_chunk});
   }
-  /// Optional member: the same of some chunks. What reaches no open cell (ProjectArgs::open) is left out, and tiles
-  /// are blended in slices (RasterArgs::progress).
-  void project(const ProjectArgs<float>& args, View<const std::uint32_t> chunks) {
+  /// Some of the chunks. Leaves out what reaches no open cell (ProjectArgs::open).
+  void run(stage::Project, const ProjectArgs<float>& args, View<const std::uint32_t> chunks) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(chunks.size, [&args, chunks, kernel](std::size_t i) { kernel(args, chunks[i]); });
   }
-  /// Optional members: binning in lanes, with the tiles that the projection left in BinArgs::spans.
   static constexpr bool bins_in_lanes = true;
-  void parallel_for(std::size_t n, const CountTileIntersections<float>& k) {
+  void run(stage::Each, std::size_t n, const CountTileIntersections<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_tiles});
   }
-  void parallel_for(std::size_t n, const CountTileIntersections<float, MeshCull<float>>& k) {
+  void run(stage::Each, std::size_t n, const CountTileIntersections<float, MeshCull<float>>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_tiles_before_mesh});
   }
-  void parallel_for(std::size_t n, const ScatterTileIntersections<float>& k) {
+  void run(stage::Each, std::size_t n, const ScatterTileIntersections<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().scatter_tiles});
   }
-  void parallel_for(std::size_t n, const ScatterTileIntersections<float, MeshCull<float>>& k) {
+  void run(stage::Each, std::size_t n, const ScatterTileIntersections<float, MeshCull<float>>& k) {
     parallel_for(n, Compiled{k, lane_kernels().scatter_tiles_before_mesh});
   }
-  /// Optional member: blending in lanes.
-  void rasterize_tiles(const RasterArgs<float>& args) {
-    const auto kernel = lane_kernels().rasterize_tile;
-    parallel_for(args.grid.count(), [&args, kernel](std::size_t tile) { kernel(args, tile); });
+  void run(stage::Blend, const RasterArgs<float>& args) {
+    parallel_for(args.grid.count(), Compiled{args, lane_kernels().rasterize_tile});
   }
-  /// Optional members: frames with a mesh in lanes, and the mesh itself.
-  static constexpr bool composes_meshes = true;
-  void composite_tiles(const RasterArgs<float>& args) {
+  void run(stage::BlendWithMeshes, const RasterArgs<float>& args) {
     parallel_for(args.grid.count(), Compiled{args, lane_kernels().composite_tile});
   }
-  void parallel_for(std::size_t n, const ProjectMeshVertices<float>& k) {
+  void run(stage::Each, std::size_t n, const ProjectMeshVertices<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().project_mesh_vertices});
   }
-  void parallel_for(std::size_t n, const CountMeshTriangles<float>& k) {
+  void run(stage::Each, std::size_t n, const CountMeshTriangles<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_mesh_triangles});
   }
-  void parallel_for(std::size_t n, const WriteMeshTriangles<float>& k) {
+  void run(stage::Each, std::size_t n, const WriteMeshTriangles<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().write_mesh_triangles});
   }
-  void parallel_for(std::size_t n, const RasterizeMeshTile<float>& k) {
+  void run(stage::Each, std::size_t n, const RasterizeMeshTile<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().rasterize_mesh_tile});
   }
-  void parallel_for(std::size_t n, const ShadeMeshRow<float>& k) {
+  void run(stage::Each, std::size_t n, const ShadeMeshRow<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().shade_mesh_row});
   }
-  /// Optional member: skinning in lanes.
-  void skin(const SkinningArgs<float>& args) {
-    in_ranges(args, lane_kernels().skin_range);
-  }
-  /// Optional members: gaps and sweeps of capsules in lanes.
-  void capsule_gaps(const CapsuleGapArgs<float>& args) { in_ranges(args, lane_kernels().gap_range); }
-  void sweep_capsules(const SweepArgs<float>& args) { in_ranges(args, lane_kernels().sweep_range); }
+  void run(stage::Skin, const SkinningArgs<float>& args) { in_ranges(args, lane_kernels().skin_range); }
+  void run(stage::CapsuleGaps, const CapsuleGapArgs<float>& args) { in_ranges(args, lane_kernels().gap_range); }
+  void run(stage::SweepCapsules, const SweepArgs<float>& args) { in_ranges(args, lane_kernels().sweep_range); }
 
  private:
   /// A kernel as it was compiled for the processor's lanes.
