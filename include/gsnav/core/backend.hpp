@@ -34,8 +34,9 @@ struct NoopFunctor {
 ///
 /// Members that are used where they exist, with a generic fallback where they do not:
 ///     rasterize_tiles(const RasterArgs<S>&)   blend all tiles (kernels/blend.hpp)
-///     project(const ProjectArgs<S>&)          project one set of Gaussians (kernels/project_chunk.hpp)
-///     project(const ProjectArgs<S>&, View<const std::uint32_t> chunks)   some of its chunks: frames may then be
+///     project(const ProjectArgs<S>&, const ProjectOutputs<S>&)   project one set of Gaussians
+///                                             (kernels/project_chunk.hpp)
+///     project(the same, View<const std::uint32_t> chunks)   some of its chunks: frames may then be
 ///                                             drawn in slices of depth (ops/depth_slices.hpp)
 ///     one_thread() -> B                       a backend of the same kind for the calling thread alone: batches
 ///                                             of cameras are then cut by frames (ops/frame_lanes.hpp)

@@ -81,7 +81,7 @@ class CudaBackend {
   // Optional members (core/backend.hpp).
   bool sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::uint32_t* keys_alt,
                   std::uint32_t* values_alt, std::size_t n, int bits);
-  void project(const ProjectArgs<float>& args);
+  void project(const ProjectArgs<float>& args, const ProjectOutputs<float>& out);
   void list_tiles(const BinArgs<float>& args, const NoCull& cull);
   void list_tiles(const BinArgs<float>& args, const MeshCull<float>& cull);
   void scatter_tiles(const BinArgs<float>& args, const NoCull& cull);

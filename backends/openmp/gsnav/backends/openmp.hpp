@@ -33,7 +33,8 @@ namespace gsnav {
 struct LaneKernels {
   const char* name;
   int width;
-  void (*project_chunk)(const ProjectArgs<float>&, std::size_t chunk) noexcept;
+  void (*project_chunk)(const ProjectArgs<float>&, const ProjectOutputs<float>&,
+                        std::size_t chunk) noexcept;
   void (*count_tiles)(const CountTileIntersections<float>&, std::size_t block) noexcept;
   void (*scatter_tiles)(const ScatterTileIntersections<float>&, std::size_t block) noexcept;
   void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
@@ -105,15 +106,17 @@ class OpenMPBackend : public HostMemory {
   Status synchronize() { return {}; }
 
   /// Optional member: projection in lanes.
-  void project(const ProjectArgs<float>& args) {
+  void project(const ProjectArgs<float>& args, const ProjectOutputs<float>& out) {
     const auto kernel = lane_kernels().project_chunk;
-    parallel_for(args.chunk_count(), [&args, kernel](std::size_t c) { kernel(args, c); });
+    parallel_for(args.chunk_count(), [&args, &out, kernel](std::size_t c) { kernel(args, out, c); });
   }
-  /// Optional member: the same of some chunks. What reaches no open cell (ProjectArgs::open) is left out, and tiles
-  /// are blended in slices (RasterArgs::progress).
-  void project(const ProjectArgs<float>& args, View<const std::uint32_t> chunks) {
+  /// Optional member: the same of some chunks. What reaches no open cell (ProjectOutputs::open) is left
+  /// out, and tiles are blended in slices (RasterArgs::progress).
+  void project(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+               View<const std::uint32_t> chunks) {
     const auto kernel = lane_kernels().project_chunk;
-    parallel_for(chunks.size, [&args, chunks, kernel](std::size_t i) { kernel(args, chunks[i]); });
+    parallel_for(chunks.size,
+                 [&args, &out, chunks, kernel](std::size_t i) { kernel(args, out, chunks[i]); });
   }
   /// Optional members: binning in lanes, with the tiles that the projection left in BinArgs::spans.
   static constexpr bool bins_in_lanes = true;
