@@ -20,10 +20,10 @@ class FrameStages {
  public:
   FrameStages(B& backend, const gsnav::GaussianCloud& cloud, const gsnav::Camera& camera,
               const gsnav::RenderConfig& config = {})
-      : config_(config), backend_(&backend), arrays_(backend, cloud), offsets_f_(backend), offsets_(backend),
+      : config_(config), backend_(&backend), arrays_(backend, cloud), offsets_(backend),
         geometry_(backend), colors_(backend), depths_(backend), bounds_(backend), chunk_keys_(backend),
-        counts_(backend), order_(backend), cursors_(backend), tile_offsets_(backend), tile_splats_(backend),
-        spans_(backend), images_(backend) {
+        counts_(backend), order_(backend), cursors_(backend), tile_offsets_(backend),
+        tile_splats_(backend), spans_(backend), images_(backend) {
     prepare_projection(camera);
     project();
     set_order();
@@ -32,7 +32,7 @@ class FrameStages {
   }
 
   void project() {
-    gsnav::run(*backend_, gsnav::stage::Project{}, project_);
+    gsnav::run(*backend_, gsnav::stage::Project{}, project_, projected_);
     sync();
   }
 
@@ -100,42 +100,33 @@ class FrameStages {
   void prepare_projection(const gsnav::Camera& camera) {
     const gsnav::GaussianSet set = arrays_.set();
     const gsnav::ProjectionRules rules = gsnav::projection_rules(config_);
-    const gsnav::Vec3d eye = gsnav::inverse(set.world_from_asset) * camera.position();
+    project_ = gsnav::make_project_args<S>(camera, set, rules, config_.max_sh_degree);
     std::vector<gsnav::Vec3d> offsets;
-    const gsnav::View<const gsnav::Vec3d> table = set.gaussians.origins;
-    for (std::size_t o = 0; o < (table.empty() ? 1 : table.size); ++o) {
-      offsets.push_back((table.empty() ? gsnav::Vec3d{} : table[o]) - eye);
+    for (std::size_t o = 0; o < gsnav::origin_count(set.gaussians); ++o) {
+      offsets.push_back(gsnav::origin_offset(project_, o));
     }
-    std::vector<gsnav::Vec3<float>> offsets_f;
-    for (const gsnav::Vec3d& o : offsets) offsets_f.push_back(gsnav::vec_cast<float>(o));
     offsets_.upload(offsets.data(), offsets.size());
-    offsets_f_.upload(offsets_f.data(), offsets_f.size());
-    project_.gaussians = set.gaussians;
-    project_.camera = gsnav::make_projection_camera<S>(camera, set, rules);
-    project_.camera64 = gsnav::make_projection_camera<double>(camera, set, rules);
-    project_.sh_degree = std::min(set.gaussians.sh_degree, config_.max_sh_degree);
-    project_.color = (config_.outputs & gsnav::kRgb) != 0;
-    project_.depth = (config_.outputs & gsnav::kAnyDepth) != 0;
+    const bool color = (config_.outputs & gsnav::kRgb) != 0,
+               depth = (config_.outputs & gsnav::kAnyDepth) != 0;
     const std::size_t slots = project_.chunk_count() * gsnav::kProjectChunk;
     geometry_.resize_discard(slots);
-    colors_.resize_discard(slots);
-    depths_.resize_discard(project_.depth ? slots : 0);
+    colors_.resize_discard(color ? slots : 0);
+    depths_.resize_discard(depth ? slots : 0);
     bounds_.resize_discard(slots);
     chunk_keys_.resize_discard(slots);
     counts_.resize_discard(project_.chunk_count());
-    project_.geometry = geometry_.view();
-    project_.colors = colors_.view();
-    project_.depths = depths_.view();
-    project_.bounds = bounds_.view();
-    project_.keys = chunk_keys_.view();
-    project_.counts = counts_.view();
-    project_.grid = gsnav::TileGrid::of(camera.width, camera.height,
-                                        gsnav::tile_size_of<B>(config_, camera.width, camera.height));
+    projected_.geometry = geometry_.view();
+    projected_.colors = colors_.view();
+    projected_.depths = depths_.view();
+    projected_.bounds = bounds_.view();
+    projected_.keys = chunk_keys_.view();
+    projected_.counts = counts_.view();
+    projected_.grid = gsnav::TileGrid::of(camera.width, camera.height,
+                                          gsnav::tile_size_of<B>(config_, camera.width, camera.height));
     constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
     spans_.resize_discard(kSpans ? slots : 0);
-    project_.spans = spans_.view();
+    projected_.spans = spans_.view();
     project_.offsets = offsets_.view();
-    project_.offsets_f = offsets_f_.view();
     images_.resize_discard(static_cast<std::size_t>(3 * camera.width) * static_cast<std::size_t>(camera.height));
   }
 
@@ -154,7 +145,7 @@ class FrameStages {
   }
 
   void prepare_bins() {
-    bin_.grid = project_.grid;
+    bin_.grid = projected_.grid;
     bin_.spans = spans_.view();
     bin_.order = order_.view();
     bin_.geometry = geometry_.view();
@@ -170,7 +161,6 @@ class FrameStages {
   gsnav::RenderConfig config_;
   B* backend_;
   gsnav::GaussianArrays<B> arrays_;
-  gsnav::Buffer<gsnav::Vec3<float>, B> offsets_f_;
   gsnav::Buffer<gsnav::Vec3d, B> offsets_;
   gsnav::Buffer<gsnav::SplatGeometry<S>, B> geometry_;
   gsnav::Buffer<gsnav::SplatColor<S>, B> colors_;
@@ -182,6 +172,7 @@ class FrameStages {
   gsnav::Buffer<gsnav::TileSpans, B> spans_;
   gsnav::Buffer<S, B> images_;
   gsnav::ProjectArgs<S> project_;
+  gsnav::ProjectOutputs<S> projected_;
   gsnav::BinArgs<S> bin_;
   std::uint64_t pairs_ = 0;
 };

@@ -20,10 +20,7 @@ class RecordMaker {
     args_.gaussians = cloud.view();
     args_.camera = gsnav::make_projection_camera<S>(camera, cloud.set(), rules);
     args_.camera64 = gsnav::make_projection_camera<double>(camera, cloud.set(), rules);
-    const gsnav::Vec3d offset = -camera.position();
-    offset_ = offset;
-    offset_f_ = gsnav::vec_cast<float>(offset);
-    args_.color = args_.depth = false;
+    offset_ = -camera.position();
   }
 
   /// Returns whether Gaussian i is drawn at all; its records hold until the next call.
@@ -36,13 +33,13 @@ class RecordMaker {
     for (auto& p : g.scales) p = {p.data + i, 1};
     g.opacities = {g.opacities.data + i, 1};
     args.offsets = {&offset_, 1};
-    args.offsets_f = {&offset_f_, 1};
-    args.geometry = {&geometry_, 1};
-    args.perspectives = {&perspective_, 1};
-    args.bounds = {&bounds_, 1};
-    args.keys = {&key_, 1};
-    args.counts = {&count_, 1};
-    gsnav::ProjectChunk<S>{args}(0);
+    gsnav::ProjectOutputs<S> out;
+    out.geometry = {&geometry_, 1};
+    out.perspectives = {&perspective_, 1};
+    out.bounds = {&bounds_, 1};
+    out.keys = {&key_, 1};
+    out.counts = {&count_, 1};
+    gsnav::ProjectChunk<S>{args, out}(0);
     return count_ == 1;
   }
 
@@ -53,7 +50,6 @@ class RecordMaker {
  private:
   gsnav::ProjectArgs<S> args_;
   gsnav::Vec3d offset_;
-  gsnav::Vec3<float> offset_f_;
   gsnav::SplatGeometry<S> geometry_;
   gsnav::SplatPerspective<S> perspective_;
   gsnav::SplatBounds bounds_;

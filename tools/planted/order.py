@@ -4,6 +4,7 @@ from . import plant
 
 PROJECTION = "include/gsnav/kernels/projection.hpp"
 CHUNK = "include/gsnav/kernels/project_chunk.hpp"
+ROW = "include/gsnav/kernels/project_row.hpp"
 TILES = "include/gsnav/kernels/tiles.hpp"
 STRIPS = "include/gsnav/kernels/footprint.hpp"
 FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
@@ -66,27 +67,20 @@ PLANTS = [
           "  const Mat3<float> r = mat_cast<float>(camera.rotation);\n"
           "  return dot(Vec3<D>{D(r(2, 0)), D(r(2, 1)), D(r(2, 2))}, delta) * D(camera.scale);\n",
           ORDER, "N22_depth_tie_grid", why="a float32 rotation moves keys by several of their roundings"),
-    plant("key_in_float", CHUNK,
-          "  return static_cast<float>(depth_key(args.camera64, camera_delta64(args, mean, origin)));\n",
-          "  const Mat3<float> r = mat_cast<float>(args.camera64.rotation);\n"
-          "  return dot(r.row[2], mean + args.offsets_f[origin]) * static_cast<float>(args.camera64.scale);\n",
-          ORDER, "N77_quantised_capture*", why="the chain in float32 swaps near ties"),
-    plant("key_in_float_in_lanes", "include/gsnav/kernels/lanes/project_chunk.hpp",
-          "    const F z = rounded(depth_key(args.camera64, delta64[0]), depth_key(args.camera64, delta64[1]));\n",
-          "    const Mat3<float> r = mat_cast<float>(args.camera64.rotation);\n"
-          "    const Vec3<F> o{rounded(offset[0].x, offset[1].x), rounded(offset[0].y, offset[1].y),\n"
-          "                    rounded(offset[0].z, offset[1].z)};\n"
-          "    const F z = dot(Vec3<F>{F(r(2, 0)), F(r(2, 1)), F(r(2, 2))}, mean + o) *\n"
-          "                F(static_cast<float>(args.camera64.scale));\n",
-          ORDER, "N79_near_ties*"),
+    plant("key_in_float", ROW,
+          "  return {delta64, mean + row.rounded_offset(offset), static_cast<F>(depth_key(camera, delta64))};\n",
+          "  const Mat3<float> r = mat_cast<float>(camera.rotation);\n"
+          "  const Vec3<F> delta = mean + row.rounded_offset(offset);\n"
+          "  const F z = dot(Vec3<F>{F(r(2, 0)), F(r(2, 1)), F(r(2, 2))}, delta) * F(static_cast<float>(camera.scale));\n"
+          "  return {delta64, delta, z};\n",
+          ORDER, "N77_quantised_capture*", "N79_near_ties*", why="the chain in float32 swaps near ties"),
     plant("reference_key_in_float", CHUNK,
-          "  if constexpr (kReference) z = static_cast<float>(axes.position.z * args.camera.scale);\n",
-          "  if constexpr (kReference) z = dot(vec_cast<float>(args.camera.rotation.row[2]), mean + "
-          "args.offsets_f[origin]);\n",
+          "    key.z = static_cast<float>(position.z * args.camera.scale);\n",
+          "    key.z = dot(vec_cast<float>(args.camera.rotation.row[2]), key.delta);\n",
           ORDER, "N77_quantised_capture*", why="a reference with the kernels' fault would hide it"),
-    plant("visible_by_another_expression", "include/gsnav/kernels/lanes/project_chunk.hpp",
-          "    const Projected<F> splat = project<F, F>(camera, axes, z, opacity);\n",
-          "    const Projected<F> splat = project<F, F>(camera, axes, axes.position.z * F(1.0000001f), opacity);\n",
+    plant("visible_by_another_expression", ROW,
+          "        splat(project<L, F>(camera, axes, key.z, ",
+          "        splat(project<L, F>(camera, axes, static_cast<F>(axes.position.z * L(1.0000001f)), ",
           "tests/hard_cases/test_near.cpp", "N16_near_plane_cross"),
     plant("key_top_bits", "include/gsnav/kernels/projection_camera.hpp",
           "    const std::uint32_t code = (bits > base ? bits - base : 0u) >> shift;",

@@ -5,6 +5,7 @@ from . import Edit, Plant, plant
 PROJECTION = "include/gsnav/kernels/projection.hpp"
 CAMERA = "include/gsnav/kernels/projection_camera.hpp"
 CHUNK = "include/gsnav/kernels/project_chunk.hpp"
+ROW = "include/gsnav/kernels/project_row.hpp"
 WRITE_SPLATS = "include/gsnav/kernels/lanes/write_splats.hpp"
 BLEND = "include/gsnav/kernels/blend.hpp"
 DETERMINANT = "tests/hard_cases/test_determinant.cpp"
@@ -37,18 +38,21 @@ PLANTS = [
           EXPONENT, "N07_alpha_long_needle", why="offsets from the image's corner cancel"),
     plant("response_ignored", BLEND, "if (along_rays) return perspective_exponent", "if (false) return perspective_exponent",
           RESPONSE, "N02_exact_ray_grid", why="the ellipse of the linearised response"),
-    plant("needles_in_float", CHUNK,
+    plant("needles_in_float", ROW,
           "  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(512))) ||\n"
-          "         (fma(abs(p.k), abs(ox), p.b * abs(oy)) > L(S(16)));",
-          "  return length_x + length_y + ox + oy < L(S(-1e30));",
+          "         (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(16)));",
+          "  return length_x + length_y + ref.dx + ref.dy < L(S(-1e30));",
           EXPONENT, "N07_alpha_long_needle", "N09_huge_needle_tilelocal"),
-    plant("mean_in_float", CHUNK,
-          "    written = detail::store_splat(args, slot, args.camera, p, axes, mean_x, mean_y);",
-          "    written = detail::store_splat(args, slot, args.camera, p, axes, p.mean_x, p.mean_y);",
+    plant("offset_of_the_reference_unturned", ROW, "fma(p.k, ref.dx, p.b * ref.dy), p.log2_opacity};",
+          "p.b * ref.dy, p.log2_opacity};",
+          RESPONSE, "N01_ewa_offaxis_grid", "N02_exact_ray_grid", why="w2 has a part along x"),
+    plant("mean_in_float", ROW,
+          "  return make_splat<Plain>(camera, depth, seen, mean_x, mean_y, out);",
+          "  return make_splat<Plain>(camera, depth, seen, seen.splat.mean_x, seen.splat.mean_y, out);",
           RESPONSE, "N01_ewa_offaxis_grid", "N02_exact_ray_grid"),
     plant("mean_in_float_in_lanes", WRITE_SPLATS,
-          "const F ox = F::load(refs.ox), oy = F::load(refs.oy);",
-          "const F ox = F::load(refs.x) - p.mean_x, oy = F::load(refs.y) - p.mean_y;",
+          "reference_of<F>(camera.width, camera.height, mean_x, mean_y)",
+          "reference_of<F>(camera.width, camera.height, p.mean_x, p.mean_y)",
           RESPONSE, "N01_ewa_offaxis_grid"),
     plant("needles_in_float_in_lanes", WRITE_SPLATS,
           "const std::uint32_t alone = lane_bits(gsnav::detail::needs_double(camera, p)) & bits;",
@@ -100,15 +104,15 @@ PLANTS = [
           FOOTPRINT, "N11_tile_cover_conservative"),
     Plant("near_inclusive",
           (Edit(PROJECTION, "(key_z > F(camera.near_plane)) &&", "(key_z >= F(camera.near_plane)) &&"),
-           Edit(CHUNK, "if (!(z > args.camera.near_plane)) return false;",
-                "if (!(z >= args.camera.near_plane)) return false;")),
+           Edit(CHUNK, "if (!(key.z > args.camera.near_plane)) return false;",
+                "if (!(key.z >= args.camera.near_plane)) return false;")),
           "tests/hard_cases/test_near.cpp", ("N16_near_plane_cross",)),
     plant("near_sigma_ignored", PROJECTION,
           "if (camera.near_sigma > S(0)) {", "if (camera.near_sigma > S(1e9)) {",
           "tests/hard_cases/test_near.cpp", "N17_camera_inside_splat"),
     Plant("behind_kept",
           (Edit(PROJECTION, "(key_z > F(camera.near_plane)) &&", "(abs(key_z) > F(camera.near_plane)) &&"),
-           Edit(CHUNK, "if (!(z > args.camera.near_plane)) return false;",
-                "if (!(abs(z) > args.camera.near_plane)) return false;")),
+           Edit(CHUNK, "if (!(key.z > args.camera.near_plane)) return false;",
+                "if (!(abs(key.z) > args.camera.near_plane)) return false;")),
           "tests/hard_cases/test_order.cpp", ("N24_neg_zero_depth",)),
 ]

@@ -75,10 +75,10 @@ PLANTS = [
     plant("world_in_float", CLOUD,
           "origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);", "origin[k] = 0;",
           WORLD, "N28_world_1e6", why="62 mm at 1000 km"),
-    plant("camera_offset_in_float", "include/gsnav/ops/render.hpp",
-          "      ws.host_offsets_f.push_back(vec_cast<float>(offset));\n",
-          "      ws.host_offsets_f.push_back(vec_cast<float>(table.empty() ? Vec3d{} : table[o]) -\n"
-          "                                  vec_cast<float>(eye));\n",
+    plant("camera_offset_in_float", "include/gsnav/kernels/project_chunk.hpp",
+          "  return (table.empty() ? Vec3d{} : table[o]) - args.camera64.position;\n",
+          "  return vec_cast<double>(vec_cast<float>(table.empty() ? Vec3d{} : table[o]) -\n"
+          "                          vec_cast<float>(args.camera64.position));\n",
           WORLD, "N28_world_1e6", why="a difference of two large floats"),
     plant("cell_of_the_first", CLOUD,
           "      cloud.origin_ids.push_back(id);\n",

@@ -10,7 +10,7 @@ RUNS = "visible sets: rows in runs*"
 
 PLANTS = [
     plant("rows_of_lanes_all_seen", "include/gsnav/kernels/lanes/project_chunk.hpp",
-          "lane_bits(splat.visible) & wanted & ", "lane_bits(splat.visible) & ", VISIBLE_TEST, DRAWN),
+          "lane_bits(seen.splat.visible) & wanted & ", "lane_bits(seen.splat.visible) & ", VISIBLE_TEST, DRAWN),
     plant("rows_one_by_one_all_seen", "include/gsnav/kernels/project_chunk.hpp",
           "if (seen.has(i - begin) && project_gaussian(", "if (project_gaussian(", VISIBLE_TEST, DRAWN),
     plant("rows_of_the_next_chunk", GAUSSIANS,

@@ -20,7 +20,7 @@ inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
 /// A set seen by a camera. Instances of a set are neighbours; those of a camera are listed by
 /// camera_instances, in order of first_rank.
 struct BatchInstance {
-  ProjectArgs<float> args;  ///< without outputs
+  ProjectArgs<float> args;
   std::uint32_t camera;
 };
 
@@ -170,6 +170,7 @@ struct BatchArgs {
   TileGrid grid;
   float log2_alpha_min;
   bool elliptic;
+  bool color;      ///< colours are asked for
   bool seen_rows;  ///< some instance knows of its rows which may be seen
   DepthBins depth_bins;
   bool short_lists;  ///< most lists are short, and put in order by a warp each before they are drawn

@@ -176,7 +176,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
       seen.push_back({s, c, rank, bits});
       rank += static_cast<std::uint32_t>(sets[s].gaussians.size);
       ++set_begins[s + 1];
-      origins += std::max<std::size_t>(1, sets[s].gaussians.origins.size);
+      origins += origin_count(sets[s].gaussians);
     };
     for (const std::uint32_t s : cameras[c].sets) see(s);
     if (cameras[c].sets.empty()) {
@@ -201,7 +201,6 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   const std::size_t at_first = layout.add<std::uint32_t>(cameras.size() + 1);
   const std::size_t at_list = layout.add<std::uint32_t>(seen.size());
   const std::size_t at_offsets = layout.add<Vec3d>(origins);
-  const std::size_t at_offsets_f = layout.add<Vec3<float>>(origins);
   cuda::Flight& flight = flights[calls % cuda::kInFlight];
   cuda::need(cudaEventSynchronize(flight.done), "waiting for an earlier batch");
   flight.inputs.reserve(layout.bytes());
@@ -212,13 +211,11 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   const auto device = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(inputs.data() + at); };
 
   // ---- instances, neighbours where they are of one set
-  const bool color = images.floats.rgb != nullptr || images.rgb8 != nullptr;
   auto* const instances = host(static_cast<BatchInstance*>(nullptr), at_instances);
   auto* const plain = host(static_cast<cuda::PlainCamera*>(nullptr), at_plain);
   auto* const first = host(static_cast<std::uint32_t*>(nullptr), at_first);
   auto* const list = host(static_cast<std::uint32_t*>(nullptr), at_list);
   auto* const offsets = host(static_cast<Vec3d*>(nullptr), at_offsets);
-  auto* const offsets_f = host(static_cast<Vec3<float>*>(nullptr), at_offsets_f);
   std::size_t origin = 0;
   std::fill(first, first + cameras.size() + 1, 0u);
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -230,23 +227,13 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
     BatchInstance instance{};
     instance.camera = seen[i].camera;
     ProjectArgs<float>& to = instance.args;
-    to.gaussians = set.gaussians;
+    to = make_project_args<float>(camera, set, rules, config.max_sh_degree);
     to.gaussians.seen = seen[i].bits;
-    to.camera = make_projection_camera<float>(camera, set, rules);
-    to.camera64 = make_projection_camera<double>(camera, set, rules);
-    to.sh_degree = std::min(set.gaussians.sh_degree, config.max_sh_degree);
-    to.color = color;
     to.first_rank = seen[i].first_rank;
-    const View<const Vec3d> table = set.gaussians.origins;
-    const std::size_t n = std::max<std::size_t>(1, table.size);
-    to.offsets = {device(static_cast<Vec3d*>(nullptr), at_offsets) + origin, n};
-    to.offsets_f = {device(static_cast<Vec3<float>*>(nullptr), at_offsets_f) + origin, n};
+    to.offsets = {device(static_cast<Vec3d*>(nullptr), at_offsets) + origin,
+                  origin_count(set.gaussians)};
     const std::size_t first_origin = origin;
-    const Vec3d eye = inverse(set.world_from_asset) * camera.position();
-    for (std::size_t o = 0; o < n; ++o, ++origin) {
-      offsets[origin] = (table.empty() ? Vec3d{} : table[o]) - eye;
-      offsets_f[origin] = vec_cast<float>(offsets[origin]);
-    }
+    for (std::size_t o = 0; o < to.offsets.size; ++o) offsets[origin++] = origin_offset(to, o);
     std::memcpy(instances + index, &instance, sizeof instance);
     if (plain_rules) plain[index] = plain_camera(instance, offsets[first_origin]);
   }
@@ -255,6 +242,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   // ---- units of culling
   auto* const units = host(static_cast<BatchSet*>(nullptr), at_sets);
   args = {};
+  args.color = images.floats.rgb != nullptr || images.rgb8 != nullptr;
   args.seen_rows = std::any_of(seen.begin(), seen.end(), [&](const Seen& v) {
     return v.bits.size > sets[v.set].gaussians.seen_words();
   });

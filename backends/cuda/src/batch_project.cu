@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_lists.cuh"
 #include "batch_rows.cuh"
-#include "batch_splat.cuh"
 
 // Culling and projection of a batch: what CPU backends do one camera at a time, by the same formulas.
 
@@ -114,8 +113,8 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
 
 /// `Room`: lists are not counted first.
 template <bool Plain, bool Room>
-__device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32_t source, const Splat& s,
-                             const SplatColor<float>& c) {
+__device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32_t source,
+                             const Splat& s, const SplatColor<float>& c) {
   const SplatGeometry<float>& g = s.geometry;
   const auto pack = [](std::uint32_t low, std::uint32_t high) { return low | high << 16; };
   const std::uint32_t x =
@@ -225,68 +224,48 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
     // Instances of a set are drawn to one degree.
     const int degree =
         gs.degree_of(item.part * kChunkPart, a.instances[item.first_instance].args.sh_degree);
-    const bool color = a.instances[item.first_instance].args.color;
-    bool has_sh = !color || degree == 0 || existing == 0;
+    bool has_sh = !a.color || degree == 0 || existing == 0;
     __syncwarp();  // all lanes are done with the rows before
     if (!has_sh) ask_for_sh(gs, degree, first, rows);
     keep_row(read, rows);
     // Of lanes that `exist`: row first + at for an instance. All lanes call it together.
-    const auto project_row = [&](bool exists, std::uint32_t index, unsigned at) {
+    const auto draw_row = [&](bool exists, std::uint32_t index, unsigned at) {
       const std::size_t row = first + at;
       bool drawn = false, hard = false;
       std::uint32_t code = 0, camera_index = 0;
       Splat splat;
-      Vec3<float> delta;
-      const Vec3<float> mean{rows.mean[0][at], rows.mean[1][at], rows.mean[2][at]};
-      // Of what may be seen: the splat, or that it is hard.
-      const auto project_seen = [&](const ProjectionCamera<float>& camera, float z, const SplatAxes<float>& axes,
-                                    const auto& mean_of) {
-        const Projected<float> p = project<float, float>(camera, axes, z, rows.opacity[at]);
-        if (!p.visible) return;
-        hard = gsnav::detail::needs_double(camera, p);
-        if (hard) return;
-        double mean_x, mean_y;
-        mean_of(mean_x, mean_y);
-        drawn = make_splat<Plain>(camera, a.depths != nullptr, p, axes, mean_x, mean_y, splat);
-      };
-      const auto axes_of = [&](const Mat3<float>& rotation) {
-        return splat_axes(rotation, delta, Quat<float>{rows.quat[0][at], rows.quat[1][at], rows.quat[2][at], rows.quat[3][at]},
-                          Vec3<float>{rows.scales[0][at], rows.scales[1][at], rows.scales[2][at]});
+      RowKey<float> key;
+      // Of what lies beyond the near plane: the splat, or that it is hard.
+      const auto project_row = [&](const ProjectionCamera<float>& camera, const auto& from,
+                                   const auto& camera64) {
+        const SeenRow<float> seen_row(camera, from, key);
+        if (!seen_row.splat.visible) return;
+        hard = gsnav::detail::needs_double(camera, seen_row.splat);
+        drawn =
+            !hard && make_splat<Plain>(camera, camera64(), a.depths != nullptr, key, seen_row, splat);
       };
       if constexpr (PlainRules) {
         const PlainCamera& packed = a.plain_cameras[index];
-        const PlainCamera::Key k = packed.key;
-        delta = mean + Vec3<float>{k.offset[0], k.offset[1], k.offset[2]};
-        ProjectionCamera<double> key_camera;
-        key_camera.rotation.row[2] = {packed.mean.rotation[6], packed.mean.rotation[7], packed.mean.rotation[8]};
-        key_camera.scale = k.scale;
-        const Vec3d offset64{packed.mean.offset[0], packed.mean.offset[1], packed.mean.offset[2]};
-        const float z = static_cast<float>(depth_key(key_camera, vec_cast<double>(mean) + offset64));
+        const PlainRow from({rows, at}, packed);
+        key = row_key<float>(key_camera_of(packed), from);
         camera_index = packed.axes.camera;
-        if (exists && z > k.near_plane) {
+        const float near_plane = packed.key.near_plane;
+        if (exists && key.z > near_plane) {
           ProjectionCamera<float> camera = camera_of(a, packed.axes);
-          camera.near_plane = k.near_plane;
-          code = packed.code.key(z);
-          project_seen(camera, z, axes_of(camera.rotation), [&](double& x, double& y) {
-            const PlainCamera::Mean m = packed.mean;
-            gsnav::detail::project_mean(camera_of(m), vec_cast<double>(mean) + offset64, x, y);
-          });
+          camera.near_plane = near_plane;
+          code = packed.code.key(key.z);
+          project_row(camera, from, [&] { return camera_of(PlainCamera::Mean(packed.mean)); });
         }
       } else {
         const BatchInstance& instance = a.instances[index];
         const ProjectArgs<float>& args = instance.args;
-        const std::size_t origin = exists && !gs.origin_ids.empty() ? gs.origin_ids[row] : 0;
-        delta = gsnav::detail::camera_delta(args, mean, origin);
-        const float z = gsnav::detail::depth_of(args, mean, origin);
+        const InstanceRow from({rows, at}, {{gs, exists ? row : 0}, args.offsets});
+        key = row_key<float>(args.camera64, from);
         camera_index = instance.camera;
-        if (exists && z > args.camera.near_plane) {
-          code = args.camera.key_code(gsnav::detail::sort_key(args, z, mean, origin));
-          project_seen(args.camera, z,
-                       gs.axes[0].empty() ? axes_of(args.camera.rotation)
-                                          : gsnav::detail::load_axes(gs, args.camera, delta, row),
-                       [&](double& x, double& y) {
-                         gsnav::detail::project_mean(args.camera64, gsnav::detail::camera_delta64(args, mean, origin), x, y);
-                       });
+        if (exists && key.z > args.camera.near_plane) {
+          code = args.camera.key_code(sort_key(args.camera64, key));
+          project_row(args.camera, from,
+                      [&]() -> const ProjectionCamera<double>& { return args.camera64; });
         }
       }
       const bool wanted = drawn || hard;
@@ -321,7 +300,8 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
           first_rank = a.instances[index].args.first_rank;
         }
         write_record<Plain, Room>(a, of, first_rank + static_cast<std::uint32_t>(row), splat,
-                                  color ? row_color<PlainRules>(gs, degree, first, at, rows, delta) : SplatColor<float>{});
+                                  a.color ? row_color<PlainRules>(gs, degree, first, at, rows, key.delta)
+                                          : SplatColor<float>{});
       }
       if constexpr (Room) {
         pairs.put(a, {code, slot});
@@ -338,13 +318,14 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
       share_in_warp(static_cast<std::uint32_t>(__popc(mine)), [&](unsigned owner, std::uint32_t n) {
         const unsigned from = owner % 32, of_owner = __shfl_sync(kAll, mine, from);
         // What has nothing left goes with the first instance.
-        project_row(owner < 32, item.first_instance + (owner < 32 ? from : 0u),
-                    owner < 32 ? nth_bit<32>(of_owner, n) : 0u);
+        draw_row(owner < 32, item.first_instance + (owner < 32 ? from : 0u),
+                 owner < 32 ? nth_bit<32>(of_owner, n) : 0u);
       });
     } else {
       for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
-        project_row((existing >> lane & 1u) != 0,
-                    item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1, lane);
+        draw_row((existing >> lane & 1u) != 0,
+                 item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1,
+                 lane);
       }
     }
     if (!has_sh) wait_for_sh();
@@ -367,18 +348,14 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
     const BatchInstance& instance = a.instances[h.instance];
     const ProjectArgs<float>& args = instance.args;
     const GaussianView& gs = args.gaussians;
-    const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[h.row];
-    const Vec3<float> mean{gs.means[0][h.row], gs.means[1][h.row], gs.means[2][h.row]};
-    const float z = gsnav::detail::depth_of(args, mean, origin);
-    const float key = gsnav::detail::sort_key(args, z, mean, origin);
+    const ViewedRow row({gs, h.row}, args.offsets);
+    const RowKey<float> key = row_key<float>(args.camera64, row);
     Splat splat;
-    if (make_splat64(args, a.depths != nullptr, h.row, key, mean, origin, splat)) {
+    if (make_splat64(args.camera64, a.depths != nullptr, row, key, splat)) {
       SplatColor<float> color;
-      if (args.color) {
-        color = gaussian_color<float>(gs, gs.degree_of(h.row, args.sh_degree), h.row,
-                                      gsnav::detail::camera_delta(args, mean, origin));
-      }
-      const SplatKey of{h.slot, args.camera.key_code(key), instance.camera};
+      if (a.color)
+        color = gaussian_color<float>(gs, gs.degree_of(h.row, args.sh_degree), h.row, key.delta);
+      const SplatKey of{h.slot, args.camera.key_code(sort_key(args.camera64, key)), instance.camera};
       const std::uint32_t source = args.first_rank + h.row;
       const bool counted = a.list_room == 0;
       if (counted) {

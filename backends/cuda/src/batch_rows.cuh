@@ -3,7 +3,7 @@
 
 #include <cuda_pipeline.h>
 
-#include "batch_args.cuh"
+#include "batch_splat.cuh"
 
 // The rows of a warp of projection: read once, and kept for all cameras of an item.
 
@@ -123,5 +123,49 @@ __device__ inline SplatColor<float> row_color(const GaussianView& gs, int degree
   }
   return gaussian_color<float>(v, degree, at, delta);
 }
+
+/// Row `at` of a warp's, as row_key and SeenRow read it.
+struct KeptRow {
+  const WarpRows& rows;
+  unsigned at;
+
+  __device__ Vec3<float> mean() const { return {rows.mean[0][at], rows.mean[1][at], rows.mean[2][at]}; }
+  __device__ Quat<float> quat() const {
+    return {rows.quat[0][at], rows.quat[1][at], rows.quat[2][at], rows.quat[3][at]};
+  }
+  __device__ Vec3<float> scales() const {
+    return {rows.scales[0][at], rows.scales[1][at], rows.scales[2][at]};
+  }
+  __device__ float opacity() const { return rows.opacity[at]; }
+};
+
+/// The same for a camera of plain rules.
+struct PlainRow : KeptRow {
+  const PlainCamera& camera;
+
+  __device__ PlainRow(const KeptRow& row, const PlainCamera& of) : KeptRow(row), camera(of) {}
+  __device__ Vec3d offset() const {
+    return {camera.mean.offset[0], camera.mean.offset[1], camera.mean.offset[2]};
+  }
+  __device__ Vec3<float> rounded_offset(const Vec3d&) const {
+    const PlainCamera::Key k = camera.key;
+    return {k.offset[0], k.offset[1], k.offset[2]};
+  }
+  __device__ static constexpr bool has_factor() { return false; }
+  __device__ static Mat3<float> factor() { return {}; }
+};
+
+/// The same for any camera: what the warp does not keep is read where the set has it.
+struct InstanceRow : KeptRow {
+  ViewedRow of_set;
+
+  __device__ InstanceRow(const KeptRow& row, const ViewedRow& set) : KeptRow(row), of_set(set) {}
+  __device__ Vec3d offset() const { return of_set.offset(); }
+  __device__ Vec3<float> rounded_offset(const Vec3d& offset) const {
+    return of_set.rounded_offset(offset);
+  }
+  __device__ bool has_factor() const { return of_set.has_factor(); }
+  __device__ Mat3<float> factor() const { return of_set.factor(); }
+};
 
 }  // namespace gsnav::cuda

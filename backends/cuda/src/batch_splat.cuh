@@ -3,37 +3,55 @@
 
 #include "batch_args.cuh"
 
-// A projected Gaussian in registers.
+// Cameras of plain rules as projection reads them: in parts, each when it is needed.
+
+namespace gsnav::detail {
+
+// What depth_record (batch_blend.cu) asks for, one value at a time.
+
+struct GivenRow {
+  const Vec3<float>& given_mean;
+  const Vec3d& given_offset;
+  __device__ const Vec3<float>& mean() const { return given_mean; }
+  __device__ const Vec3d& offset() const { return given_offset; }
+  __device__ Vec3<float> rounded_offset(const Vec3d& offset) const { return vec_cast<float>(offset); }
+};
+__device__ inline RowKey<float> key_of(const ProjectArgs<float>& args, const Vec3<float>& mean,
+                                       std::size_t origin) {
+  return row_key<float>(args.camera64, GivenRow{mean, args.offsets[origin]});
+}
+__device__ inline float depth_of(const ProjectArgs<float>& args, const Vec3<float>& mean,
+                                 std::size_t origin) {
+  return key_of(args, mean, origin).z;
+}
+__device__ inline Vec3<float> camera_delta(const ProjectArgs<float>& args, const Vec3<float>& mean,
+                                           std::size_t origin) {
+  return key_of(args, mean, origin).delta;
+}
+__device__ inline float sort_key(const ProjectArgs<float>& args, float, const Vec3<float>& mean,
+                                 std::size_t origin) {
+  return gsnav::sort_key(args.camera64, key_of(args, mean, origin));
+}
+
+}  // namespace gsnav::detail
 
 namespace gsnav::cuda {
 
-struct Splat {
-  SplatGeometry<float> geometry;
-  SplatBounds bounds;
-  SplatDepth<float> depth;
-  SplatPerspective<float> perspective;
-};
+using Splat = gsnav::Splat<float>;
 
-/// `store_splat` into registers. False where no pixel centre lies in the bounds.
-/// `Plain`: neither depth nor perspective is asked for.
-template <bool Plain, class T, class U>
-__device__ inline bool make_splat(const ProjectionCamera<T>& camera, bool depth, const Projected<T>& p,
-                           const SplatAxes<T>& axes, U mean_x, U mean_y, Splat& out) {
-  ProjectArgs<float> to;
-  to.depth = !Plain && depth;
-  to.geometry = {&out.geometry, 1};
-  to.bounds = {&out.bounds, 1};
-  to.depths = {&out.depth, 1};
-  to.perspectives = {&out.perspective, 1};
-  return gsnav::detail::store_splat(to, 0, camera, p, axes, mean_x, mean_y);
+/// As above.
+__device__ inline bool make_splat64(const ProjectArgs<float>& args, bool depth, std::size_t row, float,
+                                    const Vec3<float>&, std::size_t, Splat& out) {
+  const ViewedRow from({args.gaussians, row}, args.offsets);
+  return gsnav::make_splat64(args.camera64, depth, from, row_key<float>(args.camera64, from), out);
 }
 
-/// The same in double, for Gaussians whose geometry float cannot hold.
-__device__ inline bool make_splat64(const ProjectArgs<float>& args, bool depth, std::size_t row, float key,
-                                    const Vec3<float>& mean, std::size_t origin, Splat& out) {
-  SplatAxes<double> axes;
-  const Projected<double> p = gsnav::detail::project64(args, row, key, mean, origin, axes);
-  return make_splat<false>(args.camera64, depth, p, axes, p.mean_x, p.mean_y, out);
+/// What row_key reads of the double camera.
+__device__ inline ProjectionCamera<double> key_camera_of(const PlainCamera& p) {
+  ProjectionCamera<double> c;
+  c.rotation.row[2] = {p.mean.rotation[6], p.mean.rotation[7], p.mean.rotation[8]};
+  c.scale = p.key.scale;
+  return c;
 }
 
 /// The float camera that `p` packs, but for its key.
@@ -55,6 +73,7 @@ __device__ inline ProjectionCamera<float> camera_of(const BatchArgs& a, const Pl
   return c;
 }
 
+/// The double camera, as far as means and keys need it.
 __device__ inline ProjectionCamera<double> camera_of(const PlainCamera::Mean& p) {
   ProjectionCamera<double> c;
   for (int i = 0; i < 9; ++i) c.rotation.row[i / 3][i % 3] = p.rotation[i];

@@ -7,6 +7,7 @@
 #include "gsnav/kernels/gaussians.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/half.hpp"
+#include "gsnav/math/mat.hpp"
 #include "gsnav/math/quat.hpp"
 
 // Packed rows (scene/packed_cloud.hpp), read as the floats that they stand for: over lanes and one at a time the same
@@ -67,36 +68,79 @@ GSNAV_HD bool is_packed(const GaussianView& gs) noexcept {
 /// Whether colours are.
 GSNAV_HD bool has_packed_colors(const GaussianView& gs) noexcept { return is_packed(gs) && !gs.packed.sh0.empty(); }
 
-namespace detail {
+/// One row of a set, as SetRows reads it.
+struct OneRow {
+  using lane = float;
+  const GaussianView& gs;
+  std::size_t i;
 
-/// Codes of row i in three planes from `plane` on.
-GSNAV_HD Vec3<float> packed_codes(const GaussianView& gs, int plane, std::size_t i) noexcept {
-  const std::uint16_t* code = gs.packed.codes.data + static_cast<std::size_t>(plane) * gs.size + i;
-  return {static_cast<float>(code[0]), static_cast<float>(code[gs.size]), static_cast<float>(code[2 * gs.size])};
-}
-
-}  // namespace detail
-
-/// The mean of row i as an offset from its origin, metres.
-GSNAV_HD Vec3<float> mean_of(const GaussianView& gs, std::size_t i) noexcept {
-  if (is_packed(gs) && gs.means[0].empty()) {
-    return unpack_mean(gs.packed.chunks[i / kProjectChunk], detail::packed_codes(gs, PackedRows::kMeans, i));
+  GSNAV_HD float floats(const View<const float>& plane) const noexcept { return plane[i]; }
+  GSNAV_HD float codes(int plane) const noexcept {
+    return static_cast<float>(gs.packed.codes.data[static_cast<std::size_t>(plane) * gs.size + i]);
   }
-  return {gs.means[0][i], gs.means[1][i], gs.means[2][i]};
+  /// Null where shapes are floats.
+  GSNAV_HD const PackedChunk* chunk() const noexcept {
+    return is_packed(gs) ? &gs.packed.chunks[i / kProjectChunk] : nullptr;
+  }
+  /// The row's, of one value an origin.
+  GSNAV_HD Vec3d offset(const View<const Vec3d>& offsets) const noexcept {
+    return offsets[gs.origin_ids.empty() ? 0 : gs.origin_ids[i]];
+  }
+};
+
+/// Reads one row of a set, or a pack of rows, from any storage. Each member reads when it is called. At
+/// says where the rows lie (OneRow; lanes::PackOfRows).
+template <class At>
+struct SetRows {
+  using L = typename At::lane;
+  At at;
+
+  /// Offset from the row's origin, metres.
+  GSNAV_HD Vec3<L> mean() const noexcept {
+    const PackedChunk* const chunk = at.chunk();
+    return chunk != nullptr && at.gs.means[0].empty() ? unpack_mean(*chunk, codes3(PackedRows::kMeans))
+                                                      : floats3(at.gs.means);
+  }
+  /// Whether the shape is a factor M (GaussianView::axes), in place of a quaternion and scales.
+  GSNAV_HD bool has_factor() const noexcept { return !at.gs.axes[0].empty(); }
+  GSNAV_HD Mat3<L> factor() const noexcept {
+    return {{floats3(at.gs.axes), floats3(at.gs.axes + 3), floats3(at.gs.axes + 6)}};
+  }
+  GSNAV_HD Quat<L> quat() const noexcept {
+    if (at.chunk() != nullptr) return unpack_quat(codes3(PackedRows::kQuats));
+    const View<const float>* const q = at.gs.quats;
+    return {at.floats(q[0]), at.floats(q[1]), at.floats(q[2]), at.floats(q[3])};
+  }
+  GSNAV_HD Vec3<L> scales() const noexcept {
+    const PackedChunk* const chunk = at.chunk();
+    return chunk != nullptr ? unpack_scales(*chunk, codes3(PackedRows::kScales)) : floats3(at.gs.scales);
+  }
+  GSNAV_HD L opacity() const noexcept {
+    return at.chunk() != nullptr ? unpack_opacity(at.codes(PackedRows::kOpacity))
+                                 : at.floats(at.gs.opacities);
+  }
+
+ private:
+  GSNAV_HD Vec3<L> floats3(const View<const float>* planes) const noexcept {
+    return {at.floats(planes[0]), at.floats(planes[1]), at.floats(planes[2])};
+  }
+  GSNAV_HD Vec3<L> codes3(int plane) const noexcept {
+    return {at.codes(plane), at.codes(plane + 1), at.codes(plane + 2)};
+  }
+};
+
+/// The same of row i by itself.
+GSNAV_HD Vec3<float> mean_of(const GaussianView& gs, std::size_t i) noexcept {
+  return SetRows<OneRow>{{gs, i}}.mean();
 }
 GSNAV_HD Vec3<float> scales_of(const GaussianView& gs, std::size_t i) noexcept {
-  if (is_packed(gs)) {
-    return unpack_scales(gs.packed.chunks[i / kProjectChunk], detail::packed_codes(gs, PackedRows::kScales, i));
-  }
-  return {gs.scales[0][i], gs.scales[1][i], gs.scales[2][i]};
+  return SetRows<OneRow>{{gs, i}}.scales();
 }
 GSNAV_HD Quat<float> quat_of(const GaussianView& gs, std::size_t i) noexcept {
-  if (is_packed(gs)) return unpack_quat(detail::packed_codes(gs, PackedRows::kQuats, i));
-  return {gs.quats[0][i], gs.quats[1][i], gs.quats[2][i], gs.quats[3][i]};
+  return SetRows<OneRow>{{gs, i}}.quat();
 }
 GSNAV_HD float opacity_of(const GaussianView& gs, std::size_t i) noexcept {
-  if (is_packed(gs)) return unpack_opacity(static_cast<float>(gs.packed.codes[PackedRows::kOpacity * gs.size + i]));
-  return gs.opacities[i];
+  return SetRows<OneRow>{{gs, i}}.opacity();
 }
 
 /// Coefficient k of row i of packed colours, whichever way the bands are kept.

@@ -8,7 +8,7 @@
 #include "gsnav/kernels/cull.hpp"
 #include "gsnav/kernels/gaussians.hpp"
 #include "gsnav/kernels/packed_gaussians.hpp"
-#include "gsnav/kernels/projection.hpp"
+#include "gsnav/kernels/project_row.hpp"
 #include "gsnav/kernels/sh.hpp"
 #include "gsnav/kernels/splat.hpp"
 #include "gsnav/kernels/tiles.hpp"
@@ -16,34 +16,60 @@
 
 namespace gsnav {
 
-/// Arguments of the projection of one set for one camera. Outputs have room for
-/// kProjectChunk records per chunk; chunk c of the set writes its survivors, in row order, from
-/// (first_chunk + c) * kProjectChunk on and their number to counts[first_chunk + c].
+/// One set as one camera sees it: what projection reads.
 template <class S>
 struct ProjectArgs {
   GaussianView gaussians;
   ProjectionCamera<S> camera;
   ProjectionCamera<double> camera64;  ///< for sort keys, and for Gaussians whose geometry float cannot hold
-  View<const Vec3<float>> offsets_f;  ///< float(origin - camera), one an origin
-  View<const Vec3d> offsets;          ///< the same in double
+  View<const Vec3d> offsets;          ///< origin - camera position, one an origin
   int sh_degree = 0;                  ///< highest degree to evaluate, <= gaussians.sh_degree
-  bool color = true;                  ///< evaluate SH (RGB asked for)
-  bool depth = true;                  ///< fill `depths`
-  std::size_t first_chunk = 0;
-  std::uint32_t first_rank = 0;  ///< of the set's first Gaussian among all
+  std::size_t first_chunk = 0;        ///< among the chunks of all sets
+  std::uint32_t first_rank = 0;       ///< of the set's first Gaussian among all
+
+  GSNAV_HD std::size_t chunk_count() const noexcept { return gaussians.chunk_count(); }
+};
+
+/// Of a set for a camera, but for `offsets` and the set's place in the frame. Host code.
+template <class S>
+ProjectArgs<S> make_project_args(const Camera& camera, const GaussianSet& set,
+                                 const ProjectionRules& rules, int max_sh_degree) noexcept {
+  ProjectArgs<S> args;
+  args.gaussians = set.gaussians;
+  args.camera = make_projection_camera<S>(camera, set, rules);
+  args.camera64 = make_projection_camera<double>(camera, set, rules);
+  args.sh_degree = min(set.gaussians.sh_degree, max_sh_degree);
+  return args;
+}
+
+/// Origins of a set: at least one, at zero.
+inline std::size_t origin_count(const GaussianView& gs) noexcept {
+  return gs.origins.empty() ? 1 : gs.origins.size;
+}
+/// Value o of ProjectArgs::offsets, in double: small where the camera is near, wherever both are in the
+/// world. Host code.
+template <class S>
+Vec3d origin_offset(const ProjectArgs<S>& args, std::size_t o) noexcept {
+  const View<const Vec3d> table = args.gaussians.origins;
+  return (table.empty() ? Vec3d{} : table[o]) - args.camera64.position;
+}
+
+/// What projection writes: the records of all sets of a frame, kProjectChunk slots for each chunk. Chunk
+/// c of a set writes its survivors, in row order, from slot (first_chunk + c) * kProjectChunk on, and
+/// their number to counts[first_chunk + c].
+template <class S>
+struct ProjectOutputs {
   View<SplatGeometry<S>> geometry;
-  View<SplatColor<S>> colors;   ///< empty unless `color`
-  View<SplatDepth<S>> depths;   ///< empty unless `depth`
+  View<SplatColor<S>> colors;              ///< empty: not asked for
+  View<SplatDepth<S>> depths;              ///< empty: not asked for
   View<SplatPerspective<S>> perspectives;  ///< empty for Response::ewa
   View<SplatBounds> bounds;
-  View<std::uint32_t> keys;     ///< camera.key_code of the float32 key
-  View<std::uint32_t> ranks;    ///< what decides between equal keys; empty: the slot does
+  View<std::uint32_t> keys;   ///< camera.key_code of the float32 key
+  View<std::uint32_t> ranks;  ///< what decides between equal keys; empty: the slot does
   View<std::uint32_t> counts;
   TileGrid grid;               ///< read where `spans` is not empty
   View<TileSpans> spans;       ///< tiles of each slot's splat, for backends that find them here; else empty
-  OpenCells open;              ///< backends that do may leave out what reaches none of these
-
-  GSNAV_HD std::size_t chunk_count() const noexcept { return gaussians.chunk_count(); }
+  OpenCells open;              ///< backends may leave out what reaches none of these
 };
 
 /// Whether any Gaussian of chunk c may be visible. Never no where one is.
@@ -78,201 +104,11 @@ GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c
 
 namespace detail {
 
-/// mean - camera position, asset frame, in double.
-template <class S>
-GSNAV_HD Vec3d camera_delta64(const ProjectArgs<S>& args, const Vec3<float>& mean, std::size_t origin) noexcept {
-  return vec_cast<double>(mean) + args.offsets[origin];
-}
-
-/// The same in the scalar of the kernel.
-template <class S>
-GSNAV_HD Vec3<S> camera_delta(const ProjectArgs<S>& args, const Vec3<float>& mean,
-                              std::size_t origin) noexcept {
-  if constexpr (sizeof(S) == sizeof(float)) {
-    return mean + args.offsets_f[origin];
-  } else {
-    return vec_cast<S>(camera_delta64(args, mean, origin));
-  }
-}
-
-/// Depth of a centre along the view axis as near planes and sort keys take it: float32, metres.
-template <class S>
-GSNAV_HD float depth_of(const ProjectArgs<S>& args, const Vec3<float>& mean, std::size_t origin) noexcept {
-  return static_cast<float>(depth_key(args.camera64, camera_delta64(args, mean, origin)));
-}
-
-/// The float32 sort key of a centre whose `depth_of` is `z`, metres.
-template <class S>
-GSNAV_HD float sort_key(const ProjectArgs<S>& args, float z, const Vec3<float>& mean, std::size_t origin) noexcept {
-  if (args.camera64.sort_order == SortOrder::z_depth) return z;
-  return static_cast<float>(distance_key(args.camera64, camera_delta64(args, mean, origin)));
-}
-
-/// Pixels whose centre lies within [center - half, center + half], clipped to [0, size): half-open.
-template <class L>
-GSNAV_HD void pixel_range(L center, L half, int size, L& low, L& high) noexcept {
-  using S = scalar_of<L>;
-  const L one(S(1)), end(static_cast<S>(size));
-  const L first = clamp(center - half - L(S(0.5)), -one, end);
-  const L last = clamp(center + half - L(S(0.5)), -one, end);
-  const L f = truncated(first), l = truncated(last);  // towards zero: made a ceiling, and a floor
-  low = max(select(f < first, f + one, f), L(S(0)));
-  high = min(select(l > last, l - one, l) + one, end);
-}
-
-/// The pixels whose centres lie in the box of a footprint.
-template <class L>
-GSNAV_HD PixelBox<L> pixel_box(const ProjectionCamera<scalar_of<L>>& camera, const Projected<L>& p) noexcept {
-  PixelBox<L> box;
-  pixel_range(p.center_x, p.half_width, camera.width, box.x0, box.x1);
-  pixel_range(p.center_y, p.half_height, camera.height, box.y0, box.y1);
-  return box;
-}
-
-/// The pixels of the 16-pixel tiles that [center - radius, center + radius] reaches, in a compat mode's
-/// own rounding: `slack` is what INRIA adds to the upper end (tile - 1 pixel) where gsplat rounds up.
-template <class S>
-GSNAV_HD void clip_to_tiles(S center, S radius, S slack, int size, std::int32_t& low,
-                            std::int32_t& high) noexcept {
-  constexpr int kTile = 16;
-  const S last_tile = S((size + kTile - 1) / kTile);
-  const S first = clamp((center - radius) * S(1.0 / kTile), S(0), last_tile);
-  const S last = clamp((center + radius + slack) * S(1.0 / kTile), S(0), last_tile);
-  std::int32_t end = static_cast<std::int32_t>(last);
-  if (slack == S(0) && S(end) < last) ++end;
-  const std::int32_t begin_px = static_cast<std::int32_t>(first) * kTile, end_px = end * kTile;
-  low = low > begin_px ? low : begin_px;
-  high = high < end_px ? high : end_px;
-}
-
-/// Whole number not below x >= 0.
-template <class S>
-GSNAV_HD S ceiling(S x) noexcept {
-  if (!(x < S(8388608))) return x;
-  const S whole = S(static_cast<std::int32_t>(x));
-  return whole < x ? whole + S(1) : whole;
-}
-
-/// Narrows bounds to the tiles that the renderer named by `compat` visits.
-template <class S>
-GSNAV_HD void narrow_to_compat(const ProjectionCamera<S>& camera, const Projected<S>& p,
-                               SplatBounds& b) noexcept {
-  const S scale2 = S(kWhitenScale * kWhitenScale);
-  if (camera.compat == Compat::gsplat) {
-    const S extent = min(S(3.33), sqrt(max(p.s_max, S(0))) * S(1 / kWhitenScale));
-    clip_to_tiles(p.mean_x, ceiling(extent * sqrt(p.variance_x)), S(0), camera.width, b.x0, b.x1);
-    clip_to_tiles(p.mean_y, ceiling(extent * sqrt(p.variance_y)), S(0), camera.height, b.y0, b.y1);
-    return;
-  }
-  // det = (scale^2 / (a b))^2; the larger eigenvalue by INRIA's formula with its floor of 0.1.
-  const S root_det = scale2 / (p.a * p.b);
-  const S mid = S(0.5) * (p.variance_x + p.variance_y);
-  const S radius = ceiling(S(3) * sqrt(mid + sqrt(max(S(0.1), fma(mid, mid, -(root_det * root_det))))));
-  clip_to_tiles(p.mean_x - S(0.5), radius, S(15), camera.width, b.x0, b.x1);
-  clip_to_tiles(p.mean_y - S(0.5), radius, S(15), camera.height, b.y0, b.y1);
-}
-
-/// Centre of the pixel of [0, size) that is nearest to x.
-template <class L>
-GSNAV_HD L reference_pixel(L x, int size) noexcept {
-  using S = scalar_of<L>;
-  return truncated(clamp(x, L(S(0)), L(static_cast<S>(size - 1)))) + L(S(0.5));
-}
-
-/// The pixels that a footprint may cover. Returns false where there are none.
-template <class T>
-GSNAV_HD bool splat_bounds(const ProjectionCamera<T>& camera, const Projected<T>& p,
-                           SplatBounds& b) noexcept {
-  const PixelBox<T> box = pixel_box(camera, p);
-  b = {static_cast<std::int32_t>(box.x0), static_cast<std::int32_t>(box.y0), static_cast<std::int32_t>(box.x1),
-       static_cast<std::int32_t>(box.y1)};
-  if (camera.compat != Compat::none) narrow_to_compat(camera, p, b);
-  return b.x0 < b.x1 && b.y0 < b.y1;
-}
-
-/// Rounds what was computed in T (S, or double for the few that need it) to the records of slot. The
-/// mean comes in U: its rounding in float, 3e-5 px, would be the largest error of the exponent.
-/// Returns false where no pixel centre lies in the bounds.
-template <class T, class U, class S>
-GSNAV_HD bool store_splat(const ProjectArgs<S>& args, std::size_t slot,
-                          const ProjectionCamera<T>& camera, const Projected<T>& p,
-                          const SplatAxes<T>& axes, U mean_x, U mean_y) noexcept {
-  SplatBounds b;
-  if (!splat_bounds(camera, p, b)) return false;
-  args.bounds[slot] = b;
-
-  const U ref_x = reference_pixel(mean_x, camera.width), ref_y = reference_pixel(mean_y, camera.height);
-  const T ox = static_cast<T>(ref_x - mean_x), oy = static_cast<T>(ref_y - mean_y);
-  SplatGeometry<S>& g = args.geometry[slot];
-  g.ref_x = static_cast<S>(ref_x);
-  g.ref_y = static_cast<S>(ref_y);
-  g.a = static_cast<S>(p.a);
-  g.k = static_cast<S>(p.k);
-  g.b = static_cast<S>(p.b);
-  g.w1 = static_cast<S>(p.a * ox);
-  g.w2 = static_cast<S>(fma(p.k, ox, p.b * oy));
-  g.log2_opacity = static_cast<S>(p.log2_opacity);
-  if (camera.response != Response::ewa) {
-    args.perspectives[slot] = {static_cast<S>(fma(p.slope_x, ox, fma(p.slope_y, oy, T(1)))),
-                               static_cast<S>(p.slope_x), static_cast<S>(p.slope_y),
-                               static_cast<S>(p.bend)};
-  }
-  if (args.depth) {
-    const SplatDepth<T> d = make_splat_depth(camera, axes, p);
-    SplatDepth<S>& out = args.depths[slot];
-    out.mean_x = static_cast<S>(d.mean_x);
-    out.mean_y = static_cast<S>(d.mean_y);
-    out.z = static_cast<S>(d.z);
-    out.reach = static_cast<S>(d.reach);
-    for (int i = 0; i < 3; ++i) {
-      out.g[i] = static_cast<S>(d.g[i]);
-      out.gx[i] = static_cast<S>(d.gx[i]);
-      out.gy[i] = static_cast<S>(d.gy[i]);
-    }
-  }
-  return true;
-}
-
-/// The mean alone, in double.
-template <class L>
-GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3<L>& delta, L& mean_x,
-                           L& mean_y) noexcept {
-  const auto row = [&](int r) GSNAV_INLINED {
-    return Vec3<L>{L(camera.rotation(r, 0)), L(camera.rotation(r, 1)), L(camera.rotation(r, 2))};
-  };
-  const L inv_z = L(1.0) / dot(row(2), delta);
-  mean_x = fma(L(camera.fx), dot(row(0), delta) * inv_z, L(camera.cx));
-  mean_y = fma(L(camera.fy), dot(row(1), delta) * inv_z, L(camera.cy));
-}
-
-/// Whether the whitened form loses too much in float: k dx + b dy cancels over a long needle's visible
-/// length, or between a far mean and the image.
-template <class L>
-GSNAV_HD mask_of<L> needs_double(const ProjectionCamera<scalar_of<L>>& camera, const Projected<L>& p) noexcept {
-  using S = scalar_of<L>;
-  const L ox = reference_pixel(p.mean_x, camera.width) - p.mean_x;
-  const L oy = reference_pixel(p.mean_y, camera.height) - p.mean_y;
-  const L length_x = min(p.half_width, L(static_cast<S>(camera.width)));
-  const L length_y = min(p.half_height, L(static_cast<S>(camera.height)));
-  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(512))) ||
-         (fma(abs(p.k), abs(ox), p.b * abs(oy)) > L(S(16)));
-}
-
 /// Row i of the set's shape in camera axes.
 template <class S>
 GSNAV_HD SplatAxes<S> load_axes(const GaussianView& gs, const ProjectionCamera<S>& camera,
                                 const Vec3<S>& delta, std::size_t i) noexcept {
-  if (!gs.axes[0].empty()) {
-    Mat3<S> factor;
-    for (int r = 0; r < 3; ++r) {
-      factor.row[r] = {S(gs.axes[3 * r][i]), S(gs.axes[3 * r + 1][i]), S(gs.axes[3 * r + 2][i])};
-    }
-    return splat_axes(camera.rotation, delta, factor);
-  }
-  Quat<S> quat = quat_cast<S>(quat_of(gs, i));
-  // Rounded to float a unit quaternion is off by 6e-8: nothing in float, but not in a reference.
-  if constexpr (sizeof(S) > sizeof(float)) normalize(quat);
-  return splat_axes(camera.rotation, delta, quat, vec_cast<S>(scales_of(gs, i)));
+  return row_axes<S>(camera.rotation, delta, SetRows<OneRow>{{gs, i}});
 }
 
 }  // namespace detail
@@ -323,81 +159,78 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
   return {c.x, c.y, c.z, S(0)};
 }
 
-namespace detail {
-/// Row i projected in double.
+/// What is written of a row.
 template <class S>
-GSNAV_HD Projected<double> project64(const ProjectArgs<S>& args, std::size_t i, float key_z,
-                                     const Vec3<float>& mean, std::size_t origin,
-                                     SplatAxes<double>& axes) noexcept {
-  axes = load_axes(args.gaussians, args.camera64, camera_delta64(args, mean, origin), i);
-  return project<double, float>(args.camera64, axes, key_z,
-                                static_cast<double>(opacity_of(args.gaussians, i)));
-}
-}  // namespace detail
+struct RowSplat {
+  float key;      ///< sort_key
+  Vec3<S> delta;  ///< for its colour: mean - camera, asset frame
+  Splat<S> splat;
+};
 
-/// Writes survivor i, whose mean is `mean` (stored offset), to `slot`. Returns false where no pixel
-/// centre lies in its bounds.
+/// Projects row i in the precision that its geometry needs. False where it may not be seen. `depth`:
+/// whether its depth record is asked for.
 template <class S>
-GSNAV_HD bool write_splat(const ProjectArgs<S>& args, std::size_t slot, std::size_t i, float key,
-                          const Vec3<float>& mean, std::size_t origin, const Projected<S>& p,
-                          const SplatAxes<S>& axes) noexcept {
-  const GaussianView& gs = args.gaussians;
-  bool written;
-  if (sizeof(S) == sizeof(float) && detail::needs_double(args.camera, p)) {
-    SplatAxes<double> axes64;
-    const Projected<double> p64 = detail::project64(args, i, key, mean, origin, axes64);
-    written = detail::store_splat(args, slot, args.camera64, p64, axes64, p64.mean_x, p64.mean_y);
-  } else if (sizeof(S) == sizeof(float)) {
-    double mean_x, mean_y;
-    detail::project_mean(args.camera64, detail::camera_delta64(args, mean, origin), mean_x, mean_y);
-    written = detail::store_splat(args, slot, args.camera, p, axes, mean_x, mean_y);
+GSNAV_HD bool project_row(const ProjectArgs<S>& args, bool depth, std::size_t i,
+                          RowSplat<S>& out) noexcept {
+  const ViewedRow row({args.gaussians, i}, args.offsets);
+  RowKey<float> key = row_key<float>(args.camera64, row);
+  if constexpr (sizeof(S) == sizeof(float)) {
+    if (!(key.z > args.camera.near_plane)) return false;
+    const SeenRow<float> seen(args.camera, row, key);
+    if (!seen.splat.visible) return false;
+    out.key = sort_key(args.camera64, key);
+    out.delta = key.delta;
+    if (detail::needs_double(args.camera, seen.splat))
+      return make_splat64(args.camera64, depth, row, key, out.splat);
+    return make_splat<false>(args.camera, args.camera64, depth, key, seen, out.splat);
   } else {
-    written = detail::store_splat(args, slot, args.camera, p, axes, p.mean_x, p.mean_y);
+    // The float64 reference has depths of its own, so that a fault of `row_key` shows beside it.
+    const Vec3d position = args.camera.rotation * key.delta64;
+    key.z = static_cast<float>(position.z * args.camera.scale);
+    const SeenRow<double> seen(args.camera, row, key);
+    if (!seen.splat.visible) return false;
+    const bool by_z = args.camera.sort_order == SortOrder::z_depth;
+    out.key = by_z ? key.z : static_cast<float>(norm(position) * args.camera.scale);
+    out.delta = key.delta64;
+    return make_splat<false>(args.camera, depth, seen, seen.splat.mean_x, seen.splat.mean_y, out.splat);
   }
-  if (!written) return false;
-  if (!args.spans.empty()) args.spans[slot].rows = TileSpans::kLarge;
-  args.keys[slot] = args.camera.key_code(key);
-  if (!args.ranks.empty()) {
-    const std::uint32_t row = gs.row_ids.empty() ? static_cast<std::uint32_t>(i) : gs.row_ids[i];
-    args.ranks[slot] = args.first_rank + row;
-  }
-  if (args.color) {
-    args.colors[slot] =
-        gaussian_color<S>(gs, gs.degree_of(i, args.sh_degree), i, detail::camera_delta(args, mean, origin));
-  }
-  return true;
 }
 
-/// Projects Gaussian i to `slot`. Returns whether it may be seen.
+/// Writes the records of row i to `slot`.
 template <class S>
-GSNAV_HD bool project_gaussian(const ProjectArgs<S>& args, std::size_t slot, std::size_t i) noexcept {
+GSNAV_HD void write_splat(const ProjectArgs<S>& args, const ProjectOutputs<S>& out, std::size_t slot,
+                          std::size_t i, const RowSplat<S>& row) noexcept {
   const GaussianView& gs = args.gaussians;
-  const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
-  const Vec3<float> mean = mean_of(gs, i);
-  constexpr bool kReference = sizeof(S) > sizeof(float);
-  float z = 0;
-  if constexpr (!kReference) {
-    z = detail::depth_of(args, mean, origin);
-    if (!(z > args.camera.near_plane)) return false;
+  out.bounds[slot] = row.splat.bounds;
+  out.geometry[slot] = row.splat.geometry;
+  if (args.camera.response != Response::ewa) out.perspectives[slot] = row.splat.perspective;
+  if (!out.depths.empty()) out.depths[slot] = row.splat.depth;
+  if (!out.spans.empty()) out.spans[slot].rows = TileSpans::kLarge;
+  out.keys[slot] = args.camera.key_code(row.key);
+  if (!out.ranks.empty()) {
+    out.ranks[slot] =
+        args.first_rank + (gs.row_ids.empty() ? static_cast<std::uint32_t>(i) : gs.row_ids[i]);
   }
-  const SplatAxes<S> axes = detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), i);
-  // The float64 reference takes depths from its own projection, so that a fault of `depth_key` shows beside it.
-  if constexpr (kReference) z = static_cast<float>(axes.position.z * args.camera.scale);
-  const Projected<S> p = project<S, float>(args.camera, axes, z, S(opacity_of(gs, i)));
-  if (!p.visible) return false;
-  float key = detail::sort_key(args, z, mean, origin);
-  if constexpr (kReference) {
-    if (args.camera.sort_order == SortOrder::camera_distance) {
-      key = static_cast<float>(norm(axes.position) * args.camera.scale);
-    }
+  if (!out.colors.empty()) {
+    out.colors[slot] = gaussian_color<S>(gs, gs.degree_of(i, args.sh_degree), i, row.delta);
   }
-  return write_splat(args, slot, i, key, mean, origin, p, axes);
+}
+
+/// Projects row i to `slot`. Returns whether it may be seen.
+template <class S>
+GSNAV_HD bool project_gaussian(const ProjectArgs<S>& args, const ProjectOutputs<S>& out,
+                               std::size_t slot, std::size_t i) noexcept {
+  RowSplat<S> row;
+  if (!project_row(args, !out.depths.empty(), i, row)) return false;
+  write_splat(args, out, slot, i, row);
+  return true;
 }
 
 /// Projects chunk `c` of a set, one Gaussian after the other.
 template <class S>
 struct ProjectChunk {
   ProjectArgs<S> args;
+  ProjectOutputs<S> out;
 
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     const std::size_t begin = args.gaussians.chunk_id(c) * kProjectChunk, size = args.gaussians.size;
@@ -405,7 +238,7 @@ struct ProjectChunk {
     const std::size_t base = (args.first_chunk + c) * kProjectChunk;
     std::uint32_t written = 0, parts = candidate_parts(args, c);
     if (parts == 0) {
-      args.counts[args.first_chunk + c] = 0;
+      out.counts[args.first_chunk + c] = 0;
       return;
     }
     const SeenRows seen = args.gaussians.seen_rows(args.gaussians.chunk_id(c));
@@ -413,10 +246,10 @@ struct ProjectChunk {
       if ((parts & 1u) == 0) continue;
       const std::size_t last = first + kChunkPart < end ? first + kChunkPart : end;
       for (std::size_t i = first; i < last; ++i) {
-        if (seen.has(i - begin) && project_gaussian(args, base + written, i)) ++written;
+        if (seen.has(i - begin) && project_gaussian(args, out, base + written, i)) ++written;
       }
     }
-    args.counts[args.first_chunk + c] = written;
+    out.counts[args.first_chunk + c] = written;
   }
 };
 

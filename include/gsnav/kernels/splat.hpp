@@ -14,7 +14,7 @@ namespace gsnav {
 /// cannot become positive.
 ///
 /// The reference pixel is the one that holds the mean, or the image's nearest to it: d is exact, and
-/// what a mean far outside the image costs in bits is paid once, in w1 and w2 (kernels/project_chunk.hpp).
+/// what a mean far outside the image costs in bits is paid once, in w1 and w2 (kernels/project_row.hpp).
 template <class S>
 struct SplatGeometry {
   S ref_x{}, ref_y{};    ///< centre of the reference pixel (an integer + 0.5)
@@ -45,6 +45,29 @@ template <class S>
 struct SplatPerspective {
   S f0{}, fx{}, fy{}, c{};
 };
+
+/// Records rounded to another scalar.
+template <class S, class T>
+GSNAV_HD SplatGeometry<S> record_cast(const SplatGeometry<T>& g) noexcept {
+  return {static_cast<S>(g.ref_x), static_cast<S>(g.ref_y),       static_cast<S>(g.a),
+          static_cast<S>(g.k),     static_cast<S>(g.b),           static_cast<S>(g.w1),
+          static_cast<S>(g.w2),    static_cast<S>(g.log2_opacity)};
+}
+template <class S, class T>
+GSNAV_HD SplatPerspective<S> record_cast(const SplatPerspective<T>& p) noexcept {
+  return {static_cast<S>(p.f0), static_cast<S>(p.fx), static_cast<S>(p.fy), static_cast<S>(p.c)};
+}
+template <class S, class T>
+GSNAV_HD SplatDepth<S> record_cast(const SplatDepth<T>& d) noexcept {
+  SplatDepth<S> out{static_cast<S>(d.mean_x), static_cast<S>(d.mean_y), static_cast<S>(d.z),
+                    static_cast<S>(d.reach)};
+  for (int i = 0; i < 3; ++i) {
+    out.g[i] = static_cast<S>(d.g[i]);
+    out.gx[i] = static_cast<S>(d.gx[i]);
+    out.gy[i] = static_cast<S>(d.gy[i]);
+  }
+  return out;
+}
 
 /// Half-open pixel rectangle [x0, x1) x [y0, y1) that contains a footprint, clipped to the image.
 struct SplatBounds {

@@ -26,8 +26,9 @@ GSNAV_HD int count_bits(std::uint32_t bits) noexcept {
 
 template <class L>
 struct LaneTraits {
-  using scalar = L;   ///< the element type
-  using mask = bool;  ///< the result of a comparison
+  using scalar = L;        ///< the element type
+  using mask = bool;       ///< the result of a comparison
+  using doubles = double;  ///< a double for each element
   static constexpr int width = 1;
 };
 /// Element type of a scalar or lane pack.
@@ -36,6 +37,10 @@ using scalar_of = typename LaneTraits<L>::scalar;
 /// Comparison result of a scalar or lane pack.
 template <class L>
 using mask_of = typename LaneTraits<L>::mask;
+/// A double for each element of a scalar or lane pack (math/pack_double.hpp). static_cast converts both
+/// ways.
+template <class L>
+using doubles_of = typename LaneTraits<L>::doubles;
 
 #if defined(__CUDACC__)
 GSNAV_HD float fma(float a, float b, float c) noexcept { return ::fmaf(a, b, c); }

@@ -109,6 +109,9 @@ GSNAV_HD Mask<N> compare(typename PackTypes<N>::f a, typename PackTypes<N>::f b)
 /// N floats that are computed with together.
 template <class T, int N>
 struct Pack;
+/// N doubles: math/pack_double.hpp.
+template <int N>
+struct PackPair;
 
 template <int N>
 struct Pack<float, N> {
@@ -149,6 +152,7 @@ template <int N>
 struct LaneTraits<Pack<float, N>> {
   using scalar = float;
   using mask = Mask<N>;
+  using doubles = PackPair<N>;
   static constexpr int width = N;
 };
 

@@ -153,4 +153,52 @@ GSNAV_HD Pack<double, N> fma(Pack<double, N> a, Pack<double, N> b, Pack<double, 
   return r;
 }
 
+/// N doubles as two packs: the lower and the upper half of the lanes of Pack<float, N>.
+template <int N>
+struct PackPair {
+  using half = Pack<double, N / 2>;
+  half low, high;
+
+  GSNAV_HD PackPair() noexcept = default;
+  GSNAV_HD PackPair(double s) noexcept : low(s), high(s) {}
+  GSNAV_HD PackPair(half l, half h) noexcept : low(l), high(h) {}
+  GSNAV_HD explicit PackPair(Pack<float, N> a) noexcept : low(widened<0>(a)), high(widened<1>(a)) {}
+  /// Rounded to floats.
+  GSNAV_HD explicit operator Pack<float, N>() const noexcept { return rounded(low, high); }
+  /// Reads N doubles from any address.
+  GSNAV_HD static PackPair load(const double* p) noexcept {
+    return {half::load(p), half::load(p + N / 2)};
+  }
+
+  GSNAV_HD friend PackPair operator+(PackPair a, PackPair b) noexcept {
+    return {a.low + b.low, a.high + b.high};
+  }
+  GSNAV_HD friend PackPair operator-(PackPair a, PackPair b) noexcept {
+    return {a.low - b.low, a.high - b.high};
+  }
+  GSNAV_HD friend PackPair operator*(PackPair a, PackPair b) noexcept {
+    return {a.low * b.low, a.high * b.high};
+  }
+  GSNAV_HD friend PackPair operator/(PackPair a, PackPair b) noexcept {
+    return {a.low / b.low, a.high / b.high};
+  }
+  /// a * b + c with one rounding.
+  GSNAV_HD friend PackPair fma(PackPair a, PackPair b, PackPair c) noexcept {
+    return {fma(a.low, b.low, c.low), fma(a.high, b.high, c.high)};
+  }
+  GSNAV_HD friend PackPair sqrt(PackPair a) noexcept { return {sqrt(a.low), sqrt(a.high)}; }
+  GSNAV_HD friend PackPair truncated(PackPair a) noexcept {
+    return {truncated(a.low), truncated(a.high)};
+  }
+  GSNAV_HD friend PackPair clamp(PackPair v, PackPair low, PackPair high) noexcept {
+    return {clamp(v.low, low.low, high.low), clamp(v.high, low.high, high.high)};
+  }
+};
+
+template <int N>
+struct LaneTraits<PackPair<N>> {
+  using scalar = double;
+  static constexpr int width = N;
+};
+
 }  // namespace gsnav

@@ -17,7 +17,8 @@ namespace detail {
 
 /// Whether a mesh hides every Gaussian of a chunk at every pixel that it may reach (host memory). Never yes where one
 /// is seen: bounds are those of chunk_extent, and the reach of a depth is at most that of the largest and most opaque.
-inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const View<const float>& tile_far, std::size_t c) noexcept {
+inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const TileGrid& grid,
+                             const View<const float>& tile_far, std::size_t c) noexcept {
   const ProjectionCamera<double>& camera = args.camera64;
   const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
   if (bounds.empty() || camera.response != Response::ewa || camera.compat != Compat::none) return false;
@@ -26,7 +27,6 @@ inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const View<const fl
   const double k2 = 2 * kLn2 * (ChunkInView(camera, chunk).s_max() + 1e-5);
   const double reach = sqrt(max(k2, 0.0)) * static_cast<double>(chunk.scale_max) * camera.scale;
   const double nearest = static_cast<double>(e.nearest) * (1 - 1e-6) - reach * (1 + 1e-5);
-  const TileGrid& grid = args.grid;
   const auto tile = [&grid](double pixel, int tiles) {
     return static_cast<int>(clamp(pixel / grid.tile_size, 0.0, static_cast<double>(tiles - 1)));
   };
@@ -44,18 +44,18 @@ inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const View<const fl
 
 /// Projects the chunks of a set that a mesh does not hide; `list` is scratch, `counts` are 0.
 template <class B>
-void project_unhidden(B& backend, const ProjectArgs<float>& args, const View<const float>& tile_far,
-                      std::vector<std::uint32_t>& list) {
+void project_unhidden(B& backend, const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+                      const View<const float>& tile_far, std::vector<std::uint32_t>& list) {
   const std::size_t n = args.chunk_count();
   list.resize(n);
   backend.parallel_for(n, [&](std::size_t c) {
-    list[c] = chunk_is_candidate(args, c) && !mesh_hides_chunk(args, tile_far, c) ? 1 : 0;
+    list[c] = chunk_is_candidate(args, c) && !mesh_hides_chunk(args, out.grid, tile_far, c) ? 1 : 0;
   });
   std::size_t kept = 0;
   for (std::size_t c = 0; c < n; ++c) {
     if (list[c] != 0) list[kept++] = static_cast<std::uint32_t>(c);
   }
-  run(backend, stage::Project{}, args, View<const std::uint32_t>{list.data(), kept});
+  run(backend, stage::Project{}, args, out, View<const std::uint32_t>{list.data(), kept});
 }
 
 template <class S, Backend B>

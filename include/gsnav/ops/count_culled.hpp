@@ -40,47 +40,30 @@ requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const 
   const float log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
   for (const GaussianSet& set : sets) {
     const GaussianView& gs = set.gaussians;
-    const Vec3d eye = inverse(set.world_from_asset) * camera.position();
+    ProjectArgs<float> args = make_project_args<float>(camera, set, rules, 0);
     std::vector<Vec3d> offsets;
-    std::vector<Vec3<float>> offsets_f;
-    for (std::size_t o = 0; o < (gs.origins.empty() ? 1 : gs.origins.size); ++o) {
-      offsets.push_back((gs.origins.empty() ? Vec3d{} : gs.origins[o]) - eye);
-      offsets_f.push_back(vec_cast<float>(offsets.back()));
-    }
-    ProjectArgs<float> args;
-    args.gaussians = gs;
-    args.camera = make_projection_camera<float>(camera, set, rules);
-    args.camera64 = make_projection_camera<double>(camera, set, rules);
+    for (std::size_t o = 0; o < origin_count(gs); ++o) offsets.push_back(origin_offset(args, o));
     args.offsets = {offsets.data(), offsets.size()};
-    args.offsets_f = {offsets_f.data(), offsets_f.size()};
-    args.color = args.depth = false;
-    args.grid = TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
+    const TileGrid grid =
+        TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
 
     struct Count {
       std::uint32_t touched = 0, emitting = 0;
     };
     std::vector<Count> counts(gs.chunk_count());
     backend.parallel_for(counts.size(), [&](std::size_t c) {
-      SplatGeometry<float> geometry;
-      SplatPerspective<float> perspective;
-      SplatBounds bounds;
-      std::uint32_t key;
-      ProjectArgs<float> one = args;
-      one.geometry = {&geometry, 1};
-      one.perspectives = {&perspective, 1};
-      one.bounds = {&bounds, 1};
-      one.keys = {&key, 1};
       const std::size_t first = gs.chunk_id(c) * kProjectChunk;
-      const std::uint32_t parts = candidate_parts(one, c);
+      const std::uint32_t parts = candidate_parts(args, c);
       if (parts == 0) return;
       const SeenRows seen = gs.seen_rows(gs.chunk_id(c));
       for (std::size_t i = first; i < first + kProjectChunk && i < gs.size; ++i) {
         if ((parts >> ((i - first) / kChunkPart) & 1u) == 0 || !seen.has(i - first)) continue;
         ++counts[c].touched;
-        if (!project_gaussian(one, 0, i)) continue;
+        RowSplat<float> row;
+        if (!project_row(args, false, i, row)) continue;
         bool any = false;
-        for_each_tile(args.grid, geometry, bounds, log2_alpha_min, config.response == Response::ewa,
-                      [&any](std::size_t) { any = true; });
+        for_each_tile(grid, row.splat.geometry, row.splat.bounds, log2_alpha_min,
+                      config.response == Response::ewa, [&any](std::size_t) { any = true; });
         counts[c].emitting += any ? 1 : 0;
       }
     });

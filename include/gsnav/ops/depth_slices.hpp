@@ -22,7 +22,7 @@ namespace gsnav {
 /// Backends that can draw a frame in slices of depth.
 template <class B, class S>
 concept SlicingBackend = Backend<B> && is_host_backend<B> &&
-                         RunsStage<B, stage::Project, ProjectArgs<S>, View<const std::uint32_t>>;
+    RunsStage<B, stage::Project, ProjectArgs<S>, ProjectOutputs<S>, View<const std::uint32_t>>;
 
 /// A frame in slices of depth, front to back: what a slice leaves closed, the next need not project, colour, sort or
 /// bin. The image is that of one slice, bit for bit: a pixel meets the same splats in the same order, but for those
@@ -78,15 +78,16 @@ class DepthSlices {
     const auto end = [this](int i) { return key_of_bucket(ends_[static_cast<std::size_t>(i)]); };
     return {s == 0 ? 0 : end(s - 1), s + 1 == count_ ? 0xffffffffu : end(s) - 1};
   }
-  /// The chunks of one set that slice s projects: those that may reach an open cell.
-  View<const std::uint32_t> chunks(int s, const ProjectArgs<float>& args) {
+  /// The chunks of one set that slice s projects: those that may reach a cell of `open`, or all where
+  /// that is empty.
+  View<const std::uint32_t> chunks(int s, const ProjectArgs<float>& args, const OpenCells& open) {
     const std::size_t begin = s == 0 ? 0 : ends_[static_cast<std::size_t>(s - 1)];
     const std::size_t end = ends_[static_cast<std::size_t>(s)];
     list_.clear();
     for (std::size_t c = 0; c < args.chunk_count(); ++c) {
       const Place& place = chunks_[args.first_chunk + c];
       if (place.bucket < begin || place.bucket >= end || !place.candidate()) continue;
-      if (!args.open.empty() && !args.open.any(place.x0, place.y0, place.x1, place.y1)) continue;
+      if (!open.empty() && !open.any(place.x0, place.y0, place.x1, place.y1)) continue;
       list_.push_back(static_cast<std::uint32_t>(c));
     }
     return {list_.data(), list_.size()};
@@ -142,7 +143,7 @@ class DepthSlices {
   }
   Place place_of(const ProjectArgs<float>& args, std::size_t c) const noexcept {
     constexpr int kSize = OpenCells::kSize;
-    const int width = args.grid.width, height = args.grid.height;
+    const int width = args.camera.width, height = args.camera.height;
     const auto cells = [](int size) { return static_cast<std::uint16_t>((size + kSize - 1) / kSize); };
     const std::uint16_t columns = cells(width), rows = cells(height);
     const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;

@@ -62,12 +62,11 @@ template <class S, Backend B>
 void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
                         const RenderConfig& config, const FrameImages<S>& images, bool meshes) {
   ws.projections.resize(sets.size());
-  std::size_t chunks = 0, origins = 0;
+  std::size_t chunks = 0;
   bool ranked = false;
   for (const GaussianSet& set : sets) {
     chunks += set.gaussians.chunk_count();
     ranked = ranked || !set.gaussians.row_ids.empty();
-    origins += set.gaussians.origins.empty() ? 1 : set.gaussians.origins.size;
   }
   const std::size_t slots = chunks * kProjectChunk;
   const bool color = images.rgb != nullptr;
@@ -83,51 +82,37 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   ws.visible.counts.resize_discard(chunks);
   constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
   ws.spans.resize_discard(kSpans ? slots : 0);
-  const TileGrid grid = grid_of<B>(config, camera);
+  ProjectOutputs<S>& out = ws.projected;
+  out = {};
+  out.geometry = ws.geometry.view();
+  out.colors = ws.colors.view();
+  out.depths = ws.depths.view();
+  out.perspectives = ws.perspectives.view();
+  out.bounds = ws.bounds.view();
+  out.keys = ws.visible.chunk_keys.view();
+  out.ranks = ws.visible.ranks.view();
+  out.counts = ws.visible.counts.view();
+  out.grid = grid_of<B>(config, camera);
+  out.spans = ws.spans.view();
 
   const ProjectionRules rules = projection_rules(config);
   ws.host_offsets.clear();
-  ws.host_offsets_f.clear();
-  for (const GaussianSet& set : sets) {
-    const Vec3d eye = inverse(set.world_from_asset) * camera.position();
-    const View<const Vec3d> table = set.gaussians.origins;
-    for (std::size_t o = 0; o < (table.empty() ? 1 : table.size); ++o) {
-      const Vec3d offset = (table.empty() ? Vec3d{} : table[o]) - eye;
-      ws.host_offsets.push_back(offset);
-      ws.host_offsets_f.push_back(vec_cast<float>(offset));
-    }
-  }
-  ws.offsets.upload(ws.host_offsets.data(), origins);
-  ws.offsets_f.upload(ws.host_offsets_f.data(), origins);
-
-  std::size_t first_chunk = 0, first_origin = 0, first_rank = 0;
+  std::size_t first_chunk = 0, first_rank = 0;
   for (std::size_t i = 0; i < sets.size(); ++i) {
-    const std::size_t n = sets[i].gaussians.origins.empty() ? 1 : sets[i].gaussians.origins.size;
     ProjectArgs<S>& a = ws.projections[i];
-    a = {};
-    a.gaussians = sets[i].gaussians;
-    a.camera = make_projection_camera<S>(camera, sets[i], rules);
-    a.camera64 = make_projection_camera<double>(camera, sets[i], rules);
-    a.offsets = {ws.offsets.data() + first_origin, n};
-    a.offsets_f = {ws.offsets_f.data() + first_origin, n};
-    a.sh_degree = std::min(sets[i].gaussians.sh_degree, config.max_sh_degree);
-    a.color = color;
-    a.depth = depth;
+    a = make_project_args<S>(camera, sets[i], rules, config.max_sh_degree);
     a.first_chunk = first_chunk;
     a.first_rank = static_cast<std::uint32_t>(first_rank);
-    a.geometry = ws.geometry.view();
-    a.colors = ws.colors.view();
-    a.depths = ws.depths.view();
-    a.perspectives = ws.perspectives.view();
-    a.bounds = ws.bounds.view();
-    a.keys = ws.visible.chunk_keys.view();
-    a.ranks = ws.visible.ranks.view();
-    a.counts = ws.visible.counts.view();
-    a.grid = grid;
-    a.spans = ws.spans.view();
+    a.offsets.size = origin_count(a.gaussians);
+    for (std::size_t o = 0; o < a.offsets.size; ++o) ws.host_offsets.push_back(origin_offset(a, o));
     first_chunk += a.chunk_count();
     first_rank += a.gaussians.size;
-    first_origin += n;
+  }
+  ws.offsets.upload(ws.host_offsets.data(), ws.host_offsets.size());
+  const Vec3d* offsets = ws.offsets.data();
+  for (ProjectArgs<S>& a : ws.projections) {
+    a.offsets.data = offsets;
+    offsets += a.offsets.size;
   }
 }
 
@@ -139,9 +124,11 @@ inline bool any_other_space(std::span<const GaussianSet> sets, const RenderConfi
 
 /// Converts the colours of one projected set where its space is not the frame's.
 template <class S, Backend B>
-void convert_set(B& backend, const ProjectArgs<S>& args, ColorSpace from, ColorSpace to) {
-  if (from == to || !args.color) return;
-  backend.parallel_for(args.chunk_count(), ConvertSplatColors<S>{args.colors, args.counts, args.first_chunk, from, to});
+void convert_set(B& backend, const ProjectArgs<S>& args, const ProjectOutputs<S>& out, ColorSpace from,
+                 ColorSpace to) {
+  if (from == to || out.colors.empty()) return;
+  backend.parallel_for(args.chunk_count(),
+                       ConvertSplatColors<S>{out.colors, out.counts, args.first_chunk, from, to});
 }
 
 /// What comes after the projection of one camera: sort, bin, blend, of the keys in `range`. Adds to `stats`.
@@ -230,7 +217,7 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
                             const RenderConfig& config, const FrameImages<float>& images, RenderStats& stats) {
   if (depth_slices_of(config, stats.gaussians, camera) < 2) return false;  // nothing needs to be planned
   DepthSlices& slices = ws.slices;
-  const View<ProjectArgs<float>> sets = view_of(ws.projections);
+  const View<const ProjectArgs<float>> sets = view_of(ws.projections);
   slices.plan(backend, sets);
   const int count = depth_slices_of(config, slices.candidates(), camera);
   if (count < 2) return false;
@@ -243,18 +230,18 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
   ws.states.resize_discard(grid.count() * pixels * blend_state_values(images.depth_mode()));
   std::fill(ws.visible.counts.data(), ws.visible.counts.data() + ws.visible.counts.size(), 0u);
   for (int s = 0; s <= last; ++s) {
-    for (ProjectArgs<float>& args : sets) {
-      const View<const std::uint32_t> chunks = slices.chunks(s, args);
-      if (!chunks.empty()) run(backend, stage::Project{}, args, chunks);
+    for (const ProjectArgs<float>& args : sets) {
+      const View<const std::uint32_t> chunks = slices.chunks(s, args, ws.projected.open);
+      if (!chunks.empty()) run(backend, stage::Project{}, args, ws.projected, chunks);
     }
     const TileProgress<float> progress{ws.open.view(), ws.states.view(), s == 0, s == last};
     if (Status e = draw_projected(backend, ws, camera, config, slices.keys(s), progress, {}, images, stats); !e) {
       return e;
     }
     if (s == last) break;
-    const OpenCells open = slices.open_cells(grid, ws.open.view());
-    if (open.sums[open.sums.size - 1] == 0) break;
-    for (ProjectArgs<float>& args : sets) args.open = open;
+    ws.projected.open = slices.open_cells(grid, ws.open.view());
+    const View<const std::uint32_t>& sums = ws.projected.open.sums;
+    if (sums[sums.size - 1] == 0) break;
   }
   return true;
 }
@@ -291,14 +278,14 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
       const ProjectArgs<S>& args = ws.projections[i];
       if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
         if (!mesh.empty()) {
-          std::fill_n(args.counts.data + args.first_chunk, args.chunk_count(), 0u);
-          detail::project_unhidden(backend, args, mesh.tile_far, ws.mesh.unhidden);
-          detail::convert_set(backend, args, sets[i].color_space, config.blend_space);
+          std::fill_n(ws.projected.counts.data + args.first_chunk, args.chunk_count(), 0u);
+          detail::project_unhidden(backend, args, ws.projected, mesh.tile_far, ws.mesh.unhidden);
+          detail::convert_set(backend, args, ws.projected, sets[i].color_space, config.blend_space);
           continue;
         }
       }
-      run(backend, stage::Project{}, args);
-      detail::convert_set(backend, args, sets[i].color_space, config.blend_space);
+      run(backend, stage::Project{}, args, ws.projected);
+      detail::convert_set(backend, args, ws.projected, sets[i].color_space, config.blend_space);
     }
     if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, mesh, images, counted); !s) return s;
   }

@@ -29,11 +29,9 @@ struct RenderStats {
 template <class S, Backend B>
 struct RenderWorkspace {
   explicit RenderWorkspace(B& b)
-      : offsets_f(b), offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b),
-        visible(b), cursors(b), tile_offsets(b), tile_splats(b), spans(b), open(b), states(b), mesh(b),
-        fragments(b), composite(b) {}
+      : offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b), visible(b), cursors(b),
+        tile_offsets(b), tile_splats(b), spans(b), open(b), states(b), mesh(b), fragments(b), composite(b) {}
 
-  Buffer<Vec3<float>, B> offsets_f;
   Buffer<Vec3d, B> offsets;
   Buffer<SplatGeometry<S>, B> geometry;
   Buffer<SplatColor<S>, B> colors;
@@ -50,9 +48,9 @@ struct RenderWorkspace {
   MeshWorkspace<S, B> mesh;
   FragmentWorkspace<S, B> fragments;
   Buffer<S, B> composite;  ///< of Composite::hard_depth: what the Gaussians alone have
-  std::vector<Vec3<float>> host_offsets_f;
   std::vector<Vec3d> host_offsets;
   std::vector<ProjectArgs<S>> projections;  ///< [sets]
+  ProjectOutputs<S> projected;              ///< of the frame
 
   std::size_t bytes() const noexcept {
     std::size_t sum = 0;
@@ -75,10 +73,10 @@ struct RenderWorkspace {
  private:
   template <class A, class C, class F>
   static void for_each(A& a, C& b, const F& f) {
-    f(a.offsets_f, b.offsets_f), f(a.offsets, b.offsets), f(a.geometry, b.geometry), f(a.colors, b.colors);
+    f(a.offsets, b.offsets), f(a.geometry, b.geometry), f(a.colors, b.colors);
     f(a.depths, b.depths), f(a.perspectives, b.perspectives), f(a.bounds, b.bounds);
     f(a.cursors, b.cursors), f(a.tile_offsets, b.tile_offsets), f(a.tile_splats, b.tile_splats);
-    f(a.spans, b.spans), f(a.host_offsets_f, b.host_offsets_f), f(a.host_offsets, b.host_offsets);
+    f(a.spans, b.spans), f(a.host_offsets, b.host_offsets);
     f(a.projections, b.projections), f(a.open, b.open), f(a.states, b.states), f(a.slices, b.slices);
     f(a.mesh, b.mesh), f(a.fragments, b.fragments), f(a.composite, b.composite);
     VisibleOrder<B>::for_each(a.visible, b.visible, f);

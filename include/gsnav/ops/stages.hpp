@@ -26,6 +26,8 @@ namespace gsnav {
 template <class S>
 struct ProjectArgs;
 template <class S>
+struct ProjectOutputs;
+template <class S>
 struct ProjectChunk;
 template <class S>
 struct BinArgs;
@@ -65,7 +67,7 @@ void run(B& backend, Stage stage, const Args&... args) {
 }
 
 namespace detail {
-/// Blends all pixels by the generic kernels (ops/blend_steps.hpp).
+/// Blends all pixels by the generic kernels.
 template <class S, Backend B>
 void blend_pixels(B& backend, const RasterArgs<S>& args);
 template <class S, Backend B>
@@ -88,8 +90,8 @@ struct Each {
 /// backend has the second form, frames may be drawn in slices of depth (ops/depth_slices.hpp).
 struct Project {
   template <Backend B, class S>
-  static void generic(B& backend, const ProjectArgs<S>& args) {
-    backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args});
+  static void generic(B& backend, const ProjectArgs<S>& args, const ProjectOutputs<S>& out) {
+    backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args, out});
   }
 };
 

@@ -35,7 +35,8 @@ namespace gsnav {
 struct LaneKernels {
   const char* name;
   int width;
-  void (*project_chunk)(const ProjectArgs<float>&, std::size_t chunk) noexcept;
+  void (*project_chunk)(const ProjectArgs<float>&, const ProjectOutputs<float>&,
+                        std::size_t chunk) noexcept;
   void (*count_tiles)(const CountTileIntersections<float>&, std::size_t block) noexcept;
   void (*count_tiles_before_mesh)(const CountTileIntersections<float, MeshCull<float>>&,
                                   std::size_t block) noexcept;
@@ -99,13 +100,16 @@ class OpenMPBackend : public HostMemory {
   Status synchronize() { return {}; }
 
   // Stages in lanes (ops/stages.hpp).
-  void run(stage::Project, const ProjectArgs<float>& args) {
-    parallel_for(args.chunk_count(), Compiled{args, lane_kernels().project_chunk});
-  }
-  /// Some of the chunks. Leaves out what reaches no open cell (ProjectArgs::open).
-  void run(stage::Project, const ProjectArgs<float>& args, View<const std::uint32_t> chunks) {
+  void run(stage::Project, const ProjectArgs<float>& args, const ProjectOutputs<float>& out) {
     const auto kernel = lane_kernels().project_chunk;
-    parallel_for(chunks.size, [&args, chunks, kernel](std::size_t i) { kernel(args, chunks[i]); });
+    parallel_for(args.chunk_count(), [&args, &out, kernel](std::size_t c) { kernel(args, out, c); });
+  }
+  /// Some of the chunks. Leaves out what reaches no open cell (ProjectOutputs::open).
+  void run(stage::Project, const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+           View<const std::uint32_t> chunks) {
+    const auto kernel = lane_kernels().project_chunk;
+    parallel_for(chunks.size,
+                 [&args, &out, chunks, kernel](std::size_t i) { kernel(args, out, chunks[i]); });
   }
   static constexpr bool bins_in_lanes = true;
   void run(stage::Each, std::size_t n, const CountTileIntersections<float>& k) {

@@ -17,40 +17,14 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// Half of the lanes, in double.
-using D = Pack<double, kWidth / 2>;
-
 /// kWidth projected Gaussians: lane l is row `first + l` of the set.
 struct ProjectedPack {
   std::size_t first;
-  const Vec3<F>& delta;       ///< mean - camera, asset frame
-  const Vec3<D> (&delta64)[2];  ///< the same in double, of the lower and of the upper half of the lanes
-  F key;
-  const SplatAxes<F>& axes;
-  const Projected<F>& splat;
+  const RowKey<F>& key;
+  const SeenRow<F>& seen;
 };
 
 namespace detail {
-
-/// The reference pixel and its distance from the mean, which needs double.
-struct References {
-  float x[kWidth], y[kWidth], ox[kWidth], oy[kWidth];
-};
-
-GSNAV_HD void find_references(const ProjectArgs<float>& args, const ProjectedPack& pack, References& out) noexcept {
-  const ProjectionCamera<double>& camera = args.camera64;
-  for (int h = 0; h < 2; ++h) {
-    D x, y;
-    gsnav::detail::project_mean(camera, pack.delta64[h], x, y);
-    const D ref_x = gsnav::detail::reference_pixel(x, camera.width);
-    const D ref_y = gsnav::detail::reference_pixel(y, camera.height);
-    const int first = h * (kWidth / 2);
-    ref_x.store(out.x + first);
-    ref_y.store(out.y + first);
-    (ref_x - x).store(out.ox + first);
-    (ref_y - y).store(out.oy + first);
-  }
-}
 
 /// Those of `lanes` whose bounds reach an open cell.
 GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, const PixelBox<F>& box, std::uint32_t lanes) noexcept {
@@ -129,8 +103,9 @@ GSNAV_HD void copy_record(T& record, const float* from) noexcept {
 GSNAV_HD F as_floats(F::ints x) noexcept { return F(gsnav::detail::floats<kWidth>(x)); }
 
 /// One row by itself, with all that needs double.
-GSNAV_STAGE bool project_alone(const ProjectArgs<float>& args, std::size_t slot, std::size_t row) noexcept {
-  return project_gaussian(args, slot, row);
+GSNAV_STAGE bool project_alone(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+                               std::size_t slot, std::size_t row) noexcept {
+  return project_gaussian(args, out, slot, row);
 }
 
 }  // namespace detail
@@ -138,26 +113,26 @@ GSNAV_STAGE bool project_alone(const ProjectArgs<float>& args, std::size_t slot,
 /// Writes the survivors `bits` of a pack, in row order, behind the `count` that their chunk has from slot
 /// `base` on: the bits of write_splat, but for colours, which `survivors` are left to. Returns how many had a
 /// pixel centre in their bounds. Contract only: Response::ewa, Compat::none.
-GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, std::size_t base, std::size_t count,
-                                       const ProjectedPack& pack, std::uint32_t bits,
-                                       Survivors& survivors) noexcept {
+GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+                                       std::size_t base, std::size_t count, const ProjectedPack& pack,
+                                       std::uint32_t bits, Survivors& survivors) noexcept {
   const std::size_t slot = base + count;
   const GaussianView& gs = args.gaussians;
   const ProjectionCamera<float>& camera = args.camera;
-  const Projected<F>& p = pack.splat;
+  const Projected<F>& p = pack.seen.splat;
   const PixelBox<F> box = gsnav::detail::pixel_box(camera, p);
   // Those whose geometry float cannot hold are few: each goes its own way.
   const std::uint32_t alone = lane_bits(gsnav::detail::needs_double(camera, p)) & bits;
   bits &= lane_bits(box.any_pixel()) | alone;
-  if (!args.open.empty()) bits &= detail::reaching_open(args.open, box, bits) | alone;
+  if (!out.open.empty()) bits &= detail::reaching_open(out.open, box, bits) | alone;
   if (bits == 0) return 0;
-  if (args.color) prefetch_colors(gs, gs.degree_of(pack.first, args.sh_degree), pack.first);
+  const bool color = !out.colors.empty(), depth = !out.depths.empty();
+  if (color) prefetch_colors(gs, gs.degree_of(pack.first, args.sh_degree), pack.first);
 
-  detail::References refs;
-  detail::find_references(args, pack, refs);
-  const F ox = F::load(refs.ox), oy = F::load(refs.oy);
-  const SplatGeometry<F> g{F::load(refs.x), F::load(refs.y), p.a, p.k, p.b, p.a * ox, fma(p.k, ox, p.b * oy),
-                           p.log2_opacity};
+  doubles_of<F> mean_x, mean_y;
+  gsnav::detail::project_mean(args.camera64, pack.key.delta64, mean_x, mean_y);
+  const SplatGeometry<F> g =
+      splat_geometry(p, reference_of<F>(camera.width, camera.height, mean_x, mean_y));
 
   // Records side by side in lanes become one after the other in memory.
   alignas(64) float geometry[kWidth * 8], bounds[kWidth * 8], depths[2][kWidth * 8];
@@ -168,8 +143,8 @@ GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, std::size
   {
     const auto whole = [](F x) noexcept { return detail::as_floats(__builtin_convertvector(x.v, F::ints)); };
     detail::SpanWords spans;
-    if (!args.spans.empty()) {
-      spans = detail::find_tiles(args.grid, g, camera.log2_alpha_min, box, bits & ~alone);
+    if (!out.spans.empty()) {
+      spans = detail::find_tiles(out.grid, g, camera.log2_alpha_min, box, bits & ~alone);
     }
     const F columns[8] = {whole(box.x0),
                           whole(box.y0),
@@ -181,8 +156,8 @@ GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, std::size
                           detail::as_floats(spans.word[3])};
     store_columns<8>(columns, bounds);
   }
-  if (args.depth) {
-    const SplatDepth<F> d = make_splat_depth(camera, pack.axes, p);
+  if (depth) {
+    const SplatDepth<F> d = make_splat_depth(camera, pack.seen.axes, p);
     const F low[8] = {d.mean_x, d.mean_y, d.z, d.reach, d.g[0], d.g[1], d.g[2], d.gx[0]};
     const F high[8] = {d.gx[1], d.gx[2], d.gy[0], d.gy[1], d.gy[2], F(0.0f), F(0.0f), F(0.0f)};
     store_columns<8>(low, depths[0]);
@@ -190,12 +165,12 @@ GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, std::size
   }
   std::uint32_t rows[kWidth], keys[kWidth], ranks[kWidth];
   float key[kWidth];
-  pack.key.store(key);
+  sort_key(args.camera64, pack.key).store(key);
   for (int l = 0; l < kWidth; ++l) keys[l] = camera.key_code(key[l]);
   const std::uint32_t first = static_cast<std::uint32_t>(pack.first), last = static_cast<std::uint32_t>(gs.size - 1);
   for (std::uint32_t l = 0; l < static_cast<std::uint32_t>(kWidth); ++l) rows[l] = first + l;
   for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + rows[l];
-  if (!gs.row_ids.empty() && !args.ranks.empty()) {
+  if (!gs.row_ids.empty() && !out.ranks.empty()) {
     for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + gs.row_ids[rows[l] < last ? rows[l] : last];
   }
 
@@ -203,26 +178,26 @@ GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, std::size
   for (std::uint32_t left = bits; left != 0; left &= left - 1) {
     const std::size_t l = static_cast<std::size_t>(std::countr_zero(left)), at = slot + written;
     if ((alone >> l & 1u) != 0) {
-      if (!detail::project_alone(args, at, rows[l])) continue;
+      if (!detail::project_alone(args, out, at, rows[l])) continue;
     } else {
-      detail::copy_record<8>(args.geometry[at], geometry + 8 * l);
-      detail::copy_record<4>(args.bounds[at], bounds + 8 * l);
-      if (!args.spans.empty()) detail::copy_record<4>(args.spans[at], bounds + 8 * l + 4);
-      if (args.depth) {
+      detail::copy_record<8>(out.geometry[at], geometry + 8 * l);
+      detail::copy_record<4>(out.bounds[at], bounds + 8 * l);
+      if (!out.spans.empty()) detail::copy_record<4>(out.spans[at], bounds + 8 * l + 4);
+      if (depth) {
         float both[13];
         std::memcpy(both, depths[0] + 8 * l, 8 * sizeof(float));
         std::memcpy(both + 8, depths[1] + 8 * l, 5 * sizeof(float));
-        detail::copy_record<13>(args.depths[at], both);
+        detail::copy_record<13>(out.depths[at], both);
       }
     }
     kept |= 1u << l;
     ++written;
   }
-  store_lanes(kept, keys, args.keys.data + slot);
-  if (!args.ranks.empty()) store_lanes(kept, ranks, args.ranks.data + slot);
-  if (args.color) {
+  store_lanes(kept, keys, out.keys.data + slot);
+  if (!out.ranks.empty()) store_lanes(kept, ranks, out.ranks.data + slot);
+  if (color) {
     store_lanes(kept, rows, survivors.rows + count);
-    const F planes[3] = {pack.delta.x, pack.delta.y, pack.delta.z};
+    const F planes[3] = {pack.key.delta.x, pack.key.delta.y, pack.key.delta.z};
     for (int k = 0; k < 3; ++k) {
       std::uint32_t lanes[kWidth];
       std::memcpy(lanes, &planes[k].v, sizeof lanes);

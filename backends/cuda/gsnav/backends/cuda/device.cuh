@@ -21,7 +21,8 @@ __global__ void for_each(std::size_t n, const F f) {
 inline constexpr int kProjectThreads = 128;
 
 /// One block a chunk: Gaussians are projected side by side, survivors packed in order by a block scan.
-static __global__ void __launch_bounds__(kProjectThreads) project_kernel(const ProjectArgs<float> args) {
+static __global__ void __launch_bounds__(kProjectThreads)
+    project_kernel(const ProjectArgs<float> args, const ProjectOutputs<float> out) {
   using Scan = cub::BlockScan<std::uint32_t, kProjectThreads>;
   __shared__ typename Scan::TempStorage storage;
   const GaussianView& gs = args.gaussians;
@@ -33,39 +34,16 @@ static __global__ void __launch_bounds__(kProjectThreads) project_kernel(const P
   const SeenRows seen = parts != 0 ? gs.seen_rows(gs.chunk_id(chunk)) : SeenRows{};
   for (std::size_t first = begin; first < end && parts != 0; first += kProjectThreads) {
     const std::size_t i = first + threadIdx.x;
-    std::uint32_t keep = 0;
-    std::size_t origin = 0;
-    Vec3<float> mean;
-    float key = 0;
-    SplatAxes<float> axes;
-    Projected<float> p;
-    if (i < end && (parts >> ((i - begin) / kChunkPart) & 1u) != 0 && seen.has(i - begin)) {
-      origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[i];
-      mean = {gs.means[0][i], gs.means[1][i], gs.means[2][i]};
-      const float z = detail::depth_of(args, mean, origin);
-      if (z > args.camera.near_plane) {
-        axes = detail::load_axes(gs, args.camera, detail::camera_delta(args, mean, origin), i);
-        p = project<float, float>(args.camera, axes, z, gs.opacities[i]);
-        key = detail::sort_key(args, z, mean, origin);
-        if (p.visible) {
-          SplatBounds bounds;
-          if (detail::needs_double(args.camera, p)) {
-            SplatAxes<double> axes64;
-            const Projected<double> p64 = detail::project64(args, i, key, mean, origin, axes64);
-            keep = detail::splat_bounds(args.camera64, p64, bounds) ? 1 : 0;
-          } else {
-            keep = detail::splat_bounds(args.camera, p, bounds) ? 1 : 0;
-          }
-        }
-      }
-    }
+    RowSplat<float> row;
+    const bool keep = i < end && (parts >> ((i - begin) / kChunkPart) & 1u) != 0 &&
+                      seen.has(i - begin) && project_row(args, !out.depths.empty(), i, row);
     std::uint32_t at = 0, total = 0;
-    Scan(storage).ExclusiveSum(keep, at, total);
-    if (keep != 0) write_splat(args, base + written + at, i, key, mean, origin, p, axes);
+    Scan(storage).ExclusiveSum(keep ? 1u : 0u, at, total);
+    if (keep) write_splat(args, out, base + written + at, i, row);
     written += total;
     __syncthreads();
   }
-  if (threadIdx.x == 0) args.counts[args.first_chunk + chunk] = written;
+  if (threadIdx.x == 0) out.counts[args.first_chunk + chunk] = written;
 }
 
 /// Tile intersections of each visible splat, and of each tile.
