@@ -41,8 +41,9 @@ endfunction()
 function(gsnav_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
   if(NOT TARGET gsnav_test_support)
-    add_library(gsnav_test_support STATIC ${PROJECT_SOURCE_DIR}/tests/support/compiled_frames.cpp
-                                          ${PROJECT_SOURCE_DIR}/tests/support/main.cpp)
+    set(_tests ${PROJECT_SOURCE_DIR}/tests)
+    add_library(gsnav_test_support STATIC ${_tests}/eval/oracle_support.cpp ${_tests}/support/compiled_frames.cpp
+                                          ${_tests}/support/main.cpp ${_tests}/support/oracle.cpp)
     gsnav_private_options(gsnav_test_support)
     set_target_properties(gsnav_test_support PROPERTIES UNITY_BUILD OFF)
     target_link_libraries(gsnav_test_support PRIVATE gsnav doctest::doctest $<TARGET_NAME_IF_EXISTS:gsnav_openmp>)
