@@ -15,6 +15,7 @@
 #include "gsnav/avatar/trajectory.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
+#include "gsnav/kernels/fk.hpp"
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/math/similarity.hpp"
 
@@ -216,12 +217,11 @@ class AvatarActor {
     const Similarity world = placement(t, pose, &holds_capsules_);
     const Skeleton& skeleton = asset_->skeleton;
     globals.resize(skeleton.size());
-    // ForwardKinematics, of the joints that hold capsules.
+    // Of the joints that hold capsules alone.
     for (std::size_t j = 0; j < globals.size(); ++j) {
       if (holds_capsules_[j] == 0) continue;
       const Affine3<double> local{rotation_matrix(pose.rotations[j]), pose.translations[j]};
-      const std::int32_t parent = skeleton.parents[j];
-      globals[j] = parent < 0 ? local : globals[static_cast<std::size_t>(parent)] * local;
+      globals[j] = joint_global(globals.data(), skeleton.parents[j], local);
     }
     for (std::size_t c = 0; c < asset_->capsules.size(); ++c) {
       const ProxyCapsule& proxy = asset_->capsules[c];

@@ -57,9 +57,7 @@ struct Skeleton {
   /// Joint to root frame in the bind pose, [J]. Requires a valid skeleton.
   std::vector<Affine3<double>> rest_globals() const {
     std::vector<Affine3<double>> g(size());
-    for (std::size_t j = 0; j < size(); ++j) {
-      g[j] = parents[j] < 0 ? rest_local[j] : g[static_cast<std::size_t>(parents[j])] * rest_local[j];
-    }
+    for (std::size_t j = 0; j < size(); ++j) g[j] = joint_global(g.data(), parents[j], rest_local[j]);
     return g;
   }
 
