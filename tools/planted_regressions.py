@@ -57,19 +57,26 @@ def copy_tree(to):
 
 
 def sources_beside(tree, source):
-    """Sources of tests/ that define what the headers that a test includes declare: the same name, .cpp."""
+    """What defines what the headers that a test includes declare: the sources of their names, in tests/ and avatar."""
     seen, found, queue = set(), [], [tree / source]
     while queue:
         file = queue.pop()
         for name in re.findall(r'^#include "([^"]+)"', file.read_text(), re.MULTILINE):
-            header = next((h for h in (file.parent / name, tree / "tests" / name) if h.is_file()), None)
-            if header is None or header.resolve() in seen:
+            places = (file.parent / name, tree / "tests" / name, tree / "include" / name)
+            header = next((pathlib.Path(os.path.normpath(h)) for h in places if h.is_file()), None)
+            if header is None or header in seen:
                 continue
-            seen.add(header.resolve())
-            beside = [header] + [header.with_suffix(".cpp")] * header.with_suffix(".cpp").is_file()
-            queue += beside
-            found += [str(f.relative_to(tree)) for f in beside[1:]]
-    return [os.path.normpath(f) for f in found if not f.endswith("compiled_frames.cpp")]
+            seen.add(header)
+            queue.append(header)
+            beside = header.with_suffix(".cpp")
+            if header.is_relative_to(tree / "include/gsnav/avatar"):
+                beside = tree / "src/avatar" / beside.name
+            elif not any(header.is_relative_to(tree / d) for d in ("tests", "src/avatar")):
+                continue
+            if beside.is_file() and beside.name != "compiled_frames.cpp":
+                queue.append(beside)
+                found.append(str(beside.relative_to(tree)))
+    return found
 
 
 class Bench:

@@ -7,11 +7,12 @@
 #include <functional>
 #include <vector>
 
-#include "avatar/support.hpp"
+#include "gsnav/avatar/skinning_weights.hpp"
 #include "gsnav/ops/skin.hpp"
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/truth.hpp"
+#include "support/rotations.hpp"
 
 namespace gsnav_test {
 

@@ -4,9 +4,9 @@ from . import plant
 
 LBS = "include/gsnav/kernels/lbs.hpp"
 FK = "include/gsnav/kernels/fk.hpp"
-WEIGHTS = "include/gsnav/avatar/skinning_weights.hpp"
+WEIGHTS = "src/avatar/skinning_weights.cpp"
 QUAT = "include/gsnav/math/quat.hpp"
-MOTION = "include/gsnav/avatar/motion.hpp"
+MOTION = "src/avatar/motion.cpp"
 SKIN_TEST = "tests/hard_cases/test_skin.cpp"
 POSE_TEST = "tests/hard_cases/test_pose.cpp"
 FACTOR_TEST = "tests/hard_cases/test_factor.cpp"
