@@ -15,6 +15,7 @@
 #include "gsnav/avatar/skinned_crowd.hpp"
 #include "gsnav/avatar/weight_gradients.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/core/rng.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "gsnav/sim/default_scene.hpp"
 

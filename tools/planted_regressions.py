@@ -5,7 +5,8 @@
     tools/planted_regressions.py [--list | --check] [--only NAME ...] [--scratch DIR] [--cxx COMPILER] [--jobs N]
 
 The tree is copied; the original is never touched. A plant needs one translation unit of tests, header-only
-with OpenMP, and of the libraries at most the few files that it names, so nothing is built before. First every
+with OpenMP, the sources of what that includes of tests/, and of the libraries at most the few files that it
+names, so nothing is built before. First every
 test case named must pass as the source is; then each plant's must fail. Exit status: 0 all caught, 1 one
 missed, 2 nothing could be said (a text to replace is not there once, a plant does not compile, a case fails
 unplanted). --check only looks whether each text to replace is there once: a second, and a test of every build.
@@ -55,6 +56,29 @@ def copy_tree(to):
         shutil.copyfile(ROOT / f, target)
 
 
+def sources_beside(tree, source):
+    """What defines what the headers that a test includes declare: the sources of their names, in tests/ and avatar."""
+    seen, found, queue = set(), [], [tree / source]
+    while queue:
+        file = queue.pop()
+        for name in re.findall(r'^#include "([^"]+)"', file.read_text(), re.MULTILINE):
+            places = (file.parent / name, tree / "tests" / name, tree / "include" / name)
+            header = next((pathlib.Path(os.path.normpath(h)) for h in places if h.is_file()), None)
+            if header is None or header in seen:
+                continue
+            seen.add(header)
+            queue.append(header)
+            beside = header.with_suffix(".cpp")
+            if header.is_relative_to(tree / "include/gsnav/avatar"):
+                beside = tree / "src/avatar" / beside.name
+            elif not any(header.is_relative_to(tree / d) for d in ("tests", "src/avatar")):
+                continue
+            if beside.is_file() and beside.name != "compiled_frames.cpp":
+                queue.append(beside)
+                found.append(str(beside.relative_to(tree)))
+    return found
+
+
 class Bench:
     """A copy of the tree that compiles and runs tests."""
 
@@ -74,7 +98,8 @@ class Bench:
 
     def build(self, plant, binary, tree=None):
         """Its test, planted or not. Returns what the compiler said, or nothing."""
-        done = self.run([self.cxx, *FLAGS, plant.source, *plant.more, str(self.main), "-o", str(binary)], cwd=tree)
+        sources = [plant.source, *sources_beside(self.tree, plant.source), *plant.more]
+        done = self.run([self.cxx, *FLAGS, *sources, str(self.main), "-o", str(binary)], cwd=tree)
         return "" if done.returncode == 0 else done.stderr.strip() or "the compiler failed"
 
     def fails(self, binary, case):

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Everything that needs only a C++20 compiler. Add a backend (gsnav/backends/...); nav, io, sim and
-// interop have headers of their own, because they need a library to link or to include.
+// Everything that needs only a C++20 compiler. Add a backend (gsnav/backends/...), and link
+// gsnav::avatar for what avatar/ declares. nav, io, sim and interop have headers of their own, because
+// they need other libraries.
 
 #include "gsnav/avatar/avatar.hpp"
 #include "gsnav/core/backend.hpp"

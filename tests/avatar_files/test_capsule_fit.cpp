@@ -8,8 +8,10 @@
 
 #include "avatar_files/bodies.hpp"
 #include "gsnav/avatar/capsule_fit.hpp"
+#include "gsnav/avatar/capsule_volume.hpp"
 #include "gsnav/avatar/humanoid.hpp"
 #include "gsnav/avatar/mesh_avatar.hpp"
+#include "gsnav/core/rng.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -12,6 +12,7 @@
 #include "avatar_files/zbuffer.hpp"
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/mesh_avatar.hpp"
+#include "gsnav/avatar/mesh_surface.hpp"
 #include "gsnav/avatar/skinned_gaussians.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/scene/renderer.hpp"

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include "gsnav/backends/serial.hpp"
@@ -24,12 +23,10 @@ struct OracleBackend : gsnav::OpenMPBackend {
 using OracleBackend = gsnav::SerialBackend;
 #endif
 
-inline gsnav::eval::OracleFrames oracle(const std::vector<gsnav::GaussianSet>& sets,
-                                        const gsnav::Camera& camera,
-                                        const gsnav::eval::OracleConfig& config = {}) {
-  OracleBackend backend;
-  return gsnav::eval::oracle_render(backend, std::span(sets), camera, config).value();
-}
+/// The float64 image of `sets`, compiled once for all tests (oracle_support.cpp).
+gsnav::eval::OracleFrames oracle(const std::vector<gsnav::GaussianSet>& sets,
+                                 const gsnav::Camera& camera,
+                                 const gsnav::eval::OracleConfig& config = {});
 
 /// Every image and mask bit for bit.
 inline bool same_images(const gsnav::eval::OracleFrames& a, const gsnav::eval::OracleFrames& b) {

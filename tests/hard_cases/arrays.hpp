@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <memory>
 #include <span>
@@ -51,28 +50,6 @@ class Arrays {
   std::vector<std::shared_ptr<void>> kept_;
 };
 
-/// What a set has beyond its cloud: rotations that SH is turned back by, or blended axes.
-struct SetExtras {
-  std::array<std::vector<float>, 4> sh_rotations;
-  std::array<std::vector<float>, 9> axes;
-};
-
-/// Renders one cloud with extras on the backend of a CaseRenderer.
-template <class R>
-auto render_with(R& renderer, const gsnav::GaussianCloud& cloud, const SetExtras& extras,
-                 const gsnav::Camera& camera, const gsnav::RenderConfig& config) {
-  using B = std::remove_cvref_t<decltype(renderer.backend())>;
-  const gsnav::GaussianArrays<B> arrays(renderer.backend(), cloud);
-  Arrays<B> more(renderer.backend());
-  gsnav::GaussianSet set = arrays.set();
-  for (std::size_t k = 0; k < 4 && !extras.sh_rotations[0].empty(); ++k) {
-    set.gaussians.sh_rotations[k] = more.in(extras.sh_rotations[k]);
-  }
-  for (std::size_t k = 0; k < 9 && !extras.axes[0].empty(); ++k) set.gaussians.axes[k] = more.in(extras.axes[k]);
-  gsnav::Renderer<typename R::scalar, B> r(renderer.backend(), config);
-  return r.render(set, camera).value();
-}
-
 /// Every image has the same bits.
 template <class S>
 bool same_images(const gsnav::Frames<S>& a, const gsnav::Frames<S>& b) {
@@ -83,22 +60,7 @@ bool same_images(const gsnav::Frames<S>& a, const gsnav::Frames<S>& b) {
 
 /// Pixels whose content hangs on less than `relative` of a threshold (1/255, the stop): the reference
 /// renderer draws them otherwise where the thresholds move by so much.
-inline std::vector<bool> undecided_pixels(const std::vector<Placed>& scene, const gsnav::Camera& camera,
-                                          const gsnav::RenderConfig& config, double relative) {
-  using namespace gsnav;
-  CaseRenderer<double, SerialBackend> serial("serial double");
-  RenderConfig low = config, high = config;
-  low.outputs = high.outputs = kRgb | kAlpha | kMedianDepth;
-  low.alpha_min *= 1 - relative;
-  high.alpha_min *= 1 + relative;
-  low.transmittance_min *= 1 - relative;
-  high.transmittance_min *= 1 + relative;
-  const auto a = serial.render(scene, camera, low), b = serial.render(scene, camera, high);
-  std::vector<bool> out(a.alpha.size());
-  for (std::size_t p = 0; p < out.size(); ++p) {
-    out[p] = a.alpha[p] != b.alpha[p] || a.median_depth[p] != b.median_depth[p];
-  }
-  return out;
-}
+std::vector<bool> undecided_pixels(const std::vector<Placed>& scene, const gsnav::Camera& camera,
+                                   const gsnav::RenderConfig& config, double relative);
 
 }  // namespace gsnav_test

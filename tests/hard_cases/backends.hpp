@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <doctest/doctest.h>
+
+#include <array>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -12,7 +16,6 @@
 #include "gsnav/scene/mesh_scene.hpp"
 #include "ops/backends.hpp"
 #include "support/frame_images.hpp"
-#include "support/image_hashes.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
@@ -28,60 +31,82 @@ struct Placed {
   gsnav::Similarity place;
 };
 
-/// One backend in one precision, with a name for messages. `epsilon`: a rounding of the scalar.
-template <class S, class B>
-class CaseRenderer {
+/// What a set has beyond its cloud: rotations that SH is turned back by, or blended axes.
+struct SetExtras {
+  std::array<std::vector<float>, 4> sh_rotations;
+  std::array<std::vector<float>, 9> axes;
+};
+
+/// Renders cases in one precision on a backend whose type does not matter: cases are compiled once per
+/// scalar, and what draws once for all of them (backends.cpp). `epsilon`: a rounding of the scalar.
+template <class S>
+class CaseImages {
  public:
   using scalar = S;
-  template <class... Args>
-  explicit CaseRenderer(const char* name, Args&&... args)
-      : name_(name), backend_(std::make_unique<B>(std::forward<Args>(args)...)) {}
+  CaseImages(const char* name, bool composes_meshes) : composes(composes_meshes), name_(name) {}
+  virtual ~CaseImages() = default;
 
   std::string name() const { return name_; }
   static constexpr bool is_float = sizeof(S) == sizeof(float);
-  static constexpr bool composes = gsnav::MeshBackend<B, S>;
   static constexpr double epsilon = is_float ? 0x1p-24 : 0x1p-53;
+  const bool composes;  ///< It draws meshes among Gaussians.
   /// The bound for the scalar at hand.
   static constexpr double bound(double in_float, double in_double) noexcept {
     return is_float ? in_float : in_double;
   }
-  B& backend() noexcept { return *backend_; }
 
   /// Uploads the clouds where the backend has memory of its own, renders, and fetches the images.
-  gsnav::Frames<S> render(const std::vector<Placed>& scene, const std::vector<gsnav::Camera>& cameras,
-                          const gsnav::RenderConfig& config,
-                          const std::vector<gsnav::MeshInstance>& meshes = {}) {
-    std::vector<gsnav::GaussianArrays<B>> arrays;
-    std::vector<gsnav::GaussianSet> sets;
-    arrays.reserve(scene.size());
-    for (const Placed& p : scene) {
-      sets.push_back(arrays.emplace_back(*backend_, *p.cloud).set(p.place));
-    }
-    std::vector<gsnav::MeshArrays<B>> mesh_arrays;
-    std::vector<gsnav::MeshInstance> instances;
-    mesh_arrays.reserve(meshes.size());
-    for (const gsnav::MeshInstance& m : meshes) {
-      instances.push_back(mesh_arrays.emplace_back(*backend_, m.mesh).instance(m.world_from_mesh, m.id));
-    }
-    gsnav::Renderer<S, B> renderer(*backend_, config);
-    renderer.set_meshes(instances);
-    gsnav::Frames<S> frames = renderer.render(sets, cameras).value();
-    record_hashes(frames, name());
-    return frames;
-  }
+  virtual gsnav::Frames<S> render(const std::vector<Placed>& scene,
+                                  const std::vector<gsnav::Camera>& cameras,
+                                  const gsnav::RenderConfig& config,
+                                  const std::vector<gsnav::MeshInstance>& meshes = {}) = 0;
   gsnav::Frames<S> render(const std::vector<Placed>& scene, const gsnav::Camera& camera,
                           const gsnav::RenderConfig& config = {}) {
     return render(scene, std::vector<gsnav::Camera>{camera}, config);
   }
+  /// Renders one cloud with extras.
+  virtual gsnav::Frames<S> render_with(const gsnav::GaussianCloud& cloud, const SetExtras& extras,
+                                       const gsnav::Camera& camera,
+                                       const gsnav::RenderConfig& config) = 0;
 
  private:
   const char* name_;
-  std::unique_ptr<B> backend_;
 };
 
-/// Calls f(renderer) for every backend and precision there is; the scalar reference comes first.
+/// One backend in one precision, with a name for messages.
+template <class S, class B>
+class CaseRenderer final : public CaseImages<S> {
+ public:
+  static constexpr bool kComposes = gsnav::MeshBackend<B, S>;
+  template <class... Args>
+  explicit CaseRenderer(const char* name, Args&&... args)
+      : CaseImages<S>(name, kComposes), backend_(std::make_unique<B>(std::forward<Args>(args)...)) {}
+
+  B& backend() noexcept { return *backend_; }
+  using CaseImages<S>::render;
+  gsnav::Frames<S> render(const std::vector<Placed>& scene, const std::vector<gsnav::Camera>& cameras,
+                          const gsnav::RenderConfig& config,
+                          const std::vector<gsnav::MeshInstance>& meshes = {}) override;
+  gsnav::Frames<S> render_with(const gsnav::GaussianCloud& cloud, const SetExtras& extras,
+                               const gsnav::Camera& camera, const gsnav::RenderConfig& config) override;
+
+ private:
+  std::unique_ptr<B> backend_;
+};
+extern template class CaseRenderer<float, gsnav::SerialBackend>;
+extern template class CaseRenderer<double, gsnav::SerialBackend>;
+extern template class CaseRenderer<float, ToyBackend>;
+#if defined(_OPENMP)
+extern template class CaseRenderer<float, gsnav::OpenMPBackend>;
+#endif
+#if defined(GSNAV_HAS_CUDA)
+extern template class CaseRenderer<float, gsnav::CudaBackend>;
+#endif
+
+/// Calls f(renderer) for every backend and precision there is, with its type; the scalar reference comes
+/// first.
 template <class F>
-void for_each_renderer(const F& f) {
+void for_each_backend(const F& f) {
   const auto run = [&f](auto&& renderer) {
     CAPTURE(renderer.name());
     f(renderer);
@@ -104,6 +129,20 @@ void for_each_renderer(const F& f) {
 #endif
 }
 
+/// The same for functions of both precisions.
+void visit_renderers(const std::function<void(CaseImages<float>&)>& in_float,
+                     const std::function<void(CaseImages<double>&)>& in_double);
+
+/// Calls f(renderer) as for_each_backend does, with a CaseImages of float or double.
+template <class F>
+void for_each_renderer(const F& f) {
+  visit_renderers([&f](CaseImages<float>& renderer) { f(renderer); },
+                  [&f](CaseImages<double>& renderer) { f(renderer); });
+}
+
+/// CHECKs that every image has the reference's bits; frames become the reference where that is empty.
+void check_bits(const gsnav::Frames<float>& frames, gsnav::Frames<float>& reference);
+
 /// Renders on every backend, with meshes on those that know them; the float32 images must have the serial backend's
 /// bits. Calls check(frames, renderer) for each.
 template <class F>
@@ -112,13 +151,10 @@ void render_everywhere(const std::vector<Placed>& scene, const gsnav::Camera& ca
                        const std::vector<gsnav::MeshInstance>& meshes = {}) {
   gsnav::Frames<float> reference;
   for_each_renderer([&](auto& renderer) {
-    using R = std::remove_reference_t<decltype(renderer)>;
-    if (!R::composes && !meshes.empty()) return;
+    if (!renderer.composes && !meshes.empty()) return;
     const auto frames = renderer.render(scene, {camera}, config, meshes);
-    if constexpr (R::is_float) {
-      if (reference.cameras == 0) reference = frames;
-      for_each_image(frames, reference, [](const auto& a, const auto& b) { CHECK(a == b); });
-    }
+    if constexpr (std::is_same_v<decltype(frames), const gsnav::Frames<float>>)
+      check_bits(frames, reference);
     check(frames, renderer);
   });
 }

@@ -7,11 +7,12 @@
 #include <functional>
 #include <vector>
 
-#include "avatar/support.hpp"
+#include "gsnav/avatar/skinning_weights.hpp"
 #include "gsnav/ops/skin.hpp"
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/truth.hpp"
+#include "support/rotations.hpp"
 
 namespace gsnav_test {
 
@@ -106,7 +107,7 @@ void skin_everywhere(const SkinCase& c, const F& check) {
       return p.w == q.w && p.x == q.x && p.y == q.y && p.z == q.z;
     });
   };
-  for_each_renderer([&](auto& renderer) {
+  for_each_backend([&](auto& renderer) {
     const SkinResult result = skin_on(renderer, c);
     if (std::remove_reference_t<decltype(renderer)>::is_float) {
       if (reference.means.empty()) reference = result;
@@ -114,7 +115,9 @@ void skin_everywhere(const SkinCase& c, const F& check) {
       CHECK(bits(result.quats, reference.quats));
       CHECK(bits(result.rotations, reference.rotations));
     }
-    check(result, renderer);
+    check(result,
+          static_cast<const CaseImages<typename std::remove_reference_t<decltype(renderer)>::scalar>&>(
+              renderer));
   });
 }
 

@@ -72,7 +72,7 @@ TEST_CASE("N63_determinism_100") {
   const GaussianCloud b = needle_cloud(630, 30);
   const std::vector<Camera> all = cameras(64);
   std::vector<std::uint64_t> reference_float;
-  for_each_renderer([&](auto& renderer) {
+  for_each_backend([&](auto& renderer) {
     using R = std::remove_reference_t<decltype(renderer)>;
     // One renderer, so that scratch is used again, over batches of all sizes.
     using B = std::remove_cvref_t<decltype(renderer.backend())>;
@@ -113,7 +113,7 @@ TEST_CASE("N63_determinism_100 of work that is cut") {
     CaseRenderer<float, SerialBackend> serial("serial");
     const auto reference = serial.render({&cloud}, camera, config);
     REQUIRE(reference.stats[0].visible >= 4096);
-    for_each_renderer([&](auto& renderer) {
+    for_each_backend([&](auto& renderer) {
       using R = std::remove_reference_t<decltype(renderer)>;
       if constexpr (R::is_float) {
         const auto images = renderer.render({&cloud}, camera, config);

@@ -155,7 +155,7 @@ TEST_CASE("N62_psd_factor") {
       std::vector<float> reference;
       for_each_renderer([&](auto& renderer) {
         using R = std::remove_reference_t<decltype(renderer)>;
-        const auto image = render_with(renderer, cloud, extras, camera, all_outputs());
+        const auto image = renderer.render_with(cloud, extras, camera, all_outputs());
         REQUIRE(all_finite(image));
         if constexpr (R::is_float) {
           if (reference.empty()) reference = image.alpha;
@@ -196,7 +196,7 @@ TEST_CASE("N62_psd_factor") {
     const std::vector<bool> undecided = undecided_pixels({&cloud}, camera, all_outputs(), 1e-4);
     for_each_renderer([&](auto& renderer) {
       const auto a = renderer.render({&cloud}, camera, all_outputs());
-      const auto b = render_with(renderer, cloud, extras, camera, all_outputs());
+      const auto b = renderer.render_with(cloud, extras, camera, all_outputs());
       double colour = 0, depth = 0;
       for (std::size_t p = 0; p < a.alpha.size(); ++p) {
         if (undecided[p]) continue;

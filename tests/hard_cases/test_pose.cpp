@@ -4,7 +4,8 @@
 
 #include <string>
 
-#include "gsnav/avatar/avatar.hpp"
+#include "gsnav/avatar/motion.hpp"
+#include "gsnav/kernels/fk.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/truth.hpp"
 

@@ -179,9 +179,9 @@ TEST_CASE("N61_sh_rotation_equiv") {
   CHECK(orthogonal < 1e-6);  // of the truth: a float quaternion's rotation is a rotation to 1e-7
   double worst = 0, changed = 0;
   for_each_renderer([&](auto& renderer) {
-    const auto a = render_with(renderer, cloud, turned, axis_camera(), all_outputs());
-    const auto b = render_with(renderer, rotated, {}, axis_camera(), all_outputs());
-    const auto plain = render_with(renderer, cloud, {}, axis_camera(), all_outputs());
+    const auto a = renderer.render_with(cloud, turned, axis_camera(), all_outputs());
+    const auto b = renderer.render_with(rotated, {}, axis_camera(), all_outputs());
+    const auto plain = renderer.render_with(cloud, {}, axis_camera(), all_outputs());
     CHECK(a.alpha == b.alpha);
     for (std::size_t p = 0; p < a.rgb.size(); ++p) {
       worst = std::max(worst, std::abs(static_cast<double>(a.rgb[p]) - static_cast<double>(b.rgb[p])));

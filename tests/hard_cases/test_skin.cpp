@@ -5,6 +5,7 @@
 #include <array>
 #include <memory>
 
+#include "gsnav/avatar/skinned_crowd.hpp"
 #include "hard_cases/skin_case.hpp"
 
 using namespace gsnav;
@@ -144,7 +145,7 @@ TEST_CASE("N55_lbs_rigid_far") {
                             std::make_shared<const StandingTrajectory>(place, 0.7)).value();
     const Similarity all =
         Similarity{axis_angle(Vec3d{0, 1, 0}, 0.7), place, 1} * Similarity{{}, {0, 0, by_root ? -1000.0 : 0.0}, 1};
-    for_each_renderer([&](auto& renderer) {
+    for_each_backend([&](auto& renderer) {
       using B = std::remove_cvref_t<decltype(renderer.backend())>;
       Arrays<B> arrays(renderer.backend());
       SkinnedGaussians<B> skinned(renderer.backend(), shared);
@@ -209,7 +210,7 @@ TEST_CASE("a crowd is skinned as each of its actors alone, bit for bit") {
                                          std::make_shared<const StandingTrajectory>(Vec3d{1.0 * i, 0, 2}), options)
                          .value());
   }
-  for_each_renderer([&](auto& renderer) {
+  for_each_backend([&](auto& renderer) {
     using B = std::remove_cvref_t<decltype(renderer.backend())>;
     Arrays<B> arrays(renderer.backend());
     const auto fetch = [&](const View<const float>& v) {
@@ -298,7 +299,7 @@ TEST_CASE("N57_polar_equivariance") {
     }
   }
   double largest = 0;
-  for_each_renderer([&](auto& renderer) {
+  for_each_backend([&](auto& renderer) {
     const SkinResult a = skin_on(renderer, base);
     double worst = 0;
     for (int k = 0; k < 3; ++k) {

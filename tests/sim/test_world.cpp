@@ -9,6 +9,7 @@
 #include "flat_world.hpp"
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/humanoid.hpp"
+#include "gsnav/core/rng.hpp"
 #include "gsnav/sim/follower.hpp"
 
 using namespace gsnav;

@@ -3,9 +3,10 @@
 from . import plant
 
 LBS = "include/gsnav/kernels/lbs.hpp"
-WEIGHTS = "include/gsnav/avatar/skinning_weights.hpp"
+FK = "include/gsnav/kernels/fk.hpp"
+WEIGHTS = "src/avatar/skinning_weights.cpp"
 QUAT = "include/gsnav/math/quat.hpp"
-MOTION = "include/gsnav/avatar/motion.hpp"
+MOTION = "src/avatar/motion.cpp"
 SKIN_TEST = "tests/hard_cases/test_skin.cpp"
 POSE_TEST = "tests/hard_cases/test_pose.cpp"
 FACTOR_TEST = "tests/hard_cases/test_factor.cpp"
@@ -50,6 +51,11 @@ PLANTS = [
     plant("weights_of_eight_bits", LBS, "static_cast<S>(parts) * static_cast<S>(1.0 / kWeightParts)",
           "static_cast<S>((parts + 128) / 257) / static_cast<S>(255)",
           SKIN_TEST, "N54_lbs_identity", "N58_polar_vs_svd"),
+    plant("influences_the_last_left_out", LBS, "for (int k = 1; k < K; ++k) sum", "for (int k = 1; k < K - 1; ++k) sum",
+          SKIN_TEST, "N58_polar_vs_svd"),
+    plant("parent_after_the_joint", FK, "local : globals[static_cast<std::size_t>(parent)] * local;",
+          "local : local * globals[static_cast<std::size_t>(parent)];",
+          "tests/avatar/test_motion.cpp", "between keys joints turn and bones keep their length"),
     plant("weights_rounded_down", WEIGHTS, "    parts[j] = static_cast<std::uint16_t>(exact);\n",
           "    parts[j] = static_cast<std::uint16_t>(exact);\n    if (j + 1 == k) left = parts[j];\n",
           SKIN_TEST, "N55_lbs_rigid_far", why="Habitat-GS: the sum's error times the distance from zero"),

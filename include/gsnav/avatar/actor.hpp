@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "gsnav/avatar/asset.hpp"
@@ -21,16 +18,17 @@
 namespace gsnav {
 
 struct ActorOptions {
-  double time_begin = 0.0;                                        ///< seconds on the scene's clock
-  double time_end = std::numeric_limits<double>::infinity();      ///< it is gone after this
-  double scale = 1.0;                                             ///< uniform, > 0
-  /// Seconds after which the scene's clock begins again; 0: it does not. Over the last `loop_blend` of them whoever is
-  /// there at their begin and at time 0 moves from how it is then to how it is at 0: nobody jumps. Others are gone.
+  double time_begin = 0.0;                                    ///< seconds on the scene's clock
+  double time_end = std::numeric_limits<double>::infinity();  ///< it is gone after this
+  double scale = 1.0;                                         ///< uniform, > 0
+  /// Seconds after which the scene's clock begins again; 0: it does not. Over the last `loop_blend` of
+  /// them whoever is there at their begin and at time 0 moves from how it is then to how it is at 0:
+  /// nobody jumps. Others are gone.
   double loop_period = 0.0, loop_blend = 0.0;
 };
 
-/// Somebody in the scene: a body, how its joints move, and where it goes. Everything is a function of the
-/// scene's clock: actors keep no state, so any number of simulators may share one.
+/// Somebody in the scene: a body, how its joints move, and where it goes. Everything is a function of
+/// the scene's clock: actors keep no state, so any number of simulators may share one.
 class AvatarActor {
  public:
   /// `motion` null: the asset's idle pose. `trajectory` null: stands at the world's origin.
@@ -38,197 +36,57 @@ class AvatarActor {
   static Result<AvatarActor> create(std::shared_ptr<const AvatarAsset> asset,
                                     std::shared_ptr<const MotionSource> motion = nullptr,
                                     std::shared_ptr<const Trajectory> trajectory = nullptr,
-                                    const ActorOptions& options = {}) {
-    const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, "AvatarActor: " + what); };
-    if (asset == nullptr) return bad("no asset");
-    if (Status s = asset->validate(); !s) return s;
-    if (motion == nullptr) {
-      motion = std::make_shared<const FixedPose>(asset->idle.rotations.empty() ? asset->skeleton.rest_pose()
-                                                                               : asset->idle);
-    }
-    if (trajectory == nullptr) trajectory = std::make_shared<const StandingTrajectory>();
-    if (Status s = motion->validate(); !s) return s;
-    if (motion->joint_count() != asset->skeleton.size()) {
-      return bad("a motion of " + std::to_string(motion->joint_count()) + " joints for a skeleton of " +
-                 std::to_string(asset->skeleton.size()));
-    }
-    if (!(options.scale > 0) || !is_finite(options.scale)) return bad("ActorOptions.scale must be positive");
-    if (!is_finite(options.time_begin) || !(options.time_end >= options.time_begin)) {
-      return bad("ActorOptions.time_end lies before time_begin");
-    }
-    if (!(options.loop_period >= 0) || !is_finite(options.loop_period) || !(options.loop_blend >= 0) ||
-        !(options.loop_blend <= options.loop_period)) {
-      return bad("ActorOptions.loop_blend must be within [0, loop_period]");
-    }
-    AvatarActor actor;
-    actor.inverse_binds_ = asset->skeleton.bind_inverses();
-    actor.holds_capsules_.assign(asset->skeleton.size(), 0);
-    for (const ProxyCapsule& c : asset->capsules) {
-      for (std::int32_t j = c.joint; j >= 0; j = asset->skeleton.parents[static_cast<std::size_t>(j)]) {
-        actor.holds_capsules_[static_cast<std::size_t>(j)] = 1;
-      }
-    }
-    actor.asset_ = std::move(asset);
-    actor.motion_ = std::move(motion);
-    actor.trajectory_ = std::move(trajectory);
-    actor.options_ = options;
-    return actor;
-  }
+                                    const ActorOptions& options = {});
 
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
   const Trajectory& trajectory() const noexcept { return *trajectory_; }
   const ActorOptions& options() const noexcept { return options_; }
 
   /// Whether it is in the scene at time t (seconds on the scene's clock, as everywhere below).
-  bool active(double t) const noexcept {
-    t = clock(t);
-    return blending(t) ? within(blend_begin()) && within(0.0) : within(t);
-  }
+  bool active(double t) const noexcept;
   /// The same actor in a scene whose clock begins again (ActorOptions). Errors: as for create.
-  Result<AvatarActor> looped(double period, double blend) const {
-    ActorOptions options = options_;
-    options.loop_period = period;
-    options.loop_blend = blend;
-    return create(asset_, motion_, trajectory_, options);
-  }
+  Result<AvatarActor> looped(double period, double blend) const;
 
   /// World from the avatar's root frame: Y up, facing -Z, feet on y = 0.
-  Similarity placement(double t) const {
-    LocalPose pose;
-    return placement(t, pose);
-  }
+  Similarity placement(double t) const;
 
   /// Joint to root frame, [J], metres.
-  void joint_globals(double t, std::vector<Affine3<double>>& out) const {
-    LocalPose pose;
-    placement(t, pose);
-    forward_kinematics(asset_->skeleton, pose, out);
-  }
+  void joint_globals(double t, std::vector<Affine3<double>>& out) const;
 
   /// What skinning reads: joint to root frame times inverse bind, [J].
-  void joint_matrices(double t, std::vector<Affine3<double>>& out) const {
-    joint_globals(t, out);
-    to_joint_matrices(out);
-  }
+  void joint_matrices(double t, std::vector<Affine3<double>>& out) const;
   /// The same of what joint_globals gave, in place.
-  void to_joint_matrices(std::vector<Affine3<double>>& globals) const {
-    for (std::size_t j = 0; j < globals.size(); ++j) globals[j] = globals[j] * inverse_binds_[j];
-  }
+  void to_joint_matrices(std::vector<Affine3<double>>& globals) const;
 
   /// The proxy capsules in the world; none while it is not active.
-  std::vector<Capsule<double>> capsules(double t) const {
-    std::vector<Capsule<double>> out;
-    if (active(t)) for_each_capsule(t, [&](std::size_t, const Capsule<double>& c) { out.push_back(c); });
-    return out;
-  }
+  std::vector<Capsule<double>> capsules(double t) const;
 
-  /// Appends the proxy capsules as they move over [t0, t1], endpoints linear in between, with `avatar` as
-  /// the body's number. None unless it is active at some time in between, however shortly: then they are there for all of
-  /// [t0, t1]. `before`: what an interval that ended at t0 had of it, by bone; may be empty. It saves posing the body for
-  /// t0 once more.
+  /// Appends the proxy capsules as they move over [t0, t1], endpoints linear in between, with `avatar`
+  /// as the body's number. None unless it is active at some time in between, however shortly: then they
+  /// are there for all of [t0, t1]. `before`: what an interval that ended at t0 had of it, by bone; may
+  /// be empty. It saves posing the body for t0 once more.
   void dynamic_capsules(double t0, double t1, std::uint32_t avatar, std::vector<DynamicCapsule>& out,
-                        View<const DynamicCapsule> before = {}) const {
-    double from = t0, to_time = t1;
-    if (options_.loop_period > 0 ? !narrow_to_stay(from, to_time)
-                                 : t1 < options_.time_begin || t0 > options_.time_end) {
-      return;
-    }
-    const std::size_t first = out.size(), count = asset_->capsules.size();
-    out.resize(first + count);
-    const bool known = before.size == count && from == t0;
-    if (!known) {
-      for_each_capsule(from, [&](std::size_t c, const Capsule<double>& at) { out[first + c].motion.begin = at; });
-    }
-    for_each_capsule(to_time, [&](std::size_t c, const Capsule<double>& at) {
-      DynamicCapsule& to = out[first + c];
-      if (known) to.motion.begin = before[c].motion.end;
-      to.motion.end = at;
-      to.avatar = avatar;
-      to.bone = static_cast<std::uint32_t>(c);
-    });
-  }
+                        View<const DynamicCapsule> before = {}) const;
 
  private:
   bool within(double t) const noexcept { return t >= options_.time_begin && t <= options_.time_end; }
-  double clock(double t) const noexcept {
-    const double period = options_.loop_period;
-    if (!(period > 0)) return t;
-    const double at = t - std::floor(t / period) * period;
-    return at >= 0 && at < period ? at : 0.0;  // rounding at the begin of a round
-  }
+  double clock(double t) const noexcept;
   double blend_begin() const noexcept { return options_.loop_period - options_.loop_blend; }
   bool blending(double t) const noexcept { return options_.loop_blend > 0 && t > blend_begin(); }
 
-  /// Narrows [from, to] to when it is there, in a clock that begins again: the way between rounds is nobody's. Where it is
-  /// there at neither end, to the first stay in between. False: it is not there at all.
-  bool narrow_to_stay(double& from, double& to) const noexcept {
-    const bool at_begin = active(from), at_end = active(to);
-    if (at_begin && at_end) return true;
-    // Whoever is there while others get back is always there; of others each round has one stay.
-    const double period = options_.loop_period, come = max(options_.time_begin, 0.0);
-    const double leave = min(options_.time_end, options_.loop_blend > 0 ? blend_begin() : std::nextafter(period, 0.0));
-    if (!(come <= leave)) return false;
-    if (!at_begin && !at_end) {
-      double next = std::floor(from / period) * period + come;
-      if (next + (leave - come) < from) next += period;
-      if (next > to) return false;
-    }
-    if (!at_begin) from = come;
-    if (!at_end) to = leave;
-    return true;
-  }
+  /// Narrows [from, to] to when it is there, in a clock that begins again: the way between rounds is
+  /// nobody's. Where it is there at neither end, to the first stay in between. False: it is not there at
+  /// all.
+  bool narrow_to_stay(double& from, double& to) const noexcept;
 
   /// `needed`: the joints that are to be posed, null: all.
-  Similarity placement(double t, LocalPose& pose, const std::vector<char>* needed = nullptr) const {
-    t = clock(t);
-    if (!blending(t)) return placement_at(t, pose, needed);
-    LocalPose next;
-    const Similarity from = placement_at(blend_begin(), pose, needed), to = placement_at(0.0, next, needed);
-    const double u = (t - blend_begin()) / options_.loop_blend;
-    for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
-      pose.rotations[j] = slerp(pose.rotations[j], next.rotations[j], u);
-      pose.translations[j] = lerp(pose.translations[j], next.translations[j], u);
-    }
-    return {slerp(from.rotation, to.rotation, u), lerp(from.translation, to.translation, u), from.scale};
-  }
+  Similarity placement(double t, LocalPose& pose, const std::vector<char>* needed = nullptr) const;
 
-  Similarity placement_at(double t, LocalPose& pose, const std::vector<char>* needed) const {
-    const double local = t - options_.time_begin;
-    const TrajectorySample at = trajectory_->at(local);
-    const double scale = options_.scale;
-    const MotionInput input{local,     at.distance / scale, at.leg_begin / scale, at.leg_end / scale,
-                            at.turned, at.walking,          at.turning};
-    if (needed != nullptr) {
-      motion_->pose_of(input, *needed, pose);
-    } else {
-      motion_->pose(input, pose);
-    }
-    // The path of a clip goes into the placement, so that joint matrices stay small numbers.
-    const Similarity base{axis_angle(Vec3d{0, 1, 0}, at.yaw), at.position, scale};
-    return {base.rotation, base * pose.root, base.scale};
-  }
+  Similarity placement_at(double t, LocalPose& pose, const std::vector<char>* needed) const;
 
   /// f(number, capsule in the world) for each proxy capsule at time t.
   template <class F>
-  void for_each_capsule(double t, const F& f) const {
-    thread_local LocalPose pose;
-    thread_local std::vector<Affine3<double>> globals;
-    const Similarity world = placement(t, pose, &holds_capsules_);
-    const Skeleton& skeleton = asset_->skeleton;
-    globals.resize(skeleton.size());
-    // ForwardKinematics, of the joints that hold capsules.
-    for (std::size_t j = 0; j < globals.size(); ++j) {
-      if (holds_capsules_[j] == 0) continue;
-      const Affine3<double> local{rotation_matrix(pose.rotations[j]), pose.translations[j]};
-      const std::int32_t parent = skeleton.parents[j];
-      globals[j] = parent < 0 ? local : globals[static_cast<std::size_t>(parent)] * local;
-    }
-    for (std::size_t c = 0; c < asset_->capsules.size(); ++c) {
-      const ProxyCapsule& proxy = asset_->capsules[c];
-      const Affine3<double>& g = globals[proxy.joint];
-      f(c, Capsule<double>{world * (g * proxy.p0), world * (g * proxy.p1), proxy.radius * world.scale});
-    }
-  }
+  void for_each_capsule(double t, const F& f) const;
 
   AvatarActor() = default;
   std::shared_ptr<const AvatarAsset> asset_;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -11,8 +9,6 @@
 #include "gsnav/avatar/skeleton.hpp"
 #include "gsnav/avatar/skinning_weights.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/core/view.hpp"
-#include "gsnav/kernels/lbs.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {
@@ -24,11 +20,12 @@ struct ProxyCapsule {
   double radius = 0.0;  ///< metres
 };
 
-/// How a body's Gaussians follow its joints. A captured avatar relies on what it was trained with, which mostly is
-/// `linear`.
+/// How a body's Gaussians follow its joints. A captured avatar relies on what it was trained with, which
+/// mostly is `linear`.
 enum class Skinning : std::uint8_t {
   linear,            ///< linear blend skinning; shapes are turned by the polar factor
-  linear_stretched,  ///< the same places; shapes are stretched as the skin is, by AvatarAsset::weight_gradients
+  linear_stretched,  ///< the same places; shapes are stretched as the skin is, by
+                     ///< AvatarAsset::weight_gradients
   dual_quaternion,   ///< dual quaternion blending: twisted limbs keep their width
 };
 
@@ -37,133 +34,31 @@ struct AvatarAsset {
   std::string name;
   Skeleton skeleton;
   GaussianCloud cloud;                       ///< canonical pose, root frame (Y up, facing -Z), metres
-  int influences = kInfluences4;                ///< K: joints that move one Gaussian, 4 or 8
-  std::vector<std::uint16_t> joint_indices;     ///< [N][K], the greatest weight first
-  std::vector<std::uint16_t> skinning_weights;  ///< [N][K] parts of kWeightParts, which is the sum of each row
+  int influences = kInfluences4;             ///< K: joints that move one Gaussian, 4 or 8
+  std::vector<std::uint16_t> joint_indices;  ///< [N][K], the greatest weight first
+  std::vector<std::uint16_t>
+      skinning_weights;  ///< [N][K] parts of kWeightParts, which is the sum of each row
   Skinning skinning = Skinning::linear;
-  /// For linear_stretched (bake_weight_gradients): [N][K-1][3] of the second to last weight of each row, 1/metres.
+  /// For linear_stretched (bake_weight_gradients): [N][K-1][3] of the second to last weight of each row,
+  /// 1/metres.
   std::vector<float> weight_gradients;
   std::vector<ProxyCapsule> capsules;
-  LocalPose idle;                            ///< how it stands without a motion; empty: the rest pose
+  LocalPose idle;  ///< how it stands without a motion; empty: the rest pose
 
   std::size_t size() const noexcept { return cloud.size(); }
 
   /// Takes any k weights a Gaussian ([N][k], joint indices alongside; k = J with all joints for dense
-  /// weights): keeps the `keep` greatest (4 or 8), sorts them, and rounds them to parts that make 1 exactly
-  /// (round_weights), so that a body far from the root does not drift. Returns the greatest mass
-  /// that was left out of a row; gradients of the weights before are dropped. Errors: invalid_argument (sizes, a joint that does not exist, a weight
-  /// that is negative or not finite, a Gaussian without weight), naming the Gaussian.
+  /// weights): keeps the `keep` greatest (4 or 8), sorts them, and rounds them to parts that make 1
+  /// exactly (round_weights), so that a body far from the root does not drift. Returns the greatest mass
+  /// that was left out of a row; gradients of the weights before are dropped. Errors: invalid_argument
+  /// (sizes, a joint that does not exist, a weight that is negative or not finite, a Gaussian without
+  /// weight), naming the Gaussian.
   Result<double> set_weights(std::size_t k, const std::vector<std::uint16_t>& indices,
-                             const std::vector<float>& weights, int keep = kInfluences4) {
-    const std::size_t n = size();
-    if (keep != kInfluences4 && keep != kInfluences8) {
-      return {Errc::invalid_argument, "AvatarAsset: " + std::to_string(keep) + " influences; 4 or 8 are supported"};
-    }
-    if (k == 0 || indices.size() != n * k || weights.size() != n * k) {
-      return {Errc::invalid_argument, "AvatarAsset: " + std::to_string(weights.size()) + " weights and " +
-                                          std::to_string(indices.size()) + " joint indices for " +
-                                          std::to_string(n) + " Gaussians of " + std::to_string(k)};
-    }
-    const std::size_t row = static_cast<std::size_t>(keep), used = min(k, row);
-    std::vector<std::uint16_t> joint_out(n * row, 0), weight_out(n * row, 0);
-    std::vector<std::size_t> order(k);
-    std::vector<double> sorted(used);
-    double dropped = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto bad = [&](const std::string& what) {
-        return Status(Errc::invalid_argument, "AvatarAsset: Gaussian " + std::to_string(i) + " " + what);
-      };
-      double all = 0.0, kept = 0.0;
-      for (std::size_t j = 0; j < k; ++j) {
-        const float w = weights[i * k + j];
-        if (!(w >= 0) || !is_finite(w)) return bad("has weight " + std::to_string(w));
-        if (indices[i * k + j] >= skeleton.size()) {
-          return bad("names joint " + std::to_string(indices[i * k + j]) + " of " + std::to_string(skeleton.size()));
-        }
-        all += static_cast<double>(w);
-        order[j] = j;
-      }
-      if (!(all > 0)) return bad("has no weight");
-      std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-        return weights[i * k + a] > weights[i * k + b];
-      });
-      for (std::size_t j = 0; j < row; ++j) {
-        joint_out[i * row + j] = indices[i * k + order[j < used ? j : 0]];
-        if (j < used) kept += sorted[j] = static_cast<double>(weights[i * k + order[j]]);
-      }
-      dropped = max(dropped, 1.0 - kept / all);
-      round_weights(sorted.data(), used, weight_out.data() + i * row);
-    }
-    influences = keep;
-    weight_gradients.clear();
-    joint_indices = std::move(joint_out);
-    skinning_weights = std::move(weight_out);
-    return dropped;
-  }
+                             const std::vector<float>& weights, int keep = kInfluences4);
 
   /// invalid_argument naming the array, Gaussian, joint or capsule; unsupported for a canonical cloud
   /// further than 32 m from its root.
-  Status validate() const {
-    const auto bad = [&](const std::string& what) {
-      return Status(Errc::invalid_argument, "AvatarAsset" + (name.empty() ? "" : " \"" + name + "\"") + ": " + what);
-    };
-    if (Status s = skeleton.validate(); !s) return s;
-    const std::size_t n = size(), joints = skeleton.size();
-    if (joints > 65535) return bad("more than 65535 joints");
-    if (!cloud.origins.empty()) {
-      return {Errc::unsupported, "AvatarAsset: a canonical Gaussian lies more than 32 m from the root"};
-    }
-    if (!cloud.shN_half.empty()) return bad("the cloud is compact: expand_sh first");
-    if (influences != kInfluences4 && influences != kInfluences8) {
-      return bad("influences is " + std::to_string(influences) + "; 4 or 8 are supported");
-    }
-    const std::size_t row = static_cast<std::size_t>(influences);
-    if (joint_indices.size() != n * row || skinning_weights.size() != n * row) {
-      return bad("joint_indices and skinning_weights need " + std::to_string(row) +
-                 " values a Gaussian (set_weights makes them)");
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      int sum = 0;
-      for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
-        if (joint_indices[k] >= joints) {
-          return bad("Gaussian " + std::to_string(i) + " names joint " + std::to_string(joint_indices[k]) +
-                     " of " + std::to_string(joints));
-        }
-        if (skinning_weights[k] > skinning_weights[i * row]) {
-          return bad("Gaussian " + std::to_string(i) + " does not have its greatest weight first");
-        }
-        sum += skinning_weights[k];
-      }
-      if (sum != kWeightParts) {
-        return bad("weights of Gaussian " + std::to_string(i) + " sum to " + std::to_string(sum) + " parts of " +
-                   std::to_string(kWeightParts));
-      }
-    }
-    if (skinning == Skinning::linear_stretched) {
-      if (weight_gradients.size() != 3 * n * (row - 1)) {
-        return bad("weight_gradients has " + std::to_string(weight_gradients.size()) + " values where " +
-                   std::to_string(3 * n * (row - 1)) + " are needed (bake_weight_gradients makes them)");
-      }
-      for (std::size_t k = 0; k < weight_gradients.size(); ++k) {
-        if (!is_finite(weight_gradients[k])) {
-          return bad("weight_gradients of Gaussian " + std::to_string(k / (3 * (row - 1))) + " are not finite");
-        }
-      }
-    }
-    for (std::size_t c = 0; c < capsules.size(); ++c) {
-      const ProxyCapsule& p = capsules[c];
-      if (p.joint >= joints || !(p.radius >= 0) || !is_finite(p.radius) || !is_finite(p.p0) || !is_finite(p.p1)) {
-        return bad("capsule " + std::to_string(c) + " names no joint or is not finite");
-      }
-    }
-    if (!idle.rotations.empty() && (idle.rotations.size() != joints || idle.translations.size() != joints)) {
-      return bad("idle has another number of joints than the skeleton");
-    }
-    if (!idle.rotations.empty()) {
-      if (Status s = idle.validate("idle"); !s) return bad(s.message());
-    }
-    return {};
-  }
+  Status validate() const;
 };
 
 }  // namespace gsnav

@@ -11,9 +11,9 @@
 
 namespace gsnav {
 
-/// Many actors' Gaussians on one backend, skinned together: their joint matrices go there in one copy, and a GPU
-/// skins all of them in one launch. Actors of one asset share its canonical arrays. Positions are the bits that
-/// SkinnedGaussians gives. The backend must outlive it.
+/// Many actors' Gaussians on one backend, skinned together: their joint matrices go there in one copy,
+/// and a GPU skins all of them in one launch. Actors of one asset share its canonical arrays. Positions
+/// are the bits that SkinnedGaussians gives. The backend must outlive it.
 ///
 ///     SkinnedCrowd crowd(backend);
 ///     for (const AvatarActor& a : people) crowd.add(a.asset());
@@ -30,7 +30,8 @@ class SkinnedCrowd {
     for (const auto& known : assets_) {
       if (known->asset() == asset) arrays = known;
     }
-    if (arrays == nullptr) assets_.push_back(arrays = std::make_shared<const AvatarArrays<B>>(*backend_, asset));
+    if (arrays == nullptr)
+      assets_.push_back(arrays = std::make_shared<const AvatarArrays<B>>(*backend_, asset));
     return add(std::move(arrays));
   }
   /// The same of an asset's arrays that others share.
@@ -39,14 +40,16 @@ class SkinnedCrowd {
     return actors_.size() - 1;
   }
 
-  /// Poses actors[i] (or *actors[i]) at place i as it is at time t (seconds); those that are not in the scene then
-  /// have empty sets. Errors: invalid_argument where there are not as many actors as places, or one has another
-  /// asset than its place; no set changes its Gaussians then.
+  /// Poses actors[i] (or *actors[i]) at place i as it is at time t (seconds); those that are not in the
+  /// scene then have empty sets. Errors: invalid_argument where there are not as many actors as places,
+  /// or one has another asset than its place; no set changes its Gaussians then.
   Status pose(std::span<const AvatarActor> actors, double t) {
-    return pose(actors.size(), [&](std::size_t i) -> const AvatarActor& { return actors[i]; }, t);
+    return pose(
+        actors.size(), [&](std::size_t i) -> const AvatarActor& { return actors[i]; }, t);
   }
   Status pose(std::span<const AvatarActor* const> actors, double t) {
-    return pose(actors.size(), [&](std::size_t i) -> const AvatarActor& { return *actors[i]; }, t);
+    return pose(
+        actors.size(), [&](std::size_t i) -> const AvatarActor& { return *actors[i]; }, t);
   }
 
   /// Poses them for what these cameras see by `config`, in two steps, as SkinnedGaussians::prepare has

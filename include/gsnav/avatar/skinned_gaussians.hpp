@@ -19,8 +19,8 @@
 
 namespace gsnav {
 
-/// What all actors of an asset share, in the memory of a backend. On host backends it is the asset's own; others
-/// get a copy. The backend must outlive it.
+/// What all actors of an asset share, in the memory of a backend. On host backends it is the asset's
+/// own; others get a copy. The backend must outlive it.
 template <Backend B>
 class AvatarArrays {
  public:
@@ -74,9 +74,9 @@ class AvatarArrays {
 };
 
 /// The Gaussians of one actor, posed on a backend and ready to be rendered in one list with the scene.
-/// Only means and orientations (for SH of degree >= 1 also the rotations that colours are turned back by, with stretch
-/// the shapes) are written per frame, into buffers that are used again; all else is the asset's own memory, which on
-/// other than host backends is uploaded once. The backend must outlive it.
+/// Only means and orientations (for SH of degree >= 1 also the rotations that colours are turned back
+/// by, with stretch the shapes) are written per frame, into buffers that are used again; all else is the
+/// asset's own memory, which on other than host backends is uploaded once. The backend must outlive it.
 ///
 ///     SkinnedGaussians skin(backend, actor.asset());
 ///     skin.pose(actor, t).throw_if_error();
@@ -87,8 +87,13 @@ class SkinnedGaussians {
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarAsset> asset)
       : SkinnedGaussians(backend, std::make_shared<const AvatarArrays<B>>(backend, std::move(asset))) {}
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarArrays<B>> arrays)
-      : backend_(&backend), arrays_(std::move(arrays)), bounds_(*asset()), args_(arrays_->skinning()),
-        set_(arrays_->set()), joints_(backend), dual_joints_(backend) {
+      : backend_(&backend),
+        arrays_(std::move(arrays)),
+        bounds_(*asset()),
+        args_(arrays_->skinning()),
+        set_(arrays_->set()),
+        joints_(backend),
+        dual_joints_(backend) {
     GaussianView& v = set_.gaussians;
     for (std::size_t k = 0; k < 3; ++k) v.means[k] = args_.means_out[k] = output(v.size);
     for (std::size_t k = 0; k < 4; ++k) {
@@ -100,8 +105,8 @@ class SkinnedGaussians {
     }
   }
 
-  /// Poses the Gaussians as `actor` is at time t (seconds). An actor that is not in the scene then leaves
-  /// an empty set. The Gaussians are there after `backend.synchronize()`, which rendering does.
+  /// Poses the Gaussians as `actor` is at time t (seconds). An actor that is not in the scene then
+  /// leaves an empty set. The Gaussians are there after `backend.synchronize()`, which rendering does.
   /// Errors: invalid_argument for an actor with another asset.
   Status pose(const AvatarActor& actor, double t) {
     if (Status s = place(actor, t); !s || !visible_) return s;
@@ -109,20 +114,25 @@ class SkinnedGaussians {
     return skin();
   }
 
-  /// The same for what these cameras see by `config`: an actor that none of them can see leaves an empty set and costs its
-  /// forward kinematics, no more. No pixel of theirs changes by it.
-  Status pose(const AvatarActor& actor, double t, std::span<const Camera> cameras, const RenderConfig& config) {
+  /// The same for what these cameras see by `config`: an actor that none of them can see leaves an empty
+  /// set and costs its forward kinematics, no more. No pixel of theirs changes by it.
+  Status pose(const AvatarActor& actor, double t, std::span<const Camera> cameras,
+              const RenderConfig& config) {
     if (Status s = prepare(actor, t, cameras, config); !s) return s;
     return skin_prepared();
   }
-  /// That in two steps. The first is the host's alone: several threads may take it, each for another object.
-  Status prepare(const AvatarActor& actor, double t, std::span<const Camera> cameras, const RenderConfig& config) {
+  /// That in two steps. The first is the host's alone: several threads may take it, each for another
+  /// object.
+  Status prepare(const AvatarActor& actor, double t, std::span<const Camera> cameras,
+                 const RenderConfig& config) {
     if (Status s = place(actor, t); !s || !visible_) return s;
     actor.joint_globals(t, matrices_);
     const ChunkBounds bounds = bounds_.at(matrices_);
     visible_ = false;
     for (const Camera& c : cameras) {
-      visible_ = visible_ || may_be_visible(make_projection_camera<double>(c, set_, projection_rules(config)), bounds);
+      visible_ =
+          visible_ ||
+          may_be_visible(make_projection_camera<double>(c, set_, projection_rules(config)), bounds);
     }
     if (visible_) actor.to_joint_matrices(matrices_);
     return {};
@@ -145,7 +155,8 @@ class SkinnedGaussians {
   /// Where the actor is, and whether it is in the scene.
   Status place(const AvatarActor& actor, double t) {
     if (actor.asset() != asset()) {
-      return {Errc::invalid_argument, "SkinnedGaussians: the actor has another asset than was given at creation"};
+      return {Errc::invalid_argument,
+              "SkinnedGaussians: the actor has another asset than was given at creation"};
     }
     visible_ = actor.active(t);
     if (visible_) set_.world_from_asset = actor.placement(t);

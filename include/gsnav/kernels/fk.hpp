@@ -11,6 +11,14 @@
 
 namespace gsnav {
 
+/// A joint's frame to the root frame, from its frame to its parent's; `parent` -1: that is the root
+/// frame. The parent's `globals` are there.
+template <class S>
+GSNAV_HD Affine3<S> joint_global(const Affine3<S>* globals, std::int32_t parent,
+                                 const Affine3<S>& local) noexcept {
+  return parent < 0 ? local : globals[static_cast<std::size_t>(parent)] * local;
+}
+
 /// One actor's pose in a batch of actors that share a skeleton of J joints, A poses in all. Frames:
 /// global is the actor's root frame, metres; a local transform maps a joint's frame to its parent's.
 template <class S>
@@ -33,9 +41,7 @@ struct ForwardKinematics {
     const std::size_t count = args.parents.size, base = a * count;
     for (std::size_t j = 0; j < count; ++j) {
       const Affine3<S> local{rotation_matrix(args.rotations[base + j]), args.translations[base + j]};
-      const std::int32_t parent = args.parents[j];
-      args.globals[base + j] =
-          parent < 0 ? local : args.globals[base + static_cast<std::size_t>(parent)] * local;
+      args.globals[base + j] = joint_global(args.globals.data + base, args.parents[j], local);
     }
     if (args.joint_matrices.empty()) return;
     for (std::size_t j = 0; j < count; ++j) {

@@ -185,6 +185,28 @@ GSNAV_HD S skinning_weight(std::uint16_t parts) noexcept {
   return static_cast<S>(parts) * static_cast<S>(1.0 / kWeightParts);
 }
 
+/// Every number of `a` times the weight, and the same added to `sum`.
+template <class L>
+GSNAV_HD Affine3<L> weighted(const L& weight, const Affine3<L>& a) noexcept {
+  return {a.linear * weight, a.translation * weight};
+}
+template <class L>
+GSNAV_HD Affine3<L> weighted(const L& weight, const Affine3<L>& a, const Affine3<L>& sum) noexcept {
+  Affine3<L> out;
+  for (int r = 0; r < 3; ++r) out.linear.row[r] = fma(weight, a.linear.row[r], sum.linear.row[r]);
+  out.translation = fma(weight, a.translation, sum.translation);
+  return out;
+}
+
+/// The blend of a Gaussian's K joints: the sum of weight(k) * joint(k), in the order of k. A joint is
+/// whatever has the two functions `weighted`: its numbers may be blended in any layout.
+template <int K, class Joint, class Weight>
+GSNAV_HD auto blend_influences(const Joint& joint, const Weight& weight) noexcept {
+  auto sum = weighted(weight(0), joint(0));
+  for (int k = 1; k < K; ++k) sum = weighted(weight(k), joint(k), sum);
+  return sum;
+}
+
 /// What skinning reads of a Gaussian.
 template <int K>
 struct SkinRow {
@@ -209,16 +231,9 @@ GSNAV_HD SkinRow<K> read_skin_row(const SkinningArgs<S, Out>& args, std::size_t 
 /// Skins a Gaussian whose K joints `joint_at(index)` gives (an Affine3<S>, or a reference to one).
 template <class S, int K, class JointAt>
 GSNAV_HD Skinned<S> skin_row(const SkinRow<K>& row, const JointAt& joint_at, bool rotation) noexcept {
-  Affine3<S> blend;
-  for (int k = 0; k < K; ++k) {
-    const Affine3<S>& joint = joint_at(row.joints[k]);
-    const S weight = skinning_weight<S>(row.parts[k]);
-    for (int r = 0; r < 3; ++r) {
-      blend.linear.row[r] =
-          k == 0 ? joint.linear.row[r] * weight : fma(weight, joint.linear.row[r], blend.linear.row[r]);
-    }
-    blend.translation = k == 0 ? joint.translation * weight : fma(weight, joint.translation, blend.translation);
-  }
+  const auto joint = [&](int k) GSNAV_INLINED -> decltype(auto) { return joint_at(row.joints[k]); };
+  const auto weight = [&](int k) GSNAV_INLINED { return skinning_weight<S>(row.parts[k]); };
+  const Affine3<S> blend = blend_influences<K>(joint, weight);
   const auto first = [&]() GSNAV_INLINED { return joint_at(row.joints[0]).linear; };
   return skin<S>(blend, first, vec_cast<S>(row.mean), quat_cast<S>(row.quat), rotation);
 }

@@ -8,6 +8,9 @@
 #if defined(WITH_OPENMP)
 #include <gsnav/backends/openmp.hpp>
 #endif
+#if defined(WITH_AVATAR)
+#include <gsnav/avatar/humanoid.hpp>
+#endif
 #if defined(WITH_IO)
 #include <gsnav/io/image_file.hpp>
 #include <gsnav/io/sog.hpp>
@@ -63,6 +66,9 @@ int main() {
 #if defined(WITH_OPENMP)
   gsnav::OpenMPBackend openmp;
   check("openmp", renders_one_gaussian(openmp));
+#endif
+#if defined(WITH_AVATAR)
+  check("avatar", gsnav::try_make_humanoid({.gaussians = 2000}).ok());
 #endif
 #if defined(WITH_IO)
   // Each format's library must be linked: PNG, and WebP and zlib behind SOG.

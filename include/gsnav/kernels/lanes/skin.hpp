@@ -11,38 +11,49 @@ inline namespace GSNAV_LANES_TAG {
 // by rows, then translation. The matrices of a pack are then put side by side, in registers.
 static_assert(sizeof(Affine3<float>) == 12 * sizeof(float));
 
-/// One Gaussian's blended matrix.
+/// One Gaussian's blended matrix, and what blend_influences needs of it.
 struct BlendedRow {
 #if GSNAV_PACK_WIDTH >= 8
+  using Weight = Pack<float, 8>;
   Pack<float, 8> low;
   Pack<float, 4> high;
+
+  static GSNAV_HD Pack<float, 4> half(const Weight& w) noexcept {
+    return Pack<float, 4>(__builtin_shufflevector(w.v, w.v, 0, 1, 2, 3));
+  }
+  static GSNAV_HD BlendedRow load(const float* p) noexcept {
+    return {Pack<float, 8>::load(p), Pack<float, 4>::load(p + 8)};
+  }
+  friend GSNAV_HD BlendedRow weighted(const Weight& w, const BlendedRow& a) noexcept {
+    return {a.low * w, a.high * half(w)};
+  }
+  friend GSNAV_HD BlendedRow weighted(const Weight& w, const BlendedRow& a,
+                                      const BlendedRow& sum) noexcept {
+    return {fma(w, a.low, sum.low), fma(half(w), a.high, sum.high)};
+  }
 #else
+  using Weight = Pack<float, 4>;
   Pack<float, 4> parts[3];
+
+  static GSNAV_HD BlendedRow load(const float* p) noexcept {
+    return {{Weight::load(p), Weight::load(p + 4), Weight::load(p + 8)}};
+  }
+  friend GSNAV_HD BlendedRow weighted(const Weight& w, const BlendedRow& a) noexcept {
+    return {{a.parts[0] * w, a.parts[1] * w, a.parts[2] * w}};
+  }
+  friend GSNAV_HD BlendedRow weighted(const Weight& w, const BlendedRow& a,
+                                      const BlendedRow& sum) noexcept {
+    return {{fma(w, a.parts[0], sum.parts[0]), fma(w, a.parts[1], sum.parts[1]),
+             fma(w, a.parts[2], sum.parts[2])}};
+  }
 #endif
 };
 
 template <int K>
 GSNAV_HD BlendedRow blend_row(const float* joints, const std::uint16_t* indices, const float* weights) noexcept {
-  using P4 = Pack<float, 4>;
-  const auto joint = [&](int k) noexcept { return joints + std::size_t{12} * indices[k]; };
-#if GSNAV_PACK_WIDTH >= 8
-  using P8 = Pack<float, 8>;
-  const auto half = [](const P8& p) noexcept { return P4(__builtin_shufflevector(p.v, p.v, 0, 1, 2, 3)); };
-  const P8 first(weights[0]);
-  BlendedRow r{P8::load(joint(0)) * first, P4::load(joint(0) + 8) * half(first)};
-  for (int k = 1; k < K; ++k) {
-    const P8 w(weights[k]);
-    r.low = fma(w, P8::load(joint(k)), r.low);
-    r.high = fma(half(w), P4::load(joint(k) + 8), r.high);
-  }
-#else
-  BlendedRow r;
-  for (int p = 0; p < 3; ++p) {
-    r.parts[p] = P4::load(joint(0) + 4 * p) * P4(weights[0]);
-    for (int k = 1; k < K; ++k) r.parts[p] = fma(P4(weights[k]), P4::load(joint(k) + 4 * p), r.parts[p]);
-  }
-#endif
-  return r;
+  return blend_influences<K>(
+      [&](int k) GSNAV_INLINED { return BlendedRow::load(joints + std::size_t{12} * indices[k]); },
+      [&](int k) GSNAV_INLINED { return BlendedRow::Weight(weights[k]); });
 }
 
 /// The three parts of the rows of every fourth Gaussian, each in a 128-bit part of its pack.

@@ -17,11 +17,11 @@ enum class BodyPart : std::uint8_t { skin, hair, top, trousers, shoes };
 /// A limb's piece: elliptical sections along the segment a b, rounded at both ends. Radii are across,
 /// along and through the piece, in its own axes.
 struct Lobe {
-  Vec3d a{}, b{};                      ///< metres, bind pose, root frame
-  Vec3d radii_a{}, radii_b{};          ///< at a and at b
-  Mat3d axes = Mat3d::identity();      ///< rows: across, along, through
-  double blend = 0.02;                 ///< metres over which it grows together with what is there already
-  std::uint16_t joint = 0;             ///< what moves it
+  Vec3d a{}, b{};                  ///< metres, bind pose, root frame
+  Vec3d radii_a{}, radii_b{};      ///< at a and at b
+  Mat3d axes = Mat3d::identity();  ///< rows: across, along, through
+  double blend = 0.02;             ///< metres over which it grows together with what is there already
+  std::uint16_t joint = 0;         ///< what moves it
   BodyPart part = BodyPart::skin;
 
   /// Signed distance of p, to first order near the surface; metres, negative inside. `normal` (not null)
@@ -38,12 +38,15 @@ struct Lobe {
       if (normal != nullptr) *normal = {0, 1, 0};
       return -min(min(r.x, r.y), r.z);
     }
-    if (normal != nullptr) *normal = (axes.row[0] * g.x + axes.row[1] * g.y + axes.row[2] * g.z) * (1 / k1);
+    if (normal != nullptr)
+      *normal = (axes.row[0] * g.x + axes.row[1] * g.y + axes.row[2] * g.z) * (1 / k1);
     return k0 * (k0 - 1) / k1;
   }
 
   /// a . b without fma, which is a library call where the compiler may not assume one.
-  static double product(const Vec3d& x, const Vec3d& y) noexcept { return x.x * y.x + x.y * y.y + x.z * y.z; }
+  static double product(const Vec3d& x, const Vec3d& y) noexcept {
+    return x.x * y.x + x.y * y.y + x.z * y.z;
+  }
 
   /// Radius of a ball around the middle of the segment that holds the lobe.
   double reach() const noexcept {
@@ -89,7 +92,8 @@ struct BodyShape {
 
   /// Signed distance to the union of the lobes named by `among`. `gradient` (not null) gets its
   /// direction outwards, about of unit length.
-  double distance(const Vec3d& p, const std::vector<std::size_t>& among, Vec3d* gradient = nullptr) const noexcept {
+  double distance(const Vec3d& p, const std::vector<std::size_t>& among,
+                  Vec3d* gradient = nullptr) const noexcept {
     double d = 1e3;
     Vec3d sum{0, 1, 0}, normal;
     for (const std::size_t k : among) {

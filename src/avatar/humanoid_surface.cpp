@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#pragma once
+#include "humanoid_surface.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,33 +7,39 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "body_shape.hpp"
 #include "gsnav/avatar/asset.hpp"
-#include "gsnav/avatar/body_shape.hpp"
-#include "gsnav/avatar/humanoid_body.hpp"
-#include "gsnav/avatar/point_grid.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/sh.hpp"
+#include "humanoid_body.hpp"
+#include "point_grid.hpp"
 
 namespace gsnav::detail {
+
+namespace {
 
 /// A point of the surface before it becomes a Gaussian.
 struct SurfacePoint {
   Vec3d position{}, normal{};
-  double spacing = 0;     // metres to the nearest other point, at least
-  std::size_t lobe = 0;   // the nearest
+  double spacing = 0;    // metres to the nearest other point, at least
+  std::size_t lobe = 0;  // the nearest
 };
 
 /// Spreads points over the surface of the shape: random ones on the lobes, moved to the smooth union,
 /// kept where no other is near (dart throwing).
-inline std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidOptions& o,
-                                                const std::vector<double>& density) {
+std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidOptions& o,
+                                         const std::vector<double>& density) {
   Rng rng(o.seed);
   double weighted = 0;
-  for (std::size_t i = 0; i < shape.lobes.size(); ++i) weighted += shape.lobes[i].area() * density[i] * density[i];
-  // Measured: lobes overlap by more than half, and dart throwing gives 0.7 points per square of the spacing.
+  for (std::size_t i = 0; i < shape.lobes.size(); ++i)
+    weighted += shape.lobes[i].area() * density[i] * density[i];
+  // Measured: lobes overlap by more than half, and dart throwing gives 0.7 points per square of the
+  // spacing.
   const double spacing = std::sqrt(0.285 * weighted / o.gaussians);
   const double scale = o.height / 1.70;
   PointGrid grid(spacing, static_cast<std::size_t>(o.gaussians));
@@ -49,7 +55,8 @@ inline std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const Hu
     const auto at = std::upper_bound(sum.begin(), sum.end(), rng.uniform() * sum.back());
     const std::size_t i = min(static_cast<std::size_t>(at - sum.begin()) - 1, shape.lobes.size() - 1);
     const Lobe& l = shape.lobes[i];
-    const double z = rng.uniform(-1, 1), angle = rng.uniform(0, 6.283185307179586), q = std::sqrt(1 - z * z);
+    const double z = rng.uniform(-1, 1), angle = rng.uniform(0, 6.283185307179586),
+                 q = std::sqrt(1 - z * z);
     const Vec3d unit{q * std::cos(angle), z, q * std::sin(angle)};
     // A share of the points goes to the round ends by their length.
     const double straight = norm(l.b - l.a), ends = l.radii_a.y + l.radii_b.y;
@@ -90,7 +97,8 @@ inline std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const Hu
 /// crevices, as light in a room would leave in a captured person.
 class HumanoidPainter {
  public:
-  HumanoidPainter(const HumanoidOptions& o, const BodyShape& shape) : o_(o), shape_(shape), scale_(o.height / 1.70) {
+  HumanoidPainter(const HumanoidOptions& o, const BodyShape& shape)
+      : o_(o), shape_(shape), scale_(o.height / 1.70) {
     for (std::size_t i = 0; i < shape.lobes.size(); ++i) among_.push_back(shape.neighbours(i, 0.08));
   }
 
@@ -100,7 +108,9 @@ class HumanoidPainter {
     Vec3d c;
     double noise = 0.009, fold = 0.0;
     switch (part(x, lobe)) {
-      case BodyPart::skin: c = face(x); break;
+      case BodyPart::skin:
+        c = face(x);
+        break;
       case BodyPart::hair:
         c = o_.hair * (1.0 + 0.09 * std::sin(90 * x.x + 25 * std::sin(20 * x.y)));
         noise = 0.02;
@@ -113,11 +123,14 @@ class HumanoidPainter {
         c = o_.trousers;
         fold = std::sin(17 * x.y + 6 * std::sin(11 * x.x) + 9 * x.z);
         break;
-      case BodyPart::shoes: c = x.y < 0.014 ? Vec3d{0.55, 0.54, 0.52} : o_.shoes; break;  // sole
+      case BodyPart::shoes:
+        c = x.y < 0.014 ? Vec3d{0.55, 0.54, 0.52} : o_.shoes;
+        break;  // sole
     }
     const double light = 0.80 + 0.20 * (0.5 + 0.5 * p.normal.y) + 0.03 * fold;
     const double reach = 0.05 * scale_;
-    const double open = clamp(shape_.distance(p.position + p.normal * reach, among_[p.lobe]) / reach, 0.0, 1.0);
+    const double open =
+        clamp(shape_.distance(p.position + p.normal * reach, among_[p.lobe]) / reach, 0.0, 1.0);
     const double shade = light * (0.62 + 0.38 * open) + noise * rng.normal();
     for (int k = 0; k < 3; ++k) c[k] = clamp(c[k] * shade, 0.0, 1.0);
     return c;
@@ -137,7 +150,8 @@ class HumanoidPainter {
     }
     // Along the arm from the shoulder, metres: it hangs 50 degrees below the horizontal.
     const double along = 0.643 * (side - 0.165 * o_.shoulders) + 0.766 * (1.385 - x.y);
-    if (o_.short_sleeves && lobe.part == BodyPart::top && side > 0.19 && along > 0.17) return BodyPart::skin;
+    if (o_.short_sleeves && lobe.part == BodyPart::top && side > 0.19 && along > 0.17)
+      return BodyPart::skin;
     return lobe.part;
   }
 
@@ -148,11 +162,14 @@ class HumanoidPainter {
 
   Vec3d face(const Vec3d& x) const {
     if (x.y < 1.47) return o_.skin;
-    const auto mix = [](const Vec3d& a, const Vec3d& b, double t) { return lerp(a, b, clamp(t, 0.0, 1.0)); };
+    const auto mix = [](const Vec3d& a, const Vec3d& b, double t) {
+      return lerp(a, b, clamp(t, 0.0, 1.0));
+    };
     Vec3d c = o_.skin;
     const Vec3d m{abs(x.x), x.y, x.z};
     if (spot(m, {0.034, 1.586, 0}, 0.015, 0.007) < 1) {
-      c = spot(m, {0.034, 1.586, 0}, 0.0065, 0.0065) < 1 ? Vec3d{0.12, 0.09, 0.07} : Vec3d{0.88, 0.86, 0.84};
+      c = spot(m, {0.034, 1.586, 0}, 0.0065, 0.0065) < 1 ? Vec3d{0.12, 0.09, 0.07}
+                                                         : Vec3d{0.88, 0.86, 0.84};
     } else if (spot(m, {0.034, 1.590, 0}, 0.018, 0.0075) < 1) {
       c = o_.skin * 0.55;  // lashes
     } else if (spot(m, {0.035, 1.607 - 0.06 * (m.x - 0.035), 0}, 0.020, 0.0040) < 1) {
@@ -209,7 +226,8 @@ class HumanoidWeigher {
     const std::size_t n = distance_.size(), home = shape_.lobes[p.lobe].joint;
     std::fill(distance_.begin(), distance_.end(), 1e3);
     for (const Lobe& l : shape_.lobes) {
-      if (softness_[home * n + l.joint] > 0) distance_[l.joint] = min(distance_[l.joint], l.distance(p.position));
+      if (softness_[home * n + l.joint] > 0)
+        distance_[l.joint] = min(distance_[l.joint], l.distance(p.position));
     }
     row.assign(n, 0.0f);
     for (std::size_t j = 0; j < n; ++j) {
@@ -225,13 +243,14 @@ class HumanoidWeigher {
   std::vector<double> distance_;
 };
 
-/// Fills cloud and weights of `asset` with the surface of `shape`. Errors: as of AvatarAsset::set_weights.
-inline Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& shape, AvatarAsset& asset) {
+}  // namespace
+
+Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& shape, AvatarAsset& asset) {
   std::vector<double> density;
   for (const Lobe& l : shape.lobes) {
     const std::string& n = asset.skeleton.names[l.joint];
-    const bool fine = n.find("index") != n.npos || n.find("middle") != n.npos || n.find("ring") != n.npos ||
-                      n.find("pinky") != n.npos || n.find("thumb") != n.npos;
+    const bool fine = n.find("index") != n.npos || n.find("middle") != n.npos ||
+                      n.find("ring") != n.npos || n.find("pinky") != n.npos || n.find("thumb") != n.npos;
     density.push_back(n == "head" ? (l.part == BodyPart::skin ? 2.2 : 1.4) : fine ? 1.8 : 1.0);
   }
   const std::vector<SurfacePoint> points = sample_surface(shape, o, density);
@@ -240,20 +259,23 @@ inline Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& sh
   Rng rng(o.seed ^ 0x636f6c6f7572ull);
   GaussianCloudBuilder builder(o.sh_degree, "procedural humanoid");
   builder.reserve(points.size());
-  const std::vector<float> rest(3 * static_cast<std::size_t>(sh_coefficient_count(o.sh_degree) - 1), 0.0f);
+  const std::vector<float> rest(3 * static_cast<std::size_t>(sh_coefficient_count(o.sh_degree) - 1),
+                                0.0f);
   std::vector<std::uint16_t> indices;
   std::vector<float> weights, row;
   for (const SurfacePoint& p : points) {
     RawGaussian g;
     g.mean = p.position;
-    const Vec3d n = p.normal, u = normalized(abs(n.y) < 0.9 ? cross(Vec3d{0, 1, 0}, n) : cross(Vec3d{1, 0, 0}, n));
+    const Vec3d n = p.normal,
+                u = normalized(abs(n.y) < 0.9 ? cross(Vec3d{0, 1, 0}, n) : cross(Vec3d{1, 0, 0}, n));
     const Vec3d v = cross(n, u);
     g.quat = quat_from_matrix(transpose(Mat3d{{u, v, n}}));
     const double flat = std::log(0.80 * p.spacing);
     g.log_scales = {flat, flat, std::log(0.12 * p.spacing)};
     g.opacity_logit = 4.6;  // 0.99
     const Vec3d c = painter.color(p, rng);
-    for (int k = 0; k < 3; ++k) g.sh0[static_cast<std::size_t>(k)] = static_cast<float>((c[k] - 0.5) / kSh0);
+    for (int k = 0; k < 3; ++k)
+      g.sh0[static_cast<std::size_t>(k)] = static_cast<float>((c[k] - 0.5) / kSh0);
     g.shN = rest.empty() ? nullptr : rest.data();
     if (!builder.add(g)) continue;
     weigher.weigh(p, row);

@@ -30,7 +30,8 @@ class PointGrid {
       for (std::int64_t y = -1; y <= 1; ++y) {
         for (std::int64_t x = -1; x <= 1; ++x) {
           // Cells that share a bucket cost a distance, no more.
-          for (int i = heads_[bucket(c[0] + x, c[1] + y, c[2] + z)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) {
+          for (int i = heads_[bucket(c[0] + x, c[1] + y, c[2] + z)]; i >= 0;
+               i = next_[static_cast<std::size_t>(i)]) {
             const Vec3d d = points_[static_cast<std::size_t>(i)] - p;
             if (dot(d, d) < limit && counts(static_cast<std::size_t>(i))) return false;
           }

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/avatar/body_bounds.hpp"
+
+#include <cstddef>
+#include <vector>
+
+#include "gsnav/kernels/skin_modes.hpp"
+
+namespace gsnav {
+
+BodyBounds::BodyBounds(const AvatarAsset& asset) : reach_(asset.skeleton.size(), -1.0) {
+  const auto inverse = asset.skeleton.bind_inverses();
+  const std::size_t row = static_cast<std::size_t>(asset.influences);
+  for (std::size_t i = 0; i < asset.size(); ++i) {
+    const Vec3d p = asset.cloud.mean(i);
+    for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
+      if (asset.skinning_weights[k] == 0) continue;
+      double& reach = reach_[asset.joint_indices[k]];
+      reach = max(reach, norm(inverse[asset.joint_indices[k]] * p));
+    }
+    if (asset.skinning == Skinning::dual_quaternion) {
+      const double first = weight_of_parts(asset.skinning_weights[i * row]);
+      bulge_ = max(bulge_, (1 - first) / first);
+    }
+    for (const auto& s : asset.cloud.scales) scale_ = max(scale_, s[i]);
+    opacity_ = max(opacity_, asset.cloud.opacities[i]);
+  }
+  if (asset.skinning == Skinning::linear_stretched)
+    scale_ *= static_cast<float>(kGreatestStretch * (1 + 1e-5));
+}
+
+ChunkBounds BodyBounds::at(const std::vector<Affine3<double>>& joints) const noexcept {
+  ChunkBounds out;
+  bool first = true;
+  for (std::size_t j = 0; j < reach_.size(); ++j) {
+    if (reach_[j] < 0) continue;
+    const double r = reach_[j] * (1 + 1e-5) + 1e-5;  // skinning's own rounding
+    for (int k = 0; k < 3; ++k) {
+      const double c = joints[j].translation[k];
+      out.low[k] = first ? c - r : min(out.low[k], c - r);
+      out.high[k] = first ? c + r : max(out.high[k], c + r);
+    }
+    first = false;
+  }
+  // Where the joints put a Gaussian apart by d_k from where the first does, the blend q = sum w_k q_k
+  // puts it apart by sum w_k d_k q_k conj(q) / |q|^2: at most sum w_k |d_k| / |q|. |q| is at least the
+  // first weight, because no q_k points away from the first.
+  const Vec3d grow = Vec3d{1, 1, 1} * (bulge_ * norm(out.high - out.low));
+  out.low -= grow;
+  out.high += grow;
+  out.scale_max = scale_;
+  out.opacity_max = opacity_;
+  return out;
+}
+
+}  // namespace gsnav

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/vec.hpp"
+
+namespace gsnav::detail {
+
+/// Median distance from a point to its nearest, by a sample of them; 0 for fewer than two.
+double typical_spacing(const std::vector<Vec3d>& points);
+
+/// Points by cells, for the nearest of a point.
+class NearestPoints {
+ public:
+  explicit NearestPoints(std::vector<Vec3d> points);
+
+  /// The `count` nearest to point i, itself left out, at most kRings cells away: (squared distance,
+  /// number).
+  std::vector<std::pair<double, std::size_t>> near(std::size_t i, std::size_t count) const;
+
+ private:
+  using Cell = std::array<std::int64_t, 3>;
+  Cell cell_of(const Vec3d& p) const;
+  static std::uint64_t key(const Cell& c) noexcept;
+  std::vector<Vec3d> points_;
+  double cell_ = 1.0;
+  std::unordered_map<std::uint64_t, std::vector<std::size_t>> cells_;
+};
+
+}  // namespace gsnav::detail
