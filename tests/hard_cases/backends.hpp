@@ -43,13 +43,12 @@ template <class S>
 class CaseImages {
  public:
   using scalar = S;
-  CaseImages(const char* name, bool composes_meshes) : composes(composes_meshes), name_(name) {}
+  explicit CaseImages(const char* name) : name_(name) {}
   virtual ~CaseImages() = default;
 
   std::string name() const { return name_; }
   static constexpr bool is_float = sizeof(S) == sizeof(float);
   static constexpr double epsilon = is_float ? 0x1p-24 : 0x1p-53;
-  const bool composes;  ///< It draws meshes among Gaussians.
   /// The bound for the scalar at hand.
   static constexpr double bound(double in_float, double in_double) noexcept {
     return is_float ? in_float : in_double;
@@ -77,10 +76,9 @@ class CaseImages {
 template <class S, class B>
 class CaseRenderer final : public CaseImages<S> {
  public:
-  static constexpr bool kComposes = gsnav::MeshBackend<B, S>;
   template <class... Args>
   explicit CaseRenderer(const char* name, Args&&... args)
-      : CaseImages<S>(name, kComposes), backend_(std::make_unique<B>(std::forward<Args>(args)...)) {}
+      : CaseImages<S>(name), backend_(std::make_unique<B>(std::forward<Args>(args)...)) {}
 
   B& backend() noexcept { return *backend_; }
   using CaseImages<S>::render;
@@ -151,7 +149,6 @@ void render_everywhere(const std::vector<Placed>& scene, const gsnav::Camera& ca
                        const std::vector<gsnav::MeshInstance>& meshes = {}) {
   gsnav::Frames<float> reference;
   for_each_renderer([&](auto& renderer) {
-    if (!renderer.composes && !meshes.empty()) return;
     const auto frames = renderer.render(scene, {camera}, config, meshes);
     if constexpr (std::is_same_v<decltype(frames), const gsnav::Frames<float>>)
       check_bits(frames, reference);

@@ -206,36 +206,34 @@ TEST_CASE("N53_tile_max_mesh_cull") {
   const Camera camera = axis_camera(120, 90);
   for_each_backend([&](auto& renderer) {
     using R = std::remove_reference_t<decltype(renderer)>;
-    if constexpr (R::kComposes) {
-      using S = typename R::scalar;
-      auto& backend = renderer.backend();
-      using B = std::remove_reference_t<decltype(backend)>;
-      const GaussianArrays<B> arrays(backend, cloud);
-      const MeshArrays<B> mesh_arrays(backend, mesh.instances[0].mesh);
-      const MeshInstance instance = mesh_arrays.instance();
-      const GaussianSet set = arrays.set();
-      RenderWorkspace<S, B> ws(backend);
-      REQUIRE(draw_meshes<S>(backend, ws.mesh, {&instance, 1}, camera, {}, 16, true).ok());
-      const std::vector<S> nothing(ws.mesh.tile_far.size(), std::numeric_limits<S>::infinity());
-      Buffer<S, B> no_cull(backend), image(backend);
-      no_cull.upload(nothing.data(), nothing.size());
-      const std::size_t pixels = 120 * 120;
-      std::array<std::vector<S>, 2> images;
-      std::array<RenderStats, 2> stats;
-      for (std::size_t i = 0; i < 2; ++i) {
-        image.resize_discard(8 * pixels);
-        S* const p = image.data();
-        const FrameImages<S> out{p, p + 3 * pixels, p + 4 * pixels, p + 5 * pixels, p + 6 * pixels, p + 7 * pixels};
-        const MeshLayer<S> layer{ws.mesh.depth.data(), ws.mesh.color.data(),
-                                 i == 0 ? std::as_const(ws.mesh.tile_far).view() : std::as_const(no_cull).view()};
-        REQUIRE(detail::render_frame<S>(backend, ws, {&set, 1}, camera, all_outputs(), layer, out, stats[i]).ok());
-        images[i].resize(8 * pixels);
-        image.download(images[i].data(), 8 * pixels);
-        REQUIRE(backend.synchronize().ok());
-      }
-      CHECK(images[0] == images[1]);
-      CHECK(stats[0].tile_intersections < stats[1].tile_intersections * 9 / 10);
+    using S = typename R::scalar;
+    auto& backend = renderer.backend();
+    using B = std::remove_reference_t<decltype(backend)>;
+    const GaussianArrays<B> arrays(backend, cloud);
+    const MeshArrays<B> mesh_arrays(backend, mesh.instances[0].mesh);
+    const MeshInstance instance = mesh_arrays.instance();
+    const GaussianSet set = arrays.set();
+    RenderWorkspace<S, B> ws(backend);
+    REQUIRE(draw_meshes<S>(backend, ws.mesh, {&instance, 1}, camera, {}, 16, true).ok());
+    const std::vector<S> nothing(ws.mesh.tile_far.size(), std::numeric_limits<S>::infinity());
+    Buffer<S, B> no_cull(backend), image(backend);
+    no_cull.upload(nothing.data(), nothing.size());
+    const std::size_t pixels = 120 * 120;
+    std::array<std::vector<S>, 2> images;
+    std::array<RenderStats, 2> stats;
+    for (std::size_t i = 0; i < 2; ++i) {
+      image.resize_discard(8 * pixels);
+      S* const p = image.data();
+      const FrameImages<S> out{p, p + 3 * pixels, p + 4 * pixels, p + 5 * pixels, p + 6 * pixels, p + 7 * pixels};
+      const MeshLayer<S> layer{ws.mesh.depth.data(), ws.mesh.color.data(),
+                               i == 0 ? std::as_const(ws.mesh.tile_far).view() : std::as_const(no_cull).view()};
+      REQUIRE(detail::render_frame<S>(backend, ws, {&set, 1}, camera, all_outputs(), layer, out, stats[i]).ok());
+      images[i].resize(8 * pixels);
+      image.download(images[i].data(), 8 * pixels);
+      REQUIRE(backend.synchronize().ok());
     }
+    CHECK(images[0] == images[1]);
+    CHECK(stats[0].tile_intersections < stats[1].tile_intersections * 9 / 10);
   });
 }
 
@@ -264,7 +262,6 @@ TEST_CASE("N53_tile_max_mesh_cull of chunks, before they are projected") {
     for_each_renderer([&](auto& renderer) {
       using R = std::remove_reference_t<decltype(renderer)>;
       if constexpr (R::is_float) {
-        if (!renderer.composes) return;
         const auto some = renderer.render(scene, {camera}, all_outputs(), mesh.instances);
         CHECK(some.rgb == all.rgb);
         CHECK(some.median_depth == all.median_depth);
@@ -289,7 +286,6 @@ TEST_CASE("a mesh out of view changes no bit, whatever is asked for") {
       if (rules == 2) config.compat = Compat::inria;
       if (rules == 3) config.tile_size = 32;
       for_each_renderer([&](auto& renderer) {
-        if (!renderer.composes) return;
         const auto with = renderer.render({&cloud}, {axis_camera(75)}, config, mesh.instances);
         const auto without = renderer.render({&cloud}, {axis_camera(75)}, config);
         for (const auto image : every_image(with)) CHECK(with.*image == without.*image);
@@ -323,7 +319,7 @@ TEST_CASE("frames with a mesh: every output alone, every rule, batches and threa
   }
 }
 
-TEST_CASE("moved instances, no Gaussians, and backends that know no meshes") {
+TEST_CASE("moved instances, no Gaussians, and a backend with a form of its own of one stage") {
   SerialBackend serial;
   MeshScene scene;
   scene.add(sphere(0.5, 64, 32)).value();
@@ -339,12 +335,19 @@ TEST_CASE("moved instances, no Gaussians, and backends that know no meshes") {
     CHECK(f.alpha[32 * 65] == 0);
     CHECK(f.stats[0].meshes.triangles == scene.mesh(0).geometry.triangles.size());
   }
+  // Blending with meshes is another stage than blending without: its generic form runs.
   struct OwnBlending : SerialBackend {
-    void rasterize_tiles(const RasterArgs<float>&) {}
+    void run(stage::Blend, const RasterArgs<float>&) {}
   } own;
-  Renderer<float, OwnBlending> refused(own);
-  const MeshInstance instance = scene.instance(0);
-  refused.set_meshes({&instance, 1});
-  const auto result = refused.render({}, std::vector<Camera>{axis_camera()});
-  CHECK(result.status().code() == Errc::unsupported);
+  Renderer<float, OwnBlending> other(own);
+  const MeshInstance instance = scene.instance(0, {{}, {0, 0, 3}, 1});
+  renderer.set_meshes({&instance, 1});
+  other.set_meshes({&instance, 1});
+  const std::vector<Camera> cameras{axis_camera(65, 64)};
+  const auto expected = renderer.render({}, cameras).value();
+  const auto frames = other.render({}, cameras).value();
+  CHECK(expected.alpha[32 * 65 + 32] == 1);
+  CHECK(frames.rgb == expected.rgb);
+  CHECK(frames.alpha == expected.alpha);
+  CHECK(frames.median_depth == expected.median_depth);
 }

@@ -227,7 +227,6 @@ TEST_CASE("depths alone have the bits that they have beside colour, though pixel
     config.first_hit_tau = tau;
     for_each_renderer([&](auto& renderer) {
       for (const bool with_mesh : {false, true}) {
-        if (with_mesh && !renderer.composes) continue;
         const auto draw = [&](unsigned outputs) {
           RenderConfig c = config;
           c.outputs = outputs;

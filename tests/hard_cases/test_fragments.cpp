@@ -200,7 +200,6 @@ TEST_CASE("N72_pane_alpha_0_and_1: nothing, and a wall, bit for bit, by every ru
     if (rules == 4) config.blend_space = ColorSpace::linear;
     CAPTURE(rules);
     for_each_renderer([&](auto& renderer) {
-      if (!renderer.composes) return;
       const std::vector<Camera> camera{axis_camera(75)};
       check_same(renderer.render({&cloud}, camera, config, glass.instances),
                  renderer.render({&cloud}, camera, config, solid.instances));

@@ -144,7 +144,7 @@ class Renderer {
 
   /// Meshes that the frames from now on show among the Gaussians (docs/composition.md); none: an empty span. Their
   /// arrays are in the backend's memory, and must stay there. To move one, set them again: nothing is copied but
-  /// views. On a backend that knows no meshes frames then fail (unsupported).
+  /// views.
   void set_meshes(std::span<const MeshInstance> meshes, const MeshLight& light = {}) {
     meshes_.assign(meshes.begin(), meshes.end());
     light_ = light;
