@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 
-#include "gsnav/eval/oracle_project.hpp"
-#include "gsnav/kernels/packed_gaussians.hpp"
+#include "gsnav/eval/oracle_gaussian.hpp"
 #include "gsnav/math/mat.hpp"
 
 namespace gsnav::eval::detail {
@@ -18,32 +18,32 @@ namespace gsnav::eval::detail {
 /// factor (Cauchy-Binet), so that nothing cancels and nothing is inverted. A Gaussian whose response is
 /// largest behind the camera is not seen by that ray. No Jacobian, hence none of its limits.
 struct RayModel {
-  Mat3d factor;          ///< columns: axes times standard deviations, asset units
-  Vec3d dilation;        ///< diagonal of S - Sigma
-  Mat3d adjugate;        ///< adj(S)
-  double u, v, z;        ///< ray through the mean; its depth, asset units
+  std::array<Vec3d, 3> factor;  ///< columns: axes times standard deviations, metres
+  Vec3d dilation;               ///< diagonal of S - Sigma
+  Mat3d adjugate;               ///< adj(S)
+  double u, v, z;               ///< ray through the mean; its depth, metres
   double fx, fy, cx, cy;
-  double log2_opacity, reach, scale;
+  double log2_opacity, reach;
 
   /// False: not drawn. `box` holds every pixel with alpha >= 2^log2_cut.
   static bool make(const OracleSet& s, std::size_t row, double log2_cut, RayModel& out,
                    PixelRect& box) noexcept {
-    const ProjectionCamera<double>& c = s.camera;
-    const SplatAxes<double> axes = gsnav::detail::load_axes(s.set.gaussians, c, s.delta(row), row);
-    if (!s.in_front(row, axes)) return false;
-    out.factor = axes.factor;
-    out.z = axes.position.z;
-    out.u = axes.position.x / out.z;
-    out.v = axes.position.y / out.z;
+    const Camera& c = s.camera;
+    const Real3 mean = s.center(row);
+    const RealColumns m = s.factor(row);
+    if (!s.in_front(mean, m)) return false;
+    for (std::size_t k = 0; k < 3; ++k) out.factor[k] = rounded(m[k]);
+    out.z = static_cast<double>(mean.z);
+    out.u = static_cast<double>(mean.x / mean.z);
+    out.v = static_cast<double>(mean.y / mean.z);
     out.fx = c.fx;
     out.fy = c.fy;
     out.cx = c.cx;
     out.cy = c.cy;
-    out.scale = c.scale;
-    const double wide = sqrt(c.eps2d) * out.z / c.fx, high = sqrt(c.eps2d) * out.z / c.fy;
+    const double spread = std::sqrt(static_cast<double>(s.set.eps2d));
+    const double wide = spread * out.z / c.fx, high = spread * out.z / c.fy;
     out.dilation = {wide * wide, high * high, 0};
-    const Vec3d columns[5] = {axes.factor.column(0), axes.factor.column(1), axes.factor.column(2),
-                              {wide, 0, 0}, {0, high, 0}};
+    const Vec3d columns[5] = {out.factor[0], out.factor[1], out.factor[2], {wide, 0, 0}, {0, high, 0}};
     const Vec3d mean_ray{out.u, out.v, 1};
     double area0 = 0, area = 0;  // of the outline's plane, without and with the dilation
     out.adjugate = {};
@@ -57,12 +57,12 @@ struct RayModel {
       }
     }
     double opacity = static_cast<double>(opacity_of(s.set.gaussians, row));
-    if (c.mip) opacity *= sqrt(area0 / area);
+    if (s.set.filter == Filter::mip) opacity *= std::sqrt(area0 / area);
     out.log2_opacity = std::log2(opacity);
-    if (!(opacity > 0 && out.log2_opacity >= log2_cut && out.z > 0 && is_finite(area))) return false;
-    const double sigma_z = norm(axes.factor.row[2]);
-    out.reach = sqrt(max(2 * kLn2 * (out.log2_opacity - c.log2_alpha_min), 0.0)) * sigma_z;
-    box = out.outline(c, 2 * kLn2 * (out.log2_opacity - log2_cut));
+    if (!(opacity > 0 && out.log2_opacity >= log2_cut && out.z > 0 && std::isfinite(area))) return false;
+    out.reach = reached_sigmas(out.log2_opacity, s.log2_alpha_min) * norm(out.row(2));
+    const double k = reached_sigmas(out.log2_opacity, log2_cut);
+    box = out.outline(c, k * k);
     return true;
   }
 
@@ -72,23 +72,26 @@ struct RayModel {
     if (!(along_ray.response > along_ray.turn)) return -std::numeric_limits<double>::infinity();
     const Vec3d n{-dv * z, du * z, (u * dv - v * du) * z};  // mu x r
     double q = dilation.x * n.x * n.x + dilation.y * n.y * n.y;
-    for (int k = 0; k < 3; ++k) {
-      const double across = factor(0, k) * n.x + factor(1, k) * n.y + factor(2, k) * n.z;
+    for (const Vec3d& column : factor) {
+      const double across = column.x * n.x + column.y * n.y + column.z * n.z;
       q += across * across;
     }
-    return log2_opacity - q / along_ray.response * (0.5 / kLn2);
+    return log2_opacity - q / along_ray.response / (2 * std::log(2.0));
   }
 
   /// Limited like the contract's: standard deviations along the view axis around the centre.
   double depth(double px, double py) const noexcept {
     const double du = (px - cx) / fx - u, dv = (py - cy) / fy - v;
     const Along a = along(du, dv);
-    return (z + clamp(-z * a.turn / a.response, -reach, reach)) * scale;
+    return z + std::clamp(-z * a.turn / a.response, -reach, reach);
   }
 
  private:
-  /// r' adj(S) r and r' adj(S) d of the ray r = (u + du, v + dv, 1), d = (du, dv, 0). Plain products: what
-  /// fma would add in accuracy, a call of it costs ten times over where the processor's is not used.
+  Vec3d row(int axis) const noexcept { return {factor[0][axis], factor[1][axis], factor[2][axis]}; }
+
+  /// r' adj(S) r and r' adj(S) d of the ray r = (u + du, v + dv, 1), d = (du, dv, 0). Plain products:
+  /// what fma would add in accuracy, a call of it costs ten times over where the processor's is not
+  /// used.
   struct Along {
     double response, turn;
   };
@@ -102,24 +105,26 @@ struct RayModel {
   /// Pixels inside the outline of the ellipsoid q = k2. Its extent in u around the mean's, d, solves
   /// (d z)^2 = k2 (X - 2 d Y + d^2 Z), X, Y, Z the covariance of (x - u z, z); it is bounded where the
   /// ellipsoid lies wholly before the camera.
-  PixelRect outline(const ProjectionCamera<double>& c, double k2) const noexcept {
-    const double depth2 = dot(factor.row[2], factor.row[2]);
+  PixelRect outline(const Camera& c, double k2) const noexcept {
+    const Vec3d along_z = row(2);
+    const double depth2 = dot(along_z, along_z);
     const double front = z * z - k2 * depth2;
     // Closer to the camera than this, rounding decides the extent.
     if (!(front > 1e-6 * z * z)) return {0, 0, c.width, c.height};
     const auto extent = [&](double slope, int axis, double& center, double& half) {
-      const Vec3d across = factor.row[axis] - factor.row[2] * slope;
-      const double x = dot(across, across) + dilation[axis], y = dot(across, factor.row[2]);
+      const Vec3d across = row(axis) - along_z * slope;
+      const double x = dot(across, across) + dilation[axis], y = dot(across, along_z);
       center = -k2 * y / front;
-      half = sqrt(k2 * (k2 * y * y + front * x)) / front * (1 + 1e-8);
+      half = std::sqrt(k2 * (k2 * y * y + front * x)) / front * (1 + 1e-8);
     };
     double center_u, half_u, center_v, half_v;
     extent(u, 0, center_u, half_u);
     extent(v, 1, center_v, half_v);
     const double mean_x = cx + fx * u, mean_y = cy + fy * v;
     // 1e-8 of the offset as well: `front` is a difference.
-    return pixels_within(c, mean_x + fx * center_u, fx * (half_u + 1e-8 * abs(center_u)) + 1e-12 * abs(mean_x),
-                         mean_y + fy * center_v, fy * (half_v + 1e-8 * abs(center_v)) + 1e-12 * abs(mean_y));
+    return pixels_within(
+        c, mean_x + fx * center_u, fx * (half_u + 1e-8 * std::abs(center_u)) + 1e-12 * std::abs(mean_x),
+        mean_y + fy * center_v, fy * (half_v + 1e-8 * std::abs(center_v)) + 1e-12 * std::abs(mean_y));
   }
 };
 
