@@ -289,11 +289,11 @@ class TileBlender {
     return F::load(v);
   }
   /// The state of a block with all of its depths.
-  BlendState<F, D> whole_state(int block) noexcept {
+  GSNAV_HD decltype(auto) whole_state(int block) noexcept {
     if constexpr (D == DepthMode::median) {
-      return {states_[block], {medians_[block]}};
+      return BlendState<F, D>{states_[block], {medians_[block]}};
     } else {
-      return states_[block];
+      return (states_[block]);
     }
   }
   void close_blocks() noexcept {
