@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/kernels/lbs.hpp"
+
 namespace gsnav {
 
 namespace {

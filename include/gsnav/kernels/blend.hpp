@@ -7,7 +7,7 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/depth.hpp"
-#include "gsnav/kernels/mesh.hpp"
+#include "gsnav/kernels/mesh_layer.hpp"
 #include "gsnav/kernels/splat.hpp"
 #include "gsnav/kernels/tiles.hpp"
 #include "gsnav/math/functions.hpp"

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "gsnav/kernels/blend.hpp"
-#include "gsnav/kernels/mesh.hpp"
+#include "gsnav/kernels/mesh_layer.hpp"
 #include "gsnav/kernels/tiles.hpp"
 
 // Gaussians and meshes in one image (docs/composition.md). Frames without a mesh run none of this.

@@ -6,6 +6,7 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/kernels/camera.hpp"
+#include "gsnav/kernels/mesh_layer.hpp"
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
@@ -74,31 +75,6 @@ struct MeshLight {
 enum class Composite : std::uint8_t {
   merged,      ///< the contract: each Gaussian against the mesh at each pixel
   hard_depth,  ///< Habitat-GS's: a pixel is the Gaussians' or the mesh's, by their expected depth
-};
-
-/// A surface that is seen through, at one pixel.
-template <class S>
-struct MeshFragment {
-  S depth, alpha;  ///< planar z, metres; alpha in (0, 1]
-  S r, g, b;       ///< display-referred, or linear where the frame is blended so; not times alpha
-};
-
-/// The fragments of a pixel, nearest first.
-struct FragmentRange {
-  std::uint64_t begin = 0;
-  std::uint32_t count = 0;
-};
-
-/// What a mesh leaves of a frame for the Gaussians: planes [H][W] in a backend's memory.
-template <class S>
-struct MeshLayer {
-  const S* depth = nullptr;  ///< planar z, metres; infinity where there is no mesh. Null: the frame has none
-  const S* color = nullptr;  ///< [H][W][3] display-referred; null: no colour asked for
-  View<const S> tile_far;    ///< [tiles], the largest depth of each
-  View<const FragmentRange> ranges{};       ///< [H][W]; empty: nothing is seen through
-  View<const MeshFragment<S>> fragments{};  ///< none behind `depth`
-
-  GSNAV_HD bool empty() const noexcept { return depth == nullptr; }
 };
 
 /// An instance as one camera sees it.
