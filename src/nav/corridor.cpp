@@ -87,8 +87,9 @@ double corridor_length(const UnfoldedMesh& mesh, const LandmarkLead& lead, const
       for (std::uint32_t k = 1; k < Landmarks::kParts; ++k) {
         const double t = static_cast<double>(k) / Landmarks::kParts;
         const Flat p = edge.at + (after.at - edge.at) * t;
-        const double d = length(p - at) + max(lead.toward(e, k), distance(lerp(edge.corner, after.corner, t),
-                                                                        goal.position));
+        const double d =
+            length(p - at) +
+            max(lead.toward(e, k), distance(lerp(edge.corner, after.corner, t), goal.position));
         if (d >= best) continue;
         best = d;
         out = e;

@@ -57,7 +57,8 @@ double most_below(const AlongEdge& e, double low, double high, double a, double 
 }
 
 /// How far it can be above. `ends` is scratch.
-double most_above(const AlongEdge& e, double low, double high, double a, double b, std::vector<double>& ends) {
+double most_above(const AlongEdge& e, double low, double high, double a, double b,
+                  std::vector<double>& ends) {
   constexpr std::size_t kTaken = 6;
   ends.assign({low, high});
   for (const Reach* r = e.first; r != e.last; ++r) {
@@ -91,8 +92,8 @@ double most_above(const AlongEdge& e, double low, double high, double a, double 
     double least = kInfinity;
     for (std::size_t j = 0; j < m; ++j) {
       for (std::size_t k = 0; k <= j; ++k) {
-        const auto &[px, py] = over[j];
-        const auto &[qx, qy] = over[k];
+        const auto& [px, py] = over[j];
+        const auto& [qx, qy] = over[k];
         double peak = max(min(px, qx), min(py, qy));
         if ((px < qx) != (py < qy)) {
           const double t = (qx - px) / ((qx - px) + (py - qy));
@@ -241,7 +242,8 @@ Landmarks::Range Landmarks::distance(const UnfoldedMesh& mesh, std::size_t landm
     const double whole = length(side);
     if (!(whole > 0)) continue;
     const bool back = (line_of_[e] & 1u) != 0;
-    const double at = dot(to.at - origin, side) / whole, beside = std::abs(cross(side, to.at - origin)) / whole;
+    const double at = dot(to.at - origin, side) / whole,
+                 beside = std::abs(cross(side, to.at - origin)) / whole;
     double least = kInfinity;
     for (std::uint32_t k = 0; k < kParts; ++k) {
       const double low = whole * k / kParts, high = whole * (k + 1) / kParts;
@@ -257,7 +259,8 @@ Landmarks::Range Landmarks::distance(const UnfoldedMesh& mesh, std::size_t landm
   return out;
 }
 
-LandmarkLead::LandmarkLead(const Landmarks& marks, const UnfoldedMesh& mesh, const Site& start, const Site& goal)
+LandmarkLead::LandmarkLead(const Landmarks& marks, const UnfoldedMesh& mesh, const Site& start,
+                           const Site& goal)
     : line_of_(marks.line_of_.data()), least_(detail::distance(start.position, goal.position)) {
   const auto nearest = [&](const Site& s) {
     const UnfoldedMesh::Face& face = mesh.faces[s.face];
@@ -284,7 +287,8 @@ LandmarkLead::LandmarkLead(const Landmarks& marks, const UnfoldedMesh& mesh, con
     const Landmarks::Range from = marks.distance(mesh, k, start), to = marks.distance(mesh, k, goal);
     const bool behind = from.low - to.high >= to.low - from.high;
     const double gain = behind ? from.low - to.high : to.low - from.high;
-    const One one{marks.lines_.data() + k * marks.edges_, behind ? 1.0 : -1.0, behind ? -to.high : to.low};
+    const One one{marks.lines_.data() + k * marks.edges_, behind ? 1.0 : -1.0,
+                  behind ? -to.high : to.low};
     if (count_ == kLeads && gain <= best[count_ - 1].first) continue;
     std::size_t at = count_ < kLeads ? count_++ : count_ - 1;
     for (; at > 0 && gain > best[at - 1].first; --at) best[at] = best[at - 1];
@@ -317,7 +321,7 @@ double LandmarkLead::toward(std::uint32_t edge, std::uint32_t k) const noexcept 
 }
 
 double LandmarkLead::through(std::uint32_t edge, double length, double at, double beside, double low,
-                                double high) const noexcept {
+                             double high) const noexcept {
   const double part = length / kParts;
   const auto number = [&](double x) {
     return static_cast<std::uint32_t>(clamp(x / part, 0.0, static_cast<double>(kParts - 1)));
