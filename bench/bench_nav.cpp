@@ -194,6 +194,17 @@ void near_with_handles(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make,
         [](const Scene& s, std::size_t i) { return s.mesh->distance_between(s.near_points[i], s.near_goals[i]); });
 }
+/// To an error of 1e-3, with a proven lower bound (the same where the exact distance is not searched for).
+double to_an_error(const Scene& s, const NavPoint& a, const NavPoint& b) {
+  return s.mesh->distance_between(a, b, {.relative_error = 1e-3})->length;
+}
+void bounded_with_handles(benchmark::State& state, const Scene* (*make)()) {
+  lengths(state, make, [](const Scene& s, std::size_t i) { return to_an_error(s, s.points[i], s.goals[i]); });
+}
+void bounded_near(benchmark::State& state, const Scene* (*make)()) {
+  pairs(state, make,
+        [](const Scene& s, std::size_t i) { return to_an_error(s, s.near_points[i], s.near_goals[i]); });
+}
 /// Pairs of one island alone, by its number: the smaller ones of nav_test are hills.
 template <class F>
 void island_pairs(benchmark::State& state, const Scene* (*make)(), F&& f) {
@@ -453,6 +464,8 @@ GSNAV_NAV_BENCH(detour_near);
 BENCHMARK_CAPTURE(detour_near, terrain, terrain);
 GSNAV_NAV_BENCH(near_with_handles);
 BENCHMARK_CAPTURE(near_with_handles, terrain, terrain);
+BENCHMARK_CAPTURE(bounded_with_handles, undulating, undulating);
+BENCHMARK_CAPTURE(bounded_near, undulating, undulating);
 BENCHMARK_CAPTURE(detour_island, nav_test, nav_test)->DenseRange(0, 2);
 BENCHMARK_CAPTURE(geodesic_island, nav_test, nav_test)->DenseRange(0, 2);
 GSNAV_NAV_BENCH(path_with_handles);

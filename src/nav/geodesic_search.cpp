@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "landmarks.hpp"
+
 namespace gsnav::detail {
 namespace {
 
@@ -42,6 +44,7 @@ void GeodesicSearch::begin(const UnfoldedMesh& mesh, double bound) {
   best_ = bound;
   found_ = false;
   best_node_ = kNone;
+  slack_ = 0;
   nodes_.clear();
   heap_.clear();
   if (seen_.size() < mesh.vertices.size()) {
@@ -70,6 +73,21 @@ double GeodesicSearch::run(const UnfoldedMesh& mesh, const Site& start, const Si
   return kInfinity;
 }
 
+double GeodesicSearch::run_led(const UnfoldedMesh& mesh, const Site& start, const Site& goal,
+                               const LandmarkLead& lead, double bound, double slack) {
+  start_ = start;
+  goal_ = goal;
+  has_goal_ = true;
+  straight_ = every_vertex_ = false;
+  begin(mesh, bound);
+  lead_ = &lead;
+  slack_ = slack;
+  leave(start);
+  settle();
+  lead_ = nullptr;
+  return best_;
+}
+
 void GeodesicSearch::flood(const UnfoldedMesh& mesh, const std::vector<Site>& starts) {
   has_goal_ = every_vertex_ = straight_ = false;
   begin(mesh);
@@ -81,10 +99,11 @@ void GeodesicSearch::settle() {
   // What no mesh of Recast needs: bent or folded polygons of a file could keep windows alive for ever.
   const std::size_t most = 100000 + 1000 * mesh_->edges.size();
   while (!heap_.empty() && nodes_.size() < most) {
+    const auto [f, node] = heap_.front();
+    if (f * (1 + slack_) >= best_) break;
+    if (lead_ != nullptr && lead_->least() * (1 + slack_) >= best_) break;
     std::pop_heap(heap_.begin(), heap_.end(), std::greater<>());
-    const auto [f, node] = heap_.back();
     heap_.pop_back();
-    if (f >= best_) break;
     if (nodes_[node].is_vertex) {
       spread_vertex(node);
     } else {
@@ -94,7 +113,7 @@ void GeodesicSearch::settle() {
 }
 
 void GeodesicSearch::push(double f, const Node& node) {
-  if (!(f < best_)) return;
+  if (!(f * (1 + slack_) < best_)) return;
   heap_.emplace_back(f, static_cast<std::uint32_t>(nodes_.size()));
   std::push_heap(heap_.begin(), heap_.end(), std::greater<>());
   nodes_.push_back(node);
@@ -142,7 +161,9 @@ void GeodesicSearch::reach(std::uint32_t edge, const Flat& root, double g, std::
   n.parent = parent;
   n.is_vertex = true;
   if (!straight_) {
-    push(has_goal_ ? d + distance(goal_.position, e.corner) : d, n);
+    double left = has_goal_ ? distance(goal_.position, e.corner) : 0.0;
+    if (lead_ != nullptr) left = max(left, lead_->from(edge, 0));
+    push(d + left, n);
   } else if (!has_goal_) {
     nodes_.push_back(n);
   }
@@ -195,7 +216,15 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
   const double ee = e.x * e.x + e.y * e.y + e.z * e.z, te = to.x * e.x + to.y * e.y + to.z * e.z;
   const double tt = to.x * to.x + to.y * to.y + to.z * to.z, along = te / std::sqrt(ee);
   const double beyond = std::sqrt(max(tt - along * along, 0.0));
-  push(g + length_through(root, right, left, along - length(right - here.at), beyond), n);
+  const double begin = length(right - here.at);
+  double f = length_through(root, right, left, along - begin, beyond);
+  if (lead_ != nullptr && (g + f) * (1 + slack_) < best_) {
+    const Flat side = mesh_->edges[mesh_->next(edge)].at - here.at, r = root - here.at;
+    const double whole = length(side);
+    f = max(f, lead_->through(edge, whole, dot(r, side) / whole, std::abs(cross(side, r)) / whole, begin,
+                              begin + 1.0 / inverse));
+  }
+  push(g + f, n);
 }
 
 void GeodesicSearch::spread(std::uint32_t face, std::uint32_t first, std::uint32_t count, const Flat& root,

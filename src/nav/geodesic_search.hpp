@@ -18,6 +18,8 @@ struct Site {
   Vec3d position{};
 };
 
+class LandmarkLead;
+
 /// What is known of distances to the goal.
 class GoalBound {
  public:
@@ -53,6 +55,13 @@ class GeodesicSearch {
 
   /// Distance between two sites, infinity where the search cannot reach the goal within less than `bound`.
   double run(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar);
+  /// The same led by landmarks. What is not proven shorter than (1 + `slack`) times as long as the best is
+  /// searched; the rest leaves `least()`, which no way is shorter than.
+  double run_led(const UnfoldedMesh& mesh, const Site& start, const Site& goal, const LandmarkLead& lead,
+                 double bound = kFar, double slack = 0);
+  double least() const noexcept {
+    return min(best_ / (1 + slack_), heap_.empty() ? kFar : heap_.front().first);
+  }
   /// The same over paths that do not bend; what `views` rules out is not looked at.
   double run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar,
                       const GoalBound* least = nullptr, const FaceViews* views = nullptr);
@@ -66,6 +75,8 @@ class GeodesicSearch {
   std::size_t look_around(const UnfoldedMesh& mesh, std::uint32_t vertex);
 
   const std::vector<Node>& nodes() const noexcept { return nodes_; }
+  /// Whether the last flood spread everywhere: surfaces that no floor has are left unfinished.
+  bool finished() const noexcept { return heap_.empty(); }
   /// Distance of a vertex as far as the last search knows it; infinity where it was not seen.
   double vertex_distance(std::uint32_t vertex) const noexcept {
     return seen_[vertex] == round_ ? distance_[vertex] : std::numeric_limits<double>::infinity();
@@ -101,6 +112,8 @@ class GeodesicSearch {
   bool found_ = false;         ///< the goal
   const GoalBound* least_ = nullptr;
   const FaceViews* views_ = nullptr;
+  const LandmarkLead* lead_ = nullptr;
+  double slack_ = 0;  ///< ways that are not shorter than best_ / (1 + slack_) are left out
   double best_ = 0;
   std::uint32_t best_node_ = kNone;
   std::vector<Node> nodes_;

@@ -14,6 +14,7 @@
 #include "corner_hubs.hpp"
 #include "face_views.hpp"
 #include "geodesic_search.hpp"
+#include "landmarks.hpp"
 #include "poly_mesh.hpp"
 
 namespace gsnav {
@@ -59,17 +60,24 @@ struct NavMesh::Impl {
   const detail::CornerHubs& make_hubs() const {
     std::call_once(hubs_once, [&] {
       made_hubs = std::make_unique<const detail::CornerHubs>(unfolded());
-      if (!made_hubs->empty()) made_views = detail::FaceViews(unfolded());
+      if (made_hubs->empty()) {
+        made_landmarks = detail::Landmarks(unfolded());
+      } else {
+        made_views = detail::FaceViews(unfolded());
+      }
       corner_hubs.store(made_hubs.get(), std::memory_order_release);
     });
     return *made_hubs;
   }
   /// Made with the hubs.
   const detail::FaceViews& views() const noexcept { return made_views; }
+  /// Made in place of the hubs where there are too many corners or sights for them.
+  const detail::Landmarks& landmarks() const noexcept { return made_landmarks; }
   mutable std::once_flag hubs_once;
   mutable std::unique_ptr<const detail::CornerHubs> made_hubs;
   mutable std::atomic<const detail::CornerHubs*> corner_hubs{nullptr};
   mutable detail::FaceViews made_views;
+  mutable detail::Landmarks made_landmarks;
   Aabb<double> bounds;  ///< world
   std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon
   std::vector<PolyId> first_poly;   ///< of each of Detour's tiles
@@ -78,6 +86,8 @@ struct NavMesh::Impl {
   detail::Site site(const NavPoint& p) const noexcept;
   /// Length of the shortest path; infinity where there is none.
   double distance(const detail::Site& start, const detail::Site& goal) const;
+  /// The same to an error.
+  BoundedDistance distance(const detail::Site& start, const detail::Site& goal, double relative_error) const;
   /// The shortest path, relative to the mesh's origin; no points where there is none.
   NavPath path(const detail::Site& start, const detail::Site& goal) const;
 

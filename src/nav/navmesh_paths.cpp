@@ -42,18 +42,48 @@ detail::Site NavMesh::Impl::site(const NavPoint& p) const noexcept {
 
 double NavMesh::Impl::distance(const detail::Site& start, const detail::Site& goal) const {
   detail::GeodesicSearch& search = detail::thread_search();
-  if (hubs().empty() || start.face == goal.face) return search.run(unfolded(), start, goal);
+  if (start.face == goal.face) return search.run(unfolded(), start, goal);
+  if (hubs().empty()) {
+    if (landmarks().empty()) return search.run(unfolded(), start, goal);
+    const detail::LandmarkLead lead(landmarks(), unfolded(), start, goal);
+    const double d = search.run_led(unfolded(), start, goal, lead);
+    return d < kInfinity ? d : search.run(unfolded(), start, goal);
+  }
   const detail::CornerHubs::Way way = hubs().shortest(start, goal);
   const detail::CornerHubs::LeastToGoal least(hubs(), way);
   const double d = min(way.length, search.run_straight(unfolded(), start, goal, way.length, &least, &views()));
   return d < kInfinity ? d : search.run(unfolded(), start, goal);
 }
 
+BoundedDistance NavMesh::Impl::distance(const detail::Site& start, const detail::Site& goal,
+                                        double relative_error) const {
+  if (!hubs().empty() || landmarks().empty() || start.face == goal.face || !(relative_error > 0)) {
+    const double d = distance(start, goal);
+    return {d, d};
+  }
+  // Between two bounds that are 2 e apart their middle is off by e.
+  const double slack = 2 * relative_error;
+  const detail::LandmarkLead lead(landmarks(), unfolded(), start, goal);
+  double least = lead.least(), most = detail::corridor_length(unfolded(), lead, start, goal);
+  if (!(most <= (1 + slack) * least)) {
+    detail::GeodesicSearch& search = detail::thread_search();
+    most = search.run_led(unfolded(), start, goal, lead, most, slack);
+    least = max(least, search.least());
+    if (!(most <= (1 + slack) * least)) least = most = distance(start, goal);
+  }
+  return {0.5 * (least + most), least};
+}
+
 NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal) const {
   detail::GeodesicSearch& search = detail::thread_search();
   const auto searched = [&] {
     NavPath path;
-    path.length = search.run(unfolded(), start, goal);
+    path.length = kInfinity;
+    if (hubs().empty() && !landmarks().empty() && start.face != goal.face) {
+      const detail::LandmarkLead lead(landmarks(), unfolded(), start, goal);
+      path.length = search.run_led(unfolded(), start, goal, lead);
+    }
+    if (!(path.length < kInfinity)) path.length = search.run(unfolded(), start, goal);
     if (path.length < kInfinity) path.points = search.path();
     return path;
   };
@@ -86,6 +116,20 @@ double NavMesh::distance_between(const NavPoint& start, const NavPoint& goal) co
   if (!is_finite(start.position) || !is_finite(goal.position)) return kInfinity;
   if (island_of(start.poly) != island_of(goal.poly)) return kInfinity;
   return impl_->distance(impl_->site(start), impl_->site(goal));
+}
+
+Result<BoundedDistance> NavMesh::distance_between(const NavPoint& start, const NavPoint& goal,
+                                                  const DistanceOptions& options) const {
+  if (!(options.relative_error >= 0 && options.relative_error <= 0.1)) {
+    return Status(Errc::invalid_argument, "distance: relative_error is " +
+                                              std::to_string(options.relative_error) +
+                                              ": give 0 (exact) to 0.1");
+  }
+  if (start.poly >= polygon_count() || goal.poly >= polygon_count() || !is_finite(start.position) ||
+      !is_finite(goal.position) || island_of(start.poly) != island_of(goal.poly)) {
+    return BoundedDistance{kInfinity, kInfinity};
+  }
+  return impl_->distance(impl_->site(start), impl_->site(goal), options.relative_error);
 }
 
 Result<NavPath> NavMesh::path_between(const NavPoint& start, const NavPoint& goal) const {

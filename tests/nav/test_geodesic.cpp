@@ -442,3 +442,30 @@ TEST_CASE("geodesic: a field has the same bits for any number of threads and any
   for (std::thread& t : threads) t.join();
   for (const auto& f : found) CHECK(f == truth);
 }
+
+TEST_CASE("geodesic: to an error, between a proven bound and a path") {
+  const std::string file = gsnav_test::data_file("nav/recast/undulating.obj");
+  if (file.empty()) return;
+  const NavMesh mesh = demo("nav/recast/undulating.obj");
+  REQUIRE(mesh.impl().hubs().empty());  // hills are searched
+  detail::GeodesicSearch plain;
+  Rng rng(31);
+  for (int i = 0; i < cases(60); ++i) {
+    const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
+    const double truth = plain.run(mesh.impl().unfolded(), mesh.impl().site(a), mesh.impl().site(b));
+    REQUIRE(mesh.distance_between(a, b) == doctest::Approx(truth).epsilon(1e-12));
+    REQUIRE(mesh.path_between(a, b)->length == doctest::Approx(truth).epsilon(1e-12));
+    for (const double e : {0.0, 1e-3, 0.05}) {
+      const BoundedDistance d = mesh.distance_between(a, b, {.relative_error = e}).value();
+      REQUIRE(d.at_least <= truth + 1e-9);
+      REQUIRE(truth <= 2 * d.length - d.at_least + 1e-9);
+      REQUIRE(d.length <= (1 + e) * d.at_least + 1e-9);
+    }
+  }
+  const NavPoint a = mesh.random_point(rng), off{a.position, kNoPoly};
+  CHECK(mesh.distance_between(a, a, {.relative_error = 1e-3})->length == 0);
+  CHECK(std::isinf(mesh.distance_between(a, off, {.relative_error = 1e-3})->at_least));
+  for (const double e : {-1e-9, 0.11, std::numeric_limits<double>::quiet_NaN()}) {
+    CHECK(mesh.distance_between(a, a, {.relative_error = e}).code() == Errc::invalid_argument);
+  }
+}

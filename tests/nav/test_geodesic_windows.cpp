@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "../../src/nav/geodesic_search.hpp"
+#include "../../src/nav/landmarks.hpp"
 #include "gsnav/core/rng.hpp"
 #include "nav/cases.hpp"
 
@@ -223,5 +223,70 @@ TEST_CASE(
     CHECK(longer < 1e-9);
     CHECK(shorter < 0.05);  // points 3 cm apart, and half a metre more to divide by
     CHECK(turned < 1e-9);
+  }
+}
+
+TEST_CASE("landmarks: bounds are none too high, searches by them exact, or within what was asked for") {
+  for (const Case& c : surfaces()) {
+    const PolyMesh polys = polygons(c.surface);
+    const UnfoldedMesh mesh(polys);
+    const detail::Landmarks marks(mesh, 24);
+    REQUIRE(marks.size() == 24);
+    GeodesicSearch search;
+    Rng rng(9);
+    double high = -kInfinity, low = 0, exact = 0, above = 0, beyond = -kInfinity, short_of = -kInfinity;
+    int found = 0, at_once = 0, all = 0;
+    const auto any = [&] {
+      const auto n = static_cast<std::uint32_t>(mesh.faces.size());
+      const std::uint32_t f = min(static_cast<std::uint32_t>(rng.uniform(0, 1) * n), n - 1);
+      const Triangle& t = c.surface.triangles[f];
+      double u = rng.uniform(0, 1), v = rng.uniform(0, 1);
+      if (u + v > 1) u = 1 - u, v = 1 - v;
+      const std::vector<Vec3d>& p = c.surface.points;
+      return site(mesh, f, p[t[0]] + (p[t[1]] - p[t[0]]) * u + (p[t[2]] - p[t[0]]) * v);
+    };
+    for (int i = 0; i < gsnav_test::cases(600); ++i) {
+      const Site start = any(), goal = any();
+      if (start.face == goal.face) continue;
+      const double truth = search.run(mesh, start, goal);
+      REQUIRE(truth < kInfinity);
+      ++all;
+      const detail::LandmarkLead lead(marks, mesh, start, goal);
+      high = max(high, lead.least() - truth);
+      low += lead.least() / truth;
+      // Of each edge of the start's face, too: no way from there is shorter than what leads through it.
+      const UnfoldedMesh::Face& face = mesh.faces[start.face];
+      double through = kInfinity;
+      for (std::uint32_t e = face.first; e < face.first + face.count; ++e) {
+        if (mesh.edges[e].twin == UnfoldedMesh::kNone) continue;
+        const detail::Flat a = mesh.edges[e].at, side = mesh.edges[mesh.next(e)].at - a;
+        const double whole = length(side);
+        through = min(through, lead.through(e, whole, dot(start.at - a, side) / whole,
+                                            std::abs(cross(side, start.at - a)) / whole, 0, whole));
+      }
+      high = max(high, through - truth);
+      exact = max(exact, std::abs(search.run_led(mesh, start, goal, lead) - truth));
+      const double way = detail::corridor_length(mesh, lead, start, goal);
+      found += way < kInfinity ? 1 : 0;
+      short_of = max(short_of, truth - way);
+      for (const double slack : {2e-4, 2e-3, 0.2}) {
+        const double most = search.run_led(mesh, start, goal, lead, way, slack);
+        const double least = max(search.least(), lead.least());
+        at_once += slack < 1e-3 && way <= (1 + slack) * lead.least() ? 1 : 0;
+        beyond = max(beyond, max(least - truth, truth - most));
+        above = max(above, most / least / (1 + slack));
+      }
+    }
+    MESSAGE(std::string(c.name) << ": bounds " << low / all << " of the length, at most " << high
+                                << " m above it; led off by " << exact << " m; ways along faces "
+                                << found << " of " << all << ", " << at_once
+                                << " proofs of 2e-4 at once");
+    CHECK(high < 1e-9);
+    CHECK(low / all > 0.9);
+    CHECK(exact < 1e-9);
+    CHECK(found > all / 2);
+    CHECK(short_of < 1e-9);
+    CHECK(beyond < 1e-9);
+    CHECK(above < 1 + 1e-12);
   }
 }

@@ -95,6 +95,17 @@ struct NavPath {
   double length = 0.0;
 };
 
+/// A distance that is known to an error: `length` is at most `relative_error` times `at_least` above it,
+/// and the shortest path lies between it and 2 length - at_least, metres. Both infinite where there is no
+/// path.
+struct BoundedDistance {
+  double length = 0.0;
+  double at_least = 0.0;  ///< no path is shorter
+};
+struct DistanceOptions {
+  double relative_error = 1e-3;  ///< 0 (exact) to 0.1
+};
+
 /// Whether there is a path, and why not where there is none.
 enum class PathStatus : std::uint8_t {
   reachable,
@@ -212,7 +223,8 @@ class NavMesh {
   // ---- paths: the shortest on the surface, exactly (Polyanya, unfolded over slopes), so that distances
   // are symmetric and obey the triangle inequality. The surface is that of the height triangles; a polygon
   // that is level to a millimetre counts as flat. The first distance asked for prepares the others, once a mesh:
-  // tenths of a second and tens of megabytes for hundreds of polygons, at most 95 MiB (docs/navigation.md).
+  // tenths of a second and tens of megabytes for hundreds of polygons, at most 95 MiB; seconds and up to
+  // 64 MiB on large hills (docs/navigation.md).
   /// Whether find_path finds a path: every search ends, so this needs none.
   PathStatus path_status(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const noexcept;
   /// The shortest path between two points, after snapping. Errors (nothing_navigable) say why there is
@@ -231,6 +243,10 @@ class NavMesh {
   /// for no polygon of this mesh; nothing_navigable.
   Result<NavPath> path_between(const NavPoint& start, const NavPoint& goal) const;
   double distance_between(const NavPoint& start, const NavPoint& goal) const;
+  /// The same to a chosen error, with a proven lower bound: on hills, where exact distances are searched
+  /// for. Elsewhere it is exact. Errors: invalid_argument for a relative error that is not in [0, 0.1].
+  Result<BoundedDistance> distance_between(const NavPoint& start, const NavPoint& goal,
+                                           const DistanceOptions& options) const;
 
   // ---- walking
   /// Walks from `start` along the ground-plane part of `displacement`, polygon by polygon, so that no
