@@ -95,36 +95,29 @@ struct BlendArgs {
 /// Writes a pixel, once its mesh has taken what Gaussians left of it. Without meshes the slot of the
 /// median Gaussian is left in the image.
 template <bool Color, DepthMode D, bool Mesh>
-__device__ void write(const BlendArgs& b, std::size_t pixel, BlendState<float, kBlendedDepth<D>>& state,
-                      std::uint32_t median, float px, float py) {
-  const FrameImages<float>& out = b.raster.images;
-  if constexpr (Mesh && D == DepthMode::median) {
-    BlendState<float, D> whole{state, {median == kNoSlot ? 0.0f : ray_depth(b.batch.depths[median], px, py)}};
-    close_by_mesh<Color>(whole, b.raster.rules, b.raster.mesh, pixel);
-    out.median_depth[pixel] = whole.median;
-    static_cast<BlendColor<float>&>(state) = whole;
+__device__ void write(const BlendArgs& b, std::size_t pixel,
+                      const BlendState<float, kBlendedDepth<D>>& blended, std::uint32_t median, float px,
+                      float py) {
+  BlendState<float, D> state;
+  if constexpr (D != DepthMode::median) {
+    state = blended;
   } else if constexpr (Mesh) {
-    close_by_mesh<Color>(state, b.raster.rules, b.raster.mesh, pixel);
+    state = {blended, {median == kNoSlot ? 0.0f : ray_depth(b.batch.depths[median], px, py)}};
+  } else {
+    state = {blended, {__uint_as_float(median)}};
   }
-  if (b.rgb != nullptr || b.rgb8 != nullptr) {
-    const Vec3<float> color = pixel_color(b.raster, state);
-    const float channels[3] = {color.x, color.y, color.z};
+  if constexpr (Mesh) close_by_mesh<Color>(state, b.raster.rules, b.raster.mesh, pixel);
+  write_pixel(b.raster, pixel, state, [&](float*, const auto& value) {
+    if (b.rgb == nullptr && b.rgb8 == nullptr) return;
+    const Vec3<float> color = value(state);
     for (int c = 0; c < 3; ++c) {
-      if (b.rgb != nullptr) b.rgb[3 * pixel + c] = channels[c];
+      if (b.rgb != nullptr) b.rgb[3 * pixel + c] = color[c];
       if (b.rgb8 != nullptr) {
         b.rgb8[3 * pixel + c] =
-            static_cast<std::uint8_t>(255.0f * clamp(channels[c], 0.0f, 1.0f) + 0.5f);
+            static_cast<std::uint8_t>(255.0f * clamp(color[c], 0.0f, 1.0f) + 0.5f);
       }
     }
-  }
-  if (out.alpha != nullptr) out.alpha[pixel] = pixel_alpha(state);
-  if constexpr (D == DepthMode::median && !Mesh) out.median_depth[pixel] = __uint_as_float(median);
-  if constexpr (D == DepthMode::any) {
-    if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
-    if (out.expected_depth != nullptr) out.expected_depth[pixel] = pixel_expected_depth(b.raster, state);
-    if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = pixel_accumulated_depth(state);
-    if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
-  }
+  });
 }
 
 /// What RasterArgs decide at run time and the inner loop must not.

@@ -340,26 +340,42 @@ GSNAV_HD L pixel_accumulated_depth(const BlendState<L, DepthMode::any>& state) n
   return fma(pixel_alpha(state), state.z_ref, state.accumulated);
 }
 
-/// Writes a finished pixel.
+/// The images that a state of mode D has values for: calls color(image, value) with the colour image,
+/// then plane(image, value) with each other. value(state): what a pixel (or a pack of them) has in that
+/// image. An image that was not asked for is null.
+template <DepthMode D, class S, class C, class P>
+GSNAV_HD void for_each_image(const RasterArgs<S>& args, const C& color, const P& plane) noexcept {
+  const FrameImages<S>& out = args.images;
+  color(out.rgb, [&](const auto& state) GSNAV_INLINED { return pixel_color(args, state); });
+  plane(out.alpha, [](const auto& state) GSNAV_INLINED { return pixel_alpha(state); });
+  if constexpr (D != DepthMode::none) {
+    plane(out.median_depth, [](const auto& state) GSNAV_INLINED { return state.median; });
+  }
+  if constexpr (D == DepthMode::any) {
+    plane(out.expected_depth,
+          [&](const auto& state) GSNAV_INLINED { return pixel_expected_depth(args, state); });
+    plane(out.accumulated_depth,
+          [](const auto& state) GSNAV_INLINED { return pixel_accumulated_depth(state); });
+    plane(out.first_hit_depth, [](const auto& state) GSNAV_INLINED { return state.first_hit; });
+  }
+}
+
+/// Writes a finished pixel. color(image, value): writes its colour, as for for_each_image.
+template <class S, DepthMode D, class C>
+GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel, const BlendState<S, D>& state,
+                          const C& color) noexcept {
+  for_each_image<D>(args, color, [&](S* image, const auto& value) GSNAV_INLINED {
+    if (image != nullptr) image[pixel] = value(state);
+  });
+}
 template <class S, DepthMode D>
 GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
                           const BlendState<S, D>& state) noexcept {
-  const FrameImages<S>& out = args.images;
-  if (out.rgb != nullptr) {
-    const Vec3<S> color = pixel_color(args, state);
-    out.rgb[3 * pixel] = color.x;
-    out.rgb[3 * pixel + 1] = color.y;
-    out.rgb[3 * pixel + 2] = color.z;
-  }
-  if (out.alpha != nullptr) out.alpha[pixel] = pixel_alpha(state);
-  if constexpr (D != DepthMode::none) {
-    if (out.median_depth != nullptr) out.median_depth[pixel] = state.median;
-  }
-  if constexpr (D == DepthMode::any) {
-    if (out.expected_depth != nullptr) out.expected_depth[pixel] = pixel_expected_depth(args, state);
-    if (out.accumulated_depth != nullptr) out.accumulated_depth[pixel] = pixel_accumulated_depth(state);
-    if (out.first_hit_depth != nullptr) out.first_hit_depth[pixel] = state.first_hit;
-  }
+  write_pixel(args, pixel, state, [&](S* rgb, const auto& value) GSNAV_INLINED {
+    if (rgb == nullptr) return;
+    const Vec3<S> color = value(state);
+    for (int c = 0; c < 3; ++c) rgb[3 * pixel + static_cast<std::size_t>(c)] = color[c];
+  });
 }
 
 /// A pixel and the list of its tile: how kernels start that have one work item a pixel.

@@ -288,6 +288,14 @@ class TileBlender {
     }
     return F::load(v);
   }
+  /// The state of a block with all of its depths.
+  GSNAV_HD decltype(auto) whole_state(int block) noexcept {
+    if constexpr (D == DepthMode::median) {
+      return BlendState<F, D>{states_[block], {medians_[block]}};
+    } else {
+      return (states_[block]);
+    }
+  }
   void close_blocks() noexcept {
     for_each_block([this](int block, int x, int y) {
       Vec3<F> color{};
@@ -295,7 +303,7 @@ class TileBlender {
         for (int c = 0; c < 3; ++c) color[c] = lanes_of(args_.mesh.color, 3, c, x, y);
       }
       if constexpr (D == DepthMode::median) {
-        BlendState<F, D> whole{states_[block], {medians_[block]}};
+        BlendState<F, D> whole = whole_state(block);
         close_by_mesh<Color>(whole, args_.rules, mesh_[block], color);
         static_cast<BlendColor<F>&>(states_[block]) = whole;
         medians_[block] = whole.median;
@@ -307,26 +315,22 @@ class TileBlender {
 
   void write() noexcept {
     if constexpr (Mesh) close_blocks();
-    const FrameImages<float>& out = args_.images;
     const int blocks = tile_size_ / kBlockWidth;
     for (int y = 0, row = 0; y < tile_size_ && tile_y_ + y < args_.grid.height; y += kBlockHeight, row += blocks) {
       for (int x = 0; x < tile_size_ && tile_x_ + x < args_.grid.width; x += kWidth) {
         const BlockRow place(args_.grid, tile_x_ + x, tile_y_ + y, tile_x_ + tile_size_);
         // A small tile's rows are filled up with any block.
         const auto block = [&](int i) { return row + (x / kBlockWidth + i) % blocks; };
-        if constexpr (Color) {
-          write_color(place, out.rgb, [&](int i) { return pixel_color(args_, states_[block(i)]); });
-        }
-        write_plane(place, out.alpha, [&](int i) { return pixel_alpha(states_[block(i)]); });
-        if constexpr (D == DepthMode::median) {
-          write_plane(place, out.median_depth, [&](int i) { return medians_[block(i)]; });
-        }
-        if constexpr (D == DepthMode::any) {
-          write_plane(place, out.median_depth, [&](int i) { return states_[block(i)].median; });
-          write_plane(place, out.expected_depth, [&](int i) { return pixel_expected_depth(args_, states_[block(i)]); });
-          write_plane(place, out.accumulated_depth, [&](int i) { return pixel_accumulated_depth(states_[block(i)]); });
-          write_plane(place, out.first_hit_depth, [&](int i) { return states_[block(i)].first_hit; });
-        }
+        for_each_image<D>(
+            args_,
+            [&](float* image, const auto& value) {
+              if constexpr (Color) {
+                write_color(place, image, [&](int i) { return value(whole_state(block(i))); });
+              }
+            },
+            [&](float* image, const auto& value) {
+              write_plane(place, image, [&](int i) { return value(whole_state(block(i))); });
+            });
       }
     }
   }
