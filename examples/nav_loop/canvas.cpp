@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gsnav/math/functions.hpp"
+
 namespace nav_loop {
 
 Canvas::Canvas(int width, int height, Rgb fill)
@@ -124,8 +126,7 @@ std::vector<std::uint8_t> Canvas::bytes() const {
   std::vector<std::uint8_t> out;
   out.reserve(3 * pixels_.size());
   for (const Rgb& p : pixels_) {
-    for (const float v : {p.r, p.g, p.b})
-      out.push_back(static_cast<std::uint8_t>(255 * std::clamp(v, 0.0f, 1.0f) + 0.5f));
+    for (const float v : {p.r, p.g, p.b}) out.push_back(gsnav::to_byte(v));
   }
   return out;
 }

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/math/functions.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -12,7 +13,7 @@ using Rgb8 = std::array<std::uint8_t, 3>;
 std::uint8_t srgb_byte(double linear) {
   const double x = std::fmin(std::fmax(linear, 0.0), 1.0);
   const double encoded = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1.0 / 2.4) - 0.055;
-  return static_cast<std::uint8_t>(std::lround(255.0 * encoded));
+  return to_byte(encoded);
 }
 
 /// A colour of the Oklab space (lightness, chroma, hue in radians) as sRGB.
@@ -46,8 +47,7 @@ std::vector<std::uint8_t> colorize_depth(std::span<const float> depth, float nea
   const float range = far > near ? far - near : 1.0f;
   for (std::size_t i = 0; i < depth.size(); ++i) {
     if (!(depth[i] > 0.0f)) continue;
-    const float t = std::fmin(std::fmax((depth[i] - near) / range, 0.0f), 1.0f);
-    const Rgb8& colour = map[static_cast<std::size_t>(std::lround(255.0f * t))];
+    const Rgb8& colour = map[to_byte((depth[i] - near) / range)];
     for (std::size_t k = 0; k < 3; ++k) out[3 * i + k] = colour[k];
   }
   return out;

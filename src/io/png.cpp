@@ -2,12 +2,12 @@
 #include <png.h>
 
 #include <algorithm>
-#include <cmath>
 #include <csetjmp>
 
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/math/functions.hpp"
 #include "picture.hpp"
 
 namespace gsnav::io {
@@ -155,10 +155,7 @@ Status save_png_rgb(const std::filesystem::path& path, std::span<const float> rg
                     int height) {
   return detail::guarded(path.string(), [&]() -> Status {
     std::vector<std::uint8_t> bytes(rgb.size());
-    // fmax drops a NaN.
-    std::transform(rgb.begin(), rgb.end(), bytes.begin(), [](float x) {
-      return static_cast<std::uint8_t>(std::lround(255.0f * std::fmin(std::fmax(x, 0.0f), 1.0f)));
-    });
+    std::transform(rgb.begin(), rgb.end(), bytes.begin(), [](float x) { return to_byte(x); });
     return save(path, bytes.data(), bytes.size(), width, height, 8, 3);
   });
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "gsnav/math/functions.hpp"
 #include "gsnav/ops/render_config.hpp"
 
 namespace gsnav {
@@ -136,7 +137,7 @@ Camera sensor_camera(const SensorSpec& spec, const Vec3d& base, const Quatd& rot
 
 void to_bytes(std::span<const float> rgb, std::span<std::uint8_t> out) noexcept {
   for (std::size_t i = 0; i < rgb.size() && i < out.size(); ++i) {
-    out[i] = static_cast<std::uint8_t>(255.0f * clamp(rgb[i], 0.0f, 1.0f) + 0.5f);
+    out[i] = to_byte(rgb[i]);
   }
 }
 

@@ -62,6 +62,22 @@ TEST_CASE("finiteness and clamp") {
   CHECK(gsnav::clamp(-5.0, 0.0, 2.0) == 0.0);
 }
 
+TEST_CASE("a byte is the nearest to 255 times a value") {
+  for (int k = 0; k < 255; ++k) {
+    float v = (static_cast<float>(k) + 0.5f) / 255.0f;
+    for (int i = 0; i < 8; ++i) v = std::nextafter(v, 0.0f);
+    for (int i = 0; i < 16; ++i, v = std::nextafter(v, 1.0f)) {
+      CAPTURE(v);
+      CHECK(to_byte(v) == std::lround(255.0f * v));
+      CHECK(to_byte(static_cast<double>(v)) == std::lround(255.0 * static_cast<double>(v)));
+    }
+  }
+  CHECK(to_byte(-1.0f) == 0);
+  CHECK(to_byte(1.0f) == 255);
+  CHECK(to_byte(7.0f) == 255);
+  CHECK(to_byte(std::nanf("")) == 0);
+}
+
 TEST_CASE("fma is that of the C library, by whatever instruction") {
   Rng rng(5);
   for (int i = 0; i < 200000; ++i) {

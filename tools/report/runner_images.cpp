@@ -8,6 +8,7 @@
 
 #include "gsnav/eval/flip.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/math/functions.hpp"
 
 namespace gsnav_report {
 
@@ -16,7 +17,6 @@ using namespace gsnav;
 namespace {
 
 float display(float v) { return std::clamp(v, 0.0f, 1.0f); }
-std::uint8_t byte(float v) { return static_cast<std::uint8_t>(std::lround(255 * display(v))); }
 
 /// The greatest power of two that keeps `largest` within 1; 1 where nothing differs.
 double gain_for(double largest) {
@@ -42,8 +42,8 @@ Result<std::string> save_comparison(const std::filesystem::path& path, const std
     std::uint8_t* row = &out[9 * width * y];
     for (std::size_t x = 0; x < 3 * width; ++x) {
       const std::size_t i = 3 * width * y + x;
-      row[x] = byte(rgb[i]);
-      row[3 * width + x] = byte(static_cast<float>(gain) * difference[i]);
+      row[x] = to_byte(rgb[i]);
+      row[3 * width + x] = to_byte(static_cast<float>(gain) * difference[i]);
       row[6 * width + x] = map[i];
     }
   }

@@ -112,10 +112,7 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
     const Vec3<float> color = value(state);
     for (int c = 0; c < 3; ++c) {
       if (b.rgb != nullptr) b.rgb[3 * pixel + c] = color[c];
-      if (b.rgb8 != nullptr) {
-        b.rgb8[3 * pixel + c] =
-            static_cast<std::uint8_t>(255.0f * clamp(color[c], 0.0f, 1.0f) + 0.5f);
-      }
+      if (b.rgb8 != nullptr) b.rgb8[3 * pixel + c] = to_byte(color[c]);
     }
   });
 }

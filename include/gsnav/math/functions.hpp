@@ -131,6 +131,13 @@ template <class S>
 GSNAV_HD S clamp(S v, S low, S high) noexcept {
   return min(max(v, low), high);
 }
+/// A value in 8 bits: round(255 clamp(v, 0, 1)), halves away from zero; 0 for NaN.
+template <class S>
+GSNAV_HD std::uint8_t to_byte(S v) noexcept {
+  const S scaled = S(255) * clamp(v, S(0), S(1)), whole = truncated(scaled);
+  // Not truncated(scaled + 0.5): the sum rounds.
+  return static_cast<std::uint8_t>(static_cast<int>(whole) + (scaled - whole >= S(0.5) ? 1 : 0));
+}
 template <class S>
 GSNAV_HD constexpr S select(bool mask, S a, S b) noexcept {
   return mask ? a : b;

@@ -15,6 +15,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/kernels/mesh.hpp"
+#include "gsnav/math/functions.hpp"
 #include "gsnav/scene/triangle_mesh.hpp"
 
 namespace gsnav {
@@ -80,7 +81,7 @@ class MeshTexture {
   }
   static std::uint8_t encoded(double linear) noexcept {
     const double v = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-    return static_cast<std::uint8_t>(255 * v + 0.5);
+    return to_byte(v);
   }
 
   std::vector<std::uint8_t> texels_;
