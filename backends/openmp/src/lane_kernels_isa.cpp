@@ -8,12 +8,7 @@ namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
 extern const LaneKernels kKernels;
-const LaneKernels kKernels{GSNAV_LANES_NAME, kWidth,         &project_chunk,
-                           &count_tiles,     &scatter_tiles, &rasterize_tile_any,
-                           &skin_range,      &gap_range,     &sweep_range,
-                           &composite_tile_any, &count_tiles_before_mesh, &scatter_tiles,
-                           &project_mesh_vertices, &count_mesh_triangles, &write_mesh_triangles,
-                           &rasterize_mesh_tile, &shade_mesh_row};
+constexpr LaneKernels kKernels = kernel_table<LaneKernels>(GSNAV_LANES_NAME);
 
 }  // namespace GSNAV_LANES_TAG
 }  // namespace gsnav::lanes

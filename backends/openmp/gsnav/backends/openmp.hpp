@@ -29,26 +29,28 @@
 
 namespace gsnav {
 
-/// The lane kernels of one instruction set.
+/// The lane kernels of one instruction set, in the order in which a frame calls them.
+/// lanes::kernel_table fills it.
 struct LaneKernels {
   const char* name;
   int width;
   void (*project_chunk)(const ProjectArgs<float>&, std::size_t chunk) noexcept;
   void (*count_tiles)(const CountTileIntersections<float>&, std::size_t block) noexcept;
+  void (*count_tiles_before_mesh)(const CountTileIntersections<float, MeshCull<float>>&,
+                                  std::size_t block) noexcept;
   void (*scatter_tiles)(const ScatterTileIntersections<float>&, std::size_t block) noexcept;
-  void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
-  void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
-  void (*gap_range)(const CapsuleGapArgs<float>&, std::size_t begin, std::size_t end) noexcept;
-  void (*sweep_range)(const SweepArgs<float>&, std::size_t begin, std::size_t end) noexcept;
-  void (*composite_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
-  void (*count_tiles_before_mesh)(const CountTileIntersections<float, MeshCull<float>>&, std::size_t block) noexcept;
   void (*scatter_tiles_before_mesh)(const ScatterTileIntersections<float, MeshCull<float>>&,
                                     std::size_t block) noexcept;
+  void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  void (*composite_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
   void (*project_mesh_vertices)(const ProjectMeshVertices<float>&, std::size_t chunk) noexcept;
   void (*count_mesh_triangles)(const CountMeshTriangles<float>&, std::size_t chunk) noexcept;
   void (*write_mesh_triangles)(const WriteMeshTriangles<float>&, std::size_t chunk) noexcept;
   void (*rasterize_mesh_tile)(const RasterizeMeshTile<float>&, std::size_t tile) noexcept;
   void (*shade_mesh_row)(const ShadeMeshRow<float>&, std::size_t row) noexcept;
+  void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  void (*gap_range)(const CapsuleGapArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  void (*sweep_range)(const SweepArgs<float>&, std::size_t begin, std::size_t end) noexcept;
 };
 
 #if defined(GSNAV_OPENMP_COMPILED)
@@ -56,20 +58,11 @@ struct LaneKernels {
 /// environment variable GSNAV_ISA=baseline|avx2|avx512 lowers the choice.
 const LaneKernels& lane_kernels() noexcept;
 #else
-namespace lanes {
-inline namespace GSNAV_LANES_TAG {
-inline const LaneKernels& native_kernels() noexcept {
-  static const LaneKernels k{"native",      kWidth,         &project_chunk,
-                             &count_tiles,  &scatter_tiles, &rasterize_tile_any, &skin_range,
-                             &gap_range,    &sweep_range,   &composite_tile_any, &count_tiles_before_mesh,
-                             &scatter_tiles, &project_mesh_vertices, &count_mesh_triangles,
-                             &write_mesh_triangles, &rasterize_mesh_tile, &shade_mesh_row};
+/// Header only: the lane kernels that this translation unit's flags give.
+inline const LaneKernels& lane_kernels() noexcept {
+  static constexpr LaneKernels k = lanes::kernel_table<LaneKernels>("native");
   return k;
 }
-}  // namespace GSNAV_LANES_TAG
-}  // namespace lanes
-/// Header only: the lane kernels that this translation unit's flags give.
-inline const LaneKernels& lane_kernels() noexcept { return lanes::native_kernels(); }
 #endif
 
 /// Runs on the processor's cores. float32 frames go through lane kernels; every other scalar through

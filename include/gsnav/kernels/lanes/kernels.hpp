@@ -23,5 +23,28 @@ inline void composite_tile_any(const RasterArgs<float>& args, std::size_t tile) 
   });
 }
 
+/// The kernels of this instruction set as a backend's table of pointers (LaneKernels of
+/// backends/openmp.hpp).
+template <class Table>
+constexpr Table kernel_table(const char* name) noexcept {
+  return {.name = name,
+          .width = kWidth,
+          .project_chunk = &project_chunk,
+          .count_tiles = &count_tiles,
+          .count_tiles_before_mesh = &count_tiles_before_mesh,
+          .scatter_tiles = &scatter_tiles,
+          .scatter_tiles_before_mesh = &scatter_tiles,
+          .rasterize_tile = &rasterize_tile_any,
+          .composite_tile = &composite_tile_any,
+          .project_mesh_vertices = &project_mesh_vertices,
+          .count_mesh_triangles = &count_mesh_triangles,
+          .write_mesh_triangles = &write_mesh_triangles,
+          .rasterize_mesh_tile = &rasterize_mesh_tile,
+          .shade_mesh_row = &shade_mesh_row,
+          .skin_range = &skin_range,
+          .gap_range = &gap_range,
+          .sweep_range = &sweep_range};
+}
+
 }  // namespace GSNAV_LANES_TAG
 }  // namespace gsnav::lanes
