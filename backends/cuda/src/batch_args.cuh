@@ -8,6 +8,7 @@
 #include "gsnav/kernels/blend.hpp"
 #include "gsnav/kernels/project_chunk.hpp"
 #include "gsnav/kernels/tiles.hpp"
+#include "search.cuh"
 
 // What the kernels of a batch read and write (docs/cuda.md).
 
@@ -223,16 +224,11 @@ __device__ inline SplatBounds bounds_of(std::uint32_t x, std::uint32_t y) {
 /// The instance, among a camera's, that a source belongs to.
 __device__ inline const BatchInstance& instance_of(const BatchArgs& a, std::uint32_t camera,
                                                    std::uint32_t source) {
-  std::uint32_t low = a.camera_first[camera], high = a.camera_first[camera + 1];
-  while (high - low > 1) {
-    const std::uint32_t mid = (low + high) / 2;
-    if (a.instances[a.camera_instances[mid]].args.first_rank <= source) {
-      low = mid;
-    } else {
-      high = mid;
-    }
-  }
-  return a.instances[a.camera_instances[low]];
+  const std::uint32_t place =
+      last_start(a.camera_first[camera], a.camera_first[camera + 1], [&](std::uint32_t i) {
+        return a.instances[a.camera_instances[i]].args.first_rank <= source;
+      });
+  return a.instances[a.camera_instances[place]];
 }
 
 /// What decides between equal keys.

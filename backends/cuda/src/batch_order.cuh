@@ -334,15 +334,9 @@ class TileOrder {
         continue;
       }
       // As many bins as fit, but at least one.
-      std::uint32_t end = bin + 1, beyond = kOrderBins + 1;
-      while (beyond - end > 1) {
-        const std::uint32_t mid = (end + beyond) / 2;
-        if (begins[mid] - begins[bin] <= kOrderBatch) {
-          end = mid;
-        } else {
-          beyond = mid;
-        }
-      }
+      const std::uint32_t end = last_start(bin + 1, std::uint32_t{kOrderBins + 1}, [&](std::uint32_t i) {
+        return begins[i] - begins[bin] <= kOrderBatch;
+      });
       const std::uint32_t begin = begins[bin], n = begins[end] - begin;
       __syncthreads();
       if (threadIdx.x == 0) s.next_bin[level_] = end;

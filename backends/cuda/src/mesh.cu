@@ -5,6 +5,7 @@
 
 #include "gsnav/backends/cuda/device.cuh"
 #include "mesh.cuh"
+#include "search.cuh"
 
 // Meshes on the device (docs/composition.md): the kernels of the CPU, a vertex, a triangle or a pixel a thread. Which
 // triangle a pixel shows is found without lists of tiles: the largest of (1/z, first triangle) in one atomic word.
@@ -48,12 +49,10 @@ struct OneCamera {
 struct ManyCameras {
   MeshWave wave;
   __device__ MeshChunk chunk(std::uint32_t MeshPlace::*first) const {
-    std::uint32_t low = 0, high = wave.placements;
-    while (high - low > 1) {
-      const std::uint32_t mid = (low + high) / 2;
-      (wave.places[mid].*first <= blockIdx.x ? low : high) = mid;
-    }
-    return {low, static_cast<std::uint32_t>((blockIdx.x - wave.places[low].*first) * kMeshChunk)};
+    const std::uint32_t place = last_start(std::uint32_t{0}, wave.placements, [&](std::uint32_t i) {
+      return wave.places[i].*first <= blockIdx.x;
+    });
+    return {place, static_cast<std::uint32_t>((blockIdx.x - wave.places[place].*first) * kMeshChunk)};
   }
   __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>&) const {
     return chunk(&MeshPlace::vertex_chunk);
@@ -255,14 +254,11 @@ __global__ void __launch_bounds__(128)
   const int lane = static_cast<int>(threadIdx.x % 32);
   const std::uint64_t stride = std::uint64_t{gridDim.x} * (blockDim.x / 32);
   for (std::uint64_t u = (std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x) / 32; u < units; u += stride) {
-    std::uint64_t low = 0, high = triangles;
-    while (high - low > 1) {
-      const std::uint64_t mid = (low + high) / 2;
-      (large[mid].unit <= u ? low : high) = mid;
-    }
-    const std::uint32_t id = large[low].triangle;
+    const LargeTriangle& of =
+        large[last_start(std::uint64_t{0}, triangles, [&](std::uint64_t i) { return large[i].unit <= u; })];
+    const std::uint32_t id = of.triangle;
     const MeshTriangle<float>& t = args.triangles[id];
-    const int at = static_cast<int>(u - large[low].unit), columns = (t.x1 - t.x0 + kUnit - 1) / kUnit;
+    const int at = static_cast<int>(u - of.unit), columns = (t.x1 - t.x0 + kUnit - 1) / kUnit;
     const int x0 = t.x0 + at % columns * kUnit, y0 = t.y0 + at / columns * kUnit;
     const int width = min(kUnit, t.x1 - x0), height = min(kUnit, t.y1 - y0);
     if (!MeshEdges::of(t, args.bin.grid, x0, y0).reach(width, height) || lane >= width) continue;

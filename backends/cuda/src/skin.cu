@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "gsnav/backends/cuda.hpp"
+#include "search.cuh"
 
 // Skinning of many avatars by one launch, or two where some have four influences and some eight.
 
@@ -103,19 +104,13 @@ __global__ void __launch_bounds__(kThreads, kBlocks<K>)
   const auto share = [&](unsigned block) {
     return static_cast<std::uint32_t>(std::uint64_t{launch.pieces} * block / gridDim.x);
   };
-  std::uint32_t piece = share(blockIdx.x), low = 0, high = launch.count;
+  std::uint32_t piece = share(blockIdx.x);
   const std::uint32_t end = share(blockIdx.x + 1);
-  while (high - low > 1) {
-    const std::uint32_t mid = (low + high) / 2;
-    if (jobs[mid].first_piece <= piece) {
-      low = mid;
-    } else {
-      high = mid;
-    }
-  }
-  for (; piece < end; ++low) {
-    const SkinJob& job = jobs[low];
-    const std::uint32_t after = low + 1 < launch.count ? jobs[low + 1].first_piece : launch.pieces;
+  std::uint32_t at = cuda::last_start(std::uint32_t{0}, launch.count,
+                                [&](std::uint32_t i) { return jobs[i].first_piece <= piece; });
+  for (; piece < end; ++at) {
+    const SkinJob& job = jobs[at];
+    const std::uint32_t after = at + 1 < launch.count ? jobs[at + 1].first_piece : launch.pieces;
     const std::uint32_t last = min(after, end);
     const std::uint32_t first_row = (piece - job.first_piece) * kThreads;
     const std::uint32_t end_row = min((last - job.first_piece) * kThreads, job.size);
@@ -136,7 +131,7 @@ __global__ void __launch_bounds__(kThreads, kBlocks<K>)
     }
     __syncthreads();
     const auto rows = [&](const auto& joint_at) {
-      skin_rows<K>(Few ? jobs : &kept, Few ? low : 0, first_row, end_row, joint_at);
+      skin_rows<K>(Few ? jobs : &kept, Few ? at : 0, first_row, end_row, joint_at);
     };
     if (!fits) {
       rows([&](std::uint16_t j) -> const Affine3<float>& { return (Few ? job : kept).joints[j]; });
