@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "gsnav/core/guarded.hpp"
 #include "gsnav/core/huge_pages.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
@@ -136,24 +138,11 @@ inline std::size_t pieces_of(std::size_t count) noexcept {
 /// side. Of several errors the first piece's is returned; throws std::bad_alloc where one did.
 template <class F>
 Status for_pieces(std::size_t count, std::size_t pieces, const F& f) {
-  std::vector<Status> statuses(pieces);
-  const auto piece = [&](std::uint32_t p) noexcept {
-    try {
-      statuses[p] = f(p, count * p / pieces, count * (p + 1) / pieces);
-    } catch (const std::bad_alloc&) {
-      statuses[p] = Status(Errc::out_of_memory, std::string());
-    }
-  };
-  if (pieces == 1) {
-    piece(0);
-  } else {
-    ThreadPool(static_cast<int>(pieces)).run(static_cast<std::uint32_t>(pieces), piece);
-  }
-  for (const Status& s : statuses) {
-    if (s.code() == Errc::out_of_memory) throw std::bad_alloc();
-    if (!s) return s;
-  }
-  return {};
+  ThreadPool pool(static_cast<int>(pieces));
+  const auto piece = [&](std::uint32_t p) { return f(p, count * p / pieces, count * (p + 1) / pieces); };
+  Status s = gsnav::detail::run_guarded(pool, static_cast<std::uint32_t>(pieces), piece);
+  if (s.code() == Errc::out_of_memory) throw std::bad_alloc();
+  return s;
 }
 
 /// Gives the planes of a cloud `n` rows. Memory of new ones is asked for by all threads.

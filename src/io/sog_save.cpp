@@ -15,6 +15,7 @@
 #include "codebook.hpp"
 #include "file.hpp"
 #include "format_range.hpp"
+#include "gsnav/core/guarded.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "gsnav/io/sog.hpp"
@@ -65,20 +66,15 @@ class SogWriter {
                                                       &SogWriter::colours, &SogWriter::quats};
     constexpr std::size_t kParts = std::size(make);
     std::array<Part, kParts> parts;
-    std::array<Status, kParts> statuses;
-    const auto work = [&](std::uint32_t k) noexcept {
-      try {
-        statuses[k] = (this->*make[k])(parts[k]);
-      } catch (const std::bad_alloc&) {
-        statuses[k] = Status(Errc::out_of_memory, std::string());
-      }
-    };
-    ThreadPool(static_cast<int>(std::min(detail::io_threads(), kParts))).run(static_cast<std::uint32_t>(kParts), work);
+    ThreadPool pool(static_cast<int>(std::min(detail::io_threads(), kParts)));
+    const Status made =
+        gsnav::detail::run_guarded(pool, static_cast<std::uint32_t>(kParts),
+                                   [&](std::uint32_t k) { return (this->*make[k])(parts[k]); });
+    if (made.code() == Errc::out_of_memory) throw std::bad_alloc();
+    if (!made) return made;
     Files files;
     constexpr std::size_t kInFile[] = {1, 2, 4, 3, 0};  // the order that readers have always seen
     for (const std::size_t k : kInFile) {
-      if (statuses[k].code() == Errc::out_of_memory) throw std::bad_alloc();
-      if (!statuses[k]) return statuses[k];
       if (!parts[k].meta.is_null()) meta_[parts[k].name] = std::move(parts[k].meta);
       for (auto& file : parts[k].files) files.push_back(std::move(file));
     }

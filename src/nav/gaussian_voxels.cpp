@@ -8,9 +8,9 @@
 #include <limits>
 #include <map>
 #include <mutex>
-#include <new>
 #include <string>
 
+#include "gsnav/core/guarded.hpp"
 #include "gsnav/kernels/packed_gaussians.hpp"
 #include "navmesh_stages.hpp"
 
@@ -327,7 +327,6 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
   std::vector<TileRuns> tiles(lists.nx * lists.nz);
   std::mutex lock;
   std::size_t done = 0;
-  bool failed = false;
   const auto tile = [&](std::size_t t) {
     TileRuns& out = tiles[t];
     const std::size_t x0 = t % lists.nx * kTile, z0 = t / lists.nx * kTile;
@@ -367,20 +366,18 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
     }
     out.runs.shrink_to_fit();
   };
-  pool.run(static_cast<std::uint32_t>(tiles.size()), [&](std::uint32_t t) noexcept {
-    try {
-      tile(t);
-    } catch (const std::bad_alloc&) {
+  const Status made = run_guarded(pool, static_cast<std::uint32_t>(tiles.size()), [&](std::uint32_t t) {
+    tile(t);
+    if (o.progress) {
       const std::lock_guard held(lock);
-      failed = true;
+      ++done;
+      o.progress("voxels", static_cast<double>(done) / static_cast<double>(tiles.size()));
     }
-    if (!o.progress) return;
-    const std::lock_guard held(lock);
-    ++done;
-    o.progress("voxels", static_cast<double>(done) / static_cast<double>(tiles.size()));
+    return Status();
   });
-  if (failed)
+  if (made.code() == Errc::out_of_memory)
     return {Errc::out_of_memory, "NavMesh from Gaussians: not enough memory for the solid voxels"};
+  if (!made) return made;
   g.first.assign(g.nx * g.nz + 1, 0);
   const auto columns = [&](std::size_t t, const auto& f) {
     const std::size_t x0 = t % lists.nx * kTile, z0 = t / lists.nx * kTile,

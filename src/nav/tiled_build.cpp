@@ -5,11 +5,11 @@
 #include <cmath>
 #include <functional>
 #include <mutex>
-#include <new>
 #include <optional>
 #include <thread>
 #include <utility>
 
+#include "gsnav/core/guarded.hpp"
 #include "gsnav/core/thread_pool.hpp"
 #include "navmesh_stages.hpp"
 #include "tile_islands.hpp"
@@ -203,27 +203,23 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
   std::size_t done = 0;
   const auto piece = [&](std::uint32_t turn) noexcept {
     const std::uint32_t i = work[turn].second;
-    try {
+    failed[i] = guarded([&] {
       if (i == 0) {
         if (!hooks.height) heights.emplace(vertices, triangles, origin, box);
-        return;
+        return Status();
       }
       auto made = build_tile(grid, lists, i - 1, vertices, triangles, origin, hooks);
-      if (made.ok()) {
-        tiles[i - 1] = std::move(*made);
-      } else {
-        failed[i] = made.status();
-      }
-    } catch (const std::bad_alloc&) {
-      failed[i] = Status(Errc::out_of_memory, "NavMesh: not enough memory for the tiles");
-    }
-    if (!hooks.progress) return;
+      if (made.ok()) tiles[i - 1] = std::move(*made);
+      return made.status();
+    });
+    if (i == 0 || !hooks.progress) return;
     const std::lock_guard held(lock);
     hooks.progress(static_cast<double>(++done) / static_cast<double>(tiles.size()));
   };
   pool.run(static_cast<std::uint32_t>(tiles.size() + 1), piece);
   WalkableAreas areas;
   for (const Status& s : failed) {
+    if (s.code() == Errc::out_of_memory) return {s.code(), "NavMesh: not enough memory for the tiles"};
     if (!s.ok()) return s;
   }
   for (const TilePolygons& t : tiles) areas.add(t.areas);

@@ -2,8 +2,9 @@
 #include "gsnav/sim/scene_library.hpp"
 
 #include <algorithm>
-#include <exception>
 #include <utility>
+
+#include "gsnav/core/guarded.hpp"
 
 namespace gsnav {
 namespace {
@@ -23,16 +24,14 @@ std::size_t cloud_bytes(const GaussianCloud& c) noexcept {
 }
 
 Result<SimulatorScene> load(const SceneEntry& entry) {
-  try {
-    Result<SimulatorScene> scene = entry.load();
-    if (!scene) return {scene.code(), entry.name + ": " + scene.message()};
-    if (Status s = validate(*scene); !s) return {s.code(), entry.name + ": " + s.message()};
-    return scene;
-  } catch (const Error& e) {
-    return {e.code(), entry.name + ": " + e.what()};
-  } catch (const std::exception& e) {
-    return {Errc::out_of_memory, entry.name + ": " + e.what()};
-  }
+  Result<SimulatorScene> scene = detail::guarded([&] {
+    Result<SimulatorScene> loaded = entry.load();
+    if (!loaded) return loaded;
+    if (Status s = validate(*loaded); !s) return Result<SimulatorScene>(s);
+    return loaded;
+  });
+  if (!scene) return {scene.code(), entry.name + ": " + scene.message()};
+  return scene;
 }
 
 }  // namespace
