@@ -9,6 +9,7 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
+#include <new>
 #include <thread>
 
 #if defined(__linux__)
@@ -16,6 +17,7 @@
 #include <unistd.h>
 #endif
 
+#include "gsnav/core/guarded.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -110,6 +112,23 @@ TEST_CASE("the caller does not wait for a thread that has begun nothing") {
   CHECK(does_each_once(backend, 1000, done));
   go_on = true;
   other.join();
+}
+
+TEST_CASE("what pieces throw or return becomes one Status, that of the lowest piece") {
+  ThreadPool pool(4);
+  std::atomic<int> done{0};
+  const Status s = detail::run_guarded(pool, 40, [&](std::uint32_t p) {
+    ++done;
+    if (p == 30) throw std::bad_alloc();
+    if (p == 17) throw Error(Errc::invalid_file, "of piece 17");
+    return p == 21 ? Status(Errc::unsupported, "of piece 21") : Status();
+  });
+  CHECK(done == 40);
+  CHECK(s.code() == Errc::invalid_file);
+  CHECK(s.message() == "of piece 17");
+  const auto fails = [](std::uint32_t p) { return p > 0 ? throw std::bad_alloc() : Status(); };
+  CHECK(detail::run_guarded(pool, 2, fails).code() == Errc::out_of_memory);
+  CHECK(detail::run_guarded(pool, 0, fails).ok());
 }
 
 TEST_CASE("backends come and go, used or not, copied or not") {
