@@ -16,7 +16,7 @@
 
 #include "frame_stages.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/ops/count_culled.hpp"
+#include "gsnav/render/count_culled.hpp"
 #include "workload.hpp"
 
 using namespace gsnav;

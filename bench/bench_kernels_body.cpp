@@ -13,8 +13,8 @@
 #endif
 #include "gsnav/avatar/skinning_weights.hpp"
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/kernels/fk.hpp"
-#include "gsnav/ops/skin.hpp"
+#include "gsnav/skin/fk.hpp"
+#include "gsnav/skin/skin.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "kernel_bench.hpp"
 #include "native_lanes.hpp"

@@ -8,7 +8,7 @@
 #if defined(GSNAV_HAS_FCL)
 #include "fcl_capsules.hpp"
 #endif
-#include "gsnav/ops/sweep.hpp"
+#include "gsnav/sweep/sweep.hpp"
 #include "kernel_bench.hpp"
 
 using namespace gsnav;

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "gsnav/ops/render.hpp"
+#include "gsnav/render/render.hpp"
 #include "gsnav/scene/renderer.hpp"
 
 namespace gsnav_bench {

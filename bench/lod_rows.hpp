@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/visible_sets.hpp"

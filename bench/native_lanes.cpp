@@ -3,8 +3,8 @@
 // up code of this one's instruction set.
 #include "native_lanes.hpp"
 
-#include "gsnav/kernels/lbs.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/skin/lbs.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "gsnav/math/pack.hpp"
 
 namespace gsnav_bench {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "cache.hpp"
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav_bench {

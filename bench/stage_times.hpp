@@ -8,7 +8,7 @@
 #include <tuple>
 #include <type_traits>
 
-#include "gsnav/ops/render.hpp"
+#include "gsnav/render/render.hpp"
 
 namespace gsnav_bench {
 

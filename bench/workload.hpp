@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav_bench {

@@ -10,11 +10,11 @@ import re
 import sys
 import tempfile
 
-RANK = {"base": 0, "math": 1, "core": 2, "kernels": 3, "ops": 4, "scene": 5, "avatar": 5, "nav": 5,
-        "io": 6, "interop": 6, "sim": 6, "eval": 6}
+RANK = {"base": 0, "math": 1, "core": 2, "image": 3, "frame": 4, "skin": 4, "sweep": 4, "mesh": 5, "lanes": 6,
+        "render": 6, "scene": 7, "avatar": 7, "nav": 7, "io": 8, "interop": 8, "sim": 8, "eval": 8}
 # avatar may include these
 DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface_material.hpp"}
-UMBRELLA = {"math", "core", "kernels", "ops", "scene", "avatar", "base"}
+UMBRELLA = {"math", "core", "image", "frame", "skin", "sweep", "mesh", "render", "scene", "avatar", "base"}
 # Not standard, but there wherever the code that includes them is compiled.
 PLATFORM_HEADERS = {"immintrin.h", "arm_neon.h", "fcntl.h", "sys/mman.h", "sys/stat.h", "unistd.h"}
 SOURCES = {".hpp", ".cpp", ".h", ".inl", ".cu", ".cuh"}
@@ -37,7 +37,7 @@ def allowed(layer, target, target_path):
     if layer == "umbrella":
         return target in UMBRELLA
     if layer.startswith("backend"):
-        return RANK.get(target, 99) <= RANK["ops"]
+        return RANK.get(target, 99) <= RANK["render"]
     if layer == "avatar" and target_path in DATA_ONLY:
         return True
     return RANK.get(target, 99) < RANK[layer]
@@ -76,11 +76,11 @@ def self_test():
     good = {"include/gsnav/config.hpp": "", "include/gsnav/core/view.hpp": '"gsnav/math/vec.hpp"',
             "include/gsnav/avatar/asset.hpp": '"gsnav/scene/gaussian_cloud.hpp"',
             "include/gsnav/interop/eigen.hpp": "<Eigen/Core>", "src/io/a.cpp": "<png.h>",
-            "backends/x/gsnav/backends/x.hpp": '"gsnav/ops/render.hpp"'}
-    bad = {"include/gsnav/core/up.hpp": '"gsnav/kernels/sh.hpp"',
+            "backends/x/gsnav/backends/x.hpp": '"gsnav/render/render.hpp"'}
+    bad = {"include/gsnav/core/up.hpp": '"gsnav/frame/sh.hpp"',
            "include/gsnav/scene/sideways.hpp": '"gsnav/nav/navmesh.hpp"',
            "include/gsnav/avatar/not_data.hpp": '"gsnav/scene/renderer.hpp"',
-           "include/gsnav/ops/backend.hpp": "<gsnav/backends/serial.hpp>",
+           "include/gsnav/render/backend.hpp": "<gsnav/backends/serial.hpp>",
            "include/gsnav/scene/library.hpp": "<Eigen/Core>", "include/gsnav/gsnav.hpp": '"gsnav/io/ply.hpp"',
            "src/sim/reads.cpp": '#  include "../io/private.hpp"', "src/io/private.hpp": "",
            "backends/y/gsnav/backends/y.hpp": '"gsnav/backends/x.hpp"',

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "gsnav/sim/people.hpp"
 
 namespace nav_loop {

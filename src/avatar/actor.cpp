@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/kernels/fk.hpp"
+#include "gsnav/skin/fk.hpp"
 
 namespace gsnav {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "gsnav/kernels/skin_modes.hpp"
+#include "gsnav/skin/skin_modes.hpp"
 
 namespace gsnav {
 

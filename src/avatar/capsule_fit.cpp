@@ -11,7 +11,7 @@
 
 #include "gsnav/avatar/capsule_volume.hpp"
 #include "gsnav/avatar/proxy_fit.hpp"
-#include "gsnav/kernels/capsule.hpp"
+#include "gsnav/sweep/capsule.hpp"
 #include "gsnav/math/capsule.hpp"
 
 namespace gsnav {

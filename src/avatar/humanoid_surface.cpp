@@ -15,7 +15,7 @@
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "humanoid_body.hpp"
 #include "point_grid.hpp"
 

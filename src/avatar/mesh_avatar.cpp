@@ -12,7 +12,7 @@
 
 #include "gsnav/avatar/mesh_surface.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "mesh_weights.hpp"
 #include "point_grid.hpp"
 

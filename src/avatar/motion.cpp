@@ -8,7 +8,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "gsnav/kernels/lbs.hpp"
+#include "gsnav/skin/lbs.hpp"
 #include "gsnav/math/screw.hpp"
 
 namespace gsnav {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/kernels/skin_modes.hpp"
+#include "gsnav/skin/skin_modes.hpp"
 
 namespace gsnav {
 

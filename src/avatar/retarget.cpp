@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/kernels/lbs.hpp"
+#include "gsnav/skin/lbs.hpp"
 
 namespace gsnav {
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "gsnav/kernels/fk.hpp"
+#include "gsnav/skin/fk.hpp"
 
 namespace gsnav {
 

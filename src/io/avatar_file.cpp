@@ -10,7 +10,7 @@
 #include "gsnav/avatar/smpl_joints.hpp"
 #include "gsnav/avatar/weight_gradients.hpp"
 #include "gsnav/io/npz_file.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "npz_arrays.hpp"
 
 namespace gsnav::io {

@@ -6,7 +6,7 @@
 #include "gsnav/avatar/smpl_joints.hpp"
 #include "gsnav/io/avatar_file.hpp"
 #include "gsnav/io/npz_file.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 
 namespace gsnav::io {
 namespace {

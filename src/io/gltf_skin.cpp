@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "file.hpp"
-#include "gsnav/kernels/lbs.hpp"
+#include "gsnav/skin/lbs.hpp"
 
 namespace gsnav::io {
 namespace detail {

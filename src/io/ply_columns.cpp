@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 
-#include "gsnav/kernels/gaussians.hpp"
-#include "gsnav/kernels/temporal.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/temporal.hpp"
 #include "ply_points.hpp"
 
 namespace gsnav::io::detail {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "gsnav/math/quat.hpp"
 
 namespace gsnav::io::detail {

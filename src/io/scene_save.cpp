@@ -12,7 +12,7 @@
 #include "gsnav/io/sog.hpp"
 #include "gsnav/io/splat.hpp"
 #include "gsnav/io/spz.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 
 namespace gsnav::io {
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "gsnav/core/guarded.hpp"
-#include "gsnav/kernels/packed_gaussians.hpp"
+#include "gsnav/frame/packed_gaussians.hpp"
 #include "navmesh_stages.hpp"
 
 namespace gsnav::detail {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "gsnav/kernels/capsule.hpp"
+#include "gsnav/sweep/capsule.hpp"
 
 namespace gsnav::detail {
 namespace {

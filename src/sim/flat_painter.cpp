@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 
 namespace gsnav::flat {

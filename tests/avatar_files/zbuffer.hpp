@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gsnav/avatar/skinned_mesh.hpp"
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 
 namespace gsnav_test {
 

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "eval/oracle_support.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/brush.hpp"

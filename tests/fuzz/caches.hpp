@@ -10,7 +10,7 @@
 #include "gsnav/core/pool_backend.hpp"
 #include "gsnav/io/lod_file.hpp"
 #include "gsnav/io/visible_file.hpp"
-#include "gsnav/ops/validate_set.hpp"
+#include "gsnav/render/validate_set.hpp"
 #include "gsnav/scene/lod_build.hpp"
 #include "lod/lod_support.hpp"
 #include "support/files.hpp"

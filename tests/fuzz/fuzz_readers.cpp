@@ -30,7 +30,7 @@
 #include "gsnav/io/spz.hpp"
 #include "gsnav/io/temporal_file.hpp"
 #include "gsnav/nav/navmesh_file.hpp"
-#include "gsnav/ops/validate_set.hpp"
+#include "gsnav/render/validate_set.hpp"
 #include "io/allocations.hpp"
 #include "io/spz_file.hpp"
 #include "picture.hpp"

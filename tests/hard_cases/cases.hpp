@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/math/quat.hpp"
-#include "gsnav/ops/render_config.hpp"
+#include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/spatial_order.hpp"

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/kernels/project_chunk.hpp"
-#include "gsnav/ops/render_config.hpp"
+#include "gsnav/frame/project_chunk.hpp"
+#include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav_test {

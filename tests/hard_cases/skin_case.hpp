@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gsnav/avatar/skinning_weights.hpp"
-#include "gsnav/ops/skin.hpp"
+#include "gsnav/skin/skin.hpp"
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/truth.hpp"

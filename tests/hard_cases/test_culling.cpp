@@ -9,7 +9,7 @@
 #include "arrays.hpp"
 #include "backends.hpp"
 #include "cases.hpp"
-#include "gsnav/ops/count_culled.hpp"
+#include "gsnav/render/count_culled.hpp"
 #include "gsnav/scene/edit_cloud.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 #include "support/scenes.hpp"

@@ -13,7 +13,7 @@
 #include "backends.hpp"
 #include "cases.hpp"
 #include "eval/oracle_support.hpp"
-#include "gsnav/ops/mesh_fragments.hpp"
+#include "gsnav/render/draw_fragments.hpp"
 #include "gsnav/sim/semantic_frame.hpp"
 #include "support/fragment_truth.hpp"
 #include "support/scenes.hpp"

@@ -9,7 +9,7 @@
 #include "arrays.hpp"
 #include "backends.hpp"
 #include "cases.hpp"
-#include "gsnav/kernels/cull.hpp"
+#include "gsnav/frame/cull.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 #include "support/scenes.hpp"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "gsnav/kernels/camera.hpp"
-#include "gsnav/kernels/projection_camera.hpp"
+#include "gsnav/image/camera.hpp"
+#include "gsnav/frame/projection_camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 // What one Gaussian's alpha is, in long double and by the textbook: explicit covariance matrices, AC - B^2

@@ -21,8 +21,8 @@ ROOT = pathlib.Path(__file__).parents[2]
 BACKENDS = [ROOT / "backends" / name for name in ("serial", "openmp", "cuda")]
 NEEDS = {"gsnav/interop/eigen.hpp": "eigen", "gsnav/interop/glm.hpp": "glm",
          "gsnav/interop/dlpack.hpp": "dlpack"}
-DEVICE_LAYERS = ("math", "core", "kernels", "ops")
-HOST_ONLY = ("gsnav/math/pack", "gsnav/kernels/lanes/")  # lanes are host vectors
+DEVICE_LAYERS = ("math", "core", "image", "frame", "skin", "sweep", "mesh", "lanes", "render")
+HOST_ONLY = ("gsnav/math/pack", "gsnav/lanes/")  # lanes are host vectors
 WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow"]
 
 

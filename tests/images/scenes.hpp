@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "gsnav/avatar/skinned_gaussians.hpp"
-#include "gsnav/kernels/camera.hpp"
-#include "gsnav/ops/render_config.hpp"
+#include "gsnav/image/camera.hpp"
+#include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"

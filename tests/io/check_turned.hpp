@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 

@@ -8,7 +8,7 @@
 #include "check_cloud.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/io/ply.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "neighbours.hpp"
 #include "ply_file.hpp"
 

@@ -5,7 +5,7 @@
 #include "check_quantised.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/io/spz.hpp"
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "spz_file.hpp"
 
 using namespace gsnav;

@@ -10,7 +10,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/kernels/project_chunk.hpp"
+#include "gsnav/frame/project_chunk.hpp"
 #include "gsnav/scene/drop_bands.hpp"
 #include "gsnav/scene/ledger.hpp"
 #include "gsnav/scene/packed_cloud.hpp"

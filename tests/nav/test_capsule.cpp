@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "capsule_oracle.hpp"
-#include "gsnav/kernels/capsule.hpp"
-#include "gsnav/ops/sweep.hpp"
+#include "gsnav/sweep/capsule.hpp"
+#include "gsnav/sweep/sweep.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -6,7 +6,7 @@
 
 #include "cases.hpp"
 #include "fcl_capsules.hpp"
-#include "gsnav/kernels/capsule.hpp"
+#include "gsnav/sweep/capsule.hpp"
 #include "gsnav/nav/step.hpp"
 
 using namespace gsnav;

@@ -6,7 +6,7 @@
 
 #include "cases.hpp"
 #include "deepening.hpp"
-#include "gsnav/kernels/capsule.hpp"
+#include "gsnav/sweep/capsule.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "gsnav/ops/mesh_layer.hpp"
+#include "gsnav/render/draw_meshes.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
 #include "ops/backends.hpp"
 #include "support/mesh_truth.hpp"

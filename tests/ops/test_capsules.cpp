@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gsnav/math/pack.hpp"
-#include "gsnav/ops/sweep.hpp"
+#include "gsnav/sweep/sweep.hpp"
 #include "ops/backends.hpp"
 #include "ops/capsule_pairs.hpp"
 #if defined(_OPENMP) && defined(__x86_64__) && defined(__GNUC__)

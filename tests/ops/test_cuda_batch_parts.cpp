@@ -8,7 +8,7 @@
 #include <vector>
 
 #if defined(GSNAV_HAS_CUDA)
-#include "gsnav/kernels/cull.hpp"
+#include "gsnav/frame/cull.hpp"
 #include "gsnav/scene/spatial_order.hpp"
 #include "ops/cuda_batch_images.hpp"
 #include "ops/no_gpu.hpp"

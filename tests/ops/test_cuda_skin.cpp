@@ -14,7 +14,7 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/ops/skin.hpp"
+#include "gsnav/skin/skin.hpp"
 #include "ops/no_gpu.hpp"
 
 using namespace gsnav;

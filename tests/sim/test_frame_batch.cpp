@@ -11,7 +11,7 @@
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/host_array.hpp"
-#include "gsnav/kernels/cut_depth.hpp"
+#include "gsnav/frame/cut_depth.hpp"
 #include "gsnav/scene/lod_build.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "mesh_box.hpp"

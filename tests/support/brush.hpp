@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "support/data.hpp"
 #include "support/safetensors.hpp"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/ops/skin.hpp"
+#include "gsnav/skin/skin.hpp"
 #include "gsnav/scene/renderer.hpp"
 
 // What tests render and skin with on the serial backend, compiled once for all of them (compiled_frames.cpp): a test

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 // The contract's image written a second time, straight from its text, in long double: explicit 3D and

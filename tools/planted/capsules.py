@@ -2,7 +2,7 @@
 """Capsules that meet: who deepens an overlap, and how near they come."""
 from . import plant
 
-CAPSULE = "include/gsnav/kernels/capsule.hpp"
+CAPSULE = "include/gsnav/sweep/capsule.hpp"
 TEST = "tests/nav/test_sweep_long.cpp"
 
 PLANTS = [

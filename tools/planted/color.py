@@ -2,8 +2,8 @@
 """Spherical harmonics and the direction they are seen from."""
 from . import plant
 
-SH = "include/gsnav/kernels/sh.hpp"
-CHUNK = "include/gsnav/kernels/project_chunk.hpp"
+SH = "include/gsnav/frame/sh.hpp"
+CHUNK = "include/gsnav/frame/project_chunk.hpp"
 TEST = "tests/hard_cases/test_sh.cpp"
 
 CLAMPED = "return {max(sum.x + half, zero), max(sum.y + half, zero), max(sum.z + half, zero)};"

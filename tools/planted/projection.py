@@ -2,12 +2,12 @@
 """Projection: determinants, the exponent, filters, responses."""
 from . import Edit, Plant, plant
 
-PROJECTION = "include/gsnav/kernels/projection.hpp"
-CAMERA = "include/gsnav/kernels/projection_camera.hpp"
-CHUNK = "include/gsnav/kernels/project_chunk.hpp"
-ROW = "include/gsnav/kernels/project_row.hpp"
-WRITE_SPLATS = "include/gsnav/kernels/lanes/write_splats.hpp"
-BLEND = "include/gsnav/kernels/blend.hpp"
+PROJECTION = "include/gsnav/frame/projection.hpp"
+CAMERA = "include/gsnav/frame/projection_camera.hpp"
+CHUNK = "include/gsnav/frame/project_chunk.hpp"
+ROW = "include/gsnav/frame/project_row.hpp"
+WRITE_SPLATS = "include/gsnav/lanes/write_splats.hpp"
+BLEND = "include/gsnav/frame/blend.hpp"
 DETERMINANT = "tests/hard_cases/test_determinant.cpp"
 EXPONENT = "tests/hard_cases/test_exponent.cpp"
 FILTER = "tests/hard_cases/test_filter.cpp"

@@ -2,9 +2,9 @@
 """What every image has to have, whatever is in it."""
 from . import plant
 
-BLEND = "include/gsnav/kernels/blend.hpp"
-PROJECTION = "include/gsnav/kernels/projection.hpp"
-CHUNK = "include/gsnav/kernels/project_chunk.hpp"
+BLEND = "include/gsnav/frame/blend.hpp"
+PROJECTION = "include/gsnav/frame/projection.hpp"
+CHUNK = "include/gsnav/frame/project_chunk.hpp"
 TEST = "tests/hard_cases/test_properties.cpp"
 
 PLANTS = [
@@ -18,7 +18,7 @@ PLANTS = [
           "const L uj = ewa ? clamp(u, L(camera.u_min), L(camera.u_max)) : u;",
           "const L uj = clamp(u, L(camera.u_min), L(camera.u_max));",
           TEST, "property_split_screen", why="what is seen would hang on how large the image is"),
-    plant("more_opacity_is_less", "include/gsnav/ops/render_config.hpp",
+    plant("more_opacity_is_less", "include/gsnav/render/render_config.hpp",
           "r.exclusive_stop = c.compat != Compat::none;", "r.exclusive_stop = true;",
           TEST, "property_opacity_monotonicity"),
     plant("closed_pixel_goes_on", BLEND, "transmittance >= L(rules.transmittance_min)", "transmittance >= L(S(0))",

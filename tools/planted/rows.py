@@ -75,7 +75,7 @@ PLANTS = [
     plant("world_in_float", CLOUD,
           "origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);", "origin[k] = 0;",
           WORLD, "N28_world_1e6", why="62 mm at 1000 km"),
-    plant("camera_offset_in_float", "include/gsnav/kernels/project_chunk.hpp",
+    plant("camera_offset_in_float", "include/gsnav/frame/project_chunk.hpp",
           "  return (table.empty() ? Vec3d{} : table[o]) - args.camera64.position;\n",
           "  return vec_cast<double>(vec_cast<float>(table.empty() ? Vec3d{} : table[o]) -\n"
           "                          vec_cast<float>(args.camera64.position));\n",

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/scene/content_hash.hpp"
 
 namespace gsnav_report {

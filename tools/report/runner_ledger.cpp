@@ -7,7 +7,7 @@
 #include <string>
 
 #include "gsnav/math/functions.hpp"
-#include "gsnav/ops/render_config.hpp"
+#include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/scene_profile.hpp"
 

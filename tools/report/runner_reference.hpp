@@ -5,7 +5,7 @@
 
 #include "cache.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/frame/gaussians.hpp"
 #include "jobs.hpp"
 
 namespace gsnav_report {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 

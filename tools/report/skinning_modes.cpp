@@ -9,7 +9,7 @@
 #include "gsnav/avatar/weight_gradients.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/ops/skin.hpp"
+#include "gsnav/skin/skin.hpp"
 #include "skinning_timing.hpp"
 
 namespace gsnav_report {

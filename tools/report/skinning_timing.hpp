@@ -5,7 +5,7 @@
 
 #include "csv.hpp"
 #include "gsnav/avatar/asset.hpp"
-#include "gsnav/ops/skin.hpp"
+#include "gsnav/skin/skin.hpp"
 #include "runner_timing.hpp"
 
 namespace gsnav_report {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/kernels/capsule.hpp"
+#include "gsnav/sweep/capsule.hpp"
 #include "runner_timing.hpp"
 
 namespace gsnav_report {

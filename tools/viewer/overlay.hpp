@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "../../examples/nav_loop/canvas.hpp"
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/math/capsule.hpp"
 
 namespace gsnav_viewer {

@@ -5,9 +5,9 @@
 
 #include <cstdint>
 
-#include "gsnav/kernels/blend.hpp"
-#include "gsnav/kernels/project_chunk.hpp"
-#include "gsnav/kernels/tiles.hpp"
+#include "gsnav/frame/blend.hpp"
+#include "gsnav/frame/project_chunk.hpp"
+#include "gsnav/frame/tiles.hpp"
 #include "search.cuh"
 
 // What the kernels of a batch read and write (docs/cuda.md).

@@ -5,7 +5,7 @@
 
 #include "batch_args.cuh"
 #include "gsnav/backends/cuda.hpp"
-#include "gsnav/kernels/composite.hpp"
+#include "gsnav/frame/composite.hpp"
 
 // What the kernels share that blend tiles.
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "gsnav/avatar/asset.hpp"
-#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/frame/gaussians.hpp"
 
 namespace gsnav {
 

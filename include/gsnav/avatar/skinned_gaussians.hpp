@@ -13,9 +13,9 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/cull.hpp"
-#include "gsnav/ops/render_config.hpp"
-#include "gsnav/ops/skin.hpp"
+#include "gsnav/frame/cull.hpp"
+#include "gsnav/render/render_config.hpp"
+#include "gsnav/skin/skin.hpp"
 
 namespace gsnav {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/kernels/lbs.hpp"
+#include "gsnav/skin/lbs.hpp"
 
 namespace gsnav {
 

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/camera.hpp"
-#include "gsnav/kernels/gaussians.hpp"
-#include "gsnav/ops/render.hpp"
-#include "gsnav/ops/render_config.hpp"
+#include "gsnav/image/camera.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/render/render.hpp"
+#include "gsnav/render/render_config.hpp"
 
 namespace gsnav::eval {
 

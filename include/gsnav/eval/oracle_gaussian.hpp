@@ -9,12 +9,12 @@
 #include <cstdint>
 
 #include "gsnav/eval/oracle_config.hpp"
-#include "gsnav/kernels/camera.hpp"
-#include "gsnav/kernels/gaussians.hpp"
-#include "gsnav/kernels/packed_gaussians.hpp"
+#include "gsnav/image/camera.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/packed_gaussians.hpp"
 #include "gsnav/math/half.hpp"
 #include "gsnav/math/similarity.hpp"
-#include "gsnav/ops/render_config.hpp"
+#include "gsnav/render/render_config.hpp"
 
 // A row of a set as oracles see it, in long double and in metres. Only the decoding of stored rows
 // (packed_gaussians.hpp) is shared with the kernels: every formula here is written from the contract.

@@ -6,7 +6,7 @@
 #include <type_traits>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/math/similarity.hpp"
 
 // What the interop headers share: layouts they rely on, camera axes, taking a matrix apart.

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 
 namespace gsnav::io {
 

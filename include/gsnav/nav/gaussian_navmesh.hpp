@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/nav/navmesh.hpp"
 
 namespace gsnav {

@@ -6,7 +6,7 @@
 
 #include "gsnav/nav/navmesh.hpp"
 #include "gsnav/nav/obstacles.hpp"
-#include "gsnav/ops/sweep.hpp"
+#include "gsnav/sweep/sweep.hpp"
 
 namespace gsnav {
 
@@ -83,7 +83,7 @@ struct StepResult {
 /// Moves the agent by the ground-plane part of `desired` during the bodies' interval.
 ///
 /// The surface is walked first; every leg of the walk is then swept against the bodies' motion during
-/// its own part of the tick (kernels/capsule.hpp), so that no step is too long and no body too fast. At
+/// its own part of the tick (sweep/capsule.hpp), so that no step is too long and no body too fast. At
 /// contact the agent stops a skin away and, with `slide`, walks on along the body's tangent. In overlap,
 /// at the start or after a body has pushed into the agent, motion that does not deepen it is free: the
 /// agent stops where it would itself go deeper than the body has. The agent's own motion never takes it

@@ -11,7 +11,7 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/nav/step.hpp"
-#include "gsnav/ops/first_impacts.hpp"
+#include "gsnav/sweep/first_impacts.hpp"
 
 namespace gsnav {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/lbs.hpp"
+#include "gsnav/skin/lbs.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/scene/drop_bands.hpp"

@@ -13,8 +13,8 @@
 
 #include "gsnav/core/huge_pages.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/gaussians.hpp"
-#include "gsnav/kernels/projection_camera.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/projection_camera.hpp"
 #include "gsnav/math/half.hpp"
 #include "gsnav/scene/load_report.hpp"
 

@@ -9,9 +9,9 @@
 
 #include "gsnav/core/parallel.hpp"
 #include "gsnav/core/pool_backend.hpp"
-#include "gsnav/ops/count_culled.hpp"
-#include "gsnav/ops/render_config.hpp"
-#include "gsnav/ops/render_workspace.hpp"
+#include "gsnav/render/count_culled.hpp"
+#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/render_workspace.hpp"
 #include "gsnav/scene/load_report.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/scene_profile.hpp"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/kernels/gaussians.hpp"
-#include "gsnav/kernels/projection_camera.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/projection_camera.hpp"
 #include "gsnav/math/aabb.hpp"
 
 namespace gsnav {

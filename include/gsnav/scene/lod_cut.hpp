@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/kernels/cull.hpp"
-#include "gsnav/kernels/projection_camera.hpp"
-#include "gsnav/ops/render_config.hpp"
+#include "gsnav/frame/cull.hpp"
+#include "gsnav/frame/projection_camera.hpp"
+#include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 
 namespace gsnav {

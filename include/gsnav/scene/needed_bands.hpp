@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/frame/gaussians.hpp"
 
 namespace gsnav {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "gsnav/core/huge_pages.hpp"
-#include "gsnav/kernels/packed_gaussians.hpp"
+#include "gsnav/frame/packed_gaussians.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/load_report.hpp"

@@ -14,8 +14,8 @@
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/guarded.hpp"
-#include "gsnav/ops/frame_lanes.hpp"
-#include "gsnav/ops/render_composite.hpp"
+#include "gsnav/render/frame_lanes.hpp"
+#include "gsnav/render/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/needed_bands.hpp"
 #include "gsnav/scene/packed_cloud.hpp"

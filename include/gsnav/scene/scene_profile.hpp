@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "gsnav/core/pool_backend.hpp"
-#include "gsnav/kernels/gaussians.hpp"
-#include "gsnav/kernels/packed_gaussians.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/packed_gaussians.hpp"
 #include "gsnav/math/half.hpp"
 #include "gsnav/scene/needed_bands.hpp"
 

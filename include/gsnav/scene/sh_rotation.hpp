@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "gsnav/kernels/sh.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "gsnav/math/quat.hpp"
 
 namespace gsnav {

@@ -14,7 +14,7 @@
 #include "gsnav/core/parallel.hpp"
 #include "gsnav/core/permute.hpp"
 #include "gsnav/core/pool_backend.hpp"
-#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/ops/at_time.hpp"
+#include "gsnav/render/at_time.hpp"
 #include "gsnav/scene/edit_cloud.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 

@@ -17,11 +17,11 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
-#include "gsnav/kernels/camera.hpp"
-#include "gsnav/kernels/gaussians.hpp"
+#include "gsnav/image/camera.hpp"
+#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/similarity.hpp"
-#include "gsnav/ops/row_weights.hpp"
+#include "gsnav/render/row_weights.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/sim/sensor.hpp"
 
 namespace gsnav {

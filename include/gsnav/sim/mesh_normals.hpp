@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/ops/mesh_layer.hpp"
-#include "gsnav/ops/render_composite.hpp"
+#include "gsnav/render/draw_meshes.hpp"
+#include "gsnav/render/render_composite.hpp"
 
 namespace gsnav {
 

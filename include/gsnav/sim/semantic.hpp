@@ -8,8 +8,8 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/kernels/gaussians.hpp"
-#include "gsnav/kernels/mesh.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/mesh/mesh.hpp"
 
 namespace gsnav {
 

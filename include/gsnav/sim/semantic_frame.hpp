@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/ops/render_composite.hpp"
+#include "gsnav/render/render_composite.hpp"
 #include "gsnav/sim/semantic.hpp"
 
 namespace gsnav {

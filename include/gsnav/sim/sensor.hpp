@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/kernels/camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/math/quat.hpp"
 #include "gsnav/sim/noise.hpp"
 

@@ -14,7 +14,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/host_array.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/kernels/cut_depth.hpp"
+#include "gsnav/frame/cut_depth.hpp"
 #include "gsnav/sim/cube_map.hpp"
 #include "gsnav/sim/frame_batch.hpp"
 #include "gsnav/sim/mesh_normals.hpp"

@@ -8,15 +8,15 @@
 #include <string>
 
 #include "gsnav/core/backend.hpp"
-#include "gsnav/kernels/blend.hpp"
-#include "gsnav/kernels/cut_depth.hpp"
-#include "gsnav/kernels/project_chunk.hpp"
-#include "gsnav/kernels/tiles.hpp"
-#include "gsnav/ops/first_impacts.hpp"
-#include "gsnav/ops/render.hpp"
-#include "gsnav/ops/render_composite.hpp"
-#include "gsnav/ops/skin.hpp"
-#include "gsnav/ops/stages.hpp"
+#include "gsnav/frame/blend.hpp"
+#include "gsnav/frame/cut_depth.hpp"
+#include "gsnav/frame/project_chunk.hpp"
+#include "gsnav/frame/tiles.hpp"
+#include "gsnav/sweep/first_impacts.hpp"
+#include "gsnav/render/render.hpp"
+#include "gsnav/render/render_composite.hpp"
+#include "gsnav/skin/skin.hpp"
+#include "gsnav/core/stages.hpp"
 
 struct CUevent_st;
 struct CUstream_st;
@@ -82,7 +82,7 @@ class CudaBackend {
   bool sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::uint32_t* keys_alt,
                   std::uint32_t* values_alt, std::size_t n, int bits);
 
-  // Stages by kernels of its own (ops/stages.hpp).
+  // Stages by kernels of its own (core/stages.hpp).
   void run(stage::Project, const ProjectArgs<float>& args, const ProjectOutputs<float>& out);
   void run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull);
   void run(stage::CountTiles, const BinArgs<float>& args, const MeshCull<float>& cull);

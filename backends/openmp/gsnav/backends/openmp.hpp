@@ -14,18 +14,18 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/host_memory.hpp"
 #include "gsnav/core/thread_pool.hpp"
-#include "gsnav/kernels/blend.hpp"
-#include "gsnav/kernels/capsule_batch.hpp"
-#include "gsnav/kernels/composite.hpp"
-#include "gsnav/kernels/lbs.hpp"
-#include "gsnav/kernels/mesh_shade.hpp"
-#include "gsnav/kernels/project_chunk.hpp"
-#include "gsnav/kernels/tiles.hpp"
-#include "gsnav/ops/render_composite.hpp"
-#include "gsnav/ops/skin.hpp"
-#include "gsnav/ops/stages.hpp"
+#include "gsnav/frame/blend.hpp"
+#include "gsnav/sweep/capsule_batch.hpp"
+#include "gsnav/frame/composite.hpp"
+#include "gsnav/skin/lbs.hpp"
+#include "gsnav/mesh/mesh_shade.hpp"
+#include "gsnav/frame/project_chunk.hpp"
+#include "gsnav/frame/tiles.hpp"
+#include "gsnav/render/render_composite.hpp"
+#include "gsnav/skin/skin.hpp"
+#include "gsnav/core/stages.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
-#include "gsnav/kernels/lanes/kernels.hpp"
+#include "gsnav/lanes/kernels.hpp"
 #endif
 
 namespace gsnav {
@@ -99,7 +99,7 @@ class OpenMPBackend : public HostMemory {
   }
   Status synchronize() { return {}; }
 
-  // Stages in lanes (ops/stages.hpp).
+  // Stages in lanes (core/stages.hpp).
   void run(stage::Project, const ProjectArgs<float>& args, const ProjectOutputs<float>& out) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, &out, kernel](std::size_t c) { kernel(args, out, c); });

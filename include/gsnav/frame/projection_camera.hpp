@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "gsnav/image/camera.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/mat.hpp"
+#include "gsnav/math/quat.hpp"
+
+namespace gsnav {
+
+/// What decides which Gaussian is in front.
+enum class SortOrder : std::uint8_t {
+  z_depth,          ///< depth of the centre along the view axis (INRIA)
+  camera_distance,  ///< distance of the centre from the camera (KHR_gaussian_splatting)
+};
+
+/// How a 3D Gaussian answers a pixel's ray.
+enum class Response : std::uint8_t {
+  ewa,            ///< linearised on the image plane at the mean (Zwicker et al. 2001): the contract
+  tangent_plane,  ///< linearised on the plane across the mean's direction (Huang et al. 2024)
+  ray,            ///< exact: the maximum along the ray
+};
+
+/// Whose rules of footprint, stop and depth a render follows. Everything but `none` is for parity tests.
+enum class Compat : std::uint8_t {
+  none,        ///< the contract
+  inria,       ///< 3-sigma square of 16-pixel tiles, exclusive stop, depth of the centre
+  gsplat,      ///< box of min(3.33, sqrt(2 ln 255 o)) sigma in tiles, exclusive stop, depth of the centre
+  habitat_gs,  ///< inria with opacity compensation of at least 0.005 for every set, near plane 0.2
+};
+
+/// How a float32 key becomes the integer that is sorted: all of its bits, or fewer of them counted from
+/// the near plane on, so that 24 bits keep 20 of the mantissa's from there to 2^16 times farther.
+struct KeyCode {
+  std::uint32_t base = 0, largest = 0xffffffffu;
+  int shift = 0;
+
+  static KeyCode of(int bits, float near_plane) noexcept {
+    if (bits >= 32) return {};
+    return {bits_of(near_plane), (1u << bits) - 1u, bits < 27 ? 27 - bits : 0};
+  }
+  GSNAV_HD std::uint32_t operator()(float key) const noexcept {
+    const std::uint32_t bits = bits_of(key);
+    // A key that is rounded to just below the near plane comes first.
+    const std::uint32_t code = (bits > base ? bits - base : 0u) >> shift;
+    return code < largest ? code : largest;
+  }
+};
+
+/// What a render asks of the projection beyond the camera.
+struct ProjectionRules {
+  SortOrder sort_order = SortOrder::z_depth;
+  Response response = Response::ewa;
+  Compat compat = Compat::none;
+  double alpha_min = 1.0 / 255;
+  int key_bits = 32;
+};
+
+/// A camera as the projection of one set sees it: in the set's own frame, so that no Gaussian is
+/// transformed to place its asset in the world. With x_world = s R x + t, camera coordinates are
+/// s (W R)(x - c), c the camera's position in the asset's frame.
+template <class S>
+struct ProjectionCamera {
+  Mat3<S> rotation{};       ///< W R, asset axes to camera axes
+  Vec3d position{};         ///< c, asset frame, double
+  S scale{1};               ///< s
+  S fx{}, fy{}, cx{}, cy{};
+  S u_min{}, u_max{}, v_min{}, v_max{};  ///< limits of x/z and y/z in the Jacobian
+  int width = 0, height = 0;
+  float near_plane = 0.2f;
+  S near_sigma{0};
+  S eps2d{S(0.3)};
+  S base_eps2d{0};          ///< GaussianSet::base_eps2d
+  S log2_alpha_min{};       ///< the footprint is alpha >= 2^log2_alpha_min
+  S min_compensation{0};    ///< of the mip filter
+  bool mip = false;
+  SortOrder sort_order = SortOrder::z_depth;
+  Response response = Response::ewa;
+  Compat compat = Compat::none;
+  KeyCode key_code{};
+};
+
+/// Builds the ProjectionCamera of a set (host, in double, rounded once).
+template <class S>
+ProjectionCamera<S> make_projection_camera(const Camera& camera, const GaussianSet& set,
+                                           const ProjectionRules& rules = {}) noexcept {
+  ProjectionCamera<S> p;
+  const bool habitat = rules.compat == Compat::habitat_gs;
+  const Similarity& a = set.world_from_asset;
+  const Mat3d rotation = camera.viewmat.linear * rotation_matrix(a.rotation);
+  p.rotation = mat_cast<S>(rotation);
+  p.position = inverse(a) * camera.position();
+  p.scale = static_cast<S>(a.scale);
+  p.fx = static_cast<S>(camera.fx);
+  p.fy = static_cast<S>(camera.fy);
+  p.cx = static_cast<S>(camera.cx);
+  p.cy = static_cast<S>(camera.cy);
+  const double tx = 0.3 * camera.width / (2 * camera.fx), ty = 0.3 * camera.height / (2 * camera.fy);
+  p.u_min = static_cast<S>(-(camera.cx / camera.fx + tx));
+  p.u_max = static_cast<S>((camera.width - camera.cx) / camera.fx + tx);
+  p.v_min = static_cast<S>(-(camera.cy / camera.fy + ty));
+  p.v_max = static_cast<S>((camera.height - camera.cy) / camera.fy + ty);
+  p.width = camera.width;
+  p.height = camera.height;
+  p.near_plane = habitat ? 0.2f : static_cast<float>(camera.near_plane);
+  p.near_sigma = habitat ? S(0) : static_cast<S>(camera.near_sigma);
+  p.eps2d = static_cast<S>(set.eps2d);
+  p.base_eps2d = static_cast<S>(set.base_eps2d);
+  p.log2_alpha_min = static_cast<S>(std::log2(rules.alpha_min));
+  p.min_compensation = habitat ? S(0.005) : S(0);
+  p.mip = set.filter == Filter::mip || habitat;
+  p.sort_order = rules.sort_order;
+  p.response = rules.response;
+  p.compat = rules.compat;
+  p.key_code = KeyCode::of(rules.key_bits, p.near_plane);
+  return p;
+}
+
+}  // namespace gsnav

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+
+#include "gsnav/core/view.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/math/functions.hpp"
+
+namespace gsnav {
+
+/// Planes of motion: velocity, acceleration and jerk, three components each.
+inline constexpr std::size_t kMotionPlanes = 9;
+
+/// N Gaussians that move and fade (4D Gaussians, as Habitat-GS draws them). Owns nothing.
+///
+/// At the time t, with dt = t - times[i]: the mean is base + v dt + a dt^2 / 2 + j dt^3 / 6, the opacity
+/// base * exp(-dt^2 / (2 (sigma^2 + 1e-8))); shapes, orientations and colours stay.
+struct TemporalView {
+  GaussianView base;                        ///< each Gaussian at its own time
+  View<const float> times;                  ///< [N] seconds
+  View<const float> sigmas;                 ///< [N] seconds, >= 0; infinity: always there
+  /// x, y, z of velocity (m/s), acceleration (m/s^2), jerk (m/s^3), [N] each; what is empty is zero. Those of one kind
+  /// are all there or all empty.
+  View<const float> motion[kMotionPlanes];
+};
+
+/// How much of its opacity a Gaussian has `dt` seconds from its own time.
+template <class S>
+GSNAV_HD S temporal_weight(S dt, S sigma) noexcept {
+  // -log2(e) / 2. The limit keeps dt^2 finite in float: nothing is left of anything there.
+  const S rate = static_cast<S>(-0.72134752044448170368);
+  const S limited = clamp(dt, S(-1e15), S(1e15));
+  return exp2(rate * (limited * limited / fma(sigma, sigma, S(1e-8))));
+}
+
+/// How far a Gaussian with this velocity, acceleration and jerk is from its base after `dt` seconds.
+template <class S>
+GSNAV_HD Vec3<S> temporal_offset(const Vec3<S>& velocity, const Vec3<S>& acceleration, const Vec3<S>& jerk,
+                                 S dt) noexcept {
+  const Vec3<S> inner = fma(dt * S(1.0 / 3), jerk, acceleration);
+  return dt * fma(dt * S(0.5), inner, velocity);
+}
+
+/// Gaussian i at the time t: its offset from the base, metres, and its opacity, 0 where that is below 1/255. What is
+/// not drawn does not move.
+template <class S>
+GSNAV_HD Vec3<S> temporal_state(const TemporalView& in, std::size_t i, double t, S& opacity) noexcept {
+  const S dt = static_cast<S>(t - static_cast<double>(in.times[i]));
+  opacity = S(in.base.opacities[i]) * temporal_weight(dt, S(in.sigmas[i]));
+  if (!(opacity >= S(1.0 / 255))) {
+    opacity = S(0);
+    return {};
+  }
+  Vec3<S> of[3]{};
+  for (int k = 0; k < 3; ++k) {
+    if (in.motion[3 * k].empty()) continue;
+    of[k] = {S(in.motion[3 * k][i]), S(in.motion[3 * k + 1][i]), S(in.motion[3 * k + 2][i])};
+  }
+  return temporal_offset(of[0], of[1], of[2], dt);
+}
+
+/// Writes Gaussian i at a time: mean (offset from its origin) and opacity.
+template <class S>
+struct GaussianAt {
+  TemporalView in;
+  double t = 0;
+  View<float> means[3];
+  View<float> opacities;
+
+  GSNAV_HD void operator()(std::size_t i) const noexcept {
+    S opacity;
+    const Vec3<S> offset = temporal_state<S>(in, i, t, opacity);
+    means[0][i] = static_cast<float>(S(in.base.means[0][i]) + offset.x);
+    means[1][i] = static_cast<float>(S(in.base.means[1][i]) + offset.y);
+    means[2][i] = static_cast<float>(S(in.base.means[2][i]) + offset.z);
+    opacities[i] = static_cast<float>(opacity);
+  }
+};
+
+/// Bounds of chunk c of what GaussianAt wrote, of the Gaussians that are drawn.
+struct BoundChunkAt {
+  GaussianView moment;
+  View<ChunkBounds> bounds;
+
+  GSNAV_HD void operator()(std::size_t c) const noexcept {
+    const std::size_t begin = c * kProjectChunk;
+    const std::size_t end = begin + kProjectChunk < moment.size ? begin + kProjectChunk : moment.size;
+    ChunkBounds b;
+    bool first = true;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!(moment.opacities[i] > 0)) continue;
+      const Vec3d origin = moment.origin_ids.empty() ? Vec3d{} : moment.origins[moment.origin_ids[i]];
+      for (int k = 0; k < 3; ++k) {
+        const double offset = static_cast<double>(moment.means[k][i]), x = origin[k] + offset;
+        const double pad = 1e-6 * abs(offset);  // culling knows of offsets within the lattice only
+        b.low[k] = first ? x - pad : min(b.low[k], x - pad);
+        b.high[k] = first ? x + pad : max(b.high[k], x + pad);
+        b.scale_max = max(b.scale_max, moment.scales[k][i]);
+      }
+      b.opacity_max = max(b.opacity_max, moment.opacities[i]);
+      first = false;
+    }
+    bounds[c] = b;
+  }
+};
+
+}  // namespace gsnav

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "gsnav/image/camera.hpp"
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/vec.hpp"
+
+// From camera axes to the lattice of 2^-14 px on which coverage is decided exactly: docs/composition.md.
+
+namespace gsnav {
+
+/// Bits of a pixel's fraction, and how far from the image's centre a vertex may lie, in pixels: edge functions of
+/// such vertices at pixel centres are below 2^62.
+inline constexpr int kMeshSubpixelBits = 14;
+inline constexpr double kMeshGuard = 32768;
+
+/// Why a vertex cannot be projected as it is (the first five, in the order they are clipped in), and on which side of
+/// the image it lies.
+enum MeshOutcode : std::uint32_t {
+  kMeshNear = 1u << 0,
+  kMeshGuardLeft = 1u << 1,
+  kMeshGuardRight = 1u << 2,
+  kMeshGuardTop = 1u << 3,
+  kMeshGuardBottom = 1u << 4,
+  kMeshLeft = 1u << 5,
+  kMeshRight = 1u << 6,
+  kMeshTop = 1u << 7,
+  kMeshBottom = 1u << 8,
+  kMeshNotFinite = 1u << 9,
+};
+inline constexpr int kMeshClipPlanes = 5;
+inline constexpr std::uint32_t kMeshClipCodes = (1u << kMeshClipPlanes) - 1;
+/// Clipping adds at most one corner a plane.
+inline constexpr int kMeshMostCorners = 3 + kMeshClipPlanes;
+
+/// What projecting meshes reads of a camera; pixels are counted from the image's centre.
+struct MeshCamera {
+  double fx = 1, fy = 1;
+  double cx = 0, cy = 0;  ///< principal point from the image's centre
+  double half_width = 0, half_height = 0;
+  double near_plane = 0.2;
+  int width = 0, height = 0;
+
+  static MeshCamera of(const Camera& c) noexcept {
+    return {c.fx, c.fy, c.cx - 0.5 * c.width, c.cy - 0.5 * c.height, 0.5 * c.width, 0.5 * c.height, c.near_plane,
+            c.width, c.height};
+  }
+  /// Positive inside plane k of the first five outcodes.
+  GSNAV_HD double distance(int k, const Vec3d& p) const noexcept {
+    switch (k) {
+      case 0: return p.z - near_plane;
+      case 1: return fma(fx, p.x, (kMeshGuard + cx) * p.z);
+      case 2: return fma(-fx, p.x, (kMeshGuard - cx) * p.z);
+      case 3: return fma(fy, p.y, (kMeshGuard + cy) * p.z);
+      default: return fma(-fy, p.y, (kMeshGuard - cy) * p.z);
+    }
+  }
+  GSNAV_HD std::uint32_t outcode(const Vec3d& p) const noexcept {
+    if (!is_finite(p.x) || !is_finite(p.y) || !is_finite(p.z)) return kMeshNotFinite;
+    std::uint32_t code = 0;
+    for (int k = 0; k < kMeshClipPlanes; ++k) {
+      if (!(distance(k, p) >= 0)) code |= 1u << k;
+    }
+    // Linear in p: a triangle all of whose corners are on one side is there, whatever lies behind the camera.
+    if (fma(fx, p.x, (half_width + cx) * p.z) < 0) code |= kMeshLeft;
+    if (fma(-fx, p.x, (half_width - cx) * p.z) < 0) code |= kMeshRight;
+    if (fma(fy, p.y, (half_height + cy) * p.z) < 0) code |= kMeshTop;
+    if (fma(-fy, p.y, (half_height - cy) * p.z) < 0) code |= kMeshBottom;
+    return code;
+  }
+};
+
+/// A point of the lattice: pixels from the image's centre times 2^14.
+struct MeshPoint {
+  std::int32_t x = 0, y = 0;
+};
+
+GSNAV_HD std::int32_t snap_to_lattice(double pixels) noexcept {
+  const double v = fma(pixels, static_cast<double>(1 << kMeshSubpixelBits), 0.5);
+  const std::int64_t i = static_cast<std::int64_t>(v);
+  return static_cast<std::int32_t>(static_cast<double>(i) > v ? i - 1 : i);
+}
+
+/// Projects a point inside all planes.
+GSNAV_HD MeshPoint project_to_lattice(const MeshCamera& c, const Vec3d& p) noexcept {
+  const double inverse = 1.0 / p.z;
+  return {snap_to_lattice(fma(c.fx, p.x * inverse, c.cx)), snap_to_lattice(fma(c.fy, p.y * inverse, c.cy))};
+}
+
+/// Clips a triangle to the planes of `codes` (Sutherland-Hodgman); returns how many corners it then has. The point
+/// where an edge leaves is computed from its end inside to its end outside: both triangles of the edge get the
+/// same one.
+GSNAV_HD int clip_triangle(const MeshCamera& camera, std::uint32_t codes, Vec3d (&p)[kMeshMostCorners]) noexcept {
+  int n = 3;
+  for (int k = 0; k < kMeshClipPlanes; ++k) {
+    if ((codes >> k & 1u) == 0) continue;
+    Vec3d out[kMeshMostCorners];
+    int m = 0;
+    for (int i = 0; i < n; ++i) {
+      const Vec3d &a = p[i], &b = p[i + 1 == n ? 0 : i + 1];
+      const double da = camera.distance(k, a), db = camera.distance(k, b);
+      if (da >= 0 && m < kMeshMostCorners) out[m++] = a;
+      if ((da >= 0) == (db >= 0) || m == kMeshMostCorners) continue;
+      const Vec3d &in = da >= 0 ? a : b, &outside = da >= 0 ? b : a;
+      const double d_in = da >= 0 ? da : db, d_out = da >= 0 ? db : da;
+      const double t = d_in / (d_in - d_out);
+      Vec3d q{fma(outside.x - in.x, t, in.x), fma(outside.y - in.y, t, in.y), fma(outside.z - in.z, t, in.z)};
+      q.z = max(q.z, camera.near_plane);  // whatever rounding made of it
+      out[m++] = q;
+    }
+    n = m;
+    for (int i = 0; i < n; ++i) p[i] = out[i];
+    if (n < 3) return 0;
+  }
+  return n;
+}
+
+}  // namespace gsnav

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/frame/project_chunk.hpp"
+#include "gsnav/frame/projection_camera.hpp"
+#include "gsnav/frame/tiles.hpp"
+#include "gsnav/render/render_config.hpp"
+
+namespace gsnav {
+
+/// Rows of a frame by what culling does with them, nothing hidden by anything. Rows of chunks that a cut does not draw
+/// count as not touched.
+struct CullCounts {
+  std::uint64_t rows = 0;      ///< in all sets
+  std::uint64_t touched = 0;   ///< in chunks, and parts of chunks, that may be in view
+  std::uint64_t emitting = 0;  ///< of these, with at least one (tile, Gaussian) pair
+
+  std::uint64_t removed() const noexcept { return rows - touched; }
+  std::uint64_t removable() const noexcept { return rows - emitting; }
+  /// Rows touched for each that was needed; at least 1, and 1 where none was touched.
+  double touched_per_emitting() const noexcept {
+    return touched == 0 ? 1.0 : static_cast<double>(touched) / static_cast<double>(emitting == 0 ? 1 : emitting);
+  }
+};
+
+/// Counts for one camera. Arrays are in host memory; float32, as frames are. Rows that are not touched have no pair:
+/// that is what culling promises, and a test shows.
+template <Backend B>
+requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const GaussianSet> sets, const Camera& camera,
+                                                    const RenderConfig& config) {
+  CullCounts out;
+  const ProjectionRules rules = projection_rules(config);
+  const float log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
+  for (const GaussianSet& set : sets) {
+    const GaussianView& gs = set.gaussians;
+    ProjectArgs<float> args = make_project_args<float>(camera, set, rules, 0);
+    std::vector<Vec3d> offsets;
+    for (std::size_t o = 0; o < origin_count(gs); ++o) offsets.push_back(origin_offset(args, o));
+    args.offsets = {offsets.data(), offsets.size()};
+    const TileGrid grid =
+        TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
+
+    struct Count {
+      std::uint32_t touched = 0, emitting = 0;
+    };
+    std::vector<Count> counts(gs.chunk_count());
+    backend.parallel_for(counts.size(), [&](std::size_t c) {
+      const std::size_t first = gs.chunk_id(c) * kProjectChunk;
+      const std::uint32_t parts = candidate_parts(args, c);
+      if (parts == 0) return;
+      const SeenRows seen = gs.seen_rows(gs.chunk_id(c));
+      for (std::size_t i = first; i < first + kProjectChunk && i < gs.size; ++i) {
+        if ((parts >> ((i - first) / kChunkPart) & 1u) == 0 || !seen.has(i - first)) continue;
+        ++counts[c].touched;
+        RowSplat<float> row;
+        if (!project_row(args, false, i, row)) continue;
+        bool any = false;
+        for_each_tile(grid, row.splat.geometry, row.splat.bounds, log2_alpha_min,
+                      config.response == Response::ewa, [&any](std::size_t) { any = true; });
+        counts[c].emitting += any ? 1 : 0;
+      }
+    });
+    static_cast<void>(backend.synchronize());
+    out.rows += gs.size;
+    for (const Count& n : counts) {
+      out.touched += n.touched;
+      out.emitting += n.emitting;
+    }
+  }
+  return out;
+}
+
+}  // namespace gsnav

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/core/parallel.hpp"
+#include "gsnav/frame/blend.hpp"
+#include "gsnav/frame/color_space.hpp"
+#include "gsnav/frame/project_chunk.hpp"
+#include "gsnav/frame/tiles.hpp"
+#include "gsnav/render/composite_steps.hpp"
+#include "gsnav/render/order_visible.hpp"
+#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/render_workspace.hpp"
+#include "gsnav/core/stages.hpp"
+#include "gsnav/render/validate_set.hpp"
+
+namespace gsnav {
+
+namespace detail {
+
+template <Backend B>
+TileGrid grid_of(const RenderConfig& config, const Camera& camera) noexcept {
+  return TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
+}
+
+/// One work item per row of pixels: enough parallelism on a CPU at little overhead.
+template <class S, class PixelKernel>
+struct RasterizeRow {
+  PixelKernel kernel;
+  std::size_t width;
+  GSNAV_HD void operator()(std::size_t y) const noexcept {
+    for (std::size_t x = 0; x < width; ++x) kernel(y * width + x);
+  }
+};
+
+template <class S, Backend B>
+void blend_pixels(B& backend, const RasterArgs<S>& args) {
+  const std::size_t width = static_cast<std::size_t>(args.grid.width);
+  const std::size_t height = static_cast<std::size_t>(args.grid.height);
+  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
+    using Kernel = RasterizePixel<S, C, D, M, P>;
+    if constexpr (is_host_backend<B>) {
+      backend.parallel_for(height, RasterizeRow<S, Kernel>{{args}, width});
+    } else {
+      backend.parallel_for(width * height, Kernel{args});
+    }
+  });
+}
+
+/// Sizes the scratch of one camera's frame and writes the projection's arguments.
+template <class S, Backend B>
+void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
+                        const RenderConfig& config, const FrameImages<S>& images, bool meshes) {
+  ws.projections.resize(sets.size());
+  std::size_t chunks = 0;
+  bool ranked = false;
+  for (const GaussianSet& set : sets) {
+    chunks += set.gaussians.chunk_count();
+    ranked = ranked || !set.gaussians.row_ids.empty();
+  }
+  const std::size_t slots = chunks * kProjectChunk;
+  const bool color = images.rgb != nullptr;
+  const bool depth = meshes || images.depth_mode() != DepthMode::none;
+
+  ws.geometry.resize_discard(slots);
+  ws.bounds.resize_discard(slots);
+  ws.visible.chunk_keys.resize_discard(slots);
+  ws.visible.ranks.resize_discard(ranked ? slots : 0);
+  ws.colors.resize_discard(color ? slots : 0);
+  ws.depths.resize_discard(depth ? slots : 0);
+  ws.perspectives.resize_discard(config.response != Response::ewa ? slots : 0);
+  ws.visible.counts.resize_discard(chunks);
+  constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
+  ws.spans.resize_discard(kSpans ? slots : 0);
+  ProjectOutputs<S>& out = ws.projected;
+  out = {};
+  out.geometry = ws.geometry.view();
+  out.colors = ws.colors.view();
+  out.depths = ws.depths.view();
+  out.perspectives = ws.perspectives.view();
+  out.bounds = ws.bounds.view();
+  out.keys = ws.visible.chunk_keys.view();
+  out.ranks = ws.visible.ranks.view();
+  out.counts = ws.visible.counts.view();
+  out.grid = grid_of<B>(config, camera);
+  out.spans = ws.spans.view();
+
+  const ProjectionRules rules = projection_rules(config);
+  ws.host_offsets.clear();
+  std::size_t first_chunk = 0, first_rank = 0;
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    ProjectArgs<S>& a = ws.projections[i];
+    a = make_project_args<S>(camera, sets[i], rules, config.max_sh_degree);
+    a.first_chunk = first_chunk;
+    a.first_rank = static_cast<std::uint32_t>(first_rank);
+    a.offsets.size = origin_count(a.gaussians);
+    for (std::size_t o = 0; o < a.offsets.size; ++o) ws.host_offsets.push_back(origin_offset(a, o));
+    first_chunk += a.chunk_count();
+    first_rank += a.gaussians.size;
+  }
+  ws.offsets.upload(ws.host_offsets.data(), ws.host_offsets.size());
+  const Vec3d* offsets = ws.offsets.data();
+  for (ProjectArgs<S>& a : ws.projections) {
+    a.offsets.data = offsets;
+    offsets += a.offsets.size;
+  }
+}
+
+/// Whether colours of a set have to be converted before they are blended.
+inline bool any_other_space(std::span<const GaussianSet> sets, const RenderConfig& config) noexcept {
+  return std::any_of(sets.begin(), sets.end(),
+                     [&](const GaussianSet& s) { return s.color_space != config.blend_space; });
+}
+
+/// Converts the colours of one projected set where its space is not the frame's.
+template <class S, Backend B>
+void convert_set(B& backend, const ProjectArgs<S>& args, const ProjectOutputs<S>& out, ColorSpace from,
+                 ColorSpace to) {
+  if (from == to || out.colors.empty()) return;
+  backend.parallel_for(args.chunk_count(),
+                       ConvertSplatColors<S>{out.colors, out.counts, args.first_chunk, from, to});
+}
+
+/// What comes after the projection of one camera: sort, bin, blend, of the keys in `range`. Adds to `stats`.
+template <class S, Backend B>
+Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera, const RenderConfig& config,
+                      const KeyRange& range, const TileProgress<S>& progress, const MeshLayer<S>& mesh,
+                      const FrameImages<S>& images, RenderStats& stats) {
+  // ---- sort
+  // Distances may round to below the near plane that their z is beyond, but not to half of it.
+  const float near_plane = ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // of all sets
+  const std::uint32_t base = config.key_bits < 32 ? 0 : std::max(bits_of(0.5f * near_plane), range.low);
+  const Result<std::size_t> ordered = order_visible(backend, ws.visible, base, config.key_bits, range);
+  if (!ordered) return ordered.status();
+  const std::size_t visible = ordered.value();
+
+  // ---- bin
+  BinArgs<S> bin;
+  bin.grid = grid_of<B>(config, camera);
+  bin.order = ws.visible.order.view();
+  bin.geometry = ws.geometry.view();
+  bin.bounds = ws.bounds.view();
+  bin.log2_alpha_min = static_cast<S>(std::log2(config.alpha_min));
+  bin.elliptic = config.response == Response::ewa;
+  bin.blocks = visible < 4096 ? 1 : concurrency_of(backend);
+  ws.cursors.resize_discard(bin.blocks * bin.grid.count());
+  ws.tile_offsets.resize_discard(bin.grid.count() + 1);
+  bin.cursors = ws.cursors.view();
+  bin.tile_offsets = ws.tile_offsets.view();
+  bin.spans = ws.spans.view();
+  const MeshCull<S> cull{ws.depths.view(), mesh.tile_far};
+  if (mesh.empty()) {
+    run(backend, stage::CountTiles{}, bin, NoCull{});
+  } else {
+    run(backend, stage::CountTiles{}, bin, cull);
+  }
+  std::uint64_t intersections = 0;
+  ws.tile_offsets.download(&intersections, 1, bin.grid.count());
+  if (Status s = backend.synchronize(); !s) return s;
+  ws.tile_splats.resize_discard(intersections);
+  bin.tile_splats = ws.tile_splats.view();
+  if (mesh.empty()) {
+    run(backend, stage::ScatterTiles{}, bin, NoCull{});
+  } else {
+    run(backend, stage::ScatterTiles{}, bin, cull);
+  }
+
+  // ---- blend
+  RasterArgs<S> raster;
+  raster.grid = bin.grid;
+  raster.tile_offsets = ws.tile_offsets.view();
+  raster.tile_splats = ws.tile_splats.view();
+  raster.geometry = ws.geometry.view();
+  raster.colors = ws.colors.view();
+  raster.depths = ws.depths.view();
+  raster.perspectives = ws.perspectives.view();
+  raster.rules = blend_rules<S>(config, images);
+  raster.background = vec_cast<S>(config.background);
+  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
+  raster.images = images;
+  raster.progress = progress;
+  raster.mesh = mesh;
+  if (mesh.empty()) {
+    run(backend, stage::Blend{}, raster);
+  } else {
+    detail::rasterize_composite(backend, raster);
+  }
+
+  stats.visible += visible;
+  stats.tile_intersections += intersections;
+  return {};
+}
+
+/// Slices that a frame is drawn in, of which so many Gaussians at most may be visible.
+inline int depth_slices_of(const RenderConfig& config, std::size_t candidates, const Camera& camera) noexcept {
+  if (config.response != Response::ewa || config.compat != Compat::none || config.key_bits < 32) return 1;
+  if (config.depth_slices != 0) return config.depth_slices;
+  // Where few Gaussians are for a pixel, projecting them is a small part of the frame.
+  constexpr std::size_t kFew = 131072;
+  const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  return candidates < kFew || candidates < pixels / 2 ? 1 : 4;
+}
+
+/// Projects and draws a frame, front to back, in slices of depth; false where one is as good.
+template <class B>
+Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Camera& camera,
+                            const RenderConfig& config, const FrameImages<float>& images, RenderStats& stats) {
+  if (depth_slices_of(config, stats.gaussians, camera) < 2) return false;  // nothing needs to be planned
+  DepthSlices& slices = ws.slices;
+  const View<const ProjectArgs<float>> sets = view_of(ws.projections);
+  slices.plan(backend, sets);
+  const int count = depth_slices_of(config, slices.candidates(), camera);
+  if (count < 2) return false;
+  slices.cut(count);
+  const int last = slices.count() - 1;
+
+  const TileGrid grid = grid_of<B>(config, camera);
+  const std::size_t pixels = static_cast<std::size_t>(grid.tile_size) * static_cast<std::size_t>(grid.tile_size);
+  ws.open.resize_discard(grid.count());
+  ws.states.resize_discard(grid.count() * pixels * blend_state_values(images.depth_mode()));
+  std::fill(ws.visible.counts.data(), ws.visible.counts.data() + ws.visible.counts.size(), 0u);
+  for (int s = 0; s <= last; ++s) {
+    for (const ProjectArgs<float>& args : sets) {
+      const View<const std::uint32_t> chunks = slices.chunks(s, args, ws.projected.open);
+      if (!chunks.empty()) run(backend, stage::Project{}, args, ws.projected, chunks);
+    }
+    const TileProgress<float> progress{ws.open.view(), ws.states.view(), s == 0, s == last};
+    if (Status e = draw_projected(backend, ws, camera, config, slices.keys(s), progress, {}, images, stats); !e) {
+      return e;
+    }
+    if (s == last) break;
+    ws.projected.open = slices.open_cells(grid, ws.open.view());
+    const View<const std::uint32_t>& sums = ws.projected.open.sums;
+    if (sums[sums.size - 1] == 0) break;
+  }
+  return true;
+}
+
+
+/// render_camera, and behind a mesh where there is one.
+template <class S, Backend B>
+Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
+                    const RenderConfig& config, const MeshLayer<S>& mesh, const FrameImages<S>& images,
+                    RenderStats& stats) {
+  if (Status s = validate(config); !s) return s;
+  if (Status s = validate(camera); !s) return s;
+  std::size_t slots = 0;
+  RenderStats counted;
+  for (const GaussianSet& set : sets) {
+    if (Status s = validate(set); !s) return s;
+    slots += set.gaussians.chunk_count() * kProjectChunk;
+    counted.gaussians += set.gaussians.size;
+  }
+  if (slots > std::numeric_limits<std::uint32_t>::max()) {
+    return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
+  }
+  detail::prepare_projection(ws, sets, camera, config, images, !mesh.empty());
+  bool drawn = false;
+  if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
+    if (mesh.empty() && !detail::any_other_space(sets, config)) {
+      const Result<bool> sliced = detail::draw_in_slices(backend, ws, camera, config, images, counted);
+      if (!sliced) return sliced.status();
+      drawn = sliced.value();
+    }
+  }
+  if (!drawn) {
+    for (std::size_t i = 0; i < sets.size(); ++i) {
+      const ProjectArgs<S>& args = ws.projections[i];
+      if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
+        if (!mesh.empty()) {
+          std::fill_n(ws.projected.counts.data + args.first_chunk, args.chunk_count(), 0u);
+          detail::project_unhidden(backend, args, ws.projected, mesh.tile_far, ws.mesh.unhidden);
+          detail::convert_set(backend, args, ws.projected, sets[i].color_space, config.blend_space);
+          continue;
+        }
+      }
+      run(backend, stage::Project{}, args, ws.projected);
+      detail::convert_set(backend, args, ws.projected, sets[i].color_space, config.blend_space);
+    }
+    if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, mesh, images, counted); !s) return s;
+  }
+  stats = counted;
+  return {};
+}
+
+}  // namespace detail
+
+/// Renders sets of Gaussians as one sorted list into the images of one camera: project, sort by
+/// (float32 key, set, row), bin into tiles, blend. Arrays of `sets` and pointers of `images` are in the
+/// backend's memory ([H][W] row-major). Fills `stats` when given. The result is there after
+/// `backend.synchronize()`.
+///
+/// Errors: invalid_argument naming the field; out_of_memory is thrown by the workspace.
+template <class S, Backend B>
+Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
+                     const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
+                     RenderStats* stats = nullptr) {
+  RenderStats counted;
+  Status s = detail::render_frame<S>(backend, ws, sets, camera, config, {}, images, counted);
+  if (s.ok() && stats != nullptr) *stats = counted;
+  return s;
+}
+
+}  // namespace gsnav

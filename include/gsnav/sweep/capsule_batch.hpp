@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/core/view.hpp"
+#include "gsnav/sweep/capsule.hpp"
+
+// Many pairs of capsules at once, by planes: what lanes and devices read. Positions relative to an origin near the
+// capsules (sweep/capsule.hpp).
+
+namespace gsnav {
+
+/// N capsules, metres.
+template <class S>
+struct CapsulePlanes {
+  View<const S> p0[3], p1[3];  ///< x, y, z, [N] each
+  View<const S> radius;        ///< [N], >= 0
+
+  GSNAV_HD Capsule<S> operator[](std::size_t i) const noexcept {
+    return {{p0[0][i], p0[1][i], p0[2][i]}, {p1[0][i], p1[1][i], p1[2][i]}, radius[i]};
+  }
+};
+
+/// N capsules that move linearly over one interval.
+template <class S>
+struct MovingCapsulePlanes {
+  CapsulePlanes<S> begin, end;
+
+  GSNAV_HD MovingCapsule<S> operator[](std::size_t i) const noexcept { return {begin[i], end[i]}; }
+};
+
+/// Gaps of N pairs. What is written has the meaning of CapsuleGap.
+template <class S>
+struct CapsuleGapArgs {
+  CapsulePlanes<S> a, b;
+  View<S> gap;                            ///< [N]
+  View<S> normal[3], on_a[3], on_b[3];    ///< [N] each, or all empty: not asked for
+
+  GSNAV_HD std::size_t size() const noexcept { return a.radius.size; }
+  GSNAV_HD bool asks_for_points() const noexcept { return !normal[0].empty(); }
+};
+
+/// Bits of SweepArgs::outcome.
+inline constexpr std::uint8_t kSweepHit = 1, kSweepPushed = 2, kSweepAgentClosing = 4;
+
+/// Sweeps of N pairs. What is written has the meaning of SweepResult.
+template <class S>
+struct SweepArgs {
+  MovingCapsulePlanes<S> agents, bodies;
+  SweepRules<S> rules;
+  View<std::uint8_t> outcome;             ///< [N] sums of kSweepHit, kSweepPushed, kSweepAgentClosing
+  View<S> time, start_gap;                ///< [N] each
+  View<S> contact_time, gap;              ///< [N] each, or, with normal and point, all empty: not asked for
+  View<S> normal[3], point[3];            ///< [N] each, or empty
+
+  GSNAV_HD std::size_t size() const noexcept { return agents.begin.radius.size; }
+  GSNAV_HD bool asks_for_contact() const noexcept { return !contact_time.empty(); }
+};
+
+/// Gap of pair i.
+template <class S>
+struct GapOfPair {
+  CapsuleGapArgs<S> args;
+
+  GSNAV_HD void operator()(std::size_t i) const noexcept {
+    const CapsuleGap<S> g = capsule_gap(args.a[i], args.b[i]);
+    args.gap[i] = g.gap;
+    if (!args.asks_for_points()) return;
+    for (int k = 0; k < 3; ++k) {
+      args.normal[k][i] = g.normal[k];
+      args.on_a[k][i] = g.on_a[k];
+      args.on_b[k][i] = g.on_b[k];
+    }
+  }
+};
+
+/// Sweep of pair i.
+template <class S>
+struct SweepPair {
+  SweepArgs<S> args;
+
+  GSNAV_HD void operator()(std::size_t i) const noexcept {
+    const SweepResult<S> r = sweep(args.agents[i], args.bodies[i], args.rules);
+    args.outcome[i] = static_cast<std::uint8_t>((r.hit ? kSweepHit : 0) | (r.pushed ? kSweepPushed : 0) |
+                                                (r.agent_closing ? kSweepAgentClosing : 0));
+    args.time[i] = r.time;
+    args.start_gap[i] = r.start_gap;
+    if (!args.asks_for_contact()) return;
+    args.contact_time[i] = r.contact_time;
+    args.gap[i] = r.gap;
+    for (int k = 0; k < 3; ++k) {
+      args.normal[k][i] = r.normal[k];
+      args.point[k][i] = r.point[k];
+    }
+  }
+};
+
+}  // namespace gsnav
