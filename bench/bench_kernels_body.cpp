@@ -11,9 +11,9 @@
 #if defined(GSNAV_HAS_CUDA)
 #include "device_time.hpp"
 #endif
-#include "gsnav/avatar/skinning_weights.hpp"
+#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/skin/fk.hpp"
+#include "gsnav/detail/skin/fk.hpp"
 #include "gsnav/skin/skin.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "kernel_bench.hpp"

@@ -18,7 +18,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/lod_build.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/visible_sets.hpp"

@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/io/mesh_file.hpp"
-#include "gsnav/nav/geodesic_field.hpp"
-#include "gsnav/nav/local_planner.hpp"
-#include "gsnav/nav/step_batch.hpp"
-#include "gsnav/nav/time_planner.hpp"
+#include "gsnav/detail/io/mesh_file.hpp"
+#include "gsnav/detail/nav/geodesic_field.hpp"
+#include "gsnav/detail/nav/local_planner.hpp"
+#include "gsnav/detail/nav/step_batch.hpp"
+#include "gsnav/detail/nav/time_planner.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "navmesh_impl.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "gsnav/nav/gaussian_navmesh.hpp"
+#include "gsnav/detail/nav/gaussian_navmesh.hpp"
 #include "large_capture.hpp"
 
 namespace {

@@ -18,7 +18,7 @@
 #include "gsnav/sim/batch.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
-#include "gsnav/sim/scene_library.hpp"
+#include "gsnav/detail/sim/scene_library.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include <cuda_runtime_api.h>
 

@@ -28,7 +28,7 @@
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
-#include "gsnav/eval/depth_error.hpp"
+#include "gsnav/detail/eval/depth_error.hpp"
 #include "gsnav/eval/image_error.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "reference.hpp"

@@ -10,10 +10,10 @@
 #include <memory>
 #include <vector>
 
-#include "gsnav/avatar/humanoid.hpp"
-#include "gsnav/avatar/proxy_fit.hpp"
-#include "gsnav/avatar/skinned_crowd.hpp"
-#include "gsnav/avatar/weight_gradients.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/avatar/proxy_fit.hpp"
+#include "gsnav/detail/avatar/skinned_crowd.hpp"
+#include "gsnav/detail/avatar/weight_gradients.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/sim/batch.hpp"

@@ -12,12 +12,12 @@
 
 #include "compare.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/describe_cloud.hpp"
+#include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/scene/spatial_order.hpp"
-#include "gsnav/scene/views_around.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "floor_loops.hpp"
-#include "gsnav/math/pack.hpp"
+#include "gsnav/detail/math/pack.hpp"
 
 namespace gsnav_bench {
 

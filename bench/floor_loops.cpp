@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/math/pack.hpp"
+#include "gsnav/detail/math/pack.hpp"
 
 namespace gsnav_bench {
 

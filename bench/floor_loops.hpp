@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/frame/blend.hpp"
+#include "gsnav/detail/frame/blend.hpp"
 
 // The loops whose times make the floor of a frame (floor.hpp), each alone with its data in cache where a
 // renderer could have it there, and the loop that counts a frame's fragments. Compiled for the processor at hand.

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/eval/oracle_photo.hpp"
+#include "gsnav/detail/eval/oracle_photo.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "samples.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "gsnav/skin/lbs.hpp"
 #include "gsnav/frame/sh.hpp"
-#include "gsnav/math/pack.hpp"
+#include "gsnav/detail/math/pack.hpp"
 
 namespace gsnav_bench {
 

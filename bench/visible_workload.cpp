@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/io/visible_file.hpp"
-#include "gsnav/nav/gaussian_navmesh.hpp"
-#include "gsnav/nav/viewpoints.hpp"
+#include "gsnav/detail/io/visible_file.hpp"
+#include "gsnav/detail/nav/gaussian_navmesh.hpp"
+#include "gsnav/detail/nav/viewpoints.hpp"
 #include "workload.hpp"
 
 using namespace gsnav;

@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 
-#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/sim/default_scene.hpp"
 

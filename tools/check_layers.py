@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that no include points up or sideways (docs/architecture.md, "Layers").
+"""Checks that no include points up or sideways, and that examples and tools use public headers alone
+(docs/architecture.md, "Layers").
 
 usage: check_layers.py [root]      check a source tree (default: this one)
        check_layers.py --self-test plant violations in a scratch tree and expect to find each
@@ -14,9 +15,10 @@ RANK = {"base": 0, "math": 1, "core": 2, "image": 3, "frame": 4, "skin": 4, "swe
         "render": 6, "scene": 7, "avatar": 7, "nav": 7, "io": 8, "interop": 8, "sim": 8, "eval": 8}
 # avatar may include these
 DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface_material.hpp"}
-UMBRELLA = {"math", "core", "image", "frame", "skin", "sweep", "mesh", "render", "scene", "avatar", "base"}
 # Not standard, but there wherever the code that includes them is compiled.
 PLATFORM_HEADERS = {"immintrin.h", "arm_neon.h", "fcntl.h", "sys/mman.h", "sys/stat.h", "unistd.h"}
+MODULES = {"render", "avatar", "nav", "sim", "io", "eval", "gsnav"}  # headers that include what users need
+MOST_PUBLIC = 70
 SOURCES = {".hpp", ".cpp", ".h", ".inl", ".cu", ".cuh"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 
@@ -26,8 +28,8 @@ def layer_of(path):
     parts = path.parts
     if parts[:2] == ("include", "gsnav"):
         if len(parts) == 3:
-            return "umbrella" if parts[2] == "gsnav.hpp" else "base"
-        return parts[2]
+            return "umbrella" if path.stem in MODULES else "base"
+        return parts[3] if parts[2] == "detail" else parts[2]
     return f"backend {parts[1]}" if parts[0] == "backends" else parts[1]  # src/<layer>
 
 
@@ -35,7 +37,7 @@ def allowed(layer, target, target_path):
     if layer == target:
         return True
     if layer == "umbrella":
-        return target in UMBRELLA
+        return True
     if layer.startswith("backend"):
         return RANK.get(target, 99) <= RANK["render"]
     if layer == "avatar" and target_path in DATA_ONLY:
@@ -67,8 +69,18 @@ def check(root):
                 if public and not standard and name not in PLATFORM_HEADERS:
                     wrong.append(f"{path}: a public header includes {name}, which is not standard")
                 continue
-            if not allowed(layer, target, name.removeprefix("gsnav/")):
+            if not allowed(layer, target, name.removeprefix("gsnav/").removeprefix("detail/")):
                 wrong.append(f"{path}: {layer} may not include {name} ({target})")
+    for top in ("examples", "tools"):
+        for file in sorted(p for p in (root / top).rglob("*") if p.suffix in SOURCES):
+            files.append(file)
+            for _, name in INCLUDE.findall(file.read_text(encoding="utf-8")):
+                if name.startswith("gsnav/detail/"):
+                    wrong.append(f"{file.relative_to(root)}: {name} is not for users; its module header is")
+    public = [p for p in (root / "include/gsnav").rglob("*.hpp")
+              if p.relative_to(root / "include/gsnav").parts[0] != "detail"]
+    if len(public) > MOST_PUBLIC:
+        wrong.append(f"include/gsnav: {len(public)} public headers, more than {MOST_PUBLIC}")
     return files, wrong
 
 
@@ -81,7 +93,7 @@ def self_test():
            "include/gsnav/scene/sideways.hpp": '"gsnav/nav/navmesh.hpp"',
            "include/gsnav/avatar/not_data.hpp": '"gsnav/scene/renderer.hpp"',
            "include/gsnav/render/backend.hpp": "<gsnav/backends/serial.hpp>",
-           "include/gsnav/scene/library.hpp": "<Eigen/Core>", "include/gsnav/gsnav.hpp": '"gsnav/io/ply.hpp"',
+           "include/gsnav/scene/library.hpp": "<Eigen/Core>", "tools/t/main.cpp": '"gsnav/detail/io/ply.hpp"',
            "src/sim/reads.cpp": '#  include "../io/private.hpp"', "src/io/private.hpp": "",
            "backends/y/gsnav/backends/y.hpp": '"gsnav/backends/x.hpp"',
            "backends/z/src/z.cpp": '"gsnav/scene/renderer.hpp"', "src/other/o.cpp": ""}

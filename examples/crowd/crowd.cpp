@@ -5,8 +5,8 @@
 #include <chrono>
 #include <cmath>
 
-#include "gsnav/nav/local_planner.hpp"
-#include "gsnav/sim/proximity.hpp"
+#include "gsnav/nav.hpp"
+#include "gsnav/sim.hpp"
 
 using namespace gsnav;
 

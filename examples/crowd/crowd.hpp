@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "gsnav/nav/time_planner.hpp"
+#include "gsnav/nav.hpp"
 #include "gsnav/sim/metrics.hpp"
 
 // People who walk to and fro between places of a NavMesh, each by the shortest path, and an agent that has to get

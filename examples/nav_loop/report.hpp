@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/sim/episode.hpp"
+#include "gsnav/sim.hpp"
 #include "gsnav/sim/metrics.hpp"
 #include "options.hpp"
 

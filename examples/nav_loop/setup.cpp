@@ -10,13 +10,10 @@
 #else
 #include "gsnav/backends/serial.hpp"
 #endif
-#include "gsnav/io/lod_file.hpp"
+#include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/visible_file.hpp"
-#include "gsnav/nav/gaussian_navmesh.hpp"
-#include "gsnav/nav/viewpoints.hpp"
-#include "gsnav/scene/drop_bands.hpp"
-#include "gsnav/scene/scene_profile.hpp"
+#include "gsnav/nav.hpp"
+#include "gsnav/render.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/people.hpp"
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/skin/fk.hpp"
+#include "gsnav/detail/skin/fk.hpp"
 
 namespace gsnav {
 

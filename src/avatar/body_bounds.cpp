@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/body_bounds.hpp"
+#include "gsnav/detail/avatar/body_bounds.hpp"
 
 #include <cstddef>
 #include <vector>
 
-#include "gsnav/skin/skin_modes.hpp"
+#include "gsnav/detail/skin/skin_modes.hpp"
 
 namespace gsnav {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/capsule_track.hpp"
+#include "gsnav/detail/avatar/capsule_track.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/foot_lock.hpp"
+#include "gsnav/detail/avatar/foot_lock.hpp"
 
 #include <algorithm>
 #include <cmath>

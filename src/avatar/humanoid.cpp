@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/humanoid.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/avatar/proxy_fit.hpp"
+#include "gsnav/detail/avatar/proxy_fit.hpp"
 #include "gsnav/core/rng.hpp"
 #include "humanoid_body.hpp"
 #include "humanoid_surface.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "body_shape.hpp"
-#include "gsnav/avatar/smpl_joints.hpp"
+#include "gsnav/detail/avatar/smpl_joints.hpp"
 
 namespace gsnav::detail {
 

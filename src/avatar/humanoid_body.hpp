@@ -6,7 +6,7 @@
 #include <string>
 
 #include "body_shape.hpp"
-#include "gsnav/avatar/humanoid.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/avatar/skeleton.hpp"
 
 namespace gsnav::detail {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/mesh_avatar.hpp"
+#include "gsnav/detail/avatar/mesh_avatar.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/avatar/mesh_surface.hpp"
+#include "gsnav/detail/avatar/mesh_surface.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "mesh_weights.hpp"

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/avatar/mesh_avatar.hpp"
+#include "gsnav/detail/avatar/mesh_avatar.hpp"
 
 namespace gsnav::detail {
 

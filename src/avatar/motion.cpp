@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "gsnav/skin/lbs.hpp"
-#include "gsnav/math/screw.hpp"
+#include "gsnav/detail/math/screw.hpp"
 
 namespace gsnav {
 

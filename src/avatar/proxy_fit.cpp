@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/proxy_fit.hpp"
+#include "gsnav/detail/avatar/proxy_fit.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/skin/skin_modes.hpp"
+#include "gsnav/detail/skin/skin_modes.hpp"
 
 namespace gsnav {
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "gsnav/skin/fk.hpp"
+#include "gsnav/detail/skin/fk.hpp"
 
 namespace gsnav {
 

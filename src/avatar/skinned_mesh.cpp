@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/skinned_mesh.hpp"
+#include "gsnav/detail/avatar/skinned_mesh.hpp"
 
 #include <cstddef>
 #include <cstdint>

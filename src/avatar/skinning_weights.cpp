@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/skinning_weights.hpp"
+#include "gsnav/detail/avatar/skinning_weights.hpp"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/smpl_joints.hpp"
+#include "gsnav/detail/avatar/smpl_joints.hpp"
 
 #include <array>
 #include <cstddef>

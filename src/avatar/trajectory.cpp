@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/trajectory.hpp"
+#include "gsnav/detail/avatar/trajectory.hpp"
 
 #include <cmath>
 #include <cstddef>

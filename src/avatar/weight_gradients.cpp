@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/weight_gradients.hpp"
+#include "gsnav/detail/avatar/weight_gradients.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/math/svd.hpp"
+#include "gsnav/detail/math/svd.hpp"
 #include "nearest_points.hpp"
 
 namespace gsnav {

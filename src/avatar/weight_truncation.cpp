@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/avatar/weight_truncation.hpp"
+#include "gsnav/detail/avatar/weight_truncation.hpp"
 
 #include <algorithm>
 #include <cstddef>

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "gsnav/eval/flip.hpp"
+#include "gsnav/detail/eval/flip.hpp"
 
 namespace gsnav::eval {
 namespace {

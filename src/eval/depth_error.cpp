@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/eval/depth_error.hpp"
+#include "gsnav/detail/eval/depth_error.hpp"
 
 #include <cmath>
 #include <string>

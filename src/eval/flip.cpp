@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/eval/flip.hpp"
+#include "gsnav/detail/eval/flip.hpp"
 
 #include <algorithm>
 #include <cmath>

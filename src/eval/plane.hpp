@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/eval/samples.hpp"
+#include "gsnav/detail/eval/samples.hpp"
 
 namespace gsnav::eval::detail {
 

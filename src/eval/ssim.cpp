@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/eval/ssim.hpp"
+#include "gsnav/detail/eval/ssim.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/detail/io/avatar_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "file.hpp"
-#include "gsnav/avatar/smpl_joints.hpp"
-#include "gsnav/avatar/weight_gradients.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/avatar/smpl_joints.hpp"
+#include "gsnav/detail/avatar/weight_gradients.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "npz_arrays.hpp"
 

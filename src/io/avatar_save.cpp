@@ -3,9 +3,9 @@
 #include <array>
 
 #include "file.hpp"
-#include "gsnav/avatar/smpl_joints.hpp"
-#include "gsnav/io/avatar_file.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/avatar/smpl_joints.hpp"
+#include "gsnav/detail/io/avatar_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "gsnav/frame/sh.hpp"
 
 namespace gsnav::io {

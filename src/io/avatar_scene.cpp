@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "file.hpp"
-#include "gsnav/io/avatar_scene_file.hpp"
+#include "gsnav/detail/io/avatar_scene_file.hpp"
 #include "json.hpp"
 #include "npz_arrays.hpp"
 

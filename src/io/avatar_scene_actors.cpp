@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "file.hpp"
-#include "gsnav/avatar/capsule_track.hpp"
-#include "gsnav/io/avatar_file.hpp"
-#include "gsnav/io/avatar_scene_file.hpp"
-#include "gsnav/io/motion_file.hpp"
+#include "gsnav/detail/avatar/capsule_track.hpp"
+#include "gsnav/detail/io/avatar_file.hpp"
+#include "gsnav/detail/io/avatar_scene_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
 #include "npz_arrays.hpp"
 
 namespace gsnav::io {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/detail/io/cameras_file.hpp"
 
 #include <cmath>
 

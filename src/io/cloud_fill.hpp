@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/core/guarded.hpp"
-#include "gsnav/core/huge_pages.hpp"
-#include "gsnav/core/thread_pool.hpp"
+#include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/core/huge_pages.hpp"
+#include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
-#include "gsnav/scene/needed_bands.hpp"
+#include "gsnav/detail/scene/needed_bands.hpp"
 #include "populate_pages.hpp"
 #include "threads.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/scene/describe_cloud.hpp"
+#include "gsnav/detail/scene/describe_cloud.hpp"
 
 namespace gsnav::io::detail {
 

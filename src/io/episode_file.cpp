@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/episode_file.hpp"
+#include "gsnav/detail/io/episode_file.hpp"
 
 #include <algorithm>
 #include <set>

@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <system_error>
 
-#include "gsnav/io/read_or_build.hpp"
+#include "gsnav/detail/io/read_or_build.hpp"
 
 #if __has_include(<malloc.h>)
 #include <malloc.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/gltf.hpp"
+#include "gsnav/detail/io/gltf.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,8 +11,8 @@
 #include "cloud_fill.hpp"
 #include "described.hpp"
 #include "gltf_nodes.hpp"
-#include "gsnav/io/spz.hpp"
-#include "gsnav/scene/edit_cloud.hpp"
+#include "gsnav/detail/io/spz.hpp"
+#include "gsnav/detail/scene/edit_cloud.hpp"
 #include "report_sum.hpp"
 
 namespace gsnav::io {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gltf_file.hpp"
-#include "gsnav/scene/surface_material.hpp"
+#include "gsnav/detail/scene/surface_material.hpp"
 
 namespace gsnav::io::detail {
 

@@ -7,8 +7,8 @@
 #include "cloud_check.hpp"
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/gltf.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/io/gltf.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "json.hpp"
 
 namespace gsnav::io {

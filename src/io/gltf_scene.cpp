@@ -7,7 +7,7 @@
 #include "gltf_material.hpp"
 #include "gltf_nodes.hpp"
 #include "gltf_primitive.hpp"
-#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/detail/io/mesh_file.hpp"
 
 namespace gsnav::io {
 namespace {

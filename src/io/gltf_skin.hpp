@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "gltf_nodes.hpp"
-#include "gsnav/io/skinned_mesh_file.hpp"
+#include "gsnav/detail/io/skinned_mesh_file.hpp"
 
 namespace gsnav::io::detail {
 

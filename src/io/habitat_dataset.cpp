@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/habitat_dataset.hpp"
+#include "gsnav/detail/io/habitat_dataset.hpp"
 
 #include <algorithm>
 #include <cmath>

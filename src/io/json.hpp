@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/io/read_limits.hpp"
+#include "gsnav/detail/io/read_limits.hpp"
 
 namespace gsnav::io::detail {
 

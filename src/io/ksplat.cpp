@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/ksplat.hpp"
+#include "gsnav/detail/io/ksplat.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/lod_file.hpp"
+#include "gsnav/detail/io/lod_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "file.hpp"
-#include "gsnav/core/pool_backend.hpp"
+#include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/scene/content_hash.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/content_hash.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 
 namespace gsnav::io {
 namespace {

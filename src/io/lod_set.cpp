@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/lod_set.hpp"
+#include "gsnav/detail/io/lod_set.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -11,9 +11,9 @@
 
 #include "described.hpp"
 #include "file.hpp"
-#include "gsnav/core/pool_backend.hpp"
-#include "gsnav/io/sog.hpp"
-#include "gsnav/scene/lod_levels.hpp"
+#include "gsnav/detail/core/pool_backend.hpp"
+#include "gsnav/detail/io/sog.hpp"
+#include "gsnav/detail/scene/lod_levels.hpp"
 #include "json.hpp"
 #include "report_sum.hpp"
 #include "sog_rows.hpp"

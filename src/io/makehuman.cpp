@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "file.hpp"
-#include "gsnav/io/skinned_mesh_file.hpp"
+#include "gsnav/detail/io/skinned_mesh_file.hpp"
 #include "json.hpp"
 #include "text_lines.hpp"
 

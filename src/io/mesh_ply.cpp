@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "file.hpp"
-#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/detail/io/mesh_file.hpp"
 #include "ply_body.hpp"
 
 namespace gsnav::io {

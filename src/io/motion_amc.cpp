@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "file.hpp"
-#include "gsnav/io/motion_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
 #include "motion_asf.hpp"
 #include "text_lines.hpp"
 

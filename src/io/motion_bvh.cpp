@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "file.hpp"
-#include "gsnav/io/motion_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
 
 namespace gsnav::io {
 namespace {

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "file.hpp"
-#include "gsnav/io/motion_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
 #include "npz_arrays.hpp"
 
 namespace gsnav::io {

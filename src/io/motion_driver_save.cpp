@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "file.hpp"
-#include "gsnav/io/motion_file.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "npz_arrays.hpp"
 
 namespace gsnav::io {

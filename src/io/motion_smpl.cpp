@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "file.hpp"
-#include "gsnav/avatar/smpl_joints.hpp"
-#include "gsnav/io/motion_file.hpp"
+#include "gsnav/detail/avatar/smpl_joints.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
 #include "npz_arrays.hpp"
 
 namespace gsnav::io {

@@ -6,7 +6,7 @@
 
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/navmesh_settings_file.hpp"
+#include "gsnav/detail/io/navmesh_settings_file.hpp"
 #include "json.hpp"
 
 namespace gsnav::io {

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <limits>
 
-#include "gsnav/core/thread_pool.hpp"
-#include "gsnav/scene/point_tree.hpp"
+#include "gsnav/detail/core/thread_pool.hpp"
+#include "gsnav/detail/scene/point_tree.hpp"
 #include "threads.hpp"
 
 namespace gsnav::io::detail {

@@ -3,7 +3,7 @@
 
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "npy_format.hpp"
 #include "zip.hpp"
 #include "zip_writer.hpp"

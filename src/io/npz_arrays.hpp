@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "gsnav/math/mat.hpp"
 
 namespace gsnav::io::detail {

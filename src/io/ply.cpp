@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 
 #include <algorithm>
 #include <array>

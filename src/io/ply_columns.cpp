@@ -5,7 +5,7 @@
 #include <array>
 
 #include "gsnav/frame/gaussians.hpp"
-#include "gsnav/frame/temporal.hpp"
+#include "gsnav/detail/frame/temporal.hpp"
 #include "ply_points.hpp"
 
 namespace gsnav::io::detail {

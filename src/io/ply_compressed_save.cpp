@@ -9,7 +9,7 @@
 #include "file.hpp"
 #include "format_range.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "quantised.hpp"
 
 namespace gsnav::io {

@@ -6,8 +6,8 @@
 #include "cloud_check.hpp"
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/ply.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/io/ply.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 
 namespace gsnav::io {
 namespace {

@@ -6,12 +6,12 @@
 #include "format_range.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/gltf.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/gltf.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/sog.hpp"
-#include "gsnav/io/splat.hpp"
-#include "gsnav/io/spz.hpp"
+#include "gsnav/detail/io/sog.hpp"
+#include "gsnav/detail/io/splat.hpp"
+#include "gsnav/detail/io/spz.hpp"
 #include "gsnav/frame/sh.hpp"
 
 namespace gsnav::io {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/sog.hpp"
+#include "gsnav/detail/io/sog.hpp"
 
 #include <algorithm>
 #include <cmath>

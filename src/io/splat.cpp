@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/splat.hpp"
+#include "gsnav/detail/io/splat.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,8 +5,8 @@
 #include "cloud_check.hpp"
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/splat.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/io/splat.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "quantised.hpp"
 
 namespace gsnav::io {

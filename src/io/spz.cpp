@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/spz.hpp"
+#include "gsnav/detail/io/spz.hpp"
 
 #include <algorithm>
 #include <cmath>

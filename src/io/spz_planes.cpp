@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "cloud_fill.hpp"
-#include "gsnav/core/huge_pages.hpp"
+#include "gsnav/detail/core/huge_pages.hpp"
 #include "gzip.hpp"
 #include "quantised.hpp"
 #include "widen_rows.hpp"

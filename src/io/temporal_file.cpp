@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/temporal_file.hpp"
+#include "gsnav/detail/io/temporal_file.hpp"
 
 #include <utility>
 

@@ -12,7 +12,7 @@
 #include "cloud_fill.hpp"
 #include "described.hpp"
 #include "file.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "npz_arrays.hpp"
 #include "temporal_rows.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "gsnav/io/temporal_file.hpp"
+#include "gsnav/detail/io/temporal_file.hpp"
 
 namespace gsnav::io::detail {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/io/visible_file.hpp"
+#include "gsnav/detail/io/visible_file.hpp"
 
 #include <cmath>
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/scene/content_hash.hpp"
+#include "gsnav/detail/scene/content_hash.hpp"
 
 namespace gsnav::io {
 namespace {

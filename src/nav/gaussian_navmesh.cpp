@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/gaussian_navmesh.hpp"
+#include "gsnav/detail/nav/gaussian_navmesh.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -10,8 +10,8 @@
 #include <mutex>
 #include <string>
 
-#include "gsnav/core/guarded.hpp"
-#include "gsnav/frame/packed_gaussians.hpp"
+#include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "navmesh_stages.hpp"
 
 namespace gsnav::detail {

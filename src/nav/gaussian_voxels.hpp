@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "gsnav/core/thread_pool.hpp"
-#include "gsnav/nav/gaussian_navmesh.hpp"
+#include "gsnav/detail/core/thread_pool.hpp"
+#include "gsnav/detail/nav/gaussian_navmesh.hpp"
 
 namespace gsnav::detail {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/geodesic_field.hpp"
+#include "gsnav/detail/nav/geodesic_field.hpp"
 
 #include <atomic>
 #include <limits>

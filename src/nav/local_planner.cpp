@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/local_planner.hpp"
+#include "gsnav/detail/nav/local_planner.hpp"
 
 #include <algorithm>
 #include <cmath>

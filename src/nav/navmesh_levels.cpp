@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/navmesh_levels.hpp"
+#include "gsnav/detail/nav/navmesh_levels.hpp"
 
 #include <algorithm>
 #include <array>

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
 #include "navmesh_impl.hpp"
 
 namespace gsnav {

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <new>
 
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
 #include "navmesh_format.hpp"
 #include "navmesh_stages.hpp"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
 #include "navmesh_format.hpp"
 #include "navmesh_impl.hpp"
 

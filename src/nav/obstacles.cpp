@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/obstacles.hpp"
+#include "gsnav/detail/nav/obstacles.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/path_clearance.hpp"
+#include "gsnav/detail/nav/path_clearance.hpp"
 
 #include <cmath>
 #include <string>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "gsnav/nav/step.hpp"
+#include "gsnav/detail/nav/step.hpp"
 #include "half_planes.hpp"
 
 namespace gsnav::detail {

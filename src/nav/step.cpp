@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/step.hpp"
+#include "gsnav/detail/nav/step.hpp"
 
 #include <cmath>
 #include <limits>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "gsnav/nav/step.hpp"
+#include "gsnav/detail/nav/step.hpp"
 
 namespace gsnav::detail {
 

@@ -9,8 +9,8 @@
 #include <thread>
 #include <utility>
 
-#include "gsnav/core/guarded.hpp"
-#include "gsnav/core/thread_pool.hpp"
+#include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/core/thread_pool.hpp"
 #include "navmesh_stages.hpp"
 #include "tile_islands.hpp"
 #include "triangle_heights.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/time_planner.hpp"
+#include "gsnav/detail/nav/time_planner.hpp"
 
 #include <cmath>
 #include <optional>

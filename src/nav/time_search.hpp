@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/nav/time_planner.hpp"
+#include "gsnav/detail/nav/time_planner.hpp"
 #include "timed_bodies.hpp"
 
 namespace gsnav::detail {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "gsnav/nav/step.hpp"
+#include "gsnav/detail/nav/step.hpp"
 
 namespace gsnav::detail {
 

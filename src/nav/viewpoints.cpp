@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/viewpoints.hpp"
+#include "gsnav/detail/nav/viewpoints.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/batch_world.hpp"
+#include "gsnav/detail/sim/batch_world.hpp"
 
 #include <algorithm>
 #include <exception>

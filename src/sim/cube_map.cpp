@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/cube_map.hpp"
+#include "gsnav/detail/sim/cube_map.hpp"
 
 #include <algorithm>
 #include <cmath>

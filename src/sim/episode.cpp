@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/episode.hpp"
+#include "gsnav/detail/sim/episode.hpp"
 
 namespace gsnav {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "gsnav/frame/sh.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 
 namespace gsnav::flat {
 namespace {

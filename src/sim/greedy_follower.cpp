@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/greedy_follower.hpp"
+#include "gsnav/detail/sim/greedy_follower.hpp"
 
 #include <cmath>
 #include <limits>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/noise.hpp"
+#include "gsnav/detail/sim/noise.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -8,8 +8,8 @@
 #include <optional>
 #include <utility>
 
-#include "gsnav/avatar/avatar.hpp"
-#include "gsnav/nav/step.hpp"
+#include "gsnav/detail/avatar/avatar.hpp"
+#include "gsnav/detail/nav/step.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav {

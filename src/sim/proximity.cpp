@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/proximity.hpp"
+#include "gsnav/detail/sim/proximity.hpp"
 
 #include <algorithm>
 #include <limits>

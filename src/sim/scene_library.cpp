@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/scene_library.hpp"
+#include "gsnav/detail/sim/scene_library.hpp"
 
 #include <algorithm>
 #include <utility>
 
-#include "gsnav/core/guarded.hpp"
+#include "gsnav/detail/core/guarded.hpp"
 
 namespace gsnav {
 namespace {

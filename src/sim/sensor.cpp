@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/sensor.hpp"
+#include "gsnav/detail/sim/sensor.hpp"
 
 #include <cmath>
 #include <numbers>

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "gsnav/sim/proximity.hpp"
+#include "gsnav/detail/sim/proximity.hpp"
 
 namespace gsnav {
 namespace {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "gsnav/avatar/avatar.hpp"
+#include "gsnav/detail/avatar/avatar.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
 #include "hard_cases/cases.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "avatar/support.hpp"
-#include "gsnav/math/screw.hpp"
+#include "gsnav/detail/math/screw.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "avatar/support.hpp"
-#include "gsnav/avatar/body_bounds.hpp"
-#include "gsnav/avatar/proxy_fit.hpp"
+#include "gsnav/detail/avatar/body_bounds.hpp"
+#include "gsnav/detail/avatar/proxy_fit.hpp"
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
 

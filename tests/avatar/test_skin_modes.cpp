@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "avatar/support.hpp"
-#include "gsnav/avatar/weight_gradients.hpp"
+#include "gsnav/detail/avatar/weight_gradients.hpp"
 #if defined(_OPENMP)
 #include "gsnav/backends/openmp.hpp"
 #endif

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gsnav/avatar/motion.hpp"
-#include "gsnav/io/skinned_mesh_file.hpp"
+#include "gsnav/detail/io/skinned_mesh_file.hpp"
 #include "support/data.hpp"
 
 namespace gsnav_test {

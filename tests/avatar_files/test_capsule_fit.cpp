@@ -7,10 +7,10 @@
 #include <string>
 
 #include "avatar_files/bodies.hpp"
-#include "gsnav/avatar/capsule_fit.hpp"
-#include "gsnav/avatar/capsule_volume.hpp"
-#include "gsnav/avatar/humanoid.hpp"
-#include "gsnav/avatar/mesh_avatar.hpp"
+#include "gsnav/detail/avatar/capsule_fit.hpp"
+#include "gsnav/detail/avatar/capsule_volume.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/avatar/mesh_avatar.hpp"
 #include "gsnav/core/rng.hpp"
 
 using namespace gsnav;

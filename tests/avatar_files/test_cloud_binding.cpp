@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "gsnav/avatar/cloud_binding.hpp"
+#include "gsnav/detail/avatar/cloud_binding.hpp"
 #include "gsnav/core/rng.hpp"
 
 using namespace gsnav;

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "avatar_files/bodies.hpp"
-#include "gsnav/avatar/clip_walk.hpp"
-#include "gsnav/avatar/foot_contact.hpp"
-#include "gsnav/avatar/foot_lock.hpp"
-#include "gsnav/avatar/humanoid.hpp"
-#include "gsnav/avatar/joint_match.hpp"
-#include "gsnav/io/motion_file.hpp"
+#include "gsnav/detail/avatar/clip_walk.hpp"
+#include "gsnav/detail/avatar/foot_contact.hpp"
+#include "gsnav/detail/avatar/foot_lock.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/avatar/joint_match.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

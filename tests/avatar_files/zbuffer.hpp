@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "gsnav/avatar/skinned_mesh.hpp"
+#include "gsnav/detail/avatar/skinned_mesh.hpp"
 #include "gsnav/image/camera.hpp"
 
 namespace gsnav_test {

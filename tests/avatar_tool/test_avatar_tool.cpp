@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/avatar/clip_walk.hpp"
-#include "gsnav/avatar/humanoid.hpp"
-#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/detail/avatar/clip_walk.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/io/avatar_file.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/motion_file.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
 #include "io/gltf_builder.hpp"
 #include "support/command.hpp"
 #include "support/data.hpp"

@@ -6,7 +6,7 @@
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/eval/oracle.hpp"
-#include "gsnav/eval/oracle_photo.hpp"
+#include "gsnav/detail/eval/oracle_photo.hpp"
 #include "gsnav/scene/renderer.hpp"
 #if defined(_OPENMP)
 #include "gsnav/backends/openmp.hpp"

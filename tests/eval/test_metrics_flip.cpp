@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "gsnav/eval/flip.hpp"
+#include "gsnav/detail/eval/flip.hpp"
 #include "images.hpp"
 
 using namespace gsnav;

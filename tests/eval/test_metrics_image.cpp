@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/eval/depth_error.hpp"
+#include "gsnav/detail/eval/depth_error.hpp"
 #include "gsnav/eval/image_error.hpp"
 
 using namespace gsnav;

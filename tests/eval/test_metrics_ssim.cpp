@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "gsnav/eval/ssim.hpp"
+#include "gsnav/detail/eval/ssim.hpp"
 #include "images.hpp"
 
 using namespace gsnav;

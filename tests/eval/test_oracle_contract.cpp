@@ -8,7 +8,7 @@
 
 #include "eval/oracle_support.hpp"
 #include "gsnav/frame/sh.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/brush.hpp"
 #include "support/oracle.hpp"

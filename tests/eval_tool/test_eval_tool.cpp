@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "support/files.hpp"
-#include "gsnav/io/episode_file.hpp"
+#include "gsnav/detail/io/episode_file.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "support/command.hpp"
 #include "support/process.hpp"
 #include "support/small_disk.hpp"

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/core/pool_backend.hpp"
-#include "gsnav/io/lod_file.hpp"
-#include "gsnav/io/visible_file.hpp"
-#include "gsnav/render/validate_set.hpp"
-#include "gsnav/scene/lod_build.hpp"
+#include "gsnav/detail/core/pool_backend.hpp"
+#include "gsnav/detail/io/lod_file.hpp"
+#include "gsnav/detail/io/visible_file.hpp"
+#include "gsnav/detail/render/validate_set.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
 #include "lod/lod_support.hpp"
 #include "support/files.hpp"
 

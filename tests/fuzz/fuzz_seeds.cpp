@@ -4,10 +4,10 @@
 #include <cstdio>
 
 #include "caches.hpp"
-#include "gsnav/io/cameras_file.hpp"
-#include "gsnav/io/episode_file.hpp"
+#include "gsnav/detail/io/cameras_file.hpp"
+#include "gsnav/detail/io/episode_file.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
 #include "io/ksplat_file.hpp"
 #include "io/ply_compressed_file.hpp"
 #include "io/splat_file.hpp"

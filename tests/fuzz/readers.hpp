@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/avatar/smpl_joints.hpp"
+#include "gsnav/detail/avatar/smpl_joints.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "io/avatar_npz.hpp"
 #include "io/glb_file.hpp"

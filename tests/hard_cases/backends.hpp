@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/math/pack.hpp"
+#include "gsnav/detail/math/pack.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
 #include "ops/backends.hpp"
 #include "support/frame_images.hpp"

@@ -15,7 +15,7 @@
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 
 // Inputs that several hard cases share.
 

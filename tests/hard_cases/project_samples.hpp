@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "gsnav/frame/projection.hpp"
+#include "gsnav/detail/frame/projection.hpp"
 #include "hard_cases/backends.hpp"
 #include "hard_cases/truth.hpp"
 

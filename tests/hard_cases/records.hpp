@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 

@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "gsnav/avatar/skinning_weights.hpp"
+#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/skin/skin.hpp"
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"

@@ -10,8 +10,8 @@
 #include "backends.hpp"
 #include "cases.hpp"
 #include "gsnav/render/count_culled.hpp"
-#include "gsnav/scene/edit_cloud.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/edit_cloud.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

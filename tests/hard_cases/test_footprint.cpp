@@ -2,7 +2,7 @@
 // N11, N18, N19: which pixels a Gaussian covers.
 #include <doctest/doctest.h>
 
-#include "gsnav/math/pack_layout.hpp"
+#include "gsnav/detail/math/pack_layout.hpp"
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/records.hpp"

@@ -13,8 +13,8 @@
 #include "backends.hpp"
 #include "cases.hpp"
 #include "eval/oracle_support.hpp"
-#include "gsnav/render/draw_fragments.hpp"
-#include "gsnav/sim/semantic_frame.hpp"
+#include "gsnav/detail/render/draw_fragments.hpp"
+#include "gsnav/detail/sim/semantic_frame.hpp"
 #include "support/fragment_truth.hpp"
 #include "support/scenes.hpp"
 

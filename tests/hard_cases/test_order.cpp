@@ -8,7 +8,7 @@
 
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
-#include "gsnav/math/pack_double.hpp"
+#include "gsnav/detail/math/pack_double.hpp"
 #include "support/oracle.hpp"
 #include "support/sanitized.hpp"
 #include "support/scenes.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "gsnav/avatar/motion.hpp"
-#include "gsnav/skin/fk.hpp"
+#include "gsnav/detail/skin/fk.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/truth.hpp"
 

@@ -2,7 +2,7 @@
 // N38 to N40, N61: colours from spherical harmonics.
 #include <doctest/doctest.h>
 
-#include "gsnav/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/truth_sh.hpp"

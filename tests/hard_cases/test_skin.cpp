@@ -5,7 +5,7 @@
 #include <array>
 #include <memory>
 
-#include "gsnav/avatar/skinned_crowd.hpp"
+#include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "hard_cases/skin_case.hpp"
 
 using namespace gsnav;

@@ -9,8 +9,8 @@
 #include "arrays.hpp"
 #include "backends.hpp"
 #include "cases.hpp"
-#include "gsnav/frame/cull.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/frame/cull.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

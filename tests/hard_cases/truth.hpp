@@ -6,7 +6,7 @@
 #include <cstddef>
 
 #include "gsnav/image/camera.hpp"
-#include "gsnav/frame/projection_camera.hpp"
+#include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 // What one Gaussian's alpha is, in long double and by the textbook: explicit covariance matrices, AC - B^2

@@ -22,12 +22,12 @@ BACKENDS = [ROOT / "backends" / name for name in ("serial", "openmp", "cuda")]
 NEEDS = {"gsnav/interop/eigen.hpp": "eigen", "gsnav/interop/glm.hpp": "glm",
          "gsnav/interop/dlpack.hpp": "dlpack"}
 DEVICE_LAYERS = ("math", "core", "image", "frame", "skin", "sweep", "mesh", "lanes", "render")
-HOST_ONLY = ("gsnav/math/pack", "gsnav/lanes/")  # lanes are host vectors
+HOST_ONLY = ("gsnav/detail/math/pack", "gsnav/detail/lanes/")  # lanes are host vectors
 WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow"]
 
 
 def layer(header):
-    parts = header.split("/")
+    parts = header.replace("gsnav/detail/", "gsnav/").split("/")
     return parts[1] if len(parts) > 2 else ""
 
 

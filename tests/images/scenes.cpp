@@ -7,11 +7,11 @@
 #include <limits>
 #include <utility>
 
-#include "gsnav/avatar/humanoid.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/scene/lod_build.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "hard_cases/cases.hpp"

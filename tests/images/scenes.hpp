@@ -12,8 +12,8 @@
 #include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/scene/temporal_cloud.hpp"
-#include "gsnav/sim/scene_on_backend.hpp"
+#include "gsnav/detail/scene/temporal_cloud.hpp"
+#include "gsnav/detail/sim/scene_on_backend.hpp"
 
 // Scenes in every storage and with every selection of rows, and how they come to a backend.
 

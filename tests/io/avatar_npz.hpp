@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 
 namespace gsnav_test {
 

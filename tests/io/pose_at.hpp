@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "gsnav/io/motion_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
 
 namespace gsnav_test {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "avatar_npz.hpp"
-#include "gsnav/avatar/avatar.hpp"
-#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/detail/avatar/avatar.hpp"
+#include "gsnav/detail/io/avatar_file.hpp"
 #include "support/files.hpp"
 
 using namespace gsnav;

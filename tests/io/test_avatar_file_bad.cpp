@@ -7,7 +7,7 @@
 
 #include "allocations.hpp"
 #include "avatar_npz.hpp"
-#include "gsnav/io/avatar_file.hpp"
+#include "gsnav/detail/io/avatar_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "zip_file.hpp"
 

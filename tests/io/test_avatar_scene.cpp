@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/avatar/humanoid.hpp"
-#include "gsnav/io/avatar_file.hpp"
-#include "gsnav/io/avatar_scene_file.hpp"
-#include "gsnav/io/motion_file.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/io/avatar_file.hpp"
+#include "gsnav/detail/io/avatar_scene_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "support/files.hpp"
 #include "support/joints.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "check_refused.hpp"
-#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/detail/io/cameras_file.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"
 

@@ -9,7 +9,7 @@
 #include "check_cloud.hpp"
 #include "cloud_fill.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "widen_rows.hpp"
 
 using namespace gsnav;

@@ -4,10 +4,10 @@
 #include "check_cloud.hpp"
 #include "check_turned.hpp"
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/io/ply.hpp"
-#include "gsnav/scene/edit_cloud.hpp"
+#include "gsnav/detail/io/ply.hpp"
+#include "gsnav/detail/scene/edit_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "row_clouds.hpp"
 #include "support/compiled_frames.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "support/files.hpp"
-#include "gsnav/io/episode_file.hpp"
+#include "gsnav/detail/io/episode_file.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

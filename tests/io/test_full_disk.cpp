@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/io/cameras_file.hpp"
-#include "gsnav/io/episode_file.hpp"
-#include "gsnav/io/gltf.hpp"
+#include "gsnav/detail/io/cameras_file.hpp"
+#include "gsnav/detail/io/episode_file.hpp"
+#include "gsnav/detail/io/gltf.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "row_clouds.hpp"
 #include "support/small_disk.hpp"

@@ -9,7 +9,7 @@
 #include "check_refused.hpp"
 #include "gltf_builder.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/detail/io/mesh_file.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;

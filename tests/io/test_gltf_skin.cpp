@@ -8,7 +8,7 @@
 
 #include "allocations.hpp"
 #include "gltf_builder.hpp"
-#include "gsnav/io/skinned_mesh_file.hpp"
+#include "gsnav/detail/io/skinned_mesh_file.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "support/files.hpp"
-#include "gsnav/io/habitat_dataset.hpp"
+#include "gsnav/detail/io/habitat_dataset.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

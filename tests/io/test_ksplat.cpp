@@ -6,7 +6,7 @@
 #include "allocations.hpp"
 #include "check_quantised.hpp"
 #include "check_refused.hpp"
-#include "gsnav/io/ksplat.hpp"
+#include "gsnav/detail/io/ksplat.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "ksplat_file.hpp"
 

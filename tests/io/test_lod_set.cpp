@@ -8,10 +8,10 @@
 #include "allocations.hpp"
 #include "check_cloud.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/io/lod_set.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/lod_set.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/sog.hpp"
+#include "gsnav/detail/io/sog.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;

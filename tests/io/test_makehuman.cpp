@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <string>
 
-#include "gsnav/io/skinned_mesh_file.hpp"
+#include "gsnav/detail/io/skinned_mesh_file.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "check_refused.hpp"
-#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/detail/io/mesh_file.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"
 

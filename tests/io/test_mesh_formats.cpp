@@ -5,7 +5,7 @@
 
 #include "check_refused.hpp"
 #include "glb_file.hpp"
-#include "gsnav/io/mesh_file.hpp"
+#include "gsnav/detail/io/mesh_file.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "allocations.hpp"
-#include "gsnav/io/motion_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
 #include "pose_at.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"

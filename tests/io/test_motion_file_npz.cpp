@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "avatar_npz.hpp"
-#include "gsnav/avatar/humanoid.hpp"
-#include "gsnav/io/avatar_file.hpp"
-#include "gsnav/io/motion_file.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/io/avatar_file.hpp"
+#include "gsnav/detail/io/motion_file.hpp"
 #include "support/files.hpp"
 
 using namespace gsnav;

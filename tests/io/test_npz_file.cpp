@@ -6,7 +6,7 @@
 #include <random>
 
 #include "allocations.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/detail/io/npz_file.hpp"
 #include "zip_file.hpp"
 
 // Archives and arrays are built byte by byte here, from NumPy's and PKWARE's documents.

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "check_cloud.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;

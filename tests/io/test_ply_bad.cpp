@@ -4,7 +4,7 @@
 
 #include "allocations.hpp"
 #include "check_refused.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "ply_file.hpp"
 
 using namespace gsnav;

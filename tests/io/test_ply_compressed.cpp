@@ -6,7 +6,7 @@
 #include "allocations.hpp"
 #include "check_quantised.hpp"
 #include "check_refused.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "ply_compressed_file.hpp"
 
 using namespace gsnav;

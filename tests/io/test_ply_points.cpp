@@ -7,7 +7,7 @@
 
 #include "check_cloud.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "neighbours.hpp"
 #include "ply_file.hpp"

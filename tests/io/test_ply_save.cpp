@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "check_cloud.hpp"
-#include "gsnav/io/ply.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/io/ply.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

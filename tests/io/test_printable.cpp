@@ -8,7 +8,7 @@
 
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/io/read_or_build.hpp"
+#include "gsnav/detail/io/read_or_build.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "support/files.hpp"
 

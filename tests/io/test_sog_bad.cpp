@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "allocations.hpp"
-#include "gsnav/io/sog.hpp"
+#include "gsnav/detail/io/sog.hpp"
 #include "sog_file.hpp"
 
 using namespace gsnav;

@@ -6,7 +6,7 @@
 
 #include "check_cloud.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/sog.hpp"
+#include "gsnav/detail/io/sog.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;

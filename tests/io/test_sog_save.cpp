@@ -7,8 +7,8 @@
 
 #include "check_quantised.hpp"
 #include "codebook.hpp"
-#include "gsnav/io/ply.hpp"
-#include "gsnav/io/sog.hpp"
+#include "gsnav/detail/io/ply.hpp"
+#include "gsnav/detail/io/sog.hpp"
 #include "row_clouds.hpp"
 #include "sog_file.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "check_quantised.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/splat.hpp"
+#include "gsnav/detail/io/splat.hpp"
 #include "splat_file.hpp"
 
 using namespace gsnav;

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "check_cloud.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "real_scenes.hpp"
 #include "row_clouds.hpp"

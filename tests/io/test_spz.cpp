@@ -4,7 +4,7 @@
 #include "allocations.hpp"
 #include "check_quantised.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/spz.hpp"
+#include "gsnav/detail/io/spz.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "spz_file.hpp"
 

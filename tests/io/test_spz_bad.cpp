@@ -4,7 +4,7 @@
 #include "allocations.hpp"
 #include "check_cloud.hpp"
 #include "check_refused.hpp"
-#include "gsnav/io/spz.hpp"
+#include "gsnav/detail/io/spz.hpp"
 #include "spz_file.hpp"
 
 using namespace gsnav;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// 4D Gaussians: untested on a real file. These are built by what io/temporal_file.hpp says of the formats.
-#include "gsnav/io/temporal_file.hpp"
+// 4D Gaussians: untested on a real file. These are built by what detail/io/temporal_file.hpp says of the formats.
+#include "gsnav/detail/io/temporal_file.hpp"
 
 #include <doctest/doctest.h>
 
@@ -10,7 +10,7 @@
 
 #include "avatar_npz.hpp"
 #include "check_refused.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "temporal_rows_of.hpp"
 

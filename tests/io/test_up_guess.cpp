@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/scene/describe_cloud.hpp"
-#include "gsnav/scene/edit_cloud.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/describe_cloud.hpp"
+#include "gsnav/detail/scene/edit_cloud.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 
 using namespace gsnav;
 

@@ -2,10 +2,10 @@
 #include <doctest/doctest.h>
 
 #include "check_quantised.hpp"
-#include "gsnav/io/ply.hpp"
-#include "gsnav/io/splat.hpp"
-#include "gsnav/io/spz.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/io/ply.hpp"
+#include "gsnav/detail/io/splat.hpp"
+#include "gsnav/detail/io/spz.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "row_clouds.hpp"
 
 // What is written is read back and compared with the rows that the cloud was made of, within half of

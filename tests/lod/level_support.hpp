@@ -8,9 +8,9 @@
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/math/aabb.hpp"
-#include "gsnav/scene/edit_cloud.hpp"
-#include "gsnav/scene/lod_build.hpp"
-#include "gsnav/scene/lod_levels.hpp"
+#include "gsnav/detail/scene/edit_cloud.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/detail/scene/lod_levels.hpp"
 #include "lod/lod_support.hpp"
 
 namespace gsnav_test {

@@ -6,7 +6,7 @@
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 
 namespace gsnav_test {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/io/lod_file.hpp"
+#include "gsnav/detail/io/lod_file.hpp"
 #include "lod_support.hpp"
 #include "support/files.hpp"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/eval/oracle_photo.hpp"
+#include "gsnav/detail/eval/oracle_photo.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "level_support.hpp"

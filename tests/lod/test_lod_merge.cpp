@@ -6,7 +6,7 @@
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/math/quat.hpp"
-#include "gsnav/scene/lod_merge.hpp"
+#include "gsnav/detail/scene/lod_merge.hpp"
 
 using namespace gsnav;
 

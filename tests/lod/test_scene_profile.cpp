@@ -10,13 +10,13 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/frame/project_chunk.hpp"
-#include "gsnav/scene/drop_bands.hpp"
-#include "gsnav/scene/ledger.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/scene/drop_bands.hpp"
+#include "gsnav/detail/scene/ledger.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/scene/scene_profile.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/scene_profile.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
 

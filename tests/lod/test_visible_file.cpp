@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/io/visible_file.hpp"
+#include "gsnav/detail/io/visible_file.hpp"
 #include "support/files.hpp"
 #include "two_rooms.hpp"
 

@@ -12,7 +12,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/scene/lod_build.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/visible_sets.hpp"

@@ -7,7 +7,7 @@
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/math/functions.hpp"
-#include "gsnav/math/pack.hpp"
+#include "gsnav/detail/math/pack.hpp"
 #include "gsnav/math/vec.hpp"
 
 using namespace gsnav;

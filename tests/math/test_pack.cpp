@@ -6,9 +6,9 @@
 #include <cstdint>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/math/pack.hpp"
-#include "gsnav/math/pack_layout.hpp"
-#include "gsnav/math/packs.hpp"
+#include "gsnav/detail/math/pack.hpp"
+#include "gsnav/detail/math/pack_layout.hpp"
+#include "gsnav/detail/math/packs.hpp"
 #include "gsnav/math/quat.hpp"
 
 using namespace gsnav;

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "gsnav/nav/step.hpp"
+#include "gsnav/detail/nav/step.hpp"
 #include "meshes.hpp"
 
 namespace gsnav_test {

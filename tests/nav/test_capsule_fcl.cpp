@@ -7,7 +7,7 @@
 #include "cases.hpp"
 #include "fcl_capsules.hpp"
 #include "gsnav/sweep/capsule.hpp"
-#include "gsnav/nav/step.hpp"
+#include "gsnav/detail/nav/step.hpp"
 
 using namespace gsnav;
 

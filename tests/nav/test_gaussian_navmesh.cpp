@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "../../bench/large_capture.hpp"
-#include "gsnav/nav/gaussian_navmesh.hpp"
+#include "gsnav/detail/nav/gaussian_navmesh.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "meshes.hpp"
 

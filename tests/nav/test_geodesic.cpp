@@ -8,7 +8,7 @@
 #include "cases.hpp"
 #include "detour.hpp"
 #include "geodesic_oracle.hpp"
-#include "gsnav/nav/geodesic_field.hpp"
+#include "gsnav/detail/nav/geodesic_field.hpp"
 #include "gsnav/nav/navmesh.hpp"
 #include "meshes.hpp"
 #include "metric_check.hpp"

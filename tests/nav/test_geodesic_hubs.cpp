@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "cases.hpp"
-#include "gsnav/nav/geodesic_field.hpp"
+#include "gsnav/detail/nav/geodesic_field.hpp"
 #include "meshes.hpp"
 #include "navmesh_impl.hpp"
 #include "support/data.hpp"

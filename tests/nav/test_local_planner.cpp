@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cases.hpp"
-#include "gsnav/nav/local_planner.hpp"
+#include "gsnav/detail/nav/local_planner.hpp"
 #include "half_planes.hpp"
 #include "step_scene.hpp"
 

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "gsnav/nav/navmesh.hpp"
-#include "gsnav/nav/step.hpp"
+#include "gsnav/detail/nav/step.hpp"
 #include "meshes.hpp"
 #include "support/data.hpp"
 #include "walk_check.hpp"

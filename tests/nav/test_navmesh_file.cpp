@@ -9,7 +9,7 @@
 #include <new>
 
 #include "cases.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
 #include "height_mending.hpp"
 #include "io/allocations.hpp"
 #include "meshes.hpp"

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "capsule_oracle.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
-#include "gsnav/nav/navmesh_levels.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
+#include "gsnav/detail/nav/navmesh_levels.hpp"
 #include "meshes.hpp"
 #include "support/files.hpp"
 

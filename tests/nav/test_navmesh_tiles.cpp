@@ -10,9 +10,9 @@
 
 #include "cases.hpp"
 #include "geodesic_oracle.hpp"
-#include "gsnav/nav/gaussian_navmesh.hpp"
-#include "gsnav/nav/geodesic_field.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/detail/nav/gaussian_navmesh.hpp"
+#include "gsnav/detail/nav/geodesic_field.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
 #include "meshes.hpp"
 #include "metric_check.hpp"
 #include "navmesh_impl.hpp"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/nav/path_clearance.hpp"
+#include "gsnav/detail/nav/path_clearance.hpp"
 #include "meshes.hpp"
 #include "support/data.hpp"
 

@@ -9,8 +9,8 @@
 #include <map>
 #include <set>
 
-#include "gsnav/nav/geodesic_field.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/detail/nav/geodesic_field.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
 #include "meshes.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"

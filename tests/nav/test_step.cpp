@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "gsnav/nav/step.hpp"
+#include "gsnav/detail/nav/step.hpp"
 #include "meshes.hpp"
 #include "step_scene.hpp"
 

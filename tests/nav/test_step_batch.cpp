@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cases.hpp"
-#include "gsnav/nav/step_batch.hpp"
+#include "gsnav/detail/nav/step_batch.hpp"
 #include "ops/backends.hpp"
 #include "step_oracle.hpp"
 #include "step_scene.hpp"

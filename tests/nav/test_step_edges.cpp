@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "cases.hpp"
-#include "gsnav/core/small_vector.hpp"
+#include "gsnav/detail/core/small_vector.hpp"
 #include "io/allocations.hpp"
 #include "step_oracle.hpp"
 

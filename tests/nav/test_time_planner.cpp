@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "cases.hpp"
-#include "gsnav/nav/time_planner.hpp"
+#include "gsnav/detail/nav/time_planner.hpp"
 #include "step_oracle.hpp"
 
 using namespace gsnav;

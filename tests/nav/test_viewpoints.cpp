@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "gsnav/nav/viewpoints.hpp"
+#include "gsnav/detail/nav/viewpoints.hpp"
 #include "meshes.hpp"
 
 using namespace gsnav;

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/mesh_file.hpp"
-#include "gsnav/io/navmesh_settings_file.hpp"
-#include "gsnav/io/ply.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/detail/io/mesh_file.hpp"
+#include "gsnav/detail/io/navmesh_settings_file.hpp"
+#include "gsnav/detail/io/ply.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
 #include "support/command.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "gsnav/render/draw_meshes.hpp"
+#include "gsnav/detail/render/draw_meshes.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
 #include "ops/backends.hpp"
 #include "support/mesh_truth.hpp"

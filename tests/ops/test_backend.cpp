@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "gsnav/core/parallel.hpp"
+#include "gsnav/detail/core/parallel.hpp"
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
 

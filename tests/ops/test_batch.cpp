@@ -2,7 +2,7 @@
 // A batch of cameras is its single frames: the same bits, however threads share it.
 #include <doctest/doctest.h>
 
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/math/pack.hpp"
+#include "gsnav/detail/math/pack.hpp"
 #include "gsnav/sweep/sweep.hpp"
 #include "ops/backends.hpp"
 #include "ops/capsule_pairs.hpp"

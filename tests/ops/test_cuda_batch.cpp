@@ -9,7 +9,7 @@
 #include "support/scenes.hpp"
 
 #if defined(GSNAV_HAS_CUDA)
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "ops/cuda_batch_images.hpp"
 #include "ops/no_gpu.hpp"
 

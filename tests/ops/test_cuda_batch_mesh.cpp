@@ -14,7 +14,7 @@
 #if defined(GSNAV_HAS_CUDA)
 #include <cuda_runtime_api.h>
 
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "ops/cuda_batch_images.hpp"
 #include "ops/no_gpu.hpp"
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #if defined(GSNAV_HAS_CUDA)
-#include "gsnav/frame/cull.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/frame/cull.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "ops/cuda_batch_images.hpp"
 #include "ops/no_gpu.hpp"
 #include "support/seen_rows.hpp"

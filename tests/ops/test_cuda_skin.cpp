@@ -10,7 +10,7 @@
 #include <vector>
 
 #if defined(GSNAV_HAS_CUDA)
-#include "gsnav/avatar/skinning_weights.hpp"
+#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/rng.hpp"

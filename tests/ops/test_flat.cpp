@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <string>
 
-#include "gsnav/io/cameras_file.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/cameras_file.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "ops/backends.hpp"
 #include "support/files.hpp"
 #include "support/scenes.hpp"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "eval/oracle_support.hpp"
-#include "gsnav/scene/edit_cloud.hpp"
-#include "gsnav/sim/semantic_frame.hpp"
+#include "gsnav/detail/scene/edit_cloud.hpp"
+#include "gsnav/detail/sim/semantic_frame.hpp"
 #include "ops/mesh_images.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "gsnav/scene/placed_meshes.hpp"
+#include "gsnav/detail/scene/placed_meshes.hpp"
 #include "ops/mesh_images.hpp"
 
 namespace {

@@ -7,7 +7,7 @@
 
 #include "backends.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "gsnav/scene/drop_bands.hpp"
+#include "gsnav/detail/scene/drop_bands.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/scene_profile.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/scene_profile.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
 #if defined(GSNAV_HAS_CUDA)

@@ -9,10 +9,10 @@
 #include <tuple>
 #include <vector>
 
-#include "gsnav/core/permute.hpp"
-#include "gsnav/core/pool_backend.hpp"
+#include "gsnav/detail/core/permute.hpp"
+#include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

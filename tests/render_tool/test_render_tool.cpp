@@ -7,7 +7,7 @@
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
 

@@ -9,10 +9,10 @@
 
 #include "csv.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/io/cameras_file.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/cameras_file.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/visible_file.hpp"
+#include "gsnav/detail/io/visible_file.hpp"
 #include "lod/two_rooms.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"

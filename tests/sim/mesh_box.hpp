@@ -3,9 +3,9 @@
 
 #include <memory>
 
-#include "gsnav/scene/placed_meshes.hpp"
-#include "gsnav/sim/scene_on_backend.hpp"
-#include "gsnav/sim/sensor.hpp"
+#include "gsnav/detail/scene/placed_meshes.hpp"
+#include "gsnav/detail/sim/scene_on_backend.hpp"
+#include "gsnav/detail/sim/sensor.hpp"
 
 namespace gsnav_test {
 

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "flat_world.hpp"
-#include "gsnav/avatar/humanoid.hpp"
-#include "gsnav/sim/scene_on_backend.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/sim/scene_on_backend.hpp"
 
 namespace gsnav_test {
 

@@ -8,7 +8,7 @@
 
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/scene/lod_build.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "mesh_box.hpp"
 #include "ops/no_gpu.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include "gsnav/nav/gaussian_navmesh.hpp"
+#include "gsnav/detail/nav/gaussian_navmesh.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 using namespace gsnav;

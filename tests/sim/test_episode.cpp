@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "gsnav/sim/default_scene.hpp"
-#include "gsnav/sim/episode.hpp"
+#include "gsnav/detail/sim/episode.hpp"
 
 using namespace gsnav;
 

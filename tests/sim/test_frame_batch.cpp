@@ -10,9 +10,9 @@
 #include <limits>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/core/host_array.hpp"
-#include "gsnav/frame/cut_depth.hpp"
-#include "gsnav/scene/lod_build.hpp"
+#include "gsnav/detail/core/host_array.hpp"
+#include "gsnav/detail/frame/cut_depth.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "mesh_box.hpp"
 #include "ops/backends.hpp"

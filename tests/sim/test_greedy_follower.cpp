@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "flat_world.hpp"
-#include "gsnav/sim/greedy_follower.hpp"
+#include "gsnav/detail/sim/greedy_follower.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

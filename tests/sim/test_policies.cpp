@@ -7,7 +7,7 @@
 
 #include "flat_world.hpp"
 #include "gsnav/sim/people.hpp"
-#include "gsnav/sim/random_policy.hpp"
+#include "gsnav/detail/sim/random_policy.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

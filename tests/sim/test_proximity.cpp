@@ -7,7 +7,7 @@
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/sim/metrics.hpp"
-#include "gsnav/sim/proximity.hpp"
+#include "gsnav/detail/sim/proximity.hpp"
 
 using namespace gsnav;
 

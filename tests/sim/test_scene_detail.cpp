@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/scene/lod_build.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "lod/level_support.hpp"
 #include "same_bits.hpp"

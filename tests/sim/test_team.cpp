@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/sim/random_policy.hpp"
-#include "gsnav/sim/team.hpp"
+#include "gsnav/detail/sim/random_policy.hpp"
+#include "gsnav/detail/sim/team.hpp"
 #include "sim_scene.hpp"
 #include "support/compiled_frames.hpp"
 

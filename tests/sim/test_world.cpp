@@ -8,7 +8,7 @@
 
 #include "flat_world.hpp"
 #include "gsnav/avatar/actor.hpp"
-#include "gsnav/avatar/humanoid.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/sim/follower.hpp"
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/eval/oracle_config.hpp"
+#include "gsnav/detail/eval/oracle_config.hpp"
 #include "support/mesh_truth.hpp"
 
 // What the pixels of an image see of meshes, some of them seen through, from rays in long double. It

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/scene/content_hash.hpp"
+#include "gsnav/detail/scene/content_hash.hpp"
 #include "gsnav/scene/renderer.hpp"
 
 namespace gsnav_test {

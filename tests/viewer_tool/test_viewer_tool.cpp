@@ -19,7 +19,7 @@
 
 #include "../../tools/eval/run.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/io/ply.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "http_client.hpp"
 #include "picture.hpp"

@@ -6,10 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/avatar/joint_match.hpp"
-#include "gsnav/avatar/retarget.hpp"
-#include "gsnav/io/motion_file.hpp"
-#include "gsnav/io/skinned_mesh_file.hpp"
+#include "gsnav/avatar.hpp"
+#include "gsnav/io.hpp"
 
 namespace gsnav_avatar {
 

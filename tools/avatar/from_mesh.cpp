@@ -8,12 +8,8 @@
 
 #include "clips.hpp"
 #include "commands.hpp"
-#include "gsnav/avatar/capsule_fit.hpp"
-#include "gsnav/avatar/mesh_avatar.hpp"
-#include "gsnav/avatar/weight_gradients.hpp"
-#include "gsnav/io/avatar_file.hpp"
-#include "gsnav/io/motion_file.hpp"
-#include "gsnav/io/skinned_mesh_file.hpp"
+#include "gsnav/avatar.hpp"
+#include "gsnav/io.hpp"
 #include "gsnav/math/aabb.hpp"
 
 namespace gsnav_avatar {

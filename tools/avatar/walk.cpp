@@ -11,14 +11,9 @@
 #include "clips.hpp"
 #include "commands.hpp"
 #include "gsnav/avatar/actor.hpp"
-#include "gsnav/avatar/clip_walk.hpp"
-#include "gsnav/avatar/foot_contact.hpp"
-#include "gsnav/avatar/foot_lock.hpp"
-#include "gsnav/avatar/trajectory.hpp"
-#include "gsnav/io/avatar_file.hpp"
-#include "gsnav/io/motion_file.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
-#include "gsnav/nav/path_clearance.hpp"
+#include "gsnav/avatar.hpp"
+#include "gsnav/io.hpp"
+#include "gsnav/nav.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav_avatar {

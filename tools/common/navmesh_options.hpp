@@ -13,8 +13,7 @@
 #include <vector>
 
 #include "gsnav/core/lower_case.hpp"
-#include "gsnav/nav/gaussian_navmesh.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
+#include "gsnav/nav.hpp"
 
 // Where a program's NavMesh comes from: the same options in all of them.
 

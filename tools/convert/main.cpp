@@ -11,12 +11,9 @@
 #include "../common/parse_options.hpp"
 #include "compare.hpp"
 #include "gsnav/core/lower_case.hpp"
-#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/describe_cloud.hpp"
-#include "gsnav/scene/edit_cloud.hpp"
-#include "gsnav/scene/spatial_order.hpp"
-#include "gsnav/scene/views_around.hpp"
+#include "gsnav/render.hpp"
 
 namespace {
 

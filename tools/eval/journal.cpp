@@ -17,7 +17,7 @@
 #include <utility>
 
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/scene/content_hash.hpp"
+#include "gsnav/render.hpp"
 #include "run.hpp"
 
 namespace gsnav_eval {

@@ -9,7 +9,7 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/sim/metrics.hpp"
-#include "gsnav/sim/task.hpp"
+#include "gsnav/sim.hpp"
 #include "options.hpp"
 
 namespace gsnav_eval {

@@ -8,7 +8,7 @@
 #include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/episode_file.hpp"
+#include "gsnav/io.hpp"
 #include "page.hpp"
 #include "pictures.hpp"
 

@@ -11,7 +11,7 @@
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/npz_file.hpp"
+#include "gsnav/io.hpp"
 #include "pictures.hpp"
 
 namespace gsnav_eval {

@@ -5,10 +5,9 @@
 #include <utility>
 
 #include "../../examples/nav_loop/setup.hpp"
-#include "gsnav/io/episode_file.hpp"
+#include "gsnav/io.hpp"
 #include "gsnav/sim/follower.hpp"
-#include "gsnav/sim/greedy_follower.hpp"
-#include "gsnav/sim/random_policy.hpp"
+#include "gsnav/sim.hpp"
 
 namespace gsnav_eval {
 

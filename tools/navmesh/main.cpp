@@ -13,13 +13,9 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/mesh_file.hpp"
-#include "gsnav/io/navmesh_settings_file.hpp"
+#include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/visible_file.hpp"
-#include "gsnav/nav/navmesh_file.hpp"
-#include "gsnav/nav/navmesh_levels.hpp"
-#include "gsnav/nav/viewpoints.hpp"
+#include "gsnav/nav.hpp"
 #include "options.hpp"
 
 namespace {

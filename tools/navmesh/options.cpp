@@ -16,7 +16,7 @@
 
 #include "../common/navmesh_options.hpp"
 #include "gsnav/core/lower_case.hpp"
-#include "gsnav/io/navmesh_settings_file.hpp"
+#include "gsnav/io.hpp"
 
 namespace gsnav_navmesh {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gsnav/math/similarity.hpp"
-#include "gsnav/nav/gaussian_navmesh.hpp"
+#include "gsnav/nav.hpp"
 #include "gsnav/nav/navmesh_settings.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 

@@ -2,9 +2,9 @@
 """Blending a pixel's stack, and its depths."""
 from . import plant
 
-BLEND = "include/gsnav/frame/blend.hpp"
-DEPTH = "include/gsnav/frame/depth.hpp"
-PROJECTION = "include/gsnav/frame/projection.hpp"
+BLEND = "include/gsnav/detail/frame/blend.hpp"
+DEPTH = "include/gsnav/detail/frame/depth.hpp"
+PROJECTION = "include/gsnav/detail/frame/projection.hpp"
 STACK_TEST = "tests/hard_cases/test_stack.cpp"
 DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
 CUT_TEST = "tests/hard_cases/test_determinism.cpp"
@@ -12,7 +12,7 @@ CUT_TEST = "tests/hard_cases/test_determinism.cpp"
 OPEN = "transmittance >= L(rules.transmittance_min)"
 WEIGHT = "L weight = select(drawn, alpha * before, zero);"
 DRAWN = "return exponent >= L(rules.log2_alpha_min);"
-LANES = "include/gsnav/lanes/rasterize_tile.hpp"
+LANES = "include/gsnav/detail/lanes/rasterize_tile.hpp"
 DELTA = "  const L defined = select(denominator > L(S(0)), delta, L(S(0)));\n"
 CLAMPED = "return L(d.z) + clamp(defined, -reach, reach);"
 CROSSES = "select(falls_through(step.before, step.after, kMedianLevel<S>), z, median)"
@@ -97,11 +97,11 @@ PLANTS = [
           DEPTH_TEST, "N48_depth_no_return", why="0 / 0 where nothing is"),
     plant("return_alpha_ignored", BLEND, RETURNED, "const auto returned = alpha > zero;",
           DEPTH_TEST, "N48_depth_no_return"),
-    plant("behind_ends_the_chunk", "include/gsnav/frame/project_chunk.hpp",
+    plant("behind_ends_the_chunk", "include/gsnav/detail/frame/project_chunk.hpp",
           "        if (seen.has(i - begin) && project_gaussian(args, out, base + written, i)) ++written;\n",
           "        if (!project_gaussian(args, out, base + written, i)) break;\n        ++written;\n",
           CUT_TEST, "N65_cull_invariance"),
-    plant("behind_ends_the_chunk_of_lanes", "include/gsnav/lanes/project_chunk.hpp",
+    plant("behind_ends_the_chunk_of_lanes", "include/gsnav/detail/lanes/project_chunk.hpp",
           "    if (!any(key.z > F(camera.near_plane))) continue;\n",
           "    if (!any(key.z > F(camera.near_plane))) break;\n",
           CUT_TEST, "N65_cull_invariance"),
@@ -109,7 +109,7 @@ PLANTS = [
           "(out.center_x + out.half_width >= half) &&", "(out.center_x >= half) &&",
           "tests/hard_cases/test_footprint.cpp", "N11_tile_cover_conservative",
           why="what reaches in from beyond the border is lost"),
-    plant("tiles_appended_by_thread", "include/gsnav/frame/tiles.hpp",
+    plant("tiles_appended_by_thread", "include/gsnav/detail/frame/tiles.hpp",
           "      for (std::size_t b = 0; b < args.blocks; ++b) {\n        std::uint64_t& c = args.cursors[b",
           "      for (std::size_t b = args.blocks; b-- > 0;) {\n        std::uint64_t& c = args.cursors[b",
           CUT_TEST, "N63_determinism_100 of work that is cut", why="whoever is first, as atomics do it"),

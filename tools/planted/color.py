@@ -3,7 +3,7 @@
 from . import plant
 
 SH = "include/gsnav/frame/sh.hpp"
-CHUNK = "include/gsnav/frame/project_chunk.hpp"
+CHUNK = "include/gsnav/detail/frame/project_chunk.hpp"
 TEST = "tests/hard_cases/test_sh.cpp"
 
 CLAMPED = "return {max(sum.x + half, zero), max(sum.y + half, zero), max(sum.z + half, zero)};"

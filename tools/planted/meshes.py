@@ -2,14 +2,14 @@
 """Naive ways of drawing meshes, and of putting them among Gaussians (docs/composition.md)."""
 from planted import plant
 
-RASTER = "include/gsnav/mesh/mesh_raster.hpp"
-SETUP = "include/gsnav/mesh/mesh_setup.hpp"
-CLIP = "include/gsnav/mesh/mesh_clip.hpp"
-MERGE = "include/gsnav/frame/composite.hpp"
+RASTER = "include/gsnav/detail/mesh/mesh_raster.hpp"
+SETUP = "include/gsnav/detail/mesh/mesh_setup.hpp"
+CLIP = "include/gsnav/detail/mesh/mesh_clip.hpp"
+MERGE = "include/gsnav/detail/frame/composite.hpp"
 MESH = "tests/ops/test_mesh.cpp"
 CASES = "tests/hard_cases/test_composite.cpp"
 PANES = "tests/hard_cases/test_fragments.cpp"
-FRAGMENTS = "include/gsnav/mesh/mesh_fragments.hpp"
+FRAGMENTS = "include/gsnav/detail/mesh/mesh_fragments.hpp"
 
 PLANTS = [
     plant("mesh_edges_of_both", RASTER, "(owns ? 0 : 1)", "0", MESH, "triangles that share edges own each pixel once",
@@ -37,8 +37,8 @@ PLANTS = [
     plant("mesh_leaves_alpha", MERGE, "state.transmittance = select(state.transmittance < L(S(0)), -after, after);", "",
           CASES,
           "N49_mesh_between_layers"),
-    plant("mesh_cull_by_centre", "include/gsnav/frame/tiles.hpp", "depths[splat].z - depths[splat].reach > tile_far[tile]",
+    plant("mesh_cull_by_centre", "include/gsnav/detail/frame/tiles.hpp", "depths[splat].z - depths[splat].reach > tile_far[tile]",
           "depths[splat].z > tile_far[tile]", CASES, "N53_tile_max_mesh_cull"),
-    plant("mesh_chunk_without_reach", "include/gsnav/render/composite_steps.hpp", "* (1 - 1e-6) - reach * (1 + 1e-5);",
+    plant("mesh_chunk_without_reach", "include/gsnav/detail/render/composite_steps.hpp", "* (1 - 1e-6) - reach * (1 + 1e-5);",
           "+ reach;", CASES, "N53_tile_max_mesh_cull of chunks, before they are projected"),
 ]

@@ -2,11 +2,11 @@
 """Footprints, keys and order."""
 from . import plant
 
-PROJECTION = "include/gsnav/frame/projection.hpp"
-CHUNK = "include/gsnav/frame/project_chunk.hpp"
-ROW = "include/gsnav/frame/project_row.hpp"
-TILES = "include/gsnav/frame/tiles.hpp"
-STRIPS = "include/gsnav/frame/footprint.hpp"
+PROJECTION = "include/gsnav/detail/frame/projection.hpp"
+CHUNK = "include/gsnav/detail/frame/project_chunk.hpp"
+ROW = "include/gsnav/detail/frame/project_row.hpp"
+TILES = "include/gsnav/detail/frame/tiles.hpp"
+STRIPS = "include/gsnav/detail/frame/footprint.hpp"
 FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
 ORDER = "tests/hard_cases/test_order.cpp"
 KEYS = "tests/hard_cases/test_keys.cpp"
@@ -33,26 +33,26 @@ PLANTS = [
           "    const L y_right = select(negative_k_, at_k, against_k);\n",
           "    const L y_right = select(negative_k_, against_k, at_k);\n",
           FOOTPRINT, "N11_tile_cover_conservative"),
-    plant("cull_by_means", "include/gsnav/frame/cull.hpp",
+    plant("cull_by_means", "include/gsnav/detail/frame/cull.hpp",
           "    const double reach = f * bounds.scale_max * sqrt(1 + limit * limit);\n",
           "    const double reach = 0 * f * bounds.scale_max * sqrt(1 + limit * limit);\n",
           "tests/hard_cases/test_culling.cpp", "N65_cull_invariance of chunks in space",
           why="a Gaussian beside the image reaches into it"),
-    plant("slice_of_the_middle", "include/gsnav/render/depth_slices.hpp",
+    plant("slice_of_the_middle", "include/gsnav/detail/render/depth_slices.hpp",
           "      place.bucket = static_cast<std::uint16_t>(std::min(bucket, kBuckets - 1));\n",
           "      place.bucket = static_cast<std::uint16_t>(std::min(bucket + 2, kBuckets - 1));\n",
           "tests/hard_cases/test_slices.cpp", "N65_cull_invariance of slices of depth",
           why="a chunk's nearest Gaussian comes before its middle"),
-    plant("extent_without_footprints", "include/gsnav/frame/cull.hpp",
+    plant("extent_without_footprints", "include/gsnav/detail/frame/cull.hpp",
           "    const double left = -chunk.largest(axis * -f) - wide, right = chunk.largest(axis * f) + wide;\n",
           "    const double left = -chunk.largest(axis * -f), right = chunk.largest(axis * f);\n",
           "tests/hard_cases/test_slices.cpp", "N65_cull_invariance needs bounds that hold*",
           why="a hidden mean may have a footprint that is not"),
-    plant("open_by_the_mean", "include/gsnav/lanes/write_splats.hpp",
+    plant("open_by_the_mean", "include/gsnav/detail/lanes/write_splats.hpp",
           "    if (open.any(cell(0), cell(1), cell(2), cell(3))) found |= 1u << l;\n",
           "    if (open.any(cell(0), cell(1), cell(0) + 1, cell(1) + 1)) found |= 1u << l;\n",
           "tests/hard_cases/test_slices.cpp", "N65_cull_invariance of slices of depth"),
-    plant("ties_in_sorted_order", "include/gsnav/render/order_visible.hpp",
+    plant("ties_in_sorted_order", "include/gsnav/detail/render/order_visible.hpp",
           "    heap_sort(order.data + i, end - i);\n", "",
           "tests/hard_cases/test_culling.cpp", "N21_depth_ties_keep_file_order when rows are sorted in space"),
     plant("perspective_box_centred", PROJECTION,
@@ -82,26 +82,26 @@ PLANTS = [
           "        splat(project<L, F>(camera, axes, key.z, ",
           "        splat(project<L, F>(camera, axes, static_cast<F>(axes.position.z * L(1.0000001f)), ",
           "tests/hard_cases/test_near.cpp", "N16_near_plane_cross"),
-    plant("key_top_bits", "include/gsnav/frame/projection_camera.hpp",
+    plant("key_top_bits", "include/gsnav/detail/frame/projection_camera.hpp",
           "    const std::uint32_t code = (bits > base ? bits - base : 0u) >> shift;",
           "    const std::uint32_t code = largest == 0xffffffffu ? bits : bits >> 16;",
           ORDER, "N23_key_wide_range", why="bits spent on depths that no scene has"),
-    plant("key_below_near", "include/gsnav/frame/projection_camera.hpp",
+    plant("key_below_near", "include/gsnav/detail/frame/projection_camera.hpp",
           "    const std::uint32_t code = (bits > base ? bits - base : 0u) >> shift;",
           "    const std::uint32_t code = (bits - base) >> shift;",
           ORDER, "N23_key_wide_range", why="the nearest Gaussian comes last"),
-    plant("ties_reversed", "include/gsnav/render/order_visible.hpp",
+    plant("ties_reversed", "include/gsnav/detail/render/order_visible.hpp",
           "      for (std::uint32_t i = 0; i < n; ++i) f(k[i] - base, slot + i);\n",
           "      for (std::uint32_t i = n; i-- > 0;) f(k[i] - base, slot + i);\n",
           ORDER, "N21_depth_tie_stack", "N22_depth_tie_grid"),
-    plant("ties_dropped", "include/gsnav/render/order_visible.hpp",
+    plant("ties_dropped", "include/gsnav/detail/render/order_visible.hpp",
           "        for (std::uint32_t i = 0; i < n; ++i) f(k[i] - base, slot + i);",
           "        for (std::uint32_t i = 0; i < n; ++i) f(i > 0 && k[i] == k[i - 1] ? 0xffffffffu : k[i] - base, slot + i);",
           ORDER, "N22_depth_tie_grid"),
     plant("last_tile_of_a_row_lost", TILES,
           "tx1 = (b.x1 - 1) >> shift", "tx1 = (b.x1 - 2) >> shift",
           FOOTPRINT, "N11_tile_cover_conservative"),
-    plant("background_forgotten", "include/gsnav/frame/blend.hpp",
+    plant("background_forgotten", "include/gsnav/detail/frame/blend.hpp",
           "return {fma(t, L(args.background.x), state.r),", "return {state.r,",
           KEYS, "N26_pair_count_zero"),
 ]

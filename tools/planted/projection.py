@@ -2,12 +2,12 @@
 """Projection: determinants, the exponent, filters, responses."""
 from . import Edit, Plant, plant
 
-PROJECTION = "include/gsnav/frame/projection.hpp"
-CAMERA = "include/gsnav/frame/projection_camera.hpp"
-CHUNK = "include/gsnav/frame/project_chunk.hpp"
-ROW = "include/gsnav/frame/project_row.hpp"
-WRITE_SPLATS = "include/gsnav/lanes/write_splats.hpp"
-BLEND = "include/gsnav/frame/blend.hpp"
+PROJECTION = "include/gsnav/detail/frame/projection.hpp"
+CAMERA = "include/gsnav/detail/frame/projection_camera.hpp"
+CHUNK = "include/gsnav/detail/frame/project_chunk.hpp"
+ROW = "include/gsnav/detail/frame/project_row.hpp"
+WRITE_SPLATS = "include/gsnav/detail/lanes/write_splats.hpp"
+BLEND = "include/gsnav/detail/frame/blend.hpp"
 DETERMINANT = "tests/hard_cases/test_determinant.cpp"
 EXPONENT = "tests/hard_cases/test_exponent.cpp"
 FILTER = "tests/hard_cases/test_filter.cpp"

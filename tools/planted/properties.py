@@ -2,9 +2,9 @@
 """What every image has to have, whatever is in it."""
 from . import plant
 
-BLEND = "include/gsnav/frame/blend.hpp"
-PROJECTION = "include/gsnav/frame/projection.hpp"
-CHUNK = "include/gsnav/frame/project_chunk.hpp"
+BLEND = "include/gsnav/detail/frame/blend.hpp"
+PROJECTION = "include/gsnav/detail/frame/projection.hpp"
+CHUNK = "include/gsnav/detail/frame/project_chunk.hpp"
 TEST = "tests/hard_cases/test_properties.cpp"
 
 PLANTS = [

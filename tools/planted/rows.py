@@ -36,7 +36,7 @@ PLANTS = [
           ROWS, "N32_quat_denormal_nan", why="the largest component of NaN and 1 is 1"),
     plant("zero_rows_of_a_file_kept", CLOUD, ZERO, "  if (!normalize(quat)) quat = Quatd{};\n",
           PLY_TEST, "N37_truncated_ply_zero_rows", more=PLY_READER),
-    plant("mirror_keeps_odd_bands", "include/gsnav/scene/edit_cloud.hpp",
+    plant("mirror_keeps_odd_bands", "include/gsnav/detail/scene/edit_cloud.hpp",
           "      if (k >= 3 && k < 8) continue;\n", "      if (k < 15) continue;\n",
           "tests/io/test_edit_cloud.cpp", "a cloud that is mirrored and stretched is seen as in the mirror",
           more=PLY_READER, why="a mirror is no rotation"),
@@ -75,7 +75,7 @@ PLANTS = [
     plant("world_in_float", CLOUD,
           "origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);", "origin[k] = 0;",
           WORLD, "N28_world_1e6", why="62 mm at 1000 km"),
-    plant("camera_offset_in_float", "include/gsnav/frame/project_chunk.hpp",
+    plant("camera_offset_in_float", "include/gsnav/detail/frame/project_chunk.hpp",
           "  return (table.empty() ? Vec3d{} : table[o]) - args.camera64.position;\n",
           "  return vec_cast<double>(vec_cast<float>(table.empty() ? Vec3d{} : table[o]) -\n"
           "                          vec_cast<float>(args.camera64.position));\n",

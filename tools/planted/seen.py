@@ -9,9 +9,9 @@ DRAWN = "rows that may be seen are drawn*"
 RUNS = "visible sets: rows in runs*"
 
 PLANTS = [
-    plant("rows_of_lanes_all_seen", "include/gsnav/lanes/project_chunk.hpp",
+    plant("rows_of_lanes_all_seen", "include/gsnav/detail/lanes/project_chunk.hpp",
           "lane_bits(seen.splat.visible) & wanted & ", "lane_bits(seen.splat.visible) & ", VISIBLE_TEST, DRAWN),
-    plant("rows_one_by_one_all_seen", "include/gsnav/frame/project_chunk.hpp",
+    plant("rows_one_by_one_all_seen", "include/gsnav/detail/frame/project_chunk.hpp",
           "if (seen.has(i - begin) && project_gaussian(", "if (project_gaussian(", VISIBLE_TEST, DRAWN),
     plant("rows_of_the_next_chunk", GAUSSIANS,
           "seen[chunk / 32] & ((1u << (chunk % 32)) - 1u);", "seen[chunk / 32] & ((2u << (chunk % 32)) - 1u);",

@@ -3,7 +3,7 @@
 from . import plant
 
 LBS = "include/gsnav/skin/lbs.hpp"
-FK = "include/gsnav/skin/fk.hpp"
+FK = "include/gsnav/detail/skin/fk.hpp"
 WEIGHTS = "src/avatar/skinning_weights.cpp"
 QUAT = "include/gsnav/math/quat.hpp"
 MOTION = "src/avatar/motion.cpp"
@@ -87,11 +87,11 @@ PLANTS = [
     plant("cofactors_by_plain_products", "include/gsnav/math/vec.hpp",
           "  return fma(a, b, -cd) + error;\n", "  return (a * b - cd) + error * L(0);\n",
           FACTOR_TEST, "N62_psd_factor"),
-    plant("factor_det_ac_minus_b2", "include/gsnav/frame/projection.hpp",
+    plant("factor_det_ac_minus_b2", "include/gsnav/detail/frame/projection.hpp",
           "const L det = fma(h, (a0 + c0) + h, det0);",
           "const L det = (a0 + h) * (c0 + h) - b0 * b0;",
           FACTOR_TEST, "N62_psd_factor"),
-    plant("factor_area_signed", "include/gsnav/frame/projection.hpp",
+    plant("factor_area_signed", "include/gsnav/detail/frame/projection.hpp",
           "const L det0 = dot(area, area);", "const L det0 = dot(area, area) * select(dot(m.row[0], "
           "axes.cofactors.row[0]) < L(S(0)), L(S(-1)), L(S(1)));",
           FACTOR_TEST, "N62_psd_factor", why="a mirrored factor has a covariance too"),

@@ -25,20 +25,13 @@
 #endif
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/lod_file.hpp"
-#include "gsnav/io/mesh_file.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/visible_file.hpp"
-#include "gsnav/scene/drop_bands.hpp"
-#include "gsnav/scene/ledger.hpp"
+#include "gsnav/render.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/scene/placed_meshes.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/scene/scene_profile.hpp"
-#include "gsnav/scene/views_around.hpp"
-#include "gsnav/sim/scene_detail.hpp"
+#include "gsnav/sim.hpp"
 
 namespace {
 

@@ -14,7 +14,7 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/image/camera.hpp"
-#include "gsnav/scene/content_hash.hpp"
+#include "gsnav/render.hpp"
 
 namespace gsnav_report {
 

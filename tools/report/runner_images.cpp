@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <cstdio>
 
-#include "gsnav/eval/flip.hpp"
+#include "gsnav/eval.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/math/functions.hpp"
 

@@ -9,7 +9,7 @@
 #include "gsnav/math/functions.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/scene/scene_profile.hpp"
+#include "gsnav/render.hpp"
 
 namespace gsnav_report {
 

@@ -5,10 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "gsnav/eval/depth_error.hpp"
-#include "gsnav/eval/flip.hpp"
+#include "gsnav/eval.hpp"
 #include "gsnav/eval/image_error.hpp"
-#include "gsnav/eval/ssim.hpp"
 
 namespace gsnav_report {
 

@@ -6,7 +6,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/eval/oracle.hpp"
-#include "gsnav/eval/oracle_photo.hpp"
+#include "gsnav/eval.hpp"
 
 namespace gsnav_report {
 

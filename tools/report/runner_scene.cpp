@@ -9,7 +9,7 @@
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
-#include "gsnav/io/lod_file.hpp"
+#include "gsnav/io.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "runner_images.hpp"
 #include "runner_reference.hpp"

@@ -9,9 +9,8 @@
 #include <utility>
 
 #include "cache.hpp"
-#include "gsnav/io/cameras_file.hpp"
+#include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/io/visible_file.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav_report {

@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "gsnav/avatar/avatar.hpp"
+#include "gsnav/avatar.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"

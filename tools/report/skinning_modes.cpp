@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "gsnav/avatar/weight_gradients.hpp"
+#include "gsnav/avatar.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/skin/skin.hpp"

@@ -10,7 +10,7 @@
 
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/spatial_order.hpp"
+#include "gsnav/render.hpp"
 #include "runner_system.hpp"
 
 namespace gsnav_report {

@@ -5,9 +5,9 @@
 
 #include <cstdint>
 
-#include "gsnav/frame/blend.hpp"
-#include "gsnav/frame/project_chunk.hpp"
-#include "gsnav/frame/tiles.hpp"
+#include "gsnav/detail/frame/blend.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
 #include "search.cuh"
 
 // What the kernels of a batch read and write (docs/cuda.md).

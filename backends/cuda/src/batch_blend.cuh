@@ -5,7 +5,7 @@
 
 #include "batch_args.cuh"
 #include "gsnav/backends/cuda.hpp"
-#include "gsnav/frame/composite.hpp"
+#include "gsnav/detail/frame/composite.hpp"
 
 // What the kernels share that blend tiles.
 

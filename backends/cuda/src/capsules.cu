@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/backends/cuda/device.cuh"
-#include "gsnav/sweep/first_impacts.hpp"
+#include "gsnav/detail/sweep/first_impacts.hpp"
 
 // Capsules by the library's own kernels, a thread a pair or a leg.
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/mesh/mesh_shade.hpp"
+#include "gsnav/detail/mesh/mesh_shade.hpp"
 
 // The meshes of several cameras drawn together.
 

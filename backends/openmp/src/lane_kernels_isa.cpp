@@ -2,7 +2,7 @@
 // Compiled once per instruction set. Nothing here may leave a function behind that another object could
 // pick up: every definition lives in the set's own namespace or is always inlined.
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/lanes/kernels.hpp"
+#include "gsnav/detail/lanes/kernels.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {

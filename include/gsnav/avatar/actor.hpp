@@ -9,7 +9,7 @@
 
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/avatar/motion.hpp"
-#include "gsnav/avatar/trajectory.hpp"
+#include "gsnav/detail/avatar/trajectory.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
 #include "gsnav/math/capsule.hpp"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gsnav/avatar/skeleton.hpp"
-#include "gsnav/avatar/skinning_weights.hpp"
+#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 

@@ -38,11 +38,11 @@ struct NoopFunctor {
 ///                                             true where the result is in *_alt
 ///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)
 ///     one_thread() -> B                       a backend of the same kind for the calling thread alone: batches
-///                                             of cameras are then cut by frames (render/frame_lanes.hpp)
+///                                             of cameras are then cut by frames (detail/render/frame_lanes.hpp)
 ///     static constexpr bool bins_in_lanes     its binning reads BinArgs::spans, which projection then fills
-///     batch_renderer                          a type that draws many cameras by one call (sim/frame_batch.hpp)
+///     batch_renderer                          a type that draws many cameras by one call (detail/sim/frame_batch.hpp)
 ///     static allocate_host(bytes) -> void*, deallocate_host(p)   host memory that it copies to and from by itself
-///                                             (core/host_array.hpp); nullptr where there is none
+///                                             (detail/core/host_array.hpp); nullptr where there is none
 template <class B>
 concept Backend = requires(B& b, void* p, const void* q, std::size_t n, detail::NoopFunctor f) {
   typename B::memory_space;

@@ -86,8 +86,8 @@ struct Each {
   }
 };
 
-/// Projects a set of Gaussians for one camera, all chunks or some of them (frame/project_chunk.hpp). Where a host
-/// backend has the second form, frames may be drawn in slices of depth (render/depth_slices.hpp).
+/// Projects a set of Gaussians for one camera, all chunks or some of them (detail/frame/project_chunk.hpp). Where a host
+/// backend has the second form, frames may be drawn in slices of depth (detail/render/depth_slices.hpp).
 struct Project {
   template <Backend B, class S>
   static void generic(B& backend, const ProjectArgs<S>& args, const ProjectOutputs<S>& out) {
@@ -96,7 +96,7 @@ struct Project {
 };
 
 /// Counts the splats of each tile, less those that `cull` (NoCull, MeshCull) hides: fills args.tile_offsets, and
-/// args.cursors for ScatterTiles (frame/tiles.hpp).
+/// args.cursors for ScatterTiles (detail/frame/tiles.hpp).
 struct CountTiles {
   template <Backend B, class S, class Cull>
   static void generic(B& backend, const BinArgs<S>& args, const Cull& cull) {
@@ -113,7 +113,7 @@ struct ScatterTiles {
   }
 };
 
-/// Blends the pixels of a frame without meshes (frame/blend.hpp).
+/// Blends the pixels of a frame without meshes (detail/frame/blend.hpp).
 struct Blend {
   template <Backend B, class S>
   static void generic(B& backend, const RasterArgs<S>& args) {
@@ -121,7 +121,7 @@ struct Blend {
   }
 };
 
-/// Blends the pixels of a frame with meshes (frame/composite.hpp).
+/// Blends the pixels of a frame with meshes (detail/frame/composite.hpp).
 struct BlendWithMeshes {
   template <Backend B, class S>
   static void generic(B& backend, const RasterArgs<S>& args) {
@@ -130,7 +130,7 @@ struct BlendWithMeshes {
 };
 
 /// Rasterizes the triangles of MeshRasterArgs. The generic form bins them first and needs scratch for that: it is in
-/// draw_meshes (render/draw_meshes.hpp).
+/// draw_meshes (detail/render/draw_meshes.hpp).
 struct RasterizeMesh {};
 
 /// Skins the Gaussians of one avatar linearly (skin/skin.hpp).

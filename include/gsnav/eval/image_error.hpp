@@ -6,7 +6,7 @@
 #include <span>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/eval/samples.hpp"
+#include "gsnav/detail/eval/samples.hpp"
 
 namespace gsnav::eval {
 

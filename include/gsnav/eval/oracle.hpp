@@ -8,10 +8,10 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/eval/oracle_blend.hpp"
-#include "gsnav/eval/oracle_config.hpp"
-#include "gsnav/eval/oracle_project.hpp"
-#include "gsnav/eval/oracle_ray.hpp"
+#include "gsnav/detail/eval/oracle_blend.hpp"
+#include "gsnav/detail/eval/oracle_config.hpp"
+#include "gsnav/detail/eval/oracle_project.hpp"
+#include "gsnav/detail/eval/oracle_ray.hpp"
 
 // Images of Gaussians in float64, judged by nothing but their definition: no tiles, no float, no
 // approximation. What the errors of every renderer here are measured against; made for tests and

@@ -6,7 +6,7 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/frame/gaussians.hpp"
-#include "gsnav/frame/splat.hpp"
+#include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {

@@ -36,7 +36,7 @@ struct ChunkBounds {
   float opacity_max = 0;  ///< in [0, 1]
 };
 
-/// How the rows of a chunk of kProjectChunk are packed (frame/packed_gaussians.hpp).
+/// How the rows of a chunk of kProjectChunk are packed (detail/frame/packed_gaussians.hpp).
 struct PackedChunk {
   Vec3<float> low{}, step{};  ///< offset of a mean: low + step code, metres
   float scale_step = 0;       ///< root of a standard deviation: scale_step code
@@ -87,7 +87,7 @@ struct GaussianView {
   View<const float> opacities;             ///< in [0, 1], [N]
   View<const float> sh0;                   ///< [N][3], the degree-0 coefficients
   View<const float> shN;                   ///< [N][(degree+1)^2 - 1][3], empty for degree 0
-  /// The same as IEEE binary16 (math/half.hpp), in place of shN, which is empty then; half of most of what a Gaussian
+  /// The same as IEEE binary16 (detail/math/half.hpp), in place of shN, which is empty then; half of most of what a Gaussian
   /// takes. In host memory only: GaussianArrays gives other backends floats.
   View<const std::uint16_t> shN_half;
   int sh_degree = 0;                       ///< 0 to 3
@@ -123,7 +123,7 @@ struct GaussianView {
   View<const std::uint32_t> seen;
 
   /// Highest SH degree that the Gaussians of a chunk use, one a chunk of all_chunks()
-  /// (scene/scene_profile.hpp): bands above it are not read. In the backend's memory (GaussianArrays
+  /// (detail/scene/scene_profile.hpp): bands above it are not read. In the backend's memory (GaussianArrays
   /// puts them there). Empty: sh_degree.
   View<const std::uint8_t> chunk_sh_degrees;
 

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/io/lod_set.hpp"
-#include "gsnav/io/read_limits.hpp"
+#include "gsnav/detail/io/lod_set.hpp"
+#include "gsnav/detail/io/read_limits.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 
@@ -24,7 +24,7 @@ enum class Storage : std::uint8_t {
 struct LoadSceneOptions {
   int level = 0;     ///< of streamed LOD sets, 0 is the finest
   bool sort = true;  ///< in space, as rendering wants it; false: rows stay as they were read
-  double time = 0;   ///< seconds, of scenes that move (io/temporal_file.hpp)
+  double time = 0;   ///< seconds, of scenes that move (detail/io/temporal_file.hpp)
   Storage storage = Storage::full;
   /// Whether SH bands that are zero in every Gaussian are held. They change no bit of an image; a cloud
   /// that is written to a file again keeps its degree by them. The report says what was let go.
@@ -50,7 +50,7 @@ struct LoadedPackedCloud {
 /// A comma names sibling tiles, which are merged into one cloud: `scenes/flat/2_0,2_1` reads
 /// scenes/flat/2_0 and scenes/flat/2_1. Their reports are summed, their warnings carry the tile's path.
 ///
-/// Rows come sorted in space (scene/spatial_order.hpp) unless the options say otherwise; `row_ids` has their places
+/// Rows come sorted in space (detail/scene/spatial_order.hpp) unless the options say otherwise; `row_ids` has their places
 /// as they were read.
 /// Errors: what the loaders of these formats return; unsupported (an extension that is not in the list,
 /// named with the list); invalid_argument (an empty name or a tile twice). Never throws.

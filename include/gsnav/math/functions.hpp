@@ -8,7 +8,7 @@
 
 #include "gsnav/config.hpp"
 
-// Scalar functions under one set of names for float, double and long double. math/pack.hpp adds the
+// Scalar functions under one set of names for float, double and long double. detail/math/pack.hpp adds the
 // same names for lanes, so that a kernel written once runs on any of them. Everything here uses
 // correctly rounded operations only (+ - * / sqrt fma), except exp2, log2 and the trigonometric
 // functions of double, which come from the platform.
@@ -37,7 +37,7 @@ using scalar_of = typename LaneTraits<L>::scalar;
 /// Comparison result of a scalar or lane pack.
 template <class L>
 using mask_of = typename LaneTraits<L>::mask;
-/// A double for each element of a scalar or lane pack (math/pack_double.hpp). static_cast converts both
+/// A double for each element of a scalar or lane pack (detail/math/pack_double.hpp). static_cast converts both
 /// ways.
 template <class L>
 using doubles_of = typename LaneTraits<L>::doubles;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/core/small_vector.hpp"
+#include "gsnav/detail/core/small_vector.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/math/similarity.hpp"

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
-#include "gsnav/frame/project_chunk.hpp"
-#include "gsnav/frame/projection_camera.hpp"
-#include "gsnav/frame/tiles.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/render/render_config.hpp"
 
 namespace gsnav {

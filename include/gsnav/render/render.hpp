@@ -12,17 +12,17 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/core/parallel.hpp"
-#include "gsnav/frame/blend.hpp"
+#include "gsnav/detail/core/parallel.hpp"
+#include "gsnav/detail/frame/blend.hpp"
 #include "gsnav/frame/color_space.hpp"
-#include "gsnav/frame/project_chunk.hpp"
-#include "gsnav/frame/tiles.hpp"
-#include "gsnav/render/composite_steps.hpp"
-#include "gsnav/render/order_visible.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/render/composite_steps.hpp"
+#include "gsnav/detail/render/order_visible.hpp"
 #include "gsnav/render/render_config.hpp"
-#include "gsnav/render/render_workspace.hpp"
+#include "gsnav/detail/render/render_workspace.hpp"
 #include "gsnav/core/stages.hpp"
-#include "gsnav/render/validate_set.hpp"
+#include "gsnav/detail/render/validate_set.hpp"
 
 namespace gsnav {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <utility>
 
-#include "gsnav/render/draw_meshes.hpp"
+#include "gsnav/detail/render/draw_meshes.hpp"
 #include "gsnav/render/render.hpp"
 
 namespace gsnav {

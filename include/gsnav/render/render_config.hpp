@@ -8,11 +8,11 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/frame/blend.hpp"
+#include "gsnav/detail/frame/blend.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/frame/gaussians.hpp"
-#include "gsnav/mesh/mesh.hpp"
-#include "gsnav/frame/projection.hpp"
+#include "gsnav/detail/mesh/mesh.hpp"
+#include "gsnav/detail/frame/projection.hpp"
 
 namespace gsnav {
 

@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/core/huge_pages.hpp"
+#include "gsnav/detail/core/huge_pages.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/frame/gaussians.hpp"
-#include "gsnav/frame/projection_camera.hpp"
-#include "gsnav/math/half.hpp"
-#include "gsnav/scene/load_report.hpp"
+#include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/detail/math/half.hpp"
+#include "gsnav/detail/scene/load_report.hpp"
 
 namespace gsnav {
 
@@ -43,7 +43,7 @@ struct GaussianCloud {
   int sh_degree = 0;                         ///< 0 to 3
   std::vector<std::uint32_t> origin_ids;     ///< [N], or empty while every origin is zero
   std::vector<Vec3d> origins;                ///< lattice points in use; empty with origin_ids
-  // Filled by sort_spatially (scene/spatial_order.hpp); whoever moves, adds or scales rows clears them.
+  // Filled by sort_spatially (detail/scene/spatial_order.hpp); whoever moves, adds or scales rows clears them.
   std::vector<std::uint32_t> row_ids;        ///< place of each row as it was read, [N], or empty
   std::vector<ChunkBounds> chunk_bounds;     ///< [ceil(N / kProjectChunk)], or empty
   std::vector<ChunkBounds> part_bounds;      ///< [ceil(N / kChunkPart)], or empty; bound_chunks makes both

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/frame/cull.hpp"
-#include "gsnav/frame/projection_camera.hpp"
+#include "gsnav/detail/frame/cull.hpp"
+#include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 

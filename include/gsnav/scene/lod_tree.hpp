@@ -22,7 +22,7 @@ struct LodNode {
   ChunkBounds reach;  ///< of its own Gaussians and of all below it
 };
 
-/// A node of a set that ships its levels (scene/lod_levels.hpp).
+/// A node of a set that ships its levels (detail/scene/lod_levels.hpp).
 struct LodPlace {
   static constexpr std::uint32_t kNone = 0xffffffffu;
   std::uint32_t first_chunk = 0, chunks = 0;  ///< of the cloud where nothing is finer, else of `merged`

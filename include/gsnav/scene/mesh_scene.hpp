@@ -14,7 +14,7 @@
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/mesh/mesh.hpp"
+#include "gsnav/detail/mesh/mesh.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/scene/triangle_mesh.hpp"
 

@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/core/huge_pages.hpp"
-#include "gsnav/frame/packed_gaussians.hpp"
+#include "gsnav/detail/core/huge_pages.hpp"
+#include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
-#include "gsnav/scene/load_report.hpp"
-#include "gsnav/scene/needed_bands.hpp"
+#include "gsnav/detail/scene/load_report.hpp"
+#include "gsnav/detail/scene/needed_bands.hpp"
 
 namespace gsnav {
 

@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/core/guarded.hpp"
-#include "gsnav/render/frame_lanes.hpp"
+#include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/render/frame_lanes.hpp"
 #include "gsnav/render/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
-#include "gsnav/scene/needed_bands.hpp"
+#include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 
 namespace gsnav {
@@ -43,7 +43,7 @@ class GaussianArrays {
   GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) upload(backend, cloud);
   }
-  /// Without the SH bands that the profile says no chunk needs (scene/scene_profile.hpp): elsewhere than
+  /// Without the SH bands that the profile says no chunk needs (detail/scene/scene_profile.hpp): elsewhere than
   /// on host backends those that none does take no memory, those that a chunk does not are not read. On
   /// host backends the profile must outlive it too.
   GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneProfile& profile)

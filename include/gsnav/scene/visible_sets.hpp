@@ -21,7 +21,7 @@
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/similarity.hpp"
-#include "gsnav/render/row_weights.hpp"
+#include "gsnav/detail/render/row_weights.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {

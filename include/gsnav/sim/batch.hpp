@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/core/thread_pool.hpp"
-#include "gsnav/sim/batch_world.hpp"
-#include "gsnav/sim/scene_library.hpp"
+#include "gsnav/detail/core/thread_pool.hpp"
+#include "gsnav/detail/sim/batch_world.hpp"
+#include "gsnav/detail/sim/scene_library.hpp"
 #include "gsnav/sim/simulator.hpp"
 
 namespace gsnav {

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "gsnav/sim/episode.hpp"
-#include "gsnav/sim/scene_on_backend.hpp"
-#include "gsnav/sim/task.hpp"
+#include "gsnav/detail/sim/episode.hpp"
+#include "gsnav/detail/sim/scene_on_backend.hpp"
+#include "gsnav/detail/sim/task.hpp"
 
 namespace gsnav {
 

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/sim/scene_on_backend.hpp"
-#include "gsnav/sim/sensor_rig.hpp"
+#include "gsnav/detail/sim/scene_on_backend.hpp"
+#include "gsnav/detail/sim/sensor_rig.hpp"
 #include "gsnav/sim/world.hpp"
 
 namespace gsnav {

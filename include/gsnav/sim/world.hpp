@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/nav/step.hpp"
-#include "gsnav/sim/episode.hpp"
+#include "gsnav/detail/nav/step.hpp"
+#include "gsnav/detail/sim/episode.hpp"
 #include "gsnav/sim/metrics.hpp"
-#include "gsnav/sim/task.hpp"
+#include "gsnav/detail/sim/task.hpp"
 
 namespace gsnav {
 

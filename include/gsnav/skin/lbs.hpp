@@ -7,7 +7,7 @@
 
 #include "gsnav/config.hpp"
 #include "gsnav/core/view.hpp"
-#include "gsnav/math/dual_quat.hpp"
+#include "gsnav/detail/math/dual_quat.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/quat.hpp"
@@ -17,7 +17,7 @@ namespace gsnav {
 /// Joints that move one Gaussian: one of these two.
 inline constexpr int kInfluences4 = 4, kInfluences8 = 8;
 /// Skinning weights are whole numbers of parts, of which this many are 1; those of a Gaussian make 1 exactly.
-/// Rounding weights (avatar/skinning_weights.hpp) moves a Gaussian by at most K / (4 * kWeightParts) of the greatest
+/// Rounding weights (detail/avatar/skinning_weights.hpp) moves a Gaussian by at most K / (4 * kWeightParts) of the greatest
 /// distance between the places where its joints alone would put it: 15 um a metre for K = 4, 31 um for K = 8.
 inline constexpr int kWeightParts = 65535;
 /// A blended linear part with a smaller determinant has no orientation worth the name (the candy

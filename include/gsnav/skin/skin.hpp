@@ -10,7 +10,7 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/skin/lbs.hpp"
-#include "gsnav/skin/skin_modes.hpp"
+#include "gsnav/detail/skin/skin_modes.hpp"
 #include "gsnav/core/stages.hpp"
 
 namespace gsnav {

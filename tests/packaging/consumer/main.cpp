@@ -9,11 +9,11 @@
 #include <gsnav/backends/openmp.hpp>
 #endif
 #if defined(WITH_AVATAR)
-#include <gsnav/avatar/humanoid.hpp>
+#include <gsnav/detail/avatar/humanoid.hpp>
 #endif
 #if defined(WITH_IO)
 #include <gsnav/io/image_file.hpp>
-#include <gsnav/io/sog.hpp>
+#include <gsnav/detail/io/sog.hpp>
 #endif
 #if defined(WITH_NAV)
 #include <gsnav/nav/navmesh_settings.hpp>
@@ -22,7 +22,7 @@
 #include <gsnav/sim/default_scene.hpp>
 #endif
 #if defined(WITH_EVAL)
-#include <gsnav/eval/ssim.hpp>
+#include <gsnav/detail/eval/ssim.hpp>
 #endif
 #if defined(WITH_INTEROP_EIGEN)
 #include <gsnav/interop/eigen.hpp>

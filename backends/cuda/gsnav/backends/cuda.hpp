@@ -8,11 +8,11 @@
 #include <string>
 
 #include "gsnav/core/backend.hpp"
-#include "gsnav/frame/blend.hpp"
-#include "gsnav/frame/cut_depth.hpp"
-#include "gsnav/frame/project_chunk.hpp"
-#include "gsnav/frame/tiles.hpp"
-#include "gsnav/sweep/first_impacts.hpp"
+#include "gsnav/detail/frame/blend.hpp"
+#include "gsnav/detail/frame/cut_depth.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/sweep/first_impacts.hpp"
 #include "gsnav/render/render.hpp"
 #include "gsnav/render/render_composite.hpp"
 #include "gsnav/skin/skin.hpp"

@@ -12,20 +12,20 @@
 #endif
 
 #include "gsnav/core/backend.hpp"
-#include "gsnav/core/host_memory.hpp"
-#include "gsnav/core/thread_pool.hpp"
-#include "gsnav/frame/blend.hpp"
+#include "gsnav/detail/core/host_memory.hpp"
+#include "gsnav/detail/core/thread_pool.hpp"
+#include "gsnav/detail/frame/blend.hpp"
 #include "gsnav/sweep/capsule_batch.hpp"
-#include "gsnav/frame/composite.hpp"
+#include "gsnav/detail/frame/composite.hpp"
 #include "gsnav/skin/lbs.hpp"
-#include "gsnav/mesh/mesh_shade.hpp"
-#include "gsnav/frame/project_chunk.hpp"
-#include "gsnav/frame/tiles.hpp"
+#include "gsnav/detail/mesh/mesh_shade.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/render/render_composite.hpp"
 #include "gsnav/skin/skin.hpp"
 #include "gsnav/core/stages.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
-#include "gsnav/lanes/kernels.hpp"
+#include "gsnav/detail/lanes/kernels.hpp"
 #endif
 
 namespace gsnav {
@@ -69,7 +69,7 @@ inline const LaneKernels& lane_kernels() noexcept {
 
 /// Runs on the processor's cores. float32 frames go through lane kernels; every other scalar through
 /// the generic ones. Results do not depend on the number of threads. The threads are a pool of the backend's
-/// own, which copies share (core/thread_pool.hpp says what holds for them): OpenMP only tells how many.
+/// own, which copies share (detail/core/thread_pool.hpp says what holds for them): OpenMP only tells how many.
 class OpenMPBackend : public HostMemory {
  public:
   /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS), without OpenMP the number of cores.

@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "gsnav/core/backend.hpp"
-#include "gsnav/core/host_memory.hpp"
+#include "gsnav/detail/core/host_memory.hpp"
 
 namespace gsnav {
 

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/detail/core/parallel.hpp"
+#include "gsnav/core/view.hpp"
+#include "gsnav/detail/eval/oracle_config.hpp"
+#include "gsnav/detail/eval/oracle_gaussian.hpp"
+
+// From sets of Gaussians to one sorted list of records: what oracles of every kind share.
+
+namespace gsnav::eval::detail {
+
+/// A Gaussian ready to be blended.
+template <class Model>
+struct OracleRecord {
+  Model model;
+  Vec3d color;
+  PixelRect box;       ///< within the crop; may be empty where boxes are not used
+  std::uint32_t id;    ///< stable
+  std::uint32_t rank;  ///< place in the order that order_flip compares with
+};
+
+/// The rules of blending, limits in the form they are compared in.
+struct OracleRules {
+  double log2_alpha_min, max_alpha, transmittance_min, first_hit_tau;
+  Vec3d background;
+};
+
+/// Records in the order of the image (of float32 keys for OracleOrder::per_ray), for one camera and
+/// crop.
+template <class Model>
+struct OracleScene {
+  std::vector<OracleRecord<Model>> records;
+  OracleRules rules;
+  PixelRect rect;
+  double log2_cut;  ///< fainter pairs need not be asked
+  bool boxed, per_ray;
+  const OracleMesh* mesh;
+  std::size_t image_width;
+  OracleCounts counts;
+
+  /// Of the camera's pixel (x, y): the mesh's depth, infinity where there is none.
+  double mesh_depth(int x, int y) const noexcept {
+    return mesh == nullptr ? std::numeric_limits<double>::infinity() : mesh->depth[pixel(x, y)];
+  }
+  std::size_t pixel(int x, int y) const noexcept {
+    return static_cast<std::size_t>(y) * image_width + static_cast<std::size_t>(x);
+  }
+};
+
+struct OracleCandidate {
+  double key64;
+  std::uint32_t code;
+  std::uint32_t id;   ///< stable: what decides ties
+  std::uint32_t row;  ///< among the rows of all sets as they lie in memory
+};
+
+inline constexpr std::size_t kOracleChunk = 2048;
+
+/// Candidates of all sets: what is drawn and, where boxes are used, reaches the crop.
+template <class Model, Backend B>
+std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const OracleSet> sets, int key_bits,
+                                               OracleScene<Model>& scene) {
+  std::vector<OracleCandidate> all;
+  for (const OracleSet& s : sets) {
+    const std::size_t n = s.set.gaussians.size, chunks = (n + kOracleChunk - 1) / kOracleChunk;
+    std::vector<std::vector<OracleCandidate>> found(chunks);
+    std::vector<std::uint64_t> reaching(chunks);
+    backend.parallel_for(chunks, [&](std::size_t c) {
+      for (std::size_t row = c * kOracleChunk; row < std::min(n, (c + 1) * kOracleChunk); ++row) {
+        Model model;
+        PixelRect box;
+        if (!Model::make(s, row, scene.log2_cut, model, box)) continue;
+        const bool reaches = !box.intersection(scene.rect).empty();
+        reaching[c] += reaches ? 1 : 0;
+        if (scene.boxed && !reaches) continue;
+        const Real key = s.key(row);
+        const float near_plane = static_cast<float>(s.camera.near_plane);
+        found[c].push_back({static_cast<double>(key),
+                            sorted_code(static_cast<float>(key), key_bits, near_plane), s.id(row),
+                            static_cast<std::uint32_t>(s.first_row + row)});
+      }
+    });
+    for (std::size_t c = 0; c < chunks; ++c) {
+      all.insert(all.end(), found[c].begin(), found[c].end());
+      scene.counts.visible += reaching[c];
+    }
+    scene.counts.gaussians += n;
+  }
+  return all;
+}
+
+/// Projects, culls and sorts; what is drawn is projected again to be recorded in its place, so that
+/// nothing is held twice.
+template <class Model, Backend B>
+OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> gaussian_sets,
+                                     const Camera& camera, const OracleConfig& config) {
+  const RenderConfig& c = config.rules;
+  const bool truncated = config.kind != OracleKind::untruncated;
+  const double infinity = std::numeric_limits<double>::infinity();
+  OracleScene<Model> scene;
+  scene.rules = {truncated ? std::log2(c.alpha_min) : -infinity, c.max_alpha,
+                 truncated ? c.transmittance_min : 0.0, c.first_hit_tau, c.background};
+  scene.rect = oracle_rect(config, camera);
+  scene.boxed = config.boxed;
+  scene.mesh = config.mesh;
+  scene.image_width = static_cast<std::size_t>(camera.width);
+  scene.per_ray = config.order == OracleOrder::per_ray ||
+                  (config.order == OracleOrder::own && config.kind == OracleKind::ray);
+  // What falls short of alpha_min by less than the undecided margin has to be seen too.
+  scene.log2_cut = truncated      ? scene.rules.log2_alpha_min - 3 * kUndecidedRelative
+                   : config.boxed ? kLog2NegligibleAlpha
+                                  : -infinity;
+
+  std::vector<OracleSet> sets;
+  std::size_t total = 0;
+  for (const GaussianSet& s : gaussian_sets) {
+    sets.emplace_back(s, camera, c, total);
+    total += s.gaussians.size;
+  }
+  std::vector<OracleCandidate> order = oracle_candidates<Model>(backend, sets, c.key_bits, scene);
+  const auto by_code = [](const OracleCandidate& a, const OracleCandidate& b) {
+    return a.code != b.code ? a.code < b.code : a.id < b.id;
+  };
+  const auto by_key64 = [](const OracleCandidate& a, const OracleCandidate& b) {
+    return a.key64 != b.key64 ? a.key64 < b.key64 : a.id < b.id;
+  };
+  const bool in_float64 = config.order == OracleOrder::float64;
+  if (in_float64) {
+    std::sort(order.begin(), order.end(), by_key64);
+  } else {
+    std::sort(order.begin(), order.end(), by_code);
+  }
+  // Places in the other order, for order_flip; by pixel, the order of the list is the other one.
+  std::vector<std::uint32_t> place(order.size()), rank(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) place[i] = static_cast<std::uint32_t>(i);
+  if (!scene.per_ray) {
+    std::sort(place.begin(), place.end(), [&](std::uint32_t i, std::uint32_t j) {
+      return in_float64 ? by_code(order[i], order[j]) : by_key64(order[i], order[j]);
+    });
+  }
+  for (std::size_t i = 0; i < order.size(); ++i) rank[place[i]] = static_cast<std::uint32_t>(i);
+
+  scene.records.resize(order.size());
+  backend.parallel_for((order.size() + kOracleChunk - 1) / kOracleChunk, [&](std::size_t chunk) {
+    for (std::size_t i = chunk * kOracleChunk; i < std::min(order.size(), (chunk + 1) * kOracleChunk);
+         ++i) {
+      const auto after =
+          std::upper_bound(sets.begin(), sets.end(), order[i].row,
+                           [](std::uint32_t row, const OracleSet& s) { return row < s.first_row; });
+      const OracleSet& s = *std::prev(after);
+      const std::size_t row = order[i].row - s.first_row;
+      OracleRecord<Model>& record = scene.records[i];
+      Model::make(s, row, scene.log2_cut, record.model, record.box);
+      record.box = record.box.intersection(scene.rect);
+      record.color = s.color(row, std::min(s.set.gaussians.sh_degree, c.max_sh_degree), c.blend_space);
+      record.id = order[i].id;
+      record.rank = rank[i];
+    }
+  });
+  return scene;
+}
+
+}  // namespace gsnav::eval::detail

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/detail/frame/blend.hpp"
+#include "gsnav/detail/image/mesh_layer.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
+
+// Gaussians and meshes in one image (docs/composition.md). Frames without a mesh run none of this.
+
+namespace gsnav {
+
+/// alpha where a splat lies before the mesh at depth `mesh`, 0 where it lies behind. A splat is looked at closely
+/// only where its reach spans the mesh: its depth along a ray is within it, also when rounded.
+template <class L, class S>
+GSNAV_HD L alpha_before_mesh(L alpha, const SplatDepth<S>& depth, L mesh, L px, L py) noexcept {
+  const auto unsure = L(depth.z + depth.reach) > mesh;
+  if (!any(unsure)) return alpha;
+  return select(unsure && (ray_depth(depth, px, py) > mesh), L(S(0)), alpha);
+}
+
+/// Whether a pixel has a mesh.
+template <class L>
+GSNAV_HD mask_of<L> has_mesh(L depth) noexcept {
+  return depth <= L(scalar_of<L>(3.4e38));
+}
+
+/// Blends a surface of a mesh at depth z, metres, also where too little transmittance is left for Gaussians. Alpha 0:
+/// there is none, z must be finite; 1: transmittance becomes 0.
+template <bool Color, class L, DepthMode D, class S>
+GSNAV_HD void blend_surface(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha, L z,
+                            const Vec3<L>& color) noexcept {
+  const L before = abs(state.transmittance), weight = alpha * before, after = before - weight;
+  state.template accumulate<Color>(TransmittanceStep<L>{before, after, weight}, rules.first_hit_tau,
+                             [&]() GSNAV_INLINED { return color; }, [&]() GSNAV_INLINED { return z; });
+  state.transmittance = select(state.transmittance < L(S(0)), -after, after);
+}
+
+/// The mesh takes what transmittance the Gaussians left.
+template <bool Color, class L, DepthMode D, class S>
+GSNAV_HD void close_by_mesh(BlendState<L, D>& state, const BlendRules<S>& rules, L depth, const Vec3<L>& color) noexcept {
+  const auto covered = has_mesh(depth);
+  const L zero(S(0));
+  blend_surface<Color>(state, rules, select(covered, L(S(1)), zero), select(covered, depth, zero), color);
+}
+
+/// The same with the layer's depth and colour at a pixel.
+template <bool Color, DepthMode D, class S>
+GSNAV_HD void close_by_mesh(BlendState<S, D>& state, const BlendRules<S>& rules, const MeshLayer<S>& mesh,
+                            std::size_t pixel) noexcept {
+  Vec3<S> color{};
+  if constexpr (Color) {
+    const S* const from = mesh.color + 3 * pixel;
+    color = {from[0], from[1], from[2]};
+  }
+  close_by_mesh<Color>(state, rules, mesh.depth[pixel], color);
+}
+
+/// blend_splat before a mesh at depth `mesh`.
+template <bool Color, DepthMode D, Exp2 M, bool General, class S>
+GSNAV_HD void composite_splat(BlendState<S, D>& state, const BlendRules<S>& rules,
+                              const SplatRecords<S>& splat, S mesh, S px, S py) noexcept {
+  blend_splat<Color, D, M, General>(state, rules, splat, px, py, [&](S alpha) GSNAV_INLINED {
+    return alpha_before_mesh(alpha, *splat.depth, mesh, px, py);
+  });
+}
+
+/// Blends one pixel of a frame with a mesh: RasterizePixel, but for what the mesh hides.
+template <class S, bool Color, DepthMode D, bool General>
+struct CompositePixel {
+  RasterArgs<S> args;
+
+  GSNAV_HD void operator()(std::size_t pixel) const noexcept {
+    const PixelWalk<S> walk(args, pixel);
+    const S mesh = args.mesh.depth[pixel];
+    BlendState<S, D> state;
+    walk.for_each_splat(args, state, [&](const SplatRecords<S>& splat) GSNAV_INLINED {
+      composite_splat<Color, D, Exp2::degree5, General>(state, args.rules, splat, mesh, walk.px,
+                                                        walk.py);
+    });
+    close_by_mesh<Color>(state, args.rules, args.mesh, pixel);
+    write_pixel(args, pixel, state);
+  }
+};
+
+/// Blends a pixel that has fragments. They cut it into stretches of depth; in each the list is walked
+/// for the splats whose depths along the ray lie there, as a mesh at its far end would have it walked.
+template <class S, bool Color, DepthMode D, bool General>
+struct FragmentPixel {
+  RasterArgs<S> args;
+
+  GSNAV_HD void operator()(std::size_t pixel) const noexcept {
+    const FragmentRange range = args.mesh.ranges[pixel];
+    if (range.count == 0) return;
+    const PixelWalk<S> walk(args, pixel);
+    BlendState<S, D> state;
+    S near = S(-3.4e38);
+    for (std::uint32_t k = 0;; ++k) {
+      const MeshFragment<S>* const f =
+          k < range.count ? args.mesh.fragments.data + range.begin + k : nullptr;
+      const S far = f != nullptr ? f->depth : args.mesh.depth[pixel];
+      // Splats were binned by where the opaque mesh is.
+      walk.for_each_splat(args, state, [&](const SplatRecords<S>& splat) GSNAV_INLINED {
+        blend_within(state, splat, near, far, walk.px, walk.py);
+      });
+      if (f == nullptr) break;
+      blend_surface<Color>(state, args.rules, f->alpha, f->depth, Vec3<S>{f->r, f->g, f->b});
+      near = far;
+    }
+    close_by_mesh<Color>(state, args.rules, args.mesh, pixel);
+    write_pixel(args, pixel, state);
+  }
+
+ private:
+  /// blend_splat where its depth is in (near, far].
+  GSNAV_HD void blend_within(BlendState<S, D>& state, const SplatRecords<S>& splat, S near, S far, S px,
+                             S py) const noexcept {
+    const SplatDepth<S>& depth = *splat.depth;
+    if (depth.z - depth.reach > far || depth.z + depth.reach <= near) return;
+    blend_splat<Color, D, Exp2::degree5, General>(state, args.rules, splat, px, py,
+                                                  [&](S alpha) GSNAV_INLINED {
+                                                    const S z = ray_depth(depth, px, py);
+                                                    return z > far || z <= near ? S(0) : alpha;
+                                                  });
+  }
+};
+
+/// dispatch_raster for frames with a mesh: calls f with compile-time <Color, DepthMode, General>. The cubic exp2 does
+/// not serve these.
+template <class S, class F>
+void dispatch_composite(const RasterArgs<S>& args, const F& f) {
+  const auto with_depth = [&]<bool C, bool G>() {
+    switch (args.depth_mode()) {
+      case DepthMode::none: return f.template operator()<C, DepthMode::none, G>();
+      case DepthMode::median: return f.template operator()<C, DepthMode::median, G>();
+      case DepthMode::any: return f.template operator()<C, DepthMode::any, G>();
+    }
+  };
+  const bool general = !args.perspectives.empty() || args.rules.exclusive_stop, color = args.images.rgb != nullptr;
+  if (color) {
+    general ? with_depth.template operator()<true, true>() : with_depth.template operator()<true, false>();
+  } else {
+    general ? with_depth.template operator()<false, true>() : with_depth.template operator()<false, false>();
+  }
+}
+
+/// Composite::hard_depth: the images of Gaussians alone, over black, become those of the frame.
+template <class S>
+struct HardDepthPixel {
+  FrameImages<S> images;     ///< what was asked for; filled by the Gaussians
+  const S* alpha = nullptr;  ///< of the Gaussians
+  const S* expected = nullptr;
+  MeshLayer<S> mesh;
+  Vec3<S> background{};
+
+  GSNAV_HD void operator()(std::size_t pixel) const noexcept {
+    const S a = alpha[pixel], z = mesh.depth[pixel], d = expected[pixel];
+    const bool covered = has_mesh(z), dropped = !(a > S(0.01)), lost = dropped || (covered && d > z);
+    const S t = lost ? S(1) : S(1) - a;
+    if (images.rgb != nullptr) {
+      const S* const k = mesh.color + 3 * pixel;
+      S* const c = images.rgb + 3 * pixel;
+      const Vec3<S> under = covered ? Vec3<S>{k[0], k[1], k[2]} : background;
+      for (int i = 0; i < 3; ++i) c[i] = fma(t, under[i], lost ? S(0) : c[i]);
+    }
+    const auto depth = [&](S* image, S own) GSNAV_INLINED {
+      if (image != nullptr) image[pixel] = lost ? (covered ? z : S(0)) : own;
+    };
+    // One depth is written for a pixel, whatever is asked for.
+    depth(images.median_depth, d);
+    depth(images.accumulated_depth, d);
+    depth(images.first_hit_depth, d);
+    depth(images.expected_depth, d);
+    if (images.alpha != nullptr) images.alpha[pixel] = covered ? S(1) : (lost ? S(0) : a);
+  }
+};
+
+}  // namespace gsnav

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/math/functions.hpp"
+
+namespace gsnav {
+
+/// Pixels of a strip: from the one that holds `first` to the one before `end`, a whole number.
+template <class L>
+struct PixelColumns {
+  mask_of<L> any;
+  L first, end;  ///< where there are any
+};
+
+/// The columns that the ellipse of a splat's footprint covers within horizontal strips of an area: what
+/// tiles, and blocks of a tile, are listed by. L: one splat, or one a lane. Never less than the pixels
+/// that pass the pixel test in scalar_of<L>: the ellipse is enlarged by the rounding of that test, and of
+/// this one.
+///
+/// About the centre, |w|^2 = (a X)^2 + (k X + b Y)^2 = r^2 has its right edge at
+/// X(Y) = -s Y + sqrt((r^2 - (beta Y)^2) / alpha^2), alpha^2 = a^2 + k^2, s = k b / alpha^2, beta = a b / alpha:
+/// concave, with its maximum at Y* = -k r / (a b). So a strip's rightmost point is at Y* limited to the
+/// strip, and its leftmost at -Y*.
+///
+/// `Rough` takes sqrt_above for roots, and reciprocal_near: an ellipse up to 3e-3 larger, in less time.
+template <class L, bool Rough = false>
+class FootprintStrips {
+  using S = scalar_of<L>;
+
+ public:
+  /// Strips will lie within the pixels of the box.
+  GSNAV_HD FootprintStrips(const SplatGeometry<L>& g, S log2_alpha_min, const PixelBox<L>& box) noexcept
+      : FootprintStrips(g, log2_alpha_min, box.x0 + L(S(0.5)), box.x1 - L(S(0.5)), box.y0 + L(S(0.5)),
+                        box.y1 - L(S(0.5))) {}
+  /// ... within the pixel centres [x0, x1] x [y0, y1].
+  GSNAV_HD FootprintStrips(const SplatGeometry<L>& g, S log2_alpha_min, L x0, L x1, L y0, L y1) noexcept {
+    const L zero(S(0));
+    const L inv_a = inverse(g.a), inv_b = inverse(g.b);
+    const L mean_x = -(g.w1 * inv_a);
+    const L pulled = g.k * mean_x;
+    const L mean_y = -((pulled + g.w2) * inv_b);
+    const L aa = fma(g.a, g.a, g.k * g.k);
+    const L inv_aa = inverse(aa);
+    slope_ = (g.k * g.b) * inv_aa;
+    const L beta = g.a * g.b;
+    beta2_ = (beta * beta) * inv_aa;
+    inv_alpha_ = root(inv_aa);
+
+    // What one w of the pixel test, or the centre here, may be off by is a few roundings of this.
+    const L far_x = max(abs(x0 - g.ref_x), abs(x1 - g.ref_x));
+    const L far_y = max(abs(y0 - g.ref_y), abs(y1 - g.ref_y));
+    const L k = abs(g.k);
+    const L size = fma(g.a + k, far_x, fma(g.b, far_y, abs(g.w1) + abs(g.w2) + abs(pulled)));
+    const L edge = root(max(g.log2_opacity - L(log2_alpha_min), zero));
+    const L r = fma(size, L(S(2e-6)), edge * L(S(1.000002)));
+    r2_ = r * r;
+    turn_y_ = ((k * r) * inv_a) * inv_b;
+    negative_k_ = g.k < zero;
+    if constexpr (Rough) {
+      half_height_ = (r * root(aa)) * (abs(inv_a) * inv_b);
+    } else {
+      half_height_ = r / sqrt(beta2_);
+    }
+    center_x_ = g.ref_x + mean_x;
+    center_y_ = g.ref_y + mean_y;
+    pad_x_ = fma(fma(abs(slope_), far_y + abs(mean_y), abs(g.ref_x) + abs(mean_x)), L(S(1e-6)), L(S(1e-3)));
+    pad_y_ = fma(abs(g.ref_y) + abs(mean_y), L(S(1e-6)), L(S(1e-3)));
+  }
+
+  /// Pixel centres [y0, y1]: whether any may be covered there, and between which x.
+  GSNAV_HD mask_of<L> columns(L y0, L y1, L& left, L& right) const noexcept {
+    const L low = max(y0 - pad_y_ - center_y_, -half_height_);
+    const L high = min(y1 + pad_y_ - center_y_, half_height_);
+    const L at_k = clamp(turn_y_, low, high), against_k = clamp(-turn_y_, low, high);
+    const L y_right = select(negative_k_, at_k, against_k);
+    const L y_left = select(negative_k_, against_k, at_k);
+    const L zero(S(0));
+    const L reach_right = root(max(fma(-beta2_ * y_right, y_right, r2_), zero));
+    const L reach_left = root(max(fma(-beta2_ * y_left, y_left, r2_), zero));
+    right = center_x_ + (fma(reach_right, inv_alpha_, pad_x_) - slope_ * y_right);
+    left = center_x_ - (fma(reach_left, inv_alpha_, pad_x_) + slope_ * y_left);
+    return low <= high;
+  }
+
+  /// Rows [top, end) of the box: which of its pixels may be covered there.
+  GSNAV_HD PixelColumns<L> pixels(const PixelBox<L>& box, L top, L end) const noexcept {
+    const L half(S(0.5));
+    L left, right;
+    const auto covered = columns(max(top, box.y0) + half, min(end, box.y1) - half, left, right);
+    // The padding of left and right is more than what rounding to a pixel may lose.
+    const L first = clamp(left + half, box.x0, box.x1), behind = truncated(clamp(right + half, box.x0, box.x1));
+    return {covered && (first < behind), first, behind};
+  }
+
+ private:
+  GSNAV_HD static L root(L a) noexcept {
+    if constexpr (Rough) return sqrt_above(a);
+    return sqrt(a);
+  }
+  GSNAV_HD static L inverse(L a) noexcept {
+    if constexpr (Rough) return reciprocal_near(a);
+    return L(S(1)) / a;
+  }
+
+  L center_x_{}, center_y_{}, pad_x_{}, pad_y_{};
+  L slope_{}, beta2_{}, inv_alpha_{}, r2_{};
+  L half_height_{};
+  L turn_y_{};  // |Y*|
+  mask_of<L> negative_k_{};
+};
+
+}  // namespace gsnav

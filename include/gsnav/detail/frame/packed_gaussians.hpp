@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/math/functions.hpp"
+#include "gsnav/detail/math/half.hpp"
+#include "gsnav/math/mat.hpp"
+#include "gsnav/math/quat.hpp"
+
+// Packed rows (scene/packed_cloud.hpp), read as the floats that they stand for: over lanes and one at a time the same
+// bits, as every operation is rounded once.
+
+namespace gsnav {
+
+/// Largest code of a quaternion's part; half of it is 0.
+inline constexpr float kQuatCodes = 32766.0f;
+inline constexpr float kRootHalf = 0.70710678118654752f;
+
+/// Offset of a mean from its origin, metres. Codes are whole numbers of [0, 65535].
+template <class L>
+GSNAV_HD Vec3<L> unpack_mean(const PackedChunk& chunk, const Vec3<L>& code) noexcept {
+  return {fma(L(chunk.step.x), code.x, L(chunk.low.x)), fma(L(chunk.step.y), code.y, L(chunk.low.y)),
+          fma(L(chunk.step.z), code.z, L(chunk.low.z))};
+}
+
+/// Standard deviations, metres: steps of their roots, so that small ones are not lost beside large ones.
+template <class L>
+GSNAV_HD Vec3<L> unpack_scales(const PackedChunk& chunk, const Vec3<L>& code) noexcept {
+  const L step(chunk.scale_step);
+  const Vec3<L> roots{code.x * step, code.y * step, code.z * step};
+  return {roots.x * roots.x, roots.y * roots.y, roots.z * roots.z};
+}
+
+/// A unit quaternion from three of its parts, each within +-sqrt(1/2); the fourth, the largest, is positive. The lowest
+/// bits of the first two codes number it.
+template <class L>
+GSNAV_HD Quat<L> unpack_quat(const Vec3<L>& code) noexcept {
+  const L half(0.5f), two(2.0f), zero(0.0f), middle(kQuatCodes / 2), step(kRootHalf / (kQuatCodes / 2));
+  const L first = truncated(code.x * half), second = truncated(code.y * half), third = truncated(code.z * half);
+  const L missing = fma(two, code.y - two * second, code.x - two * first);
+  const L a = (first - middle) * step, b = (second - middle) * step, c = (third - middle) * step;
+  const L d = sqrt(max(fma(-a, a, fma(-b, b, fma(-c, c, L(1.0f)))), zero));
+  const auto w = missing < half, x = missing < L(1.5f), y = missing < L(2.5f);
+  return {select(w, d, a), select(w, a, select(x, d, b)), select(x, b, select(y, d, c)), select(y, c, d)};
+}
+
+/// In [0, 1].
+template <class L>
+GSNAV_HD L unpack_opacity(const L& code) noexcept {
+  return code / L(65535.0f);
+}
+
+/// Which of a chunk's steps coefficient k = 1, ... of a colour has.
+GSNAV_HD constexpr int packed_band(int k) noexcept { return k < 4 ? 0 : k < 9 ? 1 : 2; }
+
+/// Whether shapes and opacities of the rows are packed. Other memory than the host's holds floats.
+GSNAV_HD bool is_packed(const GaussianView& gs) noexcept {
+#if defined(__CUDA_ARCH__)
+  static_cast<void>(gs);
+  return false;
+#else
+  return !gs.packed.codes.empty();
+#endif
+}
+/// Whether colours are.
+GSNAV_HD bool has_packed_colors(const GaussianView& gs) noexcept { return is_packed(gs) && !gs.packed.sh0.empty(); }
+
+/// One row of a set, as SetRows reads it.
+struct OneRow {
+  using lane = float;
+  const GaussianView& gs;
+  std::size_t i;
+
+  GSNAV_HD float floats(const View<const float>& plane) const noexcept { return plane[i]; }
+  GSNAV_HD float codes(int plane) const noexcept {
+    return static_cast<float>(gs.packed.codes.data[static_cast<std::size_t>(plane) * gs.size + i]);
+  }
+  /// Null where shapes are floats.
+  GSNAV_HD const PackedChunk* chunk() const noexcept {
+    return is_packed(gs) ? &gs.packed.chunks[i / kProjectChunk] : nullptr;
+  }
+  /// The row's, of one value an origin.
+  GSNAV_HD Vec3d offset(const View<const Vec3d>& offsets) const noexcept {
+    return offsets[gs.origin_ids.empty() ? 0 : gs.origin_ids[i]];
+  }
+};
+
+/// Reads one row of a set, or a pack of rows, from any storage. Each member reads when it is called. At
+/// says where the rows lie (OneRow; lanes::PackOfRows).
+template <class At>
+struct SetRows {
+  using L = typename At::lane;
+  At at;
+
+  /// Offset from the row's origin, metres.
+  GSNAV_HD Vec3<L> mean() const noexcept {
+    const PackedChunk* const chunk = at.chunk();
+    return chunk != nullptr && at.gs.means[0].empty() ? unpack_mean(*chunk, codes3(PackedRows::kMeans))
+                                                      : floats3(at.gs.means);
+  }
+  /// Whether the shape is a factor M (GaussianView::axes), in place of a quaternion and scales.
+  GSNAV_HD bool has_factor() const noexcept { return !at.gs.axes[0].empty(); }
+  GSNAV_HD Mat3<L> factor() const noexcept {
+    return {{floats3(at.gs.axes), floats3(at.gs.axes + 3), floats3(at.gs.axes + 6)}};
+  }
+  GSNAV_HD Quat<L> quat() const noexcept {
+    if (at.chunk() != nullptr) return unpack_quat(codes3(PackedRows::kQuats));
+    const View<const float>* const q = at.gs.quats;
+    return {at.floats(q[0]), at.floats(q[1]), at.floats(q[2]), at.floats(q[3])};
+  }
+  GSNAV_HD Vec3<L> scales() const noexcept {
+    const PackedChunk* const chunk = at.chunk();
+    return chunk != nullptr ? unpack_scales(*chunk, codes3(PackedRows::kScales)) : floats3(at.gs.scales);
+  }
+  GSNAV_HD L opacity() const noexcept {
+    return at.chunk() != nullptr ? unpack_opacity(at.codes(PackedRows::kOpacity))
+                                 : at.floats(at.gs.opacities);
+  }
+
+ private:
+  GSNAV_HD Vec3<L> floats3(const View<const float>* planes) const noexcept {
+    return {at.floats(planes[0]), at.floats(planes[1]), at.floats(planes[2])};
+  }
+  GSNAV_HD Vec3<L> codes3(int plane) const noexcept {
+    return {at.codes(plane), at.codes(plane + 1), at.codes(plane + 2)};
+  }
+};
+
+/// The same of row i by itself.
+GSNAV_HD Vec3<float> mean_of(const GaussianView& gs, std::size_t i) noexcept {
+  return SetRows<OneRow>{{gs, i}}.mean();
+}
+GSNAV_HD Vec3<float> scales_of(const GaussianView& gs, std::size_t i) noexcept {
+  return SetRows<OneRow>{{gs, i}}.scales();
+}
+GSNAV_HD Quat<float> quat_of(const GaussianView& gs, std::size_t i) noexcept {
+  return SetRows<OneRow>{{gs, i}}.quat();
+}
+GSNAV_HD float opacity_of(const GaussianView& gs, std::size_t i) noexcept {
+  return SetRows<OneRow>{{gs, i}}.opacity();
+}
+
+/// Coefficient k of row i of packed colours, whichever way the bands are kept.
+GSNAV_HD Vec3<float> packed_coefficient(const GaussianView& gs, std::size_t i, int k) noexcept {
+  const auto halves = [](const std::uint16_t* p) GSNAV_INLINED {
+    return Vec3<float>{half_to_float(p[0]), half_to_float(p[1]), half_to_float(p[2])};
+  };
+  if (k == 0) return halves(gs.packed.sh0.data + 3 * i);
+  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
+  const std::size_t at = 3 * (rest * i + static_cast<std::size_t>(k - 1));
+  if (!gs.packed.shN.empty()) {
+    const float step = gs.packed.chunks[i / kProjectChunk].sh_steps[packed_band(k)];
+    const std::int8_t* p = gs.packed.shN.data + at;
+    return {static_cast<float>(p[0]) * step, static_cast<float>(p[1]) * step, static_cast<float>(p[2]) * step};
+  }
+  if (!gs.shN_half.empty()) return halves(gs.shN_half.data + at);
+  return {gs.shN[at], gs.shN[at + 1], gs.shN[at + 2]};
+}
+
+}  // namespace gsnav

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/core/view.hpp"
+#include "gsnav/detail/frame/cull.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/detail/frame/packed_gaussians.hpp"
+#include "gsnav/detail/frame/project_row.hpp"
+#include "gsnav/frame/sh.hpp"
+#include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/math/half.hpp"
+
+namespace gsnav {
+
+/// One set as one camera sees it: what projection reads.
+template <class S>
+struct ProjectArgs {
+  GaussianView gaussians;
+  ProjectionCamera<S> camera;
+  ProjectionCamera<double> camera64;  ///< for sort keys, and for Gaussians whose geometry float cannot hold
+  View<const Vec3d> offsets;          ///< origin - camera position, one an origin
+  int sh_degree = 0;                  ///< highest degree to evaluate, <= gaussians.sh_degree
+  std::size_t first_chunk = 0;        ///< among the chunks of all sets
+  std::uint32_t first_rank = 0;       ///< of the set's first Gaussian among all
+
+  GSNAV_HD std::size_t chunk_count() const noexcept { return gaussians.chunk_count(); }
+};
+
+/// Of a set for a camera, but for `offsets` and the set's place in the frame. Host code.
+template <class S>
+ProjectArgs<S> make_project_args(const Camera& camera, const GaussianSet& set,
+                                 const ProjectionRules& rules, int max_sh_degree) noexcept {
+  ProjectArgs<S> args;
+  args.gaussians = set.gaussians;
+  args.camera = make_projection_camera<S>(camera, set, rules);
+  args.camera64 = make_projection_camera<double>(camera, set, rules);
+  args.sh_degree = min(set.gaussians.sh_degree, max_sh_degree);
+  return args;
+}
+
+/// Origins of a set: at least one, at zero.
+inline std::size_t origin_count(const GaussianView& gs) noexcept {
+  return gs.origins.empty() ? 1 : gs.origins.size;
+}
+/// Value o of ProjectArgs::offsets, in double: small where the camera is near, wherever both are in the
+/// world. Host code.
+template <class S>
+Vec3d origin_offset(const ProjectArgs<S>& args, std::size_t o) noexcept {
+  const View<const Vec3d> table = args.gaussians.origins;
+  return (table.empty() ? Vec3d{} : table[o]) - args.camera64.position;
+}
+
+/// What projection writes: the records of all sets of a frame, kProjectChunk slots for each chunk. Chunk
+/// c of a set writes its survivors, in row order, from slot (first_chunk + c) * kProjectChunk on, and
+/// their number to counts[first_chunk + c].
+template <class S>
+struct ProjectOutputs {
+  View<SplatGeometry<S>> geometry;
+  View<SplatColor<S>> colors;              ///< empty: not asked for
+  View<SplatDepth<S>> depths;              ///< empty: not asked for
+  View<SplatPerspective<S>> perspectives;  ///< empty for Response::ewa
+  View<SplatBounds> bounds;
+  View<std::uint32_t> keys;   ///< camera.key_code of the float32 key
+  View<std::uint32_t> ranks;  ///< what decides between equal keys; empty: the slot does
+  View<std::uint32_t> counts;
+  TileGrid grid;               ///< read where `spans` is not empty
+  View<TileSpans> spans;       ///< tiles of each slot's splat, for backends that find them here; else empty
+  OpenCells open;              ///< backends may leave out what reaches none of these
+};
+
+/// Whether any Gaussian of chunk c may be visible. Never no where one is.
+template <class S>
+GSNAV_HD bool chunk_is_candidate(const ProjectArgs<S>& args, std::size_t c) noexcept {
+  const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
+  const std::size_t id = args.gaussians.chunk_id(c);
+  return args.gaussians.may_be_seen(id) && (bounds.empty() || may_be_visible(args.camera64, bounds[id]));
+}
+
+/// Which parts of chunk c have Gaussians that may be visible: bit p for the kChunkPart rows from p kChunkPart on.
+/// Never without one that is; no bit where chunk_is_candidate says no, or where seen_rows() has none of them.
+template <class S>
+GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c) noexcept {
+  static_assert(kProjectChunk / kChunkPart <= 32);
+  const GaussianView& gs = args.gaussians;
+  const std::size_t id = gs.chunk_id(c);
+  if (!gs.may_be_seen(id)) return 0;
+  constexpr std::size_t kParts = kProjectChunk / kChunkPart;
+  const std::uint32_t parts = gs.seen_rows(id).parts();
+  if (gs.chunk_bounds.empty()) return parts;
+  const double s_max = detail::ChunkInView(args.camera64, gs.chunk_bounds[id]).s_max();
+  if (!may_be_visible(args.camera64, gs.chunk_bounds[id], s_max)) return 0;
+  if (gs.part_bounds.empty() || lies_in_view(args.camera64, gs.chunk_bounds[id])) return parts;
+  std::uint32_t in_view = 0;
+  for (std::size_t p = 0; p < kParts && id * kParts + p < gs.part_bounds.size; ++p) {
+    if ((parts >> p & 1u) == 0) continue;
+    if (may_be_visible(args.camera64, gs.part_bounds[id * kParts + p], s_max)) in_view |= 1u << p;
+  }
+  return in_view;
+}
+
+namespace detail {
+
+/// Row i of the set's shape in camera axes.
+template <class S>
+GSNAV_HD SplatAxes<S> load_axes(const GaussianView& gs, const ProjectionCamera<S>& camera,
+                                const Vec3<S>& delta, std::size_t i) noexcept {
+  return row_axes<S>(camera.rotation, delta, SetRows<OneRow>{{gs, i}});
+}
+
+}  // namespace detail
+
+/// Unit vector along `delta` (mean - camera, asset frame), the direction that SH is evaluated in.
+template <class L>
+GSNAV_HD Vec3<L> view_direction(const Vec3<L>& delta) noexcept {
+  using S = scalar_of<L>;
+  const L n = norm(delta);
+  // A camera at the mean sees no direction; z stands in, so that the colour is finite.
+  const auto defined = n > L(S(1e-12));
+  const Vec3<L> unit = delta * (L(S(1)) / n);
+  return {select(defined, unit.x, L(S(0))), select(defined, unit.y, L(S(0))), select(defined, unit.z, L(S(1)))};
+}
+
+/// Colour of Gaussian i seen along `delta` (mean - camera, asset frame, any length), SH to `degree`.
+template <class S>
+GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::size_t i,
+                                      Vec3<S> delta) noexcept {
+  if (degree > 0) {
+    delta = view_direction(delta);
+    if (!gs.sh_rotations[0].empty()) {
+      const Quat<S> q{S(gs.sh_rotations[0][i]), S(gs.sh_rotations[1][i]), S(gs.sh_rotations[2][i]),
+                      S(gs.sh_rotations[3][i])};
+      delta = rotate(conjugate(q), delta);
+    }
+  }
+  if (has_packed_colors(gs)) {
+    const Vec3<S> c = sh_color<S>(degree, delta, [&](int k) GSNAV_INLINED { return vec_cast<S>(packed_coefficient(gs, i, k)); });
+    return {c.x, c.y, c.z, S(0)};
+  }
+  const float* sh0 = gs.sh0.data + 3 * i;
+  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
+  if (!gs.shN_half.empty()) {
+    const std::uint16_t* halves = gs.shN_half.data + 3 * rest * i;
+    const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
+      if (k == 0) return Vec3<S>{S(sh0[0]), S(sh0[1]), S(sh0[2])};
+      const std::uint16_t* p = halves + 3 * (k - 1);
+      return Vec3<S>{S(half_to_float(p[0])), S(half_to_float(p[1])), S(half_to_float(p[2]))};
+    });
+    return {c.x, c.y, c.z, S(0)};
+  }
+  const float* shn = gs.shN.data + 3 * rest * i;
+  const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
+    const float* p = k == 0 ? sh0 : shn + 3 * (k - 1);
+    return Vec3<S>{S(p[0]), S(p[1]), S(p[2])};
+  });
+  return {c.x, c.y, c.z, S(0)};
+}
+
+/// What is written of a row.
+template <class S>
+struct RowSplat {
+  float key;      ///< sort_key
+  Vec3<S> delta;  ///< for its colour: mean - camera, asset frame
+  Splat<S> splat;
+};
+
+/// Projects row i in the precision that its geometry needs. False where it may not be seen. `depth`:
+/// whether its depth record is asked for.
+template <class S>
+GSNAV_HD bool project_row(const ProjectArgs<S>& args, bool depth, std::size_t i,
+                          RowSplat<S>& out) noexcept {
+  const ViewedRow row({args.gaussians, i}, args.offsets);
+  RowKey<float> key = row_key<float>(args.camera64, row);
+  if constexpr (sizeof(S) == sizeof(float)) {
+    if (!(key.z > args.camera.near_plane)) return false;
+    const SeenRow<float> seen(args.camera, row, key);
+    if (!seen.splat.visible) return false;
+    out.key = sort_key(args.camera64, key);
+    out.delta = key.delta;
+    if (detail::needs_double(args.camera, seen.splat))
+      return make_splat64(args.camera64, depth, row, key, out.splat);
+    return make_splat<false>(args.camera, args.camera64, depth, key, seen, out.splat);
+  } else {
+    // The float64 reference has depths of its own, so that a fault of `row_key` shows beside it.
+    const Vec3d position = args.camera.rotation * key.delta64;
+    key.z = static_cast<float>(position.z * args.camera.scale);
+    const SeenRow<double> seen(args.camera, row, key);
+    if (!seen.splat.visible) return false;
+    const bool by_z = args.camera.sort_order == SortOrder::z_depth;
+    out.key = by_z ? key.z : static_cast<float>(norm(position) * args.camera.scale);
+    out.delta = key.delta64;
+    return make_splat<false>(args.camera, depth, seen, seen.splat.mean_x, seen.splat.mean_y, out.splat);
+  }
+}
+
+/// Writes the records of row i to `slot`.
+template <class S>
+GSNAV_HD void write_splat(const ProjectArgs<S>& args, const ProjectOutputs<S>& out, std::size_t slot,
+                          std::size_t i, const RowSplat<S>& row) noexcept {
+  const GaussianView& gs = args.gaussians;
+  out.bounds[slot] = row.splat.bounds;
+  out.geometry[slot] = row.splat.geometry;
+  if (args.camera.response != Response::ewa) out.perspectives[slot] = row.splat.perspective;
+  if (!out.depths.empty()) out.depths[slot] = row.splat.depth;
+  if (!out.spans.empty()) out.spans[slot].rows = TileSpans::kLarge;
+  out.keys[slot] = args.camera.key_code(row.key);
+  if (!out.ranks.empty()) {
+    out.ranks[slot] =
+        args.first_rank + (gs.row_ids.empty() ? static_cast<std::uint32_t>(i) : gs.row_ids[i]);
+  }
+  if (!out.colors.empty()) {
+    out.colors[slot] = gaussian_color<S>(gs, gs.degree_of(i, args.sh_degree), i, row.delta);
+  }
+}
+
+/// Projects row i to `slot`. Returns whether it may be seen.
+template <class S>
+GSNAV_HD bool project_gaussian(const ProjectArgs<S>& args, const ProjectOutputs<S>& out,
+                               std::size_t slot, std::size_t i) noexcept {
+  RowSplat<S> row;
+  if (!project_row(args, !out.depths.empty(), i, row)) return false;
+  write_splat(args, out, slot, i, row);
+  return true;
+}
+
+/// Projects chunk `c` of a set, one Gaussian after the other.
+template <class S>
+struct ProjectChunk {
+  ProjectArgs<S> args;
+  ProjectOutputs<S> out;
+
+  GSNAV_HD void operator()(std::size_t c) const noexcept {
+    const std::size_t begin = args.gaussians.chunk_id(c) * kProjectChunk, size = args.gaussians.size;
+    const std::size_t end = begin + kProjectChunk < size ? begin + kProjectChunk : size;
+    const std::size_t base = (args.first_chunk + c) * kProjectChunk;
+    std::uint32_t written = 0, parts = candidate_parts(args, c);
+    if (parts == 0) {
+      out.counts[args.first_chunk + c] = 0;
+      return;
+    }
+    const SeenRows seen = args.gaussians.seen_rows(args.gaussians.chunk_id(c));
+    for (std::size_t first = begin; first < end; first += kChunkPart, parts >>= 1) {
+      if ((parts & 1u) == 0) continue;
+      const std::size_t last = first + kChunkPart < end ? first + kChunkPart : end;
+      for (std::size_t i = first; i < last; ++i) {
+        if (seen.has(i - begin) && project_gaussian(args, out, base + written, i)) ++written;
+      }
+    }
+    out.counts[args.first_chunk + c] = written;
+  }
+};
+
+}  // namespace gsnav

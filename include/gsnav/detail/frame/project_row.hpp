@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/detail/frame/packed_gaussians.hpp"
+#include "gsnav/detail/frame/projection.hpp"
+#include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/math/functions.hpp"
+
+// The formulas between a row of a set and the records of its splat, for one row or a pack of rows.
+// Drivers (the serial kernel, the lanes and the CUDA kernels) call them in this order: row_key, near
+// plane, SeenRow, needs_double and pixel_box, splat_geometry. Drivers have the loops, masks and memory.
+
+namespace gsnav {
+
+/// Rows of a set that a camera sees: what row_key and SeenRow read.
+template <class At>
+struct ViewedRows : SetRows<At> {
+  using L = typename At::lane;
+  View<const Vec3d> offsets;  ///< origin - camera position, asset frame, one an origin
+
+  GSNAV_HD ViewedRows(const At& of, const View<const Vec3d>& from) noexcept
+      : SetRows<At>{of}, offsets(from) {}
+  GSNAV_HD Vec3<doubles_of<L>> offset() const noexcept { return this->at.offset(offsets); }
+  GSNAV_HD Vec3<L> rounded_offset(const Vec3<doubles_of<L>>& offset) const noexcept {
+    return vec_cast<L>(offset);
+  }
+};
+using ViewedRow = ViewedRows<OneRow>;
+
+/// Where the centre of a row lies. F: float, or a pack of floats.
+template <class F>
+struct RowKey {
+  Vec3<doubles_of<F>> delta64;  ///< mean - camera position, asset frame
+  Vec3<F> delta;                ///< the same in float32
+  F z;  ///< depth along the view axis, metres: what near planes and sort keys compare
+};
+
+/// The depth is computed in double and rounded to float32 once.
+template <class F, class Row>
+GSNAV_HD RowKey<F> row_key(const ProjectionCamera<double>& camera, const Row& row) noexcept {
+  using D = doubles_of<F>;
+  const Vec3<F> mean = row.mean();
+  const Vec3<D> offset = row.offset(), delta64 = vec_cast<D>(mean) + offset;
+  return {delta64, mean + row.rounded_offset(offset), static_cast<F>(depth_key(camera, delta64))};
+}
+
+/// The float32 sort key, metres.
+template <class F>
+GSNAV_HD F sort_key(const ProjectionCamera<double>& camera, const RowKey<F>& key) noexcept {
+  if (camera.sort_order == SortOrder::z_depth) return key.z;
+  return static_cast<F>(distance_key(camera, key.delta64));
+}
+
+/// mean - camera position in L.
+template <class L, class F>
+GSNAV_HD Vec3<L> delta_of(const RowKey<F>& key) noexcept {
+  if constexpr (sizeof(scalar_of<L>) > sizeof(float)) {
+    return key.delta64;
+  } else {
+    return key.delta;
+  }
+}
+
+/// The shape of a row in camera axes.
+template <class L, class Row>
+GSNAV_HD SplatAxes<L> row_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
+                               const Row& row) noexcept {
+  if (row.has_factor()) return splat_axes(rotation, delta, mat_cast<L>(row.factor()));
+  Quat<L> quat = quat_cast<L>(row.quat());
+  // A unit quaternion rounded to float32 is off by 6e-8: nothing in float, but too much for a reference.
+  if constexpr (sizeof(scalar_of<L>) > sizeof(float)) normalize(quat);
+  return splat_axes(rotation, delta, quat, vec_cast<L>(row.scales()));
+}
+
+/// A row in the image. L: what it is computed in. The members are built in place: lanes that are
+/// assigned to a struct are copied through memory.
+template <class L>
+struct SeenRow {
+  SplatAxes<L> axes;
+  Projected<L> splat;
+
+  template <class Row, class F>
+  GSNAV_HD SeenRow(const ProjectionCamera<scalar_of<L>>& camera, const Row& row,
+                   const RowKey<F>& key) noexcept
+      : axes(row_axes<L>(camera.rotation, delta_of<L>(key), row)),
+        splat(project<L, F>(camera, axes, key.z, static_cast<L>(row.opacity()))) {}
+};
+
+namespace detail {
+
+/// The mean alone, in double.
+template <class L>
+GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3<L>& delta, L& mean_x,
+                           L& mean_y) noexcept {
+  const auto row = [&](int r) GSNAV_INLINED {
+    return Vec3<L>{L(camera.rotation(r, 0)), L(camera.rotation(r, 1)), L(camera.rotation(r, 2))};
+  };
+  const L inv_z = L(1.0) / dot(row(2), delta);
+  mean_x = fma(L(camera.fx), dot(row(0), delta) * inv_z, L(camera.cx));
+  mean_y = fma(L(camera.fy), dot(row(1), delta) * inv_z, L(camera.cy));
+}
+
+/// Centre of the pixel of [0, size) that is nearest to x.
+template <class L>
+GSNAV_HD L reference_pixel(L x, int size) noexcept {
+  using S = scalar_of<L>;
+  return truncated(clamp(x, L(S(0)), L(static_cast<S>(size - 1)))) + L(S(0.5));
+}
+
+}  // namespace detail
+
+/// The pixel that the records of a splat are relative to (detail/frame/splat.hpp), and its centre's offset
+/// from the mean.
+template <class L>
+struct ReferencePixel {
+  L x, y;
+  L dx, dy;
+};
+
+/// U: what the mean is known in. Drivers take double: float32 rounding of the mean, 3e-5 px, would be
+/// the largest error of the exponent.
+template <class L, class U>
+GSNAV_HD ReferencePixel<L> reference_of(int width, int height, const U& mean_x,
+                                        const U& mean_y) noexcept {
+  const U x = detail::reference_pixel(mean_x, width), y = detail::reference_pixel(mean_y, height);
+  return {static_cast<L>(x), static_cast<L>(y), static_cast<L>(x - mean_x), static_cast<L>(y - mean_y)};
+}
+
+namespace detail {
+
+/// Whether the whitened form loses too much in float: k dx + b dy cancels over a long needle's visible
+/// length, or between a far mean and the image. Such rows are projected in double.
+template <class L>
+GSNAV_HD mask_of<L> needs_double(const ProjectionCamera<scalar_of<L>>& camera,
+                                 const Projected<L>& p) noexcept {
+  using S = scalar_of<L>;
+  const ReferencePixel<L> ref = reference_of<L>(camera.width, camera.height, p.mean_x, p.mean_y);
+  const L length_x = min(p.half_width, L(static_cast<S>(camera.width)));
+  const L length_y = min(p.half_height, L(static_cast<S>(camera.height)));
+  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(512))) ||
+         (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(16)));
+}
+
+/// Pixels whose centre lies within [center - half, center + half], clipped to [0, size): half-open.
+template <class L>
+GSNAV_HD void pixel_range(L center, L half, int size, L& low, L& high) noexcept {
+  using S = scalar_of<L>;
+  const L one(S(1)), end(static_cast<S>(size));
+  const L first = clamp(center - half - L(S(0.5)), -one, end);
+  const L last = clamp(center + half - L(S(0.5)), -one, end);
+  const L f = truncated(first), l = truncated(last);  // towards zero: made a ceiling, and a floor
+  low = max(select(f < first, f + one, f), L(S(0)));
+  high = min(select(l > last, l - one, l) + one, end);
+}
+
+/// The pixels whose centres lie in the box of a footprint.
+template <class L>
+GSNAV_HD PixelBox<L> pixel_box(const ProjectionCamera<scalar_of<L>>& camera,
+                               const Projected<L>& p) noexcept {
+  PixelBox<L> box;
+  pixel_range(p.center_x, p.half_width, camera.width, box.x0, box.x1);
+  pixel_range(p.center_y, p.half_height, camera.height, box.y0, box.y1);
+  return box;
+}
+
+/// The pixels of the 16-pixel tiles that [center - radius, center + radius] reaches, in a compat mode's
+/// own rounding: `slack` is what INRIA adds to the upper end (tile - 1 pixel) where gsplat rounds up.
+template <class S>
+GSNAV_HD void clip_to_tiles(S center, S radius, S slack, int size, std::int32_t& low,
+                            std::int32_t& high) noexcept {
+  constexpr int kTile = 16;
+  const S last_tile = S((size + kTile - 1) / kTile);
+  const S first = clamp((center - radius) * S(1.0 / kTile), S(0), last_tile);
+  const S last = clamp((center + radius + slack) * S(1.0 / kTile), S(0), last_tile);
+  std::int32_t end = static_cast<std::int32_t>(last);
+  if (slack == S(0) && S(end) < last) ++end;
+  const std::int32_t begin_px = static_cast<std::int32_t>(first) * kTile, end_px = end * kTile;
+  low = low > begin_px ? low : begin_px;
+  high = high < end_px ? high : end_px;
+}
+
+/// Whole number not below x >= 0.
+template <class S>
+GSNAV_HD S ceiling(S x) noexcept {
+  if (!(x < S(8388608))) return x;
+  const S whole = S(static_cast<std::int32_t>(x));
+  return whole < x ? whole + S(1) : whole;
+}
+
+/// Narrows bounds to the tiles that the renderer named by `compat` visits.
+template <class S>
+GSNAV_HD void narrow_to_compat(const ProjectionCamera<S>& camera, const Projected<S>& p,
+                               SplatBounds& b) noexcept {
+  const S scale2 = S(kWhitenScale * kWhitenScale);
+  if (camera.compat == Compat::gsplat) {
+    const S extent = min(S(3.33), sqrt(max(p.s_max, S(0))) * S(1 / kWhitenScale));
+    clip_to_tiles(p.mean_x, ceiling(extent * sqrt(p.variance_x)), S(0), camera.width, b.x0, b.x1);
+    clip_to_tiles(p.mean_y, ceiling(extent * sqrt(p.variance_y)), S(0), camera.height, b.y0, b.y1);
+    return;
+  }
+  // det = (scale^2 / (a b))^2; the larger eigenvalue by INRIA's formula with its floor of 0.1.
+  const S root_det = scale2 / (p.a * p.b);
+  const S mid = S(0.5) * (p.variance_x + p.variance_y);
+  const S radius = ceiling(S(3) * sqrt(mid + sqrt(max(S(0.1), fma(mid, mid, -(root_det * root_det))))));
+  clip_to_tiles(p.mean_x - S(0.5), radius, S(15), camera.width, b.x0, b.x1);
+  clip_to_tiles(p.mean_y - S(0.5), radius, S(15), camera.height, b.y0, b.y1);
+}
+
+/// The pixels that a footprint may cover. Returns false where there are none.
+template <class T>
+GSNAV_HD bool splat_bounds(const ProjectionCamera<T>& camera, const Projected<T>& p,
+                           SplatBounds& b) noexcept {
+  const PixelBox<T> box = pixel_box(camera, p);
+  b = {static_cast<std::int32_t>(box.x0), static_cast<std::int32_t>(box.y0),
+       static_cast<std::int32_t>(box.x1), static_cast<std::int32_t>(box.y1)};
+  if (camera.compat != Compat::none) narrow_to_compat(camera, p, b);
+  return b.x0 < b.x1 && b.y0 < b.y1;
+}
+
+}  // namespace detail
+
+/// The record that blending reads.
+template <class L>
+GSNAV_HD SplatGeometry<L> splat_geometry(const Projected<L>& p, const ReferencePixel<L>& ref) noexcept {
+  return {ref.x, ref.y, p.a, p.k, p.b, p.a * ref.dx, fma(p.k, ref.dx, p.b * ref.dy), p.log2_opacity};
+}
+
+/// The record of a response that is not linearised.
+template <class L>
+GSNAV_HD SplatPerspective<L> splat_perspective(const Projected<L>& p,
+                                               const ReferencePixel<L>& ref) noexcept {
+  return {fma(p.slope_x, ref.dx, fma(p.slope_y, ref.dy, L(scalar_of<L>(1)))), p.slope_x, p.slope_y,
+          p.bend};
+}
+
+/// A projected Gaussian before it is written.
+template <class S>
+struct Splat {
+  SplatBounds bounds;
+  SplatGeometry<S> geometry;
+  SplatDepth<S> depth;              ///< where it is asked for
+  SplatPerspective<S> perspective;  ///< not for Response::ewa
+};
+
+/// The records of a row that was projected in T with its mean in U, rounded to S. False where no pixel
+/// centre lies in its bounds. `Plain`: neither depth nor perspective is asked for.
+template <bool Plain, class T, class U, class S>
+GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const SeenRow<T>& seen, U mean_x,
+                         U mean_y, Splat<S>& out) noexcept {
+  if (!detail::splat_bounds(camera, seen.splat, out.bounds)) return false;
+  const ReferencePixel<T> ref = reference_of<T>(camera.width, camera.height, mean_x, mean_y);
+  out.geometry = record_cast<S>(splat_geometry(seen.splat, ref));
+  if constexpr (!Plain) {
+    if (camera.response != Response::ewa)
+      out.perspective = record_cast<S>(splat_perspective(seen.splat, ref));
+    if (depth) out.depth = record_cast<S>(make_splat_depth(camera, seen.axes, seen.splat));
+  }
+  return true;
+}
+
+/// The same of a row whose geometry float holds: only its mean is computed in double.
+template <bool Plain>
+GSNAV_HD bool make_splat(const ProjectionCamera<float>& camera, const ProjectionCamera<double>& camera64,
+                         bool depth, const RowKey<float>& key, const SeenRow<float>& seen,
+                         Splat<float>& out) noexcept {
+  double mean_x, mean_y;
+  detail::project_mean(camera64, key.delta64, mean_x, mean_y);
+  return make_splat<Plain>(camera, depth, seen, mean_x, mean_y, out);
+}
+
+/// The same of a row in double: of the float64 reference, and where `needs_double` says so.
+template <class S, class Row>
+GSNAV_HD bool make_splat64(const ProjectionCamera<double>& camera, bool depth, const Row& row,
+                           const RowKey<float>& key, Splat<S>& out) noexcept {
+  const SeenRow<double> seen(camera, row, key);
+  return make_splat<false>(camera, depth, seen, seen.splat.mean_x, seen.splat.mean_y, out);
+}
+
+}  // namespace gsnav

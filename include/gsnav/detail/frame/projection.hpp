@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/mat.hpp"
+#include "gsnav/math/quat.hpp"
+
+namespace gsnav {
+
+/// sqrt(log2(e) / 2): |w|^2 in the whitened coordinates of SplatGeometry is log2(e) q / 2.
+inline constexpr double kWhitenScale = 0.84932180028801904272;
+inline constexpr double kLn2 = 0.69314718055994530942;
+
+/// A Gaussian in camera axes: its mean, its factor M (Sigma = M M^T) and M's cofactors.
+template <class L>
+struct SplatAxes {
+  Vec3<L> position{};   ///< mean relative to the camera, asset units
+  Mat3<L> factor{};     ///< M: columns are the axes times their standard deviations, asset units
+  Mat3<L> cofactors{};  ///< columns c_i = m_j x m_k up to sign, asset units squared
+};
+
+/// From a unit quaternion and scales: the cofactors are products, exact to a rounding.
+/// `delta`: mean - camera position, asset frame.
+template <class L>
+GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
+                                 const Quat<L>& quat, const Vec3<L>& scales) noexcept {
+  const Mat3<L> r{{{L(rotation(0, 0)), L(rotation(0, 1)), L(rotation(0, 2))},
+                   {L(rotation(1, 0)), L(rotation(1, 1)), L(rotation(1, 2))},
+                   {L(rotation(2, 0)), L(rotation(2, 1)), L(rotation(2, 2))}}};
+  const Mat3<L> axes = r * rotation_matrix(quat);
+  const Vec3<L> areas{scales.y * scales.z, scales.z * scales.x, scales.x * scales.y};
+  SplatAxes<L> out;
+  out.position = r * delta;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<L>& a = axes.row[i];
+    out.factor.row[i] = {a.x * scales.x, a.y * scales.y, a.z * scales.z};
+    out.cofactors.row[i] = {a.x * areas.x, a.y * areas.y, a.z * areas.z};
+  }
+  return out;
+}
+
+/// From any factor in asset axes (a skinned Gaussian's blended axes need be neither orthogonal nor
+/// right-handed): cofactors by differences of products with one rounding.
+template <class L>
+GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
+                                 const Mat3<L>& factor) noexcept {
+  const Mat3<L> r{{{L(rotation(0, 0)), L(rotation(0, 1)), L(rotation(0, 2))},
+                   {L(rotation(1, 0)), L(rotation(1, 1)), L(rotation(1, 2))},
+                   {L(rotation(2, 0)), L(rotation(2, 1)), L(rotation(2, 2))}}};
+  SplatAxes<L> out;
+  out.position = r * delta;
+  out.factor = r * factor;
+  const Vec3<L> m0 = out.factor.column(0), m1 = out.factor.column(1), m2 = out.factor.column(2);
+  out.cofactors = transpose(Mat3<L>{{cross(m1, m2), cross(m2, m0), cross(m0, m1)}});
+  return out;
+}
+
+/// Result of `project`. `visible` holds where the footprint may reach the image; the rest is
+/// meaningful there only.
+template <class L>
+struct Projected {
+  mask_of<L> visible{};
+  L mean_x{}, mean_y{};            ///< pixels
+  L a{}, k{}, b{};                 ///< whitened triple about the mean (detail/frame/splat.hpp)
+  L log2_opacity{};
+  L s_max{};                       ///< |w|^2 at the edge of the footprint
+  L variance_x{}, variance_y{};    ///< diagonal of the 2D covariance, px^2
+  L center_x{}, center_y{};        ///< of the footprint's bounds: the mean, but under perspective
+  L half_width{}, half_height{};   ///< of the bounds, pixels, padded so that rounding only adds
+  L slope_x{}, slope_y{}, bend{};  ///< perspective: f = 1 + slope . d about the mean, and c
+};
+
+namespace detail {
+
+/// Per-ray response of a Gaussian whose linearisation at the mean is whitened by (a, k, b).
+///
+/// Along the ray r = r_c + delta (r_c through the mean, third component 1) the maximum of the response
+/// of covariance S has exponent q = |mu x r|_S^2 / (r . adj(S) r). The numerator is the linearised q_e
+/// times D0 = r_c . adj(S) r_c; and by Sylvester's identity for the minors of adj(S),
+///     D0 (r . adj(S) r) = (r_c . adj(S) r)^2 + q_e D0 det(S) / z^2,
+/// so q = q_e / (f^2 + c q_e), f = r_c . adj(S) r / D0 linear in the pixel and c = det(S) / (z^2 D0):
+/// one division a pixel, no cancellation. S is Sigma dilated by h (z / f)^2 across the view axis, which
+/// is what h px^2 is at the mean's depth. Response::tangent_plane is c = 0 with S isotropic.
+template <class L, class S>
+GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes<L>& axes, L u, L v,
+                              Projected<L>& out) noexcept {
+  L slope_u, slope_v;
+  if (camera.response == Response::tangent_plane) {
+    const L inv = L(S(1)) / fma(u, u, fma(v, v, L(S(1))));
+    slope_u = u * inv;
+    slope_v = v * inv;
+    out.bend = L(S(0));
+  } else {
+    const Vec3<L>& mx = axes.factor.row[0];
+    const Vec3<L>& my = axes.factor.row[1];
+    const Vec3<L>& mz = axes.factor.row[2];
+    const Vec3<L>& cx = axes.cofactors.row[0];
+    const Vec3<L>& cy = axes.cofactors.row[1];
+    const L z = axes.position.z;
+    const L h(camera.eps2d);
+    const L ex = h * (z / L(camera.fx)) * (z / L(camera.fx));
+    const L ey = h * (z / L(camera.fy)) * (z / L(camera.fy));
+    const Vec3<L> area = fma(u, cx, fma(v, cy, axes.cofactors.row[2]));
+    const Vec3<L> across_x = fma(-u, mz, mx), across_y = fma(-v, mz, my);
+    const L d0 = fma(ex, ey, fma(ex, dot(across_y, across_y),
+                                 fma(ey, dot(across_x, across_x), dot(area, area))));
+    slope_u = fma(-ey, dot(mz, across_x), dot(cx, area)) / d0;
+    slope_v = fma(-ex, dot(mz, across_y), dot(cy, area)) / d0;
+    const L volume = dot(mx, cx);
+    const L det = fma(volume, volume,
+                      fma(ex, dot(cx, cx), fma(ey, dot(cy, cy), (ex * ey) * dot(mz, mz))));
+    out.bend = L(S(2 * kLn2)) * (det / ((z * z) * d0));
+  }
+  out.slope_x = slope_u / L(camera.fx);
+  out.slope_y = slope_v / L(camera.fy);
+
+  // The footprint |w| <= kappa f is a conic with a focus at the mean: an ellipse while e < 1.
+  const L one(S(1)), zero(S(0)), everywhere(S(1e30));
+  const L rest = one - out.bend * out.s_max;
+  const L kappa2 = out.s_max / rest;
+  const L m2 = out.slope_y / out.b;
+  const L m1 = (out.slope_x - out.k * m2) / out.a;
+  const L open = one - kappa2 * fma(m1, m1, m2 * m2);
+  // Closer to a parabola rounding decides its extent: the whole image bounds it.
+  const auto ellipse = (rest > zero) && (open > zero) && (rest * open > L(S(0.01)));
+  const L along_x = m1 / out.a, along_y = (m2 - out.k * along_x) / out.b;
+  const L reach_x = one / (out.a * out.a);
+  const L reach_y = out.variance_y * L(S(1.0 / (kWhitenScale * kWhitenScale)));
+  const L center_x = out.mean_x + kappa2 * along_x / open;
+  const L center_y = out.mean_y + kappa2 * along_y / open;
+  const L half_x = sqrt(kappa2 * fma(open, reach_x, kappa2 * along_x * along_x)) / open;
+  const L half_y = sqrt(kappa2 * fma(open, reach_y, kappa2 * along_y * along_y)) / open;
+  // What is taken from a difference may be off by its rounding: a thousandth is more.
+  const L pad(S(1.001)), pixel(S(0.01));
+  out.center_x = select(ellipse, center_x, zero);
+  out.center_y = select(ellipse, center_y, zero);
+  out.half_width = select(ellipse, fma(half_x, pad, pixel + abs(center_x) * L(S(1e-6))), everywhere);
+  out.half_height = select(ellipse, fma(half_y, pad, pixel + abs(center_y) * L(S(1e-6))), everywhere);
+}
+
+}  // namespace detail
+
+/// Projection of Gaussians (Zwicker et al. 2001; Kerbl et al. 2023), one or a pack of them.
+///
+///  - The Jacobian is taken at the mean; Response::ewa clamps its x/z and y/z to the camera's limits.
+///  - det is built from products, never as AC - B^2 (Cauchy-Binet): det0 = (fx fy / z^2)^2 sum
+///    (c_i.(u, v, 1))^2, c_i the cofactor columns, and det = det0 + h (|l1|^2 + |l2|^2) + h^2, so det > 0
+///    always and its relative error stays near 1e-6 for needles of 1e4 : 1.
+///  - The inverse is kept as a Cholesky factor.
+///
+/// `key_z`: `depth_key` of the centre, rounded to float32, metres. `opacity` in [0, 1].
+template <class L, class F>
+GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, const SplatAxes<L>& axes,
+                              F key_z, L opacity) noexcept {
+  using S = scalar_of<L>;
+  Projected<L> out;
+  const Vec3<L>& t = axes.position;
+  const Mat3<L>& m = axes.factor;
+
+  const L inv_z = L(S(1)) / t.z;
+  const L u = t.x * inv_z, v = t.y * inv_z;
+  out.mean_x = fma(L(camera.fx), u, L(camera.cx));
+  out.mean_y = fma(L(camera.fy), v, L(camera.cy));
+
+  const bool ewa = camera.response == Response::ewa;
+  const L uj = ewa ? clamp(u, L(camera.u_min), L(camera.u_max)) : u;
+  const L vj = ewa ? clamp(v, L(camera.v_min), L(camera.v_max)) : v;
+  const L fz_x = L(camera.fx) * inv_z, fz_y = L(camera.fy) * inv_z;
+  const Vec3<L> l1 = fma(-uj, m.row[2], m.row[0]) * fz_x;
+  const Vec3<L> l2 = fma(-vj, m.row[2], m.row[1]) * fz_y;
+  const L a0 = dot(l1, l1), c0 = dot(l2, l2), b0 = dot(l1, l2);
+  const Vec3<L> area = fma(uj, axes.cofactors.row[0],
+                           fma(vj, axes.cofactors.row[1], axes.cofactors.row[2])) * (fz_x * fz_y);
+  const L det0 = dot(area, area);
+  const L h(camera.eps2d);
+  const L det = fma(h, (a0 + c0) + h, det0);
+  const L big_a = a0 + h, big_c = c0 + h;
+  out.variance_x = big_a;
+  out.variance_y = big_c;
+
+  const L a_over_det = sqrt(big_a / det);
+  out.a = L(S(kWhitenScale)) / sqrt(big_a);
+  out.b = L(S(kWhitenScale)) * a_over_det;
+  out.k = -(b0 / big_a) * out.b;
+
+  if (camera.mip) {
+    const L base(camera.base_eps2d);
+    const L det_base = fma(base, (a0 + c0) + base, det0);
+    opacity = opacity * max(sqrt(det_base / det), L(camera.min_compensation));
+  }
+  // The smallest normal number keeps log2 defined; such lanes fail s_max >= 0.
+  out.log2_opacity = log2(max(opacity, L(S(1.2e-38))));
+  out.s_max = out.log2_opacity - L(camera.log2_alpha_min);
+
+  if (ewa) {
+    const L radius = sqrt(max(out.s_max, L(S(0))));
+    // In x the test's own rounding cannot pass w1^2; in y it may by the cancellation in k dx + b dy.
+    const L aspect = a_over_det * sqrt(big_c);
+    // Means are rounded where the principal point is, however near to the image they end up.
+    const L pad_x = fma(abs(out.mean_x) + L(abs(camera.cx)), L(S(1e-6)), L(S(1e-3)));
+    const L pad_y = fma(abs(out.mean_y) + L(abs(camera.cy)), L(S(1e-6)), L(S(1e-3)));
+    out.center_x = out.mean_x;
+    out.center_y = out.mean_y;
+    out.half_width = fma(radius / out.a, L(S(1.00001)), pad_x);
+    out.half_height = fma(radius * sqrt(big_c) * L(S(1.0 / kWhitenScale)),
+                          fma(aspect, L(S(5e-7)), L(S(1.00001))), pad_y);
+  } else {
+    detail::add_perspective(camera, axes, u, v, out);
+  }
+
+  const L huge(S(3e38));  // finite in float: an overflow is culled, never drawn as NaN
+  const L half(S(0.5));
+  out.visible = (key_z > F(camera.near_plane)) && (out.s_max >= L(S(0))) && (det <= huge) &&
+                (big_a <= huge) && (abs(out.mean_x) <= huge) && (abs(out.mean_y) <= huge) &&
+                (out.center_x + out.half_width >= half) && (out.center_y + out.half_height >= half) &&
+                (out.center_x - out.half_width <= L(S(camera.width)) - half) &&
+                (out.center_y - out.half_height <= L(S(camera.height)) - half);
+  if (camera.near_sigma > S(0)) {
+    out.visible = out.visible && (t.z > L(camera.near_sigma) * norm(m.row[2]));
+  }
+  return out;
+}
+
+/// The per-ray depth record of a projected Gaussian (detail/frame/depth.hpp). Compat modes know the depth of
+/// the centre only.
+template <class L>
+GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& camera, const SplatAxes<L>& axes,
+                                        const Projected<L>& p) noexcept {
+  using S = scalar_of<L>;
+  SplatDepth<L> d;
+  d.mean_x = p.mean_x;
+  d.mean_y = p.mean_y;
+  d.z = axes.position.z * L(camera.scale);
+  if (camera.compat != Compat::none) return d;
+  // Cofactors relative to the largest entry, so that their products stay away from underflow.
+  L largest(S(0));
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<L>& c = axes.cofactors.row[i];
+    largest = max(largest, max(abs(c.x), max(abs(c.y), abs(c.z))));
+  }
+  const L unit = select(largest > L(S(1e-37)), L(S(1)) / largest, L(S(0)));
+  const L u = axes.position.x / axes.position.z, v = axes.position.y / axes.position.z;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<L> c = axes.cofactors.column(i) * unit;
+    d.g[i] = fma(u, c.x, fma(v, c.y, c.z));
+    d.gx[i] = c.x / L(camera.fx);
+    d.gy[i] = c.y / L(camera.fy);
+  }
+  d.reach = sqrt(L(S(2 * kLn2)) * p.s_max) * norm(axes.factor.row[2]) * L(camera.scale);
+  return d;
+}
+
+/// Sort key for SortOrder::z_depth: the depth of a centre along the view axis, metres, in double. Callers round it to
+/// float32, once. The rounded key has the same bits on every backend and in any float64 renderer (but where two
+/// float64 results lie on different sides of a float32 rounding, about one key in 1e8), and it depends neither on a
+/// set's origins nor on where the world's origin lies.
+/// `delta`: mean - camera position, asset frame, in double. `D`: double, or a pack of them.
+template <class D>
+GSNAV_HD D depth_key(const ProjectionCamera<double>& camera, const Vec3<D>& delta) noexcept {
+  const Vec3d& row = camera.rotation.row[2];
+  return dot(Vec3<D>{D(row.x), D(row.y), D(row.z)}, delta) * D(camera.scale);
+}
+
+/// Sort key for SortOrder::camera_distance: the distance of a centre from the camera, metres, in double. As
+/// `depth_key`, it is rounded to float32 once.
+template <class D>
+GSNAV_HD D distance_key(const ProjectionCamera<double>& camera, const Vec3<D>& delta) noexcept {
+  return norm(delta) * D(camera.scale);
+}
+
+}  // namespace gsnav

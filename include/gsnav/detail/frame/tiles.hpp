@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/detail/core/parallel.hpp"
+#include "gsnav/core/view.hpp"
+#include "gsnav/detail/frame/footprint.hpp"
+#include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/math/functions.hpp"
+
+namespace gsnav {
+
+/// How an image is cut into square tiles.
+struct TileGrid {
+  int width = 0, height = 0;  ///< image, pixels
+  int tile_size = 16;
+  int columns = 0, rows = 0;
+
+  static TileGrid of(int width, int height, int tile_size) noexcept {
+    return {width, height, tile_size, (width + tile_size - 1) / tile_size,
+            (height + tile_size - 1) / tile_size};
+  }
+  /// log2 of tile_size.
+  GSNAV_HD int tile_shift() const noexcept { return tile_size == 8 ? 3 : tile_size == 16 ? 4 : 5; }
+  GSNAV_HD std::size_t count() const noexcept {
+    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  }
+  /// The tile of a pixel of the image.
+  GSNAV_HD std::size_t tile_of(int x, int y) const noexcept {
+    return static_cast<std::size_t>(y / tile_size) * static_cast<std::size_t>(columns) +
+           static_cast<std::size_t>(x / tile_size);
+  }
+  bool operator==(const TileGrid&) const = default;
+};
+
+/// The cells of 4x4 pixels of an image that still take splats, as a summed-area table: what asks for them asks for
+/// rectangles.
+struct OpenCells {
+  static constexpr int kSize = 4;
+  View<const std::uint32_t> sums;  ///< [rows + 1][columns + 1]: open ones above and left of. Empty: all are open
+  std::size_t stride = 0;          ///< columns + 1
+
+  GSNAV_HD bool empty() const noexcept { return sums.empty(); }
+  /// Whether a cell of columns [x0, x1) in rows [y0, y1) is open.
+  GSNAV_HD bool any(std::size_t x0, std::size_t y0, std::size_t x1, std::size_t y1) const noexcept {
+    const std::uint32_t* const top = sums.data + y0 * stride;
+    const std::uint32_t* const bottom = sums.data + y1 * stride;
+    return bottom[x1] - bottom[x0] != top[x1] - top[x0];
+  }
+};
+
+/// Calls f(row, first, last), columns inclusive, for each row of tiles, in order, of which a splat may touch some.
+/// `elliptic`: within its bounds the footprint is the ellipse of its geometry (not under perspective), so tiles may be
+/// left out.
+template <class S, class F>
+GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
+                                S log2_alpha_min, bool elliptic, const F& f) noexcept {
+  const int shift = grid.tile_shift(), ts = grid.tile_size;
+  const int tx0 = b.x0 >> shift, tx1 = (b.x1 - 1) >> shift;
+  const int ty0 = b.y0 >> shift, ty1 = (b.y1 - 1) >> shift;
+  if (tx0 == tx1 && ty0 == ty1) {
+    f(ty0, tx0, tx0);
+    return;
+  }
+  const PixelBox<S> box = PixelBox<S>::of(b);
+  const FootprintStrips<S> footprint(g, log2_alpha_min, box);
+  for (int ty = ty0; ty <= ty1; ++ty) {
+    int first = tx0, last = tx1;
+    if (elliptic) {
+      const PixelColumns<S> columns = footprint.pixels(box, S(ty * ts), S((ty + 1) * ts));
+      if (!columns.any) continue;
+      first = static_cast<int>(columns.first) >> shift;
+      last = (static_cast<int>(columns.end) - 1) >> shift;
+    }
+    f(ty, first, last);
+  }
+}
+
+/// Calls f(tile) for each tile of these, in row order.
+template <class S, class F>
+GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
+                            S log2_alpha_min, bool elliptic, const F& f) noexcept {
+  for_each_tile_row(grid, g, b, log2_alpha_min, elliptic, [&](int ty, int first, int last) GSNAV_INLINED {
+    const std::size_t row = static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns);
+    for (int tx = first; tx <= last; ++tx) f(row + static_cast<std::size_t>(tx));
+  });
+}
+
+/// The tiles of a splat that covers few: from `tile` on, columns [columns[r][0], columns[r][1]) of row r; none of
+/// rows that it does not have.
+struct TileSpans {
+  static constexpr int kRows = 5, kColumns = 255;
+  static constexpr std::uint8_t kLarge = 255;  ///< in `rows`: not kept here
+  std::uint32_t tile;
+  std::uint8_t rows;
+  std::uint8_t columns[kRows][2];
+};
+
+/// Arguments of binning: `order` lists visible splats front to back.
+template <class S>
+struct BinArgs {
+  TileGrid grid;
+  View<const std::uint32_t> order;
+  View<const SplatGeometry<S>> geometry;
+  View<const SplatBounds> bounds;
+  S log2_alpha_min{};
+  bool elliptic = true;                  ///< footprints are ellipses (Response::ewa)
+  std::size_t blocks = 1;                ///< pieces that `order` is cut into
+  View<std::uint64_t> cursors;           ///< [blocks][tiles]: counts, then write positions
+  View<std::uint64_t> tile_offsets;      ///< [tiles + 1]
+  View<std::uint32_t> tile_splats;       ///< splats of all tiles, each tile's in order
+  View<TileSpans> spans;                 ///< [slots], found by the projection of such backends; else empty
+};
+
+namespace detail {
+/// `order` walks the records at random: asked for early, they are there when needed.
+template <class S>
+GSNAV_HD void prefetch_splat(const BinArgs<S>& args, std::size_t i) noexcept {
+#if !GSNAV_DEVICE_CODE && defined(__GNUC__)
+  constexpr std::size_t kAhead = 16;
+  if (i + kAhead < args.order.size) {
+    const std::uint32_t next = args.order[i + kAhead];
+    __builtin_prefetch(&args.geometry[next]);
+    __builtin_prefetch(&args.bounds[next]);
+  }
+#else
+  (void)args;
+  (void)i;
+#endif
+}
+
+/// Calls f(tile, splat) for the tiles of each splat of one block, in order.
+template <class S, class F>
+GSNAV_HD void for_each_intersection(const BinArgs<S>& args, std::size_t block, const F& f) noexcept {
+  const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
+  for (std::size_t i = r.begin; i < r.end; ++i) {
+    prefetch_splat(args, i);
+    const std::uint32_t splat = args.order[i];
+    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
+                  [&](std::size_t tile) GSNAV_INLINED { f(tile, splat); });
+  }
+}
+}  // namespace detail
+
+/// Hides no splat: for frames without a mesh.
+struct NoCull {
+  GSNAV_HD bool hides(std::size_t, std::uint32_t) const noexcept { return false; }
+};
+
+/// Hides splats that lie behind a mesh.
+template <class S>
+struct MeshCull {
+  View<const SplatDepth<S>> depths;
+  View<const S> tile_far;  ///< farthest depth of the mesh per tile, metres (MeshLayer)
+
+  /// Whether every pixel of a tile would skip the splat.
+  GSNAV_HD bool hides(std::size_t tile, std::uint32_t splat) const noexcept {
+    return depths[splat].z - depths[splat].reach > tile_far[tile];
+  }
+};
+
+/// Counts the splats of each tile for one block of `order`, less those that `cull` hides.
+template <class S, class Cull = NoCull>
+struct CountTileIntersections {
+  BinArgs<S> args;
+  Cull cull{};
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    std::uint64_t* counts = args.cursors.data + block * args.grid.count();
+    for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
+    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
+      if (!cull.hides(tile, splat)) ++counts[tile];
+    });
+  }
+};
+
+/// Turns counts into write positions (block-major within each tile) and tile offsets.
+template <class S>
+struct ScanTileIntersections {
+  BinArgs<S> args;
+  GSNAV_HD void operator()(std::size_t) const noexcept {
+    const std::size_t tiles = args.grid.count();
+    std::uint64_t sum = 0;
+    for (std::size_t t = 0; t < tiles; ++t) {
+      args.tile_offsets[t] = sum;
+      for (std::size_t b = 0; b < args.blocks; ++b) {
+        std::uint64_t& c = args.cursors[b * tiles + t];
+        const std::uint64_t n = c;
+        c = sum;
+        sum += n;
+      }
+    }
+    args.tile_offsets[tiles] = sum;
+  }
+};
+
+/// Writes the splats of one block into their tiles, less those that `cull` hides. Keeps their order.
+template <class S, class Cull = NoCull>
+struct ScatterTileIntersections {
+  BinArgs<S> args;
+  Cull cull{};
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
+    std::uint32_t* out = args.tile_splats.data;
+    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
+      if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
+    });
+  }
+};
+
+}  // namespace gsnav

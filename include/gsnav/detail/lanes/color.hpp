@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "gsnav/detail/lanes/isa.hpp"
+#include "gsnav/detail/frame/packed_gaussians.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+
+namespace gsnav::lanes {
+inline namespace GSNAV_LANES_TAG {
+
+/// The Gaussians of a chunk that are seen, in row order: row and mean - camera, asset frame.
+struct Survivors {
+  static constexpr std::size_t kRoom = kProjectChunk + static_cast<std::size_t>(kWidth);
+  std::uint32_t rows[kRoom];
+  std::uint32_t delta[3][kRoom];  ///< bits of floats
+};
+
+/// gaussian_color of kWidth Gaussians of one chunk side by side, the same bits: lane l is row rows[l]. The coefficients
+/// lie row by row; each group of 8 columns is transposed into lanes on its way to the registers.
+GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const std::uint32_t* rows,
+                                     Vec3<F> delta) noexcept {
+  constexpr int kGroup = 8;
+  if (degree > 0) {
+    delta = view_direction(delta);
+    if (!gs.sh_rotations[0].empty()) {
+      float q[4][kWidth];
+      for (int k = 0; k < 4; ++k) {
+        for (int l = 0; l < kWidth; ++l) q[k][l] = gs.sh_rotations[k][rows[l]];
+      }
+      const Quat<F> turned{F::load(q[0]), F::load(q[1]), F::load(q[2]), F::load(q[3])};
+      delta = rotate(conjugate(turned), delta);
+    }
+  }
+  // Bare vectors: they need no value before they get theirs.
+  typename F::vector c[3 * sh_coefficient_count(kMaxShDegree)];
+  const float* at[kWidth];
+  float widened[kWidth][kGroup];
+  const bool packed = has_packed_colors(gs);
+  for (int l = 0; l < kWidth; ++l) {
+    const std::size_t row = rows[l];
+    if (packed) {
+      for (std::size_t k = 0; k < 3; ++k) widened[l][k] = half_to_float(gs.packed.sh0[3 * row + k]);
+    }
+    at[l] = packed ? widened[l] : gs.sh0.data + 3 * row;
+  }
+  F dc[3];
+  load_columns<3>(at, dc);
+  for (int k = 0; k < 3; ++k) c[k] = dc[k].v;
+  const std::size_t stride = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  const int columns = 3 * (sh_coefficient_count(degree) - 1);  // 0, 9, 24 or 45
+  const bool bytes = packed && !gs.packed.shN.empty();
+  for (int first = 0; first < columns; first += kGroup) {
+    const int from = first + kGroup <= columns ? first : columns - kGroup;
+    if (bytes) {  // all rows are of one chunk
+      float steps[kGroup];
+      const PackedChunk& chunk = gs.packed.chunks[rows[0] / kProjectChunk];
+      for (int k = 0; k < kGroup; ++k) steps[k] = chunk.sh_steps[packed_band(1 + (from + k) / 3)];
+      for (int l = 0; l < kWidth; ++l) {
+        const std::int8_t* codes = gs.packed.shN.data + stride * rows[l] + from;
+        for (int k = 0; k < kGroup; ++k) widened[l][k] = static_cast<float>(codes[k]) * steps[k];
+        at[l] = widened[l];
+      }
+    } else if (gs.shN_half.empty()) {
+      for (int l = 0; l < kWidth; ++l) at[l] = gs.shN.data + stride * rows[l] + from;
+    } else {
+      for (int l = 0; l < kWidth; ++l) {
+        const std::uint16_t* halves = gs.shN_half.data + stride * rows[l] + from;
+        for (int k = 0; k < kGroup; ++k) widened[l][k] = half_to_float(halves[k]);
+        at[l] = widened[l];
+      }
+    }
+    F group[kGroup];
+    load_columns<kGroup>(at, group);
+    for (int k = 0; k < kGroup; ++k) c[3 + from + k] = group[k].v;
+  }
+  const Vec3<F> color = sh_color<F>(degree, delta, [&c](int k) noexcept {
+    return Vec3<F>{F(c[3 * k]), F(c[3 * k + 1]), F(c[3 * k + 2])};
+  });
+  return {color.x, color.y, color.z, F(0.0f)};
+}
+
+/// Asks for the coefficients of rows [first, first + kWidth), which color_survivors will read.
+GSNAV_HD void prefetch_colors(const GaussianView& gs, int degree, std::size_t first) noexcept {
+  constexpr std::size_t kLine = 64;
+  if (degree == 0) return;
+  const bool codes = has_packed_colors(gs) && !gs.packed.shN.empty(), halves = !gs.shN_half.empty();
+  const void* const data = codes    ? static_cast<const void*>(gs.packed.shN.data)
+                           : halves ? static_cast<const void*>(gs.shN_half.data)
+                                    : gs.shN.data;
+  const std::size_t bytes = codes ? 1 : halves ? sizeof(std::uint16_t) : sizeof(float);
+  const std::size_t stride = bytes * static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  const std::size_t begin = stride * first, room = stride * gs.size - begin;
+  const std::size_t rows = stride * static_cast<std::size_t>(kWidth), end = begin + (rows < room ? rows : room);
+  for (std::size_t i = begin; i < end; i += kLine) __builtin_prefetch(static_cast<const char*>(data) + i, 0, 2);
+}
+
+/// Colours of the `count` survivors of a chunk, to out[0] on. They are read when all of the chunk's geometry has
+/// been written: coefficients are most of what a frame reads, and come fastest as one stream.
+GSNAV_STAGE void color_survivors(const GaussianView& gs, int degree, Survivors& s, std::size_t count,
+                                 SplatColor<float>* out) noexcept {
+  constexpr std::size_t step = static_cast<std::size_t>(kWidth);
+  if (count == 0) return;
+  for (std::size_t i = count; i % step != 0; ++i) s.rows[i] = s.rows[count - 1];
+  for (std::size_t i = 0; i < count; i += step) {
+    float delta[3][step];
+    std::memcpy(delta[0], s.delta[0] + i, sizeof delta[0]);
+    std::memcpy(delta[1], s.delta[1] + i, sizeof delta[1]);
+    std::memcpy(delta[2], s.delta[2] + i, sizeof delta[2]);
+    const SplatColor<F> c =
+        gaussian_colors(gs, degree, s.rows + i, {F::load(delta[0]), F::load(delta[1]), F::load(delta[2])});
+    const F columns[4] = {c.r, c.g, c.b, c.pad};
+    float rows[4 * kWidth];
+    store_columns<4>(columns, rows);
+    const std::size_t n = count - i < step ? count - i : step;
+    std::memcpy(static_cast<void*>(out + i), rows, n * sizeof(SplatColor<float>));
+  }
+}
+
+}  // namespace GSNAV_LANES_TAG
+}  // namespace gsnav::lanes

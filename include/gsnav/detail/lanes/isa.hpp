@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "gsnav/detail/math/pack_layout.hpp"
+
+// Code over lanes is compiled once per instruction set and chosen at run time, so every function of it
+// lives in a namespace named after the set: no linker can mix two of them up.
+#if defined(__AVX512F__)
+#define GSNAV_LANES_TAG avx512
+#elif defined(__AVX2__)
+#define GSNAV_LANES_TAG avx2
+#else
+#define GSNAV_LANES_TAG baseline
+#endif
+
+/// A stage of a kernel over lanes. It is called, not inlined: a compiler that sees several stages as one function
+/// spills the registers of each. What a stage calls is inlined (GSNAV_HD).
+#define GSNAV_STAGE [[gnu::noinline]] inline
+
+namespace gsnav::lanes {
+inline namespace GSNAV_LANES_TAG {
+
+inline constexpr int kWidth = GSNAV_PACK_WIDTH;
+using F = Pack<float, kWidth>;
+
+}  // namespace GSNAV_LANES_TAG
+}  // namespace gsnav::lanes

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <bit>
+
+#include "gsnav/detail/lanes/isa.hpp"
+#include "gsnav/detail/lanes/write_splats.hpp"
+#include "gsnav/detail/frame/packed_gaussians.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+
+namespace gsnav::lanes {
+inline namespace GSNAV_LANES_TAG {
+
+/// kWidth rows of a set from row i on, as SetRows reads them. The last pack of a set has `count` rows
+/// and repeats the last: the caller masks those lanes.
+struct PackOfRows {
+  using lane = F;
+  static constexpr std::size_t kStep = static_cast<std::size_t>(kWidth);
+  const GaussianView& gs;
+  const PackedChunk* packed;  ///< null where shapes are floats
+  std::size_t i, count;
+
+  GSNAV_HD const PackedChunk* chunk() const noexcept { return packed; }
+  GSNAV_HD std::size_t row(std::size_t k) const noexcept { return i + (k < count ? k : count - 1); }
+  GSNAV_HD F floats(const View<const float>& plane) const noexcept {
+    if (count == kStep) return F::load(plane.data + i);
+    float tail[kStep];
+    for (std::size_t k = 0; k < kStep; ++k) tail[k] = plane[row(k)];
+    return F::load(tail);
+  }
+  GSNAV_HD F codes(int plane) const noexcept {
+    const std::uint16_t* const from = gs.packed.codes.data + static_cast<std::size_t>(plane) * gs.size;
+    float values[kStep];
+    if (count == kStep) {
+      for (std::size_t k = 0; k < kStep; ++k) values[k] = static_cast<float>(from[i + k]);
+    } else {
+      for (std::size_t k = 0; k < kStep; ++k) values[k] = static_cast<float>(from[row(k)]);
+    }
+    return F::load(values);
+  }
+  GSNAV_HD Vec3<doubles_of<F>> offset(const View<const Vec3d>& offsets) const noexcept {
+    using D = doubles_of<F>;
+    if (gs.origin_ids.empty()) return {D(offsets[0].x), D(offsets[0].y), D(offsets[0].z)};
+    double planes[3][kStep];
+    for (std::size_t k = 0; k < kStep; ++k) {
+      const Vec3d& o = offsets[gs.origin_ids[row(k)]];
+      planes[0][k] = o.x;
+      planes[1][k] = o.y;
+      planes[2][k] = o.z;
+    }
+    return {D::load(planes[0]), D::load(planes[1]), D::load(planes[2])};
+  }
+};
+
+/// The chunk by rules that are not worth lanes of their own.
+GSNAV_STAGE void project_chunk_alone(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+                                     std::size_t c) noexcept {
+  ProjectChunk<float>{args, out}(c);
+}
+
+/// ProjectChunk<float> with kWidth Gaussians side by side; the same bits.
+inline void project_chunk(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+                          std::size_t c) noexcept {
+  const GaussianView& gs = args.gaussians;
+  const ProjectionCamera<float>& camera = args.camera;
+  if (camera.response != Response::ewa || camera.compat != Compat::none) {
+    project_chunk_alone(args, out, c);
+    return;
+  }
+  const std::size_t begin = gs.chunk_id(c) * kProjectChunk;
+  const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
+  const std::size_t base = (args.first_chunk + c) * kProjectChunk;
+  constexpr std::size_t step = PackOfRows::kStep;
+  const std::uint32_t parts = candidate_parts(args, c);
+  if (parts == 0) {
+    out.counts[args.first_chunk + c] = 0;
+    return;
+  }
+  const SeenRows may_be_seen = gs.seen_rows(gs.chunk_id(c));
+  const PackedChunk* const packed = is_packed(gs) ? &gs.packed.chunks[gs.chunk_id(c)] : nullptr;
+  std::uint32_t written = 0;
+  Survivors survivors;
+  static_assert(kChunkPart % step == 0 && 32 % step == 0);
+  for (std::size_t i = begin; i < end; i += step) {
+    if ((parts >> ((i - begin) / kChunkPart) & 1u) == 0) continue;
+    const std::uint32_t wanted = may_be_seen.word((i - begin) / 32) >> ((i - begin) % 32);
+    if ((wanted & ((1u << step) - 1u)) == 0) continue;
+    const std::size_t count = end - i < step ? end - i : step;
+    const ViewedRows<PackOfRows> rows({gs, packed, i, count}, args.offsets);
+    const RowKey<F> key = row_key<F>(args.camera64, rows);
+    if (!any(key.z > F(camera.near_plane))) continue;
+    const SeenRow<F> seen(camera, rows, key);
+    const std::uint32_t bits = lane_bits(seen.splat.visible) & wanted & ((1u << count) - 1u);
+    if (bits != 0) written += write_splats(args, out, base, written, {i, key, seen}, bits, survivors);
+  }
+  if (!out.colors.empty()) {
+    color_survivors(gs, gs.degree_of(begin, args.sh_degree), survivors, written, out.colors.data + base);
+  }
+  out.counts[args.first_chunk + c] = written;
+}
+
+}  // namespace GSNAV_LANES_TAG
+}  // namespace gsnav::lanes

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+#include "gsnav/detail/frame/footprint.hpp"
+#include "gsnav/detail/lanes/color.hpp"
+#include "gsnav/detail/lanes/isa.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/math/pack_double.hpp"
+
+namespace gsnav::lanes {
+inline namespace GSNAV_LANES_TAG {
+
+/// kWidth projected Gaussians: lane l is row `first + l` of the set.
+struct ProjectedPack {
+  std::size_t first;
+  const RowKey<F>& key;
+  const SeenRow<F>& seen;
+};
+
+namespace detail {
+
+/// Those of `lanes` whose bounds reach an open cell.
+GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, const PixelBox<F>& box, std::uint32_t lanes) noexcept {
+  const F inverse(1.0f / OpenCells::kSize), one(1.0f);
+  float bounds[4][kWidth];
+  truncated(box.x0 * inverse).store(bounds[0]);
+  truncated(box.y0 * inverse).store(bounds[1]);
+  (truncated((box.x1 - one) * inverse) + one).store(bounds[2]);
+  (truncated((box.y1 - one) * inverse) + one).store(bounds[3]);
+  std::uint32_t found = 0;
+  for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
+    const int l = std::countr_zero(left);
+    const auto cell = [&](int k) { return static_cast<std::size_t>(bounds[k][l]); };
+    if (open.any(cell(0), cell(1), cell(2), cell(3))) found |= 1u << l;
+  }
+  return found;
+}
+
+/// A TileSpans a lane, as the four words that it lies in memory as.
+struct SpanWords {
+  F::ints word[4]{};
+};
+static_assert(sizeof(TileSpans) == 4 * sizeof(std::int32_t) && TileSpans::kRows == 5);
+
+/// The tiles of kWidth splats, lane by lane those that for_each_tile finds; `lanes`: which are wanted.
+GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, float log2_alpha_min,
+                              const PixelBox<F>& box, std::uint32_t lanes) noexcept {
+  const F zero(0.0f), one(1.0f), size(static_cast<float>(grid.tile_size));
+  const F inverse(1.0f / static_cast<float>(grid.tile_size));  // a power of two: exact
+  const auto tile_of = [inverse](F pixel) noexcept { return truncated(pixel * inverse); };
+  const auto whole = [](F x) noexcept { return __builtin_convertvector(x.v, F::ints); };
+  const F tx0 = tile_of(box.x0), tx1 = tile_of(box.x1 - one), ty0 = tile_of(box.y0), ty1 = tile_of(box.y1 - one);
+  const F rows = (ty1 - ty0) + one;
+  const auto large = (rows > F(static_cast<float>(TileSpans::kRows))) ||
+                     (tx1 - tx0 >= F(static_cast<float>(TileSpans::kColumns)));
+  const auto single = (ty0 >= ty1) && (tx0 >= tx1);
+  const std::uint32_t wanted = lanes & ~lane_bits(large || single);
+
+  SpanWords out;
+  out.word[0] = whole(ty0) * grid.columns + whole(tx0);
+  out.word[1] = whole(select(large, F(static_cast<float>(TileSpans::kLarge)), rows));
+  F begin = zero, end = one;  // of a single tile
+  if (wanted != 0) {
+    const FootprintStrips<F> footprint(g, log2_alpha_min, box);
+    F top = ty0 * size;
+    for (int r = 0; r < TileSpans::kRows; ++r) {
+      if ((lane_bits(F(static_cast<float>(r)) < rows) & wanted) == 0) break;
+      const F next = top + size;
+      const PixelColumns<F> columns = footprint.pixels(box, top, next);
+      const auto has_any = columns.any && (F(static_cast<float>(r)) < rows);
+      begin = select(has_any, tile_of(columns.first) - tx0, zero);
+      end = select(has_any, (tile_of(columns.end - one) - tx0) + one, zero);
+      if (r == 0) {
+        begin = select(single, zero, begin);
+        end = select(single, one, end);
+      }
+      const F::ints b = whole(begin), e = whole(end);
+      // Bytes 5 + 2 r and 6 + 2 r of the sixteen.
+      out.word[(5 + 2 * r) / 4] |= b << (8 * ((5 + 2 * r) % 4));
+      out.word[(6 + 2 * r) / 4] |= e << (8 * ((6 + 2 * r) % 4));
+      top = next;
+    }
+  } else {
+    out.word[1] |= whole(begin) << 8 | whole(end) << 16;
+  }
+  return out;
+}
+
+/// Copies a record that is N floats, or as large.
+template <int N, class T>
+GSNAV_HD void copy_record(T& record, const float* from) noexcept {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) == N * sizeof(float));
+  std::memcpy(static_cast<void*>(&record), from, sizeof(T));
+}
+
+GSNAV_HD F as_floats(F::ints x) noexcept { return F(gsnav::detail::floats<kWidth>(x)); }
+
+/// One row by itself, with all that needs double.
+GSNAV_STAGE bool project_alone(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+                               std::size_t slot, std::size_t row) noexcept {
+  return project_gaussian(args, out, slot, row);
+}
+
+}  // namespace detail
+
+/// Writes the survivors `bits` of a pack, in row order, behind the `count` that their chunk has from slot
+/// `base` on: the bits of write_splat, but for colours, which `survivors` are left to. Returns how many had a
+/// pixel centre in their bounds. Contract only: Response::ewa, Compat::none.
+GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+                                       std::size_t base, std::size_t count, const ProjectedPack& pack,
+                                       std::uint32_t bits, Survivors& survivors) noexcept {
+  const std::size_t slot = base + count;
+  const GaussianView& gs = args.gaussians;
+  const ProjectionCamera<float>& camera = args.camera;
+  const Projected<F>& p = pack.seen.splat;
+  const PixelBox<F> box = gsnav::detail::pixel_box(camera, p);
+  // Those whose geometry float cannot hold are few: each goes its own way.
+  const std::uint32_t alone = lane_bits(gsnav::detail::needs_double(camera, p)) & bits;
+  bits &= lane_bits(box.any_pixel()) | alone;
+  if (!out.open.empty()) bits &= detail::reaching_open(out.open, box, bits) | alone;
+  if (bits == 0) return 0;
+  const bool color = !out.colors.empty(), depth = !out.depths.empty();
+  if (color) prefetch_colors(gs, gs.degree_of(pack.first, args.sh_degree), pack.first);
+
+  doubles_of<F> mean_x, mean_y;
+  gsnav::detail::project_mean(args.camera64, pack.key.delta64, mean_x, mean_y);
+  const SplatGeometry<F> g =
+      splat_geometry(p, reference_of<F>(camera.width, camera.height, mean_x, mean_y));
+
+  // Records side by side in lanes become one after the other in memory.
+  alignas(64) float geometry[kWidth * 8], bounds[kWidth * 8], depths[2][kWidth * 8];
+  {
+    const F columns[8] = {g.ref_x, g.ref_y, g.a, g.k, g.b, g.w1, g.w2, g.log2_opacity};
+    store_columns<8>(columns, geometry);
+  }
+  {
+    const auto whole = [](F x) noexcept { return detail::as_floats(__builtin_convertvector(x.v, F::ints)); };
+    detail::SpanWords spans;
+    if (!out.spans.empty()) {
+      spans = detail::find_tiles(out.grid, g, camera.log2_alpha_min, box, bits & ~alone);
+    }
+    const F columns[8] = {whole(box.x0),
+                          whole(box.y0),
+                          whole(box.x1),
+                          whole(box.y1),
+                          detail::as_floats(spans.word[0]),
+                          detail::as_floats(spans.word[1]),
+                          detail::as_floats(spans.word[2]),
+                          detail::as_floats(spans.word[3])};
+    store_columns<8>(columns, bounds);
+  }
+  if (depth) {
+    const SplatDepth<F> d = make_splat_depth(camera, pack.seen.axes, p);
+    const F low[8] = {d.mean_x, d.mean_y, d.z, d.reach, d.g[0], d.g[1], d.g[2], d.gx[0]};
+    const F high[8] = {d.gx[1], d.gx[2], d.gy[0], d.gy[1], d.gy[2], F(0.0f), F(0.0f), F(0.0f)};
+    store_columns<8>(low, depths[0]);
+    store_columns<8>(high, depths[1]);
+  }
+  std::uint32_t rows[kWidth], keys[kWidth], ranks[kWidth];
+  float key[kWidth];
+  sort_key(args.camera64, pack.key).store(key);
+  for (int l = 0; l < kWidth; ++l) keys[l] = camera.key_code(key[l]);
+  const std::uint32_t first = static_cast<std::uint32_t>(pack.first), last = static_cast<std::uint32_t>(gs.size - 1);
+  for (std::uint32_t l = 0; l < static_cast<std::uint32_t>(kWidth); ++l) rows[l] = first + l;
+  for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + rows[l];
+  if (!gs.row_ids.empty() && !out.ranks.empty()) {
+    for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + gs.row_ids[rows[l] < last ? rows[l] : last];
+  }
+
+  std::uint32_t written = 0, kept = 0;
+  for (std::uint32_t left = bits; left != 0; left &= left - 1) {
+    const std::size_t l = static_cast<std::size_t>(std::countr_zero(left)), at = slot + written;
+    if ((alone >> l & 1u) != 0) {
+      if (!detail::project_alone(args, out, at, rows[l])) continue;
+    } else {
+      detail::copy_record<8>(out.geometry[at], geometry + 8 * l);
+      detail::copy_record<4>(out.bounds[at], bounds + 8 * l);
+      if (!out.spans.empty()) detail::copy_record<4>(out.spans[at], bounds + 8 * l + 4);
+      if (depth) {
+        float both[13];
+        std::memcpy(both, depths[0] + 8 * l, 8 * sizeof(float));
+        std::memcpy(both + 8, depths[1] + 8 * l, 5 * sizeof(float));
+        detail::copy_record<13>(out.depths[at], both);
+      }
+    }
+    kept |= 1u << l;
+    ++written;
+  }
+  store_lanes(kept, keys, out.keys.data + slot);
+  if (!out.ranks.empty()) store_lanes(kept, ranks, out.ranks.data + slot);
+  if (color) {
+    store_lanes(kept, rows, survivors.rows + count);
+    const F planes[3] = {pack.key.delta.x, pack.key.delta.y, pack.key.delta.z};
+    for (int k = 0; k < 3; ++k) {
+      std::uint32_t lanes[kWidth];
+      std::memcpy(lanes, &planes[k].v, sizeof lanes);
+      store_lanes(kept, lanes, survivors.delta[k] + count);
+    }
+  }
+  return written;
+}
+
+}  // namespace GSNAV_LANES_TAG
+}  // namespace gsnav::lanes

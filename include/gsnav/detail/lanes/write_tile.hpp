@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+
+#include "gsnav/detail/frame/blend.hpp"
+#include "gsnav/detail/lanes/block_lists.hpp"
+
+namespace gsnav::lanes {
+inline namespace GSNAV_LANES_TAG {
+
+/// Blocks side by side that make rows of kWidth pixels: as many as a block has rows.
+inline constexpr int kRowBlocks = kWidth / kBlockWidth;
+static_assert(kRowBlocks == kBlockHeight);
+
+/// Where kRowBlocks blocks side by side lie in an image: kBlockHeight rows of kWidth pixels, of which `columns` of
+/// `rows` are to be written.
+struct BlockRow {
+  std::size_t first;  ///< pixel
+  std::size_t stride;
+  std::size_t columns;
+  int rows;
+
+  /// From (x0, y0) on, what lies in the image and left of `end`.
+  BlockRow(const TileGrid& grid, int x0, int y0, int end) noexcept {
+    const int right = end < grid.width ? end : grid.width;
+    stride = static_cast<std::size_t>(grid.width);
+    first = static_cast<std::size_t>(y0) * stride + static_cast<std::size_t>(x0);
+    columns = static_cast<std::size_t>(right - x0 < kWidth ? right - x0 : kWidth);
+    rows = grid.height - y0 < kBlockHeight ? grid.height - y0 : kBlockHeight;
+  }
+};
+
+/// Writes one image of a row of blocks; nothing where it is null. value(i): the pixels of block i.
+template <class Value>
+void write_plane(const BlockRow& row, float* image, const Value& value) noexcept {
+  if (image == nullptr) return;
+  F v[kRowBlocks];
+  for (int i = 0; i < kRowBlocks; ++i) v[i] = value(i);
+  transpose_chunks<kBlockHeight>(v);
+  for (int y = 0; y < row.rows; ++y) {
+    float* const to = image + row.first + static_cast<std::size_t>(y) * row.stride;
+    if (row.columns == kWidth) {
+      v[y].store(to);
+    } else {
+      float values[kWidth];
+      v[y].store(values);
+      std::memcpy(to, values, row.columns * sizeof(float));
+    }
+  }
+}
+
+/// The same of three values a pixel. value(i): a Vec3.
+template <class Value>
+void write_color(const BlockRow& row, float* image, const Value& value) noexcept {
+  if (image == nullptr) return;
+  F x[kRowBlocks], y[kRowBlocks], z[kRowBlocks];
+  for (int i = 0; i < kRowBlocks; ++i) {
+    const Vec3<F> v = value(i);
+    x[i] = v.x;
+    y[i] = v.y;
+    z[i] = v.z;
+  }
+  transpose_chunks<kBlockHeight>(x);
+  transpose_chunks<kBlockHeight>(y);
+  transpose_chunks<kBlockHeight>(z);
+  for (int i = 0; i < row.rows; ++i) {
+    float* const to = image + 3 * (row.first + static_cast<std::size_t>(i) * row.stride);
+    if (row.columns == kWidth) {
+      store_interleaved(x[i], y[i], z[i], to);
+    } else {
+      float values[3 * kWidth];
+      store_interleaved(x[i], y[i], z[i], values);
+      std::memcpy(to, values, 3 * row.columns * sizeof(float));
+    }
+  }
+}
+
+/// The tile's rows are far apart in an image, and come in while it is blended.
+inline void prefetch_images(const RasterArgs<float>& args, int tile_x, int tile_y) noexcept {
+  const FrameImages<float>& out = args.images;
+  const int tile_size = args.grid.tile_size;
+  const auto prefetch = [=, &args](const float* image, std::size_t values) {
+    if (image == nullptr) return;
+    for (int y = tile_y; y < tile_y + tile_size && y < args.grid.height; ++y) {
+      const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(args.grid.width) +
+                                static_cast<std::size_t>(tile_x);
+      constexpr std::size_t kLine = 16;
+      for (std::size_t x = 0; x < values * static_cast<std::size_t>(tile_size); x += kLine) {
+        __builtin_prefetch(image + values * first + x, 0, 2);
+      }
+    }
+  };
+  prefetch(out.rgb, 3);
+  for (const float* image : {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth,
+                             out.first_hit_depth}) {
+    prefetch(image, 1);
+  }
+}
+
+}  // namespace GSNAV_LANES_TAG
+}  // namespace gsnav::lanes

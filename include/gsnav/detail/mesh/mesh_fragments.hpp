@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/detail/mesh/mesh_shade.hpp"
+
+// Surfaces that are seen through, as lists of fragments, one a pixel: counted, given room, filled and
+// sorted tile by tile. No pixel's list has a limit.
+
+namespace gsnav {
+
+/// Arguments of making the fragments of one camera.
+template <class S>
+struct FragmentArgs {
+  MeshRasterArgs<S> raster;    ///< of the transparent triangles: its lists, nothing of its images
+  MeshShadeArgs<S> shade;      ///< its light, nothing of its images
+  const S* behind = nullptr;   ///< [H][W], depth of the opaque mesh: what is beyond it is no fragment
+  bool color = false;          ///< false: colours are left at 0
+  bool linear = false;         ///< colours in linear light
+  View<FragmentRange> ranges;  ///< [H][W]
+  View<std::uint64_t> tile_begin;   ///< [tiles + 1]: counts, then where a tile's fragments begin
+  View<MeshFragment<S>> fragments;  ///< tile by tile, pixel by pixel
+};
+
+namespace detail {
+
+/// Calls f(pixel, t, x, y, z) for each pixel of a tile and triangle that owns it, is not behind the
+/// opaque mesh; pixel by pixel in the order of triangles.
+template <class S, class F>
+GSNAV_HD void for_each_fragment(const FragmentArgs<S>& args, std::size_t tile, const F& f) noexcept {
+  const BinArgs<S>& bin = args.raster.bin;
+  const TileGrid& grid = bin.grid;
+  const int ts = grid.tile_size;
+  const int tile_x = static_cast<int>(tile % static_cast<std::size_t>(grid.columns)) * ts;
+  const int tile_y = static_cast<int>(tile / static_cast<std::size_t>(grid.columns)) * ts;
+  for (std::uint64_t i = bin.tile_offsets[tile]; i < bin.tile_offsets[tile + 1]; ++i) {
+    const MeshTriangle<S>& t = args.raster.triangles[bin.tile_splats[i]];
+    for_each_span(grid, t, max(tile_x, int{t.x0}), max(tile_y, int{t.y0}),
+                  min(min(tile_x + ts, grid.width), int{t.x1}),
+                  min(min(tile_y + ts, grid.height), int{t.y1}), [&](int y, int left, int right) GSNAV_INLINED {
+                    for (int x = left; x < right; ++x) {
+                      const std::size_t pixel =
+                          static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
+                          static_cast<std::size_t>(x);
+                      const S z = S(1) / mesh_inverse_z(t, x, y);
+                      if (z <= args.behind[pixel] && z <= S(3.4e38)) f(pixel, t, x, y, z);
+                    }
+                  });
+  }
+}
+
+/// Calls f(pixel) for each pixel of a tile, row by row.
+template <class F>
+GSNAV_HD void for_each_tile_pixel(const TileGrid& grid, std::size_t tile, const F& f) noexcept {
+  const int ts = grid.tile_size;
+  const int tile_x = static_cast<int>(tile % static_cast<std::size_t>(grid.columns)) * ts;
+  const int tile_y = static_cast<int>(tile / static_cast<std::size_t>(grid.columns)) * ts;
+  for (int y = tile_y; y < min(tile_y + ts, grid.height); ++y) {
+    for (int x = tile_x; x < min(tile_x + ts, grid.width); ++x) {
+      f(static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
+        static_cast<std::size_t>(x));
+    }
+  }
+}
+
+}  // namespace detail
+
+/// Counts the fragments of a tile's pixels.
+template <class S>
+struct CountFragments {
+  FragmentArgs<S> args;
+  GSNAV_HD void operator()(std::size_t tile) const noexcept {
+    detail::for_each_tile_pixel(args.raster.bin.grid, tile, [&](std::size_t p) GSNAV_INLINED { args.ranges[p] = {}; });
+    std::uint64_t sum = 0;
+    detail::for_each_fragment(args, tile, [&](std::size_t p, const MeshTriangle<S>&, int, int, S) GSNAV_INLINED {
+      ++args.ranges[p].count;
+      ++sum;
+    });
+    args.tile_begin[tile] = sum;
+  }
+};
+
+/// Turns the counts of tiles into where each begins.
+template <class S>
+struct ScanFragments {
+  FragmentArgs<S> args;
+  GSNAV_HD void operator()(std::size_t) const noexcept {
+    detail::exclusive_sums(args.tile_begin.data, args.tile_begin.size - 1, args.tile_begin.data);
+  }
+};
+
+/// Writes a tile's fragments, each pixel's from near to far; of equally far ones the first triangle's
+/// comes first. Where a surface is all transparent there is none.
+template <class S>
+struct FillFragments {
+  FragmentArgs<S> args;
+
+  GSNAV_HD void operator()(std::size_t tile) const noexcept {
+    std::uint64_t next = args.tile_begin[tile];
+    detail::for_each_tile_pixel(args.raster.bin.grid, tile, [&](std::size_t p) GSNAV_INLINED {
+      FragmentRange& r = args.ranges[p];
+      r.begin = next;
+      next += r.count;
+      r.count = 0;
+    });
+    detail::for_each_fragment(args, tile,
+                              [&](std::size_t p, const MeshTriangle<S>& t, int x, int y, S z) GSNAV_INLINED {
+                                const MeshPlacement& placement = args.raster.placements[t.placement];
+                                const SurfacePoint<S> at = surface_point(placement.mesh, t, x, y, z);
+                                const S alpha = surface_alpha(placement.mesh, t, at);
+                                if (alpha > S(0))
+                                  insert(args.ranges[p], shaded(placement, t, at, alpha));
+                              });
+  }
+
+ private:
+  GSNAV_HD MeshFragment<S> shaded(const MeshPlacement& placement, const MeshTriangle<S>& t,
+                                  const SurfacePoint<S>& at, S alpha) const noexcept {
+    MeshFragment<S> f{at.z, alpha, S(0), S(0), S(0)};
+    if (!args.color) return f;
+    const Vec3<S> normal =
+        args.shade.lights(placement.mesh) ? surface_normal(placement, t, at) : Vec3<S>{};
+    const Vec3<S> c = shaded_color(args.shade, placement.mesh, t, at, normal);
+    f.r = args.linear ? srgb_decoded(c.x) : c.x;
+    f.g = args.linear ? srgb_decoded(c.y) : c.y;
+    f.b = args.linear ? srgb_decoded(c.z) : c.z;
+    return f;
+  }
+  GSNAV_HD void insert(FragmentRange& r, const MeshFragment<S>& f) const noexcept {
+    MeshFragment<S>* const list = args.fragments.data + r.begin;
+    std::uint32_t i = r.count++;
+    for (; i > 0 && list[i - 1].depth > f.depth; --i) list[i] = list[i - 1];
+    list[i] = f;
+  }
+};
+
+}  // namespace gsnav

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/detail/frame/temporal.hpp"
+
+namespace gsnav {
+
+/// Checks that the arrays fit each other; names the one that does not.
+inline Status validate(const TemporalView& in) {
+  const std::size_t n = in.base.size;
+  Status status;
+  const auto sized = [&](const View<const float>& v, std::size_t want, const char* name) {
+    if (status.ok() && v.size != want) {
+      status = {Errc::invalid_argument, std::string("TemporalView.") + name + " has " + std::to_string(v.size) +
+                                            " values where " + std::to_string(want) + " are needed"};
+    }
+  };
+  for (const auto& plane : in.base.means) sized(plane, n, "base.means");
+  sized(in.base.opacities, n, "base.opacities");
+  sized(in.times, n, "times");
+  sized(in.sigmas, n, "sigmas");
+  for (std::size_t k = 0; k < kMotionPlanes; ++k) sized(in.motion[k], in.motion[k / 3 * 3].empty() ? 0 : n, "motion");
+  return status;
+}
+
+/// A moment of moving Gaussians in a backend's memory, used again for the next one.
+template <Backend B>
+struct Moment {
+  explicit Moment(B& backend)
+      : means{Buffer<float, B>(backend), Buffer<float, B>(backend), Buffer<float, B>(backend)},
+        opacities(backend), bounds(backend) {}
+
+  Buffer<float, B> means[3];
+  Buffer<float, B> opacities;
+  Buffer<ChunkBounds, B> bounds;
+  GaussianView gaussians;  ///< what to render: the base's shapes and colours, the moment's means and opacities
+};
+
+/// Takes N moving Gaussians to the time `t`, seconds: `out.gaussians` is a set like any other until the next call.
+/// Those whose opacity is below 1/255 then get 0 and are not drawn. Arithmetic is in S; the reference is double. Chunks
+/// get the moment's bounds where the host reaches the backend's memory and rows are sorted (`base.chunk_bounds`), else
+/// none, and all chunks are touched. The result is there after `backend.synchronize()`.
+/// Errors: invalid_argument naming the array, or a time that is not finite.
+template <class S, Backend B>
+Status gaussians_at(B& backend, const TemporalView& in, double t, Moment<B>& out) {
+  if (Status s = validate(in); !s) return s;
+  if (!is_finite(t)) return {Errc::invalid_argument, "gaussians_at: the time is " + std::to_string(t)};
+  const std::size_t n = in.base.size;
+  GaussianAt<S> at{in, t, {}, {}};
+  out.gaussians = in.base;
+  for (std::size_t k = 0; k < 3; ++k) {
+    out.means[k].resize_discard(n);
+    at.means[k] = out.means[k].view();
+    out.gaussians.means[k] = {out.means[k].data(), n};
+  }
+  out.opacities.resize_discard(n);
+  at.opacities = out.opacities.view();
+  out.gaussians.opacities = {out.opacities.data(), n};
+  backend.parallel_for(n, at);
+  out.gaussians.chunk_bounds = out.gaussians.part_bounds = {};
+  if constexpr (is_host_backend<B>) {
+    if (!in.base.chunk_bounds.empty()) {
+      const std::size_t chunks = in.base.all_chunks();
+      out.bounds.resize_discard(chunks);
+      backend.parallel_for(chunks, BoundChunkAt{out.gaussians, out.bounds.view()});
+      out.gaussians.chunk_bounds = {out.bounds.data(), chunks};
+    }
+  }
+  return {};
+}
+
+}  // namespace gsnav

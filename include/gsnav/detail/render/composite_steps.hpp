@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/detail/frame/composite.hpp"
+#include "gsnav/detail/frame/cull.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/core/stages.hpp"
+
+namespace gsnav {
+
+namespace detail {
+
+/// Whether a mesh hides every Gaussian of a chunk at every pixel that it may reach (host memory). Never yes where one
+/// is seen: bounds are those of chunk_extent, and the reach of a depth is at most that of the largest and most opaque.
+inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const TileGrid& grid,
+                             const View<const float>& tile_far, std::size_t c) noexcept {
+  const ProjectionCamera<double>& camera = args.camera64;
+  const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
+  if (bounds.empty() || camera.response != Response::ewa || camera.compat != Compat::none) return false;
+  const ChunkBounds& chunk = bounds[args.gaussians.chunk_id(c)];
+  const ChunkExtent e = chunk_extent(camera, chunk);
+  const double k2 = 2 * kLn2 * (ChunkInView(camera, chunk).s_max() + 1e-5);
+  const double reach = sqrt(max(k2, 0.0)) * static_cast<double>(chunk.scale_max) * camera.scale;
+  const double nearest = static_cast<double>(e.nearest) * (1 - 1e-6) - reach * (1 + 1e-5);
+  const auto tile = [&grid](double pixel, int tiles) {
+    return static_cast<int>(clamp(pixel / grid.tile_size, 0.0, static_cast<double>(tiles - 1)));
+  };
+  if (!(e.x0 <= e.x1 && e.y0 <= e.y1)) return false;  // not finite: nothing is known
+  const int x0 = tile(e.x0, grid.columns), x1 = tile(e.x1, grid.columns);
+  const int y0 = tile(e.y0, grid.rows), y1 = tile(e.y1, grid.rows);
+  for (int y = y0; y <= y1; ++y) {
+    const float* const row = tile_far.data + static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.columns);
+    for (int x = x0; x <= x1; ++x) {
+      if (!(nearest > static_cast<double>(row[x]))) return false;
+    }
+  }
+  return true;
+}
+
+/// Projects the chunks of a set that a mesh does not hide; `list` is scratch, `counts` are 0.
+template <class B>
+void project_unhidden(B& backend, const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+                      const View<const float>& tile_far, std::vector<std::uint32_t>& list) {
+  const std::size_t n = args.chunk_count();
+  list.resize(n);
+  backend.parallel_for(n, [&](std::size_t c) {
+    list[c] = chunk_is_candidate(args, c) && !mesh_hides_chunk(args, out.grid, tile_far, c) ? 1 : 0;
+  });
+  std::size_t kept = 0;
+  for (std::size_t c = 0; c < n; ++c) {
+    if (list[c] != 0) list[kept++] = static_cast<std::uint32_t>(c);
+  }
+  run(backend, stage::Project{}, args, out, View<const std::uint32_t>{list.data(), kept});
+}
+
+template <class S, Backend B>
+void blend_pixels_with_meshes(B& backend, const RasterArgs<S>& args) {
+  const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
+    backend.parallel_for(pixels, CompositePixel<S, C, D, G>{args});
+  });
+}
+
+/// Blends frames with a mesh. Pixels that are seen through something are blended anew.
+template <class S, Backend B>
+void rasterize_composite(B& backend, const RasterArgs<S>& args) {
+  run(backend, stage::BlendWithMeshes{}, args);
+  if (args.mesh.ranges.empty()) return;
+  const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
+    backend.parallel_for(pixels, FragmentPixel<S, C, D, G>{args});
+  });
+}
+
+}  // namespace detail
+}  // namespace gsnav

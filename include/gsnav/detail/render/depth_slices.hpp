@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/view.hpp"
+#include "gsnav/detail/frame/cull.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/render/order_visible.hpp"
+#include "gsnav/render/render_config.hpp"
+#include "gsnav/core/stages.hpp"
+
+namespace gsnav {
+
+/// Backends that can draw a frame in slices of depth.
+template <class B, class S>
+concept SlicingBackend = Backend<B> && is_host_backend<B> &&
+    RunsStage<B, stage::Project, ProjectArgs<S>, ProjectOutputs<S>, View<const std::uint32_t>>;
+
+/// A frame in slices of depth, front to back: what a slice leaves closed, the next need not project, colour, sort or
+/// bin. The image is that of one slice, bit for bit: a pixel meets the same splats in the same order, but for those
+/// that come when it is closed.
+///
+/// A chunk belongs to the slice of its nearest possible key; what of it is farther waits, projected, for its own.
+class DepthSlices {
+ public:
+  static constexpr int kMost = 8;
+
+  /// Finds how deep each chunk lies and where in the image. `sets`: one projection a set.
+  template <class B>
+  void plan(B& backend, View<const ProjectArgs<float>> sets) {
+    chunks_.resize(sets.size == 0 ? 0 : sets[sets.size - 1].first_chunk + sets[sets.size - 1].chunk_count());
+    for (const ProjectArgs<float>& args : sets) {
+      backend.parallel_for(args.chunk_count(), [this, &args](std::size_t c) {
+        chunks_[args.first_chunk + c] = place_of(args, c);
+      });
+    }
+    weights_.fill(0);
+    candidates_ = 0;
+    for (const ProjectArgs<float>& args : sets) {
+      for (std::size_t c = 0; c < args.chunk_count(); ++c) {
+        const Place& place = chunks_[args.first_chunk + c];
+        if (!place.candidate()) continue;
+        const std::size_t first = args.gaussians.chunk_id(c) * kProjectChunk;
+        const std::size_t n = std::min(kProjectChunk, args.gaussians.size - first);
+        weights_[place.bucket] += n;
+        candidates_ += n;
+      }
+    }
+  }
+  /// Gaussians of chunks that may be visible.
+  std::size_t candidates() const noexcept { return candidates_; }
+
+  /// Cuts what was planned into n slices, or as many as there are depths.
+  void cut(int n) noexcept {
+    count_ = 0;
+    std::size_t seen = 0, bucket = 0;
+    for (int s = 0; s + 1 < n; ++s) {
+      const double share = kFirst + (1 - kFirst) * s / n;
+      const std::size_t wanted = static_cast<std::size_t>(share * static_cast<double>(candidates_));
+      if (seen >= wanted) continue;  // no slice is empty
+      while (bucket + 1 < kBuckets && seen < wanted) seen += weights_[bucket++];
+      ends_[static_cast<std::size_t>(count_++)] = bucket;
+    }
+    ends_[static_cast<std::size_t>(count_++)] = kBuckets;
+  }
+  int count() const noexcept { return count_; }
+
+  /// The keys of slice s.
+  KeyRange keys(int s) const noexcept {
+    const auto end = [this](int i) { return key_of_bucket(ends_[static_cast<std::size_t>(i)]); };
+    return {s == 0 ? 0 : end(s - 1), s + 1 == count_ ? 0xffffffffu : end(s) - 1};
+  }
+  /// The chunks of one set that slice s projects: those that may reach a cell of `open`, or all where
+  /// that is empty.
+  View<const std::uint32_t> chunks(int s, const ProjectArgs<float>& args, const OpenCells& open) {
+    const std::size_t begin = s == 0 ? 0 : ends_[static_cast<std::size_t>(s - 1)];
+    const std::size_t end = ends_[static_cast<std::size_t>(s)];
+    list_.clear();
+    for (std::size_t c = 0; c < args.chunk_count(); ++c) {
+      const Place& place = chunks_[args.first_chunk + c];
+      if (place.bucket < begin || place.bucket >= end || !place.candidate()) continue;
+      if (!open.empty() && !open.any(place.x0, place.y0, place.x1, place.y1)) continue;
+      list_.push_back(static_cast<std::uint32_t>(c));
+    }
+    return {list_.data(), list_.size()};
+  }
+
+  /// The cells that a slice left open (TileProgress::open), for the next one's projection.
+  OpenCells open_cells(const TileGrid& grid, View<const std::uint64_t> open) {
+    const std::size_t side = static_cast<std::size_t>(grid.tile_size / OpenCells::kSize);
+    const std::size_t tiles = static_cast<std::size_t>(grid.columns);
+    const std::size_t stride = tiles * side + 1, rows = static_cast<std::size_t>(grid.rows) * side;
+    sums_.resize(stride * (rows + 1));
+    std::fill(sums_.begin(), sums_.begin() + static_cast<std::ptrdiff_t>(stride), 0u);
+    for (std::size_t y = 0; y < rows; ++y) {
+      const std::uint64_t* const masks = open.data + y / side * tiles;
+      const std::uint32_t* above = sums_.data() + y * stride;
+      std::uint32_t* out = sums_.data() + (y + 1) * stride;
+      std::uint32_t row = 0;
+      *out++ = 0;
+      for (std::size_t t = 0; t < tiles; ++t) {
+        const std::uint64_t cells = masks[t] >> (y % side * side);
+        for (std::size_t x = 0; x < side; ++x) *out++ = *++above + (row += static_cast<std::uint32_t>(cells >> x & 1));
+      }
+    }
+    return {{sums_.data(), sums_.size()}, stride};
+  }
+
+  /// As RenderWorkspace::grow_to.
+  void grow_to(const DepthSlices& o) {
+    chunks_.reserve(o.chunks_.capacity());
+    list_.reserve(o.list_.capacity());
+    sums_.reserve(o.sums_.capacity());
+  }
+  std::size_t capacity_bytes() const noexcept {
+    return chunks_.capacity() * sizeof(Place) + (list_.capacity() + sums_.capacity()) * sizeof(std::uint32_t);
+  }
+
+ private:
+  /// Buckets of depth: 16 an octave, from a millimetre on.
+  static constexpr std::size_t kBuckets = 512;
+  static constexpr int kBucketShift = 19;
+  /// Share of the Gaussians in the first slice.
+  static constexpr double kFirst = 0.35;
+
+  /// Bucket of the nearest key, and cells that may be reached.
+  struct Place {
+    std::uint16_t bucket = 0;
+    std::uint16_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+    bool candidate() const noexcept { return x0 < x1; }
+  };
+
+  std::uint32_t key_of_bucket(std::size_t bucket) const noexcept {
+    return base_ + (static_cast<std::uint32_t>(bucket) << kBucketShift);
+  }
+  Place place_of(const ProjectArgs<float>& args, std::size_t c) const noexcept {
+    constexpr int kSize = OpenCells::kSize;
+    const int width = args.camera.width, height = args.camera.height;
+    const auto cells = [](int size) { return static_cast<std::uint16_t>((size + kSize - 1) / kSize); };
+    const std::uint16_t columns = cells(width), rows = cells(height);
+    const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
+    if (!args.gaussians.may_be_seen(args.gaussians.chunk_id(c))) return {};
+    if (bounds.empty()) return {0, 0, 0, columns, rows};
+    const ChunkBounds& chunk = bounds[args.gaussians.chunk_id(c)];
+    if (!may_be_visible(args.camera64, chunk)) return {};
+    const ChunkExtent e = chunk_extent(args.camera64, chunk);
+    // Of what is not finite nothing is known: it lies nearest, everywhere.
+    const auto begin = [](double pixel, int size) {
+      return static_cast<std::uint16_t>((pixel > 0 ? std::min(pixel, static_cast<double>(size)) : 0.0) / kSize);
+    };
+    const auto end = [&cells](double pixel, int size) {
+      return pixel < size ? static_cast<std::uint16_t>((pixel > 0 ? pixel : 0.0) / kSize + 1) : cells(size);
+    };
+    Place place{0, begin(e.x0, width), begin(e.y0, height), end(e.x1, width), end(e.y1, height)};
+    if (place.x0 >= place.x1 || place.y0 >= place.y1) return {0, 0, 0, columns, rows};
+    if (e.nearest > 0) {
+      const std::uint32_t key = bits_of(e.nearest);
+      const std::size_t bucket = key > base_ ? (key - base_) >> kBucketShift : 0;
+      place.bucket = static_cast<std::uint16_t>(std::min(bucket, kBuckets - 1));
+    }
+    return place;
+  }
+
+  std::vector<Place> chunks_;
+  std::vector<std::uint32_t> list_, sums_;
+  std::array<std::size_t, kBuckets> weights_{};
+  std::array<std::size_t, kMost> ends_{};
+  std::uint32_t base_ = bits_of(0.001f);
+  std::size_t candidates_ = 0;
+  int count_ = 1;
+};
+
+}  // namespace gsnav

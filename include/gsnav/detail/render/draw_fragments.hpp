@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/detail/mesh/mesh_fragments.hpp"
+#include "gsnav/detail/render/draw_meshes.hpp"
+
+namespace gsnav {
+
+/// Scratch of `draw_fragments`; grows to the largest frame. Empty while nothing is seen through.
+template <class S, Backend B>
+struct FragmentWorkspace {
+  explicit FragmentWorkspace(B& b) : mesh(b), ranges(b), tile_begin(b), fragments(b) {}
+
+  MeshWorkspace<S, B> mesh;  ///< of its triangles
+  Buffer<FragmentRange, B> ranges;
+  Buffer<std::uint64_t, B> tile_begin;
+  Buffer<MeshFragment<S>, B> fragments;
+
+  std::size_t bytes() const noexcept {
+    return mesh.bytes() + ranges.capacity_bytes() + tile_begin.capacity_bytes() +
+           fragments.capacity_bytes();
+  }
+  std::size_t capacity_bytes() const noexcept { return bytes(); }
+  /// As RenderWorkspace::grow_to.
+  void grow_to(const FragmentWorkspace& o) {
+    mesh.grow_to(o.mesh);
+    ranges.grow_to(o.ranges);
+    tile_begin.grow_to(o.tile_begin);
+    fragments.grow_to(o.fragments);
+  }
+};
+
+/// Whether a frame has surfaces that are seen through.
+inline bool any_seen_through(std::span<const MeshInstance> meshes) noexcept {
+  return std::any_of(meshes.begin(), meshes.end(), detail::seen_through);
+}
+
+/// Lists at each pixel the surfaces that are seen through (MeshAlpha::blend), as many as there are, near
+/// to far, up to the opaque depth `behind` [H][W]. `color`: with their colours, lit as draw_meshes does,
+/// linear where `linear`. Gives the lists to `layer`; they are good until the next call. Adds to
+/// `stats`. `meshes` are those of draw_meshes, which has found them valid. Errors: unsupported (2^32
+/// triangles); backend_failure; out_of_memory is thrown by the workspace.
+template <class S, Backend B>
+Status draw_fragments(B& backend, FragmentWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
+                      const Camera& camera, const MeshLight& light, int tile_size, bool color,
+                      bool linear, const S* behind, MeshLayer<S>& layer, MeshStats& stats) {
+  if (Status s = detail::set_up_meshes(backend, ws.mesh, meshes, camera, true, stats); !s) return s;
+  if (ws.mesh.triangles.size() == 0) return {};
+  FragmentArgs<S> args;
+  args.raster = detail::raster_args(ws.mesh, camera, tile_size);
+  if (Status s = detail::bin_meshes(backend, ws.mesh, args.raster); !s) return s;
+  const std::size_t tiles = args.raster.bin.grid.count();
+  ws.ranges.resize_discard(static_cast<std::size_t>(camera.width) *
+                           static_cast<std::size_t>(camera.height));
+  ws.tile_begin.resize_discard(tiles + 1);
+  args.shade = detail::shade_args(ws.mesh, camera, light);
+  args.behind = behind;
+  args.color = color;
+  args.linear = linear;
+  args.ranges = ws.ranges.view();
+  args.tile_begin = ws.tile_begin.view();
+  backend.parallel_for(tiles, CountFragments<S>{args});
+  backend.parallel_for(1, ScanFragments<S>{args});
+  std::uint64_t count = 0;
+  ws.tile_begin.download(&count, 1, tiles);
+  if (Status s = backend.synchronize(); !s) return s;
+  stats.fragments += count;
+  if (count == 0) return {};
+  ws.fragments.resize_discard(count);
+  args.fragments = ws.fragments.view();
+  backend.parallel_for(tiles, FillFragments<S>{args});
+  layer.ranges = std::as_const(ws.ranges).view();
+  layer.fragments = std::as_const(ws.fragments).view();
+  return {};
+}
+
+}  // namespace gsnav

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <concepts>
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/render/render_composite.hpp"
+
+namespace gsnav {
+
+/// Backends whose batches may be cut by camera: each thread renders whole frames.
+template <class B>
+concept LaneBackend = Backend<B> && is_host_backend<B> && requires(const B& b) {
+  { b.one_thread() } -> std::same_as<B>;
+};
+
+/// One frame of a batch: what it sees, from where, by which rules, and where its images go.
+template <class S>
+struct FrameJob {
+  std::span<const GaussianSet> sets;
+  const Camera* camera = nullptr;
+  const RenderConfig* config = nullptr;
+  FrameImages<S> images;
+  MeshFrame meshes{};
+};
+
+/// Renders batches with one lane a thread: no thread waits for another within a frame. Scratch grows with
+/// threads, not with cameras, and is the same for all lanes, so that a batch like one before it allocates
+/// nothing, whichever lane takes which camera.
+template <class S, LaneBackend B>
+class FrameLanes {
+ public:
+  /// Whether a batch keeps all threads busy for long enough that lanes pay.
+  static bool worth_it(const B& backend, std::size_t cameras) noexcept {
+    return cameras > 1 && cameras >= 2 * concurrency_of(backend);
+  }
+
+  /// render_composite() for each of `count` frames; job_of(c) gives the FrameJob of frame c. The first frame's
+  /// error, by number, is returned; out_of_memory too.
+  template <class JobOf>
+  Status render(B& backend, std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
+    while (lanes_.size() < concurrency_of(backend)) lanes_.push_back(std::make_unique<Lane>(backend));
+    std::mutex mutex;
+    std::size_t failed = count;
+    Status result;
+    backend.parallel_for(count, [&](std::size_t c) {
+      Lane& lane = take();
+      Status s = detail::guarded([&] {
+        const FrameJob<S> job = job_of(c);
+        return render_composite<S, B>(lane.backend, lane.workspace, job.sets, job.meshes, *job.camera, *job.config,
+                                      job.images, &stats[c]);
+      });
+      lane.taken.store(false, std::memory_order_release);
+      if (s.ok()) return;
+      const std::lock_guard lock(mutex);
+      if (c < failed) {
+        failed = c;
+        result = std::move(s);
+      }
+    });
+    if (!result) return result;
+    return detail::guarded([&] { return even_out(); });
+  }
+
+  std::size_t bytes() const noexcept {
+    std::size_t sum = 0;
+    for (const auto& lane : lanes_) sum += lane->workspace.bytes();
+    return sum;
+  }
+
+ private:
+  struct Lane {
+    explicit Lane(const B& b) : backend(b.one_thread()), workspace(backend) {}
+    B backend;
+    RenderWorkspace<S, B> workspace;
+    std::atomic<bool> taken{false};
+  };
+
+  /// A lane that nobody is in: there are as many as threads.
+  Lane& take() noexcept {
+    while (true) {
+      for (const auto& lane : lanes_) {
+        if (!lane->taken.exchange(true, std::memory_order_acquire)) return *lane;
+      }
+      std::this_thread::yield();
+    }
+  }
+
+  Status even_out() {
+    RenderWorkspace<S, B>& most = lanes_.front()->workspace;
+    for (const auto& lane : lanes_) most.grow_to(lane->workspace);
+    for (const auto& lane : lanes_) lane->workspace.grow_to(most);
+    return {};
+  }
+
+  std::vector<std::unique_ptr<Lane>> lanes_;
+};
+
+}  // namespace gsnav

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/core/buffer.hpp"
+#include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/render/depth_slices.hpp"
+#include "gsnav/detail/render/draw_fragments.hpp"
+#include "gsnav/detail/render/draw_meshes.hpp"
+#include "gsnav/detail/render/order_visible.hpp"
+
+namespace gsnav {
+
+/// What one camera's frame was made of.
+struct RenderStats {
+  std::uint64_t gaussians = 0;           ///< in all sets
+  std::uint64_t visible = 0;             ///< whose footprint bounds reach the image, less those found hidden
+  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, less those found hidden by a mesh
+  MeshStats meshes;
+};
+
+/// Scratch of `render_camera`; grows to the largest frame and is then reused.
+template <class S, Backend B>
+struct RenderWorkspace {
+  explicit RenderWorkspace(B& b)
+      : offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b), visible(b), cursors(b),
+        tile_offsets(b), tile_splats(b), spans(b), open(b), states(b), mesh(b), fragments(b), composite(b) {}
+
+  Buffer<Vec3d, B> offsets;
+  Buffer<SplatGeometry<S>, B> geometry;
+  Buffer<SplatColor<S>, B> colors;
+  Buffer<SplatDepth<S>, B> depths;
+  Buffer<SplatPerspective<S>, B> perspectives;
+  Buffer<SplatBounds, B> bounds;
+  VisibleOrder<B> visible;
+  Buffer<std::uint64_t, B> cursors, tile_offsets;
+  Buffer<std::uint32_t, B> tile_splats;
+  Buffer<TileSpans, B> spans;
+  Buffer<std::uint64_t, B> open;  ///< of frames in slices: cells of tiles, and the state of their pixels
+  Buffer<S, B> states;
+  DepthSlices slices;
+  MeshWorkspace<S, B> mesh;
+  FragmentWorkspace<S, B> fragments;
+  Buffer<S, B> composite;  ///< of Composite::hard_depth: what the Gaussians alone have
+  std::vector<Vec3d> host_offsets;
+  std::vector<ProjectArgs<S>> projections;  ///< [sets]
+  ProjectOutputs<S> projected;              ///< of the frame
+
+  std::size_t bytes() const noexcept {
+    std::size_t sum = 0;
+    for_each(*this, *this, [&sum](const auto& own, const auto&) {
+      if constexpr (requires { own.capacity_bytes(); }) sum += own.capacity_bytes();
+    });
+    return sum;
+  }
+  /// Makes room for what the other has room for, so that a frame of either allocates nothing. Drops the content.
+  void grow_to(const RenderWorkspace& o) {
+    for_each(*this, o, [](auto& own, const auto& other) {
+      if constexpr (requires { own.grow_to(other); }) {
+        own.grow_to(other);
+      } else {
+        own.reserve(other.capacity());
+      }
+    });
+  }
+
+ private:
+  template <class A, class C, class F>
+  static void for_each(A& a, C& b, const F& f) {
+    f(a.offsets, b.offsets), f(a.geometry, b.geometry), f(a.colors, b.colors);
+    f(a.depths, b.depths), f(a.perspectives, b.perspectives), f(a.bounds, b.bounds);
+    f(a.cursors, b.cursors), f(a.tile_offsets, b.tile_offsets), f(a.tile_splats, b.tile_splats);
+    f(a.spans, b.spans), f(a.host_offsets, b.host_offsets);
+    f(a.projections, b.projections), f(a.open, b.open), f(a.states, b.states), f(a.slices, b.slices);
+    f(a.mesh, b.mesh), f(a.fragments, b.fragments), f(a.composite, b.composite);
+    VisibleOrder<B>::for_each(a.visible, b.visible, f);
+  }
+};
+
+}  // namespace gsnav

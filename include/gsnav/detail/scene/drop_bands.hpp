@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gsnav/detail/core/huge_pages.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/detail/scene/needed_bands.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
+
+namespace gsnav {
+
+namespace detail {
+
+/// Cuts n rows of bands up to degree `from` to degree `to`, and gives their memory back.
+template <class T>
+void cut_bands(std::vector<T>& bands, std::size_t n, int from, int to) {
+  if (bands.empty()) return;
+  const std::size_t kept = n * sh_band_numbers(to);
+  cut_rows(bands.data(), n, sh_band_numbers(from), sh_band_numbers(to), bands.data());
+  discard_pages(bands.data() + kept, (bands.size() - kept) * sizeof(T));
+  bands = moved_through<T>(bands, kept, [](T v) { return v; });
+}
+
+}  // namespace detail
+
+/// Drops the SH bands above `degree`, in [0, 3]: rows become shorter, and their memory is given back. A
+/// cloud that has fewer stays as it is. Returns how many bytes less it takes.
+inline std::size_t limit_sh_degree(GaussianCloud& cloud, int degree) {
+  if (degree >= cloud.sh_degree) return 0;
+  const std::size_t before = cloud.bytes();
+  detail::cut_bands(cloud.shN, cloud.size(), cloud.sh_degree, degree);
+  detail::cut_bands(cloud.shN_half, cloud.size(), cloud.sh_degree, degree);
+  cloud.sh_degree = degree;
+  return before - cloud.bytes();
+}
+inline std::size_t limit_sh_degree(PackedCloud& cloud, int degree) {
+  GaussianCloud& rest = cloud.rest;
+  if (degree >= rest.sh_degree) return 0;
+  const std::size_t before = cloud.bytes();
+  detail::cut_bands(cloud.shN, cloud.size(), rest.sh_degree, degree);
+  detail::cut_bands(rest.shN, cloud.size(), rest.sh_degree, degree);
+  detail::cut_bands(rest.shN_half, cloud.size(), rest.sh_degree, degree);
+  rest.sh_degree = degree;
+  return before - cloud.bytes();
+}
+
+/// Has the storage of a cloud (GaussianCloud or PackedCloud) follow its profile (profile_scene): bands
+/// that no chunk needs are let go. The profile fits the cloud as before, and says how many bytes that
+/// were. Bands that some chunks need are held for all: docs/lod.md has what storage by chunk would save.
+template <class Cloud>
+void drop_bands(Cloud& cloud, SceneProfile& profile) {
+  profile.bytes_let_go +=
+      limit_sh_degree(cloud, needed_sh_degree(profile.applied_to(cloud.set()).gaussians));
+  const GaussianView v = cloud.view();
+  const std::size_t number = !v.packed.shN.empty() ? 1
+                             : !v.shN_half.empty() ? sizeof(std::uint16_t)
+                                                   : sizeof(float);
+  profile.bytes_unneeded = number * (sh_band_numbers(v.sh_degree) * v.size - profile.sh_numbers_read);
+}
+
+}  // namespace gsnav

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <span>
+#include <string>
+
+#include "gsnav/detail/core/parallel.hpp"
+#include "gsnav/detail/core/pool_backend.hpp"
+#include "gsnav/render/count_culled.hpp"
+#include "gsnav/render/render_config.hpp"
+#include "gsnav/detail/render/render_workspace.hpp"
+#include "gsnav/detail/scene/load_report.hpp"
+#include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/detail/scene/scene_profile.hpp"
+
+namespace gsnav {
+
+/// What a frame left out, put together, limited or rounded, how many, and the bound of each; made when
+/// asked for.
+struct FrameLedger {
+  // Skipped without any change of the image.
+  CullCounts culled;              ///< by chunks out of view or not in the cut
+  std::uint64_t visible = 0;      ///< RenderStats::visible
+  std::uint64_t transparent = 0;  ///< left out when the scene was read: below 1/255 everywhere
+  // Changed.
+  std::uint64_t converted = 0;   ///< Gaussians of sets whose colours are of another space than the frame blends in
+  bool other_order = false;      ///< blended in another order than the scene's file asks for
+  std::uint64_t unseen = 0;      ///< Gaussians left out by a visible set (VisibleSets)
+  double unseen_weight = 0;      ///< of which no viewpoint saw more than this part of a pixel: sampled, no bound
+  LodStats lod;                  ///< zeros where no level of detail was asked for
+  std::uint64_t sh_skipped = 0;  ///< SH coefficients in bands that are not read, held or not
+  double sh_error = 0;           ///< that changes no colour by more
+  std::uint64_t sh_bytes = 0;    ///< what bands that are not held would take
+  std::uint64_t clamped = 0;     ///< Gaussians whose log-scale the reader limited to [-20, 20]
+  double sh_storage_error = 0;   ///< largest change of a coefficient by compact storage
+  double alpha_min = 0;          ///< alphas below are not blended
+  double transmittance_min = 0;  ///< light that still comes through where a pixel ends
+  double alpha_error = 0;        ///< relative, of the profile's exponential
+};
+
+/// Fills a ledger for a frame of `sets` from `camera`, whose counts are `stats`.
+/// `report`, `profile`, `lod`: where there are any. Cuts read all bands that are held.
+inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera& camera,
+                                const RenderConfig& config, const RenderStats& stats,
+                                const LoadReport* report = nullptr,
+                                const SceneProfile* profile = nullptr, const LodCut* lod = nullptr) {
+  FrameLedger out;
+  std::size_t rows = 0;
+  for (const GaussianSet& set : sets) {
+    rows += set.gaussians.size;
+    if (set.color_space != config.blend_space) out.converted += set.gaussians.size;
+  }
+  out.other_order = report != nullptr && report->sort_order != config.sort_order;
+  PoolBackend backend(threads_for(rows));
+  out.culled = count_culled(backend, sets, camera, config);
+  out.visible = stats.visible;
+  out.alpha_min = config.alpha_min;
+  out.transmittance_min = config.transmittance_min;
+  // See Profile: what exp2 by a cubic, and by a quintic, is off by.
+  out.alpha_error = config.profile == Profile::exact ? 4e-7 : 1.0e-4;
+  if (report != nullptr) {
+    out.transparent = report->dropped_transparent;
+    out.clamped = report->clamped_scales;
+    out.sh_storage_error = report->sh_storage_error;
+    out.sh_bytes = report->sh_bytes_let_go;
+  }
+  if (profile != nullptr) {
+    if (lod == nullptr) out.sh_skipped = profile->sh_numbers - profile->sh_numbers_read;
+    if (out.sh_skipped != 0 || profile->bytes_let_go != 0) out.sh_error = profile->color_error;
+    out.sh_bytes += profile->bytes_let_go;
+  }
+  if (lod != nullptr) out.lod = lod->stats();
+  return out;
+}
+
+/// The ledger as text for people, one thing a line, each ended.
+inline std::string ledger_text(const FrameLedger& l) {
+  std::string out;
+  const auto line = [&out](const char* format, auto... values) {
+    char text[260];
+    std::snprintf(text, sizeof text, format, values...);
+    out += text;
+    out += '\n';
+  };
+  const auto count = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
+  const auto share = [](std::uint64_t a, std::uint64_t b) {
+    return b == 0 ? 0.0 : 100.0 * static_cast<double>(a) / static_cast<double>(b);
+  };
+  const CullCounts& n = l.culled;
+  line(
+      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% of what could "
+      "be); "
+      "%llu touched, %.2f for each that reaches a tile; %llu drawn",
+      count(n.removed()), count(n.rows), share(n.removed(), n.rows), share(n.removed(), n.removable()),
+      count(n.touched), n.touched_per_emitting(), count(l.visible));
+  if (l.transparent != 0)
+    line("skipped, same bits: %llu Gaussians below 1/255 everywhere", count(l.transparent));
+  if (l.sh_skipped != 0) {
+    line("skipped: %llu SH coefficients; no colour changes by more than %.2g", count(l.sh_skipped),
+         l.sh_error);
+  }
+  if (l.sh_bytes != 0) {
+    line("not held: SH bands of %llu bytes; no colour changes by more than %.2g", count(l.sh_bytes),
+         l.sh_error);
+  }
+  if (l.unseen != 0) {
+    line("left out: %llu Gaussians of which, and of those beside them, no viewpoint in or near the camera's cell sees more "
+         "than %.1g of a pixel; sampled, not proved",
+         count(l.unseen), l.unseen_weight);
+  }
+  if (l.lod.shown != 0) {
+    line(
+        "merged: %llu of %llu Gaussians in view, drawn as %llu in all; off by %.2f px root mean square "
+        "at most",
+        count(l.lod.merged), count(l.lod.shown), count(l.lod.drawn), l.lod.error_px);
+  }
+  if (l.converted != 0) line("converted: the colours of %llu Gaussians to the frame's space", count(l.converted));
+  if (l.other_order)
+    line("order: %s", "not the one that the scene's file asks for (depth, or distance from the camera)");
+  if (l.clamped != 0) line("clamped: %llu log-scales to [-20, 20]", count(l.clamped));
+  if (l.sh_storage_error > 0) line("quantised: SH coefficients, by %.2g at most", l.sh_storage_error);
+  line("cut: alphas below %.4f, a Gaussian and pixel; %.4f of the light behind a closed pixel",
+       l.alpha_min, l.transmittance_min);
+  line("rounded: the exponential of each alpha, by %.1g relative", l.alpha_error);
+  return out;
+}
+
+}  // namespace gsnav

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gsnav/skin/lbs.hpp"
+#include "gsnav/detail/math/dual_quat.hpp"
+#include "gsnav/detail/math/svd.hpp"
+
+// Skinning by other than linear blending with the rotation alone: modes of an asset, apart from the kernel that most
+// use (skin/lbs.hpp).
+
+namespace gsnav {
+
+/// Bounds of the stretch of a Gaussian along any direction.
+inline constexpr double kLeastStretch = 0.5, kGreatestStretch = 2.0;
+
+/// Dual quaternion blending of one Gaussian (Kavan et al. 2007, "Skinning with dual quaternions", DLB). `blend`: sum
+/// over the influences of weight * dual quaternion of the joint, each with the sign that puts its real part on the
+/// side of the first's. The body keeps its width where it twists and bulges outside of elbows. Joints that differ
+/// by a translation give what linear blending gives.
+template <class L>
+GSNAV_HD Skinned<L> skin(const DualQuat<L>& blend, const Vec3<L>& mean, const Quat<L>& quat) noexcept {
+  Skinned<L> out;
+  const L one(scalar_of<L>(1));
+  out.rotation = blend.real * (one / sqrt(dot(blend.real, blend.real)));
+  const Vec3<L> t = translation_of(blend);
+  const Mat3<L> turn = rotation_matrix(out.rotation);
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<L>& r = turn.row[i];
+    out.mean[i] = fma(r.z, mean.z, fma(r.y, mean.y, fma(r.x, mean.x, t[i])));
+  }
+  const Quat<L> turned = out.rotation * quat;
+  out.quat = turned * (one / sqrt(dot(turned, turned)));
+  return out;
+}
+
+/// m with its singular values held within [kLeastStretch, kGreatestStretch], as that of a body that does not
+/// fold over: a negative one counts as the least. What lies within is m itself, bit for bit.
+template <class S>
+GSNAV_HD Mat3<S> clamped_stretch(const Mat3<S>& m) noexcept {
+  // Most Gaussians are hardly stretched. With |m^T m - 1| < 0.75 no singular value is outside.
+  const Vec3<S> a = m.column(0), b = m.column(1), c = m.column(2);
+  const S aa = dot(a, a) - S(1), bb = dot(b, b) - S(1), cc = dot(c, c) - S(1);
+  const S ab = dot(a, b), ac = dot(a, c), bc = dot(b, c);
+  const S off = fma(ab, ab, fma(ac, ac, bc * bc));
+  if (fma(aa, aa, fma(bb, bb, fma(cc, cc, off + off))) < S(0.5625) && determinant(m) > S(0)) return m;
+  const Svd3<S> d = svd(m);
+  const S least(static_cast<S>(kLeastStretch)), greatest(static_cast<S>(kGreatestStretch));
+  if (d.values[2] >= least && d.values[0] <= greatest) return m;
+  Mat3<S> out;
+  for (int k = 0; k < 3; ++k) {
+    const S value = clamp(d.values[k], least, greatest);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) out(i, j) = fma(value * d.left[k][i], d.right[k][j], k == 0 ? S(0) : out(i, j));
+    }
+  }
+  return out;
+}
+
+namespace detail {
+
+template <class S, class Out>
+GSNAV_HD Vec3<S> canonical_mean(const SkinningArgs<S, Out>& args, std::size_t i) noexcept {
+  return {S(args.means[0][i]), S(args.means[1][i]), S(args.means[2][i])};
+}
+template <class S, class Out>
+GSNAV_HD Quat<S> canonical_quat(const SkinningArgs<S, Out>& args, std::size_t i) noexcept {
+  return {S(args.quats[0][i]), S(args.quats[1][i]), S(args.quats[2][i]), S(args.quats[3][i])};
+}
+
+}  // namespace detail
+
+/// Skins Gaussian i by dual quaternions.
+template <class S, class Out = float>
+struct SkinGaussianDual {
+  SkinningArgs<S, Out> args;
+
+  /// What skin() wants, of Gaussian i. Its length is at least the greatest weight.
+  GSNAV_HD DualQuat<S> blend(std::size_t i) const noexcept {
+    const std::size_t row = static_cast<std::size_t>(args.influences);
+    const std::uint16_t* const indices = args.joint_indices.data + row * i;
+    const std::uint16_t* const parts = args.weights.data + row * i;
+    const DualQuat<S> first = args.dual_joints[indices[0]];
+    const S w0 = skinning_weight<S>(parts[0]);
+    DualQuat<S> sum{first.real * w0, first.dual * w0};
+    for (std::size_t k = 1; k < row; ++k) {
+      const DualQuat<S>& q = args.dual_joints[indices[k]];
+      const S w = skinning_weight<S>(parts[k]), signed_w = select(dot(q.real, first.real) < S(0), -w, w);
+      sum = {sum.real + q.real * signed_w, sum.dual + q.dual * signed_w};
+    }
+    return sum;
+  }
+  GSNAV_HD void operator()(std::size_t i) const noexcept {
+    store_skinned(args, i, skin(blend(i), detail::canonical_mean(args, i), detail::canonical_quat(args, i)));
+  }
+};
+
+/// Skins Gaussian i linearly and stretches it as the skin is: its shape goes through the derivative of the position
+/// by the canonical position, F = sum_k w_k A_k + sum_k (A_k p + t_k) grad(w_k)^T, whose singular values are
+/// clamped (clamped_stretch), instead of through a rotation. Means, quats and rotations are those of SkinGaussian.
+template <class S, class Out = float>
+struct SkinGaussianStretched {
+  SkinningArgs<S, Out> args;
+
+  GSNAV_HD void operator()(std::size_t i) const noexcept {
+    SkinGaussian<S, Out>{args}(i);
+    const std::size_t row = static_cast<std::size_t>(args.influences);
+    const std::uint16_t* const indices = args.joint_indices.data + row * i;
+    const std::uint16_t* const parts = args.weights.data + row * i;
+    const float* gradient = args.weight_gradients.data + 3 * (row - 1) * i;
+    const Vec3<S> mean = detail::canonical_mean(args, i);
+    const Affine3<S>& first = args.joints[indices[0]];
+    const Vec3<S> place = first * mean;
+    Mat3<S> f = first.linear * skinning_weight<S>(parts[0]);
+    for (std::size_t k = 1; k < row; ++k, gradient += 3) {
+      const Affine3<S>& joint = args.joints[indices[k]];
+      const S w = skinning_weight<S>(parts[k]);
+      // Gradients of all weights add up to none: the first's is minus the sum of the others.
+      const Vec3<S> apart = joint * mean - place, g{S(gradient[0]), S(gradient[1]), S(gradient[2])};
+      for (int r = 0; r < 3; ++r) f.row[r] = f.row[r] + joint.linear.row[r] * w + g * apart[r];
+    }
+    const Mat3<S> axes = clamped_stretch(f) * rotation_matrix(detail::canonical_quat(args, i));
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) {
+        args.axes_out[3 * r + c][i] = static_cast<Out>(axes(r, c) * S(args.scales[c][i]));
+      }
+    }
+  }
+};
+
+}  // namespace gsnav
