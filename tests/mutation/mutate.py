@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Shows that the tests would notice: puts naive formulas back, one at a time, and runs what must fail.
+"""Mutation tests: seeds one fault at a time into a copy of the sources and runs the test cases that must fail.
 
-    tools/planted_regressions.py [--list | --check] [--only NAME ...] [--scratch DIR] [--cxx COMPILER] [--jobs N]
+    tests/mutation/mutate.py [--list | --check] [--only NAME ...] [--scratch DIR] [--cxx COMPILER] [--jobs N]
 
-The tree is copied; the original is never touched. A plant needs one translation unit of tests, header-only
-with OpenMP, the sources of what that includes of tests/, and of the libraries at most the few files that it
-names, so nothing is built before. First every
-test case named must pass as the source is; then each plant's must fail. Exit status: 0 all caught, 1 one
-missed, 2 nothing could be said (a text to replace is not there once, a plant does not compile, a case fails
-unplanted). --check only looks whether each text to replace is there once: a second, and a test of every build.
+A fault names a function, the tokens to replace in it, and test cases. Each needs one translation unit of tests,
+header-only with OpenMP, the sources of what that includes of tests/, and at most the few library files that it
+names, so nothing is built before. First every named case must pass on the sources as they are; then the cases of
+each fault must fail. Exit status: 0 all faults are caught, 1 one is missed, 2 no verdict (the tokens do not stand
+in the function exactly once, a fault does not compile, a case fails without a fault). --check only looks whether
+each fault has its place: a second, and a test of every build.
 """
 import argparse
 import concurrent.futures
@@ -23,9 +23,11 @@ import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tools"))
-import planted  # noqa: E402
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE))
+import faults as fault_lists  # noqa: E402
+from sources import Sources  # noqa: E402
 
 FLAGS = ["-std=c++20", "-O1", "-ffp-contract=off", "-fopenmp", "-w", "-Iinclude", "-Ibackends/serial",
          "-Ibackends/openmp", "-Itests", "-Isrc/io", '-DGSNAV_DATA_DIR="/nonexistent"']
@@ -33,13 +35,13 @@ FOLDERS = ("include", "backends", "src", "tests")
 CASE_TIMEOUT_S = 600
 
 
-def all_plants():
-    plants = []
-    for module in sorted(m.name for m in pkgutil.iter_modules(planted.__path__)):
-        plants += importlib.import_module(f"planted.{module}").PLANTS
-    names = [p.name for p in plants]
-    assert len(names) == len(set(names)), "two plants of one name"
-    return plants
+def all_faults():
+    faults = []
+    for module in sorted(m.name for m in pkgutil.iter_modules(fault_lists.__path__)):
+        faults += importlib.import_module(f"faults.{module}").FAULTS
+    names = [f.name for f in faults]
+    assert len(names) == len(set(names)), "two faults of one name"
+    return faults
 
 
 def copy_tree(to):
@@ -69,7 +71,7 @@ def sources_beside(tree, source):
             seen.add(header)
             queue.append(header)
             beside = header.with_suffix(".cpp")
-            if header.is_relative_to(tree / "include/gsnav/avatar"):
+            if header.parent.name == "avatar" and header.is_relative_to(tree / "include"):
                 beside = tree / "src/avatar" / beside.name
             elif not any(header.is_relative_to(tree / d) for d in ("tests", "src/avatar")):
                 continue
@@ -96,9 +98,9 @@ class Bench:
     def run(self, command, cwd=None, **kwargs):
         return subprocess.run(command, cwd=cwd or self.tree, text=True, capture_output=True, **kwargs)
 
-    def build(self, plant, binary, tree=None):
-        """Its test, planted or not. Returns what the compiler said, or nothing."""
-        sources = [plant.source, *sources_beside(self.tree, plant.source), *plant.more]
+    def build(self, fault, binary, tree=None):
+        """Its test, with the fault or without. Returns what the compiler said, or nothing."""
+        sources = [fault.source, *sources_beside(self.tree, fault.source), *fault.more]
         done = self.run([self.cxx, *FLAGS, *sources, str(self.main), "-o", str(binary)], cwd=tree)
         return "" if done.returncode == 0 else done.stderr.strip() or "the compiler failed"
 
@@ -115,53 +117,59 @@ class Bench:
         return "failed" if done.returncode == 1 else f"ended by {done.returncode}"
 
 
-def misplaced(tree, plant):
-    """A text of the plant that is not there once, or nothing."""
-    for e in plant.edits:
-        found = (tree / e.file).read_text().count(e.old)
-        if found != 1:
-            return f"{e.file} holds {found} times: {e.old.strip().splitlines()[0]}"
+def place_of(sources, edit):
+    """(file, begin, end) of the tokens to replace, or why there is no such place."""
+    found = sources.find(edit.function, edit.old)
+    if len(found) == 1:
+        return found[0], ""
+    return None, f"{edit.function} holds {len(found)} times: {edit.old.strip().splitlines()[0]}"
+
+
+def misplaced(sources, fault):
+    """Why an edit of the fault has no place, or nothing."""
+    return next((why for e in fault.edits if (why := place_of(sources, e)[1])), "")
+
+
+def apply(tree, fault):
+    for e in fault.edits:
+        place, why = place_of(Sources(tree), e)
+        if why:
+            return why
+        file, begin, end = place
+        text = file.read_text()
+        file.write_text(text[:begin] + e.new.strip() + text[end:])
     return ""
 
 
-def apply(tree, plant):
-    if wrong := misplaced(tree, plant):
-        return wrong
-    for e in plant.edits:
-        path = tree / e.file
-        path.write_text(path.read_text().replace(e.old, e.new))
-    return ""
-
-
-def check_plant(bench, plant, scratch):
+def check_fault(bench, fault, scratch):
     """Returns (verdict, remark)."""
-    tree = scratch / plant.name
+    tree = scratch / fault.name
     shutil.copytree(bench.tree, tree)
     try:
-        if wrong := apply(tree, plant):
+        if wrong := apply(tree, fault):
             return "BROKEN", wrong
-        binary = scratch / f"{plant.name}.bin"
-        if said := bench.build(plant, binary, tree):
+        binary = scratch / f"{fault.name}.bin"
+        if said := bench.build(fault, binary, tree):
             return "BROKEN", "does not compile: " + next((l for l in said.splitlines() if "error" in l), said)
-        missed = [c for c in plant.cases if not bench.fails(binary, c)]
+        missed = [c for c in fault.cases if not bench.fails(binary, c)]
         binary.unlink()
-        return ("MISSED", ", ".join(missed)) if missed else ("caught", ", ".join(plant.cases))
+        return ("MISSED", ", ".join(missed)) if missed else ("caught", ", ".join(fault.cases))
     finally:
         shutil.rmtree(tree)
 
 
-def check_unplanted(bench, plants, scratch, pool):
-    """Every case that a plant must fail passes as it is. Returns what does not."""
+def check_unchanged(bench, faults, scratch, pool):
+    """Every case that a fault must fail passes on the unchanged sources. Returns what does not."""
     def check(some):
         source = some[0].source
         binary = scratch / (source.replace("/", "_") + ".bin")
         if said := bench.build(some[0], binary):
             return [f"{source} does not compile: {said.splitlines()[0]}"]
         cases = sorted({c for p in some for c in p.cases})
-        return [f"{source}: {c}: {how} without a plant" for c in cases if (how := bench.fails(binary, c))]
+        return [f"{source}: {c}: {how} without a fault" for c in cases if (how := bench.fails(binary, c))]
 
     by_source = {}
-    for p in plants:
+    for p in faults:
         by_source.setdefault(p.source, []).append(p)
         assert p.more == by_source[p.source][0].more, f"{p.source} is compiled in two ways"
     return sum(pool.map(check, by_source.values()), [])
@@ -176,31 +184,32 @@ def main():
     parser.add_argument("--cxx", default=os.environ.get("CXX", "c++"))
     parser.add_argument("--jobs", type=int, default=1)
     args = parser.parse_args()
-    plants = [p for p in all_plants() if not args.only or p.name in args.only]
+    faults = [p for p in all_faults() if not args.only or p.name in args.only]
     if args.list:
-        for p in plants:
+        for p in faults:
             print(f"{p.name:32} {p.source}: {', '.join(p.cases)}")
         return 0
     if args.check:
-        wrong = [f"{p.name}: {w}" for p in plants if (w := misplaced(ROOT, p))]
-        print("\n".join(wrong) or f"{len(plants)} plants have their place")
+        sources = Sources(ROOT)
+        wrong = [f"{f.name}: {w}" for f in faults if (w := misplaced(sources, f))]
+        print("\n".join(wrong) or f"{len(faults)} faults have their place")
         return 2 if wrong else 0
-    if not plants:
-        parser.error("no plant of that name")
+    if not faults:
+        parser.error("no fault of that name")
     verdicts = []
     with tempfile.TemporaryDirectory(dir=args.scratch) as folder, \
             concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
         scratch = pathlib.Path(folder)
         bench = Bench(scratch, args.cxx)
-        if wrong := check_unplanted(bench, plants, scratch, pool):
+        if wrong := check_unchanged(bench, faults, scratch, pool):
             print("\n".join(wrong))
             return 2
-        print(f"{len({(p.source, c) for p in plants for c in p.cases})} test cases pass unplanted", flush=True)
-        found = pool.map(lambda p: check_plant(bench, p, scratch), plants)
-        for p, (verdict, remark) in zip(plants, found):
+        print(f"{len({(p.source, c) for p in faults for c in p.cases})} test cases pass without a fault", flush=True)
+        found = pool.map(lambda p: check_fault(bench, p, scratch), faults)
+        for p, (verdict, remark) in zip(faults, found):
             verdicts.append(verdict)
             print(f"{p.name:32} {verdict:7} {remark}", flush=True)
-    print(f"{verdicts.count('caught')} of {len(plants)} caught")
+    print(f"{verdicts.count('caught')} of {len(faults)} caught")
     return 2 if "BROKEN" in verdicts else 1 if "MISSED" in verdicts else 0
 
 

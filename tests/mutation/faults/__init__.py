@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Seeded faults, and the test cases that must notice them (tests/mutation/mutate.py).
+
+Each module here has a list FAULTS. The tokens to replace stand once in the function, whatever its file.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Edit:
+    function: str  # or struct or constant; "Outer::inner" where `inner` alone says too little
+    old: str       # tokens that stand in it exactly once
+    new: str
+
+
+@dataclass(frozen=True)
+class Fault:
+    name: str
+    edits: tuple[Edit, ...]
+    source: str             # the test's translation unit, relative to the source tree
+    cases: tuple[str, ...]  # doctest cases in it; each must fail
+    why: str = ""
+    more: tuple[str, ...] = ()  # compiled with it: what the test needs of the libraries
+
+
+def fault(name: str, function: str, old: str, new: str, source: str, *cases: str, why: str = "",
+          more: tuple[str, ...] = ()) -> Fault:
+    """The usual kind: one edit."""
+    return Fault(name, (Edit(function, old, new),), source, cases, why, more)

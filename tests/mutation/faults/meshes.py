@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Naive ways of drawing meshes, and of putting them among Gaussians (docs/composition.md)."""
+from . import fault
+
+MESH = "tests/ops/test_mesh.cpp"
+CASES = "tests/hard_cases/test_composite.cpp"
+PANES = "tests/hard_cases/test_fragments.cpp"
+
+FAULTS = [
+    fault("mesh_edges_of_both", "of", "(owns ? 0 : 1)", "0", MESH, "triangles that share edges own each pixel once",
+          why="a centre on an edge belongs to both triangles"),
+    fault("mesh_edges_of_none", "of", "(owns ? 0 : 1)", "1", MESH, "triangles that share edges own each pixel once",
+          why="a centre on an edge belongs to neither triangle"),
+    fault("mesh_affine_depth", "interpolate_triangle", "out.inverse_z = plane(per_depth);", "out.inverse_z.value = 1.0 / z_max;", MESH,
+          "planes: depth in closed form, from a centimetre to the horizon"),
+    fault("mesh_sliver_depth", "inverse_z_at", "clamp(plane, t.inverse_z_min, t.inverse_z_max)", "plane", MESH,
+          "slivers and needles keep the depth of their corners"),
+    fault("mesh_no_near_clip", "distance", "case 0: return p.z - near_plane;", "case 0: return p.z - 1e-9;", MESH,
+          "random triangles, also huge ones and behind the camera: what a ray tracer in long double meets"),
+    fault("mesh_ignored", "alpha_before_mesh", "(ray_depth(depth, px, py) > mesh)", "(ray_depth(depth, px, py) > mesh + L(S(1e9)))",
+          CASES, "N49_mesh_between_layers", "N50_mesh_straddle_cloud", why="Gaussians behind a mesh are seen"),
+    fault("mesh_by_centres", "alpha_before_mesh", "(ray_depth(depth, px, py) > mesh)", "(L(depth.z) > mesh)", CASES,
+          "N50_mesh_straddle_cloud", "N51_avatar_touching_wall", why="one depth a splat, wherever the ray meets it"),
+    fault("fragment_by_centres", "blend_within", "return z > far || z <= near ? S(0) : alpha;",
+          "return depth.z > far || depth.z <= near ? S(0) : alpha;", PANES, "N73_pane_cuts_splats", "N74_panes_any",
+          why="a pane is before or behind a whole splat"),
+    fault("fragments_unsorted", "insert", "i > 0 && list[i - 1].depth > f.depth", "false", PANES,
+          "N71_panes_between_layers", "N74_panes_any", "N76_many_panes"),
+    fault("fragments_behind", "for_each_fragment", "z <= args.behind[pixel] && ", "", PANES, "N71_panes_between_layers"),
+    fault("mask_ignored", "mesh_hole", "return t.masked && surface_hole", "return false && surface_hole", PANES,
+          "holes that a mask cuts", "N74_panes_any"),
+    fault("mesh_leaves_alpha", "blend_surface", "state.transmittance = select(state.transmittance < L(S(0)), -after, after);", "",
+          CASES,
+          "N49_mesh_between_layers"),
+    fault("mesh_cull_by_centre", "hides", "depths[splat].z - depths[splat].reach > tile_far[tile]",
+          "depths[splat].z > tile_far[tile]", CASES, "N53_tile_max_mesh_cull"),
+    fault("mesh_chunk_without_reach", "nearest", "* (1 - 1e-6) - reach * (1 + 1e-5);",
+          "+ reach;", CASES, "N53_tile_max_mesh_cull of chunks, before they are projected"),
+]
