@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in one row.
+// Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in
+// one row.
 //
-//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256] [--compact] [--balls 8]
+//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256]
+//   [--compact] [--balls 8]
 //       [--rgb] [--visible] [--visible-rows 8] [--visible-weight 0.001] [batch sizes...]
 //
 // Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of
 // views repeats them from slightly different places. Times are the device's, between events on the
 // stream; `host us` is how long the call takes that asks for them. --balls: so many meshes of 4000
-// triangles stand before the first cameras, seen by all. --rgb: colours alone, as most renderers have them, no depth
-// (its error is nan) and no alpha. --visible: each camera draws only what is seen from its cell (VisibleSettings::rows, min_weight); the
-// images of all views are compared with those of all that is there.
+// triangles stand before the first cameras, seen by all. --rgb: colours alone, as most renderers have
+// them, no depth (its error is nan) and no alpha. --visible: each camera draws only what is seen from
+// its cell (VisibleSettings::rows, min_weight); the images of all views are compared with those of all
+// that is there.
 #include <cuda_runtime.h>
 
 #include <algorithm>
@@ -49,7 +52,8 @@ SurfaceMesh ball() {
   for (std::uint32_t i = 0; i <= kDown; ++i) {
     for (std::uint32_t j = 0; j <= kAround; ++j) {
       const double polar = kPi * i / kDown, turn = 2 * kPi * j / kAround;
-      const Vec3d at{std::sin(polar) * std::cos(turn), std::cos(polar), std::sin(polar) * std::sin(turn)};
+      const Vec3d at{std::sin(polar) * std::cos(turn), std::cos(polar),
+                     std::sin(polar) * std::sin(turn)};
       m.geometry.vertices.push_back(vec_cast<float>(at));
       m.normals.push_back(vec_cast<float>(at));
       if (i == kDown || j == kAround) continue;
@@ -61,7 +65,8 @@ SurfaceMesh ball() {
   return m;
 }
 
-/// `count` cameras from `first` on: the views, and when they are all taken the views moved by centimetres.
+/// `count` cameras from `first` on: the views, and when they are all taken the views moved by
+/// centimetres.
 std::vector<BatchCamera> cameras_of(std::size_t first, std::size_t count) {
   const std::vector<Camera> views = gsnav_bench::sized(g_width, g_height);
   std::vector<BatchCamera> batch;
@@ -148,21 +153,24 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   std::vector<double> depth_truth;
   cuda.copy(rgb.data(), out.images.floats.rgb, rgb.size() * sizeof(float), CopyKind::device_to_host);
   if (!g_rgb_alone)
-    cuda.copy(depth.data(), out.images.floats.median_depth, depth.size() * sizeof(float), CopyKind::device_to_host);
+    cuda.copy(depth.data(), out.images.floats.median_depth, depth.size() * sizeof(float),
+              CopyKind::device_to_host);
   cuda.synchronize().throw_if_error();
   for (std::size_t i = 0; i < depth.size(); ++i) {
     if (g_rgb_alone || truth.alpha[i] <= 0.9) continue;
     depth_seen.push_back(depth[i]);
     depth_truth.push_back(truth.median_depth[i]);
   }
-  const std::vector<double> rgb_truth(truth.rgb.begin(), truth.rgb.begin() + static_cast<std::ptrdiff_t>(rgb.size()));
+  const std::vector<double> rgb_truth(truth.rgb.begin(),
+                                      truth.rgb.begin() + static_cast<std::ptrdiff_t>(rgb.size()));
   const gsnav_bench::Error e = gsnav_bench::error_of(rgb, rgb_truth);
   std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f  %.1e  %9.0f  %8.1f  %7.1f\n",
-              profile == Profile::fast ? "fast" : "exact", count, gsnav_bench::median(ms), gsnav_bench::quantile(ms, 0.9),
-              1000.0 / gsnav_bench::median(ms), e.max, e.p999, e.psnr,
-              g_rgb_alone ? std::numeric_limits<double>::quiet_NaN() : gsnav_bench::error_of(depth_seen, depth_truth).p99,
-              pairs / static_cast<double>(ms.size() * count), static_cast<double>(renderer.stats().scratch_bytes) / 1e6,
-              gsnav_bench::median(host_us));
+              profile == Profile::fast ? "fast" : "exact", count, gsnav_bench::median(ms),
+              gsnav_bench::quantile(ms, 0.9), 1000.0 / gsnav_bench::median(ms), e.max, e.p999, e.psnr,
+              g_rgb_alone ? std::numeric_limits<double>::quiet_NaN()
+                          : gsnav_bench::error_of(depth_seen, depth_truth).p99,
+              pairs / static_cast<double>(ms.size() * count),
+              static_cast<double>(renderer.stats().scratch_bytes) / 1e6, gsnav_bench::median(host_us));
   std::fflush(stdout);
   cudaEventDestroy(begin);
   cudaEventDestroy(end);
@@ -193,13 +201,15 @@ void compare_visible(CudaBackend& cuda, const GaussianArrays<CudaBackend>& array
       cuda.copy(rgb[with].data(), there.data(), values * sizeof(float), CopyKind::device_to_host);
       cuda.synchronize().throw_if_error();
     }
-    const gsnav_bench::Error e = gsnav_bench::error_of(rgb[1], std::vector<double>(rgb[0].begin(), rgb[0].end()));
+    const gsnav_bench::Error e =
+        gsnav_bench::error_of(rgb[1], std::vector<double>(rgb[0].begin(), rgb[0].end()));
     least = std::min(least, e.psnr);
     worst = std::max(worst, e.max);
     sum += std::pow(10.0, -0.1 * e.psnr);
   }
-  std::printf("with visible sets beside without, %zu views: least %.1f dB, of all %.1f dB, largest error %.1e\n", views,
-              least, -10 * std::log10(sum / static_cast<double>(views)), worst);
+  std::printf(
+      "with visible sets beside without, %zu views: least %.1f dB, of all %.1f dB, largest error %.1e\n",
+      views, least, -10 * std::log10(sum / static_cast<double>(views)), worst);
 }
 
 }  // namespace
@@ -211,7 +221,8 @@ int main(int argc, char** argv) {
   std::size_t balls = 0;
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--size" && i + 1 < argc) {
-      if (std::sscanf(argv[++i], "%dx%d", &g_width, &g_height) == 2 && g_width > 0 && g_height > 0) continue;
+      if (std::sscanf(argv[++i], "%dx%d", &g_width, &g_height) == 2 && g_width > 0 && g_height > 0)
+        continue;
     } else if (std::string(argv[i]) == "--compact") {
       compact = true;
       continue;
@@ -237,7 +248,8 @@ int main(int argc, char** argv) {
       }
     }
     std::fprintf(stderr,
-                 "bench_batch: '%s' is no size (256x256), batch size, --compact, --rgb, --visible, --visible-rows, "
+                 "bench_batch: '%s' is no size (256x256), batch size, --compact, --rgb, --visible, "
+                 "--visible-rows, "
                  "--visible-weight or --balls\n",
                  argv[i]);
     return 2;
@@ -270,10 +282,13 @@ int main(int argc, char** argv) {
   reference.set_meshes(here);
   const Frames<double> truth = reference.render(sets, cameras).value();
   std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB%s%s, %zu meshes\n", cuda.device_name().c_str(),
-              gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), g_width, g_height,
-              g_rgb_alone ? "" : " + alpha + median depth", compact ? ", SH in half precision" : "", balls);
+              gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), g_width,
+              g_height, g_rgb_alone ? "" : " + alpha + median depth",
+              compact ? ", SH in half precision" : "", balls);
   if (visible) compare_visible(cuda, arrays);
-  std::printf("profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  scratch MB  host us\n");
+  std::printf(
+      "profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  "
+      "scratch MB  host us\n");
   if (counts.empty()) counts = {1, 8, 64, 256, 512};
   for (const Profile profile : {Profile::fast, Profile::exact}) {
     for (const std::size_t count : counts) row(cuda, arrays, truth, count, profile);

@@ -4,11 +4,11 @@
 //   bench_composite [WIDTHxHEIGHT]
 //   GSNAV_BENCH_SCENE and GSNAV_BENCH_CAMERAS as for bench_render
 //
-// Before each view stands a ball of triangles, 2 m away: what a sensor that meets furniture sees. `alone`: the frame
-// without meshes; `meshes`: without Gaussians; `glass`: the balls seen through, front and back, whose errors
-// tests/hard_cases has; `hard_depth`: Habitat-GS's rule on the same scene. Errors are the worst of the views; median_ms
-// is over views, each by its median, from call to images in host memory; pairs of (tile, Gaussian) are means. On a GPU
-// too, where there is one.
+// Before each view stands a ball of triangles, 2 m away: what a sensor that meets furniture sees.
+// `alone`: the frame without meshes; `meshes`: without Gaussians; `glass`: the balls seen through, front
+// and back, whose errors tests/hard_cases has; `hard_depth`: Habitat-GS's rule on the same scene. Errors
+// are the worst of the views; median_ms is over views, each by its median, from call to images in host
+// memory; pairs of (tile, Gaussian) are means. On a GPU too, where there is one.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -46,8 +46,11 @@ SurfaceMesh ball(std::uint32_t around, std::uint32_t down) {
     for (std::uint32_t j = 0; j < around; ++j) {
       const double polar = pi * i / down, turn = 2 * pi * j / around;
       const double r = 0.35 * (1 + 0.1 * std::sin(6 * turn) * std::sin(5 * polar));
-      m.geometry.vertices.push_back(vec_cast<float>(Vec3d{std::sin(polar) * std::cos(turn), std::cos(polar), std::sin(polar) * std::sin(turn)} * r));
-      m.colors.push_back(vec_cast<float>(Vec3d{0.5 + 0.4 * std::sin(3 * turn), 0.4, 0.5 + 0.4 * std::cos(4 * polar)}));
+      m.geometry.vertices.push_back(vec_cast<float>(
+          Vec3d{std::sin(polar) * std::cos(turn), std::cos(polar), std::sin(polar) * std::sin(turn)} *
+          r));
+      m.colors.push_back(
+          vec_cast<float>(Vec3d{0.5 + 0.4 * std::sin(3 * turn), 0.4, 0.5 + 0.4 * std::cos(4 * polar)}));
     }
   }
   for (std::uint32_t i = 0; i < down; ++i) {
@@ -81,10 +84,12 @@ void print_rows(B& backend, const std::string& where, const Shown& shown) {
   const GaussianSet set = arrays.set();
   const MeshArrays<B> mesh(backend, shown.scene.view(0));
   std::vector<MeshInstance> instances;
-  for (const MeshInstance& i : shown.instances) instances.push_back(mesh.instance(i.world_from_mesh, i.id));
-  for (const Row& row : {Row{"alone", true, false, Composite::merged}, Row{"meshes", false, true, Composite::merged},
-                         Row{"merged", true, true, Composite::merged}, Row{"glass", true, true, Composite::merged, true},
-                         Row{"hard_depth", true, true, Composite::hard_depth}}) {
+  for (const MeshInstance& i : shown.instances)
+    instances.push_back(mesh.instance(i.world_from_mesh, i.id));
+  for (const Row& row :
+       {Row{"alone", true, false, Composite::merged}, Row{"meshes", false, true, Composite::merged},
+        Row{"merged", true, true, Composite::merged}, Row{"glass", true, true, Composite::merged, true},
+        Row{"hard_depth", true, true, Composite::hard_depth}}) {
     RenderConfig config;
     config.composite = row.composite;
     Renderer<float, B> renderer(backend, config);
@@ -110,9 +115,11 @@ void print_rows(B& backend, const std::string& where, const Shown& shown) {
         if (r > 0) ms.push_back(took.count());
       }
       view_ms.push_back(median(ms));
-      pairs += static_cast<double>(frames.stats[0].tile_intersections) / static_cast<double>(shown.cameras.size());
+      pairs += static_cast<double>(frames.stats[0].tile_intersections) /
+               static_cast<double>(shown.cameras.size());
       if (!row.gaussians || !row.meshes || row.through) continue;
-      const eval::ImageError e = eval::image_error(shown.truth[v].rgb, frames.rgb, 3, shown.truth[v].undecided).value();
+      const eval::ImageError e =
+          eval::image_error(shown.truth[v].rgb, frames.rgb, 3, shown.truth[v].undecided).value();
       worst.psnr = std::min(worst.psnr, e.psnr);
       worst.p999 = std::max(worst.p999, e.p999);
       worst.max = std::max(worst.max, e.max);
@@ -142,7 +149,8 @@ int main(int argc, char** argv) {
   std::vector<MeshInstance> instances;
   for (const Camera& c : cameras) {
     const Affine3<double> world = rigid_inverse(c.viewmat);
-    instances.push_back(scene.instance(mesh, {{}, world * Vec3d{0.1, 0.2, 2}, 1}, static_cast<std::uint32_t>(instances.size())));
+    instances.push_back(scene.instance(mesh, {{}, world * Vec3d{0.1, 0.2, 2}, 1},
+                                       static_cast<std::uint32_t>(instances.size())));
   }
   std::printf("%dx%d, %zu Gaussians, %zu triangles\n", width, height, set.gaussians.size,
               instances.size() * scene.mesh(mesh).geometry.triangles.size());
@@ -158,7 +166,8 @@ int main(int argc, char** argv) {
     config.mesh = &planes;
     truth.push_back(eval::oracle_render(openmp, set, c, config).value());
   }
-  std::printf("%-24s %9s %9s %9s %9s %12s\n", "", "median_ms", "rgb_psnr", "rgb_p99.9", "rgb_max", "pairs");
+  std::printf("%-24s %9s %9s %9s %9s %12s\n", "", "median_ms", "rgb_psnr", "rgb_p99.9", "rgb_max",
+              "pairs");
   const Shown shown{gsnav_bench::workload().cloud, scene, instances, cameras, truth};
   for (const int threads : {1, openmp.threads()}) {
     OpenMPBackend backend(threads);

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much of what is in view lies behind something: the share of the visible Gaussians, and of their chunks, that take
-// part of a pixel's light (alpha times transmittance) somewhere in a 256x256 image. What visible sets could leave out.
-// And what culling leaves out: rows touched for each that reaches a tile (count_culled).
+// How much of what is in view lies behind something: the share of the visible Gaussians, and of their
+// chunks, that take part of a pixel's light (alpha times transmittance) somewhere in a 256x256 image.
+// What visible sets could leave out. And what culling leaves out: rows touched for each that reaches a
+// tile (count_culled).
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_hidden [views]
 //
 // Without the variables: the embedded flat from its four viewpoints; without a number: 16 views.
 #include <algorithm>
-#include <cstdio>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <span>
 #include <string>
@@ -30,7 +31,7 @@ constexpr float kParts[] = {1e-4f, 1e-3f, 1.0f / 255};
 /// Of one view, or of all.
 struct Shares {
   CullCounts culled;
-  double visible = 0, chunks = 0;          ///< in view
+  double visible = 0, chunks = 0;            ///< in view
   double seen[3] = {}, seen_chunks[3] = {};  ///< with more than kParts of a pixel
 
   void add(const Shares& other) {
@@ -67,8 +68,8 @@ Shares shares_of(OpenMPBackend& backend, const GaussianCloud& cloud, const Camer
       for (int x = b.x0; x < b.x1; ++x) {
         BlendState<float, DepthMode::none>& pixel = pixels[static_cast<std::size_t>(y * kSide + x)];
         const float before = pixel.transmittance;
-        blend_splat<false, DepthMode::none, Exp2::degree5, false>(pixel, rules, splat, static_cast<float>(x) + 0.5f,
-                                                                  static_cast<float>(y) + 0.5f);
+        blend_splat<false, DepthMode::none, Exp2::degree5, false>(
+            pixel, rules, splat, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
         most = std::max(most, before - pixel.transmittance);
       }
     }

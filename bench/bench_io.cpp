@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "compare.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace {

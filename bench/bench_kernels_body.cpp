@@ -11,11 +11,11 @@
 #if defined(GSNAV_HAS_CUDA)
 #include "device_time.hpp"
 #endif
-#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/detail/skin/fk.hpp"
-#include "gsnav/skin/skin.hpp"
 #include "gsnav/scene/renderer.hpp"
+#include "gsnav/skin/skin.hpp"
 #include "kernel_bench.hpp"
 #include "native_lanes.hpp"
 
@@ -58,7 +58,11 @@ template <class S, class Out, class B>
 class Skinning {
  public:
   Skinning(B& backend, const GaussianCloud& cloud, const SkinWork& work)
-      : backend_(&backend), arrays_(backend, cloud), indices_(backend), weights_(backend), joints_(backend) {
+      : backend_(&backend),
+        arrays_(backend, cloud),
+        indices_(backend),
+        weights_(backend),
+        joints_(backend) {
     const std::size_t n = cloud.size(), k = static_cast<std::size_t>(work.influences);
     Rng rng(3);
     std::vector<Affine3<S>> joints;
@@ -66,7 +70,8 @@ class Skinning {
     std::vector<std::uint16_t> indices(k * n), weights(k * n);
     const double share[8] = {0.55, 0.25, 0.125, 0.075, 0.05, 0.04, 0.02, 0.01};
     for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < k; ++j) indices[k * i + j] = static_cast<std::uint16_t>(rng.below(kJoints));
+      for (std::size_t j = 0; j < k; ++j)
+        indices[k * i + j] = static_cast<std::uint16_t>(rng.below(kJoints));
       round_weights(share, k, &weights[k * i]);
     }
     joints_.upload(joints.data(), joints.size());
@@ -161,14 +166,15 @@ struct SkinBody {
       const double gigabytes = measure_bandwidth(threads);
       const double seconds = static_cast<double>(cloud.size() * work.bytes()) * 1e-9 / gigabytes;
       state.counters["stream_GB/s"] = gigabytes;
-      state.counters["x_stream"] =
-          benchmark::Counter(seconds, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+      state.counters["x_stream"] = benchmark::Counter(
+          seconds, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
     }
   }
 };
 
 #if defined(GSNAV_HAS_CUDA)
-/// Ten people in one call, the time of all together on the device; synchronised_us: that of the call until it is done.
+/// Ten people in one call, the time of all together on the device; synchronised_us: that of the call
+/// until it is done.
 struct CrowdBody {
   SkinWork work;
   template <class S, class B>
@@ -250,7 +256,8 @@ struct PolarBody {
     time_items(state, backend, kMatrices,
                [in = in.data(), out = out.data()](std::size_t i) { out[i] = polar_rotation(in[i]); });
     PolarErrors errors;
-    for (std::size_t i = 0; i < kMatrices; ++i) errors.add(mat_cast<double>(in[i]), mat_cast<double>(out[i]));
+    for (std::size_t i = 0; i < kMatrices; ++i)
+      errors.add(mat_cast<double>(in[i]), mat_cast<double>(out[i]));
     errors.report(state);
   }
 };
@@ -266,7 +273,8 @@ struct PolarLanesBody {
       from[k] = in.data() + k * kMatrices;
       to[k] = out.data() + k * kMatrices;
       for (std::size_t i = 0; i < kMatrices; ++i) {
-        in[k * kMatrices + i] = static_cast<float>(input[i](static_cast<int>(k / 3), static_cast<int>(k % 3)));
+        in[k * kMatrices + i] =
+            static_cast<float>(input[i](static_cast<int>(k / 3), static_cast<int>(k % 3)));
       }
     }
     constexpr std::size_t kPiece = 1024;
@@ -299,11 +307,13 @@ struct Poses {
     Rng rng(13);
     for (std::size_t j = 0; j < kJoints; ++j) {
       parents.push_back(j == 0 ? -1 : static_cast<std::int32_t>((j - 1) / 2));
-      inverse_binds.push_back({Mat3<S>::identity(), vec_cast<S>(Vec3d{rng.uniform(-1, 1), rng.uniform(-1, 1), 0})});
+      inverse_binds.push_back(
+          {Mat3<S>::identity(), vec_cast<S>(Vec3d{rng.uniform(-1, 1), rng.uniform(-1, 1), 0})});
     }
     for (std::size_t i = 0; i < actors * kJoints; ++i) {
       const Quat<double> q = random_turn(rng, 1);
-      rotations.push_back({static_cast<S>(q.w), static_cast<S>(q.x), static_cast<S>(q.y), static_cast<S>(q.z)});
+      rotations.push_back(
+          {static_cast<S>(q.w), static_cast<S>(q.x), static_cast<S>(q.y), static_cast<S>(q.z)});
       translations.push_back(vec_cast<S>(Vec3d{0.1 * rng.normal(), 0.3, 0.1 * rng.normal()}));
     }
     globals.resize(actors * kJoints);
@@ -353,7 +363,8 @@ struct KinematicsBody {
 
 void register_body_kernels() {
   for (const SkinWork& work : {SkinWork{4, false}, SkinWork{4, true}, SkinWork{8, false}}) {
-    const std::string variant = "influences:" + std::to_string(work.influences) + (work.rotations ? "/rotations" : "");
+    const std::string variant =
+        "influences:" + std::to_string(work.influences) + (work.rotations ? "/rotations" : "");
     add_cpu_rows("skin", variant, SkinBody{work});
     add_cuda_row("skin", variant, SkinBody{work});
 #if defined(GSNAV_HAS_CUDA)

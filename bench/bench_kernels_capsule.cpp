@@ -23,8 +23,8 @@ constexpr std::size_t kPairs = 100000;
 struct CapsulePairs {
   std::vector<MovingCapsule<double>> agents, bodies;
 
-  /// Mixed: limbs anywhere within 3 m to each side; one pair in some hundred that start apart meets. Or all of those
-  /// that meet on a step of 1 m.
+  /// Mixed: limbs anywhere within 3 m to each side; one pair in some hundred that start apart meets. Or
+  /// all of those that meet on a step of 1 m.
   static const CapsulePairs& mixed() {
     static const CapsulePairs pairs(3.0, 0.25, false);
     return pairs;
@@ -41,7 +41,8 @@ struct CapsulePairs {
     const auto near_float = [](const Vec3d& v) { return vec_cast<double>(vec_cast<float>(v)); };
     const auto motion = [&](const Vec3d& p, const Vec3d& q, double r, const Vec3d& move) {
       const auto capsule = [&](const Vec3d& by) {
-        return Capsule<double>{near_float(p + by), near_float(q + by), static_cast<double>(static_cast<float>(r))};
+        return Capsule<double>{near_float(p + by), near_float(q + by),
+                               static_cast<double>(static_cast<float>(r))};
       };
       return MovingCapsule<double>{capsule({}), capsule(move)};
     };
@@ -51,7 +52,8 @@ struct CapsulePairs {
       const auto a = motion(base, base + up, radius, Vec3d{std::cos(yaw), 0, std::sin(yaw)} * step);
       const Vec3d at{rng.uniform(-size, size), rng.uniform(0, 1.7), rng.uniform(-size, size)};
       const Vec3d limb{0.2 * rng.normal(), 0.2 * rng.normal(), 0.2 * rng.normal()};
-      const Vec3d drift = normalized(Vec3d{rng.normal(), rng.normal(), rng.normal()}) * rng.uniform(0, 0.3);
+      const Vec3d drift =
+          normalized(Vec3d{rng.normal(), rng.normal(), rng.normal()}) * rng.uniform(0, 0.3);
       const auto b = motion(at, at + limb, rng.uniform(0.03, 0.15), drift);
       if (all_meet) {
         const SweepResult<double> r = sweep(a, b, SweepRules<double>{});
@@ -96,15 +98,18 @@ class MotionPlanes {
  private:
   View<const S> plane(std::size_t k) const { return {values_.data() + k * n_, n_}; }
   CapsulePlanes<S> capsules(std::size_t k) const {
-    return {{plane(k), plane(k + 1), plane(k + 2)}, {plane(k + 3), plane(k + 4), plane(k + 5)}, plane(k + 6)};
+    return {{plane(k), plane(k + 1), plane(k + 2)},
+            {plane(k + 3), plane(k + 4), plane(k + 5)},
+            plane(k + 6)};
   }
   std::size_t n_;
   std::vector<S> values_;
 };
 
-/// Nanoseconds a pair that FCL takes on one thread: the median of some runs over a part of the pairs, measured in the
-/// process that measures the row beside it; 0 without FCL.
-[[maybe_unused]] double fcl_ns([[maybe_unused]] const CapsulePairs& pairs, [[maybe_unused]] bool moving) {
+/// Nanoseconds a pair that FCL takes on one thread: the median of some runs over a part of the pairs,
+/// measured in the process that measures the row beside it; 0 without FCL.
+[[maybe_unused]] double fcl_ns([[maybe_unused]] const CapsulePairs& pairs,
+                               [[maybe_unused]] bool moving) {
 #if defined(GSNAV_HAS_FCL)
   constexpr std::size_t kSome = 10000;
   const FclPairs fcl(pairs.agents, pairs.bodies);
@@ -114,7 +119,8 @@ class MotionPlanes {
     double sum = 0;
     for (std::size_t i = 0; i < kSome; ++i) sum += moving ? fcl.contact(i) : fcl.distance(i);
     benchmark::DoNotOptimize(sum);
-    times.push_back(std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin).count());
+    times.push_back(
+        std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin).count());
   }
   std::nth_element(times.begin(), times.begin() + 4, times.end());
   return times[4] / kSome;
@@ -128,11 +134,12 @@ void compare_with_fcl(benchmark::State& state, const CapsulePairs& pairs, bool m
   const double ns = fcl_ns(pairs, moving);
   if (ns == 0) return;
   state.counters["fcl_ns"] = ns;
-  state.counters["x_fcl"] = benchmark::Counter(ns * 1e-9 * kPairs, benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["x_fcl"] =
+      benchmark::Counter(ns * 1e-9 * kPairs, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-/// Gaps of a batch, with their errors against double: absolute, and of the distance of the axes relative to at least
-/// 1 cm.
+/// Gaps of a batch, with their errors against double: absolute, and of the distance of the axes relative
+/// to at least 1 cm.
 struct DistanceBody {
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
@@ -165,8 +172,8 @@ struct DistanceBody {
   }
 };
 
-/// Sweeps of a batch. Errors in double: how deep an agent that started free gets by the reported time, and how many
-/// pairs are called otherwise than in double.
+/// Sweeps of a batch. Errors in double: how deep an agent that started free gets by the reported time,
+/// and how many pairs are called otherwise than in double.
 struct SweepBody {
   bool all_meet;
   template <class S, class B>
@@ -207,7 +214,8 @@ struct SweepBody {
 };
 
 #if defined(GSNAV_HAS_FCL)
-/// What FCL makes of the mixed pairs: its distance against ours in double, and the contacts that it misses.
+/// What FCL makes of the mixed pairs: its distance against ours in double, and the contacts that it
+/// misses.
 void fcl_row(benchmark::State& state, bool moving, bool all_meet) {
   const CapsulePairs& pairs = all_meet ? CapsulePairs::meeting() : CapsulePairs::mixed();
   constexpr std::size_t kSome = 20000;
@@ -275,7 +283,8 @@ struct CrowdBody {
 void register_capsule_kernels() {
 #if defined(GSNAV_HAS_FCL)
   const auto fcl = [](const char* name, bool moving, bool all_meet) {
-    benchmark::RegisterBenchmark(name, [=](benchmark::State& state) { fcl_row(state, moving, all_meet); })
+    benchmark::RegisterBenchmark(name,
+                                 [=](benchmark::State& state) { fcl_row(state, moving, all_meet); })
         ->Unit(benchmark::kMicrosecond)
         ->UseRealTime();
   };

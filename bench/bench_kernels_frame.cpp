@@ -46,7 +46,9 @@ struct ProjectBody {
     const auto mean_x = [](const auto& g) {
       return static_cast<double>(g.ref_x) - static_cast<double>(g.w1) / static_cast<double>(g.a);
     };
-    const auto root_det = [](const auto& g) { return static_cast<double>(g.a) * static_cast<double>(g.b); };
+    const auto root_det = [](const auto& g) {
+      return static_cast<double>(g.a) * static_cast<double>(g.b);
+    };
     const auto geometry = stages.survivors_geometry();
     const auto geometry64 = truth.survivors_geometry();
     state.counters["survivors_differ"] =
@@ -58,9 +60,11 @@ struct ProjectBody {
       const auto red = [](const auto& c) { return c.r; };
       state.counters["mean_px_max"] =
           error_of(values_of(geometry, mean_x), values_of(geometry64, mean_x)).max;
-      state.counters["sqrt_det_rel_max"] = error_of(relative, std::vector<double>(relative.size(), 1.0)).max;
+      state.counters["sqrt_det_rel_max"] =
+          error_of(relative, std::vector<double>(relative.size(), 1.0)).max;
       state.counters["rgb_max"] =
-          error_of(values_of(stages.survivors_colors(), red), values_of(truth.survivors_colors(), red)).max;
+          error_of(values_of(stages.survivors_colors(), red), values_of(truth.survivors_colors(), red))
+              .max;
     }
     count(state, cloud.size());
   }
@@ -76,7 +80,8 @@ struct ShInput {
     Rng rng(7);
     const GaussianView view = cloud.view();
     for (std::size_t i = 0; i < n; ++i) {
-      deltas.push_back(vec_cast<float>(Vec3d{rng.uniform(-3, 3), rng.uniform(-3, 3), rng.uniform(1, 4)}));
+      deltas.push_back(
+          vec_cast<float>(Vec3d{rng.uniform(-3, 3), rng.uniform(-3, 3), rng.uniform(1, 4)}));
       const SplatColor<double> c = gaussian_color<double>(view, degree, i, vec_cast<double>(deltas[i]));
       truth.insert(truth.end(), {c.r, c.g, c.b});
     }
@@ -95,7 +100,8 @@ struct ShBody {
     const ShInput input(kShItems, degree);
     const GaussianView view = input.cloud.view();
     std::vector<SplatColor<S>> colors(kShItems);
-    const auto evaluate = [view, deltas = input.deltas.data(), out = colors.data(), d = degree](std::size_t i) {
+    const auto evaluate = [view, deltas = input.deltas.data(), out = colors.data(),
+                           d = degree](std::size_t i) {
       out[i] = gaussian_color<S>(view, d, i, vec_cast<S>(deltas[i]));
     };
     time_items(state, backend, kShItems, evaluate, input.bytes_per_item(degree));
@@ -113,7 +119,8 @@ struct ShLanesBody {
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
     const ShInput input(kShItems, degree);
-    const std::size_t n = kShItems, coefficients = static_cast<std::size_t>(sh_coefficient_count(degree));
+    const std::size_t n = kShItems,
+                      coefficients = static_cast<std::size_t>(sh_coefficient_count(degree));
     const GaussianView view = input.cloud.view();
     std::vector<float> in(3 * coefficients * n), deltas(3 * n), colors(3 * n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -132,9 +139,8 @@ struct ShLanesBody {
     }
     constexpr std::size_t kPiece = 1024;
     for (auto _ : state) {
-      backend.parallel_for(n / kPiece, [&](std::size_t p) {
-        native_sh(planes, degree, p * kPiece, (p + 1) * kPiece);
-      });
+      backend.parallel_for(
+          n / kPiece, [&](std::size_t p) { native_sh(planes, degree, p * kPiece, (p + 1) * kPiece); });
       benchmark::ClobberMemory();
     }
     count(state, n, input.bytes_per_item(degree));
@@ -305,7 +311,8 @@ void register_frame_kernels() {
   for (const std::size_t n : {std::size_t{50000}, std::size_t{500000}}) {
     for (const int bits : {32, 22}) {
       const std::string variant = "keys:" + std::to_string(n) + "/bits:" + std::to_string(bits);
-      add_row<float, SerialBackend>("stable_sort", variant, "uint32", "SerialBackend", StableSortBody{n, bits});
+      add_row<float, SerialBackend>("stable_sort", variant, "uint32", "SerialBackend",
+                                    StableSortBody{n, bits});
       add_row<float, SerialBackend>("sort_pairs", variant, "uint32", "SerialBackend", SortBody{n, bits});
       add_openmp_rows("sort_pairs", variant, "uint32", SortBody{n, bits});
       add_cuda_row("sort_pairs", variant, SortBody{n, bits});

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Levels of detail against direct rendering: error and time in one row, 256x256, the error against O_photo(4).
+// Levels of detail against direct rendering: error and time in one row, 256x256, the error against
+// O_photo(4).
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_lod [views [first [each]]]
 //
@@ -17,8 +18,8 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/visible_sets.hpp"
@@ -93,8 +94,9 @@ int main(int argc, char** argv) {
   OpenMPBackend all;
   const double start = cpu_ms();
   const LodTree tree = build_lod(all, cloud).value();
-  std::printf("%zu Gaussians; tree of %zu levels built in %.1f s of processor, %.0f MB; %zu views\n", cloud.size(),
-              tree.levels(), (cpu_ms() - start) * 1e-3, static_cast<double>(tree.bytes()) * 1e-6, cameras.size());
+  std::printf("%zu Gaussians; tree of %zu levels built in %.1f s of processor, %.0f MB; %zu views\n",
+              cloud.size(), tree.levels(), (cpu_ms() - start) * 1e-3,
+              static_cast<double>(tree.bytes()) * 1e-6, cameras.size());
   LodViews shown = lod_views(cloud, cameras);
   shown.first = first;
   shown.each = argc > 3;

@@ -27,14 +27,15 @@ namespace {
 
 struct Scene {
   std::unique_ptr<NavMesh> mesh;
-  std::vector<NavPoint> points, goals;          ///< pairs: each goal is on its point's island
+  std::vector<NavPoint> points, goals;  ///< pairs: each goal is on its point's island
   std::vector<Vec3d> positions, goal_positions;
   std::vector<NavPoint> near_points, near_goals;  ///< pairs of 1 to 30 m of path
   std::vector<NavPoint> main_points;              ///< of the largest island
   std::vector<NavPoint> walk;                     ///< steps of 0.25 m on the field's island
   std::unique_ptr<GeodesicField> field;
   double prepare_ms = 0;  ///< processor time of the first distance
-  std::unique_ptr<dtNavMeshQuery, void (*)(dtNavMeshQuery*)> detour{dtAllocNavMeshQuery(), dtFreeNavMeshQuery};
+  std::unique_ptr<dtNavMeshQuery, void (*)(dtNavMeshQuery*)> detour{dtAllocNavMeshQuery(),
+                                                                    dtFreeNavMeshQuery};
 
   explicit Scene(NavMesh m) : mesh(std::make_unique<NavMesh>(std::move(m))) {
     Rng rng(1);
@@ -65,7 +66,8 @@ struct Scene {
       NavPoint at = main_points[i];
       double heading = rng.uniform(0, 6.28);
       for (int k = 0; k < 256; ++k) {
-        const SurfaceWalk w = mesh->walk(at, Vec3d{0.25 * std::cos(heading), 0, 0.25 * std::sin(heading)}, true);
+        const SurfaceWalk w =
+            mesh->walk(at, Vec3d{0.25 * std::cos(heading), 0, 0.25 * std::sin(heading)}, true);
         if (!w.points.empty()) at = {w.points.back().position, w.points.back().poly};
         heading += w.hit_wall ? rng.uniform(1, 5) : rng.uniform(-0.2, 0.2);
         walk.push_back(at);
@@ -108,10 +110,11 @@ const Scene* terrain() {
   return scene;
 }
 
-/// Detour's snap of both ends, findPath and straight path, as Habitat calls them. The sum of chords between the corners,
-/// which do not follow the floor: on hills it is 5 to 6 % below the length on the surface (undulating), so that its error
-/// says nothing of the path there.
-double detour_geodesic(const NavMesh::Impl& impl, dtNavMeshQuery& query, const Vec3d& a, const Vec3d& b) {
+/// Detour's snap of both ends, findPath and straight path, as Habitat calls them. The sum of chords
+/// between the corners, which do not follow the floor: on hills it is 5 to 6 % below the length on the
+/// surface (undulating), so that its error says nothing of the path there.
+double detour_geodesic(const NavMesh::Impl& impl, dtNavMeshQuery& query, const Vec3d& a,
+                       const Vec3d& b) {
   const float extents[3] = {2, 4, 2};
   const dtQueryFilter filter;
   float ends[2][3];
@@ -147,8 +150,9 @@ void pairs(benchmark::State& state, const Scene* (*make)(), F&& f) {
   state.counters["polygons"] = static_cast<double>(scene->mesh->polygon_count());
 }
 
-/// pairs() of a length, with its error against the search over windows, which needs no tables: `worst_error` in metres,
-/// `mean_error` in parts of the length, `mean_short` the part that it is too short by (chords that leave the surface).
+/// pairs() of a length, with its error against the search over windows, which needs no tables:
+/// `worst_error` in metres, `mean_error` in parts of the length, `mean_short` the part that it is too
+/// short by (chords that leave the surface).
 template <class F>
 void lengths(benchmark::State& state, const Scene* (*make)(), F&& f) {
   pairs(state, make, f);
@@ -158,7 +162,8 @@ void lengths(benchmark::State& state, const Scene* (*make)(), F&& f) {
   detail::GeodesicSearch search;
   double worst = 0, sum = 0, below = 0, whole = 0;
   for (std::size_t i = 0; i < 256; ++i) {
-    const double truth = search.run(impl.unfolded(), impl.site(scene->points[i]), impl.site(scene->goals[i]));
+    const double truth =
+        search.run(impl.unfolded(), impl.site(scene->points[i]), impl.site(scene->goals[i]));
     const double off = f(*scene, i) - truth;
     worst = max(worst, std::abs(off));
     sum += std::abs(off);
@@ -181,25 +186,31 @@ void geodesic(benchmark::State& state, const Scene* (*make)()) {
   });
 }
 void geodesic_with_handles(benchmark::State& state, const Scene* (*make)()) {
-  lengths(state, make, [](const Scene& s, std::size_t i) { return s.mesh->distance_between(s.points[i], s.goals[i]); });
+  lengths(state, make, [](const Scene& s, std::size_t i) {
+    return s.mesh->distance_between(s.points[i], s.goals[i]);
+  });
   if (const Scene* scene = make()) state.counters["prepare_ms"] = scene->prepare_ms;
 }
 /// The same of pairs of 1 to 30 m.
 void detour_near(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make, [](const Scene& s, std::size_t i) {
-    return detour_geodesic(s.mesh->impl(), *s.detour, s.near_points[i].position, s.near_goals[i].position);
+    return detour_geodesic(s.mesh->impl(), *s.detour, s.near_points[i].position,
+                           s.near_goals[i].position);
   });
 }
 void near_with_handles(benchmark::State& state, const Scene* (*make)()) {
-  pairs(state, make,
-        [](const Scene& s, std::size_t i) { return s.mesh->distance_between(s.near_points[i], s.near_goals[i]); });
+  pairs(state, make, [](const Scene& s, std::size_t i) {
+    return s.mesh->distance_between(s.near_points[i], s.near_goals[i]);
+  });
 }
-/// To an error of 1e-3, with a proven lower bound (the same where the exact distance is not searched for).
+/// To an error of 1e-3, with a proven lower bound (the same where the exact distance is not searched
+/// for).
 double to_an_error(const Scene& s, const NavPoint& a, const NavPoint& b) {
   return s.mesh->distance_between(a, b, {.relative_error = 1e-3})->length;
 }
 void bounded_with_handles(benchmark::State& state, const Scene* (*make)()) {
-  lengths(state, make, [](const Scene& s, std::size_t i) { return to_an_error(s, s.points[i], s.goals[i]); });
+  lengths(state, make,
+          [](const Scene& s, std::size_t i) { return to_an_error(s, s.points[i], s.goals[i]); });
 }
 void bounded_near(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make,
@@ -248,8 +259,9 @@ void geodesic_island(benchmark::State& state, const Scene* (*make)()) {
   });
 }
 void path_with_handles(benchmark::State& state, const Scene* (*make)()) {
-  pairs(state, make,
-        [](const Scene& s, std::size_t i) { return s.mesh->path_between(s.points[i], s.goals[i])->length; });
+  pairs(state, make, [](const Scene& s, std::size_t i) {
+    return s.mesh->path_between(s.points[i], s.goals[i])->length;
+  });
 }
 void field_lookup(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make, [](const Scene& s, std::size_t i) { return s.field->distance(s.main_points[i]); });
@@ -267,7 +279,8 @@ void random_point(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make, [&](const Scene& s, std::size_t) { return s.mesh->random_point(rng).poly; });
 }
 void snap(benchmark::State& state, const Scene* (*make)()) {
-  pairs(state, make, [](const Scene& s, std::size_t i) { return s.mesh->snap_point(s.positions[i])->poly; });
+  pairs(state, make,
+        [](const Scene& s, std::size_t i) { return s.mesh->snap_point(s.positions[i])->poly; });
 }
 void detour_snap(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make, [](const Scene& s, std::size_t i) {
@@ -292,7 +305,8 @@ CapsuleSet walkers(const Scene& scene, std::size_t avatars) {
   Rng rng(3);
   std::vector<DynamicCapsule> list;
   for (std::size_t a = 0; a < avatars; ++a) {
-    const Vec3d at = scene.main_points[4095 - a].position, v{rng.uniform(-0.05, 0.05), 0, rng.uniform(-0.05, 0.05)};
+    const Vec3d at = scene.main_points[4095 - a].position,
+                v{rng.uniform(-0.05, 0.05), 0, rng.uniform(-0.05, 0.05)};
     for (std::uint32_t bone = 0; bone < 20; ++bone) {
       const Vec3d p0{rng.uniform(-0.3, 0.3), rng.uniform(0.1, 1.7), rng.uniform(-0.3, 0.3)};
       const Vec3d p1{rng.uniform(-0.3, 0.3), rng.uniform(0.1, 1.7), rng.uniform(-0.3, 0.3)};
@@ -348,7 +362,8 @@ void local_plan(benchmark::State& state, const Scene* (*make)()) {
   const CapsuleSet bodies = walkers(*scene, static_cast<std::size_t>(state.range(0)));
   std::size_t i = 0;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(plan_velocity(*scene->mesh, agent_at(*scene, i), quarter_metre(i) * 4.0, bodies));
+    benchmark::DoNotOptimize(
+        plan_velocity(*scene->mesh, agent_at(*scene, i), quarter_metre(i) * 4.0, bodies));
     ++i;
   }
 }
@@ -375,7 +390,8 @@ void plan_in_time_among(benchmark::State& state, const Scene* (*make)()) {
         const Vec3d p{rng.uniform(-0.2, 0.2), rng.uniform(0.1, 1.6), rng.uniform(-0.2, 0.2)};
         const Vec3d q{rng.uniform(-0.2, 0.2), rng.uniform(0.1, 1.6), rng.uniform(-0.2, 0.2)};
         const Vec3d a0 = at(k * kTick), a1 = at((k + 1) * kTick);
-        list.push_back({{{a0 + p, a0 + q, 0.06}, {a1 + p, a1 + q, 0.06}}, static_cast<std::uint32_t>(a), bone});
+        list.push_back(
+            {{{a0 + p, a0 + q, 0.06}, {a1 + p, a1 + q, 0.06}}, static_cast<std::uint32_t>(a), bone});
       }
     }
     ticks.push_back(CapsuleSet::create(std::move(list), k * kTick, (k + 1) * kTick).value());
@@ -390,7 +406,8 @@ void plan_in_time_among(benchmark::State& state, const Scene* (*make)()) {
     states += plan.states;
     reached += plan.status == TimedPlanStatus::reached ? 1 : 0;
     slowest = max(slowest, plan.states);
-    longest = max(longest, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    longest =
+        max(longest, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     ++i;
   }
   state.counters["states"] = static_cast<double>(states) / static_cast<double>(i);
@@ -418,8 +435,8 @@ Triangles data_triangles(const char* name) {
 Triangles nav_test_triangles() { return data_triangles("nav_test.obj"); }
 Triangles dungeon_triangles() { return data_triangles("dungeon.obj"); }
 
-/// A build of one tile and one of tiles of so many cells by some threads, in turns, at Habitat's settings; `ratio` is of
-/// wall time, `cpu_ratio` of the time of all processors.
+/// A build of one tile and one of tiles of so many cells by some threads, in turns, at Habitat's
+/// settings; `ratio` is of wall time, `cpu_ratio` of the time of all processors.
 void build(benchmark::State& state, Triangles (*make)()) {
   const auto threads = static_cast<int>(state.range(0));
   const Triangles soup = make();
@@ -477,16 +494,23 @@ GSNAV_NAV_BENCH(random_point);
 GSNAV_NAV_BENCH(snap);
 GSNAV_NAV_BENCH(detour_snap);
 GSNAV_NAV_BENCH(obstacle);
-#define GSNAV_BUILD_BENCH(scene) \
+#define GSNAV_BUILD_BENCH(scene)                     \
   BENCHMARK_CAPTURE(build, scene, scene##_triangles) \
-      ->ArgNames({"threads", "tile"})->ArgsProduct({{1, 2}, {64, 100, 128}})->Unit(benchmark::kMillisecond)->UseRealTime()
+      ->ArgNames({"threads", "tile"})                \
+      ->ArgsProduct({{1, 2}, {64, 100, 128}})        \
+      ->Unit(benchmark::kMillisecond)                \
+      ->UseRealTime()
 GSNAV_BUILD_BENCH(flat);
 GSNAV_BUILD_BENCH(nav_test);
 GSNAV_BUILD_BENCH(dungeon);
 BENCHMARK_CAPTURE(steps, flat, flat)->Arg(0)->Arg(3)->Arg(100);
 BENCHMARK_CAPTURE(thousand_agents, flat, flat)->Arg(3)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(local_plan, flat, flat)->Arg(3)->Arg(10)->Arg(30)->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(plan_in_time_among, flat, flat)->Arg(0)->Arg(3)->Arg(10)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(plan_in_time_among, flat, flat)
+    ->Arg(0)
+    ->Arg(3)
+    ->Arg(10)
+    ->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 

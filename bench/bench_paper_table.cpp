@@ -15,10 +15,10 @@
 
 #include "../tools/report/runner_system.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/detail/sim/scene_library.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
-#include "gsnav/detail/sim/scene_library.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include <cuda_runtime_api.h>
 

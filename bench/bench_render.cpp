@@ -47,7 +47,8 @@ struct Variant {
   unsigned outputs;
   Profile profile;
   bool base_color = false;  ///< of a scene of SH degree 0
-  bool axes = false;        ///< with axes computed beforehand in place of quaternions and scales (processors only)
+  bool axes =
+      false;  ///< with axes computed beforehand in place of quaternions and scales (processors only)
 
   const GaussianCloud& cloud() const {
     return base_color ? gsnav_bench::base_color_cloud() : workload().cloud;
@@ -149,7 +150,8 @@ void render_frames(benchmark::State& state, B& backend, const Variant& v, int wi
   const GaussianArrays<B> arrays(backend, v.cloud());
   std::vector<GaussianSet> sets{arrays.set()};
   if (v.axes) {
-    for (int k = 0; k < 9; ++k) sets[0].gaussians.axes[k] = {axes_of_workload()[k].data(), axes_of_workload()[k].size()};
+    for (int k = 0; k < 9; ++k)
+      sets[0].gaussians.axes[k] = {axes_of_workload()[k].data(), axes_of_workload()[k].size()};
   }
   Renderer<float, B> renderer(backend, v.config());
   Frames<float> frames;

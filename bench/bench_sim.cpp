@@ -10,12 +10,12 @@
 #include <memory>
 #include <vector>
 
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/core/rng.hpp"
 #include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/detail/avatar/proxy_fit.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/avatar/weight_gradients.hpp"
-#include "gsnav/backends/openmp.hpp"
-#include "gsnav/core/rng.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
@@ -60,12 +60,15 @@ EpisodeSource generated(const std::shared_ptr<const SimulatorScene>& scene, std:
   };
 }
 
-/// Arguments: environments, people, threads, when episodes begin. A minute has gone by when it is measured.
+/// Arguments: environments, people, threads, when episodes begin. A minute has gone by when it is
+/// measured.
 void step_batch(benchmark::State& state) {
   const auto scene = flat(static_cast<int>(state.range(1)));
   const auto n = static_cast<std::size_t>(state.range(0));
   OpenMPBackend backend(static_cast<int>(state.range(2)));
-  auto sim = make_batch_simulator(backend, {scene}, without_pictures(), n, generated(scene, state.range(3))).value();
+  auto sim =
+      make_batch_simulator(backend, {scene}, without_pictures(), n, generated(scene, state.range(3)))
+          .value();
   sim.reset().value();
   Rng rng(9);
   std::vector<Action> actions(n);
@@ -75,9 +78,9 @@ void step_batch(benchmark::State& state) {
   };
   for (int i = 0; i < 240; ++i) step();
   for (auto _ : state) step();
-  state.counters["us/environment"] = benchmark::Counter(static_cast<double>(n) * 1e-6,
-                                                        benchmark::Counter::kIsIterationInvariantRate |
-                                                            benchmark::Counter::kInvert);
+  state.counters["us/environment"] =
+      benchmark::Counter(static_cast<double>(n) * 1e-6,
+                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(step_batch)
     ->ArgNames({"environments", "people", "threads", "times"})
@@ -115,16 +118,21 @@ void step_one(benchmark::State& state) {
     }
   }
 }
-BENCHMARK(step_one)->ArgNames({"people", "facade"})->ArgsProduct({{0, 5}, {0, 1}})->Unit(benchmark::kMicrosecond);
+BENCHMARK(step_one)
+    ->ArgNames({"people", "facade"})
+    ->ArgsProduct({{0, 5}, {0, 1}})
+    ->Unit(benchmark::kMicrosecond);
 
-/// Ten people of one body walk: forward kinematics and skinning of all. Arguments: Gaussians of the body, threads,
-/// Skinning. Counters: error against float64, and memory: what they share, and what each of them has.
+/// Ten people of one body walk: forward kinematics and skinning of all. Arguments: Gaussians of the
+/// body, threads, Skinning. Counters: error against float64, and memory: what they share, and what each
+/// of them has.
 void pose_crowd(benchmark::State& state) {
   constexpr std::size_t kPeople = 10;
   HumanoidOptions look;
   look.gaussians = static_cast<int>(state.range(0));
   AvatarAsset made = make_humanoid(look);
-  if (state.range(2) == static_cast<int>(Skinning::linear_stretched)) bake_weight_gradients(made).throw_if_error();
+  if (state.range(2) == static_cast<int>(Skinning::linear_stretched))
+    bake_weight_gradients(made).throw_if_error();
   made.skinning = static_cast<Skinning>(state.range(2));
   const auto body = std::make_shared<const AvatarAsset>(std::move(made));
   std::vector<AvatarActor> people;
@@ -147,17 +155,20 @@ void pose_crowd(benchmark::State& state) {
     const std::vector<Vec3d> centers = skinned_centers(*body, joints);
     const GaussianView v = crowd.set(i).gaussians;
     for (std::size_t k = 0; k < centers.size(); ++k) {
-      worst = std::max(worst, norm(vec_cast<double>(Vec3f{v.means[0][k], v.means[1][k], v.means[2][k]}) - centers[k]));
+      worst = std::max(worst, norm(vec_cast<double>(Vec3f{v.means[0][k], v.means[1][k], v.means[2][k]}) -
+                                   centers[k]));
     }
   }
   const double n = static_cast<double>(body->size());
   const double row = static_cast<double>(body->influences);
   const bool stretched = body->skinning == Skinning::linear_stretched;
   state.counters["mean_max_m"] = worst;
-  // Means, quaternions, scales, opacities, colours, joints and weights; means and quaternions of each, or its axes too.
+  // Means, quaternions, scales, opacities, colours, joints and weights; means and quaternions of each,
+  // or its axes too.
   state.counters["shared_MB"] = n * 1e-6 * (4 * 14 + 4 * row + (stretched ? 12 * (row - 1) : 0));
   state.counters["each_MB"] = n * 1e-6 * 4 * (stretched ? 16 : 7);
-  state.counters["Gaussians/s"] = benchmark::Counter(n * kPeople, benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["Gaussians/s"] =
+      benchmark::Counter(n * kPeople, benchmark::Counter::kIsIterationInvariantRate);
 }
 BENCHMARK(pose_crowd)
     ->ArgNames({"gaussians", "threads", "skinning"})

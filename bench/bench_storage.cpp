@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench_storage [--scene FILE] [--cameras FILE] [--threads N]: a scene in each way of keeping it in memory: what that
-// takes, what it changes, and the time of a frame (RGB, median over views and repeats), one row each, and what each
-// packed plane changes by itself, as in docs/formats.md.
+// bench_storage [--scene FILE] [--cameras FILE] [--threads N]: a scene in each way of keeping it in
+// memory: what that takes, what it changes, and the time of a frame (RGB, median over views and
+// repeats), one row each, and what each packed plane changes by itself, as in docs/formats.md.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -13,11 +13,11 @@
 #include "compare.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/renderer.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace {
@@ -29,12 +29,15 @@ struct Size {
 };
 constexpr Size kSizes[] = {{256, 256}, {640, 480}, {1920, 1080}};
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 std::vector<Camera> resized(const std::vector<Camera>& cameras, const Size& size) {
   std::vector<Camera> out = cameras;
   for (Camera& c : out) {
-    const double x = static_cast<double>(size.width) / c.width, y = static_cast<double>(size.height) / c.height;
+    const double x = static_cast<double>(size.width) / c.width,
+                 y = static_cast<double>(size.height) / c.height;
     c.fx *= x;
     c.cx *= x;
     c.fy *= y;
@@ -46,7 +49,8 @@ std::vector<Camera> resized(const std::vector<Camera>& cameras, const Size& size
 }
 
 /// Milliseconds of a frame, the median of `repeats` of each camera.
-double frame_time(OpenMPBackend& backend, const GaussianSet& set, const std::vector<Camera>& cameras, int repeats) {
+double frame_time(OpenMPBackend& backend, const GaussianSet& set, const std::vector<Camera>& cameras,
+                  int repeats) {
   RenderConfig config;
   config.outputs = kRgb;
   Renderer<float, OpenMPBackend> renderer(backend, config);
@@ -59,7 +63,8 @@ double frame_time(OpenMPBackend& backend, const GaussianSet& set, const std::vec
       if (r > 0) times.push_back(1e3 * (now() - start));
     }
   }
-  std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
+  std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2),
+                   times.end());
   return times[times.size() / 2];
 }
 
@@ -70,7 +75,8 @@ int main(int argc, char** argv) {
   int threads = 0, repeats = 9;
   CLI::App app{"Memory, error and speed of each storage of a scene."};
   app.add_option("--scene", scene, "Any scene that can be read; the embedded flat if not given");
-  app.add_option("--cameras", cameras_path, "INRIA cameras.json; four views around the scene if not given");
+  app.add_option("--cameras", cameras_path,
+                 "INRIA cameras.json; four views around the scene if not given");
   app.add_option("--threads", threads, "All cores if not given");
   app.add_option("--repeats", repeats, "Frames of each view")->check(CLI::Range(1, 1000));
   CLI11_PARSE(app, argc, argv);
@@ -97,7 +103,8 @@ int main(int argc, char** argv) {
   }
   GaussianCloud compact = full;
   compact_sh(compact);
-  // What means in 16 bits would save and cost, where none moves by more than a tenth of its Gaussian's deviation.
+  // What means in 16 bits would save and cost, where none moves by more than a tenth of its Gaussian's
+  // deviation.
   PackLimits all_planes;
   all_planes.mean = 0.1;
   PackErrors errors;
@@ -105,20 +112,24 @@ int main(int argc, char** argv) {
   GaussianCloud unpacked = unpack_cloud(smaller), widened = compact;
   const GaussianCloud unpacked_default = unpack_cloud(packed);
   expand_sh(widened);
-  std::printf("%zu Gaussians of SH degree %d; packed, means too: means in %d bits, SH in %d\n\n", full.size(), full.sh_degree,
-              errors.mean_bits, errors.sh_bits);
+  std::printf("%zu Gaussians of SH degree %d; packed, means too: means in %d bits, SH in %d\n\n",
+              full.size(), full.sh_degree, errors.mean_bits, errors.sh_bits);
   OpenMPBackend backend(threads);
   std::printf(
-      "| storage | MB | bytes each | 256x256, ms | 640x480, ms | 1920x1080, ms | PSNR, dB | worst view, dB |\n");
+      "| storage | MB | bytes each | 256x256, ms | 640x480, ms | 1920x1080, ms | PSNR, dB | worst view, "
+      "dB |\n");
   std::printf("| --- | --- | --- | --- | --- | --- | --- | --- |\n");
-  const auto row = [&](const char* name, std::size_t bytes, const GaussianSet& set, const GaussianCloud* floats) {
+  const auto row = [&](const char* name, std::size_t bytes, const GaussianSet& set,
+                       const GaussianCloud* floats) {
     std::printf("| %s | %.1f | %.1f |", name, static_cast<double>(bytes) / 1e6,
                 static_cast<double>(bytes) / static_cast<double>(full.size()));
-    for (const Size& size : kSizes) std::printf(" %.2f |", frame_time(backend, set, resized(cameras, size), repeats));
+    for (const Size& size : kSizes)
+      std::printf(" %.2f |", frame_time(backend, set, resized(cameras, size), repeats));
     if (floats == nullptr) {
       std::printf(" | |\n");
     } else {
-      const auto images = gsnav_convert::image_errors(full, *floats, resized(cameras, kSizes[1])).value();
+      const auto images =
+          gsnav_convert::image_errors(full, *floats, resized(cameras, kSizes[1])).value();
       std::printf(" %.1f | %.1f |\n", images.psnr, images.worst);
     }
   };
@@ -127,12 +138,14 @@ int main(int argc, char** argv) {
   row("packed", packed.bytes(), packed.set(), &unpacked_default);
   row("packed, means too", smaller.bytes(), smaller.set(), &unpacked);
   std::printf(
-      "\nthe last changes means by up to %.2g m (%.2g of a Gaussian's largest deviation), scales by %.2g of the "
+      "\nthe last changes means by up to %.2g m (%.2g of a Gaussian's largest deviation), scales by "
+      "%.2g of the "
       "largest,\n"
-      "rotations by %.2g rad, opacities by %.2g, coefficients of degree 0 by %.2g, others by %.2g (root mean square "
+      "rotations by %.2g rad, opacities by %.2g, coefficients of degree 0 by %.2g, others by %.2g (root "
+      "mean square "
       "%.2g)\n",
-      errors.mean, errors.mean_deviations, errors.scale, errors.rotation, errors.opacity, errors.sh0, errors.sh,
-      errors.sh_rms);
+      errors.mean, errors.mean_deviations, errors.scale, errors.rotation, errors.opacity, errors.sh0,
+      errors.sh, errors.sh_rms);
   std::printf("\n| packed alone | PSNR, dB | worst view, dB |\n| --- | --- | --- |\n");
   const auto alone = [&](const char* name, const auto& replace) {
     GaussianCloud one = full;

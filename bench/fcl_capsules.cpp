@@ -32,7 +32,8 @@ struct Body {
 
   explicit Body(const MovingCapsule<double>& m)
       : shape(std::make_shared<fcl::Capsuled>(m.begin.radius, norm(m.begin.p1 - m.begin.p0))),
-        begin(placement(m.begin)), end(placement(m.end)) {}
+        begin(placement(m.begin)),
+        end(placement(m.end)) {}
 };
 
 std::vector<Body> bodies(const std::vector<MovingCapsule<double>>& motions) {
@@ -47,7 +48,8 @@ struct FclPairs::Pairs {
   std::vector<Body> a, b;
 };
 
-FclPairs::FclPairs(const std::vector<MovingCapsule<double>>& a, const std::vector<MovingCapsule<double>>& b)
+FclPairs::FclPairs(const std::vector<MovingCapsule<double>>& a,
+                   const std::vector<MovingCapsule<double>>& b)
     : pairs_(new Pairs{bodies(a), bodies(b)}) {}
 FclPairs::~FclPairs() = default;
 

@@ -37,7 +37,8 @@ double best_ns(int repeats, const Run& run) {
   for (int i = 0; i < repeats; ++i) {
     const auto begin = std::chrono::steady_clock::now();
     run();
-    const double ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin).count();
+    const double ns =
+        std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin).count();
     if (ns < best) best = ns;
   }
   return best;
@@ -96,7 +97,9 @@ double measure_sort_ns(int threads) {
   for (std::size_t i = 0; i < kKeys; ++i) {
     input[i] = static_cast<std::uint64_t>(rng.below(1u << 22)) << 32 | i;
   }
-  const auto digit = [](std::uint64_t pair, int pass) { return (pair >> (32 + kBits * pass)) & (kDigits - 1); };
+  const auto digit = [](std::uint64_t pair, int pass) {
+    return (pair >> (32 + kBits * pass)) & (kDigits - 1);
+  };
   const double ns = best_ns(100, [&] {
 #pragma omp parallel num_threads(threads)
     {
@@ -148,8 +151,10 @@ double measure_bin_ns() {
   for (std::size_t i = 0; i < kSplats; ++i) {
     // 1.5 pairs a splat: three in ten span a second tile one way or the other, one in ten both.
     const std::size_t kind = rng.below(10);
-    ranges[i] = {static_cast<std::uint8_t>(rng.below(kColumns - 1)), static_cast<std::uint8_t>(rng.below(kColumns - 1)),
-                 static_cast<std::uint8_t>(kind < 2 ? 2 : 1), static_cast<std::uint8_t>(kind == 1 || kind == 2 ? 2 : 1)};
+    ranges[i] = {static_cast<std::uint8_t>(rng.below(kColumns - 1)),
+                 static_cast<std::uint8_t>(rng.below(kColumns - 1)),
+                 static_cast<std::uint8_t>(kind < 2 ? 2 : 1),
+                 static_cast<std::uint8_t>(kind == 1 || kind == 2 ? 2 : 1)};
     count += static_cast<std::size_t>(ranges[i].columns * ranges[i].rows);
   }
   const std::unique_ptr<Pair[]> pairs(new Pair[count + 4]);
@@ -184,7 +189,8 @@ F root(F x) noexcept {
 #if defined(__AVX512F__)
   if constexpr (kLanes == 16) {
     const F v = gsnav::max(x, F(1e-20f));
-    return v * F(reinterpret_cast<F::vector>(_mm512_maskz_rsqrt14_ps(kAll, reinterpret_cast<__m512>(v.v))));
+    return v *
+           F(reinterpret_cast<F::vector>(_mm512_maskz_rsqrt14_ps(kAll, reinterpret_cast<__m512>(v.v))));
   }
 #endif
   return gsnav::sqrt(gsnav::max(x, F(0.0f)));
@@ -192,8 +198,9 @@ F root(F x) noexcept {
 
 Ints truncated(F x) noexcept { return __builtin_convertvector(x.v, Ints); }
 
-/// Ellipses of many pairs by planes, relative to the corner of the pair's tile: mean, half width, the height
-/// at which the ellipse is widest to the right, 1 / half height, and the slope of its middle line.
+/// Ellipses of many pairs by planes, relative to the corner of the pair's tile: mean, half width, the
+/// height at which the ellipse is widest to the right, 1 / half height, and the slope of its middle
+/// line.
 struct Ellipses {
   const float *x, *y, *half_width, *widest, *inv_height, *slope;
 };
@@ -233,7 +240,7 @@ double measure_mask_ns() {
   const std::unique_ptr<std::int32_t[]> masks(new std::int32_t[kPairs]);
   Rng rng(3);
   for (std::size_t i = 0; i < kPairs; ++i) {
-    const double values[6] = {rng.uniform(0, 16),  rng.uniform(0, 16),   rng.uniform(1, 6),
+    const double values[6] = {rng.uniform(0, 16), rng.uniform(0, 16),    rng.uniform(1, 6),
                               rng.uniform(-2, 2), rng.uniform(0.2, 1.0), rng.uniform(-1, 1)};
     for (std::size_t k = 0; k < 6; ++k) planes[k * kPairs + i] = static_cast<float>(values[k]);
   }
@@ -264,7 +271,8 @@ F alpha_of(F e) noexcept {
   const auto hit = e >= F(-7.9943534f);
 #if defined(__AVX512DQ__)
   if constexpr (kLanes == 16) {
-    // e - floor(e), 2^f over [0, 1] by a cubic (relative error 1e-4), and 2^floor(e) by the instruction made for it.
+    // e - floor(e), 2^f over [0, 1] by a cubic (relative error 1e-4), and 2^floor(e) by the instruction
+    // made for it.
     const __m512 v = reinterpret_cast<__m512>(e.v);
     const F f(reinterpret_cast<F::vector>(_mm512_maskz_reduce_ps(kAll, v, 0x01)));
     F p = fma(f, F(0.078967257f), F(0.22469316f));
@@ -276,7 +284,8 @@ F alpha_of(F e) noexcept {
 #endif
   const F t = e + F(gsnav::detail::kRoundMagic);
   const F p = gsnav::detail::exp2_degree3(e - (t - F(gsnav::detail::kRoundMagic)));
-  const F alpha(gsnav::detail::floats<kLanes>(gsnav::detail::bits<kLanes>(p.v) + (gsnav::detail::bits<kLanes>(t.v) << 23)));
+  const F alpha(gsnav::detail::floats<kLanes>(gsnav::detail::bits<kLanes>(p.v) +
+                                              (gsnav::detail::bits<kLanes>(t.v) << 23)));
   return select(hit, gsnav::min(alpha, F(0.99f)), F(0.0f));
 }
 

@@ -7,7 +7,8 @@
 #include "gsnav/detail/frame/blend.hpp"
 
 // The loops whose times make the floor of a frame (floor.hpp), each alone with its data in cache where a
-// renderer could have it there, and the loop that counts a frame's fragments. Compiled for the processor at hand.
+// renderer could have it there, and the loop that counts a frame's fragments. Compiled for the processor
+// at hand.
 
 namespace gsnav_bench {
 
@@ -25,13 +26,14 @@ double measure_mask_ns();
 double measure_fragment_ns(bool color);
 
 struct FragmentCounts {
-  std::uint64_t evaluated = 0;  ///< 16 for each (block with an open pixel, Gaussian whose ellipse reaches it)
-  std::uint64_t needed = 0;     ///< 16 for those of them in which a pixel changed
-  std::uint64_t blended = 0;    ///< pixels changed
+  std::uint64_t evaluated =
+      0;  ///< 16 for each (block with an open pixel, Gaussian whose ellipse reaches it)
+  std::uint64_t needed = 0;   ///< 16 for those of them in which a pixel changed
+  std::uint64_t blended = 0;  ///< pixels changed
 };
 
-/// Walks all splats front to back. `transmittance`: [blocks][16] of 4x4 blocks, `columns` of them in a row; 1
-/// inside the image and 0 outside at first.
+/// Walks all splats front to back. `transmittance`: [blocks][16] of 4x4 blocks, `columns` of them in a
+/// row; 1 inside the image and 0 outside at first.
 FragmentCounts count_fragments(gsnav::View<const std::uint32_t> order,
                                gsnav::View<const gsnav::SplatGeometry<float>> geometry,
                                gsnav::View<const gsnav::SplatBounds> bounds,

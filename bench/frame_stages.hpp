@@ -12,18 +12,30 @@
 
 namespace gsnav_bench {
 
-/// The stages of one camera's frame, each on its own, on any backend: what `render_camera` runs in a row.
-/// One cloud, one origin, Response::ewa. Every stage reads what the one before it left and may be run any
-/// number of times; the constructor runs all but the blending once.
+/// The stages of one camera's frame, each on its own, on any backend: what `render_camera` runs in a
+/// row. One cloud, one origin, Response::ewa. Every stage reads what the one before it left and may be
+/// run any number of times; the constructor runs all but the blending once.
 template <class S, gsnav::Backend B>
 class FrameStages {
  public:
   FrameStages(B& backend, const gsnav::GaussianCloud& cloud, const gsnav::Camera& camera,
               const gsnav::RenderConfig& config = {})
-      : config_(config), backend_(&backend), arrays_(backend, cloud), offsets_(backend),
-        geometry_(backend), colors_(backend), depths_(backend), bounds_(backend), chunk_keys_(backend),
-        counts_(backend), order_(backend), cursors_(backend), tile_offsets_(backend),
-        tile_splats_(backend), spans_(backend), images_(backend) {
+      : config_(config),
+        backend_(&backend),
+        arrays_(backend, cloud),
+        offsets_(backend),
+        geometry_(backend),
+        colors_(backend),
+        depths_(backend),
+        bounds_(backend),
+        chunk_keys_(backend),
+        counts_(backend),
+        order_(backend),
+        cursors_(backend),
+        tile_offsets_(backend),
+        tile_splats_(backend),
+        spans_(backend),
+        images_(backend) {
     prepare_projection(camera);
     project();
     set_order();
@@ -127,7 +139,8 @@ class FrameStages {
     spans_.resize_discard(kSpans ? slots : 0);
     projected_.spans = spans_.view();
     project_.offsets = offsets_.view();
-    images_.resize_discard(static_cast<std::size_t>(3 * camera.width) * static_cast<std::size_t>(camera.height));
+    images_.resize_discard(static_cast<std::size_t>(3 * camera.width) *
+                           static_cast<std::size_t>(camera.height));
   }
 
   /// Depth order of the survivors, on the host: the sort has a benchmark of its own.

@@ -32,11 +32,13 @@ double psnr(const std::vector<float>& a, const std::vector<float>& b) {
 template <class F>
 void for_each_ray(std::size_t p, const F& f) {
   const std::size_t x = p % kSide, y = p / kSide;
-  for (std::size_t i = 0; i < kPhoto * kPhoto; ++i) f((y * kPhoto + i / kPhoto) * kFine + x * kPhoto + i % kPhoto);
+  for (std::size_t i = 0; i < kPhoto * kPhoto; ++i)
+    f((y * kPhoto + i / kPhoto) * kFine + x * kPhoto + i % kPhoto);
 }
 
-/// How far a depth is, relatively, from the nearest of those that a pixel's rays have: at an edge any of them is
-/// right, and one between them is not. A return where no ray has one, and none where all have: 1.
+/// How far a depth is, relatively, from the nearest of those that a pixel's rays have: at an edge any of
+/// them is right, and one between them is not. A return where no ray has one, and none where all
+/// have: 1.
 double depth_error(float depth, const std::vector<float>& fine, std::size_t pixel) {
   double least = std::numeric_limits<double>::infinity();
   for_each_ray(pixel, [&](std::size_t i) {
@@ -57,22 +59,24 @@ LodViews lod_views(const GaussianCloud& cloud, const std::vector<Camera>& camera
   LodViews views;
   views.cameras = cameras;
   for (const Camera& camera : cameras) {
-    Frames<float> fine = renderer.render(cloud.set(), eval::detail::magnified(camera, kLodPhoto)).value();
+    Frames<float> fine =
+        renderer.render(cloud.set(), eval::detail::magnified(camera, kLodPhoto)).value();
     std::vector<float>& out = views.rgb.emplace_back(3 * kSide * kSide);
     for (std::size_t p = 0; p < kSide * kSide; ++p) {
       double sum[3]{};
       for_each_ray(p, [&](std::size_t i) {
         for (std::size_t c = 0; c < 3; ++c) sum[c] += static_cast<double>(fine.rgb[3 * i + c]);
       });
-      for (std::size_t c = 0; c < 3; ++c) out[3 * p + c] = static_cast<float>(sum[c] / (kPhoto * kPhoto));
+      for (std::size_t c = 0; c < 3; ++c)
+        out[3 * p + c] = static_cast<float>(sum[c] / (kPhoto * kPhoto));
     }
     views.depths.push_back(std::move(fine.median_depth));
   }
   return views;
 }
 
-void LodRow::add(const std::vector<float>& rgb, const std::vector<float>& median_depth, double ms, double visible,
-                 double pairs) {
+void LodRow::add(const std::vector<float>& rgb, const std::vector<float>& median_depth, double ms,
+                 double visible, double pairs) {
   LodViews& views = *views_;
   const std::size_t view = count_++;
   const double quality = psnr(views.rgb[view], rgb);
@@ -81,7 +85,8 @@ void LodRow::add(const std::vector<float>& rgb, const std::vector<float>& median
   for (std::size_t p = 0; p < median_depth.size(); ++p) {
     depth_errors_.push_back(depth_error(median_depth[p], views.depths[view], p));
   }
-  if (views.each) std::printf("view %zu: %.2f dB, %+.2f, %.3f ms\n", views.first + view, quality, gain, ms);
+  if (views.each)
+    std::printf("view %zu: %.2f dB, %+.2f, %.3f ms\n", views.first + view, quality, gain, ms);
   quality_ += quality;
   worst_ = std::min(worst_, quality);
   if (gain < gain_) least_view_ = view;
@@ -93,17 +98,19 @@ void LodRow::add(const std::vector<float>& rgb, const std::vector<float>& median
 }
 
 void LodRow::print_head() {
-  std::printf("%-12s %6s %8s %8s %9s %5s %6s %8s %7s %9s %9s %9s %9s\n", "", "pixels", "mean dB", "worst",
-              "least +dB", "view", "below", "ms", "faster", "visible", "pairs", "z>2 %", "z p99 %");
+  std::printf("%-12s %6s %8s %8s %9s %5s %6s %8s %7s %9s %9s %9s %9s\n", "", "pixels", "mean dB",
+              "worst", "least +dB", "view", "below", "ms", "faster", "visible", "pairs", "z>2 %",
+              "z p99 %");
 }
 
 void LodRow::print(const char* name, double pixels) const {
   LodViews& views = *views_;
   const double n = static_cast<double>(count_);
   if (draw_ == LodDraw::direct) views.direct_ms = ms_ / n;
-  const auto off = std::count_if(depth_errors_.begin(), depth_errors_.end(), [](double e) { return e > 0.02; });
-  std::printf("%-12s %6.2f %8.2f %8.2f %9.2f %5zu %6zu %8.3f %7.2f %9.0f %9.0f %9.3f %9.3f\n", name, pixels,
-              quality_ / n, worst_, gain_, views.first + least_view_, below_, ms_ / n,
+  const auto off =
+      std::count_if(depth_errors_.begin(), depth_errors_.end(), [](double e) { return e > 0.02; });
+  std::printf("%-12s %6.2f %8.2f %8.2f %9.2f %5zu %6zu %8.3f %7.2f %9.0f %9.0f %9.3f %9.3f\n", name,
+              pixels, quality_ / n, worst_, gain_, views.first + least_view_, below_, ms_ / n,
               views.direct_ms / (ms_ / n), visible_ / n, pairs_ / n,
               100 * static_cast<double>(off) / static_cast<double>(depth_errors_.size()),
               100 * quantile(depth_errors_, 0.99));

@@ -24,9 +24,10 @@ enum class LodDraw {
 /// Views and what a photo of each would be: O_photo(kLodPhoto).
 struct LodViews {
   std::vector<gsnav::Camera> cameras;
-  std::vector<std::vector<float>> rgb;     ///< [H][W][3] a view
-  std::vector<std::vector<float>> depths;  ///< [k H][k W] a view: the median depths of the photo's own rays, metres
-  std::vector<double> direct;              ///< PSNR of direct rendering, once its row was drawn
+  std::vector<std::vector<float>> rgb;  ///< [H][W][3] a view
+  std::vector<std::vector<float>>
+      depths;                  ///< [k H][k W] a view: the median depths of the photo's own rays, metres
+  std::vector<double> direct;  ///< PSNR of direct rendering, once its row was drawn
   double direct_ms = 0;
   std::size_t first = 0;  ///< number of the first camera
   bool each = false;      ///< print every view
@@ -40,8 +41,8 @@ class LodRow {
  public:
   LodRow(LodViews& views, LodDraw draw) : views_(&views), draw_(draw) {}
   /// The next view: its images, [H][W][3] and [H][W] metres (0: no return), and milliseconds.
-  void add(const std::vector<float>& rgb, const std::vector<float>& median_depth, double ms, double visible,
-           double pairs);
+  void add(const std::vector<float>& rgb, const std::vector<float>& median_depth, double ms,
+           double visible, double pairs);
   void print(const char* name, double pixels) const;
   static void print_head();
 

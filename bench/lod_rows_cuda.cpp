@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench_lod on a GPU: one camera a call, then all views in one, milliseconds a frame between events on the stream, the
-// copy of the cut's chunks among them; the cut itself is the host's.
+// bench_lod on a GPU: one camera a call, then all views in one, milliseconds a frame between events on
+// the stream, the copy of the cut's chunks among them; the cut itself is the host's.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -10,8 +10,8 @@
 
 #include "device_time.hpp"
 #include "gsnav/backends/cuda/batch.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
+#include "gsnav/scene/renderer.hpp"
 #include "lod_rows.hpp"
 
 using namespace gsnav;
@@ -56,13 +56,15 @@ class GpuRows {
       BatchImages images;
       images.floats.rgb = memory_.data();
       double least = 1e9, pairs = 0;
-      for (int repeat = 0; repeat < 9; ++repeat) least = std::min(least, draw_once(draw, camera, images, pairs));
+      for (int repeat = 0; repeat < 9; ++repeat)
+        least = std::min(least, draw_once(draw, camera, images, pairs));
       cuda_.copy(rgb.data(), images.floats.rgb, rgb.size() * sizeof(float), CopyKind::device_to_host);
       BatchImages depths;
       depths.floats.median_depth = memory_.data() + 3 * kPixels;
       double ignored = 0;
       draw_once(draw, camera, depths, ignored);
-      cuda_.copy(depth.data(), depths.floats.median_depth, depth.size() * sizeof(float), CopyKind::device_to_host);
+      cuda_.copy(depth.data(), depths.floats.median_depth, depth.size() * sizeof(float),
+                 CopyKind::device_to_host);
       cuda_.synchronize().throw_if_error();
       out.add(rgb, depth, least, static_cast<double>(drawn_), pairs);
     }
@@ -122,16 +124,19 @@ class GpuRows {
       }));
       renderer.finish().throw_if_error();
     }
-    const double pairs = static_cast<double>(renderer.stats().tile_intersections) / static_cast<double>(n);
+    const double pairs =
+        static_cast<double>(renderer.stats().tile_intersections) / static_cast<double>(n);
     renderer.render(sets, batch, depths).throw_if_error();
     renderer.finish().throw_if_error();
     std::vector<float> rgb(3 * kPixels), depth(kPixels);
     for (std::size_t c = 0; c < n; ++c) {
-      cuda_.copy(rgb.data(), images.floats.rgb + 3 * c * kPixels, rgb.size() * sizeof(float), CopyKind::device_to_host);
+      cuda_.copy(rgb.data(), images.floats.rgb + 3 * c * kPixels, rgb.size() * sizeof(float),
+                 CopyKind::device_to_host);
       cuda_.copy(depth.data(), depths.floats.median_depth + c * kPixels, depth.size() * sizeof(float),
                  CopyKind::device_to_host);
       cuda_.synchronize().throw_if_error();
-      out.add(rgb, depth, least * 1e-3 / static_cast<double>(n), static_cast<double>(drawn) / static_cast<double>(n), pairs);
+      out.add(rgb, depth, least * 1e-3 / static_cast<double>(n),
+              static_cast<double>(drawn) / static_cast<double>(n), pairs);
     }
     out.print(name, pixels);
   }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled with -march=native. Only functions that are always inlined are called: no other object can pick
-// up code of this one's instruction set.
+// Compiled with -march=native. Only functions that are always inlined are called: no other object can
+// pick up code of this one's instruction set.
 #include "native_lanes.hpp"
 
-#include "gsnav/skin/lbs.hpp"
-#include "gsnav/frame/sh.hpp"
 #include "gsnav/detail/math/pack.hpp"
+#include "gsnav/frame/sh.hpp"
+#include "gsnav/skin/lbs.hpp"
 
 namespace gsnav_bench {
 
@@ -18,7 +18,8 @@ int native_width() noexcept { return GSNAV_PACK_WIDTH; }
 
 void native_sh(const ShPlanes& planes, int degree, std::size_t begin, std::size_t end) noexcept {
   for (std::size_t i = begin; i < end; i += kStep) {
-    gsnav::Vec3<F> d{F::load(planes.deltas[0] + i), F::load(planes.deltas[1] + i), F::load(planes.deltas[2] + i)};
+    gsnav::Vec3<F> d{F::load(planes.deltas[0] + i), F::load(planes.deltas[1] + i),
+                     F::load(planes.deltas[2] + i)};
     if (degree > 0) {
       const F n = gsnav::norm(d);
       const auto far = n > F(1e-12f);

@@ -19,7 +19,8 @@ struct ShPlanes {
 /// Floats in a pack.
 int native_width() noexcept;
 
-/// SH colours of the Gaussians [begin, end), both multiples of native_width(): the bits of gaussian_color.
+/// SH colours of the Gaussians [begin, end), both multiples of native_width(): the bits of
+/// gaussian_color.
 void native_sh(const ShPlanes& planes, int degree, std::size_t begin, std::size_t end) noexcept;
 
 /// Polar rotations of the matrices [begin, end), both multiples of native_width(): the bits of

@@ -75,7 +75,8 @@ class TimedBackend : public Base {
                          std::is_same_v<F, gsnav::ScatterTileIntersections<S>>) {
       return Stage::bin;
     } else if constexpr (requires(const F& f) { f.digit; } ||
-                         std::is_same_v<F, gsnav::detail::RankTiesOfRange>) {  // passes of the radix sort
+                         std::is_same_v<F,
+                                        gsnav::detail::RankTiesOfRange>) {  // passes of the radix sort
       return Stage::sort;
     } else {
       return Stage::other;
@@ -88,7 +89,8 @@ class TimedBackend : public Base {
     namespace stage = gsnav::stage;
     if constexpr (std::is_same_v<S, stage::Project>) {
       return Stage::project;
-    } else if constexpr (std::is_same_v<S, stage::CountTiles> || std::is_same_v<S, stage::ScatterTiles>) {
+    } else if constexpr (std::is_same_v<S, stage::CountTiles> ||
+                         std::is_same_v<S, stage::ScatterTiles>) {
       return Stage::bin;
     } else if constexpr (std::is_same_v<S, stage::Blend> || std::is_same_v<S, stage::BlendWithMeshes>) {
       return Stage::blend;

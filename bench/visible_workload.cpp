@@ -56,7 +56,8 @@ VisibleSets workload_visible_sets(VisibleSettings settings) {
   settings.serve(*std::max_element(cameras.begin(), cameras.end(), [](const Camera& x, const Camera& y) {
     return std::max(x.fx, x.fy) < std::max(y.fx, y.fy);
   }));
-  const std::vector<Vec3d> viewpoints = navmesh_viewpoints(built.mesh, heights, settings.spacing()).value();
+  const std::vector<Vec3d> viewpoints =
+      navmesh_viewpoints(built.mesh, heights, settings.spacing()).value();
   settings.most_share = 1;  // measured also where nothing is gained
   OpenMPBackend backend;
   const auto start = std::chrono::steady_clock::now();

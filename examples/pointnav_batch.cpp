@@ -9,19 +9,23 @@
 
 int main() {
   gsnav::OpenMPBackend backend;
-  auto scene = std::make_shared<const gsnav::SimulatorScene>(gsnav::default_simulator_scene(3, 1, 0.2).value());
+  auto scene =
+      std::make_shared<const gsnav::SimulatorScene>(gsnav::default_simulator_scene(3, 1, 0.2).value());
   auto episodes = gsnav::generate_episodes(*scene->navmesh, 64, 1).value();
   auto episode_of = [&](std::size_t e, std::size_t k) -> gsnav::Result<gsnav::BatchEpisode> {
     return gsnav::BatchEpisode{0, episodes[(16 * k + e) % 64]};
   };
-  auto sim = gsnav::make_batch_simulator(backend, {scene}, {{.sensors = gsnav::rgbd_sensors(64, 64)}}, 16, episode_of).value();
+  auto sim = gsnav::make_batch_simulator(backend, {scene}, {{.sensors = gsnav::rgbd_sensors(64, 64)}},
+                                         16, episode_of)
+                 .value();
   gsnav::GeodesicFollower policy;
   auto out = sim.reset().value();
   std::vector<gsnav::EpisodeMetrics> ended;
   for (int i = 0; i < 60; ++i) {
     std::vector<gsnav::Action> actions;
     for (std::size_t e = 0; e < 16; ++e) actions.push_back(policy.next(sim.world(e)));
-    out = sim.step(actions).value();  // out.images[0].data: [16][64][64][3], out.rewards[e], out.terminated[e]
+    out = sim.step(actions)
+              .value();  // out.images[0].data: [16][64][64][3], out.rewards[e], out.terminated[e]
     ended.insert(ended.end(), out.final_metrics.begin(), out.final_metrics.end());
   }
   std::printf("%zu episodes, SR %.2f\n", ended.size(), gsnav::summarize(ended).success_rate);

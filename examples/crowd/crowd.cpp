@@ -34,7 +34,8 @@ Person walker(const NavMesh& mesh, Rng& rng) {
     const NavPoint to = mesh.random_point(rng, 0);
     const auto path = mesh.path_between(from, to);
     if (!path || path->length < 1.0) continue;
-    for (double done = 0; done < path->length; done += speed * kTick) out.at.push_back(along(path->points, done));
+    for (double done = 0; done < path->length; done += speed * kTick)
+      out.at.push_back(along(path->points, done));
     from = to;
   }
   return out;
@@ -64,7 +65,8 @@ void add_body(const Person& p, std::size_t tick, std::uint32_t id, std::vector<D
 
 class Agent {
  public:
-  Agent(const NavMesh& mesh, const Episode& episode, Policy policy) : mesh_(mesh), episode_(episode), policy_(policy) {
+  Agent(const NavMesh& mesh, const Episode& episode, Policy policy)
+      : mesh_(mesh), episode_(episode), policy_(policy) {
     state_ = {episode.start.position, kRadius, kHeight, episode.start.poly};
     field_.emplace_back(GeodesicField::make(mesh, std::span(&episode.goal.position, 1), kSnap).value());
   }
@@ -77,7 +79,9 @@ class Agent {
     const CapsuleSet& now = episode_.ticks[tick];
     Vec3d displacement = towards_goal() * (kSpeed * kTick);
     if (policy_ == Policy::local) {
-      displacement = plan_velocity(mesh_, state_, towards_goal() * kSpeed, now, {.max_speed = kSpeed}).velocity * kTick;
+      displacement =
+          plan_velocity(mesh_, state_, towards_goal() * kSpeed, now, {.max_speed = kSpeed}).velocity *
+          kTick;
     } else if (policy_ == Policy::in_time) {
       displacement = planned(tick, slowest);
     }
@@ -93,7 +97,8 @@ class Agent {
  private:
   /// The direction of the shortest path, as long as the agent may go in a tick, in ticks.
   Vec3d towards_goal() const {
-    const auto path = mesh_.path_between({state_.position, state_.poly}, *mesh_.snap_point(episode_.goal.position, kSnap));
+    const auto path = mesh_.path_between({state_.position, state_.poly},
+                                         *mesh_.snap_point(episode_.goal.position, kSnap));
     if (!path) return {};
     for (const Vec3d& p : path->points) {
       Vec3d d = p - state_.position;
@@ -109,9 +114,11 @@ class Agent {
     const bool off = !plan_.points.empty() && norm(plan_.at(now) - state_.position) > 0.02;
     if (plan_.points.empty() || off || now >= made_ + 1.0 || next > plan_.points.back().time) {
       const auto begin = std::chrono::steady_clock::now();
-      const auto known = std::span(episode_.ticks).subspan(tick, static_cast<std::size_t>(kHorizon / kTick));
+      const auto known =
+          std::span(episode_.ticks).subspan(tick, static_cast<std::size_t>(kHorizon / kTick));
       plan_ = plan_in_time(mesh_, state_, episode_.goal.position, known, {.speed = kSpeed}, &field_[0]);
-      slowest = max(slowest, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+      slowest =
+          max(slowest, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
       made_ = now;
     }
     if (plan_.points.empty() || next > plan_.points.back().time + kTick) return towards_goal() * 0.0;
@@ -131,10 +138,14 @@ class Agent {
 
 const char* name_of(Policy policy) {
   switch (policy) {
-    case Policy::none: return "no avoidance";
-    case Policy::filter: return "follower + filter";
-    case Policy::local: return "local planner";
-    default: return "time-aware planner";
+    case Policy::none:
+      return "no avoidance";
+    case Policy::filter:
+      return "follower + filter";
+    case Policy::local:
+      return "local planner";
+    default:
+      return "time-aware planner";
   }
 }
 
@@ -174,15 +185,16 @@ Outcome run(const NavMesh& mesh, const Episode& episode, Policy policy) {
     record.moved = norm(agent.state().position - before);
     record.wall_collision = r.hit_wall;
     record.capsule_blocked = r.blocked_by == BlockedBy::capsule;
-    record.avatar_contact =
-        r.pushed_into || std::any_of(distances.begin(), distances.end(), [](double d) { return d <= 0; });
+    record.avatar_contact = r.pushed_into || std::any_of(distances.begin(), distances.end(),
+                                                         [](double d) { return d <= 0; });
     record.avatar_distances = distances;
     tracker.add(record);
     out.track.push_back(agent.state().position);
     out.seconds = static_cast<double>(k + 1) * kTick;
     stopped = agent.left() < 0.75 * kSuccess;
   }
-  out.metrics = tracker.finish(stopped, agent.left(), norm(episode.goal.position - agent.state().position), kSuccess);
+  out.metrics = tracker.finish(stopped, agent.left(),
+                               norm(episode.goal.position - agent.state().position), kSuccess);
   return out;
 }
 

@@ -8,16 +8,16 @@
 #include "gsnav/nav.hpp"
 #include "gsnav/sim/metrics.hpp"
 
-// People who walk to and fro between places of a NavMesh, each by the shortest path, and an agent that has to get
-// from one place to another among them in four ways. Nobody gives way to the agent.
+// People who walk to and fro between places of a NavMesh, each by the shortest path, and an agent that
+// has to get from one place to another among them in four ways. Nobody gives way to the agent.
 
 namespace crowd {
 
-inline constexpr double kTick = 0.25;          ///< seconds
-inline constexpr double kHorizon = 10.0;       ///< seconds of known motion that a plan is made with
-inline constexpr double kLimit = 60.0;         ///< seconds of an episode
-inline constexpr double kSpeed = 1.0;          ///< of the agent, metres a second
-inline constexpr double kSuccess = 0.2;        ///< metres
+inline constexpr double kTick = 0.25;     ///< seconds
+inline constexpr double kHorizon = 10.0;  ///< seconds of known motion that a plan is made with
+inline constexpr double kLimit = 60.0;    ///< seconds of an episode
+inline constexpr double kSpeed = 1.0;     ///< of the agent, metres a second
+inline constexpr double kSuccess = 0.2;   ///< metres
 inline constexpr double kRadius = 0.18, kHeight = 1.5;  ///< of the agent, metres
 
 enum class Policy {
@@ -45,9 +45,9 @@ Episode make_episode(const gsnav::NavMesh& mesh, std::uint64_t seed, int people)
 
 struct Outcome {
   gsnav::EpisodeMetrics metrics;
-  double seconds = 0;                ///< until the goal or the limit
-  double slowest_plan = 0;           ///< seconds of wall-clock time, a plan
-  std::vector<gsnav::Vec3d> track;   ///< of the agent, a point a tick
+  double seconds = 0;               ///< until the goal or the limit
+  double slowest_plan = 0;          ///< seconds of wall-clock time, a plan
+  std::vector<gsnav::Vec3d> track;  ///< of the agent, a point a tick
 };
 
 Outcome run(const gsnav::NavMesh& mesh, const Episode& episode, Policy policy);

@@ -23,8 +23,8 @@ constexpr Rgb kPaper{0.97f, 0.97f, 0.96f}, kFloor{0.86f, 0.88f, 0.90f}, kPeople{
     kAgent{0.10f, 0.35f, 0.75f}, kGoal{0.15f, 0.60f, 0.30f}, kInk{0.2f, 0.2f, 0.2f};
 
 /// What one policy did until a tick, from above.
-void draw(Canvas& canvas, const NavMesh& mesh, const crowd::Episode& e, const crowd::Outcome& o, std::size_t tick,
-          double x0, double y0) {
+void draw(Canvas& canvas, const NavMesh& mesh, const crowd::Episode& e, const crowd::Outcome& o,
+          std::size_t tick, double x0, double y0) {
   const Vec3d low = mesh.bounds().low;
   const auto x = [&](const Vec3d& p) { return x0 + (p.x - low.x) * kPixels; };
   const auto y = [&](const Vec3d& p) { return y0 + (p.z - low.z) * kPixels; };
@@ -50,7 +50,8 @@ Status save(const std::filesystem::path& path, const Canvas& c) {
   return io::save_png_rgb8(path, c.bytes(), c.width(), c.height());
 }
 
-/// Rows are policies in the order of the table, columns times; and a frame a tick with all four side by side.
+/// Rows are policies in the order of the table, columns times; and a frame a tick with all four side by
+/// side.
 Status pictures(const std::filesystem::path& folder, const NavMesh& mesh, const crowd::Episode& e,
                 const std::vector<crowd::Outcome>& outcomes, bool frames) {
   const Vec3d size = mesh.bounds().high - mesh.bounds().low;
@@ -73,7 +74,8 @@ Status pictures(const std::filesystem::path& folder, const NavMesh& mesh, const 
   for (std::size_t tick = 0; frames && tick <= last; ++tick) {
     Canvas frame(2 * w + kGap, 2 * h + kGap, kPaper);
     for (std::size_t i = 0; i < outcomes.size(); ++i) {
-      draw(frame, mesh, e, outcomes[i], tick, kGap + static_cast<double>(i % 2) * w, kGap + static_cast<double>(i / 2) * h);
+      draw(frame, mesh, e, outcomes[i], tick, kGap + static_cast<double>(i % 2) * w,
+           kGap + static_cast<double>(i / 2) * h);
     }
     char name[32];
     std::snprintf(name, sizeof name, "frame_%04zu.png", tick);
@@ -85,18 +87,27 @@ Status pictures(const std::filesystem::path& folder, const NavMesh& mesh, const 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Four ways through a crowd in the embedded flat: the shortest path through everybody, the same by the step "
-               "filter, the local planner, the planner in time. A table on standard output; with --out a strip of "
-               "pictures of the first episode among ten people (rows: the four ways, columns: seconds), with --frames a "
-               "picture for each quarter of a second, for a video."};
+  CLI::App app{
+      "Four ways through a crowd in the embedded flat: the shortest path through everybody, the same by "
+      "the step "
+      "filter, the local planner, the planner in time. A table on standard output; with --out a strip "
+      "of "
+      "pictures of the first episode among ten people (rows: the four ways, columns: seconds), with "
+      "--frames a "
+      "picture for each quarter of a second, for a video."};
   int episodes = 50;
   std::vector<int> people{10, 30, 100};
   std::string out;
   bool frames = false;
   std::uint64_t seed = 1000000;
-  app.add_option("--episodes", episodes, "For each number of people")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--people", people, "How many walk there")->check(CLI::NonNegativeNumber)->capture_default_str();
-  app.add_option("--seed", seed, "Of the first episode; the local planner's weights were chosen on those from 0")
+  app.add_option("--episodes", episodes, "For each number of people")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--people", people, "How many walk there")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--seed", seed,
+                 "Of the first episode; the local planner's weights were chosen on those from 0")
       ->capture_default_str();
   app.add_option("--out", out, "Folder for the pictures");
   app.add_flag("--frames", frames, "A picture for each tick, too");
@@ -108,8 +119,10 @@ int main(int argc, char** argv) {
 
   const DefaultScene flat = make_default_scene(0.05).value();
   const NavMesh mesh = NavMesh::build({}, flat.vertices, flat.triangles).value();
-  std::printf("| people | policy | success %% | SPL %% | CR %% | PSI %% | episodes with contact %% | mean s | slowest plan ms |\n"
-              "|---|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "| people | policy | success %% | SPL %% | CR %% | PSI %% | episodes with contact %% | mean s | "
+      "slowest plan ms |\n"
+      "|---|---|---|---|---|---|---|---|---|\n");
   bool drawn = out.empty();
   for (const int n : people) {
     std::vector<crowd::Episode> list;
@@ -131,8 +144,9 @@ int main(int argc, char** argv) {
         if (&e == &list.front()) first.push_back(std::move(o));
       }
       const double share = 100.0 / episodes;
-      std::printf("| %d | %s | %.0f | %.1f | %.2f | %.2f | %.0f | %.1f | %.1f |\n", n, crowd::name_of(policy),
-                  share * success, share * spl, share * cr, share * psi, share * contact, seconds / episodes, 1e3 * slowest);
+      std::printf("| %d | %s | %.0f | %.1f | %.2f | %.2f | %.0f | %.1f | %.1f |\n", n,
+                  crowd::name_of(policy), share * success, share * spl, share * cr, share * psi,
+                  share * contact, seconds / episodes, 1e3 * slowest);
       std::fflush(stdout);
     }
     if (drawn) continue;

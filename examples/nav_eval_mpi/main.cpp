@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// An evaluation over ranks: mpirun -n 4 nav_eval_mpi --episodes 100. Episodes are scattered, each is journalled to disk
-// as it ends, metrics are gathered in the order of episodes: the same numbers for any number of ranks. Started again,
-// with any number of them, it plays what is missing.
+// An evaluation over ranks: mpirun -n 4 nav_eval_mpi --episodes 100. Episodes are scattered, each is
+// journalled to disk as it ends, metrics are gathered in the order of episodes: the same numbers for any
+// number of ranks. Started again, with any number of them, it plays what is missing.
 #include <mpi.h>
 
 #include <cstdio>
@@ -54,7 +54,8 @@ struct Ranks {
     MPI_Gather(&size, 1, MPI_INT, sizes.data(), 1, MPI_INT, 0, MPI_COMM_WORLD);
     for (std::size_t i = 1; i < at.size(); ++i) at[i] = at[i - 1] + sizes[i - 1];
     std::string all(rank == 0 ? static_cast<std::size_t>(at.back() + sizes.back()) : 0, '\0');
-    MPI_Gatherv(own.data(), size, MPI_CHAR, all.data(), sizes.data(), at.data(), MPI_CHAR, 0, MPI_COMM_WORLD);
+    MPI_Gatherv(own.data(), size, MPI_CHAR, all.data(), sizes.data(), at.data(), MPI_CHAR, 0,
+                MPI_COMM_WORLD);
     return all;
   }
 
@@ -63,7 +64,8 @@ struct Ranks {
 
 using Look = std::function<Status(const gsnav::World&)>;
 
-/// Draws the agent's sensors, as for a policy that looks. The policies here do not: the numbers are the same.
+/// Draws the agent's sensors, as for a policy that looks. The policies here do not: the numbers are the
+/// same.
 template <class B>
 gsnav::Result<Look> looker(std::shared_ptr<B> backend, const gsnav_eval::Stage& stage) {
   auto made = gsnav::Simulator<B>::create(*backend, stage.scene, stage.config);
@@ -79,8 +81,8 @@ gsnav::Result<Look> looker(std::shared_ptr<B> backend, const gsnav_eval::Stage& 
   });
 }
 
-gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o, const gsnav_eval::Stage& stage,
-                           const std::string& backend) {
+gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o,
+                           const gsnav_eval::Stage& stage, const std::string& backend) {
   if (backend == "none") return Look{};
   if (backend == "openmp") return looker(std::make_shared<gsnav::OpenMPBackend>(o.threads), stage);
 #if defined(GSNAV_HAS_CUDA)
@@ -88,7 +90,8 @@ gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o, con
     return looker(std::make_shared<gsnav::CudaBackend>(ranks.on_node % gpus), stage);
   }
 #endif
-  return Status(gsnav::Errc::unsupported, "--draw cuda: no GPU, or a build without CUDA, for rank " + std::to_string(ranks.rank));
+  return Status(gsnav::Errc::unsupported,
+                "--draw cuda: no GPU, or a build without CUDA, for rank " + std::to_string(ranks.rank));
 }
 
 Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& backend) {
@@ -109,14 +112,15 @@ Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& 
   }
   ranks.share(missing);
 
-  auto world = gsnav::World::create(stage->scene->navmesh, stage->config.task, [&](double t0, double t1, auto& out) {
-    gsnav::append_bodies(*stage->scene, t0, t1, out);
-  });
+  auto world = gsnav::World::create(
+      stage->scene->navmesh, stage->config.task,
+      [&](double t0, double t1, auto& out) { gsnav::append_bodies(*stage->scene, t0, t1, out); });
   if (!world) return world.status();
   const auto look = looker(ranks, o, *stage, backend);
   if (!look) return look.status();
   std::string lines;
-  for (std::size_t k = static_cast<std::size_t>(ranks.rank); k < missing.size(); k += static_cast<std::size_t>(ranks.count)) {
+  for (std::size_t k = static_cast<std::size_t>(ranks.rank); k < missing.size();
+       k += static_cast<std::size_t>(ranks.count)) {
     auto record = gsnav_eval::play(*world, o, stage->episodes[missing[k]], missing[k], *look);
     if (!record) return record.status();
     lines += gsnav_eval::line_of(*record) + '\n';
@@ -133,9 +137,11 @@ Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& 
   std::vector<gsnav::EpisodeMetrics> metrics;
   for (const auto& [number, record] : records) metrics.push_back(record.metrics);
   const gsnav::MetricsSummary s = gsnav::summarize(metrics);
-  std::printf("%zu episodes (%zu played by %d ranks): SR %.17g SPL %.17g SoftSPL %.17g STL %.17g DTG %.17g CR %.17g PSI %.17g\n",
-              s.episodes, missing.size(), ranks.count, s.success_rate, s.spl, s.soft_spl, s.stl, s.distance_to_goal,
-              s.collision_rate, s.psi);
+  std::printf(
+      "%zu episodes (%zu played by %d ranks): SR %.17g SPL %.17g SoftSPL %.17g STL %.17g DTG %.17g CR "
+      "%.17g PSI %.17g\n",
+      s.episodes, missing.size(), ranks.count, s.success_rate, s.spl, s.soft_spl, s.stl,
+      s.distance_to_goal, s.collision_rate, s.psi);
   return {};
 }
 
@@ -145,9 +151,12 @@ int main(int argc, char** argv) {
   const Ranks ranks(&argc, &argv);
   gsnav_eval::Options o;
   std::string backend = "none";
-  CLI::App app{"Evaluates a policy over MPI ranks, to the journal of gsnav-eval, which makes the page of it."};
+  CLI::App app{
+      "Evaluates a policy over MPI ranks, to the journal of gsnav-eval, which makes the page of it."};
   gsnav_eval::add_world_options(app, o);
-  app.add_option("--draw", backend, "what the agent sees at each step, by openmp or by cuda (one GPU a rank); none: nothing")
+  app.add_option(
+         "--draw", backend,
+         "what the agent sees at each step, by openmp or by cuda (one GPU a rank); none: nothing")
       ->capture_default_str()
       ->check(CLI::IsMember({"none", "openmp", "cuda"}));
   CLI11_PARSE(app, argc, argv);

@@ -138,7 +138,8 @@ int main(int argc, char** argv) try {
   CLI::App app{
       "Runs PointNav episodes in a scene of Gaussians with people walking in it, and writes frames, a "
       "strip, a\n"
-      "map, metrics.json and timings.json. Without arguments: an embedded furnished flat with three people."};
+      "map, metrics.json and timings.json. Without arguments: an embedded furnished flat with three "
+      "people."};
   app.add_option("--scene", o.scene,
                  "scene to load: .ply, .sog, meta.json or its folder; a comma joins sibling tiles");
   app.add_option("--up", o.up, "axis of the scene that points up: x, y, z, -x, -y or -z")
@@ -173,11 +174,13 @@ int main(int argc, char** argv) try {
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3.0));
   app.add_option("--profile", o.profile,
-                 "accuracy: exact, fast (a cheaper exponential), or lod: a level of detail for each part of the scene, kept "
+                 "accuracy: exact, fast (a cheaper exponential), or lod: a level of detail for each "
+                 "part of the scene, kept "
                  "beside its file")
       ->check(CLI::IsMember({"exact", "fast", "lod"}))
       ->capture_default_str();
-  app.add_option("--lod-error", o.lod_error, "of the profile lod: how far merged Gaussians may be off, pixels")
+  app.add_option("--lod-error", o.lod_error,
+                 "of the profile lod: how far merged Gaussians may be off, pixels")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
   app.add_flag("--visible-sets", o.visible_sets,
@@ -197,7 +200,8 @@ int main(int argc, char** argv) try {
       ->check(CLI::Range(1, 1000000));
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   if (o.shown_episode >= o.episodes) {
-    std::fprintf(stderr, "nav_loop: --show %d: of %d episodes the last is %d\n", o.shown_episode, o.episodes, o.episodes - 1);
+    std::fprintf(stderr, "nav_loop: --show %d: of %d episodes the last is %d\n", o.shown_episode,
+                 o.episodes, o.episodes - 1);
     return 2;
   }
   if (o.visible_sets && o.profile == "exact") {

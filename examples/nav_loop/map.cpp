@@ -102,21 +102,24 @@ MapFrame fit_map(const gsnav::NavMesh& navmesh, int width, int height) {
   const gsnav::Aabb<double> box = navmesh.bounds();
   const double w = box.high.x - box.low.x + 2 * kMargin, h = box.high.z - box.low.z + 2 * kMargin;
   const double scale = std::min(width / w, height / h);
-  return {box.low.x - kMargin - 0.5 * (width / scale - w), box.low.z - kMargin - 0.5 * (height / scale - h), scale};
+  return {box.low.x - kMargin - 0.5 * (width / scale - w),
+          box.low.z - kMargin - 0.5 * (height / scale - h), scale};
 }
 
-void draw_polyline(Canvas& canvas, const MapFrame& f, std::span<const Vec3d> points, double radius, Rgb color,
-                   float alpha) {
+void draw_polyline(Canvas& canvas, const MapFrame& f, std::span<const Vec3d> points, double radius,
+                   Rgb color, float alpha) {
   for (std::size_t i = 1; i < points.size(); ++i) {
     canvas.stroke(f.x(points[i - 1]), f.y(points[i - 1]), f.x(points[i]), f.y(points[i]), radius, color,
                   alpha);
   }
 }
 
-void draw_bodies(Canvas& canvas, const MapFrame& f, std::span<const gsnav::DynamicCapsule> bodies, float alpha) {
+void draw_bodies(Canvas& canvas, const MapFrame& f, std::span<const gsnav::DynamicCapsule> bodies,
+                 float alpha) {
   for (const gsnav::DynamicCapsule& body : bodies) {
     const gsnav::Capsule<double>& c = body.motion.begin;
-    canvas.stroke(f.x(c.p0), f.y(c.p0), f.x(c.p1), f.y(c.p1), c.radius * f.scale, avatar_color(body.avatar), alpha);
+    canvas.stroke(f.x(c.p0), f.y(c.p0), f.x(c.p1), f.y(c.p1), c.radius * f.scale,
+                  avatar_color(body.avatar), alpha);
   }
 }
 

@@ -38,9 +38,10 @@ MapFrame fit_map(const gsnav::NavMesh& navmesh, int width, int height);
 
 /// The scene from above without its ceiling, washed out, and the NavMesh on it.
 void draw_ground(Canvas& canvas, const MapFrame& frame, const MapContent& content);
-void draw_bodies(Canvas& canvas, const MapFrame& frame, std::span<const gsnav::DynamicCapsule> bodies, float alpha);
-void draw_polyline(Canvas& canvas, const MapFrame& frame, std::span<const gsnav::Vec3d> points, double radius, Rgb color,
-                   float alpha);
+void draw_bodies(Canvas& canvas, const MapFrame& frame, std::span<const gsnav::DynamicCapsule> bodies,
+                 float alpha);
+void draw_polyline(Canvas& canvas, const MapFrame& frame, std::span<const gsnav::Vec3d> points,
+                   double radius, Rgb color, float alpha);
 
 /// The ground with everything else on top.
 Canvas draw_map(const MapContent& content);

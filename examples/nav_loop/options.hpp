@@ -4,16 +4,16 @@
 #include <cstdint>
 #include <string>
 
+#include "../../tools/common/navmesh_options.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "../../tools/common/navmesh_options.hpp"
 
 namespace nav_loop {
 
 /// What the command line asks for.
 struct Options : NavMeshOptions {
-  std::string scene;  ///< empty: the embedded flat
+  std::string scene;     ///< empty: the embedded flat
   double density = 1.0;  ///< of the embedded flat's Gaussians and of people's
   std::string up = "y";
   int avatars = 3;
@@ -27,9 +27,9 @@ struct Options : NavMeshOptions {
   double eye_height = 1.5;
   std::string profile = "exact";  ///< exact, fast, lod
   double lod_error = gsnav::LodChoice{}.pixels;
-  bool visible_sets = false;     ///< of fast and lod: draw only what is seen from where the agent is
-  int frame_every = 10;          ///< 0: no frames
-  int shown_episode = -1;        ///< of strip and map; -1: the one that met people most closely
+  bool visible_sets = false;  ///< of fast and lod: draw only what is seen from where the agent is
+  int frame_every = 10;       ///< 0: no frames
+  int shown_episode = -1;     ///< of strip and map; -1: the one that met people most closely
   int max_steps = 500;
 };
 

@@ -86,18 +86,12 @@ gsnav::Status write_json(const std::string& path, const Options& o, const SceneF
   nlohmann::ordered_json j;
   j["gsnav"] = std::to_string(GSNAV_VERSION_MAJOR) + "." + std::to_string(GSNAV_VERSION_MINOR) + "." +
                std::to_string(GSNAV_VERSION_PATCH);
-  j["config"] = {{"scene", f.name},
-                 {"up", o.up},
-                 {"avatars", o.avatars},
-                 {"episodes", o.episodes},
-                 {"backend", f.backend},
-                 {"seed", o.seed},
-                 {"width", o.width},
-                 {"height", o.height},
-                 {"hfov", o.hfov},
-                 {"eye_height", o.eye_height},
-                 {"profile", o.profile},
-                 {"max_steps", o.max_steps}};
+  j["config"] = {{"scene", f.name},      {"up", o.up},
+                 {"avatars", o.avatars}, {"episodes", o.episodes},
+                 {"backend", f.backend}, {"seed", o.seed},
+                 {"width", o.width},     {"height", o.height},
+                 {"hfov", o.hfov},       {"eye_height", o.eye_height},
+                 {"profile", o.profile}, {"max_steps", o.max_steps}};
   j["scene"] = {{"gaussians", f.gaussians},
                 {"avatar_gaussians", f.avatar_gaussians},
                 {"navmesh", f.navmesh_source},

@@ -58,7 +58,8 @@ Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::
   if (!viewpoints) return viewpoints.status();
   auto backend = builder(options);
   if (options.scene.empty()) {
-    return gsnav::build_visible_sets(backend, *asset.cloud, *viewpoints, settings, asset.world_from_asset);
+    return gsnav::build_visible_sets(backend, *asset.cloud, *viewpoints, settings,
+                                     asset.world_from_asset);
   }
   auto cached = gsnav::io::cached_visible_sets(backend, options.scene, *asset.cloud, *viewpoints,
                                                settings, asset.world_from_asset);
@@ -163,10 +164,14 @@ Result<Setup> prepare(const Options& options) {
     auto visible = visible_sets_of(options, setup.scene.assets[0], *setup.scene.navmesh);
     if (!visible && visible.code() != Errc::unsupported) return visible.status();
     if (!visible) std::fprintf(stderr, "%s: drawn without them\n", visible.message().c_str());
-    if (visible) std::printf("visible sets: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the Gaussians\n",
-                visible->cells(), visible->viewpoints, 100 * visible->mean_share(),
-                visible->cloud_chunks, 100 * visible->mean_row_share(setup.scene.assets[0].cloud->size()));
-    if (visible) setup.scene.assets[0].visible = std::make_shared<const gsnav::VisibleSets>(std::move(*visible));
+    if (visible)
+      std::printf(
+          "visible sets: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of "
+          "the Gaussians\n",
+          visible->cells(), visible->viewpoints, 100 * visible->mean_share(), visible->cloud_chunks,
+          100 * visible->mean_row_share(setup.scene.assets[0].cloud->size()));
+    if (visible)
+      setup.scene.assets[0].visible = std::make_shared<const gsnav::VisibleSets>(std::move(*visible));
   }
   // People are wider than the agent: they keep their shoulders clear of the furniture.
   std::optional<gsnav::NavMesh> walkways;
@@ -174,14 +179,17 @@ Result<Setup> prepare(const Options& options) {
     if (auto wide = build(0.3, 1.8, "NavMesh of people"); wide) walkways = std::move(*wide);
   }
   const gsnav::NavMesh& nav = *setup.scene.navmesh;
-  setup.facts.navmesh_source = ready ? "from " + options.navmesh : from_mesh ? "from the mesh" : "from the Gaussians";
+  setup.facts.navmesh_source = ready       ? "from " + options.navmesh
+                               : from_mesh ? "from the mesh"
+                                           : "from the Gaussians";
   setup.facts.navmesh_polygons = nav.polygon_count();
   setup.facts.islands = nav.island_count();
   setup.facts.area = nav.navigable_area();
   setup.facts.island_area = nav.island_count() > 0 ? nav.island_area(0) : 0.0;
   if (options.avatars > 0) {
-    auto people = gsnav::walking_people(walkways ? *walkways : *setup.scene.navmesh,
-                                        static_cast<std::size_t>(options.avatars), options.seed, options.density);
+    auto people =
+        gsnav::walking_people(walkways ? *walkways : *setup.scene.navmesh,
+                              static_cast<std::size_t>(options.avatars), options.seed, options.density);
     if (!people) return people.status();
     setup.scene.avatars = std::move(*people);
     setup.facts.avatar_gaussians = setup.scene.avatars.front().asset()->size();

@@ -5,6 +5,9 @@
 
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/asset.hpp"
+#include "gsnav/avatar/motion.hpp"
+#include "gsnav/avatar/skeleton.hpp"
+#include "gsnav/avatar/skinned_gaussians.hpp"
 #include "gsnav/detail/avatar/avatar.hpp"
 #include "gsnav/detail/avatar/body_bounds.hpp"
 #include "gsnav/detail/avatar/capsule_fit.hpp"
@@ -19,12 +22,9 @@
 #include "gsnav/detail/avatar/joint_match.hpp"
 #include "gsnav/detail/avatar/mesh_avatar.hpp"
 #include "gsnav/detail/avatar/mesh_surface.hpp"
-#include "gsnav/avatar/motion.hpp"
 #include "gsnav/detail/avatar/proxy_fit.hpp"
 #include "gsnav/detail/avatar/retarget.hpp"
-#include "gsnav/avatar/skeleton.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
-#include "gsnav/avatar/skinned_gaussians.hpp"
 #include "gsnav/detail/avatar/skinned_mesh.hpp"
 #include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/detail/avatar/smpl_joints.hpp"
@@ -32,4 +32,3 @@
 #include "gsnav/detail/avatar/weight_gradients.hpp"
 #include "gsnav/detail/avatar/weight_truncation.hpp"
 #include "gsnav/skin/skin.hpp"
-

@@ -14,8 +14,9 @@
 #define GSNAV_HD inline
 #endif
 
-/// GSNAV_INLINED stands behind the parameters of a lambda in such a function: `[&](int k) GSNAV_INLINED { ... }`. Inlining
-/// the function does not inline its lambdas, and an out-of-line lambda has one name for all instruction sets.
+/// GSNAV_INLINED stands behind the parameters of a lambda in such a function: `[&](int k) GSNAV_INLINED
+/// { ... }`. Inlining the function does not inline its lambdas, and an out-of-line lambda has one name
+/// for all instruction sets.
 #if defined(__GNUC__) && !defined(__CUDACC__)
 #define GSNAV_INLINED __attribute__((always_inline))
 #else

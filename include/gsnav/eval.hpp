@@ -5,8 +5,6 @@
 
 #include "gsnav/detail/eval/depth_error.hpp"
 #include "gsnav/detail/eval/flip.hpp"
-#include "gsnav/eval/image_error.hpp"
-#include "gsnav/eval/oracle.hpp"
 #include "gsnav/detail/eval/oracle_blend.hpp"
 #include "gsnav/detail/eval/oracle_config.hpp"
 #include "gsnav/detail/eval/oracle_gaussian.hpp"
@@ -15,4 +13,5 @@
 #include "gsnav/detail/eval/oracle_ray.hpp"
 #include "gsnav/detail/eval/samples.hpp"
 #include "gsnav/detail/eval/ssim.hpp"
-
+#include "gsnav/eval/image_error.hpp"
+#include "gsnav/eval/oracle.hpp"

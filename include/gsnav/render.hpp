@@ -1,40 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Scenes and images: clouds of Gaussians, meshes, levels of detail, visible sets, cameras and the renderer. Add a
-// backend (gsnav/backends/...). Headers only.
+// Scenes and images: clouds of Gaussians, meshes, levels of detail, visible sets, cameras and the
+// renderer. Add a backend (gsnav/backends/...). Headers only.
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/image/camera.hpp"
-#include "gsnav/math/similarity.hpp"
-#include "gsnav/render/render_config.hpp"
 #include "gsnav/detail/scene/content_hash.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/drop_bands.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/detail/scene/ledger.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
-#include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/detail/scene/lod_greedy.hpp"
 #include "gsnav/detail/scene/lod_levels.hpp"
 #include "gsnav/detail/scene/lod_merge.hpp"
-#include "gsnav/scene/lod_tree.hpp"
-#include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
-#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
 #include "gsnav/detail/scene/point_tree.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "gsnav/detail/scene/scene_profile.hpp"
 #include "gsnav/detail/scene/sh_rotation.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/surface_material.hpp"
 #include "gsnav/detail/scene/temporal_cloud.hpp"
 #include "gsnav/detail/scene/textured_scene.hpp"
-#include "gsnav/scene/triangle_mesh.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
+#include "gsnav/image/camera.hpp"
+#include "gsnav/math/similarity.hpp"
+#include "gsnav/render/render_config.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/lod_tree.hpp"
+#include "gsnav/scene/mesh_scene.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/triangle_mesh.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #include "gsnav/version.hpp"
-

@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The simulator: sensors, actions, episodes, metrics and batches. Add a backend (gsnav/backends/...); link gsnav::sim.
+// The simulator: sensors, actions, episodes, metrics and batches. Add a backend (gsnav/backends/...);
+// link gsnav::sim.
 
-#include "gsnav/sim/batch.hpp"
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/body_cache.hpp"
 #include "gsnav/detail/sim/cube_map.hpp"
-#include "gsnav/sim/default_scene.hpp"
 #include "gsnav/detail/sim/episode.hpp"
-#include "gsnav/sim/follower.hpp"
 #include "gsnav/detail/sim/frame_batch.hpp"
 #include "gsnav/detail/sim/greedy_follower.hpp"
 #include "gsnav/detail/sim/mesh_normals.hpp"
-#include "gsnav/sim/metrics.hpp"
 #include "gsnav/detail/sim/noise.hpp"
-#include "gsnav/sim/people.hpp"
 #include "gsnav/detail/sim/proximity.hpp"
 #include "gsnav/detail/sim/random_policy.hpp"
 #include "gsnav/detail/sim/reward.hpp"
@@ -26,8 +22,12 @@
 #include "gsnav/detail/sim/semantic_frame.hpp"
 #include "gsnav/detail/sim/sensor.hpp"
 #include "gsnav/detail/sim/sensor_rig.hpp"
-#include "gsnav/sim/simulator.hpp"
 #include "gsnav/detail/sim/task.hpp"
 #include "gsnav/detail/sim/team.hpp"
+#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/default_scene.hpp"
+#include "gsnav/sim/follower.hpp"
+#include "gsnav/sim/metrics.hpp"
+#include "gsnav/sim/people.hpp"
+#include "gsnav/sim/simulator.hpp"
 #include "gsnav/sim/world.hpp"
-

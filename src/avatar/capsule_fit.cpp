@@ -11,8 +11,8 @@
 
 #include "gsnav/detail/avatar/capsule_volume.hpp"
 #include "gsnav/detail/avatar/proxy_fit.hpp"
-#include "gsnav/sweep/capsule.hpp"
 #include "gsnav/math/capsule.hpp"
+#include "gsnav/sweep/capsule.hpp"
 
 namespace gsnav {
 

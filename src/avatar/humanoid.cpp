@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/detail/avatar/proxy_fit.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/avatar/proxy_fit.hpp"
 #include "humanoid_body.hpp"
 #include "humanoid_surface.hpp"
 

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "body_shape.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/avatar/skeleton.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
 
 namespace gsnav::detail {
 

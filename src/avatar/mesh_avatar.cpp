@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/detail/avatar/mesh_surface.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/avatar/mesh_surface.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "mesh_weights.hpp"
 #include "point_grid.hpp"

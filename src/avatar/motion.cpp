@@ -8,8 +8,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "gsnav/skin/lbs.hpp"
 #include "gsnav/detail/math/screw.hpp"
+#include "gsnav/skin/lbs.hpp"
 
 namespace gsnav {
 

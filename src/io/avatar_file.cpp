@@ -16,7 +16,6 @@
 namespace gsnav::io {
 namespace {
 
-
 constexpr std::size_t kMostJoints = 4096;
 
 class AvatarReader {
@@ -25,9 +24,9 @@ class AvatarReader {
       : file_(file), arrays_(file), options_(options) {}
 
   Result<LoadedAvatar> run() {
-    for (const auto& step : {&AvatarReader::read_joints, &AvatarReader::read_arrays,
-                             &AvatarReader::read_cloud, &AvatarReader::read_weights, &AvatarReader::read_skinning,
-                             &AvatarReader::read_capsules}) {
+    for (const auto& step :
+         {&AvatarReader::read_joints, &AvatarReader::read_arrays, &AvatarReader::read_cloud,
+          &AvatarReader::read_weights, &AvatarReader::read_skinning, &AvatarReader::read_capsules}) {
       if (Status s = (this->*step)(); !s) return s;
     }
     out_.asset.name = std::filesystem::path(file_.source()).stem().string();
@@ -36,7 +35,9 @@ class AvatarReader {
   }
 
  private:
-  Status bad(const std::string& what) const { return {Errc::invalid_file, file_.source() + ": " + what}; }
+  Status bad(const std::string& what) const {
+    return {Errc::invalid_file, file_.source() + ": " + what};
+  }
 
   Status read_joints() {
     auto binds = detail::read_transforms(arrays_, "joints_inv_bind_matrix");
@@ -45,8 +46,9 @@ class AvatarReader {
     skeleton.inverse_binds = std::move(*binds);
     const std::size_t joints = skeleton.inverse_binds.size();
     if (joints > kMostJoints) {
-      return {Errc::unsupported, file_.source() + ": joints_inv_bind_matrix has " + std::to_string(joints) +
-                                     " joints, more than " + std::to_string(kMostJoints)};
+      return {Errc::unsupported, file_.source() + ": joints_inv_bind_matrix has " +
+                                     std::to_string(joints) + " joints, more than " +
+                                     std::to_string(kMostJoints)};
     }
     if (Status s = name_joints(joints); !s) return s;
     std::vector<Affine3<double>> globals;
@@ -55,10 +57,10 @@ class AvatarReader {
       // Exactly rigid, which float32 matrices are not.
       globals.push_back(rigid_inverse(Affine3<double>{polar_rotation(m.linear), m.translation}));
       const std::int32_t parent = skeleton.parents[j];
-      skeleton.rest_local.push_back(
-          parent < 0 || static_cast<std::size_t>(parent) >= j
-              ? globals[j]
-              : rigid_inverse(globals[static_cast<std::size_t>(parent)]) * globals[j]);
+      skeleton.rest_local.push_back(parent < 0 || static_cast<std::size_t>(parent) >= j
+                                        ? globals[j]
+                                        : rigid_inverse(globals[static_cast<std::size_t>(parent)]) *
+                                              globals[j]);
     }
     if (Status s = skeleton.validate(); !s) return {s.code(), file_.source() + ": " + s.message()};
     return {};
@@ -68,9 +70,10 @@ class AvatarReader {
     Skeleton& skeleton = out_.asset.skeleton;
     if (!options_.joint_names.empty() || !options_.joint_parents.empty()) {
       if (options_.joint_names.size() != joints || options_.joint_parents.size() != joints) {
-        return {Errc::invalid_argument, file_.source() + ": " + std::to_string(options_.joint_names.size()) +
-                                            " joint_names and " + std::to_string(options_.joint_parents.size()) +
-                                            " joint_parents for " + std::to_string(joints) + " joints"};
+        return {Errc::invalid_argument,
+                file_.source() + ": " + std::to_string(options_.joint_names.size()) +
+                    " joint_names and " + std::to_string(options_.joint_parents.size()) +
+                    " joint_parents for " + std::to_string(joints) + " joints"};
       }
       skeleton.names = options_.joint_names;
       skeleton.parents = options_.joint_parents;
@@ -79,7 +82,8 @@ class AvatarReader {
     if (file_.contains("joint_names")) return read_names(joints);
     const BodyJoints known = body_joints(joints);
     if (known.names.empty()) {
-      return {Errc::unsupported, file_.source() + ": joints_inv_bind_matrix has " + std::to_string(joints) +
+      return {Errc::unsupported, file_.source() + ": joints_inv_bind_matrix has " +
+                                     std::to_string(joints) +
                                      " joints: neither SMPL's 24 nor SMPL-X's 55, and no joint_names"};
     }
     skeleton.names.assign(known.names.begin(), known.names.end());
@@ -162,7 +166,8 @@ class AvatarReader {
     if (file_.contains("_features_rest")) {
       auto a = arrays_.read("_features_rest", {});
       if (!a) return a.status();
-      if (a->values.size() % (3 * count_) != 0) return bad("_features_rest has the shape " + detail::shape_text(a->shape));
+      if (a->values.size() % (3 * count_) != 0)
+        return bad("_features_rest has the shape " + detail::shape_text(a->shape));
       rest = std::move(*a);
     }
     const std::size_t more = rest.values.size() / count_;
@@ -184,7 +189,8 @@ class AvatarReader {
       for (std::size_t i = 0; i < array->values.size(); ++i) {
         const double v = array->values[i];
         if (!(v >= 0 && v <= most)) {
-          return bad(std::string(name) + ": row " + std::to_string(i / row) + " has " + std::to_string(v));
+          return bad(std::string(name) + ": row " + std::to_string(i / row) + " has " +
+                     std::to_string(v));
         }
       }
     }
@@ -195,9 +201,11 @@ class AvatarReader {
   Status find_degree(const char* name) {
     const std::size_t k = shs_.shape[1];
     degree_ = 0;
-    while (static_cast<std::size_t>(sh_coefficient_count(degree_)) < k && degree_ < kMaxShDegree) ++degree_;
+    while (static_cast<std::size_t>(sh_coefficient_count(degree_)) < k && degree_ < kMaxShDegree)
+      ++degree_;
     if (static_cast<std::size_t>(sh_coefficient_count(degree_)) == k) return {};
-    return {Errc::unsupported, file_.source() + ": " + name + " has " + std::to_string(k) + " coefficients, must be 1, 4, 9 or 16"};
+    return {Errc::unsupported, file_.source() + ": " + name + " has " + std::to_string(k) +
+                                   " coefficients, must be 1, 4, 9 or 16"};
   }
 
   Status read_sh() {
@@ -206,14 +214,14 @@ class AvatarReader {
     const auto& shape = a->shape;
     const std::size_t k = shape.size() == 2 ? 1 : shape.size() == 3 ? shape[1] : 0;
     if (k == 0 || shape[0] != count_ || shape.back() != 3) {
-      return bad("shs has the shape " + detail::shape_text(shape) + ", must be [" + std::to_string(count_) +
-                 ", 3] or [" + std::to_string(count_) + ", K, 3]");
+      return bad("shs has the shape " + detail::shape_text(shape) + ", must be [" +
+                 std::to_string(count_) + ", 3] or [" + std::to_string(count_) + ", K, 3]");
     }
     shs_ = std::move(*a);
     shs_.shape = {count_, k, 3};
     if (Status s = find_degree("shs"); !s) return s;
-    const bool could_be_rgb =
-        k == 1 && std::all_of(shs_.values.begin(), shs_.values.end(), [](double v) { return v >= 0 && v <= 1; });
+    const bool could_be_rgb = k == 1 && std::all_of(shs_.values.begin(), shs_.values.end(),
+                                                    [](double v) { return v >= 0 && v <= 1; });
     if (k == 1 && (options_.colors == AvatarColors::rgb ||
                    (options_.colors == AvatarColors::guess && could_be_rgb))) {
       for (double& v : shs_.values) v = (v - 0.5) / kSh0;
@@ -278,8 +286,9 @@ class AvatarReader {
     if (!report) return {report.code(), file_.source() + ": lbs_weights: " + report.message()};
     out_.weights = *report;
     if (out_.weights.needs_more != 0) {
-      out_.report.warnings.push_back("lbs_weights: with " + std::to_string(out_.weights.influences) + " weights " +
-                                     std::to_string(out_.weights.needs_more) + " Gaussians are off by up to " +
+      out_.report.warnings.push_back("lbs_weights: with " + std::to_string(out_.weights.influences) +
+                                     " weights " + std::to_string(out_.weights.needs_more) +
+                                     " Gaussians are off by up to " +
                                      std::to_string(1000 * out_.weights.position_error) + " mm");
     }
     return {};
@@ -289,12 +298,14 @@ class AvatarReader {
     if (!file_.contains("skinning")) return {};
     const auto mode = arrays_.number("skinning");
     if (!mode) return mode.status();
-    for (const Skinning known : {Skinning::linear, Skinning::linear_stretched, Skinning::dual_quaternion}) {
+    for (const Skinning known :
+         {Skinning::linear, Skinning::linear_stretched, Skinning::dual_quaternion}) {
       if (*mode != static_cast<double>(known)) continue;
       out_.asset.skinning = known;
       return known == Skinning::linear_stretched ? bake_weight_gradients(out_.asset) : Status();
     }
-    return bad("skinning is " + std::to_string(*mode) + ", must be 0 (linear), 1 (with stretch) or 2 (dual quaternions)");
+    return bad("skinning is " + std::to_string(*mode) +
+               ", must be 0 (linear), 1 (with stretch) or 2 (dual quaternions)");
   }
 
   /// Capsules fixed to joints, where the file has some.
@@ -311,8 +322,10 @@ class AvatarReader {
       if (!(j >= 0 && j < static_cast<double>(out_.asset.skeleton.size())) || j != std::floor(j)) {
         return bad("capsule_joints[" + std::to_string(c) + "] is " + std::to_string(j));
       }
-      if (!(v[6] >= 0)) return bad("capsules: capsule " + std::to_string(c) + " has the radius " + std::to_string(v[6]));
-      out_.asset.capsules.push_back({static_cast<std::uint16_t>(j), {v[0], v[1], v[2]}, {v[3], v[4], v[5]}, v[6]});
+      if (!(v[6] >= 0))
+        return bad("capsules: capsule " + std::to_string(c) + " has the radius " + std::to_string(v[6]));
+      out_.asset.capsules.push_back(
+          {static_cast<std::uint16_t>(j), {v[0], v[1], v[2]}, {v[3], v[4], v[5]}, v[6]});
     }
     return {};
   }

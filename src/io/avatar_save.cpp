@@ -11,7 +11,6 @@
 namespace gsnav::io {
 namespace {
 
-
 template <std::size_t K>
 std::vector<float> interleaved(const std::array<std::vector<float>, K>& planes, std::size_t n) {
   std::vector<float> out(n * K);
@@ -24,7 +23,8 @@ std::vector<float> interleaved(const std::array<std::vector<float>, K>& planes, 
 /// Whether a reader that knows 24 and 55 joints finds the same tree.
 bool known_joints(const Skeleton& skeleton) {
   const BodyJoints known = body_joints(skeleton.size());
-  return !known.names.empty() && std::equal(known.names.begin(), known.names.end(), skeleton.names.begin()) &&
+  return !known.names.empty() &&
+         std::equal(known.names.begin(), known.names.end(), skeleton.names.begin()) &&
          std::equal(known.parents.begin(), known.parents.end(), skeleton.parents.begin());
 }
 
@@ -60,9 +60,9 @@ Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset) 
     std::vector<float> sh;
     std::vector<double> rgb;
     const auto coefficients = static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree));
-    const bool looks_like_rgb = cloud.sh_degree == 0 && std::all_of(cloud.sh0.begin(), cloud.sh0.end(), [](float v) {
-                                  return v >= 0 && v <= 1;
-                                });
+    const bool looks_like_rgb =
+        cloud.sh_degree == 0 &&
+        std::all_of(cloud.sh0.begin(), cloud.sh0.end(), [](float v) { return v >= 0 && v <= 1; });
     if (looks_like_rgb) {
       for (const float v : cloud.sh0) rgb.push_back(0.5 + kSh0 * static_cast<double>(v));
       entries.push_back({"shs", {n, 3}, rgb});

@@ -23,12 +23,14 @@ class SceneReader {
       : folder_(path.parent_path()), source_(path.string()), json_(json) {}
 
   Result<AvatarScene> run() {
-    if (!json_.is_object()) return {Errc::invalid_file, source_ + ": is " + shown(json_) + ", must be an object"};
+    if (!json_.is_object())
+      return {Errc::invalid_file, source_ + ": is " + shown(json_) + ", must be an object"};
     if (Status s = number(json_, "time_max", source_, out_.time_max); !s) return s;
     if (!(out_.time_max >= 0)) return {Errc::invalid_file, source_ + ": 'time_max' is negative"};
     if (const Json* loop = member(json_, "time_loop"); loop != nullptr) {
       if (!loop->is_boolean())
-        return {Errc::invalid_file, source_ + ": 'time_loop' is " + shown(*loop) + ", must be true or false"};
+        return {Errc::invalid_file,
+                source_ + ": 'time_loop' is " + shown(*loop) + ", must be true or false"};
       out_.time_loop = loop->get<bool>();
     }
     const Json* list = member(json_, "gaussian_avatars");
@@ -66,7 +68,8 @@ class SceneReader {
   Status avatar(const Json& a, const std::string& at) {
     if (!a.is_object()) return {Errc::invalid_file, at + " is " + shown(a) + ", must be an object"};
     SceneAvatar out;
-    if (const Json* name = member(a, "name"); name != nullptr && name->is_string()) out.name = name->get<std::string>();
+    if (const Json* name = member(a, "name"); name != nullptr && name->is_string())
+      out.name = name->get<std::string>();
     if (member(a, "proxy_urdf") != nullptr)
       return {Errc::unsupported, at + ": 'proxy_urdf' is not read; capsules are in the driver"};
     const auto canonical = file(a, "canonical_gaussians", at);
@@ -75,13 +78,15 @@ class SceneReader {
     if (Status s = driver(a, at, out); !s) return s;
     if (Status s = number(a, "scale", at, out.scale); !s) return s;
     if (!(out.scale > 0))
-      return {Errc::invalid_file, at + ": 'scale' is " + std::to_string(out.scale) + ", must be positive"};
+      return {Errc::invalid_file,
+              at + ": 'scale' is " + std::to_string(out.scale) + ", must be positive"};
     if (Status s = number(a, "offset_y", at, out.offset_y); !s) return s;
     if (Status s = number(a, "time_begin", at, out.time_begin); !s) return s;
     if (member(a, "time_end") != nullptr) {
       double end = 0.0;
       if (Status s = number(a, "time_end", at, end); !s) return s;
-      if (!(end >= out.time_begin)) return {Errc::invalid_file, at + ": 'time_end' lies before 'time_begin'"};
+      if (!(end >= out.time_begin))
+        return {Errc::invalid_file, at + ": 'time_end' lies before 'time_begin'"};
       out.time_end = end;
     }
     if (Status s = coordinates(a, at, out); !s) return s;
@@ -97,7 +102,9 @@ class SceneReader {
     const Json* d = member(a, "driver");
     const bool nested = d != nullptr && d->is_object();
     const Json& from = nested ? *d : a;
-    const char* key = !nested ? "driver" : member(*d, "smpl_params") != nullptr ? "smpl_params" : "smpl_parms";
+    const char* key = !nested                                ? "driver"
+                      : member(*d, "smpl_params") != nullptr ? "smpl_params"
+                                                             : "smpl_parms";
     const auto path = file(from, key, nested ? at + ": driver" : at);
     if (!path) return path.status();
     out.driver = *path;
@@ -139,7 +146,8 @@ class SceneReader {
         m.translation[i] = v[static_cast<std::size_t>(4 * i + 3)];
       }
     }
-    if (v.size() != 16 || !detail::is_rigid(m)) return {Errc::invalid_file, at + ": 'coord_transform' is no rigid 4x4 matrix"};
+    if (v.size() != 16 || !detail::is_rigid(m))
+      return {Errc::invalid_file, at + ": 'coord_transform' is no rigid 4x4 matrix"};
     out.coordinates = m;
     return {};
   }
@@ -162,9 +170,11 @@ Result<AvatarScene> load_avatar_scene(const fs::path& path) {
   });
 }
 
-double scene_time(const AvatarScene& scene, const std::vector<AvatarActor>& actors, double seconds) noexcept {
+double scene_time(const AvatarScene& scene, const std::vector<AvatarActor>& actors,
+                  double seconds) noexcept {
   double last = scene.time_max;
-  if (scene.time_loop && !actors.empty() && actors[0].options().loop_period > 0) last = actors[0].options().loop_period;
+  if (scene.time_loop && !actors.empty() && actors[0].options().loop_period > 0)
+    last = actors[0].options().loop_period;
   if (!(last > 0)) {
     for (const AvatarActor& a : actors) {
       if (std::isfinite(a.options().time_end)) last = std::max(last, a.options().time_end);

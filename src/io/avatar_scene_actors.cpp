@@ -53,7 +53,8 @@ class ClipInPlace final : public MotionSource {
       : clip_(std::move(clip)), path_(std::move(path)) {}
   void pose(const MotionInput& input, LocalPose& out) const override {
     clip_->pose(input, out);
-    const Vec3d at{out.translations[0].x + out.root.x, path_->floor_at(input.time), out.translations[0].z + out.root.z};
+    const Vec3d at{out.translations[0].x + out.root.x, path_->floor_at(input.time),
+                   out.translations[0].z + out.root.z};
     out.root -= at;
   }
   std::size_t joint_count() const noexcept override { return clip_->joint_count(); }
@@ -64,8 +65,8 @@ class ClipInPlace final : public MotionSource {
   std::shared_ptr<const ClipPath> path_;
 };
 
-/// Moves the whole clip, and its capsules, by a rigid map of each key: every root of the skeleton alike. The clip is as
-/// load_driver makes it, with each joint's place at each key and a path.
+/// Moves the whole clip, and its capsules, by a rigid map of each key: every root of the skeleton alike.
+/// The clip is as load_driver makes it, with each joint's place at each key and a path.
 void move_clip(const Skeleton& skeleton, LoadedDriver& driver, const std::vector<Affine3<double>>& by) {
   MotionClip& clip = driver.clip;
   for (std::size_t t = 0; t < clip.frames(); ++t) {
@@ -115,7 +116,9 @@ Result<std::vector<Affine3<double>>> load_trajectory(const std::filesystem::path
   const auto file = NpzFile::open(path);
   if (!file) return file.status();
   const std::vector<std::string> names = file->names();
-  const std::string name = file->contains("trajectory") ? "trajectory" : names.size() == 1 ? names[0] : "trajectory";
+  const std::string name = file->contains("trajectory") ? "trajectory"
+                           : names.size() == 1          ? names[0]
+                                                        : "trajectory";
   const detail::NpzArrays arrays(*file);
   const auto a = arrays.read(name, {detail::NpzArrays::kAny, 7});
   if (!a) return a.status();
@@ -151,13 +154,16 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
   Affine3<double> coordinates = a.coordinates;
   if (a.guess_coordinates) {
     // Habitat-GS's rule: a root that stands on its head comes from a frame with Y down.
-    const Mat3d first = rotation_matrix(driver->clip.rotations[0]) * transpose(body->skeleton.rest_local[0].linear);
-    if (first(1, 1) < -0.7 && first(2, 2) < -0.7) coordinates.linear = {{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}};
+    const Mat3d first =
+        rotation_matrix(driver->clip.rotations[0]) * transpose(body->skeleton.rest_local[0].linear);
+    if (first(1, 1) < -0.7 && first(2, 2) < -0.7)
+      coordinates.linear = {{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}};
   }
   move_clip(body->skeleton, *driver, {coordinates});
   if (body->capsules.empty() && !driver->capsules.empty() && !driver->capsules[0].empty()) {
     // The file's body stays as it is: another entry may have another driver.
-    std::shared_ptr<const AvatarAsset>& of_driver = bodies[a.canonical.string() + '\n' + a.driver.string()];
+    std::shared_ptr<const AvatarAsset>& of_driver =
+        bodies[a.canonical.string() + '\n' + a.driver.string()];
     if (of_driver == nullptr) {
       const auto tracked = capsules_from_track(body->skeleton, driver->clip, driver->capsules);
       if (!tracked) return tracked.status();
@@ -177,7 +183,8 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
   return AvatarActor::create(body, std::make_shared<const ClipInPlace>(clip, path), path, options);
 }
 
-/// Has actors repeat after `last` seconds and as many more as those who are there at both ends need to get back.
+/// Has actors repeat after `last` seconds and as many more as those who are there at both ends need to
+/// get back.
 Status loop_actors(std::vector<AvatarActor>& actors, double last, double least) {
   constexpr double kSpeed = 1.4;  // metres a second
   double blend = 0.0;
@@ -216,7 +223,8 @@ Result<std::vector<AvatarActor>> load_scene_actors(const AvatarScene& scene) {
     }
     double last = scene.time_max;
     for (const AvatarActor& a : out) {
-      if (!(scene.time_max > 0) && std::isfinite(a.options().time_end)) last = std::max(last, a.options().time_end);
+      if (!(scene.time_max > 0) && std::isfinite(a.options().time_end))
+        last = std::max(last, a.options().time_end);
     }
     if (scene.time_loop && last > 0) {
       if (Status s = loop_actors(out, last, scene.loop_blend); !s) return s;

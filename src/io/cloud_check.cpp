@@ -12,7 +12,8 @@ std::size_t rest_width(const GaussianCloud& cloud) noexcept {
 Status check_arrays(const std::filesystem::path& path, const GaussianCloud& c) {
   const std::size_t n = c.size();
   if (!c.shN_half.empty()) {
-    return {Errc::invalid_argument, path.string() + ": the cloud is compact: expand_sh first, or save_scene"};
+    return {Errc::invalid_argument,
+            path.string() + ": the cloud is compact: expand_sh first, or save_scene"};
   }
   bool ok = c.sh_degree >= 0 && c.sh_degree <= kMaxShDegree && c.sh0.size() == 3 * n &&
             c.shN.size() == rest_width(c) * n && (c.origin_ids.empty() || c.origin_ids.size() == n);

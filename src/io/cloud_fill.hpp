@@ -12,8 +12,8 @@
 #include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/core/huge_pages.hpp"
 #include "gsnav/detail/core/thread_pool.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
 #include "populate_pages.hpp"
 #include "threads.hpp"
 

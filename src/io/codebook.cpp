@@ -119,8 +119,9 @@ class Splitter {
  private:
   const float* vector(std::size_t i) const noexcept { return vectors_.data() + order_[i] * width_; }
 
-  /// Leaves the mean in mean_. Sums are of differences to the first vector, so that identical vectors have an error of
-  /// exactly zero, and in double, where the difference of squares keeps all that matters of floats.
+  /// Leaves the mean in mean_. Sums are of differences to the first vector, so that identical vectors
+  /// have an error of exactly zero, and in double, where the difference of squares keeps all that
+  /// matters of floats.
   Group measured(std::size_t first, std::size_t last) {
     Group g{0, first, last, 0, 0};
     std::fill(mean_.begin(), mean_.end(), 0.0);

@@ -9,7 +9,8 @@
 
 namespace gsnav::io::detail {
 
-/// Which way is usually up in a PLY or npz of this name: -y, as trainers leave their scenes, but in Habitat +y.
+/// Which way is usually up in a PLY or npz of this name: -y, as trainers leave their scenes, but in
+/// Habitat +y.
 inline Vec3d usual_up(const std::string& source) {
   for (const char* name : {".gs.ply", ".3dgs.ply", ".4dgs.ply", ".4dgs.npz"}) {
     if (source.ends_with(name)) return {0, 1, 0};

@@ -33,7 +33,8 @@ Result<std::vector<std::byte>> load_text(const fs::path& path, const ReadLimits&
     return std::vector<std::byte>(bytes.begin(), bytes.end());
   }
   if (Status s = detail::check_limits(limits, path.string()); !s) return s;
-  const std::size_t most = std::max(kLeastText, static_cast<std::size_t>(limits.inflation) * bytes.size());
+  const std::size_t most =
+      std::max(kLeastText, static_cast<std::size_t>(limits.inflation) * bytes.size());
   detail::GzipReader gzip(bytes);
   std::vector<std::byte> text;
   while (!gzip.at_end()) {
@@ -45,7 +46,8 @@ Result<std::vector<std::byte>> load_text(const fs::path& path, const ReadLimits&
     text.resize(before + got);
     if (text.size() > most) {
       return {Errc::unsupported, path.string() + ": its " + std::to_string(bytes.size()) +
-                                     " bytes of gzip grow more than " + std::to_string(limits.inflation) +
+                                     " bytes of gzip grow more than " +
+                                     std::to_string(limits.inflation) +
                                      " times; raise ReadLimits::inflation for a file that you trust"};
     }
     if (text.size() > kMostText) return {Errc::unsupported, path.string() + ": more than 1 GiB of text"};
@@ -65,19 +67,23 @@ class EpisodeReader {
     const auto json = detail::parse_json(*text, path.string(), limits_);
     if (!json) return json.status();
     source_ = path.string();
-    if (!json->is_object()) return {Errc::invalid_file, source_ + ": is " + shown(*json) + ", must be an object"};
+    if (!json->is_object())
+      return {Errc::invalid_file, source_ + ": is " + shown(*json) + ", must be an object"};
     const Json* list = member(*json, "episodes");
     if (list == nullptr) return {Errc::invalid_file, source_ + ": 'episodes' is missing"};
-    if (!list->is_array()) return {Errc::invalid_file, source_ + ": 'episodes' is " + shown(*list) + ", must be an array"};
+    if (!list->is_array())
+      return {Errc::invalid_file, source_ + ": 'episodes' is " + shown(*list) + ", must be an array"};
     if (list->empty() && follow) return read_content(path.parent_path() / "content");
     for (std::size_t i = 0; i < list->size(); ++i) {
-      if (Status s = episode((*list)[i], source_ + ": episodes[" + std::to_string(i) + "]"); !s) return s;
+      if (Status s = episode((*list)[i], source_ + ": episodes[" + std::to_string(i) + "]"); !s)
+        return s;
     }
     return {};
   }
 
   EpisodeFile take() {
-    for (const std::string& key : unknown_) out_.warnings.push_back("episodes: '" + key + "' is left out");
+    for (const std::string& key : unknown_)
+      out_.warnings.push_back("episodes: '" + key + "' is left out");
     if (more_goals_) out_.warnings.push_back("episodes: of several goals the first is taken");
     return std::move(out_);
   }
@@ -158,9 +164,10 @@ class EpisodeReader {
     out.start_rotation = {(*q)[3], (*q)[0], (*q)[1], (*q)[2]};
     if (Status s = goal(e, at, out); !s) return s;
     if (Status s = info(e, at, out); !s) return s;
-    static const std::set<std::string_view> kKnown{"episode_id", "scene_id", "start_position", "start_rotation", "goals",
-                                                   "info", "scene_dataset_config", "additional_obj_config_paths",
-                                                   "shortest_paths", "start_room"};
+    static const std::set<std::string_view> kKnown{
+        "episode_id",     "scene_id",  "start_position",       "start_rotation",
+        "goals",          "info",      "scene_dataset_config", "additional_obj_config_paths",
+        "shortest_paths", "start_room"};
     for (const auto& [key, value] : e.items()) {
       if (!kKnown.contains(key) && !value.is_null()) unknown_.insert(key);
     }
@@ -200,19 +207,23 @@ Status save_episodes(const fs::path& path, std::span<const PointNavEpisode> epis
           {"start_time", is_finite(e.start_time)}};
       for (const auto& [field, ok] : finite) {  // JSON has no such numbers
         if (!ok) {
-          return {Errc::invalid_argument, path.string() + ": episode \"" + e.id + "\": " + field + " is not finite"};
+          return {Errc::invalid_argument,
+                  path.string() + ": episode \"" + e.id + "\": " + field + " is not finite"};
         }
       }
       Json info{{"geodesic_distance", e.geodesic_distance}};
-      if (e.start_time != 0) info["start_time"] = e.start_time;  // a place that Habitat-Lab leaves to everyone
-      list.push_back({{"episode_id", e.id},
-                      {"scene_id", e.scene_id},
-                      {"start_position", {s.x, s.y, s.z}},
-                      {"start_rotation", {q.x, q.y, q.z, q.w}},
-                      {"goals", Json::array({{{"position", {g.x, g.y, g.z}}, {"radius", e.goal_radius}}})},
-                      {"info", std::move(info)}});
+      if (e.start_time != 0)
+        info["start_time"] = e.start_time;  // a place that Habitat-Lab leaves to everyone
+      list.push_back(
+          {{"episode_id", e.id},
+           {"scene_id", e.scene_id},
+           {"start_position", {s.x, s.y, s.z}},
+           {"start_rotation", {q.x, q.y, q.z, q.w}},
+           {"goals", Json::array({{{"position", {g.x, g.y, g.z}}, {"radius", e.goal_radius}}})},
+           {"info", std::move(info)}});
     }
-    const std::string text = Json{{"episodes", std::move(list)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
+    const std::string text =
+        Json{{"episodes", std::move(list)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (path.extension() != ".gz") return replace_file(path, text);
     const std::vector<std::byte> packed =
         detail::gzip(std::as_bytes(std::span(text.data(), text.size())));

@@ -52,8 +52,9 @@ class SplatReader {
     if (!mesh) return mesh.status();
     const Json& node = **file_.item("nodes", instance.node);
     const Json* name = member(node, "name");
-    const std::string where = file_.source() + ": node " + std::to_string(instance.node) +
-                              (name != nullptr && name->is_string() ? " " + detail::shown(*name) : std::string());
+    const std::string where =
+        file_.source() + ": node " + std::to_string(instance.node) +
+        (name != nullptr && name->is_string() ? " " + detail::shown(*name) : std::string());
     const Json* primitives = member(**mesh, "primitives");
     if (primitives == nullptr || !primitives->is_array()) {
       return {Errc::invalid_file, where + ": its mesh has no 'primitives'"};
@@ -74,8 +75,10 @@ class SplatReader {
     return {};
   }
 
-  Status move(LoadedCloud& part, const Affine3<double>& world_from_mesh, const std::string& where) const {
-    const Similarity axes = options_.keep_axes ? Similarity{} : Similarity{{0, 0, 0, 1}, {}, 1};  // half a turn about z
+  Status move(LoadedCloud& part, const Affine3<double>& world_from_mesh,
+              const std::string& where) const {
+    const Similarity axes =
+        options_.keep_axes ? Similarity{} : Similarity{{0, 0, 0, 1}, {}, 1};  // half a turn about z
     Similarity world;
     if (detail::as_similarity(world_from_mesh, world)) {
       world = axes * world;
@@ -84,8 +87,9 @@ class SplatReader {
     } else {
       const Affine3<double> turn{rotation_matrix(axes.rotation), {}};
       if (Status s = transform(part.cloud, turn * world_from_mesh); !s) {
-        return {Errc::unsupported, where + ": its transform with those above it cannot be applied to Gaussians: " +
-                                       s.message() + "; give its 'scale' or 'matrix' three stretches above 0"};
+        return {Errc::unsupported,
+                where + ": its transform with those above it cannot be applied to Gaussians: " +
+                    s.message() + "; give its 'scale' or 'matrix' three stretches above 0"};
       }
     }
     part.report.bounds = {};
@@ -109,7 +113,8 @@ class SplatReader {
     auto out = spz != nullptr ? read_spz(*spz, where) : read_attributes(primitive, where);
     if (out && *space == "lin_rec709_display") {
       out->cloud.color_space = ColorSpace::linear;
-      out->report.warnings.push_back("colours are in linear light (lin_rec709_display), which only .glb can keep");
+      out->report.warnings.push_back(
+          "colours are in linear light (lin_rec709_display), which only .glb can keep");
     } else if (out && *space != "srgb_rec709_display") {
       out->report.warnings.push_back("colours of space " + detail::shown(*space) +
                                      " are read as if they were srgb_rec709_display");
@@ -190,14 +195,16 @@ class SplatReader {
         }
         for (std::size_t i = 0; i < n; ++i) add(block, i, sink);
         const double* const s = block[2].data();
-        for (std::size_t i = 0; i < n; ++i) negative += s[3 * i] < 0 || s[3 * i + 1] < 0 || s[3 * i + 2] < 0 ? 1 : 0;
+        for (std::size_t i = 0; i < n; ++i)
+          negative += s[3 * i] < 0 || s[3 * i + 1] < 0 || s[3 * i + 2] < 0 ? 1 : 0;
       }
       return {};
     };
     auto out = detail::fill_cloud(count_, degree, where, decode);
     if (out && negative != 0) {
-      out->report.warnings.push_back(where + ": SCALE of " + std::to_string(negative) +
-                                     " Gaussians is negative; an ellipsoid has no such side, so the sign is left out");
+      out->report.warnings.push_back(
+          where + ": SCALE of " + std::to_string(negative) +
+          " Gaussians is negative; an ellipsoid has no such side, so the sign is left out");
     }
     return out;
   }

@@ -15,7 +15,8 @@
 
 namespace gsnav::io::detail {
 
-/// The values of an accessor where they lie, in memory or in a file; normalised integers become fractions.
+/// The values of an accessor where they lie, in memory or in a file; normalised integers become
+/// fractions.
 class GltfValues {
  public:
   std::size_t size() const noexcept { return count_; }
@@ -42,8 +43,9 @@ struct GltfNumbers {
   const double* row(std::size_t i) const noexcept { return values.data() + i * width; }
 };
 
-/// A glTF 2.0 file with its buffers: GLB, or JSON with buffers inside of it or beside it. Buffers stay in their files
-/// and are read where they are asked for. Every index, offset and size is checked against the bytes there are.
+/// A glTF 2.0 file with its buffers: GLB, or JSON with buffers inside of it or beside it. Buffers stay
+/// in their files and are read where they are asked for. Every index, offset and size is checked against
+/// the bytes there are.
 class GltfFile {
  public:
   /// Errors: file_not_found, invalid_file, unsupported (another version, a required extension that is

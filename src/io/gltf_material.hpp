@@ -27,7 +27,8 @@ struct GltfMaterial {
 class GltfMaterials {
  public:
   /// Pictures are put behind `textures`; what is left out or taken otherwise is said in `warnings`.
-  GltfMaterials(const GltfFile& file, std::vector<TextureImage>& textures, std::vector<std::string>& warnings)
+  GltfMaterials(const GltfFile& file, std::vector<TextureImage>& textures,
+                std::vector<std::string>& warnings)
       : file_(file), textures_(textures), warnings_(warnings) {}
 
   /// Entry `index` of "materials". Errors: invalid_file, file_not_found.

@@ -27,10 +27,12 @@ struct Channel {
 /// The channel at `time`, by the formulas of glTF 2.0, appendix C.
 std::array<double, 4> sample(const Channel& c, double time) {
   const std::size_t n = c.times.size(), w = c.width;
-  const std::size_t stride = c.blend == Blend::cubic ? 3 * w : w, middle = c.blend == Blend::cubic ? w : 0;
+  const std::size_t stride = c.blend == Blend::cubic ? 3 * w : w,
+                    middle = c.blend == Blend::cubic ? w : 0;
   std::array<double, 4> out{};
   const auto key = [&](std::size_t i) { return c.values.data() + i * stride + middle; };
-  std::size_t b = static_cast<std::size_t>(std::upper_bound(c.times.begin(), c.times.end(), time) - c.times.begin());
+  std::size_t b =
+      static_cast<std::size_t>(std::upper_bound(c.times.begin(), c.times.end(), time) - c.times.begin());
   if (b == 0 || b == n) {
     std::copy_n(key(b == 0 ? 0 : n - 1), w, out.begin());
     return out;
@@ -43,8 +45,8 @@ std::array<double, 4> sample(const Channel& c, double time) {
   } else if (c.blend == Blend::cubic) {
     const double u2 = u * u, u3 = u2 * u;
     for (std::size_t k = 0; k < w; ++k) {
-      out[k] = (2 * u3 - 3 * u2 + 1) * p[k] + step * (u3 - 2 * u2 + u) * p[w + k] + (3 * u2 - 2 * u3) * q[k] +
-               step * (u3 - u2) * (q - w)[k];
+      out[k] = (2 * u3 - 3 * u2 + 1) * p[k] + step * (u3 - 2 * u2 + u) * p[w + k] +
+               (3 * u2 - 2 * u3) * q[k] + step * (u3 - u2) * (q - w)[k];
     }
   } else if (c.target == 'r') {
     const Quatd r = slerp(Quatd{p[3], p[0], p[1], p[2]}, Quatd{q[3], q[0], q[1], q[2]}, u);
@@ -55,7 +57,8 @@ std::array<double, 4> sample(const Channel& c, double time) {
   return out;
 }
 
-Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& animation, const std::string& at) {
+Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& animation,
+                                           const std::string& at) {
   const Json *channels = member(animation, "channels"), *samplers = member(animation, "samplers");
   if (channels == nullptr || samplers == nullptr || !channels->is_array() || !samplers->is_array()) {
     return {Errc::invalid_file, at + " has no channels or samplers"};
@@ -76,7 +79,8 @@ Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& ani
     }
     c.target = path->get<std::string>()[0];
     c.width = c.target == 'r' ? 4 : 3;
-    const auto which = get_integer((*channels)[i], "sampler", 0, static_cast<std::int64_t>(samplers->size()) - 1, here);
+    const auto which =
+        get_integer((*channels)[i], "sampler", 0, static_cast<std::int64_t>(samplers->size()) - 1, here);
     if (!which) return which.status();
     const Json& sampler = (*samplers)[static_cast<std::size_t>(*which)];
     const Json* blend = member(sampler, "interpolation");
@@ -94,13 +98,13 @@ Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& ani
     auto values = file.numbers(*output, c.width == 4 ? "VEC4" : "VEC3");
     if (!values) return values.status();
     if (values->count != times->count * (c.blend == Blend::cubic ? 3 : 1)) {
-      return {Errc::invalid_file,
-              here + ": " + std::to_string(values->count) + " values for " + std::to_string(times->count) + " keys"};
+      return {Errc::invalid_file, here + ": " + std::to_string(values->count) + " values for " +
+                                      std::to_string(times->count) + " keys"};
     }
     for (std::size_t k = 0; k < times->count; ++k) {
       if (!(times->values[k] >= 0) || (k > 0 && !(times->values[k] > times->values[k - 1]))) {
-        return {Errc::invalid_file,
-                here + ": key " + std::to_string(k) + " is at " + std::to_string(times->values[k]) + " s"};
+        return {Errc::invalid_file, here + ": key " + std::to_string(k) + " is at " +
+                                        std::to_string(times->values[k]) + " s"};
       }
     }
     c.times = std::move(times->values);
@@ -146,7 +150,8 @@ Grid grid_of(const std::vector<Channel>& channels, double rate) {
 }  // namespace
 
 Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& nodes, double frame_rate,
-                  PoseObserver& observer, std::vector<NamedClip>& out, std::vector<std::string>& warnings) {
+                  PoseObserver& observer, std::vector<NamedClip>& out,
+                  std::vector<std::string>& warnings) {
   for (std::size_t i = 0; i < file.count("animations"); ++i) {
     const auto animation = file.item("animations", i);
     if (!animation) return animation.status();
@@ -161,8 +166,8 @@ Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& n
     const Grid grid = grid_of(*channels, frame_rate);
     constexpr std::size_t kMostMatrices = std::size_t{1} << 22;
     if (grid.keys > kMostMatrices / skin.nodes.size()) {
-      return {Errc::unsupported,
-              at + ": " + std::to_string(grid.keys) + " keys at " + std::to_string(grid.rate) + " a second"};
+      return {Errc::unsupported, at + ": " + std::to_string(grid.keys) + " keys at " +
+                                     std::to_string(grid.rate) + " a second"};
     }
     std::vector<Affine3<double>> matrices;
     for (std::size_t k = 0; k < grid.keys; ++k) {

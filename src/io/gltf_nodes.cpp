@@ -95,8 +95,8 @@ std::vector<Affine3<double>> GltfNodes::globals() const {
   std::vector<Affine3<double>> out(nodes.size());
   const Affine3<double> metres{Mat3d::identity() * unit, {}};
   for (const std::size_t i : order) {
-    out[i] =
-        parents[i] < 0 ? metres * nodes[i].local() : out[static_cast<std::size_t>(parents[i])] * nodes[i].local();
+    out[i] = parents[i] < 0 ? metres * nodes[i].local()
+                            : out[static_cast<std::size_t>(parents[i])] * nodes[i].local();
   }
   return out;
 }

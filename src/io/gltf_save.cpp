@@ -76,7 +76,8 @@ void add_bounds(Json& accessor, const Attribute& position, std::size_t n) {
   accessor["max"] = high;
 }
 
-Json header_of(const std::vector<Attribute>& attributes, std::size_t n, const Vec3d& t, ColorSpace space) {
+Json header_of(const std::vector<Attribute>& attributes, std::size_t n, const Vec3d& t,
+               ColorSpace space) {
   Json views = Json::array(), accessors = Json::array(), names = Json::object();
   std::size_t offset = 0;
   for (const Attribute& a : attributes) {
@@ -92,10 +93,11 @@ Json header_of(const std::vector<Attribute>& attributes, std::size_t n, const Ve
     if (a.name == "POSITION") add_bounds(accessors.back(), a, n);
     offset += bytes;
   }
-  const Json splats = {{"kernel", "ellipse"},
-                       {"colorSpace", space == ColorSpace::linear ? "lin_rec709_display" : "srgb_rec709_display"},
-                       {"sortingMethod", "cameraDistance"},
-                       {"projection", "perspective"}};
+  const Json splats = {
+      {"kernel", "ellipse"},
+      {"colorSpace", space == ColorSpace::linear ? "lin_rec709_display" : "srgb_rec709_display"},
+      {"sortingMethod", "cameraDistance"},
+      {"projection", "perspective"}};
   const Json primitive = {{"mode", 0}, {"attributes", names}, {"extensions", {{kExtension, splats}}}};
   Json node = {{"mesh", 0}};
   if (t != Vec3d{}) node["translation"] = {t.x, t.y, t.z};

@@ -32,13 +32,14 @@ ScaledLinear scaled_rotation_of(const Mat3d& m) {
   const Mat3d stretch = transpose(out.rotation) * unit;
   out.off = 0.0;
   for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) out.off = std::max(out.off, std::fabs(stretch(i, k) - (i == k ? 1.0 : 0.0)));
+    for (int k = 0; k < 3; ++k)
+      out.off = std::max(out.off, std::fabs(stretch(i, k) - (i == k ? 1.0 : 0.0)));
   }
   return out;
 }
 
-/// The rotation of multiples of 90 degrees that is within 30 degrees of `m`, else `m`. Meshes are bound upright,
-/// whatever the pose that the file shows.
+/// The rotation of multiples of 90 degrees that is within 30 degrees of `m`, else `m`. Meshes are bound
+/// upright, whatever the pose that the file shows.
 Mat3d squared(const Mat3d& m) {
   Mat3d out;
   for (int i = 0; i < 3; ++i) {
@@ -63,7 +64,8 @@ std::size_t skin_of(const Json& node, std::size_t skins) {
   const Json* which = member(node, "skin");
   if (which == nullptr || !which->is_number() || member(node, "mesh") == nullptr) return kNoNode;
   const double k = which->get<double>();
-  return k >= 0 && k < static_cast<double>(skins) && k == std::floor(k) ? static_cast<std::size_t>(k) : kNoNode;
+  return k >= 0 && k < static_cast<double>(skins) && k == std::floor(k) ? static_cast<std::size_t>(k)
+                                                                        : kNoNode;
 }
 
 /// Fills in loads and numbers of vertices. What is wrong with the arrays is found by read_surface.
@@ -116,8 +118,8 @@ Result<FileSkin> read_file_skin(const GltfFile& file, const GltfNodes& nodes, st
     const double n = (*list)[j].is_number() ? (*list)[j].get<double>() : -1.0;
     if (!(n >= 0 && n < static_cast<double>(nodes.nodes.size())) || n != std::floor(n) ||
         !seen.insert(static_cast<std::size_t>(n)).second) {
-      return {Errc::invalid_file,
-              at + ": 'joints[" + std::to_string(j) + "]' is " + shown((*list)[j]) + ": no node, or one twice"};
+      return {Errc::invalid_file, at + ": 'joints[" + std::to_string(j) + "]' is " + shown((*list)[j]) +
+                                      ": no node, or one twice"};
     }
     out.nodes.push_back(static_cast<std::size_t>(n));
   }
@@ -129,8 +131,8 @@ Result<FileSkin> read_file_skin(const GltfFile& file, const GltfNodes& nodes, st
   const auto m = file.numbers(*a, "MAT4");
   if (!m) return m.status();
   if (m->count < count)
-    return {Errc::invalid_file,
-            at + ": " + std::to_string(m->count) + " inverse binds for " + std::to_string(count) + " joints"};
+    return {Errc::invalid_file, at + ": " + std::to_string(m->count) + " inverse binds for " +
+                                    std::to_string(count) + " joints"};
   for (std::size_t j = 0; j < count; ++j) {
     for (int i = 0; i < 3; ++i) {
       for (int k = 0; k < 3; ++k) out.binds[j].linear(i, k) = m->row(j)[4 * k + i];
@@ -147,7 +149,8 @@ std::string described_skin(const FileSkin& s) {
 }
 
 /// The indices that `wanted` stands for; all that move a mesh where it is empty, or the first.
-Result<std::vector<std::size_t>> wanted_skins(const GltfFile& file, const std::vector<std::string>& wanted) {
+Result<std::vector<std::size_t>> wanted_skins(const GltfFile& file,
+                                              const std::vector<std::string>& wanted) {
   const std::size_t count = file.count("skins");
   std::set<std::size_t> out;
   for (const std::string& want : wanted) {
@@ -157,12 +160,15 @@ Result<std::vector<std::size_t>> wanted_skins(const GltfFile& file, const std::v
       const auto entry = file.item("skins", k);
       const Json* name = entry ? member(**entry, "name") : nullptr;
       if (name != nullptr && *name == want) named.push_back(k);
-      if (k < 100) all += (k == 0 ? "" : ", ") + std::to_string(k) + (name == nullptr ? "" : " " + shown(*name));
+      if (k < 100)
+        all += (k == 0 ? "" : ", ") + std::to_string(k) + (name == nullptr ? "" : " " + shown(*name));
     }
-    const bool digits = !want.empty() && want.size() < 10 && want.find_first_not_of("0123456789") == want.npos;
+    const bool digits =
+        !want.empty() && want.size() < 10 && want.find_first_not_of("0123456789") == want.npos;
     if (named.empty() && digits && std::stoul(want) < count) named.push_back(std::stoul(want));
     if (named.size() != 1) {
-      return {Errc::invalid_argument, file.source() + ": " + (named.empty() ? "no skin" : "more than one skin") + " is \"" +
+      return {Errc::invalid_argument, file.source() + ": " +
+                                          (named.empty() ? "no skin" : "more than one skin") + " is \"" +
                                           want + "\"; there are " + all + (count > 100 ? ", ..." : "")};
     }
     out.insert(named[0]);
@@ -176,7 +182,8 @@ Result<std::vector<std::size_t>> wanted_skins(const GltfFile& file, const std::v
 
 Affine3<double> inverse_of(const Affine3<double>& m) {
   const Mat3d& a = m.linear;
-  const Vec3d c0 = cross(a.row[1], a.row[2]), c1 = cross(a.row[2], a.row[0]), c2 = cross(a.row[0], a.row[1]);
+  const Vec3d c0 = cross(a.row[1], a.row[2]), c1 = cross(a.row[2], a.row[0]),
+              c2 = cross(a.row[0], a.row[1]);
   const Mat3d inverse = transpose(Mat3d{{c0, c1, c2}}) * (1.0 / dot(a.row[0], c0));
   return {inverse, -(inverse * m.translation)};
 }
@@ -263,7 +270,8 @@ class RigidError final : public PoseObserver {
     const Mat3d& m = skin.canonical_from_mesh.linear;
     const double scale = std::cbrt(determinant(m));
     const Mat3d back = transpose(m) * (1.0 / (scale * scale));
-    for (const Vec3d& p : mesh.positions) raw_.push_back(back * (p - skin.canonical_from_mesh.translation));
+    for (const Vec3d& p : mesh.positions)
+      raw_.push_back(back * (p - skin.canonical_from_mesh.translation));
     turn_ = rotation_matrix(skin.canonical_from_scene);
   }
   void look(const std::vector<Affine3<double>>& globals) override {
@@ -298,7 +306,8 @@ struct NoObserver final : PoseObserver {
 };
 
 /// The node of a joint's name, which joint_names may have given a number; or kNoNode.
-std::size_t node_called(const std::map<std::string, std::vector<std::size_t>>& by_name, const std::string& joint) {
+std::size_t node_called(const std::map<std::string, std::vector<std::size_t>>& by_name,
+                        const std::string& joint) {
   if (const auto exact = by_name.find(joint); exact != by_name.end()) return exact->second[0];
   const std::size_t mark = joint.rfind('#');
   if (mark == joint.npos || joint.size() - mark < 2 || joint.size() - mark > 7 ||
@@ -307,7 +316,8 @@ std::size_t node_called(const std::map<std::string, std::vector<std::size_t>>& b
   }
   const auto base = by_name.find(joint.substr(0, mark));
   const std::size_t number = std::stoul(joint.substr(mark + 1));
-  return base == by_name.end() || number < 2 || number > base->second.size() ? kNoNode : base->second[number - 1];
+  return base == by_name.end() || number < 2 || number > base->second.size() ? kNoNode
+                                                                             : base->second[number - 1];
 }
 
 Status check_options(const std::filesystem::path& path, const GltfOptions& options) {
@@ -315,15 +325,16 @@ Status check_options(const std::filesystem::path& path, const GltfOptions& optio
     return {Errc::invalid_argument, path.string() + ": GltfOptions.frame_rate must not be negative"};
   }
   if (!(options.scale > 0) || !std::isfinite(options.scale)) {
-    return {Errc::invalid_argument, path.string() + ": GltfOptions.scale is " + std::to_string(options.scale) +
-                                        ", must be above 0"};
+    return {Errc::invalid_argument, path.string() + ": GltfOptions.scale is " +
+                                        std::to_string(options.scale) + ", must be above 0"};
   }
   return {};
 }
 
 }  // namespace
 
-std::vector<Affine3<double>> rigid_joints(const GltfSkin& skin, const std::vector<Affine3<double>>& globals) {
+std::vector<Affine3<double>> rigid_joints(const GltfSkin& skin,
+                                          const std::vector<Affine3<double>>& globals) {
   const Affine3<double> turn{rotation_matrix(skin.canonical_from_scene), {}};
   std::vector<Affine3<double>> out;
   for (std::size_t j = 0; j < skin.nodes.size(); ++j) {
@@ -338,7 +349,8 @@ std::vector<Affine3<double>> rigid_joints(const GltfSkin& skin, const std::vecto
   return out;
 }
 
-Result<GltfSkin> read_skin(const GltfFile& file, const GltfNodes& nodes, const std::vector<std::string>& wanted) {
+Result<GltfSkin> read_skin(const GltfFile& file, const GltfNodes& nodes,
+                           const std::vector<std::string>& wanted) {
   if (file.count("skins") == 0) return {Errc::unsupported, file.source() + ": there is no skin in it"};
   const auto indices = wanted_skins(file, wanted);
   if (!indices) return indices.status();
@@ -366,7 +378,8 @@ Result<GltfSkin> read_skin(const GltfFile& file, const GltfNodes& nodes, const s
     if (list.size() < 1000) list += (list.empty() ? "" : ", ") + described_skin(skins[k]);
   }
   if (!outside.empty()) {
-    return {Errc::unsupported, file.source() + ": its skins have more than one rig: " + inside + " on one; " + outside +
+    return {Errc::unsupported, file.source() + ": its skins have more than one rig: " + inside +
+                                   " on one; " + outside +
                                    " on others. Choose skins of one rig (GltfOptions::skins, --skin)"};
   }
   GltfSkin out;
@@ -393,41 +406,48 @@ Result<GltfSkin> read_skin(const GltfFile& file, const GltfNodes& nodes, const s
   const ScaledLinear placed = scaled_rotation_of(placed_by.linear);
   constexpr double kShear = 0.02;
   if (placed.off > kShear)
-    return {Errc::invalid_file, at + ": the bind of joint " + std::to_string(most) + " is not rigid times a scale"};
-  const Mat3d upright = rotation_matrix(out.canonical_from_scene) * squared(placed.rotation), back = transpose(upright);
+    return {Errc::invalid_file,
+            at + ": the bind of joint " + std::to_string(most) + " is not rigid times a scale"};
+  const Mat3d upright = rotation_matrix(out.canonical_from_scene) * squared(placed.rotation),
+              back = transpose(upright);
   out.canonical_from_mesh = {upright * placed.scale, {}};
   Skeleton& skeleton = out.skeleton;
   skeleton.names = joint_names(nodes, out.nodes);
   for (std::size_t j = 0; j < out.nodes.size(); ++j) {
     std::int64_t up = nodes.parents[out.nodes[j]];
-    while (up >= 0 && !rig.there[static_cast<std::size_t>(up)]) up = nodes.parents[static_cast<std::size_t>(up)];
-    skeleton.parents.push_back(up < 0 ? -1 : static_cast<std::int32_t>(place[static_cast<std::size_t>(up)]));
+    while (up >= 0 && !rig.there[static_cast<std::size_t>(up)])
+      up = nodes.parents[static_cast<std::size_t>(up)];
+    skeleton.parents.push_back(up < 0 ? -1
+                                      : static_cast<std::int32_t>(place[static_cast<std::size_t>(up)]));
     const ScaledLinear b = scaled_rotation_of(out.inverse_binds[j].linear);
     if (load[j] > 0 && (b.off > kShear || !is_finite(out.inverse_binds[j].translation))) {
-      return {Errc::invalid_file,
-              at + ": the inverse bind of joint \"" + skeleton.names[j] + "\" is not rigid times a scale"};
+      return {Errc::invalid_file, at + ": the inverse bind of joint \"" + skeleton.names[j] +
+                                      "\" is not rigid times a scale"};
     }
-    skeleton.inverse_binds.push_back(
-        {b.rotation * back, out.inverse_binds[j].translation * (placed.scale / std::max(b.scale, 1e-12))});
+    skeleton.inverse_binds.push_back({b.rotation * back, out.inverse_binds[j].translation *
+                                                             (placed.scale / std::max(b.scale, 1e-12))});
   }
-  // Joints that move nothing may have any bind: they keep the place that the file shows them in beside one that does.
+  // Joints that move nothing may have any bind: they keep the place that the file shows them in beside
+  // one that does.
   const std::vector<Affine3<double>> shown_at = rigid_joints(out, globals);
   for (std::size_t j = 0; j < out.nodes.size(); ++j) {
     if (load[j] > 0) continue;
     std::size_t beside = most;
-    for (std::int32_t up = skeleton.parents[j]; up >= 0; up = skeleton.parents[static_cast<std::size_t>(up)]) {
+    for (std::int32_t up = skeleton.parents[j]; up >= 0;
+         up = skeleton.parents[static_cast<std::size_t>(up)]) {
       if (load[static_cast<std::size_t>(up)] > 0) {
         beside = static_cast<std::size_t>(up);
         break;
       }
     }
-    skeleton.inverse_binds[j] = rigid_inverse(shown_at[j]) * shown_at[beside] * skeleton.inverse_binds[beside];
+    skeleton.inverse_binds[j] =
+        rigid_inverse(shown_at[j]) * shown_at[beside] * skeleton.inverse_binds[beside];
   }
   for (std::size_t j = 0; j < out.nodes.size(); ++j) {
     const Affine3<double> global = rigid_inverse(skeleton.inverse_binds[j]);
     const std::int32_t parent = skeleton.parents[j];
-    skeleton.rest_local.push_back(parent < 0 ? global
-                                             : skeleton.inverse_binds[static_cast<std::size_t>(parent)] * global);
+    skeleton.rest_local.push_back(
+        parent < 0 ? global : skeleton.inverse_binds[static_cast<std::size_t>(parent)] * global);
   }
   if (Status s = skeleton.validate(); !s) return {Errc::invalid_file, at + ": " + s.message()};
   return out;
@@ -451,18 +471,22 @@ Result<LoadedSkinnedMesh> load_gltf_skin(const std::filesystem::path& path, cons
     out.mesh.skeleton = skin->skeleton;
     if (Status s = read_surface(*file, *skin, out); !s) return s;
     if (Status s = out.mesh.validate(); !s) return detail::invalid_file(path, s.message());
-    const auto still = clip_from_matrices(skin->skeleton, 1.0, rigid_joints(*skin, nodes->globals()), false);
+    const auto still =
+        clip_from_matrices(skin->skeleton, 1.0, rigid_joints(*skin, nodes->globals()), false);
     if (!still) return detail::invalid_file(path, still.message());
     still->pose({}, out.pose);
     RigidError error(*skin, out.mesh);
     error.look(nodes->globals());
-    if (Status s = read_clips(*file, *skin, *nodes, options.frame_rate, error, out.clips, out.report.warnings); !s) {
+    if (Status s =
+            read_clips(*file, *skin, *nodes, options.frame_rate, error, out.clips, out.report.warnings);
+        !s) {
       return s;
     }
     out.report.rigid_error = error.worst;
     if (error.worst > 1e-3) {
-      out.report.warnings.push_back("joints change their scale, which is left out: vertices are off by up to " +
-                                    std::to_string(1000 * error.worst) + " mm");
+      out.report.warnings.push_back(
+          "joints change their scale, which is left out: vertices are off by up to " +
+          std::to_string(1000 * error.worst) + " mm");
     }
     return out;
   });
@@ -496,12 +520,15 @@ Result<LoadedClips> load_gltf_clips(const std::filesystem::path& path, const Ske
     if (missing_count > 8) missing += " and " + std::to_string(missing_count - 8) + " more";
     if (root_missing || 2 * missing_count > skeleton.size()) {
       return {Errc::invalid_argument,
-              path.string() + ": its nodes have not the names of the skeleton's joints: there is no " + missing};
+              path.string() + ": its nodes have not the names of the skeleton's joints: there is no " +
+                  missing};
     }
     LoadedClips out;
-    if (missing_count != 0) out.warnings.push_back("joints without a node keep their rest pose: " + missing);
+    if (missing_count != 0)
+      out.warnings.push_back("joints without a node keep their rest pose: " + missing);
     NoObserver none;
-    if (Status s = read_clips(*file, rig, *nodes, options.frame_rate, none, out.clips, out.warnings); !s) return s;
+    if (Status s = read_clips(*file, rig, *nodes, options.frame_rate, none, out.clips, out.warnings); !s)
+      return s;
     return out;
   });
 }

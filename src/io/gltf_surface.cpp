@@ -28,7 +28,9 @@ class SurfaceReader {
       if (mesh == nullptr) continue;
       part_ = nullptr;
       for (const GltfSkinPart& p : skin_.parts) {
-        if (which != nullptr && which->is_number() && which->get<double>() == static_cast<double>(p.index)) part_ = &p;
+        if (which != nullptr && which->is_number() &&
+            which->get<double>() == static_cast<double>(p.index))
+          part_ = &p;
       }
       if (part_ == nullptr) {
         ++others_;
@@ -39,8 +41,8 @@ class SurfaceReader {
       if (Status s = read_mesh(*m); !s) return s;
     }
     if (mesh_.triangles.empty()) {
-      return {Errc::invalid_file,
-              file_.source() + ": no triangles are moved by skins[" + std::to_string(skin_.parts[0].index) + "]"};
+      return {Errc::invalid_file, file_.source() + ": no triangles are moved by skins[" +
+                                      std::to_string(skin_.parts[0].index) + "]"};
     }
     finish();
     return {};
@@ -68,7 +70,8 @@ class SurfaceReader {
     const auto drawn = has_triangles(primitive, at);
     if (!drawn) return drawn.status();
     if (!*drawn) {
-      return {Errc::unsupported, at + ": 'mode' is " + shown(*member(primitive, "mode")) + "; triangles are read"};
+      return {Errc::unsupported,
+              at + ": 'mode' is " + shown(*member(primitive, "mode")) + "; triangles are read"};
     }
     if (member(primitive, "targets") != nullptr) warn(at + ": morph targets are left out");
     vertices_ = 0;
@@ -79,7 +82,8 @@ class SurfaceReader {
     const std::size_t first = mesh_.positions.size();
     for (std::size_t v = 0; v < vertices_; ++v) {
       const double* p = positions->row(v);
-      mesh_.positions.push_back(skin_.canonical_from_mesh * (part_->rig_from_mesh * Vec3d{p[0], p[1], p[2]}));
+      mesh_.positions.push_back(skin_.canonical_from_mesh *
+                                (part_->rig_from_mesh * Vec3d{p[0], p[1], p[2]}));
     }
     if (Status s = read_weights(primitive, at); !s) return s;
     GltfMaterial material;
@@ -91,7 +95,8 @@ class SurfaceReader {
     uvs_.resize(first, {0, 0});
     colors_.resize(first, {1, 1, 1});
     for (std::size_t v = 0; v < vertices_; ++v) {
-      uvs_.push_back(uv->count == 0 ? std::array<double, 2>{0, 0} : material.uv(uv->row(v)[0], uv->row(v)[1]));
+      uvs_.push_back(uv->count == 0 ? std::array<double, 2>{0, 0}
+                                    : material.uv(uv->row(v)[0], uv->row(v)[1]));
       colors_.push_back(color->count == 0 ? Vec3d{1, 1, 1}
                                           : Vec3d{color->row(v)[0], color->row(v)[1], color->row(v)[2]});
     }
@@ -129,7 +134,8 @@ class SurfaceReader {
       if (!w) return w.status();
       if (j->count == 0 && w->count == 0) break;
       if (j->count == 0 || w->count == 0)
-        return {Errc::invalid_file, at + ": JOINTS and WEIGHTS " + std::to_string(set) + " must come together"};
+        return {Errc::invalid_file,
+                at + ": JOINTS and WEIGHTS " + std::to_string(set) + " must come together"};
       joints.push_back(std::move(*j));
       weights.push_back(std::move(*w));
     }
@@ -141,18 +147,21 @@ class SurfaceReader {
         for (std::size_t k = 0; k < 4; ++k) {
           const double w = weights[set].row(v)[k], j = joints[set].row(v)[k];
           if (!(w >= 0))
-            return {Errc::invalid_file, at + ": vertex " + std::to_string(v) + " has weight " + std::to_string(w)};
+            return {Errc::invalid_file,
+                    at + ": vertex " + std::to_string(v) + " has weight " + std::to_string(w)};
           if (!(w > 0)) continue;
           if (!(j >= 0 && j < static_cast<double>(part_->joint_of.size())) || j != std::floor(j)) {
-            return {Errc::invalid_file, at + ": vertex " + std::to_string(v) + " names joint " + std::to_string(j) +
-                                            " of " + std::to_string(part_->joint_of.size())};
+            return {Errc::invalid_file, at + ": vertex " + std::to_string(v) + " names joint " +
+                                            std::to_string(j) + " of " +
+                                            std::to_string(part_->joint_of.size())};
           }
           row.emplace_back(part_->joint_of[static_cast<std::size_t>(j)], w);
           sum += w;
         }
       }
       if (!(sum > 0))
-        return {Errc::invalid_file, at + ": the weights of vertex " + std::to_string(v) + " are all zero"};
+        return {Errc::invalid_file,
+                at + ": the weights of vertex " + std::to_string(v) + " are all zero"};
       SkinnedMeshReport& report = out_.report;
       report.unequal_weights += std::fabs(sum - 1.0) > 1e-3 ? 1 : 0;
       report.least_weight_sum = std::min(report.least_weight_sum, sum);
@@ -168,7 +177,8 @@ class SurfaceReader {
     for (const auto& row : rows_) mesh_.influences = std::max(mesh_.influences, row.size());
     for (const auto& row : rows_) {
       for (std::size_t k = 0; k < mesh_.influences; ++k) {
-        mesh_.joint_indices.push_back(static_cast<std::uint16_t>(k < row.size() ? row[k].first : row[0].first));
+        mesh_.joint_indices.push_back(
+            static_cast<std::uint16_t>(k < row.size() ? row[k].first : row[0].first));
         mesh_.weights.push_back(k < row.size() ? static_cast<float>(row[k].second) : 0.0f);
       }
     }
@@ -181,7 +191,8 @@ class SurfaceReader {
       warn("the weights of " + std::to_string(report.unequal_weights) +
            " vertices do not sum to 1; they were divided by their sums");
     }
-    if (others_ != 0) warn(std::to_string(others_) + " meshes are moved by no skin that is read and are left out");
+    if (others_ != 0)
+      warn(std::to_string(others_) + " meshes are moved by no skin that is read and are left out");
   }
 
   const GltfFile& file_;

@@ -9,7 +9,7 @@ namespace gsnav::io::detail {
 namespace {
 constexpr std::size_t kMostAtOnce = std::size_t{1} << 30;  // zlib's counters are 32-bit
 constexpr std::size_t kReadAtOnce = std::size_t{1} << 18;
-}
+}  // namespace
 
 GzipReader::GzipReader(const ByteSource& packed) : left_(packed) {
   constexpr int kGzipOnly = 16;
@@ -48,7 +48,8 @@ std::size_t GzipReader::read(std::span<std::byte> out) {
 std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
   z_stream stream{};
   constexpr int kGzipOnly = 16, kMemory = 8;
-  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + kGzipOnly, kMemory, Z_DEFAULT_STRATEGY) != Z_OK) {
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + kGzipOnly, kMemory,
+                   Z_DEFAULT_STRATEGY) != Z_OK) {
     throw std::bad_alloc();
   }
   std::vector<std::byte> out;
@@ -61,7 +62,8 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
   std::size_t done = 0;
   int code = Z_OK;
   while (code == Z_OK) {
-    const std::size_t n = std::min(bytes.size(), kMostAtOnce), room = std::min(out.size() - done, kMostAtOnce);
+    const std::size_t n = std::min(bytes.size(), kMostAtOnce),
+                      room = std::min(out.size() - done, kMostAtOnce);
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
     stream.avail_in = static_cast<uInt>(n);
     stream.next_out = reinterpret_cast<Bytef*>(out.data() + done);

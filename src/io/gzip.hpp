@@ -11,7 +11,8 @@
 
 namespace gsnav::io::detail {
 
-/// Decompresses a gzip stream in memory or in a file, piece by piece: who reads says how much is believed.
+/// Decompresses a gzip stream in memory or in a file, piece by piece: who reads says how much is
+/// believed.
 class GzipReader {
  public:
   /// What the bytes lie in must outlive the reader.

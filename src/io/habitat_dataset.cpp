@@ -52,7 +52,8 @@ class LeftOut {
 Result<std::string> text(const Json& object, const char* key, const std::string& at) {
   const Json* v = member(object, key);
   if (v == nullptr) return std::string();
-  if (!v->is_string()) return {Errc::invalid_file, at + ": '" + key + "' is " + shown(*v) + ", must be a text"};
+  if (!v->is_string())
+    return {Errc::invalid_file, at + ": '" + key + "' is " + shown(*v) + ", must be a text"};
   return v->get<std::string>();
 }
 
@@ -68,24 +69,31 @@ Status read_scale(const Json& object, const std::string& at, double& out) {
   const Json* v = member(object, "scale");
   if (v == nullptr) return {};
   std::vector<double> s;
-  for (const Json& x : v->is_array() ? *v : Json::array({*v})) s.push_back(x.is_number() ? x.get<double>() : NAN);
+  for (const Json& x : v->is_array() ? *v : Json::array({*v}))
+    s.push_back(x.is_number() ? x.get<double>() : NAN);
   for (const double x : s) {
-    if (!(x > 0) || !std::isfinite(x)) return {Errc::invalid_file, at + ": 'scale' is " + shown(*v) + ", must be positive"};
+    if (!(x > 0) || !std::isfinite(x))
+      return {Errc::invalid_file, at + ": 'scale' is " + shown(*v) + ", must be positive"};
     if (x != s[0]) return {Errc::unsupported, at + ": 'scale' differs by axis; one for all is read"};
   }
-  if (s.size() != 1 && s.size() != 3) return {Errc::invalid_file, at + ": 'scale' must be one number or three"};
+  if (s.size() != 1 && s.size() != 3)
+    return {Errc::invalid_file, at + ": 'scale' must be one number or three"};
   out = s[0];
   return {};
 }
 
 /// What `object` says about a stage on top of what `out` has; assets lie beside `folder`.
-Status read_stage(const Json& object, const fs::path& folder, const std::string& at, StageConfig& out, LeftOut& left_out) {
-  for (const auto& [key, to] : {std::pair{"render_asset", &out.render_asset}, std::pair{"collision_asset", &out.collision_asset}}) {
+Status read_stage(const Json& object, const fs::path& folder, const std::string& at, StageConfig& out,
+                  LeftOut& left_out) {
+  for (const auto& [key, to] : {std::pair{"render_asset", &out.render_asset},
+                                std::pair{"collision_asset", &out.collision_asset}}) {
     const auto name = text(object, key, at);
     if (!name) return name.status();
-    if (!name->empty()) *to = fs::path(*name).is_absolute() ? fs::path(*name) : (folder / *name).lexically_normal();
+    if (!name->empty())
+      *to = fs::path(*name).is_absolute() ? fs::path(*name) : (folder / *name).lexically_normal();
   }
-  for (const auto& [key, to] : {std::pair{"up", &out.up}, std::pair{"front", &out.front}, std::pair{"origin", &out.origin}}) {
+  for (const auto& [key, to] :
+       {std::pair{"up", &out.up}, std::pair{"front", &out.front}, std::pair{"origin", &out.origin}}) {
     if (Status s = vec3(object, key, at, *to); !s) return s;
   }
   for (const auto& [key, v] : {std::pair{"up", out.up}, std::pair{"front", out.front}}) {
@@ -102,14 +110,20 @@ Status read_stage(const Json& object, const fs::path& folder, const std::string&
   }
   if (Status s = read_scale(object, at, out.scale); !s) return s;
   if (const Json* v = member(object, "norm_quaternion"); v != nullptr) {
-    if (!v->is_boolean()) return {Errc::invalid_file, at + ": 'norm_quaternion' is " + shown(*v) + ", must be true or false"};
+    if (!v->is_boolean())
+      return {Errc::invalid_file,
+              at + ": 'norm_quaternion' is " + shown(*v) + ", must be true or false"};
     out.norm_quaternion = v->get<bool>();
   }
-  left_out.add(object, {"render_asset", "collision_asset", "up", "front", "origin", "units_to_meters", "scale", "norm_quaternion"}, at);
+  left_out.add(object,
+               {"render_asset", "collision_asset", "up", "front", "origin", "units_to_meters", "scale",
+                "norm_quaternion"},
+               at);
   return {};
 }
 
-/// `name` matches a pattern in which `*` stands for any text. Goes back to the last star only: never long.
+/// `name` matches a pattern in which `*` stands for any text. Goes back to the last star only: never
+/// long.
 bool matches(std::string_view pattern, std::string_view name) {
   std::size_t p = 0, n = 0, star = std::string_view::npos, from = 0;
   while (n < name.size()) {
@@ -128,7 +142,8 @@ bool matches(std::string_view pattern, std::string_view name) {
   return pattern.find_first_not_of('*', p) == std::string_view::npos;
 }
 
-/// Folders and files that a path with patterns stands for, sorted. Errors: unsupported where they are too many to be meant.
+/// Folders and files that a path with patterns stands for, sorted. Errors: unsupported where they are
+/// too many to be meant.
 Result<std::vector<fs::path>> expanded(const fs::path& folder, const fs::path& pattern) {
   constexpr std::size_t kMost = 100000;
   std::vector<fs::path> found{pattern.is_absolute() ? pattern.root_path() : folder};
@@ -143,7 +158,8 @@ Result<std::vector<fs::path>> expanded(const fs::path& folder, const fs::path& p
       for (const auto& entry : fs::directory_iterator(at)) {
         if (matches(part.string(), entry.path().filename().string())) next.push_back(entry.path());
         if (next.size() > kMost) {
-          return {Errc::unsupported, "the pattern '" + pattern.string() + "' stands for over " + std::to_string(kMost) + " files"};
+          return {Errc::unsupported, "the pattern '" + pattern.string() + "' stands for over " +
+                                         std::to_string(kMost) + " files"};
         }
       }
     }
@@ -161,7 +177,8 @@ std::string name_of(const fs::path& file, std::string_view ending) {
 
 class DatasetReader {
  public:
-  explicit DatasetReader(const fs::path& path) : folder_(path.parent_path()), at_(path.string()), path_(path) {}
+  explicit DatasetReader(const fs::path& path)
+      : folder_(path.parent_path()), at_(path.string()), path_(path) {}
 
   Result<HabitatDataset> run() {
     const auto json = load_object(path_);
@@ -181,11 +198,13 @@ class DatasetReader {
         scene.name = name;
         scene.file = stage.file;
         scene.stage = stage;
-        if (const auto found = navmeshes_.find(name); found != navmeshes_.end()) scene.navmesh = found->second;
+        if (const auto found = navmeshes_.find(name); found != navmeshes_.end())
+          scene.navmesh = found->second;
         out_.scenes.push_back(std::move(scene));
       }
     }
-    std::sort(out_.scenes.begin(), out_.scenes.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+    std::sort(out_.scenes.begin(), out_.scenes.end(),
+              [](const auto& a, const auto& b) { return a.name < b.name; });
     warn_of_outside();
     left_out_.report(out_.warnings);
     return std::move(out_);
@@ -211,21 +230,26 @@ class DatasetReader {
   }
 
   /// The files that `paths` of a part of the dataset stands for.
-  Status files(const Json& json, const char* part, const std::string& ending, std::vector<fs::path>& out) {
+  Status files(const Json& json, const char* part, const std::string& ending,
+               std::vector<fs::path>& out) {
     const Json* section = member(json, part);
     if (section == nullptr) return {};
     const std::string at = at_ + ": " + part;
-    if (!section->is_object()) return {Errc::invalid_file, at + " is " + shown(*section) + ", must be an object"};
+    if (!section->is_object())
+      return {Errc::invalid_file, at + " is " + shown(*section) + ", must be an object"};
     left_out_.add(*section, {"paths", "default_attributes"}, at);
     const Json* paths = member(*section, "paths");
     if (paths == nullptr) return {};
-    if (!paths->is_object()) return {Errc::invalid_file, at + ": 'paths' is " + shown(*paths) + ", must be an object"};
+    if (!paths->is_object())
+      return {Errc::invalid_file, at + ": 'paths' is " + shown(*paths) + ", must be an object"};
     const Json* list = member(*paths, ".json");
     left_out_.add(*paths, {".json"}, at + ": paths");
     if (list == nullptr) return {};
-    if (!list->is_array()) return {Errc::invalid_file, at + ": paths['.json'] is " + shown(*list) + ", must be an array"};
+    if (!list->is_array())
+      return {Errc::invalid_file, at + ": paths['.json'] is " + shown(*list) + ", must be an array"};
     for (const Json& p : *list) {
-      if (!p.is_string()) return {Errc::invalid_file, at + ": paths['.json'] has " + shown(p) + ", must have paths"};
+      if (!p.is_string())
+        return {Errc::invalid_file, at + ": paths['.json'] has " + shown(p) + ", must have paths"};
       const auto listed = expanded(folder_, p.get<std::string>());
       if (!listed) return {listed.code(), at + ": " + listed.message()};
       for (const fs::path& found : *listed) {
@@ -243,17 +267,23 @@ class DatasetReader {
 
   Status read_stages(const Json& json, const std::vector<fs::path>& files) {
     StageConfig defaults;
-    if (const Json* section = member(json, "stages"); section != nullptr && member(*section, "default_attributes") != nullptr) {
+    if (const Json* section = member(json, "stages");
+        section != nullptr && member(*section, "default_attributes") != nullptr) {
       const std::string at = at_ + ": stages.default_attributes";
-      if (Status s = read_stage(*member(*section, "default_attributes"), folder_, at, defaults, left_out_); !s) return s;
+      if (Status s =
+              read_stage(*member(*section, "default_attributes"), folder_, at, defaults, left_out_);
+          !s)
+        return s;
     }
     for (const fs::path& file : files) {
       const auto stage = load_object(file);
       if (!stage) return stage.status();
       StageConfig config = defaults;
       config.file = file;
-      if (Status s = read_stage(*stage, file.parent_path(), file.string(), config, left_out_); !s) return s;
-      if (config.render_asset.empty()) return {Errc::invalid_file, file.string() + ": 'render_asset' is missing"};
+      if (Status s = read_stage(*stage, file.parent_path(), file.string(), config, left_out_); !s)
+        return s;
+      if (config.render_asset.empty())
+        return {Errc::invalid_file, file.string() + ": 'render_asset' is missing"};
       stages_[name_of(file, kStage)] = std::move(config);
     }
     return {};
@@ -263,11 +293,13 @@ class DatasetReader {
     const Json* section = member(json, "navmesh_instances");
     if (section == nullptr) return {};
     if (!section->is_object()) {
-      return {Errc::invalid_file, at_ + ": 'navmesh_instances' is " + shown(*section) + ", must be an object"};
+      return {Errc::invalid_file,
+              at_ + ": 'navmesh_instances' is " + shown(*section) + ", must be an object"};
     }
     for (const auto& [name, path] : section->items()) {
       if (!path.is_string()) {
-        return {Errc::invalid_file, at_ + ": navmesh_instances['" + name + "'] is " + shown(path) + ", must be a path"};
+        return {Errc::invalid_file,
+                at_ + ": navmesh_instances['" + name + "'] is " + shown(path) + ", must be a path"};
       }
       navmeshes_[name] = (folder_ / path.get<std::string>()).lexically_normal();
     }
@@ -293,7 +325,8 @@ class DatasetReader {
     if (!handle) return handle.status();
     const StageConfig* found = stage(*handle);
     if (found == nullptr) {
-      return {Errc::file_not_found, at + ": stage_instance.template_name '" + *handle + "': the dataset has no such stage"};
+      return {Errc::file_not_found,
+              at + ": stage_instance.template_name '" + *handle + "': the dataset has no such stage"};
     }
     scene.stage = *found;
     left_out_.add(*instance, {"template_name"}, at + ": stage_instance");
@@ -302,16 +335,21 @@ class DatasetReader {
     if (!navmesh) return navmesh.status();
     if (!navmesh->empty()) {
       const auto entry = navmeshes_.find(*navmesh);
-      scene.navmesh = entry != navmeshes_.end() ? entry->second : (file.parent_path() / *navmesh).lexically_normal();
+      scene.navmesh =
+          entry != navmeshes_.end() ? entry->second : (file.parent_path() / *navmesh).lexically_normal();
       if (entry == navmeshes_.end() && !fs::exists(scene.navmesh)) {
-        return {Errc::file_not_found, at + ": navmesh_instance '" + *navmesh + "': neither in the dataset's navmesh_instances nor a file"};
+        return {Errc::file_not_found, at + ": navmesh_instance '" + *navmesh +
+                                          "': neither in the dataset's navmesh_instances nor a file"};
       }
     }
     auto avatars = load_avatar_scene(file);
     if (!avatars) return avatars.status();
     for (const std::string& w : avatars->warnings) out_.warnings.push_back(w);
     scene.avatars = std::move(*avatars);
-    left_out_.add(*json, {"stage_instance", "navmesh_instance", "gaussian_avatars", "avatars", "time_max", "time_loop"}, at);
+    left_out_.add(
+        *json,
+        {"stage_instance", "navmesh_instance", "gaussian_avatars", "avatars", "time_max", "time_loop"},
+        at);
     out_.scenes.push_back(std::move(scene));
     return {};
   }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "picture.hpp"
-
 #include <algorithm>
 #include <cstdlib>
 #include <vector>
+
+#include "picture.hpp"
 
 #if defined(GSNAV_HAS_JPEG)
 
@@ -87,7 +87,8 @@ class JpegDecoder {
   ErrorHandler error_;
 };
 
-/// Encoder with its own lifetime, as the decoder has; what it writes lies in memory that libjpeg allocates.
+/// Encoder with its own lifetime, as the decoder has; what it writes lies in memory that libjpeg
+/// allocates.
 class JpegEncoder {
  public:
   JpegEncoder() { info_.err = error_.set_up(); }
@@ -111,7 +112,8 @@ class JpegEncoder {
     jpeg_start_compress(&info_, TRUE);
     while (info_.next_scanline < info_.image_height) {
       // libjpeg does not write to the rows that it compresses.
-      JSAMPROW row = const_cast<JSAMPROW>(rgb) + std::size_t{3} * info_.image_width * info_.next_scanline;
+      JSAMPROW row =
+          const_cast<JSAMPROW>(rgb) + std::size_t{3} * info_.image_width * info_.next_scanline;
       if (jpeg_write_scanlines(&info_, &row, 1) != 1) return false;
     }
     jpeg_finish_compress(&info_);
@@ -128,12 +130,15 @@ class JpegEncoder {
   unsigned long size_ = 0;
 };
 
-Result<std::vector<std::byte>> compress_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality) {
+Result<std::vector<std::byte>> compress_jpeg(std::span<const std::uint8_t> rgb, int width, int height,
+                                             int quality) {
   if (width > static_cast<int>(kLargestSide) || height > static_cast<int>(kLargestSide)) {
-    return {Errc::invalid_argument, "encode_jpeg: a side is longer than " + std::to_string(kLargestSide) + " pixels"};
+    return {Errc::invalid_argument,
+            "encode_jpeg: a side is longer than " + std::to_string(kLargestSide) + " pixels"};
   }
   JpegEncoder encoder;
-  if (!encoder.write(rgb.data(), width, height, quality)) return {Errc::out_of_memory, "encode_jpeg: libjpeg failed"};
+  if (!encoder.write(rgb.data(), width, height, quality))
+    return {Errc::out_of_memory, "encode_jpeg: libjpeg failed"};
   const std::span<const std::byte> bytes = encoder.bytes();
   return std::vector<std::byte>(bytes.begin(), bytes.end());
 }
@@ -142,7 +147,8 @@ Result<std::vector<std::byte>> compress_jpeg(std::span<const std::uint8_t> rgb, 
 
 Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string& name, int most_side) {
   JpegDecoder decoder;
-  if (!decoder.read_header(bytes)) return {Errc::invalid_file, name + ": not a JPEG, or its header is damaged"};
+  if (!decoder.read_header(bytes))
+    return {Errc::invalid_file, name + ": not a JPEG, or its header is damaged"};
   if (std::max(decoder.width(), decoder.height()) > static_cast<std::size_t>(most_side)) {
     return too_large(name, decoder.width(), decoder.height(), most_side);
   }
@@ -153,11 +159,12 @@ Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string
                                     std::to_string(bytes.size()) + " bytes"};
   }
   if (!decoder.start()) {
-    return {Errc::invalid_file, name + ": not of three colours, of more than " + std::to_string(kMostScans) +
-                                    " scans, or damaged JPEG data"};
+    return {Errc::invalid_file, name + ": not of three colours, of more than " +
+                                    std::to_string(kMostScans) + " scans, or damaged JPEG data"};
   }
   std::vector<unsigned char> pixels(3 * decoder.width() * decoder.height());
-  if (!decoder.read_rows(pixels.data())) return {Errc::invalid_file, name + ": damaged or truncated JPEG data"};
+  if (!decoder.read_rows(pixels.data()))
+    return {Errc::invalid_file, name + ": damaged or truncated JPEG data"};
   PngImage out;
   out.width = static_cast<int>(decoder.width());
   out.height = static_cast<int>(decoder.height());
@@ -190,14 +197,18 @@ Result<PngImage> decode_jpeg(std::span<const std::byte>, const std::string& name
 
 namespace gsnav::io {
 
-Result<std::vector<std::byte>> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality) {
+Result<std::vector<std::byte>> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height,
+                                           int quality) {
   if (width < 1 || height < 1 ||
-      rgb.size() != std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
-    return {Errc::invalid_argument, "encode_jpeg: " + std::to_string(rgb.size()) + " bytes for " + std::to_string(width) +
-                                        " x " + std::to_string(height) + " pixels of three"};
+      rgb.size() !=
+          std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+    return {Errc::invalid_argument, "encode_jpeg: " + std::to_string(rgb.size()) + " bytes for " +
+                                        std::to_string(width) + " x " + std::to_string(height) +
+                                        " pixels of three"};
   }
   if (quality < 1 || quality > 100) {
-    return {Errc::invalid_argument, "encode_jpeg: quality = " + std::to_string(quality) + ": must be in [1, 100]"};
+    return {Errc::invalid_argument,
+            "encode_jpeg: quality = " + std::to_string(quality) + ": must be in [1, 100]"};
   }
   return detail::compress_jpeg(rgb, width, height, quality);
 }

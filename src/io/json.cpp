@@ -8,14 +8,15 @@
 namespace gsnav::io::detail {
 namespace {
 
-/// The byte at which arrays and objects are nested deeper than `most`, or the text's size. Exact for as much of the
-/// text as is JSON; the parser refuses the rest.
+/// The byte at which arrays and objects are nested deeper than `most`, or the text's size. Exact for as
+/// much of the text as is JSON; the parser refuses the rest.
 std::size_t too_deep_at(std::span<const std::byte> text, int most) {
   int depth = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = static_cast<char>(text[i]);
     if (c == '"') {
-      for (++i; i < text.size() && text[i] != std::byte{'"'}; ++i) i += text[i] == std::byte{'\\'} ? 1 : 0;
+      for (++i; i < text.size() && text[i] != std::byte{'"'}; ++i)
+        i += text[i] == std::byte{'\\'} ? 1 : 0;
     } else if (c == '[' || c == '{') {
       if (++depth > most) return i;
     } else if (c == ']' || c == '}') {
@@ -25,10 +26,11 @@ std::size_t too_deep_at(std::span<const std::byte> text, int most) {
   return text.size();
 }
 
-Result<Json> parse(std::span<const std::byte> text, const std::string& source, int depth, const char* advice) {
+Result<Json> parse(std::span<const std::byte> text, const std::string& source, int depth,
+                   const char* advice) {
   if (const std::size_t at = too_deep_at(text, depth); at < text.size()) {
-    return {Errc::unsupported, source + ": JSON nested more than " + std::to_string(depth) + " deep at byte " +
-                                   std::to_string(at) + advice};
+    return {Errc::unsupported, source + ": JSON nested more than " + std::to_string(depth) +
+                                   " deep at byte " + std::to_string(at) + advice};
   }
   const char* first = reinterpret_cast<const char*>(text.data());
   try {
@@ -47,11 +49,13 @@ Status check_limits(const ReadLimits& limits, const std::string& source) {
     const char* name;
     int value, most;
   };
-  for (const Field& f : {Field{"json_depth", limits.json_depth, 10000}, Field{"inflation", limits.inflation, 1032},
-                         Field{"texture_side", limits.texture_side, 65535}}) {
+  for (const Field& f :
+       {Field{"json_depth", limits.json_depth, 10000}, Field{"inflation", limits.inflation, 1032},
+        Field{"texture_side", limits.texture_side, 65535}}) {
     if (f.value >= 1 && f.value <= f.most) continue;
-    return {Errc::invalid_argument, source + ": ReadLimits::" + f.name + " is " + std::to_string(f.value) +
-                                        ", must be in [1, " + std::to_string(f.most) + "]"};
+    return {Errc::invalid_argument, source + ": ReadLimits::" + f.name + " is " +
+                                        std::to_string(f.value) + ", must be in [1, " +
+                                        std::to_string(f.most) + "]"};
   }
   return {};
 }
@@ -60,9 +64,11 @@ Result<Json> parse_json(std::span<const std::byte> text, const std::string& sour
   return parse(text, source, ReadLimits{}.json_depth, "");
 }
 
-Result<Json> parse_json(std::span<const std::byte> text, const std::string& source, const ReadLimits& limits) {
+Result<Json> parse_json(std::span<const std::byte> text, const std::string& source,
+                        const ReadLimits& limits) {
   if (Status s = check_limits(limits, source); !s) return s;
-  return parse(text, source, limits.json_depth, "; raise ReadLimits::json_depth for a file that you trust");
+  return parse(text, source, limits.json_depth,
+               "; raise ReadLimits::json_depth for a file that you trust");
 }
 
 std::string shown(const Json& value) {

@@ -15,12 +15,13 @@ namespace gsnav::io::detail {
 
 using Json = nlohmann::json;
 
-/// Parses JSON text of which nothing is nested more than 64 deep. Errors: invalid_file (the byte at which it
-/// stops making sense), unsupported (nested deeper).
+/// Parses JSON text of which nothing is nested more than 64 deep. Errors: invalid_file (the byte at
+/// which it stops making sense), unsupported (nested deeper).
 Result<Json> parse_json(std::span<const std::byte> text, const std::string& source);
 
 /// The same for readers whose callers set the limits. Error besides: invalid_argument (`limits`).
-Result<Json> parse_json(std::span<const std::byte> text, const std::string& source, const ReadLimits& limits);
+Result<Json> parse_json(std::span<const std::byte> text, const std::string& source,
+                        const ReadLimits& limits);
 
 /// Errors: invalid_argument naming the field of `limits` that is out of its range.
 Status check_limits(const ReadLimits& limits, const std::string& source);

@@ -17,8 +17,9 @@ std::string report_text(const LoadReport& r) {
   const auto count = [&](std::uint64_t n, const char* what) {
     if (n != 0) line("%llu %s", static_cast<unsigned long long>(n), what);
   };
-  line("%llu Gaussians of %llu rows, SH degree %d (%d in use), %.1f MB%s", static_cast<unsigned long long>(r.kept),
-       static_cast<unsigned long long>(r.read), r.sh_degree, r.sh_degree_used, static_cast<double>(r.memory) / 1e6,
+  line("%llu Gaussians of %llu rows, SH degree %d (%d in use), %.1f MB%s",
+       static_cast<unsigned long long>(r.kept), static_cast<unsigned long long>(r.read), r.sh_degree,
+       r.sh_degree_used, static_cast<double>(r.memory) / 1e6,
        r.packed    ? ", packed"
        : r.compact ? ", compact"
                    : "");
@@ -47,11 +48,12 @@ std::string report_text(const LoadReport& r) {
   if (r.packed) {
     const PackErrors& e = r.packing;
     line(
-        "packed: means in %d bits, off by up to %.3g m (%.3g deviations), scales by %.3g of the largest, rotations by "
+        "packed: means in %d bits, off by up to %.3g m (%.3g deviations), scales by %.3g of the "
+        "largest, rotations by "
         "%.3g",
         e.mean_bits, e.mean, e.mean_deviations, e.scale, e.rotation);
-    line("opacities by %.3g, colours by %.3g; SH in %d bits, off by up to %.3g, root mean square %.3g", e.opacity,
-         e.sh0, e.sh_bits, e.sh, e.sh_rms);
+    line("opacities by %.3g, colours by %.3g; SH in %d bits, off by up to %.3g, root mean square %.3g",
+         e.opacity, e.sh0, e.sh_bits, e.sh, e.sh_rms);
   }
   for (const std::string& w : r.warnings) out += "  warning: " + w + "\n";
   return printable(out);

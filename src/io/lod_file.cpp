@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "file.hpp"
-#include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/detail/scene/content_hash.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 
@@ -90,7 +90,8 @@ Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Nod
       return row("opacity " + std::to_string(m.opacities[i]) + ", must be in [0, 1]");
     }
   }
-  if (!finite(m.sh0) || !finite(m.shN)) return invalid_file(path, "an SH coefficient that is not finite");
+  if (!finite(m.sh0) || !finite(m.shN))
+    return invalid_file(path, "an SH coefficient that is not finite");
   for (const std::uint32_t id : m.origin_ids) {
     if (id >= origins)
       return invalid_file(path, "origin " + std::to_string(id) + " of " + std::to_string(origins));
@@ -175,7 +176,7 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
     for_each_array(tree, nodes, [&wanted](const auto& v) { wanted += v.size() * sizeof(v[0]); });
     if (file.size() != wanted) {
       return invalid_file(path, "has " + std::to_string(file.size()) + " bytes where " +
-                               std::to_string(wanted) + " are needed");
+                                    std::to_string(wanted) + " are needed");
     }
     std::uint64_t at = sizeof header;
     bool whole = true;

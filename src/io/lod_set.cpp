@@ -184,7 +184,8 @@ class LodReader {
     std::size_t step = 0;
     for (auto next = std::next(chosen); coarser_ && next != there.end(); ++next) {
       const Rows& rows = next->second;
-      if (rows.range.count == 0 || rows == chosen->second) continue;  // nothing is left, or nothing is coarser
+      if (rows.range.count == 0 || rows == chosen->second)
+        continue;  // nothing is left, or nothing is coarser
       if (++step == steps_.size()) steps_.emplace_back(files_.size());
       steps_[step][rows.file].push_back({rows.range, node});
       chosen = next;
@@ -217,21 +218,22 @@ class LodReader {
     const Json* environment = detail::member(json, "environment");
     if (!options_.environment || environment == nullptr || environment->is_null()) return {};
     if (!environment->is_string() || !detail::is_safe_name(environment->get<std::string>())) {
-      return fail("'environment' is " + detail::shown(*environment) + ", must be a file below this folder");
+      return fail("'environment' is " + detail::shown(*environment) +
+                  ", must be a file below this folder");
     }
     environment_ = place(environment->get<std::string>());
     return {};
   }
 
-  /// Rows of a step by file, and the node of each; with those of the first comes the environment, as a node behind
-  /// all others.
+  /// Rows of a step by file, and the node of each; with those of the first comes the environment, as a
+  /// node behind all others.
   Result<LoadedCloud> load(std::size_t step, std::vector<std::uint32_t>& nodes) const {
     LoadedCloud out;
     out.report.source = source_;
     for (const auto& [level, count] : instead_) {
-      out.report.warnings.push_back("level " + std::to_string(options_.level) + " of " + std::to_string(count) +
-                                    " of " + std::to_string(nodes_) + " nodes is not there: level " +
-                                    std::to_string(level) + " is read");
+      out.report.warnings.push_back("level " + std::to_string(options_.level) + " of " +
+                                    std::to_string(count) + " of " + std::to_string(nodes_) +
+                                    " nodes is not there: level " + std::to_string(level) + " is read");
     }
     for (std::size_t f = 0; f < files_.size(); ++f) {
       const std::vector<NodeRows>& rows = steps_[step][f];
@@ -254,7 +256,8 @@ class LodReader {
       out.report.warnings.push_back("the environment " + environment_.string() + " is not there");
       return out;
     }
-    if (Status s = detail::merge_loaded(out, load_sog(environment_), environment_.string()); !s) return s;
+    if (Status s = detail::merge_loaded(out, load_sog(environment_), environment_.string()); !s)
+      return s;
     nodes.resize(out.cloud.size(), static_cast<std::uint32_t>(nodes_));
     return out;
   }
@@ -269,7 +272,7 @@ class LodReader {
   std::filesystem::path environment_;
   bool coarser_ = false;
   std::vector<Step> steps_;
-  std::map<int, std::size_t> instead_;       ///< nodes read at another level than the one asked for
+  std::map<int, std::size_t> instead_;  ///< nodes read at another level than the one asked for
 };
 
 }  // namespace

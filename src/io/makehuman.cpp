@@ -28,7 +28,9 @@ Result<Json> read_json(const fs::path& path, const ReadLimits& limits) {
   return detail::parse_json(file->span(), path.string(), limits);
 }
 
-std::string_view text_of(const detail::FileBytes& f) { return {reinterpret_cast<const char*>(f.data.get()), f.size}; }
+std::string_view text_of(const detail::FileBytes& f) {
+  return {reinterpret_cast<const char*>(f.data.get()), f.size};
+}
 
 /// All vertices of the file, in its units, and the faces of one group.
 struct BaseMesh {
@@ -57,13 +59,15 @@ Result<BaseMesh> read_base(const fs::path& path, const std::string& group) {
       for (std::size_t k = 1; k < lines.words().size(); ++k) {
         const std::string_view word = lines.word(k);
         double index = 0;
-        if (!TextLines::parse(word.substr(0, word.find('/')), index) || index != std::floor(index) || !(index >= 1) ||
-            index > static_cast<double>(out.vertices.size())) {
-          return lines.bad("face corner " + in_quotes(word) + ", must be 1 to " + std::to_string(out.vertices.size()));
+        if (!TextLines::parse(word.substr(0, word.find('/')), index) || index != std::floor(index) ||
+            !(index >= 1) || index > static_cast<double>(out.vertices.size())) {
+          return lines.bad("face corner " + in_quotes(word) + ", must be 1 to " +
+                           std::to_string(out.vertices.size()));
         }
         corners.push_back(static_cast<std::uint32_t>(index) - 1);
       }
-      if (corners.size() < 3) return lines.bad("a face of " + std::to_string(corners.size()) + " corners");
+      if (corners.size() < 3)
+        return lines.bad("a face of " + std::to_string(corners.size()) + " corners");
       for (std::size_t k = 2; k < corners.size(); ++k)
         out.triangles.push_back({corners[0], corners[k - 1], corners[k]});
     }
@@ -87,7 +91,8 @@ Status apply_target(const fs::path& path, double amount, BaseMesh& mesh) {
       if (Status s = lines.number(k, v[k]); !s) return s;
     }
     if (!(v[0] >= 0 && v[0] < static_cast<double>(mesh.vertices.size())) || v[0] != std::floor(v[0])) {
-      return lines.bad("vertex " + in_quotes(lines.word(0)) + " of " + std::to_string(mesh.vertices.size()));
+      return lines.bad("vertex " + in_quotes(lines.word(0)) + " of " +
+                       std::to_string(mesh.vertices.size()));
     }
     mesh.vertices[static_cast<std::size_t>(v[0])] += Vec3d{v[1], v[2], v[3]} * amount;
   }
@@ -96,10 +101,13 @@ Status apply_target(const fs::path& path, double amount, BaseMesh& mesh) {
 
 /// The bones of a `.mhskel` as a skeleton, at the means of their head vertices in `mesh`.
 Status read_skeleton(const Json& json, const std::string& source, const BaseMesh& mesh, Skeleton& out) {
-  const auto bad = [&](const std::string& what) { return Status(Errc::invalid_file, source + ": " + what); };
+  const auto bad = [&](const std::string& what) {
+    return Status(Errc::invalid_file, source + ": " + what);
+  };
   constexpr std::size_t kMostBones = 4096;
   const Json *bones = member(json, "bones"), *joints = member(json, "joints");
-  if (bones == nullptr || joints == nullptr || !bones->is_object() || bones->empty() || bones->size() > kMostBones) {
+  if (bones == nullptr || joints == nullptr || !bones->is_object() || bones->empty() ||
+      bones->size() > kMostBones) {
     return bad("there are no 'bones' and 'joints'");
   }
   std::map<std::string, Vec3d> heads;
@@ -123,9 +131,11 @@ Status read_skeleton(const Json& json, const std::string& source, const BaseMesh
       sum += mesh.vertices[static_cast<std::size_t>(i)];
     }
     heads[name] = sum * (1.0 / static_cast<double>(vertices->size()));
-    const std::string above = parent != nullptr && parent->is_string() ? parent->get<std::string>() : std::string();
+    const std::string above =
+        parent != nullptr && parent->is_string() ? parent->get<std::string>() : std::string();
     if (!above.empty() && !bones->contains(above))
-      return bad("bone " + in_quotes(name) + " has the parent " + in_quotes(above) + ", which is no bone");
+      return bad("bone " + in_quotes(name) + " has the parent " + in_quotes(above) +
+                 ", which is no bone");
     children[above].push_back(name);
   }
   std::vector<std::pair<std::string, std::int32_t>> open;
@@ -136,7 +146,8 @@ Status read_skeleton(const Json& json, const std::string& source, const BaseMesh
     out.parents.push_back(parent);
     const Vec3d above = parent < 0 ? Vec3d{} : heads[open[static_cast<std::size_t>(parent)].first];
     out.rest_local.push_back({Mat3d::identity(), heads[name] - above});
-    for (const std::string& child : children[name]) open.emplace_back(child, static_cast<std::int32_t>(at));
+    for (const std::string& child : children[name])
+      open.emplace_back(child, static_cast<std::int32_t>(at));
   }
   if (open.size() != bones->size()) return bad("a bone is its own ancestor");
   return out.validate();
@@ -149,18 +160,21 @@ class WeightReader {
 
   Status read(const Json& json) {
     const Json* all = member(json, "weights");
-    if (all == nullptr || !all->is_object()) return {Errc::invalid_file, source_ + ": there are no 'weights'"};
+    if (all == nullptr || !all->is_object())
+      return {Errc::invalid_file, source_ + ": there are no 'weights'"};
     for (const auto& [bone, list] : all->items()) {
       const int joint = skeleton_.find(bone);
       const std::string at = source_ + ": bone " + in_quotes(bone);
       if (joint < 0) return {Errc::invalid_file, at + " is not in the skeleton"};
       if (!list.is_array()) return {Errc::invalid_file, at + " has no list of weights"};
       for (const Json& pair : list) {
-        const bool two = pair.is_array() && pair.size() == 2 && pair[0].is_number() && pair[1].is_number();
+        const bool two =
+            pair.is_array() && pair.size() == 2 && pair[0].is_number() && pair[1].is_number();
         const double v = two ? pair[0].get<double>() : -1, w = two ? pair[1].get<double>() : -1;
         if (!(v >= 0 && v < static_cast<double>(rows_.size())) || v != std::floor(v) || !(w >= 0) ||
             !std::isfinite(w)) {
-          return {Errc::invalid_file, at + ": " + pair.dump().substr(0, 60) + " is no vertex with a weight"};
+          return {Errc::invalid_file,
+                  at + ": " + pair.dump().substr(0, 60) + " is no vertex with a weight"};
         }
         if (w > 0) rows_[static_cast<std::size_t>(v)].emplace_back(static_cast<std::uint16_t>(joint), w);
       }
@@ -169,13 +183,14 @@ class WeightReader {
   }
 
   /// The weights of the vertices `used`, divided by their sums; `places` are the vertices'.
-  Status finish(const std::vector<std::uint32_t>& used, const std::vector<Vec3d>& places, SkinnedMesh& mesh,
-                SkinnedMeshReport& report) {
+  Status finish(const std::vector<std::uint32_t>& used, const std::vector<Vec3d>& places,
+                SkinnedMesh& mesh, SkinnedMeshReport& report) {
     std::vector<std::uint32_t> weighted;
     for (const std::uint32_t v : used) {
       if (!rows_[v].empty()) weighted.push_back(v);
     }
-    if (weighted.empty()) return {Errc::invalid_file, source_ + ": no vertex of the surface has a weight"};
+    if (weighted.empty())
+      return {Errc::invalid_file, source_ + ": no vertex of the surface has a weight"};
     std::vector<const Row*> rows;
     for (const std::uint32_t v : used) {
       std::uint32_t from = v;
@@ -247,7 +262,8 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
   const auto bones = read_json(options.skeleton, options.limits);
   if (!bones) return bones.status();
   const std::string source = options.skeleton.string();
-  if (Status s = read_skeleton(*bones, source, *base, mesh.skeleton); !s) return {Errc::invalid_file, s.message()};
+  if (Status s = read_skeleton(*bones, source, *base, mesh.skeleton); !s)
+    return {Errc::invalid_file, s.message()};
   fs::path weights_path = options.weights;
   if (weights_path.empty()) {
     const Json* name = member(*bones, "weights_file");
@@ -262,9 +278,13 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
   if (Status s = reader.read(*weights); !s) return s;
   if (Status s = reader.finish(used, base->vertices, mesh, out.report); !s) return s;
   for (const std::uint32_t v : used) mesh.positions.push_back(base->vertices[v]);
-  for (const auto& t : base->triangles) mesh.triangles.push_back({place[t[0]], place[t[1]], place[t[2]]});
-  const auto linear = [](double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); };
-  mesh.materials.push_back({{linear(options.color.x), linear(options.color.y), linear(options.color.z)}, 0.0, -1});
+  for (const auto& t : base->triangles)
+    mesh.triangles.push_back({place[t[0]], place[t[1]], place[t[2]]});
+  const auto linear = [](double c) {
+    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+  };
+  mesh.materials.push_back(
+      {{linear(options.color.x), linear(options.color.y), linear(options.color.z)}, 0.0, -1});
   out.pose = mesh.skeleton.rest_pose();
   SkinnedMeshReport& report = out.report;
   report.vertices = mesh.positions.size();

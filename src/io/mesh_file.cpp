@@ -109,7 +109,9 @@ Result<TriangleMesh> load_obj(const std::filesystem::path& path) {
 
 namespace {
 
-std::string extension_of(const std::filesystem::path& path) { return lower_case(path.extension().string()); }
+std::string extension_of(const std::filesystem::path& path) {
+  return lower_case(path.extension().string());
+}
 
 bool is_gltf(const std::string& extension) { return extension == ".glb" || extension == ".gltf"; }
 

@@ -51,7 +51,8 @@ class BvhReader {
   }
   Status expect(std::string_view word) {
     const std::string_view have = next();
-    return have == word ? Status() : bad(detail::in_quotes(have) + " where '" + std::string(word) + "' should be");
+    return have == word ? Status()
+                        : bad(detail::in_quotes(have) + " where '" + std::string(word) + "' should be");
   }
   Status number(double& out) {
     const std::string_view word = next();
@@ -98,7 +99,8 @@ class BvhReader {
     constexpr std::size_t kMostJoints = 4096;
     Skeleton& skeleton = out_.skeleton;
     const std::string name(next());
-    if (skeleton.size() >= kMostJoints) return bad("more than " + std::to_string(kMostJoints) + " joints");
+    if (skeleton.size() >= kMostJoints)
+      return bad("more than " + std::to_string(kMostJoints) + " joints");
     if (Status s = expect("{"); !s) return s;
     Vec3d place;
     if (Status s = offset(place); !s) return s;
@@ -135,11 +137,14 @@ class BvhReader {
       if (Status s = expect(word); !s) return s;
     }
     if (Status s = number(frame_time_); !s) return s;
-    if (!(frame_time_ > 0) || !std::isfinite(1.0 / frame_time_)) return bad("the frame time is not positive");
-    // A value takes a digit and a blank at least; joints without channels must not fill the memory either.
-    const double bytes = static_cast<double>(text_.size()), joints = static_cast<double>(channels_.size());
-    if (!(frames >= 1) || frames != std::floor(frames) || 2 * frames * static_cast<double>(values_) > bytes + 2 ||
-        (frames - 1) * joints > bytes) {
+    if (!(frame_time_ > 0) || !std::isfinite(1.0 / frame_time_))
+      return bad("the frame time is not positive");
+    // A value takes a digit and a blank at least; joints without channels must not fill the memory
+    // either.
+    const double bytes = static_cast<double>(text_.size()),
+                 joints = static_cast<double>(channels_.size());
+    if (!(frames >= 1) || frames != std::floor(frames) ||
+        2 * frames * static_cast<double>(values_) > bytes + 2 || (frames - 1) * joints > bytes) {
       return bad(std::to_string(frames) + " frames of " + std::to_string(values_) + " channels in " +
                  std::to_string(text_.size()) + " bytes");
     }

@@ -25,7 +25,8 @@ Result<double> frame_rate(const NpzArrays& arrays) {
     }
     rate = *v;
   }
-  if (rate == 0) return {Errc::invalid_file, arrays.file().source() + ": there is neither joint_mats_fps nor fps"};
+  if (rate == 0)
+    return {Errc::invalid_file, arrays.file().source() + ": there is neither joint_mats_fps nor fps"};
   return rate;
 }
 
@@ -35,7 +36,8 @@ Status check_number(const NpzArrays& arrays, const char* key, double want, Errc 
   const auto v = arrays.number(key);
   if (!v) return v.status();
   if (*v == want) return {};
-  return {code, arrays.file().source() + ": " + key + " is " + std::to_string(*v) + ", must be " + std::to_string(want)};
+  return {code, arrays.file().source() + ": " + key + " is " + std::to_string(*v) + ", must be " +
+                    std::to_string(want)};
 }
 
 Status read_capsules(const NpzArrays& arrays, std::size_t frames, LoadedDriver& out) {
@@ -51,8 +53,8 @@ Status read_capsules(const NpzArrays& arrays, std::size_t frames, LoadedDriver& 
     for (std::size_t c = 0; c < a->shape[1]; ++c) {
       const double* v = &a->values[7 * (t * a->shape[1] + c)];
       if (!(v[6] >= 0)) {
-        return {Errc::invalid_file, what + ": frame " + std::to_string(t) + ", capsule " + std::to_string(c) +
-                                        " has the radius " + std::to_string(v[6])};
+        return {Errc::invalid_file, what + ": frame " + std::to_string(t) + ", capsule " +
+                                        std::to_string(c) + " has the radius " + std::to_string(v[6])};
       }
       row.push_back({{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, v[6]});
     }
@@ -73,21 +75,24 @@ Result<LoadedDriver> read_driver(const NpzArrays& arrays, const Skeleton& skelet
   }
   const double joints = static_cast<double>(skeleton.size());
   if (Status s = check_number(arrays, "joint_mats_version", 1, Errc::unsupported); !s) return s;
-  if (Status s = check_number(arrays, "joint_mats_joint_count", joints, Errc::invalid_file); !s) return s;
+  if (Status s = check_number(arrays, "joint_mats_joint_count", joints, Errc::invalid_file); !s)
+    return s;
   const auto rate = frame_rate(arrays);
   if (!rate) return rate.status();
   const auto a = arrays.read("joint_mats", {});
   if (!a) return a.status();
   const std::vector<std::size_t>& shape = a->shape;
-  if (shape.size() != 4 || shape[0] == 0 || shape[1] != skeleton.size() || shape[2] != 4 || shape[3] != 4) {
-    return {Errc::invalid_file, source + ": joint_mats has the shape " + detail::shape_text(shape) + ", must be [T, " +
-                                    std::to_string(skeleton.size()) + ", 4, 4]"};
+  if (shape.size() != 4 || shape[0] == 0 || shape[1] != skeleton.size() || shape[2] != 4 ||
+      shape[3] != 4) {
+    return {Errc::invalid_file, source + ": joint_mats has the shape " + detail::shape_text(shape) +
+                                    ", must be [T, " + std::to_string(skeleton.size()) + ", 4, 4]"};
   }
   std::vector<Affine3<double>> matrices(shape[0] * shape[1]);
   for (std::size_t i = 0; i < matrices.size(); ++i) {
     if (!detail::rigid_transform(&a->values[16 * i], matrices[i])) {
-      return {Errc::invalid_file, source + ": joint_mats: the matrix of frame " + std::to_string(i / shape[1]) +
-                                      ", joint " + std::to_string(i % shape[1]) + " is not rigid"};
+      return {Errc::invalid_file, source + ": joint_mats: the matrix of frame " +
+                                      std::to_string(i / shape[1]) + ", joint " +
+                                      std::to_string(i % shape[1]) + " is not rigid"};
     }
   }
   LoadedDriver out;

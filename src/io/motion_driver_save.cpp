@@ -17,7 +17,8 @@ Status save_driver(const std::filesystem::path& path, const DriverFrames& frames
     const auto bad = [&](const std::string& what) {
       return Status(Errc::invalid_argument, path.string() + ": DriverFrames." + what);
     };
-    if (!(frames.frame_rate > 0) || !std::isfinite(frames.frame_rate)) return bad("frame_rate must be positive");
+    if (!(frames.frame_rate > 0) || !std::isfinite(frames.frame_rate))
+      return bad("frame_rate must be positive");
     const std::size_t joints = frames.joints, count = joints == 0 ? 0 : frames.matrices.size() / joints;
     if (count == 0 || frames.matrices.size() != count * joints) {
       return bad("matrices has " + std::to_string(frames.matrices.size()) + " values: no multiple of " +
@@ -32,7 +33,8 @@ Status save_driver(const std::filesystem::path& path, const DriverFrames& frames
       const Affine3<double>& m = frames.matrices[at];
       if (!is_finite(m.translation)) return bad("matrices is not finite");
       if (!detail::is_rigid(m)) {
-        return bad("matrices: frame " + std::to_string(at / joints) + ", joint " + std::to_string(at % joints) + " is not rigid");
+        return bad("matrices: frame " + std::to_string(at / joints) + ", joint " +
+                   std::to_string(at % joints) + " is not rigid");
       }
       for (int i = 0; i < 3; ++i) {
         for (int k = 0; k < 3; ++k) mats.push_back(static_cast<float>(m.linear(i, k)));

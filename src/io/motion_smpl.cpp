@@ -38,7 +38,8 @@ Result<std::vector<Vec3d>> rest_joints(const NpzArrays& model, const std::vector
                                       " shapes for " + std::to_string(betas.size()) + " betas"};
     }
     for (std::size_t i = 0; i < 3 * count; ++i) {
-      for (std::size_t k = 0; k < betas.size(); ++k) vertices->values[i] += shapes->values[i * columns + k] * betas[k];
+      for (std::size_t k = 0; k < betas.size(); ++k)
+        vertices->values[i] += shapes->values[i * columns + k] * betas[k];
     }
   }
   const auto regressor = model.read("J_regressor", {any, count});
@@ -65,7 +66,8 @@ Status check_tree(const NpzArrays& model, const BodyJoints& body) {
   return {};
 }
 
-Result<LoadedMotion> read_motion(const NpzArrays& motion, const NpzArrays& model, const SmplMotionOptions& options) {
+Result<LoadedMotion> read_motion(const NpzArrays& motion, const NpzArrays& model,
+                                 const SmplMotionOptions& options) {
   const std::string& source = motion.file().source();
   const auto poses = motion.read("poses", {NpzArrays::kAny, NpzArrays::kAny});
   if (!poses) return poses.status();
@@ -94,7 +96,8 @@ Result<LoadedMotion> read_motion(const NpzArrays& motion, const NpzArrays& model
   const bool smplh = given == kSmplh && joints == kSmplx;
   if (frames == 0 || poses->values.size() != 3 * given * frames || (given != joints && !smplh)) {
     return {Errc::unsupported, source + ": poses has the shape " + detail::shape_text(poses->shape) +
-                                   ", must be [T, " + std::to_string(3 * joints) + "] for the model's joints"};
+                                   ", must be [T, " + std::to_string(3 * joints) +
+                                   "] for the model's joints"};
   }
   LoadedMotion out;
   out.skeleton.names.assign(body.names.begin(), body.names.end());
@@ -104,7 +107,8 @@ Result<LoadedMotion> read_motion(const NpzArrays& motion, const NpzArrays& model
   clip.joints = joints;
   for (std::size_t j = 0; j < joints; ++j) {
     const std::int32_t parent = body.parents[j];
-    const Vec3d place = (*places)[j] - (parent < 0 ? Vec3d{} : (*places)[static_cast<std::size_t>(parent)]);
+    const Vec3d place =
+        (*places)[j] - (parent < 0 ? Vec3d{} : (*places)[static_cast<std::size_t>(parent)]);
     out.skeleton.rest_local.push_back({Mat3d::identity(), place});
     clip.translations.push_back(place);
   }
@@ -131,7 +135,8 @@ Result<LoadedMotion> read_motion(const NpzArrays& motion, const NpzArrays& model
 
 }  // namespace
 
-Result<LoadedMotion> load_smpl_motion(const std::filesystem::path& path, const std::filesystem::path& model,
+Result<LoadedMotion> load_smpl_motion(const std::filesystem::path& path,
+                                      const std::filesystem::path& model,
                                       const SmplMotionOptions& options) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedMotion> {
     const auto motion_file = NpzFile::open(path);

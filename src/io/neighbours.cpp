@@ -50,7 +50,8 @@ std::vector<double> neighbour_distances(const std::vector<Vec3d>& points, std::s
       out[best.point] = std::sqrt(sum / static_cast<double>(k));
     }
   };
-  ThreadPool(static_cast<int>(io_threads())).run(static_cast<std::uint32_t>((n + kPiece - 1) / kPiece), piece);
+  ThreadPool(static_cast<int>(io_threads()))
+      .run(static_cast<std::uint32_t>((n + kPiece - 1) / kPiece), piece);
   return out;
 }
 

@@ -196,7 +196,8 @@ Result<NpyLayout> parse_npy_header(std::span<const std::byte> bytes, const std::
   const std::size_t prefix = version == 1 ? 10 : 12;
   std::size_t length = 0;
   if (text.size() >= prefix) {
-    length = version == 1 ? load_le<std::uint16_t>(bytes.data() + 8) : load_le<std::uint32_t>(bytes.data() + 8);
+    length = version == 1 ? load_le<std::uint16_t>(bytes.data() + 8)
+                          : load_le<std::uint32_t>(bytes.data() + 8);
   }
   if (length == 0 || length > text.size() - prefix) {
     return {Errc::invalid_file, name + ": header cut off"};
@@ -220,8 +221,8 @@ Result<NpyArray> parse_npy(std::span<const std::byte> bytes, const std::string& 
   const std::size_t held = bytes.size() - layout->values_at;
   const auto count = npy_count(layout->shape);
   if (!count || *count * type->size != held) {
-    return {Errc::invalid_file, name + ": " + std::to_string(held) + " bytes of values do not fit " +
-                                    layout->dictionary};
+    return {Errc::invalid_file,
+            name + ": " + std::to_string(held) + " bytes of values do not fit " + layout->dictionary};
   }
   NpyArray out;
   out.shape = layout->shape;
@@ -236,7 +237,8 @@ Result<NpyArray> parse_npy(std::span<const std::byte> bytes, const std::string& 
     constexpr double kExact = 9007199254740992.0;  // 2^53, which 2^53 + 1 is rounded to
     for (std::size_t i = 0; i < *count; ++i) {
       if (std::fabs(out.values[i]) >= kExact) {
-        return {Errc::unsupported, name + ": value " + std::to_string(i) + " reaches 2^53, where a double no " +
+        return {Errc::unsupported, name + ": value " + std::to_string(i) +
+                                       " reaches 2^53, where a double no " +
                                        "longer holds every integer"};
       }
     }

@@ -15,11 +15,11 @@ namespace gsnav::io::detail {
 
 /// What an .npy header says.
 struct NpyLayout {
-  std::string descr;                 ///< NumPy's type string, "<f4" say
+  std::string descr;  ///< NumPy's type string, "<f4" say
   bool fortran = false;
   std::vector<std::size_t> shape;
-  std::size_t values_at = 0;         ///< offset of the values in the file
-  std::string dictionary;            ///< the header as text for messages
+  std::size_t values_at = 0;  ///< offset of the values in the file
+  std::string dictionary;     ///< the header as text for messages
 };
 
 /// Product of the dimensions, or nothing where eight bytes each would not fit memory's addresses.

@@ -29,11 +29,14 @@ Result<std::string> npy_bytes(const NpzEntry& entry, const std::string& name) {
           return *header + text;
         } else {
           using T = std::remove_cv_t<typename Values::element_type>;
-          const char* descr = std::is_same_v<T, float> ? "<f4" : std::is_same_v<T, double> ? "<f8" : "<i8";
+          const char* descr = std::is_same_v<T, float>    ? "<f4"
+                              : std::is_same_v<T, double> ? "<f8"
+                                                          : "<i8";
           auto header = detail::npy_header(descr, entry.shape, values.size(), name);
           if (!header) return header;
           std::string out = std::move(*header);
-          if (!values.empty()) out.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+          if (!values.empty())
+            out.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
           return out;
         }
       },
@@ -106,14 +109,16 @@ Result<std::string> NpzFile::read_text(const std::string& name) const {
       return {Errc::invalid_file, what + ": type " + detail::in_quotes(layout->descr) + " is no text"};
     }
     const auto count = detail::npy_count(layout->shape);
-    if (!count || *count != 1 || std::to_string(held / unit) != layout->descr.substr(2) || held % unit != 0) {
+    if (!count || *count != 1 || std::to_string(held / unit) != layout->descr.substr(2) ||
+        held % unit != 0) {
       return {Errc::invalid_file, what + ": " + layout->dictionary + " is not one text of " +
                                       std::to_string(held) + " bytes"};
     }
     std::string text;
     for (std::size_t i = 0; i < held; i += unit) {
       const std::byte* p = bytes->data() + layout->values_at + i;
-      const std::uint32_t c = wide ? detail::load_le<std::uint32_t>(p) : detail::load_le<std::uint8_t>(p);
+      const std::uint32_t c =
+          wide ? detail::load_le<std::uint32_t>(p) : detail::load_le<std::uint8_t>(p);
       text += c < 128 ? static_cast<char>(c) : '?';
     }
     text.resize(text.find_last_not_of('\0') + 1);  // padding

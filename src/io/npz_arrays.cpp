@@ -37,12 +37,14 @@ Result<NpyArray> NpzArrays::read(const std::string& name, const std::vector<std:
   if (!a) return a;
   const std::string what = file_.source() + ": " + name;
   if (!shape.empty() && !fits(a->shape, shape) && !fits(core(a->shape), core(shape))) {
-    return {Errc::invalid_file, what + " has the shape " + shape_text(a->shape) + ", must be " + shape_text(shape)};
+    return {Errc::invalid_file,
+            what + " has the shape " + shape_text(a->shape) + ", must be " + shape_text(shape)};
   }
   for (std::size_t i = 0; i < a->values.size(); ++i) {
     if (!std::isfinite(a->values[i])) {
       const std::size_t row = a->shape.empty() ? 1 : a->values.size() / a->shape[0];
-      return {Errc::invalid_file, what + ": row " + std::to_string(i / row) + " has " + std::to_string(a->values[i])};
+      return {Errc::invalid_file,
+              what + ": row " + std::to_string(i / row) + " has " + std::to_string(a->values[i])};
     }
   }
   return a;
@@ -58,7 +60,8 @@ bool is_rigid(const Affine3<double>& m) {
   const Mat3d gram = m.linear * transpose(m.linear);
   bool ok = determinant(m.linear) > 0 && is_finite(m.translation);
   for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) ok = ok && std::fabs(gram(i, k) - (i == k ? 1.0 : 0.0)) < kRigidTolerance;
+    for (int k = 0; k < 3; ++k)
+      ok = ok && std::fabs(gram(i, k) - (i == k ? 1.0 : 0.0)) < kRigidTolerance;
   }
   return ok;
 }
@@ -83,7 +86,8 @@ Result<std::vector<Affine3<double>>> read_transforms(const NpzArrays& arrays, co
   if (s.size() == 4 && s[0] == 1 && s[2] == 4 && s[3] == 4) joints = s[1];
   const std::string what = arrays.file().source() + ": " + name;
   if (joints == 0) {
-    return {Errc::invalid_file, what + " has the shape " + shape_text(s) + ", must be [J, 4, 4], [1, J, 4, 4] or [J, 16]"};
+    return {Errc::invalid_file,
+            what + " has the shape " + shape_text(s) + ", must be [J, 4, 4], [1, J, 4, 4] or [J, 16]"};
   }
   std::vector<Affine3<double>> out(joints);
   for (std::size_t j = 0; j < joints; ++j) {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 
-#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/detail/frame/temporal.hpp"
+#include "gsnav/frame/gaussians.hpp"
 #include "ply_points.hpp"
 
 namespace gsnav::io::detail {
@@ -67,16 +67,16 @@ Status choose_temporal_columns(const PlyElement& vertex, const std::string& sour
   for (const PlyProperty& p : vertex.properties) c.motion_count += p.name.starts_with("motion_") ? 1 : 0;
   if (c.motion_count == 0) return {};
   if (c.motion_count % 3 != 0 || c.motion_count > kMotionPlanes) {
-    return {Errc::invalid_file,
-            source + ": " + std::to_string(c.motion_count) + " properties motion_*, must be 0, 3, 6 or 9"};
+    return {Errc::invalid_file, source + ": " + std::to_string(c.motion_count) +
+                                    " properties motion_*, must be 0, 3, 6 or 9"};
   }
   c.motion = c.properties.size();
   for (std::size_t k = 0; k < c.motion_count; ++k) {
     const std::string name = "motion_" + std::to_string(k);
     const PlyProperty* p = vertex.find(name);
     if (p == nullptr) {
-      return {Errc::invalid_file, source + ": element 'vertex' has no property '" + name + "' among its " +
-                                      std::to_string(c.motion_count) + " motion_*"};
+      return {Errc::invalid_file, source + ": element 'vertex' has no property '" + name +
+                                      "' among its " + std::to_string(c.motion_count) + " motion_*"};
     }
     c.properties.push_back(p);
   }

@@ -12,8 +12,8 @@ namespace gsnav::io::detail {
 
 inline constexpr std::size_t kPlyFixed = 14;  // x y z, f_dc 3, opacity, scale 3, rot 4
 
-/// The vertex properties that are read, in the order of a block's columns: kPlyFixed, then `rest` of f_rest, then time,
-/// time scale and motion where there are any.
+/// The vertex properties that are read, in the order of a block's columns: kPlyFixed, then `rest` of
+/// f_rest, then time, time scale and motion where there are any.
 struct PlyColumns {
   std::vector<const PlyProperty*> properties;
   int degree = 0;
@@ -23,12 +23,14 @@ struct PlyColumns {
   double greatest_colour = 0;
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
   std::size_t time = kNone, time_scale = kNone;  ///< columns of t and t_scale
-  std::size_t motion = kNone, motion_count = 0;  ///< first column of motion_0 ..., and how many there are
+  std::size_t motion = kNone,
+              motion_count = 0;  ///< first column of motion_0 ..., and how many there are
 
   bool moves() const noexcept { return time != kNone || time_scale != kNone || motion_count != 0; }
 };
 
-/// Errors: invalid_file naming the property that is missing, or a count of f_rest_* or motion_* that cannot be.
+/// Errors: invalid_file naming the property that is missing, or a count of f_rest_* or motion_* that
+/// cannot be.
 Result<PlyColumns> choose_ply_columns(const PlyElement& vertex, const std::string& source);
 
 /// Adds those of 4D Gaussians (t, t_scale, motion_*), as far as they are there.

@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "file.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
 #include "ply_header.hpp"
 
 namespace gsnav::io::detail {

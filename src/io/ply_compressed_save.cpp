@@ -43,7 +43,8 @@ struct Bounds {
   }
 };
 
-/// The float next to v that is not above it, or not below it where `up`: bounds hold what is far from zero too.
+/// The float next to v that is not above it, or not below it where `up`: bounds hold what is far from
+/// zero too.
 float float_beyond(double v, bool up) noexcept {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const float f = static_cast<float>(v);

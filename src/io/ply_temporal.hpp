@@ -18,6 +18,7 @@ struct BandsApart;
 /// (BandsApart::degree says whether they were left out), or are read.
 Result<LoadedCloud> load_ply(const std::filesystem::path& path, TemporalCloud* moving,
                              BandsApart* apart = nullptr);
-Result<LoadedCloud> parse_ply(std::span<const std::byte> bytes, const std::string& source, TemporalCloud* moving);
+Result<LoadedCloud> parse_ply(std::span<const std::byte> bytes, const std::string& source,
+                              TemporalCloud* moving);
 
 }  // namespace gsnav::io::detail

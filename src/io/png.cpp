@@ -118,7 +118,8 @@ class Decoder {
 
 }  // namespace
 
-Result<PngImage> detail::decode_png(std::span<const std::byte> bytes, const std::string& name, int most_side) {
+Result<PngImage> detail::decode_png(std::span<const std::byte> bytes, const std::string& name,
+                                    int most_side) {
   Decoder decoder;
   if (!decoder.read_header(bytes))
     return {Errc::invalid_file, name + ": not a PNG, or its header is damaged"};

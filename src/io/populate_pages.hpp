@@ -10,14 +10,15 @@
 
 namespace gsnav::io::detail {
 
-/// Has memory that has not been written yet backed by pages: several threads do that faster than the one that writes
-/// first. Where the system cannot, nothing changes.
+/// Has memory that has not been written yet backed by pages: several threads do that faster than the one
+/// that writes first. Where the system cannot, nothing changes.
 inline void populate_pages([[maybe_unused]] void* p, [[maybe_unused]] std::size_t bytes) noexcept {
 #if defined(__linux__) && defined(MADV_POPULATE_WRITE)
   constexpr std::uintptr_t kPage = 4096;
   const std::uintptr_t begin = (reinterpret_cast<std::uintptr_t>(p) + kPage - 1) / kPage * kPage;
   const std::uintptr_t end = (reinterpret_cast<std::uintptr_t>(p) + bytes) / kPage * kPage;
-  if (end > begin) static_cast<void>(::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_POPULATE_WRITE));
+  if (end > begin)
+    static_cast<void>(::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_POPULATE_WRITE));
 #endif
 }
 

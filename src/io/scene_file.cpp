@@ -33,14 +33,16 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kSupported =
-    "a .ply, .splat, .ksplat, .spz, .sog, .glb, .gltf or .4dgs.npz, a meta.json, a lod-meta.json or a folder "
+    "a .ply, .splat, .ksplat, .spz, .sog, .glb, .gltf or .4dgs.npz, a meta.json, a lod-meta.json or a "
+    "folder "
     "with one of the two";
 
 /// The moment of a scene that moves.
 LoadedCloud moment_of(const TemporalCloud& scene, LoadReport report, double time) {
   LoadedCloud out{cloud_at(scene, time), std::move(report)};
-  out.report.warnings.push_back("a moment of a moving scene: " + std::to_string(out.cloud.size()) + " of " +
-                                std::to_string(scene.size()) + " Gaussians are there at " + std::to_string(time) + " s");
+  out.report.warnings.push_back("a moment of a moving scene: " + std::to_string(out.cloud.size()) +
+                                " of " + std::to_string(scene.size()) + " Gaussians are there at " +
+                                std::to_string(time) + " s");
   return out;
 }
 
@@ -163,7 +165,8 @@ Result<LoadedCloud> load_sorted(const std::string& spec, const LoadSceneOptions&
                                 detail::BandsApart* apart) {
   return detail::guarded(spec, [&]() -> Result<LoadedCloud> {
     if (!is_finite(options.time)) {
-      return {Errc::invalid_argument, spec + ": LoadSceneOptions.time is " + std::to_string(options.time)};
+      return {Errc::invalid_argument,
+              spec + ": LoadSceneOptions.time is " + std::to_string(options.time)};
     }
     auto scene = load_named(spec, options, apart);
     if (!scene) return scene;
@@ -219,13 +222,15 @@ Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& 
   return load_sorted(spec, options, nullptr);
 }
 
-Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec, const LoadSceneOptions& options) {
+Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec,
+                                                        const LoadSceneOptions& options) {
   return detail::guarded(spec, [&]() -> Result<std::optional<LoadedLodSet>> {
     std::error_code ignored;
     const fs::path path(spec);
     const bool folder = fs::is_directory(path, ignored);
-    const bool set = folder ? !fs::exists(path / "meta.json", ignored) && fs::exists(path / "lod-meta.json", ignored)
-                            : path.filename() == "lod-meta.json" && fs::exists(path, ignored);
+    const bool set =
+        folder ? !fs::exists(path / "meta.json", ignored) && fs::exists(path / "lod-meta.json", ignored)
+               : path.filename() == "lod-meta.json" && fs::exists(path, ignored);
     if (!set) return std::optional<LoadedLodSet>();
     auto levels = load_lod_levels(path, {.level = options.level});
     if (levels.code() == Errc::unsupported) return std::optional<LoadedLodSet>();
@@ -245,7 +250,8 @@ Result<LoadedPackedCloud> detail::load_packed(const std::string& spec, const Loa
                                               std::size_t least_apart) {
   return guarded(spec, [&]() -> Result<LoadedPackedCloud> {
     if (options.storage != Storage::full) {
-      return {Errc::invalid_argument, spec + ": LoadSceneOptions.storage must be full where a scene is to be packed"};
+      return {Errc::invalid_argument,
+              spec + ": LoadSceneOptions.storage must be full where a scene is to be packed"};
     }
     detail::BandsApart apart;
     apart.least_rows = least_apart;

@@ -8,11 +8,11 @@
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/detail/io/gltf.hpp"
 #include "gsnav/detail/io/ply.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/io/sog.hpp"
 #include "gsnav/detail/io/splat.hpp"
 #include "gsnav/detail/io/spz.hpp"
 #include "gsnav/frame/sh.hpp"
+#include "gsnav/io/scene_file.hpp"
 
 namespace gsnav::io {
 namespace {

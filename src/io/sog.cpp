@@ -81,8 +81,8 @@ class SogFiles {
   std::optional<detail::ZipReader> zip_;
 };
 
-/// A plane: its size first, its pixels once all sizes have been checked. Its bytes are read each time, so that those of
-/// one plane alone are there.
+/// A plane: its size first, its pixels once all sizes have been checked. Its bytes are read each time,
+/// so that those of one plane alone are there.
 struct Plane {
   std::string name, label;
   std::size_t bytes = 0;  ///< of the file
@@ -166,13 +166,16 @@ class SogReader {
  private:
   /// f(row of the file, i) for those of the ranges' rows that i in [first, last) numbers.
   template <class F>
-  static Status for_rows(const std::vector<detail::RowRange>& ranges, std::size_t first, std::size_t last, const F& f) {
+  static Status for_rows(const std::vector<detail::RowRange>& ranges, std::size_t first,
+                         std::size_t last, const F& f) {
     std::uint64_t before = 0;  // rows of the ranges so far
     for (const detail::RowRange& r : ranges) {
       const std::uint64_t from = std::max<std::uint64_t>(first, before);
       const std::uint64_t to = std::min<std::uint64_t>(last, before + r.count);
       for (std::uint64_t i = from; i < to; ++i) {
-        if (Status s = f(static_cast<std::size_t>(r.first + i - before), static_cast<std::size_t>(i)); !s) return s;
+        if (Status s = f(static_cast<std::size_t>(r.first + i - before), static_cast<std::size_t>(i));
+            !s)
+          return s;
       }
       before += r.count;
     }
@@ -180,7 +183,8 @@ class SogReader {
   }
 
   /// The bands of all rows.
-  Status look_up_bands(const std::vector<detail::RowRange>& ranges, std::size_t count, std::vector<float>& bands) {
+  Status look_up_bands(const std::vector<detail::RowRange>& ranges, std::size_t count,
+                       std::vector<float>& bands) {
     if (meta_.degree == 0) return {};
     for (Plane* plane : {&labels_, &centroids_}) {
       if (Status s = plane->decode(files_); !s) return s;
@@ -188,7 +192,8 @@ class SogReader {
     const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(meta_.degree) - 1);
     bands = huge_vector<float>(rest * count);
     const Status s = detail::for_pieces(
-        count, detail::pieces_of(count), [&](std::size_t, std::size_t first, std::size_t last) -> Status {
+        count, detail::pieces_of(count),
+        [&](std::size_t, std::size_t first, std::size_t last) -> Status {
           return for_rows(ranges, first, last, [&](std::size_t row, std::size_t i) -> Status {
             return palette_entry(row, bands.data() + rest * i);
           });
@@ -321,9 +326,12 @@ Result<LoadedCloud> load(const std::filesystem::path& path, const std::vector<de
 
 }  // namespace
 
-Result<LoadedCloud> load_sog(const std::filesystem::path& path) { return detail::described(load(path, nullptr)); }
+Result<LoadedCloud> load_sog(const std::filesystem::path& path) {
+  return detail::described(load(path, nullptr));
+}
 
-Result<LoadedCloud> detail::load_sog_rows(const std::filesystem::path& path, const std::vector<RowRange>& ranges,
+Result<LoadedCloud> detail::load_sog_rows(const std::filesystem::path& path,
+                                          const std::vector<RowRange>& ranges,
                                           std::vector<std::uint8_t>* kept) {
   return load(path, &ranges, kept);
 }

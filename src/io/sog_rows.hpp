@@ -16,8 +16,9 @@ struct RowRange {
   bool operator==(const RowRange&) const = default;
 };
 
-/// load_sog for some rows, in the order of the ranges. `kept`: gets 1 for each row of the ranges that is in the cloud,
-/// else 0. Error beside load_sog's: invalid_file (a range that ends behind the file's count).
+/// load_sog for some rows, in the order of the ranges. `kept`: gets 1 for each row of the ranges that is
+/// in the cloud, else 0. Error beside load_sog's: invalid_file (a range that ends behind the file's
+/// count).
 Result<LoadedCloud> load_sog_rows(const std::filesystem::path& path, const std::vector<RowRange>& ranges,
                                   std::vector<std::uint8_t>* kept = nullptr);
 

@@ -15,8 +15,8 @@
 #include "codebook.hpp"
 #include "file.hpp"
 #include "format_range.hpp"
-#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/detail/io/sog.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
@@ -61,9 +61,11 @@ class SogWriter {
     }
     meta_ = {{"version", 2}, {"asset", {{"generator", "gsnav"}}}, {"count", n}};
     meta_["antialias"] = cloud_.filter == Filter::mip;
-    // What takes longest comes first. Each part is made by one thread, so that any number of them makes the same bytes.
-    Status (SogWriter::*const make[])(Part&) const = {&SogWriter::bands, &SogWriter::means, &SogWriter::scales,
-                                                      &SogWriter::colours, &SogWriter::quats};
+    // What takes longest comes first. Each part is made by one thread, so that any number of them makes
+    // the same bytes.
+    Status (SogWriter::*const make[])(Part&)
+        const = {&SogWriter::bands, &SogWriter::means, &SogWriter::scales, &SogWriter::colours,
+                 &SogWriter::quats};
     constexpr std::size_t kParts = std::size(make);
     std::array<Part, kParts> parts;
     ThreadPool pool(static_cast<int>(std::min(detail::io_threads(), kParts)));

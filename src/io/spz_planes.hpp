@@ -36,21 +36,20 @@ struct SpzHeader {
   }
 };
 
-/// An SPZ out of its compression, in the planes of the cloud that comes of it, so that no other memory is held: sh0 and
-/// shN (bands up to degree 3) as they are, the rest as stored, row i of which is
-///   means       x, y, z in the reader's axes, the origin being zero, no float being more than the file has
-///   opacities   the byte, 0 to 255
-///   scales      natural logarithms
-///   quats[0]    the file's 3 or 4 bytes, no number
+/// An SPZ out of its compression, in the planes of the cloud that comes of it, so that no other memory
+/// is held: sh0 and shN (bands up to degree 3) as they are, the rest as stored, row i of which is
+///   means       x, y, z in the reader's axes, the origin being zero, no float being more than the file
+///   has opacities   the byte, 0 to 255 scales      natural logarithms quats[0]    the file's 3 or 4
+///   bytes, no number
 struct SpzPlanes {
   SpzHeader header;
   GaussianCloud cloud;
   std::vector<std::string> warnings;
 };
 
-/// Unpacks versions 1 to 3 (one gzip stream) and 4 (a zstd stream for each plane); `turn`: half a turn about x. Sizes are
-/// checked against the header, the header's count against the bytes there are, before memory is asked for. Of the file
-/// there is one stream at a time in memory, of gzip a piece.
+/// Unpacks versions 1 to 3 (one gzip stream) and 4 (a zstd stream for each plane); `turn`: half a turn
+/// about x. Sizes are checked against the header, the header's count against the bytes there are, before
+/// memory is asked for. Of the file there is one stream at a time in memory, of gzip a piece.
 Result<SpzPlanes> read_spz_planes(const ByteSource& bytes, const std::string& source, bool turn);
 
 }  // namespace gsnav::io::detail

@@ -40,10 +40,11 @@ class SpzWriter {
     const std::vector<std::uint32_t> order = rows_as_read(cloud_);
     constexpr std::size_t kPiece = 8192;
     const std::size_t pieces = (cloud_.size() + kPiece - 1) / kPiece;
-    ThreadPool(static_cast<int>(detail::io_threads())).run(static_cast<std::uint32_t>(pieces), [&](std::uint32_t p) {
-      for (std::size_t i = p * kPiece; i < std::min((p + 1) * kPiece, cloud_.size()); ++i)
-        add(i, order[i], coefficients);
-    });
+    ThreadPool(static_cast<int>(detail::io_threads()))
+        .run(static_cast<std::uint32_t>(pieces), [&](std::uint32_t p) {
+          for (std::size_t i = p * kPiece; i < std::min((p + 1) * kPiece, cloud_.size()); ++i)
+            add(i, order[i], coefficients);
+        });
     std::vector<Plane> streams;
     std::vector<std::array<std::uint64_t, 2>> toc;
     for (std::size_t k = 0; k < 6; ++k) {

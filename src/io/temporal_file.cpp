@@ -32,7 +32,8 @@ Result<LoadedTemporalCloud> load_temporal(const std::filesystem::path& path) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedTemporalCloud> {
     if (path.extension() == ".npz") return detail::load_temporal_npz(path);
     if (path.extension() != ".ply") {
-      return {Errc::unsupported, path.string() + ": not a moving scene that is read here: .ply (.4dgs.ply) or .4dgs.npz"};
+      return {Errc::unsupported,
+              path.string() + ": not a moving scene that is read here: .ply (.4dgs.ply) or .4dgs.npz"};
     }
     TemporalCloud moving;
     return joined(detail::load_ply(path, &moving), moving);

@@ -52,7 +52,9 @@ class TemporalNpz {
       motion = std::max(motion, part.motion_width);
     }
     int degree = 0;
-    while (degree < kMaxShDegree && static_cast<std::size_t>(sh_coefficient_count(degree + 1) - 1) <= blocks) ++degree;
+    while (degree < kMaxShDegree &&
+           static_cast<std::size_t>(sh_coefficient_count(degree + 1) - 1) <= blocks)
+      ++degree;
     TemporalRows planes(total, motion);
     const auto decode = [&](std::size_t first, std::size_t last, CloudSink& sink) -> Status {
       for (std::size_t row = first; row < last; ++row) add(row, sink, planes);
@@ -65,7 +67,8 @@ class TemporalNpz {
     planes.give(out.scene, out.report);
     out.report.memory = out.scene.bytes();
     if (static_cast<std::size_t>(sh_coefficient_count(degree) - 1) < blocks) {
-      out.report.warnings.push_back(std::to_string(blocks) + " SH coefficients in the file: those up to degree " +
+      out.report.warnings.push_back(std::to_string(blocks) +
+                                    " SH coefficients in the file: those up to degree " +
                                     std::to_string(degree) + " are read");
     }
     if (file_.contains(parts_[0].prefix + "_rotation_r")) {
@@ -75,7 +78,9 @@ class TemporalNpz {
   }
 
  private:
-  Status fail(const std::string& what) const { return {Errc::invalid_file, file_.source() + ": " + what}; }
+  Status fail(const std::string& what) const {
+    return {Errc::invalid_file, file_.source() + ": " + what};
+  }
 
   /// A number that need not be there.
   Status number(const std::string& name, double& to) const {
@@ -111,26 +116,29 @@ class TemporalNpz {
     const std::size_t any = NpzArrays::kAny;
     for (const Status& s :
          {array(p, "_opacity", 1, true, p.opacity), array(p, "_scaling", 3, true, p.scaling),
-          array(p, p.moves ? "_rotation_l" : "_rotation", 4, true, p.rotation), array(p, "_features_dc", 3, true, p.dc),
-          array(p, "_features_rest", any, false, p.rest)}) {
+          array(p, p.moves ? "_rotation_l" : "_rotation", 4, true, p.rotation),
+          array(p, "_features_dc", 3, true, p.dc), array(p, "_features_rest", any, false, p.rest)}) {
       if (!s) return s;
     }
     const std::vector<std::size_t>& rest = p.rest.shape;
     if (!rest.empty()) {
       if (rest.size() != 3 || rest[2] != 3) {
-        return fail(p.prefix + "_features_rest has the shape " + shape_text(rest) + ", must be [N, M, 3]");
+        return fail(p.prefix + "_features_rest has the shape " + shape_text(rest) +
+                    ", must be [N, M, 3]");
       }
       p.rest_blocks = rest[1];
     }
     if (!p.moves) return {};
-    for (const Status& s : {array(p, "_t", 1, false, p.time), array(p, "_scaling_t", 1, false, p.time_scale),
-                            array(p, "_motion", any, false, p.motion)}) {
+    for (const Status& s :
+         {array(p, "_t", 1, false, p.time), array(p, "_scaling_t", 1, false, p.time_scale),
+          array(p, "_motion", any, false, p.motion)}) {
       if (!s) return s;
     }
     if (!p.motion.shape.empty()) {
       p.motion_width = p.motion.shape.size() == 2 ? p.motion.shape[1] : 0;
       if (p.motion_width == 0 || p.motion_width % 3 != 0 || p.motion_width > kMotionPlanes) {
-        return fail(p.prefix + "_motion has the shape " + shape_text(p.motion.shape) + ", must be [N, 3], [N, 6] or [N, 9]");
+        return fail(p.prefix + "_motion has the shape " + shape_text(p.motion.shape) +
+                    ", must be [N, 3], [N, 6] or [N, 9]");
       }
     }
     return {};
@@ -159,7 +167,8 @@ class TemporalNpz {
     if (!p.moves) t.log_sigma = std::numeric_limits<double>::infinity();
     if (!p.time.values.empty()) t.time = dilation_ * p.time.values[i];
     if (!p.time_scale.values.empty()) t.log_sigma = p.time_scale.values[i];
-    for (std::size_t k = 0; k < p.motion_width; ++k) t.motion[k] = scale_ * p.motion.values[p.motion_width * i + k];
+    for (std::size_t k = 0; k < p.motion_width; ++k)
+      t.motion[k] = scale_ * p.motion.values[p.motion_width * i + k];
     planes.add(row, t, raw, sink);
   }
 

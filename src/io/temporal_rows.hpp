@@ -21,7 +21,8 @@ struct RawTemporal {
   std::array<double, kMotionPlanes> motion{};
 };
 
-/// Takes the time planes of a file's rows beside the CloudSink that takes their Gaussians, from any number of threads.
+/// Takes the time planes of a file's rows beside the CloudSink that takes their Gaussians, from any
+/// number of threads.
 class TemporalRows {
  public:
   /// For `count` rows of `motion_planes` planes of motion: 0, 3, 6 or 9.
@@ -31,7 +32,8 @@ class TemporalRows {
     for (std::size_t k = 0; k < motion_planes; ++k) planes_.motion[k].resize(count);
   }
 
-  /// Gives row `row` to the sink and keeps its planes. A row whose planes are not finite is not finite as a whole.
+  /// Gives row `row` to the sink and keeps its planes. A row whose planes are not finite is not finite
+  /// as a whole.
   void add(std::size_t row, const RawTemporal& t, RawGaussian raw, CloudSink& sink) noexcept {
     constexpr double kLimit = 20;
     constexpr float kDropped = std::numeric_limits<float>::quiet_NaN();
@@ -50,7 +52,8 @@ class TemporalRows {
     }
   }
 
-  /// Moves the planes of the rows that were kept to `out`, whose cloud has these, and tells the report what there is.
+  /// Moves the planes of the rows that were kept to `out`, whose cloud has these, and tells the report
+  /// what there is.
   void give(TemporalCloud& out, LoadReport& report) {
     std::size_t to = 0;
     float first = std::numeric_limits<float>::infinity(), last = -first;
@@ -77,7 +80,8 @@ class TemporalRows {
     out.sigmas = std::move(planes_.sigmas);
     out.motion = std::move(planes_.motion);
     if (clamped_ != 0) {
-      report.warnings.push_back(std::to_string(clamped_) + " time scales clamped: their logarithms are outside [-20, 20]");
+      report.warnings.push_back(std::to_string(clamped_) +
+                                " time scales clamped: their logarithms are outside [-20, 20]");
     }
     if (first <= last) {
       report.moving = true;

@@ -13,8 +13,8 @@
 
 namespace gsnav::io::detail {
 
-/// Goes through a text line by line and word by word; blank lines and what follows a '#' are passed over.
-/// Messages name the source and the line.
+/// Goes through a text line by line and word by word; blank lines and what follows a '#' are passed
+/// over. Messages name the source and the line.
 class TextLines {
  public:
   TextLines(std::string_view text, const std::string& source) : text_(text), source_(source) {}
@@ -33,7 +33,9 @@ class TextLines {
   }
   const std::vector<std::string_view>& words() const noexcept { return words_; }
   /// Word k of the line, empty where there is none.
-  std::string_view word(std::size_t k) const noexcept { return k < words_.size() ? words_[k] : std::string_view{}; }
+  std::string_view word(std::size_t k) const noexcept {
+    return k < words_.size() ? words_[k] : std::string_view{};
+  }
 
   Status bad(const std::string& what) const {
     return {Errc::invalid_file, source_ + ": line " + std::to_string(line_) + ": " + what};
@@ -51,7 +53,8 @@ class TextLines {
       out = 0.0;
       return word.find("e-") != word.npos || word.find("E-") != word.npos;
     }
-    return !word.empty() && error == std::errc{} && end == word.data() + word.size() && std::isfinite(out);
+    return !word.empty() && error == std::errc{} && end == word.data() + word.size() &&
+           std::isfinite(out);
   }
 
  private:

@@ -7,8 +7,8 @@
 
 namespace gsnav::io::detail {
 
-/// So many threads instead of io_threads' own, for what this thread calls; 0: no such wish. Tests show by it that
-/// nothing depends on their number.
+/// So many threads instead of io_threads' own, for what this thread calls; 0: no such wish. Tests show
+/// by it that nothing depends on their number.
 inline thread_local std::size_t wanted_threads = 0;
 
 /// Threads that a reader or writer may use: one a core, at most 16.

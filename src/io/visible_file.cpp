@@ -55,7 +55,8 @@ const char* flaw_of(const VisibleSets& v, std::size_t cell, std::size_t cloud_ro
   const std::size_t words = v.words();
   if (words == 0) return seen.size == 0 ? nullptr : "words of a scene that has no chunk";
   const std::uint32_t beyond = v.cloud_chunks % 32 == 0 ? 0 : ~0u << (v.cloud_chunks % 32);
-  if (seen.size < words || (seen[words - 1] & beyond) != 0) return "a chunk that the scene does not have";
+  if (seen.size < words || (seen[words - 1] & beyond) != 0)
+    return "a chunk that the scene does not have";
   if (seen.size == words) return nullptr;
   if (seen.size != 2 * words + kSeenRowWords * v.count_seen(cell)) return "not as many rows as chunks";
   std::size_t place = 0;
@@ -74,7 +75,8 @@ const char* flaw_of(const VisibleSets& v, std::size_t cell, std::size_t cloud_ro
 
 /// What lookups and kernels rely on.
 Status check(const fs::path& path, const VisibleSets& v, std::size_t cloud_rows) {
-  if (!(v.cell > 0 && std::isfinite(v.cell))) return invalid_file(path, "cell = " + std::to_string(v.cell));
+  if (!(v.cell > 0 && std::isfinite(v.cell)))
+    return invalid_file(path, "cell = " + std::to_string(v.cell));
   if (!(v.focal > 0 && std::isfinite(v.focal)))
     return invalid_file(path, "focal = " + std::to_string(v.focal));
   if (!(v.near_plane > 0 && std::isfinite(v.near_plane))) {
@@ -94,7 +96,8 @@ Status check(const fs::path& path, const VisibleSets& v, std::size_t cloud_rows)
       return bad("its words are not behind those before");
     if (const char* flaw = flaw_of(v, c, cloud_rows)) return bad(flaw);
   }
-  if (v.bits.size() != (v.ends.empty() ? 0 : v.ends.back())) return invalid_file(path, "words of no cell");
+  if (v.bits.size() != (v.ends.empty() ? 0 : v.ends.back()))
+    return invalid_file(path, "words of no cell");
   return {};
 }
 
@@ -153,8 +156,9 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
                       header.cells * kCell + header.words * sizeof(std::uint32_t) == room;
     if (header.chunks != v.cloud_chunks || !fits) {
       return invalid_file(path, "has " + std::to_string(file.size()) + " bytes, not those of " +
-                               std::to_string(header.cells) + " cells, " + std::to_string(header.words) +
-                               " words and " + std::to_string(header.chunks) + " chunks");
+                                    std::to_string(header.cells) + " cells, " +
+                                    std::to_string(header.words) + " words and " +
+                                    std::to_string(header.chunks) + " chunks");
     }
     v.cell = header.cell;
     v.focal = header.focal;

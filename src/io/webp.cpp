@@ -55,7 +55,8 @@ Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::strin
 }
 
 Result<std::string> encode_webp(const RgbaImage& image, const std::string& what) {
-  // Of 9. Planes look like noise: 4 takes less than 1% more off, in half as much time again to three times as much.
+  // Of 9. Planes look like noise: 4 takes less than 1% more off, in half as much time again to three
+  // times as much.
   constexpr int kLevel = 1;
   WebPConfig config;
   WebPPicture picture;

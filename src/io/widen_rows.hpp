@@ -16,9 +16,9 @@ inline std::span<std::byte> packed_rows(std::vector<float>& rows, std::size_t by
   return std::as_writable_bytes(std::span(rows)).last(bytes);
 }
 
-/// Makes rows of floats of `count` rows of `width` bytes at the end of the same array, in place and in parallel:
-/// `row(in, out)` makes row i of `width` bytes, a copy. A row of floats must be as large as its bytes at least. No
-/// second array is there at any time.
+/// Makes rows of floats of `count` rows of `width` bytes at the end of the same array, in place and in
+/// parallel: `row(in, out)` makes row i of `width` bytes, a copy. A row of floats must be as large as
+/// its bytes at least. No second array is there at any time.
 template <std::size_t kMostWidth, class Row>
 void widen_rows(std::vector<float>& rows, std::size_t count, std::size_t width, const Row& row) {
   if (count == 0 || width == 0) return;
@@ -32,13 +32,16 @@ void widen_rows(std::vector<float>& rows, std::size_t count, std::size_t width, 
     }
   };
   for (std::size_t done = 0; done < count;) {
-    // Rows that end in front of the first byte not yet read do not depend on one another; of the last few each does.
+    // Rows that end in front of the first byte not yet read do not depend on one another; of the last
+    // few each does.
     const std::size_t free = ((size - width) * count + width * done) / size;
     const std::size_t next = std::clamp(free, done + 1, count);
-    for_pieces(next - done, pieces_of(next - done), [&](std::size_t, std::size_t first, std::size_t last) -> Status {
-      make(done + first, done + last);
-      return {};
-    }).throw_if_error();
+    for_pieces(next - done, pieces_of(next - done),
+               [&](std::size_t, std::size_t first, std::size_t last) -> Status {
+                 make(done + first, done + last);
+                 return {};
+               })
+        .throw_if_error();
     done = next;
   }
 }

@@ -42,7 +42,8 @@ Status inflate_raw(std::span<const std::byte> packed, std::span<std::byte> out,
   std::size_t read = 0, written = 0;
   int code = Z_OK;
   while (code == Z_OK) {
-    const std::size_t in = std::min(kPart, packed.size() - read), room = std::min(kPart, out.size() - written);
+    const std::size_t in = std::min(kPart, packed.size() - read),
+                      room = std::min(kPart, out.size() - written);
     z.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(packed.data() + read));
     z.avail_in = static_cast<uInt>(in);
     z.next_out = reinterpret_cast<Bytef*>(out.data() + written);
@@ -76,14 +77,16 @@ std::optional<Directory> find_directory(std::span<const std::byte> bytes, std::s
   if (at < kLocator64Size + kEnd64Size) return std::nullopt;
   const std::byte* locator = end - kLocator64Size;
   const auto record = load_le<std::uint64_t>(locator + 8);
-  if (load_le<std::uint32_t>(locator) != kLocator64Signature || record > at - kLocator64Size - kEnd64Size) {
+  if (load_le<std::uint32_t>(locator) != kLocator64Signature ||
+      record > at - kLocator64Size - kEnd64Size) {
     return std::nullopt;
   }
   const std::byte* end64 = bytes.data() + record;
   if (load_le<std::uint32_t>(end64) != kEnd64Signature) return std::nullopt;
   d = {load_le<std::uint64_t>(end64 + 32), load_le<std::uint64_t>(end64 + 40),
        load_le<std::uint64_t>(end64 + 48), false};
-  d.several_volumes = load_le<std::uint32_t>(end64 + 16) != 0 || load_le<std::uint32_t>(end64 + 20) != 0 ||
+  d.several_volumes = load_le<std::uint32_t>(end64 + 16) != 0 ||
+                      load_le<std::uint32_t>(end64 + 20) != 0 ||
                       load_le<std::uint64_t>(end64 + 24) != d.count;
   return d;
 }

@@ -30,7 +30,8 @@ class ZipReader {
   std::vector<std::string> names() const;
   /// Decompresses an entry. `slack`: bytes that are believed however small the entry is.
   /// Errors: file_not_found, invalid_file, unsupported.
-  Result<std::vector<std::byte>> read(const std::string& name, std::uint64_t slack = kInflationSlack) const;
+  Result<std::vector<std::byte>> read(const std::string& name,
+                                      std::uint64_t slack = kInflationSlack) const;
 
  private:
   struct Entry {

@@ -10,7 +10,7 @@
 namespace gsnav::io::detail {
 namespace {
 
-constexpr std::uint64_t kMost = 0xffffffff;      // from here on zip64 would be needed
+constexpr std::uint64_t kMost = 0xffffffff;       // from here on zip64 would be needed
 constexpr std::uint32_t kFirstDate = 0x00210000;  // 1 January 1980, the earliest there is
 
 template <class T>
@@ -57,8 +57,8 @@ Status ZipWriter::add(const std::string& name, std::string_view content, bool de
     if (Status s = deflate_raw(content, packed, what); !s) return s;
   }
   const std::string_view data = deflated ? std::string_view(packed) : content;
-  const auto crc =
-      static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(content.data()), content.size()));
+  const auto crc = static_cast<std::uint32_t>(
+      crc32_z(0, reinterpret_cast<const Bytef*>(content.data()), content.size()));
   const auto offset = static_cast<std::uint32_t>(entries_.size());
   const auto common = [&](std::string& to) {
     put(to, std::uint16_t{20});  // version needed

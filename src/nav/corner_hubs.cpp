@@ -98,7 +98,8 @@ bool CornerHubs::look(const UnfoldedMesh& mesh, std::vector<std::vector<Link>>& 
 }
 
 void CornerHubs::draw_sides(const UnfoldedMesh& mesh) {
-  constexpr double kShort = 1e-4;  // metres: sides that begin so near their end are left to the exact test
+  constexpr double kShort =
+      1e-4;  // metres: sides that begin so near their end are left to the exact test
   sides_.assign(6 * sights_.size(), 0.0f);
   for (const Sight& s : sights_) roots_.push_back({s.root, s.corner});
   for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
@@ -117,7 +118,8 @@ void CornerHubs::draw_sides(const UnfoldedMesh& mesh) {
         if (!(l > kShort)) return;
         const Flat normal = Flat{-d.y, d.x} * (inside / l);
         const double number[3] = {normal.x, normal.y, dot(normal, origin - s.root)};
-        for (std::size_t k = 0; k < 3; ++k) sides_[6 * first + (row + k) * n + i] = static_cast<float>(number[k]);
+        for (std::size_t k = 0; k < 3; ++k)
+          sides_[6 * first + (row + k) * n + i] = static_cast<float>(number[k]);
       };
       draw(s.right, 1.0, 0);
       draw(s.left, -1.0, 3);
@@ -126,7 +128,8 @@ void CornerHubs::draw_sides(const UnfoldedMesh& mesh) {
 }
 
 void CornerHubs::rank(const std::vector<std::vector<Link>>& links) {
-  // Corners on many shortest paths make good hubs: counted on the trees of paths from a sample of corners.
+  // Corners on many shortest paths make good hubs: counted on the trees of paths from a sample of
+  // corners.
   constexpr std::size_t kTrees = 64;
   const std::size_t n = corners_.size(), stride = max(n / kTrees, std::size_t{1});
   std::vector<double> score(n, 0.0), below(n), best(n);
@@ -212,7 +215,8 @@ void CornerHubs::fill_table() {
   table_.assign(n * n, kInfinity);
   std::vector<double> to_hub(n, kInfinity);
   for (std::size_t a = 0; a < n; ++a) {
-    for (std::uint32_t i = first_label_[a]; i < first_label_[a + 1]; ++i) to_hub[labels_[i].hub] = labels_[i].length;
+    for (std::uint32_t i = first_label_[a]; i < first_label_[a + 1]; ++i)
+      to_hub[labels_[i].hub] = labels_[i].length;
     for (std::size_t b = 0; b <= a; ++b) {
       double d = kInfinity;
       for (std::uint32_t i = first_label_[b]; i < first_label_[b + 1]; ++i) {
@@ -220,7 +224,8 @@ void CornerHubs::fill_table() {
       }
       table_[a * n + b] = table_[b * n + a] = d;
     }
-    for (std::uint32_t i = first_label_[a]; i < first_label_[a + 1]; ++i) to_hub[labels_[i].hub] = kInfinity;
+    for (std::uint32_t i = first_label_[a]; i < first_label_[a + 1]; ++i)
+      to_hub[labels_[i].hub] = kInfinity;
   }
 }
 

@@ -11,15 +11,17 @@ namespace gsnav::detail {
 
 /// Shortest paths by the corners that they bend at, without a search.
 ///
-/// Each face keeps which corners its points can see; each corner keeps its distance to some hubs, chosen so that
-/// any two corners have a hub on a shortest path between them (pruned landmark labels, Akiba, Iwata and Yoshida
-/// 2013). The least sum over both ends' corners and a common hub is the shortest path that bends (Euclidean hub
-/// labels, Du, Shen and Cui 2023), on unfolded faces as well as on level ones. Of a mesh of no more than kMostTable
-/// corners the labels are summed once, for all pairs: a table of at most 8 MiB.
+/// Each face keeps which corners its points can see; each corner keeps its distance to some hubs, chosen
+/// so that any two corners have a hub on a shortest path between them (pruned landmark labels, Akiba,
+/// Iwata and Yoshida 2013). The least sum over both ends' corners and a common hub is the shortest path
+/// that bends (Euclidean hub labels, Du, Shen and Cui 2023), on unfolded faces as well as on level ones.
+/// Of a mesh of no more than kMostTable corners the labels are summed once, for all pairs: a table of at
+/// most 8 MiB.
 class CornerHubs {
  public:
-  /// Makes nothing, so that empty() holds, for a mesh of more corners or sights than these, or whose labels take more
-  /// comparisons (a tenth of a second): a hall of thousands of pillars, each of which sees many others.
+  /// Makes nothing, so that empty() holds, for a mesh of more corners or sights than these, or whose
+  /// labels take more comparisons (a tenth of a second): a hall of thousands of pillars, each of which
+  /// sees many others.
   static constexpr std::size_t kMostCorners = std::size_t{1} << 12, kMostSights = std::size_t{1} << 19,
                                kMostWork = std::size_t{1} << 26, kMostTable = std::size_t{1} << 10;
   explicit CornerHubs(const UnfoldedMesh& mesh);
@@ -29,16 +31,18 @@ class CornerHubs {
   std::size_t sights() const noexcept { return sights_.size(); }
   std::size_t labels() const noexcept { return labels_.size(); }
 
-  /// A path that bends: from the start straight to corner `first`, the shortest way to `last`, and to the goal.
+  /// A path that bends: from the start straight to corner `first`, the shortest way to `last`, and to
+  /// the goal.
   struct Way {
     double length = std::numeric_limits<double>::infinity();
     std::uint32_t first = 0, last = 0;
     double to_first = 0, from_last = 0;  ///< straight, metres
-    std::uint32_t near_goal = UnfoldedMesh::kNone;  ///< the corner nearest to the goal of those that it sees,
-    double to_goal = 0;                             ///< and its distance
+    std::uint32_t near_goal =
+        UnfoldedMesh::kNone;  ///< the corner nearest to the goal of those that it sees,
+    double to_goal = 0;       ///< and its distance
   };
-  /// Distances to a way's goal from below: by the triangle inequality, with the corner near the goal. Until the
-  /// thread's next one.
+  /// Distances to a way's goal from below: by the triangle inequality, with the corner near the goal.
+  /// Until the thread's next one.
   class LeastToGoal final : public GoalBound {
    public:
     LeastToGoal(const CornerHubs& hubs, const Way& way);
@@ -60,7 +64,8 @@ class CornerHubs {
   std::vector<Leg> legs(const Way& way, const Site& goal) const;
 
  private:
-  /// A corner and the window of the face's edge that it sees the face through; no width for the face's own corners.
+  /// A corner and the window of the face's edge that it sees the face through; no width for the face's
+  /// own corners.
   struct Sight {
     Flat root, right, left;
     std::uint32_t corner = 0;
@@ -105,11 +110,13 @@ class CornerHubs {
     best.from_last = last.straight;
   }
   /// Of the corners that both ends see, by the table or by the labels.
-  void join_by_table(const Site& start, const Site& goal, std::vector<Seen>& near_start, std::vector<Seen>& near_goal,
-                     Way& best) const;
+  void join_by_table(const Site& start, const Site& goal, std::vector<Seen>& near_start,
+                     std::vector<Seen>& near_goal, Way& best) const;
   void join_by_labels(const Site& start, const Site& goal, const std::vector<Seen>& near_start,
                       const std::vector<Seen>& near_goal, Way& best) const;
-  const double* row(std::uint32_t corner) const noexcept { return table_.data() + corner * corners_.size(); }
+  const double* row(std::uint32_t corner) const noexcept {
+    return table_.data() + corner * corners_.size();
+  }
 
   std::vector<Site> corners_;
   std::vector<std::uint32_t> corner_of_;    ///< of each vertex; kNone where no path bends
@@ -121,18 +128,18 @@ class CornerHubs {
     std::uint32_t corner = 0;
   };
   std::vector<Root> roots_;  ///< of each sight
-  /// A face's sights have a row of each of six numbers: a, b, c of right and left side, where a x + b y + c is the
-  /// distance, metres, to the inside of the point (x, y) from the face's first corner.
+  /// A face's sights have a row of each of six numbers: a, b, c of right and left side, where a x + b y
+  /// + c is the distance, metres, to the inside of the point (x, y) from the face's first corner.
   std::vector<float> sides_;
   struct Frame {
     Flat origin;
     float margin = 0;  ///< metres: no more than that is lost by rounding
   };
-  std::vector<Frame> frames_;  ///< of each face
+  std::vector<Frame> frames_;               ///< of each face
   std::vector<std::uint32_t> first_label_;  ///< of each corner, and one past the last
   std::vector<Label> labels_;
   std::vector<std::uint32_t> hub_corner_;  ///< by rank
-  std::vector<double> table_;              ///< metres between each two corners; empty where they are too many
+  std::vector<double> table_;  ///< metres between each two corners; empty where they are too many
 };
 
 }  // namespace gsnav::detail

@@ -32,7 +32,8 @@ void CornerHubs::look_from(const Site& from, std::vector<Seen>& out) const {
   thread_local std::vector<std::uint8_t> within;
   const std::size_t begin = first_sight_[from.face], n = first_sight_[from.face + 1] - begin;
   const Frame& frame = frames_[from.face];
-  const float x = static_cast<float>(from.at.x - frame.origin.x), y = static_cast<float>(from.at.y - frame.origin.y);
+  const float x = static_cast<float>(from.at.x - frame.origin.x),
+              y = static_cast<float>(from.at.y - frame.origin.y);
   if (within.size() < n) within.resize(n);
   inside_sides(sides_.data() + std::size_t{6} * begin, n, x, y, frame.margin, within.data());
   for (std::size_t i = 0; i < n; ++i) {
@@ -80,8 +81,9 @@ CornerHubs::Way CornerHubs::shortest(const Site& start, const Site& goal) const 
 
 void CornerHubs::join_by_table(const Site& start, const Site& goal, std::vector<Seen>& near_start,
                                std::vector<Seen>& near_goal, Way& best) const {
-  // Good ways first: to the corner nearest to the one end from all that the other sees. They are also bounds, by the
-  // triangle inequality: whoever leads there a long way round leads to that end at most its distance less.
+  // Good ways first: to the corner nearest to the one end from all that the other sees. They are also
+  // bounds, by the triangle inequality: whoever leads there a long way round leads to that end at most
+  // its distance less.
   const auto by_nearest = [&](const std::vector<Seen>& from, const Seen& nearest, bool forward) {
     const double* to = row(nearest.corner);
     for (const Seen& seen : from) {
@@ -127,10 +129,12 @@ void CornerHubs::join_by_labels(const Site& start, const Site& goal, const std::
   const auto least = [&](const Seen& seen, const Site& end) {
     return seen.straight + distance(corners_[seen.corner].position, end.position);
   };
-  // A good way first, by the corners that lead most nearly to the other end: most others are then too far.
+  // A good way first, by the corners that lead most nearly to the other end: most others are then too
+  // far.
   const auto first = [&](const std::vector<Seen>& from, const Site& end) {
-    return *std::min_element(from.begin(), from.end(),
-                             [&](const Seen& a, const Seen& b) { return least(a, end) < least(b, end); });
+    return *std::min_element(from.begin(), from.end(), [&](const Seen& a, const Seen& b) {
+      return least(a, end) < least(b, end);
+    });
   };
   const Seen a0 = first(near_start, goal), b0 = first(near_goal, start);
   offer(a0.straight + meet(a0.corner, b0.corner).length + b0.straight, a0, b0, best);
@@ -158,9 +162,9 @@ namespace {
 
 /// Of the corner near a goal, and what came of it.
 struct NearGoal {
-  std::vector<double> to_hub;            ///< infinity where it has no label
-  std::vector<std::uint32_t> set;        ///< the finite ones
-  std::vector<double> from_corner;       ///< where `round_of` is the round
+  std::vector<double> to_hub;       ///< infinity where it has no label
+  std::vector<std::uint32_t> set;   ///< the finite ones
+  std::vector<double> from_corner;  ///< where `round_of` is the round
   std::vector<std::uint64_t> round_of;
   std::uint64_t round = 0;
 };
@@ -187,7 +191,8 @@ CornerHubs::LeastToGoal::LeastToGoal(const CornerHubs& hubs, const Way& way) : h
     near.round_of.resize(n, 0);
   }
   if (way.near_goal == UnfoldedMesh::kNone) return;
-  for (std::uint32_t i = hubs.first_label_[way.near_goal]; i < hubs.first_label_[way.near_goal + 1]; ++i) {
+  for (std::uint32_t i = hubs.first_label_[way.near_goal]; i < hubs.first_label_[way.near_goal + 1];
+       ++i) {
     near.to_hub[hubs.labels_[i].hub] = hubs.labels_[i].length;
     near.set.push_back(hubs.labels_[i].hub);
   }
@@ -197,7 +202,9 @@ double CornerHubs::LeastToGoal::from(std::uint32_t vertex) const noexcept {
   const std::uint32_t c = hubs_.corner_of_[vertex];
   if (c == UnfoldedMesh::kNone || way_.near_goal == UnfoldedMesh::kNone) return 0;
   // Less what rounding may have left out.
-  const auto less = [&](double d) { return d < kInfinity ? max(d - way_.to_goal - kRounding, 0.0) : 0.0; };
+  const auto less = [&](double d) {
+    return d < kInfinity ? max(d - way_.to_goal - kRounding, 0.0) : 0.0;
+  };
   if (row_ != nullptr) return less(row_[c]);
   NearGoal& near = near_goal_of_thread();
   if (near.round_of[c] == near.round) return near.from_corner[c];
@@ -215,7 +222,8 @@ std::vector<CornerHubs::Leg> CornerHubs::legs(const Way& way, const Site& goal) 
   const auto to_hub = [&](std::uint32_t corner) {
     std::vector<Place> out;
     for (;;) {
-      const auto first = labels_.begin() + first_label_[corner], last = labels_.begin() + first_label_[corner + 1];
+      const auto first = labels_.begin() + first_label_[corner],
+                 last = labels_.begin() + first_label_[corner + 1];
       const Label& l = *std::find_if(first, last, [&](const Label& label) { return label.hub == hub; });
       out.emplace_back(corner, l.length);
       if (corner == hub_corner_[hub]) return out;

@@ -37,8 +37,8 @@ Beam enter(const UnfoldedMesh::Edge& e, const Beam& b) noexcept {
           turned(b.leftmost)};
 }
 
-/// What a beam's lines have between two directions more, each taken where it is within half a turn and tighter; false
-/// where no line is left.
+/// What a beam's lines have between two directions more, each taken where it is within half a turn and
+/// tighter; false where no line is left.
 bool bound(Beam& b, const Flat& right, const Flat& left) noexcept {
   if (cross(b.rightmost, right) > 0) b.rightmost = right;
   if (cross(left, b.leftmost) > 0) b.leftmost = left;
@@ -57,7 +57,8 @@ bool cross_edge(Beam& b, const Flat& e) noexcept {
 /// Directions between the ends of the first edge and of the last window; false where no line is left.
 bool look_ahead(Beam& b) noexcept {
   // Lines cross the first edge outwards: what lies elsewhere bounds nothing.
-  const Flat first = b.first_left - b.first_right, right = b.right - b.first_left, left = b.left - b.first_right;
+  const Flat first = b.first_left - b.first_right, right = b.right - b.first_left,
+             left = b.left - b.first_right;
   const auto bounds = [&](const Flat& d) { return cross(first, d) < 0 && dot(d, d) > kShort * kShort; };
   return bound(b, bounds(right) ? right : b.rightmost, bounds(left) ? left : b.leftmost);
 }
@@ -151,7 +152,8 @@ bool FaceViews::look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::
       // An end of the first edge that is beyond this one sees it from behind, which limits nothing.
       const bool by_right = cross(r - b.first_left, l - b.first_left) > 0;
       const bool by_left = cross(l - b.first_right, r - b.first_right) < 0;
-      Beam next{e, b.first_right, b.first_left, by_right ? r : b.right, by_left ? l : b.left, b.rightmost, b.leftmost};
+      Beam next{e,           b.first_right, b.first_left, by_right ? r : b.right, by_left ? l : b.left,
+                b.rightmost, b.leftmost};
       if (cross_edge(next, q - p) && look_ahead(next)) open.push_back(enter(mesh.edges[e], next));
     }
   }

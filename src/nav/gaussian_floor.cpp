@@ -745,8 +745,8 @@ class Floors {
     }
   }
 
-  /// Solid voxels above and below the main floor in its columns and those up to a patch beside it (what stands on a
-  /// floor covers it), beyond its band.
+  /// Solid voxels above and below the main floor in its columns and those up to a patch beside it (what
+  /// stands on a floor covers it), beyond its band.
   void weigh(GaussianNavReport& report) const {
     for (std::size_t c = 0; c < g_.nx * g_.nz; ++c) {
       if (g_.first[c] == g_.first[c + 1]) continue;

@@ -24,7 +24,7 @@ Status validate(const GaussianNavOptions& o) {
     double value, low, high;
   };
   const Field fields[] = {
-      {"min_opacity", o.min_opacity, 0.0, 1.0},      {"sigmas", o.sigmas, 0.1, 10.0},
+      {"min_opacity", o.min_opacity, 0.0, 1.0},       {"sigmas", o.sigmas, 0.1, 10.0},
       {"solid_alpha", o.solid_alpha, 0.01, 0.999999}, {"max_hole", o.max_hole, 0.0, 100.0},
       {"floor_band", o.floor_band, 0.0, 1000.0},      {"min_island_area", o.min_island_area, 0.0, 1e9},
   };
@@ -146,7 +146,8 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
   return build_navmesh(settings, sets, {}, {}, options);
 }
 
-Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings, std::span<const GaussianSet> sets,
+Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
+                                           std::span<const GaussianSet> sets,
                                            std::span<const Vec3d> vertices,
                                            std::span<const NavMesh::Triangle> triangles,
                                            const GaussianNavOptions& options) {
@@ -192,17 +193,21 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings, std:
   }
 
   // The voxels' grid, by whole cells as much larger as the triangles need.
-  Vec3d low = g.low, high = g.low + Vec3d{static_cast<double>(g.nx) * g.cell, static_cast<double>(g.ny) * g.level,
-                                          static_cast<double>(g.nz) * g.cell};
+  Vec3d low = g.low,
+        high = g.low + Vec3d{static_cast<double>(g.nx) * g.cell, static_cast<double>(g.ny) * g.level,
+                             static_cast<double>(g.nz) * g.cell};
   Offset offset;
   if (!triangles.empty()) {
-    const auto below = [](double grid, double mesh, double cell) { return max(std::ceil((grid - mesh) / cell), 0.0); };
+    const auto below = [](double grid, double mesh, double cell) {
+      return max(std::ceil((grid - mesh) / cell), 0.0);
+    };
     const double x = below(g.low.x, box->low.x, g.cell), y = below(g.low.y, box->low.y, g.level),
                  z = below(g.low.z, box->low.z, g.cell);
     low = g.low - Vec3d{x * g.cell, y * g.level, z * g.cell};
     for (int k = 0; k < 3; ++k) high[k] = max(high[k], box->high[k] + (k == 1 ? g.level : g.cell));
     constexpr double kMost = 65000;  // more is refused with the grid
-    offset = {static_cast<int>(min(x, kMost)), static_cast<int>(min(y, kMost)), static_cast<int>(min(z, kMost))};
+    offset = {static_cast<int>(min(x, kMost)), static_cast<int>(min(y, kMost)),
+              static_cast<int>(min(z, kMost))};
   }
   // Tops of voxels stand half a voxel above the surface in them.
   const Vec3d origin = low - Vec3d{0, 0.5 * g.level, 0};
@@ -211,7 +216,8 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings, std:
   if (!triangles.empty()) {
     heights.emplace(vertices, triangles, origin, Aabb<double>{box->low - origin, box->high - origin});
     height = [&](const Vec3d& p) {
-      return heights->at(p, 1.01 * settings.cell_height + settings.cell_size, 0.5 * settings.cell_height).value_or(p.y);
+      return heights->at(p, 1.01 * settings.cell_height + settings.cell_size, 0.5 * settings.cell_height)
+          .value_or(p.y);
     };
   }
   const auto build = [&]() -> Result<NavMesh> {
@@ -241,13 +247,14 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings, std:
   };
   auto mesh = build();
   if (!mesh.ok()) {
-    return Status(mesh.code(), mesh.message() + "; floor found at y = " + std::to_string(report.floor_y) +
-                                   ", left out as too small " +
-                                   std::to_string(report.dropped_small) + " m2, as outside " +
-                                   std::to_string(report.dropped_uncovered) + " m2");
+    return Status(mesh.code(),
+                  mesh.message() + "; floor found at y = " + std::to_string(report.floor_y) +
+                      ", left out as too small " + std::to_string(report.dropped_small) +
+                      " m2, as outside " + std::to_string(report.dropped_uncovered) + " m2");
   }
   report.area = mesh->navigable_area();
-  for (std::size_t i = 0; i < mesh->island_count(); ++i) report.island_areas.push_back(mesh->island_area(i));
+  for (std::size_t i = 0; i < mesh->island_count(); ++i)
+    report.island_areas.push_back(mesh->island_area(i));
   return NavMeshFromGaussians{std::move(*mesh), std::move(report)};
 }
 

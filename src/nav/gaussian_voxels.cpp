@@ -164,7 +164,8 @@ class Splat {
     const double size[3] = {g.cell, g.level, g.cell};
     for (int k = 0; k < 3; ++k) {
       const double reach = sigmas * std::sqrt(cov(k, k)), c = s.mean[k] - g.low[k];
-      const double a = std::ceil((c - reach) / size[k] - 0.5), b = std::floor((c + reach) / size[k] - 0.5);
+      const double a = std::ceil((c - reach) / size[k] - 0.5),
+                   b = std::floor((c + reach) / size[k] - 0.5);
       if (b < 0 || a > static_cast<double>(n[k] - 1) || a > b) return false;
       first[k] = static_cast<std::size_t>(max(a, 0.0));
       last[k] = static_cast<std::size_t>(min(b, static_cast<double>(n[k] - 1)));
@@ -505,7 +506,8 @@ Result<VoxelGrid> voxelise(const NavMeshSettings& settings, std::span<const Gaus
   g.low = box.low;
   report.bounds = box;
   const Vec3d size = box.high - box.low;
-  const double nx = std::ceil(size.x / g.cell), ny = std::ceil(size.y / g.level), nz = std::ceil(size.z / g.cell);
+  const double nx = std::ceil(size.x / g.cell), ny = std::ceil(size.y / g.level),
+               nz = std::ceil(size.z / g.cell);
   constexpr double kLargest = 1e15;  // more cannot be counted
   if (nx < kLargest && ny < kLargest && nz < kLargest) {
     g.nx = static_cast<std::size_t>(nx);

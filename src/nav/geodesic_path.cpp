@@ -15,7 +15,8 @@ struct PathPoint {
 };
 
 /// Where the straight line from target to root crosses the window, as a share of its edge's length.
-double crossing(const GeodesicSearch::Node& n, const Flat& a, const Flat& b, const Flat& target) noexcept {
+double crossing(const GeodesicSearch::Node& n, const Flat& a, const Flat& b,
+                const Flat& target) noexcept {
   const Flat e = n.left - n.right, d = n.root - target;
   const double rate = cross(e, d);
   const double t = rate != 0 ? clamp(cross(target - n.right, d) / rate, 0.0, 1.0) : 0.0;
@@ -24,7 +25,8 @@ double crossing(const GeodesicSearch::Node& n, const Flat& a, const Flat& b, con
 }
 
 /// Appends what of [first, last] a straight line misses, last included (Douglas-Peucker).
-void simplify(const std::vector<PathPoint>& p, std::size_t first, std::size_t last, std::vector<Vec3d>& out) {
+void simplify(const std::vector<PathPoint>& p, std::size_t first, std::size_t last,
+              std::vector<Vec3d>& out) {
   std::size_t worst = first;
   double error = kHeightError;
   const Vec3d a = p[first].position, along = p[last].position - a;

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kRounding = 1e-9;   // metres, square metres or radians
-constexpr double kPoint = 1e-11;     // metres: windows below this are points
+constexpr double kRounding = 1e-9;  // metres, square metres or radians
+constexpr double kPoint = 1e-11;    // metres: windows below this are points
 
 Flat turned(const Flat& d, double angle) noexcept {
   const double c = std::cos(angle), s = std::sin(angle);
@@ -21,7 +21,8 @@ Flat turned(const Flat& d, double angle) noexcept {
 
 }  // namespace
 
-double length_through(const Flat& root, const Flat& right, const Flat& left, double along, double beyond) noexcept {
+double length_through(const Flat& root, const Flat& right, const Flat& left, double along,
+                      double beyond) noexcept {
   const Flat e = left - right;
   const double width = length(e), inverse = 1.0 / width;
   const Flat r = root - right;
@@ -169,8 +170,8 @@ void GeodesicSearch::reach(std::uint32_t edge, const Flat& root, double g, std::
   }
 }
 
-void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left, double g,
-                          std::uint32_t parent) {
+void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left,
+                          double g, std::uint32_t parent) {
   const UnfoldedMesh::Edge& here = mesh_->edges[edge];
   if (here.twin == kNone) return;
   const Flat extent = left - right;
@@ -212,7 +213,8 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
   }
   // In space: along the edge and off its line, from the right end of the window.
   const Vec3d &a = here.corner, &b = mesh_->edges[mesh_->next(edge)].corner;
-  const Vec3d e{b.x - a.x, b.y - a.y, b.z - a.z}, to{goal_.position.x - a.x, goal_.position.y - a.y, goal_.position.z - a.z};
+  const Vec3d e{b.x - a.x, b.y - a.y, b.z - a.z},
+      to{goal_.position.x - a.x, goal_.position.y - a.y, goal_.position.z - a.z};
   const double ee = e.x * e.x + e.y * e.y + e.z * e.z, te = to.x * e.x + to.y * e.y + to.z * e.z;
   const double tt = to.x * to.x + to.y * to.y + to.z * to.z, along = te / std::sqrt(ee);
   const double beyond = std::sqrt(max(tt - along * along, 0.0));
@@ -227,8 +229,8 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
   push(g + f, n);
 }
 
-void GeodesicSearch::spread(std::uint32_t face, std::uint32_t first, std::uint32_t count, const Flat& root,
-                            const Cone& cone, double g, std::uint32_t parent) {
+void GeodesicSearch::spread(std::uint32_t face, std::uint32_t first, std::uint32_t count,
+                            const Flat& root, const Cone& cone, double g, std::uint32_t parent) {
   const UnfoldedMesh::Face& f = mesh_->faces[face];
   const auto edge = [&](std::uint32_t k) { return f.first + (k < f.count ? k : k - f.count); };
   const bool wide = dot(cone.right, cone.left) < 0;
@@ -238,10 +240,12 @@ void GeodesicSearch::spread(std::uint32_t face, std::uint32_t first, std::uint32
     const std::uint32_t e = edge(k), after = mesh_->next(e);
     const Flat q = mesh_->edges[after].at;
     const double right_q = cross(cone.right, q - root), left_q = cross(cone.left, q - root);
-    if (k + 1 < first + count && right_q >= -kRounding && left_q <= kRounding) reach(after, root, g, parent);
+    if (k + 1 < first + count && right_q >= -kRounding && left_q <= kRounding)
+      reach(after, root, g, parent);
     if (left_p >= 0 && k != first) break;
-    // From a root on the edge that it enters by, or at a corner in line with its neighbours, the cone is half a turn wide:
-    // the end of the last edge lies on the line of its right side, or by rounding beyond.
+    // From a root on the edge that it enters by, or at a corner in line with its neighbours, the cone is
+    // half a turn wide: the end of the last edge lies on the line of its right side, or by rounding
+    // beyond.
     if (right_q > 0 || (wide && right_p > 0 && k + 1 == first + count)) {
       const Flat r = right_p >= 0 ? p : p + (q - p) * (right_p / (right_p - right_q));
       const Flat l = left_q <= 0 ? q : p + (q - p) * (left_p / (left_p - left_q));
@@ -258,7 +262,8 @@ void GeodesicSearch::spread_window(std::uint32_t node) {
   const std::uint32_t face = mesh_->edges[n.edge].face;
   const UnfoldedMesh::Face& f = mesh_->faces[face];
   // Seen from outside the face its edge runs from left to right, and the other edges from right to left.
-  spread(face, n.edge - f.first + 1, f.count - 1, n.root, {n.right - n.root, n.left - n.root}, n.g, node);
+  spread(face, n.edge - f.first + 1, f.count - 1, n.root, {n.right - n.root, n.left - n.root}, n.g,
+         node);
 }
 
 void GeodesicSearch::spread_vertex(std::uint32_t node) {
@@ -268,7 +273,8 @@ void GeodesicSearch::spread_vertex(std::uint32_t node) {
   const UnfoldedMesh::Vertex& v = mesh_->vertices[e.vertex];
   const Flat along = mesh_->edges[mesh_->next(n.edge)].at - e.at, back = n.root - e.at;
   const double in = e.angle + std::atan2(cross(along, back), dot(along, back));
-  // A path is straight or bends around the vertex: half a turn or more of surface on both sides of it, or a wall.
+  // A path is straight or bends around the vertex: half a turn or more of surface on both sides of it,
+  // or a wall.
   if (every_vertex_) {
     leave_vertex(e.vertex, n.g, node, 0, v.total);
   } else if (v.closed) {
@@ -279,7 +285,8 @@ void GeodesicSearch::spread_vertex(std::uint32_t node) {
   }
 }
 
-void GeodesicSearch::leave_vertex(std::uint32_t vertex, double g, std::uint32_t parent, double low, double high) {
+void GeodesicSearch::leave_vertex(std::uint32_t vertex, double g, std::uint32_t parent, double low,
+                                  double high) {
   const UnfoldedMesh::Vertex& v = mesh_->vertices[vertex];
   // Of a closed fan the range may go past its seam.
   for (const double seam : {-v.total, 0.0, v.total}) {
@@ -288,7 +295,8 @@ void GeodesicSearch::leave_vertex(std::uint32_t vertex, double g, std::uint32_t 
       const std::uint32_t edge = mesh_->fans[v.first + i];
       const UnfoldedMesh::Edge& e = mesh_->edges[edge];
       const double from = e.angle + seam;
-      const double to = seam + (i + 1 < v.count ? mesh_->edges[mesh_->fans[v.first + i + 1]].angle : v.total);
+      const double to =
+          seam + (i + 1 < v.count ? mesh_->edges[mesh_->fans[v.first + i + 1]].angle : v.total);
       if (!(low < to && high > from)) continue;
       const UnfoldedMesh::Face& f = mesh_->faces[e.face];
       const std::uint32_t after = mesh_->next(edge), before = mesh_->previous(edge);

@@ -43,9 +43,9 @@ class GeodesicSearch {
 
   /// A window on `edge` (of the face it opens into), or the event that vertex of `edge` is reached.
   struct Node {
-    Flat root;           ///< what sees the window, in the face's plane
-    Flat right, left;    ///< ends of the window
-    double g = 0;        ///< distance of the root; of the vertex itself in an event
+    Flat root;         ///< what sees the window, in the face's plane
+    Flat right, left;  ///< ends of the window
+    double g = 0;      ///< distance of the root; of the vertex itself in an event
     std::uint32_t edge = 0;
     std::uint32_t parent = kNone;
     bool is_vertex = false;
@@ -53,10 +53,11 @@ class GeodesicSearch {
 
   static constexpr double kFar = std::numeric_limits<double>::infinity();
 
-  /// Distance between two sites, infinity where the search cannot reach the goal within less than `bound`.
+  /// Distance between two sites, infinity where the search cannot reach the goal within less than
+  /// `bound`.
   double run(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar);
-  /// The same led by landmarks. What is not proven shorter than (1 + `slack`) times as long as the best is
-  /// searched; the rest leaves `least()`, which no way is shorter than.
+  /// The same led by landmarks. What is not proven shorter than (1 + `slack`) times as long as the best
+  /// is searched; the rest leaves `least()`, which no way is shorter than.
   double run_led(const UnfoldedMesh& mesh, const Site& start, const Site& goal, const LandmarkLead& lead,
                  double bound = kFar, double slack = 0);
   double least() const noexcept {
@@ -65,13 +66,13 @@ class GeodesicSearch {
   /// The same over paths that do not bend; what `views` rules out is not looked at.
   double run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar,
                       const GoalBound* least = nullptr, const FaceViews* views = nullptr);
-  /// Corners of the last run's path from start to goal; between them points where the surface leaves the straight
-  /// line by more than a centimetre.
+  /// Corners of the last run's path from start to goal; between them points where the surface leaves the
+  /// straight line by more than a centimetre.
   std::vector<Vec3d> path() const;
   /// Spreads over everything that can be reached from `starts`.
   void flood(const UnfoldedMesh& mesh, const std::vector<Site>& starts);
-  /// Spreads straight ways from a vertex: nodes() are the windows, and turning vertices as they were reached. Returns
-  /// how many of them come first in whose directions a path that bends there may leave.
+  /// Spreads straight ways from a vertex: nodes() are the windows, and turning vertices as they were
+  /// reached. Returns how many of them come first in whose directions a path that bends there may leave.
   std::size_t look_around(const UnfoldedMesh& mesh, std::uint32_t vertex);
 
   const std::vector<Node>& nodes() const noexcept { return nodes_; }
@@ -125,7 +126,8 @@ class GeodesicSearch {
 
 /// Shortest way from the window's root through it to a point at `along` the edge from its right end and
 /// `beyond` it (its mirror image where it lies on this side): a lower bound wherever that point is.
-double length_through(const Flat& root, const Flat& right, const Flat& left, double along, double beyond) noexcept;
+double length_through(const Flat& root, const Flat& right, const Flat& left, double along,
+                      double beyond) noexcept;
 
 /// A search to use until the thread's next one.
 GeodesicSearch& thread_search();

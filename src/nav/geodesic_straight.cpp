@@ -15,8 +15,8 @@ constexpr double kRounding = 1e-9;  // radians
 
 }  // namespace
 
-double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound,
-                                    const GoalBound* least, const FaceViews* views) {
+double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal,
+                                    double bound, const GoalBound* least, const FaceViews* views) {
   start_ = start;
   goal_ = goal;
   has_goal_ = straight_ = true;
@@ -61,7 +61,8 @@ std::size_t GeodesicSearch::look_around(const UnfoldedMesh& mesh, std::uint32_t 
   return bending;
 }
 
-void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, Flat right, Flat left, std::uint32_t parent) {
+void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, Flat right, Flat left,
+                                   std::uint32_t parent) {
   const UnfoldedMesh::Edge &here = mesh_->edges[edge], &there = mesh_->edges[here.twin],
                            &after = mesh_->edges[mesh_->next(edge)];
   if (views_ != nullptr) {
@@ -72,13 +73,14 @@ void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, Flat ri
     const auto along = [&](const Flat& p) { return dot(p - here.at, side) * inverse; };
     const double right_was = along(right), left_was = along(left);
     double r = right_was, l = left_was;
-    if (!FaceViews::narrow(range, along(root), max(cross(side, root - here.at) * inverse, 0.0), r, l)) return;
+    if (!FaceViews::narrow(range, along(root), max(cross(side, root - here.at) * inverse, 0.0), r, l))
+      return;
     if (r > right_was) right = here.at + side * r;
     if (l < left_was) left = here.at + side * l;
   }
   const double to_right = length(right - root), to_left = length(left - root);
-  // Where there are many: moving off a corner, what is left may shrink by as much, the way there grows by less, so that
-  // the far end is the least.
+  // Where there are many: moving off a corner, what is left may shrink by as much, the way there grows
+  // by less, so that the far end is the least.
   constexpr std::size_t kMany = 24;
   if (least_ != nullptr && nodes_.size() > kMany) {
     if (to_left + least_->from(here.vertex) - length(left - here.at) >= best_ ||
@@ -96,7 +98,8 @@ void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, Flat ri
   const double width = length(e);
   if (there.face == goal_.face) {
     const Flat to = goal_.at - n.right, along = n.left - n.right;
-    const double f = length_through(n.root, n.right, n.left, dot(to, along) / width, std::abs(cross(along, to)) / width);
+    const double f = length_through(n.root, n.right, n.left, dot(to, along) / width,
+                                    std::abs(cross(along, to)) / width);
     if (f >= best_) return;
     nodes_.push_back(n);
     offer_goal(f, static_cast<std::uint32_t>(nodes_.size() - 1));

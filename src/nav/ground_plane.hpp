@@ -9,7 +9,8 @@
 
 namespace gsnav::detail {
 
-/// Twice the area of a triangle on the ground plane, positive where its corners run counter-clockwise in (x, z).
+/// Twice the area of a triangle on the ground plane, positive where its corners run counter-clockwise in
+/// (x, z).
 inline double area_xz(const Vec3d& a, const Vec3d& b, const Vec3d& c) noexcept {
   return (b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z);
 }

@@ -33,7 +33,7 @@ struct HalfPlane {
 /// where they leave nothing. One after the other: a half plane that the point so far misses has the new
 /// one on its line.
 inline std::optional<Ground> nearest_in(std::span<const HalfPlane> planes, const Ground& wanted,
-                                      double limit, double slack = 0.0) noexcept {
+                                        double limit, double slack = 0.0) noexcept {
   constexpr double kRounding = 1e-12;
   const auto offset = [&](const HalfPlane& h) { return h.offset - (h.soft ? slack : 0.0); };
   const double speed = length(wanted);

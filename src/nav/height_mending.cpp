@@ -26,7 +26,8 @@ class Places {
   Places(std::span<const Vec3d> points, std::span<const Triangle> triangles) : points_(points) {
     first_.reserve(3 * triangles.size());
     for (const Triangle& t : triangles) first_.insert(first_.end(), t.begin(), t.end());
-    std::sort(first_.begin(), first_.end(), [&](std::uint32_t a, std::uint32_t b) { return before(a, b); });
+    std::sort(first_.begin(), first_.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return before(a, b); });
     const auto same = [&](std::uint32_t a, std::uint32_t b) { return !before(a, b); };
     first_.erase(std::unique(first_.begin(), first_.end(), same), first_.end());
   }
@@ -46,11 +47,14 @@ class Places {
   std::vector<std::uint32_t> first_;  ///< a point of each place
 };
 
-/// True where triangles of `points` cover the polygon once: each side of one is another's or lies on the polygon's.
-bool cover_once(std::span<const Vec3d> corners, std::span<const Vec3d> points, std::span<const Triangle> triangles) {
+/// True where triangles of `points` cover the polygon once: each side of one is another's or lies on the
+/// polygon's.
+bool cover_once(std::span<const Vec3d> corners, std::span<const Vec3d> points,
+                std::span<const Triangle> triangles) {
   using Side = std::pair<std::uint16_t, std::uint16_t>;  // a polygon has at most 255 triangles
   double covered = 0, whole = 0;
-  for (std::size_t k = 1; k + 1 < corners.size(); ++k) whole += area_xz(corners[0], corners[k], corners[k + 1]);
+  for (std::size_t k = 1; k + 1 < corners.size(); ++k)
+    whole += area_xz(corners[0], corners[k], corners[k + 1]);
   for (const Triangle& t : triangles) {
     const double area = std::abs(area_xz(points[t[0]], points[t[1]], points[t[2]]));
     if (!(area > kSliver)) return false;
@@ -147,7 +151,8 @@ class Delaunay {
   }
   /// Whether d lies in the circle of a, b and c.
   static bool in_circle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) noexcept {
-    const double ax = a.x - d.x, az = a.z - d.z, bx = b.x - d.x, bz = b.z - d.z, cx = c.x - d.x, cz = c.z - d.z;
+    const double ax = a.x - d.x, az = a.z - d.z, bx = b.x - d.x, bz = b.z - d.z, cx = c.x - d.x,
+                 cz = c.z - d.z;
     const double aa = ax * ax + az * az, bb = bx * bx + bz * bz, cc = cx * cx + cz * cz;
     const double det = ax * (bz * cc - cz * bb) - az * (bx * cc - cx * bb) + aa * (bx * cz - cx * bz);
     return det > 1e-9 * max(aa, max(bb, cc)) * max(aa, max(bb, cc));
@@ -164,8 +169,8 @@ class Delaunay {
       if (!(area_xz(a, d, c) > kSliver && area_xz(d, b, c) > kSliver)) continue;
       const bool flat = min(area_xz(a, b, c), area_xz(b, a, d)) <= kSliver;
       if (!flat && !in_circle(a, b, c, d)) continue;
-      const std::uint32_t ia = triangles_[t][e], ib = triangles_[t][(e + 1) % 3], ic = triangles_[t][(e + 2) % 3],
-                          id = triangles_[u][(f + 2) % 3];
+      const std::uint32_t ia = triangles_[t][e], ib = triangles_[t][(e + 1) % 3],
+                          ic = triangles_[t][(e + 2) % 3], id = triangles_[u][(f + 2) % 3];
       triangles_[t] = {ic, ia, id};
       triangles_[u] = {ic, id, ib};
       for (const std::size_t k : {std::size_t{0}, std::size_t{1}, std::size_t{2}}) {
@@ -179,14 +184,16 @@ class Delaunay {
   std::vector<Triangle> triangles_;
 };
 
-/// New triangles of a polygon, empty where they would not do. Corners that no height triangle had get their places in
-/// `added`, which will follow the mesh's points.
-std::vector<Triangle> triangulated(const PolyMesh& mesh, const PolyMesh::Poly& poly, std::vector<Vec3d>& added) {
+/// New triangles of a polygon, empty where they would not do. Corners that no height triangle had get
+/// their places in `added`, which will follow the mesh's points.
+std::vector<Triangle> triangulated(const PolyMesh& mesh, const PolyMesh::Poly& poly,
+                                   std::vector<Vec3d>& added) {
   const std::span<const Vec3d> corners = std::span(mesh.corners).subspan(poly.first, poly.count);
   const std::span<const Triangle> old = std::span(mesh.tris).subspan(poly.tri_first, poly.tri_count);
   std::vector<Vec3d> strict, rest;
   for (std::size_t k = 0; k < corners.size(); ++k) {
-    const Vec3d &before = strict.empty() ? corners.back() : strict.back(), &after = corners[(k + 1) % corners.size()];
+    const Vec3d &before = strict.empty() ? corners.back() : strict.back(),
+                &after = corners[(k + 1) % corners.size()];
     const bool straight = along_xz(before, after, corners[k]).second < kOnLine;
     (straight ? rest : strict).push_back(corners[k]);
   }
@@ -216,7 +223,8 @@ std::vector<Triangle> triangulated(const PolyMesh& mesh, const PolyMesh::Poly& p
   }
   for (const std::uint32_t point : inner) add(point);
   std::vector<Triangle> made = fresh.triangles();
-  if (made.size() > old.size() + old.size() / 4 + 4 || !cover_once(corners, fresh.points(), made)) return {};
+  if (made.size() > old.size() + old.size() / 4 + 4 || !cover_once(corners, fresh.points(), made))
+    return {};
 
   std::vector<std::uint32_t> corner_names(own, kNew);
   for (std::size_t k = 0; k < own; ++k) {

@@ -97,7 +97,8 @@ SurfaceWalk NavMesh::walk(const NavPoint& start, const Vec3d& displacement, bool
     if (!snapped) return out;
     from = *snapped;
   }
-  impl_->polys.walk(from.poly, from.position - impl_->origin, displacement.x, displacement.z, slide, out);
+  impl_->polys.walk(from.poly, from.position - impl_->origin, displacement.x, displacement.z, slide,
+                    out);
   for (WalkPoint& p : out.points) p.position += impl_->origin;
   return out;
 }

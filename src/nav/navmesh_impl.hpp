@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/nav/navmesh.hpp"
 #include "corner_hubs.hpp"
 #include "face_views.hpp"
 #include "geodesic_search.hpp"
+#include "gsnav/nav/navmesh.hpp"
 #include "landmarks.hpp"
 #include "poly_mesh.hpp"
 
@@ -37,7 +37,8 @@ struct NavMesh::Impl {
   Vec3d origin{};  ///< world position of the mesh's own zero
   detail::NavMeshPtr mesh;
   detail::PolyMesh polys;
-  /// Made when first asked for, so that a file takes no more memory than its queries need; shared with geodesic fields.
+  /// Made when first asked for, so that a file takes no more memory than its queries need; shared with
+  /// geodesic fields.
   const detail::UnfoldedMesh& unfolded() const {
     const detail::UnfoldedMesh* made = unfolded_mesh.load(std::memory_order_acquire);
     return made != nullptr ? *made : *share_unfolded();
@@ -78,16 +79,17 @@ struct NavMesh::Impl {
   mutable std::atomic<const detail::CornerHubs*> corner_hubs{nullptr};
   mutable detail::FaceViews made_views;
   mutable detail::Landmarks made_landmarks;
-  Aabb<double> bounds;  ///< world
-  std::vector<dtPolyRef> refs;      ///< Detour's name of each polygon
-  std::vector<PolyId> first_poly;   ///< of each of Detour's tiles
+  Aabb<double> bounds;                     ///< world
+  std::vector<dtPolyRef> refs;             ///< Detour's name of each polygon
+  std::vector<PolyId> first_poly;          ///< of each of Detour's tiles
   std::vector<std::uint32_t> first_point;  ///< the same, of `polys.points`
 
   detail::Site site(const NavPoint& p) const noexcept;
   /// Length of the shortest path; infinity where there is none.
   double distance(const detail::Site& start, const detail::Site& goal) const;
   /// The same to an error.
-  BoundedDistance distance(const detail::Site& start, const detail::Site& goal, double relative_error) const;
+  BoundedDistance distance(const detail::Site& start, const detail::Site& goal,
+                           double relative_error) const;
   /// The shortest path, relative to the mesh's origin; no points where there is none.
   NavPath path(const detail::Site& start, const detail::Site& goal) const;
 

@@ -35,7 +35,8 @@ detail::Site NavMesh::Impl::site(const NavPoint& p) const noexcept {
   local.y = polys.height(p.poly, local);
   face = m.face_at(p.poly, local);
   const detail::Flat at = m.flat(m.faces[face], local);
-  // What lies outside its face, be it by a micrometre, sees the edge there from behind and would not pass it.
+  // What lies outside its face, be it by a micrometre, sees the edge there from behind and would not
+  // pass it.
   const bool whole = polys.polys[p.poly].planar && m.first_face[p.poly + 1] - m.first_face[p.poly] == 1;
   return {face, whole ? at : m.clamped(face, at), local};
 }
@@ -51,7 +52,8 @@ double NavMesh::Impl::distance(const detail::Site& start, const detail::Site& go
   }
   const detail::CornerHubs::Way way = hubs().shortest(start, goal);
   const detail::CornerHubs::LeastToGoal least(hubs(), way);
-  const double d = min(way.length, search.run_straight(unfolded(), start, goal, way.length, &least, &views()));
+  const double d =
+      min(way.length, search.run_straight(unfolded(), start, goal, way.length, &least, &views()));
   return d < kInfinity ? d : search.run(unfolded(), start, goal);
 }
 
@@ -135,9 +137,9 @@ Result<BoundedDistance> NavMesh::distance_between(const NavPoint& start, const N
 Result<NavPath> NavMesh::path_between(const NavPoint& start, const NavPoint& goal) const {
   for (const auto& [name, p] : {std::pair{"start", &start}, std::pair{"goal", &goal}}) {
     if (p->poly >= polygon_count() || !is_finite(p->position)) {
-      return Status(Errc::invalid_argument, std::string("no path: the ") + name + " " + text(p->position) +
-                                                " has polygon " + std::to_string(p->poly) + " of " +
-                                                std::to_string(polygon_count()));
+      return Status(Errc::invalid_argument,
+                    std::string("no path: the ") + name + " " + text(p->position) + " has polygon " +
+                        std::to_string(p->poly) + " of " + std::to_string(polygon_count()));
     }
   }
   const std::size_t ia = island_of(start.poly), ib = island_of(goal.poly);
@@ -153,7 +155,8 @@ Result<NavPath> NavMesh::path_between(const NavPoint& start, const NavPoint& goa
   return path;
 }
 
-PathStatus NavMesh::path_status(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const noexcept {
+PathStatus NavMesh::path_status(const Vec3d& start, const Vec3d& goal,
+                                const SnapOptions& options) const noexcept {
   if (!is_finite(start) || !is_finite(goal)) return PathStatus::not_finite;
   const auto a = snap_point(start, options);
   if (!a) return PathStatus::start_off_mesh;
@@ -162,7 +165,8 @@ PathStatus NavMesh::path_status(const Vec3d& start, const Vec3d& goal, const Sna
   return island_of(a->poly) == island_of(b->poly) ? PathStatus::reachable : PathStatus::other_island;
 }
 
-Result<NavPath> NavMesh::find_path(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const {
+Result<NavPath> NavMesh::find_path(const Vec3d& start, const Vec3d& goal,
+                                   const SnapOptions& options) const {
   const auto a = snap_point(start, options);
   if (!a) return off_mesh("start", start);
   const auto b = snap_point(goal, options);
@@ -170,7 +174,8 @@ Result<NavPath> NavMesh::find_path(const Vec3d& start, const Vec3d& goal, const 
   return path_between(*a, *b);
 }
 
-double NavMesh::geodesic_distance(const Vec3d& start, const Vec3d& goal, const SnapOptions& options) const {
+double NavMesh::geodesic_distance(const Vec3d& start, const Vec3d& goal,
+                                  const SnapOptions& options) const {
   return geodesic_distance(start, std::span(&goal, 1), options);
 }
 

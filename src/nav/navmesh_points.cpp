@@ -87,24 +87,27 @@ Vec3d inward(const Vec3d& a, const Vec3d& b) noexcept {
 
 std::optional<ObstacleHit> closest_wall(const NavMesh::Impl& impl, const NavPoint& start,
                                         double max_radius) {
-  constexpr double kSame = 1e-9;  // metres: where edges meet they are as near as one another but for rounding
+  constexpr double kSame =
+      1e-9;  // metres: where edges meet they are as near as one another but for rounding
   std::optional<ObstacleHit> hit;
   const Vec3d c = start.position - impl.origin;
   double radius = max_radius, faces = 0;
-  each_wall(impl.polys, start.poly, c, radius, [&](double d, const Vec3d& a, const Vec3d& b, const Vec3d& nearest) {
-    const Vec3d normal = inward(a, b);
-    const double facing = dot(c - nearest, normal);
-    if (hit && d > hit->distance - kSame) {
-      hit->distance = min(d, hit->distance);
-      if (facing <= faces) return;  // the edge that turns more towards the point stands for the corner
-    } else {
-      hit.emplace().distance = d;
-      radius = min(max_radius, d + kSame);
-    }
-    hit->position = nearest + impl.origin;
-    hit->normal = normal;
-    faces = facing;
-  });
+  each_wall(impl.polys, start.poly, c, radius,
+            [&](double d, const Vec3d& a, const Vec3d& b, const Vec3d& nearest) {
+              const Vec3d normal = inward(a, b);
+              const double facing = dot(c - nearest, normal);
+              if (hit && d > hit->distance - kSame) {
+                hit->distance = min(d, hit->distance);
+                if (facing <= faces)
+                  return;  // the edge that turns more towards the point stands for the corner
+              } else {
+                hit.emplace().distance = d;
+                radius = min(max_radius, d + kSame);
+              }
+              hit->position = nearest + impl.origin;
+              hit->normal = normal;
+              faces = facing;
+            });
   return hit;
 }
 

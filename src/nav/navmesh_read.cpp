@@ -23,7 +23,9 @@ struct Where {
   Status bad(const char* field, T value, const std::string& why) const {
     return bad(std::string(field) + " = " + std::to_string(value) + " " + why);
   }
-  Where in(const char* part, std::size_t i) const { return {text + ": " + part + " " + std::to_string(i)}; }
+  Where in(const char* part, std::size_t i) const {
+    return {text + ": " + part + " " + std::to_string(i)};
+  }
 };
 
 template <class T>
@@ -33,23 +35,28 @@ T load(const std::byte* p) noexcept {
   return v;
 }
 
-bool usable(float v) noexcept { return std::abs(static_cast<double>(v)) <= kMaxCoordinate; }  // false for NaN
+bool usable(float v) noexcept {
+  return std::abs(static_cast<double>(v)) <= kMaxCoordinate;
+}  // false for NaN
 
 /// The fields of dtMeshHeader and where its arrays start.
 struct TileLayout {
-  static constexpr const char* kCountNames[] = {"polyCount",      "vertCount",       "maxLinkCount",
+  static constexpr const char* kCountNames[] = {"polyCount",       "vertCount",       "maxLinkCount",
                                                 "detailMeshCount", "detailVertCount", "detailTriCount",
                                                 "bvNodeCount",     "offMeshConCount"};
   std::int32_t polys, verts, links, details, detail_verts, detail_tris, bv_nodes, off_mesh, ground;
   std::size_t at_verts, at_polys, at_details, at_detail_verts, at_detail_tris, at_bv;
 };
 
-Result<TileLayout> read_layout(std::span<const std::byte> tile, std::size_t link_size, const Where& where) {
+Result<TileLayout> read_layout(std::span<const std::byte> tile, std::size_t link_size,
+                               const Where& where) {
   if (tile.size() < kTileHeader) return where.bad("dataSize", tile.size(), "is less than a tile header");
   const std::byte* p = tile.data();
-  if (load<std::int32_t>(p) != DT_NAVMESH_MAGIC) return where.bad("magic", load<std::int32_t>(p), "is not DNAV");
+  if (load<std::int32_t>(p) != DT_NAVMESH_MAGIC)
+    return where.bad("magic", load<std::int32_t>(p), "is not DNAV");
   if (load<std::int32_t>(p + 4) != DT_NAVMESH_VERSION) {
-    return Status(Errc::unsupported, where.text + ": version = " + std::to_string(load<std::int32_t>(p + 4)) +
+    return Status(Errc::unsupported, where.text +
+                                         ": version = " + std::to_string(load<std::int32_t>(p + 4)) +
                                          ", only " + std::to_string(DT_NAVMESH_VERSION) + " is known");
   }
   for (const std::size_t k : {8u, 12u, 16u}) {
@@ -59,7 +66,8 @@ Result<TileLayout> read_layout(std::span<const std::byte> tile, std::size_t link
     }
   }
   for (std::size_t k = 60; k < kTileHeader; k += 4) {
-    if (!usable(load<float>(p + k))) return where.bad("header float", (k - 60) / 4, "is not finite or too large");
+    if (!usable(load<float>(p + k)))
+      return where.bad("header float", (k - 60) / 4, "is not finite or too large");
   }
   std::int32_t count[8];
   const std::size_t sizes[8] = {kPoly, 12, link_size, kPolyDetail, 12, 4, kBvNode, kOffMesh};
@@ -75,11 +83,13 @@ Result<TileLayout> read_layout(std::span<const std::byte> tile, std::size_t link
   if (total > tile.size()) {
     return where.bad("dataSize", tile.size(), "is less than its counts need, " + std::to_string(total));
   }
-  TileLayout t{count[0], count[1], count[2], count[3], count[4], count[5], count[6], count[7], 0, 0, 0, 0, 0, 0, 0};
+  TileLayout t{count[0], count[1], count[2], count[3], count[4], count[5], count[6], count[7],
+               0,        0,        0,        0,        0,        0,        0};
   t.ground = t.polys - t.off_mesh;
   if (t.ground < 0) return where.bad("offMeshConCount", t.off_mesh, "is more than polyCount");
   if (t.polys > 0 && t.links == 0) return where.bad("maxLinkCount", t.links, "is not positive");
-  if (t.details != t.ground) return where.bad("detailMeshCount", t.details, "is not the count of ground polygons");
+  if (t.details != t.ground)
+    return where.bad("detailMeshCount", t.details, "is not the count of ground polygons");
   const auto bytes = [](std::int32_t n, std::size_t size) { return static_cast<std::size_t>(n) * size; };
   t.at_verts = kTileHeader;
   t.at_polys = t.at_verts + bytes(t.verts, 12);
@@ -91,7 +101,9 @@ Result<TileLayout> read_layout(std::span<const std::byte> tile, std::size_t link
 }
 
 Status check_poly(const std::byte* tile, const TileLayout& t, std::int32_t i, const Where& where) {
-  const auto poly = [&](std::int32_t k) { return tile + t.at_polys + static_cast<std::size_t>(k) * kPoly; };
+  const auto poly = [&](std::int32_t k) {
+    return tile + t.at_polys + static_cast<std::size_t>(k) * kPoly;
+  };
   const auto corners = [&](const std::byte* q) { return static_cast<std::size_t>(q[30]); };
   const std::byte* p = poly(i);
   const std::size_t n = corners(p);
@@ -104,7 +116,8 @@ Status check_poly(const std::byte* tile, const TileLayout& t, std::int32_t i, co
     if (v >= t.verts) return where.bad("vertex", v, "of " + std::to_string(t.verts));
     const auto nei = load<std::uint16_t>(p + 16 + 2 * k);
     if (nei == 0 || (nei & DT_EXT_LINK) != 0) continue;
-    if (nei > t.ground || nei == i + 1) return where.bad("neighbour", nei, "of " + std::to_string(t.ground));
+    if (nei > t.ground || nei == i + 1)
+      return where.bad("neighbour", nei, "of " + std::to_string(t.ground));
     const std::byte* q = poly(nei - 1);
     bool back = false;
     for (std::size_t m = 0; m < corners(q) && m < DT_VERTS_PER_POLYGON; ++m) {
@@ -116,25 +129,30 @@ Status check_poly(const std::byte* tile, const TileLayout& t, std::int32_t i, co
   const auto vert_base = load<std::uint32_t>(d), tri_base = load<std::uint32_t>(d + 4);
   const auto vert_count = static_cast<unsigned>(d[8]), tri_count = static_cast<unsigned>(d[9]);
   if (std::uint64_t{vert_base} + vert_count > static_cast<std::uint64_t>(t.detail_verts)) {
-    return where.bad("detail vertBase", vert_base, "+ " + std::to_string(vert_count) + " is past detailVertCount");
+    return where.bad("detail vertBase", vert_base,
+                     "+ " + std::to_string(vert_count) + " is past detailVertCount");
   }
   if (std::uint64_t{tri_base} + tri_count > static_cast<std::uint64_t>(t.detail_tris)) {
-    return where.bad("detail triBase", tri_base, "+ " + std::to_string(tri_count) + " is past detailTriCount");
+    return where.bad("detail triBase", tri_base,
+                     "+ " + std::to_string(tri_count) + " is past detailTriCount");
   }
   for (unsigned k = 0; k < 3 * tri_count; ++k) {
     const std::size_t at = t.at_detail_tris + 4 * (tri_base + std::size_t{k / 3}) + k % 3;
     const auto v = static_cast<unsigned>(tile[at]);
-    if (v >= n + vert_count) return where.bad("detail triangle's vertex", v, "of " + std::to_string(n + vert_count));
+    if (v >= n + vert_count)
+      return where.bad("detail triangle's vertex", v, "of " + std::to_string(n + vert_count));
   }
   return {};
 }
 
 Status check_tile(std::span<const std::byte> tile, const TileLayout& t, const Where& where) {
-  for (const auto& [name, at, count] : {std::tuple{"vertex", t.at_verts, t.verts},
-                                        std::tuple{"detail vertex", t.at_detail_verts, t.detail_verts}}) {
+  for (const auto& [name, at, count] :
+       {std::tuple{"vertex", t.at_verts, t.verts},
+        std::tuple{"detail vertex", t.at_detail_verts, t.detail_verts}}) {
     for (std::size_t k = 0; k < 3 * static_cast<std::size_t>(count); ++k) {
       if (!usable(load<float>(tile.data() + at + 4 * k))) {
-        return where.bad(std::string(name) + " " + std::to_string(k / 3) + " is not finite or beyond 1000 km");
+        return where.bad(std::string(name) + " " + std::to_string(k / 3) +
+                         " is not finite or beyond 1000 km");
       }
     }
   }
@@ -156,16 +174,19 @@ Status check_tile(std::span<const std::byte> tile, const TileLayout& t, const Wh
                      "is less than the polygons have, " + std::to_string(detail_tris));
   }
   for (std::int32_t i = 0; i < t.bv_nodes; ++i) {
-    const auto v = load<std::int32_t>(tile.data() + t.at_bv + static_cast<std::size_t>(i) * kBvNode + 12);
+    const auto v =
+        load<std::int32_t>(tile.data() + t.at_bv + static_cast<std::size_t>(i) * kBvNode + 12);
     // A leaf names a polygon, a branch how many nodes to skip.
     if (v >= 0 ? v >= t.ground : v < -(t.bv_nodes - i)) {
-      return where.in("bvNode", static_cast<std::size_t>(i)).bad("i", v, "leaves the tree or the polygons");
+      return where.in("bvNode", static_cast<std::size_t>(i))
+          .bad("i", v, "leaves the tree or the polygons");
     }
   }
   return {};
 }
 
-/// The tile as Detour wants it in memory: 32-bit links, which it fills itself, and no off-mesh connections.
+/// The tile as Detour wants it in memory: 32-bit links, which it fills itself, and no off-mesh
+/// connections.
 DetourBytes copy_tile(std::span<const std::byte> tile, const TileLayout& t, int& size) {
   const auto bytes = [](std::int32_t n, std::size_t each) { return static_cast<std::size_t>(n) * each; };
   const std::size_t polys = bytes(t.ground, kPoly), links = bytes(t.links, kLink);
@@ -178,8 +199,8 @@ DetourBytes copy_tile(std::span<const std::byte> tile, const TileLayout& t, int&
   std::memcpy(out.get() + t.at_polys + polys + links, tile.data() + t.at_details, rest);
   const std::int32_t none = 0;
   std::memcpy(out.get() + 24, &t.ground, 4);
-  std::memcpy(out.get() + 52, &none, 4);       // offMeshConCount
-  std::memcpy(out.get() + 56, &t.ground, 4);   // offMeshBase
+  std::memcpy(out.get() + 52, &none, 4);      // offMeshConCount
+  std::memcpy(out.get() + 56, &t.ground, 4);  // offMeshBase
   size = static_cast<int>(total);
   return out;
 }
@@ -221,26 +242,31 @@ struct Tile {
 Result<NavMesh> parse(std::span<const std::byte> file, const Where& where) {
   if (file.size() < kSetHeader) return where.bad("size", file.size(), "is less than a header");
   const std::byte* p = file.data();
-  if (load<std::int32_t>(p) != kSetMagic) return where.bad("magic", load<std::int32_t>(p), "is not MSET");
+  if (load<std::int32_t>(p) != kSetMagic)
+    return where.bad("magic", load<std::int32_t>(p), "is not MSET");
   const auto version = load<std::int32_t>(p + 4), count = load<std::int32_t>(p + 8);
   if (version != 1 && version != 2) {
-    return Status(Errc::unsupported, where.text + ": version = " + std::to_string(version) + " is not 1 or 2");
+    return Status(Errc::unsupported,
+                  where.text + ": version = " + std::to_string(version) + " is not 1 or 2");
   }
   NavMeshSettings settings;
   std::size_t at = kSetHeader;
   if (version == 2) {
-    if (file.size() < at + kSetSettings) return where.bad("size", file.size(), "ends within the settings");
+    if (file.size() < at + kSetSettings)
+      return where.bad("size", file.size(), "ends within the settings");
     if (const Status s = read_settings(p + at, where, settings); !s.ok()) return s;
     at += kSetSettings;
   }
   if (count < 0 || static_cast<std::uint64_t>(count) > (file.size() - at) / kTileHeader) {
-    return where.bad("numTiles", count, "does not fit a file of " + std::to_string(file.size()) + " bytes");
+    return where.bad("numTiles", count,
+                     "does not fit a file of " + std::to_string(file.size()) + " bytes");
   }
   dtNavMeshParams params{};
   std::memcpy(params.orig, p + 12, 12);
   params.tileWidth = load<float>(p + 24);
   params.tileHeight = load<float>(p + 28);
-  for (const float v : {params.orig[0], params.orig[1], params.orig[2], params.tileWidth, params.tileHeight}) {
+  for (const float v :
+       {params.orig[0], params.orig[1], params.orig[2], params.tileWidth, params.tileHeight}) {
     if (!usable(v)) return where.bad("params are not finite or too large");
   }
 
@@ -278,8 +304,8 @@ Result<NavMesh> parse(std::span<const std::byte> file, const Where& where) {
   NavMeshPtr mesh(dtAllocNavMesh());
   if (mesh == nullptr) return Status(Errc::out_of_memory, where.text + ": not enough memory");
   if (dtStatusFailed(mesh->init(&params))) {
-    return Status(Errc::unsupported, where.text + ": " + std::to_string(tiles.size()) + " tiles of up to " +
-                                         std::to_string(params.maxPolys) +
+    return Status(Errc::unsupported, where.text + ": " + std::to_string(tiles.size()) +
+                                         " tiles of up to " + std::to_string(params.maxPolys) +
                                          " polygons are more than 32-bit references name");
   }
   for (std::size_t i = 0; i < tiles.size(); ++i) {

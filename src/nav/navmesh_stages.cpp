@@ -107,13 +107,15 @@ Status check_grid(const NavMeshSettings& settings, const Vec3d& low, const Vec3d
   };
   // Recast counts half cells of the agent's radius, and cells of free height, in 8 bits.
   if (const VoxelSettings v(settings); v.radius > 127) {
-    return Status(Errc::invalid_argument, "NavMeshSettings.agent_radius = " + std::to_string(settings.agent_radius) +
-                                              " is more than 127 cells of cell_size " + std::to_string(cs) +
-                                              "; raise cell_size");
+    return Status(Errc::invalid_argument,
+                  "NavMeshSettings.agent_radius = " + std::to_string(settings.agent_radius) +
+                      " is more than 127 cells of cell_size " + std::to_string(cs) +
+                      "; raise cell_size");
   } else if (v.height > 255) {
-    return Status(Errc::invalid_argument, "NavMeshSettings.agent_height = " + std::to_string(settings.agent_height) +
-                                              " is more than 255 cells of cell_height " + std::to_string(ch) +
-                                              "; raise cell_height");
+    return Status(Errc::invalid_argument,
+                  "NavMeshSettings.agent_height = " + std::to_string(settings.agent_height) +
+                      " is more than 255 cells of cell_height " + std::to_string(ch) +
+                      "; raise cell_height");
   }
   // Recast keeps vertices in 16 bits and spans in RC_SPAN_HEIGHT_BITS.
   const double most = settings.tile_size > 0 ? 1e9 : 65000;
@@ -202,7 +204,8 @@ Result<TilePolygons> build_polygons(RecastLog& log, const NavMeshSettings& s, rc
     return stage("building polygons", log);
   if (out.polys->npolys == 0) return out;
   out.heights.reset(rcAllocPolyMeshDetail());
-  // None: farther apart than any edge is long. (Recast reads an empty hull where the distance is 0: its issue 650.)
+  // None: farther apart than any edge is long. (Recast reads an empty hull where the distance is 0: its
+  // issue 650.)
   constexpr double kNoSamples = 1e9;
   const double sample = s.detail_sample_dist < 0.9 ? kNoSamples : s.detail_sample_dist * s.cell_size;
   if (!rcBuildPolyMeshDetail(&log, *out.polys, *compact, static_cast<float>(sample),

@@ -136,7 +136,8 @@ double floor_below(const TriangleHeights& heights, const NavMeshSettings& settin
 
 /// What a source of voxels may add to a build in tiles. Called from many threads.
 struct TileHooks {
-  /// Adds spans to a tile's field, whose first column is (x0, z0) of the box's cells (below 0 in the border).
+  /// Adds spans to a tile's field, whose first column is (x0, z0) of the box's cells (below 0 in the
+  /// border).
   std::function<Status(RecastLog&, int x0, int z0, rcHeightfield&)> fill;
   std::function<double(const Vec3d&)> height;  ///< as BuildHooks::height
   double least_area = 0;                       ///< islands below this are dropped, square metres

@@ -40,7 +40,8 @@ class Extractor {
       impl_.first_poly.push_back(static_cast<PolyId>(impl_.refs.size()));
       if (tile.header == nullptr) continue;
       const dtPolyRef base = mesh_.getPolyRefBase(&tile);
-      for (int i = 0; i < tile.header->polyCount; ++i) impl_.refs.push_back(base | static_cast<dtPolyRef>(i));
+      for (int i = 0; i < tile.header->polyCount; ++i)
+        impl_.refs.push_back(base | static_cast<dtPolyRef>(i));
     }
     reserve();
     std::vector<std::uint32_t> tile_of;
@@ -99,8 +100,9 @@ class Extractor {
       twice += a.x * b.z - b.x * a.z;
       if (p.neis[k] == 0 || (p.neis[k] & DT_EXT_LINK) == 0) {
         v.push_back(a);
-        n.push_back(p.neis[k] == 0 ? kNoPoly
-                                   : impl_.first_poly[static_cast<std::size_t>(tile_index)] + p.neis[k] - 1u);
+        n.push_back(p.neis[k] == 0
+                        ? kNoPoly
+                        : impl_.first_poly[static_cast<std::size_t>(tile_index)] + p.neis[k] - 1u);
         continue;
       }
       double at = 0;
@@ -130,7 +132,8 @@ class Extractor {
     poly.tri_first = static_cast<std::uint32_t>(out.tris.size());
     const dtPolyDetail& d = tile.detailMeshes[i];
     const std::uint32_t vertices = impl_.first_point.back();
-    const std::uint32_t samples = vertices + static_cast<std::uint32_t>(tile.header->vertCount) + d.vertBase;
+    const std::uint32_t samples =
+        vertices + static_cast<std::uint32_t>(tile.header->vertCount) + d.vertBase;
     for (unsigned t = 0; t < d.triCount; ++t) {
       const unsigned char* ids = &tile.detailTris[4 * (d.triBase + t)];
       PolyMesh::Corners tri;
@@ -168,9 +171,11 @@ class Extractor {
         const auto along = [&](const Vec3d& c) {
           return clamp(((c.x - a.x) * ex + (c.z - a.z) * ez) / len2, 0.0, 1.0);
         };
-        const Vec3d c = corner_of(*other, *q, other->links[m].edge), d = corner_of(*other, *q, other->links[m].edge + 1u);
+        const Vec3d c = corner_of(*other, *q, other->links[m].edge),
+                    d = corner_of(*other, *q, other->links[m].edge + 1u);
         const double s = along(c), e = along(d);
-        if (std::abs(e - s) * std::sqrt(len2) > kNarrow && within_climb(a, b, c, d, min(s, e), max(s, e))) {
+        if (std::abs(e - s) * std::sqrt(len2) > kNarrow &&
+            within_climb(a, b, c, d, min(s, e), max(s, e))) {
           out.push_back({min(s, e), max(s, e), impl_.id_of(tile.links[l].ref)});
         }
       }
@@ -182,12 +187,15 @@ class Extractor {
     return out;
   }
 
-  /// Whether edge c d of another tile is within a step of the agent from edge a b, between parts `from` and `to` of the
-  /// latter. Detour links what is within twice its climb, a shelf with the floor below it.
-  bool within_climb(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d, double from, double to) const {
+  /// Whether edge c d of another tile is within a step of the agent from edge a b, between parts `from`
+  /// and `to` of the latter. Detour links what is within twice its climb, a shelf with the floor below
+  /// it.
+  bool within_climb(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d, double from,
+                    double to) const {
     const NavMeshSettings& s = impl_.settings;
     const double most = (std::floor(s.agent_max_climb / s.cell_height + 1e-6) + 0.5) * s.cell_height;
-    const double ex = b.x - a.x, ez = b.z - a.z, cd2 = (d.x - c.x) * (d.x - c.x) + (d.z - c.z) * (d.z - c.z);
+    const double ex = b.x - a.x, ez = b.z - a.z,
+                 cd2 = (d.x - c.x) * (d.x - c.x) + (d.z - c.z) * (d.z - c.z);
     const auto rise = [&](double t) {
       const double x = a.x + t * ex - c.x, z = a.z + t * ez - c.z;
       const double u = cd2 > 0 ? clamp((x * (d.x - c.x) + z * (d.z - c.z)) / cd2, 0.0, 1.0) : 0.0;

@@ -22,7 +22,8 @@ void put_settings(OutputFile& out, const NavMeshSettings& s) {
   for (const detail::SettingField& f : detail::kSettingFields) {
     put_float(out, f.value != nullptr ? s.*f.value : s.verts_per_poly);
   }
-  for (const bool f : {s.filter_low_hanging_obstacles, s.filter_ledge_spans, s.filter_walkable_low_height_spans}) {
+  for (const bool f :
+       {s.filter_low_hanging_obstacles, s.filter_ledge_spans, s.filter_walkable_low_height_spans}) {
     out.write(f ? "\1" : "\0", 1);
   }
   out.write(s.include_static_objects ? "\1" : "\0", 1);
@@ -33,12 +34,14 @@ void shift(float* p, const Vec3d& d) noexcept {
   for (int c = 0; c < 3; ++c) p[c] = static_cast<float>(static_cast<double>(p[c]) + d[c]);
 }
 
-/// A tile's bytes in world coordinates with the true heights of the floor, which Detour's own does not have; `points`
-/// are its vertices' and height samples', relative to the origin.
-std::vector<unsigned char> world_tile(const NavMesh::Impl& impl, const dtMeshTile& tile, const Vec3d* points) {
+/// A tile's bytes in world coordinates with the true heights of the floor, which Detour's own does not
+/// have; `points` are its vertices' and height samples', relative to the origin.
+std::vector<unsigned char> world_tile(const NavMesh::Impl& impl, const dtMeshTile& tile,
+                                      const Vec3d* points) {
   std::vector<unsigned char> data(tile.data, tile.data + tile.dataSize);
   const auto floats = [&](const void* inside) {
-    return reinterpret_cast<float*>(data.data() + (static_cast<const unsigned char*>(inside) - tile.data));
+    return reinterpret_cast<float*>(data.data() +
+                                    (static_cast<const unsigned char*>(inside) - tile.data));
   };
   float* verts = floats(tile.verts);
   float* detail_verts = tile.header->detailVertCount > 0 ? floats(tile.detailVerts) : nullptr;
@@ -60,12 +63,14 @@ std::vector<unsigned char> world_tile(const NavMesh::Impl& impl, const dtMeshTil
 
 Status save_navmesh(const NavMesh& mesh, const std::filesystem::path& path, int version) {
   if (version != 1 && version != 2) {
-    return {Errc::invalid_argument, path.string() + ": version = " + std::to_string(version) + " is not 1 or 2"};
+    return {Errc::invalid_argument,
+            path.string() + ": version = " + std::to_string(version) + " is not 1 or 2"};
   }
   const NavMesh::Impl& impl = mesh.impl();
   for (const Vec3d& p : {impl.bounds.low, impl.bounds.high}) {
     for (int k = 0; k < 3; ++k) {
-      if (std::abs(p[k]) < detail::kMaxCoordinate - impl.settings.cell_size - impl.settings.cell_height) continue;
+      if (std::abs(p[k]) < detail::kMaxCoordinate - impl.settings.cell_size - impl.settings.cell_height)
+        continue;
       return {Errc::unsupported, path.string() + ": the mesh reaches to " + std::to_string(p[k]) +
                                      " m: a file's float32 has no centimetres beyond 1e6 m"};
     }
@@ -85,7 +90,8 @@ Status save_navmesh(const NavMesh& mesh, const std::filesystem::path& path, int 
   for (int t = 0; t < detour.getMaxTiles(); ++t) {
     const dtMeshTile& tile = *detour.getTile(t);
     if (tile.header == nullptr) continue;
-    const auto data = world_tile(impl, tile, impl.polys.points.data() + impl.first_point[static_cast<std::size_t>(t)]);
+    const auto data =
+        world_tile(impl, tile, impl.polys.points.data() + impl.first_point[static_cast<std::size_t>(t)]);
     const dtTileRef ref = detour.getTileRef(&tile);
     out.write(&ref, 4);
     put_int(out, static_cast<std::int32_t>(data.size()));

@@ -55,7 +55,8 @@ Result<CapsuleSet> CapsuleSet::create(std::vector<DynamicCapsule> capsules, doub
     if (a.bone != b.bone) return a.bone < b.bone;
     return numbers_of(a) < numbers_of(b);
   };
-  if (!std::is_sorted(capsules.begin(), capsules.end(), before)) std::sort(capsules.begin(), capsules.end(), before);
+  if (!std::is_sorted(capsules.begin(), capsules.end(), before))
+    std::sort(capsules.begin(), capsules.end(), before);
   CapsuleSet set;
   set.t0_ = t0;
   set.t1_ = t1;

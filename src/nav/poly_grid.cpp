@@ -47,7 +47,8 @@ void PolyGrid::build(const PolyMesh& mesh) {
   low_ = all.low;
   const double width = all.high.x - all.low.x, depth = all.high.z - all.low.z;
   const double count = max(static_cast<double>(mesh.polys.size()) / kPolygonsPerCell, 1.0);
-  // Never many more cells, and entries of them, than polygons: what overlaps or is thin gets larger cells.
+  // Never many more cells, and entries of them, than polygons: what overlaps or is thin gets larger
+  // cells.
   const double most_side = clamp(2 * count, 8.0, kMaxSideCells);
   side_ = max(max(std::sqrt(width * depth / count), max(width, depth) / most_side), kLeastSide);
   const auto columns_of = [&](PolyId id) {

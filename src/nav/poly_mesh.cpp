@@ -12,8 +12,7 @@ namespace {
 
 Vec3d nearest_on_edge_xz(const Vec3d& a, const Vec3d& b, const Vec3d& q) noexcept {
   const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
-  const double s =
-      len2 > 0 ? clamp(((q.x - a.x) * ex + (q.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
+  const double s = len2 > 0 ? clamp(((q.x - a.x) * ex + (q.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
   return {a.x + s * ex, a.y + s * (b.y - a.y), a.z + s * ez};
 }
 
@@ -36,7 +35,8 @@ bool PolyMesh::holds(PolyId id, const Vec3d& q, double margin) const noexcept {
 Vec3d PolyMesh::clamped(PolyId id, const Vec3d& q) const noexcept {
   const Poly& p = polys[id];
   bool inside = true;
-  for (std::uint32_t k = 0; k < p.count && inside; ++k) inside = !(area_xz(corner(p, k), corner(p, k + 1), q) < 0);
+  for (std::uint32_t k = 0; k < p.count && inside; ++k)
+    inside = !(area_xz(corner(p, k), corner(p, k + 1), q) < 0);
   if (inside) return q;
   double best = std::numeric_limits<double>::max();
   Vec3d nearest = q;
@@ -158,10 +158,13 @@ void PolyMesh::finish() {
 /// Height triangles where they tile the polygon, else its fan.
 void PolyMesh::add_pieces(PolyId id) {
   Poly& p = polys[id];
-  constexpr double kOff = 1e-5;  // metres: what float32 makes of corners some hundred metres from the origin
+  constexpr double kOff =
+      1e-5;  // metres: what float32 makes of corners some hundred metres from the origin
   double area = 0, covered = 0, around = 0;
-  for (std::uint32_t k = 1; k + 1 < p.count; ++k) area += area_xz(corner(p, 0), corner(p, k), corner(p, k + 1));
-  for (std::uint32_t k = 0; k < p.count; ++k) around += std::sqrt(distance2_xz(corner(p, k), corner(p, k + 1)));
+  for (std::uint32_t k = 1; k + 1 < p.count; ++k)
+    area += area_xz(corner(p, 0), corner(p, k), corner(p, k + 1));
+  for (std::uint32_t k = 0; k < p.count; ++k)
+    around += std::sqrt(distance2_xz(corner(p, k), corner(p, k + 1)));
   bool tiled = !p.planar;
   const std::size_t first = pieces.size();
   for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count && tiled; ++t) {
@@ -174,7 +177,8 @@ void PolyMesh::add_pieces(PolyId id) {
   p.tiled = tiled && pieces.size() > first && std::abs(covered - std::abs(area)) <= kOff * around;
   if (p.tiled) return;
   pieces.resize(first);
-  for (std::uint32_t k = 1; k + 1 < p.count; ++k) pieces.push_back({{p.first, p.first + k, p.first + k + 1}, id});
+  for (std::uint32_t k = 1; k + 1 < p.count; ++k)
+    pieces.push_back({{p.first, p.first + k, p.first + k + 1}, id});
 }
 
 void PolyMesh::prepare_sampling() {
@@ -189,7 +193,8 @@ void PolyMesh::prepare_sampling() {
     Poly& p = polys[i];
     const Vec3d& o = corner(p, 0);
     Vec3d normal{};
-    for (std::uint32_t k = 1; k + 1 < p.count; ++k) normal += cross(corner(p, k + 1) - o, corner(p, k) - o);
+    for (std::uint32_t k = 1; k + 1 < p.count; ++k)
+      normal += cross(corner(p, k + 1) - o, corner(p, k) - o);
     const double scale = norm(normal);
     const auto off = [&](const Vec3d& q) { return !(std::abs(dot(normal, q - o)) <= 1e-6 * scale); };
     p.planar = std::abs(normal.y) > 1e-3 * scale;
@@ -215,7 +220,8 @@ void PolyMesh::prepare_sampling() {
 Vec3d PolyMesh::point_in(const Piece& piece, Rng& rng) const noexcept {
   const auto [o, a, b] = triangle(piece);
   double u = rng.uniform(), v = rng.uniform();
-  const bool beyond = u + v > 1;  // the other half of the parallelogram; selected, for it is as likely as not
+  const bool beyond =
+      u + v > 1;  // the other half of the parallelogram; selected, for it is as likely as not
   u = beyond ? 1 - u : u;
   v = beyond ? 1 - v : v;
   Vec3d q{o.x + u * (a.x - o.x) + v * (b.x - o.x), o.y + u * (a.y - o.y) + v * (b.y - o.y),

@@ -159,7 +159,8 @@ StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& asked
     out.blocked_by = BlockedBy::invalid;
     return out;
   }
-  if (options.compat == StepCompat::habitat_gs) return detail::step_as_habitat_gs(mesh, agent, desired, bodies, options);
+  if (options.compat == StepCompat::habitat_gs)
+    return detail::step_as_habitat_gs(mesh, agent, desired, bodies, options);
   SweepRules<double> rules;
   rules.skin = max(options.skin, kRounding);  // points that touch have no direction between them
   Stepper stepper{agent, bodies, rules, out};

@@ -5,16 +5,16 @@
 
 #include "poly_mesh.hpp"
 
-// A straight walk crosses convex polygons one after the other; only at a corner or a wall, where it makes
-// no progress, are all polygons around the point looked at. Which of them the direction enters, or along
-// which wall it slides farthest, is then decided without regard to the polygon it came from.
+// A straight walk crosses convex polygons one after the other; only at a corner or a wall, where it
+// makes no progress, are all polygons around the point looked at. Which of them the direction enters, or
+// along which wall it slides farthest, is then decided without regard to the polygon it came from.
 
 namespace gsnav::detail {
 namespace {
 
-constexpr double kTouch = 1e-9;      // metres: closer than this is at it
-constexpr double kParallel = 1e-12;  // sine of an angle
-constexpr std::size_t kMaxFan = 64;  // polygons around one point
+constexpr double kTouch = 1e-9;       // metres: closer than this is at it
+constexpr double kParallel = 1e-12;   // sine of an angle
+constexpr std::size_t kMaxFan = 64;   // polygons around one point
 constexpr double kOffSurface = 0.01;  // metres: a leg that leaves the surface by more is cut
 
 struct Exit {
@@ -130,8 +130,8 @@ struct Bends {
   SmallVector<Bend, 16> list;
 
   Bends(const PolyMesh& m, PolyId id, const Vec3d& a, const Vec3d& b) {
-    // A leg along the rim may run outside of all triangles by a rounding, or past a sample that lies beside
-    // its side: what is nearly met counts, and costs no more than a look at the height there.
+    // A leg along the rim may run outside of all triangles by a rounding, or past a sample that lies
+    // beside its side: what is nearly met counts, and costs no more than a look at the height there.
     constexpr double kNearly = -0.1;
     const PolyMesh::Poly& poly = m.polys[id];
     for (std::uint32_t i = poly.tri_first; i < poly.tri_first + poly.tri_count; ++i) {

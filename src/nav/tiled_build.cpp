@@ -78,8 +78,8 @@ struct TriangleLists {
   std::vector<std::size_t> first;
   std::vector<std::uint32_t> triangles;
 
-  TriangleLists(const TileGrid& grid, std::span<const Vec3d> vertices, std::span<const NavMesh::Triangle> triangles_in,
-                const Vec3d& origin, ThreadPool& pool)
+  TriangleLists(const TileGrid& grid, std::span<const Vec3d> vertices,
+                std::span<const NavMesh::Triangle> triangles_in, const Vec3d& origin, ThreadPool& pool)
       : first(grid.count() + 1, 0) {
     const double rim = (grid.border + 1) * grid.settings.cell_size;
     const auto index = [&](double v, int n) {
@@ -91,19 +91,21 @@ struct TriangleLists {
     std::vector<Reach> reach(triangles_in.size());
     const double x = origin.x + grid.box.low.x, z = origin.z + grid.box.low.z;
     constexpr std::size_t kChunk = 4096;
-    pool.run(static_cast<std::uint32_t>((reach.size() + kChunk - 1) / kChunk), [&](std::uint32_t chunk) noexcept {
-      for (std::size_t i = chunk * kChunk; i < min((chunk + 1) * kChunk, reach.size()); ++i) {
-        const NavMesh::Triangle& t = triangles_in[i];
-        const Vec3d &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
-        reach[i] = {index(min(a.x, min(b.x, c.x)) - x - rim, grid.nx),
-                    index(max(a.x, max(b.x, c.x)) - x + rim, grid.nx),
-                    index(min(a.z, min(b.z, c.z)) - z - rim, grid.nz),
-                    index(max(a.z, max(b.z, c.z)) - z + rim, grid.nz)};
-      }
-    });
+    pool.run(static_cast<std::uint32_t>((reach.size() + kChunk - 1) / kChunk),
+             [&](std::uint32_t chunk) noexcept {
+               for (std::size_t i = chunk * kChunk; i < min((chunk + 1) * kChunk, reach.size()); ++i) {
+                 const NavMesh::Triangle& t = triangles_in[i];
+                 const Vec3d &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
+                 reach[i] = {index(min(a.x, min(b.x, c.x)) - x - rim, grid.nx),
+                             index(max(a.x, max(b.x, c.x)) - x + rim, grid.nx),
+                             index(min(a.z, min(b.z, c.z)) - z - rim, grid.nz),
+                             index(max(a.z, max(b.z, c.z)) - z + rim, grid.nz)};
+               }
+             });
     const auto each_tile = [&](const Reach& r, const auto& f) {
       for (std::uint32_t row = r.z0; row <= r.z1; ++row) {
-        for (std::uint32_t column = r.x0; column <= r.x1; ++column) f(column + static_cast<std::size_t>(grid.nx) * row);
+        for (std::uint32_t column = r.x0; column <= r.x1; ++column)
+          f(column + static_cast<std::size_t>(grid.nx) * row);
       }
     };
     for (const Reach& r : reach) each_tile(r, [&](std::size_t tile) { ++first[tile + 1]; });
@@ -192,8 +194,8 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
   std::vector<TilePolygons> tiles(grid.count());
   std::vector<Status> failed(tiles.size() + 1);
   std::optional<TriangleHeights> heights;
-  // The most work first, so that no thread is left with it at the end. Piece 0, the heights, has all triangles but does
-  // a twentieth as much with each as a tile.
+  // The most work first, so that no thread is left with it at the end. Piece 0, the heights, has all
+  // triangles but does a twentieth as much with each as a tile.
   std::vector<std::pair<std::size_t, std::uint32_t>> work{{triangles.size() / 20, 0}};
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     work.emplace_back(lists.first[i + 1] - lists.first[i], static_cast<std::uint32_t>(i + 1));

@@ -30,11 +30,13 @@ Vec3d TimedPlan::at(double t) const noexcept {
 }
 
 TimedPlan plan_in_time(const NavMesh& mesh, const AgentState& agent, const Vec3d& goal,
-                       std::span<const CapsuleSet> ticks, const TimePlannerOptions& o, const GeodesicField* field) {
+                       std::span<const CapsuleSet> ticks, const TimePlannerOptions& o,
+                       const GeodesicField* field) {
   TimedPlan plan;
-  const bool valid = is_finite(agent.position) && is_finite(goal) && is_finite(agent.radius) && is_finite(agent.height) &&
-                     agent.radius >= 0 && agent.height >= 0 && o.speed > 0 && is_finite(o.speed) && o.cell > 0 &&
-                     is_finite(o.cell) && o.margin >= 0 && is_finite(o.margin) && follow_each_other(ticks);
+  const bool valid = is_finite(agent.position) && is_finite(goal) && is_finite(agent.radius) &&
+                     is_finite(agent.height) && agent.radius >= 0 && agent.height >= 0 && o.speed > 0 &&
+                     is_finite(o.speed) && o.cell > 0 && is_finite(o.cell) && o.margin >= 0 &&
+                     is_finite(o.margin) && follow_each_other(ticks);
   if (!valid) return plan;
   plan.status = TimedPlanStatus::unreachable;
   const SurfaceWalk here = mesh.walk({agent.position, agent.poly}, {}, false);
@@ -52,7 +54,9 @@ TimedPlan plan_in_time(const NavMesh& mesh, const AgentState& agent, const Vec3d
   }
   // Nearer than the margin to somebody, the agent may at least not be touched.
   double margin = o.margin;
-  const double gap = clearance({start.position, agent.radius, agent.height, start.poly}, ticks[0], ticks[0].t0()).distance;
+  const double gap =
+      clearance({start.position, agent.radius, agent.height, start.poly}, ticks[0], ticks[0].t0())
+          .distance;
   if (gap < margin + 1e-3) margin = 0;
   const detail::TimedBodies bodies(ticks, agent.radius, agent.height, margin);
   return detail::TimeSearch(mesh, bodies, *field, o).run(start, *there, *path);

@@ -15,8 +15,9 @@
 
 namespace gsnav::detail {
 
-/// Safe-interval search for plan_in_time: places are those of the static path and of a lattice around it, states a place
-/// and one of the intervals in which it is safe to stand there, each with the earliest arrival.
+/// Safe-interval search for plan_in_time: places are those of the static path and of a lattice around
+/// it, states a place and one of the intervals in which it is safe to stand there, each with the
+/// earliest arrival.
 class TimeSearch {
  public:
   TimeSearch(const NavMesh& mesh, const TimedBodies& bodies, const GeodesicField& field,
@@ -53,8 +54,8 @@ class TimeSearch {
     trace(best, plan);
     const double left = places_[states_[best].place].left;
     plan.status = states_[best].place == goal_ ? TimedPlanStatus::reached
-                  : left < reach - kSame     ? TimedPlanStatus::on_way
-                                             : TimedPlanStatus::blocked;
+                  : left < reach - kSame       ? TimedPlanStatus::on_way
+                                               : TimedPlanStatus::blocked;
     if (plan.status != TimedPlanStatus::reached) stay(states_[best], plan);
     if (plan.status == TimedPlanStatus::blocked) plan.blocked_until = bodies_.begin(bodies_.ticks());
     return plan;
@@ -109,7 +110,8 @@ class TimeSearch {
 
   /// The places of the static path, no farther apart than a cell, as far as the known motion allows.
   void follow(const NavPoint& start, const NavPoint& goal, const NavPath& path) {
-    const double time = bodies_.begin(bodies_.ticks()) - bodies_.begin(0), reach = o_.speed * time + o_.cell;
+    const double time = bodies_.begin(bodies_.ticks()) - bodies_.begin(0),
+                 reach = o_.speed * time + o_.cell;
     const double tick = o_.speed * bodies_.seconds(0);
     // Whole ticks, so that none is lost on the way from one to the next.
     const double spacing = max(std::floor(o_.cell / max(tick, 1e-9)), 1.0) * tick;
@@ -176,7 +178,8 @@ class TimeSearch {
   }
   void enter(const State& s) {
     const double time = bodies_.begin(s.rests ? bodies_.ticks() : s.tick);
-    open_.emplace_back(time + places_[s.place].left / o_.speed, static_cast<std::uint32_t>(states_.size()));
+    open_.emplace_back(time + places_[s.place].left / o_.speed,
+                       static_cast<std::uint32_t>(states_.size()));
     std::push_heap(open_.begin(), open_.end(), std::greater<>());
     states_.push_back(s);
   }
@@ -266,7 +269,9 @@ class TimeSearch {
         if (safe[i].first <= k + count && k + count <= safe[i].last) interval = i;
       }
       if (interval == safe.size() && to != goal_ && k + count != bodies_.ticks()) continue;
-      if (interval < safe.size() && (interval == reached_interval || safe[interval].arrival <= k + count)) continue;
+      if (interval < safe.size() &&
+          (interval == reached_interval || safe[interval].arrival <= k + count))
+        continue;
       if (!leg_is_clear(k, count, leg)) continue;
       reached_interval = interval;
       push({to, 0, k + count, k, s});
@@ -281,7 +286,8 @@ class TimeSearch {
       const double u1 = k + 1 == first + count ? 1.0 : (bodies_.begin(k + 1) - begin) / whole;
       WalkPoints between;
       for (const WalkPoint& p : leg) {
-        if (p.fraction > u0 && p.fraction < u1) between.push_back({p.position, p.poly, (p.fraction - u0) / (u1 - u0)});
+        if (p.fraction > u0 && p.fraction < u1)
+          between.push_back({p.position, p.poly, (p.fraction - u0) / (u1 - u0)});
       }
       const Vec3d to = along(leg, u1);
       if (!bodies_.clear(k, from, to, between)) return false;
@@ -294,7 +300,8 @@ class TimeSearch {
     for (std::size_t i = 1; i < leg.size(); ++i) {
       if (u > leg[i].fraction) continue;
       const double span = leg[i].fraction - leg[i - 1].fraction;
-      return span > 0 ? lerp(leg[i - 1].position, leg[i].position, (u - leg[i - 1].fraction) / span) : leg[i].position;
+      return span > 0 ? lerp(leg[i - 1].position, leg[i].position, (u - leg[i - 1].fraction) / span)
+                      : leg[i].position;
     }
     return leg.back().position;
   }

@@ -28,14 +28,16 @@ class TimedBodies {
   }
   double seconds(std::size_t tick) const noexcept { return ticks_[tick].t1() - ticks_[tick].t0(); }
 
-  /// Whether nobody is met on the way from a to b during a tick, which takes all of it; `path` are the points
-  /// between where it is no straight line, with their fractions of the tick.
-  bool clear(std::size_t tick, const Vec3d& a, const Vec3d& b, std::span<const WalkPoint> path = {}) const {
+  /// Whether nobody is met on the way from a to b during a tick, which takes all of it; `path` are the
+  /// points between where it is no straight line, with their fractions of the tick.
+  bool clear(std::size_t tick, const Vec3d& a, const Vec3d& b,
+             std::span<const WalkPoint> path = {}) const {
     const Aabb<double> box = swept(a, b, path);
     const CapsuleSet::Group* const groups = ticks_[tick].groups().data();
     bool free = true;
     ticks_[tick].groups_in(box, [&](const CapsuleSet::Group& g) {
-      if (!free || passes(discs_[first_[tick] + static_cast<std::size_t>(&g - groups)], a, b, path)) return;
+      if (!free || passes(discs_[first_[tick] + static_cast<std::size_t>(&g - groups)], a, b, path))
+        return;
       free = clear_of(ticks_[tick].capsules_of(g), a, b, path);
     });
     return free;
@@ -71,7 +73,8 @@ class TimedBodies {
   }
 
   /// True where the way stays away from the disc: what is in it need not be looked at.
-  bool passes(const MovingDisc& d, const Vec3d& a, const Vec3d& b, std::span<const WalkPoint> path) const noexcept {
+  bool passes(const MovingDisc& d, const Vec3d& a, const Vec3d& b,
+              std::span<const WalkPoint> path) const noexcept {
     const double reach = d.radius + radius_ + margin_ + kRounding;
     WalkPoint from{a, kNoPoly, 0.0};
     for (std::size_t i = 0; i <= path.size(); ++i) {
@@ -115,7 +118,8 @@ class TimedBodies {
     }
     return true;
   }
-  /// Whether first_impact() would have something to report of this body: the first evaluation says so of most.
+  /// Whether first_impact() would have something to report of this body: the first evaluation says so of
+  /// most.
   static bool meets(const MovingCapsule<double>& agent, const MovingCapsule<double>& body, double u0,
                     double u1) noexcept {
     constexpr SweepRules<double> rules;
@@ -138,7 +142,7 @@ class TimedBodies {
 
   std::span<const CapsuleSet> ticks_;
   double radius_, height_, margin_;
-  std::vector<MovingDisc> discs_;    ///< of each tick's groups
+  std::vector<MovingDisc> discs_;   ///< of each tick's groups
   std::vector<std::size_t> first_;  ///< of each tick
 };
 

@@ -14,8 +14,8 @@
 
 namespace gsnav::detail {
 
-/// Heights of the triangles that a NavMesh was built from. Recast places its surface on the tops of voxels,
-/// up to a cell height above the floor; this gives the floor back.
+/// Heights of the triangles that a NavMesh was built from. Recast places its surface on the tops of
+/// voxels, up to a cell height above the floor; this gives the floor back.
 class TriangleHeights {
  public:
   /// Positions relative to `origin`; `box` holds them all.
@@ -28,7 +28,8 @@ class TriangleHeights {
     nz_ = static_cast<std::size_t>(size.z / side_) + 1;
     first_.assign(nx_ * nz_ + 1, 0);
     for (const NavMesh::Triangle& t : triangles) {
-      const std::array<Vec3d, 3> p{vertices[t[0]] - origin, vertices[t[1]] - origin, vertices[t[2]] - origin};
+      const std::array<Vec3d, 3> p{vertices[t[0]] - origin, vertices[t[1]] - origin,
+                                   vertices[t[2]] - origin};
       const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
       if (!(n.y > 0.1 * norm(n))) continue;
       faces_.push_back({p[0], n});
@@ -50,8 +51,10 @@ class TriangleHeights {
     for (std::uint32_t k = first_[cell]; k < first_[cell + 1]; ++k) {
       const std::uint32_t i = in_cells_[k];
       const Face& f = faces_[i];
-      const double y = f.point.y - ((p.x - f.point.x) * f.normal.x + (p.z - f.point.z) * f.normal.z) / f.normal.y;
-      if (y < p.y - below || y > p.y + above || (best && y <= *best) || !covers(corners_[i], p)) continue;
+      const double y =
+          f.point.y - ((p.x - f.point.x) * f.normal.x + (p.z - f.point.z) * f.normal.z) / f.normal.y;
+      if (y < p.y - below || y > p.y + above || (best && y <= *best) || !covers(corners_[i], p))
+        continue;
       best = y;
     }
     return best;
@@ -88,7 +91,8 @@ class TriangleHeights {
   Vec3d low_;
   double side_ = 1.0;
   std::size_t nx_ = 1, nz_ = 1;
-  std::vector<std::uint32_t> first_, in_cells_;  ///< of each cell in `in_cells_`, and one past the last; faces
+  std::vector<std::uint32_t> first_,
+      in_cells_;  ///< of each cell in `in_cells_`, and one past the last; faces
   std::vector<Face> faces_;
   std::vector<std::array<Vec3d, 3>> corners_;
 };

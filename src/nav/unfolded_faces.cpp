@@ -10,7 +10,8 @@ std::uint32_t UnfoldedMesh::face_at(PolyId poly, const Vec3d& p) const noexcept 
   const std::uint32_t first = first_face[poly], last = first_face[poly + 1];
   if (last - first == 1) return first;
   const auto area = [&](const Face& f, std::uint32_t k) {
-    const Vec3d &a = edges[f.first + k].corner, &b = edges[f.first + (k + 1 < f.count ? k + 1 : 0)].corner;
+    const Vec3d &a = edges[f.first + k].corner,
+                &b = edges[f.first + (k + 1 < f.count ? k + 1 : 0)].corner;
     return (b.x - a.x) * (p.z - a.z) - (p.x - a.x) * (b.z - a.z);
   };
   for (std::uint32_t i = first; i < last; ++i) {

@@ -164,7 +164,8 @@ std::uint32_t opposite(const PolyMesh& m, const PolyMesh::Poly& p, PolyId id, st
   double best = std::numeric_limits<double>::max();
   for (std::uint32_t j = 0; j < q.count; ++j) {
     if (m.neighbours[q.first + j] != id) continue;
-    const double apart = norm(m.corner(q, j + 1) - m.corner(p, k)) + norm(m.corner(q, j) - m.corner(p, k + 1));
+    const double apart =
+        norm(m.corner(q, j + 1) - m.corner(p, k)) + norm(m.corner(q, j) - m.corner(p, k + 1));
     if (apart < best) {
       best = apart;
       found = q.first + j;
@@ -206,7 +207,8 @@ void UnfoldedMesh::add_faces(const PolyMesh& mesh) {
       }
       std::sort(at.begin(), at.end());
       const double weld = kWeld / max(norm(mesh.corner(p, k + 1) - mesh.corner(p, k)), kWeld);
-      at.erase(std::unique(at.begin(), at.end(), [&](double a, double b) { return b - a < weld; }), at.end());
+      at.erase(std::unique(at.begin(), at.end(), [&](double a, double b) { return b - a < weld; }),
+               at.end());
       for (const double t : at) {
         cuts[e].push_back({t, f == kNone ? kWall : keys});
         if (f != kNone) cuts[f].push_back({1 - t, keys - 1});
@@ -302,7 +304,8 @@ void UnfoldedMesh::unfold() {
 }
 
 void UnfoldedMesh::fan_out() {
-  // Polygons of a file may lie on one another, so that an edge is two others' twin: what is not both ways is a wall.
+  // Polygons of a file may lie on one another, so that an edge is two others' twin: what is not both
+  // ways is a wall.
   std::vector<std::uint32_t> twins(edges.size());
   for (std::uint32_t e = 0; e < edges.size(); ++e) twins[e] = edges[e].twin;
   for (std::uint32_t e = 0; e < edges.size(); ++e) {

@@ -20,16 +20,17 @@ inline Flat operator*(const Flat& a, double s) noexcept { return {a.x * s, a.y *
 inline double cross(const Flat& a, const Flat& b) noexcept { return a.x * b.y - a.y * b.x; }
 inline double dot(const Flat& a, const Flat& b) noexcept { return a.x * b.x + a.y * b.y; }
 inline double length(const Flat& a) noexcept { return std::sqrt(dot(a, a)); }
-/// Straight through space, without fused steps, which are calls where the processor is not known to have them.
+/// Straight through space, without fused steps, which are calls where the processor is not known to have
+/// them.
 inline double distance(const Vec3d& a, const Vec3d& b) noexcept {
   const double x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
   return std::sqrt(x * x + y * y + z * z);
 }
 
-/// The surface of a NavMesh as flat convex faces, each with plane coordinates of its own, and the turn that
-/// lays a face's neighbour into its plane. A level polygon is one face; a polygon whose height triangles leave its
-/// plane is as many faces as triangles. Shortest paths on it are straight in the unfolded faces and bend
-/// only at vertices.
+/// The surface of a NavMesh as flat convex faces, each with plane coordinates of its own, and the turn
+/// that lays a face's neighbour into its plane. A level polygon is one face; a polygon whose height
+/// triangles leave its plane is as many faces as triangles. Shortest paths on it are straight in the
+/// unfolded faces and bend only at vertices.
 class UnfoldedMesh {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -37,14 +38,14 @@ class UnfoldedMesh {
   /// Edge of a face from its corner to the next, counter-clockwise; the number of an edge also names its
   /// first corner.
   struct Edge {
-    Flat at;                     ///< the corner, in the face's plane
-    Vec3d corner{};              ///< the corner
+    Flat at;         ///< the corner, in the face's plane
+    Vec3d corner{};  ///< the corner
     std::uint32_t face = 0;
     std::uint32_t twin = kNone;  ///< the neighbour's edge; kNone at a wall
     std::uint32_t vertex = 0;
     double cosine = 1, sine = 0, dx = 0, dy = 0;  ///< from this face's plane to the neighbour's
     bool same_plane = true;                       ///< that is the identity
-    double angle = 0;  ///< of this edge in the fan of its vertex
+    double angle = 0;                             ///< of this edge in the fan of its vertex
   };
   struct Face {
     std::uint32_t first = 0, count = 0;  ///< edges

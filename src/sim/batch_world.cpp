@@ -12,14 +12,18 @@ Status bad(std::string what) { return {Errc::invalid_argument, std::move(what)};
 
 }  // namespace
 
-Result<BatchWorld> BatchWorld::create(std::vector<BatchScene> scenes, const TaskConfig& config, AutoReset auto_reset,
-                                      std::size_t environments, EpisodeSource next_episode) {
+Result<BatchWorld> BatchWorld::create(std::vector<BatchScene> scenes, const TaskConfig& config,
+                                      AutoReset auto_reset, std::size_t environments,
+                                      EpisodeSource next_episode) {
   for (std::size_t i = 0; i < scenes.size(); ++i) {
-    if (scenes[i].navmesh == nullptr) return bad("BatchWorld: scene " + std::to_string(i) + " has no NavMesh");
+    if (scenes[i].navmesh == nullptr)
+      return bad("BatchWorld: scene " + std::to_string(i) + " has no NavMesh");
   }
   BatchPlaces places;
   places.count = scenes.size();
-  places.get = [held = std::move(scenes)](std::size_t scene) -> Result<BatchScene> { return held[scene]; };
+  places.get = [held = std::move(scenes)](std::size_t scene) -> Result<BatchScene> {
+    return held[scene];
+  };
   return create(std::move(places), config, auto_reset, environments, std::move(next_episode));
 }
 
@@ -72,8 +76,8 @@ Status BatchWorld::begin(const ParallelFor& run, std::span<const std::size_t> wh
     e.next.reset();
     if (!next) return {next.code(), at + next.message()};
     if (next->scene >= places_.count) {
-      return bad(at + "episode \"" + next->episode.id + "\" is in scene " + std::to_string(next->scene) + " of " +
-                 std::to_string(places_.count));
+      return bad(at + "episode \"" + next->episode.id + "\" is in scene " + std::to_string(next->scene) +
+                 " of " + std::to_string(places_.count));
     }
     if (places_.prefetch) places_.prefetch(next->scene);
     ++e.episodes;
@@ -108,7 +112,8 @@ Status BatchWorld::begin(const ParallelFor& run, std::span<const std::size_t> wh
 
 Status BatchWorld::reset(const ParallelFor& run, std::span<const std::uint8_t> mask) {
   if (!mask.empty() && mask.size() != size()) {
-    return bad("reset: a mask of " + std::to_string(mask.size()) + " for " + std::to_string(size()) + " environments");
+    return bad("reset: a mask of " + std::to_string(mask.size()) + " for " + std::to_string(size()) +
+               " environments");
   }
   if (!mask.empty() && !begun_) return bad("reset: the first one is of all environments");
   begun_ = false;  // until all has gone well
@@ -171,7 +176,8 @@ Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size
   for (std::size_t m = 0; m < missing_.size(); ++m) {
     if (made_[m].ok()) continue;
     const BodyCache::Key& key = missing_[m].key;
-    if (first.ok()) first = {made_[m].code(), "scene " + std::to_string(key.scene) + ": " + made_[m].message()};
+    if (first.ok())
+      first = {made_[m].code(), "scene " + std::to_string(key.scene) + ": " + made_[m].message()};
     bodies_.erase(key);
   }
   return first;
@@ -187,10 +193,12 @@ Status BatchWorld::step(const ParallelFor& run, std::span<const VelocityCommand>
 }
 
 template <class A>
-Status BatchWorld::act(const ParallelFor& run, std::span<const A> actions, const std::function<Status()>& before_reset) {
+Status BatchWorld::act(const ParallelFor& run, std::span<const A> actions,
+                       const std::function<Status()>& before_reset) {
   if (!begun_) return bad("step before reset: no episodes are running");
   if (actions.size() != size()) {
-    return bad("step: " + std::to_string(actions.size()) + " actions for " + std::to_string(size()) + " environments");
+    return bad("step: " + std::to_string(actions.size()) + " actions for " + std::to_string(size()) +
+               " environments");
   }
   stepping_.clear();
   resetting_.clear();

@@ -78,7 +78,8 @@ CubeMap::CubeMap(const SensorSpec& spec) {
         if (dot(kFaceFromSensor[k].row[2], *ray) > dot(kFaceFromSensor[face].row[2], *ray)) face = k;
       }
       const Vec3d p = kFaceFromSensor[face] * *ray;
-      Tap& tap = taps_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column)];
+      Tap& tap = taps_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                       static_cast<std::size_t>(column)];
       tap.face = static_cast<std::uint32_t>(face);
       tap.x = static_cast<float>(f * p.x / p.z + 0.5 * side_ - 0.5);
       tap.y = static_cast<float>(f * p.y / p.z + 0.5 * side_ - 0.5);
@@ -138,7 +139,8 @@ void CubeMap::sample_color(const std::array<const float*, kFaces>& face_images, 
   }
 }
 
-void CubeMap::sample_depth(const std::array<const float*, kFaces>& face_images, std::span<float> out) const {
+void CubeMap::sample_depth(const std::array<const float*, kFaces>& face_images,
+                           std::span<float> out) const {
   constexpr float kOneSurface = 1.02f;
   for (std::size_t i = 0; i < taps_.size(); ++i) {
     const Tap& tap = taps_[i];
@@ -151,7 +153,8 @@ void CubeMap::sample_depth(const std::array<const float*, kFaces>& face_images, 
     const float z[4] = {p[0], p[1], p[side_], p[side_ + 1]};
     const float least = std::min({z[0], z[1], z[2], z[3]}), most = std::max({z[0], z[1], z[2], z[3]});
     float seen = z[(at.fy >= 0.5f ? 2 : 0) + (at.fx >= 0.5f ? 1 : 0)];
-    if (least > 0.0f && most < kOneSurface * least) seen = 1.0f / at.mix(1 / z[0], 1 / z[1], 1 / z[2], 1 / z[3]);
+    if (least > 0.0f && most < kOneSurface * least)
+      seen = 1.0f / at.mix(1 / z[0], 1 / z[1], 1 / z[2], 1 / z[3]);
     out[i] = seen * tap.stretch;
   }
 }

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "gsnav/frame/sh.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/frame/sh.hpp"
 
 namespace gsnav::flat {
 namespace {

@@ -19,8 +19,8 @@ Result<GreedyGeodesicFollower> GreedyGeodesicFollower::make(const NavMesh& mesh,
                                                             const GreedyFollowerOptions& options) {
   if (Status s = validate(task); !s) return s;
   if (!(options.goal_radius >= 0) || !is_finite(options.goal_radius)) {
-    return {Errc::invalid_argument, "GreedyFollowerOptions.goal_radius = " + std::to_string(options.goal_radius) +
-                                        ": must be >= 0"};
+    return {Errc::invalid_argument, "GreedyFollowerOptions.goal_radius = " +
+                                        std::to_string(options.goal_radius) + ": must be >= 0"};
   }
   auto field = GeodesicField::make(mesh, std::span(&goal, 1), {{0.5, 1.0, 0.5}});
   if (!field) return field.status();
@@ -34,7 +34,8 @@ void GreedyGeodesicFollower::act(AgentPose& agent, Action action) const {
   if (action == Action::turn_left) agent.yaw += turn;
   if (action == Action::turn_right) agent.yaw -= turn;
   if (action != Action::move_forward) return;
-  const SurfaceWalk walk = mesh_->walk({agent.position, agent.poly}, agent.forward() * task_.forward_step, task_.allow_sliding);
+  const SurfaceWalk walk = mesh_->walk({agent.position, agent.poly},
+                                       agent.forward() * task_.forward_step, task_.allow_sliding);
   if (walk.points.empty()) return;
   agent.position = walk.points.back().position;
   agent.poly = walk.points.back().poly;
@@ -42,10 +43,12 @@ void GreedyGeodesicFollower::act(AgentPose& agent, Action action) const {
 
 Result<Action> GreedyGeodesicFollower::next(const AgentPose& pose) {
   const SurfaceWalk here = mesh_->walk({pose.position, pose.poly}, {}, false);
-  if (here.points.empty()) return Status(Errc::nothing_navigable, "greedy follower: the agent is off the NavMesh");
+  if (here.points.empty())
+    return Status(Errc::nothing_navigable, "greedy follower: the agent is off the NavMesh");
   const NavPoint at{here.points[0].position, here.points[0].poly};
   const double left = field_.distance(at);
-  if (!is_finite(left)) return Status(Errc::nothing_navigable, "greedy follower: the goal is on another island");
+  if (!is_finite(left))
+    return Status(Errc::nothing_navigable, "greedy follower: the goal is on another island");
   if (left < options_.goal_radius) return Action::stop;
   if (!pending_.empty()) {
     const Action a = pending_.back();
@@ -59,7 +62,8 @@ Result<Action> GreedyGeodesicFollower::next(const AgentPose& pose) {
     for (const int side : {k, -k}) {
       if (k == 0 && side != k) continue;
       AgentPose trial{at.position, pose.yaw + side * turn, at.poly};
-      const SurfaceWalk walk = mesh_->walk(at, trial.forward() * task_.forward_step, task_.allow_sliding);
+      const SurfaceWalk walk =
+          mesh_->walk(at, trial.forward() * task_.forward_step, task_.allow_sliding);
       const WalkPoint& end = walk.points.back();
       const double reward = (left - field_.distance({end.position, end.poly})) / task_.forward_step -
                             kPerAction * (k + 1) - (walk.hit_wall ? kPerCollision : 0.0);
@@ -98,9 +102,9 @@ Result<std::vector<Action>> GreedyGeodesicFollower::all(AgentPose agent, std::si
     if (*action == Action::stop) return out;
     act(agent, *action);
   }
-  return Status(Errc::invalid_argument,
-                "greedy follower: " + std::to_string(most) + " actions did not lead within " +
-                    std::to_string(options_.goal_radius) + " m of the goal");
+  return Status(Errc::invalid_argument, "greedy follower: " + std::to_string(most) +
+                                            " actions did not lead within " +
+                                            std::to_string(options_.goal_radius) + " m of the goal");
 }
 
 }  // namespace gsnav

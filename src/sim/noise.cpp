@@ -10,22 +10,23 @@
 namespace gsnav {
 namespace {
 
-constexpr double kBaseline = 35.130;       // focal length times baseline: disparity = kBaseline / z
-constexpr double kSteps = 8.0;             // of disparity in one
+constexpr double kBaseline = 35.130;  // focal length times baseline: disparity = kBaseline / z
+constexpr double kSteps = 8.0;        // of disparity in one
 constexpr double kDisparitySigma = 1.0 / 36.0;
-constexpr double kShiftSigma = 0.25;       // pixels
+constexpr double kShiftSigma = 0.25;  // pixels
 
 }  // namespace
 
 Status validate(const NoiseModel& m, const char* sensor) {
   const auto bad = [&](const char* field, double value, const char* rule) {
-    return Status(Errc::invalid_argument, "SensorSpec \"" + std::string(sensor) + "\": noise." + field + " = " +
-                                              std::to_string(value) + ": " + rule);
+    return Status(Errc::invalid_argument, "SensorSpec \"" + std::string(sensor) + "\": noise." + field +
+                                              " = " + std::to_string(value) + ": " + rule);
   };
   if (!is_finite(m.intensity)) return bad("intensity", m.intensity, "must be finite");
   if (!is_finite(m.mean)) return bad("mean", m.mean, "must be finite");
   if (!(m.sigma >= 0) || !is_finite(m.sigma)) return bad("sigma", m.sigma, "must be >= 0");
-  if (!(m.multiplier >= 0) || !is_finite(m.multiplier)) return bad("multiplier", m.multiplier, "must be >= 0");
+  if (!(m.multiplier >= 0) || !is_finite(m.multiplier))
+    return bad("multiplier", m.multiplier, "must be >= 0");
   return {};
 }
 
@@ -37,8 +38,8 @@ void add_gaussian_noise(const NoiseModel& model, std::uint64_t seed, std::span<f
   }
 }
 
-void redwood_depth(const NoiseModel& model, std::uint64_t seed, int height, int width, std::span<const float> depth,
-                   std::span<float> out) {
+void redwood_depth(const NoiseModel& model, std::uint64_t seed, int height, int width,
+                   std::span<const float> depth, std::span<float> out) {
   Rng rng(seed);
   const auto looked_up = [&](int at, int most) {
     const double shifted = std::round(at + kShiftSigma * model.multiplier * rng.normal());
@@ -48,8 +49,9 @@ void redwood_depth(const NoiseModel& model, std::uint64_t seed, int height, int 
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const int row = looked_up(y, height - 1), column = looked_up(x, width - 1);
-      const double z = static_cast<double>(depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
-                                                 static_cast<std::size_t>(column)]);
+      const double z =
+          static_cast<double>(depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                                    static_cast<std::size_t>(column)]);
       const double noise = kDisparitySigma * model.multiplier * rng.normal();
       const double steps = z > 0 ? std::round(kSteps * (kBaseline / z + noise)) : 0.0;
       out[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)] =

@@ -68,13 +68,17 @@ double closest(const Way& a, const std::vector<Way>& others) {
 }  // namespace
 
 Vec3d person_color(std::size_t index) noexcept {
-  static constexpr std::array<Vec3d, 6> kColors{{{0.90, 0.45, 0.05}, {0.55, 0.15, 0.65}, {0.05, 0.55, 0.50},
-                                                 {0.75, 0.10, 0.40}, {0.45, 0.45, 0.05}, {0.35, 0.25, 0.15}}};
+  static constexpr std::array<Vec3d, 6> kColors{{{0.90, 0.45, 0.05},
+                                                 {0.55, 0.15, 0.65},
+                                                 {0.05, 0.55, 0.50},
+                                                 {0.75, 0.10, 0.40},
+                                                 {0.45, 0.45, 0.05},
+                                                 {0.35, 0.25, 0.15}}};
   return kColors[index % kColors.size()];
 }
 
-Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count, std::uint64_t seed,
-                                                double density) {
+Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count,
+                                                std::uint64_t seed, double density) {
   if (!std::isfinite(density)) return {Errc::invalid_argument, "walking_people: density is not finite"};
   std::vector<Way> ways;
   std::vector<AvatarActor> people;
@@ -98,7 +102,8 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
     look.top = person_color(i) * 0.72 + Vec3d{0.10, 0.10, 0.10};
     auto body = try_make_humanoid(look);
     if (!body) return body.status();
-    auto actor = make_walker(std::make_shared<const AvatarAsset>(std::move(*body)), best->points, best->walk);
+    auto actor =
+        make_walker(std::make_shared<const AvatarAsset>(std::move(*body)), best->points, best->walk);
     if (!actor) return actor.status();
     people.push_back(std::move(*actor));
     ways.push_back(std::move(*best));
@@ -106,12 +111,13 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
   return people;
 }
 
-Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene, const TaskConfig& task,
-                        std::uint64_t seed) {
+Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene,
+                        const TaskConfig& task, std::uint64_t seed) {
   Rng rng(seed ^ 0x7469636bull);
   for (PointNavEpisode& e : episodes) {
     for (int tries = 0; tries < 100; ++tries) {
-      // At a multiple of the control period many episodes meet the same moments, whose bodies are then made once.
+      // At a multiple of the control period many episodes meet the same moments, whose bodies are then
+      // made once.
       e.start_time = task.control_period * std::floor(rng.uniform(0.0, 600.0) / task.control_period);
       std::vector<DynamicCapsule> now;
       append_bodies(scene, e.start_time, e.start_time, now);

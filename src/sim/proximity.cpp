@@ -41,9 +41,11 @@ double least_distance(const Aabb<double>& a, const Aabb<double>& b) {
   return square > 0 ? sqrt(square) - kRounding : -std::numeric_limits<double>::infinity();
 }
 
-/// How fast a point of a body moves at most, metres a tick: points between the ends are no faster than those.
+/// How fast a point of a body moves at most, metres a tick: points between the ends are no faster than
+/// those.
 double speed_of(const MovingCapsule<double>& m) {
-  return max(norm(m.end.p0 - m.begin.p0), norm(m.end.p1 - m.begin.p1)) + abs(m.end.radius - m.begin.radius);
+  return max(norm(m.end.p0 - m.begin.p0), norm(m.end.p1 - m.begin.p1)) +
+         abs(m.end.radius - m.begin.radius);
 }
 
 /// The same of whoever walks along `path`; infinity where it jumps.
@@ -92,7 +94,8 @@ class Approach {
         scratch_(scratch),
         near_(scratch.near) {}
 
-  /// Looks at the boxes that the agent (`reach`) and the avatar's capsules sweep; returns a lower bound of find().
+  /// Looks at the boxes that the agent (`reach`) and the avatar's capsules sweep; returns a lower bound
+  /// of find().
   double look(const Aabb<double>& reach, View<const DynamicCapsule> avatar) {
     avatar_ = avatar;
     scratch_.bounds.resize(avatar.size);
@@ -239,8 +242,8 @@ class Approach {
 
 }  // namespace
 
-void closest_approach(std::span<const WalkPoint> path, double radius, double height, const CapsuleSet& bodies,
-                      std::vector<double>& out) {
+void closest_approach(std::span<const WalkPoint> path, double radius, double height,
+                      const CapsuleSet& bodies, std::vector<double>& out) {
   const std::span<const CapsuleSet::Group> groups = bodies.groups();
   out.resize(groups.size());
   if (groups.empty()) return;

@@ -50,17 +50,20 @@ std::size_t scene_bytes(const SimulatorScene& scene) noexcept {
   return sum;
 }
 
-Result<std::shared_ptr<SceneLibrary>> SceneLibrary::create(std::vector<SceneEntry> scenes, std::size_t budget) {
+Result<std::shared_ptr<SceneLibrary>> SceneLibrary::create(std::vector<SceneEntry> scenes,
+                                                           std::size_t budget) {
   if (scenes.empty()) return {Errc::invalid_argument, "SceneLibrary: no scene"};
   for (const SceneEntry& e : scenes) {
-    if (!e.load) return {Errc::invalid_argument, "SceneLibrary: scene \"" + e.name + "\" has no way to load it"};
+    if (!e.load)
+      return {Errc::invalid_argument, "SceneLibrary: scene \"" + e.name + "\" has no way to load it"};
   }
   std::shared_ptr<SceneLibrary> library(new SceneLibrary(std::move(scenes), budget));
   library->thread_ = std::thread([p = library.get()] { p->work(); });
   return library;
 }
 
-SceneLibrary::SceneLibrary(std::vector<SceneEntry> scenes, std::size_t budget) : budget_(budget), slots_(scenes.size()) {
+SceneLibrary::SceneLibrary(std::vector<SceneEntry> scenes, std::size_t budget)
+    : budget_(budget), slots_(scenes.size()) {
   for (std::size_t i = 0; i < scenes.size(); ++i) slots_[i].entry = std::move(scenes[i]);
 }
 
@@ -131,7 +134,8 @@ void SceneLibrary::prefetch(std::size_t index) {
 Result<std::shared_ptr<const SimulatorScene>> SceneLibrary::get(std::size_t index) {
   std::unique_lock lock(mutex_);
   if (index >= slots_.size()) {
-    return {Errc::invalid_argument, "scene " + std::to_string(index) + " of " + std::to_string(slots_.size())};
+    return {Errc::invalid_argument,
+            "scene " + std::to_string(index) + " of " + std::to_string(slots_.size())};
   }
   Slot& slot = slots_[index];
   want(index);

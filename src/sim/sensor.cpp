@@ -38,10 +38,13 @@ Status validate(const SensorSpec& s) {
                   "SensorSpec \"" + s.uuid + "\": " + field + " = " + value + ": " + rule);
   };
   if (s.uuid.empty()) return {Errc::invalid_argument, "SensorSpec.uuid is empty: a sensor needs a name"};
-  if (s.kind > SensorKind::normal) return bad("kind", std::to_string(static_cast<int>(s.kind)), "there is none of this number");
-  if (s.model > SensorModel::fisheye) return bad("model", std::to_string(static_cast<int>(s.model)), "there is none of this number");
+  if (s.kind > SensorKind::normal)
+    return bad("kind", std::to_string(static_cast<int>(s.kind)), "there is none of this number");
+  if (s.model > SensorModel::fisheye)
+    return bad("model", std::to_string(static_cast<int>(s.model)), "there is none of this number");
   if (s.noise.kind > NoiseKind::redwood_depth) {
-    return bad("noise.kind", std::to_string(static_cast<int>(s.noise.kind)), "there is none of this number");
+    return bad("noise.kind", std::to_string(static_cast<int>(s.noise.kind)),
+               "there is none of this number");
   }
   for (const int side : s.resolution) {
     if (side < 1 || side > kMaxImageSide)
@@ -66,10 +69,12 @@ Status validate(const SensorSpec& s) {
   }
   if (fisheye && (!(s.fisheye.focal_length[0] > 0) || !(s.fisheye.focal_length[1] > 0))) {
     // Where the double sphere's projection ends: further off the axis an image point would come twice.
-    const double a = s.fisheye.alpha, z = std::cos(s.hfov * std::numbers::pi / 360.0), shifted = s.fisheye.xi + z;
+    const double a = s.fisheye.alpha, z = std::cos(s.hfov * std::numbers::pi / 360.0),
+                 shifted = s.fisheye.xi + z;
     const double w = a > 0.5 ? (1 - a) / a : a / (1 - a);
     if (!(shifted > -w * std::sqrt(1 - z * z + shifted * shifted))) {
-      return bad("hfov", std::to_string(s.hfov), "is more than a lens of this fisheye.alpha and xi sees");
+      return bad("hfov", std::to_string(s.hfov),
+                 "is more than a lens of this fisheye.alpha and xi sees");
     }
   }
   if (s.cube_size < 0 || s.cube_size > kMaxImageSide - 2) {
@@ -82,7 +87,8 @@ Status validate(const SensorSpec& s) {
     return bad("model", "not pinhole", "sensors of normals are pinholes");
   }
   if (Status noise = validate(s.noise, s.uuid.c_str()); !noise) return noise;
-  const SensorKind noisy = s.noise.kind == NoiseKind::redwood_depth ? SensorKind::depth : SensorKind::rgb;
+  const SensorKind noisy =
+      s.noise.kind == NoiseKind::redwood_depth ? SensorKind::depth : SensorKind::rgb;
   if (s.noise.kind != NoiseKind::none && s.kind != noisy) {
     return bad("noise.kind", s.noise.kind == NoiseKind::gaussian ? "gaussian" : "redwood_depth",
                "gaussian noise is for colour, redwood_depth for depth");
@@ -116,12 +122,14 @@ Status validate(std::span<const SensorSpec> sensors) {
 bool same_camera(const SensorSpec& a, const SensorSpec& b) noexcept {
   return a.model == b.model && a.cube_size == b.cube_size && a.fisheye.alpha == b.fisheye.alpha &&
          a.fisheye.xi == b.fisheye.xi && a.fisheye.focal_length == b.fisheye.focal_length &&
-         a.fisheye.principal_point_offset == b.fisheye.principal_point_offset && a.resolution == b.resolution && a.hfov == b.hfov && a.position == b.position &&
+         a.fisheye.principal_point_offset == b.fisheye.principal_point_offset &&
+         a.resolution == b.resolution && a.hfov == b.hfov && a.position == b.position &&
          a.orientation == b.orientation && a.near_plane == b.near_plane &&
          a.near_sigma == b.near_sigma && a.far_plane == b.far_plane;
 }
 
-Camera sensor_camera(const SensorSpec& spec, const Vec3d& base, const Quatd& rotation, double pitch) noexcept {
+Camera sensor_camera(const SensorSpec& spec, const Vec3d& base, const Quatd& rotation,
+                     double pitch) noexcept {
   const Vec3d& o = spec.orientation;
   const Quatd local = axis_angle(Vec3d{0, 0, 1}, o.z) * axis_angle(Vec3d{0, 1, 0}, o.y) *
                       axis_angle(Vec3d{1, 0, 0}, o.x + pitch);

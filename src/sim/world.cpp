@@ -40,7 +40,8 @@ Status validate(const TaskConfig& c) {
   if (!(c.turn_angle > 0 && c.turn_angle <= 180))
     return bad("turn_angle", c.turn_angle, "must be in (0, 180]");
   if (!positive(c.control_period)) return bad("control_period", c.control_period, "must be positive");
-  if (!(c.tilt_angle > 0 && c.tilt_angle <= 90)) return bad("tilt_angle", c.tilt_angle, "must be in (0, 90]");
+  if (!(c.tilt_angle > 0 && c.tilt_angle <= 90))
+    return bad("tilt_angle", c.tilt_angle, "must be in (0, 90]");
   if (c.substeps < 1 || c.substeps > 1000) return bad("substeps", c.substeps, "must be in [1, 1000]");
   const RewardConfig& r = c.reward;
   for (const double w : {r.progress, r.slack, r.success, r.proximity, r.collision, r.wall}) {
@@ -67,7 +68,9 @@ Result<CapsuleSet> World::bodies(double t0, double t1) const {
 }
 
 namespace {
-Status moved_away() { return {Errc::invalid_argument, "this World or Simulator was moved from: use what it became"}; }
+Status moved_away() {
+  return {Errc::invalid_argument, "this World or Simulator was moved from: use what it became"};
+}
 }  // namespace
 
 Status World::set_state(const WorldState& state) {
@@ -90,11 +93,13 @@ Status World::set_state(const WorldState& state) {
     if (navmesh_->island_of(state.goal.poly) == kNoIsland) {
       return bad("goal.poly", std::to_string(state.goal.poly) + " is no polygon of this NavMesh");
     }
-    if (a.poly != kNoPoly && navmesh_->island_of(a.poly) == kNoIsland) {  // steps find a place without one
+    if (a.poly != kNoPoly &&
+        navmesh_->island_of(a.poly) == kNoIsland) {  // steps find a place without one
       return bad("agent.poly", std::to_string(a.poly) + " is no polygon of this NavMesh");
     }
     if (!navmesh_->snap_point(a.position, {{0.1, 0.5, 0.1}})) {
-      return {Errc::nothing_navigable, "WorldState.agent.position is off the NavMesh; set_agent finds the nearest place"};
+      return {Errc::nothing_navigable,
+              "WorldState.agent.position is off the NavMesh; set_agent finds the nearest place"};
     }
   }
   s_ = state;
@@ -175,7 +180,8 @@ Result<World::Motion> World::motion_of(Action action) const {
       m.tilt = -config_.tilt_angle * kPi / 180.0;
       break;
     default:
-      return {Errc::invalid_argument, "action " + std::to_string(static_cast<int>(action)) + " is unknown"};
+      return {Errc::invalid_argument,
+              "action " + std::to_string(static_cast<int>(action)) + " is unknown"};
   }
   return m;
 }
@@ -219,7 +225,9 @@ Result<StepInfo> World::act(const A& action, std::span<const CapsuleSet* const> 
 
 Result<StepInfo> World::step(Action action) { return act(action); }
 Result<StepInfo> World::step(const VelocityCommand& command) { return act(command); }
-Result<StepInfo> World::step(Action action, std::span<const CapsuleSet* const> bodies) { return act(action, bodies); }
+Result<StepInfo> World::step(Action action, std::span<const CapsuleSet* const> bodies) {
+  return act(action, bodies);
+}
 Result<StepInfo> World::step(const VelocityCommand& command, std::span<const CapsuleSet* const> bodies) {
   return act(command, bodies);
 }
@@ -285,7 +293,8 @@ StepInfo World::move(const Motion& motion, std::span<const CapsuleSet* const> bo
   info.moved = norm(s_.agent.position - from);
   info.avatar_touched = info.pushed_into || info.avatar_clearance <= 0.0;
   info.avatar_contact = info.capsule_blocked || info.avatar_touched;
-  s_.tracker.add({info.moved, info.wall_collision, info.capsule_blocked, info.avatar_touched, distances_});
+  s_.tracker.add(
+      {info.moved, info.wall_collision, info.capsule_blocked, info.avatar_touched, distances_});
 
   const double before = s_.distance_to_goal;
   if (info.moved > 0) measure_distance();
@@ -303,7 +312,8 @@ void World::merge_distances(const CapsuleSet& bodies) {
     const auto at = std::lower_bound(avatars_.begin(), avatars_.end(), avatar);
     const auto i = at - avatars_.begin();
     if (at != avatars_.end() && *at == avatar) {
-      distances_[static_cast<std::size_t>(i)] = min(distances_[static_cast<std::size_t>(i)], approach_[g]);
+      distances_[static_cast<std::size_t>(i)] =
+          min(distances_[static_cast<std::size_t>(i)], approach_[g]);
     } else {
       avatars_.insert(at, avatar);
       distances_.insert(distances_.begin() + i, approach_[g]);

@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "gsnav/detail/avatar/avatar.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/avatar/avatar.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/rotations.hpp"
 
@@ -27,7 +27,8 @@ struct SkinnedPlanes {
     return gsnav::vec_cast<double>(gsnav::Vec3<Out>{means[0][i], means[1][i], means[2][i]});
   }
   gsnav::Quatd quat(std::size_t i) const {
-    return gsnav::quat_cast<double>(gsnav::Quat<Out>{quats[0][i], quats[1][i], quats[2][i], quats[3][i]});
+    return gsnav::quat_cast<double>(
+        gsnav::Quat<Out>{quats[0][i], quats[1][i], quats[2][i], quats[3][i]});
   }
   /// Factor of the covariance, of a stretched body.
   gsnav::Mat3d factor(std::size_t i) const {
@@ -38,7 +39,8 @@ struct SkinnedPlanes {
 };
 
 template <class S, class Out>
-SkinnedPlanes<S, Out> skin_all(const gsnav::AvatarAsset& asset, const std::vector<gsnav::Affine3<double>>& joints) {
+SkinnedPlanes<S, Out> skin_all(const gsnav::AvatarAsset& asset,
+                               const std::vector<gsnav::Affine3<double>>& joints) {
   std::vector<gsnav::Affine3<S>> cast;
   for (const auto& m : joints) cast.push_back(gsnav::affine_cast<S>(m));
   SkinnedPlanes<S, Out> out;

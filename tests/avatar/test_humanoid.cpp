@@ -34,7 +34,8 @@ TEST_CASE("the procedural person is complete") {
   CHECK(a.skeleton.names[0] == "pelvis");
   CHECK(a.skeleton.names[15] == "head");
   CHECK(a.skeleton.names[54] == "right_thumb3");
-  CHECK(a.skeleton.parents[static_cast<std::size_t>(a.skeleton.find("left_index1"))] == a.skeleton.find("left_wrist"));
+  CHECK(a.skeleton.parents[static_cast<std::size_t>(a.skeleton.find("left_index1"))] ==
+        a.skeleton.find("left_wrist"));
   CHECK(a.size() > 20000);
   CHECK(a.size() < 40000);
   double low = 9, high = 0;
@@ -128,13 +129,15 @@ TEST_CASE("standing feet do not slide, and nothing goes through the floor") {
         slide = std::max(slide, high - low);
       }
     }
-    MESSAGE(speed << " m/s: stride " << walk.stride() << " m, slide " << 1e3 * slide << " mm, lift " << 1e3 * lift << " mm");
+    MESSAGE(speed << " m/s: stride " << walk.stride() << " m, slide " << 1e3 * slide << " mm, lift "
+                  << 1e3 * lift << " mm");
     CHECK(slide < 0.005);
     CHECK(lift < 0.005);
     double lowest = 1;
     for (int k = 0; k < 40; ++k) {
       std::vector<Affine3<double>> g;
-      for (const Vec3d& p : skinned_centers(a, joints_at(walk, k / 40.0, 1.0, g))) lowest = std::min(lowest, p.y);
+      for (const Vec3d& p : skinned_centers(a, joints_at(walk, k / 40.0, 1.0, g)))
+        lowest = std::min(lowest, p.y);
     }
     MESSAGE("lowest Gaussian " << 1e3 * lowest << " mm");
     CHECK(lowest > -0.006);
@@ -167,13 +170,15 @@ TEST_CASE("the soles of somebody who walks past stay where they touch the floor"
   };
   double worst = 0, start = 0;
   const GaitOptions gait;
-  const double stride = 8.0 / 0.5 / std::ceil(8.0 / (0.5 * WalkMotion::create(a.skeleton, gait)->stride()));
+  const double stride =
+      8.0 / 0.5 / std::ceil(8.0 / (0.5 * WalkMotion::create(a.skeleton, gait)->stride()));
   for (std::size_t side = 0; side < 2; ++side) {
     const std::vector<std::size_t>& sole = soles[side];
     REQUIRE(sole.size() > 100);
     double slid = 0;
     const auto standing = [&](double t) {
-      const double p = actor.trajectory().at(t).distance / stride + 0.43 * gait.duty + (side == 0 ? 0.0 : 0.5);
+      const double p =
+          actor.trajectory().at(t).distance / stride + 0.43 * gait.duty + (side == 0 ? 0.0 : 0.5);
       return p - std::floor(p) <= gait.duty;
     };
     const double h = 0.01;
@@ -190,14 +195,17 @@ TEST_CASE("the soles of somebody who walks past stay where they touch the floor"
       before = now;
     }
   }
-  MESSAGE("a stance slides " << 1e3 * worst << " mm walking, " << 1e3 * start << " mm while starting to walk");
+  MESSAGE("a stance slides " << 1e3 * worst << " mm walking, " << 1e3 * start
+                             << " mm while starting to walk");
   CHECK(worst < 0.015);
   CHECK(start < 0.015);
 }
 
 TEST_CASE("arms swing against the legs") {
   const WalkMotion walk = WalkMotion::create(person()->skeleton).value();
-  const auto at = [](const char* name) { return static_cast<std::size_t>(person()->skeleton.find(name)); };
+  const auto at = [](const char* name) {
+    return static_cast<std::size_t>(person()->skeleton.find(name));
+  };
   std::vector<Affine3<double>> g;
   joints_at(walk, 0.0, 1.0, g);  // right heel strikes
   CHECK(g[at("right_ankle")].translation.z < g[at("left_ankle")].translation.z - 0.4);
@@ -209,7 +217,8 @@ TEST_CASE("arms swing against the legs") {
   for (int k = 0; k < 60; ++k) {
     joints_at(walk, k / 60.0, 1.0, g);
     for (const std::string s : {"left_", "right_"}) {
-      const Vec3d hip = g[at((s + "hip").c_str())].translation, knee = g[at((s + "knee").c_str())].translation,
+      const Vec3d hip = g[at((s + "hip").c_str())].translation,
+                  knee = g[at((s + "knee").c_str())].translation,
                   foot = g[at((s + "ankle").c_str())].translation;
       CHECK(cross(knee - hip, foot - knee).x < 0.0);
     }
@@ -231,7 +240,8 @@ TEST_CASE("capsules hold the body in every frame") {
     std::vector<Affine3<double>> g;
     const auto joints = joints_at(walk, (k + 0.37) / 24, k == 24 ? 0.0 : 1.0, g);
     std::vector<Capsule<double>> capsules;
-    for (const ProxyCapsule& c : a.capsules) capsules.push_back({g[c.joint] * c.p0, g[c.joint] * c.p1, c.radius});
+    for (const ProxyCapsule& c : a.capsules)
+      capsules.push_back({g[c.joint] * c.p0, g[c.joint] * c.p1, c.radius});
     const auto centers = skinned_centers(a, joints);
     least = std::min(least, capsule_coverage(capsules, centers));
     deepest = std::max(deepest, 1 - capsule_coverage(capsules, centers, 0.01));
@@ -242,7 +252,8 @@ TEST_CASE("capsules hold the body in every frame") {
   // The whole body and not its middle alone: head, hands, feet.
   std::set<std::string> named;
   for (const ProxyCapsule& c : a.capsules) named.insert(a.skeleton.names[c.joint]);
-  for (const char* n : {"head", "pelvis", "spine3", "left_wrist", "right_wrist", "left_ankle", "right_ankle"}) {
+  for (const char* n :
+       {"head", "pelvis", "spine3", "left_wrist", "right_wrist", "left_ankle", "right_ankle"}) {
     CHECK(named.count(n) == 1);
   }
   double volume = 0;
@@ -261,7 +272,8 @@ TEST_CASE("capsules can be fitted to any body's bones") {
   CHECK(a.validate().ok());
   std::vector<Capsule<double>> world;
   std::vector<Vec3d> centers;
-  for (const ProxyCapsule& c : a.capsules) world.push_back({rest[c.joint] * c.p0, rest[c.joint] * c.p1, c.radius});
+  for (const ProxyCapsule& c : a.capsules)
+    world.push_back({rest[c.joint] * c.p0, rest[c.joint] * c.p1, c.radius});
   for (std::size_t i = 0; i < a.size(); ++i) centers.push_back(a.cloud.mean(i));
   CHECK(capsule_coverage(world, centers) >= 0.99);
 }

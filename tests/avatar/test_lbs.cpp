@@ -32,11 +32,13 @@ TEST_CASE("unusable weights are refused by name") {
   ones[7] = -1;
   CHECK(asset.set_weights(1, zeros, ones).message().find("Gaussian 7 ") != std::string::npos);
   ones[7] = 0;
-  CHECK(asset.set_weights(1, zeros, ones).message().find("Gaussian 7 has no weight") != std::string::npos);
+  CHECK(asset.set_weights(1, zeros, ones).message().find("Gaussian 7 has no weight") !=
+        std::string::npos);
   ones[7] = std::nanf("");
   CHECK_FALSE(asset.set_weights(1, zeros, ones).ok());
   ones[7] = 1;
-  CHECK(asset.set_weights(1, std::vector<std::uint16_t>(n, 55), ones).message().find("joint 55 of 55") != std::string::npos);
+  CHECK(asset.set_weights(1, std::vector<std::uint16_t>(n, 55), ones).message().find("joint 55 of 55") !=
+        std::string::npos);
   CHECK_FALSE(asset.set_weights(2, zeros, ones).ok());
   CHECK(asset.set_weights(1, zeros, ones).ok());
   asset.skinning_weights[4] -= 1;
@@ -69,7 +71,8 @@ TEST_CASE("rounded weights make 1 and move a point by at most K / 4 parts of its
       // Every second row is the worst there is: each weight half a part from the next whole number.
       if (i % 2 == 0) {
         double left = kWeightParts;
-        for (std::size_t j = k; j-- > 1;) left -= weights[j] = static_cast<double>(rng.below(4000)) + 0.5;
+        for (std::size_t j = k; j-- > 1;)
+          left -= weights[j] = static_cast<double>(rng.below(4000)) + 0.5;
         weights[0] = left;
       }
       std::sort(weights.begin(), weights.end(), std::greater<>());
@@ -82,7 +85,8 @@ TEST_CASE("rounded weights make 1 and move a point by at most K / 4 parts of its
       Vec3d exact{}, rounded{};
       for (std::size_t j = 0; j < k; ++j) {
         // Two clusters of joints, a metre apart, are what the bound is about.
-        places[j] = i % 4 < 2 ? Vec3d{rng.below(2) == 0 ? 0.0 : 1.0, 0, 0} : Vec3d{rng.uniform(), rng.uniform(), rng.uniform()};
+        places[j] = i % 4 < 2 ? Vec3d{rng.below(2) == 0 ? 0.0 : 1.0, 0, 0}
+                              : Vec3d{rng.uniform(), rng.uniform(), rng.uniform()};
         for (std::size_t n = 0; n < j; ++n) reach = std::max(reach, norm(places[j] - places[n]));
         sum += weights[j];
         all += parts[j];

@@ -109,7 +109,8 @@ TEST_CASE("clips loop without a jump") {
       clip.end = end;
       clip.wrap_time = wrap;
       double jump = 0;
-      for (double t = -2; t < 4; t += 1e-3) jump = std::max(jump, norm(end_of(s, clip, t + 1e-3) - end_of(s, clip, t)));
+      for (double t = -2; t < 4; t += 1e-3)
+        jump = std::max(jump, norm(end_of(s, clip, t + 1e-3) - end_of(s, clip, t)));
       CHECK(jump < 0.02);  // 1 ms; a teleport would be 0.7 m
       LocalPose a, b;
       MotionInput at;
@@ -158,7 +159,8 @@ TEST_CASE("joint matrices become a clip that gives them back") {
       CHECK(norm(pose.translations[0] - s.rest_local[0].translation) < 1e-9);
       forward_kinematics(s, pose, g);
       for (std::size_t j = 0; j < 4; ++j) {
-        CHECK(norm(g[j].translation + pose.root - globals[static_cast<std::size_t>(t)][j].translation) < 1e-9);
+        CHECK(norm(g[j].translation + pose.root - globals[static_cast<std::size_t>(t)][j].translation) <
+              1e-9);
       }
     }
     const Mat3d turned = matrices[5].linear, mirror{{{1, 0, 0}, {0, -1, 0}, {0, 0, 1}}};

@@ -16,7 +16,9 @@ using Pose = RigidPose<double>;
 Pose operator*(const Pose& a, const Pose& b) {
   return {a.rotation * b.rotation, a.translation + rotate(a.rotation, b.translation)};
 }
-Pose inverted(const Pose& a) { return {conjugate(a.rotation), -rotate(conjugate(a.rotation), a.translation)}; }
+Pose inverted(const Pose& a) {
+  return {conjugate(a.rotation), -rotate(conjugate(a.rotation), a.translation)};
+}
 double apart(const Pose& a, const Pose& b) {
   return std::max(norm(a.translation - b.translation), angle_between(a.rotation, b.rotation));
 }

@@ -25,7 +25,8 @@ std::shared_ptr<const AvatarAsset> stiff(const GaussianCloud& cloud) {
   a->skeleton.parents = {-1};
   a->skeleton.rest_local.resize(1);
   a->cloud = cloud;
-  a->set_weights(1, std::vector<std::uint16_t>(cloud.size(), 0), std::vector<float>(cloud.size(), 1.0f)).value();
+  a->set_weights(1, std::vector<std::uint16_t>(cloud.size(), 0), std::vector<float>(cloud.size(), 1.0f))
+      .value();
   return a;
 }
 
@@ -35,7 +36,8 @@ GaussianCloud card(double z, const std::array<float, 3>& rgb) {
   g.mean = {0, 0, z};
   g.log_scales = {std::log(0.3), std::log(0.3), std::log(0.01)};
   g.opacity_logit = 6;
-  for (std::size_t k = 0; k < 3; ++k) g.sh0[k] = static_cast<float>((static_cast<double>(rgb[k]) - 0.5) / kSh0);
+  for (std::size_t k = 0; k < 3; ++k)
+    g.sh0[k] = static_cast<float>((static_cast<double>(rgb[k]) - 0.5) / kSh0);
   b.add(g);
   return b.cloud();
 }
@@ -61,7 +63,8 @@ TEST_CASE("a turned body of SH degree 3 looks as if the camera had gone around i
   const Camera camera = Camera::look_at({0, 0, -3}, {0, 0, 0}, {0, 1, 0}, kSize, kSize, 50);
   Camera around = camera;
   around.viewmat.linear = camera.viewmat.linear * rotation_matrix(turn);
-  // With the usual cut, skinning's roundings decide whether a pixel at the rim of a Gaussian gets 1/255 of it.
+  // With the usual cut, skinning's roundings decide whether a pixel at the rim of a Gaussian gets 1/255
+  // of it.
   RenderConfig config;
   config.alpha_min = 1e-6;
   const auto a = gsnav_test::render<double>(backend, {skin.set()}, camera, config).rgb;
@@ -80,7 +83,9 @@ TEST_CASE("avatar and scene are one list: front, avatar, back") {
   const auto body = stiff(card(0, {0, 1, 0}));
   const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, kSize, kSize, 60);
   const auto nearest_color = [&](double z) {
-    const AvatarActor actor = AvatarActor::create(body, nullptr, std::make_shared<const StandingTrajectory>(Vec3d{0, 0, z})).value();
+    const AvatarActor actor =
+        AvatarActor::create(body, nullptr, std::make_shared<const StandingTrajectory>(Vec3d{0, 0, z}))
+            .value();
     SkinnedGaussians<SerialBackend> skin(backend, body);
     skin.pose(actor, 0).throw_if_error();
     // The order of the sets must not matter: it is by depth.
@@ -113,7 +118,8 @@ TEST_CASE("a backend with memory of its own gives the same picture, and buffers 
   for (const double t : {1.0, 1.3}) {
     a.pose(actor, t).throw_if_error();
     b.pose(actor, t).throw_if_error();
-    const auto x = gsnav_test::render<float>(toy, {a.set()}, camera), y = gsnav_test::render<float>(serial, {b.set()}, camera);
+    const auto x = gsnav_test::render<float>(toy, {a.set()}, camera),
+               y = gsnav_test::render<float>(serial, {b.set()}, camera);
     CHECK(x.rgb == y.rgb);
     float covered = 0;
     for (const float v : x.alpha) covered = std::max(covered, v);
@@ -134,7 +140,8 @@ TEST_CASE("a person seen from the front is opaque: no holes at joints") {
   for (const double phase : {0.0, 0.25, 0.6}) {
     LocalPose pose;
     walk.pose(phase, 1, 0, pose);
-    const AvatarActor actor = AvatarActor::create(person(), std::make_shared<const FixedPose>(pose)).value();
+    const AvatarActor actor =
+        AvatarActor::create(person(), std::make_shared<const FixedPose>(pose)).value();
     SkinnedGaussians<SerialBackend> skin(backend, person());
     skin.pose(actor, 0).throw_if_error();
     const Camera camera = Camera::look_at({0, 1, -2.2}, {0, 0.88, 0}, {0, 1, 0}, 256, 256, 50);
@@ -145,7 +152,9 @@ TEST_CASE("a person seen from the front is opaque: no holes at joints") {
     for (std::size_t y = 6; y < 250; ++y) {
       for (std::size_t x = 6; x < 250; ++x) {
         const std::size_t i = y * 256 + x;
-        if (alpha[i - 3] < 0.9f || alpha[i + 3] < 0.9f || alpha[i - 3 * 256] < 0.9f || alpha[i + 3 * 256] < 0.9f) continue;
+        if (alpha[i - 3] < 0.9f || alpha[i + 3] < 0.9f || alpha[i - 3 * 256] < 0.9f ||
+            alpha[i + 3 * 256] < 0.9f)
+          continue;
         ++inside;
         holes += alpha[i] < 0.9f ? 1 : 0;
       }
@@ -179,7 +188,8 @@ TEST_CASE("an actor that no camera sees is not skinned, and no pixel changes by 
   for (int step = 0; step < 24; ++step) {
     const double a = 6.283185307179586 * step / 24;
     const AvatarActor actor = AvatarActor::create(rest, std::make_shared<const FixedPose>(pose),
-                                                  std::make_shared<const StandingTrajectory>(Vec3d{2.5 * std::sin(a), 0, 2.5 * std::cos(a)}, a))
+                                                  std::make_shared<const StandingTrajectory>(
+                                                      Vec3d{2.5 * std::sin(a), 0, 2.5 * std::cos(a)}, a))
                                   .value();
     const Camera camera = Camera::look_at({0, 1, 0}, {0, 1, 1}, {0, 1, 0}, 48, 48, 60);
     all.pose(actor, 0).throw_if_error();

@@ -27,13 +27,15 @@ double greatest(const Mat3d& m) {
 Mat3d minus(const Mat3d& a, const Mat3d& b) { return a + b * -1.0; }
 
 Quatd quat_of(const AvatarAsset& a, std::size_t i) {
-  return quat_cast<double>(Quatf{a.cloud.quats[0][i], a.cloud.quats[1][i], a.cloud.quats[2][i], a.cloud.quats[3][i]});
+  return quat_cast<double>(
+      Quatf{a.cloud.quats[0][i], a.cloud.quats[1][i], a.cloud.quats[2][i], a.cloud.quats[3][i]});
 }
 Vec3d scales_of(const AvatarAsset& a, std::size_t i) {
   return vec_cast<double>(Vec3f{a.cloud.scales[0][i], a.cloud.scales[1][i], a.cloud.scales[2][i]});
 }
 
-/// A limb along X, 4 cm thick, of flat Gaussians: joint 1 at the middle takes over within 6 cm to either side.
+/// A limb along X, 4 cm thick, of flat Gaussians: joint 1 at the middle takes over within 6 cm to either
+/// side.
 AvatarAsset limb() {
   AvatarAsset asset;
   asset.skeleton.names = {"upper", "lower"};
@@ -47,7 +49,8 @@ AvatarAsset limb() {
   for (int k = 0; k < kAlong; ++k) {
     for (int a = 0; a < kAround; ++a) {
       const double angle = 2 * kPi * (a + 0.5 * (k % 2)) / kAround, x = 0.6 * (k + 0.5) / kAlong;
-      RawGaussian g = gaussian({x, 0.04 * std::cos(angle), 0.04 * std::sin(angle)}, {0.0005, 0.003, 0.003}, 0.9);
+      RawGaussian g =
+          gaussian({x, 0.04 * std::cos(angle), 0.04 * std::sin(angle)}, {0.0005, 0.003, 0.003}, 0.9);
       // Its thin axis points outwards.
       g.quat = axis_angle(Vec3d{1, 0, 0}, angle) * axis_angle(Vec3d{0, 0, 1}, kPi / 2);
       builder.add(g);
@@ -87,7 +90,9 @@ Mat3d true_derivative(const std::vector<Affine3<double>>& joints, const Vec3d& p
 
 }  // namespace
 
-TEST_CASE("singular values: the factors are rotations, the product is the matrix, also near rank one and folded over") {
+TEST_CASE(
+    "singular values: the factors are rotations, the product is the matrix, also near rank one and "
+    "folded over") {
   Rng rng(3);
   double worst = 0, worst_float = 0;
   for (int i = 0; i < 4000; ++i) {
@@ -126,7 +131,8 @@ TEST_CASE("singular values: the factors are rotations, the product is the matrix
   CHECK(worst_float < 2e-5);
 }
 
-TEST_CASE("dual quaternions of joints that differ by a translation give exactly what linear blending gives") {
+TEST_CASE(
+    "dual quaternions of joints that differ by a translation give exactly what linear blending gives") {
   AvatarAsset asset = limb();
   const Quatd turn = axis_angle(normalized(Vec3d{1, 2, 3}), 2.5);
   const std::vector<Affine3<double>> joints{{rotation_matrix(turn), {0.3, -0.2, 1.1}},
@@ -156,7 +162,8 @@ TEST_CASE("a twisted limb keeps its width with dual quaternions and collapses wi
       CHECK(std::abs(std::hypot(p.y, p.z) - 0.04) < 1e-6);
       CHECK(std::abs(p.x - c.x) < 1e-6);
       // Twisted along X by w of the whole, at the place's own weight.
-      const double w = weight_of_parts(asset.skinning_weights[4 * i + (asset.joint_indices[4 * i] == 1 ? 0 : 1)]);
+      const double w =
+          weight_of_parts(asset.skinning_weights[4 * i + (asset.joint_indices[4 * i] == 1 ? 0 : 1)]);
       const double half = degrees * kPi / 360;
       // DLB: the angle whose half's tangent is the blend's.
       const double turned = 2 * std::atan2(w * std::sin(half), 1 - w + w * std::cos(half));
@@ -201,7 +208,8 @@ TEST_CASE("stretched shapes are pushed forward by the skin's own derivative") {
     const bool within = x > 0.26 && x < 0.34;
     if (!within && x > 0.22 && x < 0.38) continue;
     const double sign = asset.joint_indices[4 * i] == 0 ? 1 : -1;
-    const Vec3d g{asset.weight_gradients[9 * i], asset.weight_gradients[9 * i + 1], asset.weight_gradients[9 * i + 2]};
+    const Vec3d g{asset.weight_gradients[9 * i], asset.weight_gradients[9 * i + 1],
+                  asset.weight_gradients[9 * i + 2]};
     CHECK(norm(g - Vec3d{within ? sign / 0.12 : 0.0, 0, 0}) < 0.02 / 0.12);
   }
   for (const double degrees : {30.0, 60.0, 90.0}) {
@@ -212,7 +220,8 @@ TEST_CASE("stretched shapes are pushed forward by the skin's own derivative") {
     std::size_t clamped = 0, checked = 0;
     for (std::size_t i = 0; i < asset.size(); ++i) {
       const Vec3d p = asset.cloud.mean(i), s = scales_of(asset, i);
-      if (std::abs(p.x - 0.24) < 0.02 || std::abs(p.x - 0.36) < 0.02) continue;  // the weight has a kink there
+      if (std::abs(p.x - 0.24) < 0.02 || std::abs(p.x - 0.36) < 0.02)
+        continue;  // the weight has a kink there
       const Mat3d derivative = true_derivative(joints, p);
       const auto axes = [&](const Mat3d& m, const Quatd& q) {
         Mat3d r = m * rotation_matrix(q);
@@ -220,7 +229,8 @@ TEST_CASE("stretched shapes are pushed forward by the skin's own derivative") {
         return r * transpose(r);
       };
       const Mat3d want = axes(derivative, quat_of(asset, i));
-      const Mat3d have = d.factor(i) * transpose(d.factor(i)), single = f.factor(i) * transpose(f.factor(i));
+      const Mat3d have = d.factor(i) * transpose(d.factor(i)),
+                  single = f.factor(i) * transpose(f.factor(i));
       rounding = std::max(rounding, greatest(minus(single, have)) / greatest(have));
       const Svd3<double> e = svd(derivative);
       if (e.values[2] < 0.5 || e.values[0] > 2) {
@@ -229,10 +239,12 @@ TEST_CASE("stretched shapes are pushed forward by the skin's own derivative") {
       }
       ++checked;
       worst = std::max(worst, greatest(minus(have, want)) / greatest(want));
-      turned_only = std::max(turned_only, greatest(minus(axes(Mat3d::identity(), d.quat(i)), want)) / greatest(want));
+      turned_only = std::max(turned_only,
+                             greatest(minus(axes(Mat3d::identity(), d.quat(i)), want)) / greatest(want));
     }
     MESSAGE(degrees << " degrees: " << 100 * worst << " % of the covariance off, " << 100 * turned_only
-                    << " % with the rotation alone; float " << rounding << ", " << clamped << " clamped");
+                    << " % with the rotation alone; float " << rounding << ", " << clamped
+                    << " clamped");
     CHECK(checked > asset.size() / 2);
     CHECK(worst < 0.03);
     CHECK(turned_only > 5 * worst);
@@ -259,7 +271,9 @@ TEST_CASE("stretch stays within its bounds where the skin collapses or folds ove
   }
 }
 
-TEST_CASE("modes: every backend gives the same bits, a crowd those of its members, and unfit arrays are named") {
+TEST_CASE(
+    "modes: every backend gives the same bits, a crowd those of its members, and unfit arrays are "
+    "named") {
   for (const Skinning mode : {Skinning::dual_quaternion, Skinning::linear_stretched}) {
     AvatarAsset asset = limb();
     if (mode == Skinning::linear_stretched) bake_weight_gradients(asset).throw_if_error();
@@ -267,7 +281,8 @@ TEST_CASE("modes: every backend gives the same bits, a crowd those of its member
     const auto shared = std::make_shared<const AvatarAsset>(asset);
     LocalPose pose = asset.skeleton.rest_pose();
     pose.rotations[1] = axis_angle(Vec3d{0, 1, 0}, 1.4);
-    const AvatarActor actor = AvatarActor::create(shared, std::make_shared<const FixedPose>(pose)).value();
+    const AvatarActor actor =
+        AvatarActor::create(shared, std::make_shared<const FixedPose>(pose)).value();
     const auto want = skin_all<float, float>(asset, joint_matrices(asset, pose));
 #if defined(_OPENMP)
     OpenMPBackend backend(3);
@@ -286,7 +301,8 @@ TEST_CASE("modes: every backend gives the same bits, a crowd those of its member
       for (std::size_t i = 0; i < asset.size(); ++i) {
         for (std::size_t k = 0; k < 3; ++k) REQUIRE(v.means[k][i] == want.means[k][i]);
         for (std::size_t k = 0; k < 4; ++k) REQUIRE(v.quats[k][i] == want.quats[k][i]);
-        for (std::size_t k = 0; k < 9 && mode == Skinning::linear_stretched; ++k) REQUIRE(v.axes[k][i] == want.axes[k][i]);
+        for (std::size_t k = 0; k < 9 && mode == Skinning::linear_stretched; ++k)
+          REQUIRE(v.axes[k][i] == want.axes[k][i]);
       }
       CHECK(v.axes[0].empty() == (mode != Skinning::linear_stretched));
     }
@@ -308,7 +324,8 @@ TEST_CASE("modes: every backend gives the same bits, a crowd those of its member
   args.weight_gradients = view_of(gradients);
   CHECK(skin_gaussians<float>(backend, args).message().find("linear blending") != std::string::npos);
   args.dual_joints = {};
-  CHECK(skin_gaussians<float>(backend, args).message().find("weight_gradients has 9") != std::string::npos);
+  CHECK(skin_gaussians<float>(backend, args).message().find("weight_gradients has 9") !=
+        std::string::npos);
 }
 
 TEST_CASE("the box of a body holds it in every mode") {

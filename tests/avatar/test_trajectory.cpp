@@ -18,7 +18,8 @@ struct Rates {
 double distance_to(const std::vector<Vec3d>& path, bool closed, const Vec3d& p) {
   double best = std::numeric_limits<double>::max();
   for (std::size_t i = closed ? 0 : 1; i < path.size(); ++i) {
-    best = std::min(best, std::sqrt(segment_distance2(path[(i + path.size() - 1) % path.size()], path[i], p)));
+    best = std::min(best,
+                    std::sqrt(segment_distance2(path[(i + path.size() - 1) % path.size()], path[i], p)));
   }
   return best;
 }
@@ -92,7 +93,8 @@ TEST_CASE("a walker faces where it goes, at its speed") {
 
 TEST_CASE("a closed path without sharp corners is walked without a stop") {
   std::vector<Vec3d> circle;
-  for (int k = 0; k < 24; ++k) circle.push_back({2 * std::cos(k * 0.2617993878), 0, 2 * std::sin(k * 0.2617993878)});
+  for (int k = 0; k < 24; ++k)
+    circle.push_back({2 * std::cos(k * 0.2617993878), 0, 2 * std::sin(k * 0.2617993878)});
   WalkOptions o;
   o.closed = true;
   const WalkTrajectory w = WalkTrajectory::create(circle, o).value();

@@ -27,7 +27,8 @@ MotionClip wandering() {
     walk.pose(t / 25.0, 1, 0, pose);
     pose.rotations[0] = axis_angle(Vec3d{0, 1, 0}, t / 40.0) * pose.rotations[0];
     clip.rotations.insert(clip.rotations.end(), pose.rotations.begin(), pose.rotations.end());
-    clip.translations.insert(clip.translations.end(), pose.translations.begin(), pose.translations.end());
+    clip.translations.insert(clip.translations.end(), pose.translations.begin(),
+                             pose.translations.end());
     clip.root_translation.push_back({0.02 * t, 0, -0.05 * t});
   }
   return clip;
@@ -53,19 +54,23 @@ TEST_CASE("a clip that loops brings every joint back without a jump, as fast as 
     MotionClip clip = wandering();
     clip.end = end;
     const auto speed_over_wrap = [&](const MotionClip& c) {
-      const AvatarActor actor = AvatarActor::create(person(), std::make_shared<const MotionClip>(c)).value();
+      const AvatarActor actor =
+          AvatarActor::create(person(), std::make_shared<const MotionClip>(c)).value();
       return furthest(actor, c.duration() - 0.01, c.period() + 0.01, kStep) / kStep;
     };
     const double abrupt = speed_over_wrap(clip);
     CHECK(abrupt > 5);  // what there is to mend
     clip.wrap_time = smooth_wrap_time(person()->skeleton, clip, end == ClipEnd::loop_forward, 1.5);
     // At the ends the clip's own motion is in it; a key is 33 ms, the recording's hands are faster.
-    const AvatarActor actor = AvatarActor::create(person(), std::make_shared<const MotionClip>(clip)).value();
+    const AvatarActor actor =
+        AvatarActor::create(person(), std::make_shared<const MotionClip>(clip)).value();
     CHECK(furthest(actor, clip.duration() + kStep, clip.period() - kStep, kStep) <= 1.5 * kStep * 1.02);
     const double inside = furthest(actor, 0, clip.duration(), kStep);
-    CHECK(furthest(actor, clip.duration() - 0.1, clip.period() + 0.1, kStep) <= std::max(inside, 1.5 * kStep * 1.02));
+    CHECK(furthest(actor, clip.duration() - 0.1, clip.period() + 0.1, kStep) <=
+          std::max(inside, 1.5 * kStep * 1.02));
     // A thousandth of a second before the wrap's end it is nearly there.
-    const auto a = joints_in_world(actor, clip.period() - 1e-9), b = joints_in_world(actor, clip.period() + 1e-9);
+    const auto a = joints_in_world(actor, clip.period() - 1e-9),
+               b = joints_in_world(actor, clip.period() + 1e-9);
     for (std::size_t j = 0; j < a.size(); ++j) CHECK(norm(a[j] - b[j]) < 1e-7);
   }
   MotionClip closed = wandering();
@@ -91,7 +96,8 @@ TEST_CASE("where the scene's clock begins again everybody gets back by and by") 
   CHECK(furthest(actor, 0.0, 11.0, kStep) <= furthest(once, 0.0, 2.0, kStep) * 1.001);
   CHECK(furthest(actor, 2.0 + kStep, 5.0 - kStep, kStep) < 2.5 * kStep);
   for (const double t : {0.0, 0.7, 1.99}) {
-    const auto a = joints_in_world(actor, t), b = joints_in_world(once, t), c = joints_in_world(actor, t + 15.0);
+    const auto a = joints_in_world(actor, t), b = joints_in_world(once, t),
+               c = joints_in_world(actor, t + 15.0);
     for (std::size_t j = 0; j < a.size(); ++j) {
       CHECK(norm(a[j] - b[j]) < 1e-12);
       CHECK(norm(a[j] - c[j]) < 1e-9);
@@ -119,7 +125,8 @@ TEST_CASE("who is not there at both ends of a looping clock is gone while others
   late.dynamic_capsules(5.9, 6.1, 0, none);
   CHECK_FALSE(none.empty());
   options.loop_blend = 6;
-  CHECK(AvatarActor::create(person(), nullptr, nullptr, options).message().find("loop_blend") != std::string::npos);
+  CHECK(AvatarActor::create(person(), nullptr, nullptr, options).message().find("loop_blend") !=
+        std::string::npos);
 }
 
 TEST_CASE("who leaves or comes while a looping clock's step is taken sweeps through nothing") {
@@ -139,20 +146,23 @@ TEST_CASE("who leaves or comes while a looping clock's step is taken sweeps thro
       options.time_end = begin + 5;
       options.loop_period = 10 + blend;
       options.loop_blend = blend;
-      const AvatarActor actor = AvatarActor::create(person(), nullptr, std::make_shared<Line>(), options).value();
+      const AvatarActor actor =
+          AvatarActor::create(person(), nullptr, std::make_shared<Line>(), options).value();
       for (const double edge : {begin, begin + 5, begin + options.loop_period}) {
         for (const double before : {0.05, 0.1, 0.2}) {
           std::vector<DynamicCapsule> moved;
           actor.dynamic_capsules(edge - before, edge - before + 0.25, 0, moved);
           CAPTURE(edge - before);
-          for (const DynamicCapsule& m : moved) CHECK(norm(m.motion.begin.p0 - m.motion.end.p0) < 0.25 * 3.5);
+          for (const DynamicCapsule& m : moved)
+            CHECK(norm(m.motion.begin.p0 - m.motion.end.p0) < 0.25 * 3.5);
         }
       }
     }
   }
 }
 
-TEST_CASE("who is there for less than a step of a looping clock is in that step, as it is while it is there") {
+TEST_CASE(
+    "who is there for less than a step of a looping clock is in that step, as it is while it is there") {
   /// Walks at 1.2 m/s, whatever the time.
   struct Line : Trajectory {
     TrajectorySample at(double t) const override {
@@ -162,16 +172,20 @@ TEST_CASE("who is there for less than a step of a looping clock is in that step,
     }
   };
   constexpr double kStep = 0.25;
-  const auto apart = [](const Capsule<double>& a, const Capsule<double>& b) { return std::max(norm(a.p0 - b.p0), norm(a.p1 - b.p1)); };
+  const auto apart = [](const Capsule<double>& a, const Capsule<double>& b) {
+    return std::max(norm(a.p0 - b.p0), norm(a.p1 - b.p1));
+  };
   for (const double blend : {0.0, 0.3}) {
-    for (const double begin : {-0.04, 0.0, 0.6, 0.93, 1.4}) {  // the fourth is cut off by the clock's end, or by its blend
+    for (const double begin :
+         {-0.04, 0.0, 0.6, 0.93, 1.4}) {  // the fourth is cut off by the clock's end, or by its blend
       for (const double length : {0.02, 0.1}) {
         ActorOptions options;
         options.time_begin = begin;
         options.time_end = begin + length;
         options.loop_period = 1.0 + blend;
         options.loop_blend = blend;
-        const AvatarActor actor = AvatarActor::create(person(), nullptr, std::make_shared<Line>(), options).value();
+        const AvatarActor actor =
+            AvatarActor::create(person(), nullptr, std::make_shared<Line>(), options).value();
         const double come = std::max(begin, 0.0), leave = std::min(begin + length, 1.0 - 1e-9);
         CAPTURE(blend);
         CAPTURE(begin);
@@ -189,7 +203,8 @@ TEST_CASE("who is there for less than a step of a looping clock is in that step,
           CAPTURE(t0);
           REQUIRE(moved.size() == (rounds.empty() ? 0 : person()->capsules.size()));
           if (rounds.size() != 1) continue;
-          const auto first = actor.capsules(std::max(t0, rounds[0] + come + 1e-9)), last = actor.capsules(std::min(t1, rounds[0] + leave - 1e-9));
+          const auto first = actor.capsules(std::max(t0, rounds[0] + come + 1e-9)),
+                     last = actor.capsules(std::min(t1, rounds[0] + leave - 1e-9));
           REQUIRE(first.size() == moved.size());
           REQUIRE(last.size() == moved.size());
           for (std::size_t c = 0; c < moved.size(); ++c) {

@@ -41,7 +41,8 @@ inline TestBody makehuman_body(const std::string& sex) {
 }
 
 /// Joint to root frame, [J], at a time of a clip.
-inline std::vector<gsnav::Affine3<double>> joints_at(const gsnav::Skeleton& skeleton, const gsnav::LocalPose& pose) {
+inline std::vector<gsnav::Affine3<double>> joints_at(const gsnav::Skeleton& skeleton,
+                                                     const gsnav::LocalPose& pose) {
   std::vector<gsnav::Affine3<double>> out;
   gsnav::forward_kinematics(skeleton, pose, out);
   return out;
@@ -49,7 +50,8 @@ inline std::vector<gsnav::Affine3<double>> joints_at(const gsnav::Skeleton& skel
 
 /// `count` poses over the clip, joint to root frame.
 inline std::vector<std::vector<gsnav::Affine3<double>>> poses_of(const gsnav::Skeleton& skeleton,
-                                                                 const gsnav::MotionClip& clip, int count) {
+                                                                 const gsnav::MotionClip& clip,
+                                                                 int count) {
   std::vector<std::vector<gsnav::Affine3<double>>> out;
   for (int k = 0; k < count; ++k) {
     gsnav::LocalPose pose;

@@ -7,11 +7,11 @@
 #include <string>
 
 #include "avatar_files/bodies.hpp"
+#include "gsnav/core/rng.hpp"
 #include "gsnav/detail/avatar/capsule_fit.hpp"
 #include "gsnav/detail/avatar/capsule_volume.hpp"
 #include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/detail/avatar/mesh_avatar.hpp"
-#include "gsnav/core/rng.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -28,7 +28,8 @@ double held(const AvatarAsset& asset, const std::vector<ProxyCapsule>& capsules,
     long double x[3] = {0, 0, 0};
     for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
       const Vec3d p = joints[asset.joint_indices[k]] * asset.cloud.mean(i);
-      for (int c = 0; c < 3; ++c) x[c] += static_cast<long double>(p[c]) * asset.skinning_weights[k] / 65535.0L;
+      for (int c = 0; c < 3; ++c)
+        x[c] += static_cast<long double>(p[c]) * asset.skinning_weights[k] / 65535.0L;
     }
     bool in = false;
     for (const ProxyCapsule& c : capsules) {
@@ -40,7 +41,8 @@ double held(const AvatarAsset& asset, const std::vector<ProxyCapsule>& capsules,
       }
       const long double t = ab2 > 0 ? std::clamp(along / ab2, 0.0L, 1.0L) : 0.0L;
       for (int k = 0; k < 3; ++k) {
-        const long double d = x[k] - static_cast<long double>(a[k]) - t * static_cast<long double>(b[k] - a[k]);
+        const long double d =
+            x[k] - static_cast<long double>(a[k]) - t * static_cast<long double>(b[k] - a[k]);
         d2 += d * d;
       }
       in = in || std::sqrt(d2) <= static_cast<long double>(c.radius) + 1e-12L;
@@ -50,20 +52,26 @@ double held(const AvatarAsset& asset, const std::vector<ProxyCapsule>& capsules,
   return static_cast<double>(inside) / static_cast<double>(asset.size());
 }
 
-void check_body(const char* name, AvatarAsset asset, const std::vector<std::vector<Affine3<double>>>& poses) {
+void check_body(const char* name, AvatarAsset asset,
+                const std::vector<std::vector<Affine3<double>>>& poses) {
   const auto r = fit_body_capsules(asset, poses);
   CAPTURE(r.status().message());
   REQUIRE(r.ok());
   const CapsuleReport thin = measure_capsules(asset, habitat_capsules(asset.skeleton), poses);
   std::printf(
-      "%s: %zu capsules by percentile %.4f hold at least %.4f of the centres in %zu poses, %.1f mm outside at most; "
-      "over-cover %.1f mm mean, %.1f mm p99. A tenth of the bones' lengths (%zu capsules): %.4f, %.1f mm outside\n",
-      name, r->capsules, r->percentile, r->contained_least, r->poses, 1e3 * r->outside_greatest, 1e3 * r->over_mean,
-      1e3 * r->over_p99, thin.capsules, thin.contained_least, 1e3 * thin.outside_greatest);
-  std::printf("  of %.1f l of body %.2f %% uncovered, %.2f %% in the worst pose; %.0f %% of it over-covered. By the bones' "
-              "lengths %.1f %% uncovered\n",
-              1e3 * r->body_volume, 100 * r->uncovered_mean, 100 * r->uncovered_greatest, 100 * r->over_volume,
-              100 * thin.uncovered_mean);
+      "%s: %zu capsules by percentile %.4f hold at least %.4f of the centres in %zu poses, %.1f mm "
+      "outside at most; "
+      "over-cover %.1f mm mean, %.1f mm p99. A tenth of the bones' lengths (%zu capsules): %.4f, %.1f "
+      "mm outside\n",
+      name, r->capsules, r->percentile, r->contained_least, r->poses, 1e3 * r->outside_greatest,
+      1e3 * r->over_mean, 1e3 * r->over_p99, thin.capsules, thin.contained_least,
+      1e3 * thin.outside_greatest);
+  std::printf(
+      "  of %.1f l of body %.2f %% uncovered, %.2f %% in the worst pose; %.0f %% of it over-covered. By "
+      "the bones' "
+      "lengths %.1f %% uncovered\n",
+      1e3 * r->body_volume, 100 * r->uncovered_mean, 100 * r->uncovered_greatest, 100 * r->over_volume,
+      100 * thin.uncovered_mean);
   CHECK(r->uncovered_greatest < 0.02);
   CHECK(thin.uncovered_mean > 0.5);
   double least = 1;
@@ -82,8 +90,9 @@ TEST_CASE("fitted capsules of a body that is capsules are those capsules") {
   AvatarAsset asset;
   asset.skeleton.names = {"low", "high"};
   asset.skeleton.parents = {-1, 0};
-  asset.skeleton.rest_local = {{Mat3d::identity(), {0, 1, 0}},
-                               {rotation_matrix(axis_angle(normalized(Vec3d{1, 2, 3}), 0.8)), {0.8, 0, 0}}};
+  asset.skeleton.rest_local = {
+      {Mat3d::identity(), {0, 1, 0}},
+      {rotation_matrix(axis_angle(normalized(Vec3d{1, 2, 3}), 0.8)), {0.8, 0, 0}}};
   GaussianCloudBuilder builder(0);
   RawGaussian g;
   g.opacity_logit = 3;
@@ -95,9 +104,9 @@ TEST_CASE("fitted capsules of a body that is capsules are those capsules") {
     for (int i = 0; i < 8000; ++i) {
       const Vec3d d = normalized(Vec3d{rng.normal(), rng.normal(), rng.normal()});
       const Vec3d axis = normalized(ends[c][1] - ends[c][0]);
-      g.mean = i % 2 == 0
-                   ? (dot(d, axis) > 0 ? ends[c][1] : ends[c][0]) + d * radii[c]
-                   : lerp(ends[c][0], ends[c][1], rng.uniform()) + normalized(d - axis * dot(d, axis)) * radii[c];
+      g.mean = i % 2 == 0 ? (dot(d, axis) > 0 ? ends[c][1] : ends[c][0]) + d * radii[c]
+                          : lerp(ends[c][0], ends[c][1], rng.uniform()) +
+                                normalized(d - axis * dot(d, axis)) * radii[c];
       builder.add(g);
       joints.push_back(c);
     }
@@ -122,7 +131,8 @@ TEST_CASE("fitted capsules of a body that is capsules are those capsules") {
   options.percentile = 0.2;
   CHECK(fit_body_capsules(asset, {pose}, options).message().find("percentile") != std::string::npos);
   CHECK(fit_body_capsules(asset, {}, {}).message().find("no poses") != std::string::npos);
-  CHECK(fit_body_capsules(asset, {{pose[0]}}, {}).message().find("a pose of 1 joints") != std::string::npos);
+  CHECK(fit_body_capsules(asset, {{pose[0]}}, {}).message().find("a pose of 1 joints") !=
+        std::string::npos);
 }
 
 TEST_CASE("capsules hold people while they walk") {
@@ -160,7 +170,8 @@ TEST_CASE("volumes of a ball, and of what capsules leave of it and cover beside 
   CHECK(small.uncovered == doctest::Approx(volume * 19.0 / 27).epsilon(0.03));
   CHECK(small.over == 0);
   // Twice as wide, and one that stands apart.
-  const CapsuleVolume large = measure_capsule_volume(ball, {{{0, 1, 0}, {0, 1, 0}, 0.6}, {{2, 1, 0}, {2, 1.5, 0}, 0.1}});
+  const CapsuleVolume large =
+      measure_capsule_volume(ball, {{{0, 1, 0}, {0, 1, 0}, 0.6}, {{2, 1, 0}, {2, 1.5, 0}, 0.1}});
   CHECK(large.uncovered == 0);
   const double apart = 3.14159265358979 * 0.01 * (0.5 + 4.0 / 3 * 0.1);
   CHECK(large.over == doctest::Approx(7 * volume + apart).epsilon(0.02));

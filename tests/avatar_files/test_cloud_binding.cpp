@@ -5,8 +5,8 @@
 #include <limits>
 #include <vector>
 
-#include "gsnav/detail/avatar/cloud_binding.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/avatar/cloud_binding.hpp"
 
 using namespace gsnav;
 
@@ -65,7 +65,8 @@ TEST_CASE("Gaussians around a body take the weights of the surface below them, i
   g.log_scales = {std::log(0.02), std::log(0.01), std::log(0.001)};
   const Similarity mesh_from_cloud{{}, {1, 0.5, 0}, 0.4};
   for (int i = 0; i < 500; ++i) {
-    const Vec3d p{rng.uniform(0, 2), rng.uniform(-0.04, 0.04) + (i % 50 == 0 ? 1 : 0), rng.uniform(0, 0.1)};
+    const Vec3d p{rng.uniform(0, 2), rng.uniform(-0.04, 0.04) + (i % 50 == 0 ? 1 : 0),
+                  rng.uniform(0, 0.1)};
     g.mean = inverse(mesh_from_cloud) * p;
     builder.add(g);
   }
@@ -87,7 +88,8 @@ TEST_CASE("Gaussians around a body take the weights of the surface below them, i
   options.mesh_from_cloud.rotation = axis_angle(Vec3d{0, 1, 0}, 0.5);
   CHECK(bind_cloud(builder.cloud(), m, options).code() == Errc::unsupported);
   options.mesh_from_cloud = {{}, {100, 0, 0}, 1};
-  CHECK(bind_cloud(builder.cloud(), m, options).message().find("no Gaussian lies within") != std::string::npos);
+  CHECK(bind_cloud(builder.cloud(), m, options).message().find("no Gaussian lies within") !=
+        std::string::npos);
   options.furthest = 0;
   CHECK(bind_cloud(builder.cloud(), m, options).message().find("furthest") != std::string::npos);
   options.mesh_from_cloud.scale = 0;

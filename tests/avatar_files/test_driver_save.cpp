@@ -46,7 +46,8 @@ TEST_CASE("a driver and its capsules come back, and the capsules find their join
     }
   }
   CHECK(worst < 1e-6);
-  const TrackedCapsules tracked = capsules_from_track(person.skeleton, driver->clip, driver->capsules).value();
+  const TrackedCapsules tracked =
+      capsules_from_track(person.skeleton, driver->clip, driver->capsules).value();
   CHECK(tracked.error < 2e-6);
   REQUIRE(tracked.capsules.size() == person.capsules.size());
   for (std::size_t c = 0; c < person.capsules.size(); ++c) {
@@ -70,7 +71,8 @@ TEST_CASE("a driver and its capsules come back, and the capsules find their join
   fails([](auto& f) { f.matrices.pop_back(); }, "no multiple of 55");
   fails([](auto& f) { f.matrices.clear(); }, "matrices");
   fails([](auto& f) { f.matrices[3].translation.y = NAN; }, "not finite");
-  fails([](auto& f) { f.matrices[58].linear = f.matrices[58].linear * 2.0; }, "frame 1, joint 3 is not rigid");
+  fails([](auto& f) { f.matrices[58].linear = f.matrices[58].linear * 2.0; },
+        "frame 1, joint 3 is not rigid");
   fails([](auto& f) { f.matrices[3].linear(1, 1) = NAN; }, "frame 0, joint 3 is not rigid");
   fails([](auto& f) { f.capsules[1][0].radius = -1; }, "negative radius");
   fails([](auto& f) { f.capsules[1][0].p1.x = NAN; }, "not finite");

@@ -11,10 +11,10 @@
 #include "avatar_files/bodies.hpp"
 #include "avatar_files/zbuffer.hpp"
 #include "gsnav/avatar/actor.hpp"
-#include "gsnav/detail/avatar/mesh_avatar.hpp"
-#include "gsnav/detail/avatar/mesh_surface.hpp"
 #include "gsnav/avatar/skinned_gaussians.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/detail/avatar/mesh_avatar.hpp"
+#include "gsnav/detail/avatar/mesh_surface.hpp"
 #include "gsnav/scene/renderer.hpp"
 
 using namespace gsnav;
@@ -33,14 +33,17 @@ SkinnedMesh tube() {
   const int around = 24, rings = 20;
   for (int r = 0; r <= rings; ++r) {
     for (int k = 0; k < around; ++k) {
-      const double a = 6.283185307179586 * k / around, radius = 0.15 - 0.003 * r, h = static_cast<double>(r) / rings;
+      const double a = 6.283185307179586 * k / around, radius = 0.15 - 0.003 * r,
+                   h = static_cast<double>(r) / rings;
       m.positions.push_back({radius * std::cos(a), h, radius * std::sin(a)});
       m.joint_indices.insert(m.joint_indices.end(), {0, 1});
       const float w = static_cast<float>(std::clamp(5 * (h - 0.4), 0.0, 1.0));
       m.weights.insert(m.weights.end(), {1 - w, w});
       m.colors.push_back({h, 0.25, 1 - h});
       if (r == rings) continue;
-      const auto v = [&](int ring, int at) { return static_cast<std::uint32_t>(ring * around + at % around); };
+      const auto v = [&](int ring, int at) {
+        return static_cast<std::uint32_t>(ring * around + at % around);
+      };
       m.triangles.push_back({v(r, k), v(r + 1, k), v(r, k + 1)});
       m.triangles.push_back({v(r, k + 1), v(r + 1, k), v(r + 1, k + 1)});
     }
@@ -58,7 +61,8 @@ struct Comparison {
   std::size_t inner = 0;
 };
 
-Comparison compare(const SkinnedMesh& mesh, const AvatarAsset& asset, const LocalPose& pose, const Camera& camera) {
+Comparison compare(const SkinnedMesh& mesh, const AvatarAsset& asset, const LocalPose& pose,
+                   const Camera& camera) {
   const auto shared = std::make_shared<const AvatarAsset>(asset);
   const AvatarActor actor = AvatarActor::create(shared, std::make_shared<const FixedPose>(pose)).value();
   OpenMPBackend backend;
@@ -91,8 +95,9 @@ Comparison compare(const SkinnedMesh& mesh, const AvatarAsset& asset, const Loca
       ++out.inner;
       open += frame.alpha[at] < 0.9f ? 1 : 0;
       for (int c = 0; c < 3; ++c) {
-        out.color +=
-            std::abs(static_cast<double>(frame.rgb[3 * at + static_cast<std::size_t>(c)]) - image.rgb[at][c]) / 3;
+        out.color += std::abs(static_cast<double>(frame.rgb[3 * at + static_cast<std::size_t>(c)]) -
+                              image.rgb[at][c]) /
+                     3;
       }
       depth.push_back(std::abs(static_cast<double>(frame.median_depth[at]) - image.depth[at]));
     }
@@ -150,10 +155,11 @@ TEST_CASE("mesh avatar: a bent tube looks like its mesh") {
   for (const double degrees : {0.0, 60.0, 90.0}) {
     LocalPose pose = mesh.skeleton.rest_pose();
     pose.rotations[1] = axis_angle(Vec3d{0, 0, 1}, degrees * 0.017453292519943295);
-    const Comparison c =
-        compare(mesh, asset, pose, Camera::look_at({0.2, 1.2, -1.6}, {-0.1, 0.5, 0}, {0, 1, 0}, 400, 400, 50));
-    MESSAGE(degrees << " degrees: outline " << c.union_share << ", holes " << c.holes << ", colour " << c.color
-                    << ", depth p99 " << 1e3 * c.depth_p99 << " mm, " << c.inner << " pixels");
+    const Comparison c = compare(
+        mesh, asset, pose, Camera::look_at({0.2, 1.2, -1.6}, {-0.1, 0.5, 0}, {0, 1, 0}, 400, 400, 50));
+    MESSAGE(degrees << " degrees: outline " << c.union_share << ", holes " << c.holes << ", colour "
+                    << c.color << ", depth p99 " << 1e3 * c.depth_p99 << " mm, " << c.inner
+                    << " pixels");
     CHECK(c.inner > 10000);
     CHECK(c.union_share > 0.94);  // a Gaussian is drawn wider by half a pixel
     CHECK(c.holes < 1e-3);
@@ -217,10 +223,11 @@ TEST_CASE("mesh avatar: real bodies beside their meshes") {
           Camera::look_at(middle + Vec3d{0.6 * side, 0.4, -2.0 * side}, middle, {0, 1, 0}, 480, 480, 55);
       const Comparison r = compare(mesh, a.asset, pose, camera);
       std::printf(
-          "%s: %zu Gaussians %.1f mm apart, K = %d off by %.3f mm; outline %.3f, holes %.5f, colour %.4f, depth p99 "
+          "%s: %zu Gaussians %.1f mm apart, K = %d off by %.3f mm; outline %.3f, holes %.5f, colour "
+          "%.4f, depth p99 "
           "%.1f mm\n",
-          c.name, a.asset.size(), 1e3 * a.spacing, a.weights.influences, 1e3 * a.weights.position_error, r.union_share,
-          r.holes, r.color, 1e3 * r.depth_p99);
+          c.name, a.asset.size(), 1e3 * a.spacing, a.weights.influences, 1e3 * a.weights.position_error,
+          r.union_share, r.holes, r.color, 1e3 * r.depth_p99);
       CHECK(r.inner > 8000);
       CHECK(r.union_share > 0.90);
       CHECK(r.holes < 2e-3);

@@ -17,9 +17,11 @@ using namespace gsnav_test;
 
 namespace {
 
-/// Greatest angle by which the float32 orientation is off, degrees, and the share of Gaussians whose blend lies
-/// so near to the determinant below which the greatest joint decides that float and double may decide otherwise.
-void compare(const char* name, const AvatarAsset& asset, const std::vector<std::vector<Affine3<double>>>& poses) {
+/// Greatest angle by which the float32 orientation is off, degrees, and the share of Gaussians whose
+/// blend lies so near to the determinant below which the greatest joint decides that float and double
+/// may decide otherwise.
+void compare(const char* name, const AvatarAsset& asset,
+             const std::vector<std::vector<Affine3<double>>>& poses) {
   double distance = 0, angle = 0;
   std::size_t undecided = 0;
   const std::size_t row = static_cast<std::size_t>(asset.influences);
@@ -30,7 +32,8 @@ void compare(const char* name, const AvatarAsset& asset, const std::vector<std::
     for (std::size_t i = 0; i < asset.size(); ++i) {
       Mat3d blend{};
       for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
-        blend = blend + joints[asset.joint_indices[k]].linear * weight_of_parts(asset.skinning_weights[k]);
+        blend =
+            blend + joints[asset.joint_indices[k]].linear * weight_of_parts(asset.skinning_weights[k]);
       }
       distance = std::max(distance, norm(f.mean(i) - d.mean(i)));
       if (std::abs(determinant(blend) - kMinBlendDeterminant) < 1e-4) {
@@ -40,8 +43,9 @@ void compare(const char* name, const AvatarAsset& asset, const std::vector<std::
       }
     }
   }
-  std::printf("%s: float32 skinning is off by %.5f mm and %.6f degrees at most in %zu poses (%zu undecided)\n", name,
-              1e3 * distance, angle, poses.size(), undecided);
+  std::printf(
+      "%s: float32 skinning is off by %.5f mm and %.6f degrees at most in %zu poses (%zu undecided)\n",
+      name, 1e3 * distance, angle, poses.size(), undecided);
   CHECK(distance <= 2e-5);
   CHECK(angle <= 0.01);
   CHECK(undecided < asset.size() / 1000);
@@ -56,7 +60,8 @@ TEST_CASE("real bodies are skinned to 0.02 mm and 0.01 degrees") {
     const TestBody body = gltf_body(name);
     if (!body.ok) continue;
     const AvatarAsset asset = make_mesh_avatar(body.loaded.mesh, options).value().asset;
-    for (const auto& clip : body.loaded.clips) compare(name, asset, poses_of(asset.skeleton, clip.clip, 8));
+    for (const auto& clip : body.loaded.clips)
+      compare(name, asset, poses_of(asset.skeleton, clip.clip, 8));
   }
   const TestBody body = makehuman_body("female");
   if (!body.ok) return;

@@ -33,8 +33,10 @@ MotionClip recorded(const Skeleton& skeleton, double heading, bool on_the_spot) 
     pose.rotations[0] = turn * pose.rotations[0];
     pose.translations[0] = rotate(turn, pose.translations[0]);
     clip.rotations.insert(clip.rotations.end(), pose.rotations.begin(), pose.rotations.end());
-    clip.translations.insert(clip.translations.end(), pose.translations.begin(), pose.translations.end());
-    clip.root_translation.push_back(on_the_spot ? Vec3d{} : rotate(turn, Vec3d{0, 0, -walk.stride() * k / 60.0}));
+    clip.translations.insert(clip.translations.end(), pose.translations.begin(),
+                             pose.translations.end());
+    clip.root_translation.push_back(on_the_spot ? Vec3d{}
+                                                : rotate(turn, Vec3d{0, 0, -walk.stride() * k / 60.0}));
   }
   return clip;
 }
@@ -69,10 +71,12 @@ TEST_CASE("feet are found by where they are") {
     const auto rest = s.rest_globals();
     REQUIRE(f.sole.size() == 3);
     for (const SolePoint& p : f.sole) CHECK((rest[p.joint] * p.local).y == doctest::Approx(0.0));
-    CHECK((rest[f.sole[0].joint] * f.sole[0].local).z > (rest[f.sole[1].joint] * f.sole[1].local).z + 0.1);
+    CHECK((rest[f.sole[0].joint] * f.sole[0].local).z >
+          (rest[f.sole[1].joint] * f.sole[1].local).z + 0.1);
   }
   FootSlideMeter meter({Foot{{0}, {{0, {}}}}});
-  for (int k = 0; k < 10; ++k) meter.add({{Mat3d::identity(), {0.001 * k, k < 5 ? 0.0 : 0.1, 0}}}, {0.02 * k, 0, 0});
+  for (int k = 0; k < 10; ++k)
+    meter.add({{Mat3d::identity(), {0.001 * k, k < 5 ? 0.0 : 0.1, 0}}}, {0.02 * k, 0, 0});
   const FootSlide slide = meter.measure();
   CHECK(slide.contacts == 1);
   CHECK(slide.total == doctest::Approx(0.004));
@@ -91,9 +95,9 @@ TEST_CASE("a recorded walk goes where it is sent without sliding, whatever its o
       CHECK(walk.keys() == 60);
       CHECK(walk.stride() == doctest::Approx(truth).epsilon(0.03));
       const FootSlide slide = slide_of(s, walk, 6.0);
-      MESSAGE("heading " << heading << std::string(on_the_spot ? ", on the spot" : "") << ": stride " << walk.stride()
-                         << " of " << truth << " m, feet slide " << 1e3 * slide.mean << " mm a step, "
-                         << 1e3 * slide.greatest << " at most");
+      MESSAGE("heading " << heading << std::string(on_the_spot ? ", on the spot" : "") << ": stride "
+                         << walk.stride() << " of " << truth << " m, feet slide " << 1e3 * slide.mean
+                         << " mm a step, " << 1e3 * slide.greatest << " at most");
       CHECK(slide.contacts >= 8);
       CHECK(slide.mean < pinned.mean + 0.012);
       // It stands on the floor, faces -Z, and repeats after a stride.
@@ -104,9 +108,12 @@ TEST_CASE("a recorded walk goes where it is sent without sliding, whatever its o
       walk.pose(in, a);
       in.distance += 3 * walk.stride();
       walk.pose(in, b);
-      for (std::size_t j = 0; j < s.size(); ++j) CHECK(std::abs(dot(a.rotations[j], b.rotations[j])) > 1 - 1e-9);
+      for (std::size_t j = 0; j < s.size(); ++j)
+        CHECK(std::abs(dot(a.rotations[j], b.rotations[j])) > 1 - 1e-9);
       const auto joints = joints_at(s, a);
-      const auto at = [&](const char* n) { return joints[static_cast<std::size_t>(s.find(n))].translation; };
+      const auto at = [&](const char* n) {
+        return joints[static_cast<std::size_t>(s.find(n))].translation;
+      };
       CHECK(at("left_hip").x < at("right_hip").x - 0.1);
       double low = 9;
       for (const Foot& f : find_feet(s)) {
@@ -124,7 +131,8 @@ TEST_CASE("a recorded walk goes where it is sent without sliding, whatever its o
   options.turn_per_cycle = 0;
   CHECK(ClipWalk::create(s, clip, options).message().find("turn_per_cycle") != std::string::npos);
   for (std::size_t t = 1; t < clip.frames(); ++t) {
-    std::copy_n(clip.rotations.begin(), s.size(), clip.rotations.begin() + static_cast<std::ptrdiff_t>(t * s.size()));
+    std::copy_n(clip.rotations.begin(), s.size(),
+                clip.rotations.begin() + static_cast<std::ptrdiff_t>(t * s.size()));
     std::copy_n(clip.translations.begin(), s.size(),
                 clip.translations.begin() + static_cast<std::ptrdiff_t>(t * s.size()));
   }
@@ -139,10 +147,12 @@ TEST_CASE("joints are matched by name, between rigs that face different ways") {
   Skeleton none = body;
   for (std::string& n : none.names) n = "x" + n;
   CHECK(match_joints(none, body).message().find("left_hip") != std::string::npos);
-  const std::string asf = data_file("avatars/cmu_mocap/11.asf"), amc = data_file("avatars/cmu_mocap/11_01.amc");
+  const std::string asf = data_file("avatars/cmu_mocap/11.asf"),
+                    amc = data_file("avatars/cmu_mocap/11_01.amc");
   if (asf.empty() || amc.empty()) return;
   const io::LoadedMotion cmu = io::load_amc(asf, amc).value();
-  CHECK(std::abs(rest_heading(cmu.skeleton).value()) == doctest::Approx(3.14159265).epsilon(1e-3));  // it faces +Z
+  CHECK(std::abs(rest_heading(cmu.skeleton).value()) ==
+        doctest::Approx(3.14159265).epsilon(1e-3));  // it faces +Z
   std::vector<std::pair<const char*, Skeleton>> targets{{"humanoid", body}};
   const TestBody makehuman = makehuman_body("male");
   if (makehuman.ok) targets.emplace_back("makehuman", makehuman.loaded.mesh.skeleton);
@@ -162,7 +172,9 @@ TEST_CASE("joints are matched by name, between rigs that face different ways") {
       const auto ga = joints_at(cmu.skeleton, a), gb = joints_at(target, b);
       for (const auto& [upper, lower] :
            {std::pair{6, 7}, {7, 8}, {10, 11}, {11, 12}, {15, 16}, {16, 17}, {19, 20}, {20, 21}}) {
-        const auto place = [](const auto& g, int j) { return g[static_cast<std::size_t>(j)].translation; };
+        const auto place = [](const auto& g, int j) {
+          return g[static_cast<std::size_t>(j)].translation;
+        };
         const std::size_t u = static_cast<std::size_t>(upper), l = static_cast<std::size_t>(lower);
         const Vec3d d = normalized(place(ga, from[l]) - place(ga, from[u])),
                     e = normalized(place(gb, to[l]) - place(gb, to[u]));
@@ -183,9 +195,10 @@ TEST_CASE("joints are matched by name, between rigs that face different ways") {
     CHECK(hip(6).x < hip(10).x);  // nobody walks backwards
     const FootSlide slide = slide_of(target, *walk, 8.0);
     std::printf(
-        "11_01 on the %s: keys %zu to %zu are a cycle of %.2f m at %.2f m/s; feet slide %.1f mm a step, %.1f at most\n",
-        name, walk->first_key(), walk->first_key() + walk->keys(), walk->stride(), walk->speed(), 1e3 * slide.mean,
-        1e3 * slide.greatest);
+        "11_01 on the %s: keys %zu to %zu are a cycle of %.2f m at %.2f m/s; feet slide %.1f mm a step, "
+        "%.1f at most\n",
+        name, walk->first_key(), walk->first_key() + walk->keys(), walk->stride(), walk->speed(),
+        1e3 * slide.mean, 1e3 * slide.greatest);
     CHECK(walk->stride() > 0.5);
     CHECK(walk->stride() < 2.0);  // the recording speeds up to a kick
     CHECK(slide.mean < 0.05);
@@ -194,7 +207,8 @@ TEST_CASE("joints are matched by name, between rigs that face different ways") {
 
 TEST_CASE("MakeHuman walks upright and on the floor, by its own clip and by others'") {
   const TestBody body = makehuman_body("male");
-  const std::string bvh = data_file("avatars/makehuman_cc0/walk1.bvh"), asf = data_file("avatars/cmu_mocap/11.asf"),
+  const std::string bvh = data_file("avatars/makehuman_cc0/walk1.bvh"),
+                    asf = data_file("avatars/cmu_mocap/11.asf"),
                     amc = data_file("avatars/cmu_mocap/11_01.amc");
   if (!body.ok || bvh.empty() || asf.empty()) return;
   const Skeleton& target = body.loaded.mesh.skeleton;
@@ -214,14 +228,16 @@ TEST_CASE("MakeHuman walks upright and on the floor, by its own clip and by othe
     sources.back().cycle.keys = 130;
     const TestBody lumberjack = gltf_body("lumberjack.glb");
     if (lumberjack.ok)
-      sources.push_back({"lumberjack.glb", lumberjack.loaded.mesh.skeleton, lumberjack.loaded.clips[0].clip, {}});
+      sources.push_back(
+          {"lumberjack.glb", lumberjack.loaded.mesh.skeleton, lumberjack.loaded.clips[0].clip, {}});
   }
   const auto joints = find_body_joints(target);
   const double rest_height = target.rest_globals()[static_cast<std::size_t>(joints[5])].translation.y;
   for (Source& source : sources) {
     CAPTURE(source.name);
     const MotionClip clip =
-        retarget(source.clip, source.skeleton, target, match_joints(source.skeleton, target).value()).value();
+        retarget(source.clip, source.skeleton, target, match_joints(source.skeleton, target).value())
+            .value();
     const auto walk = ClipWalk::create(target, clip, source.cycle);
     CAPTURE(walk.status().message());
     REQUIRE(walk.ok());
@@ -234,7 +250,9 @@ TEST_CASE("MakeHuman walks upright and on the floor, by its own clip and by othe
       in.distance = 0.01 * k * walk->stride();
       walk->pose(in, pose);
       const auto at = joints_at(target, pose);
-      const auto place = [&](std::size_t j) { return at[static_cast<std::size_t>(joints[j])].translation; };
+      const auto place = [&](std::size_t j) {
+        return at[static_cast<std::size_t>(joints[j])].translation;
+      };
       const Vec3d trunk = place(4) - place(0);
       lean = std::max(lean, std::atan2(std::hypot(trunk.x, trunk.z), trunk.y) * 57.29577951308232);
       double sole = 9;
@@ -248,9 +266,11 @@ TEST_CASE("MakeHuman walks upright and on the floor, by its own clip and by othe
     }
     const FootSlide slide = slide_of(target, *walk, 8.0);
     std::printf(
-        "MakeHuman by %s: %.2f m a cycle, leans %.0f degrees at most, soles %.0f to %.0f mm over the floor, feet slide "
+        "MakeHuman by %s: %.2f m a cycle, leans %.0f degrees at most, soles %.0f to %.0f mm over the "
+        "floor, feet slide "
         "%.1f mm a step, %.1f at most\n",
-        source.name, walk->stride(), lean, 1e3 * low, 1e3 * high, 1e3 * slide.mean, 1e3 * slide.greatest);
+        source.name, walk->stride(), lean, 1e3 * low, 1e3 * high, 1e3 * slide.mean,
+        1e3 * slide.greatest);
     CHECK(walk->stride() > 0.6);
     CHECK(walk->stride() < 2.0);
     CHECK(lean < 35);
@@ -293,17 +313,23 @@ TEST_CASE("feet that are held stay where they are; what they carry keeps its sha
   const FootLockReport report = lock_feet(s, feet, 40, bodies, frames).value();
   for (std::size_t t = 0; t < frames.size(); ++t) after.add(frames[t], bodies[t]);
   const FootSlide a = before.measure(), b = after.measure();
-  std::printf("round a bend of 1 m: feet slide %.1f mm a step, %.1f at most; held %.1f and %.1f (moved by up to %.1f mm)\n",
-              1e3 * a.mean, 1e3 * a.greatest, 1e3 * b.mean, 1e3 * b.greatest, 1e3 * report.moved);
+  std::printf(
+      "round a bend of 1 m: feet slide %.1f mm a step, %.1f at most; held %.1f and %.1f (moved by up to "
+      "%.1f mm)\n",
+      1e3 * a.mean, 1e3 * a.greatest, 1e3 * b.mean, 1e3 * b.greatest, 1e3 * report.moved);
   CHECK(a.mean > 0.02);
   CHECK(b.mean < 0.25 * a.mean);
   CHECK(report.moved <= 0.1);
   double stretch = 0, rigid = 0, jump = 0, heading = 0;
   for (std::size_t t = 0; t < frames.size(); ++t) {
     for (const Leg& leg : legs) {
-      const auto length = [&](const auto& g, std::size_t i, std::size_t j) { return norm(g[i].translation - g[j].translation); };
-      stretch = std::max(stretch, std::abs(length(frames[t], leg.hip, leg.knee) - length(free[t], leg.hip, leg.knee)));
-      stretch = std::max(stretch, std::abs(length(frames[t], leg.knee, leg.ankle) - length(free[t], leg.knee, leg.ankle)));
+      const auto length = [&](const auto& g, std::size_t i, std::size_t j) {
+        return norm(g[i].translation - g[j].translation);
+      };
+      stretch = std::max(
+          stretch, std::abs(length(frames[t], leg.hip, leg.knee) - length(free[t], leg.hip, leg.knee)));
+      stretch = std::max(stretch, std::abs(length(frames[t], leg.knee, leg.ankle) -
+                                           length(free[t], leg.knee, leg.ankle)));
       for (const std::size_t j : leg.foot) {
         heading = std::max(heading, norm(frames[t][j].linear.row[0] - free[t][j].linear.row[0]));
         if (t > 0) {
@@ -314,7 +340,8 @@ TEST_CASE("feet that are held stay where they are; what they carry keeps its sha
     }
     for (std::size_t j = 0; j < s.size(); ++j) {
       const Mat3d m = frames[t][j].linear * transpose(frames[t][j].linear);
-      for (int k = 0; k < 9; ++k) rigid = std::max(rigid, std::abs(m(k / 3, k % 3) - (k % 4 == 0 ? 1.0 : 0.0)));
+      for (int k = 0; k < 9; ++k)
+        rigid = std::max(rigid, std::abs(m(k / 3, k % 3) - (k % 4 == 0 ? 1.0 : 0.0)));
     }
   }
   CHECK(stretch < 1e-9);
@@ -334,8 +361,9 @@ TEST_CASE("real walks on their own bodies do not slide") {
     CAPTURE(walk.status().message());
     REQUIRE(walk.ok());
     const FootSlide slide = slide_of(body.loaded.mesh.skeleton, *walk, 8.0);
-    std::printf("%s: a cycle of %.2f m at %.2f m/s; feet slide %.1f mm a step, %.1f at most, %zu steps\n", name,
-                walk->stride(), walk->speed(), 1e3 * slide.mean, 1e3 * slide.greatest, slide.contacts);
+    std::printf(
+        "%s: a cycle of %.2f m at %.2f m/s; feet slide %.1f mm a step, %.1f at most, %zu steps\n", name,
+        walk->stride(), walk->speed(), 1e3 * slide.mean, 1e3 * slide.greatest, slide.contacts);
     CHECK(walk->stride() > 0.5);
     CHECK(walk->stride() < 2.5);
     CHECK(slide.mean < 0.05);

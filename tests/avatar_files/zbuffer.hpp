@@ -18,8 +18,8 @@ struct MeshImage {
   std::vector<double> depth;      // planar, metres; 0: nothing
 };
 
-/// Draws posed vertices with a z-buffer, double, nearest texels, unlit. Shares no code with the library's
-/// sampling of surfaces.
+/// Draws posed vertices with a z-buffer, double, nearest texels, unlit. Shares no code with the
+/// library's sampling of surfaces.
 inline MeshImage draw_mesh(const gsnav::SkinnedMesh& mesh, const std::vector<gsnav::Vec3d>& vertices,
                            const gsnav::Camera& camera) {
   using gsnav::Vec3d;
@@ -72,7 +72,8 @@ inline MeshImage draw_mesh(const gsnav::SkinnedMesh& mesh, const std::vector<gsn
         }
         for (int c = 0; c < 3; ++c) color[c] *= material.factor[c];
         for (int c = 0; c < 3; ++c)
-          color[c] = color[c] <= 0.0031308 ? 12.92 * color[c] : 1.055 * std::pow(color[c], 1 / 2.4) - 0.055;
+          color[c] =
+              color[c] <= 0.0031308 ? 12.92 * color[c] : 1.055 * std::pow(color[c], 1 / 2.4) - 0.055;
         if (material.texture >= 0) {
           const auto& tex = mesh.textures[static_cast<std::size_t>(material.texture)];
           std::size_t texel[2];
@@ -81,9 +82,11 @@ inline MeshImage draw_mesh(const gsnav::SkinnedMesh& mesh, const std::vector<gsn
             const double f = uv[k] - std::floor(uv[k]);
             texel[k] = std::min(size[k] - 1, static_cast<std::size_t>(f * static_cast<double>(size[k])));
           }
-          // Factors are white where there are textures in these files: a product of encoded values would be wrong else.
+          // Factors are white where there are textures in these files: a product of encoded values would
+          // be wrong else.
           for (int c = 0; c < 3; ++c)
-            color[c] *= tex.rgba[4 * (texel[1] * tex.width + texel[0]) + static_cast<std::size_t>(c)] / 255.0;
+            color[c] *=
+                tex.rgba[4 * (texel[1] * tex.width + texel[0]) + static_cast<std::size_t>(c)] / 255.0;
         }
         out.rgb[at] = color;
       }

@@ -10,9 +10,9 @@
 #include "gsnav/detail/avatar/clip_walk.hpp"
 #include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/detail/io/avatar_file.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/detail/io/motion_file.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "io/gltf_builder.hpp"
 #include "support/command.hpp"
 #include "support/data.hpp"
@@ -33,8 +33,10 @@ Outcome run(const TempFolder& folder, const std::string& arguments) {
 
 /// A floor of 10 m by 10 m with a wall in it that leaves a passage at one end.
 void write_floor(const std::filesystem::path& path) {
-  std::vector<Vec3d> v{{0, 0, 0}, {10, 0, 0}, {10, 0, 10}, {0, 0, 10}, {0, 0, 5}, {7, 0, 5}, {7, 2, 5}, {0, 2, 5}};
-  const std::vector<NavMesh::Triangle> t{{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {4, 6, 5}, {4, 7, 6}};
+  std::vector<Vec3d> v{{0, 0, 0}, {10, 0, 0}, {10, 0, 10}, {0, 0, 10},
+                       {0, 0, 5}, {7, 0, 5},  {7, 2, 5},   {0, 2, 5}};
+  const std::vector<NavMesh::Triangle> t{{0, 2, 1}, {0, 3, 2}, {4, 5, 6},
+                                         {4, 6, 7}, {4, 6, 5}, {4, 7, 6}};
   NavMeshSettings settings;
   settings.agent_radius = 0.25;
   save_navmesh(NavMesh::build(settings, v, t).value(), path).throw_if_error();
@@ -61,8 +63,8 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
   }
   io::save_driver(folder / "clip.npz", clip).throw_if_error();
   const std::string common = "walk --avatar " + quoted(folder / "person.npz") + " --navmesh " +
-                             quoted(folder / "floor.navmesh") + " --clip " + quoted(folder / "clip.npz") + " --out " +
-                             quoted(folder / "walk.npz");
+                             quoted(folder / "floor.navmesh") + " --clip " +
+                             quoted(folder / "clip.npz") + " --out " + quoted(folder / "walk.npz");
   const Outcome made = run(folder, common + " --from 1,0,2 --via 5,0,4 --to 1,0,8 --speed 1.2");
   INFO(made.text);
   REQUIRE(made.ok);
@@ -98,7 +100,8 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
     REQUIRE(on);
     off = std::max(off, std::hypot(on->position.x - root.x, on->position.z - root.z));
   }
-  const double shortest = mesh.geodesic_distance({1, 0, 2}, {5, 0, 4}) + mesh.geodesic_distance({5, 0, 4}, {1, 0, 8});
+  const double shortest =
+      mesh.geodesic_distance({1, 0, 2}, {5, 0, 4}) + mesh.geodesic_distance({5, 0, 4}, {1, 0, 8});
   CHECK(length > 0.98 * shortest);
   CHECK(length < 1.10 * shortest);  // hips sway
   CHECK(off < 0.06);
@@ -113,8 +116,9 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
   CHECK(made.says("with the feet held"));
   CHECK_FALSE(run(folder, common + " --from 1,0,2 --to 5,0,4 --no-lock-feet").says("feet held"));
 
-  const std::string strip = "strip --avatar " + quoted(folder / "person.npz") + " --driver " + quoted(folder / "walk.npz") +
-                            " --eye 4,1.6,8 --target 3,0.9,3 --out " + quoted(folder / "strip.png");
+  const std::string strip = "strip --avatar " + quoted(folder / "person.npz") + " --driver " +
+                            quoted(folder / "walk.npz") + " --eye 4,1.6,8 --target 3,0.9,3 --out " +
+                            quoted(folder / "strip.png");
   const Outcome drawn = run(folder, strip + " --frames 3 --width 64 --height 48");
   INFO(drawn.text);
   REQUIRE(drawn.ok);
@@ -149,18 +153,21 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
   CHECK(clearance(run(folder, common + across + " --clearance 0")) == 0.0);
   CHECK(run(folder, common + across + " --clearance -1").says("clearance"));
   // The generated flat needs no file.
-  const std::string clip_of = "walk --avatar " + quoted(folder / "person.npz") + " --clip " + quoted(folder / "clip.npz") +
-                              " --out " + quoted(folder / "flat.npz") + across;
+  const std::string clip_of = "walk --avatar " + quoted(folder / "person.npz") + " --clip " +
+                              quoted(folder / "clip.npz") + " --out " + quoted(folder / "flat.npz") +
+                              across;
   CHECK(run(folder, clip_of).says("--navmesh or --flat"));
   CHECK(run(folder, clip_of + " --flat --navmesh x").says("--navmesh"));
-  CHECK(run(folder, "walk --flat --avatar " + quoted(folder / "person.npz") + " --clip " + quoted(folder / "clip.npz") +
-                        " --out " + quoted(folder / "flat.npz") + " --from 1.7,0,3.3 --to 6.6,0,5.3")
+  CHECK(run(folder, "walk --flat --avatar " + quoted(folder / "person.npz") + " --clip " +
+                        quoted(folder / "clip.npz") + " --out " + quoted(folder / "flat.npz") +
+                        " --from 1.7,0,3.3 --to 6.6,0,5.3")
             .says("walls another 0.25 m"));
 
   CHECK(run(folder, common + " --from 1,0,2 --to 30,0,8").says("floor.navmesh"));
   CHECK(run(folder, common + " --from 1,0 --to 3,0,8").says("'1,0' is no point"));
   CHECK(run(folder, common + " --from 1,0,2 --to 3,0,8 --first-key 50 --keys 20").says("no cycle"));
-  CHECK(run(folder, "walk --avatar none.npz --navmesh none --clip none.bvh --from 0,0,0 --to 1,0,0 --out x.npz")
+  CHECK(run(folder,
+            "walk --avatar none.npz --navmesh none --clip none.bvh --from 0,0,0 --to 1,0,0 --out x.npz")
             .says("none.npz"));
   CHECK_FALSE(run(folder, "").ok);
   CHECK(run(folder, "--help").ok);
@@ -170,8 +177,8 @@ TEST_CASE("avatar tool: from a rigged file to an avatar and its driver") {
   const TempFolder folder("avatar_tool_mesh");
   const std::string glb = data_file("avatars/lumberjack.glb");
   if (glb.empty()) return;
-  const std::string common =
-      "from-gltf " + quoted(std::filesystem::path(glb)) + " --gaussians 5000 --out " + quoted(folder / "a.npz");
+  const std::string common = "from-gltf " + quoted(std::filesystem::path(glb)) +
+                             " --gaussians 5000 --out " + quoted(folder / "a.npz");
   const Outcome made = run(folder, common + " --clip Walk --driver " + quoted(folder / "d.npz"));
   INFO(made.text);
   REQUIRE(made.ok);
@@ -189,8 +196,8 @@ TEST_CASE("avatar tool: from a rigged file to an avatar and its driver") {
 
 namespace {
 
-/// A column of 180 x 30 x 30 units that bends at the middle, in three parts of a skin each on one pair of joints, and
-/// a clip whose first key is at 0.5 s.
+/// A column of 180 x 30 x 30 units that bends at the middle, in three parts of a skin each on one pair
+/// of joints, and a clip whose first key is at 0.5 s.
 gsnav_test::TestGltf column() {
   using gsnav_test::json;
   gsnav_test::TestGltf g;
@@ -205,7 +212,8 @@ gsnav_test::TestGltf column() {
     for (int ring = 0; ring < 2; ++ring) {
       const float y = static_cast<float>(60 * (part + ring));
       for (int k = 0; k < 4; ++k) {
-        positions.insert(positions.end(), {k == 1 || k == 2 ? 15.0f : -15.0f, y, k >= 2 ? 15.0f : -15.0f});
+        positions.insert(positions.end(),
+                         {k == 1 || k == 2 ? 15.0f : -15.0f, y, k >= 2 ? 15.0f : -15.0f});
         weights.insert(weights.end(), {1 - y / 180, y / 180, 0, 0});
         joints.insert(joints.end(), {0, 1, 0, 0});
       }
@@ -219,10 +227,13 @@ gsnav_test::TestGltf column() {
                              {"JOINTS_0", g.add(joints, "VEC4", 5121)},
                              {"WEIGHTS_0", g.add(weights, "VEC4", 5126)}};
     g.doc["meshes"].push_back(
-        {{"primitives", json::array({{{"attributes", attributes}, {"indices", g.add(triangles, "SCALAR", 5123)}}})}});
-    g.doc["skins"].push_back({{"name", names[part]}, {"joints", {0, 1}}, {"inverseBindMatrices", binds}});
+        {{"primitives",
+          json::array({{{"attributes", attributes}, {"indices", g.add(triangles, "SCALAR", 5123)}}})}});
+    g.doc["skins"].push_back(
+        {{"name", names[part]}, {"joints", {0, 1}}, {"inverseBindMatrices", binds}});
   }
-  g.doc["nodes"] = json::array({{{"name", "foot"}, {"children", {1}}}, {{"name", "back"}, {"translation", {0, 90, 0}}}});
+  g.doc["nodes"] = json::array(
+      {{{"name", "foot"}, {"children", {1}}}, {{"name", "back"}, {"translation", {0, 90, 0}}}});
   for (int part = 0; part < 3; ++part) g.doc["nodes"].push_back({{"mesh", part}, {"skin", part}});
   const std::size_t times = g.add(std::vector<float>{0.5f, 1.0f}, "SCALAR", 5126),
                     turns = g.add(std::vector<float>{0, 0, 0, 1, 0.6f, 0, 0, 0.8f}, "VEC4", 5126);
@@ -243,8 +254,11 @@ TEST_CASE("avatar tool: skins of one rig in centimetres, and a clip from a file 
   const std::string common = "from-gltf column.glb --gaussians 3000 --out " + quoted(folder / "a.npz");
   const Outcome large = run(folder, common);
   CHECK_FALSE(large.ok);
-  CHECK(large.says("more than 32 m from the root (it is 180 m large); --scale sets metres a unit, 0.01 for centimetres"));
-  const Outcome made = run(folder, common + " --scale 0.01 --clip bow --driver " + quoted(folder / "own.npz"));
+  CHECK(
+      large.says("more than 32 m from the root (it is 180 m large); --scale sets metres a unit, 0.01 "
+                 "for centimetres"));
+  const Outcome made =
+      run(folder, common + " --scale 0.01 --clip bow --driver " + quoted(folder / "own.npz"));
   INFO(made.text);
   REQUIRE(made.ok);
   CHECK(made.says("24 vertices, 24 triangles, 2 joints, 1 clips; 3 of 3 skins"));
@@ -257,15 +271,18 @@ TEST_CASE("avatar tool: skins of one rig in centimetres, and a clip from a file 
     low = std::min(low, y), high = std::max(high, y);
   }
   CHECK(high - low == doctest::Approx(1.8).epsilon(0.02));  // all three parts
-  CHECK(run(folder, common + " --scale 0.01 --skin head").says("8 vertices, 8 triangles, 2 joints, 1 clips; 1 of 3 skins"));
+  CHECK(run(folder, common + " --scale 0.01 --skin head")
+            .says("8 vertices, 8 triangles, 2 joints, 1 clips; 1 of 3 skins"));
   CHECK(run(folder, common + " --scale 0.01 --skin 0 --skin trunk").says("2 of 3 skins"));
-  CHECK(run(folder, common + " --scale 0.01 --skin tail").says("no skin is \"tail\"; there are 0 '\"legs\"'"));
+  CHECK(run(folder, common + " --scale 0.01 --skin tail")
+            .says("no skin is \"tail\"; there are 0 '\"legs\"'"));
   // The clip alone: nodes, no skin, no mesh. The rig's unit is the body's.
   g.doc.erase("skins");
   g.doc.erase("meshes");
   g.doc["nodes"].erase(g.doc["nodes"].begin() + 2, g.doc["nodes"].end());
   g.write(folder / "bow.glb");
-  const Outcome apart = run(folder, common + " --scale 0.01 --clip bow.glb:bow --driver " + quoted(folder / "apart.npz"));
+  const Outcome apart =
+      run(folder, common + " --scale 0.01 --clip bow.glb:bow --driver " + quoted(folder / "apart.npz"));
   INFO(apart.text);
   REQUIRE(apart.ok);
   const auto a = io::load_driver(folder / "own.npz", avatar->asset.skeleton),

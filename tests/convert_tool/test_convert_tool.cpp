@@ -15,11 +15,11 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/detail/io/ply.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "io/check_turned.hpp"
 #include "io/ply_file.hpp"
 #include "io/row_clouds.hpp"
@@ -80,7 +80,10 @@ TEST_CASE("convert: every format, with the error that it adds") {
     if (made.sort_order != source.sort_order) {
       // Drawn in the source's order, the images show the format's rounding alone.
       made.sort_order = source.sort_order;
-      psnr = gsnav_convert::image_errors(source, made, views_around(source, guess_up(source).up, 3, 64, 48)).value().psnr;
+      psnr =
+          gsnav_convert::image_errors(source, made, views_around(source, guess_up(source).up, 3, 64, 48))
+              .value()
+              .psnr;
     }
     CHECK(psnr > t.least_psnr);
   }
@@ -192,13 +195,15 @@ TEST_CASE("convert: a format that is drawn in another order is judged as it is d
     return rgb;
   };
   const auto check = [&](const char* from, const char* to) {
-    const Outcome out = run(folder, std::string(from) + " " + to + " --cameras c.json --width 96 --height 64");
+    const Outcome out =
+        run(folder, std::string(from) + " " + to + " --cameras c.json --width 96 --height 64");
     CAPTURE(out.text);
     REQUIRE(out.ok);
     CHECK(out.says("another order of drawing"));
     const std::vector<float> a = drawn(from), b = drawn(to);
     double squares = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) squares += std::pow(static_cast<double>(a[i]) - static_cast<double>(b[i]), 2);
+    for (std::size_t i = 0; i < a.size(); ++i)
+      squares += std::pow(static_cast<double>(a[i]) - static_cast<double>(b[i]), 2);
     const double psnr = -10 * std::log10(squares / static_cast<double>(a.size()));
     CHECK(psnr < 60);
     CHECK(number_behind(out.text, "PSNR ") == doctest::Approx(psnr).epsilon(0.001));
@@ -300,7 +305,8 @@ TEST_CASE("convert: a full disk and kill -9 leave the input that is written over
   }
 }
 
-TEST_CASE("convert: control characters of a file name do not reach the terminal by way of an option's error") {
+TEST_CASE(
+    "convert: control characters of a file name do not reach the terminal by way of an option's error") {
   const TempFolder folder("convert_control");
   const Outcome out = run(folder, "a.ply b.ply --views \"$(printf 'x\\033[31m')\"");
   CAPTURE(out.text);
@@ -444,8 +450,9 @@ TEST_CASE("convert: what cannot be done is said") {
   says("a.ply", "paths");
   // In place: nothing is written before all is known to be right.
   const std::string before = read_file(folder / "a.ply");
-  for (const char* edit : {"--scale nan", "--translate nan 0 0", "--rotate 0 0 1 inf", "--rotate nan 0 0 3", "--max-scale nan",
-                           "--max-scale -1", "--min-opacity nan", "--scale 1e40", "--translate 1e39 0 0"}) {
+  for (const char* edit : {"--scale nan", "--translate nan 0 0", "--rotate 0 0 1 inf",
+                           "--rotate nan 0 0 3", "--max-scale nan", "--max-scale -1",
+                           "--min-opacity nan", "--scale 1e40", "--translate 1e39 0 0"}) {
     const std::string option(edit, std::string(edit).find(' '));
     CAPTURE(edit);
     says(std::string("a.ply a.ply ") + edit, option);

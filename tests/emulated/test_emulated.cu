@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device code on the host (GSNAV_CUDA=EMULATED): what warps, blocks, streams and graphs promise, against loops over what
-// their threads were given; and that code which a device would hang on, or read nonsense in, is named.
+// Device code on the host (GSNAV_CUDA=EMULATED): what warps, blocks, streams and graphs promise, against
+// loops over what their threads were given; and that code which a device would hang on, or read nonsense
+// in, is named.
 #include <doctest/doctest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -55,7 +56,8 @@ std::vector<unsigned> random_numbers(std::size_t count, std::uint64_t seed, unsi
 
 constexpr unsigned kOperations = 9;
 
-/// Eight threads of each warp leave before; the rest in two groups, each with its own masks and numbers of rounds.
+/// Eight threads of each warp leave before; the rest in two groups, each with its own masks and numbers
+/// of rounds.
 __global__ void warp_kernel(const unsigned* in, const int* by, unsigned* out) {
   const unsigned at = blockIdx.x * blockDim.x + threadIdx.x, lane = threadIdx.x % 32;
   if (lane >= 24) return;
@@ -119,7 +121,9 @@ __global__ void cub_kernel(const unsigned* in, unsigned* out) {
   for (unsigned i = 0; i < 3; ++i) out[2 * Threads + 3 * t + i] = values[i];
 }
 
-__global__ void add_kernel(unsigned* to, unsigned factor, unsigned term) { to[threadIdx.x] = to[threadIdx.x] * factor + term; }
+__global__ void add_kernel(unsigned* to, unsigned factor, unsigned term) {
+  to[threadIdx.x] = to[threadIdx.x] * factor + term;
+}
 
 __global__ void every_kernel(unsigned* seen) {
   atomicAdd(&seen[(blockIdx.z * gridDim.y + blockIdx.y) * gridDim.x + blockIdx.x], 1 + threadIdx.x);
@@ -173,7 +177,8 @@ std::string last_words(F f) {
   close(ends[1]);
   std::string text;
   char part[512];
-  for (ssize_t n = 0; (n = read(ends[0], part, sizeof part)) > 0;) text.append(part, static_cast<std::size_t>(n));
+  for (ssize_t n = 0; (n = read(ends[0], part, sizeof part)) > 0;)
+    text.append(part, static_cast<std::size_t>(n));
   close(ends[0]);
   int status = 0;
   REQUIRE(waitpid(child, &status, 0) == child);
@@ -182,7 +187,8 @@ std::string last_words(F f) {
 
 }  // namespace
 
-TEST_CASE("emulated: operations of a warp are what their definitions say, in groups that go their own ways") {
+TEST_CASE(
+    "emulated: operations of a warp are what their definitions say, in groups that go their own ways") {
   constexpr unsigned kThreads = 64, kBlocks = 5, kAll = kThreads * kBlocks;
   std::vector<unsigned> in = random_numbers(kAll, 1, 1000);
   Rng rng(2);
@@ -196,7 +202,9 @@ TEST_CASE("emulated: operations of a warp are what their definitions say, in gro
   for (unsigned at = 0; at < kAll; ++at) {
     const unsigned lane = at % 32, warp = at - lane;
     if (lane >= 24) continue;
-    const auto with_me = [&](unsigned other) { return other < 24 && (other % 3 == 0) == (lane % 3 == 0); };
+    const auto with_me = [&](unsigned other) {
+      return other < 24 && (other % 3 == 0) == (lane % 3 == 0);
+    };
     for (unsigned round = 0; round < (lane % 3 == 0 ? 3u : 2u); ++round) {
       const unsigned* o = &got[(at * 3 + round) * kOperations];
       const auto value = [&](unsigned other) { return in[warp + other] + round; };
@@ -297,12 +305,16 @@ TEST_CASE("emulated: every block of a grid runs once; what a device refuses is r
   void* much = nullptr;
   CHECK(cudaMalloc(&much, std::size_t{1} << 50) == cudaErrorMemoryAllocation);
   unsigned here = 0;
-  CHECK(cudaMemcpy(seen.data(), &here, 31 * sizeof(unsigned), cudaMemcpyHostToDevice) == cudaErrorInvalidValue);
-  CHECK(cudaMemcpyAsync(&here, &here, sizeof here, cudaMemcpyDeviceToHost, nullptr) == cudaErrorInvalidValue);
+  CHECK(cudaMemcpy(seen.data(), &here, 31 * sizeof(unsigned), cudaMemcpyHostToDevice) ==
+        cudaErrorInvalidValue);
+  CHECK(cudaMemcpyAsync(&here, &here, sizeof here, cudaMemcpyDeviceToHost, nullptr) ==
+        cudaErrorInvalidValue);
   cudaGetLastError();
 }
 
-TEST_CASE("emulated: streams go in order, wait for one another's events, and graphs do again what they recorded") {
+TEST_CASE(
+    "emulated: streams go in order, wait for one another's events, and graphs do again what they "
+    "recorded") {
   cudaStream_t a, b;
   cudaEvent_t event;
   REQUIRE(cudaStreamCreate(&a) == cudaSuccess);
@@ -318,7 +330,8 @@ TEST_CASE("emulated: streams go in order, wait for one another's events, and gra
   unsigned* pinned = nullptr;
   REQUIRE(cudaMallocHost(&pinned, sizeof(unsigned)) == cudaSuccess);
   *pinned = 0;
-  CHECK(cudaMemcpyAsync(pinned, number.data(), sizeof(unsigned), cudaMemcpyDeviceToHost, b) == cudaSuccess);
+  CHECK(cudaMemcpyAsync(pinned, number.data(), sizeof(unsigned), cudaMemcpyDeviceToHost, b) ==
+        cudaSuccess);
   CHECK(*pinned == 0);  // nobody has waited
   CHECK(cudaStreamSynchronize(b) == cudaSuccess);
   CHECK(*pinned == 2 * (3 * 5 + 1));
@@ -347,7 +360,8 @@ TEST_CASE("emulated: streams go in order, wait for one another's events, and gra
   cudaGetLastError();
 }
 
-TEST_CASE("emulated: threads that wait for ever, or for nobody, are named with kernel, block and thread") {
+TEST_CASE(
+    "emulated: threads that wait for ever, or for nobody, are named with kernel, block and thread") {
   OnDevice<unsigned> out(32);
   const auto words = [&](auto launch) {
     return last_words([&] {

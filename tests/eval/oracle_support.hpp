@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/eval/oracle.hpp"
 #include "gsnav/detail/eval/oracle_photo.hpp"
+#include "gsnav/eval/oracle.hpp"
 #include "gsnav/scene/renderer.hpp"
 #if defined(_OPENMP)
 #include "gsnav/backends/openmp.hpp"

@@ -23,7 +23,8 @@ namespace {
 constexpr std::array kOrders{OracleOrder::float32_key, OracleOrder::float64, OracleOrder::per_ray};
 
 /// Brute force and boxes, in every order; returns the boxed counts of the first.
-OracleCounts check_levels(const std::vector<GaussianSet>& sets, const Camera& camera, OracleConfig config) {
+OracleCounts check_levels(const std::vector<GaussianSet>& sets, const Camera& camera,
+                          OracleConfig config) {
   OracleCounts counts;
   for (const OracleOrder order : kOrders) {
     CAPTURE(static_cast<int>(order));
@@ -66,7 +67,8 @@ OracleFrames cut(const OracleFrames& f, const PixelRect& rect) {
   return out;
 }
 
-/// Two sets, one placed with a rotation and a scale, seen by a camera whose principal point is off-centre.
+/// Two sets, one placed with a rotation and a scale, seen by a camera whose principal point is
+/// off-centre.
 struct TwoSets {
   GaussianCloud a, b;
   std::vector<GaussianSet> sets;
@@ -101,8 +103,8 @@ TEST_CASE("oracle: brute force and boxes give the same bits, every kind that cut
     config.rules.alpha_min = 0.01;
     check_levels(two.sets, two.camera, config);
     // The camera among Gaussians: outlines without bounds, means far outside the image.
-    const GaussianCloud around =
-        random_cloud(8, {.count = 1500, .sh_degree = 0, .needle = 0.4, .scale = 0.2, .center = {0, 0, 0}});
+    const GaussianCloud around = random_cloud(
+        8, {.count = 1500, .sh_degree = 0, .needle = 0.4, .scale = 0.2, .center = {0, 0, 0}});
     Camera inside = axis_camera(33, 20);
     inside.near_plane = 0.01;
     check_levels({around.set()}, inside, {.kind = kind});
@@ -125,7 +127,8 @@ TEST_CASE("oracle: a crop of a real scene by brute force") {
   if (path.empty()) return;
   const LoadedCloud loaded = io::load_scene(path).value();
   Vec3d center{};
-  for (std::size_t i = 0; i < loaded.cloud.size(); i += 997) center = center + loaded.cloud.mean(i) * 997.0;
+  for (std::size_t i = 0; i < loaded.cloud.size(); i += 997)
+    center = center + loaded.cloud.mean(i) * 997.0;
   center = center * (1.0 / static_cast<double>(loaded.cloud.size()));
   const Camera camera = Camera::look_at(center, center + Vec3d{1, 0.4, -0.1}, {0, 0, 1}, 256, 256, 90);
   // 64 pixels and not 1024: every Gaussian is asked at each of them, six times.
@@ -161,7 +164,8 @@ TEST_CASE("oracle: crops, threads and bands of rows change no bit") {
     config.kind = kind;
     const OracleFrames whole = oracle(two.sets, two.camera, config);
     SerialBackend serial;
-    CHECK(same_images(whole, eval::oracle_render(serial, std::span(two.sets), two.camera, config).value()));
+    CHECK(same_images(whole,
+                      eval::oracle_render(serial, std::span(two.sets), two.camera, config).value()));
     config.crop = rect;
     CHECK(same_images(cut(whole, rect), oracle(two.sets, two.camera, config)));
   }

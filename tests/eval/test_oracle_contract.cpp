@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "eval/oracle_support.hpp"
-#include "gsnav/frame/sh.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/brush.hpp"
 #include "support/oracle.hpp"
@@ -33,12 +33,14 @@ RawGaussian opaque(const Vec3d& mean, const Vec3d& scales, const std::array<floa
 }  // namespace
 
 TEST_CASE("oracle: one Gaussian on the axis, by its closed form") {
-  const GaussianCloud cloud = cloud_of({gaussian({0, 0, 2}, {0.1, 0.05, 0.2}, 0.8, {0.3f, -0.4f, 1.2f})});
+  const GaussianCloud cloud =
+      cloud_of({gaussian({0, 0, 2}, {0.1, 0.05, 0.2}, 0.8, {0.3f, -0.4f, 1.2f})});
   const Camera camera = axis_camera();
   OracleConfig config;
   config.rules.background = {0.1, 0.2, 0.3};
   const OracleFrames f = oracle({cloud.set()}, camera, config);
-  const double sx = static_cast<double>(cloud.scales[0][0]), sy = static_cast<double>(cloud.scales[1][0]),
+  const double sx = static_cast<double>(cloud.scales[0][0]),
+               sy = static_cast<double>(cloud.scales[1][0]),
                sz = static_cast<double>(cloud.scales[2][0]), o = static_cast<double>(cloud.opacities[0]);
   const double h = static_cast<double>(0.3f);
   const double a = std::pow(64 * sx / 2, 2) + h, c = std::pow(64 * sy / 2, 2) + h;
@@ -79,7 +81,8 @@ TEST_CASE("oracle: two layers, their depths and what is marked undecided") {
   config.rules.background = {1, 1, 1};
   const OracleFrames f = oracle({cloud.set()}, axis_camera(), config);
   const std::size_t center = 32 * 65 + 32;
-  const double o1 = static_cast<double>(cloud.opacities[1]), o2 = static_cast<double>(cloud.opacities[0]);
+  const double o1 = static_cast<double>(cloud.opacities[1]),
+               o2 = static_cast<double>(cloud.opacities[0]);
   const double w1 = o1, w2 = (1 - o1) * o2, t = (1 - o1) * (1 - o2);
   for (std::size_t c = 0; c < 3; ++c) {
     const double expected = w1 * color_of(cloud, 1, c) + w2 * color_of(cloud, 0, c) + t;
@@ -93,7 +96,8 @@ TEST_CASE("oracle: two layers, their depths and what is marked undecided") {
   CHECK(f.undecided[center] == 0);
   CHECK(f.undecided_depth[center] == 0);
 
-  const auto at_center = [&](const std::vector<RawGaussian>& g, const auto& mask, const OracleConfig& c = {}) {
+  const auto at_center = [&](const std::vector<RawGaussian>& g, const auto& mask,
+                             const OracleConfig& c = {}) {
     return int{mask(oracle({cloud_of(g).set()}, axis_camera(), c))[center]};
   };
   const auto undecided = [](const OracleFrames& r) { return r.undecided; };
@@ -102,7 +106,8 @@ TEST_CASE("oracle: two layers, their depths and what is marked undecided") {
   CHECK(at_center({gaussian({0, 0, 2}, wide, (1 + 5e-5) / 255)}, undecided) == 0);
   OracleConfig faint;
   faint.rules.alpha_min = 0.01;
-  CHECK(at_center({gaussian({0, 0, 2}, wide, 0.01 * (1 - 5e-6))}, undecided, faint) == 1);  // and not drawn
+  CHECK(at_center({gaussian({0, 0, 2}, wide, 0.01 * (1 - 5e-6))}, undecided, faint) ==
+        1);  // and not drawn
   CHECK(at_center({gaussian({0, 0, 2}, wide, 0.01 * (1 - 5e-5))}, undecided, faint) == 0);
   // Twice max_alpha is T = 1e-4, the stop.
   CHECK(at_center({opaque({0, 0, 2}, wide, {}), opaque({0, 0, 3}, wide, {})}, undecided) == 1);
@@ -148,7 +153,8 @@ TEST_CASE("oracle: keys that tie in float32 and not in float64") {
       const double o1 = static_cast<double>(cloud.opacities[front]),
                    o2 = static_cast<double>(cloud.opacities[back]);
       for (std::size_t c = 0; c < 3; ++c) {
-        const double expected = o1 * color_of(cloud, front, c) + (1 - o1) * o2 * color_of(cloud, back, c);
+        const double expected =
+            o1 * color_of(cloud, front, c) + (1 - o1) * o2 * color_of(cloud, back, c);
         CHECK(std::abs(f.rgb[3 * center + c] - expected) < 1e-12);
       }
       CHECK(f.order_flip[center] == 1);
@@ -164,8 +170,8 @@ TEST_CASE("oracle: ties go by the file's order, however rows lie in memory") {
   Rng rng(212);
   std::vector<RawGaussian> front, back;
   for (int i = 0; i < 600; ++i) {
-    RawGaussian g = gaussian({rng.uniform(-1, 1), rng.uniform(-1, 1), 2.0 + 0.5 * (i % 2)}, {0.2, 0.2, 0.01}, 0.7,
-                             {0, 0, 0});
+    RawGaussian g = gaussian({rng.uniform(-1, 1), rng.uniform(-1, 1), 2.0 + 0.5 * (i % 2)},
+                             {0.2, 0.2, 0.01}, 0.7, {0, 0, 0});
     for (float& c : g.sh0) c = static_cast<float>(rng.normal());
     (i % 3 == 0 ? back : front).push_back(g);
   }
@@ -174,7 +180,8 @@ TEST_CASE("oracle: ties go by the file's order, however rows lie in memory") {
   sort_spatially(a_sorted);
   sort_spatially(b_sorted);
   REQUIRE(!std::is_sorted(a_sorted.row_ids.begin(), a_sorted.row_ids.end()));
-  for (const OracleOrder order : {OracleOrder::float32_key, OracleOrder::float64, OracleOrder::per_ray}) {
+  for (const OracleOrder order :
+       {OracleOrder::float32_key, OracleOrder::float64, OracleOrder::per_ray}) {
     OracleConfig config;
     config.order = order;
     const OracleFrames f = oracle({a.set(), b.set()}, axis_camera(), config);

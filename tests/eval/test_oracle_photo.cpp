@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// oracle_photo against the oracle at k times the resolution, reduced by hand, and against the integral of
-// a Gaussian over a pixel.
+// oracle_photo against the oracle at k times the resolution, reduced by hand, and against the integral
+// of a Gaussian over a pixel.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -90,8 +90,8 @@ TEST_CASE("photo oracle: a sub-pixel Gaussian is its integral over each pixel") 
   double total = 0;
   for (std::size_t p = 0; p < f.alpha.size(); ++p) {
     const double x = static_cast<double>(p % 9), y = static_cast<double>(p / 9);
-    const double expected = integral * (below(x + 1, mx, sx) - below(x, mx, sx)) *
-                            (below(y + 1, my, sy) - below(y, my, sy));
+    const double expected =
+        integral * (below(x + 1, mx, sx) - below(x, mx, sx)) * (below(y + 1, my, sy) - below(y, my, sy));
     CHECK(std::abs(f.alpha[p] - expected) < 2e-3 * peak);
     total += f.alpha[p];
   }
@@ -119,7 +119,8 @@ TEST_CASE("photo oracle: what cannot be is named") {
   const GaussianSet set = cloud.set();
   SerialBackend backend;
   for (const int k : {0, 17, -1}) {
-    CHECK(oracle_photo(backend, std::span(&set, 1), Camera{}, k).message().find("k = ") != std::string::npos);
+    CHECK(oracle_photo(backend, std::span(&set, 1), Camera{}, k).message().find("k = ") !=
+          std::string::npos);
   }
   Camera large;
   large.set_hfov(4096, 16, 60);

@@ -73,9 +73,10 @@ TEST_CASE("ray oracle: alpha of single Gaussians is the maximum along the ray, w
   for (int n = 0; n < 200; ++n) {
     CAPTURE(n);
     const double z = rng.uniform(0.5, 5), scale = z * std::pow(10.0, rng.uniform(-2.5, -0.2));
-    RawGaussian g = gaussian({rng.uniform(-1.3, 1.3) * z, rng.uniform(-1, 1) * z, z},
-                             {scale, scale * std::pow(10.0, rng.uniform(-3, 0)), scale * rng.uniform(0.1, 1)},
-                             rng.uniform(0.1, 0.98));
+    RawGaussian g =
+        gaussian({rng.uniform(-1.3, 1.3) * z, rng.uniform(-1, 1) * z, z},
+                 {scale, scale * std::pow(10.0, rng.uniform(-3, 0)), scale * rng.uniform(0.1, 1)},
+                 rng.uniform(0.1, 0.98));
     g.quat = random_rotation(rng);
     GaussianCloud cloud = cloud_of({g});
     if (n % 2 == 1) cloud.filter = Filter::mip;
@@ -132,8 +133,9 @@ TEST_CASE("ray oracle: two disks that cut through each other are ordered at each
 
 TEST_CASE("ray oracle: one depth is ordered by stable id") {
   const Vec3d mean{0, 0, 4}, round{0.2, 0.2, 0.2};
-  const GaussianCloud cloud = cloud_of({gaussian(mean, round, 0.5, {1, 0, -1}), gaussian(mean, round, 0.5),
-                                        gaussian(mean, round, 0.5, {-1, 0, 1})});
+  const GaussianCloud cloud =
+      cloud_of({gaussian(mean, round, 0.5, {1, 0, -1}), gaussian(mean, round, 0.5),
+                gaussian(mean, round, 0.5, {-1, 0, 1})});
   const OracleFrames f = oracle({cloud.set()}, axis_camera(), {.kind = OracleKind::ray});
   const std::size_t center = 32 * 65 + 32;
   CHECK(f.rgb[3 * center] == doctest::Approx(0.5 * 0.875 + kSh0 * (0.5 - 0.125)).epsilon(1e-12));
@@ -145,8 +147,8 @@ TEST_CASE("ray oracle: what EWA is off by, over N02's grid of spheres") {
   camera.set_hfov(640, 480, 130);
   for (const double rho : {0.01, 0.03, 0.1}) {
     for (const double theta : {0.0, 30.0, 45.0, 60.0}) {
-      const GaussianCloud cloud = cloud_of(
-          {gaussian({std::sin(theta * kRadians), 0, std::cos(theta * kRadians)}, {rho, rho, rho}, 0.98)});
+      const GaussianCloud cloud = cloud_of({gaussian(
+          {std::sin(theta * kRadians), 0, std::cos(theta * kRadians)}, {rho, rho, rho}, 0.98)});
       OracleConfig config;
       config.rules.alpha_min = 1e-6;
       const OracleFrames ewa = oracle({cloud.set()}, camera, config);

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "support/files.hpp"
 #include "gsnav/detail/io/episode_file.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/detail/io/npz_file.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "support/command.hpp"
+#include "support/files.hpp"
 #include "support/process.hpp"
 #include "support/small_disk.hpp"
 
@@ -18,20 +18,26 @@ namespace {
 
 // Programs make the flat anew each time: as few Gaussians as it may have.
 const std::string kSparse = " --density 0.05 ";
-const std::string kOptions = kSparse + "--avatars 2 --episodes 3 --max-steps 25 --width 32 --height 24 --out out ";
+const std::string kOptions =
+    kSparse + "--avatars 2 --episodes 3 --max-steps 25 --width 32 --height 24 --out out ";
 
-std::size_t lines(const std::string& text) { return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')); }
+std::size_t lines(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
 
 }  // namespace
 
 TEST_CASE("an evaluation that was broken off goes on, to the same journal and page") {
   const TempFolder folder("eval");
-  const auto eval = [&](const std::string& more) { return run_command(GSNAV_EVAL, kOptions + more, folder.path()); };
+  const auto eval = [&](const std::string& more) {
+    return run_command(GSNAV_EVAL, kOptions + more, folder.path());
+  };
   const Outcome whole = eval("--pictures 1");
   CAPTURE(whole.text);
   REQUIRE(whole.ok);
   CHECK(whole.says("3 episodes: SR"));
-  const std::string journal = read_file(folder / "out/journal.jsonl"), page = read_file(folder / "out/index.html");
+  const std::string journal = read_file(folder / "out/journal.jsonl"),
+                    page = read_file(folder / "out/index.html");
   CHECK(lines(journal) == 4);
   CHECK(contains(page, "data:image/"));
   CHECK(contains(page, "personal space intrusion"));
@@ -59,7 +65,9 @@ TEST_CASE("an evaluation that was broken off goes on, to the same journal and pa
 
   // What was recorded is played again: the agent's own camera, then one that stands.
   // Its options are in the journal.
-  const auto replay = [&](const std::string& more) { return run_command(GSNAV_REPLAY, "--out out " + more, folder.path()); };
+  const auto replay = [&](const std::string& more) {
+    return run_command(GSNAV_REPLAY, "--out out " + more, folder.path());
+  };
   const Outcome differs = replay("--episode 0 --policy random");
   CHECK_FALSE(differs.ok);
   CHECK(differs.says("was recorded with --policy follower, but this run has --policy random"));
@@ -77,7 +85,8 @@ TEST_CASE("an evaluation that was broken off goes on, to the same journal and pa
   bool same = true;
   for (std::size_t y = 0; y < 24; ++y) {
     for (std::size_t x = 0; x < 96; ++x) {
-      same = same && frame.samples[y * 96 + x] == strip.samples[(y + 4) * 3 * static_cast<std::size_t>(strip.width) + 12 + x];
+      same = same && frame.samples[y * 96 + x] ==
+                         strip.samples[(y + 4) * 3 * static_cast<std::size_t>(strip.width) + 12 + x];
     }
   }
   CHECK(same);
@@ -96,10 +105,11 @@ TEST_CASE("episodes of a file are played by any policy") {
   episodes[0].goal_position = {5.2, 0, 3.2};
   REQUIRE(gsnav::io::save_episodes(folder / "val.json.gz", episodes).ok());
   for (const std::string policy : {"greedy", "random"}) {
-    const Outcome out = run_command(GSNAV_EVAL,
-                                    kSparse + "--avatars 0 --max-steps 60 --pictures 0 --episode-file val.json.gz --out " +
-                                        policy + " --policy " + policy,
-                                    folder.path());
+    const Outcome out = run_command(
+        GSNAV_EVAL,
+        kSparse + "--avatars 0 --max-steps 60 --pictures 0 --episode-file val.json.gz --out " + policy +
+            " --policy " + policy,
+        folder.path());
     CAPTURE(out.text);
     CHECK(out.ok);
     CHECK(out.says(policy == "greedy" ? "SR 1.000" : "1 episodes"));
@@ -107,7 +117,9 @@ TEST_CASE("episodes of a file are played by any policy") {
   CHECK(run_command(GSNAV_EVAL, "--episode-file none.json --out x", folder.path()).says("none.json"));
 }
 
-TEST_CASE("an evaluation whose episodes, scene or NavMesh changed is refused by name, and begun anew on request") {
+TEST_CASE(
+    "an evaluation whose episodes, scene or NavMesh changed is refused by name, and begun anew on "
+    "request") {
   const TempFolder folder("eval");
   std::vector<gsnav::PointNavEpisode> episodes(1);
   episodes[0].id = "kitchen";
@@ -115,7 +127,9 @@ TEST_CASE("an evaluation whose episodes, scene or NavMesh changed is refused by 
   episodes[0].goal_position = {5.2, 0, 3.2};
   REQUIRE(gsnav::io::save_episodes(folder / "val.json.gz", episodes).ok());
   const auto eval = [&](const std::string& more = "", const std::string& file = "val.json.gz") {
-    return run_command(GSNAV_EVAL, kSparse + "--avatars 0 --pictures 0 --out out --episode-file " + file + " " + more, folder.path());
+    return run_command(
+        GSNAV_EVAL, kSparse + "--avatars 0 --pictures 0 --out out --episode-file " + file + " " + more,
+        folder.path());
   };
   REQUIRE(eval().ok);
   CHECK(eval().says("SR 1.000"));
@@ -136,7 +150,8 @@ TEST_CASE("an evaluation whose episodes, scene or NavMesh changed is refused by 
   CHECK_FALSE(replay.ok);
   CHECK(replay.says("the episodes in val.json.gz have changed"));
   // Options that change the world.
-  for (const std::string more : {"--cell-size 0.1", "--crop 0 0 0 9 2 9", "--max-steps 61", "--width 48", "--hfov 60.5"}) {
+  for (const std::string more :
+       {"--cell-size 0.1", "--crop 0 0 0 9 2 9", "--max-steps 61", "--width 48", "--hfov 60.5"}) {
     const Outcome differs = eval(more);
     CAPTURE(differs.text);
     CHECK_FALSE(differs.ok);
@@ -151,7 +166,8 @@ TEST_CASE("an evaluation whose episodes, scene or NavMesh changed is refused by 
   const std::string journal = read_file(folder / "out/journal.jsonl");
   for (const std::string name : {"scene", "navmesh", "people"}) {
     std::string changed = journal;
-    const std::size_t at = changed.find("\"" + name + "\":\"", changed.find("\"contents\"")) + name.size() + 4;
+    const std::size_t at =
+        changed.find("\"" + name + "\":\"", changed.find("\"contents\"")) + name.size() + 4;
     changed[at] = changed[at] == '0' ? '1' : '0';
     write_file(folder / "out/journal.jsonl", changed);
     const Outcome out = eval();
@@ -160,7 +176,8 @@ TEST_CASE("an evaluation whose episodes, scene or NavMesh changed is refused by 
     CHECK(out.says(("the " + name + " that gsnav made ha").c_str()));
   }
   // The header that gsnav wrote before.
-  write_file(folder / "out/journal.jsonl", "{\"avatars\":0,\"scene\":\"\"}\n" + journal.substr(journal.find('\n') + 1));
+  write_file(folder / "out/journal.jsonl",
+             "{\"avatars\":0,\"scene\":\"\"}\n" + journal.substr(journal.find('\n') + 1));
   const Outcome old = eval();
   CHECK_FALSE(old.ok);
   CHECK(old.says("line 1: is of an earlier gsnav"));
@@ -172,8 +189,10 @@ TEST_CASE("a record that is none of the evaluation is named by file, line, field
   REQUIRE(run_command(GSNAV_EVAL, options, folder.path()).ok);
   const std::string journal = read_file(folder / "out/journal.jsonl");
   const std::string header = journal.substr(0, journal.find('\n') + 1);
-  const std::string first = journal.substr(header.size(), journal.find('\n', header.size()) + 1 - header.size());
-  const auto with = [&](const std::string& field, const std::string& value) {  // in place of what the first record has
+  const std::string first =
+      journal.substr(header.size(), journal.find('\n', header.size()) + 1 - header.size());
+  const auto with = [&](const std::string& field,
+                        const std::string& value) {  // in place of what the first record has
     std::string line = first;
     const std::size_t at = line.find("\"" + field + "\":");
     REQUIRE(at != std::string::npos);
@@ -184,7 +203,8 @@ TEST_CASE("a record that is none of the evaluation is named by file, line, field
     std::string line, says;
   };
   std::string short_metrics = first;
-  short_metrics.erase(short_metrics.find("\"spl\":"), short_metrics.find("\"soft_spl\":") - short_metrics.find("\"spl\":"));
+  short_metrics.erase(short_metrics.find("\"spl\":"),
+                      short_metrics.find("\"soft_spl\":") - short_metrics.find("\"spl\":"));
   const std::size_t from = first.find("\"metrics\":{") + 11, to = first.find('}', from);
   std::string empty = first;
   empty.erase(from, to - from);
@@ -223,12 +243,14 @@ TEST_CASE("a record that is none of the evaluation is named by file, line, field
 
 TEST_CASE("equal evaluations write equal bytes, on any number of threads") {
   const TempFolder folder("eval");
-  const std::string options = kSparse + "--avatars 2 --episodes 3 --max-steps 25 --pictures 0 --policy random ";
+  const std::string options =
+      kSparse + "--avatars 2 --episodes 3 --max-steps 25 --pictures 0 --policy random ";
   REQUIRE(run_command(GSNAV_EVAL, options + "--threads 1 --out one", folder.path()).ok);
   REQUIRE(run_command(GSNAV_EVAL, options + "--threads 3 --out three", folder.path()).ok);
   const std::string one = read_file(folder / "one/metrics.json");
   CHECK(one == read_file(folder / "three/metrics.json"));
-  for (const char* name : {"\"psc\":", "\"human_collision_episode_rate\":", "\"human_blocked_episode_rate\":", "\"means\":"}) {
+  for (const char* name : {"\"psc\":", "\"human_collision_episode_rate\":",
+                           "\"human_blocked_episode_rate\":", "\"means\":"}) {
     CHECK(contains(one, name));
   }
   CHECK_FALSE(contains(one, "_s\""));
@@ -237,8 +259,9 @@ TEST_CASE("equal evaluations write equal bytes, on any number of threads") {
 
 TEST_CASE("an evaluation that is killed while it plays goes on to the bytes of one that never was") {
   const TempFolder folder("eval");
-  const std::vector<std::string> common{"--density", "0.05", "--avatars", "1", "--episodes", "12", "--max-steps", "150",
-                                        "--policy", "random", "--pictures", "0", "--out"};
+  const std::vector<std::string> common{"--density",   "0.05", "--avatars", "1",      "--episodes", "12",
+                                        "--max-steps", "150",  "--policy",  "random", "--pictures", "0",
+                                        "--out"};
   const auto words = [&](const std::string& out) {
     std::vector<std::string> all{GSNAV_EVAL};
     all.insert(all.end(), common.begin(), common.end());
@@ -258,7 +281,8 @@ TEST_CASE("an evaluation that is killed while it plays goes on to the bytes of o
   CHECK(Process(words("whole"), folder.path()).wait(120) == 0);
   for (const char* name : {"journal.jsonl", "metrics.json", "index.html", "episodes.json.gz"}) {
     CAPTURE(name);
-    CHECK(read_file(folder / ("killed/" + std::string(name))) == read_file(folder / ("whole/" + std::string(name))));
+    CHECK(read_file(folder / ("killed/" + std::string(name))) ==
+          read_file(folder / ("whole/" + std::string(name))));
   }
   for (const auto& entry : std::filesystem::directory_iterator(folder / "killed")) {
     CHECK(entry.path().extension() != ".part");
@@ -270,7 +294,8 @@ TEST_CASE("a full disk leaves the journal whole and nothing half written") {
   std::filesystem::create_directories(folder / "disk");
   const SmallDisk disk(folder / "disk", 24);
   if (!disk.mounted()) return;
-  const std::string options = kSparse + "--avatars 0 --episodes 40 --max-steps 200 --policy random --pictures 0 --out ";
+  const std::string options =
+      kSparse + "--avatars 0 --episodes 40 --max-steps 200 --policy random --pictures 0 --out ";
   const Outcome out = run_command(GSNAV_EVAL, options + "disk", folder.path());
   CAPTURE(out.text);
   CHECK_FALSE(out.ok);
@@ -278,8 +303,10 @@ TEST_CASE("a full disk leaves the journal whole and nothing half written") {
   const std::string journal = read_file(folder / "disk/journal.jsonl");
   REQUIRE(lines(journal) > 1);
   CHECK(journal.back() == '\n');
-  for (const char* name : {"metrics.json", "index.html", "timings.json"}) CHECK_FALSE(std::filesystem::exists(folder / "disk" / name));
-  for (const auto& entry : std::filesystem::directory_iterator(folder / "disk")) CHECK(entry.path().extension() != ".part");
+  for (const char* name : {"metrics.json", "index.html", "timings.json"})
+    CHECK_FALSE(std::filesystem::exists(folder / "disk" / name));
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "disk"))
+    CHECK(entry.path().extension() != ".part");
   // With room it goes on to what a run that was never stopped has.
   std::filesystem::create_directories(folder / "room");
   write_file(folder / "room/journal.jsonl", journal);
@@ -302,9 +329,12 @@ TEST_CASE("output names that cannot be written are refused before anything is lo
 
 TEST_CASE("a replay becomes a video of any size, and says what is missing where there is no ffmpeg") {
   const TempFolder folder("video");
-  const std::string options = kSparse + "--avatars 1 --episodes 1 --max-steps 12 --width 63 --height 47 --out out ";
+  const std::string options =
+      kSparse + "--avatars 1 --episodes 1 --max-steps 12 --width 63 --height 47 --out out ";
   REQUIRE(run_command(GSNAV_EVAL, options + "--pictures 0", folder.path()).ok);
-  const Outcome none = run_command("env", "PATH=/nowhere " + quoted(GSNAV_REPLAY) + " " + options + "--video none.mp4", folder.path());
+  const Outcome none =
+      run_command("env", "PATH=/nowhere " + quoted(GSNAV_REPLAY) + " " + options + "--video none.mp4",
+                  folder.path());
   CHECK_FALSE(none.ok);
   CHECK(none.says("is it installed?"));
 #if defined(GSNAV_FFMPEG)
@@ -316,13 +346,15 @@ TEST_CASE("a replay becomes a video of any size, and says what is missing where 
   REQUIRE(run_command(GSNAV_FFMPEG, "-loglevel error -i walk.mp4 again%02d.png", folder.path()).ok);
   CHECK(std::filesystem::exists(folder / "again13.png"));  // the start and twelve actions
   CHECK_FALSE(std::filesystem::exists(folder / "again14.png"));
-  const auto still = gsnav::io::load_png(folder / "still/00012.png").value(), frame = gsnav::io::load_png(folder / "again13.png").value();
+  const auto still = gsnav::io::load_png(folder / "still/00012.png").value(),
+             frame = gsnav::io::load_png(folder / "again13.png").value();
   REQUIRE(frame.width == 64);
   REQUIRE(frame.height == 48);
   double sum = 0;
   for (std::size_t y = 0; y < 47; ++y) {
     for (std::size_t x = 0; x < 63 * 3; ++x) {
-      sum += std::abs(static_cast<double>(still.samples[y * 63 * 3 + x]) - frame.samples[y * 64 * 3 + x]);
+      sum +=
+          std::abs(static_cast<double>(still.samples[y * 63 * 3 + x]) - frame.samples[y * 64 * 3 + x]);
     }
   }
   CHECK(sum / (47 * 63 * 3) < 8);  // of 255
@@ -332,11 +364,16 @@ TEST_CASE("a replay becomes a video of any size, and says what is missing where 
 }
 
 #if defined(GSNAV_NAV_LOOP)
-TEST_CASE("the demo draws any episode that it plays, and refuses to draw one beyond the last before it plays") {
+TEST_CASE(
+    "the demo draws any episode that it plays, and refuses to draw one beyond the last before it "
+    "plays") {
   const TempFolder folder("nav_loop");
   const auto demo = [&](const std::string& more) {
-    return run_command(GSNAV_NAV_LOOP, "--avatars 0 --episodes 2 --max-steps 3 --width 32 --height 24 --frames-every 0 --out out " + more,
-                       folder.path());
+    return run_command(
+        GSNAV_NAV_LOOP,
+        "--avatars 0 --episodes 2 --max-steps 3 --width 32 --height 24 --frames-every 0 --out out " +
+            more,
+        folder.path());
   };
   const Outcome beyond = demo("--show 2");
   CAPTURE(beyond.text);
@@ -351,11 +388,13 @@ TEST_CASE("the demo draws any episode that it plays, and refuses to draw one bey
 #endif
 
 #if defined(GSNAV_EVAL_MPI)
-TEST_CASE("any number of ranks gives the same numbers, also where one was killed and the job begins again") {
+TEST_CASE(
+    "any number of ranks gives the same numbers, also where one was killed and the job begins again") {
   const TempFolder folder("eval");
   const auto ranks = [&](int n, const std::string& out, const std::string& more = "") {
-    const std::string arguments = "--oversubscribe --allow-run-as-root -n " + std::to_string(n) + " " + quoted(GSNAV_EVAL_MPI) +
-                                  kSparse + "--avatars 1 --episodes 7 --max-steps 30 --policy random --out " + out + more;
+    const std::string arguments =
+        "--oversubscribe --allow-run-as-root -n " + std::to_string(n) + " " + quoted(GSNAV_EVAL_MPI) +
+        kSparse + "--avatars 1 --episodes 7 --max-steps 30 --policy random --out " + out + more;
     const Outcome run = run_command(GSNAV_MPIEXEC, arguments, folder.path());
     CAPTURE(run.text);
     REQUIRE(run.ok);
@@ -365,13 +404,16 @@ TEST_CASE("any number of ranks gives the same numbers, also where one was killed
   const std::string one = ranks(1, "one");
   CHECK(ranks(4, "four") == one);
   CHECK(ranks(2, "drawn", " --draw openmp --threads 1 --width 24 --height 16") == one);
-  // As a rank that is killed leaves its journal: its last line cut, and all of it gone that was not yet on disk.
-  const std::string second = read_file(folder / "four/journal.2.jsonl"), third = read_file(folder / "four/journal.3.jsonl");
+  // As a rank that is killed leaves its journal: its last line cut, and all of it gone that was not yet
+  // on disk.
+  const std::string second = read_file(folder / "four/journal.2.jsonl"),
+                    third = read_file(folder / "four/journal.3.jsonl");
   CHECK(lines(second) == 3);  // a header and episodes 2 and 6
   write_file(folder / "four/journal.2.jsonl", second.substr(0, second.size() - 10));
   write_file(folder / "four/journal.3.jsonl", third.substr(0, third.find('\n') + 1));
   CHECK(ranks(3, "four") == one);
-  const std::string same = kSparse + "--avatars 1 --episodes 7 --max-steps 30 --policy random --pictures 0 --out four";
+  const std::string same =
+      kSparse + "--avatars 1 --episodes 7 --max-steps 30 --policy random --pictures 0 --out four";
   const Outcome again = run_command(GSNAV_EVAL, same, folder.path());
   CHECK(again.says("7 episodes: SR"));
   CHECK_FALSE(again.says("episode 1/7"));  // none is missing
@@ -385,10 +427,14 @@ pid_t process_of_rank(int rank, const std::filesystem::path& folder) {
     const std::string pid = entry.path().filename().string();
     if (pid.find_first_not_of("0123456789") != std::string::npos) continue;
     std::error_code gone;
-    if (std::filesystem::read_symlink(entry.path() / "exe", gone) != std::filesystem::path(GSNAV_EVAL_MPI)) continue;
-    if (std::filesystem::read_symlink(entry.path() / "cwd", gone) != std::filesystem::canonical(folder)) continue;
+    if (std::filesystem::read_symlink(entry.path() / "exe", gone) !=
+        std::filesystem::path(GSNAV_EVAL_MPI))
+      continue;
+    if (std::filesystem::read_symlink(entry.path() / "cwd", gone) != std::filesystem::canonical(folder))
+      continue;
     const std::string environment = '\0' + read_file(entry.path() / "environ");
-    const std::string name = std::string(1, '\0') + "OMPI_COMM_WORLD_RANK=" + std::to_string(rank) + std::string(1, '\0');
+    const std::string name =
+        std::string(1, '\0') + "OMPI_COMM_WORLD_RANK=" + std::to_string(rank) + std::string(1, '\0');
     if (contains(environment, name)) return std::stoi(pid);
   }
   return 0;
@@ -396,12 +442,30 @@ pid_t process_of_rank(int rank, const std::filesystem::path& folder) {
 
 }  // namespace
 
-TEST_CASE("a rank is killed while it plays; the job, begun again with fewer ranks, has the numbers of one that was never stopped") {
+TEST_CASE(
+    "a rank is killed while it plays; the job, begun again with fewer ranks, has the numbers of one "
+    "that was never stopped") {
   const TempFolder folder("killed");
-  const std::string options = kSparse + "--avatars 1 --episodes 60 --max-steps 200 --policy random --out ";
-  const std::vector<std::string> words{GSNAV_MPIEXEC, "--oversubscribe", "--allow-run-as-root", "-n", "3", GSNAV_EVAL_MPI,
-                                       "--density", "0.05", "--avatars", "1", "--episodes", "60", "--max-steps", "200",
-                                       "--policy", "random", "--out", "out"};
+  const std::string options =
+      kSparse + "--avatars 1 --episodes 60 --max-steps 200 --policy random --out ";
+  const std::vector<std::string> words{GSNAV_MPIEXEC,
+                                       "--oversubscribe",
+                                       "--allow-run-as-root",
+                                       "-n",
+                                       "3",
+                                       GSNAV_EVAL_MPI,
+                                       "--density",
+                                       "0.05",
+                                       "--avatars",
+                                       "1",
+                                       "--episodes",
+                                       "60",
+                                       "--max-steps",
+                                       "200",
+                                       "--policy",
+                                       "random",
+                                       "--out",
+                                       "out"};
   Process job(words, folder.path());
   pid_t victim = 0;
   while (job.runs() && lines(read_file(folder / "out/journal.1.jsonl")) < 4) usleep(1000);
@@ -420,8 +484,10 @@ TEST_CASE("a rank is killed while it plays; the job, begun again with fewer rank
   CHECK(finished >= 3);
   REQUIRE(finished < 60);
   const auto numbers = [&](int n, const std::string& out) {
-    const Outcome run = run_command(GSNAV_MPIEXEC, "--oversubscribe --allow-run-as-root -n " + std::to_string(n) + " " +
-                                                       quoted(GSNAV_EVAL_MPI) + options + out, folder.path());
+    const Outcome run = run_command(GSNAV_MPIEXEC,
+                                    "--oversubscribe --allow-run-as-root -n " + std::to_string(n) + " " +
+                                        quoted(GSNAV_EVAL_MPI) + options + out,
+                                    folder.path());
     CAPTURE(run.text);
     REQUIRE(run.ok);
     REQUIRE(run.says("60 episodes ("));

@@ -15,8 +15,8 @@
 #include "lod/lod_support.hpp"
 #include "support/files.hpp"
 
-// Files that are cached beside a scene. Their checksums would stop every mutation: an input is the file itself after a
-// zero, or what the writer is to write.
+// Files that are cached beside a scene. Their checksums would stop every mutation: an input is the file
+// itself after a zero, or what the writer is to write.
 
 namespace gsnav_fuzz {
 
@@ -81,7 +81,8 @@ inline const char* read_visible(const std::string& input) {
   } else {
     InputValues from(rest);
     VisibleSets v;
-    for (double* x : {&v.cell, &v.focal, &v.near_plane, &v.near_sigma, &v.min_weight}) *x = from.next<double>();
+    for (double* x : {&v.cell, &v.focal, &v.near_plane, &v.near_sigma, &v.min_weight})
+      *x = from.next<double>();
     const std::size_t cells = from.next<std::uint8_t>();
     v.keys = from.array<VisibleSets::Key>(cells);
     v.ends = from.array<std::uint64_t>(v.keys.size());
@@ -136,8 +137,8 @@ inline const gsnav::LodTree& cached_tree() {
   return tree;
 }
 
-/// What is wrong with what was read, or null. An input but for its first byte: values of four bytes, each behind the
-/// number of the array and the place in it where it stands in a tree that is right.
+/// What is wrong with what was read, or null. An input but for its first byte: values of four bytes,
+/// each behind the number of the array and the place in it where it stands in a tree that is right.
 inline const char* read_lod(const std::string& input) {
   using namespace gsnav;
   static const gsnav_test::TempFolder folder("fuzz_lod_file");
@@ -155,7 +156,8 @@ inline const char* read_lod(const std::string& input) {
       for_each_lod_array(tree, [&](auto& values) {
         const std::size_t words = values.size() * sizeof values[0] / sizeof word;
         if (n++ != array % kLodArrays || words == 0) return;
-        std::memcpy(reinterpret_cast<unsigned char*>(values.data()) + place % words * sizeof word, &word, sizeof word);
+        std::memcpy(reinterpret_cast<unsigned char*>(values.data()) + place % words * sizeof word, &word,
+                    sizeof word);
       });
     }
     if (!io::save_lod(path, tree, cached_scene()).ok()) return "a tree that could not be written";

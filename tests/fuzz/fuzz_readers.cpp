@@ -17,7 +17,6 @@
 #include "gsnav/detail/io/episode_file.hpp"
 #include "gsnav/detail/io/gltf.hpp"
 #include "gsnav/detail/io/habitat_dataset.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/detail/io/ksplat.hpp"
 #include "gsnav/detail/io/lod_set.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
@@ -31,6 +30,7 @@
 #include "gsnav/detail/io/temporal_file.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
 #include "gsnav/detail/render/validate_set.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "io/allocations.hpp"
 #include "io/spz_file.hpp"
 #include "picture.hpp"
@@ -195,15 +195,17 @@ void read_smpl_motion(const std::string& input) {
   std::string changed = input;
   if (of_model) changed[0] = static_cast<char>(part - motion.size());
   changed = zip_of(of_model ? model : motion, changed);
-  const auto loaded =
-      io::load_smpl_motion(file_of(of_model ? fixed : changed, 0), file_of(of_model ? changed : fixed, 1));
+  const auto loaded = io::load_smpl_motion(file_of(of_model ? fixed : changed, 0),
+                                           file_of(of_model ? changed : fixed, 1));
   if (!loaded) return;
-  if (!loaded->skeleton.validate().ok() || !loaded->clip.validate().ok()) stop("a motion that does not fit its joints");
+  if (!loaded->skeleton.validate().ok() || !loaded->clip.validate().ok())
+    stop("a motion that does not fit its joints");
 }
 
 void check(const Result<io::PngImage>& picture) {
   if (!picture) return;
-  const auto pixels = static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height);
+  const auto pixels =
+      static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height);
   if (picture->samples.size() != pixels * static_cast<std::size_t>(picture->channels)) {
     stop("samples that are not the picture's");
   }
@@ -267,8 +269,8 @@ void read_makehuman(const std::string& input) {
   (void)io::load_makehuman(folder / "a.obj", options);
 }
 
-/// Reading may ask for four times the file, Detour's allocations counted, or 80 bytes a height triangle; questions for
-/// more.
+/// Reading may ask for four times the file, Detour's allocations counted, or 80 bytes a height triangle;
+/// questions for more.
 void read_navmesh(const std::string& input) {
   reset_largest_allocation();
   const auto mesh = parse_navmesh(bytes_of(input), "fuzz");
@@ -303,7 +305,8 @@ constexpr std::size_t kMiB = std::size_t{1} << 20;
 
 const std::map<std::string, Reader> kReaders = {
     {"ply", {[](const std::string& s) { check(io::parse_ply(bytes_of(s), "fuzz")); }, kMiB, 64}},
-    {"4dgs_ply", {[](const std::string& s) { check(io::parse_temporal_ply(bytes_of(s), "fuzz")); }, kMiB, 64}},
+    {"4dgs_ply",
+     {[](const std::string& s) { check(io::parse_temporal_ply(bytes_of(s), "fuzz")); }, kMiB, 64}},
     {"4dgs_npz", {read_temporal_npz, 260 * kMiB, 10000}},
     {"splat", {[](const std::string& s) { check(io::parse_splat(bytes_of(s), "fuzz")); }, kMiB, 4}},
     {"ksplat", {[](const std::string& s) { check(io::parse_ksplat(bytes_of(s), "fuzz")); }, kMiB, 64}},
@@ -322,7 +325,9 @@ const std::map<std::string, Reader> kReaders = {
     {"obj", {[](const std::string& s) { check(io::load_obj(file_of(s))); }, kMiB, 64}},
     {"mesh_ply", {[](const std::string& s) { check(io::load_ply_mesh(file_of(s))); }, kMiB, 64}},
     {"png", {[](const std::string& s) { check(io::load_png(file_of(s))); }, 64 * kMiB, 10000}},
-    {"jpeg", {[](const std::string& s) { check(io::detail::decode_jpeg(bytes_of(s), "fuzz")); }, 64 * kMiB, 10000}},
+    {"jpeg",
+     {[](const std::string& s) { check(io::detail::decode_jpeg(bytes_of(s), "fuzz")); }, 64 * kMiB,
+      10000}},
     {"webp", {read_webp, 64 * kMiB, 10000}},
     {"npy", {[](const std::string& s) { (void)io::load_npy(file_of(s)); }, kMiB, 64}},
     {"npz", {read_npz, 260 * kMiB, 10000}},

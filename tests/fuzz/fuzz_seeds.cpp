@@ -6,8 +6,8 @@
 #include "caches.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/detail/io/episode_file.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "io/ksplat_file.hpp"
 #include "io/ply_compressed_file.hpp"
 #include "io/splat_file.hpp"
@@ -124,22 +124,29 @@ void add_others(Seeds& seeds) {
   seeds.add_parts("driver", driver_parts());
   seeds.add_parts("4dgs_npz", temporal_parts());
   Parts motion = smpl_motion_parts();
-  for (const auto& [name, content] : smpl_model_parts()) motion["~" + name] = content;  // behind the motion's
+  for (const auto& [name, content] : smpl_model_parts())
+    motion["~" + name] = content;  // behind the motion's
   seeds.add_parts("smpl_motion", motion);
-  for (const std::size_t degree : {0u, 3u, 9u}) seeds.add("4dgs_ply", temporal_file(3, degree, 2).text());
+  for (const std::size_t degree : {0u, 3u, 9u})
+    seeds.add("4dgs_ply", temporal_file(3, degree, 2).text());
   char part = 0;
   for (const auto& [name, content] : dataset_parts()) seeds.add("dataset", part++ + content);
-  seeds.add("amc",
-            std::string(":units\n  length 0.5\n  angle deg\n:root\n   order TX TY TZ RX RY RZ\n   axis XYZ\n"
-                        "   position 1 2 3\n   orientation 0 0 30\n:bonedata\n  begin\n   id 1\n   name arm\n"
-                        "   direction 0 1 0\n   length 4\n   axis 10 20 30 XYZ\n   dof rx ry rz\n"
-                        "   limits (-160.0 20.0)\n          (-70.0 70.0)\n  end\n:hierarchy\n  begin\n    root arm\n"
-                        "  end\n") +
-                '\0' + ":DEGREES\n1\nroot 5 6 7 10 20 30\narm 40 50 60\n2\nroot -1 0 1 -170 3 4e1\narm 0 +5 -5.5\n");
-  seeds.add("makehuman",
-            std::string(R"({"bones":{"arm":{"head":"a","tail":"b","parent":"base"},"base":{"head":"b","tail":"a",)"
-                        R"("parent":null}},"joints":{"a":[2,3],"b":[1,0]},"weights_file":"w.mhw"})") +
-                '\0' + R"({"weights":{"base":[[0,1],[1,0.5],[2,0.25]],"arm":[[2,0.5],[3,0.3]]}})");
+  seeds.add(
+      "amc",
+      std::string(
+          ":units\n  length 0.5\n  angle deg\n:root\n   order TX TY TZ RX RY RZ\n   axis XYZ\n"
+          "   position 1 2 3\n   orientation 0 0 30\n:bonedata\n  begin\n   id 1\n   name arm\n"
+          "   direction 0 1 0\n   length 4\n   axis 10 20 30 XYZ\n   dof rx ry rz\n"
+          "   limits (-160.0 20.0)\n          (-70.0 70.0)\n  end\n:hierarchy\n  begin\n    root arm\n"
+          "  end\n") +
+          '\0' +
+          ":DEGREES\n1\nroot 5 6 7 10 20 30\narm 40 50 60\n2\nroot -1 0 1 -170 3 4e1\narm 0 +5 -5.5\n");
+  seeds.add(
+      "makehuman",
+      std::string(
+          R"({"bones":{"arm":{"head":"a","tail":"b","parent":"base"},"base":{"head":"b","tail":"a",)"
+          R"("parent":null}},"joints":{"a":[2,3],"b":[1,0]},"weights_file":"w.mhw"})") +
+          '\0' + R"({"weights":{"base":[[0,1],[1,0.5],[2,0.25]],"arm":[[2,0.5],[3,0.3]]}})");
   seeds.add("lod_set",
             R"({"lodLevels":2,"environment":null,"filenames":["a.sog","b.sog"],"tree":{"bound":{},)"
             R"("children":[{"lods":{"0":{"file":0,"offset":0,"count":6}}},{"lods":{"0":{"file":0,)"
@@ -179,7 +186,8 @@ void add_navmesh(Seeds& seeds) {
     settings.agent_radius = 0.1;
     settings.cell_size = cell;
     settings.tile_size = tile_size;
-    save_navmesh(NavMesh::build(settings, soup.vertices, soup.triangles).value(), folder / "a").throw_if_error();
+    save_navmesh(NavMesh::build(settings, soup.vertices, soup.triangles).value(), folder / "a")
+        .throw_if_error();
     seeds.add("navmesh", read_file(folder / "a"));
   };
   Soup floor;
@@ -205,7 +213,8 @@ void add_caches(Seeds& seeds) {
   sets.cloud_chunks = cached_scene().view().all_chunks();
   sets.keys = {{-1, 0, 2}, {0, 0, 0}};
   sets.bits = {5, 3, 0};  // the second cell: chunks 0 and 1, of which rows follow
-  for (std::uint32_t word = 0; word < 2 * kSeenRowWords; ++word) sets.bits.push_back(0xff00ffu << word % 8);
+  for (std::uint32_t word = 0; word < 2 * kSeenRowWords; ++word)
+    sets.bits.push_back(0xff00ffu << word % 8);
   sets.ends = {1, sets.bits.size()};
   TempFolder folder("fuzz_caches");
   io::save_visible_sets(folder / "a", sets, cached_scene()).throw_if_error();

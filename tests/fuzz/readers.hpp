@@ -89,16 +89,17 @@ inline Parts smpl_model_parts() {
 
 /// The files of a Habitat dataset.
 inline Parts dataset_parts() {
-  return {{"a.scene_dataset_config.json",
-           R"({"stages":{"paths":{".json":["*.stage_config.json"]},"default_attributes":{"scale":2}},)"
-           R"("scene_instances":{"paths":{".json":["."]}},"navmesh_instances":{"n":"a.navmesh"}})"},
-          {"a.scene_instance.json",
-           R"({"stage_instance":{"template_name":"a"},"navmesh_instance":"n","time_max":20.0,"time_loop":true,)"
-           R"("gaussian_avatars":[{"name":"b","canonical_gaussians":"b.npz","driver":"d.npz","offset_y":1.0,"scale":1.5,)"
-           R"("coord_transform":[[0,0,1,5],[0,1,0,0],[-1,0,0,0],[0,0,0,1]]},{"canonical_gaussians":"b.npz",)"
-           R"("driver":{"smpl_params":"d.npz","trajectory":"t.npz"},"time_begin":2,"time_end":9}]})"},
-          {"a.stage_config.json",
-           R"({"render_asset":"a.gs.ply","collision_asset":"a.glb","up":[0,0,1],"front":[0,1,0],"units_to_meters":1})"}};
+  return {
+      {"a.scene_dataset_config.json",
+       R"({"stages":{"paths":{".json":["*.stage_config.json"]},"default_attributes":{"scale":2}},)"
+       R"("scene_instances":{"paths":{".json":["."]}},"navmesh_instances":{"n":"a.navmesh"}})"},
+      {"a.scene_instance.json",
+       R"({"stage_instance":{"template_name":"a"},"navmesh_instance":"n","time_max":20.0,"time_loop":true,)"
+       R"("gaussian_avatars":[{"name":"b","canonical_gaussians":"b.npz","driver":"d.npz","offset_y":1.0,"scale":1.5,)"
+       R"("coord_transform":[[0,0,1,5],[0,1,0,0],[-1,0,0,0],[0,0,0,1]]},{"canonical_gaussians":"b.npz",)"
+       R"("driver":{"smpl_params":"d.npz","trajectory":"t.npz"},"time_begin":2,"time_end":9}]})"},
+      {"a.stage_config.json",
+       R"({"render_asset":"a.gs.ply","collision_asset":"a.glb","up":[0,0,1],"front":[0,1,0],"units_to_meters":1})"}};
 }
 
 inline std::string zip_of(const Parts& parts) {

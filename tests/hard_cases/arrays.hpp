@@ -33,8 +33,9 @@ class Arrays {
   template <class T>
   std::vector<T> fetch(const gsnav::View<T>& view) {
     std::vector<T> host(view.size);
-    backend_->copy(host.data(), view.data, view.size * sizeof(T),
-                   gsnav::is_host_backend<B> ? gsnav::CopyKind::host_to_host : gsnav::CopyKind::device_to_host);
+    backend_->copy(
+        host.data(), view.data, view.size * sizeof(T),
+        gsnav::is_host_backend<B> ? gsnav::CopyKind::host_to_host : gsnav::CopyKind::device_to_host);
     backend_->synchronize().throw_if_error();
     return host;
   }

@@ -141,8 +141,8 @@ void for_each_renderer(const F& f) {
 /// CHECKs that every image has the reference's bits; frames become the reference where that is empty.
 void check_bits(const gsnav::Frames<float>& frames, gsnav::Frames<float>& reference);
 
-/// Renders on every backend, with meshes on those that know them; the float32 images must have the serial backend's
-/// bits. Calls check(frames, renderer) for each.
+/// Renders on every backend, with meshes on those that know them; the float32 images must have the
+/// serial backend's bits. Calls check(frames, renderer) for each.
 template <class F>
 void render_everywhere(const std::vector<Placed>& scene, const gsnav::Camera& camera,
                        const gsnav::RenderConfig& config, const F& check,

@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/quat.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/detail/scene/spatial_order.hpp"
 
 // Inputs that several hard cases share.
 
@@ -24,7 +24,8 @@ namespace gsnav_test {
 /// How many random samples a case draws: `base` times GSNAV_HARD_CASE_SAMPLES (1 where it is not set).
 inline std::size_t sample_count(std::size_t base) {
   const char* factor = std::getenv("GSNAV_HARD_CASE_SAMPLES");
-  return static_cast<std::size_t>(static_cast<double>(base) * (factor != nullptr ? std::atof(factor) : 1.0));
+  return static_cast<std::size_t>(static_cast<double>(base) *
+                                  (factor != nullptr ? std::atof(factor) : 1.0));
 }
 
 /// Standard deviations may be 0: a flat axis.

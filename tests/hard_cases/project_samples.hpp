@@ -68,8 +68,8 @@ std::vector<SampleResult> project_samples(const gsnav::Camera& camera, const gsn
                  load([](const Sample& s) { return s.quat[3]; })};
     if constexpr (std::is_same_v<S, double>) normalize(quat);  // as detail::load_axes does
     const auto axes = splat_axes(projection.rotation, position, quat, scales);
-    const auto p = project<L, L>(projection, axes, position.z,
-                                 load([](const Sample& s) { return s.opacity; }));
+    const auto p =
+        project<L, L>(projection, axes, position.z, load([](const Sample& s) { return s.opacity; }));
     double out[7][kLanes];
     LaneIo<L>::store(p.mean_x, out[0]);
     LaneIo<L>::store(p.mean_y, out[1]);

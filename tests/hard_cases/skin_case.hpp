@@ -18,9 +18,9 @@ namespace gsnav_test {
 
 /// Gaussians with K joints each, as skinning is given them.
 struct SkinCase {
-  int influences = 4;                             // K
+  int influences = 4;  // K
   std::vector<float> means[3], quats[4];
-  std::vector<std::uint16_t> joints, weights;     // [N][K]
+  std::vector<std::uint16_t> joints, weights;  // [N][K]
   std::vector<gsnav::Affine3<double>> matrices;
 
   std::size_t size() const { return means[0].size(); }
@@ -49,7 +49,8 @@ struct SkinCase {
       const gsnav::Affine3<double>& m = matrices[joints[k]];
       for (int r = 0; r < 3; ++r) {
         shift[r] += w * static_cast<Real>(static_cast<S>(m.translation[r]));
-        for (int c = 0; c < 3; ++c) linear[r][c] += w * static_cast<Real>(static_cast<S>(m.linear(r, c)));
+        for (int c = 0; c < 3; ++c)
+          linear[r][c] += w * static_cast<Real>(static_cast<S>(m.linear(r, c)));
       }
     }
   }
@@ -93,7 +94,8 @@ SkinResult skin_on(R& renderer, const SkinCase& c) {
   for (std::size_t i = 0; i < c.size(); ++i) {
     out.means.push_back(gsnav::vec_cast<double>(gsnav::Vec3<S>{m[0][i], m[1][i], m[2][i]}));
     out.quats.push_back(gsnav::quat_cast<double>(gsnav::Quat<S>{q[0][i], q[1][i], q[2][i], q[3][i]}));
-    out.rotations.push_back(gsnav::quat_cast<double>(gsnav::Quat<S>{r[0][i], r[1][i], r[2][i], r[3][i]}));
+    out.rotations.push_back(
+        gsnav::quat_cast<double>(gsnav::Quat<S>{r[0][i], r[1][i], r[2][i], r[3][i]}));
   }
   return out;
 }
@@ -103,9 +105,10 @@ template <class F>
 void skin_everywhere(const SkinCase& c, const F& check) {
   SkinResult reference;
   const auto bits = [](const std::vector<gsnav::Quatd>& a, const std::vector<gsnav::Quatd>& b) {
-    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const gsnav::Quatd& p, const gsnav::Quatd& q) {
-      return p.w == q.w && p.x == q.x && p.y == q.y && p.z == q.z;
-    });
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [](const gsnav::Quatd& p, const gsnav::Quatd& q) {
+                        return p.w == q.w && p.x == q.x && p.y == q.y && p.z == q.z;
+                      });
   };
   for_each_backend([&](auto& renderer) {
     const SkinResult result = skin_on(renderer, c);
@@ -126,7 +129,8 @@ inline SkinCase random_case(std::uint64_t seed, std::size_t count, double degree
   gsnav::Rng rng(seed);
   SkinCase c;
   c.influences = influences;
-  const std::size_t row = c.row(), distinct = 64000 / row;  // joint indices have 16 bits: rows far apart share
+  const std::size_t row = c.row(),
+                    distinct = 64000 / row;  // joint indices have 16 bits: rows far apart share
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t n = 2 + rng.below(row - 1);
     std::vector<double> w(row, 0.0);
@@ -138,7 +142,8 @@ inline SkinCase random_case(std::uint64_t seed, std::size_t count, double degree
       j[k] = static_cast<std::uint16_t>(row * (i % distinct) + k);
       if (i >= distinct) continue;
       const gsnav::Quatd q = k == 0 ? base : rotation_within(rng, degrees) * base;
-      c.matrices.push_back({gsnav::rotation_matrix(q), {rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)}});
+      c.matrices.push_back(
+          {gsnav::rotation_matrix(q), {rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)}});
     }
     c.add({rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}, random_rotation(rng), w, j);
   }

@@ -27,8 +27,8 @@ eval::OracleMesh planes(const std::vector<MeshInstance>& meshes, const Camera& c
   return {drawn.depth, drawn.color};
 }
 
-eval::OracleFrames merged_truth(const std::vector<Placed>& scene, const Camera& camera, const RenderConfig& rules,
-                                const eval::OracleMesh& mesh) {
+eval::OracleFrames merged_truth(const std::vector<Placed>& scene, const Camera& camera,
+                                const RenderConfig& rules, const eval::OracleMesh& mesh) {
   eval::OracleConfig config;
   config.rules = rules;
   config.mesh = mesh.depth.empty() ? nullptr : &mesh;
@@ -66,7 +66,8 @@ Difference difference(const Frames<S>& f, const eval::OracleFrames& truth) {
 }
 
 template <class S>
-double largest_depth_error(const std::vector<S>& depth, const std::vector<double>& truth, const eval::OracleFrames& f) {
+double largest_depth_error(const std::vector<S>& depth, const std::vector<double>& truth,
+                           const eval::OracleFrames& f) {
   double largest = 0;
   for (std::size_t p = 0; p < truth.size(); ++p) {
     if (f.undecided[p] != 0 || f.undecided_depth[p] != 0) continue;
@@ -78,7 +79,12 @@ double largest_depth_error(const std::vector<S>& depth, const std::vector<double
 template <class S>
 std::array<std::vector<S> Frames<S>::*, 6> every_image(const Frames<S>&) {
   using F = Frames<S>;
-  return {&F::rgb, &F::alpha, &F::median_depth, &F::expected_depth, &F::accumulated_depth, &F::first_hit_depth};
+  return {&F::rgb,
+          &F::alpha,
+          &F::median_depth,
+          &F::expected_depth,
+          &F::accumulated_depth,
+          &F::first_hit_depth};
 }
 
 /// Shells of Gaussians about a point, each flat on its sphere.
@@ -87,8 +93,9 @@ GaussianCloud shell(std::uint64_t seed, const Vec3d& center, double radius, int 
   std::vector<RawGaussian> gaussians;
   for (int i = 0; i < count; ++i) {
     const Vec3d n = normalized(Vec3d{rng.normal(), rng.normal(), rng.normal()});
-    RawGaussian g = gaussian(center + n * radius, {0.05, 0.05, 0.004}, rng.uniform(0.3, 0.95),
-                             {static_cast<float>(rng.uniform(0, 1.5)), 0.8f, static_cast<float>(rng.uniform(-1, 0.5))});
+    RawGaussian g = gaussian(
+        center + n * radius, {0.05, 0.05, 0.004}, rng.uniform(0.3, 0.95),
+        {static_cast<float>(rng.uniform(0, 1.5)), 0.8f, static_cast<float>(rng.uniform(-1, 0.5))});
     // z onto n.
     const Vec3d axis = cross(Vec3d{0, 0, 1}, n);
     g.quat = {1 + n.z, axis.x, axis.y, axis.z};
@@ -102,8 +109,9 @@ GaussianCloud wall_of_disks(std::uint64_t seed, double z, double half, int count
   Rng rng(seed);
   std::vector<RawGaussian> disks;
   for (int i = 0; i < count; ++i) {
-    disks.push_back(gaussian({rng.uniform(-half, half), rng.uniform(-half, half), z + 0.003 * rng.normal()},
-                             {0.12, 0.12, 0.003}, 0.9, {-0.5f, static_cast<float>(rng.uniform(0, 1)), 1.0f}));
+    disks.push_back(
+        gaussian({rng.uniform(-half, half), rng.uniform(-half, half), z + 0.003 * rng.normal()},
+                 {0.12, 0.12, 0.003}, 0.9, {-0.5f, static_cast<float>(rng.uniform(0, 1)), 1.0f}));
   }
   return cloud_of(disks);
 }
@@ -120,31 +128,40 @@ TEST_CASE("N49_mesh_between_layers") {
   const OneMesh mesh = wall_mesh(3, 5, {1, 0.5f, 0});
   const std::array<double, 3> k{1, static_cast<double>(srgb_encoded(0.5)), 0};
   for (const double opacity : {0.4, 0.5, 0.6}) {
-    const GaussianCloud cloud = cloud_of({gaussian({0, 0, 2}, {0.4, 0.4, 1e-4}, opacity, {0.9f, -0.7f, 0.4f}),
-                                          gaussian({0, 0, 4}, {4, 4, 1e-4}, 0.9, {1.5f, 1.5f, 1.5f})});
+    const GaussianCloud cloud =
+        cloud_of({gaussian({0, 0, 2}, {0.4, 0.4, 1e-4}, opacity, {0.9f, -0.7f, 0.4f}),
+                  gaussian({0, 0, 4}, {4, 4, 1e-4}, 0.9, {1.5f, 1.5f, 1.5f})});
     const auto color = [](float sh0) { return 0.5 + 0.28209479177387814 * static_cast<double>(sh0); };
     const std::array<double, 3> front{color(0.9f), color(-0.7f), color(0.4f)};
-    render_everywhere({&cloud}, axis_camera(), all_outputs(), [&](const auto& f, const auto&) {
-      const std::size_t p = 32 * 65 + 32;
-      for (std::size_t c = 0; c < 3; ++c) {
-        CHECK(std::abs(static_cast<double>(f.rgb[3 * p + c]) - (opacity * front[c] + (1 - opacity) * k[c])) < 1e-6);
-      }
-      CHECK(f.alpha[p] == 1);
-      const double mean = opacity * 2 + (1 - opacity) * 3;
-      CHECK(std::abs(static_cast<double>(f.accumulated_depth[p]) - mean) < 2e-6);
-      CHECK(std::abs(static_cast<double>(f.expected_depth[p]) - mean) < 2e-6);
-      if (opacity != 0.5) {  // there T = 1/2 is a matter of rounding
-        const double half = opacity > 0.5 ? 2 : 3;
-        CHECK(std::abs(static_cast<double>(f.median_depth[p]) - half) < 2e-6);
-        CHECK(std::abs(static_cast<double>(f.first_hit_depth[p]) - half) < 2e-6);
-      }
-    }, mesh.instances);
+    render_everywhere(
+        {&cloud}, axis_camera(), all_outputs(),
+        [&](const auto& f, const auto&) {
+          const std::size_t p = 32 * 65 + 32;
+          for (std::size_t c = 0; c < 3; ++c) {
+            CHECK(std::abs(static_cast<double>(f.rgb[3 * p + c]) -
+                           (opacity * front[c] + (1 - opacity) * k[c])) < 1e-6);
+          }
+          CHECK(f.alpha[p] == 1);
+          const double mean = opacity * 2 + (1 - opacity) * 3;
+          CHECK(std::abs(static_cast<double>(f.accumulated_depth[p]) - mean) < 2e-6);
+          CHECK(std::abs(static_cast<double>(f.expected_depth[p]) - mean) < 2e-6);
+          if (opacity != 0.5) {  // there T = 1/2 is a matter of rounding
+            const double half = opacity > 0.5 ? 2 : 3;
+            CHECK(std::abs(static_cast<double>(f.median_depth[p]) - half) < 2e-6);
+            CHECK(std::abs(static_cast<double>(f.first_hit_depth[p]) - half) < 2e-6);
+          }
+        },
+        mesh.instances);
   }
 }
 
 TEST_CASE("N50_mesh_straddle_cloud") {
-  const GaussianCloud cloud = random_cloud(50, {.count = 10000, .sh_degree = 1, .needle = 0.1, .scale = 0.03,
-                                                .center = {0, 0, 3}, .extent = 1.2});
+  const GaussianCloud cloud = random_cloud(50, {.count = 10000,
+                                                .sh_degree = 1,
+                                                .needle = 0.1,
+                                                .scale = 0.03,
+                                                .center = {0, 0, 3},
+                                                .extent = 1.2});
   SurfaceMesh ball = sphere(0.7, 48, 24);
   ball.base_color = {0.8f, 0.1f, 0.05f};
   const OneMesh mesh(ball, {{}, {0.1, 0, 3}, 1});
@@ -155,23 +172,33 @@ TEST_CASE("N50_mesh_straddle_cloud") {
   std::size_t sure = 0;
   for (const std::uint8_t u : truth.undecided) sure += u == 0 ? 1 : 0;
   CHECK(sure > truth.undecided.size() * 97 / 100);
-  render_everywhere({&cloud}, camera, all_outputs(), [&](const auto& f, const auto& renderer) {
-    CHECK(difference(f, truth).largest < renderer.bound(1.0 / 510, 1e-9));
-    CHECK(largest_depth_error(f.median_depth, truth.median_depth, truth) < renderer.bound(1e-3, 1e-9));
-    CHECK(largest_depth_error(f.expected_depth, truth.expected_depth, truth) < renderer.bound(1e-3, 1e-9));
-    CHECK(largest_depth_error(f.first_hit_depth, truth.first_hit_depth, truth) < renderer.bound(1e-3, 1e-9));
-  }, mesh.instances);
+  render_everywhere(
+      {&cloud}, camera, all_outputs(),
+      [&](const auto& f, const auto& renderer) {
+        CHECK(difference(f, truth).largest < renderer.bound(1.0 / 510, 1e-9));
+        CHECK(largest_depth_error(f.median_depth, truth.median_depth, truth) <
+              renderer.bound(1e-3, 1e-9));
+        CHECK(largest_depth_error(f.expected_depth, truth.expected_depth, truth) <
+              renderer.bound(1e-3, 1e-9));
+        CHECK(largest_depth_error(f.first_hit_depth, truth.first_hit_depth, truth) <
+              renderer.bound(1e-3, 1e-9));
+      },
+      mesh.instances);
   // Habitat-GS's rule on the same scene.
   RenderConfig hard = all_outputs();
   hard.composite = Composite::hard_depth;
-  render_everywhere({&cloud}, camera, hard, [&](const auto& f, const auto& renderer) {
-    const Difference d = difference(f, truth);
-    if (renderer.name() == "serial double") {
-      MESSAGE("hard_depth: " << d.psnr << " dB, largest " << d.largest << ", wrong by more than 0.1: " << 100 * d.wrong << " %");
-    }
-    CHECK(d.psnr < 35);
-    CHECK(d.largest > 0.1);
-  }, mesh.instances);
+  render_everywhere(
+      {&cloud}, camera, hard,
+      [&](const auto& f, const auto& renderer) {
+        const Difference d = difference(f, truth);
+        if (renderer.name() == "serial double") {
+          MESSAGE("hard_depth: " << d.psnr << " dB, largest " << d.largest
+                                 << ", wrong by more than 0.1: " << 100 * d.wrong << " %");
+        }
+        CHECK(d.psnr < 35);
+        CHECK(d.largest > 0.1);
+      },
+      mesh.instances);
 }
 
 TEST_CASE("N51_avatar_touching_wall") {
@@ -183,16 +210,21 @@ TEST_CASE("N51_avatar_touching_wall") {
   const auto check = [&](const std::vector<Placed>& scene, const eval::OracleMesh& truth_mesh,
                          const std::vector<MeshInstance>& meshes) {
     const eval::OracleFrames truth = merged_truth(scene, camera, all_outputs(), truth_mesh);
-    render_everywhere(scene, camera, all_outputs(), [&](const auto& f, const auto& renderer) {
-      CHECK(difference(f, truth).largest < renderer.bound(1.0 / 510, 1e-9));
-      CHECK(largest_depth_error(f.median_depth, truth.median_depth, truth) < renderer.bound(1e-3, 1e-9));
-    }, meshes);
+    render_everywhere(
+        scene, camera, all_outputs(),
+        [&](const auto& f, const auto& renderer) {
+          CHECK(difference(f, truth).largest < renderer.bound(1.0 / 510, 1e-9));
+          CHECK(largest_depth_error(f.median_depth, truth.median_depth, truth) <
+                renderer.bound(1e-3, 1e-9));
+        },
+        meshes);
     if (meshes.empty()) return;
     RenderConfig hard = all_outputs();
     hard.composite = Composite::hard_depth;
     CaseRenderer<double, SerialBackend> renderer("serial double");
     const Difference d = difference(renderer.render(scene, {camera}, hard, meshes), truth);
-    MESSAGE("hard_depth: " << d.psnr << " dB, largest " << d.largest << ", wrong by more than 0.1: " << 100 * d.wrong << " %");
+    MESSAGE("hard_depth: " << d.psnr << " dB, largest " << d.largest
+                           << ", wrong by more than 0.1: " << 100 * d.wrong << " %");
     CHECK(d.largest > 1.0 / 510);
   };
   check({&wall, &body}, none, {});
@@ -200,8 +232,9 @@ TEST_CASE("N51_avatar_touching_wall") {
 }
 
 TEST_CASE("N53_tile_max_mesh_cull") {
-  const GaussianCloud cloud = random_cloud(53, {.count = 6000, .sh_degree = 0, .needle = 0.2, .scale = 0.04,
-                                                .center = {0, 0, 3}, .extent = 2});
+  const GaussianCloud cloud = random_cloud(
+      53,
+      {.count = 6000, .sh_degree = 0, .needle = 0.2, .scale = 0.04, .center = {0, 0, 3}, .extent = 2});
   const OneMesh mesh = wall_mesh(2.6f, 0.8f, {0.5f, 0.5f, 0.5f});
   const Camera camera = axis_camera(120, 90);
   for_each_backend([&](auto& renderer) {
@@ -224,10 +257,14 @@ TEST_CASE("N53_tile_max_mesh_cull") {
     for (std::size_t i = 0; i < 2; ++i) {
       image.resize_discard(8 * pixels);
       S* const p = image.data();
-      const FrameImages<S> out{p, p + 3 * pixels, p + 4 * pixels, p + 5 * pixels, p + 6 * pixels, p + 7 * pixels};
-      const MeshLayer<S> layer{ws.mesh.depth.data(), ws.mesh.color.data(),
-                               i == 0 ? std::as_const(ws.mesh.tile_far).view() : std::as_const(no_cull).view()};
-      REQUIRE(detail::render_frame<S>(backend, ws, {&set, 1}, camera, all_outputs(), layer, out, stats[i]).ok());
+      const FrameImages<S> out{
+          p, p + 3 * pixels, p + 4 * pixels, p + 5 * pixels, p + 6 * pixels, p + 7 * pixels};
+      const MeshLayer<S> layer{
+          ws.mesh.depth.data(), ws.mesh.color.data(),
+          i == 0 ? std::as_const(ws.mesh.tile_far).view() : std::as_const(no_cull).view()};
+      REQUIRE(
+          detail::render_frame<S>(backend, ws, {&set, 1}, camera, all_outputs(), layer, out, stats[i])
+              .ok());
       images[i].resize(8 * pixels);
       image.download(images[i].data(), 8 * pixels);
       REQUIRE(backend.synchronize().ok());
@@ -239,17 +276,19 @@ TEST_CASE("N53_tile_max_mesh_cull") {
 
 TEST_CASE("N53_tile_max_mesh_cull of chunks, before they are projected") {
   // Rooms behind a wall with a window, sorted in space, some placed; small and large Gaussians.
-  const GaussianCloud rooms = sorted(random_cloud(531, {.count = 30000, .sh_degree = 1, .needle = 0, .scale = 0.02,
-                                                        .center = {0, 0, 9}, .extent = 5}));
-  const GaussianCloud large = sorted(random_cloud(532, {.count = 1500, .sh_degree = 1, .scale = 0.3,
-                                                        .center = {0, 0, 6}, .extent = 4}));
+  const GaussianCloud rooms = sorted(random_cloud(
+      531,
+      {.count = 30000, .sh_degree = 1, .needle = 0, .scale = 0.02, .center = {0, 0, 9}, .extent = 5}));
+  const GaussianCloud large = sorted(random_cloud(
+      532, {.count = 1500, .sh_degree = 1, .scale = 0.3, .center = {0, 0, 6}, .extent = 4}));
   const GaussianCloud placed = sorted(random_cloud(533, {.count = 4000, .sh_degree = 0, .scale = 0.05}));
   const Similarity place{{0.8, 0.2, -0.5, 0.26457513110645907}, {0.3, -0.2, 4}, 1.5};
   SurfaceMesh wall;
   wall.two_sided = true;
   for (const auto& [x0, x1] : {std::pair{-9.0f, 0.4f}, std::pair{0.9f, 9.0f}}) {
     const auto first = static_cast<std::uint32_t>(wall.geometry.vertices.size());
-    for (const Vec3f& v : {Vec3f{x0, -9, 3}, Vec3f{x1, -9, 3}, Vec3f{x1, 9, 3}, Vec3f{x0, 9, 3}}) wall.geometry.vertices.push_back(v);
+    for (const Vec3f& v : {Vec3f{x0, -9, 3}, Vec3f{x1, -9, 3}, Vec3f{x1, 9, 3}, Vec3f{x0, 9, 3}})
+      wall.geometry.vertices.push_back(v);
     wall.geometry.triangles.push_back({first, first + 1, first + 2});
     wall.geometry.triangles.push_back({first, first + 2, first + 3});
   }
@@ -258,7 +297,8 @@ TEST_CASE("N53_tile_max_mesh_cull of chunks, before they are projected") {
     const Camera camera = axis_camera(90, f);
     CaseRenderer<float, SerialBackend> reference("serial float");
     const std::vector<Placed> scene{&rooms, &large, {&placed, place}};
-    const auto all = reference.render(scene, {camera}, all_outputs(), mesh.instances);  // which projects every chunk
+    const auto all =
+        reference.render(scene, {camera}, all_outputs(), mesh.instances);  // which projects every chunk
     for_each_renderer([&](auto& renderer) {
       using R = std::remove_reference_t<decltype(renderer)>;
       if constexpr (R::is_float) {
@@ -267,17 +307,20 @@ TEST_CASE("N53_tile_max_mesh_cull of chunks, before they are projected") {
         CHECK(some.median_depth == all.median_depth);
         CHECK(some.expected_depth == all.expected_depth);
         CHECK(some.stats[0].tile_intersections == all.stats[0].tile_intersections);
-        if (renderer.name().find("openmp") == 0) CHECK(some.stats[0].visible < all.stats[0].visible * 9 / 10);
+        if (renderer.name().find("openmp") == 0)
+          CHECK(some.stats[0].visible < all.stats[0].visible * 9 / 10);
       }
     });
   }
 }
 
 TEST_CASE("a mesh out of view changes no bit, whatever is asked for") {
-  const GaussianCloud cloud = random_cloud(54, {.count = 3000, .sh_degree = 1, .needle = 0.2, .scale = 0.05,
-                                                .center = {0, 0, 3}, .extent = 2});
+  const GaussianCloud cloud = random_cloud(
+      54,
+      {.count = 3000, .sh_degree = 1, .needle = 0.2, .scale = 0.05, .center = {0, 0, 3}, .extent = 2});
   const OneMesh mesh = wall_mesh(-2, 1, {1, 1, 1});
-  for (const unsigned outputs : {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth}, kRgb | kMedianDepth, kRgb | kAlpha | kAnyDepth}) {
+  for (const unsigned outputs : {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth},
+                                 kRgb | kMedianDepth, kRgb | kAlpha | kAnyDepth}) {
     for (int rules = 0; rules < 4; ++rules) {
       RenderConfig config;
       config.outputs = outputs;
@@ -295,8 +338,9 @@ TEST_CASE("a mesh out of view changes no bit, whatever is asked for") {
 }
 
 TEST_CASE("frames with a mesh: every output alone, every rule, batches and threads") {
-  const GaussianCloud cloud = random_cloud(55, {.count = 5000, .sh_degree = 1, .needle = 0.2, .scale = 0.05,
-                                                .center = {0, 0, 3}, .extent = 2});
+  const GaussianCloud cloud = random_cloud(
+      55,
+      {.count = 5000, .sh_degree = 1, .needle = 0.2, .scale = 0.05, .center = {0, 0, 3}, .extent = 2});
   SurfaceMesh ball = sphere(0.8, 32, 16);
   const OneMesh mesh(ball, {{}, {0.2, 0.1, 3}, 1});
   for (int rules = 0; rules < 4; ++rules) {
@@ -304,18 +348,23 @@ TEST_CASE("frames with a mesh: every output alone, every rule, batches and threa
     if (rules == 1) config.response = Response::tangent_plane;
     if (rules == 2) config.compat = Compat::habitat_gs;
     if (rules == 3) config.composite = Composite::hard_depth;
-    render_everywhere({&cloud}, axis_camera(83), config, [&](const auto& all, auto& renderer) {
-      for (const unsigned output : {kRgb, kAlpha, kMedianDepth, kExpectedDepth, kAccumulatedDepth, kFirstHitDepth}) {
-        RenderConfig alone = config;
-        alone.outputs = output;
-        const auto f = renderer.render({&cloud}, {axis_camera(83)}, alone, mesh.instances);
-        for (const auto image : every_image(f)) CHECK(((f.*image).empty() || f.*image == all.*image));
-      }
-      std::vector<Camera> batch(7, axis_camera(83));
-      for (std::size_t i = 0; i < batch.size(); ++i) batch[i].cx += static_cast<double>(i) - 3;
-      const auto many = renderer.render({&cloud}, batch, config, mesh.instances);
-      CHECK(std::equal(all.rgb.begin(), all.rgb.end(), many.rgb.begin() + 3 * 3 * 83 * 83));
-    }, mesh.instances);
+    render_everywhere(
+        {&cloud}, axis_camera(83), config,
+        [&](const auto& all, auto& renderer) {
+          for (const unsigned output :
+               {kRgb, kAlpha, kMedianDepth, kExpectedDepth, kAccumulatedDepth, kFirstHitDepth}) {
+            RenderConfig alone = config;
+            alone.outputs = output;
+            const auto f = renderer.render({&cloud}, {axis_camera(83)}, alone, mesh.instances);
+            for (const auto image : every_image(f))
+              CHECK(((f.*image).empty() || f.*image == all.*image));
+          }
+          std::vector<Camera> batch(7, axis_camera(83));
+          for (std::size_t i = 0; i < batch.size(); ++i) batch[i].cx += static_cast<double>(i) - 3;
+          const auto many = renderer.render({&cloud}, batch, config, mesh.instances);
+          CHECK(std::equal(all.rgb.begin(), all.rgb.end(), many.rgb.begin() + 3 * 3 * 83 * 83));
+        },
+        mesh.instances);
   }
 }
 

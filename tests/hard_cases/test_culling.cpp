@@ -9,9 +9,9 @@
 #include "arrays.hpp"
 #include "backends.hpp"
 #include "cases.hpp"
-#include "gsnav/render/count_culled.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/render/count_culled.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -20,7 +20,9 @@ using namespace gsnav_test;
 namespace {
 
 Camera camera_anywhere(Rng& rng) {
-  const auto in = [&](double r) { return Vec3d{rng.uniform(-r, r), rng.uniform(-r, r), rng.uniform(-r, r)}; };
+  const auto in = [&](double r) {
+    return Vec3d{rng.uniform(-r, r), rng.uniform(-r, r), rng.uniform(-r, r)};
+  };
   const Vec3d eye = in(6), target = eye + in(1) + Vec3d{0, 0, 0.1};
   Camera c = Camera::look_at(eye, target, {0.1, 1, 0.05}, 48, 40, rng.uniform(20, 120));
   c.cx += rng.uniform(-60, 60);  // also outside the image
@@ -34,10 +36,19 @@ Camera camera_anywhere(Rng& rng) {
 
 TEST_CASE("N65_cull_invariance of chunks in space") {
   // A cloud much larger than the view, with needles of any length and grazing ones at its edges.
-  GaussianCloud cloud = random_cloud(651, {.count = 15000, .sh_degree = 1, .needle = 0.002, .scale = 0.02,
-                                           .center = {0, 0, 0}, .extent = 6});
-  REQUIRE(append(cloud, random_cloud(652, {.count = 60, .sh_degree = 1, .needle = 0.5, .scale = 1.0,
-                                           .center = {0, 0, 0}, .extent = 9})).ok());
+  GaussianCloud cloud = random_cloud(651, {.count = 15000,
+                                           .sh_degree = 1,
+                                           .needle = 0.002,
+                                           .scale = 0.02,
+                                           .center = {0, 0, 0},
+                                           .extent = 6});
+  REQUIRE(append(cloud, random_cloud(652, {.count = 60,
+                                           .sh_degree = 1,
+                                           .needle = 0.5,
+                                           .scale = 1.0,
+                                           .center = {0, 0, 0},
+                                           .extent = 9}))
+              .ok());
   for (const bool mip : {false, true}) {
     cloud.filter = mip ? Filter::mip : Filter::classic;
     const GaussianCloud in_chunks = sorted(cloud);
@@ -53,15 +64,16 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
       config.alpha_min = i % 4 == 3 ? 0.1 : 1.0 / 255;
       Similarity place;
       if (i % 2 == 1) place = {{0.8, 0.2, -0.5, 0.26457513110645907}, {0.3, -0.2, 0.5}, 2.5};
-      const auto c64 = make_projection_camera<double>(camera, in_chunks.set(place), projection_rules(config));
+      const auto c64 =
+          make_projection_camera<double>(camera, in_chunks.set(place), projection_rules(config));
       for (const ChunkBounds& b : in_chunks.chunk_bounds) left_out += may_be_visible(c64, b) ? 0 : 1;
       chunks += in_chunks.chunk_bounds.size();
       for (std::size_t p = 0; p < in_chunks.part_bounds.size(); ++p) {
         const ChunkBounds& chunk = in_chunks.chunk_bounds[p * kChunkPart / kProjectChunk];
-        parts_left_out +=
-            may_be_visible(c64, chunk) && !lies_in_view(c64, chunk) && !may_be_visible(c64, in_chunks.part_bounds[p])
-                ? 1
-                : 0;
+        parts_left_out += may_be_visible(c64, chunk) && !lies_in_view(c64, chunk) &&
+                                  !may_be_visible(c64, in_chunks.part_bounds[p])
+                              ? 1
+                              : 0;
       }
       for_each_renderer([&](auto& renderer) {
         const auto a = renderer.render({{&cloud, place}}, camera, config);
@@ -80,7 +92,8 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
 
 TEST_CASE("count_culled: what single Gaussians and boxes say, each by itself") {
   GaussianCloud cloud = sorted(random_cloud(
-      655, {.count = 1200, .sh_degree = 0, .needle = 0.05, .scale = 0.3, .center = {0, 0, 0}, .extent = 6}));
+      655,
+      {.count = 1200, .sh_degree = 0, .needle = 0.05, .scale = 0.3, .center = {0, 0, 0}, .extent = 6}));
   SerialBackend backend;
   Renderer<float, SerialBackend> renderer(backend);
   Rng rng(656);
@@ -99,12 +112,14 @@ TEST_CASE("count_culled: what single Gaussians and boxes say, each by itself") {
     for (std::size_t row = 0; row < cloud.size(); ++row) {
       GaussianCloud one = cloud;
       filter_rows(one, [row](std::size_t r) { return r == row; });
-      want.emitting += renderer.render(one.set(), camera).value().stats[0].tile_intersections > 0 ? 1 : 0;
+      want.emitting +=
+          renderer.render(one.set(), camera).value().stats[0].tile_intersections > 0 ? 1 : 0;
     }
     const auto c64 = make_projection_camera<double>(camera, set, projection_rules(config));
     for (std::size_t row = 0; row < cloud.size(); ++row) {
       const ChunkBounds& chunk = cloud.chunk_bounds[row / kProjectChunk];
-      const bool whole = lies_in_view(c64, chunk) || may_be_visible(c64, cloud.part_bounds[row / kChunkPart]);
+      const bool whole =
+          lies_in_view(c64, chunk) || may_be_visible(c64, cloud.part_bounds[row / kChunkPart]);
       want.touched += may_be_visible(c64, chunk) && whole ? 1 : 0;
     }
     CAPTURE(i);
@@ -152,7 +167,8 @@ TEST_CASE("N21_depth_ties_keep_file_order when rows are sorted in space") {
 }
 
 TEST_CASE("sort_spatially permutes rows whole") {
-  GaussianCloud cloud = random_cloud(654, {.count = 1000, .sh_degree = 2, .center = {500, -70, 0}, .extent = 200});
+  GaussianCloud cloud =
+      random_cloud(654, {.count = 1000, .sh_degree = 2, .center = {500, -70, 0}, .extent = 200});
   REQUIRE(!cloud.origin_ids.empty());
   const GaussianCloud s = sorted(sorted(cloud));  // twice: row ids are those of the file still
   REQUIRE(s.size() == cloud.size());

@@ -91,7 +91,8 @@ TEST_CASE("N46_depth_tilted_disk") {
           } else {
             worst = std::max(worst, std::abs(std::abs(seen - mean.z) - reach));
           }
-          if (f.median_depth[p] != 0) worst = std::max(worst, std::abs(static_cast<double>(f.median_depth[p]) - seen));
+          if (f.median_depth[p] != 0)
+            worst = std::max(worst, std::abs(static_cast<double>(f.median_depth[p]) - seen));
           if (f.first_hit_depth[p] != 0) {
             worst = std::max(worst, std::abs(static_cast<double>(f.first_hit_depth[p]) - seen));
           }
@@ -107,20 +108,22 @@ TEST_CASE("N46_depth_tilted_disk") {
       render_everywhere({&cloud}, camera, config, [&](const auto& f, const auto&) {
         double off = 0;
         for (std::size_t p = 0; p < f.alpha.size(); ++p) {
-          if (f.alpha[p] > 0) off = std::max(off, std::abs(static_cast<double>(f.expected_depth[p]) - mean.z));
+          if (f.alpha[p] > 0)
+            off = std::max(off, std::abs(static_cast<double>(f.expected_depth[p]) - mean.z));
         }
         CHECK(off < 1e-6);
       });
     }
   }
-  MESSAGE("depths of one Gaussian at 3 m: " << nearest << " to " << farthest << " m, off by " << largest << " m");
+  MESSAGE("depths of one Gaussian at 3 m: " << nearest << " to " << farthest << " m, off by " << largest
+                                            << " m");
   CHECK(farthest - nearest > 0.5);
 }
 
 TEST_CASE("N47_depth_far") {
   Camera camera = axis_camera(33, 64);
-  // A plane at 100 m of 1000 Gaussians: across the view axis, and turned; patches of it, and faint sheets
-  // that all cover the image.
+  // A plane at 100 m of 1000 Gaussians: across the view axis, and turned; patches of it, and faint
+  // sheets that all cover the image.
   for (const double tilt : {0.0, 35.0}) {
     for (const bool sheets : {false, true}) {
       Rng rng(47);
@@ -149,8 +152,8 @@ TEST_CASE("N47_depth_far") {
           plane_error = std::max(plane_error, std::abs(seen - 100 * normal.z / dot(normal, ray)));
         }
       });
-      MESSAGE(tilt << " degrees, " << std::string(sheets ? "sheets" : "patches") << ": " << worst << " m; from the plane "
-                   << plane_error << " m");
+      MESSAGE(tilt << " degrees, " << std::string(sheets ? "sheets" : "patches") << ": " << worst
+                   << " m; from the plane " << plane_error << " m");
       CHECK(worst < 1e-4);
       // Across the view axis the answer is known without any rendering: the thickness is a millimetre.
       if (tilt == 0) CHECK(plane_error < 1e-4);
@@ -170,12 +173,12 @@ TEST_CASE("N48_depth_no_return") {
   const GaussianCloud fainter = cloud_of({gaussian({0, 0, 2}, {5, 5, 1e-4}, 0.008)});
   RenderConfig config = all_outputs();
   config.compat = Compat::habitat_gs;
-  render_everywhere({&fainter}, axis_camera(), config, [](const auto& f, const auto&) {
-    CHECK(all_zero(f.expected_depth));
-  });
+  render_everywhere({&fainter}, axis_camera(), config,
+                    [](const auto& f, const auto&) { CHECK(all_zero(f.expected_depth)); });
   const GaussianCloud none;
   render_everywhere({&none}, axis_camera(), all_outputs(), [](const auto& f, const auto&) {
-    for (const auto* image : {&f.median_depth, &f.expected_depth, &f.accumulated_depth, &f.first_hit_depth}) {
+    for (const auto* image :
+         {&f.median_depth, &f.expected_depth, &f.accumulated_depth, &f.first_hit_depth}) {
       CHECK(all_zero(*image));
     }
   });
@@ -194,7 +197,8 @@ TEST_CASE("N70_depth_only_equals_rgbd") {
       // Each output alone, with colour, and every depth without it.
       for (const unsigned more : {0u, static_cast<unsigned>(kRgb), static_cast<unsigned>(kAlpha),
                                   static_cast<unsigned>(kMedianDepth)}) {
-        for (const unsigned output : {kRgb, kAlpha, kMedianDepth, kExpectedDepth, kAccumulatedDepth, kFirstHitDepth}) {
+        for (const unsigned output :
+             {kRgb, kAlpha, kMedianDepth, kExpectedDepth, kAccumulatedDepth, kFirstHitDepth}) {
           config.outputs = output | more;
           const auto f = renderer.render(scene, axis_camera(), config);
           const auto same = [&](const auto& part, const auto& whole, unsigned which) {
@@ -214,7 +218,8 @@ TEST_CASE("N70_depth_only_equals_rgbd") {
 
 TEST_CASE("depths alone have the bits that they have beside colour, though pixels close earlier") {
   GaussianCloud cloud = random_cloud(21, {.count = 6000, .scale = 0.08});
-  for (std::size_t i = 0; i < cloud.size(); i += 7) cloud.opacities[i] = i % 2 == 0 ? 0.5f : 0.99f;  // steps to a half
+  for (std::size_t i = 0; i < cloud.size(); i += 7)
+    cloud.opacities[i] = i % 2 == 0 ? 0.5f : 0.99f;  // steps to a half
   const Camera camera = Camera::look_at({0.1, 0, 0}, {0, 0, 4}, {0, -1, 0}, 97, 64, 70);
   const MeshScene ball = [] {
     MeshScene scene;
@@ -230,7 +235,8 @@ TEST_CASE("depths alone have the bits that they have beside colour, though pixel
         const auto draw = [&](unsigned outputs) {
           RenderConfig c = config;
           c.outputs = outputs;
-          return renderer.render({{&cloud, {}}}, {camera}, c, with_mesh ? instances : std::vector<MeshInstance>{});
+          return renderer.render({{&cloud, {}}}, {camera}, c,
+                                 with_mesh ? instances : std::vector<MeshInstance>{});
         };
         const auto all = draw(config.outputs), median = draw(kMedianDepth), first = draw(kFirstHitDepth),
                    both = draw(kMedianDepth | kFirstHitDepth);
@@ -238,7 +244,8 @@ TEST_CASE("depths alone have the bits that they have beside colour, though pixel
         CHECK(first.first_hit_depth == all.first_hit_depth);
         CHECK(both.median_depth == all.median_depth);
         CHECK(both.first_hit_depth == all.first_hit_depth);
-        CHECK(std::count_if(all.median_depth.begin(), all.median_depth.end(), [](auto d) { return d > 0; }) > 1000);
+        CHECK(std::count_if(all.median_depth.begin(), all.median_depth.end(),
+                            [](auto d) { return d > 0; }) > 1000);
       }
     });
   }

@@ -40,7 +40,8 @@ std::vector<Sample> aimed_needles(std::size_t count, double aspect, std::vector<
   for (Sample& s : out) {
     const Vec3d ray = normalized(Vec3d{s.position[0], s.position[1], s.position[2]});
     const double miss = std::pow(10.0, rng.uniform(-5, -1));
-    const Vec3d axis = normalized(ray + normalized(cross(ray, Vec3d{rng.normal(), rng.normal(), rng.normal()})) * miss);
+    const Vec3d axis =
+        normalized(ray + normalized(cross(ray, Vec3d{rng.normal(), rng.normal(), rng.normal()})) * miss);
     const Vec3d half = normalized(axis + Vec3d{1, 0, 0});  // the half-way turn takes x to the axis
     const double quat[4] = {0, half.x, half.y, half.z};
     for (int k = 0; k < 4; ++k) s.quat[k] = static_cast<float>(quat[k]);
@@ -72,9 +73,13 @@ void check_determinant(const std::vector<Sample>& samples, double bound_float, d
 
 }  // namespace
 
-TEST_CASE("N03_det_needle_1e2") { check_determinant(needles(sample_count(20000), 1e2, 1, 3), 2e-5, 1e-12); }
+TEST_CASE("N03_det_needle_1e2") {
+  check_determinant(needles(sample_count(20000), 1e2, 1, 3), 2e-5, 1e-12);
+}
 
-TEST_CASE("N04_det_needle_1e4") { check_determinant(needles(sample_count(20000), 1e4, 1, 5), 2e-4, 1e-7); }
+TEST_CASE("N04_det_needle_1e4") {
+  check_determinant(needles(sample_count(20000), 1e4, 1, 5), 2e-4, 1e-7);
+}
 
 TEST_CASE("N05_comp_factor_needle") {
   const auto samples = needles(sample_count(20000), 1e4, 1, 5);
@@ -100,9 +105,10 @@ TEST_CASE("N05_comp_factor_needle") {
 }
 
 TEST_CASE("N04_N05_needles_end_on") {
-  // (r x ray) of the two short axes nearly vanishes there: its rounding, eps, is what det0 is made of. So the
-  // relative error of sqrt(det0) goes as eps / sin, sin the angle between the needle and the ray, down to the
-  // needle's own width. Random poses stay within the catalogue's bounds because few come this close.
+  // (r x ray) of the two short axes nearly vanishes there: its rounding, eps, is what det0 is made of.
+  // So the relative error of sqrt(det0) goes as eps / sin, sin the angle between the needle and the ray,
+  // down to the needle's own width. Random poses stay within the catalogue's bounds because few come
+  // this close.
   const double aspect = 1e4;
   std::vector<double> sines;
   const auto samples = aimed_needles(sample_count(20000), aspect, sines);
@@ -131,8 +137,8 @@ TEST_CASE("N04_N05_needles_end_on") {
       CHECK(factor_scaled < 8);
     }
     CHECK(largest <= 1);
-    MESSAGE(name << ": det is off by " << det_scaled << " eps / sin, the compensation by " << factor_scaled
-                 << " eps / sin, " << factor_worst << " at most");
+    MESSAGE(name << ": det is off by " << det_scaled << " eps / sin, the compensation by "
+                 << factor_scaled << " eps / sin, " << factor_worst << " at most");
   });
 }
 

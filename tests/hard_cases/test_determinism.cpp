@@ -118,7 +118,8 @@ TEST_CASE("N63_determinism_100 of work that is cut") {
       if constexpr (R::is_float) {
         const auto images = renderer.render({&cloud}, camera, config);
         // A GPU's `fast` has an exponential of its own (Exp2::hardware).
-        const bool own = profile == Profile::fast && !is_host_backend<std::remove_cvref_t<decltype(renderer.backend())>>;
+        const bool own = profile == Profile::fast &&
+                         !is_host_backend<std::remove_cvref_t<decltype(renderer.backend())>>;
         CHECK(same_images(own ? renderer.render({&cloud}, camera, config) : reference, images));
       }
     });

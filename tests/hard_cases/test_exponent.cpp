@@ -12,9 +12,9 @@ using namespace gsnav_test;
 
 namespace {
 
-/// Largest error of alpha over windows of 64 x 64 px along a needle of sigma_px : 1e-4 sigma_px that faces
-/// the camera, to 3 sigma of its length. It has no depth, so that the Jacobian's limits do not touch it
-/// where its mean lies far outside the window.
+/// Largest error of alpha over windows of 64 x 64 px along a needle of sigma_px : 1e-4 sigma_px that
+/// faces the camera, to 3 sigma of its length. It has no depth, so that the Jacobian's limits do not
+/// touch it where its mean lies far outside the window.
 template <class R>
 double needle_error(R& renderer, double sigma_px, int windows, Rng& rng) {
   const double f = 1000, z = 2;
@@ -105,14 +105,15 @@ TEST_CASE("N08_power_sign") {
           // On the line w2 = 0 a long Gaussian is near its largest.
           const double k = static_cast<double>(g.k), b = static_cast<double>(g.b);
           const double on_axis = std::nearbyint(-(k * dx + static_cast<double>(g.w2)) / b);
-          const double dy = kind < 2 ? std::floor(rng.uniform(-reach, reach + 1)) : clamp(on_axis, -1e3, 1e3);
+          const double dy =
+              kind < 2 ? std::floor(rng.uniform(-reach, reach + 1)) : clamp(on_axis, -1e3, 1e3);
           x[l] = static_cast<float>(static_cast<double>(g.ref_x) + dx);
           y[l] = static_cast<float>(static_cast<double>(g.ref_y) + dy);
         }
         BlendState<L, DepthMode::none> state;
         const SplatRecords<S> records{&g, nullptr, nullptr, nullptr};
-        blend_splat<false, DepthMode::none, Exp2::degree5, false>(state, rules, records, LaneIo<L>::load(x),
-                                                                  LaneIo<L>::load(y));
+        blend_splat<false, DepthMode::none, Exp2::degree5, false>(
+            state, rules, records, LaneIo<L>::load(x), LaneIo<L>::load(y));
         double transmittance[kLanes];
         LaneIo<L>::store(state.transmittance, transmittance);
         for (const double t : transmittance) {

@@ -17,8 +17,8 @@ struct Factor {
   float at[3];
 };
 
-/// Products of rotations and scales up to `size` metres with a ratio up to 10^decades, sheared and mirrored
-/// (det < 0), some singular, some exactly flat.
+/// Products of rotations and scales up to `size` metres with a ratio up to 10^decades, sheared and
+/// mirrored (det < 0), some singular, some exactly flat.
 std::vector<Factor> random_factors(std::uint64_t seed, std::size_t count, double size, double decades) {
   Rng rng(seed);
   std::vector<Factor> out(count);
@@ -53,7 +53,8 @@ struct FactorTruth {
     Real sigma[3][3] = {};
     for (int i = 0; i < 3; ++i) {
       for (int k = 0; k < 3; ++k) {
-        for (int j = 0; j < 3; ++j) sigma[i][k] += static_cast<Real>(f.m[i][j]) * static_cast<Real>(f.m[k][j]);
+        for (int j = 0; j < 3; ++j)
+          sigma[i][k] += static_cast<Real>(f.m[i][j]) * static_cast<Real>(f.m[k][j]);
       }
     }
     const Real z = f.at[2], u = f.at[0] / z, v = f.at[1] / z, fx = camera.fx, fy = camera.fy;
@@ -96,7 +97,8 @@ double det_error(const std::vector<Factor>& factors, const Camera& camera, const
     Mat3<L> m;
     Vec3<L> at;
     for (int i = 0; i < 3; ++i) {
-      m.row[i] = {load([i](const Factor& f) { return f.m[i][0]; }), load([i](const Factor& f) { return f.m[i][1]; }),
+      m.row[i] = {load([i](const Factor& f) { return f.m[i][0]; }),
+                  load([i](const Factor& f) { return f.m[i][1]; }),
                   load([i](const Factor& f) { return f.m[i][2]; })};
       at[i] = load([i](const Factor& f) { return f.at[i]; });
     }
@@ -113,7 +115,8 @@ double det_error(const std::vector<Factor>& factors, const Camera& camera, const
       REQUIRE(std::isfinite(half[l]));
       const Real product = static_cast<Real>(a[l]) * static_cast<Real>(b[l]);
       const Real det = std::pow(static_cast<Real>(kWhitenScale), 4) / (product * product);
-      const FactorTruth truth(factors[first + static_cast<std::size_t>(l)], camera, static_cast<Real>(set.eps2d));
+      const FactorTruth truth(factors[first + static_cast<std::size_t>(l)], camera,
+                              static_cast<Real>(set.eps2d));
       worst = std::max(worst, static_cast<double>(std::abs(det / truth.det - 1)));
     }
   }
@@ -131,14 +134,17 @@ TEST_CASE("N62_psd_factor") {
       std::size_t count;
       double in_double;  // what the truth, AC - B^2 in long double, is good for
     };
-    // Large ones seen nearly end-on lose digits (N04_N05_needles_end_on), so that more of them prove nothing.
-    for (const Row& row : {Row{1, 0.5, sample_count(16000), 1e-13}, Row{1, 3, sample_count(16000), 1e-13},
-                           Row{1, 6, sample_count(16000), 1e-13}, Row{100, 2, 16000, 1e-11},
-                           Row{100, 4, 16000, 1e-11}, Row{100, 6, 16000, 1e-11}}) {
+    // Large ones seen nearly end-on lose digits (N04_N05_needles_end_on), so that more of them prove
+    // nothing.
+    for (const Row& row :
+         {Row{1, 0.5, sample_count(16000), 1e-13}, Row{1, 3, sample_count(16000), 1e-13},
+          Row{1, 6, sample_count(16000), 1e-13}, Row{100, 2, 16000, 1e-11}, Row{100, 4, 16000, 1e-11},
+          Row{100, 6, 16000, 1e-11}}) {
       const auto factors = random_factors(62, row.count, row.size, row.decades);
       for_each_lane_type([&]<class L>(const char* name) {
         const double worst = det_error<L>(factors, camera, none.set());
-        MESSAGE(std::string(name) << ", " << row.size << " m, ratio to 1e" << row.decades << ": " << worst << " relative");
+        MESSAGE(std::string(name) << ", " << row.size << " m, ratio to 1e" << row.decades << ": "
+                                  << worst << " relative");
         CHECK(worst < (std::is_same_v<L, double> ? row.in_double : 2e-5));
       });
     }
@@ -163,7 +169,8 @@ TEST_CASE("N62_psd_factor") {
         }
         for (std::size_t p = 0; p < image.alpha.size(); ++p) {
           const Real x = static_cast<Real>(p % 65) + 0.5L, y = static_cast<Real>(p / 65) + 0.5L;
-          const double raw = static_cast<double>(truth.alpha(static_cast<Real>(cloud.opacities[0]), x, y));
+          const double raw =
+              static_cast<double>(truth.alpha(static_cast<Real>(cloud.opacities[0]), x, y));
           if (std::abs(raw * 255 - 1) < 1e-3) continue;
           double& w = worst[R::is_float ? 0 : 1];
           w = std::max(w, std::abs(static_cast<double>(image.alpha[p]) - (raw * 255 < 1 ? 0 : raw)));
@@ -179,7 +186,8 @@ TEST_CASE("N62_psd_factor") {
     std::vector<RawGaussian> gs;
     for (int i = 0; i < 100; ++i) {
       gs.push_back(gaussian({rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(2, 5)},
-                            {0.2, 0.2 * rng.uniform(), 0.02}, 0.6, {static_cast<float>(rng.normal()), 0, 1}));
+                            {0.2, 0.2 * rng.uniform(), 0.02}, 0.6,
+                            {static_cast<float>(rng.normal()), 0, 1}));
       gs.back().quat = random_rotation(rng);
     }
     const GaussianCloud cloud = cloud_of(gs);
@@ -200,8 +208,10 @@ TEST_CASE("N62_psd_factor") {
       double colour = 0, depth = 0;
       for (std::size_t p = 0; p < a.alpha.size(); ++p) {
         if (undecided[p]) continue;
-        colour = std::max(colour, std::abs(static_cast<double>(a.rgb[3 * p]) - static_cast<double>(b.rgb[3 * p])));
-        depth = std::max(depth, std::abs(static_cast<double>(a.expected_depth[p]) - static_cast<double>(b.expected_depth[p])));
+        colour = std::max(
+            colour, std::abs(static_cast<double>(a.rgb[3 * p]) - static_cast<double>(b.rgb[3 * p])));
+        depth = std::max(depth, std::abs(static_cast<double>(a.expected_depth[p]) -
+                                         static_cast<double>(b.expected_depth[p])));
       }
       CHECK(colour < 1e-5);  // the factor's own rounding to float
       CHECK(depth < 1e-4);

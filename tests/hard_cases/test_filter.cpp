@@ -99,8 +99,9 @@ TEST_CASE("N14_h_0p1_asset") {
 }
 
 TEST_CASE("N15_subpixel_drift") {
-  // Poisson summation: the samples of a Gaussian of variance v on a grid ripple by 2 exp(-2 pi^2 v) of their
-  // sum in each axis. The threshold adds what it cuts: 1/(255 o) of the sum, give or take where pixels fall.
+  // Poisson summation: the samples of a Gaussian of variance v on a grid ripple by 2 exp(-2 pi^2 v) of
+  // their sum in each axis. The threshold adds what it cuts: 1/(255 o) of the sum, give or take where
+  // pixels fall.
   const double pi = 3.14159265358979323846;
   for_each_renderer([&](auto& renderer) {
     for (const double sigma_px : {0.05, 0.2, 0.5, 1.0}) {
@@ -120,7 +121,8 @@ TEST_CASE("N15_subpixel_drift") {
     // h = 0.1 is too narrow a filter by itself: 28 % an axis.
     const double narrow = drift_ripple(renderer, 0.05, 0.1, 0.9, 1e-12);
     CHECK(narrow > 0.2);
-    MESSAGE(renderer.name() << ": ripple at sigma 0.05 px: " << drift_ripple(renderer, 0.05, 0.3, 0.5, 1.0 / 255)
+    MESSAGE(renderer.name() << ": ripple at sigma 0.05 px: "
+                            << drift_ripple(renderer, 0.05, 0.3, 0.5, 1.0 / 255)
                             << " under the contract at opacity 0.5, "
                             << drift_ripple(renderer, 0.05, 0.3, 0.02, 1.0 / 255) << " at 0.02, "
                             << drift_ripple(renderer, 0.05, 0.3, 0.5, 1e-12) << " without a threshold, "

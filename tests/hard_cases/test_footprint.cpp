@@ -23,8 +23,8 @@ Camera footprint_camera() {
   return c;
 }
 
-/// 1: alpha is above the threshold beyond rounding; 0: below it; -1: within 1e-4 of it, or of the line where
-/// an exact response goes behind the camera.
+/// 1: alpha is above the threshold beyond rounding; 0: below it; -1: within 1e-4 of it, or of the line
+/// where an exact response goes behind the camera.
 template <class Truth>
 std::vector<int> covered_pixels(const Truth& truth, Real opacity) {
   std::vector<int> covered(kColumns * kRows, 0);
@@ -56,9 +56,9 @@ std::size_t count_covered(const std::vector<int>& covered, int x0, int y0, int x
 }
 
 struct CoverCounts {
-  std::size_t tiles = 0, pixels = 0;      ///< covered ones that were left out
+  std::size_t tiles = 0, pixels = 0;        ///< covered ones that were left out
   std::size_t extra_tiles = 0, listed = 0;  ///< listed ones without a covered pixel, and all
-  std::size_t extra_pixels = 0;           ///< drawn below the threshold
+  std::size_t extra_pixels = 0;             ///< drawn below the threshold
 };
 
 /// Tile lists and the pixel test of one splat against what is truly covered.
@@ -92,8 +92,9 @@ void count_errors(const std::vector<int>& covered, bool drawn, const RecordMaker
       const S px = S(x) + S(0.5), py = S(y) + S(0.5);
       BlendState<S, DepthMode::none> state;
       const bool hit =
-          elliptic ? blend_splat<false, DepthMode::none, Exp2::degree5, false>(state, rules, records, px, py)
-                   : blend_splat<false, DepthMode::none, Exp2::degree5, true>(state, rules, records, px, py);
+          elliptic
+              ? blend_splat<false, DepthMode::none, Exp2::degree5, false>(state, rules, records, px, py)
+              : blend_splat<false, DepthMode::none, Exp2::degree5, true>(state, rules, records, px, py);
       const int truth = covered[static_cast<std::size_t>(y * kColumns + x)];
       counts.pixels += truth == 1 && !hit ? 1 : 0;
       counts.extra_pixels += truth == 0 && hit ? 1 : 0;
@@ -111,11 +112,15 @@ CoverCounts cover_counts(const GaussianCloud& cloud, const RenderConfig& config)
     const Truth2d ewa = truth_project(splat, camera, config.response == Response::ewa);
     std::vector<int> covered;
     switch (config.response) {
-      case Response::ewa: covered = covered_pixels(ewa, ewa.opacity); break;
+      case Response::ewa:
+        covered = covered_pixels(ewa, ewa.opacity);
+        break;
       case Response::tangent_plane:
         covered = covered_pixels(TruthTangent(splat, camera), ewa.opacity);
         break;
-      case Response::ray: covered = covered_pixels(TruthRay(splat, camera), ewa.opacity); break;
+      case Response::ray:
+        covered = covered_pixels(TruthRay(splat, camera), ewa.opacity);
+        break;
     }
     const bool drawn = maker.project(i);
     count_errors(covered, drawn, maker, config, counts);
@@ -162,7 +167,8 @@ TEST_CASE("N11_tile_cover_conservative") {
       for (int i = 0; i < 600; ++i) {
         const double x = rng.uniform(0, kColumns), y = rng.uniform(0, kRows), z = rng.uniform(2, 6);
         const double scale = z / camera.fx * std::exp(rng.uniform(-2, 1.5));
-        gs.push_back(gaussian({(x - camera.cx) / camera.fx * z, (y - camera.cy) / camera.fy * z, z}, {scale, scale, scale}, 0.9));
+        gs.push_back(gaussian({(x - camera.cx) / camera.fx * z, (y - camera.cy) / camera.fy * z, z},
+                              {scale, scale, scale}, 0.9));
       }
       const GaussianCloud cloud = cloud_of(gs);
       RecordMaker<float> maker(cloud, camera, config);
@@ -170,12 +176,15 @@ TEST_CASE("N11_tile_cover_conservative") {
       for (std::size_t i = 0; i < cloud.size(); ++i) {
         if (!maker.project(i)) continue;
         std::vector<char> listed(grid.count(), 0);
-        for_each_tile(grid, maker.geometry(), maker.bounds(), rules.log2_alpha_min, true, [&](std::size_t tile) { listed[tile] = 1; });
+        for_each_tile(grid, maker.geometry(), maker.bounds(), rules.log2_alpha_min, true,
+                      [&](std::size_t tile) { listed[tile] = 1; });
         const SplatRecords<float> records{&maker.geometry(), nullptr, nullptr, &maker.perspective()};
         for (int y = 0; y < kRows; ++y) {
           for (int x = 0; x < kColumns; ++x) {
             BlendState<float, DepthMode::none> state;
-            if (!blend_splat<false, DepthMode::none, Exp2::degree5, false>(state, rules, records, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f)) continue;
+            if (!blend_splat<false, DepthMode::none, Exp2::degree5, false>(
+                    state, rules, records, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f))
+              continue;
             ++passed;
             lost += listed[static_cast<std::size_t>(y / 8 * grid.columns + x / 8)] == 0 ? 1 : 0;
           }
@@ -198,13 +207,14 @@ TEST_CASE("N11_tile_cover_conservative") {
     for (std::size_t first = 0; first + 16 <= splats.size(); first += 16) {
       const float x0 = static_cast<float>(rng.below(kColumns - 16)) + 0.5f, x1 = x0 + 15;
       const float y0 = static_cast<float>(rng.below(kRows - 16)) + 0.5f, y1 = y0 + 15;
-      const float low = y0 + static_cast<float>(rng.below(12)), high = low + static_cast<float>(rng.below(4));
+      const float low = y0 + static_cast<float>(rng.below(12)),
+                  high = low + static_cast<float>(rng.below(4));
       const auto compare = [&]<int N>() {
         using P = Pack<float, N>;
         P c[8];
         load_columns<8>(&splats[first].ref_x, c);
-        const FootprintStrips<P> strips({c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]}, log2_alpha_min, P(x0),
-                                        P(x1), P(y0), P(y1));
+        const FootprintStrips<P> strips({c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]}, log2_alpha_min,
+                                        P(x0), P(x1), P(y0), P(y1));
         P left, right;
         const std::uint32_t lanes = lane_bits(strips.columns(P(low), P(high), left, right));
         for (std::size_t l = 0; l < static_cast<std::size_t>(N); ++l) {
@@ -258,7 +268,8 @@ TEST_CASE("N18_screen_filling") {
       double worst = 0;
       for (std::size_t p = 0; p < f.alpha.size(); ++p) {
         const Real x = static_cast<Real>(p % 65) + 0.5L, y = static_cast<Real>(p / 65) + 0.5L;
-        worst = std::max(worst, std::abs(static_cast<double>(f.alpha[p]) - static_cast<double>(truth.alpha(x, y))));
+        worst = std::max(
+            worst, std::abs(static_cast<double>(f.alpha[p]) - static_cast<double>(truth.alpha(x, y))));
       }
       CHECK(worst < renderer.bound(1e-6, 1e-12));
       CHECK(f.stats[0].tile_intersections == 25);  // all tiles of 16 px
@@ -277,7 +288,8 @@ TEST_CASE("N19_offscreen_rod_fan") {
   int fans = 0;
   for (int round = 0; round < 150; ++round) {
     const Camera& camera = round % 2 == 0 ? centred : shifted;
-    RawGaussian g = gaussian({2 * 1.5, rng.uniform(-1, 1), 1.5}, {1, 0.01 / 3, 0.01 / 3}, 0.99);  // 3 m: +- 1.5 sigma
+    RawGaussian g = gaussian({2 * 1.5, rng.uniform(-1, 1), 1.5}, {1, 0.01 / 3, 0.01 / 3},
+                             0.99);  // 3 m: +- 1.5 sigma
     g.quat = random_rotation(rng);
     const GaussianCloud cloud = cloud_of({g});
     const TruthSplat splat = truth_of(cloud, 0);

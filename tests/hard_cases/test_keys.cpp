@@ -20,8 +20,10 @@ static_assert(sizeof(Offset) == 8 && std::is_unsigned_v<Offset>);
 static_assert(sizeof(Cursor) == 8 && std::is_unsigned_v<Cursor>);
 static_assert(std::is_same_v<decltype(RenderStats::tile_intersections), std::uint64_t>);
 // Tiles are lists, not bits of a key: a key is the depth alone.
-static_assert(std::is_same_v<decltype(RenderWorkspace<float, SerialBackend>{
-                                 std::declval<SerialBackend&>()}.visible.keys.data()), std::uint32_t*>);
+static_assert(
+    std::is_same_v<decltype(RenderWorkspace<float, SerialBackend>{std::declval<SerialBackend&>()}
+                                .visible.keys.data()),
+                   std::uint32_t*>);
 
 /// A disk facing the camera that covers little more than pixel (x, y) at depth z.
 RawGaussian dot_at(const Camera& c, double x, double y, double z, const std::array<float, 3>& sh0) {
@@ -60,7 +62,8 @@ TEST_CASE("N25_key_overflow") {
           for (int dx = -2; dx <= 2; ++dx) {
             const int x = p[0] + dx, y = p[1] + dy;
             if (x < 0 || y < 0 || x >= 4096 || y >= 4096) continue;
-            expected += f.alpha[static_cast<std::size_t>(y) * 4096 + static_cast<std::size_t>(x)] > 0 ? 1 : 0;
+            expected +=
+                f.alpha[static_cast<std::size_t>(y) * 4096 + static_cast<std::size_t>(x)] > 0 ? 1 : 0;
           }
         }
       }
@@ -72,8 +75,8 @@ TEST_CASE("N25_key_overflow") {
   SUBCASE("depths over all of float's range stay in order, in a batch of 64 cameras") {
     Camera camera = axis_camera(16, 16);
     camera.near_plane = 1e-20;
-    // Straight into the arrays: what files may hold ends long before 1e17 m. The far ones come first; each
-    // covers the image.
+    // Straight into the arrays: what files may hold ends long before 1e17 m. The far ones come first;
+    // each covers the image.
     constexpr int kCount = 60;
     GaussianCloud cloud;
     for (int i = 0; i < kCount; ++i) {
@@ -112,14 +115,16 @@ TEST_CASE("N26_pair_count_zero") {
   const GaussianCloud behind = cloud_of({gaussian({0, 0, -3}, {0.1, 0.1, 0.1}, 0.5)});
   const GaussianCloud beside = cloud_of({gaussian({9, 0, 3}, {0.1, 0.1, 0.1}, 0.5)});
   const GaussianCloud empty;
-  const std::vector<std::vector<Placed>> nothing{{}, {&empty}, {&behind}, {&beside}, {&behind, &empty, &beside}};
+  const std::vector<std::vector<Placed>> nothing{
+      {}, {&empty}, {&behind}, {&beside}, {&behind, &empty, &beside}};
   for (const auto& scene : nothing) {
     render_everywhere(scene, camera, config, [&](const auto& f, const auto&) {
       CHECK(f.stats[0].visible == 0);
       CHECK(f.stats[0].tile_intersections == 0);
       bool background = true, none = true;
       for (std::size_t p = 0; p < f.alpha.size(); ++p) {
-        background = background && f.rgb[3 * p] == 0.25f && f.rgb[3 * p + 1] == 0.5f && f.rgb[3 * p + 2] == 0.75f;
+        background =
+            background && f.rgb[3 * p] == 0.25f && f.rgb[3 * p + 1] == 0.5f && f.rgb[3 * p + 2] == 0.75f;
         none = none && f.alpha[p] == 0 && f.median_depth[p] == 0 && f.expected_depth[p] == 0 &&
                f.accumulated_depth[p] == 0 && f.first_hit_depth[p] == 0;
       }

@@ -41,13 +41,15 @@ TEST_CASE("N16_near_plane_cross") {
     at(std::nextafter(plane, 1.0f), 0.5);
     at(std::nextafter(plane, 0.0f), 0);
   }
-  // A turned camera: the float32 key decides, in every precision. Which Gaussians are visible must agree.
+  // A turned camera: the float32 key decides, in every precision. Which Gaussians are visible must
+  // agree.
   Rng rng(16);
   std::vector<RawGaussian> gs;
   camera.near_plane = 0.5;
   for (int i = 0; i < 4000; ++i) {
     gs.push_back(gaussian({rng.uniform(-0.05, 0.05), rng.uniform(-0.05, 0.05),
-                           0.5 + 1e-7 * std::floor(rng.uniform(-4, 5))}, {0.01, 0.01, 0.01}, 0.5));
+                           0.5 + 1e-7 * std::floor(rng.uniform(-4, 5))},
+                          {0.01, 0.01, 0.01}, 0.5));
   }
   Camera turned = camera;
   const Quatd turn = axis_angle(normalized(Vec3d{1, 2, 3}), 0.7);

@@ -6,9 +6,9 @@
 #include <array>
 #include <utility>
 
+#include "gsnav/detail/math/pack_double.hpp"
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
-#include "gsnav/detail/math/pack_double.hpp"
 #include "support/oracle.hpp"
 #include "support/sanitized.hpp"
 #include "support/scenes.hpp"
@@ -26,7 +26,9 @@ struct Keys {
 
 /// origin - camera position of a row, asset frame.
 Vec3d offset_of(const GaussianCloud& cloud, const Vec3d& eye, std::size_t row) {
-  return (cloud.origins.empty() ? Vec3d{} : cloud.origins[cloud.origin_ids.empty() ? 0 : cloud.origin_ids[row]]) - eye;
+  return (cloud.origins.empty() ? Vec3d{}
+                                : cloud.origins[cloud.origin_ids.empty() ? 0 : cloud.origin_ids[row]]) -
+         eye;
 }
 
 /// The kernel's keys of every Gaussian, one after the other, bits.
@@ -79,15 +81,16 @@ Keys keys_in_lanes(const GaussianCloud& cloud, const Camera& camera, const Simil
 }
 
 /// The centre of row i in camera axes, metres, in long double: by the text of the contract.
-std::array<Real, 3> true_center(const GaussianCloud& cloud, const Camera& camera, const Similarity& place,
-                                std::size_t i) {
+std::array<Real, 3> true_center(const GaussianCloud& cloud, const Camera& camera,
+                                const Similarity& place, std::size_t i) {
   const Real w = place.rotation.w, x = place.rotation.x, y = place.rotation.y, z = place.rotation.z;
   const Real turn[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
                            {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
                            {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
   const Vec3d origin = offset_of(cloud, {}, i);
   Real asset[3], world[3];
-  for (int k = 0; k < 3; ++k) asset[k] = Real(cloud.means[static_cast<std::size_t>(k)][i]) + Real(origin[k]);
+  for (int k = 0; k < 3; ++k)
+    asset[k] = Real(cloud.means[static_cast<std::size_t>(k)][i]) + Real(origin[k]);
   for (int k = 0; k < 3; ++k) {
     world[k] = place.scale * (turn[k][0] * asset[0] + turn[k][1] * asset[1] + turn[k][2] * asset[2]) +
                place.translation[k];
@@ -106,7 +109,8 @@ Keys true_keys(const GaussianCloud& cloud, const Camera& camera, const Similarit
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const auto c = true_center(cloud, camera, place, i);
     keys.depth.push_back(bits_of(static_cast<float>(c[2])));
-    keys.distance.push_back(bits_of(static_cast<float>(std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]))));
+    keys.distance.push_back(
+        bits_of(static_cast<float>(std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]))));
   }
   return keys;
 }
@@ -116,12 +120,15 @@ Camera turned_camera(const Vec3d& eye, const Vec3d& target, int size, double hfo
   return Camera::look_at(eye, target, normalized(Vec3d{0.3, 1, -0.2}), size, size, hfov);
 }
 
-/// `count` Gaussians about 100 m in front of `axis_camera`, on the grid of a 16-bit capture (1/256 m): all but
-/// `apart` in one plane, over several of the lattice's origins. `moved` is a multiple of the grid's step.
+/// `count` Gaussians about 100 m in front of `axis_camera`, on the grid of a 16-bit capture (1/256 m):
+/// all but `apart` in one plane, over several of the lattice's origins. `moved` is a multiple of the
+/// grid's step.
 GaussianCloud coarse_capture(std::size_t count, std::size_t apart, const Vec3d& moved = {}) {
   Rng rng(71);
   std::vector<RawGaussian> gs;
-  const auto grid = [&](double low, double high) { return std::floor(rng.uniform(low, high) * 256) / 256; };
+  const auto grid = [&](double low, double high) {
+    return std::floor(rng.uniform(low, high) * 256) / 256;
+  };
   for (std::size_t i = 0; i < count; ++i) {
     const double z = 96 + (i % 6 == 5 && i / 6 < apart ? grid(0, 0.1) : 0.0);
     const Vec3d at{grid(-45, 45), grid(-45, 45), z};
@@ -193,7 +200,9 @@ TEST_CASE("N22_depth_tie_grid") {
   Rng rng(22);
   std::vector<RawGaussian> gs;
   for (int i = 0; i < 3000; ++i) {
-    const auto grid = [&](double low, double high) { return std::floor(rng.uniform(low, high) * 4096) / 4096; };
+    const auto grid = [&](double low, double high) {
+      return std::floor(rng.uniform(low, high) * 4096) / 4096;
+    };
     const double z = 3 + std::floor(rng.uniform(0, 8)) / 4096;
     gs.push_back(gaussian({grid(-1, 1), grid(-1, 1), z}, {0.05, 0.05, 0.02}, 0.3,
                           {static_cast<float>(rng.normal()), static_cast<float>(rng.normal()), 0}));
@@ -247,7 +256,8 @@ TEST_CASE("N23_key_wide_range") {
   }
   for (int i = 0; i < 300; ++i) {
     const double z = 1e5 * rng.uniform(0.5, 2);
-    gs.push_back(gaussian({rng.uniform(-1, 1) * z, rng.uniform(-1, 1) * z, z}, {2e4, 2e4, 2e4}, 0.5, {1, 1, 2}));
+    gs.push_back(
+        gaussian({rng.uniform(-1, 1) * z, rng.uniform(-1, 1) * z, z}, {2e4, 2e4, 2e4}, 0.5, {1, 1, 2}));
   }
   const GaussianCloud cloud = cloud_of(gs);
   RenderConfig config = all_outputs();
@@ -262,7 +272,8 @@ TEST_CASE("N23_key_wide_range") {
     const double few = image_error(renderer.render({&cloud}, camera, config).rgb, full.rgb, 3).psnr;
     MESSAGE(renderer.name() << ": key of 24 bits " << psnr << " dB, of 16 bits " << few << " dB");
   });
-  // What is compared is the key from the near plane on, to 2^16 times as far and beyond: never out of order.
+  // What is compared is the key from the near plane on, to 2^16 times as far and beyond: never out of
+  // order.
   for (const int bits : {8, 16, 20, 24, 27, 30, 31, 32}) {
     const KeyCode code = KeyCode::of(bits, 0.2f);
     std::uint32_t last = 0;
@@ -274,7 +285,8 @@ TEST_CASE("N23_key_wide_range") {
     }
     CHECK(ascending);
     CHECK(fits);
-    // Distances are rounded by themselves: one just below the near plane is the nearest, not the farthest.
+    // Distances are rounded by themselves: one just below the near plane is the nearest, not the
+    // farthest.
     if (bits < 32) CHECK(code(std::nextafter(0.2f, 0.0f)) == 0);
     CHECK(code(std::nextafter(0.2f, 0.0f)) <= code(0.2f));
   }
@@ -284,7 +296,8 @@ TEST_CASE("N24_neg_zero_depth") {
   GaussianCloud cloud = random_cloud(24, {.count = 400, .sh_degree = 0});
   Camera camera = axis_camera();
   camera.near_plane = 1e-30;  // behind it lies only what has no depth at all
-  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              inf = std::numeric_limits<float>::infinity();
   const std::vector<float> depths{-0.0f, 0.0f, -1e-45f, -1e-38f, -1e-7f, -3.0f, nan, -nan, -inf, 1e-40f};
   std::vector<bool> dropped(cloud.size(), false);
   for (std::size_t i = 0; i < 10 * depths.size(); ++i) {
@@ -298,7 +311,8 @@ TEST_CASE("N24_neg_zero_depth") {
   cloud.opacities[8] = nan;
   for (const std::size_t row : {2u, 5u, 8u}) dropped[row] = true;
   const GaussianCloud rest = without(cloud, dropped);
-  render_everywhere({&cloud}, camera, all_outputs(), [](const auto& f, const auto&) { CHECK(all_finite(f)); });
+  render_everywhere({&cloud}, camera, all_outputs(),
+                    [](const auto& f, const auto&) { CHECK(all_finite(f)); });
   for_each_renderer([&](auto& renderer) {
     const auto all = renderer.render({&cloud}, camera, all_outputs());
     const auto some = renderer.render({&rest}, camera, all_outputs());
@@ -325,7 +339,8 @@ TEST_CASE("N77_quantised_capture keeps its order at any place") {
   {
     const Keys keys = keys_of(cloud, axis, {});
     const std::uint32_t plane = bits_of(96.0f);
-    CHECK(std::count(keys.depth.begin(), keys.depth.end(), plane) >= static_cast<std::ptrdiff_t>(kRows / 6 * 5));
+    CHECK(std::count(keys.depth.begin(), keys.depth.end(), plane) >=
+          static_cast<std::ptrdiff_t>(kRows / 6 * 5));
   }
   for (const Camera& camera : {axis, tilted}) {
     const OracleImage truth = oracle_render({&cloud}, camera);
@@ -355,7 +370,8 @@ TEST_CASE("N78_moved_world keeps the order of depths that float32 tells apart") 
   Rng rng(72);
   std::vector<RawGaussian> here;
   for (int i = 0; i < 20000; ++i) {
-    here.push_back(gaussian({rng.uniform(-4, 4), rng.uniform(-1.5, 1.5), rng.uniform(-4, 4)}, {0.05, 0.05, 0.05}, 0.5));
+    here.push_back(gaussian({rng.uniform(-4, 4), rng.uniform(-1.5, 1.5), rng.uniform(-4, 4)},
+                            {0.05, 0.05, 0.05}, 0.5));
   }
   const Camera camera = turned_camera({-3.7, 0.4, -3.9}, {1, 0, 1}, 64, 90);
   for (const double metres : {1000.0, 64.0, 0.3}) {
@@ -388,7 +404,8 @@ TEST_CASE("N78_moved_world keeps the order of depths that float32 tells apart") 
 }
 
 TEST_CASE("N79_near_ties one step of float32 apart are in order") {
-  // Pairs of dots, the farther one first in the file: red is in front, and its depth is the float before.
+  // Pairs of dots, the farther one first in the file: red is in front, and its depth is the float
+  // before.
   constexpr int kSide = 16, kPitch = 4;
   const Camera camera = turned_camera({31.2, 17.3, -33.1}, {0.2, -0.1, 0.3}, kSide * kPitch, 16);
   Rng rng(73);
@@ -404,7 +421,9 @@ TEST_CASE("N79_near_ties one step of float32 apart are in order") {
   }
   GaussianCloud cloud = cloud_of(gs);
   REQUIRE(cloud.origins.size() <= 1);
-  const auto key = [&](std::size_t row) { return static_cast<float>(true_center(cloud, camera, {}, row)[2]); };
+  const auto key = [&](std::size_t row) {
+    return static_cast<float>(true_center(cloud, camera, {}, row)[2]);
+  };
   for (std::size_t i = 0; i < cloud.size(); i += 2) {
     const float wanted = std::nextafter(key(i), 1e9f);
     const float away = camera.viewmat.linear(2, 0) > 0 ? 1e9f : -1e9f;

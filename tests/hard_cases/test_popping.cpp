@@ -77,8 +77,8 @@ std::vector<double> ordered_truth(const GaussianCloud& cloud, const Camera& came
 }
 
 /// Largest change between two frames in a row: of any pixel, and of the mean over the image. A swap of
-/// centres moves all pixels that two Gaussians share at once; where surfaces cross, the true order changes
-/// too, but along a line.
+/// centres moves all pixels that two Gaussians share at once; where surfaces cross, the true order
+/// changes too, but along a line.
 struct Steps {
   double pixel = 0, mean = 0;
   std::vector<double> last;

@@ -53,7 +53,8 @@ TEST_CASE("N60_slerp_vs_lerp") {
           const Real cross_axis[3][3] = {{0, -n[2], n[1]}, {n[2], 0, -n[0]}, {-n[1], n[0], 0}};
           Real turn[3][3], local[3][3], next[3][3];
           for (int r = 0; r < 3; ++r) {
-            for (int k = 0; k < 3; ++k) turn[r][k] = (r == k ? c : 0) + s * cross_axis[r][k] + (1 - c) * n[r] * n[k];
+            for (int k = 0; k < 3; ++k)
+              turn[r][k] = (r == k ? c : 0) + s * cross_axis[r][k] + (1 - c) * n[r] * n[k];
           }
           for (int r = 0; r < 3; ++r) {
             for (int k = 0; k < 3; ++k) {
@@ -99,13 +100,16 @@ TEST_CASE("N60_slerp_vs_lerp") {
         const Vec3d arm = normalized(cross(axes[0], Vec3d{0.3, 0.5, 0.8})) * 0.5;
         matrix_lerp = std::max(matrix_lerp, norm(mixed * arm - right * arm));
         for (int r = 0; r < 3; ++r) {
-          worst_double = std::max(worst_double, static_cast<double>(std::abs(at[r] - static_cast<Real>(seen[r]))));
-          worst_float = std::max(worst_float, static_cast<double>(std::abs(at[r] - static_cast<Real>(seen_f[r]))));
+          worst_double =
+              std::max(worst_double, static_cast<double>(std::abs(at[r] - static_cast<Real>(seen[r]))));
+          worst_float =
+              std::max(worst_float, static_cast<double>(std::abs(at[r] - static_cast<Real>(seen_f[r]))));
         }
       }
     }
-    MESSAGE(degrees << " degrees a key: slerp and forward kinematics " << 1e3 * worst_float << " mm in float, "
-                    << 1e3 * worst_double << " in double; matrices mixed " << 1e3 * matrix_lerp << " mm");
+    MESSAGE(degrees << " degrees a key: slerp and forward kinematics " << 1e3 * worst_float
+                    << " mm in float, " << 1e3 * worst_double << " in double; matrices mixed "
+                    << 1e3 * matrix_lerp << " mm");
     CHECK(worst_double < 1e-12);
     CHECK(worst_float < 5e-6);  // the budget is 0.05 mm
     CHECK(matrix_lerp > 1e-3);

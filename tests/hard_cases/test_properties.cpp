@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Properties that an image of Gaussians has whatever is in it: random scenes with needles, several seeds.
+// Properties that an image of Gaussians has whatever is in it: random scenes with needles, several
+// seeds.
 #include <doctest/doctest.h>
 
 #include "hard_cases/arrays.hpp"
@@ -25,7 +26,8 @@ Camera square_camera() {
 GaussianCloud scene(std::uint64_t seed) { return random_cloud(seed, {.count = 500, .needle = 0.5}); }
 
 template <class A, class B>
-double difference(const std::vector<A>& a, std::size_t i, const std::vector<B>& b, std::size_t k, std::size_t channels) {
+double difference(const std::vector<A>& a, std::size_t i, const std::vector<B>& b, std::size_t k,
+                  std::size_t channels) {
   double worst = 0;
   for (std::size_t c = 0; c < channels; ++c) {
     const double d = static_cast<double>(a[channels * i + c]) - static_cast<double>(b[channels * k + c]);
@@ -34,9 +36,11 @@ double difference(const std::vector<A>& a, std::size_t i, const std::vector<B>& 
   return worst;
 }
 
-/// Largest difference of colour and alpha where pixel p of a is pixel `other(p)` of b, but for undecided ones.
+/// Largest difference of colour and alpha where pixel p of a is pixel `other(p)` of b, but for undecided
+/// ones.
 template <class S, class F>
-double largest_difference(const Frames<S>& a, const Frames<S>& b, const std::vector<bool>& undecided, const F& other) {
+double largest_difference(const Frames<S>& a, const Frames<S>& b, const std::vector<bool>& undecided,
+                          const F& other) {
   double worst = 0;
   for (std::size_t p = 0; p < a.alpha.size(); ++p) {
     if (undecided[p]) continue;
@@ -84,8 +88,10 @@ TEST_CASE("property_scale_by_power_of_two") {
         for_each_renderer([&](auto& renderer) {
           const auto a = renderer.render({&cloud}, camera, config);
           auto b = renderer.render({&scaled}, far, config);
-          for (auto* image : {&b.median_depth, &b.expected_depth, &b.accumulated_depth, &b.first_hit_depth}) {
-            for (auto& z : *image) z /= static_cast<typename std::remove_reference_t<decltype(renderer)>::scalar>(factor);
+          for (auto* image :
+               {&b.median_depth, &b.expected_depth, &b.accumulated_depth, &b.first_hit_depth}) {
+            for (auto& z : *image)
+              z /= static_cast<typename std::remove_reference_t<decltype(renderer)>::scalar>(factor);
           }
           CHECK(same_images(a, b));
         });
@@ -152,19 +158,21 @@ TEST_CASE("property_horizontal_mirror") {
 }
 
 TEST_CASE("property_split_screen") {
-  // A part of the image is the image of a camera whose principal point is shifted. The contract's limits on
-  // x/z and y/z in the Jacobian (Response::ewa) are taken from the image's own borders, so that for it this
-  // holds only where no limit is met: means that every part has within its limits.
+  // A part of the image is the image of a camera whose principal point is shifted. The contract's limits
+  // on x/z and y/z in the Jacobian (Response::ewa) are taken from the image's own borders, so that for
+  // it this holds only where no limit is met: means that every part has within its limits.
   struct Part {
     int x, y, w, h;
   };
-  const Part parts[] = {{0, 0, 32, 64}, {32, 0, 32, 64}, {0, 0, 64, 32}, {0, 32, 64, 32}, {16, 8, 25, 31}};
+  const Part parts[] = {
+      {0, 0, 32, 64}, {32, 0, 32, 64}, {0, 0, 64, 32}, {0, 32, 64, 32}, {16, 8, 25, 31}};
   Worst worst;
   std::size_t same = 0, all = 0;
   for (const std::uint64_t seed : kSeeds) {
     const GaussianCloud wide = scene(seed);
     // Seen within 4 px of the middle, which is 0.15 of half of the narrowest part.
-    const GaussianCloud narrow = random_cloud(seed, {.count = 300, .needle = 0.5, .center = {-0.125, 0.25, 6}, .extent = 0.35});
+    const GaussianCloud narrow =
+        random_cloud(seed, {.count = 300, .needle = 0.5, .center = {-0.125, 0.25, 6}, .extent = 0.35});
     for (const Response response : {Response::ewa, Response::tangent_plane, Response::ray}) {
       const GaussianCloud& cloud = response == Response::ewa ? narrow : wide;
       RenderConfig config = all_outputs();
@@ -183,11 +191,14 @@ TEST_CASE("property_split_screen") {
           c.cy -= part.y;
           const auto f = renderer.render({&cloud}, c, config);
           for (std::size_t p = 0; p < f.alpha.size(); ++p) {
-            const std::size_t x = p % static_cast<std::size_t>(part.w) + static_cast<std::size_t>(part.x);
-            const std::size_t y = p / static_cast<std::size_t>(part.w) + static_cast<std::size_t>(part.y);
+            const std::size_t x =
+                p % static_cast<std::size_t>(part.w) + static_cast<std::size_t>(part.x);
+            const std::size_t y =
+                p / static_cast<std::size_t>(part.w) + static_cast<std::size_t>(part.y);
             const std::size_t q = y * kWidth + x;
             if (undecided[q]) continue;
-            const double d = std::max(difference(f.rgb, p, whole.rgb, q, 3), difference(f.alpha, p, whole.alpha, q, 1));
+            const double d = std::max(difference(f.rgb, p, whole.rgb, q, 3),
+                                      difference(f.alpha, p, whole.alpha, q, 1));
             worst.add(renderer, d);
             same += d == 0 ? 1 : 0;
             ++all;
@@ -196,7 +207,8 @@ TEST_CASE("property_split_screen") {
       });
     }
   }
-  MESSAGE("the same bits in " << 100.0 * static_cast<double>(same) / static_cast<double>(all) << " % of the pixels");
+  MESSAGE("the same bits in " << 100.0 * static_cast<double>(same) / static_cast<double>(all)
+                              << " % of the pixels");
   worst.check("split screen", 2e-6);
 }
 
@@ -248,7 +260,9 @@ TEST_CASE("property_occluded_changes_nothing") {
 
 TEST_CASE("property_union_is_the_merged_list") {
   for (const std::uint64_t seed : kSeeds) {
-    const GaussianCloud a = scene(seed), b = random_cloud(seed + 50, {.count = 700, .needle = 0.2, .center = {0.5, 0, 5}});
+    const GaussianCloud a = scene(seed),
+                        b = random_cloud(seed + 50,
+                                         {.count = 700, .needle = 0.2, .center = {0.5, 0, 5}});
     GaussianCloud merged = a;
     REQUIRE(append(merged, b).ok());
     for (const Response response : {Response::ewa, Response::ray}) {
@@ -277,8 +291,9 @@ TEST_CASE("property_placement") {
     const Camera camera = square_camera();
     const Affine3<double> world_from_camera = rigid_inverse(camera.viewmat);
     Camera moved = camera;
-    moved.viewmat = rigid_inverse(Affine3<double>{rotation_matrix(place.rotation) * world_from_camera.linear,
-                                                  place * world_from_camera.translation});
+    moved.viewmat =
+        rigid_inverse(Affine3<double>{rotation_matrix(place.rotation) * world_from_camera.linear,
+                                      place * world_from_camera.translation});
     moved.near_plane = camera.near_plane * place.scale;
     const auto undecided = undecided_pixels({&cloud}, camera, all_outputs(), 1e-4);
     for_each_renderer([&](auto& renderer) {
@@ -288,7 +303,8 @@ TEST_CASE("property_placement") {
       worst.add(renderer, largest_difference(a, b, undecided, [](std::size_t p) { return p; }));
       for (std::size_t p = 0; p < a.alpha.size() && !R::is_float; ++p) {
         if (undecided[p]) continue;
-        const double d = static_cast<double>(a.expected_depth[p]) * place.scale - static_cast<double>(b.expected_depth[p]);
+        const double d = static_cast<double>(a.expected_depth[p]) * place.scale -
+                         static_cast<double>(b.expected_depth[p]);
         depth = std::max(depth, std::abs(d));
       }
     });

@@ -128,7 +128,8 @@ TEST_CASE("N33_logscale_extreme") {
       for (const Response response : {Response::ewa, Response::tangent_plane, Response::ray}) {
         RenderConfig config = all_outputs();
         config.response = response;
-        render_everywhere({&cloud}, axis_camera(), config, [](const auto& f, const auto&) { CHECK(all_finite(f)); });
+        render_everywhere({&cloud}, axis_camera(), config,
+                          [](const auto& f, const auto&) { CHECK(all_finite(f)); });
       }
     }
   }
@@ -136,7 +137,8 @@ TEST_CASE("N33_logscale_extreme") {
     RawGaussian g = plain();
     g.log_scales = {all, all, all};
     const GaussianCloud cloud = cloud_of({plain(), g});
-    render_everywhere({&cloud}, axis_camera(), all_outputs(), [](const auto& f, const auto&) { CHECK(all_finite(f)); });
+    render_everywhere({&cloud}, axis_camera(), all_outputs(),
+                      [](const auto& f, const auto&) { CHECK(all_finite(f)); });
   }
   RawGaussian g = plain();
   g.log_scales.y = kNan;

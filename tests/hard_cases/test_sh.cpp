@@ -46,7 +46,8 @@ double sh_error(std::size_t count, int degree) {
           size += std::abs(static_cast<Real>(c[k][l]));
         }
       }
-      worst = std::max(worst, static_cast<double>(std::abs(static_cast<Real>(out[l]) - expected) / size));
+      worst =
+          std::max(worst, static_cast<double>(std::abs(static_cast<Real>(out[l]) - expected) / size));
     }
   }
   return worst;
@@ -106,7 +107,8 @@ TEST_CASE("N39_sh_dir_zero") {
   // In an image: the camera at a mean, drawn by none of the pinhole's rules.
   Camera camera = axis_camera();
   camera.viewmat.translation = -cloud.mean(27);
-  render_everywhere({&cloud}, camera, all_outputs(), [](const auto& f, const auto&) { CHECK(all_finite(f)); });
+  render_everywhere({&cloud}, camera, all_outputs(),
+                    [](const auto& f, const auto&) { CHECK(all_finite(f)); });
 }
 
 TEST_CASE("N40_sh_negative") {
@@ -116,8 +118,8 @@ TEST_CASE("N40_sh_negative") {
   struct Row {
     float c0, c1;
   };
-  for (const Row& row : {Row{-3, 0}, Row{-3, 2}, Row{3, -4}, Row{-1, -1}, Row{5, 0}, Row{30, 10}, Row{1e4f, 0},
-                         Row{-1.7724538f, 0}}) {
+  for (const Row& row : {Row{-3, 0}, Row{-3, 2}, Row{3, -4}, Row{-1, -1}, Row{5, 0}, Row{30, 10},
+                         Row{1e4f, 0}, Row{-1.7724538f, 0}}) {
     GaussianCloudBuilder builder(1);
     const float rest[9] = {0, 0, 0, row.c1, row.c1, row.c1, 0, 0, 0};
     RawGaussian g = gaussian({0, 0, 3}, {1, 1, 0.1}, 0.8, {row.c0, row.c0, row.c0});
@@ -125,12 +127,14 @@ TEST_CASE("N40_sh_negative") {
     builder.add(g);
     const GaussianCloud cloud = builder.cloud();
     const Real sum = 0.5L + y0 * static_cast<Real>(row.c0) + y1 * static_cast<Real>(row.c1);
-    const double expected = static_cast<double>(std::max<Real>(sum, 0) * static_cast<Real>(cloud.opacities[0]));
+    const double expected =
+        static_cast<double>(std::max<Real>(sum, 0) * static_cast<Real>(cloud.opacities[0]));
     render_everywhere({&cloud}, axis_camera(), all_outputs(), [&](const auto& f, const auto&) {
       const double red = static_cast<double>(f.rgb[3 * (32 * 65 + 32)]);
       CHECK(red >= 0);
       // The sum cancels by up to its terms.
-      const double size = 0.5 + std::abs(static_cast<double>(row.c0)) + std::abs(static_cast<double>(row.c1));
+      const double size =
+          0.5 + std::abs(static_cast<double>(row.c0)) + std::abs(static_cast<double>(row.c1));
       CHECK(std::abs(red - expected) < 1e-6 * size);
       if (sum < -1e-6L) CHECK(red == 0);
     });
@@ -160,7 +164,8 @@ TEST_CASE("N61_sh_rotation_equiv") {
       for (int b = 0; b < 3; ++b) r[a][b] = m(a, b);
     }
     for (int band = 1; band <= 3; ++band) {
-      const std::size_t n = static_cast<std::size_t>(2 * band + 1), first = static_cast<std::size_t>(band * band);
+      const std::size_t n = static_cast<std::size_t>(2 * band + 1),
+                        first = static_cast<std::size_t>(band * band);
       const std::vector<Real> d = fit_band_rotation(band, r);
       for (std::size_t a = 0; a < n; ++a) {
         Real length = 0;
@@ -185,7 +190,8 @@ TEST_CASE("N61_sh_rotation_equiv") {
     CHECK(a.alpha == b.alpha);
     for (std::size_t p = 0; p < a.rgb.size(); ++p) {
       worst = std::max(worst, std::abs(static_cast<double>(a.rgb[p]) - static_cast<double>(b.rgb[p])));
-      changed = std::max(changed, std::abs(static_cast<double>(a.rgb[p]) - static_cast<double>(plain.rgb[p])));
+      changed =
+          std::max(changed, std::abs(static_cast<double>(a.rgb[p]) - static_cast<double>(plain.rgb[p])));
     }
   });
   MESSAGE("colours differ by " << worst << "; not turned by " << changed);

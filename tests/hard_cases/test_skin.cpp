@@ -14,7 +14,8 @@ using namespace gsnav_test;
 namespace {
 
 Real determinant3(const Real m[3][3]) {
-  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+         m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
          m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
 }
 
@@ -102,7 +103,8 @@ TEST_CASE("N54_lbs_identity") {
 }
 
 TEST_CASE("N55_lbs_rigid_far") {
-  // Weights off by 1e-3 in their sum, a root 1000 m away: renormalised at load, skinned relative to the root.
+  // Weights off by 1e-3 in their sum, a root 1000 m away: renormalised at load, skinned relative to the
+  // root.
   AvatarAsset asset;
   asset.skeleton.names = {"a", "b", "c"};
   asset.skeleton.parents = {-1, 0, 1};
@@ -112,7 +114,8 @@ TEST_CASE("N55_lbs_rigid_far") {
   std::vector<std::uint16_t> indices;
   std::vector<float> weights;
   for (int i = 0; i < 500; ++i) {
-    RawGaussian g = gaussian({rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}, {0.1, 0.1, 0.1}, 0.9);
+    RawGaussian g =
+        gaussian({rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}, {0.1, 0.1, 0.1}, 0.9);
     g.quat = random_rotation(rng);
     builder.add(g);
     double w[3] = {rng.uniform(), rng.uniform(), rng.uniform()};
@@ -140,11 +143,11 @@ TEST_CASE("N55_lbs_rigid_far") {
     if (by_root) clip.root_translation = {{0, 0, -1000}};
     const Vec3d place = by_root ? Vec3d{3, 0, 0} : Vec3d{1000, 0, -600};
     const auto shared = std::make_shared<const AvatarAsset>(asset);
-    const AvatarActor actor =
-        AvatarActor::create(shared, std::make_shared<const MotionClip>(clip),
-                            std::make_shared<const StandingTrajectory>(place, 0.7)).value();
-    const Similarity all =
-        Similarity{axis_angle(Vec3d{0, 1, 0}, 0.7), place, 1} * Similarity{{}, {0, 0, by_root ? -1000.0 : 0.0}, 1};
+    const AvatarActor actor = AvatarActor::create(shared, std::make_shared<const MotionClip>(clip),
+                                                  std::make_shared<const StandingTrajectory>(place, 0.7))
+                                  .value();
+    const Similarity all = Similarity{axis_angle(Vec3d{0, 1, 0}, 0.7), place, 1} *
+                           Similarity{{}, {0, 0, by_root ? -1000.0 : 0.0}, 1};
     for_each_backend([&](auto& renderer) {
       using B = std::remove_cvref_t<decltype(renderer.backend())>;
       Arrays<B> arrays(renderer.backend());
@@ -183,7 +186,8 @@ TEST_CASE("a crowd is skinned as each of its actors alone, bit for bit") {
     std::vector<float> weights;
     const float first_band[9] = {};
     for (int i = 0; i < count; ++i) {
-      RawGaussian g = gaussian({rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}, {0.1, 0.05, 0.1}, 0.9);
+      RawGaussian g =
+          gaussian({rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}, {0.1, 0.05, 0.1}, 0.9);
       g.quat = random_rotation(rng);
       g.shN = first_band;
       builder.add(g);
@@ -206,9 +210,10 @@ TEST_CASE("a crowd is skinned as each of its actors alone, bit for bit") {
     for (auto& r : pose.rotations) r = random_rotation(rng);
     ActorOptions options;
     if (i == 2) options.time_begin = 10;  // not there yet
-    people.push_back(AvatarActor::create(asset, std::make_shared<const FixedPose>(pose),
-                                         std::make_shared<const StandingTrajectory>(Vec3d{1.0 * i, 0, 2}), options)
-                         .value());
+    people.push_back(
+        AvatarActor::create(asset, std::make_shared<const FixedPose>(pose),
+                            std::make_shared<const StandingTrajectory>(Vec3d{1.0 * i, 0, 2}), options)
+            .value());
   }
   for_each_backend([&](auto& renderer) {
     using B = std::remove_cvref_t<decltype(renderer.backend())>;
@@ -233,7 +238,8 @@ TEST_CASE("a crowd is skinned as each of its actors alone, bit for bit") {
     }
     const std::vector<AvatarActor> swapped{people[1], people[0], people[2], people[3], people[4]};
     CHECK(crowd.pose(swapped, 0.5).message().find("place 0") != std::string::npos);
-    CHECK(crowd.pose(std::span(people).first(2), 0.5).message().find("2 actors for 5") != std::string::npos);
+    CHECK(crowd.pose(std::span(people).first(2), 0.5).message().find("2 actors for 5") !=
+          std::string::npos);
   });
 }
 
@@ -276,7 +282,8 @@ TEST_CASE("N56_lbs_candy_180") {
     CHECK(angle < renderer.bound(3e-5, 1e-6));  // the joint's own matrix, as the scalar holds it
     CHECK(place < 1e-6);                        // positions stay linear: LBS is the asset's contract
   });
-  MESSAGE("the greatest joint's rotation to " << worst_angle << " degrees, positions to " << worst_place << " m");
+  MESSAGE("the greatest joint's rotation to " << worst_angle << " degrees, positions to " << worst_place
+                                              << " m");
 }
 
 TEST_CASE("N57_polar_equivariance") {

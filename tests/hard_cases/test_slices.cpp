@@ -30,9 +30,12 @@ GaussianCloud wall(std::uint64_t seed, double z, int count) {
 }
 
 Camera random_camera(Rng& rng) {
-  const auto in = [&](double r) { return Vec3d{rng.uniform(-r, r), rng.uniform(-r, r), rng.uniform(-r, r)}; };
+  const auto in = [&](double r) {
+    return Vec3d{rng.uniform(-r, r), rng.uniform(-r, r), rng.uniform(-r, r)};
+  };
   const Vec3d eye = in(2);
-  Camera c = Camera::look_at(eye, eye + in(1) + Vec3d{0, 0, 1.2}, {0.1, 1, 0.05}, 75, 58, rng.uniform(30, 110));
+  Camera c =
+      Camera::look_at(eye, eye + in(1) + Vec3d{0, 0, 1.2}, {0.1, 1, 0.05}, 75, 58, rng.uniform(30, 110));
   c.cx += rng.uniform(-20, 20);
   c.cy += rng.uniform(-20, 20);
   c.near_plane = rng.uniform() < 0.5 ? 0.02 : 0.8;
@@ -42,15 +45,21 @@ Camera random_camera(Rng& rng) {
 }  // namespace
 
 TEST_CASE("N65_cull_invariance of slices of depth") {
-  // A room of many layers, sorted in space; a cloud without chunks of its own among it, and one that is placed.
-  GaussianCloud layers = random_cloud(661, {.count = 24000, .sh_degree = 1, .needle = 0.002, .scale = 0.05,
-                                            .center = {0, 0, 3}, .extent = 4});
+  // A room of many layers, sorted in space; a cloud without chunks of its own among it, and one that is
+  // placed.
+  GaussianCloud layers = random_cloud(661, {.count = 24000,
+                                            .sh_degree = 1,
+                                            .needle = 0.002,
+                                            .scale = 0.05,
+                                            .center = {0, 0, 3},
+                                            .extent = 4});
   REQUIRE(append(layers, wall(660, 3.0, 4000)).ok());
   const GaussianCloud room = sorted(layers);
   const GaussianCloud plain = random_cloud(662, {.count = 800, .sh_degree = 2, .needle = 0.1});
   const GaussianCloud placed = sorted(random_cloud(663, {.count = 3000, .sh_degree = 0, .scale = 0.03}));
   const Similarity place{{0.8, 0.2, -0.5, 0.26457513110645907}, {0.3, -0.2, 0.5}, 1.5};
-  const std::array<unsigned, 4> outputs{kRgb, kMedianDepth, kRgb | kAlpha | kMedianDepth, kRgb | kAlpha | kAnyDepth};
+  const std::array<unsigned, 4> outputs{kRgb, kMedianDepth, kRgb | kAlpha | kMedianDepth,
+                                        kRgb | kAlpha | kAnyDepth};
   Rng rng(664);
   std::uint64_t drawn = 0, all = 0;
   for (int i = 0; i < 12; ++i) {
@@ -104,11 +113,18 @@ TEST_CASE("N65_cull_invariance behind a wall, and before it") {
   });
 }
 
-TEST_CASE("N65_cull_invariance needs bounds that hold: no footprint or key lies outside a chunk's extent") {
-  GaussianCloud cloud = random_cloud(667, {.count = 15000, .sh_degree = 0, .needle = 0.01, .scale = 0.06,
-                                           .center = {0, 0, 2}, .extent = 4});
-  REQUIRE(append(cloud, random_cloud(668, {.count = 3, .sh_degree = 0, .needle = 0.5, .scale = 0.8,
-                                           .center = {0, 0, 0}, .extent = 6})).ok());
+TEST_CASE(
+    "N65_cull_invariance needs bounds that hold: no footprint or key lies outside a chunk's extent") {
+  GaussianCloud cloud = random_cloud(
+      667,
+      {.count = 15000, .sh_degree = 0, .needle = 0.01, .scale = 0.06, .center = {0, 0, 2}, .extent = 4});
+  REQUIRE(append(cloud, random_cloud(668, {.count = 3,
+                                           .sh_degree = 0,
+                                           .needle = 0.5,
+                                           .scale = 0.8,
+                                           .center = {0, 0, 0},
+                                           .extent = 6}))
+              .ok());
   sort_spatially(cloud);
   SerialBackend backend;
   RenderWorkspace<float, SerialBackend> ws(backend);
@@ -120,10 +136,12 @@ TEST_CASE("N65_cull_invariance needs bounds that hold: no footprint or key lies 
     RenderConfig config;
     config.outputs = kAlpha;
     config.sort_order = i % 2 == 0 ? SortOrder::z_depth : SortOrder::camera_distance;
-    const Similarity place = i % 3 == 0 ? Similarity{{0.8, 0.2, -0.5, 0.26457513110645907}, {0.3, -0.2, 0.5}, 2.5}
-                                        : Similarity{};
+    const Similarity place =
+        i % 3 == 0 ? Similarity{{0.8, 0.2, -0.5, 0.26457513110645907}, {0.3, -0.2, 0.5}, 2.5}
+                   : Similarity{};
     const GaussianSet set = cloud.set(place);
-    std::vector<float> alpha(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
+    std::vector<float> alpha(static_cast<std::size_t>(camera.width) *
+                             static_cast<std::size_t>(camera.height));
     FrameImages<float> images;
     images.alpha = alpha.data();
     REQUIRE(render_camera<float>(backend, ws, {&set, 1}, camera, config, images).ok());
@@ -138,7 +156,8 @@ TEST_CASE("N65_cull_invariance needs bounds that hold: no footprint or key lies 
       for (std::uint32_t k = 0; k < n; ++k) {
         const std::size_t slot = c * kProjectChunk + k;
         const SplatBounds& b = ws.bounds.data()[slot];
-        const bool within = b.x0 + 0.5 >= e.x0 && b.y0 + 0.5 >= e.y0 && b.x1 - 0.5 <= e.x1 && b.y1 - 0.5 <= e.y1 &&
+        const bool within = b.x0 + 0.5 >= e.x0 && b.y0 + 0.5 >= e.y0 && b.x1 - 0.5 <= e.x1 &&
+                            b.y1 - 0.5 <= e.y1 &&
                             ws.visible.chunk_keys.data()[slot] >= bits_of(e.nearest);
         if (!within) CHECK(within);
         ++seen;
@@ -150,7 +169,8 @@ TEST_CASE("N65_cull_invariance needs bounds that hold: no footprint or key lies 
 }
 
 TEST_CASE("slices of depth by distance, where the viewmat is as little rigid as is allowed") {
-  // Small disks a little nearer than where slices may begin: by z, and by a distance that is not quite z, on different sides.
+  // Small disks a little nearer than where slices may begin: by z, and by a distance that is not quite
+  // z, on different sides.
   for (const double grow : {0.0, 1e-5, 4e-4}) {
     std::vector<RawGaussian> disks;
     Rng rng(2);
@@ -160,8 +180,8 @@ TEST_CASE("slices of depth by distance, where the viewmat is as little rigid as 
       if (!(border > 1 && border < 60)) continue;
       const double z = border * (1 - (grow > 0 ? grow / 2 : 2e-6));
       for (int i = 0; i < 256; ++i) {
-        disks.push_back(gaussian({rng.uniform(-0.01, 0.01) * z, rng.uniform(-0.01, 0.01) * z, z}, {1e-4 * z, 1e-4 * z, 0}, 0.12,
-                                 {0.3f, 0.1f, 0.2f}));
+        disks.push_back(gaussian({rng.uniform(-0.01, 0.01) * z, rng.uniform(-0.01, 0.01) * z, z},
+                                 {1e-4 * z, 1e-4 * z, 0}, 0.12, {0.3f, 0.1f, 0.2f}));
       }
     }
     GaussianCloud cloud = cloud_of(disks);

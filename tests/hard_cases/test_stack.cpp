@@ -38,7 +38,8 @@ struct Blend {
       if (alpha * 255 < 1) continue;
       const Real after = transmittance * (1 - alpha);
       if (exclusive && after < static_cast<Real>(transmittance_min)) return;
-      const Real dc = static_cast<Real>(cloud.sh0[3 * i]) / std::sqrt(4 * 3.14159265358979323846264338328L);
+      const Real dc =
+          static_cast<Real>(cloud.sh0[3 * i]) / std::sqrt(4 * 3.14159265358979323846264338328L);
       red += alpha * transmittance * std::max<Real>(0, 0.5L + dc);
       depth += alpha * transmittance * static_cast<Real>(cloud.means[2][i]);
       transmittance = after;
@@ -142,9 +143,8 @@ TEST_CASE("N43_faint_fog") {
       if (alpha * 255 > 1) transmittance *= 1 - alpha;
     }
     REQUIRE((transmittance < 0.2L) == (faint > 1.0 / 255));
-    on_axis(cloud, all_outputs(), [&](double alpha, double, const auto&) {
-      check(alpha, 1 - transmittance);
-    });
+    on_axis(cloud, all_outputs(),
+            [&](double alpha, double, const auto&) { check(alpha, 1 - transmittance); });
   }
   // From 0.00393 on they count, and add up.
   for (const double faint : {0.00393, 0.004, 0.01}) {
@@ -170,13 +170,16 @@ TEST_CASE("N44_deep_stack") {
     const Blend truth(cloud, 0.99, stop, false);
     double worst = 0, worst_depth = 0;
     render_everywhere({&cloud}, axis_camera(kSize, 64), config, [&](const auto& f, const auto&) {
-      const double alpha = static_cast<double>(f.alpha[kMiddle]), red = static_cast<double>(f.rgb[3 * kMiddle]);
+      const double alpha = static_cast<double>(f.alpha[kMiddle]),
+                   red = static_cast<double>(f.rgb[3 * kMiddle]);
       worst = std::max(worst, std::abs(alpha - static_cast<double>(1 - truth.transmittance)));
       worst = std::max(worst, std::abs(red - static_cast<double>(truth.red)));
       const double expected = static_cast<double>(truth.depth / (1 - truth.transmittance));
-      worst_depth = std::max(worst_depth, std::abs(static_cast<double>(f.expected_depth[kMiddle]) - expected));
+      worst_depth =
+          std::max(worst_depth, std::abs(static_cast<double>(f.expected_depth[kMiddle]) - expected));
     });
-    MESSAGE("stop at " << stop << ": colour and transmittance " << worst << ", depth " << worst_depth << " m");
+    MESSAGE("stop at " << stop << ": colour and transmittance " << worst << ", depth " << worst_depth
+                       << " m");
     CHECK(worst < 5e-6);
     CHECK(worst_depth < 1e-5);
   }

@@ -21,7 +21,8 @@ std::vector<RawGaussian> raw_scene(std::uint64_t seed, std::size_t count, double
   for (RawGaussian& g : gs) {
     const Vec3d mean{dyadic(rng.uniform(-2, 2), step), dyadic(rng.uniform(-2, 2), step),
                      dyadic(rng.uniform(2, 6), step)};
-    g = gaussian(mean, {0.08, 0.08 * rng.uniform(0.1, 1), 0.08 * rng.uniform(0.1, 1)}, rng.uniform(0.05, 0.95),
+    g = gaussian(mean, {0.08, 0.08 * rng.uniform(0.1, 1), 0.08 * rng.uniform(0.1, 1)},
+                 rng.uniform(0.05, 0.95),
                  {static_cast<float>(rng.normal()), static_cast<float>(rng.normal()), 0});
     g.quat = random_rotation(rng);
   }
@@ -40,8 +41,8 @@ Camera shifted(Camera camera, const Vec3d& shift) {
   return camera;
 }
 
-/// Dots on a grid of pixels, depths between 2 and 6 m, as seen by `axis_camera` at `eye`: each alone at its
-/// pixel, opaque, flat and across the view axis.
+/// Dots on a grid of pixels, depths between 2 and 6 m, as seen by `axis_camera` at `eye`: each alone at
+/// its pixel, opaque, flat and across the view axis.
 std::vector<RawGaussian> dots(Rng& rng, const Camera& camera, const Vec3d& eye) {
   std::vector<RawGaussian> gs;
   for (int y = 4; y < camera.height; y += 8) {
@@ -56,7 +57,8 @@ std::vector<RawGaussian> dots(Rng& rng, const Camera& camera, const Vec3d& eye) 
 
 /// Largest error of the depth of `dots`, metres.
 template <class S>
-double depth_error(const Frames<S>& f, const Camera& camera, const std::vector<RawGaussian>& gs, const Vec3d& eye) {
+double depth_error(const Frames<S>& f, const Camera& camera, const std::vector<RawGaussian>& gs,
+                   const Vec3d& eye) {
   double worst = 0;
   std::size_t i = 0;
   for (int y = 4; y < camera.height; y += 8) {
@@ -125,7 +127,8 @@ TEST_CASE("N29_chunk_boundary") {
   // Cells of the lattice meet at x = 32 m. The same scene around x = 0 has no seam.
   const Vec3d edge{32, 0, 0};
   Rng rng(29);
-  SUBCASE("positions that both cells hold exactly: the same bits, the camera on either side and between") {
+  SUBCASE(
+      "positions that both cells hold exactly: the same bits, the camera on either side and between") {
     const std::vector<RawGaussian> gs = raw_scene(290, 800, 0x1p-18);
     const GaussianCloud across = shifted(gs, edge), inside = cloud_of(gs);
     REQUIRE(across.origins.size() == 2);
@@ -147,7 +150,8 @@ TEST_CASE("N29_chunk_boundary") {
         const auto reference = renderer.render({&inside}, camera, all_outputs());
         CHECK(same_images(reference, renderer.render({&across}, shifted(camera, edge), all_outputs())));
         CHECK(same_images(reference, renderer.render({&eight}, shifted(camera, corner), all_outputs())));
-        CHECK(same_images(reference, renderer.render({&halves}, shifted(camera, corner), all_outputs())));
+        CHECK(
+            same_images(reference, renderer.render({&halves}, shifted(camera, corner), all_outputs())));
       });
     }
   }

@@ -5,12 +5,13 @@
 #include <cmath>
 #include <cstddef>
 
-#include "gsnav/image/camera.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
-// What one Gaussian's alpha is, in long double and by the textbook: explicit covariance matrices, AC - B^2
-// and explicit inverses. Shares no formula with the kernels. Cameras stand at the origin and look along +z.
+// What one Gaussian's alpha is, in long double and by the textbook: explicit covariance matrices, AC -
+// B^2 and explicit inverses. Shares no formula with the kernels. Cameras stand at the origin and look
+// along +z.
 
 namespace gsnav_test {
 
@@ -56,10 +57,10 @@ inline void truth_covariance(const TruthSplat& t, Real sigma[3][3]) {
 
 /// The 2D Gaussian of the linearisation at the mean.
 struct Truth2d {
-  Real x = 0, y = 0;           ///< mean, pixels
-  Real a = 0, b = 0, c = 0;    ///< covariance with the dilation, px^2
-  Real det0 = 0, det = 0;      ///< without and with the dilation
-  Real opacity = 0;            ///< after the mip compensation
+  Real x = 0, y = 0;         ///< mean, pixels
+  Real a = 0, b = 0, c = 0;  ///< covariance with the dilation, px^2
+  Real det0 = 0, det = 0;    ///< without and with the dilation
+  Real opacity = 0;          ///< after the mip compensation
   Real compensation() const { return std::sqrt(std::max<Real>(det0, 0) / det); }
   /// Mahalanobis distance squared of a pixel centre.
   Real q(Real px, Real py) const {
@@ -99,9 +100,9 @@ inline Truth2d truth_project(const TruthSplat& t, const gsnav::Camera& camera, b
   return out;
 }
 
-/// Largest response of the 3D Gaussian along a pixel's ray: its covariance is inverted and the distance is
-/// taken at the parameter where its derivative vanishes. The dilation is eps2d px^2 at the mean's depth,
-/// across the view axis. Alpha is 0 where that point lies behind the camera.
+/// Largest response of the 3D Gaussian along a pixel's ray: its covariance is inverted and the distance
+/// is taken at the parameter where its derivative vanishes. The dilation is eps2d px^2 at the mean's
+/// depth, across the view axis. Alpha is 0 where that point lies behind the camera.
 class TruthRay {
  public:
   TruthRay(const TruthSplat& t, const gsnav::Camera& camera) : splat_(t), camera_(camera) {
@@ -132,7 +133,8 @@ class TruthRay {
     return form(d, d);
   }
   /// Whether a ray is close to the line where its largest response goes behind the camera, so that alpha
-  /// falls from some value to 0: form(r, c) / form(c, c), c the mean's ray, is 1 at the mean and 0 there.
+  /// falls from some value to 0: form(r, c) / form(c, c), c the mean's ray, is 1 at the mean and 0
+  /// there.
   bool at_horizon(Real px, Real py) const {
     const Real r[3] = {(px - camera_.cx) / camera_.fx, (py - camera_.cy) / camera_.fy, 1};
     const Real c[3] = {splat_.mean[0] / splat_.mean[2], splat_.mean[1] / splat_.mean[2], 1};
@@ -158,11 +160,12 @@ class TruthRay {
   Real adjugate_[3][3]{}, det_ = 0, opacity_ = 0;
 };
 
-/// Linearised on the plane through the mean across its direction: a pixel's ray is carried to that plane,
-/// where the offset is exact, and the covariance is taken in the plane's own axes.
+/// Linearised on the plane through the mean across its direction: a pixel's ray is carried to that
+/// plane, where the offset is exact, and the covariance is taken in the plane's own axes.
 class TruthTangent {
  public:
-  TruthTangent(const TruthSplat& t, const gsnav::Camera& camera) : flat_(truth_project(t, camera, false)) {
+  TruthTangent(const TruthSplat& t, const gsnav::Camera& camera)
+      : flat_(truth_project(t, camera, false)) {
     for (int k = 0; k < 3; ++k) mean_[k] = t.mean[k];
     camera_ = camera;
   }

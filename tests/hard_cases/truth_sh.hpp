@@ -51,7 +51,8 @@ inline std::vector<Real> fit_band_rotation(int l, const Real rotation[3][3]) {
     const Real turn = 2.39996322972865332L * static_cast<Real>(s);
     const Real d[3] = {r * std::cos(turn), r * std::sin(turn), z};
     Real back[3];  // the rotation's inverse applied
-    for (int i = 0; i < 3; ++i) back[i] = rotation[0][i] * d[0] + rotation[1][i] * d[1] + rotation[2][i] * d[2];
+    for (int i = 0; i < 3; ++i)
+      back[i] = rotation[0][i] * d[0] + rotation[1][i] * d[1] + rotation[2][i] * d[2];
     for (std::size_t i = 0; i < n; ++i) {
       const Real yi = truth_sh_basis(l, static_cast<int>(i) - l, d);
       for (std::size_t k = 0; k < n; ++k) {

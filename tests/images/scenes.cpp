@@ -7,9 +7,9 @@
 #include <limits>
 #include <utility>
 
-#include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/scene/visible_sets.hpp"
@@ -29,7 +29,9 @@ using Configure = std::function<void(RenderConfig&)>;
 std::shared_ptr<const GaussianCloud> shared(GaussianCloud cloud) {
   return std::make_shared<const GaussianCloud>(std::move(cloud));
 }
-std::shared_ptr<const GaussianCloud> in_chunks(GaussianCloud cloud) { return shared(sorted(std::move(cloud))); }
+std::shared_ptr<const GaussianCloud> in_chunks(GaussianCloud cloud) {
+  return shared(sorted(std::move(cloud)));
+}
 
 Stored of(std::shared_ptr<const GaussianCloud> cloud) {
   Stored s;
@@ -68,7 +70,8 @@ TemporalCloud moving_cloud() {
   Rng rng(72);
   for (std::size_t i = 0; i < scene.size(); ++i) {
     scene.times.push_back(static_cast<float>(rng.normal()));
-    scene.sigmas.push_back(i % 5 == 0 ? std::numeric_limits<float>::infinity() : static_cast<float>(rng.uniform(0, 1)));
+    scene.sigmas.push_back(i % 5 == 0 ? std::numeric_limits<float>::infinity()
+                                      : static_cast<float>(rng.uniform(0, 1)));
     for (auto& plane : scene.motion) plane.push_back(static_cast<float>(0.2 * rng.normal()));
   }
   sort_spatially(scene);
@@ -103,16 +106,23 @@ Configure all_images_and(const Configure& more) {
 
 void add_flat(SceneList& list) {
   const auto cloud = in_chunks(make_default_scene(0.05).value().cloud);
-  const auto child = std::make_shared<const AvatarAsset>(make_humanoid({.gaussians = 2000, .sh_degree = 1}));
-  const auto adult = std::make_shared<const AvatarAsset>(make_humanoid({.build = 1.1, .seed = 3, .gaussians = 2000}));
-  const std::vector<AvatarActor> people{make_walker(child, {{3.4, 0, 3.7}, {5.4, 0, 3.0}}).value(),
-                                        make_walker(adult, {{5.3, 0, 1.6}, {3.6, 0, 2.9}, {4.6, 0, 4.0}}).value()};
+  const auto child =
+      std::make_shared<const AvatarAsset>(make_humanoid({.gaussians = 2000, .sh_degree = 1}));
+  const auto adult =
+      std::make_shared<const AvatarAsset>(make_humanoid({.build = 1.1, .seed = 3, .gaussians = 2000}));
+  const std::vector<AvatarActor> people{
+      make_walker(child, {{3.4, 0, 3.7}, {5.4, 0, 3.0}}).value(),
+      make_walker(adult, {{5.3, 0, 1.6}, {3.6, 0, 2.9}, {4.6, 0, 4.0}}).value()};
   MeshScene board, glass;
-  board.add(rectangle({{{1.0f, 0.0f, 1.0f}, {3.4f, 0.0f, 2.4f}, {3.4f, 1.1f, 2.4f}, {1.0f, 1.1f, 1.0f}}},
-                      {0.8f, 0.4f, 0.1f})).value();
+  board
+      .add(rectangle({{{1.0f, 0.0f, 1.0f}, {3.4f, 0.0f, 2.4f}, {3.4f, 1.1f, 2.4f}, {1.0f, 1.1f, 1.0f}}},
+                     {0.8f, 0.4f, 0.1f}))
+      .value();
   glass = board;
-  glass.add(rectangle({{{3.2f, 0.0f, 1.0f}, {4.6f, 0.0f, 3.4f}, {4.6f, 1.8f, 3.4f}, {3.2f, 1.8f, 1.0f}}},
-                      {0.2f, 0.7f, 0.9f}, 0.4f)).value();
+  glass
+      .add(rectangle({{{3.2f, 0.0f, 1.0f}, {4.6f, 0.0f, 3.4f}, {4.6f, 1.8f, 3.4f}, {3.2f, 1.8f, 1.0f}}},
+                     {0.2f, 0.7f, 0.9f}, 0.4f))
+      .value();
   const auto wall = std::make_shared<const MeshScene>(std::move(board));
   const auto pane = std::make_shared<const MeshScene>(std::move(glass));
 
@@ -128,7 +138,13 @@ void add_flat(SceneList& list) {
   ImageScene s = named("flat, people");
   s.people = people;
   list.add(s);
-  list.add(s = [&] { s.name = "flat, people, four slices"; return s; }(), [](RenderConfig& c) { c.depth_slices = 4; });
+  list.add(
+      s =
+          [&] {
+            s.name = "flat, people, four slices";
+            return s;
+          }(),
+      [](RenderConfig& c) { c.depth_slices = 4; });
   s.name = "flat, people, mesh";
   s.meshes = wall;
   list.add(s, kAllImages);
@@ -162,7 +178,9 @@ void add_flat(SceneList& list) {
     cells.face = 64;
     const Vec3d eye = flat.camera.position();
     scene.assets[0].visible = std::make_shared<const VisibleSets>(
-        build_visible_sets(backend, *scene.assets[0].cloud, std::array{eye, eye + Vec3d{0.3, 0, 0.2}}, cells).value());
+        build_visible_sets(backend, *scene.assets[0].cloud, std::array{eye, eye + Vec3d{0.3, 0, 0.2}},
+                           cells)
+            .value());
     scene.avatars = people;
     const auto there = std::make_shared<const SimulatorScene>(std::move(scene));
     LodChoice coarse;
@@ -178,9 +196,11 @@ void add_flat(SceneList& list) {
       list.add(chosen);
     }
   };
-  detailed("flat and its tree", cloud, std::make_shared<const LodTree>(build_lod(backend, *cloud).value()));
+  detailed("flat and its tree", cloud,
+           std::make_shared<const LodTree>(build_lod(backend, *cloud).value()));
   auto shipped = join_levels(backend, shipped_levels(*cloud, 2), 16).value();
-  detailed("flat in shipped levels", shared(std::move(shipped.cloud)), std::make_shared<const LodTree>(std::move(shipped.tree)));
+  detailed("flat in shipped levels", shared(std::move(shipped.cloud)),
+           std::make_shared<const LodTree>(std::move(shipped.tree)));
 }
 
 void add_storages(SceneList& list) {
@@ -196,7 +216,8 @@ void add_storages(SceneList& list) {
     return s;
   };
   const auto cloud = in_chunks(random_cloud(11, {.count = 1500, .needle = 0.3}));
-  const auto mip = in_chunks(random_cloud(12, {.count = 800, .sh_degree = 1, .scale = 0.2, .mip = true}));
+  const auto mip =
+      in_chunks(random_cloud(12, {.count = 800, .sh_degree = 1, .scale = 0.2, .mip = true}));
   const auto needles = in_chunks(needle_cloud(5, 800));
   GaussianCloud halves = *cloud;
   compact_sh(halves);
@@ -233,7 +254,8 @@ void add_storages(SceneList& list) {
   list.add(s, [](RenderConfig& c) { c.blend_space = ColorSpace::linear; });
 
   list.add(scene("needles", {of(needles)}, axis_camera(33, 32)), kAllImages);
-  list.add(scene("needles not in chunks", {of(shared(needle_cloud(6, 400)))}, axis_camera(33, 32)), kAllImages);
+  list.add(scene("needles not in chunks", {of(shared(needle_cloud(6, 400)))}, axis_camera(33, 32)),
+           kAllImages);
   for (const auto response : {Response::ray, Response::tangent_plane}) {
     list.add(scene("close, response " + std::to_string(static_cast<int>(response)), {of(cloud)}, close),
              all_images_and([response](RenderConfig& c) { c.response = response; }));
@@ -244,11 +266,15 @@ void add_storages(SceneList& list) {
   }
   const Vec3d far_away{600, -300, 576};
   list.add(scene("far from zero",
-                 {of(in_chunks(random_cloud(13, {.count = 600, .sh_degree = 2, .center = far_away + Vec3d{0, 0, 4}})))},
-                 Camera::look_at(far_away, far_away + Vec3d{0, 0, 4}, {0, -1, 0}, 40, 30, 80)), kAllImages);
+                 {of(in_chunks(random_cloud(
+                     13, {.count = 600, .sh_degree = 2, .center = far_away + Vec3d{0, 0, 4}})))},
+                 Camera::look_at(far_away, far_away + Vec3d{0, 0, 4}, {0, -1, 0}, 40, 30, 80)),
+           kAllImages);
   list.add(scene("two origins",
-                 {of(shared(random_cloud(14, {.count = 600, .sh_degree = 0, .scale = 0.3, .center = {31.5, 0.5, 5}})))},
-                 Camera::look_at({31.5, 0.5, 0.5}, {31.7, 0.4, 5}, {0, -1, 0}, 40, 30, 80)), kAllImages);
+                 {of(shared(random_cloud(
+                     14, {.count = 600, .sh_degree = 0, .scale = 0.3, .center = {31.5, 0.5, 5}})))},
+                 Camera::look_at({31.5, 0.5, 0.5}, {31.7, 0.4, 5}, {0, -1, 0}, 40, 30, 80)),
+           kAllImages);
 }
 
 }  // namespace

@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "gsnav/avatar/skinned_gaussians.hpp"
+#include "gsnav/detail/scene/temporal_cloud.hpp"
+#include "gsnav/detail/sim/scene_on_backend.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/detail/scene/temporal_cloud.hpp"
-#include "gsnav/detail/sim/scene_on_backend.hpp"
 
 // Scenes in every storage and with every selection of rows, and how they come to a backend.
 
@@ -25,8 +25,8 @@ struct Stored {
   std::shared_ptr<const gsnav::PackedCloud> packed{};
   std::shared_ptr<const gsnav::TemporalCloud> moving{};  ///< drawn as it is at 0.4 s, on host backends
   gsnav::Similarity place{};
-  bool as_factors = false;             ///< shapes by GaussianView::axes in place of quats and scales
-  std::vector<std::uint32_t> seen{};   ///< GaussianView::seen
+  bool as_factors = false;            ///< shapes by GaussianView::axes in place of quats and scales
+  std::vector<std::uint32_t> seen{};  ///< GaussianView::seen
 };
 
 /// What is drawn, and how.
@@ -34,13 +34,14 @@ struct ImageScene {
   std::string name;
   std::vector<Stored> sets{};
   std::vector<gsnav::AvatarActor> people{};
-  std::shared_ptr<const gsnav::SimulatorScene> detailed{};  ///< in place of sets and people: drawn by `choice`
+  std::shared_ptr<const gsnav::SimulatorScene>
+      detailed{};  ///< in place of sets and people: drawn by `choice`
   gsnav::DetailChoice choice{};
   std::shared_ptr<const gsnav::MeshScene> meshes{};
   gsnav::Camera camera{};
   gsnav::RenderConfig config{};
   bool on_device = true;
-  bool in_batches = true;              ///< CudaBatchRenderer draws it
+  bool in_batches = true;  ///< CudaBatchRenderer draws it
 };
 
 /// Every scene there is; made once.
@@ -97,7 +98,8 @@ class SceneThere {
       moving_.back()->set_time(0.4).throw_if_error();
       return moving_.back()->set(place);
     } else {
-      gsnav::Status(gsnav::Errc::unsupported, "tests: a moving scene is drawn on host backends").throw_if_error();
+      gsnav::Status(gsnav::Errc::unsupported, "tests: a moving scene is drawn on host backends")
+          .throw_if_error();
       return {};
     }
   }

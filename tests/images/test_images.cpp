@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every storage and every selection of rows, on every backend: the float32 images have the serial backend's bits. By
-// `fast` a device has bits of its own, and a batch those of one camera.
+// Every storage and every selection of rows, on every backend: the float32 images have the serial
+// backend's bits. By `fast` a device has bits of its own, and a batch those of one camera.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -43,7 +43,8 @@ void check_same_bits(const Frames<float>& a, const Frames<float>& b) {
 
 bool shows_something(const Frames<float>& f) {
   for (const auto* image : {&f.rgb, &f.median_depth, &f.first_hit_depth}) {
-    if (std::any_of(image->begin(), image->end(), [&](float v) { return v != image->front(); })) return true;
+    if (std::any_of(image->begin(), image->end(), [&](float v) { return v != image->front(); }))
+      return true;
   }
   return false;
 }
@@ -72,13 +73,14 @@ TEST_CASE("images: every storage and selection of rows draws the same bits on ev
       const Frames<float> single = draw<float>(cuda, scene, "cuda");
       if (there.config().profile == Profile::exact) {
         check_same_bits(single, reference);
-      } else if (!reference.rgb.empty()) {  // the device has an exponential of its own there (docs/cuda.md)
+      } else if (!reference.rgb
+                      .empty()) {  // the device has an exponential of its own there (docs/cuda.md)
         CHECK(image_error(single.rgb, reference.rgb, 3).psnr > 80);
       }
       if (scene.in_batches) {
         CudaBatchRenderer renderer(cuda, there.config());
-        const Batch batch = draw_batch(cuda, renderer, there.sets(), {scene.camera}, {}, scene.config.outputs, false,
-                                       {MeshFrame{there.meshes(), {}}});
+        const Batch batch = draw_batch(cuda, renderer, there.sets(), {scene.camera}, {},
+                                       scene.config.outputs, false, {MeshFrame{there.meshes(), {}}});
         record_hashes(batch.frames, "cuda batch, " + scene.name);
         check_same_bits(batch.frames, single);
       }

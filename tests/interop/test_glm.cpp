@@ -81,8 +81,8 @@ TEST_CASE("an OpenGL projection gives the same pixels") {
     CHECK(camera.fx * c.x / c.z + camera.cx == doctest::Approx(column).epsilon(1e-12));
     CHECK(camera.fy * c.y / c.z + camera.cy == doctest::Approx(row).epsilon(1e-12));
   }
-  const Camera plain = camera_from_opengl(view, glm::perspective(glm::radians(60.0), 1.0, 0.1, 9.0), 64, 64)
-                           .value();
+  const Camera plain =
+      camera_from_opengl(view, glm::perspective(glm::radians(60.0), 1.0, 0.1, 9.0), 64, 64).value();
   const Camera expected = Camera{}.set_hfov(64, 64, 60);
   CHECK(plain.fx == doctest::Approx(expected.fx));
   CHECK(plain.fy == doctest::Approx(expected.fy));

@@ -21,7 +21,8 @@ inline bool near(long double a, long double b, long double relative = 3e-7L) {
 
 /// Checks the SH bands above 0 of Gaussian i against the row it was read from by `same(got, want)`.
 template <class Same>
-void check_rest(const gsnav::GaussianCloud& c, std::size_t i, const PlyRow& row, int rest_in_file, const Same& same) {
+void check_rest(const gsnav::GaussianCloud& c, std::size_t i, const PlyRow& row, int rest_in_file,
+                const Same& same) {
   const int kept = (c.sh_degree + 1) * (c.sh_degree + 1) - 1;
   bool rest_ok = true;
   for (int coefficient = 0; coefficient < kept; ++coefficient) {
@@ -48,7 +49,8 @@ inline void check_gaussian(const gsnav::GaussianCloud& c, std::size_t i, const P
   }
   for (std::size_t k = 0; k < 4; ++k) CHECK(near(c.quats[k][i], e.quat[k]));
   CHECK(near(c.opacities[i], e.opacity));
-  check_rest(c, i, row, rest_in_file, [](float got, double want) { return got == static_cast<float>(want); });
+  check_rest(c, i, row, rest_in_file,
+             [](float got, double want) { return got == static_cast<float>(want); });
 }
 
 /// A row as another program gives it: a PLY's fields.

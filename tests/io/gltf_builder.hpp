@@ -19,14 +19,17 @@ using nlohmann::json;
 
 /// A glTF file in the making: arrays go into one buffer.
 struct TestGltf {
-  json doc = {{"asset", {{"version", "2.0"}}}, {"buffers", json::array()}, {"bufferViews", json::array()},
-              {"accessors", json::array()},    {"nodes", json::array()},   {"meshes", json::array()},
+  json doc = {{"asset", {{"version", "2.0"}}}, {"buffers", json::array()},
+              {"bufferViews", json::array()},  {"accessors", json::array()},
+              {"nodes", json::array()},        {"meshes", json::array()},
               {"skins", json::array()},        {"scenes", json::array()}};
   std::string bytes;
 
   template <class T>
-  std::size_t add(const std::vector<T>& values, const std::string& type, int component, bool normalized = false) {
-    const std::map<std::string, std::size_t> widths{{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT4", 16}};
+  std::size_t add(const std::vector<T>& values, const std::string& type, int component,
+                  bool normalized = false) {
+    const std::map<std::string, std::size_t> widths{
+        {"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT4", 16}};
     bytes.resize((bytes.size() + 3) / 4 * 4);
     json view = {{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", values.size() * sizeof(T)}};
     doc["bufferViews"].push_back(view);
@@ -58,13 +61,14 @@ struct TestGltf {
       const std::uint32_t n = static_cast<std::uint32_t>(v);
       return std::string(reinterpret_cast<const char*>(&n), 4);
     };
-    write_file(path, "glTF" + u32(2) + u32(28 + text.size() + body.size()) + u32(text.size()) + "JSON" + text +
-                         u32(body.size()) + std::string("BIN\0", 4) + body);
+    write_file(path, "glTF" + u32(2) + u32(28 + text.size() + body.size()) + u32(text.size()) + "JSON" +
+                         text + u32(body.size()) + std::string("BIN\0", 4) + body);
   }
 };
 
-/// Plays a glTF file by the book, in long double with 4x4 matrices: what the reader is compared with. Knows
-/// what the test files have: float and integer arrays without strides, linear, step and cubic keys.
+/// Plays a glTF file by the book, in long double with 4x4 matrices: what the reader is compared with.
+/// Knows what the test files have: float and integer arrays without strides, linear, step and cubic
+/// keys.
 class GltfTruth {
  public:
   using Real = long double;
@@ -96,7 +100,8 @@ class GltfTruth {
   const json& doc() const { return doc_; }
 
   std::vector<Real> numbers(std::size_t accessor) const {
-    const std::map<std::string, std::size_t> widths{{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT4", 16}};
+    const std::map<std::string, std::size_t> widths{
+        {"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT4", 16}};
     const json& a = doc_["accessors"][accessor];
     const json& v = doc_["bufferViews"][a["bufferView"].get<std::size_t>()];
     const std::size_t width = widths.at(a["type"]), count = a["count"];
@@ -106,7 +111,8 @@ class GltfTruth {
     std::vector<Real> out;
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t k = 0; k < width; ++k) {
-        const char* p = bytes_.data() + v.value("byteOffset", 0u) + a.value("byteOffset", 0u) + i * stride + k * size;
+        const char* p = bytes_.data() + v.value("byteOffset", 0u) + a.value("byteOffset", 0u) +
+                        i * stride + k * size;
         float f = 0;
         std::uint32_t u = 0;
         if (kind == 5126)
@@ -130,9 +136,10 @@ class GltfTruth {
         bool any = false;
         for (const json& c : doc_["animations"][static_cast<std::size_t>(animation)]["channels"]) {
           if (c["target"]["node"] != n || c["target"]["path"] == "weights") continue;
-          const json& s =
-              doc_["animations"][static_cast<std::size_t>(animation)]["samplers"][c["sampler"].get<std::size_t>()];
-          changed[c["target"]["path"].get<std::string>()] = value(s, time, c["target"]["path"] == "rotation" ? 4 : 3);
+          const json& s = doc_["animations"][static_cast<std::size_t>(animation)]["samplers"]
+                              [c["sampler"].get<std::size_t>()];
+          changed[c["target"]["path"].get<std::string>()] =
+              value(s, time, c["target"]["path"] == "rotation" ? 4 : 3);
           any = true;
         }
         if (any) local[n] = local_of(changed);
@@ -167,8 +174,8 @@ class GltfTruth {
             const Matrix& m = joints[static_cast<std::size_t>(j[4 * v + k])];
             all += w[4 * v + k];
             for (std::size_t i = 0; i < 3; ++i) {
-              sum[i] +=
-                  w[4 * v + k] * (m[i][0] * at[3 * v] + m[i][1] * at[3 * v + 1] + m[i][2] * at[3 * v + 2] + m[i][3]);
+              sum[i] += w[4 * v + k] * (m[i][0] * at[3 * v] + m[i][1] * at[3 * v + 1] +
+                                        m[i][2] * at[3 * v + 2] + m[i][3]);
             }
           }
           out.push_back({static_cast<double>(-sum[0] / all), static_cast<double>(sum[1] / all),
@@ -246,7 +253,8 @@ class GltfTruth {
         d = -d;
       }
       const Real angle = std::acos(std::min<Real>(d, 1));
-      if (angle > 1e-6L) a = std::sin((1 - u) * angle) / std::sin(angle), c = std::sin(u * angle) / std::sin(angle);
+      if (angle > 1e-6L)
+        a = std::sin((1 - u) * angle) / std::sin(angle), c = std::sin(u * angle) / std::sin(angle);
     }
     for (std::size_t k = 0; k < w; ++k) p[k] = a * p[k] + c * q[k];
     return p;

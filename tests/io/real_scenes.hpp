@@ -10,8 +10,9 @@
 
 namespace gsnav_test {
 
-/// Every scene of Gaussians in the data's splats/ that io::load_scene reads, sorted; empty where the data is not there.
-/// Reference images' own files (.safetensors) are none; a set's `lod-meta.json` is one beside its levels' files.
+/// Every scene of Gaussians in the data's splats/ that io::load_scene reads, sorted; empty where the
+/// data is not there. Reference images' own files (.safetensors) are none; a set's `lod-meta.json` is
+/// one beside its levels' files.
 inline std::vector<std::string> real_scenes() {
   std::vector<std::string> out;
   const std::string folder = data_file("splats");

@@ -16,11 +16,14 @@ inline PlyFile temporal_file(std::size_t n, std::size_t motion, unsigned seed) {
   file.properties = inria_properties(9);
   file.properties.emplace_back("t", "float");
   file.properties.emplace_back("t_scale", "float");
-  for (std::size_t k = 0; k < motion; ++k) file.properties.emplace_back("motion_" + std::to_string(k), "float");
+  for (std::size_t k = 0; k < motion; ++k)
+    file.properties.emplace_back("motion_" + std::to_string(k), "float");
   file.rows = random_rows(n, 9, seed);
   std::mt19937 generator(seed + 1);
   std::normal_distribution<double> normal;
-  const auto draw = [&](double scale) { return static_cast<double>(static_cast<float>(scale * normal(generator))); };
+  const auto draw = [&](double scale) {
+    return static_cast<double>(static_cast<float>(scale * normal(generator)));
+  };
   for (PlyRow& row : file.rows) {
     row["t"] = draw(1);
     row["t_scale"] = draw(1);
@@ -30,7 +33,8 @@ inline PlyFile temporal_file(std::size_t n, std::size_t motion, unsigned seed) {
 }
 
 /// The same rows as a network's arrays, whose names begin with `prefix`.
-inline TestArrays temporal_arrays(const std::vector<PlyRow>& rows, std::size_t motion, const std::string& prefix) {
+inline TestArrays temporal_arrays(const std::vector<PlyRow>& rows, std::size_t motion,
+                                  const std::string& prefix) {
   const auto array = [&](const std::vector<std::string>& names) {
     TestArray a{{rows.size(), names.size()}, {}};
     for (const PlyRow& row : rows) {
@@ -47,7 +51,8 @@ inline TestArrays temporal_arrays(const std::vector<PlyRow>& rows, std::size_t m
   out[prefix + "_features_dc"].shape = {rows.size(), 1, 3};
   std::vector<std::string> rest;  // colour inner here, channel-major in a PLY
   for (int k = 0; k < 3; ++k) {
-    for (int channel = 0; channel < 3; ++channel) rest.push_back("f_rest_" + std::to_string(3 * channel + k));
+    for (int channel = 0; channel < 3; ++channel)
+      rest.push_back("f_rest_" + std::to_string(3 * channel + k));
   }
   out[prefix + "_features_rest"] = array(rest);
   out[prefix + "_features_rest"].shape = {rows.size(), 3, 3};

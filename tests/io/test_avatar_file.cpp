@@ -15,7 +15,8 @@ namespace {
 
 struct AvatarFolder : TempFolder {
   AvatarFolder() : TempFolder("avatar") {}
-  Result<io::LoadedAvatar> load(const TestArrays& arrays, const io::LoadAvatarOptions& options = {}) const {
+  Result<io::LoadedAvatar> load(const TestArrays& arrays,
+                                const io::LoadAvatarOptions& options = {}) const {
     write_npz(*this / "a.npz", arrays);
     return io::load_avatar(*this / "a.npz", options);
   }
@@ -53,7 +54,8 @@ TEST_CASE("avatar file: every degree, both floats, both bodies") {
         CHECK(asset.cloud.mean(i) == Vec3d{0.125 * x, 1.0, -0.5 * x});
         CHECK(asset.cloud.scales[0][i] == doctest::Approx(0.01).epsilon(1e-7));
         CHECK(asset.cloud.scales[2][i] == 0.0f);
-        CHECK(asset.cloud.quats[3][i] == doctest::Approx(0.5 * x / std::hypot(2.0, 0.5 * x)).epsilon(1e-7));
+        CHECK(asset.cloud.quats[3][i] ==
+              doctest::Approx(0.5 * x / std::hypot(2.0, 0.5 * x)).epsilon(1e-7));
         CHECK(asset.joint_indices[4 * i] == i % joints);
         CHECK(asset.skinning_weights[4 * i] == kWeightParts);
         if (i == 0) continue;
@@ -131,7 +133,8 @@ TEST_CASE("avatar file: what dropping weights costs, against sums by hand") {
   CHECK(loaded.weights.dropped_mass == doctest::Approx(0.25).epsilon(1e-6));
   // The four that are kept are up to 3 m apart; their weights are rounded.
   CHECK(std::abs(loaded.weights.position_error - std::abs(four - all)) < 3 * 4.0 / (4 * kWeightParts));
-  CHECK(loaded.weights.position_error_8 == doctest::Approx(std::abs(eight - all)).epsilon(1e-5));  // weights are float
+  CHECK(loaded.weights.position_error_8 ==
+        doctest::Approx(std::abs(eight - all)).epsilon(1e-5));  // weights are float
   CHECK(loaded.weights.needs_more == 1);
   REQUIRE(loaded.report.warnings.size() == 2);
   CHECK(contains(loaded.report.warnings[0], "1 rows do not sum to 1"));
@@ -149,7 +152,8 @@ TEST_CASE("avatar file: what dropping weights costs, against sums by hand") {
   options.weights.influences = 4;
   options.weights.tolerance = 10;
   CHECK(folder.load(arrays, options).value().weights.needs_more == 0);
-  // Left to choose, it keeps four where that is within the bound, and eight where it is not or nobody knows.
+  // Left to choose, it keeps four where that is within the bound, and eight where it is not or nobody
+  // knows.
   options.weights.influences = 0;
   CHECK(folder.load(arrays, options).value().weights.influences == 4);
   options.weights.tolerance = 0.5 * std::abs(four - all);
@@ -202,11 +206,13 @@ TEST_CASE("avatar file: what is written is read back") {
     double worst_quat = 0, worst_rest = 0;
     for (std::size_t k = 0; k < 4; ++k) {
       for (std::size_t i = 0; i < asset.size(); ++i) {
-        worst_quat = max(worst_quat, static_cast<double>(abs(back.cloud.quats[k][i] - asset.cloud.quats[k][i])));
+        worst_quat =
+            max(worst_quat, static_cast<double>(abs(back.cloud.quats[k][i] - asset.cloud.quats[k][i])));
       }
     }
     for (std::size_t j = 0; j < 55; ++j) {
-      worst_rest = max(worst_rest, norm(back.skeleton.rest_local[j].translation - asset.skeleton.rest_local[j].translation));
+      worst_rest = max(worst_rest, norm(back.skeleton.rest_local[j].translation -
+                                        asset.skeleton.rest_local[j].translation));
     }
     CHECK(worst_quat < 1e-7);
     CHECK(back.skinning_weights == asset.skinning_weights);
@@ -267,10 +273,12 @@ TEST_CASE("avatar file: GART's parameters become the same avatar as activated on
   for (std::size_t i = 0; i < a.size(); ++i) {
     CHECK(a.cloud.mean(i) == b.cloud.mean(i));
     CHECK(a.cloud.opacities[i] == doctest::Approx(b.cloud.opacities[i]).epsilon(1e-5));
-    for (std::size_t k = 0; k < 3; ++k) CHECK(a.cloud.scales[k][i] == doctest::Approx(b.cloud.scales[k][i]).epsilon(1e-5));
+    for (std::size_t k = 0; k < 3; ++k)
+      CHECK(a.cloud.scales[k][i] == doctest::Approx(b.cloud.scales[k][i]).epsilon(1e-5));
   }
   gart["max_scale"] = {{1}, {0.2}};
-  CHECK(folder.load(gart).value().asset.cloud.scales[0][3] == doctest::Approx(2 * a.cloud.scales[0][3]).epsilon(1e-5));
+  CHECK(folder.load(gart).value().asset.cloud.scales[0][3] ==
+        doctest::Approx(2 * a.cloud.scales[0][3]).epsilon(1e-5));
   gart["_features_rest"] = {{30, 6}, std::vector<double>(180, 0.0)};
   CHECK(contains(folder.load(gart).status().message(), "_features_rest has 3 coefficients"));
   gart.erase("_opacity");

@@ -49,7 +49,8 @@ TEST_CASE("avatar file: each array must be there") {
 TEST_CASE("avatar file: numbers that are none") {
   for (const auto& [name, array] : avatar_arrays(3, 24)) {
     for (const double v : {static_cast<double>(NAN), HUGE_VAL, -HUGE_VAL}) {
-      check_fails(changed([&, key = name](TestArrays& a) { a[key].values[17] = v; }), Errc::invalid_file, {name, "row"});
+      check_fails(changed([&, key = name](TestArrays& a) { a[key].values[17] = v; }), Errc::invalid_file,
+                  {name, "row"});
     }
   }
 }
@@ -61,13 +62,16 @@ TEST_CASE("avatar file: shapes that do not fit each other") {
       a[name].shape = {n, row};
     });
   };
-  check_fails(rows("means", 30, 4), Errc::invalid_file, {"means has the shape [30, 4], must be [any, 3]"});
+  check_fails(rows("means", 30, 4), Errc::invalid_file,
+              {"means has the shape [30, 4], must be [any, 3]"});
   check_fails(rows("means", 0, 3), Errc::invalid_file, {"no Gaussians"});
-  check_fails(rows("scales", 29, 3), Errc::invalid_file, {"scales has the shape [29, 3], must be [30, 3]"});
+  check_fails(rows("scales", 29, 3), Errc::invalid_file,
+              {"scales has the shape [29, 3], must be [30, 3]"});
   check_fails(rows("quats", 30, 3), Errc::invalid_file, {"quats", "must be [30, 4]"});
   check_fails(rows("opacities", 31, 1), Errc::invalid_file, {"opacities", "must be [30, 1]"});
   check_fails(rows("lbs_weights", 30, 55), Errc::invalid_file, {"lbs_weights", "must be [30, 24]"});
-  check_fails(rows("joints_inv_bind_matrix", 24, 15), Errc::invalid_file, {"joints_inv_bind_matrix", "[24, 15]"});
+  check_fails(rows("joints_inv_bind_matrix", 24, 15), Errc::invalid_file,
+              {"joints_inv_bind_matrix", "[24, 15]"});
   check_fails(rows("shs", 30, 4), Errc::invalid_file, {"shs", "[30, 4]"});
   for (const std::size_t k : {2u, 25u}) {
     check_fails(changed([k](TestArrays& a) {
@@ -82,25 +86,32 @@ TEST_CASE("avatar file: shapes that do not fit each other") {
                 a["lbs_weights"].values.resize(750, 0.25);
               }),
               Errc::unsupported, {"has 25 joints"});
-  check_fails(changed([](TestArrays& a) { a["joints_inv_bind_matrix"] = identities(4097); }), Errc::unsupported,
-              {"more than 4096"});
+  check_fails(changed([](TestArrays& a) { a["joints_inv_bind_matrix"] = identities(4097); }),
+              Errc::unsupported, {"more than 4096"});
 }
 
 TEST_CASE("avatar file: values that cannot be") {
-  check_fails(changed([](TestArrays& a) { a["scales"].values[10] = -0.5; }), Errc::invalid_file, {"scales: row 3 has -0.5"});
-  check_fails(changed([](TestArrays& a) { a["opacities"].values[4] = 1.5; }), Errc::invalid_file, {"opacities: row 4 has 1.5"});
-  check_fails(changed([](TestArrays& a) { a["opacities"].values[4] = -0.5; }), Errc::invalid_file, {"opacities: row 4"});
-  check_fails(changed([](TestArrays& a) { a["lbs_weights"].values[50] = -0.5; }), Errc::invalid_file, {"lbs_weights: row 2 has -0.5"});
-  check_fails(changed([](TestArrays& a) { a["lbs_weights"].values[24 * 5 + 5] = 0; }), Errc::invalid_file,
-              {"lbs_weights: row 5 is all zero"});
+  check_fails(changed([](TestArrays& a) { a["scales"].values[10] = -0.5; }), Errc::invalid_file,
+              {"scales: row 3 has -0.5"});
+  check_fails(changed([](TestArrays& a) { a["opacities"].values[4] = 1.5; }), Errc::invalid_file,
+              {"opacities: row 4 has 1.5"});
+  check_fails(changed([](TestArrays& a) { a["opacities"].values[4] = -0.5; }), Errc::invalid_file,
+              {"opacities: row 4"});
+  check_fails(changed([](TestArrays& a) { a["lbs_weights"].values[50] = -0.5; }), Errc::invalid_file,
+              {"lbs_weights: row 2 has -0.5"});
+  check_fails(changed([](TestArrays& a) { a["lbs_weights"].values[24 * 5 + 5] = 0; }),
+              Errc::invalid_file, {"lbs_weights: row 5 is all zero"});
   check_fails(changed([](TestArrays& a) {
                 for (double& v : a["opacities"].values) v = 0;
               }),
               Errc::invalid_file, {"no Gaussian can be seen"});
   check_fails(changed([](TestArrays& a) { a["means"].values[3] = 1000; }), Errc::unsupported, {"32 m"});
-  const std::vector<std::pair<std::size_t, double>> not_rigid{{0, 1.01}, {1, 0.1}, {5, -1.0}, {12, 0.5}, {15, 2.0}, {15, 0.0}};
+  const std::vector<std::pair<std::size_t, double>> not_rigid{{0, 1.01}, {1, 0.1},  {5, -1.0},
+                                                              {12, 0.5}, {15, 2.0}, {15, 0.0}};
   for (const auto& [at, value] : not_rigid) {
-    check_fails(changed([p = at, v = value](TestArrays& a) { a["joints_inv_bind_matrix"].values[16 * 7 + p] = v; }),
+    check_fails(changed([p = at, v = value](TestArrays& a) {
+                  a["joints_inv_bind_matrix"].values[16 * 7 + p] = v;
+                }),
                 Errc::invalid_file, {"joints_inv_bind_matrix: the matrix of joint 7 is not rigid"});
   }
 }

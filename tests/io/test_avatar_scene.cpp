@@ -61,7 +61,8 @@ TEST_CASE("avatar scene: Habitat-GS's file puts people where its frames say") {
   REQUIRE(io::save_driver(folder / "d.npz", walking(person, {}, true)).ok());
   REQUIRE(io::save_driver(folder / "down.npz", walking(person, kFlipped, false)).ok());
   std::vector<float> rows;
-  for (int t = 0; t <= 40; ++t) rows.insert(rows.end(), {1, 0.25f, 2, 0, std::sin(0.2f), 0, std::cos(0.2f)});
+  for (int t = 0; t <= 40; ++t)
+    rows.insert(rows.end(), {1, 0.25f, 2, 0, std::sin(0.2f), 0, std::cos(0.2f)});
   const std::vector<io::NpzEntry> trajectory{{"trajectory", {41, 7}, rows}};
   REQUIRE(io::save_npz(folder / "t.npz", trajectory).ok());
   write_file(folder / "x.scene_instance.json", R"({"time_loop": true, "gaussian_avatars": [
@@ -97,7 +98,8 @@ TEST_CASE("avatar scene: Habitat-GS's file puts people where its frames say") {
     }
     CHECK(apart(joints_in_world((*actors)[3], time), turned) < 1e-5);
     CHECK(apart(joints_in_world((*actors)[5], time), far) < 1e-5);
-    // Scaled about the floor below the root: that point stays, so do feet on the floor of 3 m; all distances grow.
+    // Scaled about the floor below the root: that point stays, so do feet on the floor of 3 m; all
+    // distances grow.
     const auto large = joints_in_world((*actors)[4], time);
     CHECK(norm(Vec3d{large[0].x, 0, large[0].z} - Vec3d{want[0].x, 0, want[0].z}) < 1e-5);
     CHECK(norm(large[15] - large[7]) == doctest::Approx(1.5 * norm(want[15] - want[7])).epsilon(1e-5));
@@ -127,7 +129,8 @@ TEST_CASE("avatar scene: a body of several roots is moved as one, by a path and 
   const AvatarAsset person = make_humanoid({.gaussians = 2000});
   AvatarAsset cut = person;
   const auto rest = person.skeleton.rest_globals();
-  for (const std::size_t j : {std::size_t{15}, std::size_t{20}}) {  // the head and a hand hang on nothing
+  for (const std::size_t j :
+       {std::size_t{15}, std::size_t{20}}) {  // the head and a hand hang on nothing
     cut.skeleton.parents[j] = -1;
     cut.skeleton.rest_local[j] = rest[j];
   }
@@ -135,12 +138,14 @@ TEST_CASE("avatar scene: a body of several roots is moved as one, by a path and 
   const io::DriverFrames truth = walking(person, {}, false);
   REQUIRE(io::save_driver(folder / "d.npz", truth).ok());
   const auto place = [](double key) {  // a walk on a circle
-    return Affine3<double>{rotation_matrix(axis_angle(Vec3d{0, 1, 0}, 0.02 * key)), {3 * std::cos(0.02 * key), 0.25, 2}};
+    return Affine3<double>{rotation_matrix(axis_angle(Vec3d{0, 1, 0}, 0.02 * key)),
+                           {3 * std::cos(0.02 * key), 0.25, 2}};
   };
   std::vector<float> rows;
   for (int t = 0; t <= 40; ++t) {
     const Vec3d at = place(t).translation;
-    for (const double v : {at.x, at.y, at.z, 0.0, std::sin(0.01 * t), 0.0, std::cos(0.01 * t)}) rows.push_back(static_cast<float>(v));
+    for (const double v : {at.x, at.y, at.z, 0.0, std::sin(0.01 * t), 0.0, std::cos(0.01 * t)})
+      rows.push_back(static_cast<float>(v));
   }
   const std::vector<io::NpzEntry> trajectory{{"trajectory", {41, 7}, rows}};
   REQUIRE(io::save_npz(folder / "t.npz", trajectory).ok());
@@ -159,7 +164,8 @@ TEST_CASE("avatar scene: a body of several roots is moved as one, by a path and 
     }
     return out;
   };
-  for (const int t : {0, 7, 25, 40}) CHECK(apart(joints_in_world((*actors)[0], t / 40.0), in_world(t)) < 1e-5);
+  for (const int t : {0, 7, 25, 40})
+    CHECK(apart(joints_in_world((*actors)[0], t / 40.0), in_world(t)) < 1e-5);
   // Between two keys nothing comes off either.
   auto half = in_world(7);
   const auto next = in_world(8);
@@ -191,7 +197,8 @@ TEST_CASE("avatar scene: what is wrong is named with the avatar and the key") {
   fails("{" + good + R"(, "coord_transform": [1, 2]})", bad, "'coord_transform' is no rigid");
   fails("{" + good + R"(, "proxy_urdf": "x"})", Errc::unsupported, "proxy_urdf");
   write_file(folder / "some.json", R"({"time_max": -1})");
-  CHECK(contains(io::load_avatar_scene(folder / "some.json").status().message(), "'time_max' is negative"));
+  CHECK(contains(io::load_avatar_scene(folder / "some.json").status().message(),
+                 "'time_max' is negative"));
   write_file(folder / "some.json", R"({"time_loop": 1})");
   CHECK(contains(io::load_avatar_scene(folder / "some.json").status().message(), "'time_loop'"));
   write_file(folder / "some.json", R"({"avatars": {}})");
@@ -224,17 +231,20 @@ TEST_CASE("avatar scene: each of two drivers of one body gives it its own capsul
   const auto radii = [&](const std::vector<std::string>& drivers) {
     std::string entries;
     for (const std::string& d : drivers)
-      entries += (entries.empty() ? "" : ",") + std::string(R"({"canonical_gaussians":"a.npz","driver":")") + d + ".npz\"}";
+      entries += (entries.empty() ? "" : ",") +
+                 std::string(R"({"canonical_gaussians":"a.npz","driver":")") + d + ".npz\"}";
     write_file(folder / "s.json", "{\"gaussian_avatars\":[" + entries + "]}");
     std::vector<double> out;
-    for (const AvatarActor& actor : io::load_scene_actors(io::load_avatar_scene(folder / "s.json").value()).value()) {
+    for (const AvatarActor& actor :
+         io::load_scene_actors(io::load_avatar_scene(folder / "s.json").value()).value()) {
       const auto capsules = actor.capsules(0.2);
       out.push_back(capsules.empty() ? 0.0 : capsules[0].radius);
     }
     return out;
   };
   const double of_person = person.capsules[0].radius;
-  for (const std::vector<std::string>& drivers : {std::vector<std::string>{"thin", "fat", "none"}, {"none", "fat", "thin", "fat"}}) {
+  for (const std::vector<std::string>& drivers :
+       {std::vector<std::string>{"thin", "fat", "none"}, {"none", "fat", "thin", "fat"}}) {
     const std::vector<double> got = radii(drivers);
     REQUIRE(got.size() == drivers.size());
     for (std::size_t i = 0; i < got.size(); ++i) {

@@ -26,8 +26,8 @@ Result<std::vector<Camera>> parse(const std::string& text, int width = 0, int he
 }
 
 void check_fails(const std::string& from, const std::string& to, const std::string& part) {
-  check_refused(parse("[" + kOne + "," + replaced(kOne, from, to) + "]"), Errc::invalid_file, "cameras.json: camera 1",
-                part);
+  check_refused(parse("[" + kOne + "," + replaced(kOne, from, to) + "]"), Errc::invalid_file,
+                "cameras.json: camera 1", part);
 }
 
 }  // namespace

@@ -134,21 +134,26 @@ TEST_CASE("ply: a large file is read piece by piece, to the same cloud as its by
 }
 
 TEST_CASE("widen_rows: bytes at an array's end become its floats, in place") {
-  // Strides of every SH degree, degree 4's bytes for the floats of degree 3 among them; few rows and many.
+  // Strides of every SH degree, degree 4's bytes for the floats of degree 3 among them; few rows and
+  // many.
   for (const std::size_t width : {9u, 24u, 45u, 72u}) {
     const std::size_t floats = std::min<std::size_t>(width, 45);
-    for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{2}, std::size_t{7}, std::size_t{140001}}) {
+    for (const std::size_t count :
+         {std::size_t{0}, std::size_t{1}, std::size_t{2}, std::size_t{7}, std::size_t{140001}}) {
       CAPTURE(width);
       CAPTURE(count);
       std::vector<float> rows(count * floats);
       const std::span<std::byte> packed = io::detail::packed_rows(rows, count * width);
-      const auto byte = [&](std::size_t i, std::size_t k) { return static_cast<std::byte>((i * 31 + k * 7 + i / 251) & 255); };
+      const auto byte = [&](std::size_t i, std::size_t k) {
+        return static_cast<std::byte>((i * 31 + k * 7 + i / 251) & 255);
+      };
       for (std::size_t i = 0; i < count; ++i) {
         for (std::size_t k = 0; k < width; ++k) packed[i * width + k] = byte(i, k);
       }
       io::detail::wanted_threads = 4;
       io::detail::widen_rows<72>(rows, count, width, [&](const std::byte* in, float* out) {
-        for (std::size_t k = 0; k < floats; ++k) out[k] = static_cast<float>(std::to_integer<int>(in[k]));
+        for (std::size_t k = 0; k < floats; ++k)
+          out[k] = static_cast<float>(std::to_integer<int>(in[k]));
       });
       io::detail::wanted_threads = 0;
       bool same = true;

@@ -239,12 +239,15 @@ TEST_CASE("gltf: files that make no sense") {
               "bufferViews[0]");
   check_fails(with("\"buffer\":0", "\"buffer\":1"), Errc::invalid_file, "bufferViews[0]");
   check_fails(with("\"bufferView\":0,", ""), Errc::unsupported, "without a buffer view");
-  check_fails(with("\"bufferView\":0,", "\"bufferView\":99,"), Errc::invalid_file, "'bufferView' is '99'");
+  check_fails(with("\"bufferView\":0,", "\"bufferView\":99,"), Errc::invalid_file,
+              "'bufferView' is '99'");
   check_fails(with("\"mesh\":0", "\"mesh\":7"), Errc::invalid_file, "'mesh' is '7'");
-  check_fails(with("\"POSITION\":0", "\"POSITION\":77"), Errc::invalid_file, "'accessors' has no object 77");
+  check_fails(with("\"POSITION\":0", "\"POSITION\":77"), Errc::invalid_file,
+              "'accessors' has no object 77");
   check_fails(GlbFile::glb(json, binary.substr(4)), Errc::invalid_file, "byteLength");
   GlbFile ring = file;
-  for (const char* nodes : {R"([{"mesh":0,"children":[0]}])", R"([{"children":[1]},{"children":[0]}])"}) {
+  for (const char* nodes :
+       {R"([{"mesh":0,"children":[0]}])", R"([{"children":[1]},{"children":[0]}])"}) {
     ring.nodes = nodes;
     check_fails(ring.text(), Errc::invalid_file, "its own ancestor");
   }
@@ -302,7 +305,8 @@ TEST_CASE("gltf: the sign of a SCALE means nothing, and is told") {
   GlbFile file = small_file(1, 4);
   const LoadedCloud plain = parse(file);
   std::string binary = file.binary();
-  for (const std::size_t k : {std::size_t{0}, std::size_t{4}, std::size_t{5}}) {  // one of row 0, two of row 1
+  for (const std::size_t k :
+       {std::size_t{0}, std::size_t{4}, std::size_t{5}}) {  // one of row 0, two of row 1
     float v = 0;
     std::memcpy(&v, binary.data() + 48 + 64 + 4 * k, 4);
     v = -v;
@@ -319,30 +323,34 @@ TEST_CASE("gltf: the sign of a SCALE means nothing, and is told") {
 TEST_CASE("gltf: nodes that scale unevenly, shear or mirror, bands included") {
   struct Case {
     const char* nodes;
-    Mat3d m;         // by hand, from the node
+    Mat3d m;  // by hand, from the node
     Vec3d t;
-    Mat3d q;         // the orthogonal factor of m, by hand
+    Mat3d q;  // the orthogonal factor of m, by hand
   };
   // One scaled along its own axes; the same under a turn by 90 degrees about z; a mirror; both at once.
   const Mat3d one{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, turn{{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}},
       mirror{{{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  const auto diagonal = [](double x, double y, double z) { return Mat3d{{{x, 0, 0}, {0, y, 0}, {0, 0, z}}}; };
+  const auto diagonal = [](double x, double y, double z) {
+    return Mat3d{{{x, 0, 0}, {0, y, 0}, {0, 0, z}}};
+  };
   const std::string h = "0.7071067811865476";
-  const std::string turned = R"([{"mesh":0,"translation":[1,2,3],"rotation":[0,0,)" + h + "," + h + R"(],"scale":[3,0.5,1]}])",
-                    both = R"([{"children":[1],"scale":[-1,1,1]},{"mesh":0,"rotation":[0,0,)" + h + "," + h +
-                           R"(],"scale":[0.001,2,4]}])";
-  const Case cases[] = {{R"([{"mesh":0,"scale":[1,2,0.25]}])", diagonal(1, 2, 0.25), {}, one},
-                        {turned.c_str(), turn * diagonal(3, 0.5, 1), {1, 2, 3}, turn},
-                        {R"([{"mesh":0,"scale":[-1,1,1]}])", mirror, {}, mirror},
-                        {R"([{"mesh":0,"scale":[-2,-2,-2]}])", diagonal(-2, -2, -2), {}, diagonal(-1, -1, -1)},
-                        {both.c_str(), mirror * turn * diagonal(0.001, 2, 4), {}, mirror * turn},
-                        // A shear: x += 0.75 y. Its factor is the turn by -atan(0.375) about z.
-                        {R"([{"mesh":0,"matrix":[1,0,0,0,0.75,1,0,0,0,0,1,0,0,0,0,1]}])",
-                         Mat3d{{{1, 0.75, 0}, {0, 1, 0}, {0, 0, 1}}},
-                         {},
-                         Mat3d{{{std::cos(std::atan(0.375)), std::sin(std::atan(0.375)), 0},
-                                {-std::sin(std::atan(0.375)), std::cos(std::atan(0.375)), 0},
-                                {0, 0, 1}}}}};
+  const std::string turned = R"([{"mesh":0,"translation":[1,2,3],"rotation":[0,0,)" + h + "," + h +
+                             R"(],"scale":[3,0.5,1]}])",
+                    both = R"([{"children":[1],"scale":[-1,1,1]},{"mesh":0,"rotation":[0,0,)" + h + "," +
+                           h + R"(],"scale":[0.001,2,4]}])";
+  const Case cases[] = {
+      {R"([{"mesh":0,"scale":[1,2,0.25]}])", diagonal(1, 2, 0.25), {}, one},
+      {turned.c_str(), turn * diagonal(3, 0.5, 1), {1, 2, 3}, turn},
+      {R"([{"mesh":0,"scale":[-1,1,1]}])", mirror, {}, mirror},
+      {R"([{"mesh":0,"scale":[-2,-2,-2]}])", diagonal(-2, -2, -2), {}, diagonal(-1, -1, -1)},
+      {both.c_str(), mirror * turn * diagonal(0.001, 2, 4), {}, mirror * turn},
+      // A shear: x += 0.75 y. Its factor is the turn by -atan(0.375) about z.
+      {R"([{"mesh":0,"matrix":[1,0,0,0,0.75,1,0,0,0,0,1,0,0,0,0,1]}])",
+       Mat3d{{{1, 0.75, 0}, {0, 1, 0}, {0, 0, 1}}},
+       {},
+       Mat3d{{{std::cos(std::atan(0.375)), std::sin(std::atan(0.375)), 0},
+              {-std::sin(std::atan(0.375)), std::cos(std::atan(0.375)), 0},
+              {0, 0, 1}}}}};
   for (int degree = 0; degree <= 3; ++degree) {
     GlbFile file = small_file(degree, 40);
     const GaussianCloud base = parse(file, {.keep_axes = true}).cloud;
@@ -369,7 +377,8 @@ TEST_CASE("gltf: nodes that scale unevenly, shear or mirror, bands included") {
         // The volume says that the least scale is right too.
         double volume = std::fabs(determinant(c.m)), made = 1;
         for (std::size_t k = 0; k < 3; ++k) {
-          volume *= static_cast<double>(base.scales[k][i]), made *= static_cast<double>(got.scales[k][i]);
+          volume *= static_cast<double>(base.scales[k][i]),
+              made *= static_cast<double>(got.scales[k][i]);
         }
         CHECK(made == doctest::Approx(volume).epsilon(1e-5));
         for (const Vec3d& d : {Vec3d{0.6, -0.48, 0.64}, Vec3d{-0.36, 0.48, 0.8}, Vec3d{0, 0, 1}}) {

@@ -8,8 +8,8 @@
 
 #include "check_refused.hpp"
 #include "gltf_builder.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;
@@ -49,8 +49,7 @@ TestGltf square() {
   TestGltf g;
   const std::vector<float> corners{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
   const std::vector<float> normals{0, 0, 2, 0, 0, 2, 0, 0, 2, 0, 0, 2}, uvs{0, 1, 1, 1, 1, 0, 0, 0};
-  const std::vector<std::uint8_t> colors{255, 0, 51,  255, 0,   255, 0, 255,
-                                         0,   0, 255, 255, 102, 0,   0, 51};
+  const std::vector<std::uint8_t> colors{255, 0, 51, 255, 0, 255, 0, 255, 0, 0, 255, 255, 102, 0, 0, 51};
   const json attributes = {{"POSITION", g.add(corners, "VEC3", 5126)},
                            {"NORMAL", g.add(normals, "VEC3", 5126)},
                            {"TEXCOORD_0", g.add(uvs, "VEC2", 5126)},
@@ -259,7 +258,8 @@ TEST_CASE("gltf scene: many nodes that scale one mesh unevenly are not trusted w
   const std::size_t points = g.add(std::vector<float>(3 * 4000, 1.0f), "VEC3", 5126);
   g.doc["meshes"].push_back({{"primitives", json::array({{{"attributes", {{"POSITION", points}}}}})}});
   for (int k = 0; k < 3000; ++k) g.doc["nodes"].push_back({{"mesh", 0}, {"scale", {1, 2, 1}}});
-  check_refused(load(g), Errc::invalid_file, "a.glb", "more vertices or triangles than the file has bytes");
+  check_refused(load(g), Errc::invalid_file, "a.glb",
+                "more vertices or triangles than the file has bytes");
 }
 
 TEST_CASE("gltf scene: real files hold the triangles that load_mesh finds") {

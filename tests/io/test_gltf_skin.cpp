@@ -28,12 +28,15 @@ TestGltf tube() {
       const float x = static_cast<float>(10 * (k % 2)), y = static_cast<float>(10 * (k / 2));
       positions.insert(positions.end(), {x, y, static_cast<float>(20 * ring)});
       const float w = static_cast<float>(ring) / 5;
-      weights.insert(weights.end(), {ring == 3 ? 0.8f * (1 - w) : 1 - w, ring == 3 ? 0.8f * w : w, 0, 0});
-      joints.insert(joints.end(), {1, 0, 7, 0});  // the file lists the child first; weight 0 may name any joint
+      weights.insert(weights.end(),
+                     {ring == 3 ? 0.8f * (1 - w) : 1 - w, ring == 3 ? 0.8f * w : w, 0, 0});
+      joints.insert(joints.end(),
+                    {1, 0, 7, 0});  // the file lists the child first; weight 0 may name any joint
       uvs.insert(uvs.end(), {0, w});
       colors.insert(colors.end(), {65535, 0, static_cast<std::uint16_t>(65535 * ring / 5)});
       if (ring < 5) {
-        const auto v = static_cast<std::uint16_t>(4 * ring + k), n = static_cast<std::uint16_t>(4 * ring + (k + 1) % 4);
+        const auto v = static_cast<std::uint16_t>(4 * ring + k),
+                   n = static_cast<std::uint16_t>(4 * ring + (k + 1) % 4);
         const auto up = static_cast<std::uint16_t>(v + 4), next = static_cast<std::uint16_t>(n + 4);
         triangles.insert(triangles.end(), {v, n, up, n, next, up});
       }
@@ -47,38 +50,45 @@ TestGltf tube() {
                      {"WEIGHTS_0", g.add(weights, "VEC4", 5126)},
                      {"TEXCOORD_0", g.add(uvs, "VEC2", 5126)},
                      {"COLOR_0", g.add(colors, "VEC3", 5123, true)}};
-  g.doc["materials"] = json::array({{{"pbrMetallicRoughness", {{"baseColorFactor", {0.5, 0.25, 1.0, 1.0}}}}}});
-  g.doc["meshes"].push_back(
-      {{"primitives",
-        json::array({{{"attributes", attributes}, {"indices", g.add(triangles, "SCALAR", 5123)}, {"material", 0}}})}});
+  g.doc["materials"] =
+      json::array({{{"pbrMetallicRoughness", {{"baseColorFactor", {0.5, 0.25, 1.0, 1.0}}}}}});
+  g.doc["meshes"].push_back({{"primitives", json::array({{{"attributes", attributes},
+                                                          {"indices", g.add(triangles, "SCALAR", 5123)},
+                                                          {"material", 0}}})}});
   const double h = std::sqrt(0.5);
-  g.doc["nodes"] = json::array(
-      {{{"name", "scene"}, {"scale", {0.01, 0.01, 0.01}}, {"rotation", {-h, 0, 0, h}}, {"children", {1, 4}}},
-       {{"name", "hip"}, {"translation", {3, 4, 5}}, {"children", {2}}},
-       {{"name", "between"}, {"translation", {0, 0, 20}}, {"children", {3}}},
-       {{"name", "hip"}, {"translation", {0, 0, 30}}, {"rotation", {h, 0, 0, h}}},
-       {{"mesh", 0}, {"skin", 0}, {"translation", {100, 100, 100}}}});
+  g.doc["nodes"] =
+      json::array({{{"name", "scene"},
+                    {"scale", {0.01, 0.01, 0.01}},
+                    {"rotation", {-h, 0, 0, h}},
+                    {"children", {1, 4}}},
+                   {{"name", "hip"}, {"translation", {3, 4, 5}}, {"children", {2}}},
+                   {{"name", "between"}, {"translation", {0, 0, 20}}, {"children", {3}}},
+                   {{"name", "hip"}, {"translation", {0, 0, 30}}, {"rotation", {h, 0, 0, h}}},
+                   {{"mesh", 0}, {"skin", 0}, {"translation", {100, 100, 100}}}});
   g.doc["skins"].push_back({{"joints", {3, 1}}, {"inverseBindMatrices", g.add(binds, "MAT4", 5126)}});
   const std::size_t even = g.add(std::vector<float>{0.5f, 0.75f, 1.0f}, "SCALAR", 5126);
   const std::size_t uneven = g.add(std::vector<float>{0.0f, 0.2f, 0.9f}, "SCALAR", 5126);
   const float s = static_cast<float>(h);
   const std::size_t turns = g.add(std::vector<float>{0, 0, 0, 1, s, 0, 0, s, 0, -1, 0, 0}, "VEC4", 5126);
   const std::size_t ways = g.add(std::vector<float>{0, 0, 30, 0, 5, 30, 10, 0, 30}, "VEC3", 5126);
-  const std::size_t cubic =
-      g.add(std::vector<float>{0, 0, 0, 1, 2, 3, 9, 0, -9, 1, 1, 1, 4, 5, 6, -7, 2, 0, 3, 3, 3, 0, 0, 9, 0, 0, 0},
-            "VEC3", 5126);
+  const std::size_t cubic = g.add(std::vector<float>{0, 0,  0, 1, 2, 3, 9, 0, -9, 1, 1, 1, 4, 5,
+                                                     6, -7, 2, 0, 3, 3, 3, 0, 0,  9, 0, 0, 0},
+                                  "VEC3", 5126);
   const auto channel = [](int sampler, int node, const char* path) {
     return json{{"sampler", sampler}, {"target", {{"node", node}, {"path", path}}}};
   };
   g.doc["animations"] = json::array(
       {{{"name", "even"},
-        {"channels", json::array({channel(0, 1, "rotation"), channel(0, 3, "rotation"), channel(1, 3, "translation")})},
-        {"samplers", json::array({{{"input", even}, {"output", turns}}, {{"input", even}, {"output", ways}}})}},
-       {{"channels",
-         json::array({channel(0, 1, "translation"), channel(1, 3, "rotation"), channel(2, 2, "translation")})},
-        {"samplers", json::array({{{"input", uneven}, {"output", cubic}, {"interpolation", "CUBICSPLINE"}},
-                                  {{"input", uneven}, {"output", turns}},
-                                  {{"input", uneven}, {"output", ways}, {"interpolation", "STEP"}}})}}});
+        {"channels", json::array({channel(0, 1, "rotation"), channel(0, 3, "rotation"),
+                                  channel(1, 3, "translation")})},
+        {"samplers",
+         json::array({{{"input", even}, {"output", turns}}, {{"input", even}, {"output", ways}}})}},
+       {{"channels", json::array({channel(0, 1, "translation"), channel(1, 3, "rotation"),
+                                  channel(2, 2, "translation")})},
+        {"samplers",
+         json::array({{{"input", uneven}, {"output", cubic}, {"interpolation", "CUBICSPLINE"}},
+                      {{"input", uneven}, {"output", turns}},
+                      {{"input", uneven}, {"output", ways}, {"interpolation", "STEP"}}})}}});
   return g;
 }
 
@@ -100,7 +110,8 @@ std::vector<Vec3d> posed(const SkinnedMesh& mesh, const LocalPose& pose) {
 }
 
 /// Greatest distance of vertices from the truth at a clip's time.
-double apart(const io::LoadedSkinnedMesh& m, const GltfTruth& truth, int clip, double begin, double time) {
+double apart(const io::LoadedSkinnedMesh& m, const GltfTruth& truth, int clip, double begin,
+             double time) {
   LocalPose pose = m.pose;
   if (clip >= 0) m.clips[static_cast<std::size_t>(clip)].clip.pose({time}, pose);
   const auto a = posed(m.mesh, pose), b = truth.vertices(clip, static_cast<long double>(begin + time));
@@ -168,13 +179,19 @@ TEST_CASE("gltf skin: what is wrong is named") {
   fails([](auto& g) { g.doc["nodes"][3]["children"] = {1}; }, bad, "nodes[1] hangs on two nodes");
   fails([](auto& g) { g.doc["nodes"][0]["children"] = {4}, g.doc["nodes"][3]["children"] = {1}; }, bad,
         "its own ancestor");
-  fails([](auto& g) { g.doc["nodes"][1]["rotation"] = {0, 0, 0, 0}; }, bad, "nodes[1]: 'rotation' is zero");
+  fails(
+      [](auto& g) {
+        g.doc["nodes"][1]["rotation"] = {0, 0, 0, 0};
+      },
+      bad, "nodes[1]: 'rotation' is zero");
   fails([](auto& g) { g.doc["nodes"][1]["scale"] = {1, 1}; }, bad, "nodes[1]: 'scale' is 2 values");
-  fails([](auto& g) { g.doc["accessors"][0]["count"] = 25; }, bad, "accessors[0]: 25 elements 12 bytes apart");
+  fails([](auto& g) { g.doc["accessors"][0]["count"] = 25; }, bad,
+        "accessors[0]: 25 elements 12 bytes apart");
   fails([](auto& g) { g.doc["accessors"][0]["count"] = 40000000; }, bad, "accessors[0]");
   fails([](auto& g) { g.doc["accessors"][0]["type"] = "VEC2"; }, bad, "'VEC2', must be VEC3");
   fails([](auto& g) { g.doc["accessors"][0]["componentType"] = 5124; }, bad, "'componentType' is 5124");
-  fails([](auto& g) { g.doc["bufferViews"][0]["byteLength"] = 1 << 30; }, bad, "bufferViews[0]: 1073741824 bytes");
+  fails([](auto& g) { g.doc["bufferViews"][0]["byteLength"] = 1 << 30; }, bad,
+        "bufferViews[0]: 1073741824 bytes");
   fails([](auto& g) { g.doc["meshes"][0]["primitives"][0]["mode"] = 1; }, no, "'mode' is '1'");
   fails([](auto& g) { g.doc["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0"); }, bad,
         "must come together");
@@ -187,10 +204,12 @@ TEST_CASE("gltf skin: what is wrong is named") {
   fails([&](auto& g) { put(g, 2, 0, 0.0f); }, bad, "weights of vertex 0 are all zero");
   fails([&](auto& g) { put(g, 1, 0, std::uint8_t{2}); }, bad, "vertex 0 names joint 2");
   fails([&](auto& g) { put(g, 5, 0, std::uint16_t{24}); }, bad, "corner 24 of 24");
-  fails([&](auto& g) { put(g, 6, 1, 0.5f); }, bad, "inverse bind of joint \"hip#2\" is not rigid times a scale");
+  fails([&](auto& g) { put(g, 6, 1, 0.5f); }, bad,
+        "inverse bind of joint \"hip#2\" is not rigid times a scale");
   fails([&](auto& g) { put(g, 7, 1, 0.25f); }, bad, "key 1 is at 0.25");
   fails([](auto& g) { g.doc["animations"][0]["samplers"][0]["interpolation"] = "MAGIC"; }, bad, "MAGIC");
-  fails([](auto& g) { g.doc["animations"][0]["channels"][0]["target"]["path"] = "colour"; }, bad, "colour");
+  fails([](auto& g) { g.doc["animations"][0]["channels"][0]["target"]["path"] = "colour"; }, bad,
+        "colour");
   fails([](auto& g) { g.bytes.resize(100); }, bad, "its buffer has 100", true);
   write_file(folder / "some.gltf", "{");
   CHECK(contains(io::load_gltf_skin(folder / "some.gltf").status().message(), "not valid JSON"));
@@ -205,7 +224,8 @@ TEST_CASE("gltf skin: what is wrong is named") {
   CHECK(contains(io::load_gltf_skin(folder / "some.gltf").status().message(), "no file beside it"));
 }
 
-TEST_CASE("gltf skin: damaged files are refused or read, and take no memory that they have no bytes for") {
+TEST_CASE(
+    "gltf skin: damaged files are refused or read, and take no memory that they have no bytes for") {
   TempFolder folder("gltf_fuzz");
   tube().write(folder / "some.glb");
   const std::string whole = read_file(folder / "some.glb");
@@ -237,8 +257,9 @@ TEST_CASE("gltf skin: real files, every clip") {
     std::size_t joints, clips;
     double height_low, height_high;
   };
-  for (const Case& c : {Case{"cesium_man.gltf", 19, 1, 1.3, 1.6}, Case{"lumberjack.glb", 53, 3, 1.5, 1.9},
-                        Case{"rigged_simple.gltf", 2, 1, 1, 20}}) {
+  for (const Case& c :
+       {Case{"cesium_man.gltf", 19, 1, 1.3, 1.6}, Case{"lumberjack.glb", 53, 3, 1.5, 1.9},
+        Case{"rigged_simple.gltf", 2, 1, 1, 20}}) {
     const std::string path = data_file(std::string("avatars/") + c.name);
     if (path.empty()) continue;
     const auto m = io::load_gltf_skin(path);
@@ -251,13 +272,14 @@ TEST_CASE("gltf skin: real files, every clip") {
     for (std::size_t k = 0; k < m->clips.size(); ++k) {
       const MotionClip& clip = m->clips[k].clip;
       for (std::size_t f = 0; f < clip.frames(); f += std::max<std::size_t>(1, clip.frames() / 5)) {
-        worst = std::max(worst, apart(*m, truth, static_cast<int>(k), 0, static_cast<double>(f) / clip.frame_rate));
+        worst = std::max(
+            worst, apart(*m, truth, static_cast<int>(k), 0, static_cast<double>(f) / clip.frame_rate));
       }
     }
     double low = 9, high = -9;
     for (const Vec3d& p : posed(m->mesh, m->pose)) low = std::min(low, p.y), high = std::max(high, p.y);
-    std::printf("%s: %zu vertices, %.2f m high, rigid joints are off by %.3f mm (reported %.3f mm)\n", c.name,
-                m->mesh.positions.size(), high - low, 1e3 * worst, 1e3 * m->report.rigid_error);
+    std::printf("%s: %zu vertices, %.2f m high, rigid joints are off by %.3f mm (reported %.3f mm)\n",
+                c.name, m->mesh.positions.size(), high - low, 1e3 * worst, 1e3 * m->report.rigid_error);
     for (const std::string& w : m->report.warnings) std::printf("  %s\n", w.c_str());
     CHECK(worst < 1.5 * m->report.rigid_error + 1e-5);
     CHECK(high - low > c.height_low);
@@ -267,8 +289,8 @@ TEST_CASE("gltf skin: real files, every clip") {
 
 namespace {
 
-/// The tube three times over, each by a skin of its own on the same joints: the second lists them the other way
-/// round, the third is bound in another space (two units a unit, moved and turned).
+/// The tube three times over, each by a skin of its own on the same joints: the second lists them the
+/// other way round, the third is bound in another space (two units a unit, moved and turned).
 TestGltf tube_in_parts() {
   TestGltf g = tube();
   const json primitive = g.doc["meshes"][0]["primitives"][0];
@@ -285,7 +307,8 @@ TestGltf tube_in_parts() {
   other_order.insert(other_order.end(), binds.begin(), binds.begin() + 16);
   json second = primitive, third = primitive;
   second["attributes"]["JOINTS_0"] = g.add(swapped, "VEC4", 5121);
-  // By hand: q = (2 y + 1, -2 x, 2 z) takes the third's vertices p' to the tube's own p; p' = (-p.y, p.x - 1, p.z) / 2.
+  // By hand: q = (2 y + 1, -2 x, 2 z) takes the third's vertices p' to the tube's own p; p' = (-p.y, p.x
+  // - 1, p.z) / 2.
   std::vector<float> moved, moved_binds;
   for (std::size_t v = 0; v < positions.size(); v += 3) {
     moved.insert(moved.end(), {-positions[v + 1] / 2, (positions[v] - 1) / 2, positions[v + 2] / 2});
@@ -306,7 +329,8 @@ TestGltf tube_in_parts() {
   g.doc["skins"][0]["name"] = "coat";
   g.doc["skins"].push_back(
       {{"name", "hat"}, {"joints", {1, 3}}, {"inverseBindMatrices", g.add(other_order, "MAT4", 5126)}});
-  g.doc["skins"].push_back({{"joints", {3, 1}}, {"inverseBindMatrices", g.add(moved_binds, "MAT4", 5126)}});
+  g.doc["skins"].push_back(
+      {{"joints", {3, 1}}, {"inverseBindMatrices", g.add(moved_binds, "MAT4", 5126)}});
   g.doc["nodes"].push_back({{"mesh", 1}, {"skin", 1}});
   g.doc["nodes"].push_back({{"mesh", 2}, {"skin", 2}});
   return g;
@@ -331,7 +355,8 @@ TEST_CASE("gltf skin: skins that share joints are one body") {
   for (const double time : {0.0, 0.6, 1.0}) {
     m->clips.at(0).clip.pose({time}, pose);
     const auto got = posed(m->mesh, pose), want = truth.vertices(0, static_cast<long double>(time));
-    for (std::size_t v = 0; v < 72; ++v) CHECK(norm(got[v] - want[v % 24]) < (time == 0.6 ? 2e-3 : 1e-6));
+    for (std::size_t v = 0; v < 72; ++v)
+      CHECK(norm(got[v] - want[v % 24]) < (time == 0.6 ? 2e-3 : 1e-6));
   }
   // One or two of them, by name and by index.
   const auto hat = io::load_gltf_skin(folder / "parts.glb", {.skins = {"hat"}});
@@ -357,8 +382,11 @@ TEST_CASE("gltf skin: skins of two rigs are named, and either can be chosen") {
   const Status s = io::load_gltf_skin(folder / "rigs.glb").status();
   CAPTURE(s.message());
   CHECK(s.code() == Errc::unsupported);
-  CHECK(contains(s.message(), "rigs.glb: its skins have more than one rig: \"coat\" (skins[0], 24 vertices), (skins[2], 24"));
-  CHECK(contains(s.message(), "on one; \"hat\" (skins[1], 24 vertices) on others. Choose skins of one rig"));
+  CHECK(contains(
+      s.message(),
+      "rigs.glb: its skins have more than one rig: \"coat\" (skins[0], 24 vertices), (skins[2], 24"));
+  CHECK(contains(s.message(),
+                 "on one; \"hat\" (skins[1], 24 vertices) on others. Choose skins of one rig"));
   CHECK(io::load_gltf_skin(folder / "rigs.glb", {.skins = {"coat", "2"}})->mesh.positions.size() == 48);
   // Shared joints that a second map would have to take to different places: two rigs as well.
   TestGltf bent = tube_in_parts();
@@ -373,7 +401,8 @@ TEST_CASE("gltf skin: a unit of the file may be a centimetre") {
   g.write(folder / "a.glb");
   g.doc["nodes"][0]["scale"] = {1, 1, 1};  // 0.01 before
   g.write(folder / "b.glb");
-  const auto a = io::load_gltf_skin(folder / "a.glb"), b = io::load_gltf_skin(folder / "b.glb", {.scale = 0.01}),
+  const auto a = io::load_gltf_skin(folder / "a.glb"),
+             b = io::load_gltf_skin(folder / "b.glb", {.scale = 0.01}),
              large = io::load_gltf_skin(folder / "b.glb");
   REQUIRE(a.ok());
   REQUIRE(b.ok());
@@ -389,7 +418,8 @@ TEST_CASE("gltf skin: a unit of the file may be a centimetre") {
   }
   CHECK(norm(large->mesh.positions[5] - b->mesh.positions[5] * 100.0) < 1e-4);
   for (const double bad : {0.0, -1.0, std::nan("")}) {
-    CHECK(contains(io::load_gltf_skin(folder / "a.glb", {.scale = bad}).status().message(), "GltfOptions.scale"));
+    CHECK(contains(io::load_gltf_skin(folder / "a.glb", {.scale = bad}).status().message(),
+                   "GltfOptions.scale"));
   }
 }
 
@@ -446,8 +476,11 @@ TEST_CASE("gltf clips: a file without a skin moves joints by the names of its no
   g.write(folder / "clips.gltf");
   const Status none = io::load_gltf_clips(folder / "clips.gltf", m->mesh.skeleton).status();
   CHECK(none.code() == Errc::invalid_argument);
-  CHECK(contains(none.message(), "clips.gltf: its nodes have not the names of the skeleton's joints: there is no \"hip\""));
+  CHECK(contains(
+      none.message(),
+      "clips.gltf: its nodes have not the names of the skeleton's joints: there is no \"hip\""));
   g.doc.erase("animations");
   g.write(folder / "clips.gltf");
-  CHECK(contains(io::load_gltf_clips(folder / "clips.gltf", m->mesh.skeleton).status().message(), "no animation"));
+  CHECK(contains(io::load_gltf_clips(folder / "clips.gltf", m->mesh.skeleton).status().message(),
+                 "no animation"));
 }

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "support/files.hpp"
 #include "gsnav/detail/io/habitat_dataset.hpp"
+#include "support/files.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -17,24 +17,29 @@ struct Dataset {
     for (const char* sub : {"configs/stages/old", "configs/scenes", "navmeshes"}) {
       std::filesystem::create_directories(folder / sub);
     }
-    write_file(folder / "gs.scene_dataset_config.json",
-               R"({"stages":{"paths":{".json":["configs/stages"]},"default_attributes":{"norm_quaternion":false}},)"
-               R"("scene_instances":{"paths":{".json":["configs/scene*"]}},)"
-               R"("navmesh_instances":{"playroom_nav":"navmeshes/playroom.navmesh"},)"
-               R"("light_setups":{"paths":{".json":["lighting"]}}})");
-    write_file(folder / "configs/stages/playroom.stage_config.json",
-               R"({"render_asset":"../../assets/playroom.gs.ply","collision_asset":"../../assets/playroom.glb",)"
-               R"("up":[0,0,1],"front":[0,1,0],"friction_coefficient":0.4})");
+    write_file(
+        folder / "gs.scene_dataset_config.json",
+        R"({"stages":{"paths":{".json":["configs/stages"]},"default_attributes":{"norm_quaternion":false}},)"
+        R"("scene_instances":{"paths":{".json":["configs/scene*"]}},)"
+        R"("navmesh_instances":{"playroom_nav":"navmeshes/playroom.navmesh"},)"
+        R"("light_setups":{"paths":{".json":["lighting"]}}})");
+    write_file(
+        folder / "configs/stages/playroom.stage_config.json",
+        R"({"render_asset":"../../assets/playroom.gs.ply","collision_asset":"../../assets/playroom.glb",)"
+        R"("up":[0,0,1],"front":[0,1,0],"friction_coefficient":0.4})");
     write_file(folder / "configs/stages/attic.stage_config.json", R"({"render_asset":"attic.gs.ply"})");
     write_file(folder / "configs/stages/readme.json", "not one");
-    write_file(folder / "configs/scenes/playroom_people.scene_instance.json",
-               R"({"stage_instance":{"template_name":"stages/playroom"},"navmesh_instance":"playroom_nav",)"
-               R"("object_instances":[],"default_lighting":"","time_max":20.0,"time_loop":true,)"
-               R"("gaussian_avatars":[{"name":"anna","canonical_gaussians":"anna.npz","driver":"walk.npz","offset_y":1.0}]})");
+    write_file(
+        folder / "configs/scenes/playroom_people.scene_instance.json",
+        R"({"stage_instance":{"template_name":"stages/playroom"},"navmesh_instance":"playroom_nav",)"
+        R"("object_instances":[],"default_lighting":"","time_max":20.0,"time_loop":true,)"
+        R"("gaussian_avatars":[{"name":"anna","canonical_gaussians":"anna.npz","driver":"walk.npz","offset_y":1.0}]})");
     write_file(folder / "configs/scenes/attic.scene_instance.json",
                R"({"stage_instance":{"template_name":"attic.stage_config.json"}})");
   }
-  Result<io::HabitatDataset> load() const { return io::load_habitat_dataset(folder / "gs.scene_dataset_config.json"); }
+  Result<io::HabitatDataset> load() const {
+    return io::load_habitat_dataset(folder / "gs.scene_dataset_config.json");
+  }
   void write(const std::string& name, const std::string& text) const { write_file(folder / name, text); }
   TempFolder folder;
 };
@@ -83,9 +88,11 @@ TEST_CASE("a dataset names the files outside of its folder that it uses") {
 
 TEST_CASE("a stage's frame by hand: z up and y ahead becomes y up and -z ahead") {
   const Dataset d;
-  d.write("configs/stages/playroom.stage_config.json",
-          R"({"render_asset":"a.ply","up":[0,0,1],"front":[0,1,0],"origin":[1,2,3],"units_to_meters":0.5,"scale":[4,4,4]})");
-  const Similarity s = io::load_stage_config(d.folder / "configs/stages/playroom.stage_config.json")->world_from_asset();
+  d.write(
+      "configs/stages/playroom.stage_config.json",
+      R"({"render_asset":"a.ply","up":[0,0,1],"front":[0,1,0],"origin":[1,2,3],"units_to_meters":0.5,"scale":[4,4,4]})");
+  const Similarity s =
+      io::load_stage_config(d.folder / "configs/stages/playroom.stage_config.json")->world_from_asset();
   const auto near = [](const Vec3d& a, const Vec3d& b) { return norm(a - b) < 1e-12; };
   CHECK(near(s * Vec3d{1, 2, 3}, {0, 0, 0}));
   CHECK(near(s * Vec3d{1, 2, 4}, {0, 2, 0}));
@@ -98,8 +105,9 @@ TEST_CASE("a stage's frame by hand: z up and y ahead becomes y up and -z ahead")
 
 TEST_CASE("a dataset of stages alone has a scene for each") {
   const Dataset d;
-  d.write("gs.scene_dataset_config.json",
-          R"({"stages":{"paths":{".json":["configs/stages/*"]}},"navmesh_instances":{"attic":"navmeshes/attic.navmesh"}})");
+  d.write(
+      "gs.scene_dataset_config.json",
+      R"({"stages":{"paths":{".json":["configs/stages/*"]}},"navmesh_instances":{"attic":"navmeshes/attic.navmesh"}})");
   const auto data = d.load().value();
   REQUIRE(data.scenes.size() == 2);
   CHECK(data.scenes[0].name == "attic");
@@ -144,9 +152,11 @@ TEST_CASE("mutated datasets and episodes are read or refused") {
     state = state * 6364136223846793005ull + 1442695040888963407ull;
     return static_cast<std::size_t>(state >> 33) % n;
   };
-  const std::string scene = "configs/scenes/playroom_people.scene_instance.json", set = "gs.scene_dataset_config.json";
+  const std::string scene = "configs/scenes/playroom_people.scene_instance.json",
+                    set = "gs.scene_dataset_config.json";
   int refused = 0;
-  for (const std::string& name : {scene, set, std::string("configs/stages/playroom.stage_config.json")}) {
+  for (const std::string& name :
+       {scene, set, std::string("configs/stages/playroom.stage_config.json")}) {
     const std::string whole = read_file(d.folder / name);
     for (int i = 0; i < 400; ++i) {
       std::string text = whole;
@@ -170,22 +180,31 @@ TEST_CASE("bad datasets are named with file and key") {
     CHECK(contains(data.message(), std::filesystem::path(file).filename().string()));
     return data.message();
   };
-  const std::string stage = "configs/stages/attic.stage_config.json", scene = "configs/scenes/attic.scene_instance.json",
+  const std::string stage = "configs/stages/attic.stage_config.json",
+                    scene = "configs/scenes/attic.scene_instance.json",
                     set = "gs.scene_dataset_config.json";
   CHECK(contains(message(stage, "{}", Errc::invalid_file), "render_asset"));
   CHECK(contains(message(stage, R"({"render_asset":7})", Errc::invalid_file), "render_asset"));
   CHECK(contains(message(stage, R"({"render_asset":"a","up":[0,0,0]})", Errc::invalid_file), "up"));
-  CHECK(contains(message(stage, R"({"render_asset":"a","up":[0,0,1],"front":[0,0,1]})", Errc::invalid_file), "right angles"));
+  CHECK(contains(
+      message(stage, R"({"render_asset":"a","up":[0,0,1],"front":[0,0,1]})", Errc::invalid_file),
+      "right angles"));
   CHECK(contains(message(stage, R"({"render_asset":"a","scale":[1,2,1]})", Errc::unsupported), "scale"));
   CHECK(contains(message(stage, R"({"render_asset":"a","scale":[0]})", Errc::invalid_file), "scale"));
-  CHECK(contains(message(stage, R"({"render_asset":"a","units_to_meters":-1})", Errc::invalid_file), "units_to_meters"));
+  CHECK(contains(message(stage, R"({"render_asset":"a","units_to_meters":-1})", Errc::invalid_file),
+                 "units_to_meters"));
   CHECK(contains(message(stage, "[]", Errc::invalid_file), "object"));
   CHECK(contains(message(scene, "{}", Errc::invalid_file), "stage_instance"));
-  CHECK(contains(message(scene, R"({"stage_instance":{"template_name":"cellar"}})", Errc::file_not_found), "cellar"));
-  CHECK(contains(message(scene, R"({"stage_instance":{"template_name":"attic"},"navmesh_instance":"nix"})", Errc::file_not_found),
-                 "navmesh_instance"));
+  CHECK(
+      contains(message(scene, R"({"stage_instance":{"template_name":"cellar"}})", Errc::file_not_found),
+               "cellar"));
+  CHECK(
+      contains(message(scene, R"({"stage_instance":{"template_name":"attic"},"navmesh_instance":"nix"})",
+                       Errc::file_not_found),
+               "navmesh_instance"));
   CHECK(contains(message(set, R"({"stages":[]})", Errc::invalid_file), "stages"));
   CHECK(contains(message(set, R"({"stages":{"paths":{".json":"x"}}})", Errc::invalid_file), ".json"));
-  CHECK(contains(message(set, R"({"navmesh_instances":{"a":7}})", Errc::invalid_file), "navmesh_instances"));
+  CHECK(contains(message(set, R"({"navmesh_instances":{"a":7}})", Errc::invalid_file),
+                 "navmesh_instances"));
   CHECK(io::load_habitat_dataset("nowhere.json").code() == Errc::file_not_found);
 }

@@ -17,9 +17,9 @@
 #include "gsnav/detail/io/ksplat.hpp"
 #include "gsnav/detail/io/npz_file.hpp"
 #include "gsnav/detail/io/ply.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/io/sog.hpp"
 #include "gsnav/detail/io/temporal_file.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "ksplat_file.hpp"
 #include "ply_compressed_file.hpp"
 #include "sog_file.hpp"
@@ -105,7 +105,8 @@ TEST_CASE("hardening: path traversal in bundles") {
   write_file(folder / "secret.webp", "secret");
   std::filesystem::create_directories(folder / "set");
   const SogFile file = sog();
-  for (const char* name : {"../secret.webp", "/etc/passwd", "a/../../secret.webp", "..\\\\secret.webp", "c:secret.webp"}) {
+  for (const char* name :
+       {"../secret.webp", "/etc/passwd", "a/../../secret.webp", "..\\\\secret.webp", "c:secret.webp"}) {
     CAPTURE(name);
     SogFile outside = file;
     outside.files["meta.json"] = replaced(file.files.at("meta.json"), "scales.webp", name);
@@ -118,8 +119,8 @@ TEST_CASE("hardening: path traversal in bundles") {
     gltf.rows = random_rows(3, 0, 4);
     gltf.uri = name;
     CHECK_FALSE(load(folder, "a.gltf", gltf.json()).ok());
-    const std::string set = std::string(R"({"lodLevels":1,"filenames":[")") + name + R"("],"tree":{"lods":{"0":{"file":0,)" +
-                            R"("offset":0,"count":1}}}})";
+    const std::string set = std::string(R"({"lodLevels":1,"filenames":[")") + name +
+                            R"("],"tree":{"lods":{"0":{"file":0,)" + R"("offset":0,"count":1}}}})";
     CHECK(load(folder, "lod-meta.json", set).code() == Errc::invalid_file);
   }
 }
@@ -135,7 +136,8 @@ TEST_CASE("hardening: integer overflow") {
     file.before_header.clear();
     file.count = count;
     check_refused(load(folder, "a.ply", file.text()), Errc::invalid_file, "a.ply", "'vertex' promises");
-    const std::string meta = replaced(sog().files.at("meta.json"), "\"count\":13", std::string("\"count\":") + count);
+    const std::string meta =
+        replaced(sog().files.at("meta.json"), "\"count\":13", std::string("\"count\":") + count);
     SogFile wrapped = sog();
     wrapped.files["meta.json"] = meta;
     CHECK_FALSE(load(folder, "a.sog", wrapped.bundle(false)).ok());
@@ -143,21 +145,26 @@ TEST_CASE("hardening: integer overflow") {
     gltf.rows = random_rows(3, 0, 4);
     const std::string text = gltf.json();
     for (const char* key : {"\"count\":3", "\"byteOffset\":0"}) {
-      const std::string changed = replaced(text, key, std::string(key, std::strchr(key, ':')) + ":" + count);
-      check_refused(io::parse_gltf(bytes_of(GlbFile::glb(changed, gltf.binary())), "a"), Errc::invalid_file, "a", "");
+      const std::string changed =
+          replaced(text, key, std::string(key, std::strchr(key, ':')) + ":" + count);
+      check_refused(io::parse_gltf(bytes_of(GlbFile::glb(changed, gltf.binary())), "a"),
+                    Errc::invalid_file, "a", "");
     }
-    const std::string set = std::string(R"({"lodLevels":1,"filenames":["a.sog"],"tree":{"lods":{"0":{"file":0,"offset":)") +
-                            count + R"(,"count":)" + count + "}}}}";
+    const std::string set =
+        std::string(R"({"lodLevels":1,"filenames":["a.sog"],"tree":{"lods":{"0":{"file":0,"offset":)") +
+        count + R"(,"count":)" + count + "}}}}";
     CHECK_FALSE(load(folder, "lod-meta.json", set).ok());
   }
   // An array of 2^32 x 2^32 values.
   write_npz(folder / "a.npz", {{"a", {{1}, {7}}}});
-  const std::string npy = std::string("\x93NUMPY\x01\x00", 8) + std::string("\x60\x00", 2) +
-                          "{'descr': '<f4', 'fortran_order': False, 'shape': (4294967296, 4294967296), }";
+  const std::string npy =
+      std::string("\x93NUMPY\x01\x00", 8) + std::string("\x60\x00", 2) +
+      "{'descr': '<f4', 'fortran_order': False, 'shape': (4294967296, 4294967296), }";
   std::string padded = npy;
   padded.resize(10 + 0x60, ' ');
   write_file(folder / "b.npz", make_zip({{"a.npy", padded + "1234"}}));
-  check_refused(io::NpzFile::open(folder / "b.npz").value().read("a"), Errc::invalid_file, "b.npz", "do not fit");
+  check_refused(io::NpzFile::open(folder / "b.npz").value().read("a"), Errc::invalid_file, "b.npz",
+                "do not fit");
   CHECK(largest_allocation() < 2000000);
 }
 
@@ -165,11 +172,14 @@ TEST_CASE("hardening: files beyond 4 GiB") {
   const TempFolder folder("large");
   constexpr std::uint64_t kFar = (std::uint64_t{1} << 32) + 4096;
   // Sparse: the bytes between take no room on the disk.
-  const auto sparse = [&](const std::string& name, const std::string& front, std::uint64_t at, const std::string& back) {
+  const auto sparse = [&](const std::string& name, const std::string& front, std::uint64_t at,
+                          const std::string& back) {
     const int fd = ::open((folder / name).c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600);
     REQUIRE(fd >= 0);
-    const bool there = ::pwrite(fd, front.data(), front.size(), 0) == static_cast<ssize_t>(front.size()) &&
-                       ::pwrite(fd, back.data(), back.size(), static_cast<off_t>(at)) == static_cast<ssize_t>(back.size());
+    const bool there =
+        ::pwrite(fd, front.data(), front.size(), 0) == static_cast<ssize_t>(front.size()) &&
+        ::pwrite(fd, back.data(), back.size(), static_cast<off_t>(at)) ==
+            static_cast<ssize_t>(back.size());
     ::close(fd);
     return there;
   };
@@ -211,7 +221,8 @@ TEST_CASE("hardening: truncated streams of every format that is written") {
     const std::string whole = read_file(folder / name);
     REQUIRE(load(folder, name, whole).ok());
     for (std::size_t n = 0; n < whole.size(); n += whole.size() / 150 + 1) {
-      const bool records = std::string(name) == "a.splat" && n % 32 == 0 && n != 0;  // shorter, and whole
+      const bool records =
+          std::string(name) == "a.splat" && n % 32 == 0 && n != 0;  // shorter, and whole
       CHECK(load(folder, name, whole.substr(0, n)).ok() == records);
     }
   }
@@ -230,8 +241,8 @@ TEST_CASE("hardening: duplicate properties") {
   CompressedPlyFile packed;
   packed.rows = random_rows(5, 0, 6);
   const std::string text = packed.text();
-  check_refused(io::parse_ply(bytes_of(replaced(text, "packed_scale", "packed_color")), "a"), Errc::invalid_file, "a",
-                "comes twice");
+  check_refused(io::parse_ply(bytes_of(replaced(text, "packed_scale", "packed_color")), "a"),
+                Errc::invalid_file, "a", "comes twice");
   SogFile file = sog();
   write_file(folder / "a.sog", make_zip({{"meta.json", file.meta()}, {"meta.json", "{}"}}));
   check_refused(io::load_sog(folder / "a.sog"), Errc::invalid_file, "a.sog", "comes twice");
@@ -252,7 +263,8 @@ TEST_CASE("hardening: huge headers") {
     put(npy, length);
     write_file(folder / "a.npz", make_zip({{"a.npy", npy + "{}"}}));
     reset_largest_allocation();
-    check_refused(io::NpzFile::open(folder / "a.npz").value().read("a"), Errc::invalid_file, "a.npz", "cut off");
+    check_refused(io::NpzFile::open(folder / "a.npz").value().read("a"), Errc::invalid_file, "a.npz",
+                  "cut off");
     std::string glb = "glTF";
     for (const std::uint32_t v : {2u, length, length}) put(glb, v);
     CHECK(io::parse_gltf(bytes_of(glb + "JSON{}"), "a").code() == Errc::invalid_file);
@@ -303,7 +315,8 @@ TEST_CASE("hardening: NaN in headers") {
     check_finite(io::parse_gltf(bytes_of(gltf.text()), "a"));
   }
   TestArrays arrays = temporal_arrays(temporal_file(4, 3, 8).rows, 3, "network.tfgs.fdgs.");
-  for (const double v : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double v :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     for (const char* name : {"network.scene_scale", "network.time_dilation"}) {
       TestArrays bad = arrays;
       bad[name] = {{1}, {v}};

@@ -29,7 +29,8 @@ TEST_CASE("what is written as JPEG is read again, nearly") {
   REQUIRE(back.width == kW);
   REQUIRE(back.height == kH);
   int worst = 0;
-  for (std::size_t i = 0; i < rgb.size(); ++i) worst = std::max(worst, std::abs(int{back.samples[i]} - int{rgb[i]}));
+  for (std::size_t i = 0; i < rgb.size(); ++i)
+    worst = std::max(worst, std::abs(int{back.samples[i]} - int{rgb[i]}));
   CHECK(worst <= 16);  // colour is kept at half the resolution
   CHECK(io::encode_jpeg(rgb, kW, kH, 20)->size() < written->size());
   CHECK(io::encode_jpeg(rgb, kW, kH + 1).code() == Errc::invalid_argument);
@@ -47,8 +48,8 @@ std::vector<std::byte> progressive_jpeg(std::size_t scans, unsigned width, unsig
   const std::vector<std::byte>& from = *written;
   for (std::size_t at = 2; at + 4 <= from.size();) {
     const unsigned marker = std::to_integer<unsigned>(from[at + 1]);
-    const std::size_t length =
-        2 + (std::to_integer<std::size_t>(from[at + 2]) << 8) + std::to_integer<std::size_t>(from[at + 3]);
+    const std::size_t length = 2 + (std::to_integer<std::size_t>(from[at + 2]) << 8) +
+                               std::to_integer<std::size_t>(from[at + 3]);
     std::vector<std::byte> segment(from.begin() + static_cast<std::ptrdiff_t>(at),
                                    from.begin() + static_cast<std::ptrdiff_t>(at + length));
     if (marker == 0xc0) {  // the frame: marker, length, bits, height, width

@@ -10,8 +10,8 @@
 #include "gsnav/core/rng.hpp"
 #include "gsnav/detail/io/lod_set.hpp"
 #include "gsnav/detail/io/ply.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/io/sog.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;
@@ -219,9 +219,10 @@ TEST_CASE("lod set: levels that make no sense, or are not there") {
   set.first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":0,"offset":0,"count":6}})";
   write_file(set.folder / "lod-meta.json", set.text());
   CHECK(io::load_lod_levels(set.folder.path()).value().tree.places.size() == 3);
-  for (const char* bad : {R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":9,"offset":0,"count":2}})",
-                          R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":-1,"count":2}})",
-                          R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":0}})"}) {
+  for (const char* bad :
+       {R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":9,"offset":0,"count":2}})",
+        R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":-1,"count":2}})",
+        R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":0}})"}) {
     set.first = bad;
     refused(Errc::invalid_file, "level 1");
   }

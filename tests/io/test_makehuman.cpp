@@ -21,7 +21,8 @@ struct Files {
   std::string skeleton =
       R"({"bones": {"arm": {"head": "a", "tail": "b", "parent": "base"}, "base": {"head": "b", "tail": "a", "parent": null}},
           "joints": {"a": [2, 3], "b": [5, 0]}, "weights_file": "folder/w.mhw"})";
-  std::string weights = R"({"weights": {"base": [[0, 1], [1, 0.5], [2, 0.25]], "arm": [[2, 0.5], [3, 0.3], [5, 9]]}})";
+  std::string weights =
+      R"({"weights": {"base": [[0, 1], [1, 0.5], [2, 0.25]], "arm": [[2, 0.5], [3, 0.3], [5, 9]]}})";
   std::string target = "# target\n2 .5 0 -1e-1\n5 0 0 2\n";
 };
 
@@ -46,7 +47,8 @@ TEST_CASE("makehuman: a body by hand") {
   // Vertices 0 to 4 are the surface; it faces -Z in metres and stands on the floor.
   REQUIRE(m->mesh.positions.size() == 5);
   REQUIRE(m->mesh.triangles.size() == 3);
-  CHECK(norm(m->mesh.positions[2] - Vec3d{-0.2, 0.2, 0.02}) < 1e-12);  // 1 + 2 * 0.5, 2, -0.2, turned, times 0.1
+  CHECK(norm(m->mesh.positions[2] - Vec3d{-0.2, 0.2, 0.02}) <
+        1e-12);  // 1 + 2 * 0.5, 2, -0.2, turned, times 0.1
   CHECK(m->mesh.skeleton.names == std::vector<std::string>{"base", "arm"});
   const auto rest = m->mesh.skeleton.rest_globals();
   CHECK(norm(rest[0].translation - Vec3d{-0.25, -0.45, -0.45}) < 1e-12);  // (5, -9, 5 + 4) and (0, 0, 0)
@@ -85,7 +87,8 @@ TEST_CASE("makehuman: what is wrong is named") {
   fails(&Files::obj, "g body", "g head", "no faces in the group 'body'");
   fails(&Files::skeleton, "\"base\"}", "\"chest\"}", "has the parent 'chest'");
   fails(&Files::skeleton, "\"parent\": null", "\"parent\": \"arm\"", "its own ancestor");
-  fails(&Files::skeleton, "\"arm\"", "\"\"", "a bone has no name");  // once its own child for ever, found by fuzzing
+  fails(&Files::skeleton, "\"arm\"", "\"\"",
+        "a bone has no name");  // once its own child for ever, found by fuzzing
   fails(&Files::skeleton, "[5, 0]", "[6, 0]", "names vertex '6' of 6");
   fails(&Files::skeleton, "\"head\": \"a\"", "\"head\": \"q\"", "there is no joint");
   fails(&Files::skeleton, "{\"bones\"", "{\"bonez\"", "no 'bones'");
@@ -113,9 +116,11 @@ TEST_CASE("makehuman: the real body") {
   REQUIRE(m.ok());
   double high = 0;
   for (const Vec3d& p : m->mesh.positions) high = std::max(high, p.y);
-  std::printf("makehuman: %zu vertices, %.2f m, %zu joints, weights sum to %.2f to %.2f, %zu unequal, %zu without\n",
-              m->mesh.positions.size(), high, m->mesh.skeleton.size(), m->report.least_weight_sum,
-              m->report.greatest_weight_sum, m->report.unequal_weights, m->report.without_weights);
+  std::printf(
+      "makehuman: %zu vertices, %.2f m, %zu joints, weights sum to %.2f to %.2f, %zu unequal, %zu "
+      "without\n",
+      m->mesh.positions.size(), high, m->mesh.skeleton.size(), m->report.least_weight_sum,
+      m->report.greatest_weight_sum, m->report.unequal_weights, m->report.without_weights);
   CHECK(m->mesh.positions.size() == 13380);
   CHECK(m->mesh.skeleton.size() == 163);
   CHECK(high > 1.6);
@@ -123,7 +128,9 @@ TEST_CASE("makehuman: the real body") {
   CHECK(m->report.unequal_weights > 0);
   // Feet point to -Z.
   const auto rest = m->mesh.skeleton.rest_globals();
-  const auto at = [&](const char* n) { return rest[static_cast<std::size_t>(m->mesh.skeleton.find(n))].translation; };
+  const auto at = [&](const char* n) {
+    return rest[static_cast<std::size_t>(m->mesh.skeleton.find(n))].translation;
+  };
   CHECK(at("toe2-1.L").z < at("foot.L").z - 0.05);
   CHECK(at("foot.L").x < 0);  // its left is on -X
   CHECK(at("head").y > at("neck01").y);

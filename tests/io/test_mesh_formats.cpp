@@ -159,7 +159,8 @@ TEST_CASE("gltf mesh: nodes place it; a mirrored one keeps its outside") {
 TEST_CASE("gltf mesh: what makes no sense") {
   check_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 4}), "corner 4 of 4 vertices");
   check_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 2}, "4"), "accessors[1]: 4 elements");
-  check_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 2}, "4294967295"), "accessors[1]: 4294967295 elements");
+  check_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 2}, "4294967295"),
+              "accessors[1]: 4294967295 elements");
   check_fails("a.glb", square_glb(R"([{"mesh":0}])", "0"), "no triangles");
   check_fails("a.glb", square_glb(R"([{"mesh":0,"scale":[1e300,1,1]}])"), "is not finite");
   check_fails("a.glb", square_glb("[]"), "no triangles");

@@ -21,9 +21,11 @@ namespace {
 const char* const kSkeleton =
     "# a comment\n:version 1.10\n:name test\n:units\n  mass 1.0\n  length 0.5\n  angle deg\n:root\n"
     "   order TX TY TZ RX RY RZ\n   axis XYZ\n   position 1 2 3\n   orientation 0 0 30\n:bonedata\n"
-    "  begin\n   id 1\n   name arm\n   direction 0 1 0\n   length 4\n   axis 10 20 30 XYZ\n   dof rx ry rz\n"
+    "  begin\n   id 1\n   name arm\n   direction 0 1 0\n   length 4\n   axis 10 20 30 XYZ\n   dof rx ry "
+    "rz\n"
     "   limits (-160.0 20.0)\n          (-70.0 70.0)\n  end\n"
-    "  begin\n   id 2\n   name hand\n   direction 0.6 0 0.8\n   length 2\n   axis -90 5 7 ZXY\n   dof rz rx\n  end\n"
+    "  begin\n   id 2\n   name hand\n   direction 0.6 0 0.8\n   length 2\n   axis -90 5 7 ZXY\n   dof "
+    "rz rx\n  end\n"
     "  begin\n   id 3\n   name fixed\n   direction -1 0 0\n   length 3\n   axis 0 0 0 XYZ\n  end\n"
     ":hierarchy\n  begin\n    root arm fixed\n    arm hand\n  end\n";
 const char* const kMotion =
@@ -66,8 +68,9 @@ Matrix about(char axis, Real degrees) {
 Vec3d at(const Matrix& m, const Vec3d& v) {
   Vec3d out;
   for (std::size_t i = 0; i < 3; ++i) {
-    out[static_cast<int>(i)] = static_cast<double>(m[i][0] * static_cast<Real>(v.x) + m[i][1] * static_cast<Real>(v.y) +
-                                                   m[i][2] * static_cast<Real>(v.z));
+    out[static_cast<int>(i)] =
+        static_cast<double>(m[i][0] * static_cast<Real>(v.x) + m[i][1] * static_cast<Real>(v.y) +
+                            m[i][2] * static_cast<Real>(v.z));
   }
   return out;
 }
@@ -80,21 +83,26 @@ TEST_CASE("amc: kinematics against matrices in long double") {
   REQUIRE(m.clip.frames() == 2);
   REQUIRE(m.skeleton.size() == 6);
   const double unit = 0.0254 / 0.5;
-  const Real f[2][11] = {{5, 6, 7, 10, 20, 30, 40, 50, 60, 70, -80}, {-1, 0, 1, -170, 3, 40, 0, 5, -5.5L, 1, 2}};
+  const Real f[2][11] = {{5, 6, 7, 10, 20, 30, 40, 50, 60, 70, -80},
+                         {-1, 0, 1, -170, 3, 40, 0, 5, -5.5L, 1, 2}};
   for (std::size_t t = 0; t < 2; ++t) {
     // C M C^-1, with the first angle turned by first.
     const Matrix root_axis = about('Z', 30), arm_axis = about('Z', 30) * about('Y', 20) * about('X', 10);
     const Matrix hand_axis = about('Y', 7) * about('X', 5) * about('Z', -90);
-    const Matrix root =
-        root_axis * (about('Z', f[t][5]) * about('Y', f[t][4]) * about('X', f[t][3])) * transposed(root_axis);
-    const Matrix arm =
-        root * arm_axis * (about('Z', f[t][8]) * about('Y', f[t][7]) * about('X', f[t][6])) * transposed(arm_axis);
-    const Matrix hand = arm * hand_axis * (about('X', f[t][10]) * about('Z', f[t][9])) * transposed(hand_axis);
+    const Matrix root = root_axis * (about('Z', f[t][5]) * about('Y', f[t][4]) * about('X', f[t][3])) *
+                        transposed(root_axis);
+    const Matrix arm = root * arm_axis *
+                       (about('Z', f[t][8]) * about('Y', f[t][7]) * about('X', f[t][6])) *
+                       transposed(arm_axis);
+    const Matrix hand =
+        arm * hand_axis * (about('X', f[t][10]) * about('Z', f[t][9])) * transposed(hand_axis);
     const Vec3d place{static_cast<double>(1 + f[t][0]), static_cast<double>(2 + f[t][1]),
                       static_cast<double>(3 + f[t][2])};
     const Vec3d elbow = place + at(arm, {0, 4, 0}), tip = elbow + at(hand, Vec3d{0.6, 0, 0.8} * 2.0);
     const auto globals = pose_at(m, static_cast<double>(t) / 120);
-    const auto joint = [&](const char* name) { return globals[static_cast<std::size_t>(m.skeleton.find(name))]; };
+    const auto joint = [&](const char* name) {
+      return globals[static_cast<std::size_t>(m.skeleton.find(name))];
+    };
     CHECK(norm(joint("root").translation - place * unit) < 1e-12);
     CHECK(norm(joint("arm").translation - place * unit) < 1e-12);
     CHECK(norm(joint("hand").translation - elbow * unit) < 1e-12);
@@ -157,7 +165,8 @@ TEST_CASE("amc: what is wrong is named with its file and line") {
     if (i % 4 == 0) {
       changed.resize(place);
     } else {
-      changed[place] = i % 4 == 1 ? "0123456789-.eE :\n"[generator() % 17] : static_cast<char>(generator());
+      changed[place] =
+          i % 4 == 1 ? "0123456789-.eE :\n"[generator() % 17] : static_cast<char>(generator());
     }
     reset_largest_allocation();
     const auto m = load(text[0], text[1]);
@@ -170,7 +179,8 @@ TEST_CASE("amc: what is wrong is named with its file and line") {
 }
 
 TEST_CASE("amc: somebody walks on two feet") {
-  const std::string asf = data_file("avatars/cmu_mocap/11.asf"), amc = data_file("avatars/cmu_mocap/11_01.amc");
+  const std::string asf = data_file("avatars/cmu_mocap/11.asf"),
+                    amc = data_file("avatars/cmu_mocap/11_01.amc");
   if (asf.empty() || amc.empty()) return;
   const auto m = io::load_amc(asf, amc);
   CAPTURE(m.status().message());
@@ -188,7 +198,8 @@ TEST_CASE("amc: somebody walks on two feet") {
   }
   const Vec3d way = m->clip.root_translation.back() - m->clip.root_translation.front();
   std::printf(
-      "11_01: %zu frames, %.2f m, the lower tip of the toes is %.3f to %.3f m high, the head's top at least %.2f m\n",
+      "11_01: %zu frames, %.2f m, the lower tip of the toes is %.3f to %.3f m high, the head's top at "
+      "least %.2f m\n",
       m->clip.frames(), norm(way), lowest, highest, head);
   // The floor of the recording is y = 0; one foot is always down.
   CHECK(lowest > -0.05);

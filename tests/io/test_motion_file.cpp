@@ -23,9 +23,11 @@ using namespace gsnav_test;
 namespace {
 
 const char* const kArm =
-    "HIERARCHY\nROOT hips\n{\n OFFSET 1 2 3\n CHANNELS 6 Xposition Zposition Yposition Yrotation Xrotation Zrotation\n"
+    "HIERARCHY\nROOT hips\n{\n OFFSET 1 2 3\n CHANNELS 6 Xposition Zposition Yposition Yrotation "
+    "Xrotation Zrotation\n"
     " JOINT arm\n {\n  OFFSET 0 5 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n"
-    "  JOINT hand\n  {\n   OFFSET -4 0 0.5\n   CHANNELS 1 Yrotation\n   End Site\n   {\n    OFFSET 0 1 0\n   }\n  }\n }\n}\n"
+    "  JOINT hand\n  {\n   OFFSET -4 0 0.5\n   CHANNELS 1 Yrotation\n   End Site\n   {\n    OFFSET 0 1 "
+    "0\n   }\n  }\n }\n}\n"
     "MOTION\nFrames: 2\nFrame Time: 0.05\n"
     "0.5 0.25 -1 10 20 30 40 50 60 70\n1 2 3 -10 -200 30 -40 150 -60 7e1\n";
 
@@ -48,7 +50,9 @@ Matrix times(const Matrix& a, const Matrix& b) {
   return c;
 }
 
-Matrix moved(Real x, Real y, Real z) { return {{{1, 0, 0, x}, {0, 1, 0, y}, {0, 0, 1, z}, {0, 0, 0, 1}}}; }
+Matrix moved(Real x, Real y, Real z) {
+  return {{{1, 0, 0, x}, {0, 1, 0, y}, {0, 0, 1, z}, {0, 0, 0, 1}}};
+}
 
 /// Rotation about 'X', 'Y' or 'Z', by the textbook.
 Matrix turned(char axis, Real degrees) {
@@ -66,23 +70,28 @@ TEST_CASE("bvh: kinematics against matrices in long double") {
   CHECK(m.skeleton.parents == std::vector<std::int32_t>{-1, 0, 1});
   CHECK(m.clip.frame_rate == doctest::Approx(20.0));
   REQUIRE(m.clip.frames() == 2);
-  const Real f[2][10] = {{0.5L, 0.25L, -1, 10, 20, 30, 40, 50, 60, 70}, {1, 2, 3, -10, -200, 30, -40, 150, -60, 70}};
+  const Real f[2][10] = {{0.5L, 0.25L, -1, 10, 20, 30, 40, 50, 60, 70},
+                         {1, 2, 3, -10, -200, 30, -40, 150, -60, 70}};
   for (std::size_t t = 0; t < 2; ++t) {
     // The first frame's place is nearer to zero than to the OFFSET, so places are added to it.
-    const Matrix hips = times(times(times(moved(1 + f[t][0], 2 + f[t][2], 3 + f[t][1]), turned('Y', f[t][3])),
-                                    turned('X', f[t][4])),
-                              turned('Z', f[t][5]));
-    const Matrix arm = times(times(times(times(hips, moved(0, 5, 0)), turned('Z', f[t][6])), turned('X', f[t][7])),
-                             turned('Y', f[t][8]));
+    const Matrix hips =
+        times(times(times(moved(1 + f[t][0], 2 + f[t][2], 3 + f[t][1]), turned('Y', f[t][3])),
+                    turned('X', f[t][4])),
+              turned('Z', f[t][5]));
+    const Matrix arm =
+        times(times(times(times(hips, moved(0, 5, 0)), turned('Z', f[t][6])), turned('X', f[t][7])),
+              turned('Y', f[t][8]));
     const Matrix hand = times(times(arm, moved(-4, 0, 0.5L)), turned('Y', f[t][9]));
     const auto globals = pose_at(m, 0.05 * static_cast<double>(t));
     const Matrix* truth[3] = {&hips, &arm, &hand};
     for (std::size_t j = 0; j < 3; ++j) {
       for (std::size_t i = 0; i < 3; ++i) {
         const int row = static_cast<int>(i);
-        CHECK(globals[j].translation[row] == doctest::Approx(static_cast<double>((*truth[j])[i][3])).epsilon(1e-12));
+        CHECK(globals[j].translation[row] ==
+              doctest::Approx(static_cast<double>((*truth[j])[i][3])).epsilon(1e-12));
         for (std::size_t k = 0; k < 3; ++k) {
-          CHECK(std::abs(globals[j].linear(row, static_cast<int>(k)) - static_cast<double>((*truth[j])[i][k])) < 1e-12);
+          CHECK(std::abs(globals[j].linear(row, static_cast<int>(k)) -
+                         static_cast<double>((*truth[j])[i][k])) < 1e-12);
         }
       }
     }
@@ -150,7 +159,8 @@ TEST_CASE("bvh: what is wrong is named with its line") {
 }
 
 TEST_CASE("bvh: the rest pose of real files is the sum of their offsets") {
-  for (const char* name : {"makehuman_cc0/walk1.bvh", "makehuman_cc0/tpose.bvh", "cmu_mocap/sinusoidal.bvh"}) {
+  for (const char* name :
+       {"makehuman_cc0/walk1.bvh", "makehuman_cc0/tpose.bvh", "cmu_mocap/sinusoidal.bvh"}) {
     const std::string path = data_file(std::string("avatars/") + name);
     if (path.empty()) continue;
     const auto m = io::load_bvh(path);
@@ -176,7 +186,8 @@ TEST_CASE("bvh: the rest pose of real files is the sum of their offsets") {
         sums.push_back(p);
         if (!end_site) {
           for (std::size_t k = 0; k < 3; ++k) {
-            CHECK(std::abs(rest[joint].translation[static_cast<int>(k)] - static_cast<double>(p[k])) < 1e-12);
+            CHECK(std::abs(rest[joint].translation[static_cast<int>(k)] - static_cast<double>(p[k])) <
+                  1e-12);
           }
           ++joint;
         }
@@ -266,7 +277,8 @@ TEST_CASE("retarget: further roots of the target go with the first one, with a p
     const auto source = pose_at(m, time);
     const std::size_t arm = static_cast<std::size_t>(m.skeleton.find("arm"));
     const Mat3d turn = rotation_matrix(axis_angle(Vec3d{0, 1, 0}, 0.5));
-    const Mat3d want = turn * source[arm].linear * transpose(m.skeleton.rest_globals()[arm].linear) * transpose(turn) * rest[4].linear;
+    const Mat3d want = turn * source[arm].linear * transpose(m.skeleton.rest_globals()[arm].linear) *
+                       transpose(turn) * rest[4].linear;
     CHECK(differ(b[4], {want, b[4].translation}) < 1e-12);
   }
 }
@@ -301,8 +313,12 @@ TEST_CASE("retarget: a real walk on the humanoid, limb by limb") {
   options.joints = {{"pelvis", "Root"}};
   for (const std::string side : {"L", "R"}) {
     const std::string name = side == "L" ? "left_" : "right_";
-    for (const auto& [to, from] : {std::pair{"hip", "UpLeg_"}, {"knee", "LoLeg_"}, {"ankle", "Foot_"},
-                                   {"shoulder", "UpArm_"}, {"elbow", "LoArm_"}, {"wrist", "Hand_"}}) {
+    for (const auto& [to, from] : {std::pair{"hip", "UpLeg_"},
+                                   {"knee", "LoLeg_"},
+                                   {"ankle", "Foot_"},
+                                   {"shoulder", "UpArm_"},
+                                   {"elbow", "LoArm_"},
+                                   {"wrist", "Hand_"}}) {
       options.joints.emplace_back(name + to, from + side);
     }
   }
@@ -318,10 +334,12 @@ TEST_CASE("retarget: a real walk on the humanoid, limb by limb") {
     double foot = 9;
     for (const std::string side : {"L", "R"}) {
       const std::string name = side == "L" ? "left_" : "right_";
-      for (const auto& [to, from, next_to, next_from] :
-           {std::tuple{"hip", "UpLeg_", "knee", "LoLeg_"}, {"knee", "LoLeg_", "ankle", "Foot_"},
-            {"shoulder", "UpArm_", "elbow", "LoArm_"}, {"elbow", "LoArm_", "wrist", "Hand_"}}) {
-        const Vec3d d = normalized(place(a, walk.skeleton, next_from + side) - place(a, walk.skeleton, from + side));
+      for (const auto& [to, from, next_to, next_from] : {std::tuple{"hip", "UpLeg_", "knee", "LoLeg_"},
+                                                         {"knee", "LoLeg_", "ankle", "Foot_"},
+                                                         {"shoulder", "UpArm_", "elbow", "LoArm_"},
+                                                         {"elbow", "LoArm_", "wrist", "Hand_"}}) {
+        const Vec3d d =
+            normalized(place(a, walk.skeleton, next_from + side) - place(a, walk.skeleton, from + side));
         const Vec3d e = normalized(place(b, body, name + next_to) - place(b, body, name + to));
         worst = max(worst, norm(Vec3d{-d.x, d.y, -d.z} - e));
       }

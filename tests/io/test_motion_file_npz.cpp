@@ -72,11 +72,13 @@ TEST_CASE("driver: keys come back, bones keep their length between them") {
   CHECK(driver->capsules[7].at(0).radius == 0.25);
   double worst = 0, stretch = 0;
   for (int t = 0; t < 20; ++t) {
-    const auto g = pose_at(driver->clip, skeleton, t / 25.0), half = pose_at(driver->clip, skeleton, (t + 0.5) / 25.0);
+    const auto g = pose_at(driver->clip, skeleton, t / 25.0),
+               half = pose_at(driver->clip, skeleton, (t + 0.5) / 25.0);
     for (std::size_t j = 0; j < 55; ++j) {
       const double* m = &arrays["joint_mats"].values[16 * (55 * static_cast<std::size_t>(t) + j)];
       worst = max(worst, norm(g[j].translation - Vec3d{m[3], m[7], m[11]}));
-      for (int k = 0; k < 9; ++k) worst = max(worst, std::abs(g[j].linear(k / 3, k % 3) - m[4 * (k / 3) + k % 3]));
+      for (int k = 0; k < 9; ++k)
+        worst = max(worst, std::abs(g[j].linear(k / 3, k % 3) - m[4 * (k / 3) + k % 3]));
       if (t == 19 || j == 0) continue;
       const auto p = static_cast<std::size_t>(skeleton.parents[j]);
       stretch = max(stretch, std::abs(norm(half[j].translation - half[p].translation) -
@@ -105,13 +107,24 @@ TEST_CASE("driver: what does not fit is named") {
   fails([](auto& a) { a["fps"] = number(30); }, Errc::invalid_file, "fps is 30");
   fails([](auto& a) { a["joint_mats_fps"] = number(0); }, Errc::invalid_file, "must be positive");
   fails([](auto& a) { a.erase("fps"), a.erase("joint_mats_fps"); }, Errc::invalid_file, "neither");
-  fails([](auto& a) { a["joint_mats_version"] = number(2); }, Errc::unsupported, "joint_mats_version is 2");
-  fails([](auto& a) { a["joint_mats_joint_count"] = number(24); }, Errc::invalid_file, "joint_mats_joint_count");
+  fails([](auto& a) { a["joint_mats_version"] = number(2); }, Errc::unsupported,
+        "joint_mats_version is 2");
+  fails([](auto& a) { a["joint_mats_joint_count"] = number(24); }, Errc::invalid_file,
+        "joint_mats_joint_count");
   fails([](auto& a) { a["joint_mats"].shape = {15, 11, 4, 4}; }, Errc::invalid_file, "[15, 11, 4, 4]");
-  fails([](auto& a) { a["joint_mats"].values[16 * 60] = 2; }, Errc::invalid_file, "frame 1, joint 5 is not rigid");
+  fails([](auto& a) { a["joint_mats"].values[16 * 60] = 2; }, Errc::invalid_file,
+        "frame 1, joint 5 is not rigid");
   fails([](auto& a) { a["joint_mats"].values[16 * 60 + 3] = NAN; }, Errc::invalid_file, "row 1 has nan");
-  fails([](auto& a) { a["proxy_capsules"] = {{2, 1, 7}, std::vector<double>(14, 0.1)}; }, Errc::invalid_file, "[2, 1, 7]");
-  fails([](auto& a) { a["proxy_capsules"] = {{3, 1, 7}, std::vector<double>(21, -1)}; }, Errc::invalid_file, "radius");
+  fails(
+      [](auto& a) {
+        a["proxy_capsules"] = {{2, 1, 7}, std::vector<double>(14, 0.1)};
+      },
+      Errc::invalid_file, "[2, 1, 7]");
+  fails(
+      [](auto& a) {
+        a["proxy_capsules"] = {{3, 1, 7}, std::vector<double>(21, -1)};
+      },
+      Errc::invalid_file, "radius");
   const std::vector<io::NpzEntry> text{{"joint_mats_space", {}, std::string("world")}};
   REQUIRE(io::save_npz(folder / "t.npz", text).ok());
   CHECK(contains(io::load_driver(folder / "t.npz", skeleton).status().message(), "'world'"));
@@ -122,7 +135,8 @@ TEST_CASE("smpl motion: rest joints of a shaped body, kinematics by hand") {
   // A body of 55 vertices, each of which is a joint; the one shape moves all of them up by their number.
   const BodyJoints body = body_joints(55);
   TestArrays model;
-  TestArray vertices{{55, 3}, {}, false}, regressor{{55, 55}, {}, false}, tree{{2, 55}, {}, false}, shapes{{55, 3, 1}, {}, false};
+  TestArray vertices{{55, 3}, {}, false}, regressor{{55, 55}, {}, false}, tree{{2, 55}, {}, false},
+      shapes{{55, 3, 1}, {}, false};
   for (std::size_t j = 0; j < 55; ++j) {
     const auto x = static_cast<double>(j);
     vertices.values.insert(vertices.values.end(), {0.1 * x, 1 + 0.01 * x * x, 0.0});
@@ -143,8 +157,9 @@ TEST_CASE("smpl motion: rest joints of a shaped body, kinematics by hand") {
   for (const std::size_t given : {52u, 55u}) {
     TestArrays motion;
     TestArray poses{{2, 3 * given}, std::vector<double>(6 * given), false};
-    poses.values[2] = 1.5707963267948966;            // the root by 90 degrees about Z in the first frame
-    poses.values[3 * given + 3] = 1.0471975511965976;  // the left hip by 60 degrees about X in the second
+    poses.values[2] = 1.5707963267948966;  // the root by 90 degrees about Z in the first frame
+    poses.values[3 * given + 3] =
+        1.0471975511965976;  // the left hip by 60 degrees about X in the second
     poses.values[3 * given + 3 * (given == 52 ? 22 : 25) + 1] = 0.25;  // the left index
     motion["poses"] = poses;
     motion["trans"] = {{2, 3}, {1, 2, 3, 4, 5, 6}, false};
@@ -155,14 +170,16 @@ TEST_CASE("smpl motion: rest joints of a shaped body, kinematics by hand") {
     CAPTURE(m.status().message());
     REQUIRE(m.ok());
     CHECK(m->clip.frame_rate == 120.0);
-    const auto first = pose_at(m->clip, m->skeleton, 0), second = pose_at(m->clip, m->skeleton, 1 / 120.0);
+    const auto first = pose_at(m->clip, m->skeleton, 0),
+               second = pose_at(m->clip, m->skeleton, 1 / 120.0);
     const double c = 0.5, s = std::sqrt(0.75);
     for (std::size_t j = 0; j < 55; ++j) {
       const Vec3d d = rest(j) - rest(0);
       CHECK(norm(first[j].translation - (rest(0) + Vec3d{1 - d.y, 2 + d.x, 3})) < 1e-12);
     }
     const Vec3d knee = rest(4) - rest(1);
-    CHECK(norm(second[4].translation - (rest(1) + Vec3d{4 + knee.x, 5 + c * knee.y, 6 + s * knee.y})) < 1e-12);
+    CHECK(norm(second[4].translation - (rest(1) + Vec3d{4 + knee.x, 5 + c * knee.y, 6 + s * knee.y})) <
+          1e-12);
     CHECK(second[25].linear(0, 2) == doctest::Approx(std::sin(0.25)).epsilon(1e-12));
     const auto up = io::load_smpl_motion(folder / "m.npz", folder / "model.npz").value();
     const auto turned = pose_at(up.clip, up.skeleton, 0);
@@ -182,11 +199,14 @@ TEST_CASE("smpl motion: rest joints of a shaped body, kinematics by hand") {
       a[key] = value;
       return a;
     };
-    fails(with(motion, "poses", {{2, 72}, std::vector<double>(144)}), model, Errc::unsupported, "[2, 72]");
+    fails(with(motion, "poses", {{2, 72}, std::vector<double>(144)}), model, Errc::unsupported,
+          "[2, 72]");
     fails(with(motion, "trans", {{3, 3}, std::vector<double>(9)}), model, Errc::invalid_file, "trans");
     fails(with(motion, "betas", {{2}, {0.5, 0.5}}), model, Errc::invalid_file, "1 shapes for 2 betas");
     fails(with(motion, "mocap_framerate", number(-1)), model, Errc::invalid_file, "frame_rate");
-    fails(motion, with(model, "kintree_table", {{2, 55}, std::vector<double>(110)}), Errc::invalid_file, "kintree_table");
-    fails(motion, with(model, "J_regressor", {{3, 55}, std::vector<double>(165)}), Errc::unsupported, "3 joints");
+    fails(motion, with(model, "kintree_table", {{2, 55}, std::vector<double>(110)}), Errc::invalid_file,
+          "kintree_table");
+    fails(motion, with(model, "J_regressor", {{3, 55}, std::vector<double>(165)}), Errc::unsupported,
+          "3 joints");
   }
 }

@@ -10,13 +10,13 @@
 #include "glb_file.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/detail/io/gltf.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/detail/io/ksplat.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/detail/io/sog.hpp"
 #include "gsnav/detail/io/splat.hpp"
 #include "gsnav/detail/io/spz.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "ksplat_file.hpp"
 #include "ply_compressed_file.hpp"
 #include "sog_file.hpp"
@@ -189,9 +189,8 @@ TEST_CASE("mutations: gltf") {
   });
   CHECK(t.ok > 100);
   CHECK(t.failed > 1000);
-  feed(file.text(), 3000, 20, "some.glb", [&](const std::string& text) {
-    return check_cloud(io::parse_gltf(bytes_of(text), "some.glb"));
-  });
+  feed(file.text(), 3000, 20, "some.glb",
+       [&](const std::string& text) { return check_cloud(io::parse_gltf(bytes_of(text), "some.glb")); });
 }
 
 TEST_CASE("mutations: ksplat") {

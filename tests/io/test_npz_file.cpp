@@ -18,7 +18,8 @@ namespace {
 
 std::string npy(const std::string& descr, const std::string& shape, const std::string& values,
                 bool fortran = false, char version = 1) {
-  const std::string dictionary = "{'descr': '" + descr + "', 'fortran_order': " + (fortran ? "True" : "False") +
+  const std::string dictionary = "{'descr': '" + descr +
+                                 "', 'fortran_order': " + (fortran ? "True" : "False") +
                                  ", 'shape': " + shape + ", }\n";
   std::string out("\x93NUMPY", 6);
   out += version;
@@ -143,7 +144,8 @@ TEST_CASE("npz: every number type, stored and deflated") {
 
 TEST_CASE("npz: float16 at its landmarks") {
   // 1, the largest, the smallest normal and subnormal, minus zero, infinity, NaN.
-  const auto a = read_array(npy("<f2", "(7,)", raw<std::uint16_t>({0x3c00, 0x7bff, 0x0400, 0x0001, 0x8000, 0xfc00, 0x7e00})));
+  const auto a = read_array(
+      npy("<f2", "(7,)", raw<std::uint16_t>({0x3c00, 0x7bff, 0x0400, 0x0001, 0x8000, 0xfc00, 0x7e00})));
   REQUIRE(a.ok());
   CHECK(a->values[0] == 1.0);
   CHECK(a->values[1] == 65504.0);
@@ -160,7 +162,8 @@ TEST_CASE("npz: Fortran order of any rank is turned to C order") {
   for (const bool fortran : {false, true}) {
     std::string bytes;
     for (int a = 0; a < 24; ++a) {
-      const int i = fortran ? a % 2 : a / 12, j = fortran ? a / 2 % 3 : a / 4 % 3, k = fortran ? a / 6 : a % 4;
+      const int i = fortran ? a % 2 : a / 12, j = fortran ? a / 2 % 3 : a / 4 % 3,
+                k = fortran ? a / 6 : a % 4;
       put(bytes, static_cast<float>(100 * i + 10 * j + k));
     }
     const auto array = read_array(npy("<f4", "(2, 3, 4)", bytes, fortran));
@@ -249,8 +252,11 @@ TEST_CASE("npz: what is written is read back") {
   const std::vector<double> d{0.1};
   const std::vector<std::int64_t> n{-1, 0, 1};
   for (const bool deflated : {false, true}) {
-    const std::vector<io::NpzEntry> entries{
-        {"f", {1, 2, 3}, f}, {"d", {}, d}, {"n", {3}, n}, {"t", {}, std::string("smpl")}, {"e", {0, 3}, std::span<const float>{}}};
+    const std::vector<io::NpzEntry> entries{{"f", {1, 2, 3}, f},
+                                            {"d", {}, d},
+                                            {"n", {3}, n},
+                                            {"t", {}, std::string("smpl")},
+                                            {"e", {0, 3}, std::span<const float>{}}};
     REQUIRE(io::save_npz(folder / "a.npz", entries, deflated).ok());
     const auto file = io::NpzFile::open(folder / "a.npz").value();
     CHECK(file.names() == std::vector<std::string>{"d", "e", "f", "n", "t"});

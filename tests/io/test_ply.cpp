@@ -181,13 +181,15 @@ TEST_CASE("N35_nan_position_row") {
   for (float& v : values) v = uniform(generator);
   const auto text_of = [&](const std::vector<float>& rows) {
     file.count = std::to_string(rows.size() / kFloats);
-    return file.header() + std::string(reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof(float));
+    return file.header() +
+           std::string(reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof(float));
   };
   std::vector<float> without = values;
   without.erase(without.begin() + 17 * kFloats, without.begin() + 18 * kFloats);
   const LoadedCloud expected = parse(text_of(without));
   REQUIRE(expected.cloud.size() == kRows - 1);
-  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              inf = std::numeric_limits<float>::infinity();
   // x, z and, for the same reason, a coefficient of SH.
   for (const auto& [column, bad] : {std::pair<std::size_t, float>{0, nan}, {2, inf}, {9 + 4, nan}}) {
     std::vector<float> rows = values;

@@ -164,11 +164,14 @@ TEST_CASE("compressed ply: properties that are missing or of another type") {
   }
   check_fails(replaced(text, "f_rest_4\n", "f_rest_9\n"), Errc::invalid_file, "no property 'f_rest_4'");
   check_fails(replaced(text, "property uchar f_rest_8\n", ""), Errc::invalid_file, "8 properties");
-  check_fails(replaced(text, "uint packed_scale", "float packed_scale"), Errc::invalid_file, "must be uint");
+  check_fails(replaced(text, "uint packed_scale", "float packed_scale"), Errc::invalid_file,
+              "must be uint");
   check_fails(replaced(text, "float max_y", "int max_y"), Errc::invalid_file, "must be float");
   check_fails(replaced(text, "uchar f_rest_3", "char f_rest_3"), Errc::invalid_file, "must be uchar");
-  check_fails(replaced(text, "element chunk", "element chunks"), Errc::invalid_file, "no element 'chunk'");
+  check_fails(replaced(text, "element chunk", "element chunks"), Errc::invalid_file,
+              "no element 'chunk'");
   check_fails(replaced(text, "float max_y", "list uchar float max_y"), Errc::unsupported, "list");
   check_fails(replaced(text, "little", "big"), Errc::unsupported, "binary_little_endian");
-  check_fails(replaced(text, "binary_little_endian", "ascii"), Errc::unsupported, "binary_little_endian");
+  check_fails(replaced(text, "binary_little_endian", "ascii"), Errc::unsupported,
+              "binary_little_endian");
 }

@@ -17,12 +17,12 @@
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/detail/io/episode_file.hpp"
 #include "gsnav/detail/io/habitat_dataset.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/detail/io/lod_set.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
 #include "gsnav/detail/io/navmesh_settings_file.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/io/skinned_mesh_file.hpp"
+#include "gsnav/io/image_file.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "gzip.hpp"
 
 using namespace gsnav;
@@ -57,8 +57,8 @@ TestGltf textured_triangle(const std::string& picture) {
   g.doc["textures"] = json::array({{{"source", 0}}});
   g.doc["materials"] = json::array({{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}});
   g.doc["meshes"].push_back(
-      {{"primitives",
-        json::array({{{"attributes", {{"POSITION", corners}, {"TEXCOORD_0", uvs}}}, {"material", 0}}})}});
+      {{"primitives", json::array({{{"attributes", {{"POSITION", corners}, {"TEXCOORD_0", uvs}}},
+                                    {"material", 0}}})}});
   g.doc["nodes"] = json::array({{{"mesh", 0}}});
   g.doc.erase("scenes");
   return g;
@@ -72,10 +72,12 @@ std::string png_claiming(std::uint32_t width, std::uint32_t height, std::size_t 
     return out;
   };
   const auto chunk = [&](const std::string& body) {  // name and data
-    const uLong sum = crc32(0, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
+    const uLong sum =
+        crc32(0, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
     return big_endian(body.size() - 4) + body + big_endian(sum);
   };
-  return "\x89PNG\r\n\x1a\n" + chunk("IHDR" + big_endian(width) + big_endian(height) + std::string("\x08\x02\0\0\0", 5)) +
+  return "\x89PNG\r\n\x1a\n" +
+         chunk("IHDR" + big_endian(width) + big_endian(height) + std::string("\x08\x02\0\0\0", 5)) +
          chunk("IDAT\x78\x01" + std::string(bytes, '\0')) + chunk("IEND");
 }
 
@@ -89,7 +91,8 @@ TEST_CASE("read limits: JSON of depth 100000 is refused by every reader, at once
     write_file(folder / name, deep);
     reset_largest_allocation();
     const auto begin = std::chrono::steady_clock::now();
-    check_refused(load(folder / name), Errc::unsupported, name, "JSON nested more than 64 deep at byte 64");
+    check_refused(load(folder / name), Errc::unsupported, name,
+                  "JSON nested more than 64 deep at byte 64");
     CHECK(seconds_of(begin) < 0.5);
     CHECK(largest_allocation() < 400000);
   };
@@ -131,7 +134,8 @@ TEST_CASE("read limits: 200 KB of gzip are refused early, in little memory") {
   const auto path = folder / "bomb.json.gz";
   {
     std::string text = R"({"episodes":[)";
-    while (text.size() < 200000000) text += "[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],";
+    while (text.size() < 200000000)
+      text += "[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],";
     write_file(path, compressed(text + "[]]}"));
   }
   const std::size_t size = std::filesystem::file_size(path);
@@ -142,7 +146,8 @@ TEST_CASE("read limits: 200 KB of gzip are refused early, in little memory") {
   check_refused(io::load_episodes(path), Errc::unsupported, "bomb.json.gz",
                 "bytes of gzip grow more than 200 times; raise ReadLimits::inflation");
   const double took = seconds_of(begin);
-  std::printf("gzip of %zu bytes refused in %.3f s, largest allocation %zu\n", size, took, largest_allocation());
+  std::printf("gzip of %zu bytes refused in %.3f s, largest allocation %zu\n", size, took,
+              largest_allocation());
   CHECK(took < 1.0);
   CHECK(largest_allocation() <= 200 * size + 1);
 }
@@ -163,13 +168,15 @@ TEST_CASE("read limits: text in gzip that grows less is read, and more where the
   REQUIRE(spaced(3000000) > 900);
   CHECK(io::load_episodes(path).code() == Errc::unsupported);
   CHECK(io::load_episodes(path, {.inflation = 1032}).ok());
-  for (const int bad : {0, 1033}) CHECK(io::load_episodes(path, {.inflation = bad}).code() == Errc::invalid_argument);
+  for (const int bad : {0, 1033})
+    CHECK(io::load_episodes(path, {.inflation = bad}).code() == Errc::invalid_argument);
   // Episodes as generators write them shrink to a tenth or so: far from the limit.
   std::string text = R"({"episodes":[)";
   for (int k = 0; k < 3000; ++k) {
     text += (k == 0 ? "" : ",");
-    text += R"({"episode_id":")" + std::to_string(k) + R"(","scene_id":"a.glb","start_position":[1,2.5,)" +
-            std::to_string(k % 7) + R"(],"start_rotation":[0,0,0,1],"goals":[{"position":[4,2.5,-1]}]})";
+    text += R"({"episode_id":")" + std::to_string(k) +
+            R"(","scene_id":"a.glb","start_position":[1,2.5,)" + std::to_string(k % 7) +
+            R"(],"start_rotation":[0,0,0,1],"goals":[{"position":[4,2.5,-1]}]})";
   }
   const std::string gzip = compressed(text + "]}");
   write_file(path, gzip);
@@ -217,7 +224,8 @@ TEST_CASE("read limits: the side of textures, of every kind of picture, is the c
     REQUIRE(none->warnings.size() == 1);
     CHECK(contains(none->warnings[0], "20 x 12 pixels, a side of at most 19 is read"));
     CHECK(contains(none->warnings[0], "raise ReadLimits::texture_side"));
-    CHECK(io::load_gltf_scene(folder / "a.glb", {.texture_side = 65536}).code() == Errc::invalid_argument);
+    CHECK(io::load_gltf_scene(folder / "a.glb", {.texture_side = 65536}).code() ==
+          Errc::invalid_argument);
   }
 }
 

@@ -59,9 +59,11 @@ TEST_CASE("real scenes: every file is read, fits its report and is seen") {
     CHECK(norm(r.up) == 1);
     for (std::size_t i = 0; i < cloud.size(); i += 97) {
       const Vec3d m = cloud.mean(i);
-      for (int k = 0; k < 3; ++k) REQUIRE((m[k] >= r.bounds.low[k] - 1e-3 && m[k] <= r.bounds.high[k] + 1e-3));
+      for (int k = 0; k < 3; ++k)
+        REQUIRE((m[k] >= r.bounds.low[k] - 1e-3 && m[k] <= r.bounds.high[k] + 1e-3));
     }
-    // From outside, where there is something in the picture; from within nothing but finite colours is promised.
+    // From outside, where there is something in the picture; from within nothing but finite colours is
+    // promised.
     const Aabb<double> box = middle_of(cloud);
     const Vec3d centre = (box.low + box.high) * 0.5, size = box.high - box.low;
     for (const double distance : {1.5, 0.0}) {

@@ -99,8 +99,10 @@ TEST_CASE("scene: a comma list merges siblings and sums their reports") {
   CHECK(contains(scene.report.warnings[0], (folder / "c.ply").string()));
   REQUIRE(scene.cloud.size() == 17);
   REQUIRE(scene.cloud.sh_degree == 3);
-  for (std::size_t i = 0; i < 6; ++i) check_gaussian(scene.cloud, place_of(scene.cloud, 4 + i), b.rows[i], 45);
-  for (std::size_t i = 0; i < 4; ++i) CHECK(near(scene.cloud.mean(place_of(scene.cloud, i)).x, a.rows[i]["x"]));
+  for (std::size_t i = 0; i < 6; ++i)
+    check_gaussian(scene.cloud, place_of(scene.cloud, 4 + i), b.rows[i], 45);
+  for (std::size_t i = 0; i < 4; ++i)
+    CHECK(near(scene.cloud.mean(place_of(scene.cloud, i)).x, a.rows[i]["x"]));
   for (std::size_t i = 0; i < 7; ++i) {
     const std::size_t at = place_of(scene.cloud, 10 + i);
     CHECK(near(scene.cloud.mean(at).z, c.rows[i]["z"]));

@@ -5,8 +5,8 @@
 #include <array>
 
 #include "check_cloud.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/io/sog.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "support/data.hpp"
 
 using namespace gsnav;

@@ -74,7 +74,8 @@ TEST_CASE("save_sog: every field within the bound that the header states") {
 
 TEST_CASE("save_sog: a folder has the planes of its last scene, and what else is in it stays") {
   const TempFolder folder("sog_again");
-  const std::set<std::string> plain{"meta.json", "means_l.webp", "means_u.webp", "scales.webp", "quats.webp", "sh0.webp"};
+  const std::set<std::string> plain{"meta.json",   "means_l.webp", "means_u.webp",
+                                    "scales.webp", "quats.webp",   "sh0.webp"};
   std::set<std::string> banded = plain;
   banded.insert({"shN_centroids.webp", "shN_labels.webp"});
   const auto save = [&](int rest) {

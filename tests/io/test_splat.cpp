@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "check_quantised.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/io/splat.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "splat_file.hpp"
 
 using namespace gsnav;

@@ -122,7 +122,9 @@ void check_same(const GaussianCloud& cloud, const Rows& rows, double rotation = 
   CHECK(cloud.size() > 0);
 }
 
-GaussianCloud load_in_order(const std::string& path) { return io::load_scene(path, {.sort = false}).value().cloud; }
+GaussianCloud load_in_order(const std::string& path) {
+  return io::load_scene(path, {.sort = false}).value().cloud;
+}
 
 }  // namespace
 

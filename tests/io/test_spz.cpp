@@ -3,9 +3,9 @@
 
 #include "allocations.hpp"
 #include "check_quantised.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/io/spz.hpp"
 #include "gsnav/frame/sh.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "spz_file.hpp"
 
 using namespace gsnav;

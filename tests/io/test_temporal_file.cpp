@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// 4D Gaussians: untested on a real file. These are built by what detail/io/temporal_file.hpp says of the formats.
-#include "gsnav/detail/io/temporal_file.hpp"
-
+// 4D Gaussians: untested on a real file. These are built by what detail/io/temporal_file.hpp says of the
+// formats.
 #include <doctest/doctest.h>
 
 #include <array>
@@ -11,6 +10,7 @@
 #include "avatar_npz.hpp"
 #include "check_refused.hpp"
 #include "gsnav/detail/io/ply.hpp"
+#include "gsnav/detail/io/temporal_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "temporal_rows_of.hpp"
 
@@ -32,12 +32,14 @@ struct ExpectedMoment {
     const long double powers[] = {dt, dt * dt / 2, dt * dt * dt / 6};
     for (std::size_t k = 0; k < 3; ++k) {
       mean[k] = base.mean[k];
-      for (std::size_t m = 0; 3 * m + k < motion; ++m) mean[k] += powers[m] * at("motion_" + std::to_string(3 * m + k));
+      for (std::size_t m = 0; 3 * m + k < motion; ++m)
+        mean[k] += powers[m] * at("motion_" + std::to_string(3 * m + k));
     }
   }
 };
 
-void check_moment(const GaussianCloud& cloud, const std::vector<PlyRow>& rows, std::size_t motion, double t) {
+void check_moment(const GaussianCloud& cloud, const std::vector<PlyRow>& rows, std::size_t motion,
+                  double t) {
   std::size_t i = 0;
   for (const PlyRow& r : rows) {
     const ExpectedMoment want(r, motion, t);
@@ -47,9 +49,11 @@ void check_moment(const GaussianCloud& cloud, const std::vector<PlyRow>& rows, s
     REQUIRE(i < cloud.size());
     for (std::size_t k = 0; k < 3; ++k) {
       const double size = 1 + std::fabs(static_cast<double>(want.mean[k]));
-      CHECK(cloud.mean(i)[static_cast<int>(k)] == doctest::Approx(static_cast<double>(want.mean[k])).epsilon(4e-6 * size));
+      CHECK(cloud.mean(i)[static_cast<int>(k)] ==
+            doctest::Approx(static_cast<double>(want.mean[k])).epsilon(4e-6 * size));
     }
-    CHECK(static_cast<double>(cloud.opacities[i]) == doctest::Approx(static_cast<double>(want.opacity)).epsilon(2e-6));
+    CHECK(static_cast<double>(cloud.opacities[i]) ==
+          doctest::Approx(static_cast<double>(want.opacity)).epsilon(2e-6));
     ++i;
   }
   CHECK(i == cloud.size());
@@ -57,7 +61,8 @@ void check_moment(const GaussianCloud& cloud, const std::vector<PlyRow>& rows, s
 
 }  // namespace
 
-TEST_CASE("4dgs ply (untested on a real file): every moment by the formulas, whatever the motion's order") {
+TEST_CASE(
+    "4dgs ply (untested on a real file): every moment by the formulas, whatever the motion's order") {
   for (const std::size_t motion : {0u, 3u, 6u, 9u}) {
     const PlyFile file = temporal_file(200, motion, 5);
     const auto loaded = io::parse_temporal_ply(bytes_of(file.text()), "a.4dgs.ply");
@@ -66,7 +71,8 @@ TEST_CASE("4dgs ply (untested on a real file): every moment by the formulas, wha
     CHECK(loaded->scene.motion[motion == 0 ? 0 : motion - 1].size() == (motion == 0 ? 0 : 200));
     if (motion < kMotionPlanes) CHECK(loaded->scene.motion[motion].empty());
     CHECK(loaded->report.moving);
-    for (const double t : {-1.0, 0.0, 0.7, 3.0}) check_moment(cloud_at(loaded->scene, t), file.rows, motion, t);
+    for (const double t : {-1.0, 0.0, 0.7, 3.0})
+      check_moment(cloud_at(loaded->scene, t), file.rows, motion, t);
   }
 }
 
@@ -86,14 +92,16 @@ TEST_CASE("4dgs ply: what is missing is zero, a file without any of it stands") 
     std::erase_if(out.properties, [&](const auto& p) { return p.first.starts_with(name); });
     return io::parse_temporal_ply(bytes_of(out.text()), "a").value().scene;
   };
-  const TemporalCloud no_time = without("t"), no_motion = without("motion_");  // "t" takes t_scale with it
+  const TemporalCloud no_time = without("t"),
+                      no_motion = without("motion_");  // "t" takes t_scale with it
   for (std::size_t i = 0; i < 5; ++i) {
     CHECK(no_time.times[i] == 0);
     CHECK(no_time.sigmas[i] == 1);
     CHECK(static_cast<double>(no_motion.times[i]) == file.rows[i]["t"]);
   }
   CHECK(no_motion.motion[0].empty());
-  std::erase_if(file.properties, [](const auto& p) { return p.first[0] == 't' || p.first.starts_with("motion_"); });
+  std::erase_if(file.properties,
+                [](const auto& p) { return p.first[0] == 't' || p.first.starts_with("motion_"); });
   const auto still = io::parse_temporal_ply(bytes_of(file.text()), "a").value();
   CHECK_FALSE(still.report.moving);
   CHECK(cloud_at(still.scene, 1e9).size() == 5);
@@ -127,7 +135,8 @@ TEST_CASE("4dgs ply: cut off anywhere, motion that makes no sense") {
   }
   PlyFile file = temporal_file(3, 3, 9);
   file.properties.pop_back();
-  check_refused(io::parse_temporal_ply(bytes_of(file.text()), "a"), Errc::invalid_file, "a", "2 properties motion_*");
+  check_refused(io::parse_temporal_ply(bytes_of(file.text()), "a"), Errc::invalid_file, "a",
+                "2 properties motion_*");
   file.properties.emplace_back("motion_7", "float");
   check_refused(io::parse_temporal_ply(bytes_of(file.text()), "a"), Errc::invalid_file, "a", "motion_2");
 }
@@ -167,9 +176,11 @@ TEST_CASE("4dgs npz: scale and dilation, and a background that stands") {
   for (std::size_t i = 0; i < 20; ++i) {
     PlyRow row = moving.rows[i];
     CHECK(scene.cloud.mean(i).y == doctest::Approx(2.5 * row["y"]).epsilon(1e-6));
-    CHECK(static_cast<double>(scene.cloud.scales[1][i]) == doctest::Approx(2.5 * std::exp(row["scale_1"])).epsilon(1e-6));
+    CHECK(static_cast<double>(scene.cloud.scales[1][i]) ==
+          doctest::Approx(2.5 * std::exp(row["scale_1"])).epsilon(1e-6));
     CHECK(static_cast<double>(scene.times[i]) == doctest::Approx(4 * row["t"]).epsilon(1e-6));
-    CHECK(static_cast<double>(scene.motion[0][i]) == doctest::Approx(2.5 * row["motion_0"]).epsilon(1e-6));
+    CHECK(static_cast<double>(scene.motion[0][i]) ==
+          doctest::Approx(2.5 * row["motion_0"]).epsilon(1e-6));
   }
   const GaussianCloud late = cloud_at(scene, 1e6);  // only the background is left
   REQUIRE(late.size() == 30);

@@ -136,8 +136,8 @@ TEST_CASE("guess_up: of objects, what is usual") {
 }
 
 TEST_CASE("guess_up: a box so large that its last points are rounded to its end") {
-  // A sixth lie 1e20 m away: the box that has most reaches there, and what is a metre before its end is its end. Some
-  // lie as far beyond it as is still looked at.
+  // A sixth lie 1e20 m away: the box that has most reaches there, and what is a metre before its end is
+  // its end. Some lie as far beyond it as is still looked at.
   GaussianCloudBuilder builder(0);
   for (int i = 0; i < 1200; ++i) {
     RawGaussian g;

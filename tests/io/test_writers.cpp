@@ -179,7 +179,8 @@ TEST_CASE("save_compressed_ply: means far from zero lie within their chunk's bou
   // Bounds are float32, of 1/16 m there, and hold all of it.
   const double half_step = (high - low + 2 * 0.0625) / 2047 / 2;
   double worst = 0;
-  for (std::size_t i = 0; i < cloud.size(); ++i) worst = std::max(worst, std::abs(back.mean(i).x - cloud.mean(i).x));
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    worst = std::max(worst, std::abs(back.mean(i).x - cloud.mean(i).x));
   CHECK(worst < half_step * 1.001);
 }
 

@@ -7,16 +7,16 @@
 #include <vector>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/math/aabb.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/detail/scene/lod_levels.hpp"
+#include "gsnav/math/aabb.hpp"
 #include "lod/lod_support.hpp"
 
 namespace gsnav_test {
 
-/// Levels of a cloud as a set ships them: boxes x boxes over its two longest sides, each halved `coarser` times by a
-/// tree of its own. Rows of the coarser levels come box after box.
+/// Levels of a cloud as a set ships them: boxes x boxes over its two longest sides, each halved
+/// `coarser` times by a tree of its own. Rows of the coarser levels come box after box.
 inline std::vector<gsnav::LodLevel> shipped_levels(const gsnav::GaussianCloud& wall, std::size_t coarser,
                                                    std::size_t boxes = 4) {
   using namespace gsnav;

@@ -40,7 +40,8 @@ std::vector<std::size_t> rows_of(const LodPlace& place) {
 
 }  // namespace
 
-TEST_CASE("lod levels: each node has the rows of its box and level, each once, and nothing else is seen") {
+TEST_CASE(
+    "lod levels: each node has the rows of its box and level, each once, and nothing else is seen") {
   const std::vector<LodLevel>& levels = wall_levels();
   const LeveledCloud set = joined();
   REQUIRE(set.tree.levels() == 4);
@@ -108,7 +109,9 @@ TEST_CASE("lod levels: a node's error is that of trying all pairs") {
           least = std::min(least, dot(d, d));
         }
         // These face the camera: sigma_x sigma_y is what they cover, but for what their edges add.
-        const auto s = [&](std::size_t axis) { return static_cast<double>(levels[0].cloud.scales[axis][i]); };
+        const auto s = [&](std::size_t axis) {
+          return static_cast<double>(levels[0].cloud.scales[axis][i]);
+        };
         const double area =
             std::sqrt(s(0) * s(0) * s(1) * s(1) + s(0) * s(0) * s(2) * s(2) + s(1) * s(1) * s(2) * s(2));
         const double m = static_cast<double>(levels[0].cloud.opacities[i]) * area;
@@ -154,7 +157,8 @@ TEST_CASE("lod levels: any cut shows each box in view once, and the same for any
   bool mixed = false;
   for (int run = 0; run < 60; ++run) {
     const Vec3d eye{2 * rng.uniform(-1, 1), 2 * rng.uniform(-1, 1), rng.uniform(-6, 3.5)};
-    const Camera camera = Camera::look_at(eye, {rng.uniform(-2, 2), rng.uniform(-2, 2), 4}, {0, -1, 0}, 64, 64, 60);
+    const Camera camera =
+        Camera::look_at(eye, {rng.uniform(-2, 2), rng.uniform(-2, 2), 4}, {0, -1, 0}, 64, 64, 60);
     LodChoice choice;
     choice.pixels = std::exp(rng.uniform(-2, 3));
     static_cast<void>(cut.select(camera, choice));
@@ -189,10 +193,13 @@ TEST_CASE("lod levels: any cut shows each box in view once, and the same for any
   CHECK(other.cloud.means == set.cloud.means);
   CHECK(other.cloud.row_ids == set.cloud.row_ids);
   CHECK(other.tree.merged.shN == set.tree.merged.shN);
-  for (std::size_t i = 0; i < set.tree.nodes.size(); ++i) CHECK(other.tree.nodes[i].error == set.tree.nodes[i].error);
+  for (std::size_t i = 0; i < set.tree.nodes.size(); ++i)
+    CHECK(other.tree.nodes[i].error == set.tree.nodes[i].error);
 }
 
-TEST_CASE("lod levels: a cut is never farther from the photo than its coarsest level, nor than direct rendering") {
+TEST_CASE(
+    "lod levels: a cut is never farther from the photo than its coarsest level, nor than direct "
+    "rendering") {
   const LeveledCloud set = joined();
   OpenMPBackend backend;
   RenderConfig config;
@@ -228,7 +235,8 @@ TEST_CASE("lod levels: a cut is never farther from the photo than its coarsest l
           }
         }
         std::vector<std::uint32_t> level;
-        for (std::size_t n = set.tree.level_begin[coarsest]; n < set.tree.level_begin[coarsest + 1]; ++n) {
+        for (std::size_t n = set.tree.level_begin[coarsest]; n < set.tree.level_begin[coarsest + 1];
+             ++n) {
           for (std::uint32_t c = 0; c < set.tree.places[n].chunks; ++c)
             level.push_back(set.tree.places[n].first_chunk + c);
         }
@@ -250,7 +258,8 @@ TEST_CASE("lod levels: a cut is never farther from the photo than its coarsest l
 TEST_CASE("lod levels: boxes without a level, and what makes no sense") {
   SerialBackend backend;
   std::vector<LodLevel> levels = wall_levels();
-  // Box 3 has its finest level alone, box 5 lacks the second, box 7 nothing at the finest: it is not shown at all.
+  // Box 3 has its finest level alone, box 5 lacks the second, box 7 nothing at the finest: it is not
+  // shown at all.
   const auto without = [&](std::size_t l, std::uint32_t box) {
     LodLevel& level = levels[l];
     const std::vector<std::uint32_t> boxes = level.boxes;

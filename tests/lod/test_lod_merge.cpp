@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/math/quat.hpp"
 #include "gsnav/detail/scene/lod_merge.hpp"
+#include "gsnav/math/quat.hpp"
 
 using namespace gsnav;
 

@@ -86,7 +86,8 @@ TEST_CASE("lod photo: nearer to the photo than direct rendering, in every view (
   double gain = 0;
   std::uint64_t drawn = 0, shown = 0;
   int views = 0;
-  for (const double z : {-6.0, -2.0, 1.0, 3.0, 3.5}) {  // the last see few, large ones: direct rendering is good there
+  for (const double z :
+       {-6.0, -2.0, 1.0, 3.0, 3.5}) {  // the last see few, large ones: direct rendering is good there
     for (const double x : {-1.0, 0.7}) {
       const Camera camera = Camera::look_at({x, 0.2, z}, {0, 0, 4}, {0, -1, 0}, 40, 40, 50);
       const GaussianSet whole = cloud.set();
@@ -112,8 +113,11 @@ TEST_CASE("lod photo: nearer to the photo than direct rendering, in every view (
   CHECK(2 * drawn < shown);
 }
 
-TEST_CASE("lod photo: where Gaussians are large direct rendering is good, and no cut makes levels of detail worse") {
-  GaussianCloud cloud = random_cloud(12, {.count = 1500, .sh_degree = 1, .needle = 0, .scale = 0.5, .center = {0, 0, 4}, .extent = 2});
+TEST_CASE(
+    "lod photo: where Gaussians are large direct rendering is good, and no cut makes levels of detail "
+    "worse") {
+  GaussianCloud cloud = random_cloud(
+      12, {.count = 1500, .sh_degree = 1, .needle = 0, .scale = 0.5, .center = {0, 0, 4}, .extent = 2});
   sort_spatially(cloud);
   OpenMPBackend backend;
   const LodTree tree = build_lod(backend, cloud).value();
@@ -129,7 +133,8 @@ TEST_CASE("lod photo: where Gaussians are large direct rendering is good, and no
     const auto sets = cut.select(camera);
     lods.set_config(lod_config(config, cut.stats()));
     const auto lod = lods.render(sets, std::span(&camera, 1)).value();
-    const double before = image_error(truth.rgb, direct.rgb, 3).psnr, after = image_error(truth.rgb, lod.rgb, 3).psnr;
+    const double before = image_error(truth.rgb, direct.rgb, 3).psnr,
+                 after = image_error(truth.rgb, lod.rgb, 3).psnr;
     MESSAGE("direct " << before << " dB, lod " << after << " dB");
     CHECK(before > 45);
     CHECK(after >= before);

@@ -135,7 +135,8 @@ TEST_CASE("lod tree: grain is the geometric mean size of the cloud's Gaussians b
         mass += m.mass;
         log_size += m.mass * 0.5L * std::log(static_cast<long double>(m.mass) / cloud.opacities[i]);
       }
-      CHECK(tree.nodes[node].grain == doctest::Approx(static_cast<double>(std::exp(log_size / mass))).epsilon(1e-6));
+      CHECK(tree.nodes[node].grain ==
+            doctest::Approx(static_cast<double>(std::exp(log_size / mass))).epsilon(1e-6));
     }
   }
   GaussianCloud empty = small_wall(15, 300);

@@ -13,10 +13,10 @@
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/scene/drop_bands.hpp"
 #include "gsnav/detail/scene/ledger.hpp"
-#include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "gsnav/detail/scene/scene_profile.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
+#include "gsnav/scene/renderer.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
 
@@ -256,6 +256,7 @@ TEST_CASE("ledger: its counts are those of the frame") {
   CHECK(other.converted == cloud.size());
   CHECK(other.other_order);
   CHECK(other.culled.emitting == 2 * l.culled.emitting);
-  CHECK(ledger_text(other).find("converted: the colours of " + std::to_string(cloud.size())) != std::string::npos);
+  CHECK(ledger_text(other).find("converted: the colours of " + std::to_string(cloud.size())) !=
+        std::string::npos);
   CHECK(ledger_text(other).find("order: not") != std::string::npos);
 }

@@ -107,14 +107,22 @@ TEST_CASE("visible sets file: values that cannot be are refused though the check
   refused([](auto& v) { v.min_weight = 2; }, "min_weight");
   refused([](auto& v) { std::swap(v.keys[0], v.keys[1]); }, "cell 1");
   REQUIRE(sets().cloud_chunks % 32 != 0);
-  const auto of_cell = [](auto& v, std::size_t cell) { return v.bits.data() + (cell == 0 ? 0 : v.ends[cell - 1]); };
+  const auto of_cell = [](auto& v, std::size_t cell) {
+    return v.bits.data() + (cell == 0 ? 0 : v.ends[cell - 1]);
+  };
   refused([&](auto& v) { of_cell(v, 1)[v.words() - 1] |= 0x80000000u; }, "cell 1: a chunk");
-  refused([&](auto& v) { of_cell(v, 1)[2 * v.words() - 1] += 1; }, "cell 1: chunks that are not counted");
+  refused([&](auto& v) { of_cell(v, 1)[2 * v.words() - 1] += 1; },
+          "cell 1: chunks that are not counted");
   refused([](auto& v) { v.ends[1] -= 1; }, "cell 1: not as many rows");
   refused([](auto& v) { std::swap(v.ends[0], v.ends[1]); }, "cell");
   refused([](auto& v) { v.ends[2] = ~std::uint64_t{0}; }, "cell 2: its words");
   refused([](auto& v) { v.bits.push_back(0); }, "words of no cell");
-  refused([](auto& v) { v.ends.back() -= kSeenRowWords; v.bits.resize(v.bits.size() - kSeenRowWords); }, "not as many rows");
+  refused(
+      [](auto& v) {
+        v.ends.back() -= kSeenRowWords;
+        v.bits.resize(v.bits.size() - kSeenRowWords);
+      },
+      "not as many rows");
   // The last row of the last chunk that a cell sees there, which has fewer.
   REQUIRE(rooms().size() % kProjectChunk != 0);
   for (std::size_t c = 0; c < sets().cells(); ++c) {
@@ -132,7 +140,8 @@ TEST_CASE("visible sets file: of chunks alone") {
   VisibleSettings settings = coarse();
   settings.rows = 0;
   const std::vector<Vec3d> eyes = places_in_rooms();
-  const VisibleSets made = build_visible_sets(backend, rooms(), std::span(eyes).first(4), settings).value();
+  const VisibleSets made =
+      build_visible_sets(backend, rooms(), std::span(eyes).first(4), settings).value();
   REQUIRE(io::save_visible_sets(folder / "a.vis", made, rooms()).ok());
   const VisibleSets read = io::load_visible_sets(folder / "a.vis", rooms()).value();
   CHECK(read.ends == made.ends);

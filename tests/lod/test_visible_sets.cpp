@@ -116,10 +116,13 @@ TEST_CASE("row weights: of a few Gaussians, what an image of each alone in white
         Errc::invalid_argument);
 }
 
-TEST_CASE("rows that may be seen are drawn as if the others were transparent: whole, in lanes, in slices, in double") {
+TEST_CASE(
+    "rows that may be seen are drawn as if the others were transparent: whole, in lanes, in slices, in "
+    "double") {
   Rng rng(31);
   GaussianCloud cloud = random_cloud(
-      71, {.count = 9007, .sh_degree = 1, .needle = 0.02, .scale = 0.03, .center = {0, 0, 0}, .extent = 5});
+      71,
+      {.count = 9007, .sh_degree = 1, .needle = 0.02, .scale = 0.03, .center = {0, 0, 0}, .extent = 5});
   sort_spatially(cloud);
   OpenMPBackend lanes(2);
   SerialBackend serial;
@@ -130,12 +133,14 @@ TEST_CASE("rows that may be seen are drawn as if the others were transparent: wh
     GaussianSet set = cloud.set();
     set.gaussians.seen = {words.data(), words.size()};
     const double yaw = rng.uniform(0, 6.3);
-    const Camera camera = Camera::look_at({0, 0, 0}, {std::cos(yaw), 0.2, std::sin(yaw)}, {0, 1, 0}, 60, 44, 80);
+    const Camera camera =
+        Camera::look_at({0, 0, 0}, {std::cos(yaw), 0.2, std::sin(yaw)}, {0, 1, 0}, 60, 44, 80);
     RenderConfig config;
     config.outputs = kRgb | kAlpha | kMedianDepth;
     const auto same = [&](auto& backend, auto scalar) {
       Renderer<decltype(scalar), std::remove_reference_t<decltype(backend)>> renderer(backend, config);
-      const auto part = renderer.render(set, camera).value(), want = renderer.render(rest.set(), camera).value();
+      const auto part = renderer.render(set, camera).value(),
+                 want = renderer.render(rest.set(), camera).value();
       CHECK(part.rgb == want.rgb);
       CHECK(part.alpha == want.alpha);
       CHECK(part.median_depth == want.median_depth);
@@ -153,7 +158,10 @@ TEST_CASE("rows that may be seen are drawn as if the others were transparent: wh
   }
   GaussianSet set = cloud.set();
   const std::vector<std::uint32_t> words = seen_words(std::vector<bool>(cloud.size(), true));
-  const auto render = [&] { return Renderer<float, SerialBackend>(serial, {}).render(set, Camera::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 8, 8, 80)); };
+  const auto render = [&] {
+    return Renderer<float, SerialBackend>(serial, {})
+        .render(set, Camera::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 8, 8, 80));
+  };
   set.gaussians.seen = {words.data(), words.size()};
   CHECK(render().status().ok());
   set.gaussians.seen.size = words.size() - 1;
@@ -241,7 +249,8 @@ TEST_CASE("visible sets: a further viewpoint takes nothing away, and adds") {
   VisibleSettings settings = coarse();
   settings.rows = 1;
   const std::vector<Vec3d> eyes{{1.1, 1.3, 0.1}, {1.4, 1.3, 0.4}};  // of one cell
-  const VisibleSets one = build_visible_sets(backend, rooms(), std::span(eyes).first(1), settings).value();
+  const VisibleSets one =
+      build_visible_sets(backend, rooms(), std::span(eyes).first(1), settings).value();
   const VisibleSets both = build_visible_sets(backend, rooms(), eyes, settings).value();
   const auto at = std::lower_bound(both.keys.begin(), both.keys.end(), one.keys[0]);
   REQUIRE(at != both.keys.end());
@@ -316,7 +325,9 @@ TEST_CASE("visible sets: nothing is known elsewhere, nor of cameras that see mor
   }
 }
 
-TEST_CASE("visible sets: where nearly all is seen a sample says so, and sets that are made do not depend on it") {
+TEST_CASE(
+    "visible sets: where nearly all is seen a sample says so, and sets that are made do not depend on "
+    "it") {
   // In the open: small Gaussians on a ring around the viewpoints, which hide nothing of each other.
   GaussianCloudBuilder builder(0);
   Rng rng(3);

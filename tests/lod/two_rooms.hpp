@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav_test {
 

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/math/functions.hpp"
 #include "gsnav/detail/math/pack.hpp"
+#include "gsnav/math/functions.hpp"
 #include "gsnav/math/vec.hpp"
 
 using namespace gsnav;
@@ -81,9 +81,11 @@ TEST_CASE("a byte is the nearest to 255 times a value") {
 TEST_CASE("fma is that of the C library, by whatever instruction") {
   Rng rng(5);
   for (int i = 0; i < 200000; ++i) {
-    const double a = rng.uniform(-1.0, 1.0), b = rng.uniform(-1e3, 1e3), c = i % 2 == 0 ? -a * b : rng.uniform(-1.0, 1.0);
+    const double a = rng.uniform(-1.0, 1.0), b = rng.uniform(-1e3, 1e3),
+                 c = i % 2 == 0 ? -a * b : rng.uniform(-1.0, 1.0);
     CHECK(gsnav::fma(a, b, c) == std::fma(a, b, c));
-    const auto af = static_cast<float>(a), bf = static_cast<float>(b), cf = i % 2 == 0 ? -af * bf : static_cast<float>(c);
+    const auto af = static_cast<float>(a), bf = static_cast<float>(b),
+               cf = i % 2 == 0 ? -af * bf : static_cast<float>(c);
     CHECK(gsnav::fma(af, bf, cf) == std::fma(af, bf, cf));
   }
 }

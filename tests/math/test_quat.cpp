@@ -35,7 +35,8 @@ TEST_CASE("N31 quaternions of any length normalise alike") {
 }
 
 TEST_CASE("N30, N32 zero and non-finite quaternions are refused") {
-  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              inf = std::numeric_limits<float>::infinity();
   for (Quatf q : {Quatf{0, 0, 0, 0}, Quatf{nan, 0, 0, 1}, Quatf{1, nan, 0, 0}, Quatf{1, 0, 0, nan},
                   Quatf{inf, 0, 0, 1}, Quatf{0, 0, -inf, 0}}) {
     CHECK(!normalize(q));
@@ -62,7 +63,8 @@ TEST_CASE("matrices, products and rotations of quaternions agree") {
 }
 
 TEST_CASE("rotations by 180 degrees survive the way through a matrix") {
-  for (const Vec3d& axis : {Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}, normalized(Vec3d{1, -2, 0.5})}) {
+  for (const Vec3d& axis :
+       {Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}, normalized(Vec3d{1, -2, 0.5})}) {
     const Quatd q = axis_angle(axis, 3.14159265358979323846);
     CHECK(std::abs(std::abs(dot(q, quat_from_matrix(rotation_matrix(q)))) - 1) < 1e-12);
   }
@@ -86,7 +88,8 @@ TEST_CASE("similarities compose and invert") {
   Rng rng(4);
   for (int i = 0; i < 1000; ++i) {
     const auto random = [&] {
-      return Similarity{random_quat(rng), {rng.normal(), rng.normal(), rng.normal()}, rng.uniform(0.1, 5)};
+      return Similarity{
+          random_quat(rng), {rng.normal(), rng.normal(), rng.normal()}, rng.uniform(0.1, 5)};
     };
     const Similarity a = random(), b = random();
     const Vec3d v{rng.normal(), rng.normal(), rng.normal()};

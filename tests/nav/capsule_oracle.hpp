@@ -20,11 +20,13 @@ inline Real length(const V& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * 
 inline Real point_segment(const V& p, const V& a, const V& b) {
   const V d = b - a, w = p - a;
   const Real dd = d.x * d.x + d.y * d.y + d.z * d.z;
-  const Real s = dd > 0 ? std::clamp((d.x * w.x + d.y * w.y + d.z * w.z) / dd, Real(0), Real(1)) : Real(0);
+  const Real s =
+      dd > 0 ? std::clamp((d.x * w.x + d.y * w.y + d.z * w.z) / dd, Real(0), Real(1)) : Real(0);
   return length(w - d * s);
 }
 
-inline Real segment_distance_oracle(const V& a0, const V& a1, const V& b0, const V& b1, int steps = 120) {
+inline Real segment_distance_oracle(const V& a0, const V& a1, const V& b0, const V& b1,
+                                    int steps = 120) {
   Real low = 0, high = 1;
   const auto f = [&](Real s) { return point_segment(a0 + (a1 - a0) * s, b0, b1); };
   for (int i = 0; i < steps; ++i) {
@@ -60,7 +62,9 @@ inline Real segment_distance_clamped(const V& a0, const V& a1, const V& b0, cons
 /// Signed gap of two moving capsules at time t, straight from the definition.
 template <class S>
 Real gap_oracle(const gsnav::MovingCapsule<S>& a, const gsnav::MovingCapsule<S>& b, Real t) {
-  const auto at = [t](const gsnav::Vec3<S>& p, const gsnav::Vec3<S>& q) { return real(p) + (real(q) - real(p)) * t; };
+  const auto at = [t](const gsnav::Vec3<S>& p, const gsnav::Vec3<S>& q) {
+    return real(p) + (real(q) - real(p)) * t;
+  };
   const auto radius = [t](const gsnav::MovingCapsule<S>& m) {
     return Real(m.begin.radius) + (Real(m.end.radius) - Real(m.begin.radius)) * t;
   };
@@ -73,7 +77,8 @@ Real gap_oracle(const gsnav::MovingCapsule<S>& a, const gsnav::MovingCapsule<S>&
 template <class S>
 Real gap_speed(const gsnav::MovingCapsule<S>& a, const gsnav::MovingCapsule<S>& b) {
   const auto most = [](const gsnav::MovingCapsule<S>& m) {
-    return std::max(length(real(m.end.p0) - real(m.begin.p0)), length(real(m.end.p1) - real(m.begin.p1))) +
+    return std::max(length(real(m.end.p0) - real(m.begin.p0)),
+                    length(real(m.end.p1) - real(m.begin.p1))) +
            std::abs(Real(m.end.radius) - Real(m.begin.radius));
   };
   return most(a) + most(b);
@@ -82,7 +87,8 @@ Real gap_speed(const gsnav::MovingCapsule<S>& a, const gsnav::MovingCapsule<S>& 
 /// A gap below `limit` somewhere in [t0, t1], or the least of those looked at where there is none (up to
 /// 1e-7 m). Branch and bound on the speed limit of the gap: nothing slips between samples.
 template <class S>
-Real gap_below(const gsnav::MovingCapsule<S>& a, const gsnav::MovingCapsule<S>& b, Real t0, Real t1, Real limit) {
+Real gap_below(const gsnav::MovingCapsule<S>& a, const gsnav::MovingCapsule<S>& b, Real t0, Real t1,
+               Real limit) {
   const Real speed = gap_speed(a, b), g0 = gap_oracle(a, b, t0), g1 = gap_oracle(a, b, t1);
   Real least = std::min(g0, g1);
   const auto search = [&](auto&& self, Real ta, Real ga, Real tb, Real gb) -> void {

@@ -12,9 +12,9 @@
 
 namespace gsnav_test {
 
-/// Shortest paths on a level NavMesh by brute force in long double: Dijkstra on the visibility graph of the
-/// corners of its boundary. Knows only the triangles. Where parts of the floor touch in a corner alone, no way leads from one
-/// to the other there: each has a corner of its own.
+/// Shortest paths on a level NavMesh by brute force in long double: Dijkstra on the visibility graph of
+/// the corners of its boundary. Knows only the triangles. Where parts of the floor touch in a corner
+/// alone, no way leads from one to the other there: each has a corner of its own.
 class VisibilityGraph {
  public:
   using Real = long double;
@@ -58,7 +58,8 @@ class VisibilityGraph {
         const Corner &a = corners_[i], &b = corners_[j];
         const bool parted = a.at.x == b.at.x && a.at.z == b.at.z;
         const bool open = !parted && a.opens_to(b.at) && b.opens_to(a.at);
-        near_[i * corners_.size() + j] = near_[j * corners_.size() + i] = open ? direct(a.at, b.at) : kFar;
+        near_[i * corners_.size() + j] = near_[j * corners_.size() + i] =
+            open ? direct(a.at, b.at) : kFar;
       }
     }
   }
@@ -99,7 +100,8 @@ class VisibilityGraph {
 
   struct Corner {
     Point at;
-    std::vector<std::array<Point, 2>> parts;  ///< far sides of its triangles, right to left; empty: all there are
+    std::vector<std::array<Point, 2>>
+        parts;  ///< far sides of its triangles, right to left; empty: all there are
     bool opens_to(const Point& p) const noexcept {
       return parts.empty() || std::any_of(parts.begin(), parts.end(), [&](const auto& side) {
                return area(at, side[0], p) >= -kTouch && area(at, p, side[1]) >= -kTouch;
@@ -137,11 +139,13 @@ class VisibilityGraph {
 
   bool inside(const Point& p) const noexcept {
     return std::any_of(triangles_.begin(), triangles_.end(), [&](const auto& t) {
-      return area(t[0], t[1], p) >= -kTouch && area(t[1], t[2], p) >= -kTouch && area(t[2], t[0], p) >= -kTouch;
+      return area(t[0], t[1], p) >= -kTouch && area(t[1], t[2], p) >= -kTouch &&
+             area(t[2], t[0], p) >= -kTouch;
     });
   }
 
-  /// Length of the segment where it stays on the surface: cut at every wall, each piece's middle is inside.
+  /// Length of the segment where it stays on the surface: cut at every wall, each piece's middle is
+  /// inside.
   Real direct(const Point& a, const Point& b) const {
     std::vector<Real> cuts{0, 1};
     const Real dx = b.x - a.x, dz = b.z - a.z;
@@ -155,7 +159,8 @@ class VisibilityGraph {
       if ((sp > kTouch && sq > kTouch) || (sp < -kTouch && sq < -kTouch)) continue;
       if (ta != tb) cuts.push_back(ta / (ta - tb));
       for (const Point& e : {p, q}) {
-        cuts.push_back(((e.x - a.x) * dx + (e.z - a.z) * dz) / std::max(dx * dx + dz * dz, Real(1e-300L)));
+        cuts.push_back(((e.x - a.x) * dx + (e.z - a.z) * dz) /
+                       std::max(dx * dx + dz * dz, Real(1e-300L)));
       }
     }
     std::sort(cuts.begin(), cuts.end());

@@ -67,7 +67,8 @@ inline Soup read_obj(const std::string& path) {
     } else if (tag == "f") {
       std::vector<std::uint32_t> face;
       for (std::string w; words >> w;) face.push_back(static_cast<std::uint32_t>(std::stoul(w)) - 1);
-      for (std::size_t k = 2; k < face.size(); ++k) soup.triangles.push_back({face[0], face[k - 1], face[k]});
+      for (std::size_t k = 2; k < face.size(); ++k)
+        soup.triangles.push_back({face[0], face[k - 1], face[k]});
     }
   }
   return soup;

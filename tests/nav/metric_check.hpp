@@ -21,8 +21,10 @@ inline double sum_of(const std::vector<gsnav::Vec3d>& points) {
 
 inline constexpr int kPathsOfAFloor = 60;
 
-/// So many paths between random points against brute force; returns how far the worst length is off, metres.
-inline double check_brute_force(const gsnav::NavMesh& mesh, const VisibilityGraph& graph, std::uint64_t seed) {
+/// So many paths between random points against brute force; returns how far the worst length is off,
+/// metres.
+inline double check_brute_force(const gsnav::NavMesh& mesh, const VisibilityGraph& graph,
+                                std::uint64_t seed) {
   using namespace gsnav;
   Rng rng(seed);
   double worst = 0;

@@ -119,8 +119,8 @@ TEST_CASE("segments: degenerate, crossing and touching") {
   CHECK(segment_distance(o, o, o, o).distance == 0);
   CHECK(norm(segment_distance(o, o, o, o).normal) == doctest::Approx(1));
   CHECK(segment_distance(o, o, x, x).distance == 1);
-  CHECK(segment_distance(o, x, z, z + x).distance == 1);           // parallel
-  CHECK(segment_distance(o, x, x * 3.0, x * 2.0).distance == 1);   // in line
+  CHECK(segment_distance(o, x, z, z + x).distance == 1);          // parallel
+  CHECK(segment_distance(o, x, x * 3.0, x * 2.0).distance == 1);  // in line
   const auto crossing = segment_distance(-x, x, -z, z);
   CHECK(crossing.distance == 0);
   CHECK(std::abs(crossing.normal.y) == doctest::Approx(1));
@@ -128,7 +128,8 @@ TEST_CASE("segments: degenerate, crossing and touching") {
   CHECK(on_axis.distance == 0);
   CHECK(on_axis.normal.y == doctest::Approx(0));
   CHECK(norm(on_axis.normal) == doctest::Approx(1));
-  const auto lengths = segment_distance(Vec3f{0, 0, 0}, Vec3f{1e-20f, 0, 0}, Vec3f{0, 1, 0}, Vec3f{0, 1, 1e-20f});
+  const auto lengths =
+      segment_distance(Vec3f{0, 0, 0}, Vec3f{1e-20f, 0, 0}, Vec3f{0, 1, 0}, Vec3f{0, 1, 1e-20f});
   CHECK(lengths.distance == doctest::Approx(1.0f));
 }
 

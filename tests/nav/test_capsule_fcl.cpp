@@ -6,18 +6,21 @@
 
 #include "cases.hpp"
 #include "fcl_capsules.hpp"
-#include "gsnav/sweep/capsule.hpp"
 #include "gsnav/detail/nav/step.hpp"
+#include "gsnav/sweep/capsule.hpp"
 
 using namespace gsnav;
 
 namespace {
 
 Capsule<double> random_capsule(Rng& rng, double spread, double longest) {
-  const Vec3d p{rng.uniform(-spread, spread), rng.uniform(-spread, spread), rng.uniform(-spread, spread)};
-  const double azimuth = rng.uniform(0, 6.2831853), rise = rng.uniform(-1, 1), flat = std::sqrt(1 - rise * rise);
+  const Vec3d p{rng.uniform(-spread, spread), rng.uniform(-spread, spread),
+                rng.uniform(-spread, spread)};
+  const double azimuth = rng.uniform(0, 6.2831853), rise = rng.uniform(-1, 1),
+               flat = std::sqrt(1 - rise * rise);
   const double length = longest * rng.uniform();
-  return {p, p + Vec3d{flat * std::cos(azimuth), rise, flat * std::sin(azimuth)} * length, rng.uniform(0.01, 0.3)};
+  return {p, p + Vec3d{flat * std::cos(azimuth), rise, flat * std::sin(azimuth)} * length,
+          rng.uniform(0.01, 0.3)};
 }
 
 }  // namespace
@@ -61,7 +64,8 @@ TEST_CASE("property 10: the clearance of an agent is the least of FCL's distance
     std::vector<Capsule<double>> bodies;
     for (int k = 0; k < 6; ++k) bodies.push_back(random_capsule(rng, 3.0, 0.6));
     const CapsuleSet set = CapsuleSet::standing(bodies).value();
-    const AgentState agent{{rng.uniform(-1, 1), rng.uniform(-1, 0), rng.uniform(-1, 1)}, 0.15, 1.5, kNoPoly};
+    const AgentState agent{
+        {rng.uniform(-1, 1), rng.uniform(-1, 0), rng.uniform(-1, 1)}, 0.15, 1.5, kNoPoly};
     const Clearance c = clearance(agent, set, 0);
     const Capsule<double> solid = agent_capsule(agent.position, agent.radius, agent.height);
     std::vector<MovingCapsule<double>> ours(bodies.size(), {solid, solid}), theirs;

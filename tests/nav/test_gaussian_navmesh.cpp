@@ -67,7 +67,8 @@ struct Painter {
 
 constexpr double kDoorLow = 2.0, kDoorHigh = 3.0;
 
-/// Two rooms of 4 x 5 m with a door of 1 m between them, a table in the first, at most a door's way outside.
+/// Two rooms of 4 x 5 m with a door of 1 m between them, a table in the first, at most a door's way
+/// outside.
 Painter flat() {
   Painter p;
   p.ground(0, 0, 8, 5);
@@ -111,7 +112,7 @@ void check_flat(const NavMeshFromGaussians& r, const Similarity& where = {}) {
     REQUIRE(p.x < 7.95);
     REQUIRE(p.z > 0.05);
     REQUIRE(p.z < 4.95);
-    REQUIRE_FALSE((p.x > 0.95 && p.x < 2.25 && p.z > 0.95 && p.z < 1.85));  // the table
+    REQUIRE_FALSE((p.x > 0.95 && p.x < 2.25 && p.z > 0.95 && p.z < 1.85));             // the table
     REQUIRE_FALSE((std::abs(p.x - 4) < 0.05 && (p.z < kDoorLow || p.z > kDoorHigh)));  // the wall
   }
 }
@@ -138,7 +139,8 @@ TEST_CASE("gaussian navmesh: outliers and floaters are harmless") {
     p.splat(d, {0, 1, 0}, 1.0, 0.5);
   }
   for (int i = 0; i < 60; ++i) {  // fist-sized blobs in mid-air and faint clouds
-    p.splat({rng.uniform(0.5, 7.5), rng.uniform(0.5, 1.9), rng.uniform(0.5, 4.5)}, {0, 1, 0}, 0.03, 0.03);
+    p.splat({rng.uniform(0.5, 7.5), rng.uniform(0.5, 1.9), rng.uniform(0.5, 4.5)}, {0, 1, 0}, 0.03,
+            0.03);
     p.opacity = 0.05;
     p.splat({rng.uniform(0.5, 7.5), 1.0, rng.uniform(0.5, 4.5)}, {0, 1, 0}, 0.3, 0.3);
     p.opacity = 0.9;
@@ -271,7 +273,8 @@ TEST_CASE("gaussian navmesh: with triangles: furniture in a mesh, a wall in a sc
   wall.box(3.9, kDoorLow - 0.1, 4.1, kDoorHigh + 0.1, 0, 2.5);
   const GaussianCloud scan = flat().cloud();
   const GaussianSet rooms = scan.set(Similarity{});
-  const auto closed = build_navmesh(gaussian_navmesh_settings(), {&rooms, 1}, wall.vertices, wall.triangles);
+  const auto closed =
+      build_navmesh(gaussian_navmesh_settings(), {&rooms, 1}, wall.vertices, wall.triangles);
   INFO(closed.message());
   REQUIRE(closed.ok());
   CHECK(closed->mesh.find_path({1, 0, 3}, {7, 0, 0.6}).code() == Errc::nothing_navigable);

@@ -27,7 +27,7 @@ using gsnav_test::Soup;
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kStep = 0.02;  // metres
+constexpr double kStep = 0.02;          // metres
 constexpr double kFloatCorners = 1e-5;  // metres: Detour's path has its corners in float
 
 NavMesh build(const Soup& soup, double cell = 0.1) {
@@ -36,28 +36,30 @@ NavMesh build(const Soup& soup, double cell = 0.1) {
   return NavMesh::build(s, soup.vertices, soup.triangles).value();
 }
 
-/// Detour's path, each leg laid on the surface in steps so short that no bump is cut; infinity where a leg does not stay
-/// on it.
-double detour_length(const NavMesh& mesh, const dtNavMeshQuery* query, const NavPoint& a, const NavPoint& b) {
+/// Detour's path, each leg laid on the surface in steps so short that no bump is cut; infinity where a
+/// leg does not stay on it.
+double detour_length(const NavMesh& mesh, const dtNavMeshQuery* query, const NavPoint& a,
+                     const NavPoint& b) {
   const NavMesh::Impl& impl = mesh.impl();
   const auto from = detour_position(mesh, a.position), to = detour_position(mesh, b.position);
   const dtQueryFilter filter;
   std::vector<dtPolyRef> refs(mesh.polygon_count() + 2);
   int count = 0, corners = 0;
-  if (query->findPath(impl.ref_of(a.poly), impl.ref_of(b.poly), from.data(), to.data(), &filter, refs.data(),
-                      &count, static_cast<int>(refs.size())) != DT_SUCCESS) {
+  if (query->findPath(impl.ref_of(a.poly), impl.ref_of(b.poly), from.data(), to.data(), &filter,
+                      refs.data(), &count, static_cast<int>(refs.size())) != DT_SUCCESS) {
     return kInfinity;
   }
   std::vector<float> straight(3 * refs.size());
-  query->findStraightPath(from.data(), to.data(), refs.data(), count, straight.data(), nullptr, nullptr, &corners,
-                          static_cast<int>(refs.size()));
+  query->findStraightPath(from.data(), to.data(), refs.data(), count, straight.data(), nullptr, nullptr,
+                          &corners, static_cast<int>(refs.size()));
   double sum = 0;
   NavPoint at = a;
   for (int i = 1; i < corners; ++i) {
     const float* c = straight.data() + 3 * i;
     const Vec3d goal = Vec3d{static_cast<double>(c[0]), 0, static_cast<double>(c[2])} + impl.origin;
     const Vec3d begin = at.position;
-    const int parts = static_cast<int>(std::ceil(std::hypot(goal.x - begin.x, goal.z - begin.z) / kStep));
+    const int parts =
+        static_cast<int>(std::ceil(std::hypot(goal.x - begin.x, goal.z - begin.z) / kStep));
     for (int k = 1; k <= parts; ++k) {
       const Vec3d next = begin + (goal - begin) * (static_cast<double>(k) / parts);
       const SurfaceWalk w = mesh.walk(at, next - at.position, true);
@@ -108,7 +110,8 @@ NavMesh demo(const char* file) {
 TEST_CASE("geodesic: equals brute force on the visibility graph of random floors with holes") {
   double worst = 0;
   std::size_t corners = 0, touched = 0, floors = 0;
-  for (const std::uint64_t seed : {1u, 2u, 3u, 4u, 5u, 6u, 12u, 19u, 20u, 22u}) {  // parts of the last touch in corners
+  for (const std::uint64_t seed :
+       {1u, 2u, 3u, 4u, 5u, 6u, 12u, 19u, 20u, 22u}) {  // parts of the last touch in corners
     const NavMesh mesh = build(random_boxes(seed, 6 + 2 * static_cast<int>(seed), 12));
     const gsnav_test::VisibilityGraph graph(mesh);
     corners += graph.corner_count();
@@ -117,8 +120,8 @@ TEST_CASE("geodesic: equals brute force on the visibility graph of random floors
     ++floors;
   }
   CHECK(touched >= 4);
-  MESSAGE((floors * gsnav_test::kPathsOfAFloor) << " paths among " << corners << " corners: at most " << worst
-                                              << " m from the truth");
+  MESSAGE((floors * gsnav_test::kPathsOfAFloor)
+          << " paths among " << corners << " corners: at most " << worst << " m from the truth");
 }
 
 TEST_CASE("geodesic: closed forms") {
@@ -132,11 +135,13 @@ TEST_CASE("geodesic: closed forms") {
   REQUIRE(path->points.size() == 3);
   const Vec3d corner = path->points[1];
   CHECK(max(std::abs(corner.x - 5), std::abs(corner.z - 5)) == doctest::Approx(2.1).epsilon(0.03));
-  CHECK(path->length == doctest::Approx(norm(corner - Vec3d{2, 0, 2}) + norm(corner - Vec3d{8, 0, 8})).epsilon(1e-9));
+  CHECK(path->length ==
+        doctest::Approx(norm(corner - Vec3d{2, 0, 2}) + norm(corner - Vec3d{8, 0, 8})).epsilon(1e-9));
   CHECK(path->length == doctest::Approx(2 * std::hypot(0.9, 5.1)).epsilon(0.01));
   CHECK(mesh.geodesic_distance({1, 0, 1}, {9, 0, 1}) == doctest::Approx(8).epsilon(1e-9));
   CHECK(mesh.geodesic_distance({1, 0, 1}, {1, 0, 1}) == 0);
-  CHECK(mesh.geodesic_distance(corner, {8, 0, 8}) == doctest::Approx(norm(corner - Vec3d{8, 0, 8})).epsilon(1e-9));
+  CHECK(mesh.geodesic_distance(corner, {8, 0, 8}) ==
+        doctest::Approx(norm(corner - Vec3d{8, 0, 8})).epsilon(1e-9));
 
   // Up a ramp of 30 degrees: the length is the slope's, not the plan's.
   Soup ramp;
@@ -179,8 +184,10 @@ TEST_CASE("geodesic: symmetric, and no detour is shorter") {
 }
 
 TEST_CASE("geodesic: the surface has no step where Recast's height triangles overlap") {
-  // Delaunay's triangles of samples on one circle: a polygon of each of these had some twice, others not at all.
-  for (const auto& [file, tile_size] : {std::pair{"nav/recast/nav_test.obj", 0}, {"nav/recast/undulating.obj", 128}}) {
+  // Delaunay's triangles of samples on one circle: a polygon of each of these had some twice, others not
+  // at all.
+  for (const auto& [file, tile_size] :
+       {std::pair{"nav/recast/nav_test.obj", 0}, {"nav/recast/undulating.obj", 128}}) {
     const std::string path = gsnav_test::data_file(file);
     if (path.empty()) continue;
     const Soup soup = gsnav_test::read_obj(path);
@@ -292,7 +299,8 @@ TEST_CASE("geodesic: fields over slopes") {
   }
 }
 
-TEST_CASE("geodesic: a point's face and height by the grid are those of the height triangle that it is on") {
+TEST_CASE(
+    "geodesic: a point's face and height by the grid are those of the height triangle that it is on") {
   Soup waves;
   const auto height = [](int x, int z) { return 0.8 * std::sin(0.7 * x) * std::cos(0.6 * z); };
   for (int x = 0; x < 12; ++x) {
@@ -323,21 +331,23 @@ TEST_CASE("geodesic: a point's face and height by the grid are those of the heig
       REQUIRE(f.poly == p.poly);
       long double inside = 1;  // metres
       for (std::uint32_t k = 0; k < f.count; ++k) {
-        const Vec3d &a = faces.edges[f.first + k].corner, &b = faces.edges[f.first + (k + 1) % f.count].corner;
+        const Vec3d &a = faces.edges[f.first + k].corner,
+                    &b = faces.edges[f.first + (k + 1) % f.count].corner;
         const long double ex = b.x - a.x, ez = b.z - a.z;
         const long double side = ex * (at.position.z - a.z) - (at.position.x - a.x) * ez;
         inside = std::min(inside, side / std::max(std::hypot(ex, ez), 1e-12L));
       }
       REQUIRE(inside > -1e-9L);
-      // Beside its polygon a point is taken to the polygon's nearest, or to the triangle that stands out there.
+      // Beside its polygon a point is taken to the polygon's nearest, or to the triangle that stands out
+      // there.
       p.position.x += rng.uniform(-0.5, 0.5);
       p.position.z += rng.uniform(-0.5, 0.5);
       const Vec3d beside = impl.site(p).position + impl.origin;
       const Vec3d nearest = impl.polys.clamped(p.poly, p.position - impl.origin) + impl.origin;
       if (std::hypot(beside.x - nearest.x, beside.z - nearest.z) > 0.01) ++off;
     }
-    MESSAGE(faces.faces.size() << " faces, " << by_grid << " of " << n << " points by the grid, at most " << worst
-                               << " m from where they were drawn");
+    MESSAGE(faces.faces.size() << " faces, " << by_grid << " of " << n << " points by the grid, at most "
+                               << worst << " m from where they were drawn");
     CHECK(by_grid > n / 4);
     CHECK(worst < 1e-9);
     CHECK(off == 0);
@@ -358,10 +368,12 @@ TEST_CASE("geodesic: as far there as back for points that lie a rounding outside
     if (mesh.island_of(id) != 0) continue;
     const detail::PolyMesh::Poly& poly = impl.polys.polys[id];
     const auto k = static_cast<std::uint32_t>(id % poly.count);
-    const NavPoint p{lerp(impl.polys.corner(poly, k), impl.polys.corner(poly, k + 1), 0.25) + impl.origin, id};
+    const NavPoint p{
+        lerp(impl.polys.corner(poly, k), impl.polys.corner(poly, k + 1), 0.25) + impl.origin, id};
     // A micrometre farther in.
     Vec3d middle{};
-    for (std::uint32_t c = 0; c < poly.count; ++c) middle += impl.polys.corner(poly, c) * (1.0 / poly.count);
+    for (std::uint32_t c = 0; c < poly.count; ++c)
+      middle += impl.polys.corner(poly, c) * (1.0 / poly.count);
     middle += impl.origin;
     const NavPoint q{p.position + (middle - p.position) * (1e-5 / norm(middle - p.position)), id};
     const NavPoint& goal = goals[id % goals.size()];
@@ -369,19 +381,22 @@ TEST_CASE("geodesic: as far there as back for points that lie a rounding outside
     turned = max(turned, std::abs(there - mesh.distance_between(goal, p)));
     worst = max(worst, std::abs(there - mesh.distance_between(q, goal)));
   }
-  MESSAGE("there and back differ by at most " << turned << " m, from 0.01 mm farther in by " << worst << " m");
+  MESSAGE("there and back differ by at most " << turned << " m, from 0.01 mm farther in by " << worst
+                                              << " m");
   CHECK(turned < 1e-5);
   CHECK(worst < 1e-3);
 }
 
-TEST_CASE("geodesic: a field's cells hold the least of all ways, on hills, at corners and beside the mesh") {
+TEST_CASE(
+    "geodesic: a field's cells hold the least of all ways, on hills, at corners and beside the mesh") {
   // Against the search over windows from each point, which knows neither fields nor cells.
   for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/undulating.obj"}) {
     if (gsnav_test::data_file(file).empty()) continue;
     const NavMesh mesh = demo(file);
     const NavMesh::Impl& impl = mesh.impl();
     Rng rng(42);
-    const std::vector<Vec3d> goals{mesh.random_point(rng, 0).position, mesh.random_point(rng, 0).position};
+    const std::vector<Vec3d> goals{mesh.random_point(rng, 0).position,
+                                   mesh.random_point(rng, 0).position};
     std::vector<detail::Site> ends;
     for (const Vec3d& g : goals) ends.push_back(impl.site(*mesh.snap_point(g)));
     std::vector<NavPoint> points;
@@ -390,9 +405,11 @@ TEST_CASE("geodesic: a field's cells hold the least of all ways, on hills, at co
       points[i].position.x += rng.uniform(-0.2, 0.2);
       points[i].position.z += rng.uniform(-0.2, 0.2);
       const detail::PolyMesh::Poly& poly = impl.polys.polys[points[i + 1].poly];
-      points[i + 1].position = impl.polys.corner(poly, static_cast<std::uint32_t>(i % poly.count)) + impl.origin;
+      points[i + 1].position =
+          impl.polys.corner(poly, static_cast<std::uint32_t>(i % poly.count)) + impl.origin;
       points[i + 2].position = lerp(impl.polys.corner(impl.polys.polys[points[i + 2].poly], 0),
-                                    impl.polys.corner(impl.polys.polys[points[i + 2].poly], 1), 0.25) + impl.origin;
+                                    impl.polys.corner(impl.polys.polys[points[i + 2].poly], 1), 0.25) +
+                               impl.origin;
     }
     detail::GeodesicSearch search;
     std::vector<double> truth;
@@ -410,8 +427,8 @@ TEST_CASE("geodesic: a field's cells hold the least of all ways, on hills, at co
         above = max(above, off - error * truth[i]);
         below = max(below, -off);
       }
-      MESSAGE(std::string(file) << ", error " << error << ": above by at most " << above << " m more, below by "
-                                << below << " m");
+      MESSAGE(std::string(file) << ", error " << error << ": above by at most " << above
+                                << " m more, below by " << below << " m");
       CHECK(above < 1e-7);
       CHECK(below < 1e-7);
     }

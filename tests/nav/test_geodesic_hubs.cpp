@@ -22,7 +22,8 @@ NavMesh build(const Soup& soup, double cell, int tile_size = 0) {
   return NavMesh::build(s, soup.vertices, soup.triangles).value();
 }
 
-/// Distances by corners and hubs against the search over windows, and paths that are as long as they say.
+/// Distances by corners and hubs against the search over windows, and paths that are as long as they
+/// say.
 void check(const NavMesh& mesh, int pairs, double tolerance) {
   const NavMesh::Impl& impl = mesh.impl();
   REQUIRE_FALSE(impl.hubs().empty());
@@ -40,12 +41,13 @@ void check(const NavMesh& mesh, int pairs, double tolerance) {
     const NavPath path = mesh.path_between(a, b).value();
     REQUIRE(path.length == by_hubs);
     double sum = 0;
-    for (std::size_t k = 1; k < path.points.size(); ++k) sum += norm(path.points[k] - path.points[k - 1]);
+    for (std::size_t k = 1; k < path.points.size(); ++k)
+      sum += norm(path.points[k] - path.points[k - 1]);
     REQUIRE(sum <= path.length + 1e-6);
     REQUIRE(sum >= path.length - tolerance * static_cast<double>(path.points.size()));
   }
-  MESSAGE(mesh.polygon_count() << " polygons, " << pairs << " pairs, " << bent << " of them bent: worst difference "
-                               << worst << " m");
+  MESSAGE(mesh.polygon_count() << " polygons, " << pairs << " pairs, " << bent
+                               << " of them bent: worst difference " << worst << " m");
   CHECK(worst < 1e-6);
   CHECK(bent > pairs / 10);
 }
@@ -53,7 +55,8 @@ void check(const NavMesh& mesh, int pairs, double tolerance) {
 }  // namespace
 
 TEST_CASE("geodesic: by hubs the distances of the search") {
-  for (const std::uint64_t seed : {3u, 4u}) check(build(random_boxes(seed, 30, 20), 0.1), cases(50000), 0.02);
+  for (const std::uint64_t seed : {3u, 4u})
+    check(build(random_boxes(seed, 30, 20), 0.1), cases(50000), 0.02);
   for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/dungeon.obj"}) {
     const std::string path = data_file(file);
     if (path.empty()) continue;
@@ -63,7 +66,8 @@ TEST_CASE("geodesic: by hubs the distances of the search") {
 }
 
 TEST_CASE("geodesic: by hubs the distances of the search where edges of many tiles lie in line") {
-  for (const std::uint64_t seed : {5u, 6u}) check(build(random_boxes(seed, 12, 12), 0.1, 16), cases(20000), 0.02);
+  for (const std::uint64_t seed : {5u, 6u})
+    check(build(random_boxes(seed, 12, 12), 0.1, 16), cases(20000), 0.02);
   Soup slopes = random_boxes(7, 8, 10);
   slopes.quad({10, 0, 2}, {10, 0, 6}, {14, 1.5, 6}, {14, 1.5, 2});
   slopes.quad({14, 1.5, 2}, {14, 1.5, 6}, {18, 0.5, 7}, {18, 0.5, 1});
@@ -71,7 +75,9 @@ TEST_CASE("geodesic: by hubs the distances of the search where edges of many til
   check(build(slopes, 0.1, 24), cases(20000), 0.02);
 }
 
-TEST_CASE("geodesic: by hubs the distances of the search where corners are too many for a table of all pairs") {
+TEST_CASE(
+    "geodesic: by hubs the distances of the search where corners are too many for a table of all "
+    "pairs") {
   const NavMesh mesh = build(random_boxes(8, 300, 45), 0.1);
   REQUIRE(mesh.impl().hubs().corners() > detail::CornerHubs::kMostTable);
   check(mesh, cases(5000), 0.02);
@@ -121,7 +127,8 @@ TEST_CASE("geodesic: few edges of nav_test's hills are taken to see what they do
     blind += sees_other ? 1 : 0;
     ++on_hills;
   }
-  MESSAGE(blind << " of " << on_hills << " edges of the smaller islands are taken to see another island");
+  MESSAGE(blind << " of " << on_hills
+                << " edges of the smaller islands are taken to see another island");
   CHECK(blind < on_hills / 5);
 }
 
@@ -144,7 +151,8 @@ TEST_CASE("geodesic: a mesh of too many sights keeps the search") {
   }
 }
 
-TEST_CASE("property 17: paths of thousands of polygons are found, as long as a field of distances says") {
+TEST_CASE(
+    "property 17: paths of thousands of polygons are found, as long as a field of distances says") {
   // Walls across a hall, open at alternate ends: from row to row there is one way.
   constexpr int kRows = 150;
   Soup soup;
@@ -166,7 +174,8 @@ TEST_CASE("property 17: paths of thousands of polygons are found, as long as a f
       const double d = mesh.distance_between(p, goal);
       REQUIRE(d < std::numeric_limits<double>::infinity());
       REQUIRE(std::abs(d - field.distance(p)) < 1e-6 * max(d, 1.0));
-      const int rows = std::abs(static_cast<int>(p.position.z / 2) - static_cast<int>(goal.position.z / 2));
+      const int rows =
+          std::abs(static_cast<int>(p.position.z / 2) - static_cast<int>(goal.position.z / 2));
       REQUIRE(d >= 18.0 * (rows - 2));
       longest += rows > 100 ? 1 : 0;
     }

@@ -13,8 +13,8 @@
 
 using namespace gsnav;
 using namespace gsnav_test;
-using detail::HalfPlane;
 using detail::Ground;
+using detail::HalfPlane;
 
 namespace {
 
@@ -124,7 +124,8 @@ TEST_CASE(
     for (const Body& b : around) {
       if (plan.safe) REQUIRE(least(b, plan.velocity) >= b.reach - 1e-9);
       // A sweep ends half a skin before bodies touch.
-      preferred_is_safe = preferred_is_safe && least(b, preferred) >= b.reach + 0.5 * StepOptions{}.skin + 1e-9;
+      preferred_is_safe =
+          preferred_is_safe && least(b, preferred) >= b.reach + 0.5 * StepOptions{}.skin + 1e-9;
     }
     if (preferred_is_safe) {
       REQUIRE(plan.safe);
@@ -138,8 +139,9 @@ TEST_CASE(
   MESSAGE(n << " plans: " << free << " as preferred, " << turned << " turned, " << unsafe
             << " with no safe velocity");
   CHECK(free > n / 5);
-  // What is preferred is not safe in one case of eight, whoever plans. Most of those are turned into a safe
-  // velocity; in the others there is none among those tried, or it costs more than a contact some seconds ahead.
+  // What is preferred is not safe in one case of eight, whoever plans. Most of those are turned into a
+  // safe velocity; in the others there is none among those tried, or it costs more than a contact some
+  // seconds ahead.
   CHECK(turned + unsafe > n / 10);
   CHECK(turned > unsafe);
   CHECK(unsafe > 0);

@@ -5,8 +5,8 @@
 #include <limits>
 #include <thread>
 
-#include "gsnav/nav/navmesh.hpp"
 #include "gsnav/detail/nav/step.hpp"
+#include "gsnav/nav/navmesh.hpp"
 #include "meshes.hpp"
 #include "support/data.hpp"
 #include "walk_check.hpp"
@@ -34,7 +34,8 @@ TEST_CASE("navmesh: a square floor has the area left by the agent's radius") {
   CHECK(b.low.x == doctest::Approx(0.15).epsilon(1e-3));
   CHECK(b.high.z == doctest::Approx(5.85).epsilon(1e-3));
   CHECK(mesh.is_navigable({5, 0.1, 3}));
-  CHECK(mesh.snap_point({5, 1, 3})->position.y == doctest::Approx(0).epsilon(1e-6));  // on the floor itself
+  CHECK(mesh.snap_point({5, 1, 3})->position.y ==
+        doctest::Approx(0).epsilon(1e-6));  // on the floor itself
   CHECK_FALSE(mesh.is_navigable({5, 0.1, 5.99}));
   CHECK_FALSE(mesh.is_navigable({5, 3, 3}));
   CHECK(mesh.geodesic_distance({1, 0, 1}, {9, 0, 1}) == doctest::Approx(8.0).epsilon(1e-6));
@@ -52,17 +53,20 @@ TEST_CASE("navmesh: impossible input is refused by name") {
   CHECK(r.message().find("agent_radius") != std::string::npos);
   s = {};
   s.cell_size = 0;
-  CHECK(NavMesh::build(s, soup.vertices, soup.triangles).message().find("cell_size") != std::string::npos);
+  CHECK(NavMesh::build(s, soup.vertices, soup.triangles).message().find("cell_size") !=
+        std::string::npos);
   s = {};
   s.max_cells = 100;
-  CHECK(NavMesh::build(s, soup.vertices, soup.triangles).message().find("max_cells") != std::string::npos);
+  CHECK(NavMesh::build(s, soup.vertices, soup.triangles).message().find("max_cells") !=
+        std::string::npos);
 
   Soup bad = soup;
   bad.vertices[2].y = nan;
   CHECK(NavMesh::build({}, bad.vertices, bad.triangles).message().find("vertex 2") != std::string::npos);
   bad = soup;
   bad.triangles[1][2] = 99;
-  CHECK(NavMesh::build({}, bad.vertices, bad.triangles).message().find("triangle 1") != std::string::npos);
+  CHECK(NavMesh::build({}, bad.vertices, bad.triangles).message().find("triangle 1") !=
+        std::string::npos);
 
   Soup walls;
   walls.quad({0, 0, 0}, {4, 0, 0}, {4, 3, 0}, {0, 3, 0});
@@ -116,7 +120,8 @@ TEST_CASE("navmesh: islands, by falling area, and samples on them") {
     REQUIRE(mesh.island_of(q.poly) == 0);
     mean += q.position * (1.0 / n);
   }
-  CHECK(on_largest / double(n) == doctest::Approx(mesh.island_area(0) / mesh.navigable_area()).epsilon(0.04));
+  CHECK(on_largest / double(n) ==
+        doctest::Approx(mesh.island_area(0) / mesh.navigable_area()).epsilon(0.04));
   CHECK(mean.x == doctest::Approx(25).epsilon(0.01));
   CHECK(mean.z == doctest::Approx(5).epsilon(0.05));
 }

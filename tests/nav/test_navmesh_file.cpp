@@ -65,9 +65,10 @@ std::vector<std::byte> tiled() {
   return saved(NavMesh::build(s, soup.vertices, soup.triangles).value());
 }
 
-/// A file of `count` polygons that lie on each other, `length` metres long: triangles of so many height triangles, or
-/// the same with each corner twice.
-std::vector<std::byte> pile(std::int32_t count, float length, std::int32_t heights = 1, bool twice = false) {
+/// A file of `count` polygons that lie on each other, `length` metres long: triangles of so many height
+/// triangles, or the same with each corner twice.
+std::vector<std::byte> pile(std::int32_t count, float length, std::int32_t heights = 1,
+                            bool twice = false) {
   std::vector<std::byte> b;
   const auto put = [&](const auto& v) {
     const auto* p = reinterpret_cast<const std::byte*>(&v);
@@ -83,7 +84,8 @@ std::vector<std::byte> pile(std::int32_t count, float length, std::int32_t heigh
   floats({0, 0, 0, length, length});
   ints({1, count});
   ints({1, 100 + 36 + 12 + count * (32 + 12 + 4 * heights)});  // reference and size; counts of the tile
-  ints({'D' << 24 | 'N' << 16 | 'A' << 8 | 'V', 7, 0, 0, 0, 0, count, 3, 1, count, 0, count * heights, 0, 0, count});
+  ints({'D' << 24 | 'N' << 16 | 'A' << 8 | 'V', 7, 0, 0, 0, 0, count, 3, 1, count, 0, count * heights, 0,
+        0, count});
   floats({1.5f, 0.1f, 0.2f, 0, 0, 0, length, 1, length, 1});
   floats({0, 0, 0, 0, 0, 1, length, 0, 1});
   for (std::int32_t i = 0; i < count; ++i) {
@@ -105,7 +107,9 @@ std::vector<std::byte> pile(std::int32_t count, float length, std::int32_t heigh
   return b;
 }
 
-void patch(std::vector<std::byte>& b, std::size_t at, std::int32_t v) { std::memcpy(b.data() + at, &v, 4); }
+void patch(std::vector<std::byte>& b, std::size_t at, std::int32_t v) {
+  std::memcpy(b.data() + at, &v, 4);
+}
 
 /// Asks what reads most of a mesh.
 void use(const NavMesh& mesh) {
@@ -164,8 +168,8 @@ TEST_CASE("navmesh file: version 1, which has no settings, is written and read")
   const Vec3d at{120, -7, 33};
   const NavMesh mesh = boxes(at);
   const auto bytes = saved(mesh, 1), second = saved(mesh);
-  // magic, version, numTiles; orig, tileWidth, tileHeight, maxTiles, maxPolys; tileRef, dataSize; magic and version of
-  // the tile, whose agent the settings are taken from.
+  // magic, version, numTiles; orig, tileWidth, tileHeight, maxTiles, maxPolys; tileRef, dataSize; magic
+  // and version of the tile, whose agent the settings are taken from.
   const auto int_at = [&](std::size_t k) {
     std::int32_t v = 0;
     std::memcpy(&v, bytes.data() + k, 4);
@@ -361,7 +365,9 @@ TEST_CASE("navmesh file: what is wrong is named") {
     CHECK(r.message().find("x.navmesh") == 0);
     return r.message();
   };
-  const auto names = [](const std::string& m, const char* word) { return m.find(word) != std::string::npos; };
+  const auto names = [](const std::string& m, const char* word) {
+    return m.find(word) != std::string::npos;
+  };
   CHECK(names(message(0, 7), "magic = 7"));
   CHECK(names(message(4, 3), "version = 3"));
   CHECK(names(message(8, 1 << 30), "numTiles = 1073741824"));
@@ -370,22 +376,30 @@ TEST_CASE("navmesh file: what is wrong is named") {
   CHECK(names(message(104 + 24, 0x7fffffff), "polyCount = 2147483647"));
   CHECK(names(message(104 + 32, 0), "maxLinkCount = 0"));
   CHECK(names(message(104 + 100, 0x7f800000), "vertex 0"));
-  for (const std::size_t size : {std::size_t{0}, std::size_t{20}, std::size_t{60}, std::size_t{110}, good.size() - 1}) {
+  for (const std::size_t size :
+       {std::size_t{0}, std::size_t{20}, std::size_t{60}, std::size_t{110}, good.size() - 1}) {
     CHECK(parse_navmesh(std::span(good).first(size), "x").code() == Errc::invalid_file);
   }
 }
 
 TEST_CASE("navmesh file: a polygon of no area without height triangles has points to draw") {
   // Found by fuzzing: four corners, two of them in one place, a record of no triangles.
-  const auto mesh = parse_navmesh(bytes_of_hex(
-      "5445534d020000000100000000000000000000000000000000004040000040400100000001000000cdcc4c3dcdcc4c3e0000c03f"
-      "cdcccc3dcdcc4c3e000034420000a0410000a041000040416666a63f0000c0400000c0400000803f010101000100000018010000"
-      "56414e44070000000000000000000000000000000000000001000000040000000400000001000000000000000200000002000000"
-      "00000000010000000000c03fcdcccc3dcdcc4c3e00000000000000000000000000004040cdcccc3f000040400000a04198000040"
-      "40000040400100000001003e000000006766364067663640000000006766364067663640000000009899193eff05000000000000"
-      "00000300000000000000000000000000000000000100043f0000000000000000010000000000000000000000020000803f010101"
-      "00010000001801000056414e44070000000000000000000000000000000000000300021100010205020008000200390008003900"
-      "0000000000000000000000000000000000000000"), "sliver");
+  const auto mesh = parse_navmesh(bytes_of_hex("5445534d020000000100000000000000000000000000000000004040"
+                                               "000040400100000001000000cdcc4c3dcdcc4c3e0000c03f"
+                                               "cdcccc3dcdcc4c3e000034420000a0410000a041000040416666a63f"
+                                               "0000c0400000c0400000803f010101000100000018010000"
+                                               "56414e44070000000000000000000000000000000000000001000000"
+                                               "040000000400000001000000000000000200000002000000"
+                                               "00000000010000000000c03fcdcccc3dcdcc4c3e0000000000000000"
+                                               "0000000000004040cdcccc3f000040400000a04198000040"
+                                               "40000040400100000001003e00000000676636406766364000000000"
+                                               "6766364067663640000000009899193eff05000000000000"
+                                               "00000300000000000000000000000000000000000100043f00000000"
+                                               "00000000010000000000000000000000020000803f010101"
+                                               "00010000001801000056414e44070000000000000000000000000000"
+                                               "000000000300021100010205020008000200390008003900"
+                                               "0000000000000000000000000000000000000000"),
+                                  "sliver");
   CAPTURE(mesh.message());
   REQUIRE(mesh.ok());
   Rng rng(1);
@@ -396,7 +410,8 @@ TEST_CASE("navmesh file: a polygon of no area without height triangles has point
   }
 }
 
-TEST_CASE("navmesh file: no allocation is over four times the file, whatever its polygons share or cover") {
+TEST_CASE(
+    "navmesh file: no allocation is over four times the file, whatever its polygons share or cover") {
   std::vector<std::vector<std::byte>> files{saved(boxes())};
   for (const char* name : {"nav/recast/nav_test.obj", "nav/recast/dungeon.obj"}) {
     const std::string path = gsnav_test::data_file(name);
@@ -432,7 +447,8 @@ TEST_CASE("navmesh file: no allocation is over four times the file, whatever its
     CAPTURE(mesh.message());
     CHECK(mesh.ok());
     CHECK(gsnav_test::largest_allocation() <= 4 * file.size() + 512);
-    most = max(most, static_cast<double>(gsnav_test::largest_allocation()) / static_cast<double>(file.size()));
+    most = max(most,
+               static_cast<double>(gsnav_test::largest_allocation()) / static_cast<double>(file.size()));
   }
   MESSAGE("at most " << most << " times the file");
   // Polygons that share their height triangles.
@@ -443,7 +459,8 @@ TEST_CASE("navmesh file: no allocation is over four times the file, whatever its
     return v;
   };
   const std::size_t tile = 104, polys = static_cast<std::size_t>(at(tile + 24)),
-                    verts = static_cast<std::size_t>(at(tile + 28)), links = static_cast<std::size_t>(at(tile + 32));
+                    verts = static_cast<std::size_t>(at(tile + 28)),
+                    links = static_cast<std::size_t>(at(tile + 32));
   const std::size_t details = tile + 100 + 12 * verts + 32 * polys + 12 * links;
   for (std::size_t i = 0; i < polys; ++i) {
     patch(shared, details + 12 * i + 4, 0);
@@ -456,15 +473,22 @@ TEST_CASE("navmesh file: no allocation is over four times the file, whatever its
 
 TEST_CASE("navmesh file: polygons that lie on one another have paths, each edge in a fan") {
   // Found by fuzzing: one edge was two others' neighbour.
-  const auto mesh = parse_navmesh(bytes_of_hex(
-      "5445534d020000000100000000000000000000000000000040000040000040400100000001000000cdcc4c3dc9cc4c3e0000c03f"
-      "cdcccc3dcdcc4c00000181420000a0410000a041000040416666a63f0000c0400000c040e800803f010108000100000018010000"
-      "56414e44070000000000000000000000000000000000000001000000040000000400000001000000000000000200000002000000"
-      "0000000001000000fa00c03fcdcccc3dcdcc4c3e00000000000000000000000000004040cdcccc3f00004040000060be67ffffbf"
-      "d4fe0040400001400211000102050207f80002003900080039000000000031bf989bc9c00008400f04000000000000ff00000100"
-      "02000300000001000000000000000000000000fc0100063f00000000290100000000000000000000000200000000000000000000"
-      "000300000000000000000000ffffffff0000000000000000000000000002000003000211000102050207f8000200390008003900"
-      "0000000000001000000000000000000000000000"), "folded");
+  const auto mesh = parse_navmesh(bytes_of_hex("5445534d020000000100000000000000000000000000000040000040"
+                                               "000040400100000001000000cdcc4c3dc9cc4c3e0000c03f"
+                                               "cdcccc3dcdcc4c00000181420000a0410000a041000040416666a63f"
+                                               "0000c0400000c040e800803f010108000100000018010000"
+                                               "56414e44070000000000000000000000000000000000000001000000"
+                                               "040000000400000001000000000000000200000002000000"
+                                               "0000000001000000fa00c03fcdcccc3dcdcc4c3e0000000000000000"
+                                               "0000000000004040cdcccc3f00004040000060be67ffffbf"
+                                               "d4fe0040400001400211000102050207f80002003900080039000000"
+                                               "000031bf989bc9c00008400f04000000000000ff00000100"
+                                               "02000300000001000000000000000000000000fc0100063f00000000"
+                                               "290100000000000000000000000200000000000000000000"
+                                               "000300000000000000000000ffffffff000000000000000000000000"
+                                               "0002000003000211000102050207f8000200390008003900"
+                                               "0000000000001000000000000000000000000000"),
+                                  "folded");
   CAPTURE(mesh.message());
   REQUIRE(mesh.ok());
   Rng rng(1);
@@ -490,10 +514,15 @@ TEST_CASE("navmesh file: mutated and truncated files do no harm") {
       for (std::uint64_t k = 1 + rng.below(4); k-- > 0;) {
         const std::size_t at = rng.below(i % 2 ? min<std::size_t>(b.size(), 400) : b.size());
         switch (rng.below(4)) {
-          case 0: b[at] ^= static_cast<std::byte>(1u << rng.below(8)); break;
-          case 1: b[at] = static_cast<std::byte>(rng.below(256)); break;
+          case 0:
+            b[at] ^= static_cast<std::byte>(1u << rng.below(8));
+            break;
+          case 1:
+            b[at] = static_cast<std::byte>(rng.below(256));
+            break;
           case 2:
-            if (at + 4 <= b.size()) patch(b, at & ~std::size_t{3}, static_cast<std::int32_t>(rng.next()));
+            if (at + 4 <= b.size())
+              patch(b, at & ~std::size_t{3}, static_cast<std::int32_t>(rng.next()));
             break;
           default:
             if (rng.below(8) == 0) b.resize(at + 1);

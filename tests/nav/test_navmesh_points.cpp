@@ -122,7 +122,8 @@ void check_uniform(const NavMesh& mesh) {
   double area = 0;
   for (const double a : areas) area += a;
   // Of polygons that are not plane the mesh counts the corners' fan; there are more of those in tiles.
-  CHECK(mesh.navigable_area() == doctest::Approx(area).epsilon(mesh.settings().tile_size > 0 ? 3e-3 : 1e-3));
+  CHECK(mesh.navigable_area() ==
+        doctest::Approx(area).epsilon(mesh.settings().tile_size > 0 ? 3e-3 : 1e-3));
   std::vector<double> seen(areas.size(), 0.0), of_island = seen, areas_of_island = seen;
   Rng rng(2);
   for (int i = 0; i < kPoints; ++i) {

@@ -138,7 +138,8 @@ void compare_distances(const NavMesh& one, const NavMesh& tiled, int pairs, doub
   CHECK(sum <= within * length);
 }
 
-/// The floor of one tile, its islands and area, and no step at a border. `reach`: as check_within has it, metres.
+/// The floor of one tile, its islands and area, and no step at a border. `reach`: as check_within has
+/// it, metres.
 Borders check_same_floor(const NavMesh& one, const NavMesh& tiled, double area, double reach) {
   const Borders borders = borders_of(tiled);
   CHECK(borders.step < kPlanar);

@@ -20,9 +20,7 @@ namespace {
 
 Capsule<double> post(double x, double z, double r = 0.2) { return {{x, 0.1, z}, {x, 1.7, z}, r}; }
 
-CapsuleSet standing(std::vector<Capsule<double>> list) {
-  return CapsuleSet::standing(list).value();
-}
+CapsuleSet standing(std::vector<Capsule<double>> list) { return CapsuleSet::standing(list).value(); }
 
 CapsuleSet moving(const Capsule<double>& from, const Capsule<double>& to, std::uint32_t avatar = 0) {
   return CapsuleSet::create({{{from, to}, avatar, 0}}).value();
@@ -97,7 +95,8 @@ TEST_CASE("capsules: bad ones are refused by avatar and bone") {
 
 TEST_CASE("step: invalid input returns the start") {
   const NavMesh mesh = room();
-  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  const double nan = std::numeric_limits<double>::quiet_NaN(),
+               inf = std::numeric_limits<double>::infinity();
   const AgentState good = agent_at(1, 1);
   for (const Vec3d d : {Vec3d{nan, 0, 0}, Vec3d{0, inf, 0}, Vec3d{0, 0, -inf}}) {
     const StepResult r = step(mesh, good, d, {});
@@ -130,7 +129,8 @@ TEST_CASE("step: the solid is inside its height") {
   CHECK(step(room(), point, {5, 0, 0}, standing({log}), {.slide = false}).position.x ==
         doctest::Approx(1.8 - 1e-4).epsilon(1e-6));
   // Over the head and under the raised arm.
-  CHECK_FALSE(step(room(), agent_at(0, 0), {5, 0, 0}, standing({{{2, 1.75, -1}, {2, 1.75, 1}, 0.2}})).blocked());
+  CHECK_FALSE(
+      step(room(), agent_at(0, 0), {5, 0, 0}, standing({{{2, 1.75, -1}, {2, 1.75, 1}, 0.2}})).blocked());
   CHECK(step(room(), agent_at(0, 0), {5, 0, 0}, standing({{{2, 1.6, -1}, {2, 1.6, 1}, 0.2}})).blocked());
 }
 

@@ -43,7 +43,8 @@ TEST_CASE("step as habitat_gs: stops before a standing body, by at most what six
   for (int i = 0; i < cases(100000); ++i) {
     AgentState agent = agent_at(rng.uniform(-3, 3), rng.uniform(-3, 3));
     agent.radius = rng.uniform(0.05, 0.3);
-    const double length = rng.uniform(0.1, 0.45), radius = rng.uniform(0.1, 0.4), reach = radius + agent.radius;
+    const double length = rng.uniform(0.1, 0.45), radius = rng.uniform(0.1, 0.4),
+                 reach = radius + agent.radius;
     const Vec3d d = heading(rng, length), ahead = d * (1 / length);
     // Straight ahead, met within the step.
     const double gap = rng.uniform(0.001, 0.9) * length;

@@ -338,7 +338,9 @@ TEST_CASE("property 13: one tick and its two halves agree about contact") {
   CHECK(contacts > n / 40);
 }
 
-TEST_CASE("property 10: a step that a body stops ends on the polygon that it says, and distances from there are right") {
+TEST_CASE(
+    "property 10: a step that a body stops ends on the polygon that it says, and distances from there "
+    "are right") {
   for (const int tile_size : {0, 64}) {
     NavMeshSettings settings;
     settings.tile_size = tile_size;
@@ -352,13 +354,17 @@ TEST_CASE("property 10: a step that a body stops ends on the polygon that it say
       const Vec3d ahead{std::cos(yaw), 0, std::sin(yaw)}, at = a.position + off * ahead;
       const Capsule<double> body{at + Vec3d{0, 0.2, 0}, at + Vec3d{0, 1.6, 0}, 0.15};
       const CapsuleSet bodies = CapsuleSet::standing(std::span(&body, 1)).value();
-      const StepResult r = step(mesh, {a.position, 0.1, 1.5, a.poly}, 0.25 * ahead, bodies, {.slide = i % 2 == 0});
+      const StepResult r =
+          step(mesh, {a.position, 0.1, 1.5, a.poly}, 0.25 * ahead, bodies, {.slide = i % 2 == 0});
       if (r.blocked_by != BlockedBy::capsule) continue;
       ++contacts;
       const NavPoint goal = mesh.random_point(rng, mesh.island_of(a.poly));
       const auto there = mesh.snap_point(r.position, {{0.01, 0.3, 0.01}});
       REQUIRE(there.has_value());
-      wrong += std::abs(mesh.distance_between({r.position, r.poly}, goal) - mesh.distance_between(*there, goal)) > 1e-6 ? 1 : 0;
+      wrong += std::abs(mesh.distance_between({r.position, r.poly}, goal) -
+                        mesh.distance_between(*there, goal)) > 1e-6
+                   ? 1
+                   : 0;
     }
     CAPTURE(tile_size);
     CHECK(contacts > cases(6000) / 2);
@@ -366,7 +372,9 @@ TEST_CASE("property 10: a step that a body stops ends on the polygon that it say
   }
 }
 
-TEST_CASE("property 11: no step is too long to stay on the mesh and out of bodies, and points stop points without a skin") {
+TEST_CASE(
+    "property 11: no step is too long to stay on the mesh and out of bodies, and points stop points "
+    "without a skin") {
   Soup floor;
   floor.floor(0, 0, 10, 10);
   const NavMesh open = NavMesh::build({}, floor.vertices, floor.triangles).value();
@@ -374,7 +382,8 @@ TEST_CASE("property 11: no step is too long to stay on the mesh and out of bodie
   const CapsuleSet bodies = CapsuleSet::standing(std::span(&body, 1)).value();
   for (const double length : {1e3, 1e100, 1e153, 1e155, 1e300}) {
     CAPTURE(length);
-    const StepResult r = step(open, {{5, 0, 5}, 0.1, 1.5, kNoPoly}, {length, 0, 0}, bodies, {.slide = false});
+    const StepResult r =
+        step(open, {{5, 0, 5}, 0.1, 1.5, kNoPoly}, {length, 0, 0}, bodies, {.slide = false});
     CHECK(r.blocked_by == BlockedBy::capsule);
     CHECK(r.position.x < 7.4);
     const SurfaceWalk w = open.walk(*open.snap_point({5, 0, 5}), {length, 0, 0.3 * length}, true);

@@ -30,7 +30,8 @@ std::vector<CapsuleSet> motion(const std::vector<Walker>& people, int ticks, dou
   for (int k = 0; k < ticks; ++k) {
     std::vector<DynamicCapsule> list;
     for (std::uint32_t a = 0; a < people.size(); ++a) {
-      const Vec3d p = people[a].at(k * kTick), q = people[a].at((k + 1) * kTick), up{0, 1.3, 0}, foot{0, 0.25, 0};
+      const Vec3d p = people[a].at(k * kTick), q = people[a].at((k + 1) * kTick), up{0, 1.3, 0},
+                  foot{0, 0.25, 0};
       list.push_back({{{p + foot, p + foot + up, 0.25}, {q + foot, q + foot + up, 0.25}}, a, 0});
       const Vec3d arm{0.35 * std::sin(0.9 * k), 0.9, 0.35 * std::cos(0.9 * k)};
       list.push_back({{{p + up, p + arm, 0.06}, {q + up, q + arm, 0.06}}, a, 1});
@@ -61,8 +62,8 @@ struct Followed {
 };
 
 /// Takes the plan tick by tick; requires that nobody is met, by the step and by the gaps in long double.
-Followed follow(const NavMesh& mesh, AgentState agent, const TimedPlan& plan, const std::vector<CapsuleSet>& ticks,
-                double least) {
+Followed follow(const NavMesh& mesh, AgentState agent, const TimedPlan& plan,
+                const std::vector<CapsuleSet>& ticks, double least) {
   Followed out;
   for (const CapsuleSet& set : ticks) {
     if (set.t0() >= plan.points.back().time - 1e-9) break;
@@ -124,7 +125,8 @@ TEST_CASE("time planner: a plan that is followed meets nobody") {
         REQUIRE(seconds > 0);
         REQUIRE(norm(plan.points[p].position - plan.points[p - 1].position) <= o.speed * seconds + 1e-5);
       }
-      const Followed f = follow(mesh, agent, plan, ticks, gap < o.margin + 1e-3 ? -1e-5 : 0.5 * o.margin);
+      const Followed f =
+          follow(mesh, agent, plan, ticks, gap < o.margin + 1e-3 ? -1e-5 : 0.5 * o.margin);
       ticks_walked += f.moved;
       ticks_waited += f.ticks - f.moved;
       if (plan.status == TimedPlanStatus::reached) {
@@ -134,8 +136,9 @@ TEST_CASE("time planner: a plan that is followed meets nobody") {
       }
     }
   }
-  MESSAGE("reached " << status[0] << ", on the way " << status[1] << ", blocked " << status[2] << ", caught " << status[3]
-                     << ", gave up " << status[4] << "; ticks walked " << ticks_walked << ", waited " << ticks_waited);
+  MESSAGE("reached " << status[0] << ", on the way " << status[1] << ", blocked " << status[2]
+                     << ", caught " << status[3] << ", gave up " << status[4] << "; ticks walked "
+                     << ticks_walked << ", waited " << ticks_waited);
   CHECK(status[0] > 10 * (status[2] + status[3] + status[4]));
   CHECK(ticks_waited > 0);
 }
@@ -150,14 +153,16 @@ TEST_CASE("time planner: with nobody in the way it is the static path, a tick fo
     const AgentState agent{start.position, 0.1, 1.5, start.poly};
     const TimedPlan plan = plan_in_time(mesh, agent, goal.position, ticks);
     REQUIRE(plan.status == TimedPlanStatus::reached);
-    const double least = path.length, most = path.length + kTick * static_cast<double>(path.points.size());
+    const double least = path.length,
+                 most = path.length + kTick * static_cast<double>(path.points.size());
     REQUIRE(plan.points.back().time >= least - 1e-3);
     REQUIRE(plan.points.back().time <= most + 1e-3);
     REQUIRE(follow(mesh, agent, plan, ticks, -1e-5).length <= path.length * 1.15 + 0.1);
   }
 }
 
-TEST_CASE("time planner: somebody in a corridor is waited for; who stays there blocks it until the end") {
+TEST_CASE(
+    "time planner: somebody in a corridor is waited for; who stays there blocks it until the end") {
   const NavMesh mesh = corridor();
   const AgentState agent{{2, 0, 2}, 0.1, 1.5, kNoPoly};
   const Vec3d goal{8, 0, 2};

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
 #include "gsnav/detail/io/navmesh_settings_file.hpp"
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "support/command.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"
@@ -114,7 +114,9 @@ TEST_CASE("navmesh tool: builds, inspects, converts and draws") {
   std::string without = read_file(folder / "a.navmesh");
   without.erase(40, 56)[4] = 1;
   CHECK(read_file(folder / "1.navmesh") == without);
-  CHECK_FALSE(run(folder, quoted(folder / "a.navmesh") + " --mset-version 3 --out " + quoted(folder / "3.navmesh")).ok);
+  CHECK_FALSE(run(folder, quoted(folder / "a.navmesh") + " --mset-version 3 --out " +
+                              quoted(folder / "3.navmesh"))
+                  .ok);
 }
 
 TEST_CASE("navmesh tool: a stage and objects from glTF") {
@@ -257,8 +259,8 @@ TEST_CASE("navmesh tool: in tiles, whatever the number of threads") {
   const TempFolder folder("navmesh_tool_tiles");
   write_file(folder / "floors.obj", two_floors_z_up());
   const auto build = [&](const std::string& more, const char* out) {
-    const Outcome made = run(folder, quoted(folder / "floors.obj") + " --up z --scale 0.01 " + kPlain + " " + more +
-                                         " --out " + quoted(folder / out));
+    const Outcome made = run(folder, quoted(folder / "floors.obj") + " --up z --scale 0.01 " + kPlain +
+                                         " " + more + " --out " + quoted(folder / out));
     INFO(made.text);
     REQUIRE(made.ok);
     CHECK(made.says("level 1: at 3.00 m, 40"));
@@ -268,11 +270,13 @@ TEST_CASE("navmesh tool: in tiles, whatever the number of threads") {
   CHECK(build("--tile-size 48 --threads 1", "a.navmesh").says("tiles of 48 x 48 cells"));
   build("--tile-size 48 --threads 3", "b.navmesh");
   CHECK(read_file(folder / "a.navmesh") == read_file(folder / "b.navmesh"));
-  const NavMesh one = load_navmesh(folder / "one.navmesh").value(), tiled = load_navmesh(folder / "a.navmesh").value();
+  const NavMesh one = load_navmesh(folder / "one.navmesh").value(),
+                tiled = load_navmesh(folder / "a.navmesh").value();
   CHECK(tiled.polygon_count() > one.polygon_count());
   CHECK(tiled.island_count() == one.island_count());
   CHECK(tiled.settings().tile_size == 48);
-  const Outcome again = run(folder, quoted(folder / "a.navmesh") + " --out " + quoted(folder / "c.navmesh"));
+  const Outcome again =
+      run(folder, quoted(folder / "a.navmesh") + " --out " + quoted(folder / "c.navmesh"));
   REQUIRE(again.ok);
   CHECK(read_file(folder / "a.navmesh") == read_file(folder / "c.navmesh"));
   const Outcome refused = run(folder, quoted(folder / "a.navmesh") + " --tile-size 48");
@@ -305,14 +309,16 @@ TEST_CASE("navmesh tool: from Gaussians") {
   write_file(folder / "box.obj",
              "v 2 0 1\nv 4 0 1\nv 4 0 3\nv 2 0 3\nv 2 1 1\nv 4 1 1\nv 4 1 3\nv 2 1 3\n"
              "f 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\nf 5 8 7 6\n");
-  const Outcome both = run(folder, quoted(folder / "floor.ply") + " --mesh " + quoted(folder / "box.obj") + " --out " +
-                                       quoted(folder / "b.navmesh"));
+  const Outcome both =
+      run(folder, quoted(folder / "floor.ply") + " --mesh " + quoted(folder / "box.obj") + " --out " +
+                      quoted(folder / "b.navmesh"));
   INFO(both.text);
   REQUIRE(both.ok);
   CHECK(both.says("10 triangles"));
   CHECK(mesh.is_navigable({3, 0, 2}));
   CHECK_FALSE(load_navmesh(folder / "b.navmesh")->is_navigable({3, 0, 2}));
-  const Outcome wrong = run(folder, quoted(folder / "box.obj") + " --mesh " + quoted(folder / "box.obj"));
+  const Outcome wrong =
+      run(folder, quoted(folder / "box.obj") + " --mesh " + quoted(folder / "box.obj"));
   CHECK_FALSE(wrong.ok);
   CHECK(wrong.says("has no Gaussians"));
 }

@@ -54,9 +54,11 @@ gsnav::Frames<S> render(B& backend, const std::vector<gsnav::GaussianSet>& sets,
 // Compiled once for all tests (support/compiled_frames.cpp).
 namespace gsnav {
 using gsnav_test::ToyBackend;
-extern template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>,
-                       const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
-extern template Status render_composite<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>,
-                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
-                       RenderStats*);
+extern template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&,
+                                                        std::span<const GaussianSet>, const Camera&,
+                                                        const RenderConfig&, const FrameImages<float>&,
+                                                        RenderStats*);
+extern template Status render_composite<float, ToyBackend>(
+    ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>, const MeshFrame&,
+    const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
 }  // namespace gsnav

@@ -20,21 +20,22 @@ using Lists = std::vector<std::vector<std::uint32_t>>;
 /// More than sixteen a multiprocessor, and than that would be few: of any GPU, or of the emulated one.
 inline int many_tiles() { return is_emulated() ? 9 * 16 : 9 * 384; }
 
-/// Images of a batch, fetched. `lists`: the sets of each camera; empty: all. `meshes`: likewise; empty: none. `seen`: of
-/// each camera, BatchCamera::seen.
+/// Images of a batch, fetched. `lists`: the sets of each camera; empty: all. `meshes`: likewise; empty:
+/// none. `seen`: of each camera, BatchCamera::seen.
 struct Batch {
   Frames<float> frames;
   std::vector<std::uint8_t> rgb8;
   BatchStats stats;
 };
 
-inline Batch draw_batch(CudaBackend& cuda, CudaBatchRenderer& renderer, const std::vector<GaussianSet>& sets,
-           const std::vector<Camera>& cameras, const Lists& lists, unsigned outputs, bool bytes = true,
-           const std::vector<MeshFrame>& meshes = {},
-           const std::vector<std::vector<View<const std::uint32_t>>>& seen = {}) {
+inline Batch draw_batch(CudaBackend& cuda, CudaBatchRenderer& renderer,
+                        const std::vector<GaussianSet>& sets, const std::vector<Camera>& cameras,
+                        const Lists& lists, unsigned outputs, bool bytes = true,
+                        const std::vector<MeshFrame>& meshes = {},
+                        const std::vector<std::vector<View<const std::uint32_t>>>& seen = {}) {
   Batch out;
-  const std::size_t pixels =
-      static_cast<std::size_t>(cameras[0].width) * static_cast<std::size_t>(cameras[0].height) * cameras.size();
+  const std::size_t pixels = static_cast<std::size_t>(cameras[0].width) *
+                             static_cast<std::size_t>(cameras[0].height) * cameras.size();
   Buffer<float, CudaBackend> images(cuda);
   Buffer<std::uint8_t, CudaBackend> rgb8(cuda);
   images.resize_discard(8 * pixels);
@@ -45,7 +46,11 @@ inline Batch draw_batch(CudaBackend& cuda, CudaBatchRenderer& renderer, const st
   const auto at = [&](unsigned output, std::size_t first) {
     return (outputs & output) != 0 ? images.data() + first * pixels : nullptr;
   };
-  to.floats = {at(kRgb, 0), at(kAlpha, 3), at(kMedianDepth, 4), at(kExpectedDepth, 5), at(kAccumulatedDepth, 6),
+  to.floats = {at(kRgb, 0),
+               at(kAlpha, 3),
+               at(kMedianDepth, 4),
+               at(kExpectedDepth, 5),
+               at(kAccumulatedDepth, 6),
                at(kFirstHitDepth, 7)};
   to.rgb8 = bytes ? rgb8.data() : nullptr;
   std::vector<BatchCamera> batch;
@@ -77,9 +82,9 @@ inline Batch draw_batch(CudaBackend& cuda, CudaBatchRenderer& renderer, const st
 }
 
 /// The same cameras one at a time through the generic path.
-inline Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& sets, const std::vector<Camera>& cameras,
-                     const Lists& lists, RenderConfig config, unsigned outputs,
-                     const std::vector<MeshFrame>& meshes = {}) {
+inline Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& sets,
+                            const std::vector<Camera>& cameras, const Lists& lists, RenderConfig config,
+                            unsigned outputs, const std::vector<MeshFrame>& meshes = {}) {
   config.outputs = outputs;
   Renderer<float, CudaBackend> renderer(cuda, config);
   Frames<float> all;
@@ -128,7 +133,9 @@ inline std::vector<Camera> ring(int count, int width, int height) {
 inline int many_cameras() { return is_emulated() ? 8 : 60; }
 
 /// Cameras of `count` in a ring, whose images have tiles cut by the edge.
-inline std::vector<Camera> ring_of(int count) { return is_emulated() ? ring(count, 53, 37) : ring(count, 149, 101); }
+inline std::vector<Camera> ring_of(int count) {
+  return is_emulated() ? ring(count, 53, 37) : ring(count, 149, 101);
+}
 
 inline constexpr unsigned kMedianOnly = kRgb | kAlpha | kMedianDepth, kAll = kRgb | kAlpha | kAnyDepth;
 

@@ -32,13 +32,15 @@ struct MeshPictures {
   gsnav::MeshStats stats;
 
   bool operator==(const MeshPictures& o) const {
-    return depth == o.depth && color == o.color && normal == o.normal && instance == o.instance && triangle == o.triangle;
+    return depth == o.depth && color == o.color && normal == o.normal && instance == o.instance &&
+           triangle == o.triangle;
   }
 };
 
 template <class S, gsnav::Backend B>
-MeshPictures<S> draw(B& backend, const std::vector<gsnav::MeshInstance>& meshes, const gsnav::Camera& camera,
-                     const gsnav::MeshLight& light = {}, int tile_size = 16) {
+MeshPictures<S> draw(B& backend, const std::vector<gsnav::MeshInstance>& meshes,
+                     const gsnav::Camera& camera, const gsnav::MeshLight& light = {},
+                     int tile_size = 16) {
   using namespace gsnav;
   std::vector<MeshArrays<B>> arrays;
   std::vector<MeshInstance> instances;
@@ -46,7 +48,8 @@ MeshPictures<S> draw(B& backend, const std::vector<gsnav::MeshInstance>& meshes,
   for (const MeshInstance& m : meshes) {
     instances.push_back(arrays.emplace_back(backend, m.mesh).instance(m.world_from_mesh, m.id));
   }
-  const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   Buffer<S, B> color(backend), normal(backend);
   Buffer<std::uint32_t, B> instance(backend), triangle(backend);
   color.resize_discard(3 * pixels);
@@ -55,8 +58,9 @@ MeshPictures<S> draw(B& backend, const std::vector<gsnav::MeshInstance>& meshes,
   triangle.resize_discard(pixels);
   MeshWorkspace<S, B> ws(backend);
   MeshPictures<S> out{};
-  const Status s = draw_meshes<S>(backend, ws, std::span<const MeshInstance>(instances), camera, light, tile_size, false,
-                                  {color.data(), normal.data(), instance.data(), triangle.data()}, &out.stats);
+  const Status s =
+      draw_meshes<S>(backend, ws, std::span<const MeshInstance>(instances), camera, light, tile_size,
+                     false, {color.data(), normal.data(), instance.data(), triangle.data()}, &out.stats);
   s.throw_if_error();
   const auto fetch = [](auto& to, const auto& from) {
     to.resize(from.size());

@@ -15,7 +15,8 @@ inline bool no_gpu(const char* what) {
   return true;
 }
 
-/// Whether device code runs on the host (GSNAV_CUDA=EMULATED), a thread at a time: tests then draw less of the same.
+/// Whether device code runs on the host (GSNAV_CUDA=EMULATED), a thread at a time: tests then draw less
+/// of the same.
 inline bool is_emulated() {
   static const bool emulated = gsnav::CudaBackend().device_name().find("emulated") != std::string::npos;
   return emulated;

@@ -23,7 +23,8 @@ TemporalCloud random_scene(std::uint64_t seed, int count, double speed = 0.3) {
   Rng rng(seed + 1);
   for (std::size_t i = 0; i < scene.size(); ++i) {
     scene.times.push_back(static_cast<float>(rng.normal()));
-    scene.sigmas.push_back(i % 7 == 0 ? std::numeric_limits<float>::infinity() : static_cast<float>(rng.uniform(0, 1)));
+    scene.sigmas.push_back(i % 7 == 0 ? std::numeric_limits<float>::infinity()
+                                      : static_cast<float>(rng.uniform(0, 1)));
     for (auto& plane : scene.motion) plane.push_back(static_cast<float>(speed * rng.normal()));
   }
   return scene;
@@ -67,7 +68,8 @@ void check_state(B& backend, double relative) {
       for (std::size_t k = 0; k < 3; ++k) {
         const long double mean = static_cast<long double>(scene.cloud.means[k][i]) + want.offset[k];
         const double size = 8 + std::fabs(t * t * t);
-        CHECK(std::fabs(static_cast<double>(moment.means[k].data()[i]) - static_cast<double>(mean)) < relative * size);
+        CHECK(std::fabs(static_cast<double>(moment.means[k].data()[i]) - static_cast<double>(mean)) <
+              relative * size);
       }
     }
     CHECK(drawn > 100);
@@ -77,7 +79,9 @@ void check_state(B& backend, double relative) {
 
 }  // namespace
 
-TEST_CASE("at_time: means and opacities by the formulas in long double, in every scalar and on every backend") {
+TEST_CASE(
+    "at_time: means and opacities by the formulas in long double, in every scalar and on every "
+    "backend") {
   SerialBackend serial;
   check_state<float>(serial, 3e-7);
   check_state<double>(serial, 1.2e-7);  // the planes written are float
@@ -121,7 +125,8 @@ TEST_CASE("at_time: far from its time nothing is drawn and nothing overflows") {
   }
 }
 
-TEST_CASE("at_time: a scene in uniform motion is the standing one before a camera that moves against it") {
+TEST_CASE(
+    "at_time: a scene in uniform motion is the standing one before a camera that moves against it") {
   TemporalCloud scene = random_scene(6, 600);
   stand_still(scene);
   const Vec3d velocity{0.25, -0.125, 0.5};
@@ -131,7 +136,8 @@ TEST_CASE("at_time: a scene in uniform motion is the standing one before a camer
   sort_spatially(scene);
   const double t = 2;
   const Camera still = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 160, 120, 70);
-  const Camera against = Camera::look_at(Vec3d{} - velocity * t, Vec3d{0, 0, 4} - velocity * t, {0, -1, 0}, 160, 120, 70);
+  const Camera against =
+      Camera::look_at(Vec3d{} - velocity * t, Vec3d{0, 0, 4} - velocity * t, {0, -1, 0}, 160, 120, 70);
   const auto check = [&](auto& backend) {
     using B = std::decay_t<decltype(backend)>;
     TemporalGaussians<B> moving(backend, scene);
@@ -166,7 +172,8 @@ TEST_CASE("at_time: a moment drawn by its chunks is the moment as a cloud of its
       CHECK((x >= b.low.x && x <= b.high.x && v.opacities[i] <= b.opacity_max));
     }
     const GaussianCloud cloud = cloud_at(scene, t);
-    const auto got = render<float>(serial, {moving.set()}, camera), want = render<float>(serial, {cloud.set()}, camera);
+    const auto got = render<float>(serial, {moving.set()}, camera),
+               want = render<float>(serial, {cloud.set()}, camera);
     CHECK(got.stats[0].visible == want.stats[0].visible);
     CHECK(image_error(got.rgb, want.rgb, 3).psnr > 90);  // that one was computed in double
   }
@@ -185,6 +192,8 @@ TEST_CASE("at_time: arrays that do not fit, and times that are none, are named")
   };
   CHECK(message([](TemporalCloud& s) { s.times.pop_back(); }).find("times has 19") != std::string::npos);
   CHECK(message([](TemporalCloud& s) { s.sigmas.clear(); }).find("sigmas has 0") != std::string::npos);
-  CHECK(message([](TemporalCloud& s) { s.motion[4].clear(); }).find("motion has 0") != std::string::npos);
-  CHECK_FALSE(gaussians_at<float>(serial, scene.view(), std::numeric_limits<double>::quiet_NaN(), moment).ok());
+  CHECK(message([](TemporalCloud& s) { s.motion[4].clear(); }).find("motion has 0") !=
+        std::string::npos);
+  CHECK_FALSE(
+      gaussians_at<float>(serial, scene.view(), std::numeric_limits<double>::quiet_NaN(), moment).ok());
 }

@@ -17,7 +17,8 @@ namespace {
 std::vector<Camera> cameras(std::size_t n) {
   std::vector<Camera> out;
   for (std::size_t i = 0; i < n; ++i) {
-    const double x = 0.3 * static_cast<double>(i % 5), z = i % 7 == 3 ? 9.0 : -0.4 * static_cast<double>(i % 3);
+    const double x = 0.3 * static_cast<double>(i % 5),
+                 z = i % 7 == 3 ? 9.0 : -0.4 * static_cast<double>(i % 3);
     out.push_back(Camera::look_at({x, 0, z}, {0, 0, i % 7 == 3 ? 40.0 : 4.0}, {0, -1, 0}, 97, 66, 70));
   }
   return out;
@@ -52,7 +53,8 @@ TEST_CASE("a batch has the bits of its single frames, for any number of cameras 
   OpenMPBackend one(1);
   Renderer<float, OpenMPBackend> single(one, config);
   std::vector<Frames<float>> expected;
-  for (const Camera& view : views) expected.push_back(single.render(sets, std::vector<Camera>{view}).value());
+  for (const Camera& view : views)
+    expected.push_back(single.render(sets, std::vector<Camera>{view}).value());
   REQUIRE(expected[0].stats[0].visible > 0);
   for (const int threads : {1, 2, 3, 8}) {
     OpenMPBackend backend(threads);

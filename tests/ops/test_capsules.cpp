@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many pairs of capsules at once: packs of every width and every backend give the bits of one pair alone.
+// Many pairs of capsules at once: packs of every width and every backend give the bits of one pair
+// alone.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -49,9 +50,12 @@ struct Planes {
     sweeps.bodies = moving(pairs.bodies);
     outcome.resize_discard(n);
     sweeps.outcome = outcome.view();
-    for (View<S>* v : {&sweeps.time, &sweeps.start_gap, &sweeps.contact_time, &sweeps.gap, &gaps.gap}) *v = output();
+    for (View<S>* v : {&sweeps.time, &sweeps.start_gap, &sweeps.contact_time, &sweeps.gap, &gaps.gap})
+      *v = output();
     for (int k = 0; k < 3; ++k) {
-      for (View<S>* v : {&sweeps.normal[k], &sweeps.point[k], &gaps.normal[k], &gaps.on_a[k], &gaps.on_b[k]}) *v = output();
+      for (View<S>* v :
+           {&sweeps.normal[k], &sweeps.point[k], &gaps.normal[k], &gaps.on_a[k], &gaps.on_b[k]})
+        *v = output();
     }
     gaps.a = sweeps.agents.begin;
     gaps.b = sweeps.bodies.begin;
@@ -102,8 +106,9 @@ void check_batch(B& backend, const CapsulePairs& pairs, const std::string& name)
   Planes<S, B> p(backend, pairs);
   REQUIRE(capsule_gaps(backend, p.gaps).ok());
   REQUIRE(sweep_capsules(backend, p.sweeps).ok());
-  const auto gap = p.fetch(p.gaps.gap), time = p.fetch(p.sweeps.time), start = p.fetch(p.sweeps.start_gap),
-             contact = p.fetch(p.sweeps.contact_time), last = p.fetch(p.sweeps.gap);
+  const auto gap = p.fetch(p.gaps.gap), time = p.fetch(p.sweeps.time),
+             start = p.fetch(p.sweeps.start_gap), contact = p.fetch(p.sweeps.contact_time),
+             last = p.fetch(p.sweeps.gap);
   const auto outcome = p.fetch_outcome();
   std::vector<S> normal[3], on_a[3], on_b[3], sweep_normal[3], point[3];
   for (int k = 0; k < 3; ++k) {
@@ -120,18 +125,21 @@ void check_batch(B& backend, const CapsulePairs& pairs, const std::string& name)
     const SweepResult<S> r = sweep(a, b, p.sweeps.rules);
     bool equal = same(gap[i], g.gap) && same(time[i], r.time) && same(start[i], r.start_gap) &&
                  same(contact[i], r.contact_time) && same(last[i], r.gap);
-    equal = equal && ((outcome[i] & kSweepHit) != 0) == r.hit && ((outcome[i] & kSweepPushed) != 0) == r.pushed &&
+    equal = equal && ((outcome[i] & kSweepHit) != 0) == r.hit &&
+            ((outcome[i] & kSweepPushed) != 0) == r.pushed &&
             ((outcome[i] & kSweepAgentClosing) != 0) == r.agent_closing;
     for (int k = 0; k < 3; ++k) {
-      equal = equal && same(normal[k][i], g.normal[k]) && same(on_a[k][i], g.on_a[k]) && same(on_b[k][i], g.on_b[k]) &&
-              same(sweep_normal[k][i], r.normal[k]) && same(point[k][i], r.point[k]);
+      equal = equal && same(normal[k][i], g.normal[k]) && same(on_a[k][i], g.on_a[k]) &&
+              same(on_b[k][i], g.on_b[k]) && same(sweep_normal[k][i], r.normal[k]) &&
+              same(point[k][i], r.point[k]);
     }
     differ += equal ? 0 : 1;
   }
   CHECK(differ == 0);
   // Asked for less, the rest is the same.
   p.sweeps.contact_time = p.sweeps.gap = {};
-  for (int k = 0; k < 3; ++k) p.sweeps.normal[k] = p.sweeps.point[k] = p.gaps.normal[k] = p.gaps.on_a[k] = p.gaps.on_b[k] = {};
+  for (int k = 0; k < 3; ++k)
+    p.sweeps.normal[k] = p.sweeps.point[k] = p.gaps.normal[k] = p.gaps.on_a[k] = p.gaps.on_b[k] = {};
   REQUIRE(capsule_gaps(backend, p.gaps).ok());
   REQUIRE(sweep_capsules(backend, p.sweeps).ok());
   const auto all_same = [](const std::vector<S>& a, const std::vector<S>& b) {
@@ -155,28 +163,34 @@ std::size_t differing_packs(const CapsulePairs& pairs) {
         return P::load(v);
       };
       const auto point = [&](const auto& field) {
-        return Vec3<P>{lane([&](const auto& c) { return field(c).x; }), lane([&](const auto& c) { return field(c).y; }),
+        return Vec3<P>{lane([&](const auto& c) { return field(c).x; }),
+                       lane([&](const auto& c) { return field(c).y; }),
                        lane([&](const auto& c) { return field(c).z; })};
       };
-      return MovingCapsule<P>{{point([](const auto& c) { return c.begin.p0; }), point([](const auto& c) { return c.begin.p1; }),
-                               lane([](const auto& c) { return c.begin.radius; })},
-                              {point([](const auto& c) { return c.end.p0; }), point([](const auto& c) { return c.end.p1; }),
-                               lane([](const auto& c) { return c.end.radius; })}};
+      return MovingCapsule<P>{
+          {point([](const auto& c) { return c.begin.p0; }),
+           point([](const auto& c) { return c.begin.p1; }),
+           lane([](const auto& c) { return c.begin.radius; })},
+          {point([](const auto& c) { return c.end.p0; }), point([](const auto& c) { return c.end.p1; }),
+           lane([](const auto& c) { return c.end.radius; })}};
     };
     const MovingCapsule<P> a = gather(pairs.agents), b = gather(pairs.bodies);
     const SweepResult<P> r = sweep(a, b, SweepRules<float>{});
     const CapsuleGap<P> g = capsule_gap(a.begin, b.begin);
     for (int i = 0; i < N; ++i) {
-      const auto &u = pairs.agents[first + static_cast<std::size_t>(i)], &v = pairs.bodies[first + static_cast<std::size_t>(i)];
+      const auto &u = pairs.agents[first + static_cast<std::size_t>(i)],
+                 &v = pairs.bodies[first + static_cast<std::size_t>(i)];
       const SweepResult<float> s = sweep(u, v, SweepRules<float>{});
       const CapsuleGap<float> h = capsule_gap(u.begin, v.begin);
       const auto bit = [i](const Mask<N>& m) { return (lane_bits(m) >> i & 1u) != 0; };
-      bool equal = bit(r.hit) == s.hit && bit(r.pushed) == s.pushed && bit(r.agent_closing) == s.agent_closing &&
-                   same(r.time[i], s.time) && same(r.contact_time[i], s.contact_time) && same(r.gap[i], s.gap) &&
+      bool equal = bit(r.hit) == s.hit && bit(r.pushed) == s.pushed &&
+                   bit(r.agent_closing) == s.agent_closing && same(r.time[i], s.time) &&
+                   same(r.contact_time[i], s.contact_time) && same(r.gap[i], s.gap) &&
                    same(r.start_gap[i], s.start_gap) && same(g.gap[i], h.gap);
       for (int k = 0; k < 3; ++k) {
         equal = equal && same(r.normal[k][i], s.normal[k]) && same(r.point[k][i], s.point[k]) &&
-                same(g.normal[k][i], h.normal[k]) && same(g.on_a[k][i], h.on_a[k]) && same(g.on_b[k][i], h.on_b[k]);
+                same(g.normal[k][i], h.normal[k]) && same(g.on_a[k][i], h.on_a[k]) &&
+                same(g.on_b[k][i], h.on_b[k]);
       }
       differ += equal ? 0 : 1;
     }
@@ -206,7 +220,8 @@ TEST_CASE("capsules: batches on every backend compute the bits of one pair") {
 #if defined(_OPENMP)
     for (const int threads : {1, 3}) {
       OpenMPBackend openmp(threads);
-      check_batch<float>(openmp, pairs, std::string(lane_kernels().name) + ", threads: " + std::to_string(threads));
+      check_batch<float>(openmp, pairs,
+                         std::string(lane_kernels().name) + ", threads: " + std::to_string(threads));
       check_batch<float>(openmp, hard_pairs(), "hard pairs");
     }
 #endif
@@ -219,7 +234,8 @@ namespace {
 /// Whether this processor says which registers are in use (XGETBV of 1).
 bool says_what_is_in_use() {
   unsigned a = 0, b = 0, c = 0, d = 0;
-  return __builtin_cpu_supports("avx") && __get_cpuid_count(0xd, 1, &a, &b, &c, &d) != 0 && (a & 4u) != 0;
+  return __builtin_cpu_supports("avx") && __get_cpuid_count(0xd, 1, &a, &b, &c, &d) != 0 &&
+         (a & 4u) != 0;
 }
 
 /// Upper halves of vector registers that hold something: of the sixteen that code without AVX uses too.
@@ -231,12 +247,14 @@ unsigned upper_halves_in_use() {
 
 }  // namespace
 
-TEST_CASE("lanes: leave nothing in the upper halves of registers, which would slow down all that follows") {
+TEST_CASE(
+    "lanes: leave nothing in the upper halves of registers, which would slow down all that follows") {
   if (!says_what_is_in_use()) {
     MESSAGE("SKIP: this processor does not say which registers are in use");
     return;
   }
-  __asm__ volatile("vpcmpeqd %%xmm0, %%xmm0, %%xmm0\n\tvinsertf128 $1, %%xmm0, %%ymm0, %%ymm0" ::: "xmm0");
+  __asm__ volatile("vpcmpeqd %%xmm0, %%xmm0, %%xmm0\n\tvinsertf128 $1, %%xmm0, %%ymm0, %%ymm0" ::
+                       : "xmm0");
   const unsigned dirty = upper_halves_in_use();
   __asm__ volatile("vzeroupper" ::: "memory");
   if (dirty == 0 || upper_halves_in_use() != 0) {
@@ -247,8 +265,12 @@ TEST_CASE("lanes: leave nothing in the upper halves of registers, which would sl
   Planes<float, SerialBackend> p(serial, random_pairs(10, 512));
   const LaneKernels& kernels = lane_kernels();
   CAPTURE(std::string(kernels.name));
-  for (const auto& run : {+[](const LaneKernels& k, const Planes<float, SerialBackend>& of) { k.gap_range(of.gaps, 0, 512); },
-                          +[](const LaneKernels& k, const Planes<float, SerialBackend>& of) { k.sweep_range(of.sweeps, 0, 512); }}) {
+  for (const auto& run : {+[](const LaneKernels&k, const Planes<float, SerialBackend>&of) {
+                            k.gap_range(of.gaps, 0, 512);
+                          },
+                          +[](const LaneKernels&k, const Planes<float, SerialBackend>&of) {
+                            k.sweep_range(of.sweeps, 0, 512);
+                          }}) {
     run(kernels, p);
     const unsigned after = upper_halves_in_use();
     __asm__ volatile("vzeroupper" ::: "memory");
@@ -275,13 +297,15 @@ TEST_CASE("capsules: arrays that do not fit are refused by name") {
   Planes<float, SerialBackend> p(backend, random_pairs(9, 10));
   auto gaps = p.gaps;
   gaps.b.p1[2].size = 9;
-  CHECK(capsule_gaps(backend, gaps).message().find("CapsuleGapArgs.b has 9 values where 10") != std::string::npos);
+  CHECK(capsule_gaps(backend, gaps).message().find("CapsuleGapArgs.b has 9 values where 10") !=
+        std::string::npos);
   gaps = p.gaps;
   gaps.normal[0] = {};
   CHECK(capsule_gaps(backend, gaps).message().find("normal has 10 values where 0") != std::string::npos);
   auto sweeps = p.sweeps;
   sweeps.bodies.end.radius.size = 11;
-  CHECK(sweep_capsules(backend, sweeps).message().find("SweepArgs.bodies.end has 11") != std::string::npos);
+  CHECK(sweep_capsules(backend, sweeps).message().find("SweepArgs.bodies.end has 11") !=
+        std::string::npos);
   sweeps = p.sweeps;
   sweeps.outcome.size = 3;
   CHECK(sweep_capsules(backend, sweeps).message().find("outcome") != std::string::npos);

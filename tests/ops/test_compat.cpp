@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// RenderConfig::compat against the other renderers' rules written out a second time: explicit covariances,
-// tiles of 16 pixels, the Gaussian that would close a pixel left out.
+// RenderConfig::compat against the other renderers' rules written out a second time: explicit
+// covariances, tiles of 16 pixels, the Gaussian that would close a pixel left out.
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -87,7 +87,8 @@ Emulated emulate(const GaussianCloud& cloud, const Camera& camera, Compat compat
       s.y1 = std::clamp(static_cast<int>((py + radius + 15) / 16), 0, rows);
     }
     for (int k = 0; k < 3; ++k) {
-      s.color[k] = std::max(0.0, 0.5 + 0.28209479177387814 * cloud.sh0[3 * i + static_cast<std::size_t>(k)]);
+      s.color[k] =
+          std::max(0.0, 0.5 + 0.28209479177387814 * cloud.sh0[3 * i + static_cast<std::size_t>(k)]);
     }
     splats.push_back(s);
   }
@@ -143,7 +144,8 @@ TEST_CASE("compat modes follow the rules of the renderer they name") {
         double worst = 0;
         for (std::size_t p = 0; p < truth.alpha.size(); ++p) {
           if (std::abs(truth.alpha[p] - 0.01) < 1e-4) continue;
-          worst = std::max(worst, std::abs(static_cast<double>(f.expected_depth[p]) - truth.expected[p]));
+          worst =
+              std::max(worst, std::abs(static_cast<double>(f.expected_depth[p]) - truth.expected[p]));
           CHECK(static_cast<double>(f.accumulated_depth[p]) ==
                 doctest::Approx(truth.accumulated[p]).epsilon(1e-3));
         }

@@ -74,7 +74,8 @@ TEST_CASE("images that no machine holds are refused before they are allocated") 
   const GaussianSet set = cloud.set();
   const auto r = renderer.render(std::span(&set, 1), cameras);
   CHECK(r.code() == Errc::out_of_memory);
-  for (const char* part : {"20000 cameras", "16384 x 16384", "5368709120 bytes"}) CHECK(names(r.message(), part));
+  for (const char* part : {"20000 cameras", "16384 x 16384", "5368709120 bytes"})
+    CHECK(names(r.message(), part));
 }
 
 TEST_CASE("null spans with a size are refused") {
@@ -127,11 +128,15 @@ TEST_CASE("bad render configurations name their field") {
   CHECK(names(message([](RenderConfig& c) { c.background.y = std::nan(""); }), "background"));
   CHECK(names(message([](RenderConfig& c) { c.profile = static_cast<Profile>(99); }), "profile = 99"));
   CHECK(names(message([](RenderConfig& c) { c.profile = static_cast<Profile>(-1); }), "profile = -1"));
-  CHECK(names(message([](RenderConfig& c) { c.sort_order = static_cast<SortOrder>(99); }), "sort_order = 99"));
-  CHECK(names(message([](RenderConfig& c) { c.response = static_cast<Response>(99); }), "response = 99"));
+  CHECK(names(message([](RenderConfig& c) { c.sort_order = static_cast<SortOrder>(99); }),
+              "sort_order = 99"));
+  CHECK(
+      names(message([](RenderConfig& c) { c.response = static_cast<Response>(99); }), "response = 99"));
   CHECK(names(message([](RenderConfig& c) { c.compat = static_cast<Compat>(99); }), "compat = 99"));
-  CHECK(names(message([](RenderConfig& c) { c.blend_space = static_cast<ColorSpace>(99); }), "blend_space = 99"));
-  CHECK(names(message([](RenderConfig& c) { c.composite = static_cast<Composite>(99); }), "composite = 99"));
+  CHECK(names(message([](RenderConfig& c) { c.blend_space = static_cast<ColorSpace>(99); }),
+              "blend_space = 99"));
+  CHECK(names(message([](RenderConfig& c) { c.composite = static_cast<Composite>(99); }),
+              "composite = 99"));
   CHECK(message([](RenderConfig&) {}).empty());
 }
 
@@ -150,7 +155,8 @@ TEST_CASE("bad cameras name their field") {
   CHECK(names(message([](Camera& c) { c.cx = std::nan(""); }), "cx = nan"));
   CHECK(names(message([](Camera& c) { c.cy = std::numeric_limits<double>::infinity(); }), "cy = inf"));
   CHECK(names(message([](Camera& c) { c.viewmat.linear.row[0] = -c.viewmat.linear.row[0]; }), "mirror"));
-  CHECK(names(message([](Camera& c) { std::swap(c.viewmat.linear.row[1], c.viewmat.linear.row[2]); }), "mirror"));
+  CHECK(names(message([](Camera& c) { std::swap(c.viewmat.linear.row[1], c.viewmat.linear.row[2]); }),
+              "mirror"));
   CHECK(names(message([](Camera& c) { c.viewmat.translation.x = std::nan(""); }), "viewmat"));
   CHECK(names(message([](Camera& c) { c.viewmat.linear(0, 0) = 2; }), "viewmat"));
   CHECK(names(message([](Camera& c) { c.viewmat.linear(1, 2) = std::nan(""); }), "viewmat"));
@@ -172,7 +178,8 @@ TEST_CASE("bad sets name their array") {
   CHECK(names(message([](GaussianSet& s) { s.gaussians.sh0.data = nullptr; }), "sh0 is null"));
   CHECK(names(message([](GaussianSet& s) { s.gaussians.row_ids = {nullptr, 10}; }), "row_ids is null"));
   CHECK(names(message([](GaussianSet& s) { s.filter = static_cast<Filter>(99); }), "filter = 99"));
-  CHECK(names(message([](GaussianSet& s) { s.color_space = static_cast<ColorSpace>(99); }), "color_space = 99"));
+  CHECK(names(message([](GaussianSet& s) { s.color_space = static_cast<ColorSpace>(99); }),
+              "color_space = 99"));
   CHECK(names(message([](GaussianSet& s) { s.world_from_asset.scale = -1; }), "world_from_asset"));
 }
 

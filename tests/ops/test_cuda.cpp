@@ -31,7 +31,8 @@ Frames<float> on_gpu(CudaBackend& cuda, const std::vector<const GaussianCloud*>&
 double largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
   REQUIRE(a.size() == b.size());
   double worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(double{a[i]} - double{b[i]}));
+  for (std::size_t i = 0; i < a.size(); ++i)
+    worst = std::max(worst, std::abs(double{a[i]} - double{b[i]}));
   return worst;
 }
 
@@ -87,7 +88,8 @@ TEST_CASE("cuda: outputs asked for alone, profiles and compat modes") {
         CHECK(gpu.median_depth == cpu.median_depth);
         CHECK(gpu.expected_depth == cpu.expected_depth);
       } else {
-        // On the GPU `fast` has the exponential of the hardware, on the CPU a cubic, off by 1e-4 of alpha.
+        // On the GPU `fast` has the exponential of the hardware, on the CPU a cubic, off by 1e-4 of
+        // alpha.
         CHECK(largest_difference(gpu.rgb, cpu.rgb) < 3e-4);
         CHECK(largest_difference(gpu.alpha, cpu.alpha) < 3e-4);
         config.profile = Profile::exact;
@@ -123,8 +125,9 @@ TEST_CASE("N64_cpu_cuda_keys") {
     const std::size_t pixels = 640 * 480;
     Buffer<float, B> images(backend);
     images.resize_discard(5 * pixels);
-    const FrameImages<float> out{images.data(), images.data() + 3 * pixels, images.data() + 4 * pixels,
-                                 nullptr, nullptr, nullptr};
+    const FrameImages<float> out{
+        images.data(), images.data() + 3 * pixels, images.data() + 4 * pixels, nullptr, nullptr,
+        nullptr};
     REQUIRE(render_camera<float>(backend, workspace, sets, camera, RenderConfig{}, out).ok());
     // Once more on memory that is written: keys of what was culled are fetched with the others.
     auto& chunk_keys = workspace.visible.chunk_keys;

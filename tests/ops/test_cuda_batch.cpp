@@ -31,9 +31,10 @@ TEST_CASE("cuda batch: every camera has the bits it has alone") {
   const std::vector<Camera> cameras = ring_of(37);  // two words of instances
   Lists lists;
   for (std::uint32_t i = 0; i < 37; ++i) {
-    lists.push_back(i % 4 == 0 ? std::vector<std::uint32_t>{2, 0}
-                               : i % 4 == 1 ? std::vector<std::uint32_t>{1}
-                                            : i % 4 == 2 ? std::vector<std::uint32_t>{} : std::vector<std::uint32_t>{0, 1, 2});
+    lists.push_back(i % 4 == 0   ? std::vector<std::uint32_t>{2, 0}
+                    : i % 4 == 1 ? std::vector<std::uint32_t>{1}
+                    : i % 4 == 2 ? std::vector<std::uint32_t>{}
+                                 : std::vector<std::uint32_t>{0, 1, 2});
   }
   for (const Response response : {Response::ewa, Response::tangent_plane, Response::ray}) {
     for (const SortOrder order : {SortOrder::z_depth, SortOrder::camera_distance}) {
@@ -43,7 +44,9 @@ TEST_CASE("cuda batch: every camera has the bits it has alone") {
       config.background = {0.25, 0.5, 0.75};
       CudaBatchRenderer renderer(cuda, config);
       for (const unsigned outputs : {kMedianOnly, kAll}) {
-        if (is_emulated() && ((order == SortOrder::z_depth) != (outputs == kAll) || response == Response::tangent_plane)) continue;
+        if (is_emulated() &&
+            ((order == SortOrder::z_depth) != (outputs == kAll) || response == Response::tangent_plane))
+          continue;
         CAPTURE(static_cast<int>(response));
         CAPTURE(outputs);
         const Batch got = draw_batch(cuda, renderer, sets, cameras, lists, outputs);
@@ -74,7 +77,8 @@ TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
       config.compat = compat;
       config.profile = profile;
       CudaBatchRenderer renderer(cuda, config);
-      for (const unsigned outputs : {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth}, kMedianOnly, kAll}) {
+      for (const unsigned outputs :
+           {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth}, kMedianOnly, kAll}) {
         config.outputs = outputs;
         const Batch got = draw_batch(cuda, renderer, {arrays.set()}, {camera}, {}, outputs, false);
         check_same(got.frames, singly(cuda, {arrays.set()}, {camera}, {}, config, outputs));
@@ -89,7 +93,8 @@ TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
 TEST_CASE("cuda batch: what only some sets or cameras have is in images of colours alone") {
   if (no_gpu("cuda batch rules")) return;
   CudaBackend cuda;
-  const GaussianCloud cloud = random_cloud(41, {.count = 1500}), filtered = random_cloud(42, {.count = 1500, .mip = true});
+  const GaussianCloud cloud = random_cloud(41, {.count = 1500}),
+                      filtered = random_cloud(42, {.count = 1500, .mip = true});
   GaussianCloud far = random_cloud(43, {.count = 1500});
   far.origins = {{0, 0, 0}, {0.5, 0, 0}};
   for (std::size_t i = 0; i < far.size(); ++i) far.origin_ids.push_back(i % 2 == 0 ? 1 : 0);
@@ -98,7 +103,8 @@ TEST_CASE("cuda batch: what only some sets or cameras have is in images of colou
   GaussianSet turned = arrays.set();
   for (int k = 0; k < 4; ++k) turned.gaussians.sh_rotations[k] = arrays.set().gaussians.quats[k];
   enum class Has { nothing, mip, origins, rotations, near_sigma, distance };
-  for (const Has has : {Has::nothing, Has::mip, Has::origins, Has::rotations, Has::near_sigma, Has::distance}) {
+  for (const Has has :
+       {Has::nothing, Has::mip, Has::origins, Has::rotations, Has::near_sigma, Has::distance}) {
     CAPTURE(static_cast<int>(has));
     const std::vector<GaussianSet> sets{has == Has::mip         ? on_mip.set()
                                         : has == Has::origins   ? on_far.set()
@@ -123,18 +129,21 @@ TEST_CASE("cuda batch: images of many pixels, and bands in half precision") {
   SerialBackend serial;
   for (const int degree : {1, 2, 3}) {
     // Splats of all sizes, some of which cover most tiles; rows that no warp has 32 of.
-    GaussianCloud cloud = random_cloud(11, {.count = 4003, .sh_degree = degree, .needle = 0.2, .scale = 0.15});
+    GaussianCloud cloud =
+        random_cloud(11, {.count = 4003, .sh_degree = degree, .needle = 0.2, .scale = 0.15});
     const GaussianCloud full = cloud;
     compact_sh(cloud);
     const GaussianArrays<CudaBackend> arrays(cuda, cloud);
     const std::vector<GaussianSet> sets{arrays.set()};
-    const std::vector<Camera> one = is_emulated() ? ring(1, 321, 240) : ring(1, 641, 480), many = ring(9, 149, 101);
+    const std::vector<Camera> one = is_emulated() ? ring(1, 321, 240) : ring(1, 641, 480),
+                              many = ring(9, 149, 101);
     RenderConfig config;
     config.outputs = kMedianOnly;
     CudaBatchRenderer renderer(cuda, config);
     const Batch large = draw_batch(cuda, renderer, sets, one, {}, kMedianOnly, false);
     check_same(large.frames, render<float>(serial, {cloud.set()}, one[0], config));
-    check_same(draw_batch(cuda, renderer, sets, many, {}, kMedianOnly, false).frames, singly(cuda, sets, many, {}, config, kMedianOnly));
+    check_same(draw_batch(cuda, renderer, sets, many, {}, kMedianOnly, false).frames,
+               singly(cuda, sets, many, {}, config, kMedianOnly));
     const Frames<float> of_floats = render<float>(serial, {full.set()}, one[0], config);
     CHECK(differing(large.frames.rgb, of_floats.rgb) > 0);
     CHECK(differing(large.frames.median_depth, of_floats.median_depth) == 0);
@@ -167,7 +176,8 @@ TEST_CASE("cuda batch: a list of the chunks to draw is a cloud of those chunks")
   for (const int count : {3, many_cameras()}) {
     const std::vector<Camera> cameras = ring_of(count);
     CudaBatchRenderer renderer(cuda);
-    const Batch got = draw_batch(cuda, renderer, sets, cameras, {}, kAll), want = draw_batch(cuda, renderer, by_hand, cameras, {}, kAll);
+    const Batch got = draw_batch(cuda, renderer, sets, cameras, {}, kAll),
+                want = draw_batch(cuda, renderer, by_hand, cameras, {}, kAll);
     check_same(got.frames, want.frames);
     check_same(got.frames, singly(cuda, sets, cameras, {}, {}, kAll));
   }
@@ -177,8 +187,8 @@ TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are 
   if (no_gpu("cuda batch order")) return;
   CudaBackend cuda;
   SerialBackend serial;
-  // A wall across the view: every key is equal, and tiles hold more than fits into shared memory. Faint, so that
-  // pixels stay open to the end.
+  // A wall across the view: every key is equal, and tiles hold more than fits into shared memory. Faint,
+  // so that pixels stay open to the end.
   GaussianCloudBuilder builder(0);
   Rng rng(5);
   for (int i = 0; i < 30000; ++i) {
@@ -207,7 +217,8 @@ TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are 
     for (const std::size_t c : {std::size_t{0}, many.size() - 1}) {
       const auto rgb = crowd.frames.rgb.begin() + static_cast<std::ptrdiff_t>(c * 3 * 48 * 48);
       const auto one = got.frames.rgb.begin();
-      CHECK(differing(std::vector<float>(rgb, rgb + 3 * 48 * 48), std::vector<float>(one, one + 3 * 48 * 48)) == 0);
+      CHECK(differing(std::vector<float>(rgb, rgb + 3 * 48 * 48),
+                      std::vector<float>(one, one + 3 * 48 * 48)) == 0);
     }
     RenderConfig config;
     config.outputs = kRgb;
@@ -217,7 +228,8 @@ TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are 
   }
 }
 
-TEST_CASE("cuda batch: a large image has lists of all lengths, with few and many Gaussians at one depth") {
+TEST_CASE(
+    "cuda batch: a large image has lists of all lengths, with few and many Gaussians at one depth") {
   if (no_gpu("cuda batch order of large images")) return;
   CudaBackend cuda;
   SerialBackend serial;
@@ -232,7 +244,8 @@ TEST_CASE("cuda batch: a large image has lists of all lengths, with few and many
     for (auto& c : g.sh0) c = static_cast<float>(rng.normal());
     builder.add(g);
   };
-  // Patches a tile wide, all of one depth or of so many: what a warp puts in order in one way, in the other, and not.
+  // Patches a tile wide, all of one depth or of so many: what a warp puts in order in one way, in the
+  // other, and not.
   constexpr int kLengths[] = {1, 2, 33, 64, 65, 128, 129, 250, 256, 257, 500, 900};
   int column = 0;
   for (const int length : kLengths) {
@@ -240,14 +253,16 @@ TEST_CASE("cuda batch: a large image has lists of all lengths, with few and many
     for (const int depths : {1, 2, 40, 100000}) {
       const double x = -1.7 + 0.3 * column, y = -0.9 + 0.5 * row;
       for (int i = 0; i < length; ++i) {
-        const double z = 2 + 0.001 * static_cast<double>(rng.next() % static_cast<std::uint64_t>(depths)) / depths;
+        const double z =
+            2 + 0.001 * static_cast<double>(rng.next() % static_cast<std::uint64_t>(depths)) / depths;
         add(x + rng.uniform(-0.01, 0.01), y + rng.uniform(-0.01, 0.01), z, 0.003);
       }
       ++row;
     }
     ++column;
   }
-  for (int i = 0; i < 3000; ++i) add(rng.uniform(-3, 3), rng.uniform(-2, 2), rng.uniform(1, 4), rng.uniform(0.01, 0.3));
+  for (int i = 0; i < 3000; ++i)
+    add(rng.uniform(-3, 3), rng.uniform(-2, 2), rng.uniform(1, 4), rng.uniform(0.01, 0.3));
   GaussianCloud cloud = builder.cloud();
   Camera camera;
   camera.set_hfov(is_emulated() ? 640 : 1280, is_emulated() ? 424 : 848, 90);
@@ -300,7 +315,8 @@ TEST_CASE("cuda batch: an empty view, no sets, and what cannot be drawn") {
   config.background = {0.25, 0.5, 0.75};
   CudaBatchRenderer renderer(cuda, config);
   for (const bool empty : {false, true}) {
-    const std::vector<GaussianSet> sets = empty ? std::vector<GaussianSet>{} : std::vector<GaussianSet>{arrays.set()};
+    const std::vector<GaussianSet> sets =
+        empty ? std::vector<GaussianSet>{} : std::vector<GaussianSet>{arrays.set()};
     const Batch f = draw_batch(cuda, renderer, sets, {away, away}, {}, kMedianOnly);
     CHECK(f.frames.rgb[1] == 0.5f);
     CHECK(f.frames.alpha.back() == 0.0f);

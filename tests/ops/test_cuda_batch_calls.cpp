@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calls of the batched renderer one after another: what is kept between them, and what several under way share.
+// Calls of the batched renderer one after another: what is kept between them, and what several under way
+// share.
 #include <doctest/doctest.h>
 
 #include <cstdio>
@@ -75,7 +76,8 @@ TEST_CASE("cuda batch: recorded calls know where scratch is, after others have m
   if (no_gpu("cuda batch scratch that moves")) return;
   CudaBackend cuda;
   const GaussianCloud cloud = random_cloud(33, {.count = is_emulated() ? 1000 : 8000, .needle = 0.2});
-  GaussianCloud out_of_view = random_cloud(34, {.count = is_emulated() ? 50000 : 300000, .sh_degree = 0});
+  GaussianCloud out_of_view =
+      random_cloud(34, {.count = is_emulated() ? 50000 : 300000, .sh_degree = 0});
   for (float& z : out_of_view.means[2]) z -= 50;
   const GaussianArrays<CudaBackend> arrays(cuda, cloud), behind(cuda, out_of_view);
   const std::vector<GaussianSet> alone{arrays.set()}, both{arrays.set(), behind.set()};
@@ -85,12 +87,15 @@ TEST_CASE("cuda batch: recorded calls know where scratch is, after others have m
   elsewhere.resize_discard(4 * 40 * 36);
   CudaBatchRenderer fresh(cuda), renderer(cuda);
   const std::vector<float> expected = draw_into(cuda, fresh, elsewhere.data(), alone, one);
-  draw_into(cuda, renderer, images.data(), both, crowd);  // room for all arrays that few cameras and many share
-  for (int i = 0; i < 8; ++i) CHECK(differing(draw_into(cuda, renderer, images.data(), alone, one), expected) == 0);
+  draw_into(cuda, renderer, images.data(), both,
+            crowd);  // room for all arrays that few cameras and many share
+  for (int i = 0; i < 8; ++i)
+    CHECK(differing(draw_into(cuda, renderer, images.data(), alone, one), expected) == 0);
   CHECK(renderer.stats().replayed);
   // Moves what few cameras alone have.
   CHECK(differing(draw_into(cuda, renderer, images.data(), both, one), expected) == 0);
-  for (int i = 0; i < 4; ++i) CHECK(differing(draw_into(cuda, renderer, images.data(), alone, one), expected) == 0);
+  for (int i = 0; i < 4; ++i)
+    CHECK(differing(draw_into(cuda, renderer, images.data(), alone, one), expected) == 0);
 }
 
 TEST_CASE("cuda batch: images go to another stream and to pinned memory without the host waiting") {
@@ -149,11 +154,14 @@ TEST_CASE("cuda batch: scratch that is too small grows, and says so") {
   check_same(steady.frames, grown.frames);
 }
 
-TEST_CASE("cuda batch: of calls under way that scratch is too small for, the last is drawn again and others are told") {
+TEST_CASE(
+    "cuda batch: of calls under way that scratch is too small for, the last is drawn again and others "
+    "are told") {
   if (no_gpu("cuda batch calls under way")) return;
   CudaBackend cuda;
   const GaussianCloud small = random_cloud(11, {.count = 50});
-  const GaussianCloud big = random_cloud(12, {.count = is_emulated() ? 2500 : 60000, .needle = 0.2, .scale = is_emulated() ? 0.4 : 0.1});
+  const GaussianCloud big = random_cloud(
+      12, {.count = is_emulated() ? 2500 : 60000, .needle = 0.2, .scale = is_emulated() ? 0.4 : 0.1});
   const GaussianArrays<CudaBackend> few(cuda, small), many(cuda, big);
   const std::vector<GaussianSet> sets{many.set()};
   const std::vector<Camera> cameras = ring(9, 96, 80);

@@ -71,12 +71,14 @@ TEST_CASE("cuda batch: meshes among the Gaussians have the bits they have one ca
       GaussianSet set = sets[0];
       set.color_space = config.blend_space;
       CudaBatchRenderer renderer(cuda, config);
-      for (const unsigned outputs : {unsigned{kRgb}, unsigned{kMedianDepth}, unsigned{kAlpha}, kMedianOnly, kAll}) {
+      for (const unsigned outputs :
+           {unsigned{kRgb}, unsigned{kMedianDepth}, unsigned{kAlpha}, kMedianOnly, kAll}) {
         CAPTURE(count);
         CAPTURE(all);
         CAPTURE(outputs);
         if (is_emulated() && count != 5 && outputs != kMedianOnly && outputs != kAll) continue;
-        const Batch got = draw_batch(cuda, renderer, {set}, cameras, {}, outputs, outputs == kMedianOnly, seen);
+        const Batch got =
+            draw_batch(cuda, renderer, {set}, cameras, {}, outputs, outputs == kMedianOnly, seen);
         const Frames<float> expected = singly(cuda, {set}, cameras, {}, config, outputs, seen);
         check_same(got.frames, expected);
         CHECK(got.stats.meshes.drawn > 1000);
@@ -139,13 +141,15 @@ TEST_CASE("cuda batch: counts of triangles stay on the device, and what does not
     const Vec3d at{0.45 * (i % 4 - 1.5), 0.4 * (i / 4 - 1), 3.6 + 0.1 * (i % 5)};
     balls.push_back(there.instance({{1, 0, 0, 0}, at, 1.0}, static_cast<std::uint32_t>(i)));
   }
-  // Few cameras; many; and more pixels than one wave has, which an emulated device would take minutes for.
+  // Few cameras; many; and more pixels than one wave has, which an emulated device would take minutes
+  // for.
   std::vector<std::vector<Camera>> rings{ring(4, 97, 64), ring_of(is_emulated() ? 20 : 60)};
   if (!is_emulated()) rings.push_back(ring(76, 640, 352));
   for (const std::vector<Camera>& cameras : rings) {
     CAPTURE(cameras.size());
     std::vector<MeshFrame> seen;
-    for (std::size_t c = 0; c < cameras.size(); ++c) seen.push_back({std::span(balls).first(c % 13), {}});
+    for (std::size_t c = 0; c < cameras.size(); ++c)
+      seen.push_back({std::span(balls).first(c % 13), {}});
     MeshStats expected;
     MeshWorkspace<float, CudaBackend> alone(cuda);
     for (std::size_t c = 0; c < cameras.size(); ++c) {

@@ -158,12 +158,15 @@ TEST_CASE("cuda batch: bounds of parts do not show") {
   CHECK(parts_read < of_chunks);
 }
 
-TEST_CASE("cuda batch: each camera draws what may be seen from where it is, as if the rest were transparent") {
+TEST_CASE(
+    "cuda batch: each camera draws what may be seen from where it is, as if the rest were transparent") {
   if (no_gpu("cuda batch of visible sets")) return;
   CudaBackend cuda;
   GaussianCloud a = random_cloud(
-      65, {.count = 15050, .sh_degree = 1, .needle = 0.02, .scale = 0.03, .center = {0, 0, 0}, .extent = 5});
-  GaussianCloud b = random_cloud(66, {.count = 3001, .sh_degree = 0, .scale = 0.05, .center = {1, 0, 0}, .extent = 4});
+      65,
+      {.count = 15050, .sh_degree = 1, .needle = 0.02, .scale = 0.03, .center = {0, 0, 0}, .extent = 5});
+  GaussianCloud b =
+      random_cloud(66, {.count = 3001, .sh_degree = 0, .scale = 0.05, .center = {1, 0, 0}, .extent = 4});
   sort_spatially(a);
   sort_spatially(b);
   const GaussianArrays<CudaBackend> on_a(cuda, a), on_b(cuda, b);
@@ -204,7 +207,8 @@ TEST_CASE("cuda batch: each camera draws what may be seen from where it is, as i
       });
     }
     CudaBatchRenderer renderer(cuda);
-    const Batch got = draw_batch(cuda, renderer, {on_a.set(), on_b.set()}, cameras, {}, kAll, false, {}, seen);
+    const Batch got =
+        draw_batch(cuda, renderer, {on_a.set(), on_b.set()}, cameras, {}, kAll, false, {}, seen);
     check_same(got.frames, want);
     // The generic path, of the first camera.
     GaussianSet alone = on_a.set();
@@ -216,7 +220,8 @@ TEST_CASE("cuda batch: each camera draws what may be seen from where it is, as i
     CHECK(renderer.render(sets, std::span(&short_list, 1), {}).code() == Errc::invalid_argument);
     const std::vector<View<const std::uint32_t>> wrong{{there.data(), words - 1}, {}};
     const BatchCamera of_wrong_size{cameras[0], {}, {}, wrong};
-    CHECK(renderer.render(sets, std::span(&of_wrong_size, 1), {}).message().find("seen[0]") != std::string::npos);
+    CHECK(renderer.render(sets, std::span(&of_wrong_size, 1), {}).message().find("seen[0]") !=
+          std::string::npos);
   }
 }
 #else

@@ -42,33 +42,41 @@ class Context {
  private:
   std::string make() {
     if (CudaBackend::device_count() == 0) return "no GPU";
-    const auto devices = reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
+    const auto devices =
+        reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
     const auto attribute =
         reinterpret_cast<PFNEGLQUERYDEVICEATTRIBEXTPROC>(eglGetProcAddress("eglQueryDeviceAttribEXT"));
     const auto display_of =
         reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(eglGetProcAddress("eglGetPlatformDisplayEXT"));
-    if (devices == nullptr || attribute == nullptr || display_of == nullptr) return "EGL knows no devices";
+    if (devices == nullptr || attribute == nullptr || display_of == nullptr)
+      return "EGL knows no devices";
     std::vector<EGLDeviceEXT> found(16);
     EGLint n = 0;
-    if (devices(static_cast<EGLint>(found.size()), found.data(), &n) == EGL_FALSE) return "EGL lists no devices";
+    if (devices(static_cast<EGLint>(found.size()), found.data(), &n) == EGL_FALSE)
+      return "EGL lists no devices";
     EGLDeviceEXT gpu = nullptr;
     for (EGLint i = 0; i < n; ++i) {
       EGLAttrib number = -1;
-      if (attribute(found[static_cast<std::size_t>(i)], kCudaDevice, &number) != EGL_FALSE && number == 0) {
+      if (attribute(found[static_cast<std::size_t>(i)], kCudaDevice, &number) != EGL_FALSE &&
+          number == 0) {
         gpu = found[static_cast<std::size_t>(i)];
       }
     }
     if (gpu == nullptr) return "none of EGL's " + std::to_string(n) + " devices is a CUDA device";
     EGLDisplay display = display_of(EGL_PLATFORM_DEVICE_EXT, gpu, nullptr);
-    if (display == EGL_NO_DISPLAY || eglInitialize(display, nullptr, nullptr) == EGL_FALSE) return "no EGL display";
+    if (display == EGL_NO_DISPLAY || eglInitialize(display, nullptr, nullptr) == EGL_FALSE)
+      return "no EGL display";
     display_ = display;
     if (eglBindAPI(EGL_OPENGL_API) == EGL_FALSE) return "EGL has no OpenGL";
-    const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
+    const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
+                             EGL_NONE};
     EGLConfig config = nullptr;
-    if (eglChooseConfig(display_, wanted, &config, 1, &n) == EGL_FALSE || n == 0) return "no EGL configuration";
+    if (eglChooseConfig(display_, wanted, &config, 1, &n) == EGL_FALSE || n == 0)
+      return "no EGL configuration";
     context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, nullptr);
     if (context_ == EGL_NO_CONTEXT) return "no EGL context";
-    if (eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_FALSE) return "no context without a surface";
+    if (eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_FALSE)
+      return "no context without a surface";
     return {};
   }
 
@@ -138,7 +146,8 @@ TEST_CASE("cuda_gl: frames stand in textures, upright, as they were drawn") {
       for (std::size_t y = 0; y < kHeight; ++y) {
         for (std::size_t x = 0; x < kWidth; ++x) {
           const std::size_t texel = (kHeight - 1 - y) * kWidth + x, pixel = y * kWidth + x;
-          for (std::size_t k = 0; k < 3; ++k) wrong += texels[4 * texel + k] == drawn[3 * pixel + k] ? 0u : 1u;
+          for (std::size_t k = 0; k < 3; ++k)
+            wrong += texels[4 * texel + k] == drawn[3 * pixel + k] ? 0u : 1u;
           wrong += texels[4 * texel + 3] == 255 ? 0u : 1u;
           wrong += values[texel] == planar[pixel] ? 0u : 1u;
           seen += planar[pixel] > 0 ? 1u : 0u;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes on the GPU against the CPU: the same kernels must give the same bits, whatever order triangles come in.
-// Frames of both, and their oracles: tests/hard_cases/test_composite.cpp.
+// Meshes on the GPU against the CPU: the same kernels must give the same bits, whatever order triangles
+// come in. Frames of both, and their oracles: tests/hard_cases/test_composite.cpp.
 #include <doctest/doctest.h>
 
 #include <cstddef>
@@ -29,10 +29,12 @@ std::shared_ptr<const MeshTexture> noise(std::uint64_t seed, std::size_t width, 
   return std::make_shared<const MeshTexture>(MeshTexture::make(width, height, std::move(rgba)).value());
 }
 
-void check_same(CudaBackend& cuda, const std::vector<MeshInstance>& meshes, const Camera& camera, const MeshLight& light) {
+void check_same(CudaBackend& cuda, const std::vector<MeshInstance>& meshes, const Camera& camera,
+                const MeshLight& light) {
   SerialBackend serial;
   for (const int tile : {8, 16, 32}) {
-    const auto cpu = draw<float>(serial, meshes, camera, light, tile), gpu = draw<float>(cuda, meshes, camera, light, tile);
+    const auto cpu = draw<float>(serial, meshes, camera, light, tile),
+               gpu = draw<float>(cuda, meshes, camera, light, tile);
     CHECK(gpu.depth == cpu.depth);
     CHECK(gpu.triangle == cpu.triangle);
     CHECK(gpu.instance == cpu.instance);
@@ -75,7 +77,8 @@ TEST_CASE("cuda meshes: textures and vertex colours, two-sided, of equal depth")
   floor.texture = noise(2, 1, 5);
   floor.two_sided = true;
   scene.add(floor).value();  // where the first lies: the first is seen
-  const std::vector<MeshInstance> all{scene.instance(0, {}, 1), scene.instance(1, {}, 2), scene.instance(1, {{}, {0, -2, 0}, 1}, 5)};
+  const std::vector<MeshInstance> all{scene.instance(0, {}, 1), scene.instance(1, {}, 2),
+                                      scene.instance(1, {{}, {0, -2, 0}, 1}, 5)};
   check_same(cuda, all, mesh_lens(320, 240, 160), {});
   SerialBackend serial;
   const auto seen = draw<float>(serial, all, mesh_lens(320, 240, 160));

@@ -10,10 +10,10 @@
 #include <vector>
 
 #if defined(GSNAV_HAS_CUDA)
-#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/skin/skin.hpp"
 #include "ops/no_gpu.hpp"
 

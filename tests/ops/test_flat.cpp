@@ -40,7 +40,8 @@ TEST_CASE("the benchmark flat at 300K") {
   const std::string ply = (dir / "flat.ply").string(), cameras_path = (dir / "cameras.json").string();
   const std::string generator = GSNAV_BENCH_SCENE_GENERATOR;
   REQUIRE(std::system(("\"" + generator + "\" ply 300000 \"" + ply + "\" 2> /dev/null").c_str()) == 0);
-  REQUIRE(std::system(("\"" + generator + "\" cameras 64 256 256 \"" + cameras_path + "\"").c_str()) == 0);
+  REQUIRE(std::system(("\"" + generator + "\" cameras 64 256 256 \"" + cameras_path + "\"").c_str()) ==
+          0);
   const LoadedCloud loaded = io::load_ply(ply).value();
   const std::vector<Camera> cameras = io::load_cameras(cameras_path).value();
   CHECK(loaded.report.read == 300000);

@@ -20,7 +20,8 @@ namespace {
 /// IEEE 754 binary16 by its definition.
 double value_of(unsigned bits) {
   const int exponent = static_cast<int>(bits >> 10 & 31), mantissa = static_cast<int>(bits & 1023);
-  const double v = exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(mantissa + 1024, exponent - 25);
+  const double v =
+      exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(mantissa + 1024, exponent - 25);
   return (bits & 0x8000) != 0 ? -v : v;
 }
 
@@ -49,7 +50,8 @@ TEST_CASE("half: all finite values, both ways") {
 TEST_CASE("half: floats become the nearest, ties even, what is too large the largest") {
   Rng rng(1);
   for (int n = 0; n < 200000; ++n) {
-    const float v = static_cast<float>(std::ldexp(rng.uniform(-1, 1), static_cast<int>(rng.uniform(-30, 17))));
+    const float v =
+        static_cast<float>(std::ldexp(rng.uniform(-1, 1), static_cast<int>(rng.uniform(-30, 17))));
     const unsigned half = half_of_float(v);
     const double error = std::fabs(value_of(half) - static_cast<double>(v));
     for (const unsigned beside : {half - 1, half + 1}) {
@@ -64,7 +66,8 @@ TEST_CASE("half: floats become the nearest, ties even, what is too large the lar
   CHECK(half_of_float(std::numeric_limits<float>::quiet_NaN()) == 0);
 }
 
-TEST_CASE("compact clouds: half of the bands' memory, the image of the rounded coefficients bit for bit") {
+TEST_CASE(
+    "compact clouds: half of the bands' memory, the image of the rounded coefficients bit for bit") {
   for (const int degree : {1, 2, 3}) {
     const GaussianCloud full = scene_of(degree);
     GaussianCloud compact = full, rounded = full;
@@ -81,10 +84,12 @@ TEST_CASE("compact clouds: half of the bands' memory, the image of the rounded c
     const auto check = [&](auto& backend) {
       using B = std::decay_t<decltype(backend)>;
       const GaussianArrays<B> a(backend, compact), b(backend, rounded);
-      const auto got = render<float>(backend, {a.set()}, kCamera), want = render<float>(backend, {b.set()}, kCamera);
+      const auto got = render<float>(backend, {a.set()}, kCamera),
+                 want = render<float>(backend, {b.set()}, kCamera);
       CHECK(got.stats[0].visible > 100);
       CHECK(got.rgb == want.rgb);
-      // A colour is off by at most 4.3 times a coefficient's error, and an image by no more than its colours.
+      // A colour is off by at most 4.3 times a coefficient's error, and an image by no more than its
+      // colours.
       const auto before = render<float>(backend, {GaussianArrays<B>(backend, full).set()}, kCamera);
       for (std::size_t i = 0; i < got.rgb.size(); ++i) {
         REQUIRE(std::fabs(static_cast<double>(got.rgb[i] - before.rgb[i])) <= 4.3 * error + 1e-6);
@@ -126,7 +131,11 @@ TEST_CASE("compact clouds: edits do what they do to full ones") {
   both([](GaussianCloud& c) { crop(c, {{-1, -1, 3}, {1, 1, 5}}); }, step);
   both([](GaussianCloud& c) { limit_sh_degree(c, 1); }, step);
   both([](GaussianCloud& c) { sort_spatially(c); }, step);
-  both([](GaussianCloud& c) { transform(c, {axis_angle(Vec3d{0, 1, 0}, 0.5), {1, 2, 3}, 2.0}); }, 8 * step);
+  both(
+      [](GaussianCloud& c) {
+        transform(c, {axis_angle(Vec3d{0, 1, 0}, 0.5), {1, 2, 3}, 2.0});
+      },
+      8 * step);
   GaussianCloud a = compact;
   CHECK_FALSE(append(a, full).ok());
   CHECK_FALSE(append(a, compact).ok());

@@ -53,7 +53,8 @@ std::size_t check_truth(const MeshPictures<S>& drawn, const MeshTruth& truth, do
   return undecided;
 }
 
-TEST_CASE("random triangles, also huge ones and behind the camera: what a ray tracer in long double meets") {
+TEST_CASE(
+    "random triangles, also huge ones and behind the camera: what a ray tracer in long double meets") {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     const OneMesh mesh(random_triangles(seed, 60));
     const Camera camera = mesh_lens();
@@ -80,7 +81,8 @@ TEST_CASE("the same bits on every backend, for any number of threads and any til
   SerialBackend serial;
   const auto reference = draw<float>(serial, mesh.instances, camera, light);
   CHECK(covered(reference.depth) > reference.depth.size() / 4);
-  for (const int tile : {8, 32}) CHECK(draw<float>(serial, mesh.instances, camera, light, tile) == reference);
+  for (const int tile : {8, 32})
+    CHECK(draw<float>(serial, mesh.instances, camera, light, tile) == reference);
   ToyBackend toy;
   CHECK(draw<float>(toy, mesh.instances, camera, light) == reference);
 #if defined(_OPENMP)
@@ -90,11 +92,13 @@ TEST_CASE("the same bits on every backend, for any number of threads and any til
     CHECK(draw<float>(openmp, mesh.instances, camera, light, 32) == reference);
   }
 #endif
-  for (std::size_t t = 0; t < reference.tile_far.size(); ++t) {  // the largest of each tile, nothing less
+  for (std::size_t t = 0; t < reference.tile_far.size();
+       ++t) {  // the largest of each tile, nothing less
     const std::size_t columns = (97 + 15) / 16, x0 = t % columns * 16, y0 = t / columns * 16;
     float far = 0;
     for (std::size_t y = y0; y < std::min<std::size_t>(y0 + 16, 61); ++y) {
-      for (std::size_t x = x0; x < std::min<std::size_t>(x0 + 16, 97); ++x) far = std::max(far, reference.depth[y * 97 + x]);
+      for (std::size_t x = x0; x < std::min<std::size_t>(x0 + 16, 97); ++x)
+        far = std::max(far, reference.depth[y * 97 + x]);
     }
     CHECK(reference.tile_far[t] == far);
   }
@@ -106,7 +110,9 @@ TEST_CASE("triangles that share edges own each pixel once") {
   SerialBackend serial;
   for (int round = 0; round < 12; ++round) {
     const Camera camera = mesh_lens(33, 33, 32);  // (0, 0) is the centre of the middle pixel
-    const auto on_grid = [&](double v) { return static_cast<float>(round < 6 ? std::round(v * 32) / 32 : v); };
+    const auto on_grid = [&](double v) {
+      return static_cast<float>(round < 6 ? std::round(v * 32) / 32 : v);
+    };
     const Vec3f hub{on_grid(rng.uniform(-0.2, 0.2)), on_grid(rng.uniform(-0.2, 0.2)), 1};
     SurfaceMesh fan;
     fan.two_sided = true;
@@ -116,7 +122,10 @@ TEST_CASE("triangles that share edges own each pixel once") {
     for (std::uint32_t i = 0; i < rim; ++i) {
       const double along = 4.0 * i / rim, side = std::floor(along), s = 2 * (along - side) - 1;
       const float a = static_cast<float>(s) * half;
-      fan.geometry.vertices.push_back(side < 1 ? Vec3f{a, -half, 1} : side < 2 ? Vec3f{half, a, 1} : side < 3 ? Vec3f{-a, half, 1} : Vec3f{-half, -a, 1});
+      fan.geometry.vertices.push_back(side < 1   ? Vec3f{a, -half, 1}
+                                      : side < 2 ? Vec3f{half, a, 1}
+                                      : side < 3 ? Vec3f{-a, half, 1}
+                                                 : Vec3f{-half, -a, 1});
       fan.geometry.triangles.push_back({0, 1 + i, 1 + (i + 1) % rim});
     }
     std::vector<int> times(33 * 33);
@@ -146,7 +155,8 @@ TEST_CASE("a closed surface has no holes, however near, far, large or finely cut
   SerialBackend serial;
   for (const double radius : {0.3, 1.0, 40.0, 3e4}) {
     for (const std::uint32_t around : {5u, 64u, 700u}) {
-      const OneMesh ball(sphere(radius, around, around / 2 + 2), {turn({1, 2, 3}, 33), {0, 0, 2.5 * radius}, 1});
+      const OneMesh ball(sphere(radius, around, around / 2 + 2),
+                         {turn({1, 2, 3}, 33), {0, 0, 2.5 * radius}, 1});
       const auto drawn = draw<float>(serial, ball.instances, mesh_lens());
       // Inside the silhouette of the polyhedron's inner sphere everything is covered.
       const double inner = radius * std::pow(std::cos(std::numbers::pi / std::min(around, 64u)), 2);
@@ -154,7 +164,8 @@ TEST_CASE("a closed surface has no holes, however near, far, large or finely cut
       for (int y = 0; y < 48; ++y) {
         for (int x = 0; x < 64; ++x) {
           const double u = (x + 0.5 - 32) / 40, v = (y + 0.5 - 24) / 40;
-          if (std::hypot(u, v) < 0.97 * limit) REQUIRE(drawn.depth[static_cast<std::size_t>(y * 64 + x)] < kInf);
+          if (std::hypot(u, v) < 0.97 * limit)
+            REQUIRE(drawn.depth[static_cast<std::size_t>(y * 64 + x)] < kInf);
         }
       }
       // From its centre it is not seen, unless both sides are.
@@ -195,8 +206,11 @@ TEST_CASE("slivers and needles keep the depth of their corners") {
     m.two_sided = true;
     // Edge-on within a rounding: through the camera, but for 1e-9.
     const Vec3d along{rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), 1};
-    const auto point = [&](double z) { return vec_cast<float>(along * z + Vec3d{rng.normal(), rng.normal(), 0} * 1e-7); };
-    m.geometry.vertices = {point(0.5), point(20), vec_cast<float>(along * 3.0 + Vec3d{rng.normal(), rng.normal(), 0} * 0.02)};
+    const auto point = [&](double z) {
+      return vec_cast<float>(along * z + Vec3d{rng.normal(), rng.normal(), 0} * 1e-7);
+    };
+    m.geometry.vertices = {point(0.5), point(20),
+                           vec_cast<float>(along * 3.0 + Vec3d{rng.normal(), rng.normal(), 0} * 0.02)};
     m.geometry.triangles = {{0, 1, 2}};
     const OneMesh mesh(m);
     for (const float z : draw<float>(serial, mesh.instances, mesh_lens()).depth) {
@@ -205,7 +219,8 @@ TEST_CASE("slivers and needles keep the depth of their corners") {
   }
 }
 
-TEST_CASE("NaN, infinities, points and numbers near the end of float: left out, counted, nothing else moves") {
+TEST_CASE(
+    "NaN, infinities, points and numbers near the end of float: left out, counted, nothing else moves") {
   SerialBackend serial;
   const Camera camera = mesh_lens();
   const SurfaceMesh good = quad({-1, -1, 3}, {1, -1, 3}, {1, 1, 3}, {-1, 1, 3});
@@ -220,11 +235,11 @@ TEST_CASE("NaN, infinities, points and numbers near the end of float: left out, 
   add({kNan, 0, 2}, {1, 0, 2}, {0, 1, 2});
   add({0, 0, 2}, {kInf, 0, 2}, {0, 1, 2});
   add({0, 0, 2}, {1, 0, -kInf}, {0, 1, 2});
-  add({0, 0, 2}, {0, 0, 2}, {1, 1, 2});        // no area
-  add({0, 0, 0}, {0, 0, 0}, {0, 0, 0});        // at the camera
-  add({0, 0, 1}, {0, 0, 2}, {0, 0, 3});        // a line through it
+  add({0, 0, 2}, {0, 0, 2}, {1, 1, 2});                                     // no area
+  add({0, 0, 0}, {0, 0, 0}, {0, 0, 0});                                     // at the camera
+  add({0, 0, 1}, {0, 0, 2}, {0, 0, 3});                                     // a line through it
   add({-3e38f, -3e38f, 3e38f}, {3e38f, -3e38f, 3e38f}, {0, 3e38f, 3e38f});  // behind everything
-  add({-3e38f, 0, -3e38f}, {3e38f, 0, -3e38f}, {0, 3e38f, -1});  // behind the camera
+  add({-3e38f, 0, -3e38f}, {3e38f, 0, -3e38f}, {0, 3e38f, -1});             // behind the camera
   const auto drawn = draw<float>(serial, OneMesh(bad).instances, camera);
   CHECK(drawn.stats.not_finite == 3);
   CHECK(drawn.stats.triangles == 10);
@@ -245,7 +260,8 @@ TEST_CASE("ids, normals and the side that is seen") {
     if (!hit) continue;
     ++seen;
     // The face's normal, near that of the sphere through the hit point.
-    const double u = (static_cast<double>(i % 64) + 0.5 - 32) / 40, v = (static_cast<double>(i / 64) + 0.5 - 24) / 40;
+    const double u = (static_cast<double>(i % 64) + 0.5 - 32) / 40,
+                 v = (static_cast<double>(i / 64) + 0.5 - 24) / 40;
     const Vec3d n{drawn.normal[3 * i], drawn.normal[3 * i + 1], drawn.normal[3 * i + 2]};
     const Vec3d out = normalized(Vec3d{u, v, 1} * drawn.depth[i] - Vec3d{0.2, 0.1, 4});
     REQUIRE(std::abs(norm(n) - 1) < 1e-12);

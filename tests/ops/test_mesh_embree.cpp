@@ -20,18 +20,20 @@ using namespace gsnav_test;
 /// The instances' triangles in the world, in Embree.
 class Traced {
  public:
-  explicit Traced(const std::vector<MeshInstance>& meshes) : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_)) {
+  explicit Traced(const std::vector<MeshInstance>& meshes)
+      : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_)) {
     rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
     for (const MeshInstance& m : meshes) {
       RTCGeometry g = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-      auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                            3 * sizeof(float), m.mesh.vertices.size));
+      auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(
+          g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), m.mesh.vertices.size));
       for (const Vec3f& p : m.mesh.vertices) {
         const Vec3f w = vec_cast<float>(m.world_from_mesh * vec_cast<double>(p));
         *v++ = w.x, *v++ = w.y, *v++ = w.z;
       }
-      auto* i = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
-          g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), m.mesh.triangle_count()));
+      auto* i = static_cast<std::uint32_t*>(
+          rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                  3 * sizeof(std::uint32_t), m.mesh.triangle_count()));
       for (const std::uint32_t index : m.mesh.indices) *i++ = index;
       rtcCommitGeometry(g);
       rtcAttachGeometry(scene_, g);
@@ -67,7 +69,8 @@ class Traced {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcIntersect1(scene_, &context, &r);
-    if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {std::numeric_limits<double>::infinity(), kNoInstance, kNoInstance};
+    if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID)
+      return {std::numeric_limits<double>::infinity(), kNoInstance, kNoInstance};
     return {static_cast<double>(r.ray.tfar), r.hit.geomID, r.hit.primID};
   }
 
@@ -87,15 +90,17 @@ TEST_CASE("what each pixel shows and how far it is: Embree on the same triangles
   normalize(turned);
   const std::vector<MeshInstance> meshes{scene.instance(0, {turned, {0.5, 0.2, 4}, 1.3}, 0),
                                          scene.instance(0, {turned, {-2, 0.4, 6}, 0.7}, 1),
-                                         scene.instance(1, {turned, {0, 0, 3}, 1}, 2), scene.instance(2, {}, 3)};
+                                         scene.instance(1, {turned, {0, 0, 3}, 1}, 2),
+                                         scene.instance(2, {}, 3)};
   const Traced truth(meshes);
   Rng rng(78);
   std::size_t pixels = 0, elsewhere = 0, shown = 0;
   double worst = 0;
   std::set<std::pair<std::uint32_t, std::uint32_t>> different;
   for (int view = 0; view < 6; ++view) {
-    Camera camera = Camera::look_at({rng.uniform(-1, 1), rng.uniform(-0.5, 0.5), rng.uniform(-1, 1)},
-                                    {rng.uniform(-1, 1), 0.2, 5}, {0, -1, 0}, 160, 120, rng.uniform(40, 110));
+    Camera camera =
+        Camera::look_at({rng.uniform(-1, 1), rng.uniform(-0.5, 0.5), rng.uniform(-1, 1)},
+                        {rng.uniform(-1, 1), 0.2, 5}, {0, -1, 0}, 160, 120, rng.uniform(40, 110));
     camera.cx += rng.uniform(-20, 20);
     camera.near_plane = 0.05;
     SerialBackend serial;
@@ -103,7 +108,9 @@ TEST_CASE("what each pixel shows and how far it is: Embree on the same triangles
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
         const std::size_t i = static_cast<std::size_t>(y * camera.width + x);
-        const auto same = [&](const Traced::Hit& h) { return h.instance == drawn.instance[i] && h.triangle == drawn.triangle[i]; };
+        const auto same = [&](const Traced::Hit& h) {
+          return h.instance == drawn.instance[i] && h.triangle == drawn.triangle[i];
+        };
         Traced::Hit hit = truth.trace(camera, x + 0.5, y + 0.5);
         ++pixels;
         if (!same(hit)) {  // float's rounding of vertices and rays: what is shown lies next to the ray
@@ -129,7 +136,8 @@ TEST_CASE("what each pixel shows and how far it is: Embree on the same triangles
   CHECK(different.size() > 10000);
   CHECK(elsewhere < pixels / 200);
   CHECK(worst < 1e-3);
-  MESSAGE(shown << " of " << pixels << " pixels, " << different.size() << " triangles, depth within " << worst << ", " << elsewhere << " on an edge");
+  MESSAGE(shown << " of " << pixels << " pixels, " << different.size() << " triangles, depth within "
+                << worst << ", " << elsewhere << " on an edge");
 }
 
 }  // namespace

@@ -33,8 +33,10 @@ std::vector<std::uint8_t> rgba_of(int width, int height, const auto& texel) {
 }
 
 std::shared_ptr<const MeshTexture> texture(int width, int height, const auto& texel) {
-  return std::make_shared<const MeshTexture>(
-      MeshTexture::make(static_cast<std::size_t>(width), static_cast<std::size_t>(height), rgba_of(width, height, texel)).value());
+  return std::make_shared<const MeshTexture>(MeshTexture::make(static_cast<std::size_t>(width),
+                                                               static_cast<std::size_t>(height),
+                                                               rgba_of(width, height, texel))
+                                                 .value());
 }
 
 TEST_CASE("vertex colours are linear in space, not on the screen, and encoded at last") {
@@ -62,7 +64,8 @@ TEST_CASE("a base colour in a byte comes back as that byte") {
     SurfaceMesh wall = quad({-2, -2, 1}, {2, -2, 1}, {2, 2, 1}, {-2, 2, 1});
     const float v = srgb_decoded(static_cast<std::uint8_t>(byte));
     wall.base_color = {v, v, v};
-    CHECK(std::abs(draw<float>(serial, OneMesh(wall).instances, lens(4, 4)).color[0] * 255 - static_cast<float>(byte)) < 1e-3f);
+    CHECK(std::abs(draw<float>(serial, OneMesh(wall).instances, lens(4, 4)).color[0] * 255 -
+                   static_cast<float>(byte)) < 1e-3f);
   }
 }
 
@@ -78,7 +81,8 @@ TEST_CASE("textures: perspective-correct, texel centres, repetition") {
     for (int x = 0; x < 32; ++x) {
       const auto expected = value(x % 16, y % 8);
       for (std::size_t c = 0; c < 3; ++c) {
-        const double got = 255 * static_cast<double>(f.color[3 * static_cast<std::size_t>(y * 32 + x) + c]);
+        const double got =
+            255 * static_cast<double>(f.color[3 * static_cast<std::size_t>(y * 32 + x) + c]);
         CAPTURE(x);
         CAPTURE(y);
         REQUIRE(std::abs(got - expected[c]) < 0.02);
@@ -92,20 +96,29 @@ TEST_CASE("textures: perspective-correct, texel centres, repetition") {
   const auto g = draw<double>(serial, OneMesh(floor).instances, lens(64, 30));
   for (std::size_t i = 0; i < g.depth.size(); ++i) {
     const double z = 30 / (static_cast<double>(i / 64) + 0.5 - 32);
-    // Mipmaps of a ramp are the ramp, but for its curvature in linear light and a shift of a texel of theirs.
-    if (g.depth[i] < 5) REQUIRE(std::abs(255 * g.color[3 * i] - (256 * (0.25 + (z - 1) / 16) - 0.5)) < 1.5);
+    // Mipmaps of a ramp are the ramp, but for its curvature in linear light and a shift of a texel of
+    // theirs.
+    if (g.depth[i] < 5)
+      REQUIRE(std::abs(255 * g.color[3 * i] - (256 * (0.25 + (z - 1) / 16) - 0.5)) < 1.5);
   }
 }
 
 TEST_CASE("mipmaps: a far checkerboard is its mean in linear light") {
   SurfaceMesh wall = quad({-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1});
-  wall.texture = texture(64, 64, [](int x, int y) { const int v = (x + y) % 2 * 255; return std::vector<int>{v, v, v}; });
+  wall.texture = texture(64, 64, [](int x, int y) {
+    const int v = (x + y) % 2 * 255;
+    return std::vector<int>{v, v, v};
+  });
   wall.uvs = {{0, 0}, {50, 0}, {50, 50}, {0, 50}};
   SerialBackend serial;
   const auto f = draw<float>(serial, OneMesh(wall).instances, lens(32, 16));
-  for (const float c : f.color) REQUIRE(std::abs(static_cast<double>(c) - encoded(0.5)) < 2e-3);  // a byte's half
+  for (const float c : f.color)
+    REQUIRE(std::abs(static_cast<double>(c) - encoded(0.5)) < 2e-3);  // a byte's half
   // Odd sizes keep their mean too: 3 x 5, one white column of three.
-  wall.texture = texture(3, 5, [](int x, int) { const int v = x == 1 ? 255 : 0; return std::vector<int>{v, v, v}; });
+  wall.texture = texture(3, 5, [](int x, int) {
+    const int v = x == 1 ? 255 : 0;
+    return std::vector<int>{v, v, v};
+  });
   const auto g = draw<float>(serial, OneMesh(wall).instances, lens(32, 16));
   for (const float c : g.color) REQUIRE(std::abs(static_cast<double>(c) - encoded(1.0 / 3)) < 4e-3);
 }
@@ -124,7 +137,8 @@ TEST_CASE("light: ambient and one direction, on the side that is seen") {
   CHECK(f.color[0] == doctest::Approx(encoded(0.5 * (0.1 + 0.6 * 0.8))).epsilon(1e-7));
   CHECK(f.color[1] == doctest::Approx(encoded(0.25 * (0.2 + 0.5 * 0.8))).epsilon(1e-7));
   light.direction = {0, 0, 1};  // from behind
-  CHECK(draw<double>(serial, mesh.instances, lens(8, 4), light).color[2] == doctest::Approx(encoded(0.3)).epsilon(1e-7));
+  CHECK(draw<double>(serial, mesh.instances, lens(8, 4), light).color[2] ==
+        doctest::Approx(encoded(0.3)).epsilon(1e-7));
 }
 
 TEST_CASE("what does not fit is named") {
@@ -144,9 +158,12 @@ TEST_CASE("what does not fit is named") {
 
 }  // namespace
 
-TEST_CASE("a surface as files give it: parts share textures, stand in several places, and are lit or not") {
+TEST_CASE(
+    "a surface as files give it: parts share textures, stand in several places, and are lit or not") {
   TexturedScene scene;
-  scene.textures.push_back({4, 1, rgba_of(4, 1, [](int x, int) { return std::vector<int>{60 * x, 200, 10}; })});
+  scene.textures.push_back({4, 1, rgba_of(4, 1, [](int x, int) {
+                              return std::vector<int>{60 * x, 200, 10};
+                            })});
   for (int part = 0; part < 2; ++part) {
     TexturedPart p;
     p.geometry = quad({-0.5, -0.5, 0}, {0.5, -0.5, 0}, {0.5, 0.5, 0}, {-0.5, 0.5, 0}).geometry;
@@ -158,7 +175,8 @@ TEST_CASE("a surface as files give it: parts share textures, stand in several pl
   }
   // Two of the first part beside each other, one of the other above.
   for (const Vec3d& at : {Vec3d{-0.5, 0.5, 2}, Vec3d{0.5, 0.5, 2}, Vec3d{0, -0.5, 2}}) {
-    scene.instances.push_back({scene.instances.size() == 2 ? std::size_t{1} : std::size_t{0}, {{}, at, 1}});
+    scene.instances.push_back(
+        {scene.instances.size() == 2 ? std::size_t{1} : std::size_t{0}, {{}, at, 1}});
   }
   const PlacedMeshes placed = placed_meshes(scene).value();
   CHECK(placed.meshes.size() == 2);
@@ -172,7 +190,9 @@ TEST_CASE("a surface as files give it: parts share textures, stand in several pl
   SerialBackend serial;
   const auto plain = draw<float>(serial, placed.in_world(), lens(32, 32));
   const auto lit = draw<float>(serial, placed.in_world(), lens(32, 32), dark);
-  const auto red = [](const auto& f, int x, int y) { return f.color[3 * static_cast<std::size_t>(y * 32 + x)] * 255; };
+  const auto red = [](const auto& f, int x, int y) {
+    return f.color[3 * static_cast<std::size_t>(y * 32 + x)] * 255;
+  };
   for (int texel = 0; texel < 4; ++texel) {
     for (const int left : {0, 16}) {
       CHECK(std::abs(red(plain, left + 4 * texel + 2, 24) - 60.0f * static_cast<float>(texel)) < 25);
@@ -194,10 +214,12 @@ TEST_CASE("a surface as files give it: parts share textures, stand in several pl
   CHECK(placed_meshes(bad).status().message().find("parts[0]: MeshTexture") != std::string::npos);
   bad = scene;
   bad.parts[0].material.alpha = 1.5;
-  CHECK(placed_meshes(bad).status().message().find("parts[0]: SurfaceMesh: base_alpha = 1.5") != std::string::npos);
+  CHECK(placed_meshes(bad).status().message().find("parts[0]: SurfaceMesh: base_alpha = 1.5") !=
+        std::string::npos);
   bad = scene;
   bad.parts[1].alphas = {1, 1};
-  CHECK(placed_meshes(bad).status().message().find("parts[1]: SurfaceMesh: alphas: 2 for 4 vertices") != std::string::npos);
+  CHECK(placed_meshes(bad).status().message().find("parts[1]: SurfaceMesh: alphas: 2 for 4 vertices") !=
+        std::string::npos);
   scene.parts[0].material.alpha_cutoff = 0.25;
   scene.parts[1].material.blend = true;
   scene.parts[1].material.alpha = 0.5;

@@ -82,7 +82,8 @@ TEST_CASE("the fast profile stays within its budget") {
   RenderConfig config;
   config.profile = Profile::fast;
   SerialBackend serial;
-  const ImageError e = image_error(render<float>(serial, {cloud.set()}, camera, config).rgb, oracle.rgb, 3);
+  const ImageError e =
+      image_error(render<float>(serial, {cloud.set()}, camera, config).rgb, oracle.rgb, 3);
   CHECK(e.psnr >= 60);
   CHECK(e.max <= 6.0 / 255);
 }

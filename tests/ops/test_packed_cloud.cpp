@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "backends.hpp"
-#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -44,8 +44,8 @@ void on_backends(const F& f) {
 template <class Value>
 long double most_in_chunk(std::size_t i, std::size_t n, const Value& value) {
   long double most = 0;
-  for (std::size_t k = i / kProjectChunk * kProjectChunk; k < std::min(n, (i / kProjectChunk + 1) * kProjectChunk);
-       ++k) {
+  for (std::size_t k = i / kProjectChunk * kProjectChunk;
+       k < std::min(n, (i / kProjectChunk + 1) * kProjectChunk); ++k) {
     most = std::max(most, value(k));
   }
   return most;
@@ -60,7 +60,8 @@ TEST_CASE("packed clouds: each field within its steps, which the errors report")
     PackErrors errors;
     const PackedCloud packed = pack_cloud(full, kAnything, &errors);
     const GaussianCloud got = unpack_cloud(packed);
-    const std::size_t n = full.size(), rest = 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1);
+    const std::size_t n = full.size(),
+                      rest = 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1);
     REQUIRE(got.size() == n);
     CHECK(errors.mean_bits == 16);
     CHECK(errors.sh_bits == 8);
@@ -75,7 +76,8 @@ TEST_CASE("packed clouds: each field within its steps, which the errors report")
             -most_in_chunk(i, n, [&](std::size_t r) { return -1.0L * full.means[k][r] + 1000; }) + 1000;
         const long double high =
             most_in_chunk(i, n, [&](std::size_t r) { return 1.0L * full.means[k][r] + 1000; }) - 1000;
-        REQUIRE(std::fabs(is - was) <= (high - low) / 131070 + 1e-6L * (std::fabs(low) + std::fabs(high)));
+        REQUIRE(std::fabs(is - was) <=
+                (high - low) / 131070 + 1e-6L * (std::fabs(low) + std::fabs(high)));
         moved += (is - was) * (is - was);
         const long double s = full.scales[k][i], t = got.scales[k][i];
         const long double most = most_in_chunk(i, n, [&](std::size_t r) {
@@ -99,13 +101,15 @@ TEST_CASE("packed clouds: each field within its steps, which the errors report")
                               std::copysign(full.quats[k][i] / std::sqrt(other), dot * full.quats[k][i]);
         apart += d * d;
       }
-      // Half a step of 4.3e-5 in each of three parts; the fourth follows with at most three times theirs.
+      // Half a step of 4.3e-5 in each of three parts; the fourth follows with at most three times
+      // theirs.
       const long double angle = 4 * std::asin(std::sqrt(apart) / 2);
       REQUIRE(angle < 1.6e-4L);
       seen.rotation = std::max(seen.rotation, static_cast<double>(angle));
       REQUIRE(std::fabs(1.0L * got.opacities[i] - full.opacities[i]) <= 1 / 131070.0L + 6e-8L);
       seen.mean = std::max(seen.mean, static_cast<double>(std::sqrt(moved)));
-      seen.mean_deviations = std::max(seen.mean_deviations, static_cast<double>(std::sqrt(moved) / largest));
+      seen.mean_deviations =
+          std::max(seen.mean_deviations, static_cast<double>(std::sqrt(moved) / largest));
       seen.scale = std::max(seen.scale, static_cast<double>(change / largest));
       for (std::size_t k = 0; k < rest; ++k) {
         const std::size_t from = k < 9 ? 0 : k < 24 ? 9 : 24, to = k < 9 ? 9 : k < 24 ? 24 : 45;
@@ -124,7 +128,8 @@ TEST_CASE("packed clouds: each field within its steps, which the errors report")
     CHECK(errors.mean_deviations == doctest::Approx(seen.mean_deviations).epsilon(1e-4));
     CHECK(errors.scale == doctest::Approx(seen.scale).epsilon(1e-4));
     CHECK(errors.sh == doctest::Approx(seen.sh).epsilon(1e-4));
-    CHECK(errors.rotation == doctest::Approx(seen.rotation).epsilon(1e-2));  // of floats, not quite of unit length
+    CHECK(errors.rotation ==
+          doctest::Approx(seen.rotation).epsilon(1e-2));  // of floats, not quite of unit length
     CHECK(errors.opacity < 7.7e-6);
   }
 }
@@ -133,7 +138,8 @@ TEST_CASE("packed clouds: images of what the codes stand for, bit for bit") {
   for (const int degree : {0, 1, 2, 3}) {
     CAPTURE(degree);
     const GaussianCloud full = scene_of(degree);
-    const PackLimits limits[] = {kAnything, {1e9, 0, 1e9}, {0, 0, 0}};  // 8, 16 and 32 bits of SH; means as floats
+    const PackLimits limits[] = {
+        kAnything, {1e9, 0, 1e9}, {0, 0, 0}};  // 8, 16 and 32 bits of SH; means as floats
     for (const PackLimits& limit : limits) {
       PackErrors errors;
       const PackedCloud packed = pack_cloud(full, limit, &errors);
@@ -147,7 +153,8 @@ TEST_CASE("packed clouds: images of what the codes stand for, bit for bit") {
       on_backends([&](auto& backend) {
         using B = std::decay_t<decltype(backend)>;
         const GaussianArrays<B> a(backend, packed), b(backend, floats);
-        const auto got = render<float>(backend, {a.set()}, kCamera), want = render<float>(backend, {b.set()}, kCamera);
+        const auto got = render<float>(backend, {a.set()}, kCamera),
+                   want = render<float>(backend, {b.set()}, kCamera);
         CHECK(got.stats[0].visible > 100);
         CHECK(got.rgb == want.rgb);
         CHECK(got.median_depth == want.median_depth);

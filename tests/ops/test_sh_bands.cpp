@@ -7,9 +7,9 @@
 #include <limits>
 
 #include "gsnav/detail/scene/drop_bands.hpp"
-#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/detail/scene/scene_profile.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
 #if defined(GSNAV_HAS_CUDA)

@@ -9,9 +9,9 @@
 #include <tuple>
 #include <vector>
 
+#include "gsnav/core/rng.hpp"
 #include "gsnav/detail/core/permute.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
-#include "gsnav/core/rng.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "support/scenes.hpp"
 
@@ -51,8 +51,8 @@ std::uint64_t code_of(const Vec3d& place) {
 }  // namespace
 
 TEST_CASE("permute_rows: what picking row after row gives, narrow rows and wide") {
-  const std::vector<Order> orders = {{},           {0},         {1, 0},           rotated(100000, 1),
-                                     shuffled(7, 1), shuffled(1000, 2), shuffled(70001, 3)};
+  const std::vector<Order> orders = {
+      {}, {0}, {1, 0}, rotated(100000, 1), shuffled(7, 1), shuffled(1000, 2), shuffled(70001, 3)};
   for (const Order& order : orders) {
     CAPTURE(order.size());
     for (const std::size_t stride : {1u, 3u, 9u, 15u, 24u, 45u}) {
@@ -99,10 +99,12 @@ TEST_CASE("hilbert_code: fills each cube of cells, of any size, before the next,
     const int level = run < 20 ? 0 : run - 20 < 19 ? run - 20 : 18;
     CAPTURE(level);
     std::array<std::uint32_t, 3> corner{};
-    for (auto& c : corner) c = static_cast<std::uint32_t>(rng.uniform() * (1 << (18 - level))) << (3 + level);
+    for (auto& c : corner)
+      c = static_cast<std::uint32_t>(rng.uniform() * (1 << (18 - level))) << (3 + level);
     std::vector<Cell> cells;
     for (std::uint32_t i = 0; i < 512; ++i) {
-      const std::array<std::uint32_t, 3> at{corner[0] + ((i & 7) << level), corner[1] + ((i >> 3 & 7) << level),
+      const std::array<std::uint32_t, 3> at{corner[0] + ((i & 7) << level),
+                                            corner[1] + ((i >> 3 & 7) << level),
                                             corner[2] + ((i >> 6) << level)};
       cells.push_back({detail::hilbert_code(at) >> (3 * level), at});
     }

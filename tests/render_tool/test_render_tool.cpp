@@ -6,8 +6,8 @@
 #include <string>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/detail/io/ply.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
 

@@ -144,10 +144,14 @@ TEST_CASE("budgets: an infinite or negative-infinite error is missed, not met") 
 
 TEST_CASE("targets: one setting beside another, over the views that have both") {
   std::vector<Row> rows;
-  const auto add = [&rows](const char* profile, const char* oracle, const char* sensor, int view, double psnr,
-                           double ms) -> Row& {
+  const auto add = [&rows](const char* profile, const char* oracle, const char* sensor, int view,
+                           double psnr, double ms) -> Row& {
     Row r = render(profile, "none", "", view, psnr, ms);
-    r.set("oracle", oracle).set("sensor", sensor).set("width", 256).set("height", 256).set("gaussians", 1000);
+    r.set("oracle", oracle)
+        .set("sensor", sensor)
+        .set("width", 256)
+        .set("height", 256)
+        .set("gaussians", 1000);
     rows.push_back(r);
     return rows.back();
   };
@@ -156,10 +160,22 @@ TEST_CASE("targets: one setting beside another, over the views that have both") 
   add("fast", "photo4", "rgbd", 2, 40, 1000);  // no lod row of that view
   add("lod", "photo4", "rgbd", 0, 37, 4);
   add("lod", "photo4", "rgbd", 1, 39, 6);
-  add("fast", "contract", "rgbd", 0, 100, 12).set("touched", 300).set("emitting", 200).set("row_bytes", 236);
-  add("fast", "contract", "rgbd", 1, 100, 20).set("touched", 500).set("emitting", 400).set("row_bytes", 236);
-  add("fast", "contract", "depth", 0, 100, 6).set("touched", 999).set("emitting", 1).set("row_bytes", 59);
-  add("fast", "contract", "depth", 1, 100, 10).set("touched", 999).set("emitting", 1).set("row_bytes", 59);
+  add("fast", "contract", "rgbd", 0, 100, 12)
+      .set("touched", 300)
+      .set("emitting", 200)
+      .set("row_bytes", 236);
+  add("fast", "contract", "rgbd", 1, 100, 20)
+      .set("touched", 500)
+      .set("emitting", 400)
+      .set("row_bytes", 236);
+  add("fast", "contract", "depth", 0, 100, 6)
+      .set("touched", 999)
+      .set("emitting", 1)
+      .set("row_bytes", 59);
+  add("fast", "contract", "depth", 1, 100, 10)
+      .set("touched", 999)
+      .set("emitting", 1)
+      .set("row_bytes", 59);
   add("exact", "contract", "rgbd", 0, 78, 12)
       .set("knob", "storage")
       .set("knob_value", "packed")
@@ -190,6 +206,7 @@ TEST_CASE("targets: one setting beside another, over the views that have both") 
   CHECK(value("packed: most memory").value == doctest::Approx(1.5));
   const std::string text = targets_text(checks);
   CHECK(std::count(text.begin(), text.end(), '\n') == 8);
-  CHECK(text.find("box, 256x256, serial: packed: bytes a Gaussian beside its SH bands: 38") != std::string::npos);
+  CHECK(text.find("box, 256x256, serial: packed: bytes a Gaussian beside its SH bands: 38") !=
+        std::string::npos);
   CHECK(check_targets(Table({}, {})).empty());
 }

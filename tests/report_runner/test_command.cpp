@@ -11,8 +11,8 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/detail/io/ply.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/detail/io/visible_file.hpp"
+#include "gsnav/io/scene_file.hpp"
 #include "lod/two_rooms.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
@@ -37,7 +37,8 @@ std::string tiny_scene(const TempFolder& folder) {
     cameras.push_back(Camera::look_at({x, 0, 0}, {0, 0, 4}, {0, -1, 0}, 48, 32, 70));
   }
   io::save_cameras(folder / "cameras.json", cameras).throw_if_error();
-  return "--scene tiny=\"" + (folder / "tiny.ply").string() + ":" + (folder / "cameras.json").string() + "\"";
+  return "--scene tiny=\"" + (folder / "tiny.ply").string() + ":" + (folder / "cameras.json").string() +
+         "\"";
 }
 
 }  // namespace
@@ -81,8 +82,9 @@ TEST_CASE("report: errors name the option and the value") {
 TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed") {
   const TempFolder folder("report_smoke");
   const std::string out = (folder / "out").string();
-  const std::string arguments = tiny_scene(folder) + " --views 2 --sizes 48x32 --knob-size 48x32 --runs 1 --kinds " +
-                                "render,ledger --knobs response,storage --threads 2 --commit c1 --out \"" + out + "\"";
+  const std::string arguments =
+      tiny_scene(folder) + " --views 2 --sizes 48x32 --knob-size 48x32 --runs 1 --kinds " +
+      "render,ledger --knobs response,storage --threads 2 --commit c1 --out \"" + out + "\"";
   Outcome first = run(folder, arguments);
   CAPTURE(first.text);
   REQUIRE(first.ok);
@@ -106,7 +108,8 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
       CHECK(*row.number("band_bytes") == 9 * *row.number("gaussians"));
       CHECK(*row.number("cloud_bytes") - *row.number("band_bytes") < 40 * *row.number("gaussians"));
     }
-    if (row.get("profile") != "exact" || row.get("knob") != "none" || row.get("oracle") != "contract") continue;
+    if (row.get("profile") != "exact" || row.get("knob") != "none" || row.get("oracle") != "contract")
+      continue;
     ++exact;
     CAPTURE(row.line());
     CHECK(*row.number("excluded") <= 1e-3);  // of so few pixels one may lie on an edge
@@ -124,8 +127,8 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
   CHECK(exact == 2 * (3 + 1));  // views x (openmp by sensor, serial)
   CHECK(knobs == 2 * (3 * 3 + 9));
   CHECK(picture);
-  for (const char* target : {"culling: Gaussians touched", "depth alone: times faster", "depth alone: fewer bytes",
-                             "packed: bytes a Gaussian"}) {
+  for (const char* target : {"culling: Gaussians touched", "depth alone: times faster",
+                             "depth alone: fewer bytes", "packed: bytes a Gaussian"}) {
     CAPTURE(target);
     CHECK(first.text.find(std::string("tiny, 48x32, openmp: ") + target) != std::string::npos);
   }
@@ -152,7 +155,8 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
 
 TEST_CASE("report: visible sets are rows beside fast, and say where no set serves") {
   const TempFolder folder("report_visible");
-  const std::filesystem::path ply = folder / "rooms.ply", cameras = folder / "cameras.json", sets = folder / "rooms.vis";
+  const std::filesystem::path ply = folder / "rooms.ply", cameras = folder / "cameras.json",
+                              sets = folder / "rooms.vis";
   io::save_ply(ply, two_rooms(1)).throw_if_error();
   const GaussianCloud cloud = io::load_scene(ply.string()).value().cloud;
   VisibleSettings settings;
@@ -161,12 +165,14 @@ TEST_CASE("report: visible sets are rows beside fast, and say where no set serve
   const VisibleSets seen = build_visible_sets(backend, cloud, places_in_rooms(), settings).value();
   io::save_visible_sets(sets, seen, cloud).throw_if_error();
   std::vector<Camera> from;
-  for (const double x : {-1.8, 1.6}) from.push_back(Camera::look_at({x, 1.3, 0.1}, {-x, 1.2, 0.2}, {0, 1, 0}, 48, 32, 90));
+  for (const double x : {-1.8, 1.6})
+    from.push_back(Camera::look_at({x, 1.3, 0.1}, {-x, 1.2, 0.2}, {0, 1, 0}, 48, 32, 90));
   io::save_cameras(cameras, from).throw_if_error();
-  const std::string arguments = "--scene rooms=\"" + ply.string() + ":" + cameras.string() + "\" --visible-sets rooms=\"" +
-                                sets.string() + "\" --views 2 --sizes 48x32,96x64 --runs 1 --kinds render --knobs none " +
-                                "--profiles fast --sensors rgbd --backends openmp --oracles contract --no-html --out \"" +
-                                (folder / "out").string() + "\"";
+  const std::string arguments =
+      "--scene rooms=\"" + ply.string() + ":" + cameras.string() + "\" --visible-sets rooms=\"" +
+      sets.string() + "\" --views 2 --sizes 48x32,96x64 --runs 1 --kinds render --knobs none " +
+      "--profiles fast --sensors rgbd --backends openmp --oracles contract --no-html --out \"" +
+      (folder / "out").string() + "\"";
   const Outcome made = run(folder, arguments);
   CAPTURE(made.text);
   REQUIRE(made.ok);
@@ -176,13 +182,15 @@ TEST_CASE("report: visible sets are rows beside fast, and say where no set serve
     if (row.get("profile") != "visible") continue;
     CAPTURE(row.line());
     const auto fast = std::find_if(rows.begin(), rows.end(), [&](const Row& r) {
-      return r.get("profile") == "fast" && r.get("view") == row.get("view") && r.get("width") == row.get("width");
+      return r.get("profile") == "fast" && r.get("view") == row.get("view") &&
+             r.get("width") == row.get("width");
     });
     REQUIRE(fast != rows.end());
     const bool served = row.get("width") == "48";
     CHECK((row.get("note").find("no visible set") == std::string::npos) == served);
     CHECK(*row.number("rgb_psnr") >= 60);
-    CHECK(*row.number("cloud_bytes") == *fast->number("cloud_bytes") + static_cast<double>(seen.bytes()));
+    CHECK(*row.number("cloud_bytes") ==
+          *fast->number("cloud_bytes") + static_cast<double>(seen.bytes()));
     if (served) {
       CHECK(*row.number("touched") < 0.7 * *fast->number("touched"));  // the other room is not
     } else {

@@ -9,10 +9,14 @@ using namespace gsnav_report;
 using namespace gsnav_test;
 
 TEST_CASE("csv: fields of any text come back") {
-  for (const char* text : {"plain", "a,b", "say \"no\"", "two\nlines", "\"", ",", "", "trailing,", "caf\xc3\xa9"}) {
+  for (const char* text :
+       {"plain", "a,b", "say \"no\"", "two\nlines", "\"", ",", "", "trailing,", "caf\xc3\xa9"}) {
     CAPTURE(text);
     Row row;
-    row.set("scene", text).set("note", text).set("rgb_max", 0.1).set("pairs", std::uint64_t{18446744073709551615ull});
+    row.set("scene", text)
+        .set("note", text)
+        .set("rgb_max", 0.1)
+        .set("pairs", std::uint64_t{18446744073709551615ull});
     std::string file;
     for (const std::string_view c : kColumns) file.append(file.empty() ? "" : ",").append(c);
     const auto rows = parse_csv(file + "\n" + row.line() + row.line(), "text").value();
@@ -91,6 +95,7 @@ TEST_CASE("kernels: benchmarks with their counters") {
   CHECK(rows[2].get("error_unit").empty());
   CHECK(parse_benchmarks("[]", "f").code() == gsnav::Errc::invalid_file);
   CHECK(parse_benchmarks("{\"benchmarks\": [3]}", "f").code() == gsnav::Errc::invalid_file);
-  CHECK(parse_benchmarks("{\"benchmarks\": [{\"name\": \"x\"}]}", "f").message().find("\"x\"") != std::string::npos);
+  CHECK(parse_benchmarks("{\"benchmarks\": [{\"name\": \"x\"}]}", "f").message().find("\"x\"") !=
+        std::string::npos);
   CHECK(kernel_rows("/nowhere.json").code() == gsnav::Errc::file_not_found);
 }

@@ -21,7 +21,8 @@ TEST_CASE("sweep truth: distances known in closed form") {
   CHECK(segment_distance_truth(-x, x, z - y, z + y) == doctest::Approx(1));          // skew
   CHECK(segment_distance_truth(-x, x, -y, y) == doctest::Approx(0).epsilon(1e-15));  // crossing
   CHECK(segment_distance_truth(o, o, x + y, x + y) == doctest::Approx(std::sqrt(2.0)));
-  CHECK(segment_distance_truth(o, x, y * 2.0L + x * 2.0L, y * 2.0L + x * 5.0L) == doctest::Approx(std::sqrt(5.0)));
+  CHECK(segment_distance_truth(o, x, y * 2.0L + x * 2.0L, y * 2.0L + x * 5.0L) ==
+        doctest::Approx(std::sqrt(5.0)));
 }
 
 TEST_CASE("sweep truth: the least gap of a passing sphere") {

@@ -37,14 +37,16 @@ TEST_CASE("plan: every combination once, knobs one at a time") {
   for (const Setting& s : settings) {
     CHECK(validate(render_config(s, SortOrder::z_depth)).ok());
     CHECK_FALSE(s.oracles.empty());
-    CHECK(seen.insert(std::to_string(s.view) + to_string(s.size) + s.sensor + s.backend + s.profile + s.knob +
-                      s.knob_value).second);
+    CHECK(seen.insert(std::to_string(s.view) + to_string(s.size) + s.sensor + s.backend + s.profile +
+                      s.knob + s.knob_value)
+              .second);
     if (s.knob != "none") {
       CHECK(s.size == ImageSize{64, 64});
       CHECK(s.profile == "exact");
     }
   }
-  const auto plain = std::count_if(settings.begin(), settings.end(), [](const Setting& s) { return s.knob == "none"; });
+  const auto plain =
+      std::count_if(settings.begin(), settings.end(), [](const Setting& s) { return s.knob == "none"; });
   CHECK(plain == 2 * 2 * (3 * 2 + 2));  // views x sizes x (openmp by sensor and profile, serial as rgbd)
 }
 

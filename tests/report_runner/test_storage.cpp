@@ -23,10 +23,12 @@ GaussianCloud scene() { return random_cloud(7, {.count = 3000, .extent = 20}); }
 
 /// Largest |a - b| in units of half a step; values out of the codec's range must come back at its end.
 template <class F>
-double worst(const std::vector<float>& a, const std::vector<float>& b, const StorageCodec& c, const F& stored) {
+double worst(const std::vector<float>& a, const std::vector<float>& b, const StorageCodec& c,
+             const F& stored) {
   double most = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    const double x = std::clamp(stored(static_cast<double>(a[i])), c.low, c.high), y = stored(static_cast<double>(b[i]));
+    const double x = std::clamp(stored(static_cast<double>(a[i])), c.low, c.high),
+                 y = stored(static_cast<double>(b[i]));
     most = std::max(most, std::abs(x - y) / (0.5 * c.step));
   }
   return most;
@@ -89,13 +91,13 @@ TEST_CASE("storage: quaternions stay of unit length and turn by a known angle at
 
 TEST_CASE("storage: float16 rounds to the nearest, ties to even") {
   CHECK(round_to_half(1.0f) == 1.0f);
-  CHECK(round_to_half(1.0f + 0x1p-11f) == 1.0f);                  // a tie
-  CHECK(round_to_half(1.0f + 3 * 0x1p-11f) == 1.0f + 0x1p-9f);    // a tie the other way
+  CHECK(round_to_half(1.0f + 0x1p-11f) == 1.0f);                // a tie
+  CHECK(round_to_half(1.0f + 3 * 0x1p-11f) == 1.0f + 0x1p-9f);  // a tie the other way
   CHECK(round_to_half(1.0f + 0x1.1p-11f) == 1.0f + 0x1p-10f);
   CHECK(round_to_half(2047.4f) == 2047.0f);
-  CHECK(round_to_half(-4098.0f) == -4096.0f);                     // steps of 4 from 4096 on
+  CHECK(round_to_half(-4098.0f) == -4096.0f);  // steps of 4 from 4096 on
   CHECK(round_to_half(1e6f) == 65504.0f);
-  CHECK(round_to_half(0x1p-24f) == 0x1p-24f);                     // the least subnormal
+  CHECK(round_to_half(0x1p-24f) == 0x1p-24f);  // the least subnormal
   CHECK(round_to_half(0x1p-26f) == 0.0f);
   CHECK(round_to_half(0.0f) == 0.0f);
   const GaussianCloud a = scene(), b = through_storage(a, "position_fp16").value();

@@ -40,7 +40,8 @@ TEST_CASE("velocities take the agent along the arc that they describe, however m
     const Vec3d truth{centre.x + r * std::cos(yaw1), from.y, centre.z - r * std::sin(yaw1)};
     CHECK(std::hypot(w.agent().position.x - truth.x, w.agent().position.z - truth.z) < 1e-9);
     CHECK(w.agent().yaw == doctest::Approx(yaw1).epsilon(1e-12));
-    CHECK(info.moved == doctest::Approx(norm(truth - from)).epsilon(1e-4));  // the floor is even to millimetres
+    CHECK(info.moved ==
+          doctest::Approx(norm(truth - from)).epsilon(1e-4));  // the floor is even to millimetres
     CHECK(w.time() == 0.5);
   }
 }
@@ -175,8 +176,9 @@ TEST_CASE("a world that was moved from answers with an error") {
   const World other(std::move(w));
   CHECK(!other.moved_from());
   CHECK(w.moved_from());
-  for (const Status& s : {w.reset(in_living_room()), w.step(Action::move_forward).status(), w.set_state(here),
-                          w.set_agent({3, 0, 3}, 0), w.clearance().status(), w.probe(Action::turn_left).status()}) {
+  for (const Status& s :
+       {w.reset(in_living_room()), w.step(Action::move_forward).status(), w.set_state(here),
+        w.set_agent({3, 0, 3}, 0), w.clearance().status(), w.probe(Action::turn_left).status()}) {
     CHECK(s.code() == Errc::invalid_argument);
     CHECK(s.message().find("moved from") != std::string::npos);
   }
@@ -237,12 +239,14 @@ TEST_CASE("rewards add up to the distance covered") {
   REQUIRE(w.reset(in_living_room(-1.2)).ok());
   const double l = w.distance_to_goal();
   double sum = 0.0;
-  for (int i = 0; i < 12; ++i) sum += w.step(i % 5 == 4 ? Action::turn_right : Action::move_forward)->reward;
+  for (int i = 0; i < 12; ++i)
+    sum += w.step(i % 5 == 4 ? Action::turn_right : Action::move_forward)->reward;
   sum += w.step(Action::stop)->reward;
   // Progress telescopes; 13 actions of slack; no success.
   CHECK(sum == doctest::Approx(l - w.distance_to_goal() - 0.13));
   CHECK(w.distance_to_goal() ==
-        doctest::Approx(w.navmesh().geodesic_distance(w.agent().position, w.episode().goal_position)).epsilon(1e-9));
+        doctest::Approx(w.navmesh().geodesic_distance(w.agent().position, w.episode().goal_position))
+            .epsilon(1e-9));
 }
 
 TEST_CASE("impossible clocks, tilts and rewards name their field") {

@@ -29,12 +29,14 @@ BatchConfig small_batch(int height = 16, int width = 24) {
 }
 
 std::vector<std::shared_ptr<const SimulatorScene>> two_scenes() {
-  return {std::make_shared<const SimulatorScene>(peopled_scene(2000)), std::make_shared<const SimulatorScene>(flat_scene())};
+  return {std::make_shared<const SimulatorScene>(peopled_scene(2000)),
+          std::make_shared<const SimulatorScene>(flat_scene())};
 }
 
 bool same_info(const StepInfo& a, const StepInfo& b) {
-  return a.collided == b.collided && a.wall_collision == b.wall_collision && a.capsule_blocked == b.capsule_blocked &&
-         a.avatar_contact == b.avatar_contact && a.pushed_into == b.pushed_into && a.moved == b.moved &&
+  return a.collided == b.collided && a.wall_collision == b.wall_collision &&
+         a.capsule_blocked == b.capsule_blocked && a.avatar_contact == b.avatar_contact &&
+         a.pushed_into == b.pushed_into && a.moved == b.moved &&
          a.avatar_clearance == b.avatar_clearance && a.reward == b.reward;
 }
 
@@ -123,7 +125,8 @@ TEST_CASE("a batch that is steered by velocities has the bits of single simulato
   double moved = 0.0;
   for (int i = 0; i < 20; ++i) {
     std::vector<VelocityCommand> commands(kEnvironments);
-    for (VelocityCommand& c : commands) c = {rng.uniform(-0.5, 1.5), rng.uniform(-1, 1), i == 19, rng.uniform(-0.3, 0.3)};
+    for (VelocityCommand& c : commands)
+      c = {rng.uniform(-0.5, 1.5), rng.uniform(-1, 1), i == 19, rng.uniform(-0.3, 0.3)};
     const BatchStep out = batch.step(commands).value();
     for (std::size_t e = 0; e < kEnvironments; ++e) {
       const Observations obs = single[e].step(commands[e]).value();
@@ -236,9 +239,10 @@ TEST_CASE("people are skinned once for each time that is looked at, and once for
     return b;
   };
   const auto poses = [&](const EpisodeSource& source) {
-    auto sim = make_batch_simulator(backend, {std::make_shared<const SimulatorScene>(peopled_scene(2000))}, small_batch(),
-                                    10, source)
-                   .value();
+    auto sim =
+        make_batch_simulator(backend, {std::make_shared<const SimulatorScene>(peopled_scene(2000))},
+                             small_batch(), 10, source)
+            .value();
     sim.reset().value();
     CHECK(sim.render_count() == 10);  // colour and depth share theirs
     return sim.pose_count();
@@ -264,7 +268,8 @@ TEST_CASE("bodies of a moment are made once, also for who comes by there later, 
       made += t1 > t0 ? 1 : 0;
       append_bodies(*scene, t0, t1, out);
     };
-    auto worlds = BatchWorld::create({{scene->navmesh, bodies}}, {}, AutoReset::disabled, 2, apart).value();
+    auto worlds =
+        BatchWorld::create({{scene->navmesh, bodies}}, {}, AutoReset::disabled, 2, apart).value();
     worlds.keep_bodies(kept);
     REQUIRE(worlds.reset(in_turn).ok());
     for (int i = 0; i < 8; ++i) {
@@ -286,10 +291,13 @@ TEST_CASE("what is wrong with a batch is named") {
     CHECK(made.code() == Errc::invalid_argument);
     return made.message();
   };
-  const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  const auto has = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
   CHECK(has(message(make_batch_simulator(backend, {}, small_batch(), 2, wandering)), "no scene"));
   CHECK(has(message(make_batch_simulator(backend, {nullptr}, small_batch(), 2, wandering)), "null"));
-  CHECK(has(message(make_batch_simulator(backend, two_scenes(), small_batch(), 0, wandering)), "environments = 0"));
+  CHECK(has(message(make_batch_simulator(backend, two_scenes(), small_batch(), 0, wandering)),
+            "environments = 0"));
   CHECK(has(message(make_batch_simulator(backend, two_scenes(), small_batch(), 2, {})), "source"));
   BatchConfig config = small_batch();
   config.pose_slots = 0;
@@ -304,7 +312,9 @@ TEST_CASE("what is wrong with a batch is named") {
   CHECK(has(message(sim.step(unknown)), "before reset"));
   CHECK(sim.reset().ok());
 
-  const auto elsewhere = [](std::size_t, std::size_t) -> Result<BatchEpisode> { return BatchEpisode{5, to_kitchen()}; };
+  const auto elsewhere = [](std::size_t, std::size_t) -> Result<BatchEpisode> {
+    return BatchEpisode{5, to_kitchen()};
+  };
   auto lost = make_batch_simulator(backend, two_scenes(), small_batch(), 1, elsewhere).value();
   CHECK(has(message(lost.reset()), "scene 5 of 2"));
 }
@@ -318,7 +328,9 @@ TEST_CASE("memory grows with scenes, not with environments") {
   OpenMPBackend backend(1);
   BatchConfig config = small_batch();
   const auto scene = std::make_shared<const SimulatorScene>(peopled_scene(20000));
-  const auto at_one_time = [](std::size_t, std::size_t) -> Result<BatchEpisode> { return BatchEpisode{0, to_kitchen()}; };
+  const auto at_one_time = [](std::size_t, std::size_t) -> Result<BatchEpisode> {
+    return BatchEpisode{0, to_kitchen()};
+  };
   const auto bytes = [&](std::size_t environments) {
     const std::size_t before = in_use();
     auto sim = make_batch_simulator(backend, {scene}, config, environments, at_one_time).value();
@@ -329,7 +341,8 @@ TEST_CASE("memory grows with scenes, not with environments") {
   bytes(2);
   const std::size_t few = bytes(8), many = bytes(136);
   const std::size_t images = 16 * 24 * 4 * sizeof(float);
-  // What 128 more take beyond their images: less than 8 KiB each, where a scene of one's own takes megabytes.
+  // What 128 more take beyond their images: less than 8 KiB each, where a scene of one's own takes
+  // megabytes.
   CHECK(many - few < 128 * (images + 8192));
   CHECK(few > 1000000);
 }

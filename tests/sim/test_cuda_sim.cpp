@@ -119,7 +119,8 @@ TEST_CASE("cuda: meshes, their normals, and batches with them") {
   config.sensors[2].uuid = "normal";
   config.sensors[2].kind = SensorKind::normal;
   const std::vector<std::shared_ptr<const SimulatorScene>> scenes{
-      std::make_shared<const SimulatorScene>(furnished), std::make_shared<const SimulatorScene>(flat_scene())};
+      std::make_shared<const SimulatorScene>(furnished),
+      std::make_shared<const SimulatorScene>(flat_scene())};
   const auto facing = [](std::size_t environment, std::size_t) -> Result<BatchEpisode> {
     return BatchEpisode{environment % 3 == 2 ? 1u : 0u, to_kitchen()};
   };
@@ -148,7 +149,8 @@ TEST_CASE("cuda: levels of detail, and what is seen from where") {
   SimulatorScene detailed = peopled_scene(4000);
   CudaBackend cuda;
   OpenMPBackend openmp;
-  detailed.assets[0].lod = std::make_shared<const LodTree>(build_lod(openmp, *detailed.assets[0].cloud).value());
+  detailed.assets[0].lod =
+      std::make_shared<const LodTree>(build_lod(openmp, *detailed.assets[0].cloud).value());
   BatchConfig config;
   config.sensors = rgbd_sensors(64, 96);
   bool levels = false, visible = false;
@@ -167,16 +169,19 @@ TEST_CASE("cuda: levels of detail, and what is seen from where") {
     settings.near_plane = config.sensors[0].near_plane;
     settings.near_sigma = config.sensors[0].near_sigma;
     std::vector<Vec3d> eyes;
-    for (std::size_t e = 0; e < 2; ++e) eyes.push_back(there(e, 0).value().episode.start_position + Vec3d{0, 1.5, 0});  // not the third's
+    for (std::size_t e = 0; e < 2; ++e)
+      eyes.push_back(there(e, 0).value().episode.start_position + Vec3d{0, 1.5, 0});  // not the third's
     detailed.assets[0].visible = std::make_shared<const VisibleSets>(
         build_visible_sets(openmp, *detailed.assets[0].cloud, eyes, settings).value());
     config.visible_sets = true;
   }
-  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{std::make_shared<const SimulatorScene>(detailed)};
+  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{
+      std::make_shared<const SimulatorScene>(detailed)};
   auto on_gpu = make_batch_simulator(cuda, scenes, config, 3, there).value();
   auto on_cpu = make_batch_simulator(openmp, scenes, config, 3, there).value();
   const auto got = on_gpu.reset().value(), want = on_cpu.reset().value();
-  // Levels of detail are of the profile fast, which has another exponential there: its budget, not a rounding's.
+  // Levels of detail are of the profile fast, which has another exponential there: its budget, not a
+  // rounding's.
   const std::span<const float> rgb = got.images[0].data, expected = want.images[0].data;
   double squares = 0, largest = 0;
   for (std::size_t i = 0; i < expected.size(); ++i) {

@@ -277,7 +277,8 @@ TEST_CASE("meshes, which its batches do not know, are drawn there with the same 
   SimulatorScene furnished = flat_scene();
   furnished.meshes.push_back(turned_box(0.3));
   const std::vector<std::shared_ptr<const SimulatorScene>> scenes{
-      std::make_shared<const SimulatorScene>(furnished), std::make_shared<const SimulatorScene>(flat_scene())};
+      std::make_shared<const SimulatorScene>(furnished),
+      std::make_shared<const SimulatorScene>(flat_scene())};
   const auto facing = [](std::size_t environment, std::size_t) -> Result<BatchEpisode> {
     return BatchEpisode{environment % 2, to_kitchen()};
   };
@@ -299,8 +300,10 @@ TEST_CASE("meshes, which its batches do not know, are drawn there with the same 
 TEST_CASE("levels of detail are chosen for a backend with a memory of its own as for the serial one") {
   SimulatorScene detailed = peopled_scene(2000);
   SerialBackend serial;
-  detailed.assets[0].lod = std::make_shared<const LodTree>(build_lod(serial, *detailed.assets[0].cloud).value());
-  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{std::make_shared<const SimulatorScene>(detailed)};
+  detailed.assets[0].lod =
+      std::make_shared<const LodTree>(build_lod(serial, *detailed.assets[0].cloud).value());
+  const std::vector<std::shared_ptr<const SimulatorScene>> scenes{
+      std::make_shared<const SimulatorScene>(detailed)};
   BatchConfig config;
   config.sensors = rgbd_sensors(24, 36);
   config.lod = LodChoice{};
@@ -310,7 +313,9 @@ TEST_CASE("levels of detail are chosen for a backend with a memory of its own as
   const auto want = images_of(expected.reset().value().images);
   BatchConfig whole = config;
   whole.lod = {};
-  CHECK(images_of(make_batch_simulator(serial, scenes, whole, 3, spread).value().reset().value().images) != want);
+  CHECK(
+      images_of(make_batch_simulator(serial, scenes, whole, 3, spread).value().reset().value().images) !=
+      want);
   for (const ImageMemory memory : {ImageMemory::host, ImageMemory::backend}) {
     BatchingBackend batching;
     config.images = memory;

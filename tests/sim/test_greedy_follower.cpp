@@ -9,7 +9,8 @@
 using namespace gsnav;
 using namespace gsnav_test;
 
-TEST_CASE("greedy follower: it arrives everywhere in the flat, by ways little longer than the shortest") {
+TEST_CASE(
+    "greedy follower: it arrives everywhere in the flat, by ways little longer than the shortest") {
   const auto mesh = flat_navmesh();
   Rng rng(81);
   for (const TaskConfig& task : {TaskConfig{}, TaskConfig::pointnav_v2()}) {

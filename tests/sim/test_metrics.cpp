@@ -89,9 +89,12 @@ TEST_CASE("an episode of four steps by hand") {
   CHECK(m.euclidean_distance_to_goal == 0.05);
 }
 
-TEST_CASE("personal space compliance is the share of actions that keep 1 m between centres of Falcon's bodies") {
-  // An agent of radius 0.25 walks past a person of radius 0.3 who stands at the origin, along z = 0.6. Its
-  // centre is within 1 m while |x| < 0.8: of x = -5, -4.75 .. 5 (41 actions) -0.75 .. 0.75 are, 7 of them.
+TEST_CASE(
+    "personal space compliance is the share of actions that keep 1 m between centres of Falcon's "
+    "bodies") {
+  // An agent of radius 0.25 walks past a person of radius 0.3 who stands at the origin, along z = 0.6.
+  // Its centre is within 1 m while |x| < 0.8: of x = -5, -4.75 .. 5 (41 actions) -0.75 .. 0.75 are, 7 of
+  // them.
   EpisodeTracker t;
   t.reset(10.0);
   for (int i = 0; i <= 40; ++i) {
@@ -125,9 +128,9 @@ TEST_CASE("H-Coll counts episodes in which bodies touched, not moves that were s
     t.add({0.25, false, false, false, {}});
     return t.finish(false, 0.5, 0.5, 0.2);
   };
-  const std::array<EpisodeMetrics, 8> all{episode(false, false), episode(true, false),  episode(true, false),
-                                          episode(true, false),  episode(false, true),  episode(true, true),
-                                          episode(false, false), episode(false, false)};
+  const std::array<EpisodeMetrics, 8> all{
+      episode(false, false), episode(true, false), episode(true, false),  episode(true, false),
+      episode(false, true),  episode(true, true),  episode(false, false), episode(false, false)};
   CHECK_FALSE(all[1].human_collision);
   CHECK(all[1].human_blocked);
   CHECK(all[1].collision_rate == 0.5);

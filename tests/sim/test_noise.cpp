@@ -25,9 +25,10 @@ TEST_CASE("Gaussian noise has the mean and the deviation asked for and stays wit
     sum += static_cast<double>(v) - 0.5;
     squares += (static_cast<double>(v) - 0.5) * (static_cast<double>(v) - 0.5);
   }
-  const double n = static_cast<double>(c.size()), mean = sum / n, deviation = std::sqrt(squares / n - mean * mean);
-  CHECK(mean == doctest::Approx(0.02).epsilon(0.02));         // 0.05 * 0.4; five standard errors are 0.0008
-  CHECK(deviation == doctest::Approx(0.075).epsilon(0.01));   // 0.05 * 1.5
+  const double n = static_cast<double>(c.size()), mean = sum / n,
+               deviation = std::sqrt(squares / n - mean * mean);
+  CHECK(mean == doctest::Approx(0.02).epsilon(0.02));  // 0.05 * 0.4; five standard errors are 0.0008
+  CHECK(deviation == doctest::Approx(0.075).epsilon(0.01));  // 0.05 * 1.5
   std::vector<float> white(1000, 1.0f), again(1000, 1.0f);
   add_gaussian_noise(m, 4, white);
   add_gaussian_noise(m, 4, again);
@@ -37,7 +38,8 @@ TEST_CASE("Gaussian noise has the mean and the deviation asked for and stays wit
   CHECK(white != again);
 }
 
-TEST_CASE("Redwood depth is quantised in disparity, on every second pixel, with the deviation published") {
+TEST_CASE(
+    "Redwood depth is quantised in disparity, on every second pixel, with the deviation published") {
   const int height = 60, width = 80;
   const std::vector<float> wall(static_cast<std::size_t>(height * width), 4.0f);
   std::vector<float> out(wall.size());
@@ -54,7 +56,9 @@ TEST_CASE("Redwood depth is quantised in disparity, on every second pixel, with 
   const double n = static_cast<double>(out.size()), mean = sum / n;
   // A normal of mean 281.04 / 4 and deviation 8 / 36, rounded: its moments by the error function.
   double true_mean = 0.0, true_square = 0.0;
-  const auto below = [](double x) { return 0.5 * std::erfc(-(x - 281.04 / 4.0) / (8.0 / 36.0) / std::sqrt(2.0)); };
+  const auto below = [](double x) {
+    return 0.5 * std::erfc(-(x - 281.04 / 4.0) / (8.0 / 36.0) / std::sqrt(2.0));
+  };
   for (int k = 65; k < 76; ++k) {
     const double p = below(k + 0.5) - below(k - 0.5);
     true_mean += p * k;
@@ -66,7 +70,8 @@ TEST_CASE("Redwood depth is quantised in disparity, on every second pixel, with 
 
   // Without noise: the value of the even pixel, rounded to a step; no return stays none.
   std::vector<float> ramp(wall.size());
-  for (std::size_t i = 0; i < ramp.size(); ++i) ramp[i] = i % 80 < 40 ? 1.0f + 0.01f * static_cast<float>(i % 80) : 0.0f;
+  for (std::size_t i = 0; i < ramp.size(); ++i)
+    ramp[i] = i % 80 < 40 ? 1.0f + 0.01f * static_cast<float>(i % 80) : 0.0f;
   m.multiplier = 0.0;
   redwood_depth(m, 9, height, width, ramp, out);
   for (std::size_t i = 0; i < ramp.size(); ++i) {
@@ -140,7 +145,8 @@ TEST_CASE("sensors of a rig have noise of their own: none is another's, moved on
           yy += of[k][n] * of[k][n];
         }
         REQUIRE(xx > 0);
-        CHECK(std::abs(xy / std::sqrt(xx * yy)) < 0.08);  // of some thousand values; 1 where they are the same
+        CHECK(std::abs(xy / std::sqrt(xx * yy)) <
+              0.08);  // of some thousand values; 1 where they are the same
       }
     }
   }

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "flat_world.hpp"
-#include "gsnav/sim/people.hpp"
 #include "gsnav/detail/sim/random_policy.hpp"
+#include "gsnav/sim/people.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -57,7 +57,8 @@ TEST_CASE("people walk on the NavMesh, apart from each other, the same for the s
       const Vec3d p = people[i].placement(t).translation;
       CHECK(p == again[i].placement(t).translation);
       CHECK(flat_navmesh()->snap_point(p, {{0.05, 0.5, 0.05}}).has_value());
-      for (std::size_t j = 0; j < i; ++j) least = std::min(least, norm(p - people[j].placement(t).translation));
+      for (std::size_t j = 0; j < i; ++j)
+        least = std::min(least, norm(p - people[j].placement(t).translation));
     }
   }
   CHECK(least > 0.5);

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/sim/metrics.hpp"
 #include "gsnav/detail/sim/proximity.hpp"
+#include "gsnav/sim/metrics.hpp"
 
 using namespace gsnav;
 
@@ -39,12 +39,14 @@ TEST_CASE("the least distance to each avatar is that of a fine sampling") {
       const Vec3d base = Vec3d{rng.uniform(-2.5, 2.5), 0, rng.uniform(-2.5, 2.5)};
       const Vec3d go{rng.uniform(-0.4, 0.4), 0, rng.uniform(-0.4, 0.4)};
       for (std::uint32_t bone = 0; bone < 6; ++bone) {
-        const Vec3d a = base + somewhere(0.3), b = a + somewhere(0.2) - Vec3d{0, 0.9, 0}, turn = somewhere(0.1) - Vec3d{0, 0.9, 0};
+        const Vec3d a = base + somewhere(0.3), b = a + somewhere(0.2) - Vec3d{0, 0.9, 0},
+                    turn = somewhere(0.1) - Vec3d{0, 0.9, 0};
         capsules.push_back({{{a, b, 0.08}, {a + go, b + go + turn * 0.2, 0.09}}, avatar, bone});
       }
     }
     const CapsuleSet set = CapsuleSet::create(capsules).value();
-    const Vec3d start{0, 0, 0}, corner{rng.uniform(-0.3, 0.3), 0, 0.1}, end = corner + Vec3d{0.1, 0, rng.uniform(-0.2, 0.2)};
+    const Vec3d start{0, 0, 0}, corner{rng.uniform(-0.3, 0.3), 0, 0.1},
+        end = corner + Vec3d{0.1, 0, rng.uniform(-0.2, 0.2)};
     const std::vector<WalkPoint> path{{start, 0, 0.0}, {corner, 0, 0.4}, {end, 0, 0.9}};
     std::vector<double> out;
     closest_approach(path, 0.1, 1.5, set, out);
@@ -52,10 +54,13 @@ TEST_CASE("the least distance to each avatar is that of a fine sampling") {
     std::vector<double> truth(3, 1e30);
     for (int i = 0; i <= 400; ++i) {
       const double u = i / 400.0;
-      const Vec3d at = u < 0.4 ? lerp(start, corner, u / 0.4) : u < 0.9 ? lerp(corner, end, (u - 0.4) / 0.5) : end;
+      const Vec3d at = u < 0.4   ? lerp(start, corner, u / 0.4)
+                       : u < 0.9 ? lerp(corner, end, (u - 0.4) / 0.5)
+                                 : end;
       for (const DynamicCapsule& c : set.capsules()) {
         const double r = 0.08 + 0.01 * u;
-        const double d = segments(at + Vec3d{0, 0.1, 0}, at + Vec3d{0, 1.4, 0}, lerp(c.motion.begin.p0, c.motion.end.p0, u),
+        const double d = segments(at + Vec3d{0, 0.1, 0}, at + Vec3d{0, 1.4, 0},
+                                  lerp(c.motion.begin.p0, c.motion.end.p0, u),
                                   lerp(c.motion.begin.p1, c.motion.end.p1, u));
         truth[c.avatar] = std::min(truth[c.avatar], d - 0.1 - r);
       }

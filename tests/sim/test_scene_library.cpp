@@ -37,7 +37,8 @@ struct Counted {
 };
 
 bool holds_within_a_second(const SceneLibrary& library, std::size_t index) {
-  for (int i = 0; i < 100 && !library.holds(index); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 100 && !library.holds(index); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   return library.holds(index);
 }
 
@@ -46,7 +47,8 @@ bool holds_within_a_second(const SceneLibrary& library, std::size_t index) {
 TEST_CASE("what does not fit leaves, the least recently used first, but never what is in use") {
   Counted counted;
   const std::size_t one = scene_bytes(flat_scene());
-  CHECK(one > 14 * sizeof(float) * flat_scene().assets[0].cloud->size());  // mean, turn, sizes, opacity, colour
+  CHECK(one > 14 * sizeof(float) *
+                  flat_scene().assets[0].cloud->size());  // mean, turn, sizes, opacity, colour
   const auto library = SceneLibrary::create(counted.entries(), 3 * one).value();  // two, and the people
   library->get(1).value();
   library->get(2).value();
@@ -113,7 +115,8 @@ TEST_CASE("a batch over a library that has room for one scene has the bits of on
   const auto library = SceneLibrary::create(counted.entries(), scene_bytes(flat_scene())).value();
   std::vector<std::shared_ptr<const SimulatorScene>> all;
   Counted own;
-  for (const SceneEntry& e : own.entries()) all.push_back(std::make_shared<const SimulatorScene>(e.load().value()));
+  for (const SceneEntry& e : own.entries())
+    all.push_back(std::make_shared<const SimulatorScene>(e.load().value()));
   BatchConfig config;
   config.sensors = rgbd_sensors(8, 12);
   config.task.max_steps = 5;
@@ -130,7 +133,9 @@ TEST_CASE("a batch over a library that has room for one scene has the bits of on
   auto b = make_batch_simulator_from_library(backend, library, config, 3, source).value();
   const auto same = [](const BatchStep& x, const BatchStep& y) {
     for (std::size_t i = 0; i < x.images.size(); ++i) {
-      if (std::memcmp(x.images[i].data.data(), y.images[i].data.data(), x.images[i].data.size_bytes()) != 0) return false;
+      if (std::memcmp(x.images[i].data.data(), y.images[i].data.data(), x.images[i].data.size_bytes()) !=
+          0)
+        return false;
     }
     return std::equal(x.rewards.begin(), x.rewards.end(), y.rewards.begin()) &&
            std::equal(x.times.begin(), x.times.end(), y.times.begin());

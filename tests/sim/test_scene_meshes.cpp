@@ -186,6 +186,7 @@ TEST_CASE("a backend with a memory of its own has the bits of the serial one, no
   const auto want = expected.reset(to_kitchen()).value(), got = sim.reset(to_kitchen()).value();
   for (std::size_t s = 0; s < 4; ++s) {
     CAPTURE(s);
-    CHECK(std::equal(want.images[s].data.begin(), want.images[s].data.end(), got.images[s].data.begin()));
+    CHECK(
+        std::equal(want.images[s].data.begin(), want.images[s].data.end(), got.images[s].data.begin()));
   }
 }

@@ -16,7 +16,6 @@ using namespace gsnav_test;
 
 namespace {
 
-
 SensorSpec sensor(SensorModel model, int height, int width, double hfov = 90.0) {
   SensorSpec s;
   s.uuid = "around";
@@ -26,14 +25,17 @@ SensorSpec sensor(SensorModel model, int height, int width, double hfov = 90.0) 
   return s;
 }
 
-/// The double sphere as its paper projects (Usenko, Demmel and Cremers 2018, eq. 40), for half the width as focal length.
+/// The double sphere as its paper projects (Usenko, Demmel and Cremers 2018, eq. 40), for half the width
+/// as focal length.
 std::array<double, 2> projected(const SensorSpec& s, const Vec3d& p) {
   const double d1 = norm(p);
   const double shifted = s.fisheye.xi * d1 + p.z;
   const double d2 = std::sqrt(p.x * p.x + p.y * p.y + shifted * shifted);
   const double scale = s.fisheye.alpha * d2 + (1 - s.fisheye.alpha) * shifted;
-  return {s.fisheye.focal_length[0] * p.x / scale + 0.5 * s.resolution[1] + s.fisheye.principal_point_offset[0],
-          s.fisheye.focal_length[1] * p.y / scale + 0.5 * s.resolution[0] + s.fisheye.principal_point_offset[1]};
+  return {s.fisheye.focal_length[0] * p.x / scale + 0.5 * s.resolution[1] +
+              s.fisheye.principal_point_offset[0],
+          s.fisheye.focal_length[1] * p.y / scale + 0.5 * s.resolution[0] +
+              s.fisheye.principal_point_offset[1]};
 }
 
 /// Distance from inside a box to its walls.
@@ -59,13 +61,15 @@ std::array<std::vector<float>, CubeMap::kFaces> filled(const CubeMap& cube, cons
   for (std::size_t f = 0; f < CubeMap::kFaces; ++f) {
     const Camera c = cube.face_camera(Camera{}, f);
     for (int row = 0; row < cube.side(); ++row) {
-      for (int column = 0; column < cube.side(); ++column) out[f].push_back(static_cast<float>(value(face_ray(c, row, column))));
+      for (int column = 0; column < cube.side(); ++column)
+        out[f].push_back(static_cast<float>(value(face_ray(c, row, column))));
     }
   }
   return out;
 }
 
-std::array<const float*, CubeMap::kFaces> pointers(const std::array<std::vector<float>, CubeMap::kFaces>& faces) {
+std::array<const float*, CubeMap::kFaces> pointers(
+    const std::array<std::vector<float>, CubeMap::kFaces>& faces) {
   std::array<const float*, CubeMap::kFaces> out{};
   for (std::size_t f = 0; f < CubeMap::kFaces; ++f) out[f] = faces[f].data();
   return out;
@@ -124,7 +128,8 @@ TEST_CASE("what is sampled from a cube is what its directions show") {
   };
   const Vec3d low{-2.0, -1.2, -3.0}, high{1.5, 1.5, 2.5};
   const auto planar = [&](const Vec3d& d) { return to_wall(low, high, d); };  // planar z is 1 along d
-  for (const SensorSpec& s : {sensor(SensorModel::equirectangular, 64, 128), sensor(SensorModel::fisheye, 96, 96, 190)}) {
+  for (const SensorSpec& s :
+       {sensor(SensorModel::equirectangular, 64, 128), sensor(SensorModel::fisheye, 96, 96, 190)}) {
     const CubeMap cube(s);
     const auto colours = filled(cube, colour), depths = filled(cube, planar);
     const auto size = static_cast<std::size_t>(s.resolution[0] * s.resolution[1]);
@@ -150,7 +155,8 @@ TEST_CASE("what is sampled from a cube is what its directions show") {
       }
     }
     CHECK(worst < 1e-3);
-    // Exact but for the box's edges and for walls seen at so flat an angle that neighbours differ by over 2 %.
+    // Exact but for the box's edges and for walls seen at so flat an angle that neighbours differ by
+    // over 2 %.
     CHECK(static_cast<double>(exact) > 0.75 * static_cast<double>(seen));
   }
 }
@@ -158,7 +164,8 @@ TEST_CASE("what is sampled from a cube is what its directions show") {
 TEST_CASE("an equirectangular render is, pixel for pixel, what pinholes that look there see") {
   SerialBackend backend;
   SimulatorConfig config;
-  config.sensors = {sensor(SensorModel::equirectangular, 48, 96), sensor(SensorModel::equirectangular, 48, 96)};
+  config.sensors = {sensor(SensorModel::equirectangular, 48, 96),
+                    sensor(SensorModel::equirectangular, 48, 96)};
   config.sensors[1].uuid = "distance";
   config.sensors[1].kind = SensorKind::depth;
   auto sim = make_simulator(backend, flat_scene(), config).value();
@@ -176,25 +183,29 @@ TEST_CASE("an equirectangular render is, pixel for pixel, what pinholes that loo
   std::size_t n = 0;
   for (int row = 2; row < 48; row += 5) {
     for (int column = 1; column < 96; column += 5) {
-      const Vec3d d = transpose(middle.viewmat.linear) * *sensor_ray(config.sensors[0], column + 0.5, row + 0.5);
+      const Vec3d d =
+          transpose(middle.viewmat.linear) * *sensor_ray(config.sensors[0], column + 0.5, row + 0.5);
       // A pinhole of as many pixels to the radian as the faces have in their middle.
-      Camera look = Camera::look_at(eye, eye + d, std::abs(d.y) > 0.99 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0}, 9, 9,
-                                    2 * std::atan(4.5 / 24.0) * 180 / std::numbers::pi);
+      Camera look = Camera::look_at(eye, eye + d, std::abs(d.y) > 0.99 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0},
+                                    9, 9, 2 * std::atan(4.5 / 24.0) * 180 / std::numbers::pi);
       look.near_plane = middle.near_plane;
       look.near_sigma = middle.near_sigma;
       const Frames<float>* truth = sim.render(look, kRgb | kMedianDepth).value();
       const auto i = static_cast<std::size_t>(row * 96 + column);
       for (std::size_t c = 0; c < 3; ++c) {
-        const double error = static_cast<double>(obs["around"][3 * i + c] - truth->rgb[3 * (4 * 9 + 4) + c]);
+        const double error =
+            static_cast<double>(obs["around"][3 * i + c] - truth->rgb[3 * (4 * 9 + 4) + c]);
         squares += error * error;
         ++n;
       }
-      const double z = static_cast<double>(truth->median_depth[4 * 9 + 4]), seen = static_cast<double>(obs["distance"][i]);
+      const double z = static_cast<double>(truth->median_depth[4 * 9 + 4]),
+                   seen = static_cast<double>(obs["distance"][i]);
       depth_errors.push_back(std::abs(seen - z) / z);
       // And the flat's own triangles.
       double t = 1e30;
       for (const auto& triangle : flat.triangles) {
-        const Vec3d a = flat.vertices[triangle[0]], ab = flat.vertices[triangle[1]] - a, ac = flat.vertices[triangle[2]] - a;
+        const Vec3d a = flat.vertices[triangle[0]], ab = flat.vertices[triangle[1]] - a,
+                    ac = flat.vertices[triangle[2]] - a;
         const Vec3d p = cross(d, ac);
         const double det = dot(ab, p);
         if (std::abs(det) < 1e-12) continue;
@@ -211,7 +222,8 @@ TEST_CASE("an equirectangular render is, pixel for pixel, what pinholes that loo
     return v[static_cast<std::size_t>(q * static_cast<double>(v.size() - 1))];
   };
   MESSAGE("against pinholes: PSNR " << psnr << " dB, depth p75 " << quantile(depth_errors, 0.75)
-                                    << "; against the mesh: depth median " << quantile(mesh_errors, 0.5));
+                                    << "; against the mesh: depth median "
+                                    << quantile(mesh_errors, 0.5));
   CHECK(psnr > 26.0);
   CHECK(quantile(depth_errors, 0.5) < 1e-3);
   CHECK(quantile(depth_errors, 0.75) < 0.02);  // medians jump at silhouettes
@@ -256,7 +268,9 @@ TEST_CASE("impossible sensors name their field") {
     CHECK(status.code() == Errc::invalid_argument);
     return status.message();
   };
-  const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  const auto has = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
   CHECK(has(message([](auto& s) { s.hfov = 360; }), "hfov"));
   for (const double wide : {260.0, 300.0, 340.0}) {  // the default lens sees 253 degrees
     CHECK(has(message([wide](auto& s) { s.hfov = wide; }), "hfov"));
@@ -303,13 +317,16 @@ TEST_CASE("a semantic sensor says whose each pixel is") {
     auto alone = make_simulator(backend, one, plain).value();
     const auto seen = alone.reset(e).value();
     for (std::size_t i = 0; i < 48 * 64; ++i) {
-      const bool here = seen["depth"][i] < nobody["depth"][i] - 0.05f && obs["depth"][i] == seen["depth"][i];
+      const bool here =
+          seen["depth"][i] < nobody["depth"][i] - 0.05f && obs["depth"][i] == seen["depth"][i];
       people += here ? 1 : 0;
       right += here && obs["who"][i] == static_cast<float>(2 + person) ? 1 : 0;
     }
   }
   for (std::size_t i = 0; i < 48 * 64; ++i) {
-    room += obs["depth"][i] == nobody["depth"][i] && obs["rgb"][3 * i] == nobody["rgb"][3 * i] ? (obs["who"][i] == 1.0f ? 0 : 1) : 0;
+    room += obs["depth"][i] == nobody["depth"][i] && obs["rgb"][3 * i] == nobody["rgb"][3 * i]
+                ? (obs["who"][i] == 1.0f ? 0 : 1)
+                : 0;
   }
   CHECK(people > 60);
   // At a person's edge it may be in front by depth and yet less than the room behind it.
@@ -322,7 +339,8 @@ TEST_CASE("a semantic sensor says whose each pixel is") {
 
 TEST_CASE("labels by hand") {
   // Four sets in two passes; three pixels: nobody's, the second's, the fourth's over the first.
-  const std::vector<std::vector<float>> shares{{0.2f, 0.1f, 0, 0.1f, 0.6f, 0.2f, 0.4f, 0, 0}, {0.1f, 0, 0, 0, 0, 0, 0.5f, 0, 0}};
+  const std::vector<std::vector<float>> shares{{0.2f, 0.1f, 0, 0.1f, 0.6f, 0.2f, 0.4f, 0, 0},
+                                               {0.1f, 0, 0, 0, 0, 0, 0.5f, 0, 0}};
   std::vector<float> labels(3);
   label_pixels(shares, 4, labels);
   CHECK(labels == std::vector<float>{0, 2, 4});

@@ -223,8 +223,9 @@ TEST_CASE("a simulator that was moved from answers with an error") {
   const WorldState here = sim.state();
   auto other = std::move(sim);
   CHECK(other.observe().ok());
-  for (const Status& s : {sim.reset(to_kitchen()).status(), sim.step(Action::turn_left).status(), sim.observe().status(),
-                          sim.set_state(here), sim.render(Camera{}).status(), sim.goal_images().status()}) {
+  for (const Status& s :
+       {sim.reset(to_kitchen()).status(), sim.step(Action::turn_left).status(), sim.observe().status(),
+        sim.set_state(here), sim.render(Camera{}).status(), sim.goal_images().status()}) {
     CHECK(s.code() == Errc::invalid_argument);
     CHECK(s.message().find("moved from") != std::string::npos);
   }

@@ -15,7 +15,6 @@ using namespace gsnav_test;
 
 namespace {
 
-
 PointNavEpisode at(const Vec3d& start, double yaw) {
   PointNavEpisode e;
   e.start_position = start;
@@ -42,8 +41,10 @@ double gap(const Simulator<SerialBackend>& a, const Simulator<SerialBackend>& b)
 
 TEST_CASE("two agents that walk at each other meet, and neither enters the other") {
   SerialBackend backend;
-  auto team = Team<SerialBackend>::create(backend, flat_scene(), {body(0.1, 1.5), body(0.3, 0.9)}).value();
-  const std::vector<PointNavEpisode> episodes{at({3.4, 0, 3.8}, 0.0), at({3.4, 0, 2.3}, std::numbers::pi)};  // face to face
+  auto team =
+      Team<SerialBackend>::create(backend, flat_scene(), {body(0.1, 1.5), body(0.3, 0.9)}).value();
+  const std::vector<PointNavEpisode> episodes{at({3.4, 0, 3.8}, 0.0),
+                                              at({3.4, 0, 2.3}, std::numbers::pi)};  // face to face
   const auto begun = team.reset(episodes).value();
   // 1.5 m between them, less both radii: before anybody moves and seen from either side.
   CHECK(begun[0].avatar_clearance == doctest::Approx(1.1).epsilon(1e-3));
@@ -65,7 +66,8 @@ TEST_CASE("two agents that walk at each other meet, and neither enters the other
 
 TEST_CASE("an agent that comes later in the tick meets the earlier one where it has gone") {
   SerialBackend backend;
-  auto team = Team<SerialBackend>::create(backend, flat_scene(), {body(0.1, 1.5), body(0.1, 1.5)}).value();
+  auto team =
+      Team<SerialBackend>::create(backend, flat_scene(), {body(0.1, 1.5), body(0.1, 1.5)}).value();
   // In line, 0.3 m apart, the same way: the first steps ahead and the second follows freely.
   REQUIRE(team.reset(std::vector<PointNavEpisode>{at({3.4, 0, 3.0}, 0), at({3.4, 0, 3.3}, 0)}).ok());
   const auto out = team.step(std::vector<Action>(2, Action::move_forward)).value();
@@ -81,17 +83,21 @@ TEST_CASE("an agent that comes later in the tick meets the earlier one where it 
 
 TEST_CASE("agents that wander among people never enter each other") {
   SerialBackend backend;
-  auto team = Team<SerialBackend>::create(backend, peopled_scene(2000), {body(0.1, 1.5), body(0.2, 1.2), body(0.15, 0.9)}).value();
+  auto team = Team<SerialBackend>::create(backend, peopled_scene(2000),
+                                          {body(0.1, 1.5), body(0.2, 1.2), body(0.15, 0.9)})
+                  .value();
   Rng rng(2);
   int met = 0;
   for (int episode = 0; episode < 6; ++episode) {
-    std::vector<PointNavEpisode> starts{at({3.0, 0, 3.6}, rng.uniform(0, 6)), at({4.0, 0, 2.6}, rng.uniform(0, 6)),
+    std::vector<PointNavEpisode> starts{at({3.0, 0, 3.6}, rng.uniform(0, 6)),
+                                        at({4.0, 0, 2.6}, rng.uniform(0, 6)),
                                         at({3.4, 0, 2.0}, rng.uniform(0, 6))};
     for (PointNavEpisode& e : starts) e.start_time = 7.0 * episode;
     REQUIRE(team.reset(starts).ok());
     for (int i = 0; i < 60; ++i) {
       std::vector<Action> actions;
-      for (std::size_t k = 0; k < 3; ++k) actions.push_back(static_cast<Action>(1 + (rng.below(3) == 0 ? 1 + rng.below(2) : 0)));
+      for (std::size_t k = 0; k < 3; ++k)
+        actions.push_back(static_cast<Action>(1 + (rng.below(3) == 0 ? 1 + rng.below(2) : 0)));
       const auto out = team.step(actions).value();
       for (std::size_t a = 0; a < 3; ++a) {
         met += out[a].capsule_blocked ? 1 : 0;
@@ -130,7 +136,8 @@ TEST_CASE("impossible teams are named") {
   SimulatorConfig slow = body(0.1, 1.5), wide = body(-0.1, 1.5);
   slow.task.control_period = 1.0;
   CHECK(make({body(0.1, 1.5), slow}).message().find("control_period") != std::string::npos);
-  CHECK(make({body(0.1, 1.5), wide}).message().find("agent 1: TaskConfig.agent_radius") != std::string::npos);
+  CHECK(make({body(0.1, 1.5), wide}).message().find("agent 1: TaskConfig.agent_radius") !=
+        std::string::npos);
   auto team = make({body(0.1, 1.5), body(0.1, 1.5)}).value();
   std::vector<PointNavEpisode> episodes{at({3.4, 0, 3.0}, 0), at({4.4, 0, 3.0}, 0)};
   CHECK(team.step(std::vector<Action>(1)).message().find("1 actions for 2") != std::string::npos);

@@ -8,8 +8,8 @@
 
 #include "flat_world.hpp"
 #include "gsnav/avatar/actor.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/sim/follower.hpp"
 
 using namespace gsnav;
@@ -152,8 +152,11 @@ TEST_CASE("a body that a looping clock shows for less than a step is not walked 
   options.time_begin = 0.6;
   options.time_end = 0.65;
   options.loop_period = 1.0;
-  const AvatarActor actor = AvatarActor::create(body, nullptr, std::make_shared<Ahead>(), options).value();
-  World w = flat_world({}, [&](double t0, double t1, std::vector<DynamicCapsule>& out) { actor.dynamic_capsules(t0, t1, 0, out); });
+  const AvatarActor actor =
+      AvatarActor::create(body, nullptr, std::make_shared<Ahead>(), options).value();
+  World w = flat_world({}, [&](double t0, double t1, std::vector<DynamicCapsule>& out) {
+    actor.dynamic_capsules(t0, t1, 0, out);
+  });
   for (const int round : {0, 3}) {
     for (const int tick : {0, 1, 2, 3}) {
       PointNavEpisode e = open_floor();
@@ -236,13 +239,15 @@ TEST_CASE("the follower gives way to bodies and still arrives") {
   CHECK(s.collision_rate < 0.1);
 }
 
-TEST_CASE("a goal straight behind is half a turn to the left, and a start that is turned nowhere is refused") {
+TEST_CASE(
+    "a goal straight behind is half a turn to the left, and a start that is turned nowhere is refused") {
   World w = flat_world();
   PointNavEpisode e = open_floor();
   e.goal_position = e.start_position + Vec3d{0, 0, 0.5};
   REQUIRE(w.reset(e).ok());
   CHECK(w.point_goal().angle == doctest::Approx(std::numbers::pi));
-  for (const double v : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double v :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     e.start_rotation = {v, 0, 0, 0};
     CHECK(w.reset(e).message().find("start_rotation") != std::string::npos);
   }

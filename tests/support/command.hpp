@@ -21,8 +21,10 @@ inline std::string quoted(const std::filesystem::path& p) {
   return std::string(1, '"').append(p.string()).append("\"");
 }
 
-/// Runs a program in `folder`, by the shell's reading of `arguments`; what it prints goes to the file `log` there.
-inline Outcome run_command(const char* program, const std::string& arguments, const std::filesystem::path& folder) {
+/// Runs a program in `folder`, by the shell's reading of `arguments`; what it prints goes to the file
+/// `log` there.
+inline Outcome run_command(const char* program, const std::string& arguments,
+                           const std::filesystem::path& folder) {
   std::string command = "cd ";
   command.append(quoted(folder)).append(" && ").append(quoted(program)).append(" ");
   command.append(arguments).append(" > log 2>&1");

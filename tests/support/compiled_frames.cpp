@@ -4,22 +4,36 @@
 
 namespace gsnav {
 
-template Status render_camera<float, SerialBackend>(SerialBackend&, RenderWorkspace<float, SerialBackend>&, std::span<const GaussianSet>,
-                const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
-template Status render_composite<float, SerialBackend>(SerialBackend&, RenderWorkspace<float, SerialBackend>&, std::span<const GaussianSet>,
-                const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
-                RenderStats*);
-template Status render_camera<double, SerialBackend>(SerialBackend&, RenderWorkspace<double, SerialBackend>&, std::span<const GaussianSet>,
-                const Camera&, const RenderConfig&, const FrameImages<double>&, RenderStats*);
-template Status render_composite<double, SerialBackend>(SerialBackend&, RenderWorkspace<double, SerialBackend>&, std::span<const GaussianSet>,
-                const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&,
-                RenderStats*);
-template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>,
-                const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
-template Status render_composite<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>,
-                const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
-                RenderStats*);
+template Status render_camera<float, SerialBackend>(SerialBackend&,
+                                                    RenderWorkspace<float, SerialBackend>&,
+                                                    std::span<const GaussianSet>, const Camera&,
+                                                    const RenderConfig&, const FrameImages<float>&,
+                                                    RenderStats*);
+template Status render_composite<float, SerialBackend>(SerialBackend&,
+                                                       RenderWorkspace<float, SerialBackend>&,
+                                                       std::span<const GaussianSet>, const MeshFrame&,
+                                                       const Camera&, const RenderConfig&,
+                                                       const FrameImages<float>&, RenderStats*);
+template Status render_camera<double, SerialBackend>(SerialBackend&,
+                                                     RenderWorkspace<double, SerialBackend>&,
+                                                     std::span<const GaussianSet>, const Camera&,
+                                                     const RenderConfig&, const FrameImages<double>&,
+                                                     RenderStats*);
+template Status render_composite<double, SerialBackend>(SerialBackend&,
+                                                        RenderWorkspace<double, SerialBackend>&,
+                                                        std::span<const GaussianSet>, const MeshFrame&,
+                                                        const Camera&, const RenderConfig&,
+                                                        const FrameImages<double>&, RenderStats*);
+template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&,
+                                                 std::span<const GaussianSet>, const Camera&,
+                                                 const RenderConfig&, const FrameImages<float>&,
+                                                 RenderStats*);
+template Status render_composite<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&,
+                                                    std::span<const GaussianSet>, const MeshFrame&,
+                                                    const Camera&, const RenderConfig&,
+                                                    const FrameImages<float>&, RenderStats*);
 template Status skin_gaussians<float, SerialBackend, float>(SerialBackend&, const SkinningArgs<float>&);
-template Status skin_all<float, SerialBackend, float>(SerialBackend&, std::span<const SkinningArgs<float>>);
+template Status skin_all<float, SerialBackend, float>(SerialBackend&,
+                                                      std::span<const SkinningArgs<float>>);
 
 }  // namespace gsnav

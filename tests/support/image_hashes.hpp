@@ -15,9 +15,10 @@
 
 namespace gsnav_test {
 
-/// Where the environment variable GSNAV_IMAGE_HASHES names a file, appends a line for each image of these frames:
-/// test case | backend | number of the call in that case on that backend | image | 128-bit hash of its values.
-/// tools/image_hashes.sh compares such files before and after a change that must not change a bit.
+/// Where the environment variable GSNAV_IMAGE_HASHES names a file, appends a line for each image of
+/// these frames: test case | backend | number of the call in that case on that backend | image | 128-bit
+/// hash of its values. tools/image_hashes.sh compares such files before and after a change that must not
+/// change a bit.
 template <class S>
 void record_hashes(const gsnav::Frames<S>& frames, const std::string& backend) {
   const char* path = std::getenv("GSNAV_IMAGE_HASHES");
@@ -31,7 +32,8 @@ void record_hashes(const gsnav::Frames<S>& frames, const std::string& backend) {
     if (values.empty()) return;
     gsnav::Hasher h;
     h.array(values);
-    std::fprintf(file, "%s | %s | %d | %s | %s\n", test.c_str(), backend.c_str(), call, image, h.hex().c_str());
+    std::fprintf(file, "%s | %s | %d | %s | %s\n", test.c_str(), backend.c_str(), call, image,
+                 h.hex().c_str());
   };
   line("rgb", frames.rgb);
   line("alpha", frames.alpha);

@@ -12,7 +12,8 @@
 
 namespace gsnav_test {
 
-/// A program that runs beside the test, in `folder`; what it prints goes to the file `log` there. Ends with the object.
+/// A program that runs beside the test, in `folder`; what it prints goes to the file `log` there. Ends
+/// with the object.
 class Process {
  public:
   Process(std::vector<std::string> words, const std::filesystem::path& folder) {
@@ -23,7 +24,9 @@ class Process {
     pid_ = fork();
     if (pid_ != 0) return;
     const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    if (out < 0 || dup2(out, STDOUT_FILENO) < 0 || dup2(out, STDERR_FILENO) < 0 || chdir(folder.c_str()) != 0) _exit(126);
+    if (out < 0 || dup2(out, STDOUT_FILENO) < 0 || dup2(out, STDERR_FILENO) < 0 ||
+        chdir(folder.c_str()) != 0)
+      _exit(126);
     execv(arguments[0], arguments.data());
     _exit(127);
   }
@@ -51,7 +54,8 @@ class Process {
   bool runs() {
     if (pid_ < 0) return false;
     siginfo_t info{};
-    return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
+    return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           info.si_pid == 0;
   }
 
  private:

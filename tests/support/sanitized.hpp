@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// GSNAV_TEST_SANITIZED is defined where a sanitizer has replaced the heap; g++ and clang say so differently.
+// GSNAV_TEST_SANITIZED is defined where a sanitizer has replaced the heap; g++ and clang say so
+// differently.
 #if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(memory_sanitizer) || __has_feature(thread_sanitizer)
+#if __has_feature(address_sanitizer) || __has_feature(memory_sanitizer) || \
+    __has_feature(thread_sanitizer)
 #define GSNAV_TEST_SANITIZED
 #endif
 #endif

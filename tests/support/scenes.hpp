@@ -15,10 +15,10 @@ namespace gsnav_test {
 struct CloudOptions {
   int count = 200;
   int sh_degree = 3;
-  double needle = 0.1;       ///< share of 1000 : 1 needles
-  double scale = 0.08;       ///< median standard deviation, metres
+  double needle = 0.1;  ///< share of 1000 : 1 needles
+  double scale = 0.08;  ///< median standard deviation, metres
   gsnav::Vec3d center{0, 0, 4};
-  double extent = 1.5;       ///< half side of the box that holds the means
+  double extent = 1.5;  ///< half side of the box that holds the means
   bool mip = false;
 };
 
@@ -67,7 +67,8 @@ ImageError image_error(const std::vector<A>& a, const std::vector<B>& b, std::si
   }
   std::sort(kept.begin(), kept.end());
   e.max = kept.empty() ? 0 : kept.back();
-  e.p999 = kept.empty() ? 0 : kept[static_cast<std::size_t>(0.999 * static_cast<double>(kept.size() - 1))];
+  e.p999 =
+      kept.empty() ? 0 : kept[static_cast<std::size_t>(0.999 * static_cast<double>(kept.size() - 1))];
   e.psnr = -10 * std::log10(std::max(squares / static_cast<double>(a.size()), 1e-30));
   return e;
 }

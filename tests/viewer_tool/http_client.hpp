@@ -28,7 +28,9 @@ class Client {
   ~Client() { close(socket_); }
 
   bool ok() const { return ok_; }
-  void send(const std::string& bytes) const { (void)!::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL); }
+  void send(const std::string& bytes) const {
+    (void)!::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  }
   void finish() const { shutdown(socket_, SHUT_WR); }
   /// Waits for more; false at the end or after `seconds` of silence.
   bool more(int seconds = 20) {
@@ -60,9 +62,11 @@ inline std::string converse(int port, const std::string& bytes) {
   return c.all();
 }
 
-inline std::string request(int port, const std::string& line, const std::string& body = "", const std::string& fields = "") {
+inline std::string request(int port, const std::string& line, const std::string& body = "",
+                           const std::string& fields = "") {
   return converse(port, line + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\n" + fields +
-                            "Connection: close\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
+                            "Connection: close\r\nContent-Length: " + std::to_string(body.size()) +
+                            "\r\n\r\n" + body);
 }
 
 inline int status_of(const std::string& answer) {

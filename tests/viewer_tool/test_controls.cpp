@@ -23,13 +23,15 @@ TEST_CASE("messages change what they mention; turns add up and commands are once
 }
 
 TEST_CASE("a bad message names its field and changes nothing") {
-  for (const char* message : {"forward=2", "left=-1.01", "forward=nan", "turn=inf", "turn=1e400", "time=-1", "time=1e9", "paused=2", "stop=yes",
-                              "next", "next=", "=1", "&", "fly=1", "forward=1 ", "forward=0x1", "paused=0.5"}) {
+  for (const char* message : {"forward=2", "left=-1.01", "forward=nan", "turn=inf", "turn=1e400",
+                              "time=-1", "time=1e9", "paused=2", "stop=yes", "next", "next=", "=1", "&",
+                              "fly=1", "forward=1 ", "forward=0x1", "paused=0.5"}) {
     Controls c;
     CAPTURE(message);
     const auto s = apply(std::string("left=1&") + message, c);
     CHECK(s.code() == gsnav::Errc::invalid_argument);
-    CHECK(s.message().find(std::string(message).substr(0, std::string(message).find_first_of("=&"))) != std::string::npos);
+    CHECK(s.message().find(std::string(message).substr(0, std::string(message).find_first_of("=&"))) !=
+          std::string::npos);
     CHECK(c.left == 0.0);
   }
 }

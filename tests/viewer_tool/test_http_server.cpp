@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
-
 #include <unistd.h>
 
 #include <chrono>
@@ -51,16 +50,19 @@ TEST_CASE("a server answers, whatever was asked before") {
   CHECK(status_of(head) == 200);
   CHECK(body_of(head).empty());
   CHECK(contains(head, "Content-Length: 4\r\n"));
-  for (const char* path : {"/../../etc/passwd", "/%2e%2e/etc/passwd", "//etc/passwd", "/.", "/index.html", "/frame/../"}) {
+  for (const char* path :
+       {"/../../etc/passwd", "/%2e%2e/etc/passwd", "//etc/passwd", "/.", "/index.html", "/frame/../"}) {
     const std::string answer = request(port, std::string("GET ") + path);
     CHECK(status_of(answer) == 404);
     CHECK_FALSE(contains(answer, "root:"));
   }
   CHECK(status_of(converse(port, "nonsense\r\n\r\n")) == 400);
   CHECK(status_of(converse(port, std::string("\0\0\0\r\n\r\n", 7))) == 400);
-  CHECK(status_of(converse(port, "GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n")) == 403);
+  CHECK(status_of(converse(port, "GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n")) ==
+        403);
   CHECK(status_of(request(port, "POST /", "x", "Origin: http://evil.example\r\n")) == 403);
-  CHECK(status_of(request(port, "POST /", "x", "Origin: http://127.0.0.1:" + std::to_string(port) + "\r\n")) == 200);
+  CHECK(status_of(request(port, "POST /", "x",
+                          "Origin: http://127.0.0.1:" + std::to_string(port) + "\r\n")) == 200);
   CHECK(status_of(request(port, "GET /", "", "a: " + std::string(9000, 'x') + "\r\n")) == 431);
   CHECK(status_of(converse(port, std::string(100000, 'x'))) == 431);  // no end of a line at all
   CHECK(status_of(request(port, "POST /", std::string(5000, 'x'))) == 413);
@@ -72,7 +74,8 @@ TEST_CASE("who sends half a request or nothing is sent away, and others are serv
   const auto s = server();
   Client silent(s->port()), half(s->port()), body(s->port());
   half.send("GET / HT");
-  body.send("POST / HTTP/1.1\r\nHost: localhost:" + std::to_string(s->port()) + "\r\nContent-Length: 10\r\n\r\nabc");
+  body.send("POST / HTTP/1.1\r\nHost: localhost:" + std::to_string(s->port()) +
+            "\r\nContent-Length: 10\r\n\r\nabc");
   CHECK(status_of(request(s->port(), "GET /")) == 200);
   CHECK(status_of(silent.all()) == 408);
   CHECK(status_of(half.all()) == 408);
@@ -123,11 +126,13 @@ TEST_CASE("one connection serves one request after the other, also when they com
 TEST_CASE("clients that do not read lose their place within the time for a reply") {
   const auto s = server();
   std::list<Client> slow;
-  for (int i = 0; i < 6; ++i) slow.emplace_back(s->port()).send("GET /large HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  for (int i = 0; i < 6; ++i)
+    slow.emplace_back(s->port()).send("GET /large HTTP/1.1\r\nHost: localhost\r\n\r\n");
   usleep(100000);
   const auto begin = std::chrono::steady_clock::now();
   std::string answer;
-  while (status_of(answer) != 200 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(20)) {
+  while (status_of(answer) != 200 &&
+         std::chrono::steady_clock::now() - begin < std::chrono::seconds(20)) {
     answer = request(s->port(), "GET /");
     if (status_of(answer) != 200) usleep(20000);
   }
@@ -149,13 +154,16 @@ TEST_CASE("where every place is taken, the connection that was idle longest make
   CHECK(status_of(seventh.text) == 200);
 }
 
-TEST_CASE("hosts and sites that are not the viewer's are refused, and the answer says what allows them") {
+TEST_CASE(
+    "hosts and sites that are not the viewer's are refused, and the answer says what allows them") {
   ServerOptions o = quick();
   o.allowed_hosts = {"robot-7.lab"};
   auto s = HttpServer::bind(o).value();
   s->serve(echo);
-  const auto from = [&](const std::string& host, const std::string& fields = "", const std::string& method = "POST") {
-    return converse(s->port(), method + " / HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n" + fields + "\r\n");
+  const auto from = [&](const std::string& host, const std::string& fields = "",
+                        const std::string& method = "POST") {
+    return converse(s->port(), method + " / HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n" +
+                                   fields + "\r\n");
   };
   CHECK(status_of(from("robot-7.lab:7007")) == 200);
   CHECK(status_of(from("127.0.0.1")) == 200);  // port 80 is left out
@@ -164,7 +172,8 @@ TEST_CASE("hosts and sites that are not the viewer's are refused, and the answer
   CHECK(contains(refused, "--allow-host"));
   CHECK(status_of(from("localhost", "Sec-Fetch-Site: cross-site\r\n")) == 403);
   CHECK(status_of(from("localhost", "Sec-Fetch-Site: same-origin\r\n")) == 200);
-  CHECK(status_of(from("localhost", "Sec-Fetch-Site: cross-site\r\n", "GET")) == 200);  // a link to the page
+  CHECK(status_of(from("localhost", "Sec-Fetch-Site: cross-site\r\n", "GET")) ==
+        200);  // a link to the page
 }
 
 TEST_CASE("a port is taken when the server is made, and answered from when it serves") {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer as people run it: a process, its page and its frames.
 #include <doctest/doctest.h>
-
 #include <sys/stat.h>
 
 #include <atomic>
@@ -33,7 +32,8 @@ using Json = nlohmann::json;
 namespace {
 
 constexpr int kWidth = 320, kHeight = 240;
-const std::vector<std::string> kScene{"--avatars", "2", "--episodes", "2", "--width", "320", "--height", "240", "--threads", "2"};
+const std::vector<std::string> kScene{"--avatars", "2",        "--episodes", "2",         "--width",
+                                      "320",       "--height", "240",        "--threads", "2"};
 
 /// The viewer in a process of its own, at a free port.
 class Viewer {
@@ -63,7 +63,9 @@ class Viewer {
     std::string jpeg[3];  ///< colour, depth, map
   };
   /// A frame that was begun after this was asked for, or after `message` has had its effect.
-  Frame frame(const std::string& message = "") const { return parse(body_of(request(port, "POST /frame", message))); }
+  Frame frame(const std::string& message = "") const {
+    return parse(body_of(request(port, "POST /frame", message)));
+  }
   static Frame parse(const std::string& body) {
     Frame f;
     const std::size_t line = body.find('\n');
@@ -111,7 +113,8 @@ std::vector<std::uint16_t> truth(const Json& state) {
   episode.start_time = state["time"].get<double>();
   sim.reset(episode).value();
   gsnav::WorldState at = sim.state();
-  at.agent.position = {state["position"][0].get<double>(), state["position"][1].get<double>(), state["position"][2].get<double>()};
+  at.agent.position = {state["position"][0].get<double>(), state["position"][1].get<double>(),
+                       state["position"][2].get<double>()};
   at.agent.yaw = state["yaw"].get<double>();
   at.agent.pitch = state["pitch"].get<double>();
   REQUIRE(sim.set_state(at).ok());
@@ -128,8 +131,8 @@ TEST_CASE("the viewer serves its page and its frames and nothing else") {
   const std::string page = request(v.port, "GET /");
   CHECK(status_of(page) == 200);
   CHECK(contains(page, "/frame"));
-  for (const char* path : {"/index.html", "/../../../etc/passwd", "/stream/color", "/frame/", "/frame/..", "/frame/%2e%2e", "/favicon.ico",
-                           "/control"}) {
+  for (const char* path : {"/index.html", "/../../../etc/passwd", "/stream/color", "/frame/",
+                           "/frame/..", "/frame/%2e%2e", "/favicon.ico", "/control"}) {
     CHECK(status_of(request(v.port, std::string("GET ") + path)) == 404);
   }
   CHECK(status_of(request(v.port, "GET /frame")) == 405);
@@ -137,7 +140,8 @@ TEST_CASE("the viewer serves its page and its frames and nothing else") {
   const std::string refused = request(v.port, "POST /frame", "forward=7");
   CHECK(status_of(refused) == 400);
   CHECK(contains(refused, "forward"));
-  CHECK(status_of(converse(v.port, "GET / HTTP/1.1\r\nHost: evil.example:80\r\nConnection: close\r\n\r\n")) == 403);
+  CHECK(status_of(converse(
+            v.port, "GET / HTTP/1.1\r\nHost: evil.example:80\r\nConnection: close\r\n\r\n")) == 403);
   const auto frame = v.frame();
   for (const std::string& jpeg : frame.jpeg) CHECK(jpeg.starts_with("\xff\xd8\xff"));
   CHECK(frame.state["depth"]["colors"].size() == 9);
@@ -161,7 +165,8 @@ TEST_CASE("the colour picture is what the library draws there, and steering chan
   const auto turned = Viewer::picture(after_turn, 0);
   const Json there = after_turn.state;
   CHECK(there["time"].get<double>() == doctest::Approx(7.5));
-  CHECK(std::remainder(there["yaw"].get<double>() - start["yaw"].get<double>() - 0.5, 6.283185307179586) == doctest::Approx(0));
+  CHECK(std::remainder(there["yaw"].get<double>() - start["yaw"].get<double>() - 0.5,
+                       6.283185307179586) == doctest::Approx(0));
   CHECK(there["pitch"].get<double>() == doctest::Approx(-0.2));
   CHECK(there["position"] == start["position"]);
   CHECK(psnr(turned.samples, truth(there)) > 28);
@@ -192,7 +197,8 @@ TEST_CASE("a request waits for a frame newer than the one it has seen") {
     CHECK(number > seen);
     seen = number;
   }
-  CHECK(v.frame("seen=9000000000").state["frame"].get<std::uint64_t>() > seen);  // another process's number
+  CHECK(v.frame("seen=9000000000").state["frame"].get<std::uint64_t>() >
+        seen);  // another process's number
   CHECK(v.end() == 0);
 }
 
@@ -207,14 +213,18 @@ TEST_CASE("eight tabs at once each get their frames over one connection") {
       for (int i = 0; i < 5; ++i) {
         const std::string message = seen.empty() ? "" : "seen=" + seen;
         c.text.clear();
-        c.send("POST /frame HTTP/1.1\r\nHost: localhost\r\nSec-Fetch-Site: same-origin\r\nContent-Length: " +
-               std::to_string(message.size()) + "\r\n\r\n" + message);
+        c.send(
+            "POST /frame HTTP/1.1\r\nHost: localhost\r\nSec-Fetch-Site: "
+            "same-origin\r\nContent-Length: " +
+            std::to_string(message.size()) + "\r\n\r\n" + message);
         const std::string mark = "Content-Length: ";
         while (true) {
           const std::size_t at = c.text.find(mark), body = c.text.find("\r\n\r\n", at);
           if (at != std::string::npos && body != std::string::npos &&
-              c.text.size() == body + 4 + static_cast<std::size_t>(std::atoi(c.text.c_str() + at + mark.size()))) {
-            const Json state = Json::parse(c.text.substr(body + 4, c.text.find('\n', body + 4) - body - 4), nullptr, false);
+              c.text.size() ==
+                  body + 4 + static_cast<std::size_t>(std::atoi(c.text.c_str() + at + mark.size()))) {
+            const Json state = Json::parse(
+                c.text.substr(body + 4, c.text.find('\n', body + 4) - body - 4), nullptr, false);
             if (state.is_object() && status_of(c.text) == 200) seen = state["frame"].dump();
             break;
           }
@@ -254,10 +264,11 @@ TEST_CASE("a scene whose name is no UTF-8 is shown") {
 TEST_CASE("memory that runs out while a frame is drawn is said, and ends the viewer with 1") {
   const TempFolder folder("viewer_memory");
   // What a page of this size takes is refused by the system; loading takes less.
-  Process limited({"/bin/bash", "-c",
-                         "ulimit -v 900000; exec " + quoted(GSNAV_VIEWER) +
-                             " --port 0 --paused --avatars 0 --episodes 1 --threads 1 --width 4096 --height 4096"},
-                        folder.path());
+  Process limited(
+      {"/bin/bash", "-c",
+       "ulimit -v 900000; exec " + quoted(GSNAV_VIEWER) +
+           " --port 0 --paused --avatars 0 --episodes 1 --threads 1 --width 4096 --height 4096"},
+      folder.path());
   std::string line;
   for (int i = 0; i < 3000 && !contains(line, "http://") && limited.runs(); ++i) {
     usleep(20000);
@@ -275,7 +286,8 @@ TEST_CASE("a port that is taken is said before anything is loaded, and a signal 
   Viewer v;
   const TempFolder folder("viewer_port");
   const auto begin = std::chrono::steady_clock::now();
-  Process second({GSNAV_VIEWER, "--port", std::to_string(v.port), "--scene", "/nonexistent.ply"}, folder.path());
+  Process second({GSNAV_VIEWER, "--port", std::to_string(v.port), "--scene", "/nonexistent.ply"},
+                 folder.path());
   CHECK(second.wait(30) == 1);
   const std::string log = read_file(folder / "log");
   CHECK(contains(log, std::to_string(v.port)));
@@ -298,13 +310,14 @@ TEST_CASE("two browsers at once show the scene, without scrolling at 1280 x 720"
   Viewer v;
   const auto frame = Viewer::picture(v.frame(), 0);
   const TempFolder folders[2] = {TempFolder("browser_a"), TempFolder("browser_b")};
-  std::vector<std::unique_ptr<Process>> browsers;
+  std::vector<std::unique_ptr<Process> > browsers;
   for (const TempFolder& folder : folders) {
     // Its clock stands while it waits for an answer, so that slow machines show as many frames.
     browsers.push_back(std::make_unique<Process>(
-        std::vector<std::string>{GSNAV_CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-                                 "--no-first-run", "--user-data-dir=profile", "--window-size=1280,720",
-                                 "--virtual-time-budget=3000", "--screenshot=page.png",
+        std::vector<std::string>{GSNAV_CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu",
+                                 "--disable-dev-shm-usage", "--no-first-run", "--user-data-dir=profile",
+                                 "--window-size=1280,720", "--virtual-time-budget=3000",
+                                 "--screenshot=page.png",
                                  "http://127.0.0.1:" + std::to_string(v.port) + "/"},
         folder.path()));
   }
@@ -314,7 +327,8 @@ TEST_CASE("two browsers at once show the scene, without scrolling at 1280 x 720"
     REQUIRE(std::filesystem::exists(folders[b] / "page.png"));
     const auto page = gsnav::io::load_png(folders[b] / "page.png").value();
     // The colour panel is shown pixel by pixel: somewhere on the page is the frame itself.
-    const auto channels = static_cast<std::size_t>(page.channels), width = static_cast<std::size_t>(page.width);
+    const auto channels = static_cast<std::size_t>(page.channels),
+               width = static_cast<std::size_t>(page.width);
     double best = 1e9;
     for (std::size_t y0 = 0; y0 + kHeight <= static_cast<std::size_t>(page.height); ++y0) {
       for (std::size_t x0 = 0; x0 + kWidth <= width; ++x0) {
@@ -323,8 +337,9 @@ TEST_CASE("two browsers at once show the scene, without scrolling at 1280 x 720"
         for (std::size_t k = 0; k < 64 && sum <= best * 64 * 3; ++k) {
           const std::size_t x = (k * 37 + 11) % kWidth, y = (k * 53 + 7) % kHeight;
           for (std::size_t c = 0; c < 3; ++c, ++n) {
-            sum += std::abs(static_cast<double>(page.samples[((y0 + y) * width + x0 + x) * channels + c]) -
-                            frame.samples[(y * kWidth + x) * 3 + c]);
+            sum +=
+                std::abs(static_cast<double>(page.samples[((y0 + y) * width + x0 + x) * channels + c]) -
+                         frame.samples[(y * kWidth + x) * 3 + c]);
           }
         }
         if (n == 64 * 3) best = std::min(best, sum / n);
@@ -335,7 +350,8 @@ TEST_CASE("two browsers at once show the scene, without scrolling at 1280 x 720"
     std::size_t other = 0;
     for (std::size_t y = 60; y < static_cast<std::size_t>(page.height); ++y) {
       for (std::size_t c = 0; c < 3; ++c) {
-        other += page.samples[(y * width + width - 3) * channels + c] != page.samples[(60 * width + width - 3) * channels + c];
+        other += page.samples[(y * width + width - 3) * channels + c] !=
+                 page.samples[(60 * width + width - 3) * channels + c];
       }
     }
     CHECK(other == 0);

@@ -43,11 +43,12 @@ Result<MotionClip> clip_of(const MeshCommand& c, const io::LoadedSkinnedMesh& me
     names += (names.empty() ? "" : ", ") + n.name;
   }
   if (c.clip.clip.find('.') == std::string::npos) {
-    return {Errc::invalid_argument,
-            c.input + ": there is no clip '" + c.clip.clip + "'; there are: " + (names.empty() ? "none" : names)};
+    return {Errc::invalid_argument, c.input + ": there is no clip '" + c.clip.clip +
+                                        "'; there are: " + (names.empty() ? "none" : names)};
   }
   ClipSource source = c.clip;
-  const std::string extension = std::filesystem::path(source.clip.substr(0, source.clip.rfind(':'))).extension().string();
+  const std::string extension =
+      std::filesystem::path(source.clip.substr(0, source.clip.rfind(':'))).extension().string();
   if (!(source.scale > 0) && (extension == ".glb" || extension == ".gltf")) source.scale = c.scale;
   return load_clip(source, mesh.mesh.skeleton);
 }
@@ -125,12 +126,14 @@ Status make_from_mesh(const MeshCommand& c, bool makehuman) {
   options.seed = c.seed;
   options.shade = c.shade;
   options.weights.influences = c.influences;
-  options.weights.poses.assign(poses.begin(),
-                               poses.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, poses.size())));
+  options.weights.poses.assign(
+      poses.begin(),
+      poses.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, poses.size())));
   auto made = make_mesh_avatar(mesh, options);
   if (made.code() == Errc::unsupported) {
     char text[200];
-    std::snprintf(text, sizeof text, " (it is %.4g m large); --scale sets metres a unit, %.4g for centimetres",
+    std::snprintf(text, sizeof text,
+                  " (it is %.4g m large); --scale sets metres a unit, %.4g for centimetres",
                   size_of(mesh), c.scale / 100);
     return {made.code(), c.input + ": " + made.message() + text};
   }
@@ -142,27 +145,31 @@ Status make_from_mesh(const MeshCommand& c, bool makehuman) {
     if (Status s = bake_weight_gradients(asset); !s) return s;
   }
   std::printf(
-      "%zu Gaussians on %.2f m2, %.2f mm apart; %d weights each of at most %zu, off by %.3f mm (%zu by more than 0.2 "
+      "%zu Gaussians on %.2f m2, %.2f mm apart; %d weights each of at most %zu, off by %.3f mm (%zu by "
+      "more than 0.2 "
       "mm)\n",
-      asset.size(), made->area, 1e3 * made->spacing, made->weights.influences, made->weights.most_weights,
-      1e3 * made->weights.position_error, made->weights.needs_more);
+      asset.size(), made->area, 1e3 * made->spacing, made->weights.influences,
+      made->weights.most_weights, 1e3 * made->weights.position_error, made->weights.needs_more);
   CapsuleFitOptions fit;
   fit.percentile = c.percentile;
   const auto capsules = fit_body_capsules(asset, poses, fit);
   if (!capsules) return capsules.status();
   const CapsuleReport thin = measure_capsules(asset, habitat_capsules(asset.skeleton), poses);
   std::printf(
-      "%zu capsules (percentile %.4f) hold %.2f %% of the centres in the worst of %zu poses, the others lie up to %.1f "
+      "%zu capsules (percentile %.4f) hold %.2f %% of the centres in the worst of %zu poses, the others "
+      "lie up to %.1f "
       "cm "
       "outside; over-cover %.1f cm mean, %.1f cm p99\n",
       capsules->capsules, capsules->percentile, 100 * capsules->contained_least, capsules->poses,
       100 * capsules->outside_greatest, 100 * capsules->over_mean, 100 * capsules->over_p99);
   std::printf(
-      "of the body's %.1f l they leave %.2f %% uncovered (%.2f %% in the worst pose) and cover %.0f %% as much outside\n",
+      "of the body's %.1f l they leave %.2f %% uncovered (%.2f %% in the worst pose) and cover %.0f %% "
+      "as much outside\n",
       1e3 * capsules->body_volume, 100 * capsules->uncovered_mean, 100 * capsules->uncovered_greatest,
       100 * capsules->over_volume);
   std::printf(
-      "by Habitat-GS's rule: %zu capsules hold %.2f %%, the others lie up to %.1f cm outside; %.1f %% of the volume "
+      "by Habitat-GS's rule: %zu capsules hold %.2f %%, the others lie up to %.1f cm outside; %.1f %% "
+      "of the volume "
       "uncovered\n",
       thin.capsules, 100 * thin.contained_least, 100 * thin.outside_greatest, 100 * thin.uncovered_mean);
   if (Status s = io::save_avatar(c.out, asset); !s) return s;

@@ -13,7 +13,8 @@ namespace gsnav_avatar {
 
 /// Where a clip comes from.
 struct ClipSource {
-  std::string clip;    ///< a file (.bvh, .amc, .glb, .gltf, a driver's .npz), or a clip's name in the body's own file
+  std::string clip;    ///< a file (.bvh, .amc, .glb, .gltf, a driver's .npz), or a clip's name in the
+                       ///< body's own file
   std::string asf;     ///< skeleton of an .amc
   double scale = 0.0;  ///< metres a unit of the clip's file; 0: 1, or what the .asf says
   bool z_up = false;
@@ -22,8 +23,8 @@ struct ClipSource {
 /// from-gltf and from-makehuman.
 struct MeshCommand {
   std::string input, out, driver;
-  std::vector<std::string> skins;  // glTF; empty: all
-  double scale = 1.0;              // metres a unit of the input
+  std::vector<std::string> skins;                       // glTF; empty: all
+  double scale = 1.0;                                   // metres a unit of the input
   std::string skeleton, weights;                        // MakeHuman
   std::vector<std::pair<std::string, double>> targets;  // MakeHuman
   ClipSource clip;
@@ -60,7 +61,8 @@ struct Options {
   std::optional<StripCommand> strip;
 };
 
-/// Reads the command line; prints help or what is wrong and sets `exit_code` where nothing is left to do.
+/// Reads the command line; prints help or what is wrong and sets `exit_code` where nothing is left to
+/// do.
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
 
 }  // namespace gsnav_avatar

@@ -47,7 +47,8 @@ Status make_strip(const StripCommand& c) {
   driver->clip.end = ClipEnd::hold;
   const double duration = driver->clip.duration(), begin = min(c.begin, duration),
                end = c.end > 0 ? min(c.end, duration) : duration;
-  const auto actor = AvatarActor::create(asset, std::make_shared<const MotionClip>(std::move(driver->clip)));
+  const auto actor =
+      AvatarActor::create(asset, std::make_shared<const MotionClip>(std::move(driver->clip)));
   if (!actor) return actor.status();
   const auto surroundings = load_surroundings(c);
   if (!surroundings) return surroundings.status();
@@ -59,17 +60,19 @@ Status make_strip(const StripCommand& c) {
   if (surroundings->has_value()) {
     sets.push_back((*surroundings)->set());
     // (x, y, z) of a scene with Z upwards is (x, z, -y) here.
-    if (c.z_up) sets.back().world_from_asset = {axis_angle(Vec3d{1, 0, 0}, -1.5707963267948966), {}, 1.0};
+    if (c.z_up)
+      sets.back().world_from_asset = {axis_angle(Vec3d{1, 0, 0}, -1.5707963267948966), {}, 1.0};
   }
   sets.emplace_back();
   const Camera camera = Camera::look_at(c.eye, c.target, {0, 1, 0}, c.width, c.height, c.fov);
-  const auto width = static_cast<std::size_t>(c.width), height = static_cast<std::size_t>(c.height), row = 3 * width,
-             frames = static_cast<std::size_t>(c.frames);
+  const auto width = static_cast<std::size_t>(c.width), height = static_cast<std::size_t>(c.height),
+             row = 3 * width, frames = static_cast<std::size_t>(c.frames);
   std::vector<float> strip(row * frames * height);
   Frames<float> image;
   for (std::size_t k = 0; k < frames; ++k) {
-    const double time = frames == 1 ? begin
-                                    : begin + (end - begin) * static_cast<double>(k) / static_cast<double>(frames - 1);
+    const double time =
+        frames == 1 ? begin
+                    : begin + (end - begin) * static_cast<double>(k) / static_cast<double>(frames - 1);
     if (Status s = skin.pose(*actor, time); !s) return s;
     sets.back() = skin.set();
     if (Status s = renderer.render(sets, std::span(&camera, 1), image); !s) return s;

@@ -10,8 +10,8 @@
 
 #include "clips.hpp"
 #include "commands.hpp"
-#include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar.hpp"
+#include "gsnav/avatar/actor.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/nav.hpp"
 #include "gsnav/sim/default_scene.hpp"
@@ -32,7 +32,8 @@ Result<NavMesh> find_mesh(const WalkCommand& c) {
 }
 
 /// The shortest path through all the points, drawn away from the mesh's edges, on the surface.
-Result<std::vector<Vec3d>> lay_path(const NavMesh& mesh, const WalkCommand& c, double& length, double& clearance) {
+Result<std::vector<Vec3d>> lay_path(const NavMesh& mesh, const WalkCommand& c, double& length,
+                                    double& clearance) {
   std::vector<Vec3d> stops{c.from};
   stops.insert(stops.end(), c.via.begin(), c.via.end());
   stops.push_back(c.to);
@@ -119,7 +120,8 @@ Status make_walk(const WalkCommand& c) {
     if (at.walking > 0.999) steady_first = min(steady_first, t), steady_last = max(steady_last, t + 1);
   }
   std::printf(
-      "path of %.2f m in %.2f s at %.2f m/s, %.1f steps, turns on the spot of %.0f degrees; between its ends and "
+      "path of %.2f m in %.2f s at %.2f m/s, %.1f steps, turns on the spot of %.0f degrees; between its "
+      "ends and "
       "stops the mesh's edges are at least %.2f m away (walls another %.2f m)\n",
       length, path->arrival(), options.speed, 2 * length / stride, turned * 57.29577951308232, clearance,
       mesh->settings().agent_radius);
@@ -127,15 +129,16 @@ Status make_walk(const WalkCommand& c) {
     FootSlideMeter meter(feet);
     for (std::size_t t = 0; t < count; ++t) meter.add(joints[t], bodies[t]);
     print_slide("in all" + when, meter.measure());
-    if (steady_first < steady_last) print_slide("at full speed" + when, meter.measure(steady_first, steady_last));
+    if (steady_first < steady_last)
+      print_slide("at full speed" + when, meter.measure(steady_first, steady_last));
   };
   print_slides(c.lock_feet ? " as recorded" : "");
   if (c.lock_feet) {
     const auto locked = lock_feet(skeleton, feet, c.frame_rate, bodies, joints);
     if (!locked) return locked.status();
     print_slides(" with the feet held");
-    std::printf("feet were moved by up to %.1f mm; legs were up to %.1f mm too short\n", 1e3 * locked->moved,
-                1e3 * locked->out_of_reach);
+    std::printf("feet were moved by up to %.1f mm; legs were up to %.1f mm too short\n",
+                1e3 * locked->moved, 1e3 * locked->out_of_reach);
   }
   for (const auto& globals : joints) {
     frames.matrices.insert(frames.matrices.end(), globals.begin(), globals.end());

@@ -60,7 +60,8 @@ inline void add_navmesh_options(CLI::App& app, NavMeshOptions& o) {
 }
 
 /// Prints on stderr what a build is at, from its third second on: a line that is written over on a
-/// terminal, a line every ten seconds elsewhere. `name` says which NavMesh it is: a program may build several.
+/// terminal, a line every ten seconds elsewhere. `name` says which NavMesh it is: a program may build
+/// several.
 inline std::function<void(const char*, double)> navmesh_progress(const std::string& name = "NavMesh") {
   using Clock = std::chrono::steady_clock;
   return [name, begin = Clock::now(), shown = Clock::time_point{}, any = false](const char* stage,
@@ -75,8 +76,8 @@ inline std::function<void(const char*, double)> navmesh_progress(const std::stri
       return;
     shown = now;
     any = true;
-    std::fprintf(stderr, "%s%s: %s %3.0f %%%s", terminal ? "\r\x1b[K" : "", name.c_str(), stage, 100 * share,
-                 terminal && !last ? "" : "\n");
+    std::fprintf(stderr, "%s%s: %s %3.0f %%%s", terminal ? "\r\x1b[K" : "", name.c_str(), stage,
+                 100 * share, terminal && !last ? "" : "\n");
     std::fflush(stderr);
   };
 }
@@ -92,7 +93,9 @@ inline std::function<void(double)> visible_progress() {
     const double since = std::chrono::duration<double>(now - shown).count();
     if (spent < 2 || share <= 0 || (since < (terminal ? 0.2 : 10.0) && !(last && terminal))) return;
     shown = now;
-    std::fprintf(stderr, terminal ? "\rvisible sets: %3.0f %%, about %.0f s left %s" : "visible sets: %3.0f %%, about %.0f s left%s",
+    std::fprintf(stderr,
+                 terminal ? "\rvisible sets: %3.0f %%, about %.0f s left %s"
+                          : "visible sets: %3.0f %%, about %.0f s left%s",
                  100 * share, spent * (1 - share) / share, terminal && !last ? "" : "\n");
     std::fflush(stderr);
   };

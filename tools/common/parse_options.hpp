@@ -10,8 +10,8 @@
 
 namespace gsnav_tools {
 
-/// Prints what CLI11 says of an error, or its help. Control characters of arguments become \xHH, so that a file name
-/// cannot steer a terminal. Returns CLI11's exit status, 0 for help.
+/// Prints what CLI11 says of an error, or its help. Control characters of arguments become \xHH, so that
+/// a file name cannot steer a terminal. Returns CLI11's exit status, 0 for help.
 inline int print_parse_error(const CLI::App& app, const CLI::ParseError& error) {
   std::ostringstream out, err;
   const int status = app.exit(error, out, err);

@@ -65,7 +65,8 @@ Result<ImageErrors> image_errors(const GaussianCloud& source, const GaussianClou
   e.worst = std::numeric_limits<double>::infinity();
   double sum = 0, values = 0;
   for (const Camera& camera : cameras) {
-    const auto want = renderer.render(source.set(), camera), got = renderer_made.render(made.set(), camera);
+    const auto want = renderer.render(source.set(), camera),
+               got = renderer_made.render(made.set(), camera);
     for (const Status& s : {want.status(), got.status()}) {
       if (!s) return s;
     }

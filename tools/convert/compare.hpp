@@ -36,8 +36,8 @@ struct ImageErrors {
   double largest = 0;  ///< difference of a value
 };
 
-/// Renders both from each camera as gsnav-render does: each in its own sort order, ties of depth in the order in which
-/// it was read. Values above 1 are compared too.
+/// Renders both from each camera as gsnav-render does: each in its own sort order, ties of depth in the
+/// order in which it was read. Values above 1 are compared too.
 gsnav::Result<ImageErrors> image_errors(const gsnav::GaussianCloud& source,
                                         const gsnav::GaussianCloud& made,
                                         const std::vector<gsnav::Camera>& cameras);

@@ -46,15 +46,21 @@ Result<GaussianCloud> load(const Options& o) {
 
 /// Names an option whose value no scene can be edited by, or ok.
 Status validate(const Options& o) {
-  const std::pair<const char*, std::vector<double>> all[] = {
-      {"--crop", o.crop},   {"--rotate", o.rotate},           {"--translate", o.translate},
-      {"--scale", {o.scale}}, {"--min-opacity", {o.min_opacity}}, {"--max-scale", {o.max_scale}}};
+  const std::pair<const char*, std::vector<double>> all[] = {{"--crop", o.crop},
+                                                             {"--rotate", o.rotate},
+                                                             {"--translate", o.translate},
+                                                             {"--scale", {o.scale}},
+                                                             {"--min-opacity", {o.min_opacity}},
+                                                             {"--max-scale", {o.max_scale}}};
   for (const auto& [name, values] : all) {
     for (const double v : values) {
-      if (!std::isfinite(v)) return {Errc::invalid_argument, std::string(name) + " " + std::to_string(v) + ": must be finite"};
+      if (!std::isfinite(v))
+        return {Errc::invalid_argument,
+                std::string(name) + " " + std::to_string(v) + ": must be finite"};
     }
   }
-  if (o.max_scale < 0) return {Errc::invalid_argument, "--max-scale " + std::to_string(o.max_scale) + ": must be positive"};
+  if (o.max_scale < 0)
+    return {Errc::invalid_argument, "--max-scale " + std::to_string(o.max_scale) + ": must be positive"};
   return {};
 }
 
@@ -97,7 +103,9 @@ Status edit(GaussianCloud& cloud, const Options& o) {
   if (!o.translate.empty()) by.translation = {o.translate[0], o.translate[1], o.translate[2]};
   if (!o.rotate.empty() || !o.translate.empty() || o.scale != 1) transform(cloud, by);
   if (cloud.size() == 0) return {Errc::invalid_argument, "no Gaussian is left"};
-  if (!is_finite(cloud)) return {Errc::invalid_argument, "a Gaussian would be moved or scaled beyond float32: --scale, --translate"};
+  if (!is_finite(cloud))
+    return {Errc::invalid_argument,
+            "a Gaussian would be moved or scaled beyond float32: --scale, --translate"};
   sort_spatially(cloud);
   return {};
 }
@@ -106,8 +114,10 @@ std::uintmax_t bytes_of(const std::filesystem::path& out) {
   std::error_code ignored;
   if (out.filename() != "meta.json") return std::filesystem::file_size(out, ignored);
   std::uintmax_t sum = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(out.parent_path().empty() ? "." : out.parent_path(), ignored)) {
-    if (entry.path().filename() == out.filename() || entry.path().extension() == ".webp") sum += entry.file_size(ignored);
+  for (const auto& entry : std::filesystem::directory_iterator(
+           out.parent_path().empty() ? "." : out.parent_path(), ignored)) {
+    if (entry.path().filename() == out.filename() || entry.path().extension() == ".webp")
+      sum += entry.file_size(ignored);
   }
   return sum;
 }
@@ -150,9 +160,11 @@ Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& ro
   }
   if (cameras.empty()) return {};
   if (source.sort_order != made.sort_order) {
-    const auto by = [](SortOrder order) { return order == SortOrder::z_depth ? "depth" : "distance from the camera"; };
-    std::printf("  the format has another order of drawing: by %s, the source by %s\n", by(made.sort_order),
-                by(source.sort_order));
+    const auto by = [](SortOrder order) {
+      return order == SortOrder::z_depth ? "depth" : "distance from the camera";
+    };
+    std::printf("  the format has another order of drawing: by %s, the source by %s\n",
+                by(made.sort_order), by(source.sort_order));
   }
   const auto images = gsnav_convert::image_errors(source, made, cameras);
   if (!images) return images.status();

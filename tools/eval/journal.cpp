@@ -37,7 +37,11 @@ Json to_json(const Record& r) {
   for_each_metric(r.metrics, [&](const char* name, const auto& v) { metrics[name] = v; });
   std::string actions;
   for (const gsnav::Action a : r.actions) actions += static_cast<char>('0' + static_cast<int>(a));
-  return {{"episode", r.episode}, {"id", r.id}, {"reward", r.reward}, {"metrics", metrics}, {"actions", actions}};
+  return {{"episode", r.episode},
+          {"id", r.id},
+          {"reward", r.reward},
+          {"metrics", metrics},
+          {"actions", actions}};
 }
 
 /// Thrown with "FIELD = VALUE: RULE".
@@ -88,7 +92,8 @@ Record from_json(const Json& j, const Stage& stage) {
   Record r;
   r.episode = count(member(j, "", "episode"), "episode");
   if (r.episode >= stage.episodes.size()) {
-    refuse("episode", j["episode"], "there are " + std::to_string(stage.episodes.size()) + " episodes, from 0");
+    refuse("episode", j["episode"],
+           "there are " + std::to_string(stage.episodes.size()) + " episodes, from 0");
   }
   const std::string& expected = stage.episodes[r.episode].id;
   if (member(j, "", "id") != expected) {
@@ -125,14 +130,16 @@ Record from_json(const Json& j, const Stage& stage) {
 
   // What fits nothing that can happen.
   const gsnav::EpisodeMetrics& m = r.metrics;
-  const auto stops = static_cast<std::size_t>(std::count(r.actions.begin(), r.actions.end(), gsnav::Action::stop));
+  const auto stops =
+      static_cast<std::size_t>(std::count(r.actions.begin(), r.actions.end(), gsnav::Action::stop));
   const auto check = [&](bool ok, const char* name, const char* rule) {
     if (!ok) refuse(std::string("metrics.") + name, metrics[name], rule);
   };
   constexpr double kRounding = 1e-9;
   const auto equal = [](double a, double b) { return std::abs(a - b) <= kRounding; };
   const double steps = static_cast<double>(m.steps);
-  check(m.steps <= static_cast<std::size_t>(std::max(stage.config.task.max_steps, 0)), "steps", "more than --max-steps");
+  check(m.steps <= static_cast<std::size_t>(std::max(stage.config.task.max_steps, 0)), "steps",
+        "more than --max-steps");
   check(m.steps + stops == r.actions.size() && stops <= 1, "steps", "is not the number of actions");
   check(m.stop_called == (stops == 1), "stop_called", "does not fit the actions");
   check(!m.success || m.stop_called, "success", "without a stop");
@@ -142,10 +149,10 @@ Record from_json(const Json& j, const Stage& stage) {
         "is not collision_steps / steps");
   check((m.human_collision || m.human_blocked) == (m.collision_steps > 0), "collision_steps",
         "does not fit human_collision and human_blocked");
-  check(equal(m.spl, gsnav::success_weighted_by_path_length(m.success, m.start_distance, m.path_length)), "spl",
-        "does not follow from success, start_distance and path_length");
-  check(equal(m.soft_spl,
-              gsnav::soft_success_weighted_by_path_length(m.distance_to_goal, m.start_distance, m.path_length)),
+  check(equal(m.spl, gsnav::success_weighted_by_path_length(m.success, m.start_distance, m.path_length)),
+        "spl", "does not follow from success, start_distance and path_length");
+  check(equal(m.soft_spl, gsnav::soft_success_weighted_by_path_length(m.distance_to_goal,
+                                                                      m.start_distance, m.path_length)),
         "soft_spl", "does not follow from distance_to_goal, start_distance and path_length");
   return r;
 }
@@ -164,8 +171,10 @@ Status append(const fs::path& path, std::string line) {
   int error = before < 0 ? errno : 0;
   for (std::size_t done = 0; error == 0 && done < line.size();) {
     const ::ssize_t n = ::write(fd, line.data() + done, line.size() - done);
-    if (n > 0) done += static_cast<std::size_t>(n);
-    else if (n < 0 && errno != EINTR) error = errno;
+    if (n > 0)
+      done += static_cast<std::size_t>(n);
+    else if (n < 0 && errno != EINTR)
+      error = errno;
   }
   if (error == 0 && ::fdatasync(fd) != 0 && errno != EINVAL) error = errno;
   if (error != 0 && before >= 0 && ::ftruncate(fd, before) != 0) error = errno;
@@ -177,7 +186,8 @@ std::string header_of(const Options& o, const Contents& made_of) {
   Json options = Json::object(), contents = Json::object();
   for (const OptionValue& v : option_values(o)) options[v.flag.substr(2)] = v.value;
   for (const auto& [name, hash] : made_of) contents[name] = hash;
-  const Json header{{"journal", "gsnav-eval"}, {"format", kFormat}, {"options", options}, {"contents", contents}};
+  const Json header{
+      {"journal", "gsnav-eval"}, {"format", kFormat}, {"options", options}, {"contents", contents}};
   return header.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -196,8 +206,10 @@ Result<Header> read_header(const fs::path& path, const std::string& line) {
     return {Errc::invalid_file, where + "is not the header of a journal; " + kAnew};
   }
   if (!j.is_object() || !j.contains("format") || !j["format"].is_number_integer()) {
-    return {Errc::invalid_file, where + "is of an earlier gsnav, whose journals do not say what they are of "
-                                        "(format 1; this one reads 2); " + kAnew};
+    return {Errc::invalid_file, where +
+                                    "is of an earlier gsnav, whose journals do not say what they are of "
+                                    "(format 1; this one reads 2); " +
+                                    kAnew};
   }
   if (j["format"] != kFormat) {
     return {Errc::invalid_file, where + "format = " + j["format"].dump() + ": this gsnav reads " +
@@ -207,7 +219,8 @@ Result<Header> read_header(const fs::path& path, const std::string& line) {
   for (const OptionValue& v : option_values(Options{})) {
     const auto options = j.find("options");
     const std::string name = v.flag.substr(2);
-    if (options == j.end() || !options->is_object() || !options->contains(name) || !(*options)[name].is_string()) {
+    if (options == j.end() || !options->is_object() || !options->contains(name) ||
+        !(*options)[name].is_string()) {
       return {Errc::invalid_file, where + "options." + name + " is missing or no text; " + kAnew};
     }
     out.options.push_back({v.flag, (*options)[name].get<std::string>(), v.role, false});
@@ -221,7 +234,9 @@ Result<Header> read_header(const fs::path& path, const std::string& line) {
   return out;
 }
 
-std::string shown(const OptionValue& v) { return v.value.empty() ? "no " + v.flag : v.flag + " " + v.value; }
+std::string shown(const OptionValue& v) {
+  return v.value.empty() ? "no " + v.flag : v.flag + " " + v.value;
+}
 
 Status compare_options(const fs::path& path, const Header& header, const Options& o, bool views) {
   const std::vector<OptionValue> now = option_values(o);
@@ -230,25 +245,29 @@ Status compare_options(const fs::path& path, const Header& header, const Options
     if (now[i].value == was.value || (!views && now[i].role == OptionRole::view)) continue;
     // Files may lie elsewhere: their contents are compared.
     if (now[i].names_file && !was.value.empty() && now[i].role == OptionRole::file) continue;
-    return {Errc::invalid_argument, path.string() + " was recorded with " + shown(was) + ", but this run has " +
-                                        shown(now[i]) + ". Give the recorded option, " + kAnew};
+    return {Errc::invalid_argument, path.string() + " was recorded with " + shown(was) +
+                                        ", but this run has " + shown(now[i]) +
+                                        ". Give the recorded option, " + kAnew};
   }
   return {};
 }
 
-Status compare_contents(const fs::path& path, const Header& header, const Options& o, const Contents& now) {
+Status compare_contents(const fs::path& path, const Header& header, const Options& o,
+                        const Contents& now) {
   for (const auto& [name, hash] : now) {
     const auto same_name = [&n = name](const auto& entry) { return entry.first == n; };
     const auto was = std::find_if(header.contents.begin(), header.contents.end(), same_name);
     if (was != header.contents.end() && was->second == hash) continue;
-    const std::string file = name == "scene"      ? o.scene
-                             : name == "episodes" ? o.episode_file
-                             : name == "navmesh" && o.ready_made() ? o.navmesh : std::string();
-    return {Errc::invalid_argument,
-            path.string() + " is of other contents: the " + name +
-                (file.empty() ? " that gsnav made" : " in " + file) + (name == "scene" || name == "navmesh" ? " has" : " have") +
-                " changed (content hash " + hash + ", recorded " +
-                (was == header.contents.end() ? "none" : was->second) + "). Put back what was, " + kAnew};
+    const std::string file = name == "scene"                       ? o.scene
+                             : name == "episodes"                  ? o.episode_file
+                             : name == "navmesh" && o.ready_made() ? o.navmesh
+                                                                   : std::string();
+    return {Errc::invalid_argument, path.string() + " is of other contents: the " + name +
+                                        (file.empty() ? " that gsnav made" : " in " + file) +
+                                        (name == "scene" || name == "navmesh" ? " has" : " have") +
+                                        " changed (content hash " + hash + ", recorded " +
+                                        (was == header.contents.end() ? "none" : was->second) +
+                                        "). Put back what was, " + kAnew};
   }
   return {};
 }
@@ -257,7 +276,8 @@ Status compare_contents(const fs::path& path, const Header& header, const Option
 bool is_journal(const std::string& name) {
   if (name == "journal.jsonl") return true;
   constexpr std::string_view kFront = "journal.", kEnd = ".jsonl";
-  if (!name.starts_with(kFront) || !name.ends_with(kEnd) || name.size() <= kFront.size() + kEnd.size()) return false;
+  if (!name.starts_with(kFront) || !name.ends_with(kEnd) || name.size() <= kFront.size() + kEnd.size())
+    return false;
   const std::string rank = name.substr(kFront.size(), name.size() - kFront.size() - kEnd.size());
   return rank.find_first_not_of("0123456789") == std::string::npos;
 }
@@ -283,7 +303,8 @@ std::vector<fs::path> files_in(const fs::path& folder, bool (*wanted)(const std:
 Status remove_file(const fs::path& path) {
   std::error_code error;
   fs::remove(path, error);
-  return error ? Status(Errc::file_not_found, path.string() + ": cannot be removed: " + error.message()) : Status();
+  return error ? Status(Errc::file_not_found, path.string() + ": cannot be removed: " + error.message())
+               : Status();
 }
 
 Status remove_pictures(const fs::path& folder) {
@@ -294,7 +315,9 @@ Status remove_pictures(const fs::path& folder) {
 }
 
 /// A file's first line where it has a whole one.
-std::string first_line(const std::string& text) { return text.substr(0, std::min(text.find('\n'), text.size())); }
+std::string first_line(const std::string& text) {
+  return text.substr(0, std::min(text.find('\n'), text.size()));
+}
 
 }  // namespace
 
@@ -318,7 +341,8 @@ Contents contents_of(const Stage& stage) {
   for (const auto& asset : stage.scene->assets) {
     hash_cloud(scene, *asset.cloud);
     const gsnav::Similarity& at = asset.world_from_asset;
-    for (const double x : {at.rotation.w, at.rotation.x, at.rotation.y, at.rotation.z, at.scale}) scene.value(x);
+    for (const double x : {at.rotation.w, at.rotation.x, at.rotation.y, at.rotation.z, at.scale})
+      scene.value(x);
     vector(scene, at.translation);
   }
   for (const auto& triangle : stage.scene->navmesh->triangles()) {
@@ -326,7 +350,8 @@ Contents contents_of(const Stage& stage) {
   }
   const auto hash_body = [&vector](gsnav::Hasher& h, const gsnav::DynamicCapsule& b) {
     h.value(b.avatar), h.value(b.bone);
-    for (const auto& c : {b.motion.begin, b.motion.end}) vector(h, c.p0), vector(h, c.p1), h.value(c.radius);
+    for (const auto& c : {b.motion.begin, b.motion.end})
+      vector(h, c.p0), vector(h, c.p1), h.value(c.radius);
   };
   // Bodies as they are met, at times that no walk repeats.
   constexpr int kTimes = 32;
@@ -347,14 +372,19 @@ Contents contents_of(const Stage& stage) {
     episodes.text(e.scene_id);
     vector(episodes, e.start_position), vector(episodes, e.goal_position);
     const gsnav::Quatd& q = e.start_rotation;
-    for (const double x : {q.w, q.x, q.y, q.z, e.geodesic_distance, e.start_time, e.goal_radius}) episodes.value(x);
+    for (const double x : {q.w, q.x, q.y, q.z, e.geodesic_distance, e.start_time, e.goal_radius})
+      episodes.value(x);
   }
-  return {{"scene", scene.hex()}, {"navmesh", navmesh.hex()}, {"people", people.hex()}, {"episodes", episodes.hex()}};
+  return {{"scene", scene.hex()},
+          {"navmesh", navmesh.hex()},
+          {"people", people.hex()},
+          {"episodes", episodes.hex()}};
 }
 
 Result<std::vector<OptionValue>> Journal::recorded_options(const fs::path& folder) {
   const fs::path path = folder / "journal.jsonl";
-  if (!fs::exists(path)) return Status(Errc::file_not_found, path.string() + ": there is no evaluation here");
+  if (!fs::exists(path))
+    return Status(Errc::file_not_found, path.string() + ": there is no evaluation here");
   auto header = read_header(path, first_line(file_text(path)));
   if (!header) return header.status();
   return std::move(header->options);
@@ -371,10 +401,11 @@ Status Journal::check_options(const fs::path& folder, const Options& options, bo
   return {};
 }
 
-Status Journal::read(const fs::path& path, const Options& options, const Stage& stage, const Contents& made_of,
-                     bool own, bool views) {
+Status Journal::read(const fs::path& path, const Options& options, const Stage& stage,
+                     const Contents& made_of, bool own, bool views) {
   const std::string text = file_text(path);
-  std::size_t whole = 0, line = 0;  // what follows the last end of a line was cut off while being written
+  std::size_t whole = 0,
+              line = 0;  // what follows the last end of a line was cut off while being written
   for (std::size_t at = 0, end; (end = text.find('\n', at)) != std::string::npos; at = whole = end + 1) {
     const std::string one = text.substr(at, end - at);
     if (++line == 1) {
@@ -389,15 +420,17 @@ Status Journal::read(const fs::path& path, const Options& options, const Stage& 
     if (!r) return r.status();
     const auto found = records_.find(r->episode);
     if (found != records_.end() && line_of(found->second) != line_of(*r)) {
-      return {Errc::invalid_file, where + ": episode = " + std::to_string(r->episode) + ": differs from " +
-                                      places_[r->episode] + ", of the same episode. Remove one of them, " + kAnew};
+      return {Errc::invalid_file, where + ": episode = " + std::to_string(r->episode) +
+                                      ": differs from " + places_[r->episode] +
+                                      ", of the same episode. Remove one of them, " + kAnew};
     }
     places_.emplace(r->episode, where);
     records_.insert_or_assign(r->episode, std::move(*r));
   }
   if (whole < text.size()) {
-    notes_.push_back(path.string() + ": line " + std::to_string(line + 1) + " has no end, as after a kill: " +
-                     std::to_string(text.size() - whole) + " bytes are dropped");
+    notes_.push_back(path.string() + ": line " + std::to_string(line + 1) +
+                     " has no end, as after a kill: " + std::to_string(text.size() - whole) +
+                     " bytes are dropped");
     if (own && ::truncate(path.c_str(), static_cast<::off_t>(whole)) != 0) {
       return gsnav::detail::unwritable(path, errno);
     }
@@ -408,7 +441,8 @@ Status Journal::read(const fs::path& path, const Options& options, const Stage& 
 Result<Journal> Journal::load(const fs::path& folder, const Options& options, const Stage& stage) {
   Journal j;
   j.path_ = folder / "journal.jsonl";
-  if (!fs::exists(j.path_)) return Status(Errc::file_not_found, j.path_.string() + ": there is no evaluation here");
+  if (!fs::exists(j.path_))
+    return Status(Errc::file_not_found, j.path_.string() + ": there is no evaluation here");
   const Contents made_of = contents_of(stage);
   for (const fs::path& path : files_in(folder, is_journal)) {
     if (Status s = j.read(path, options, stage, made_of, false, false); !s) return s;
@@ -416,13 +450,17 @@ Result<Journal> Journal::load(const fs::path& folder, const Options& options, co
   return j;
 }
 
-Result<Journal> Journal::open(const fs::path& folder, const Options& options, const Stage& stage, int rank) {
+Result<Journal> Journal::open(const fs::path& folder, const Options& options, const Stage& stage,
+                              int rank) {
   if (Status s = gsnav::make_output_folder(folder); !s) return s;
   Journal j;
   j.path_ = folder / (rank == 0 ? "journal.jsonl" : "journal." + std::to_string(rank) + ".jsonl");
   const Contents made_of = contents_of(stage);
   if (file_text(j.path_).find('\n') == std::string::npos) {  // none, or a header that was cut off
-    if (Status s = rank == 0 && files_in(folder, is_journal).empty() ? remove_pictures(folder) : Status(); !s) return s;
+    if (Status s =
+            rank == 0 && files_in(folder, is_journal).empty() ? remove_pictures(folder) : Status();
+        !s)
+      return s;
     if (Status s = gsnav::replace_file(j.path_, header_of(options, made_of) + "\n"); !s) return s;
   }
   if (Status s = j.read(j.path_, options, stage, made_of, true, true); !s) return s;

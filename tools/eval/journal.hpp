@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/sim/metrics.hpp"
 #include "gsnav/sim.hpp"
+#include "gsnav/sim/metrics.hpp"
 #include "options.hpp"
 
 namespace gsnav_eval {
@@ -37,9 +37,9 @@ gsnav::Result<Record> record_of(const std::string& line, const std::string& wher
 using Contents = std::vector<std::pair<std::string, std::string>>;
 Contents contents_of(const Stage& stage);
 
-/// `journal.jsonl`: a header with the format's version, the options and the contents' hashes, then a line
-/// for each finished episode in the order that they finished in. Of several ranks each but the first
-/// writes a `journal.RANK.jsonl`; all read what all have written, whatever their number was.
+/// `journal.jsonl`: a header with the format's version, the options and the contents' hashes, then a
+/// line for each finished episode in the order that they finished in. Of several ranks each but the
+/// first writes a `journal.RANK.jsonl`; all read what all have written, whatever their number was.
 ///
 /// A line is on the disk (fdatasync) before `add` returns, and one that does not fit leaves nothing. A
 /// last line that a kill cut off is dropped and counted in `notes`; any other line that is no record of

@@ -21,7 +21,9 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
-double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
+double seconds_since(Clock::time_point t) {
+  return std::chrono::duration<double>(Clock::now() - t).count();
+}
 
 /// Seconds of this run.
 struct Timings {
@@ -30,7 +32,8 @@ struct Timings {
 };
 
 /// What came out: equal bytes for equal runs, on any number of threads, also where a run was broken off.
-std::string metrics_json(const Options& o, const gsnav::MetricsSummary& means, const Journal& journal, const Stage& stage) {
+std::string metrics_json(const Options& o, const gsnav::MetricsSummary& means, const Journal& journal,
+                         const Stage& stage) {
   Json j;
   for (const OptionValue& v : option_values(o)) {
     if (v.role != OptionRole::view) j["options"][v.flag.substr(2)] = v.value;
@@ -48,8 +51,11 @@ std::string metrics_json(const Options& o, const gsnav::MetricsSummary& means, c
 }
 
 std::string timings_json(const Options& o, const Timings& t) {
-  return Json{{"load_s", t.load},          {"play_s", t.play},       {"pictures_s", t.pictures},
-              {"episodes_played", t.played}, {"threads", o.threads}}
+  return Json{{"load_s", t.load},
+              {"play_s", t.play},
+              {"pictures_s", t.pictures},
+              {"episodes_played", t.played},
+              {"threads", o.threads}}
              .dump(2) +
          "\n";
 }
@@ -59,7 +65,8 @@ Status run(const Options& o, int pictures, bool restart) {
   for (const fs::path& folder : {out, episode_folder}) {
     if (Status s = gsnav::make_output_folder(folder); !s) return s;
   }
-  for (const char* name : {"journal.jsonl", "episodes.json.gz", "index.html", "metrics.json", "timings.json"}) {
+  for (const char* name :
+       {"journal.jsonl", "episodes.json.gz", "index.html", "metrics.json", "timings.json"}) {
     if (Status s = gsnav::check_output_path(out / name); !s) return s;
   }
   if (Status s = restart ? Status() : Journal::check_options(out, o); !s) return s;
@@ -70,7 +77,8 @@ Status run(const Options& o, int pictures, bool restart) {
   if (Status s = restart ? Journal::restart(out) : Status(); !s) return s;
   auto journal = Journal::open(out, o, *stage);
   if (!journal) return journal.status();
-  for (const std::string& note : journal->notes()) std::fprintf(stderr, "%s\n", gsnav::printable(note).c_str());
+  for (const std::string& note : journal->notes())
+    std::fprintf(stderr, "%s\n", gsnav::printable(note).c_str());
   if (Status s = gsnav::io::save_episodes(out / "episodes.json.gz", stage->episodes); !s) return s;
   gsnav::OpenMPBackend backend(o.threads);
   auto sim = Simulator::create(backend, stage->scene, stage->config);
@@ -84,7 +92,8 @@ Status run(const Options& o, int pictures, bool restart) {
     auto record = play(world, o, stage->episodes[i], i);
     if (!record) return record.status();
     std::fprintf(stderr, "episode %zu/%zu: %s, SPL %.2f, %zu actions\n", i + 1, stage->episodes.size(),
-                 record->metrics.success ? "reached" : "not reached", record->metrics.spl, record->metrics.steps);
+                 record->metrics.success ? "reached" : "not reached", record->metrics.spl,
+                 record->metrics.steps);
     if (Status s = journal->add(std::move(*record)); !s) return s;
     ++timings.played;
   }
@@ -94,7 +103,8 @@ Status run(const Options& o, int pictures, bool restart) {
   std::vector<gsnav::EpisodeMetrics> metrics;
   for (const auto& [number, record] : journal->records()) metrics.push_back(record.metrics);
   const gsnav::MetricsSummary s = gsnav::summarize(metrics);
-  if (Status w = gsnav::replace_file(out / "metrics.json", metrics_json(o, s, *journal, *stage)); !w) return w;
+  if (Status w = gsnav::replace_file(out / "metrics.json", metrics_json(o, s, *journal, *stage)); !w)
+    return w;
   std::vector<Entry> entries;
   for (const auto& [number, record] : journal->records()) {
     Entry e{&record, {}, {}};
@@ -113,9 +123,11 @@ Status run(const Options& o, int pictures, bool restart) {
     entries.push_back(std::move(e));
   }
   timings.pictures = seconds_since(from);
-  std::printf("%zu episodes: SR %.3f  SPL %.3f  SoftSPL %.3f  STL %.3f  DTG %.2f m  CR %.4f  H-Coll %.4f  PSI %.4f  PSC %.4f\n",
-              s.episodes, s.success_rate, s.spl, s.soft_spl, s.stl, s.distance_to_goal, s.collision_rate,
-              s.human_collision_episode_rate, s.psi, s.psc);
+  std::printf(
+      "%zu episodes: SR %.3f  SPL %.3f  SoftSPL %.3f  STL %.3f  DTG %.2f m  CR %.4f  H-Coll %.4f  PSI "
+      "%.4f  PSC %.4f\n",
+      s.episodes, s.success_rate, s.spl, s.soft_spl, s.stl, s.distance_to_goal, s.collision_rate,
+      s.human_collision_episode_rate, s.psi, s.psc);
   if (Status w = gsnav::replace_file(out / "timings.json", timings_json(o, timings)); !w) return w;
   return gsnav::replace_file(out / "index.html", page(o, s, entries));
 }
@@ -127,11 +139,15 @@ int main(int argc, char** argv) try {
   gsnav_eval::Options o;
   int pictures = -1;
   CLI::App app{
-      "Evaluates a policy and writes episodes.json.gz, journal.jsonl (a line for each episode as it ends, its actions with\n"
-      "it), metrics.json, timings.json and index.html, one page with metrics, pictures and maps. Started again it plays\n"
-      "what is missing, if options and the contents of scene, NavMesh, people and episodes are those of the journal."};
+      "Evaluates a policy and writes episodes.json.gz, journal.jsonl (a line for each episode as it "
+      "ends, its actions with\n"
+      "it), metrics.json, timings.json and index.html, one page with metrics, pictures and maps. "
+      "Started again it plays\n"
+      "what is missing, if options and the contents of scene, NavMesh, people and episodes are those of "
+      "the journal."};
   gsnav_eval::add_world_options(app, o);
-  app.add_option("--pictures", pictures, "so many episodes have pictures on the page; -1: all")->capture_default_str();
+  app.add_option("--pictures", pictures, "so many episodes have pictures on the page; -1: all")
+      ->capture_default_str();
   bool restart = false;
   app.add_flag("--restart", restart, "remove the evaluation that --out has, and begin anew");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;

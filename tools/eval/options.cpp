@@ -17,7 +17,8 @@ std::string text_of(const T& value) {
     return value;
   } else if constexpr (std::is_arithmetic_v<T>) {
     std::array<char, 32> text{};
-    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};  // the shortest that reads back
+    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value)
+                             .ptr};  // the shortest that reads back
   } else {
     std::string all;
     for (const auto& v : value) all += (all.empty() ? "" : " ") + text_of(v);
@@ -25,7 +26,8 @@ std::string text_of(const T& value) {
   }
 }
 
-/// Calls f(flag, value, role, whether the value is a file's name) for each option that decides something.
+/// Calls f(flag, value, role, whether the value is a file's name) for each option that decides
+/// something.
 template <class O, class F>
 void for_each_option(O& o, const F& f) {
   using enum OptionRole;
@@ -58,7 +60,8 @@ std::vector<OptionValue> option_values(const Options& o) {
   return out;
 }
 
-gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& values, Options& options) {
+gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& values,
+                           Options& options) {
   std::vector<std::string> words;
   for (const OptionValue& v : values) {
     if (v.value.empty() || app.get_option(v.flag)->count() > 0) continue;
@@ -98,20 +101,35 @@ void add_scene_options(CLI::App& app, Options& o) {
       ->check(CLI::Range(0.05, 20.0));
   app.add_option("--up", o.up, "axis of the scene that points up")->capture_default_str();
   nav_loop::add_navmesh_options(app, o);
-  app.add_option("--avatars", o.avatars, "people walking about")->capture_default_str()->check(CLI::Range(0, 64));
-  app.add_option("--episodes", o.episodes, "episodes to generate")->capture_default_str()->check(CLI::Range(1, 100000));
-  app.add_option("--episode-file", o.episode_file, "Habitat-Lab's .json or .json.gz, instead of generated ones");
-  app.add_option("--preset", o.preset, "body and rules: v1, v2 (PointNav challenges), avatar (v1 with people charged)")
+  app.add_option("--avatars", o.avatars, "people walking about")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 64));
+  app.add_option("--episodes", o.episodes, "episodes to generate")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  app.add_option("--episode-file", o.episode_file,
+                 "Habitat-Lab's .json or .json.gz, instead of generated ones");
+  app.add_option("--preset", o.preset,
+                 "body and rules: v1, v2 (PointNav challenges), avatar (v1 with people charged)")
       ->capture_default_str()
       ->check(CLI::IsMember({"v1", "v2", "avatar"}));
-  app.add_option("--seed", o.seed, "decides episodes, people and the random policy")->capture_default_str();
-  app.add_option("--width", o.width, "image width, pixels")->capture_default_str()->check(CLI::Range(16, 4096));
-  app.add_option("--height", o.height, "image height, pixels")->capture_default_str()->check(CLI::Range(16, 4096));
-  app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")->capture_default_str()->check(CLI::Range(10.0, 170.0));
+  app.add_option("--seed", o.seed, "decides episodes, people and the random policy")
+      ->capture_default_str();
+  app.add_option("--width", o.width, "image width, pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 4096));
+  app.add_option("--height", o.height, "image height, pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 4096));
+  app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")
+      ->capture_default_str()
+      ->check(CLI::Range(10.0, 170.0));
   app.add_option("--eye-height", o.eye_height, "camera above the floor, metres")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3.0));
-  app.add_option("--threads", o.threads, "threads, 0: all")->capture_default_str()->check(CLI::Range(0, 1024));
+  app.add_option("--threads", o.threads, "threads, 0: all")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
 }
 
 void add_world_options(CLI::App& app, Options& o) {

@@ -11,14 +11,15 @@ namespace gsnav_eval {
 
 /// What both programs are asked for; scene, people and seed as nav_loop has them.
 struct Options : nav_loop::Options {
-  std::string policy = "follower";     ///< follower, greedy, random
-  std::string episode_file;            ///< empty: generated
-  std::string preset = "avatar";       ///< v1, v2, avatar
+  std::string policy = "follower";  ///< follower, greedy, random
+  std::string episode_file;         ///< empty: generated
+  std::string preset = "avatar";    ///< v1, v2, avatar
 };
 
 /// Scene, people, episodes, body and picture.
 void add_scene_options(CLI::App& app, Options& options);
-/// These and the policy: the options that decide what happens: an evaluation goes on, and is replayed, only with the same ones.
+/// These and the policy: the options that decide what happens: an evaluation goes on, and is replayed,
+/// only with the same ones.
 void add_world_options(CLI::App& app, Options& options);
 
 /// What an option of add_world_options decides.
@@ -38,6 +39,7 @@ struct OptionValue {
 std::vector<OptionValue> option_values(const Options& options);
 /// Sets those options that `app` was not given from `values`, by the rules of the command line. Errors:
 /// invalid_argument, naming the option.
-gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& values, Options& options);
+gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& values,
+                           Options& options);
 
 }  // namespace gsnav_eval

@@ -18,19 +18,22 @@ using gsnav_report::format;
 
 const char* const kStyle =
     "body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:70em;padding:0 1em;color:#222}"
-    "table{border-collapse:collapse}td,th{padding:.2em .8em;text-align:right;border-bottom:1px solid #ddd}"
+    "table{border-collapse:collapse}td,th{padding:.2em .8em;text-align:right;border-bottom:1px solid "
+    "#ddd}"
     "th:first-child,td:first-child{text-align:left}img{max-width:100%;height:auto}"
     "details{border-bottom:1px solid #ddd;padding:.4em 0}summary{cursor:pointer}"
-    "@media(prefers-color-scheme:dark){body{background:#181818;color:#ddd}td,th,details{border-color:#444}}";
+    "@media(prefers-color-scheme:dark){body{background:#181818;color:#ddd}td,th,details{border-color:#"
+    "444}}";
 
 void row(std::string& out, const char* name, const char* unit, double value) {
-  out += "<tr><td>" + std::string(name) + "</td><td>" + format(value) + "</td><td>" + unit + "</td></tr>\n";
+  out +=
+      "<tr><td>" + std::string(name) + "</td><td>" + format(value) + "</td><td>" + unit + "</td></tr>\n";
 }
 
 std::string picture(const Picture& p, const std::string& what) {
   if (p.bytes.empty()) return {};
-  return "<p><img alt=\"" + escape(what) + "\" loading=\"lazy\" src=\"data:image/" + p.type + ";base64," +
-         base64(p.bytes) + "\"/></p>\n";
+  return "<p><img alt=\"" + escape(what) + "\" loading=\"lazy\" src=\"data:image/" + p.type +
+         ";base64," + base64(p.bytes) + "\"/></p>\n";
 }
 
 }  // namespace
@@ -46,11 +49,14 @@ gsnav::Result<Picture> page_picture(const std::string& png_file) {
 }
 
 std::string page(const Options& o, const gsnav::MetricsSummary& s, const std::vector<Entry>& entries) {
-  std::string out = "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><title>Evaluation</title><style>";
+  std::string out =
+      "<!doctype html>\n<html lang=\"en\"><head><meta "
+      "charset=\"utf-8\"/><title>Evaluation</title><style>";
   out += kStyle;
   out += "</style></head><body>\n<h1>Evaluation</h1>\n<p>" +
-         escape(o.scene.empty() ? "embedded flat" : o.scene) + ", " + std::to_string(o.avatars) + " people, policy " +
-         escape(o.policy) + ", preset " + escape(o.preset) + ", seed " + std::to_string(o.seed) + "</p>\n<table>\n";
+         escape(o.scene.empty() ? "embedded flat" : o.scene) + ", " + std::to_string(o.avatars) +
+         " people, policy " + escape(o.policy) + ", preset " + escape(o.preset) + ", seed " +
+         std::to_string(o.seed) + "</p>\n<table>\n";
   row(out, "episodes", "", static_cast<double>(s.episodes));
   row(out, "success rate (SR)", "", s.success_rate);
   row(out, "SPL", "", s.spl);
@@ -69,9 +75,13 @@ std::string page(const Options& o, const gsnav::MetricsSummary& s, const std::ve
   out += "</table>\n<h2>Episodes</h2>\n";
   for (const Entry& e : entries) {
     const gsnav::EpisodeMetrics& m = e.record->metrics;
-    out += "<details><summary>" + escape(e.record->id) + ": " + (m.success ? "reached" : m.stop_called ? "missed" : "cut off") +
-           ", SPL " + format(m.spl) + ", " + std::to_string(m.steps) + " actions, CR " + format(m.collision_rate) + ", PSI " +
-           format(m.psi) + ", reward " + format(e.record->reward) + "</summary>\n";
+    out += "<details><summary>" + escape(e.record->id) + ": " +
+           (m.success       ? "reached"
+            : m.stop_called ? "missed"
+                            : "cut off") +
+           ", SPL " + format(m.spl) + ", " + std::to_string(m.steps) + " actions, CR " +
+           format(m.collision_rate) + ", PSI " + format(m.psi) + ", reward " + format(e.record->reward) +
+           "</summary>\n";
     out += picture(e.strip, "what the agent saw in episode " + e.record->id);
     out += picture(e.map, "map of episode " + e.record->id);
     out += "</details>\n";

@@ -13,7 +13,8 @@ struct Picture {
   const char* type = "png";
   std::string bytes;
 };
-/// A PNG file for the page: as a JPEG, a tenth as large, where the build has libjpeg. Errors: those of reading it.
+/// A PNG file for the page: as a JPEG, a tenth as large, where the build has libjpeg. Errors: those of
+/// reading it.
 gsnav::Result<Picture> page_picture(const std::string& png_file);
 
 /// An episode on the page.
@@ -23,6 +24,7 @@ struct Entry {
 };
 
 /// The evaluation as one HTML page that needs nothing else.
-std::string page(const Options& options, const gsnav::MetricsSummary& summary, const std::vector<Entry>& entries);
+std::string page(const Options& options, const gsnav::MetricsSummary& summary,
+                 const std::vector<Entry>& entries);
 
 }  // namespace gsnav_eval

@@ -61,7 +61,8 @@ Status draw(Simulator& sim, const Stage& stage, const Record& record, const std:
     return {};
   };
   if (Status s = replay(sim, episode, record, look); !s) return s;
-  if (Status s = gsnav::io::save_png_rgb8(strip, sheet.bytes(), sheet.width(), sheet.height()); !s) return s;
+  if (Status s = gsnav::io::save_png_rgb8(strip, sheet.bytes(), sheet.width(), sheet.height()); !s)
+    return s;
   const nav_loop::Canvas picture = draw_map(map);
   return gsnav::io::save_png_rgb8(map_file, picture.bytes(), picture.width(), picture.height());
 }

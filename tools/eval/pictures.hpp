@@ -10,10 +10,12 @@ namespace gsnav_eval {
 
 using Simulator = gsnav::Simulator<gsnav::OpenMPBackend>;
 
-/// Plays a record's actions again. Errors: invalid_file where they do not lead to its metrics (another scene or version
-/// made it); what the simulator reports. `look(simulator, step)` is called before the first and after each action.
+/// Plays a record's actions again. Errors: invalid_file where they do not lead to its metrics (another
+/// scene or version made it); what the simulator reports. `look(simulator, step)` is called before the
+/// first and after each action.
 template <class Look>
-gsnav::Status replay(Simulator& sim, const gsnav::PointNavEpisode& episode, const Record& record, const Look& look) {
+gsnav::Status replay(Simulator& sim, const gsnav::PointNavEpisode& episode, const Record& record,
+                     const Look& look) {
   sim.set_rendering(false);
   if (const auto r = sim.reset(episode); !r) return r.status();
   if (gsnav::Status s = look(sim, std::size_t{0}); !s) return s;
@@ -22,15 +24,17 @@ gsnav::Status replay(Simulator& sim, const gsnav::PointNavEpisode& episode, cons
     if (gsnav::Status s = look(sim, i + 1); !s) return s;
   }
   const gsnav::EpisodeMetrics m = sim.metrics();
-  if (m.path_length != record.metrics.path_length || m.psi != record.metrics.psi || m.steps != record.metrics.steps) {
-    return {gsnav::Errc::invalid_file,
-            "episode " + record.id + ": its actions end elsewhere than recorded; was the scene changed?"};
+  if (m.path_length != record.metrics.path_length || m.psi != record.metrics.psi ||
+      m.steps != record.metrics.steps) {
+    return {
+        gsnav::Errc::invalid_file,
+        "episode " + record.id + ": its actions end elsewhere than recorded; was the scene changed?"};
   }
   return {};
 }
 
 /// Writes a strip of four frames, colour above depth, and a map of an episode.
-gsnav::Status draw(Simulator& sim, const Stage& stage, const Record& record, const std::filesystem::path& strip,
-                   const std::filesystem::path& map);
+gsnav::Status draw(Simulator& sim, const Stage& stage, const Record& record,
+                   const std::filesystem::path& strip, const std::filesystem::path& map);
 
 }  // namespace gsnav_eval

@@ -10,8 +10,8 @@
 #include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/io.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "pictures.hpp"
 
 namespace gsnav_eval {
@@ -34,13 +34,16 @@ struct ReplayOptions {
 class Video {
  public:
   Status open(const std::string& path, int width, int height, double rate) {
-    if (path.find_first_of("'\\\n") != std::string::npos) return {Errc::invalid_argument, "--video: quotes in the path"};
+    if (path.find_first_of("'\\\n") != std::string::npos)
+      return {Errc::invalid_argument, "--video: quotes in the path"};
     char command[512];
-    const int n = std::snprintf(command, sizeof command,
-                                "ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s %dx%d -r %g -i - "
-                                "-vf 'pad=ceil(iw/2)*2:ceil(ih/2)*2' -pix_fmt yuv420p '%s'",  // its colour is at half the size
-                                width, height, rate, path.c_str());
-    if (n < 0 || n >= static_cast<int>(sizeof command)) return {Errc::invalid_argument, "--video: the path is too long"};
+    const int n = std::snprintf(
+        command, sizeof command,
+        "ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s %dx%d -r %g -i - "
+        "-vf 'pad=ceil(iw/2)*2:ceil(ih/2)*2' -pix_fmt yuv420p '%s'",  // its colour is at half the size
+        width, height, rate, path.c_str());
+    if (n < 0 || n >= static_cast<int>(sizeof command))
+      return {Errc::invalid_argument, "--video: the path is too long"};
     std::signal(SIGPIPE, SIG_IGN);  // an ffmpeg that ends early is reported, not died of
     pipe_.reset(popen(command, "w"));
     if (pipe_ == nullptr) return {Errc::unsupported, "--video: ffmpeg cannot be run"};
@@ -88,7 +91,8 @@ Status run(const Options& o, const ReplayOptions& r) {
   }
   const auto found = journal->records().find(r.episode);
   if (found == journal->records().end()) {
-    return {Errc::invalid_argument, "--episode " + std::to_string(r.episode) + ": the journal has no such episode"};
+    return {Errc::invalid_argument,
+            "--episode " + std::to_string(r.episode) + ": the journal has no such episode"};
   }
   gsnav::OpenMPBackend backend(o.threads);
   auto sim = Simulator::create(backend, stage->scene, stage->config);
@@ -102,17 +106,20 @@ Status run(const Options& o, const ReplayOptions& r) {
   Track track;
   const auto look = [&](Simulator& s, std::size_t step) -> Status {
     const gsnav::AgentPose& agent = s.agent();
-    track.positions.insert(track.positions.end(), {agent.position.x, agent.position.y, agent.position.z});
+    track.positions.insert(track.positions.end(),
+                           {agent.position.x, agent.position.y, agent.position.z});
     track.yaws.push_back(agent.yaw);
     track.times.push_back(s.clock());
     track.clearances.push_back(s.world().last_step().avatar_clearance);
     if (step % static_cast<std::size_t>(r.every) != 0) return {};
-    gsnav::Camera camera = gsnav::sensor_camera(stage->config.sensors.front(), agent.position, agent.rotation(), agent.pitch);
+    gsnav::Camera camera = gsnav::sensor_camera(stage->config.sensors.front(), agent.position,
+                                                agent.rotation(), agent.pitch);
     if (!r.eye.empty()) {
       const Vec3d eye{r.eye[0], r.eye[1], r.eye[2]}, target{r.target[0], r.target[1], r.target[2]};
       const Vec3d down = target - eye;
       const bool steep = std::hypot(down.x, down.z) < 1e-6 * gsnav::norm(down);
-      camera = gsnav::Camera::look_at(eye, target, steep ? Vec3d{0, 0, -1} : Vec3d{0, 1, 0}, o.width, o.height, o.hfov);
+      camera = gsnav::Camera::look_at(eye, target, steep ? Vec3d{0, 0, -1} : Vec3d{0, 1, 0}, o.width,
+                                      o.height, o.hfov);
     }
     const auto frame = s.render(camera);
     if (!frame) return frame.status();
@@ -137,17 +144,22 @@ int main(int argc, char** argv) try {
   gsnav_eval::Options o;
   gsnav_eval::ReplayOptions r;
   CLI::App app{
-      "Plays an episode of an evaluation once more, by its recorded actions, and writes what a camera sees as PNG files\n"
-      "and where everything was as track.npz. Options of the evaluation come from its journal (--out): what happens\n"
+      "Plays an episode of an evaluation once more, by its recorded actions, and writes what a camera "
+      "sees as PNG files\n"
+      "and where everything was as track.npz. Options of the evaluation come from its journal (--out): "
+      "what happens\n"
       "cannot be another; files may be given where they lie now, and the camera's options may differ."};
   gsnav_eval::add_world_options(app, o);
   app.add_option("--episode", r.episode, "its number, from 0")->capture_default_str();
-  app.add_option("--eye", r.eye, "camera that stands, x y z in metres; without: the agent's own")->expected(3);
+  app.add_option("--eye", r.eye, "camera that stands, x y z in metres; without: the agent's own")
+      ->expected(3);
   app.add_option("--target", r.target, "where that camera looks")->expected(3)->needs("--eye");
   app.get_option("--eye")->needs("--target");
   app.add_option("--frames", r.frames, "folder for pictures and track")->capture_default_str();
   app.add_option("--video", r.video, "an .mp4 in place of PNG files, by ffmpeg");
-  app.add_option("--every", r.every, "every so many actions a frame")->capture_default_str()->check(CLI::Range(1, 100000));
+  app.add_option("--every", r.every, "every so many actions a frame")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   gsnav::Status s;
   if (const auto recorded = gsnav_eval::Journal::recorded_options(o.out); !recorded) {

@@ -6,8 +6,8 @@
 
 #include "../../examples/nav_loop/setup.hpp"
 #include "gsnav/io.hpp"
-#include "gsnav/sim/follower.hpp"
 #include "gsnav/sim.hpp"
+#include "gsnav/sim/follower.hpp"
 
 namespace gsnav_eval {
 
@@ -37,8 +37,8 @@ Result<Stage> prepare(const Options& o) {
   return stage;
 }
 
-Result<Record> play(gsnav::World& world, const Options& o, const gsnav::PointNavEpisode& episode, std::size_t number,
-                    const std::function<Status(const gsnav::World&)>& look) {
+Result<Record> play(gsnav::World& world, const Options& o, const gsnav::PointNavEpisode& episode,
+                    std::size_t number, const std::function<Status(const gsnav::World&)>& look) {
   if (Status s = world.reset(episode); !s) return s;
   if (look) {
     if (Status s = look(world); !s) return s;
@@ -52,7 +52,8 @@ Result<Record> play(gsnav::World& world, const Options& o, const gsnav::PointNav
   if (o.policy == "greedy") {
     gsnav::GreedyFollowerOptions how;
     how.goal_radius = 0.95 * world.config().success_distance;
-    auto made = gsnav::GreedyGeodesicFollower::make(world.navmesh(), episode.goal_position, world.config(), how);
+    auto made =
+        gsnav::GreedyGeodesicFollower::make(world.navmesh(), episode.goal_position, world.config(), how);
     if (!made) return made.status();
     greedy.emplace(std::move(*made));
   }

@@ -21,8 +21,10 @@ struct Stage {
 /// Loads or makes the scene, its NavMesh, people and episodes. Errors name the file or option.
 gsnav::Result<Stage> prepare(const Options& options);
 
-/// Plays episode `number` by the policy. `look`, where it is given, sees the world after reset and after each action.
-gsnav::Result<Record> play(gsnav::World& world, const Options& options, const gsnav::PointNavEpisode& episode,
-                           std::size_t number, const std::function<gsnav::Status(const gsnav::World&)>& look = {});
+/// Plays episode `number` by the policy. `look`, where it is given, sees the world after reset and after
+/// each action.
+gsnav::Result<Record> play(gsnav::World& world, const Options& options,
+                           const gsnav::PointNavEpisode& episode, std::size_t number,
+                           const std::function<gsnav::Status(const gsnav::World&)>& look = {});
 
 }  // namespace gsnav_eval

@@ -12,8 +12,8 @@
 #include "draw.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/io/image_file.hpp"
 #include "gsnav/io.hpp"
+#include "gsnav/io/image_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/nav.hpp"
 #include "options.hpp"
@@ -85,9 +85,8 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   std::printf(
       "%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the "
       "Gaussians\n",
-      printable(o.visible_sets).c_str(), sets->cells(),
-      sets->viewpoints, 100 * sets->mean_share(), sets->cloud_chunks,
-      100 * sets->mean_row_share(cloud.size()));
+      printable(o.visible_sets).c_str(), sets->cells(), sets->viewpoints, 100 * sets->mean_share(),
+      sets->cloud_chunks, 100 * sets->mean_row_share(cloud.size()));
   return {};
 }
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "../common/parse_options.hpp"
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
@@ -15,6 +14,7 @@
 #include <system_error>
 
 #include "../common/navmesh_options.hpp"
+#include "../common/parse_options.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/io.hpp"
 
@@ -225,8 +225,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
           "How many neighbouring Gaussians are seen or not together, up to 32; 0: a whole chunk of 256");
   setting("--visible-face", v.face,
           "Pixels that span 90 degrees: for cameras of no larger focal length");
-  setting("--visible-most", v.most_share,
-          "Write no file where cells of a sample see more than this share: nothing is gained (1: write it)");
+  setting(
+      "--visible-most", v.most_share,
+      "Write no file where cells of a sample see more than this share: nothing is gained (1: write it)");
   setting("--near-plane", v.near_plane, "Of cameras, at most; metres");
   try {
     app.parse(argc, argv);

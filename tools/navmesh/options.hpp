@@ -33,7 +33,7 @@ struct Options {
   gsnav::NavMeshSettings settings;
   int threads = 0;  ///< that share out the tiles; 0: one a core
   gsnav::GaussianNavOptions gaussians;
-  std::vector<double> crop;  ///< x0 y0 z0 x1 y1 z1 in the world; empty: all of the scene
+  std::vector<double> crop;      ///< x0 y0 z0 x1 y1 z1 in the world; empty: all of the scene
   std::optional<double> height;  ///< of the picture; a level's where it is not given
   std::optional<std::size_t> level;
   std::string visible_sets;  ///< file to write; empty: none

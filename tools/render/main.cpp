@@ -43,7 +43,8 @@ struct Options {
                                    visible_sets;
   std::vector<std::string> meshes;
   int width = 0, height = 0, threads = 0, orbit = 4;
-  double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0, lod_pixels = LodChoice{}.pixels;
+  double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0,
+         lod_pixels = LodChoice{}.pixels;
   bool npy = false, png = false, ledger = false;
 };
 
@@ -51,8 +52,8 @@ struct Options {
 struct Scene {
   const LoadReport& report;
   const SceneProfile& profile;
-  const LodTree* tree;          ///< where the profile is lod
-  const VisibleSets* visible;   ///< where some are given
+  const LodTree* tree;         ///< where the profile is lod
+  const VisibleSets* visible;  ///< where some are given
 };
 
 /// Which image --depth names; first hit may carry its tau.
@@ -109,7 +110,8 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
       profiled ? GaussianArrays<B>(backend, cloud, scene.profile) : GaussianArrays<B>(backend, cloud);
   const std::vector<GaussianSet> whole{arrays.set()};
   const GaussianSet whole_here = cloud.set();  // in host memory, as cuts are
-  std::span<const GaussianSet> sets = whole, here = is_host_backend<B> ? sets : std::span(&whole_here, 1);
+  std::span<const GaussianSet> sets = whole,
+                               here = is_host_backend<B> ? sets : std::span(&whole_here, 1);
   SceneDetail detail;
   detail.choice.pixels = o.lod_pixels;
   std::optional<GaussianArrays<B>> merged;
@@ -141,7 +143,8 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
   mesh_arrays.reserve(parts);
   for (const PlacedMeshes& file : meshes) {
     const std::size_t first = mesh_arrays.size();
-    for (std::size_t i = 0; i < file.meshes.size(); ++i) mesh_arrays.emplace_back(backend, file.meshes.view(i));
+    for (std::size_t i = 0; i < file.meshes.size(); ++i)
+      mesh_arrays.emplace_back(backend, file.meshes.view(i));
     for (const TexturedScene::Instance& i : file.instances) {
       const auto id = static_cast<std::uint32_t>(instances.size());
       instances.push_back(mesh_arrays[first + i.part].instance(i.world_from_part, id));
@@ -179,7 +182,8 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
     const auto end = std::chrono::steady_clock::now();
     total_ms += std::chrono::duration<double, std::milli>(end - start).count();
     if (o.ledger) {
-      FrameLedger l = frame_ledger(here, cameras[c], renderer.config(), f.stats[0], &scene.report, &scene.profile, cut);
+      FrameLedger l = frame_ledger(here, cameras[c], renderer.config(), f.stats[0], &scene.report,
+                                   &scene.profile, cut);
       l.unseen = details.unseen();
       if (scene.visible != nullptr) l.unseen_weight = scene.visible->min_weight;
       std::printf("camera %zu:\n%s", c, ledger_text(l).c_str());
@@ -235,7 +239,8 @@ int main(int argc, char** argv) {
                  "Any scene of Gaussians that can be read, or a folder's sibling tiles: DIR/2_0,2_1,2_2")
       ->required();
   app.add_option("--time", o.time, "Moment of a scene that moves (4D Gaussians), seconds");
-  app.add_option("--storage", o.storage, "full; compact: SH in half of the memory; packed: all in a third (docs/formats.md)")
+  app.add_option("--storage", o.storage,
+                 "full; compact: SH in half of the memory; packed: all in a third (docs/formats.md)")
       ->check(CLI::IsMember({"full", "compact", "packed"}))
       ->capture_default_str();
   app.add_option("--cameras", o.cameras,
@@ -249,25 +254,31 @@ int main(int argc, char** argv) {
   app.add_option("--width", o.width, "Image width; with --height, focal lengths scale by it")
       ->check(CLI::Range(1, kMaxImageSide));
   app.add_option("--height", o.height, "Image height")->check(CLI::Range(1, kMaxImageSide));
-  app.add_option("--near", o.near_plane, "Gaussians whose centre is not beyond this are not drawn, metres")
+  app.add_option("--near", o.near_plane,
+                 "Gaussians whose centre is not beyond this are not drawn, metres")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--backend", o.backend, "serial (float32), serial64 (the float64 reference), openmp, cuda")
+  app.add_option("--backend", o.backend,
+                 "serial (float32), serial64 (the float64 reference), openmp, cuda")
       ->check(CLI::IsMember({"serial", "serial64", "openmp", "cuda"}))
       ->capture_default_str();
-  app.add_option("--profile", o.profile, "exact, fast (docs/accuracy.md), or lod: a level of detail for each part of the scene (docs/lod.md)")
+  app.add_option("--profile", o.profile,
+                 "exact, fast (docs/accuracy.md), or lod: a level of detail for each part of the scene "
+                 "(docs/lod.md)")
       ->check(CLI::IsMember({"exact", "fast", "lod"}))
       ->capture_default_str();
-  app.add_option("--lod-error", o.lod_pixels, "Of the profile lod: how far merged Gaussians may be off, pixels")
+  app.add_option("--lod-error", o.lod_pixels,
+                 "Of the profile lod: how far merged Gaussians may be off, pixels")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
-  app.add_option(
-         "--lod-levels", o.lod_levels,
-         "Of the profile lod: shipped, those that a streamed set has, where it has any; built: the tree of its finest")
+  app.add_option("--lod-levels", o.lod_levels,
+                 "Of the profile lod: shipped, those that a streamed set has, where it has any; built: "
+                 "the tree of its finest")
       ->check(CLI::IsMember({"shipped", "built"}))
       ->capture_default_str();
   app.add_option("--visible-sets", o.visible_sets,
-                 "Of the profiles fast and lod: file of what is seen from where (gsnav-navmesh writes it); the rest is "
+                 "Of the profiles fast and lod: file of what is seen from where (gsnav-navmesh writes "
+                 "it); the rest is "
                  "not drawn")
       ->check(CLI::ExistingFile);
   app.add_flag("--ledger", o.ledger,
@@ -278,7 +289,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--mesh", o.meshes,
-                 "Triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj and .ply grey), in the "
+                 "Triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj "
+                 "and .ply grey), in the "
                  "scene's frame, lit from the camera (docs/composition.md)");
   app.add_option("--composite", o.composite, "merged, or hard_depth: Habitat-GS's rule, to compare with")
       ->check(CLI::IsMember({"merged", "hard_depth"}))
@@ -286,7 +298,8 @@ int main(int argc, char** argv) {
   app.add_option("--threads", o.threads, "Threads of the openmp backend; 0: OMP_NUM_THREADS")
       ->check(CLI::Range(0, 1024));
   app.add_option("--depth-near", o.depth_near, "Depth picture: nearest metre of the colour scale");
-  app.add_option("--depth-far", o.depth_far, "Depth picture: farthest; 0: the image's own range (2nd to 98th percentile)");
+  app.add_option("--depth-far", o.depth_far,
+                 "Depth picture: farthest; 0: the image's own range (2nd to 98th percentile)");
   app.add_flag("--npy", o.npy, "Write NPY arrays");
   app.add_flag("--png", o.png, "Write PNG pictures (both are written where neither flag is given)");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
@@ -298,7 +311,8 @@ int main(int argc, char** argv) {
   };
   const std::optional<DepthChoice> depth = parse_depth(o.depth);
   if (!depth) {
-    return fail("--depth " + o.depth + ": use median, expected, accumulated, first or first:TAU, 0 < TAU < 1");
+    return fail("--depth " + o.depth +
+                ": use median, expected, accumulated, first or first:TAU, 0 < TAU < 1");
   }
   if ((o.width > 0) != (o.height > 0)) return fail("--width and --height go together");
 #if defined(GSNAV_HAS_CUDA)
@@ -383,8 +397,9 @@ int main(int argc, char** argv) {
     auto made = io::cached_lod(openmp, o.scene, full, settings);
     if (!made) return fail(made.message());
     lod = std::move(*made);
-    std::printf("%slevels of detail: %zu, %.1f MB, %s\n", terminal && lod->built ? "\r" : "", lod->tree.levels(),
-                static_cast<double>(lod->tree.bytes()) * 1e-6, lod->built ? "built" : "read");
+    std::printf("%slevels of detail: %zu, %.1f MB, %s\n", terminal && lod->built ? "\r" : "",
+                lod->tree.levels(), static_cast<double>(lod->tree.bytes()) * 1e-6,
+                lod->built ? "built" : "read");
     if (!lod->warning.empty()) std::printf("%s\n", lod->warning.c_str());
   }
   std::optional<VisibleSets> visible;

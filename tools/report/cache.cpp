@@ -79,7 +79,8 @@ std::optional<Reference> ReferenceCache::load(const std::string& hash, std::stri
   if (header.width < 1 || header.height < 1 || header.width > kMaxSide || header.height > kMaxSide) {
     return damaged("an impossible image size");
   }
-  const std::uint64_t pixels = static_cast<std::uint64_t>(header.width) * static_cast<std::uint64_t>(header.height);
+  const std::uint64_t pixels =
+      static_cast<std::uint64_t>(header.width) * static_cast<std::uint64_t>(header.height);
   std::uint64_t bytes = sizeof(Header);
   for (std::size_t k = 0; k < 5; ++k) {
     const std::uint64_t full = k == 0 ? 3 * pixels : pixels;
@@ -88,7 +89,8 @@ std::optional<Reference> ReferenceCache::load(const std::string& hash, std::stri
     }
     bytes += header.counts[k] * (k < 3 ? sizeof(float) : 1);
   }
-  if (std::filesystem::file_size(path, error) != bytes || error) return damaged("another size than its header says");
+  if (std::filesystem::file_size(path, error) != bytes || error)
+    return damaged("another size than its header says");
   Reference r;
   r.width = header.width;
   r.height = header.height;
@@ -96,8 +98,9 @@ std::optional<Reference> ReferenceCache::load(const std::string& hash, std::stri
   std::size_t k = 0;
   each_array(r, [&](auto& v) {
     v.resize(header.counts[k++]);
-    in.read(reinterpret_cast<char*>(v.data()),
-            static_cast<std::streamsize>(v.size() * sizeof(typename std::decay_t<decltype(v)>::value_type)));
+    in.read(
+        reinterpret_cast<char*>(v.data()),
+        static_cast<std::streamsize>(v.size() * sizeof(typename std::decay_t<decltype(v)>::value_type)));
   });
   if (!in) return damaged("cannot be read");
   if (checksum(r) != header.checksum) return damaged("checksum does not agree");

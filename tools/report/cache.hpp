@@ -28,15 +28,16 @@ void hash_camera(Hasher& hasher, const gsnav::Camera& camera);
 /// below what is measured with it (a PSNR of 150 dB).
 struct Reference {
   int width = 0, height = 0;
-  std::vector<float> rgb;                ///< [H][W][3]
-  std::vector<float> alpha;              ///< [H][W]
-  std::vector<float> depth;              ///< [H][W] median, metres; empty where the oracle has none
+  std::vector<float> rgb;                     ///< [H][W][3]
+  std::vector<float> alpha;                   ///< [H][W]
+  std::vector<float> depth;                   ///< [H][W] median, metres; empty where the oracle has none
   std::vector<std::uint8_t> undecided;        ///< [H][W] colour may differ by rounding alone; or empty
   std::vector<std::uint8_t> undecided_depth;  ///< [H][W] the median may; or empty
-  std::uint64_t evaluations = 0;  ///< (pixel, Gaussian) pairs blended; 0: not counted
+  std::uint64_t evaluations = 0;              ///< (pixel, Gaussian) pairs blended; 0: not counted
 };
 
-/// References on disk, one file each, named by content hash. A file that is damaged is as good as absent.
+/// References on disk, one file each, named by content hash. A file that is damaged is as good as
+/// absent.
 class ReferenceCache {
  public:
   /// An empty folder name: nothing is kept. The folder is made when the first entry is stored.

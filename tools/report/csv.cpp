@@ -70,7 +70,8 @@ bool next_record(const std::string& text, std::size_t& at, std::vector<std::stri
 std::size_t Row::index(std::string_view column) {
   const auto it = std::find(kColumns.begin(), kColumns.end(), column);
   if (it == kColumns.end()) {
-    throw gsnav::Error(Errc::invalid_argument, "no column \"" + std::string(column) + "\" in the report");
+    throw gsnav::Error(Errc::invalid_argument,
+                       "no column \"" + std::string(column) + "\" in the report");
   }
   return static_cast<std::size_t>(it - kColumns.begin());
 }
@@ -94,7 +95,9 @@ Row& Row::set(std::string_view column, double value) {
   return set(column, std::string(text));
 }
 
-Row& Row::set(std::string_view column, std::uint64_t value) { return set(column, std::to_string(value)); }
+Row& Row::set(std::string_view column, std::uint64_t value) {
+  return set(column, std::to_string(value));
+}
 
 Row& Row::fill(const Row& other) {
   for (std::size_t k = 0; k < fields_.size(); ++k) {

@@ -16,9 +16,9 @@
 
 namespace gsnav_report {
 
-/// Columns of the report in the order they are written; rows of all kinds share them. Lengths are metres,
-/// shares 0 to 1, memory bytes; a field that does not apply is empty. `key` names the measurement
-/// (commit, scene, settings) for --resume.
+/// Columns of the report in the order they are written; rows of all kinds share them. Lengths are
+/// metres, shares 0 to 1, memory bytes; a field that does not apply is empty. `key` names the
+/// measurement (commit, scene, settings) for --resume.
 inline constexpr std::array<std::string_view, 55> kColumns{"kind",
                                                            "machine",
                                                            "commit",
@@ -100,16 +100,16 @@ class Row {
   friend gsnav::Result<std::vector<Row>> parse_csv(const std::string&, const std::string&);
 };
 
-/// Rows of CSV text with any subset of the columns in any order. A last line without its line feed was cut
-/// off while it was written and is left out. Errors: invalid_file naming `source` and the line.
+/// Rows of CSV text with any subset of the columns in any order. A last line without its line feed was
+/// cut off while it was written and is left out. Errors: invalid_file naming `source` and the line.
 gsnav::Result<std::vector<Row>> parse_csv(const std::string& text, const std::string& source);
 
 /// The report's CSV while it grows: every row is on disk once `add` returns, so that the file is valid
 /// whenever the run ends.
 class CsvFile {
  public:
-  /// Starts the file, or with `resume` takes up what is there. Errors: file_not_found (cannot be written),
-  /// invalid_file (resumed file is none of the report's).
+  /// Starts the file, or with `resume` takes up what is there. Errors: file_not_found (cannot be
+  /// written), invalid_file (resumed file is none of the report's).
   static gsnav::Result<CsvFile> open(const std::filesystem::path& path, bool resume);
 
   gsnav::Status add(Row row);

@@ -43,7 +43,8 @@ const std::array<Section, 10> kSections{{
     {"ledger", "Approximation ledger", "What each profile does not compute exactly.", ledger_section},
     {"skinning", "Skinning", "", skinning_section},
     {"sweeps", "Capsule distances and sweeps", "", sweep_section},
-    {"kernels", "Kernels", "Microbenchmarks, with the error against float64 beside the time.", kernel_section},
+    {"kernels", "Kernels", "Microbenchmarks, with the error against float64 beside the time.",
+     kernel_section},
 }};
 
 std::string fact(const char* name, const std::string& value) {

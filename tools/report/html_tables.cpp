@@ -130,13 +130,16 @@ std::string budget_section(const Table& table) {
 std::string target_section(const Table& table) {
   std::vector<std::vector<std::string>> rows;
   for (const TargetCheck& c : check_targets(table)) {
-    rows.push_back({escape(c.scene), escape(c.size), escape(c.backend), escape(c.measure),
-                    c.met() ? "<span class=\"pass\">reached</span>" : "<span class=\"miss\">not reached</span>",
-                    escape(c.note), (c.at_least ? "\u2265 " : "\u2264 ") + format_round(c.limit), format(c.value, 4),
-                    std::to_string(c.views)});
+    rows.push_back(
+        {escape(c.scene), escape(c.size), escape(c.backend), escape(c.measure),
+         c.met() ? "<span class=\"pass\">reached</span>" : "<span class=\"miss\">not reached</span>",
+         escape(c.note), (c.at_least ? "\u2265 " : "\u2264 ") + format_round(c.limit),
+         format(c.value, 4), std::to_string(c.views)});
   }
   if (rows.empty()) return {};
-  return html_table({"scene", "size", "backend", "measure", "verdict", "note", "target", "measured", "views"}, rows, 6);
+  return html_table(
+      {"scene", "size", "backend", "measure", "verdict", "note", "target", "measured", "views"}, rows,
+      6);
 }
 
 std::string settings_section(const Table& table) {

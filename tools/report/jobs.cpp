@@ -15,12 +15,13 @@ using namespace gsnav;
 
 namespace {
 
-constexpr std::array<std::pair<Oracle, std::string_view>, 6> kOracles{{{Oracle::contract, "contract"},
-                                                                       {Oracle::contract_f64, "contract_f64"},
-                                                                       {Oracle::photo4, "photo4"},
-                                                                       {Oracle::ray, "ray"},
-                                                                       {Oracle::ray_key, "ray_key"},
-                                                                       {Oracle::untruncated, "untruncated"}}};
+constexpr std::array<std::pair<Oracle, std::string_view>, 6> kOracles{
+    {{Oracle::contract, "contract"},
+     {Oracle::contract_f64, "contract_f64"},
+     {Oracle::photo4, "photo4"},
+     {Oracle::ray, "ray"},
+     {Oracle::ray_key, "ray_key"},
+     {Oracle::untruncated, "untruncated"}}};
 
 struct Knob {
   std::string name;
@@ -30,7 +31,8 @@ struct Knob {
 
 std::vector<Knob> knobs() {
   std::vector<Knob> all{
-      {"alpha_min", {"0.015625", "0.0078125", "0.00392156862745098", "0.001953125"},
+      {"alpha_min",
+       {"0.015625", "0.0078125", "0.00392156862745098", "0.001953125"},
        {Oracle::contract, Oracle::untruncated}},
       {"transmittance_min", {"1e-2", "1e-3", "1e-4", "1e-5"}, {Oracle::contract, Oracle::untruncated}},
       {"max_sh_degree", {"0", "1", "2", "3"}, {Oracle::contract}},
@@ -48,7 +50,8 @@ bool contains(const std::vector<T>& list, const T& value) {
   return std::find(list.begin(), list.end(), value) != list.end();
 }
 
-void add_profiles(const PlanOptions& o, std::size_t view, const ImageSize& size, std::vector<Setting>& out) {
+void add_profiles(const PlanOptions& o, std::size_t view, const ImageSize& size,
+                  std::vector<Setting>& out) {
   for (const std::string& backend : o.backends) {
     for (const std::string& sensor : o.sensors) {
       const bool first = backend == o.backends.front();
@@ -63,11 +66,13 @@ void add_profiles(const PlanOptions& o, std::size_t view, const ImageSize& size,
         // The report cuts in host memory, and has sets there.
         if ((lod || profile == "visible") && backend == "cuda") continue;
         for (const Oracle q : o.oracles) {
-          if (q == Oracle::photo4 && (lod || (first_sensor && profile == "fast" && contains<std::string>(o.profiles, "lod")))) {
+          if (q == Oracle::photo4 &&
+              (lod || (first_sensor && profile == "fast" && contains<std::string>(o.profiles, "lod")))) {
             s.oracles.push_back(q);  // what levels of detail are judged by, and what they stand beside
           } else if (lod) {
             continue;
-          } else if (q == Oracle::contract || (others && (q == Oracle::contract_f64 || q == Oracle::photo4))) {
+          } else if (q == Oracle::contract ||
+                     (others && (q == Oracle::contract_f64 || q == Oracle::photo4))) {
             s.oracles.push_back(q);
           }
         }
@@ -95,9 +100,13 @@ void add_knobs(const PlanOptions& o, std::size_t view, std::vector<Setting>& out
 
 }  // namespace
 
-std::string to_string(const ImageSize& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
+std::string to_string(const ImageSize& size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
 
-std::string_view to_string(Oracle oracle) noexcept { return kOracles[static_cast<std::size_t>(oracle)].second; }
+std::string_view to_string(Oracle oracle) noexcept {
+  return kOracles[static_cast<std::size_t>(oracle)].second;
+}
 
 Result<Oracle> parse_oracle(const std::string& name) {
   std::string known;
@@ -130,7 +139,9 @@ std::vector<Setting> plan(const PlanOptions& o) {
 
 RenderConfig render_config(const Setting& s, SortOrder order) {
   RenderConfig c;
-  c.outputs = s.sensor == "depth" ? kAlpha | kMedianDepth : s.sensor == "rgb" ? kRgb | kAlpha : kRgb | kAlpha | kMedianDepth;
+  c.outputs = s.sensor == "depth" ? kAlpha | kMedianDepth
+              : s.sensor == "rgb" ? kRgb | kAlpha
+                                  : kRgb | kAlpha | kMedianDepth;
   c.profile = s.profile != "exact" ? Profile::fast : Profile::exact;
   if (s.profile == "lod") c = lod_config(c);
   c.sort_order = order;
@@ -140,12 +151,14 @@ RenderConfig render_config(const Setting& s, SortOrder order) {
   if (s.knob == "max_sh_degree") c.max_sh_degree = static_cast<int>(number);
   if (s.knob == "key_bits") c.key_bits = static_cast<int>(number);
   if (s.knob == "response") {
-    c.response = s.knob_value == "ray" ? Response::ray
-                                       : s.knob_value == "tangent_plane" ? Response::tangent_plane : Response::ewa;
+    c.response = s.knob_value == "ray"             ? Response::ray
+                 : s.knob_value == "tangent_plane" ? Response::tangent_plane
+                                                   : Response::ewa;
   }
   if (s.knob == "compat") {
-    c.compat = s.knob_value == "inria" ? Compat::inria
-                                       : s.knob_value == "gsplat" ? Compat::gsplat : Compat::habitat_gs;
+    c.compat = s.knob_value == "inria"    ? Compat::inria
+               : s.knob_value == "gsplat" ? Compat::gsplat
+                                          : Compat::habitat_gs;
   }
   return c;
 }

@@ -23,9 +23,9 @@ enum class Oracle {
   contract,      ///< float64 in float32-key order: what `exact` rounds
   contract_f64,  ///< float64 in float64 order: what the key's rounding swaps
   photo4,        ///< the contract at 4 times the resolution, box-averaged: the truth of anti-aliasing
-  ray,           ///< exact response and order along each pixel's ray: what EWA and centre order approximate
-  ray_key,       ///< exact response in the contract's order: what EWA alone approximates
-  untruncated,   ///< no alpha cut and no stop: what truncation leaves out
+  ray,      ///< exact response and order along each pixel's ray: what EWA and centre order approximate
+  ray_key,  ///< exact response in the contract's order: what EWA alone approximates
+  untruncated,  ///< no alpha cut and no stop: what truncation leaves out
 };
 std::string_view to_string(Oracle oracle) noexcept;
 /// Errors: invalid_argument with the known names.
@@ -35,9 +35,9 @@ gsnav::Result<Oracle> parse_oracle(const std::string& name);
 struct Setting {
   std::size_t view = 0;
   ImageSize size{};
-  std::string sensor = "rgbd";    ///< rgbd, rgb, depth
-  std::string backend = "openmp"; ///< openmp, serial, cuda
-  std::string profile = "exact";  ///< exact, fast, lod, visible: fast of a visible set
+  std::string sensor = "rgbd";     ///< rgbd, rgb, depth
+  std::string backend = "openmp";  ///< openmp, serial, cuda
+  std::string profile = "exact";   ///< exact, fast, lod, visible: fast of a visible set
   std::string knob = "none", knob_value;
   std::vector<Oracle> oracles;
 };
@@ -53,9 +53,9 @@ struct PlanOptions {
   std::vector<std::string> knob_values{};  ///< of the knobs, only these; empty: all
 };
 
-/// All settings for one scene: profiles by sensor and backend at every size (other backends than the first
-/// as rgbd only), then each knob by itself from `exact`. Settings of one view and size lie together, so that
-/// a reference is made once.
+/// All settings for one scene: profiles by sensor and backend at every size (other backends than the
+/// first as rgbd only), then each knob by itself from `exact`. Settings of one view and size lie
+/// together, so that a reference is made once.
 std::vector<Setting> plan(const PlanOptions& options);
 
 /// Names of all knobs, in the order of the report.

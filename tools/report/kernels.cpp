@@ -19,9 +19,11 @@ namespace {
 using Json = nlohmann::json;
 
 /// Numbers that Google Benchmark itself writes; all others are counters.
-constexpr std::array<std::string_view, 10> kOwn{"family_index", "per_family_instance_index", "repetitions",
-                                                "repetition_index", "threads", "iterations", "real_time",
-                                                "cpu_time", "items_per_second", "bytes_per_second"};
+constexpr std::array<std::string_view, 10> kOwn{"family_index",     "per_family_instance_index",
+                                                "repetitions",      "repetition_index",
+                                                "threads",          "iterations",
+                                                "real_time",        "cpu_time",
+                                                "items_per_second", "bytes_per_second"};
 
 /// How benchmarks name backends: by type.
 constexpr std::array<std::pair<std::string_view, const char*>, 3> kBackends{

@@ -11,8 +11,8 @@
 namespace gsnav_report {
 
 /// Rows of a Google Benchmark JSON: one a benchmark and counter (the counter's name in `error_unit`, its
-/// value in `error_max`), or one without where a benchmark has none. Repetitions count as their median where
-/// the file has it. Errors: file_not_found, invalid_file naming the benchmark.
+/// value in `error_max`), or one without where a benchmark has none. Repetitions count as their median
+/// where the file has it. Errors: file_not_found, invalid_file naming the benchmark.
 gsnav::Result<std::vector<Row>> kernel_rows(const std::filesystem::path& path);
 
 /// The same from text; `source` names it in messages.

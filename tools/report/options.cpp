@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "../common/parse_options.hpp"
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 
+#include "../common/parse_options.hpp"
 #include "gsnav/version.hpp"
 
 namespace gsnav_report {
@@ -26,9 +26,12 @@ std::optional<ImageSize> parse_size(const std::string& text) {
 }
 
 const char kDescription[] =
-    "Measures speed against error: renders scenes from several views with every profile, sensor and backend, "
-    "turns each knob by itself, and judges every image by float64 oracles; skinning, capsule sweeps and kernel "
-    "benchmarks likewise. Writes OUT/report.csv (one row a measurement), OUT/images and OUT/report.html. "
+    "Measures speed against error: renders scenes from several views with every profile, sensor and "
+    "backend, "
+    "turns each knob by itself, and judges every image by float64 oracles; skinning, capsule sweeps and "
+    "kernel "
+    "benchmarks likewise. Writes OUT/report.csv (one row a measurement), OUT/images and "
+    "OUT/report.html. "
     "References are kept by content hash, so that a second run is fast; Ctrl-C leaves a valid CSV that "
     "--resume continues.";
 
@@ -40,36 +43,47 @@ bool Options::wants(const std::string& kind) const {
 
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   Options o;
-  o.commit = std::string("v") + std::to_string(GSNAV_VERSION_MAJOR) + "." + std::to_string(GSNAV_VERSION_MINOR) +
-             "." + std::to_string(GSNAV_VERSION_PATCH);
+  o.commit = std::string("v") + std::to_string(GSNAV_VERSION_MAJOR) + "." +
+             std::to_string(GSNAV_VERSION_MINOR) + "." + std::to_string(GSNAV_VERSION_PATCH);
   std::vector<std::string> sizes{"256x256", "640x480"}, oracles;
   for (const Oracle q : o.oracles) oracles.emplace_back(to_string(q));
   std::string knob_size = "256x256";
 
   CLI::App app{kDescription};
-  const auto list = [&app](const char* name, std::vector<std::string>& values, std::vector<std::string> known,
-                           const char* text) {
-    app.add_option(name, values, text)->delimiter(',')->check(CLI::IsMember(std::move(known)))->capture_default_str();
+  const auto list = [&app](const char* name, std::vector<std::string>& values,
+                           std::vector<std::string> known, const char* text) {
+    app.add_option(name, values, text)
+        ->delimiter(',')
+        ->check(CLI::IsMember(std::move(known)))
+        ->capture_default_str();
   };
-  app.add_option("--scene", o.scenes,
-                 "NAME=PATH[:CAMERAS.json]: a .ply, .sog, SOG folder or a folder's tiles (DIR/2_0,2_1) and an "
-                 "INRIA cameras.json; without cameras four views from outside. Repeatable");
+  app.add_option(
+      "--scene", o.scenes,
+      "NAME=PATH[:CAMERAS.json]: a .ply, .sog, SOG folder or a folder's tiles (DIR/2_0,2_1) and an "
+      "INRIA cameras.json; without cameras four views from outside. Repeatable");
   app.add_flag("--default", o.default_scene, "The embedded flat");
   app.add_option("--data", o.data, "Folder of real scenes (GSNAV_DATA_DIR): those that are there")
       ->check(CLI::ExistingDirectory);
   app.add_option("--flat", o.flats, "Benchmark flats, PLY files with a cameras.json beside them");
-  app.add_option("--visible-sets", o.visible_sets,
-                 "SCENE=FILE: what is seen from where cameras go (gsnav-navmesh --visible-sets writes it); adds the "
-                 "profile visible to that scene: fast, drawing what is in the set of a view's cell. Repeatable");
+  app.add_option(
+      "--visible-sets", o.visible_sets,
+      "SCENE=FILE: what is seen from where cameras go (gsnav-navmesh --visible-sets writes it); adds "
+      "the "
+      "profile visible to that scene: fast, drawing what is in the set of a view's cell. Repeatable");
   app.add_option("--views", o.views, "Views a scene, spread over its cameras")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  app.add_option("--sizes", sizes, "Image sizes, WIDTHxHEIGHT,...")->delimiter(',')->capture_default_str();
-  app.add_option("--knob-size", knob_size, "Image size of the one-knob-at-a-time rows")->capture_default_str();
+  app.add_option("--sizes", sizes, "Image sizes, WIDTHxHEIGHT,...")
+      ->delimiter(',')
+      ->capture_default_str();
+  app.add_option("--knob-size", knob_size, "Image size of the one-knob-at-a-time rows")
+      ->capture_default_str();
   app.add_option("--hfov", o.hfov, "Horizontal field of view, degrees")
       ->check(CLI::Range(1.0, 170.0))
       ->capture_default_str();
-  app.add_option("--near", o.near_plane, "Near plane, metres")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--near", o.near_plane, "Near plane, metres")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   list("--kinds", o.kinds, {"render", "ledger", "skinning", "sweep", "kernel"}, "Kinds of rows");
   list("--sensors", o.sensors, {"rgbd", "rgb", "depth"}, "What is rendered");
   list("--profiles", o.profiles, {"exact", "fast", "lod", "none"},
@@ -79,25 +93,34 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
        "Backends; all but the first with the first sensor only");
   std::vector<std::string> known_knobs = knob_names();
   known_knobs.emplace_back("none");
-  list("--knobs", o.knobs, std::move(known_knobs), "Knobs that are turned by themselves; none: no such rows");
+  list("--knobs", o.knobs, std::move(known_knobs),
+       "Knobs that are turned by themselves; none: no such rows");
   app.add_option("--knob-values", o.knob_values,
                  "Only these values of the knobs, as the CSV has them: packed, 1e-3, ...")
       ->delimiter(',');
-  list("--oracles", oracles, oracles, "Judges: contract of all rows, the others of those that they say something of");
-  app.add_option("--threads", o.threads, "Threads of the openmp backend and of the oracles; 0: OMP_NUM_THREADS")
+  list("--oracles", oracles, oracles,
+       "Judges: contract of all rows, the others of those that they say something of");
+  app.add_option("--threads", o.threads,
+                 "Threads of the openmp backend and of the oracles; 0: OMP_NUM_THREADS")
       ->check(CLI::Range(0, 1024));
-  app.add_option("--runs", o.runs, "Timed runs a setting")->check(CLI::Range(1, 100000))->capture_default_str();
+  app.add_option("--runs", o.runs, "Timed runs a setting")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   app.add_option("--max-seconds", o.max_seconds, "Time spent on timing one setting, three runs at least")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--benchmarks", o.benchmarks, "JSON of bench_kernels (--benchmark_format=json), for kernel rows")
+  app.add_option("--benchmarks", o.benchmarks,
+                 "JSON of bench_kernels (--benchmark_format=json), for kernel rows")
       ->check(CLI::ExistingFile);
   app.add_option("--out", o.out, "Folder of the report")->capture_default_str();
-  app.add_option("--cache", o.cache, "Folder of the references; default OUT/references, `none`: not kept");
-  app.add_option("--docs", o.docs, "Also writes a Markdown page of approximations from the CSV to this file");
+  app.add_option("--cache", o.cache,
+                 "Folder of the references; default OUT/references, `none`: not kept");
+  app.add_option("--docs", o.docs,
+                 "Also writes a Markdown page of approximations from the CSV to this file");
   app.add_option("--commit", o.commit, "What the rows are of")->capture_default_str();
   app.add_option("--machine", o.machine, "What they were measured on; default: the processor's name");
-  app.add_flag("--resume", o.resume, "Keeps the rows of OUT/report.csv and makes those that are missing");
+  app.add_flag("--resume", o.resume,
+               "Keeps the rows of OUT/report.csv and makes those that are missing");
   app.add_flag("--no-html", o.no_html, "No page, the CSV only");
   app.set_version_flag("--version", o.commit);
   try {
@@ -131,7 +154,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   }
 #endif
   if (o.wants("render") && o.scenes.empty() && o.flats.empty() && o.data.empty() && !o.default_scene) {
-    return fail("no scene: name one by --scene, --default, --data or --flat, or leave `render` out of --kinds");
+    return fail(
+        "no scene: name one by --scene, --default, --data or --flat, or leave `render` out of --kinds");
   }
   if (o.cache.empty()) o.cache = o.out + "/references";
   if (o.cache == "none") o.cache.clear();

@@ -22,8 +22,8 @@ struct Options {
   std::vector<std::string> kinds{"render", "ledger", "skinning", "sweep", "kernel"};
   std::vector<std::string> sensors{"rgbd", "rgb", "depth"}, profiles{"exact", "fast", "lod"},
       backends{"openmp", "serial"}, knobs = knob_names(), knob_values;
-  std::vector<Oracle> oracles{Oracle::contract, Oracle::contract_f64, Oracle::photo4, Oracle::ray,
-                              Oracle::ray_key, Oracle::untruncated};
+  std::vector<Oracle> oracles{Oracle::contract, Oracle::contract_f64, Oracle::photo4,
+                              Oracle::ray,      Oracle::ray_key,      Oracle::untruncated};
   int threads = 0, runs = 15;
   double max_seconds = 3;  ///< of timing one setting
   std::string out = "report", cache, docs, benchmarks, commit, machine;
@@ -32,7 +32,8 @@ struct Options {
   bool wants(const std::string& kind) const;
 };
 
-/// Parses the command line. Nothing: `exit_code` says how to end (help was asked for, or an error printed).
+/// Parses the command line. Nothing: `exit_code` says how to end (help was asked for, or an error
+/// printed).
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
 
 }  // namespace gsnav_report

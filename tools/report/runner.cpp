@@ -47,7 +47,8 @@ Result<std::vector<SceneSpec>> scene_specs(const Options& o) {
   }
   std::map<std::string, SceneSpec*> names;
   for (SceneSpec& spec : specs) {
-    if (!names.emplace(spec.name, &spec).second) return {Errc::invalid_argument, "two scenes are called " + spec.name};
+    if (!names.emplace(spec.name, &spec).second)
+      return {Errc::invalid_argument, "two scenes are called " + spec.name};
   }
   for (const std::string& text : o.visible_sets) {
     const std::size_t equals = text.find('=');
@@ -55,11 +56,13 @@ Result<std::vector<SceneSpec>> scene_specs(const Options& o) {
     if (equals == text.npos || scene == names.end()) {
       std::string known;
       for (const auto& [name, spec] : names) known.append(known.empty() ? "" : ", ").append(name);
-      return {Errc::invalid_argument, "--visible-sets " + text + ": use SCENE=FILE; scenes are " + known};
+      return {Errc::invalid_argument,
+              "--visible-sets " + text + ": use SCENE=FILE; scenes are " + known};
     }
     scene->second->visible_sets = text.substr(equals + 1);
   }
-  if (specs.empty()) return {Errc::file_not_found, "--data " + o.data + ": none of the known scenes is there"};
+  if (specs.empty())
+    return {Errc::file_not_found, "--data " + o.data + ": none of the known scenes is there"};
   return specs;
 }
 
@@ -75,19 +78,22 @@ Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
   if (!specs) return specs.status();
   const ReferenceCache cache(o.cache);
   // Until a scene is loaded it counts as one of the largest plan.
-  const std::size_t each = plan(plan_options(o, static_cast<std::size_t>(o.views), 3, !o.visible_sets.empty())).size();
+  const std::size_t each =
+      plan(plan_options(o, static_cast<std::size_t>(o.views), 3, !o.visible_sets.empty())).size();
   std::size_t total = each * specs->size(), done = 0;
   Progress progress(total);
   for (const SceneSpec& spec : *specs) {
     const Result<Scene> scene = load(spec, o.views);
     if (!scene) return scene.status();
-    const std::vector<Setting> settings = plan(plan_options(o, scene->views.size(), scene->cloud.sh_degree, scene->visible.has_value()));
+    const std::vector<Setting> settings =
+        plan(plan_options(o, scene->views.size(), scene->cloud.sh_degree, scene->visible.has_value()));
     progress.set_total(total -= each - settings.size());
     SceneRunner runner(o, *scene, cache, csv, stamp);
     for (const Setting& s : settings) {
       if (interrupted()) return csv.save();
-      progress.show(done++, scene->name + " " + to_string(s.size) + " " + scene->views[s.view].name + " " + s.backend +
-                                " " + s.profile + (s.knob == "none" ? "" : " " + s.knob + " " + s.knob_value));
+      progress.show(done++, scene->name + " " + to_string(s.size) + " " + scene->views[s.view].name +
+                                " " + s.backend + " " + s.profile +
+                                (s.knob == "none" ? "" : " " + s.knob + " " + s.knob_value));
       if (Status status = runner.run(s); !status) {
         return {status.code(), "scene " + scene->name + ": " + status.message()};
       }
@@ -127,7 +133,9 @@ Status run_report(const Options& o) {
   Result<CsvFile> csv = CsvFile::open(path, o.resume);
   if (!csv) return csv.status();
   Row stamp;
-  stamp.set("machine", o.machine.empty() ? machine_name() : o.machine).set("commit", o.commit).set("date", today());
+  stamp.set("machine", o.machine.empty() ? machine_name() : o.machine)
+      .set("commit", o.commit)
+      .set("date", today());
 
   watch_interrupts();
   if (Status s = add_rows(o, *csv, stamp, "ledger", [] { return ledger_rows(); }); !s) return s;
@@ -137,14 +145,17 @@ Status run_report(const Options& o) {
   SkinningOptions skinning;
   skinning.threads = o.threads;
   skinning.runs = o.runs;
-  if (Status s = add_rows(o, *csv, stamp, "skinning", [&] { return skinning_rows(skinning); }); !s) return s;
+  if (Status s = add_rows(o, *csv, stamp, "skinning", [&] { return skinning_rows(skinning); }); !s)
+    return s;
   SweepOptions sweep;
   sweep.runs = o.runs;
   if (Status s = add_rows(o, *csv, stamp, "sweep", [&] { return sweep_rows(sweep); }); !s) return s;
   if (!o.benchmarks.empty()) {
-    if (Status s = add_rows(o, *csv, stamp, "kernel", [&] { return kernel_rows(o.benchmarks); }); !s) return s;
+    if (Status s = add_rows(o, *csv, stamp, "kernel", [&] { return kernel_rows(o.benchmarks); }); !s)
+      return s;
   }
-  if (interrupted()) std::fprintf(stderr, "\ninterrupted: %s holds the rows so far; --resume goes on\n", path.c_str());
+  if (interrupted())
+    std::fprintf(stderr, "\ninterrupted: %s holds the rows so far; --resume goes on\n", path.c_str());
   const Result<Table> table = Table::read(path);
   if (!table) return table.status();
   if (!o.no_html) {

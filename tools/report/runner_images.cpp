@@ -28,13 +28,17 @@ double gain_for(double largest) {
 Result<std::string> save_comparison(const std::filesystem::path& path, const std::vector<float>& rgb,
                                     const Reference& r) {
   const auto width = static_cast<std::size_t>(r.width), height = static_cast<std::size_t>(r.height);
-  if (rgb.size() != r.rgb.size()) return {Errc::invalid_argument, "save_comparison: images differ in size"};
+  if (rgb.size() != r.rgb.size())
+    return {Errc::invalid_argument, "save_comparison: images differ in size"};
   std::vector<float> difference(rgb.size());
-  for (std::size_t i = 0; i < rgb.size(); ++i) difference[i] = std::abs(display(rgb[i]) - display(r.rgb[i]));
-  const double gain = gain_for(static_cast<double>(*std::max_element(difference.begin(), difference.end())));
+  for (std::size_t i = 0; i < rgb.size(); ++i)
+    difference[i] = std::abs(display(rgb[i]) - display(r.rgb[i]));
+  const double gain =
+      gain_for(static_cast<double>(*std::max_element(difference.begin(), difference.end())));
   const Result<eval::Flip> flip = eval::flip(r.rgb, rgb, r.width, r.height);
   if (!flip) return flip.status();
-  const double full = 1 / gain_for(static_cast<double>(*std::max_element(flip->map.begin(), flip->map.end())));
+  const double full =
+      1 / gain_for(static_cast<double>(*std::max_element(flip->map.begin(), flip->map.end())));
   const std::vector<std::uint8_t> map = eval::colorize_error(flip->map, static_cast<float>(full));
 
   std::vector<std::uint8_t> out(9 * width * height);

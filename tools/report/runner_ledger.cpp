@@ -7,9 +7,9 @@
 #include <string>
 
 #include "gsnav/math/functions.hpp"
+#include "gsnav/render.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/render.hpp"
 
 namespace gsnav_report {
 
@@ -29,7 +29,8 @@ double exp2_error() {
   return worst;
 }
 
-Row entry(const char* profile, const char* name, const char* knob, double error, const char* unit, const char* note) {
+Row entry(const char* profile, const char* name, const char* knob, double error, const char* unit,
+          const char* note) {
   Row row;
   row.set("kind", "ledger").set("profile", profile).set("name", name).set("knob", knob);
   row.set("error_max", error).set("error_unit", unit);

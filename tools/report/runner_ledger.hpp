@@ -7,8 +7,8 @@
 
 namespace gsnav_report {
 
-/// What each profile approximates beyond the contract, and by how much: a bound, or measured here. A profile
-/// that changes what it approximates changes its entry.
+/// What each profile approximates beyond the contract, and by how much: a bound, or measured here. A
+/// profile that changes what it approximates changes its entry.
 std::vector<Row> ledger_rows();
 
 }  // namespace gsnav_report

@@ -33,7 +33,8 @@ Status judge_depth(const Frames<float>& f, const Reference& r, Row& row) {
   for (std::size_t i = 0; i < undecided.size(); ++i) undecided[i] |= r.undecided[i];
   eval::DepthErrorOptions options;
   options.max_range = kDepthRange;
-  const Result<eval::DepthError> e = eval::depth_error(r.depth, f.median_depth, r.alpha, undecided, options);
+  const Result<eval::DepthError> e =
+      eval::depth_error(r.depth, f.median_depth, r.alpha, undecided, options);
   if (!e) return e.status();
   row.set("depth_p50", e->p50).set("depth_p99", e->p99).set("depth_max", e->max);
   row.set("depth_absrel_p90", e->abs_rel_p90).set("depth_missing", e->missing);

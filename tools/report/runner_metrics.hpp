@@ -17,9 +17,9 @@ inline constexpr double kDepthRange = 10.0;
 /// Judges images, and remembers: sensors and backends that give the same bits are judged once.
 class Judge {
  public:
-  /// Fills the error columns of `row` with what `frames` (one camera; images not rendered are empty) differs
-  /// by from `reference`, which `hash` names. Pixels that rounding alone decides are left out of all but
-  /// PSNR, SSIM and FLIP.
+  /// Fills the error columns of `row` with what `frames` (one camera; images not rendered are empty)
+  /// differs by from `reference`, which `hash` names. Pixels that rounding alone decides are left out of
+  /// all but PSNR, SSIM and FLIP.
   gsnav::Status operator()(const gsnav::Frames<float>& frames, const Reference& reference,
                            const std::string& hash, Row& row);
 

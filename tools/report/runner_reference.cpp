@@ -5,14 +5,15 @@
 #include <utility>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/eval/oracle.hpp"
 #include "gsnav/eval.hpp"
+#include "gsnav/eval/oracle.hpp"
 
 namespace gsnav_report {
 
 using namespace gsnav;
 
-std::string reference_hash(const std::string& scene_hash, const Camera& camera, Oracle oracle, SortOrder order) {
+std::string reference_hash(const std::string& scene_hash, const Camera& camera, Oracle oracle,
+                           SortOrder order) {
   Hasher h;
   h.text(scene_hash);
   hash_camera(h, camera);
@@ -22,8 +23,8 @@ std::string reference_hash(const std::string& scene_hash, const Camera& camera, 
   return h.hex();
 }
 
-Result<Reference> render_reference(const GaussianSet& set, const Camera& camera, Oracle oracle, SortOrder order,
-                                   int threads) {
+Result<Reference> render_reference(const GaussianSet& set, const Camera& camera, Oracle oracle,
+                                   SortOrder order, int threads) {
   OpenMPBackend backend(threads);
   const std::span<const GaussianSet> sets(&set, 1);
   eval::OracleConfig config;

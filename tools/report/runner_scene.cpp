@@ -20,17 +20,21 @@ namespace gsnav_report {
 using namespace gsnav;
 
 Camera SceneRunner::camera(const Setting& s) const {
-  return camera_of(scene_.views[s.view], s.size.width, s.size.height, options_.hfov, options_.near_plane);
+  return camera_of(scene_.views[s.view], s.size.width, s.size.height, options_.hfov,
+                   options_.near_plane);
 }
 
-int SceneRunner::threads(const Setting& s) const { return s.backend == "openmp" ? openmp_.threads() : 1; }
+int SceneRunner::threads(const Setting& s) const {
+  return s.backend == "openmp" ? openmp_.threads() : 1;
+}
 
 std::string SceneRunner::key(const Setting& s, Oracle oracle) const {
   Hasher h;
   h.text(scene_.hash);
   hash_camera(h, camera(s));
-  for (const std::string& t : {stamp_.get("commit"), stamp_.get("machine"), scene_.name, s.sensor, s.backend,
-                               s.profile, s.knob, s.knob_value, std::string(to_string(oracle))}) {
+  for (const std::string& t :
+       {stamp_.get("commit"), stamp_.get("machine"), scene_.name, s.sensor, s.backend, s.profile, s.knob,
+        s.knob_value, std::string(to_string(oracle))}) {
     h.text(t);
   }
   h.value(threads(s));
@@ -39,8 +43,8 @@ std::string SceneRunner::key(const Setting& s, Oracle oracle) const {
 }
 
 template <class B>
-Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s, const GaussianCloud& cloud,
-                                                    int runs) {
+Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s,
+                                                    const GaussianCloud& cloud, int runs) {
   Outcome out;
   const GaussianArrays<B> arrays(backend, cloud);
   GaussianSet set = arrays.set();
@@ -88,7 +92,8 @@ Result<const LodTree*> SceneRunner::tree_of(const Setting& s) {
     } else {
       Result<io::CachedLod> cached = io::cached_lod(openmp_, scene_.path, scene_.cloud);
       if (!cached) return cached.status();
-      if (!cached->warning.empty()) std::fprintf(stderr, "\ngsnav-report: warning: %s\n", cached->warning.c_str());
+      if (!cached->warning.empty())
+        std::fprintf(stderr, "\ngsnav-report: warning: %s\n", cached->warning.c_str());
       tree_ = std::move(cached->tree);
     }
   }
@@ -100,10 +105,12 @@ std::uint64_t SceneRunner::row_bytes(const GaussianCloud& cloud, const std::stri
   return sizeof(float) * (11 + (sensor == "depth" ? 0 : colors));
 }
 
-Result<SceneRunner::Outcome> SceneRunner::render(const Setting& s, const GaussianCloud& cloud, int runs) {
+Result<SceneRunner::Outcome> SceneRunner::render(const Setting& s, const GaussianCloud& cloud,
+                                                 int runs) {
 #if defined(GSNAV_HAS_CUDA)
   if (s.backend == "cuda") {
-    if (CudaBackend::device_count() == 0) return {Errc::backend_failure, "--backends cuda: no GPU, or no driver"};
+    if (CudaBackend::device_count() == 0)
+      return {Errc::backend_failure, "--backends cuda: no GPU, or no driver"};
     CudaBackend cuda;
     return render_on(cuda, s, cloud, runs);
   }
@@ -176,10 +183,13 @@ Status SceneRunner::run(const Setting& s) {
     row.set("width", s.size.width).set("height", s.size.height).set("sensor", s.sensor);
     row.set("backend", s.backend).set("threads", threads(s)).set("profile", s.profile);
     row.set("knob", s.knob).set("knob_value", s.knob_value).set("oracle", std::string(to_string(q)));
-    if (Status judged = judge_(outcome->frames, *named->reference, named->hash, row); !judged) return judged;
+    if (Status judged = judge_(outcome->frames, *named->reference, named->hash, row); !judged)
+      return judged;
     const RenderStats& stats = outcome->frames.stats[0];
     row.set("time_p50_ms", outcome->timing.p50_ms).set("time_p99_ms", outcome->timing.p99_ms);
-    row.set("gaussians", stats.gaussians).set("visible", stats.visible).set("pairs", stats.tile_intersections);
+    row.set("gaussians", stats.gaussians)
+        .set("visible", stats.visible)
+        .set("pairs", stats.tile_intersections);
     if (outcome->culled.rows != 0)
       row.set("touched", outcome->culled.touched).set("emitting", outcome->culled.emitting);
     row.set("row_bytes", row_bytes(*cloud, s.sensor)).set("cloud_bytes", std::uint64_t{cloud_bytes});
@@ -200,13 +210,14 @@ Status SceneRunner::run(const Setting& s) {
 Status SceneRunner::save_worst_view(const ImageSize& size, const std::string& profile) {
   Row* worst = nullptr;
   for (Row& row : csv_.rows()) {
-    const bool candidate = row.get("scene") == scene_.name && row.get("commit") == stamp_.get("commit") &&
-                           row.get("kind") == "render" && row.get("knob") == "none" &&
-                           row.get("oracle") == "contract" && row.get("profile") == profile &&
-                           row.get("backend") == options_.backends.front() && row.get("sensor") != "depth" &&
-                           row.get("width") == std::to_string(size.width) &&
-                           row.get("height") == std::to_string(size.height) && row.number("rgb_max");
-    if (candidate && (worst == nullptr || *row.number("rgb_max") > *worst->number("rgb_max"))) worst = &row;
+    const bool candidate =
+        row.get("scene") == scene_.name && row.get("commit") == stamp_.get("commit") &&
+        row.get("kind") == "render" && row.get("knob") == "none" && row.get("oracle") == "contract" &&
+        row.get("profile") == profile && row.get("backend") == options_.backends.front() &&
+        row.get("sensor") != "depth" && row.get("width") == std::to_string(size.width) &&
+        row.get("height") == std::to_string(size.height) && row.number("rgb_max");
+    if (candidate && (worst == nullptr || *row.number("rgb_max") > *worst->number("rgb_max")))
+      worst = &row;
   }
   if (worst == nullptr || !worst->get("image").empty()) return {};
   Setting s;
@@ -224,9 +235,11 @@ Status SceneRunner::save_worst_view(const ImageSize& size, const std::string& pr
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   const std::string file = scene_.name + "_" + to_string(size) + "_" + profile + ".png";
-  const Result<std::string> text = save_comparison(folder / file, outcome->frames.rgb, *named->reference);
+  const Result<std::string> text =
+      save_comparison(folder / file, outcome->frames.rgb, *named->reference);
   if (!text) return text.status();
-  worst->set("image", (images / file).string()).set("note", worst->get("note") + "; worst view: " + *text);
+  worst->set("image", (images / file).string())
+      .set("note", worst->get("note") + "; worst view: " + *text);
   return {};
 }
 

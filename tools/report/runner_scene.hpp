@@ -30,13 +30,21 @@ namespace gsnav_report {
 class SceneRunner {
  public:
   /// `stamp` holds the columns that all rows of the run share. All arguments must outlive it.
-  SceneRunner(const Options& options, const Scene& scene, const ReferenceCache& cache, CsvFile& csv, const Row& stamp)
-      : options_(options), scene_(scene), cache_(cache), csv_(csv), stamp_(stamp), openmp_(options.threads) {}
+  SceneRunner(const Options& options, const Scene& scene, const ReferenceCache& cache, CsvFile& csv,
+              const Row& stamp)
+      : options_(options),
+        scene_(scene),
+        cache_(cache),
+        csv_(csv),
+        stamp_(stamp),
+        openmp_(options.threads) {}
 
-  /// Renders a setting and adds a row for each of its judges; rows that are there already are not made again.
+  /// Renders a setting and adds a row for each of its judges; rows that are there already are not made
+  /// again.
   gsnav::Status run(const Setting& setting);
 
-  /// Pictures of the worst view of each size and profile, by the largest colour error among the rows there.
+  /// Pictures of the worst view of each size and profile, by the largest colour error among the rows
+  /// there.
   gsnav::Status save_worst_views();
 
  private:
@@ -58,11 +66,13 @@ class SceneRunner {
   /// What a frame of a sensor reads of one Gaussian.
   static std::uint64_t row_bytes(const gsnav::GaussianCloud& cloud, const std::string& sensor) noexcept;
   std::string key(const Setting& s, Oracle oracle) const;
-  /// The scene's levels of detail: read from beside its file, or built. Null: the setting does not ask for them.
+  /// The scene's levels of detail: read from beside its file, or built. Null: the setting does not ask
+  /// for them.
   gsnav::Result<const gsnav::LodTree*> tree_of(const Setting& s);
   gsnav::Result<Outcome> render(const Setting& s, const gsnav::GaussianCloud& cloud, int runs);
   template <class B>
-  gsnav::Result<Outcome> render_on(B& backend, const Setting& s, const gsnav::GaussianCloud& cloud, int runs);
+  gsnav::Result<Outcome> render_on(B& backend, const Setting& s, const gsnav::GaussianCloud& cloud,
+                                   int runs);
   gsnav::Result<Named> reference(const Setting& s, Oracle oracle);
   gsnav::Status save_worst_view(const ImageSize& size, const std::string& profile);
 

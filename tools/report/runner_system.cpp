@@ -88,13 +88,15 @@ void Progress::show(std::size_t done, const std::string& what) {
   last_ = now;
   const double elapsed = now - begin_;
   std::string left = "?";
-  if (done > 0) left = clock_text(elapsed / static_cast<double>(done) * static_cast<double>(total_ - done));
+  if (done > 0)
+    left = clock_text(elapsed / static_cast<double>(done) * static_cast<double>(total_ - done));
   std::fprintf(stderr, "%s[%zu/%zu] %s, about %s left: %s%s", terminal_ ? "\r\033[K" : "", done, total_,
                clock_text(elapsed).c_str(), left.c_str(), what.c_str(), terminal_ ? "" : "\n");
 }
 
 void Progress::finish() {
-  std::fprintf(stderr, "%s[%zu] done in %s\n", terminal_ ? "\r\033[K" : "", total_, clock_text(seconds_now() - begin_).c_str());
+  std::fprintf(stderr, "%s[%zu] done in %s\n", terminal_ ? "\r\033[K" : "", total_,
+               clock_text(seconds_now() - begin_).c_str());
 }
 
 }  // namespace gsnav_report

@@ -12,17 +12,19 @@ std::string machine_name();
 /// Today, UTC, YYYY-MM-DD.
 std::string today();
 
-/// Greatest resident memory of the process since `reset_peak_memory`, bytes; 0 where the system does not say.
+/// Greatest resident memory of the process since `reset_peak_memory`, bytes; 0 where the system does not
+/// say.
 std::uint64_t peak_memory();
-/// Starts peak_memory anew where the system allows it (Linux); elsewhere the peak is that of the whole run.
+/// Starts peak_memory anew where the system allows it (Linux); elsewhere the peak is that of the whole
+/// run.
 void reset_peak_memory();
 
 /// From here on the first Ctrl-C only raises `interrupted`; a second one ends the process.
 void watch_interrupts();
 bool interrupted() noexcept;
 
-/// A line of progress: done, elapsed, what is left by the pace so far. One line that changes on a terminal,
-/// else a line every ten seconds.
+/// A line of progress: done, elapsed, what is left by the pace so far. One line that changes on a
+/// terminal, else a line every ten seconds.
 class Progress {
  public:
   explicit Progress(std::size_t total);

@@ -9,7 +9,8 @@
 
 namespace gsnav_report {
 
-/// Value below or at which the share `q` of the values lies (nearest rank); 0 for none. Reorders `values`.
+/// Value below or at which the share `q` of the values lies (nearest rank); 0 for none. Reorders
+/// `values`.
 inline double percentile(std::vector<double>& values, double q) {
   if (values.empty()) return 0;
   const double rank = std::ceil(q * static_cast<double>(values.size())) - 1;
@@ -23,8 +24,8 @@ struct Timing {
   int runs = 0;
 };
 
-/// Times `f` `runs` times after two runs that do not count (buffers reach their size, caches fill). Stops
-/// after three runs at the earliest once `budget_s` seconds are spent.
+/// Times `f` `runs` times after two runs that do not count (buffers reach their size, caches fill).
+/// Stops after three runs at the earliest once `budget_s` seconds are spent.
 template <class F>
 Timing measure(const F& f, int runs, double budget_s) {
   using Clock = std::chrono::steady_clock;
@@ -33,7 +34,8 @@ Timing measure(const F& f, int runs, double budget_s) {
   f();
   if (seconds(Clock::now() - begin) < budget_s) f();
   std::vector<double> ms;
-  while (static_cast<int>(ms.size()) < runs && (ms.size() < 3 || seconds(Clock::now() - begin) < budget_s)) {
+  while (static_cast<int>(ms.size()) < runs &&
+         (ms.size() < 3 || seconds(Clock::now() - begin) < budget_s)) {
     const auto start = Clock::now();
     f();
     ms.push_back(1e3 * seconds(Clock::now() - start));

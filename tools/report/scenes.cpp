@@ -28,14 +28,15 @@ bool is_there(const std::filesystem::path& p) {
   return std::filesystem::exists(p, error);
 }
 
-/// Four views from outside, a quarter turn apart: what a scene without cameras is seen from. They look at
-/// the median of the means from 1.5 times the radius that holds nine tenths of them, y up.
+/// Four views from outside, a quarter turn apart: what a scene without cameras is seen from. They look
+/// at the median of the means from 1.5 times the radius that holds nine tenths of them, y up.
 std::vector<ViewPoint> orbit(const GaussianCloud& cloud) {
   Vec3d center;
   std::vector<double> values(cloud.size());
   if (values.empty()) return {look("orbit0", {0, 0, -1}, {}, {0, 1, 0})};
   const auto quantile = [&](double q) {
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+    const auto at =
+        values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
     return *at;
   };
@@ -63,7 +64,8 @@ Result<SceneSpec> parse_scene(const std::string& text) {
   }
   SceneSpec spec{text.substr(0, equals), text.substr(equals + 1), {}};
   const std::size_t colon = spec.path.rfind(':');
-  if (colon != spec.path.npos && spec.path.size() > 5 && spec.path.substr(spec.path.size() - 5) == ".json") {
+  if (colon != spec.path.npos && spec.path.size() > 5 &&
+      spec.path.substr(spec.path.size() - 5) == ".json") {
     spec.cameras = spec.path.substr(colon + 1);
     spec.path.resize(colon);
     if (!is_there(spec.cameras)) {
@@ -75,14 +77,16 @@ Result<SceneSpec> parse_scene(const std::string& text) {
 
 SceneSpec default_flat() {
   SceneSpec spec{"embedded_flat", {}, {}};
-  for (const DefaultView& v : default_scene_views()) spec.views.push_back(look(v.name, v.eye, v.target, {0, 1, 0}));
+  for (const DefaultView& v : default_scene_views())
+    spec.views.push_back(look(v.name, v.eye, v.target, {0, 1, 0}));
   return spec;
 }
 
 Result<SceneSpec> benchmark_flat(const std::string& ply) {
   const std::filesystem::path path(ply), cameras = path.parent_path() / "cameras.json";
   for (const auto& p : {path, cameras}) {
-    if (!is_there(p)) return {Errc::file_not_found, "--flat " + ply + ": " + p.string() + " does not exist"};
+    if (!is_there(p))
+      return {Errc::file_not_found, "--flat " + ply + ": " + p.string() + " does not exist"};
   }
   return SceneSpec{path.stem().string(), ply, cameras.string()};
 }
@@ -102,8 +106,9 @@ std::vector<SceneSpec> data_scenes(const std::filesystem::path& folder) {
   if (is_there(ruin)) {
     SceneSpec spec{"fyoxy_ruin", ruin.string(), {}};
     const Vec3d up{0, -1, 0};  // the scan is y down, about one unit a metre
-    spec.views = {look("wall", {0, -1, -2.5}, {2, -1.2, 0}, up), look("yard", {2.2, -1.5, -5}, {0.5, -1, 0}, up),
-                  look("corner", {-3, -1.5, -5}, {0, -1, 0}, up), look("fence", {0, -1.4, -3}, {-3, -1.2, 0}, up)};
+    spec.views = {
+        look("wall", {0, -1, -2.5}, {2, -1.2, 0}, up), look("yard", {2.2, -1.5, -5}, {0.5, -1, 0}, up),
+        look("corner", {-3, -1.5, -5}, {0, -1, 0}, up), look("fence", {0, -1.4, -3}, {-3, -1.2, 0}, up)};
     out.push_back(std::move(spec));
   }
   return out;
@@ -116,7 +121,8 @@ Result<Scene> load(const SceneSpec& spec, int views) {
   if (!spec.cameras.empty()) {  // before the scene, which may take long
     const Result<std::vector<Camera>> cameras = io::load_cameras(spec.cameras);
     if (!cameras) return Status(cameras.code(), "scene " + spec.name + ": " + cameras.message());
-    if (cameras->empty()) return {Errc::invalid_file, "scene " + spec.name + ": " + spec.cameras + " holds no camera"};
+    if (cameras->empty())
+      return {Errc::invalid_file, "scene " + spec.name + ": " + spec.cameras + " holds no camera"};
     for (const Camera& c : *cameras) {
       all.push_back({std::string("camera") + std::to_string(all.size()), c.viewmat});
     }
@@ -133,7 +139,9 @@ Result<Scene> load(const SceneSpec& spec, int views) {
   scene.path = spec.path;
   if (!spec.visible_sets.empty()) {
     Result<VisibleSets> sets = io::load_visible_sets(spec.visible_sets, scene.cloud);
-    if (!sets) return Status(sets.code(), "--visible-sets " + spec.name + "=" + spec.visible_sets + ": " + sets.message());
+    if (!sets)
+      return Status(sets.code(),
+                    "--visible-sets " + spec.name + "=" + spec.visible_sets + ": " + sets.message());
     scene.visible = std::move(*sets);
   }
   scene.hash = content_hash(scene.cloud);

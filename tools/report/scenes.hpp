@@ -22,18 +22,18 @@ struct ViewPoint {
 /// A scene to be measured, not yet loaded.
 struct SceneSpec {
   std::string name;
-  std::string path;                 ///< what io::load_scene takes; empty: the embedded flat
-  std::string cameras;              ///< INRIA cameras.json; empty: `views`, or views made from the cloud
+  std::string path;     ///< what io::load_scene takes; empty: the embedded flat
+  std::string cameras;  ///< INRIA cameras.json; empty: `views`, or views made from the cloud
   std::vector<ViewPoint> views{};
-  std::string visible_sets{};       ///< a file of them; empty: none
+  std::string visible_sets{};  ///< a file of them; empty: none
 };
 
 struct Scene {
   std::string name;
   gsnav::GaussianCloud cloud;
-  std::string path;              ///< its spec's
+  std::string path;  ///< its spec's
   std::optional<gsnav::VisibleSets> visible;
-  std::string hash;              ///< content_hash of the cloud
+  std::string hash;  ///< content_hash of the cloud
   std::vector<ViewPoint> views;
 };
 

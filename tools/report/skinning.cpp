@@ -50,8 +50,8 @@ struct Posed {
   Mat3d rotation{};
 };
 
-/// Blends all joints with a weight in double: the definition, with the kernel's rule for blends that have no
-/// orientation.
+/// Blends all joints with a weight in double: the definition, with the kernel's rule for blends that
+/// have no orientation.
 Posed blend(const Matrices& joints, const double* weights, const Vec3d& mean) {
   Mat3d linear{};
   Vec3d shift{};
@@ -70,8 +70,9 @@ Posed blend(const Matrices& joints, const double* weights, const Vec3d& mean) {
 void truncate_weights(const double* dense, std::size_t joints, std::size_t k, std::vector<double>& out) {
   std::vector<std::size_t> order(joints);
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(k), order.end(),
-                    [&](std::size_t a, std::size_t b) { return dense[a] != dense[b] ? dense[a] > dense[b] : a < b; });
+  std::partial_sort(
+      order.begin(), order.begin() + static_cast<std::ptrdiff_t>(k), order.end(),
+      [&](std::size_t a, std::size_t b) { return dense[a] != dense[b] ? dense[a] > dense[b] : a < b; });
   out.assign(joints, 0.0);
   double sum = 0;
   for (std::size_t j = 0; j < k; ++j) sum += dense[order[j]];
@@ -127,7 +128,8 @@ Status float_rows(B& backend, Row base, const AvatarAsset& sampled, const Avatar
       }
       const Posed truth = blend(pose, weights.data(), sampled.cloud.mean(i));
       const Vec3d mean{small.means[0][i], small.means[1][i], small.means[2][i]};
-      const Quatd q{small.rotations[0][i], small.rotations[1][i], small.rotations[2][i], small.rotations[3][i]};
+      const Quatd q{small.rotations[0][i], small.rotations[1][i], small.rotations[2][i],
+                    small.rotations[3][i]};
       e.position.push_back(norm(mean - truth.mean));
       e.rotation.push_back(angle_degrees(rotation_matrix(q), truth.rotation));
     }
@@ -163,7 +165,8 @@ Result<std::vector<Row>> skinning_rows(const SkinningOptions& o) {
   const std::size_t joints = skeleton.size();
   SerialBackend serial;
   OpenMPBackend openmp(o.threads);
-  const std::pair<const char*, const std::vector<LocalPose>*> sets[] = {{"walk", &walking}, {"random_60deg", &random}};
+  const std::pair<const char*, const std::vector<LocalPose>*> sets[] = {{"walk", &walking},
+                                                                        {"random_60deg", &random}};
   for (const auto& [name, poses] : sets) {
     const std::vector<Matrices> matrices = skinning_matrices(skeleton, *poses);
     Row base;
@@ -181,15 +184,18 @@ Result<std::vector<Row>> skinning_rows(const SkinningOptions& o) {
         }
       }
       Row row = base;
-      row.set("influences", static_cast<int>(k)).set("note", "float64, K greatest weights against all joints");
+      row.set("influences", static_cast<int>(k))
+          .set("note", "float64, K greatest weights against all joints");
       add_skinning_rows(rows, std::move(row), e);
     }
     base.set("profile", "exact");
     Row by_serial = base, by_openmp = base;
     by_serial.set("backend", "serial").set("threads", 1);
     by_openmp.set("backend", "openmp").set("threads", openmp.threads());
-    if (Status s = float_rows(serial, std::move(by_serial), *sampled, *timed, matrices, o, rows); !s) return s;
-    if (Status s = float_rows(openmp, std::move(by_openmp), *sampled, *timed, matrices, o, rows); !s) return s;
+    if (Status s = float_rows(serial, std::move(by_serial), *sampled, *timed, matrices, o, rows); !s)
+      return s;
+    if (Status s = float_rows(openmp, std::move(by_openmp), *sampled, *timed, matrices, o, rows); !s)
+      return s;
     if (Status s = mode_rows(*timed, matrices, name, o, rows); !s) return s;
   }
   return rows;

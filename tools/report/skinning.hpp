@@ -16,8 +16,9 @@ struct SkinningOptions {
   int runs = 15;
 };
 
-/// What K influences a Gaussian cost in accuracy (float64, against weights of all joints), and what float32
-/// and each backend add, with the time for 100,000 Gaussians. Errors: what making the humanoid reports.
+/// What K influences a Gaussian cost in accuracy (float64, against weights of all joints), and what
+/// float32 and each backend add, with the time for 100,000 Gaussians. Errors: what making the humanoid
+/// reports.
 gsnav::Result<std::vector<Row>> skinning_rows(const SkinningOptions& options);
 
 }  // namespace gsnav_report

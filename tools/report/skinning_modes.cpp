@@ -29,7 +29,8 @@ struct ModeSkinning {
   explicit ModeSkinning(const AvatarAsset& asset) {
     const GaussianView v = asset.cloud.view();
     for (auto& p : planes) p.resize(asset.size());
-    for (std::size_t k = 0; k < 3; ++k) args.means[k] = v.means[k], args.means_out[k] = view_of(planes[k]);
+    for (std::size_t k = 0; k < 3; ++k)
+      args.means[k] = v.means[k], args.means_out[k] = view_of(planes[k]);
     for (std::size_t k = 0; k < 4; ++k) {
       args.quats[k] = v.quats[k];
       args.quats_out[k] = view_of(planes[3 + k]);
@@ -138,7 +139,8 @@ Status mode_rows(const AvatarAsset& body, const std::vector<Matrices>& poses, co
       weights.push_back(static_cast<float>(w[j]));
     }
   }
-  if (const auto kept = asset.set_weights(joints, indices, weights, kInfluences8); !kept) return kept.status();
+  if (const auto kept = asset.set_weights(joints, indices, weights, kInfluences8); !kept)
+    return kept.status();
   if (Status s = bake_weight_gradients(asset); !s) return s;
   Row base;
   base.set("kind", "skinning").set("scene", "humanoid").set("knob", "poses").set("knob_value", name);
@@ -152,11 +154,13 @@ Status mode_rows(const AvatarAsset& body, const std::vector<Matrices>& poses, co
     if (Status s = skin_gaussians<double>(serial, exact.args); !s) return s;
     for (std::size_t i = 0; i < asset.size(); i += 16) {
       const auto& c = asset.cloud;
-      const Quatd q = quat_cast<double>(Quatf{c.quats[0][i], c.quats[1][i], c.quats[2][i], c.quats[3][i]});
+      const Quatd q =
+          quat_cast<double>(Quatf{c.quats[0][i], c.quats[1][i], c.quats[2][i], c.quats[3][i]});
       const auto shape = [&](const Mat3d& m) {
         Mat3d axes = m * rotation_matrix(q);
         for (auto& row : axes.row) {
-          for (std::size_t k = 0; k < 3; ++k) row[static_cast<int>(k)] *= static_cast<double>(c.scales[k][i]);
+          for (std::size_t k = 0; k < 3; ++k)
+            row[static_cast<int>(k)] *= static_cast<double>(c.scales[k][i]);
         }
         return axes * transpose(axes);
       };
@@ -172,8 +176,9 @@ Status mode_rows(const AvatarAsset& body, const std::vector<Matrices>& poses, co
       stretched.push_back(100 * greatest(exact.covariance(i) + want * -1.0) / greatest(want));
     }
   }
-  const std::string share = std::to_string(100.0 * static_cast<double>(held) /
-                                           static_cast<double>(std::max<std::size_t>(1, held + turned.size())));
+  const std::string share =
+      std::to_string(100.0 * static_cast<double>(held) /
+                     static_cast<double>(std::max<std::size_t>(1, held + turned.size())));
   const std::string left_out = " (" + share.substr(0, 4) + " % beyond the bounds left out)";
   Row row = base;
   row.set("note", "LBS + polar: shapes turned only, against the skin's derivative" + left_out);
@@ -185,8 +190,9 @@ Status mode_rows(const AvatarAsset& body, const std::vector<Matrices>& poses, co
   for (const Skinning mode : {Skinning::linear_stretched, Skinning::dual_quaternion}) {
     asset.skinning = mode;
     base.set("profile", "exact");
-    base.set("note", std::string(mode == Skinning::dual_quaternion ? "dual quaternions" : "LBS + stretch") +
-                         ": float32 against float64; time for 100000 Gaussians");
+    base.set("note",
+             std::string(mode == Skinning::dual_quaternion ? "dual quaternions" : "LBS + stretch") +
+                 ": float32 against float64; time for 100000 Gaussians");
     Row by_serial = base, by_openmp = base;
     by_serial.set("backend", "serial").set("threads", 1);
     by_openmp.set("backend", "openmp").set("threads", openmp.threads());

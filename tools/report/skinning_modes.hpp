@@ -10,10 +10,10 @@
 
 namespace gsnav_report {
 
-/// What turning shapes only and stretching them cost against the derivative of the skin itself (soft weights of all
-/// joints, central differences in float64), and what float32 adds to dual quaternions and stretch, with their times.
-/// `poses`: joint matrices, called `name`.
-gsnav::Status mode_rows(const gsnav::AvatarAsset& body, const std::vector<Matrices>& poses, const char* name,
-                        const SkinningOptions& options, std::vector<Row>& rows);
+/// What turning shapes only and stretching them cost against the derivative of the skin itself (soft
+/// weights of all joints, central differences in float64), and what float32 adds to dual quaternions and
+/// stretch, with their times. `poses`: joint matrices, called `name`.
+gsnav::Status mode_rows(const gsnav::AvatarAsset& body, const std::vector<Matrices>& poses,
+                        const char* name, const SkinningOptions& options, std::vector<Row>& rows);
 
 }  // namespace gsnav_report

@@ -12,7 +12,8 @@ namespace gsnav_report {
 
 /// Times skinning of the asset's Gaussians on a backend and writes it into `row`: for 100000 of them.
 template <class B, class Args>
-gsnav::Status time_skinning(B& backend, const gsnav::AvatarAsset& asset, const Args& args, int runs, Row& row) {
+gsnav::Status time_skinning(B& backend, const gsnav::AvatarAsset& asset, const Args& args, int runs,
+                            Row& row) {
   gsnav::Status status;
   const Timing t = measure(
       [&] {

@@ -11,7 +11,8 @@ namespace gsnav_report {
 
 using namespace gsnav;
 
-SoftWeights::SoftWeights(const AvatarAsset& asset) : asset_(&asset), rest_(asset.skeleton.rest_globals()) {}
+SoftWeights::SoftWeights(const AvatarAsset& asset)
+    : asset_(&asset), rest_(asset.skeleton.rest_globals()) {}
 
 void SoftWeights::at(const Vec3d& p, std::vector<double>& out) const {
   constexpr double kSoftness = 0.025;
@@ -43,9 +44,13 @@ double angle_degrees(const Mat3d& a, const Mat3d& b) {
   return std::atan2(norm(axis), d(0, 0) + d(1, 1) + d(2, 2) - 1) * 57.29577951308232;
 }
 
-void add_error_row(std::vector<Row>& rows, Row row, const char* name, const char* unit, std::vector<double>& values) {
+void add_error_row(std::vector<Row>& rows, Row row, const char* name, const char* unit,
+                   std::vector<double>& values) {
   const double p99 = percentile(values, 0.99);
-  row.set("name", name).set("error_max", percentile(values, 1.0)).set("error_p99", p99).set("error_unit", unit);
+  row.set("name", name)
+      .set("error_max", percentile(values, 1.0))
+      .set("error_p99", p99)
+      .set("error_unit", unit);
   rows.push_back(std::move(row));
 }
 

@@ -10,8 +10,8 @@ namespace gsnav_report {
 
 using Matrices = std::vector<gsnav::Affine3<double>>;
 
-/// Weights of all joints at any place: falling off exponentially, 25 mm a factor e, with the distance from the joint's
-/// capsules beyond the nearest one's.
+/// Weights of all joints at any place: falling off exponentially, 25 mm a factor e, with the distance
+/// from the joint's capsules beyond the nearest one's.
 class SoftWeights {
  public:
   explicit SoftWeights(const gsnav::AvatarAsset& asset);
@@ -23,7 +23,8 @@ class SoftWeights {
 };
 
 /// Posed joint * inverse bind for each pose.
-std::vector<Matrices> skinning_matrices(const gsnav::Skeleton& skeleton, const std::vector<gsnav::LocalPose>& poses);
+std::vector<Matrices> skinning_matrices(const gsnav::Skeleton& skeleton,
+                                        const std::vector<gsnav::LocalPose>& poses);
 
 /// Angle between two rotations, degrees; accurate near 0.
 double angle_degrees(const gsnav::Mat3d& a, const gsnav::Mat3d& b);
@@ -35,6 +36,7 @@ struct SkinningErrors {
 /// Rows of both, greatest and 99th percentile.
 void add_skinning_rows(std::vector<Row>& rows, const Row& base, SkinningErrors& e);
 /// A row of one quantity.
-void add_error_row(std::vector<Row>& rows, Row row, const char* name, const char* unit, std::vector<double>& values);
+void add_error_row(std::vector<Row>& rows, Row row, const char* name, const char* unit,
+                   std::vector<double>& values);
 
 }  // namespace gsnav_report

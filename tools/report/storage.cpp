@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/render.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "runner_system.hpp"
 
 namespace gsnav_report {
@@ -23,20 +23,26 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kHalfSqrt2 = 0.70710678118654752440;
 
 constexpr std::array<StorageCodec, 8> kCodecs{{
-    {"position_fp16", "positions as float16 offsets from the 64 m lattice", 0x1p-10, -65504, 65504, 16, 3},
-    {"position_fixed24", "positions in 24 bit, 12 of them fraction (SPZ)", 1.0 / 4096, -kInf, kInf, 24, 3},
+    {"position_fp16", "positions as float16 offsets from the 64 m lattice", 0x1p-10, -65504, 65504, 16,
+     3},
+    {"position_fixed24", "positions in 24 bit, 12 of them fraction (SPZ)", 1.0 / 4096, -kInf, kInf, 24,
+     3},
     {"position_u16_8m", "positions in 16 bit within cells of 8 m", 8.0 / 65536, -kInf, kInf, 16, 3},
-    {"log_scale_8", "log-scales in 8 bit, 1/16 a step from -10 (SPZ)", 1.0 / 16, -10, 255.0 / 16 - 10, 8, 3},
-    {"quat_10", "the three smallest components in 10 bit", kHalfSqrt2 / 511, -kHalfSqrt2, kHalfSqrt2, 8, 4},
+    {"log_scale_8", "log-scales in 8 bit, 1/16 a step from -10 (SPZ)", 1.0 / 16, -10, 255.0 / 16 - 10, 8,
+     3},
+    {"quat_10", "the three smallest components in 10 bit", kHalfSqrt2 / 511, -kHalfSqrt2, kHalfSqrt2, 8,
+     4},
     {"opacity_8", "opacity in 8 bit", 1.0 / 255, 0, 1, 8, 1},
-    {"sh0_8", "degree-0 colour in 8 bit, scale 0.15 (SPZ)", 1 / (0.15 * 255), -0.5 / 0.15, 0.5 / 0.15, 8, 3},
+    {"sh0_8", "degree-0 colour in 8 bit, scale 0.15 (SPZ)", 1 / (0.15 * 255), -0.5 / 0.15, 0.5 / 0.15, 8,
+     3},
     {"shN_8", "higher SH in 8 bit, 1/128 a step (SPZ)", 1.0 / 128, -1, 127.0 / 128, 8, -1},
 }};
 
 /// The nearest point of the grid low + k step (0 + k step where low is infinite) within the range.
 float snap(float x, const StorageCodec& c) noexcept {
   const double v = static_cast<double>(x), from = std::isinf(c.low) ? 0.0 : c.low;
-  return static_cast<float>(std::clamp(from + std::nearbyint((v - from) / c.step) * c.step, c.low, c.high));
+  return static_cast<float>(
+      std::clamp(from + std::nearbyint((v - from) / c.step) * c.step, c.low, c.high));
 }
 
 void snap_quats(GaussianCloud& cloud, const StorageCodec& c) {
@@ -73,7 +79,8 @@ float round_to_half(float x) noexcept {
 PackedThrough through_packing(const PackedCloud& packed) {
   const GaussianCloud& rest = packed.rest;
   return {unpack_cloud(packed), packed.bytes(),
-          packed.shN.size() + sizeof(float) * rest.shN.size() + sizeof(std::uint16_t) * rest.shN_half.size()};
+          packed.shN.size() + sizeof(float) * rest.shN.size() +
+              sizeof(std::uint16_t) * rest.shN_half.size()};
 }
 
 Result<PackedThrough> read_packed(const std::string& path) {
@@ -88,7 +95,8 @@ Result<PackedThrough> read_packed(const std::string& path) {
 }
 
 Result<GaussianCloud> through_storage(const GaussianCloud& cloud, std::string_view name) {
-  const auto codec = std::find_if(kCodecs.begin(), kCodecs.end(), [&](const auto& c) { return c.name == name; });
+  const auto codec =
+      std::find_if(kCodecs.begin(), kCodecs.end(), [&](const auto& c) { return c.name == name; });
   if (codec == kCodecs.end()) {
     std::string known;
     for (const StorageCodec& c : kCodecs) known.append(known.empty() ? "" : ", ").append(c.name);
@@ -117,8 +125,9 @@ Result<GaussianCloud> through_storage(const GaussianCloud& cloud, std::string_vi
 }
 
 std::size_t stored_bytes(const GaussianCloud& cloud, const StorageCodec& codec) noexcept {
-  const double values = codec.values > 0 ? static_cast<double>(codec.values) * static_cast<double>(cloud.size())
-                                         : static_cast<double>(cloud.shN.size());
+  const double values = codec.values > 0
+                            ? static_cast<double>(codec.values) * static_cast<double>(cloud.size())
+                            : static_cast<double>(cloud.shN.size());
   return cloud.bytes() - static_cast<std::size_t>(values * (32 - codec.bits) / 8);
 }
 

@@ -17,10 +17,10 @@ namespace gsnav_report {
 /// formats named use it.
 struct StorageCodec {
   std::string_view name, description;
-  double step;           ///< of the stored quantity, uniform; for fp16: relative, at the binade's lower end
-  double low, high;      ///< range; beyond it values are clamped (positions: no limit within a 64 m cell)
-  double bits;           ///< per value
-  int values;            ///< per Gaussian: 3, 4 (stored as 3 and an index), 1, or -1: all of shN
+  double step;       ///< of the stored quantity, uniform; for fp16: relative, at the binade's lower end
+  double low, high;  ///< range; beyond it values are clamped (positions: no limit within a 64 m cell)
+  double bits;       ///< per value
+  int values;        ///< per Gaussian: 3, 4 (stored as 3 and an index), 1, or -1: all of shN
 };
 
 /// All codecs that the report measures, by name.
@@ -41,7 +41,8 @@ gsnav::Result<PackedThrough> read_packed(const std::string& path);
 
 /// `cloud` as it comes back from storage by the codec `name`; all other fields keep their bits.
 /// Errors: invalid_argument for an unknown name, with the known ones.
-gsnav::Result<gsnav::GaussianCloud> through_storage(const gsnav::GaussianCloud& cloud, std::string_view name);
+gsnav::Result<gsnav::GaussianCloud> through_storage(const gsnav::GaussianCloud& cloud,
+                                                    std::string_view name);
 
 /// Bytes of the cloud's arrays with the codec's field in its stored size.
 std::size_t stored_bytes(const gsnav::GaussianCloud& cloud, const StorageCodec& codec) noexcept;

@@ -33,8 +33,9 @@ MovingCapsule<S> cast(const MovingCapsule<double>& m) {
 
 V random_direction(Rng& rng) { return normalized(V{rng.normal(), rng.normal(), rng.normal()}); }
 
-/// A standing agent that moves a step of at most 0.25 m and a bone that moves `speed` metres, aimed so that
-/// the two meet within a metre. Coordinates are float32 values: both precisions see the same motion.
+/// A standing agent that moves a step of at most 0.25 m and a bone that moves `speed` metres, aimed so
+/// that the two meet within a metre. Coordinates are float32 values: both precisions see the same
+/// motion.
 struct Pair {
   MovingCapsule<double> agent, body;
 };
@@ -45,16 +46,19 @@ Pair random_pair(Rng& rng, double speed) {
     return Capsule<double>{near_float(p), near_float(q), static_cast<double>(static_cast<float>(r))};
   };
   const double radius = rng.uniform(0.1, 0.3), height = rng.uniform(2 * radius, 1.8);
-  const V step = random_direction(rng) * static_cast<Real>(0.25 * rng.uniform()), up{0, height - 2 * radius, 0};
+  const V step = random_direction(rng) * static_cast<Real>(0.25 * rng.uniform()),
+          up{0, height - 2 * radius, 0};
   Pair p;
   p.agent = {capsule({}, up, radius), capsule(step, step + up, radius)};
   const V travel = random_direction(rng) * static_cast<Real>(speed * rng.uniform(0.5, 1.0));
   const Real when = rng.uniform();
   const V meet = step * when + random_direction(rng) * static_cast<Real>(rng.uniform());
-  const V bone = random_direction(rng) * static_cast<Real>(0.2), spin = random_direction(rng) * Real(0.2);
+  const V bone = random_direction(rng) * static_cast<Real>(0.2),
+          spin = random_direction(rng) * Real(0.2);
   const double r0 = rng.uniform(0.03, 0.2), r1 = rng.uniform(0.03, 0.2);
   const V start = meet - travel * when, stop = meet + travel * (1 - when);
-  p.body = {capsule(start - bone, start + bone, r0), capsule(stop - bone + spin, stop + bone - spin, r1)};
+  p.body = {capsule(start - bone, start + bone, r0),
+            capsule(stop - bone + spin, stop + bone - spin, r1)};
   return p;
 }
 
@@ -63,8 +67,8 @@ Capsule<Real> at(const MovingCapsule<Real>& m, Real t) {
   return {mix(m.begin.p0, m.end.p0), mix(m.begin.p1, m.end.p1), mix(m.begin.radius, m.end.radius)};
 }
 
-/// From the point of b nearest to a to that of a, by bisection on the slope of the (convex) distance from a
-/// point that runs along a to the segment b.
+/// From the point of b nearest to a to that of a, by bisection on the slope of the (convex) distance
+/// from a point that runs along a to the segment b.
 V segment_offset(const V& a0, const V& a1, const V& b0, const V& b1) {
   const V u = a1 - a0, v = b1 - b0;
   const Real vv = dot(v, v);
@@ -94,8 +98,8 @@ Row distance_row(const SweepOptions& o, const char* precision) {
     b.push_back(cast<S>(p.body));
     const auto& u = a.back().begin;
     const auto& v = b.back().begin;
-    const Real truth = segment_distance_truth(vec_cast<Real>(u.p0), vec_cast<Real>(u.p1), vec_cast<Real>(v.p0),
-                                              vec_cast<Real>(v.p1));
+    const Real truth = segment_distance_truth(vec_cast<Real>(u.p0), vec_cast<Real>(u.p1),
+                                              vec_cast<Real>(v.p0), vec_cast<Real>(v.p1));
     const Real d = segment_distance(u.p0, u.p1, v.p0, v.p1).distance;
     errors.push_back(static_cast<double>(std::abs(d - truth) / std::max(truth, Real(0.01))));
   }
@@ -111,14 +115,16 @@ Row distance_row(const SweepOptions& o, const char* precision) {
       o.runs, 2.0);
   Row row;
   row.set("kind", "sweep").set("name", std::string("distance, ") + precision).set("backend", "serial");
-  row.set("threads", 1).set("error_max", percentile(errors, 1.0)).set("error_p99", percentile(errors, 0.99));
+  row.set("threads", 1)
+      .set("error_max", percentile(errors, 1.0))
+      .set("error_p99", percentile(errors, 0.99));
   row.set("error_unit", "relative").set("time_p50_ms", t.p50_ms).set("time_p99_ms", t.p99_ms);
   row.set("items_per_second", 1e3 * static_cast<double>(a.size()) / t.p50_ms);
   return row.set("note", "of segments up to 2 m apart, relative to at least 1 cm, against long double");
 }
 
-/// Two rows of one speed: how deep motion goes into a body before the sweep stops it (never, if all is well),
-/// and how much room beyond contact a motion that was stopped would have left.
+/// Two rows of one speed: how deep motion goes into a body before the sweep stops it (never, if all is
+/// well), and how much room beyond contact a motion that was stopped would have left.
 template <class S>
 void speed_rows(const SweepOptions& o, const char* precision, double speed, std::vector<Row>& rows) {
   Rng rng(static_cast<std::uint64_t>(speed * 1024));
@@ -149,7 +155,11 @@ void speed_rows(const SweepOptions& o, const char* precision, double speed, std:
       },
       o.runs, 2.0);
   Row row;
-  row.set("kind", "sweep").set("backend", "serial").set("threads", 1).set("knob", "speed").set("knob_value", speed);
+  row.set("kind", "sweep")
+      .set("backend", "serial")
+      .set("threads", 1)
+      .set("knob", "speed")
+      .set("knob_value", speed);
   row.set("error_unit", "m").set("time_p50_ms", t.p50_ms).set("time_p99_ms", t.p99_ms);
   row.set("items_per_second", 1e3 * static_cast<double>(a.size()) / t.p50_ms);
   const std::string hits = std::to_string(room.size()) + " of " + std::to_string(o.pairs) + " stopped; ";
@@ -157,7 +167,8 @@ void speed_rows(const SweepOptions& o, const char* precision, double speed, std:
   row.set("error_p99", percentile(depth, 0.99)).set("note", hits + "depth reached before the stop");
   rows.push_back(row);
   row.set("name", std::string("needless stop, ") + precision).set("error_max", percentile(room, 1.0));
-  row.set("error_p99", percentile(room, 0.99)).set("note", hits + "room that the whole motion would have left beyond contact");
+  row.set("error_p99", percentile(room, 0.99))
+      .set("note", hits + "room that the whole motion would have left beyond contact");
   rows.push_back(row);
 }
 
@@ -172,11 +183,12 @@ long double least_gap(const MovingCapsule<double>& a, const MovingCapsule<double
   constexpr Real kTolerance = 1e-8L;
   const MovingCapsule<Real> ma = cast<Real>(a), mb = cast<Real>(b);
   Real least = kInf;
-  // Along a fixed direction the four pairs of endpoints separate linearly in time: at the ends of an interval
-  // their least separation bounds the gap from below.
+  // Along a fixed direction the four pairs of endpoints separate linearly in time: at the ends of an
+  // interval their least separation bounds the gap from below.
   const auto separation = [&](const V& n, Real t) {
     const Capsule<Real> p = at(ma, t), q = at(mb, t);
-    return std::min(dot(n, p.p0), dot(n, p.p1)) - std::max(dot(n, q.p0), dot(n, q.p1)) - p.radius - q.radius;
+    return std::min(dot(n, p.p0), dot(n, p.p1)) - std::max(dot(n, q.p0), dot(n, q.p1)) - p.radius -
+           q.radius;
   };
   std::vector<std::pair<Real, Real>> open{{0, end}};
   while (!open.empty()) {

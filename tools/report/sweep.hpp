@@ -10,14 +10,17 @@
 namespace gsnav_report {
 
 /// Distance of two segments in long double, metres.
-long double segment_distance_truth(const gsnav::Vec3<long double>& a0, const gsnav::Vec3<long double>& a1,
-                                   const gsnav::Vec3<long double>& b0, const gsnav::Vec3<long double>& b1);
+long double segment_distance_truth(const gsnav::Vec3<long double>& a0,
+                                   const gsnav::Vec3<long double>& a1,
+                                   const gsnav::Vec3<long double>& b0,
+                                   const gsnav::Vec3<long double>& b1);
 
-/// Least gap of two moving capsules over [0, end] in long double, within 1e-8 m: branch and bound, so that
-/// nothing slips between samples. Gaps above `ceiling` are not told apart, and a gap below `enough` ends the
-/// search: the answer is then only known to be above, or below.
+/// Least gap of two moving capsules over [0, end] in long double, within 1e-8 m: branch and bound, so
+/// that nothing slips between samples. Gaps above `ceiling` are not told apart, and a gap below `enough`
+/// ends the search: the answer is then only known to be above, or below.
 long double least_gap(const gsnav::MovingCapsule<double>& a, const gsnav::MovingCapsule<double>& b,
-                      long double end, long double ceiling = std::numeric_limits<long double>::infinity(),
+                      long double end,
+                      long double ceiling = std::numeric_limits<long double>::infinity(),
                       long double enough = -std::numeric_limits<long double>::infinity());
 
 struct SweepOptions {

@@ -26,29 +26,33 @@ class Place {
 
  private:
   RowRefs plain(std::string_view profile, std::string_view oracle) const {
-    return select(
-        rows_, [&](const Row& r) { return is_plain(r) && r.get("profile") == profile && r.get("oracle") == oracle; });
+    return select(rows_, [&](const Row& r) {
+      return is_plain(r) && r.get("profile") == profile && r.get("oracle") == oracle;
+    });
   }
   static RowRefs of_sensor(const RowRefs& rows, std::string_view sensor) {
     return select(rows, [&](const Row& r) { return r.get("sensor") == sensor; });
   }
   /// Pairs of rows of one view; sensor too where `same_sensor`.
-  static std::vector<std::pair<const Row*, const Row*>> by_view(const RowRefs& a, const RowRefs& b, bool same_sensor) {
+  static std::vector<std::pair<const Row*, const Row*>> by_view(const RowRefs& a, const RowRefs& b,
+                                                                bool same_sensor) {
     std::vector<std::pair<const Row*, const Row*>> out;
     for (const Row* x : a) {
       for (const Row* y : b) {
-        if (x->get("view") != y->get("view") || (same_sensor && x->get("sensor") != y->get("sensor"))) continue;
+        if (x->get("view") != y->get("view") || (same_sensor && x->get("sensor") != y->get("sensor")))
+          continue;
         out.emplace_back(x, y);
         break;
       }
     }
     return out;
   }
-  void add(const char* measure, double limit, double value, bool at_least, std::size_t views, std::string note = {}) {
+  void add(const char* measure, double limit, double value, bool at_least, std::size_t views,
+           std::string note = {}) {
     if (!std::isfinite(value)) return;
     const Row& r = *rows_.front();
-    out_.push_back(
-        {r.get("scene"), resolution(r), r.get("backend"), measure, limit, value, at_least, std::move(note), views});
+    out_.push_back({r.get("scene"), resolution(r), r.get("backend"), measure, limit, value, at_least,
+                    std::move(note), views});
   }
   static std::string percent(double share) {
     char text[32];
@@ -108,12 +112,14 @@ class Place {
     }
     if (n == 0) return;
     add("depth alone: times faster than with colour", 1.5, both_ms / depth_ms, true, n);
-    add("depth alone: fewer bytes of a Gaussian read, %", 70, 100 * (1 - depth_bytes / both_bytes), true, n);
+    add("depth alone: fewer bytes of a Gaussian read, %", 70, 100 * (1 - depth_bytes / both_bytes), true,
+        n);
   }
 
   void memory() {
     const RowRefs packed = select(rows_, [](const Row& r) {
-      return r.get("knob") == "storage" && r.get("knob_value") == "packed" && r.get("oracle") == "contract";
+      return r.get("knob") == "storage" && r.get("knob_value") == "packed" &&
+             r.get("oracle") == "contract";
     });
     if (packed.empty()) return;
     const auto n = packed.front()->number("gaussians"), bytes = packed.front()->number("cloud_bytes"),
@@ -121,8 +127,10 @@ class Place {
     const Spread psnr = spread(packed, "rgb_psnr");
     if (!n || !bytes || !bands || !(*n > 0)) return;
     char note[80];
-    std::snprintf(note, sizeof note, "and %.1f of SH bands; %.1f dB, least %.1f", *bands / *n, psnr.mean, psnr.min);
-    add("packed: bytes a Gaussian beside its SH bands", 40, (*bytes - *bands) / *n, false, packed.size(), note);
+    std::snprintf(note, sizeof note, "and %.1f of SH bands; %.1f dB, least %.1f", *bands / *n, psnr.mean,
+                  psnr.min);
+    add("packed: bytes a Gaussian beside its SH bands", 40, (*bytes - *bands) / *n, false, packed.size(),
+        note);
     constexpr double kLeast = 1.6e7;  // of less, what threads and pages take says more
     if (const auto peak = packed.front()->number("read_peak"); peak && *bytes >= kLeast)
       add("packed: most memory while it is read, of what stays", 2, *peak / *bytes, false,
@@ -147,9 +155,10 @@ std::vector<TargetCheck> check_targets(const Table& table) {
 std::string targets_text(const std::vector<TargetCheck>& checks) {
   std::string out;
   for (const TargetCheck& c : checks) {
-    out += c.scene + ", " + c.size + ", " + c.backend + ": " + c.measure + ": " + format(c.value, 4) + " (" +
-           (c.at_least ? "at least " : "at most ") + format_round(c.limit) + (c.met() ? ", met)" : ", missed)") +
-           (c.note.empty() ? "" : "; " + c.note) + ", " + std::to_string(c.views) + " views\n";
+    out += c.scene + ", " + c.size + ", " + c.backend + ": " + c.measure + ": " + format(c.value, 4) +
+           " (" + (c.at_least ? "at least " : "at most ") + format_round(c.limit) +
+           (c.met() ? ", met)" : ", missed)") + (c.note.empty() ? "" : "; " + c.note) + ", " +
+           std::to_string(c.views) + " views\n";
   }
   return out;
 }

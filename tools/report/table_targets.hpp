@@ -8,8 +8,8 @@
 
 namespace gsnav_report {
 
-/// Something that is to be reached by one setting beside another, of one scene, size and backend: what no row says
-/// alone.
+/// Something that is to be reached by one setting beside another, of one scene, size and backend: what
+/// no row says alone.
 struct TargetCheck {
   std::string scene, size, backend;
   std::string measure;  ///< "lod: times faster than fast"
@@ -22,8 +22,8 @@ struct TargetCheck {
   bool met() const noexcept { return at_least ? value >= limit : value <= limit; }
 };
 
-/// Every target that the table has rows for: levels of detail beside `fast`, culling by chunks, frames of depths alone,
-/// memory of packed scenes.
+/// Every target that the table has rows for: levels of detail beside `fast`, culling by chunks, frames
+/// of depths alone, memory of packed scenes.
 std::vector<TargetCheck> check_targets(const Table& table);
 
 /// The same as lines of text.

@@ -36,7 +36,8 @@ Status apply(std::string_view message, Controls& controls) {
     const std::size_t equals = pair.find('=');
     const std::string_view name = pair.substr(0, equals);
     double v = 0;
-    if (equals == std::string_view::npos || !read(pair.substr(equals + 1), v)) return bad(name, "no number");
+    if (equals == std::string_view::npos || !read(pair.substr(equals + 1), v))
+      return bad(name, "no number");
     const auto number = [&](double& to, double most) {
       to = v;
       return v >= -most && v <= most;

@@ -26,7 +26,9 @@ bool is_visible(std::string_view s) {
 
 /// A field's value may have anything but control characters.
 bool is_value(std::string_view s) {
-  return std::all_of(s.begin(), s.end(), [](char c) { return c == '\t' || (static_cast<unsigned char>(c) >= ' ' && c != 127); });
+  return std::all_of(s.begin(), s.end(), [](char c) {
+    return c == '\t' || (static_cast<unsigned char>(c) >= ' ' && c != 127);
+  });
 }
 
 std::string_view trimmed(std::string_view s) {
@@ -64,7 +66,8 @@ bool take_line(std::string_view& text, std::string_view& line) {
 int parse_line(std::string_view line, Request& r, bool& needs_host) {
   const std::size_t a = line.find(' '), b = line.rfind(' ');
   if (a == std::string_view::npos || a == b) return 400;
-  const std::string_view method = line.substr(0, a), target = line.substr(a + 1, b - a - 1), version = line.substr(b + 1);
+  const std::string_view method = line.substr(0, a), target = line.substr(a + 1, b - a - 1),
+                         version = line.substr(b + 1);
   if (!is_token(method)) return 400;
   if (target.size() > kLongestTarget) return 414;
   if (target.empty() || target.front() != '/' || !is_visible(target)) return 400;
@@ -114,7 +117,8 @@ ParsedRequest parse_request(std::string_view head) {
     } else if (same_name(name, "content-length")) {
       if (length || value.empty()) return refuse(400);
       length = true;
-      const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), out.request.content_length);
+      const auto [end, error] =
+          std::from_chars(value.data(), value.data() + value.size(), out.request.content_length);
       if (end != value.data() + value.size()) return refuse(400);
       if (error != std::errc{} || out.request.content_length > kLongestBody) return refuse(413);
     }
@@ -139,7 +143,8 @@ bool is_allowed_host(std::string_view host, bool loopback, std::span<const std::
   if (same_name(name, "localhost")) return true;
   in_addr at{};
   if (inet_pton(AF_INET, name.c_str(), &at) == 1) return !loopback || (ntohl(at.s_addr) >> 24) == 127;
-  return std::any_of(names.begin(), names.end(), [&](const std::string& n) { return same_name(name, lower(n)); });
+  return std::any_of(names.begin(), names.end(),
+                     [&](const std::string& n) { return same_name(name, lower(n)); });
 }
 
 bool is_from_elsewhere(const Request& r) {

@@ -25,27 +25,43 @@ constexpr int kTick = 100;  // milliseconds between looks at whether the server 
 
 const char* reason_of(int status) {
   switch (status) {
-    case 200: return "OK";
-    case 400: return "Bad Request";
-    case 403: return "Forbidden";
-    case 404: return "Not Found";
-    case 405: return "Method Not Allowed";
-    case 408: return "Request Timeout";
-    case 413: return "Content Too Large";
-    case 414: return "URI Too Long";
-    case 431: return "Request Header Fields Too Large";
-    case 501: return "Not Implemented";
-    case 503: return "Service Unavailable";
-    case 505: return "HTTP Version Not Supported";
-    default: return "Internal Server Error";
+    case 200:
+      return "OK";
+    case 400:
+      return "Bad Request";
+    case 403:
+      return "Forbidden";
+    case 404:
+      return "Not Found";
+    case 405:
+      return "Method Not Allowed";
+    case 408:
+      return "Request Timeout";
+    case 413:
+      return "Content Too Large";
+    case 414:
+      return "URI Too Long";
+    case 431:
+      return "Request Header Fields Too Large";
+    case 501:
+      return "Not Implemented";
+    case 503:
+      return "Service Unavailable";
+    case 505:
+      return "HTTP Version Not Supported";
+    default:
+      return "Internal Server Error";
   }
 }
 
-Reply plain(int status) { return {status, "text/plain; charset=utf-8", std::string(reason_of(status)) + "\n"}; }
+Reply plain(int status) {
+  return {status, "text/plain; charset=utf-8", std::string(reason_of(status)) + "\n"};
+}
 
 std::string head_of(const Reply& reply, bool keep_alive) {
   std::string h = "HTTP/1.1 " + std::to_string(reply.status) + " " + reason_of(reply.status) + "\r\n";
-  h += "Content-Type: " + reply.type + "\r\nContent-Length: " + std::to_string(reply.body.size()) + "\r\n";
+  h += "Content-Type: " + reply.type + "\r\nContent-Length: " + std::to_string(reply.body.size()) +
+       "\r\n";
   h += keep_alive ? "" : "Connection: close\r\n";
   h += "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n";
   h += "Cross-Origin-Resource-Policy: same-origin\r\nX-Frame-Options: DENY\r\n";
@@ -85,18 +101,23 @@ Status HttpServer::listen() {
   sockaddr_in at{};
   at.sin_family = AF_INET;
   at.sin_port = htons(static_cast<std::uint16_t>(options_.port));
-  if (options_.port < 0 || options_.port > 65535 || inet_pton(AF_INET, options_.address.c_str(), &at.sin_addr) != 1) {
-    return {Errc::invalid_argument, options_.address + ":" + std::to_string(options_.port) + " is no IPv4 address and port"};
+  if (options_.port < 0 || options_.port > 65535 ||
+      inet_pton(AF_INET, options_.address.c_str(), &at.sin_addr) != 1) {
+    return {Errc::invalid_argument,
+            options_.address + ":" + std::to_string(options_.port) + " is no IPv4 address and port"};
   }
   loopback_ = (ntohl(at.sin_addr.s_addr) >> 24) == 127;
   const auto failed = [&] {
-    return Status(Errc::backend_failure, options_.address + ":" + std::to_string(options_.port) + ": " + std::strerror(errno));
+    return Status(Errc::backend_failure,
+                  options_.address + ":" + std::to_string(options_.port) + ": " + std::strerror(errno));
   };
   listener_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (listener_ < 0) return failed();
   const int on = 1;
   setsockopt(listener_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  if (::bind(listener_, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0 || ::listen(listener_, 32) != 0) return failed();
+  if (::bind(listener_, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0 ||
+      ::listen(listener_, 32) != 0)
+    return failed();
   socklen_t size = sizeof at;
   if (getsockname(listener_, reinterpret_cast<sockaddr*>(&at), &size) != 0) return failed();
   options_.port = ntohs(at.sin_port);
@@ -115,7 +136,8 @@ void HttpServer::forget_finished() {
   }
 }
 
-/// Whether another connection may be had. Where there are too many, the one that was idle longest is dropped.
+/// Whether another connection may be had. Where there are too many, the one that was idle longest is
+/// dropped.
 bool HttpServer::make_room() {
   std::size_t kept = 0;
   Connection* idle = nullptr;
@@ -145,7 +167,8 @@ void HttpServer::accept_connections() {
     if (!somebody) continue;
     const int socket = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (socket < 0) {
-      if (errno == EMFILE || errno == ENFILE) std::this_thread::sleep_for(std::chrono::milliseconds(kTick));
+      if (errno == EMFILE || errno == ENFILE)
+        std::this_thread::sleep_for(std::chrono::milliseconds(kTick));
       continue;
     }
     const int on = 1;
@@ -232,14 +255,17 @@ void HttpServer::talk(Connection& c) const {
   // What was not read would make the system take the answer back.
   shutdown(c.socket, SHUT_WR);
   std::array<char, 4096> rest{};
-  for (int i = 0; i < 16 && wait_for(c.socket, POLLIN) == 1 && recv(c.socket, rest.data(), rest.size(), 0) > 0; ++i) {
+  for (int i = 0;
+       i < 16 && wait_for(c.socket, POLLIN) == 1 && recv(c.socket, rest.data(), rest.size(), 0) > 0;
+       ++i) {
   }
 }
 
 Reply HttpServer::answer(const Request& request) const {
   if (!request.host.empty() && !is_allowed_host(request.host, loopback_, options_.allowed_hosts)) {
     Reply refused = plain(403);
-    refused.body = "The viewer does not know the host name of this address. Start it with --allow-host NAME.\n";
+    refused.body =
+        "The viewer does not know the host name of this address. Start it with --allow-host NAME.\n";
     return refused;
   }
   // Pages of other sites may neither steer nor have anything drawn.

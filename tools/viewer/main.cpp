@@ -31,8 +31,8 @@ Reply answer(Session& session, const Request& r) {
   return {200, "application/octet-stream", std::move(*frame)};
 }
 
-/// Waits for SIGINT and SIGTERM in a thread of its own, from its making to its end. Before a session is there, they
-/// end the process: nothing is half written, since files are made aside and renamed.
+/// Waits for SIGINT and SIGTERM in a thread of its own, from its making to its end. Before a session is
+/// there, they end the process: nothing is half written, since files are made aside and renamed.
 class Signals {
  public:
   Signals() {
@@ -110,18 +110,29 @@ int main(int argc, char** argv) try {
   o.height = 336;
   where.port = 7007;
   CLI::App app{
-      "Walks a scene in the browser: open the address that it prints (from elsewhere: ssh -L 7007:127.0.0.1:7007 HOST).\n"
+      "Walks a scene in the browser: open the address that it prints (from elsewhere: ssh -L "
+      "7007:127.0.0.1:7007 HOST).\n"
       "Colour, depth and map side by side, people, capsules and NavMesh, metrics. Ends with Ctrl-C."};
   gsnav_eval::add_scene_options(app, o);
-  app.add_option("--port", where.port, "port to listen at; 0: any that is free")->capture_default_str()->check(CLI::Range(0, 65535));
-  app.add_option("--bind", where.address, "IPv4 address to listen at; whoever reaches it can look and steer")
+  app.add_option("--port", where.port, "port to listen at; 0: any that is free")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 65535));
+  app.add_option("--bind", where.address,
+                 "IPv4 address to listen at; whoever reaches it can look and steer")
       ->capture_default_str();
   app.add_option("--allow-host", where.allowed_hosts,
-                 "host name by which browsers may call the viewer, beside addresses and localhost; may be repeated")
+                 "host name by which browsers may call the viewer, beside addresses and localhost; may "
+                 "be repeated")
       ->type_name("NAME");
-  app.add_option("--rate", how.rate, "frames a second at most")->capture_default_str()->check(CLI::Range(1.0, 120.0));
-  app.add_option("--speed", how.speed, "of walking, m/s")->capture_default_str()->check(CLI::Range(0.05, 20.0));
-  app.add_option("--quality", how.quality, "of JPEG images")->capture_default_str()->check(CLI::Range(1, 100));
+  app.add_option("--rate", how.rate, "frames a second at most")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 120.0));
+  app.add_option("--speed", how.speed, "of walking, m/s")
+      ->capture_default_str()
+      ->check(CLI::Range(0.05, 20.0));
+  app.add_option("--quality", how.quality, "of JPEG images")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100));
   app.add_flag("--paused", how.paused, "time stands still at first");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   const gsnav::Status s = gsnav_viewer::run(o, how, where);

@@ -13,10 +13,10 @@ namespace {
 using gsnav::Vec3d;
 
 constexpr nav_loop::Rgb kEdge{0.25f, 0.75f, 1.0f};
-constexpr double kNear = 0.05;      // metres: nothing nearer is drawn
-constexpr double kSurface = 0.12;   // metres that a line on the floor may lie behind the scene's depth
-constexpr double kBody = 0.6;       // the same for a body's axis, which is inside of its surface
-constexpr double kPiece = 0.15;     // metres of line that are hidden or not as one
+constexpr double kNear = 0.05;     // metres: nothing nearer is drawn
+constexpr double kSurface = 0.12;  // metres that a line on the floor may lie behind the scene's depth
+constexpr double kBody = 0.6;      // the same for a body's axis, which is inside of its surface
+constexpr double kPiece = 0.15;    // metres of line that are hidden or not as one
 
 struct Point {
   double x, y, z;
@@ -31,7 +31,8 @@ std::optional<Point> project(const gsnav::Camera& c, const Vec3d& p) {
 bool visible(const DrawnView& view, const Point& p, double behind) {
   const gsnav::Camera& c = view.camera;
   if (!(p.x >= 0 && p.y >= 0 && p.x < c.width && p.y < c.height)) return false;
-  const auto at = static_cast<std::size_t>(p.y) * static_cast<std::size_t>(c.width) + static_cast<std::size_t>(p.x);
+  const auto at =
+      static_cast<std::size_t>(p.y) * static_cast<std::size_t>(c.width) + static_cast<std::size_t>(p.x);
   const double z = static_cast<double>(view.depth[at]);
   return z == 0 || p.z < z + behind;
 }
@@ -41,7 +42,9 @@ void draw_line(const DrawnView& view, const Vec3d& a, const Vec3d& b) {
   std::optional<Point> from = project(view.camera, a);
   for (int i = 1; i <= pieces; ++i) {
     const std::optional<Point> to = project(view.camera, lerp(a, b, static_cast<double>(i) / pieces));
-    if (from && to && visible(view, {0.5 * (from->x + to->x), 0.5 * (from->y + to->y), 0.5 * (from->z + to->z)}, kSurface)) {
+    if (from && to &&
+        visible(view, {0.5 * (from->x + to->x), 0.5 * (from->y + to->y), 0.5 * (from->z + to->z)},
+                kSurface)) {
       view.canvas.stroke(from->x, from->y, to->x, to->y, 0.7, kEdge, 0.7f);
     }
     from = to;
@@ -68,7 +71,8 @@ void draw_capsules(const DrawnView& view, std::span<const gsnav::DynamicCapsule>
     const Point middle{0.5 * (a->x + b->x), 0.5 * (a->y + b->y), 0.5 * (a->z + b->z)};
     if (!visible(view, middle, kBody)) continue;
     const double radius = view.camera.fx * c.radius / middle.z;
-    view.canvas.stroke(a->x, a->y, b->x, b->y, std::min(radius, 400.0), nav_loop::avatar_color(body.avatar), 0.35f);
+    view.canvas.stroke(a->x, a->y, b->x, b->y, std::min(radius, 400.0),
+                       nav_loop::avatar_color(body.avatar), 0.35f);
   }
 }
 

@@ -19,7 +19,8 @@ struct DrawnView {
 };
 
 /// Edges of triangles within `reach` metres, where nothing of the scene is nearer.
-void draw_navmesh(const DrawnView& view, std::span<const std::array<gsnav::Vec3d, 3>> triangles, double reach = 8.0);
+void draw_navmesh(const DrawnView& view, std::span<const std::array<gsnav::Vec3d, 3>> triangles,
+                  double reach = 8.0);
 
 /// Capsules, each in its avatar's colour, where nothing of the scene is clearly nearer.
 void draw_capsules(const DrawnView& view, std::span<const gsnav::DynamicCapsule> bodies);

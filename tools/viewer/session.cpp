@@ -26,20 +26,22 @@ using std::chrono::milliseconds;
 constexpr double kTurnedUp = 1.55;          // radians: as far as one looks up and down
 constexpr auto kHeld = milliseconds(1000);  // a key whose release got lost is let go after that
 constexpr auto kStill = milliseconds(250);  // between frames while nothing moves
-constexpr auto kLinger = milliseconds(100); // the next frame is begun though nobody has asked for it yet
-constexpr auto kAnswer = milliseconds(500); // a request for a frame waits no longer
-constexpr int kMostActions = 5;             // caught up with in one frame, where drawing is slow
-constexpr double kLeastIsland = 1.5;        // metres: as on maps
+constexpr auto kLinger =
+    milliseconds(100);  // the next frame is begun though nobody has asked for it yet
+constexpr auto kAnswer = milliseconds(500);  // a request for a frame waits no longer
+constexpr int kMostActions = 5;              // caught up with in one frame, where drawing is slow
+constexpr double kLeastIsland = 1.5;         // metres: as on maps
 
 /// Colours of depth, evenly from near to far, as CSS writes them.
 std::vector<std::string> depth_colors(const SessionOptions& how) {
   constexpr int kColors = 9;
   std::vector<float> depth;
   for (int i = 0; i < kColors; ++i) {
-    depth.push_back(static_cast<float>(how.depth_near + i * (how.depth_far - how.depth_near) / (kColors - 1)));
+    depth.push_back(
+        static_cast<float>(how.depth_near + i * (how.depth_far - how.depth_near) / (kColors - 1)));
   }
-  const std::vector<std::uint8_t> rgb =
-      gsnav::io::colorize_depth(depth, static_cast<float>(how.depth_near), static_cast<float>(how.depth_far));
+  const std::vector<std::uint8_t> rgb = gsnav::io::colorize_depth(
+      depth, static_cast<float>(how.depth_near), static_cast<float>(how.depth_far));
   std::vector<std::string> out;
   for (std::size_t i = 0; i < depth.size(); ++i) {
     char text[8];
@@ -60,21 +62,23 @@ std::vector<std::array<Vec3d, 3>> walkable(const gsnav::NavMesh& mesh) {
 
 }  // namespace
 
-Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& options, gsnav_eval::Stage stage,
-                                                 const SessionOptions& how) {
+Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& options,
+                                                 gsnav_eval::Stage stage, const SessionOptions& how) {
   if (stage.episodes.empty()) return {Errc::invalid_argument, "no episode to begin with"};
   stage.config.task.control_period = 1.0 / how.rate;
   stage.config.task.max_steps = 1000000000;  // who walks by hand is not cut off
-  auto world = gsnav::World::create(stage.scene->navmesh, stage.config.task, [scene = stage.scene](double t0, double t1, auto& out) {
-    gsnav::append_bodies(*scene, t0, t1, out);
-  });
+  auto world = gsnav::World::create(stage.scene->navmesh, stage.config.task,
+                                    [scene = stage.scene](double t0, double t1, auto& out) {
+                                      gsnav::append_bodies(*scene, t0, t1, out);
+                                    });
   if (!world) return world.status();
   std::unique_ptr<Session> s(new Session(options, std::move(stage), how, std::move(*world)));
   if (Status status = s->begin_episode(0); !status) return status;
   return s;
 }
 
-Session::Session(const gsnav_eval::Options& options, gsnav_eval::Stage stage, const SessionOptions& how, gsnav::World world)
+Session::Session(const gsnav_eval::Options& options, gsnav_eval::Stage stage, const SessionOptions& how,
+                 gsnav::World world)
     : stage_(std::move(stage)),
       how_(how),
       depth_colors_(depth_colors(how)),
@@ -124,7 +128,8 @@ Status Session::run() {
   try {
     return draw_frames();
   } catch (const std::bad_alloc&) {
-    return failed(Errc::out_of_memory, "out of memory; a smaller --width and --height or fewer --avatars take less");
+    return failed(Errc::out_of_memory,
+                  "out of memory; a smaller --width and --height or fewer --avatars take less");
   } catch (const std::exception& e) {
     return failed(Errc::backend_failure, e.what());
   }
@@ -139,7 +144,9 @@ Status Session::draw_frames() {
       std::unique_lock lock(mutex_);
       news_.wait(lock, [&] { return stopped_ || waiting_ > 0 || Clock::now() - last_wait_ < kLinger; });
       news_.wait_until(lock, before + period, [&] { return stopped_; });
-      const auto still = [&] { return controls_.paused && controls_.forward == 0 && controls_.left == 0 && !changed_; };
+      const auto still = [&] {
+        return controls_.paused && controls_.forward == 0 && controls_.left == 0 && !changed_;
+      };
       if (still()) news_.wait_until(lock, before + kStill, [&] { return stopped_ || !still(); });
       if (stopped_) return {};
       if (Clock::now() - last_message_ > kHeld) controls_.forward = controls_.left = 0;
@@ -153,7 +160,10 @@ Status Session::draw_frames() {
     before = now;
     if (passed > 1.0) rate_ = 0.0;  // nobody looked
     rate_ += (rate_ == 0.0 ? 1.0 : 0.1) * (1.0 / passed - rate_);
-    if (Status s = advance(c, std::clamp(static_cast<int>(std::lround(passed * how_.rate)), 1, kMostActions)); !s) return s;
+    if (Status s =
+            advance(c, std::clamp(static_cast<int>(std::lround(passed * how_.rate)), 1, kMostActions));
+        !s)
+      return s;
     if (Status s = draw(c); !s) return s;
     frame_seconds_ = duration<double>(Clock::now() - now).count();
     std::string made = describe(c, begun_) + '\n';
@@ -219,7 +229,8 @@ Status Session::draw_view(const Controls& c, const gsnav::CapsuleSet& bodies) {
   std::span<const gsnav::GaussianSet> sets = scene_.assets();
   if (c.people) {
     scene_.make_slots(1);
-    if (Status s = scene_.prepare(0, world_.time(), std::span(&camera, 1), renderer_.config()); !s) return s;
+    if (Status s = scene_.prepare(0, world_.time(), std::span(&camera, 1), renderer_.config()); !s)
+      return s;
     if (Status s = scene_.pose_prepared(0); !s) return s;
     sets = scene_.sets(0);
   }
@@ -235,12 +246,14 @@ Status Session::draw_view(const Controls& c, const gsnav::CapsuleSet& bodies) {
     rgb = canvas.bytes();
   }
   if (Status s = publish(Panel::color, rgb); !s) return s;
-  return publish(Panel::depth, gsnav::io::colorize_depth(frames_.median_depth, static_cast<float>(how_.depth_near),
-                                                         static_cast<float>(how_.depth_far)));
+  return publish(Panel::depth,
+                 gsnav::io::colorize_depth(frames_.median_depth, static_cast<float>(how_.depth_near),
+                                           static_cast<float>(how_.depth_far)));
 }
 
 Status Session::draw_map(const Controls& c, const gsnav::CapsuleSet& bodies) {
-  constexpr nav_loop::Rgb kAgent{0.05f, 0.30f, 0.85f}, kGoal{0.86f, 0.10f, 0.16f}, kShortest{0.15f, 0.15f, 0.17f};
+  constexpr nav_loop::Rgb kAgent{0.05f, 0.30f, 0.85f}, kGoal{0.86f, 0.10f, 0.16f},
+      kShortest{0.15f, 0.15f, 0.17f};
   nav_loop::Canvas canvas = ground_;
   const nav_loop::MapFrame& f = map_frame_;
   nav_loop::draw_polyline(canvas, f, shortest_, 0.8, kShortest, 0.6f);
@@ -269,7 +282,8 @@ Status Session::publish(Panel panel, std::span<const std::uint8_t> rgb) {
   const gsnav::SensorSpec& s = stage_.config.sensors.front();
   const auto jpeg = gsnav::io::encode_jpeg(rgb, s.resolution[1], s.resolution[0], how_.quality);
   if (!jpeg) return jpeg.status();
-  drawn_[static_cast<std::size_t>(panel)].assign(reinterpret_cast<const char*>(jpeg->data()), jpeg->size());
+  drawn_[static_cast<std::size_t>(panel)].assign(reinterpret_cast<const char*>(jpeg->data()),
+                                                 jpeg->size());
   return {};
 }
 

@@ -29,13 +29,13 @@
 #include <sanitizer/common_interface_defs.h>
 #endif
 
-// Each thread of a block has a stack of its own, and leaves the processor where it waits for others: at a barrier of the
-// block, or at an operation of its warp. One thread of the host runs them all.
+// Each thread of a block has a stack of its own, and leaves the processor where it waits for others: at
+// a barrier of the block, or at an operation of its warp. One thread of the host runs them all.
 
 namespace gsnav::emulated {
 
-// void gsnav_emulated_switch(void** from, void* to): keeps what a call keeps (System V), leaves its stack in *from and
-// goes on where `to` was left.
+// void gsnav_emulated_switch(void** from, void* to): keeps what a call keeps (System V), leaves its
+// stack in *from and goes on where `to` was left.
 extern "C" void gsnav_emulated_switch(void** from, void* to);
 asm(R"(
 .text
@@ -106,7 +106,8 @@ class Block {
     }
   }
 
-  void run(const Launch& launch, const dim3& at, const char* name, void (*thread)(const void*), const void* arguments);
+  void run(const Launch& launch, const dim3& at, const char* name, void (*thread)(const void*),
+           const void* arguments);
   Gathered& gather(unsigned mask, std::uint64_t value, const char* what);
   int barrier(int number);
   void interleave();
@@ -158,8 +159,8 @@ Block& block() {
 }
 
 void Block::fail(const std::string& why) const {
-  std::fprintf(stderr, "emulated device: %s, block (%u, %u, %u), thread %u: %s\n", name_, at_.x, at_.y, at_.z, current_,
-               why.c_str());
+  std::fprintf(stderr, "emulated device: %s, block (%u, %u, %u), thread %u: %s\n", name_, at_.x, at_.y,
+               at_.z, current_, why.c_str());
   std::abort();
 }
 
@@ -182,7 +183,8 @@ void Block::main() {
 
 void Block::prepare(Thread& t) {
   const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-  void* const memory = mmap(nullptr, kStackBytes + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
+  void* const memory = mmap(nullptr, kStackBytes + page, PROT_READ | PROT_WRITE,
+                            MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
   if (memory == MAP_FAILED || mprotect(memory, page, PROT_NONE) != 0) fail("no memory for its stack");
   t.stack = static_cast<char*>(memory) + page;
   // As if main() had been called: its return address, which nobody uses, 8 bytes below a line of 16.
@@ -239,8 +241,8 @@ Gathered& Block::gather(unsigned mask, std::uint64_t value, const char* what) {
   if ((mask & bit()) == 0) fail(std::string(what) + " with a mask that it is not of");
   if ((mask & ~w.there) != 0) fail(std::string(what) + " waits for threads that the block has not");
   if ((mask & w.done) != 0) {
-    fail(std::string(what) + " waits for thread " + std::to_string(current_ / kWarp * kWarp + first_of(mask & w.done)) +
-         ", which has ended");
+    fail(std::string(what) + " waits for thread " +
+         std::to_string(current_ / kWarp * kWarp + first_of(mask & w.done)) + ", which has ended");
   }
   Thread* const lanes = &threads_[current_ / kWarp * kWarp];
   Thread& t = self();
@@ -311,7 +313,8 @@ bool Block::wake_paused() {
   return any && ++in_vain_ < kMostInVain;
 }
 
-void Block::run(const Launch& launch, const dim3& at, const char* name, void (*thread)(const void*), const void* arguments) {
+void Block::run(const Launch& launch, const dim3& at, const char* name, void (*thread)(const void*),
+                const void* arguments) {
   name_ = name;
   at_ = at;
   thread_ = thread;
@@ -329,7 +332,8 @@ void Block::run(const Launch& launch, const dim3& at, const char* name, void (*t
   for (unsigned i = 0; i < size_; ++i) {
     Thread& t = threads_[i];
     if (t.stack == nullptr) prepare(t);
-    t.index = dim3(i % launch.block.x, i / launch.block.x % launch.block.y, i / launch.block.x / launch.block.y);
+    t.index = dim3(i % launch.block.x, i / launch.block.x % launch.block.y,
+                   i / launch.block.x / launch.block.y);
   }
   const unsigned count = (size_ + kWarp - 1) / kWarp;
   for (unsigned i = 0; i < count; ++i) {
@@ -375,7 +379,9 @@ std::string Block::who_waits() const {
 
 }  // namespace
 
-Gathered& gather(unsigned mask, std::uint64_t value, const char* what) { return block().gather(mask, value, what); }
+Gathered& gather(unsigned mask, std::uint64_t value, const char* what) {
+  return block().gather(mask, value, what);
+}
 int block_barrier(int number) { return block().barrier(number); }
 void interleave() { block().interleave(); }
 void pause() { block().pause(); }
@@ -393,7 +399,8 @@ void finish_copies() {
   copies.clear();
 }
 
-void run_grid(const Launch& launch, const char* name, void (*thread)(const void*), const void* arguments) {
+void run_grid(const Launch& launch, const char* name, void (*thread)(const void*),
+              const void* arguments) {
   const dim3& g = launch.grid;
   const std::uint64_t blocks = std::uint64_t{g.x} * g.y * g.z;
   // Each once, in an order of its own: a step that shares no divisor with their number.
@@ -406,8 +413,10 @@ void run_grid(const Launch& launch, const char* name, void (*thread)(const void*
     at = rng.below(blocks);
   }
   for (std::uint64_t i = 0; i < blocks; ++i, at = (at + step) % blocks) {
-    block().run(launch, dim3(static_cast<unsigned>(at % g.x), static_cast<unsigned>(at / g.x % g.y),
-                             static_cast<unsigned>(at / g.x / g.y)), name, thread, arguments);
+    block().run(launch,
+                dim3(static_cast<unsigned>(at % g.x), static_cast<unsigned>(at / g.x % g.y),
+                     static_cast<unsigned>(at / g.x / g.y)),
+                name, thread, arguments);
   }
 }
 

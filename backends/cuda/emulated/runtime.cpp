@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "cuda_runtime.h"
-
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
@@ -11,9 +9,11 @@
 #include <new>
 #include <vector>
 
+#include "cuda_runtime.h"
 #include "settings.hpp"
 
-// Streams, events, graphs and memory of the emulated device. A stream is a queue that is worked off by whoever waits.
+// Streams, events, graphs and memory of the emulated device. A stream is a queue that is worked off by
+// whoever waits.
 
 using gsnav::emulated::Work;
 
@@ -75,11 +75,13 @@ void work_off(CUstream_st& s, std::uint64_t until) {
 }
 void work_off(CUstream_st& s) { work_off(s, ~std::uint64_t{0}); }
 
-cudaError_t allocate(void** p, std::size_t bytes, std::map<const void*, std::size_t> Device::*kind, bool counts) {
+cudaError_t allocate(void** p, std::size_t bytes, std::map<const void*, std::size_t> Device::*kind,
+                     bool counts) {
   Device& d = device();
   const std::lock_guard lock(d.mutex);
   if (counts && bytes > kDeviceBytes - d.used) return failed(cudaErrorMemoryAllocation);
-  void* const memory = std::aligned_alloc(kAlign, (std::max<std::size_t>(bytes, 1) + kAlign - 1) / kAlign * kAlign);
+  void* const memory =
+      std::aligned_alloc(kAlign, (std::max<std::size_t>(bytes, 1) + kAlign - 1) / kAlign * kAlign);
   if (memory == nullptr) return failed(cudaErrorMemoryAllocation);
   // What nobody has written has no meaning: another one with each seed.
   std::memset(memory, gsnav::emulated::seed() % 2 == 0 ? 0xcb : 0x3e, bytes);
@@ -108,7 +110,8 @@ bool lies_in(const std::map<const void*, std::size_t>& blocks, const void* p, st
   auto after = blocks.upper_bound(p);
   if (after == blocks.begin()) return false;
   --after;
-  const auto offset = static_cast<std::size_t>(static_cast<const char*>(p) - static_cast<const char*>(after->first));
+  const auto offset =
+      static_cast<std::size_t>(static_cast<const char*>(p) - static_cast<const char*>(after->first));
   return offset + bytes <= after->second;
 }
 
@@ -156,12 +159,18 @@ cudaError_t set_attribute(cudaFuncAttribute, int value) {
 cudaError_t cudaGetLastError() { return std::exchange(last_error, cudaSuccess); }
 const char* cudaGetErrorString(cudaError_t error) {
   switch (error) {
-    case cudaSuccess: return "no error";
-    case cudaErrorMemoryAllocation: return "out of memory";
-    case cudaErrorInvalidConfiguration: return "invalid configuration argument";
-    case cudaErrorInvalidDevice: return "invalid device ordinal";
-    case cudaErrorStreamCaptureUnsupported: return "operation not permitted when stream is capturing";
-    default: return "invalid argument";
+    case cudaSuccess:
+      return "no error";
+    case cudaErrorMemoryAllocation:
+      return "out of memory";
+    case cudaErrorInvalidConfiguration:
+      return "invalid configuration argument";
+    case cudaErrorInvalidDevice:
+      return "invalid device ordinal";
+    case cudaErrorStreamCaptureUnsupported:
+      return "operation not permitted when stream is capturing";
+    default:
+      return "invalid argument";
   }
 }
 cudaError_t cudaGetDeviceCount(int* count) {
@@ -172,7 +181,9 @@ cudaError_t cudaGetDevice(int* device) {
   *device = 0;
   return cudaSuccess;
 }
-cudaError_t cudaSetDevice(int device) { return failed(device == 0 ? cudaSuccess : cudaErrorInvalidDevice); }
+cudaError_t cudaSetDevice(int device) {
+  return failed(device == 0 ? cudaSuccess : cudaErrorInvalidDevice);
+}
 cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int) {
   std::strcpy(properties->name, "emulated on the host");
   return cudaSuccess;
@@ -196,11 +207,15 @@ cudaError_t cudaDeviceSynchronize() {
   return cudaSuccess;
 }
 
-cudaError_t cudaMallocBytes(void** p, std::size_t bytes) { return allocate(p, bytes, &Device::blocks, true); }
+cudaError_t cudaMallocBytes(void** p, std::size_t bytes) {
+  return allocate(p, bytes, &Device::blocks, true);
+}
 cudaError_t cudaMallocAsyncBytes(void** p, std::size_t bytes, cudaStream_t) {
   return allocate(p, bytes, &Device::blocks, true);
 }
-cudaError_t cudaMallocHostBytes(void** p, std::size_t bytes) { return allocate(p, bytes, &Device::pinned, false); }
+cudaError_t cudaMallocHostBytes(void** p, std::size_t bytes) {
+  return allocate(p, bytes, &Device::pinned, false);
+}
 cudaError_t cudaFree(void* p) {
   cudaDeviceSynchronize();
   return release(p, &Device::blocks, true);
@@ -214,14 +229,16 @@ cudaError_t cudaFreeAsync(void* p, cudaStream_t stream) {
   return gsnav::emulated::enqueue(stream, [p] { release(p, &Device::blocks, true); });
 }
 
-cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind, cudaStream_t stream) {
+cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind,
+                            cudaStream_t stream) {
   Device& d = device();
   const bool to_device = kind == cudaMemcpyHostToDevice || kind == cudaMemcpyDeviceToDevice;
   const bool from_device = kind == cudaMemcpyDeviceToHost || kind == cudaMemcpyDeviceToDevice;
   bool pinned_from = false, pinned_to = false;
   {
     const std::lock_guard lock(d.mutex);
-    if ((to_device && !lies_in(d.blocks, to, bytes)) || (from_device && !lies_in(d.blocks, from, bytes))) {
+    if ((to_device && !lies_in(d.blocks, to, bytes)) ||
+        (from_device && !lies_in(d.blocks, from, bytes))) {
       return failed(cudaErrorInvalidValue);
     }
     pinned_from = lies_in(d.pinned, from, bytes);
@@ -229,11 +246,13 @@ cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaM
   }
   CUstream_st& s = of(stream);
   const std::lock_guard lock(s.mutex);
-  if (s.capture == nullptr && !from_device && !pinned_from) {  // pageable memory may change when this returns
+  if (s.capture == nullptr && !from_device &&
+      !pinned_from) {  // pageable memory may change when this returns
     const auto* const bytes_of = static_cast<const unsigned char*>(from);
-    return gsnav::emulated::enqueue(stream, [to, copy = std::vector<unsigned char>(bytes_of, bytes_of + bytes)] {
-      std::memcpy(to, copy.data(), copy.size());
-    });
+    return gsnav::emulated::enqueue(stream,
+                                    [to, copy = std::vector<unsigned char>(bytes_of, bytes_of + bytes)] {
+                                      std::memcpy(to, copy.data(), copy.size());
+                                    });
   }
   gsnav::emulated::enqueue(stream, [to, from, bytes] { std::memmove(to, from, bytes); });
   if (s.capture == nullptr && !to_device && !pinned_to) work_off(s);
@@ -276,7 +295,8 @@ cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
 }
 cudaError_t cudaStreamWaitEvent(cudaStream_t stream, cudaEvent_t event, unsigned) {
   if (event->stream == nullptr) return cudaSuccess;
-  return gsnav::emulated::enqueue(stream, [waited = event->stream, at = event->at] { work_off(*waited, at); });
+  return gsnav::emulated::enqueue(stream,
+                                  [waited = event->stream, at = event->at] { work_off(*waited, at); });
 }
 cudaError_t cudaLaunchHostFunc(cudaStream_t stream, cudaHostFn_t function, void* data) {
   return gsnav::emulated::enqueue(stream, [function, data] { function(data); });

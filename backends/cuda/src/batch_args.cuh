@@ -24,8 +24,8 @@ struct BatchInstance {
   std::uint32_t camera;
 };
 
-/// What projection reads of an instance for each of its rows where rules are plain (BatchArgs::plain_cameras): together what
-/// is read together, in loads of 16 bytes.
+/// What projection reads of an instance for each of its rows where rules are plain
+/// (BatchArgs::plain_cameras): together what is read together, in loads of 16 bytes.
 struct PlainCamera {
   struct alignas(16) Key {
     float offset[3], near_plane;
@@ -51,15 +51,17 @@ inline constexpr std::uint32_t kPartsPerChunk = kProjectChunk / kChunkPart;
 /// Of a set with so few instances a warp tests parts at once, a lane a part and an instance.
 inline constexpr std::uint32_t kFewInstances = 32 / kPartsPerChunk;
 
-/// A set of the call. Of few instances a unit of culling has as many chunks as a warp has room for, seen by all of
-/// them; of more it is one chunk, seen by 32: first_unit + word * chunks + chunk.
+/// A set of the call. Of few instances a unit of culling has as many chunks as a warp has room for, seen
+/// by all of them; of more it is one chunk, seen by 32: first_unit + word * chunks + chunk.
 struct BatchSet {
   std::uint64_t first_unit;
   std::uint32_t first_instance, instances, chunks;
   __host__ __device__ bool has_few() const { return instances <= kFewInstances; }
   __host__ __device__ std::uint32_t words() const { return (instances + 31) / 32; }
   /// Of a unit.
-  __host__ __device__ std::uint32_t unit_chunks() const { return has_few() ? kFewInstances / instances : 1; }
+  __host__ __device__ std::uint32_t unit_chunks() const {
+    return has_few() ? kFewInstances / instances : 1;
+  }
   __host__ __device__ std::uint64_t units() const {
     return std::uint64_t{words()} * ((chunks + unit_chunks() - 1) / unit_chunks());
   }
@@ -79,8 +81,8 @@ struct alignas(16) SplatRecord {
   std::uint32_t x, y;  ///< bounds: first | end << 16
 };
 
-/// A survivor as binning reads it where lists are counted first: a TileWindow, without tiles where a warp of its own
-/// bins it. `camera` is kNoSlot where a slot was taken and not used.
+/// A survivor as binning reads it where lists are counted first: a TileWindow, without tiles where a
+/// warp of its own bins it. `camera` is kNoSlot where a slot was taken and not used.
 struct alignas(16) SplatEntry {
   std::uint32_t key, corner, tiles, camera;
 };
@@ -95,7 +97,8 @@ struct Pair {
   std::uint32_t key, slot;
 };
 
-/// A survivor whose tiles are still to be found. `camera` is kNoSlot where its place was taken and not used.
+/// A survivor whose tiles are still to be found. `camera` is kNoSlot where its place was taken and not
+/// used.
 struct SplatKey {
   std::uint32_t slot, key, camera;
 };
@@ -112,23 +115,26 @@ struct alignas(16) LargeRow {
   std::uint32_t row;
 };
 
-/// A part of a tile's list that is put in order by itself: pairs [begin, end), which are whole bins of depth from `bin` on.
+/// A part of a tile's list that is put in order by itself: pairs [begin, end), which are whole bins of
+/// depth from `bin` on.
 struct alignas(16) ListPart {
   std::uint32_t tile, bin, begin, end;
 };
 /// Of an entry of tile_order: the tile's list is in order already.
 inline constexpr std::uint32_t kListInOrder = 0x80000000u;
-inline constexpr std::uint32_t kOrderBatch = 512;  ///< pairs of a list that a block puts in order at a time
-inline constexpr std::uint32_t kPartLength = 128;  ///< part p has the bins that begin so many pairs apart
+inline constexpr std::uint32_t kOrderBatch =
+    512;  ///< pairs of a list that a block puts in order at a time
+inline constexpr std::uint32_t kPartLength =
+    128;  ///< part p has the bins that begin so many pairs apart
 
 inline constexpr int kMinDepthBits = 6, kMaxDepthBits = 9;
 
-/// Where cameras are few, lists are kept in bins of depth, an octave's share each, so that many blocks can put one
-/// in order.
+/// Where cameras are few, lists are kept in bins of depth, an octave's share each, so that many blocks
+/// can put one in order.
 struct DepthBins {
   std::uint32_t base;  ///< the key that bin 0 begins at; nearer ones are in it too
   int shift;           ///< a bin is 2^shift keys
-  int bits;            ///< 2^bits bins: 0, or kMinDepthBits to kMaxDepthBits; the last has all that is farther
+  int bits;  ///< 2^bits bins: 0, or kMinDepthBits to kMaxDepthBits; the last has all that is farther
   __host__ __device__ bool many() const { return bits != 0; }
   __device__ std::uint32_t count() const { return 1u << bits; }
   __device__ std::uint32_t of(std::uint32_t key) const {
@@ -137,8 +143,8 @@ struct DepthBins {
   bool operator==(const DepthBins&) const = default;
 };
 
-/// Counts go on where capacities end, so that they say what would have been needed. Each has a line of memory of its own:
-/// what adds to counters of one line is served one after the other.
+/// Counts go on where capacities end, so that they say what would have been needed. Each has a line of
+/// memory of its own: what adds to counters of one line is served one after the other.
 struct BatchCounters {
   static constexpr std::size_t kLine = 256;
   alignas(kLine) unsigned long long slots;
@@ -148,22 +154,24 @@ struct BatchCounters {
   alignas(kLine) unsigned long long pairs;
   alignas(kLine) unsigned long long beyond;
   alignas(kLine) unsigned long long placed;  ///< of those beyond
-  alignas(kLine) unsigned long long alt;  ///< of lists that may need places in pairs_alt, where lists have room
+  alignas(kLine) unsigned long long alt;     ///< of lists that may need places in pairs_alt, where lists
+                                             ///< have room
   alignas(kLine) std::uint32_t items;
   alignas(kLine) std::uint32_t parts;
   alignas(kLine) std::uint32_t long_parts;
-  alignas(kLine) std::uint32_t tiles_of_length[33];  ///< by leading zeros of a tile's count: long lists first
-  std::uint32_t ordered_of_length[33];               ///< of these in tile_order already
+  alignas(kLine) std::uint32_t
+      tiles_of_length[33];              ///< by leading zeros of a tile's count: long lists first
+  std::uint32_t ordered_of_length[33];  ///< of these in tile_order already
 };
 
 /// By value to every kernel.
 struct BatchArgs {
   const BatchSet* sets;
   const BatchInstance* instances;
-  /// One an instance where rules are plain: Response::ewa, Compat::none, SortOrder::z_depth, no mip filter, no near_sigma, no
-  /// set with axes, rotations of SH or origins; else null.
+  /// One an instance where rules are plain: Response::ewa, Compat::none, SortOrder::z_depth, no mip
+  /// filter, no near_sigma, no set with axes, rotations of SH or origins; else null.
   const PlainCamera* plain_cameras;
-  const std::uint32_t* camera_first;      ///< [cameras + 1] into camera_instances
+  const std::uint32_t* camera_first;  ///< [cameras + 1] into camera_instances
   const std::uint32_t* camera_instances;
   std::uint64_t units;
   std::uint32_t set_count, cameras, tiles;  ///< tiles of all cameras
@@ -179,30 +187,32 @@ struct BatchArgs {
   BatchCounters* counters;
   SplatRecord* records;
   SplatEntry* entries;
-  std::uint32_t* sources;  ///< per slot: first_rank of its instance + row as stored
-  SplatDepth<float>* depths;              ///< null: no image sums depths, and medians are few beside survivors
+  std::uint32_t* sources;     ///< per slot: first_rank of its instance + row as stored
+  SplatDepth<float>* depths;  ///< null: no image sums depths, and medians are few beside survivors
   SplatPerspective<float>* perspectives;  ///< null: Response::ewa
   HardSplat* hard;
   SplatKey* several;
   LargeRow* large;
-  /// [tiles << depth_bins.bits]: how many pairs; where the next goes, once lists have their places; where bins
-  /// end, once all are there.
+  /// [tiles << depth_bins.bits]: how many pairs; where the next goes, once lists have their places;
+  /// where bins end, once all are there.
   std::uint32_t* bins;
-  /// Pairs that each list has room for, tile by tile; the rest of longer ones lies behind all of them. 0: lists are counted
-  /// first, and follow one another.
+  /// Pairs that each list has room for, tile by tile; the rest of longer ones lies behind all of them.
+  /// 0: lists are counted first, and follow one another.
   std::uint32_t list_room;
   std::uint32_t* tile_counts;
   std::uint32_t* tile_begins;
-  uint2* tile_shifts;  ///< to places of what is beyond the room; to those in pairs_alt. Null: lists are counted first
-  /// The order that tiles are begun in: longest lists first, so that none is waited for. With kListInOrder.
+  uint2* tile_shifts;  ///< to places of what is beyond the room; to those in pairs_alt. Null: lists are
+                       ///< counted first
+  /// The order that tiles are begun in: longest lists first, so that none is waited for. With
+  /// kListInOrder.
   std::uint32_t* tile_order;
   ListPart* parts;            ///< where there are many bins of depth
   std::uint32_t* long_parts;  ///< those that a warp has not put in order
-  Pair* pairs;      ///< of a tile together: in no order, or in order once order_lists has been there
+  Pair* pairs;  ///< of a tile together: in no order, or in order once order_lists has been there
   Pair* pairs_alt;
   BeyondPair* beyond;
   std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, part_capacity;
-  std::uint32_t pair_capacity;                                  ///< where lists are counted first
+  std::uint32_t pair_capacity;                  ///< where lists are counted first
   std::uint32_t beyond_capacity, alt_capacity;  ///< where they have room
   std::uint32_t slab;  ///< slots that a warp takes at a time: few cameras leave few to share them
   bool operator==(const BatchArgs&) const = default;
@@ -213,8 +223,14 @@ __device__ inline std::uint32_t used(unsigned long long count, std::uint32_t cap
 }
 
 __device__ inline SplatGeometry<float> geometry_of(const SplatRecord& r) {
-  return {static_cast<float>(r.ref & 0xffffu) + 0.5f, static_cast<float>(r.ref >> 16) + 0.5f,
-          r.a, r.k, r.b, r.w1, r.w2, r.log2_opacity};
+  return {static_cast<float>(r.ref & 0xffffu) + 0.5f,
+          static_cast<float>(r.ref >> 16) + 0.5f,
+          r.a,
+          r.k,
+          r.b,
+          r.w1,
+          r.w2,
+          r.log2_opacity};
 }
 
 __device__ inline SplatBounds bounds_of(std::uint32_t x, std::uint32_t y) {
@@ -225,10 +241,9 @@ __device__ inline SplatBounds bounds_of(std::uint32_t x, std::uint32_t y) {
 /// The instance, among a camera's, that a source belongs to.
 __device__ inline const BatchInstance& instance_of(const BatchArgs& a, std::uint32_t camera,
                                                    std::uint32_t source) {
-  const std::uint32_t place =
-      last_start(a.camera_first[camera], a.camera_first[camera + 1], [&](std::uint32_t i) {
-        return a.instances[a.camera_instances[i]].args.first_rank <= source;
-      });
+  const std::uint32_t place = last_start(
+      a.camera_first[camera], a.camera_first[camera + 1],
+      [&](std::uint32_t i) { return a.instances[a.camera_instances[i]].args.first_rank <= source; });
   return a.instances[a.camera_instances[place]];
 }
 

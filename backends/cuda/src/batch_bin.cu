@@ -3,8 +3,8 @@
 
 #include "batch_lists.cuh"
 
-// Tile lists of a batch: of few cameras counted, placed and written; of many written at once, into the room that each has,
-// and most of them by projection. Their order is decided where they are read.
+// Tile lists of a batch: of few cameras counted, placed and written; of many written at once, into the
+// room that each has, and most of them by projection. Their order is decided where they are read.
 
 namespace gsnav::cuda {
 
@@ -12,9 +12,9 @@ namespace {
 
 constexpr unsigned kThreads = 128;
 
-/// Calls f(splat, tile, wanted), by all lanes together, for the tiles of the large splats: a lane finds those of a
-/// row. A warp's rows lie far apart in the queue: neighbours are mostly of one splat, and a warp that has all of the
-/// largest would be waited for.
+/// Calls f(splat, tile, wanted), by all lanes together, for the tiles of the large splats: a lane finds
+/// those of a row. A warp's rows lie far apart in the queue: neighbours are mostly of one splat, and a
+/// warp that has all of the largest would be waited for.
 template <class F>
 __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
   constexpr unsigned kAll = 0xffffffffu;
@@ -32,10 +32,12 @@ __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
       const SplatBounds b = bounds_of(r.x, r.y);
       const int y = static_cast<int>(part.row) * ts;
       const SplatBounds row{b.x0, max(b.y0, y), b.x1, min(b.y1, y + ts)};
-      for_each_tile_row(a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](int ty, int first, int last) {
-        begin = first_tile(a, splat.camera) + static_cast<std::uint32_t>(ty * a.grid.columns + first);
-        count = static_cast<std::uint32_t>(last - first + 1);
-      });
+      for_each_tile_row(
+          a.grid, geometry_of(r), row, a.log2_alpha_min, a.elliptic, [&](int ty, int first, int last) {
+            begin =
+                first_tile(a, splat.camera) + static_cast<std::uint32_t>(ty * a.grid.columns + first);
+            count = static_cast<std::uint32_t>(last - first + 1);
+          });
     }
     share_in_warp(count, [&](unsigned owner, std::uint32_t k) {
       const unsigned from = owner % 32;
@@ -47,11 +49,13 @@ __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
 
 /// The same for the windows of a warp's lanes.
 template <class F>
-__device__ void for_each_tile_of_windows(const BatchArgs& a, const SplatKey& splat, const TileWindow& window, const F& f) {
+__device__ void for_each_tile_of_windows(const BatchArgs& a, const SplatKey& splat,
+                                         const TileWindow& window, const F& f) {
   constexpr unsigned kAll = 0xffffffffu;
   share_in_warp(static_cast<std::uint32_t>(__popc(window.tiles)), [&](unsigned owner, std::uint32_t k) {
     const unsigned from = owner % 32;
-    const TileWindow shared{__shfl_sync(kAll, window.corner, from), __shfl_sync(kAll, window.tiles, from)};
+    const TileWindow shared{__shfl_sync(kAll, window.corner, from),
+                            __shfl_sync(kAll, window.tiles, from)};
     const std::uint32_t camera = __shfl_sync(kAll, splat.camera, from);
     f(SplatKey{__shfl_sync(kAll, splat.slot, from), __shfl_sync(kAll, splat.key, from), camera},
       tile_of(a, camera, shared, nth_bit<16>(shared.tiles, k)), owner < 32);
@@ -71,12 +75,13 @@ __device__ void for_each_tile_of_several(const BatchArgs& a, const K& known, con
       const SplatRecord& r = a.records[splat.slot];
       const SplatBounds bounds = bounds_of(r.x, r.y);
       window.corner = window_of(a, bounds).corner;
-      for_each_tile_row(a.grid, geometry_of(r), bounds, a.log2_alpha_min, a.elliptic,
-                        [&](int ty, int first, int last) {
-                          const std::uint32_t row = static_cast<std::uint32_t>(ty) - window.row(),
-                                              column = static_cast<std::uint32_t>(first) - window.column();
-                          window.tiles |= ((2u << (last - first)) - 1u) << (row * TileWindow::kSide + column);
-                        });
+      for_each_tile_row(
+          a.grid, geometry_of(r), bounds, a.log2_alpha_min, a.elliptic,
+          [&](int ty, int first, int last) {
+            const std::uint32_t row = static_cast<std::uint32_t>(ty) - window.row(),
+                                column = static_cast<std::uint32_t>(first) - window.column();
+            window.tiles |= ((2u << (last - first)) - 1u) << (row * TileWindow::kSide + column);
+          });
       known(splat, window);
     }
     for_each_tile_of_windows(a, splat, window, f);
@@ -90,7 +95,11 @@ __global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
   };
   for_each_tile_of_large(a, count);
   for_each_tile_of_several(
-      a, [&](const SplatKey& splat, const TileWindow& window) { a.entries[splat.slot].tiles = window.tiles; }, count);
+      a,
+      [&](const SplatKey& splat, const TileWindow& window) {
+        a.entries[splat.slot].tiles = window.tiles;
+      },
+      count);
 }
 
 /// Writes the pairs of splats whose tiles projection has not found.
@@ -101,7 +110,8 @@ __global__ void __launch_bounds__(kThreads) list_kernel(const BatchArgs a) {
     pairs.put(a, tile, {splat.key, splat.slot});
   };
   for_each_tile_of_large(a, list);
-  for_each_tile_of_several(a, [](const SplatKey&, const TileWindow&) {}, list);
+  for_each_tile_of_several(
+      a, [](const SplatKey&, const TileWindow&) {}, list);
 }
 
 /// Puts the block's share of the tiles into tile_order.
@@ -117,7 +127,8 @@ __device__ void order_tiles(const BatchArgs& a) {
     if (threadIdx.x < 33 && taken[threadIdx.x] != 0) {
       std::uint32_t longer = 0;
       for (unsigned l = 0; l < threadIdx.x; ++l) longer += a.counters->tiles_of_length[l];
-      places[threadIdx.x] = longer + atomicAdd(a.counters->ordered_of_length + threadIdx.x, taken[threadIdx.x]);
+      places[threadIdx.x] =
+          longer + atomicAdd(a.counters->ordered_of_length + threadIdx.x, taken[threadIdx.x]);
     }
     __syncthreads();
     if (tile < a.tiles) a.tile_order[places[length] + at] = tile;
@@ -150,8 +161,8 @@ __global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
 }
 
 /// Takes the place of a tile's list of `total` pairs, and remembers it. One lane calls it.
-__device__ std::uint32_t place_list(const BatchArgs& a, std::uint32_t tile, std::uint32_t total, unsigned long long base,
-                                    std::uint32_t* of_length) {
+__device__ std::uint32_t place_list(const BatchArgs& a, std::uint32_t tile, std::uint32_t total,
+                                    unsigned long long base, std::uint32_t* of_length) {
   // By the count that is left below, which is what order_tiles reads.
   const std::uint32_t begin = used(base, a.pair_capacity), kept = min(total, a.pair_capacity - begin);
   a.tile_begins[tile] = begin;
@@ -164,12 +175,15 @@ __device__ std::uint32_t place_list(const BatchArgs& a, std::uint32_t tile, std:
 __device__ void measure_lists(const BatchArgs& a, std::uint32_t* of_length) {
   const bool whole = a.counters->beyond <= a.beyond_capacity;
   const std::uint32_t rooms = a.tiles * a.list_room, end = (a.tiles + 31) / 32 * 32;
-  for (std::uint32_t tile = blockIdx.x * kThreads + threadIdx.x; tile < end; tile += gridDim.x * kThreads) {
+  for (std::uint32_t tile = blockIdx.x * kThreads + threadIdx.x; tile < end;
+       tile += gridDim.x * kThreads) {
     std::uint32_t count = tile < a.tiles ? a.bins[tile] : 0;
-    const std::uint32_t begin = tile * a.list_room, beyond = count > a.list_room ? count - a.list_room : 0,
+    const std::uint32_t begin = tile * a.list_room,
+                        beyond = count > a.list_room ? count - a.list_room : 0,
                         apart = count > kOrderBatch ? count : 0;
     take_places(&a.counters->pairs, count);
-    const std::uint32_t rest = rooms + static_cast<std::uint32_t>(take_places(&a.counters->placed, beyond));
+    const std::uint32_t rest =
+        rooms + static_cast<std::uint32_t>(take_places(&a.counters->placed, beyond));
     const unsigned long long alt = take_places(&a.counters->alt, apart);
     if (tile >= a.tiles) continue;
     // What has no place is left out: the call will be repeated.
@@ -182,14 +196,16 @@ __device__ void measure_lists(const BatchArgs& a, std::uint32_t* of_length) {
   }
 }
 
-/// Places of lists in bins, which follow one another in no particular order: a warp a tile. Also what order_kernel has
-/// to do.
+/// Places of lists in bins, which follow one another in no particular order: a warp a tile. Also what
+/// order_kernel has to do.
 __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
   constexpr unsigned kAll = 0xffffffffu, kMost = (1u << kMaxDepthBits) / 64;
-  const unsigned lane = threadIdx.x % 32, mine = a.depth_bins.count() / 64;  // of a lane: pairs of bins, neighbours
+  const unsigned lane = threadIdx.x % 32,
+                 mine = a.depth_bins.count() / 64;  // of a lane: pairs of bins, neighbours
   for (std::uint32_t tile = (blockIdx.x * kThreads + threadIdx.x) / 32; tile < a.tiles;
        tile += gridDim.x * kThreads / 32) {
-    uint2* const bins = reinterpret_cast<uint2*>(a.bins + (std::size_t{tile} << a.depth_bins.bits)) + lane * mine;
+    uint2* const bins =
+        reinterpret_cast<uint2*>(a.bins + (std::size_t{tile} << a.depth_bins.bits)) + lane * mine;
     uint2 counts[kMost];
     std::uint32_t sum = 0, last = 0;  // of all; in the last bin
 #pragma unroll
@@ -217,9 +233,11 @@ __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
     }
     begin = __shfl_sync(kAll, begin, 0);
     first_part = __shfl_sync(kAll, first_part, 0);
-    // A part begins with the first bin that begins at or after it; `before`: where the bin before begins.
+    // A part begins with the first bin that begins at or after it; `before`: where the bin before
+    // begins.
     const bool fits = first_part + parts <= a.part_capacity;
-    const auto begin_bin = [&](std::uint32_t before, std::uint32_t at, std::uint32_t bin, std::uint32_t last_part) {
+    const auto begin_bin = [&](std::uint32_t before, std::uint32_t at, std::uint32_t bin,
+                               std::uint32_t last_part) {
       if (!fits) return;
       const std::uint32_t pair = min(begin + at, a.pair_capacity);
       for (std::uint32_t p = before / kPartLength + 1; p <= last_part; ++p) {
@@ -284,7 +302,9 @@ __global__ void __launch_bounds__(kThreads) beyond_kernel(const BatchArgs a) {
 
 void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
   const unsigned blocks = static_cast<unsigned>(multiprocessors) * 16;
-  const auto blocks_of = [&](unsigned tiles) { return std::min(blocks, (args.tiles + tiles - 1) / tiles); };
+  const auto blocks_of = [&](unsigned tiles) {
+    return std::min(blocks, (args.tiles + tiles - 1) / tiles);
+  };
   if (args.list_room != 0) {
     list_kernel<<<blocks, kThreads, 0, stream>>>(args);
     place_kernel<true><<<blocks_of(kThreads), kThreads, 0, stream>>>(args);

@@ -43,11 +43,11 @@ struct BlendShared {
   }
 };
 
-/// Puts the records of n splats, of which slot_of(i) is the i-th, into shared memory, and what they may reach. `far`:
-/// of the tile's meshes.
+/// Puts the records of n splats, of which slot_of(i) is the i-th, into shared memory, and what they may
+/// reach. `far`: of the tile's meshes.
 template <bool Mesh, class F>
-__device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int tile_x, int tile_y, float far,
-                      const F& slot_of) {
+__device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int tile_x, int tile_y,
+                      float far, const F& slot_of) {
   if (threadIdx.x == 0) s.splat(kNothing) = staged_nothing();
   const unsigned lane = threadIdx.x % 32;
   std::uint16_t* const queue = s.queues[threadIdx.x / 32];

@@ -146,7 +146,8 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
         drawn = alpha > 0;
       }
     }
-    if constexpr (D == DepthMode::median) median[k] = last_above_half(state[k].transmittance, slot, median[k]);
+    if constexpr (D == DepthMode::median)
+      median[k] = last_above_half(state[k].transmittance, slot, median[k]);
     blend_drawn<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, drawn, alpha, &color, depth,
                                                            px, py[k]);
   }

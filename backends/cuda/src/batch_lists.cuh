@@ -3,12 +3,14 @@
 
 #include "batch_tiles.cuh"
 
-// Pairs as they are found, into lists that have room for so many each: nothing is found twice. What comes beyond is queued.
+// Pairs as they are found, into lists that have room for so many each: nothing is found twice. What
+// comes beyond is queued.
 
 namespace gsnav::cuda {
 
-/// Pairs of one tile for each lane that wants one: their numbers in their lists are asked for, and used later. Lanes often share a
-/// list, and one may be in great demand: one atomic operation a list. All lanes of the warp call both together.
+/// Pairs of one tile for each lane that wants one: their numbers in their lists are asked for, and used
+/// later. Lanes often share a list, and one may be in great demand: one atomic operation a list. All
+/// lanes of the warp call both together.
 class WarpPairs {
  public:
   __device__ void ask(const BatchArgs& a, bool wanted, std::uint32_t tile) {
@@ -17,7 +19,8 @@ class WarpPairs {
     const unsigned lane = threadIdx.x % 32, peers = __match_any_sync(takers_, tile);
     leader_ = __ffs(static_cast<int>(peers)) - 1;
     before_ = static_cast<std::uint32_t>(__popc(peers & ((1u << lane) - 1)));
-    if (static_cast<int>(lane) == leader_) number_ = atomicAdd(a.bins + tile, static_cast<std::uint32_t>(__popc(peers)));
+    if (static_cast<int>(lane) == leader_)
+      number_ = atomicAdd(a.bins + tile, static_cast<std::uint32_t>(__popc(peers)));
   }
   __device__ void put(const BatchArgs& a, std::uint32_t tile, const Pair& pair) const {
     if (takers_ == 0) return;
@@ -31,9 +34,10 @@ class WarpPairs {
  private:
   static constexpr unsigned kAll = 0xffffffffu;
 
-  /// Of the lanes `late`. Rare, and not to weigh on what is not: nor may it be given the address of a kernel's arguments.
-  static __device__ __noinline__ void queue(unsigned long long* counter, BeyondPair* to, std::uint32_t capacity,
-                                            unsigned late, BeyondPair pair) {
+  /// Of the lanes `late`. Rare, and not to weigh on what is not: nor may it be given the address of a
+  /// kernel's arguments.
+  static __device__ __noinline__ void queue(unsigned long long* counter, BeyondPair* to,
+                                            std::uint32_t capacity, unsigned late, BeyondPair pair) {
     const unsigned lane = threadIdx.x % 32;
     unsigned long long place = 0;
     if (lane == 0) place = atomicAdd(counter, static_cast<unsigned long long>(__popc(late)));
@@ -60,7 +64,8 @@ class NearPairs {
     const int shift = a.grid.tile_shift();
     const int tx = b.x0 >> shift, ty = b.y0 >> shift;
     columns_ = static_cast<std::uint32_t>(a.grid.columns);
-    tile_ = first_tile(a, camera) + static_cast<std::uint32_t>(ty) * columns_ + static_cast<std::uint32_t>(tx);
+    tile_ = first_tile(a, camera) + static_cast<std::uint32_t>(ty) * columns_ +
+            static_cast<std::uint32_t>(tx);
     const bool right = (b.x1 - 1) >> shift != tx, below = (b.y1 - 1) >> shift != ty;
     pairs_[0].ask(a, wanted, tile_of(0));
     pairs_[1].ask(a, wanted && right, tile_of(1));

@@ -33,7 +33,8 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
   if (!flight.has_meshes) return {};
 
   // ---- what each camera sees
-  const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
   meshes.placements.clear();
   meshes.places.clear();
   meshes.chunk_begins.clear();

@@ -116,13 +116,16 @@ __device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const Batc
 struct PairsAt {
   Pair* pairs;
   std::uint32_t shift, rest, rest_shift;
-  __device__ Pair& operator[](std::uint32_t place) const { return pairs[place + (place < rest ? shift : rest_shift)]; }
+  __device__ Pair& operator[](std::uint32_t place) const {
+    return pairs[place + (place < rest ? shift : rest_shift)];
+  }
 };
 
-/// Sorts the n pairs from `begin_pair` on into s.slots. All keys lie in [low, high]; low > high: not known.
+/// Sorts the n pairs from `begin_pair` on into s.slots. All keys lie in [low, high]; low > high: not
+/// known.
 __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
-                                               const PairsAt pairs, std::uint32_t begin_pair, std::uint32_t n,
-                                               std::uint32_t low, std::uint32_t high) {
+                                               const PairsAt pairs, std::uint32_t begin_pair,
+                                               std::uint32_t n, std::uint32_t low, std::uint32_t high) {
   constexpr std::uint32_t kLongest = 64;  // bucket that is put in order by comparing all with all
   Pair pair[kOrderItems];
   std::uint32_t place[kOrderItems];
@@ -352,7 +355,8 @@ class TileOrder {
         return n;
       }
       ++level_;
-      ordering::partition(s, a, camera_, here, level_ % 2 == 0 ? bins_of_list(a) : list(a), begin, n, level_);
+      ordering::partition(s, a, camera_, here, level_ % 2 == 0 ? bins_of_list(a) : list(a), begin, n,
+                          level_);
     }
     return 0;
   }

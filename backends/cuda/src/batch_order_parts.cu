@@ -3,8 +3,8 @@
 
 #include "batch_order.cuh"
 
-// Few cameras: parts of lists are put in order by themselves, by a warp each, or by a block where they are long. Large
-// images: so are whole lists, where they are short.
+// Few cameras: parts of lists are put in order by themselves, by a warp each, or by a block where they
+// are long. Large images: so are whole lists, where they are short.
 
 namespace gsnav::cuda {
 
@@ -21,9 +21,9 @@ __device__ inline void put_in_order(std::uint64_t& first, std::uint64_t& second,
   second = swap ? was : second;
 }
 
-/// Puts the K * 32 values of a warp in ascending order, K neighbours a lane: a bitonic sort (Batcher, Sorting networks
-/// and their applications, 1968). All lanes call it. What is between lanes is a loop: unrolled it is longer than what
-/// instructions are cached in.
+/// Puts the K * 32 values of a warp in ascending order, K neighbours a lane: a bitonic sort (Batcher,
+/// Sorting networks and their applications, 1968). All lanes call it. What is between lanes is a loop:
+/// unrolled it is longer than what instructions are cached in.
 template <int K>
 __device__ void sort_in_warp(std::uint64_t (&v)[K]) {
   const unsigned lane = threadIdx.x % 32;
@@ -56,10 +56,11 @@ __device__ void sort_in_warp(std::uint64_t (&v)[K]) {
   }
 }
 
-/// Puts neighbours of equal keys in the order of their ranks. Depths that are equal by chance are two; false, and all
-/// is left as it is, where they are many.
+/// Puts neighbours of equal keys in the order of their ranks. Depths that are equal by chance are two;
+/// false, and all is left as it is, where they are many.
 template <int K>
-__device__ bool order_equals(const BatchArgs& a, std::uint32_t camera, std::uint64_t (&v)[K], std::uint32_t n) {
+__device__ bool order_equals(const BatchArgs& a, std::uint32_t camera, std::uint64_t (&v)[K],
+                             std::uint32_t n) {
   constexpr int kMost = 8;
   const unsigned lane = threadIdx.x % 32;
   const auto key = [](std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); };
@@ -145,7 +146,8 @@ __global__ void __launch_bounds__(kThreads) order_kernel(const BatchArgs a) {
   for (std::uint32_t p = blockIdx.x * kWarps + threadIdx.x / 32; p < count; p += gridDim.x * kWarps) {
     const ListPart part = a.parts[p];
     const std::uint32_t n = part.end - part.begin, camera = part.tile / tiles;
-    const bool done = n <= 128 ? order_part<4>(a, part, camera) : n <= 256 && order_part<8>(a, part, camera);
+    const bool done =
+        n <= 128 ? order_part<4>(a, part, camera) : n <= 256 && order_part<8>(a, part, camera);
     if (!done && threadIdx.x % 32 == 0) a.long_parts[atomicAdd(&a.counters->long_parts, 1u)] = p;
   }
 }
@@ -168,7 +170,8 @@ __global__ void __launch_bounds__(kThreads) order_long_kernel(const BatchArgs a)
   }
 }
 
-/// A warp a list; what is too long for one, or has many equal keys, is left to be put in order as it is drawn.
+/// A warp a list; what is too long for one, or has many equal keys, is left to be put in order as it is
+/// drawn.
 __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a) {
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
   for (std::uint32_t i = blockIdx.x * kWarps + threadIdx.x / 32; i < a.tiles; i += gridDim.x * kWarps) {
@@ -176,8 +179,8 @@ __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a
     const std::uint32_t begin = a.tile_begins[tile];
     const ListPart list{tile, 0, begin, begin + n};
     const bool together = n <= a.list_room;
-    const bool done = !together ? false
-                      : n <= 64    ? order_part<2>(a, list, camera)
+    const bool done = !together  ? false
+                      : n <= 64  ? order_part<2>(a, list, camera)
                       : n <= 128 ? order_part<4>(a, list, camera)
                                  : n <= 256 && order_part<8>(a, list, camera);
     if (done && threadIdx.x % 32 == 0) a.tile_order[i] = tile | kListInOrder;
@@ -189,7 +192,8 @@ __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a
 void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
   const unsigned processors = static_cast<unsigned>(multiprocessors);
   if (args.short_lists) {
-    order_lists_kernel<<<std::min(processors * 16, (args.tiles + kWarps - 1) / kWarps), kThreads, 0, stream>>>(args);
+    order_lists_kernel<<<std::min(processors * 16, (args.tiles + kWarps - 1) / kWarps), kThreads, 0,
+                         stream>>>(args);
     return;
   }
   order_kernel<<<processors * 8, kThreads, 0, stream>>>(args);

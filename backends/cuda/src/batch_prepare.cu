@@ -12,11 +12,12 @@ namespace gsnav {
 
 namespace cuda {
 
-Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras, const RenderConfig& config) {
+Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+                   const RenderConfig& config) {
   if (cameras.empty()) return {Errc::invalid_argument, "CudaBatchRenderer: no camera to render from"};
   if (cameras.size() > 65535) {
-    return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(cameras.size()) +
-                                   " cameras: at most 65535 a call"};
+    return {Errc::unsupported,
+            "CudaBatchRenderer: " + std::to_string(cameras.size()) + " cameras: at most 65535 a call"};
   }
   for (std::size_t i = 0; i < sets.size(); ++i) {
     if (Status s = validate(sets[i]); !s) {
@@ -25,7 +26,8 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
     const auto unsupported = [&](const char* what) {
       return Status(Errc::unsupported, "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + what);
     };
-    if (sets[i].color_space != config.blend_space) return unsupported("color_space is not the frame's blend_space");
+    if (sets[i].color_space != config.blend_space)
+      return unsupported("color_space is not the frame's blend_space");
   }
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const auto bad = [&](Errc code, const std::string& what) {
@@ -37,11 +39,14 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
       return bad(Errc::invalid_argument, "its size is not that of cameras[0]; a batch has one size");
     }
     if (!cameras[c].meshes.instances.empty() &&
-        (config.composite != Composite::merged || config.response != Response::ewa || config.compat != Compat::none)) {
-      return bad(Errc::unsupported, "meshes: only with Composite::merged, Response::ewa and Compat::none");
+        (config.composite != Composite::merged || config.response != Response::ewa ||
+         config.compat != Compat::none)) {
+      return bad(Errc::unsupported,
+                 "meshes: only with Composite::merged, Response::ewa and Compat::none");
     }
     if (any_seen_through(cameras[c].meshes.instances)) {
-      return bad(Errc::unsupported, "meshes that are seen through (MeshAlpha::blend): draw them one camera at a time");
+      return bad(Errc::unsupported,
+                 "meshes that are seen through (MeshAlpha::blend): draw them one camera at a time");
     }
     std::uint64_t gaussians = 0;
     const auto count = [&](std::size_t s) { gaussians += sets[s].gaussians.size; };
@@ -83,24 +88,26 @@ namespace {
 using cuda::BatchInstance;
 using cuda::BatchSet;
 
-/// Whether a call takes as long as its longest list, so that lists are to be short. `tiles`: of 16 pixels; `gaussians`: of
-/// all cameras. In larger images splats are larger too, and small tiles share too many; of more Gaussians lists are
-/// longer.
-bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussians, int multiprocessors) {
+/// Whether a call takes as long as its longest list, so that lists are to be short. `tiles`: of 16
+/// pixels; `gaussians`: of all cameras. In larger images splats are larger too, and small tiles share
+/// too many; of more Gaussians lists are longer.
+bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussians,
+               int multiprocessors) {
   constexpr std::uint64_t kSmallImage = 512, kManyGaussians = 2'500'000;
   const std::uint64_t at_a_time = gaussians >= kManyGaussians * cameras ? 32 : 16;
-  return tiles <= kSmallImage && cameras * tiles <= at_a_time * static_cast<std::uint64_t>(multiprocessors);
+  return tiles <= kSmallImage &&
+         cameras * tiles <= at_a_time * static_cast<std::uint64_t>(multiprocessors);
 }
 
-/// Whether lists of an image of so many tiles are short, for the most part: what takes a block long is then not to draw
-/// one but to put it in order.
+/// Whether lists of an image of so many tiles are short, for the most part: what takes a block long is
+/// then not to draw one but to put it in order.
 bool has_short_lists(std::uint64_t tiles, int multiprocessors) {
   return tiles > 16 * static_cast<std::uint64_t>(multiprocessors);
 }
 
-/// Eight octaves from the nearest near plane on, or from kNear, as finely as counters in the GPU's cache allow. An
-/// agent's near plane is a centimetre off: octaves up to its body's radius would be spent on nothing, and all that
-/// lies beyond 2.5 m would share the last bin.
+/// Eight octaves from the nearest near plane on, or from kNear, as finely as counters in the GPU's cache
+/// allow. An agent's near plane is a centimetre off: octaves up to its body's radius would be spent on
+/// nothing, and all that lies beyond 2.5 m would share the last bin.
 cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits, std::uint32_t tiles) {
   constexpr std::uint32_t kCounters = 1u << 22;
   constexpr int kOctaves = 3;      // log2
@@ -110,7 +117,8 @@ cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits
   double near_plane = cameras[0].camera.near_plane;
   for (const BatchCamera& c : cameras) near_plane = std::min<double>(near_plane, c.camera.near_plane);
   const KeyCode code = KeyCode::of(key_bits, static_cast<float>(near_plane));
-  // Bits of positive floats are in their order; of keys in fewer bits so are the codes, which begin at the near plane.
+  // Bits of positive floats are in their order; of keys in fewer bits so are the codes, which begin at
+  // the near plane.
   const float first = std::max(static_cast<float>(near_plane), kNear);
   const std::uint32_t base = code.base == 0 ? bits_of(first) : code(first);
   return {base, std::max(0, 23 - code.shift + kOctaves - bits), bits};
@@ -152,17 +160,19 @@ cuda::PlainCamera plain_camera(const BatchInstance& instance, const Vec3d& offse
 
 }  // namespace
 
-/// Of lists of the prepared call that hold so many pairs together: twice the mean. Few lists are much longer, but have much of
-/// the pairs.
+/// Of lists of the prepared call that hold so many pairs together: twice the mean. Few lists are much
+/// longer, but have much of the pairs.
 std::uint32_t CudaBatchRenderer::State::room_for(std::uint64_t pairs) const {
   constexpr std::uint64_t kPairs = 32;
   const std::uint64_t tiles = args.tiles;
-  return static_cast<std::uint32_t>(std::min<std::uint64_t>(
-      (2 * pairs + tiles * kPairs) / (tiles * kPairs) * kPairs, std::numeric_limits<std::uint32_t>::max()));
+  return static_cast<std::uint32_t>(
+      std::min<std::uint64_t>((2 * pairs + tiles * kPairs) / (tiles * kPairs) * kPairs,
+                              std::numeric_limits<std::uint32_t>::max()));
 }
 
 /// Everything of a call that the host computes, into one pinned block and on to the device.
-Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
+                                         std::span<const BatchCamera> cameras,
                                          const BatchImages& images) {
   // ---- who sees what
   seen.clear();
@@ -190,13 +200,15 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   cuda::Layout layout;
   const std::size_t at_sets = layout.add<BatchSet>(sets.size());
   const std::size_t at_instances = layout.add<BatchInstance>(seen.size());
-  const bool plain_rules =
-      config.response == Response::ewa && config.compat == Compat::none && rules.sort_order == SortOrder::z_depth &&
-      std::all_of(cameras.begin(), cameras.end(), [](const BatchCamera& c) { return c.camera.near_sigma == 0; }) &&
-      std::all_of(sets.begin(), sets.end(), [](const GaussianSet& s) {
-        return s.filter == Filter::classic && s.gaussians.axes[0].empty() && s.gaussians.sh_rotations[0].empty() &&
-               s.gaussians.origin_ids.empty();
-      });
+  const bool plain_rules = config.response == Response::ewa && config.compat == Compat::none &&
+                           rules.sort_order == SortOrder::z_depth &&
+                           std::all_of(cameras.begin(), cameras.end(),
+                                       [](const BatchCamera& c) { return c.camera.near_sigma == 0; }) &&
+                           std::all_of(sets.begin(), sets.end(), [](const GaussianSet& s) {
+                             return s.filter == Filter::classic && s.gaussians.axes[0].empty() &&
+                                    s.gaussians.sh_rotations[0].empty() &&
+                                    s.gaussians.origin_ids.empty();
+                           });
   const std::size_t at_plain = layout.add<cuda::PlainCamera>(plain_rules ? seen.size() : 0);
   const std::size_t at_first = layout.add<std::uint32_t>(cameras.size() + 1);
   const std::size_t at_list = layout.add<std::uint32_t>(seen.size());
@@ -208,7 +220,9 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   const auto host = [&](auto* type, std::size_t at) {
     return reinterpret_cast<decltype(type)>(flight.inputs.data + at);
   };
-  const auto device = [&](auto* type, std::size_t at) { return reinterpret_cast<decltype(type)>(inputs.data() + at); };
+  const auto device = [&](auto* type, std::size_t at) {
+    return reinterpret_cast<decltype(type)>(inputs.data() + at);
+  };
 
   // ---- instances, neighbours where they are of one set
   auto* const instances = host(static_cast<BatchInstance*>(nullptr), at_instances);
@@ -257,13 +271,15 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   }
   // A warp of projection has half of an item.
   if (item_capacity > std::numeric_limits<std::uint32_t>::max() / 2) {
-    return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(item_capacity) +
-                                   " parts of chunks times words of cameras in one batch: draw fewer cameras a call"};
+    return {Errc::unsupported,
+            "CudaBatchRenderer: " + std::to_string(item_capacity) +
+                " parts of chunks times words of cameras in one batch: draw fewer cameras a call"};
   }
 
   args.sets = device(static_cast<BatchSet*>(nullptr), at_sets);
   args.instances = device(static_cast<BatchInstance*>(nullptr), at_instances);
-  args.plain_cameras = plain_rules ? device(static_cast<cuda::PlainCamera*>(nullptr), at_plain) : nullptr;
+  args.plain_cameras =
+      plain_rules ? device(static_cast<cuda::PlainCamera*>(nullptr), at_plain) : nullptr;
   args.camera_first = device(static_cast<std::uint32_t*>(nullptr), at_first);
   args.camera_instances = device(static_cast<std::uint32_t*>(nullptr), at_list);
   args.set_count = static_cast<std::uint32_t>(sets.size());
@@ -275,7 +291,8 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, multiprocessors);
   if (few) args.grid = TileGrid::of(width, height, cuda::kSmallTile);
   const std::uint64_t tiles = args.cameras * std::uint64_t{args.grid.count()};
-  if (tiles > 0x7fffffffu) return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
+  if (tiles > 0x7fffffffu)
+    return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
   args.tiles = static_cast<std::uint32_t>(tiles);
   args.short_lists = !few && has_short_lists(args.grid.count(), multiprocessors);
   args.depth_bins = few ? depth_bins_of(cameras, rules.key_bits, args.tiles) : cuda::DepthBins{};
@@ -288,11 +305,14 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   raster.background = vec_cast<float>(config.background);
   raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
   raster.images = images.floats;
-  raster.rules = images.rgb8 != nullptr ? blend_rules<float>(config) : blend_rules<float>(config, images.floats);
+  raster.rules =
+      images.rgb8 != nullptr ? blend_rules<float>(config) : blend_rules<float>(config, images.floats);
   rgb8 = images.rgb8;
 
-  // Guesses; the first calls find out. Of what is drawn by few cameras and by many there is scratch of its own.
-  const std::uint32_t slots = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(gaussians / 4, 1u << 16, 1u << 26));
+  // Guesses; the first calls find out. Of what is drawn by few cameras and by many there is scratch of
+  // its own.
+  const std::uint32_t slots =
+      static_cast<std::uint32_t>(std::clamp<std::uint64_t>(gaussians / 4, 1u << 16, 1u << 26));
   const auto guess = [](std::uint32_t& capacity, std::uint32_t n) {
     if (capacity == 0) capacity = n;
   };
@@ -301,8 +321,10 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets, std:
   guess(large_capacity, slots / 32);
   guess(several_capacity, few ? slots / 4 : slots / 16);
   if (few) {
-    // Those that are drawn, and what as many warps as a multiprocessor can have may leave of their slabs.
-    entry_capacity = gaussians + std::uint64_t{64} * static_cast<std::uint64_t>(multiprocessors) * args.slab;
+    // Those that are drawn, and what as many warps as a multiprocessor can have may leave of their
+    // slabs.
+    entry_capacity =
+        gaussians + std::uint64_t{64} * static_cast<std::uint64_t>(multiprocessors) * args.slab;
     guess(pair_capacity, 2 * slots);
   } else {
     guess(alt_capacity, slots);

@@ -17,7 +17,8 @@ constexpr unsigned kAll = 0xffffffffu;
 __device__ bool part_is_candidate(const ProjectArgs<float>& args, std::size_t chunk, unsigned part) {
   const GaussianView& gs = args.gaussians;
   const std::size_t at = chunk * kPartsPerChunk + part;
-  if (at * kChunkPart >= gs.size || !gs.may_be_seen(chunk) || !gs.seen_rows(chunk).any_of_part(part)) return false;
+  if (at * kChunkPart >= gs.size || !gs.may_be_seen(chunk) || !gs.seen_rows(chunk).any_of_part(part))
+    return false;
   if (gs.chunk_bounds.empty()) return true;
   return may_be_visible(args.camera64,
                         gs.part_bounds.empty() ? gs.chunk_bounds[chunk] : gs.part_bounds[at]);
@@ -154,12 +155,13 @@ __device__ LargeRows large_rows(const BatchArgs& a, const SplatBounds& b) {
   return {first, static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1 - first};
 }
 
-__device__ void queue_large_row(const BatchArgs& a, unsigned long long place, const SplatKey& splat, std::uint32_t row) {
+__device__ void queue_large_row(const BatchArgs& a, unsigned long long place, const SplatKey& splat,
+                                std::uint32_t row) {
   if (place < a.large_capacity) a.large[place] = {splat, row};
 }
 
-/// Queues the rows of the lanes that have some; all lanes call both, `ask` first, so that nobody waits for the counter
-/// until `put`.
+/// Queues the rows of the lanes that have some; all lanes call both, `ask` first, so that nobody waits
+/// for the counter until `put`.
 class LargeQueue {
  public:
   __device__ void ask(const BatchArgs& a, const LargeRows& rows) {
@@ -167,14 +169,16 @@ class LargeQueue {
     if (!any_) return;
     const std::uint32_t end = sum_to_lane(rows.count);
     begin_ = end - rows.count;
-    if (threadIdx.x % 32 == 31) base_ = atomicAdd(&a.counters->large, static_cast<unsigned long long>(end));
+    if (threadIdx.x % 32 == 31)
+      base_ = atomicAdd(&a.counters->large, static_cast<unsigned long long>(end));
   }
   __device__ void put(const BatchArgs& a, const SplatKey& splat, const LargeRows& rows) const {
     if (!any_) return;
     const unsigned long long base = __shfl_sync(kAll, base_, 31);
     share_in_warp(rows.count, [&](unsigned owner, std::uint32_t k) {
       const unsigned from = owner % 32;
-      const std::uint32_t place = __shfl_sync(kAll, begin_, from) + k, row = __shfl_sync(kAll, rows.first, from) + k;
+      const std::uint32_t place = __shfl_sync(kAll, begin_, from) + k,
+                          row = __shfl_sync(kAll, rows.first, from) + k;
       const SplatKey of{__shfl_sync(kAll, splat.slot, from), __shfl_sync(kAll, splat.key, from),
                         __shfl_sync(kAll, splat.camera, from)};
       if (owner < 32) queue_large_row(a, base + place, of, row);
@@ -187,13 +191,12 @@ class LargeQueue {
   unsigned long long base_ = 0;  ///< of lane 31: where the warp's begin
 };
 
-/// A warp half of an item: Gaussians are read once and projected for each camera of the mask, or where some of the
-/// cameras see some of the rows only (`SomeRows`) those of all cameras side by side.
-/// `Plain`: records of neither depth nor perspective are asked for. `PlainRules`: there are plain_cameras. `Room`: lists are not
-/// counted first.
+/// A warp half of an item: Gaussians are read once and projected for each camera of the mask, or where
+/// some of the cameras see some of the rows only (`SomeRows`) those of all cameras side by side.
+/// `Plain`: records of neither depth nor perspective are asked for. `PlainRules`: there are
+/// plain_cameras. `Room`: lists are not counted first.
 template <bool PlainRules, bool Plain, bool SomeRows, bool Room>
-__global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
-    project_kernel(const BatchArgs a) {
+__global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_kernel(const BatchArgs a) {
   __shared__ WarpRows shared[kProjectWarps];
   const unsigned lane = threadIdx.x % 32;
   WarpRows& rows = shared[threadIdx.x / 32];
@@ -209,13 +212,15 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
     next = item_of(half + gridDim.x * kProjectWarps);
     const GaussianView& gs = a.instances[item.first_instance].args.gaussians;
     const std::size_t first = item.part * kChunkPart + half % kWarpsPerPart * 32;  // row of lane 0
-    const unsigned existing =
-        first >= gs.size ? 0u : gs.size - first >= 32 ? kAll : (1u << (gs.size - first)) - 1u;
+    const unsigned existing = first >= gs.size        ? 0u
+                              : gs.size - first >= 32 ? kAll
+                                                      : (1u << (gs.size - first)) - 1u;
     // Of the lane's instance.
     unsigned mine = 0;
     if constexpr (SomeRows) {
       if ((item.mask >> lane & 1u) != 0) {
-        mine = existing & a.instances[item.first_instance + lane].args.gaussians.seen_rows(first / kProjectChunk)
+        mine = existing & a.instances[item.first_instance + lane]
+                              .args.gaussians.seen_rows(first / kProjectChunk)
                               .word(first % kProjectChunk / 32);
       }
       if (!__any_sync(kAll, mine != 0)) continue;
@@ -285,7 +290,8 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks)
       queue.ask(a, large);
       const bool small = listed && large.count == 0;
       // Those whose tiles another kernel finds.
-      const bool queued = small && (Room ? is_wide(a, splat.bounds) : window_of(a, splat.bounds).tiles == 0);
+      const bool queued =
+          small && (Room ? is_wide(a, splat.bounds) : window_of(a, splat.bounds).tiles == 0);
       NearPairs pairs;
       if constexpr (Room) pairs.ask(a, camera_index, small && !queued, splat.bounds);
       if (!has_sh && __any_sync(kAll, drawn)) {
@@ -368,7 +374,8 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
         add_to_bin(a, tile_of(a, of.camera, window, 0), of.key);
       } else if (is_large(a, splat.bounds)) {
         const LargeRows rows = large_rows(a, splat.bounds);
-        const unsigned long long place = atomicAdd(&a.counters->large, static_cast<unsigned long long>(rows.count));
+        const unsigned long long place =
+            atomicAdd(&a.counters->large, static_cast<unsigned long long>(rows.count));
         for (std::uint32_t k = 0; k < rows.count; ++k) queue_large_row(a, place + k, of, rows.first + k);
       } else {
         const unsigned long long place = atomicAdd(&a.counters->several, 1ull);
@@ -385,16 +392,21 @@ void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t 
   cull_kernel<<<blocks, kThreads, 0, stream>>>(args);
   const bool plain = args.depths == nullptr && args.perspectives == nullptr;
   const auto project = [&](auto kernel) {
-    kernel<<<static_cast<unsigned>(multiprocessors) * kProjectBlocks, 32 * kProjectWarps, 0, stream>>>(args);
+    kernel<<<static_cast<unsigned>(multiprocessors) * kProjectBlocks, 32 * kProjectWarps, 0, stream>>>(
+        args);
   };
   const auto of_lists = [&]<bool SomeRows, bool Room>() {
-    if (plain && args.plain_cameras != nullptr) return project(project_kernel<true, true, SomeRows, Room>);
-    project(plain ? project_kernel<false, true, SomeRows, Room> : project_kernel<false, false, SomeRows, Room>);
+    if (plain && args.plain_cameras != nullptr)
+      return project(project_kernel<true, true, SomeRows, Room>);
+    project(plain ? project_kernel<false, true, SomeRows, Room>
+                  : project_kernel<false, false, SomeRows, Room>);
   };
   if (args.seen_rows) {
-    args.list_room != 0 ? of_lists.template operator()<true, true>() : of_lists.template operator()<true, false>();
+    args.list_room != 0 ? of_lists.template operator()<true, true>()
+                        : of_lists.template operator()<true, false>();
   } else {
-    args.list_room != 0 ? of_lists.template operator()<false, true>() : of_lists.template operator()<false, false>();
+    args.list_room != 0 ? of_lists.template operator()<false, true>()
+                        : of_lists.template operator()<false, false>();
   }
   project_hard_kernel<<<blocks, 128, 0, stream>>>(args);
 }

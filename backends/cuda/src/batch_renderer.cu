@@ -17,7 +17,9 @@ std::uint32_t grown(unsigned long long needed) {
 constexpr std::size_t kCounterWords =
     (sizeof(cuda::BatchCounters) + 255) / 256 * 256 / sizeof(std::uint32_t);
 
-std::size_t bin_words(const cuda::BatchArgs& args) { return std::size_t{args.tiles} << args.depth_bins.bits; }
+std::size_t bin_words(const cuda::BatchArgs& args) {
+  return std::size_t{args.tiles} << args.depth_bins.bits;
+}
 
 /// Counters of the call and of the bins.
 std::size_t zeroed_words(const cuda::BatchArgs& args) { return kCounterWords + bin_words(args); }
@@ -38,9 +40,11 @@ void CudaBatchRenderer::State::size_scratch() {
   args.records = exactly(records, slot_capacity);
   const bool counted = args.depth_bins.many();
   constexpr std::uint64_t kPlaces = std::numeric_limits<std::uint32_t>::max();
-  args.list_room =
-      counted ? 0 : static_cast<std::uint32_t>(std::min<std::uint64_t>(list_room, (kPlaces - beyond_capacity) / args.tiles));
-  args.entries = with_room(entries, counted ? std::min<std::uint64_t>(slot_capacity, entry_capacity) : 0);
+  args.list_room = counted ? 0
+                           : static_cast<std::uint32_t>(std::min<std::uint64_t>(
+                                 list_room, (kPlaces - beyond_capacity) / args.tiles));
+  args.entries =
+      with_room(entries, counted ? std::min<std::uint64_t>(slot_capacity, entry_capacity) : 0);
   args.sources = exactly(sources, slot_capacity);
   args.hard = exactly(hard, hard_capacity);
   args.several = exactly(several, several_capacity);
@@ -56,7 +60,8 @@ void CudaBatchRenderer::State::size_scratch() {
   args.part_capacity = counted ? args.tiles + pair_capacity / cuda::kPartLength : 0;
   args.parts = exactly(parts, args.part_capacity);
   args.long_parts = exactly(long_parts, args.part_capacity);
-  args.pairs = exactly(pairs, counted ? pair_capacity : std::size_t{args.tiles} * args.list_room + beyond_capacity);
+  args.pairs = exactly(
+      pairs, counted ? pair_capacity : std::size_t{args.tiles} * args.list_room + beyond_capacity);
   args.pairs_alt = exactly(pairs_alt, counted ? pair_capacity : alt_capacity);
   args.beyond = exactly(beyond, counted ? 0 : beyond_capacity);
   // Where pixels are many beside survivors, a record each is less than projecting median Gaussians once
@@ -84,9 +89,9 @@ void CudaBatchRenderer::State::size_scratch() {
                         several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() +
                         long_parts.capacity_bytes() + zeroed.capacity_bytes() +
                         tile_counts.capacity_bytes() + tile_begins.capacity_bytes() +
-                        tile_shifts.capacity_bytes() + tile_order.capacity_bytes() + pairs.capacity_bytes() +
-                        pairs_alt.capacity_bytes() + beyond.capacity_bytes() + depths.capacity_bytes() +
-                        perspectives.capacity_bytes() + meshes.bytes();
+                        tile_shifts.capacity_bytes() + tile_order.capacity_bytes() +
+                        pairs.capacity_bytes() + pairs_alt.capacity_bytes() + beyond.capacity_bytes() +
+                        depths.capacity_bytes() + perspectives.capacity_bytes() + meshes.bytes();
 }
 
 void CudaBatchRenderer::State::fit_room(const cuda::BatchCounters& n) {
@@ -130,7 +135,8 @@ Status CudaBatchRenderer::State::launch() {
   if (flight.has_meshes) size_layers();
   flight.triangle_capacity = triangle_capacity;
   size_scratch();
-  const cuda::LaunchKey key{args, raster.images, rgb8, raster.mesh.depth, raster.mesh.color, flight.inputs.data, input_bytes};
+  const cuda::LaunchKey key{
+      args, raster.images, rgb8, raster.mesh.depth, raster.mesh.color, flight.inputs.data, input_bytes};
   if (key != flight.key) {
     flight.forget_recorded();
     flight.key = key;
@@ -242,7 +248,8 @@ Status CudaBatchRenderer::finish() {
   }
   if (lost) {
     return {Errc::out_of_memory,
-            "CudaBatchRenderer: scratch was too small for a batch that another call of render() followed before "
+            "CudaBatchRenderer: scratch was too small for a batch that another call of render() "
+            "followed before "
             "finish(); its images are not whole. There is room for it now: draw it again"};
   }
   return s.backend.synchronize();

@@ -67,7 +67,7 @@ __device__ inline void copy_async(T* to, const T* from, unsigned n) {
 /// ask_for_sh for the bands up to `degree` of each row, `rest` values apart, of which no others are
 /// read.
 __device__ __noinline__ inline void ask_for_bands(const GaussianView& gs, int degree, unsigned rest,
-                                           std::size_t first, WarpRows& to) {
+                                                  std::size_t first, WarpRows& to) {
   const unsigned rows = static_cast<unsigned>(gs.size - first < 32 ? gs.size - first : 32),
                  lane = threadIdx.x % 32;
   const unsigned kept = static_cast<unsigned>(3 * (sh_coefficient_count(degree) - 1));
@@ -108,8 +108,9 @@ __device__ inline void wait_for_sh() {
 
 /// Colour of row first + at after wait_for_sh; `degree` as it was asked for.
 template <bool PlainRules>
-__device__ inline SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t first, unsigned at,
-                                       const WarpRows& rows, const Vec3<float>& delta) {
+__device__ inline SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t first,
+                                              unsigned at, const WarpRows& rows,
+                                              const Vec3<float>& delta) {
   GaussianView v;  // of the warp's rows
   v.sh_degree = degree;
   v.sh0 = {gs.sh0.data + 3 * first, 3 * 32};

@@ -241,7 +241,9 @@ struct CudaBatchRenderer::State {
   bool prepared = false;  ///< `args`, `raster` and `meshes` are those of the last call made
   std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0,
                 pair_capacity = 0, beyond_capacity = 0, alt_capacity = 0;
-  std::uint32_t list_room = 0, room_tiles = 0;  ///< of lists that are not counted first; the tiles that it was chosen for
+  std::uint32_t list_room = 0,
+                room_tiles =
+                    0;  ///< of lists that are not counted first; the tiles that it was chosen for
   std::uint32_t triangle_capacity = 0;  ///< of meshes, a wave
   BatchStats stats;
 

@@ -47,8 +47,8 @@ __device__ inline bool is_large(const BatchArgs& a, const SplatBounds& b) {
 }
 
 /// The window's tile of bit `bit`, among those of all cameras.
-__device__ inline std::uint32_t tile_of(const BatchArgs& a, std::uint32_t camera, const TileWindow& window,
-                                        std::uint32_t bit) {
+__device__ inline std::uint32_t tile_of(const BatchArgs& a, std::uint32_t camera,
+                                        const TileWindow& window, std::uint32_t bit) {
   const std::uint32_t columns = static_cast<std::uint32_t>(a.grid.columns);
   return first_tile(a, camera) + (window.row() + bit / TileWindow::kSide) * columns + window.column() +
          bit % TileWindow::kSide;
@@ -64,7 +64,8 @@ __device__ inline T sum_to_lane(T value) {
   return value;
 }
 
-/// A warp's share of a counter: the place of each lane that takes `count`, one after the other. All lanes call it.
+/// A warp's share of a counter: the place of each lane that takes `count`, one after the other. All
+/// lanes call it.
 __device__ inline unsigned long long take_places(unsigned long long* counter, std::uint32_t count) {
   const unsigned long long end = sum_to_lane(static_cast<unsigned long long>(count));
   unsigned long long base = 0;
@@ -72,8 +73,8 @@ __device__ inline unsigned long long take_places(unsigned long long* counter, st
   return __shfl_sync(0xffffffffu, base, 31) + end - count;
 }
 
-/// Calls f(owner, i) for i in [0, count) of each lane `owner`, all of the warp's calls shared evenly by its lanes. All
-/// lanes call it; f is called together, with owner 32 by lanes that have nothing left.
+/// Calls f(owner, i) for i in [0, count) of each lane `owner`, all of the warp's calls shared evenly by
+/// its lanes. All lanes call it; f is called together, with owner 32 by lanes that have nothing left.
 template <class F>
 __device__ inline void share_in_warp(std::uint32_t count, const F& f) {
   constexpr unsigned kAll = 0xffffffffu;
@@ -107,10 +108,12 @@ __device__ inline std::uint32_t nth_bit(std::uint32_t bits, std::uint32_t n) {
   return place;
 }
 
-/// Places that a warp takes from a counter by the slab; those that it has not used are left to the caller.
+/// Places that a warp takes from a counter by the slab; those that it has not used are left to the
+/// caller.
 class WarpSlab {
  public:
-  __device__ WarpSlab(unsigned long long* counter, std::uint32_t slab) : counter_(counter), slab_(slab) {}
+  __device__ WarpSlab(unsigned long long* counter, std::uint32_t slab)
+      : counter_(counter), slab_(slab) {}
 
   /// The place of each lane that wants one. All lanes call it.
   __device__ std::uint64_t take(bool wanted) {

@@ -12,8 +12,8 @@ namespace gsnav {
 namespace {
 
 std::string describe(int device, int error, const char* what) {
-  return std::string("CUDA device ") + std::to_string(device) + ": " + what + " failed: " +
-         cudaGetErrorString(static_cast<cudaError_t>(error));
+  return std::string("CUDA device ") + std::to_string(device) + ": " + what +
+         " failed: " + cudaGetErrorString(static_cast<cudaError_t>(error));
 }
 
 }  // namespace
@@ -117,7 +117,8 @@ Status CudaBackend::synchronize() {
 
 void CudaBackend::hand_over_to(CUstream_st* consumer) {
   if (!usable()) return;
-  if (handed_over_ == nullptr) note(cudaEventCreateWithFlags(&handed_over_, cudaEventDisableTiming), "an event");
+  if (handed_over_ == nullptr)
+    note(cudaEventCreateWithFlags(&handed_over_, cudaEventDisableTiming), "an event");
   if (usable()) note(cudaEventRecord(handed_over_, stream_), "an event");
   if (usable()) note(cudaStreamWaitEvent(consumer, handed_over_), "a wait between streams");
 }
@@ -130,8 +131,8 @@ void* CudaBackend::scratch(int slot, std::size_t bytes) {
     b.data = allocate(b.bytes, 256);
     if (b.data == nullptr) {
       b.bytes = 0;
-      detail::fail(Errc::out_of_memory, std::string("CUDA: cannot allocate ") + std::to_string(bytes) +
-                                            " bytes of scratch");
+      detail::fail(Errc::out_of_memory,
+                   std::string("CUDA: cannot allocate ") + std::to_string(bytes) + " bytes of scratch");
     }
   }
   return b.data;
@@ -148,8 +149,7 @@ bool CudaBackend::sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::ui
   return k.Current() == keys_alt;
 }
 
-void CudaBackend::run(stage::Project, const ProjectArgs<float>& args,
-                      const ProjectOutputs<float>& out) {
+void CudaBackend::run(stage::Project, const ProjectArgs<float>& args, const ProjectOutputs<float>& out) {
   if (!usable() || args.gaussians.size == 0) return;
   cuda::project_kernel<<<static_cast<unsigned>(args.chunk_count()), cuda::kProjectThreads, 0, stream_>>>(
       args, out);
@@ -169,10 +169,12 @@ void CudaBackend::list(const BinArgs<float>& args, const Cull& cull) {
   const auto scan = [&](const std::uint32_t* counts, std::uint64_t* out, std::size_t count) {
     std::size_t bytes = 0;
     note(cub::DeviceScan::ExclusiveScan(nullptr, bytes, counts, out, ::cuda::std::plus<>{},
-                                        std::uint64_t{0}, count, stream_), "a scan");
+                                        std::uint64_t{0}, count, stream_),
+         "a scan");
     void* temp = scratch(kCubTemp, bytes);
-    note(cub::DeviceScan::ExclusiveScan(temp, bytes, counts, out, ::cuda::std::plus<>{}, std::uint64_t{0},
-                                        count, stream_), "a scan");
+    note(cub::DeviceScan::ExclusiveScan(temp, bytes, counts, out, ::cuda::std::plus<>{},
+                                        std::uint64_t{0}, count, stream_),
+         "a scan");
   };
   scan(per_splat, offsets, n + 1);
   scan(per_tile, args.tile_offsets.data, tiles + 1);
@@ -188,17 +190,27 @@ void CudaBackend::scatter(const BinArgs<float>& args, const Cull& cull) {
   parallel_for(args.order.size, cuda::EmitSplatTiles<Cull>{args, cull, offsets, tiles, splats});
   const int bits = std::bit_width(args.grid.count() - 1) + (args.grid.count() == 1 ? 1 : 0);
   std::size_t bytes = 0;
-  note(cub::DeviceRadixSort::SortPairs(nullptr, bytes, tiles, tiles + pairs, splats, args.tile_splats.data,
-                                       pairs, 0, bits, stream_), "a sort");
+  note(cub::DeviceRadixSort::SortPairs(nullptr, bytes, tiles, tiles + pairs, splats,
+                                       args.tile_splats.data, pairs, 0, bits, stream_),
+       "a sort");
   void* temp = scratch(kCubTemp, bytes);
   note(cub::DeviceRadixSort::SortPairs(temp, bytes, tiles, tiles + pairs, splats, args.tile_splats.data,
-                                       pairs, 0, bits, stream_), "a sort");
+                                       pairs, 0, bits, stream_),
+       "a sort");
 }
 
-void CudaBackend::run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull) { list(args, cull); }
-void CudaBackend::run(stage::CountTiles, const BinArgs<float>& args, const MeshCull<float>& cull) { list(args, cull); }
-void CudaBackend::run(stage::ScatterTiles, const BinArgs<float>& args, const NoCull& cull) { scatter(args, cull); }
-void CudaBackend::run(stage::ScatterTiles, const BinArgs<float>& args, const MeshCull<float>& cull) { scatter(args, cull); }
+void CudaBackend::run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull) {
+  list(args, cull);
+}
+void CudaBackend::run(stage::CountTiles, const BinArgs<float>& args, const MeshCull<float>& cull) {
+  list(args, cull);
+}
+void CudaBackend::run(stage::ScatterTiles, const BinArgs<float>& args, const NoCull& cull) {
+  scatter(args, cull);
+}
+void CudaBackend::run(stage::ScatterTiles, const BinArgs<float>& args, const MeshCull<float>& cull) {
+  scatter(args, cull);
+}
 
 void CudaBackend::run(stage::Blend, const RasterArgs<float>& args) {
   if (!usable()) return;
@@ -225,15 +237,18 @@ template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWorkspace<
                                                   const RenderConfig&, const FrameImages<float>&,
                                                   RenderStats*);
 template Status render_composite<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
-                                                     std::span<const GaussianSet>, const MeshFrame&, const Camera&,
-                                                     const RenderConfig&, const FrameImages<float>&, RenderStats*);
-template Status detail::render_frame<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+                                                     std::span<const GaussianSet>, const MeshFrame&,
+                                                     const Camera&, const RenderConfig&,
+                                                     const FrameImages<float>&, RenderStats*);
+template Status detail::render_frame<float, CudaBackend>(CudaBackend&,
+                                                         RenderWorkspace<float, CudaBackend>&,
                                                          std::span<const GaussianSet>, const Camera&,
                                                          const RenderConfig&, const MeshLayer<float>&,
                                                          const FrameImages<float>&, RenderStats&);
 template Status draw_meshes<float, CudaBackend>(CudaBackend&, MeshWorkspace<float, CudaBackend>&,
-                                                std::span<const MeshInstance>, const Camera&, const MeshLight&, int,
-                                                bool, MeshImages<float>, MeshStats*);
+                                                std::span<const MeshInstance>, const Camera&,
+                                                const MeshLight&, int, bool, MeshImages<float>,
+                                                MeshStats*);
 template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
 template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
 template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/backends/cuda/gl_image.hpp"
-
-#include <cuda_runtime.h>
-
 #include <GL/gl.h>
 #include <cuda_gl_interop.h>
+#include <cuda_runtime.h>
 
 #include <string>
 #include <utility>
 
+#include "gsnav/backends/cuda/gl_image.hpp"
 #include "gsnav/core/buffer.hpp"
 
 namespace gsnav {
@@ -17,26 +15,31 @@ namespace {
 
 /// Texels of a texture, its first row the image's last.
 __global__ void rgba_of_rgb(const std::uint8_t* rgb, uchar4* to, int width, int height) {
-  const int x = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x), y = static_cast<int>(blockIdx.y);
+  const int x = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x),
+            y = static_cast<int>(blockIdx.y);
   if (x >= width) return;
-  const std::size_t from = 3 * (static_cast<std::size_t>(height - 1 - y) * static_cast<std::size_t>(width) +
-                                static_cast<std::size_t>(x));
+  const std::size_t from =
+      3 * (static_cast<std::size_t>(height - 1 - y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x));
   to[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)] =
       make_uchar4(rgb[from], rgb[from + 1], rgb[from + 2], 255);
 }
 __global__ void turned_round(const float* values, float* to, int width, int height) {
-  const int x = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x), y = static_cast<int>(blockIdx.y);
+  const int x = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x),
+            y = static_cast<int>(blockIdx.y);
   if (x >= width) return;
   const std::size_t line = static_cast<std::size_t>(width), column = static_cast<std::size_t>(x);
-  to[static_cast<std::size_t>(y) * line + column] = values[static_cast<std::size_t>(height - 1 - y) * line + column];
+  to[static_cast<std::size_t>(y) * line + column] =
+      values[static_cast<std::size_t>(height - 1 - y) * line + column];
 }
 
 constexpr unsigned kThreads = 128;
 
 Status failed(const char* what, cudaError_t e) {
   cudaGetLastError();
-  return {Errc::backend_failure, std::string("GlImage: ") + what + " failed: " + cudaGetErrorString(e) +
-                                     "; the texture's context must be current in this thread, and on the backend's GPU"};
+  return {Errc::backend_failure,
+          std::string("GlImage: ") + what + " failed: " + cudaGetErrorString(e) +
+              "; the texture's context must be current in this thread, and on the backend's GPU"};
 }
 
 }  // namespace
@@ -47,9 +50,12 @@ struct GlImage::State {
     if (resource != nullptr) cudaGraphicsUnregisterResource(resource);
   }
 
-  dim3 blocks() const { return {(static_cast<unsigned>(width) + kThreads - 1) / kThreads, static_cast<unsigned>(height), 1}; }
+  dim3 blocks() const {
+    return {(static_cast<unsigned>(width) + kThreads - 1) / kThreads, static_cast<unsigned>(height), 1};
+  }
 
-  /// Calls f(array) while the texture is mapped: commands of OpenGL before are done first, those after wait.
+  /// Calls f(array) while the texture is mapped: commands of OpenGL before are done first, those after
+  /// wait.
   template <class F>
   Status mapped(const F& f) {
     const cudaStream_t stream = backend->stream();
@@ -68,8 +74,9 @@ struct GlImage::State {
       const std::size_t line = static_cast<std::size_t>(width) * bytes;
       cudaError_t e = cudaGetLastError();
       if (e == cudaSuccess) {
-        e = cudaMemcpy2DToArrayAsync(array, 0, 0, texels.data(), line, line, static_cast<std::size_t>(height),
-                                     cudaMemcpyDeviceToDevice, backend->stream());
+        e = cudaMemcpy2DToArrayAsync(array, 0, 0, texels.data(), line, line,
+                                     static_cast<std::size_t>(height), cudaMemcpyDeviceToDevice,
+                                     backend->stream());
       }
       return e == cudaSuccess ? Status{} : failed("the copy to the texture", e);
     });
@@ -88,9 +95,12 @@ GlImage& GlImage::operator=(GlImage&&) noexcept = default;
 GlImage::~GlImage() = default;
 
 Result<GlImage> GlImage::create(CudaBackend& backend, unsigned texture, int width, int height) {
-  const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, "GlImage: " + what); };
+  const auto bad = [](const std::string& what) {
+    return Status(Errc::invalid_argument, "GlImage: " + what);
+  };
   if (width <= 0 || height <= 0 || height > 65535) {
-    return bad("size " + std::to_string(width) + " x " + std::to_string(height) + " is none that can be drawn");
+    return bad("size " + std::to_string(width) + " x " + std::to_string(height) +
+               " is none that can be drawn");
   }
   auto state = std::make_unique<State>(backend, width, height);
   const cudaError_t e = cudaGraphicsGLRegisterImage(&state->resource, texture, GL_TEXTURE_2D,
@@ -105,9 +115,11 @@ Result<GlImage> GlImage::create(CudaBackend& backend, unsigned texture, int widt
     unsigned flags = 0;
     const cudaError_t asked = cudaArrayGetInfo(&format, &extent, &flags, array);
     if (asked != cudaSuccess) return failed("asking for the texture's format", asked);
-    if (extent.width != static_cast<std::size_t>(width) || extent.height != static_cast<std::size_t>(height)) {
-      return bad("the texture has " + std::to_string(extent.width) + " x " + std::to_string(extent.height) +
-                 " texels; given are " + std::to_string(width) + " x " + std::to_string(height));
+    if (extent.width != static_cast<std::size_t>(width) ||
+        extent.height != static_cast<std::size_t>(height)) {
+      return bad("the texture has " + std::to_string(extent.width) + " x " +
+                 std::to_string(extent.height) + " texels; given are " + std::to_string(width) + " x " +
+                 std::to_string(height));
     }
     const bool bytes = format.x == 8 && format.y == 8 && format.z == 8 && format.w == 8 &&
                        format.f == cudaChannelFormatKindUnsigned;
@@ -122,17 +134,19 @@ Result<GlImage> GlImage::create(CudaBackend& backend, unsigned texture, int widt
 
 Status GlImage::write_rgb8(const std::uint8_t* rgb8) {
   State& s = *state_;
-  if (s.depth) return {Errc::invalid_argument, "GlImage: colours need a texture of GL_RGBA8, not GL_R32F"};
-  rgba_of_rgb<<<s.blocks(), kThreads, 0, s.backend->stream()>>>(rgb8, reinterpret_cast<uchar4*>(s.texels.data()),
-                                                                s.width, s.height);
+  if (s.depth)
+    return {Errc::invalid_argument, "GlImage: colours need a texture of GL_RGBA8, not GL_R32F"};
+  rgba_of_rgb<<<s.blocks(), kThreads, 0, s.backend->stream()>>>(
+      rgb8, reinterpret_cast<uchar4*>(s.texels.data()), s.width, s.height);
   return s.fill(sizeof(uchar4));
 }
 
 Status GlImage::write_depth(const float* depth) {
   State& s = *state_;
-  if (!s.depth) return {Errc::invalid_argument, "GlImage: depths need a texture of GL_R32F, not GL_RGBA8"};
-  turned_round<<<s.blocks(), kThreads, 0, s.backend->stream()>>>(depth, reinterpret_cast<float*>(s.texels.data()),
-                                                                 s.width, s.height);
+  if (!s.depth)
+    return {Errc::invalid_argument, "GlImage: depths need a texture of GL_R32F, not GL_RGBA8"};
+  turned_round<<<s.blocks(), kThreads, 0, s.backend->stream()>>>(
+      depth, reinterpret_cast<float*>(s.texels.data()), s.width, s.height);
   return s.fill(sizeof(float));
 }
 

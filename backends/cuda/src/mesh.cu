@@ -7,8 +7,9 @@
 #include "mesh.cuh"
 #include "search.cuh"
 
-// Meshes on the device (docs/composition.md): the kernels of the CPU, a vertex, a triangle or a pixel a thread. Which
-// triangle a pixel shows is found without lists of tiles: the largest of (1/z, first triangle) in one atomic word.
+// Meshes on the device (docs/composition.md): the kernels of the CPU, a vertex, a triangle or a pixel a
+// thread. Which triangle a pixel shows is found without lists of tiles: the largest of (1/z, first
+// triangle) in one atomic word.
 
 namespace gsnav {
 
@@ -18,8 +19,8 @@ namespace {
 
 constexpr unsigned kThreads = kMeshChunk;  ///< of a block that takes a chunk
 constexpr unsigned kScanThreads = 1024;
-constexpr int kSmallBox = 8;               ///< a thread draws triangles of up to kSmallBox^2 pixels by itself
-constexpr int kUnit = 32;  ///< larger ones are drawn in squares of so many pixels, a warp each
+constexpr int kSmallBox = 8;  ///< a thread draws triangles of up to kSmallBox^2 pixels by itself
+constexpr int kUnit = 32;     ///< larger ones are drawn in squares of so many pixels, a warp each
 constexpr unsigned kUnitBits = 40;
 
 /// The work of one camera: lists of chunks, and counts that the host has been told.
@@ -186,14 +187,15 @@ __global__ void __launch_bounds__(kThreads)
 }
 
 /// Shows a triangle at a pixel of its box, if it is inside, and nearer than what is shown there.
-__device__ void show(const MeshRasterArgs<float>& args, const MeshTriangle<float>& t, std::uint32_t id, int x, int y,
-                     PixelWord* pixels) {
+__device__ void show(const MeshRasterArgs<float>& args, const MeshTriangle<float>& t, std::uint32_t id,
+                     int x, int y, PixelWord* pixels) {
   const float inverse_z = mesh_inverse_z(t, x, y);
   if (!(inverse_z > 0) || mesh_hole(args, t, x, y, inverse_z)) return;
   // Of equally near ones the first is the largest word.
   const PixelWord word = PixelWord{__float_as_uint(inverse_z)} << 32 | (0xffffffffu - id);
-  PixelWord* const at =
-      pixels + static_cast<std::size_t>(y) * static_cast<std::size_t>(args.bin.grid.width) + static_cast<std::size_t>(x);
+  PixelWord* const at = pixels +
+                        static_cast<std::size_t>(y) * static_cast<std::size_t>(args.bin.grid.width) +
+                        static_cast<std::size_t>(x);
   if (*at < word) atomicMax(at, word);
 }
 
@@ -253,9 +255,10 @@ __global__ void __launch_bounds__(128)
   const std::uint64_t units = *count & ((1ull << kUnitBits) - 1), triangles = *count >> kUnitBits;
   const int lane = static_cast<int>(threadIdx.x % 32);
   const std::uint64_t stride = std::uint64_t{gridDim.x} * (blockDim.x / 32);
-  for (std::uint64_t u = (std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x) / 32; u < units; u += stride) {
-    const LargeTriangle& of =
-        large[last_start(std::uint64_t{0}, triangles, [&](std::uint64_t i) { return large[i].unit <= u; })];
+  for (std::uint64_t u = (std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x) / 32; u < units;
+       u += stride) {
+    const LargeTriangle& of = large[last_start(std::uint64_t{0}, triangles,
+                                               [&](std::uint64_t i) { return large[i].unit <= u; })];
     const std::uint32_t id = of.triangle;
     const MeshTriangle<float>& t = args.triangles[id];
     const int at = static_cast<int>(u - of.unit), columns = (t.x1 - t.x0 + kUnit - 1) / kUnit;
@@ -280,7 +283,8 @@ __device__ std::uint32_t triangle_of(PixelWord word) {
 }
 
 /// A block a tile: depths, triangles and the tile's farthest from the words of its pixels.
-__global__ void __launch_bounds__(1024) resolve_kernel(const MeshRasterArgs<float> args, const PixelWord* pixels) {
+__global__ void __launch_bounds__(1024)
+    resolve_kernel(const MeshRasterArgs<float> args, const PixelWord* pixels) {
   __shared__ unsigned far;
   const TileGrid& grid = args.bin.grid;
   const int ts = grid.tile_size, t = static_cast<int>(threadIdx.x);
@@ -397,8 +401,8 @@ void CudaBackend::run(stage::RasterizeMesh, const MeshRasterArgs<float>& args) {
   using cuda::LargeTriangle;
   const TileGrid& grid = args.bin.grid;
   const std::size_t n = args.triangles.size;
-  const std::size_t bytes = static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height) *
-                            sizeof(cuda::PixelWord);
+  const std::size_t bytes = static_cast<std::size_t>(grid.width) *
+                            static_cast<std::size_t>(grid.height) * sizeof(cuda::PixelWord);
   auto* const pixels = static_cast<cuda::PixelWord*>(scratch(kMeshPixels, bytes));
   auto* const count = static_cast<unsigned long long*>(scratch(kMeshLarge, cuda::large_bytes(n)));
   auto* const large = reinterpret_cast<LargeTriangle*>(count + 2);

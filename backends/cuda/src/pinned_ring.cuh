@@ -8,8 +8,9 @@
 
 namespace gsnav::cuda {
 
-/// Pinned blocks that small copies to the device go through, in turn: a copy from pageable memory may wait for
-/// all that the stream has to do. Only a block that is asked for again before its copy is done is waited for.
+/// Pinned blocks that small copies to the device go through, in turn: a copy from pageable memory may
+/// wait for all that the stream has to do. Only a block that is asked for again before its copy is done
+/// is waited for.
 class PinnedRing {
  public:
   static constexpr std::size_t kMaxBytes = std::size_t{1} << 20;  ///< of one copy

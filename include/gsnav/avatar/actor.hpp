@@ -9,9 +9,9 @@
 
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/avatar/motion.hpp"
-#include "gsnav/detail/avatar/trajectory.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
+#include "gsnav/detail/avatar/trajectory.hpp"
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/math/similarity.hpp"
 

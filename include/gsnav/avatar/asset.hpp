@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "gsnav/avatar/skeleton.hpp"
-#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/avatar/skinning_weights.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "gsnav/avatar/actor.hpp"
-#include "gsnav/detail/avatar/body_bounds.hpp"
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/avatar/body_bounds.hpp"
 #include "gsnav/detail/frame/cull.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/skin/skin.hpp"

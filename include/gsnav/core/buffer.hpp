@@ -21,7 +21,9 @@ class Buffer {
  public:
   explicit Buffer(B& backend) noexcept : backend_(&backend) {}
   Buffer(Buffer&& o) noexcept
-      : backend_(o.backend_), data_(std::exchange(o.data_, nullptr)), size_(std::exchange(o.size_, 0)),
+      : backend_(o.backend_),
+        data_(std::exchange(o.data_, nullptr)),
+        size_(std::exchange(o.size_, 0)),
         capacity_(std::exchange(o.capacity_, 0)) {}
   Buffer& operator=(Buffer&& o) noexcept {
     std::swap(backend_, o.backend_);
@@ -80,8 +82,8 @@ class Buffer {
     // Less than all addresses, so that backends may round up.
     if (room <= kMost / 2 / sizeof(T)) data_ = static_cast<T*>(allocate(room * sizeof(T)));
     if (data_ == nullptr) {
-      detail::fail(Errc::out_of_memory,
-                   "cannot allocate " + std::to_string(needed) + " x " + std::to_string(sizeof(T)) + " bytes");
+      detail::fail(Errc::out_of_memory, "cannot allocate " + std::to_string(needed) + " x " +
+                                            std::to_string(sizeof(T)) + " bytes");
     }
     capacity_ = room;
   }

@@ -25,7 +25,8 @@ inline Status unwritable(const std::filesystem::path& path, const std::string& w
                          Errc code = Errc::file_not_found) {
   return {code, path.string() + ": cannot be written: " + why};
 }
-inline Status unwritable(const std::filesystem::path& path, int error, Errc code = Errc::file_not_found) {
+inline Status unwritable(const std::filesystem::path& path, int error,
+                         Errc code = Errc::file_not_found) {
   return unwritable(path, std::generic_category().message(error), code);
 }
 
@@ -226,10 +227,11 @@ class OutputFile {
 
 /// Writes a file by `write(OutputFile&)`, which may return a Status. Readers see the file of before or
 /// the whole new one; a failure, an exception too, changes nothing (`OutputFile` says how).
-/// @return the Status of `write`; file_not_found where the file cannot be begun, write_failed where it cannot be finished.
+/// @return the Status of `write`; file_not_found where the file cannot be begun, write_failed where it
+/// cannot be finished.
 template <class F>
-  requires std::is_invocable_v<const F&, OutputFile&>
-Status replace_file(const std::filesystem::path& path, const F& write) {
+requires std::is_invocable_v<const F&, OutputFile&> Status
+replace_file(const std::filesystem::path& path, const F& write) {
   OutputFile file;
   if (Status s = file.open(path); !s) return s;
   if constexpr (std::is_void_v<std::invoke_result_t<const F&, OutputFile&>>) {

@@ -19,7 +19,8 @@
 //       void run(stage::Blend, const RasterArgs<float>& args);   // only this stage, only in float
 //     };
 //
-// A backend's form must leave the bits of the generic form, but where RenderConfig::profile allows another exponential.
+// A backend's form must leave the bits of the generic form, but where RenderConfig::profile allows
+// another exponential.
 
 namespace gsnav {
 
@@ -54,7 +55,9 @@ struct SkinGaussian;
 
 /// Whether a backend has a form of its own of a stage for these arguments.
 template <class B, class Stage, class... Args>
-concept RunsStage = requires(B& backend, Stage stage, const Args&... args) { backend.run(stage, args...); };
+concept RunsStage = requires(B& backend, Stage stage, const Args&... args) {
+  backend.run(stage, args...);
+};
 
 /// Runs a stage: the backend's form where there is one, else the generic one.
 template <Backend B, class Stage, class... Args>
@@ -76,9 +79,9 @@ void blend_pixels_with_meshes(B& backend, const RasterArgs<S>& args);
 
 namespace stage {
 
-/// A kernel for each of n items. A backend names the kernels that it has compiled by overloads on their type:
-/// ProjectMeshVertices, CountMeshTriangles, ScanMeshTriangles, WriteMeshTriangles, RasterizeMeshTile, ShadeMeshRow,
-/// CountTileIntersections, ScatterTileIntersections, each of float.
+/// A kernel for each of n items. A backend names the kernels that it has compiled by overloads on their
+/// type: ProjectMeshVertices, CountMeshTriangles, ScanMeshTriangles, WriteMeshTriangles,
+/// RasterizeMeshTile, ShadeMeshRow, CountTileIntersections, ScatterTileIntersections, each of float.
 struct Each {
   template <Backend B, class Kernel>
   static void generic(B& backend, std::size_t n, const Kernel& kernel) {
@@ -86,8 +89,9 @@ struct Each {
   }
 };
 
-/// Projects a set of Gaussians for one camera, all chunks or some of them (detail/frame/project_chunk.hpp). Where a host
-/// backend has the second form, frames may be drawn in slices of depth (detail/render/depth_slices.hpp).
+/// Projects a set of Gaussians for one camera, all chunks or some of them
+/// (detail/frame/project_chunk.hpp). Where a host backend has the second form, frames may be drawn in
+/// slices of depth (detail/render/depth_slices.hpp).
 struct Project {
   template <Backend B, class S>
   static void generic(B& backend, const ProjectArgs<S>& args, const ProjectOutputs<S>& out) {
@@ -95,8 +99,8 @@ struct Project {
   }
 };
 
-/// Counts the splats of each tile, less those that `cull` (NoCull, MeshCull) hides: fills args.tile_offsets, and
-/// args.cursors for ScatterTiles (detail/frame/tiles.hpp).
+/// Counts the splats of each tile, less those that `cull` (NoCull, MeshCull) hides: fills
+/// args.tile_offsets, and args.cursors for ScatterTiles (detail/frame/tiles.hpp).
 struct CountTiles {
   template <Backend B, class S, class Cull>
   static void generic(B& backend, const BinArgs<S>& args, const Cull& cull) {
@@ -129,8 +133,8 @@ struct BlendWithMeshes {
   }
 };
 
-/// Rasterizes the triangles of MeshRasterArgs. The generic form bins them first and needs scratch for that: it is in
-/// draw_meshes (detail/render/draw_meshes.hpp).
+/// Rasterizes the triangles of MeshRasterArgs. The generic form bins them first and needs scratch for
+/// that: it is in draw_meshes (detail/render/draw_meshes.hpp).
 struct RasterizeMesh {};
 
 /// Skins the Gaussians of one avatar linearly (skin/skin.hpp).

@@ -23,7 +23,7 @@ enum class Errc {
   out_of_memory,      ///< an allocation failed
   nothing_navigable,  ///< a NavMesh build found no walkable surface
   backend_failure,    ///< a device or driver reported an error
-  write_failed,       ///< a file was begun and could not be finished: a full disk, a quota, a failing device
+  write_failed,  ///< a file was begun and could not be finished: a full disk, a quota, a failing device
 };
 
 /// The exception behind `.value()` and `.throw_if_error()`.

@@ -44,19 +44,20 @@ Status with_oracle_scene(B& backend, std::span<const GaussianSet> sets, const Ca
 
 }  // namespace detail
 
-/// The float64 image of sets of Gaussians, as one sorted list, from one camera. The backend, whose memory
-/// is the host's, only shares out the work: rows in parallel, the same bits for any number of threads.
-/// Memory, above the images: at most 350 bytes a visible Gaussian (a drawn one for `boxed` = false), 64 MiB
-/// of row lists, and for OracleOrder::per_ray 24 MiB a thread (more only where one pixel is under a million
-/// Gaussians).
-/// Errors: invalid_argument or unsupported, naming the field.
+/// The float64 image of sets of Gaussians, as one sorted list, from one camera. The backend, whose
+/// memory is the host's, only shares out the work: rows in parallel, the same bits for any number of
+/// threads. Memory, above the images: at most 350 bytes a visible Gaussian (a drawn one for `boxed` =
+/// false), 64 MiB of row lists, and for OracleOrder::per_ray 24 MiB a thread (more only where one pixel
+/// is under a million Gaussians). Errors: invalid_argument or unsupported, naming the field.
 ///
 ///     gsnav::OpenMPBackend backend;
-///     auto truth = gsnav::eval::oracle_render(backend, {{cloud.set()}}, camera).value();  // truth.rgb, ...
+///     auto truth = gsnav::eval::oracle_render(backend, {{cloud.set()}}, camera).value();  // truth.rgb,
+///     ...
 template <Backend B>
-  requires is_host_backend<B>
-Result<OracleFrames> oracle_render(B& backend, std::span<const GaussianSet> sets, const Camera& camera,
-                                   const OracleConfig& config = {}) {
+requires is_host_backend<B> Result<OracleFrames> oracle_render(B& backend,
+                                                               std::span<const GaussianSet> sets,
+                                                               const Camera& camera,
+                                                               const OracleConfig& config = {}) {
   OracleFrames frames;
   if (Status s = detail::with_oracle_scene(backend, sets, camera, config,
                                            [&](const auto& scene) {
@@ -70,9 +71,9 @@ Result<OracleFrames> oracle_render(B& backend, std::span<const GaussianSet> sets
   return frames;
 }
 template <Backend B>
-  requires is_host_backend<B>
-Result<OracleFrames> oracle_render(B& backend, const GaussianSet& set, const Camera& camera,
-                                   const OracleConfig& config = {}) {
+requires is_host_backend<B> Result<OracleFrames> oracle_render(B& backend, const GaussianSet& set,
+                                                               const Camera& camera,
+                                                               const OracleConfig& config = {}) {
   return oracle_render(backend, std::span(&set, 1), camera, config);
 }
 

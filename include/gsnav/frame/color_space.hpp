@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "gsnav/core/view.hpp"
-#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {

@@ -14,7 +14,7 @@ struct Camera {
   double fx = 128, fy = 128;  ///< focal lengths in pixels, > 0
   double cx = 128, cy = 128;  ///< principal point in pixels, may be off-centre
   int width = 256, height = 256;
-  double near_plane = 0.2;    ///< a Gaussian whose centre has z <= near_plane is not drawn; metres
+  double near_plane = 0.2;  ///< a Gaussian whose centre has z <= near_plane is not drawn; metres
   /// Additionally a Gaussian is not drawn where z <= near_sigma times its extent (one sigma) along the
   /// view axis. 0 for tools; 1 for simulator sensors, whose near plane is close to zero.
   double near_sigma = 0.0;

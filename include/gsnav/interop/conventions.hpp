@@ -14,10 +14,12 @@
 namespace gsnav::interop {
 
 namespace detail {
-/// True where an array of T is S S S ... without gaps, so that other libraries' matrices can lie over it.
+/// True where an array of T is S S S ... without gaps, so that other libraries' matrices can lie over
+/// it.
 template <class T, class S, int N>
-inline constexpr bool is_packed = sizeof(T) == N * sizeof(S) && alignof(T) == alignof(S) &&
-                                  std::is_standard_layout_v<T> && std::is_trivially_copyable_v<T>;
+inline constexpr bool is_packed =
+    sizeof(T) == N * sizeof(S) &&
+    alignof(T) == alignof(S) && std::is_standard_layout_v<T>&& std::is_trivially_copyable_v<T>;
 static_assert(is_packed<Vec3f, float, 3> && is_packed<Vec3d, double, 3>);
 static_assert(is_packed<Mat3f, float, 9> && is_packed<Mat3d, double, 9>);
 static_assert(is_packed<Quatf, float, 4> && is_packed<Quatd, double, 4>);
@@ -53,7 +55,8 @@ inline Result<Similarity> similarity_from(const Affine3<double>& a, double toler
   const Mat3d gram = rotation * transpose(rotation);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      if (!(abs(gram(i, j) - (i == j ? 1.0 : 0.0)) <= tolerance)) return bad("shears or scales unevenly");
+      if (!(abs(gram(i, j) - (i == j ? 1.0 : 0.0)) <= tolerance))
+        return bad("shears or scales unevenly");
     }
   }
   return Similarity{quat_from_matrix(rotation), a.translation, scale};

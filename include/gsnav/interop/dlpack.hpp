@@ -16,17 +16,20 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
 
-// DLPack over gsnav's arrays and the other way, without a copy: what learners (PyTorch, JAX, CuPy, TensorFlow)
-// exchange tensors by. A tensor says nothing of streams. Where the learner works on another stream than the
-// backend, call `backend.hand_over_to(learners_stream)` after the work that fills a tensor was given to the backend,
-// and let the learner's stream do the same before the memory is written again.
+// DLPack over gsnav's arrays and the other way, without a copy: what learners (PyTorch, JAX, CuPy,
+// TensorFlow) exchange tensors by. A tensor says nothing of streams. Where the learner works on another
+// stream than the backend, call `backend.hand_over_to(learners_stream)` after the work that fills a
+// tensor was given to the backend, and let the learner's stream do the same before the memory is written
+// again.
 
 namespace gsnav::interop {
 
 /// Of a backend's memory: the GPU's number where there is one, else the CPU.
 template <Backend B>
 DLDevice dlpack_device([[maybe_unused]] const B& backend) noexcept {
-  if constexpr (requires { { backend.device() } -> std::convertible_to<int>; }) {
+  if constexpr (requires {
+                  { backend.device() } -> std::convertible_to<int>;
+                }) {
     return {kDLCUDA, backend.device()};
   } else {
     static_assert(is_host_backend<B>, "a backend with memory of its own must have device()");
@@ -42,8 +45,9 @@ constexpr DLDataType dlpack_type() noexcept {
   return {static_cast<std::uint8_t>(code), static_cast<std::uint8_t>(8 * sizeof(T)), 1};
 }
 
-/// A compact row-major tensor of `shape` over `data`. The taker calls its deleter, once, which lets go of `owner` (may
-/// be null: then the memory must outlive the tensor by other means). `data` may be null where a size is 0.
+/// A compact row-major tensor of `shape` over `data`. The taker calls its deleter, once, which lets go
+/// of `owner` (may be null: then the memory must outlive the tensor by other means). `data` may be null
+/// where a size is 0.
 ///
 ///     std::shared_ptr<Frames> frames = ...;
 ///     DLManagedTensor* t = to_dlpack(frames->rgb.data(), {n, h, w, 3}, dlpack_device(backend), frames);
@@ -75,22 +79,27 @@ DLManagedTensor* to_dlpack(T* data, const std::int64_t (&shape)[N], DLDevice dev
   return &holder.release()->tensor;
 }
 
-/// The elements of a tensor that another library owns, for images to be written into. It must outlive the view.
-/// Errors: invalid_argument naming the field where the type is not T, the memory is not on `device`, or elements
-/// are not compact and row-major.
+/// The elements of a tensor that another library owns, for images to be written into. It must outlive
+/// the view. Errors: invalid_argument naming the field where the type is not T, the memory is not on
+/// `device`, or elements are not compact and row-major.
 template <class T>
 Result<View<T>> from_dlpack(const DLTensor& tensor, DLDevice device) {
-  const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, "DLTensor." + what); };
+  const auto bad = [](const std::string& what) {
+    return Status(Errc::invalid_argument, "DLTensor." + what);
+  };
   const DLDataType want = dlpack_type<std::remove_const_t<T>>();
-  if (tensor.dtype.code != want.code || tensor.dtype.bits != want.bits || tensor.dtype.lanes != want.lanes) {
-    return bad("dtype has code " + std::to_string(tensor.dtype.code) + ", " + std::to_string(tensor.dtype.bits) +
-               " bits and " + std::to_string(tensor.dtype.lanes) + " lanes; needed are " + std::to_string(want.code) +
-               ", " + std::to_string(want.bits) + " and 1");
+  if (tensor.dtype.code != want.code || tensor.dtype.bits != want.bits ||
+      tensor.dtype.lanes != want.lanes) {
+    return bad("dtype has code " + std::to_string(tensor.dtype.code) + ", " +
+               std::to_string(tensor.dtype.bits) + " bits and " + std::to_string(tensor.dtype.lanes) +
+               " lanes; needed are " + std::to_string(want.code) + ", " + std::to_string(want.bits) +
+               " and 1");
   }
   if (tensor.device.device_type != device.device_type || tensor.device.device_id != device.device_id) {
     return bad("device is type " + std::to_string(tensor.device.device_type) + " number " +
-               std::to_string(tensor.device.device_id) + "; needed is type " + std::to_string(device.device_type) +
-               " number " + std::to_string(device.device_id) + " (1: CPU, 2: CUDA)");
+               std::to_string(tensor.device.device_id) + "; needed is type " +
+               std::to_string(device.device_type) + " number " + std::to_string(device.device_id) +
+               " (1: CPU, 2: CUDA)");
   }
   if (tensor.ndim < 0 || (tensor.ndim > 0 && tensor.shape == nullptr)) return bad("shape is missing");
   std::uint64_t count = 1;
@@ -101,12 +110,14 @@ Result<View<T>> from_dlpack(const DLTensor& tensor, DLDevice device) {
       return bad("strides[" + std::to_string(i) + "] is " + std::to_string(tensor.strides[i]) +
                  "; elements must be compact and row-major (make the tensor contiguous)");
     }
-    if (n != 0 && count > (std::uint64_t{1} << 62) / static_cast<std::uint64_t>(n)) return bad("shape is too large");
+    if (n != 0 && count > (std::uint64_t{1} << 62) / static_cast<std::uint64_t>(n))
+      return bad("shape is too large");
     count *= static_cast<std::uint64_t>(n);
   }
   auto* const data = static_cast<char*>(tensor.data) + (tensor.data == nullptr ? 0 : tensor.byte_offset);
   if (count > 0 && tensor.data == nullptr) return bad("data is null");
-  if (reinterpret_cast<std::uintptr_t>(data) % alignof(T) != 0) return bad("data is not aligned to its type");
+  if (reinterpret_cast<std::uintptr_t>(data) % alignof(T) != 0)
+    return bad("data is not aligned to its type");
   return View<T>{reinterpret_cast<T*>(data), static_cast<std::size_t>(count)};
 }
 

@@ -10,8 +10,8 @@
 #include "gsnav/core/view.hpp"
 #include "gsnav/interop/conventions.hpp"
 
-// Eigen over gsnav's arrays and the other way. `as_` functions copy nothing: what they return points into
-// their argument and lives no longer. `to_` and `from_` functions copy, where layouts differ.
+// Eigen over gsnav's arrays and the other way. `as_` functions copy nothing: what they return points
+// into their argument and lives no longer. `to_` and `from_` functions copy, where layouts differ.
 
 namespace gsnav::interop {
 
@@ -23,8 +23,8 @@ template <class S>
 using EigenImage = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 /// One channel of an [H][W][C] image.
 template <class S>
-using EigenChannelMap = Eigen::Map<const EigenImage<S>, Eigen::Unaligned,
-                                   Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
+using EigenChannelMap =
+    Eigen::Map<const EigenImage<S>, Eigen::Unaligned, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
 
 // ---- zero copy: gsnav's memory as Eigen
 
@@ -62,16 +62,17 @@ Eigen::Map<const EigenPoints<S>> as_eigen(View<const Vec3<S>> points) noexcept {
 
 /// An array of numbers as a column.
 template <class S>
-  requires std::is_arithmetic_v<S>
+requires std::is_arithmetic_v<S>
 auto as_eigen(View<S> values) noexcept {
   using Column = Eigen::Matrix<std::remove_const_t<S>, Eigen::Dynamic, 1>;
   using Mapped = std::conditional_t<std::is_const_v<S>, const Column, Column>;
   return Eigen::Map<Mapped>(values.data, static_cast<Eigen::Index>(values.size));
 }
 
-/// An image [H][W], for instance one camera of Frames::median_depth. `pixels` holds height x width values.
+/// An image [H][W], for instance one camera of Frames::median_depth. `pixels` holds height x width
+/// values.
 template <class S>
-  requires std::is_arithmetic_v<S>
+requires std::is_arithmetic_v<S>
 auto as_eigen(View<S> pixels, std::size_t height, std::size_t width) noexcept {
   assert(pixels.size == height * width);
   using Image = EigenImage<std::remove_const_t<S>>;
@@ -102,13 +103,15 @@ inline constexpr bool points_lie_together =
 /// copy and do not compile.
 template <class Derived>
 View<Vec3<typename Derived::Scalar>> as_view(Eigen::PlainObjectBase<Derived>& m) noexcept {
-  static_assert(detail::points_lie_together<Derived>, "points must lie together: N x 3 RowMajor or 3 x N");
+  static_assert(detail::points_lie_together<Derived>,
+                "points must lie together: N x 3 RowMajor or 3 x N");
   return {reinterpret_cast<Vec3<typename Derived::Scalar>*>(m.data()),
           static_cast<std::size_t>(m.size() / 3)};
 }
 template <class Derived>
 View<const Vec3<typename Derived::Scalar>> as_view(const Eigen::PlainObjectBase<Derived>& m) noexcept {
-  static_assert(detail::points_lie_together<Derived>, "points must lie together: N x 3 RowMajor or 3 x N");
+  static_assert(detail::points_lie_together<Derived>,
+                "points must lie together: N x 3 RowMajor or 3 x N");
   return {reinterpret_cast<const Vec3<typename Derived::Scalar>*>(m.data()),
           static_cast<std::size_t>(m.size() / 3)};
 }

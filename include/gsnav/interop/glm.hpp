@@ -11,8 +11,8 @@
 #include "gsnav/interop/conventions.hpp"
 
 // GLM over gsnav's arrays and the other way. `as_` functions copy nothing: what they return points into
-// their argument and lives no longer. `to_` and `from_` functions copy, because GLM's matrices are stored
-// by columns and the order of its quaternions depends on a macro.
+// their argument and lives no longer. `to_` and `from_` functions copy, because GLM's matrices are
+// stored by columns and the order of its quaternions depends on a macro.
 
 namespace gsnav::interop {
 
@@ -130,7 +130,8 @@ template <class S>
 Result<Camera> camera_from_opengl(const GlmMat4<S>& view, const GlmMat4<S>& projection, int w, int h) {
   const auto p = [&](int row, int column) { return static_cast<double>(projection[column][row]); };
   if (!(p(3, 2) == -1 && p(3, 3) == 0 && p(0, 0) > 0 && p(1, 1) > 0 && p(0, 1) == 0 && p(1, 0) == 0)) {
-    return Status(Errc::invalid_argument, "the projection is no perspective of OpenGL's right-handed kind");
+    return Status(Errc::invalid_argument,
+                  "the projection is no perspective of OpenGL's right-handed kind");
   }
   Camera c;
   c.viewmat = viewmat_from(view);

@@ -23,9 +23,10 @@ Status save_png_rgb(const std::filesystem::path& path, std::span<const float> rg
 Status save_png_rgb8(const std::filesystem::path& path, std::span<const std::uint8_t> rgb, int width,
                      int height);
 
-/// [height][width][3] bytes as a JPEG in memory; `quality` in [1, 100], colour at half the resolution. Errors:
-/// invalid_argument (sizes, quality); unsupported where the build has no libjpeg.
-Result<std::vector<std::byte>> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality = 85);
+/// [height][width][3] bytes as a JPEG in memory; `quality` in [1, 100], colour at half the resolution.
+/// Errors: invalid_argument (sizes, quality); unsupported where the build has no libjpeg.
+Result<std::vector<std::byte>> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height,
+                                           int quality = 85);
 
 /// Writes [height][width] values as 16-bit grey PNG (millimetres of depth, say), values unchanged.
 Status save_png_gray16(const std::filesystem::path& path, std::span<const std::uint16_t> values,

@@ -17,7 +17,8 @@ namespace gsnav::io {
 /// How a cloud is kept in memory.
 enum class Storage : std::uint8_t {
   full,     ///< float32
-  compact,  ///< SH bands from 1 on as binary16 (compact_sh): 146 bytes a Gaussian of degree 3 in place of 236
+  compact,  ///< SH bands from 1 on as binary16 (compact_sh): 146 bytes a Gaussian of degree 3 in place
+            ///< of 236
 };
 
 /// How load_scene reads.
@@ -29,11 +30,11 @@ struct LoadSceneOptions {
   /// Whether SH bands that are zero in every Gaussian are held. They change no bit of an image; a cloud
   /// that is written to a file again keeps its degree by them. The report says what was let go.
   bool keep_zero_bands = false;
-  /// What compact storage may change a coefficient by; a cloud that it changes by more stays as it is, with a warning.
-  /// The report has the error. A colour changes by at most 4.3 times that: 15 basis functions whose squares sum to
-  /// 15 / (4 pi).
+  /// What compact storage may change a coefficient by; a cloud that it changes by more stays as it is,
+  /// with a warning. The report has the error. A colour changes by at most 4.3 times that: 15 basis
+  /// functions whose squares sum to 15 / (4 pi).
   double most_sh_error = 2e-3;
-  PackLimits pack{};  ///< of load_packed_scene
+  PackLimits pack{};    ///< of load_packed_scene
   ReadLimits limits{};  ///< json_depth, of glTF and lod-meta.json
 };
 
@@ -44,27 +45,29 @@ struct LoadedPackedCloud {
 };
 
 /// Reads a scene of Gaussians by what its path names: a `.ply`, `.splat`, `.ksplat`, `.spz`, `.sog`,
-/// `.glb` or `.gltf`, a `meta.json` or a `lod-meta.json`, or a folder with one of these two. Of scenes that move
-/// (a `.ply` with t, t_scale or motion_*, a `.4dgs.npz`) it gives the moment `options.time`.
+/// `.glb` or `.gltf`, a `meta.json` or a `lod-meta.json`, or a folder with one of these two. Of scenes
+/// that move (a `.ply` with t, t_scale or motion_*, a `.4dgs.npz`) it gives the moment `options.time`.
 ///
 /// A comma names sibling tiles, which are merged into one cloud: `scenes/flat/2_0,2_1` reads
 /// scenes/flat/2_0 and scenes/flat/2_1. Their reports are summed, their warnings carry the tile's path.
 ///
-/// Rows come sorted in space (detail/scene/spatial_order.hpp) unless the options say otherwise; `row_ids` has their places
-/// as they were read.
-/// Errors: what the loaders of these formats return; unsupported (an extension that is not in the list,
-/// named with the list); invalid_argument (an empty name or a tile twice). Never throws.
+/// Rows come sorted in space (detail/scene/spatial_order.hpp) unless the options say otherwise;
+/// `row_ids` has their places as they were read. Errors: what the loaders of these formats return;
+/// unsupported (an extension that is not in the list, named with the list); invalid_argument (an empty
+/// name or a tile twice). Never throws.
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options = {});
 
 /// The same, packed: a third of the memory, to be rendered. Large binary PLY files are read five times,
 /// so that never more than twice that memory is needed; of others both clouds are there while one is
 /// packed. `options.storage` must be full. Errors: load_scene's.
-Result<LoadedPackedCloud> load_packed_scene(const std::string& spec, const LoadSceneOptions& options = {});
+Result<LoadedPackedCloud> load_packed_scene(const std::string& spec,
+                                            const LoadSceneOptions& options = {});
 
-/// A scene that ships its levels of detail, with them, as load_lod_levels reads it; nothing where `spec` is no streamed
-/// set, where no level above its finest is there, or where its nodes are too small to be drawn one by one. Rows are in
-/// chunks whatever `options.sort` says. Errors: load_lod_levels'.
-Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec, const LoadSceneOptions& options = {});
+/// A scene that ships its levels of detail, with them, as load_lod_levels reads it; nothing where `spec`
+/// is no streamed set, where no level above its finest is there, or where its nodes are too small to be
+/// drawn one by one. Rows are in chunks whatever `options.sort` says. Errors: load_lod_levels'.
+Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec,
+                                                        const LoadSceneOptions& options = {});
 
 /// The report as text for people, a line for each thing there is to say, each ended.
 std::string report_text(const LoadReport& report);

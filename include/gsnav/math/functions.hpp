@@ -8,8 +8,8 @@
 
 #include "gsnav/config.hpp"
 
-// Scalar functions under one set of names for float, double and long double. detail/math/pack.hpp adds the
-// same names for lanes, so that a kernel written once runs on any of them. Everything here uses
+// Scalar functions under one set of names for float, double and long double. detail/math/pack.hpp adds
+// the same names for lanes, so that a kernel written once runs on any of them. Everything here uses
 // correctly rounded operations only (+ - * / sqrt fma), except exp2, log2 and the trigonometric
 // functions of double, which come from the platform.
 
@@ -37,8 +37,8 @@ using scalar_of = typename LaneTraits<L>::scalar;
 /// Comparison result of a scalar or lane pack.
 template <class L>
 using mask_of = typename LaneTraits<L>::mask;
-/// A double for each element of a scalar or lane pack (detail/math/pack_double.hpp). static_cast converts both
-/// ways.
+/// A double for each element of a scalar or lane pack (detail/math/pack_double.hpp). static_cast
+/// converts both ways.
 template <class L>
 using doubles_of = typename LaneTraits<L>::doubles;
 
@@ -51,8 +51,8 @@ GSNAV_HD float abs(float a) noexcept { return ::fabsf(a); }
 GSNAV_HD double abs(double a) noexcept { return ::fabs(a); }
 #else
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__FMA__)
-// Code for any x86-64 may not use the instruction unasked, so that compilers call libm, at five times the cost. All
-// processors since 2013 have it, and it rounds as libm does: the same bits.
+// Code for any x86-64 may not use the instruction unasked, so that compilers call libm, at five times
+// the cost. All processors since 2013 have it, and it rounds as libm does: the same bits.
 GSNAV_HD float fma(float a, float b, float c) noexcept {
   if (!__builtin_cpu_supports("fma")) return __builtin_fmaf(a, b, c);
   // Not volatile, it may be executed before the test.
@@ -79,8 +79,8 @@ GSNAV_HD double abs(double a) noexcept { return __builtin_fabs(a); }
 GSNAV_HD long double abs(long double a) noexcept { return __builtin_fabsl(a); }
 #endif
 
-/// Not below the square root of a >= 0, and above it by 1e-3 relative (and 1e-15) at most: packs need not take
-/// the time of a correctly rounded one. The bits may differ between processors.
+/// Not below the square root of a >= 0, and above it by 1e-3 relative (and 1e-15) at most: packs need
+/// not take the time of a correctly rounded one. The bits may differ between processors.
 template <class S>
 GSNAV_HD S sqrt_above(S a) noexcept {
   return sqrt(a);
@@ -113,7 +113,9 @@ GSNAV_HD float reciprocal_near(float a) noexcept {
 #endif
 /// x without its fraction, |x| < 2^31.
 GSNAV_HD float truncated(float a) noexcept { return static_cast<float>(static_cast<std::int32_t>(a)); }
-GSNAV_HD double truncated(double a) noexcept { return static_cast<double>(static_cast<std::int32_t>(a)); }
+GSNAV_HD double truncated(double a) noexcept {
+  return static_cast<double>(static_cast<std::int32_t>(a));
+}
 
 GSNAV_HD float sin(float a) noexcept { return ::sinf(a); }
 GSNAV_HD double sin(double a) noexcept { return ::sin(a); }
@@ -171,14 +173,14 @@ GSNAV_HD bool is_finite(long double a) noexcept {
 #endif
 
 /// How exp2 is computed in float. Relative error against the true value, over [-126, 126]:
-/// degree 5: 1.7e-7 (half of it rounding); degree 3: 1.0e-4 (the polynomial). hardware: a GPU's own instruction,
-/// 1.8e-7 (PTX ISA, ex2.approx); on a CPU it is degree 5.
+/// degree 5: 1.7e-7 (half of it rounding); degree 3: 1.0e-4 (the polynomial). hardware: a GPU's own
+/// instruction, 1.8e-7 (PTX ISA, ex2.approx); on a CPU it is degree 5.
 enum class Exp2 { degree5, degree3, hardware };
 
 namespace detail {
 
-// 2^f over [-1/2, 1/2]: the least relative error of a degree 5 with 2^0 = 1 (9.1e-8 before rounding), and the
-// interpolant at Chebyshev nodes of degree 3.
+// 2^f over [-1/2, 1/2]: the least relative error of a degree 5 with 2^0 = 1 (9.1e-8 before rounding),
+// and the interpolant at Chebyshev nodes of degree 3.
 template <class L>
 GSNAV_HD L exp2_degree5(L f) noexcept {
   L p = fma(f, L(1.326472539421809e-3f), L(9.671512835181242e-3f));
@@ -200,7 +202,9 @@ inline constexpr float kRoundMagic = 12582912.0f;
 }  // namespace detail
 
 /// p 2^n for a positive p and the t = n + detail::kRoundMagic of an integer n; no check for overflow.
-GSNAV_HD float scale_by_rounded(float p, float t) noexcept { return float_of_bits(bits_of(p) + (bits_of(t) << 23)); }
+GSNAV_HD float scale_by_rounded(float p, float t) noexcept {
+  return float_of_bits(bits_of(p) + (bits_of(t) << 23));
+}
 
 namespace detail {
 template <Exp2 M, class L>

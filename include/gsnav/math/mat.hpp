@@ -16,9 +16,7 @@ struct Mat3 {
   GSNAV_HD static constexpr Mat3 identity() noexcept {
     return {{{L(1), L(0), L(0)}, {L(0), L(1), L(0)}, {L(0), L(0), L(1)}}};
   }
-  GSNAV_HD constexpr Vec3<L> column(int j) const noexcept {
-    return {row[0][j], row[1][j], row[2][j]};
-  }
+  GSNAV_HD constexpr Vec3<L> column(int j) const noexcept { return {row[0][j], row[1][j], row[2][j]}; }
 };
 
 using Mat3f = Mat3<float>;

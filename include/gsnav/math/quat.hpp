@@ -77,7 +77,8 @@ GSNAV_HD Mat3<L> rotation_matrix(const Quat<L>& q) noexcept {
            {fma(q.x, z2, -wy), fma(q.y, z2, wx), fma(-q.x, x2, fma(-q.y, y2, one))}}};
 }
 
-/// Quaternion of a rotation matrix; the branch on the largest diagonal term keeps it stable at 180 degrees.
+/// Quaternion of a rotation matrix; the branch on the largest diagonal term keeps it stable at 180
+/// degrees.
 template <class S>
 GSNAV_HD Quat<S> quat_from_matrix(const Mat3<S>& m) noexcept {
   const S trace = m(0, 0) + m(1, 1) + m(2, 2);

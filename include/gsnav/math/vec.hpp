@@ -18,9 +18,7 @@ struct Vec3 {
   L x{}, y{}, z{};
 
   GSNAV_HD constexpr L& operator[](int i) noexcept { return i == 0 ? x : (i == 1 ? y : z); }
-  GSNAV_HD constexpr const L& operator[](int i) const noexcept {
-    return i == 0 ? x : (i == 1 ? y : z);
-  }
+  GSNAV_HD constexpr const L& operator[](int i) const noexcept { return i == 0 ? x : (i == 1 ? y : z); }
 };
 
 using Vec3f = Vec3<float>;
@@ -79,8 +77,8 @@ GSNAV_HD Vec3<L> cross(const Vec3<L>& a, const Vec3<L>& b) noexcept {
           difference_of_products(a.x, b.y, a.y, b.x)};
 }
 
-/// a x b with an error of a rounding of |a| |b| a component: for vectors that are not nearly parallel, or where that
-/// does no harm.
+/// a x b with an error of a rounding of |a| |b| a component: for vectors that are not nearly parallel,
+/// or where that does no harm.
 template <class L>
 GSNAV_HD Vec3<L> rough_cross(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return {fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/detail/core/small_vector.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/core/small_vector.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
@@ -32,8 +32,8 @@ struct NavPoint {
   PolyId poly = kNoPoly;
 };
 
-/// How far a point may lie from the surface to be snapped to it: half extents of a box, metres. The defaults are
-/// Habitat's, and generous: two metres beside the mesh or four above it still snap.
+/// How far a point may lie from the surface to be snapped to it: half extents of a box, metres. The
+/// defaults are Habitat's, and generous: two metres beside the mesh or four above it still snap.
 struct SnapOptions {
   Vec3d half_extents{2.0, 4.0, 2.0};
   std::optional<std::size_t> island{};  ///< only to this island, where one is named
@@ -65,7 +65,8 @@ Result<NavMeshTriangles> gather_parts(const NavMeshSettings& settings,
 struct ObstacleHit {
   double distance = 0.0;  ///< on the ground plane, metres
   Vec3d position{};       ///< nearest point of the edge
-  Vec3d normal{};         ///< of the edge (at a corner: that which faces p more), on the ground plane, into the mesh
+  Vec3d normal{};  ///< of the edge (at a corner: that which faces p more), on the ground plane, into the
+                   ///< mesh
 };
 
 /// How a top-down map is laid out.
@@ -78,26 +79,30 @@ enum class TopDownLayout : std::uint8_t {
 
 /// The walkable surface near one height, seen from above.
 struct TopDownMap {
-  Vec3d low{};                        ///< world corner of cell (0, 0)
+  Vec3d low{};  ///< world corner of cell (0, 0)
   double metres_per_cell = 0.0;
   double at = 0.5;  ///< where in a cell the surface was looked up, in cells from its corner: 0.5 at the
                     ///< centre, or 0
   std::size_t columns = 0, rows = 0;  ///< along x and z
-  std::vector<std::int32_t> islands;  ///< columns * row + column: island, or -1 where nothing is walkable
+  std::vector<std::int32_t>
+      islands;  ///< columns * row + column: island, or -1 where nothing is walkable
 
-  bool walkable(std::size_t column, std::size_t row) const noexcept { return islands[columns * row + column] >= 0; }
+  bool walkable(std::size_t column, std::size_t row) const noexcept {
+    return islands[columns * row + column] >= 0;
+  }
 };
 
 /// A path along the surface from start to goal: the corners it turns at, between them points wherever a
-/// straight line would leave the surface by more than a centimetre, and its length on the surface, metres.
+/// straight line would leave the surface by more than a centimetre, and its length on the surface,
+/// metres.
 struct NavPath {
   std::vector<Vec3d> points;
   double length = 0.0;
 };
 
 /// A distance that is known to an error: `length` is at most `relative_error` times `at_least` above it,
-/// and the shortest path lies between it and 2 length - at_least, metres. Both infinite where there is no
-/// path.
+/// and the shortest path lies between it and 2 length - at_least, metres. Both infinite where there is
+/// no path.
 struct BoundedDistance {
   double length = 0.0;
   double at_least = 0.0;  ///< no path is shorter
@@ -134,24 +139,24 @@ using WalkPoints = SmallVector<WalkPoint, 8>;
 /// A straight or sliding walk along the surface. Each leg between consecutive points lies within one
 /// polygon and follows its height to a centimetre. A walk that ends before fraction 1 was stopped.
 struct SurfaceWalk {
-  WalkPoints points;              ///< at least the start
-  double length = 0.0;            ///< metres walked, in three dimensions
-  bool hit_wall = false;          ///< an edge of the mesh stopped or turned the walk
-  Vec3d wall_normal{};  ///< ground-plane normal of the last wall met, pointing into the mesh
+  WalkPoints points;      ///< at least the start
+  double length = 0.0;    ///< metres walked, in three dimensions
+  bool hit_wall = false;  ///< an edge of the mesh stopped or turned the walk
+  Vec3d wall_normal{};    ///< ground-plane normal of the last wall met, pointing into the mesh
 };
 
 /// Where agents can walk: a Recast NavMesh with queries. Built once, then constant: every query is
-/// const, changes no flags and may run from any number of threads at the same time. One that was moved from may only
-/// be assigned to or destroyed.
+/// const, changes no flags and may run from any number of threads at the same time. One that was moved
+/// from may only be assigned to or destroyed.
 class NavMesh {
  public:
   using Triangle = std::array<std::uint32_t, 3>;
 
   /// Builds from triangles (counter-clockwise seen from above is walkable; Y up, metres), at any
   /// distance from the world's origin. Errors: invalid_argument naming the setting, vertex or index
-  /// at fault or the size of a grid beyond `max_cells`; nothing_navigable where no surface is left; unsupported
-  /// where Detour cannot number the polygons. With `settings.tile_size`, `threads` share out the tiles (0: one a
-  /// core, at most 16); the mesh is the same, bit for bit, for any number of them.
+  /// at fault or the size of a grid beyond `max_cells`; nothing_navigable where no surface is left;
+  /// unsupported where Detour cannot number the polygons. With `settings.tile_size`, `threads` share out
+  /// the tiles (0: one a core, at most 16); the mesh is the same, bit for bit, for any number of them.
   static Result<NavMesh> build(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
                                std::span<const Triangle> triangles, int threads = 0);
   /// The same from a stage and the objects in it (gather_parts). Errors: as both.
@@ -197,11 +202,11 @@ class NavMesh {
   /// Height of the surface on `poly` at the ground position of p, metres; NaN for kNoPoly and whatever
   /// is no polygon of this mesh.
   double height_at(PolyId poly, const Vec3d& p) const noexcept;
-  /// Uniform over the surface by area (alias table: constant time), from the caller's generator; `island`
-  /// restricts it. No polygon where there is no such island.
+  /// Uniform over the surface by area (alias table: constant time), from the caller's generator;
+  /// `island` restricts it. No polygon where there is no such island.
   NavPoint random_point(Rng& rng, std::optional<std::size_t> island = {}) const;
-  /// Uniform over the part of the surface within `radius` metres of p in space; none where there is no such
-  /// part or less than about a thousandth of what lies above or below the disc.
+  /// Uniform over the part of the surface within `radius` metres of p in space; none where there is no
+  /// such part or less than about a thousandth of what lies above or below the disc.
   std::optional<NavPoint> random_point_near(Rng& rng, const Vec3d& p, double radius,
                                             std::optional<std::size_t> island = {}) const;
   /// Ground-plane distance from p, snapped, to the nearest edge of the mesh that can be reached on the
@@ -211,8 +216,8 @@ class NavMesh {
   /// The edge itself; none where p cannot be snapped or no edge is within `max_radius`.
   std::optional<ObstacleHit> closest_obstacle(const Vec3d& p, double max_radius = 2.0,
                                               const SnapOptions& options = {}) const;
-  /// All edges within `radius` that can be reached on the surface within it, each with its nearest point; the
-  /// normal there points to p, or into the mesh where p is on the edge.
+  /// All edges within `radius` that can be reached on the surface within it, each with its nearest
+  /// point; the normal there points to p, or into the mesh where p is on the edge.
   std::vector<ObstacleHit> obstacles_near(const NavPoint& p, double radius) const;
   /// Which cells of a grid over the bounds are walkable within `max_height_delta` of `height` (world,
   /// metres). Errors: invalid_argument for a cell that is not positive, a grid of more than 2^28 cells,
@@ -221,15 +226,17 @@ class NavMesh {
                                   TopDownLayout layout = TopDownLayout::centres) const;
 
   // ---- paths: the shortest on the surface, exactly (Polyanya, unfolded over slopes), so that distances
-  // are symmetric and obey the triangle inequality. The surface is that of the height triangles; a polygon
-  // that is level to a millimetre counts as flat. The first distance asked for prepares the others, once a mesh:
-  // tenths of a second and tens of megabytes for hundreds of polygons, at most 95 MiB; seconds and up to
-  // 64 MiB on large hills (docs/navigation.md).
+  // are symmetric and obey the triangle inequality. The surface is that of the height triangles; a
+  // polygon that is level to a millimetre counts as flat. The first distance asked for prepares the
+  // others, once a mesh: tenths of a second and tens of megabytes for hundreds of polygons, at most 95
+  // MiB; seconds and up to 64 MiB on large hills (docs/navigation.md).
   /// Whether find_path finds a path: every search ends, so this needs none.
-  PathStatus path_status(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const noexcept;
+  PathStatus path_status(const Vec3d& start, const Vec3d& goal,
+                         const SnapOptions& options = {}) const noexcept;
   /// The shortest path between two points, after snapping. Errors (nothing_navigable) say why there is
   /// none, as path_status does: a point off the mesh, or different islands.
-  Result<NavPath> find_path(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const;
+  Result<NavPath> find_path(const Vec3d& start, const Vec3d& goal,
+                            const SnapOptions& options = {}) const;
   /// Length of find_path, infinity where there is none.
   double geodesic_distance(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const;
   /// The shortest of the paths to many goals, and the goal it leads to. Goals that cannot be reached are

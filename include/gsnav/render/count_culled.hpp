@@ -15,8 +15,8 @@
 
 namespace gsnav {
 
-/// Rows of a frame by what culling does with them, nothing hidden by anything. Rows of chunks that a cut does not draw
-/// count as not touched.
+/// Rows of a frame by what culling does with them, nothing hidden by anything. Rows of chunks that a cut
+/// does not draw count as not touched.
 struct CullCounts {
   std::uint64_t rows = 0;      ///< in all sets
   std::uint64_t touched = 0;   ///< in chunks, and parts of chunks, that may be in view
@@ -26,15 +26,17 @@ struct CullCounts {
   std::uint64_t removable() const noexcept { return rows - emitting; }
   /// Rows touched for each that was needed; at least 1, and 1 where none was touched.
   double touched_per_emitting() const noexcept {
-    return touched == 0 ? 1.0 : static_cast<double>(touched) / static_cast<double>(emitting == 0 ? 1 : emitting);
+    return touched == 0
+               ? 1.0
+               : static_cast<double>(touched) / static_cast<double>(emitting == 0 ? 1 : emitting);
   }
 };
 
-/// Counts for one camera. Arrays are in host memory; float32, as frames are. Rows that are not touched have no pair:
-/// that is what culling promises, and a test shows.
+/// Counts for one camera. Arrays are in host memory; float32, as frames are. Rows that are not touched
+/// have no pair: that is what culling promises, and a test shows.
 template <Backend B>
-requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const GaussianSet> sets, const Camera& camera,
-                                                    const RenderConfig& config) {
+requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const GaussianSet> sets,
+                                                    const Camera& camera, const RenderConfig& config) {
   CullCounts out;
   const ProjectionRules rules = projection_rules(config);
   const float log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));

@@ -12,17 +12,17 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/core/stages.hpp"
 #include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/frame/blend.hpp"
-#include "gsnav/frame/color_space.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/render/composite_steps.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
-#include "gsnav/render/render_config.hpp"
 #include "gsnav/detail/render/render_workspace.hpp"
-#include "gsnav/core/stages.hpp"
 #include "gsnav/detail/render/validate_set.hpp"
+#include "gsnav/frame/color_space.hpp"
+#include "gsnav/render/render_config.hpp"
 
 namespace gsnav {
 
@@ -59,8 +59,9 @@ void blend_pixels(B& backend, const RasterArgs<S>& args) {
 
 /// Sizes the scratch of one camera's frame and writes the projection's arguments.
 template <class S, Backend B>
-void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
-                        const RenderConfig& config, const FrameImages<S>& images, bool meshes) {
+void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
+                        const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
+                        bool meshes) {
   ws.projections.resize(sets.size());
   std::size_t chunks = 0;
   bool ranked = false;
@@ -131,14 +132,16 @@ void convert_set(B& backend, const ProjectArgs<S>& args, const ProjectOutputs<S>
                        ConvertSplatColors<S>{out.colors, out.counts, args.first_chunk, from, to});
 }
 
-/// What comes after the projection of one camera: sort, bin, blend, of the keys in `range`. Adds to `stats`.
+/// What comes after the projection of one camera: sort, bin, blend, of the keys in `range`. Adds to
+/// `stats`.
 template <class S, Backend B>
-Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera, const RenderConfig& config,
-                      const KeyRange& range, const TileProgress<S>& progress, const MeshLayer<S>& mesh,
-                      const FrameImages<S>& images, RenderStats& stats) {
+Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera,
+                      const RenderConfig& config, const KeyRange& range, const TileProgress<S>& progress,
+                      const MeshLayer<S>& mesh, const FrameImages<S>& images, RenderStats& stats) {
   // ---- sort
   // Distances may round to below the near plane that their z is beyond, but not to half of it.
-  const float near_plane = ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // of all sets
+  const float near_plane =
+      ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // of all sets
   const std::uint32_t base = config.key_bits < 32 ? 0 : std::max(bits_of(0.5f * near_plane), range.low);
   const Result<std::size_t> ordered = order_visible(backend, ws.visible, base, config.key_bits, range);
   if (!ordered) return ordered.status();
@@ -202,19 +205,23 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
 }
 
 /// Slices that a frame is drawn in, of which so many Gaussians at most may be visible.
-inline int depth_slices_of(const RenderConfig& config, std::size_t candidates, const Camera& camera) noexcept {
-  if (config.response != Response::ewa || config.compat != Compat::none || config.key_bits < 32) return 1;
+inline int depth_slices_of(const RenderConfig& config, std::size_t candidates,
+                           const Camera& camera) noexcept {
+  if (config.response != Response::ewa || config.compat != Compat::none || config.key_bits < 32)
+    return 1;
   if (config.depth_slices != 0) return config.depth_slices;
   // Where few Gaussians are for a pixel, projecting them is a small part of the frame.
   constexpr std::size_t kFew = 131072;
-  const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   return candidates < kFew || candidates < pixels / 2 ? 1 : 4;
 }
 
 /// Projects and draws a frame, front to back, in slices of depth; false where one is as good.
 template <class B>
 Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Camera& camera,
-                            const RenderConfig& config, const FrameImages<float>& images, RenderStats& stats) {
+                            const RenderConfig& config, const FrameImages<float>& images,
+                            RenderStats& stats) {
   if (depth_slices_of(config, stats.gaussians, camera) < 2) return false;  // nothing needs to be planned
   DepthSlices& slices = ws.slices;
   const View<const ProjectArgs<float>> sets = view_of(ws.projections);
@@ -225,7 +232,8 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
   const int last = slices.count() - 1;
 
   const TileGrid grid = grid_of<B>(config, camera);
-  const std::size_t pixels = static_cast<std::size_t>(grid.tile_size) * static_cast<std::size_t>(grid.tile_size);
+  const std::size_t pixels =
+      static_cast<std::size_t>(grid.tile_size) * static_cast<std::size_t>(grid.tile_size);
   ws.open.resize_discard(grid.count());
   ws.states.resize_discard(grid.count() * pixels * blend_state_values(images.depth_mode()));
   std::fill(ws.visible.counts.data(), ws.visible.counts.data() + ws.visible.counts.size(), 0u);
@@ -235,7 +243,9 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
       if (!chunks.empty()) run(backend, stage::Project{}, args, ws.projected, chunks);
     }
     const TileProgress<float> progress{ws.open.view(), ws.states.view(), s == 0, s == last};
-    if (Status e = draw_projected(backend, ws, camera, config, slices.keys(s), progress, {}, images, stats); !e) {
+    if (Status e =
+            draw_projected(backend, ws, camera, config, slices.keys(s), progress, {}, images, stats);
+        !e) {
       return e;
     }
     if (s == last) break;
@@ -246,12 +256,11 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
   return true;
 }
 
-
 /// render_camera, and behind a mesh where there is one.
 template <class S, Backend B>
-Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets, const Camera& camera,
-                    const RenderConfig& config, const MeshLayer<S>& mesh, const FrameImages<S>& images,
-                    RenderStats& stats) {
+Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
+                    const Camera& camera, const RenderConfig& config, const MeshLayer<S>& mesh,
+                    const FrameImages<S>& images, RenderStats& stats) {
   if (Status s = validate(config); !s) return s;
   if (Status s = validate(camera); !s) return s;
   std::size_t slots = 0;
@@ -287,7 +296,9 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
       run(backend, stage::Project{}, args, ws.projected);
       detail::convert_set(backend, args, ws.projected, sets[i].color_space, config.blend_space);
     }
-    if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, mesh, images, counted); !s) return s;
+    if (Status s = detail::draw_projected<S>(backend, ws, camera, config, {}, {}, mesh, images, counted);
+        !s)
+      return s;
   }
   stats = counted;
   return {};

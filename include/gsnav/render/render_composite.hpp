@@ -16,48 +16,59 @@ struct MeshFrame {
   MeshLight light{};
 };
 
-/// render_camera with meshes among the Gaussians (docs/composition.md); without any it is that. `sets` may be empty.
-/// Errors: those of render_camera and draw_meshes; unsupported, where Composite::hard_depth meets a mesh that is seen
-/// through.
+/// render_camera with meshes among the Gaussians (docs/composition.md); without any it is that. `sets`
+/// may be empty. Errors: those of render_camera and draw_meshes; unsupported, where
+/// Composite::hard_depth meets a mesh that is seen through.
 template <class S, Backend B>
 Status render_composite(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
                         const MeshFrame& meshes, const Camera& camera, const RenderConfig& config,
                         const FrameImages<S>& images, RenderStats* stats = nullptr) {
-  if (meshes.instances.empty()) return render_camera<S>(backend, ws, sets, camera, config, images, stats);
+  if (meshes.instances.empty())
+    return render_camera<S>(backend, ws, sets, camera, config, images, stats);
   if (Status s = validate(config); !s) return s;
   RenderStats counted;
   MeshStats drawn;
   const int tile_size = tile_size_of<B>(config, camera.width, camera.height);
   const bool color = images.rgb != nullptr;
-  if (Status s = draw_meshes<S>(backend, ws.mesh, meshes.instances, camera, meshes.light, tile_size, color, {}, &drawn);
+  if (Status s = draw_meshes<S>(backend, ws.mesh, meshes.instances, camera, meshes.light, tile_size,
+                                color, {}, &drawn);
       !s) {
     return s;
   }
   const bool linear = config.blend_space == ColorSpace::linear;
   if (color && linear) backend.parallel_for(ws.mesh.color.size(), DecodeImage<S>{ws.mesh.color.data()});
-  MeshLayer<S> layer{ws.mesh.depth.data(), color ? ws.mesh.color.data() : nullptr,
-                           std::as_const(ws.mesh.tile_far).view(), {}, {}};
+  MeshLayer<S> layer{ws.mesh.depth.data(),
+                     color ? ws.mesh.color.data() : nullptr,
+                     std::as_const(ws.mesh.tile_far).view(),
+                     {},
+                     {}};
   if (any_seen_through(meshes.instances)) {
     if (config.composite == Composite::hard_depth) {
-      return {Errc::unsupported, "Composite::hard_depth has one layer a pixel: a mesh with MeshAlpha::blend is drawn merged"};
+      return {
+          Errc::unsupported,
+          "Composite::hard_depth has one layer a pixel: a mesh with MeshAlpha::blend is drawn merged"};
     }
-    if (Status s = draw_fragments<S>(backend, ws.fragments, meshes.instances, camera, meshes.light, tile_size, color,
-                                     linear, ws.mesh.depth.data(), layer, drawn);
+    if (Status s = draw_fragments<S>(backend, ws.fragments, meshes.instances, camera, meshes.light,
+                                     tile_size, color, linear, ws.mesh.depth.data(), layer, drawn);
         !s) {
       return s;
     }
   }
   if (config.composite == Composite::merged) {
-    if (Status s = detail::render_frame<S>(backend, ws, sets, camera, config, layer, images, counted); !s) return s;
+    if (Status s = detail::render_frame<S>(backend, ws, sets, camera, config, layer, images, counted);
+        !s)
+      return s;
   } else {
-    const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+    const std::size_t pixels =
+        static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
     ws.composite.resize_discard(2 * pixels);
     FrameImages<S> alone = images;
     if (alone.alpha == nullptr) alone.alpha = ws.composite.data();
     if (alone.expected_depth == nullptr) alone.expected_depth = ws.composite.data() + pixels;
     RenderConfig black = config;
     black.background = {};
-    if (Status s = detail::render_frame<S>(backend, ws, sets, camera, black, {}, alone, counted); !s) return s;
+    if (Status s = detail::render_frame<S>(backend, ws, sets, camera, black, {}, alone, counted); !s)
+      return s;
     backend.parallel_for(pixels, HardDepthPixel<S>{images, alone.alpha, alone.expected_depth, layer,
                                                    vec_cast<S>(config.background)});
   }

@@ -9,10 +9,10 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/frame/blend.hpp"
-#include "gsnav/image/camera.hpp"
-#include "gsnav/frame/gaussians.hpp"
-#include "gsnav/detail/mesh/mesh.hpp"
 #include "gsnav/detail/frame/projection.hpp"
+#include "gsnav/detail/mesh/mesh.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/image/camera.hpp"
 
 namespace gsnav {
 
@@ -30,26 +30,27 @@ struct RenderConfig {
   SortOrder sort_order = SortOrder::z_depth;
   Response response = Response::ewa;
   Compat compat = Compat::none;
-  int tile_size = 0;                   ///< 8, 16 or 32, or 0: what is fast; the image does not depend on it
-  int depth_slices = 0;                ///< in [1, 8], or 0: what is fast; the image does not depend on it. Some
-                                       ///< backends draw so many one after the other and skip what earlier ones hide
-  int max_sh_degree = kMaxShDegree;    ///< in [0, 3]: bands above it are left out
-  int key_bits = 32;                   ///< in [8, 32]: how much of the sort key is compared
-  double alpha_min = 1.0 / 255;        ///< in (0, 1): a Gaussian is not blended where alpha is below
-  double max_alpha = 0.99;             ///< in (0, 1]
-  double transmittance_min = 1e-4;     ///< in [0, 1)
-  double first_hit_tau = 0.5;          ///< in (0, 1): first-hit depth is where alpha reaches this
-  /// What colours are blended in, and images and `background` hold: the main asset's space. Sets of the other are
-  /// converted Gaussian by Gaussian, after SH; meshes too. Linear images need encoding to be looked at (srgb_encoded).
+  int tile_size = 0;     ///< 8, 16 or 32, or 0: what is fast; the image does not depend on it
+  int depth_slices = 0;  ///< in [1, 8], or 0: what is fast; the image does not depend on it. Some
+                         ///< backends draw so many one after the other and skip what earlier ones hide
+  int max_sh_degree = kMaxShDegree;  ///< in [0, 3]: bands above it are left out
+  int key_bits = 32;                 ///< in [8, 32]: how much of the sort key is compared
+  double alpha_min = 1.0 / 255;      ///< in (0, 1): a Gaussian is not blended where alpha is below
+  double max_alpha = 0.99;           ///< in (0, 1]
+  double transmittance_min = 1e-4;   ///< in [0, 1)
+  double first_hit_tau = 0.5;        ///< in (0, 1): first-hit depth is where alpha reaches this
+  /// What colours are blended in, and images and `background` hold: the main asset's space. Sets of the
+  /// other are converted Gaussian by Gaussian, after SH; meshes too. Linear images need encoding to be
+  /// looked at (srgb_encoded).
   ColorSpace blend_space = ColorSpace::display;
-  Vec3d background{0, 0, 0};           ///< of blend_space
+  Vec3d background{0, 0, 0};                ///< of blend_space
   Composite composite = Composite::merged;  ///< of Gaussians and meshes, where a frame has both
 
   bool operator==(const RenderConfig&) const = default;
 };
 
-/// Side of the tiles that an image is rendered in. On a processor large images have tiles of 32 pixels: their
-/// footprints are large too, and take fewer of those.
+/// Side of the tiles that an image is rendered in. On a processor large images have tiles of 32 pixels:
+/// their footprints are large too, and take fewer of those.
 template <Backend B>
 int tile_size_of(const RenderConfig& c, int width, int height) noexcept {
   if (c.tile_size != 0) return c.tile_size;
@@ -86,7 +87,8 @@ inline Status validate(const RenderConfig& c) {
     return bad("response", std::to_string(static_cast<int>(c.response)), "compat modes know ewa only");
   }
   if (c.depth_slices < 0 || c.depth_slices > 8) {
-    return bad("depth_slices", std::to_string(c.depth_slices), "must be in [1, 8], or 0 for what is fast");
+    return bad("depth_slices", std::to_string(c.depth_slices),
+               "must be in [1, 8], or 0 for what is fast");
   }
   if (c.max_sh_degree < 0 || c.max_sh_degree > kMaxShDegree) {
     return bad("max_sh_degree", std::to_string(c.max_sh_degree), "must be in [0, 3]");
@@ -131,13 +133,13 @@ BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
   return r;
 }
 
-/// The same for a frame of these images: where no colour and no alpha are asked for, and of depths only those that a
-/// transmittance decides, a pixel is closed once it has them. The images keep their bits.
+/// The same for a frame of these images: where no colour and no alpha are asked for, and of depths only
+/// those that a transmittance decides, a pixel is closed once it has them. The images keep their bits.
 template <class S>
 BlendRules<S> blend_rules(const RenderConfig& c, const FrameImages<S>& images) noexcept {
   BlendRules<S> r = blend_rules<S>(c);
-  const bool sums = images.rgb != nullptr || images.alpha != nullptr || images.expected_depth != nullptr ||
-                    images.accumulated_depth != nullptr;
+  const bool sums = images.rgb != nullptr || images.alpha != nullptr ||
+                    images.expected_depth != nullptr || images.accumulated_depth != nullptr;
   if (sums || c.compat != Compat::none) return r;
   S needed(1);
   if (images.median_depth != nullptr) needed = S(0.5);

@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/detail/core/huge_pages.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/detail/core/huge_pages.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/detail/math/half.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
+#include "gsnav/frame/gaussians.hpp"
 
 namespace gsnav {
 
@@ -38,15 +38,16 @@ struct GaussianCloud {
   std::array<std::vector<float>, 3> scales;  ///< standard deviations, metres, [N] each
   std::vector<float> opacities;              ///< in [0, 1], [N]
   std::vector<float> sh0;                    ///< [N][3]
-  std::vector<float> shN;                    ///< [N][(degree+1)^2 - 1][3], or empty where shN_half has them
-  std::vector<std::uint16_t> shN_half;       ///< the same as binary16 (compact_sh), or empty
-  int sh_degree = 0;                         ///< 0 to 3
-  std::vector<std::uint32_t> origin_ids;     ///< [N], or empty while every origin is zero
-  std::vector<Vec3d> origins;                ///< lattice points in use; empty with origin_ids
-  // Filled by sort_spatially (detail/scene/spatial_order.hpp); whoever moves, adds or scales rows clears them.
-  std::vector<std::uint32_t> row_ids;        ///< place of each row as it was read, [N], or empty
-  std::vector<ChunkBounds> chunk_bounds;     ///< [ceil(N / kProjectChunk)], or empty
-  std::vector<ChunkBounds> part_bounds;      ///< [ceil(N / kChunkPart)], or empty; bound_chunks makes both
+  std::vector<float> shN;                 ///< [N][(degree+1)^2 - 1][3], or empty where shN_half has them
+  std::vector<std::uint16_t> shN_half;    ///< the same as binary16 (compact_sh), or empty
+  int sh_degree = 0;                      ///< 0 to 3
+  std::vector<std::uint32_t> origin_ids;  ///< [N], or empty while every origin is zero
+  std::vector<Vec3d> origins;             ///< lattice points in use; empty with origin_ids
+  // Filled by sort_spatially (detail/scene/spatial_order.hpp); whoever moves, adds or scales rows clears
+  // them.
+  std::vector<std::uint32_t> row_ids;     ///< place of each row as it was read, [N], or empty
+  std::vector<ChunkBounds> chunk_bounds;  ///< [ceil(N / kProjectChunk)], or empty
+  std::vector<ChunkBounds> part_bounds;   ///< [ceil(N / kChunkPart)], or empty; bound_chunks makes both
 
   // How the asset was trained; copied into each GaussianSet made of the cloud.
   Filter filter = Filter::classic;
@@ -64,8 +65,10 @@ struct GaussianCloud {
 
   /// Bytes held by the arrays.
   std::size_t bytes() const noexcept {
-    return sizeof(float) * (11 * size() + sh0.size() + shN.size()) + sizeof(std::uint16_t) * shN_half.size() +
-           sizeof(std::uint32_t) * (origin_ids.size() + row_ids.size()) + sizeof(Vec3d) * origins.size() +
+    return sizeof(float) * (11 * size() + sh0.size() + shN.size()) +
+           sizeof(std::uint16_t) * shN_half.size() +
+           sizeof(std::uint32_t) * (origin_ids.size() + row_ids.size()) +
+           sizeof(Vec3d) * origins.size() +
            sizeof(ChunkBounds) * (chunk_bounds.size() + part_bounds.size());
   }
 
@@ -259,8 +262,8 @@ struct LoadedCloud {
 
 /// Appends `b` to `a`; the SH degree becomes the larger (missing bands are zero). Used to merge the
 /// tiles of one scene. Chunks lose their bounds: sort again. An empty `a` becomes `b`.
-/// Errors, with `a` as it was: invalid_argument where filters, sort orders or colour spaces differ, or one is compact
-/// (expand_sh).
+/// Errors, with `a` as it was: invalid_argument where filters, sort orders or colour spaces differ, or
+/// one is compact (expand_sh).
 inline Status append(GaussianCloud& a, const GaussianCloud& b) {
   if (!a.shN_half.empty() || !b.shN_half.empty()) {
     return {Errc::invalid_argument, "compact clouds cannot be merged: expand_sh first"};
@@ -271,7 +274,8 @@ inline Status append(GaussianCloud& a, const GaussianCloud& b) {
   }
   if (a.filter != b.filter || a.eps2d != b.eps2d || a.sort_order != b.sort_order ||
       a.color_space != b.color_space) {
-    return {Errc::invalid_argument, "clouds with different filters, sort orders or colour spaces cannot be merged"};
+    return {Errc::invalid_argument,
+            "clouds with different filters, sort orders or colour spaces cannot be merged"};
   }
   const int degree = max(a.sh_degree, b.sh_degree);
   const auto widen = [degree](const GaussianCloud& c) {

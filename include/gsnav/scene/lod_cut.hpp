@@ -18,8 +18,8 @@ namespace gsnav {
 /// How LodCut chooses.
 struct LodChoice {
   double pixels = 1;  ///< a node is fine enough where its error is at most so many pixels ...
-  /// ... and times its grain at most pixels times this, in square pixels: the larger Gaussians are, the nearer direct
-  /// rendering is to the photo, and the less may be merged.
+  /// ... and times its grain at most pixels times this, in square pixels: the larger Gaussians are, the
+  /// nearer direct rendering is to the photo, and the less may be merged.
   double grain = 0.5;
   double hysteresis =
       0.1;  ///< a node that is drawn stays until its error is beyond (1 + this) of that; one that is
@@ -30,11 +30,13 @@ struct LodChoice {
 /// Names the field that cannot be, or ok.
 inline Status validate(const LodChoice& c) {
   const auto bad = [](const char* field, double value, const char* rule) {
-    return Status(Errc::invalid_argument, std::string("LodChoice.") + field + " = " + std::to_string(value) + ": " + rule);
+    return Status(Errc::invalid_argument,
+                  std::string("LodChoice.") + field + " = " + std::to_string(value) + ": " + rule);
   };
   if (!(c.pixels > 0 && is_finite(c.pixels))) return bad("pixels", c.pixels, "must be positive");
   if (!(c.grain > 0 && is_finite(c.grain))) return bad("grain", c.grain, "must be positive");
-  if (!(c.hysteresis >= 0 && c.hysteresis < 1)) return bad("hysteresis", c.hysteresis, "must be in [0, 1)");
+  if (!(c.hysteresis >= 0 && c.hysteresis < 1))
+    return bad("hysteresis", c.hysteresis, "must be in [0, 1)");
   if (c.photo < 1 || c.photo > 16) return bad("photo", c.photo, "must be in [1, 16]");
   return {};
 }
@@ -47,9 +49,10 @@ struct LodStats {
   double error_px = 0;       ///< the largest error of a node that is drawn (LodNode::error), pixels
 };
 
-/// The rules of the profile `lod`: those of `fast`; and where at least half of what a cut shows is merged, a pixel ends
-/// where less than 1/1000 of the light comes through. (Where little is merged Gaussians are large and direct rendering is
-/// 60 dB and more from the photo: an earlier end would be what is seen of the error.)
+/// The rules of the profile `lod`: those of `fast`; and where at least half of what a cut shows is
+/// merged, a pixel ends where less than 1/1000 of the light comes through. (Where little is merged
+/// Gaussians are large and direct rendering is 60 dB and more from the photo: an earlier end would be
+/// what is seen of the error.)
 inline RenderConfig lod_config(RenderConfig config, const LodStats& stats = {}) noexcept {
   config.profile = Profile::fast;
   if (stats.shown > 0 && 2 * stats.merged >= stats.shown) {
@@ -68,8 +71,8 @@ class LodCut {
 
   /// Chooses for a camera; the cloud stands in the world by `world_from_asset`. What to draw then:
   /// chunks of the cloud, and merged ones, as the pixels of O_photo(choice.photo) see them. Valid until
-  /// the next call. `seen`: what of the cloud may be seen (VisibleSets::seen_from, here): what shows none
-  /// of its chunks is left out, and of chunks of the cloud its rows; empty: all may be.
+  /// the next call. `seen`: what of the cloud may be seen (VisibleSets::seen_from, here): what shows
+  /// none of its chunks is left out, and of chunks of the cloud its rows; empty: all may be.
   std::span<const GaussianSet> select(const Camera& camera, const LodChoice& choice = {},
                                       const Similarity& world_from_asset = {},
                                       View<const std::uint32_t> seen = {}) {
@@ -144,7 +147,8 @@ class LodCut {
     return any_seen(place.first_chunk, std::uint64_t{place.first_chunk} + place.chunks);
   }
   /// What a metre is at the node's nearest depth, in choice.pixels.
-  static double scale_of(const LodNode& n, const ProjectionCamera<double>& camera, double per_metre) noexcept {
+  static double scale_of(const LodNode& n, const ProjectionCamera<double>& camera,
+                         double per_metre) noexcept {
     return per_metre / detail::ChunkInView(camera, n.reach).z_min();
   }
   /// Whether what is finer than a node is needed.
@@ -160,7 +164,8 @@ class LodCut {
     stats_.error_px = std::max(stats_.error_px, static_cast<double>(n.error) * scale * choice.pixels);
   }
   /// The level of one box of a forest.
-  void descend(std::uint32_t node, const ProjectionCamera<double>& camera, double per_metre, const LodChoice& choice) {
+  void descend(std::uint32_t node, const ProjectionCamera<double>& camera, double per_metre,
+               const LodChoice& choice) {
     for (;;) {
       const LodNode& n = tree_->nodes[node];
       const LodPlace& place = tree_->places[node];

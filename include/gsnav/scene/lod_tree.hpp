@@ -16,8 +16,8 @@ struct LodNode {
   /// How far what the node merged lies from where it shows it: root mean square over its mass, metres; 0
   /// for a leaf. A parent's is not below its children's.
   float error = 0;
-  /// How large the cloud's own Gaussians below it are: root of the area (lod_area), geometric mean over their mass,
-  /// metres; 0 where nothing has mass.
+  /// How large the cloud's own Gaussians below it are: root of the area (lod_area), geometric mean over
+  /// their mass, metres; 0 where nothing has mass.
   float grain = 0;
   ChunkBounds reach;  ///< of its own Gaussians and of all below it
 };
@@ -27,8 +27,8 @@ struct LodPlace {
   static constexpr std::uint32_t kNone = 0xffffffffu;
   std::uint32_t first_chunk = 0, chunks = 0;  ///< of the cloud where nothing is finer, else of `merged`
   std::uint32_t finer = kNone;                ///< the node that shows the same in more Gaussians
-  std::uint32_t rows = 0;                     ///< Gaussians in its chunks, less those that fill the last one
-  std::uint32_t shown = 0;                    ///< Gaussians of the cloud that it stands for
+  std::uint32_t rows = 0;   ///< Gaussians in its chunks, less those that fill the last one
+  std::uint32_t shown = 0;  ///< Gaussians of the cloud that it stands for
 };
 
 /// A cloud at every level of detail (docs/lod.md): a binary tree over the chunks of a cloud in spatial
@@ -36,8 +36,9 @@ struct LodPlace {
 /// many Gaussians, at most kProjectChunk. Any cut through the tree shows each Gaussian of the cloud
 /// once.
 ///
-/// Or a forest of the levels that a set ships: `places` and `roots` are not empty then. Nodes are boxes of the set,
-/// each at one level, and have as many chunks as they need; a cut takes one level of each box.
+/// Or a forest of the levels that a set ships: `places` and `roots` are not empty then. Nodes are boxes
+/// of the set, each at one level, and have as many chunks as they need; a cut takes one level of each
+/// box.
 struct LodTree {
   GaussianCloud merged;  ///< Gaussians of the nodes above leaves: kProjectChunk rows a node, the last
                          ///< ones transparent where it has fewer

@@ -26,15 +26,19 @@ inline float srgb_decoded(std::uint8_t byte) noexcept {
   return static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
 }
 
-/// A base-colour texture with its mip chain: each level the mean, in linear light, of what it covers of the finer.
+/// A base-colour texture with its mip chain: each level the mean, in linear light, of what it covers of
+/// the finer.
 class MeshTexture {
  public:
   /// `rgba`: [height][width][4], sRGB-encoded, top row first. Error: invalid_argument (sizes).
-  static Result<MeshTexture> make(std::size_t width, std::size_t height, std::vector<std::uint8_t> rgba) {
+  static Result<MeshTexture> make(std::size_t width, std::size_t height,
+                                  std::vector<std::uint8_t> rgba) {
     constexpr std::size_t kLargest = 32768;
-    if (width < 1 || height < 1 || width > kLargest || height > kLargest || rgba.size() != 4 * width * height) {
-      return Status(Errc::invalid_argument, "MeshTexture: " + std::to_string(width) + " x " + std::to_string(height) +
-                                                " with " + std::to_string(rgba.size()) +
+    if (width < 1 || height < 1 || width > kLargest || height > kLargest ||
+        rgba.size() != 4 * width * height) {
+      return Status(Errc::invalid_argument, "MeshTexture: " + std::to_string(width) + " x " +
+                                                std::to_string(height) + " with " +
+                                                std::to_string(rgba.size()) +
                                                 " bytes: needs four a pixel and sides in [1, 32768]");
     }
     MeshTexture t;
@@ -57,7 +61,8 @@ class MeshTexture {
   }
 
  private:
-  /// Appends the level below one of w x h pixels at `from`. Of an odd side the last two or three share a pixel.
+  /// Appends the level below one of w x h pixels at `from`. Of an odd side the last two or three share a
+  /// pixel.
   void reduce(std::size_t from, int w, int h) {
     const int half_w = std::max(w / 2, 1), half_h = std::max(h / 2, 1);
     for (int y = 0; y < half_h; ++y) {
@@ -92,39 +97,51 @@ class MeshTexture {
 /// A mesh and what its surface looks like. What it does not have stays empty, and costs nothing.
 struct SurfaceMesh {
   TriangleMesh geometry;
-  std::vector<Vec3f> normals;   ///< one a vertex, unit; empty: the faces'
-  std::vector<Vec3f> colors;    ///< one a vertex, linear RGB; empty: white
+  std::vector<Vec3f> normals;    ///< one a vertex, unit; empty: the faces'
+  std::vector<Vec3f> colors;     ///< one a vertex, linear RGB; empty: white
   std::vector<Vec2<float>> uvs;  ///< one a vertex, (0, 0) the texture's top left; empty: no texture
   std::shared_ptr<const MeshTexture> texture;  ///< null: white
-  Vec3f base_color{1, 1, 1};    ///< linear RGB
+  Vec3f base_color{1, 1, 1};                   ///< linear RGB
   bool two_sided = false;
-  bool unlit = false;           ///< its colour is what is seen, whatever the light
-  MeshAlpha alpha_mode = MeshAlpha::opaque;  ///< what alpha does: base_alpha times those of vertices and of the texture
-  float base_alpha = 1;         ///< in [0, 1]
-  float alpha_cutoff = 0.5f;    ///< of MeshAlpha::mask: a hole where alpha is below
-  std::vector<float> alphas;    ///< one a vertex, in [0, 1]; empty: 1
+  bool unlit = false;  ///< its colour is what is seen, whatever the light
+  MeshAlpha alpha_mode =
+      MeshAlpha::opaque;      ///< what alpha does: base_alpha times those of vertices and of the texture
+  float base_alpha = 1;       ///< in [0, 1]
+  float alpha_cutoff = 0.5f;  ///< of MeshAlpha::mask: a hole where alpha is below
+  std::vector<float> alphas;  ///< one a vertex, in [0, 1]; empty: 1
 };
 
 /// Meshes and where they stand. Moving an instance is setting its transform.
 class MeshScene {
  public:
-  /// Returns the mesh's number. Errors: invalid_argument naming what does not fit (indices beyond the vertices,
-  /// numbers of normals, colours, coordinates or alphas, an alpha out of range); the scene is then as it was.
+  /// Returns the mesh's number. Errors: invalid_argument naming what does not fit (indices beyond the
+  /// vertices, numbers of normals, colours, coordinates or alphas, an alpha out of range); the scene is
+  /// then as it was.
   Result<std::size_t> add(SurfaceMesh mesh) {
     const std::size_t n = mesh.geometry.vertices.size();
-    const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, "SurfaceMesh: " + what); };
+    const auto bad = [](const std::string& what) {
+      return Status(Errc::invalid_argument, "SurfaceMesh: " + what);
+    };
     for (std::size_t t = 0; t < mesh.geometry.triangles.size(); ++t) {
       for (const std::uint32_t i : mesh.geometry.triangles[t]) {
         if (i >= n) {
-          return bad("triangle " + std::to_string(t) + " has vertex " + std::to_string(i) + " of " + std::to_string(n));
+          return bad("triangle " + std::to_string(t) + " has vertex " + std::to_string(i) + " of " +
+                     std::to_string(n));
         }
       }
     }
     const auto fits = [n](const auto& v) { return v.empty() || v.size() == n; };
-    if (!fits(mesh.normals)) return bad("normals: " + std::to_string(mesh.normals.size()) + " for " + std::to_string(n) + " vertices");
-    if (!fits(mesh.colors)) return bad("colors: " + std::to_string(mesh.colors.size()) + " for " + std::to_string(n) + " vertices");
-    if (!fits(mesh.uvs)) return bad("uvs: " + std::to_string(mesh.uvs.size()) + " for " + std::to_string(n) + " vertices");
-    if (!fits(mesh.alphas)) return bad("alphas: " + std::to_string(mesh.alphas.size()) + " for " + std::to_string(n) + " vertices");
+    if (!fits(mesh.normals))
+      return bad("normals: " + std::to_string(mesh.normals.size()) + " for " + std::to_string(n) +
+                 " vertices");
+    if (!fits(mesh.colors))
+      return bad("colors: " + std::to_string(mesh.colors.size()) + " for " + std::to_string(n) +
+                 " vertices");
+    if (!fits(mesh.uvs))
+      return bad("uvs: " + std::to_string(mesh.uvs.size()) + " for " + std::to_string(n) + " vertices");
+    if (!fits(mesh.alphas))
+      return bad("alphas: " + std::to_string(mesh.alphas.size()) + " for " + std::to_string(n) +
+                 " vertices");
     if (!(mesh.base_alpha >= 0 && mesh.base_alpha <= 1)) {
       return bad("base_alpha = " + std::to_string(mesh.base_alpha) + ": must be in [0, 1]");
     }
@@ -141,7 +158,8 @@ class MeshScene {
     const SurfaceMesh& m = held.surface;
     MeshView v;
     v.vertices = view_of(m.geometry.vertices);
-    if (!m.geometry.triangles.empty()) v.indices = {m.geometry.triangles.front().data(), 3 * m.geometry.triangles.size()};
+    if (!m.geometry.triangles.empty())
+      v.indices = {m.geometry.triangles.front().data(), 3 * m.geometry.triangles.size()};
     v.normals = view_of(m.normals);
     v.colors = view_of(m.colors);
     v.uvs = view_of(m.uvs);
@@ -158,7 +176,8 @@ class MeshScene {
     return v;
   }
   /// Mesh i standing in the world.
-  MeshInstance instance(std::size_t i, const Similarity& world_from_mesh = {}, std::uint32_t id = 0) const noexcept {
+  MeshInstance instance(std::size_t i, const Similarity& world_from_mesh = {},
+                        std::uint32_t id = 0) const noexcept {
     return {view(i), world_from_mesh, id};
   }
 
@@ -184,7 +203,8 @@ class MeshScene {
   std::vector<Held> meshes_;
 };
 
-/// A mesh's arrays in a backend's own memory. On host backends nothing is copied: what `mesh` views must outlive it.
+/// A mesh's arrays in a backend's own memory. On host backends nothing is copied: what `mesh` views must
+/// outlive it.
 template <Backend B>
 class MeshArrays {
  public:

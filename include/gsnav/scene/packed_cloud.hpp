@@ -11,26 +11,27 @@
 
 #include "gsnav/detail/core/huge_pages.hpp"
 #include "gsnav/detail/frame/packed_gaussians.hpp"
-#include "gsnav/math/aabb.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
+#include "gsnav/math/aabb.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {
 
 /// What packing may cost. Beyond a bound the planes stay as exact as it asks for.
 struct PackLimits {
-  /// How far any mean may move, in its Gaussian's largest standard deviations; else float32. 16 bits of a chunk's box save
-  /// 6 bytes, but Gaussians at nearly one depth may change places (docs/formats.md).
+  /// How far any mean may move, in its Gaussian's largest standard deviations; else float32. 16 bits of
+  /// a chunk's box save 6 bytes, but Gaussians at nearly one depth may change places (docs/formats.md).
   double mean = 0;
-  double sh = 2e-3;      ///< root mean square error by 8 bits of a coefficient of bands from 1 on; else binary16
+  double sh =
+      2e-3;  ///< root mean square error by 8 bits of a coefficient of bands from 1 on; else binary16
   double sh_max = 2e-3;  ///< largest error of one by binary16; else float32
 };
 
-/// A GaussianCloud in a third of its memory: 26 bytes a Gaussian for place, shape and opacity, 6 for its colour, 45 for
-/// SH degree 3 by 8 bits. Host backends render it as it is, in the bits of unpack_cloud's floats; others are given
-/// these (GaussianArrays). It can be edited and written only after unpack_cloud. Pack sorted clouds: places are steps
-/// of a chunk's box.
+/// A GaussianCloud in a third of its memory: 26 bytes a Gaussian for place, shape and opacity, 6 for its
+/// colour, 45 for SH degree 3 by 8 bits. Host backends render it as it is, in the bits of unpack_cloud's
+/// floats; others are given these (GaussianArrays). It can be edited and written only after
+/// unpack_cloud. Pack sorted clouds: places are steps of a chunk's box.
 struct PackedCloud {
   std::vector<std::uint16_t> codes;  ///< PackedRows::codes
   std::vector<std::uint16_t> sh0;    ///< [N][3], binary16
@@ -42,8 +43,9 @@ struct PackedCloud {
 
   std::size_t size() const noexcept { return count; }
   std::size_t bytes() const noexcept {
-    return sizeof(std::uint16_t) * (codes.size() + sh0.size()) + shN.size() + sizeof(PackedChunk) * chunks.size() +
-           rest.bytes() + sizeof(float) * (rest.means[0].empty() ? 0 : 3 * count);
+    return sizeof(std::uint16_t) * (codes.size() + sh0.size()) + shN.size() +
+           sizeof(PackedChunk) * chunks.size() + rest.bytes() +
+           sizeof(float) * (rest.means[0].empty() ? 0 : 3 * count);
   }
   GaussianView view() const noexcept {
     GaussianView v = rest.view();
@@ -66,7 +68,8 @@ inline std::uint16_t code_of(double value, double largest) noexcept {
 inline std::array<std::uint16_t, 3> pack_quat(const Quatd& q) noexcept {
   const double parts[] = {q.w, q.x, q.y, q.z};
   std::size_t missing = 0;
-  for (std::size_t k = 1; k < 4; ++k) missing = std::fabs(parts[k]) > std::fabs(parts[missing]) ? k : missing;
+  for (std::size_t k = 1; k < 4; ++k)
+    missing = std::fabs(parts[k]) > std::fabs(parts[missing]) ? k : missing;
   const double sign = parts[missing] < 0 ? -1 : 1, middle = static_cast<double>(kQuatCodes) / 2;
   std::array<std::uint16_t, 3> out{};
   std::size_t to = 0;
@@ -91,18 +94,23 @@ inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
     const std::size_t first = c * kProjectChunk, last = std::min(n, first + kProjectChunk);
     float largest = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto [low, high] = std::minmax_element(cloud.means[k].data() + first, cloud.means[k].data() + last);
+      const auto [low, high] =
+          std::minmax_element(cloud.means[k].data() + first, cloud.means[k].data() + last);
       const int axis = static_cast<int>(k);
       chunk.low[axis] = *low;
       chunk.step[axis] = (*high - *low) / 65535.0f;
-      largest = std::max(largest, *std::max_element(cloud.scales[k].data() + first, cloud.scales[k].data() + last));
+      largest = std::max(
+          largest, *std::max_element(cloud.scales[k].data() + first, cloud.scales[k].data() + last));
     }
     chunk.scale_step = std::sqrt(largest) / 65535.0f;
-    const auto steps = [](double value, float step) { return step > 0 ? value / static_cast<double>(step) : 0.0; };
+    const auto steps = [](double value, float step) {
+      return step > 0 ? value / static_cast<double>(step) : 0.0;
+    };
     for (std::size_t i = first; i < last; ++i) {
       for (std::size_t k = 0; k < 3; ++k) {
         const int axis = static_cast<int>(k);
-        const double from_low = static_cast<double>(cloud.means[k][i]) - static_cast<double>(chunk.low[axis]);
+        const double from_low =
+            static_cast<double>(cloud.means[k][i]) - static_cast<double>(chunk.low[axis]);
         plane(PackedRows::kMeans + k)[i] = code_of(steps(from_low, chunk.step[axis]), 65535);
         const double root = std::sqrt(static_cast<double>(cloud.scales[k][i]));
         plane(PackedRows::kScales + k)[i] = code_of(steps(root, chunk.scale_step), 65535);
@@ -116,7 +124,8 @@ inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
 }
 
 /// Compares places, shapes and opacities; `packed` is of `cloud`.
-inline void compare_shapes(const GaussianCloud& cloud, const GaussianView& packed, PackErrors& out) noexcept {
+inline void compare_shapes(const GaussianCloud& cloud, const GaussianView& packed,
+                           PackErrors& out) noexcept {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Vec3d was{static_cast<double>(cloud.means[0][i]), static_cast<double>(cloud.means[1][i]),
                     static_cast<double>(cloud.means[2][i])};
@@ -140,8 +149,8 @@ inline void compare_shapes(const GaussianCloud& cloud, const GaussianView& packe
     if (moved > 0) out.mean_deviations = std::max(out.mean_deviations, moved / std::max(largest, 1e-9));
     if (change > 0) out.scale = std::max(out.scale, change / std::max(largest, 1e-9));
     out.rotation = std::max(out.rotation, 4 * std::asin(std::min(1.0, std::sqrt(sum) / 2)));
-    out.opacity = std::max(
-        out.opacity, std::fabs(static_cast<double>(opacity_of(packed, i)) - static_cast<double>(cloud.opacities[i])));
+    out.opacity = std::max(out.opacity, std::fabs(static_cast<double>(opacity_of(packed, i)) -
+                                                  static_cast<double>(cloud.opacities[i])));
   }
 }
 
@@ -277,7 +286,8 @@ inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {}
 inline GaussianCloud unpack_cloud(const PackedCloud& packed) {
   GaussianCloud out = packed.rest;
   const GaussianView v = packed.view();
-  const std::size_t n = packed.size(), rest = static_cast<std::size_t>(sh_coefficient_count(v.sh_degree) - 1);
+  const std::size_t n = packed.size(),
+                    rest = static_cast<std::size_t>(sh_coefficient_count(v.sh_degree) - 1);
   const auto planes = [n](auto& of) {
     for (auto& plane : of) plane = huge_vector<float>(n);
   };

@@ -15,9 +15,9 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/render/frame_lanes.hpp"
+#include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/render/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
-#include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 
 namespace gsnav {
@@ -43,9 +43,9 @@ class GaussianArrays {
   GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) upload(backend, cloud);
   }
-  /// Without the SH bands that the profile says no chunk needs (detail/scene/scene_profile.hpp): elsewhere than
-  /// on host backends those that none does take no memory, those that a chunk does not are not read. On
-  /// host backends the profile must outlive it too.
+  /// Without the SH bands that the profile says no chunk needs (detail/scene/scene_profile.hpp):
+  /// elsewhere than on host backends those that none does take no memory, those that a chunk does not
+  /// are not read. On host backends the profile must outlive it too.
   GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneProfile& profile)
       : set_(profile.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {
@@ -126,9 +126,9 @@ class GaussianArrays {
 
 /// Renders Gaussians on a backend. Keeps its scratch between calls: a steady frame allocates nothing
 /// but what its caller's vectors need. `S` is the scalar of all arithmetic; sort keys are float32 for
-/// every S. The backend must outlive it. One that was moved from has its settings, no meshes and no scratch, and may
-/// render on. Floating point must round to nearest (fegetround() == FE_TONEAREST, as a program starts): in other modes
-/// images have other bits. Flushing denormals to zero changes none.
+/// every S. The backend must outlive it. One that was moved from has its settings, no meshes and no
+/// scratch, and may render on. Floating point must round to nearest (fegetround() == FE_TONEAREST, as a
+/// program starts): in other modes images have other bits. Flushing denormals to zero changes none.
 ///
 ///     gsnav::SerialBackend backend;
 ///     gsnav::Renderer<float, gsnav::SerialBackend> renderer(backend);
@@ -142,20 +142,20 @@ class Renderer {
   const RenderConfig& config() const noexcept { return config_; }
   void set_config(const RenderConfig& config) { config_ = config; }
 
-  /// Meshes that the frames from now on show among the Gaussians (docs/composition.md); none: an empty span. Their
-  /// arrays are in the backend's memory, and must stay there. To move one, set them again: nothing is copied but
-  /// views.
+  /// Meshes that the frames from now on show among the Gaussians (docs/composition.md); none: an empty
+  /// span. Their arrays are in the backend's memory, and must stay there. To move one, set them again:
+  /// nothing is copied but views.
   void set_meshes(std::span<const MeshInstance> meshes, const MeshLight& light = {}) {
     meshes_.assign(meshes.begin(), meshes.end());
     light_ = light;
   }
 
   /// Renders all sets, as one sorted list, from each camera; all cameras have one size. `sets` hold
-  /// arrays in the backend's memory. Errors: invalid_argument (names the field; no camera; cameras of several sizes);
-  /// unsupported (2^32 Gaussians or triangles in a frame; meshes on a backend that knows none, or with MeshAlpha::blend
-  /// under Composite::hard_depth); backend_failure; out_of_memory, with the frames, their size and their Gaussians, where
-  /// images or scratch cannot be allocated, and before trying where images are larger than the machine's memory.
-  /// Throws nothing.
+  /// arrays in the backend's memory. Errors: invalid_argument (names the field; no camera; cameras of
+  /// several sizes); unsupported (2^32 Gaussians or triangles in a frame; meshes on a backend that knows
+  /// none, or with MeshAlpha::blend under Composite::hard_depth); backend_failure; out_of_memory, with
+  /// the frames, their size and their Gaussians, where images or scratch cannot be allocated, and before
+  /// trying where images are larger than the machine's memory. Throws nothing.
   Result<Frames<S>> render(std::span<const GaussianSet> sets, std::span<const Camera> cameras) {
     Frames<S> frames;
     if (Status s = render(sets, cameras, frames); !s) return s;
@@ -168,7 +168,8 @@ class Renderer {
   /// The same into images that are used again.
   Status render(std::span<const GaussianSet> sets, std::span<const Camera> cameras, Frames<S>& out) {
     if (cameras.empty()) return {Errc::invalid_argument, "no camera to render from"};
-    if (cameras.data() == nullptr) return {Errc::invalid_argument, "cameras: a null pointer with a size"};
+    if (cameras.data() == nullptr)
+      return {Errc::invalid_argument, "cameras: a null pointer with a size"};
     for (const Camera& c : cameras) {
       if (Status s = validate(c); !s) return s;
       if (c.width != cameras[0].width || c.height != cameras[0].height) {
@@ -187,9 +188,9 @@ class Renderer {
     return render_jobs(cameras.size(), job_of, out.stats);
   }
 
-  /// Renders frames that share nothing: each sees its own sets and goes to images in host memory, of its camera's
-  /// size, that its caller has (a null pointer: not made). The same bits as one at a time. `stats` [jobs].
-  /// Errors: as of render above, of the first job that fails.
+  /// Renders frames that share nothing: each sees its own sets and goes to images in host memory, of its
+  /// camera's size, that its caller has (a null pointer: not made). The same bits as one at a time.
+  /// `stats` [jobs]. Errors: as of render above, of the first job that fails.
   Status render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats) {
     if (stats.size() < jobs.size()) {
       return {Errc::invalid_argument, "stats has room for " + std::to_string(stats.size()) + " of " +
@@ -204,11 +205,13 @@ class Renderer {
       }
       if (Status s = validate(*job.camera); !s) return s;  // scratch is sized by it
     }
-    return render_jobs(jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
+    return render_jobs(
+        jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
   }
 
-  /// One frame into images in the backend's memory, which are there once the backend has been synchronised.
-  /// Errors: as of render above; what fails on a device after the call is for `synchronize()` to report.
+  /// One frame into images in the backend's memory, which are there once the backend has been
+  /// synchronised. Errors: as of render above; what fails on a device after the call is for
+  /// `synchronize()` to report.
   Status render_on_backend(const FrameJob<S>& job, RenderStats& stats) {
     if (job.camera == nullptr || job.config == nullptr) {
       return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
@@ -251,16 +254,19 @@ class Renderer {
     for (const Image& i : images) channels += (config_.outputs & i.output) != 0 ? i.channels : 0;
     const std::size_t bytes = pixels * channels * sizeof(S);  // of a camera: at most 2^34
     const auto refused = [&](const std::string& why) {
-      return Status(Errc::out_of_memory, "Renderer: the images of " + std::to_string(cameras) + " cameras of " +
-                                             std::to_string(out.width) + " x " + std::to_string(out.height) +
-                                             ", " + std::to_string(bytes) + " bytes each, " + why);
+      return Status(Errc::out_of_memory, "Renderer: the images of " + std::to_string(cameras) +
+                                             " cameras of " + std::to_string(out.width) + " x " +
+                                             std::to_string(out.height) + ", " + std::to_string(bytes) +
+                                             " bytes each, " + why);
     };
     constexpr std::size_t kSmall = std::size_t{1} << 30;
     if (bytes != 0 && cameras > kSmall / bytes) {
       const long pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGESIZE);
-      const std::size_t memory = pages > 0 && page > 0 ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page)
-                                                       : std::numeric_limits<std::size_t>::max() / 2;
-      if (cameras > memory / bytes) return refused("are more than the machine's memory: render fewer at a time");
+      const std::size_t memory = pages > 0 && page > 0
+                                     ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page)
+                                     : std::numeric_limits<std::size_t>::max() / 2;
+      if (cameras > memory / bytes)
+        return refused("are more than the machine's memory: render fewer at a time");
     }
     Status s = detail::guarded([&] {
       for (const Image& i : images) {
@@ -273,7 +279,8 @@ class Renderer {
   }
 
   Status draw(const FrameJob<S>& job, RenderStats& stats) {
-    return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, job.images, &stats);
+    return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config,
+                               job.images, &stats);
   }
 
   /// Runs what may throw; where memory was missing the error says for what.
@@ -286,10 +293,10 @@ class Renderer {
     if (s.code() != Errc::out_of_memory) return s;
     std::size_t gaussians = 0;
     for (const GaussianSet& set : first.sets) gaussians += set.gaussians.size;
-    return {Errc::out_of_memory, "Renderer: not enough memory to draw " + std::to_string(frames) + " frames of " +
-                                     std::to_string(first.camera->width) + " x " +
-                                     std::to_string(first.camera->height) + " with " + std::to_string(gaussians) +
-                                     " Gaussians: " + s.message()};
+    return {Errc::out_of_memory, "Renderer: not enough memory to draw " + std::to_string(frames) +
+                                     " frames of " + std::to_string(first.camera->width) + " x " +
+                                     std::to_string(first.camera->height) + " with " +
+                                     std::to_string(gaussians) + " Gaussians: " + s.message()};
   }
 
   template <class JobOf>

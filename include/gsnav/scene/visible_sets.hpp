@@ -17,11 +17,11 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
-#include "gsnav/image/camera.hpp"
+#include "gsnav/detail/render/row_weights.hpp"
 #include "gsnav/frame/gaussians.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/similarity.hpp"
-#include "gsnav/detail/render/row_weights.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {
@@ -37,13 +37,14 @@ struct VisibleSets {
   double cell = 0;
   /// Focal length of the viewpoints' images, pixels: of cameras with a longer one nothing is known.
   double focal = 0;
-  double near_plane = 0;            ///< metres in the world: nor of those with a farther one
-  double near_sigma = 0;            ///< Camera::near_sigma: nor of those with another
-  double min_weight = 0;            ///< VisibleSettings::min_weight
-  std::size_t cloud_chunks = 0;     ///< of the cloud that these are of
-  std::size_t viewpoints = 0;       ///< that were looked from
-  std::vector<Key> keys;            ///< of the cells, ascending
-  std::vector<std::uint64_t> ends;  ///< [cells], where the words of each end; those of the first begin at 0
+  double near_plane = 0;         ///< metres in the world: nor of those with a farther one
+  double near_sigma = 0;         ///< Camera::near_sigma: nor of those with another
+  double min_weight = 0;         ///< VisibleSettings::min_weight
+  std::size_t cloud_chunks = 0;  ///< of the cloud that these are of
+  std::size_t viewpoints = 0;    ///< that were looked from
+  std::vector<Key> keys;         ///< of the cells, ascending
+  std::vector<std::uint64_t>
+      ends;  ///< [cells], where the words of each end; those of the first begin at 0
   std::vector<std::uint32_t> bits;  ///< GaussianView::seen of each cell, one behind the other
 
   std::size_t cells() const noexcept { return keys.size(); }
@@ -69,8 +70,9 @@ struct VisibleSets {
     const View<const std::uint32_t> seen = seen_from(cell_index);
     if (seen.size > words()) return count_bits_of(seen, 2 * words(), seen.size);
     const std::size_t last = cloud_chunks - 1;  // it may have fewer
-    const std::size_t missing =
-        count_seen(cell_index) != 0 && (seen[last / 32] >> (last % 32) & 1u) != 0 ? kProjectChunk * cloud_chunks - cloud_rows : 0;
+    const std::size_t missing = count_seen(cell_index) != 0 && (seen[last / 32] >> (last % 32) & 1u) != 0
+                                    ? kProjectChunk * cloud_chunks - cloud_rows
+                                    : 0;
     return kProjectChunk * count_seen(cell_index) - missing;
   }
   /// Share of the chunks that a cell sees, on average.
@@ -124,19 +126,20 @@ struct VisibleSettings {
   double cell = 0.5;         ///< side of a cell
   double margin = 0.25;      ///< viewpoints so far outside of a cell count for it too
   double min_weight = 1e-3;  ///< what is seen has more of a pixel than this
-  /// Rows of a chunk that are seen or not together, each a whole share of 32: Gaussians that lie together. 0: all of
-  /// a chunk.
+  /// Rows of a chunk that are seen or not together, each a whole share of 32: Gaussians that lie
+  /// together. 0: all of a chunk.
   int rows = 8;
-  int face = 256;            ///< pixels along a face of the cube that is looked at from each viewpoint
-  double near_plane = 0.2;   ///< of these images (Camera); what lies nearer to a cell is in its set in any case
-  double near_sigma = 0;     ///< likewise
-  /// Gives up early where sets gain nothing: in the open a cell sees nearly all. 16 cells, spread evenly,
-  /// are finished first; where they see more than this share of the Gaussians on average,
+  int face = 256;  ///< pixels along a face of the cube that is looked at from each viewpoint
+  double near_plane =
+      0.2;  ///< of these images (Camera); what lies nearer to a cell is in its set in any case
+  double near_sigma = 0;  ///< likewise
+  /// Gives up early where sets gain nothing: in the open a cell sees nearly all. 16 cells, spread
+  /// evenly, are finished first; where they see more than this share of the Gaussians on average,
   /// build_visible_sets returns unsupported. In (0, 1]; 1: never. Fewer than 64 cells are all found.
   double most_share = 0.9;
 
-  /// How far apart viewpoints should be (navmesh_viewpoints): with a margin of as much every cell has several, each
-  /// with its own directions.
+  /// How far apart viewpoints should be (navmesh_viewpoints): with a margin of as much every cell has
+  /// several, each with its own directions.
   double spacing() const noexcept { return 0.5 * cell; }
   /// Has `face`, `near_plane` and `near_sigma` be such that the sets serve this camera.
   void serve(const Camera& camera) noexcept {
@@ -286,13 +289,14 @@ inline std::array<Camera, 6> cube_cameras(const Vec3d& eye, std::size_t viewpoin
 
 }  // namespace detail
 
-/// Finds what of a cloud is seen from each cell that has a viewpoint in it or within 5 cm (world, metres;
-/// navmesh_viewpoints makes them): the cloud stands in the world by `world_from_asset`, with bounds of its
-/// chunks (sort_spatially). Each viewpoint costs six frames of settings.face pixels a side. The same bits for
-/// any number of threads.
+/// Finds what of a cloud is seen from each cell that has a viewpoint in it or within 5 cm (world,
+/// metres; navmesh_viewpoints makes them): the cloud stands in the world by `world_from_asset`, with
+/// bounds of its chunks (sort_spatially). Each viewpoint costs six frames of settings.face pixels a
+/// side. The same bits for any number of threads.
 ///
 /// Errors: invalid_argument (a setting; no viewpoint, or one that is not finite; a cloud that is not in
-/// spatial order); unsupported (VisibleSettings::most_share: nothing is gained, draw without sets); those of rendering.
+/// spatial order); unsupported (VisibleSettings::most_share: nothing is gained, draw without sets);
+/// those of rendering.
 template <Backend B>
 requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
     B& backend, const GaussianCloud& cloud, std::span<const Vec3d> viewpoints,
@@ -312,7 +316,7 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   out.cloud_chunks = cloud.view().all_chunks();
   out.viewpoints = viewpoints.size();
   constexpr double kBeside = 0.05;  // metres
-  std::vector<Vec3d> eyes;  // in the asset's frame
+  std::vector<Vec3d> eyes;          // in the asset's frame
   for (std::size_t v = 0; v < viewpoints.size(); ++v) {
     eyes.push_back(inverse(world_from_asset) * viewpoints[v]);
     const auto key = VisibleSets::key_of(eyes.back(), out.cell);
@@ -320,10 +324,12 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
       return Status(Errc::invalid_argument,
                     "build_visible_sets: viewpoint " + std::to_string(v) + " is not finite or too far");
     }
-    // Rounding, or a step in the floor, must not take a camera that is where a viewpoint is to a cell that has none.
+    // Rounding, or a step in the floor, must not take a camera that is where a viewpoint is to a cell
+    // that has none.
     for (int corner = 0; corner < 8; ++corner) {
       Vec3d beside = eyes.back();
-      for (int k = 0; k < 3; ++k) beside[k] += ((corner >> k & 1) != 0 ? 1 : -1) * kBeside / world_from_asset.scale;
+      for (int k = 0; k < 3; ++k)
+        beside[k] += ((corner >> k & 1) != 0 ? 1 : -1) * kBeside / world_from_asset.scale;
       out.keys.push_back(VisibleSets::key_of(beside, out.cell).value_or(*key));
     }
   }
@@ -344,7 +350,8 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
     box_of(out.keys[c], low, high);
     for (std::size_t i = 0; i < out.cloud_chunks; ++i) {
       const ChunkBounds& b = cloud.chunk_bounds[i];
-      if (detail::box_distance(low, high, b.low, b.high) <= near_distance) found[c].add(i, detail::all_rows(cloud.size(), i));
+      if (detail::box_distance(low, high, b.low, b.high) <= near_distance)
+        found[c].add(i, detail::all_rows(cloud.size(), i));
     }
   });
   const double margin = settings.margin / world_from_asset.scale;
@@ -360,7 +367,8 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   // Viewpoints of the sample come first. What is found does not depend on the order.
   std::vector<std::size_t> sample, order(viewpoints.size());
   if (settings.most_share < 1 && out.cells() >= detail::kLeastSampled) {
-    for (std::size_t k = 0; k < detail::kSampleCells; ++k) sample.push_back((2 * k + 1) * out.cells() / (2 * detail::kSampleCells));
+    for (std::size_t k = 0; k < detail::kSampleCells; ++k)
+      sample.push_back((2 * k + 1) * out.cells() / (2 * detail::kSampleCells));
   }
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto rest = std::stable_partition(order.begin(), order.end(), [&](std::size_t v) {
@@ -372,11 +380,13 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
     if (done == sampled && !sample.empty()) {
       double share = 0;
       for (const std::size_t c : sample) share += static_cast<double>(found[c].count());
-      share /= static_cast<double>(sample.size()) * static_cast<double>(std::max<std::size_t>(cloud.size(), 1));
+      share /= static_cast<double>(sample.size()) *
+               static_cast<double>(std::max<std::size_t>(cloud.size(), 1));
       if (share > settings.most_share) {
         return Status(Errc::unsupported,
                       "visible sets gain nothing here: " + std::to_string(sample.size()) + " of " +
-                          std::to_string(out.cells()) + " cells see " + std::to_string(std::lround(100 * share)) +
+                          std::to_string(out.cells()) + " cells see " +
+                          std::to_string(std::lround(100 * share)) +
                           " % of the Gaussians on average, more than most_share = " +
                           std::to_string(std::lround(100 * settings.most_share)) +
                           " %. Draw without them, or set most_share = 1");
@@ -386,7 +396,8 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
     for (const Camera& camera : detail::cube_cameras(viewpoints[v], v, settings)) {
       if (Status s = add_row_weights(backend, workspace, set, camera, most); !s) return s;
     }
-    backend.parallel_for(rows.size(), [&](std::size_t i) { rows[i] = detail::seen_rows(most, i, settings); });
+    backend.parallel_for(rows.size(),
+                         [&](std::size_t i) { rows[i] = detail::seen_rows(most, i, settings); });
     backend.parallel_for(out.cells(), [&](std::size_t c) {
       if (!counts_for(c, v)) return;
       for (std::size_t i = 0; i < rows.size(); ++i) {

@@ -21,37 +21,41 @@
 
 namespace gsnav {
 
-/// One sensor's images of all environments, [environments][height][width][channels]. Valid until the next call.
-/// interop/dlpack.hpp makes tensors of them, wherever they are.
+/// One sensor's images of all environments, [environments][height][width][channels]. Valid until the
+/// next call. interop/dlpack.hpp makes tensors of them, wherever they are.
 struct BatchObservation {
   std::string_view uuid;
   SensorKind kind = SensorKind::rgb;
   std::size_t environments = 0;
   int height = 0, width = 0, channels = 0;
-  std::span<const float> data;        ///< in host memory; empty where images stay in the backend's
-  const float* on_backend = nullptr;  ///< there (BatchConfig::images), whole when the call that drew them returns
+  std::span<const float> data;  ///< in host memory; empty where images stay in the backend's
+  const float* on_backend =
+      nullptr;  ///< there (BatchConfig::images), whole when the call that drew them returns
 
-  /// The image, in host memory, of one environment (of a finished one: by its place in BatchStep::finished).
+  /// The image, in host memory, of one environment (of a finished one: by its place in
+  /// BatchStep::finished).
   std::span<const float> of(std::size_t environment) const noexcept {
     const std::size_t n = data.size() / environments;
     return data.subspan(environment * n, n);
   }
 };
 
-/// What Gymnasium's VectorEnv returns: observations, rewards, terminated, truncated and what else there is to know.
+/// What Gymnasium's VectorEnv returns: observations, rewards, terminated, truncated and what else there
+/// is to know.
 struct BatchStep : BatchInfo {
   std::span<const BatchObservation> images;  ///< in the sensors' order; empty without rendering
-  /// The last images of episodes that ended in this step and whose environments were reset in it, a row for each of
-  /// `finished`; only with AutoReset::same_step.
+  /// The last images of episodes that ended in this step and whose environments were reset in it, a row
+  /// for each of `finished`; only with AutoReset::same_step.
   std::span<const BatchObservation> final_images;
 };
 
 struct BatchConfig : SimulatorConfig {
   AutoReset auto_reset = AutoReset::next_step;
-  /// Times of a scene for which its avatars are held posed at once; more are drawn one after the other. Memory grows
-  /// with it.
+  /// Times of a scene for which its avatars are held posed at once; more are drawn one after the other.
+  /// Memory grows with it.
   std::size_t pose_slots = 8;
-  /// `backend` leaves images on the GPU that drew them: colour, depth and alpha of pinholes, without noise.
+  /// `backend` leaves images on the GPU that drew them: colour, depth and alpha of pinholes, without
+  /// noise.
   ImageMemory images = ImageMemory::host;
 };
 
@@ -61,36 +65,43 @@ struct BatchConfig : SimulatorConfig {
 ///     auto out = sim.reset().value();
 ///     while (running) out = sim.step(policy(out)).value();
 ///
-/// Environment e draws its sensors' noise with seed + e. Environments that are in one scene at one time share its
-/// avatars' capsules and skinned Gaussians. Scenes are held once, however many environments look at them. The backend
-/// must outlive it. After an error reset() begins anew. One that was moved from has no environments and answers with
-/// invalid_argument.
+/// Environment e draws its sensors' noise with seed + e. Environments that are in one scene at one time
+/// share its avatars' capsules and skinned Gaussians. Scenes are held once, however many environments
+/// look at them. The backend must outlive it. After an error reset() begins anew. One that was moved
+/// from has no environments and answers with invalid_argument.
 template <Backend B>
 class BatchSimulator {
  public:
-  /// `next_episode` is asked for each episode of each environment; see EpisodeSource. Errors: invalid_argument (names
-  /// the field, sensor or scene); unsupported, naming a sensor whose images cannot stay where BatchConfig::images says.
-  static Result<BatchSimulator> create(B& backend, std::vector<std::shared_ptr<const SimulatorScene>> scenes,
-                                       BatchConfig config, std::size_t environments, EpisodeSource next_episode) {
+  /// `next_episode` is asked for each episode of each environment; see EpisodeSource. Errors:
+  /// invalid_argument (names the field, sensor or scene); unsupported, naming a sensor whose images
+  /// cannot stay where BatchConfig::images says.
+  static Result<BatchSimulator> create(B& backend,
+                                       std::vector<std::shared_ptr<const SimulatorScene>> scenes,
+                                       BatchConfig config, std::size_t environments,
+                                       EpisodeSource next_episode) {
     for (const auto& scene : scenes) {
       if (scene == nullptr) return {Errc::invalid_argument, "BatchSimulator: a scene is null"};
       if (Status s = validate(*scene); !s) return s;
       if (Status s = validate_detail(*scene, detail_choice(config)); !s) return s;
     }
     const std::size_t count = scenes.size();
-    return create(backend, [held = std::move(scenes)](std::size_t i) -> Result<ScenePointer> { return held[i]; }, {}, count,
-                  std::move(config), environments, std::move(next_episode));
+    return create(
+        backend, [held = std::move(scenes)](std::size_t i) -> Result<ScenePointer> { return held[i]; },
+        {}, count, std::move(config), environments, std::move(next_episode));
   }
-  /// The same over scenes that are loaded in the background and leave when they are not needed. `next_episode` is asked
-  /// for the next episode of an environment already when one begins, so that its scene can be loaded meanwhile.
-  /// Errors: as above; invalid_argument where `library` is null. What loading a scene reports comes from the reset or
-  /// step that needs it.
-  static Result<BatchSimulator> create_from_library(B& backend, std::shared_ptr<SceneLibrary> library, BatchConfig config,
-                                                    std::size_t environments, EpisodeSource next_episode) {
-    if (library == nullptr) return {Errc::invalid_argument, "BatchSimulator: the library of scenes is null"};
-    return create(backend, [library](std::size_t i) { return library->get(i); },
-                  [library](std::size_t i) { library->prefetch(i); }, library->size(), std::move(config), environments,
-                  std::move(next_episode));
+  /// The same over scenes that are loaded in the background and leave when they are not needed.
+  /// `next_episode` is asked for the next episode of an environment already when one begins, so that its
+  /// scene can be loaded meanwhile. Errors: as above; invalid_argument where `library` is null. What
+  /// loading a scene reports comes from the reset or step that needs it.
+  static Result<BatchSimulator> create_from_library(B& backend, std::shared_ptr<SceneLibrary> library,
+                                                    BatchConfig config, std::size_t environments,
+                                                    EpisodeSource next_episode) {
+    if (library == nullptr)
+      return {Errc::invalid_argument, "BatchSimulator: the library of scenes is null"};
+    return create(
+        backend, [library](std::size_t i) { return library->get(i); },
+        [library](std::size_t i) { library->prefetch(i); }, library->size(), std::move(config),
+        environments, std::move(next_episode));
   }
 
   std::size_t environments() const noexcept { return worlds_.size(); }
@@ -106,11 +117,10 @@ class BatchSimulator {
     return observe(mask.empty());
   }
 
-  /// One action for each environment, [N]. Errors: invalid_argument (another number of actions; an environment that is
-  /// done, with AutoReset::disabled; before reset), with the environment's number; what World::step reports; rendering.
-  Result<BatchStep> step(std::span<const Action> actions) {
-    return act(actions);
-  }
+  /// One action for each environment, [N]. Errors: invalid_argument (another number of actions; an
+  /// environment that is done, with AutoReset::disabled; before reset), with the environment's number;
+  /// what World::step reports; rendering.
+  Result<BatchStep> step(std::span<const Action> actions) { return act(actions); }
   /// The same by velocities, as Simulator::step(VelocityCommand).
   Result<BatchStep> step(std::span<const VelocityCommand> commands) { return act(commands); }
 
@@ -127,36 +137,43 @@ class BatchSimulator {
   using ScenePointer = std::shared_ptr<const SimulatorScene>;
   using SceneOf = std::function<Result<ScenePointer>(std::size_t)>;
 
-  static Result<BatchSimulator> create(B& backend, SceneOf scene_of, std::function<void(std::size_t)> prefetch,
-                                       std::size_t scenes, BatchConfig config, std::size_t environments,
+  static Result<BatchSimulator> create(B& backend, SceneOf scene_of,
+                                       std::function<void(std::size_t)> prefetch, std::size_t scenes,
+                                       BatchConfig config, std::size_t environments,
                                        EpisodeSource next_episode) {
     if (Status s = validate(static_cast<const SimulatorConfig&>(config)); !s) return s;
     if (config.images > ImageMemory::backend) {
-      return {Errc::invalid_argument, "BatchConfig.images = " + std::to_string(static_cast<int>(config.images)) +
-                                          ": there is none of this number"};
+      return {Errc::invalid_argument,
+              "BatchConfig.images = " + std::to_string(static_cast<int>(config.images)) +
+                  ": there is none of this number"};
     }
     if (config.auto_reset > AutoReset::disabled) {
-      return {Errc::invalid_argument, "BatchConfig.auto_reset = " + std::to_string(static_cast<int>(config.auto_reset)) +
-                                          ": there is none of this number"};
+      return {Errc::invalid_argument,
+              "BatchConfig.auto_reset = " + std::to_string(static_cast<int>(config.auto_reset)) +
+                  ": there is none of this number"};
     }
-    if (config.pose_slots < 1) return {Errc::invalid_argument, "BatchConfig.pose_slots = 0: must be >= 1"};
+    if (config.pose_slots < 1)
+      return {Errc::invalid_argument, "BatchConfig.pose_slots = 0: must be >= 1"};
     if (Status s = SensorRig<B>::check_memory(config.sensors, config.images); !s) return s;
     BatchPlaces places;
     places.count = scenes;
     places.get = [scene_of](std::size_t i) -> Result<BatchScene> {
       auto scene = scene_of(i);
       if (!scene) return scene.status();
-      return BatchScene{(*scene)->navmesh,
-                        [held = *scene](double t0, double t1, auto& out) { append_bodies(*held, t0, t1, out); },
-                        [held = *scene](double t0, double t1, const CapsuleSet* before, auto& out) {
-                          append_bodies(*held, t0, t1, out, before);
-                        }};
+      return BatchScene{
+          (*scene)->navmesh,
+          [held = *scene](double t0, double t1, auto& out) { append_bodies(*held, t0, t1, out); },
+          [held = *scene](double t0, double t1, const CapsuleSet* before, auto& out) {
+            append_bodies(*held, t0, t1, out, before);
+          }};
     };
     const bool scenes_leave = prefetch != nullptr;
     places.prefetch = std::move(prefetch);
-    auto worlds = BatchWorld::create(std::move(places), config.task, config.auto_reset, environments, std::move(next_episode));
+    auto worlds = BatchWorld::create(std::move(places), config.task, config.auto_reset, environments,
+                                     std::move(next_episode));
     if (!worlds) return worlds.status();
-    return BatchSimulator(backend, std::move(*worlds), std::move(config), std::move(scene_of), scenes, scenes_leave);
+    return BatchSimulator(backend, std::move(*worlds), std::move(config), std::move(scene_of), scenes,
+                          scenes_leave);
   }
 
   BatchSimulator(B& backend, BatchWorld worlds, BatchConfig config, SceneOf scene_of, std::size_t scenes,
@@ -175,7 +192,8 @@ class BatchSimulator {
     final_images_ = images_;
     buffers_.memory = final_buffers_.memory = config_.images;
     if constexpr (!is_host_backend<B>) {
-      pool_ = std::make_unique<ThreadPool>(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+      pool_ = std::make_unique<ThreadPool>(
+          std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
     }
   }
 
@@ -188,7 +206,8 @@ class BatchSimulator {
     auto held = scene_pointer_(scene);
     if (!held) return held.status();
     if (Status s = validate_detail(**held, detail_choice(config_)); !s) return s;
-    scenes_[scene] = std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held), detail_choice(config_));
+    scenes_[scene] =
+        std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held), detail_choice(config_));
     render_configs_[scene] = scenes_[scene]->render_config(config_.render);
     return {};
   }
@@ -245,7 +264,8 @@ class BatchSimulator {
     drawn_ = true;
     fill(images_, buffers_);
     out.images = images_;
-    if (worlds_.auto_reset() == AutoReset::same_step && !worlds_.info().finished.empty()) out.final_images = final_images_;
+    if (worlds_.auto_reset() == AutoReset::same_step && !worlds_.info().finished.empty())
+      out.final_images = final_images_;
     return out;
   }
 
@@ -281,9 +301,11 @@ class BatchSimulator {
     // Where nobody walks all times are one.
     const auto key = [this](const Looker& l) {
       const std::size_t scene = worlds_.scene_of(l.environment);
-      return std::pair(scene, scenes_[scene]->scene().avatars.empty() ? 0.0 : world(l.environment).time());
+      return std::pair(scene,
+                       scenes_[scene]->scene().avatars.empty() ? 0.0 : world(l.environment).time());
     };
-    std::stable_sort(lookers_.begin(), lookers_.end(), [&](const Looker& a, const Looker& b) { return key(a) < key(b); });
+    std::stable_sort(lookers_.begin(), lookers_.end(),
+                     [&](const Looker& a, const Looker& b) { return key(a) < key(b); });
     posed_.clear();
     std::vector<std::size_t> used(scenes_.size());  // slots of each scene
     for (std::size_t first = 0, last = 0; first < lookers_.size(); first = last) {
@@ -298,7 +320,8 @@ class BatchSimulator {
     return {};
   }
 
-  /// Lookers [first, last) share a scene and a time, and so a slot that the scene's avatars are posed in.
+  /// Lookers [first, last) share a scene and a time, and so a slot that the scene's avatars are posed
+  /// in.
   struct Posed {
     std::size_t first, last, scene, slot;
     std::vector<Camera> cameras;
@@ -327,8 +350,9 @@ class BatchSimulator {
       for (std::size_t i = p.first; i < p.last; ++i) {
         const std::size_t e = lookers_[i].environment;
         const AgentPose& agent = world(e).agent();
-        views_.push_back({agent.position, agent.rotation(), agent.pitch, noise_seed(config_.seed + e, world(e).state()),
-                          scene.sets(p.slot), &render_configs_[p.scene], lookers_[i].row, scene.meshes(), scene.detail()});
+        views_.push_back({agent.position, agent.rotation(), agent.pitch,
+                          noise_seed(config_.seed + e, world(e).state()), scene.sets(p.slot),
+                          &render_configs_[p.scene], lookers_[i].row, scene.meshes(), scene.detail()});
       }
     }
     return rig_.render(views_, images);
@@ -357,17 +381,21 @@ class BatchSimulator {
 
 /// BatchSimulator<B>::create, and create_from_library, with B deduced.
 template <Backend B>
-Result<BatchSimulator<B>> make_batch_simulator(B& backend, std::vector<std::shared_ptr<const SimulatorScene>> scenes,
-                                               BatchConfig config, std::size_t environments, EpisodeSource next_episode) {
-  return BatchSimulator<B>::create(backend, std::move(scenes), std::move(config), environments, std::move(next_episode));
+Result<BatchSimulator<B>> make_batch_simulator(B& backend,
+                                               std::vector<std::shared_ptr<const SimulatorScene>> scenes,
+                                               BatchConfig config, std::size_t environments,
+                                               EpisodeSource next_episode) {
+  return BatchSimulator<B>::create(backend, std::move(scenes), std::move(config), environments,
+                                   std::move(next_episode));
 }
 
 template <Backend B>
-Result<BatchSimulator<B>> make_batch_simulator_from_library(B& backend, std::shared_ptr<SceneLibrary> library,
+Result<BatchSimulator<B>> make_batch_simulator_from_library(B& backend,
+                                                            std::shared_ptr<SceneLibrary> library,
                                                             BatchConfig config, std::size_t environments,
                                                             EpisodeSource next_episode) {
-  return BatchSimulator<B>::create_from_library(backend, std::move(library), std::move(config), environments,
-                                                std::move(next_episode));
+  return BatchSimulator<B>::create_from_library(backend, std::move(library), std::move(config),
+                                                environments, std::move(next_episode));
 }
 
 }  // namespace gsnav

@@ -40,9 +40,11 @@ inline double soft_success_weighted_by_path_length(double g, double l, double p)
   return is_finite(soft) ? soft : 0.0;
 }
 
-/// STL = S T0 / max(T0, T) with T = steps and T0 = l / forward_step, both in actions: the time of whoever goes the
-/// shortest way at full speed without turning. With l = 0: S where no step was taken, else 0.
-inline double success_weighted_by_time(bool success, double l, double forward_step, std::size_t steps) noexcept {
+/// STL = S T0 / max(T0, T) with T = steps and T0 = l / forward_step, both in actions: the time of
+/// whoever goes the shortest way at full speed without turning. With l = 0: S where no step was taken,
+/// else 0.
+inline double success_weighted_by_time(bool success, double l, double forward_step,
+                                       std::size_t steps) noexcept {
   return success ? detail::path_efficiency(l / forward_step, static_cast<double>(steps)) : 0.0;
 }
 
@@ -171,8 +173,9 @@ struct MetricsSummary {
   /// [0, 1]. There nothing stops a robot short of a person; here the step filter does, and what it
   /// stopped is counted by the next two.
   double human_collision_episode_rate = 0.0;
-  double human_blocked_episode_rate = 0.0;    ///< episodes in which a person stopped a move / episodes
-  double disturbed_episode_rate = 0.0;  ///< episodes with any step counted by CR / episodes: either of both
+  double human_blocked_episode_rate = 0.0;  ///< episodes in which a person stopped a move / episodes
+  double disturbed_episode_rate =
+      0.0;  ///< episodes with any step counted by CR / episodes: either of both
   double steps = 0.0;
   double path_length = 0.0;
   double min_clearance = std::numeric_limits<double>::infinity();  ///< the least of all episodes
@@ -202,10 +205,10 @@ inline MetricsSummary summarize(std::span<const EpisodeMetrics> episodes) noexce
     s.min_clearance = min(e.min_clearance, s.min_clearance);
   }
   const double n = static_cast<double>(episodes.size());
-  for (double* v : {&s.success_rate, &s.spl, &s.soft_spl, &s.stl, &s.distance_to_goal,
-                    &s.euclidean_distance_to_goal, &s.collision_rate, &s.psi, &s.psc, &s.collisions,
-                    &s.human_collision_episode_rate, &s.human_blocked_episode_rate,
-                    &s.disturbed_episode_rate, &s.steps, &s.path_length}) {
+  for (double* v :
+       {&s.success_rate, &s.spl, &s.soft_spl, &s.stl, &s.distance_to_goal, &s.euclidean_distance_to_goal,
+        &s.collision_rate, &s.psi, &s.psc, &s.collisions, &s.human_collision_episode_rate,
+        &s.human_blocked_episode_rate, &s.disturbed_episode_rate, &s.steps, &s.path_length}) {
     *v /= n;
   }
   return s;
@@ -213,7 +216,7 @@ inline MetricsSummary summarize(std::span<const EpisodeMetrics> episodes) noexce
 
 /// Calls f(name, value) for each metric of an episode, by the names that files have.
 template <class M, class F>
-  requires std::is_same_v<std::remove_const_t<M>, EpisodeMetrics>
+requires std::is_same_v<std::remove_const_t<M>, EpisodeMetrics>
 void for_each_metric(M& m, const F& f) {
   f("success", m.success), f("spl", m.spl), f("soft_spl", m.soft_spl), f("stl", m.stl);
   f("distance_to_goal", m.distance_to_goal);
@@ -226,7 +229,7 @@ void for_each_metric(M& m, const F& f) {
 }
 /// The same for the means over episodes.
 template <class M, class F>
-  requires std::is_same_v<std::remove_const_t<M>, MetricsSummary>
+requires std::is_same_v<std::remove_const_t<M>, MetricsSummary>
 void for_each_metric(M& s, const F& f) {
   f("success_rate", s.success_rate), f("spl", s.spl), f("soft_spl", s.soft_spl), f("stl", s.stl);
   f("distance_to_goal", s.distance_to_goal);

@@ -15,23 +15,25 @@ namespace gsnav {
 /// Colour of person `index`'s clothes and of their marks in maps, display-referred.
 Vec3d person_color(std::size_t index) noexcept;
 
-/// People on random ways over the largest island of `walkways` (a NavMesh for a body wider than the agent's keeps their
-/// shoulders off the furniture). Ways are drawn until one keeps 0.75 m from those before it, where that can be had; all
-/// have one period, so what holds for one round holds for ever. The same arguments give the same people; `density` scales
-/// the number of their Gaussians, as far as HumanoidOptions allows.
-/// Errors: nothing_navigable where nobody finds a place; invalid_argument where density is not finite.
-Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count, std::uint64_t seed,
-                                                double density = 1.0);
+/// People on random ways over the largest island of `walkways` (a NavMesh for a body wider than the
+/// agent's keeps their shoulders off the furniture). Ways are drawn until one keeps 0.75 m from those
+/// before it, where that can be had; all have one period, so what holds for one round holds for ever.
+/// The same arguments give the same people; `density` scales the number of their Gaussians, as far as
+/// HumanoidOptions allows. Errors: nothing_navigable where nobody finds a place; invalid_argument where
+/// density is not finite.
+Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count,
+                                                std::uint64_t seed, double density = 1.0);
 
-/// Gives each episode a start time, a multiple of the control period in [0, 600) s, at which no avatar is within 0.6 m of its start (the last of a hundred
-/// tries where there is none). Errors: what CapsuleSet::create reports.
-Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene, const TaskConfig& task,
-                        std::uint64_t seed);
+/// Gives each episode a start time, a multiple of the control period in [0, 600) s, at which no avatar
+/// is within 0.6 m of its start (the last of a hundred tries where there is none). Errors: what
+/// CapsuleSet::create reports.
+Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene,
+                        const TaskConfig& task, std::uint64_t seed);
 
-/// The embedded flat (default_scene.hpp) with its NavMesh for a body as of `task` and people who walk in it;
-/// `density`: of the flat's Gaussians, not of people's (walking_people).
-/// Errors: what the parts report.
-Result<SimulatorScene> default_simulator_scene(std::size_t people = 3, std::uint64_t seed = 1, double density = 1.0,
-                                               const TaskConfig& task = {});
+/// The embedded flat (default_scene.hpp) with its NavMesh for a body as of `task` and people who walk in
+/// it; `density`: of the flat's Gaussians, not of people's (walking_people). Errors: what the parts
+/// report.
+Result<SimulatorScene> default_simulator_scene(std::size_t people = 3, std::uint64_t seed = 1,
+                                               double density = 1.0, const TaskConfig& task = {});
 
 }  // namespace gsnav

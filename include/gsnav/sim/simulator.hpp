@@ -18,8 +18,9 @@ struct SimulatorConfig {
   TaskConfig task{};
   std::vector<SensorSpec> sensors;  ///< none: nothing is rendered
   RenderConfig render{};            ///< outputs and sort order are chosen by sensors and scene
-  /// Draws the assets by levels of detail: the profile lod (docs/lod.md), whatever render.profile is. Each needs its
-  /// tree (SceneAsset::lod). No hysteresis: an image depends on its camera, not on what was seen before.
+  /// Draws the assets by levels of detail: the profile lod (docs/lod.md), whatever render.profile is.
+  /// Each needs its tree (SceneAsset::lod). No hysteresis: an image depends on its camera, not on what
+  /// was seen before.
   std::optional<LodChoice> lod{};
   /// Draws of the assets only what is seen from where a camera is, by the rules of the profile fast
   /// (VisibleSets). Each needs its sets (SceneAsset::visible); from where these know nothing, all is
@@ -30,7 +31,9 @@ struct SimulatorConfig {
 };
 
 /// What of its assets a simulator draws.
-inline DetailChoice detail_choice(const SimulatorConfig& config) { return {config.lod, config.visible_sets}; }
+inline DetailChoice detail_choice(const SimulatorConfig& config) {
+  return {config.lod, config.visible_sets};
+}
 
 /// invalid_argument, naming the field, where a value is impossible.
 inline Status validate(const SimulatorConfig& config) {
@@ -42,8 +45,8 @@ inline Status validate(const SimulatorConfig& config) {
 /// What the noise of an observation depends on: the seed, the episode and how many actions it has seen.
 std::uint64_t noise_seed(std::uint64_t seed, const WorldState& state) noexcept;
 
-/// Where the camera of an ImageNav goal looks: about +Y by an angle that the episode's id alone decides, so that an
-/// episode has one goal image.
+/// Where the camera of an ImageNav goal looks: about +Y by an angle that the episode's id alone decides,
+/// so that an episode has one goal image.
 Quatd goal_rotation(const PointNavEpisode& episode) noexcept;
 
 /// One sensor's image. Valid until the next step or reset of its simulator.
@@ -77,9 +80,10 @@ struct Observations : StepInfo {
 ///     auto metrics = sim.metrics();
 ///
 /// During an action avatars and agent move together over one control period; avatars are skinned only
-/// when a sensor looks. The same calls give the same bits, where floating point rounds to nearest as a program starts;
-/// flushing denormals to zero changes none. The backend must outlive it. One that was moved from answers whatever can
-/// fail with invalid_argument; world().navmesh() and avatars() must not be asked of it.
+/// when a sensor looks. The same calls give the same bits, where floating point rounds to nearest as a
+/// program starts; flushing denormals to zero changes none. The backend must outlive it. One that was
+/// moved from answers whatever can fail with invalid_argument; world().navmesh() and avatars() must not
+/// be asked of it.
 template <Backend B>
 class Simulator {
  public:
@@ -88,8 +92,8 @@ class Simulator {
     return create(backend, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(config));
   }
   /// `others` adds bodies to the scene's avatars, numbered behind them. Errors: as above.
-  static Result<Simulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene, SimulatorConfig config,
-                                  World::BodySource others = {}) {
+  static Result<Simulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene,
+                                  SimulatorConfig config, World::BodySource others = {}) {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
     if (Status s = validate(*scene); !s) return s;
     if (Status s = validate(config); !s) return s;
@@ -130,8 +134,10 @@ class Simulator {
     if (!config_.rendering || images_.empty()) return obs;
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
     const AgentPose& agent = world_.agent();
-    const SensorView view{agent.position, agent.rotation(), agent.pitch, noise_seed(config_.seed, world_.state()),
-                          scene_.sets(0), &config_.render, 0, scene_.meshes(), scene_.detail()};
+    const SensorView view{
+        agent.position, agent.rotation(), agent.pitch, noise_seed(config_.seed, world_.state()),
+        scene_.sets(0), &config_.render,  0,           scene_.meshes(),
+        scene_.detail()};
     rig_.resize(buffers_, 1);
     if (Status s = rig_.render(std::span(&view, 1), buffers_); !s) return s;
     for (std::size_t i = 0; i < images_.size(); ++i) images_[i].data = rig_.image(buffers_, i, 0);
@@ -147,7 +153,8 @@ class Simulator {
   const SimulatorConfig& config() const noexcept { return config_; }
   const std::vector<AvatarActor>& avatars() const noexcept { return scene_.scene().avatars; }
 
-  /// Everything that changes while it runs, and the way back to it; observe() then sees what was seen there.
+  /// Everything that changes while it runs, and the way back to it; observe() then sees what was seen
+  /// there.
   const WorldState& state() const noexcept { return world_.state(); }
   /// As World::set_state, its errors: nothing is changed by a state that is refused.
   Status set_state(const WorldState& state) { return world_.set_state(state); }
@@ -183,25 +190,29 @@ class Simulator {
     return &spectator_;
   }
 
-  /// The goal of ImageNav: what an agent at the episode's goal sees, turned by goal_rotation(), with nobody about. The
-  /// images are in the sensors' order and live until the next call. Errors: invalid_argument before reset; rendering.
+  /// The goal of ImageNav: what an agent at the episode's goal sees, turned by goal_rotation(), with
+  /// nobody about. The images are in the sensors' order and live until the next call. Errors:
+  /// invalid_argument before reset; rendering.
   Result<std::span<const Observation>> goal_images() {
     if (Status s = alive(); !s) return s;
     const WorldState& s = world_.state();
     if (!s.running) return {Errc::invalid_argument, "goal_images before reset: no episode is running"};
     const SensorView view{s.goal.position, goal_rotation(s.episode), 0.0, noise_seed(config_.seed, s),
-                          scene_.assets(), &config_.render, 0, scene_.meshes(), scene_.detail()};
+                          scene_.assets(), &config_.render,          0,   scene_.meshes(),
+                          scene_.detail()};
     rig_.resize(goal_buffers_, 1);
     if (Status e = rig_.render(std::span(&view, 1), goal_buffers_); !e) return e;
     goal_images_ = images_;
-    for (std::size_t i = 0; i < images_.size(); ++i) goal_images_[i].data = rig_.image(goal_buffers_, i, 0);
+    for (std::size_t i = 0; i < images_.size(); ++i)
+      goal_images_[i].data = rig_.image(goal_buffers_, i, 0);
     return std::span<const Observation>(goal_images_);
   }
 
  private:
   Status alive() const {
-    return world_.moved_from() ? Status(Errc::invalid_argument, "this Simulator was moved from: use what it became")
-                               : Status();
+    return world_.moved_from()
+               ? Status(Errc::invalid_argument, "this Simulator was moved from: use what it became")
+               : Status();
   }
 
   Simulator(B& backend, World world, SimulatorConfig config, std::shared_ptr<const SimulatorScene> scene)

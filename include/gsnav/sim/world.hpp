@@ -11,8 +11,8 @@
 
 #include "gsnav/detail/nav/step.hpp"
 #include "gsnav/detail/sim/episode.hpp"
-#include "gsnav/sim/metrics.hpp"
 #include "gsnav/detail/sim/task.hpp"
+#include "gsnav/sim/metrics.hpp"
 
 namespace gsnav {
 
@@ -55,7 +55,7 @@ struct WorldState {
   NavPoint goal;  ///< the episode's, on the surface
   StepInfo last;
   EpisodeTracker tracker;
-  double time = 0.0, start_time = 0.0;  ///< seconds on the scene's clock
+  double time = 0.0, start_time = 0.0;                                ///< seconds on the scene's clock
   double distance_to_goal = std::numeric_limits<double>::infinity();  ///< along the surface, metres
   int steps = 0;
   bool done = true, stop_called = false, running = false;
@@ -105,24 +105,28 @@ class World {
   const TaskConfig& config() const noexcept { return config_; }
   const NavMesh& navmesh() const noexcept { return *navmesh_; }
 
-  /// What is needed to come back here: set_state() makes everything that follows happen again, bit for bit.
+  /// What is needed to come back here: set_state() makes everything that follows happen again, bit for
+  /// bit.
   const WorldState& state() const noexcept { return s_; }
-  /// `state` comes from a World of the same NavMesh, settings and bodies. It is taken as it is, never snapped: of a
-  /// running episode the agent must be within 0.1 m of the surface beside it and 0.5 m above or below.
-  /// Errors, which change nothing: invalid_argument, naming the field (a time, place or angle that is not finite, steps
-  /// below 0, a polygon that is none of this NavMesh); nothing_navigable (the agent is off the NavMesh).
+  /// `state` comes from a World of the same NavMesh, settings and bodies. It is taken as it is, never
+  /// snapped: of a running episode the agent must be within 0.1 m of the surface beside it and 0.5 m
+  /// above or below. Errors, which change nothing: invalid_argument, naming the field (a time, place or
+  /// angle that is not finite, steps below 0, a polygon that is none of this NavMesh); nothing_navigable
+  /// (the agent is off the NavMesh).
   Status set_state(const WorldState& state);
-  /// Whether it was moved from: all that can fail then returns invalid_argument, and navmesh() must not be asked.
+  /// Whether it was moved from: all that can fail then returns invalid_argument, and navmesh() must not
+  /// be asked.
   bool moved_from() const noexcept { return navmesh_ == nullptr; }
-  /// Puts the agent somewhere else on the surface; no time passes and nothing is counted. Errors: nothing_navigable
-  /// off the NavMesh or on an island without the goal; invalid_argument (not finite; no episode is running). Metres in the
-  /// world, yaw and pitch in radians.
+  /// Puts the agent somewhere else on the surface; no time passes and nothing is counted. Errors:
+  /// nothing_navigable off the NavMesh or on an island without the goal; invalid_argument (not finite;
+  /// no episode is running). Metres in the world, yaw and pitch in radians.
   Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0);
 
-  /// The bodies over [t0, t1], seconds on the scene's clock. A policy may look ahead with it; avatars are scripted, so
-  /// this is what will happen. Errors: what CapsuleSet::create reports.
+  /// The bodies over [t0, t1], seconds on the scene's clock. A policy may look ahead with it; avatars
+  /// are scripted, so this is what will happen. Errors: what CapsuleSet::create reports.
   Result<CapsuleSet> bodies(double t0, double t1) const;
-  /// Query 1: how far the agent is from the nearest body now, metres. Errors: what CapsuleSet::create reports.
+  /// Query 1: how far the agent is from the nearest body now, metres. Errors: what CapsuleSet::create
+  /// reports.
   Result<Clearance> clearance() const;
   /// Query 2: what the next action would do, without doing it: the code of step() on the same bodies.
   /// Errors: as step.

@@ -16,9 +16,10 @@ namespace gsnav {
 
 /// Joints that move one Gaussian: one of these two.
 inline constexpr int kInfluences4 = 4, kInfluences8 = 8;
-/// Skinning weights are whole numbers of parts, of which this many are 1; those of a Gaussian make 1 exactly.
-/// Rounding weights (detail/avatar/skinning_weights.hpp) moves a Gaussian by at most K / (4 * kWeightParts) of the greatest
-/// distance between the places where its joints alone would put it: 15 um a metre for K = 4, 31 um for K = 8.
+/// Skinning weights are whole numbers of parts, of which this many are 1; those of a Gaussian make 1
+/// exactly. Rounding weights (detail/avatar/skinning_weights.hpp) moves a Gaussian by at most K / (4 *
+/// kWeightParts) of the greatest distance between the places where its joints alone would put it: 15 um
+/// a metre for K = 4, 31 um for K = 8.
 inline constexpr int kWeightParts = 65535;
 /// A blended linear part with a smaller determinant has no orientation worth the name (the candy
 /// wrapper of a 180 degree twist): the joint of the greatest weight gives the rotation there.
@@ -26,11 +27,12 @@ inline constexpr double kMinBlendDeterminant = 0.1;
 
 namespace detail {
 
-/// Cofactor matrix: det(m) times the inverse transposed. Errors are roundings of m's greatest elements: enough
-/// for the polar factor of what has det > 0.1, not for needles (cross() has what they need).
+/// Cofactor matrix: det(m) times the inverse transposed. Errors are roundings of m's greatest elements:
+/// enough for the polar factor of what has det > 0.1, not for needles (cross() has what they need).
 template <class L>
 GSNAV_HD Mat3<L> cofactors(const Mat3<L>& m) noexcept {
-  return {{rough_cross(m.row[1], m.row[2]), rough_cross(m.row[2], m.row[0]), rough_cross(m.row[0], m.row[1])}};
+  return {{rough_cross(m.row[1], m.row[2]), rough_cross(m.row[2], m.row[0]),
+           rough_cross(m.row[0], m.row[1])}};
 }
 
 }  // namespace detail
@@ -42,12 +44,12 @@ struct ScaledRotation {
   L scale;
 };
 
-/// The rotation nearest to m in the Frobenius norm (its polar factor), for det(m) > 0, in closed form from the
-/// sum of m's singular values (Markley 1993, FOAM). The sum is the greatest root of
-/// (x^2 - |m|^2)^2 - 8 det(m) x - 4 |cofactors|^2, to which Newton's iteration descends from sqrt(3) |m| without
-/// passing it. Error of an element for blends of rotations with det > 0.1: 1e-6 in float, 2e-15 in double; it grows
-/// as the greatest singular value over the sum of the other two. Lanes that are done stay where they are
-/// while others go on.
+/// The rotation nearest to m in the Frobenius norm (its polar factor), for det(m) > 0, in closed form
+/// from the sum of m's singular values (Markley 1993, FOAM). The sum is the greatest root of (x^2 -
+/// |m|^2)^2 - 8 det(m) x - 4 |cofactors|^2, to which Newton's iteration descends from sqrt(3) |m|
+/// without passing it. Error of an element for blends of rotations with det > 0.1: 1e-6 in float, 2e-15
+/// in double; it grows as the greatest singular value over the sum of the other two. Lanes that are done
+/// stay where they are while others go on.
 template <class L>
 GSNAV_HD ScaledRotation<L> scaled_polar_rotation(const Mat3<L>& m) noexcept {
   using S = scalar_of<L>;
@@ -72,8 +74,8 @@ GSNAV_HD ScaledRotation<L> scaled_polar_rotation(const Mat3<L>& m) noexcept {
     active = active && (change > converged * sum);
     if (!any(active)) break;
   }
-  // With singular values a, b, c and their vectors, ((ab + bc + ca + |m|^2) I - m m^T) m + sum * cofactors is
-  // (a + b) (b + c) (c + a) times the rotation.
+  // With singular values a, b, c and their vectors, ((ab + bc + ca + |m|^2) I - m m^T) m + sum *
+  // cofactors is (a + b) (b + c) (c + a) times the rotation.
   const L pairs = L(S(0.5)) * fma(sum, sum, -m2), d = pairs + m2;
   g00 = d - g00;
   g11 = d - g11;
@@ -126,11 +128,12 @@ struct Skinned {
 
 /// Linear blend skinning of one Gaussian, or of a pack of them.
 ///
-/// `blend`: sum over the influences of weight * (posed joint * inverse bind), the joints rigid, metres, relative
-/// to the actor's root (so that an error of the weights' sum is scaled by the body's size, not by its place in
-/// the world). `first()`: linear part of the joint of the greatest weight; called where a blend has no
-/// orientation. The mean goes through the blended matrix, the orientation through its polar factor, so that the
-/// result does not depend on how the ellipsoid's axes are numbered. `rotation`: whether Skinned::rotation is asked for.
+/// `blend`: sum over the influences of weight * (posed joint * inverse bind), the joints rigid, metres,
+/// relative to the actor's root (so that an error of the weights' sum is scaled by the body's size, not
+/// by its place in the world). `first()`: linear part of the joint of the greatest weight; called where
+/// a blend has no orientation. The mean goes through the blended matrix, the orientation through its
+/// polar factor, so that the result does not depend on how the ellipsoid's axes are numbered.
+/// `rotation`: whether Skinned::rotation is asked for.
 template <class L, class First>
 GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& mean, const Quat<L>& quat,
                          bool rotation = true) noexcept {
@@ -140,11 +143,13 @@ GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& me
     const Vec3<L>& r = blend.linear.row[i];
     out.mean[i] = fma(r.z, mean.z, fma(r.y, mean.y, fma(r.x, mean.x, blend.translation[i])));
   }
-  const mask_of<L> usable = dot(blend.linear.row[0], detail::cofactors(blend.linear).row[0]) > L(static_cast<S>(kMinBlendDeterminant));
+  const mask_of<L> usable = dot(blend.linear.row[0], detail::cofactors(blend.linear).row[0]) >
+                            L(static_cast<S>(kMinBlendDeterminant));
   if (!all(usable)) {
     const Mat3<L> greatest = first();
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) blend.linear(i, j) = select(usable, blend.linear(i, j), greatest(i, j));
+      for (int j = 0; j < 3; ++j)
+        blend.linear(i, j) = select(usable, blend.linear(i, j), greatest(i, j));
     }
   }
   const Quat<L> turn = quat_direction(scaled_polar_rotation(blend.linear)), turned = turn * quat;
@@ -162,15 +167,17 @@ struct SkinningArgs {
   View<const float> quats[4];               ///< canonical w, x, y, z of unit length, [N] each
   int influences = kInfluences4;            ///< K: 4 or 8
   View<const std::uint16_t> joint_indices;  ///< [N][K], the greatest weight first
-  View<const std::uint16_t> weights;        ///< [N][K] parts of kWeightParts, which is the sum of each row
-  View<const Affine3<S>> joints;            ///< [J] posed joint * inverse bind, relative to the root
-  View<Out> means_out[3];                   ///< [N] each
-  View<Out> quats_out[4];                   ///< [N] each
-  View<Out> rotations_out[4];               ///< [N] each, or empty: not asked for
-  /// Dual quaternion blending: `joints` as dual quaternions, [J], which are then what is read. Empty: linear blending.
+  View<const std::uint16_t> weights;  ///< [N][K] parts of kWeightParts, which is the sum of each row
+  View<const Affine3<S>> joints;      ///< [J] posed joint * inverse bind, relative to the root
+  View<Out> means_out[3];             ///< [N] each
+  View<Out> quats_out[4];             ///< [N] each
+  View<Out> rotations_out[4];         ///< [N] each, or empty: not asked for
+  /// Dual quaternion blending: `joints` as dual quaternions, [J], which are then what is read. Empty:
+  /// linear blending.
   View<const DualQuat<S>> dual_joints;
-  /// Linear blending with stretch: gradients of the second to last weight of each Gaussian by its canonical place,
-  /// [N][K-1][3], 1/metres, standard deviations, and where the shapes go. Empty: shapes are turned only.
+  /// Linear blending with stretch: gradients of the second to last weight of each Gaussian by its
+  /// canonical place, [N][K-1][3], 1/metres, standard deviations, and where the shapes go. Empty: shapes
+  /// are turned only.
   View<const float> weight_gradients;
   View<const float> scales[3];  ///< canonical, metres, [N] each
   View<Out> axes_out[9];        ///< [N] each, as GaussianView::axes
@@ -256,11 +263,14 @@ struct SkinGaussian {
   SkinningArgs<S, Out> args;
 
   GSNAV_HD void operator()(std::size_t i) const noexcept {
-    const auto joint_at = [this](std::uint16_t j) GSNAV_INLINED -> const Affine3<S>& { return args.joints[j]; };
+    const auto joint_at = [this](std::uint16_t j)
+                              GSNAV_INLINED -> const Affine3<S>& { return args.joints[j]; };
     if (args.influences == kInfluences8) {
-      store_skinned(args, i, skin_row<S>(read_skin_row<kInfluences8>(args, i), joint_at, args.writes_rotations()));
+      store_skinned(
+          args, i, skin_row<S>(read_skin_row<kInfluences8>(args, i), joint_at, args.writes_rotations()));
     } else {
-      store_skinned(args, i, skin_row<S>(read_skin_row<kInfluences4>(args, i), joint_at, args.writes_rotations()));
+      store_skinned(
+          args, i, skin_row<S>(read_skin_row<kInfluences4>(args, i), joint_at, args.writes_rotations()));
     }
   }
 };

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
-#include "gsnav/core/status.hpp"
-#include "gsnav/skin/lbs.hpp"
-#include "gsnav/detail/skin/skin_modes.hpp"
 #include "gsnav/core/stages.hpp"
+#include "gsnav/core/status.hpp"
+#include "gsnav/detail/skin/skin_modes.hpp"
+#include "gsnav/skin/lbs.hpp"
 
 namespace gsnav {
 
@@ -48,7 +48,8 @@ Status validate(const SkinningArgs<S, Out>& args) {
   }
   if (!args.weight_gradients.empty()) {
     if (!args.dual_joints.empty()) {
-      return {Errc::invalid_argument, "SkinningArgs.weight_gradients: stretch goes with linear blending, not with dual_joints"};
+      return {Errc::invalid_argument,
+              "SkinningArgs.weight_gradients: stretch goes with linear blending, not with dual_joints"};
     }
     sized(args.weight_gradients, 3 * (row - 1) * n, "weight_gradients");
     for (const auto& v : args.scales) sized(v, n, "scales");
@@ -67,9 +68,9 @@ bool has_skinning_mode(const SkinningArgs<S, Out>& args) noexcept {
 
 }  // namespace detail
 
-/// Skins N Gaussians on a backend: linearly (stage::Skin), by dual quaternions or with stretch, as the arrays that are
-/// given say. Every joint index must be below joints.size (AvatarAsset::validate checks that).
-/// The result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
+/// Skins N Gaussians on a backend: linearly (stage::Skin), by dual quaternions or with stretch, as the
+/// arrays that are given say. Every joint index must be below joints.size (AvatarAsset::validate checks
+/// that). The result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
 template <class S, Backend B, class Out>
 Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
   if (Status s = validate(args); !s) return s;
@@ -85,9 +86,9 @@ Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
   return {};
 }
 
-/// The same for many avatars (stage::SkinAll: a GPU takes one launch). The bits are those of one avatar at a time.
-/// Errors: invalid_argument
-/// naming the avatar by its place and the array; nothing is skinned then.
+/// The same for many avatars (stage::SkinAll: a GPU takes one launch). The bits are those of one avatar
+/// at a time. Errors: invalid_argument naming the avatar by its place and the array; nothing is skinned
+/// then.
 template <class S, Backend B, class Out = float>
 Status skin_all(B& backend, std::span<const SkinningArgs<S, Out>> avatars) {
   for (std::size_t i = 0; i < avatars.size(); ++i) {

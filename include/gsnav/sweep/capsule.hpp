@@ -122,8 +122,8 @@ GSNAV_HD SegmentDistance<L> segment_distance(const Vec3<L>& a0, const Vec3<L>& a
   const Vec3<L> fallback = detail::select_vec(
       den > tiny, crossed, detail::any_perpendicular(detail::select_vec(u_longer, u, v)));
   const auto apart = best.distance2 > tiny;
-  out.normal = detail::select_vec(
-      apart, best.delta * (one / select(apart, out.distance, one)), fallback);
+  out.normal =
+      detail::select_vec(apart, best.delta * (one / select(apart, out.distance, one)), fallback);
   return out;
 }
 
@@ -131,7 +131,7 @@ GSNAV_HD SegmentDistance<L> segment_distance(const Vec3<L>& a0, const Vec3<L>& a
 template <class L>
 struct CapsuleGap {
   L gap;
-  Vec3<L> normal;    ///< unit, from b to a: the way a gets out
+  Vec3<L> normal;      ///< unit, from b to a: the way a gets out
   Vec3<L> on_a, on_b;  ///< points of the two surfaces along the normal
 };
 
@@ -161,14 +161,14 @@ struct SweepRules {
 /// Outcome of a sweep over the unit interval.
 template <class L>
 struct SweepResult {
-  mask_of<L> hit;     ///< the agent has to stop
-  mask_of<L> pushed;  ///< the body came closer from contact without the agent's doing
-  L time;             ///< where the agent rests, in [0, 1]; 1 without a hit
-  L contact_time;     ///< where contact was declared, >= time
-  L start_gap;        ///< signed gap at time 0
-  L gap;              ///< signed gap at the last evaluation
-  Vec3<L> normal;     ///< unit, from the body to the agent, at contact
-  Vec3<L> point;      ///< on the body's surface, at contact
+  mask_of<L> hit;            ///< the agent has to stop
+  mask_of<L> pushed;         ///< the body came closer from contact without the agent's doing
+  L time;                    ///< where the agent rests, in [0, 1]; 1 without a hit
+  L contact_time;            ///< where contact was declared, >= time
+  L start_gap;               ///< signed gap at time 0
+  L gap;                     ///< signed gap at the last evaluation
+  Vec3<L> normal;            ///< unit, from the body to the agent, at contact
+  Vec3<L> point;             ///< on the body's surface, at contact
   mask_of<L> agent_closing;  ///< at contact the agent itself moved towards the body
 };
 
@@ -238,7 +238,8 @@ GSNAV_HD L time_to_look(L skin, L agent_speed, L rate, L axes_apart, L relative_
 /// `sweep`, up to `steps` evaluations of it: lanes that are not in `unfinished` have their result.
 template <class L, class S = scalar_of<L>>
 GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
-                                    const SweepRules<S>& rules, int steps, mask_of<L>& unfinished) noexcept {
+                                    const SweepRules<S>& rules, int steps,
+                                    mask_of<L>& unfinished) noexcept {
   const L zero(S(0)), one(S(1)), never(S(4));
   const L skin(rules.skin), target(rules.skin * S(0.5)), tolerance(rules.tolerance), slack(rules.slack);
   const Vec3<L> va[2] = {agent.end.p0 - agent.begin.p0, agent.end.p1 - agent.begin.p1};

@@ -7,8 +7,8 @@
 #include "gsnav/core/view.hpp"
 #include "gsnav/sweep/capsule.hpp"
 
-// Many pairs of capsules at once, by planes: what lanes and devices read. Positions relative to an origin near the
-// capsules (sweep/capsule.hpp).
+// Many pairs of capsules at once, by planes: what lanes and devices read. Positions relative to an
+// origin near the capsules (sweep/capsule.hpp).
 
 namespace gsnav {
 
@@ -35,8 +35,8 @@ struct MovingCapsulePlanes {
 template <class S>
 struct CapsuleGapArgs {
   CapsulePlanes<S> a, b;
-  View<S> gap;                            ///< [N]
-  View<S> normal[3], on_a[3], on_b[3];    ///< [N] each, or all empty: not asked for
+  View<S> gap;                          ///< [N]
+  View<S> normal[3], on_a[3], on_b[3];  ///< [N] each, or all empty: not asked for
 
   GSNAV_HD std::size_t size() const noexcept { return a.radius.size; }
   GSNAV_HD bool asks_for_points() const noexcept { return !normal[0].empty(); }
@@ -50,10 +50,10 @@ template <class S>
 struct SweepArgs {
   MovingCapsulePlanes<S> agents, bodies;
   SweepRules<S> rules;
-  View<std::uint8_t> outcome;             ///< [N] sums of kSweepHit, kSweepPushed, kSweepAgentClosing
-  View<S> time, start_gap;                ///< [N] each
-  View<S> contact_time, gap;              ///< [N] each, or, with normal and point, all empty: not asked for
-  View<S> normal[3], point[3];            ///< [N] each, or empty
+  View<std::uint8_t> outcome;   ///< [N] sums of kSweepHit, kSweepPushed, kSweepAgentClosing
+  View<S> time, start_gap;      ///< [N] each
+  View<S> contact_time, gap;    ///< [N] each, or, with normal and point, all empty: not asked for
+  View<S> normal[3], point[3];  ///< [N] each, or empty
 
   GSNAV_HD std::size_t size() const noexcept { return agents.begin.radius.size; }
   GSNAV_HD bool asks_for_contact() const noexcept { return !contact_time.empty(); }

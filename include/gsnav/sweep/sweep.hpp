@@ -7,10 +7,10 @@
 #include <string>
 
 #include "gsnav/core/backend.hpp"
+#include "gsnav/core/stages.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
 #include "gsnav/sweep/capsule_batch.hpp"
-#include "gsnav/core/stages.hpp"
 
 // One agent against many capsules: the outcome does not depend on the order of the capsules, equal
 // times and equal gaps are decided by (avatar, bone). And many pairs at once, on a backend.
@@ -27,7 +27,8 @@ GSNAV_HD Capsule<S> local_capsule(const Capsule<double>& c, const Vec3d& origin)
 template <class S>
 GSNAV_HD MovingCapsule<S> local_motion(const MovingCapsule<double>& m, double u0, double u1,
                                        const Vec3d& origin) noexcept {
-  return {local_capsule<S>(lerp(m.begin, m.end, u0), origin), local_capsule<S>(lerp(m.begin, m.end, u1), origin)};
+  return {local_capsule<S>(lerp(m.begin, m.end, u0), origin),
+          local_capsule<S>(lerp(m.begin, m.end, u1), origin)};
 }
 
 /// True where the boxes that two motions sweep are further apart than `margin`: they cannot touch.
@@ -65,8 +66,9 @@ struct FirstImpact {
 /// Sweeps `agent` over the part [u0, u1] of the bodies' motion and merges the outcome into `best`.
 /// Positions are made relative to the agent's start in double before they become S.
 template <class S = double>
-GSNAV_HD void first_impact(const MovingCapsule<double>& agent, View<const DynamicCapsule> bodies, double u0,
-                           double u1, const SweepRules<S>& rules, FirstImpact<S>& best) noexcept {
+GSNAV_HD void first_impact(const MovingCapsule<double>& agent, View<const DynamicCapsule> bodies,
+                           double u0, double u1, const SweepRules<S>& rules,
+                           FirstImpact<S>& best) noexcept {
   const Vec3d origin = agent.begin.p0;
   const MovingCapsule<S> a = detail::local_motion<S>(agent, 0.0, 1.0, origin);
   // Wider than any contact by far more than rounding: leaving a body out changes no bit.
@@ -75,8 +77,8 @@ GSNAV_HD void first_impact(const MovingCapsule<double>& agent, View<const Dynami
     if (detail::swept_apart(agent, body.motion, margin)) continue;
     const SweepResult<S> r = sweep(a, detail::local_motion<S>(body.motion, u0, u1, origin), rules);
     if (r.start_gap < S(0)) best.started_overlapping = true;
-    if (r.pushed && (!best.pushed || detail::id_less(body.avatar, body.bone, best.pushed_avatar,
-                                                     best.pushed_bone))) {
+    if (r.pushed && (!best.pushed ||
+                     detail::id_less(body.avatar, body.bone, best.pushed_avatar, best.pushed_bone))) {
       best.pushed = true;
       best.pushed_avatar = body.avatar;
       best.pushed_bone = body.bone;
@@ -102,8 +104,8 @@ GSNAV_HD void first_impact(const MovingCapsule<double>& agent, View<const Dynami
 struct Clearance {
   double distance = std::numeric_limits<double>::infinity();  ///< metres, negative: depth of overlap
   std::uint32_t avatar = 0, bone = 0;                         ///< meaningful where distance is finite
-  Vec3d on_agent{}, on_body{};  ///< points of the two surfaces, world
-  Vec3d normal{};               ///< unit, from the body to the agent
+  Vec3d on_agent{}, on_body{};                                ///< points of the two surfaces, world
+  Vec3d normal{};                                             ///< unit, from the body to the agent
 };
 
 /// Signed gap of a standing agent and the nearest body at the part u in [0, 1] of the bodies' motion,
@@ -139,8 +141,9 @@ class SizeCheck {
   template <class T>
   void operator()(const View<T>& view, const char* name) {
     if (!status_.ok() || view.size == want_) return;
-    status_ = {Errc::invalid_argument, std::string(args_) + "." + name + " has " + std::to_string(view.size) +
-                                           " values where " + std::to_string(want_) + " are needed"};
+    status_ = {Errc::invalid_argument, std::string(args_) + "." + name + " has " +
+                                           std::to_string(view.size) + " values where " +
+                                           std::to_string(want_) + " are needed"};
   }
   template <class T>
   void operator()(const View<T> (&views)[3], const char* name) {
@@ -163,8 +166,9 @@ class SizeCheck {
 
 }  // namespace detail
 
-/// Gaps of N pairs of capsules on a backend, whose memory the arrays are in (stage::CapsuleGaps). The bits are those of
-/// capsule_gap. The result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
+/// Gaps of N pairs of capsules on a backend, whose memory the arrays are in (stage::CapsuleGaps). The
+/// bits are those of capsule_gap. The result is there after `backend.synchronize()`. Errors:
+/// invalid_argument naming the array.
 template <Backend B, class S>
 Status capsule_gaps(B& backend, const CapsuleGapArgs<S>& args) {
   detail::SizeCheck check("CapsuleGapArgs", args.size());
@@ -180,8 +184,9 @@ Status capsule_gaps(B& backend, const CapsuleGapArgs<S>& args) {
   return {};
 }
 
-/// Sweeps of N pairs of moving capsules on a backend, whose memory the arrays are in (stage::SweepCapsules). The bits
-/// are those of sweep. The result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
+/// Sweeps of N pairs of moving capsules on a backend, whose memory the arrays are in
+/// (stage::SweepCapsules). The bits are those of sweep. The result is there after
+/// `backend.synchronize()`. Errors: invalid_argument naming the array.
 template <Backend B, class S>
 Status sweep_capsules(B& backend, const SweepArgs<S>& args) {
   detail::SizeCheck check("SweepArgs", args.size());

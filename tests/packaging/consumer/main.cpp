@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Touches each component that it was linked with, so that a missing link or header shows.
 #include <cstdio>
-#include <vector>
-
 #include <gsnav/backends/serial.hpp>
 #include <gsnav/gsnav.hpp>
+#include <vector>
 #if defined(WITH_OPENMP)
 #include <gsnav/backends/openmp.hpp>
 #endif
@@ -12,8 +11,8 @@
 #include <gsnav/detail/avatar/humanoid.hpp>
 #endif
 #if defined(WITH_IO)
-#include <gsnav/io/image_file.hpp>
 #include <gsnav/detail/io/sog.hpp>
+#include <gsnav/io/image_file.hpp>
 #endif
 #if defined(WITH_NAV)
 #include <gsnav/nav/navmesh_settings.hpp>

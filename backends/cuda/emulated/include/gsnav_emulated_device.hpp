@@ -8,14 +8,16 @@
 #include <type_traits>
 #include <utility>
 
-// Blocks of threads on the host: what device code finds around it when a C++ compiler has compiled it (docs/cuda.md).
+// Blocks of threads on the host: what device code finds around it when a C++ compiler has compiled it
+// (docs/cuda.md).
 
 struct CUstream_st;
 
 struct dim3 {
   unsigned x = 1, y = 1, z = 1;
   constexpr dim3() = default;
-  constexpr dim3(unsigned columns, unsigned rows = 1, unsigned layers = 1) : x(columns), y(rows), z(layers) {}
+  constexpr dim3(unsigned columns, unsigned rows = 1, unsigned layers = 1)
+      : x(columns), y(rows), z(layers) {}
 };
 
 namespace gsnav::emulated {
@@ -26,8 +28,9 @@ struct Gathered {
   int readers;
 };
 
-/// The calling thread's value among those of `mask`. Returns when all of them have called, for the same `what`. Ends
-/// the program, naming kernel, block and thread, where one of them has ended, is not there or has not named itself.
+/// The calling thread's value among those of `mask`. Returns when all of them have called, for the same
+/// `what`. Ends the program, naming kernel, block and thread, where one of them has ended, is not there
+/// or has not named itself.
 Gathered& gather(unsigned mask, std::uint64_t value, const char* what);
 
 /// Every thread of the block that has not ended waits for the others; the sum of their numbers.
@@ -36,7 +39,8 @@ int block_barrier(int number);
 /// A place where another thread may go on before this one.
 void interleave();
 
-/// Lets all others go on first, as far as they get. A loop that waits for what another thread writes has to call it.
+/// Lets all others go on first, as far as they get. A loop that waits for what another thread writes has
+/// to call it.
 void pause();
 
 /// Of the thread in its warp, and in its block.
@@ -53,7 +57,8 @@ struct Launch {
 };
 
 /// Runs every block of a grid, one after the other in an order that GSNAV_EMULATED_SEED decides.
-void run_grid(const Launch& launch, const char* name, void (*thread)(const void*), const void* arguments);
+void run_grid(const Launch& launch, const char* name, void (*thread)(const void*),
+              const void* arguments);
 
 /// False, with the error set that cudaGetLastError returns, where a device would refuse.
 bool accepts(const Launch& launch);
@@ -89,11 +94,12 @@ class Reading {
 template <class T>
 T shuffled(unsigned mask, const T& value, unsigned from, const char* what) {
   const Reading all(mask, bits_of_value(value), what);
-  return (mask >> from & 1u) != 0 ? value_of_bits<T>(all[from]) : value_of_bits<T>(0xdeadbeefdeadbeefull);
+  return (mask >> from & 1u) != 0 ? value_of_bits<T>(all[from])
+                                  : value_of_bits<T>(0xdeadbeefdeadbeefull);
 }
 
-/// Puts changed(*to) in place of *to, which it returns. One thread of the host runs all threads of a grid, so that nothing
-/// comes in between.
+/// Puts changed(*to) in place of *to, which it returns. One thread of the host runs all threads of a
+/// grid, so that nothing comes in between.
 template <class T, class F>
 T atomically(T* to, F changed) {
   interleave();
@@ -133,14 +139,17 @@ struct __attribute__((aligned(8))) uint2 {
 };
 
 inline void __syncthreads() { gsnav::emulated::block_barrier(0); }
-inline int __syncthreads_count(int predicate) { return gsnav::emulated::block_barrier(predicate != 0 ? 1 : 0); }
+inline int __syncthreads_count(int predicate) {
+  return gsnav::emulated::block_barrier(predicate != 0 ? 1 : 0);
+}
 inline int __syncthreads_or(int predicate) { return __syncthreads_count(predicate) != 0 ? 1 : 0; }
 
 inline void __syncwarp(unsigned mask = 0xffffffffu) { gsnav::emulated::Reading(mask, 0, "__syncwarp"); }
 template <class T>
 T __shfl_sync(unsigned mask, T value, int from, int width = 32) {
   const unsigned lane = gsnav::emulated::lane(), w = static_cast<unsigned>(width);
-  return gsnav::emulated::shuffled(mask, value, (lane & ~(w - 1)) | (static_cast<unsigned>(from) & (w - 1)), "__shfl_sync");
+  return gsnav::emulated::shuffled(
+      mask, value, (lane & ~(w - 1)) | (static_cast<unsigned>(from) & (w - 1)), "__shfl_sync");
 }
 template <class T>
 T __shfl_up_sync(unsigned mask, T value, unsigned delta, int width = 32) {
@@ -150,13 +159,15 @@ T __shfl_up_sync(unsigned mask, T value, unsigned delta, int width = 32) {
 template <class T>
 T __shfl_down_sync(unsigned mask, T value, unsigned delta, int width = 32) {
   const unsigned lane = gsnav::emulated::lane(), w = static_cast<unsigned>(width), in = lane & (w - 1);
-  return gsnav::emulated::shuffled(mask, value, in + delta < w ? lane + delta : lane, "__shfl_down_sync");
+  return gsnav::emulated::shuffled(mask, value, in + delta < w ? lane + delta : lane,
+                                   "__shfl_down_sync");
 }
 template <class T>
 T __shfl_xor_sync(unsigned mask, T value, int bits, int width = 32) {
   const unsigned lane = gsnav::emulated::lane(), w = static_cast<unsigned>(width);
   const unsigned other = lane ^ static_cast<unsigned>(bits);
-  return gsnav::emulated::shuffled(mask, value, (other & ~(w - 1)) <= lane ? other : lane, "__shfl_xor_sync");
+  return gsnav::emulated::shuffled(mask, value, (other & ~(w - 1)) <= lane ? other : lane,
+                                   "__shfl_xor_sync");
 }
 inline unsigned __ballot_sync(unsigned mask, int predicate) {
   const gsnav::emulated::Reading all(mask, predicate != 0, "__ballot_sync");
@@ -193,8 +204,14 @@ inline int __popc(unsigned bits) { return __builtin_popcount(bits); }
 inline int __ffs(int bits) { return __builtin_ffs(bits); }
 inline int __clz(int bits) { return bits == 0 ? 32 : __builtin_clz(static_cast<unsigned>(bits)); }
 inline float __uint_as_float(unsigned bits) { return gsnav::emulated::value_of_bits<float>(bits); }
-inline unsigned __float_as_uint(float value) { return static_cast<unsigned>(gsnav::emulated::bits_of_value(value)); }
+inline unsigned __float_as_uint(float value) {
+  return static_cast<unsigned>(gsnav::emulated::bits_of_value(value));
+}
 template <class T>
-T min(T a, std::type_identity_t<T> b) { return b < a ? b : a; }
+T min(T a, std::type_identity_t<T> b) {
+  return b < a ? b : a;
+}
 template <class T>
-T max(T a, std::type_identity_t<T> b) { return a < b ? b : a; }
+T max(T a, std::type_identity_t<T> b) {
+  return a < b ? b : a;
+}

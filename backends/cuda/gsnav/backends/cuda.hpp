@@ -8,6 +8,7 @@
 #include <string>
 
 #include "gsnav/core/backend.hpp"
+#include "gsnav/core/stages.hpp"
 #include "gsnav/detail/frame/blend.hpp"
 #include "gsnav/detail/frame/cut_depth.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
@@ -16,7 +17,6 @@
 #include "gsnav/render/render.hpp"
 #include "gsnav/render/render_composite.hpp"
 #include "gsnav/skin/skin.hpp"
-#include "gsnav/core/stages.hpp"
 
 struct CUevent_st;
 struct CUstream_st;
@@ -26,8 +26,11 @@ namespace gsnav {
 namespace cuda {
 class PinnedRing;
 
-/// The cubic of `fast` saves a CPU work; a GPU has an instruction that is faster yet and as good as degree 5.
-constexpr Exp2 device_exp2(Exp2 asked) noexcept { return asked == Exp2::degree3 ? Exp2::hardware : asked; }
+/// The cubic of `fast` saves a CPU work; a GPU has an instruction that is faster yet and as good as
+/// degree 5.
+constexpr Exp2 device_exp2(Exp2 asked) noexcept {
+  return asked == Exp2::degree3 ? Exp2::hardware : asked;
+}
 }  // namespace cuda
 
 class CudaBatchRenderer;
@@ -35,9 +38,9 @@ class CudaBatchRenderer;
 /// Device memory of one GPU.
 struct CudaSpace {};
 
-/// Runs on one NVIDIA GPU, by the same kernels as the CPU: keys and footprints, and float32 images of the profile
-/// `exact`, have the CPU's bits; images of `fast` differ by the CPU's exponential (docs/cuda.md). Work goes to one
-/// stream in order. Link gsnav::cuda; the header itself needs no CUDA.
+/// Runs on one NVIDIA GPU, by the same kernels as the CPU: keys and footprints, and float32 images of
+/// the profile `exact`, have the CPU's bits; images of `fast` differ by the CPU's exponential
+/// (docs/cuda.md). Work goes to one stream in order. Link gsnav::cuda; the header itself needs no CUDA.
 ///
 /// A call that the driver refuses is remembered and reported by the next `synchronize()`; what was asked
 /// for after it is not done.
@@ -62,8 +65,8 @@ class CudaBackend {
   /// Page-locked host memory; null where there is none.
   static void* allocate_host(std::size_t bytes) noexcept;
   static void deallocate_host(void* p) noexcept;
-  /// Copies to the device of up to 1 MiB never wait for the stream, and what is copied may change at once. Others
-  /// return early only from and to pinned memory.
+  /// Copies to the device of up to 1 MiB never wait for the stream, and what is copied may change at
+  /// once. Others return early only from and to pinned memory.
   void copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);
   void fill(void* p, unsigned char byte, std::size_t bytes);
   /// Defined where nvcc compiles (backends/cuda/device.cuh).
@@ -74,8 +77,8 @@ class CudaBackend {
   std::size_t concurrency() const noexcept { return 1; }
   int device() const noexcept { return device_; }
   CUstream_st* stream() const noexcept { return stream_; }
-  /// What the consumer's stream is given from now on waits for what this one has been given so far; the host does
-  /// not wait. For handing images over without a copy.
+  /// What the consumer's stream is given from now on waits for what this one has been given so far; the
+  /// host does not wait. For handing images over without a copy.
   void hand_over_to(CUstream_st* consumer);
   std::string device_name() const;
 
@@ -110,8 +113,18 @@ class CudaBackend {
   void scatter(const BinArgs<float>& args, const Cull& cull);
 
   /// Scratch that outlives a call, by use.
-  enum Slot { kCubTemp, kPerSplat, kPerTile, kSplatOffsets, kPairTiles, kPairSplats, kSkinJobs, kMeshPixels, kMeshLarge,
-              kScratchSlots };
+  enum Slot {
+    kCubTemp,
+    kPerSplat,
+    kPerTile,
+    kSplatOffsets,
+    kPairTiles,
+    kPairSplats,
+    kSkinJobs,
+    kMeshPixels,
+    kMeshLarge,
+    kScratchSlots
+  };
   struct Block {
     void* data = nullptr;
     std::size_t bytes = 0;
@@ -130,23 +143,25 @@ static_assert(Backend<CudaBackend>);
 
 #if !defined(__CUDACC__)
 // Compiled in gsnav::cuda: what a host compiler cannot.
-extern template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+extern template Status render_camera<float, CudaBackend>(CudaBackend&,
+                                                         RenderWorkspace<float, CudaBackend>&,
                                                          std::span<const GaussianSet>, const Camera&,
                                                          const RenderConfig&, const FrameImages<float>&,
                                                          RenderStats*);
-extern template Status render_composite<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
-                                                            std::span<const GaussianSet>, const MeshFrame&,
-                                                            const Camera&, const RenderConfig&,
-                                                            const FrameImages<float>&, RenderStats*);
-extern template Status detail::render_frame<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
-                                                                std::span<const GaussianSet>, const Camera&,
-                                                                const RenderConfig&, const MeshLayer<float>&,
-                                                                const FrameImages<float>&, RenderStats&);
+extern template Status render_composite<float, CudaBackend>(
+    CudaBackend&, RenderWorkspace<float, CudaBackend>&, std::span<const GaussianSet>, const MeshFrame&,
+    const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status detail::render_frame<float, CudaBackend>(
+    CudaBackend&, RenderWorkspace<float, CudaBackend>&, std::span<const GaussianSet>, const Camera&,
+    const RenderConfig&, const MeshLayer<float>&, const FrameImages<float>&, RenderStats&);
 extern template Status draw_meshes<float, CudaBackend>(CudaBackend&, MeshWorkspace<float, CudaBackend>&,
-                                                       std::span<const MeshInstance>, const Camera&, const MeshLight&,
-                                                       int, bool, MeshImages<float>, MeshStats*);
-extern template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
-extern template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
+                                                       std::span<const MeshInstance>, const Camera&,
+                                                       const MeshLight&, int, bool, MeshImages<float>,
+                                                       MeshStats*);
+extern template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&,
+                                                                 const SkinningArgs<float>&);
+extern template Status skin_all<float, CudaBackend, float>(CudaBackend&,
+                                                           std::span<const SkinningArgs<float>>);
 extern template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);
 extern template Status capsule_gaps<CudaBackend, float>(CudaBackend&, const CapsuleGapArgs<float>&);
 extern template Status capsule_gaps<CudaBackend, double>(CudaBackend&, const CapsuleGapArgs<double>&);

@@ -12,18 +12,18 @@
 #endif
 
 #include "gsnav/core/backend.hpp"
+#include "gsnav/core/stages.hpp"
 #include "gsnav/detail/core/host_memory.hpp"
 #include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/detail/frame/blend.hpp"
-#include "gsnav/sweep/capsule_batch.hpp"
 #include "gsnav/detail/frame/composite.hpp"
-#include "gsnav/skin/lbs.hpp"
-#include "gsnav/detail/mesh/mesh_shade.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/mesh/mesh_shade.hpp"
 #include "gsnav/render/render_composite.hpp"
+#include "gsnav/skin/lbs.hpp"
 #include "gsnav/skin/skin.hpp"
-#include "gsnav/core/stages.hpp"
+#include "gsnav/sweep/capsule_batch.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
 #include "gsnav/detail/lanes/kernels.hpp"
 #endif
@@ -68,8 +68,9 @@ inline const LaneKernels& lane_kernels() noexcept {
 #endif
 
 /// Runs on the processor's cores. float32 frames go through lane kernels; every other scalar through
-/// the generic ones. Results do not depend on the number of threads. The threads are a pool of the backend's
-/// own, which copies share (detail/core/thread_pool.hpp says what holds for them): OpenMP only tells how many.
+/// the generic ones. Results do not depend on the number of threads. The threads are a pool of the
+/// backend's own, which copies share (detail/core/thread_pool.hpp says what holds for them): OpenMP only
+/// tells how many.
 class OpenMPBackend : public HostMemory {
  public:
   /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS), without OpenMP the number of cores.
@@ -146,8 +147,12 @@ class OpenMPBackend : public HostMemory {
     parallel_for(n, Compiled{k, lane_kernels().shade_mesh_row});
   }
   void run(stage::Skin, const SkinningArgs<float>& args) { in_ranges(args, lane_kernels().skin_range); }
-  void run(stage::CapsuleGaps, const CapsuleGapArgs<float>& args) { in_ranges(args, lane_kernels().gap_range); }
-  void run(stage::SweepCapsules, const SweepArgs<float>& args) { in_ranges(args, lane_kernels().sweep_range); }
+  void run(stage::CapsuleGaps, const CapsuleGapArgs<float>& args) {
+    in_ranges(args, lane_kernels().gap_range);
+  }
+  void run(stage::SweepCapsules, const SweepArgs<float>& args) {
+    in_ranges(args, lane_kernels().sweep_range);
+  }
 
  private:
   /// A kernel as it was compiled for the processor's lanes.
@@ -186,18 +191,26 @@ static_assert(Backend<OpenMPBackend>);
 
 #if defined(GSNAV_OPENMP_COMPILED)
 // Compiled in gsnav::openmp: whoever renders or skins need not.
-extern template Status render_camera<float, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
-                       const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
-extern template Status render_composite<float, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
-                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&,
-                       RenderStats*);
-extern template Status render_camera<double, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<double, OpenMPBackend>&, std::span<const GaussianSet>,
-                       const Camera&, const RenderConfig&, const FrameImages<double>&, RenderStats*);
-extern template Status render_composite<double, OpenMPBackend>(OpenMPBackend&, RenderWorkspace<double, OpenMPBackend>&, std::span<const GaussianSet>,
-                       const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&,
-                       RenderStats*);
-extern template Status skin_gaussians<float, OpenMPBackend, float>(OpenMPBackend&, const SkinningArgs<float>&);
-extern template Status skin_all<float, OpenMPBackend, float>(OpenMPBackend&, std::span<const SkinningArgs<float>>);
+extern template Status render_camera<float, OpenMPBackend>(OpenMPBackend&,
+                                                           RenderWorkspace<float, OpenMPBackend>&,
+                                                           std::span<const GaussianSet>, const Camera&,
+                                                           const RenderConfig&,
+                                                           const FrameImages<float>&, RenderStats*);
+extern template Status render_composite<float, OpenMPBackend>(
+    OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
+    const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status render_camera<double, OpenMPBackend>(OpenMPBackend&,
+                                                            RenderWorkspace<double, OpenMPBackend>&,
+                                                            std::span<const GaussianSet>, const Camera&,
+                                                            const RenderConfig&,
+                                                            const FrameImages<double>&, RenderStats*);
+extern template Status render_composite<double, OpenMPBackend>(
+    OpenMPBackend&, RenderWorkspace<double, OpenMPBackend>&, std::span<const GaussianSet>,
+    const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&, RenderStats*);
+extern template Status skin_gaussians<float, OpenMPBackend, float>(OpenMPBackend&,
+                                                                   const SkinningArgs<float>&);
+extern template Status skin_all<float, OpenMPBackend, float>(OpenMPBackend&,
+                                                             std::span<const SkinningArgs<float>>);
 #endif
 
 }  // namespace gsnav

@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "gsnav/detail/avatar/foot_contact.hpp"
 #include "gsnav/avatar/motion.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/avatar/foot_contact.hpp"
 
 namespace gsnav {
 

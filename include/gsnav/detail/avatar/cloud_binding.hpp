@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "gsnav/avatar/asset.hpp"
+#include "gsnav/core/status.hpp"
 #include "gsnav/detail/avatar/mesh_avatar.hpp"
 #include "gsnav/detail/avatar/skinned_mesh.hpp"
 #include "gsnav/detail/avatar/weight_truncation.hpp"
-#include "gsnav/core/status.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 

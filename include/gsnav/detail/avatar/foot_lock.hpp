@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "gsnav/detail/avatar/foot_contact.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/avatar/foot_contact.hpp"
 
 namespace gsnav {
 

@@ -3,8 +3,8 @@
 
 #include <array>
 
-#include "gsnav/detail/avatar/retarget.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/avatar/retarget.hpp"
 
 namespace gsnav {
 

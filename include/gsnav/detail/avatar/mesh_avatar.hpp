@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "gsnav/avatar/asset.hpp"
+#include "gsnav/core/status.hpp"
 #include "gsnav/detail/avatar/skinned_mesh.hpp"
 #include "gsnav/detail/avatar/weight_truncation.hpp"
-#include "gsnav/core/status.hpp"
 
 namespace gsnav {
 

@@ -9,8 +9,8 @@
 
 #include "gsnav/avatar/skeleton.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/math/vec.hpp"
 #include "gsnav/detail/scene/surface_material.hpp"
+#include "gsnav/math/vec.hpp"
 
 namespace gsnav {
 

@@ -39,7 +39,9 @@ struct SortBlocks {
     return static_cast<std::size_t>((place * inverse) >> 32);
   }
   GSNAV_HD std::size_t begin(std::size_t block) const noexcept {
-    return block == blocks ? size : static_cast<std::size_t>(((std::uint64_t{block} << 32) + inverse - 1) / inverse);
+    return block == blocks
+               ? size
+               : static_cast<std::size_t>(((std::uint64_t{block} << 32) + inverse - 1) / inverse);
   }
 };
 
@@ -122,8 +124,8 @@ struct RadixOffsets {
   }
 };
 
-/// Moves a block's records to their places by one digit, and counts the next digit by the block that a record
-/// comes to lie in: no pass reads its records twice.
+/// Moves a block's records to their places by one digit, and counts the next digit by the block that a
+/// record comes to lie in: no pass reads its records twice.
 template <class Source>
 struct RadixScatter {
   Source source;
@@ -168,8 +170,8 @@ struct RadixFinish {
 template <Backend B>
 struct SortScratch {
   explicit SortScratch(B& b) : keys(b), values(b), first(b), second(b), counts(b), cursors(b), used(b) {}
-  Buffer<std::uint32_t, B> keys, values;     ///< where sort_pairs puts the result before it swaps
-  Buffer<std::uint64_t, B> first, second;    ///< records between passes
+  Buffer<std::uint32_t, B> keys, values;   ///< where sort_pairs puts the result before it swaps
+  Buffer<std::uint64_t, B> first, second;  ///< records between passes
   Buffer<std::uint32_t, B> counts, cursors, used;
 
   /// f(a.member, b.member) for each buffer.
@@ -188,14 +190,18 @@ std::size_t sort_blocks(const B& backend, std::size_t n) noexcept {
   return n / kLeast + 1 < blocks ? n / kLeast + 1 : blocks;
 }
 
-/// Sorts what `source` gives, cut into the blocks of `cut`, by the lowest `bits` of the key (the others zero),
-/// stably, to `keys` and `values`; 1 to 2^32 - 1 pairs. LSD radix in as many passes as the keys in use need.
+/// Sorts what `source` gives, cut into the blocks of `cut`, by the lowest `bits` of the key (the others
+/// zero), stably, to `keys` and `values`; 1 to 2^32 - 1 pairs. LSD radix in as many passes as the keys
+/// in use need.
 template <class Source, Backend B>
-void sort_from(B& backend, const Source& source, const detail::SortBlocks& cut, int bits, SortScratch<B>& s,
-               View<std::uint32_t> keys, View<std::uint32_t> values) {
-  // Two passes where they do; a digit of 9 bits else, whose 512 write positions stay in the nearest cache.
+void sort_from(B& backend, const Source& source, const detail::SortBlocks& cut, int bits,
+               SortScratch<B>& s, View<std::uint32_t> keys, View<std::uint32_t> values) {
+  // Two passes where they do; a digit of 9 bits else, whose 512 write positions stay in the nearest
+  // cache.
   const int digit_bits = bits <= 22 ? (bits + 1) / 2 : 9;
-  const auto digit = [digit_bits](int pass) { return detail::RadixDigit{pass * digit_bits, digit_bits}; };
+  const auto digit = [digit_bits](int pass) {
+    return detail::RadixDigit{pass * digit_bits, digit_bits};
+  };
   const std::size_t row = cut.blocks * digit(0).size();
   s.first.resize_discard(cut.size);
   s.second.resize_discard(cut.size);
@@ -203,8 +209,8 @@ void sort_from(B& backend, const Source& source, const detail::SortBlocks& cut, 
   s.cursors.resize_discard(row);
   s.used.resize_discard(cut.blocks);
 
-  backend.parallel_for(cut.blocks,
-                       detail::RadixCount<Source>{source, cut, digit(0), s.counts.view(), s.used.view()});
+  backend.parallel_for(
+      cut.blocks, detail::RadixCount<Source>{source, cut, digit(0), s.counts.view(), s.used.view()});
   std::array<std::uint32_t, 64> used{};
   s.used.download(used.data(), cut.blocks);
   backend.synchronize().throw_if_error();
@@ -217,9 +223,9 @@ void sort_from(B& backend, const Source& source, const detail::SortBlocks& cut, 
     using From = std::remove_cvref_t<decltype(from)>;
     backend.parallel_for(1, detail::RadixOffsets{cut, digit(pass), s.counts.view(), s.cursors.view()});
     if (pass + 1 < passes) {
-      backend.parallel_for(cut.blocks, detail::RadixScatter<From>{from, cut, digit(pass), digit(pass + 1),
-                                                                  s.cursors.view(), s.counts.view(),
-                                                                  s.second.view()});
+      backend.parallel_for(
+          cut.blocks, detail::RadixScatter<From>{from, cut, digit(pass), digit(pass + 1),
+                                                 s.cursors.view(), s.counts.view(), s.second.view()});
       std::swap(s.first, s.second);
     } else {
       backend.parallel_for(cut.blocks,
@@ -230,8 +236,8 @@ void sort_from(B& backend, const Source& source, const detail::SortBlocks& cut, 
   for (int pass = 1; pass < passes; ++pass) run_pass(detail::RecordSource{s.first.view(), cut}, pass);
 }
 
-/// Sorts (key, value) pairs by the lowest `bits` of the key (the others zero), stably; fewer than 2^32 of
-/// them.
+/// Sorts (key, value) pairs by the lowest `bits` of the key (the others zero), stably; fewer than 2^32
+/// of them.
 template <Backend B>
 void sort_pairs(B& backend, Buffer<std::uint32_t, B>& keys, Buffer<std::uint32_t, B>& values,
                 SortScratch<B>& scratch, int bits = 32) {
@@ -240,9 +246,9 @@ void sort_pairs(B& backend, Buffer<std::uint32_t, B>& keys, Buffer<std::uint32_t
   scratch.keys.resize_discard(n);
   scratch.values.resize_discard(n);
   bool in_scratch = true;
-  if constexpr (requires(std::uint32_t* p) { backend.sort_pairs(p, p, p, p, n, bits); }) {
-    in_scratch = backend.sort_pairs(keys.data(), values.data(), scratch.keys.data(), scratch.values.data(), n,
-                                    bits);
+  if constexpr (requires(std::uint32_t * p) { backend.sort_pairs(p, p, p, p, n, bits); }) {
+    in_scratch = backend.sort_pairs(keys.data(), values.data(), scratch.keys.data(),
+                                    scratch.values.data(), n, bits);
   } else {
     const auto cut = detail::SortBlocks::of(n, sort_blocks(backend, n));
     sort_from(backend, detail::PairSource{keys.view(), values.view(), cut}, cut, bits, scratch,

@@ -12,12 +12,12 @@
 
 namespace gsnav {
 
-/// Moves rows of `stride` values each, on all threads: row i becomes what row order[i] was. Wide rows go by columns
-/// through `room`, so that a scene's largest array is not there twice: fresh memory costs more than moving does. `room`
-/// may be used again.
+/// Moves rows of `stride` values each, on all threads: row i becomes what row order[i] was. Wide rows go
+/// by columns through `room`, so that a scene's largest array is not there twice: fresh memory costs
+/// more than moving does. `room` may be used again.
 template <Backend B, class T>
-void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t stride, std::vector<T>& values,
-                  std::vector<T>& room) {
+void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t stride,
+                  std::vector<T>& values, std::vector<T>& room) {
   static_assert(is_host_backend<B>);
   constexpr std::size_t kColumns = 9;  // a fifth of SH of degree 3
   if (values.empty()) return;
@@ -46,7 +46,8 @@ void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t 
   if (width == stride) values.swap(room);
 }
 template <Backend B, class T>
-void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t stride, std::vector<T>& values) {
+void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t stride,
+                  std::vector<T>& values) {
   std::vector<T> room;
   permute_rows(backend, order, stride, values, room);
 }

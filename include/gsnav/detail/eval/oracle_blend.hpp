@@ -24,11 +24,11 @@ struct OraclePixel {
   std::uint32_t blended = 0, last_rank = 0;
   bool closed = false, undecided = false, undecided_depth = false, order_flip = false;
 
-  /// Blends one Gaussian: 2^log2_alpha is its alpha before max_alpha, depth() its depth along the ray, `mesh` how far
-  /// the mesh is.
+  /// Blends one Gaussian: 2^log2_alpha is its alpha before max_alpha, depth() its depth along the ray,
+  /// `mesh` how far the mesh is.
   template <class Depth>
-  void blend(const OracleRules& rules, double log2_alpha, const Vec3d& c, std::uint32_t rank, double mesh,
-             const Depth& depth) noexcept {
+  void blend(const OracleRules& rules, double log2_alpha, const Vec3d& c, std::uint32_t rank,
+             double mesh, const Depth& depth) noexcept {
     const double excess = log2_alpha - rules.log2_alpha_min;
     if (is_finite(mesh)) {
       const double beyond = depth() - mesh;
@@ -49,7 +49,8 @@ struct OraclePixel {
     const double open = 1 - rules.first_hit_tau;
     if (before > 0.5 && transmittance <= 0.5) median = z;
     if (before > open && transmittance <= open) first_hit = z;
-    if (abs(transmittance - 0.5) < kUndecidedCrossing || abs(transmittance - open) < kUndecidedCrossing) {
+    if (abs(transmittance - 0.5) < kUndecidedCrossing ||
+        abs(transmittance - open) < kUndecidedCrossing) {
       undecided_depth = true;
     }
     const double stop = rules.transmittance_min;
@@ -78,7 +79,8 @@ struct OraclePixel {
     accumulated += weight * f.depth;
     if (before > 0.5 && transmittance <= 0.5) median = f.depth;
     if (before > open && transmittance <= open) first_hit = f.depth;
-    for (const double at : {0.5, open}) undecided_depth = undecided_depth || abs(transmittance - at) < kUndecidedCrossing;
+    for (const double at : {0.5, open})
+      undecided_depth = undecided_depth || abs(transmittance - at) < kUndecidedCrossing;
     undecided = undecided || abs(transmittance - stop) < kUndecidedRelative * stop;
     closed = closed || transmittance < stop;
     last_rank = 0;  // another list begins
@@ -106,8 +108,8 @@ struct OracleSpan {
       : x0(s.boxed ? r.box.x0 : s.rect.x0), x1(s.boxed ? r.box.x1 : s.rect.x1) {}
 };
 
-/// Blends a pixel that has fragments: each Gaussian lies before, between or behind them by its depth along the ray; of
-/// those between the same two the order of `list` holds.
+/// Blends a pixel that has fragments: each Gaussian lies before, between or behind them by its depth
+/// along the ray; of those between the same two the order of `list` holds.
 template <class Model>
 void blend_among(const OracleScene<Model>& scene, View<const std::uint32_t> list, int x, int y,
                  const std::vector<OracleFragment>& fragments, OraclePixel& pixel) {
@@ -132,7 +134,8 @@ void blend_among(const OracleScene<Model>& scene, View<const std::uint32_t> list
     }
     met.push_back(m);
   }
-  std::stable_sort(met.begin(), met.end(), [](const Met& a, const Met& b) { return a.behind < b.behind; });
+  std::stable_sort(met.begin(), met.end(),
+                   [](const Met& a, const Met& b) { return a.behind < b.behind; });
   std::size_t next = 0;
   for (std::size_t k = 0; k <= fragments.size(); ++k) {
     for (; next < met.size() && met[next].behind == k; ++next) {
@@ -207,7 +210,8 @@ void blend_per_ray(const OracleScene<Model>& scene, View<const std::uint32_t> li
       ++last;
     }
     fragments.resize(begin[last]);
-    const int strip0 = scene.rect.x0 + static_cast<int>(first), strip1 = scene.rect.x0 + static_cast<int>(last);
+    const int strip0 = scene.rect.x0 + static_cast<int>(first),
+              strip1 = scene.rect.x0 + static_cast<int>(last);
     const double py = y + 0.5;
     for (std::size_t i = 0; i < list.size; ++i) {
       const OracleRecord<Model>& r = scene.records[list[i]];
@@ -215,8 +219,8 @@ void blend_per_ray(const OracleScene<Model>& scene, View<const std::uint32_t> li
       for (int x = std::max(span.x0, strip0); x < std::min(span.x1, strip1); ++x) {
         const double px = x + 0.5, log2_alpha = r.model.log2_alpha(px, py);
         if (!(log2_alpha >= scene.log2_cut)) continue;
-        fragments[end[static_cast<std::size_t>(x - scene.rect.x0)]++] = {r.model.depth(px, py), log2_alpha,
-                                                                        list[i], r.id};
+        fragments[end[static_cast<std::size_t>(x - scene.rect.x0)]++] = {r.model.depth(px, py),
+                                                                         log2_alpha, list[i], r.id};
       }
     }
     for (std::size_t p = first; p < last; ++p) {
@@ -228,7 +232,8 @@ void blend_per_ray(const OracleScene<Model>& scene, View<const std::uint32_t> li
       for (auto f = from; f != to && !pixels[p].closed; ++f) {
         const OracleRecord<Model>& r = scene.records[f->record];
         pixels[p].blend(scene.rules, f->log2_alpha, r.color, r.rank,
-                        scene.mesh_depth(scene.rect.x0 + static_cast<int>(p), y), [&] { return f->depth; });
+                        scene.mesh_depth(scene.rect.x0 + static_cast<int>(p), y),
+                        [&] { return f->depth; });
       }
     }
   }
@@ -302,7 +307,8 @@ class RowLists {
   struct Rows {
     int from, to;
   };
-  Rows rows_of(const OracleScene<Model>& scene, const OracleRecord<Model>& r, int y_limit) const noexcept {
+  Rows rows_of(const OracleScene<Model>& scene, const OracleRecord<Model>& r,
+               int y_limit) const noexcept {
     return {std::max(scene.boxed ? r.box.y0 : scene.rect.y0, y0_),
             std::min(scene.boxed ? r.box.y1 : scene.rect.y1, y_limit)};
   }

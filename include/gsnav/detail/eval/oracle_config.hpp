@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/image/camera.hpp"
 #include "gsnav/frame/gaussians.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/render/render.hpp"
 #include "gsnav/render/render_config.hpp"
 
@@ -69,13 +69,14 @@ struct OracleConfig {
   /// `untruncated` with boxes leaves alpha < kNegligibleAlpha out.
   bool boxed = true;
   PixelRect crop{};  ///< what to render of the camera's image; all 0: everything
-  /// Hides the Gaussians behind it and closes its pixels (docs/composition.md). Null: none. Must outlive the call.
+  /// Hides the Gaussians behind it and closes its pixels (docs/composition.md). Null: none. Must outlive
+  /// the call.
   const OracleMesh* mesh = nullptr;
 };
 
-/// Below this the boxes of OracleKind::untruncated leave a Gaussian out. A pixel's colour is linear in each
-/// alpha with a slope of at most c, the largest colour component (background included), so n Gaussians
-/// left out move it by less than n c 2^-40 and its alpha by n 2^-40: 9.1e-7 c for a million.
+/// Below this the boxes of OracleKind::untruncated leave a Gaussian out. A pixel's colour is linear in
+/// each alpha with a slope of at most c, the largest colour component (background included), so n
+/// Gaussians left out move it by less than n c 2^-40 and its alpha by n 2^-40: 9.1e-7 c for a million.
 inline constexpr double kLog2NegligibleAlpha = -40;
 inline constexpr double kNegligibleAlpha = 0x1p-40;
 
@@ -118,9 +119,9 @@ struct OracleFrames {
   std::vector<std::uint8_t> undecided;
   /// A Gaussian takes T within kUndecidedCrossing of 1/2 or of 1 - first_hit_tau.
   std::vector<std::uint8_t> undecided_depth;
-  /// The Gaussians blended here stand in another order by float64 (where the image is by the float32 key)
-  /// or by the float32 key (where it is by anything else). Exact: a list is out of order if and only if
-  /// two neighbours in it are.
+  /// The Gaussians blended here stand in another order by float64 (where the image is by the float32
+  /// key) or by the float32 key (where it is by anything else). Exact: a list is out of order if and
+  /// only if two neighbours in it are.
   std::vector<std::uint8_t> order_flip;
   OracleCounts counts;
 
@@ -145,9 +146,11 @@ inline Status validate(const OracleConfig& c, const Camera& camera) {
             "response"};
   }
   if (c.rules.compat != Compat::none) {
-    return {Errc::unsupported, "OracleConfig.rules.compat: no kind of oracle has other renderers' rules"};
+    return {Errc::unsupported,
+            "OracleConfig.rules.compat: no kind of oracle has other renderers' rules"};
   }
-  const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   if (c.mesh != nullptr && (c.mesh->depth.size() != pixels || c.mesh->rgb.size() != 3 * pixels)) {
     return {Errc::invalid_argument, "OracleConfig.mesh: its planes are not of the camera's image"};
   }
@@ -156,16 +159,17 @@ inline Status validate(const OracleConfig& c, const Camera& camera) {
       return {Errc::invalid_argument, "OracleConfig.mesh.fragments: not of the camera's image"};
     }
     if (c.kind == OracleKind::ray || c.order == OracleOrder::per_ray) {
-      return {Errc::unsupported, "OracleConfig.mesh.fragments: among Gaussians in the order of keys only"};
+      return {Errc::unsupported,
+              "OracleConfig.mesh.fragments: among Gaussians in the order of keys only"};
     }
   }
   const PixelRect& r = c.crop;
   const bool whole = r.x0 == 0 && r.y0 == 0 && r.x1 == 0 && r.y1 == 0;
   if (!whole && (r.empty() || r.x0 < 0 || r.y0 < 0 || r.x1 > camera.width || r.y1 > camera.height)) {
-    return {Errc::invalid_argument,
-            std::string("OracleConfig.crop = [") + std::to_string(r.x0) + ", " + std::to_string(r.x1) +
-                ") x [" + std::to_string(r.y0) + ", " + std::to_string(r.y1) +
-                "): must hold a pixel and lie inside the image, or be all 0"};
+    return {Errc::invalid_argument, std::string("OracleConfig.crop = [") + std::to_string(r.x0) + ", " +
+                                        std::to_string(r.x1) + ") x [" + std::to_string(r.y0) + ", " +
+                                        std::to_string(r.y1) +
+                                        "): must hold a pixel and lie inside the image, or be all 0"};
   }
   return {};
 }

@@ -9,10 +9,10 @@
 #include <cstdint>
 
 #include "gsnav/detail/eval/oracle_config.hpp"
-#include "gsnav/image/camera.hpp"
-#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/detail/math/half.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/render/render_config.hpp"
 

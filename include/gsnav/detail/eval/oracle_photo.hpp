@@ -91,16 +91,18 @@ class PhotoReducer {
 /// O_photo(k): what a sensor that integrates over its pixels sees. The oracle of `config` at k times the
 /// resolution (in [1, 16]; each pixel k x k), reduced to the camera's own. Per k x k block:
 ///  - colour, alpha and accumulated depth: the mean;
-///  - median, expected and first-hit depth: the median of the samples that have a return (the lower of two
+///  - median, expected and first-hit depth: the median of the samples that have a return (the lower of
+///  two
 ///    middle ones: a depth that was seen), 0 where less than half of the samples have one;
 ///  - masks: set where any sample's is.
 /// `config.crop` is in pixels of `camera`; counts are those of the fine image. Works in bands of rows of
 /// about 2^20 fine pixels: 90 MB above what oracle_render needs.
 /// Errors: those of oracle_render; invalid_argument where k or k times the image is too large.
 template <Backend B>
-  requires is_host_backend<B>
-Result<OracleFrames> oracle_photo(B& backend, std::span<const GaussianSet> sets, const Camera& camera, int k,
-                                  OracleConfig config = {}) {
+requires is_host_backend<B> Result<OracleFrames> oracle_photo(B& backend,
+                                                              std::span<const GaussianSet> sets,
+                                                              const Camera& camera, int k,
+                                                              OracleConfig config = {}) {
   if (Status s = validate(config, camera); !s) return s;
   if (config.mesh != nullptr) {
     return Status(Errc::unsupported, "OracleConfig.mesh: its planes have the image's resolution only");

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
-#include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/core/view.hpp"
+#include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/eval/oracle_config.hpp"
 #include "gsnav/detail/eval/oracle_gaussian.hpp"
 

@@ -7,9 +7,9 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/frame/depth.hpp"
-#include "gsnav/detail/image/mesh_layer.hpp"
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/image/mesh_layer.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {
@@ -23,8 +23,7 @@ enum Output : unsigned {
   kAccumulatedDepth = 1u << 4,  ///< [H][W] metres, sum(w z)
   kFirstHitDepth = 1u << 5,     ///< [H][W] metres, where alpha first reaches first_hit_tau; 0: never
 };
-inline constexpr unsigned kAnyDepth =
-    kMedianDepth | kExpectedDepth | kAccumulatedDepth | kFirstHitDepth;
+inline constexpr unsigned kAnyDepth = kMedianDepth | kExpectedDepth | kAccumulatedDepth | kFirstHitDepth;
 
 /// The rules of blending, in the scalar of the kernel.
 template <class S>
@@ -33,21 +32,22 @@ struct BlendRules {
   S transmittance_min{S(1e-4)};  ///< a pixel is closed by the Gaussian that takes T below this
   S first_hit_tau{S(0.5)};
   S log2_alpha_min{S(-7.9943534368588579)};  ///< log2 of the smallest alpha that is blended
-  S return_alpha{S(0)};          ///< expected depth has no return where alpha is not above this
-  bool exclusive_stop = false;   ///< the Gaussian that closes a pixel is not blended (Compat)
+  S return_alpha{S(0)};         ///< expected depth has no return where alpha is not above this
+  bool exclusive_stop = false;  ///< the Gaussian that closes a pixel is not blended (Compat)
 };
 
 /// Which depth images a compiled blend loop serves; less is cheaper.
 enum class DepthMode { none, median, any };
 
-/// Transmittance of a pixel (or a pack of them) before and after a splat or a surface, and the weight that this
-/// has in the sums: before - after where it is blended, else 0.
+/// Transmittance of a pixel (or a pack of them) before and after a splat or a surface, and the weight
+/// that this has in the sums: before - after where it is blended, else 0.
 template <class L>
 struct TransmittanceStep {
   L before, after, weight;
 };
 
-/// Whether transmittance goes from above a level to the level or below it: what decides median and first-hit depth.
+/// Whether transmittance goes from above a level to the level or below it: what decides median and
+/// first-hit depth.
 template <class L>
 GSNAV_HD mask_of<L> falls_through(L before, L after, scalar_of<L> level) noexcept {
   return (before > L(level)) && (after <= L(level));
@@ -57,8 +57,9 @@ GSNAV_HD mask_of<L> falls_through(L before, L after, scalar_of<L> level) noexcep
 template <class S>
 inline constexpr S kMedianLevel = S(0.5);
 
-/// The depths of one pixel (or a pack of them) that a DepthMode keeps. `accumulate` adds what lies at depth z(),
-/// metres; z is called only where it is needed. Where the weight is 0, z() may be any finite number.
+/// The depths of one pixel (or a pack of them) that a DepthMode keeps. `accumulate` adds what lies at
+/// depth z(), metres; z is called only where it is needed. Where the weight is 0, z() may be any finite
+/// number.
 template <class L, DepthMode D>
 struct DepthState {
   template <class Z>
@@ -82,7 +83,8 @@ struct DepthState<L, DepthMode::any> {
   L first_hit{scalar_of<L>(0)};
 
   template <class Z>
-  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L> first_hit_tau, const Z& z_of) noexcept {
+  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L> first_hit_tau,
+                           const Z& z_of) noexcept {
     using S = scalar_of<L>;
     const L z = z_of();
     median = select(falls_through(step.before, step.after, kMedianLevel<S>), z, median);
@@ -92,8 +94,9 @@ struct DepthState<L, DepthMode::any> {
   }
 };
 
-/// The number of the splat that the median depth is of, for loops that compute one depth a pixel: the last one that
-/// is met while transmittance is above kMedianLevel, if transmittance falls through that level at all.
+/// The number of the splat that the median depth is of, for loops that compute one depth a pixel: the
+/// last one that is met while transmittance is above kMedianLevel, if transmittance falls through that
+/// level at all.
 template <class L, class Id>
 GSNAV_HD Id last_above_half(L before, Id met, Id last) noexcept {
   return select(before > L(kMedianLevel<scalar_of<L>>), met, last);
@@ -117,7 +120,8 @@ template <class L, DepthMode D>
 struct BlendState : BlendColor<L>, DepthState<L, D> {
   /// Adds what has color() and lies at depth z(); each is called only where it is needed.
   template <bool Color, class C, class Z>
-  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L> first_hit_tau, const C& color, const Z& z) noexcept {
+  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L> first_hit_tau, const C& color,
+                           const Z& z) noexcept {
     if constexpr (Color) {
       const Vec3<L> c = color();
       this->r = fma(step.weight, c.x, this->r);
@@ -157,9 +161,11 @@ GSNAV_HD L column_exponent(const ColumnTerms<L>& terms, L ref_y, L b, L py) noex
   return fma(-w2, w2, terms.column);
 }
 
-/// log2 alpha where the response is not linearised (Response): far below any that is drawn behind the camera.
+/// log2 alpha where the response is not linearised (Response): far below any that is drawn behind the
+/// camera.
 template <class L, class S>
-GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspective<S>& v, L px, L py) noexcept {
+GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspective<S>& v, L px,
+                                L py) noexcept {
   const L dx = px - L(g.ref_x), dy = py - L(g.ref_y);
   const L w1 = fma(dx, L(g.a), L(g.w1));
   const L w2 = fma(dy, L(g.b), fma(dx, L(g.k), L(g.w2)));
@@ -206,9 +212,9 @@ GSNAV_HD L footprint_alpha(const BlendRules<S>& rules, L exponent) noexcept {
   return select(in_footprint(rules, exponent), alpha_in_footprint<M>(rules, exponent), L(S(0)));
 }
 
-/// Blends one splat onto the pixels that are `drawn`, open ones of its footprint, where it has `alpha`. (px, py): pixel
-/// centres. Other pixels keep their state bit for bit. `General` obeys rules.exclusive_stop: a pixel that it closed
-/// keeps its transmittance, negated.
+/// Blends one splat onto the pixels that are `drawn`, open ones of its footprint, where it has `alpha`.
+/// (px, py): pixel centres. Other pixels keep their state bit for bit. `General` obeys
+/// rules.exclusive_stop: a pixel that it closed keeps its transmittance, negated.
 template <bool Color, DepthMode D, bool General, class L, class S>
 GSNAV_HD void blend_drawn(BlendState<L, D>& state, const BlendRules<S>& rules, mask_of<L> drawn, L alpha,
                           const SplatColor<S>* color, const SplatDepth<S>* depth, L px, L py) noexcept {
@@ -226,14 +232,16 @@ GSNAV_HD void blend_drawn(BlendState<L, D>& state, const BlendRules<S>& rules, m
   }
   state.template accumulate<Color>(
       TransmittanceStep<L>{before, after, weight}, rules.first_hit_tau,
-      [&]() GSNAV_INLINED { return Vec3<L>{L(color->r), L(color->g), L(color->b)}; },
+      [&]() GSNAV_INLINED {
+        return Vec3<L>{L(color->r), L(color->g), L(color->b)};
+      },
       [&]() GSNAV_INLINED { return ray_depth(*depth, px, py); });
 }
 
 /// The same for an alpha that is 0 outside the footprint.
 template <bool Color, DepthMode D, bool General, class L, class S>
-GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha, const SplatColor<S>* color,
-                          const SplatDepth<S>* depth, L px, L py) noexcept {
+GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha,
+                          const SplatColor<S>* color, const SplatDepth<S>* depth, L px, L py) noexcept {
   blend_drawn<Color, D, General>(state, rules, state.open(rules), alpha, color, depth, px, py);
 }
 
@@ -273,7 +281,8 @@ struct FrameImages {
   S* first_hit_depth = nullptr;
 
   GSNAV_HD DepthMode depth_mode() const noexcept {
-    if (expected_depth != nullptr || accumulated_depth != nullptr || first_hit_depth != nullptr) return DepthMode::any;
+    if (expected_depth != nullptr || accumulated_depth != nullptr || first_hit_depth != nullptr)
+      return DepthMode::any;
     return median_depth != nullptr ? DepthMode::median : DepthMode::none;
   }
   bool operator==(const FrameImages&) const = default;
@@ -282,8 +291,8 @@ struct FrameImages {
 /// Where tiles are kept between the slices of depth that a frame is blended in.
 template <class S>
 struct TileProgress {
-  View<std::uint64_t> open;  ///< [tiles]: bits of cells (OpenCells) in row order, 0 where the pixels are written.
-                             ///< Empty: one slice is all
+  View<std::uint64_t> open;  ///< [tiles]: bits of cells (OpenCells) in row order, 0 where the pixels are
+                             ///< written. Empty: one slice is all
   View<S> states;            ///< [tiles][blend_state_values * pixels of a tile]
   bool first = true, last = true;
 };
@@ -300,8 +309,8 @@ struct RasterArgs {
   View<const std::uint64_t> tile_offsets;  ///< [tiles + 1]
   View<const std::uint32_t> tile_splats;   ///< per tile, front to back
   View<const SplatGeometry<S>> geometry;
-  View<const SplatColor<S>> colors;        ///< empty: no colour asked for
-  View<const SplatDepth<S>> depths;        ///< empty: no depth asked for
+  View<const SplatColor<S>> colors;              ///< empty: no colour asked for
+  View<const SplatDepth<S>> depths;              ///< empty: no depth asked for
   View<const SplatPerspective<S>> perspectives;  ///< empty: Response::ewa
   BlendRules<S> rules;
   Vec3<S> background;
@@ -330,7 +339,8 @@ GSNAV_HD L pixel_alpha(const BlendColor<L>& state) noexcept {
   return L(scalar_of<L>(1)) - abs(state.transmittance);
 }
 template <class S, class L>
-GSNAV_HD L pixel_expected_depth(const RasterArgs<S>& args, const BlendState<L, DepthMode::any>& state) noexcept {
+GSNAV_HD L pixel_expected_depth(const RasterArgs<S>& args,
+                                const BlendState<L, DepthMode::any>& state) noexcept {
   const L alpha = pixel_alpha(state), one(S(1)), zero(S(0));
   const auto returned = alpha > L(args.rules.return_alpha);
   return select(returned, state.accumulated / select(returned, alpha, one) + state.z_ref, zero);
@@ -419,8 +429,8 @@ struct RasterizePixel {
   }
 };
 
-/// Calls f with compile-time <Color, DepthMode, Exp2, General> for what `args` asks for. General: a response
-/// other than Response::ewa, or an exclusive stop; the cubic exp2 does not serve these.
+/// Calls f with compile-time <Color, DepthMode, Exp2, General> for what `args` asks for. General: a
+/// response other than Response::ewa, or an exclusive stop; the cubic exp2 does not serve these.
 template <class S, class F>
 void dispatch_raster(const RasterArgs<S>& args, const F& f) {
   const auto with_exp2 = [&]<bool C, DepthMode D>() {
@@ -434,9 +444,12 @@ void dispatch_raster(const RasterArgs<S>& args, const F& f) {
   };
   const auto with_depth = [&]<bool C>() {
     switch (args.depth_mode()) {
-      case DepthMode::none: return with_exp2.template operator()<C, DepthMode::none>();
-      case DepthMode::median: return with_exp2.template operator()<C, DepthMode::median>();
-      case DepthMode::any: return with_exp2.template operator()<C, DepthMode::any>();
+      case DepthMode::none:
+        return with_exp2.template operator()<C, DepthMode::none>();
+      case DepthMode::median:
+        return with_exp2.template operator()<C, DepthMode::median>();
+      case DepthMode::any:
+        return with_exp2.template operator()<C, DepthMode::any>();
     }
   };
   if (args.images.rgb != nullptr) {

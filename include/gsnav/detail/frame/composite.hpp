@@ -5,15 +5,16 @@
 #include <cstdint>
 
 #include "gsnav/detail/frame/blend.hpp"
-#include "gsnav/detail/image/mesh_layer.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/image/mesh_layer.hpp"
 
 // Gaussians and meshes in one image (docs/composition.md). Frames without a mesh run none of this.
 
 namespace gsnav {
 
-/// alpha where a splat lies before the mesh at depth `mesh`, 0 where it lies behind. A splat is looked at closely
-/// only where its reach spans the mesh: its depth along a ray is within it, also when rounded.
+/// alpha where a splat lies before the mesh at depth `mesh`, 0 where it lies behind. A splat is looked
+/// at closely only where its reach spans the mesh: its depth along a ray is within it, also when
+/// rounded.
 template <class L, class S>
 GSNAV_HD L alpha_before_mesh(L alpha, const SplatDepth<S>& depth, L mesh, L px, L py) noexcept {
   const auto unsure = L(depth.z + depth.reach) > mesh;
@@ -27,29 +28,32 @@ GSNAV_HD mask_of<L> has_mesh(L depth) noexcept {
   return depth <= L(scalar_of<L>(3.4e38));
 }
 
-/// Blends a surface of a mesh at depth z, metres, also where too little transmittance is left for Gaussians. Alpha 0:
-/// there is none, z must be finite; 1: transmittance becomes 0.
+/// Blends a surface of a mesh at depth z, metres, also where too little transmittance is left for
+/// Gaussians. Alpha 0: there is none, z must be finite; 1: transmittance becomes 0.
 template <bool Color, class L, DepthMode D, class S>
 GSNAV_HD void blend_surface(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha, L z,
                             const Vec3<L>& color) noexcept {
   const L before = abs(state.transmittance), weight = alpha * before, after = before - weight;
-  state.template accumulate<Color>(TransmittanceStep<L>{before, after, weight}, rules.first_hit_tau,
-                             [&]() GSNAV_INLINED { return color; }, [&]() GSNAV_INLINED { return z; });
+  state.template accumulate<Color>(
+      TransmittanceStep<L>{before, after, weight}, rules.first_hit_tau,
+      [&]() GSNAV_INLINED { return color; }, [&]() GSNAV_INLINED { return z; });
   state.transmittance = select(state.transmittance < L(S(0)), -after, after);
 }
 
 /// The mesh takes what transmittance the Gaussians left.
 template <bool Color, class L, DepthMode D, class S>
-GSNAV_HD void close_by_mesh(BlendState<L, D>& state, const BlendRules<S>& rules, L depth, const Vec3<L>& color) noexcept {
+GSNAV_HD void close_by_mesh(BlendState<L, D>& state, const BlendRules<S>& rules, L depth,
+                            const Vec3<L>& color) noexcept {
   const auto covered = has_mesh(depth);
   const L zero(S(0));
-  blend_surface<Color>(state, rules, select(covered, L(S(1)), zero), select(covered, depth, zero), color);
+  blend_surface<Color>(state, rules, select(covered, L(S(1)), zero), select(covered, depth, zero),
+                       color);
 }
 
 /// The same with the layer's depth and colour at a pixel.
 template <bool Color, DepthMode D, class S>
-GSNAV_HD void close_by_mesh(BlendState<S, D>& state, const BlendRules<S>& rules, const MeshLayer<S>& mesh,
-                            std::size_t pixel) noexcept {
+GSNAV_HD void close_by_mesh(BlendState<S, D>& state, const BlendRules<S>& rules,
+                            const MeshLayer<S>& mesh, std::size_t pixel) noexcept {
   Vec3<S> color{};
   if constexpr (Color) {
     const S* const from = mesh.color + 3 * pixel;
@@ -127,22 +131,28 @@ struct FragmentPixel {
   }
 };
 
-/// dispatch_raster for frames with a mesh: calls f with compile-time <Color, DepthMode, General>. The cubic exp2 does
-/// not serve these.
+/// dispatch_raster for frames with a mesh: calls f with compile-time <Color, DepthMode, General>. The
+/// cubic exp2 does not serve these.
 template <class S, class F>
 void dispatch_composite(const RasterArgs<S>& args, const F& f) {
   const auto with_depth = [&]<bool C, bool G>() {
     switch (args.depth_mode()) {
-      case DepthMode::none: return f.template operator()<C, DepthMode::none, G>();
-      case DepthMode::median: return f.template operator()<C, DepthMode::median, G>();
-      case DepthMode::any: return f.template operator()<C, DepthMode::any, G>();
+      case DepthMode::none:
+        return f.template operator()<C, DepthMode::none, G>();
+      case DepthMode::median:
+        return f.template operator()<C, DepthMode::median, G>();
+      case DepthMode::any:
+        return f.template operator()<C, DepthMode::any, G>();
     }
   };
-  const bool general = !args.perspectives.empty() || args.rules.exclusive_stop, color = args.images.rgb != nullptr;
+  const bool general = !args.perspectives.empty() || args.rules.exclusive_stop,
+             color = args.images.rgb != nullptr;
   if (color) {
-    general ? with_depth.template operator()<true, true>() : with_depth.template operator()<true, false>();
+    general ? with_depth.template operator()<true, true>()
+            : with_depth.template operator()<true, false>();
   } else {
-    general ? with_depth.template operator()<false, true>() : with_depth.template operator()<false, false>();
+    general ? with_depth.template operator()<false, true>()
+            : with_depth.template operator()<false, false>();
   }
 }
 

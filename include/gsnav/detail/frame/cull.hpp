@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/detail/frame/projection.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/frame/gaussians.hpp"
 
 namespace gsnav {
 
 namespace detail {
 
-/// Linear functions over a chunk's box of means, relative to a camera, with margins that are larger than all
-/// rounding, in float too.
+/// Linear functions over a chunk's box of means, relative to a camera, with margins that are larger than
+/// all rounding, in float too.
 ///
 /// With R the largest |w| of a footprint in standard deviations and L >= |(1, u)| for the u that the
-/// Jacobian is limited to, its half-width is at most R (f sigma L / z + sqrt(h)): in pixels times z the footprint
-/// reaches R f sigma L (`wide`) beyond its mean, and R sqrt(h) (`fixed`) pixels more.
+/// Jacobian is limited to, its half-width is at most R (f sigma L / z + sqrt(h)): in pixels times z the
+/// footprint reaches R f sigma L (`wide`) beyond its mean, and R sqrt(h) (`fixed`) pixels more.
 struct ChunkInView {
   const ProjectionCamera<double>& camera;
   const ChunkBounds& bounds;
@@ -23,7 +23,8 @@ struct ChunkInView {
 
   GSNAV_HD ChunkInView(const ProjectionCamera<double>& c, const ChunkBounds& b) noexcept
       : camera(c), bounds(b), center((b.low + b.high) * 0.5 - c.position), half((b.high - b.low) * 0.5) {
-    // What float may add: means are rounded to 2e-6 m (offsets of up to 64 m), the camera's offset relatively.
+    // What float may add: means are rounded to 2e-6 m (offsets of up to 64 m), the camera's offset
+    // relatively.
     size = abs(center.x) + abs(center.y) + abs(center.z) + half.x + half.y + half.z;
     slack = 1e-6 * size + 1e-5;
   }
@@ -40,51 +41,57 @@ struct ChunkInView {
     return log2(max(static_cast<double>(bounds.opacity_max), 1e-30)) - camera.log2_alpha_min;
   }
 
-  /// How far footprints reach along one axis of the image, whose focal length, principal point, size and limit of
-  /// the Jacobian these are.
+  /// How far footprints reach along one axis of the image, whose focal length, principal point, size and
+  /// limit of the Jacobian these are.
   struct Reach {
     double wide, fixed;
   };
-  GSNAV_HD Reach reach(double z_min, double s_max, double f, double c, double limit, double extent) const noexcept {
+  GSNAV_HD Reach reach(double z_min, double s_max, double f, double c, double limit,
+                       double extent) const noexcept {
     const double radius = sqrt(max(s_max, 0.0)) / kWhitenScale;
     const double h = sqrt(camera.eps2d);
     const double reach = f * bounds.scale_max * sqrt(1 + limit * limit);
     // splat_bounds' own padding: relative, by 5e-7 of the aspect ratio more, and absolute.
     const double pad = 1.002 + 5e-7 * (reach / (z_min * h) + 1);
-    return {pad * radius * reach + 1e-5 * (f + abs(c) + extent) * (size + slack), pad * radius * h + 0.01};
+    return {pad * radius * reach + 1e-5 * (f + abs(c) + extent) * (size + slack),
+            pad * radius * h + 0.01};
   }
 };
 
 }  // namespace detail
 
-/// Whether a Gaussian within the bounds may be visible (`Projected::visible`). Never no where one is. Anything that
-/// is not finite may be. "Left of the image" is linear in the mean once multiplied by z:
+/// Whether a Gaussian within the bounds may be visible (`Projected::visible`). Never no where one is.
+/// Anything that is not finite may be. "Left of the image" is linear in the mean once multiplied by z:
 /// f x + (cx + fixed) z < -wide; such a function is largest at a corner of the box.
 /// `s_max`: ChunkInView::s_max of the bounds, or of larger ones that they are a part of.
-GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const ChunkBounds& b, double s_max) noexcept {
+GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const ChunkBounds& b,
+                             double s_max) noexcept {
   const detail::ChunkInView chunk(camera, b);
   if (chunk.z_max() * camera.scale * (1 + 1e-6) <= camera.near_plane) return false;
   if (camera.response != Response::ewa) return true;  // those footprints are not bounded by this
   const double z_min = chunk.z_min();
   if (s_max < -1e-5) return false;
-  const auto outside = [&](const Vec3d& axis, double f, double c, double limit, double extent) GSNAV_INLINED {
+  const auto outside = [&](const Vec3d& axis, double f, double c, double limit,
+                           double extent) GSNAV_INLINED {
     const auto [wide, fixed] = chunk.reach(z_min, s_max, f, c, limit, extent);
     const Vec3d& z = camera.rotation.row[2];
-    return chunk.largest(axis * f + z * (c + fixed)) < -wide ||           // below the first pixel
+    return chunk.largest(axis * f + z * (c + fixed)) < -wide ||          // below the first pixel
            chunk.largest(axis * -f + z * (extent - c + fixed)) < -wide;  // beyond the last
   };
   const double limit_u = max(abs(camera.u_min), abs(camera.u_max));
   const double limit_v = max(abs(camera.v_min), abs(camera.v_max));
-  return !outside(camera.rotation.row[0], camera.fx, camera.cx, limit_u, static_cast<double>(camera.width)) &&
-         !outside(camera.rotation.row[1], camera.fy, camera.cy, limit_v, static_cast<double>(camera.height));
+  return !outside(camera.rotation.row[0], camera.fx, camera.cx, limit_u,
+                  static_cast<double>(camera.width)) &&
+         !outside(camera.rotation.row[1], camera.fy, camera.cy, limit_v,
+                  static_cast<double>(camera.height));
 }
 
 GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const ChunkBounds& b) noexcept {
   return may_be_visible(camera, b, detail::ChunkInView(camera, b).s_max());
 }
 
-/// Whether all means of a box are before the camera and in the image, so that tests of its parts would leave out
-/// little: a matter of speed alone.
+/// Whether all means of a box are before the camera and in the image, so that tests of its parts would
+/// leave out little: a matter of speed alone.
 GSNAV_HD bool lies_in_view(const ProjectionCamera<double>& camera, const ChunkBounds& b) noexcept {
   const detail::ChunkInView chunk(camera, b);
   const Vec3d& z = camera.rotation.row[2];
@@ -98,17 +105,19 @@ GSNAV_HD bool lies_in_view(const ProjectionCamera<double>& camera, const ChunkBo
 
 /// What the Gaussians of a chunk may at most be, seen from a camera.
 struct ChunkExtent {
-  float nearest;                   ///< no sort key of theirs is below
-  double x0, y0, x1, y1;           ///< no footprint reaches beyond, pixels; may lie outside the image
+  float nearest;          ///< no sort key of theirs is below
+  double x0, y0, x1, y1;  ///< no footprint reaches beyond, pixels; may lie outside the image
 };
 
 /// The extent of a chunk that may_be_visible, Response::ewa.
-GSNAV_HD ChunkExtent chunk_extent(const ProjectionCamera<double>& camera, const ChunkBounds& b) noexcept {
+GSNAV_HD ChunkExtent chunk_extent(const ProjectionCamera<double>& camera,
+                                  const ChunkBounds& b) noexcept {
   const detail::ChunkInView chunk(camera, b);
   const double z_min = chunk.z_min(), z_max = chunk.z_max(), s_max = chunk.s_max();
   ChunkExtent e;
   // A distance is z at least only where the view axis has unit length: a viewmat need not be that rigid.
-  const double row = camera.sort_order == SortOrder::z_depth ? 1.0 : max(1.0, norm(camera.rotation.row[2]));
+  const double row =
+      camera.sort_order == SortOrder::z_depth ? 1.0 : max(1.0, norm(camera.rotation.row[2]));
   e.nearest = static_cast<float>(z_min / row * camera.scale * (1 - 1e-6));
   const auto along = [&](const Vec3d& axis, double f, double c, double limit, double extent, double& low,
                          double& high) GSNAV_INLINED {
@@ -119,8 +128,10 @@ GSNAV_HD ChunkExtent chunk_extent(const ProjectionCamera<double>& camera, const 
   };
   const double limit_u = max(abs(camera.u_min), abs(camera.u_max));
   const double limit_v = max(abs(camera.v_min), abs(camera.v_max));
-  along(camera.rotation.row[0], camera.fx, camera.cx, limit_u, static_cast<double>(camera.width), e.x0, e.x1);
-  along(camera.rotation.row[1], camera.fy, camera.cy, limit_v, static_cast<double>(camera.height), e.y0, e.y1);
+  along(camera.rotation.row[0], camera.fx, camera.cx, limit_u, static_cast<double>(camera.width), e.x0,
+        e.x1);
+  along(camera.rotation.row[1], camera.fy, camera.cy, limit_v, static_cast<double>(camera.height), e.y0,
+        e.y1);
   return e;
 }
 

@@ -10,10 +10,10 @@ namespace gsnav {
 /// (px, py): pixel centre.
 ///
 /// With camera-space axes M (columns) and cofactor columns c_i = m_j x m_k, the maximum of the response
-/// along the ray t r, r = (u, v, 1), is at t = sum (c_i.r)(c_i.m) / sum (c_i.r)^2, m the mean. Nothing is
-/// inverted, so flat (s = 0) Gaussians give their plane. Written as z + delta relative to the ray
-/// through the mean: delta = -z sum h_i p_i / sum h_i^2 with p_i the change of c_i.r from that ray to the
-/// pixel's and h_i = g_i + p_i, so that rounding is relative to delta and not to z.
+/// along the ray t r, r = (u, v, 1), is at t = sum (c_i.r)(c_i.m) / sum (c_i.r)^2, m the mean. Nothing
+/// is inverted, so flat (s = 0) Gaussians give their plane. Written as z + delta relative to the ray
+/// through the mean: delta = -z sum h_i p_i / sum h_i^2 with p_i the change of c_i.r from that ray to
+/// the pixel's and h_i = g_i + p_i, so that rounding is relative to delta and not to z.
 template <class L, class S>
 GSNAV_HD L ray_depth(const SplatDepth<S>& d, L px, L py) noexcept {
   const L dx = px - L(d.mean_x), dy = py - L(d.mean_y);

@@ -15,13 +15,13 @@ struct PixelColumns {
 
 /// The columns that the ellipse of a splat's footprint covers within horizontal strips of an area: what
 /// tiles, and blocks of a tile, are listed by. L: one splat, or one a lane. Never less than the pixels
-/// that pass the pixel test in scalar_of<L>: the ellipse is enlarged by the rounding of that test, and of
-/// this one.
+/// that pass the pixel test in scalar_of<L>: the ellipse is enlarged by the rounding of that test, and
+/// of this one.
 ///
 /// About the centre, |w|^2 = (a X)^2 + (k X + b Y)^2 = r^2 has its right edge at
-/// X(Y) = -s Y + sqrt((r^2 - (beta Y)^2) / alpha^2), alpha^2 = a^2 + k^2, s = k b / alpha^2, beta = a b / alpha:
-/// concave, with its maximum at Y* = -k r / (a b). So a strip's rightmost point is at Y* limited to the
-/// strip, and its leftmost at -Y*.
+/// X(Y) = -s Y + sqrt((r^2 - (beta Y)^2) / alpha^2), alpha^2 = a^2 + k^2, s = k b / alpha^2, beta = a b
+/// / alpha: concave, with its maximum at Y* = -k r / (a b). So a strip's rightmost point is at Y*
+/// limited to the strip, and its leftmost at -Y*.
 ///
 /// `Rough` takes sqrt_above for roots, and reciprocal_near: an ellipse up to 3e-3 larger, in less time.
 template <class L, bool Rough = false>
@@ -34,7 +34,8 @@ class FootprintStrips {
       : FootprintStrips(g, log2_alpha_min, box.x0 + L(S(0.5)), box.x1 - L(S(0.5)), box.y0 + L(S(0.5)),
                         box.y1 - L(S(0.5))) {}
   /// ... within the pixel centres [x0, x1] x [y0, y1].
-  GSNAV_HD FootprintStrips(const SplatGeometry<L>& g, S log2_alpha_min, L x0, L x1, L y0, L y1) noexcept {
+  GSNAV_HD FootprintStrips(const SplatGeometry<L>& g, S log2_alpha_min, L x0, L x1, L y0,
+                           L y1) noexcept {
     const L zero(S(0));
     const L inv_a = inverse(g.a), inv_b = inverse(g.b);
     const L mean_x = -(g.w1 * inv_a);
@@ -64,7 +65,8 @@ class FootprintStrips {
     }
     center_x_ = g.ref_x + mean_x;
     center_y_ = g.ref_y + mean_y;
-    pad_x_ = fma(fma(abs(slope_), far_y + abs(mean_y), abs(g.ref_x) + abs(mean_x)), L(S(1e-6)), L(S(1e-3)));
+    pad_x_ =
+        fma(fma(abs(slope_), far_y + abs(mean_y), abs(g.ref_x) + abs(mean_x)), L(S(1e-6)), L(S(1e-3)));
     pad_y_ = fma(abs(g.ref_y) + abs(mean_y), L(S(1e-6)), L(S(1e-3)));
   }
 
@@ -89,7 +91,8 @@ class FootprintStrips {
     L left, right;
     const auto covered = columns(max(top, box.y0) + half, min(end, box.y1) - half, left, right);
     // The padding of left and right is more than what rounding to a pixel may lose.
-    const L first = clamp(left + half, box.x0, box.x1), behind = truncated(clamp(right + half, box.x0, box.x1));
+    const L first = clamp(left + half, box.x0, box.x1),
+            behind = truncated(clamp(right + half, box.x0, box.x1));
     return {covered && (first < behind), first, behind};
   }
 

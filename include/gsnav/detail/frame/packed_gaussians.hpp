@@ -4,14 +4,14 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "gsnav/detail/math/half.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/math/functions.hpp"
-#include "gsnav/detail/math/half.hpp"
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/quat.hpp"
 
-// Packed rows (scene/packed_cloud.hpp), read as the floats that they stand for: over lanes and one at a time the same
-// bits, as every operation is rounded once.
+// Packed rows (scene/packed_cloud.hpp), read as the floats that they stand for: over lanes and one at a
+// time the same bits, as every operation is rounded once.
 
 namespace gsnav {
 
@@ -34,17 +34,19 @@ GSNAV_HD Vec3<L> unpack_scales(const PackedChunk& chunk, const Vec3<L>& code) no
   return {roots.x * roots.x, roots.y * roots.y, roots.z * roots.z};
 }
 
-/// A unit quaternion from three of its parts, each within +-sqrt(1/2); the fourth, the largest, is positive. The lowest
-/// bits of the first two codes number it.
+/// A unit quaternion from three of its parts, each within +-sqrt(1/2); the fourth, the largest, is
+/// positive. The lowest bits of the first two codes number it.
 template <class L>
 GSNAV_HD Quat<L> unpack_quat(const Vec3<L>& code) noexcept {
   const L half(0.5f), two(2.0f), zero(0.0f), middle(kQuatCodes / 2), step(kRootHalf / (kQuatCodes / 2));
-  const L first = truncated(code.x * half), second = truncated(code.y * half), third = truncated(code.z * half);
+  const L first = truncated(code.x * half), second = truncated(code.y * half),
+          third = truncated(code.z * half);
   const L missing = fma(two, code.y - two * second, code.x - two * first);
   const L a = (first - middle) * step, b = (second - middle) * step, c = (third - middle) * step;
   const L d = sqrt(max(fma(-a, a, fma(-b, b, fma(-c, c, L(1.0f)))), zero));
   const auto w = missing < half, x = missing < L(1.5f), y = missing < L(2.5f);
-  return {select(w, d, a), select(w, a, select(x, d, b)), select(x, b, select(y, d, c)), select(y, c, d)};
+  return {select(w, d, a), select(w, a, select(x, d, b)), select(x, b, select(y, d, c)),
+          select(y, c, d)};
 }
 
 /// In [0, 1].
@@ -66,7 +68,9 @@ GSNAV_HD bool is_packed(const GaussianView& gs) noexcept {
 #endif
 }
 /// Whether colours are.
-GSNAV_HD bool has_packed_colors(const GaussianView& gs) noexcept { return is_packed(gs) && !gs.packed.sh0.empty(); }
+GSNAV_HD bool has_packed_colors(const GaussianView& gs) noexcept {
+  return is_packed(gs) && !gs.packed.sh0.empty();
+}
 
 /// One row of a set, as SetRows reads it.
 struct OneRow {
@@ -154,7 +158,8 @@ GSNAV_HD Vec3<float> packed_coefficient(const GaussianView& gs, std::size_t i, i
   if (!gs.packed.shN.empty()) {
     const float step = gs.packed.chunks[i / kProjectChunk].sh_steps[packed_band(k)];
     const std::int8_t* p = gs.packed.shN.data + at;
-    return {static_cast<float>(p[0]) * step, static_cast<float>(p[1]) * step, static_cast<float>(p[2]) * step};
+    return {static_cast<float>(p[0]) * step, static_cast<float>(p[1]) * step,
+            static_cast<float>(p[2]) * step};
   }
   if (!gs.shN_half.empty()) return halves(gs.shN_half.data + at);
   return {gs.shN[at], gs.shN[at + 1], gs.shN[at + 2]};

@@ -6,13 +6,13 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/frame/cull.hpp"
-#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/detail/frame/project_row.hpp"
-#include "gsnav/frame/sh.hpp"
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/math/half.hpp"
+#include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/sh.hpp"
 
 namespace gsnav {
 
@@ -21,11 +21,12 @@ template <class S>
 struct ProjectArgs {
   GaussianView gaussians;
   ProjectionCamera<S> camera;
-  ProjectionCamera<double> camera64;  ///< for sort keys, and for Gaussians whose geometry float cannot hold
-  View<const Vec3d> offsets;          ///< origin - camera position, one an origin
-  int sh_degree = 0;                  ///< highest degree to evaluate, <= gaussians.sh_degree
-  std::size_t first_chunk = 0;        ///< among the chunks of all sets
-  std::uint32_t first_rank = 0;       ///< of the set's first Gaussian among all
+  ProjectionCamera<double>
+      camera64;                  ///< for sort keys, and for Gaussians whose geometry float cannot hold
+  View<const Vec3d> offsets;     ///< origin - camera position, one an origin
+  int sh_degree = 0;             ///< highest degree to evaluate, <= gaussians.sh_degree
+  std::size_t first_chunk = 0;   ///< among the chunks of all sets
+  std::uint32_t first_rank = 0;  ///< of the set's first Gaussian among all
 
   GSNAV_HD std::size_t chunk_count() const noexcept { return gaussians.chunk_count(); }
 };
@@ -67,9 +68,9 @@ struct ProjectOutputs {
   View<std::uint32_t> keys;   ///< camera.key_code of the float32 key
   View<std::uint32_t> ranks;  ///< what decides between equal keys; empty: the slot does
   View<std::uint32_t> counts;
-  TileGrid grid;               ///< read where `spans` is not empty
-  View<TileSpans> spans;       ///< tiles of each slot's splat, for backends that find them here; else empty
-  OpenCells open;              ///< backends may leave out what reaches none of these
+  TileGrid grid;          ///< read where `spans` is not empty
+  View<TileSpans> spans;  ///< tiles of each slot's splat, for backends that find them here; else empty
+  OpenCells open;         ///< backends may leave out what reaches none of these
 };
 
 /// Whether any Gaussian of chunk c may be visible. Never no where one is.
@@ -80,8 +81,9 @@ GSNAV_HD bool chunk_is_candidate(const ProjectArgs<S>& args, std::size_t c) noex
   return args.gaussians.may_be_seen(id) && (bounds.empty() || may_be_visible(args.camera64, bounds[id]));
 }
 
-/// Which parts of chunk c have Gaussians that may be visible: bit p for the kChunkPart rows from p kChunkPart on.
-/// Never without one that is; no bit where chunk_is_candidate says no, or where seen_rows() has none of them.
+/// Which parts of chunk c have Gaussians that may be visible: bit p for the kChunkPart rows from p
+/// kChunkPart on. Never without one that is; no bit where chunk_is_candidate says no, or where
+/// seen_rows() has none of them.
 template <class S>
 GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c) noexcept {
   static_assert(kProjectChunk / kChunkPart <= 32);
@@ -121,7 +123,8 @@ GSNAV_HD Vec3<L> view_direction(const Vec3<L>& delta) noexcept {
   // A camera at the mean sees no direction; z stands in, so that the colour is finite.
   const auto defined = n > L(S(1e-12));
   const Vec3<L> unit = delta * (L(S(1)) / n);
-  return {select(defined, unit.x, L(S(0))), select(defined, unit.y, L(S(0))), select(defined, unit.z, L(S(1)))};
+  return {select(defined, unit.x, L(S(0))), select(defined, unit.y, L(S(0))),
+          select(defined, unit.z, L(S(1)))};
 }
 
 /// Colour of Gaussian i seen along `delta` (mean - camera, asset frame, any length), SH to `degree`.
@@ -137,7 +140,8 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
     }
   }
   if (has_packed_colors(gs)) {
-    const Vec3<S> c = sh_color<S>(degree, delta, [&](int k) GSNAV_INLINED { return vec_cast<S>(packed_coefficient(gs, i, k)); });
+    const Vec3<S> c = sh_color<S>(
+        degree, delta, [&](int k) GSNAV_INLINED { return vec_cast<S>(packed_coefficient(gs, i, k)); });
     return {c.x, c.y, c.z, S(0)};
   }
   const float* sh0 = gs.sh0.data + 3 * i;

@@ -113,8 +113,8 @@ GSNAV_HD L reference_pixel(L x, int size) noexcept {
 
 }  // namespace detail
 
-/// The pixel that the records of a splat are relative to (detail/frame/splat.hpp), and its centre's offset
-/// from the mean.
+/// The pixel that the records of a splat are relative to (detail/frame/splat.hpp), and its centre's
+/// offset from the mean.
 template <class L>
 struct ReferencePixel {
   L x, y;

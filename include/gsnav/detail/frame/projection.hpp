@@ -62,8 +62,8 @@ GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<
 template <class L>
 struct Projected {
   mask_of<L> visible{};
-  L mean_x{}, mean_y{};            ///< pixels
-  L a{}, k{}, b{};                 ///< whitened triple about the mean (detail/frame/splat.hpp)
+  L mean_x{}, mean_y{};  ///< pixels
+  L a{}, k{}, b{};       ///< whitened triple about the mean (detail/frame/splat.hpp)
   L log2_opacity{};
   L s_max{};                       ///< |w|^2 at the edge of the footprint
   L variance_x{}, variance_y{};    ///< diagonal of the 2D covariance, px^2
@@ -104,13 +104,13 @@ GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes
     const L ey = h * (z / L(camera.fy)) * (z / L(camera.fy));
     const Vec3<L> area = fma(u, cx, fma(v, cy, axes.cofactors.row[2]));
     const Vec3<L> across_x = fma(-u, mz, mx), across_y = fma(-v, mz, my);
-    const L d0 = fma(ex, ey, fma(ex, dot(across_y, across_y),
-                                 fma(ey, dot(across_x, across_x), dot(area, area))));
+    const L d0 =
+        fma(ex, ey, fma(ex, dot(across_y, across_y), fma(ey, dot(across_x, across_x), dot(area, area))));
     slope_u = fma(-ey, dot(mz, across_x), dot(cx, area)) / d0;
     slope_v = fma(-ex, dot(mz, across_y), dot(cy, area)) / d0;
     const L volume = dot(mx, cx);
-    const L det = fma(volume, volume,
-                      fma(ex, dot(cx, cx), fma(ey, dot(cy, cy), (ex * ey) * dot(mz, mz))));
+    const L det =
+        fma(volume, volume, fma(ex, dot(cx, cx), fma(ey, dot(cy, cy), (ex * ey) * dot(mz, mz))));
     out.bend = L(S(2 * kLn2)) * (det / ((z * z) * d0));
   }
   out.slope_x = slope_u / L(camera.fx);
@@ -146,8 +146,8 @@ GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes
 ///
 ///  - The Jacobian is taken at the mean; Response::ewa clamps its x/z and y/z to the camera's limits.
 ///  - det is built from products, never as AC - B^2 (Cauchy-Binet): det0 = (fx fy / z^2)^2 sum
-///    (c_i.(u, v, 1))^2, c_i the cofactor columns, and det = det0 + h (|l1|^2 + |l2|^2) + h^2, so det > 0
-///    always and its relative error stays near 1e-6 for needles of 1e4 : 1.
+///    (c_i.(u, v, 1))^2, c_i the cofactor columns, and det = det0 + h (|l1|^2 + |l2|^2) + h^2, so det >
+///    0 always and its relative error stays near 1e-6 for needles of 1e4 : 1.
 ///  - The inverse is kept as a Cholesky factor.
 ///
 /// `key_z`: `depth_key` of the centre, rounded to float32, metres. `opacity` in [0, 1].
@@ -171,8 +171,9 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
   const Vec3<L> l1 = fma(-uj, m.row[2], m.row[0]) * fz_x;
   const Vec3<L> l2 = fma(-vj, m.row[2], m.row[1]) * fz_y;
   const L a0 = dot(l1, l1), c0 = dot(l2, l2), b0 = dot(l1, l2);
-  const Vec3<L> area = fma(uj, axes.cofactors.row[0],
-                           fma(vj, axes.cofactors.row[1], axes.cofactors.row[2])) * (fz_x * fz_y);
+  const Vec3<L> area =
+      fma(uj, axes.cofactors.row[0], fma(vj, axes.cofactors.row[1], axes.cofactors.row[2])) *
+      (fz_x * fz_y);
   const L det0 = dot(area, area);
   const L h(camera.eps2d);
   const L det = fma(h, (a0 + c0) + h, det0);
@@ -223,11 +224,11 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
   return out;
 }
 
-/// The per-ray depth record of a projected Gaussian (detail/frame/depth.hpp). Compat modes know the depth of
-/// the centre only.
+/// The per-ray depth record of a projected Gaussian (detail/frame/depth.hpp). Compat modes know the
+/// depth of the centre only.
 template <class L>
-GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& camera, const SplatAxes<L>& axes,
-                                        const Projected<L>& p) noexcept {
+GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& camera,
+                                        const SplatAxes<L>& axes, const Projected<L>& p) noexcept {
   using S = scalar_of<L>;
   SplatDepth<L> d;
   d.mean_x = p.mean_x;
@@ -252,10 +253,10 @@ GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& ca
   return d;
 }
 
-/// Sort key for SortOrder::z_depth: the depth of a centre along the view axis, metres, in double. Callers round it to
-/// float32, once. The rounded key has the same bits on every backend and in any float64 renderer (but where two
-/// float64 results lie on different sides of a float32 rounding, about one key in 1e8), and it depends neither on a
-/// set's origins nor on where the world's origin lies.
+/// Sort key for SortOrder::z_depth: the depth of a centre along the view axis, metres, in double.
+/// Callers round it to float32, once. The rounded key has the same bits on every backend and in any
+/// float64 renderer (but where two float64 results lie on different sides of a float32 rounding, about
+/// one key in 1e8), and it depends neither on a set's origins nor on where the world's origin lies.
 /// `delta`: mean - camera position, asset frame, in double. `D`: double, or a pack of them.
 template <class D>
 GSNAV_HD D depth_key(const ProjectionCamera<double>& camera, const Vec3<D>& delta) noexcept {
@@ -263,8 +264,8 @@ GSNAV_HD D depth_key(const ProjectionCamera<double>& camera, const Vec3<D>& delt
   return dot(Vec3<D>{D(row.x), D(row.y), D(row.z)}, delta) * D(camera.scale);
 }
 
-/// Sort key for SortOrder::camera_distance: the distance of a centre from the camera, metres, in double. As
-/// `depth_key`, it is rounded to float32 once.
+/// Sort key for SortOrder::camera_distance: the distance of a centre from the camera, metres, in double.
+/// As `depth_key`, it is rounded to float32 once.
 template <class D>
 GSNAV_HD D distance_key(const ProjectionCamera<double>& camera, const Vec3<D>& delta) noexcept {
   return norm(delta) * D(camera.scale);

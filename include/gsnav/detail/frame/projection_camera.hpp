@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "gsnav/image/camera.hpp"
 #include "gsnav/frame/gaussians.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/quat.hpp"
@@ -26,9 +26,9 @@ enum class Response : std::uint8_t {
 
 /// Whose rules of footprint, stop and depth a render follows. Everything but `none` is for parity tests.
 enum class Compat : std::uint8_t {
-  none,        ///< the contract
-  inria,       ///< 3-sigma square of 16-pixel tiles, exclusive stop, depth of the centre
-  gsplat,      ///< box of min(3.33, sqrt(2 ln 255 o)) sigma in tiles, exclusive stop, depth of the centre
+  none,    ///< the contract
+  inria,   ///< 3-sigma square of 16-pixel tiles, exclusive stop, depth of the centre
+  gsplat,  ///< box of min(3.33, sqrt(2 ln 255 o)) sigma in tiles, exclusive stop, depth of the centre
   habitat_gs,  ///< inria with opacity compensation of at least 0.005 for every set, near plane 0.2
 };
 
@@ -64,18 +64,18 @@ struct ProjectionRules {
 /// s (W R)(x - c), c the camera's position in the asset's frame.
 template <class S>
 struct ProjectionCamera {
-  Mat3<S> rotation{};       ///< W R, asset axes to camera axes
-  Vec3d position{};         ///< c, asset frame, double
-  S scale{1};               ///< s
+  Mat3<S> rotation{};  ///< W R, asset axes to camera axes
+  Vec3d position{};    ///< c, asset frame, double
+  S scale{1};          ///< s
   S fx{}, fy{}, cx{}, cy{};
   S u_min{}, u_max{}, v_min{}, v_max{};  ///< limits of x/z and y/z in the Jacobian
   int width = 0, height = 0;
   float near_plane = 0.2f;
   S near_sigma{0};
   S eps2d{S(0.3)};
-  S base_eps2d{0};          ///< GaussianSet::base_eps2d
-  S log2_alpha_min{};       ///< the footprint is alpha >= 2^log2_alpha_min
-  S min_compensation{0};    ///< of the mip filter
+  S base_eps2d{0};        ///< GaussianSet::base_eps2d
+  S log2_alpha_min{};     ///< the footprint is alpha >= 2^log2_alpha_min
+  S min_compensation{0};  ///< of the mip filter
   bool mip = false;
   SortOrder sort_order = SortOrder::z_depth;
   Response response = Response::ewa;

@@ -14,13 +14,14 @@ namespace gsnav {
 /// cannot become positive.
 ///
 /// The reference pixel is the one that holds the mean, or the image's nearest to it: d is exact, and
-/// what a mean far outside the image costs in bits is paid once, in w1 and w2 (detail/frame/project_row.hpp).
+/// what a mean far outside the image costs in bits is paid once, in w1 and w2
+/// (detail/frame/project_row.hpp).
 template <class S>
 struct SplatGeometry {
-  S ref_x{}, ref_y{};    ///< centre of the reference pixel (an integer + 0.5)
-  S a{}, k{}, b{};       ///< whitened (Cholesky) triple
-  S w1{}, w2{};          ///< whitened offset of the reference pixel from the mean
-  S log2_opacity{};      ///< log2 of the opacity after the filter's compensation
+  S ref_x{}, ref_y{};  ///< centre of the reference pixel (an integer + 0.5)
+  S a{}, k{}, b{};     ///< whitened (Cholesky) triple
+  S w1{}, w2{};        ///< whitened offset of the reference pixel from the mean
+  S log2_opacity{};    ///< log2 of the opacity after the filter's compensation
 };
 
 /// Colour of a projected Gaussian, display-referred, >= 0.
@@ -29,8 +30,8 @@ struct SplatColor {
   S r{}, g{}, b{}, pad{};
 };
 
-/// What per-ray depth needs (detail/frame/depth.hpp): cofactor columns of the camera-space axes against the
-/// ray through the mean (g) and its change per pixel in x and y.
+/// What per-ray depth needs (detail/frame/depth.hpp): cofactor columns of the camera-space axes against
+/// the ray through the mean (g) and its change per pixel in x and y.
 template <class S>
 struct SplatDepth {
   S mean_x{}, mean_y{};  ///< pixels

@@ -17,11 +17,11 @@ inline constexpr std::size_t kMotionPlanes = 9;
 /// At the time t, with dt = t - times[i]: the mean is base + v dt + a dt^2 / 2 + j dt^3 / 6, the opacity
 /// base * exp(-dt^2 / (2 (sigma^2 + 1e-8))); shapes, orientations and colours stay.
 struct TemporalView {
-  GaussianView base;                        ///< each Gaussian at its own time
-  View<const float> times;                  ///< [N] seconds
-  View<const float> sigmas;                 ///< [N] seconds, >= 0; infinity: always there
-  /// x, y, z of velocity (m/s), acceleration (m/s^2), jerk (m/s^3), [N] each; what is empty is zero. Those of one kind
-  /// are all there or all empty.
+  GaussianView base;         ///< each Gaussian at its own time
+  View<const float> times;   ///< [N] seconds
+  View<const float> sigmas;  ///< [N] seconds, >= 0; infinity: always there
+  /// x, y, z of velocity (m/s), acceleration (m/s^2), jerk (m/s^3), [N] each; what is empty is zero.
+  /// Those of one kind are all there or all empty.
   View<const float> motion[kMotionPlanes];
 };
 
@@ -36,14 +36,14 @@ GSNAV_HD S temporal_weight(S dt, S sigma) noexcept {
 
 /// How far a Gaussian with this velocity, acceleration and jerk is from its base after `dt` seconds.
 template <class S>
-GSNAV_HD Vec3<S> temporal_offset(const Vec3<S>& velocity, const Vec3<S>& acceleration, const Vec3<S>& jerk,
-                                 S dt) noexcept {
+GSNAV_HD Vec3<S> temporal_offset(const Vec3<S>& velocity, const Vec3<S>& acceleration,
+                                 const Vec3<S>& jerk, S dt) noexcept {
   const Vec3<S> inner = fma(dt * S(1.0 / 3), jerk, acceleration);
   return dt * fma(dt * S(0.5), inner, velocity);
 }
 
-/// Gaussian i at the time t: its offset from the base, metres, and its opacity, 0 where that is below 1/255. What is
-/// not drawn does not move.
+/// Gaussian i at the time t: its offset from the base, metres, and its opacity, 0 where that is below
+/// 1/255. What is not drawn does not move.
 template <class S>
 GSNAV_HD Vec3<S> temporal_state(const TemporalView& in, std::size_t i, double t, S& opacity) noexcept {
   const S dt = static_cast<S>(t - static_cast<double>(in.times[i]));

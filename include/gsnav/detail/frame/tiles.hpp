@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/core/view.hpp"
+#include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/frame/footprint.hpp"
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/math/functions.hpp"
@@ -35,12 +35,13 @@ struct TileGrid {
   bool operator==(const TileGrid&) const = default;
 };
 
-/// The cells of 4x4 pixels of an image that still take splats, as a summed-area table: what asks for them asks for
-/// rectangles.
+/// The cells of 4x4 pixels of an image that still take splats, as a summed-area table: what asks for
+/// them asks for rectangles.
 struct OpenCells {
   static constexpr int kSize = 4;
-  View<const std::uint32_t> sums;  ///< [rows + 1][columns + 1]: open ones above and left of. Empty: all are open
-  std::size_t stride = 0;          ///< columns + 1
+  View<const std::uint32_t>
+      sums;                ///< [rows + 1][columns + 1]: open ones above and left of. Empty: all are open
+  std::size_t stride = 0;  ///< columns + 1
 
   GSNAV_HD bool empty() const noexcept { return sums.empty(); }
   /// Whether a cell of columns [x0, x1) in rows [y0, y1) is open.
@@ -51,9 +52,9 @@ struct OpenCells {
   }
 };
 
-/// Calls f(row, first, last), columns inclusive, for each row of tiles, in order, of which a splat may touch some.
-/// `elliptic`: within its bounds the footprint is the ellipse of its geometry (not under perspective), so tiles may be
-/// left out.
+/// Calls f(row, first, last), columns inclusive, for each row of tiles, in order, of which a splat may
+/// touch some. `elliptic`: within its bounds the footprint is the ellipse of its geometry (not under
+/// perspective), so tiles may be left out.
 template <class S, class F>
 GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
                                 S log2_alpha_min, bool elliptic, const F& f) noexcept {
@@ -82,14 +83,15 @@ GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g,
 template <class S, class F>
 GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
                             S log2_alpha_min, bool elliptic, const F& f) noexcept {
-  for_each_tile_row(grid, g, b, log2_alpha_min, elliptic, [&](int ty, int first, int last) GSNAV_INLINED {
-    const std::size_t row = static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns);
-    for (int tx = first; tx <= last; ++tx) f(row + static_cast<std::size_t>(tx));
-  });
+  for_each_tile_row(
+      grid, g, b, log2_alpha_min, elliptic, [&](int ty, int first, int last) GSNAV_INLINED {
+        const std::size_t row = static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns);
+        for (int tx = first; tx <= last; ++tx) f(row + static_cast<std::size_t>(tx));
+      });
 }
 
-/// The tiles of a splat that covers few: from `tile` on, columns [columns[r][0], columns[r][1]) of row r; none of
-/// rows that it does not have.
+/// The tiles of a splat that covers few: from `tile` on, columns [columns[r][0], columns[r][1]) of row
+/// r; none of rows that it does not have.
 struct TileSpans {
   static constexpr int kRows = 5, kColumns = 255;
   static constexpr std::uint8_t kLarge = 255;  ///< in `rows`: not kept here
@@ -106,12 +108,12 @@ struct BinArgs {
   View<const SplatGeometry<S>> geometry;
   View<const SplatBounds> bounds;
   S log2_alpha_min{};
-  bool elliptic = true;                  ///< footprints are ellipses (Response::ewa)
-  std::size_t blocks = 1;                ///< pieces that `order` is cut into
-  View<std::uint64_t> cursors;           ///< [blocks][tiles]: counts, then write positions
-  View<std::uint64_t> tile_offsets;      ///< [tiles + 1]
-  View<std::uint32_t> tile_splats;       ///< splats of all tiles, each tile's in order
-  View<TileSpans> spans;                 ///< [slots], found by the projection of such backends; else empty
+  bool elliptic = true;              ///< footprints are ellipses (Response::ewa)
+  std::size_t blocks = 1;            ///< pieces that `order` is cut into
+  View<std::uint64_t> cursors;       ///< [blocks][tiles]: counts, then write positions
+  View<std::uint64_t> tile_offsets;  ///< [tiles + 1]
+  View<std::uint32_t> tile_splats;   ///< splats of all tiles, each tile's in order
+  View<TileSpans> spans;             ///< [slots], found by the projection of such backends; else empty
 };
 
 namespace detail {
@@ -138,8 +140,8 @@ GSNAV_HD void for_each_intersection(const BinArgs<S>& args, std::size_t block, c
   for (std::size_t i = r.begin; i < r.end; ++i) {
     prefetch_splat(args, i);
     const std::uint32_t splat = args.order[i];
-    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
-                  [&](std::size_t tile) GSNAV_INLINED { f(tile, splat); });
+    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
+                  args.elliptic, [&](std::size_t tile) GSNAV_INLINED { f(tile, splat); });
   }
 }
 }  // namespace detail
@@ -169,9 +171,10 @@ struct CountTileIntersections {
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* counts = args.cursors.data + block * args.grid.count();
     for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-      if (!cull.hides(tile, splat)) ++counts[tile];
-    });
+    detail::for_each_intersection(args, block,
+                                  [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
+                                    if (!cull.hides(tile, splat)) ++counts[tile];
+                                  });
   }
 };
 
@@ -203,9 +206,10 @@ struct ScatterTileIntersections {
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
     std::uint32_t* out = args.tile_splats.data;
-    detail::for_each_intersection(args, block, [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-      if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
-    });
+    detail::for_each_intersection(args, block,
+                                  [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
+                                    if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
+                                  });
   }
 };
 

@@ -25,9 +25,10 @@ struct FragmentRange {
 /// What a mesh leaves of a frame for the Gaussians: planes [H][W] in a backend's memory.
 template <class S>
 struct MeshLayer {
-  const S* depth = nullptr;  ///< planar z, metres; infinity where there is no mesh. Null: the frame has none
-  const S* color = nullptr;  ///< [H][W][3] display-referred; null: no colour asked for
-  View<const S> tile_far;    ///< [tiles], the largest depth of each
+  const S* depth =
+      nullptr;  ///< planar z, metres; infinity where there is no mesh. Null: the frame has none
+  const S* color = nullptr;                 ///< [H][W][3] display-referred; null: no colour asked for
+  View<const S> tile_far;                   ///< [tiles], the largest depth of each
   View<const FragmentRange> ranges{};       ///< [H][W]; empty: nothing is seen through
   View<const MeshFragment<S>> fragments{};  ///< none behind `depth`
 

@@ -24,11 +24,11 @@ struct LoadGltfOptions {
 };
 
 /// Reads the Gaussians of a glTF 2.0 file, GLB or JSON, by KHR_gaussian_splatting (release candidate):
-/// every primitive of the scene with kernel "ellipse", its node's transform applied, merged into one cloud.
-/// Transforms may scale unevenly, shear and mirror: covariances follow exactly, SH bands by the transform's
-/// orthogonal factor (`transform` in detail/scene/edit_cloud.hpp). Opacities and scales are linear in the file; the
-/// sign of a scale, which means nothing, is left out with a warning. The sort order becomes camera_distance,
-/// which is the extension's.
+/// every primitive of the scene with kernel "ellipse", its node's transform applied, merged into one
+/// cloud. Transforms may scale unevenly, shear and mirror: covariances follow exactly, SH bands by the
+/// transform's orthogonal factor (`transform` in detail/scene/edit_cloud.hpp). Opacities and scales are
+/// linear in the file; the sign of a scale, which means nothing, is left out with a warning. The sort
+/// order becomes camera_distance, which is the extension's.
 ///
 /// Rows that hold no drawable Gaussian are dropped and counted in the report; colours of another space
 /// than sRGB are read as they are, with a warning. Memory is bounded by 260 bytes for each byte of the

@@ -23,8 +23,8 @@ struct StageConfig {
   double scale = 1.0;
   bool norm_quaternion = true;  ///< Habitat-GS's; quaternions are always normalised here
 
-  /// World from asset by up, front, origin, units and scale. Habitat-GS leaves all of these out for Gaussians and takes
-  /// them as they are stored, so data made for it wants the identity.
+  /// World from asset by up, front, origin, units and scale. Habitat-GS leaves all of these out for
+  /// Gaussians and takes them as they are stored, so data made for it wants the identity.
   Similarity world_from_asset() const noexcept;
 };
 
@@ -40,9 +40,11 @@ struct HabitatScene {
 /// What a `*.scene_dataset_config.json` leads to. Its order is that of the scenes' names.
 struct HabitatDataset {
   std::vector<HabitatScene> scenes;
-  std::vector<std::string> warnings;  ///< keys that are left out, each once, with the first file that has it
+  std::vector<std::string>
+      warnings;  ///< keys that are left out, each once, with the first file that has it
 
-  /// The scene of this name, or whose file or asset an episode's `scene_id` names; null where there is none.
+  /// The scene of this name, or whose file or asset an episode's `scene_id` names; null where there is
+  /// none.
   const HabitatScene* find(const std::string& name) const noexcept;
 };
 
@@ -59,8 +61,8 @@ struct HabitatDataset {
 /// invalid_file; unsupported (a stage with a scale for each axis); out_of_memory. Never throws.
 Result<HabitatDataset> load_habitat_dataset(const std::filesystem::path& path);
 
-/// Reads one stage. Errors name the file and the key: file_not_found; invalid_file (also: no render_asset); unsupported
-/// (a scale for each axis); out_of_memory. Never throws.
+/// Reads one stage. Errors name the file and the key: file_not_found; invalid_file (also: no
+/// render_asset); unsupported (a scale for each axis); out_of_memory. Never throws.
 Result<StageConfig> load_stage_config(const std::filesystem::path& path);
 
 }  // namespace gsnav::io

@@ -45,7 +45,9 @@ Result<CachedLod> cached_lod(B& backend, const std::string& spec, const Gaussian
       lod_path(spec, cloud, settings), &CachedLod::tree,
       [&](const std::filesystem::path& path) { return load_lod(path, cloud, settings); },
       [&] { return build_lod(backend, cloud, settings); },
-      [&](const std::filesystem::path& path, const LodTree& tree) { return save_lod(path, tree, cloud, settings); });
+      [&](const std::filesystem::path& path, const LodTree& tree) {
+        return save_lod(path, tree, cloud, settings);
+      });
 }
 
 }  // namespace gsnav::io

@@ -30,15 +30,18 @@ Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLo
 
 /// A streamed set with its levels of detail, to be drawn by a LodCut.
 struct LoadedLodSet {
-  GaussianCloud cloud;  ///< the finest level that is there, in chunks of one node each; filled up with transparent rows
+  GaussianCloud cloud;  ///< the finest level that is there, in chunks of one node each; filled up with
+                        ///< transparent rows
   LodTree tree;         ///< the levels above
   LoadReport report;    ///< of the finest level; kept has no rows that fill chunks
 };
 
-/// Reads all levels of a streamed set that are there, from `options.level` on: what load_lod_set gives is the finest,
-/// and each node may be shown by any coarser one. `row_ids` are places in load_lod_set's order. The environment is
-/// always shown whole. Errors: load_lod_set's; invalid_file (rows that two levels share, but where a node names the
-/// same rows twice); unsupported (nodes of so few rows that chunks would be mostly empty). Never throws.
-Result<LoadedLodSet> load_lod_levels(const std::filesystem::path& path, const LoadLodOptions& options = {});
+/// Reads all levels of a streamed set that are there, from `options.level` on: what load_lod_set gives
+/// is the finest, and each node may be shown by any coarser one. `row_ids` are places in load_lod_set's
+/// order. The environment is always shown whole. Errors: load_lod_set's; invalid_file (rows that two
+/// levels share, but where a node names the same rows twice); unsupported (nodes of so few rows that
+/// chunks would be mostly empty). Never throws.
+Result<LoadedLodSet> load_lod_levels(const std::filesystem::path& path,
+                                     const LoadLodOptions& options = {});
 
 }  // namespace gsnav::io

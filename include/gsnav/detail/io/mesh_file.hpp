@@ -29,24 +29,27 @@ Result<TriangleMesh> load_ply_mesh(const std::filesystem::path& path);
 /// stay outside); other primitives, skins and morph targets are left out. Axes and units are the file's.
 /// Memory is bounded by 30 bytes for each byte of the file and its buffers.
 /// Errors: file_not_found; invalid_file (indices, offsets and sizes that do not fit each other or the
-/// bytes there are, no triangle primitive); unsupported (a required extension that is not read: compressed
-/// geometry, say; JSON nested deeper than `limits` allow); invalid_argument (`limits`); out_of_memory.
-/// Never throws.
+/// bytes there are, no triangle primitive); unsupported (a required extension that is not read:
+/// compressed geometry, say; JSON nested deeper than `limits` allow); invalid_argument (`limits`);
+/// out_of_memory. Never throws.
 Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path, const ReadLimits& limits = {});
 
-/// Reads the same triangles with what they look like: a part for each primitive of a mesh, standing wherever nodes show
-/// it; normals, linear vertex colours (COLOR_0), base colour factor and texture with its coordinates
-/// (KHR_texture_transform applied), alpha mode (OPAQUE, MASK with its cut-off, BLEND) with the alphas that it reads, double-sided and KHR_materials_unlit. Pictures are PNG, JPEG (where the
-/// build has libjpeg) or WebP, in the file or beside it; one that cannot be read leaves the factor and a warning. A node
-/// that mirrors or scales unevenly gets a part of its own with its transform applied. Axes and units are the file's.
-/// Errors: as of load_gltf_mesh. Never throws.
+/// Reads the same triangles with what they look like: a part for each primitive of a mesh, standing
+/// wherever nodes show it; normals, linear vertex colours (COLOR_0), base colour factor and texture with
+/// its coordinates (KHR_texture_transform applied), alpha mode (OPAQUE, MASK with its cut-off, BLEND)
+/// with the alphas that it reads, double-sided and KHR_materials_unlit. Pictures are PNG, JPEG (where
+/// the build has libjpeg) or WebP, in the file or beside it; one that cannot be read leaves the factor
+/// and a warning. A node that mirrors or scales unevenly gets a part of its own with its transform
+/// applied. Axes and units are the file's. Errors: as of load_gltf_mesh. Never throws.
 Result<TexturedScene> load_gltf_scene(const std::filesystem::path& path, const ReadLimits& limits = {});
 
-/// Reads what load_mesh reads with what it looks like: glTF by load_gltf_scene, others as one white part.
-/// Errors: as of load_mesh.
-Result<TexturedScene> load_textured_scene(const std::filesystem::path& path, const ReadLimits& limits = {});
+/// Reads what load_mesh reads with what it looks like: glTF by load_gltf_scene, others as one white
+/// part. Errors: as of load_mesh.
+Result<TexturedScene> load_textured_scene(const std::filesystem::path& path,
+                                          const ReadLimits& limits = {});
 
-/// A mesh by its extension: OBJ, PLY or glTF. Error beside its reader's: unsupported (another extension).
+/// A mesh by its extension: OBJ, PLY or glTF. Error beside its reader's: unsupported (another
+/// extension).
 Result<TriangleMesh> load_mesh(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 }  // namespace gsnav::io

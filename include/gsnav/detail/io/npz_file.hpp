@@ -47,12 +47,15 @@ struct NpzEntry {
   std::string name;  ///< without `.npy`
   std::vector<std::size_t> shape;
   /// C order; written as `<f4`, `<f8`, `<i8` or, a text, as `|S` of one element (its shape is ignored).
-  std::variant<std::span<const float>, std::span<const double>, std::span<const std::int64_t>, std::string> values;
+  std::variant<std::span<const float>, std::span<const double>, std::span<const std::int64_t>,
+               std::string>
+      values;
 };
 
 /// Writes the arrays as `.npz`, deflated or stored. The same input gives the same bytes.
 /// Errors: invalid_argument (shape and values disagree, an empty name or one twice); unsupported (4 GiB
 /// or more); file_not_found (parent folder), write_failed.
-Status save_npz(const std::filesystem::path& path, std::span<const NpzEntry> entries, bool deflated = true);
+Status save_npz(const std::filesystem::path& path, std::span<const NpzEntry> entries,
+                bool deflated = true);
 
 }  // namespace gsnav::io

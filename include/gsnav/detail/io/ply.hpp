@@ -22,9 +22,10 @@ namespace gsnav::io {
 /// PlayCanvas' compressed PLY (`.compressed.ply`) is told by its header and read too: `chunk` with 12 or
 /// 18 float properties, `vertex` with four packed uint, and optionally `sh` with 9, 24, 45 or 72 uchar.
 ///
-/// Where f_dc is missing and `red green blue` are there, colours come from these (bytes, 16 bits, or floats in [0, 1]).
-/// A PLY of points with such colours and no shapes at all is read too, as round Gaussians of opacity 0.99 whose standard
-/// deviation is the root mean square distance to the three nearest points, as training begins with them.
+/// Where f_dc is missing and `red green blue` are there, colours come from these (bytes, 16 bits, or
+/// floats in [0, 1]). A PLY of points with such colours and no shapes at all is read too, as round
+/// Gaussians of opacity 0.99 whose standard deviation is the root mean square distance to the three
+/// nearest points, as training begins with them.
 ///
 /// Rows that hold no drawable Gaussian are dropped and counted in the report. Errors: file_not_found;
 /// invalid_file (malformed header, fewer rows than promised, a property missing or twice, a count of

@@ -4,8 +4,8 @@
 namespace gsnav::io {
 
 /// Limits on the work and memory that a file may ask of a reader. A file that exceeds one is refused
-/// with Errc::unsupported (a texture is left out with a warning), naming the field to raise. The defaults
-/// are far above what ordinary files need. A value out of its range is invalid_argument.
+/// with Errc::unsupported (a texture is left out with a warning), naming the field to raise. The
+/// defaults are far above what ordinary files need. A value out of its range is invalid_argument.
 struct ReadLimits {
   /// Arrays and objects inside each other in JSON text. Range [1, 10000]. Readers of JSON that take no
   /// ReadLimits (SOG, cameras, Habitat's configurations, NavMesh settings, avatar scenes) allow 64.

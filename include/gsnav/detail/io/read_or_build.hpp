@@ -19,8 +19,8 @@ void remove_stale_caches(const std::filesystem::path& path) noexcept;
 /// and `build()` give a Result, `save(path, value)` a Status. A file that cannot be taken, and a folder
 /// that cannot be written, are warnings. Errors: those of `build`.
 template <class Cached, class T, class Load, class Build, class Save>
-Result<Cached> read_or_build(const std::filesystem::path& path, T Cached::*value, const Load& load, const Build& build,
-                             const Save& save) {
+Result<Cached> read_or_build(const std::filesystem::path& path, T Cached::*value, const Load& load,
+                             const Build& build, const Save& save) {
   Cached out;
   Result<T> read = load(path);
   if (read) {

@@ -13,10 +13,10 @@ namespace gsnav::io {
 /// without SH bands). SH degree 0 to 3 through the palette. `"antialias": true` sets the filter to mip.
 ///
 /// Memory is bounded by 62 MB and 2 kB for each byte of the planes: constant planes of any size fit into
-/// some bytes. Errors name the file, the field and the value: file_not_found (a plane is missing); invalid_file
-/// (sizes of planes that do not fit the count or each other, a quaternion mode outside 252..255, a
-/// palette label or a codebook index beyond its end, a damaged zip or WebP, more pixels than so few
-/// bytes are believed to hold); unsupported (other versions, lossy planes, encrypted bundles);
+/// some bytes. Errors name the file, the field and the value: file_not_found (a plane is missing);
+/// invalid_file (sizes of planes that do not fit the count or each other, a quaternion mode outside
+/// 252..255, a palette label or a codebook index beyond its end, a damaged zip or WebP, more pixels than
+/// so few bytes are believed to hold); unsupported (other versions, lossy planes, encrypted bundles);
 /// out_of_memory. Never throws.
 Result<LoadedCloud> load_sog(const std::filesystem::path& path);
 

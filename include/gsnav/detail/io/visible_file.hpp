@@ -31,8 +31,9 @@ std::filesystem::path visible_sets_path(const std::string& spec, const GaussianC
 /// Visible sets, and what there is to say of where they came from.
 struct CachedVisibleSets {
   VisibleSets sets;
-  bool built = false;   ///< now; else read
-  std::string warning;  ///< why a file that is there was not taken, or why none could be written; or empty
+  bool built = false;  ///< now; else read
+  std::string
+      warning;  ///< why a file that is there was not taken, or why none could be written; or empty
 };
 
 /// The visible sets of a scene: read where visible_sets_path() has them, else built and written there;
@@ -48,7 +49,9 @@ Result<CachedVisibleSets> cached_visible_sets(B& backend, const std::string& spe
       visible_sets_path(spec, cloud, viewpoints, settings, world_from_asset), &CachedVisibleSets::sets,
       [&](const std::filesystem::path& path) { return load_visible_sets(path, cloud); },
       [&] { return build_visible_sets(backend, cloud, viewpoints, settings, world_from_asset); },
-      [&](const std::filesystem::path& path, const VisibleSets& sets) { return save_visible_sets(path, sets, cloud); });
+      [&](const std::filesystem::path& path, const VisibleSets& sets) {
+        return save_visible_sets(path, sets, cloud);
+      });
 }
 
 }  // namespace gsnav::io

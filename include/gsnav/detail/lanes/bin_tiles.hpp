@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "gsnav/detail/core/parallel.hpp"
-#include "gsnav/detail/lanes/isa.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/lanes/isa.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
@@ -55,8 +55,8 @@ GSNAV_HD void for_each_intersection(const BinArgs<float>& args, const Cull& cull
 
 }  // namespace detail
 
-/// CountTileIntersections with the tiles that the projection found (BinArgs::spans). Notes where each row of tiles
-/// begins and ends and sums up at the end, so that long rows cost no more than short ones.
+/// CountTileIntersections with the tiles that the projection found (BinArgs::spans). Notes where each
+/// row of tiles begins and ends and sums up at the end, so that long rows cost no more than short ones.
 inline void count_tiles(const CountTileIntersections<float>& kernel, std::size_t block) noexcept {
   const BinArgs<float>& args = kernel.args;
   const std::size_t tiles = args.grid.count(), columns = static_cast<std::size_t>(args.grid.columns);
@@ -92,7 +92,8 @@ inline void count_tiles_before_mesh(const CountTileIntersections<float, MeshCull
   const BinArgs<float>& args = kernel.args;
   std::uint64_t* counts = args.cursors.data + block * args.grid.count();
   for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-  detail::for_each_intersection(args, kernel.cull, block, [=](std::size_t tile, std::uint32_t) { ++counts[tile]; });
+  detail::for_each_intersection(args, kernel.cull, block,
+                                [=](std::size_t tile, std::uint32_t) { ++counts[tile]; });
 }
 
 /// ScatterTileIntersections with the tiles that the projection found.
@@ -101,9 +102,9 @@ void scatter_tiles(const ScatterTileIntersections<float, Cull>& kernel, std::siz
   const BinArgs<float>& args = kernel.args;
   std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
   std::uint32_t* out = args.tile_splats.data;
-  detail::for_each_intersection(args, kernel.cull, block, [=](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-    out[cursors[tile]++] = splat;
-  });
+  detail::for_each_intersection(args, kernel.cull, block,
+                                [=](std::size_t tile, std::uint32_t splat)
+                                    GSNAV_INLINED { out[cursors[tile]++] = splat; });
 }
 
 }  // namespace GSNAV_LANES_TAG

@@ -24,10 +24,10 @@ struct BlockLists {
   int counts[kMaxBlocks];
 };
 
-/// Lists the n splats of a batch in the blocks of an image's tile at (tile_x, tile_y) that their ellipses reach
-/// and that are open. The batch is read in whole packs.
-inline void list_blocks(const SplatGeometry<float>* batch, int n, float log2_alpha_min, int tile_x, int tile_y,
-                        int tile_size, const bool* open, BlockLists& lists) noexcept {
+/// Lists the n splats of a batch in the blocks of an image's tile at (tile_x, tile_y) that their
+/// ellipses reach and that are open. The batch is read in whole packs.
+inline void list_blocks(const SplatGeometry<float>* batch, int n, float log2_alpha_min, int tile_x,
+                        int tile_y, int tile_size, const bool* open, BlockLists& lists) noexcept {
   static_assert(sizeof(SplatGeometry<float>) == 8 * sizeof(float));
   // Between which first columns of a block each splat reaches it, by rows of blocks.
   alignas(64) float first[kMaxTile / kBlockHeight][kBatch], last[kMaxTile / kBlockHeight][kBatch];
@@ -45,7 +45,8 @@ inline void list_blocks(const SplatGeometry<float>* batch, int n, float log2_alp
     F top = y0;
     for (int row = 0; row < tile_size / kBlockHeight; ++row) {
       F left, right;
-      const auto reached = footprint.columns(top, top + F(static_cast<float>(kBlockHeight - 1)), left, right);
+      const auto reached =
+          footprint.columns(top, top + F(static_cast<float>(kBlockHeight - 1)), left, right);
       const F from = left - F(static_cast<float>(kBlockWidth - 1));
       select(reached && listed, from, F(std::numeric_limits<float>::infinity())).store(first[row] + j);
       right.store(last[row] + j);

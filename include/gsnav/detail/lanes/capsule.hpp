@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "gsnav/sweep/capsule_batch.hpp"
 #include "gsnav/detail/lanes/isa.hpp"
+#include "gsnav/sweep/capsule_batch.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
@@ -10,7 +10,9 @@ inline namespace GSNAV_LANES_TAG {
 /// kWidth capsules; `read(plane)` has one plane's values of them.
 template <class Read>
 GSNAV_HD Capsule<F> read_capsules(const CapsulePlanes<float>& c, const Read& read) noexcept {
-  return {{read(c.p0[0]), read(c.p0[1]), read(c.p0[2])}, {read(c.p1[0]), read(c.p1[1]), read(c.p1[2])}, read(c.radius)};
+  return {{read(c.p0[0]), read(c.p0[1]), read(c.p0[2])},
+          {read(c.p1[0]), read(c.p1[1]), read(c.p1[2])},
+          read(c.radius)};
 }
 template <class Read>
 GSNAV_HD MovingCapsule<F> read_capsules(const MovingCapsulePlanes<float>& c, const Read& read) noexcept {
@@ -46,18 +48,24 @@ inline void gap_range(const CapsuleGapArgs<float>& args, std::size_t begin, std:
   for (std::size_t i = packs; i < end; ++i) one(i);
 }
 
-GSNAV_HD std::uint8_t sweep_outcome(std::uint32_t hit, std::uint32_t pushed, std::uint32_t closing, int lane) noexcept {
-  const auto bit = [lane](std::uint32_t bits, unsigned flag) noexcept { return (bits >> lane & 1u) != 0 ? flag : 0u; };
-  return static_cast<std::uint8_t>(bit(hit, kSweepHit) | bit(pushed, kSweepPushed) | bit(closing, kSweepAgentClosing));
+GSNAV_HD std::uint8_t sweep_outcome(std::uint32_t hit, std::uint32_t pushed, std::uint32_t closing,
+                                    int lane) noexcept {
+  const auto bit = [lane](std::uint32_t bits, unsigned flag) noexcept {
+    return (bits >> lane & 1u) != 0 ? flag : 0u;
+  };
+  return static_cast<std::uint8_t>(bit(hit, kSweepHit) | bit(pushed, kSweepPushed) |
+                                   bit(closing, kSweepAgentClosing));
 }
 
 /// Writes the lanes of `r`, lane l as pair row(l); `write(plane, values)` does so for one plane.
 template <class Row, class Write>
-GSNAV_HD void write_sweeps(const SweepArgs<float>& args, const SweepResult<F>& r, int lanes, const Row& row,
-                           const Write& write) noexcept {
-  const std::uint32_t hit = lane_bits(r.hit), pushed = lane_bits(r.pushed), closing = lane_bits(r.agent_closing);
+GSNAV_HD void write_sweeps(const SweepArgs<float>& args, const SweepResult<F>& r, int lanes,
+                           const Row& row, const Write& write) noexcept {
+  const std::uint32_t hit = lane_bits(r.hit), pushed = lane_bits(r.pushed),
+                      closing = lane_bits(r.agent_closing);
   for (int l = 0; l < lanes; ++l) args.outcome[row(l)] = 0;
-  for (std::uint32_t eventful = (hit | pushed | closing) & ((1u << lanes) - 1u); eventful != 0; eventful &= eventful - 1) {
+  for (std::uint32_t eventful = (hit | pushed | closing) & ((1u << lanes) - 1u); eventful != 0;
+       eventful &= eventful - 1) {
     const int l = __builtin_ctz(eventful);
     args.outcome[row(l)] = sweep_outcome(hit, pushed, closing, l);
   }
@@ -77,8 +85,8 @@ inline constexpr std::size_t kSweepRange = 1024;
 
 /// SweepPair<float> for the pairs [begin, end), at most kSweepRange; the same bits.
 ///
-/// Most pairs move apart or pass: one evaluation says so. Those that need more are put together afterwards, so that
-/// packs do not wait for one of their lanes.
+/// Most pairs move apart or pass: one evaluation says so. Those that need more are put together
+/// afterwards, so that packs do not wait for one of their lanes.
 inline void sweep_range(const SweepArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   std::uint32_t open[kSweepRange + kWidth];
   std::size_t count = 0;
@@ -88,9 +96,11 @@ inline void sweep_range(const SweepArgs<float>& args, std::size_t begin, std::si
     const auto read = [i](const View<const float>& plane) noexcept { return F::load(plane.data + i); };
     const auto write = [i](const View<float>& plane, const F& v) noexcept { v.store(plane.data + i); };
     mask_of<F> unfinished;
-    const SweepResult<F> r = gsnav::detail::sweep_steps(read_capsules(args.agents, read), read_capsules(args.bodies, read),
-                                                 args.rules, once, unfinished);
-    write_sweeps(args, r, kWidth, [i](int l) noexcept { return i + static_cast<std::size_t>(l); }, write);
+    const SweepResult<F> r =
+        gsnav::detail::sweep_steps(read_capsules(args.agents, read), read_capsules(args.bodies, read),
+                                   args.rules, once, unfinished);
+    write_sweeps(
+        args, r, kWidth, [i](int l) noexcept { return i + static_cast<std::size_t>(l); }, write);
     for (std::uint32_t bits = lane_bits(unfinished); bits != 0; bits &= bits - 1) {
       open[count++] = static_cast<std::uint32_t>(i + static_cast<std::size_t>(__builtin_ctz(bits)));
     }
@@ -98,7 +108,8 @@ inline void sweep_range(const SweepArgs<float>& args, std::size_t begin, std::si
   for (std::size_t first = 0; first < count; first += kWidth) {
     const std::size_t lanes = count - first < kWidth ? count - first : kWidth;
     const std::uint32_t* const rows = open + first;
-    for (std::size_t l = lanes; l < kWidth; ++l) open[first + l] = open[first];  // computed and not written
+    for (std::size_t l = lanes; l < kWidth; ++l)
+      open[first + l] = open[first];  // computed and not written
     const auto read = [rows](const View<const float>& plane) noexcept {
       float v[kWidth];
       for (std::size_t l = 0; l < kWidth; ++l) v[l] = plane[rows[l]];
@@ -107,8 +118,10 @@ inline void sweep_range(const SweepArgs<float>& args, std::size_t begin, std::si
     const auto write = [rows, lanes](const View<float>& plane, const F& v) noexcept {
       for (std::size_t l = 0; l < lanes; ++l) plane[rows[l]] = v[static_cast<int>(l)];
     };
-    const SweepResult<F> r = sweep(read_capsules(args.agents, read), read_capsules(args.bodies, read), args.rules);
-    write_sweeps(args, r, static_cast<int>(lanes), [rows](int l) noexcept { return rows[l]; }, write);
+    const SweepResult<F> r =
+        sweep(read_capsules(args.agents, read), read_capsules(args.bodies, read), args.rules);
+    write_sweeps(
+        args, r, static_cast<int>(lanes), [rows](int l) noexcept { return rows[l]; }, write);
   }
   const SweepPair<float> one{args};
   for (std::size_t i = packs; i < end; ++i) one(i);

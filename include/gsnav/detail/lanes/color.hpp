@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <cstring>
 
-#include "gsnav/detail/lanes/isa.hpp"
 #include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/lanes/isa.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
@@ -19,10 +19,11 @@ struct Survivors {
   std::uint32_t delta[3][kRoom];  ///< bits of floats
 };
 
-/// gaussian_color of kWidth Gaussians of one chunk side by side, the same bits: lane l is row rows[l]. The coefficients
-/// lie row by row; each group of 8 columns is transposed into lanes on its way to the registers.
+/// gaussian_color of kWidth Gaussians of one chunk side by side, the same bits: lane l is row rows[l].
+/// The coefficients lie row by row; each group of 8 columns is transposed into lanes on its way to the
+/// registers.
 GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const std::uint32_t* rows,
-                                     Vec3<F> delta) noexcept {
+                                       Vec3<F> delta) noexcept {
   constexpr int kGroup = 8;
   if (degree > 0) {
     delta = view_direction(delta);
@@ -92,14 +93,18 @@ GSNAV_HD void prefetch_colors(const GaussianView& gs, int degree, std::size_t fi
                            : halves ? static_cast<const void*>(gs.shN_half.data)
                                     : gs.shN.data;
   const std::size_t bytes = codes ? 1 : halves ? sizeof(std::uint16_t) : sizeof(float);
-  const std::size_t stride = bytes * static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  const std::size_t stride =
+      bytes * static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
   const std::size_t begin = stride * first, room = stride * gs.size - begin;
-  const std::size_t rows = stride * static_cast<std::size_t>(kWidth), end = begin + (rows < room ? rows : room);
-  for (std::size_t i = begin; i < end; i += kLine) __builtin_prefetch(static_cast<const char*>(data) + i, 0, 2);
+  const std::size_t rows = stride * static_cast<std::size_t>(kWidth),
+                    end = begin + (rows < room ? rows : room);
+  for (std::size_t i = begin; i < end; i += kLine)
+    __builtin_prefetch(static_cast<const char*>(data) + i, 0, 2);
 }
 
-/// Colours of the `count` survivors of a chunk, to out[0] on. They are read when all of the chunk's geometry has
-/// been written: coefficients are most of what a frame reads, and come fastest as one stream.
+/// Colours of the `count` survivors of a chunk, to out[0] on. They are read when all of the chunk's
+/// geometry has been written: coefficients are most of what a frame reads, and come fastest as one
+/// stream.
 GSNAV_STAGE void color_survivors(const GaussianView& gs, int degree, Survivors& s, std::size_t count,
                                  SplatColor<float>* out) noexcept {
   constexpr std::size_t step = static_cast<std::size_t>(kWidth);
@@ -110,8 +115,8 @@ GSNAV_STAGE void color_survivors(const GaussianView& gs, int degree, Survivors& 
     std::memcpy(delta[0], s.delta[0] + i, sizeof delta[0]);
     std::memcpy(delta[1], s.delta[1] + i, sizeof delta[1]);
     std::memcpy(delta[2], s.delta[2] + i, sizeof delta[2]);
-    const SplatColor<F> c =
-        gaussian_colors(gs, degree, s.rows + i, {F::load(delta[0]), F::load(delta[1]), F::load(delta[2])});
+    const SplatColor<F> c = gaussian_colors(gs, degree, s.rows + i,
+                                            {F::load(delta[0]), F::load(delta[1]), F::load(delta[2])});
     const F columns[4] = {c.r, c.g, c.b, c.pad};
     float rows[4 * kWidth];
     store_columns<4>(columns, rows);

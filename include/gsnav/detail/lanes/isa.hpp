@@ -13,8 +13,8 @@
 #define GSNAV_LANES_TAG baseline
 #endif
 
-/// A stage of a kernel over lanes. It is called, not inlined: a compiler that sees several stages as one function
-/// spills the registers of each. What a stage calls is inlined (GSNAV_HD).
+/// A stage of a kernel over lanes. It is called, not inlined: a compiler that sees several stages as one
+/// function spills the registers of each. What a stage calls is inlined (GSNAV_HD).
 #define GSNAV_STAGE [[gnu::noinline]] inline
 
 namespace gsnav::lanes {

@@ -13,7 +13,8 @@ inline namespace GSNAV_LANES_TAG {
 
 /// Blends one tile in the variant that `args` asks for.
 inline void rasterize_tile_any(const RasterArgs<float>& args, std::size_t tile) noexcept {
-  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool G>() { TileBlender<C, D, M, G>(args, tile).blend(); });
+  dispatch_raster(
+      args, [&]<bool C, DepthMode D, Exp2 M, bool G>() { TileBlender<C, D, M, G>(args, tile).blend(); });
 }
 
 /// The same of frames with a mesh.

@@ -3,10 +3,10 @@
 
 #include <bit>
 
-#include "gsnav/detail/lanes/isa.hpp"
-#include "gsnav/detail/lanes/write_splats.hpp"
 #include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/lanes/isa.hpp"
+#include "gsnav/detail/lanes/write_splats.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {

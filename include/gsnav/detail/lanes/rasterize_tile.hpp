@@ -29,10 +29,10 @@ class Unset {
 };
 
 /// Blends one tile. Splats go in batches: the blocks of pixels that their ellipses reach are found for
-/// kWidth of them side by side, and what their exponents share in a column of pixels is computed once a tile;
-/// then each block runs through its own list with its state in registers. A closed block takes no more
-/// splats, and the tile ends when all are closed. Per pixel the order and the arithmetic are those of
-/// RasterizePixel: the same bits. `Mesh`: those of CompositePixel.
+/// kWidth of them side by side, and what their exponents share in a column of pixels is computed once a
+/// tile; then each block runs through its own list with its state in registers. A closed block takes no
+/// more splats, and the tile ends when all are closed. Per pixel the order and the arithmetic are those
+/// of RasterizePixel: the same bits. `Mesh`: those of CompositePixel.
 template <bool Color, DepthMode D, Exp2 M, bool General, bool Mesh = false>
 class TileBlender {
   /// The median depth is found after a list has run: until then its splat's number does.
@@ -142,7 +142,8 @@ class TileBlender {
 
   /// The tile's place among the kept.
   float* kept() const noexcept {
-    const std::size_t pixels = static_cast<std::size_t>(tile_size_) * static_cast<std::size_t>(tile_size_);
+    const std::size_t pixels =
+        static_cast<std::size_t>(tile_size_) * static_cast<std::size_t>(tile_size_);
     return args_.progress.states.data + tile_ * blend_state_values(D) * pixels;
   }
   std::size_t state_bytes() const noexcept {
@@ -150,7 +151,8 @@ class TileBlender {
     return sizeof(BlendState<F, kLoop>) * static_cast<std::size_t>(tile_size_ * tile_size_ / kWidth);
   }
   std::size_t median_bytes() const noexcept {
-    return D == DepthMode::median ? sizeof(float) * static_cast<std::size_t>(tile_size_ * tile_size_) : 0;
+    return D == DepthMode::median ? sizeof(float) * static_cast<std::size_t>(tile_size_ * tile_size_)
+                                  : 0;
   }
   void keep() noexcept {
     std::memcpy(kept(), states_.bytes(), state_bytes());
@@ -185,16 +187,18 @@ class TileBlender {
       if constexpr (kNeedsId) ids_[j] = ids[j];
       if constexpr (Mesh) rows_[j].far = args_.depths[ids[j]].z + args_.depths[ids[j]].reach;
     }
-    if constexpr (kNeedsId) ids_[kNothing] = ids[0];           // any depth will do
-    if (General && !args_.perspectives.empty()) {  // the footprint is no ellipse: every open block
+    if constexpr (kNeedsId) ids_[kNothing] = ids[0];  // any depth will do
+    if (General && !args_.perspectives.empty()) {     // the footprint is no ellipse: every open block
       for_each_block([&](int block, int, int) {
         lists_.counts[block] = open_[block] ? n : 0;
-        for (int j = 0; j < lists_.counts[block]; ++j) lists_.splats[block][j] = static_cast<std::uint8_t>(j);
+        for (int j = 0; j < lists_.counts[block]; ++j)
+          lists_.splats[block][j] = static_cast<std::uint8_t>(j);
       });
       return;
     }
     for (int j = n; j % kWidth != 0; ++j) geometry_[j] = {};  // lanes that are left out
-    list_blocks(&geometry_[0], n, args_.rules.log2_alpha_min, tile_x_, tile_y_, tile_size_, open_, lists_);
+    list_blocks(&geometry_[0], n, args_.rules.log2_alpha_min, tile_x_, tile_y_, tile_size_, open_,
+                lists_);
     if constexpr (General) return;
     float x[kWidth];
     for (int l = 0; l < kWidth; ++l) x[l] = static_cast<float>(l) + 0.5f;
@@ -231,7 +235,8 @@ class TileBlender {
       }
       if constexpr (Near) last = last_above_half(state.transmittance, F(rows[j].number), last);
       blend_alpha<Color, kLoop, General>(state, rules, alpha, &rows[j].color,
-                                         kLoop == DepthMode::none ? nullptr : &args_.depths[ids_[j]], px, py);
+                                         kLoop == DepthMode::none ? nullptr : &args_.depths[ids_[j]], px,
+                                         py);
     };
     if constexpr (General) {
       for (int i = 0; i < n; ++i) {
@@ -249,7 +254,9 @@ class TileBlender {
       for (int i = 0; i < n; i += kGroup) {
         using Group = Packs<F, kGroup>;
         const std::uint8_t* const j = list + i;
-        const auto gather = [&](const auto& value) { return Group::of([&](int k) { return value(j[k]); }); };
+        const auto gather = [&](const auto& value) {
+          return Group::of([&](int k) { return value(j[k]); });
+        };
         const auto repeated = [](const float* p) { return load_repeated<kBlockWidth, kWidth>(p); };
         const ColumnTerms<Group> terms{gather([&](int s) { return repeated(columns[s].column + at); }),
                                        gather([&](int s) { return repeated(columns[s].w2 + at); })};
@@ -284,7 +291,9 @@ class TileBlender {
     for (int l = 0; l < kWidth; ++l) {
       const int column = min(tile_x_ + x + l % kBlockWidth, args_.grid.width - 1);
       const int row = min(tile_y_ + y + l / kBlockWidth, args_.grid.height - 1);
-      v[l] = image[static_cast<std::ptrdiff_t>(values) * (static_cast<std::ptrdiff_t>(row) * args_.grid.width + column) + value];
+      v[l] = image[static_cast<std::ptrdiff_t>(values) *
+                       (static_cast<std::ptrdiff_t>(row) * args_.grid.width + column) +
+                   value];
     }
     return F::load(v);
   }
@@ -316,7 +325,8 @@ class TileBlender {
   void write() noexcept {
     if constexpr (Mesh) close_blocks();
     const int blocks = tile_size_ / kBlockWidth;
-    for (int y = 0, row = 0; y < tile_size_ && tile_y_ + y < args_.grid.height; y += kBlockHeight, row += blocks) {
+    for (int y = 0, row = 0; y < tile_size_ && tile_y_ + y < args_.grid.height;
+         y += kBlockHeight, row += blocks) {
       for (int x = 0; x < tile_size_ && tile_x_ + x < args_.grid.width; x += kWidth) {
         const BlockRow place(args_.grid, tile_x_ + x, tile_y_ + y, tile_x_ + tile_size_);
         // A small tile's rows are filled up with any block.

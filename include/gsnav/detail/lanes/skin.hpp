@@ -7,8 +7,8 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-// One Gaussian's matrix is blended element beside element, as its joints lie in memory: twelve floats, linear part
-// by rows, then translation. The matrices of a pack are then put side by side, in registers.
+// One Gaussian's matrix is blended element beside element, as its joints lie in memory: twelve floats,
+// linear part by rows, then translation. The matrices of a pack are then put side by side, in registers.
 static_assert(sizeof(Affine3<float>) == 12 * sizeof(float));
 
 /// One Gaussian's blended matrix, and what blend_influences needs of it.
@@ -50,7 +50,8 @@ struct BlendedRow {
 };
 
 template <int K>
-GSNAV_HD BlendedRow blend_row(const float* joints, const std::uint16_t* indices, const float* weights) noexcept {
+GSNAV_HD BlendedRow blend_row(const float* joints, const std::uint16_t* indices,
+                              const float* weights) noexcept {
   return blend_influences<K>(
       [&](int k) GSNAV_INLINED { return BlendedRow::load(joints + std::size_t{12} * indices[k]); },
       [&](int k) GSNAV_INLINED { return BlendedRow::Weight(weights[k]); });
@@ -64,7 +65,9 @@ struct BlendedRows {
 template <int K>
 GSNAV_HD BlendedRows blend_every_fourth(const float* joints, const std::uint16_t* indices,
                                         const float* weights) noexcept {
-  const auto row = [&](int l) noexcept { return blend_row<K>(joints, indices + 4 * K * l, weights + 4 * K * l); };
+  const auto row = [&](int l) noexcept {
+    return blend_row<K>(joints, indices + 4 * K * l, weights + 4 * K * l);
+  };
   const BlendedRow r0 = row(0);
 #if GSNAV_PACK_WIDTH == 16
   const BlendedRow r1 = row(1), r2 = row(2), r3 = row(3);
@@ -94,16 +97,19 @@ struct Columns {
   GSNAV_HD Columns(F::vector a, F::vector b, F::vector c_, F::vector d) noexcept {
     constexpr int w = kWidth;
 #if GSNAV_PACK_WIDTH == 16
-#define GSNAV_PARTS(x, y, i, j, k, l)                                                                           \
-  __builtin_shufflevector(x, y, i, j, k, l, i + 4, j + 4, k + 4, l + 4, i + 8, j + 8, k + 8, l + 8, i + 12, j + 12, \
-                          k + 12, l + 12)
+#define GSNAV_PARTS(x, y, i, j, k, l)                                                               \
+  __builtin_shufflevector(x, y, i, j, k, l, i + 4, j + 4, k + 4, l + 4, i + 8, j + 8, k + 8, l + 8, \
+                          i + 12, j + 12, k + 12, l + 12)
 #elif GSNAV_PACK_WIDTH == 8
-#define GSNAV_PARTS(x, y, i, j, k, l) __builtin_shufflevector(x, y, i, j, k, l, i + 4, j + 4, k + 4, l + 4)
+#define GSNAV_PARTS(x, y, i, j, k, l) \
+  __builtin_shufflevector(x, y, i, j, k, l, i + 4, j + 4, k + 4, l + 4)
 #else
 #define GSNAV_PARTS(x, y, i, j, k, l) __builtin_shufflevector(x, y, i, j, k, l)
 #endif
-    const auto ab_low = GSNAV_PARTS(a, b, 0, w, 1, w + 1), ab_high = GSNAV_PARTS(a, b, 2, w + 2, 3, w + 3);
-    const auto cd_low = GSNAV_PARTS(c_, d, 0, w, 1, w + 1), cd_high = GSNAV_PARTS(c_, d, 2, w + 2, 3, w + 3);
+    const auto ab_low = GSNAV_PARTS(a, b, 0, w, 1, w + 1),
+               ab_high = GSNAV_PARTS(a, b, 2, w + 2, 3, w + 3);
+    const auto cd_low = GSNAV_PARTS(c_, d, 0, w, 1, w + 1),
+               cd_high = GSNAV_PARTS(c_, d, 2, w + 2, 3, w + 3);
     c[0].v = GSNAV_PARTS(ab_low, cd_low, 0, 1, w, w + 1);
     c[1].v = GSNAV_PARTS(ab_low, cd_low, 2, 3, w + 2, w + 3);
     c[2].v = GSNAV_PARTS(ab_high, cd_high, 0, 1, w, w + 1);
@@ -125,21 +131,24 @@ GSNAV_HD Affine3<F> blend_joints(const SkinningArgs<float>& args, std::size_t fi
                     b = blend_every_fourth<K>(joints, indices + K, weights + K),
                     c = blend_every_fourth<K>(joints, indices + 2 * K, weights + 2 * K),
                     d = blend_every_fourth<K>(joints, indices + 3 * K, weights + 3 * K);
-  const Columns m0(a.parts[0], b.parts[0], c.parts[0], d.parts[0]), m1(a.parts[1], b.parts[1], c.parts[1], d.parts[1]),
+  const Columns m0(a.parts[0], b.parts[0], c.parts[0], d.parts[0]),
+      m1(a.parts[1], b.parts[1], c.parts[1], d.parts[1]),
       m2(a.parts[2], b.parts[2], c.parts[2], d.parts[2]);
   return {{{{m0.c[0], m0.c[1], m0.c[2]}, {m0.c[3], m1.c[0], m1.c[1]}, {m1.c[2], m1.c[3], m2.c[0]}}},
           {m2.c[1], m2.c[2], m2.c[3]}};
 }
 
-/// Linear parts of the joints of the greatest weights of the pack that begins at `first`. Rarely called, and
-/// apart, for its loads to take no registers from skin_packs.
+/// Linear parts of the joints of the greatest weights of the pack that begins at `first`. Rarely called,
+/// and apart, for its loads to take no registers from skin_packs.
 template <int K>
-[[gnu::noinline, gnu::cold]] Mat3<F> greatest_joints(const SkinningArgs<float>& args, std::size_t first) noexcept {
+[[gnu::noinline, gnu::cold]] Mat3<F> greatest_joints(const SkinningArgs<float>& args,
+                                                     std::size_t first) noexcept {
   Mat3<F> out;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       float v[kWidth];
-      for (std::size_t l = 0; l < kWidth; ++l) v[l] = args.joints[args.joint_indices[K * (first + l)]].linear(i, j);
+      for (std::size_t l = 0; l < kWidth; ++l)
+        v[l] = args.joints[args.joint_indices[K * (first + l)]].linear(i, j);
       out(i, j) = F::load(v);
     }
   }
@@ -150,7 +159,9 @@ template <int K>
 template <int K>
 GSNAV_HD void skin_packs(const SkinningArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   for (std::size_t first = begin; first < end; first += kWidth) {
-    const auto at = [first](const View<const float>& plane) noexcept { return F::load(plane.data + first); };
+    const auto at = [first](const View<const float>& plane) noexcept {
+      return F::load(plane.data + first);
+    };
     const Affine3<F> blend = blend_joints<K>(args, first);
     const Vec3<F> mean{at(args.means[0]), at(args.means[1]), at(args.means[2])};
     const Quat<F> quat{at(args.quats[0]), at(args.quats[1]), at(args.quats[2]), at(args.quats[3])};

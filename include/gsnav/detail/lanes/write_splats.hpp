@@ -8,10 +8,10 @@
 #include <type_traits>
 
 #include "gsnav/detail/frame/footprint.hpp"
-#include "gsnav/detail/lanes/color.hpp"
-#include "gsnav/detail/lanes/isa.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/lanes/color.hpp"
+#include "gsnav/detail/lanes/isa.hpp"
 #include "gsnav/detail/math/pack_double.hpp"
 
 namespace gsnav::lanes {
@@ -27,7 +27,8 @@ struct ProjectedPack {
 namespace detail {
 
 /// Those of `lanes` whose bounds reach an open cell.
-GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, const PixelBox<F>& box, std::uint32_t lanes) noexcept {
+GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, const PixelBox<F>& box,
+                                     std::uint32_t lanes) noexcept {
   const F inverse(1.0f / OpenCells::kSize), one(1.0f);
   float bounds[4][kWidth];
   truncated(box.x0 * inverse).store(bounds[0]);
@@ -56,7 +57,8 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
   const F inverse(1.0f / static_cast<float>(grid.tile_size));  // a power of two: exact
   const auto tile_of = [inverse](F pixel) noexcept { return truncated(pixel * inverse); };
   const auto whole = [](F x) noexcept { return __builtin_convertvector(x.v, F::ints); };
-  const F tx0 = tile_of(box.x0), tx1 = tile_of(box.x1 - one), ty0 = tile_of(box.y0), ty1 = tile_of(box.y1 - one);
+  const F tx0 = tile_of(box.x0), tx1 = tile_of(box.x1 - one), ty0 = tile_of(box.y0),
+          ty1 = tile_of(box.y1 - one);
   const F rows = (ty1 - ty0) + one;
   const auto large = (rows > F(static_cast<float>(TileSpans::kRows))) ||
                      (tx1 - tx0 >= F(static_cast<float>(TileSpans::kColumns)));
@@ -110,9 +112,9 @@ GSNAV_STAGE bool project_alone(const ProjectArgs<float>& args, const ProjectOutp
 
 }  // namespace detail
 
-/// Writes the survivors `bits` of a pack, in row order, behind the `count` that their chunk has from slot
-/// `base` on: the bits of write_splat, but for colours, which `survivors` are left to. Returns how many had a
-/// pixel centre in their bounds. Contract only: Response::ewa, Compat::none.
+/// Writes the survivors `bits` of a pack, in row order, behind the `count` that their chunk has from
+/// slot `base` on: the bits of write_splat, but for colours, which `survivors` are left to. Returns how
+/// many had a pixel centre in their bounds. Contract only: Response::ewa, Compat::none.
 GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
                                        std::size_t base, std::size_t count, const ProjectedPack& pack,
                                        std::uint32_t bits, Survivors& survivors) noexcept {
@@ -141,7 +143,9 @@ GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, const Pro
     store_columns<8>(columns, geometry);
   }
   {
-    const auto whole = [](F x) noexcept { return detail::as_floats(__builtin_convertvector(x.v, F::ints)); };
+    const auto whole = [](F x) noexcept {
+      return detail::as_floats(__builtin_convertvector(x.v, F::ints));
+    };
     detail::SpanWords spans;
     if (!out.spans.empty()) {
       spans = detail::find_tiles(out.grid, g, camera.log2_alpha_min, box, bits & ~alone);
@@ -167,11 +171,13 @@ GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, const Pro
   float key[kWidth];
   sort_key(args.camera64, pack.key).store(key);
   for (int l = 0; l < kWidth; ++l) keys[l] = camera.key_code(key[l]);
-  const std::uint32_t first = static_cast<std::uint32_t>(pack.first), last = static_cast<std::uint32_t>(gs.size - 1);
+  const std::uint32_t first = static_cast<std::uint32_t>(pack.first),
+                      last = static_cast<std::uint32_t>(gs.size - 1);
   for (std::uint32_t l = 0; l < static_cast<std::uint32_t>(kWidth); ++l) rows[l] = first + l;
   for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + rows[l];
   if (!gs.row_ids.empty() && !out.ranks.empty()) {
-    for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + gs.row_ids[rows[l] < last ? rows[l] : last];
+    for (int l = 0; l < kWidth; ++l)
+      ranks[l] = args.first_rank + gs.row_ids[rows[l] < last ? rows[l] : last];
   }
 
   std::uint32_t written = 0, kept = 0;

@@ -14,8 +14,8 @@ inline namespace GSNAV_LANES_TAG {
 inline constexpr int kRowBlocks = kWidth / kBlockWidth;
 static_assert(kRowBlocks == kBlockHeight);
 
-/// Where kRowBlocks blocks side by side lie in an image: kBlockHeight rows of kWidth pixels, of which `columns` of
-/// `rows` are to be written.
+/// Where kRowBlocks blocks side by side lie in an image: kBlockHeight rows of kWidth pixels, of which
+/// `columns` of `rows` are to be written.
 struct BlockRow {
   std::size_t first;  ///< pixel
   std::size_t stride;
@@ -93,8 +93,8 @@ inline void prefetch_images(const RasterArgs<float>& args, int tile_x, int tile_
     }
   };
   prefetch(out.rgb, 3);
-  for (const float* image : {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth,
-                             out.first_hit_depth}) {
+  for (const float* image :
+       {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth, out.first_hit_depth}) {
     prefetch(image, 1);
   }
 }

@@ -5,8 +5,8 @@
 
 namespace gsnav {
 
-/// A rigid map x -> rotate(real, x) + t as a unit dual quaternion, whose dual part is t * real / 2 with t as (0, t).
-/// (real, dual) and (-real, -dual) are the same map.
+/// A rigid map x -> rotate(real, x) + t as a unit dual quaternion, whose dual part is t * real / 2 with
+/// t as (0, t). (real, dual) and (-real, -dual) are the same map.
 template <class L>
 struct DualQuat {
   Quat<L> real{};
@@ -26,8 +26,9 @@ GSNAV_HD constexpr DualQuat<T> dual_quat_cast(const DualQuat<U>& q) noexcept {
   return {quat_cast<T>(q.real), quat_cast<T>(q.dual)};
 }
 
-/// The translation of the rigid map that a dual quaternion of any length stands for. A part of `dual` along `real`,
-/// which sums of unit dual quaternions have, is left out, as dividing by the dual norm would.
+/// The translation of the rigid map that a dual quaternion of any length stands for. A part of `dual`
+/// along `real`, which sums of unit dual quaternions have, is left out, as dividing by the dual norm
+/// would.
 template <class L>
 GSNAV_HD Vec3<L> translation_of(const DualQuat<L>& q) noexcept {
   const Quat<L> t = q.dual * conjugate(q.real);

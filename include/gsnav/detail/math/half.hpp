@@ -10,8 +10,9 @@ namespace gsnav {
 /// The largest finite binary16.
 inline constexpr float kLargestHalf = 65504.0f;
 
-/// The value of a finite IEEE 754 binary16, exactly, subnormal ones too: its bits become a float's with another bias,
-/// and a product with a power of two sets that right. Infinities and NaN have no place in what is stored so.
+/// The value of a finite IEEE 754 binary16, exactly, subnormal ones too: its bits become a float's with
+/// another bias, and a product with a power of two sets that right. Infinities and NaN have no place in
+/// what is stored so.
 GSNAV_HD float half_to_float(std::uint16_t half) noexcept {
 #if defined(__CUDA_ARCH__)
   float value;
@@ -30,7 +31,8 @@ GSNAV_HD std::uint16_t half_of_float(float value) noexcept {
   if (!(magnitude == magnitude)) return 0;
   magnitude = min(magnitude, kLargestHalf);
   // Below 2^-14 steps are 2^-24; adding 2^-1 leaves just these in a float's mantissa, rounded to even.
-  if (magnitude < 0x1p-14f) return static_cast<std::uint16_t>(sign | (bits_of(magnitude + 0.5f) - bits_of(0.5f)));
+  if (magnitude < 0x1p-14f)
+    return static_cast<std::uint16_t>(sign | (bits_of(magnitude + 0.5f) - bits_of(0.5f)));
   const std::uint32_t bits = bits_of(magnitude) - (112u << 23);
   return static_cast<std::uint16_t>(sign | (bits + 0xfffu + (bits >> 13 & 1u)) >> 13);
 }

@@ -302,14 +302,16 @@ GSNAV_HD Pack<float, N> sqrt_above(Pack<float, N> a) noexcept {
 #endif
 #if defined(__AVX__)
   if constexpr (N == 8) {  // 1.5 * 2^-12
-    return positive * (Pack<float, N>(reinterpret_cast<V>(_mm256_rsqrt_ps(reinterpret_cast<__m256>(positive.v)))) *
-                       Pack<float, N>(1.0004f));
+    return positive *
+           (Pack<float, N>(reinterpret_cast<V>(_mm256_rsqrt_ps(reinterpret_cast<__m256>(positive.v)))) *
+            Pack<float, N>(1.0004f));
   }
 #endif
 #if defined(__SSE2__)
   if constexpr (N == 4) {
-    return positive * (Pack<float, N>(reinterpret_cast<V>(_mm_rsqrt_ps(reinterpret_cast<__m128>(positive.v)))) *
-                       Pack<float, N>(1.0004f));
+    return positive *
+           (Pack<float, N>(reinterpret_cast<V>(_mm_rsqrt_ps(reinterpret_cast<__m128>(positive.v)))) *
+            Pack<float, N>(1.0004f));
   }
 #endif
   return sqrt(a);

@@ -7,8 +7,8 @@
 
 #include "gsnav/detail/math/pack.hpp"
 
-// Lanes of doubles, half as many as of floats, for the little that float cannot hold: each lane has the bits
-// of the scalar function.
+// Lanes of doubles, half as many as of floats, for the little that float cannot hold: each lane has the
+// bits of the scalar function.
 
 namespace gsnav {
 
@@ -112,7 +112,8 @@ GSNAV_HD Pack<double, N / 2> widened(Pack<float, N> a, std::index_sequence<Lane.
   return P(__builtin_convertvector(half, typename P::vector));
 }
 template <int N, std::size_t... Lane>
-GSNAV_HD Pack<float, 2 * N> rounded(Pack<double, N> low, Pack<double, N> high, std::index_sequence<Lane...>) noexcept {
+GSNAV_HD Pack<float, 2 * N> rounded(Pack<double, N> low, Pack<double, N> high,
+                                    std::index_sequence<Lane...>) noexcept {
   using P = Pack<double, N>;
   const typename P::floats l = __builtin_convertvector(low.v, typename P::floats);
   const typename P::floats h = __builtin_convertvector(high.v, typename P::floats);
@@ -138,14 +139,16 @@ GSNAV_HD Pack<double, N> fma(Pack<double, N> a, Pack<double, N> b, Pack<double, 
   using P = Pack<double, N>;
 #if defined(__AVX512F__)
   if constexpr (N == 8) {
-    return P(reinterpret_cast<typename P::vector>(_mm512_fmadd_pd(
-        reinterpret_cast<__m512d>(a.v), reinterpret_cast<__m512d>(b.v), reinterpret_cast<__m512d>(c.v))));
+    return P(reinterpret_cast<typename P::vector>(_mm512_fmadd_pd(reinterpret_cast<__m512d>(a.v),
+                                                                  reinterpret_cast<__m512d>(b.v),
+                                                                  reinterpret_cast<__m512d>(c.v))));
   }
 #endif
 #if defined(__FMA__)
   if constexpr (N == 4) {
-    return P(reinterpret_cast<typename P::vector>(_mm256_fmadd_pd(
-        reinterpret_cast<__m256d>(a.v), reinterpret_cast<__m256d>(b.v), reinterpret_cast<__m256d>(c.v))));
+    return P(reinterpret_cast<typename P::vector>(_mm256_fmadd_pd(reinterpret_cast<__m256d>(a.v),
+                                                                  reinterpret_cast<__m256d>(b.v),
+                                                                  reinterpret_cast<__m256d>(c.v))));
   }
 #endif
   P r;

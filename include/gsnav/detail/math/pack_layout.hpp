@@ -34,8 +34,8 @@ GSNAV_HD Pack<float, N> load_repeated(const float* p) noexcept {
 }
 
 namespace detail {
-/// Lane l of the K-th pack of interleaved triples comes from pixel (K N + l) / 3. Step 0 places the first and
-/// second of each triple, step 1 the third.
+/// Lane l of the K-th pack of interleaved triples comes from pixel (K N + l) / 3. Step 0 places the
+/// first and second of each triple, step 1 the third.
 template <int N, int K, int Step>
 constexpr int interleaved_lane(int l) noexcept {
   const int pixel = (K * N + l) / 3, component = (K * N + l) % 3;
@@ -45,14 +45,17 @@ constexpr int interleaved_lane(int l) noexcept {
 template <int K, int N, std::size_t... Lane>
 GSNAV_HD Pack<float, N> interleaved(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c,
                                     std::index_sequence<Lane...>) noexcept {
-  const auto ab = __builtin_shufflevector(a.v, b.v, interleaved_lane<N, K, 0>(static_cast<int>(Lane))...);
-  return Pack<float, N>(__builtin_shufflevector(ab, c.v, interleaved_lane<N, K, 1>(static_cast<int>(Lane))...));
+  const auto ab =
+      __builtin_shufflevector(a.v, b.v, interleaved_lane<N, K, 0>(static_cast<int>(Lane))...);
+  return Pack<float, N>(
+      __builtin_shufflevector(ab, c.v, interleaved_lane<N, K, 1>(static_cast<int>(Lane))...));
 }
 }  // namespace detail
 
 /// Writes a[0], b[0], c[0], a[1], ...: 3 N floats.
 template <int N>
-GSNAV_HD void store_interleaved(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c, float* out) noexcept {
+GSNAV_HD void store_interleaved(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c,
+                                float* out) noexcept {
   constexpr auto lanes = std::make_index_sequence<static_cast<std::size_t>(N)>{};
   detail::interleaved<0>(a, b, c, lanes).store(out);
   detail::interleaved<1>(a, b, c, lanes).store(out + N);
@@ -60,8 +63,8 @@ GSNAV_HD void store_interleaved(Pack<float, N> a, Pack<float, N> b, Pack<float, 
 }
 
 namespace detail {
-/// Chunk `Chunk` of pack a, then that of pack b, where packs are of chunks of W lanes: of both, those that are
-/// `Every` apart from `First` on.
+/// Chunk `Chunk` of pack a, then that of pack b, where packs are of chunks of W lanes: of both, those
+/// that are `Every` apart from `First` on.
 template <int W, int N>
 constexpr int chunk_lane(int l, int first, int every) noexcept {
   constexpr int kHalf = N / W / 2;  // chunks of the result that come from a
@@ -69,7 +72,8 @@ constexpr int chunk_lane(int l, int first, int every) noexcept {
   return (chunk >= kHalf ? N : 0) + (first + every * (chunk % kHalf)) * W + l % W;
 }
 template <int W, int First, int Every, int N, std::size_t... Lane>
-GSNAV_HD Pack<float, N> chunks(Pack<float, N> a, Pack<float, N> b, std::index_sequence<Lane...>) noexcept {
+GSNAV_HD Pack<float, N> chunks(Pack<float, N> a, Pack<float, N> b,
+                               std::index_sequence<Lane...>) noexcept {
   return Pack<float, N>(
       __builtin_shufflevector(a.v, b.v, chunk_lane<W, N>(static_cast<int>(Lane), First, Every)...));
 }
@@ -98,8 +102,8 @@ GSNAV_HD void transpose_chunks(Pack<float, N>* v) noexcept {
   }
 }
 
-/// Writes first + l for each lane l of `m`, in order, and returns how many. Up to N bytes from `out` on are
-/// overwritten.
+/// Writes first + l for each lane l of `m`, in order, and returns how many. Up to N bytes from `out` on
+/// are overwritten.
 template <int N>
 GSNAV_HD int store_lane_indices(Mask<N> m, int first, std::uint8_t* out) noexcept {
 #if defined(__AVX512F__)
@@ -114,18 +118,21 @@ GSNAV_HD int store_lane_indices(Mask<N> m, int first, std::uint8_t* out) noexcep
 #endif
   {
     int count = 0;
-    for (std::uint32_t bits = lane_bits(m); bits != 0; bits &= bits - 1) out[count++] = static_cast<std::uint8_t>(first + __builtin_ctz(bits));
+    for (std::uint32_t bits = lane_bits(m); bits != 0; bits &= bits - 1)
+      out[count++] = static_cast<std::uint8_t>(first + __builtin_ctz(bits));
     return count;
   }
 }
 
 /// Writes the lanes of `bits` to consecutive places from `out` on, nothing else, and returns how many.
 template <int N>
-GSNAV_HD int store_lanes(std::uint32_t bits, const std::uint32_t (&lanes)[N], std::uint32_t* out) noexcept {
+GSNAV_HD int store_lanes(std::uint32_t bits, const std::uint32_t (&lanes)[N],
+                         std::uint32_t* out) noexcept {
 #if defined(__AVX512F__)
   if constexpr (N == 16) {
     const int count = __builtin_popcount(bits);
-    const __m512i packed = _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), _mm512_loadu_si512(lanes));
+    const __m512i packed =
+        _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), _mm512_loadu_si512(lanes));
     _mm512_mask_storeu_epi32(out, static_cast<__mmask16>((1u << count) - 1u), packed);
     return count;
   } else
@@ -144,14 +151,18 @@ GSNAV_HD void transpose_halves(PackTypes<16>::f* r) noexcept {
   using V = PackTypes<16>::f;
   V t[8];
   for (int i = 0; i < 8; i += 2) {
-    t[i] = __builtin_shufflevector(r[i], r[i + 1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    t[i + 1] = __builtin_shufflevector(r[i], r[i + 1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    t[i] = __builtin_shufflevector(r[i], r[i + 1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13,
+                                   29);
+    t[i + 1] = __builtin_shufflevector(r[i], r[i + 1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14,
+                                       30, 15, 31);
   }
   for (int i = 0; i < 8; i += 4) {
     for (int h = 0; h < 2; ++h) {
       const V a = t[i + h], b = t[i + 2 + h];
-      r[i + 2 * h] = __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-      r[i + 2 * h + 1] = __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
+      r[i + 2 * h] =
+          __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+      r[i + 2 * h + 1] =
+          __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
     }
   }
   for (int i = 0; i < 4; ++i) {
@@ -192,13 +203,20 @@ GSNAV_HD void load_columns(const float* const (&rows)[N], Pack<float, N>* column
       const auto high = __builtin_shufflevector(row(i + 8), row(i + 12), 0, 1, 2, 3, 4, 5, 6, 7);
       r[i] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     }
-    const V t0 = __builtin_shufflevector(r[0], r[1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V t1 = __builtin_shufflevector(r[0], r[1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const V t2 = __builtin_shufflevector(r[2], r[3], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V t3 = __builtin_shufflevector(r[2], r[3], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    columns[0].v = __builtin_shufflevector(t0, t2, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-    columns[1].v = __builtin_shufflevector(t0, t2, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
-    columns[2].v = __builtin_shufflevector(t1, t3, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+    const V t0 =
+        __builtin_shufflevector(r[0], r[1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    const V t1 =
+        __builtin_shufflevector(r[0], r[1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    const V t2 =
+        __builtin_shufflevector(r[2], r[3], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    const V t3 =
+        __builtin_shufflevector(r[2], r[3], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    columns[0].v =
+        __builtin_shufflevector(t0, t2, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+    columns[1].v =
+        __builtin_shufflevector(t0, t2, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
+    columns[2].v =
+        __builtin_shufflevector(t1, t3, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
     return;
   }
 #endif
@@ -226,7 +244,8 @@ GSNAV_HD void store_columns(const Pack<float, N>* columns, float* matrix) noexce
     detail::transpose_halves(r);
     for (int i = 0; i < 8; ++i) {
       Pack<float, 8>(__builtin_shufflevector(r[i], r[i], 0, 1, 2, 3, 4, 5, 6, 7)).store(matrix + 8 * i);
-      Pack<float, 8>(__builtin_shufflevector(r[i], r[i], 8, 9, 10, 11, 12, 13, 14, 15)).store(matrix + 8 * (i + 8));
+      Pack<float, 8>(__builtin_shufflevector(r[i], r[i], 8, 9, 10, 11, 12, 13, 14, 15))
+          .store(matrix + 8 * (i + 8));
     }
     return;
   }
@@ -235,15 +254,20 @@ GSNAV_HD void store_columns(const Pack<float, N>* columns, float* matrix) noexce
   if constexpr (N == 16 && K == 4) {
     using V = typename Pack<float, 16>::vector;
     const V a = columns[0].v, b = columns[1].v, c = columns[2].v, d = columns[3].v;
-    const V ab0 = __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V ab1 = __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const V cd0 = __builtin_shufflevector(c, d, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V cd1 = __builtin_shufflevector(c, d, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    const V ab0 =
+        __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    const V ab1 =
+        __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    const V cd0 =
+        __builtin_shufflevector(c, d, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    const V cd1 =
+        __builtin_shufflevector(c, d, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
     // Rows 0, 4, 8 and 12; 1, 5, ...; four floats each.
-    const V r[4] = {__builtin_shufflevector(ab0, cd0, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
-                    __builtin_shufflevector(ab0, cd0, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31),
-                    __builtin_shufflevector(ab1, cd1, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
-                    __builtin_shufflevector(ab1, cd1, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)};
+    const V r[4] = {
+        __builtin_shufflevector(ab0, cd0, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
+        __builtin_shufflevector(ab0, cd0, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31),
+        __builtin_shufflevector(ab1, cd1, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
+        __builtin_shufflevector(ab1, cd1, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)};
     for (int i = 0; i < 4; ++i) {
       Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 0, 1, 2, 3)).store(matrix + 4 * i);
       Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 4, 5, 6, 7)).store(matrix + 4 * (i + 4));

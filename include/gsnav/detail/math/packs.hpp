@@ -5,8 +5,9 @@
 
 namespace gsnav {
 
-/// G packs that are computed with side by side. A processor looks only so far ahead for instructions that need
-/// not wait for others: in chains as long as exp2's it runs dry, but not where each step is that of G chains.
+/// G packs that are computed with side by side. A processor looks only so far ahead for instructions
+/// that need not wait for others: in chains as long as exp2's it runs dry, but not where each step is
+/// that of G chains.
 template <class P, int G>
 struct Packs {
   P v[G];
@@ -55,7 +56,8 @@ GSNAV_HD PackMasks<P, G> operator>=(const Packs<P, G>& a, const Packs<P, G>& b) 
   return r;
 }
 template <class P, int G>
-GSNAV_HD Packs<P, G> select(const PackMasks<P, G>& m, const Packs<P, G>& a, const Packs<P, G>& b) noexcept {
+GSNAV_HD Packs<P, G> select(const PackMasks<P, G>& m, const Packs<P, G>& a,
+                            const Packs<P, G>& b) noexcept {
   return Packs<P, G>::of([&](int i) GSNAV_INLINED { return select(m.v[i], a.v[i], b.v[i]); });
 }
 template <class P, int G>

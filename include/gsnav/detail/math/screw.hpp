@@ -14,11 +14,12 @@ struct RigidPose {
   Vec3<S> translation{};
 };
 
-/// What lies at u in [0, 1] between the rigid poses a and b: a screw motion (Chasles), the shorter way round, turning
-/// and advancing at constant rates about an axis that is fixed both in space and in the body. Unlike slerp beside a
-/// straight line it does not depend on which point of the body is called its origin. No special case for
-/// small angles: with t the translation from a to b in a's frame, theta the angle and n the axis, the part of t across
-/// n becomes sin(u theta / 2) / sin(theta / 2) times itself turned by (u - 1) theta / 2 about n.
+/// What lies at u in [0, 1] between the rigid poses a and b: a screw motion (Chasles), the shorter way
+/// round, turning and advancing at constant rates about an axis that is fixed both in space and in the
+/// body. Unlike slerp beside a straight line it does not depend on which point of the body is called its
+/// origin. No special case for small angles: with t the translation from a to b in a's frame, theta the
+/// angle and n the axis, the part of t across n becomes sin(u theta / 2) / sin(theta / 2) times itself
+/// turned by (u - 1) theta / 2 about n.
 template <class S>
 RigidPose<S> screw_between(const RigidPose<S>& a, const RigidPose<S>& b, S u) noexcept {
   const Quat<S> back = conjugate(a.rotation);
@@ -33,7 +34,8 @@ RigidPose<S> screw_between(const RigidPose<S>& a, const RigidPose<S>& b, S u) no
   const Vec3<S> n = axis * (S(1) / sine);
   const S half = std::atan2(sine, turn.w);
   const Vec3<S> along = n * dot(way, n), across = way - along;
-  const Vec3<S> moved = along * u + rotate(axis_angle(n, (u - S(1)) * half), across) * (std::sin(u * half) / sine);
+  const Vec3<S> moved =
+      along * u + rotate(axis_angle(n, (u - S(1)) * half), across) * (std::sin(u * half) / sine);
   Quat<S> rotation = a.rotation * axis_angle(n, S(2) * u * half);
   normalize(rotation);
   return {rotation, a.translation + rotate(a.rotation, moved)};

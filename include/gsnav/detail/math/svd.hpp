@@ -6,18 +6,19 @@
 
 namespace gsnav {
 
-/// m = left diag(values) transpose(right), with left and right rotations: the values come greatest first and only the
-/// last may be negative, where det(m) is. So all three are continuous where a body folds over.
+/// m = left diag(values) transpose(right), with left and right rotations: the values come greatest first
+/// and only the last may be negative, where det(m) is. So all three are continuous where a body folds
+/// over.
 template <class L>
 struct Svd3 {
   Vec3<L> left[3], right[3];  ///< columns
   L values[3];
 };
 
-/// Singular values and vectors by one-sided Jacobi rotations (Hestenes 1958): columns of m are turned among each other
-/// until they are orthogonal, in five sweeps. Error of a value: 2e-6 of the greatest in float, 4e-15 in double. Where
-/// the second value is below 1e-4 of the first, the vectors that go with it are any that are orthogonal to the
-/// first.
+/// Singular values and vectors by one-sided Jacobi rotations (Hestenes 1958): columns of m are turned
+/// among each other until they are orthogonal, in five sweeps. Error of a value: 2e-6 of the greatest in
+/// float, 4e-15 in double. Where the second value is below 1e-4 of the first, the vectors that go with
+/// it are any that are orthogonal to the first.
 template <class L>
 GSNAV_HD Svd3<L> svd(const Mat3<L>& m) noexcept {
   using S = scalar_of<L>;
@@ -29,7 +30,8 @@ GSNAV_HD Svd3<L> svd(const Mat3<L>& m) noexcept {
     for (const auto& pair : kPairs) {
       Vec3<L>&p = a[pair[0]], &q = a[pair[1]], &vp = v[pair[0]], &vq = v[pair[1]];
       const L pp = dot(p, p), qq = dot(q, q), pq = dot(p, q);
-      // tan of the angle: the smaller root of t^2 + 2 z t - 1, z = (qq - pp) / (2 pq), times pq to spare its zeros.
+      // tan of the angle: the smaller root of t^2 + 2 z t - 1, z = (qq - pp) / (2 pq), times pq to spare
+      // its zeros.
       const L z = L(S(0.5)) * (qq - pp), length = sqrt(fma(z, z, pq * pq)) + abs(z);
       const auto turns = length > zero;
       L t = pq / select(turns, length, one);
@@ -42,7 +44,8 @@ GSNAV_HD Svd3<L> svd(const Mat3<L>& m) noexcept {
       vq = vp0 * s + vq * c;
     }
   }
-  // Greatest first; a column that changes places with another changes its sign, so that v stays a rotation.
+  // Greatest first; a column that changes places with another changes its sign, so that v stays a
+  // rotation.
   for (const auto& pair : kPairs) {
     Vec3<L>&p = a[pair[0]], &q = a[pair[1]], &vp = v[pair[0]], &vq = v[pair[1]];
     const auto swap = dot(q, q) > dot(p, p);

@@ -11,13 +11,13 @@
 
 namespace gsnav {
 
-/// Bits of a pixel's fraction, and how far from the image's centre a vertex may lie, in pixels: edge functions of
-/// such vertices at pixel centres are below 2^62.
+/// Bits of a pixel's fraction, and how far from the image's centre a vertex may lie, in pixels: edge
+/// functions of such vertices at pixel centres are below 2^62.
 inline constexpr int kMeshSubpixelBits = 14;
 inline constexpr double kMeshGuard = 32768;
 
-/// Why a vertex cannot be projected as it is (the first five, in the order they are clipped in), and on which side of
-/// the image it lies.
+/// Why a vertex cannot be projected as it is (the first five, in the order they are clipped in), and on
+/// which side of the image it lies.
 enum MeshOutcode : std::uint32_t {
   kMeshNear = 1u << 0,
   kMeshGuardLeft = 1u << 1,
@@ -44,17 +44,23 @@ struct MeshCamera {
   int width = 0, height = 0;
 
   static MeshCamera of(const Camera& c) noexcept {
-    return {c.fx, c.fy, c.cx - 0.5 * c.width, c.cy - 0.5 * c.height, 0.5 * c.width, 0.5 * c.height, c.near_plane,
-            c.width, c.height};
+    return {c.fx,          c.fy,           c.cx - 0.5 * c.width, c.cy - 0.5 * c.height,
+            0.5 * c.width, 0.5 * c.height, c.near_plane,         c.width,
+            c.height};
   }
   /// Positive inside plane k of the first five outcodes.
   GSNAV_HD double distance(int k, const Vec3d& p) const noexcept {
     switch (k) {
-      case 0: return p.z - near_plane;
-      case 1: return fma(fx, p.x, (kMeshGuard + cx) * p.z);
-      case 2: return fma(-fx, p.x, (kMeshGuard - cx) * p.z);
-      case 3: return fma(fy, p.y, (kMeshGuard + cy) * p.z);
-      default: return fma(-fy, p.y, (kMeshGuard - cy) * p.z);
+      case 0:
+        return p.z - near_plane;
+      case 1:
+        return fma(fx, p.x, (kMeshGuard + cx) * p.z);
+      case 2:
+        return fma(-fx, p.x, (kMeshGuard - cx) * p.z);
+      case 3:
+        return fma(fy, p.y, (kMeshGuard + cy) * p.z);
+      default:
+        return fma(-fy, p.y, (kMeshGuard - cy) * p.z);
     }
   }
   GSNAV_HD std::uint32_t outcode(const Vec3d& p) const noexcept {
@@ -63,7 +69,8 @@ struct MeshCamera {
     for (int k = 0; k < kMeshClipPlanes; ++k) {
       if (!(distance(k, p) >= 0)) code |= 1u << k;
     }
-    // Linear in p: a triangle all of whose corners are on one side is there, whatever lies behind the camera.
+    // Linear in p: a triangle all of whose corners are on one side is there, whatever lies behind the
+    // camera.
     if (fma(fx, p.x, (half_width + cx) * p.z) < 0) code |= kMeshLeft;
     if (fma(-fx, p.x, (half_width - cx) * p.z) < 0) code |= kMeshRight;
     if (fma(fy, p.y, (half_height + cy) * p.z) < 0) code |= kMeshTop;
@@ -86,13 +93,15 @@ GSNAV_HD std::int32_t snap_to_lattice(double pixels) noexcept {
 /// Projects a point inside all planes.
 GSNAV_HD MeshPoint project_to_lattice(const MeshCamera& c, const Vec3d& p) noexcept {
   const double inverse = 1.0 / p.z;
-  return {snap_to_lattice(fma(c.fx, p.x * inverse, c.cx)), snap_to_lattice(fma(c.fy, p.y * inverse, c.cy))};
+  return {snap_to_lattice(fma(c.fx, p.x * inverse, c.cx)),
+          snap_to_lattice(fma(c.fy, p.y * inverse, c.cy))};
 }
 
-/// Clips a triangle to the planes of `codes` (Sutherland-Hodgman); returns how many corners it then has. The point
-/// where an edge leaves is computed from its end inside to its end outside: both triangles of the edge get the
-/// same one.
-GSNAV_HD int clip_triangle(const MeshCamera& camera, std::uint32_t codes, Vec3d (&p)[kMeshMostCorners]) noexcept {
+/// Clips a triangle to the planes of `codes` (Sutherland-Hodgman); returns how many corners it then has.
+/// The point where an edge leaves is computed from its end inside to its end outside: both triangles of
+/// the edge get the same one.
+GSNAV_HD int clip_triangle(const MeshCamera& camera, std::uint32_t codes,
+                           Vec3d (&p)[kMeshMostCorners]) noexcept {
   int n = 3;
   for (int k = 0; k < kMeshClipPlanes; ++k) {
     if ((codes >> k & 1u) == 0) continue;
@@ -106,7 +115,8 @@ GSNAV_HD int clip_triangle(const MeshCamera& camera, std::uint32_t codes, Vec3d 
       const Vec3d &in = da >= 0 ? a : b, &outside = da >= 0 ? b : a;
       const double d_in = da >= 0 ? da : db, d_out = da >= 0 ? db : da;
       const double t = d_in / (d_in - d_out);
-      Vec3d q{fma(outside.x - in.x, t, in.x), fma(outside.y - in.y, t, in.y), fma(outside.z - in.z, t, in.z)};
+      Vec3d q{fma(outside.x - in.x, t, in.x), fma(outside.y - in.y, t, in.y),
+              fma(outside.z - in.z, t, in.z)};
       q.z = max(q.z, camera.near_plane);  // whatever rounding made of it
       out[m++] = q;
     }

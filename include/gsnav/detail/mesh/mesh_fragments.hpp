@@ -39,7 +39,8 @@ GSNAV_HD void for_each_fragment(const FragmentArgs<S>& args, std::size_t tile, c
     const MeshTriangle<S>& t = args.raster.triangles[bin.tile_splats[i]];
     for_each_span(grid, t, max(tile_x, int{t.x0}), max(tile_y, int{t.y0}),
                   min(min(tile_x + ts, grid.width), int{t.x1}),
-                  min(min(tile_y + ts, grid.height), int{t.y1}), [&](int y, int left, int right) GSNAV_INLINED {
+                  min(min(tile_y + ts, grid.height), int{t.y1}),
+                  [&](int y, int left, int right) GSNAV_INLINED {
                     for (int x = left; x < right; ++x) {
                       const std::size_t pixel =
                           static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
@@ -72,12 +73,14 @@ template <class S>
 struct CountFragments {
   FragmentArgs<S> args;
   GSNAV_HD void operator()(std::size_t tile) const noexcept {
-    detail::for_each_tile_pixel(args.raster.bin.grid, tile, [&](std::size_t p) GSNAV_INLINED { args.ranges[p] = {}; });
+    detail::for_each_tile_pixel(args.raster.bin.grid, tile,
+                                [&](std::size_t p) GSNAV_INLINED { args.ranges[p] = {}; });
     std::uint64_t sum = 0;
-    detail::for_each_fragment(args, tile, [&](std::size_t p, const MeshTriangle<S>&, int, int, S) GSNAV_INLINED {
-      ++args.ranges[p].count;
-      ++sum;
-    });
+    detail::for_each_fragment(args, tile,
+                              [&](std::size_t p, const MeshTriangle<S>&, int, int, S) GSNAV_INLINED {
+                                ++args.ranges[p].count;
+                                ++sum;
+                              });
     args.tile_begin[tile] = sum;
   }
 };
@@ -105,14 +108,13 @@ struct FillFragments {
       next += r.count;
       r.count = 0;
     });
-    detail::for_each_fragment(args, tile,
-                              [&](std::size_t p, const MeshTriangle<S>& t, int x, int y, S z) GSNAV_INLINED {
-                                const MeshPlacement& placement = args.raster.placements[t.placement];
-                                const SurfacePoint<S> at = surface_point(placement.mesh, t, x, y, z);
-                                const S alpha = surface_alpha(placement.mesh, t, at);
-                                if (alpha > S(0))
-                                  insert(args.ranges[p], shaded(placement, t, at, alpha));
-                              });
+    detail::for_each_fragment(
+        args, tile, [&](std::size_t p, const MeshTriangle<S>& t, int x, int y, S z) GSNAV_INLINED {
+          const MeshPlacement& placement = args.raster.placements[t.placement];
+          const SurfacePoint<S> at = surface_point(placement.mesh, t, x, y, z);
+          const S alpha = surface_alpha(placement.mesh, t, at);
+          if (alpha > S(0)) insert(args.ranges[p], shaded(placement, t, at, alpha));
+        });
   }
 
  private:

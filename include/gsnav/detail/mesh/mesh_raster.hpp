@@ -4,17 +4,18 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/detail/mesh/mesh_surface.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/mesh/mesh_surface.hpp"
 
 // Which triangle each pixel shows, and how far it is: the visibility pass. Nothing is shaded here.
 
 namespace gsnav {
 
-/// The three edge functions of a triangle at pixel centres, exactly: all are >= 0 at the pixels that it owns. An
-/// edge owns a centre on it if it is a top or a left one, so that of two triangles that share it one does.
+/// The three edge functions of a triangle at pixel centres, exactly: all are >= 0 at the pixels that it
+/// owns. An edge owns a centre on it if it is a top or a left one, so that of two triangles that share
+/// it one does.
 struct MeshEdges {
-  std::int64_t at[3];      ///< at the centre of the pixel asked for
+  std::int64_t at[3];                 ///< at the centre of the pixel asked for
   std::int64_t step_x[3], step_y[3];  ///< a pixel right, a pixel down
 
   template <class S>
@@ -43,8 +44,8 @@ struct MeshEdges {
   /// Whether some pixel of the w x h from the one asked for on may be inside.
   GSNAV_HD bool reach(int w, int h) const noexcept {
     for (int i = 0; i < 3; ++i) {
-      const std::int64_t best = at[i] + (step_x[i] > 0 ? step_x[i] * (w - 1) : 0) +
-                                (step_y[i] > 0 ? step_y[i] * (h - 1) : 0);
+      const std::int64_t best =
+          at[i] + (step_x[i] > 0 ? step_x[i] * (w - 1) : 0) + (step_y[i] > 0 ? step_y[i] * (h - 1) : 0);
       if (best < 0) return false;
     }
     return true;
@@ -57,9 +58,9 @@ struct MeshRasterArgs {
   BinArgs<S> bin;  ///< of its arrays: cursors, tile_offsets, tile_splats
   View<const MeshTriangle<S>> triangles;
   View<const MeshPlacement> placements;
-  S* depth = nullptr;              ///< [H][W]
+  S* depth = nullptr;                ///< [H][W]
   std::uint32_t* visible = nullptr;  ///< [H][W], which of `triangles`; kNoTriangle where none
-  View<S> tile_far;                ///< [tiles]
+  View<S> tile_far;                  ///< [tiles]
 };
 inline constexpr std::uint32_t kNoTriangle = 0xffffffffu;
 
@@ -69,21 +70,24 @@ namespace detail {
 template <class S, class F>
 GSNAV_HD void for_each_mesh_tile(const TileGrid& grid, const MeshTriangle<S>& t, const F& f) noexcept {
   const int shift = grid.tile_shift(), ts = grid.tile_size;
-  const int tx0 = t.x0 >> shift, tx1 = (t.x1 - 1) >> shift, ty0 = t.y0 >> shift, ty1 = (t.y1 - 1) >> shift;
+  const int tx0 = t.x0 >> shift, tx1 = (t.x1 - 1) >> shift, ty0 = t.y0 >> shift,
+            ty1 = (t.y1 - 1) >> shift;
   const bool single = tx0 == tx1 && ty0 == ty1;
   for (int ty = ty0; ty <= ty1; ++ty) {
     const int y0 = max(ty * ts, int{t.y0}), y1 = min((ty + 1) * ts, int{t.y1});
     for (int tx = tx0; tx <= tx1; ++tx) {
       const int x0 = max(tx * ts, int{t.x0}), x1 = min((tx + 1) * ts, int{t.x1});
       if (!single && !MeshEdges::of(t, grid, x0, y0).reach(x1 - x0, y1 - y0)) continue;
-      f(static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns) + static_cast<std::size_t>(tx));
+      f(static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns) +
+        static_cast<std::size_t>(tx));
     }
   }
 }
 
-/// The pixels [left, right) of a row of n that one edge leaves: e at the first, `step` to the next. `inverse`:
-/// 1 / |step|, which only guesses; the edge decides.
-GSNAV_HD void clip_span(std::int64_t e, std::int64_t step, double inverse, int n, int& left, int& right) noexcept {
+/// The pixels [left, right) of a row of n that one edge leaves: e at the first, `step` to the next.
+/// `inverse`: 1 / |step|, which only guesses; the edge decides.
+GSNAV_HD void clip_span(std::int64_t e, std::int64_t step, double inverse, int n, int& left,
+                        int& right) noexcept {
   if (step > 0) {
     if (e >= 0) return;
     const double guess = -static_cast<double>(e) * inverse;
@@ -119,7 +123,8 @@ struct CountMeshTiles {
     for (std::size_t t = 0; t < bin.grid.count(); ++t) counts[t] = 0;
     const BlockRange r = BlockRange::of(block, bin.blocks, args.triangles.size);
     for (std::size_t i = r.begin; i < r.end; ++i) {
-      detail::for_each_mesh_tile(bin.grid, args.triangles[i], [=](std::size_t tile) GSNAV_INLINED { ++counts[tile]; });
+      detail::for_each_mesh_tile(bin.grid, args.triangles[i],
+                                 [=](std::size_t tile) GSNAV_INLINED { ++counts[tile]; });
     }
   }
 };
@@ -165,17 +170,18 @@ GSNAV_HD S mesh_inverse_z(const MeshTriangle<S>& t, int x, int y) noexcept {
 
 /// Whether a triangle that owns a pixel has a hole there.
 template <class S>
-GSNAV_HD bool mesh_hole(const MeshRasterArgs<S>& args, const MeshTriangle<S>& t, int x, int y, S inverse_z) noexcept {
+GSNAV_HD bool mesh_hole(const MeshRasterArgs<S>& args, const MeshTriangle<S>& t, int x, int y,
+                        S inverse_z) noexcept {
   return t.masked && surface_hole(args.placements[t.placement].mesh, t, x, y, S(1) / inverse_z);
 }
 
 namespace detail {
 
-/// Calls f(y, left, right) for the pixels [left, right) of rows of [x0, x1) x [y0, y1), all in a triangle's box, that
-/// the triangle owns.
+/// Calls f(y, left, right) for the pixels [left, right) of rows of [x0, x1) x [y0, y1), all in a
+/// triangle's box, that the triangle owns.
 template <class S, class F>
-GSNAV_HD void for_each_span(const TileGrid& grid, const MeshTriangle<S>& t, int x0, int y0, int x1, int y1,
-                            const F& f) noexcept {
+GSNAV_HD void for_each_span(const TileGrid& grid, const MeshTriangle<S>& t, int x0, int y0, int x1,
+                            int y1, const F& f) noexcept {
   MeshEdges edges = MeshEdges::of(t, grid, x0, y0);
   double inverse[3];
   for (int k = 0; k < 3; ++k) {
@@ -184,7 +190,8 @@ GSNAV_HD void for_each_span(const TileGrid& grid, const MeshTriangle<S>& t, int 
   }
   for (int y = y0; y < y1; ++y) {
     int left = 0, right = x1 - x0;
-    for (int k = 0; k < 3; ++k) clip_span(edges.at[k], edges.step_x[k], inverse[k], x1 - x0, left, right);
+    for (int k = 0; k < 3; ++k)
+      clip_span(edges.at[k], edges.step_x[k], inverse[k], x1 - x0, left, right);
     edges.step_down();
     f(y, x0 + left, x0 + right);
   }
@@ -199,7 +206,8 @@ struct ShowSpan {
 
   GSNAV_HD void operator()(int y, int left, int right) const noexcept {
     const double row = inverse_z_row(t, y);
-    const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(args.bin.grid.width);
+    const std::size_t first =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(args.bin.grid.width);
     S* const nearest = args.depth + first;
     std::uint32_t* const visible = args.visible + first;
     if (t.masked) {
@@ -222,8 +230,8 @@ struct ShowSpan {
 
 }  // namespace detail
 
-/// Finds the nearest triangle of each pixel of a tile; of equally near ones the first. No pixel's depth depends on
-/// the tile that it is found in.
+/// Finds the nearest triangle of each pixel of a tile; of equally near ones the first. No pixel's depth
+/// depends on the tile that it is found in.
 template <class S>
 GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t tile) noexcept {
   const TileGrid& grid = args.bin.grid;

@@ -8,8 +8,9 @@
 #include "gsnav/detail/mesh/mesh.hpp"
 #include "gsnav/detail/mesh/mesh_clip.hpp"
 
-// From meshes to triangles on the image: what the rasteriser walks over. All of it in double, whatever the scalar
-// of the frame, so that which pixel belongs to whom is the same on every backend and in every precision.
+// From meshes to triangles on the image: what the rasteriser walks over. All of it in double, whatever
+// the scalar of the frame, so that which pixel belongs to whom is the same on every backend and in every
+// precision.
 
 namespace gsnav {
 
@@ -30,14 +31,15 @@ struct PixelPlane {
 /// A triangle ready to be rasterised, or a piece of one that had to be clipped.
 template <class S>
 struct MeshTriangle {
-  MeshPoint corner[3];                  ///< clockwise on the screen: edge functions are positive inside
-  std::int16_t x0, y0, x1, y1;          ///< half-open box of pixels whose centres may be inside
-  std::uint32_t placement, triangle;    ///< of the mesh's triangles
-  PixelPlane<double> inverse_z;         ///< 1 / z
-  S inverse_z_min, inverse_z_max;       ///< over the corners: what a sliver's plane gives beyond is not its own
-  PixelPlane<S> b1, b2;                 ///< weights of corners 1 and 2 of the mesh's triangle, over z
-  bool back;                            ///< seen from behind
-  bool masked;                          ///< MeshAlpha::mask
+  MeshPoint corner[3];                ///< clockwise on the screen: edge functions are positive inside
+  std::int16_t x0, y0, x1, y1;        ///< half-open box of pixels whose centres may be inside
+  std::uint32_t placement, triangle;  ///< of the mesh's triangles
+  PixelPlane<double> inverse_z;       ///< 1 / z
+  S inverse_z_min,
+      inverse_z_max;     ///< over the corners: what a sliver's plane gives beyond is not its own
+  PixelPlane<S> b1, b2;  ///< weights of corners 1 and 2 of the mesh's triangle, over z
+  bool back;             ///< seen from behind
+  bool masked;           ///< MeshAlpha::mask
 };
 
 template <class S>
@@ -46,19 +48,21 @@ struct MeshSetupArgs {
   View<const MeshPlacement> placements;
   View<const MeshChunk> vertex_chunks, triangle_chunks;
   View<MeshVertex> vertices;
-  View<std::uint32_t> counts;       ///< [triangle chunks], triangles that may cover a pixel centre
-  View<std::uint32_t> not_finite;   ///< [triangle chunks], left out: a corner is NaN or infinite
-  View<std::uint64_t> offsets;      ///< [triangle chunks + 1]
+  View<std::uint32_t> counts;      ///< [triangle chunks], triangles that may cover a pixel centre
+  View<std::uint32_t> not_finite;  ///< [triangle chunks], left out: a corner is NaN or infinite
+  View<std::uint64_t> offsets;     ///< [triangle chunks + 1]
   View<MeshTriangle<S>> triangles;
 };
 
 /// Takes vertex i of a placement into the camera's axes and onto the lattice.
 template <class S>
-GSNAV_HD void project_mesh_vertex(const MeshSetupArgs<S>& args, const MeshPlacement& placement, std::size_t i) noexcept {
+GSNAV_HD void project_mesh_vertex(const MeshSetupArgs<S>& args, const MeshPlacement& placement,
+                                  std::size_t i) noexcept {
   MeshVertex& v = args.vertices[placement.first_vertex + i];
   v.position = placement.linear * vec_cast<double>(placement.mesh.vertices[i]) + placement.translation;
   v.code = args.camera.outcode(v.position);
-  if ((v.code & (kMeshClipCodes | kMeshNotFinite)) == 0) v.point = project_to_lattice(args.camera, v.position);
+  if ((v.code & (kMeshClipCodes | kMeshNotFinite)) == 0)
+    v.point = project_to_lattice(args.camera, v.position);
 }
 
 /// project_mesh_vertex for a chunk.
@@ -75,7 +79,8 @@ struct ProjectMeshVertices {
 
 namespace detail {
 
-/// The first pixel whose centre is not below x, and the last whose centre is not above, of a row of `size`.
+/// The first pixel whose centre is not below x, and the last whose centre is not above, of a row of
+/// `size`.
 GSNAV_HD std::int32_t first_centre(std::int32_t x, int size) noexcept {
   constexpr std::int32_t kHalf = 1 << (kMeshSubpixelBits - 1);
   return (x + (size - 1) * kHalf + 2 * kHalf - 1) >> kMeshSubpixelBits;
@@ -90,10 +95,11 @@ GSNAV_HD std::int64_t doubled_area(const MeshPoint& a, const MeshPoint& b, const
   return std::int64_t{b.x - a.x} * (c.y - a.y) - std::int64_t{b.y - a.y} * (c.x - a.x);
 }
 
-/// Places corners and box; false where nothing can be covered or what is seen is a back that is not drawn.
+/// Places corners and box; false where nothing can be covered or what is seen is a back that is not
+/// drawn.
 template <class S>
-GSNAV_HD bool place_triangle(const MeshCamera& camera, bool two_sided, const MeshPoint& a, const MeshPoint& b,
-                             const MeshPoint& c, MeshTriangle<S>& out) noexcept {
+GSNAV_HD bool place_triangle(const MeshCamera& camera, bool two_sided, const MeshPoint& a,
+                             const MeshPoint& b, const MeshPoint& c, MeshTriangle<S>& out) noexcept {
   const std::int64_t area = doubled_area(a, b, c);
   if (area == 0) return false;
   out.back = area > 0;  // counter-clockwise from outside is clockwise where y points down: negative
@@ -109,15 +115,17 @@ GSNAV_HD bool place_triangle(const MeshCamera& camera, bool two_sided, const Mes
     high = static_cast<std::int16_t>(min(last, size - 1) + 1);
     return max(first, 0) <= min(last, size - 1);
   };
-  return box(a.x, b.x, c.x, camera.width, out.x0, out.x1) && box(a.y, b.y, c.y, camera.height, out.y0, out.y1);
+  return box(a.x, b.x, c.x, camera.width, out.x0, out.x1) &&
+         box(a.y, b.y, c.y, camera.height, out.y0, out.y1);
 }
 
-/// Fills what is interpolated. With n = e1 x e2 the plane is n.p = n.v0, so 1/z = n.r / n.v0 along r = (u, v, 1);
-/// and the weight of corner 1 over z is r.c1 with c1 = q1 - n (q1.v0) / (n.v0), q1 = e2 x n / n.n: linear in r,
-/// whatever of the triangle lies behind the camera.
+/// Fills what is interpolated. With n = e1 x e2 the plane is n.p = n.v0, so 1/z = n.r / n.v0 along r =
+/// (u, v, 1); and the weight of corner 1 over z is r.c1 with c1 = q1 - n (q1.v0) / (n.v0), q1 = e2 x n /
+/// n.n: linear in r, whatever of the triangle lies behind the camera.
 template <class S>
-GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, const Vec3d& v1, const Vec3d& v2,
-                                   double z_min, double z_max, MeshTriangle<S>& out) noexcept {
+GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, const Vec3d& v1,
+                                   const Vec3d& v2, double z_min, double z_max,
+                                   MeshTriangle<S>& out) noexcept {
   out.inverse_z_min = S(1.0 / z_max);
   out.inverse_z_max = S(1.0 / z_min);
   const Vec3d e1 = v1 - v0, e2 = v2 - v0, n = cross(e1, e2);
@@ -126,7 +134,8 @@ GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, co
   out.b1 = out.b2 = {};
   const double inverse = 1.0 / nv;
   if (!(nn > 0) || !is_finite(inverse)) return;  // edge-on: its nearest depth, its first corner's colour
-  const double px = out.x0 + 0.5 - camera.half_width - camera.cx, py = out.y0 + 0.5 - camera.half_height - camera.cy;
+  const double px = out.x0 + 0.5 - camera.half_width - camera.cx,
+               py = out.y0 + 0.5 - camera.half_height - camera.cy;
   const auto plane = [&](const Vec3d& c) GSNAV_INLINED {
     const double x = c.x / camera.fx, y = c.y / camera.fy;
     return PixelPlane<double>{fma(x, px, fma(y, py, c.z)), x, y};
@@ -141,14 +150,15 @@ GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, co
   out.b2 = weight(cross(n, e1) * (1.0 / nn));
 }
 
-/// Calls f(piece) for each piece of triangle t of a placement, number `at`, that may cover a pixel centre; `Full`:
-/// with what is interpolated. False where a corner is not finite.
+/// Calls f(piece) for each piece of triangle t of a placement, number `at`, that may cover a pixel
+/// centre; `Full`: with what is interpolated. False where a corner is not finite.
 template <bool Full, class S, class F>
-GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std::size_t t, const F& f) noexcept {
+GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std::size_t t,
+                             const F& f) noexcept {
   const MeshPlacement& placement = args.placements[at];
   const MeshVertex* const vertices = args.vertices.data + placement.first_vertex;
   const std::uint32_t* const index = placement.mesh.indices.data + 3 * t;
-  const MeshVertex *v[3] = {vertices + index[0], vertices + index[1], vertices + index[2]};
+  const MeshVertex* v[3] = {vertices + index[0], vertices + index[1], vertices + index[2]};
   const std::uint32_t some = v[0]->code | v[1]->code | v[2]->code;
   if ((some & kMeshNotFinite) != 0) return false;
   if ((v[0]->code & v[1]->code & v[2]->code) != 0) return true;
@@ -158,13 +168,15 @@ GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std
   piece.masked = placement.mesh.alpha_mode == MeshAlpha::mask;
   const auto emit = [&](double z_min, double z_max) GSNAV_INLINED {
     if constexpr (Full) {
-      interpolate_triangle(args.camera, v[0]->position, v[1]->position, v[2]->position, z_min, z_max, piece);
+      interpolate_triangle(args.camera, v[0]->position, v[1]->position, v[2]->position, z_min, z_max,
+                           piece);
     }
     f(piece);
   };
   if ((some & kMeshClipCodes) == 0) {
     const double z0 = v[0]->position.z, z1 = v[1]->position.z, z2 = v[2]->position.z;
-    if (place_triangle(args.camera, placement.mesh.two_sided, v[0]->point, v[1]->point, v[2]->point, piece)) {
+    if (place_triangle(args.camera, placement.mesh.two_sided, v[0]->point, v[1]->point, v[2]->point,
+                       piece)) {
       emit(min(z0, min(z1, z2)), max(z0, max(z1, z2)));
     }
     return true;
@@ -180,7 +192,8 @@ GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std
     points[i] = project_to_lattice(args.camera, corners[i]);
   }
   for (int i = 2; i < n; ++i) {
-    if (place_triangle(args.camera, placement.mesh.two_sided, points[0], points[i - 1], points[i], piece)) {
+    if (place_triangle(args.camera, placement.mesh.two_sided, points[0], points[i - 1], points[i],
+                       piece)) {
       emit(z_min, z_max);
     }
   }
@@ -189,7 +202,8 @@ GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std
 
 /// The same for a chunk of triangles; returns how many have a corner that is not finite.
 template <bool Full, class S, class F>
-GSNAV_HD std::uint32_t for_each_piece_of_chunk(const MeshSetupArgs<S>& args, std::size_t c, const F& f) noexcept {
+GSNAV_HD std::uint32_t for_each_piece_of_chunk(const MeshSetupArgs<S>& args, std::size_t c,
+                                               const F& f) noexcept {
   const MeshChunk chunk = args.triangle_chunks[c];
   const std::size_t end = chunk.end(args.placements[chunk.placement].mesh.triangle_count());
   std::uint32_t not_finite = 0;
@@ -219,7 +233,8 @@ struct CountMeshTriangles {
   MeshSetupArgs<S> args;
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     std::uint32_t n = 0;
-    args.not_finite[c] = detail::for_each_piece_of_chunk<false>(args, c, [&n](const MeshTriangle<S>&) GSNAV_INLINED { ++n; });
+    args.not_finite[c] = detail::for_each_piece_of_chunk<false>(
+        args, c, [&n](const MeshTriangle<S>&) GSNAV_INLINED { ++n; });
     args.counts[c] = n;
   }
 };
@@ -240,7 +255,8 @@ struct WriteMeshTriangles {
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     if (args.counts[c] == 0) return;
     MeshTriangle<S>* out = args.triangles.data + args.offsets[c];
-    detail::for_each_piece_of_chunk<true>(args, c, [&out](const MeshTriangle<S>& t) GSNAV_INLINED { *out++ = t; });
+    detail::for_each_piece_of_chunk<true>(
+        args, c, [&out](const MeshTriangle<S>& t) GSNAV_INLINED { *out++ = t; });
   }
 };
 

@@ -4,11 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/frame/color_space.hpp"
 #include "gsnav/detail/mesh/mesh_raster.hpp"
+#include "gsnav/frame/color_space.hpp"
 
-// What the visible triangles look like, one pixel after the other: each is shaded once, however many triangles lie
-// behind it.
+// What the visible triangles look like, one pixel after the other: each is shaded once, however many
+// triangles lie behind it.
 
 namespace gsnav {
 
@@ -33,7 +33,7 @@ struct MeshShadeArgs {
   const std::uint32_t* visible = nullptr;  ///< [H][W]
   std::size_t width = 0;
   bool unlit = true;
-  Vec3<S> ambient{}, light{}, diffuse{};   ///< light: unit, world axes
+  Vec3<S> ambient{}, light{}, diffuse{};  ///< light: unit, world axes
   MeshImages<S> images;
 
   GSNAV_HD bool lights(const MeshView& mesh) const noexcept { return !unlit && !mesh.unlit; }
@@ -41,12 +41,14 @@ struct MeshShadeArgs {
 
 /// What is seen of a surface there, display-referred; `normal`: read where it is lit.
 template <class S>
-GSNAV_HD Vec3<S> shaded_color(const MeshShadeArgs<S>& args, const MeshView& mesh, const MeshTriangle<S>& t,
-                              const SurfacePoint<S>& at, const Vec3<S>& normal) noexcept {
+GSNAV_HD Vec3<S> shaded_color(const MeshShadeArgs<S>& args, const MeshView& mesh,
+                              const MeshTriangle<S>& t, const SurfacePoint<S>& at,
+                              const Vec3<S>& normal) noexcept {
   Vec3<S> color = surface_color(mesh, t, at);
   if (args.lights(mesh)) {
     const S cosine = max(dot(normal, args.light), S(0));
-    color = {color.x * fma(args.diffuse.x, cosine, args.ambient.x), color.y * fma(args.diffuse.y, cosine, args.ambient.y),
+    color = {color.x * fma(args.diffuse.x, cosine, args.ambient.x),
+             color.y * fma(args.diffuse.y, cosine, args.ambient.y),
              color.z * fma(args.diffuse.z, cosine, args.ambient.z)};
   }
   return {srgb_encoded(color.x), srgb_encoded(color.y), srgb_encoded(color.z)};

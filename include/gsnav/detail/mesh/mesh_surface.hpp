@@ -15,7 +15,8 @@ namespace detail {
 template <class S>
 GSNAV_HD Vec3<S> mixed(const Vec3f& a, const Vec3f& b, const Vec3f& c, S wb, S wc) noexcept {
   const S wa = S(1) - wb - wc;
-  const auto mix = [=](float x, float y, float z) GSNAV_INLINED { return fma(S(x), wa, fma(S(y), wb, S(z) * wc)); };
+  const auto mix = [=](float x, float y, float z)
+                       GSNAV_INLINED { return fma(S(x), wa, fma(S(y), wb, S(z) * wc)); };
   return {mix(a.x, b.x, c.x), mix(a.y, b.y, c.y), mix(a.z, b.z, c.z)};
 }
 
@@ -55,7 +56,8 @@ GSNAV_HD Vec3<S> sample_level(const TextureView& t, const std::uint8_t* texels, 
   const S x = u * S(width) - S(0.5), y = v * S(height) - S(0.5);
   const std::int32_t x0 = floor_of(x), y0 = floor_of(y);
   const S fx = x - S(x0), fy = y - S(y0);
-  const auto wrap = [](std::int32_t i, int n) GSNAV_INLINED { return i < 0 ? i + n : (i >= n ? i - n : i); };
+  const auto wrap = [](std::int32_t i, int n)
+                        GSNAV_INLINED { return i < 0 ? i + n : (i >= n ? i - n : i); };
   TexelSum<What, S> sum;
   for (int k = 0; k < 4; ++k) {
     const std::int32_t i = wrap(x0 + (k & 1), width), j = wrap(y0 + (k >> 1), height);

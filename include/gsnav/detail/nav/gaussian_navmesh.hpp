@@ -48,9 +48,10 @@ struct GaussianNavReport {
   std::vector<Storey> storeys;  ///< upwards, the main floor's among them
   std::size_t stairs = 0;       ///< stairs and ramps between storeys
   double ceiling_share = 0.0;   ///< share of the main floor that has something solid above head height
-  std::size_t solid_above = 0, solid_below = 0;  ///< voxels over and under the main floor and 1 m beside it
-  Aabb<double> bounds{};       ///< box that was voxelised, world
-  std::size_t columns = 0, voxels = 0;          ///< of the grid
+  std::size_t solid_above = 0,
+              solid_below = 0;          ///< voxels over and under the main floor and 1 m beside it
+  Aabb<double> bounds{};                ///< box that was voxelised, world
+  std::size_t columns = 0, voxels = 0;  ///< of the grid
   std::size_t solid_voxels = 0, floater_voxels = 0;
   std::size_t gaussians_used = 0;
   std::size_t gaussians_faint = 0;    ///< below min_opacity, or not finite
@@ -96,12 +97,14 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
                                            std::span<const GaussianSet> sets,
                                            const GaussianNavOptions& options = {});
 
-/// The same from Gaussians and triangles of one world together (triangles as NavMesh::build takes them): what stands in
-/// either is in the way, and the floor of either is walked on. Gaussians need no floor of their own then: furniture in
-/// a room that is a mesh. Where both have a floor, its height is that of the triangles.
+/// The same from Gaussians and triangles of one world together (triangles as NavMesh::build takes them):
+/// what stands in either is in the way, and the floor of either is walked on. Gaussians need no floor of
+/// their own then: furniture in a room that is a mesh. Where both have a floor, its height is that of
+/// the triangles.
 ///
 /// Errors: as both, naming a vertex or index.
-Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings, std::span<const GaussianSet> sets,
+Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
+                                           std::span<const GaussianSet> sets,
                                            std::span<const Vec3d> vertices,
                                            std::span<const NavMesh::Triangle> triangles,
                                            const GaussianNavOptions& options = {});

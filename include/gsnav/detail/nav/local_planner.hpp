@@ -3,9 +3,9 @@
 
 #include <cstddef>
 
-#include "gsnav/nav/navmesh.hpp"
 #include "gsnav/detail/nav/obstacles.hpp"
 #include "gsnav/detail/nav/step.hpp"
+#include "gsnav/nav/navmesh.hpp"
 
 namespace gsnav {
 
@@ -20,28 +20,30 @@ struct LocalPlannerOptions {
 /// The velocity for the next tick.
 struct PlannedVelocity {
   Vec3d velocity{};  ///< on the ground plane, metres a second
-  bool safe = true;          ///< nobody comes within the margin within the horizon, as far as can be foreseen
+  bool safe = true;  ///< nobody comes within the margin within the horizon, as far as can be foreseen
   double contact_after = 0;  ///< seconds until somebody does; the horizon where nobody
-  std::size_t bodies = 0;  ///< avatars that were near enough to matter
+  std::size_t bodies = 0;    ///< avatars that were near enough to matter
 };
 
-/// A velocity near `preferred` that meets nobody, as far as can be foreseen from one tick of their motion, and that
-/// leaves a way out.
+/// A velocity near `preferred` that meets nobody, as far as can be foreseen from one tick of their
+/// motion, and that leaves a way out.
 ///
-/// Tried are the velocity of optimal reciprocal collision avoidance (van den Berg et al. 2011) with the whole
-/// responsibility on the agent, because scripted avatars take none, among discs around the avatars and the edges of
-/// the NavMesh; `preferred`; standing; and 24 directions at full and half speed. Each is walked on the mesh for the
-/// horizon and swept against the capsules: within the tick [t0, t1] (seconds) of `bodies` as they move, then in the
-/// pose of its end at the avatar's mean velocity. The price of a velocity is its difference from `preferred` and the
-/// urgency 1 / t of the first contact (as in van den Berg et al. 2008), once with the margin and once, without, for the
-/// best that can be done after it: backing off is tried like all else, before it is too late. A contact within the
-/// tick is taken only where nothing avoids it, the latest first.
+/// Tried are the velocity of optimal reciprocal collision avoidance (van den Berg et al. 2011) with the
+/// whole responsibility on the agent, because scripted avatars take none, among discs around the avatars
+/// and the edges of the NavMesh; `preferred`; standing; and 24 directions at full and half speed. Each
+/// is walked on the mesh for the horizon and swept against the capsules: within the tick [t0, t1]
+/// (seconds) of `bodies` as they move, then in the pose of its end at the avatar's mean velocity. The
+/// price of a velocity is its difference from `preferred` and the urgency 1 / t of the first contact (as
+/// in van den Berg et al. 2008), once with the margin and once, without, for the best that can be done
+/// after it: backing off is tried like all else, before it is too late. A contact within the tick is
+/// taken only where nothing avoids it, the latest first.
 ///
-/// Where nobody is near it is the velocity nearest to `preferred` that meets no wall. Best effort: take the step itself
-/// by step(), which guarantees. No state; constant in its arguments, so that any number of threads may plan.
+/// Where nobody is near it is the velocity nearest to `preferred` that meets no wall. Best effort: take
+/// the step itself by step(), which guarantees. No state; constant in its arguments, so that any number
+/// of threads may plan.
 ///
-/// Zero velocity, not safe, for an agent that is invalid or off the mesh, a velocity that is not finite or
-/// options out of range.
+/// Zero velocity, not safe, for an agent that is invalid or off the mesh, a velocity that is not finite
+/// or options out of range.
 PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, const Vec3d& preferred,
                               const CapsuleSet& bodies, const LocalPlannerOptions& options = {});
 

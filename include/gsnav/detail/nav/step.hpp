@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "gsnav/nav/navmesh.hpp"
 #include "gsnav/detail/nav/obstacles.hpp"
+#include "gsnav/nav/navmesh.hpp"
 #include "gsnav/sweep/sweep.hpp"
 
 namespace gsnav {
@@ -13,9 +13,9 @@ namespace gsnav {
 /// An agent standing on the NavMesh: base position (metres, Y up) and solid.
 struct AgentState {
   Vec3d position{};
-  double radius = 0.1;   ///< metres, >= 0
-  double height = 1.5;   ///< metres, >= 0
-  PolyId poly = kNoPoly; ///< polygon under it, where known: saves a search
+  double radius = 0.1;    ///< metres, >= 0
+  double height = 1.5;    ///< metres, >= 0
+  PolyId poly = kNoPoly;  ///< polygon under it, where known: saves a search
 };
 
 /// The agent's solid: a vertical capsule inside [0, height] above its base. Where the height is less
@@ -53,18 +53,18 @@ enum class BlockedBy : std::uint8_t {
 
 /// What a step did. Times are fractions of the tick [0, 1].
 struct StepResult {
-  Vec3d position{};        ///< where the agent stands at the end
-  PolyId poly = kNoPoly;   ///< for the next AgentState; kNoPoly only where blocked_by is invalid
-  double fraction = 0.0;   ///< ground-plane distance walked / asked for, in [0, 1]; 1 for a zero step
+  Vec3d position{};       ///< where the agent stands at the end
+  PolyId poly = kNoPoly;  ///< for the next AgentState; kNoPoly only where blocked_by is invalid
+  double fraction = 0.0;  ///< ground-plane distance walked / asked for, in [0, 1]; 1 for a zero step
   BlockedBy blocked_by = BlockedBy::none;
   bool hit_wall = false;
-  Vec3d wall_normal{};     ///< where hit_wall, pointing into the mesh
+  Vec3d wall_normal{};  ///< where hit_wall, pointing into the mesh
 
   // The first contact that stopped or turned the agent; meaningful where blocked_by is capsule.
-  double toi = 1.0;        ///< when
+  double toi = 1.0;  ///< when
   std::uint32_t avatar = 0, bone = 0;
-  Vec3d contact_point{};   ///< on the body's surface
-  Vec3d normal{};          ///< unit, from the body to the agent
+  Vec3d contact_point{};      ///< on the body's surface
+  Vec3d normal{};             ///< unit, from the body to the agent
   bool agent_caused = false;  ///< the agent itself moved towards the body (else it was caught up with)
 
   bool started_overlapping = false;

@@ -7,25 +7,26 @@
 #include <vector>
 
 #include "gsnav/detail/nav/geodesic_field.hpp"
-#include "gsnav/nav/navmesh.hpp"
 #include "gsnav/detail/nav/obstacles.hpp"
 #include "gsnav/detail/nav/step.hpp"
+#include "gsnav/nav/navmesh.hpp"
 
 namespace gsnav {
 
 struct TimePlannerOptions {
-  double speed = 1.0;    ///< at most, metres a second on the surface, > 0
-  double cell = 0.5;     ///< spacing of the lattice around the static path, metres, > 0
-  double margin = 0.03;  ///< metres kept beyond touching, >= 0; given up where the agent starts nearer than that
+  double speed = 1.0;  ///< at most, metres a second on the surface, > 0
+  double cell = 0.5;   ///< spacing of the lattice around the static path, metres, > 0
+  double margin =
+      0.03;  ///< metres kept beyond touching, >= 0; given up where the agent starts nearer than that
   std::size_t max_states = 20000;  ///< give up the search after so many
 };
 
 enum class TimedPlanStatus : std::uint8_t {
-  reached,   ///< the last point is the goal
-  on_way,    ///< the known motion ends first: the rest is the static path from the last point
-  blocked,   ///< until `blocked_until` no way leads nearer to the goal; the plan keeps clear of everybody
-  caught,    ///< whatever it does somebody walks into the agent; the plan lasts as long as any
-  gave_up,      ///< after `max_states`; the plan lasts as long as any found
+  reached,  ///< the last point is the goal
+  on_way,   ///< the known motion ends first: the rest is the static path from the last point
+  blocked,  ///< until `blocked_until` no way leads nearer to the goal; the plan keeps clear of everybody
+  caught,   ///< whatever it does somebody walks into the agent; the plan lasts as long as any
+  gave_up,  ///< after `max_states`; the plan lasts as long as any found
   unreachable,  ///< no path even without people, or a point off the mesh: no points
   invalid,      ///< input that is not finite, or ticks that do not follow each other: no points
 };
@@ -48,14 +49,15 @@ struct TimedPlan {
   Vec3d at(double t) const noexcept;
 };
 
-/// A way to `goal` among bodies whose motion is known, in time: safe-interval path planning (Phillips and
-/// Likhachev 2011) over the static shortest path and a lattice around it.
+/// A way to `goal` among bodies whose motion is known, in time: safe-interval path planning (Phillips
+/// and Likhachev 2011) over the static shortest path and a lattice around it.
 ///
-/// `ticks` are consecutive: each begins where the one before ends. A leg takes whole ticks and is clear of
-/// every body by the step filter's own sweep at all times, waits included: taken tick by tick with step() the
-/// plan is never stopped. It is the fastest on the lattice; where nobody is in the way it is the static
-/// path, in its length over the speed and at most a tick for each corner and for the end. Constant in its
-/// arguments, so that any number of threads may plan. `field` is of the goal; made where it is null.
+/// `ticks` are consecutive: each begins where the one before ends. A leg takes whole ticks and is clear
+/// of every body by the step filter's own sweep at all times, waits included: taken tick by tick with
+/// step() the plan is never stopped. It is the fastest on the lattice; where nobody is in the way it is
+/// the static path, in its length over the speed and at most a tick for each corner and for the end.
+/// Constant in its arguments, so that any number of threads may plan. `field` is of the goal; made where
+/// it is null.
 TimedPlan plan_in_time(const NavMesh& mesh, const AgentState& agent, const Vec3d& goal,
                        std::span<const CapsuleSet> ticks, const TimePlannerOptions& options = {},
                        const GeodesicField* field = nullptr);

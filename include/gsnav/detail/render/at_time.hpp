@@ -17,15 +17,17 @@ inline Status validate(const TemporalView& in) {
   Status status;
   const auto sized = [&](const View<const float>& v, std::size_t want, const char* name) {
     if (status.ok() && v.size != want) {
-      status = {Errc::invalid_argument, std::string("TemporalView.") + name + " has " + std::to_string(v.size) +
-                                            " values where " + std::to_string(want) + " are needed"};
+      status = {Errc::invalid_argument, std::string("TemporalView.") + name + " has " +
+                                            std::to_string(v.size) + " values where " +
+                                            std::to_string(want) + " are needed"};
     }
   };
   for (const auto& plane : in.base.means) sized(plane, n, "base.means");
   sized(in.base.opacities, n, "base.opacities");
   sized(in.times, n, "times");
   sized(in.sigmas, n, "sigmas");
-  for (std::size_t k = 0; k < kMotionPlanes; ++k) sized(in.motion[k], in.motion[k / 3 * 3].empty() ? 0 : n, "motion");
+  for (std::size_t k = 0; k < kMotionPlanes; ++k)
+    sized(in.motion[k], in.motion[k / 3 * 3].empty() ? 0 : n, "motion");
   return status;
 }
 
@@ -34,19 +36,22 @@ template <Backend B>
 struct Moment {
   explicit Moment(B& backend)
       : means{Buffer<float, B>(backend), Buffer<float, B>(backend), Buffer<float, B>(backend)},
-        opacities(backend), bounds(backend) {}
+        opacities(backend),
+        bounds(backend) {}
 
   Buffer<float, B> means[3];
   Buffer<float, B> opacities;
   Buffer<ChunkBounds, B> bounds;
-  GaussianView gaussians;  ///< what to render: the base's shapes and colours, the moment's means and opacities
+  GaussianView
+      gaussians;  ///< what to render: the base's shapes and colours, the moment's means and opacities
 };
 
-/// Takes N moving Gaussians to the time `t`, seconds: `out.gaussians` is a set like any other until the next call.
-/// Those whose opacity is below 1/255 then get 0 and are not drawn. Arithmetic is in S; the reference is double. Chunks
-/// get the moment's bounds where the host reaches the backend's memory and rows are sorted (`base.chunk_bounds`), else
-/// none, and all chunks are touched. The result is there after `backend.synchronize()`.
-/// Errors: invalid_argument naming the array, or a time that is not finite.
+/// Takes N moving Gaussians to the time `t`, seconds: `out.gaussians` is a set like any other until the
+/// next call. Those whose opacity is below 1/255 then get 0 and are not drawn. Arithmetic is in S; the
+/// reference is double. Chunks get the moment's bounds where the host reaches the backend's memory and
+/// rows are sorted (`base.chunk_bounds`), else none, and all chunks are touched. The result is there
+/// after `backend.synchronize()`. Errors: invalid_argument naming the array, or a time that is not
+/// finite.
 template <class S, Backend B>
 Status gaussians_at(B& backend, const TemporalView& in, double t, Moment<B>& out) {
   if (Status s = validate(in); !s) return s;

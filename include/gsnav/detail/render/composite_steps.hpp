@@ -6,17 +6,18 @@
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
+#include "gsnav/core/stages.hpp"
 #include "gsnav/detail/frame/composite.hpp"
 #include "gsnav/detail/frame/cull.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
-#include "gsnav/core/stages.hpp"
 
 namespace gsnav {
 
 namespace detail {
 
-/// Whether a mesh hides every Gaussian of a chunk at every pixel that it may reach (host memory). Never yes where one
-/// is seen: bounds are those of chunk_extent, and the reach of a depth is at most that of the largest and most opaque.
+/// Whether a mesh hides every Gaussian of a chunk at every pixel that it may reach (host memory). Never
+/// yes where one is seen: bounds are those of chunk_extent, and the reach of a depth is at most that of
+/// the largest and most opaque.
 inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const TileGrid& grid,
                              const View<const float>& tile_far, std::size_t c) noexcept {
   const ProjectionCamera<double>& camera = args.camera64;
@@ -34,7 +35,8 @@ inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const TileGrid& gri
   const int x0 = tile(e.x0, grid.columns), x1 = tile(e.x1, grid.columns);
   const int y0 = tile(e.y0, grid.rows), y1 = tile(e.y1, grid.rows);
   for (int y = y0; y <= y1; ++y) {
-    const float* const row = tile_far.data + static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.columns);
+    const float* const row =
+        tile_far.data + static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.columns);
     for (int x = x0; x <= x1; ++x) {
       if (!(nearest > static_cast<double>(row[x]))) return false;
     }
@@ -60,7 +62,8 @@ void project_unhidden(B& backend, const ProjectArgs<float>& args, const ProjectO
 
 template <class S, Backend B>
 void blend_pixels_with_meshes(B& backend, const RasterArgs<S>& args) {
-  const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
   dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
     backend.parallel_for(pixels, CompositePixel<S, C, D, G>{args});
   });
@@ -71,7 +74,8 @@ template <class S, Backend B>
 void rasterize_composite(B& backend, const RasterArgs<S>& args) {
   run(backend, stage::BlendWithMeshes{}, args);
   if (args.mesh.ranges.empty()) return;
-  const std::size_t pixels = static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
   dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
     backend.parallel_for(pixels, FragmentPixel<S, C, D, G>{args});
   });

@@ -9,13 +9,13 @@
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
+#include "gsnav/core/stages.hpp"
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/frame/cull.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
 #include "gsnav/render/render_config.hpp"
-#include "gsnav/core/stages.hpp"
 
 namespace gsnav {
 
@@ -24,11 +24,12 @@ template <class B, class S>
 concept SlicingBackend = Backend<B> && is_host_backend<B> &&
     RunsStage<B, stage::Project, ProjectArgs<S>, ProjectOutputs<S>, View<const std::uint32_t>>;
 
-/// A frame in slices of depth, front to back: what a slice leaves closed, the next need not project, colour, sort or
-/// bin. The image is that of one slice, bit for bit: a pixel meets the same splats in the same order, but for those
-/// that come when it is closed.
+/// A frame in slices of depth, front to back: what a slice leaves closed, the next need not project,
+/// colour, sort or bin. The image is that of one slice, bit for bit: a pixel meets the same splats in
+/// the same order, but for those that come when it is closed.
 ///
-/// A chunk belongs to the slice of its nearest possible key; what of it is farther waits, projected, for its own.
+/// A chunk belongs to the slice of its nearest possible key; what of it is farther waits, projected, for
+/// its own.
 class DepthSlices {
  public:
   static constexpr int kMost = 8;
@@ -36,7 +37,8 @@ class DepthSlices {
   /// Finds how deep each chunk lies and where in the image. `sets`: one projection a set.
   template <class B>
   void plan(B& backend, View<const ProjectArgs<float>> sets) {
-    chunks_.resize(sets.size == 0 ? 0 : sets[sets.size - 1].first_chunk + sets[sets.size - 1].chunk_count());
+    chunks_.resize(sets.size == 0 ? 0
+                                  : sets[sets.size - 1].first_chunk + sets[sets.size - 1].chunk_count());
     for (const ProjectArgs<float>& args : sets) {
       backend.parallel_for(args.chunk_count(), [this, &args](std::size_t c) {
         chunks_[args.first_chunk + c] = place_of(args, c);
@@ -108,7 +110,8 @@ class DepthSlices {
       *out++ = 0;
       for (std::size_t t = 0; t < tiles; ++t) {
         const std::uint64_t cells = masks[t] >> (y % side * side);
-        for (std::size_t x = 0; x < side; ++x) *out++ = *++above + (row += static_cast<std::uint32_t>(cells >> x & 1));
+        for (std::size_t x = 0; x < side; ++x)
+          *out++ = *++above + (row += static_cast<std::uint32_t>(cells >> x & 1));
       }
     }
     return {{sums_.data(), sums_.size()}, stride};
@@ -121,7 +124,8 @@ class DepthSlices {
     sums_.reserve(o.sums_.capacity());
   }
   std::size_t capacity_bytes() const noexcept {
-    return chunks_.capacity() * sizeof(Place) + (list_.capacity() + sums_.capacity()) * sizeof(std::uint32_t);
+    return chunks_.capacity() * sizeof(Place) +
+           (list_.capacity() + sums_.capacity()) * sizeof(std::uint32_t);
   }
 
  private:
@@ -154,10 +158,12 @@ class DepthSlices {
     const ChunkExtent e = chunk_extent(args.camera64, chunk);
     // Of what is not finite nothing is known: it lies nearest, everywhere.
     const auto begin = [](double pixel, int size) {
-      return static_cast<std::uint16_t>((pixel > 0 ? std::min(pixel, static_cast<double>(size)) : 0.0) / kSize);
+      return static_cast<std::uint16_t>((pixel > 0 ? std::min(pixel, static_cast<double>(size)) : 0.0) /
+                                        kSize);
     };
     const auto end = [&cells](double pixel, int size) {
-      return pixel < size ? static_cast<std::uint16_t>((pixel > 0 ? pixel : 0.0) / kSize + 1) : cells(size);
+      return pixel < size ? static_cast<std::uint16_t>((pixel > 0 ? pixel : 0.0) / kSize + 1)
+                          : cells(size);
     };
     Place place{0, begin(e.x0, width), begin(e.y0, height), end(e.x1, width), end(e.y1, height)};
     if (place.x0 >= place.x1 || place.y0 >= place.y1) return {0, 0, 0, columns, rows};

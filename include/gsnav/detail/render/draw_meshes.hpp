@@ -10,9 +10,9 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/core/stages.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
 #include "gsnav/render/render_config.hpp"
-#include "gsnav/core/stages.hpp"
 
 namespace gsnav {
 
@@ -21,15 +21,29 @@ struct MeshStats {
   std::uint64_t triangles = 0;   ///< in all instances
   std::uint64_t not_finite = 0;  ///< of those in view, left out: a corner is NaN or infinite
   std::uint64_t drawn = 0;       ///< that may cover a pixel centre; pieces, where clipped
-  std::uint64_t fragments = 0;   ///< pixels of surfaces that are seen through (MeshAlpha::blend), not behind opaque ones
+  std::uint64_t fragments =
+      0;  ///< pixels of surfaces that are seen through (MeshAlpha::blend), not behind opaque ones
 };
 
 /// Scratch of `draw_meshes`; grows to the largest frame. Empty while there are no meshes.
 template <class S, Backend B>
 struct MeshWorkspace {
   explicit MeshWorkspace(B& b)
-      : placements(b), vertex_chunks(b), triangle_chunks(b), vertices(b), counts(b), not_finite(b), offsets(b),
-        triangles(b), cursors(b), tile_offsets(b), tile_triangles(b), depth(b), visible(b), tile_far(b), color(b) {}
+      : placements(b),
+        vertex_chunks(b),
+        triangle_chunks(b),
+        vertices(b),
+        counts(b),
+        not_finite(b),
+        offsets(b),
+        triangles(b),
+        cursors(b),
+        tile_offsets(b),
+        tile_triangles(b),
+        depth(b),
+        visible(b),
+        tile_far(b),
+        color(b) {}
 
   Buffer<MeshPlacement, B> placements;
   Buffer<MeshChunk, B> vertex_chunks, triangle_chunks;
@@ -42,7 +56,7 @@ struct MeshWorkspace {
   Buffer<S, B> depth;                ///< [H][W] of the last frame
   Buffer<std::uint32_t, B> visible;  ///< [H][W]
   Buffer<S, B> tile_far;
-  Buffer<S, B> color;                ///< [H][W][3], where draw_meshes was asked for a layer's colour
+  Buffer<S, B> color;  ///< [H][W][3], where draw_meshes was asked for a layer's colour
   std::vector<MeshPlacement> host_placements;
   std::vector<MeshChunk> host_vertex_chunks, host_triangle_chunks;
   std::vector<std::uint32_t> host_not_finite;
@@ -70,10 +84,13 @@ struct MeshWorkspace {
  private:
   template <class A, class C, class F>
   static void for_each(A& a, C& b, const F& f) {
-    f(a.placements, b.placements), f(a.vertex_chunks, b.vertex_chunks), f(a.triangle_chunks, b.triangle_chunks);
-    f(a.vertices, b.vertices), f(a.counts, b.counts), f(a.not_finite, b.not_finite), f(a.offsets, b.offsets);
+    f(a.placements, b.placements), f(a.vertex_chunks, b.vertex_chunks),
+        f(a.triangle_chunks, b.triangle_chunks);
+    f(a.vertices, b.vertices), f(a.counts, b.counts), f(a.not_finite, b.not_finite),
+        f(a.offsets, b.offsets);
     f(a.triangles, b.triangles), f(a.cursors, b.cursors), f(a.tile_offsets, b.tile_offsets);
-    f(a.tile_triangles, b.tile_triangles), f(a.depth, b.depth), f(a.visible, b.visible), f(a.tile_far, b.tile_far);
+    f(a.tile_triangles, b.tile_triangles), f(a.depth, b.depth), f(a.visible, b.visible),
+        f(a.tile_far, b.tile_far);
     f(a.color, b.color), f(a.host_placements, b.host_placements);
     f(a.host_vertex_chunks, b.host_vertex_chunks), f(a.host_triangle_chunks, b.host_triangle_chunks);
     f(a.host_not_finite, b.host_not_finite), f(a.unhidden, b.unhidden);
@@ -83,13 +100,16 @@ struct MeshWorkspace {
 /// Checks an instance against what kernels assume, but for its indices; names what does not fit.
 inline Status validate(const MeshInstance& instance) {
   const MeshView& m = instance.mesh;
-  const auto bad = [](const std::string& what) { return Status(Errc::invalid_argument, "MeshInstance: " + what); };
+  const auto bad = [](const std::string& what) {
+    return Status(Errc::invalid_argument, "MeshInstance: " + what);
+  };
   const auto sized = [&](std::size_t n, const char* name) {
     if (n == 0 || n == m.vertices.size) return Status();
-    return bad(std::string(name) + " has " + std::to_string(n) + " values where " + std::to_string(m.vertices.size) +
-               " are needed, or none");
+    return bad(std::string(name) + " has " + std::to_string(n) + " values where " +
+               std::to_string(m.vertices.size) + " are needed, or none");
   };
-  if (m.indices.size % 3 != 0) return bad("indices has " + std::to_string(m.indices.size) + " values: three a triangle");
+  if (m.indices.size % 3 != 0)
+    return bad("indices has " + std::to_string(m.indices.size) + " values: three a triangle");
   if (m.vertices.size > std::numeric_limits<std::uint32_t>::max() ||
       m.triangle_count() > std::numeric_limits<std::uint32_t>::max()) {
     return bad("more than 2^32 vertices or triangles");
@@ -109,7 +129,8 @@ inline Status validate(const MeshInstance& instance) {
       w = std::max(w / 2, 1);
       h = std::max(h / 2, 1);
     }
-    if (t.width < 1 || t.height < 1 || t.levels < 1 || t.texels.size != 4 * texels || t.decode.size != 256) {
+    if (t.width < 1 || t.height < 1 || t.levels < 1 || t.texels.size != 4 * texels ||
+        t.decode.size != 256) {
       return bad("texture: sizes do not fit its texels");
     }
   }
@@ -137,7 +158,9 @@ inline bool box_may_be_visible(const MeshCamera& camera, const MeshPlacement& p)
 }
 
 /// Whether a mesh is drawn as fragments.
-inline bool seen_through(const MeshInstance& m) noexcept { return m.mesh.alpha_mode == MeshAlpha::blend; }
+inline bool seen_through(const MeshInstance& m) noexcept {
+  return m.mesh.alpha_mode == MeshAlpha::blend;
+}
 
 /// An instance as a camera sees it; false where there is nothing to draw of it among those that are seen
 /// through, or among the others.
@@ -154,7 +177,8 @@ inline bool place_mesh(const MeshInstance& i, const Camera& camera, const MeshCa
 
 /// Lists the work of the instances in view, of those that are seen through or of the others.
 template <class S, Backend B>
-void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera, bool through) {
+void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera,
+                  bool through) {
   const MeshCamera lens = MeshCamera::of(camera);
   ws.host_placements.clear();
   ws.host_vertex_chunks.clear();
@@ -181,7 +205,8 @@ void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
 }
 
 /// Names what of a frame's meshes cannot be, or ok.
-inline Status validate(std::span<const MeshInstance> meshes, const Camera& camera, const MeshLight& light) {
+inline Status validate(std::span<const MeshInstance> meshes, const Camera& camera,
+                       const MeshLight& light) {
   if (Status s = gsnav::validate(camera); !s) return s;
   for (const MeshInstance& m : meshes) {
     if (Status s = gsnav::validate(m); !s) return s;
@@ -193,11 +218,11 @@ inline Status validate(std::span<const MeshInstance> meshes, const Camera& camer
   return {};
 }
 
-/// Fills ws.triangles with what may cover a pixel of the instances that are seen through, or of the others; adds to
-/// `stats`.
+/// Fills ws.triangles with what may cover a pixel of the instances that are seen through, or of the
+/// others; adds to `stats`.
 template <class S, Backend B>
-Status set_up_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera,
-                     bool through, MeshStats& stats) {
+Status set_up_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
+                     const Camera& camera, bool through, MeshStats& stats) {
   place_meshes(ws, meshes, camera, through);
   const std::size_t chunks = ws.host_triangle_chunks.size();
   ws.counts.resize_discard(chunks);
@@ -280,22 +305,23 @@ MeshShadeArgs<S> shade_args(MeshWorkspace<S, B>& ws, const Camera& camera, const
 
 }  // namespace detail
 
-/// Draws meshes into ws.depth, ws.visible and ws.tile_far (of tiles of `tile_size`), and into `images` what is asked
-/// for; `layer_color`: colour into ws.color. Those that are seen through (MeshAlpha::blend) are not drawn here
-/// (detail/render/draw_fragments.hpp). The result is there after `backend.synchronize()`, and good until the
-/// next call. Arrays of `meshes` are in the backend's memory. Fills `stats` when given.
-/// Errors: invalid_argument naming the field; backend_failure.
+/// Draws meshes into ws.depth, ws.visible and ws.tile_far (of tiles of `tile_size`), and into `images`
+/// what is asked for; `layer_color`: colour into ws.color. Those that are seen through
+/// (MeshAlpha::blend) are not drawn here (detail/render/draw_fragments.hpp). The result is there after
+/// `backend.synchronize()`, and good until the next call. Arrays of `meshes` are in the backend's
+/// memory. Fills `stats` when given. Errors: invalid_argument naming the field; backend_failure.
 template <class S, Backend B>
-Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera,
-                   const MeshLight& light, int tile_size, bool layer_color, MeshImages<S> images = {},
-                   MeshStats* stats = nullptr) {
+Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
+                   const Camera& camera, const MeshLight& light, int tile_size, bool layer_color,
+                   MeshImages<S> images = {}, MeshStats* stats = nullptr) {
   if (Status s = detail::validate(meshes, camera, light); !s) return s;
   MeshStats counted;
   for (const MeshInstance& m : meshes) counted.triangles += m.mesh.triangle_count();
   if (Status s = detail::set_up_meshes(backend, ws, meshes, camera, false, counted); !s) return s;
 
   MeshRasterArgs<S> raster = detail::raster_args(ws, camera, tile_size);
-  const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   ws.depth.resize_discard(pixels);
   ws.visible.resize_discard(pixels);
   ws.tile_far.resize_discard(raster.bin.grid.count());

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
-#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/render/render_composite.hpp"
 
 namespace gsnav {
@@ -35,9 +35,9 @@ struct FrameJob {
   MeshFrame meshes{};
 };
 
-/// Renders batches with one lane a thread: no thread waits for another within a frame. Scratch grows with
-/// threads, not with cameras, and is the same for all lanes, so that a batch like one before it allocates
-/// nothing, whichever lane takes which camera.
+/// Renders batches with one lane a thread: no thread waits for another within a frame. Scratch grows
+/// with threads, not with cameras, and is the same for all lanes, so that a batch like one before it
+/// allocates nothing, whichever lane takes which camera.
 template <class S, LaneBackend B>
 class FrameLanes {
  public:
@@ -46,8 +46,8 @@ class FrameLanes {
     return cameras > 1 && cameras >= 2 * concurrency_of(backend);
   }
 
-  /// render_composite() for each of `count` frames; job_of(c) gives the FrameJob of frame c. The first frame's
-  /// error, by number, is returned; out_of_memory too.
+  /// render_composite() for each of `count` frames; job_of(c) gives the FrameJob of frame c. The first
+  /// frame's error, by number, is returned; out_of_memory too.
   template <class JobOf>
   Status render(B& backend, std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
     while (lanes_.size() < concurrency_of(backend)) lanes_.push_back(std::make_unique<Lane>(backend));
@@ -58,8 +58,8 @@ class FrameLanes {
       Lane& lane = take();
       Status s = detail::guarded([&] {
         const FrameJob<S> job = job_of(c);
-        return render_composite<S, B>(lane.backend, lane.workspace, job.sets, job.meshes, *job.camera, *job.config,
-                                      job.images, &stats[c]);
+        return render_composite<S, B>(lane.backend, lane.workspace, job.sets, job.meshes, *job.camera,
+                                      *job.config, job.images, &stats[c]);
       });
       lane.taken.store(false, std::memory_order_release);
       if (s.ok()) return;

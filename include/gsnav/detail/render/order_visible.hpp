@@ -9,9 +9,9 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
+#include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/frame/gaussians.hpp"
 
 namespace gsnav {
@@ -31,7 +31,7 @@ struct VisibleOrder {
   Buffer<std::uint32_t, B> chunk_keys, ranks, counts;  ///< [slots], [slots] or none, [chunks]
   Buffer<std::uint32_t, B> taken;                      ///< [chunks]: how many are in a range of keys
   Buffer<std::uint32_t, B> keys, order;                ///< of the visible, front to back
-  Buffer<std::uint64_t, B> offsets;                    ///< of chunks, where the host cannot read `counts`
+  Buffer<std::uint64_t, B> offsets;  ///< of chunks, where the host cannot read `counts`
   SortScratch<B> sort;
   std::vector<std::uint32_t> host_counts;
   std::vector<std::uint64_t> host_offsets;
@@ -49,8 +49,8 @@ struct VisibleOrder {
 
 namespace detail {
 
-/// Moves the survivors of the chunks into one list, (key, slot) pairs in slot order: one work item a slot, for
-/// backends of very many threads.
+/// Moves the survivors of the chunks into one list, (key, slot) pairs in slot order: one work item a
+/// slot, for backends of very many threads.
 struct GatherSlot {
   View<const std::uint32_t> chunk_keys, counts;
   View<const std::uint64_t> chunk_offsets;
@@ -144,7 +144,8 @@ struct RankTies {
   }
 };
 
-/// The same with one work item for kRange keys, of which most are found to be without ties many at a time.
+/// The same with one work item for kRange keys, of which most are found to be without ties many at a
+/// time.
 struct RankTiesOfRange {
   static constexpr std::size_t kRange = 4096;
   RankTies ties;
@@ -164,9 +165,9 @@ struct RankTiesOfRange {
 
 }  // namespace detail
 
-/// Lists the visible slots front to back in `v.order`: by the lowest `bits` of the key, ties by rank or, where
-/// there are no ranks, by slot; those of a range of keys on the host alone. No key is below `base`. Returns how many
-/// there are.
+/// Lists the visible slots front to back in `v.order`: by the lowest `bits` of the key, ties by rank or,
+/// where there are no ranks, by slot; those of a range of keys on the host alone. No key is below
+/// `base`. Returns how many there are.
 template <Backend B>
 Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t base, int bits,
                                   const KeyRange& range = {}) {
@@ -182,7 +183,8 @@ Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t 
   if constexpr (is_host_backend<B>) {
     if (!range.whole()) {
       v.taken.resize_discard(chunks);
-      backend.parallel_for(chunks, detail::CountInRange{v.chunk_keys.view(), counts, range, v.taken.view()});
+      backend.parallel_for(chunks,
+                           detail::CountInRange{v.chunk_keys.view(), counts, range, v.taken.view()});
       taken = v.taken.view();
     }
   }
@@ -205,8 +207,8 @@ Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t 
       sum += counts[c];
     }
     v.offsets.upload(v.host_offsets.data(), chunks);
-    backend.parallel_for(slots, detail::GatherSlot{v.chunk_keys.view(), v.counts.view(), v.offsets.view(),
-                                                   v.keys.view(), v.order.view()});
+    backend.parallel_for(slots, detail::GatherSlot{v.chunk_keys.view(), v.counts.view(),
+                                                   v.offsets.view(), v.keys.view(), v.order.view()});
     sort_pairs(backend, v.keys, v.order, v.sort, bits);
   }
   if (v.ranks.size() != 0) {

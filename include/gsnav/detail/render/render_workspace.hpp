@@ -19,8 +19,8 @@ namespace gsnav {
 
 /// What one camera's frame was made of.
 struct RenderStats {
-  std::uint64_t gaussians = 0;           ///< in all sets
-  std::uint64_t visible = 0;             ///< whose footprint bounds reach the image, less those found hidden
+  std::uint64_t gaussians = 0;  ///< in all sets
+  std::uint64_t visible = 0;    ///< whose footprint bounds reach the image, less those found hidden
   std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, less those found hidden by a mesh
   MeshStats meshes;
 };
@@ -29,8 +29,22 @@ struct RenderStats {
 template <class S, Backend B>
 struct RenderWorkspace {
   explicit RenderWorkspace(B& b)
-      : offsets(b), geometry(b), colors(b), depths(b), perspectives(b), bounds(b), visible(b), cursors(b),
-        tile_offsets(b), tile_splats(b), spans(b), open(b), states(b), mesh(b), fragments(b), composite(b) {}
+      : offsets(b),
+        geometry(b),
+        colors(b),
+        depths(b),
+        perspectives(b),
+        bounds(b),
+        visible(b),
+        cursors(b),
+        tile_offsets(b),
+        tile_splats(b),
+        spans(b),
+        open(b),
+        states(b),
+        mesh(b),
+        fragments(b),
+        composite(b) {}
 
   Buffer<Vec3d, B> offsets;
   Buffer<SplatGeometry<S>, B> geometry;
@@ -59,7 +73,8 @@ struct RenderWorkspace {
     });
     return sum;
   }
-  /// Makes room for what the other has room for, so that a frame of either allocates nothing. Drops the content.
+  /// Makes room for what the other has room for, so that a frame of either allocates nothing. Drops the
+  /// content.
   void grow_to(const RenderWorkspace& o) {
     for_each(*this, o, [](auto& own, const auto& other) {
       if constexpr (requires { own.grow_to(other); }) {

@@ -85,8 +85,9 @@ struct RowWeightsWorkspace {
 /// of one depth in row order. The same bits for any number of threads. Errors: those of render_camera;
 /// unsupported (a response other than Response::ewa).
 template <Backend B>
-requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspace<B>& ws, GaussianSet set,
-                                                   const Camera& camera, std::span<float> most) {
+requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspace<B>& ws,
+                                                   GaussianSet set, const Camera& camera,
+                                                   std::span<float> most) {
   if (most.size() != set.gaussians.size) {
     return {Errc::invalid_argument, "add_row_weights: `most` has " + std::to_string(most.size()) +
                                         " values for " + std::to_string(set.gaussians.size) + " rows"};

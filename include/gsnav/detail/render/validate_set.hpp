@@ -38,14 +38,18 @@ inline Status validate(const GaussianSet& set) {
     return Status(Errc::invalid_argument, "GaussianSet: " + what);
   };
   const auto sized = [&](const View<const float>& v, std::size_t n, const char* name) {
-    if (v.data == nullptr && v.size != 0) return bad(std::string(name) + " is null, with a size of " + std::to_string(v.size));
+    if (v.data == nullptr && v.size != 0)
+      return bad(std::string(name) + " is null, with a size of " + std::to_string(v.size));
     return v.size == n ? Status()
-                       : bad(std::string(name) + " has " + std::to_string(v.size) +
-                             " values where " + std::to_string(n) + " are needed");
+                       : bad(std::string(name) + " has " + std::to_string(v.size) + " values where " +
+                             std::to_string(n) + " are needed");
   };
-  if (set.filter > Filter::mip) return bad("filter = " + std::to_string(static_cast<int>(set.filter)) + ": there is none of this number");
+  if (set.filter > Filter::mip)
+    return bad("filter = " + std::to_string(static_cast<int>(set.filter)) +
+               ": there is none of this number");
   if (set.color_space > ColorSpace::linear) {
-    return bad("color_space = " + std::to_string(static_cast<int>(set.color_space)) + ": there is none of this number");
+    return bad("color_space = " + std::to_string(static_cast<int>(set.color_space)) +
+               ": there is none of this number");
   }
   const auto null = [](const auto& v) { return v.data == nullptr && v.size != 0; };
   const char* nothing = null(g.shN_half)           ? "shN_half"
@@ -71,7 +75,8 @@ inline Status validate(const GaussianSet& set) {
   }
   for (int k = 0; k < 3; ++k) {
     if (Status s =
-            sized(g.means[k], packed && g.packed.codes.size == PackedRows::kPlanes * g.size ? 0 : g.size, "means");
+            sized(g.means[k], packed && g.packed.codes.size == PackedRows::kPlanes * g.size ? 0 : g.size,
+                  "means");
         !s) {
       return s;
     }
@@ -105,16 +110,17 @@ inline Status validate(const GaussianSet& set) {
   }
   const std::size_t parts = (g.size + kChunkPart - 1) / kChunkPart;
   if (!g.part_bounds.empty() && g.part_bounds.size != parts) {
-    return bad("part_bounds has " + std::to_string(g.part_bounds.size) + " values where " + std::to_string(parts) +
-               " are needed");
+    return bad("part_bounds has " + std::to_string(g.part_bounds.size) + " values where " +
+               std::to_string(parts) + " are needed");
   }
   if (!g.chunk_sh_degrees.empty() && g.chunk_sh_degrees.size != g.all_chunks()) {
     return bad("chunk_sh_degrees has " + std::to_string(g.chunk_sh_degrees.size) + " values where " +
                std::to_string(g.all_chunks()) + " are needed");
   }
   if (!g.seen.empty() && !g.seen_may_have(g.seen.size)) {
-    return bad("seen has " + std::to_string(g.seen.size) + " words where " + std::to_string(g.seen_words()) +
-               " are needed, or twice as many and " + std::to_string(kSeenRowWords) + " a chunk that is seen");
+    return bad("seen has " + std::to_string(g.seen.size) + " words where " +
+               std::to_string(g.seen_words()) + " are needed, or twice as many and " +
+               std::to_string(kSeenRowWords) + " a chunk that is seen");
   }
   if (g.drawn_chunks.size > g.all_chunks()) {
     return bad("drawn_chunks has " + std::to_string(g.drawn_chunks.size) + " chunks of " +

@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav {
 
@@ -19,7 +19,8 @@ inline int sh_degree_in_use(const GaussianCloud& cloud) noexcept {
   const auto highest = [&](const auto& bands) {
     int found = 0;
     const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
-    for (std::size_t row = 0; row + rest <= bands.size() && rest != 0 && found < cloud.sh_degree; row += rest) {
+    for (std::size_t row = 0; row + rest <= bands.size() && rest != 0 && found < cloud.sh_degree;
+         row += rest) {
       for (int degree = cloud.sh_degree; degree > found; --degree) {
         const auto first = bands.begin() + static_cast<std::ptrdiff_t>(row);
         const auto band = first + 3 * (sh_coefficient_count(degree - 1) - 1);
@@ -54,9 +55,9 @@ struct GroundSearch {
 inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::vector<Vec3d>& facing,
                                   const Vec3d& low, const Vec3d& high, int axis) {
   constexpr std::size_t kCells = 16;  // of a slab on each side
-  constexpr double kAlong = 0.9;    // cosine of 26 degrees
-  constexpr double kBeyond = 0.3;   // of the box's height, on each side: ground may be its outer tenth
-  constexpr double kThick = 0.015;  // of the box's shorter side: ground is neither thin nor level
+  constexpr double kAlong = 0.9;      // cosine of 26 degrees
+  constexpr double kBeyond = 0.3;     // of the box's height, on each side: ground may be its outer tenth
+  constexpr double kThick = 0.015;    // of the box's shorter side: ground is neither thin nor level
   constexpr double kMostSlabs = 512, kLeastSlabs = 8;
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;
   const double height = (1 + 2 * kBeyond) * (high[axis] - low[axis]),
@@ -189,7 +190,8 @@ inline UpGuess guess_up(const GaussianCloud& cloud, const Vec3d& usual = {0, -1,
 }
 
 /// Fills in what a report says of the cloud as a whole: SH bands in use, filter, order, memory, up.
-inline void describe(const GaussianCloud& cloud, LoadReport& report, const Vec3d& usual_up = {0, -1, 0}) {
+inline void describe(const GaussianCloud& cloud, LoadReport& report,
+                     const Vec3d& usual_up = {0, -1, 0}) {
   report.sh_degree_used = sh_degree_in_use(cloud);
   report.filter = cloud.filter;
   report.eps2d = cloud.eps2d;

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "gsnav/detail/core/huge_pages.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 
 namespace gsnav {

@@ -9,18 +9,19 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/skin/lbs.hpp"
-#include "gsnav/math/aabb.hpp"
-#include "gsnav/math/similarity.hpp"
 #include "gsnav/detail/scene/drop_bands.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/detail/scene/sh_rotation.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/math/aabb.hpp"
+#include "gsnav/math/similarity.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/skin/lbs.hpp"
 
 namespace gsnav {
 
 /// Moves, turns and scales a cloud as a solid body, SH bands included. Chunk bounds are dropped: sort
-/// again. `by.rotation` must be a unit quaternion and `by.scale` positive. A compact cloud's bands are rounded again.
+/// again. `by.rotation` must be a unit quaternion and `by.scale` positive. A compact cloud's bands are
+/// rounded again.
 inline void transform(GaussianCloud& cloud, const Similarity& by) {
   const bool compact = !cloud.shN_half.empty();
   expand_sh(cloud);
@@ -50,8 +51,8 @@ inline void transform(GaussianCloud& cloud, const Similarity& by) {
 
 namespace detail {
 
-/// Turns the columns of `a` until they are orthogonal (one-sided Jacobi): a = rotation * diag(lengths) * v for
-/// some rotation v. Flat and line-like ones keep their small lengths, which squares would lose.
+/// Turns the columns of `a` until they are orthogonal (one-sided Jacobi): a = rotation * diag(lengths) *
+/// v for some rotation v. Flat and line-like ones keep their small lengths, which squares would lose.
 inline void orthogonal_columns(Mat3d& a, Mat3d& rotation, Vec3d& lengths) {
   const auto column = [&a](int k) { return Vec3d{a(0, k), a(1, k), a(2, k)}; };
   for (int sweep = 0; sweep < 16; ++sweep) {
@@ -80,7 +81,8 @@ inline void orthogonal_columns(Mat3d& a, Mat3d& rotation, Vec3d& lengths) {
     if (lengths[k] <= lengths[shortest]) shortest = k;
   }
   if (!(lengths[longest] > 0) || longest == shortest) {
-    rotation = Mat3d::identity();  // a point: no axes; of three equal lengths above 0 the last is the shortest
+    rotation =
+        Mat3d::identity();  // a point: no axes; of three equal lengths above 0 the last is the shortest
     return;
   }
   const int middle = 3 - longest - shortest;
@@ -110,11 +112,11 @@ inline void orthogonal_columns(Mat3d& a, Mat3d& rotation, Vec3d& lengths) {
 
 /// Moves a cloud by any map that can be undone, M and a translation: uneven scales, shears, mirrors. A
 /// covariance C becomes M C M^T, taken apart into a rotation and scales again. Colours turn with the
-/// orthogonal factor Q of M = Q P (P symmetric and positive): what was seen from direction d is seen from
-/// Q d. Where M mirrors, Q does: the bands of odd degree change their sign, then turn by the rotation -Q.
-/// A direction that is only stretched keeps its colours. Chunk bounds are dropped: sort again.
-/// Errors: invalid_argument (M is flat, its smallest stretch below 1e-6 of its largest, or not finite); the
-/// cloud is then as it was.
+/// orthogonal factor Q of M = Q P (P symmetric and positive): what was seen from direction d is seen
+/// from Q d. Where M mirrors, Q does: the bands of odd degree change their sign, then turn by the
+/// rotation -Q. A direction that is only stretched keeps its colours. Chunk bounds are dropped: sort
+/// again. Errors: invalid_argument (M is flat, its smallest stretch below 1e-6 of its largest, or not
+/// finite); the cloud is then as it was.
 inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
   const Mat3d& m = by.linear;
   Mat3d columns = m, axes;
@@ -142,7 +144,8 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
     const auto part = [&](std::size_t k) { return static_cast<double>(cloud.quats[k][i]); };
     Mat3d shape = stretch * rotation_matrix(Quatd{part(0), part(1), part(2), part(3)}), rotation;
     for (int k = 0; k < 3; ++k) {
-      for (int j = 0; j < 3; ++j) shape(j, k) *= static_cast<double>(cloud.scales[static_cast<std::size_t>(k)][i]);
+      for (int j = 0; j < 3; ++j)
+        shape(j, k) *= static_cast<double>(cloud.scales[static_cast<std::size_t>(k)][i]);
     }
     Vec3d scales{};
     detail::orthogonal_columns(shape, rotation, scales);
@@ -150,7 +153,8 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
     normalize(q);
     const double parts[] = {q.w, q.x, q.y, q.z};
     for (std::size_t k = 0; k < 4; ++k) cloud.quats[k][i] = static_cast<float>(parts[k]);
-    for (int k = 0; k < 3; ++k) cloud.scales[static_cast<std::size_t>(k)][i] = static_cast<float>(scales[k]);
+    for (int k = 0; k < 3; ++k)
+      cloud.scales[static_cast<std::size_t>(k)][i] = static_cast<float>(scales[k]);
     // Degree 1 has coefficients 0 to 2 of those behind degree 0, degree 3 has 8 to 14.
     for (std::size_t k = 0; sign < 0 && k < rest / 3; ++k) {
       if (k >= 3 && k < 8) continue;

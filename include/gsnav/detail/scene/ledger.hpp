@@ -9,12 +9,12 @@
 
 #include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
-#include "gsnav/render/count_culled.hpp"
-#include "gsnav/render/render_config.hpp"
 #include "gsnav/detail/render/render_workspace.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
-#include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/detail/scene/scene_profile.hpp"
+#include "gsnav/render/count_culled.hpp"
+#include "gsnav/render/render_config.hpp"
+#include "gsnav/scene/lod_cut.hpp"
 
 namespace gsnav {
 
@@ -26,11 +26,13 @@ struct FrameLedger {
   std::uint64_t visible = 0;      ///< RenderStats::visible
   std::uint64_t transparent = 0;  ///< left out when the scene was read: below 1/255 everywhere
   // Changed.
-  std::uint64_t converted = 0;   ///< Gaussians of sets whose colours are of another space than the frame blends in
-  bool other_order = false;      ///< blended in another order than the scene's file asks for
-  std::uint64_t unseen = 0;      ///< Gaussians left out by a visible set (VisibleSets)
-  double unseen_weight = 0;      ///< of which no viewpoint saw more than this part of a pixel: sampled, no bound
-  LodStats lod;                  ///< zeros where no level of detail was asked for
+  std::uint64_t converted =
+      0;  ///< Gaussians of sets whose colours are of another space than the frame blends in
+  bool other_order = false;  ///< blended in another order than the scene's file asks for
+  std::uint64_t unseen = 0;  ///< Gaussians left out by a visible set (VisibleSets)
+  double unseen_weight =
+      0;         ///< of which no viewpoint saw more than this part of a pixel: sampled, no bound
+  LodStats lod;  ///< zeros where no level of detail was asked for
   std::uint64_t sh_skipped = 0;  ///< SH coefficients in bands that are not read, held or not
   double sh_error = 0;           ///< that changes no colour by more
   std::uint64_t sh_bytes = 0;    ///< what bands that are not held would take
@@ -91,7 +93,8 @@ inline std::string ledger_text(const FrameLedger& l) {
   };
   const CullCounts& n = l.culled;
   line(
-      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% of what could "
+      "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% "
+      "of what could "
       "be); "
       "%llu touched, %.2f for each that reaches a tile; %llu drawn",
       count(n.removed()), count(n.rows), share(n.removed(), n.rows), share(n.removed(), n.removable()),
@@ -107,9 +110,11 @@ inline std::string ledger_text(const FrameLedger& l) {
          l.sh_error);
   }
   if (l.unseen != 0) {
-    line("left out: %llu Gaussians of which, and of those beside them, no viewpoint in or near the camera's cell sees more "
-         "than %.1g of a pixel; sampled, not proved",
-         count(l.unseen), l.unseen_weight);
+    line(
+        "left out: %llu Gaussians of which, and of those beside them, no viewpoint in or near the "
+        "camera's cell sees more "
+        "than %.1g of a pixel; sampled, not proved",
+        count(l.unseen), l.unseen_weight);
   }
   if (l.lod.shown != 0) {
     line(
@@ -117,7 +122,8 @@ inline std::string ledger_text(const FrameLedger& l) {
         "at most",
         count(l.lod.merged), count(l.lod.shown), count(l.lod.drawn), l.lod.error_px);
   }
-  if (l.converted != 0) line("converted: the colours of %llu Gaussians to the frame's space", count(l.converted));
+  if (l.converted != 0)
+    line("converted: the colours of %llu Gaussians to the frame's space", count(l.converted));
   if (l.other_order)
     line("order: %s", "not the one that the scene's file asks for (depth, or distance from the camera)");
   if (l.clamped != 0) line("clamped: %llu log-scales to [-20, 20]", count(l.clamped));

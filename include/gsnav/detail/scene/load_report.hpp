@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/frame/gaussians.hpp"
 #include "gsnav/math/aabb.hpp"
 
 namespace gsnav {
@@ -38,20 +38,20 @@ struct LoadReport {
   std::uint64_t clamped_scales = 0;       ///< log-scale outside [-20, 20]
   int sh_degree = 0;                      ///< of the file; the cloud has room for fewer where:
   std::uint64_t sh_bytes_let_go =
-      0;  ///< what bands of zeros alone would take (LoadSceneOptions::keep_zero_bands)
-  int sh_degree_used = 0;                 ///< highest band with a coefficient that is not zero
-  Filter filter = Filter::classic;        ///< that the file asks for
-  float eps2d = 0.3f;                     ///< its term on the 2D covariance's diagonal, px^2
+      0;                   ///< what bands of zeros alone would take (LoadSceneOptions::keep_zero_bands)
+  int sh_degree_used = 0;  ///< highest band with a coefficient that is not zero
+  Filter filter = Filter::classic;  ///< that the file asks for
+  float eps2d = 0.3f;               ///< its term on the 2D covariance's diagonal, px^2
   SortOrder sort_order = SortOrder::z_depth;
-  std::uint64_t memory = 0;               ///< bytes of the cloud's arrays
-  Vec3d up{};                             ///< guessed, asset frame: one of +-y, +-z; zero of an empty cloud
+  std::uint64_t memory = 0;  ///< bytes of the cloud's arrays
+  Vec3d up{};                ///< guessed, asset frame: one of +-y, +-z; zero of an empty cloud
   bool up_seen = false;  ///< by the cloud's ground (guess_up); false: only by what its kind of file does
-  double up_confidence = 0;               ///< of a seen one, 0 to 1
-  double sh_storage_error = 0;            ///< largest difference of a coefficient by keeping them as binary16
-  bool compact = false;                   ///< SH is kept as binary16
-  bool packed = false;                    ///< all is kept in fewer bits (PackedCloud), which changed:
+  double up_confidence = 0;     ///< of a seen one, 0 to 1
+  double sh_storage_error = 0;  ///< largest difference of a coefficient by keeping them as binary16
+  bool compact = false;         ///< SH is kept as binary16
+  bool packed = false;          ///< all is kept in fewer bits (PackedCloud), which changed:
   PackErrors packing;
-  bool moving = false;                    ///< 4D Gaussians; these are the first and the last of their own times, seconds:
+  bool moving = false;  ///< 4D Gaussians; these are the first and the last of their own times, seconds:
   double first_time = 0, last_time = 0;
   Aabb<double> bounds{};              ///< of the kept means, asset frame
   std::vector<std::string> warnings;  ///< everything else a person should know

@@ -10,13 +10,13 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/math/quat.hpp"
 #include "gsnav/detail/math/svd.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/detail/scene/lod_greedy.hpp"
 #include "gsnav/detail/scene/lod_merge.hpp"
-#include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/math/quat.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/lod_tree.hpp"
 
 namespace gsnav {
 
@@ -69,7 +69,8 @@ class LodBuilder {
   /// Fills leaf i but for its bounds.
   void measure(std::size_t i) {
     LodGrain& sum = grains_[i];
-    for (std::size_t row = i * kProjectChunk; row < std::min((i + 1) * kProjectChunk, source_.size()); ++row) {
+    for (std::size_t row = i * kProjectChunk; row < std::min((i + 1) * kProjectChunk, source_.size());
+         ++row) {
       sum.add(lod_gaussian(source_, row, 0));
     }
     out_.nodes[i].grain = sum.size();

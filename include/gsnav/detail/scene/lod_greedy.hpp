@@ -8,9 +8,9 @@
 #include <queue>
 #include <vector>
 
+#include "gsnav/detail/scene/lod_merge.hpp"
 #include "gsnav/math/quat.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
-#include "gsnav/detail/scene/lod_merge.hpp"
 
 namespace gsnav::detail {
 
@@ -48,7 +48,9 @@ struct LodGrain {
     log_area += o.log_area;
   }
   /// LodNode::grain
-  float size() const noexcept { return mass > 0 ? static_cast<float>(std::exp(0.5 * log_area / mass)) : 0.0f; }
+  float size() const noexcept {
+    return mass > 0 ? static_cast<float>(std::exp(0.5 * log_area / mass)) : 0.0f;
+  }
 };
 
 /// Puts Gaussians together, two at a time, the cheapest pair of neighbours first, until `target` are

@@ -13,12 +13,12 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/math/aabb.hpp"
-#include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/detail/scene/lod_greedy.hpp"
-#include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/detail/scene/point_tree.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/math/aabb.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/lod_tree.hpp"
 
 namespace gsnav {
 
@@ -28,8 +28,8 @@ struct LodLevel {
   std::vector<std::uint32_t> boxes;  ///< [N]
 };
 
-/// A cloud in chunks that belong to one box each, and its levels of detail. The last chunk of a box is filled with
-/// transparent rows.
+/// A cloud in chunks that belong to one box each, and its levels of detail. The last chunk of a box is
+/// filled with transparent rows.
 struct LeveledCloud {
   GaussianCloud cloud;
   LodTree tree;
@@ -55,8 +55,8 @@ inline std::size_t filled_rows(const std::vector<LodLevel>& levels, std::size_t 
   return chunks * kProjectChunk;
 }
 
-/// Brings the rows of a level together by box, along Hilbert's curve within each, the largest behind the others as in
-/// sort_spatially, and fills up chunks. `row_ids` keeps the places.
+/// Brings the rows of a level together by box, along Hilbert's curve within each, the largest behind the
+/// others as in sort_spatially, and fills up chunks. `row_ids` keeps the places.
 template <Backend B>
 std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) {
   GaussianCloud& in = level.cloud;
@@ -92,11 +92,14 @@ std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) 
   });
   std::vector<std::uint32_t> from(std::size_t{chunks} * kProjectChunk);
   backend.parallel_for(boxes, [&](std::size_t b) {
-    const auto begin = order.begin() + static_cast<std::ptrdiff_t>(out[b].first), end = begin + out[b].count;
-    std::sort(begin, end,
-              [&](std::uint32_t x, std::uint32_t y) { return codes[x] != codes[y] ? codes[x] < codes[y] : x < y; });
+    const auto begin = order.begin() + static_cast<std::ptrdiff_t>(out[b].first),
+               end = begin + out[b].count;
+    std::sort(begin, end, [&](std::uint32_t x, std::uint32_t y) {
+      return codes[x] != codes[y] ? codes[x] < codes[y] : x < y;
+    });
     for (std::size_t k = 0; k < out[b].chunks * kProjectChunk; ++k) {
-      from[out[b].first_chunk * kProjectChunk + k] = order[out[b].first + std::min<std::size_t>(k, out[b].count - 1)];
+      from[out[b].first_chunk * kProjectChunk + k] =
+          order[out[b].first + std::min<std::size_t>(k, out[b].count - 1)];
     }
   });
   static_cast<void>(backend.synchronize());
@@ -120,7 +123,8 @@ std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) 
   in.row_ids = std::move(from);
   std::uint32_t filled = static_cast<std::uint32_t>(n);
   for (const BoxRows& b : out) {
-    for (std::size_t i = b.first_chunk * kProjectChunk + b.count; i < (b.first_chunk + b.chunks) * kProjectChunk; ++i) {
+    for (std::size_t i = b.first_chunk * kProjectChunk + b.count;
+         i < (b.first_chunk + b.chunks) * kProjectChunk; ++i) {
       in.opacities[i] = 0;
       in.row_ids[i] = filled++;
     }
@@ -129,11 +133,13 @@ std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) 
   return out;
 }
 
-/// Root mean square, by mass, of the distance from each of a box's finest Gaussians to the nearest of a coarser level.
-inline double distance_to_level(const GaussianCloud& fine, const BoxRows& in_fine, const GaussianCloud& coarse,
-                                const BoxRows& in_coarse) {
+/// Root mean square, by mass, of the distance from each of a box's finest Gaussians to the nearest of a
+/// coarser level.
+inline double distance_to_level(const GaussianCloud& fine, const BoxRows& in_fine,
+                                const GaussianCloud& coarse, const BoxRows& in_coarse) {
   std::vector<Vec3d> points(in_coarse.count);
-  for (std::size_t i = 0; i < points.size(); ++i) points[i] = coarse.mean(in_coarse.first_chunk * kProjectChunk + i);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    points[i] = coarse.mean(in_coarse.first_chunk * kProjectChunk + i);
   const PointTree tree(points);
   double squares = 0, mass = 0;
   for (std::size_t i = 0; i < in_fine.count; ++i) {
@@ -146,12 +152,13 @@ inline double distance_to_level(const GaussianCloud& fine, const BoxRows& in_fin
 
 }  // namespace detail
 
-/// Makes a cloud and its levels of detail of the levels that a set ships, finest first. Level k holds, of each box that
-/// has one, the k-th level that is there; boxes without rows in the first are not shown. A node's error is the root
-/// mean square distance, by mass, from the box's finest Gaussians to the nearest of the node's own, and not below that
-/// of a finer node. The same bits for any number of threads. Levels are used up. Errors: invalid_argument (no level,
-/// compact SH, a box that is not one of `boxes`, levels of different filters); unsupported (boxes so small that filling
-/// their chunks would take many times the rows).
+/// Makes a cloud and its levels of detail of the levels that a set ships, finest first. Level k holds,
+/// of each box that has one, the k-th level that is there; boxes without rows in the first are not
+/// shown. A node's error is the root mean square distance, by mass, from the box's finest Gaussians to
+/// the nearest of the node's own, and not below that of a finer node. The same bits for any number of
+/// threads. Levels are used up. Errors: invalid_argument (no level, compact SH, a box that is not one of
+/// `boxes`, levels of different filters); unsupported (boxes so small that filling their chunks would
+/// take many times the rows).
 template <Backend B>
 requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::vector<LodLevel> levels,
                                                              std::size_t boxes) {
@@ -164,7 +171,8 @@ requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::ve
   for (std::size_t l = 0; l < levels.size(); ++l) {
     const LodLevel& level = levels[l];
     if (level.boxes.size() != level.cloud.size()) {
-      return bad(l, std::to_string(level.boxes.size()) + " boxes for " + std::to_string(level.cloud.size()) + " rows");
+      return bad(l, std::to_string(level.boxes.size()) + " boxes for " +
+                        std::to_string(level.cloud.size()) + " rows");
     }
     if (!level.cloud.shN_half.empty()) return bad(l, "compact: expand_sh first");
     all += level.cloud.size();
@@ -225,7 +233,8 @@ requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::ve
       node.grain = finer.grain;
       node.reach = detail::both(node.reach, finer.reach);
       node.error =
-          std::max(finer.error, static_cast<float>(detail::distance_to_level(levels[0].cloud, rows[0][b], own, r)));
+          std::max(finer.error,
+                   static_cast<float>(detail::distance_to_level(levels[0].cloud, rows[0][b], own, r)));
     });
     if (Status s = backend.synchronize(); !s) return s;
   }

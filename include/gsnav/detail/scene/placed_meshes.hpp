@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/detail/scene/textured_scene.hpp"
+#include "gsnav/scene/mesh_scene.hpp"
 
 namespace gsnav {
 
@@ -19,8 +19,10 @@ struct PlacedMeshes {
   std::vector<TexturedScene::Instance> instances;
   std::vector<std::string> warnings;  ///< what is drawn otherwise than asked for
 
-  /// All of it in the world, for Renderer::set_meshes on host backends; ids count from `first_id`. Good while this is.
-  std::vector<MeshInstance> in_world(const Similarity& world_from_scene = {}, std::uint32_t first_id = 0) const {
+  /// All of it in the world, for Renderer::set_meshes on host backends; ids count from `first_id`. Good
+  /// while this is.
+  std::vector<MeshInstance> in_world(const Similarity& world_from_scene = {},
+                                     std::uint32_t first_id = 0) const {
     std::vector<MeshInstance> all;
     for (const TexturedScene::Instance& i : instances) {
       all.push_back(meshes.instance(i.part, world_from_scene * i.world_from_part,
@@ -30,8 +32,8 @@ struct PlacedMeshes {
   }
 };
 
-/// Takes a surface as files give it (io::load_textured_scene). Parts share their textures' mip chains. Errors:
-/// invalid_argument naming the part, texture or instance that does not fit.
+/// Takes a surface as files give it (io::load_textured_scene). Parts share their textures' mip chains.
+/// Errors: invalid_argument naming the part, texture or instance that does not fit.
 inline Result<PlacedMeshes> placed_meshes(TexturedScene scene) {
   PlacedMeshes out;
   out.warnings = std::move(scene.warnings);
@@ -46,7 +48,8 @@ inline Result<PlacedMeshes> placed_meshes(TexturedScene scene) {
     if (material.texture >= 0) {
       const std::size_t t = static_cast<std::size_t>(material.texture);
       if (t >= textures.size()) {
-        return named({Errc::invalid_argument, "texture " + std::to_string(t) + " of " + std::to_string(textures.size())});
+        return named({Errc::invalid_argument,
+                      "texture " + std::to_string(t) + " of " + std::to_string(textures.size())});
       }
       if (textures[t] == nullptr) {
         const TextureImage& picture = scene.textures[t];

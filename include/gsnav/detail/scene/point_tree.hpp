@@ -13,8 +13,8 @@
 
 namespace gsnav::detail {
 
-/// Points by a k-d tree without nodes: [first, last) is split at its middle by its longest axis, over and over. Points
-/// that are not finite are left out. The points must stay.
+/// Points by a k-d tree without nodes: [first, last) is split at its middle by its longest axis, over
+/// and over. Points that are not finite are left out. The points must stay.
 class PointTree {
  public:
   explicit PointTree(std::span<const Vec3d> points) : points_(points), axes_(points.size()) {
@@ -26,8 +26,8 @@ class PointTree {
   /// Numbers of the points, neighbours mostly together.
   const std::vector<std::uint32_t>& order() const noexcept { return order_; }
 
-  /// Calls best.add(number, squared distance) for every point nearer to `from` than the root of best.worst(), which may
-  /// shrink meanwhile, and for others.
+  /// Calls best.add(number, squared distance) for every point nearer to `from` than the root of
+  /// best.worst(), which may shrink meanwhile, and for others.
   template <class Best>
   void search(const Vec3d& from, Best& best) const {
     search(0, order_.size(), from, best);
@@ -60,8 +60,9 @@ class PointTree {
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     const std::size_t middle = first + (last - first) / 2;
     const auto at = [this](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-    std::nth_element(at(first), at(middle), at(last),
-                     [&](std::uint32_t a, std::uint32_t b) { return points_[a][axis] < points_[b][axis]; });
+    std::nth_element(at(first), at(middle), at(last), [&](std::uint32_t a, std::uint32_t b) {
+      return points_[a][axis] < points_[b][axis];
+    });
     axes_[middle] = static_cast<std::uint8_t>(axis);
     split(first, middle);
     split(middle + 1, last);

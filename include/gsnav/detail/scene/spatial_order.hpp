@@ -63,7 +63,8 @@ inline std::uint64_t hilbert_code(std::array<std::uint32_t, 3> x) noexcept {
   for (std::uint32_t q = kTop; q > 1; q >>= 1) {
     const std::uint32_t below = q - 1;
     for (std::uint32_t& v : x) {
-      // Where the bit is set the first coordinate is turned over, else the two change places. Branches would be chance.
+      // Where the bit is set the first coordinate is turned over, else the two change places. Branches
+      // would be chance.
       const std::uint32_t set = (v & q) != 0 ? ~0u : 0u, swapped = (x[0] ^ v) & below & ~set;
       x[0] ^= swapped | (below & set);
       v ^= swapped;
@@ -102,7 +103,8 @@ std::vector<std::uint32_t> rows_by_code(B& backend, std::size_t n, const Code& c
 
 /// Bounds of each `rows` consecutive rows.
 template <Backend B>
-std::vector<ChunkBounds> chunk_bounds_of(B& backend, const GaussianCloud& cloud, std::size_t rows = kProjectChunk) {
+std::vector<ChunkBounds> chunk_bounds_of(B& backend, const GaussianCloud& cloud,
+                                         std::size_t rows = kProjectChunk) {
   std::vector<ChunkBounds> out((cloud.size() + rows - 1) / rows);
   backend.parallel_for(out.size(), [&](std::size_t c) {
     Aabb<double> box;
@@ -142,11 +144,11 @@ inline std::vector<std::uint32_t> rows_as_read(const GaussianCloud& cloud) {
   return rows;
 }
 
-/// Brings the rows into the order of Hilbert's curve through their means and bounds each chunk of them, so that a
-/// renderer touches what is near the view only, and neighbours lie together in memory. `row_ids` keeps each row's
-/// place, so that images stay the same, bit for bit. Large Gaussians go together behind the others: one
-/// among small ones would open its whole chunk's bounds. The order is the
-/// same for any number of threads.
+/// Brings the rows into the order of Hilbert's curve through their means and bounds each chunk of them,
+/// so that a renderer touches what is near the view only, and neighbours lie together in memory.
+/// `row_ids` keeps each row's place, so that images stay the same, bit for bit. Large Gaussians go
+/// together behind the others: one among small ones would open its whole chunk's bounds. The order is
+/// the same for any number of threads.
 template <Backend B>
 void sort_spatially(B& backend, GaussianCloud& cloud) {
   static_assert(is_host_backend<B>);
@@ -172,8 +174,9 @@ void sort_spatially(B& backend, GaussianCloud& cloud) {
   const float large = detail::value_of_rank(largest, n - 1 - (n - 1) / 64);
   std::vector<std::uint32_t> order = detail::rows_by_code(backend, n, [&](std::size_t i) {
     const Vec3d p = (cloud.mean(i) - box.low) * (1.0 / cell);
-    const std::uint64_t code = detail::hilbert_code(
-        {static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y), static_cast<std::uint32_t>(p.z)});
+    const std::uint64_t code =
+        detail::hilbert_code({static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y),
+                              static_cast<std::uint32_t>(p.z)});
     return code | (largest[i] > large ? std::uint64_t{1} << 63 : 0);
   });
   std::vector<float> room = std::move(largest);

@@ -23,7 +23,8 @@ struct SurfaceMaterial {
   bool double_sided = false;  ///< seen from behind too
   bool unlit = false;         ///< its colour is what is seen, whatever the light
   bool blend = false;         ///< what is behind is seen through it, as alpha says
-  double alpha = 1.0;         ///< in [0, 1], times the texture's; read where holes are cut or what is behind is seen
+  double alpha =
+      1.0;  ///< in [0, 1], times the texture's; read where holes are cut or what is behind is seen
 };
 
 }  // namespace gsnav

@@ -10,18 +10,19 @@
 
 #include "gsnav/detail/render/at_time.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/detail/scene/spatial_order.hpp"
 
 namespace gsnav {
 
 /// Gaussians that move and fade in host memory (TemporalView has the formulas).
 struct TemporalCloud {
-  GaussianCloud cloud;                                  ///< each Gaussian at its own time
-  std::vector<float> times;                             ///< [N] seconds
-  std::vector<float> sigmas;                            ///< [N] seconds; infinity: always there
-  std::array<std::vector<float>, kMotionPlanes> motion; ///< x, y, z of velocity, acceleration, jerk; [N] or empty
+  GaussianCloud cloud;        ///< each Gaussian at its own time
+  std::vector<float> times;   ///< [N] seconds
+  std::vector<float> sigmas;  ///< [N] seconds; infinity: always there
+  std::array<std::vector<float>, kMotionPlanes>
+      motion;  ///< x, y, z of velocity, acceleration, jerk; [N] or empty
 
   std::size_t size() const noexcept { return cloud.size(); }
   /// Bytes held by the arrays.
@@ -59,8 +60,8 @@ inline void sort_spatially(TemporalCloud& scene) {
   for (auto& plane : scene.motion) permute_rows(backend, order, 1, plane);
 }
 
-/// The scene at a finite time `t`, seconds, as a cloud that stands: computed in double, Gaussians below 1/255 left out.
-/// Not sorted.
+/// The scene at a finite time `t`, seconds, as a cloud that stands: computed in double, Gaussians below
+/// 1/255 left out. Not sorted.
 inline GaussianCloud cloud_at(const TemporalCloud& scene, double t) {
   const TemporalView view = scene.view();
   GaussianCloud out = scene.cloud, moved;
@@ -77,8 +78,8 @@ inline GaussianCloud cloud_at(const TemporalCloud& scene, double t) {
   return out;
 }
 
-/// A moving scene in a backend's memory, taken to one time after the other. On host backends the scene's arrays are
-/// used as they are: it must outlive this, as must the backend.
+/// A moving scene in a backend's memory, taken to one time after the other. On host backends the scene's
+/// arrays are used as they are: it must outlive this, as must the backend.
 template <Backend B>
 class TemporalGaussians {
  public:

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/detail/scene/surface_material.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
-#include "gsnav/detail/scene/surface_material.hpp"
 #include "gsnav/scene/triangle_mesh.hpp"
 
 namespace gsnav {

@@ -11,8 +11,9 @@
 
 namespace gsnav {
 
-/// Bodies of scenes over intervals of time, kept for whoever comes by there later: episodes that begin at multiples of
-/// the control period meet the same intervals over and over. What was not used for longest leaves first.
+/// Bodies of scenes over intervals of time, kept for whoever comes by there later: episodes that begin
+/// at multiples of the control period meet the same intervals over and over. What was not used for
+/// longest leaves first.
 class BodyCache {
  public:
   struct Key {
@@ -22,11 +23,12 @@ class BodyCache {
   };
   struct Entry {
     CapsuleSet bodies;
-    bool made = false;                ///< set by whoever makes the bodies
+    bool made = false;                 ///< set by whoever makes the bodies
     std::list<Key>::iterator place{};  ///< the cache's own
   };
 
-  /// The entry of `key`, which stays where it is until trim(), and whether its bodies have yet to be made.
+  /// The entry of `key`, which stays where it is until trim(), and whether its bodies have yet to be
+  /// made.
   std::pair<Entry*, bool> find(const Key& key) {
     const auto [at, fresh] = entries_.try_emplace(key);
     Entry& entry = at->second;

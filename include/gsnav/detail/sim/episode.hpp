@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/math/quat.hpp"
 #include "gsnav/detail/nav/episode.hpp"
+#include "gsnav/math/quat.hpp"
 #include "gsnav/nav/navmesh.hpp"
 
 namespace gsnav {

@@ -20,7 +20,8 @@
 namespace gsnav {
 
 /// Backends that draw many cameras in one call, each with sets of its own, into images in their own
-/// memory (CudaBatchRenderer says what is asked of it). What one of them refuses as unsupported is drawn by Renderer.
+/// memory (CudaBatchRenderer says what is asked of it). What one of them refuses as unsupported is drawn
+/// by Renderer.
 template <class B>
 concept BatchBackend = Backend<B> && !is_host_backend<B> && requires {
   typename B::batch_renderer;

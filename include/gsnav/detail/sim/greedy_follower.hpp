@@ -13,25 +13,28 @@ namespace gsnav {
 
 struct GreedyFollowerOptions {
   double goal_radius = 0.0;  ///< metres: stop nearer than this; 0: three quarters of a forward step
-  std::size_t thrashing = 16;  ///< turns to and fro in a row after which a whole turn is carried out; 0: never
+  std::size_t thrashing =
+      16;  ///< turns to and fro in a row after which a whole turn is carried out; 0: never
 };
 
 /// A baseline in the manner of Habitat's GreedyGeodesicFollower: sees walls, never people.
 ///
-/// At each place it tries "turn k times to one side, then one step" for all k up to half a turn and takes the
-/// first action of the one that brings it nearest to the goal along the surface, in steps, less a little for every
-/// action and for running into a wall. A field of distances makes a trial one walk and one lookup.
+/// At each place it tries "turn k times to one side, then one step" for all k up to half a turn and
+/// takes the first action of the one that brings it nearest to the goal along the surface, in steps,
+/// less a little for every action and for running into a wall. A field of distances makes a trial one
+/// walk and one lookup.
 class GreedyGeodesicFollower {
  public:
   /// The mesh must outlive it. Errors: what GeodesicField::make and validate(TaskConfig) report.
-  static Result<GreedyGeodesicFollower> make(const NavMesh& mesh, const Vec3d& goal, const TaskConfig& task = {},
+  static Result<GreedyGeodesicFollower> make(const NavMesh& mesh, const Vec3d& goal,
+                                             const TaskConfig& task = {},
                                              const GreedyFollowerOptions& options = {});
 
-  /// The next action; stop within the goal's radius. Errors: nothing_navigable where the agent is off the mesh or
-  /// the goal cannot be reached from it.
+  /// The next action; stop within the goal's radius. Errors: nothing_navigable where the agent is off
+  /// the mesh or the goal cannot be reached from it.
   Result<Action> next(const AgentPose& agent);
-  /// All actions from a pose to the goal, stop at the end, where nothing else moves. Errors: as next; invalid_argument
-  /// where `most` actions do not lead there.
+  /// All actions from a pose to the goal, stop at the end, where nothing else moves. Errors: as next;
+  /// invalid_argument where `most` actions do not lead there.
   Result<std::vector<Action>> all(AgentPose agent, std::size_t most = 5000);
   /// Forgets the actions so far.
   void reset() { recent_.clear(), pending_.clear(); }

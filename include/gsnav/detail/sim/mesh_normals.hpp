@@ -20,7 +20,8 @@ class MeshNormals {
   explicit MeshNormals(B& backend) : backend_(&backend), workspace_(backend), normals_(backend) {}
 
   /// Writes `out` [height][width][3] as SensorKind::normal has it. `seen` [height][width] is the median
-  /// depth of the same camera's frame with the same meshes, in host memory as `out`. Errors: what draw_meshes reports.
+  /// depth of the same camera's frame with the same meshes, in host memory as `out`. Errors: what
+  /// draw_meshes reports.
   Status draw(const MeshFrame& meshes, const Camera& camera, const float* seen, double far_plane,
               std::span<float> out) {
     if (meshes.instances.empty()) {
@@ -35,8 +36,8 @@ class MeshNormals {
       images.normal = normals_.data();
     }
     constexpr int kTile = 16;  // no image depends on it
-    if (Status s = draw_meshes<float>(*backend_, workspace_, meshes.instances, camera, meshes.light, kTile, false,
-                                      images);
+    if (Status s = draw_meshes<float>(*backend_, workspace_, meshes.instances, camera, meshes.light,
+                                      kTile, false, images);
         !s) {
       return s;
     }
@@ -62,8 +63,8 @@ class MeshNormals {
  private:
   B* backend_;
   MeshWorkspace<float, B> workspace_;
-  Buffer<float, B> normals_;   // in the backend's memory, where that is its own
-  std::vector<float> depth_;   // of the meshes, likewise
+  Buffer<float, B> normals_;  // in the backend's memory, where that is its own
+  std::vector<float> depth_;  // of the meshes, likewise
 };
 
 }  // namespace gsnav

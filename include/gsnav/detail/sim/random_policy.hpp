@@ -8,9 +8,9 @@
 
 namespace gsnav {
 
-/// The baseline that everything is better than, in the manner of Habitat-Lab's RandomAgent: stops where the goal is
-/// within the success distance (straight), else forward, left or right, each as likely. The same seed gives the same
-/// actions.
+/// The baseline that everything is better than, in the manner of Habitat-Lab's RandomAgent: stops where
+/// the goal is within the success distance (straight), else forward, left or right, each as likely. The
+/// same seed gives the same actions.
 class RandomPolicy {
  public:
   explicit RandomPolicy(std::uint64_t seed = 0) noexcept : rng_(seed) {}

@@ -8,9 +8,10 @@ namespace gsnav {
 
 /// Weights of the reward of one action,
 ///     r = progress (g_before - g_after) + slack + success S - proximity i - collision C - wall W,
-/// where g is the distance to the goal along the surface (metres), S is 1 where stop ends the episode in success, i the
-/// intrusion (0 to 1) into the space of the avatar that came nearest, C is 1 where an avatar was touched or stopped the
-/// move, and W where a wall did. The first three are Habitat's for PointNav, the others are zero there.
+/// where g is the distance to the goal along the surface (metres), S is 1 where stop ends the episode in
+/// success, i the intrusion (0 to 1) into the space of the avatar that came nearest, C is 1 where an
+/// avatar was touched or stopped the move, and W where a wall did. The first three are Habitat's for
+/// PointNav, the others are zero there.
 struct RewardConfig {
   double progress = 1.0;   ///< a metre
   double slack = -0.01;    ///< an action
@@ -24,7 +25,8 @@ struct RewardConfig {
 struct RewardInput {
   double before = 0.0, after = 0.0;  ///< distance to the goal along the surface, metres
   bool success = false;
-  double avatar_clearance = 0.0;  ///< least distance to any avatar during the action, metres; infinity with none
+  double avatar_clearance =
+      0.0;  ///< least distance to any avatar during the action, metres; infinity with none
   bool human_collision = false, wall_collision = false;
 };
 

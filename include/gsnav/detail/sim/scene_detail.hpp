@@ -21,9 +21,11 @@ struct SceneDetail {
     const LodTree* tree;  ///< null: all of the cloud, or what of it is seen
     const GaussianCloud* cloud;
     Similarity world_from_asset;
-    GaussianView cloud_there{}, merged_there{};  ///< cloud's and tree's arrays in a backend's own memory; empty: the host's
-    const VisibleSets* visible = nullptr;        ///< null: anything may be seen
-    const std::uint32_t* visible_there = nullptr;  ///< visible->bits in a backend's own memory; null: the host's
+    GaussianView cloud_there{},
+        merged_there{};  ///< cloud's and tree's arrays in a backend's own memory; empty: the host's
+    const VisibleSets* visible = nullptr;  ///< null: anything may be seen
+    const std::uint32_t* visible_there =
+        nullptr;  ///< visible->bits in a backend's own memory; null: the host's
   };
   std::vector<Asset> assets;  ///< in the order of the scene's sets; empty: all are drawn whole
   LodChoice choice{};
@@ -56,8 +58,7 @@ class DetailSets {
       }
       if (asset.tree == nullptr) {
         sets_.push_back(sets[a]);
-        if (cell)
-          sets_.back().gaussians.seen = asset.visible->seen_from(*cell, asset.visible_there);
+        if (cell) sets_.back().gaussians.seen = asset.visible->seen_from(*cell, asset.visible_there);
         continue;
       }
       Cut& cut = cuts_[a];
@@ -99,7 +100,8 @@ class DetailSets {
     return sum;
   }
 
-  /// Chunks of the last choice that a backend with a memory of its own has to be given, and where they are there.
+  /// Chunks of the last choice that a backend with a memory of its own has to be given, and where they
+  /// are there.
   std::span<const std::uint32_t> chunks() const noexcept { return chunks_; }
   void place_chunks(const std::uint32_t* there) noexcept {
     for (const std::size_t s : to_place_) {
@@ -148,7 +150,8 @@ class ChosenChunks {
   void place(std::span<DetailSets> cuts) {
     if constexpr (!is_host_backend<B>) {
       all_.clear();
-      for (const DetailSets& cut : cuts) all_.insert(all_.end(), cut.chunks().begin(), cut.chunks().end());
+      for (const DetailSets& cut : cuts)
+        all_.insert(all_.end(), cut.chunks().begin(), cut.chunks().end());
       there_.resize_discard(all_.size());
       there_.upload(all_.data(), all_.size());
       const std::uint32_t* at = there_.data();

@@ -16,22 +16,25 @@
 
 namespace gsnav {
 
-/// Bytes that a scene's Gaussians, its people and their capsules take on the host; a NavMesh is small beside them.
+/// Bytes that a scene's Gaussians, its people and their capsules take on the host; a NavMesh is small
+/// beside them.
 std::size_t scene_bytes(const SimulatorScene& scene) noexcept;
 
 /// A scene that is loaded when somebody needs it.
 struct SceneEntry {
-  std::string name;                             ///< for messages, a file's path say
+  std::string name;                              ///< for messages, a file's path say
   std::function<Result<SimulatorScene>()> load;  ///< by another thread; gives the same scene each time
 };
 
-/// Scenes by number, loaded in the background by one thread and kept while they fit a budget. Where they do not, the one
-/// that was used least recently leaves first; one that somebody holds stays. Any thread may use it.
+/// Scenes by number, loaded in the background by one thread and kept while they fit a budget. Where they
+/// do not, the one that was used least recently leaves first; one that somebody holds stays. Any thread
+/// may use it.
 class SceneLibrary {
  public:
-  /// `budget` is in bytes, as scene_bytes counts; what is in use may exceed it. Errors: invalid_argument (no scene; one
-  /// without a way to load it).
-  static Result<std::shared_ptr<SceneLibrary>> create(std::vector<SceneEntry> scenes, std::size_t budget);
+  /// `budget` is in bytes, as scene_bytes counts; what is in use may exceed it. Errors: invalid_argument
+  /// (no scene; one without a way to load it).
+  static Result<std::shared_ptr<SceneLibrary>> create(std::vector<SceneEntry> scenes,
+                                                      std::size_t budget);
   ~SceneLibrary();  ///< waits for the scene that is being loaded
   SceneLibrary(const SceneLibrary&) = delete;
   SceneLibrary& operator=(const SceneLibrary&) = delete;
@@ -39,8 +42,8 @@ class SceneLibrary {
   std::size_t size() const noexcept { return slots_.size(); }
   /// Begins to load scene `index`, unless it is there.
   void prefetch(std::size_t index);
-  /// Scene `index`, when it has been loaded. Errors: invalid_argument (there is none); what loading reports, with the
-  /// scene's name. What failed is tried again the next time.
+  /// Scene `index`, when it has been loaded. Errors: invalid_argument (there is none); what loading
+  /// reports, with the scene's name. What failed is tried again the next time.
   Result<std::shared_ptr<const SimulatorScene>> get(std::size_t index);
 
   /// What is held now, and how many scenes were loaded so far.

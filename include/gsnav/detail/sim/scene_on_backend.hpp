@@ -12,11 +12,11 @@
 
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
-#include "gsnav/nav/navmesh.hpp"
 #include "gsnav/detail/nav/obstacles.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
+#include "gsnav/nav/navmesh.hpp"
+#include "gsnav/scene/renderer.hpp"
 
 namespace gsnav {
 
@@ -31,7 +31,8 @@ struct SceneAsset {
   std::shared_ptr<const VisibleSets> visible{};
 };
 
-/// A surface of triangles and how it stands in the world; seen among the Gaussians (docs/composition.md).
+/// A surface of triangles and how it stands in the world; seen among the Gaussians
+/// (docs/composition.md).
 struct SceneMesh {
   std::shared_ptr<const PlacedMeshes> surface;
   Similarity world_from_surface{};
@@ -56,7 +57,8 @@ inline Status validate(const SimulatorScene& scene) {
   }
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     if (scene.meshes[i].surface == nullptr) {
-      return {Errc::invalid_argument, "SimulatorScene.meshes[" + std::to_string(i) + "].surface is null"};
+      return {Errc::invalid_argument,
+              "SimulatorScene.meshes[" + std::to_string(i) + "].surface is null"};
     }
   }
   return {};
@@ -93,23 +95,26 @@ inline Status validate_detail(const SimulatorScene& scene, const DetailChoice& c
   return {};
 }
 
-/// Appends how the scene's avatars move over [t0, t1], numbered as they stand in the scene. `before`: what this gave
-/// for an interval that ended at t0, or null; with it the same comes in half the time.
-inline void append_bodies(const SimulatorScene& scene, double t0, double t1, std::vector<DynamicCapsule>& out,
-                          const CapsuleSet* before = nullptr) {
+/// Appends how the scene's avatars move over [t0, t1], numbered as they stand in the scene. `before`:
+/// what this gave for an interval that ended at t0, or null; with it the same comes in half the time.
+inline void append_bodies(const SimulatorScene& scene, double t0, double t1,
+                          std::vector<DynamicCapsule>& out, const CapsuleSet* before = nullptr) {
   std::span<const CapsuleSet::Group> there;  // by avatar
   if (before != nullptr) there = before->groups();
   for (std::size_t i = 0; i < scene.avatars.size(); ++i) {
     const auto number = static_cast<std::uint32_t>(i);
     View<const DynamicCapsule> of_it;
-    while (!there.empty() && before->capsules_of(there.front())[0].avatar < number) there = there.subspan(1);
-    if (!there.empty() && before->capsules_of(there.front())[0].avatar == number) of_it = before->capsules_of(there.front());
+    while (!there.empty() && before->capsules_of(there.front())[0].avatar < number)
+      there = there.subspan(1);
+    if (!there.empty() && before->capsules_of(there.front())[0].avatar == number)
+      of_it = before->capsules_of(there.front());
     scene.avatars[i].dynamic_capsules(t0, t1, number, out, of_it);
   }
 }
 
-/// A scene in a backend's memory, its avatars posed for one or a few times at once. Each time that is held needs the
-/// avatars' means and orientations once more, so what this takes grows with `slots`, not with who looks.
+/// A scene in a backend's memory, its avatars posed for one or a few times at once. Each time that is
+/// held needs the avatars' means and orientations once more, so what this takes grows with `slots`, not
+/// with who looks.
 template <Backend B>
 class SceneOnBackend {
  public:
@@ -131,7 +136,8 @@ class SceneOnBackend {
         if (!choice.lod) continue;
         detail_.assets.back().cloud_there = sets_.back().gaussians;
         if (a.lod->merged.size() == 0) continue;
-        detail_.assets.back().merged_there = merged_.emplace_back(backend, a.lod->merged).set().gaussians;
+        detail_.assets.back().merged_there =
+            merged_.emplace_back(backend, a.lod->merged).set().gaussians;
       }
     }
     for (std::size_t m = 0; m < scene_->meshes.size(); ++m) place(m);
@@ -139,7 +145,8 @@ class SceneOnBackend {
     for (const AvatarActor& actor : scene_->avatars) {
       std::shared_ptr<const AvatarArrays<B>> body;
       for (const auto& known : bodies_) body = known->asset() == actor.asset() ? known : body;
-      bodies_.push_back(body != nullptr ? body : std::make_shared<const AvatarArrays<B>>(backend, actor.asset()));
+      bodies_.push_back(
+          body != nullptr ? body : std::make_shared<const AvatarArrays<B>>(backend, actor.asset()));
     }
   }
 
@@ -160,17 +167,18 @@ class SceneOnBackend {
   /// How many times an avatar was posed so far.
   std::size_t pose_count() const noexcept { return pose_count_; }
 
-  /// Poses slot `slot` for time t (seconds on the scene's clock), for whoever looks; nothing is done where it is so
-  /// already. Errors: what skinning reports.
+  /// Poses slot `slot` for time t (seconds on the scene's clock), for whoever looks; nothing is done
+  /// where it is so already. Errors: what skinning reports.
   Status pose(std::size_t slot, double t) {
     Slot& s = at(slot);
     if (s.whole && s.time == t) return {};
     return posed(s, t, true, [&] { return s.people.pose(scene_->avatars, t); });
   }
-  /// The same for what these cameras see, in two steps: avatars that none of them can see cost little. The first is the
-  /// host's alone: several threads may take it, each for another slot, once there are so many (make_slots). Errors: as
-  /// of pose.
-  Status prepare(std::size_t slot, double t, std::span<const Camera> cameras, const RenderConfig& config) {
+  /// The same for what these cameras see, in two steps: avatars that none of them can see cost little.
+  /// The first is the host's alone: several threads may take it, each for another slot, once there are
+  /// so many (make_slots). Errors: as of pose.
+  Status prepare(std::size_t slot, double t, std::span<const Camera> cameras,
+                 const RenderConfig& config) {
     Slot& s = *slots_[slot];
     s.whole = false;
     s.time = t;
@@ -232,7 +240,7 @@ class SceneOnBackend {
   B* backend_;
   std::shared_ptr<const SimulatorScene> scene_;
   std::vector<GaussianArrays<B>> arrays_;
-  std::vector<GaussianSet> sets_;  // of the assets
+  std::vector<GaussianSet> sets_;          // of the assets
   std::vector<GaussianArrays<B>> merged_;  // of their trees, where the backend has a memory of its own
   std::vector<Buffer<std::uint32_t, B>> visible_;  // their visible sets, likewise
   SceneDetail detail_;

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/render/render_composite.hpp"
 #include "gsnav/detail/sim/semantic.hpp"
+#include "gsnav/render/render_composite.hpp"
 
 namespace gsnav {
 
@@ -53,8 +53,8 @@ class SemanticFrames {
     rgb_.resize_discard(3 * pixels);
     alpha_.resize_discard(pixels);
 
-    // Black and unlit: what an opaque mesh has of a pixel is what the others leave of its alpha. Those that are seen
-    // through are passed like sets, behind them.
+    // Black and unlit: what an opaque mesh has of a pixel is what the others leave of its alpha. Those
+    // that are seen through are passed like sets, behind them.
     std::vector<MeshInstance> black(meshes.begin(), meshes.end());
     for (std::size_t i = 0; i < black.size(); ++i) {
       if (Status s = validate(black[i]); !s) return s;

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/detail/core/host_array.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/core/host_array.hpp"
 #include "gsnav/detail/frame/cut_depth.hpp"
 #include "gsnav/detail/sim/cube_map.hpp"
 #include "gsnav/detail/sim/frame_batch.hpp"
@@ -26,14 +26,14 @@ namespace gsnav {
 
 /// One who looks: where it stands, what there is to see, and which row of the images is its own.
 struct SensorView {
-  Vec3d base{};              ///< world, metres
+  Vec3d base{};  ///< world, metres
   Quatd rotation{};
-  double pitch = 0.0;        ///< radians
-  std::uint64_t noise = 0;   ///< decides what noise models draw
+  double pitch = 0.0;       ///< radians
+  std::uint64_t noise = 0;  ///< decides what noise models draw
   std::span<const GaussianSet> sets;
   const RenderConfig* config = nullptr;  ///< outputs are chosen by the sensors
   std::size_t row = 0;
-  MeshFrame meshes{};  ///< ids are their numbers for semantic sensors
+  MeshFrame meshes{};                   ///< ids are their numbers for semantic sensors
   const SceneDetail* detail = nullptr;  ///< levels of detail of the first of `sets`; null: whole.
                                         ///< Semantic sensors see all sets whole
 };
@@ -55,14 +55,19 @@ struct SensorImages {
   bool in_host_memory() const noexcept { return is_host_backend<B> || memory == ImageMemory::host; }
 };
 
-/// The sensors of a body. Whoever carries the same sensors can be drawn in one batch; sensors at one place with one field
-/// of view share a render.
+/// The sensors of a body. Whoever carries the same sensors can be drawn in one batch; sensors at one
+/// place with one field of view share a render.
 template <Backend B>
 class SensorRig {
  public:
   /// `sensors` are valid.
   SensorRig(B& backend, std::vector<SensorSpec> sensors)
-      : backend_(&backend), sensors_(std::move(sensors)), frames_(backend), semantic_(backend), normals_(backend), chosen_(backend) {
+      : backend_(&backend),
+        sensors_(std::move(sensors)),
+        frames_(backend),
+        semantic_(backend),
+        normals_(backend),
+        chosen_(backend) {
     for (std::size_t i = 0; i < sensors_.size(); ++i) {
       Group* group = nullptr;
       for (Group& g : groups_) {
@@ -71,7 +76,8 @@ class SensorRig {
       if (group == nullptr) {
         group = &groups_.emplace_back();
         group->sensor = i;
-        if (sensors_[i].model != SensorModel::pinhole) group->cube = std::make_shared<const CubeMap>(sensors_[i]);
+        if (sensors_[i].model != SensorModel::pinhole)
+          group->cube = std::make_shared<const CubeMap>(sensors_[i]);
       }
       const auto kind = static_cast<std::size_t>(sensors_[i].kind);
       if (group->buffer[kind] == kNone) group->buffer[kind] = add_buffer(i);
@@ -82,19 +88,25 @@ class SensorRig {
   }
 
   const std::vector<SensorSpec>& sensors() const noexcept { return sensors_; }
-  /// Whether images of such sensors can be left in a backend's memory. Errors: unsupported, naming the sensor.
+  /// Whether images of such sensors can be left in a backend's memory. Errors: unsupported, naming the
+  /// sensor.
   static Status check_memory(std::span<const SensorSpec> sensors, ImageMemory memory) {
     if (memory == ImageMemory::host || is_host_backend<B>) return {};
     for (const SensorSpec& s : sensors) {
-      const bool plain = s.kind == SensorKind::rgb || s.kind == SensorKind::depth || s.kind == SensorKind::alpha;
-      if (BatchBackend<B> && plain && s.model == SensorModel::pinhole && s.noise.kind == NoiseKind::none) continue;
-      return {Errc::unsupported, "SensorSpec \"" + s.uuid + "\": images stay in a backend's memory where they are a "
-                                 "pinhole's colour, depth or alpha, without noise; use ImageMemory::host"};
+      const bool plain =
+          s.kind == SensorKind::rgb || s.kind == SensorKind::depth || s.kind == SensorKind::alpha;
+      if (BatchBackend<B> && plain && s.model == SensorModel::pinhole && s.noise.kind == NoiseKind::none)
+        continue;
+      return {Errc::unsupported,
+              "SensorSpec \"" + s.uuid +
+                  "\": images stay in a backend's memory where they are a "
+                  "pinhole's colour, depth or alpha, without noise; use ImageMemory::host"};
     }
     return {};
   }
   /// The image of a sensor in one row, [height][width][channels], in host memory.
-  std::span<const float> image(const SensorImages<B>& images, std::size_t sensor, std::size_t row) const noexcept {
+  std::span<const float> image(const SensorImages<B>& images, std::size_t sensor,
+                               std::size_t row) const noexcept {
     const std::size_t n = size_[outputs_[sensor].noisy];
     return {images.buffers[outputs_[sensor].noisy].data() + row * n, n};
   }
@@ -112,7 +124,8 @@ class SensorRig {
     images.rows = rows;
     if (!images.in_host_memory()) {
       while (images.on_backend.size() < size_.size()) images.on_backend.emplace_back(*backend_);
-      for (std::size_t b = 0; b < size_.size(); ++b) images.on_backend[b].resize_discard(rows * size_[b]);
+      for (std::size_t b = 0; b < size_.size(); ++b)
+        images.on_backend[b].resize_discard(rows * size_[b]);
       return;
     }
     images.buffers.resize(size_.size());
@@ -120,7 +133,8 @@ class SensorRig {
   }
 
   /// Appends every camera that a view from there needs.
-  void append_cameras(const Vec3d& base, const Quatd& rotation, double pitch, std::vector<Camera>& out) const {
+  void append_cameras(const Vec3d& base, const Quatd& rotation, double pitch,
+                      std::vector<Camera>& out) const {
     for (const Group& g : groups_) {
       const Camera c = sensor_camera(sensors_[g.sensor], base, rotation, pitch);
       if (g.cube == nullptr) {
@@ -133,18 +147,20 @@ class SensorRig {
 
   /// Draws all sensors of all views into their rows, in one batch. Errors: what rendering reports.
   Status render(std::span<const SensorView> views, SensorImages<B>& images) {
-    // Faces of cubes, shares of sets and depths for normals are scratch: so many views at a time that it stays small.
+    // Faces of cubes, shares of sets and depths for normals are scratch: so many views at a time that it
+    // stays small.
     const bool scratch = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) {
       return g.cube != nullptr || g.buffer[kSemantic] != kNone || g.buffer[kNormal] != kNone;
     });
     const std::size_t most = scratch ? kScratchViews : views.size();
     for (std::size_t first = 0; first < views.size(); first += most) {
-      if (Status s = render_some(views.subspan(first, std::min(most, views.size() - first)), images); !s) return s;
+      if (Status s = render_some(views.subspan(first, std::min(most, views.size() - first)), images); !s)
+        return s;
     }
     return {};
   }
-  /// Renders so far: one for each view and camera (a cube counts one), and one for every three sets that a semantic
-  /// sensor tells apart.
+  /// Renders so far: one for each view and camera (a cube counts one), and one for every three sets that
+  /// a semantic sensor tells apart.
   std::size_t render_count() const noexcept { return render_count_; }
   Renderer<float, B>& renderer() noexcept { return frames_.renderer(); }
 
@@ -165,7 +181,8 @@ class SensorRig {
 
   std::size_t add_buffer(std::size_t sensor) {
     const SensorSpec& s = sensors_[sensor];
-    size_.push_back(static_cast<std::size_t>(s.resolution[0]) * static_cast<std::size_t>(s.resolution[1]) *
+    size_.push_back(static_cast<std::size_t>(s.resolution[0]) *
+                    static_cast<std::size_t>(s.resolution[1]) *
                     static_cast<std::size_t>(channels_of(s.kind)));
     return size_.size() - 1;
   }
@@ -214,9 +231,11 @@ class SensorRig {
     if (Status s = frames_.render(jobs_); !s) return s;
     for (const NormalJob& n : normal_jobs_) {
       const Group& group = groups_[n.group];
-      const std::span<float> out(row(images, group.buffer[kNormal], views[n.view].row), size_[group.buffer[kNormal]]);
+      const std::span<float> out(row(images, group.buffer[kNormal], views[n.view].row),
+                                 size_[group.buffer[kNormal]]);
       const double far_plane = sensors_[group.sensor].far_plane;
-      if (Status s = normals_.draw(views[n.view].meshes, cameras_[n.camera], n.seen, far_plane, out); !s) return s;
+      if (Status s = normals_.draw(views[n.view].meshes, cameras_[n.camera], n.seen, far_plane, out); !s)
+        return s;
     }
     for_each(views.size(), [&](std::size_t v) { finish(views[v], v, images); });
     for (const Shares& s : shares_) {
@@ -254,7 +273,9 @@ class SensorRig {
     shares_.clear();
     normal_jobs_.clear();
     share_configs_.clear();
-    if (std::none_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.buffer[kSemantic] != kNone; })) return;
+    if (std::none_of(groups_.begin(), groups_.end(),
+                     [](const Group& g) { return g.buffer[kSemantic] != kNone; }))
+      return;
     std::size_t most = 0;
     for (const SensorView& v : views) {
       for (const GaussianSet& set : v.sets) most = std::max(most, set.gaussians.size);
@@ -266,12 +287,15 @@ class SensorRig {
     }
   }
 
-  /// Appends what group g of view v needs; `camera` is the place of its first camera, then of the next group's.
-  void add_jobs(std::span<const SensorView> views, std::size_t v, std::size_t g, SensorImages<B>& images, std::size_t& camera) {
+  /// Appends what group g of view v needs; `camera` is the place of its first camera, then of the next
+  /// group's.
+  void add_jobs(std::span<const SensorView> views, std::size_t v, std::size_t g, SensorImages<B>& images,
+                std::size_t& camera) {
     Group& group = groups_[g];
     const auto add = [&](const std::array<float*, kKinds>& at) {
       if (views[v].detail != nullptr) detail_jobs_.push_back({jobs_.size(), views[v].detail});
-      jobs_.push_back({views[v].sets, &cameras_[camera++], views[v].config, frame_images(at), views[v].meshes});
+      jobs_.push_back(
+          {views[v].sets, &cameras_[camera++], views[v].config, frame_images(at), views[v].meshes});
     };
     std::array<float*, kKinds> at{};
     if (group.cube == nullptr) {
@@ -300,18 +324,22 @@ class SensorRig {
     ++render_count_;
     const std::size_t pixels = face_pixels(*group.cube);
     for (std::size_t k = 0; k < kKinds; ++k) {
-      const std::size_t n = group.buffer[k] != kNone ? views.size() * CubeMap::kFaces * pixels * channels(k) : 0;
+      const std::size_t n =
+          group.buffer[k] != kNone ? views.size() * CubeMap::kFaces * pixels * channels(k) : 0;
       if (v == 0) faces_[g][k].resize(n);
     }
     for (const std::size_t face : group.cube->faces()) {
       for (std::size_t k = 0; k < kKinds; ++k) {
-        at[k] = group.buffer[k] != kNone ? faces_[g][k].data() + (v * CubeMap::kFaces + face) * pixels * channels(k) : nullptr;
+        at[k] = group.buffer[k] != kNone
+                    ? faces_[g][k].data() + (v * CubeMap::kFaces + face) * pixels * channels(k)
+                    : nullptr;
       }
       add(at);
     }
   }
 
-  void add_shares(std::span<const SensorView> views, std::size_t v, const Group& group, std::size_t camera) {
+  void add_shares(std::span<const SensorView> views, std::size_t v, const Group& group,
+                  std::size_t camera) {
     const MeshFrame& meshes = views[v].meshes;
     Shares s{v, group.buffer[kSemantic], {}, {}, {}};
     for (std::size_t pass = 0; pass < SemanticPasses<B>::count(things_in(views[v])); ++pass) {
@@ -319,7 +347,8 @@ class SensorRig {
       s.meshes.push_back(semantic_.recolored(meshes.instances, views[v].sets.size(), pass));
       FrameImages<float> out;
       out.rgb = s.images.emplace_back(SemanticPasses<B>::kChannels * size_[s.buffer]).data();
-      jobs_.push_back({s.sets.back(), &cameras_[camera], &share_configs_[v], out, {s.meshes.back(), meshes.light}});
+      jobs_.push_back(
+          {s.sets.back(), &cameras_[camera], &share_configs_[v], out, {s.meshes.back(), meshes.light}});
       ++render_count_;
     }
     shares_.push_back(std::move(s));
@@ -355,7 +384,8 @@ class SensorRig {
     }
   }
 
-  void sample(const CubeMap& cube, const float* faces, std::size_t v, std::size_t kind, std::span<float> out) const {
+  void sample(const CubeMap& cube, const float* faces, std::size_t v, std::size_t kind,
+              std::span<float> out) const {
     const std::size_t step = face_pixels(cube) * channels(kind);
     std::array<const float*, CubeMap::kFaces> at{};
     for (std::size_t f = 0; f < CubeMap::kFaces; ++f) at[f] = faces + (v * CubeMap::kFaces + f) * step;
@@ -367,7 +397,8 @@ class SensorRig {
   }
 
   float* row(SensorImages<B>& images, std::size_t buffer, std::size_t r) const noexcept {
-    float* const first = images.in_host_memory() ? images.buffers[buffer].data() : images.on_backend[buffer].data();
+    float* const first =
+        images.in_host_memory() ? images.buffers[buffer].data() : images.on_backend[buffer].data();
     return first + r * size_[buffer];
   }
   static std::size_t channels(std::size_t kind) noexcept {
@@ -401,8 +432,8 @@ class SensorRig {
   std::vector<Shares> shares_;
   std::vector<RenderConfig> share_configs_;  // of each view
   std::vector<Group> groups_;
-  std::vector<Output> outputs_;      // of each sensor
-  std::vector<std::size_t> size_;    // values in a row of each buffer
+  std::vector<Output> outputs_;    // of each sensor
+  std::vector<std::size_t> size_;  // values in a row of each buffer
   std::vector<Camera> cameras_;
   std::vector<FrameJob<float>> jobs_;
   std::vector<NormalJob> normal_jobs_;

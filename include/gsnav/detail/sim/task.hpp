@@ -14,7 +14,7 @@ enum class Action : std::uint8_t {
   move_forward = 1,
   turn_left = 2,
   turn_right = 3,
-  look_up = 4,    ///< tilts the sensors, not the body
+  look_up = 4,  ///< tilts the sensors, not the body
   look_down = 5,
 };
 
@@ -52,8 +52,8 @@ struct TaskConfig {
     return c;
   }
 
-  /// PointNav among people: whoever comes near is charged. An action wholly inside somebody's space costs what a step
-  /// forward earns, meeting somebody twice that.
+  /// PointNav among people: whoever comes near is charged. An action wholly inside somebody's space
+  /// costs what a step forward earns, meeting somebody twice that.
   static TaskConfig avatar_pointnav() noexcept {
     TaskConfig c;
     c.reward.proximity = 0.25;

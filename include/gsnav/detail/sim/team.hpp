@@ -40,16 +40,17 @@ class TeamBodies {
 
 /// Several agents, each with its own body, sensors and episode, in one scene at one time.
 ///
-/// They act one after the other within a tick, each while the others stand: the earlier ones where they have gone, the
-/// later ones where they were. So no agent ever enters another. (Were they to move at once, one that stops at another's
-/// flank could be run over by a motion that was checked against its old place.) To an agent the others are avatars: they
-/// count in CR and PSI and are numbered behind the scene's. An agent whose episode is over stays where it is. Other
-/// agents are bodies, not pictures: cameras see the scene and its avatars.
+/// They act one after the other within a tick, each while the others stand: the earlier ones where they
+/// have gone, the later ones where they were. So no agent ever enters another. (Were they to move at
+/// once, one that stops at another's flank could be run over by a motion that was checked against its
+/// old place.) To an agent the others are avatars: they count in CR and PSI and are numbered behind the
+/// scene's. An agent whose episode is over stays where it is. Other agents are bodies, not pictures:
+/// cameras see the scene and its avatars.
 template <Backend B>
 class Team {
  public:
-  /// One config for each agent; their control periods must be one. Errors: what Simulator::create reports, with the
-  /// agent's number; invalid_argument (no agent, other control periods).
+  /// One config for each agent; their control periods must be one. Errors: what Simulator::create
+  /// reports, with the agent's number; invalid_argument (no agent, other control periods).
   static Result<Team> create(B& backend, SimulatorScene scene, std::vector<SimulatorConfig> agents) {
     if (agents.empty()) return {Errc::invalid_argument, "Team: no agent"};
     Team team;
@@ -57,9 +58,11 @@ class Team {
     const auto shared = std::make_shared<const SimulatorScene>(std::move(scene));
     for (std::size_t i = 0; i < agents.size(); ++i) {
       if (agents[i].task.control_period != agents[0].task.control_period) {
-        return {Errc::invalid_argument, "Team: agent " + std::to_string(i) + " has another control_period than agent 0"};
+        return {Errc::invalid_argument,
+                "Team: agent " + std::to_string(i) + " has another control_period than agent 0"};
       }
-      const auto others = [bodies = team.bodies_, i, n = shared->avatars.size()](double, double, auto& out) {
+      const auto others = [bodies = team.bodies_, i, n = shared->avatars.size()](double, double,
+                                                                                 auto& out) {
         bodies->append(i, static_cast<std::uint32_t>(n), out);
       };
       auto sim = Simulator<B>::create(backend, shared, std::move(agents[i]), others);
@@ -78,34 +81,38 @@ class Team {
     return true;
   }
 
-  /// Begins an episode for each agent, at one start time. Errors: invalid_argument (another number of episodes, other
-  /// start times); what Simulator::reset reports.
+  /// Begins an episode for each agent, at one start time. Errors: invalid_argument (another number of
+  /// episodes, other start times); what Simulator::reset reports.
   Result<std::vector<Observations>> reset(std::span<const PointNavEpisode> episodes) {
     if (episodes.size() != size()) return wrong_number("episodes", episodes.size());
     for (std::size_t i = 0; i < size(); ++i) {
       if (episodes[i].start_time != episodes[0].start_time) {
-        return {Errc::invalid_argument, "Team: agent " + std::to_string(i) + " starts at another time than agent 0"};
+        return {Errc::invalid_argument,
+                "Team: agent " + std::to_string(i) + " starts at another time than agent 0"};
       }
       (*bodies_)[i].present = false;
     }
     // All take their places before anybody looks or is measured against.
     for (std::size_t i = 0; i < size(); ++i) {
-      if (Result<Observations> r = quietly(i, [&] { return agents_[i].reset(episodes[i]); }); !r) return r.status();
+      if (Result<Observations> r = quietly(i, [&] { return agents_[i].reset(episodes[i]); }); !r)
+        return r.status();
       stand(i);
     }
     for (std::size_t i = 0; i < size(); ++i) {
-      if (Result<Observations> r = quietly(i, [&] { return agents_[i].reset(episodes[i]); }); !r) return r.status();
+      if (Result<Observations> r = quietly(i, [&] { return agents_[i].reset(episodes[i]); }); !r)
+        return r.status();
     }
     return observe();
   }
 
-  /// One action for each agent; of those whose episode is over none is taken. Errors: invalid_argument (another number
-  /// of actions); what Simulator::step reports.
+  /// One action for each agent; of those whose episode is over none is taken. Errors: invalid_argument
+  /// (another number of actions); what Simulator::step reports.
   Result<std::vector<Observations>> step(std::span<const Action> actions) {
     if (actions.size() != size()) return wrong_number("actions", actions.size());
     for (std::size_t i = 0; i < size(); ++i) {
       if (agents_[i].done()) continue;
-      if (Result<Observations> r = quietly(i, [&] { return agents_[i].step(actions[i]); }); !r) return r.status();
+      if (Result<Observations> r = quietly(i, [&] { return agents_[i].step(actions[i]); }); !r)
+        return r.status();
       stand(i);
     }
     return observe();
@@ -131,7 +138,8 @@ class Team {
 
   void stand(std::size_t i) {
     const Simulator<B>& a = agents_[i];
-    (*bodies_)[i] = {a.agent().position, a.config().task.agent_radius, a.config().task.agent_height, true};
+    (*bodies_)[i] = {a.agent().position, a.config().task.agent_radius, a.config().task.agent_height,
+                     true};
   }
 
   Result<std::vector<Observations>> observe() {

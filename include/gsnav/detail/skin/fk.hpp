@@ -23,12 +23,12 @@ GSNAV_HD Affine3<S> joint_global(const Affine3<S>* globals, std::int32_t parent,
 /// global is the actor's root frame, metres; a local transform maps a joint's frame to its parent's.
 template <class S>
 struct ForwardKinematicsArgs {
-  View<const std::int32_t> parents;         ///< [J], -1: child of the root frame; a parent comes first
-  View<const Quat<S>> rotations;            ///< [A][J] local, unit
-  View<const Vec3<S>> translations;         ///< [A][J] local, metres
-  View<const Affine3<S>> inverse_binds;     ///< [J], or empty: no joint matrices
-  View<Affine3<S>> globals;                 ///< [A][J] joint frame to root frame
-  View<Affine3<S>> joint_matrices;          ///< [A][J] global * inverse bind, or empty
+  View<const std::int32_t> parents;      ///< [J], -1: child of the root frame; a parent comes first
+  View<const Quat<S>> rotations;         ///< [A][J] local, unit
+  View<const Vec3<S>> translations;      ///< [A][J] local, metres
+  View<const Affine3<S>> inverse_binds;  ///< [J], or empty: no joint matrices
+  View<Affine3<S>> globals;              ///< [A][J] joint frame to root frame
+  View<Affine3<S>> joint_matrices;       ///< [A][J] global * inverse bind, or empty
 };
 
 /// Forward kinematics of pose a: from local rotations and offsets to global transforms and, where they

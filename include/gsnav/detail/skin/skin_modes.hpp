@@ -4,22 +4,22 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/skin/lbs.hpp"
 #include "gsnav/detail/math/dual_quat.hpp"
 #include "gsnav/detail/math/svd.hpp"
+#include "gsnav/skin/lbs.hpp"
 
-// Skinning by other than linear blending with the rotation alone: modes of an asset, apart from the kernel that most
-// use (skin/lbs.hpp).
+// Skinning by other than linear blending with the rotation alone: modes of an asset, apart from the
+// kernel that most use (skin/lbs.hpp).
 
 namespace gsnav {
 
 /// Bounds of the stretch of a Gaussian along any direction.
 inline constexpr double kLeastStretch = 0.5, kGreatestStretch = 2.0;
 
-/// Dual quaternion blending of one Gaussian (Kavan et al. 2007, "Skinning with dual quaternions", DLB). `blend`: sum
-/// over the influences of weight * dual quaternion of the joint, each with the sign that puts its real part on the
-/// side of the first's. The body keeps its width where it twists and bulges outside of elbows. Joints that differ
-/// by a translation give what linear blending gives.
+/// Dual quaternion blending of one Gaussian (Kavan et al. 2007, "Skinning with dual quaternions", DLB).
+/// `blend`: sum over the influences of weight * dual quaternion of the joint, each with the sign that
+/// puts its real part on the side of the first's. The body keeps its width where it twists and bulges
+/// outside of elbows. Joints that differ by a translation give what linear blending gives.
 template <class L>
 GSNAV_HD Skinned<L> skin(const DualQuat<L>& blend, const Vec3<L>& mean, const Quat<L>& quat) noexcept {
   Skinned<L> out;
@@ -36,8 +36,8 @@ GSNAV_HD Skinned<L> skin(const DualQuat<L>& blend, const Vec3<L>& mean, const Qu
   return out;
 }
 
-/// m with its singular values held within [kLeastStretch, kGreatestStretch], as that of a body that does not
-/// fold over: a negative one counts as the least. What lies within is m itself, bit for bit.
+/// m with its singular values held within [kLeastStretch, kGreatestStretch], as that of a body that does
+/// not fold over: a negative one counts as the least. What lies within is m itself, bit for bit.
 template <class S>
 GSNAV_HD Mat3<S> clamped_stretch(const Mat3<S>& m) noexcept {
   // Most Gaussians are hardly stretched. With |m^T m - 1| < 0.75 no singular value is outside.
@@ -53,7 +53,8 @@ GSNAV_HD Mat3<S> clamped_stretch(const Mat3<S>& m) noexcept {
   for (int k = 0; k < 3; ++k) {
     const S value = clamp(d.values[k], least, greatest);
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) out(i, j) = fma(value * d.left[k][i], d.right[k][j], k == 0 ? S(0) : out(i, j));
+      for (int j = 0; j < 3; ++j)
+        out(i, j) = fma(value * d.left[k][i], d.right[k][j], k == 0 ? S(0) : out(i, j));
     }
   }
   return out;
@@ -93,13 +94,15 @@ struct SkinGaussianDual {
     return sum;
   }
   GSNAV_HD void operator()(std::size_t i) const noexcept {
-    store_skinned(args, i, skin(blend(i), detail::canonical_mean(args, i), detail::canonical_quat(args, i)));
+    store_skinned(args, i,
+                  skin(blend(i), detail::canonical_mean(args, i), detail::canonical_quat(args, i)));
   }
 };
 
-/// Skins Gaussian i linearly and stretches it as the skin is: its shape goes through the derivative of the position
-/// by the canonical position, F = sum_k w_k A_k + sum_k (A_k p + t_k) grad(w_k)^T, whose singular values are
-/// clamped (clamped_stretch), instead of through a rotation. Means, quats and rotations are those of SkinGaussian.
+/// Skins Gaussian i linearly and stretches it as the skin is: its shape goes through the derivative of
+/// the position by the canonical position, F = sum_k w_k A_k + sum_k (A_k p + t_k) grad(w_k)^T, whose
+/// singular values are clamped (clamped_stretch), instead of through a rotation. Means, quats and
+/// rotations are those of SkinGaussian.
 template <class S, class Out = float>
 struct SkinGaussianStretched {
   SkinningArgs<S, Out> args;

@@ -24,20 +24,23 @@ struct BatchCamera {
   std::span<const View<const std::uint32_t>> seen{};
 };
 
-/// Images of a batch in device memory, [C][H][W] row-major; null: not asked for. They stay on the device: a
-/// learner on the same stream reads them without a copy.
+/// Images of a batch in device memory, [C][H][W] row-major; null: not asked for. They stay on the
+/// device: a learner on the same stream reads them without a copy.
 struct BatchImages {
-  FrameImages<float> floats;   ///< rgb is [C][H][W][3], unclamped
-  std::uint8_t* rgb8 = nullptr;  ///< [C][H][W][3], round(255 clamp(c, 0, 1)); may stand beside floats.rgb
+  FrameImages<float> floats;  ///< rgb is [C][H][W][3], unclamped
+  std::uint8_t* rgb8 =
+      nullptr;  ///< [C][H][W][3], round(255 clamp(c, 0, 1)); may stand beside floats.rgb
 };
 
 /// What a batch was made of; all cameras together.
 struct BatchStats {
-  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs; docs/cuda.md says how large tiles are
-  std::uint64_t parts_read = 0;          ///< kChunkPart rows each, that may be in view, counted once for 32 cameras
-  std::uint64_t scratch_bytes = 0;       ///< held on the device, without scene and images
-  int reruns = 0;                        ///< how often the batch was drawn again because scratch had to grow
-  bool replayed = false;                 ///< by a recorded CUDA graph: calls that differ in their cameras alone are
+  std::uint64_t tile_intersections =
+      0;  ///< (tile, Gaussian) pairs; docs/cuda.md says how large tiles are
+  std::uint64_t parts_read =
+      0;  ///< kChunkPart rows each, that may be in view, counted once for 32 cameras
+  std::uint64_t scratch_bytes = 0;  ///< held on the device, without scene and images
+  int reruns = 0;                   ///< how often the batch was drawn again because scratch had to grow
+  bool replayed = false;  ///< by a recorded CUDA graph: calls that differ in their cameras alone are
   MeshStats meshes;
 };
 
@@ -68,15 +71,17 @@ class CudaBatchRenderer {
   CudaBatchRenderer& operator=(const CudaBatchRenderer&) = delete;
 
   /// Draws the sets (arrays on the device) from all cameras, which have one size. Enqueues and returns;
-  /// images are whole once `finish()` has said ok. Errors: invalid_argument naming camera, set or field, or
-  /// where more than three calls would be under way without `finish()`; unsupported; backend_failure. Throws gsnav::Error (out_of_memory) where scratch cannot be allocated.
+  /// images are whole once `finish()` has said ok. Errors: invalid_argument naming camera, set or field,
+  /// or where more than three calls would be under way without `finish()`; unsupported; backend_failure.
+  /// Throws gsnav::Error (out_of_memory) where scratch cannot be allocated.
   Status render(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                 const BatchImages& images);
 
-  /// Waits for every `render` since the last `finish`. Where scratch was too small for the last of them, grows it and
-  /// draws that batch again: arrays and images of that call must still be there. Errors: out_of_memory where it was too
-  /// small for an earlier one, or for the last and `render` has failed since: those images are not whole, and there is
-  /// room for them now; backend_failure; unsupported naming counts that 32 bits do not hold. Throws as `render` does.
+  /// Waits for every `render` since the last `finish`. Where scratch was too small for the last of them,
+  /// grows it and draws that batch again: arrays and images of that call must still be there. Errors:
+  /// out_of_memory where it was too small for an earlier one, or for the last and `render` has failed
+  /// since: those images are not whole, and there is room for them now; backend_failure; unsupported
+  /// naming counts that 32 bits do not hold. Throws as `render` does.
   Status finish();
 
   /// Of the last batch that `finish()` saw.

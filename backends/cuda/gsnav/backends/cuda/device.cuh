@@ -56,8 +56,8 @@ struct CountSplatTiles {
   __device__ void operator()(std::size_t i) const {
     const std::uint32_t splat = args.order[i];
     std::uint32_t n = 0;
-    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
-                  [&](std::size_t tile) {
+    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
+                  args.elliptic, [&](std::size_t tile) {
                     if (cull.hides(tile, splat)) return;
                     atomicAdd(per_tile + tile, 1u);  // a sum of ones: the order does not matter
                     ++n;
@@ -77,8 +77,8 @@ struct EmitSplatTiles {
   __device__ void operator()(std::size_t i) const {
     const std::uint32_t splat = args.order[i];
     std::uint64_t at = offsets[i];
-    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
-                  [&](std::size_t tile) {
+    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
+                  args.elliptic, [&](std::size_t tile) {
                     if (cull.hides(tile, splat)) return;
                     tiles[at] = static_cast<std::uint32_t>(tile);
                     splats[at++] = splat;
@@ -88,7 +88,8 @@ struct EmitSplatTiles {
 
 inline constexpr int kRasterBatch = 64;
 
-/// One block a tile, one thread a pixel; splats come through shared memory in batches. `Mesh`: the frame has one.
+/// One block a tile, one thread a pixel; splats come through shared memory in batches. `Mesh`: the frame
+/// has one.
 template <bool Color, DepthMode D, Exp2 M, bool General, bool Mesh>
 __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float> args) {
   __shared__ SplatGeometry<float> geometry[kRasterBatch];
@@ -117,9 +118,10 @@ __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float>
     }
     __syncthreads();
     for (int j = 0; open && j < n; ++j) {
-      const SplatRecords<float> splat{geometry + j, Color ? colors + j : nullptr,
-                                      D == DepthMode::none && !Mesh ? nullptr : args.depths.data + ids[j],
-                                      args.perspectives.empty() ? nullptr : args.perspectives.data + ids[j]};
+      const SplatRecords<float> splat{
+          geometry + j, Color ? colors + j : nullptr,
+          D == DepthMode::none && !Mesh ? nullptr : args.depths.data + ids[j],
+          args.perspectives.empty() ? nullptr : args.perspectives.data + ids[j]};
       if constexpr (Mesh) {
         composite_splat<Color, D, M, General>(state, args.rules, splat, mesh, px, py);
       } else {
@@ -140,7 +142,8 @@ void CudaBackend::parallel_for(std::size_t n, const F& f) {
   if (n == 0 || !usable()) return;
   constexpr unsigned kThreads = 128;
   const std::size_t blocks = (n + kThreads - 1) / kThreads;
-  if (blocks > 0x7fffffffu) return note(cudaErrorInvalidConfiguration, "a launch of too many work items");
+  if (blocks > 0x7fffffffu)
+    return note(cudaErrorInvalidConfiguration, "a launch of too many work items");
   cuda::for_each<F><<<static_cast<unsigned>(blocks), kThreads, 0, stream_>>>(n, f);
   note(cudaGetLastError(), "a kernel launch");
 }

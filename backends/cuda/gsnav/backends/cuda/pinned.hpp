@@ -18,8 +18,8 @@ void* allocate_pinned(std::size_t bytes) noexcept;
 void free_pinned(void* p) noexcept;
 }  // namespace cuda
 
-/// Host memory that a GPU copies to and from by itself: `CudaBackend::copy` of images into it returns at once, and they
-/// are there after `synchronize()` or `finish()`. Elements are not initialised.
+/// Host memory that a GPU copies to and from by itself: `CudaBackend::copy` of images into it returns at
+/// once, and they are there after `synchronize()` or `finish()`. Elements are not initialised.
 template <class T>
 class PinnedArray {
   static_assert(std::is_trivially_copyable_v<T>);

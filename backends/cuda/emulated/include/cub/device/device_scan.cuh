@@ -17,8 +17,8 @@ namespace cub {
 
 struct DeviceScan {
   template <class In, class Out, class Operation>
-  static cudaError_t ExclusiveScan(void* temp, ::std::size_t& bytes, const In* in, Out* out, Operation add, Out first,
-                                   ::std::size_t n, cudaStream_t stream) {
+  static cudaError_t ExclusiveScan(void* temp, ::std::size_t& bytes, const In* in, Out* out,
+                                   Operation add, Out first, ::std::size_t n, cudaStream_t stream) {
     if (temp == nullptr) {
       bytes = 1;
       return cudaSuccess;
