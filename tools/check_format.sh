@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# Checks the layout of text: C++ and CUDA sources are as clang-format 14 writes them, and no line of prose in Markdown
+# is longer than 105 columns (tables, code and links may be; docs/approximations.md is generated).
+#
+#   tools/check_format.sh          names what is wrong; exit status 1 where anything is
+#   tools/check_format.sh --fix    formats the sources in place
+set -euo pipefail
+
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+case ${1:-} in
+  "") options=(--dry-run -Werror) ;;
+  --fix) options=(-i) ;;
+  *)
+    sed -n '4,8s/^# \{0,1\}//p' tools/check_format.sh
+    exit $([[ $1 == --help || $1 == -h ]] && echo 0 || echo 2)
+    ;;
+esac
+if ! command -v clang-format > /dev/null; then
+  echo "clang-format is not installed (Debian: clang-format)" >&2
+  exit 1
+fi
+failed=0
+git ls-files -z '*.hpp' '*.cpp' '*.cu' '*.cuh' | xargs -0 -n 64 -P "$(nproc)" clang-format "${options[@]}" || failed=1
+git ls-files -z '*.md' | { grep -zvx docs/approximations.md || true; } | xargs -0 awk '
+  FNR == 1 { code = 0 }
+  /^ *```/ { code = !code }
+  length($0) > 105 && !code && !/^ *\|/ && !/^    / && !/^[^ ]*$/ {
+    printf "%s:%d: %d columns\n", FILENAME, FNR, length($0); wrong = 1
+  }
+  END { exit wrong }' || failed=1
+if [[ $failed -ne 0 ]]; then
+  echo "Lines above: run tools/check_format.sh --fix for sources, and wrap prose at 105 columns" >&2
+fi
+exit $failed
