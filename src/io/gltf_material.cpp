@@ -13,6 +13,8 @@ namespace gsnav::io::detail {
 namespace {
 
 constexpr int kRepeat = 10497;
+/// Squares of ReadLimits::texture_side that all textures of a file may fill.
+constexpr std::size_t kMostLargest = 8;
 
 /// Extension `name` of an object, or null.
 const Json* extension(const Json& object, const char* name) {
@@ -141,12 +143,22 @@ Result<std::int32_t> GltfMaterials::picture(const Json& texture, std::size_t ind
   const auto source = file_.index(holder, "source", "images", at);
   if (!source) return source.status();
   if (const auto have = texture_of_.find(*source); have != texture_of_.end()) return have->second;
+  // A small picture may have many pixels, and a file many pictures, of the same bytes even.
+  const auto side = static_cast<std::size_t>(file_.limits().texture_side);
+  if (pixels_ >= kMostLargest * side * side) {
+    warnings_.push_back(
+        file_.where("images", *source) + ": the pictures before it have " + std::to_string(pixels_) +
+        " pixels, and no more are read; make them smaller, or raise ReadLimits::texture_side; "
+        "the material's colour is taken");
+    return texture_of_[*source] = -1;
+  }
   auto decoded = decode(*source);
   if (!decoded) {
     if (decoded.code() != Errc::unsupported) return decoded.status();
     warnings_.push_back(decoded.message() + "; the material's colour is taken");
     return texture_of_[*source] = -1;
   }
+  pixels_ += decoded->width * decoded->height;
   textures_.push_back(std::move(*decoded));
   return texture_of_[*source] = static_cast<std::int32_t>(textures_.size() - 1);
 }

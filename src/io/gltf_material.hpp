@@ -43,6 +43,7 @@ class GltfMaterials {
   std::vector<TextureImage>& textures_;
   std::vector<std::string>& warnings_;
   std::map<std::size_t, std::int32_t> texture_of_;  ///< of images that were read, -1 where one cannot be
+  std::size_t pixels_ = 0;                          ///< of all textures
 };
 
 }  // namespace gsnav::io::detail

@@ -220,3 +220,28 @@ TEST_CASE("read limits: the side of textures, of every kind of picture, is the c
     CHECK(io::load_gltf_scene(folder / "a.glb", {.texture_side = 65536}).code() == Errc::invalid_argument);
   }
 }
+
+TEST_CASE("read limits: one small picture that a file shows many times is read a few times only") {
+  const TempFolder folder("many");
+  constexpr std::size_t kImages = 30;
+  REQUIRE(io::save_png_rgb8(folder / "p.png", std::vector<std::uint8_t>(3 * 20 * 20, 90), 20, 20).ok());
+  TestGltf g = textured_triangle(read_file(folder / "p.png"));
+  auto& primitives = g.doc["meshes"][0]["primitives"];
+  for (std::size_t i = 1; i < kImages; ++i) {
+    g.doc["images"].push_back(g.doc["images"][0]);  // the same bytes
+    g.doc["textures"].push_back({{"source", i}});
+    g.doc["materials"].push_back({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", i}}}}}});
+    primitives.push_back(primitives[0]);
+    primitives.back()["material"] = i;
+  }
+  g.write(folder / "a.glb");
+  const auto few = io::load_gltf_scene(folder / "a.glb", {.texture_side = 20});
+  REQUIRE(few.ok());
+  CHECK(few->textures.size() == 8);
+  REQUIRE(few->warnings.size() == kImages - 8);
+  CHECK(contains(few->warnings[0], "images[8]: the pictures before it have 3200 pixels"));
+  const auto all = io::load_gltf_scene(folder / "a.glb");
+  REQUIRE(all.ok());
+  CHECK(all->textures.size() == kImages);
+  CHECK(all->warnings.empty());
+}

@@ -15,7 +15,8 @@ struct ReadLimits {
   int inflation = 200;
   /// Pixels along the longer side of a texture of a glTF file (PNG, JPEG, WebP), looked at before it is
   /// decoded. Range [1, 65535]; of a JPEG never more than 16384. A larger one is left out, with a
-  /// warning: its material keeps its colour factor.
+  /// warning: its material keeps its colour factor. So are all pictures after those that together have
+  /// the pixels of eight squares of this side.
   int texture_side = 8192;
 };
 
