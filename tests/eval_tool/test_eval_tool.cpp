@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "gsnav/detail/io/episode_file.hpp"
 #include "gsnav/detail/io/npz_file.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/sim/metrics.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
 #include "support/process.hpp"
@@ -175,6 +177,14 @@ TEST_CASE(
     CHECK_FALSE(out.ok);
     CHECK(out.says(("the " + name + " that gsnav made ha").c_str()));
   }
+  // A hash of arrays inside each other: more than a stack holds.
+  const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+  const std::size_t hash = journal.find("\"scene\":\"", journal.find("\"contents\"")) + 8;
+  write_file(folder / "out/journal.jsonl",
+             journal.substr(0, hash) + deep + ",\"was\":" + journal.substr(hash));
+  const Outcome nested = eval();
+  CHECK_FALSE(nested.ok);
+  CHECK(nested.says("line 1: is not the header of a journal"));
   // The header that gsnav wrote before.
   write_file(folder / "out/journal.jsonl",
              "{\"avatars\":0,\"scene\":\"\"}\n" + journal.substr(journal.find('\n') + 1));
@@ -208,23 +218,38 @@ TEST_CASE("a record that is none of the evaluation is named by file, line, field
   const std::size_t from = first.find("\"metrics\":{") + 11, to = first.find('}', from);
   std::string empty = first;
   empty.erase(from, to - from);
-  const std::vector<Bad> cases{{with("episode", "99"), "episode = 99"},
-                               {with("episode", "-1"), "episode = -1"},
-                               {with("id", "\"other\""), "id = \"other\""},
-                               {with("spl", "1.7"), "metrics.spl = 1.7: must be in [0.0, 1.0]"},
-                               {with("spl", "null"), "metrics.spl = null"},
-                               {with("path_length", "-3"), "metrics.path_length = -3"},
-                               {with("path_length", "1e300"), "metrics.path_length = 1e+300"},
-                               {with("steps", "21"), "metrics.steps = 21"},
-                               {with("success", "3"), "metrics.success = 3"},
-                               {with("collision_rate", "0.5"), "metrics.collision_rate = 0.5"},
-                               {with("reward", "null"), "reward = null"},
-                               {with("actions", "\"19\""), "actions = \"19\""},
-                               {short_metrics, "metrics.spl is missing"},
-                               {empty, "metrics.success is missing"},
-                               {with("reward", "7") + first, "differs from out/journal.jsonl: line 2"},
-                               {"[]\n", "is not an object"},
-                               {"{\n", "is not JSON"}};
+  // A success far from the goal, which all else fits.
+  auto far = nlohmann::ordered_json::parse(first);
+  auto& m = far["metrics"];
+  const double l = m["start_distance"], p = m["path_length"];
+  if (!m["stop_called"].get<bool>()) far["actions"] = far["actions"].get<std::string>() + '0';
+  m["stop_called"] = m["success"] = true;
+  m["distance_to_goal"] = 7;
+  m["spl"] = gsnav::success_weighted_by_path_length(true, l, p);
+  m["soft_spl"] = gsnav::soft_success_weighted_by_path_length(7, l, p);
+  m["stl"] = gsnav::success_weighted_by_time(true, l, 0.25, m["steps"].get<std::size_t>());
+  const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+  const std::vector<Bad> cases{
+      {with("episode", "99"), "episode = 99"},
+      {with("episode", "-1"), "episode = -1"},
+      {with("id", "\"other\""), "id = \"other\""},
+      {with("spl", "1.7"), "metrics.spl = 1.7: must be in [0.0, 1.0]"},
+      {with("spl", "null"), "metrics.spl = null"},
+      {with("path_length", "-3"), "metrics.path_length = -3"},
+      {with("path_length", "1e300"), "metrics.path_length = 1e+300"},
+      {with("steps", "21"), "metrics.steps = 21"},
+      {with("success", "3"), "metrics.success = 3"},
+      {with("collision_rate", "0.5"), "metrics.collision_rate = 0.5"},
+      {with("reward", "null"), "reward = null"},
+      {with("actions", "\"19\""), "actions = \"19\""},
+      {short_metrics, "metrics.spl is missing"},
+      {empty, "metrics.success is missing"},
+      {with("reward", "7") + first, "differs from out/journal.jsonl: line 2"},
+      {far.dump() + "\n", "metrics.success = true: does not follow from stop_called"},
+      {with("stl", "0.9"), "metrics.stl = 0.9: does not follow"},
+      {"{\"episode\":" + deep + ",\"id\":0}\n", "is JSON nested more than 4 deep"},
+      {"[]\n", "is not an object"},
+      {"{\n", "is not JSON"}};
   for (const Bad& bad : cases) {
     write_file(folder / "out/journal.jsonl", header + bad.line);
     const Outcome out = run_command(GSNAV_EVAL, options, folder.path());

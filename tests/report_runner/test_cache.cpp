@@ -84,6 +84,9 @@ TEST_CASE("hash: every array, the order of values and the camera count") {
   changed = cloud;
   changed.filter = gsnav::Filter::mip;
   CHECK(content_hash(changed) != hash);
+  changed = cloud;
+  changed.color_space = gsnav::ColorSpace::linear;
+  CHECK(content_hash(changed) != hash);
   const auto camera_hash = [](const gsnav::Camera& c) {
     Hasher h;
     hash_camera(h, c);

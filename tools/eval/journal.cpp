@@ -44,6 +44,17 @@ Json to_json(const Record& r) {
           {"actions", actions}};
 }
 
+/// The JSON of a line. Nesting is bounded, since copies and dump() take stack for each level.
+Json parse_line(const std::string& line) {
+  constexpr int kDepth = 4;  // a journal's own lines have two levels
+  return Json::parse(line, [](int depth, Json::parse_event_t, const Json&) {
+    if (depth > kDepth)
+      throw gsnav::Error(Errc::invalid_file,
+                         "is JSON nested more than " + std::to_string(kDepth) + " deep");
+    return true;
+  });
+}
+
 /// Thrown with "FIELD = VALUE: RULE".
 [[noreturn]] void refuse(const std::string& field, const Json& value, const std::string& rule) {
   constexpr std::size_t kShown = 60;
@@ -138,11 +149,13 @@ Record from_json(const Json& j, const Stage& stage) {
   constexpr double kRounding = 1e-9;
   const auto equal = [](double a, double b) { return std::abs(a - b) <= kRounding; };
   const double steps = static_cast<double>(m.steps);
-  check(m.steps <= static_cast<std::size_t>(std::max(stage.config.task.max_steps, 0)), "steps",
+  const gsnav::TaskConfig& task = stage.config.task;
+  check(m.steps <= static_cast<std::size_t>(std::max(task.max_steps, 0)), "steps",
         "more than --max-steps");
   check(m.steps + stops == r.actions.size() && stops <= 1, "steps", "is not the number of actions");
   check(m.stop_called == (stops == 1), "stop_called", "does not fit the actions");
-  check(!m.success || m.stop_called, "success", "without a stop");
+  check(m.success == gsnav::episode_success(m.stop_called, m.distance_to_goal, task.success_distance),
+        "success", "does not follow from stop_called and distance_to_goal");
   check(m.collisions <= m.steps, "collisions", "more than steps");
   check(m.collision_steps <= m.steps, "collision_steps", "more than steps");
   check(equal(m.collision_rate * steps, static_cast<double>(m.collision_steps)), "collision_rate",
@@ -151,6 +164,9 @@ Record from_json(const Json& j, const Stage& stage) {
         "does not fit human_collision and human_blocked");
   check(equal(m.spl, gsnav::success_weighted_by_path_length(m.success, m.start_distance, m.path_length)),
         "spl", "does not follow from success, start_distance and path_length");
+  check(equal(m.stl,
+              gsnav::success_weighted_by_time(m.success, m.start_distance, task.forward_step, m.steps)),
+        "stl", "does not follow from success, start_distance and steps");
   check(equal(m.soft_spl, gsnav::soft_success_weighted_by_path_length(m.distance_to_goal,
                                                                       m.start_distance, m.path_length)),
         "soft_spl", "does not follow from distance_to_goal, start_distance and path_length");
@@ -201,7 +217,7 @@ Result<Header> read_header(const fs::path& path, const std::string& line) {
   const std::string where = path.string() + ": line 1: ";
   Json j;
   try {
-    j = Json::parse(line);
+    j = parse_line(line);
   } catch (const std::exception&) {
     return {Errc::invalid_file, where + "is not the header of a journal; " + kAnew};
   }
@@ -325,7 +341,7 @@ std::string line_of(const Record& record) { return to_json(record).dump(); }
 
 Result<Record> record_of(const std::string& line, const std::string& where, const Stage& stage) {
   try {
-    return from_json(Json::parse(line), stage);
+    return from_json(parse_line(line), stage);
   } catch (const gsnav::Error& e) {
     return {Errc::invalid_file, where + ": " + e.what() + ". Remove the line, " + kAnew};
   } catch (const std::exception&) {

@@ -90,6 +90,8 @@ inline void hash_cloud(Hasher& h, const GaussianCloud& cloud) {
   h.array(cloud.shN);
   if (!cloud.shN_half.empty()) h.array(cloud.shN_half);
   h.value(cloud.sh_degree);
+  // Only what is not the rule, so that hashes of before stay valid.
+  if (cloud.color_space != ColorSpace::display) h.value(cloud.color_space);
 }
 
 /// All that an image depends on in a cloud: 32 hexadecimal digits.
