@@ -173,14 +173,14 @@ void HttpServer::accept_connections() {
     }
     const int on = 1;
     setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    if (!make_room()) {
-      send_reply(socket, plain(503), true, false);
-      close(socket);
-      continue;
-    }
-    Connection& c = connections_.emplace_back();
-    c.socket = socket;
     try {
+      if (!make_room()) {
+        send_reply(socket, plain(503), true, false);
+        close(socket);
+        continue;
+      }
+      Connection& c = connections_.emplace_back();
+      c.socket = socket;
       c.thread = std::thread([this, &c] {
         try {
           talk(c);
@@ -191,8 +191,9 @@ void HttpServer::accept_connections() {
         c.over = true;
       });
     } catch (const std::exception&) {
+      // Out of memory, or no thread to be had: this client goes, the server stays.
       close(socket);
-      connections_.pop_back();
+      if (!connections_.empty() && !connections_.back().thread.joinable()) connections_.pop_back();
     }
   }
   for (Connection& c : connections_) {
