@@ -206,18 +206,18 @@ bool Landmarks::add(const UnfoldedMesh& mesh, const Site& at, GeodesicSearch& se
     Line out{};
     if (own.from_low < kInfinity && own.from_high < kInfinity) {
       double below = 0, above = 0;
-      std::array<double, kParts + 1> at;
+      std::array<double, kParts + 1> kept;
       for (std::uint32_t k = 0; k <= kParts; ++k) {
         const double d = own.distance(own.length * k / kParts);
         out.at[k] = static_cast<float>(d);
-        at[k] = static_cast<double>(out.at[k]);
-        below = max(below, at[k] - d);
-        above = max(above, d - at[k]);
+        kept[k] = static_cast<double>(out.at[k]);
+        below = max(below, kept[k] - d);
+        above = max(above, d - kept[k]);
       }
       for (std::uint32_t k = 0; k < kParts && own.length > kRounding; ++k) {
         const double low = own.length * k / kParts, high = own.length * (k + 1) / kParts;
-        below = max(below, most_below(own, low, high, at[k], at[k + 1]));
-        above = max(above, most_above(own, low, high, at[k], at[k + 1], scratch));
+        below = max(below, most_below(own, low, high, kept[k], kept[k + 1]));
+        above = max(above, most_above(own, low, high, kept[k], kept[k + 1], scratch));
       }
       out.below = rounded_up(below + kRounding);
       out.above = rounded_up(above + kRounding);

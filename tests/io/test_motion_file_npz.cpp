@@ -5,6 +5,7 @@
 
 #include "avatar_npz.hpp"
 #include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/avatar/smpl_joints.hpp"
 #include "gsnav/detail/io/avatar_file.hpp"
 #include "gsnav/detail/io/motion_file.hpp"
 #include "support/files.hpp"

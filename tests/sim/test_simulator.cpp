@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <cmath>
+
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/sim/simulator.hpp"
 #include "sim_scene.hpp"
@@ -79,8 +81,8 @@ TEST_CASE("the camera looks where the agent goes") {
     // A point ahead of the agent at eye level is on the axis; up in the world is up in the image.
     const Vec3d ahead = base + Vec3d{-std::sin(yaw), 1.5, -std::cos(yaw)} * 1.0;
     const Vec3d p = c.viewmat * ahead;
-    CHECK(abs(p.x) < 1e-12);
-    CHECK(abs(p.y) < 1e-12);
+    CHECK(std::abs(p.x) < 1e-12);
+    CHECK(std::abs(p.y) < 1e-12);
     CHECK(p.z == doctest::Approx(1.0));
     CHECK((c.viewmat * (ahead + Vec3d{0, 0.1, 0})).y == doctest::Approx(-0.1));
     const Vec3d left = ahead + Vec3d{-std::cos(yaw), 0, std::sin(yaw)} * 0.1;
@@ -147,7 +149,7 @@ TEST_CASE("people are seen, and move while the agent acts") {
   e.start_rotation = yaw_rotation(3.14159265358979323846);
   const auto differing = [](std::span<const float> a, std::span<const float> b) {
     std::size_t n = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) n += abs(a[i] - b[i]) > 0.02f ? 1 : 0;
+    for (std::size_t i = 0; i < a.size(); ++i) n += std::abs(a[i] - b[i]) > 0.02f ? 1 : 0;
     return n;
   };
   const auto a = empty.reset(e).value(), b = peopled.reset(e).value();
