@@ -177,8 +177,7 @@ class Floors {
     }
     std::vector<Mark> marks = find_stairs(report);
     progress(0.9);
-    for (std::size_t id = 0; id < storeys_.size(); ++id) {
-      Storey& s = storeys_[id];
+    for (Storey& s : storeys_) {
       if (!s.kept) continue;
       double area = 0;
       for (std::size_t i = 0; i < s.marks.size(); ++i) {
@@ -189,7 +188,8 @@ class Floors {
         area += g_.cell * g_.cell;
         Mark& m = s.marks[i];
         for (std::uint32_t r = g_.first[m.column]; r < g_.first[m.column + 1]; ++r) {
-          if (label_[r] == static_cast<std::int32_t>(id) && ramp_[r] != kNoLevel) m.top = ramp_[r];
+          const bool same = max(ramp_[r], m.top) - min(ramp_[r], m.top) < static_cast<int>(s_.clearance);
+          if (ramp_[r] != kNoLevel && same) m.top = ramp_[r];
         }
         marks.push_back(m);
       }
