@@ -15,8 +15,11 @@ constexpr double kApart = 2.0;  // metres between storeys
 constexpr std::size_t kBeside =
     3;  // patches around a floor in which what is nearer than kApart is furniture
 constexpr double kLeastStorey = 4.0;  // square metres
+constexpr double kStairHead = 1.0;    // metres: floor around stairs that is levelled with them
+constexpr double kRampRadius = 0.15;  // metres that heights of stairs are averaged over
 constexpr double kCoverGap = 0.6;     // metres: holes in a ceiling up to this wide are closed
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+constexpr std::uint16_t kNoLevel = std::numeric_limits<std::uint16_t>::max();
 constexpr std::int32_t kNotWalkable = -1, kFree = -2;  // labels of runs; storeys from 0
 
 /// Levels free above run k of a column; all where nothing is above.
@@ -117,8 +120,8 @@ struct Mark {
 
 /// Ground beside the storeys, connected by the agent's climb.
 struct Piece {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> runs;  // column, run
-  std::vector<std::uint32_t> beside;                          // columns of the storeys next to it
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> runs;    // column, run
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> beside;  // of the storeys next to it
   std::vector<std::int32_t> storeys;
 };
 
@@ -174,7 +177,7 @@ class Floors {
     }
     std::vector<Mark> marks = find_stairs(report);
     progress(0.9);
-    for (const Storey& s : storeys_) {
+    for (Storey& s : storeys_) {
       if (!s.kept) continue;
       double area = 0;
       for (std::size_t i = 0; i < s.marks.size(); ++i) {
@@ -183,7 +186,12 @@ class Floors {
           continue;
         }
         area += g_.cell * g_.cell;
-        marks.push_back(s.marks[i]);
+        Mark& m = s.marks[i];
+        for (std::uint32_t r = g_.first[m.column]; r < g_.first[m.column + 1]; ++r) {
+          const bool same = max(ramp_[r], m.top) - min(ramp_[r], m.top) < static_cast<int>(s_.clearance);
+          if (ramp_[r] != kNoLevel && same) m.top = ramp_[r];
+        }
+        marks.push_back(m);
       }
       report.holes_filled += s.holes;
       report.storeys.push_back({g_.low.y + (s.level + 0.5) * g_.level, area});
@@ -447,8 +455,7 @@ class Floors {
     x0 = (x0 - min<std::size_t>(x0, 1)) * side_;
     z0 = (z0 - min<std::size_t>(z0, 1)) * side_;
     const std::size_t nx = min((x1 + 2) * side_, g_.nx) - x0, nz = min((z1 + 2) * side_, g_.nz) - z0;
-    constexpr std::uint16_t kEmpty = std::numeric_limits<std::uint16_t>::max();
-    std::vector<std::uint16_t> tops(nx * nz, kEmpty);
+    std::vector<std::uint16_t> tops(nx * nz, kNoLevel);
     std::vector<std::uint8_t> mask(nx * nz, 0);
     pool_.run(static_cast<std::uint32_t>(nz), [&](std::uint32_t row) noexcept {
       for (std::size_t x = 0; x < nx; ++x) {
@@ -471,14 +478,14 @@ class Floors {
     const std::vector<std::uint16_t> around = tops;
     const std::size_t near = max<std::size_t>(1, static_cast<std::size_t>(0.1 / g_.cell + 0.5));
     for (std::size_t i = 0; i < tops.size(); ++i) {
-      if (tops[i] != kEmpty || mask[i] == 0) continue;
+      if (tops[i] != kNoLevel || mask[i] == 0) continue;
       const std::size_t level = at(id, x0 + i % nx, z0 + i / nx);
       if (level == kNone) continue;
       // No higher and no lower than the floor beside it.
-      std::uint16_t low = kEmpty, high = 0;
+      std::uint16_t low = kNoLevel, high = 0;
       for (std::size_t z = i / nx - min(i / nx, near); z <= min(i / nx + near, nz - 1); ++z) {
         for (std::size_t x = i % nx - min(i % nx, near); x <= min(i % nx + near, nx - 1); ++x) {
-          if (around[x + nx * z] == kEmpty) continue;
+          if (around[x + nx * z] == kNoLevel) continue;
           low = min(low, around[x + nx * z]);
           high = max(high, around[x + nx * z]);
         }
@@ -489,12 +496,12 @@ class Floors {
     for (std::size_t i = 0; i < tops.size(); ++i) {
       const auto runs = g_.runs_of(x0 + i % nx + g_.nx * (z0 + i / nx));
       mask[i] =
-          tops[i] != kEmpty && !runs.empty() && runs.back().top() >= tops[i] + s_.clearance ? 1 : 0;
+          tops[i] != kNoLevel && !runs.empty() && runs.back().top() >= tops[i] + s_.clearance ? 1 : 0;
     }
     close_mask(mask, nx, nz, static_cast<int>(kCoverGap / g_.cell));
     double roofed = 0;
     for (std::size_t i = 0; i < tops.size(); ++i) {
-      if (tops[i] == kEmpty) continue;
+      if (tops[i] == kNoLevel) continue;
       s.marks.push_back({static_cast<std::uint32_t>(x0 + i % nx + g_.nx * (z0 + i / nx)), tops[i]});
       s.roofed.push_back(mask[i]);
       roofed += mask[i];
@@ -506,7 +513,6 @@ class Floors {
   /// lower: a tread of stairs at the floor's edge is no pit.
   void raise_pits(std::int32_t id, std::size_t x0, std::size_t z0, std::size_t nx,
                   std::vector<std::uint16_t>& tops) {
-    constexpr std::uint16_t kEmpty = std::numeric_limits<std::uint16_t>::max();
     const std::vector<std::uint16_t> raw = tops;
     const std::size_t nz = tops.size() / nx,
                       near = max<std::size_t>(1, static_cast<std::size_t>(0.1 / g_.cell + 0.5));
@@ -514,7 +520,7 @@ class Floors {
       std::vector<std::uint16_t> around;
       for (std::size_t x = 0; x < nx; ++x) {
         std::uint16_t& top = tops[x + nx * row];
-        if (top == kEmpty) continue;
+        if (top == kNoLevel) continue;
         const std::size_t level = at(id, x0 + x, z0 + row);
         if (top >= level) continue;
         std::size_t to = level;
@@ -522,7 +528,7 @@ class Floors {
           around.clear();
           for (std::size_t z = row - min<std::size_t>(row, near); z <= min(row + near, nz - 1); ++z) {
             for (std::size_t i = x - min(x, near); i <= min(x + near, nx - 1); ++i) {
-              if (raw[i + nx * z] != kEmpty) around.push_back(raw[i + nx * z]);
+              if (raw[i + nx * z] != kNoLevel) around.push_back(raw[i + nx * z]);
             }
           }
           const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
@@ -608,7 +614,7 @@ class Floors {
           each_neighbour(column, run, [&](std::size_t nc, std::uint32_t n) {
             if (label_[n] >= 0) {
               note(piece.storeys, label_[n]);
-              piece.beside.push_back(static_cast<std::uint32_t>(nc));
+              piece.beside.push_back({static_cast<std::uint32_t>(nc), n});
             }
             if (label_[n] != kFree) return;
             label_[n] = kSeen;
@@ -634,11 +640,10 @@ class Floors {
       }
     }
     std::vector<Mark> out;
-    for (const Piece& p : pieces) {
-      if (!kept(p.storeys.front())) continue;
-      ++report.stairs;
-      level_stairs(p, out, report);
-    }
+    std::erase_if(pieces, [&](const Piece& p) { return !kept(p.storeys.front()); });
+    report.stairs = pieces.size();
+    level_ramps(pieces, out);
+    for (const Piece& p : pieces) fill_stairs(p, out, report);
     return out;
   }
 
@@ -677,10 +682,66 @@ class Floors {
     });
   }
 
-  /// Marks stairs at the mean of the ground within 0.15 m that a step reaches, which is a ramp that
-  /// erosion cannot widen the edges of; takes off the voxels that stand out of it and closes small gaps.
-  void level_stairs(const Piece& p, std::vector<Mark>& out, GaussianNavReport& report) {
-    const auto far = max<std::size_t>(1, static_cast<std::size_t>(0.15 / g_.cell + 0.5));
+  /// Gives stairs, and the floors within kStairHead of them, the mean height of the ground within kRampRadius
+  /// that a step reaches. That is a ramp without steps, whatever the grid's offset: no step is too high for
+  /// Recast, and erosion widens none. Takes off the voxels that stand out of it.
+  void level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out) {
+    ramp_.assign(g_.runs.size(), kNoLevel);
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> ground;
+    for (const Piece& p : pieces) {
+      for (const auto& [c, run] : p.runs) ramp_[run] = height_[run];
+      ground.insert(ground.end(), p.runs.begin(), p.runs.end());
+    }
+    // Treads near a floor's own height are marked as that floor, and the risers between them as no floor.
+    std::size_t next = ground.size();
+    const auto add = [&](std::size_t c, std::uint32_t run) {
+      if (ramp_[run] != kNoLevel) return;
+      if (label_[run] < 0 && g_.runs[run].top() > height_[run] + s_.climb) return;
+      ramp_[run] = height_[run];
+      ground.push_back({static_cast<std::uint32_t>(c), run});
+    };
+    for (const Piece& p : pieces) {
+      for (const auto& [c, run] : p.beside) add(c, run);
+    }
+    const auto reach = static_cast<std::size_t>(kStairHead / g_.cell + 0.5);
+    for (std::size_t k = 0; k < reach; ++k) {
+      for (const std::size_t end = ground.size(); next < end; ++next) {
+        const auto [c, run] = ground[next];
+        each_neighbour(c, run, add);
+      }
+    }
+    const auto far = max<std::size_t>(1, static_cast<std::size_t>(kRampRadius / g_.cell + 0.5));
+    std::vector<std::uint16_t> tops(ground.size());
+    pool_.run(static_cast<std::uint32_t>(tops.size()), [&](std::uint32_t i) noexcept {
+      const auto [c, run] = ground[i];
+      const std::size_t x = c % g_.nx, z = c / g_.nx, top = height_[run];
+      double sum = 0, n = 0;
+      for (std::size_t k = z - min(z, far); k <= min(z + far, g_.nz - 1); ++k) {
+        for (std::size_t j = x - min(x, far); j <= min(x + far, g_.nx - 1); ++j) {
+          for (std::uint32_t r = g_.first[j + g_.nx * k]; r < g_.first[j + g_.nx * k + 1]; ++r) {
+            const std::size_t h = height_[r];
+            if (ramp_[r] == kNoLevel || max(h, top) - min(h, top) > s_.climb) continue;
+            sum += static_cast<double>(h);
+            n += 1;
+          }
+        }
+      }
+      tops[i] = static_cast<std::uint16_t>(sum / n + 0.5);
+    });
+    for (std::size_t i = 0; i < tops.size(); ++i) {
+      const auto [c, run] = ground[i];
+      SolidRun& r = g_.runs[run];
+      // What stands out may hang above the run below, which it then rests on.
+      r.low = min(r.low, run > g_.first[c] ? max(tops[i], g_.runs[run - 1].end) : tops[i]);
+      ramp_[run] = max(r.low, tops[i]);
+      r.end = min(r.end, static_cast<std::uint16_t>(ramp_[run] + 1));
+      if (label_[run] < 0) out.push_back({c, ramp_[run]});
+    }
+  }
+
+  /// Closes small gaps in stairs.
+  void fill_stairs(const Piece& p, std::vector<Mark>& out, GaussianNavReport& report) {
+    const auto far = max<std::size_t>(1, static_cast<std::size_t>(kRampRadius / g_.cell + 0.5));
     std::size_t x0 = g_.nx, x1 = 0, z0 = g_.nz, z1 = 0;
     for (const auto& [c, run] : p.runs) {
       x0 = min(x0, c % g_.nx);
@@ -694,36 +755,27 @@ class Floors {
     std::vector<std::uint8_t> mask(nx * nz, 0), own(nx * nz, 0);
     std::vector<std::uint16_t> heights(nx * nz, 0);
     const auto index = [&](std::uint32_t c) { return c % g_.nx - x0 + nx * (c / g_.nx - z0); };
-    for (const std::uint32_t c : p.beside) mask[index(c)] = 1;
+    for (const auto& [c, run] : p.beside) mask[index(c)] = 1;
     for (const auto& [c, run] : p.runs) {
       mask[index(c)] = own[index(c)] = 1;
       heights[index(c)] = height_[run];
     }
-    const auto mean = [&](std::size_t i, std::size_t top) {
+    const auto mean = [&](std::size_t i) {
       double sum = 0, n = 0;
       for (std::size_t z = i / nx - min(i / nx, far); z <= min(i / nx + far, nz - 1); ++z) {
         for (std::size_t x = i % nx - min(i % nx, far); x <= min(i % nx + far, nx - 1); ++x) {
-          const std::size_t h = heights[x + nx * z];
-          if (own[x + nx * z] == 0 || (top != kNone && max(h, top) - min(h, top) > s_.climb)) continue;
-          sum += static_cast<double>(h);
+          if (own[x + nx * z] == 0) continue;
+          sum += static_cast<double>(heights[x + nx * z]);
           n += 1;
         }
       }
       return n > 0 ? static_cast<std::size_t>(sum / n + 0.5) : kNone;
     };
-    for (const auto& [c, run] : p.runs) {
-      const std::size_t around = mean(index(c), height_[run]);
-      SolidRun& r = g_.runs[run];
-      const std::uint16_t top =
-          max(r.low, around == kNone ? height_[run] : static_cast<std::uint16_t>(around));
-      r.end = min(r.end, static_cast<std::uint16_t>(top + 1));
-      out.push_back({c, top});
-    }
     close_mask(mask, nx, nz, static_cast<int>(o_.max_hole / g_.cell + 1e-6));
-    for (const std::uint32_t c : p.beside) mask[index(c)] = 0;
+    for (const auto& [c, run] : p.beside) mask[index(c)] = 0;
     for (std::size_t i = 0; i < mask.size(); ++i) {
       if (mask[i] == 0 || own[i] != 0) continue;
-      std::size_t top = mean(i, kNone);
+      std::size_t top = mean(i);
       const std::size_t c = x0 + i % nx + g_.nx * (z0 + i / nx);
       if (top == kNone) continue;
       bool floor = false;
@@ -771,6 +823,7 @@ class Floors {
   std::vector<Storey> storeys_;
   std::vector<std::int32_t> label_;    // of each run: a storey, kNotWalkable or kFree
   std::vector<std::uint16_t> height_;  // of each walkable run
+  std::vector<std::uint16_t> ramp_;    // level of each run that is or leads to stairs, or kNoLevel
 };
 
 }  // namespace

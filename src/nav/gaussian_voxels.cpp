@@ -227,25 +227,34 @@ class TileMass {
     }
     return mass_[brick * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick + y % kBrick];
   }
-  /// Appends the runs of a column of at least `least`. Returns how many.
+  /// Appends the solid runs of a column. Returns how many. A voxel is solid with a mass of `least`. Of
+  /// two voxels that share the mass of a sheet on the face between them, the heavier one is solid too.
   std::uint32_t runs(std::size_t x, std::size_t z, std::size_t levels, float least,
                      std::vector<SolidRun>& out) const {
     const std::size_t before = out.size();
-    bool open = false;
     const std::uint32_t* bricks = table_.data() + (z / kBrick * (kTile / kBrick) + x / kBrick) * high_;
-    for (std::size_t b = 0; b < high_; ++b) {
-      if (bricks[b] == kNoBrick) {
+    const auto mass = [&](std::size_t y) {
+      if (y >= levels || bricks[y / kBrick] == kNoBrick) return 0.0f;  // below 0 too: y wraps around
+      return mass_[bricks[y / kBrick] * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick + y % kBrick];
+    };
+    // Mass that lies in two voxels and not in those below and above them.
+    const auto sheet = [&](std::size_t y) {
+      const float pair = mass(y) + mass(y + 1);
+      return mass(y) < least && mass(y + 1) < least && pair - mass(y - 1) - mass(y + 2) >= least;
+    };
+    bool open = false;
+    for (std::size_t y = 0; y < levels; ++y) {
+      if (bricks[y / kBrick] == kNoBrick) {
         open = false;
+        y |= kBrick - 1;
         continue;
       }
-      const float* m = mass_.data() + bricks[b] * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick;
-      for (std::size_t k = 0; k < kBrick && b * kBrick + k < levels; ++k) {
-        const auto y = static_cast<std::uint16_t>(b * kBrick + k);
-        const bool solid = m[k] >= least;
-        if (solid && !open) out.push_back({y, y});
-        if (solid) out.back().end = static_cast<std::uint16_t>(y + 1);
-        open = solid;
-      }
+      const float m = mass(y);
+      const bool solid = m >= least || (m > 0 && ((m > mass(y + 1) && sheet(y)) ||
+                                                  (m >= mass(y - 1) && sheet(y - 1))));
+      if (solid && !open) out.push_back({static_cast<std::uint16_t>(y), 0});
+      if (solid) out.back().end = static_cast<std::uint16_t>(y + 1);
+      open = solid;
     }
     return static_cast<std::uint32_t>(out.size() - before);
   }
