@@ -682,9 +682,9 @@ class Floors {
     });
   }
 
-  /// Gives stairs, and the floors within kStairHead of them, the mean height of the ground within kRampRadius
-  /// that a step reaches. That is a ramp without steps, whatever the grid's offset: no step is too high for
-  /// Recast, and erosion widens none. Takes off the voxels that stand out of it.
+  /// Gives stairs, and the floors within kStairHead of them, the mean height of the ground within
+  /// kRampRadius that a step reaches. That is a ramp without steps, whatever the grid's offset: no step
+  /// is too high for Recast, and erosion widens none. Takes off the voxels that stand out of it.
   void level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out) {
     ramp_.assign(g_.runs.size(), kNoLevel);
     std::vector<std::pair<std::uint32_t, std::uint32_t>> ground;
@@ -692,7 +692,8 @@ class Floors {
       for (const auto& [c, run] : p.runs) ramp_[run] = height_[run];
       ground.insert(ground.end(), p.runs.begin(), p.runs.end());
     }
-    // Treads near a floor's own height are marked as that floor, and the risers between them as no floor.
+    // Treads near a floor's own height are marked as that floor, and the risers between them as no
+    // floor.
     std::size_t next = ground.size();
     const auto add = [&](std::size_t c, std::uint32_t run) {
       if (ramp_[run] != kNoLevel) return;

@@ -235,7 +235,8 @@ class TileMass {
     const std::uint32_t* bricks = table_.data() + (z / kBrick * (kTile / kBrick) + x / kBrick) * high_;
     const auto mass = [&](std::size_t y) {
       if (y >= levels || bricks[y / kBrick] == kNoBrick) return 0.0f;  // below 0 too: y wraps around
-      return mass_[bricks[y / kBrick] * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick + y % kBrick];
+      return mass_[bricks[y / kBrick] * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick +
+                   y % kBrick];
     };
     // Mass that lies in two voxels and not in those below and above them.
     const auto sheet = [&](std::size_t y) {
@@ -250,8 +251,8 @@ class TileMass {
         continue;
       }
       const float m = mass(y);
-      const bool solid = m >= least || (m > 0 && ((m > mass(y + 1) && sheet(y)) ||
-                                                  (m >= mass(y - 1) && sheet(y - 1))));
+      const bool solid =
+          m >= least || (m > 0 && ((m > mass(y + 1) && sheet(y)) || (m >= mass(y - 1) && sheet(y - 1))));
       if (solid && !open) out.push_back({static_cast<std::uint16_t>(y), 0});
       if (solid) out.back().end = static_cast<std::uint16_t>(y + 1);
       open = solid;
