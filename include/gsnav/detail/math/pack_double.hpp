@@ -193,8 +193,8 @@ struct PackPair {
   GSNAV_HD friend PackPair truncated(PackPair a) noexcept {
     return {truncated(a.low), truncated(a.high)};
   }
-  GSNAV_HD friend PackPair clamp(PackPair v, PackPair low, PackPair high) noexcept {
-    return {clamp(v.low, low.low, high.low), clamp(v.high, low.high, high.high)};
+  GSNAV_HD friend PackPair clamp(PackPair v, PackPair least, PackPair most) noexcept {
+    return {clamp(v.low, least.low, most.low), clamp(v.high, least.high, most.high)};
   }
 };
 
