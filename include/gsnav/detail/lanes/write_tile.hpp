@@ -53,7 +53,7 @@ void write_plane(const BlockRow& row, float* image, const Value& value) noexcept
 
 /// The same of three values a pixel. value(i): a Vec3.
 template <class Value>
-GSNAV_HD void write_color(const BlockRow& row, float* image, const Value& value) noexcept {
+void write_color(const BlockRow& row, float* image, const Value& value) noexcept {
   if (image == nullptr) return;
   F x[kRowBlocks], y[kRowBlocks], z[kRowBlocks];
   for (int i = 0; i < kRowBlocks; ++i) {
