@@ -61,4 +61,11 @@ extern template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorks
 extern template Status render_composite<float, ToyBackend>(
     ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>, const MeshFrame&,
     const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status draw_meshes<float, ToyBackend>(ToyBackend&, MeshWorkspace<float, ToyBackend>&,
+                                                      std::span<const MeshInstance>, const Camera&,
+                                                      const MeshLight&, int, bool, MeshImages<float>,
+                                                      MeshStats*);
+extern template Status detail::render_frame<float, ToyBackend>(
+    ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>, const Camera&,
+    const RenderConfig&, const MeshLayer<float>&, const FrameImages<float>&, RenderStats&);
 }  // namespace gsnav
