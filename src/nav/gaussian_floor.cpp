@@ -29,7 +29,7 @@ std::size_t room_above(std::span<const SolidRun> runs, std::size_t k) noexcept {
 
 /// The height at which the scene's main floor lies: the lowest at which a good share of the columns that
 /// have room for the agent end. Columns below a ceiling decide where the scene has one: a garden around
-/// a house is not its floor.
+/// a house is not its floor. Thin tops count little: noise under the ground is one too.
 std::optional<std::size_t> main_level(const VoxelGrid& g, std::size_t clearance, std::size_t smooth,
                                       double& most_area) {
   std::vector<double> open(g.ny, 0.0), roofed(g.ny, 0.0);
@@ -37,8 +37,9 @@ std::optional<std::size_t> main_level(const VoxelGrid& g, std::size_t clearance,
     const auto runs = g.runs_of(c);
     for (std::size_t k = 0; k < runs.size(); ++k) {
       if (room_above(runs, k) < clearance) continue;
-      open[runs[k].top()] += 1;
-      if (k + 1 < runs.size()) roofed[runs[k].top()] += 1;
+      const double weight = runs[k].thin ? 0.125 : 1.0;
+      open[runs[k].top()] += weight;
+      if (k + 1 < runs.size()) roofed[runs[k].top()] += weight;
     }
   }
   const auto smoothed = [&](const std::vector<double>& h) {

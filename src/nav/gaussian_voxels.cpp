@@ -8,9 +8,9 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <new>
 #include <string>
 
-#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "navmesh_stages.hpp"
 
@@ -228,7 +228,8 @@ class TileMass {
     return mass_[brick * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick + y % kBrick];
   }
   /// Appends the solid runs of a column. Returns how many. A voxel is solid with a mass of `least`. Of
-  /// two voxels that share the mass of a sheet on the face between them, the heavier one is solid too.
+  /// two voxels with a sheet on the face between them, the heavier one is solid too, where a voxel
+  /// around that face would be.
   std::uint32_t runs(std::size_t x, std::size_t z, std::size_t levels, float least,
                      std::vector<SolidRun>& out) const {
     const std::size_t before = out.size();
@@ -238,10 +239,12 @@ class TileMass {
       return mass_[bricks[y / kBrick] * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick +
                    y % kBrick];
     };
-    // Mass that lies in two voxels and not in those below and above them.
+    // Splat widens a thin sheet to a variance of level^2 / 12. On the face between two voxels it has
+    // exp(1.5) times the geometric mean of their masses, and the voxels below and above have none.
+    constexpr float kFace = 4.4816890703f;
     const auto sheet = [&](std::size_t y) {
-      const float pair = mass(y) + mass(y + 1);
-      return mass(y) < least && mass(y + 1) < least && pair - mass(y - 1) - mass(y + 2) >= least;
+      return mass(y) < least && mass(y + 1) < least &&
+             kFace * (std::sqrt(mass(y) * mass(y + 1)) - mass(y - 1) - mass(y + 2)) >= least;
     };
     bool open = false;
     for (std::size_t y = 0; y < levels; ++y) {
@@ -251,10 +254,14 @@ class TileMass {
         continue;
       }
       const float m = mass(y);
-      const bool solid =
-          m >= least || (m > 0 && ((m > mass(y + 1) && sheet(y)) || (m >= mass(y - 1) && sheet(y - 1))));
-      if (solid && !open) out.push_back({static_cast<std::uint16_t>(y), 0});
-      if (solid) out.back().end = static_cast<std::uint16_t>(y + 1);
+      const bool thin =
+          m > 0 && m < least && ((m > mass(y + 1) && sheet(y)) || (m >= mass(y - 1) && sheet(y - 1)));
+      const bool solid = m >= least || thin;
+      if (solid && !open) out.push_back({static_cast<std::uint16_t>(y), 0, false});
+      if (solid) {
+        out.back().end = static_cast<std::uint16_t>(y + 1);
+        out.back().thin = thin;
+      }
       open = solid;
     }
     return static_cast<std::uint32_t>(out.size() - before);
@@ -338,6 +345,7 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
   std::vector<TileRuns> tiles(lists.nx * lists.nz);
   std::mutex lock;
   std::size_t done = 0;
+  bool failed = false;
   const auto tile = [&](std::size_t t) {
     TileRuns& out = tiles[t];
     const std::size_t x0 = t % lists.nx * kTile, z0 = t / lists.nx * kTile;
@@ -377,18 +385,20 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
     }
     out.runs.shrink_to_fit();
   };
-  const Status made = run_guarded(pool, static_cast<std::uint32_t>(tiles.size()), [&](std::uint32_t t) {
-    tile(t);
-    if (o.progress) {
+  pool.run(static_cast<std::uint32_t>(tiles.size()), [&](std::uint32_t t) noexcept {
+    try {
+      tile(t);
+    } catch (const std::bad_alloc&) {
       const std::lock_guard held(lock);
-      ++done;
-      o.progress("voxels", static_cast<double>(done) / static_cast<double>(tiles.size()));
+      failed = true;
     }
-    return Status();
+    if (!o.progress) return;
+    const std::lock_guard held(lock);
+    ++done;
+    o.progress("voxels", static_cast<double>(done) / static_cast<double>(tiles.size()));
   });
-  if (made.code() == Errc::out_of_memory)
+  if (failed)
     return {Errc::out_of_memory, "NavMesh from Gaussians: not enough memory for the solid voxels"};
-  if (!made) return made;
   g.first.assign(g.nx * g.nz + 1, 0);
   const auto columns = [&](std::size_t t, const auto& f) {
     const std::size_t x0 = t % lists.nx * kTile, z0 = t / lists.nx * kTile,

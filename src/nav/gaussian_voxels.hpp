@@ -13,6 +13,7 @@ namespace gsnav::detail {
 /// Consecutive solid voxels of one column: levels [low, end).
 struct SolidRun {
   std::uint16_t low = 0, end = 0;
+  bool thin = false;  ///< the top voxel is solid only as one of two that a sheet lies between
   std::size_t top() const noexcept { return end - std::size_t{1}; }
 };
 

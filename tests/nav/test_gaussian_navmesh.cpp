@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../../bench/large_capture.hpp"
+#include "cases.hpp"
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "meshes.hpp"
@@ -289,48 +290,66 @@ TEST_CASE("gaussian navmesh: with triangles: furniture in a mesh, a wall in a sc
 
 namespace {
 
-/// Two storeys of 8 x 5 m, 2.8 m apart, in one house with a roof: from x = 2 to 6.2 m a flight of 15
-/// steps of 0.28 m (each 2.8 / 16 m) along the wall z = 5 leads through an opening of the upper floor.
-/// `steps` false: no stairs.
-constexpr double kUp = 2.8, kStep = kUp / 16, kTread = 0.28, kStairX = 1.6, kStairZ = 3.8;
+/// Two storeys of 8 x 5 m or more in one house with a roof. A flight of `steps` - 1 treads along the
+/// wall z = 5 starts at x = 1.6 m and leads through an opening of the upper floor.
+struct House {
+  double up = 2.8;  // metres between the storeys
+  int steps = 16;   // rises; 0: no stairs
+  double tread = 0.28, width = 1.2, noise = 0.01;
+  std::uint64_t seed = 17;
+  Similarity where{};
 
-Painter house(bool steps) {
-  Painter p;
-  p.ground(0, 0, 8, 5);
-  p.ground(0, 0, 8, kStairZ, kUp);  // the upper floor, open over the stairs
-  p.ground(0, kStairZ, kStairX, 5, kUp);
-  p.ground(kStairX + 15 * kTread, kStairZ, 8, 5, kUp);
-  p.ground(0, 0, 8, 5, 2 * kUp);  // the roof
-  for (const double z : {0.0, 5.0}) p.wall(0, z, 8, z, 0, 2 * kUp);
-  for (const double x : {0.0, 8.0}) p.wall(x, 0, x, 5, 0, 2 * kUp);
-  for (int i = 0; steps && i < 15; ++i) {
-    const double x = kStairX + i * kTread, y = (i + 1) * kStep;
-    p.ground(x, kStairZ, x + kTread, 5, y);
-    p.wall(x, kStairZ, x, 5, y - kStep, y);
+  static constexpr double foot = 1.6;
+  double rise() const { return up / steps; }
+  double head() const { return foot + (steps > 0 ? steps - 1 : 15) * tread; }
+  double side() const { return 5 - width; }
+  double length() const { return max(8.0, head() + 1.8); }
+  /// From the lower floor before the flight to the upper one behind it.
+  Result<NavPath> walk(const NavMesh& m) const {
+    const double z = 5 - width / 2;
+    return m.find_path(where * Vec3d{0.8, 0, z}, where * Vec3d{length() - 0.8, up, z});
   }
-  return p;
-}
+  double walk_length() const {
+    return (foot - 0.8) + std::hypot(head() - foot, up) + (length() - 0.8 - head());
+  }
+
+  Painter paint() const {
+    Painter p;
+    p.rng = Rng(seed);
+    p.noise = noise;
+    p.ground(0, 0, length(), 5);
+    p.ground(0, 0, length(), side(), up);  // the upper floor, open over the stairs
+    p.ground(0, side(), foot, 5, up);
+    p.ground(head(), side(), length(), 5, up);
+    p.ground(0, 0, length(), 5, 2 * up);  // the roof
+    for (const double z : {0.0, 5.0}) p.wall(0, z, length(), z, 0, 2 * up);
+    for (const double x : {0.0, length()}) p.wall(x, 0, x, 5, 0, 2 * up);
+    for (int i = 0; i + 1 < steps; ++i) {
+      const double x = foot + i * tread, y = (i + 1) * rise();
+      p.ground(x, side(), x + tread, 5, y);
+      p.wall(x, side(), x, 5, y - rise(), y);
+    }
+    return p;
+  }
+};
 
 }  // namespace
 
 TEST_CASE("gaussian navmesh: a house of two storeys is walked by its stairs") {
-  const auto r = build(house(true));
+  const House house;
+  const auto r = build(house.paint());
   INFO(r.message());
   REQUIRE(r.ok());
   REQUIRE(r->report.storeys.size() == 2);
   CHECK(r->report.stairs == 1);
   CHECK(std::abs(r->report.storeys[0].height) < 0.04);
-  CHECK(std::abs(r->report.storeys[1].height - kUp) < 0.04);
+  CHECK(std::abs(r->report.storeys[1].height - house.up) < 0.04);
   const NavMesh& m = r->mesh;
-  // From the middle of the lower floor up the flight to the far corner of the upper one: the flight's
-  // own length on the slope, and the ways to and from it.
-  const double foot = kStairX, head = kStairX + 15 * kTread, z = 0.5 * (kStairZ + 5);
-  const Vec3d below{0.8, 0, z}, above{7.2, kUp, z};
-  const auto path = m.find_path(below, above);
+  // The flight's own length on the slope, and the ways to and from it.
+  const auto path = house.walk(m);
   INFO(path.message());
   REQUIRE(path.ok());
-  const double true_length = (foot - below.x) + std::hypot(head - foot, kUp) + (above.x - head);
-  CHECK(path->length == doctest::Approx(true_length).epsilon(0.06));
+  CHECK(path->length == doctest::Approx(house.walk_length()).epsilon(0.06));
   CHECK(m.island_count() == 1);
   // Nobody stands on the roof, in the walls or in the air.
   Rng rng(5);
@@ -341,22 +360,92 @@ TEST_CASE("gaussian navmesh: a house of two storeys is walked by its stairs") {
     REQUIRE(p.x < 7.95);
     REQUIRE(p.z > 0.05);
     REQUIRE(p.z < 4.95);
-    const bool lower = std::abs(p.y) < 0.1, upper = std::abs(p.y - kUp) < 0.1;
+    const bool lower = std::abs(p.y) < 0.1, upper = std::abs(p.y - house.up) < 0.1;
     on_lower += lower ? 1 : 0;
     on_upper += upper ? 1 : 0;
     if (lower || upper) continue;
     // On the stairs, within the agent's climb of the slope through the middles of the treads.
-    REQUIRE(p.z > kStairZ - 0.1);
-    REQUIRE(std::abs(p.y - (p.x - foot + 0.5 * kTread) / kTread * kStep) < 0.2);
+    REQUIRE(p.z > house.side() - 0.1);
+    REQUIRE(std::abs(p.y - ((p.x - House::foot) / house.tread + 0.5) * house.rise()) < 0.2);
   }
   CHECK(on_lower > 1500);
   CHECK(on_upper > 1500);
 }
 
+namespace {
+
+void check_stairs(const House& h) {
+  CAPTURE(h.rise());
+  CAPTURE(h.tread);
+  CAPTURE(h.width);
+  CAPTURE(h.noise);
+  CAPTURE(h.where.translation.y);
+  const auto r = build(h.paint(), {}, h.where);
+  INFO(r.message());
+  REQUIRE(r.ok());
+  CHECK(r->report.storeys.size() == 2);
+  CHECK(r->report.stairs == 1);
+  const auto path = h.walk(r->mesh);
+  INFO(path.message());
+  REQUIRE(path.ok());
+  CHECK(path->length == doctest::Approx(h.walk_length()).epsilon(0.08));
+}
+
+constexpr double kOffsets[] = {0.03, 0.0, 0.01, 0.05}, kNoises[] = {0.0005, 0.01};
+
+}  // namespace
+
+TEST_CASE("gaussian navmesh: stairs are found wherever the grid of voxels lies") {
+  for (int i = 0; i < gsnav_test::cases(8); ++i) {
+    House h;
+    h.where.translation.y = kOffsets[i % 4];
+    h.noise = kNoises[i / 4];
+    check_stairs(h);
+  }
+  Rng rng(7);
+  for (int i = 0; i < gsnav_test::cases(8); ++i) {
+    House h;
+    h.up = rng.uniform(2.3, 3.4);
+    h.steps = static_cast<int>(std::ceil(h.up / rng.uniform(0.15, 0.2)));
+    h.tread = rng.uniform(0.25, 0.32);
+    h.width = rng.uniform(0.9, 1.3);
+    h.noise = kNoises[i % 2];
+    h.seed = static_cast<std::uint64_t>(100 + i);
+    if (i % 3 == 1) h.where.rotation = axis_angle(Vec3d{0, 1, 0}, rng.uniform(0, 6.28));
+    h.where.translation = {300.0 * (i % 2), rng.uniform(-20, 1), 0};
+    check_stairs(h);
+  }
+}
+
+TEST_CASE("gaussian navmesh: steps that are too high are no stairs, nor are tables and shelves") {
+  for (int i = 0; i < gsnav_test::cases(4); ++i) {
+    // The last two have a table and a shelf below the opening in place of steps.
+    House h{.steps = i < 2 ? 12 + i : 0};
+    h.where.translation.y = kOffsets[i];
+    h.noise = kNoises[i % 2];
+    Painter p = h.paint();
+    if (h.steps == 0) {
+      p.box(3, 3.9, 4.5, 4.9, 0.75);
+      for (int board = 1; board <= 14; ++board) p.ground(5, 4.6, 6, 4.95, 0.19 * board);
+      p.wall(5, 4.95, 6, 4.95, 0, 2.66);
+    }
+    const auto r = build(p, {}, h.where);
+    INFO(r.message());
+    REQUIRE(r.ok());
+    CHECK(r->report.storeys.size() == 2);
+    CHECK(r->report.stairs == 0);
+    CHECK(h.walk(r->mesh).code() == Errc::nothing_navigable);
+    if (h.steps == 0) {
+      CHECK_FALSE(r->mesh.is_navigable(h.where * Vec3d{3.75, 0.75, 4.4}));
+      CHECK_FALSE(r->mesh.is_navigable(h.where * Vec3d{5.5, 1.33, 4.8}));
+    }
+  }
+}
+
 TEST_CASE(
     "gaussian navmesh: storeys without stairs are islands, roofs and what noise lies under the ground "
     "are none") {
-  const auto r = build(house(false));
+  const auto r = build(House{.steps = 0}.paint());
   INFO(r.message());
   REQUIRE(r.ok());
   REQUIRE(r->report.storeys.size() == 2);

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Floors and stairs from Gaussians: what levels a flight and the floors it leads to."""
+from . import fault
+
+FLOOR = "src/nav/gaussian_floor.cpp"
+TEST = "tests/nav/test_gaussian_floor.cpp"
+CASE = "gaussian floor: stairs are a ramp*"
+MORE = (FLOOR,)
+
+FAULTS = [
+    fault("ramp_of_the_flight_alone", "kStairHead", "kStairHead = 1.0;", "kStairHead = 0.0;", TEST, CASE, more=MORE,
+          why="treads near a floor's height belong to the floor and stay steps"),
+    fault("risers_left_standing", "level_ramps", "if (label_[run] < 0 && g_.runs[run].top() > height_[run] + s_.climb)",
+          "if (label_[run] < 0)", TEST, CASE, more=MORE,
+          why="a riser between two treads of a floor blocks the flight"),
+    fault("gaps_filled_over_stairs", "find", "ramp_[r] != kNoLevel && same", "false && same", TEST, CASE, more=MORE,
+          why="a floor's own level above a tread closes the flight"),
+    fault("steps_of_two_climbs", "each_neighbour", "max(other, top) - min(other, top) <= s_.climb) f(n, r);",
+          "max(other, top) - min(other, top) <= 2 * s_.climb) f(n, r);", TEST, "gaussian floor: steps above*",
+          more=MORE, why="steps above the agent's climb lead nowhere"),
+]
