@@ -107,7 +107,7 @@ __global__ void __launch_bounds__(kThreads, kBlocks<K>)
   std::uint32_t piece = share(blockIdx.x);
   const std::uint32_t end = share(blockIdx.x + 1);
   std::uint32_t at = cuda::last_start(std::uint32_t{0}, launch.count,
-                                [&](std::uint32_t i) { return jobs[i].first_piece <= piece; });
+                                      [&](std::uint32_t i) { return jobs[i].first_piece <= piece; });
   for (; piece < end; ++at) {
     const SkinJob& job = jobs[at];
     const std::uint32_t after = at + 1 < launch.count ? jobs[at + 1].first_piece : launch.pieces;
