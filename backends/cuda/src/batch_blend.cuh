@@ -107,12 +107,16 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
     state = {blended, {__uint_as_float(median)}};
   }
   if constexpr (Mesh) close_by_mesh<Color>(state, b.raster.rules, b.raster.mesh, pixel);
-  write_pixel(b.raster, pixel, state, [&](float*, const auto& value) {
-    if (b.rgb == nullptr && b.rgb8 == nullptr) return;
-    const Vec3<float> color = value(state);
-    for (int c = 0; c < 3; ++c) {
-      if (b.rgb != nullptr) b.rgb[3 * pixel + c] = color[c];
-      if (b.rgb8 != nullptr) b.rgb8[3 * pixel + c] = to_byte(color[c]);
+  for_each_image<D>(b.raster.images, [&]<Output O>(float* image) {
+    if constexpr (O == kRgb) {
+      if (b.rgb == nullptr && b.rgb8 == nullptr) return;
+      const Vec3<float> color = pixel_value<O>(b.raster, state);
+      for (int c = 0; c < 3; ++c) {
+        if (b.rgb != nullptr) b.rgb[3 * pixel + c] = color[c];
+        if (b.rgb8 != nullptr) b.rgb8[3 * pixel + c] = to_byte(color[c]);
+      }
+    } else {
+      if (image != nullptr) image[pixel] = pixel_value<O>(b.raster, state);
     }
   });
 }

@@ -350,41 +350,53 @@ GSNAV_HD L pixel_accumulated_depth(const BlendState<L, DepthMode::any>& state) n
   return fma(pixel_alpha(state), state.z_ref, state.accumulated);
 }
 
-/// The images that a state of mode D has values for: calls color(image, value) with the colour image,
-/// then plane(image, value) with each other. value(state): what a pixel (or a pack of them) has in that
-/// image. An image that was not asked for is null.
-template <DepthMode D, class S, class C, class P>
-GSNAV_HD void for_each_image(const RasterArgs<S>& args, const C& color, const P& plane) noexcept {
-  const FrameImages<S>& out = args.images;
-  color(out.rgb, [&](const auto& state) GSNAV_INLINED { return pixel_color(args, state); });
-  plane(out.alpha, [](const auto& state) GSNAV_INLINED { return pixel_alpha(state); });
-  if constexpr (D != DepthMode::none) {
-    plane(out.median_depth, [](const auto& state) GSNAV_INLINED { return state.median; });
-  }
-  if constexpr (D == DepthMode::any) {
-    plane(out.expected_depth,
-          [&](const auto& state) GSNAV_INLINED { return pixel_expected_depth(args, state); });
-    plane(out.accumulated_depth,
-          [](const auto& state) GSNAV_INLINED { return pixel_accumulated_depth(state); });
-    plane(out.first_hit_depth, [](const auto& state) GSNAV_INLINED { return state.first_hit; });
+/// What a pixel (or a pack of them) that ends in `state` has in an image; a Vec3 for kRgb.
+template <Output O, class S, class State>
+GSNAV_HD auto pixel_value(const RasterArgs<S>& args, const State& state) noexcept {
+  if constexpr (O == kRgb) {
+    return pixel_color(args, state);
+  } else if constexpr (O == kAlpha) {
+    return pixel_alpha(state);
+  } else if constexpr (O == kMedianDepth) {
+    return state.median;
+  } else if constexpr (O == kExpectedDepth) {
+    return pixel_expected_depth(args, state);
+  } else if constexpr (O == kAccumulatedDepth) {
+    return pixel_accumulated_depth(state);
+  } else {
+    static_assert(O == kFirstHitDepth);
+    return state.first_hit;
   }
 }
 
-/// Writes a finished pixel. color(image, value): writes its colour, as for for_each_image.
-template <class S, DepthMode D, class C>
-GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel, const BlendState<S, D>& state,
-                          const C& color) noexcept {
-  for_each_image<D>(args, color, [&](S* image, const auto& value) GSNAV_INLINED {
-    if (image != nullptr) image[pixel] = value(state);
-  });
+/// Calls f.operator()<Output>(image) for each image that a state of mode D has values for: null where it
+/// was not asked for.
+template <DepthMode D, class S, class F>
+GSNAV_HD void for_each_image(const FrameImages<S>& images, const F& f) noexcept {
+  f.template operator()<kRgb>(images.rgb);
+  f.template operator()<kAlpha>(images.alpha);
+  if constexpr (D != DepthMode::none) f.template operator()<kMedianDepth>(images.median_depth);
+  if constexpr (D == DepthMode::any) {
+    f.template operator()<kExpectedDepth>(images.expected_depth);
+    f.template operator()<kAccumulatedDepth>(images.accumulated_depth);
+    f.template operator()<kFirstHitDepth>(images.first_hit_depth);
+  }
 }
+
+/// Writes a finished pixel.
 template <class S, DepthMode D>
 GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
                           const BlendState<S, D>& state) noexcept {
-  write_pixel(args, pixel, state, [&](S* rgb, const auto& value) GSNAV_INLINED {
-    if (rgb == nullptr) return;
-    const Vec3<S> color = value(state);
-    for (int c = 0; c < 3; ++c) rgb[3 * pixel + static_cast<std::size_t>(c)] = color[c];
+  for_each_image<D>(args.images, [&]<Output O>(S* image) GSNAV_INLINED {
+    if (image == nullptr) return;
+    const auto value = pixel_value<O>(args, state);
+    if constexpr (O == kRgb) {
+      image[3 * pixel] = value.x;
+      image[3 * pixel + 1] = value.y;
+      image[3 * pixel + 2] = value.z;
+    } else {
+      image[pixel] = value;
+    }
   });
 }
 

@@ -331,16 +331,14 @@ class TileBlender {
         const BlockRow place(args_.grid, tile_x_ + x, tile_y_ + y, tile_x_ + tile_size_);
         // A small tile's rows are filled up with any block.
         const auto block = [&](int i) { return row + (x / kBlockWidth + i) % blocks; };
-        for_each_image<D>(
-            args_,
-            [&](float* image, const auto& value) {
-              if constexpr (Color) {
-                write_color(place, image, [&](int i) { return value(whole_state(block(i))); });
-              }
-            },
-            [&](float* image, const auto& value) {
-              write_plane(place, image, [&](int i) { return value(whole_state(block(i))); });
-            });
+        for_each_image<D>(args_.images, [&]<Output O>(float* image) {
+          const auto value = [&](int i) { return pixel_value<O>(args_, whole_state(block(i))); };
+          if constexpr (O != kRgb) {
+            write_plane(place, image, value);
+          } else if constexpr (Color) {
+            write_color(place, image, value);
+          }
+        });
       }
     }
   }
