@@ -152,7 +152,7 @@ int main(int argc, char** argv) {
     instances.push_back(scene.instance(mesh, {{}, world * Vec3d{0.1, 0.2, 2}, 1},
                                        static_cast<std::uint32_t>(instances.size())));
   }
-  std::printf("%dx%d, %zu Gaussians, %zu triangles\n", width, height, set.gaussians.size,
+  std::printf("%dx%d, %zu Gaussians, %zu triangles\n", width, height, set.gaussians.size(),
               instances.size() * scene.mesh(mesh).geometry.triangles.size());
 
   OpenMPBackend openmp;

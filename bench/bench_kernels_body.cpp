@@ -77,7 +77,7 @@ class Skinning {
     joints_.upload(joints.data(), joints.size());
     indices_.upload(indices.data(), indices.size());
     weights_.upload(weights.data(), weights.size());
-    const GaussianView view = arrays_.set().gaussians;
+    const ShapeRows view = arrays_.set().gaussians.shape;
     const auto output = [&] {
       out_.emplace_back(backend).resize_discard(n);
       return out_.back().view();

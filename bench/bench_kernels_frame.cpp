@@ -78,7 +78,7 @@ struct ShInput {
 
   ShInput(std::size_t n, int degree) : cloud(wall(n, degree)) {
     Rng rng(7);
-    const GaussianView view = cloud.view();
+    const ColorRows view = cloud.view().color;
     for (std::size_t i = 0; i < n; ++i) {
       deltas.push_back(
           vec_cast<float>(Vec3d{rng.uniform(-3, 3), rng.uniform(-3, 3), rng.uniform(1, 4)}));
@@ -98,7 +98,7 @@ struct ShBody {
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
     const ShInput input(kShItems, degree);
-    const GaussianView view = input.cloud.view();
+    const ColorRows view = input.cloud.view().color;
     std::vector<SplatColor<S>> colors(kShItems);
     const auto evaluate = [view, deltas = input.deltas.data(), out = colors.data(),
                            d = degree](std::size_t i) {
@@ -121,7 +121,7 @@ struct ShLanesBody {
     const ShInput input(kShItems, degree);
     const std::size_t n = kShItems,
                       coefficients = static_cast<std::size_t>(sh_coefficient_count(degree));
-    const GaussianView view = input.cloud.view();
+    const ColorRows view = input.cloud.view().color;
     std::vector<float> in(3 * coefficients * n), deltas(3 * n), colors(3 * n);
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t c = 0; c < 3; ++c) {
@@ -158,10 +158,11 @@ struct KeyBody {
   void operator()(benchmark::State& state, B& backend) const {
     const GaussianCloud cloud = wall(100000, 0);
     const std::size_t n = cloud.size();
-    const GaussianView view = cloud.view();
+    const GaussianRows rows = cloud.view();
+    const ShapeRows& view = rows.shape;
     const Camera camera = Camera::look_at({0.1, 0.2, -1}, {0, 0, 3}, {0, 1, 0}, 256, 256, 90);
     const auto projection64 = make_projection_camera<double>(camera, cloud.set());
-    const Vec3d offset = (view.origins.empty() ? Vec3d{} : view.origins[0]) - projection64.position;
+    const Vec3d offset = (rows.origins.empty() ? Vec3d{} : rows.origins[0]) - projection64.position;
     std::vector<S> depths(n);
     std::vector<std::uint32_t> codes(n);
     const auto depth64 = [&](std::size_t i) {

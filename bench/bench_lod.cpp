@@ -57,7 +57,7 @@ void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const
       GaussianSet whole = draw == LodDraw::photo ? LodCut::photo_set(cloud, choice) : cloud.set();
       const auto cell = visible != nullptr ? visible->cell_of(camera) : std::nullopt;
       View<const std::uint32_t> seen;
-      if (cell) seen = whole.gaussians.seen = visible->seen_from(*cell);
+      if (cell) seen = whole.selection.seen = visible->seen_from(*cell);
       const std::span<const GaussianSet> sets =
           draw == LodDraw::lod ? cut.select(camera, choice, {}, seen) : std::span(&whole, 1);
       RenderConfig rules = draw == LodDraw::lod ? lod_config(config, cut.stats()) : config;

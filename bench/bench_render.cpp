@@ -77,7 +77,7 @@ const std::vector<float>* axes_of_workload() {
   const GaussianCloud& cloud = workload().cloud;
   if (axes[0].empty()) {
     for (std::vector<float>& plane : axes) plane.resize(cloud.size());
-    const GaussianView view = cloud.set().gaussians;
+    const ShapeRows view = cloud.view().shape;
     for (std::size_t i = 0; i < cloud.size(); ++i) {
       const Mat3<float> rotation = rotation_matrix(quat_of(view, i));
       const Vec3<float> scales = scales_of(view, i);
@@ -150,8 +150,8 @@ void render_frames(benchmark::State& state, B& backend, const Variant& v, int wi
   const GaussianArrays<B> arrays(backend, v.cloud());
   std::vector<GaussianSet> sets{arrays.set()};
   if (v.axes) {
-    for (int k = 0; k < 9; ++k)
-      sets[0].gaussians.axes[k] = {axes_of_workload()[k].data(), axes_of_workload()[k].size()};
+    for (std::size_t k = 0; k < 9; ++k)
+      sets[0].gaussians.shape.axes.set(k, view_of(axes_of_workload()[k]));
   }
   Renderer<float, B> renderer(backend, v.config());
   Frames<float> frames;

@@ -153,7 +153,7 @@ void pose_crowd(benchmark::State& state) {
   for (std::size_t i = 0; i < kPeople; ++i) {
     people[i].joint_matrices(t, joints);
     const std::vector<Vec3d> centers = skinned_centers(*body, joints);
-    const GaussianView v = crowd.set(i).gaussians;
+    const ShapeRows v = crowd.set(i).gaussians.shape;
     for (std::size_t k = 0; k < centers.size(); ++k) {
       worst = std::max(worst, norm(vec_cast<double>(Vec3f{v.means[0][k], v.means[1][k], v.means[2][k]}) -
                                    centers[k]));

@@ -112,7 +112,7 @@ class FrameStages {
   void prepare_projection(const gsnav::Camera& camera) {
     const gsnav::GaussianSet set = arrays_.set();
     const gsnav::ProjectionRules rules = gsnav::projection_rules(config_);
-    project_ = gsnav::make_project_args<S>(camera, set, rules, config_.max_sh_degree);
+    project_ = gsnav::view_set<S>(camera, set, rules, config_.max_sh_degree);
     std::vector<gsnav::Vec3d> offsets;
     for (std::size_t o = 0; o < gsnav::origin_count(set.gaussians); ++o) {
       offsets.push_back(gsnav::origin_offset(project_, o));
@@ -184,7 +184,7 @@ class FrameStages {
   gsnav::Buffer<std::uint32_t, B> tile_splats_;
   gsnav::Buffer<gsnav::TileSpans, B> spans_;
   gsnav::Buffer<S, B> images_;
-  gsnav::ProjectArgs<S> project_;
+  gsnav::ViewedSet<S> project_;
   gsnav::ProjectOutputs<S> projected_;
   gsnav::BinArgs<S> bin_;
   std::uint64_t pairs_ = 0;

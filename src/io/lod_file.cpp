@@ -167,7 +167,7 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
           path.string() + ": was built of another scene, by other settings or by another version");
     }
     LodTree tree;
-    if (cloud.size() != 0 && cloud.chunk_bounds.size() != cloud.view().all_chunks()) {
+    if (cloud.size() != 0 && cloud.chunk_bounds.size() != cloud.view().chunk_count()) {
       return Status(Errc::invalid_argument, path.string() + ": the cloud is not in spatial order");
     }
     gsnav::detail::shape_lod(tree, cloud, settings);

@@ -149,7 +149,7 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
     }
     // Nothing is allocated that the file does not have.
     VisibleSets v;
-    v.cloud_chunks = cloud.view().all_chunks();
+    v.cloud_chunks = cloud.view().chunk_count();
     constexpr std::uint64_t kCell = sizeof(VisibleSets::Key) + sizeof(std::uint64_t);
     const std::uint64_t room = file.size() - sizeof header;
     const bool fits = header.cells <= room / kCell && header.words <= room / sizeof(std::uint32_t) &&

@@ -33,9 +33,9 @@ struct PlacedSet {
 
   /// False where the Gaussian is fainter than `min_opacity`, or not finite.
   bool read(std::size_t i, double min_opacity, Solid& s) const {
-    const GaussianView& g = set->gaussians;
+    const ShapeRows& g = set->gaussians.shape;
     s.opacity = static_cast<double>(opacity_of(g, i));
-    const Vec3d o = g.origin_ids.empty() ? Vec3d{} : g.origins[g.origin_ids[i]];
+    const Vec3d o = g.origin_ids.empty() ? Vec3d{} : set->gaussians.origins[g.origin_ids[i]];
     s.mean = set->world_from_asset * (o + vec_cast<double>(mean_of(g, i)));
     if (!(s.opacity >= min_opacity) || !is_finite(s.mean)) return false;
     const Vec3d scales = vec_cast<double>(scales_of(g, i));
@@ -52,7 +52,7 @@ void for_each_opaque(std::span<const GaussianSet> sets, double min_opacity, std:
   for (const GaussianSet& set : sets) {
     const PlacedSet placed(set);
     Solid s;
-    for (std::size_t i = 0; i < set.gaussians.size; ++i) {
+    for (std::size_t i = 0; i < set.gaussians.size(); ++i) {
       if (placed.read(i, min_opacity, s)) {
         f(s);
       } else {
@@ -292,7 +292,7 @@ struct TileLists {
     Splat splat;
     for (const GaussianSet& set : sets) {
       const PlacedSet placed(set);
-      for (std::size_t i = 0; i < set.gaussians.size; ++i) {
+      for (std::size_t i = 0; i < set.gaussians.size(); ++i) {
         reach.emplace_back();
         if (!placed.read(i, o.min_opacity, s)) {
           ++report.gaussians_faint;
@@ -338,7 +338,7 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
   for (const GaussianSet& set : sets) {
     placed.emplace_back(set);
     begins.push_back(total);
-    total += set.gaussians.size;
+    total += set.gaussians.size();
   }
   const double cut = o.sigmas * o.sigmas;
   const float least = static_cast<float>(-std::log1p(-o.solid_alpha));
@@ -541,7 +541,7 @@ Result<VoxelGrid> voxelise(const NavMeshSettings& settings, std::span<const Gaus
   if (!(columns <= 1)) return too_large(g, "NavMeshSettings.max_cells", settings.max_cells, columns, 2);
   if (Status s = check_grid(settings, {}, size); !s.ok()) return s;
   std::size_t rows = 0;
-  for (const GaussianSet& set : sets) rows += set.gaussians.size;
+  for (const GaussianSet& set : sets) rows += set.gaussians.size();
   if (rows >= std::numeric_limits<std::uint32_t>::max()) {
     return Status(Errc::invalid_argument, "NavMesh from Gaussians: " + std::to_string(rows) +
                                               " Gaussians are more than 2^32; crop the scene");

@@ -45,7 +45,7 @@ SkinnedPlanes<S, Out> skin_all(const gsnav::AvatarAsset& asset,
   for (const auto& m : joints) cast.push_back(gsnav::affine_cast<S>(m));
   SkinnedPlanes<S, Out> out;
   gsnav::SkinningArgs<S, Out> args;
-  const auto view = asset.cloud.view();
+  const gsnav::ShapeRows view = asset.cloud.view().shape;
   for (std::size_t k = 0; k < 3; ++k) {
     out.means[k].resize(asset.size());
     args.means[k] = view.means[k];

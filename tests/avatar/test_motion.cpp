@@ -199,11 +199,11 @@ TEST_CASE("actors check what they are made of") {
   CHECK(out.back().bone == out.size() - 1);
   SerialBackend backend;
   SkinnedGaussians<SerialBackend> skin(backend, person());
-  CHECK(skin.set().gaussians.size == 0);
+  CHECK(skin.set().gaussians.size() == 0);
   CHECK(skin.pose(actor, 6).ok());
-  CHECK(skin.set().gaussians.size == person()->size());
+  CHECK(skin.set().gaussians.size() == person()->size());
   CHECK(skin.pose(actor, 9).ok());
-  CHECK(skin.set().gaussians.size == 0);
+  CHECK(skin.set().gaussians.size() == 0);
   const AvatarActor other = AvatarActor::create(std::make_shared<const AvatarAsset>(*person())).value();
   CHECK_FALSE(skin.pose(other, 0).ok());
 }

@@ -58,7 +58,7 @@ TEST_CASE("a turned body of SH degree 3 looks as if the camera had gone around i
   SerialBackend backend;
   SkinnedGaussians<SerialBackend> skin(backend, asset);
   skin.pose(actor, 0).throw_if_error();
-  REQUIRE_FALSE(skin.set().gaussians.sh_rotations[0].empty());
+  REQUIRE_FALSE(skin.set().gaussians.color.rotations.empty());
 
   const Camera camera = Camera::look_at({0, 0, -3}, {0, 0, 0}, {0, 1, 0}, kSize, kSize, 50);
   Camera around = camera;
@@ -73,7 +73,7 @@ TEST_CASE("a turned body of SH degree 3 looks as if the camera had gone around i
   MESSAGE("max " << e.max);
   CHECK(e.max < 2e-5);
   GaussianSet naive = skin.set();
-  for (auto& v : naive.gaussians.sh_rotations) v = {};
+  naive.gaussians.color.rotations = {};
   CHECK(image_error(gsnav_test::render<double>(backend, {naive}, camera, config).rgb, b, 3).max > 0.05);
 }
 
@@ -130,8 +130,8 @@ TEST_CASE("a backend with memory of its own gives the same picture, and buffers 
   a.pose(actor, 1.5).throw_if_error();
   CHECK(toy.allocations == after_render);
   // Shared, not copied.
-  CHECK(b.set().gaussians.opacities.data == person()->cloud.opacities.data());
-  CHECK(b.set().gaussians.scales[0].data == person()->cloud.scales[0].data());
+  CHECK(b.set().gaussians.shape.opacities.data == person()->cloud.opacities.data());
+  CHECK(b.set().gaussians.shape.scales[0].data == person()->cloud.scales[0].data());
 }
 
 TEST_CASE("a person seen from the front is opaque: no holes at joints") {
@@ -197,7 +197,7 @@ TEST_CASE("an actor that no camera sees is not skinned, and no pixel changes by 
     const auto x = gsnav_test::render<float>(backend, {all.set()}, camera, config).rgb;
     const auto y = gsnav_test::render<float>(backend, {seen.set()}, camera, config).rgb;
     CHECK(x == y);
-    skipped += seen.set().gaussians.size == 0 ? 1 : 0;
+    skipped += seen.set().gaussians.size() == 0 ? 1 : 0;
   }
   CHECK(skipped >= 14);  // of the 20 that stand more than 30 degrees off; a body is wide
   CHECK(skipped <= 20);

@@ -297,16 +297,16 @@ TEST_CASE(
     const std::vector<AvatarActor> people{AvatarActor::create(plain).value(), actor};
     for (const auto& a : people) crowd.add(a.asset());
     crowd.pose(people, 0).throw_if_error();
-    for (const GaussianView& v : {alone.set().gaussians, crowd.set(1).gaussians}) {
+    for (const ShapeRows& v : {alone.set().gaussians.shape, crowd.set(1).gaussians.shape}) {
       for (std::size_t i = 0; i < asset.size(); ++i) {
         for (std::size_t k = 0; k < 3; ++k) REQUIRE(v.means[k][i] == want.means[k][i]);
         for (std::size_t k = 0; k < 4; ++k) REQUIRE(v.quats[k][i] == want.quats[k][i]);
         for (std::size_t k = 0; k < 9 && mode == Skinning::linear_stretched; ++k)
           REQUIRE(v.axes[k][i] == want.axes[k][i]);
       }
-      CHECK(v.axes[0].empty() == (mode != Skinning::linear_stretched));
+      CHECK(v.axes.empty() == (mode != Skinning::linear_stretched));
     }
-    CHECK(crowd.set(0).gaussians.axes[0].empty());
+    CHECK(crowd.set(0).gaussians.shape.axes.empty());
   }
   AvatarAsset asset = limb();
   asset.skinning = Skinning::linear_stretched;

@@ -88,28 +88,28 @@ inline const char* read_visible(const std::string& input) {
     v.ends = from.array<std::uint64_t>(v.keys.size());
     v.ends.resize(v.keys.size());
     v.bits = from.array<std::uint32_t>(rest.size());
-    v.cloud_chunks = cached_scene().view().all_chunks();
+    v.cloud_chunks = cached_scene().view().chunk_count();
     if (!io::save_visible_sets(path, v, cached_scene()).ok()) return "sets that could not be written";
   }
   const auto sets = io::load_visible_sets(path, cached_scene());
   if (!sets) return nullptr;
-  GaussianView view = cached_scene().view();
+  const std::size_t size = cached_scene().size(), chunks = cached_scene().view().chunk_count();
   for (std::size_t c = 0; c < sets->cells(); ++c) {
-    view.seen = sets->seen_from(c);
-    if (!view.seen_may_have(view.seen.size)) return "a cell with words of nothing";
+    const Selection view{{}, sets->seen_from(c)};
+    if (!seen_may_have(view.seen.size, chunks)) return "a cell with words of nothing";
     std::size_t rows = 0;
-    for (std::size_t chunk = 0; chunk < view.all_chunks(); ++chunk) {
+    for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
       if (!view.may_be_seen(chunk)) continue;
       for (std::size_t k = 0; k < kSeenRowWords; ++k) {
-        std::uint32_t word = view.seen_rows(chunk).word(k);
+        std::uint32_t word = view.seen_rows(chunks, chunk).word(k);
         for (std::size_t first = chunk * kProjectChunk + 32 * k; word != 0; word &= word - 1) {
           const std::size_t row = first + static_cast<std::size_t>(std::countr_zero(word));
-          if (view.has_seen_rows() && row >= view.size) return "a row that the scene does not have";
-          rows += row < view.size ? 1 : 0;
+          if (view.has_seen_rows(chunks) && row >= size) return "a row that the scene does not have";
+          rows += row < size ? 1 : 0;
         }
       }
     }
-    if (rows != sets->count_seen_rows(c, view.size)) return "rows that are counted otherwise";
+    if (rows != sets->count_seen_rows(c, size)) return "rows that are counted otherwise";
   }
   return nullptr;
 }

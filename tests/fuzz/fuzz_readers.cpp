@@ -155,7 +155,7 @@ void read_lod_set(const std::string& input) {
   bool ok = validate(levels->cloud.set()).ok() && validate(levels->tree.merged.set()).ok();
   for (const LodPlace& p : levels->tree.places) {
     const GaussianCloud& of = p.finer == LodPlace::kNone ? levels->cloud : levels->tree.merged;
-    ok = ok && p.first_chunk + p.chunks <= of.view().all_chunks() && p.rows <= p.chunks * kProjectChunk;
+    ok = ok && p.first_chunk + p.chunks <= of.view().chunk_count() && p.rows <= p.chunks * kProjectChunk;
   }
   for (const LodNode& n : levels->tree.nodes) ok = ok && is_finite(n.error) && n.error >= 0;
   if (!ok) stop("levels that do not fit their cloud");

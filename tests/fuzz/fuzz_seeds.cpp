@@ -210,7 +210,7 @@ void add_caches(Seeds& seeds) {
   sets.focal = 128;
   sets.near_plane = 0.2;
   sets.min_weight = 1e-3;
-  sets.cloud_chunks = cached_scene().view().all_chunks();
+  sets.cloud_chunks = cached_scene().view().chunk_count();
   sets.keys = {{-1, 0, 2}, {0, 0, 0}};
   sets.bits = {5, 3, 0};  // the second cell: chunks 0 and 1, of which rows follow
   for (std::uint32_t word = 0; word < 2 * kSeenRowWords; ++word)

@@ -37,10 +37,10 @@ Frames<S> CaseRenderer<S, B>::render_with(const GaussianCloud& cloud, const SetE
   Arrays<B> more(*backend_);
   GaussianSet set = arrays.set();
   for (std::size_t k = 0; k < 4 && !extras.sh_rotations[0].empty(); ++k) {
-    set.gaussians.sh_rotations[k] = more.in(extras.sh_rotations[k]);
+    set.gaussians.color.rotations.set(k, more.in(extras.sh_rotations[k]));
   }
   for (std::size_t k = 0; k < 9 && !extras.axes[0].empty(); ++k)
-    set.gaussians.axes[k] = more.in(extras.axes[k]);
+    set.gaussians.shape.axes.set(k, more.in(extras.axes[k]));
   Renderer<S, B> renderer(*backend_, config);
   return renderer.render(set, camera).value();
 }

@@ -66,7 +66,7 @@ std::vector<SampleResult> project_samples(const gsnav::Camera& camera, const gsn
                  load([](const Sample& s) { return s.quat[1]; }),
                  load([](const Sample& s) { return s.quat[2]; }),
                  load([](const Sample& s) { return s.quat[3]; })};
-    if constexpr (std::is_same_v<S, double>) normalize(quat);  // as detail::load_axes does
+    if constexpr (std::is_same_v<S, double>) normalize(quat);  // as row_axes does
     const auto axes = splat_axes(projection.rotation, position, quat, scales);
     const auto p =
         project<L, L>(projection, axes, position.z, load([](const Sample& s) { return s.opacity; }));

@@ -25,12 +25,16 @@ class RecordMaker {
 
   /// Returns whether Gaussian i is drawn at all; its records hold until the next call.
   bool project(std::size_t i) {
-    gsnav::ProjectArgs<S> args = args_;
-    gsnav::GaussianView& g = args.gaussians;
+    gsnav::ViewedSet<S> args = args_;
+    gsnav::ShapeRows& g = args.gaussians.shape;
     g.size = 1;
-    for (auto& p : g.means) p = {p.data + i, 1};
-    for (auto& p : g.quats) p = {p.data + i, 1};
-    for (auto& p : g.scales) p = {p.data + i, 1};
+    const auto only_row = [i](auto& planes) {
+      for (auto& plane : planes.data) plane += i;
+      planes.size = 1;
+    };
+    only_row(g.means);
+    only_row(g.quats);
+    only_row(g.scales);
     g.opacities = {g.opacities.data + i, 1};
     args.offsets = {&offset_, 1};
     gsnav::ProjectOutputs<S> out;
@@ -48,7 +52,7 @@ class RecordMaker {
   const gsnav::SplatBounds& bounds() const { return bounds_; }
 
  private:
-  gsnav::ProjectArgs<S> args_;
+  gsnav::ViewedSet<S> args_;
   gsnav::Vec3d offset_;
   gsnav::SplatGeometry<S> geometry_;
   gsnav::SplatPerspective<S> perspective_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// N62: shapes that are no rotated ellipsoids' (GaussianView::axes): any factor has a covariance.
+// N62: shapes that are no rotated ellipsoids' (ShapeRows::axes): any factor has a covariance.
 #include <doctest/doctest.h>
 
 #include "hard_cases/arrays.hpp"

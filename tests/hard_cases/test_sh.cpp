@@ -85,7 +85,7 @@ TEST_CASE("N38_sh_constants") {
 
 TEST_CASE("N39_sh_dir_zero") {
   const GaussianCloud cloud = coloured(39, 0.3);
-  const GaussianView view = cloud.view();
+  const ColorRows view = cloud.view().color;
   const auto check = [&]<class S>(S) {
     for (std::size_t i = 0; i < cloud.size(); ++i) {
       const SplatColor<S> forward = gaussian_color<S>(view, 3, i, {S(0), S(0), S(1)});

@@ -155,8 +155,8 @@ TEST_CASE("N55_lbs_rigid_far") {
       skinned.pose(actor, 0).throw_if_error();
       const GaussianSet set = skinned.set();
       std::vector<float> mean[3];
-      for (int k = 0; k < 3; ++k) {
-        const View<const float>& v = set.gaussians.means[k];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const View<const float> v = set.gaussians.shape.means[k];
         mean[k] = arrays.fetch(View<float>{const_cast<float*>(v.data), v.size});
       }
       double worst = 0;
@@ -227,14 +227,15 @@ TEST_CASE("a crowd is skinned as each of its actors alone, bit for bit") {
     for (std::size_t i = 0; i < people.size(); ++i) {
       SkinnedGaussians<B> alone(renderer.backend(), people[i].asset());
       REQUIRE(alone.pose(people[i], 0.5).ok());
-      const GaussianView a = crowd.set(i).gaussians, b = alone.set().gaussians;
-      REQUIRE(a.size == (i == 2 ? 0 : people[i].asset()->size()));
-      REQUIRE(a.size == b.size);
+      const GaussianRows a = crowd.set(i).gaussians, b = alone.set().gaussians;
+      REQUIRE(a.size() == (i == 2 ? 0 : people[i].asset()->size()));
+      REQUIRE(a.size() == b.size());
       if (i == 2) continue;
       CHECK(crowd.set(i).world_from_asset.translation.x == 1.0 * static_cast<double>(i));
-      for (int k = 0; k < 3; ++k) CHECK(fetch(a.means[k]) == fetch(b.means[k]));
-      for (int k = 0; k < 4; ++k) CHECK(fetch(a.quats[k]) == fetch(b.quats[k]));
-      for (int k = 0; k < 4; ++k) CHECK(fetch(a.sh_rotations[k]) == fetch(b.sh_rotations[k]));
+      for (std::size_t k = 0; k < 3; ++k) CHECK(fetch(a.shape.means[k]) == fetch(b.shape.means[k]));
+      for (std::size_t k = 0; k < 4; ++k) CHECK(fetch(a.shape.quats[k]) == fetch(b.shape.quats[k]));
+      for (std::size_t k = 0; k < 4; ++k)
+        CHECK(fetch(a.color.rotations[k]) == fetch(b.color.rotations[k]));
     }
     const std::vector<AvatarActor> swapped{people[1], people[0], people[2], people[3], people[4]};
     CHECK(crowd.pose(swapped, 0.5).message().find("place 0") != std::string::npos);

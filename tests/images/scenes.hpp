@@ -25,8 +25,8 @@ struct Stored {
   std::shared_ptr<const gsnav::PackedCloud> packed{};
   std::shared_ptr<const gsnav::TemporalCloud> moving{};  ///< drawn as it is at 0.4 s, on host backends
   gsnav::Similarity place{};
-  bool as_factors = false;            ///< shapes by GaussianView::axes in place of quats and scales
-  std::vector<std::uint32_t> seen{};  ///< GaussianView::seen
+  bool as_factors = false;            ///< shapes by ShapeRows::axes in place of quats and scales
+  std::vector<std::uint32_t> seen{};  ///< Selection::seen
 };
 
 /// What is drawn, and how.
@@ -88,8 +88,8 @@ class SceneThere {
                                             : std::make_unique<GaussianArrays<B>>(backend_, *s.cloud));
       set = arrays_.back()->set(s.place);
     }
-    if (s.as_factors) give_factors(*s.cloud, set.gaussians);
-    if (!s.seen.empty()) set.gaussians.seen = there(words_, s.seen);
+    if (s.as_factors) give_factors(*s.cloud, set.gaussians.shape);
+    if (!s.seen.empty()) set.selection.seen = there(words_, s.seen);
     return set;
   }
   gsnav::GaussianSet load_moving(const gsnav::TemporalCloud& cloud, const gsnav::Similarity& place) {
@@ -103,15 +103,15 @@ class SceneThere {
       return {};
     }
   }
-  void give_factors(const gsnav::GaussianCloud& cloud, gsnav::GaussianView& view) {
-    const gsnav::GaussianView rows = cloud.view();
+  void give_factors(const gsnav::GaussianCloud& cloud, gsnav::ShapeRows& shape) {
+    const gsnav::ShapeRows rows = cloud.view().shape;
     for (std::size_t k = 0; k < 9; ++k) {
       std::vector<float> plane(rows.size);
       for (std::size_t i = 0; i < rows.size; ++i) {
         plane[i] = gsnav::rotation_matrix(gsnav::quat_of(rows, i)).row[k / 3][static_cast<int>(k % 3)] *
                    rows.scales[k % 3][i];
       }
-      view.axes[k] = there(floats_, plane);
+      shape.axes.set(k, there(floats_, plane));
     }
   }
   /// A copy in the backend's memory.

@@ -266,7 +266,7 @@ TEST_CASE("lod set: the levels of a damaged set fit their cloud, or it is refuse
     ++taken;
     for (const LodPlace& p : got->tree.places) {
       const GaussianCloud& of = p.finer == LodPlace::kNone ? got->cloud : got->tree.merged;
-      CHECK(p.first_chunk + p.chunks <= of.view().all_chunks());
+      CHECK(p.first_chunk + p.chunks <= of.view().chunk_count());
       CHECK(p.rows <= p.chunks * kProjectChunk);
     }
     for (const LodNode& n : got->tree.nodes) CHECK((n.error >= 0 && is_finite(n.error)));

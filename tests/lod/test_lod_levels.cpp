@@ -46,7 +46,7 @@ TEST_CASE(
   const LeveledCloud set = joined();
   REQUIRE(set.tree.levels() == 4);
   REQUIRE(set.tree.roots.size() == 16);
-  REQUIRE(set.tree.cloud_chunks() == set.cloud.view().all_chunks());
+  REQUIRE(set.tree.cloud_chunks() == set.cloud.view().chunk_count());
   std::vector<int> seen(set.cloud.size());
   std::size_t real = 0;
   for (std::size_t node = 0; node < set.tree.leaves(); ++node) {
@@ -162,7 +162,7 @@ TEST_CASE("lod levels: any cut shows each box in view once, and the same for any
     LodChoice choice;
     choice.pixels = std::exp(rng.uniform(-2, 3));
     static_cast<void>(cut.select(camera, choice));
-    std::vector<int> leaf(set.cloud.view().all_chunks()), merged(set.tree.merged.view().all_chunks());
+    std::vector<int> leaf(set.cloud.view().chunk_count()), merged(set.tree.merged.view().chunk_count());
     for (const std::uint32_t c : cut.leaf_chunks()) ++leaf[c];
     for (const std::uint32_t c : cut.merged_chunks()) ++merged[c];
     const auto p = make_projection_camera<double>(camera, LodCut::photo_set(set.cloud, choice));
@@ -241,7 +241,7 @@ TEST_CASE(
             level.push_back(set.tree.places[n].first_chunk + c);
         }
         GaussianSet one = LodCut::photo_set(coarsest == 0 ? set.cloud : set.tree.merged, choice);
-        one.gaussians.drawn_chunks = {level.data(), level.size()};
+        one.selection.drawn_chunks = {level.data(), level.size()};
         CAPTURE(z);
         CAPTURE(x);
         CAPTURE(pixels);
@@ -272,7 +272,7 @@ TEST_CASE("lod levels: boxes without a level, and what makes no sense") {
   const LeveledCloud set = join_levels(backend, levels, 20).value();
   CHECK(set.tree.roots.size() == 15);
   CHECK(set.tree.nodes.size() == 15 * 4 - 3 - 1);
-  CHECK(set.tree.cloud_chunks() == set.cloud.view().all_chunks());
+  CHECK(set.tree.cloud_chunks() == set.cloud.view().chunk_count());
   const auto refused = [&](std::vector<LodLevel> bad, std::size_t boxes, const char* part) {
     const auto result = join_levels(backend, std::move(bad), boxes);
     CAPTURE(result.message());

@@ -104,9 +104,9 @@ void check_dropped(Cloud cloud, int most, std::size_t bytes_a_number, double uns
   SceneProfile profile = profile_scene(cloud, unseen);
   drop_bands(cloud, profile);
   const std::size_t kept = static_cast<std::size_t>(3 * ((most + 1) * (most + 1) - 1));
-  const GaussianView v = cloud.view();
-  CHECK(v.sh_degree == most);
-  CHECK(v.shN.size + v.shN_half.size + v.packed.shN.size == kept * n);
+  const ColorRows v = cloud.view().color;
+  CHECK(v.degree == most);
+  CHECK(v.shN.size + v.shN_half.size + v.shN_codes.size == kept * n);
   CHECK(profile.bytes_let_go == (45 - kept) * n * bytes_a_number);
   CHECK(whole.bytes() - cloud.bytes() == profile.bytes_let_go);
   std::size_t unneeded = 0;
@@ -206,8 +206,9 @@ TEST_CASE("scene profile: no colour changes by more than the bound (N69)") {
   for (int run = 0; run < 20000; ++run) {
     const std::size_t i = rng.next() % cloud.size();
     const Vec3d direction{rng.normal(), rng.normal(), rng.normal()};
-    const auto all = gaussian_color<double>(set.gaussians, 3, i, direction);
-    const auto some = gaussian_color<double>(set.gaussians, set.gaussians.degree_of(i, 3), i, direction);
+    const auto all = gaussian_color<double>(set.gaussians.color, 3, i, direction);
+    const auto some =
+        gaussian_color<double>(set.gaussians.color, set.gaussians.color.degree_of(i, 3), i, direction);
     worst =
         std::max({worst, std::abs(all.r - some.r), std::abs(all.g - some.g), std::abs(all.b - some.b)});
   }

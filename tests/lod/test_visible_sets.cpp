@@ -59,7 +59,7 @@ Camera random_camera(Rng& rng) {
 
 GaussianSet seen_set(const GaussianCloud& cloud, const VisibleSets& sets, std::size_t cell) {
   GaussianSet s = cloud.set();
-  s.gaussians.seen = sets.seen_from(cell);
+  s.selection.seen = sets.seen_from(cell);
   return s;
 }
 
@@ -131,7 +131,7 @@ TEST_CASE(
     const std::vector<std::uint32_t> words = seen_words(may);
     const GaussianCloud rest = only_seen(cloud, may);
     GaussianSet set = cloud.set();
-    set.gaussians.seen = {words.data(), words.size()};
+    set.selection.seen = {words.data(), words.size()};
     const double yaw = rng.uniform(0, 6.3);
     const Camera camera =
         Camera::look_at({0, 0, 0}, {std::cos(yaw), 0.2, std::sin(yaw)}, {0, 1, 0}, 60, 44, 80);
@@ -162,9 +162,9 @@ TEST_CASE(
     return Renderer<float, SerialBackend>(serial, {})
         .render(set, Camera::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 8, 8, 80));
   };
-  set.gaussians.seen = {words.data(), words.size()};
+  set.selection.seen = {words.data(), words.size()};
   CHECK(render().status().ok());
-  set.gaussians.seen.size = words.size() - 1;
+  set.selection.seen.size = words.size() - 1;
   CHECK(render().code() == Errc::invalid_argument);
   CHECK(contains(render().message(), "seen"));
 }
@@ -185,16 +185,15 @@ TEST_CASE("visible sets: rows in runs hold what single ones do, and chunks are t
   for (std::size_t c = 0; c < chunks.cells(); ++c) {
     REQUIRE(chunks.seen_from(c).size == words);
     REQUIRE(ones.seen_from(c).size == 2 * words + kSeenRowWords * chunks.count_seen(c));
-    GaussianView a = rooms().view(), b = rooms().view();
-    a.seen = ones.seen_from(c);
-    b.seen = runs.seen_from(c);
+    const Selection a{{}, ones.seen_from(c)}, b{{}, runs.seen_from(c)};
     std::size_t rows = 0;
     for (std::size_t chunk = 0; chunk < chunks.cloud_chunks; ++chunk) {
       const bool seen = (chunks.seen_from(c)[chunk / 32] >> (chunk % 32) & 1) != 0;
       CHECK(a.may_be_seen(chunk) == seen);
       CHECK(b.may_be_seen(chunk) == seen);
       if (!seen) continue;
-      const SeenRows of_ones = a.seen_rows(chunk), of_runs = b.seen_rows(chunk);
+      const SeenRows of_ones = a.seen_rows(chunks.cloud_chunks, chunk),
+                     of_runs = b.seen_rows(chunks.cloud_chunks, chunk);
       const std::size_t size = std::min(kProjectChunk, rooms().size() - chunk * kProjectChunk);
       for (std::size_t r = 0; r < kProjectChunk; ++r) {
         bool any = false;
@@ -256,13 +255,13 @@ TEST_CASE("visible sets: a further viewpoint takes nothing away, and adds") {
   REQUIRE(at != both.keys.end());
   REQUIRE(*at == one.keys[0]);
   const std::size_t cell = static_cast<std::size_t>(at - both.keys.begin());
-  GaussianView a = rooms().view(), b = rooms().view();
-  a.seen = one.seen_from(0);
-  b.seen = both.seen_from(cell);
+  const Selection a{{}, one.seen_from(0)}, b{{}, both.seen_from(cell)};
+  const std::size_t chunks = rooms().view().chunk_count();
   std::size_t more = 0;
   for (std::size_t i = 0; i < rooms().size(); ++i) {
-    const auto seen = [i](const GaussianView& v) {
-      return v.may_be_seen(i / kProjectChunk) && v.seen_rows(i / kProjectChunk).has(i % kProjectChunk);
+    const auto seen = [i, chunks](const Selection& v) {
+      return v.may_be_seen(i / kProjectChunk) &&
+             v.seen_rows(chunks, i / kProjectChunk).has(i % kProjectChunk);
     };
     if (seen(a)) CHECK(seen(b));
     more += !seen(a) && seen(b) ? 1 : 0;
@@ -298,7 +297,7 @@ TEST_CASE("visible sets: of a placed cloud in its own frame") {
   config.outputs = kRgb;
   Renderer<float, OpenMPBackend> renderer(backend, config);
   GaussianSet part = rooms().set(placed);
-  part.gaussians.seen = sets.seen_from(*cell);
+  part.selection.seen = sets.seen_from(*cell);
   CHECK(psnr(renderer.render(rooms().set(placed), camera).value().rgb,
              renderer.render(part, camera).value().rgb) > 60);
 }
@@ -417,9 +416,9 @@ TEST_CASE("a cut of what is seen: every chunk that is seen once, nothing that sh
   Rng rng(8);
   for (int i = 0; i < 20; ++i) {
     const Camera camera = random_camera(rng);
-    std::vector<std::uint32_t> bits((shown.view().all_chunks() + 31) / 32), list;
+    std::vector<std::uint32_t> bits((shown.view().chunk_count() + 31) / 32), list;
     const double share = i % 2 == 0 ? 0.3 : 0.02;
-    for (std::uint32_t c = 0; c < shown.view().all_chunks(); ++c) {
+    for (std::uint32_t c = 0; c < shown.view().chunk_count(); ++c) {
       if (rng.uniform(0, 1) >= share) continue;
       list.push_back(c);
       bits[c / 32] |= 1u << (c % 32);

@@ -163,13 +163,13 @@ TEST_CASE("at_time: a moment drawn by its chunks is the moment as a cloud of its
   TemporalGaussians<SerialBackend> moving(serial, scene);
   for (const double t : {-0.5, 0.75}) {
     REQUIRE(moving.set_time(t).ok());
-    const GaussianView v = moving.set().gaussians;
+    const GaussianRows v = moving.set().gaussians;
     REQUIRE(v.chunk_bounds.size == v.chunk_count());
-    for (std::size_t i = 0; i < v.size; ++i) {
-      if (!(v.opacities[i] > 0)) continue;
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      if (!(v.shape.opacities[i] > 0)) continue;
       const ChunkBounds& b = v.chunk_bounds[i / kProjectChunk];
-      const double x = static_cast<double>(v.means[0][i]);
-      CHECK((x >= b.low.x && x <= b.high.x && v.opacities[i] <= b.opacity_max));
+      const double x = static_cast<double>(v.shape.means[0][i]);
+      CHECK((x >= b.low.x && x <= b.high.x && v.shape.opacities[i] <= b.opacity_max));
     }
     const GaussianCloud cloud = cloud_at(scene, t);
     const auto got = render<float>(serial, {moving.set()}, camera),

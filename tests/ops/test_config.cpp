@@ -169,13 +169,14 @@ TEST_CASE("bad sets name their array") {
     change(set);
     return error_of(set, Camera{}, {});
   };
-  CHECK(names(message([](GaussianSet& s) { s.gaussians.means[1].size = 3; }), "means"));
-  CHECK(names(message([](GaussianSet& s) { s.gaussians.quats[3] = {}; }), "quats"));
-  CHECK(names(message([](GaussianSet& s) { s.gaussians.sh_degree = 4; }), "sh_degree"));
-  CHECK(names(message([](GaussianSet& s) { s.gaussians.sh_degree = 1; }), "shN"));
+  CHECK(names(message([](GaussianSet& s) { s.gaussians.shape.means.size = 3; }), "means"));
+  CHECK(names(message([](GaussianSet& s) { s.gaussians.shape.quats.set(3, {}); }), "quats"));
+  CHECK(names(message([](GaussianSet& s) { s.gaussians.color.degree = 4; }), "color.degree = 4"));
+  CHECK(names(message([](GaussianSet& s) { s.gaussians.color.degree = 1; }), "shN"));
   CHECK(names(message([](GaussianSet& s) { s.eps2d = 0; }), "eps2d"));
-  CHECK(names(message([](GaussianSet& s) { s.gaussians.means[1].data = nullptr; }), "means is null"));
-  CHECK(names(message([](GaussianSet& s) { s.gaussians.sh0.data = nullptr; }), "sh0 is null"));
+  CHECK(names(message([](GaussianSet& s) { s.gaussians.shape.means.data[1] = nullptr; }),
+              "means is null"));
+  CHECK(names(message([](GaussianSet& s) { s.gaussians.color.sh0.data = nullptr; }), "sh0 is null"));
   CHECK(names(message([](GaussianSet& s) { s.gaussians.row_ids = {nullptr, 10}; }), "row_ids is null"));
   CHECK(names(message([](GaussianSet& s) { s.filter = static_cast<Filter>(99); }), "filter = 99"));
   CHECK(names(message([](GaussianSet& s) { s.color_space = static_cast<ColorSpace>(99); }),

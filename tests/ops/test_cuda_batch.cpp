@@ -101,7 +101,7 @@ TEST_CASE("cuda batch: what only some sets or cameras have is in images of colou
   const GaussianArrays<CudaBackend> arrays(cuda, cloud), on_mip(cuda, filtered), on_far(cuda, far);
   // Each Gaussian's bands turned by as much as its shape.
   GaussianSet turned = arrays.set();
-  for (int k = 0; k < 4; ++k) turned.gaussians.sh_rotations[k] = arrays.set().gaussians.quats[k];
+  turned.gaussians.color.rotations = arrays.set().gaussians.shape.quats;
   enum class Has { nothing, mip, origins, rotations, near_sigma, distance };
   for (const Has has :
        {Has::nothing, Has::mip, Has::origins, Has::rotations, Has::near_sigma, Has::distance}) {
@@ -157,14 +157,14 @@ TEST_CASE("cuda batch: a list of the chunks to draw is a cloud of those chunks")
   sort_spatially(cloud);
   const GaussianArrays<CudaBackend> arrays(cuda, cloud);
   std::vector<std::uint32_t> drawn;
-  for (std::uint32_t c = 0; c < cloud.view().all_chunks(); ++c) {
+  for (std::uint32_t c = 0; c < cloud.view().chunk_count(); ++c) {
     if (c % 3 != 1 && c != 5) drawn.push_back(c);
   }
   Buffer<std::uint32_t, CudaBackend> list(cuda);
   list.resize_discard(drawn.size());
   list.upload(drawn.data(), drawn.size());
   GaussianSet set = arrays.set();
-  set.gaussians.drawn_chunks = {list.data(), drawn.size()};
+  set.selection.drawn_chunks = {list.data(), drawn.size()};
   // By hand: what is not drawn is too faint to be.
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const auto c = static_cast<std::uint32_t>(i / kProjectChunk);

@@ -115,8 +115,8 @@ TEST_CASE("cuda batch: bounds of parts do not show") {
       bare_a(cuda, without_bounds(a)), bare_b(cuda, without_bounds(b)), chunks_b(cuda, only_chunks);
   // Every other chunk, the last in part one of them.
   std::vector<std::uint32_t> drawn;
-  for (std::uint32_t i = 0; i < b.view().all_chunks(); ++i) {
-    if (i % 2 == (b.view().all_chunks() - 1) % 2) drawn.push_back(i);
+  for (std::uint32_t i = 0; i < b.view().chunk_count(); ++i) {
+    if (i % 2 == (b.view().chunk_count() - 1) % 2) drawn.push_back(i);
   }
   Buffer<std::uint32_t, CudaBackend> list(cuda);
   list.upload(drawn.data(), drawn.size());
@@ -125,7 +125,7 @@ TEST_CASE("cuda batch: bounds of parts do not show") {
   placed.scale = 0.7;
   const auto sets_of = [&](const auto& of_a, const auto& of_b) {
     GaussianSet cut = of_b.set(placed);
-    cut.gaussians.drawn_chunks = {list.data(), drawn.size()};
+    cut.selection.drawn_chunks = {list.data(), drawn.size()};
     return std::vector<GaussianSet>{of_a.set(), cut, on_c.set()};
   };
   std::uint64_t parts_read = 0, of_chunks = 0;
@@ -170,7 +170,7 @@ TEST_CASE(
   sort_spatially(a);
   sort_spatially(b);
   const GaussianArrays<CudaBackend> on_a(cuda, a), on_b(cuda, b);
-  const std::size_t words = (a.view().all_chunks() + 31) / 32;
+  const std::size_t words = (a.view().chunk_count() + 31) / 32;
   Rng rng(6);
   for (const int count : {1, 5, 40}) {
     CAPTURE(count);
@@ -212,7 +212,7 @@ TEST_CASE(
     check_same(got.frames, want);
     // The generic path, of the first camera.
     GaussianSet alone = on_a.set();
-    alone.gaussians.seen = seen[0][0];
+    alone.selection.seen = seen[0][0];
     check_same(singly(cuda, {alone, on_b.set()}, {cameras[0]}, {}, {}, kAll),
                draw_batch(cuda, renderer, {alone, on_b.set()}, {cameras[0]}, {}, kAll, false).frames);
     const BatchCamera short_list{cameras[0], {}, {}, std::span(seen[0]).first(1)};

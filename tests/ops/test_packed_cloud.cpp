@@ -174,7 +174,7 @@ TEST_CASE("packed clouds: chunks by a list are those of the floats, whatever its
   const std::vector<std::uint32_t> list{7, 2, 11, 0};
   on_backends([&](auto& backend) {
     const auto drawn = [&](GaussianSet set) {
-      set.gaussians.drawn_chunks = {list.data(), list.size()};
+      set.selection.drawn_chunks = {list.data(), list.size()};
       return render<float>(backend, {set}, kCamera);
     };
     const auto got = drawn(packed.set()), want = drawn(floats.set());
@@ -256,13 +256,15 @@ TEST_CASE("packed clouds: planes that do not fit are named") {
     CHECK(s.message().find(part) != std::string::npos);
   };
   CHECK(validate(packed.set()).ok());
-  refused([](GaussianView& v) { --v.packed.codes.size; }, "packed.codes");
-  refused([](GaussianView& v) { v.packed.codes.size = 7 * v.size; }, "packed.codes");
-  refused([](GaussianView& v) { --v.packed.chunks.size; }, "packed.chunks");
-  refused([](GaussianView& v) { --v.packed.sh0.size; }, "packed.sh0");
-  refused([](GaussianView& v) { v.packed.shN.size -= 3; }, "packed.shN");
-  refused([](GaussianView& v) { v.packed.shN = {}; }, "shN has 0");
-  refused([](GaussianView& v) { v.packed = {}; }, "means");
+  refused([](GaussianRows& v) { --v.shape.codes.size; }, "shape.codes");
+  refused([](GaussianRows& v) { v.shape.codes.size = 7 * v.size(); }, "shape.codes");
+  refused([](GaussianRows& v) { --v.shape.chunks.size; }, "shape.chunks");
+  refused([](GaussianRows& v) { --v.color.sh0_half.size; }, "color.sh0_half");
+  refused([](GaussianRows& v) { v.color.shN_codes.size -= 3; }, "color.shN_codes");
+  refused([](GaussianRows& v) { --v.color.chunks.size; }, "color.chunks");
+  refused([](GaussianRows& v) { v.color.shN_codes = {}; }, "color.shN has 0");
+  refused([](GaussianRows& v) { v.color.sh0_half = {}; }, "color.shN_codes (without sh0_half)");
+  refused([](GaussianRows& v) { v.shape.codes = {}; }, "shape.means");
   const PackedCloud none = pack_cloud(GaussianCloud{});
   CHECK(none.size() == 0);
   CHECK(validate(none.set()).ok());

@@ -52,11 +52,11 @@ struct Banded {
 };
 
 /// What a set of degree `degree` holds of N Gaussians.
-void check_held(const GaussianView& v, int degree) {
-  CHECK(v.sh_degree == degree);
-  const std::size_t numbers = 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1) * v.size;
-  CHECK(v.shN.size + v.shN_half.size == numbers);
-  CHECK(v.chunk_sh_degrees.size == v.all_chunks());
+void check_held(const GaussianRows& v, int degree) {
+  CHECK(v.color.degree == degree);
+  const std::size_t numbers = 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1) * v.size();
+  CHECK(v.color.shN.size + v.color.shN_half.size == numbers);
+  CHECK(v.color.chunk_degrees.size == v.chunk_count());
 }
 
 }  // namespace

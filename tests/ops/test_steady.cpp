@@ -135,9 +135,9 @@ TEST_CASE(
       return renderer.render(std::span(&set, 1), views).value();
     };
     GaussianSet without_color = cloud().set(), base_only = cloud().set();
-    without_color.gaussians.sh0 = no_sh0.view(3 * n);
-    without_color.gaussians.shN = no_shN.view(45 * n);
-    base_only.gaussians.shN = no_shN.view(45 * n);
+    without_color.gaussians.color.sh0 = no_sh0.view(3 * n);
+    without_color.gaussians.color.shN = no_shN.view(45 * n);
+    base_only.gaussians.color.shN = no_shN.view(45 * n);
     RenderConfig config;
     for (const unsigned outputs : {+kAlpha, +kMedianDepth, kAlpha | kAnyDepth}) {
       config.outputs = outputs;

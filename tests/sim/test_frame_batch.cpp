@@ -53,7 +53,7 @@ class BatchOfToys {
       std::vector<GaussianSet> seen;
       for (const std::uint32_t s : cameras[c].sets) seen.push_back(sets[s]);
       for (std::size_t s = 0; s < cameras[c].seen.size(); ++s)
-        seen[s].gaussians.seen = cameras[c].seen[s];
+        seen[s].selection.seen = cameras[c].seen[s];
       const std::size_t pixels =
           static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
       FrameImages<float> to = images.floats;

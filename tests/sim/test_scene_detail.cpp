@@ -202,7 +202,7 @@ TEST_CASE(
     sets.assign(chosen.begin(), chosen.end());
   } else {
     sets.push_back(by_hand.sets(0)[0]);
-    sets[0].gaussians.seen = visible->seen_from(*cell);
+    sets[0].selection.seen = visible->seen_from(*cell);
   }
   for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
   RenderConfig rules = lod_config({}, levels ? cut.stats() : LodStats{});

@@ -10,7 +10,7 @@
 
 namespace gsnav_test {
 
-/// A GaussianView::seen of the rows of which `may` is true.
+/// A Selection::seen of the rows of which `may` is true.
 inline std::vector<std::uint32_t> seen_words(const std::vector<bool>& may) {
   const std::size_t chunks = (may.size() + gsnav::kProjectChunk - 1) / gsnav::kProjectChunk;
   const std::size_t words = (chunks + 31) / 32;

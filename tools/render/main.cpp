@@ -170,7 +170,7 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
         here = sets;
       } else if (const auto cell = scene.visible->cell_of(cameras[c])) {
         seen_here = whole_here;
-        seen_here.gaussians.seen = scene.visible->seen_from(*cell);
+        seen_here.selection.seen = scene.visible->seen_from(*cell);
         here = std::span(&seen_here, 1);
       }
       renderer.set_config(details.rules(config));

@@ -52,7 +52,7 @@ Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s
   if (s.profile == "visible") {
     const auto cell = scene_.visible->cell_of(c);
     out.cell_known = cell.has_value();
-    if (cell) set.gaussians.seen = scene_.visible->seen_from(*cell);
+    if (cell) set.selection.seen = scene_.visible->seen_from(*cell);
   }
   Renderer<float, B> renderer(backend, render_config(s, cloud.sort_order));
   const Result<const LodTree*> tree = tree_of(s);

@@ -87,7 +87,7 @@ struct FloatSkinning {
   SkinningArgs<float> args;
 
   explicit FloatSkinning(const AvatarAsset& asset) {
-    const GaussianView v = asset.cloud.view();
+    const ShapeRows v = asset.cloud.view().shape;
     for (std::size_t k = 0; k < 3; ++k) {
       means[k].resize(asset.size());
       args.means[k] = v.means[k];

@@ -27,7 +27,7 @@ struct ModeSkinning {
   SkinningArgs<S, S> args;
 
   explicit ModeSkinning(const AvatarAsset& asset) {
-    const GaussianView v = asset.cloud.view();
+    const ShapeRows v = asset.cloud.view().shape;
     for (auto& p : planes) p.resize(asset.size());
     for (std::size_t k = 0; k < 3; ++k)
       args.means[k] = v.means[k], args.means_out[k] = view_of(planes[k]);

@@ -20,7 +20,7 @@ inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
 /// A set seen by a camera. Instances of a set are neighbours; those of a camera are listed by
 /// camera_instances, in order of first_rank.
 struct BatchInstance {
-  ProjectArgs<float> args;
+  ViewedSet<float> args;
   std::uint32_t camera;
 };
 
@@ -250,7 +250,7 @@ __device__ inline const BatchInstance& instance_of(const BatchArgs& a, std::uint
 /// What decides between equal keys.
 __device__ inline std::uint32_t rank_of(const BatchArgs& a, std::uint32_t camera, std::uint32_t slot) {
   const std::uint32_t source = a.sources[slot];
-  const ProjectArgs<float>& args = instance_of(a, camera, source).args;
+  const ViewedSet<float>& args = instance_of(a, camera, source).args;
   const View<const std::uint32_t>& rows = args.gaussians.row_ids;
   return rows.empty() ? source : args.first_rank + rows[source - args.first_rank];
 }

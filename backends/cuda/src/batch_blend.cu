@@ -198,29 +198,24 @@ __global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor)
 }
 
 /// Out of line: few need it, and all would pay for its registers.
-__device__ __noinline__ void depth_record64(const ProjectArgs<float>& args, std::size_t row, float key,
-                                            const Vec3<float>& mean, std::size_t origin,
-                                            SplatDepth<float>& depth) {
+__device__ __noinline__ void depth_record64(const ViewedSet<float>& args, const ViewedRow& row,
+                                            const RowKey<float>& key, SplatDepth<float>& depth) {
   Splat splat;
-  make_splat64(args, true, row, key, mean, origin, splat);
+  make_splat64(args.camera64, true, row, key, splat);
   depth = splat.depth;
 }
 
 /// What the depth of a slot's Gaussian is made of.
 __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t camera, std::uint32_t slot) {
   const std::uint32_t source = a.sources[slot];
-  const ProjectArgs<float>& args = instance_of(a, camera, source).args;
-  const GaussianView& gs = args.gaussians;
-  const std::size_t row = source - args.first_rank;
-  const std::size_t origin = gs.origin_ids.empty() ? 0 : gs.origin_ids[row];
-  const Vec3<float> mean{gs.means[0][row], gs.means[1][row], gs.means[2][row]};
-  const float z = gsnav::detail::depth_of(args, mean, origin);
-  const SplatAxes<float> axes =
-      gsnav::detail::load_axes(gs, args.camera, gsnav::detail::camera_delta(args, mean, origin), row);
-  const Projected<float> p = project<float, float>(args.camera, axes, z, gs.opacities[row]);
-  if (!gsnav::detail::needs_double(args.camera, p)) return make_splat_depth(args.camera, axes, p);
+  const ViewedSet<float>& args = instance_of(a, camera, source).args;
+  const ViewedRow row({args.gaussians.shape, source - args.first_rank}, args.offsets);
+  const RowKey<float> key = row_key<float>(args.camera64, row);
+  const SeenRow<float> seen(args.camera, row, key);
+  if (!gsnav::detail::needs_double(args.camera, seen.splat))
+    return make_splat_depth(args.camera, seen.axes, seen.splat);
   SplatDepth<float> depth;
-  depth_record64(args, row, gsnav::detail::sort_key(args, z, mean, origin), mean, origin, depth);
+  depth_record64(args, row, key, depth);
   return depth;
 }
 

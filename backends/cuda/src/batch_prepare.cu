@@ -49,7 +49,7 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
                  "meshes that are seen through (MeshAlpha::blend): draw them one camera at a time");
     }
     std::uint64_t gaussians = 0;
-    const auto count = [&](std::size_t s) { gaussians += sets[s].gaussians.size; };
+    const auto count = [&](std::size_t s) { gaussians += sets[s].gaussians.size(); };
     for (const std::uint32_t s : cameras[c].sets) {
       if (s >= sets.size()) {
         return bad(Errc::invalid_argument, "sets has " + std::to_string(s) + ", but there are " +
@@ -67,11 +67,12 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
                                              std::to_string(listed) + " sets");
     }
     for (std::size_t i = 0; i < seen.size(); ++i) {
-      const GaussianView& g = sets[cameras[c].sets.empty() ? i : cameras[c].sets[i]].gaussians;
-      if (!seen[i].empty() && !g.seen_may_have(seen[i].size)) {
+      const std::size_t chunks =
+          sets[cameras[c].sets.empty() ? i : cameras[c].sets[i]].gaussians.chunk_count();
+      if (!seen[i].empty() && !seen_may_have(seen[i].size, chunks)) {
         return bad(Errc::invalid_argument, "seen[" + std::to_string(i) + "] has " +
                                                std::to_string(seen[i].size) + " words for " +
-                                               std::to_string(g.all_chunks()) + " chunks");
+                                               std::to_string(chunks) + " chunks");
       }
     }
     if (gaussians > std::numeric_limits<std::uint32_t>::max()) {
@@ -182,9 +183,9 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
     std::uint32_t rank = 0;
     std::size_t place = 0;
     const auto see = [&](std::uint32_t s) {
-      const auto bits = cameras[c].seen.empty() ? sets[s].gaussians.seen : cameras[c].seen[place++];
+      const auto bits = cameras[c].seen.empty() ? sets[s].selection.seen : cameras[c].seen[place++];
       seen.push_back({s, c, rank, bits});
-      rank += static_cast<std::uint32_t>(sets[s].gaussians.size);
+      rank += static_cast<std::uint32_t>(sets[s].gaussians.size());
       ++set_begins[s + 1];
       origins += origin_count(sets[s].gaussians);
     };
@@ -205,9 +206,9 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
                            std::all_of(cameras.begin(), cameras.end(),
                                        [](const BatchCamera& c) { return c.camera.near_sigma == 0; }) &&
                            std::all_of(sets.begin(), sets.end(), [](const GaussianSet& s) {
-                             return s.filter == Filter::classic && s.gaussians.axes[0].empty() &&
-                                    s.gaussians.sh_rotations[0].empty() &&
-                                    s.gaussians.origin_ids.empty();
+                             return s.filter == Filter::classic && s.gaussians.shape.axes.empty() &&
+                                    s.gaussians.color.rotations.empty() &&
+                                    s.gaussians.shape.origin_ids.empty();
                            });
   const std::size_t at_plain = layout.add<cuda::PlainCamera>(plain_rules ? seen.size() : 0);
   const std::size_t at_first = layout.add<std::uint32_t>(cameras.size() + 1);
@@ -240,9 +241,9 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
     ++first[seen[i].camera + 1];
     BatchInstance instance{};
     instance.camera = seen[i].camera;
-    ProjectArgs<float>& to = instance.args;
-    to = make_project_args<float>(camera, set, rules, config.max_sh_degree);
-    to.gaussians.seen = seen[i].bits;
+    ViewedSet<float>& to = instance.args;
+    to = view_set<float>(camera, set, rules, config.max_sh_degree);
+    to.selection.seen = seen[i].bits;
     to.first_rank = seen[i].first_rank;
     to.offsets = {device(static_cast<Vec3d*>(nullptr), at_offsets) + origin,
                   origin_count(set.gaussians)};
@@ -258,13 +259,13 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
   args = {};
   args.color = images.floats.rgb != nullptr || images.rgb8 != nullptr;
   args.seen_rows = std::any_of(seen.begin(), seen.end(), [&](const Seen& v) {
-    return v.bits.size > sets[v.set].gaussians.seen_words();
+    return v.bits.size > seen_chunk_words(sets[v.set].gaussians.chunk_count());
   });
   item_capacity = 0;
   for (std::size_t s = 0; s < sets.size(); ++s) {
     BatchSet& u = units[s];
     u = {args.units, set_begins[s], set_begins[s + 1] - set_begins[s],
-         static_cast<std::uint32_t>(sets[s].gaussians.chunk_count())};
+         static_cast<std::uint32_t>(sets[s].drawn_chunk_count())};
     if (u.instances == 0) continue;
     item_capacity += std::uint64_t{u.words()} * u.chunks * cuda::kPartsPerChunk;
     args.units += u.units();
@@ -287,7 +288,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
   const int width = cameras[0].camera.width, height = cameras[0].camera.height;
   args.grid = TileGrid::of(width, height, cuda::kBatchTile);
   std::uint64_t gaussians = 0;
-  for (const Seen& v : seen) gaussians += sets[v.set].gaussians.size;
+  for (const Seen& v : seen) gaussians += sets[v.set].gaussians.size();
   const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, multiprocessors);
   if (few) args.grid = TileGrid::of(width, height, cuda::kSmallTile);
   const std::uint64_t tiles = args.cameras * std::uint64_t{args.grid.count()};

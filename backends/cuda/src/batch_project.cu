@@ -14,11 +14,13 @@ constexpr unsigned kWarpsPerPart = kChunkPart / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
 /// Whether part `part` of the chunk may have visible Gaussians: by bounds of its own, or by the chunk's.
-__device__ bool part_is_candidate(const ProjectArgs<float>& args, std::size_t chunk, unsigned part) {
-  const GaussianView& gs = args.gaussians;
+__device__ bool part_is_candidate(const ViewedSet<float>& args, std::size_t chunk, unsigned part) {
+  const GaussianRows& gs = args.gaussians;
   const std::size_t at = chunk * kPartsPerChunk + part;
-  if (at * kChunkPart >= gs.size || !gs.may_be_seen(chunk) || !gs.seen_rows(chunk).any_of_part(part))
+  if (at * kChunkPart >= gs.size() || !args.selection.may_be_seen(chunk) ||
+      !args.seen_rows(chunk).any_of_part(part)) {
     return false;
+  }
   if (gs.chunk_bounds.empty()) return true;
   return may_be_visible(args.camera64,
                         gs.part_bounds.empty() ? gs.chunk_bounds[chunk] : gs.part_bounds[at]);
@@ -28,12 +30,12 @@ __device__ bool part_is_candidate(const ProjectArgs<float>& args, std::size_t ch
 /// chunk is at the edge of its view those that the lanes find together, four for each such instance.
 __device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t chunk, bool seen) {
   const unsigned lane = threadIdx.x % 32;
-  const GaussianView& gs = instances[0].args.gaussians;
-  const std::size_t rows = gs.size - chunk * kProjectChunk;
+  const GaussianRows& gs = instances[0].args.gaussians;
+  const std::size_t rows = gs.size() - chunk * kProjectChunk;
   const unsigned all =
       (1u << (rows < kProjectChunk ? (rows + kChunkPart - 1) / kChunkPart : kPartsPerChunk)) - 1;
   unsigned parts = seen ? all : 0;
-  if (seen) parts &= instances[lane].args.gaussians.seen_rows(chunk).parts();
+  if (seen) parts &= instances[lane].args.seen_rows(chunk).parts();
   unsigned edges =
       __ballot_sync(kAll, seen && !gs.part_bounds.empty() &&
                               !lies_in_view(instances[lane].args.camera64, gs.chunk_bounds[chunk]));
@@ -58,7 +60,7 @@ __device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t ch
 
 /// Chunk c of those that are drawn: the same for all instances of a set.
 __device__ std::uint32_t chunk_of(const BatchInstance& instance, std::uint32_t c) {
-  return static_cast<std::uint32_t>(instance.args.gaussians.chunk_id(c));
+  return static_cast<std::uint32_t>(instance.args.selection.chunk_id(c));
 }
 
 /// A warp a unit: the lanes are instances, or where these are few parts and instances.
@@ -210,28 +212,29 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
   for (; half < halves; half += gridDim.x * kProjectWarps) {
     const BatchItem item = next;
     next = item_of(half + gridDim.x * kProjectWarps);
-    const GaussianView& gs = a.instances[item.first_instance].args.gaussians;
+    const GaussianRows& gs = a.instances[item.first_instance].args.gaussians;
+    const std::size_t size = gs.size();
     const std::size_t first = item.part * kChunkPart + half % kWarpsPerPart * 32;  // row of lane 0
-    const unsigned existing = first >= gs.size        ? 0u
-                              : gs.size - first >= 32 ? kAll
-                                                      : (1u << (gs.size - first)) - 1u;
+    const unsigned existing = first >= size        ? 0u
+                              : size - first >= 32 ? kAll
+                                                   : (1u << (size - first)) - 1u;
     // Of the lane's instance.
     unsigned mine = 0;
     if constexpr (SomeRows) {
       if ((item.mask >> lane & 1u) != 0) {
         mine = existing & a.instances[item.first_instance + lane]
-                              .args.gaussians.seen_rows(first / kProjectChunk)
+                              .args.seen_rows(first / kProjectChunk)
                               .word(first % kProjectChunk / 32);
       }
       if (!__any_sync(kAll, mine != 0)) continue;
     }
-    const LaneRow read = read_row<PlainRules>(gs, first + lane);
+    const LaneRow read = read_row<PlainRules>(gs.shape, first + lane);
     // Instances of a set are drawn to one degree.
     const int degree =
-        gs.degree_of(item.part * kChunkPart, a.instances[item.first_instance].args.sh_degree);
+        gs.color.degree_of(item.part * kChunkPart, a.instances[item.first_instance].args.sh_degree);
     bool has_sh = !a.color || degree == 0 || existing == 0;
     __syncwarp();  // all lanes are done with the rows before
-    if (!has_sh) ask_for_sh(gs, degree, first, rows);
+    if (!has_sh) ask_for_sh(gs.color, size, degree, first, rows);
     keep_row(read, rows);
     // Of lanes that `exist`: row first + at for an instance. All lanes call it together.
     const auto draw_row = [&](bool exists, std::uint32_t index, unsigned at) {
@@ -263,8 +266,8 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
         }
       } else {
         const BatchInstance& instance = a.instances[index];
-        const ProjectArgs<float>& args = instance.args;
-        const InstanceRow from({rows, at}, {{gs, exists ? row : 0}, args.offsets});
+        const ViewedSet<float>& args = instance.args;
+        const InstanceRow from({rows, at}, {{gs.shape, exists ? row : 0}, args.offsets});
         key = row_key<float>(args.camera64, from);
         camera_index = instance.camera;
         if (exists && key.z > args.camera.near_plane) {
@@ -305,9 +308,10 @@ __global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_ke
         } else {
           first_rank = a.instances[index].args.first_rank;
         }
-        write_record<Plain, Room>(a, of, first_rank + static_cast<std::uint32_t>(row), splat,
-                                  a.color ? row_color<PlainRules>(gs, degree, first, at, rows, key.delta)
-                                          : SplatColor<float>{});
+        write_record<Plain, Room>(
+            a, of, first_rank + static_cast<std::uint32_t>(row), splat,
+            a.color ? row_color<PlainRules>(gs.color, degree, first, at, rows, key.delta)
+                    : SplatColor<float>{});
       }
       if constexpr (Room) {
         pairs.put(a, {code, slot});
@@ -352,15 +356,15 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
     const HardSplat h = a.hard[i];
     if (h.slot == kNoSlot) continue;
     const BatchInstance& instance = a.instances[h.instance];
-    const ProjectArgs<float>& args = instance.args;
-    const GaussianView& gs = args.gaussians;
-    const ViewedRow row({gs, h.row}, args.offsets);
+    const ViewedSet<float>& args = instance.args;
+    const ColorRows& sh = args.gaussians.color;
+    const ViewedRow row({args.gaussians.shape, h.row}, args.offsets);
     const RowKey<float> key = row_key<float>(args.camera64, row);
     Splat splat;
     if (make_splat64(args.camera64, a.depths != nullptr, row, key, splat)) {
       SplatColor<float> color;
       if (a.color)
-        color = gaussian_color<float>(gs, gs.degree_of(h.row, args.sh_degree), h.row, key.delta);
+        color = gaussian_color<float>(sh, sh.degree_of(h.row, args.sh_degree), h.row, key.delta);
       const SplatKey of{h.slot, args.camera.key_code(sort_key(args.camera64, key)), instance.camera};
       const std::uint32_t source = args.first_rank + h.row;
       const bool counted = a.list_room == 0;

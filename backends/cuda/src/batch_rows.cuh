@@ -28,17 +28,15 @@ struct LaneRow {
 /// Of row `row`, or the first where there is none. Nothing is stored in between, nor decided: behind
 /// either, reads would be waited for one after the other.
 template <bool PlainRules>
-__device__ inline LaneRow read_row(const GaussianView& gs, std::size_t row) {
-  const std::size_t at = row < gs.size ? row : 0;
-  const bool has_axes = !PlainRules && !gs.axes[0].empty();
-  const auto of = [&](const View<const float>& plane) {
-    return (has_axes ? gs.means[0].data : plane.data)[at];
-  };
+__device__ inline LaneRow read_row(const ShapeRows& rows, std::size_t row) {
+  const std::size_t at = row < rows.size ? row : 0;
+  const bool has_axes = !PlainRules && !rows.axes.empty();
+  const auto of = [&](const float* plane) { return (has_axes ? rows.means.data[0] : plane)[at]; };
   LaneRow r;
-  for (int k = 0; k < 3; ++k) r.mean[k] = gs.means[k].data[at];
-  r.opacity = gs.opacities.data[at];
-  for (int k = 0; k < 4; ++k) r.quat[k] = of(gs.quats[k]);
-  for (int k = 0; k < 3; ++k) r.scales[k] = of(gs.scales[k]);
+  for (int k = 0; k < 3; ++k) r.mean[k] = rows.means.data[k][at];
+  r.opacity = rows.opacities.data[at];
+  for (int k = 0; k < 4; ++k) r.quat[k] = of(rows.quats.data[k]);
+  for (int k = 0; k < 3; ++k) r.scales[k] = of(rows.scales.data[k]);
   return r;
 }
 
@@ -64,21 +62,21 @@ __device__ inline void copy_async(T* to, const T* from, unsigned n) {
   }
 }
 
-/// ask_for_sh for the bands up to `degree` of each row, `rest` values apart, of which no others are
-/// read.
-__device__ __noinline__ inline void ask_for_bands(const GaussianView& gs, int degree, unsigned rest,
+/// ask_for_sh for the bands up to `degree` of each row, of which no others are read.
+__device__ __noinline__ inline void ask_for_bands(const ColorRows& sh, std::size_t size, int degree,
                                                   std::size_t first, WarpRows& to) {
-  const unsigned rows = static_cast<unsigned>(gs.size - first < 32 ? gs.size - first : 32),
+  const unsigned rows = static_cast<unsigned>(size - first < 32 ? size - first : 32),
                  lane = threadIdx.x % 32;
   const unsigned kept = static_cast<unsigned>(3 * (sh_coefficient_count(degree) - 1));
+  const unsigned rest = static_cast<unsigned>(sh.rest());
   const std::size_t begin = rest * first;
   for (unsigned row = 0; row < rows; ++row) {
     if (lane >= kept) continue;  // at most 24 of degree 2
     const std::size_t from = begin + rest * row + lane;
-    if (gs.shN_half.empty()) {
-      __pipeline_memcpy_async(to.sh + kept * row + lane, gs.shN.data + from, sizeof(float));
+    if (sh.shN_half.empty()) {
+      __pipeline_memcpy_async(to.sh + kept * row + lane, sh.shN.data + from, sizeof(float));
     } else {
-      to.sh_half[kept * row + lane] = gs.shN_half.data[from];
+      to.sh_half[kept * row + lane] = sh.shN_half.data[from];
     }
   }
   __pipeline_commit();
@@ -86,15 +84,15 @@ __device__ __noinline__ inline void ask_for_bands(const GaussianView& gs, int de
 
 /// Asks for the coefficients of rows `first` (lane 0) on, up to `degree` >= 1; they are there after
 /// wait_for_sh.
-__device__ inline void ask_for_sh(const GaussianView& gs, int degree, std::size_t first, WarpRows& to) {
-  const std::size_t rest = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
-  if (degree < gs.sh_degree) return ask_for_bands(gs, degree, static_cast<unsigned>(rest), first, to);
-  const std::size_t rows = gs.size - first < 32 ? gs.size - first : 32;
+__device__ inline void ask_for_sh(const ColorRows& sh, std::size_t size, int degree, std::size_t first,
+                                  WarpRows& to) {
+  if (degree < sh.degree) return ask_for_bands(sh, size, degree, first, to);
+  const std::size_t rest = sh.rest(), rows = size - first < 32 ? size - first : 32;
   const unsigned n = static_cast<unsigned>(rest * rows);
-  if (gs.shN_half.empty()) {
-    copy_async(to.sh, gs.shN.data + rest * first, n);
+  if (sh.shN_half.empty()) {
+    copy_async(to.sh, sh.shN.data + rest * first, n);
   } else {
-    const std::uint16_t* const from = gs.shN_half.data + rest * first;
+    const std::uint16_t* const from = sh.shN_half.data + rest * first;
     copy_async(to.sh_half, from, n & ~1u);
     if (n % 2 != 0 && threadIdx.x % 32 == 0) to.sh_half[n - 1] = from[n - 1];
   }
@@ -108,19 +106,20 @@ __device__ inline void wait_for_sh() {
 
 /// Colour of row first + at after wait_for_sh; `degree` as it was asked for.
 template <bool PlainRules>
-__device__ inline SplatColor<float> row_color(const GaussianView& gs, int degree, std::size_t first,
+__device__ inline SplatColor<float> row_color(const ColorRows& sh, int degree, std::size_t first,
                                               unsigned at, const WarpRows& rows,
                                               const Vec3<float>& delta) {
-  GaussianView v;  // of the warp's rows
-  v.sh_degree = degree;
-  v.sh0 = {gs.sh0.data + 3 * first, 3 * 32};
-  if (gs.shN_half.empty()) {
+  ColorRows v;  // of the warp's rows
+  v.degree = degree;
+  v.sh0 = {sh.sh0.data + 3 * first, 3 * 32};
+  if (sh.shN_half.empty()) {
     v.shN = {rows.sh, 1};
   } else {
     v.shN_half = {rows.sh_half, 1};
   }
-  if (!PlainRules && !gs.sh_rotations[0].empty()) {
-    for (int k = 0; k < 4; ++k) v.sh_rotations[k] = {gs.sh_rotations[k].data + first, 32};
+  if (!PlainRules && !sh.rotations.empty()) {
+    for (std::size_t k = 0; k < 4; ++k) v.rotations.data[k] = sh.rotations.data[k] + first;
+    v.rotations.size = 32;
   }
   return gaussian_color<float>(v, degree, at, delta);
 }

@@ -250,7 +250,7 @@ struct CudaBatchRenderer::State {
   // Reused by every call.
   struct Seen {
     std::uint32_t set, camera, first_rank;
-    View<const std::uint32_t> bits;  ///< GaussianView::seen
+    View<const std::uint32_t> bits;  ///< Selection::seen
   };
   std::vector<Seen> seen;  ///< camera by camera
   std::vector<std::uint32_t> set_begins, cursors;

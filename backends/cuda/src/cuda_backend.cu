@@ -149,8 +149,8 @@ bool CudaBackend::sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::ui
   return k.Current() == keys_alt;
 }
 
-void CudaBackend::run(stage::Project, const ProjectArgs<float>& args, const ProjectOutputs<float>& out) {
-  if (!usable() || args.gaussians.size == 0) return;
+void CudaBackend::run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out) {
+  if (!usable() || args.gaussians.size() == 0) return;
   cuda::project_kernel<<<static_cast<unsigned>(args.chunk_count()), cuda::kProjectThreads, 0, stream_>>>(
       args, out);
   note(cudaGetLastError(), "the projection");

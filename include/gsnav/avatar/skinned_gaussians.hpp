@@ -27,7 +27,7 @@ class AvatarArrays {
   AvatarArrays(B& backend, std::shared_ptr<const AvatarAsset> asset)
       : asset_(std::move(asset)), indices_(backend), weights_(backend) {
     set_ = asset_->cloud.set();
-    GaussianView& v = set_.gaussians;
+    GaussianRows& v = set_.gaussians;
     args_.influences = asset_->influences;
     args_.joint_indices = view_of(asset_->joint_indices);
     args_.weights = view_of(asset_->skinning_weights);
@@ -36,12 +36,19 @@ class AvatarArrays {
         floats_.emplace_back(backend).upload(from.data, from.size);
         from = {floats_.back().data(), from.size};
       };
-      for (auto& p : v.means) to_device(p);
-      for (auto& p : v.quats) to_device(p);
-      for (auto& p : v.scales) to_device(p);
-      to_device(v.opacities);
-      to_device(v.sh0);
-      to_device(v.shN);
+      const auto planes_to_device = [&](auto& planes) {
+        for (std::size_t k = 0; k < std::size(planes.data); ++k) {
+          View<const float> plane = planes[k];
+          to_device(plane);
+          planes.data[k] = plane.data;
+        }
+      };
+      planes_to_device(v.shape.means);
+      planes_to_device(v.shape.quats);
+      planes_to_device(v.shape.scales);
+      to_device(v.shape.opacities);
+      to_device(v.color.sh0);
+      to_device(v.color.shN);
       indices_.upload(args_.joint_indices.data, args_.joint_indices.size);
       args_.joint_indices = std::as_const(indices_).view();
       weights_.upload(args_.weights.data, args_.weights.size);
@@ -53,10 +60,10 @@ class AvatarArrays {
         floats_.emplace_back(backend).upload(args_.weight_gradients.data, args_.weight_gradients.size);
         args_.weight_gradients = {floats_.back().data(), args_.weight_gradients.size};
       }
-      for (std::size_t k = 0; k < 3; ++k) args_.scales[k] = v.scales[k];
+      for (std::size_t k = 0; k < 3; ++k) args_.scales[k] = v.shape.scales[k];
     }
-    for (std::size_t k = 0; k < 3; ++k) args_.means[k] = v.means[k];
-    for (std::size_t k = 0; k < 4; ++k) args_.quats[k] = v.quats[k];
+    for (std::size_t k = 0; k < 3; ++k) args_.means[k] = v.shape.means[k];
+    for (std::size_t k = 0; k < 4; ++k) args_.quats[k] = v.shape.quats[k];
   }
 
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
@@ -94,14 +101,15 @@ class SkinnedGaussians {
         set_(arrays_->set()),
         joints_(backend),
         dual_joints_(backend) {
-    GaussianView& v = set_.gaussians;
-    for (std::size_t k = 0; k < 3; ++k) v.means[k] = args_.means_out[k] = output(v.size);
+    ShapeRows& v = set_.gaussians.shape;
+    ColorRows& color = set_.gaussians.color;
+    for (std::size_t k = 0; k < 3; ++k) v.means.set(k, args_.means_out[k] = output(v.size));
     for (std::size_t k = 0; k < 4; ++k) {
-      v.quats[k] = args_.quats_out[k] = output(v.size);
-      if (v.sh_degree >= 1) v.sh_rotations[k] = args_.rotations_out[k] = output(v.size);
+      v.quats.set(k, args_.quats_out[k] = output(v.size));
+      if (color.degree >= 1) color.rotations.set(k, args_.rotations_out[k] = output(v.size));
     }
     if (this->asset()->skinning == Skinning::linear_stretched) {
-      for (std::size_t k = 0; k < 9; ++k) v.axes[k] = args_.axes_out[k] = output(v.size);
+      for (std::size_t k = 0; k < 9; ++k) v.axes.set(k, args_.axes_out[k] = output(v.size));
     }
   }
 

@@ -25,7 +25,7 @@
 namespace gsnav {
 
 template <class S>
-struct ProjectArgs;
+struct ViewedSet;
 template <class S>
 struct ProjectOutputs;
 template <class S>
@@ -94,7 +94,7 @@ struct Each {
 /// slices of depth (detail/render/depth_slices.hpp).
 struct Project {
   template <Backend B, class S>
-  static void generic(B& backend, const ProjectArgs<S>& args, const ProjectOutputs<S>& out) {
+  static void generic(B& backend, const ViewedSet<S>& args, const ProjectOutputs<S>& out) {
     backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args, out});
   }
 };

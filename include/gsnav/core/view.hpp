@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <type_traits>
 
@@ -31,6 +32,34 @@ struct View {
 template <class C>
 auto view_of(C& c) noexcept -> View<std::remove_pointer_t<decltype(c.data())>> {
   return {c.data(), c.size()};
+}
+
+/// K arrays of one length, as kernels see them.
+template <class T, std::size_t K>
+struct Planes {
+  T* data[K]{};
+  std::size_t size = 0;  ///< of each; kUnequal where the arrays differ
+
+  static constexpr std::size_t kUnequal = static_cast<std::size_t>(-1);
+
+  GSNAV_HD constexpr View<T> operator[](std::size_t k) const noexcept { return {data[k], size}; }
+  GSNAV_HD constexpr bool empty() const noexcept { return size == 0; }
+  /// Array k. The first one that is set gives the length.
+  GSNAV_HD constexpr void set(std::size_t k, const View<T>& plane) noexcept {
+    bool first = true;
+    for (std::size_t i = 0; i < K; ++i) first = first && (i == k || data[i] == nullptr);
+    data[k] = plane.data;
+    size = first || size == plane.size ? plane.size : kUnequal;
+  }
+};
+
+/// Planes of K contiguous containers.
+template <class C, std::size_t K>
+auto planes_of(const std::array<C, K>& c) noexcept
+    -> Planes<std::remove_pointer_t<decltype(c[0].data())>, K> {
+  Planes<std::remove_pointer_t<decltype(c[0].data())>, K> out;
+  for (std::size_t k = 0; k < K; ++k) out.set(k, view_of(c[k]));
+  return out;
 }
 
 }  // namespace gsnav

@@ -29,7 +29,7 @@ Status with_oracle_scene(B& backend, std::span<const GaussianSet> sets, const Ca
   std::size_t total = 0;
   for (const GaussianSet& set : sets) {
     if (Status s = gsnav::validate(set); !s) return s;
-    total += set.gaussians.size;
+    total += set.gaussians.size();
   }
   if (total > std::numeric_limits<std::uint32_t>::max()) {
     return {Errc::unsupported, "more than 2^32 Gaussians in one render"};

@@ -44,16 +44,6 @@ struct PackedChunk {
   float sh_steps[3]{};        ///< coefficient of band 1, 2, 3: step code, where these have 8 bits
 };
 
-/// Read-only packed rows: 20 bytes a Gaussian and its bands.
-struct PackedRows {
-  static constexpr int kScales = 0, kQuats = 3, kOpacity = 6, kMeans = 7, kPlanes = 10;
-  View<const std::uint16_t> codes;  ///< [10][N], planes in that order; [7][N] where means are floats
-  View<const std::uint16_t> sh0;    ///< [N][3], binary16
-  View<const std::int8_t>
-      shN;  ///< [N][(degree+1)^2 - 1][3], or empty: shN or shN_half of the view has them
-  View<const PackedChunk> chunks;  ///< [ceil(N / kProjectChunk)]
-};
-
 /// Words of 32 bits, one a row, that a chunk takes.
 inline constexpr std::size_t kSeenRowWords = kProjectChunk / 32;
 
@@ -77,31 +67,75 @@ struct SeenRows {
   }
 };
 
+/// Where N Gaussians are, how large and how opaque they are: what geometry is computed from. Metres, in
+/// the asset's own frame. One of three encodings holds the shapes: quats and scales; axes; codes.
+struct ShapeRows {
+  std::size_t size = 0;           ///< N
+  Planes<const float, 3> means;   ///< x, y, z offsets from the row's origin
+  Planes<const float, 4> quats;   ///< w, x, y, z of unit length
+  Planes<const float, 3> scales;  ///< standard deviations >= 0
+  /// Shapes that are no rotated ellipsoids' (a skinned Gaussian's blended axes): [3 r + c] is row r,
+  /// column c of the factor M, Sigma = M M^T. Without quats and scales, or in place of them.
+  Planes<const float, 9> axes;
+  View<const float> opacities;           ///< in [0, 1], [N]
+  View<const std::uint32_t> origin_ids;  ///< [N] into GaussianRows::origins, or empty: all 0
+  /// Packed shapes and opacities, [10][N]: kScales, kQuats, kOpacity, kMeans. [7][N] where means are
+  /// floats. Without quats, scales and opacities. Host memory only.
+  View<const std::uint16_t> codes;
+  View<const PackedChunk> chunks;  ///< what codes stand for, [ceil(N / kProjectChunk)]
+
+  static constexpr int kScales = 0, kQuats = 3, kOpacity = 6, kMeans = 7, kCodePlanes = 10;
+
+  /// Whether shapes and opacities are packed. False in device code.
+  GSNAV_HD bool packed() const noexcept { return GSNAV_DEVICE_CODE == 0 && !codes.empty(); }
+  /// Chunks that the rows make.
+  GSNAV_HD std::size_t chunk_count() const noexcept {
+    return (size + kProjectChunk - 1) / kProjectChunk;
+  }
+};
+
+/// The SH coefficients of N Gaussians. One of three encodings holds them: floats; floats and halves;
+/// packed.
+struct ColorRows {
+  int degree = 0;         ///< 0 to 3
+  View<const float> sh0;  ///< [N][3], the degree-0 coefficients
+  View<const float> shN;  ///< [N][(degree+1)^2 - 1][3], empty for degree 0
+  /// The same as IEEE binary16 (detail/math/half.hpp), in place of shN.
+  View<const std::uint16_t> shN_half;
+  /// Packed degree-0 coefficients as binary16, [N][3], in place of sh0. Host memory only.
+  View<const std::uint16_t> sh0_half;
+  /// Packed bands, [N][(degree+1)^2 - 1][3], in place of shN and shN_half. Beside sh0_half only.
+  View<const std::int8_t> shN_codes;
+  View<const PackedChunk> chunks;  ///< steps of shN_codes, [ceil(N / kProjectChunk)]
+  /// Rotation of each Gaussian since training (w, x, y, z), or empty: the view direction is turned back
+  /// by it before SH is evaluated. Of skinned sets of degree >= 1.
+  Planes<const float, 4> rotations;
+  /// Highest SH degree that the Gaussians of a chunk use, one a chunk (detail/scene/scene_profile.hpp):
+  /// bands above it are not read. In the backend's memory. Empty: degree.
+  View<const std::uint8_t> chunk_degrees;
+
+  /// Whether degree-0 coefficients are packed. False in device code.
+  GSNAV_HD bool packed() const noexcept { return GSNAV_DEVICE_CODE == 0 && !sh0_half.empty(); }
+  /// Values of a row above degree 0.
+  GSNAV_HD std::size_t rest() const noexcept {
+    return static_cast<std::size_t>(3 * (sh_coefficient_count(degree) - 1));
+  }
+  /// Degree to which row i is evaluated where `wanted` is asked for.
+  GSNAV_HD int degree_of(std::size_t i, int wanted) const noexcept {
+    if (chunk_degrees.empty()) return wanted;
+    const int used = static_cast<int>(chunk_degrees[i / kProjectChunk]);
+    return used < wanted ? used : wanted;
+  }
+};
+
 /// Read-only arrays of N Gaussians, as kernels see them. Owns nothing.
 ///
-/// Metres in the asset's own frame. A position is `origins[origin_ids[i]] + mean_i`: float32 offsets
-/// from origins on a 64 m lattice, so that scenes far from zero lose nothing.
-struct GaussianView {
-  std::size_t size = 0;         ///< N
-  View<const float> means[3];   ///< x, y, z offsets, [N] each
-  View<const float> quats[4];   ///< w, x, y, z of unit length, [N] each
-  View<const float> scales[3];  ///< standard deviations >= 0, [N] each
-  View<const float> opacities;  ///< in [0, 1], [N]
-  View<const float> sh0;        ///< [N][3], the degree-0 coefficients
-  View<const float> shN;        ///< [N][(degree+1)^2 - 1][3], empty for degree 0
-  /// The same as IEEE binary16 (detail/math/half.hpp), in place of shN, which is empty then; half of
-  /// most of what a Gaussian takes. In host memory only: GaussianArrays gives other backends floats.
-  View<const std::uint16_t> shN_half;
-  int sh_degree = 0;                     ///< 0 to 3
-  View<const std::uint32_t> origin_ids;  ///< [N], or empty: all 0
-  View<const Vec3d> origins;             ///< host memory; empty: one origin at zero
-  /// Rotation each Gaussian has made since training (w, x, y, z), empty where none has: the view
-  /// direction is turned back by it before SH is evaluated. Used for skinned sets of degree >= 1.
-  View<const float> sh_rotations[4];
-  /// Shapes that are no rotated ellipsoids' (a skinned Gaussian's blended axes): [3 r + c] is row r,
-  /// column c of the factor M, Sigma = M M^T, asset frame, metres. They stand in for quats and scales,
-  /// which may then be empty; empty where those hold.
-  View<const float> axes[9];
+/// A position is `origins[origin_ids[i]] + mean_i`: float32 offsets from origins on a 64 m lattice, so
+/// that scenes far from zero lose nothing.
+struct GaussianRows {
+  ShapeRows shape;
+  ColorRows color;
+  View<const Vec3d> origins;  ///< metres, asset frame; host memory; empty: one origin at zero
   /// Place of each Gaussian before rows were sorted in space, [N]: those of one depth are blended in
   /// that order. Empty: row order.
   View<const std::uint32_t> row_ids;
@@ -111,64 +145,58 @@ struct GaussianView {
   /// One for kChunkPart rows, [ceil(N / kChunkPart)]: of chunks at the edge of the view only the parts
   /// that may be seen are touched. Empty: chunks are taken whole.
   View<const ChunkBounds> part_bounds;
-  /// In place of quats, scales, opacities, sh0 and mostly means and shN, which are empty then. In host
-  /// memory only.
-  PackedRows packed;
 
-  /// Which chunks are drawn, by number, each once: a cut of a level-of-detail tree (scene/lod_cut.hpp).
-  /// In the backend's memory. Empty: all chunks.
+  GSNAV_HD std::size_t size() const noexcept { return shape.size; }
+  GSNAV_HD std::size_t chunk_count() const noexcept { return shape.chunk_count(); }
+};
+
+/// Words of `Selection::seen` that a set of so many chunks has for its chunks.
+GSNAV_HD constexpr std::size_t seen_chunk_words(std::size_t chunks) noexcept {
+  return (chunks + 31) / 32;
+}
+
+/// Which rows of a set are drawn, of a set of `chunks` chunks. In the backend's memory. Owns nothing.
+struct Selection {
+  /// Numbers of the chunks that are drawn, each once: the selection of a level-of-detail tree
+  /// (scene/lod_cut.hpp). Empty: all chunks.
   View<const std::uint32_t> drawn_chunks;
-
-  /// What may be seen from where the camera is; the rest is not drawn (scene/visible_sets.hpp). In the
-  /// backend's memory. Empty: all may. First seen_words() words: bit c % 32 of word c / 32 for each
-  /// chunk c. Where it is longer, as many more: how many bits the words before have; then kSeenRowWords
-  /// words for each chunk with a bit, in their order, of which bit r % 32 of word r / 32 is its row r.
+  /// What may be seen from where the camera is; the rest is not drawn (scene/visible_sets.hpp). Empty:
+  /// all may. First seen_chunk_words() words: bit c % 32 of word c / 32 for each chunk c. Where it is
+  /// longer, as many more: how many bits the words before have; then kSeenRowWords words for each chunk
+  /// with a bit, in their order, of which bit r % 32 of word r / 32 is its row r.
   View<const std::uint32_t> seen;
 
-  /// Highest SH degree that the Gaussians of a chunk use, one a chunk of all_chunks()
-  /// (detail/scene/scene_profile.hpp): bands above it are not read. In the backend's memory
-  /// (GaussianArrays puts them there). Empty: sh_degree.
-  View<const std::uint8_t> chunk_sh_degrees;
-
-  /// Degree to which row i is evaluated where `degree` is asked for.
-  GSNAV_HD int degree_of(std::size_t i, int degree) const noexcept {
-    if (chunk_sh_degrees.empty()) return degree;
-    const int used = static_cast<int>(chunk_sh_degrees[i / kProjectChunk]);
-    return used < degree ? used : degree;
-  }
-
-  /// Whether anything of a chunk, by its number, may be seen from where the camera is.
-  GSNAV_HD bool may_be_seen(std::size_t chunk) const noexcept {
-    return seen.empty() || (seen[chunk / 32] >> (chunk % 32) & 1u) != 0;
-  }
-  /// Words of `seen` that chunks take.
-  GSNAV_HD std::size_t seen_words() const noexcept { return (all_chunks() + 31) / 32; }
-  GSNAV_HD bool has_seen_rows() const noexcept { return seen.size > seen_words(); }
-  /// Whether `seen` may have so many words, of chunks alone or of rows too.
-  GSNAV_HD bool seen_may_have(std::size_t words) const noexcept {
-    const std::size_t of_chunks = seen_words();
-    return words == of_chunks ||
-           (words >= 2 * of_chunks && (words - 2 * of_chunks) % kSeenRowWords == 0);
-  }
-  /// Which rows of a chunk that may be seen may be.
-  GSNAV_HD SeenRows seen_rows(std::size_t chunk) const noexcept {
-    if (!has_seen_rows()) return {};
-    const std::size_t words = seen_words();
-    const std::uint32_t before = seen[chunk / 32] & ((1u << (chunk % 32)) - 1u);
-    const std::size_t place = seen[words + chunk / 32] + static_cast<std::size_t>(count_bits(before));
-    return {seen.data + 2 * words + place * kSeenRowWords};
-  }
-  /// Chunks that the rows make.
-  GSNAV_HD std::size_t all_chunks() const noexcept { return (size + kProjectChunk - 1) / kProjectChunk; }
-  /// Chunks that are drawn.
-  GSNAV_HD std::size_t chunk_count() const noexcept {
-    return drawn_chunks.empty() ? all_chunks() : drawn_chunks.size;
+  /// How many chunks are drawn.
+  GSNAV_HD std::size_t count(std::size_t chunks) const noexcept {
+    return drawn_chunks.empty() ? chunks : drawn_chunks.size;
   }
   /// The chunk that is drawn as the c-th.
   GSNAV_HD std::size_t chunk_id(std::size_t c) const noexcept {
     return drawn_chunks.empty() ? c : drawn_chunks[c];
   }
+  /// Whether anything of a chunk, by its number, may be seen from where the camera is.
+  GSNAV_HD bool may_be_seen(std::size_t chunk) const noexcept {
+    return seen.empty() || (seen[chunk / 32] >> (chunk % 32) & 1u) != 0;
+  }
+  /// Whether `seen` knows of rows too.
+  GSNAV_HD bool has_seen_rows(std::size_t chunks) const noexcept {
+    return seen.size > seen_chunk_words(chunks);
+  }
+  /// Which rows may be seen of a chunk that may be seen.
+  GSNAV_HD SeenRows seen_rows(std::size_t chunks, std::size_t chunk) const noexcept {
+    if (!has_seen_rows(chunks)) return {};
+    const std::size_t words = seen_chunk_words(chunks);
+    const std::uint32_t before = seen[chunk / 32] & ((1u << (chunk % 32)) - 1u);
+    const std::size_t place = seen[words + chunk / 32] + static_cast<std::size_t>(count_bits(before));
+    return {seen.data + 2 * words + place * kSeenRowWords};
+  }
 };
+
+/// Whether Selection::seen may have so many words for so many chunks: of chunks alone, or of rows too.
+GSNAV_HD constexpr bool seen_may_have(std::size_t words, std::size_t chunks) noexcept {
+  const std::size_t of_chunks = seen_chunk_words(chunks);
+  return words == of_chunks || (words >= 2 * of_chunks && (words - 2 * of_chunks) % kSeenRowWords == 0);
+}
 
 /// What the numbers of a colour mean.
 enum class ColorSpace : std::uint8_t {
@@ -178,7 +206,7 @@ enum class ColorSpace : std::uint8_t {
 
 /// One set of Gaussians in the world: a scene tile, an avatar, an object.
 struct GaussianSet {
-  GaussianView gaussians;
+  GaussianRows gaussians;
   Similarity world_from_asset{};
   Filter filter = Filter::classic;
   float eps2d = 0.3f;                            ///< px^2 added to the diagonal of the 2D covariance
@@ -186,6 +214,12 @@ struct GaussianSet {
   /// px^2 that the opacities count with already, in [0, eps2d]: the mip filter makes up for the rest. 0:
   /// Mip-Splatting's.
   float base_eps2d = 0;
+  Selection selection{};  ///< which rows are drawn
+
+  /// How many chunks are drawn.
+  GSNAV_HD std::size_t drawn_chunk_count() const noexcept {
+    return selection.count(gaussians.chunk_count());
+  }
 };
 
 }  // namespace gsnav

@@ -41,8 +41,8 @@ requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const 
   const ProjectionRules rules = projection_rules(config);
   const float log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
   for (const GaussianSet& set : sets) {
-    const GaussianView& gs = set.gaussians;
-    ProjectArgs<float> args = make_project_args<float>(camera, set, rules, 0);
+    const GaussianRows& gs = set.gaussians;
+    ViewedSet<float> args = view_set<float>(camera, set, rules, 0);
     std::vector<Vec3d> offsets;
     for (std::size_t o = 0; o < origin_count(gs); ++o) offsets.push_back(origin_offset(args, o));
     args.offsets = {offsets.data(), offsets.size()};
@@ -52,13 +52,13 @@ requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const 
     struct Count {
       std::uint32_t touched = 0, emitting = 0;
     };
-    std::vector<Count> counts(gs.chunk_count());
+    std::vector<Count> counts(args.chunk_count());
     backend.parallel_for(counts.size(), [&](std::size_t c) {
-      const std::size_t first = gs.chunk_id(c) * kProjectChunk;
+      const std::size_t id = set.selection.chunk_id(c), first = id * kProjectChunk;
       const std::uint32_t parts = candidate_parts(args, c);
       if (parts == 0) return;
-      const SeenRows seen = gs.seen_rows(gs.chunk_id(c));
-      for (std::size_t i = first; i < first + kProjectChunk && i < gs.size; ++i) {
+      const SeenRows seen = args.seen_rows(id);
+      for (std::size_t i = first; i < first + kProjectChunk && i < gs.size(); ++i) {
         if ((parts >> ((i - first) / kChunkPart) & 1u) == 0 || !seen.has(i - first)) continue;
         ++counts[c].touched;
         RowSplat<float> row;
@@ -70,7 +70,7 @@ requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const 
       }
     });
     static_cast<void>(backend.synchronize());
-    out.rows += gs.size;
+    out.rows += gs.size();
     for (const Count& n : counts) {
       out.touched += n.touched;
       out.emitting += n.emitting;

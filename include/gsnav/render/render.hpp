@@ -66,7 +66,7 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   std::size_t chunks = 0;
   bool ranked = false;
   for (const GaussianSet& set : sets) {
-    chunks += set.gaussians.chunk_count();
+    chunks += set.drawn_chunk_count();
     ranked = ranked || !set.gaussians.row_ids.empty();
   }
   const std::size_t slots = chunks * kProjectChunk;
@@ -100,18 +100,18 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   ws.host_offsets.clear();
   std::size_t first_chunk = 0, first_rank = 0;
   for (std::size_t i = 0; i < sets.size(); ++i) {
-    ProjectArgs<S>& a = ws.projections[i];
-    a = make_project_args<S>(camera, sets[i], rules, config.max_sh_degree);
+    ViewedSet<S>& a = ws.projections[i];
+    a = view_set<S>(camera, sets[i], rules, config.max_sh_degree);
     a.first_chunk = first_chunk;
     a.first_rank = static_cast<std::uint32_t>(first_rank);
     a.offsets.size = origin_count(a.gaussians);
     for (std::size_t o = 0; o < a.offsets.size; ++o) ws.host_offsets.push_back(origin_offset(a, o));
     first_chunk += a.chunk_count();
-    first_rank += a.gaussians.size;
+    first_rank += a.gaussians.size();
   }
   ws.offsets.upload(ws.host_offsets.data(), ws.host_offsets.size());
   const Vec3d* offsets = ws.offsets.data();
-  for (ProjectArgs<S>& a : ws.projections) {
+  for (ViewedSet<S>& a : ws.projections) {
     a.offsets.data = offsets;
     offsets += a.offsets.size;
   }
@@ -125,7 +125,7 @@ inline bool any_other_space(std::span<const GaussianSet> sets, const RenderConfi
 
 /// Converts the colours of one projected set where its space is not the frame's.
 template <class S, Backend B>
-void convert_set(B& backend, const ProjectArgs<S>& args, const ProjectOutputs<S>& out, ColorSpace from,
+void convert_set(B& backend, const ViewedSet<S>& args, const ProjectOutputs<S>& out, ColorSpace from,
                  ColorSpace to) {
   if (from == to || out.colors.empty()) return;
   backend.parallel_for(args.chunk_count(),
@@ -224,7 +224,7 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
                             RenderStats& stats) {
   if (depth_slices_of(config, stats.gaussians, camera) < 2) return false;  // nothing needs to be planned
   DepthSlices& slices = ws.slices;
-  const View<const ProjectArgs<float>> sets = view_of(ws.projections);
+  const View<const ViewedSet<float>> sets = view_of(ws.projections);
   slices.plan(backend, sets);
   const int count = depth_slices_of(config, slices.candidates(), camera);
   if (count < 2) return false;
@@ -238,7 +238,7 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
   ws.states.resize_discard(grid.count() * pixels * blend_state_values(images.depth_mode()));
   std::fill(ws.visible.counts.data(), ws.visible.counts.data() + ws.visible.counts.size(), 0u);
   for (int s = 0; s <= last; ++s) {
-    for (const ProjectArgs<float>& args : sets) {
+    for (const ViewedSet<float>& args : sets) {
       const View<const std::uint32_t> chunks = slices.chunks(s, args, ws.projected.open);
       if (!chunks.empty()) run(backend, stage::Project{}, args, ws.projected, chunks);
     }
@@ -267,8 +267,8 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
   RenderStats counted;
   for (const GaussianSet& set : sets) {
     if (Status s = validate(set); !s) return s;
-    slots += set.gaussians.chunk_count() * kProjectChunk;
-    counted.gaussians += set.gaussians.size;
+    slots += set.drawn_chunk_count() * kProjectChunk;
+    counted.gaussians += set.gaussians.size();
   }
   if (slots > std::numeric_limits<std::uint32_t>::max()) {
     return {Errc::unsupported, "more than 2^32 Gaussians in one render"};
@@ -284,7 +284,7 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
   }
   if (!drawn) {
     for (std::size_t i = 0; i < sets.size(); ++i) {
-      const ProjectArgs<S>& args = ws.projections[i];
+      const ViewedSet<S>& args = ws.projections[i];
       if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
         if (!mesh.empty()) {
           std::fill_n(ws.projected.counts.data + args.first_chunk, args.chunk_count(), 0u);

@@ -73,18 +73,18 @@ struct GaussianCloud {
   }
 
   /// What kernels read; valid while the cloud lives and does not grow.
-  GaussianView view() const noexcept {
-    GaussianView v;
-    v.size = size();
-    for (std::size_t k = 0; k < 3; ++k) v.means[k] = view_of(means[k]);
-    for (std::size_t k = 0; k < 4; ++k) v.quats[k] = view_of(quats[k]);
-    for (std::size_t k = 0; k < 3; ++k) v.scales[k] = view_of(scales[k]);
-    v.opacities = view_of(opacities);
-    v.sh0 = view_of(sh0);
-    v.shN = view_of(shN);
-    v.shN_half = view_of(shN_half);
-    v.sh_degree = sh_degree;
-    v.origin_ids = view_of(origin_ids);
+  GaussianRows view() const noexcept {
+    GaussianRows v;
+    v.shape.size = size();
+    v.shape.means = planes_of(means);
+    v.shape.quats = planes_of(quats);
+    v.shape.scales = planes_of(scales);
+    v.shape.opacities = view_of(opacities);
+    v.shape.origin_ids = view_of(origin_ids);
+    v.color.degree = sh_degree;
+    v.color.sh0 = view_of(sh0);
+    v.color.shN = view_of(shN);
+    v.color.shN_half = view_of(shN_half);
     v.origins = view_of(origins);
     v.row_ids = view_of(row_ids);
     v.chunk_bounds = view_of(chunk_bounds);

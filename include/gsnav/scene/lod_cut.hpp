@@ -76,7 +76,9 @@ class LodCut {
   std::span<const GaussianSet> select(const Camera& camera, const LodChoice& choice = {},
                                       const Similarity& world_from_asset = {},
                                       View<const std::uint32_t> seen = {}) {
-    seen_ = seen.empty() ? seen : View<const std::uint32_t>{seen.data, cloud_->view().seen_words()};
+    seen_ = seen.empty()
+                ? seen
+                : View<const std::uint32_t>{seen.data, seen_chunk_words(cloud_->view().chunk_count())};
     leaf_chunks_.clear();
     merged_chunks_.clear();
     sets_.clear();
@@ -124,8 +126,7 @@ class LodCut {
            const Similarity& world_from_asset, View<const std::uint32_t> seen = {}) {
     if (chunks.empty()) return;
     sets_.push_back(photo_set(cloud, choice, world_from_asset));
-    sets_.back().gaussians.drawn_chunks = {chunks.data(), chunks.size()};
-    sets_.back().gaussians.seen = seen;
+    sets_.back().selection = {{chunks.data(), chunks.size()}, seen};
   }
   /// Whether one of the chunks [first, end), some of which may be beyond the cloud's, is among those
   /// that are seen.

@@ -33,7 +33,7 @@ struct PackLimits {
 /// floats; others are given these (GaussianArrays). It can be edited and written only after
 /// unpack_cloud. Pack sorted clouds: places are steps of a chunk's box.
 struct PackedCloud {
-  std::vector<std::uint16_t> codes;  ///< PackedRows::codes
+  std::vector<std::uint16_t> codes;  ///< ShapeRows::codes
   std::vector<std::uint16_t> sh0;    ///< [N][3], binary16
   std::vector<std::int8_t> shN;      ///< [N][(degree+1)^2 - 1][3]; empty where rest has the bands
   std::vector<PackedChunk> chunks;   ///< [ceil(N / kProjectChunk)]
@@ -47,10 +47,13 @@ struct PackedCloud {
            sizeof(PackedChunk) * chunks.size() + rest.bytes() +
            sizeof(float) * (rest.means[0].empty() ? 0 : 3 * count);
   }
-  GaussianView view() const noexcept {
-    GaussianView v = rest.view();
-    v.size = count;
-    v.packed = {view_of(codes), view_of(sh0), view_of(shN), view_of(chunks)};
+  GaussianRows view() const noexcept {
+    GaussianRows v = rest.view();
+    v.shape.size = count;
+    v.shape.codes = view_of(codes);
+    v.color.sh0_half = view_of(sh0);
+    v.color.shN_codes = view_of(shN);
+    v.shape.chunks = v.color.chunks = view_of(chunks);
     return v;
   }
   GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
@@ -86,8 +89,8 @@ inline std::array<std::uint16_t, 3> pack_quat(const Quatd& q) noexcept {
 /// Steps and codes of a cloud's places, shapes and opacities.
 inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
   const std::size_t n = cloud.size();
-  out.codes = huge_vector<std::uint16_t>(PackedRows::kPlanes * n);
-  out.chunks.resize(cloud.view().all_chunks());
+  out.codes = huge_vector<std::uint16_t>(ShapeRows::kCodePlanes * n);
+  out.chunks.resize(cloud.view().chunk_count());
   const auto plane = [&](std::size_t k) { return out.codes.data() + k * n; };
   for (std::size_t c = 0; c < out.chunks.size(); ++c) {
     PackedChunk& chunk = out.chunks[c];
@@ -111,20 +114,20 @@ inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
         const int axis = static_cast<int>(k);
         const double from_low =
             static_cast<double>(cloud.means[k][i]) - static_cast<double>(chunk.low[axis]);
-        plane(PackedRows::kMeans + k)[i] = code_of(steps(from_low, chunk.step[axis]), 65535);
+        plane(ShapeRows::kMeans + k)[i] = code_of(steps(from_low, chunk.step[axis]), 65535);
         const double root = std::sqrt(static_cast<double>(cloud.scales[k][i]));
-        plane(PackedRows::kScales + k)[i] = code_of(steps(root, chunk.scale_step), 65535);
+        plane(ShapeRows::kScales + k)[i] = code_of(steps(root, chunk.scale_step), 65535);
       }
       const auto part = [&](std::size_t k) { return static_cast<double>(cloud.quats[k][i]); };
       const auto quat = pack_quat({part(0), part(1), part(2), part(3)});
-      for (std::size_t k = 0; k < 3; ++k) plane(PackedRows::kQuats + k)[i] = quat[k];
-      plane(PackedRows::kOpacity)[i] = code_of(65535.0 * static_cast<double>(cloud.opacities[i]), 65535);
+      for (std::size_t k = 0; k < 3; ++k) plane(ShapeRows::kQuats + k)[i] = quat[k];
+      plane(ShapeRows::kOpacity)[i] = code_of(65535.0 * static_cast<double>(cloud.opacities[i]), 65535);
     }
   }
 }
 
 /// Compares places, shapes and opacities; `packed` is of `cloud`.
-inline void compare_shapes(const GaussianCloud& cloud, const GaussianView& packed,
+inline void compare_shapes(const GaussianCloud& cloud, const ShapeRows& packed,
                            PackErrors& out) noexcept {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Vec3d was{static_cast<double>(cloud.means[0][i]), static_cast<double>(cloud.means[1][i]),
@@ -203,12 +206,13 @@ class BandPacker {
 
 /// Bounds of what each `rows` packed rows stand for.
 inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed, std::size_t rows) {
-  const GaussianView v = packed.view();
+  const GaussianRows all = packed.view();
+  const ShapeRows& v = all.shape;
   std::vector<ChunkBounds> out((v.size + rows - 1) / rows);
   for (std::size_t c = 0; c < out.size(); ++c) {
     Aabb<double> box;
     for (std::size_t i = c * rows; i < std::min(v.size, (c + 1) * rows); ++i) {
-      const Vec3d origin = v.origin_ids.empty() ? Vec3d{} : v.origins[v.origin_ids[i]];
+      const Vec3d origin = v.origin_ids.empty() ? Vec3d{} : all.origins[v.origin_ids[i]];
       box.add(origin + vec_cast<double>(mean_of(v, i)));
       const Vec3f s = scales_of(v, i);
       out[c].scale_max = std::max({out[c].scale_max, s.x, s.y, s.z});
@@ -225,11 +229,11 @@ inline PackedCloud pack_rows(GaussianCloud& cloud, const PackLimits& limits, Pac
   PackedCloud out;
   out.count = cloud.size();
   pack_shapes(cloud, out);
-  compare_shapes(cloud, out.view(), found);
+  compare_shapes(cloud, out.view().shape, found);
   if (found.mean_deviations > limits.mean) {
     found.mean_bits = 32;
     found.mean = found.mean_deviations = 0;
-    out.codes.resize(PackedRows::kMeans * out.count);
+    out.codes.resize(ShapeRows::kMeans * out.count);
     out.codes.shrink_to_fit();
     out.rest.means = std::move(cloud.means);
   }
@@ -285,9 +289,9 @@ inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {}
 /// The floats that packed rows stand for.
 inline GaussianCloud unpack_cloud(const PackedCloud& packed) {
   GaussianCloud out = packed.rest;
-  const GaussianView v = packed.view();
-  const std::size_t n = packed.size(),
-                    rest = static_cast<std::size_t>(sh_coefficient_count(v.sh_degree) - 1);
+  const GaussianRows all = packed.view();
+  const ShapeRows& v = all.shape;
+  const std::size_t n = packed.size(), rest = all.color.rest() / 3;
   const auto planes = [n](auto& of) {
     for (auto& plane : of) plane = huge_vector<float>(n);
   };
@@ -309,7 +313,7 @@ inline GaussianCloud unpack_cloud(const PackedCloud& packed) {
     for (std::size_t k = 0; k < 4; ++k) out.quats[k][i] = parts[k];
     out.opacities[i] = opacity_of(v, i);
     for (std::size_t k = 0; k <= rest; ++k) {
-      const Vec3f c = packed_coefficient(v, i, static_cast<int>(k));
+      const Vec3f c = packed_coefficient(all.color, i, static_cast<int>(k));
       float* const to = k == 0 ? &out.sh0[3 * i] : &out.shN[3 * (rest * i + k - 1)];
       for (int channel = 0; channel < 3; ++channel) to[channel] = c[channel];
     }

@@ -50,7 +50,7 @@ class GaussianArrays {
       : set_(profile.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {
       upload(backend, cloud);
-      to_device(backend, set_.gaussians.chunk_sh_degrees, bytes_);
+      to_device(backend, set_.gaussians.color.chunk_degrees, bytes_);
     }
   }
   GaussianArrays(B& backend, const PackedCloud& cloud) : set_(cloud.set()) {
@@ -66,7 +66,7 @@ class GaussianArrays {
       const GaussianCloud floats = unpack_cloud(cloud);
       set_ = profile.applied_to(floats.set());
       upload(backend, floats);
-      to_device(backend, set_.gaussians.chunk_sh_degrees, bytes_);
+      to_device(backend, set_.gaussians.color.chunk_degrees, bytes_);
     }
   }
   GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
@@ -77,18 +77,18 @@ class GaussianArrays {
 
  private:
   void upload(B& backend, const GaussianCloud& cloud) {
-    GaussianView& v = set_.gaussians;
-    for (auto& p : v.means) to_device(backend, p, floats_);
-    for (auto& p : v.quats) to_device(backend, p, floats_);
-    for (auto& p : v.scales) to_device(backend, p, floats_);
-    to_device(backend, v.opacities, floats_);
-    to_device(backend, v.sh0, floats_);
+    GaussianRows& v = set_.gaussians;
+    to_device(backend, v.shape.means);
+    to_device(backend, v.shape.quats);
+    to_device(backend, v.shape.scales);
+    to_device(backend, v.shape.opacities, floats_);
+    to_device(backend, v.shape.origin_ids, ids_);
+    to_device(backend, v.color.sh0, floats_);
     std::vector<float> floats;
     std::vector<std::uint16_t> halves;
-    drop_bands(v, floats, halves);
-    to_device(backend, v.shN, floats_);
-    to_device(backend, v.shN_half, halves_);
-    to_device(backend, v.origin_ids, ids_);
+    drop_bands(v.color, v.size(), floats, halves);
+    to_device(backend, v.color.shN, floats_);
+    to_device(backend, v.color.shN_half, halves_);
     to_device(backend, v.row_ids, ids_);
     to_device(backend, v.chunk_bounds, bounds_);
     to_device(backend, v.part_bounds, bounds_);
@@ -96,24 +96,32 @@ class GaussianArrays {
     v.origins = view_of(std::as_const(origins_));
   }
   /// Leaves out the bands that no chunk has: rows become shorter.
-  static void drop_bands(GaussianView& v, std::vector<float>& floats,
+  static void drop_bands(ColorRows& v, std::size_t size, std::vector<float>& floats,
                          std::vector<std::uint16_t>& halves) {
     const int most = needed_sh_degree(v);
-    if (most == v.sh_degree) return;
+    if (most == v.degree) return;
     const auto drop = [&]<class T>(View<const T>& from, std::vector<T>& to) {
       if (from.empty()) return;
-      to.resize(sh_band_numbers(most) * v.size);
-      cut_rows(from.data, v.size, sh_band_numbers(v.sh_degree), sh_band_numbers(most), to.data());
+      to.resize(sh_band_numbers(most) * size);
+      cut_rows(from.data, size, v.rest(), sh_band_numbers(most), to.data());
       from = view_of(std::as_const(to));
     };
     drop(v.shN, floats);
     drop(v.shN_half, halves);
-    v.sh_degree = most;
+    v.degree = most;
   }
   template <class T>
   static void to_device(B& backend, View<const T>& v, std::vector<Buffer<T, B>>& held) {
     held.emplace_back(backend).upload(v.data, v.size);
     v = {held.back().data(), v.size};
+  }
+  template <std::size_t K>
+  void to_device(B& backend, Planes<const float, K>& planes) {
+    for (std::size_t k = 0; k < K; ++k) {
+      View<const float> plane = planes[k];
+      to_device(backend, plane, floats_);
+      planes.data[k] = plane.data;
+    }
   }
   GaussianSet set_;
   std::vector<Buffer<float, B>> floats_;
@@ -292,7 +300,7 @@ class Renderer {
     Status s = detail::guarded(run);
     if (s.code() != Errc::out_of_memory) return s;
     std::size_t gaussians = 0;
-    for (const GaussianSet& set : first.sets) gaussians += set.gaussians.size;
+    for (const GaussianSet& set : first.sets) gaussians += set.gaussians.size();
     return {Errc::out_of_memory, "Renderer: not enough memory to draw " + std::to_string(frames) +
                                      " frames of " + std::to_string(first.camera->width) + " x " +
                                      std::to_string(first.camera->height) + " with " +

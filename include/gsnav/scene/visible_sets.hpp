@@ -45,7 +45,7 @@ struct VisibleSets {
   std::vector<Key> keys;         ///< of the cells, ascending
   std::vector<std::uint64_t>
       ends;  ///< [cells], where the words of each end; those of the first begin at 0
-  std::vector<std::uint32_t> bits;  ///< GaussianView::seen of each cell, one behind the other
+  std::vector<std::uint32_t> bits;  ///< Selection::seen of each cell, one behind the other
 
   std::size_t cells() const noexcept { return keys.size(); }
   /// Words of a cell that say which chunks it sees.
@@ -239,7 +239,7 @@ class SeenOfCell {
     return sum;
   }
 
-  /// As GaussianView::seen has it.
+  /// As Selection::seen has it.
   void append_to(std::vector<std::uint32_t>& bits, bool with_rows) const {
     const std::size_t begin = bits.size(), words = (places_.size() + 31) / 32;
     bits.resize(begin + (with_rows ? 2 : 1) * words);
@@ -303,7 +303,7 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
     const VisibleSettings& settings = {}, const Similarity& world_from_asset = {}) {
   if (Status s = validate(settings); !s) return s;
   if (viewpoints.empty()) return Status(Errc::invalid_argument, "build_visible_sets: no viewpoint");
-  if (cloud.chunk_bounds.size() != cloud.view().all_chunks()) {
+  if (cloud.chunk_bounds.size() != cloud.view().chunk_count()) {
     return Status(Errc::invalid_argument,
                   "build_visible_sets: the cloud's rows are not in spatial order: sort_spatially first");
   }
@@ -313,7 +313,7 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   out.near_plane = settings.near_plane;
   out.near_sigma = settings.near_sigma;
   out.min_weight = settings.min_weight;
-  out.cloud_chunks = cloud.view().all_chunks();
+  out.cloud_chunks = cloud.view().chunk_count();
   out.viewpoints = viewpoints.size();
   constexpr double kBeside = 0.05;  // metres
   std::vector<Vec3d> eyes;          // in the asset's frame

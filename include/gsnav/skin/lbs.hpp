@@ -180,7 +180,7 @@ struct SkinningArgs {
   /// are turned only.
   View<const float> weight_gradients;
   View<const float> scales[3];  ///< canonical, metres, [N] each
-  View<Out> axes_out[9];        ///< [N] each, as GaussianView::axes
+  View<Out> axes_out[9];        ///< [N] each, as ShapeRows::axes
 
   GSNAV_HD std::size_t size() const noexcept { return means[0].size; }
   GSNAV_HD bool writes_rotations() const noexcept { return !rotations_out[0].empty(); }

@@ -37,6 +37,6 @@ FAULTS = [
           TEST, "N39_sh_dir_zero"),
     fault("sh_turned_forwards", "delta", "delta = rotate(conjugate(q), delta);", "delta = rotate(q, delta);",
           TEST, "N61_sh_rotation_equiv", why="the direction is turned back, not on"),
-    fault("sh_not_turned", "gaussian_color", "if (!gs.sh_rotations[0].empty()) {", "if (degree > 9) {",
+    fault("sh_not_turned", "gaussian_color", "if (!rows.rotations.empty()) {", "if (degree > 9) {",
           TEST, "N61_sh_rotation_equiv", why="lights stay with the world when a body turns"),
 ]

@@ -86,7 +86,7 @@ class CudaBackend {
                   std::uint32_t* values_alt, std::size_t n, int bits);
 
   // Stages by kernels of its own (core/stages.hpp).
-  void run(stage::Project, const ProjectArgs<float>& args, const ProjectOutputs<float>& out);
+  void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out);
   void run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull);
   void run(stage::CountTiles, const BinArgs<float>& args, const MeshCull<float>& cull);
   void run(stage::ScatterTiles, const BinArgs<float>& args, const NoCull& cull);

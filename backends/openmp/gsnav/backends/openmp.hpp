@@ -35,7 +35,7 @@ namespace gsnav {
 struct LaneKernels {
   const char* name;
   int width;
-  void (*project_chunk)(const ProjectArgs<float>&, const ProjectOutputs<float>&,
+  void (*project_chunk)(const ViewedSet<float>&, const ProjectOutputs<float>&,
                         std::size_t chunk) noexcept;
   void (*count_tiles)(const CountTileIntersections<float>&, std::size_t block) noexcept;
   void (*count_tiles_before_mesh)(const CountTileIntersections<float, MeshCull<float>>&,
@@ -101,12 +101,12 @@ class OpenMPBackend : public HostMemory {
   Status synchronize() { return {}; }
 
   // Stages in lanes (core/stages.hpp).
-  void run(stage::Project, const ProjectArgs<float>& args, const ProjectOutputs<float>& out) {
+  void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, &out, kernel](std::size_t c) { kernel(args, out, c); });
   }
   /// Some of the chunks. Leaves out what reaches no open cell (ProjectOutputs::open).
-  void run(stage::Project, const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+  void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out,
            View<const std::uint32_t> chunks) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(chunks.size,

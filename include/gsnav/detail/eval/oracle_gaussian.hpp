@@ -89,13 +89,13 @@ inline Real in_blend_space(Real value, ColorSpace from, ColorSpace to) noexcept 
 }
 
 /// SH coefficient k of a row.
-inline Real3 stored_coefficient(const GaussianView& gs, std::size_t row, int k) noexcept {
-  if (has_packed_colors(gs)) {
+inline Real3 stored_coefficient(const ColorRows& gs, std::size_t row, int k) noexcept {
+  if (gs.packed()) {
     const Vec3<float> c = packed_coefficient(gs, row, k);
     return {c.x, c.y, c.z};
   }
   if (k == 0) return {gs.sh0[3 * row], gs.sh0[3 * row + 1], gs.sh0[3 * row + 2]};
-  const std::size_t rest = static_cast<std::size_t>((gs.sh_degree + 1) * (gs.sh_degree + 1) - 1);
+  const std::size_t rest = static_cast<std::size_t>((gs.degree + 1) * (gs.degree + 1) - 1);
   const std::size_t at = 3 * (rest * row + static_cast<std::size_t>(k - 1));
   if (gs.shN_half.empty()) return {gs.shN[at], gs.shN[at + 1], gs.shN[at + 2]};
   return {half_to_float(gs.shN_half[at]), half_to_float(gs.shN_half[at + 1]),
@@ -141,11 +141,11 @@ struct OracleSet {
   }
   /// The mean, asset frame.
   Real3 place(std::size_t row) const noexcept {
-    const GaussianView& gs = set.gaussians;
-    const Vec3<float> offset = mean_of(gs, row);
+    const GaussianRows& gs = set.gaussians;
+    const Vec3<float> offset = mean_of(gs.shape, row);
     Real3 p{offset.x, offset.y, offset.z};
     if (!gs.origins.empty()) {
-      const Vec3d& from = gs.origins[gs.origin_ids.empty() ? 0 : gs.origin_ids[row]];
+      const Vec3d& from = gs.origins[gs.shape.origin_ids.empty() ? 0 : gs.shape.origin_ids[row]];
       p = p + Real3{from.x, from.y, from.z};
     }
     return p;
@@ -157,9 +157,9 @@ struct OracleSet {
 
   /// Columns of M, Sigma = M M^T, in camera axes, metres.
   RealColumns factor(std::size_t row) const noexcept {
-    const GaussianView& gs = set.gaussians;
+    const ShapeRows& gs = set.gaussians.shape;
     RealColumns m;
-    if (!gs.axes[0].empty()) {
+    if (!gs.axes.empty()) {
       for (std::size_t k = 0; k < 3; ++k)
         m[k] = {gs.axes[k][row], gs.axes[3 + k][row], gs.axes[6 + k][row]};
     } else {
@@ -187,13 +187,13 @@ struct OracleSet {
 
   /// Colour seen from the camera, SH to `degree`, in `blend_space`.
   Vec3d color(std::size_t row, int degree, ColorSpace blend_space) const noexcept {
-    const GaussianView& gs = set.gaussians;
+    const ColorRows& gs = set.gaussians.color;
     Real3 d = place(row) + Real3{-eye.x, -eye.y, -eye.z};
     const Real length = std::sqrt(inner(d, d));
     d = length > 1e-12L ? (1 / length) * d : Real3{0, 0, 1};
-    if (!gs.sh_rotations[0].empty()) {
-      const RealColumns turned = rotation_columns(gs.sh_rotations[0][row], gs.sh_rotations[1][row],
-                                                  gs.sh_rotations[2][row], gs.sh_rotations[3][row]);
+    if (!gs.rotations.empty()) {
+      const Planes<const float, 4>& r = gs.rotations;
+      const RealColumns turned = rotation_columns(r[0][row], r[1][row], r[2][row], r[3][row]);
       d = {inner(turned[0], d), inner(turned[1], d), inner(turned[2], d)};
     }
     Real3 sum{0.5L, 0.5L, 0.5L};
@@ -268,7 +268,7 @@ struct EwaModel {
     const auto dilated = [&](Real h) { return inner(crossed, crossed) + h * (a0 + c0) + h * h; };
     const Real h = s.set.eps2d, det = dilated(h);
 
-    Real opacity = opacity_of(s.set.gaussians, row);
+    Real opacity = opacity_of(s.set.gaussians.shape, row);
     if (s.set.filter == Filter::mip) opacity *= std::sqrt(dilated(s.set.base_eps2d) / det);
     out.mean_x = static_cast<double>(c.fx * u + c.cx);
     out.mean_y = static_cast<double>(c.fy * v + c.cy);

@@ -73,7 +73,7 @@ std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const Oracl
                                                OracleScene<Model>& scene) {
   std::vector<OracleCandidate> all;
   for (const OracleSet& s : sets) {
-    const std::size_t n = s.set.gaussians.size, chunks = (n + kOracleChunk - 1) / kOracleChunk;
+    const std::size_t n = s.set.gaussians.size(), chunks = (n + kOracleChunk - 1) / kOracleChunk;
     std::vector<std::vector<OracleCandidate>> found(chunks);
     std::vector<std::uint64_t> reaching(chunks);
     backend.parallel_for(chunks, [&](std::size_t c) {
@@ -126,7 +126,7 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
   std::size_t total = 0;
   for (const GaussianSet& s : gaussian_sets) {
     sets.emplace_back(s, camera, c, total);
-    total += s.gaussians.size;
+    total += s.gaussians.size();
   }
   std::vector<OracleCandidate> order = oracle_candidates<Model>(backend, sets, c.key_bits, scene);
   const auto by_code = [](const OracleCandidate& a, const OracleCandidate& b) {
@@ -163,7 +163,8 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
       OracleRecord<Model>& record = scene.records[i];
       Model::make(s, row, scene.log2_cut, record.model, record.box);
       record.box = record.box.intersection(scene.rect);
-      record.color = s.color(row, std::min(s.set.gaussians.sh_degree, c.max_sh_degree), c.blend_space);
+      record.color =
+          s.color(row, std::min(s.set.gaussians.color.degree, c.max_sh_degree), c.blend_space);
       record.id = order[i].id;
       record.rank = rank[i];
     }

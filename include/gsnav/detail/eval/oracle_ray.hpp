@@ -56,7 +56,7 @@ struct RayModel {
         if (j < 3) area0 += across * across;
       }
     }
-    double opacity = static_cast<double>(opacity_of(s.set.gaussians, row));
+    double opacity = static_cast<double>(opacity_of(s.set.gaussians.shape, row));
     if (s.set.filter == Filter::mip) opacity *= std::sqrt(area0 / area);
     out.log2_opacity = std::log2(opacity);
     if (!(opacity > 0 && out.log2_opacity >= log2_cut && out.z > 0 && std::isfinite(area))) return false;

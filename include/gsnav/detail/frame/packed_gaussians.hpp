@@ -58,37 +58,23 @@ GSNAV_HD L unpack_opacity(const L& code) noexcept {
 /// Which of a chunk's steps coefficient k = 1, ... of a colour has.
 GSNAV_HD constexpr int packed_band(int k) noexcept { return k < 4 ? 0 : k < 9 ? 1 : 2; }
 
-/// Whether shapes and opacities of the rows are packed. Other memory than the host's holds floats.
-GSNAV_HD bool is_packed(const GaussianView& gs) noexcept {
-#if defined(__CUDA_ARCH__)
-  static_cast<void>(gs);
-  return false;
-#else
-  return !gs.packed.codes.empty();
-#endif
-}
-/// Whether colours are.
-GSNAV_HD bool has_packed_colors(const GaussianView& gs) noexcept {
-  return is_packed(gs) && !gs.packed.sh0.empty();
-}
-
 /// One row of a set, as SetRows reads it.
 struct OneRow {
   using lane = float;
-  const GaussianView& gs;
+  const ShapeRows& shape;
   std::size_t i;
 
   GSNAV_HD float floats(const View<const float>& plane) const noexcept { return plane[i]; }
   GSNAV_HD float codes(int plane) const noexcept {
-    return static_cast<float>(gs.packed.codes.data[static_cast<std::size_t>(plane) * gs.size + i]);
+    return static_cast<float>(shape.codes.data[static_cast<std::size_t>(plane) * shape.size + i]);
   }
   /// Null where shapes are floats.
   GSNAV_HD const PackedChunk* chunk() const noexcept {
-    return is_packed(gs) ? &gs.packed.chunks[i / kProjectChunk] : nullptr;
+    return shape.packed() ? &shape.chunks[i / kProjectChunk] : nullptr;
   }
   /// The row's, of one value an origin.
   GSNAV_HD Vec3d offset(const View<const Vec3d>& offsets) const noexcept {
-    return offsets[gs.origin_ids.empty() ? 0 : gs.origin_ids[i]];
+    return offsets[shape.origin_ids.empty() ? 0 : shape.origin_ids[i]];
   }
 };
 
@@ -102,31 +88,33 @@ struct SetRows {
   /// Offset from the row's origin, metres.
   GSNAV_HD Vec3<L> mean() const noexcept {
     const PackedChunk* const chunk = at.chunk();
-    return chunk != nullptr && at.gs.means[0].empty() ? unpack_mean(*chunk, codes3(PackedRows::kMeans))
-                                                      : floats3(at.gs.means);
+    return chunk != nullptr && at.shape.means.empty() ? unpack_mean(*chunk, codes3(ShapeRows::kMeans))
+                                                      : floats3(at.shape.means);
   }
-  /// Whether the shape is a factor M (GaussianView::axes), in place of a quaternion and scales.
-  GSNAV_HD bool has_factor() const noexcept { return !at.gs.axes[0].empty(); }
+  /// Whether the shape is a factor M (ShapeRows::axes), in place of a quaternion and scales.
+  GSNAV_HD bool has_factor() const noexcept { return !at.shape.axes.empty(); }
   GSNAV_HD Mat3<L> factor() const noexcept {
-    return {{floats3(at.gs.axes), floats3(at.gs.axes + 3), floats3(at.gs.axes + 6)}};
+    return {{floats3(at.shape.axes), floats3(at.shape.axes, 3), floats3(at.shape.axes, 6)}};
   }
   GSNAV_HD Quat<L> quat() const noexcept {
-    if (at.chunk() != nullptr) return unpack_quat(codes3(PackedRows::kQuats));
-    const View<const float>* const q = at.gs.quats;
+    if (at.chunk() != nullptr) return unpack_quat(codes3(ShapeRows::kQuats));
+    const Planes<const float, 4>& q = at.shape.quats;
     return {at.floats(q[0]), at.floats(q[1]), at.floats(q[2]), at.floats(q[3])};
   }
   GSNAV_HD Vec3<L> scales() const noexcept {
     const PackedChunk* const chunk = at.chunk();
-    return chunk != nullptr ? unpack_scales(*chunk, codes3(PackedRows::kScales)) : floats3(at.gs.scales);
+    return chunk != nullptr ? unpack_scales(*chunk, codes3(ShapeRows::kScales))
+                            : floats3(at.shape.scales);
   }
   GSNAV_HD L opacity() const noexcept {
-    return at.chunk() != nullptr ? unpack_opacity(at.codes(PackedRows::kOpacity))
-                                 : at.floats(at.gs.opacities);
+    return at.chunk() != nullptr ? unpack_opacity(at.codes(ShapeRows::kOpacity))
+                                 : at.floats(at.shape.opacities);
   }
 
  private:
-  GSNAV_HD Vec3<L> floats3(const View<const float>* planes) const noexcept {
-    return {at.floats(planes[0]), at.floats(planes[1]), at.floats(planes[2])};
+  template <std::size_t K>
+  GSNAV_HD Vec3<L> floats3(const Planes<const float, K>& planes, std::size_t k = 0) const noexcept {
+    return {at.floats(planes[k]), at.floats(planes[k + 1]), at.floats(planes[k + 2])};
   }
   GSNAV_HD Vec3<L> codes3(int plane) const noexcept {
     return {at.codes(plane), at.codes(plane + 1), at.codes(plane + 2)};
@@ -134,35 +122,34 @@ struct SetRows {
 };
 
 /// The same of row i by itself.
-GSNAV_HD Vec3<float> mean_of(const GaussianView& gs, std::size_t i) noexcept {
-  return SetRows<OneRow>{{gs, i}}.mean();
+GSNAV_HD Vec3<float> mean_of(const ShapeRows& shape, std::size_t i) noexcept {
+  return SetRows<OneRow>{{shape, i}}.mean();
 }
-GSNAV_HD Vec3<float> scales_of(const GaussianView& gs, std::size_t i) noexcept {
-  return SetRows<OneRow>{{gs, i}}.scales();
+GSNAV_HD Vec3<float> scales_of(const ShapeRows& shape, std::size_t i) noexcept {
+  return SetRows<OneRow>{{shape, i}}.scales();
 }
-GSNAV_HD Quat<float> quat_of(const GaussianView& gs, std::size_t i) noexcept {
-  return SetRows<OneRow>{{gs, i}}.quat();
+GSNAV_HD Quat<float> quat_of(const ShapeRows& shape, std::size_t i) noexcept {
+  return SetRows<OneRow>{{shape, i}}.quat();
 }
-GSNAV_HD float opacity_of(const GaussianView& gs, std::size_t i) noexcept {
-  return SetRows<OneRow>{{gs, i}}.opacity();
+GSNAV_HD float opacity_of(const ShapeRows& shape, std::size_t i) noexcept {
+  return SetRows<OneRow>{{shape, i}}.opacity();
 }
 
 /// Coefficient k of row i of packed colours, whichever way the bands are kept.
-GSNAV_HD Vec3<float> packed_coefficient(const GaussianView& gs, std::size_t i, int k) noexcept {
+GSNAV_HD Vec3<float> packed_coefficient(const ColorRows& rows, std::size_t i, int k) noexcept {
   const auto halves = [](const std::uint16_t* p) GSNAV_INLINED {
     return Vec3<float>{half_to_float(p[0]), half_to_float(p[1]), half_to_float(p[2])};
   };
-  if (k == 0) return halves(gs.packed.sh0.data + 3 * i);
-  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
-  const std::size_t at = 3 * (rest * i + static_cast<std::size_t>(k - 1));
-  if (!gs.packed.shN.empty()) {
-    const float step = gs.packed.chunks[i / kProjectChunk].sh_steps[packed_band(k)];
-    const std::int8_t* p = gs.packed.shN.data + at;
+  if (k == 0) return halves(rows.sh0_half.data + 3 * i);
+  const std::size_t at = rows.rest() * i + 3 * static_cast<std::size_t>(k - 1);
+  if (!rows.shN_codes.empty()) {
+    const float step = rows.chunks[i / kProjectChunk].sh_steps[packed_band(k)];
+    const std::int8_t* p = rows.shN_codes.data + at;
     return {static_cast<float>(p[0]) * step, static_cast<float>(p[1]) * step,
             static_cast<float>(p[2]) * step};
   }
-  if (!gs.shN_half.empty()) return halves(gs.shN_half.data + at);
-  return {gs.shN[at], gs.shN[at + 1], gs.shN[at + 2]};
+  if (!rows.shN_half.empty()) return halves(rows.shN_half.data + at);
+  return {rows.shN[at], rows.shN[at + 1], rows.shN[at + 2]};
 }
 
 }  // namespace gsnav

@@ -18,39 +18,46 @@ namespace gsnav {
 
 /// One set as one camera sees it: what projection reads.
 template <class S>
-struct ProjectArgs {
-  GaussianView gaussians;
+struct ViewedSet {
+  GaussianRows gaussians;
+  Selection selection;
   ProjectionCamera<S> camera;
   ProjectionCamera<double>
       camera64;                  ///< for sort keys, and for Gaussians whose geometry float cannot hold
   View<const Vec3d> offsets;     ///< origin - camera position, one an origin
-  int sh_degree = 0;             ///< highest degree to evaluate, <= gaussians.sh_degree
+  int sh_degree = 0;             ///< highest degree to evaluate, <= gaussians.color.degree
   std::size_t first_chunk = 0;   ///< among the chunks of all sets
   std::uint32_t first_rank = 0;  ///< of the set's first Gaussian among all
 
-  GSNAV_HD std::size_t chunk_count() const noexcept { return gaussians.chunk_count(); }
+  /// How many chunks are drawn.
+  GSNAV_HD std::size_t chunk_count() const noexcept { return selection.count(gaussians.chunk_count()); }
+  /// Which rows may be seen of a chunk, by its number.
+  GSNAV_HD SeenRows seen_rows(std::size_t id) const noexcept {
+    return selection.seen_rows(gaussians.chunk_count(), id);
+  }
 };
 
 /// Of a set for a camera, but for `offsets` and the set's place in the frame. Host code.
 template <class S>
-ProjectArgs<S> make_project_args(const Camera& camera, const GaussianSet& set,
-                                 const ProjectionRules& rules, int max_sh_degree) noexcept {
-  ProjectArgs<S> args;
+ViewedSet<S> view_set(const Camera& camera, const GaussianSet& set, const ProjectionRules& rules,
+                      int max_sh_degree) noexcept {
+  ViewedSet<S> args;
   args.gaussians = set.gaussians;
+  args.selection = set.selection;
   args.camera = make_projection_camera<S>(camera, set, rules);
   args.camera64 = make_projection_camera<double>(camera, set, rules);
-  args.sh_degree = min(set.gaussians.sh_degree, max_sh_degree);
+  args.sh_degree = min(set.gaussians.color.degree, max_sh_degree);
   return args;
 }
 
 /// Origins of a set: at least one, at zero.
-inline std::size_t origin_count(const GaussianView& gs) noexcept {
+inline std::size_t origin_count(const GaussianRows& gs) noexcept {
   return gs.origins.empty() ? 1 : gs.origins.size;
 }
-/// Value o of ProjectArgs::offsets, in double: small where the camera is near, wherever both are in the
+/// Value o of ViewedSet::offsets, in double: small where the camera is near, wherever both are in the
 /// world. Host code.
 template <class S>
-Vec3d origin_offset(const ProjectArgs<S>& args, std::size_t o) noexcept {
+Vec3d origin_offset(const ViewedSet<S>& args, std::size_t o) noexcept {
   const View<const Vec3d> table = args.gaussians.origins;
   return (table.empty() ? Vec3d{} : table[o]) - args.camera64.position;
 }
@@ -75,23 +82,23 @@ struct ProjectOutputs {
 
 /// Whether any Gaussian of chunk c may be visible. Never no where one is.
 template <class S>
-GSNAV_HD bool chunk_is_candidate(const ProjectArgs<S>& args, std::size_t c) noexcept {
+GSNAV_HD bool chunk_is_candidate(const ViewedSet<S>& args, std::size_t c) noexcept {
   const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
-  const std::size_t id = args.gaussians.chunk_id(c);
-  return args.gaussians.may_be_seen(id) && (bounds.empty() || may_be_visible(args.camera64, bounds[id]));
+  const std::size_t id = args.selection.chunk_id(c);
+  return args.selection.may_be_seen(id) && (bounds.empty() || may_be_visible(args.camera64, bounds[id]));
 }
 
 /// Which parts of chunk c have Gaussians that may be visible: bit p for the kChunkPart rows from p
 /// kChunkPart on. Never without one that is; no bit where chunk_is_candidate says no, or where
 /// seen_rows() has none of them.
 template <class S>
-GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c) noexcept {
+GSNAV_HD std::uint32_t candidate_parts(const ViewedSet<S>& args, std::size_t c) noexcept {
   static_assert(kProjectChunk / kChunkPart <= 32);
-  const GaussianView& gs = args.gaussians;
-  const std::size_t id = gs.chunk_id(c);
-  if (!gs.may_be_seen(id)) return 0;
+  const GaussianRows& gs = args.gaussians;
+  const std::size_t id = args.selection.chunk_id(c);
+  if (!args.selection.may_be_seen(id)) return 0;
   constexpr std::size_t kParts = kProjectChunk / kChunkPart;
-  const std::uint32_t parts = gs.seen_rows(id).parts();
+  const std::uint32_t parts = args.seen_rows(id).parts();
   if (gs.chunk_bounds.empty()) return parts;
   const double s_max = detail::ChunkInView(args.camera64, gs.chunk_bounds[id]).s_max();
   if (!may_be_visible(args.camera64, gs.chunk_bounds[id], s_max)) return 0;
@@ -103,17 +110,6 @@ GSNAV_HD std::uint32_t candidate_parts(const ProjectArgs<S>& args, std::size_t c
   }
   return in_view;
 }
-
-namespace detail {
-
-/// Row i of the set's shape in camera axes.
-template <class S>
-GSNAV_HD SplatAxes<S> load_axes(const GaussianView& gs, const ProjectionCamera<S>& camera,
-                                const Vec3<S>& delta, std::size_t i) noexcept {
-  return row_axes<S>(camera.rotation, delta, SetRows<OneRow>{{gs, i}});
-}
-
-}  // namespace detail
 
 /// Unit vector along `delta` (mean - camera, asset frame), the direction that SH is evaluated in.
 template <class L>
@@ -129,25 +125,24 @@ GSNAV_HD Vec3<L> view_direction(const Vec3<L>& delta) noexcept {
 
 /// Colour of Gaussian i seen along `delta` (mean - camera, asset frame, any length), SH to `degree`.
 template <class S>
-GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::size_t i,
+GSNAV_HD SplatColor<S> gaussian_color(const ColorRows& rows, int degree, std::size_t i,
                                       Vec3<S> delta) noexcept {
   if (degree > 0) {
     delta = view_direction(delta);
-    if (!gs.sh_rotations[0].empty()) {
-      const Quat<S> q{S(gs.sh_rotations[0][i]), S(gs.sh_rotations[1][i]), S(gs.sh_rotations[2][i]),
-                      S(gs.sh_rotations[3][i])};
+    if (!rows.rotations.empty()) {
+      const Planes<const float, 4>& r = rows.rotations;
+      const Quat<S> q{S(r[0][i]), S(r[1][i]), S(r[2][i]), S(r[3][i])};
       delta = rotate(conjugate(q), delta);
     }
   }
-  if (has_packed_colors(gs)) {
+  if (rows.packed()) {
     const Vec3<S> c = sh_color<S>(
-        degree, delta, [&](int k) GSNAV_INLINED { return vec_cast<S>(packed_coefficient(gs, i, k)); });
+        degree, delta, [&](int k) GSNAV_INLINED { return vec_cast<S>(packed_coefficient(rows, i, k)); });
     return {c.x, c.y, c.z, S(0)};
   }
-  const float* sh0 = gs.sh0.data + 3 * i;
-  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(gs.sh_degree) - 1);
-  if (!gs.shN_half.empty()) {
-    const std::uint16_t* halves = gs.shN_half.data + 3 * rest * i;
+  const float* sh0 = rows.sh0.data + 3 * i;
+  if (!rows.shN_half.empty()) {
+    const std::uint16_t* halves = rows.shN_half.data + rows.rest() * i;
     const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
       if (k == 0) return Vec3<S>{S(sh0[0]), S(sh0[1]), S(sh0[2])};
       const std::uint16_t* p = halves + 3 * (k - 1);
@@ -155,7 +150,7 @@ GSNAV_HD SplatColor<S> gaussian_color(const GaussianView& gs, int degree, std::s
     });
     return {c.x, c.y, c.z, S(0)};
   }
-  const float* shn = gs.shN.data + 3 * rest * i;
+  const float* shn = rows.shN.data + rows.rest() * i;
   const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
     const float* p = k == 0 ? sh0 : shn + 3 * (k - 1);
     return Vec3<S>{S(p[0]), S(p[1]), S(p[2])};
@@ -174,9 +169,9 @@ struct RowSplat {
 /// Projects row i in the precision that its geometry needs. False where it may not be seen. `depth`:
 /// whether its depth record is asked for.
 template <class S>
-GSNAV_HD bool project_row(const ProjectArgs<S>& args, bool depth, std::size_t i,
+GSNAV_HD bool project_row(const ViewedSet<S>& args, bool depth, std::size_t i,
                           RowSplat<S>& out) noexcept {
-  const ViewedRow row({args.gaussians, i}, args.offsets);
+  const ViewedRow row({args.gaussians.shape, i}, args.offsets);
   RowKey<float> key = row_key<float>(args.camera64, row);
   if constexpr (sizeof(S) == sizeof(float)) {
     if (!(key.z > args.camera.near_plane)) return false;
@@ -202,9 +197,9 @@ GSNAV_HD bool project_row(const ProjectArgs<S>& args, bool depth, std::size_t i,
 
 /// Writes the records of row i to `slot`.
 template <class S>
-GSNAV_HD void write_splat(const ProjectArgs<S>& args, const ProjectOutputs<S>& out, std::size_t slot,
+GSNAV_HD void write_splat(const ViewedSet<S>& args, const ProjectOutputs<S>& out, std::size_t slot,
                           std::size_t i, const RowSplat<S>& row) noexcept {
-  const GaussianView& gs = args.gaussians;
+  const GaussianRows& gs = args.gaussians;
   out.bounds[slot] = row.splat.bounds;
   out.geometry[slot] = row.splat.geometry;
   if (args.camera.response != Response::ewa) out.perspectives[slot] = row.splat.perspective;
@@ -216,14 +211,14 @@ GSNAV_HD void write_splat(const ProjectArgs<S>& args, const ProjectOutputs<S>& o
         args.first_rank + (gs.row_ids.empty() ? static_cast<std::uint32_t>(i) : gs.row_ids[i]);
   }
   if (!out.colors.empty()) {
-    out.colors[slot] = gaussian_color<S>(gs, gs.degree_of(i, args.sh_degree), i, row.delta);
+    out.colors[slot] = gaussian_color<S>(gs.color, gs.color.degree_of(i, args.sh_degree), i, row.delta);
   }
 }
 
 /// Projects row i to `slot`. Returns whether it may be seen.
 template <class S>
-GSNAV_HD bool project_gaussian(const ProjectArgs<S>& args, const ProjectOutputs<S>& out,
-                               std::size_t slot, std::size_t i) noexcept {
+GSNAV_HD bool project_gaussian(const ViewedSet<S>& args, const ProjectOutputs<S>& out, std::size_t slot,
+                               std::size_t i) noexcept {
   RowSplat<S> row;
   if (!project_row(args, !out.depths.empty(), i, row)) return false;
   write_splat(args, out, slot, i, row);
@@ -233,11 +228,12 @@ GSNAV_HD bool project_gaussian(const ProjectArgs<S>& args, const ProjectOutputs<
 /// Projects chunk `c` of a set, one Gaussian after the other.
 template <class S>
 struct ProjectChunk {
-  ProjectArgs<S> args;
+  ViewedSet<S> args;
   ProjectOutputs<S> out;
 
   GSNAV_HD void operator()(std::size_t c) const noexcept {
-    const std::size_t begin = args.gaussians.chunk_id(c) * kProjectChunk, size = args.gaussians.size;
+    const std::size_t id = args.selection.chunk_id(c), size = args.gaussians.size();
+    const std::size_t begin = id * kProjectChunk;
     const std::size_t end = begin + kProjectChunk < size ? begin + kProjectChunk : size;
     const std::size_t base = (args.first_chunk + c) * kProjectChunk;
     std::uint32_t written = 0, parts = candidate_parts(args, c);
@@ -245,7 +241,7 @@ struct ProjectChunk {
       out.counts[args.first_chunk + c] = 0;
       return;
     }
-    const SeenRows seen = args.gaussians.seen_rows(args.gaussians.chunk_id(c));
+    const SeenRows seen = args.seen_rows(id);
     for (std::size_t first = begin; first < end; first += kChunkPart, parts >>= 1) {
       if ((parts & 1u) == 0) continue;
       const std::size_t last = first + kChunkPart < end ? first + kChunkPart : end;

@@ -17,7 +17,7 @@ inline constexpr std::size_t kMotionPlanes = 9;
 /// At the time t, with dt = t - times[i]: the mean is base + v dt + a dt^2 / 2 + j dt^3 / 6, the opacity
 /// base * exp(-dt^2 / (2 (sigma^2 + 1e-8))); shapes, orientations and colours stay.
 struct TemporalView {
-  GaussianView base;         ///< each Gaussian at its own time
+  GaussianRows base;         ///< each Gaussian at its own time
   View<const float> times;   ///< [N] seconds
   View<const float> sigmas;  ///< [N] seconds, >= 0; infinity: always there
   /// x, y, z of velocity (m/s), acceleration (m/s^2), jerk (m/s^3), [N] each; what is empty is zero.
@@ -47,7 +47,7 @@ GSNAV_HD Vec3<S> temporal_offset(const Vec3<S>& velocity, const Vec3<S>& acceler
 template <class S>
 GSNAV_HD Vec3<S> temporal_state(const TemporalView& in, std::size_t i, double t, S& opacity) noexcept {
   const S dt = static_cast<S>(t - static_cast<double>(in.times[i]));
-  opacity = S(in.base.opacities[i]) * temporal_weight(dt, S(in.sigmas[i]));
+  opacity = S(in.base.shape.opacities[i]) * temporal_weight(dt, S(in.sigmas[i]));
   if (!(opacity >= S(1.0 / 255))) {
     opacity = S(0);
     return {};
@@ -71,34 +71,36 @@ struct GaussianAt {
   GSNAV_HD void operator()(std::size_t i) const noexcept {
     S opacity;
     const Vec3<S> offset = temporal_state<S>(in, i, t, opacity);
-    means[0][i] = static_cast<float>(S(in.base.means[0][i]) + offset.x);
-    means[1][i] = static_cast<float>(S(in.base.means[1][i]) + offset.y);
-    means[2][i] = static_cast<float>(S(in.base.means[2][i]) + offset.z);
+    means[0][i] = static_cast<float>(S(in.base.shape.means[0][i]) + offset.x);
+    means[1][i] = static_cast<float>(S(in.base.shape.means[1][i]) + offset.y);
+    means[2][i] = static_cast<float>(S(in.base.shape.means[2][i]) + offset.z);
     opacities[i] = static_cast<float>(opacity);
   }
 };
 
 /// Bounds of chunk c of what GaussianAt wrote, of the Gaussians that are drawn.
 struct BoundChunkAt {
-  GaussianView moment;
+  GaussianRows moment;
   View<ChunkBounds> bounds;
 
   GSNAV_HD void operator()(std::size_t c) const noexcept {
+    const ShapeRows& rows = moment.shape;
     const std::size_t begin = c * kProjectChunk;
-    const std::size_t end = begin + kProjectChunk < moment.size ? begin + kProjectChunk : moment.size;
+    const std::size_t end = begin + kProjectChunk < rows.size ? begin + kProjectChunk : rows.size;
     ChunkBounds b;
     bool first = true;
     for (std::size_t i = begin; i < end; ++i) {
-      if (!(moment.opacities[i] > 0)) continue;
-      const Vec3d origin = moment.origin_ids.empty() ? Vec3d{} : moment.origins[moment.origin_ids[i]];
+      if (!(rows.opacities[i] > 0)) continue;
+      const Vec3d origin = rows.origin_ids.empty() ? Vec3d{} : moment.origins[rows.origin_ids[i]];
       for (int k = 0; k < 3; ++k) {
-        const double offset = static_cast<double>(moment.means[k][i]), x = origin[k] + offset;
+        const std::size_t axis = static_cast<std::size_t>(k);
+        const double offset = static_cast<double>(rows.means[axis][i]), x = origin[k] + offset;
         const double pad = 1e-6 * abs(offset);  // culling knows of offsets within the lattice only
         b.low[k] = first ? x - pad : min(b.low[k], x - pad);
         b.high[k] = first ? x + pad : max(b.high[k], x + pad);
-        b.scale_max = max(b.scale_max, moment.scales[k][i]);
+        b.scale_max = max(b.scale_max, rows.scales[axis][i]);
       }
-      b.opacity_max = max(b.opacity_max, moment.opacities[i]);
+      b.opacity_max = max(b.opacity_max, rows.opacities[i]);
       first = false;
     }
     bounds[c] = b;

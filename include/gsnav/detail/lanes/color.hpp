@@ -22,15 +22,15 @@ struct Survivors {
 /// gaussian_color of kWidth Gaussians of one chunk side by side, the same bits: lane l is row rows[l].
 /// The coefficients lie row by row; each group of 8 columns is transposed into lanes on its way to the
 /// registers.
-GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const std::uint32_t* rows,
+GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const std::uint32_t* rows,
                                        Vec3<F> delta) noexcept {
   constexpr int kGroup = 8;
   if (degree > 0) {
     delta = view_direction(delta);
-    if (!gs.sh_rotations[0].empty()) {
+    if (!sh.rotations.empty()) {
       float q[4][kWidth];
-      for (int k = 0; k < 4; ++k) {
-        for (int l = 0; l < kWidth; ++l) q[k][l] = gs.sh_rotations[k][rows[l]];
+      for (std::size_t k = 0; k < 4; ++k) {
+        for (int l = 0; l < kWidth; ++l) q[k][l] = sh.rotations[k][rows[l]];
       }
       const Quat<F> turned{F::load(q[0]), F::load(q[1]), F::load(q[2]), F::load(q[3])};
       delta = rotate(conjugate(turned), delta);
@@ -40,36 +40,36 @@ GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const
   typename F::vector c[3 * sh_coefficient_count(kMaxShDegree)];
   const float* at[kWidth];
   float widened[kWidth][kGroup];
-  const bool packed = has_packed_colors(gs);
+  const bool packed = sh.packed();
   for (int l = 0; l < kWidth; ++l) {
     const std::size_t row = rows[l];
     if (packed) {
-      for (std::size_t k = 0; k < 3; ++k) widened[l][k] = half_to_float(gs.packed.sh0[3 * row + k]);
+      for (std::size_t k = 0; k < 3; ++k) widened[l][k] = half_to_float(sh.sh0_half[3 * row + k]);
     }
-    at[l] = packed ? widened[l] : gs.sh0.data + 3 * row;
+    at[l] = packed ? widened[l] : sh.sh0.data + 3 * row;
   }
   F dc[3];
   load_columns<3>(at, dc);
   for (int k = 0; k < 3; ++k) c[k] = dc[k].v;
-  const std::size_t stride = static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
+  const std::size_t stride = sh.rest();
   const int columns = 3 * (sh_coefficient_count(degree) - 1);  // 0, 9, 24 or 45
-  const bool bytes = packed && !gs.packed.shN.empty();
+  const bool bytes = packed && !sh.shN_codes.empty();
   for (int first = 0; first < columns; first += kGroup) {
     const int from = first + kGroup <= columns ? first : columns - kGroup;
     if (bytes) {  // all rows are of one chunk
       float steps[kGroup];
-      const PackedChunk& chunk = gs.packed.chunks[rows[0] / kProjectChunk];
+      const PackedChunk& chunk = sh.chunks[rows[0] / kProjectChunk];
       for (int k = 0; k < kGroup; ++k) steps[k] = chunk.sh_steps[packed_band(1 + (from + k) / 3)];
       for (int l = 0; l < kWidth; ++l) {
-        const std::int8_t* codes = gs.packed.shN.data + stride * rows[l] + from;
+        const std::int8_t* codes = sh.shN_codes.data + stride * rows[l] + from;
         for (int k = 0; k < kGroup; ++k) widened[l][k] = static_cast<float>(codes[k]) * steps[k];
         at[l] = widened[l];
       }
-    } else if (gs.shN_half.empty()) {
-      for (int l = 0; l < kWidth; ++l) at[l] = gs.shN.data + stride * rows[l] + from;
+    } else if (sh.shN_half.empty()) {
+      for (int l = 0; l < kWidth; ++l) at[l] = sh.shN.data + stride * rows[l] + from;
     } else {
       for (int l = 0; l < kWidth; ++l) {
-        const std::uint16_t* halves = gs.shN_half.data + stride * rows[l] + from;
+        const std::uint16_t* halves = sh.shN_half.data + stride * rows[l] + from;
         for (int k = 0; k < kGroup; ++k) widened[l][k] = half_to_float(halves[k]);
         at[l] = widened[l];
       }
@@ -85,17 +85,17 @@ GSNAV_HD SplatColor<F> gaussian_colors(const GaussianView& gs, int degree, const
 }
 
 /// Asks for the coefficients of rows [first, first + kWidth), which color_survivors will read.
-GSNAV_HD void prefetch_colors(const GaussianView& gs, int degree, std::size_t first) noexcept {
+GSNAV_HD void prefetch_colors(const ColorRows& sh, std::size_t size, int degree,
+                              std::size_t first) noexcept {
   constexpr std::size_t kLine = 64;
   if (degree == 0) return;
-  const bool codes = has_packed_colors(gs) && !gs.packed.shN.empty(), halves = !gs.shN_half.empty();
-  const void* const data = codes    ? static_cast<const void*>(gs.packed.shN.data)
-                           : halves ? static_cast<const void*>(gs.shN_half.data)
-                                    : gs.shN.data;
+  const bool codes = sh.packed() && !sh.shN_codes.empty(), halves = !sh.shN_half.empty();
+  const void* const data = codes    ? static_cast<const void*>(sh.shN_codes.data)
+                           : halves ? static_cast<const void*>(sh.shN_half.data)
+                                    : sh.shN.data;
   const std::size_t bytes = codes ? 1 : halves ? sizeof(std::uint16_t) : sizeof(float);
-  const std::size_t stride =
-      bytes * static_cast<std::size_t>(3 * (sh_coefficient_count(gs.sh_degree) - 1));
-  const std::size_t begin = stride * first, room = stride * gs.size - begin;
+  const std::size_t stride = bytes * sh.rest();
+  const std::size_t begin = stride * first, room = stride * size - begin;
   const std::size_t rows = stride * static_cast<std::size_t>(kWidth),
                     end = begin + (rows < room ? rows : room);
   for (std::size_t i = begin; i < end; i += kLine)
@@ -105,7 +105,7 @@ GSNAV_HD void prefetch_colors(const GaussianView& gs, int degree, std::size_t fi
 /// Colours of the `count` survivors of a chunk, to out[0] on. They are read when all of the chunk's
 /// geometry has been written: coefficients are most of what a frame reads, and come fastest as one
 /// stream.
-GSNAV_STAGE void color_survivors(const GaussianView& gs, int degree, Survivors& s, std::size_t count,
+GSNAV_STAGE void color_survivors(const ColorRows& sh, int degree, Survivors& s, std::size_t count,
                                  SplatColor<float>* out) noexcept {
   constexpr std::size_t step = static_cast<std::size_t>(kWidth);
   if (count == 0) return;
@@ -115,7 +115,7 @@ GSNAV_STAGE void color_survivors(const GaussianView& gs, int degree, Survivors& 
     std::memcpy(delta[0], s.delta[0] + i, sizeof delta[0]);
     std::memcpy(delta[1], s.delta[1] + i, sizeof delta[1]);
     std::memcpy(delta[2], s.delta[2] + i, sizeof delta[2]);
-    const SplatColor<F> c = gaussian_colors(gs, degree, s.rows + i,
+    const SplatColor<F> c = gaussian_colors(sh, degree, s.rows + i,
                                             {F::load(delta[0]), F::load(delta[1]), F::load(delta[2])});
     const F columns[4] = {c.r, c.g, c.b, c.pad};
     float rows[4 * kWidth];

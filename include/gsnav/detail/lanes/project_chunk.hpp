@@ -16,7 +16,7 @@ inline namespace GSNAV_LANES_TAG {
 struct PackOfRows {
   using lane = F;
   static constexpr std::size_t kStep = static_cast<std::size_t>(kWidth);
-  const GaussianView& gs;
+  const ShapeRows& shape;
   const PackedChunk* packed;  ///< null where shapes are floats
   std::size_t i, count;
 
@@ -29,7 +29,7 @@ struct PackOfRows {
     return F::load(tail);
   }
   GSNAV_HD F codes(int plane) const noexcept {
-    const std::uint16_t* const from = gs.packed.codes.data + static_cast<std::size_t>(plane) * gs.size;
+    const std::uint16_t* const from = shape.codes.data + static_cast<std::size_t>(plane) * shape.size;
     float values[kStep];
     if (count == kStep) {
       for (std::size_t k = 0; k < kStep; ++k) values[k] = static_cast<float>(from[i + k]);
@@ -40,10 +40,10 @@ struct PackOfRows {
   }
   GSNAV_HD Vec3<doubles_of<F>> offset(const View<const Vec3d>& offsets) const noexcept {
     using D = doubles_of<F>;
-    if (gs.origin_ids.empty()) return {D(offsets[0].x), D(offsets[0].y), D(offsets[0].z)};
+    if (shape.origin_ids.empty()) return {D(offsets[0].x), D(offsets[0].y), D(offsets[0].z)};
     double planes[3][kStep];
     for (std::size_t k = 0; k < kStep; ++k) {
-      const Vec3d& o = offsets[gs.origin_ids[row(k)]];
+      const Vec3d& o = offsets[shape.origin_ids[row(k)]];
       planes[0][k] = o.x;
       planes[1][k] = o.y;
       planes[2][k] = o.z;
@@ -53,22 +53,22 @@ struct PackOfRows {
 };
 
 /// The chunk by rules that are not worth lanes of their own.
-GSNAV_STAGE void project_chunk_alone(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+GSNAV_STAGE void project_chunk_alone(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                                      std::size_t c) noexcept {
   ProjectChunk<float>{args, out}(c);
 }
 
 /// ProjectChunk<float> with kWidth Gaussians side by side; the same bits.
-inline void project_chunk(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+inline void project_chunk(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                           std::size_t c) noexcept {
-  const GaussianView& gs = args.gaussians;
+  const ShapeRows& shape = args.gaussians.shape;
   const ProjectionCamera<float>& camera = args.camera;
   if (camera.response != Response::ewa || camera.compat != Compat::none) {
     project_chunk_alone(args, out, c);
     return;
   }
-  const std::size_t begin = gs.chunk_id(c) * kProjectChunk;
-  const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
+  const std::size_t id = args.selection.chunk_id(c), begin = id * kProjectChunk;
+  const std::size_t end = begin + kProjectChunk < shape.size ? begin + kProjectChunk : shape.size;
   const std::size_t base = (args.first_chunk + c) * kProjectChunk;
   constexpr std::size_t step = PackOfRows::kStep;
   const std::uint32_t parts = candidate_parts(args, c);
@@ -76,8 +76,8 @@ inline void project_chunk(const ProjectArgs<float>& args, const ProjectOutputs<f
     out.counts[args.first_chunk + c] = 0;
     return;
   }
-  const SeenRows may_be_seen = gs.seen_rows(gs.chunk_id(c));
-  const PackedChunk* const packed = is_packed(gs) ? &gs.packed.chunks[gs.chunk_id(c)] : nullptr;
+  const SeenRows may_be_seen = args.seen_rows(id);
+  const PackedChunk* const packed = shape.packed() ? &shape.chunks[id] : nullptr;
   std::uint32_t written = 0;
   Survivors survivors;
   static_assert(kChunkPart % step == 0 && 32 % step == 0);
@@ -86,7 +86,7 @@ inline void project_chunk(const ProjectArgs<float>& args, const ProjectOutputs<f
     const std::uint32_t wanted = may_be_seen.word((i - begin) / 32) >> ((i - begin) % 32);
     if ((wanted & ((1u << step) - 1u)) == 0) continue;
     const std::size_t count = end - i < step ? end - i : step;
-    const ViewedRows<PackOfRows> rows({gs, packed, i, count}, args.offsets);
+    const ViewedRows<PackOfRows> rows({shape, packed, i, count}, args.offsets);
     const RowKey<F> key = row_key<F>(args.camera64, rows);
     if (!any(key.z > F(camera.near_plane))) continue;
     const SeenRow<F> seen(camera, rows, key);
@@ -94,7 +94,8 @@ inline void project_chunk(const ProjectArgs<float>& args, const ProjectOutputs<f
     if (bits != 0) written += write_splats(args, out, base, written, {i, key, seen}, bits, survivors);
   }
   if (!out.colors.empty()) {
-    color_survivors(gs, gs.degree_of(begin, args.sh_degree), survivors, written, out.colors.data + base);
+    const ColorRows& sh = args.gaussians.color;
+    color_survivors(sh, sh.degree_of(begin, args.sh_degree), survivors, written, out.colors.data + base);
   }
   out.counts[args.first_chunk + c] = written;
 }

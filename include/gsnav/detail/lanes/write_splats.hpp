@@ -105,7 +105,7 @@ GSNAV_HD void copy_record(T& record, const float* from) noexcept {
 GSNAV_HD F as_floats(F::ints x) noexcept { return F(gsnav::detail::floats<kWidth>(x)); }
 
 /// One row by itself, with all that needs double.
-GSNAV_STAGE bool project_alone(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+GSNAV_STAGE bool project_alone(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                                std::size_t slot, std::size_t row) noexcept {
   return project_gaussian(args, out, slot, row);
 }
@@ -115,11 +115,11 @@ GSNAV_STAGE bool project_alone(const ProjectArgs<float>& args, const ProjectOutp
 /// Writes the survivors `bits` of a pack, in row order, behind the `count` that their chunk has from
 /// slot `base` on: the bits of write_splat, but for colours, which `survivors` are left to. Returns how
 /// many had a pixel centre in their bounds. Contract only: Response::ewa, Compat::none.
-GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                                        std::size_t base, std::size_t count, const ProjectedPack& pack,
                                        std::uint32_t bits, Survivors& survivors) noexcept {
   const std::size_t slot = base + count;
-  const GaussianView& gs = args.gaussians;
+  const GaussianRows& gs = args.gaussians;
   const ProjectionCamera<float>& camera = args.camera;
   const Projected<F>& p = pack.seen.splat;
   const PixelBox<F> box = gsnav::detail::pixel_box(camera, p);
@@ -129,7 +129,9 @@ GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, const Pro
   if (!out.open.empty()) bits &= detail::reaching_open(out.open, box, bits) | alone;
   if (bits == 0) return 0;
   const bool color = !out.colors.empty(), depth = !out.depths.empty();
-  if (color) prefetch_colors(gs, gs.degree_of(pack.first, args.sh_degree), pack.first);
+  if (color) {
+    prefetch_colors(gs.color, gs.size(), gs.color.degree_of(pack.first, args.sh_degree), pack.first);
+  }
 
   doubles_of<F> mean_x, mean_y;
   gsnav::detail::project_mean(args.camera64, pack.key.delta64, mean_x, mean_y);
@@ -172,7 +174,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ProjectArgs<float>& args, const Pro
   sort_key(args.camera64, pack.key).store(key);
   for (int l = 0; l < kWidth; ++l) keys[l] = camera.key_code(key[l]);
   const std::uint32_t first = static_cast<std::uint32_t>(pack.first),
-                      last = static_cast<std::uint32_t>(gs.size - 1);
+                      last = static_cast<std::uint32_t>(gs.size() - 1);
   for (std::uint32_t l = 0; l < static_cast<std::uint32_t>(kWidth); ++l) rows[l] = first + l;
   for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + rows[l];
   if (!gs.row_ids.empty() && !out.ranks.empty()) {

@@ -13,7 +13,7 @@ namespace gsnav {
 
 /// Checks that the arrays fit each other; names the one that does not.
 inline Status validate(const TemporalView& in) {
-  const std::size_t n = in.base.size;
+  const std::size_t n = in.base.size();
   Status status;
   const auto sized = [&](const View<const float>& v, std::size_t want, const char* name) {
     if (status.ok() && v.size != want) {
@@ -22,8 +22,8 @@ inline Status validate(const TemporalView& in) {
                                             std::to_string(want) + " are needed"};
     }
   };
-  for (const auto& plane : in.base.means) sized(plane, n, "base.means");
-  sized(in.base.opacities, n, "base.opacities");
+  for (std::size_t k = 0; k < 3; ++k) sized(in.base.shape.means[k], n, "base.means");
+  sized(in.base.shape.opacities, n, "base.opacities");
   sized(in.times, n, "times");
   sized(in.sigmas, n, "sigmas");
   for (std::size_t k = 0; k < kMotionPlanes; ++k)
@@ -42,7 +42,7 @@ struct Moment {
   Buffer<float, B> means[3];
   Buffer<float, B> opacities;
   Buffer<ChunkBounds, B> bounds;
-  GaussianView
+  GaussianRows
       gaussians;  ///< what to render: the base's shapes and colours, the moment's means and opacities
 };
 
@@ -56,22 +56,22 @@ template <class S, Backend B>
 Status gaussians_at(B& backend, const TemporalView& in, double t, Moment<B>& out) {
   if (Status s = validate(in); !s) return s;
   if (!is_finite(t)) return {Errc::invalid_argument, "gaussians_at: the time is " + std::to_string(t)};
-  const std::size_t n = in.base.size;
+  const std::size_t n = in.base.size();
   GaussianAt<S> at{in, t, {}, {}};
   out.gaussians = in.base;
   for (std::size_t k = 0; k < 3; ++k) {
     out.means[k].resize_discard(n);
     at.means[k] = out.means[k].view();
-    out.gaussians.means[k] = {out.means[k].data(), n};
+    out.gaussians.shape.means.set(k, {out.means[k].data(), n});
   }
   out.opacities.resize_discard(n);
   at.opacities = out.opacities.view();
-  out.gaussians.opacities = {out.opacities.data(), n};
+  out.gaussians.shape.opacities = {out.opacities.data(), n};
   backend.parallel_for(n, at);
   out.gaussians.chunk_bounds = out.gaussians.part_bounds = {};
   if constexpr (is_host_backend<B>) {
     if (!in.base.chunk_bounds.empty()) {
-      const std::size_t chunks = in.base.all_chunks();
+      const std::size_t chunks = in.base.chunk_count();
       out.bounds.resize_discard(chunks);
       backend.parallel_for(chunks, BoundChunkAt{out.gaussians, out.bounds.view()});
       out.gaussians.chunk_bounds = {out.bounds.data(), chunks};

@@ -18,12 +18,12 @@ namespace detail {
 /// Whether a mesh hides every Gaussian of a chunk at every pixel that it may reach (host memory). Never
 /// yes where one is seen: bounds are those of chunk_extent, and the reach of a depth is at most that of
 /// the largest and most opaque.
-inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const TileGrid& grid,
+inline bool mesh_hides_chunk(const ViewedSet<float>& args, const TileGrid& grid,
                              const View<const float>& tile_far, std::size_t c) noexcept {
   const ProjectionCamera<double>& camera = args.camera64;
   const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
   if (bounds.empty() || camera.response != Response::ewa || camera.compat != Compat::none) return false;
-  const ChunkBounds& chunk = bounds[args.gaussians.chunk_id(c)];
+  const ChunkBounds& chunk = bounds[args.selection.chunk_id(c)];
   const ChunkExtent e = chunk_extent(camera, chunk);
   const double k2 = 2 * kLn2 * (ChunkInView(camera, chunk).s_max() + 1e-5);
   const double reach = sqrt(max(k2, 0.0)) * static_cast<double>(chunk.scale_max) * camera.scale;
@@ -46,7 +46,7 @@ inline bool mesh_hides_chunk(const ProjectArgs<float>& args, const TileGrid& gri
 
 /// Projects the chunks of a set that a mesh does not hide; `list` is scratch, `counts` are 0.
 template <class B>
-void project_unhidden(B& backend, const ProjectArgs<float>& args, const ProjectOutputs<float>& out,
+void project_unhidden(B& backend, const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                       const View<const float>& tile_far, std::vector<std::uint32_t>& list) {
   const std::size_t n = args.chunk_count();
   list.resize(n);

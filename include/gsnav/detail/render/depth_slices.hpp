@@ -22,7 +22,7 @@ namespace gsnav {
 /// Backends that can draw a frame in slices of depth.
 template <class B, class S>
 concept SlicingBackend = Backend<B> && is_host_backend<B> &&
-    RunsStage<B, stage::Project, ProjectArgs<S>, ProjectOutputs<S>, View<const std::uint32_t>>;
+    RunsStage<B, stage::Project, ViewedSet<S>, ProjectOutputs<S>, View<const std::uint32_t>>;
 
 /// A frame in slices of depth, front to back: what a slice leaves closed, the next need not project,
 /// colour, sort or bin. The image is that of one slice, bit for bit: a pixel meets the same splats in
@@ -36,22 +36,22 @@ class DepthSlices {
 
   /// Finds how deep each chunk lies and where in the image. `sets`: one projection a set.
   template <class B>
-  void plan(B& backend, View<const ProjectArgs<float>> sets) {
+  void plan(B& backend, View<const ViewedSet<float>> sets) {
     chunks_.resize(sets.size == 0 ? 0
                                   : sets[sets.size - 1].first_chunk + sets[sets.size - 1].chunk_count());
-    for (const ProjectArgs<float>& args : sets) {
+    for (const ViewedSet<float>& args : sets) {
       backend.parallel_for(args.chunk_count(), [this, &args](std::size_t c) {
         chunks_[args.first_chunk + c] = place_of(args, c);
       });
     }
     weights_.fill(0);
     candidates_ = 0;
-    for (const ProjectArgs<float>& args : sets) {
+    for (const ViewedSet<float>& args : sets) {
       for (std::size_t c = 0; c < args.chunk_count(); ++c) {
         const Place& place = chunks_[args.first_chunk + c];
         if (!place.candidate()) continue;
-        const std::size_t first = args.gaussians.chunk_id(c) * kProjectChunk;
-        const std::size_t n = std::min(kProjectChunk, args.gaussians.size - first);
+        const std::size_t first = args.selection.chunk_id(c) * kProjectChunk;
+        const std::size_t n = std::min(kProjectChunk, args.gaussians.size() - first);
         weights_[place.bucket] += n;
         candidates_ += n;
       }
@@ -82,7 +82,7 @@ class DepthSlices {
   }
   /// The chunks of one set that slice s projects: those that may reach a cell of `open`, or all where
   /// that is empty.
-  View<const std::uint32_t> chunks(int s, const ProjectArgs<float>& args, const OpenCells& open) {
+  View<const std::uint32_t> chunks(int s, const ViewedSet<float>& args, const OpenCells& open) {
     const std::size_t begin = s == 0 ? 0 : ends_[static_cast<std::size_t>(s - 1)];
     const std::size_t end = ends_[static_cast<std::size_t>(s)];
     list_.clear();
@@ -145,15 +145,16 @@ class DepthSlices {
   std::uint32_t key_of_bucket(std::size_t bucket) const noexcept {
     return base_ + (static_cast<std::uint32_t>(bucket) << kBucketShift);
   }
-  Place place_of(const ProjectArgs<float>& args, std::size_t c) const noexcept {
+  Place place_of(const ViewedSet<float>& args, std::size_t c) const noexcept {
     constexpr int kSize = OpenCells::kSize;
     const int width = args.camera.width, height = args.camera.height;
     const auto cells = [](int size) { return static_cast<std::uint16_t>((size + kSize - 1) / kSize); };
     const std::uint16_t columns = cells(width), rows = cells(height);
     const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
-    if (!args.gaussians.may_be_seen(args.gaussians.chunk_id(c))) return {};
+    const std::size_t id = args.selection.chunk_id(c);
+    if (!args.selection.may_be_seen(id)) return {};
     if (bounds.empty()) return {0, 0, 0, columns, rows};
-    const ChunkBounds& chunk = bounds[args.gaussians.chunk_id(c)];
+    const ChunkBounds& chunk = bounds[id];
     if (!may_be_visible(args.camera64, chunk)) return {};
     const ChunkExtent e = chunk_extent(args.camera64, chunk);
     // Of what is not finite nothing is known: it lies nearest, everywhere.

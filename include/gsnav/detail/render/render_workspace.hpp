@@ -63,8 +63,8 @@ struct RenderWorkspace {
   FragmentWorkspace<S, B> fragments;
   Buffer<S, B> composite;  ///< of Composite::hard_depth: what the Gaussians alone have
   std::vector<Vec3d> host_offsets;
-  std::vector<ProjectArgs<S>> projections;  ///< [sets]
-  ProjectOutputs<S> projected;              ///< of the frame
+  std::vector<ViewedSet<S>> projections;  ///< [sets]
+  ProjectOutputs<S> projected;            ///< of the frame
 
   std::size_t bytes() const noexcept {
     std::size_t sum = 0;

@@ -88,9 +88,9 @@ template <Backend B>
 requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspace<B>& ws,
                                                    GaussianSet set, const Camera& camera,
                                                    std::span<float> most) {
-  if (most.size() != set.gaussians.size) {
+  if (most.size() != set.gaussians.size()) {
     return {Errc::invalid_argument, "add_row_weights: `most` has " + std::to_string(most.size()) +
-                                        " values for " + std::to_string(set.gaussians.size) + " rows"};
+                                        " values for " + std::to_string(set.gaussians.size()) + " rows"};
   }
   RenderConfig config;
   config.profile = Profile::fast;

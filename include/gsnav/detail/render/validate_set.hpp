@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <iterator>
 #include <string>
+#include <utility>
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/frame/gaussians.hpp"
@@ -11,38 +14,108 @@
 
 namespace gsnav {
 
-/// Packed rows: each plane where it is wanted, and no axes beside them.
-inline Status validate_packed(const GaussianView& g) {
-  const PackedRows& p = g.packed;
-  const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(g.sh_degree) - 1);
-  const bool codes = p.codes.size == PackedRows::kPlanes * g.size ||
-                     (p.codes.size == PackedRows::kMeans * g.size && !g.means[0].empty());
-  const char* wrong = !codes                                          ? "codes"
-                      : p.chunks.size != g.all_chunks()               ? "chunks"
-                      : !p.sh0.empty() && p.sh0.size != 3 * g.size    ? "sh0"
-                      : !p.shN.empty() && p.shN.size != rest * g.size ? "shN"
-                      : !p.shN.empty() && p.sh0.empty()               ? "shN (without sh0)"
-                      : !p.shN.empty() && !g.shN_half.empty()         ? "shN (beside shN_half)"
-                      : !g.axes[0].empty()                            ? "codes (beside axes)"
-                                                                      : nullptr;
-  if (wrong == nullptr) return {};
-  return {Errc::invalid_argument, std::string("GaussianSet: packed.") + wrong + " do not fit " +
-                                      std::to_string(g.size) + " Gaussians of SH degree " +
-                                      std::to_string(g.sh_degree)};
+namespace detail {
+
+/// Names the packed array that does not fit, or null.
+inline const char* wrong_packed(const GaussianRows& g) noexcept {
+  const ShapeRows& shape = g.shape;
+  const ColorRows& color = g.color;
+  const std::size_t n = g.size();
+  if (!shape.codes.empty()) {
+    const bool means_are_floats = shape.codes.size == ShapeRows::kMeans * n && !shape.means.empty();
+    if (shape.codes.size != ShapeRows::kCodePlanes * n && !means_are_floats) return "shape.codes";
+    if (shape.chunks.size != g.chunk_count()) return "shape.chunks";
+    if (!shape.axes.empty()) return "shape.codes (beside axes)";
+  }
+  if (!color.sh0_half.empty() && color.sh0_half.size != 3 * n) return "color.sh0_half";
+  if (color.shN_codes.empty()) return nullptr;
+  if (color.shN_codes.size != color.rest() * n) return "color.shN_codes";
+  if (color.chunks.size != g.chunk_count()) return "color.chunks";
+  if (color.sh0_half.empty()) return "color.shN_codes (without sh0_half)";
+  return color.shN_half.empty() ? nullptr : "color.shN_codes (beside shN_half)";
+}
+
+}  // namespace detail
+
+namespace detail {
+
+/// Names the array that is null and has a size, or null.
+inline const char* null_array(const GaussianSet& set) noexcept {
+  const GaussianRows& g = set.gaussians;
+  const auto null = [](const auto& v) { return v.data == nullptr && v.size != 0; };
+  const auto null_plane = [](const auto& planes) {
+    for (std::size_t k = 0; k < std::size(planes.data); ++k) {
+      if (planes.data[k] == nullptr && planes.size != 0) return true;
+    }
+    return false;
+  };
+  return null_plane(g.shape.means)          ? "shape.means"
+         : null_plane(g.shape.quats)        ? "shape.quats"
+         : null_plane(g.shape.scales)       ? "shape.scales"
+         : null_plane(g.shape.axes)         ? "shape.axes"
+         : null(g.shape.opacities)          ? "shape.opacities"
+         : null(g.shape.origin_ids)         ? "shape.origin_ids"
+         : null(g.shape.codes)              ? "shape.codes"
+         : null(g.shape.chunks)             ? "shape.chunks"
+         : null(g.color.sh0)                ? "color.sh0"
+         : null(g.color.shN)                ? "color.shN"
+         : null(g.color.shN_half)           ? "color.shN_half"
+         : null(g.color.sh0_half)           ? "color.sh0_half"
+         : null(g.color.shN_codes)          ? "color.shN_codes"
+         : null(g.color.chunks)             ? "color.chunks"
+         : null_plane(g.color.rotations)    ? "color.rotations"
+         : null(g.color.chunk_degrees)      ? "color.chunk_degrees"
+         : null(g.origins)                  ? "origins"
+         : null(g.row_ids)                  ? "row_ids"
+         : null(g.chunk_bounds)             ? "chunk_bounds"
+         : null(g.part_bounds)              ? "part_bounds"
+         : null(set.selection.drawn_chunks) ? "selection.drawn_chunks"
+         : null(set.selection.seen)         ? "selection.seen"
+                                            : nullptr;
+}
+
+/// Names the planes of which one is longer than another, or null.
+inline const char* unequal_planes(const GaussianRows& g) noexcept {
+  const auto unequal = [](const auto& planes) { return planes.size == planes.kUnequal; };
+  return unequal(g.shape.means)       ? "shape.means"
+         : unequal(g.shape.quats)     ? "shape.quats"
+         : unequal(g.shape.scales)    ? "shape.scales"
+         : unequal(g.shape.axes)      ? "shape.axes"
+         : unequal(g.color.rotations) ? "color.rotations"
+                                      : nullptr;
+}
+
+}  // namespace detail
+
+/// Checks which rows of a set of so many chunks are drawn.
+inline Status validate(const Selection& selection, std::size_t chunks) {
+  if (!selection.seen.empty() && !seen_may_have(selection.seen.size, chunks)) {
+    return {Errc::invalid_argument,
+            "GaussianSet: selection.seen has " + std::to_string(selection.seen.size) + " words where " +
+                std::to_string(seen_chunk_words(chunks)) + " are needed, or twice as many and " +
+                std::to_string(kSeenRowWords) + " a chunk that is seen"};
+  }
+  if (selection.drawn_chunks.size > chunks) {
+    return {Errc::invalid_argument, "GaussianSet: selection.drawn_chunks has " +
+                                        std::to_string(selection.drawn_chunks.size) + " chunks of " +
+                                        std::to_string(chunks)};
+  }
+  return {};
 }
 
 /// Checks a set against what kernels assume; names the array that does not fit.
 inline Status validate(const GaussianSet& set) {
-  const GaussianView& g = set.gaussians;
+  const GaussianRows& g = set.gaussians;
+  const ShapeRows& shape = g.shape;
+  const ColorRows& color = g.color;
+  const std::size_t n = g.size(), chunks = g.chunk_count();
   const auto bad = [](const std::string& what) {
     return Status(Errc::invalid_argument, "GaussianSet: " + what);
   };
-  const auto sized = [&](const View<const float>& v, std::size_t n, const char* name) {
-    if (v.data == nullptr && v.size != 0)
-      return bad(std::string(name) + " is null, with a size of " + std::to_string(v.size));
-    return v.size == n ? Status()
-                       : bad(std::string(name) + " has " + std::to_string(v.size) + " values where " +
-                             std::to_string(n) + " are needed");
+  const auto counted = [&](const char* name, std::size_t has, std::size_t wanted) {
+    return has == wanted ? Status()
+                         : bad(std::string(name) + " has " + std::to_string(has) + " values where " +
+                               std::to_string(wanted) + " are needed");
   };
   if (set.filter > Filter::mip)
     return bad("filter = " + std::to_string(static_cast<int>(set.filter)) +
@@ -51,84 +124,44 @@ inline Status validate(const GaussianSet& set) {
     return bad("color_space = " + std::to_string(static_cast<int>(set.color_space)) +
                ": there is none of this number");
   }
-  const auto null = [](const auto& v) { return v.data == nullptr && v.size != 0; };
-  const char* nothing = null(g.shN_half)           ? "shN_half"
-                        : null(g.row_ids)          ? "row_ids"
-                        : null(g.origin_ids)       ? "origin_ids"
-                        : null(g.origins)          ? "origins"
-                        : null(g.chunk_bounds)     ? "chunk_bounds"
-                        : null(g.part_bounds)      ? "part_bounds"
-                        : null(g.chunk_sh_degrees) ? "chunk_sh_degrees"
-                        : null(g.drawn_chunks)     ? "drawn_chunks"
-                        : null(g.seen)             ? "seen"
-                                                   : nullptr;
-  if (nothing != nullptr) return bad(std::string(nothing) + " is null, with a size");
-  if (g.sh_degree < 0 || g.sh_degree > kMaxShDegree) {
-    return bad("sh_degree = " + std::to_string(g.sh_degree) + ": must be in [0, 3]");
+  if (color.degree < 0 || color.degree > kMaxShDegree) {
+    return bad("color.degree = " + std::to_string(color.degree) + ": must be in [0, 3]");
   }
-  const bool has_axes = !g.axes[0].empty(), packed = !g.packed.codes.empty();
-  if (packed) {
-    if (Status s = validate_packed(g); !s) return s;
+  const char* wrong = detail::null_array(set);
+  if (wrong != nullptr) return bad(std::string(wrong) + " is null, with a size");
+  wrong = detail::unequal_planes(g);
+  if (wrong != nullptr) return bad(std::string(wrong) + " has arrays of different lengths");
+  wrong = detail::wrong_packed(g);
+  if (wrong != nullptr) {
+    return bad(std::string(wrong) + " does not fit " + std::to_string(n) + " Gaussians of SH degree " +
+               std::to_string(color.degree));
   }
-  for (int k = 0; k < 9 && has_axes; ++k) {
-    if (Status s = sized(g.axes[k], g.size, "axes"); !s) return s;
+
+  const bool packed = !shape.codes.empty(), has_axes = !shape.axes.empty();
+  const bool packed_means = packed && shape.codes.size == ShapeRows::kCodePlanes * n;
+  const std::size_t rest = color.rest() * n;
+  const std::pair<const char*, std::array<std::size_t, 2>> lengths[] = {
+      {"shape.means", {shape.means.size, packed_means ? 0 : n}},
+      {"shape.scales", {shape.scales.size, has_axes || packed ? shape.scales.size : n}},
+      {"shape.quats", {shape.quats.size, has_axes || packed ? shape.quats.size : n}},
+      {"shape.axes", {shape.axes.size, has_axes ? n : 0}},
+      {"shape.opacities", {shape.opacities.size, packed ? 0 : n}},
+      {"color.rotations", {color.rotations.size, color.rotations.empty() ? 0 : n}},
+      {"color.sh0", {color.sh0.size, color.sh0_half.empty() ? 3 * n : 0}},
+      {"color.shN", {color.shN.size, color.shN_half.empty() && color.shN_codes.empty() ? rest : 0}},
+      {"color.shN_half", {color.shN_half.size, color.shN_half.empty() ? 0 : rest}},
+      {"color.chunk_degrees", {color.chunk_degrees.size, color.chunk_degrees.empty() ? 0 : chunks}},
+      {"shape.origin_ids", {shape.origin_ids.size, shape.origin_ids.empty() ? 0 : n}},
+      {"row_ids", {g.row_ids.size, g.row_ids.empty() ? 0 : n}},
+      {"chunk_bounds", {g.chunk_bounds.size, g.chunk_bounds.empty() ? 0 : chunks}},
+      {"part_bounds",
+       {g.part_bounds.size, g.part_bounds.empty() ? 0 : (n + kChunkPart - 1) / kChunkPart}},
+  };
+  for (const auto& [name, length] : lengths) {
+    if (Status s = counted(name, length[0], length[1]); !s) return s;
   }
-  for (int k = 0; k < 3; ++k) {
-    if (Status s =
-            sized(g.means[k], packed && g.packed.codes.size == PackedRows::kPlanes * g.size ? 0 : g.size,
-                  "means");
-        !s) {
-      return s;
-    }
-    if (has_axes || packed) continue;
-    if (Status s = sized(g.scales[k], g.size, "scales"); !s) return s;
-  }
-  for (int k = 0; k < 4; ++k) {
-    if (!g.sh_rotations[k].empty()) {
-      if (Status s = sized(g.sh_rotations[k], g.size, "sh_rotations"); !s) return s;
-    }
-    if (has_axes || packed) continue;
-    if (Status s = sized(g.quats[k], g.size, "quats"); !s) return s;
-  }
-  if (Status s = sized(g.opacities, packed ? 0 : g.size, "opacities"); !s) return s;
-  const bool bytes = packed && !g.packed.shN.empty();
-  if (Status s = sized(g.sh0, packed && !g.packed.sh0.empty() ? 0 : 3 * g.size, "sh0"); !s) return s;
-  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(g.sh_degree) - 1);
-  if (g.shN_half.empty()) {
-    if (Status s = sized(g.shN, bytes ? 0 : 3 * rest * g.size, "shN"); !s) return s;
-  } else if (g.shN_half.size != 3 * rest * g.size || !g.shN.empty()) {
-    return bad("shN_half has " + std::to_string(g.shN_half.size) + " values where " +
-               std::to_string(3 * rest * g.size) + " are needed, and shN must be empty beside it");
-  }
-  if (!g.row_ids.empty() && g.row_ids.size != g.size) {
-    return bad("row_ids has " + std::to_string(g.row_ids.size) + " values where " +
-               std::to_string(g.size) + " are needed");
-  }
-  if (!g.chunk_bounds.empty() && g.chunk_bounds.size != g.all_chunks()) {
-    return bad("chunk_bounds has " + std::to_string(g.chunk_bounds.size) + " values where " +
-               std::to_string(g.all_chunks()) + " are needed");
-  }
-  const std::size_t parts = (g.size + kChunkPart - 1) / kChunkPart;
-  if (!g.part_bounds.empty() && g.part_bounds.size != parts) {
-    return bad("part_bounds has " + std::to_string(g.part_bounds.size) + " values where " +
-               std::to_string(parts) + " are needed");
-  }
-  if (!g.chunk_sh_degrees.empty() && g.chunk_sh_degrees.size != g.all_chunks()) {
-    return bad("chunk_sh_degrees has " + std::to_string(g.chunk_sh_degrees.size) + " values where " +
-               std::to_string(g.all_chunks()) + " are needed");
-  }
-  if (!g.seen.empty() && !g.seen_may_have(g.seen.size)) {
-    return bad("seen has " + std::to_string(g.seen.size) + " words where " +
-               std::to_string(g.seen_words()) + " are needed, or twice as many and " +
-               std::to_string(kSeenRowWords) + " a chunk that is seen");
-  }
-  if (g.drawn_chunks.size > g.all_chunks()) {
-    return bad("drawn_chunks has " + std::to_string(g.drawn_chunks.size) + " chunks of " +
-               std::to_string(g.all_chunks()));
-  }
-  if (!g.origin_ids.empty() && (g.origin_ids.size != g.size || g.origins.empty())) {
-    return bad("origin_ids needs one id per Gaussian and a table of origins");
-  }
+  if (!shape.origin_ids.empty() && g.origins.empty()) return bad("shape.origin_ids needs origins");
+  if (Status s = validate(set.selection, chunks); !s) return s;
   if (!(set.eps2d > 0) || !is_finite(set.eps2d)) {
     return bad("eps2d = " + std::to_string(set.eps2d) + ": must be positive");
   }

@@ -53,12 +53,12 @@ inline std::size_t limit_sh_degree(PackedCloud& cloud, int degree) {
 template <class Cloud>
 void drop_bands(Cloud& cloud, SceneProfile& profile) {
   profile.bytes_let_go +=
-      limit_sh_degree(cloud, needed_sh_degree(profile.applied_to(cloud.set()).gaussians));
-  const GaussianView v = cloud.view();
-  const std::size_t number = !v.packed.shN.empty() ? 1
+      limit_sh_degree(cloud, needed_sh_degree(profile.applied_to(cloud.set()).gaussians.color));
+  const ColorRows v = cloud.view().color;
+  const std::size_t number = !v.shN_codes.empty()  ? 1
                              : !v.shN_half.empty() ? sizeof(std::uint16_t)
                                                    : sizeof(float);
-  profile.bytes_unneeded = number * (sh_band_numbers(v.sh_degree) * v.size - profile.sh_numbers_read);
+  profile.bytes_unneeded = number * (v.rest() * cloud.size() - profile.sh_numbers_read);
 }
 
 }  // namespace gsnav

@@ -52,8 +52,8 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
   FrameLedger out;
   std::size_t rows = 0;
   for (const GaussianSet& set : sets) {
-    rows += set.gaussians.size;
-    if (set.color_space != config.blend_space) out.converted += set.gaussians.size;
+    rows += set.gaussians.size();
+    if (set.color_space != config.blend_space) out.converted += set.gaussians.size();
   }
   out.other_order = report != nullptr && report->sort_order != config.sort_order;
   PoolBackend backend(threads_for(rows));

@@ -33,7 +33,7 @@ inline void shape_lod(LodTree& out, const GaussianCloud& source, const LodSettin
   m.sort_order = source.sort_order;
   const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(m.sh_degree) - 1);
 
-  std::size_t count = source.view().all_chunks(), total = 0;
+  std::size_t count = source.view().chunk_count(), total = 0;
   for (bool last = false; !last; count = (count + 1) / 2) {
     out.level_begin.push_back(static_cast<std::uint32_t>(total));
     total += count;
@@ -218,7 +218,7 @@ class LodBuilder {
 template <Backend B>
 requires is_host_backend<B> Result<LodTree> build_lod(B& backend, const GaussianCloud& cloud,
                                                       const LodSettings& settings = {}) {
-  if (cloud.chunk_bounds.size() != cloud.view().all_chunks()) {
+  if (cloud.chunk_bounds.size() != cloud.view().chunk_count()) {
     return Status(Errc::invalid_argument,
                   "build_lod: the cloud's rows are not in spatial order: sort_spatially first");
   }

@@ -16,11 +16,11 @@ constexpr std::size_t sh_band_numbers(int degree) noexcept {
 }
 
 /// The highest SH degree that any chunk needs: bands above it need not be held.
-inline int needed_sh_degree(const GaussianView& v) noexcept {
-  if (v.chunk_sh_degrees.empty()) return v.sh_degree;
+inline int needed_sh_degree(const ColorRows& v) noexcept {
+  if (v.chunk_degrees.empty()) return v.degree;
   int most = 0;
-  for (const std::uint8_t degree : v.chunk_sh_degrees)
-    most = std::max(most, std::min(v.sh_degree, int{degree}));
+  for (const std::uint8_t degree : v.chunk_degrees)
+    most = std::max(most, std::min(v.degree, int{degree}));
   return most;
 }
 
@@ -34,7 +34,7 @@ void cut_rows(const T* rows, std::size_t n, std::size_t from, std::size_t to, T*
 
 /// What of a cloud a frame has to read: measured once by profile_scene (detail/scene/scene_profile.hpp).
 struct SceneProfile {
-  std::vector<std::uint8_t> chunk_sh_degrees;  ///< what GaussianView::chunk_sh_degrees takes, [chunks]
+  std::vector<std::uint8_t> chunk_sh_degrees;  ///< what ColorRows::chunk_degrees takes, [chunks]
   std::uint64_t sh_numbers = 0;  ///< SH coefficients above degree 0, of all channels, that there are
   std::uint64_t sh_numbers_read = 0;  ///< of these, in the bands that are kept
   double color_error = 0;             ///< no colour changes by more; 0 where only zeros are left out
@@ -45,7 +45,7 @@ struct SceneProfile {
   /// The set, of arrays in host memory, without the bands that were found to say nothing. The profile
   /// must outlive it. For other backends: GaussianArrays.
   GaussianSet applied_to(GaussianSet set) const noexcept {
-    set.gaussians.chunk_sh_degrees = {chunk_sh_degrees.data(), chunk_sh_degrees.size()};
+    set.gaussians.color.chunk_degrees = {chunk_sh_degrees.data(), chunk_sh_degrees.size()};
     return set;
   }
 };

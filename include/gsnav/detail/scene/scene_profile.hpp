@@ -23,27 +23,27 @@ inline constexpr double kUnseenColor = 1.0 / 1020;
 /// Gaussian and channel of the chunk, they change the colour by at most `unseen`, seen from anywhere. By
 /// the addition theorem a band l of coefficients c is at most |c| sqrt((2 l + 1) / (4 pi)). `unseen` = 0
 /// leaves out zeros alone: the same bits. `cloud`: arrays in host memory, packed ones too.
-inline SceneProfile profile_scene(const GaussianView& cloud, double unseen = 0) {
+inline SceneProfile profile_scene(const GaussianRows& cloud, double unseen = 0) {
   SceneProfile out;
-  const std::size_t rest = sh_band_numbers(cloud.sh_degree);
-  out.chunk_sh_degrees.assign(cloud.all_chunks(), static_cast<std::uint8_t>(cloud.sh_degree));
+  const ColorRows& sh = cloud.color;
+  const std::size_t size = cloud.size(), rest = sh.rest();
+  out.chunk_sh_degrees.assign(cloud.chunk_count(), static_cast<std::uint8_t>(sh.degree));
   const auto number = [&](std::size_t at, std::size_t chunk, int k) {
-    if (!cloud.packed.shN.empty()) {
-      const float step = cloud.packed.chunks[chunk].sh_steps[packed_band(k)];
-      return static_cast<double>(static_cast<float>(cloud.packed.shN[at]) * step);
+    if (!sh.shN_codes.empty()) {
+      const float step = sh.chunks[chunk].sh_steps[packed_band(k)];
+      return static_cast<double>(static_cast<float>(sh.shN_codes[at]) * step);
     }
-    return static_cast<double>(cloud.shN_half.empty() ? cloud.shN[at]
-                                                      : half_to_float(cloud.shN_half[at]));
+    return static_cast<double>(sh.shN_half.empty() ? sh.shN[at] : half_to_float(sh.shN_half[at]));
   };
   std::vector<double> errors(out.chunk_sh_degrees.size());
-  PoolBackend backend(threads_for(cloud.size));
+  PoolBackend backend(threads_for(size));
   backend.parallel_for(errors.size(), [&](std::size_t c) {
-    const std::size_t first = c * kProjectChunk, end = std::min(cloud.size, first + kProjectChunk);
+    const std::size_t first = c * kProjectChunk, end = std::min(size, first + kProjectChunk);
     double left_out[kMaxShDegree + 1] = {};  // largest error where bands above a degree are
     for (std::size_t i = first; i < end; ++i) {
       for (std::size_t channel = 0; channel < 3; ++channel) {
         double error = 0;
-        for (int l = cloud.sh_degree; l > 0; --l) {
+        for (int l = sh.degree; l > 0; --l) {
           double squares = 0;
           for (int k = sh_coefficient_count(l - 1); k < sh_coefficient_count(l); ++k) {
             const double v = number(rest * i + 3 * static_cast<std::size_t>(k - 1) + channel, c, k);
@@ -54,14 +54,14 @@ inline SceneProfile profile_scene(const GaussianView& cloud, double unseen = 0) 
         }
       }
     }
-    int degree = cloud.sh_degree;
+    int degree = sh.degree;
     while (degree > 0 && left_out[degree - 1] <= unseen) --degree;
     out.chunk_sh_degrees[c] = static_cast<std::uint8_t>(degree);
     errors[c] = left_out[degree];
   });
   backend.synchronize().throw_if_error();
   for (std::size_t c = 0; c < errors.size(); ++c) {
-    const std::size_t n = std::min(cloud.size - c * kProjectChunk, std::size_t{kProjectChunk});
+    const std::size_t n = std::min(size - c * kProjectChunk, std::size_t{kProjectChunk});
     out.color_error = std::max(out.color_error, errors[c]);
     out.sh_numbers += rest * n;
     out.sh_numbers_read += sh_band_numbers(out.chunk_sh_degrees[c]) * n;

@@ -179,7 +179,7 @@ class FrameBatch<B> {
     cameras_.clear();
     for (const std::size_t j : which) {
       for (const GaussianSet& set : jobs[j].sets) {
-        if (set.gaussians.size != 0) list(set);
+        if (set.gaussians.size() != 0) list(set);
       }
       // A list of no sets stands for all of them.
       if (lists_.size() == first_of(cameras_.size())) list({});
@@ -196,8 +196,8 @@ class FrameBatch<B> {
 
   /// Appends to a camera's list: what it sees of the set is its own, the set is all cameras'.
   void list(GaussianSet set) {
-    seen_.push_back(set.gaussians.seen);
-    set.gaussians.seen = {};
+    seen_.push_back(set.selection.seen);
+    set.selection.seen = {};
     lists_.push_back(place_of(set));
   }
   std::uint32_t place_of(const GaussianSet& set) {
@@ -205,13 +205,13 @@ class FrameBatch<B> {
     const auto same = [](const GaussianSet& a, const GaussianSet& b) {
       return std::memcmp(&a, &b, sizeof a) == 0;
     };
-    auto [at, end] = places_.equal_range(set.gaussians.means[0].data);
+    auto [at, end] = places_.equal_range(set.gaussians.shape.means.data[0]);
     for (; at != end; ++at) {
       if (same(sets_[at->second], set)) return at->second;
     }
     const auto place = static_cast<std::uint32_t>(sets_.size());
     sets_.push_back(set);
-    places_.emplace(set.gaussians.means[0].data, place);
+    places_.emplace(set.gaussians.shape.means.data[0], place);
     return place;
   }
 

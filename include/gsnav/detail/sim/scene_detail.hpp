@@ -21,7 +21,7 @@ struct SceneDetail {
     const LodTree* tree;  ///< null: all of the cloud, or what of it is seen
     const GaussianCloud* cloud;
     Similarity world_from_asset;
-    GaussianView cloud_there{},
+    GaussianRows cloud_there{},
         merged_there{};  ///< cloud's and tree's arrays in a backend's own memory; empty: the host's
     const VisibleSets* visible = nullptr;  ///< null: anything may be seen
     const std::uint32_t* visible_there =
@@ -58,7 +58,7 @@ class DetailSets {
       }
       if (asset.tree == nullptr) {
         sets_.push_back(sets[a]);
-        if (cell) sets_.back().gaussians.seen = asset.visible->seen_from(*cell, asset.visible_there);
+        if (cell) sets_.back().selection.seen = asset.visible->seen_from(*cell, asset.visible_there);
         continue;
       }
       Cut& cut = cuts_[a];
@@ -68,8 +68,8 @@ class DetailSets {
       const auto chosen = cut.cut->select(camera, choice, asset.world_from_asset, seen);
       for (const GaussianSet& set : chosen) {
         sets_.push_back(set);
-        if (asset.cloud_there.size != 0) {
-          move(asset, sets_.back().gaussians, cell);
+        if (asset.cloud_there.size() != 0) {
+          move(asset, sets_.back(), cell);
           to_place_.push_back(sets_.size() - 1);
         }
       }
@@ -105,7 +105,7 @@ class DetailSets {
   std::span<const std::uint32_t> chunks() const noexcept { return chunks_; }
   void place_chunks(const std::uint32_t* there) noexcept {
     for (const std::size_t s : to_place_) {
-      View<const std::uint32_t>& drawn = sets_[s].gaussians.drawn_chunks;
+      View<const std::uint32_t>& drawn = sets_[s].selection.drawn_chunks;
       drawn.data = there;
       there += drawn.size;
     }
@@ -113,13 +113,13 @@ class DetailSets {
 
  private:
   /// From the host's arrays to the backend's.
-  void move(const SceneDetail::Asset& asset, GaussianView& view, std::optional<std::size_t> cell) {
-    const View<const std::uint32_t> drawn = view.drawn_chunks;
+  void move(const SceneDetail::Asset& asset, GaussianSet& set, std::optional<std::size_t> cell) {
+    const View<const std::uint32_t> drawn = set.selection.drawn_chunks;
     chunks_.insert(chunks_.end(), drawn.data, drawn.data + drawn.size);
-    const bool is_cloud = view.means[0].data == asset.cloud->means[0].data();
-    view = is_cloud ? asset.cloud_there : asset.merged_there;
-    view.drawn_chunks = {nullptr, drawn.size};
-    if (is_cloud && cell) view.seen = asset.visible->seen_from(*cell, asset.visible_there);
+    const bool is_cloud = set.gaussians.shape.means.data[0] == asset.cloud->means[0].data();
+    set.gaussians = is_cloud ? asset.cloud_there : asset.merged_there;
+    set.selection = {{nullptr, drawn.size}, {}};
+    if (is_cloud && cell) set.selection.seen = asset.visible->seen_from(*cell, asset.visible_there);
   }
 
   struct Cut {

@@ -82,13 +82,13 @@ inline Status validate_detail(const SimulatorScene& scene, const DetailChoice& c
                                                 std::to_string(i) + "]." + what);
     };
     if (choice.visible_sets &&
-        (a.visible == nullptr || a.visible->cloud_chunks != a.cloud->view().all_chunks())) {
+        (a.visible == nullptr || a.visible->cloud_chunks != a.cloud->view().chunk_count())) {
       return bad("visible_sets",
                  std::string("visible is ") +
                      (a.visible == nullptr ? "null: build_visible_sets makes it" : "of another cloud"));
     }
     if (!choice.lod) continue;
-    if (a.lod != nullptr && a.lod->cloud_chunks() == a.cloud->view().all_chunks()) continue;
+    if (a.lod != nullptr && a.lod->cloud_chunks() == a.cloud->view().chunk_count()) continue;
     return bad("lod", std::string("lod is ") +
                           (a.lod == nullptr ? "null: build_lod makes it" : "of another cloud"));
   }

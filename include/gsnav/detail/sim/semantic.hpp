@@ -44,14 +44,10 @@ class SemanticPasses {
     std::vector<GaussianSet> out(sets.begin(), sets.end());
     for (std::size_t i = 0; i < out.size(); ++i) {
       const std::size_t channel = i / kChannels == pass ? i % kChannels : kChannels;
-      GaussianView& g = out[i].gaussians;
-      g.sh_degree = 0;
-      g.shN = {};
-      g.shN_half = {};
-      g.packed.sh0 = {};
-      g.packed.shN = {};
-      g.sh0 = {shades_[channel].data(),
-               kChannels * g.size};  // 0 and 1 are the same in every colour space
+      GaussianRows& g = out[i].gaussians;
+      g.color = {};
+      // 0 and 1 are the same in every colour space.
+      g.color.sh0 = {shades_[channel].data(), kChannels * g.size()};
     }
     return out;
   }

@@ -47,7 +47,7 @@ class SemanticFrames {
     std::size_t most = 0;
     for (const GaussianSet& set : sets) {
       if (Status s = validate(set); !s) return s;
-      most = set.gaussians.size > most ? set.gaussians.size : most;
+      most = std::max(most, set.gaussians.size());
     }
     passes_.reserve(most);
     rgb_.resize_discard(3 * pixels);

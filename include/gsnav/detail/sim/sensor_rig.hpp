@@ -278,7 +278,7 @@ class SensorRig {
       return;
     std::size_t most = 0;
     for (const SensorView& v : views) {
-      for (const GaussianSet& set : v.sets) most = std::max(most, set.gaussians.size);
+      for (const GaussianSet& set : v.sets) most = std::max(most, set.gaussians.size());
     }
     semantic_.reserve(most);
     for (const SensorView& v : views) {

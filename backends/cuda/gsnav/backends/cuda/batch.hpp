@@ -18,7 +18,7 @@ struct BatchCamera {
   std::span<const std::uint32_t> sets;
   /// Meshes among these Gaussians (docs/composition.md), arrays on the device.
   MeshFrame meshes{};
-  /// GaussianView::seen of each of `sets` (of all sets, where that is empty) for this camera:
+  /// Selection::seen of each of `sets` (of all sets, where that is empty) for this camera:
   /// cameras that look at one set from several places still share it. Empty: those of the sets. Read
   /// during the call, the bits by the device.
   std::span<const View<const std::uint32_t>> seen{};

@@ -22,16 +22,17 @@ inline constexpr int kProjectThreads = 128;
 
 /// One block a chunk: Gaussians are projected side by side, survivors packed in order by a block scan.
 static __global__ void __launch_bounds__(kProjectThreads)
-    project_kernel(const ProjectArgs<float> args, const ProjectOutputs<float> out) {
+    project_kernel(const ViewedSet<float> args, const ProjectOutputs<float> out) {
   using Scan = cub::BlockScan<std::uint32_t, kProjectThreads>;
   __shared__ typename Scan::TempStorage storage;
-  const GaussianView& gs = args.gaussians;
-  const std::size_t chunk = blockIdx.x, begin = gs.chunk_id(chunk) * kProjectChunk;
-  const std::size_t end = begin + kProjectChunk < gs.size ? begin + kProjectChunk : gs.size;
+  const std::size_t chunk = blockIdx.x, id = args.selection.chunk_id(chunk),
+                    size = args.gaussians.size();
+  const std::size_t begin = id * kProjectChunk;
+  const std::size_t end = begin + kProjectChunk < size ? begin + kProjectChunk : size;
   const std::size_t base = (args.first_chunk + chunk) * kProjectChunk;
   std::uint32_t written = 0;
   const std::uint32_t parts = candidate_parts(args, chunk);
-  const SeenRows seen = parts != 0 ? gs.seen_rows(gs.chunk_id(chunk)) : SeenRows{};
+  const SeenRows seen = parts != 0 ? args.seen_rows(id) : SeenRows{};
   for (std::size_t first = begin; first < end && parts != 0; first += kProjectThreads) {
     const std::size_t i = first + threadIdx.x;
     RowSplat<float> row;
