@@ -16,24 +16,12 @@
 #include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/render/frame_lanes.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
+#include "gsnav/render/frames.hpp"
 #include "gsnav/render/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 
 namespace gsnav {
-
-/// Images of a batch of cameras of one size in host memory; an image not asked for is empty.
-template <class S>
-struct Frames {
-  std::size_t cameras = 0, height = 0, width = 0;
-  std::vector<S> rgb;                ///< [C][H][W][3]
-  std::vector<S> alpha;              ///< [C][H][W]
-  std::vector<S> median_depth;       ///< [C][H][W] metres, 0: no return
-  std::vector<S> expected_depth;     ///< [C][H][W]
-  std::vector<S> accumulated_depth;  ///< [C][H][W]
-  std::vector<S> first_hit_depth;    ///< [C][H][W]
-  std::vector<RenderStats> stats;    ///< [C]
-};
 
 /// A cloud's arrays in a backend's own memory. On host backends nothing is copied: the cloud must
 /// outlive it. Packed clouds become floats elsewhere.

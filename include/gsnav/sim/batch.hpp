@@ -17,47 +17,11 @@
 #include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
+#include "gsnav/sim/config.hpp"
+#include "gsnav/sim/observations.hpp"
 #include "gsnav/sim/simulator.hpp"
 
 namespace gsnav {
-
-/// One sensor's images of all environments, [environments][height][width][channels]. Valid until the
-/// next call. interop/dlpack.hpp makes tensors of them, wherever they are.
-struct BatchObservation {
-  std::string_view uuid;
-  SensorKind kind = SensorKind::rgb;
-  std::size_t environments = 0;
-  int height = 0, width = 0, channels = 0;
-  std::span<const float> data;  ///< in host memory; empty where images stay in the backend's
-  const float* on_backend =
-      nullptr;  ///< there (BatchConfig::images), whole when the call that drew them returns
-
-  /// The image, in host memory, of one environment (of a finished one: by its place in
-  /// BatchStep::finished).
-  std::span<const float> of(std::size_t environment) const noexcept {
-    const std::size_t n = data.size() / environments;
-    return data.subspan(environment * n, n);
-  }
-};
-
-/// What Gymnasium's VectorEnv returns: observations, rewards, terminated, truncated and what else there
-/// is to know.
-struct BatchStep : BatchInfo {
-  std::span<const BatchObservation> images;  ///< in the sensors' order; empty without rendering
-  /// The last images of episodes that ended in this step and whose environments were reset in it, a row
-  /// for each of `finished`; only with AutoReset::same_step.
-  std::span<const BatchObservation> final_images;
-};
-
-struct BatchConfig : SimulatorConfig {
-  AutoReset auto_reset = AutoReset::next_step;
-  /// Times of a scene for which its avatars are held posed at once; more are drawn one after the other.
-  /// Memory grows with it.
-  std::size_t pose_slots = 8;
-  /// `backend` leaves images on the GPU that drew them: colour, depth and alpha of pinholes, without
-  /// noise.
-  ImageMemory images = ImageMemory::host;
-};
 
 /// N environments over M scenes that they share: what N Simulators would do, bit for bit, by one call.
 ///

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gsnav/detail/sim/episode.hpp"
-#include "gsnav/detail/sim/scene_on_backend.hpp"
+#include "gsnav/sim/scene.hpp"
 #include "gsnav/detail/sim/task.hpp"
 
 namespace gsnav {

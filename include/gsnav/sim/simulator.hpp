@@ -10,37 +10,11 @@
 
 #include "gsnav/detail/sim/scene_on_backend.hpp"
 #include "gsnav/detail/sim/sensor_rig.hpp"
+#include "gsnav/sim/config.hpp"
+#include "gsnav/sim/observations.hpp"
 #include "gsnav/sim/world.hpp"
 
 namespace gsnav {
-
-struct SimulatorConfig {
-  TaskConfig task{};
-  std::vector<SensorSpec> sensors;  ///< none: nothing is rendered
-  RenderConfig render{};            ///< outputs and sort order are chosen by sensors and scene
-  /// Draws the assets by levels of detail: the profile lod (docs/lod.md), whatever render.profile is.
-  /// Each needs its tree (SceneAsset::lod). No hysteresis: an image depends on its camera, not on what
-  /// was seen before.
-  std::optional<LodChoice> lod{};
-  /// Draws of the assets only what is seen from where a camera is, by the rules of the profile fast
-  /// (VisibleSets). Each needs its sets (SceneAsset::visible); from where these know nothing, all is
-  /// drawn.
-  bool visible_sets = false;
-  bool rendering = true;   ///< off: physics and metrics only, no image memory
-  std::uint64_t seed = 0;  ///< of the sensors' noise
-};
-
-/// What of its assets a simulator draws.
-inline DetailChoice detail_choice(const SimulatorConfig& config) {
-  return {config.lod, config.visible_sets};
-}
-
-/// invalid_argument, naming the field, where a value is impossible.
-inline Status validate(const SimulatorConfig& config) {
-  if (Status s = validate(config.task); !s) return s;
-  if (Status s = validate(config.render); !s) return s;
-  return validate(std::span<const SensorSpec>(config.sensors));
-}
 
 /// What the noise of an observation depends on: the seed, the episode and how many actions it has seen.
 std::uint64_t noise_seed(std::uint64_t seed, const WorldState& state) noexcept;
@@ -48,29 +22,6 @@ std::uint64_t noise_seed(std::uint64_t seed, const WorldState& state) noexcept;
 /// Where the camera of an ImageNav goal looks: about +Y by an angle that the episode's id alone decides,
 /// so that an episode has one goal image.
 Quatd goal_rotation(const PointNavEpisode& episode) noexcept;
-
-/// One sensor's image. Valid until the next step or reset of its simulator.
-struct Observation {
-  std::string_view uuid;
-  SensorKind kind = SensorKind::rgb;
-  int height = 0, width = 0, channels = 0;
-  std::span<const float> data;  ///< [H][W][channels], row 0 on top
-};
-
-/// What the agent perceives after a reset or an action, and what that action did.
-struct Observations : StepInfo {
-  std::span<const Observation> images;  ///< in the sensors' order; empty without rendering
-  PointGoal point_goal{};
-  double time = 0.0;  ///< seconds on the scene's clock
-
-  /// The image of sensor `uuid`; empty where there is none.
-  std::span<const float> operator[](std::string_view uuid) const noexcept {
-    for (const Observation& o : images) {
-      if (o.uuid == uuid) return o.data;
-    }
-    return {};
-  }
-};
 
 /// A simulator: scene, avatars, agent, sensors and the PointNav task, rendered on backend B.
 ///

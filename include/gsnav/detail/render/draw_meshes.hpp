@@ -12,18 +12,10 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/stages.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
+#include "gsnav/render/frames.hpp"
 #include "gsnav/render/render_config.hpp"
 
 namespace gsnav {
-
-/// What the meshes of a frame were made of.
-struct MeshStats {
-  std::uint64_t triangles = 0;   ///< in all instances
-  std::uint64_t not_finite = 0;  ///< of those in view, left out: a corner is NaN or infinite
-  std::uint64_t drawn = 0;       ///< that may cover a pixel centre; pieces, where clipped
-  std::uint64_t fragments =
-      0;  ///< pixels of surfaces that are seen through (MeshAlpha::blend), not behind opaque ones
-};
 
 /// Scratch of `draw_meshes`; grows to the largest frame. Empty while there are no meshes.
 template <class S, Backend B>

@@ -14,16 +14,9 @@
 #include "gsnav/detail/render/draw_fragments.hpp"
 #include "gsnav/detail/render/draw_meshes.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
+#include "gsnav/render/frames.hpp"
 
 namespace gsnav {
-
-/// What one camera's frame was made of.
-struct RenderStats {
-  std::uint64_t gaussians = 0;  ///< in all sets
-  std::uint64_t visible = 0;    ///< whose footprint bounds reach the image, less those found hidden
-  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, less those found hidden by a mesh
-  MeshStats meshes;
-};
 
 /// Scratch of `render_camera`; grows to the largest frame and is then reused.
 template <class S, Backend B>

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "gsnav/detail/sim/scene_on_backend.hpp"
+#include "gsnav/sim/scene.hpp"
 
 namespace gsnav {
 

@@ -12,105 +12,12 @@
 
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
-#include "gsnav/detail/nav/obstacles.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
-#include "gsnav/nav/navmesh.hpp"
 #include "gsnav/scene/renderer.hpp"
+#include "gsnav/sim/scene.hpp"
 
 namespace gsnav {
-
-/// A cloud and how it stands in the world.
-struct SceneAsset {
-  std::shared_ptr<const GaussianCloud> cloud;
-  Similarity world_from_asset{};
-  /// Its levels of detail (build_lod, io::cached_lod); read where SimulatorConfig::lod is set.
-  std::shared_ptr<const LodTree> lod{};
-  /// What is seen of it from where agents go (build_visible_sets, io::cached_visible_sets); read where
-  /// SimulatorConfig::visible_sets is set.
-  std::shared_ptr<const VisibleSets> visible{};
-};
-
-/// A surface of triangles and how it stands in the world; seen among the Gaussians
-/// (docs/composition.md).
-struct SceneMesh {
-  std::shared_ptr<const PlacedMeshes> surface;
-  Similarity world_from_surface{};
-};
-
-/// What a simulator runs in. Shared, never changed: many simulators may use one.
-struct SimulatorScene {
-  std::vector<SceneAsset> assets;
-  std::vector<SceneMesh> meshes;
-  MeshLight light{};  ///< of the meshes
-  std::shared_ptr<const NavMesh> navmesh;
-  std::vector<AvatarActor> avatars;
-};
-
-/// invalid_argument, naming the part, where something is missing.
-inline Status validate(const SimulatorScene& scene) {
-  if (scene.navmesh == nullptr) return {Errc::invalid_argument, "SimulatorScene.navmesh is null"};
-  for (std::size_t i = 0; i < scene.assets.size(); ++i) {
-    if (scene.assets[i].cloud == nullptr) {
-      return {Errc::invalid_argument, "SimulatorScene.assets[" + std::to_string(i) + "].cloud is null"};
-    }
-  }
-  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
-    if (scene.meshes[i].surface == nullptr) {
-      return {Errc::invalid_argument,
-              "SimulatorScene.meshes[" + std::to_string(i) + "].surface is null"};
-    }
-  }
-  return {};
-}
-
-/// What of a scene's assets is drawn.
-struct DetailChoice {
-  std::optional<LodChoice> lod{};  ///< by levels of detail; none: whole
-  bool visible_sets = false;       ///< only what is seen from where the camera is
-};
-
-/// Whether a scene can be drawn so. invalid_argument, naming what is missing or out of range.
-inline Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice) {
-  if (choice.lod) {
-    if (Status s = validate(*choice.lod); !s) return s;
-  }
-  for (std::size_t i = 0; i < scene.assets.size(); ++i) {
-    const SceneAsset& a = scene.assets[i];
-    const auto bad = [i](const std::string& field, const std::string& what) {
-      return Status(Errc::invalid_argument, "SimulatorConfig." + field + ": SimulatorScene.assets[" +
-                                                std::to_string(i) + "]." + what);
-    };
-    if (choice.visible_sets &&
-        (a.visible == nullptr || a.visible->cloud_chunks != a.cloud->view().chunk_count())) {
-      return bad("visible_sets",
-                 std::string("visible is ") +
-                     (a.visible == nullptr ? "null: build_visible_sets makes it" : "of another cloud"));
-    }
-    if (!choice.lod) continue;
-    if (a.lod != nullptr && a.lod->cloud_chunks() == a.cloud->view().chunk_count()) continue;
-    return bad("lod", std::string("lod is ") +
-                          (a.lod == nullptr ? "null: build_lod makes it" : "of another cloud"));
-  }
-  return {};
-}
-
-/// Appends how the scene's avatars move over [t0, t1], numbered as they stand in the scene. `before`:
-/// what this gave for an interval that ended at t0, or null; with it the same comes in half the time.
-inline void append_bodies(const SimulatorScene& scene, double t0, double t1,
-                          std::vector<DynamicCapsule>& out, const CapsuleSet* before = nullptr) {
-  std::span<const CapsuleSet::Group> there;  // by avatar
-  if (before != nullptr) there = before->groups();
-  for (std::size_t i = 0; i < scene.avatars.size(); ++i) {
-    const auto number = static_cast<std::uint32_t>(i);
-    View<const DynamicCapsule> of_it;
-    while (!there.empty() && before->capsules_of(there.front())[0].avatar < number)
-      there = there.subspan(1);
-    if (!there.empty() && before->capsules_of(there.front())[0].avatar == number)
-      of_it = before->capsules_of(there.front());
-    scene.avatars[i].dynamic_capsules(t0, t1, number, out, of_it);
-  }
-}
 
 /// A scene in a backend's memory, its avatars posed for one or a few times at once. Each time that is
 /// held needs the avatars' means and orientations once more, so what this takes grows with `slots`, not

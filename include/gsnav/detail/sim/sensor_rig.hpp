@@ -21,6 +21,7 @@
 #include "gsnav/detail/sim/scene_detail.hpp"
 #include "gsnav/detail/sim/semantic.hpp"
 #include "gsnav/detail/sim/sensor.hpp"
+#include "gsnav/sim/config.hpp"
 
 namespace gsnav {
 
@@ -36,12 +37,6 @@ struct SensorView {
   MeshFrame meshes{};                   ///< ids are their numbers for semantic sensors
   const SceneDetail* detail = nullptr;  ///< levels of detail of the first of `sets`; null: whole.
                                         ///< Semantic sensors see all sets whole
-};
-
-/// Where images are.
-enum class ImageMemory : std::uint8_t {
-  host,
-  backend,  ///< in the backend's own, a GPU's say; on host backends the same
 };
 
 /// The images of all sensors for a number of rows.

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/sim/scene.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "gsnav/scene/visible_sets.hpp"
+
+namespace gsnav {
+
+Status validate(const SimulatorScene& scene) {
+  if (scene.navmesh == nullptr) return {Errc::invalid_argument, "SimulatorScene.navmesh is null"};
+  for (std::size_t i = 0; i < scene.assets.size(); ++i) {
+    if (scene.assets[i].cloud == nullptr) {
+      return {Errc::invalid_argument, "SimulatorScene.assets[" + std::to_string(i) + "].cloud is null"};
+    }
+  }
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    if (scene.meshes[i].surface == nullptr) {
+      return {Errc::invalid_argument,
+              "SimulatorScene.meshes[" + std::to_string(i) + "].surface is null"};
+    }
+  }
+  return {};
+}
+
+Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice) {
+  if (choice.lod) {
+    if (Status s = validate(*choice.lod); !s) return s;
+  }
+  for (std::size_t i = 0; i < scene.assets.size(); ++i) {
+    const SceneAsset& a = scene.assets[i];
+    const auto bad = [i](const std::string& field, const std::string& what) {
+      return Status(Errc::invalid_argument, "SimulatorConfig." + field + ": SimulatorScene.assets[" +
+                                                std::to_string(i) + "]." + what);
+    };
+    if (choice.visible_sets &&
+        (a.visible == nullptr || a.visible->cloud_chunks != a.cloud->view().chunk_count())) {
+      return bad("visible_sets",
+                 std::string("visible is ") +
+                     (a.visible == nullptr ? "null: build_visible_sets makes it" : "of another cloud"));
+    }
+    if (!choice.lod) continue;
+    if (a.lod != nullptr && a.lod->cloud_chunks() == a.cloud->view().chunk_count()) continue;
+    return bad("lod", std::string("lod is ") +
+                          (a.lod == nullptr ? "null: build_lod makes it" : "of another cloud"));
+  }
+  return {};
+}
+
+void append_bodies(const SimulatorScene& scene, double t0, double t1,
+                   std::vector<DynamicCapsule>& out, const CapsuleSet* before) {
+  std::span<const CapsuleSet::Group> there;  // by avatar
+  if (before != nullptr) there = before->groups();
+  for (std::size_t i = 0; i < scene.avatars.size(); ++i) {
+    const auto number = static_cast<std::uint32_t>(i);
+    View<const DynamicCapsule> of_it;
+    while (!there.empty() && before->capsules_of(there.front())[0].avatar < number)
+      there = there.subspan(1);
+    if (!there.empty() && before->capsules_of(there.front())[0].avatar == number)
+      of_it = before->capsules_of(there.front());
+    scene.avatars[i].dynamic_capsules(t0, t1, number, out, of_it);
+  }
+}
+
+}  // namespace gsnav
