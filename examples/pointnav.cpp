@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// PointNav among people: fifteen lines.
+// PointNav among people: fifteen lines. usage: pointnav [device]
 #include <cstdio>
 
-#include "gsnav/backends/openmp.hpp"
+#include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
-#include "gsnav/sim/simulator.hpp"
 
-int main() {
-  gsnav::OpenMPBackend backend;
+int main(int argc, char** argv) {
+  auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
   auto scene = gsnav::default_simulator_scene(3).value();
   auto episodes = gsnav::generate_episodes(*scene.navmesh, 3, 1).value();
-  auto sim = gsnav::make_simulator(backend, scene, {.sensors = gsnav::rgbd_sensors(128, 128)}).value();
+  auto sim =
+      gsnav::DeviceSimulator::create(device, scene, {.sensors = gsnav::rgbd_sensors(128, 128)}).value();
   gsnav::GeodesicFollower policy;
   for (const auto& episode : episodes) {
     auto obs = sim.reset(episode).value();

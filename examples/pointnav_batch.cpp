@@ -1,22 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// The same in many environments at once.
+// The same in many environments at once. usage: pointnav_batch [device]
 #include <cstdio>
 
-#include "gsnav/backends/openmp.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/device/batch.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
 
-int main() {
-  gsnav::OpenMPBackend backend;
+int main(int argc, char** argv) {
+  auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
   auto scene =
       std::make_shared<const gsnav::SimulatorScene>(gsnav::default_simulator_scene(3, 1, 0.2).value());
   auto episodes = gsnav::generate_episodes(*scene->navmesh, 64, 1).value();
   auto episode_of = [&](std::size_t e, std::size_t k) -> gsnav::Result<gsnav::BatchEpisode> {
     return gsnav::BatchEpisode{0, episodes[(16 * k + e) % 64]};
   };
-  auto sim = gsnav::make_batch_simulator(backend, {scene}, {{.sensors = gsnav::rgbd_sensors(64, 64)}},
-                                         16, episode_of)
+  auto sim = gsnav::DeviceBatchSimulator::create(
+                 device, {scene}, {{.sensors = gsnav::rgbd_sensors(64, 64)}}, 16, episode_of)
                  .value();
   gsnav::GeodesicFollower policy;
   auto out = sim.reset().value();
@@ -24,8 +23,7 @@ int main() {
   for (int i = 0; i < 60; ++i) {
     std::vector<gsnav::Action> actions;
     for (std::size_t e = 0; e < 16; ++e) actions.push_back(policy.next(sim.world(e)));
-    out = sim.step(actions)
-              .value();  // out.images[0].data: [16][64][64][3], out.rewards[e], out.terminated[e]
+    out = sim.step(actions).value();  // out.images[0].data: [16][64][64][3], out.rewards[e]
     ended.insert(ended.end(), out.final_metrics.begin(), out.final_metrics.end());
   }
   std::printf("%zu episodes, SR %.2f\n", ended.size(), gsnav::summarize(ended).success_rate);

@@ -12,6 +12,10 @@ namespace gsnav {
 
 Status validate(const SimulatorScene& scene) {
   if (scene.navmesh == nullptr) return {Errc::invalid_argument, "SimulatorScene.navmesh is null"};
+  return validate_assets(scene);
+}
+
+Status validate_assets(const SimulatorScene& scene) {
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
     if (scene.assets[i].cloud == nullptr) {
       return {Errc::invalid_argument, "SimulatorScene.assets[" + std::to_string(i) + "].cloud is null"};
@@ -50,8 +54,8 @@ Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice) 
   return {};
 }
 
-void append_bodies(const SimulatorScene& scene, double t0, double t1,
-                   std::vector<DynamicCapsule>& out, const CapsuleSet* before) {
+void append_bodies(const SimulatorScene& scene, double t0, double t1, std::vector<DynamicCapsule>& out,
+                   const CapsuleSet* before) {
   std::span<const CapsuleSet::Group> there;  // by avatar
   if (before != nullptr) there = before->groups();
   for (std::size_t i = 0; i < scene.avatars.size(); ++i) {

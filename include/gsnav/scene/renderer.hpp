@@ -163,23 +163,9 @@ class Renderer {
 
   /// The same into images that are used again.
   Status render(std::span<const GaussianSet> sets, std::span<const Camera> cameras, Frames<S>& out) {
-    if (cameras.empty()) return {Errc::invalid_argument, "no camera to render from"};
-    if (cameras.data() == nullptr)
-      return {Errc::invalid_argument, "cameras: a null pointer with a size"};
-    for (const Camera& c : cameras) {
-      if (Status s = validate(c); !s) return s;
-      if (c.width != cameras[0].width || c.height != cameras[0].height) {
-        return {Errc::invalid_argument, "cameras of one batch must have one size"};
-      }
-    }
-    out.cameras = cameras.size();
-    out.width = static_cast<std::size_t>(cameras[0].width);
-    out.height = static_cast<std::size_t>(cameras[0].height);
-    const std::size_t pixels = out.width * out.height;
-    if (Status s = size_images(out, cameras.size(), pixels); !s) return s;
-
+    if (Status s = size_frames(cameras, config_.outputs, out); !s) return s;
     const auto job_of = [&](std::size_t c) {
-      return FrameJob<S>{sets, &cameras[c], &config_, host_images(out, c), mesh_frame()};
+      return FrameJob<S>{sets, &cameras[c], &config_, images_of(out, c), mesh_frame()};
     };
     return render_jobs(cameras.size(), job_of, out.stats);
   }
@@ -215,6 +201,37 @@ class Renderer {
     return with_sizes(1, job, [&] { return draw(job, stats); });
   }
 
+  /// Makes room in `out` for the images `outputs` of these cameras. Errors: as of render above.
+  static Status size_frames(std::span<const Camera> cameras, unsigned outputs, Frames<S>& out) {
+    if (cameras.empty()) return {Errc::invalid_argument, "no camera to render from"};
+    if (cameras.data() == nullptr)
+      return {Errc::invalid_argument, "cameras: a null pointer with a size"};
+    for (const Camera& c : cameras) {
+      if (Status s = validate(c); !s) return s;
+      if (c.width != cameras[0].width || c.height != cameras[0].height) {
+        return {Errc::invalid_argument, "cameras of one batch must have one size"};
+      }
+    }
+    out.cameras = cameras.size();
+    out.width = static_cast<std::size_t>(cameras[0].width);
+    out.height = static_cast<std::size_t>(cameras[0].height);
+    return size_images(out, outputs);
+  }
+  /// Where the images of camera c lie in `out`.
+  static FrameImages<S> images_of(Frames<S>& out, std::size_t c) noexcept {
+    const auto at = [&out, c](std::vector<S>& image, std::size_t channels) -> S* {
+      return image.empty() ? nullptr : image.data() + c * out.width * out.height * channels;
+    };
+    FrameImages<S> images;
+    images.rgb = at(out.rgb, 3);
+    images.alpha = at(out.alpha, 1);
+    images.median_depth = at(out.median_depth, 1);
+    images.expected_depth = at(out.expected_depth, 1);
+    images.accumulated_depth = at(out.accumulated_depth, 1);
+    images.first_hit_depth = at(out.first_hit_depth, 1);
+    return images;
+  }
+
   /// Bytes of scratch held.
   std::size_t scratch_bytes() const noexcept {
     std::size_t sum = workspace_.bytes();
@@ -233,8 +250,9 @@ class Renderer {
     using type = FrameLanes<S, T>;
   };
 
-  /// Makes `out`'s images as large as `pixels` of each camera need.
-  Status size_images(Frames<S>& out, std::size_t cameras, std::size_t pixels) const {
+  /// Makes `out`'s images as large as its size says.
+  static Status size_images(Frames<S>& out, unsigned outputs) {
+    const std::size_t cameras = out.cameras, pixels = out.width * out.height;
     struct Image {
       std::vector<S>& values;
       unsigned output;
@@ -247,7 +265,7 @@ class Renderer {
                             {out.accumulated_depth, kAccumulatedDepth, 1},
                             {out.first_hit_depth, kFirstHitDepth, 1}};
     std::size_t channels = 0;
-    for (const Image& i : images) channels += (config_.outputs & i.output) != 0 ? i.channels : 0;
+    for (const Image& i : images) channels += (outputs & i.output) != 0 ? i.channels : 0;
     const std::size_t bytes = pixels * channels * sizeof(S);  // of a camera: at most 2^34
     const auto refused = [&](const std::string& why) {
       return Status(Errc::out_of_memory, "Renderer: the images of " + std::to_string(cameras) +
@@ -266,7 +284,7 @@ class Renderer {
     }
     Status s = detail::guarded([&] {
       for (const Image& i : images) {
-        i.values.resize((config_.outputs & i.output) != 0 ? cameras * pixels * i.channels : 0);
+        i.values.resize((outputs & i.output) != 0 ? cameras * pixels * i.channels : 0);
       }
       out.stats.assign(cameras, {});
       return Status();
@@ -331,20 +349,6 @@ class Renderer {
   }
   MeshFrame mesh_frame() const noexcept { return {meshes_, light_}; }
 
-  /// Where the images of camera c lie in `out`.
-  static FrameImages<S> host_images(Frames<S>& out, std::size_t c) noexcept {
-    const auto at = [&out, c](std::vector<S>& image, std::size_t channels) -> S* {
-      return image.empty() ? nullptr : image.data() + c * out.width * out.height * channels;
-    };
-    FrameImages<S> images;
-    images.rgb = at(out.rgb, 3);
-    images.alpha = at(out.alpha, 1);
-    images.median_depth = at(out.median_depth, 1);
-    images.expected_depth = at(out.expected_depth, 1);
-    images.accumulated_depth = at(out.accumulated_depth, 1);
-    images.first_hit_depth = at(out.first_hit_depth, 1);
-    return images;
-  }
   /// f(image of a, image of b, channels) for each image that `a` has.
   template <class F>
   static void for_each_image(FrameImages<S> a, FrameImages<S>& b, const F& f) {

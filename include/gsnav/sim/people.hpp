@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "gsnav/detail/sim/episode.hpp"
-#include "gsnav/sim/scene.hpp"
 #include "gsnav/detail/sim/task.hpp"
+#include "gsnav/sim/scene.hpp"
 
 namespace gsnav {
 

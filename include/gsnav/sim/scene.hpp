@@ -53,6 +53,8 @@ struct DetailChoice {
 
 /// invalid_argument, naming the part, where something is missing.
 Status validate(const SimulatorScene& scene);
+/// The same of what is drawn: a NavMesh may be missing.
+Status validate_assets(const SimulatorScene& scene);
 
 /// Whether a scene can be drawn so. invalid_argument, naming what is missing or out of range.
 Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice);

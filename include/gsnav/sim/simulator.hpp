@@ -102,6 +102,7 @@ class Simulator {
   const AgentPose& agent() const noexcept { return world_.agent(); }
   const World& world() const noexcept { return world_; }
   const SimulatorConfig& config() const noexcept { return config_; }
+  const SimulatorScene& scene() const noexcept { return scene_.scene(); }
   const std::vector<AvatarActor>& avatars() const noexcept { return scene_.scene().avatars; }
 
   /// Everything that changes while it runs, and the way back to it; observe() then sees what was seen

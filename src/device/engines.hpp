@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gsnav/device/batch.hpp"
+#include "gsnav/device/renderer.hpp"
+#include "gsnav/device/simulator.hpp"
+
+// What a backend does for the classes over Device: an interface for each of them, and for each backend a
+// function that makes one.
+
+namespace gsnav::detail {
+
+class RendererEngine {
+ public:
+  virtual ~RendererEngine() = default;
+  virtual Status render(std::span<const Camera> cameras, double time, Frames<float>& out) = 0;
+  virtual void set_config(const RenderConfig& config) = 0;
+};
+
+class SimulatorEngine {
+ public:
+  virtual ~SimulatorEngine() = default;
+  virtual Result<Observations> reset(const PointNavEpisode& episode) = 0;
+  virtual Result<Observations> step(Action action) = 0;
+  virtual Result<Observations> step(const VelocityCommand& command) = 0;
+  virtual Result<Observations> observe() = 0;
+  virtual const World& world() const noexcept = 0;
+  virtual const SimulatorScene& scene() const noexcept = 0;
+  virtual const SimulatorConfig& config() const noexcept = 0;
+  virtual Status set_state(const WorldState& state) = 0;
+  virtual Status set_agent(const Vec3d& position, double yaw, double pitch) = 0;
+  virtual void set_seed(std::uint64_t seed) noexcept = 0;
+  virtual void set_rendering(bool on) noexcept = 0;
+  virtual std::size_t render_count() const noexcept = 0;
+  virtual Result<const Frames<float>*> render(const Camera& camera, unsigned outputs) = 0;
+  virtual Result<std::span<const Observation>> goal_images() = 0;
+};
+
+class BatchEngine {
+ public:
+  virtual ~BatchEngine() = default;
+  virtual std::size_t environments() const noexcept = 0;
+  virtual const World& world(std::size_t environment) const noexcept = 0;
+  virtual std::size_t scene_of(std::size_t environment) const noexcept = 0;
+  virtual Result<BatchStep> reset(std::span<const std::uint8_t> mask) = 0;
+  virtual Result<BatchStep> step(std::span<const Action> actions) = 0;
+  virtual Result<BatchStep> step(std::span<const VelocityCommand> commands) = 0;
+  virtual std::size_t render_count() const noexcept = 0;
+  virtual std::size_t pose_count() const noexcept = 0;
+  virtual void set_rendering(bool on) noexcept = 0;
+};
+
+/// What a batch simulator is made of.
+struct BatchParts {
+  std::vector<std::shared_ptr<const SimulatorScene>> scenes;
+  std::shared_ptr<SceneLibrary> library;  ///< in place of scenes, where it is set
+  BatchConfig config;
+  std::size_t environments = 0;
+  EpisodeSource next_episode;
+};
+
+/// Makes engines on one kind of device. May throw what guarded() turns into a Status.
+struct EngineFactory {
+  std::unique_ptr<RendererEngine> (*renderer)(const Device&, std::shared_ptr<const SimulatorScene>,
+                                              const RenderOptions&);
+  Result<std::unique_ptr<SimulatorEngine>> (*simulator)(const Device&,
+                                                        std::shared_ptr<const SimulatorScene>,
+                                                        SimulatorConfig, World::BodySource);
+  Result<std::unique_ptr<BatchEngine>> (*batch)(const Device&, BatchParts);
+};
+
+extern const EngineFactory serial_engines;
+#if defined(GSNAV_DEVICE_OPENMP)
+extern const EngineFactory openmp_engines;
+/// Threads that a CPU device of so many has, and the name of its SIMD lanes.
+int cpu_threads(int threads);
+const char* cpu_lanes();
+#endif
+#if defined(GSNAV_DEVICE_CUDA)
+extern const EngineFactory cuda_engines;
+int cuda_count() noexcept;
+std::string cuda_name(int index);
+#endif
+
+}  // namespace gsnav::detail

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "engines.hpp"
+#include "gsnav/detail/sim/frame_batch.hpp"
+#include "gsnav/detail/sim/scene_detail.hpp"
+#include "gsnav/detail/sim/scene_on_backend.hpp"
+#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/simulator.hpp"
+
+// The engines on a backend B. Each has a backend of its own; `MakeBackend` makes one of a Device.
+
+namespace gsnav::detail {
+
+template <class B>
+class RendererOn final : public RendererEngine {
+ public:
+  RendererOn(std::unique_ptr<B> backend, std::shared_ptr<const SimulatorScene> scene,
+             const RenderOptions& options)
+      : backend_(std::move(backend)),
+        scene_(*backend_, std::move(scene), options.detail),
+        frames_(*backend_),
+        chunks_(*backend_) {
+    set_config(options.render);
+  }
+
+  void set_config(const RenderConfig& config) override { config_ = scene_.render_config(config); }
+
+  Status render(std::span<const Camera> cameras, double time, Frames<float>& out) override {
+    if (Status s = scene_.pose(0, time); !s) return s;
+    if (Status s = Renderer<float, B>::size_frames(cameras, config_.outputs, out); !s) return s;
+    const std::span<const GaussianSet> sets = scene_.sets(0);
+    cuts_.resize(scene_.detail() != nullptr ? cameras.size() : 0);
+    for (std::size_t c = 0; c < cuts_.size(); ++c) cuts_[c].select(*scene_.detail(), sets, cameras[c]);
+    chunks_.place(cuts_);
+    jobs_.clear();
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      const bool cut = c < cuts_.size();
+      jobs_.push_back({cut ? cuts_[c].sets() : sets, &cameras[c],
+                       cut ? &cuts_[c].rules(config_) : &config_, Renderer<float, B>::images_of(out, c),
+                       scene_.meshes()});
+    }
+    if constexpr (is_host_backend<B>) {
+      return frames_.renderer().render(jobs_, out.stats);
+    } else {
+      return frames_.render(jobs_);
+    }
+  }
+
+ private:
+  std::unique_ptr<B> backend_;
+  SceneOnBackend<B> scene_;
+  FrameBatch<B> frames_;
+  ChosenChunks<B> chunks_;
+  RenderConfig config_;
+  std::vector<DetailSets> cuts_;
+  std::vector<FrameJob<float>> jobs_;
+};
+
+template <class B>
+class SimulatorOn final : public SimulatorEngine {
+ public:
+  SimulatorOn(std::unique_ptr<B> backend, Simulator<B> simulator)
+      : backend_(std::move(backend)), sim_(std::move(simulator)) {}
+
+  Result<Observations> reset(const PointNavEpisode& episode) override { return sim_.reset(episode); }
+  Result<Observations> step(Action action) override { return sim_.step(action); }
+  Result<Observations> step(const VelocityCommand& command) override { return sim_.step(command); }
+  Result<Observations> observe() override { return sim_.observe(); }
+  const World& world() const noexcept override { return sim_.world(); }
+  const SimulatorScene& scene() const noexcept override { return sim_.scene(); }
+  const SimulatorConfig& config() const noexcept override { return sim_.config(); }
+  Status set_state(const WorldState& state) override { return sim_.set_state(state); }
+  Status set_agent(const Vec3d& position, double yaw, double pitch) override {
+    return sim_.set_agent(position, yaw, pitch);
+  }
+  void set_seed(std::uint64_t seed) noexcept override { sim_.set_seed(seed); }
+  void set_rendering(bool on) noexcept override { sim_.set_rendering(on); }
+  std::size_t render_count() const noexcept override { return sim_.render_count(); }
+  Result<const Frames<float>*> render(const Camera& camera, unsigned outputs) override {
+    return sim_.render(camera, outputs);
+  }
+  Result<std::span<const Observation>> goal_images() override { return sim_.goal_images(); }
+
+ private:
+  std::unique_ptr<B> backend_;
+  Simulator<B> sim_;
+};
+
+template <class B>
+class BatchOn final : public BatchEngine {
+ public:
+  BatchOn(std::unique_ptr<B> backend, BatchSimulator<B> simulator)
+      : backend_(std::move(backend)), sim_(std::move(simulator)) {}
+
+  std::size_t environments() const noexcept override { return sim_.environments(); }
+  const World& world(std::size_t environment) const noexcept override { return sim_.world(environment); }
+  std::size_t scene_of(std::size_t environment) const noexcept override {
+    return sim_.scene_of(environment);
+  }
+  Result<BatchStep> reset(std::span<const std::uint8_t> mask) override { return sim_.reset(mask); }
+  Result<BatchStep> step(std::span<const Action> actions) override { return sim_.step(actions); }
+  Result<BatchStep> step(std::span<const VelocityCommand> commands) override {
+    return sim_.step(commands);
+  }
+  std::size_t render_count() const noexcept override { return sim_.render_count(); }
+  std::size_t pose_count() const noexcept override { return sim_.pose_count(); }
+  void set_rendering(bool on) noexcept override { sim_.set_rendering(on); }
+
+ private:
+  std::unique_ptr<B> backend_;
+  BatchSimulator<B> sim_;
+};
+
+/// `make`: a std::unique_ptr<B> of a Device.
+template <class B, auto make>
+constexpr EngineFactory engines_on() {
+  return {
+      [](const Device& device, std::shared_ptr<const SimulatorScene> scene,
+         const RenderOptions& options) -> std::unique_ptr<RendererEngine> {
+        return std::make_unique<RendererOn<B>>(make(device), std::move(scene), options);
+      },
+      [](const Device& device, std::shared_ptr<const SimulatorScene> scene, SimulatorConfig config,
+         World::BodySource others) -> Result<std::unique_ptr<SimulatorEngine>> {
+        std::unique_ptr<B> backend = make(device);
+        auto sim =
+            Simulator<B>::create(*backend, std::move(scene), std::move(config), std::move(others));
+        if (!sim) return sim.status();
+        return std::unique_ptr<SimulatorEngine>(
+            std::make_unique<SimulatorOn<B>>(std::move(backend), std::move(*sim)));
+      },
+      [](const Device& device, BatchParts p) -> Result<std::unique_ptr<BatchEngine>> {
+        std::unique_ptr<B> backend = make(device);
+        auto sim = p.library != nullptr
+                       ? BatchSimulator<B>::create_from_library(*backend, std::move(p.library),
+                                                                std::move(p.config), p.environments,
+                                                                std::move(p.next_episode))
+                       : BatchSimulator<B>::create(*backend, std::move(p.scenes), std::move(p.config),
+                                                   p.environments, std::move(p.next_episode));
+        if (!sim) return sim.status();
+        return std::unique_ptr<BatchEngine>(
+            std::make_unique<BatchOn<B>>(std::move(backend), std::move(*sim)));
+      },
+  };
+}
+
+}  // namespace gsnav::detail
