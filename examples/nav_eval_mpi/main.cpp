@@ -4,6 +4,7 @@
 // number of ranks. Started again, with any number of them, it plays what is missing.
 #include <mpi.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <functional>
@@ -12,13 +13,11 @@
 #include <string>
 #include <vector>
 
+#include "../../tools/common/device_option.hpp"
 #include "../../tools/eval/run.hpp"
-#include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
-#if defined(GSNAV_HAS_CUDA)
-#include "gsnav/backends/cuda.hpp"
-#endif
+#include "gsnav/device/simulator.hpp"
 
 namespace {
 
@@ -66,32 +65,22 @@ using Look = std::function<Status(const gsnav::World&)>;
 
 /// Draws the agent's sensors, as for a policy that looks. The policies here do not: the numbers are the
 /// same.
-template <class B>
-gsnav::Result<Look> looker(std::shared_ptr<B> backend, const gsnav_eval::Stage& stage) {
-  auto made = gsnav::Simulator<B>::create(*backend, stage.scene, stage.config);
-  if (!made) return made.status();
-  struct Eye {
-    std::shared_ptr<B> backend;  // outlives what follows
-    gsnav::Simulator<B> sim;
-  };
-  auto eye = std::make_shared<Eye>(Eye{backend, std::move(*made)});
-  return Look([eye](const gsnav::World& world) {
-    if (Status s = eye->sim.set_state(world.state()); !s) return s;
-    return eye->sim.observe().status();
-  });
-}
-
 gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o,
                            const gsnav_eval::Stage& stage, const std::string& backend) {
   if (backend == "none") return Look{};
-  if (backend == "openmp") return looker(std::make_shared<gsnav::OpenMPBackend>(o.threads), stage);
-#if defined(GSNAV_HAS_CUDA)
-  if (const int gpus = gsnav::CudaBackend::device_count(); gpus > 0) {
-    return looker(std::make_shared<gsnav::CudaBackend>(ranks.on_node % gpus), stage);
-  }
-#endif
-  return Status(gsnav::Errc::unsupported,
-                "--draw cuda: no GPU, or a build without CUDA, for rank " + std::to_string(ranks.rank));
+  const auto gpus = std::ranges::count_if(gsnav::Device::available(),
+                                          [](const std::string& d) { return d.starts_with("cuda"); });
+  const auto device = backend == "cuda" && gpus > 0
+                          ? gsnav::Device::parse("cuda:" + std::to_string(ranks.on_node % gpus))
+                          : gsnav_tools::device_of(backend, o.threads);
+  if (!device) return device.status();
+  auto made = gsnav::DeviceSimulator::create(*device, stage.scene, stage.config);
+  if (!made) return made.status();
+  auto eye = std::make_shared<gsnav::DeviceSimulator>(std::move(*made));
+  return Look([eye](const gsnav::World& world) {
+    if (Status s = eye->set_state(world.state()); !s) return s;
+    return eye->observe().status();
+  });
 }
 
 Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& backend) {

@@ -6,14 +6,9 @@
 #include <cstdio>
 #include <exception>
 
+#include "../../tools/common/device_option.hpp"
 #include "../../tools/common/parse_options.hpp"
-#include "gsnav/backends/serial.hpp"
-#if defined(NAV_LOOP_OPENMP)
-#include "gsnav/backends/openmp.hpp"
-#endif
-#if defined(GSNAV_HAS_CUDA)
-#include "gsnav/backends/cuda.hpp"
-#endif
+#include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "recorder.hpp"
 #include "setup.hpp"
@@ -28,8 +23,7 @@ double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
 }
 
-template <gsnav::Backend B>
-Status run(B& backend, const Options& options) {
+Status run(const gsnav::Device& device, const Options& options) {
   Recorder recorder(options);
   if (Status s = recorder.open(); !s) return s;
   auto prepared = prepare(options);
@@ -47,7 +41,7 @@ Status run(B& backend, const Options& options) {
   config.visible_sets = options.visible_sets;
   const auto episodes = make_episodes(options, setup.scene, config.task);
   if (!episodes) return episodes.status();
-  auto made = gsnav::make_simulator(backend, setup.scene, config);
+  auto made = gsnav::DeviceSimulator::create(device, setup.scene, config);
   if (!made) return made.status();
   auto& sim = *made;
 
@@ -92,7 +86,7 @@ Status run(B& backend, const Options& options) {
     record.metrics = sim.metrics();
     progress.episode(i, record);
     records.push_back(record);
-    recorder.end(sim.world(), sim.avatars());
+    recorder.end(sim.world(), sim.scene().avatars);
   }
   if (Status s = recorder.finish(setup.scene); !s) return s;
   print_table(options, setup.facts, records, t);
@@ -100,31 +94,6 @@ Status run(B& backend, const Options& options) {
   if (Status s = write_timings(options.out + "/timings.json", t); !s) return s;
   std::printf("Pictures, metrics.json and timings.json are in %s\n", options.out.c_str());
   return {};
-}
-
-Status dispatch(const Options& options) {
-  if (options.backend == "serial") {
-    gsnav::SerialBackend backend;
-    return run(backend, options);
-  }
-  if (options.backend == "openmp") {
-#if defined(NAV_LOOP_OPENMP)
-    gsnav::OpenMPBackend backend(options.threads);
-    return run(backend, options);
-#else
-    return {gsnav::Errc::unsupported,
-            "--backend openmp: this build has none (GSNAV_OPENMP=OFF); use serial"};
-#endif
-  }
-#if defined(GSNAV_HAS_CUDA)
-  if (gsnav::CudaBackend::device_count() == 0) {
-    return {gsnav::Errc::unsupported, "--backend cuda: no GPU, or no driver for it; use openmp"};
-  }
-  gsnav::CudaBackend backend;
-  return run(backend, options);
-#else
-  return {gsnav::Errc::unsupported, "--backend " + options.backend + ": nav_loop was not built with it"};
-#endif
 }
 
 }  // namespace
@@ -210,7 +179,8 @@ int main(int argc, char** argv) try {
     return 2;
   }
 
-  const gsnav::Status s = nav_loop::dispatch(o);
+  const auto device = gsnav_tools::device_of(o.backend, o.threads);
+  const gsnav::Status s = device ? nav_loop::run(*device, o) : device.status();
   if (!s) std::fprintf(stderr, "nav_loop: %s\n", s.message().c_str());
   return s ? 0 : 1;
 } catch (const std::exception& e) {

@@ -33,8 +33,10 @@ class RendererOn final : public RendererEngine {
   void set_config(const RenderConfig& config) override { config_ = scene_.render_config(config); }
 
   Status render(std::span<const Camera> cameras, double time, Frames<float>& out) override {
-    if (Status s = scene_.pose(0, time); !s) return s;
     if (Status s = Renderer<float, B>::size_frames(cameras, config_.outputs, out); !s) return s;
+    scene_.make_slots(1);
+    if (Status s = scene_.prepare(0, time, cameras, config_); !s) return s;
+    if (Status s = scene_.pose_prepared(0); !s) return s;
     const std::span<const GaussianSet> sets = scene_.sets(0);
     cuts_.resize(scene_.detail() != nullptr ? cameras.size() : 0);
     for (std::size_t c = 0; c < cuts_.size(); ++c) cuts_[c].select(*scene_.detail(), sets, cameras[c]);

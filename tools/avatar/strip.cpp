@@ -9,12 +9,10 @@
 
 #include "commands.hpp"
 #include "gsnav/avatar/actor.hpp"
-#include "gsnav/avatar/skinned_gaussians.hpp"
-#include "gsnav/backends/openmp.hpp"
+#include "gsnav/device/renderer.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav_avatar {
@@ -50,20 +48,20 @@ Status make_strip(const StripCommand& c) {
   const auto actor =
       AvatarActor::create(asset, std::make_shared<const MotionClip>(std::move(driver->clip)));
   if (!actor) return actor.status();
-  const auto surroundings = load_surroundings(c);
+  auto surroundings = load_surroundings(c);
   if (!surroundings) return surroundings.status();
 
-  OpenMPBackend backend;
-  Renderer<float, OpenMPBackend> renderer(backend);
-  SkinnedGaussians<OpenMPBackend> skin(backend, asset);
-  std::vector<GaussianSet> sets;
+  SimulatorScene scene;
+  scene.avatars.push_back(*actor);
   if (surroundings->has_value()) {
-    sets.push_back((*surroundings)->set());
+    scene.assets.push_back({std::make_shared<const GaussianCloud>(std::move(**surroundings))});
     // (x, y, z) of a scene with Z upwards is (x, z, -y) here.
     if (c.z_up)
-      sets.back().world_from_asset = {axis_angle(Vec3d{1, 0, 0}, -1.5707963267948966), {}, 1.0};
+      scene.assets.back().world_from_asset = {axis_angle(Vec3d{1, 0, 0}, -1.5707963267948966), {}, 1.0};
   }
-  sets.emplace_back();
+  auto renderer = DeviceRenderer::create(Device::parse("cpu").value(),
+                                         std::make_shared<const SimulatorScene>(std::move(scene)));
+  if (!renderer) return renderer.status();
   const Camera camera = Camera::look_at(c.eye, c.target, {0, 1, 0}, c.width, c.height, c.fov);
   const auto width = static_cast<std::size_t>(c.width), height = static_cast<std::size_t>(c.height),
              row = 3 * width, frames = static_cast<std::size_t>(c.frames);
@@ -73,9 +71,7 @@ Status make_strip(const StripCommand& c) {
     const double time =
         frames == 1 ? begin
                     : begin + (end - begin) * static_cast<double>(k) / static_cast<double>(frames - 1);
-    if (Status s = skin.pose(*actor, time); !s) return s;
-    sets.back() = skin.set();
-    if (Status s = renderer.render(sets, std::span(&camera, 1), image); !s) return s;
+    if (Status s = renderer->render(std::span(&camera, 1), image, time); !s) return s;
     for (std::size_t y = 0; y < height; ++y) {
       std::copy_n(image.rgb.begin() + static_cast<std::ptrdiff_t>(y * row), row,
                   strip.begin() + static_cast<std::ptrdiff_t>((y * frames + k) * row));

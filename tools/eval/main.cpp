@@ -80,8 +80,7 @@ Status run(const Options& o, int pictures, bool restart) {
   for (const std::string& note : journal->notes())
     std::fprintf(stderr, "%s\n", gsnav::printable(note).c_str());
   if (Status s = gsnav::io::save_episodes(out / "episodes.json.gz", stage->episodes); !s) return s;
-  gsnav::OpenMPBackend backend(o.threads);
-  auto sim = Simulator::create(backend, stage->scene, stage->config);
+  auto sim = make_simulator(o, *stage);
   if (!sim) return sim.status();
   timings.load = seconds_since(from);
 

@@ -5,16 +5,24 @@
 
 #include "../../examples/nav_loop/canvas.hpp"
 #include "../../examples/nav_loop/map.hpp"
+#include "../common/device_option.hpp"
 #include "gsnav/io/image_file.hpp"
 
 namespace gsnav_eval {
 namespace {
 
+using gsnav::Result;
 using gsnav::Status;
 constexpr float kNear = 0.3f, kFar = 7.0f;  // range of depth colours, metres
 constexpr std::size_t kShots = 4;
 
 }  // namespace
+
+Result<Simulator> make_simulator(const Options& options, const Stage& stage) {
+  const auto device = gsnav_tools::device_of("openmp", options.threads);
+  if (!device) return device.status();
+  return Simulator::create(*device, stage.scene, stage.config);
+}
 
 Status draw(Simulator& sim, const Stage& stage, const Record& record, const std::filesystem::path& strip,
             const std::filesystem::path& map_file) {

@@ -3,12 +3,15 @@
 
 #include <filesystem>
 
-#include "gsnav/backends/openmp.hpp"
+#include "gsnav/device/simulator.hpp"
 #include "run.hpp"
 
 namespace gsnav_eval {
 
-using Simulator = gsnav::Simulator<gsnav::OpenMPBackend>;
+using Simulator = gsnav::DeviceSimulator;
+
+/// The simulator that draws for an evaluation. Errors: as of DeviceSimulator::create.
+gsnav::Result<Simulator> make_simulator(const Options& options, const Stage& stage);
 
 /// Plays a record's actions again. Errors: invalid_file where they do not lead to its metrics (another
 /// scene or version made it); what the simulator reports. `look(simulator, step)` is called before the

@@ -94,8 +94,7 @@ Status run(const Options& o, const ReplayOptions& r) {
     return {Errc::invalid_argument,
             "--episode " + std::to_string(r.episode) + ": the journal has no such episode"};
   }
-  gsnav::OpenMPBackend backend(o.threads);
-  auto sim = Simulator::create(backend, stage->scene, stage->config);
+  auto sim = make_simulator(o, *stage);
   if (!sim) return sim.status();
   std::optional<Video> video;
   if (!r.video.empty()) {

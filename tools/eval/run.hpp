@@ -5,7 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/config.hpp"
+#include "gsnav/sim/world.hpp"
 #include "journal.hpp"
 #include "options.hpp"
 

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "../common/device_option.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "overlay.hpp"
 
@@ -72,27 +73,35 @@ Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& opti
                                       gsnav::append_bodies(*scene, t0, t1, out);
                                     });
   if (!world) return world.status();
-  std::unique_ptr<Session> s(new Session(options, std::move(stage), how, std::move(*world)));
+  const auto device = gsnav_tools::device_of("openmp", options.threads);
+  if (!device) return device.status();
+  gsnav::RenderOptions draws{stage.config.render};
+  draws.render.outputs = gsnav::kRgb | gsnav::kMedianDepth;
+  auto renderer = gsnav::DeviceRenderer::create(*device, stage.scene, draws);
+  if (!renderer) return renderer.status();
+  auto empty = std::make_shared<gsnav::SimulatorScene>(*stage.scene);
+  empty->avatars.clear();
+  auto without_people = gsnav::DeviceRenderer::create(*device, std::move(empty), draws);
+  if (!without_people) return without_people.status();
+  std::unique_ptr<Session> s(new Session(options, std::move(stage), how, std::move(*world),
+                                         std::move(*renderer), std::move(*without_people)));
   if (Status status = s->begin_episode(0); !status) return status;
   return s;
 }
 
 Session::Session(const gsnav_eval::Options& options, gsnav_eval::Stage stage, const SessionOptions& how,
-                 gsnav::World world)
+                 gsnav::World world, gsnav::DeviceRenderer renderer,
+                 gsnav::DeviceRenderer without_people)
     : stage_(std::move(stage)),
       how_(how),
       depth_colors_(depth_colors(how)),
       scene_name_(options.scene.empty() ? "embedded flat" : options.scene),
       world_(std::move(world)),
-      backend_(options.threads),
-      scene_(backend_, stage_.scene),
-      renderer_(backend_),
+      renderer_(std::move(renderer)),
+      without_people_(std::move(without_people)),
       walkable_(walkable(*stage_.scene->navmesh)),
       map_frame_(nav_loop::fit_map(*stage_.scene->navmesh, options.width, options.height)),
       ground_(options.width, options.height, {0.96f, 0.96f, 0.96f}) {
-  gsnav::RenderConfig config = scene_.render_config(stage_.config.render);
-  config.outputs = gsnav::kRgb | gsnav::kMedianDepth;
-  renderer_.set_config(config);
   controls_.paused = how.paused;
   nav_loop::MapContent map;
   map.navmesh = stage_.scene->navmesh.get();
@@ -226,15 +235,8 @@ Status Session::draw_view(const Controls& c, const gsnav::CapsuleSet& bodies) {
   const gsnav::AgentPose& agent = world_.agent();
   const gsnav::Camera camera =
       gsnav::sensor_camera(stage_.config.sensors.front(), agent.position, agent.rotation(), agent.pitch);
-  std::span<const gsnav::GaussianSet> sets = scene_.assets();
-  if (c.people) {
-    scene_.make_slots(1);
-    if (Status s = scene_.prepare(0, world_.time(), std::span(&camera, 1), renderer_.config()); !s)
-      return s;
-    if (Status s = scene_.pose_prepared(0); !s) return s;
-    sets = scene_.sets(0);
-  }
-  if (Status s = renderer_.render(sets, std::span(&camera, 1), frames_); !s) return s;
+  gsnav::DeviceRenderer& renderer = c.people ? renderer_ : without_people_;
+  if (Status s = renderer.render(std::span(&camera, 1), frames_, world_.time()); !s) return s;
   std::vector<std::uint8_t> rgb(frames_.rgb.size());
   gsnav::to_bytes(frames_.rgb, rgb);
   if (c.navmesh || c.capsules) {
