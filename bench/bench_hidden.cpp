@@ -17,7 +17,7 @@
 
 #include "frame_stages.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/render/count_culled.hpp"
+#include "gsnav/detail/render/count_culled.hpp"
 #include "workload.hpp"
 
 using namespace gsnav;

@@ -2,7 +2,7 @@
 // The same in many environments at once. usage: pointnav_batch [device]
 #include <cstdio>
 
-#include "gsnav/device/batch.hpp"
+#include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
 

@@ -12,7 +12,7 @@ import sys
 import tempfile
 
 RANK = {"base": 0, "math": 1, "core": 2, "image": 3, "frame": 4, "skin": 4, "sweep": 4, "mesh": 5, "lanes": 6,
-        "render": 6, "scene": 7, "avatar": 7, "nav": 7, "io": 8, "interop": 8, "sim": 8, "eval": 8}
+        "render": 6, "scene": 7, "avatar": 7, "nav": 7, "io": 8, "interop": 8, "sim": 8, "eval": 8, "device": 9}
 # avatar may include these
 DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface_material.hpp"}
 # Not standard, but there wherever the code that includes them is compiled.
@@ -36,7 +36,7 @@ def layer_of(path):
 def allowed(layer, target, target_path):
     if layer == target:
         return True
-    if layer == "umbrella":
+    if layer == "umbrella" or (layer == "device" and target.startswith("backend")):
         return True
     if layer.startswith("backend"):
         return RANK.get(target, 99) <= RANK["render"]

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/device/batch.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
 

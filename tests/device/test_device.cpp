@@ -9,7 +9,6 @@
 
 #include "doctest/doctest.h"
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/device/batch.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"

@@ -9,9 +9,9 @@
 #include "arrays.hpp"
 #include "backends.hpp"
 #include "cases.hpp"
+#include "gsnav/detail/render/count_culled.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
-#include "gsnav/render/count_culled.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

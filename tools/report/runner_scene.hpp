@@ -15,7 +15,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/render/count_culled.hpp"
+#include "gsnav/detail/render/count_culled.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "options.hpp"

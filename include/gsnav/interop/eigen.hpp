@@ -8,7 +8,7 @@
 #include <type_traits>
 
 #include "gsnav/core/view.hpp"
-#include "gsnav/interop/conventions.hpp"
+#include "gsnav/detail/interop/conventions.hpp"
 
 // Eigen over gsnav's arrays and the other way. `as_` functions copy nothing: what they return points
 // into their argument and lives no longer. `to_` and `from_` functions copy, where layouts differ.

@@ -21,7 +21,7 @@
 #include "gsnav/detail/render/order_visible.hpp"
 #include "gsnav/detail/render/render_workspace.hpp"
 #include "gsnav/detail/render/validate_set.hpp"
-#include "gsnav/frame/color_space.hpp"
+#include "gsnav/detail/frame/color_space.hpp"
 #include "gsnav/render/render_config.hpp"
 
 namespace gsnav {

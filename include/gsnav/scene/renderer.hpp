@@ -15,9 +15,9 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/render/frame_lanes.hpp"
+#include "gsnav/detail/render/render_composite.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/render/frames.hpp"
-#include "gsnav/render/render_composite.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 

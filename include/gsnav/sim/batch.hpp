@@ -18,7 +18,6 @@
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
 #include "gsnav/sim/config.hpp"
-#include "gsnav/sim/observations.hpp"
 #include "gsnav/sim/simulator.hpp"
 
 namespace gsnav {

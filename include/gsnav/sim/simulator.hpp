@@ -11,7 +11,6 @@
 #include "gsnav/detail/sim/scene_on_backend.hpp"
 #include "gsnav/detail/sim/sensor_rig.hpp"
 #include "gsnav/sim/config.hpp"
-#include "gsnav/sim/observations.hpp"
 #include "gsnav/sim/world.hpp"
 
 namespace gsnav {

@@ -10,7 +10,7 @@
 #include "gsnav/core/stages.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
-#include "gsnav/sweep/capsule_batch.hpp"
+#include "gsnav/detail/sweep/capsule_batch.hpp"
 
 // One agent against many capsules: the outcome does not depend on the order of the capsules, equal
 // times and equal gaps are decided by (avatar, bone). And many pairs at once, on a backend.

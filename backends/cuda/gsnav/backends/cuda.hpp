@@ -13,9 +13,9 @@
 #include "gsnav/detail/frame/cut_depth.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/render/render_composite.hpp"
 #include "gsnav/detail/sweep/first_impacts.hpp"
 #include "gsnav/render/render.hpp"
-#include "gsnav/render/render_composite.hpp"
 #include "gsnav/skin/skin.hpp"
 
 struct CUevent_st;

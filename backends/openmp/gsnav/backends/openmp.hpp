@@ -20,10 +20,10 @@
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
-#include "gsnav/render/render_composite.hpp"
+#include "gsnav/detail/render/render_composite.hpp"
+#include "gsnav/detail/sweep/capsule_batch.hpp"
 #include "gsnav/skin/lbs.hpp"
 #include "gsnav/skin/skin.hpp"
-#include "gsnav/sweep/capsule_batch.hpp"
 #if !defined(GSNAV_OPENMP_COMPILED)
 #include "gsnav/detail/lanes/kernels.hpp"
 #endif

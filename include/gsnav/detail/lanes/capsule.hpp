@@ -2,7 +2,7 @@
 #pragma once
 
 #include "gsnav/detail/lanes/isa.hpp"
-#include "gsnav/sweep/capsule_batch.hpp"
+#include "gsnav/detail/sweep/capsule_batch.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "gsnav/detail/mesh/mesh_raster.hpp"
-#include "gsnav/frame/color_space.hpp"
+#include "gsnav/detail/frame/color_space.hpp"
 
 // What the visible triangles look like, one pixel after the other: each is shaded once, however many
 // triangles lie behind it.

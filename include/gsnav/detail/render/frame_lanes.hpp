@@ -15,7 +15,7 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/core/guarded.hpp"
-#include "gsnav/render/render_composite.hpp"
+#include "gsnav/detail/render/render_composite.hpp"
 
 namespace gsnav {
 

@@ -9,10 +9,10 @@
 
 #include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
+#include "gsnav/detail/render/count_culled.hpp"
 #include "gsnav/detail/render/render_workspace.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
 #include "gsnav/detail/scene/scene_profile.hpp"
-#include "gsnav/render/count_culled.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 

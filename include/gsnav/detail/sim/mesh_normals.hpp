@@ -8,7 +8,7 @@
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/detail/render/draw_meshes.hpp"
-#include "gsnav/render/render_composite.hpp"
+#include "gsnav/detail/render/render_composite.hpp"
 
 namespace gsnav {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/detail/render/render_composite.hpp"
 #include "gsnav/detail/sim/semantic.hpp"
-#include "gsnav/render/render_composite.hpp"
 
 namespace gsnav {
 
