@@ -15,13 +15,13 @@
 #include "gsnav/core/stages.hpp"
 #include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/frame/blend.hpp"
+#include "gsnav/detail/frame/color_space.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/render/composite_steps.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
 #include "gsnav/detail/render/render_workspace.hpp"
 #include "gsnav/detail/render/validate_set.hpp"
-#include "gsnav/detail/frame/color_space.hpp"
 #include "gsnav/render/render_config.hpp"
 
 namespace gsnav {

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/detail/mesh/mesh_raster.hpp"
 #include "gsnav/detail/frame/color_space.hpp"
+#include "gsnav/detail/mesh/mesh_raster.hpp"
 
 // What the visible triangles look like, one pixel after the other: each is shaded once, however many
 // triangles lie behind it.
