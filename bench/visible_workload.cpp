@@ -63,10 +63,11 @@ VisibleSets workload_visible_sets(VisibleSettings settings) {
   const auto start = std::chrono::steady_clock::now();
   const char* scene = std::getenv("GSNAV_BENCH_SCENE");
   io::CachedVisibleSets found;
+  const auto build = [&] { return build_visible_sets(backend, cloud, viewpoints, settings, placed); };
   if (scene != nullptr) {
-    found = io::cached_visible_sets(backend, scene, cloud, viewpoints, settings, placed).value();
+    found = io::cached_visible_sets(scene, cloud, viewpoints, settings, placed, build).value();
   } else {
-    found.sets = build_visible_sets(backend, cloud, viewpoints, settings, placed).value();
+    found.sets = build().value();
     found.built = true;
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;

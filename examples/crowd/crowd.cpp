@@ -7,6 +7,7 @@
 
 #include "gsnav/nav.hpp"
 #include "gsnav/sim.hpp"
+#include "gsnav/sim/batch.hpp"
 
 using namespace gsnav;
 

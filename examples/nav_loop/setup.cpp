@@ -5,15 +5,13 @@
 #include <cstdio>
 #include <optional>
 
-#if defined(NAV_LOOP_OPENMP)
-#include "gsnav/backends/openmp.hpp"
-#else
-#include "gsnav/backends/serial.hpp"
-#endif
+#include "../../tools/common/device_option.hpp"
+#include "gsnav/device/renderer.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/nav.hpp"
 #include "gsnav/render.hpp"
+#include "gsnav/scene/prepare.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/people.hpp"
 
@@ -29,17 +27,13 @@ double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
 }
 
-#if defined(NAV_LOOP_OPENMP)
-gsnav::OpenMPBackend builder(const Options& options) { return gsnav::OpenMPBackend(options.threads); }
-#else
-gsnav::SerialBackend builder(const Options&) { return {}; }
-#endif
-
 /// Levels of detail: those beside the scene's file, or built; the embedded flat's are built.
 Result<gsnav::LodTree> levels_of(const Options& options, const gsnav::GaussianCloud& cloud) {
-  auto backend = builder(options);
-  if (options.scene.empty()) return gsnav::build_lod(backend, cloud);
-  auto cached = gsnav::io::cached_lod(backend, options.scene, cloud);
+  const auto device = gsnav_tools::device_of(options.backend, options.threads);
+  if (!device) return device.status();
+  const auto build = [&] { return gsnav::build_lod(*device, cloud); };
+  if (options.scene.empty()) return build();
+  auto cached = gsnav::io::cached_lod(options.scene, cloud, {}, build);
   if (!cached) return cached.status();
   if (!cached->warning.empty()) std::fprintf(stderr, "%s\n", cached->warning.c_str());
   return std::move(cached->tree);
@@ -56,13 +50,15 @@ Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::
   const double heights[] = {options.eye_height};
   const auto viewpoints = gsnav::navmesh_viewpoints(navmesh, heights, settings.spacing());
   if (!viewpoints) return viewpoints.status();
-  auto backend = builder(options);
-  if (options.scene.empty()) {
-    return gsnav::build_visible_sets(backend, *asset.cloud, *viewpoints, settings,
+  const auto device = gsnav_tools::device_of(options.backend, options.threads);
+  if (!device) return device.status();
+  const auto build = [&] {
+    return gsnav::build_visible_sets(*device, *asset.cloud, *viewpoints, settings,
                                      asset.world_from_asset);
-  }
-  auto cached = gsnav::io::cached_visible_sets(backend, options.scene, *asset.cloud, *viewpoints,
-                                               settings, asset.world_from_asset);
+  };
+  if (options.scene.empty()) return build();
+  auto cached = gsnav::io::cached_visible_sets(options.scene, *asset.cloud, *viewpoints, settings,
+                                               asset.world_from_asset, build);
   if (!cached) return cached.status();
   if (!cached->warning.empty()) std::fprintf(stderr, "%s\n", cached->warning.c_str());
   return std::move(cached->sets);

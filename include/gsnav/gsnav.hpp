@@ -16,7 +16,7 @@
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
-#include "gsnav/detail/scene/temporal_cloud.hpp"
+#include "gsnav/detail/scene/temporal_gaussians.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/math/functions.hpp"

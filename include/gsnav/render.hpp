@@ -1,39 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Scenes and images: clouds of Gaussians, meshes, levels of detail, visible sets, cameras and the
-// renderer. Add a backend (gsnav/backends/...). Headers only.
+// Scenes and images: clouds of Gaussians, meshes, cameras, and the renderer on a device chosen at run
+// time. Link gsnav::device. A backend of your own: scene/renderer.hpp. What is made of a cloud before it
+// is drawn: scene/prepare.hpp.
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/scene/content_hash.hpp"
-#include "gsnav/detail/scene/describe_cloud.hpp"
-#include "gsnav/detail/scene/drop_bands.hpp"
-#include "gsnav/detail/scene/edit_cloud.hpp"
-#include "gsnav/detail/scene/ledger.hpp"
+#include "gsnav/detail/frame/color_space.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
-#include "gsnav/detail/scene/lod_build.hpp"
-#include "gsnav/detail/scene/lod_greedy.hpp"
-#include "gsnav/detail/scene/lod_levels.hpp"
-#include "gsnav/detail/scene/lod_merge.hpp"
-#include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
-#include "gsnav/detail/scene/point_tree.hpp"
-#include "gsnav/detail/scene/scene_profile.hpp"
-#include "gsnav/detail/scene/sh_rotation.hpp"
-#include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/surface_material.hpp"
-#include "gsnav/detail/scene/temporal_cloud.hpp"
 #include "gsnav/detail/scene/textured_scene.hpp"
-#include "gsnav/detail/scene/views_around.hpp"
+#include "gsnav/device/device.hpp"
+#include "gsnav/device/renderer.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/similarity.hpp"
+#include "gsnav/render/frames.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
-#include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/triangle_mesh.hpp"
-#include "gsnav/scene/visible_sets.hpp"
+#include "gsnav/sim/scene.hpp"
 #include "gsnav/version.hpp"

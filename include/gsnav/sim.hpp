@@ -1,33 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The simulator: sensors, actions, episodes, metrics and batches. Add a backend (gsnav/backends/...);
-// link gsnav::sim.
+// The simulator on a device chosen at run time: scenes, sensors, actions, episodes, metrics, people and
+// batches. Link gsnav::device. On a backend of your own: sim/simulator.hpp and sim/batch.hpp.
 
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/body_cache.hpp"
 #include "gsnav/detail/sim/cube_map.hpp"
 #include "gsnav/detail/sim/episode.hpp"
-#include "gsnav/detail/sim/frame_batch.hpp"
 #include "gsnav/detail/sim/greedy_follower.hpp"
-#include "gsnav/detail/sim/mesh_normals.hpp"
 #include "gsnav/detail/sim/noise.hpp"
 #include "gsnav/detail/sim/proximity.hpp"
 #include "gsnav/detail/sim/random_policy.hpp"
 #include "gsnav/detail/sim/reward.hpp"
-#include "gsnav/detail/sim/scene_detail.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
-#include "gsnav/detail/sim/scene_on_backend.hpp"
-#include "gsnav/detail/sim/semantic.hpp"
-#include "gsnav/detail/sim/semantic_frame.hpp"
 #include "gsnav/detail/sim/sensor.hpp"
-#include "gsnav/detail/sim/sensor_rig.hpp"
 #include "gsnav/detail/sim/task.hpp"
-#include "gsnav/detail/sim/team.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/device/device.hpp"
+#include "gsnav/device/renderer.hpp"
+#include "gsnav/device/simulator.hpp"
+#include "gsnav/sim/config.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/metrics.hpp"
 #include "gsnav/sim/people.hpp"
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/scene.hpp"
 #include "gsnav/sim/world.hpp"

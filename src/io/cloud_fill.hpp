@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/core/huge_pages.hpp"
+#include "gsnav/detail/core/run_guarded.hpp"
 #include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"

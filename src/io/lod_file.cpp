@@ -13,6 +13,7 @@
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/detail/scene/content_hash.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 
 namespace gsnav::io {

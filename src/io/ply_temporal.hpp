@@ -7,7 +7,7 @@
 #include <string>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/scene/temporal_cloud.hpp"
+#include "gsnav/detail/scene/temporal_edit.hpp"
 
 namespace gsnav::io::detail {
 

@@ -16,7 +16,7 @@
 #include "file.hpp"
 #include "format_range.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/core/run_guarded.hpp"
 #include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/detail/io/sog.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"

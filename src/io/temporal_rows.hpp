@@ -10,7 +10,7 @@
 #include <string>
 
 #include "cloud_fill.hpp"
-#include "gsnav/detail/scene/temporal_cloud.hpp"
+#include "gsnav/detail/scene/temporal_edit.hpp"
 
 namespace gsnav::io::detail {
 

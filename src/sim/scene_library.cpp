@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav {
 namespace {

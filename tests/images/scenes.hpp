@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gsnav/avatar/skinned_gaussians.hpp"
-#include "gsnav/detail/scene/temporal_cloud.hpp"
+#include "gsnav/detail/scene/temporal_gaussians.hpp"
 #include "gsnav/detail/sim/scene_on_backend.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/render/render_config.hpp"

@@ -139,18 +139,19 @@ TEST_CASE("lod file: cached beside the asset, by its content") {
   CHECK(path.parent_path() == folder.path());
   CHECK(path != io::lod_path(asset, other));
   CHECK(path == io::lod_path(asset + ",b,c", cloud));
-  CHECK(io::cached_lod(backend, asset, cloud).value().built);
+  const auto build = [&] { return build_lod(backend, cloud); };
+  CHECK(io::cached_lod(asset, cloud, {}, build).value().built);
   CHECK(std::filesystem::exists(path));
-  const io::CachedLod again = io::cached_lod(backend, asset, cloud).value();
+  const io::CachedLod again = io::cached_lod(asset, cloud, {}, build).value();
   CHECK(!again.built);
   CHECK(again.warning.empty());
   write_file(path, read_file(path).substr(0, 1000));
-  const io::CachedLod repaired = io::cached_lod(backend, asset, cloud).value();
+  const io::CachedLod repaired = io::cached_lod(asset, cloud, {}, build).value();
   CHECK(repaired.built);
   CHECK(contains(repaired.warning, "bytes"));
-  CHECK(!io::cached_lod(backend, asset, cloud).value().built);
+  CHECK(!io::cached_lod(asset, cloud, {}, build).value().built);
   const io::CachedLod nowhere =
-      io::cached_lod(backend, (folder / "none/scene.ply").string(), cloud).value();
+      io::cached_lod((folder / "none/scene.ply").string(), cloud, {}, build).value();
   CHECK(nowhere.built);
   CHECK(contains(nowhere.warning, "does not exist"));
 }

@@ -164,12 +164,13 @@ TEST_CASE("visible sets file: cached beside the asset, by all that they are made
   CHECK(path != io::visible_sets_path(asset, rooms(), std::span(eyes).first(9), coarse()));
   CHECK(path != io::visible_sets_path(asset, rooms(), eyes, coarse(), {{}, {1, 0, 0}, 1}));
   CHECK(path != io::visible_sets_path(asset, two_rooms(3, 200), eyes, coarse()));
-  CHECK(io::cached_visible_sets(backend, asset, rooms(), eyes, coarse()).value().built);
+  const auto build = [&] { return build_visible_sets(backend, rooms(), eyes, coarse()); };
+  CHECK(io::cached_visible_sets(asset, rooms(), eyes, coarse(), {}, build).value().built);
   CHECK(std::filesystem::exists(path));
-  CHECK_FALSE(io::cached_visible_sets(backend, asset, rooms(), eyes, coarse()).value().built);
+  CHECK_FALSE(io::cached_visible_sets(asset, rooms(), eyes, coarse(), {}, build).value().built);
   write_file(path, read_file(path).substr(0, 500));
-  const auto repaired = io::cached_visible_sets(backend, asset, rooms(), eyes, coarse()).value();
+  const auto repaired = io::cached_visible_sets(asset, rooms(), eyes, coarse(), {}, build).value();
   CHECK(repaired.built);
   CHECK(contains(repaired.warning, "bytes"));
-  CHECK_FALSE(io::cached_visible_sets(backend, asset, rooms(), eyes, coarse()).value().built);
+  CHECK_FALSE(io::cached_visible_sets(asset, rooms(), eyes, coarse(), {}, build).value().built);
 }

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "backends.hpp"
-#include "gsnav/detail/scene/temporal_cloud.hpp"
+#include "gsnav/detail/scene/temporal_gaussians.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

@@ -17,7 +17,7 @@
 #include <unistd.h>
 #endif
 
-#include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/core/run_guarded.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

@@ -14,6 +14,7 @@
 #include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/render.hpp"
+#include "gsnav/scene/prepare.hpp"
 
 namespace {
 

@@ -18,6 +18,7 @@
 
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/render.hpp"
+#include "gsnav/scene/prepare.hpp"
 #include "run.hpp"
 
 namespace gsnav_eval {

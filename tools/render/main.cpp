@@ -30,8 +30,10 @@
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/render.hpp"
 #include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/prepare.hpp"
 #include "gsnav/scene/renderer.hpp"
 #include "gsnav/sim.hpp"
+#include "gsnav/sim/simulator.hpp"
 
 namespace {
 
@@ -394,7 +396,8 @@ int main(int argc, char** argv) {
       if (terminal) std::printf("\rbuilding levels of detail: %.0f %%", 100 * share);
       if (terminal) std::fflush(stdout);
     };
-    auto made = io::cached_lod(openmp, o.scene, full, settings);
+    auto made =
+        io::cached_lod(o.scene, full, settings, [&] { return build_lod(openmp, full, settings); });
     if (!made) return fail(made.message());
     lod = std::move(*made);
     std::printf("%slevels of detail: %zu, %.1f MB, %s\n", terminal && lod->built ? "\r" : "",

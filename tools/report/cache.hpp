@@ -15,6 +15,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/render.hpp"
+#include "gsnav/scene/prepare.hpp"
 
 namespace gsnav_report {
 

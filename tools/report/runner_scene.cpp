@@ -90,7 +90,8 @@ Result<const LodTree*> SceneRunner::tree_of(const Setting& s) {
       if (!built) return built.status();
       tree_ = std::move(*built);
     } else {
-      Result<io::CachedLod> cached = io::cached_lod(openmp_, scene_.path, scene_.cloud);
+      Result<io::CachedLod> cached = io::cached_lod(scene_.path, scene_.cloud, {},
+                                                    [this] { return build_lod(openmp_, scene_.cloud); });
       if (!cached) return cached.status();
       if (!cached->warning.empty())
         std::fprintf(stderr, "\ngsnav-report: warning: %s\n", cached->warning.c_str());

@@ -10,6 +10,7 @@
 
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/render.hpp"
+#include "gsnav/scene/prepare.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "runner_system.hpp"
 

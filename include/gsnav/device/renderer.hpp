@@ -13,6 +13,8 @@
 
 namespace gsnav {
 
+struct VisibleSettings;
+
 namespace detail {
 class RendererEngine;
 }
@@ -62,5 +64,14 @@ class DeviceRenderer {
   Device device_;
   std::unique_ptr<detail::RendererEngine> engine_;
 };
+
+/// build_lod, and build_visible_sets (scene/visible_sets.hpp), compiled: by the device's threads, or of
+/// a GPU by the CPU's. Errors: theirs.
+Result<LodTree> build_lod(const Device& device, const GaussianCloud& cloud,
+                          const LodSettings& settings = {});
+Result<VisibleSets> build_visible_sets(const Device& device, const GaussianCloud& cloud,
+                                       std::span<const Vec3d> viewpoints,
+                                       const VisibleSettings& settings,
+                                       const Similarity& world_from_asset = {});
 
 }  // namespace gsnav

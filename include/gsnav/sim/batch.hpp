@@ -17,6 +17,7 @@
 #include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
+#include "gsnav/detail/sim/team.hpp"
 #include "gsnav/sim/config.hpp"
 #include "gsnav/sim/simulator.hpp"
 

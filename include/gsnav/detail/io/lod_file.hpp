@@ -6,7 +6,7 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/io/read_or_build.hpp"
-#include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/scene/lod_tree.hpp"
 
 namespace gsnav::io {
 
@@ -35,16 +35,16 @@ struct CachedLod {
       warning;  ///< why a file that is there was not taken, or why none could be written; or empty
 };
 
-/// The tree of a scene: read where lod_path() has it, else built and written there; trees of an earlier
-/// content of the scene's file, older than it, are then removed. A file that cannot be taken, and a
-/// folder that cannot be written, are warnings. Errors: those of build_lod.
-template <Backend B>
-Result<CachedLod> cached_lod(B& backend, const std::string& spec, const GaussianCloud& cloud,
-                             const LodSettings& settings = {}) {
+/// The tree of a scene: read where lod_path() has it, else built by `build`, which returns a
+/// Result<LodTree>, and written there; trees of an earlier content of the scene's file, older than it,
+/// are then removed. A file that cannot be taken, and a folder that cannot be written, are warnings.
+/// Errors: those of `build`.
+template <class Build>
+Result<CachedLod> cached_lod(const std::string& spec, const GaussianCloud& cloud,
+                             const LodSettings& settings, const Build& build) {
   return detail::read_or_build<CachedLod>(
       lod_path(spec, cloud, settings), &CachedLod::tree,
-      [&](const std::filesystem::path& path) { return load_lod(path, cloud, settings); },
-      [&] { return build_lod(backend, cloud, settings); },
+      [&](const std::filesystem::path& path) { return load_lod(path, cloud, settings); }, build,
       [&](const std::filesystem::path& path, const LodTree& tree) {
         return save_lod(path, tree, cloud, settings);
       });

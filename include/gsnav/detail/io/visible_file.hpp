@@ -36,19 +36,18 @@ struct CachedVisibleSets {
       warning;  ///< why a file that is there was not taken, or why none could be written; or empty
 };
 
-/// The visible sets of a scene: read where visible_sets_path() has them, else built and written there;
-/// those of an earlier content of the scene's file, older than it, are then removed. A file that cannot
-/// be taken, and a folder that cannot be written, are warnings. Errors: those of build_visible_sets.
-template <Backend B>
-Result<CachedVisibleSets> cached_visible_sets(B& backend, const std::string& spec,
-                                              const GaussianCloud& cloud,
+/// The visible sets of a scene: read where visible_sets_path() has them, else built by `build`, which
+/// returns a Result<VisibleSets>, and written there; those of an earlier content of the scene's file,
+/// older than it, are then removed. A file that cannot be taken, and a folder that cannot be written,
+/// are warnings. Errors: those of `build`.
+template <class Build>
+Result<CachedVisibleSets> cached_visible_sets(const std::string& spec, const GaussianCloud& cloud,
                                               std::span<const Vec3d> viewpoints,
-                                              const VisibleSettings& settings = {},
-                                              const Similarity& world_from_asset = {}) {
+                                              const VisibleSettings& settings,
+                                              const Similarity& world_from_asset, const Build& build) {
   return detail::read_or_build<CachedVisibleSets>(
       visible_sets_path(spec, cloud, viewpoints, settings, world_from_asset), &CachedVisibleSets::sets,
-      [&](const std::filesystem::path& path) { return load_visible_sets(path, cloud); },
-      [&] { return build_visible_sets(backend, cloud, viewpoints, settings, world_from_asset); },
+      [&](const std::filesystem::path& path) { return load_visible_sets(path, cloud); }, build,
       [&](const std::filesystem::path& path, const VisibleSets& sets) {
         return save_visible_sets(path, sets, cloud);
       });

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/core/thread_pool.hpp"
+
+namespace gsnav::detail {
+
+/// guarded(f(p)) for each p in [0, pieces), shared out among the threads of a pool. Of several failures
+/// that of the lowest p is returned.
+template <class F>
+Status run_guarded(ThreadPool& pool, std::uint32_t pieces, const F& f) {
+  std::vector<Status> statuses(pieces);
+  pool.run(pieces, [&](std::uint32_t p) { statuses[p] = guarded([&] { return f(p); }); });
+  for (Status& s : statuses) {
+    if (!s) return std::move(s);
+  }
+  return {};
+}
+
+}  // namespace gsnav::detail

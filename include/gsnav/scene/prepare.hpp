@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What is made of a cloud before it is drawn, and what is found out about it: editing, order in space,
+// levels of detail, visible sets, packed storage, the bands that matter, what a frame skipped. Functions
+// that work hard take a backend (gsnav/backends/...).
+
+#include "gsnav/detail/scene/content_hash.hpp"
+#include "gsnav/detail/scene/describe_cloud.hpp"
+#include "gsnav/detail/scene/drop_bands.hpp"
+#include "gsnav/detail/scene/edit_cloud.hpp"
+#include "gsnav/detail/scene/ledger.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/detail/scene/lod_greedy.hpp"
+#include "gsnav/detail/scene/lod_levels.hpp"
+#include "gsnav/detail/scene/lod_merge.hpp"
+#include "gsnav/detail/scene/needed_bands.hpp"
+#include "gsnav/detail/scene/point_tree.hpp"
+#include "gsnav/detail/scene/scene_profile.hpp"
+#include "gsnav/detail/scene/sh_rotation.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/detail/scene/temporal_edit.hpp"
+#include "gsnav/detail/scene/temporal_gaussians.hpp"
+#include "gsnav/detail/scene/views_around.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
+#include "gsnav/scene/visible_sets.hpp"
