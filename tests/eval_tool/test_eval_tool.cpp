@@ -218,22 +218,29 @@ TEST_CASE("a record that is none of the evaluation is named by file, line, field
   const std::size_t from = first.find("\"metrics\":{") + 11, to = first.find('}', from);
   std::string empty = first;
   empty.erase(from, to - from);
-  // A success far from the goal, which all else fits.
-  auto far = nlohmann::ordered_json::parse(first);
-  auto& m = far["metrics"];
-  const double l = m["start_distance"], p = m["path_length"];
-  if (!m["stop_called"].get<bool>()) far["actions"] = far["actions"].get<std::string>() + '0';
-  m["stop_called"] = m["success"] = true;
-  m["distance_to_goal"] = 7;
-  m["spl"] = gsnav::success_weighted_by_path_length(true, l, p);
-  m["soft_spl"] = gsnav::soft_success_weighted_by_path_length(7, l, p);
-  m["stl"] = gsnav::success_weighted_by_time(true, l, 0.25, m["steps"].get<std::size_t>());
+  // A success far from the goal, and half the way to it: their metrics fit each other.
+  const auto fitted = [&](double l, double p, bool success) {
+    auto j = nlohmann::ordered_json::parse(first);
+    auto& m = j["metrics"];
+    m["start_distance"] = l;
+    m["stop_called"] = m["success"] = success;
+    const double g = success ? 7 : m["distance_to_goal"].get<double>();
+    m["distance_to_goal"] = g;
+    m["spl"] = gsnav::success_weighted_by_path_length(success, l, p);
+    m["soft_spl"] = gsnav::soft_success_weighted_by_path_length(g, l, p);
+    m["stl"] = gsnav::success_weighted_by_time(success, l, 0.25, m["steps"].get<std::size_t>());
+    return j.dump() + "\n";
+  };
+  const auto whole = nlohmann::ordered_json::parse(first);
+  REQUIRE_FALSE(whole["metrics"]["stop_called"].get<bool>());
+  const std::string actions = whole["actions"];
+  const double l = whole["metrics"]["start_distance"], p = whole["metrics"]["path_length"];
   const std::string deep = std::string(200000, '[') + std::string(200000, ']');
   const std::vector<Bad> cases{
       {with("episode", "99"), "episode = 99"},
       {with("episode", "-1"), "episode = -1"},
       {with("id", "\"other\""), "id = \"other\""},
-      {with("spl", "1.7"), "metrics.spl = 1.7: must be in [0.0, 1.0]"},
+      {with("spl", "1.7"), "metrics.spl = 1.7: the recorded actions lead to 0.0"},
       {with("spl", "null"), "metrics.spl = null"},
       {with("path_length", "-3"), "metrics.path_length = -3"},
       {with("path_length", "1e300"), "metrics.path_length = 1e+300"},
@@ -245,8 +252,17 @@ TEST_CASE("a record that is none of the evaluation is named by file, line, field
       {short_metrics, "metrics.spl is missing"},
       {empty, "metrics.success is missing"},
       {with("reward", "7") + first, "differs from out/journal.jsonl: line 2"},
-      {far.dump() + "\n", "metrics.success = true: does not follow from stop_called"},
-      {with("stl", "0.9"), "metrics.stl = 0.9: does not follow"},
+      {fitted(l, p, true), "metrics.success = true: the recorded actions lead to false"},
+      {fitted(0.5 * l, p, false), "metrics.soft_spl = "},
+      {with("start_distance", "1.5"), "metrics.start_distance = 1.5: the recorded actions lead to"},
+      {with("stl", "0.9"), "metrics.stl = 0.9: the recorded actions lead to 0.0"},
+      // Nobody is there.
+      {with("psi", "0.25"), "metrics.psi = 0.25: the recorded actions lead to 0.0"},
+      {with("psc", "0.5"), "metrics.psc = 0.5: the recorded actions lead to 1.0"},
+      {with("min_clearance", "1.5"), "metrics.min_clearance = 1.5: the recorded actions lead to null"},
+      {with("reward", "1e8"), "reward = 100000000.0: the recorded actions lead to"},
+      {with("actions", '"' + actions + "1\""), "actions: step after the end"},
+      {with("actions", '"' + actions.substr(1) + '"'), "the episode goes on after the last one"},
       {"{\"episode\":" + deep + ",\"id\":0}\n", "is JSON nested more than 4 deep"},
       {"[]\n", "is not an object"},
       {"{\n", "is not JSON"}};
