@@ -378,6 +378,24 @@ TEST_CASE("a replay becomes a video of any size, and says what is missing where 
                   folder.path());
   CHECK_FALSE(none.ok);
   CHECK(none.says("is it installed?"));
+  // One that fails in the middle of its file leaves the video that was there.
+  std::filesystem::create_directories(folder / "bin");
+  const auto program = [&](const char* end) {
+    write_file(
+        folder / "bin/ffmpeg",
+        std::string("#!/bin/sh\nfor out; do :; done\ncat > /dev/null\nprintf made > \"$out\"\n") + end);
+    std::filesystem::permissions(folder / "bin/ffmpeg", std::filesystem::perms::owner_all);
+    return run_command(
+        "env", "PATH=bin:/usr/bin:/bin " + quoted(GSNAV_REPLAY) + " " + options + "--video kept.mp4",
+        folder.path());
+  };
+  write_file(folder / "kept.mp4", "before");
+  CHECK(program("exit 1").says("ffmpeg failed"));
+  CHECK(read_file(folder / "kept.mp4") == "before");
+  CHECK(program("exit 0").ok);
+  CHECK(read_file(folder / "kept.mp4") == "made");
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
+    CHECK_FALSE(contains(entry.path().filename().string(), ".part"));
 #if defined(GSNAV_FFMPEG)
   CHECK_FALSE(run_command(GSNAV_REPLAY, options + "--video nowhere/walk.mp4", folder.path()).ok);
   REQUIRE(run_command(GSNAV_REPLAY, options + "--frames still", folder.path()).ok);
