@@ -14,6 +14,7 @@
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #endif
+#include "gsnav/core/printable.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "recorder.hpp"
 #include "setup.hpp"
@@ -98,7 +99,8 @@ Status run(B& backend, const Options& options) {
   print_table(options, setup.facts, records, t);
   if (Status s = write_json(options.out + "/metrics.json", options, setup.facts, records); !s) return s;
   if (Status s = write_timings(options.out + "/timings.json", t); !s) return s;
-  std::printf("Pictures, metrics.json and timings.json are in %s\n", options.out.c_str());
+  std::printf("Pictures, metrics.json and timings.json are in %s\n",
+              gsnav::printable(options.out).c_str());
   return {};
 }
 

@@ -10,6 +10,7 @@
 #else
 #include "gsnav/backends/serial.hpp"
 #endif
+#include "gsnav/core/printable.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/nav.hpp"
@@ -105,13 +106,15 @@ Result<Setup> prepare(const Options& options) {
       shipped = std::move(*set);
     }
     if (shipped) {
-      for (const std::string& w : shipped->report.warnings) std::fprintf(stderr, "%s\n", w.c_str());
+      for (const std::string& w : shipped->report.warnings)
+        std::fprintf(stderr, "%s\n", gsnav::printable(w).c_str());
       cloud = std::move(shipped->cloud);
       levels = std::move(shipped->tree);
     } else {
       auto loaded = gsnav::io::load_scene(options.scene);
       if (!loaded) return loaded.status();
-      for (const std::string& w : loaded->report.warnings) std::fprintf(stderr, "%s\n", w.c_str());
+      for (const std::string& w : loaded->report.warnings)
+        std::fprintf(stderr, "%s\n", gsnav::printable(w).c_str());
       cloud = std::move(loaded->cloud);
     }
     const auto up = upright(options.up);

@@ -117,6 +117,17 @@ TEST_CASE("episodes of a file are played by any policy") {
     CHECK(out.says(policy == "greedy" ? "SR 1.000" : "1 episodes"));
   }
   CHECK(run_command(GSNAV_EVAL, "--episode-file none.json --out x", folder.path()).says("none.json"));
+  // A name in a file that would clear the terminal.
+  write_file(folder / "odd.json",
+             R"({"episodes":[{"episode_id":"0","scene_id":"","start_position":[4.6,0,3.6],)"
+             R"("start_rotation":[0,0,0,1],"goals":[{"position":[5.2,0,3.2]}],"\u001b[2J":1}]})");
+  const Outcome odd = run_command(
+      GSNAV_EVAL, kSparse + "--avatars 0 --max-steps 1 --pictures 0 --episode-file odd.json --out odd",
+      folder.path());
+  CAPTURE(odd.text);
+  CHECK(odd.ok);
+  CHECK(odd.says("'\\x1B[2J' is left out"));
+  CHECK(odd.text.find('\x1b') == std::string::npos);
 }
 
 TEST_CASE(

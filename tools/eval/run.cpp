@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "../../examples/nav_loop/setup.hpp"
+#include "gsnav/core/printable.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/sim.hpp"
 #include "gsnav/sim/follower.hpp"
@@ -31,7 +32,7 @@ Result<Stage> prepare(const Options& o) {
     auto file = gsnav::io::load_episodes(o.episode_file);
     if (!file) return file.status();
     for (const std::string& w : file->warnings)
-      std::fprintf(stderr, "%s\n", w.c_str());
+      std::fprintf(stderr, "%s\n", gsnav::printable(w).c_str());
     stage.episodes = std::move(file->episodes);
   }
   stage.scene = std::make_shared<const gsnav::SimulatorScene>(std::move(setup->scene));
