@@ -8,6 +8,7 @@
 #include "gsnav/detail/io/episode_file.hpp"
 #include "gsnav/detail/io/npz_file.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/nav.hpp"
 #include "gsnav/sim/metrics.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
@@ -202,6 +203,35 @@ TEST_CASE(
   const Outcome old = eval();
   CHECK_FALSE(old.ok);
   CHECK(old.says("line 1: is of an earlier gsnav"));
+}
+
+TEST_CASE("a ready NavMesh is walked on, and another one in its file is refused by name") {
+  const TempFolder folder("eval");
+  const auto save_floor = [&](double length) {
+    const std::vector<gsnav::Vec3d> corners{
+        {1, 0, 1}, {1, 0, 4}, {1 + length, 0, 4}, {1 + length, 0, 1}};
+    const std::vector<gsnav::NavMesh::Triangle> triangles{{0, 1, 2}, {0, 2, 3}};
+    const auto mesh = gsnav::NavMesh::build({}, corners, triangles).value();
+    REQUIRE(gsnav::save_navmesh(mesh, folder / "floor.navmesh").ok());
+  };
+  const auto eval = [&](const std::string& more) {
+    return run_command(GSNAV_EVAL,
+                       kSparse + "--avatars 0 --episodes 2 --max-steps 5 --pictures 0 --out out " + more,
+                       folder.path());
+  };
+  save_floor(8);
+  const Outcome made = eval("--navmesh floor.navmesh");
+  CAPTURE(made.text);
+  CHECK(made.ok);
+  for (const auto& e : gsnav::io::load_episodes(folder / "out/episodes.json.gz")->episodes) {
+    CHECK(e.start_position.x < 9);
+    CHECK(e.start_position.z < 4);
+  }
+  save_floor(7);
+  const Outcome other = eval("--navmesh floor.navmesh");
+  CHECK_FALSE(other.ok);
+  CHECK(other.says("the navmesh in floor.navmesh has changed"));
+  CHECK(eval("--navmesh none.navmesh").says("none.navmesh"));
 }
 
 TEST_CASE("a record that is none of the evaluation is named by file, line, field and value") {
