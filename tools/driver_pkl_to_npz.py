@@ -10,6 +10,7 @@ and numbers; everything else in a pickle is dict, list, tuple, str, bytes, bool,
 need no names. Strings and numbers become arrays of one element, nested values are refused.
 """
 import io
+import os
 import pathlib
 import pickle
 import sys
@@ -82,8 +83,15 @@ def convert(source, target):
     arrays = load(pathlib.Path(source).read_bytes())
     if "joint_mats" not in arrays:
         raise ValueError("there is no joint_mats")
-    with open(target, "wb") as out:
-        numpy.savez_compressed(out, **arrays)
+    aside = pathlib.Path(f"{target}.{os.getpid()}.part")
+    try:
+        with open(aside, "wb") as out:
+            numpy.savez_compressed(out, **arrays)
+            out.flush()
+            os.fsync(out.fileno())
+        os.replace(aside, target)
+    finally:
+        aside.unlink(missing_ok=True)
     return arrays
 
 

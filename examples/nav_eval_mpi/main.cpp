@@ -101,9 +101,7 @@ Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& 
   }
   ranks.share(missing);
 
-  auto world = gsnav::World::create(
-      stage->scene->navmesh, stage->config.task,
-      [&](double t0, double t1, auto& out) { gsnav::append_bodies(*stage->scene, t0, t1, out); });
+  auto world = gsnav_eval::make_world(*stage);
   if (!world) return world.status();
   const auto look = looker(ranks, o, *stage, backend);
   if (!look) return look.status();

@@ -8,6 +8,7 @@
 
 #include "../../tools/common/device_option.hpp"
 #include "../../tools/common/parse_options.hpp"
+#include "gsnav/core/printable.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "recorder.hpp"
@@ -92,7 +93,8 @@ Status run(const gsnav::Device& device, const Options& options) {
   print_table(options, setup.facts, records, t);
   if (Status s = write_json(options.out + "/metrics.json", options, setup.facts, records); !s) return s;
   if (Status s = write_timings(options.out + "/timings.json", t); !s) return s;
-  std::printf("Pictures, metrics.json and timings.json are in %s\n", options.out.c_str());
+  std::printf("Pictures, metrics.json and timings.json are in %s\n",
+              gsnav::printable(options.out).c_str());
   return {};
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "../../tools/common/device_option.hpp"
+#include "gsnav/core/printable.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
@@ -101,13 +102,15 @@ Result<Setup> prepare(const Options& options) {
       shipped = std::move(*set);
     }
     if (shipped) {
-      for (const std::string& w : shipped->report.warnings) std::fprintf(stderr, "%s\n", w.c_str());
+      for (const std::string& w : shipped->report.warnings)
+        std::fprintf(stderr, "%s\n", gsnav::printable(w).c_str());
       cloud = std::move(shipped->cloud);
       levels = std::move(shipped->tree);
     } else {
       auto loaded = gsnav::io::load_scene(options.scene);
       if (!loaded) return loaded.status();
-      for (const std::string& w : loaded->report.warnings) std::fprintf(stderr, "%s\n", w.c_str());
+      for (const std::string& w : loaded->report.warnings)
+        std::fprintf(stderr, "%s\n", gsnav::printable(w).c_str());
       cloud = std::move(loaded->cloud);
     }
     const auto up = upright(options.up);

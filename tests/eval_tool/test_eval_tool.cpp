@@ -8,6 +8,7 @@
 #include "gsnav/detail/io/episode_file.hpp"
 #include "gsnav/detail/io/npz_file.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/nav.hpp"
 #include "gsnav/sim/metrics.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
@@ -117,6 +118,17 @@ TEST_CASE("episodes of a file are played by any policy") {
     CHECK(out.says(policy == "greedy" ? "SR 1.000" : "1 episodes"));
   }
   CHECK(run_command(GSNAV_EVAL, "--episode-file none.json --out x", folder.path()).says("none.json"));
+  // A name in a file that would clear the terminal.
+  write_file(folder / "odd.json",
+             R"({"episodes":[{"episode_id":"0","scene_id":"","start_position":[4.6,0,3.6],)"
+             R"("start_rotation":[0,0,0,1],"goals":[{"position":[5.2,0,3.2]}],"\u001b[2J":1}]})");
+  const Outcome odd = run_command(
+      GSNAV_EVAL, kSparse + "--avatars 0 --max-steps 1 --pictures 0 --episode-file odd.json --out odd",
+      folder.path());
+  CAPTURE(odd.text);
+  CHECK(odd.ok);
+  CHECK(odd.says("'\\x1B[2J' is left out"));
+  CHECK(odd.text.find('\x1b') == std::string::npos);
 }
 
 TEST_CASE(
@@ -193,6 +205,35 @@ TEST_CASE(
   CHECK(old.says("line 1: is of an earlier gsnav"));
 }
 
+TEST_CASE("a ready NavMesh is walked on, and another one in its file is refused by name") {
+  const TempFolder folder("eval");
+  const auto save_floor = [&](double length) {
+    const std::vector<gsnav::Vec3d> corners{
+        {1, 0, 1}, {1, 0, 4}, {1 + length, 0, 4}, {1 + length, 0, 1}};
+    const std::vector<gsnav::NavMesh::Triangle> triangles{{0, 1, 2}, {0, 2, 3}};
+    const auto mesh = gsnav::NavMesh::build({}, corners, triangles).value();
+    REQUIRE(gsnav::save_navmesh(mesh, folder / "floor.navmesh").ok());
+  };
+  const auto eval = [&](const std::string& more) {
+    return run_command(GSNAV_EVAL,
+                       kSparse + "--avatars 0 --episodes 2 --max-steps 5 --pictures 0 --out out " + more,
+                       folder.path());
+  };
+  save_floor(8);
+  const Outcome made = eval("--navmesh floor.navmesh");
+  CAPTURE(made.text);
+  CHECK(made.ok);
+  for (const auto& e : gsnav::io::load_episodes(folder / "out/episodes.json.gz")->episodes) {
+    CHECK(e.start_position.x < 9);
+    CHECK(e.start_position.z < 4);
+  }
+  save_floor(7);
+  const Outcome other = eval("--navmesh floor.navmesh");
+  CHECK_FALSE(other.ok);
+  CHECK(other.says("the navmesh in floor.navmesh has changed"));
+  CHECK(eval("--navmesh none.navmesh").says("none.navmesh"));
+}
+
 TEST_CASE("a record that is none of the evaluation is named by file, line, field and value") {
   const TempFolder folder("eval");
   const std::string options = kSparse + "--avatars 0 --episodes 2 --max-steps 20 --pictures 0 --out out";
@@ -218,22 +259,29 @@ TEST_CASE("a record that is none of the evaluation is named by file, line, field
   const std::size_t from = first.find("\"metrics\":{") + 11, to = first.find('}', from);
   std::string empty = first;
   empty.erase(from, to - from);
-  // A success far from the goal, which all else fits.
-  auto far = nlohmann::ordered_json::parse(first);
-  auto& m = far["metrics"];
-  const double l = m["start_distance"], p = m["path_length"];
-  if (!m["stop_called"].get<bool>()) far["actions"] = far["actions"].get<std::string>() + '0';
-  m["stop_called"] = m["success"] = true;
-  m["distance_to_goal"] = 7;
-  m["spl"] = gsnav::success_weighted_by_path_length(true, l, p);
-  m["soft_spl"] = gsnav::soft_success_weighted_by_path_length(7, l, p);
-  m["stl"] = gsnav::success_weighted_by_time(true, l, 0.25, m["steps"].get<std::size_t>());
+  // A success far from the goal, and half the way to it: their metrics fit each other.
+  const auto fitted = [&](double l, double p, bool success) {
+    auto j = nlohmann::ordered_json::parse(first);
+    auto& m = j["metrics"];
+    m["start_distance"] = l;
+    m["stop_called"] = m["success"] = success;
+    const double g = success ? 7 : m["distance_to_goal"].get<double>();
+    m["distance_to_goal"] = g;
+    m["spl"] = gsnav::success_weighted_by_path_length(success, l, p);
+    m["soft_spl"] = gsnav::soft_success_weighted_by_path_length(g, l, p);
+    m["stl"] = gsnav::success_weighted_by_time(success, l, 0.25, m["steps"].get<std::size_t>());
+    return j.dump() + "\n";
+  };
+  const auto whole = nlohmann::ordered_json::parse(first);
+  REQUIRE_FALSE(whole["metrics"]["stop_called"].get<bool>());
+  const std::string actions = whole["actions"];
+  const double l = whole["metrics"]["start_distance"], p = whole["metrics"]["path_length"];
   const std::string deep = std::string(200000, '[') + std::string(200000, ']');
   const std::vector<Bad> cases{
       {with("episode", "99"), "episode = 99"},
       {with("episode", "-1"), "episode = -1"},
       {with("id", "\"other\""), "id = \"other\""},
-      {with("spl", "1.7"), "metrics.spl = 1.7: must be in [0.0, 1.0]"},
+      {with("spl", "1.7"), "metrics.spl = 1.7: the recorded actions lead to 0.0"},
       {with("spl", "null"), "metrics.spl = null"},
       {with("path_length", "-3"), "metrics.path_length = -3"},
       {with("path_length", "1e300"), "metrics.path_length = 1e+300"},
@@ -245,8 +293,17 @@ TEST_CASE("a record that is none of the evaluation is named by file, line, field
       {short_metrics, "metrics.spl is missing"},
       {empty, "metrics.success is missing"},
       {with("reward", "7") + first, "differs from out/journal.jsonl: line 2"},
-      {far.dump() + "\n", "metrics.success = true: does not follow from stop_called"},
-      {with("stl", "0.9"), "metrics.stl = 0.9: does not follow"},
+      {fitted(l, p, true), "metrics.success = true: the recorded actions lead to false"},
+      {fitted(0.5 * l, p, false), "metrics.soft_spl = "},
+      {with("start_distance", "1.5"), "metrics.start_distance = 1.5: the recorded actions lead to"},
+      {with("stl", "0.9"), "metrics.stl = 0.9: the recorded actions lead to 0.0"},
+      // Nobody is there.
+      {with("psi", "0.25"), "metrics.psi = 0.25: the recorded actions lead to 0.0"},
+      {with("psc", "0.5"), "metrics.psc = 0.5: the recorded actions lead to 1.0"},
+      {with("min_clearance", "1.5"), "metrics.min_clearance = 1.5: the recorded actions lead to null"},
+      {with("reward", "1e8"), "reward = 100000000.0: the recorded actions lead to"},
+      {with("actions", '"' + actions + "1\""), "actions: step after the end"},
+      {with("actions", '"' + actions.substr(1) + '"'), "the episode goes on after the last one"},
       {"{\"episode\":" + deep + ",\"id\":0}\n", "is JSON nested more than 4 deep"},
       {"[]\n", "is not an object"},
       {"{\n", "is not JSON"}};
@@ -362,6 +419,24 @@ TEST_CASE("a replay becomes a video of any size, and says what is missing where 
                   folder.path());
   CHECK_FALSE(none.ok);
   CHECK(none.says("is it installed?"));
+  // One that fails in the middle of its file leaves the video that was there.
+  std::filesystem::create_directories(folder / "bin");
+  const auto program = [&](const char* end) {
+    write_file(
+        folder / "bin/ffmpeg",
+        std::string("#!/bin/sh\nfor out; do :; done\ncat > /dev/null\nprintf made > \"$out\"\n") + end);
+    std::filesystem::permissions(folder / "bin/ffmpeg", std::filesystem::perms::owner_all);
+    return run_command(
+        "env", "PATH=bin:/usr/bin:/bin " + quoted(GSNAV_REPLAY) + " " + options + "--video kept.mp4",
+        folder.path());
+  };
+  write_file(folder / "kept.mp4", "before");
+  CHECK(program("exit 1").says("ffmpeg failed"));
+  CHECK(read_file(folder / "kept.mp4") == "before");
+  CHECK(program("exit 0").ok);
+  CHECK(read_file(folder / "kept.mp4") == "made");
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
+    CHECK_FALSE(contains(entry.path().filename().string(), ".part"));
 #if defined(GSNAV_FFMPEG)
   CHECK_FALSE(run_command(GSNAV_REPLAY, options + "--video nowhere/walk.mp4", folder.path()).ok);
   REQUIRE(run_command(GSNAV_REPLAY, options + "--frames still", folder.path()).ok);

@@ -5,9 +5,11 @@
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <set>
 #include <stdexcept>
@@ -34,7 +36,19 @@ std::set<std::string> names_in(const fs::path& folder) {
 
 using Names = std::set<std::string>;
 
+std::atomic<int> folders_synced{0}, files_synced{0};
+
+int count_sync(int fd, long call) {
+  struct ::stat found {};
+  if (::fstat(fd, &found) == 0) ++(S_ISDIR(found.st_mode) ? folders_synced : files_synced);
+  return static_cast<int>(::syscall(call, fd));
+}
+
 }  // namespace
+
+// In place of the C library's, for this program.
+extern "C" int fsync(int fd) { return count_sync(fd, SYS_fsync); }
+extern "C" int fdatasync(int fd) { return count_sync(fd, SYS_fdatasync); }
 
 TEST_CASE("replace_file: new, again, and nothing beside it") {
   const TempFolder folder("replace");
@@ -246,4 +260,42 @@ TEST_CASE("replace_file: threads that write one name do not mix") {
   const std::string found = read_file(folder / "a");
   CHECK(found == std::string(20'000, found.at(0)));
   CHECK(names_in(folder.path()) == Names{"a"});
+}
+
+TEST_CASE("replace_file: a new name is on the disk, as the bytes are") {
+  const TempFolder folder("replace_synced");
+  for (const char* what : {"new", "again"}) {
+    folders_synced = files_synced = 0;
+    REQUIRE(replace_file(folder / "a", what).ok());
+    CHECK(files_synced == 1);
+    CHECK(folders_synced == 1);
+  }
+  folders_synced = 0;
+  REQUIRE(replace_file("/dev/null", "x").ok());
+  CHECK(folders_synced == 0);
+  // A folder that may be written to but not read.
+  if (::geteuid() == 0) return;
+  fs::permissions(folder.path(), fs::perms::owner_write | fs::perms::owner_exec);
+  CHECK(replace_file(folder / "b", "x").ok());
+  fs::permissions(folder.path(), fs::perms::owner_all);
+}
+
+TEST_CASE("append_line: on the disk when it returns; a full disk leaves whole lines") {
+  const TempFolder folder("append");
+  CHECK(detail::append_line(folder / "none", "x").code() == Errc::file_not_found);
+  write_file(folder / "a", "head\n");
+  files_synced = 0;
+  CHECK(detail::append_line(folder / "a", "one").ok());
+  CHECK(files_synced == 1);
+  CHECK(read_file(folder / "a") == "head\none\n");
+  fs::create_directories(folder / "disk");
+  const SmallDisk disk(folder / "disk", 64);
+  if (!disk.mounted()) return;
+  write_file(folder / "disk/a", "head\n");
+  std::string expected = "head\n";
+  const std::string line(10000, 'x');
+  Status s;
+  while ((s = detail::append_line(folder / "disk/a", line))) expected += line + "\n";
+  CHECK(s.code() == Errc::write_failed);
+  CHECK(read_file(folder / "disk/a") == expected);
 }

@@ -111,6 +111,34 @@ void patch(std::vector<std::byte>& b, std::size_t at, std::int32_t v) {
   std::memcpy(b.data() + at, &v, 4);
 }
 
+/// `tiled()` as a program may write it that samples each tile's heights for itself: every second tile
+/// lies `lift` metres higher.
+std::vector<std::byte> tiled_with_steps(float lift) {
+  std::vector<std::byte> b = tiled();
+  const auto at = [&](std::size_t k) {
+    std::int32_t v = 0;
+    std::memcpy(&v, b.data() + k, 4);
+    return static_cast<std::size_t>(v);
+  };
+  const std::size_t tiles = at(8);
+  std::size_t tile = 104;
+  for (std::size_t t = 0; t < tiles; ++t, tile += at(tile - 4) + 8) {
+    const std::size_t polys = at(tile + 24), vertices = at(tile + 28), links = at(tile + 32),
+                      details = at(tile + 36), samples = at(tile + 40);
+    const std::size_t first = tile + 100, second = first + 12 * vertices + 32 * polys + 12 * links;
+    for (std::size_t i = 0; t % 2 == 1 && i < vertices + samples; ++i) {
+      const std::size_t y =
+          4 + (i < vertices ? first + 12 * i : second + 12 * details + 12 * (i - vertices));
+      float height = 0;
+      std::memcpy(&height, b.data() + y, 4);
+      height += lift;
+      std::memcpy(b.data() + y, &height, 4);
+    }
+  }
+  REQUIRE(tile == b.size() + 8);
+  return b;
+}
+
 /// Asks what reads most of a mesh.
 void use(const NavMesh& mesh) {
   Rng rng(1);
@@ -324,14 +352,14 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("navmesh file: one path has one length, across the borders of another program's tiles too") {
-  const std::string path = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");
-  if (path.empty()) return;
-  const NavMesh mesh = load_navmesh(path).value();
-  CHECK(highest_step(mesh) < 1e-4);
-  Rng rng(21);
+namespace {
+
+/// The three lengths of a path: find_path's, geodesic_distance and that of the line through its points.
+struct Lengths {
+  const NavMesh& mesh;
   double worst = 0, between = 0;
-  const auto check = [&](const NavPoint& a, const NavPoint& b) {
+
+  void add(const NavPoint& a, const NavPoint& b) {
     const NavPath found = mesh.find_path(a.position, b.position).value();
     const double d = mesh.geodesic_distance(a.position, b.position);
     double length = 0;
@@ -340,18 +368,47 @@ TEST_CASE("navmesh file: one path has one length, across the borders of another 
     worst = max(worst, std::abs(found.length - d));
     // Its points follow the surface to a centimetre, so that the line through them is hardly shorter.
     between = max(between, std::abs(length - d) / max(d, 1.0));
-  };
+  }
+  void check() const {
+    MESSAGE("path and distance differ by " << worst << " m at most, the line of the path by "
+                                           << between);
+    CHECK(worst < 1e-9);
+    CHECK(between < 2e-3);
+  }
+};
+
+}  // namespace
+
+TEST_CASE(
+    "navmesh file: one path has one length where tiles of a file lie higher than their neighbours") {
+  const NavMesh mesh = parse_navmesh(tiled_with_steps(0.06f), "steps").value();
+  CHECK(mesh.polygon_count() > 50);
+  CHECK(highest_step(mesh) < 1e-4);
+  Rng rng(22);
+  Lengths lengths{mesh};
+  for (int i = 0; i < cases(2000); ++i) {
+    const NavPoint a = mesh.random_point(rng);
+    lengths.add(a, mesh.random_point(rng, mesh.island_of(a.poly)));
+  }
+  lengths.check();
+}
+
+TEST_CASE("navmesh file: one path has one length, across the borders of another program's tiles too") {
+  const std::string path = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");
+  if (path.empty()) return;
+  const NavMesh mesh = load_navmesh(path).value();
+  CHECK(highest_step(mesh) < 1e-4);
+  Rng rng(21);
+  Lengths lengths{mesh};
   for (int i = 0; i < cases(1000); ++i) {
     const NavPoint a = mesh.random_point(rng);
-    check(a, mesh.random_point(rng, mesh.island_of(a.poly)));
+    lengths.add(a, mesh.random_point(rng, mesh.island_of(a.poly)));
     // Where a ramp of two polygons once had a step.
     const auto c = mesh.random_point_near(rng, {32, -1.2, 1}, 4),
                d = mesh.random_point_near(rng, {32, -1.2, 0.5}, 6);
-    if (c && d && mesh.island_of(c->poly) == mesh.island_of(d->poly)) check(*c, *d);
+    if (c && d && mesh.island_of(c->poly) == mesh.island_of(d->poly)) lengths.add(*c, *d);
   }
-  MESSAGE("path and distance differ by " << worst << " m at most, the line of the path by " << between);
-  CHECK(worst < 1e-9);
-  CHECK(between < 2e-3);
+  lengths.check();
 }
 
 TEST_CASE("navmesh file: what is wrong is named") {

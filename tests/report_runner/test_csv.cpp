@@ -19,7 +19,7 @@ TEST_CASE("csv: fields of any text come back") {
         .set("pairs", std::uint64_t{18446744073709551615ull});
     std::string file;
     for (const std::string_view c : kColumns) file.append(file.empty() ? "" : ",").append(c);
-    const auto rows = parse_csv(file + "\n" + row.line() + row.line(), "text").value();
+    const auto rows = parse_csv(file + "\n" + row.line() + "\n" + row.line() + "\n", "text").value();
     REQUIRE(rows.size() == 2);
     CHECK(rows[1].get("scene") == text);
     CHECK(rows[1].get("note") == text);

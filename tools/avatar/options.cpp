@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../common/parse_options.hpp"
+#include "gsnav/core/printable.hpp"
 
 namespace gsnav_avatar {
 namespace {
@@ -159,7 +160,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     return std::nullopt;
   }
   const auto bad = [&](const std::string& text, const char* what) {
-    std::fprintf(stderr, "gsnav-avatar: '%s' is no %s\n", text.c_str(), what);
+    std::fprintf(stderr, "gsnav-avatar: '%s' is no %s\n", gsnav::printable(text).c_str(), what);
     exit_code = 1;
     return std::nullopt;
   };

@@ -4,38 +4,14 @@
 #include <filesystem>
 #include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/sim.hpp"
-#include "gsnav/sim/metrics.hpp"
+#include "journal_header.hpp"
 #include "options.hpp"
+#include "record.hpp"
 
 namespace gsnav_eval {
-
-struct Stage;
-
-/// One finished episode: its metrics and its actions, from which all else follows again.
-struct Record {
-  std::size_t episode = 0;  ///< its number
-  std::string id;
-  gsnav::EpisodeMetrics metrics;
-  double reward = 0.0;  ///< sum over the episode
-  std::vector<gsnav::Action> actions;
-};
-
-/// A record as one line of JSON; an infinite distance is null.
-std::string line_of(const Record& record);
-/// The record of a line, checked against the episodes of `stage`: its number and id are those of an
-/// episode, all metrics are there, in their ranges and fit each other and the actions.
-/// @return invalid_file: "WHERE: FIELD = VALUE: RULE".
-gsnav::Result<Record> record_of(const std::string& line, const std::string& where, const Stage& stage);
-
-/// What an evaluation is of: name and content hash of the scene's Gaussians, the NavMesh, the people's
-/// bodies and ways, and the episodes, as they were loaded or made.
-using Contents = std::vector<std::pair<std::string, std::string>>;
-Contents contents_of(const Stage& stage);
 
 /// `journal.jsonl`: a header with the format's version, the options and the contents' hashes, then a
 /// line for each finished episode in the order that they finished in. Of several ranks each but the
@@ -53,13 +29,15 @@ class Journal {
                                      bool views = true);
   /// The options that a folder's journal was recorded with.
   static gsnav::Result<std::vector<OptionValue>> recorded_options(const std::filesystem::path& folder);
-  /// Opens or begins the journal of a folder, to be written by `rank`. Pictures of episodes that another
-  /// journal left are removed where one is begun by rank 0.
+  /// Opens or begins the journal of a folder, to be written by `rank`. The actions of each record are
+  /// played again, without a policy and without pictures, and must lead to its metrics. Pictures of
+  /// episodes that another journal left are removed where one is begun by rank 0.
   /// @return invalid_argument where its options or contents differ, naming what differs; invalid_file,
   /// naming file, line, field and value; file_not_found.
   static gsnav::Result<Journal> open(const std::filesystem::path& folder, const Options& options,
                                      const Stage& stage, int rank = 0);
-  /// The same, of a folder that has one, for reading. Options of role `view` may differ.
+  /// The same, of a folder that has one, for reading. Options of role `view` may differ; actions are not
+  /// played.
   static gsnav::Result<Journal> load(const std::filesystem::path& folder, const Options& options,
                                      const Stage& stage);
   /// Removes what gsnav-eval writes to a folder, so that it begins anew.
@@ -71,6 +49,7 @@ class Journal {
   gsnav::Status add(Record record);
 
  private:
+  gsnav::Status check_outcomes(const Stage& stage) const;
   gsnav::Status read(const std::filesystem::path& path, const Options& options, const Stage& stage,
                      const Contents& made_of, bool own, bool views);
   std::filesystem::path path_;

@@ -22,17 +22,14 @@ gsnav::Status replay(Simulator& sim, const gsnav::PointNavEpisode& episode, cons
   sim.set_rendering(false);
   if (const auto r = sim.reset(episode); !r) return r.status();
   if (gsnav::Status s = look(sim, std::size_t{0}); !s) return s;
+  double reward = 0.0;
   for (std::size_t i = 0; i < record.actions.size(); ++i) {
     if (const auto r = sim.step(record.actions[i]); !r) return r.status();
+    reward += sim.world().last_step().reward;
     if (gsnav::Status s = look(sim, i + 1); !s) return s;
   }
-  const gsnav::EpisodeMetrics m = sim.metrics();
-  if (m.path_length != record.metrics.path_length || m.psi != record.metrics.psi ||
-      m.steps != record.metrics.steps) {
-    return {
-        gsnav::Errc::invalid_file,
-        "episode " + record.id + ": its actions end elsewhere than recorded; was the scene changed?"};
-  }
+  if (gsnav::Status s = check_outcome(record, sim.world(), reward); !s)
+    return {s.code(), "episode " + record.id + ": " + s.message() + "; was the scene changed?"};
   return {};
 }
 

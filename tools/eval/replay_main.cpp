@@ -1,11 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-replay: an episode of an evaluation once more, from any camera.
+#include <unistd.h>
+
 #include <array>
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
 
 #include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
@@ -30,18 +37,31 @@ struct ReplayOptions {
   int every = 1;
 };
 
-/// Frames into ffmpeg's standard input.
+/// Frames into ffmpeg's standard input. ffmpeg writes to a file aside, which takes the video's name once
+/// it is whole.
 class Video {
  public:
+  Video() = default;
+  Video(const Video&) = delete;
+  Video& operator=(const Video&) = delete;
+  ~Video() {
+    pipe_.reset();
+    std::error_code none;
+    if (!aside_.empty()) fs::remove(aside_, none);
+  }
+
   Status open(const std::string& path, int width, int height, double rate) {
     if (path.find_first_of("'\\\n") != std::string::npos)
       return {Errc::invalid_argument, "--video: quotes in the path"};
+    path_ = path;
+    aside_ = fs::path(path).replace_extension(std::to_string(::getpid()) + ".part" +
+                                              fs::path(path).extension().string());
     char command[512];
     const int n = std::snprintf(
         command, sizeof command,
         "ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s %dx%d -r %g -i - "
         "-vf 'pad=ceil(iw/2)*2:ceil(ih/2)*2' -pix_fmt yuv420p '%s'",  // its colour is at half the size
-        width, height, rate, path.c_str());
+        width, height, rate, aside_.c_str());
     if (n < 0 || n >= static_cast<int>(sizeof command))
       return {Errc::invalid_argument, "--video: the path is too long"};
     std::signal(SIGPIPE, SIG_IGN);  // an ffmpeg that ends early is reported, not died of
@@ -54,8 +74,16 @@ class Video {
     return {Errc::unsupported, "--video: ffmpeg takes no frames; is it installed?"};
   }
   Status close() {
-    if (pclose(pipe_.release()) == 0) return {};
-    return {Errc::unsupported, "--video: ffmpeg failed; is it installed?"};
+    if (pclose(pipe_.release()) != 0)
+      return {Errc::unsupported, "--video: ffmpeg failed; is it installed?"};
+    return gsnav::replace_file(path_, [this](gsnav::OutputFile& out) -> Status {
+      std::ifstream in(aside_, std::ios::binary);
+      for (std::vector<char> part(1 << 16); in;) {
+        in.read(part.data(), static_cast<std::streamsize>(part.size()));
+        out.write(part.data(), static_cast<std::size_t>(in.gcount()));
+      }
+      return in.eof() ? Status() : Status(Errc::invalid_file, aside_.string() + ": cannot be read");
+    });
   }
 
  private:
@@ -63,6 +91,7 @@ class Video {
     void operator()(std::FILE* f) const noexcept { pclose(f); }
   };
   std::unique_ptr<std::FILE, Close> pipe_;
+  fs::path path_, aside_;
 };
 
 /// Where everything was at each step, [T]...

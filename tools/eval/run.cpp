@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "../../examples/nav_loop/setup.hpp"
+#include "gsnav/core/printable.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/sim.hpp"
 #include "gsnav/sim/follower.hpp"
@@ -30,11 +31,18 @@ Result<Stage> prepare(const Options& o) {
   } else {
     auto file = gsnav::io::load_episodes(o.episode_file);
     if (!file) return file.status();
-    for (const std::string& w : file->warnings) std::fprintf(stderr, "%s\n", w.c_str());
+    for (const std::string& w : file->warnings)
+      std::fprintf(stderr, "%s\n", gsnav::printable(w).c_str());
     stage.episodes = std::move(file->episodes);
   }
   stage.scene = std::make_shared<const gsnav::SimulatorScene>(std::move(setup->scene));
   return stage;
+}
+
+Result<gsnav::World> make_world(const Stage& stage) {
+  return gsnav::World::create(
+      stage.scene->navmesh, stage.config.task,
+      [scene = stage.scene](double t0, double t1, auto& out) { append_bodies(*scene, t0, t1, out); });
 }
 
 Result<Record> play(gsnav::World& world, const Options& o, const gsnav::PointNavEpisode& episode,

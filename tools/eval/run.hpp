@@ -22,6 +22,9 @@ struct Stage {
 /// Loads or makes the scene, its NavMesh, people and episodes. Errors name the file or option.
 gsnav::Result<Stage> prepare(const Options& options);
 
+/// The task of `stage` among its people, without pictures.
+gsnav::Result<gsnav::World> make_world(const Stage& stage);
+
 /// Plays episode `number` by the policy. `look`, where it is given, sees the world after reset and after
 /// each action.
 gsnav::Result<Record> play(gsnav::World& world, const Options& options,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
+#include <fstream>
 #include <iterator>
 #include <system_error>
 #include <utility>
@@ -112,7 +113,7 @@ std::string Row::line() const {
     if (k != 0) out += ',';
     append_quoted(out, fields_[k]);
   }
-  return out + "\n";
+  return out;
 }
 
 Result<std::vector<Row>> parse_csv(const std::string& text, const std::string& source) {
@@ -157,25 +158,17 @@ Result<CsvFile> CsvFile::open(const std::filesystem::path& path, bool resume) {
 }
 
 Status CsvFile::add(Row row) {
-  // One write a line: a run that is cut off leaves whole lines.
-  const std::string line = row.line();
-  out_.write(line.data(), static_cast<std::streamsize>(line.size())).flush();
-  if (!out_) return {Errc::file_not_found, path_.string() + ": cannot be written"};
+  if (Status s = gsnav::detail::append_line(path_, row.line()); !s) return s;
   keys_.insert(row.get("key"));
   rows_.push_back(std::move(row));
   return {};
 }
 
 Status CsvFile::save() {
-  out_.close();
-  const Status saved = gsnav::replace_file(path_, [this](gsnav::OutputFile& out) {
+  return gsnav::replace_file(path_, [this](gsnav::OutputFile& out) {
     out.write(header_line());
-    for (const Row& r : rows_) out.write(r.line());
+    for (const Row& r : rows_) out.write(r.line() + "\n");
   });
-  if (!saved) return saved;
-  out_.open(path_, std::ios::binary | std::ios::app);
-  if (!out_) return {Errc::file_not_found, path_.string() + ": cannot be written"};
-  return {};
 }
 
 }  // namespace gsnav_report

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -91,7 +90,7 @@ class Row {
   /// Takes over all fields of `other` that are not empty.
   Row& fill(const Row& other);
 
-  /// One CSV line (RFC 4180) with its line feed.
+  /// One CSV line (RFC 4180) without its line feed.
   std::string line() const;
 
  private:
@@ -124,7 +123,6 @@ class CsvFile {
   std::filesystem::path path_;
   std::vector<Row> rows_;
   std::unordered_set<std::string> keys_;
-  std::ofstream out_;
 };
 
 }  // namespace gsnav_report

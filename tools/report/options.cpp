@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "../common/parse_options.hpp"
+#include "gsnav/core/printable.hpp"
 #include "gsnav/version.hpp"
 
 namespace gsnav_report {
@@ -130,7 +131,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     return std::nullopt;
   }
   const auto fail = [&](const std::string& message) {
-    std::fprintf(stderr, "gsnav-report: %s\n", message.c_str());
+    std::fprintf(stderr, "gsnav-report: %s\n", gsnav::printable(message).c_str());
     exit_code = 1;
     return std::nullopt;
   };

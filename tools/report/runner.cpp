@@ -12,6 +12,7 @@
 
 #include "csv.hpp"
 #include "docs.hpp"
+#include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "html.hpp"
 #include "kernels.hpp"
@@ -155,7 +156,8 @@ Status run_report(const Options& o) {
       return s;
   }
   if (interrupted())
-    std::fprintf(stderr, "\ninterrupted: %s holds the rows so far; --resume goes on\n", path.c_str());
+    std::fprintf(stderr, "\ninterrupted: %s holds the rows so far; --resume goes on\n",
+                 gsnav::printable(path.string()).c_str());
   const Result<Table> table = Table::read(path);
   if (!table) return table.status();
   if (!o.no_html) {
@@ -165,7 +167,7 @@ Status run_report(const Options& o) {
     if (Status s = write_docs(*table, o.docs); !s) return s;
   }
   std::fputs(targets_text(check_targets(*table)).c_str(), stdout);
-  std::printf("%zu rows in %s\n", csv->rows().size(), path.c_str());
+  std::printf("%zu rows in %s\n", csv->rows().size(), gsnav::printable(path.string()).c_str());
   return {};
 }
 

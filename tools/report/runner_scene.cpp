@@ -8,6 +8,7 @@
 
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
+#include "gsnav/core/printable.hpp"
 #endif
 #include "gsnav/io.hpp"
 #include "gsnav/scene/lod_cut.hpp"
@@ -129,7 +130,8 @@ Result<SceneRunner::Named> SceneRunner::reference(const Setting& s, Oracle oracl
   }
   std::string warning;
   std::optional<Reference> found = cache_.load(hash, warning);
-  if (!warning.empty()) std::fprintf(stderr, "\ngsnav-report: warning: %s\n", warning.c_str());
+  if (!warning.empty())
+    std::fprintf(stderr, "\ngsnav-report: warning: %s\n", gsnav::printable(warning).c_str());
   if (!found) {
     Result<Reference> made = render_reference(scene_.cloud.set(), c, oracle, order, options_.threads);
     if (!made) return made.status();

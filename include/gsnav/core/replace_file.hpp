@@ -47,6 +47,37 @@ inline std::filesystem::path folder_of(const std::filesystem::path& path) {
   return parent.empty() ? std::filesystem::path(".") : parent;
 }
 
+/// Forces the names in a folder to the disk; errno of what failed, or 0. A folder that may not be read,
+/// or a file system without such a call, is left as it is.
+inline int sync_folder(const std::filesystem::path& folder) {
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return errno == EACCES ? 0 : errno;
+  const int error = ::fsync(fd) == 0 || errno == EINVAL ? 0 : errno;
+  ::close(fd);
+  return error;
+}
+
+/// Appends a line to a file that exists. It is on the disk when this returns (fdatasync); a failure
+/// leaves the file as it was. A process that is killed can leave part of the line, without its end.
+inline Status append_line(const std::filesystem::path& path, std::string line) {
+  line += '\n';
+  const int fd = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (fd < 0) return unwritable(path, errno);
+  const ::off_t before = ::lseek(fd, 0, SEEK_END);
+  int error = before < 0 ? errno : 0;
+  for (std::size_t done = 0; error == 0 && done < line.size();) {
+    const ::ssize_t n = ::write(fd, line.data() + done, line.size() - done);
+    if (n > 0)
+      done += static_cast<std::size_t>(n);
+    else if (n < 0 && errno != EINTR)
+      error = errno;
+  }
+  if (error == 0 && ::fdatasync(fd) != 0 && errno != EINVAL) error = errno;
+  if (error != 0 && before >= 0 && ::ftruncate(fd, before) != 0) error = errno;
+  ::close(fd);
+  return error == 0 ? Status() : unwritable(path, error, Errc::write_failed);
+}
+
 }  // namespace detail
 
 /// Checks that a file of this name can be written: the folder exists and may be written to, and what has
@@ -143,8 +174,10 @@ class OutputFile {
   void write(std::string_view text) { write(text.data(), text.size()); }
   bool failed() const noexcept { return error_ != 0; }
 
-  /// Forces the bytes to the disk and gives the file its name; the object can then be opened again.
-  /// @return write_failed with the system's reason. Then what had the name before is unchanged.
+  /// Forces the bytes to the disk, gives the file its name and forces that to the disk too; the object
+  /// can then be opened again.
+  /// @return write_failed with the system's reason. Then what had the name before is unchanged, unless
+  /// the new name alone could not be forced to the disk.
   Status commit() {
     if (file_ == nullptr) return {Errc::invalid_argument, "OutputFile: no file is open"};
     if (error_ == 0 && std::fflush(file_) != 0) error_ = errno;
@@ -155,7 +188,8 @@ class OutputFile {
     if (error_ == 0 && !aside_.empty() && ::rename(aside_.c_str(), target_.c_str()) != 0) error_ = errno;
     if (error_ == 0) {
       aside_.clear();
-      return {};
+      if (!in_place_) error_ = detail::sync_folder(detail::folder_of(target_));
+      if (error_ == 0) return {};
     }
     remove_aside();
     return detail::unwritable(path_, error_, Errc::write_failed);
