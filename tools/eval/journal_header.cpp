@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "gsnav/render.hpp"
+#include "gsnav/scene/prepare.hpp"
 #include "journal_json.hpp"
 #include "run.hpp"
 
