@@ -11,6 +11,7 @@
 #include "check_refused.hpp"
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/detail/io/temporal_file.hpp"
+#include "gsnav/detail/scene/temporal_edit.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "temporal_rows_of.hpp"
 

@@ -7,6 +7,7 @@
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/detail/io/lod_file.hpp"
+#include "gsnav/detail/scene/lod_build.hpp"
 #include "lod_support.hpp"
 #include "support/files.hpp"
 

@@ -27,8 +27,8 @@ namespace {
 
 /// The pairs by planes, and arrays for all that can be asked for.
 template <class S, class B>
-struct Planes {
-  explicit Planes(B& b, const CapsulePairs& pairs) : backend(b), n(pairs.agents.size()) {
+struct PairPlanes {
+  explicit PairPlanes(B& b, const CapsulePairs& pairs) : backend(b), n(pairs.agents.size()) {
     const auto moving = [&](const std::vector<MovingCapsule<float>>& m) {
       const auto plane = [&](const auto& field) {
         std::vector<S> v;
@@ -103,7 +103,7 @@ bool same(S a, S b) {
 template <class S, class B>
 void check_batch(B& backend, const CapsulePairs& pairs, const std::string& name) {
   CAPTURE(name);
-  Planes<S, B> p(backend, pairs);
+  PairPlanes<S, B> p(backend, pairs);
   REQUIRE(capsule_gaps(backend, p.gaps).ok());
   REQUIRE(sweep_capsules(backend, p.sweeps).ok());
   const auto gap = p.fetch(p.gaps.gap), time = p.fetch(p.sweeps.time),
@@ -262,13 +262,13 @@ TEST_CASE(
     return;
   }
   SerialBackend serial;
-  Planes<float, SerialBackend> p(serial, random_pairs(10, 512));
+  PairPlanes<float, SerialBackend> p(serial, random_pairs(10, 512));
   const LaneKernels& kernels = lane_kernels();
   CAPTURE(std::string(kernels.name));
-  for (const auto& run : {+[](const LaneKernels&k, const Planes<float, SerialBackend>&of) {
+  for (const auto& run : {+[](const LaneKernels&k, const PairPlanes<float, SerialBackend>&of) {
                             k.gap_range(of.gaps, 0, 512);
                           },
-                          +[](const LaneKernels&k, const Planes<float, SerialBackend>&of) {
+                          +[](const LaneKernels&k, const PairPlanes<float, SerialBackend>&of) {
                             k.sweep_range(of.sweeps, 0, 512);
                           }}) {
     run(kernels, p);
@@ -294,7 +294,7 @@ TEST_CASE("capsules, cuda: gaps and sweeps have the CPU's bits") {
 
 TEST_CASE("capsules: arrays that do not fit are refused by name") {
   SerialBackend backend;
-  Planes<float, SerialBackend> p(backend, random_pairs(9, 10));
+  PairPlanes<float, SerialBackend> p(backend, random_pairs(9, 10));
   auto gaps = p.gaps;
   gaps.b.p1[2].size = 9;
   CHECK(capsule_gaps(backend, gaps).message().find("CapsuleGapArgs.b has 9 values where 10") !=

@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "../../tools/eval/run.hpp"
-#include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/io/ply.hpp"
+#include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "http_client.hpp"
 #include "picture.hpp"
@@ -107,8 +107,9 @@ std::vector<std::uint16_t> truth(const Json& state) {
   o.width = kWidth;
   o.height = kHeight;
   const auto stage = gsnav_eval::prepare(o).value();
-  gsnav::OpenMPBackend backend(2);
-  auto sim = gsnav::Simulator<gsnav::OpenMPBackend>::create(backend, stage.scene, stage.config).value();
+  auto sim =
+      gsnav::DeviceSimulator::create(gsnav::Device::parse("cpu:2").value(), stage.scene, stage.config)
+          .value();
   gsnav::PointNavEpisode episode = stage.episodes[0];
   episode.start_time = state["time"].get<double>();
   sim.reset(episode).value();
