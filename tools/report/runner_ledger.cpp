@@ -8,9 +8,9 @@
 
 #include "gsnav/math/functions.hpp"
 #include "gsnav/render.hpp"
-#include "gsnav/scene/prepare.hpp"
 #include "gsnav/render/render_config.hpp"
 #include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/prepare.hpp"
 
 namespace gsnav_report {
 

@@ -10,8 +10,8 @@
 
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/render.hpp"
-#include "gsnav/scene/prepare.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
+#include "gsnav/scene/prepare.hpp"
 #include "runner_system.hpp"
 
 namespace gsnav_report {
