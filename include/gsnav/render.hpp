@@ -27,7 +27,7 @@
 #include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/similarity.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/lod_tree.hpp"

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -17,10 +18,12 @@ namespace gsnav {
 struct SimulatorConfig {
   TaskConfig task{};
   std::vector<SensorSpec> sensors;  ///< none: nothing is rendered
-  RenderConfig render{};            ///< outputs and sort order are chosen by sensors and scene
-  /// Draws the assets by levels of detail: the profile lod (docs/lod.md), whatever render.profile is.
-  /// Each needs its tree (SceneAsset::lod). No hysteresis: an image depends on its camera, not on what
-  /// was seen before.
+  /// How sensors draw. They choose `outputs`, and the scene's first asset chooses `sort_order`: a value
+  /// that is neither the default nor theirs is an error.
+  RenderConfig render{};
+  /// Draws the assets by levels of detail: the profile lod (docs/lod.md), with Exponential::fast
+  /// whatever render.quality has. Each needs its tree (SceneAsset::lod). No hysteresis: an image depends
+  /// on its camera, not on what was seen before.
   std::optional<LodChoice> lod{};
   /// Draws of the assets only what is seen from where a camera is, by the rules of the profile fast
   /// (VisibleSets). Each needs its sets (SceneAsset::visible); from where these know nothing, all is
@@ -39,7 +42,25 @@ inline DetailChoice detail_choice(const SimulatorConfig& config) {
 inline Status validate(const SimulatorConfig& config) {
   if (Status s = validate(config.task); !s) return s;
   if (Status s = validate(config.render); !s) return s;
+  if (config.render.outputs != RenderConfig{}.outputs) {
+    return {Errc::invalid_argument,
+            "SimulatorConfig.render.outputs = " + std::to_string(config.render.outputs) +
+                ": sensors choose the images; leave the default"};
+  }
   return validate(std::span<const SensorSpec>(config.sensors));
+}
+
+/// Whether a simulator may run in `scene` so: what of it is missing, or what of `config` it contradicts.
+inline Status validate(const SimulatorScene& scene, const SimulatorConfig& config) {
+  if (Status s = validate(scene); !s) return s;
+  const SortOrder asked = config.render.sort_order;
+  if (asked != SortOrder::z_depth && !scene.assets.empty() &&
+      asked != scene.assets.front().cloud->sort_order) {
+    return {
+        Errc::invalid_argument,
+        "SimulatorConfig.render.sort_order: SimulatorScene.assets[0] has another; leave the default"};
+  }
+  return validate_detail(scene, detail_choice(config));
 }
 
 /// What the noise of an observation depends on: the seed, the episode and how many actions it has seen.
@@ -95,9 +116,8 @@ class Simulator {
   static Result<Simulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene,
                                   SimulatorConfig config, World::BodySource others = {}) {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
-    if (Status s = validate(*scene); !s) return s;
     if (Status s = validate(config); !s) return s;
-    if (Status s = validate_detail(*scene, detail_choice(config)); !s) return s;
+    if (Status s = validate(*scene, config); !s) return s;
     Result<World> world =
         World::create(scene->navmesh, config.task, [scene, others](double t0, double t1, auto& out) {
           append_bodies(*scene, t0, t1, out);

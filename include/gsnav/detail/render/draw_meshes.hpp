@@ -12,7 +12,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/stages.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 
 namespace gsnav {
 
