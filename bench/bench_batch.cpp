@@ -111,9 +111,9 @@ struct DeviceImages {
 };
 
 void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Frames<double>& truth,
-         std::size_t count, Profile profile) {
+         std::size_t count, Exponential profile) {
   RenderConfig config;
-  config.profile = profile;
+  config.quality.exponential = profile;
   CudaBatchRenderer renderer(cuda, config);
   const std::size_t pixels = static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);
   DeviceImages out(cuda, count * pixels);
@@ -165,7 +165,7 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
                                       truth.rgb.begin() + static_cast<std::ptrdiff_t>(rgb.size()));
   const gsnav_bench::Error e = gsnav_bench::error_of(rgb, rgb_truth);
   std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f  %.1e  %9.0f  %8.1f  %7.1f\n",
-              profile == Profile::fast ? "fast" : "exact", count, gsnav_bench::median(ms),
+              profile == Exponential::fast ? "fast" : "exact", count, gsnav_bench::median(ms),
               gsnav_bench::quantile(ms, 0.9), 1000.0 / gsnav_bench::median(ms), e.max, e.p999, e.psnr,
               g_rgb_alone ? std::numeric_limits<double>::quiet_NaN()
                           : gsnav_bench::error_of(depth_seen, depth_truth).p99,
@@ -181,7 +181,7 @@ void compare_visible(CudaBackend& cuda, const GaussianArrays<CudaBackend>& array
   const std::size_t views = gsnav_bench::workload().cameras.size();
   const std::size_t values = 3 * static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);
   RenderConfig config;
-  config.profile = Profile::fast;
+  config.quality = Quality::fast();
   CudaBatchRenderer renderer(cuda, config);
   const std::vector<GaussianSet> sets{arrays.set()};
   Buffer<float, CudaBackend> there(cuda);
@@ -290,7 +290,7 @@ int main(int argc, char** argv) {
       "profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  "
       "scratch MB  host us\n");
   if (counts.empty()) counts = {1, 8, 64, 256, 512};
-  for (const Profile profile : {Profile::fast, Profile::exact}) {
+  for (const Exponential profile : {Exponential::fast, Exponential::exact}) {
     for (const std::size_t count : counts) row(cuda, arrays, truth, count, profile);
   }
 }

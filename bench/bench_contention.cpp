@@ -76,7 +76,7 @@ Times measure(int threads, const std::vector<Camera>& cameras) {
   OpenMPBackend backend(threads);
   RenderConfig config;
   config.outputs = kRgb;
-  config.profile = Profile::fast;
+  config.quality = Quality::fast();
   Renderer<float, OpenMPBackend> renderer(backend, config);
   const GaussianSet set = gsnav_bench::workload().cloud.set();
   Frames<float> frames;

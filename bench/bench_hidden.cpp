@@ -49,7 +49,7 @@ struct Shares {
 
 Shares shares_of(OpenMPBackend& backend, const GaussianCloud& cloud, const Camera& camera) {
   RenderConfig config;
-  config.tile_size = 16;
+  config.tuning.tile_size = 16;
   config.outputs = kAlpha;
   const FrameStages<float, OpenMPBackend> stages(backend, cloud, camera, config);
   const BinArgs<float>& bins = stages.bins();

@@ -277,7 +277,7 @@ struct BinBody {
 };
 
 struct BlendBody {
-  Profile profile;
+  Exponential profile;
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
     const GaussianCloud cloud = wall(100000, 0);
@@ -285,7 +285,7 @@ struct BlendBody {
     SerialBackend serial;
     FrameStages<double, SerialBackend> truth(serial, cloud, front_camera(), config);
     truth.blend();
-    config.profile = profile;
+    config.quality.exponential = profile;
     FrameStages<S, B> stages(backend, cloud, front_camera(), config);
     for (auto _ : state) stages.blend();
     const Error e = error_of(stages.image(), truth.image());
@@ -321,10 +321,10 @@ void register_frame_kernels() {
   }
   add_cpu_rows("bin", "", BinBody{});
   add_cuda_row("bin", "", BinBody{});
-  add_cpu_rows("blend", "exact", BlendBody{Profile::exact});
-  add_cuda_row("blend", "exact", BlendBody{Profile::exact});
-  add_openmp_rows("blend", "fast", "float", BlendBody{Profile::fast});
-  add_cuda_row("blend", "fast", BlendBody{Profile::fast});
+  add_cpu_rows("blend", "exact", BlendBody{Exponential::exact});
+  add_cuda_row("blend", "exact", BlendBody{Exponential::exact});
+  add_openmp_rows("blend", "fast", "float", BlendBody{Exponential::fast});
+  add_cuda_row("blend", "fast", BlendBody{Exponential::fast});
 }
 
 }  // namespace gsnav_bench

@@ -43,7 +43,7 @@ void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const
   OpenMPBackend one(1);
   RenderConfig config;
   config.outputs = kRgb;
-  config.profile = Profile::fast;
+  config.quality = Quality::fast();
   Renderer<float, OpenMPBackend> renderer(one, config);
   LodCut cut(tree, cloud);
   LodChoice choice;

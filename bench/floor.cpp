@@ -58,7 +58,7 @@ UnitCosts least_costs(int threads) {
 
 FrameWork count_work(const GaussianCloud& cloud, const Camera& camera, const RenderConfig& config) {
   RenderConfig counted = config;
-  counted.tile_size = 16;
+  counted.tuning.tile_size = 16;
   counted.outputs = kAlpha;
   OpenMPBackend backend(1);
   const FrameStages<float, OpenMPBackend> stages(backend, cloud, camera, counted);
@@ -79,7 +79,7 @@ FrameWork count_work(const GaussianCloud& cloud, const Camera& camera, const Ren
 
   FrameWork work;
   work.color = (config.outputs & kRgb) != 0;
-  const int degree = std::min(cloud.sh_degree, config.max_sh_degree);
+  const int degree = std::min(cloud.sh_degree, config.quality.max_sh_degree);
   work.bytes_per_gaussian = 44 + (work.color ? 6 * sh_coefficient_count(degree) : 0);
   work.visible = static_cast<double>(stages.visible());
   work.pairs = static_cast<double>(stages.pairs());

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 // The least time in which a processor could render a frame: what a renderer's time is divided by.

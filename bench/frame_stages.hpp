@@ -68,8 +68,7 @@ class FrameStages {
     raster.geometry = geometry_.view();
     raster.colors = colors_.view();
     raster.rules = gsnav::blend_rules<S>(config_);
-    raster.exp2_method =
-        config_.profile == gsnav::Profile::fast ? gsnav::Exp2::degree3 : gsnav::Exp2::degree5;
+    raster.exp2_method = gsnav::exp2_method(config_.quality);
     raster.images.rgb = images_.data();
     gsnav::run(*backend_, gsnav::stage::Blend{}, raster);
     sync();
@@ -112,7 +111,7 @@ class FrameStages {
   void prepare_projection(const gsnav::Camera& camera) {
     const gsnav::GaussianSet set = arrays_.set();
     const gsnav::ProjectionRules rules = gsnav::projection_rules(config_);
-    project_ = gsnav::view_set<S>(camera, set, rules, config_.max_sh_degree);
+    project_ = gsnav::view_set<S>(camera, set, rules, config_.quality.max_sh_degree);
     std::vector<gsnav::Vec3d> offsets;
     for (std::size_t o = 0; o < gsnav::origin_count(set.gaussians); ++o) {
       offsets.push_back(gsnav::origin_offset(project_, o));
@@ -163,7 +162,7 @@ class FrameStages {
     bin_.order = order_.view();
     bin_.geometry = geometry_.view();
     bin_.bounds = bounds_.view();
-    bin_.log2_alpha_min = static_cast<S>(std::log2(config_.alpha_min));
+    bin_.log2_alpha_min = static_cast<S>(std::log2(config_.quality.alpha_min));
     bin_.blocks = gsnav::concurrency_of(*backend_);
     cursors_.resize_discard(bin_.blocks * bin_.grid.count());
     tile_offsets_.resize_discard(bin_.grid.count() + 1);

@@ -91,7 +91,8 @@ class GpuRows {
       batch.push_back({views_.cameras[c], {}, {}});
       if (draw == LodDraw::lod) {
         cuts[c].select(detail_, {}, views_.cameras[c]);
-        closes = closes && cuts[c].rules(fast()).transmittance_min > fast().transmittance_min;
+        closes =
+            closes && cuts[c].rules(fast()).quality.transmittance_min > fast().quality.transmittance_min;
         drawn += cuts[c].cut(0).stats().drawn;
       } else {
         drawn += cloud_.size();
@@ -144,7 +145,7 @@ class GpuRows {
  private:
   static RenderConfig fast() {
     RenderConfig config;
-    config.profile = Profile::fast;
+    config.quality = Quality::fast();
     return config;
   }
   /// lod_config where a cut is mostly of merged ones.
@@ -165,7 +166,9 @@ class GpuRows {
     const bool chosen = draw == LodDraw::lod || detail_.assets[0].visible != nullptr;
     if (chosen) sets = cut_.select(detail_, sets, camera);
     if (draw == LodDraw::lod) {
-      renderer = cut_.rules(fast()).transmittance_min > fast().transmittance_min ? &closing_ : &direct_;
+      renderer = cut_.rules(fast()).quality.transmittance_min > fast().quality.transmittance_min
+                     ? &closing_
+                     : &direct_;
       drawn_ = cut_.cut(0).stats().drawn;
     } else if (chosen) {
       drawn_ -= cut_.unseen();

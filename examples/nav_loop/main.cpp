@@ -34,7 +34,7 @@ Status run(const gsnav::Device& device, const Options& options) {
   gsnav::SimulatorConfig config;
   config.task.max_steps = options.max_steps;
   config.sensors = sensors_of(options);
-  config.render.profile = options.profile == "exact" ? gsnav::Profile::exact : gsnav::Profile::fast;
+  config.render.quality = options.profile == "exact" ? gsnav::Quality::exact() : gsnav::Quality::fast();
   if (options.profile == "lod") {
     config.lod = gsnav::LodChoice{};
     config.lod->pixels = options.lod_error;

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "gsnav/math/functions.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 
 namespace gsnav {
 

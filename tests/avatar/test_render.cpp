@@ -66,7 +66,7 @@ TEST_CASE("a turned body of SH degree 3 looks as if the camera had gone around i
   // With the usual cut, skinning's roundings decide whether a pixel at the rim of a Gaussian gets 1/255
   // of it.
   RenderConfig config;
-  config.alpha_min = 1e-6;
+  config.quality.alpha_min = 1e-6;
   const auto a = gsnav_test::render<double>(backend, {skin.set()}, camera, config).rgb;
   const auto b = gsnav_test::render<double>(backend, {cloud.set()}, around, config).rgb;
   const ImageError e = image_error(a, b, 3);

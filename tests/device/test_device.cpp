@@ -143,7 +143,7 @@ TEST_CASE("renderer: a cloud alone, rules that change, errors that name what is 
   CHECK(depth.median_depth == frames.median_depth);
 
   RenderConfig wrong;
-  wrong.alpha_min = 2;
+  wrong.quality.alpha_min = 2;
   CHECK(has(renderer.set_config(wrong).message(), "alpha_min"));
   Camera bad = camera;
   bad.fx = std::nan("");

@@ -98,9 +98,9 @@ TEST_CASE("oracle: brute force and boxes give the same bits, every kind that cut
     const TwoSets two(600);
     check_levels(two.sets, two.camera, config);
     config.rules.sort_order = SortOrder::camera_distance;
-    config.rules.max_sh_degree = 0;
-    config.rules.key_bits = 20;
-    config.rules.alpha_min = 0.01;
+    config.rules.quality.max_sh_degree = 0;
+    config.rules.quality.key_bits = 20;
+    config.rules.quality.alpha_min = 0.01;
     check_levels(two.sets, two.camera, config);
     // The camera among Gaussians: outlines without bounds, means far outside the image.
     const GaussianCloud around = random_cloud(
@@ -196,8 +196,8 @@ TEST_CASE("oracle: the renderer in double gives the same image to rounding") {
     RenderConfig rules = all_outputs();
     rules.sort_order = sort;
     rules.background = {0.3, 0.2, 0.1};
-    rules.max_sh_degree = 1;
-    if (sort == SortOrder::camera_distance) rules.key_bits = 14;  // ties by the hundred
+    rules.quality.max_sh_degree = 1;
+    if (sort == SortOrder::camera_distance) rules.quality.key_bits = 14;  // ties by the hundred
     SerialBackend serial;
     Renderer<double, SerialBackend> renderer(serial, rules);
     const auto rendered = renderer.render(two.sets, {{two.camera}}).value();

@@ -105,7 +105,7 @@ TEST_CASE("oracle: two layers, their depths and what is marked undecided") {
   CHECK(at_center({gaussian({0, 0, 2}, wide, (1 + 5e-6) / 255)}, undecided) == 1);
   CHECK(at_center({gaussian({0, 0, 2}, wide, (1 + 5e-5) / 255)}, undecided) == 0);
   OracleConfig faint;
-  faint.rules.alpha_min = 0.01;
+  faint.rules.quality.alpha_min = 0.01;
   CHECK(at_center({gaussian({0, 0, 2}, wide, 0.01 * (1 - 5e-6))}, undecided, faint) ==
         1);  // and not drawn
   CHECK(at_center({gaussian({0, 0, 2}, wide, 0.01 * (1 - 5e-5))}, undecided, faint) == 0);
@@ -122,7 +122,7 @@ TEST_CASE("oracle: a pixel is closed by the Gaussian that takes T below the stop
   std::vector<RawGaussian> layers;
   for (int i = 0; i < 5; ++i) layers.push_back(opaque({0, 0, 2.0 + i}, {0.5, 0.5, 0.01}, {}));
   OracleConfig config;
-  config.rules.transmittance_min = 0.95e-4;  // the second layer's T is 1e-4
+  config.rules.quality.transmittance_min = 0.95e-4;  // the second layer's T is 1e-4
   const GaussianCloud cloud = cloud_of(layers);
   const std::size_t center = 32 * 65 + 32;
   const OracleFrames f = oracle({cloud.set()}, axis_camera(), config);
@@ -228,8 +228,8 @@ TEST_CASE("oracle: Brush's reference images") {
     if (!brush) continue;
     CAPTURE(name);
     OracleConfig config;
-    config.rules.max_alpha = brush->max_alpha;
-    config.rules.transmittance_min = brush->transmittance_min;
+    config.rules.quality.max_alpha = brush->max_alpha;
+    config.rules.quality.transmittance_min = brush->transmittance_min;
     const OracleFrames f = oracle({brush->cloud.set()}, brush->camera, config);
     CHECK(brush->error(f.rgb, f.alpha) < 1e-5);
   }
@@ -250,7 +250,15 @@ TEST_CASE("oracle: what cannot be is named") {
   config.rules.compat = Compat::inria;
   CHECK(message(config).find("rules.compat") != std::string::npos);
   config = {};
-  config.rules.max_alpha = 2;
+  const OracleMesh mesh;
+  config.mesh = &mesh;
+  config.rules.composite = Composite::hard_depth;
+  CHECK(message(config).find("rules.composite") != std::string::npos);
+  config.rules.composite = Composite::merged;
+  config.rules.blend_space = ColorSpace::linear;
+  CHECK(message(config).find("rules.blend_space") != std::string::npos);
+  config = {};
+  config.rules.quality.max_alpha = 2;
   CHECK(message(config).find("max_alpha") != std::string::npos);
   for (const PixelRect crop : {PixelRect{3, 3, 3, 5}, PixelRect{0, 0, 66, 10}, PixelRect{-1, 0, 5, 5}}) {
     config = {};

@@ -150,7 +150,7 @@ TEST_CASE("ray oracle: what EWA is off by, over N02's grid of spheres") {
       const GaussianCloud cloud = cloud_of({gaussian(
           {std::sin(theta * kRadians), 0, std::cos(theta * kRadians)}, {rho, rho, rho}, 0.98)});
       OracleConfig config;
-      config.rules.alpha_min = 1e-6;
+      config.rules.quality.alpha_min = 1e-6;
       const OracleFrames ewa = oracle({cloud.set()}, camera, config);
       config.kind = OracleKind::ray;
       const OracleFrames ray = oracle({cloud.set()}, camera, config);

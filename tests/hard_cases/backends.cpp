@@ -76,10 +76,10 @@ std::vector<bool> undecided_pixels(const std::vector<Placed>& scene, const Camer
   CaseRenderer<double, SerialBackend> serial("serial double");
   RenderConfig low = config, high = config;
   low.outputs = high.outputs = kRgb | kAlpha | kMedianDepth;
-  low.alpha_min *= 1 - relative;
-  high.alpha_min *= 1 + relative;
-  low.transmittance_min *= 1 - relative;
-  high.transmittance_min *= 1 + relative;
+  low.quality.alpha_min *= 1 - relative;
+  high.quality.alpha_min *= 1 + relative;
+  low.quality.transmittance_min *= 1 - relative;
+  high.quality.transmittance_min *= 1 + relative;
   const auto a = serial.render(scene, camera, low), b = serial.render(scene, camera, high);
   std::vector<bool> out(a.alpha.size());
   for (std::size_t p = 0; p < out.size(); ++p) {

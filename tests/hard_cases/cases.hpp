@@ -13,7 +13,7 @@
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/quat.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "gsnav/detail/frame/project_chunk.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav_test {

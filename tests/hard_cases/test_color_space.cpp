@@ -120,7 +120,7 @@ TEST_CASE(
     };
     render_everywhere({&a, &b}, axis_camera(), config, check);
     // In slices of depth, where a backend has them: the same bits.
-    config.depth_slices = 4;
+    config.tuning.depth_slices = 4;
     render_everywhere({&a, &b}, axis_camera(), config, check);
   }
   // Clouds of two spaces cannot become one.

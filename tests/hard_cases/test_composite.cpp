@@ -327,7 +327,7 @@ TEST_CASE("a mesh out of view changes no bit, whatever is asked for") {
       config.background = {0.1, 0.2, 0.3};
       if (rules == 1) config.response = Response::ray;
       if (rules == 2) config.compat = Compat::inria;
-      if (rules == 3) config.tile_size = 32;
+      if (rules == 3) config.tuning.tile_size = 32;
       for_each_renderer([&](auto& renderer) {
         const auto with = renderer.render({&cloud}, {axis_camera(75)}, config, mesh.instances);
         const auto without = renderer.render({&cloud}, {axis_camera(75)}, config);

@@ -61,7 +61,7 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
       RenderConfig config = all_outputs();
       config.response = static_cast<Response>(i % 3);
       config.sort_order = i % 2 == 0 ? SortOrder::z_depth : SortOrder::camera_distance;
-      config.alpha_min = i % 4 == 3 ? 0.1 : 1.0 / 255;
+      config.quality.alpha_min = i % 4 == 3 ? 0.1 : 1.0 / 255;
       Similarity place;
       if (i % 2 == 1) place = {{0.8, 0.2, -0.5, 0.26457513110645907}, {0.3, -0.2, 0.5}, 2.5};
       const auto c64 =
@@ -101,8 +101,8 @@ TEST_CASE("count_culled: what single Gaussians and boxes say, each by itself") {
   for (int i = 0; i < 6; ++i) {
     Camera camera = camera_anywhere(rng);
     RenderConfig config;
-    config.alpha_min = i % 2 == 0 ? 1.0 / 255 : 0.1;
-    config.tile_size = i % 3 == 0 ? 8 : 16;
+    config.quality.alpha_min = i % 2 == 0 ? 1.0 / 255 : 0.1;
+    config.tuning.tile_size = i % 3 == 0 ? 8 : 16;
     const GaussianSet set = cloud.set();
     const CullCounts n = count_culled(backend, std::span(&set, 1), camera, config);
     renderer.set_config(config);
@@ -156,7 +156,7 @@ TEST_CASE("N21_depth_ties_keep_file_order when rows are sorted in space") {
   const Camera camera = axis_camera();
   for (const int bits : {32, 8}) {  // 8: hundreds of Gaussians a key
     RenderConfig config = all_outputs();
-    config.key_bits = bits;
+    config.quality.key_bits = bits;
     for_each_renderer([&](auto& renderer) {
       const auto reference = renderer.render({&first, &other}, camera, config);
       CHECK(same_images(reference, renderer.render({&first_sorted, &other_sorted}, camera, config)));

@@ -104,7 +104,7 @@ TEST_CASE("N46_depth_tilted_disk") {
       });
       // The depth of the centre, which compat modes know only, is off by decimetres.
       config.compat = Compat::inria;
-      config.tile_size = 16;
+      config.tuning.tile_size = 16;
       render_everywhere({&cloud}, camera, config, [&](const auto& f, const auto&) {
         double off = 0;
         for (std::size_t p = 0; p < f.alpha.size(); ++p) {

@@ -107,9 +107,9 @@ TEST_CASE("N63_determinism_100 of work that is cut") {
   // Enough Gaussians for binning in blocks, one a thread.
   const GaussianCloud cloud = random_cloud(631, {.count = 9000, .scale = 0.03});
   const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 100, 71, 75);
-  for (const Profile profile : {Profile::exact, Profile::fast}) {
+  for (const Exponential profile : {Exponential::exact, Exponential::fast}) {
     RenderConfig config = all_outputs();
-    config.profile = profile;
+    config.quality.exponential = profile;
     CaseRenderer<float, SerialBackend> serial("serial");
     const auto reference = serial.render({&cloud}, camera, config);
     REQUIRE(reference.stats[0].visible >= 4096);
@@ -118,7 +118,7 @@ TEST_CASE("N63_determinism_100 of work that is cut") {
       if constexpr (R::is_float) {
         const auto images = renderer.render({&cloud}, camera, config);
         // A GPU's `fast` has an exponential of its own (Exp2::hardware).
-        const bool own = profile == Profile::fast &&
+        const bool own = profile == Exponential::fast &&
                          !is_host_backend<std::remove_cvref_t<decltype(renderer.backend())>>;
         CHECK(same_images(own ? renderer.render({&cloud}, camera, config) : reference, images));
       }

@@ -81,8 +81,8 @@ TEST_CASE("N08_power_sign") {
   // Pixels at the mean and along the axis, where a conic's rounding turns the exponent positive.
   const Camera camera = axis_camera(128, 100);
   RenderConfig config;
-  config.max_alpha = 1;
-  config.alpha_min = 1e-30;
+  config.quality.max_alpha = 1;
+  config.quality.alpha_min = 1e-30;
   GaussianCloud cloud = needle_cloud(8, sample_count(20000));
   REQUIRE(append(cloud, long_needles(sample_count(20000))).ok());
   for_each_lane_type([&]<class L>(const std::string& name) {

@@ -30,8 +30,8 @@ double drift_ripple(R& renderer, double sigma_px, double h, double opacity, doub
   Camera camera = axis_camera(33, 64);
   RenderConfig config;
   config.outputs = kAlpha;
-  config.alpha_min = alpha_min;
-  config.max_alpha = 1;
+  config.quality.alpha_min = alpha_min;
+  config.quality.max_alpha = 1;
   const double sigma = sigma_px * 2 / 64;
   GaussianCloud cloud = cloud_of({gaussian({0, 0, 2}, {sigma, sigma, sigma}, opacity)});
   cloud.eps2d = static_cast<float>(h);
@@ -67,7 +67,7 @@ TEST_CASE("N13_comp_subpixel") {
   // A sphere of sigma px on the axis keeps sigma^2 / (sigma^2 + h) of its opacity.
   const Camera camera = axis_camera(33, 64);
   RenderConfig config = all_outputs();
-  config.alpha_min = 1e-6;  // 0.9 of 3e-4 is below 1/255
+  config.quality.alpha_min = 1e-6;  // 0.9 of 3e-4 is below 1/255
   for (const double sigma_px : {0.01, 0.03, 0.1, 0.3, 0.55, 1.0}) {
     CAPTURE(sigma_px);
     const double sigma = sigma_px * 2 / 64;

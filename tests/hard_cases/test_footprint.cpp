@@ -242,10 +242,10 @@ TEST_CASE("N11_tile_cover_conservative") {
       RenderConfig config = all_outputs();
       config.response = response;
       for_each_renderer([&](auto& renderer) {
-        config.tile_size = 16;
+        config.tuning.tile_size = 16;
         const auto reference = renderer.render({&a, &b}, footprint_camera(), config);
         for (const int size : {8, 32}) {
-          config.tile_size = size;
+          config.tuning.tile_size = size;
           const auto f = renderer.render({&a, &b}, footprint_camera(), config);
           CHECK(f.rgb == reference.rgb);
           CHECK(f.alpha == reference.alpha);

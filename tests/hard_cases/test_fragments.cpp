@@ -196,7 +196,7 @@ TEST_CASE("N72_pane_alpha_0_and_1: nothing, and a wall, bit for bit, by every ru
     config.background = {0.1, 0.2, 0.3};
     if (rules == 1) config.response = Response::ray;
     if (rules == 2) config.compat = Compat::inria;
-    if (rules == 3) config.tile_size = 32;
+    if (rules == 3) config.tuning.tile_size = 32;
     if (rules == 4) config.blend_space = ColorSpace::linear;
     CAPTURE(rules);
     for_each_renderer([&](auto& renderer) {

@@ -38,7 +38,7 @@ TEST_CASE("N25_key_overflow") {
     const Camera camera = axis_camera(4096, 4000);
     RenderConfig config;
     config.outputs = kAlpha | kMedianDepth;
-    config.tile_size = 8;
+    config.tuning.tile_size = 8;
     // Two depths at the corners, the middle and tile borders; the nearer one comes last in the file.
     std::vector<RawGaussian> gs;
     std::vector<std::array<int, 2>> at;

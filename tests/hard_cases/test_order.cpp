@@ -263,12 +263,12 @@ TEST_CASE("N23_key_wide_range") {
   RenderConfig config = all_outputs();
   const Camera camera = axis_camera(96, 48);
   for_each_renderer([&](auto& renderer) {
-    config.key_bits = 32;
+    config.quality.key_bits = 32;
     const auto full = renderer.render({&cloud}, camera, config);
-    config.key_bits = 24;
+    config.quality.key_bits = 24;
     const double psnr = image_error(renderer.render({&cloud}, camera, config).rgb, full.rgb, 3).psnr;
     CHECK(psnr >= 80);
-    config.key_bits = 16;
+    config.quality.key_bits = 16;
     const double few = image_error(renderer.render({&cloud}, camera, config).rgb, full.rgb, 3).psnr;
     MESSAGE(renderer.name() << ": key of 24 bits " << psnr << " dB, of 16 bits " << few << " dB");
   });

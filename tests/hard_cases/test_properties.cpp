@@ -225,7 +225,7 @@ TEST_CASE("property_opacity_monotonicity") {
       for (const double stop : {0.0, 1e-4}) {
         RenderConfig config;
         config.outputs = kAlpha;
-        config.transmittance_min = stop;
+        config.quality.transmittance_min = stop;
         for_each_renderer([&](auto& renderer) {
           const auto a = renderer.render({&cloud}, square_camera(), config);
           const auto b = renderer.render({&more}, square_camera(), config);

@@ -66,13 +66,13 @@ TEST_CASE("N65_cull_invariance of slices of depth") {
     const Camera camera = random_camera(rng);
     RenderConfig one;
     one.outputs = outputs[static_cast<std::size_t>(i % 4)];
-    one.profile = i % 2 == 0 ? Profile::exact : Profile::fast;
+    one.quality.exponential = i % 2 == 0 ? Exponential::exact : Exponential::fast;
     one.sort_order = i % 5 == 4 ? SortOrder::camera_distance : SortOrder::z_depth;
-    one.tile_size = 8 << (i % 3);
-    one.transmittance_min = i % 3 == 0 ? 0.05 : 1e-4;
-    one.depth_slices = 1;
+    one.tuning.tile_size = 8 << (i % 3);
+    one.quality.transmittance_min = i % 3 == 0 ? 0.05 : 1e-4;
+    one.tuning.depth_slices = 1;
     RenderConfig several = one;
-    several.depth_slices = 2 + i % 7;
+    several.tuning.depth_slices = 2 + i % 7;
     for_each_renderer([&](auto& renderer) {
       const std::vector<Placed> scene{{&room}, {&plain}, {&placed, place}};
       const auto a = renderer.render(scene, camera, one);
@@ -99,10 +99,10 @@ TEST_CASE("N65_cull_invariance behind a wall, and before it") {
   const Camera camera = axis_camera(64, 60);
   RenderConfig config = all_outputs();
   for_each_renderer([&](auto& renderer) {
-    config.depth_slices = 1;
+    config.tuning.depth_slices = 1;
     const auto whole = renderer.render({&cloud}, camera, config);
     for (const int n : {2, 5, 8}) {
-      config.depth_slices = n;
+      config.tuning.depth_slices = n;
       const auto f = renderer.render({&cloud}, camera, config);
       CAPTURE(n);
       CHECK(same_images(whole, f));
@@ -195,7 +195,7 @@ TEST_CASE("slices of depth by distance, where the viewmat is as little rigid as 
     OpenMPBackend backend(1);
     std::vector<float> first;
     for (const int slices : {1, 4, 8}) {
-      config.depth_slices = slices;
+      config.tuning.depth_slices = slices;
       Renderer<float, OpenMPBackend> renderer(backend, config);
       const auto frame = renderer.render(cloud.set(), camera).value();
       if (slices == 1) first = frame.rgb;

@@ -64,7 +64,7 @@ TEST_CASE("N41_single_opaque") {
   REQUIRE(color > 0.1L);
   for (const double max_alpha : {0.99, 1.0}) {
     RenderConfig config = all_outputs();
-    config.max_alpha = max_alpha;
+    config.quality.max_alpha = max_alpha;
     on_axis(cloud, config, [&](double alpha, double red, const auto&) {
       CHECK(std::abs(alpha - max_alpha) < 1e-6);
       CHECK(std::abs(red - max_alpha * static_cast<double>(color)) < 1e-6);
@@ -89,7 +89,7 @@ TEST_CASE("N42_saturation_stop") {
     const GaussianCloud cloud = layers(row.opacities, 42);
     for (const Compat compat : {Compat::none, Compat::inria, Compat::gsplat}) {
       RenderConfig config = all_outputs();
-      config.max_alpha = row.max_alpha;
+      config.quality.max_alpha = row.max_alpha;
       config.compat = compat;
       const Blend truth(cloud, row.max_alpha, 1e-4, compat != Compat::none);
       if (compat == Compat::none) {
@@ -166,7 +166,7 @@ TEST_CASE("N44_deep_stack") {
   for (const double stop : {1e-4, 0.0}) {
     CAPTURE(stop);
     RenderConfig config = all_outputs();
-    config.transmittance_min = stop;
+    config.quality.transmittance_min = stop;
     const Blend truth(cloud, 0.99, stop, false);
     double worst = 0, worst_depth = 0;
     render_everywhere({&cloud}, axis_camera(kSize, 64), config, [&](const auto& f, const auto&) {

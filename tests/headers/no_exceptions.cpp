@@ -23,7 +23,7 @@ int main() {
   if (!frames || !(frames.value().alpha[16 * 32 + 16] > 0.8f)) return 1;
 
   RenderConfig impossible;
-  impossible.tile_size = 7;
+  impossible.tuning.tile_size = 7;
   renderer.set_config(impossible);
   if (renderer.render(cloud.set(), camera).code() != Errc::invalid_argument) return 2;
   return scratch_of_second_unit() == 0 ? 0 : 3;

@@ -87,9 +87,9 @@ class SceneList {
     scene.config.background = {0.25, 0.5, 0.75};
     if (configure) configure(scene.config);
     const std::string name = scene.name;
-    for (const Profile profile : {Profile::exact, Profile::fast}) {
-      scene.name = name + (profile == Profile::exact ? ", exact" : ", fast");
-      scene.config.profile = profile;
+    for (const Exponential profile : {Exponential::exact, Exponential::fast}) {
+      scene.name = name + (profile == Exponential::exact ? ", exact" : ", fast");
+      scene.config.quality.exponential = profile;
       scenes.push_back(scene);
     }
   }
@@ -144,7 +144,7 @@ void add_flat(SceneList& list) {
             s.name = "flat, people, four slices";
             return s;
           }(),
-      [](RenderConfig& c) { c.depth_slices = 4; });
+      [](RenderConfig& c) { c.tuning.depth_slices = 4; });
   s.name = "flat, people, mesh";
   s.meshes = wall;
   list.add(s, kAllImages);
@@ -159,7 +159,7 @@ void add_flat(SceneList& list) {
   for (const int tile : {8, 32}) {
     s = named("flat, tiles of " + std::to_string(tile));
     s.camera = camera_in_flat(3, 70, 44);
-    list.add(s, [tile](RenderConfig& c) { c.tile_size = tile; });
+    list.add(s, [tile](RenderConfig& c) { c.tuning.tile_size = tile; });
   }
   list.add(named("flat, median depth alone"), [](RenderConfig& c) { c.outputs = kMedianDepth; });
   list.add(named("flat, first hit alone"), [](RenderConfig& c) {
@@ -248,7 +248,8 @@ void add_storages(SceneList& list) {
   list.add(scene("three sets", three, ahead), kAllImages);
   list.add(scene("three sets by distance", three, ahead),
            all_images_and([](RenderConfig& c) { c.sort_order = SortOrder::camera_distance; }));
-  list.add(scene("three sets, 24 bits of key", three, ahead), [](RenderConfig& c) { c.key_bits = 24; });
+  list.add(scene("three sets, 24 bits of key", three, ahead),
+           [](RenderConfig& c) { c.quality.key_bits = 24; });
   s = scene("three sets, linear", three, ahead);
   s.in_batches = false;
   list.add(s, [](RenderConfig& c) { c.blend_space = ColorSpace::linear; });

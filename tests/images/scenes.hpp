@@ -10,7 +10,7 @@
 #include "gsnav/detail/scene/temporal_gaussians.hpp"
 #include "gsnav/detail/sim/scene_on_backend.hpp"
 #include "gsnav/image/camera.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/renderer.hpp"

@@ -58,7 +58,7 @@ TEST_CASE("images: every storage and selection of rows draws the same bits on ev
     const Frames<float> reference = draw<float>(serial, scene, "serial");
     CHECK(all_finite(reference));
     CHECK(shows_something(reference));
-    if (scene.config.profile == Profile::exact) {
+    if (scene.config.quality.exponential == Exponential::exact) {
       const Frames<double> in_double = draw<double>(serial, scene, "serial double");
       if (!reference.rgb.empty()) CHECK(image_error(reference.rgb, in_double.rgb, 3).psnr > 80);
     }
@@ -71,7 +71,7 @@ TEST_CASE("images: every storage and selection of rows draws the same bits on ev
       CudaBackend cuda;
       const SceneThere<CudaBackend> there(cuda, scene);
       const Frames<float> single = draw<float>(cuda, scene, "cuda");
-      if (there.config().profile == Profile::exact) {
+      if (there.config().quality.exponential == Exponential::exact) {
         check_same_bits(single, reference);
       } else if (!reference.rgb
                       .empty()) {  // the device has an exponential of its own there (docs/cuda.md)

@@ -34,7 +34,7 @@ TEST_CASE("lod photo: a Gaussian's light does not depend on how much a pixel blu
   SerialBackend backend;
   RenderConfig config;
   config.outputs = kAlpha;
-  config.alpha_min = 1e-7;
+  config.quality.alpha_min = 1e-7;
   Renderer<double, SerialBackend> renderer(backend, config);
   const double per_metre = camera.fx / 5;
   for (const float base : {0.0f, 0.02f, 0.3f}) {

@@ -230,7 +230,7 @@ TEST_CASE("ledger: its counts are those of the frame") {
   const SceneProfile profile = profile_scene(cloud, kUnseenColor);
   SerialBackend backend;
   RenderConfig config;
-  config.profile = Profile::fast;
+  config.quality.exponential = Exponential::fast;
   Renderer<float, SerialBackend> renderer(backend, config);
   const GaussianSet set = profile.applied_to(cloud.set());
   const auto f = renderer.render(set, camera).value();
@@ -260,4 +260,10 @@ TEST_CASE("ledger: its counts are those of the frame") {
   CHECK(ledger_text(other).find("converted: the colours of " + std::to_string(cloud.size())) !=
         std::string::npos);
   CHECK(ledger_text(other).find("order: not") != std::string::npos);
+  config.compat = Compat::inria;
+  config.quality.key_bits = 24;
+  config.quality.max_sh_degree = 1;
+  const std::string rules = ledger_text(frame_ledger(both, camera, config, f.stats[0]));
+  for (const char* line : {"order: by 24 bits", "SH bands above degree 1", "RenderConfig::compat"})
+    CHECK(rules.find(line) != std::string::npos);
 }

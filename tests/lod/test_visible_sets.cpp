@@ -147,7 +147,7 @@ TEST_CASE(
       CHECK(*std::max_element(part.alpha.begin(), part.alpha.end()) > 0.3);
     };
     for (const int slices : {1, 3}) {
-      config.depth_slices = slices;
+      config.tuning.depth_slices = slices;
       same(lanes, 0.0f);
     }
     config.response = Response::ray;  // without lanes
@@ -215,9 +215,9 @@ TEST_CASE("visible sets: what is behind a wall is left out, and no image shows i
   OpenMPBackend backend(2);
   RenderConfig config;
   config.outputs = kRgb;
-  config.profile = Profile::fast;
+  config.quality.exponential = Exponential::fast;
   Renderer<float, OpenMPBackend> renderer(backend, config);
-  config.depth_slices = 3;
+  config.tuning.depth_slices = 3;
   Renderer<float, OpenMPBackend> sliced(backend, config);
   Rng rng(5);
   int known = 0, hidden = 0;

@@ -13,8 +13,8 @@ namespace {
 template <class S, class B>
 double brush_error(B& backend, const BrushCase& brush) {
   RenderConfig config;
-  config.max_alpha = brush.max_alpha;
-  config.transmittance_min = brush.transmittance_min;
+  config.quality.max_alpha = brush.max_alpha;
+  config.quality.transmittance_min = brush.transmittance_min;
   const auto f = render<S>(backend, {brush.cloud.set()}, brush.camera, config);
   return brush.error(f.rgb, f.alpha);
 }

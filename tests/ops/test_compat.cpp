@@ -152,10 +152,10 @@ TEST_CASE("compat modes follow the rules of the renderer they name") {
         CHECK(worst < 1e-2);
       };
       SerialBackend serial;
-      config.tile_size = 8;
+      config.tuning.tile_size = 8;
       const auto exact = render<double>(serial, {cloud.set()}, camera, config);
       check(exact, 150);
-      config.tile_size = 16;
+      config.tuning.tile_size = 16;
       CHECK(render<double>(serial, {cloud.set()}, camera, config).rgb == exact.rgb);
       const auto single = render<float>(serial, {cloud.set()}, camera, config);
       check(single, 80);
@@ -188,7 +188,7 @@ TEST_CASE("responses: serial and lanes agree bit for bit") {
     OpenMPBackend openmp(2);
     const auto a = render<float>(serial, {cloud.set()}, camera, config);
     for (const int tile : {8, 16, 32}) {
-      config.tile_size = tile;
+      config.tuning.tile_size = tile;
       const auto b = render<float>(openmp, {cloud.set()}, camera, config);
       CHECK(a.rgb == b.rgb);
       CHECK(a.median_depth == b.median_depth);

@@ -119,15 +119,18 @@ TEST_CASE("bad render configurations name their field") {
     change(config);
     return error_of(cloud.set(), Camera{}, config);
   };
-  CHECK(names(message([](RenderConfig& c) { c.tile_size = 12; }), "tile_size"));
+  CHECK(names(message([](RenderConfig& c) { c.tuning.tile_size = 12; }), "tuning.tile_size"));
   CHECK(names(message([](RenderConfig& c) { c.outputs = 0; }), "outputs"));
   CHECK(names(message([](RenderConfig& c) { c.outputs = 1u << 20; }), "outputs"));
-  CHECK(names(message([](RenderConfig& c) { c.max_alpha = 0; }), "max_alpha"));
-  CHECK(names(message([](RenderConfig& c) { c.transmittance_min = 1; }), "transmittance_min"));
+  CHECK(names(message([](RenderConfig& c) { c.quality.max_alpha = 0; }), "quality.max_alpha"));
+  CHECK(names(message([](RenderConfig& c) { c.quality.transmittance_min = 1; }),
+              "quality.transmittance_min"));
   CHECK(names(message([](RenderConfig& c) { c.first_hit_tau = std::nan(""); }), "first_hit_tau"));
   CHECK(names(message([](RenderConfig& c) { c.background.y = std::nan(""); }), "background"));
-  CHECK(names(message([](RenderConfig& c) { c.profile = static_cast<Profile>(99); }), "profile = 99"));
-  CHECK(names(message([](RenderConfig& c) { c.profile = static_cast<Profile>(-1); }), "profile = -1"));
+  CHECK(names(message([](RenderConfig& c) { c.quality.exponential = static_cast<Exponential>(99); }),
+              "quality.exponential = 99"));
+  CHECK(names(message([](RenderConfig& c) { c.quality.exponential = static_cast<Exponential>(-1); }),
+              "quality.exponential = -1"));
   CHECK(names(message([](RenderConfig& c) { c.sort_order = static_cast<SortOrder>(99); }),
               "sort_order = 99"));
   CHECK(

@@ -51,7 +51,7 @@ TEST_CASE("cuda: images have the serial backend's bits") {
       for (const Response response : {Response::ewa, Response::tangent_plane, Response::ray}) {
         RenderConfig config;
         config.outputs = kRgb | kAlpha | kAnyDepth;
-        config.tile_size = tile;
+        config.tuning.tile_size = tile;
         config.response = response;
         const auto gpu = on_gpu(cuda, {&a, &b}, camera, config);
         const auto cpu = render<float>(serial, {a.set(), b.set()}, camera, config);
@@ -76,13 +76,13 @@ TEST_CASE("cuda: outputs asked for alone, profiles and compat modes") {
   const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 97, 64, 70);
   for (const unsigned outputs : {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth},
                                  kRgb | kMedianDepth, unsigned{kExpectedDepth}}) {
-    for (const Profile profile : {Profile::exact, Profile::fast}) {
+    for (const Exponential profile : {Exponential::exact, Exponential::fast}) {
       RenderConfig config;
       config.outputs = outputs;
-      config.profile = profile;
+      config.quality.exponential = profile;
       const auto gpu = on_gpu(cuda, {&cloud}, camera, config);
       const auto cpu = render<float>(serial, {cloud.set()}, camera, config);
-      if (profile == Profile::exact) {
+      if (profile == Exponential::exact) {
         CHECK(gpu.rgb == cpu.rgb);
         CHECK(gpu.alpha == cpu.alpha);
         CHECK(gpu.median_depth == cpu.median_depth);
@@ -92,7 +92,7 @@ TEST_CASE("cuda: outputs asked for alone, profiles and compat modes") {
         // alpha.
         CHECK(largest_difference(gpu.rgb, cpu.rgb) < 3e-4);
         CHECK(largest_difference(gpu.alpha, cpu.alpha) < 3e-4);
-        config.profile = Profile::exact;
+        config.quality.exponential = Exponential::exact;
         const auto exact = on_gpu(cuda, {&cloud}, camera, config);
         CHECK(largest_difference(gpu.rgb, exact.rgb) < 2e-6);
         CHECK(largest_difference(gpu.alpha, exact.alpha) < 2e-6);

@@ -66,7 +66,7 @@ TEST_CASE("cuda batch: meshes among the Gaussians have the bits they have one ca
       }
       RenderConfig config;
       config.background = {0.25, 0.5, 0.75};
-      config.profile = all ? Profile::fast : Profile::exact;
+      config.quality.exponential = all ? Exponential::fast : Exponential::exact;
       if (count == 5) config.blend_space = ColorSpace::linear;
       GaussianSet set = sets[0];
       set.color_space = config.blend_space;

@@ -65,7 +65,7 @@ TEST_CASE("the benchmark flat at 300K") {
       OpenMPBackend openmp(threads);
       for (const int tile : {8, 16, 32}) {
         RenderConfig config;
-        config.tile_size = tile;
+        config.tuning.tile_size = tile;
         const auto f = render<float>(openmp, sets, cameras[c], config);
         CHECK(f.rgb == single.rgb);
         CHECK(f.alpha == single.alpha);
@@ -73,7 +73,7 @@ TEST_CASE("the benchmark flat at 300K") {
       }
     }
     RenderConfig fast;
-    fast.profile = Profile::fast;
+    fast.quality = Quality::fast();
     OpenMPBackend openmp(2);
     const auto f = render<float>(openmp, sets, cameras[c], fast);
     const ImageError e = image_error(f.rgb, reference.rgb, 3);

@@ -80,7 +80,7 @@ TEST_CASE("the fast profile stays within its budget") {
   const Camera camera = test_camera(0);
   const OracleImage oracle = oracle_render({&cloud}, camera);
   RenderConfig config;
-  config.profile = Profile::fast;
+  config.quality = Quality::fast();
   SerialBackend serial;
   const ImageError e =
       image_error(render<float>(serial, {cloud.set()}, camera, config).rgb, oracle.rgb, 3);
@@ -118,8 +118,8 @@ TEST_CASE("max_alpha and the stop are fields of the configuration") {
   const GaussianCloud cloud = random_cloud(9, {.count = 400});
   const Camera camera = test_camera(0);
   RenderConfig config;
-  config.max_alpha = 0.9;
-  config.transmittance_min = 0.05;
+  config.quality.max_alpha = 0.9;
+  config.quality.transmittance_min = 0.05;
   OracleOptions rules;
   rules.max_alpha = 0.9L;
   rules.transmittance_min = static_cast<Real>(0.05);

@@ -115,7 +115,7 @@ TEST_CASE("cuda: SH bands that chunks do not need are not read, in batches and a
           CAPTURE(limit);
           CAPTURE(count);
           RenderConfig config;
-          config.max_sh_degree = limit;
+          config.quality.max_sh_degree = limit;
           CudaBatchRenderer renderer(cuda, config);
           const std::vector<Camera> cameras = ring_of(count);
           const Batch got = draw_batch(cuda, renderer, {some.set()}, cameras, {}, kMedianOnly);

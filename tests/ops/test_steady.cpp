@@ -83,10 +83,10 @@ TEST_CASE(
   if (!heap_is_watched()) return;
   for (const int threads : {1, 2, 4}) {
     for (const std::size_t batch : {std::size_t{1}, std::size_t{5}, std::size_t{13}}) {
-      for (const Profile profile : {Profile::exact, Profile::fast}) {
+      for (const Exponential profile : {Exponential::exact, Exponential::fast}) {
         for (const unsigned outputs : {+kRgb, +kMedianDepth, kRgb | kAlpha | kAnyDepth}) {
           RenderConfig config;
-          config.profile = profile;
+          config.quality.exponential = profile;
           config.outputs = outputs;
           CAPTURE(threads);
           CAPTURE(batch);
@@ -147,7 +147,7 @@ TEST_CASE(
       CHECK(whole.first_hit_depth == spared.first_hit_depth);
     }
     config.outputs = kRgb;
-    config.max_sh_degree = 0;
+    config.quality.max_sh_degree = 0;
     CHECK(render(cloud().set(), config).rgb == render(base_only, config).rgb);
   }
 }

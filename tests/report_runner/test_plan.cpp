@@ -54,12 +54,12 @@ TEST_CASE("plan: a knob's config differs from exact in that knob") {
   Setting s;
   s.knob = "alpha_min";
   s.knob_value = "0.015625";
-  CHECK(render_config(s, SortOrder::z_depth).alpha_min == 1.0 / 64);
+  CHECK(render_config(s, SortOrder::z_depth).quality.alpha_min == 1.0 / 64);
   s = {};
   s.knob = "response";
   s.knob_value = "ray";
   CHECK(render_config(s, SortOrder::z_depth).response == Response::ray);
-  CHECK(render_config(s, SortOrder::z_depth).alpha_min == RenderConfig{}.alpha_min);
+  CHECK(render_config(s, SortOrder::z_depth).quality.alpha_min == RenderConfig{}.quality.alpha_min);
   s = {};
   s.sensor = "depth";
   CHECK(render_config(s, SortOrder::camera_distance).outputs == (kAlpha | kMedianDepth));
@@ -118,7 +118,7 @@ TEST_CASE("levels of detail are judged by the photo, beside fast, and drawn by i
       CHECK(s.oracles == std::vector<Oracle>{Oracle::photo4});
       const RenderConfig c = render_config(s, SortOrder::z_depth), own = lod_config(c);
       CHECK(c == own);
-      CHECK(c.profile == Profile::fast);
+      CHECK(c.quality.exponential == Exponential::fast);
     }
     const bool judged = std::find(s.oracles.begin(), s.oracles.end(), Oracle::photo4) != s.oracles.end();
     fast += s.profile == "fast" && judged ? 1 : 0;

@@ -137,7 +137,10 @@ TEST_CASE("impossible configurations name what is wrong") {
   CHECK(has(message([](auto&, auto& c) { c.sensors[0].near_sigma = -1; }), "near_sigma"));
   CHECK(has(message([](auto&, auto& c) { c.sensors[0].position.x = std::nan(""); }), "position"));
   CHECK(has(message([](auto&, auto& c) { c.task.forward_step = 0; }), "forward_step"));
-  CHECK(has(message([](auto&, auto& c) { c.render.tile_size = 7; }), "tile_size"));
+  CHECK(has(message([](auto&, auto& c) { c.render.tuning.tile_size = 7; }), "tile_size"));
+  CHECK(has(message([](auto&, auto& c) { c.render.outputs = kRgb; }), "render.outputs = 1"));
+  CHECK(has(message([](auto&, auto& c) { c.render.sort_order = SortOrder::camera_distance; }),
+            "render.sort_order"));
 }
 
 TEST_CASE("people are seen, and move while the agent acts") {

@@ -100,9 +100,9 @@ int run(B& backend, const Options& o, const DepthChoice& depth, const Cloud& clo
         const std::vector<PlacedMeshes>& meshes, const std::vector<Camera>& cameras) {
   RenderConfig config;
   config.outputs = kRgb | kAlpha | depth.output;
-  config.profile = o.profile == "exact" ? Profile::exact : Profile::fast;
+  config.quality = o.profile == "exact" ? Quality::exact() : Quality::fast();
   if (scene.tree != nullptr) config = lod_config(config);
-  config.max_alpha = o.max_alpha;
+  config.quality.max_alpha = o.max_alpha;
   config.first_hit_tau = depth.tau;
   config.sort_order = scene.report.sort_order;
   config.composite = o.composite == "merged" ? Composite::merged : Composite::hard_depth;

@@ -142,14 +142,14 @@ RenderConfig render_config(const Setting& s, SortOrder order) {
   c.outputs = s.sensor == "depth" ? kAlpha | kMedianDepth
               : s.sensor == "rgb" ? kRgb | kAlpha
                                   : kRgb | kAlpha | kMedianDepth;
-  c.profile = s.profile != "exact" ? Profile::fast : Profile::exact;
+  c.quality = s.profile == "exact" ? Quality::exact() : Quality::fast();
   if (s.profile == "lod") c = lod_config(c);
   c.sort_order = order;
   const double number = std::strtod(s.knob_value.c_str(), nullptr);
-  if (s.knob == "alpha_min") c.alpha_min = number;
-  if (s.knob == "transmittance_min") c.transmittance_min = number;
-  if (s.knob == "max_sh_degree") c.max_sh_degree = static_cast<int>(number);
-  if (s.knob == "key_bits") c.key_bits = static_cast<int>(number);
+  if (s.knob == "alpha_min") c.quality.alpha_min = number;
+  if (s.knob == "transmittance_min") c.quality.transmittance_min = number;
+  if (s.knob == "max_sh_degree") c.quality.max_sh_degree = static_cast<int>(number);
+  if (s.knob == "key_bits") c.quality.key_bits = static_cast<int>(number);
   if (s.knob == "response") {
     c.response = s.knob_value == "ray"             ? Response::ray
                  : s.knob_value == "tangent_plane" ? Response::tangent_plane

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 
 namespace gsnav_report {
 

@@ -8,7 +8,7 @@
 
 #include "gsnav/math/functions.hpp"
 #include "gsnav/render.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/prepare.hpp"
 
@@ -52,10 +52,10 @@ std::vector<Row> ledger_rows() {
             "relative, of alpha", "rounding; measured over the exponents that pass the alpha cut"),
       entry("exact", "sort by the float32 key", "key_bits", rounding, "relative, of depth",
             "part of the contract: two Gaussians nearer than a rounding may swap against float64 order"),
-      entry("exact", "alpha cut", "alpha_min", c.alpha_min, "alpha, a Gaussian and pixel",
+      entry("exact", "alpha cut", "alpha_min", c.quality.alpha_min, "alpha, a Gaussian and pixel",
             "part of the contract: a Gaussian is not blended where its alpha is below"),
-      entry("exact", "transmittance stop", "transmittance_min", c.transmittance_min, "alpha, a pixel",
-            "part of the contract: what lies behind a closed pixel is left out"),
+      entry("exact", "transmittance stop", "transmittance_min", c.quality.transmittance_min,
+            "alpha, a pixel", "part of the contract: what lies behind a closed pixel is left out"),
       entry("fast", "exp2 by a cubic", "", exp2_error<Exp2::degree3>(), "relative, of alpha",
             "in place of degree 5; all else as in exact"),
       entry("fast", "SH bands left out", "", kUnseenColor, "colour, a Gaussian",
@@ -65,8 +65,9 @@ std::vector<Row> ledger_rows() {
       entry(
           "lod", "merged Gaussians", "", LodChoice{}.pixels, "pixels, root mean square",
           "what was merged lies no farther from where it is shown, on this sensor; all else as in fast"),
-      entry("lod", "transmittance stop", "transmittance_min", lod_config(c, merged).transmittance_min,
-            "alpha, a pixel", "where at least half of what is in view is merged"),
+      entry("lod", "transmittance stop", "transmittance_min",
+            lod_config(c, merged).quality.transmittance_min, "alpha, a pixel",
+            "where at least half of what is in view is merged"),
   };
   return rows;
 }

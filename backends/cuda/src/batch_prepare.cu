@@ -242,7 +242,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
     BatchInstance instance{};
     instance.camera = seen[i].camera;
     ViewedSet<float>& to = instance.args;
-    to = view_set<float>(camera, set, rules, config.max_sh_degree);
+    to = view_set<float>(camera, set, rules, config.quality.max_sh_degree);
     to.selection.seen = seen[i].bits;
     to.first_rank = seen[i].first_rank;
     to.offsets = {device(static_cast<Vec3d*>(nullptr), at_offsets) + origin,
@@ -297,14 +297,14 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
   args.tiles = static_cast<std::uint32_t>(tiles);
   args.short_lists = !few && has_short_lists(args.grid.count(), multiprocessors);
   args.depth_bins = few ? depth_bins_of(cameras, rules.key_bits, args.tiles) : cuda::DepthBins{};
-  args.log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
+  args.log2_alpha_min = static_cast<float>(std::log2(config.quality.alpha_min));
   args.elliptic = config.response == Response::ewa;
   args.slab = args.cameras < 8 ? 64 : 256;
 
   raster = {};
   raster.grid = args.grid;
   raster.background = vec_cast<float>(config.background);
-  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
+  raster.exp2_method = exp2_method(config.quality);
   raster.images = images.floats;
   raster.rules =
       images.rgb8 != nullptr ? blend_rules<float>(config) : blend_rules<float>(config, images.floats);

@@ -14,7 +14,8 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/avatar/body_bounds.hpp"
 #include "gsnav/detail/frame/cull.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/detail/render/rules.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/skin/skin.hpp"
 
 namespace gsnav {

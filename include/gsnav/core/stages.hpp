@@ -19,7 +19,7 @@
 //       void run(stage::Blend, const RasterArgs<float>& args);   // only this stage, only in float
 //     };
 //
-// A backend's form must leave the bits of the generic form, but where RenderConfig::profile allows
+// A backend's form must leave the bits of the generic form, but where RenderConfig::quality allows
 // another exponential.
 
 namespace gsnav {

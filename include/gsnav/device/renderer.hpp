@@ -7,8 +7,8 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/image/camera.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/render/frames.hpp"
-#include "gsnav/render/render_config.hpp"
 #include "gsnav/sim/scene.hpp"
 
 namespace gsnav {

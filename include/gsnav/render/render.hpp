@@ -21,8 +21,9 @@
 #include "gsnav/detail/render/composite_steps.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
 #include "gsnav/detail/render/render_workspace.hpp"
+#include "gsnav/detail/render/rules.hpp"
 #include "gsnav/detail/render/validate_set.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 
 namespace gsnav {
 
@@ -101,7 +102,7 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   std::size_t first_chunk = 0, first_rank = 0;
   for (std::size_t i = 0; i < sets.size(); ++i) {
     ViewedSet<S>& a = ws.projections[i];
-    a = view_set<S>(camera, sets[i], rules, config.max_sh_degree);
+    a = view_set<S>(camera, sets[i], rules, config.quality.max_sh_degree);
     a.first_chunk = first_chunk;
     a.first_rank = static_cast<std::uint32_t>(first_rank);
     a.offsets.size = origin_count(a.gaussians);
@@ -142,8 +143,10 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   // Distances may round to below the near plane that their z is beyond, but not to half of it.
   const float near_plane =
       ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // of all sets
-  const std::uint32_t base = config.key_bits < 32 ? 0 : std::max(bits_of(0.5f * near_plane), range.low);
-  const Result<std::size_t> ordered = order_visible(backend, ws.visible, base, config.key_bits, range);
+  const std::uint32_t base =
+      config.quality.key_bits < 32 ? 0 : std::max(bits_of(0.5f * near_plane), range.low);
+  const Result<std::size_t> ordered =
+      order_visible(backend, ws.visible, base, config.quality.key_bits, range);
   if (!ordered) return ordered.status();
   const std::size_t visible = ordered.value();
 
@@ -153,7 +156,7 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   bin.order = ws.visible.order.view();
   bin.geometry = ws.geometry.view();
   bin.bounds = ws.bounds.view();
-  bin.log2_alpha_min = static_cast<S>(std::log2(config.alpha_min));
+  bin.log2_alpha_min = static_cast<S>(std::log2(config.quality.alpha_min));
   bin.elliptic = config.response == Response::ewa;
   bin.blocks = visible < 4096 ? 1 : concurrency_of(backend);
   ws.cursors.resize_discard(bin.blocks * bin.grid.count());
@@ -189,7 +192,7 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   raster.perspectives = ws.perspectives.view();
   raster.rules = blend_rules<S>(config, images);
   raster.background = vec_cast<S>(config.background);
-  raster.exp2_method = config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5;
+  raster.exp2_method = exp2_method(config.quality);
   raster.images = images;
   raster.progress = progress;
   raster.mesh = mesh;
@@ -207,9 +210,9 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
 /// Slices that a frame is drawn in, of which so many Gaussians at most may be visible.
 inline int depth_slices_of(const RenderConfig& config, std::size_t candidates,
                            const Camera& camera) noexcept {
-  if (config.response != Response::ewa || config.compat != Compat::none || config.key_bits < 32)
+  if (config.response != Response::ewa || config.compat != Compat::none || config.quality.key_bits < 32)
     return 1;
-  if (config.depth_slices != 0) return config.depth_slices;
+  if (config.tuning.depth_slices != 0) return config.tuning.depth_slices;
   // Where few Gaussians are for a pixel, projecting them is a small part of the frame.
   constexpr std::size_t kFew = 131072;
   const std::size_t pixels =

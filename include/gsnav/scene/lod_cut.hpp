@@ -10,7 +10,7 @@
 
 #include "gsnav/detail/frame/cull.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 
 namespace gsnav {
@@ -54,9 +54,9 @@ struct LodStats {
 /// Gaussians are large and direct rendering is 60 dB and more from the photo: an earlier end would be
 /// what is seen of the error.)
 inline RenderConfig lod_config(RenderConfig config, const LodStats& stats = {}) noexcept {
-  config.profile = Profile::fast;
+  config.quality.exponential = Exponential::fast;
   if (stats.shown > 0 && 2 * stats.merged >= stats.shown) {
-    config.transmittance_min = std::max(config.transmittance_min, 0.001);
+    config.quality.transmittance_min = std::max(config.quality.transmittance_min, 0.001);
   }
   return config;
 }

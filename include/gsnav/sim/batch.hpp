@@ -45,8 +45,7 @@ class BatchSimulator {
                                        EpisodeSource next_episode) {
     for (const auto& scene : scenes) {
       if (scene == nullptr) return {Errc::invalid_argument, "BatchSimulator: a scene is null"};
-      if (Status s = validate(*scene); !s) return s;
-      if (Status s = validate_detail(*scene, detail_choice(config)); !s) return s;
+      if (Status s = validate(*scene, config); !s) return s;
     }
     const std::size_t count = scenes.size();
     return create(
@@ -169,7 +168,7 @@ class BatchSimulator {
     if (scenes_[scene] != nullptr) return {};
     auto held = scene_pointer_(scene);
     if (!held) return held.status();
-    if (Status s = validate_detail(**held, detail_choice(config_)); !s) return s;
+    if (Status s = validate(**held, config_); !s) return s;
     scenes_[scene] =
         std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held), detail_choice(config_));
     render_configs_[scene] = scenes_[scene]->render_config(config_.render);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -12,7 +13,7 @@
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/sensor.hpp"
 #include "gsnav/detail/sim/task.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/sim/scene.hpp"
 #include "gsnav/sim/world.hpp"
 
@@ -21,10 +22,12 @@ namespace gsnav {
 struct SimulatorConfig {
   TaskConfig task{};
   std::vector<SensorSpec> sensors;  ///< none: nothing is rendered
-  RenderConfig render{};            ///< outputs and sort order are chosen by sensors and scene
-  /// Draws the assets by levels of detail: the profile lod (docs/lod.md), whatever render.profile is.
-  /// Each needs its tree (SceneAsset::lod). No hysteresis: an image depends on its camera, not on what
-  /// was seen before.
+  /// How sensors draw. They choose `outputs`, and the scene's first asset chooses `sort_order`: a value
+  /// that is neither the default nor theirs is an error.
+  RenderConfig render{};
+  /// Draws the assets by levels of detail: the profile lod (docs/lod.md), with Exponential::fast
+  /// whatever render.quality has. Each needs its tree (SceneAsset::lod). No hysteresis: an image depends
+  /// on its camera, not on what was seen before.
   std::optional<LodChoice> lod{};
   /// Draws of the assets only what is seen from where a camera is, by the rules of the profile fast
   /// (VisibleSets). Each needs its sets (SceneAsset::visible); from where these know nothing, all is
@@ -43,7 +46,25 @@ inline DetailChoice detail_choice(const SimulatorConfig& config) {
 inline Status validate(const SimulatorConfig& config) {
   if (Status s = validate(config.task); !s) return s;
   if (Status s = validate(config.render); !s) return s;
+  if (config.render.outputs != RenderConfig{}.outputs) {
+    return {Errc::invalid_argument,
+            "SimulatorConfig.render.outputs = " + std::to_string(config.render.outputs) +
+                ": sensors choose the images; leave the default"};
+  }
   return validate(std::span<const SensorSpec>(config.sensors));
+}
+
+/// Whether a simulator may run in `scene` so: what of it is missing, or what of `config` it contradicts.
+inline Status validate(const SimulatorScene& scene, const SimulatorConfig& config) {
+  if (Status s = validate(scene); !s) return s;
+  const SortOrder asked = config.render.sort_order;
+  if (asked != SortOrder::z_depth && !scene.assets.empty() &&
+      asked != scene.assets.front().cloud->sort_order) {
+    return {
+        Errc::invalid_argument,
+        "SimulatorConfig.render.sort_order: SimulatorScene.assets[0] has another; leave the default"};
+  }
+  return validate_detail(scene, detail_choice(config));
 }
 
 /// Where images are.

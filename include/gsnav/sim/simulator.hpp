@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -45,9 +46,8 @@ class Simulator {
   static Result<Simulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene,
                                   SimulatorConfig config, World::BodySource others = {}) {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
-    if (Status s = validate(*scene); !s) return s;
     if (Status s = validate(config); !s) return s;
-    if (Status s = validate_detail(*scene, detail_choice(config)); !s) return s;
+    if (Status s = validate(*scene, config); !s) return s;
     Result<World> world =
         World::create(scene->navmesh, config.task, [scene, others](double t0, double t1, auto& out) {
           append_bodies(*scene, t0, t1, out);

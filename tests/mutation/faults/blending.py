@@ -35,8 +35,8 @@ FAULTS = [
           STACK_TEST, "N43_faint_fog", why="0.7 % above 1/255"),
     fault("alpha_not_limited", "alpha_in_footprint", "return min(alpha, largest);", "return alpha;",
           STACK_TEST, "N41_single_opaque"),
-    fault("exp2_cubic", "draw_projected",
-          "config.profile == Profile::fast ? Exp2::degree3 : Exp2::degree5", "Exp2::degree3",
+    fault("exp2_cubic", "exp2_method",
+          "q.exponential == Exponential::fast ? Exp2::degree3 : Exp2::degree5", "Exp2::degree3",
           "tests/hard_cases/test_response.cpp", "N01_ewa_offaxis_grid", why="off by 1e-4 of alpha"),
     fault("color_summed_in_half", "accumulate", "      this->r = fma(step.weight, c.x, this->r);\n",
           "      this->r = fma(step.weight, c.x, this->r);\n"

@@ -11,8 +11,8 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/image/camera.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/render/render.hpp"
-#include "gsnav/render/render_config.hpp"
 
 namespace gsnav::eval {
 
@@ -59,8 +59,9 @@ struct OracleMesh {
 
 /// Which oracle, by which rules.
 struct OracleConfig {
-  /// Rules of the image. `outputs`, `profile` and `tile_size` mean nothing here: every image is made, in
-  /// float64, without tiles. `response` and `compat` must be the contract's.
+  /// Rules of the image. `outputs`, `tuning` and `quality.exponential` mean nothing here: every image is
+  /// made, in float64, without tiles. `response` and `compat` must be the contract's, and where there is
+  /// a mesh `composite` and `blend_space` too.
   RenderConfig rules{};
   OracleKind kind = OracleKind::contract;
   OracleOrder order = OracleOrder::own;
@@ -148,6 +149,13 @@ inline Status validate(const OracleConfig& c, const Camera& camera) {
   if (c.rules.compat != Compat::none) {
     return {Errc::unsupported,
             "OracleConfig.rules.compat: no kind of oracle has other renderers' rules"};
+  }
+  if (c.mesh != nullptr && c.rules.composite != Composite::merged) {
+    return {Errc::unsupported,
+            "OracleConfig.rules.composite: oracles merge meshes among Gaussians only"};
+  }
+  if (c.mesh != nullptr && c.rules.blend_space != ColorSpace::display) {
+    return {Errc::unsupported, "OracleConfig.rules.blend_space: a mesh's colours are display-referred"};
   }
   const std::size_t pixels =
       static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);

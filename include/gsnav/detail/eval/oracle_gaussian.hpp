@@ -14,7 +14,7 @@
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/similarity.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 
 // A row of a set as oracles see it, in long double and in metres. Only the decoding of stored rows
 // (packed_gaussians.hpp) is shared with the kernels: every formula here is written from the contract.
@@ -118,7 +118,7 @@ struct OracleSet {
         camera(c),
         sort_order(rules.sort_order),
         first_row(first),
-        log2_alpha_min(std::log2(rules.alpha_min)) {
+        log2_alpha_min(std::log2(rules.quality.alpha_min)) {
     const Similarity& a = s.world_from_asset;
     const auto view = [&c](const Real3& v) {
       const auto row = [&](int r) {

@@ -109,8 +109,8 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
   const bool truncated = config.kind != OracleKind::untruncated;
   const double infinity = std::numeric_limits<double>::infinity();
   OracleScene<Model> scene;
-  scene.rules = {truncated ? std::log2(c.alpha_min) : -infinity, c.max_alpha,
-                 truncated ? c.transmittance_min : 0.0, c.first_hit_tau, c.background};
+  scene.rules = {truncated ? std::log2(c.quality.alpha_min) : -infinity, c.quality.max_alpha,
+                 truncated ? c.quality.transmittance_min : 0.0, c.first_hit_tau, c.background};
   scene.rect = oracle_rect(config, camera);
   scene.boxed = config.boxed;
   scene.mesh = config.mesh;
@@ -128,7 +128,8 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
     sets.emplace_back(s, camera, c, total);
     total += s.gaussians.size();
   }
-  std::vector<OracleCandidate> order = oracle_candidates<Model>(backend, sets, c.key_bits, scene);
+  std::vector<OracleCandidate> order =
+      oracle_candidates<Model>(backend, sets, c.quality.key_bits, scene);
   const auto by_code = [](const OracleCandidate& a, const OracleCandidate& b) {
     return a.code != b.code ? a.code < b.code : a.id < b.id;
   };
@@ -164,7 +165,7 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
       Model::make(s, row, scene.log2_cut, record.model, record.box);
       record.box = record.box.intersection(scene.rect);
       record.color =
-          s.color(row, std::min(s.set.gaussians.color.degree, c.max_sh_degree), c.blend_space);
+          s.color(row, std::min(s.set.gaussians.color.degree, c.quality.max_sh_degree), c.blend_space);
       record.id = order[i].id;
       record.rank = rank[i];
     }

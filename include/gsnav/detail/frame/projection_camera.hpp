@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "gsnav/frame/compat.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
@@ -22,14 +23,6 @@ enum class Response : std::uint8_t {
   ewa,            ///< linearised on the image plane at the mean (Zwicker et al. 2001): the contract
   tangent_plane,  ///< linearised on the plane across the mean's direction (Huang et al. 2024)
   ray,            ///< exact: the maximum along the ray
-};
-
-/// Whose rules of footprint, stop and depth a render follows. Everything but `none` is for parity tests.
-enum class Compat : std::uint8_t {
-  none,    ///< the contract
-  inria,   ///< 3-sigma square of 16-pixel tiles, exclusive stop, depth of the centre
-  gsplat,  ///< box of min(3.33, sqrt(2 ln 255 o)) sigma in tiles, exclusive stop, depth of the centre
-  habitat_gs,  ///< inria with opacity compensation of at least 0.005 for every set, near plane 0.2
 };
 
 /// How a float32 key becomes the integer that is sorted: all of its bits, or fewer of them counted from

@@ -11,7 +11,8 @@
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/detail/render/rules.hpp"
+#include "gsnav/render/config.hpp"
 
 namespace gsnav {
 
@@ -39,7 +40,7 @@ requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const 
                                                     const Camera& camera, const RenderConfig& config) {
   CullCounts out;
   const ProjectionRules rules = projection_rules(config);
-  const float log2_alpha_min = static_cast<float>(std::log2(config.alpha_min));
+  const float log2_alpha_min = static_cast<float>(std::log2(config.quality.alpha_min));
   for (const GaussianSet& set : sets) {
     const GaussianRows& gs = set.gaussians;
     ViewedSet<float> args = view_set<float>(camera, set, rules, 0);

@@ -15,7 +15,7 @@
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 
 namespace gsnav {
 

@@ -12,8 +12,8 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/stages.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/render/frames.hpp"
-#include "gsnav/render/render_config.hpp"
 
 namespace gsnav {
 

@@ -81,7 +81,7 @@ struct RowWeightsWorkspace {
 };
 
 /// Draws a set and raises `most` [rows] to the largest part of a pixel's light, alpha times
-/// transmittance, that each Gaussian takes anywhere in the image. By the rules of Profile::fast, those
+/// transmittance, that each Gaussian takes anywhere in the image. By the rules of Quality::fast(), those
 /// of one depth in row order. The same bits for any number of threads. Errors: those of render_camera;
 /// unsupported (a response other than Response::ewa).
 template <Backend B>
@@ -93,10 +93,10 @@ requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspa
                                         " values for " + std::to_string(set.gaussians.size()) + " rows"};
   }
   RenderConfig config;
-  config.profile = Profile::fast;
+  config.quality = Quality::fast();
   config.outputs = kAlpha;
-  config.tile_size = detail::WeighTile::kSide;
-  config.depth_slices = 1;  // the lists of a whole frame are read
+  config.tuning.tile_size = detail::WeighTile::kSide;
+  config.tuning.depth_slices = 1;  // the lists of a whole frame are read
   ws.alpha.resize(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
   FrameImages<float> images;
   images.alpha = ws.alpha.data();

@@ -13,7 +13,7 @@
 #include "gsnav/detail/render/render_workspace.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
 #include "gsnav/detail/scene/scene_profile.hpp"
-#include "gsnav/render/render_config.hpp"
+#include "gsnav/render/config.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 
 namespace gsnav {
@@ -33,14 +33,17 @@ struct FrameLedger {
   double unseen_weight =
       0;         ///< of which no viewpoint saw more than this part of a pixel: sampled, no bound
   LodStats lod;  ///< zeros where no level of detail was asked for
-  std::uint64_t sh_skipped = 0;  ///< SH coefficients in bands that are not read, held or not
-  double sh_error = 0;           ///< that changes no colour by more
-  std::uint64_t sh_bytes = 0;    ///< what bands that are not held would take
-  std::uint64_t clamped = 0;     ///< Gaussians whose log-scale the reader limited to [-20, 20]
-  double sh_storage_error = 0;   ///< largest change of a coefficient by compact storage
-  double alpha_min = 0;          ///< alphas below are not blended
-  double transmittance_min = 0;  ///< light that still comes through where a pixel ends
-  double alpha_error = 0;        ///< relative, of the profile's exponential
+  std::uint64_t sh_skipped = 0;      ///< SH coefficients in bands that are not read, held or not
+  double sh_error = 0;               ///< that changes no colour by more
+  std::uint64_t sh_bytes = 0;        ///< what bands that are not held would take
+  std::uint64_t clamped = 0;         ///< Gaussians whose log-scale the reader limited to [-20, 20]
+  double sh_storage_error = 0;       ///< largest change of a coefficient by compact storage
+  double alpha_min = 0;              ///< alphas below are not blended
+  double transmittance_min = 0;      ///< light that still comes through where a pixel ends
+  double alpha_error = 0;            ///< relative, of the exponential
+  int max_sh_degree = kMaxShDegree;  ///< SH bands above it were left out, whatever a set has
+  int key_bits = 32;                 ///< of the sort key that were compared
+  bool other_rules = false;          ///< response or compat is not the contract's: without a bound
 };
 
 /// Fills a ledger for a frame of `sets` from `camera`, whose counts are `stats`.
@@ -59,10 +62,13 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
   PoolBackend backend(threads_for(rows));
   out.culled = count_culled(backend, sets, camera, config);
   out.visible = stats.visible;
-  out.alpha_min = config.alpha_min;
-  out.transmittance_min = config.transmittance_min;
-  // See Profile: what exp2 by a cubic, and by a quintic, is off by.
-  out.alpha_error = config.profile == Profile::exact ? 4e-7 : 1.0e-4;
+  out.alpha_min = config.quality.alpha_min;
+  out.transmittance_min = config.quality.transmittance_min;
+  // What exp2 by a quintic, and by a cubic, is off by (Exponential).
+  out.alpha_error = config.quality.exponential == Exponential::exact ? 4e-7 : 1.0e-4;
+  out.max_sh_degree = config.quality.max_sh_degree;
+  out.key_bits = config.quality.key_bits;
+  out.other_rules = config.response != Response::ewa || config.compat != Compat::none;
   if (report != nullptr) {
     out.transparent = report->dropped_transparent;
     out.clamped = report->clamped_scales;
@@ -126,6 +132,10 @@ inline std::string ledger_text(const FrameLedger& l) {
     line("converted: the colours of %llu Gaussians to the frame's space", count(l.converted));
   if (l.other_order)
     line("order: %s", "not the one that the scene's file asks for (depth, or distance from the camera)");
+  if (l.key_bits < 32) line("order: by %d bits of each key", l.key_bits);
+  if (l.max_sh_degree < kMaxShDegree) line("left out: SH bands above degree %d", l.max_sh_degree);
+  if (l.other_rules)
+    line("rules: %s", "not the contract's (RenderConfig::response, RenderConfig::compat)");
   if (l.clamped != 0) line("clamped: %llu log-scales to [-20, 20]", count(l.clamped));
   if (l.sh_storage_error > 0) line("quantised: SH coefficients, by %.2g at most", l.sh_storage_error);
   line("cut: alphas below %.4f, a Gaussian and pixel; %.4f of the light behind a closed pixel",

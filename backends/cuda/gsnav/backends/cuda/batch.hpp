@@ -52,7 +52,7 @@ struct BatchStats {
 ///     ...                                                      // work on cuda.stream() may follow
 ///     batch.finish().throw_if_error();                         // images are there, and whole
 ///
-/// `RenderConfig::outputs` and `tile_size` are not read: pointers say which images, and
+/// `RenderConfig::outputs` and `RenderConfig::tuning` are not read: pointers say which images, and
 /// tiles are of 8 or 16 pixels, as the number of cameras has it.
 ///
 /// Meshes are drawn into a layer for each camera, over which the batch is then blended. As everywhere,

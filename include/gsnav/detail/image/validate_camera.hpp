@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/image/camera.hpp"
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/mat.hpp"
+
+namespace gsnav {
+
+/// Largest image side; tile counts and pixel offsets stay well inside their types.
+inline constexpr int kMaxImageSide = 16384;
+
+/// Names the field that cannot be, or ok.
+inline Status validate(const Camera& c) {
+  const auto bad = [](const char* field, const std::string& value, const char* rule) {
+    return Status(Errc::invalid_argument, std::string("Camera.") + field + " = " + value + ": " + rule);
+  };
+  if (c.width < 1 || c.width > kMaxImageSide) {
+    return bad("width", std::to_string(c.width), "must be in [1, 16384]");
+  }
+  if (c.height < 1 || c.height > kMaxImageSide) {
+    return bad("height", std::to_string(c.height), "must be in [1, 16384]");
+  }
+  if (!(c.fx > 0 && is_finite(c.fx))) return bad("fx", std::to_string(c.fx), "must be positive");
+  if (!(c.fy > 0 && is_finite(c.fy))) return bad("fy", std::to_string(c.fy), "must be positive");
+  if (!is_finite(c.cx)) return bad("cx", std::to_string(c.cx), "must be finite");
+  if (!is_finite(c.cy)) return bad("cy", std::to_string(c.cy), "must be finite");
+  if (!(c.near_plane > 0 && is_finite(c.near_plane))) {
+    return bad("near_plane", std::to_string(c.near_plane), "must be positive");
+  }
+  if (!(c.near_sigma >= 0 && is_finite(c.near_sigma))) {
+    return bad("near_sigma", std::to_string(c.near_sigma), "must be >= 0");
+  }
+  if (!is_finite(c.viewmat.translation)) {
+    return bad("viewmat", "a translation that is not finite", "must be finite");
+  }
+  const Mat3d gram = c.viewmat.linear * transpose(c.viewmat.linear);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      if (!(abs(gram(i, j) - (i == j ? 1.0 : 0.0)) < 1e-3)) {
+        return bad("viewmat", "a linear part that is no rotation", "must be rigid (within 1e-3)");
+      }
+    }
+  }
+  const auto& m = c.viewmat.linear;
+  if (dot(m.row[0], cross(m.row[1], m.row[2])) < 0) {
+    return bad("viewmat", "a linear part with determinant -1",
+               "must not mirror (from OpenGL's axes negate both y and z)");
+  }
+  return {};
+}
+
+}  // namespace gsnav

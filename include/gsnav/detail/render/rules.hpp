@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "gsnav/core/backend.hpp"
+#include "gsnav/detail/frame/blend.hpp"
+#include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/math/functions.hpp"
+#include "gsnav/render/config.hpp"
+
+// What the stages of a frame read of its RenderConfig.
+
+namespace gsnav {
+
+/// Side of the tiles that an image is rendered in. On a processor large images have tiles of 32 pixels:
+/// their footprints are large too, and take fewer of those.
+template <Backend B>
+int tile_size_of(const RenderConfig& c, int width, int height) noexcept {
+  if (c.tuning.tile_size != 0) return c.tuning.tile_size;
+  constexpr std::int64_t kLarge = 1000000;
+  const bool large = std::int64_t{width} * height >= kLarge;
+  return is_host_backend<B> && large && c.compat == Compat::none ? 32 : 16;
+}
+
+/// The part that projection reads.
+inline ProjectionRules projection_rules(const RenderConfig& c) noexcept {
+  return {c.sort_order, c.response, c.compat, c.quality.alpha_min, c.quality.key_bits};
+}
+
+inline Exp2 exp2_method(const Quality& q) noexcept {
+  return q.exponential == Exponential::fast ? Exp2::degree3 : Exp2::degree5;
+}
+
+namespace detail {
+
+/// Changes rules of blending to those of another renderer.
+template <class S>
+void follow(Compat compat, BlendRules<S>& r) noexcept {
+  r.exclusive_stop = compat != Compat::none;
+  // gsplat stops at T <= T_min where INRIA stops at T < T_min.
+  if (compat == Compat::gsplat) r.transmittance_min = std::nextafter(r.transmittance_min, S(1));
+  if (compat == Compat::habitat_gs) r.return_alpha = S(0.01);
+}
+
+}  // namespace detail
+
+/// The part that blending reads, rounded to the scalar of the kernel.
+template <class S>
+BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
+  BlendRules<S> r;
+  r.max_alpha = static_cast<S>(c.quality.max_alpha);
+  r.transmittance_min = static_cast<S>(c.quality.transmittance_min);
+  r.first_hit_tau = static_cast<S>(c.first_hit_tau);
+  // What float's exp2 reaches.
+  r.log2_alpha_min = static_cast<S>(std::max(std::log2(c.quality.alpha_min), -126.0));
+  detail::follow(c.compat, r);
+  return r;
+}
+
+/// The same for a frame of these images: where no colour and no alpha are asked for, and of depths only
+/// those that a transmittance decides, a pixel is closed once it has them. The images keep their bits.
+template <class S>
+BlendRules<S> blend_rules(const RenderConfig& c, const FrameImages<S>& images) noexcept {
+  BlendRules<S> r = blend_rules<S>(c);
+  const bool sums = images.rgb != nullptr || images.alpha != nullptr ||
+                    images.expected_depth != nullptr || images.accumulated_depth != nullptr;
+  if (sums || c.compat != Compat::none) return r;
+  S needed(1);
+  if (images.median_depth != nullptr) needed = S(0.5);
+  if (images.first_hit_depth != nullptr) needed = std::min(needed, S(1) - r.first_hit_tau);
+  r.transmittance_min = std::max(r.transmittance_min, needed);
+  return r;
+}
+
+}  // namespace gsnav
