@@ -15,8 +15,8 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/mesh/mesh.hpp"
+#include "gsnav/detail/scene/triangle_mesh.hpp"
 #include "gsnav/math/functions.hpp"
-#include "gsnav/scene/triangle_mesh.hpp"
 
 namespace gsnav {
 

@@ -6,7 +6,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/io/read_limits.hpp"
 #include "gsnav/detail/scene/textured_scene.hpp"
-#include "gsnav/scene/triangle_mesh.hpp"
+#include "gsnav/detail/scene/triangle_mesh.hpp"
 
 namespace gsnav::io {
 

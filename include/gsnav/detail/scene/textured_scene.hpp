@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "gsnav/detail/scene/surface_material.hpp"
+#include "gsnav/detail/scene/triangle_mesh.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
-#include "gsnav/scene/triangle_mesh.hpp"
 
 namespace gsnav {
 
