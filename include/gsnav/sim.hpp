@@ -4,12 +4,13 @@
 // The simulator: sensors, actions, episodes, metrics and batches. Add a backend (gsnav/backends/...);
 // link gsnav::sim.
 
+#include "gsnav/detail/sim/batch_scenes.hpp"
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/body_cache.hpp"
 #include "gsnav/detail/sim/cube_map.hpp"
 #include "gsnav/detail/sim/episode.hpp"
-#include "gsnav/detail/sim/frame_batch.hpp"
 #include "gsnav/detail/sim/greedy_follower.hpp"
+#include "gsnav/detail/sim/image_renderer.hpp"
 #include "gsnav/detail/sim/mesh_normals.hpp"
 #include "gsnav/detail/sim/noise.hpp"
 #include "gsnav/detail/sim/proximity.hpp"
