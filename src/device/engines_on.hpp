@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <span>
@@ -8,8 +9,7 @@
 #include <vector>
 
 #include "engines.hpp"
-#include "gsnav/detail/sim/frame_batch.hpp"
-#include "gsnav/detail/sim/scene_detail.hpp"
+#include "gsnav/detail/sim/image_renderer.hpp"
 #include "gsnav/detail/sim/scene_on_backend.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "gsnav/sim/simulator.hpp"
@@ -25,8 +25,7 @@ class RendererOn final : public RendererEngine {
              const RenderOptions& options)
       : backend_(std::move(backend)),
         scene_(*backend_, std::move(scene), options.detail),
-        frames_(*backend_),
-        chunks_(*backend_) {
+        images_(*backend_) {
     set_config(options.render);
   }
 
@@ -37,32 +36,23 @@ class RendererOn final : public RendererEngine {
     scene_.make_slots(1);
     if (Status s = scene_.prepare(0, time, cameras, config_); !s) return s;
     if (Status s = scene_.pose_prepared(0); !s) return s;
-    const std::span<const GaussianSet> sets = scene_.sets(0);
-    cuts_.resize(scene_.detail() != nullptr ? cameras.size() : 0);
-    for (std::size_t c = 0; c < cuts_.size(); ++c) cuts_[c].select(*scene_.detail(), sets, cameras[c]);
-    chunks_.place(cuts_);
-    jobs_.clear();
+    requests_.clear();
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      const bool cut = c < cuts_.size();
-      jobs_.push_back({cut ? cuts_[c].sets() : sets, &cameras[c],
-                       cut ? &cuts_[c].rules(config_) : &config_, Renderer<float, B>::images_of(out, c),
-                       scene_.meshes()});
+      requests_.push_back({{scene_.sets(0), &cameras[c], &config_, Renderer<float, B>::images_of(out, c),
+                            scene_.meshes()},
+                           scene_.detail()});
     }
-    if constexpr (is_host_backend<B>) {
-      return frames_.renderer().render(jobs_, out.stats);
-    } else {
-      return frames_.render(jobs_);
-    }
+    if (Status s = images_.render(requests_, ImageMemory::host); !s) return s;
+    std::copy(images_.stats().begin(), images_.stats().end(), out.stats.begin());
+    return {};
   }
 
  private:
   std::unique_ptr<B> backend_;
   SceneOnBackend<B> scene_;
-  FrameBatch<B> frames_;
-  ChosenChunks<B> chunks_;
+  ImageRenderer<B> images_;
   RenderConfig config_;
-  std::vector<DetailSets> cuts_;
-  std::vector<FrameJob<float>> jobs_;
+  std::vector<ImageRequest> requests_;
 };
 
 template <class B>

@@ -208,6 +208,7 @@ TEST_CASE(
     start(renderer, 0);
     const Camera huge = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 16384, 16384, 70);
     const std::vector<BatchCamera> too_many(2048, BatchCamera{huge, {}});
+    CHECK(renderer.capacity(sets, too_many) == 2047);  // 2^20 tiles each
     const Status refused = renderer.render(sets, too_many, {});
     CHECK(refused.code() == Errc::unsupported);
     CHECK(refused.message().find("tiles") != std::string::npos);
@@ -220,6 +221,35 @@ TEST_CASE(
     CHECK(renderer.finish().ok());
     check_same(image(1), expected);
   }
+}
+
+TEST_CASE("cuda batch: how many cameras a call can draw is told beforehand") {
+  if (no_gpu("cuda batch capacity")) return;
+  CudaBackend cuda;
+  const GaussianArrays<CudaBackend> arrays(cuda, random_cloud(5, {.count = 3000}));
+  const std::vector<GaussianSet> sets{arrays.set()};
+  CudaBatchRenderer renderer(cuda);
+  CHECK(renderer.capacity(sets, {}) == 0);
+  CHECK(renderer.capacity(sets, batch_of(ring(12, 64, 48))) == 12);
+  const std::vector<BatchCamera> many(70000, batch_of(ring(1, 64, 48)).front());
+  CHECK(renderer.capacity(sets, many) == 65535);
+  Buffer<float, CudaBackend> images(cuda);
+  images.resize_discard(12 * 4 * 64 * 48);
+  draw_into(cuda, renderer, images.data(), sets, ring(12, 64, 48));
+  CHECK(renderer.capacity(sets, batch_of(ring(12, 64, 48))) == 12);
+  // As much as each of the twelve took does not fit 65535 times into 6 GiB.
+  if (is_emulated()) CHECK(renderer.capacity(sets, many) < 65535);
+  // 2^31 parts of chunks, for each camera's own set.
+  GaussianSet wide = sets.front();
+  wide.gaussians.shape.size = std::size_t{1} << 31;
+  const std::vector<GaussianSet> own(1000, wide);
+  std::vector<std::uint32_t> numbers(own.size());
+  std::vector<BatchCamera> each(own.size(), many.front());
+  for (std::uint32_t i = 0; i < own.size(); ++i) {
+    numbers[i] = i;
+    each[i].sets = std::span(numbers).subspan(i, 1);
+  }
+  CHECK(CudaBatchRenderer(cuda).capacity(own, each) == 63);
 }
 #else
 TEST_CASE("cuda batch calls") { std::printf("SKIP: cuda batch calls: built without CUDA\n"); }

@@ -120,6 +120,10 @@ TEST_CASE("cuda batch: meshes alone, meshes that come and go, and rules that bat
     to.floats.rgb = rgb.data();
     const std::vector<GaussianSet> sets{arrays.set()};
     const std::vector<BatchCamera> one{{cameras[0], {}, all[0]}};
+    CHECK(CudaBatchRenderer::supports(config, sets).ok());
+    CHECK(CudaBatchRenderer::supports({}, sets, all[0]).ok());
+    CHECK(CudaBatchRenderer::supports(config, sets, all[0]).message().find("RenderConfig.") !=
+          std::string::npos);
     const Status s = other.render(sets, one, to);
     CHECK(s.code() == Errc::unsupported);
     CHECK(s.message().find("cameras[0]: meshes") != std::string::npos);

@@ -24,7 +24,8 @@ using namespace gsnav_test;
 namespace {
 
 int batch_calls = 0;
-std::size_t most_sets = 0, most_cameras = ~std::size_t{0};  // drawn by a call; accepted by one
+std::size_t most_sets = 0, most_drawn = 0;   // sets and cameras of a call
+std::size_t most_cameras = ~std::size_t{0};  // that one accepts
 
 /// One camera after the other, as CudaBatchRenderer is asked for batches of them.
 class BatchOfToys {
@@ -38,12 +39,20 @@ class BatchOfToys {
   struct images_type {
     FrameImages<float> floats;
   };
+  static Status supports(const RenderConfig&, std::span<const GaussianSet>, const MeshFrame& meshes) {
+    if (most_cameras == 0) return {Errc::unsupported, "nothing"};
+    return meshes.instances.empty() ? Status() : Status(Errc::unsupported, "no meshes");
+  }
+  std::size_t capacity(std::span<const GaussianSet>, std::span<const camera_type> cameras) const {
+    return std::min(most_cameras, cameras.size());
+  }
   explicit BatchOfToys(ToyBackend& backend, const RenderConfig& config)
       : backend_(&backend), workspace_(backend), config_(config) {}
   Status render(std::span<const GaussianSet> sets, std::span<const camera_type> cameras,
                 const images_type& images) {
     ++batch_calls;
     most_sets = std::max(most_sets, sets.size());
+    most_drawn = std::max(most_drawn, cameras.size());
     if (cameras.size() > most_cameras) return {Errc::unsupported, "draw fewer cameras a call"};
     for (const camera_type& c : cameras) {
       if (!c.meshes.instances.empty()) return {Errc::unsupported, "no meshes"};
@@ -259,7 +268,7 @@ TEST_CASE("depths are cut at the far plane as doubles compare, whether or not a 
   }
 }
 
-TEST_CASE("a batch that is too large is drawn in halves, what it cannot draw one by one") {
+TEST_CASE("a batch is drawn by as many cameras as a call has room for, what it does not support alone") {
   BatchConfig config;
   config.sensors = rgbd_sensors(8, 8);
   SerialBackend serial;
@@ -267,9 +276,13 @@ TEST_CASE("a batch that is too large is drawn in halves, what it cannot draw one
   auto expected = make_batch_simulator(serial, two_scenes(), config, 7, spread).value();
   auto sim = make_batch_simulator(batching, two_scenes(), config, 7, spread).value();
   most_cameras = 2;
+  most_drawn = 0;
   CHECK(images_of(sim.reset().value().images) == images_of(expected.reset().value().images));
+  CHECK(most_drawn == 2);
   most_cameras = 0;
+  const int calls = batch_calls;
   CHECK(images_of(sim.reset().value().images) == images_of(expected.reset().value().images));
+  CHECK(batch_calls == calls);
   most_cameras = ~std::size_t{0};
 }
 

@@ -207,6 +207,14 @@ cudaError_t cudaDeviceSynchronize() {
   return cudaSuccess;
 }
 
+cudaError_t cudaMemGetInfo(std::size_t* free, std::size_t* total) {
+  Device& d = device();
+  const std::lock_guard lock(d.mutex);
+  *free = kDeviceBytes - d.used;
+  *total = kDeviceBytes;
+  return cudaSuccess;
+}
+
 cudaError_t cudaMallocBytes(void** p, std::size_t bytes) {
   return allocate(p, bytes, &Device::blocks, true);
 }

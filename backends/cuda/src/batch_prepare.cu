@@ -10,80 +10,6 @@
 
 namespace gsnav {
 
-namespace cuda {
-
-Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
-                   const RenderConfig& config) {
-  if (cameras.empty()) return {Errc::invalid_argument, "CudaBatchRenderer: no camera to render from"};
-  if (cameras.size() > 65535) {
-    return {Errc::unsupported,
-            "CudaBatchRenderer: " + std::to_string(cameras.size()) + " cameras: at most 65535 a call"};
-  }
-  for (std::size_t i = 0; i < sets.size(); ++i) {
-    if (Status s = validate(sets[i]); !s) {
-      return {s.code(), "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + s.message()};
-    }
-    const auto unsupported = [&](const char* what) {
-      return Status(Errc::unsupported, "CudaBatchRenderer: sets[" + std::to_string(i) + "]: " + what);
-    };
-    if (sets[i].color_space != config.blend_space)
-      return unsupported("color_space is not the frame's blend_space");
-  }
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    const auto bad = [&](Errc code, const std::string& what) {
-      return Status(code, "CudaBatchRenderer: cameras[" + std::to_string(c) + "]: " + what);
-    };
-    const Camera& camera = cameras[c].camera;
-    if (Status s = validate(camera); !s) return bad(s.code(), s.message());
-    if (camera.width != cameras[0].camera.width || camera.height != cameras[0].camera.height) {
-      return bad(Errc::invalid_argument, "its size is not that of cameras[0]; a batch has one size");
-    }
-    if (!cameras[c].meshes.instances.empty() &&
-        (config.composite != Composite::merged || config.response != Response::ewa ||
-         config.compat != Compat::none)) {
-      return bad(Errc::unsupported,
-                 "meshes: only with Composite::merged, Response::ewa and Compat::none");
-    }
-    if (any_seen_through(cameras[c].meshes.instances)) {
-      return bad(Errc::unsupported,
-                 "meshes that are seen through (MeshAlpha::blend): draw them one camera at a time");
-    }
-    std::uint64_t gaussians = 0;
-    const auto count = [&](std::size_t s) { gaussians += sets[s].gaussians.size(); };
-    for (const std::uint32_t s : cameras[c].sets) {
-      if (s >= sets.size()) {
-        return bad(Errc::invalid_argument, "sets has " + std::to_string(s) + ", but there are " +
-                                               std::to_string(sets.size()) + " sets");
-      }
-      count(s);
-    }
-    if (cameras[c].sets.empty()) {
-      for (std::size_t s = 0; s < sets.size(); ++s) count(s);
-    }
-    const std::span<const View<const std::uint32_t>> seen = cameras[c].seen;
-    const std::size_t listed = cameras[c].sets.empty() ? sets.size() : cameras[c].sets.size();
-    if (!seen.empty() && seen.size() != listed) {
-      return bad(Errc::invalid_argument, "seen has " + std::to_string(seen.size()) + " entries for " +
-                                             std::to_string(listed) + " sets");
-    }
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      const std::size_t chunks =
-          sets[cameras[c].sets.empty() ? i : cameras[c].sets[i]].gaussians.chunk_count();
-      if (!seen[i].empty() && !seen_may_have(seen[i].size, chunks)) {
-        return bad(Errc::invalid_argument, "seen[" + std::to_string(i) + "] has " +
-                                               std::to_string(seen[i].size) + " words for " +
-                                               std::to_string(chunks) + " chunks");
-      }
-    }
-    if (gaussians > std::numeric_limits<std::uint32_t>::max()) {
-      return bad(Errc::unsupported, "it sees more than 2^32 Gaussians");
-    }
-  }
-  return {};
-}
-
-}  // namespace cuda
-
 namespace {
 
 using cuda::BatchInstance;
@@ -189,10 +115,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
       ++set_begins[s + 1];
       origins += origin_count(sets[s].gaussians);
     };
-    for (const std::uint32_t s : cameras[c].sets) see(s);
-    if (cameras[c].sets.empty()) {
-      for (std::uint32_t s = 0; s < sets.size(); ++s) see(s);
-    }
+    cuda::for_each_set(cameras[c], sets.size(), see);
   }
   for (std::size_t s = 0; s < sets.size(); ++s) set_begins[s + 1] += set_begins[s];
   cursors.assign(set_begins.begin(), set_begins.end() - 1);
@@ -270,8 +193,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
     item_capacity += std::uint64_t{u.words()} * u.chunks * cuda::kPartsPerChunk;
     args.units += u.units();
   }
-  // A warp of projection has half of an item.
-  if (item_capacity > std::numeric_limits<std::uint32_t>::max() / 2) {
+  if (item_capacity > cuda::kMostItems) {
     return {Errc::unsupported,
             "CudaBatchRenderer: " + std::to_string(item_capacity) +
                 " parts of chunks times words of cameras in one batch: draw fewer cameras a call"};
@@ -292,7 +214,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
   const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, multiprocessors);
   if (few) args.grid = TileGrid::of(width, height, cuda::kSmallTile);
   const std::uint64_t tiles = args.cameras * std::uint64_t{args.grid.count()};
-  if (tiles > 0x7fffffffu)
+  if (tiles > cuda::kMostTiles)
     return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
   args.tiles = static_cast<std::uint32_t>(tiles);
   args.short_lists = !few && has_short_lists(args.grid.count(), multiprocessors);

@@ -233,6 +233,7 @@ Status CudaBatchRenderer::finish() {
     const bool had_room = s.fit_capacities(flight);
     const bool last = s.finished + 1 == s.calls;
     if (last && s.prepared) s.fit_room(n);
+    s.taken = {flight.key.args.cameras, n.slots, n.pairs};
     s.stats.tile_intersections = n.pairs;
     s.stats.parts_read = n.items;
     s.stats.meshes = {flight.mesh_triangles, of_meshes.not_finite, of_meshes.drawn, 0};

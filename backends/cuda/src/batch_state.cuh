@@ -136,6 +136,17 @@ struct BatchMeshes {
               input_bytes = 0;
 };
 
+// Of one call: grids of launches; places of items, of which a warp of projection has half.
+inline constexpr std::size_t kMostCameras = 65535, kMostTiles = 0x7fffffff, kMostItems = 0x7fffffff;
+
+/// Calls f with the index of each set that a camera sees, in order.
+template <class F>
+void for_each_set(const BatchCamera& camera, std::size_t sets, const F& f) {
+  for (const std::uint32_t s : camera.sets) f(s);
+  if (!camera.sets.empty()) return;
+  for (std::uint32_t s = 0; s < sets; ++s) f(s);
+}
+
 /// Names the camera, set or field that cannot be, or ok.
 Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                    const RenderConfig& config);
@@ -197,6 +208,9 @@ struct CudaBatchRenderer::State {
   /// What meshes the prepared cameras see, into the same call's pinned memory.
   Status place_meshes(std::span<const BatchCamera> cameras);
   std::uint32_t room_for(std::uint64_t pairs) const;
+  /// How many of so many cameras counts of 32 bits and the device's free memory have room for, where
+  /// each takes what those of the last call took.
+  std::size_t measured_capacity(std::size_t cameras) const;
   /// What lists of the next call have room for, by what those of the last needed.
   void fit_room(const cuda::BatchCounters& n);
   void size_scratch();
@@ -246,6 +260,9 @@ struct CudaBatchRenderer::State {
                     0;  ///< of lists that are not counted first; the tiles that it was chosen for
   std::uint32_t triangle_capacity = 0;  ///< of meshes, a wave
   BatchStats stats;
+  struct {
+    std::uint64_t cameras = 0, slots = 0, pairs = 0;
+  } taken;  ///< by the last call whose counts have been looked at
 
   // Reused by every call.
   struct Seen {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <functional>
 #include <memory>
 #include <span>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "gsnav/detail/core/thread_pool.hpp"
+#include "gsnav/detail/sim/batch_scenes.hpp"
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
 #include "gsnav/detail/sim/team.hpp"
@@ -76,7 +76,7 @@ class BatchSimulator {
   Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) {
     if (environments() == 0) return moved_away();
     if (Status s = worlds_.reset(parallel(), mask); !s) return s;
-    let_scenes_go();
+    free_scenes();
     return observe(mask.empty());
   }
 
@@ -89,16 +89,12 @@ class BatchSimulator {
 
   /// Renders made so far, and how many times an avatar was skinned for them.
   std::size_t render_count() const noexcept { return rig_.render_count(); }
-  std::size_t pose_count() const noexcept {
-    std::size_t sum = left_poses_;
-    for (const auto& s : scenes_) sum += s != nullptr ? s->pose_count() : 0;
-    return sum;
-  }
+  std::size_t pose_count() const noexcept { return scenes_.pose_count(); }
   void set_rendering(bool on) noexcept { config_.rendering = on; }
 
  private:
   using ScenePointer = std::shared_ptr<const SimulatorScene>;
-  using SceneOf = std::function<Result<ScenePointer>(std::size_t)>;
+  using SceneOf = typename BatchScenes<B>::SceneOf;
 
   static Result<BatchSimulator> create(B& backend, SceneOf scene_of,
                                        std::function<void(std::size_t)> prefetch, std::size_t scenes,
@@ -135,7 +131,14 @@ class BatchSimulator {
     auto worlds = BatchWorld::create(std::move(places), config.task, config.auto_reset, environments,
                                      std::move(next_episode));
     if (!worlds) return worlds.status();
-    return BatchSimulator(backend, std::move(*worlds), std::move(config), std::move(scene_of), scenes,
+    // Scenes of a library are known only when they come.
+    SceneOf checked = [scene_of, config](std::size_t i) -> Result<ScenePointer> {
+      auto scene = scene_of(i);
+      if (!scene) return scene;
+      if (Status s = validate(**scene, config); !s) return s;
+      return scene;
+    };
+    return BatchSimulator(backend, std::move(*worlds), std::move(config), std::move(checked), scenes,
                           scenes_leave);
   }
 
@@ -145,10 +148,10 @@ class BatchSimulator {
         worlds_(std::move(worlds)),
         config_(std::move(config)),
         rig_(backend, config_.sensors),
-        scene_pointer_(std::move(scene_of)),
         scenes_leave_(scenes_leave),
-        scenes_(scenes),
-        render_configs_(scenes) {
+        scenes_(backend, std::move(scene_of), scenes, config_.render, detail_choice(config_),
+                config_.pose_slots),
+        in_use_(scenes) {
     for (const SensorSpec& s : config_.sensors) {
       images_.push_back({s.uuid, s.kind, 0, s.resolution[0], s.resolution[1], channels_of(s.kind), {}});
     }
@@ -163,27 +166,12 @@ class BatchSimulator {
   static Status moved_away() {
     return {Errc::invalid_argument, "this BatchSimulator was moved from: use what it became"};
   }
-  /// Puts a scene that environments are in into the backend's memory, where it is not there yet.
-  Status place_scene(std::size_t scene) {
-    if (scenes_[scene] != nullptr) return {};
-    auto held = scene_pointer_(scene);
-    if (!held) return held.status();
-    if (Status s = validate(**held, config_); !s) return s;
-    scenes_[scene] =
-        std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held), detail_choice(config_));
-    render_configs_[scene] = scenes_[scene]->render_config(config_.render);
-    return {};
-  }
-  /// Scenes that no environment is in any more.
-  void let_scenes_go() {
+  /// Frees scenes that no environment is in any more.
+  void free_scenes() {
     if (!scenes_leave_) return;
-    in_use_.assign(scenes_.size(), 0);
+    std::fill(in_use_.begin(), in_use_.end(), std::uint8_t{0});
     for (std::size_t e = 0; e < environments(); ++e) in_use_[worlds_.scene_of(e)] = 1;
-    for (std::size_t s = 0; s < scenes_.size(); ++s) {
-      if (in_use_[s] != 0 || scenes_[s] == nullptr) continue;
-      left_poses_ += scenes_[s]->pose_count();
-      scenes_[s].reset();
-    }
+    scenes_.keep(in_use_);
   }
 
   auto parallel() noexcept {
@@ -205,7 +193,7 @@ class BatchSimulator {
     if (environments() == 0) return moved_away();
     const auto draw_final = [this] { return observe_finished(); };
     if (Status s = worlds_.step(parallel(), actions, draw_final); !s) return s;
-    let_scenes_go();
+    free_scenes();
     return observe(false);
   }
 
@@ -217,11 +205,11 @@ class BatchSimulator {
       return out;
     }
     rig_.resize(buffers_, environments());
-    lookers_.clear();
+    views_.clear();
     // Where the last call drew nothing, what has not moved since has no image either.
     const bool every = all || !std::exchange(drawn_, false);
     for (std::size_t e = 0; e < environments(); ++e) {
-      if (every || worlds_.moved(e)) lookers_.push_back({e, e});
+      if (every || worlds_.moved(e)) add_view(e, e);
     }
     if (Status s = draw(buffers_); !s) return s;
     drawn_ = true;
@@ -237,8 +225,8 @@ class BatchSimulator {
     if (!config_.rendering || images_.empty()) return {};
     const std::span<const std::size_t> finished = worlds_.info().finished;
     rig_.resize(final_buffers_, finished.size());
-    lookers_.clear();
-    for (std::size_t i = 0; i < finished.size(); ++i) lookers_.push_back({finished[i], i});
+    views_.clear();
+    for (std::size_t i = 0; i < finished.size(); ++i) add_view(finished[i], i);
     if (Status s = draw(final_buffers_); !s) return s;
     fill(final_images_, final_buffers_);
     return {};
@@ -247,78 +235,26 @@ class BatchSimulator {
   void fill(std::vector<BatchObservation>& images, const SensorImages<B>& buffers) const {
     for (std::size_t i = 0; i < images.size(); ++i) {
       images[i].environments = buffers.rows;
-      images[i].data = rig_.all(buffers, i);
-      images[i].on_backend = rig_.all_on_backend(buffers, i);
+      images[i].data = buffers.all(rig_.plan(), i);
+      images[i].on_backend = buffers.all_on_backend(rig_.plan(), i);
     }
   }
 
-  struct Looker {
-    std::size_t environment, row;
-  };
-
-  /// Draws `lookers_` into their rows: as many times of the scenes at once as there are slots for.
+  /// What environment e sees, into a row of the images.
+  void add_view(std::size_t e, std::size_t row) {
+    const AgentPose& agent = world(e).agent();
+    SceneView& v = views_.emplace_back();
+    v.scene = worlds_.scene_of(e);
+    v.time = world(e).time();
+    v.view.base = agent.position;
+    v.view.rotation = agent.rotation();
+    v.view.pitch = agent.pitch;
+    v.view.noise = noise_seed(config_.seed + e, world(e).state());
+    v.view.row = row;
+  }
   Status draw(SensorImages<B>& images) {
-    for (const Looker& l : lookers_) {
-      if (Status s = place_scene(worlds_.scene_of(l.environment)); !s) return s;
-    }
-    // Where nobody walks all times are one.
-    const auto key = [this](const Looker& l) {
-      const std::size_t scene = worlds_.scene_of(l.environment);
-      return std::pair(scene,
-                       scenes_[scene]->scene().avatars.empty() ? 0.0 : world(l.environment).time());
-    };
-    std::stable_sort(lookers_.begin(), lookers_.end(),
-                     [&](const Looker& a, const Looker& b) { return key(a) < key(b); });
-    posed_.clear();
-    std::vector<std::size_t> used(scenes_.size());  // slots of each scene
-    for (std::size_t first = 0, last = 0; first < lookers_.size(); first = last) {
-      const auto here = key(lookers_[first]);
-      while (last < lookers_.size() && key(lookers_[last]) == here) ++last;
-      posed_.push_back({first, last, here.first, used[here.first]++, {}, {}});
-      if (posed_.size() < config_.pose_slots && last < lookers_.size()) continue;
-      if (Status s = draw_posed(images); !s) return s;
-      posed_.clear();
-      std::fill(used.begin(), used.end(), std::size_t{0});
-    }
-    return {};
-  }
-
-  /// Lookers [first, last) share a scene and a time, and so a slot that the scene's avatars are posed
-  /// in.
-  struct Posed {
-    std::size_t first, last, scene, slot;
-    std::vector<Camera> cameras;
-    Status status;
-  };
-
-  /// Draws posed_ by one batch. Joints are found by all threads, Gaussians skinned by the backend.
-  Status draw_posed(SensorImages<B>& images) {
-    for (const Posed& p : posed_) scenes_[p.scene]->make_slots(p.slot + 1);
-    parallel()(posed_.size(), [this](std::size_t i) {
-      Posed& p = posed_[i];
-      p.status = detail::guarded([&] {
-        for (std::size_t l = p.first; l < p.last; ++l) {
-          const AgentPose& agent = world(lookers_[l].environment).agent();
-          rig_.append_cameras(agent.position, agent.rotation(), agent.pitch, p.cameras);
-        }
-        const double time = world(lookers_[p.first].environment).time();
-        return scenes_[p.scene]->prepare(p.slot, time, p.cameras, render_configs_[p.scene]);
-      });
-    });
-    views_.clear();
-    for (const Posed& p : posed_) {
-      if (!p.status) return p.status;
-      SceneOnBackend<B>& scene = *scenes_[p.scene];
-      if (Status s = scene.pose_prepared(p.slot); !s) return s;
-      for (std::size_t i = p.first; i < p.last; ++i) {
-        const std::size_t e = lookers_[i].environment;
-        const AgentPose& agent = world(e).agent();
-        views_.push_back({agent.position, agent.rotation(), agent.pitch,
-                          noise_seed(config_.seed + e, world(e).state()), scene.sets(p.slot),
-                          &render_configs_[p.scene], lookers_[i].row, scene.meshes(), scene.detail()});
-      }
-    }
-    return rig_.render(views_, images);
+    return scenes_.draw(views_, rig_.plan(), parallel(),
+                        [&](std::span<const SensorView> views) { return rig_.render(views, images); });
   }
 
   static constexpr std::size_t kPieces = 64;
@@ -327,19 +263,14 @@ class BatchSimulator {
   BatchWorld worlds_;
   BatchConfig config_;
   SensorRig<B> rig_;
-  SceneOf scene_pointer_;
   bool scenes_leave_;
-  std::vector<std::unique_ptr<SceneOnBackend<B>>> scenes_;  // none where no environment is
-  std::vector<RenderConfig> render_configs_;
-  std::vector<std::uint8_t> in_use_;
-  std::size_t left_poses_ = 0;
-  bool drawn_ = false;  // all rows of buffers_ are of the worlds before the present call
+  BatchScenes<B> scenes_;
+  std::vector<std::uint8_t> in_use_;  // of each scene
+  bool drawn_ = false;                // all rows of buffers_ are of the worlds before the present call
   SensorImages<B> buffers_, final_buffers_;
   std::unique_ptr<ThreadPool> pool_;  // where the backend's own work is not the host's
   std::vector<BatchObservation> images_, final_images_;
-  std::vector<Looker> lookers_;
-  std::vector<Posed> posed_;
-  std::vector<SensorView> views_;
+  std::vector<SceneView> views_;
 };
 
 /// BatchSimulator<B>::create, and create_from_library, with B deduced.

@@ -90,7 +90,7 @@ class Simulator {
         scene_.detail()};
     rig_.resize(buffers_, 1);
     if (Status s = rig_.render(std::span(&view, 1), buffers_); !s) return s;
-    for (std::size_t i = 0; i < images_.size(); ++i) images_[i].data = rig_.image(buffers_, i, 0);
+    for (std::size_t i = 0; i < images_.size(); ++i) images_[i].data = buffers_.image(rig_.plan(), i, 0);
     obs.images = images_;
     return obs;
   }
@@ -126,18 +126,11 @@ class Simulator {
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) {
     if (Status s = alive(); !s) return s;
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
-    RenderConfig rc = config_.render;
-    rc.outputs = outputs;
-    rig_.renderer().set_meshes(scene_.meshes().instances, scene_.scene().light);
+    RenderConfig config = config_.render;
+    config.outputs = outputs;
     ++spectator_count_;
-    std::span<const GaussianSet> sets = scene_.sets(0);
-    if (scene_.detail() != nullptr) {
-      sets = spectator_cut_.select(*scene_.detail(), sets, camera);
-      spectator_chunks_.place(std::span(&spectator_cut_, 1));
-      rc = spectator_cut_.rules(rc);
-    }
-    rig_.renderer().set_config(rc);
-    if (Status s = rig_.renderer().render(sets, std::span(&camera, 1), spectator_); !s) return s;
+    const ImageRequest request{{scene_.sets(0), &camera, &config, {}, scene_.meshes()}, scene_.detail()};
+    if (Status s = rig_.renderer().render(request, spectator_); !s) return s;
     return &spectator_;
   }
 
@@ -155,7 +148,7 @@ class Simulator {
     if (Status e = rig_.render(std::span(&view, 1), goal_buffers_); !e) return e;
     goal_images_ = images_;
     for (std::size_t i = 0; i < images_.size(); ++i)
-      goal_images_[i].data = rig_.image(goal_buffers_, i, 0);
+      goal_images_[i].data = goal_buffers_.image(rig_.plan(), i, 0);
     return std::span<const Observation>(goal_images_);
   }
 
@@ -170,8 +163,7 @@ class Simulator {
       : world_(std::move(world)),
         config_(std::move(config)),
         scene_(backend, std::move(scene), detail_choice(config_)),
-        rig_(backend, config_.sensors),
-        spectator_chunks_(backend) {
+        rig_(backend, config_.sensors) {
     config_.render = scene_.render_config(config_.render);
     for (const SensorSpec& s : config_.sensors) {
       images_.push_back({s.uuid, s.kind, s.resolution[0], s.resolution[1], channels_of(s.kind), {}});
@@ -185,8 +177,6 @@ class Simulator {
   SensorImages<B> buffers_, goal_buffers_;
   std::vector<Observation> images_, goal_images_;
   Frames<float> spectator_;
-  DetailSets spectator_cut_;
-  ChosenChunks<B> spectator_chunks_;
   std::size_t spectator_count_ = 0;
 };
 

@@ -50,6 +50,7 @@ cudaError_t cudaDeviceGetDefaultMemPool(cudaMemPool_t* pool, int device);
 cudaError_t cudaMemPoolSetAttribute(cudaMemPool_t pool, cudaMemPoolAttr attribute, void* value);
 cudaError_t cudaDeviceSynchronize();
 
+cudaError_t cudaMemGetInfo(std::size_t* free, std::size_t* total);
 cudaError_t cudaMallocBytes(void** p, std::size_t bytes);
 cudaError_t cudaMallocHostBytes(void** p, std::size_t bytes);
 cudaError_t cudaMallocAsyncBytes(void** p, std::size_t bytes, cudaStream_t stream);

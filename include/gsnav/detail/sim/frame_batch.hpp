@@ -15,49 +15,59 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/detail/render/frame_lanes.hpp"
+#include "gsnav/render/config.hpp"
 
 namespace gsnav {
 
 /// Backends that draw many cameras in one call, each with sets of its own, into images in their own
-/// memory (CudaBatchRenderer says what is asked of it). What one of them refuses as unsupported is drawn
-/// by Renderer.
+/// memory. Before a call their renderer is asked what it supports and how many cameras one call can draw
+/// (CudaBatchRenderer says what is asked of it).
 template <class B>
-concept BatchBackend = Backend<B> && !is_host_backend<B> && requires {
-  typename B::batch_renderer;
+concept BatchBackend = Backend<B> && !is_host_backend<B> &&
+                       requires(const typename B::batch_renderer& batch, const FrameJob<float>& job,
+                                std::span<const typename B::batch_renderer::camera_type> cameras) {
+  { B::batch_renderer::supports(*job.config, job.sets, job.meshes) } -> std::same_as<Status>;
+  { batch.capacity(job.sets, cameras) } -> std::same_as<std::size_t>;
 };
 
-/// Draws frames that share nothing: by Renderer, or where the backend has a batched renderer by one call
-/// of that for all frames of one size, rules and images. The bits are the same.
-template <Backend B>
+/// Draws frames that share nothing by a backend's batched renderer: all frames of one size, rules and
+/// images by one call, or by as few as it has the capacity for. The bits are those of Renderer.
+template <BatchBackend B>
 class FrameBatch {
  public:
-  explicit FrameBatch(B& backend) : renderer_(backend) {}
+  explicit FrameBatch(B& backend) : backend_(&backend), scratch_(backend) {}
 
-  /// Images in host memory. Errors: what rendering reports.
-  Status render(std::span<const FrameJob<float>> jobs) {
-    stats_.assign(jobs.size(), {});
-    return renderer_.render(jobs, stats_);
+  /// Whether `render` can draw a frame.
+  static bool supports(const FrameJob<float>& job) {
+    return Batch::supports(*job.config, job.sets, job.meshes).ok();
   }
-  Renderer<float, B>& renderer() noexcept { return renderer_; }
 
- private:
-  Renderer<float, B> renderer_;
-  std::vector<RenderStats> stats_;
-};
-
-template <BatchBackend B>
-class FrameBatch<B> {
- public:
-  explicit FrameBatch(B& backend) : backend_(&backend), renderer_(backend), scratch_(backend) {}
-
-  /// Images in host memory. Errors: what rendering reports. Throws gsnav::Error (out_of_memory).
-  Status render(std::span<const FrameJob<float>> jobs) { return render(jobs, CopyKind::device_to_host); }
-  /// The same into the backend's memory, errors too.
-  Status render_on_backend(std::span<const FrameJob<float>> jobs) {
-    return render(jobs, CopyKind::device_to_device);
+  /// Draws frames that are all supported; their images are in host memory or the backend's, as `to` has
+  /// it. Errors: what rendering reports. Throws gsnav::Error (out_of_memory).
+  Status render(std::span<const FrameJob<float>> jobs, CopyKind to) {
+    for (Known& k : known_) k.jobs.clear();
+    for (std::size_t j = 0; j < jobs.size(); ++j) group(kind_of(jobs[j])).jobs.push_back(j);
+    for (Known& k : known_) {
+      // By where images go, so that they can be drawn there, or copied, together.
+      const auto first = [&](std::size_t j) {
+        for (float* p : images_of(jobs[j].images)) {
+          if (p != nullptr) return p;
+        }
+        return static_cast<float*>(nullptr);
+      };
+      std::sort(k.jobs.begin(), k.jobs.end(),
+                [&](std::size_t a, std::size_t b) { return std::less<>()(first(a), first(b)); });
+      list_sets(k.jobs, jobs);
+      const std::span<const typename Batch::camera_type> cameras(cameras_);
+      for (std::size_t begin = 0, count = 0; begin < k.jobs.size(); begin += count) {
+        count = k.batch->capacity(sets_, cameras.subspan(begin));
+        count = std::clamp(count, std::size_t{1}, k.jobs.size() - begin);
+        if (Status s = draw(k, begin, count, jobs, to); !s) return s;
+      }
+    }
+    return backend_->synchronize();
   }
-  Renderer<float, B>& renderer() noexcept { return renderer_; }
 
  private:
   using Batch = typename B::batch_renderer;
@@ -89,24 +99,6 @@ class FrameBatch<B> {
     return k;
   }
 
-  Status render(std::span<const FrameJob<float>> jobs, CopyKind to) {
-    for (Known& k : known_) k.jobs.clear();
-    for (std::size_t j = 0; j < jobs.size(); ++j) group(kind_of(jobs[j])).jobs.push_back(j);
-    for (Known& k : known_) {
-      // By where images go, so that they can be drawn there, or copied, together.
-      const auto first = [&](std::size_t j) {
-        for (float* p : images_of(jobs[j].images)) {
-          if (p != nullptr) return p;
-        }
-        return static_cast<float*>(nullptr);
-      };
-      std::sort(k.jobs.begin(), k.jobs.end(),
-                [&](std::size_t a, std::size_t b) { return std::less<>()(first(a), first(b)); });
-      if (Status s = draw(k, k.jobs, jobs, to); !s) return s;
-    }
-    return backend_->synchronize();
-  }
-
   Known& group(const Kind& kind) {
     for (Known& k : known_) {
       if (k.kind == kind) return k;
@@ -114,28 +106,10 @@ class FrameBatch<B> {
     return known_.emplace_back(Known{kind, std::make_unique<Batch>(*backend_, kind.config), {}});
   }
 
-  /// Draws some of a group's frames by one call; by two of half of them where the renderer says that
-  /// they are too many, and what it refuses alone without it.
-  Status draw(Known& known, std::span<const std::size_t> which, std::span<const FrameJob<float>> jobs,
+  /// Draws frames [begin, begin + count) of a group, whose sets and cameras are listed, by one call.
+  Status draw(Known& known, std::size_t begin, std::size_t count, std::span<const FrameJob<float>> jobs,
               CopyKind to) {
-    if (which.empty()) return {};
-    Status s = draw_at_once(known, which, jobs, to);
-    if (s.ok() || s.code() != Errc::unsupported) return s;
-    if (which.size() == 1) return draw_alone(jobs[which.front()], to);
-    const std::size_t half = which.size() / 2;
-    if (s = draw(known, which.first(half), jobs, to); !s) return s;
-    return draw(known, which.subspan(half), jobs, to);
-  }
-
-  Status draw_alone(const FrameJob<float>& job, CopyKind to) {
-    RenderStats stats;
-    return to == CopyKind::device_to_device ? renderer_.render_on_backend(job, stats)
-                                            : renderer_.render(std::span(&job, 1), std::span(&stats, 1));
-  }
-
-  Status draw_at_once(Known& known, std::span<const std::size_t> which,
-                      std::span<const FrameJob<float>> jobs, CopyKind to) {
-    list_sets(which, jobs);
+    const std::span<const std::size_t> which = std::span(known.jobs).subspan(begin, count);
     const std::size_t pixels =
         static_cast<std::size_t>(known.kind.width) * static_cast<std::size_t>(known.kind.height);
     const bool in_place = to == CopyKind::device_to_device && in_rows(which, jobs, pixels);
@@ -153,7 +127,8 @@ class FrameBatch<B> {
     }
     typename Batch::images_type images;
     images.floats = {at[0], at[1], at[2], at[3], at[4], at[5]};
-    if (Status s = known.batch->render(sets_, cameras_, images); !s) return s;
+    if (Status s = known.batch->render(sets_, std::span(cameras_).subspan(begin, count), images); !s)
+      return s;
     const auto hand_out = [&] {
       for (std::size_t i = 0; i < kImages && !in_place; ++i) {
         if (at[i] != nullptr) copy(i, at[i], which, jobs, pixels * kChannels[i], to);
@@ -239,10 +214,9 @@ class FrameBatch<B> {
   }
 
   B* backend_;
-  Renderer<float, B> renderer_;
   std::vector<Known> known_;
   Buffer<float, B> scratch_;
-  // Of the present call.
+  // Of the present group.
   std::vector<GaussianSet> sets_;
   std::unordered_multimap<const float*, std::uint32_t> places_;  // in sets_, by their means
   std::vector<std::uint32_t> lists_;

@@ -57,8 +57,8 @@ struct BatchStats {
 ///
 /// Meshes are drawn into a layer for each camera, over which the batch is then blended. As everywhere,
 /// `fast` has the exponential of `exact` where there are meshes: in a call with any, for all of its
-/// cameras. Unsupported among meshes: Composite::hard_depth, Response other than ewa, Compat, and meshes
-/// that are seen through (MeshAlpha::blend).
+/// cameras. `supports` tells which frames it can draw, and `capacity` how many at once; `render` refuses
+/// the others as unsupported.
 class CudaBatchRenderer {
  public:
   using camera_type = BatchCamera;
@@ -69,6 +69,18 @@ class CudaBatchRenderer {
   ~CudaBatchRenderer();
   CudaBatchRenderer(const CudaBatchRenderer&) = delete;
   CudaBatchRenderer& operator=(const CudaBatchRenderer&) = delete;
+
+  /// Whether a frame of these sets and meshes can be one of a batch: unsupported, saying why, where a
+  /// set has another colour space than the frame, where it has more than 2^32 Gaussians, and of meshes
+  /// with Composite::hard_depth, a Response other than ewa, a Compat, or MeshAlpha::blend.
+  static Status supports(const RenderConfig& config, std::span<const GaussianSet> sets,
+                         const MeshFrame& meshes = {});
+
+  /// How many of `cameras`, from the first on, one call should draw: what counts of 32 bits have room
+  /// for and, where each camera takes what those of the last call took, the device's free memory. At
+  /// least 1 where there is a camera. `sets` and `cameras` are as for `render`, which draws more where
+  /// it can.
+  std::size_t capacity(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras) const;
 
   /// Draws the sets (arrays on the device) from all cameras, which have one size. Enqueues and returns;
   /// images are whole once `finish()` has said ok. Errors: invalid_argument naming camera, set or field,

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/sim/scene_on_backend.hpp"
+#include "gsnav/detail/sim/sensor_requests.hpp"
+
+namespace gsnav {
+
+/// A view into one of a batch's scenes at a time. BatchScenes fills what the scene gives to the view.
+struct SceneView {
+  std::size_t scene = 0;
+  double time = 0.0;  ///< seconds on the scene's clock
+  SensorView view{};
+};
+
+/// The scenes of a batch in a backend's memory, and their avatars posed for the views of a step.
+template <Backend B>
+class BatchScenes {
+ public:
+  using SceneOf = std::function<Result<std::shared_ptr<const SimulatorScene>>(std::size_t)>;
+
+  /// `scene_of` gives a scene when a view first needs it; it can be drawn by `render` and `detail`.
+  /// `pose_slots`: for how many times of a scene avatars are held posed at once.
+  BatchScenes(B& backend, SceneOf scene_of, std::size_t count, const RenderConfig& render,
+              const DetailChoice& detail, std::size_t pose_slots)
+      : backend_(&backend),
+        scene_of_(std::move(scene_of)),
+        render_(render),
+        detail_(detail),
+        pose_slots_(pose_slots),
+        scenes_(count),
+        configs_(count) {}
+
+  /// Frees scenes that are not in use.
+  void keep(std::span<const std::uint8_t> in_use) {
+    for (std::size_t s = 0; s < scenes_.size(); ++s) {
+      if (in_use[s] != 0 || scenes_[s] == nullptr) continue;
+      left_poses_ += scenes_[s]->pose_count();
+      scenes_[s].reset();
+    }
+  }
+  /// How many times an avatar was posed so far.
+  std::size_t pose_count() const noexcept {
+    std::size_t sum = left_poses_;
+    for (const auto& s : scenes_) sum += s != nullptr ? s->pose_count() : 0;
+    return sum;
+  }
+
+  /// Poses the scenes for `views` and calls draw(span of SensorView) for them, for as many at a time as
+  /// there are slots. Sorts `views`. `run(n, f)` calls f(i) for i in [0, n) on several threads. Errors:
+  /// what `scene_of`, skinning and `draw` report.
+  template <class Run, class Draw>
+  Status draw(std::span<SceneView> views, const SensorPlan& plan, const Run& run, const Draw& draw) {
+    for (const SceneView& v : views) {
+      if (Status s = place(v.scene); !s) return s;
+    }
+    // Without avatars a scene is the same at all times.
+    const auto key = [this](const SceneView& v) {
+      return std::pair(v.scene, scenes_[v.scene]->scene().avatars.empty() ? 0.0 : v.time);
+    };
+    std::stable_sort(views.begin(), views.end(),
+                     [&](const SceneView& a, const SceneView& b) { return key(a) < key(b); });
+    posed_.clear();
+    used_.assign(scenes_.size(), 0);
+    for (std::size_t first = 0, last = 0; first < views.size(); first = last) {
+      while (last < views.size() && key(views[last]) == key(views[first])) ++last;
+      const std::size_t scene = views[first].scene;
+      posed_.push_back({views.subspan(first, last - first), used_[scene]++, {}, {}});
+      if (posed_.size() < pose_slots_ && last < views.size()) continue;
+      if (Status s = pose(plan, run); !s) return s;
+      if (Status s = draw(std::span<const SensorView>(ready_)); !s) return s;
+      posed_.clear();
+      used_.assign(scenes_.size(), 0);
+    }
+    return {};
+  }
+
+ private:
+  /// Views that share a scene and a time, and so a slot that the scene's avatars are posed in.
+  struct Posed {
+    std::span<SceneView> views;
+    std::size_t slot;
+    std::vector<Camera> cameras;
+    Status status;
+  };
+
+  /// Puts a scene into the backend's memory, where it is not there yet.
+  Status place(std::size_t scene) {
+    if (scenes_[scene] != nullptr) return {};
+    auto held = scene_of_(scene);
+    if (!held) return held.status();
+    scenes_[scene] = std::make_unique<SceneOnBackend<B>>(*backend_, std::move(*held), detail_);
+    configs_[scene] = scenes_[scene]->render_config(render_);
+    return {};
+  }
+
+  /// Poses posed_ and lists its views. Joints are found by all threads, Gaussians skinned by the
+  /// backend.
+  template <class Run>
+  Status pose(const SensorPlan& plan, const Run& run) {
+    for (const Posed& p : posed_) scenes_[p.views[0].scene]->make_slots(p.slot + 1);
+    run(posed_.size(), [&](std::size_t i) {
+      Posed& p = posed_[i];
+      p.status = detail::guarded([&] {
+        for (const SceneView& v : p.views)
+          plan.append_cameras(v.view.base, v.view.rotation, v.view.pitch, p.cameras);
+        const std::size_t scene = p.views[0].scene;
+        return scenes_[scene]->prepare(p.slot, p.views[0].time, p.cameras, configs_[scene]);
+      });
+    });
+    ready_.clear();
+    for (const Posed& p : posed_) {
+      if (!p.status) return p.status;
+      const std::size_t number = p.views[0].scene;
+      SceneOnBackend<B>& scene = *scenes_[number];
+      if (Status s = scene.pose_prepared(p.slot); !s) return s;
+      for (const SceneView& v : p.views) {
+        SensorView& view = ready_.emplace_back(v.view);
+        view.sets = scene.sets(p.slot);
+        view.config = &configs_[number];
+        view.meshes = scene.meshes();
+        view.detail = scene.detail();
+      }
+    }
+    return {};
+  }
+
+  B* backend_;
+  SceneOf scene_of_;
+  RenderConfig render_;
+  DetailChoice detail_;
+  std::size_t pose_slots_;
+  std::vector<std::unique_ptr<SceneOnBackend<B>>> scenes_;  // null where no view is
+  std::vector<RenderConfig> configs_;                       // of each scene
+  std::size_t left_poses_ = 0;                              // of scenes that were freed
+  std::vector<Posed> posed_;
+  std::vector<std::size_t> used_;  // slots of each scene
+  std::vector<SensorView> ready_;
+};
+
+}  // namespace gsnav

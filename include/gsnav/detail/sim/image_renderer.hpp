@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "gsnav/detail/sim/frame_batch.hpp"
+#include "gsnav/detail/sim/scene_detail.hpp"
+#include "gsnav/scene/renderer.hpp"
+#include "gsnav/sim/config.hpp"
+
+namespace gsnav {
+
+/// f(i) for i in [0, n): by the threads of a host backend, else by this one.
+template <Backend B, class F>
+void for_each_on_host(B& backend, std::size_t n, const F& f) {
+  if constexpr (is_host_backend<B>) {
+    backend.parallel_for(n, f);
+  } else {
+    for (std::size_t i = 0; i < n; ++i) f(i);
+  }
+}
+
+/// A frame to draw: camera, sets, meshes, rules, and where its images go.
+struct ImageRequest : FrameJob<float> {
+  const SceneDetail* detail = nullptr;  ///< levels of detail of the first of `sets`; null: whole
+};
+
+/// Draws frames that share nothing: chooses what each shows of its assets, then draws what a batched
+/// renderer of the backend supports by that, and everything else by Renderer. The bits are the same.
+template <Backend B>
+class ImageRenderer {
+ public:
+  explicit ImageRenderer(B& backend)
+      : backend_(&backend), renderer_(backend), batches_(backend), chosen_(backend) {}
+
+  /// Draws all of them into images that are in `memory`; writes the sets and rules that were drawn into
+  /// the requests, valid until the next call. Errors: what rendering reports. Throws gsnav::Error
+  /// (out_of_memory).
+  Status render(std::span<ImageRequest> requests, ImageMemory memory) {
+    choose_detail(requests);
+    jobs_.clear();
+    if constexpr (BatchBackend<B>) {
+      single_.clear();
+      for (const ImageRequest& r : requests) (batches_.supports(r) ? jobs_ : single_).push_back(r);
+      const bool there = memory == ImageMemory::backend;
+      if (Status s =
+              batches_.render(jobs_, there ? CopyKind::device_to_device : CopyKind::device_to_host);
+          !s) {
+        return s;
+      }
+      return there ? render_on_backend(single_) : render_by_one(single_);
+    } else {
+      jobs_.assign(requests.begin(), requests.end());
+      return render_by_one(jobs_);
+    }
+  }
+
+  /// The same of one request into frames that are made as large as they have to be; request.images is
+  /// not read, request.config->outputs says which.
+  Status render(ImageRequest request, Frames<float>& out) {
+    choose_detail(std::span(&request, 1));
+    renderer_.set_config(*request.config);
+    renderer_.set_meshes(request.meshes.instances, request.meshes.light);
+    return renderer_.render(request.sets, std::span(request.camera, 1), out);
+  }
+
+  /// Of each request of the last call, on host backends; else empty.
+  std::span<const RenderStats> stats() const noexcept { return stats_; }
+
+ private:
+  struct NoBatches {
+    explicit NoBatches(B&) {}
+  };
+  template <class T>
+  struct BatchesOf {
+    using type = NoBatches;
+  };
+  template <BatchBackend T>
+  struct BatchesOf<T> {
+    using type = FrameBatch<T>;
+  };
+
+  void choose_detail(std::span<ImageRequest> requests) {
+    detailed_.clear();
+    for (ImageRequest& r : requests) {
+      if (r.detail != nullptr) detailed_.push_back(&r);
+    }
+    while (cuts_.size() < detailed_.size()) cuts_.emplace_back();
+    for_each_on_host(*backend_, detailed_.size(), [this](std::size_t i) {
+      ImageRequest& r = *detailed_[i];
+      r.sets = cuts_[i].select(*r.detail, r.sets, *r.camera);
+      r.config = &cuts_[i].rules(*r.config);
+    });
+    chosen_.place(std::span(cuts_).first(detailed_.size()));
+  }
+  Status render_by_one(std::span<const FrameJob<float>> jobs) {
+    stats_.assign(jobs.size(), {});
+    return renderer_.render(jobs, stats_);
+  }
+  Status render_on_backend(std::span<const FrameJob<float>> jobs) {
+    RenderStats stats;
+    for (const FrameJob<float>& job : jobs) {
+      if (Status s = renderer_.render_on_backend(job, stats); !s) return s;
+    }
+    return backend_->synchronize();
+  }
+
+  B* backend_;
+  Renderer<float, B> renderer_;
+  [[no_unique_address]] typename BatchesOf<B>::type batches_;
+  ChosenChunks<B> chosen_;
+  std::vector<DetailSets> cuts_;  // of each of these
+  std::vector<ImageRequest*> detailed_;
+  std::vector<FrameJob<float>> jobs_, single_;
+  std::vector<RenderStats> stats_;
+};
+
+}  // namespace gsnav
