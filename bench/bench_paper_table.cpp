@@ -13,12 +13,12 @@
 #include <string>
 #include <vector>
 
-#include "../tools/report/runner_system.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
 #include "gsnav/sim/batch.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
+#include "report/runner_system.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include <cuda_runtime_api.h>
 

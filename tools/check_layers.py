@@ -71,7 +71,7 @@ def check(root):
                 continue
             if not allowed(layer, target, name.removeprefix("gsnav/").removeprefix("detail/")):
                 wrong.append(f"{path}: {layer} may not include {name} ({target})")
-    for top in ("examples", "tools"):
+    for top in ("examples", "tools", "bench/report"):
         for file in sorted(p for p in (root / top).rglob("*") if p.suffix in SOURCES):
             files.append(file)
             for _, name in INCLUDE.findall(file.read_text(encoding="utf-8")):

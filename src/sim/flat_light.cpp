@@ -12,37 +12,58 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 const Vec3d kToSun = normalized(Vec3d{-0.42, 0.78, -0.85});
 
-/// Where the ray o + t d enters the box, or infinity; a start inside does not count.
-double enter(const Box& b, const Vec3d& o, const Vec3d& inverse) noexcept {
-  double t0 = 0, t1 = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < 3; ++k) {
-    const double a = (b.low[k] - o[k]) * inverse[k], c = (b.high[k] - o[k]) * inverse[k];
-    t0 = std::max(t0, std::min(a, c));
-    t1 = std::min(t1, std::max(a, c));
-  }
-  return t0 < t1 && t0 > 1e-4 ? t0 : std::numeric_limits<double>::infinity();
-}
-
-/// Where a ray that starts inside leaves the box.
-double leave(const Box& b, const Vec3d& o, const Vec3d& inverse) noexcept {
-  double t1 = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < 3; ++k) {
-    t1 = std::min(t1, std::max((b.low[k] - o[k]) * inverse[k], (b.high[k] - o[k]) * inverse[k]));
-  }
-  return std::max(t1, 0.0);
-}
-
 Vec3d inverse_of(const Vec3d& d) noexcept {
   const auto safe = [](double x) { return 1.0 / (abs(x) < 1e-9 ? 1e-9 : x); };
   return {safe(d.x), safe(d.y), safe(d.z)};
 }
 
-bool blocked(const Room& room, const Vec3d& from, const Vec3d& to) noexcept {
-  const Vec3d inverse = inverse_of(to - from);
-  for (const Box& b : room.blockers) {
-    if (enter(b, from, inverse) < 0.999) return true;
+constexpr double kClear = 0.02;  // metres: rays to a window end so far in front of it
+
+/// A room's boxes about a point, without those behind the plane through it: no ray goes there, but one
+/// to a window that lies in the plane may by what it ends in front of the window.
+class NearBoxes {
+ public:
+  NearBoxes(const Room& room, const Vec3d& point, const Vec3d& normal) {
+    boxes_.reserve(room.blockers.size());
+    for (const Box& b : room.blockers) {
+      const Vec3d low = b.low - point, high = b.high - point;
+      double before = 0;
+      for (int k = 0; k < 3; ++k) before += (normal[k] > 0 ? high[k] : low[k]) * normal[k];
+      if (before > -1.01 * kClear) boxes_.push_back({{low.x, high.x}, {low.y, high.y}, {low.z, high.z}});
+    }
   }
-  return false;
+
+  /// Where the ray t d enters the first of them, at most `t`; a start inside does not count.
+  double first(const Vec3d& d, double t) const noexcept {
+    const Vec3d inverse = inverse_of(d);
+    const int x = inverse.x < 0, y = inverse.y < 0, z = inverse.z < 0;  // the plane that it enters by
+    for (const Slabs& b : boxes_) {
+      const double in_x = b.x[x] * inverse.x, in_y = b.y[y] * inverse.y, in_z = b.z[z] * inverse.z;
+      const double in_xy = in_x > in_y ? in_x : in_y, in = in_xy > in_z ? in_xy : in_z;
+      if (!(in > 1e-4 && in < t)) continue;
+      if (in < b.x[1 - x] * inverse.x && in < b.y[1 - y] * inverse.y && in < b.z[1 - z] * inverse.z)
+        t = in;
+    }
+    return t;
+  }
+  /// Whether one lies between the point and the end of `d`.
+  bool between(const Vec3d& d) const noexcept { return first(d, 0.999) < 0.999; }
+
+ private:
+  struct Slabs {
+    double x[2], y[2], z[2];  ///< low and high
+  };
+  std::vector<Slabs> boxes_;
+};
+
+/// Where a ray that starts inside leaves the box.
+double leave(const Box& b, const Vec3d& o, const Vec3d& d) noexcept {
+  const Vec3d inverse = inverse_of(d);
+  double t1 = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    t1 = std::min(t1, std::max((b.low[k] - o[k]) * inverse[k], (b.high[k] - o[k]) * inverse[k]));
+  }
+  return std::max(t1, 0.0);
 }
 
 }  // namespace
@@ -53,12 +74,11 @@ Vec3d Painter::light_at(const Room& room, const Vec3d& point, const Vec3d& n) co
   // Ambient: near surfaces darken, low ones give the floor's colour.
   const Vec3d u = normalized(cross(abs(n.y) < 0.9 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0}, n)),
               v = cross(n, u);
+  const NearBoxes boxes(room, p, n);
   Vec3d ambient{};
   for (const Vec3d& h : hemisphere_) {
     const Vec3d d = u * h.x + v * h.y + n * h.z;
-    const Vec3d inverse = inverse_of(d);
-    double t = leave(room.inside, p, inverse);
-    for (const Box& b : room.blockers) t = std::min(t, enter(b, p, inverse));
+    const double t = boxes.first(d, leave(room.inside, p, d));
     const double open = t * t / (t * t + 0.16);
     const double down = std::clamp(-d.y * 1.5, 0.0, 1.0);
     ambient += lerp(Vec3d{1.0, 0.98, 0.95}, room.bounce, down) * (0.25 + 0.75 * open);
@@ -75,7 +95,7 @@ Vec3d Painter::light_at(const Room& room, const Vec3d& point, const Vec3d& n) co
           w.corner + w.u * ((k % kAcross + 0.5) / kAcross) + w.v * ((k / kAcross + 0.5) / kUp);
       const Vec3d d = q - p;
       const double r2 = dot(d, d), c0 = dot(d, n), c1 = -dot(d, facing) / area;
-      if (c0 <= 0 || c1 <= 0 || blocked(room, p, q + facing * (0.02 / area))) continue;
+      if (c0 <= 0 || c1 <= 0 || boxes.between(q + facing * (kClear / area) - p)) continue;
       direct += c0 * c1 / (r2 * (r2 + 0.05));
     }
     sum += Vec3d{0.93, 0.98, 1.06} * (5.2 * direct * area / (kPi * kAcross * kUp));
@@ -86,7 +106,7 @@ Vec3d Painter::light_at(const Room& room, const Vec3d& point, const Vec3d& n) co
       const Vec3d q = l.position + Vec3d{(k & 1) != 0 ? 0.08 : -0.08, 0, (k & 2) != 0 ? 0.08 : -0.08};
       const Vec3d d = q - p;
       const double r2 = dot(d, d), c = dot(d, n) / std::sqrt(r2);
-      if (c > 0 && !blocked(room, p, q)) direct += c / (r2 + 0.12);
+      if (c > 0 && !boxes.between(q - p)) direct += c / (r2 + 0.12);
     }
     sum += Vec3d{1.0, 0.80, 0.55} * (0.25 * 0.30 * l.power * direct);
   }
@@ -107,7 +127,7 @@ bool Painter::sun_at(const Room& room, const Vec3d& point, const Vec3d& n) const
     // Two bars cross the pane.
     if (a < 0.03 || a > 0.97 || b < 0.03 || b > 0.97 || abs(a - 0.5) < 0.025 || abs(b - 0.62) < 0.02)
       continue;
-    return !blocked(room, p, p + kToSun * t);
+    return !NearBoxes(room, p, n).between(p + kToSun * t - p);
   }
   return false;
 }

@@ -5,14 +5,18 @@
 usage: check_headers.py COMPILER [--nvcc] [--together] [--system DIR]... [--have eigen|glm|dlpack]...
 
 Headers are found when the check runs, so a new one is covered without a new configure. --system adds
-a folder of third-party headers; an interop header is compiled where --have names its library. With --together all
-that have the same options are first compiled as one, which says what this compiler warns of; each is compiled alone
-only where that fails. Another compiler must then see to it that each header includes what it uses.
+a folder of third-party headers; an interop header is compiled where --have names its library.
+
+Headers of which each includes the one before are compiled as one file, innermost first: nothing stands before a
+header but what it includes by itself, so each is seen as if it was alone. With --together all that have the same
+options are compiled as one, which says what this compiler warns of; another compiler must then see to it that each
+header includes what it uses. Where a file of several headers fails, each of them is compiled alone.
 """
 import argparse
 import concurrent.futures
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -43,6 +47,49 @@ def headers(args):
 
 def strict(header):
     return layer(header) in DEVICE_LAYERS
+
+
+def options(header):
+    return strict(header), header in NEEDS
+
+
+def chains(checked):
+    """The fewest lists of headers in which each header includes the one before, with the same options."""
+    texts = {}
+    for folder in [ROOT / "include", *BACKENDS]:
+        for h in checked:
+            if (folder / h).is_file():
+                texts[h] = (folder / h).read_text(encoding="utf-8")
+    inner = {}  # all that a header includes
+
+    def visit(h):
+        if h not in inner:
+            inner[h] = set()
+            for other in re.findall(r'#include [<"]([^">]+)[">]', texts[h]):
+                if other in texts:
+                    visit(other)
+                    inner[h] |= {other} | inner[other]
+    for h in checked:
+        visit(h)
+    before = {}  # of a header, the one before it in its list
+
+    def place(h, tried):
+        for outer in checked:
+            if h in inner[outer] and outer not in tried and options(outer) == options(h):
+                tried.add(outer)
+                if outer not in before or place(before[outer], tried):
+                    before[outer] = h
+                    return True
+        return False
+    for h in checked:
+        place(h, set())
+    found = []
+    for h in set(checked) - set(before.values()):
+        chain = [h]
+        while chain[0] in before:
+            chain.insert(0, before[chain[0]])
+        found.append(chain)
+    return sorted(found, key=len, reverse=True)
 
 
 def compile_headers(checked, args, scratch):
@@ -77,7 +124,7 @@ def main():
     parser.add_argument("--have", action="append", default=[])
     args = parser.parse_args()
     checked = headers(args)
-    groups = [[h] for h in checked]
+    groups = chains(checked)
     if args.together:
         groups = [[h for h in checked if strict(h)], [h for h in checked if not strict(h)]]
     with tempfile.TemporaryDirectory() as scratch, \
@@ -86,14 +133,14 @@ def main():
             return list(pool.map(lambda part: compile_headers(part, args, pathlib.Path(scratch)), parts))
         groups = [g for g in groups if g]
         wrong = [(g, text) for g, text in zip(groups, outputs(groups)) if text]
-        if args.together and wrong:
+        if wrong:
             alone = [[h] for g, _ in wrong for h in g]
             each = [(g, text) for g, text in zip(alone, outputs(alone)) if text]
             wrong = each or wrong  # of headers that are accepted alone, not beside each other
     print("\n".join(f"--- {' '.join(g)}\n{text}" for g, text in wrong))
     refused = sum(len(g) for g, _ in wrong)
     print(f"{args.compiler}: {len(checked) - refused} of {len(checked)} headers compile "
-          f"{'together' if args.together else 'alone'}")
+          f"{'together' if args.together else 'alone'}, in {len(groups)} files")
     sys.exit(1 if wrong or not checked else 0)
 
 

@@ -70,7 +70,7 @@ TEST_CASE("real scenes: every file is read, fits its report and is seen") {
       if ((distance == 0 || kSanitized) && cloud.size() > 200000) continue;  // time
       const Vec3d eye = centre + Vec3d{0.3, -0.4, 1.0} * (distance * norm(size));
       const Camera camera =
-          Camera::look_at(eye, distance > 0 ? centre : centre + Vec3d{1, 0, 0}, {0, -1, 0}, 32, 24, 60);
+          Camera::look_at(eye, distance > 0 ? centre : centre + Vec3d{1, 0, 0}, {0, -1, 0}, 12, 9, 60);
       const auto frames = renderer.render(cloud.set(), camera).value();
       double covered = 0;
       bool finite = true;

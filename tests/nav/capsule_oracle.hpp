@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "gsnav/core/rng.hpp"
@@ -73,15 +74,21 @@ Real gap_oracle(const gsnav::MovingCapsule<S>& a, const gsnav::MovingCapsule<S>&
          radius(a) - radius(b);
 }
 
-/// Greatest speed at which the gap can change, metres per unit of time.
+/// Greatest speed at which the gap can change, metres per unit of time: points of the two move apart no
+/// faster than two of their ends.
 template <class S>
 Real gap_speed(const gsnav::MovingCapsule<S>& a, const gsnav::MovingCapsule<S>& b) {
-  const auto most = [](const gsnav::MovingCapsule<S>& m) {
-    return std::max(length(real(m.end.p0) - real(m.begin.p0)),
-                    length(real(m.end.p1) - real(m.begin.p1))) +
-           std::abs(Real(m.end.radius) - Real(m.begin.radius));
+  const auto moves = [](const gsnav::MovingCapsule<S>& m) {
+    return std::array{real(m.end.p0) - real(m.begin.p0), real(m.end.p1) - real(m.begin.p1)};
   };
-  return most(a) + most(b);
+  const auto grows = [](const gsnav::MovingCapsule<S>& m) {
+    return Real(m.end.radius) - Real(m.begin.radius);
+  };
+  Real apart = 0;
+  for (const V& p : moves(a)) {
+    for (const V& q : moves(b)) apart = std::max(apart, length(p - q));
+  }
+  return apart + std::abs(grows(a) + grows(b));
 }
 
 /// A gap below `limit` somewhere in [t0, t1], or the least of those looked at where there is none (up to

@@ -6,12 +6,16 @@
 #include <limits>
 #include <regex>
 
-#include "html_text.hpp"
+#include "../../tools/common/html_text.hpp"
 #include "plot.hpp"
 #include "plot_pareto.hpp"
 #include "synthetic.hpp"
 
 using namespace gsnav_report;
+using gsnav_tools::base64;
+using gsnav_tools::escape;
+using gsnav_tools::format;
+using gsnav_tools::format_round;
 
 namespace {
 

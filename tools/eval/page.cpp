@@ -6,15 +6,15 @@
 #include <iterator>
 #include <utility>
 
-#include "../report/html_text.hpp"
+#include "../common/html_text.hpp"
 #include "gsnav/io/image_file.hpp"
 
 namespace gsnav_eval {
 namespace {
 
-using gsnav_report::base64;
-using gsnav_report::escape;
-using gsnav_report::format;
+using gsnav_tools::base64;
+using gsnav_tools::escape;
+using gsnav_tools::format;
 
 const char* const kStyle =
     "body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:70em;padding:0 1em;color:#222}"

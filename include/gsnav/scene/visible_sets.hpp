@@ -18,6 +18,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/render/row_weights.hpp"
+#include "gsnav/detail/scene/seen_cells.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
@@ -175,120 +176,6 @@ inline Status validate(const VisibleSettings& s) {
   return {};
 }
 
-namespace detail {
-
-/// Distance between two boxes, along no axis less than 0.
-inline double box_distance(const Vec3d& low, const Vec3d& high, const Vec3d& other_low,
-                           const Vec3d& other_high) noexcept {
-  Vec3d gap;
-  for (int k = 0; k < 3; ++k) gap[k] = std::max({0.0, other_low[k] - high[k], low[k] - other_high[k]});
-  return norm(gap);
-}
-
-/// A bit a row of a chunk.
-using RowBits = std::array<std::uint32_t, kSeenRowWords>;
-
-/// Those of chunk `chunk` that a cloud of so many Gaussians has.
-inline RowBits all_rows(std::size_t size, std::size_t chunk) noexcept {
-  RowBits out{};
-  for (std::size_t k = 0; k < kSeenRowWords; ++k) {
-    const std::size_t first = chunk * kProjectChunk + 32 * k;
-    if (first < size) out[k] = size - first < 32 ? (1u << (size - first)) - 1u : ~0u;
-  }
-  return out;
-}
-
-/// Those that take more of a pixel than min_weight, with all that are seen together with them.
-inline RowBits seen_rows(std::span<const float> most, std::size_t chunk,
-                         const VisibleSettings& settings) noexcept {
-  RowBits out = all_rows(most.size(), chunk);
-  const std::size_t run = settings.rows == 0 ? kProjectChunk : static_cast<std::size_t>(settings.rows);
-  const std::size_t begin = chunk * kProjectChunk;
-  for (std::size_t first = 0; first < kProjectChunk; first += run) {
-    bool any = false;
-    for (std::size_t i = begin + first; i < begin + first + run && i < most.size(); ++i) {
-      any = any || static_cast<double>(most[i]) > settings.min_weight;
-    }
-    if (any) continue;
-    for (std::size_t r = first; r < first + run; ++r) out[r / 32] &= ~(1u << (r % 32));
-  }
-  return out;
-}
-
-/// What a cell sees, as it is found.
-class SeenOfCell {
- public:
-  explicit SeenOfCell(std::size_t chunks) : places_(chunks, kNone) {}
-
-  void add(std::size_t chunk, const RowBits& rows) {
-    if (places_[chunk] == kNone) {
-      places_[chunk] = static_cast<std::uint32_t>(rows_.size());
-      rows_.push_back(rows);
-      return;
-    }
-    RowBits& to = rows_[places_[chunk]];
-    for (std::size_t k = 0; k < kSeenRowWords; ++k) to[k] |= rows[k];
-  }
-
-  /// How many Gaussians.
-  std::size_t count() const noexcept {
-    std::size_t sum = 0;
-    for (const RowBits& r : rows_) {
-      for (const std::uint32_t word : r) sum += static_cast<std::size_t>(count_bits(word));
-    }
-    return sum;
-  }
-
-  /// As Selection::seen has it.
-  void append_to(std::vector<std::uint32_t>& bits, bool with_rows) const {
-    const std::size_t begin = bits.size(), words = (places_.size() + 31) / 32;
-    bits.resize(begin + (with_rows ? 2 : 1) * words);
-    std::uint32_t count = 0;
-    for (std::size_t c = 0; c < places_.size(); ++c) {
-      if (with_rows && c % 32 == 0) bits[begin + words + c / 32] = count;
-      if (places_[c] == kNone) continue;
-      bits[begin + c / 32] |= std::uint32_t{1} << (c % 32);
-      ++count;
-    }
-    for (std::size_t c = 0; with_rows && c < places_.size(); ++c) {
-      if (places_[c] == kNone) continue;
-      bits.insert(bits.end(), rows_[places_[c]].begin(), rows_[places_[c]].end());
-    }
-  }
-
- private:
-  static constexpr std::uint32_t kNone = 0xffffffffu;
-  std::vector<std::uint32_t> places_;  // [chunks] into rows_
-  std::vector<RowBits> rows_;
-};
-
-/// Cells that are looked at before it is said whether sets are worth their time, and the least number of
-/// cells for which it is asked.
-inline constexpr std::size_t kSampleCells = 16, kLeastSampled = 64;
-
-/// Cameras that look at the six faces of a cube, turned about the world's up (Y) by another angle for
-/// each viewpoint: in what order Gaussians are blended depends on where a camera looks, so that some are
-/// seen in one direction only.
-inline std::array<Camera, 6> cube_cameras(const Vec3d& eye, std::size_t viewpoint,
-                                          const VisibleSettings& settings) noexcept {
-  constexpr double kGoldenRatio = 0.6180339887498949, kQuarter = 1.5707963267948966;
-  const double turned = static_cast<double>(viewpoint) * kGoldenRatio;
-  const double turn = (turned - std::floor(turned)) * kQuarter;
-  std::array<Camera, 6> out;
-  for (std::size_t f = 0; f < 6; ++f) {
-    const double angle = turn + kQuarter * static_cast<double>(f);
-    const Vec3d level{std::cos(angle), 0, std::sin(angle)};
-    const Vec3d forward = f < 4 ? level : Vec3d{0, f == 4 ? 1.0 : -1.0, 0};
-    out[f] = Camera::look_at(eye, eye + forward, f < 4 ? Vec3d{0, 1, 0} : level, settings.face,
-                             settings.face, 90);
-    out[f].near_plane = settings.near_plane;
-    out[f].near_sigma = settings.near_sigma;
-  }
-  return out;
-}
-
-}  // namespace detail
-
 /// Finds what of a cloud is seen from each cell that has a viewpoint in it or within 5 cm (world,
 /// metres; navmesh_viewpoints makes them): the cloud stands in the world by `world_from_asset`, with
 /// bounds of its chunks (sort_spatially). Each viewpoint costs six frames of settings.face pixels a
@@ -393,11 +280,13 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
       }
     }
     std::fill(most.begin(), most.end(), 0.0f);
-    for (const Camera& camera : detail::cube_cameras(viewpoints[v], v, settings)) {
+    for (const Camera& camera : detail::cube_cameras(viewpoints[v], v, settings.face,
+                                                     settings.near_plane, settings.near_sigma)) {
       if (Status s = add_row_weights(backend, workspace, set, camera, most); !s) return s;
     }
-    backend.parallel_for(rows.size(),
-                         [&](std::size_t i) { rows[i] = detail::seen_rows(most, i, settings); });
+    backend.parallel_for(rows.size(), [&](std::size_t i) {
+      rows[i] = detail::seen_rows(most, i, settings.rows, settings.min_weight);
+    });
     backend.parallel_for(out.cells(), [&](std::size_t c) {
       if (!counts_for(c, v)) return;
       for (std::size_t i = 0; i < rows.size(); ++i) {

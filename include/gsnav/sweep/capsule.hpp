@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "gsnav/detail/sweep/capsule_gap.hpp"
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/math/vec.hpp"
 
@@ -9,138 +10,6 @@
 // the agent (subtract in double first): at 1000 m a float cannot hold a millimetre.
 
 namespace gsnav {
-
-/// Closest points of two segments.
-template <class L>
-struct SegmentDistance {
-  L distance;
-  Vec3<L> on_a, on_b;  ///< witness points
-  Vec3<L> normal;      ///< unit, from a to b; where they touch, perpendicular to both
-};
-
-namespace detail {
-
-/// Smallest normal number. A literal: numeric_limits' constexpr functions are host code to nvcc.
-template <class S>
-GSNAV_HD constexpr S least_normal() noexcept {
-  return static_cast<S>(sizeof(S) > sizeof(float) ? 2.2250738585072014e-308 : 1.1754943508222875e-38);
-}
-
-template <class L, class M>
-GSNAV_HD Vec3<L> select_vec(const M& m, const Vec3<L>& a, const Vec3<L>& b) noexcept {
-  return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)};
-}
-
-/// Best candidate so far: parameters on both segments and the vector from a to b.
-template <class L>
-struct SegmentCandidate {
-  L s, t, distance2;
-  Vec3<L> delta;
-
-  GSNAV_HD void offer(L s2, L t2, const Vec3<L>& d) noexcept {
-    const L d2 = dot(d, d);
-    take(d2 < distance2, s2, t2, d);
-    distance2 = min(d2, distance2);
-  }
-  template <class M>
-  GSNAV_HD void offer(const M& valid, L s2, L t2, const Vec3<L>& d) noexcept {
-    const L d2 = dot(d, d);
-    const auto better = valid && (d2 < distance2);
-    take(better, s2, t2, d);
-    distance2 = select(better, d2, distance2);
-  }
-
- private:
-  template <class M>
-  GSNAV_HD void take(const M& better, L s2, L t2, const Vec3<L>& d) noexcept {
-    s = select(better, s2, s);
-    t = select(better, t2, t);
-    delta = select_vec(better, d, delta);
-  }
-};
-
-/// A unit vector perpendicular to v (unit length not needed); x for the zero vector.
-template <class L>
-GSNAV_HD Vec3<L> any_perpendicular(const Vec3<L>& v) noexcept {
-  using S = scalar_of<L>;
-  const L zero(S(0)), one(S(1)), ax = abs(v.x), ay = abs(v.y), az = abs(v.z);
-  const auto x_least = (ax <= ay) && (ax <= az);
-  const auto y_least = !x_least && (ay <= az);
-  const Vec3<L> axis = select_vec(x_least, Vec3<L>{one, zero, zero},
-                                  select_vec(y_least, Vec3<L>{zero, one, zero}, {zero, zero, one}));
-  const Vec3<L> c = cross(v, axis);
-  const L n2 = dot(c, c);
-  const auto ok = n2 > L(detail::least_normal<S>());
-  return select_vec(ok, c * (one / sqrt(select(ok, n2, one))), {one, zero, zero});
-}
-
-}  // namespace detail
-
-/// Distance of the segments a0 a1 and b0 b1 with witness points and a deterministic normal.
-///
-/// The minimum over the four endpoint-to-segment candidates and the crossing of the two lines where it
-/// lies inside both. No tolerance is involved: segments of zero length and parallel ones fall out of the
-/// endpoint candidates, and an inexact crossing near parallelism still lies on both segments, where it
-/// costs second order only. Relative error in float <= 1e-5 for distances >= 1 cm and coordinates of a
-/// few metres.
-template <class L>
-GSNAV_HD SegmentDistance<L> segment_distance(const Vec3<L>& a0, const Vec3<L>& a1, const Vec3<L>& b0,
-                                             const Vec3<L>& b1) noexcept {
-  using S = scalar_of<L>;
-  const L zero(S(0)), one(S(1)), tiny(detail::least_normal<S>());
-  const Vec3<L> u = a1 - a0, v = b1 - b0;
-  const Vec3<L> w00 = b0 - a0, w01 = b1 - a0, w10 = b0 - a1;
-  const L by_uu = one / max(dot(u, u), tiny), minus_by_vv = -one / max(dot(v, v), tiny);
-
-  const L ta0 = clamp(dot(w00, v) * minus_by_vv, zero, one);  // a0 against b
-  detail::SegmentCandidate<L> best{zero, ta0, zero, fma(ta0, v, w00)};
-  best.distance2 = dot(best.delta, best.delta);
-  const L ta1 = clamp(dot(w10, v) * minus_by_vv, zero, one);  // a1 against b
-  best.offer(one, ta1, fma(ta1, v, w10));
-  const L sb0 = clamp(dot(w00, u) * by_uu, zero, one);  // b0 against a
-  best.offer(sb0, zero, fma(-sb0, u, w00));
-  const L sb1 = clamp(dot(w01, u) * by_uu, zero, one);  // b1 against a
-  best.offer(sb1, one, fma(-sb1, u, w01));
-
-  const Vec3<L> n = cross(u, v);
-  const L den = dot(n, n);
-  // Where the lines are nearly parallel, an error along them costs second order only.
-  const L s_num = dot(rough_cross(w00, v), n), t_num = dot(rough_cross(w00, u), n);
-  const auto inside = (den > tiny) && (min(s_num, t_num) >= zero) && (max(s_num, t_num) <= den);
-  const L safe_den = select(den > tiny, den, one);
-  const L by_den = one / safe_den;
-  const L s = min(s_num * by_den, one), t = min(t_num * by_den, one);
-  best.offer(inside, s, t, fma(t, v, fma(-s, u, w00)));
-
-  SegmentDistance<L> out;
-  out.distance = sqrt(best.distance2);
-  out.on_a = fma(best.s, u, a0);
-  out.on_b = fma(best.t, v, b0);
-  // Touching cores have no direction between them: across both, else across the one that has length.
-  const Vec3<L> crossed = n * (one / sqrt(safe_den));
-  const auto u_longer = dot(u, u) >= dot(v, v);
-  const Vec3<L> fallback = detail::select_vec(
-      den > tiny, crossed, detail::any_perpendicular(detail::select_vec(u_longer, u, v)));
-  const auto apart = best.distance2 > tiny;
-  out.normal =
-      detail::select_vec(apart, best.delta * (one / select(apart, out.distance, one)), fallback);
-  return out;
-}
-
-/// Signed gap of two capsules: metres between the surfaces, negative where they overlap.
-template <class L>
-struct CapsuleGap {
-  L gap;
-  Vec3<L> normal;      ///< unit, from b to a: the way a gets out
-  Vec3<L> on_a, on_b;  ///< points of the two surfaces along the normal
-};
-
-template <class L>
-GSNAV_HD CapsuleGap<L> capsule_gap(const Capsule<L>& a, const Capsule<L>& b) noexcept {
-  const SegmentDistance<L> d = segment_distance(a.p0, a.p1, b.p0, b.p1);
-  return {d.distance - a.radius - b.radius, -d.normal, fma(a.radius, d.normal, d.on_a),
-          fma(-b.radius, d.normal, d.on_b)};
-}
 
 /// Rules of a sweep. All lengths in metres.
 template <class S>

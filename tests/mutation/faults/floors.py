@@ -2,10 +2,9 @@
 """Floors and stairs from Gaussians: what levels a flight and the floors it leads to."""
 from . import fault
 
-FLOOR = "src/nav/gaussian_floor.cpp"
 TEST = "tests/nav/test_gaussian_floor.cpp"
 CASE = "gaussian floor: stairs are a ramp*"
-MORE = (FLOOR,)
+MORE = ("src/nav/gaussian_floor.cpp", "src/nav/storeys.cpp", "src/nav/floor_marks.cpp", "src/nav/stairs.cpp")
 
 FAULTS = [
     fault("ramp_of_the_flight_alone", "kStairHead", "kStairHead = 1.0;", "kStairHead = 0.0;", TEST, CASE, more=MORE,

@@ -12,6 +12,8 @@
 #include <immintrin.h>
 #endif
 
+#include "gsnav/detail/math/pack_fma.hpp"
+#include "gsnav/detail/math/pack_mask.hpp"
 #include "gsnav/math/functions.hpp"
 
 // Float lanes over the compilers' vector extension: the functions of math/functions.hpp with the same
@@ -28,83 +30,6 @@
 #endif
 
 namespace gsnav {
-
-namespace detail {
-
-// g++ 12 rejects a vector_size that depends on a template parameter, so widths are spelled out.
-template <int N>
-struct PackTypes;
-template <>
-struct PackTypes<4> {
-  typedef float f __attribute__((vector_size(16)));
-  typedef std::int32_t i __attribute__((vector_size(16)));
-  typedef std::uint32_t u __attribute__((vector_size(16)));
-};
-template <>
-struct PackTypes<8> {
-  typedef float f __attribute__((vector_size(32)));
-  typedef std::int32_t i __attribute__((vector_size(32)));
-  typedef std::uint32_t u __attribute__((vector_size(32)));
-};
-template <>
-struct PackTypes<16> {
-  typedef float f __attribute__((vector_size(64)));
-  typedef std::int32_t i __attribute__((vector_size(64)));
-  typedef std::uint32_t u __attribute__((vector_size(64)));
-};
-
-}  // namespace detail
-
-/// Comparison result of a Pack: all bits of a lane set, or none.
-template <int N>
-struct Mask {
-  using vector = typename detail::PackTypes<N>::i;
-  vector v{};
-
-  GSNAV_HD Mask() noexcept = default;
-  GSNAV_HD explicit Mask(bool b) noexcept : v(vector{} - static_cast<std::int32_t>(b)) {}
-  GSNAV_HD explicit Mask(vector x) noexcept : v(x) {}
-
-  GSNAV_HD friend Mask operator&&(Mask a, Mask b) noexcept { return Mask(a.v & b.v); }
-  GSNAV_HD friend Mask operator||(Mask a, Mask b) noexcept { return Mask(a.v | b.v); }
-  GSNAV_HD friend Mask operator!(Mask a) noexcept { return Mask(~a.v); }
-};
-
-#if defined(__AVX512F__)
-/// With AVX-512 a mask is a register of one bit a lane; g++ does not see through the vector form.
-template <>
-struct Mask<16> {
-  __mmask16 v = 0;
-
-  GSNAV_HD Mask() noexcept = default;
-  GSNAV_HD explicit Mask(bool b) noexcept : v(static_cast<__mmask16>(b ? 0xffff : 0)) {}
-  GSNAV_HD static Mask of(__mmask16 m) noexcept {
-    Mask r;
-    r.v = m;
-    return r;
-  }
-  // By name, or g++ moves masks to general registers and back.
-  GSNAV_HD friend Mask operator&&(Mask a, Mask b) noexcept { return of(_kand_mask16(a.v, b.v)); }
-  GSNAV_HD friend Mask operator||(Mask a, Mask b) noexcept { return of(_kor_mask16(a.v, b.v)); }
-  GSNAV_HD friend Mask operator!(Mask a) noexcept { return of(_knot_mask16(a.v)); }
-};
-#endif
-
-namespace detail {
-enum class Compare { less, less_equal };
-template <int N, Compare C>
-GSNAV_HD Mask<N> compare(typename PackTypes<N>::f a, typename PackTypes<N>::f b) noexcept {
-#if defined(__AVX512F__)
-  if constexpr (N == 16) {
-    return Mask<16>::of(_mm512_cmp_ps_mask(reinterpret_cast<__m512>(a), reinterpret_cast<__m512>(b),
-                                           C == Compare::less ? _CMP_LT_OQ : _CMP_LE_OQ));
-  } else
-#endif
-  {
-    return C == Compare::less ? Mask<N>(a < b) : Mask<N>(a <= b);
-  }
-}
-}  // namespace detail
 
 /// N floats that are computed with together.
 template <class T, int N>
@@ -316,51 +241,6 @@ GSNAV_HD Pack<float, N> sqrt_above(Pack<float, N> a) noexcept {
 #endif
   return sqrt(a);
 }
-
-namespace detail {
-
-/// fma by way of double: the product is exact there, the sum is rounded to odd, and rounding that to
-/// float gives the correctly rounded result (Boldo and Melquiond 2008).
-GSNAV_HD float fma_by_double(float a, float b, float c) noexcept {
-  const double p = static_cast<double>(a) * static_cast<double>(b), d = static_cast<double>(c);
-  double s = p + d;
-  const double t = s - p;
-  const double error = (p - (s - t)) + (d - t);
-  std::uint64_t u;
-  std::memcpy(&u, &s, sizeof u);
-  if ((error > 0 || error < 0) && (u & 1) == 0) {
-    u = (error > 0) == (s > 0) ? u + 1 : u - 1;
-    std::memcpy(&s, &u, sizeof s);
-  }
-  return static_cast<float>(s);
-}
-
-#if defined(__SSE2__) && !defined(__FMA__)
-/// The same for two lanes at once.
-GSNAV_HD __m128 fma_by_double(__m128 a, __m128 b, __m128 c) noexcept {
-  const auto half = [](__m128d x, __m128d y, __m128d d) GSNAV_INLINED {
-    const __m128d p = _mm_mul_pd(x, y), s = _mm_add_pd(p, d), t = _mm_sub_pd(s, p);
-    const __m128d error = _mm_add_pd(_mm_sub_pd(p, _mm_sub_pd(s, t)), _mm_sub_pd(d, t));
-    const __m128d zero = _mm_setzero_pd();
-    const __m128i u = _mm_castpd_si128(s), one = _mm_set1_epi64x(1);
-    const __m128d inexact = _mm_or_pd(_mm_cmplt_pd(error, zero), _mm_cmpgt_pd(error, zero));
-    // All ones where the last bit is 0: subtracting 1 from that bit alone.
-    const __m128i even = _mm_sub_epi64(_mm_and_si128(u, one), one);
-    const __m128d same_sign = _mm_cmpge_pd(
-        _mm_mul_pd(_mm_or_pd(_mm_and_pd(error, _mm_set1_pd(-0.0)), _mm_set1_pd(1.0)), s), zero);
-    // +1 where error and sum point the same way, else -1.
-    const __m128i move =
-        _mm_or_si128(_mm_andnot_si128(_mm_castpd_si128(same_sign), _mm_set1_epi64x(-1)), one);
-    const __m128i apply = _mm_and_si128(_mm_castpd_si128(inexact), even);
-    return _mm_castsi128_pd(_mm_add_epi64(u, _mm_and_si128(move, apply)));
-  };
-  const auto high = [](__m128 x) GSNAV_INLINED { return _mm_cvtps_pd(_mm_movehl_ps(x, x)); };
-  const __m128 low = _mm_cvtpd_ps(half(_mm_cvtps_pd(a), _mm_cvtps_pd(b), _mm_cvtps_pd(c)));
-  return _mm_movelh_ps(low, _mm_cvtpd_ps(half(high(a), high(b), high(c))));
-}
-#endif
-
-}  // namespace detail
 
 /// a * b + c with one rounding.
 template <int N>

@@ -5,9 +5,14 @@
 #include <array>
 #include <cmath>
 
-#include "html_text.hpp"
+#include "../../tools/common/html_text.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::coordinate;
+using gsnav_tools::escape;
+using gsnav_tools::format;
+using gsnav_tools::format_round;
 namespace {
 
 // The drawing's size and the data's rectangle in it, SVG units.

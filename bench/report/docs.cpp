@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <vector>
 
+#include "../../tools/common/html_text.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "html_text.hpp"
 #include "table_budget.hpp"
 #include "table_targets.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::format;
+using gsnav_tools::format_round;
 namespace {
 
 /// Text for a cell of a Markdown table: no markup, no column break.

@@ -2,12 +2,16 @@
 #include <algorithm>
 #include <array>
 
+#include "../../tools/common/html_text.hpp"
 #include "html_sections.hpp"
-#include "html_text.hpp"
 #include "table_budget.hpp"
 #include "table_targets.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::escape;
+using gsnav_tools::format;
+using gsnav_tools::format_round;
 namespace {
 
 /// A column of the table of settings; `lowest` where the worst view is the one with the least.

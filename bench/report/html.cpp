@@ -3,13 +3,15 @@
 
 #include <array>
 
+#include "../../tools/common/html_text.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "html_sections.hpp"
 #include "html_style.hpp"
-#include "html_text.hpp"
 #include "plot_pareto.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::escape;
 
 using gsnav::Status;
 

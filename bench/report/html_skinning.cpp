@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "../../tools/common/html_text.hpp"
 #include "html_sections.hpp"
-#include "html_text.hpp"
 #include "plot.hpp"
 #include "plot_style.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::escape;
+using gsnav_tools::format;
 namespace {
 
 /// A curve over the number of influences for each series that has `column`.

@@ -10,9 +10,11 @@
 #include <map>
 #include <set>
 
-#include "html_text.hpp"
+#include "../../tools/common/html_text.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::format_round;
 
 using gsnav::Errc;
 using gsnav::Result;

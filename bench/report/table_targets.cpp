@@ -6,9 +6,12 @@
 #include <cstdio>
 #include <utility>
 
-#include "html_text.hpp"
+#include "../../tools/common/html_text.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::format;
+using gsnav_tools::format_round;
 namespace {
 
 /// Rows of one scene, size, backend and number of threads.

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "../common/parse_options.hpp"
+#include "../../tools/common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/version.hpp"
 

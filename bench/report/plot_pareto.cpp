@@ -5,10 +5,13 @@
 #include <initializer_list>
 #include <map>
 
-#include "html_text.hpp"
+#include "../../tools/common/html_text.hpp"
 #include "plot_style.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::escape;
+using gsnav_tools::format;
 namespace {
 
 /// What is drawn against time.

@@ -3,10 +3,14 @@
 #include <iterator>
 #include <set>
 
+#include "../../tools/common/html_text.hpp"
 #include "html_sections.hpp"
-#include "html_text.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::base64;
+using gsnav_tools::escape;
+using gsnav_tools::format;
 namespace {
 
 std::string read_png(const std::filesystem::path& path) {

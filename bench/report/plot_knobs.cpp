@@ -3,11 +3,14 @@
 #include <limits>
 #include <optional>
 
-#include "html_text.hpp"
+#include "../../tools/common/html_text.hpp"
 #include "plot_pareto.hpp"
 #include "plot_style.hpp"
 
 namespace gsnav_report {
+
+using gsnav_tools::escape;
+using gsnav_tools::format;
 namespace {
 
 constexpr const char* kExact = "exact";

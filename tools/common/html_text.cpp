@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace gsnav_report {
+namespace gsnav_tools {
 namespace {
 
 std::string to_text(double value, std::chars_format form, int precision) {
@@ -90,4 +90,4 @@ std::string format_round(double value) {
 
 std::string coordinate(double value) { return to_text(value, std::chars_format::fixed, 2); }
 
-}  // namespace gsnav_report
+}  // namespace gsnav_tools

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace gsnav_report {
+namespace gsnav_tools {
 
 /// Text for HTML and SVG, inside elements and attributes: & < > " ' become entities, control characters
 /// that XML forbids are dropped.
@@ -24,4 +24,4 @@ std::string format_round(double value);
 /// A coordinate in SVG: two decimals, in every locale.
 std::string coordinate(double value);
 
-}  // namespace gsnav_report
+}  // namespace gsnav_tools

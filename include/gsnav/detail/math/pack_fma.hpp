@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#if defined(__CUDACC__)
+#error "detail/math/pack_fma.hpp is host code: nvcc has no vector types in device functions"
+#endif
+
+#include <cstdint>
+#include <cstring>
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+#include "gsnav/config.hpp"
+
+namespace gsnav {
+
+namespace detail {
+
+/// fma by way of double: the product is exact there, the sum is rounded to odd, and rounding that to
+/// float gives the correctly rounded result (Boldo and Melquiond 2008).
+GSNAV_HD float fma_by_double(float a, float b, float c) noexcept {
+  const double p = static_cast<double>(a) * static_cast<double>(b), d = static_cast<double>(c);
+  double s = p + d;
+  const double t = s - p;
+  const double error = (p - (s - t)) + (d - t);
+  std::uint64_t u;
+  std::memcpy(&u, &s, sizeof u);
+  if ((error > 0 || error < 0) && (u & 1) == 0) {
+    u = (error > 0) == (s > 0) ? u + 1 : u - 1;
+    std::memcpy(&s, &u, sizeof s);
+  }
+  return static_cast<float>(s);
+}
+
+#if defined(__SSE2__) && !defined(__FMA__)
+/// The same for two lanes at once.
+GSNAV_HD __m128 fma_by_double(__m128 a, __m128 b, __m128 c) noexcept {
+  const auto half = [](__m128d x, __m128d y, __m128d d) GSNAV_INLINED {
+    const __m128d p = _mm_mul_pd(x, y), s = _mm_add_pd(p, d), t = _mm_sub_pd(s, p);
+    const __m128d error = _mm_add_pd(_mm_sub_pd(p, _mm_sub_pd(s, t)), _mm_sub_pd(d, t));
+    const __m128d zero = _mm_setzero_pd();
+    const __m128i u = _mm_castpd_si128(s), one = _mm_set1_epi64x(1);
+    const __m128d inexact = _mm_or_pd(_mm_cmplt_pd(error, zero), _mm_cmpgt_pd(error, zero));
+    // All ones where the last bit is 0: subtracting 1 from that bit alone.
+    const __m128i even = _mm_sub_epi64(_mm_and_si128(u, one), one);
+    const __m128d same_sign = _mm_cmpge_pd(
+        _mm_mul_pd(_mm_or_pd(_mm_and_pd(error, _mm_set1_pd(-0.0)), _mm_set1_pd(1.0)), s), zero);
+    // +1 where error and sum point the same way, else -1.
+    const __m128i move =
+        _mm_or_si128(_mm_andnot_si128(_mm_castpd_si128(same_sign), _mm_set1_epi64x(-1)), one);
+    const __m128i apply = _mm_and_si128(_mm_castpd_si128(inexact), even);
+    return _mm_castsi128_pd(_mm_add_epi64(u, _mm_and_si128(move, apply)));
+  };
+  const auto high = [](__m128 x) GSNAV_INLINED { return _mm_cvtps_pd(_mm_movehl_ps(x, x)); };
+  const __m128 low = _mm_cvtpd_ps(half(_mm_cvtps_pd(a), _mm_cvtps_pd(b), _mm_cvtps_pd(c)));
+  return _mm_movelh_ps(low, _mm_cvtpd_ps(half(high(a), high(b), high(c))));
+}
+#endif
+
+}  // namespace detail
+
+}  // namespace gsnav

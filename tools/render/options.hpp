@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gsnav/render.hpp"
+#include "gsnav/scene/lod_cut.hpp"
+
+namespace gsnav_render {
+
+using namespace gsnav;
+
+/// Which image --depth names; first hit may carry its tau.
+struct DepthChoice {
+  unsigned output = kMedianDepth;
+  double tau = 0.5;
+};
+
+struct Options {
+  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median",
+                                   composite = "merged", storage = "full", lod_levels = "shipped",
+                                   visible_sets;
+  DepthChoice depth_choice;
+  std::vector<std::string> meshes;
+  int width = 0, height = 0, threads = 0, orbit = 4;
+  double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0,
+         lod_pixels = LodChoice{}.pixels;
+  bool npy = false, png = false, ledger = false;
+};
+
+/// Prints "gsnav-render: `message`". Returns the exit status 1.
+int fail(const std::string& message);
+
+/// The exit status where there is nothing to draw: --help, or options that do not go together.
+std::optional<int> parse_options(int argc, char** argv, Options& o);
+
+}  // namespace gsnav_render

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/printable.hpp"
+#include "gsnav/io/scene_file.hpp"
+
+namespace gsnav_render {
+namespace {
+
+Status read_cloud(const Options& o, Scene& scene) {
+  io::LoadSceneOptions load;
+  load.time = o.time;
+  load.storage = o.storage == "compact" ? io::Storage::compact : io::Storage::full;
+  if (o.profile == "lod" && o.storage == "packed") {
+    return Status(Errc::invalid_argument,
+                  "--profile lod: not with --storage packed; use full or compact");
+  }
+  if (o.profile == "lod" && o.lod_levels == "shipped") {
+    auto set = io::load_shipped_levels(o.scene, load);
+    if (!set) return set.status();
+    if (*set) {
+      scene.full = std::move((*set)->cloud);
+      scene.report = std::move((*set)->report);
+      scene.tree = std::move((*set)->tree);
+    }
+  }
+  if (scene.tree) {
+    std::printf("levels of detail: %zu, %.1f MB, shipped\n", scene.tree->levels(),
+                static_cast<double>(scene.tree->bytes()) * 1e-6);
+  } else if (o.storage == "packed") {
+    auto read = io::load_packed_scene(o.scene, load);
+    if (!read) return read.status();
+    scene.packed = std::move(read->cloud);
+    scene.report = std::move(read->report);
+  } else {
+    auto read = io::load_scene(o.scene, load);
+    if (!read) return read.status();
+    scene.full = std::move(read->cloud);
+    scene.report = std::move(read->report);
+  }
+  std::fputs(io::report_text(scene.report).c_str(), stdout);
+  return {};
+}
+
+Status read_meshes(const Options& o, Scene& scene) {
+  for (const std::string& file : o.meshes) {
+    auto surface = io::load_textured_scene(file);
+    if (!surface) return surface.status();
+    const std::string kind = lower_case(std::filesystem::path(file).extension().string());
+    std::size_t triangles = 0;
+    for (TexturedPart& part : surface->parts) {
+      triangles += part.geometry.triangles.size();
+      // What says nothing of its looks is grey.
+      if (kind == ".obj" || kind == ".ply") part.material = {{0.5, 0.5, 0.5}, 0, -1, true, false};
+    }
+    auto placed = placed_meshes(std::move(*surface));
+    if (!placed) return Status(placed.status().code(), file + ": " + placed.message());
+    std::printf("%s: %zu triangles in %zu places\n", printable(file).c_str(), triangles,
+                placed->instances.size());
+    for (const std::string& w : placed->warnings)
+      std::printf("%s: %s\n", printable(file).c_str(), printable(w).c_str());
+    scene.meshes.push_back(std::move(*placed));
+  }
+  return {};
+}
+
+Status read_cameras(const Options& o, Scene& scene) {
+  const auto orbit = [&]() -> Result<std::vector<Camera>> {
+    const int w = o.width > 0 ? o.width : 640, h = o.height > 0 ? o.height : 480;
+    if (scene.packed) return views_around(scene.report.bounds, scene.report.up, o.orbit, w, h);
+    return views_around(scene.full, scene.report.up, o.orbit, w, h);
+  };
+  auto cameras = o.cameras.empty() ? orbit() : io::load_cameras(o.cameras, o.width, o.height);
+  if (!cameras) return cameras.status();
+  for (Camera& c : *cameras) c.near_plane = o.near_plane;
+  scene.cameras = std::move(*cameras);
+  return {};
+}
+
+/// The tree of a scene that has none of its own.
+Status build_levels(OpenMPBackend& backend, const Options& o, Scene& scene) {
+  if (o.profile != "lod" || scene.tree) return {};
+  LodSettings settings;
+  const bool terminal = isatty(fileno(stdout)) != 0;
+  settings.progress = [terminal](double share) {
+    if (terminal) std::printf("\rbuilding levels of detail: %.0f %%", 100 * share);
+    if (terminal) std::fflush(stdout);
+  };
+  auto made = io::cached_lod(o.scene, scene.full, settings,
+                             [&] { return build_lod(backend, scene.full, settings); });
+  if (!made) return made.status();
+  std::printf("%slevels of detail: %zu, %.1f MB, %s\n", terminal && made->built ? "\r" : "",
+              made->tree.levels(), static_cast<double>(made->tree.bytes()) * 1e-6,
+              made->built ? "built" : "read");
+  if (!made->warning.empty()) std::printf("%s\n", made->warning.c_str());
+  scene.tree = std::move(made->tree);
+  return {};
+}
+
+Status read_visible_sets(const Options& o, Scene& scene) {
+  if (o.visible_sets.empty()) return {};
+  if (o.profile == "exact")
+    return {Errc::invalid_argument,
+            "--visible-sets: sampled, so not for --profile exact; use fast or lod"};
+  if (scene.packed)
+    return {Errc::invalid_argument, "--visible-sets: not with --storage packed; use full or compact"};
+  auto sets = io::load_visible_sets(o.visible_sets, scene.full);
+  if (!sets) return sets.status();
+  std::printf("%s: %zu cells, from %zu viewpoints\n", printable(o.visible_sets).c_str(), sets->cells(),
+              sets->viewpoints);
+  scene.visible = std::move(*sets);
+  return {};
+}
+
+void profile_clouds(const Options& o, Scene& scene) {
+  // What cannot be seen is not held and not read; in exact, what is zero.
+  const auto fit = [unseen = o.profile == "exact" ? 0 : kUnseenColor](auto& cloud) {
+    SceneProfile made = profile_scene(cloud, unseen);
+    drop_bands(cloud, made);
+    return made;
+  };
+  SceneProfile& profile = scene.profile;
+  profile = scene.packed ? fit(*scene.packed) : fit(scene.full);
+  if (scene.tree) {
+    const SceneProfile merged = fit(scene.tree->merged);
+    profile.bytes_let_go += merged.bytes_let_go;
+    profile.color_error = std::max(profile.color_error, merged.color_error);
+  }
+  if (profile.sh_numbers != 0) {
+    std::array<std::size_t, kMaxShDegree + 1> chunks{};
+    for (const std::uint8_t degree : profile.chunk_sh_degrees) ++chunks[degree];
+    std::printf(
+        "SH: %zu, %zu, %zu, %zu chunks need degree 0 to 3; %llu bytes let go that none needs, %llu held "
+        "that only others "
+        "need\n",
+        chunks[0], chunks[1], chunks[2], chunks[3],
+        static_cast<unsigned long long>(profile.bytes_let_go),
+        static_cast<unsigned long long>(profile.bytes_unneeded));
+  }
+}
+
+}  // namespace
+
+Result<Scene> load_scene(OpenMPBackend& backend, const Options& o) {
+  Scene scene;
+  Status s = read_cloud(o, scene);
+  if (s.ok()) s = read_meshes(o, scene);
+  if (s.ok()) s = read_cameras(o, scene);
+  if (s.ok()) s = build_levels(backend, o, scene);
+  if (s.ok()) s = read_visible_sets(o, scene);
+  if (!s.ok()) return s;
+  profile_clouds(o, scene);
+  return scene;
+}
+
+}  // namespace gsnav_render
