@@ -164,7 +164,7 @@ struct TileLists {
     Splat splat;
     for (const GaussianSet& set : sets) {
       const PlacedSet placed(set);
-      for (std::size_t i = 0; i < set.gaussians.size; ++i) {
+      for (std::size_t i = 0; i < set.gaussians.size(); ++i) {
         reach.emplace_back();
         if (!placed.read(i, o.min_opacity, s)) {
           ++report.gaussians_faint;
@@ -243,7 +243,7 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
   for (const GaussianSet& set : sets) {
     placed.emplace_back(set);
     begins.push_back(total);
-    total += set.gaussians.size;
+    total += set.gaussians.size();
   }
   const double cut = o.sigmas * o.sigmas;
   const float least = static_cast<float>(-std::log1p(-o.solid_alpha));
