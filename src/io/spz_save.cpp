@@ -25,7 +25,7 @@ constexpr int kLevel = 12;  // of zstd: beyond it the files hardly shrink
 constexpr int kJob = 1 << 20;
 constexpr std::uint32_t kTocOffset = 32;
 
-using Plane = std::vector<std::uint8_t>;
+using ByteColumn = std::vector<std::uint8_t>;
 
 class SpzWriter {
  public:
@@ -45,11 +45,11 @@ class SpzWriter {
           for (std::size_t i = p * kPiece; i < std::min((p + 1) * kPiece, cloud_.size()); ++i)
             add(i, order[i], coefficients);
         });
-    std::vector<Plane> streams;
+    std::vector<ByteColumn> streams;
     std::vector<std::array<std::uint64_t, 2>> toc;
     for (std::size_t k = 0; k < 6; ++k) {
       if (widths[k] == 0) continue;
-      Plane packed;
+      ByteColumn packed;
       if (Status s = pack(planes_[k], packed); !s) return s;
       toc.push_back({packed.size(), planes_[k].size()});
       streams.push_back(std::move(packed));
@@ -65,7 +65,7 @@ class SpzWriter {
     out.write(small, sizeof small);
     out.write(tail, sizeof tail);
     for (const auto& entry : toc) out.write(entry.data(), sizeof entry);
-    for (const Plane& stream : streams) out.write(stream.data(), stream.size());
+    for (const ByteColumn& stream : streams) out.write(stream.data(), stream.size());
     return out.commit();
   }
 
@@ -73,7 +73,7 @@ class SpzWriter {
   Status fail(const std::string& what) const { return {Errc::invalid_argument, target_ + ": " + what}; }
 
   /// Compresses by zstd's own threads where it has them; the bytes do not depend on their number.
-  Status pack(const Plane& plane, Plane& packed) const {
+  Status pack(const ByteColumn& plane, ByteColumn& packed) const {
     const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(),
                                                                           ZSTD_freeCCtx);
     if (!context) return {Errc::out_of_memory, target_ + ": not enough memory"};
@@ -177,7 +177,7 @@ class SpzWriter {
   const std::string& target_;
   double turn_;  ///< of y and z
   detail::SpzHeader header_;
-  std::array<Plane, 6> planes_;
+  std::array<ByteColumn, 6> planes_;
 };
 
 }  // namespace
