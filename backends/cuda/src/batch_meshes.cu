@@ -23,22 +23,16 @@ std::uint32_t chunks_of(std::size_t n) {
 
 }  // namespace
 
-Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> cameras) {
-  cuda::Flight& flight = flights[calls % cuda::kInFlight];
-  flight.mesh_triangles = 0;
-  meshes.waves.clear();
-  flight.has_meshes = false;
-  for (const BatchCamera& c : cameras)
-    flight.has_meshes = flight.has_meshes || !c.meshes.instances.empty();
-  if (!flight.has_meshes) return {};
-
-  // ---- what each camera sees
+/// Lists what each camera sees, in waves of cameras. `most_triangles`: of one wave, at most.
+Status CudaBatchRenderer::State::list_meshes(std::span<const BatchCamera> cameras,
+                                             std::uint64_t& most_triangles) {
   const std::size_t pixels =
       static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  cuda::Flight& flight = flights[calls % cuda::kInFlight];
   meshes.placements.clear();
   meshes.places.clear();
   meshes.chunk_begins.clear();
-  std::uint64_t triangles = 0, most_triangles = 0;
+  std::uint64_t triangles = 0;
   for (std::uint32_t c = 0; c < cameras.size(); ++c) {
     const MeshFrame& frame = cameras[c].meshes;
     if (Status s = detail::validate(frame.instances, cameras[c].camera, frame.light); !s) {
@@ -79,8 +73,12 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
     triangles += of_camera;
     most_triangles = std::max(most_triangles, triangles);
   }
+  return {};
+}
 
-  // ---- into pinned memory
+/// Copies the lists, cameras and lights into the call's pinned memory.
+void CudaBatchRenderer::State::write_mesh_inputs(std::span<const BatchCamera> cameras) {
+  cuda::Flight& flight = flights[calls % cuda::kInFlight];
   cuda::Layout layout;
   meshes.at_placements = layout.add<MeshPlacement>(meshes.placements.size());
   meshes.at_places = layout.add<cuda::MeshPlace>(meshes.places.size());
@@ -103,8 +101,21 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
     lights[c] = {};
     detail::set_light(lights[c], cameras[c].meshes.light);
   }
+}
 
-  // ---- layers
+Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> cameras) {
+  cuda::Flight& flight = flights[calls % cuda::kInFlight];
+  flight.mesh_triangles = 0;
+  meshes.waves.clear();
+  flight.has_meshes = std::any_of(cameras.begin(), cameras.end(),
+                                  [](const BatchCamera& c) { return !c.meshes.instances.empty(); });
+  if (!flight.has_meshes) return {};
+  std::uint64_t most_triangles = 0;
+  if (Status s = list_meshes(cameras, most_triangles); !s) return s;
+  write_mesh_inputs(cameras);
+
+  const std::size_t pixels =
+      static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
   const bool color = raster.images.rgb != nullptr || rgb8 != nullptr;
   meshes.depth.resize_discard(args.cameras * pixels);
   meshes.color.resize_discard(color ? args.cameras * 3 * pixels : 0);

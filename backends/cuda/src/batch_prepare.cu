@@ -85,6 +85,19 @@ cuda::PlainCamera plain_camera(const BatchInstance& instance, const Vec3d& offse
   return p;
 }
 
+/// Whether projection may read PlainCamera (BatchArgs::plain_cameras).
+bool has_plain_rules(const RenderConfig& config, std::span<const GaussianSet> sets,
+                     std::span<const BatchCamera> cameras) {
+  return config.response == Response::ewa && config.compat == Compat::none &&
+         config.sort_order == SortOrder::z_depth &&
+         std::all_of(cameras.begin(), cameras.end(),
+                     [](const BatchCamera& c) { return c.camera.near_sigma == 0; }) &&
+         std::all_of(sets.begin(), sets.end(), [](const GaussianSet& s) {
+           return s.filter == Filter::classic && s.gaussians.shape.axes.empty() &&
+                  s.gaussians.color.rotations.empty() && s.gaussians.shape.origin_ids.empty();
+         });
+}
+
 }  // namespace
 
 /// Of lists of the prepared call that hold so many pairs together: twice the mean. Few lists are much
@@ -97,11 +110,9 @@ std::uint32_t CudaBatchRenderer::State::room_for(std::uint64_t pairs) const {
                               std::numeric_limits<std::uint32_t>::max()));
 }
 
-/// Everything of a call that the host computes, into one pinned block and on to the device.
-Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
-                                         std::span<const BatchCamera> cameras,
-                                         const BatchImages& images) {
-  // ---- who sees what
+/// Fills `seen`, `set_begins` and `cursors`: who sees what. Returns how many origins that takes.
+std::size_t CudaBatchRenderer::State::list_seen(std::span<const GaussianSet> sets,
+                                                std::span<const BatchCamera> cameras) {
   seen.clear();
   set_begins.assign(sets.size() + 1, 0);
   std::size_t origins = 0;
@@ -119,41 +130,40 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
   }
   for (std::size_t s = 0; s < sets.size(); ++s) set_begins[s + 1] += set_begins[s];
   cursors.assign(set_begins.begin(), set_begins.end() - 1);
+  return origins;
+}
 
-  const ProjectionRules rules = projection_rules(config);
+/// Reserves one pinned block and as much on the device for the inputs of a call.
+cuda::InputPlaces CudaBatchRenderer::State::reserve_inputs(std::size_t sets, std::size_t cameras,
+                                                           std::size_t origins, bool plain_rules) {
   cuda::Layout layout;
-  const std::size_t at_sets = layout.add<BatchSet>(sets.size());
-  const std::size_t at_instances = layout.add<BatchInstance>(seen.size());
-  const bool plain_rules = config.response == Response::ewa && config.compat == Compat::none &&
-                           rules.sort_order == SortOrder::z_depth &&
-                           std::all_of(cameras.begin(), cameras.end(),
-                                       [](const BatchCamera& c) { return c.camera.near_sigma == 0; }) &&
-                           std::all_of(sets.begin(), sets.end(), [](const GaussianSet& s) {
-                             return s.filter == Filter::classic && s.gaussians.shape.axes.empty() &&
-                                    s.gaussians.color.rotations.empty() &&
-                                    s.gaussians.shape.origin_ids.empty();
-                           });
-  const std::size_t at_plain = layout.add<cuda::PlainCamera>(plain_rules ? seen.size() : 0);
-  const std::size_t at_first = layout.add<std::uint32_t>(cameras.size() + 1);
-  const std::size_t at_list = layout.add<std::uint32_t>(seen.size());
-  const std::size_t at_offsets = layout.add<Vec3d>(origins);
+  cuda::InputPlaces at;
+  at.sets = layout.add<BatchSet>(sets);
+  at.instances = layout.add<BatchInstance>(seen.size());
+  at.plain = layout.add<cuda::PlainCamera>(plain_rules ? seen.size() : 0);
+  at.first = layout.add<std::uint32_t>(cameras + 1);
+  at.list = layout.add<std::uint32_t>(seen.size());
+  at.offsets = layout.add<Vec3d>(origins);
   cuda::Flight& flight = flights[calls % cuda::kInFlight];
   cuda::need(cudaEventSynchronize(flight.done), "waiting for an earlier batch");
   flight.inputs.reserve(layout.bytes());
   inputs.resize_discard(layout.bytes());
-  const auto host = [&](auto* type, std::size_t at) {
-    return reinterpret_cast<decltype(type)>(flight.inputs.data + at);
-  };
-  const auto device = [&](auto* type, std::size_t at) {
-    return reinterpret_cast<decltype(type)>(inputs.data() + at);
-  };
+  input_bytes = layout.bytes();
+  at.host = flight.inputs.data;
+  at.device = inputs.data();
+  return at;
+}
 
-  // ---- instances, neighbours where they are of one set
-  auto* const instances = host(static_cast<BatchInstance*>(nullptr), at_instances);
-  auto* const plain = host(static_cast<cuda::PlainCamera*>(nullptr), at_plain);
-  auto* const first = host(static_cast<std::uint32_t*>(nullptr), at_first);
-  auto* const list = host(static_cast<std::uint32_t*>(nullptr), at_list);
-  auto* const offsets = host(static_cast<Vec3d*>(nullptr), at_offsets);
+/// Writes the instances, neighbours where they are of one set, and the list of each camera.
+void CudaBatchRenderer::State::fill_instances(std::span<const GaussianSet> sets,
+                                              std::span<const BatchCamera> cameras,
+                                              const cuda::InputPlaces& at, bool plain_rules) {
+  const ProjectionRules rules = projection_rules(config);
+  auto* const instances = at.on_host<BatchInstance>(at.instances);
+  auto* const plain = at.on_host<cuda::PlainCamera>(at.plain);
+  auto* const first = at.on_host<std::uint32_t>(at.first);
+  auto* const list = at.on_host<std::uint32_t>(at.list);
+  auto* const offsets = at.on_host<Vec3d>(at.offsets);
   std::size_t origin = 0;
   std::fill(first, first + cameras.size() + 1, 0u);
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -168,19 +178,19 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
     to = view_set<float>(camera, set, rules, config.quality.max_sh_degree);
     to.selection.seen = seen[i].bits;
     to.first_rank = seen[i].first_rank;
-    to.offsets = {device(static_cast<Vec3d*>(nullptr), at_offsets) + origin,
-                  origin_count(set.gaussians)};
+    to.offsets = {at.on_device<Vec3d>(at.offsets) + origin, origin_count(set.gaussians)};
     const std::size_t first_origin = origin;
     for (std::size_t o = 0; o < to.offsets.size; ++o) offsets[origin++] = origin_offset(to, o);
     std::memcpy(instances + index, &instance, sizeof instance);
     if (plain_rules) plain[index] = plain_camera(instance, offsets[first_origin]);
   }
   for (std::size_t c = 0; c < cameras.size(); ++c) first[c + 1] += first[c];
+}
 
-  // ---- units of culling
-  auto* const units = host(static_cast<BatchSet*>(nullptr), at_sets);
-  args = {};
-  args.color = images.floats.rgb != nullptr || images.rgb8 != nullptr;
+/// Writes the units of culling. False where counts of 32 bits do not hold the items.
+bool CudaBatchRenderer::State::plan_units(std::span<const GaussianSet> sets,
+                                          const cuda::InputPlaces& at) {
+  auto* const units = at.on_host<BatchSet>(at.sets);
   args.seen_rows = std::any_of(seen.begin(), seen.end(), [&](const Seen& v) {
     return v.bits.size > seen_chunk_words(sets[v.set].gaussians.chunk_count());
   });
@@ -193,36 +203,29 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
     item_capacity += std::uint64_t{u.words()} * u.chunks * cuda::kPartsPerChunk;
     args.units += u.units();
   }
-  if (item_capacity > cuda::kMostItems) {
-    return {Errc::unsupported,
-            "CudaBatchRenderer: " + std::to_string(item_capacity) +
-                " parts of chunks times words of cameras in one batch: draw fewer cameras a call"};
-  }
+  return item_capacity <= cuda::kMostItems;
+}
 
-  args.sets = device(static_cast<BatchSet*>(nullptr), at_sets);
-  args.instances = device(static_cast<BatchInstance*>(nullptr), at_instances);
-  args.plain_cameras =
-      plain_rules ? device(static_cast<cuda::PlainCamera*>(nullptr), at_plain) : nullptr;
-  args.camera_first = device(static_cast<std::uint32_t*>(nullptr), at_first);
-  args.camera_instances = device(static_cast<std::uint32_t*>(nullptr), at_list);
-  args.set_count = static_cast<std::uint32_t>(sets.size());
-  args.cameras = static_cast<std::uint32_t>(cameras.size());
+/// Chooses tiles and lists. Returns whether the call is one of few cameras.
+bool CudaBatchRenderer::State::plan_tiles(std::span<const BatchCamera> cameras,
+                                          std::uint64_t gaussians) {
   const int width = cameras[0].camera.width, height = cameras[0].camera.height;
   args.grid = TileGrid::of(width, height, cuda::kBatchTile);
-  std::uint64_t gaussians = 0;
-  for (const Seen& v : seen) gaussians += sets[v.set].gaussians.size();
   const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, multiprocessors);
   if (few) args.grid = TileGrid::of(width, height, cuda::kSmallTile);
-  const std::uint64_t tiles = args.cameras * std::uint64_t{args.grid.count()};
-  if (tiles > cuda::kMostTiles)
-    return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
-  args.tiles = static_cast<std::uint32_t>(tiles);
+  args.tiles = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(args.cameras * std::uint64_t{args.grid.count()}, ~std::uint32_t{0}));
   args.short_lists = !few && has_short_lists(args.grid.count(), multiprocessors);
-  args.depth_bins = few ? depth_bins_of(cameras, rules.key_bits, args.tiles) : cuda::DepthBins{};
+  args.depth_bins =
+      few ? depth_bins_of(cameras, config.quality.key_bits, args.tiles) : cuda::DepthBins{};
   args.log2_alpha_min = static_cast<float>(std::log2(config.quality.alpha_min));
   args.elliptic = config.response == Response::ewa;
   args.slab = args.cameras < 8 ? 64 : 256;
+  return few;
+}
 
+/// What blending reads beside the lists.
+void CudaBatchRenderer::State::set_raster(const BatchImages& images) {
   raster = {};
   raster.grid = args.grid;
   raster.background = vec_cast<float>(config.background);
@@ -231,9 +234,11 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
   raster.rules =
       images.rgb8 != nullptr ? blend_rules<float>(config) : blend_rules<float>(config, images.floats);
   rgb8 = images.rgb8;
+}
 
-  // Guesses; the first calls find out. Of what is drawn by few cameras and by many there is scratch of
-  // its own.
+/// Capacities of the first calls, which find out. Of what is drawn by few cameras and by many there is
+/// scratch of its own.
+void CudaBatchRenderer::State::guess_capacities(std::uint64_t gaussians, bool few) {
   const std::uint32_t slots =
       static_cast<std::uint32_t>(std::clamp<std::uint64_t>(gaussians / 4, 1u << 16, 1u << 26));
   const auto guess = [](std::uint32_t& capacity, std::uint32_t n) {
@@ -257,7 +262,38 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
       room_tiles = args.tiles;
     }
   }
-  input_bytes = layout.bytes();
+}
+
+/// Everything of a call that the host computes, into one pinned block and on to the device.
+Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
+                                         std::span<const BatchCamera> cameras,
+                                         const BatchImages& images) {
+  const std::size_t origins = list_seen(sets, cameras);
+  const bool plain_rules = has_plain_rules(config, sets, cameras);
+  const cuda::InputPlaces at = reserve_inputs(sets.size(), cameras.size(), origins, plain_rules);
+  fill_instances(sets, cameras, at, plain_rules);
+
+  args = {};
+  args.color = images.floats.rgb != nullptr || images.rgb8 != nullptr;
+  if (!plan_units(sets, at)) {
+    return {Errc::unsupported,
+            "CudaBatchRenderer: " + std::to_string(item_capacity) +
+                " parts of chunks times words of cameras in one batch: draw fewer cameras a call"};
+  }
+  args.sets = at.on_device<BatchSet>(at.sets);
+  args.instances = at.on_device<BatchInstance>(at.instances);
+  args.plain_cameras = plain_rules ? at.on_device<cuda::PlainCamera>(at.plain) : nullptr;
+  args.camera_first = at.on_device<std::uint32_t>(at.first);
+  args.camera_instances = at.on_device<std::uint32_t>(at.list);
+  args.set_count = static_cast<std::uint32_t>(sets.size());
+  args.cameras = static_cast<std::uint32_t>(cameras.size());
+  std::uint64_t gaussians = 0;
+  for (const Seen& v : seen) gaussians += sets[v.set].gaussians.size();
+  const bool few = plan_tiles(cameras, gaussians);
+  if (args.tiles > cuda::kMostTiles)
+    return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
+  set_raster(images);
+  guess_capacities(gaussians, few);
   return {};
 }
 

@@ -147,6 +147,22 @@ void for_each_set(const BatchCamera& camera, std::size_t sets, const F& f) {
   for (std::uint32_t s = 0; s < sets; ++s) f(s);
 }
 
+/// Where the inputs of a call lie: bytes from the begin of a block, in pinned memory and on the device.
+struct InputPlaces {
+  std::size_t sets = 0, instances = 0, plain = 0, first = 0, list = 0, offsets = 0;
+  unsigned char* host = nullptr;
+  unsigned char* device = nullptr;
+
+  template <class T>
+  T* on_host(std::size_t at) const {
+    return reinterpret_cast<T*>(host + at);
+  }
+  template <class T>
+  T* on_device(std::size_t at) const {
+    return reinterpret_cast<T*>(device + at);
+  }
+};
+
 /// Names the camera, set or field that cannot be, or ok.
 Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                    const RenderConfig& config);
@@ -205,8 +221,21 @@ struct CudaBatchRenderer::State {
 
   Status prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                  const BatchImages& images);
+  // The steps of prepare().
+  std::size_t list_seen(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras);
+  cuda::InputPlaces reserve_inputs(std::size_t sets, std::size_t cameras, std::size_t origins,
+                                   bool plain_rules);
+  void fill_instances(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+                      const cuda::InputPlaces& at, bool plain_rules);
+  bool plan_units(std::span<const GaussianSet> sets, const cuda::InputPlaces& at);
+  bool plan_tiles(std::span<const BatchCamera> cameras, std::uint64_t gaussians);
+  void set_raster(const BatchImages& images);
+  void guess_capacities(std::uint64_t gaussians, bool few);
   /// What meshes the prepared cameras see, into the same call's pinned memory.
   Status place_meshes(std::span<const BatchCamera> cameras);
+  // The steps of place_meshes().
+  Status list_meshes(std::span<const BatchCamera> cameras, std::uint64_t& most_triangles);
+  void write_mesh_inputs(std::span<const BatchCamera> cameras);
   std::uint32_t room_for(std::uint64_t pairs) const;
   /// How many of so many cameras counts of 32 bits and the device's free memory have room for, where
   /// each takes what those of the last call took.

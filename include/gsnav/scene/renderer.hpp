@@ -16,109 +16,12 @@
 #include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/render/frame_lanes.hpp"
 #include "gsnav/detail/render/render_composite.hpp"
-#include "gsnav/detail/scene/needed_bands.hpp"
+#include "gsnav/detail/scene/gaussian_arrays.hpp"
 #include "gsnav/render/frames.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 
 namespace gsnav {
-
-/// A cloud's arrays in a backend's own memory. On host backends nothing is copied: the cloud must
-/// outlive it. Packed clouds become floats elsewhere.
-template <Backend B>
-class GaussianArrays {
- public:
-  GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
-    if constexpr (!is_host_backend<B>) upload(backend, cloud);
-  }
-  /// Without the SH bands that the profile says no chunk needs (detail/scene/scene_profile.hpp):
-  /// elsewhere than on host backends those that none does take no memory, those that a chunk does not
-  /// are not read. On host backends the profile must outlive it too.
-  GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneProfile& profile)
-      : set_(profile.applied_to(cloud.set())) {
-    if constexpr (!is_host_backend<B>) {
-      upload(backend, cloud);
-      to_device(backend, set_.gaussians.color.chunk_degrees, bytes_);
-    }
-  }
-  GaussianArrays(B& backend, const PackedCloud& cloud) : set_(cloud.set()) {
-    if constexpr (!is_host_backend<B>) {
-      const GaussianCloud floats = unpack_cloud(cloud);
-      set_ = floats.set();
-      upload(backend, floats);
-    }
-  }
-  GaussianArrays(B& backend, const PackedCloud& cloud, const SceneProfile& profile)
-      : set_(profile.applied_to(cloud.set())) {
-    if constexpr (!is_host_backend<B>) {
-      const GaussianCloud floats = unpack_cloud(cloud);
-      set_ = profile.applied_to(floats.set());
-      upload(backend, floats);
-      to_device(backend, set_.gaussians.color.chunk_degrees, bytes_);
-    }
-  }
-  GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
-    GaussianSet s = set_;
-    s.world_from_asset = world_from_asset;
-    return s;
-  }
-
- private:
-  void upload(B& backend, const GaussianCloud& cloud) {
-    GaussianRows& v = set_.gaussians;
-    to_device(backend, v.shape.means);
-    to_device(backend, v.shape.quats);
-    to_device(backend, v.shape.scales);
-    to_device(backend, v.shape.opacities, floats_);
-    to_device(backend, v.shape.origin_ids, ids_);
-    to_device(backend, v.color.sh0, floats_);
-    std::vector<float> floats;
-    std::vector<std::uint16_t> halves;
-    drop_bands(v.color, v.size(), floats, halves);
-    to_device(backend, v.color.shN, floats_);
-    to_device(backend, v.color.shN_half, halves_);
-    to_device(backend, v.row_ids, ids_);
-    to_device(backend, v.chunk_bounds, bounds_);
-    to_device(backend, v.part_bounds, bounds_);
-    origins_ = cloud.origins;  // read by the host
-    v.origins = view_of(std::as_const(origins_));
-  }
-  /// Leaves out the bands that no chunk has: rows become shorter.
-  static void drop_bands(ColorRows& v, std::size_t size, std::vector<float>& floats,
-                         std::vector<std::uint16_t>& halves) {
-    const int most = needed_sh_degree(v);
-    if (most == v.degree) return;
-    const auto drop = [&]<class T>(View<const T>& from, std::vector<T>& to) {
-      if (from.empty()) return;
-      to.resize(sh_band_numbers(most) * size);
-      cut_rows(from.data, size, v.rest(), sh_band_numbers(most), to.data());
-      from = view_of(std::as_const(to));
-    };
-    drop(v.shN, floats);
-    drop(v.shN_half, halves);
-    v.degree = most;
-  }
-  template <class T>
-  static void to_device(B& backend, View<const T>& v, std::vector<Buffer<T, B>>& held) {
-    held.emplace_back(backend).upload(v.data, v.size);
-    v = {held.back().data(), v.size};
-  }
-  template <std::size_t K>
-  void to_device(B& backend, Planes<const float, K>& planes) {
-    for (std::size_t k = 0; k < K; ++k) {
-      View<const float> plane = planes[k];
-      to_device(backend, plane, floats_);
-      planes.data[k] = plane.data;
-    }
-  }
-  GaussianSet set_;
-  std::vector<Buffer<float, B>> floats_;
-  std::vector<Buffer<std::uint16_t, B>> halves_;
-  std::vector<Buffer<std::uint32_t, B>> ids_;
-  std::vector<Buffer<ChunkBounds, B>> bounds_;
-  std::vector<Buffer<std::uint8_t, B>> bytes_;
-  std::vector<Vec3d> origins_;
-};
 
 /// Renders Gaussians on a backend. Keeps its scratch between calls: a steady frame allocates nothing
 /// but what its caller's vectors need. `S` is the scalar of all arithmetic; sort keys are float32 for

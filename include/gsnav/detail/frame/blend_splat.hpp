@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "gsnav/core/view.hpp"
+#include "gsnav/detail/frame/depth.hpp"
+#include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/image/mesh_layer.hpp"
+#include "gsnav/math/functions.hpp"
+
+namespace gsnav {
+
+/// Images a render may produce; combine with |. Nothing that is not asked for is computed.
+enum Output : unsigned {
+  kRgb = 1u << 0,               ///< [H][W][3], unclamped, over the background
+  kAlpha = 1u << 1,             ///< [H][W], 1 - transmittance
+  kMedianDepth = 1u << 2,       ///< [H][W] metres, where transmittance crosses 1/2; 0: no return
+  kExpectedDepth = 1u << 3,     ///< [H][W] metres, sum(w z) / sum(w); 0 where sum(w) = 0
+  kAccumulatedDepth = 1u << 4,  ///< [H][W] metres, sum(w z)
+  kFirstHitDepth = 1u << 5,     ///< [H][W] metres, where alpha first reaches first_hit_tau; 0: never
+};
+inline constexpr unsigned kAnyDepth = kMedianDepth | kExpectedDepth | kAccumulatedDepth | kFirstHitDepth;
+
+/// The rules of blending, in the scalar of the kernel.
+template <class S>
+struct BlendRules {
+  S max_alpha{S(0.99)};
+  S transmittance_min{S(1e-4)};  ///< a pixel is closed by the Gaussian that takes T below this
+  S first_hit_tau{S(0.5)};
+  S log2_alpha_min{S(-7.9943534368588579)};  ///< log2 of the smallest alpha that is blended
+  S return_alpha{S(0)};         ///< expected depth has no return where alpha is not above this
+  bool exclusive_stop = false;  ///< the Gaussian that closes a pixel is not blended (Compat)
+};
+
+/// Which depth images a compiled blend loop serves; less is cheaper.
+enum class DepthMode { none, median, any };
+
+/// Transmittance of a pixel (or a pack of them) before and after a splat or a surface, and the weight
+/// that this has in the sums: before - after where it is blended, else 0.
+template <class L>
+struct TransmittanceStep {
+  L before, after, weight;
+};
+
+/// Whether transmittance goes from above a level to the level or below it: what decides median and
+/// first-hit depth.
+template <class L>
+GSNAV_HD mask_of<L> falls_through(L before, L after, scalar_of<L> level) noexcept {
+  return (before > L(level)) && (after <= L(level));
+}
+
+/// The transmittance whose crossing is the median depth.
+template <class S>
+inline constexpr S kMedianLevel = S(0.5);
+
+/// The depths of one pixel (or a pack of them) that a DepthMode keeps. `accumulate` adds what lies at
+/// depth z(), metres; z is called only where it is needed. Where the weight is 0, z() may be any finite
+/// number.
+template <class L, DepthMode D>
+struct DepthState {
+  template <class Z>
+  GSNAV_HD void accumulate(const TransmittanceStep<L>&, scalar_of<L>, const Z&) noexcept {}
+};
+template <class L>
+struct DepthState<L, DepthMode::median> {
+  L median{scalar_of<L>(0)};
+
+  template <class Z>
+  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L>, const Z& z) noexcept {
+    const auto crosses = falls_through(step.before, step.after, kMedianLevel<scalar_of<L>>);
+    if (any(crosses)) median = select(crosses, z(), median);
+  }
+};
+template <class L>
+struct DepthState<L, DepthMode::any> {
+  L median{scalar_of<L>(0)};
+  /// sum w (z - z_ref), z_ref the first depth blended: a far wall's depths lose no digits to their size.
+  L accumulated{scalar_of<L>(0)}, z_ref{scalar_of<L>(0)};
+  L first_hit{scalar_of<L>(0)};
+
+  template <class Z>
+  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L> first_hit_tau,
+                           const Z& z_of) noexcept {
+    using S = scalar_of<L>;
+    const L z = z_of();
+    median = select(falls_through(step.before, step.after, kMedianLevel<S>), z, median);
+    z_ref = select((step.before >= L(S(1))) && (step.weight > L(S(0))), z, z_ref);
+    accumulated = fma(step.weight, z - z_ref, accumulated);
+    first_hit = select(falls_through(step.before, step.after, S(1) - first_hit_tau), z, first_hit);
+  }
+};
+
+/// The number of the splat that the median depth is of, for loops that compute one depth a pixel: the
+/// last one that is met while transmittance is above kMedianLevel, if transmittance falls through that
+/// level at all.
+template <class L, class Id>
+GSNAV_HD Id last_above_half(L before, Id met, Id last) noexcept {
+  return select(before > L(kMedianLevel<scalar_of<L>>), met, last);
+}
+
+/// Transmittance and colour so far of one pixel (or a pack of them).
+template <class L>
+struct BlendColor {
+  L transmittance{scalar_of<L>(1)};
+  L r{scalar_of<L>(0)}, g{scalar_of<L>(0)}, b{scalar_of<L>(0)};
+
+  /// No Gaussian has closed the pixel yet.
+  template <class S>
+  GSNAV_HD mask_of<L> open(const BlendRules<S>& rules) const noexcept {
+    return transmittance >= L(rules.transmittance_min);
+  }
+};
+
+/// Running state of one pixel (or a pack of them), front to back.
+template <class L, DepthMode D>
+struct BlendState : BlendColor<L>, DepthState<L, D> {
+  /// Adds what has color() and lies at depth z(); each is called only where it is needed.
+  template <bool Color, class C, class Z>
+  GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L> first_hit_tau, const C& color,
+                           const Z& z) noexcept {
+    if constexpr (Color) {
+      const Vec3<L> c = color();
+      this->r = fma(step.weight, c.x, this->r);
+      this->g = fma(step.weight, c.y, this->g);
+      this->b = fma(step.weight, c.z, this->b);
+    }
+    DepthState<L, D>::accumulate(step, first_hit_tau, z);
+  }
+};
+
+/// The records of one splat that blending may read; null where no output needs them.
+template <class S>
+struct SplatRecords {
+  const SplatGeometry<S>* geometry;
+  const SplatColor<S>* color;
+  const SplatDepth<S>* depth;
+  const SplatPerspective<S>* perspective;
+};
+
+/// What log2 alpha of a splat is made of in one column of pixels: column - (b dy + w2)^2.
+template <class L>
+struct ColumnTerms {
+  L column, w2;
+};
+
+template <class L, class S>
+GSNAV_HD ColumnTerms<L> column_terms(const SplatGeometry<S>& g, L px) noexcept {
+  const L dx = px - L(g.ref_x);
+  const L w1 = fma(dx, L(g.a), L(g.w1));
+  return {fma(-w1, w1, L(g.log2_opacity)), fma(dx, L(g.k), L(g.w2))};
+}
+
+/// log2 alpha at the pixel centre `py` of a column: never above log2 of the opacity.
+template <class L>
+GSNAV_HD L column_exponent(const ColumnTerms<L>& terms, L ref_y, L b, L py) noexcept {
+  const L w2 = fma(py - ref_y, b, terms.w2);
+  return fma(-w2, w2, terms.column);
+}
+
+/// log2 alpha where the response is not linearised (Response): far below any that is drawn behind the
+/// camera.
+template <class L, class S>
+GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspective<S>& v, L px,
+                                L py) noexcept {
+  const L dx = px - L(g.ref_x), dy = py - L(g.ref_y);
+  const L w1 = fma(dx, L(g.a), L(g.w1));
+  const L w2 = fma(dy, L(g.b), fma(dx, L(g.k), L(g.w2)));
+  const L s = fma(w2, w2, w1 * w1);
+  const L f = fma(dx, L(v.fx), fma(dy, L(v.fy), L(v.f0)));
+  const L exponent = L(g.log2_opacity) - s / fma(f, f, L(v.c) * s);
+  return select(f > L(S(0)), exponent, L(S(-1e30)));
+}
+
+/// log2 alpha of a splat at pixel centres: of the response along each ray if `along_rays`, else of the
+/// splat's ellipse. `perspective` is read in the first case only.
+template <class L, class S>
+GSNAV_HD L splat_exponent(bool along_rays, const SplatGeometry<S>& g,
+                          const SplatPerspective<S>* perspective, L px, L py) noexcept {
+  if (along_rays) return perspective_exponent(g, *perspective, px, py);
+  return column_exponent(column_terms(g, px), L(g.ref_y), L(g.b), py);
+}
+
+/// Whether pixels are in the footprint, which is alpha >= 2^log2_alpha_min. The exponent decides it, so
+/// that it does not depend on tiles; and alpha is positive wherever it is drawn.
+template <class L, class S>
+GSNAV_HD mask_of<L> in_footprint(const BlendRules<S>& rules, L exponent) noexcept {
+  return exponent >= L(rules.log2_alpha_min);
+}
+
+/// Alpha of log2 alpha in the footprint. Outside it may be any value, also NaN.
+template <Exp2 M, class L, class S>
+GSNAV_HD L alpha_in_footprint(const BlendRules<S>& rules, L exponent) noexcept {
+  const L alpha = exp2_in_range<M>(exponent), largest(rules.max_alpha);
+#if GSNAV_DEVICE_CODE
+  // The hardware's minimum. `min`, which has a rule for NaN, compares and selects.
+  if constexpr (std::is_same_v<L, float>) {
+    return ::fminf(alpha, largest);
+  } else
+#endif
+  {
+    return min(alpha, largest);
+  }
+}
+
+/// The same with 0 outside the footprint.
+template <Exp2 M, class L, class S>
+GSNAV_HD L footprint_alpha(const BlendRules<S>& rules, L exponent) noexcept {
+  return select(in_footprint(rules, exponent), alpha_in_footprint<M>(rules, exponent), L(S(0)));
+}
+
+/// Blends one splat onto the pixels that are `drawn`, open ones of its footprint, where it has `alpha`.
+/// (px, py): pixel centres. Other pixels keep their state bit for bit. `General` obeys
+/// rules.exclusive_stop: a pixel that it closed keeps its transmittance, negated.
+template <bool Color, DepthMode D, bool General, class L, class S>
+GSNAV_HD void blend_drawn(BlendState<L, D>& state, const BlendRules<S>& rules, mask_of<L> drawn, L alpha,
+                          const SplatColor<S>* color, const SplatDepth<S>* depth, L px, L py) noexcept {
+  const L zero(S(0)), before = state.transmittance;
+  L weight = select(drawn, alpha * before, zero);
+  L after = before - weight;
+  state.transmittance = after;
+  if constexpr (General) {
+    if (rules.exclusive_stop) {
+      const auto closes = drawn && (after < L(rules.transmittance_min));
+      weight = select(closes, zero, weight);
+      after = select(closes, before, after);
+      state.transmittance = select(closes, -before, after);
+    }
+  }
+  state.template accumulate<Color>(
+      TransmittanceStep<L>{before, after, weight}, rules.first_hit_tau,
+      [&]() GSNAV_INLINED {
+        return Vec3<L>{L(color->r), L(color->g), L(color->b)};
+      },
+      [&]() GSNAV_INLINED { return ray_depth(*depth, px, py); });
+}
+
+/// The same for an alpha that is 0 outside the footprint.
+template <bool Color, DepthMode D, bool General, class L, class S>
+GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha,
+                          const SplatColor<S>* color, const SplatDepth<S>* depth, L px, L py) noexcept {
+  blend_drawn<Color, D, General>(state, rules, state.open(rules), alpha, color, depth, px, py);
+}
+
+/// What is drawn of a splat where nothing cuts it: all of its alpha.
+struct WholeSplat {
+  template <class L>
+  GSNAV_HD L operator()(L alpha) const noexcept {
+    return alpha;
+  }
+};
+
+/// Blends one splat onto pixels at (px, py). cut(alpha): what is left of its alpha, 0 where it is not
+/// seen. Returns the open pixels of its footprint.
+template <bool Color, DepthMode D, Exp2 M, bool General, class L, class S, class Cut = WholeSplat>
+GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& rules,
+                                const SplatRecords<S>& splat, L px, L py, const Cut& cut = {}) noexcept {
+  const L exponent = splat_exponent(General && splat.perspective != nullptr, *splat.geometry,
+                                    splat.perspective, px, py);
+  const auto hit = state.open(rules) && in_footprint(rules, exponent);
+  // Lanes are rarely all missed; asking costs them more than it saves.
+  if constexpr (LaneTraits<L>::width == 1) {
+    if (!hit) return hit;
+  }
+  blend_drawn<Color, D, General>(state, rules, hit, cut(alpha_in_footprint<M>(rules, exponent)),
+                                 splat.color, splat.depth, px, py);
+  return hit;
+}
+
+}  // namespace gsnav
