@@ -36,28 +36,7 @@ const char kDescription[] =
     "References are kept by content hash, so that a second run is fast; Ctrl-C leaves a valid CSV that "
     "--resume continues.";
 
-}  // namespace
-
-bool Options::wants(const std::string& kind) const {
-  return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
-}
-
-std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
-  Options o;
-  o.commit = std::string("v") + std::to_string(GSNAV_VERSION_MAJOR) + "." +
-             std::to_string(GSNAV_VERSION_MINOR) + "." + std::to_string(GSNAV_VERSION_PATCH);
-  std::vector<std::string> sizes{"256x256", "640x480"}, oracles;
-  for (const Oracle q : o.oracles) oracles.emplace_back(to_string(q));
-  std::string knob_size = "256x256";
-
-  CLI::App app{kDescription};
-  const auto list = [&app](const char* name, std::vector<std::string>& values,
-                           std::vector<std::string> known, const char* text) {
-    app.add_option(name, values, text)
-        ->delimiter(',')
-        ->check(CLI::IsMember(std::move(known)))
-        ->capture_default_str();
-  };
+void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std::string& knob_size) {
   app.add_option(
       "--scene", o.scenes,
       "NAME=PATH[:CAMERAS.json]: a .ply, .sog, SOG folder or a folder's tiles (DIR/2_0,2_1) and an "
@@ -85,6 +64,16 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   app.add_option("--near", o.near_plane, "Near plane, metres")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+}
+
+void add_rows(CLI::App& app, Options& o, std::vector<std::string>& oracles) {
+  const auto list = [&app](const char* name, std::vector<std::string>& values,
+                           std::vector<std::string> known, const char* text) {
+    app.add_option(name, values, text)
+        ->delimiter(',')
+        ->check(CLI::IsMember(std::move(known)))
+        ->capture_default_str();
+  };
   list("--kinds", o.kinds, {"render", "ledger", "skinning", "sweep", "kernel"}, "Kinds of rows");
   list("--sensors", o.sensors, {"rgbd", "rgb", "depth"}, "What is rendered");
   list("--profiles", o.profiles, {"exact", "fast", "lod", "none"},
@@ -101,6 +90,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       ->delimiter(',');
   list("--oracles", oracles, oracles,
        "Judges: contract of all rows, the others of those that they say something of");
+}
+
+void add_run(CLI::App& app, Options& o) {
   app.add_option("--threads", o.threads,
                  "Threads of the openmp backend and of the oracles; 0: OMP_NUM_THREADS")
       ->check(CLI::Range(0, 1024));
@@ -124,6 +116,26 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
                "Keeps the rows of OUT/report.csv and makes those that are missing");
   app.add_flag("--no-html", o.no_html, "No page, the CSV only");
   app.set_version_flag("--version", o.commit);
+}
+
+}  // namespace
+
+bool Options::wants(const std::string& kind) const {
+  return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+}
+
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
+  Options o;
+  o.commit = std::string("v") + std::to_string(GSNAV_VERSION_MAJOR) + "." +
+             std::to_string(GSNAV_VERSION_MINOR) + "." + std::to_string(GSNAV_VERSION_PATCH);
+  std::vector<std::string> sizes{"256x256", "640x480"}, oracles;
+  for (const Oracle q : o.oracles) oracles.emplace_back(to_string(q));
+  std::string knob_size = "256x256";
+
+  CLI::App app{kDescription};
+  add_scenes(app, o, sizes, knob_size);
+  add_rows(app, o, oracles);
+  add_run(app, o);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

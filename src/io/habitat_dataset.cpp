@@ -2,14 +2,13 @@
 #include "gsnav/detail/io/habitat_dataset.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <set>
 #include <string_view>
 #include <utility>
 
 #include "file.hpp"
-#include "json.hpp"
+#include "habitat_json.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -18,109 +17,10 @@ namespace fs = std::filesystem;
 using detail::Json;
 using detail::member;
 using detail::shown;
+using namespace habitat;
 
 constexpr const char* kStage = ".stage_config.json";
 constexpr const char* kScene = ".scene_instance.json";
-
-Result<Json> load_object(const fs::path& path) {
-  const auto file = detail::read_file(path);
-  if (!file) return file.status();
-  auto json = detail::parse_json(file->span(), path.string());
-  if (json && !json->is_object()) {
-    return detail::invalid_file(path, "is " + shown(*json) + ", must be an object");
-  }
-  return json;
-}
-
-/// Keys that change nothing here, each with the file that had it first.
-class LeftOut {
- public:
-  void add(const Json& object, const std::set<std::string_view>& known, const std::string& at) {
-    for (const auto& [key, value] : object.items()) {
-      if (!known.contains(key)) first_.emplace(key, at);
-    }
-  }
-  void report(std::vector<std::string>& warnings) const {
-    for (const auto& [key, at] : first_) warnings.push_back(at + ": '" + key + "' is left out");
-  }
-
- private:
-  std::map<std::string, std::string> first_;
-};
-
-/// Text of `key`; empty where it is missing.
-Result<std::string> text(const Json& object, const char* key, const std::string& at) {
-  const Json* v = member(object, key);
-  if (v == nullptr) return std::string();
-  if (!v->is_string())
-    return {Errc::invalid_file, at + ": '" + key + "' is " + shown(*v) + ", must be a text"};
-  return v->get<std::string>();
-}
-
-Status vec3(const Json& object, const char* key, const std::string& at, Vec3d& out) {
-  if (member(object, key) == nullptr) return {};
-  const auto v = detail::get_numbers(object, key, 3, at);
-  if (!v) return v.status();
-  out = {(*v)[0], (*v)[1], (*v)[2]};
-  return {};
-}
-
-Status read_scale(const Json& object, const std::string& at, double& out) {
-  const Json* v = member(object, "scale");
-  if (v == nullptr) return {};
-  std::vector<double> s;
-  for (const Json& x : v->is_array() ? *v : Json::array({*v}))
-    s.push_back(x.is_number() ? x.get<double>() : NAN);
-  for (const double x : s) {
-    if (!(x > 0) || !std::isfinite(x))
-      return {Errc::invalid_file, at + ": 'scale' is " + shown(*v) + ", must be positive"};
-    if (x != s[0]) return {Errc::unsupported, at + ": 'scale' differs by axis; one for all is read"};
-  }
-  if (s.size() != 1 && s.size() != 3)
-    return {Errc::invalid_file, at + ": 'scale' must be one number or three"};
-  out = s[0];
-  return {};
-}
-
-/// What `object` says about a stage on top of what `out` has; assets lie beside `folder`.
-Status read_stage(const Json& object, const fs::path& folder, const std::string& at, StageConfig& out,
-                  LeftOut& left_out) {
-  for (const auto& [key, to] : {std::pair{"render_asset", &out.render_asset},
-                                std::pair{"collision_asset", &out.collision_asset}}) {
-    const auto name = text(object, key, at);
-    if (!name) return name.status();
-    if (!name->empty())
-      *to = fs::path(*name).is_absolute() ? fs::path(*name) : (folder / *name).lexically_normal();
-  }
-  for (const auto& [key, to] :
-       {std::pair{"up", &out.up}, std::pair{"front", &out.front}, std::pair{"origin", &out.origin}}) {
-    if (Status s = vec3(object, key, at, *to); !s) return s;
-  }
-  for (const auto& [key, v] : {std::pair{"up", out.up}, std::pair{"front", out.front}}) {
-    if (!(norm(v) > 0)) return {Errc::invalid_file, at + ": '" + key + "' is zero"};
-  }
-  if (std::abs(dot(out.up, out.front)) > 1e-3 * norm(out.up) * norm(out.front)) {
-    return {Errc::invalid_file, at + ": 'up' and 'front' are not at right angles"};
-  }
-  if (member(object, "units_to_meters") != nullptr) {
-    const auto v = detail::get_number(object, "units_to_meters", at);
-    if (!v) return v.status();
-    if (!(*v > 0)) return {Errc::invalid_file, at + ": 'units_to_meters' must be positive"};
-    out.units_to_meters = *v;
-  }
-  if (Status s = read_scale(object, at, out.scale); !s) return s;
-  if (const Json* v = member(object, "norm_quaternion"); v != nullptr) {
-    if (!v->is_boolean())
-      return {Errc::invalid_file,
-              at + ": 'norm_quaternion' is " + shown(*v) + ", must be true or false"};
-    out.norm_quaternion = v->get<bool>();
-  }
-  left_out.add(object,
-               {"render_asset", "collision_asset", "up", "front", "origin", "units_to_meters", "scale",
-                "norm_quaternion"},
-               at);
-  return {};
-}
 
 /// `name` matches a pattern in which `*` stands for any text. Goes back to the last star only: never
 /// long.
@@ -365,16 +265,6 @@ class DatasetReader {
 
 }  // namespace
 
-Similarity StageConfig::world_from_asset() const noexcept {
-  // The asset's right, up and back become the world's x, y and z.
-  const Vec3d y = normalized(up), z = -normalized(front), x = cross(y, z);
-  Similarity out;
-  out.rotation = quat_from_matrix(Mat3d{{x, y, z}});
-  out.scale = units_to_meters * scale;
-  out.translation = -(rotate(out.rotation, origin) * out.scale);
-  return out;
-}
-
 const HabitatScene* HabitatDataset::find(const std::string& name) const noexcept {
   const std::string file = fs::path(name).filename().string();
   for (const HabitatScene& s : scenes) {
@@ -384,19 +274,6 @@ const HabitatScene* HabitatDataset::find(const std::string& name) const noexcept
     }
   }
   return nullptr;
-}
-
-Result<StageConfig> load_stage_config(const fs::path& path) {
-  return detail::guarded(path.string(), [&]() -> Result<StageConfig> {
-    const auto json = load_object(path);
-    if (!json) return json.status();
-    StageConfig out;
-    LeftOut ignored;
-    out.file = path;
-    if (Status s = read_stage(*json, path.parent_path(), path.string(), out, ignored); !s) return s;
-    if (out.render_asset.empty()) return detail::invalid_file(path, "'render_asset' is missing");
-    return out;
-  });
 }
 
 Result<HabitatDataset> load_habitat_dataset(const fs::path& path) {

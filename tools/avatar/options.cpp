@@ -84,26 +84,8 @@ void add_mesh(CLI::App& app, MeshCommand& m, bool makehuman) {
   add_clip(app, m.clip);
 }
 
-}  // namespace
-
-std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
-  Options out;
-  MeshCommand gltf, human;
-  WalkCommand walk;
-  std::vector<std::string> targets, via;
-  std::string from, to, eye, target;
-  StripCommand strip;
-  CLI::App app{kDescription};
-  app.require_subcommand(1);
-  CLI::App* from_gltf = app.add_subcommand("from-gltf", "An avatar from a rigged glTF file");
-  add_mesh(*from_gltf, gltf, false);
-  CLI::App* from_makehuman =
-      app.add_subcommand("from-makehuman", "An avatar from MakeHuman's base mesh and rig");
-  add_mesh(*from_makehuman, human, true);
-  from_makehuman->add_option("--skeleton", human.skeleton, "Rig (.mhskel)")->required();
-  from_makehuman->add_option("--weights", human.weights,
-                             "Weights (.mhw); by default those that the rig names");
-  from_makehuman->add_option("--target", targets, "Shape (.target), FILE or FILE=AMOUNT; any number");
+CLI::App* add_walk(CLI::App& app, WalkCommand& walk, std::string& from, std::string& to,
+                   std::vector<std::string>& via) {
   CLI::App* walks = app.add_subcommand("walk", "A driver that walks a path on a NavMesh");
   walks->add_option("--avatar", walk.avatar, "Avatar (.npz)")->required();
   CLI::Option* mesh = walks->add_option("--navmesh", walk.navmesh, "NavMesh (.navmesh, .bin)");
@@ -129,6 +111,10 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
                   "Hold feet where they come down (default)");
   add_clip(*walks, walk.clip);
   walks->get_option("--clip")->required();
+  return walks;
+}
+
+CLI::App* add_strip(CLI::App& app, StripCommand& strip, std::string& eye, std::string& target) {
   CLI::App* strips = app.add_subcommand("strip", "Pictures of a walk from one camera, side by side");
   strips->add_option("--avatar", strip.avatar, "Avatar (.npz)")->required();
   strips->add_option("--driver", strip.driver, "Driver (.npz)")->required();
@@ -153,6 +139,31 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   strips->add_option("--begin", strip.begin, "Seconds into the driver")->check(CLI::NonNegativeNumber);
   strips->add_option("--end", strip.end, "Seconds; 0: the driver's end")->check(CLI::NonNegativeNumber);
   strips->add_option("--out", strip.out, "Picture to write (.png)")->required();
+  return strips;
+}
+
+}  // namespace
+
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
+  Options out;
+  MeshCommand gltf, human;
+  WalkCommand walk;
+  StripCommand strip;
+  std::vector<std::string> targets, via;
+  std::string from, to, eye, target;
+  CLI::App app{kDescription};
+  app.require_subcommand(1);
+  CLI::App* from_gltf = app.add_subcommand("from-gltf", "An avatar from a rigged glTF file");
+  add_mesh(*from_gltf, gltf, false);
+  CLI::App* from_makehuman =
+      app.add_subcommand("from-makehuman", "An avatar from MakeHuman's base mesh and rig");
+  add_mesh(*from_makehuman, human, true);
+  from_makehuman->add_option("--skeleton", human.skeleton, "Rig (.mhskel)")->required();
+  from_makehuman->add_option("--weights", human.weights,
+                             "Weights (.mhw); by default those that the rig names");
+  from_makehuman->add_option("--target", targets, "Shape (.target), FILE or FILE=AMOUNT; any number");
+  CLI::App* walks = add_walk(app, walk, from, to, via);
+  CLI::App* strips = add_strip(app, strip, eye, target);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

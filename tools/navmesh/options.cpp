@@ -71,32 +71,29 @@ std::optional<StaticObject> parse_object(const std::string& text) {
   return out;
 }
 
-}  // namespace
+/// Options that are looked at again when all are known.
+struct Given {
+  CLI::Option *up = nullptr, *scale = nullptr, *settings = nullptr, *object = nullptr,
+              *cell_height = nullptr, *tile_size = nullptr, *mesh = nullptr, *visible_sets = nullptr;
+  std::vector<std::string> objects;
+};
 
-InputKind kind_of(const std::string& input) {
-  const std::string extension = gsnav::lower_case(std::filesystem::path(input).extension().string());
-  if (extension == ".navmesh" || extension == ".bin") return InputKind::navmesh;
-  if (extension == ".obj") return InputKind::mesh;
-  const bool gltf = extension == ".glb" || extension == ".gltf";
-  return gltf && !has_gaussians(input) ? InputKind::mesh : InputKind::gaussians;
-}
-
-std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
-  Options o;
-  CLI::App app{kDescription};
+void add_input(CLI::App& app, Options& o, Given& given) {
   app.add_option("input", o.input,
                  "NavMesh (.navmesh, .bin), triangles (.obj, .glb, .gltf) or Gaussians (.ply, .sog, "
                  ".spz, .splat, "
                  ".ksplat, a SOG "
                  "folder, or sibling tiles: DIR/2_0,2_1)")
       ->required();
-  auto* up = app.add_option("--up", o.up, "Axis of the input that points up; not for a NavMesh")
+  given.up = app.add_option("--up", o.up, "Axis of the input that points up; not for a NavMesh")
                  ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}))
                  ->capture_default_str();
-  auto* scale = app.add_option("--scale", o.scale, "Metres a unit of the input; not for a NavMesh")
+  given.scale = app.add_option("--scale", o.scale, "Metres a unit of the input; not for a NavMesh")
                     ->check(CLI::PositiveNumber)
                     ->capture_default_str();
+}
 
+void add_outputs(CLI::App& app, Options& o) {
   const char* write = "Write";
   auto* out = app.add_option("--out", o.out, "NavMesh file (MSET, as Habitat reads it)")->group(write);
   app.add_option("--mset-version", o.mset_version, "Of --out: 2, or 1, which has no settings")
@@ -118,10 +115,12 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
                  "Of the picture; 0: 1200 pixels for the longer side")
       ->check(CLI::NonNegativeNumber)
       ->group(write);
+}
 
+void add_build(CLI::App& app, Options& o, Given& given) {
   gsnav::NavMeshSettings& s = o.settings;
   const char* build = "Build (names and defaults are Habitat's)";
-  auto* settings = app.add_option_function<std::string>(
+  given.settings = app.add_option_function<std::string>(
                           "--settings",
                           [&s](const std::string& file) {
                             const auto read = gsnav::io::load_navmesh_settings(file);
@@ -131,10 +130,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
                           "Settings (.json) as Habitat writes them; options beside it come after it")
                        ->trigger_on_parse()
                        ->group(build);
-  std::vector<std::string> objects;
-  auto* object =
+  given.object =
       app.add_option(
-             "--object", objects,
+             "--object", given.objects,
              "Triangles of an object that stands in the scene for good, at X Y Z metres of the world, "
              "turned by YAW degrees about Y and enlarged by SCALE; for each object once more")
           ->type_name("FILE[@X,Y,Z[,YAW[,SCALE]]]")
@@ -143,7 +141,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     app.add_option(name, value, text)->capture_default_str()->group(build);
   };
   nav_loop::add_voxel_options(app, s.cell_size, o.crop);
-  auto* cell_height = app.add_option("--cell-height", s.cell_height, "Voxel height; 0.05 for Gaussians")
+  given.cell_height = app.add_option("--cell-height", s.cell_height, "Voxel height; 0.05 for Gaussians")
                           ->capture_default_str()
                           ->group(build);
   number("--agent-height", s.agent_height, "Clearance that the agent needs");
@@ -159,7 +157,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
          "Spacing of height samples, in cells; below 0.9: none");
   number("--detail-sample-max-error", s.detail_sample_max_error,
          "Height error of the surface, in cell heights");
-  auto* tile_size = app.add_option("--tile-size", s.tile_size,
+  given.tile_size = app.add_option("--tile-size", s.tile_size,
                                    "Build in tiles of so many cells a side, in parallel; 0: one tile, "
                                    "as Habitat does (Gaussians "
                                    "over 2^22 columns: 512)")
@@ -179,13 +177,15 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   without("--no-filter-ledge-spans", s.filter_ledge_spans, "Edges of drops stay walkable");
   without("--no-filter-walkable-low-height-spans", s.filter_walkable_low_height_spans,
           "Low rooms stay walkable");
+}
 
+void add_gaussians(CLI::App& app, Options& o, Given& given) {
   gsnav::GaussianNavOptions& g = o.gaussians;
   const char* from = "Build from Gaussians";
   const auto option = [&](const char* name, auto& value, const char* text) {
     app.add_option(name, value, text)->capture_default_str()->group(from);
   };
-  auto* mesh = app.add_option("--mesh", o.mesh,
+  given.mesh = app.add_option("--mesh", o.mesh,
                               "Triangles (.obj, .glb, .gltf) of the same scene: what stands in either "
                               "is in the way, the floor of "
                               "either is walked on")
@@ -205,12 +205,15 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
          "--keep-underside", [&g] { g.refuse_underside = false; },
          "Take open ground for the floor even where nearly everything hangs below it")
       ->group(from);
+}
+
+void add_visible_sets(CLI::App& app, Options& o, Given& given) {
   gsnav::VisibleSettings& v = o.visible;
   const char* seen = "Visible sets of Gaussians";
-  const auto* visible_sets = app.add_option("--visible-sets", o.visible_sets,
-                                            "File to write: what is seen from each cell of the NavMesh "
-                                            "that eyes can be in (gsnav-render reads it)")
-                                 ->group(seen);
+  given.visible_sets = app.add_option("--visible-sets", o.visible_sets,
+                                      "File to write: what is seen from each cell of the NavMesh "
+                                      "that eyes can be in (gsnav-render reads it)")
+                           ->group(seen);
   app.add_option("--eye-heights", o.eye_heights, "Of cameras, metres above the floor")
       ->capture_default_str()
       ->group(seen);
@@ -229,44 +232,75 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       "--visible-most", v.most_share,
       "Write no file where cells of a sample see more than this share: nothing is gained (1: write it)");
   setting("--near-plane", v.near_plane, "Of cameras, at most; metres");
+}
+
+}  // namespace
+
+InputKind kind_of(const std::string& input) {
+  const std::string extension = gsnav::lower_case(std::filesystem::path(input).extension().string());
+  if (extension == ".navmesh" || extension == ".bin") return InputKind::navmesh;
+  if (extension == ".obj") return InputKind::mesh;
+  const bool gltf = extension == ".glb" || extension == ".gltf";
+  return gltf && !has_gaussians(input) ? InputKind::mesh : InputKind::gaussians;
+}
+
+namespace {
+
+/// Refuses options that do not go together.
+void check_together(Options& o, const Given& given) {
+  if (kind_of(o.input) != InputKind::gaussians && given.visible_sets->count() > 0) {
+    throw CLI::ValidationError("--visible-sets", o.input + " has no Gaussians");
+  }
+  if (o.scale != 1 && given.visible_sets->count() > 0) {
+    throw CLI::ValidationError("--visible-sets", "not with --scale: gsnav-render knows no scale");
+  }
+  if (kind_of(o.input) == InputKind::navmesh && given.up->count() + given.scale->count() > 0) {
+    throw CLI::ValidationError("--up, --scale", o.input + " is a NavMesh: it stands as it is");
+  }
+  if (kind_of(o.input) == InputKind::navmesh && given.tile_size->count() > 0) {
+    throw CLI::ValidationError("--tile-size", o.input + " is a NavMesh already");
+  }
+  if (kind_of(o.input) != InputKind::gaussians && !o.crop.empty()) {
+    throw CLI::ValidationError("--crop", o.input + " has no Gaussians");
+  }
+  if (kind_of(o.input) == InputKind::navmesh && given.object->count() + given.settings->count() > 0) {
+    throw CLI::ValidationError("--object, --settings", o.input + " is a NavMesh: nothing is built");
+  }
+  for (const std::string& text : given.objects) {
+    const auto one = parse_object(text);
+    if (!one) throw CLI::ValidationError("--object", text + " is not FILE[@X,Y,Z[,YAW[,SCALE]]]");
+    o.objects.push_back(*one);
+    o.settings.include_static_objects = true;
+  }
+  if (kind_of(o.input) != InputKind::gaussians && given.mesh->count() > 0) {
+    throw CLI::ValidationError("--mesh", o.input + " has no Gaussians to go with " + o.mesh);
+  }
+}
+
+}  // namespace
+
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
+  Options o;
+  CLI::App app{kDescription};
+  Given given;
+  add_input(app, o, given);
+  add_outputs(app, o);
+  add_build(app, o, given);
+  add_gaussians(app, o, given);
+  add_visible_sets(app, o, given);
   try {
     app.parse(argc, argv);
-    if (kind_of(o.input) != InputKind::gaussians && visible_sets->count() > 0) {
-      throw CLI::ValidationError("--visible-sets", o.input + " has no Gaussians");
-    }
-    if (o.scale != 1 && visible_sets->count() > 0) {
-      throw CLI::ValidationError("--visible-sets", "not with --scale: gsnav-render knows no scale");
-    }
-    if (kind_of(o.input) == InputKind::navmesh && up->count() + scale->count() > 0) {
-      throw CLI::ValidationError("--up, --scale", o.input + " is a NavMesh: it stands as it is");
-    }
-    if (kind_of(o.input) == InputKind::navmesh && tile_size->count() > 0) {
-      throw CLI::ValidationError("--tile-size", o.input + " is a NavMesh already");
-    }
-    if (kind_of(o.input) != InputKind::gaussians && !o.crop.empty()) {
-      throw CLI::ValidationError("--crop", o.input + " has no Gaussians");
-    }
-    if (kind_of(o.input) == InputKind::navmesh && object->count() + settings->count() > 0) {
-      throw CLI::ValidationError("--object, --settings", o.input + " is a NavMesh: nothing is built");
-    }
-    for (const std::string& text : objects) {
-      const auto one = parse_object(text);
-      if (!one) throw CLI::ValidationError("--object", text + " is not FILE[@X,Y,Z[,YAW[,SCALE]]]");
-      o.objects.push_back(*one);
-      s.include_static_objects = true;
-    }
-    if (kind_of(o.input) != InputKind::gaussians && mesh->count() > 0) {
-      throw CLI::ValidationError("--mesh", o.input + " has no Gaussians to go with " + o.mesh);
-    }
+    check_together(o, given);
   } catch (const CLI::ParseError& error) {
     exit_code = gsnav_tools::print_parse_error(app, error) == 0 ? 0 : 1;
     return std::nullopt;
   }
   if (kind_of(o.input) == InputKind::gaussians) {
-    const double given = s.cell_height;
-    nav_loop::apply(s.cell_size, o.crop, s, g);
-    if (cell_height->count() + settings->count() > 0) s.cell_height = given;
-    g.threads = o.threads;
+    gsnav::NavMeshSettings& s = o.settings;
+    const double height = s.cell_height;
+    nav_loop::apply(s.cell_size, o.crop, s, o.gaussians);
+    if (given.cell_height->count() + given.settings->count() > 0) s.cell_height = height;
+    o.gaussians.threads = o.threads;
   }
   return o;
 }
