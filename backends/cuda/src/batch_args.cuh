@@ -256,6 +256,7 @@ __device__ inline std::uint32_t rank_of(const BatchArgs& a, std::uint32_t camera
 }
 
 // Launches, in the order of a frame. `blocks`: how many keep the device full.
+void launch_culling(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
 void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
 void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
 /// Of lists in bins, and of short ones.

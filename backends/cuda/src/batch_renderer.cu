@@ -105,6 +105,7 @@ void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
   const cudaStream_t stream = backend.stream();
   cudaMemcpyAsync(inputs.data(), flight.inputs.data, input_bytes, cudaMemcpyHostToDevice, stream);
   backend.fill(zeroed.data(), 0, zeroed_words(args) * sizeof(std::uint32_t));
+  cuda::launch_culling(args, multiprocessors, stream);
   cuda::launch_projection(args, multiprocessors, stream);
   cuda::launch_binning(args, multiprocessors, stream);
   if (args.depth_bins.many() || args.short_lists) cuda::launch_ordering(args, multiprocessors, stream);

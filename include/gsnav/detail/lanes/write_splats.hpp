@@ -104,6 +104,42 @@ GSNAV_HD void copy_record(T& record, const float* from) noexcept {
 
 GSNAV_HD F as_floats(F::ints x) noexcept { return F(gsnav::detail::floats<kWidth>(x)); }
 
+/// Bounds and tiles of kWidth splats, eight words each, one behind the other.
+GSNAV_HD void store_bounds(const PixelBox<F>& box, const SpanWords& spans, float* to) noexcept {
+  const auto whole = [](F x) noexcept { return as_floats(__builtin_convertvector(x.v, F::ints)); };
+  const F columns[8] = {whole(box.x0),
+                        whole(box.y0),
+                        whole(box.x1),
+                        whole(box.y1),
+                        as_floats(spans.word[0]),
+                        as_floats(spans.word[1]),
+                        as_floats(spans.word[2]),
+                        as_floats(spans.word[3])};
+  store_columns<8>(columns, to);
+}
+
+/// What decides between equal keys of kWidth rows.
+GSNAV_HD void ranks_of(const ViewedSet<float>& args, const std::uint32_t* rows, bool wanted,
+                       std::uint32_t* ranks) noexcept {
+  const View<const std::uint32_t>& ids = args.gaussians.row_ids;
+  const std::uint32_t last = static_cast<std::uint32_t>(args.gaussians.size() - 1);
+  for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + rows[l];
+  if (ids.empty() || !wanted) return;
+  for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + ids[rows[l] < last ? rows[l] : last];
+}
+
+/// Leaves the lanes `kept` to color_survivors, behind the `count` that there are.
+GSNAV_HD void keep_survivors(std::uint32_t kept, const std::uint32_t* rows, const Vec3<F>& delta,
+                             std::size_t count, Survivors& survivors) noexcept {
+  store_lanes(kept, rows, survivors.rows + count);
+  const F planes[3] = {delta.x, delta.y, delta.z};
+  for (int k = 0; k < 3; ++k) {
+    std::uint32_t lanes[kWidth];
+    std::memcpy(lanes, &planes[k].v, sizeof lanes);
+    store_lanes(kept, lanes, survivors.delta[k] + count);
+  }
+}
+
 /// One row by itself, with all that needs double.
 GSNAV_STAGE bool project_alone(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                                std::size_t slot, std::size_t row) noexcept {
@@ -145,22 +181,11 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
     store_columns<8>(columns, geometry);
   }
   {
-    const auto whole = [](F x) noexcept {
-      return detail::as_floats(__builtin_convertvector(x.v, F::ints));
-    };
     detail::SpanWords spans;
     if (!out.spans.empty()) {
       spans = detail::find_tiles(out.grid, g, camera.log2_alpha_min, box, bits & ~alone);
     }
-    const F columns[8] = {whole(box.x0),
-                          whole(box.y0),
-                          whole(box.x1),
-                          whole(box.y1),
-                          detail::as_floats(spans.word[0]),
-                          detail::as_floats(spans.word[1]),
-                          detail::as_floats(spans.word[2]),
-                          detail::as_floats(spans.word[3])};
-    store_columns<8>(columns, bounds);
+    detail::store_bounds(box, spans, bounds);
   }
   if (depth) {
     const SplatDepth<F> d = make_splat_depth(camera, pack.seen.axes, p);
@@ -173,14 +198,9 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
   float key[kWidth];
   sort_key(args.camera64, pack.key).store(key);
   for (int l = 0; l < kWidth; ++l) keys[l] = camera.key_code(key[l]);
-  const std::uint32_t first = static_cast<std::uint32_t>(pack.first),
-                      last = static_cast<std::uint32_t>(gs.size() - 1);
+  const std::uint32_t first = static_cast<std::uint32_t>(pack.first);
   for (std::uint32_t l = 0; l < static_cast<std::uint32_t>(kWidth); ++l) rows[l] = first + l;
-  for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + rows[l];
-  if (!gs.row_ids.empty() && !out.ranks.empty()) {
-    for (int l = 0; l < kWidth; ++l)
-      ranks[l] = args.first_rank + gs.row_ids[rows[l] < last ? rows[l] : last];
-  }
+  detail::ranks_of(args, rows, !out.ranks.empty(), ranks);
 
   std::uint32_t written = 0, kept = 0;
   for (std::uint32_t left = bits; left != 0; left &= left - 1) {
@@ -203,15 +223,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
   }
   store_lanes(kept, keys, out.keys.data + slot);
   if (!out.ranks.empty()) store_lanes(kept, ranks, out.ranks.data + slot);
-  if (color) {
-    store_lanes(kept, rows, survivors.rows + count);
-    const F planes[3] = {pack.key.delta.x, pack.key.delta.y, pack.key.delta.z};
-    for (int k = 0; k < 3; ++k) {
-      std::uint32_t lanes[kWidth];
-      std::memcpy(lanes, &planes[k].v, sizeof lanes);
-      store_lanes(kept, lanes, survivors.delta[k] + count);
-    }
-  }
+  if (color) detail::keep_survivors(kept, rows, pack.key.delta, count, survivors);
   return written;
 }
 

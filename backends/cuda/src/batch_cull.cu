@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "batch_lists.cuh"
+
+// Culling of a batch: which parts of chunks which instances may see.
+
+namespace gsnav::cuda {
+
+namespace {
+
+constexpr unsigned kThreads = 256, kWarps = kThreads / 32;
+constexpr unsigned kAll = 0xffffffffu;
+
+/// Whether part `part` of the chunk may have visible Gaussians: by bounds of its own, or by the chunk's.
+__device__ bool part_is_candidate(const ViewedSet<float>& args, std::size_t chunk, unsigned part) {
+  const GaussianRows& gs = args.gaussians;
+  const std::size_t at = chunk * kPartsPerChunk + part;
+  if (at * kChunkPart >= gs.size() || !args.selection.may_be_seen(chunk) ||
+      !args.seen_rows(chunk).any_of_part(part)) {
+    return false;
+  }
+  if (gs.chunk_bounds.empty()) return true;
+  return may_be_visible(args.camera64,
+                        gs.part_bounds.empty() ? gs.chunk_bounds[chunk] : gs.part_bounds[at]);
+}
+
+/// Parts, a bit each, of a chunk that the lane's instance may see (`seen`): all of them, or where the
+/// chunk is at the edge of its view those that the lanes find together, four for each such instance.
+__device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t chunk, bool seen) {
+  const unsigned lane = threadIdx.x % 32;
+  const GaussianRows& gs = instances[0].args.gaussians;
+  const std::size_t rows = gs.size() - chunk * kProjectChunk;
+  const unsigned all =
+      (1u << (rows < kProjectChunk ? (rows + kChunkPart - 1) / kChunkPart : kPartsPerChunk)) - 1;
+  unsigned parts = seen ? all : 0;
+  if (seen) parts &= instances[lane].args.seen_rows(chunk).parts();
+  unsigned edges =
+      __ballot_sync(kAll, seen && !gs.part_bounds.empty() &&
+                              !lies_in_view(instances[lane].args.camera64, gs.chunk_bounds[chunk]));
+  while (edges != 0) {
+    unsigned mine = edges, rest = edges;
+    for (unsigned k = 0; k < kFewInstances; ++k) {
+      if (k < lane / kPartsPerChunk) mine &= mine - 1;
+      rest &= rest - 1;
+    }
+    const bool in_view =
+        mine != 0 && part_is_candidate(instances[__ffs(static_cast<int>(mine)) - 1].args, chunk,
+                                       lane % kPartsPerChunk);
+    const unsigned votes = __ballot_sync(kAll, in_view);
+    if (((edges & ~rest) >> lane & 1u) != 0) {
+      const int turn = __popc(edges & ((1u << lane) - 1));
+      parts = votes >> (turn * static_cast<int>(kPartsPerChunk)) & ((1u << kPartsPerChunk) - 1);
+    }
+    edges = rest;
+  }
+  return parts;
+}
+
+/// Chunk c of those that are drawn: the same for all instances of a set.
+__device__ std::uint32_t chunk_of(const BatchInstance& instance, std::uint32_t c) {
+  return static_cast<std::uint32_t>(instance.args.selection.chunk_id(c));
+}
+
+/// A warp a unit: the lanes are instances, or where these are few parts and instances.
+__global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
+  const unsigned lane = threadIdx.x % 32;
+  const std::uint64_t stride = std::uint64_t{gridDim.x} * kWarps;
+  for (std::uint64_t unit = blockIdx.x * kWarps + threadIdx.x / 32; unit < a.units; unit += stride) {
+    std::uint32_t low = 0, high = a.set_count;
+    while (high - low > 1) {
+      const std::uint32_t mid = (low + high) / 2;
+      if (a.sets[mid].first_unit <= unit) {
+        low = mid;
+      } else {
+        high = mid;
+      }
+    }
+    const BatchSet set = a.sets[low];
+    const std::uint32_t at = static_cast<std::uint32_t>(unit - set.first_unit);
+    const BatchInstance* instances = a.instances + set.first_instance;
+    std::uint32_t first = set.first_instance, chunk, part, mask;  // the lane's item, if mask is not 0
+    if (set.has_few()) {
+      const std::uint32_t slot = lane % kFewInstances, index = slot % set.instances;
+      part = lane / kFewInstances;
+      chunk = at * set.unit_chunks() + slot / set.instances;
+      const bool exists = slot / set.instances < set.unit_chunks() && chunk < set.chunks;
+      if (exists) chunk = chunk_of(instances[0], chunk);
+      const unsigned votes =
+          __ballot_sync(kAll, exists && part_is_candidate(instances[index].args, chunk, part));
+      mask = index == 0 && exists ? votes >> lane & ((1u << set.instances) - 1) : 0;
+    } else {
+      const std::uint32_t word = at / set.chunks, index = 32 * word + lane;
+      first += 32 * word;
+      instances += 32 * word;
+      const bool seen =
+          index < set.instances && chunk_is_candidate(instances[lane].args, at % set.chunks);
+      chunk = chunk_of(instances[0], at % set.chunks);
+      const unsigned parts = parts_in_view(instances, chunk, seen);
+      part = lane;
+      mask = 0;
+      for (unsigned p = 0; p < kPartsPerChunk; ++p) {
+        const unsigned votes = __ballot_sync(kAll, (parts >> p & 1u) != 0);
+        if (lane == p) mask = votes;
+      }
+    }
+    const unsigned items = __ballot_sync(kAll, mask != 0);
+    if (items == 0) continue;
+    std::uint32_t place = 0;
+    if (lane == 0) place = atomicAdd(&a.counters->items, static_cast<std::uint32_t>(__popc(items)));
+    place = __shfl_sync(kAll, place, 0) + static_cast<std::uint32_t>(__popc(items & ((1u << lane) - 1)));
+    if (mask != 0) a.items[place] = {first, chunk * kPartsPerChunk + part, mask};
+  }
+}
+
+}  // namespace
+
+void launch_culling(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
+  cull_kernel<<<static_cast<unsigned>(multiprocessors) * 8, kThreads, 0, stream>>>(args);
+}
+
+}  // namespace gsnav::cuda
