@@ -119,7 +119,7 @@ GSNAV_HD void store_bounds(const PixelBox<F>& box, const SpanWords& spans, float
 }
 
 /// What decides between equal keys of kWidth rows.
-GSNAV_HD void ranks_of(const ViewedSet<float>& args, const std::uint32_t* rows, bool wanted,
+GSNAV_HD void ranks_of(const ViewedSet<float>& args, const std::uint32_t (&rows)[kWidth], bool wanted,
                        std::uint32_t* ranks) noexcept {
   const View<const std::uint32_t>& ids = args.gaussians.row_ids;
   const std::uint32_t last = static_cast<std::uint32_t>(args.gaussians.size() - 1);
@@ -129,8 +129,8 @@ GSNAV_HD void ranks_of(const ViewedSet<float>& args, const std::uint32_t* rows, 
 }
 
 /// Leaves the lanes `kept` to color_survivors, behind the `count` that there are.
-GSNAV_HD void keep_survivors(std::uint32_t kept, const std::uint32_t* rows, const Vec3<F>& delta,
-                             std::size_t count, Survivors& survivors) noexcept {
+GSNAV_HD void keep_survivors(std::uint32_t kept, const std::uint32_t (&rows)[kWidth],
+                             const Vec3<F>& delta, std::size_t count, Survivors& survivors) noexcept {
   store_lanes(kept, rows, survivors.rows + count);
   const F planes[3] = {delta.x, delta.y, delta.z};
   for (int k = 0; k < 3; ++k) {
