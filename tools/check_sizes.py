@@ -20,7 +20,6 @@ LONG_FILES = {
     "backends/cuda/src/batch_project.cu": 414,
     "backends/cuda/src/mesh.cu": 427,
     "bench/bench_kernels_body.cpp": 379,
-    "bench/bench_nav.cpp": 517,
     "bench/floor_loops.cpp": 360,
     "include/gsnav/detail/frame/blend.hpp": 474,
     "include/gsnav/detail/lanes/rasterize_tile.hpp": 363,
@@ -36,7 +35,6 @@ LONG_FUNCTIONS = {
     "backends/cuda/src/batch_prepare.cu": 164,
     "backends/cuda/src/batch_project.cu": 149,
     "bench/bench_storage.cpp": 92,
-    "bench/report/options.cpp": 121,
     "include/gsnav/detail/lanes/write_splats.hpp": 95,
     "include/gsnav/detail/render/validate_set.hpp": 110,
     "include/gsnav/detail/scene/lod_levels.hpp": 86,
@@ -49,9 +47,7 @@ LONG_FUNCTIONS = {
     "src/nav/gaussian_navmesh.cpp": 107,
     "src/nav/step.cpp": 84,
     "src/nav/unfolded_mesh.cpp": 101,
-    "tools/avatar/options.cpp": 103,
     "tools/avatar/walk.cpp": 85,
-    "tools/navmesh/options.cpp": 189,
 }
 NO_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'', re.DOTALL)
 NO_FUNCTION = re.compile(r"(template *<.*> *)?(inline )?(namespace|class|struct|enum|union|extern)\b", re.DOTALL)
