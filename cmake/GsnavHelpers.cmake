@@ -36,6 +36,13 @@ function(gsnav_executable name)
   target_link_libraries(${name} PRIVATE gsnav ${ARG_LIBS})
 endfunction()
 
+set(GSNAV_BRIEF_TESTS_FLAGS "" CACHE STRING "Further options of the compiler for tests that run for seconds (a list)")
+
+# gsnav_brief_test(target): takes longer to compile than to run. Sanitizers leave it without optimisation.
+function(gsnav_brief_test target)
+  target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:${GSNAV_BRIEF_TESTS_FLAGS}>")
+endfunction()
+
 # gsnav_test(name SOURCES ... LIBS ...): a doctest executable that ctest runs. tests/support has main(), helpers and
 # what all tests render with, compiled once; GSNAV_DATA_DIR reaches the tests as a definition.
 function(gsnav_test name)

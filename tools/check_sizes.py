@@ -19,7 +19,6 @@ LONG_FILES = {
     "backends/cuda/src/batch_order.cuh": 379,
     "backends/cuda/src/mesh.cu": 427,
     "bench/bench_kernels_body.cpp": 379,
-    "bench/bench_nav.cpp": 517,
     "bench/floor_loops.cpp": 360,
     "include/gsnav/detail/lanes/rasterize_tile.hpp": 363,
     "src/io/avatar_file.cpp": 360,
