@@ -66,7 +66,7 @@ void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std:
       ->capture_default_str();
 }
 
-void add_rows(CLI::App& app, Options& o, std::vector<std::string>& oracles) {
+void add_kinds_of_rows(CLI::App& app, Options& o, std::vector<std::string>& oracles) {
   const auto list = [&app](const char* name, std::vector<std::string>& values,
                            std::vector<std::string> known, const char* text) {
     app.add_option(name, values, text)
@@ -134,7 +134,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
 
   CLI::App app{kDescription};
   add_scenes(app, o, sizes, knob_size);
-  add_rows(app, o, oracles);
+  add_kinds_of_rows(app, o, oracles);
   add_run(app, o);
   try {
     app.parse(argc, argv);
