@@ -7,6 +7,9 @@
 #if defined(WITH_OPENMP)
 #include <gsnav/backends/openmp.hpp>
 #endif
+#if defined(WITH_DEVICE)
+#include <gsnav/device/renderer.hpp>
+#endif
 #if defined(WITH_AVATAR)
 #include <gsnav/detail/avatar/humanoid.hpp>
 #endif
@@ -81,6 +84,10 @@ int main() {
 #endif
 #if defined(WITH_SIM)
   check("sim", gsnav::make_default_scene(0.05).ok());
+#endif
+#if defined(WITH_DEVICE)
+  check("device", gsnav::Device::parse("best").ok() &&
+                      gsnav::DeviceRenderer::create(gsnav::Device(), gsnav::GaussianCloud{}).ok());
 #endif
 #if defined(WITH_EVAL)
   check("eval", gsnav::eval::ssim(std::vector<float>{1, 0, 0}, std::vector<float>{1, 0, 0}, 1, 1).ok());
