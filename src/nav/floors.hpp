@@ -60,6 +60,7 @@ struct Storey {
   double columns = 0;  // that have room for the agent
   double covered = 0;  // share of the marks that have something solid above head height
   bool kept = false;
+  bool inside = false;  // kept because it is the main one or lies under a ceiling, not for stairs alone
   std::size_t holes = 0;
   std::vector<Mark> marks;
   std::vector<std::uint8_t> roofed;  // of each mark

@@ -78,6 +78,7 @@ FloorTops Floors::find(GaussianNavReport& report, double& most_area) {
   for (Storey& s : storeys_) {
     const bool above = s.level > storeys_[0].level - static_cast<double>(s_.band);
     s.kept = s.kept || (above && (o_.drop_uncovered ? indoors && s.covered > 0.5 : true));
+    s.inside = s.kept;
   }
   std::vector<Mark> marks = find_stairs(report);
   progress(0.9);
@@ -85,7 +86,7 @@ FloorTops Floors::find(GaussianNavReport& report, double& most_area) {
     if (!s.kept) continue;
     double area = 0;
     for (std::size_t i = 0; i < s.marks.size(); ++i) {
-      if (o_.drop_uncovered && indoors && s.roofed[i] == 0) {
+      if (o_.drop_uncovered && indoors && s.inside && s.roofed[i] == 0) {
         report.dropped_uncovered += g_.cell * g_.cell;
         continue;
       }

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -61,6 +64,16 @@ TEST_CASE("an evaluation that was broken off goes on, to the same journal and pa
 
   CHECK(again.says("journal.jsonl: line 3 has no end, as after a kill: 20 bytes are dropped"));
 
+  {
+    // Two processes that write one journal would read and cut off each other's lines.
+    const int held = ::open((folder / "out/journal.jsonl").c_str(), O_RDONLY | O_CLOEXEC);
+    REQUIRE(::flock(held, LOCK_EX | LOCK_NB) == 0);
+    const Outcome second_process = eval("");
+    CHECK_FALSE(second_process.ok);
+    CHECK(second_process.says("journal.jsonl: another process writes it"));
+    CHECK(read_file(folder / "out/journal.jsonl") == journal);
+    ::close(held);
+  }
   const Outcome other = eval("--seed 5");
   CHECK_FALSE(other.ok);
   CHECK(other.says("was recorded with --seed 1, but this run has --seed 5"));

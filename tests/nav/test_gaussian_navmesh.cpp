@@ -296,6 +296,7 @@ struct House {
   double up = 2.8;  // metres between the storeys
   int steps = 16;   // rises; 0: no stairs
   double tread = 0.28, width = 1.2, noise = 0.01;
+  bool roof = true;
   std::uint64_t seed = 17;
   Similarity where{};
 
@@ -321,7 +322,7 @@ struct House {
     p.ground(0, 0, length(), side(), up);  // the upper floor, open over the stairs
     p.ground(0, side(), foot, 5, up);
     p.ground(head(), side(), length(), 5, up);
-    p.ground(0, 0, length(), 5, 2 * up);  // the roof
+    if (roof) p.ground(0, 0, length(), 5, 2 * up);
     for (const double z : {0.0, 5.0}) p.wall(0, z, length(), z, 0, 2 * up);
     for (const double x : {0.0, length()}) p.wall(x, 0, x, 5, 0, 2 * up);
     for (int i = 0; i + 1 < steps; ++i) {
@@ -440,6 +441,24 @@ TEST_CASE("gaussian navmesh: steps that are too high are no stairs, nor are tabl
       CHECK_FALSE(r->mesh.is_navigable(h.where * Vec3d{5.5, 1.33, 4.8}));
     }
   }
+}
+
+TEST_CASE("gaussian navmesh: a storey that stairs lead to is a floor under the open sky too") {
+  // A scan whose roof was cut off, or a terrace.
+  const House house{.roof = false};
+  const auto r = build(house.paint());
+  INFO(r.message());
+  REQUIRE(r.ok());
+  REQUIRE(r->report.storeys.size() == 2);
+  const double upper = r->report.storeys[1].area, open = 4.4 * 1.3;  // the opening over the stairs
+  CHECK(upper == doctest::Approx(7.8 * 4.8 - open).epsilon(0.1));
+  const auto path = house.walk(r->mesh);
+  REQUIRE(path.ok());
+  CHECK(path->length == doctest::Approx(house.walk_length()).epsilon(0.06));
+  // Without stairs nothing says that anybody walks there.
+  const auto unreached = build(House{.steps = 0, .roof = false}.paint());
+  REQUIRE(unreached.ok());
+  CHECK(unreached->report.storeys.size() == 1);
 }
 
 TEST_CASE(

@@ -63,9 +63,13 @@ class Viewer {
     Json state;
     std::string jpeg[3];  ///< colour, depth, map
   };
-  /// A frame that was begun after this was asked for, or after `message` has had its effect.
+  /// A frame that was begun after this was asked for, or after `message` has had its effect. An answer
+  /// comes after half a second, without pictures where the first frame is still being drawn.
   Frame frame(const std::string& message = "") const {
-    return parse(body_of(request(port, "POST /frame", message)));
+    Frame f = parse(body_of(request(port, "POST /frame", message)));
+    for (int again = 0; again < 120 && f.jpeg[0].empty(); ++again)
+      f = parse(body_of(request(port, "POST /frame", "")));
+    return f;
   }
   static Frame parse(const std::string& body) {
     Frame f;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "journal.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -171,6 +174,7 @@ Result<Journal> Journal::open(const fs::path& folder, const Options& options, co
       return s;
     if (Status s = gsnav::replace_file(j.path_, header_of(options, made_of) + "\n"); !s) return s;
   }
+  if (Status s = j.lock(); !s) return s;
   if (Status s = j.read(j.path_, options, stage, made_of, true, true); !s) return s;
   for (const fs::path& path : files_in(folder, is_journal)) {
     if (rank != 0 || path == j.path_) continue;
@@ -189,6 +193,20 @@ Status Journal::restart(const fs::path& folder) {
     if (Status s = remove_file(path); !s) return s;
   }
   return {};
+}
+
+Status Journal::lock() {
+  const int file = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return {Errc::file_not_found, path_.string() + ": cannot be opened"};
+  lock_ = std::shared_ptr<const void>(this, [file](const void*) { ::close(file); });
+  struct stat held {
+  }, there{};
+  // A process that began the journal at the same moment has put another file in place of this one.
+  const bool own = ::flock(file, LOCK_EX | LOCK_NB) == 0 && ::fstat(file, &held) == 0 &&
+                   ::stat(path_.c_str(), &there) == 0 && held.st_ino == there.st_ino;
+  if (own) return {};
+  return {Errc::invalid_argument,
+          path_.string() + ": another process writes it; wait, or use another --out"};
 }
 
 Status Journal::add(Record record) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -32,8 +33,8 @@ class Journal {
   /// Opens or begins the journal of a folder, to be written by `rank`. The actions of each record are
   /// played again, without a policy and without pictures, and must lead to its metrics. Pictures of
   /// episodes that another journal left are removed where one is begun by rank 0.
-  /// @return invalid_argument where its options or contents differ, naming what differs; invalid_file,
-  /// naming file, line, field and value; file_not_found.
+  /// @return invalid_argument where its options or contents differ, naming what differs, or where another
+  /// process writes it; invalid_file, naming file, line, field and value; file_not_found.
   static gsnav::Result<Journal> open(const std::filesystem::path& folder, const Options& options,
                                      const Stage& stage, int rank = 0);
   /// The same, of a folder that has one, for reading. Options of role `view` may differ; actions are not
@@ -52,7 +53,10 @@ class Journal {
   gsnav::Status check_outcomes(const Stage& stage) const;
   gsnav::Status read(const std::filesystem::path& path, const Options& options, const Stage& stage,
                      const Contents& made_of, bool own, bool views);
+  gsnav::Status lock();
+
   std::filesystem::path path_;
+  std::shared_ptr<const void> lock_;  // held while this or a copy lives
   std::map<std::size_t, Record> records_;
   std::map<std::size_t, std::string> places_;  // where each was read
   std::vector<std::string> notes_;

@@ -17,4 +17,7 @@ FAULTS = [
     fault("steps_of_two_climbs", "each_neighbour", "max(other, top) - min(other, top) <= s_.climb) f(n, r);",
           "max(other, top) - min(other, top) <= 2 * s_.climb) f(n, r);", TEST, "gaussian floor: steps above*",
           more=MORE, why="steps above the agent's climb lead nowhere"),
+    fault("open_storeys_dropped", "find", "indoors && s.inside && s.roofed[i] == 0", "indoors && s.roofed[i] == 0",
+          "tests/nav/test_gaussian_navmesh.cpp", "gaussian navmesh: a storey that stairs lead to*", more=MORE,
+          why="a terrace, or the upper floor of a scan without its roof, is no floor"),
 ]
