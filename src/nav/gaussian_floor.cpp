@@ -86,16 +86,20 @@ FloorTops Floors::find(GaussianNavReport& report, double& most_area) {
     if (!s.kept) continue;
     double area = 0;
     for (std::size_t i = 0; i < s.marks.size(); ++i) {
-      if (o_.drop_uncovered && indoors && s.inside && s.roofed[i] == 0) {
+      Mark& m = s.marks[i];
+      bool stairs = false;
+      for (std::uint32_t r = g_.first[m.column]; r < g_.first[m.column + 1]; ++r) {
+        const bool same = max(ramp_[r], m.top) - min(ramp_[r], m.top) < static_cast<int>(s_.clearance);
+        if (ramp_[r] == kNoLevel || !same) continue;
+        m.top = ramp_[r];
+        stairs = true;
+      }
+      // What lies under the open sky beside a house is outside; a flight below an open storey is not.
+      if (o_.drop_uncovered && indoors && s.inside && s.roofed[i] == 0 && !stairs) {
         report.dropped_uncovered += g_.cell * g_.cell;
         continue;
       }
       area += g_.cell * g_.cell;
-      Mark& m = s.marks[i];
-      for (std::uint32_t r = g_.first[m.column]; r < g_.first[m.column + 1]; ++r) {
-        const bool same = max(ramp_[r], m.top) - min(ramp_[r], m.top) < static_cast<int>(s_.clearance);
-        if (ramp_[r] != kNoLevel && same) m.top = ramp_[r];
-      }
       marks.push_back(m);
     }
     report.holes_filled += s.holes;

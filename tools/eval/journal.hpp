@@ -33,8 +33,8 @@ class Journal {
   /// Opens or begins the journal of a folder, to be written by `rank`. The actions of each record are
   /// played again, without a policy and without pictures, and must lead to its metrics. Pictures of
   /// episodes that another journal left are removed where one is begun by rank 0.
-  /// @return invalid_argument where its options or contents differ, naming what differs, or where another
-  /// process writes it; invalid_file, naming file, line, field and value; file_not_found.
+  /// @return invalid_argument where its options or contents differ, naming what differs, or where
+  /// another process writes it; invalid_file, naming file, line, field and value; file_not_found.
   static gsnav::Result<Journal> open(const std::filesystem::path& folder, const Options& options,
                                      const Stage& stage, int rank = 0);
   /// The same, of a folder that has one, for reading. Options of role `view` may differ; actions are not
