@@ -220,7 +220,7 @@ TEST_CASE("scene profile: one that does not fit its set is refused") {
   const GaussianCloud cloud = banded(0);
   SceneProfile profile = profile_scene(cloud);
   profile.chunk_sh_degrees.pop_back();
-  CHECK(validate(profile.applied_to(cloud.set())).message().find("chunk_sh_degrees") !=
+  CHECK(validate(profile.applied_to(cloud.set())).message().find("color.chunk_degrees") !=
         std::string::npos);
 }
 
