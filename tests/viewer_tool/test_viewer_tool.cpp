@@ -272,7 +272,7 @@ TEST_CASE("memory that runs out while a frame is drawn is said, and ends the vie
   const TempFolder folder("viewer_memory");
   // What a page of this size takes is refused by the system; loading takes less.
   Process limited({"/bin/bash", "-c",
-                   "ulimit -v 900000; exec " + quoted(GSNAV_VIEWER) +
+                   "ulimit -v 650000; exec " + quoted(GSNAV_VIEWER) +
                        " --port 0 --paused --density 0.05 --avatars 0 --episodes 1 --threads 1 --width "
                        "4096 --height 4096"},
                   folder.path());
