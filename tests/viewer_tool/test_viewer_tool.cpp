@@ -188,6 +188,11 @@ TEST_CASE("the colour picture is what the library draws there, and steering chan
   const auto plain = Viewer::picture(v.frame(), 0);
   CHECK(Viewer::picture(v.frame("navmesh=1&capsules=1"), 0).samples != plain.samples);
 
+  // What is shown is in the state, for the boxes of other tabs.
+  const Json shown = v.frame("people=0").state;
+  CHECK(shown["people"] == false);
+  CHECK(shown["capsules"] == true);
+  CHECK(shown["navmesh"] == true);
   CHECK(v.frame("stop=1").state["done"] == true);
   const Json next = v.frame("next=1").state;
   CHECK(next["done"] == false);

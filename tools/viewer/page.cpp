@@ -67,6 +67,7 @@ kbd{border:1px solid var(--line);border-radius:4px;padding:0 .35em;font:inherit}
 const $ = id => document.getElementById(id);
 const panels = ["color", "depth", "map"];
 const held = new Set(), once = {};
+const boxes = ["people", "capsules", "navmesh"];
 let turn = 0, tilt = 0, scrubbing = false, wasMoving = false, state = null, seen = null, request = null, before = 0;
 const number = (v, digits, unit) => v === null || v === undefined ? "none" : v.toFixed(digits) + unit;
 function say(id, text) { if ($(id).textContent !== text) $(id).textContent = text; }
@@ -77,6 +78,7 @@ function show(s) {
   say("news", !s.done ? "" : (s.success ? "Reached the goal." : "Stopped away from the goal.") + " N or \u201cnext episode\u201d begins the next one.");
   say("speed", number(s.rate, 1, " frames/s, ") + number(s.frame_ms, 1, " ms a frame, ") + s.visible.toLocaleString("en") + " Gaussians in view");
   say("paused", s.paused ? "play" : "pause");
+  for (const id of boxes) { if (!(id in once)) $(id).checked = s[id]; }  // another tab may have changed them
   say("near", s.depth.near + " m"); say("far", s.depth.far + " m");
   $("scale").style.background = "linear-gradient(to right," + s.depth.colors.join() + ")";
   if (s.time > +$("time").max) $("time").max = Math.ceil(s.time / 60) * 60 + 60;
@@ -144,7 +146,7 @@ async function frames() {
 }
 const ask = fields => { Object.assign(once, fields); hurry(); };
 const flip = id => { $(id).checked = !$(id).checked; ask({[id]: +$(id).checked}); };
-for (const id of ["people", "capsules", "navmesh"]) $(id).onchange = () => ask({[id]: +$(id).checked});
+for (const id of boxes) $(id).onchange = () => ask({[id]: +$(id).checked});
 const pause = () => ask({paused: state && state.paused ? 0 : 1});
 const shift = by => ask({time: Math.max(0, (state ? state.time : 0) + by), paused: 1});
 $("paused").onclick = pause;
