@@ -14,9 +14,10 @@ namespace {
 constexpr std::size_t kFoot = 30, kSide = 10, kWidth = 26, kTread = 6;  // columns of the flight
 constexpr std::size_t kSteps = 16, kLow = 4;
 
-/// Two storeys and a roof as voxels. A flight of kSteps - 1 treads of `rise` levels leads up through an
-/// opening. Each riser stands two levels out of its tread, as Gaussians on edge do.
-detail::VoxelGrid house(double rise, double phase) {
+/// Two storeys, and a roof unless it was cut off, as voxels. A flight of kSteps - 1 treads of `rise`
+/// levels leads up through an opening. Each riser stands two levels out of its tread, as Gaussians on
+/// edge do.
+detail::VoxelGrid house(double rise, double phase, bool roof = true) {
   detail::VoxelGrid g;
   const std::size_t head = kFoot + (kSteps - 1) * kTread;
   g.nx = head + 30;
@@ -41,7 +42,7 @@ detail::VoxelGrid house(double rise, double phase) {
     } else {
       sheet(upper, 0);
     }
-    sheet(static_cast<std::uint16_t>(2 * upper - kLow), 0);
+    if (roof) sheet(static_cast<std::uint16_t>(2 * upper - kLow), 0);
     g.first.push_back(static_cast<std::uint32_t>(g.runs.size()));
   }
   return g;
@@ -99,6 +100,17 @@ TEST_CASE("gaussian floor: stairs are a ramp without steps from floor to floor")
       CHECK(std::abs(at - upper) <= 1);
     }
   }
+}
+
+TEST_CASE("gaussian floor: an open storey that stairs lead to is kept, and the flight below it") {
+  detail::VoxelGrid covered = house(3.5, 0.25), open = house(3.5, 0.25, false);
+  const Found want = find(covered), got = find(open);
+  REQUIRE(got.report.storeys.size() == 2);
+  CHECK(got.report.stairs == 1);
+  CHECK(got.report.storeys[1].area == want.report.storeys[1].area);
+  // Some ground at the edge of the opening lies under the open sky.
+  CHECK(static_cast<double>(got.floors.tops.size()) >
+        0.98 * static_cast<double>(want.floors.tops.size()));
 }
 
 TEST_CASE("gaussian floor: steps above the climb are no stairs") {

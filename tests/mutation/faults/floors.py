@@ -18,6 +18,6 @@ FAULTS = [
           "max(other, top) - min(other, top) <= 2 * s_.climb) f(n, r);", TEST, "gaussian floor: steps above*",
           more=MORE, why="steps above the agent's climb lead nowhere"),
     fault("open_storeys_dropped", "find", "indoors && s.inside && s.roofed[i] == 0 && !stairs", "indoors && s.roofed[i] == 0",
-          "tests/nav/test_gaussian_navmesh.cpp", "gaussian navmesh: a storey that stairs lead to*", more=MORE,
+          TEST, "gaussian floor: an open storey*", more=MORE,
           why="a terrace, or the upper floor of a scan without its roof, is no floor"),
 ]
