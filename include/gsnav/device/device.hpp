@@ -45,7 +45,7 @@ class Device {
 
   /// As parse takes it: "serial", "cpu", "cpu:4", "cuda:0".
   std::string name() const;
-  /// For people: "CPU, 4 threads, AVX2 lanes" or "NVIDIA H100 80GB HBM3 (cuda:0)".
+  /// For people: "CPU, 4 threads, avx2 lanes" or "NVIDIA H100 80GB HBM3 (cuda:0)".
   std::string description() const;
 
   bool operator==(const Device&) const = default;

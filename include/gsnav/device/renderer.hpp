@@ -26,9 +26,9 @@ struct RenderOptions {
 };
 
 /// Renders a scene on any device: Gaussians, meshes and avatars in one image. It holds the scene in the
-/// device's memory and keeps its scratch between calls. Images have the bits of BasicRenderer on the
-/// device's backend. It may be moved; one that was moved from answers with invalid_argument. Calls of
-/// one renderer must not overlap.
+/// device's memory and keeps its scratch between calls. Images have the bits of Renderer<float, B>,
+/// where B is the device's backend. It may be moved; one that was moved from answers with
+/// invalid_argument. Calls of one renderer must not overlap.
 ///
 ///     auto device = gsnav::Device::parse("best").value();
 ///     auto renderer = gsnav::DeviceRenderer::create(device, cloud).value();

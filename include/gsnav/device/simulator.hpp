@@ -24,9 +24,9 @@ class BatchEngine;
 class SimulatorEngine;
 }  // namespace detail
 
-/// A simulator on any device: scene, avatars, agent, sensors and the PointNav task. It is BasicSimulator
-/// on the device's backend, compiled once: the same calls give the same bits. It may be moved; one that
-/// was moved from answers whatever can fail with invalid_argument, and nothing else must be asked of it.
+/// A simulator on any device: scene, avatars, agent, sensors and the PointNav task. It is Simulator<B>,
+/// where B is the device's backend, compiled once: the same calls give the same bits. It may be moved.
+/// In one that was moved from, calls that can fail answer invalid_argument; make no others.
 ///
 ///     auto sim = gsnav::DeviceSimulator::create(device, scene, config).value();
 ///     auto obs = sim.reset(episode).value();
@@ -91,8 +91,8 @@ class DeviceSimulator {
   std::unique_ptr<detail::SimulatorEngine> engine_;
 };
 
-/// N environments over M scenes on any device: BasicBatchSimulator on the device's backend, compiled
-/// once. It may be moved; one that was moved from has no environments and answers with
+/// N environments over M scenes on any device: BatchSimulator<B>, where B is the device's backend,
+/// compiled once. It may be moved; one that was moved from has no environments and answers with
 /// invalid_argument. After an error reset() begins anew.
 ///
 ///     auto sim = gsnav::DeviceBatchSimulator::create(device, scenes, config, 256, episode_of).value();
