@@ -7,10 +7,11 @@ usage: check_headers.py COMPILER [--nvcc] [--together] [--system DIR]... [--have
 Headers are found when the check runs, so a new one is covered without a new configure. --system adds
 a folder of third-party headers; an interop header is compiled where --have names its library.
 
-Headers of which each includes the one before are compiled as one file, innermost first: nothing stands before a
-header but what it includes by itself, so each is seen as if it was alone. With --together all that have the same
-options are compiled as one, which says what this compiler warns of; another compiler must then see to it that each
-header includes what it uses. Where a file of several headers fails, each of them is compiled alone.
+Where each header of a list includes the one before it, the list is compiled as one file, innermost
+first. A header then follows only what it includes itself, so the result is the same as alone. With
+--together, all headers with the same options are compiled as one file. That shows this compiler's
+warnings, but not whether each header includes what it uses: check that with another compiler. Where a
+file of several headers fails, each of them is compiled alone.
 """
 import argparse
 import concurrent.futures
@@ -54,7 +55,7 @@ def options(header):
 
 
 def chains(checked):
-    """The fewest lists of headers in which each header includes the one before, with the same options."""
+    """The fewest lists of headers with the same options, each header including the one before it."""
     texts = {}
     for folder in [ROOT / "include", *BACKENDS]:
         for h in checked:

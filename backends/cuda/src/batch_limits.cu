@@ -33,7 +33,8 @@ Status supports_meshes(const RenderConfig& config, const MeshFrame& meshes) {
   return {};
 }
 
-/// Of the lists of one camera. `sets` are valid.
+/// Checks the sets that one camera lists, and the list of what it sees of each. The sets themselves
+/// are already validated.
 Status check_lists(std::span<const GaussianSet> sets, const BatchCamera& camera) {
   for (const std::uint32_t s : camera.sets) {
     if (s < sets.size()) continue;

@@ -224,7 +224,7 @@ bool CudaBatchRenderer::State::plan_tiles(std::span<const BatchCamera> cameras,
   return few;
 }
 
-/// What blending reads beside the lists.
+/// Sets the arguments of the blending kernels, except the lists of splats.
 void CudaBatchRenderer::State::set_raster(const BatchImages& images) {
   raster = {};
   raster.grid = args.grid;

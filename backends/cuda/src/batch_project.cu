@@ -12,7 +12,7 @@ constexpr unsigned kProjectWarps = 4, kProjectBlocks = 5;  ///< of a block; of a
 constexpr unsigned kWarpsPerPart = kChunkPart / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
-/// Of the 32 rows from `first` on, a bit each, those that a set of so many has.
+/// A bit for each of the 32 rows from `first` on: 1 where a set of `size` rows has that row.
 __device__ unsigned rows_there(std::size_t size, std::size_t first) {
   if (first >= size) return 0u;
   return size - first >= 32 ? kAll : (1u << (size - first)) - 1u;

@@ -237,8 +237,8 @@ struct CudaBatchRenderer::State {
   Status list_meshes(std::span<const BatchCamera> cameras, std::uint64_t& most_triangles);
   void write_mesh_inputs(std::span<const BatchCamera> cameras);
   std::uint32_t room_for(std::uint64_t pairs) const;
-  /// How many of so many cameras counts of 32 bits and the device's free memory have room for, where
-  /// each takes what those of the last call took.
+  /// How many of `cameras` cameras one call can draw: limited by counts of 32 bits and by the device's
+  /// free memory, if each camera needs as much as the cameras of the last call did on average.
   std::size_t measured_capacity(std::size_t cameras) const;
   /// What lists of the next call have room for, by what those of the last needed.
   void fit_room(const cuda::BatchCounters& n);

@@ -4,7 +4,8 @@ from . import fault
 
 TEST = "tests/nav/test_gaussian_floor.cpp"
 CASE = "gaussian floor: stairs are a ramp*"
-MORE = ("src/nav/gaussian_floor.cpp", "src/nav/storeys.cpp", "src/nav/floor_marks.cpp", "src/nav/stairs.cpp")
+MORE = ("src/nav/gaussian_floor.cpp", "src/nav/storeys.cpp", "src/nav/floor_marks.cpp",
+        "src/nav/stairs.cpp")
 
 FAULTS = [
     fault("ramp_of_the_flight_alone", "kStairHead", "kStairHead = 1.0;", "kStairHead = 0.0;", TEST, CASE, more=MORE,

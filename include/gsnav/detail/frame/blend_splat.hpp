@@ -141,7 +141,8 @@ struct SplatRecords {
   const SplatPerspective<S>* perspective;
 };
 
-/// What log2 alpha of a splat is made of in one column of pixels: column - (b dy + w2)^2.
+/// The terms of log2 alpha that are constant in one column of pixels. In the row at dy from the
+/// reference, log2 alpha = column - (b dy + w2)^2.
 template <class L>
 struct ColumnTerms {
   L column, w2;
@@ -206,7 +207,7 @@ GSNAV_HD L alpha_in_footprint(const BlendRules<S>& rules, L exponent) noexcept {
   }
 }
 
-/// The same with 0 outside the footprint.
+/// Alpha of a splat at a pixel, from log2 alpha (`exponent`): 0 outside the footprint.
 template <Exp2 M, class L, class S>
 GSNAV_HD L footprint_alpha(const BlendRules<S>& rules, L exponent) noexcept {
   return select(in_footprint(rules, exponent), alpha_in_footprint<M>(rules, exponent), L(S(0)));
@@ -238,14 +239,14 @@ GSNAV_HD void blend_drawn(BlendState<L, D>& state, const BlendRules<S>& rules, m
       [&]() GSNAV_INLINED { return ray_depth(*depth, px, py); });
 }
 
-/// The same for an alpha that is 0 outside the footprint.
+/// Blends one splat onto the open pixels. `alpha` is already 0 outside its footprint.
 template <bool Color, DepthMode D, bool General, class L, class S>
 GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha,
                           const SplatColor<S>* color, const SplatDepth<S>* depth, L px, L py) noexcept {
   blend_drawn<Color, D, General>(state, rules, state.open(rules), alpha, color, depth, px, py);
 }
 
-/// What is drawn of a splat where nothing cuts it: all of its alpha.
+/// The `cut` of blend_splat() for a splat that nothing hides in part: keeps all of its alpha.
 struct WholeSplat {
   template <class L>
   GSNAV_HD L operator()(L alpha) const noexcept {
