@@ -30,6 +30,13 @@ Status moved_from(const char* what) {
   return {Errc::invalid_argument, std::string("this ") + what + " was moved from: use what it became"};
 }
 
+/// f(*engine), whose exceptions become a status; an error where the owner, a `what`, was moved from.
+template <class Engine, class F>
+auto on_engine(const std::unique_ptr<Engine>& engine, const char* what, F&& f) -> decltype(f(*engine)) {
+  if (engine == nullptr) return moved_from(what);
+  return detail::guarded([&] { return f(*engine); });
+}
+
 }  // namespace
 
 // ---- DeviceRenderer
@@ -62,8 +69,8 @@ Result<DeviceRenderer> DeviceRenderer::create(const Device& device, GaussianClou
 }
 
 Status DeviceRenderer::render(std::span<const Camera> cameras, Frames<float>& out, double time) {
-  if (engine_ == nullptr) return moved_from("DeviceRenderer");
-  return detail::guarded([&] { return engine_->render(cameras, time, out); });
+  return on_engine(engine_, "DeviceRenderer",
+                   [&](auto& engine) { return engine.render(cameras, time, out); });
 }
 Result<Frames<float>> DeviceRenderer::render(std::span<const Camera> cameras, double time) {
   Frames<float> frames;
@@ -106,20 +113,16 @@ Result<DeviceSimulator> DeviceSimulator::create(const Device& device, SimulatorS
 }
 
 Result<Observations> DeviceSimulator::reset(const PointNavEpisode& episode) {
-  if (engine_ == nullptr) return moved_from("DeviceSimulator");
-  return detail::guarded([&] { return engine_->reset(episode); });
+  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.reset(episode); });
 }
 Result<Observations> DeviceSimulator::step(Action action) {
-  if (engine_ == nullptr) return moved_from("DeviceSimulator");
-  return detail::guarded([&] { return engine_->step(action); });
+  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.step(action); });
 }
 Result<Observations> DeviceSimulator::step(const VelocityCommand& command) {
-  if (engine_ == nullptr) return moved_from("DeviceSimulator");
-  return detail::guarded([&] { return engine_->step(command); });
+  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.step(command); });
 }
 Result<Observations> DeviceSimulator::observe() {
-  if (engine_ == nullptr) return moved_from("DeviceSimulator");
-  return detail::guarded([&] { return engine_->observe(); });
+  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.observe(); });
 }
 bool DeviceSimulator::done() const noexcept { return engine_ == nullptr || world().done(); }
 EpisodeMetrics DeviceSimulator::metrics() const { return world().metrics(); }
@@ -127,23 +130,21 @@ const World& DeviceSimulator::world() const noexcept { return engine_->world(); 
 const SimulatorScene& DeviceSimulator::scene() const noexcept { return engine_->scene(); }
 const SimulatorConfig& DeviceSimulator::config() const noexcept { return engine_->config(); }
 Status DeviceSimulator::set_state(const WorldState& state) {
-  if (engine_ == nullptr) return moved_from("DeviceSimulator");
-  return detail::guarded([&] { return engine_->set_state(state); });
+  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.set_state(state); });
 }
 Status DeviceSimulator::set_agent(const Vec3d& position, double yaw, double pitch) {
-  if (engine_ == nullptr) return moved_from("DeviceSimulator");
-  return detail::guarded([&] { return engine_->set_agent(position, yaw, pitch); });
+  return on_engine(engine_, "DeviceSimulator",
+                   [&](auto& engine) { return engine.set_agent(position, yaw, pitch); });
 }
 void DeviceSimulator::set_seed(std::uint64_t seed) noexcept { engine_->set_seed(seed); }
 void DeviceSimulator::set_rendering(bool on) noexcept { engine_->set_rendering(on); }
 std::size_t DeviceSimulator::render_count() const noexcept { return engine_->render_count(); }
 Result<const Frames<float>*> DeviceSimulator::render(const Camera& camera, unsigned outputs) {
-  if (engine_ == nullptr) return moved_from("DeviceSimulator");
-  return detail::guarded([&] { return engine_->render(camera, outputs); });
+  return on_engine(engine_, "DeviceSimulator",
+                   [&](auto& engine) { return engine.render(camera, outputs); });
 }
 Result<std::span<const Observation>> DeviceSimulator::goal_images() {
-  if (engine_ == nullptr) return moved_from("DeviceSimulator");
-  return detail::guarded([&] { return engine_->goal_images(); });
+  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.goal_images(); });
 }
 
 // ---- DeviceBatchSimulator
@@ -196,16 +197,13 @@ std::size_t DeviceBatchSimulator::scene_of(std::size_t environment) const noexce
   return engine_->scene_of(environment);
 }
 Result<BatchStep> DeviceBatchSimulator::reset(std::span<const std::uint8_t> mask) {
-  if (engine_ == nullptr) return moved_from("DeviceBatchSimulator");
-  return detail::guarded([&] { return engine_->reset(mask); });
+  return on_engine(engine_, "DeviceBatchSimulator", [&](auto& engine) { return engine.reset(mask); });
 }
 Result<BatchStep> DeviceBatchSimulator::step(std::span<const Action> actions) {
-  if (engine_ == nullptr) return moved_from("DeviceBatchSimulator");
-  return detail::guarded([&] { return engine_->step(actions); });
+  return on_engine(engine_, "DeviceBatchSimulator", [&](auto& engine) { return engine.step(actions); });
 }
 Result<BatchStep> DeviceBatchSimulator::step(std::span<const VelocityCommand> commands) {
-  if (engine_ == nullptr) return moved_from("DeviceBatchSimulator");
-  return detail::guarded([&] { return engine_->step(commands); });
+  return on_engine(engine_, "DeviceBatchSimulator", [&](auto& engine) { return engine.step(commands); });
 }
 std::size_t DeviceBatchSimulator::render_count() const noexcept { return engine_->render_count(); }
 std::size_t DeviceBatchSimulator::pose_count() const noexcept { return engine_->pose_count(); }
