@@ -137,7 +137,7 @@ void HttpServer::forget_finished() {
 }
 
 /// Whether another connection may be had. Where there are too many, the one that was idle longest is
-/// dropped.
+/// dropped. One whose request has arrived is not idle, also where its thread has not read it yet.
 bool HttpServer::make_room() {
   std::size_t kept = 0;
   Connection* idle = nullptr;
@@ -145,7 +145,9 @@ bool HttpServer::make_room() {
   for (Connection& c : connections_) {
     if (c.dropped) continue;
     ++kept;
-    const Clock::rep t = c.idle_since;
+    pollfd p{c.socket, POLLIN, 0};
+    if (poll(&p, 1, 0) != 0) continue;
+    const Clock::rep t = c.idle_since;  // read after the poll: it is cleared before bytes are taken
     if (t != 0 && (idle == nullptr || t < since)) {
       idle = &c;
       since = t;
@@ -233,12 +235,10 @@ bool HttpServer::read_request(Connection& c, ParsedRequest& out) const {
     const int ready = wait_for(c.socket, POLLIN);
     if (ready < 0) return false;
     if (ready == 0) continue;
+    c.idle_since = 0;
     const ssize_t n = recv(c.socket, some.data(), some.size(), 0);
     if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) return false;
-    if (n > 0) {
-      bytes.append(some.data(), static_cast<std::size_t>(n));
-      c.idle_since = 0;
-    }
+    if (n > 0) bytes.append(some.data(), static_cast<std::size_t>(n));
   }
   return false;
 }
