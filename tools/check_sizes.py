@@ -16,15 +16,12 @@ SOURCES = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".inl"}
 LONG_FILES = {
     "backends/cuda/emulated/blocks.cpp": 423,
     "backends/cuda/emulated/runtime.cpp": 362,
-    "backends/cuda/src/batch_order.cuh": 379,
-    "backends/cuda/src/mesh.cu": 427,
     "bench/bench_kernels_body.cpp": 379,
     "bench/floor_loops.cpp": 360,
     "include/gsnav/detail/lanes/rasterize_tile.hpp": 363,
     "src/io/avatar_file.cpp": 360,
 }
 LONG_FUNCTIONS = {
-    "backends/cuda/src/batch_project.cu": 149,
     "bench/bench_storage.cpp": 92,
     "include/gsnav/detail/scene/lod_levels.hpp": 86,
     "include/gsnav/detail/sim/semantic_frame.hpp": 86,

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "gsnav/backends/cuda/policy.hpp"
 #include "gsnav/detail/frame/blend.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
@@ -14,7 +15,6 @@
 
 namespace gsnav::cuda {
 
-inline constexpr int kBatchTile = 16, kSmallTile = 8;  ///< pixels a side; small where cameras are few
 inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
 
 /// A set seen by a camera. Instances of a set are neighbours; those of a camera are listed by
@@ -122,19 +122,15 @@ struct alignas(16) ListPart {
 };
 /// Of an entry of tile_order: the tile's list is in order already.
 inline constexpr std::uint32_t kListInOrder = 0x80000000u;
-inline constexpr std::uint32_t kOrderBatch =
-    512;  ///< pairs of a list that a block puts in order at a time
-inline constexpr std::uint32_t kPartLength =
-    128;  ///< part p has the bins that begin so many pairs apart
-
-inline constexpr int kMinDepthBits = 6, kMaxDepthBits = 9;
+/// Pairs of a list that a block puts in order at a time.
+inline constexpr std::uint32_t kOrderBatch = policy::Order::kThreads * policy::Order::kItems;
 
 /// Where cameras are few, lists are kept in bins of depth, an octave's share each, so that many blocks
 /// can put one in order.
 struct DepthBins {
   std::uint32_t base;  ///< the key that bin 0 begins at; nearer ones are in it too
   int shift;           ///< a bin is 2^shift keys
-  int bits;  ///< 2^bits bins: 0, or kMinDepthBits to kMaxDepthBits; the last has all that is farther
+  int bits;            ///< 2^bits bins, or none where 0 (policy::Bin); the last has all that is farther
   __host__ __device__ bool many() const { return bits != 0; }
   __device__ std::uint32_t count() const { return 1u << bits; }
   __device__ std::uint32_t of(std::uint32_t key) const {

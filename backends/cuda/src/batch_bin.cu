@@ -10,7 +10,8 @@ namespace gsnav::cuda {
 
 namespace {
 
-constexpr unsigned kThreads = 128;
+constexpr unsigned kThreads = policy::Bin::kThreads;
+constexpr std::uint32_t kPartLength = policy::Bin::kPartLength;
 
 /// Calls f(splat, tile, wanted), by all lanes together, for the tiles of the large splats: a lane finds
 /// those of a row. A warp's rows lie far apart in the queue: neighbours are mostly of one splat, and a
@@ -199,7 +200,7 @@ __device__ void measure_lists(const BatchArgs& a, std::uint32_t* of_length) {
 /// Places of lists in bins, which follow one another in no particular order: a warp a tile. Also what
 /// order_kernel has to do.
 __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
-  constexpr unsigned kAll = 0xffffffffu, kMost = (1u << kMaxDepthBits) / 64;
+  constexpr unsigned kAll = 0xffffffffu, kMost = (1u << policy::Bin::kMaxDepthBits) / 64;
   const unsigned lane = threadIdx.x % 32,
                  mine = a.depth_bins.count() / 64;  // of a lane: pairs of bins, neighbours
   for (std::uint32_t tile = (blockIdx.x * kThreads + threadIdx.x) / 32; tile < a.tiles;
@@ -301,7 +302,7 @@ __global__ void __launch_bounds__(kThreads) beyond_kernel(const BatchArgs a) {
 }  // namespace
 
 void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
-  const unsigned blocks = static_cast<unsigned>(multiprocessors) * 16;
+  const unsigned blocks = static_cast<unsigned>(multiprocessors) * policy::Bin::kBlocks;
   const auto blocks_of = [&](unsigned tiles) {
     return std::min(blocks, (args.tiles + tiles - 1) / tiles);
   };

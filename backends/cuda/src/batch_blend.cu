@@ -2,8 +2,8 @@
 #include <cstring>
 
 #include "batch_blend.cuh"
-#include "batch_order.cuh"
 #include "batch_splat.cuh"
+#include "batch_tile_order.cuh"
 #include "gsnav/backends/cuda.hpp"
 
 // Blending of a batch, and the median depths of the Gaussians that it found.
@@ -12,18 +12,15 @@ namespace gsnav::cuda {
 
 namespace {
 
-constexpr int kPixels = 2;  ///< of a thread, one above the other
-constexpr int kThreads = kBatchTile * kBatchTile / kPixels;
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
-constexpr int kBlocksPerProcessor = 4;
-#else
-constexpr int kBlocksPerProcessor = 7;
-#endif
+using Policy = policy::Blend;
+constexpr int kTile = policy::Batch::kTile;
+constexpr int kPixels = Policy::kPixels;
+constexpr int kThreads = kTile * kTile / kPixels;
 constexpr int kRowsApart = kBlock / kPixels;  ///< of a thread's pixels
-constexpr std::uint32_t kChunk = 256;         ///< splats that are staged at a time
-constexpr std::uint32_t kNothing = kChunk;    ///< a staged splat that covers no pixel
+constexpr std::uint32_t kChunk = Policy::kChunk;
+constexpr std::uint32_t kNothing = kChunk;  ///< a staged splat that covers no pixel
 constexpr unsigned kAll = 0xffffffffu;
-static_assert(kThreads == kOrderThreads && 4 * kBlock * kBlock == 32 * kPixels &&
+static_assert(kThreads == policy::Order::kThreads && 4 * kBlock * kBlock == 32 * kPixels &&
               kOrderBatch % kChunk == 0);
 
 static_assert((kChunk + 1) * sizeof(StagedSplat) <= kOrderLent && kOrderLent <= 0xffff);
@@ -117,7 +114,7 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned b
 /// A block a tile, a thread two pixels of a column, a quarter of a warp a block of 4 x 4 of them. For
 /// DepthMode::median the slot of the median Gaussian is left in the image.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh>
-__global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor)
+__global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : Policy::kResident)
     blend_kernel(const __grid_constant__ BlendArgs b) {
   extern __shared__ __align__(16) unsigned char memory[];
   BlendShared& s = *reinterpret_cast<BlendShared*>(memory);
@@ -126,8 +123,8 @@ __global__ void __launch_bounds__(kThreads, Mesh ? 4 : kBlocksPerProcessor)
   const std::uint32_t entry = a.tile_order[blockIdx.x], ordered = entry & ~kListInOrder,
                       camera = ordered / tiles, tile = ordered % tiles;
   const bool in_order = (entry & kListInOrder) != 0;
-  const int tile_x = static_cast<int>(tile) % a.grid.columns * kBatchTile;
-  const int tile_y = static_cast<int>(tile) / a.grid.columns * kBatchTile;
+  const int tile_x = static_cast<int>(tile) % a.grid.columns * kTile;
+  const int tile_y = static_cast<int>(tile) / a.grid.columns * kTile;
   // A warp has 2 x 2 blocks of the tile's 4 x 4.
   const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32, quarter = lane / 8, at = lane % 8;
   const unsigned column = warp % 2 * 2 + quarter % 2, row = warp / 2 * 2 + quarter / 2;
@@ -219,11 +216,13 @@ __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t came
   return depth;
 }
 
-constexpr unsigned kDepthColumns = 16, kDepthRows = 8, kDepthThreads = kDepthColumns * kDepthRows;
+constexpr unsigned kDepthColumns = policy::MedianDepth::kColumns,
+                   kDepthRows = policy::MedianDepth::kRows, kDepthThreads = kDepthColumns * kDepthRows;
 
 /// A thread a pixel of camera blockIdx.z, a warp 8 x 4 of them: slots become depths, of records where
 /// these are. Else neighbours have Gaussians in common, and each is projected once a warp.
-__global__ void __launch_bounds__(kDepthThreads, 6) depth_kernel(const BatchArgs a, float* images) {
+__global__ void __launch_bounds__(kDepthThreads, policy::MedianDepth::kResident)
+    depth_kernel(const BatchArgs a, float* images) {
   const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
   const int x = static_cast<int>(blockIdx.x * kDepthColumns + warp % 2 * 8 + lane % 8);
   const int y = static_cast<int>(blockIdx.y * kDepthRows + warp / 2 * 4 + lane / 8);

@@ -43,7 +43,7 @@ __device__ inline SplatGeometry<float> geometry_of(const StagedSplat& s) {
 struct ReachedBlocks {
   int x, y;            ///< of the tile
   int x0, x1, y0, y1;  ///< pixels of the bounds in it, inclusive
-  __device__ ReachedBlocks(const SplatBounds& b, int tile_x, int tile_y, int side = kBatchTile)
+  __device__ ReachedBlocks(const SplatBounds& b, int tile_x, int tile_y, int side = policy::Batch::kTile)
       : x(tile_x),
         y(tile_y),
         x0(max(b.x0, x)),

@@ -8,13 +8,14 @@ namespace gsnav::cuda {
 
 namespace {
 
-constexpr int kThreads = 128, kWarps = kThreads / 32;   ///< of half a block
-constexpr std::uint32_t kOfThread = 2;                  ///< splats that a thread stages at a time
+using Policy = policy::BlendSmall;
+constexpr int kTile = policy::Batch::kSmallTile;
+constexpr int kThreads = Policy::kThreads, kWarps = kThreads / 32;  ///< of half a block
+constexpr std::uint32_t kOfThread = Policy::kOfThread;
 constexpr std::uint32_t kChunk = kOfThread * kThreads;  ///< splats that are staged at a time
 constexpr std::uint32_t kOfWarp = kChunk / kWarps;      ///< of these a warp's, neighbours
-constexpr int kBlocksPerProcessor = 3;                  ///< four would spill registers: 4 to 8 % slower
 constexpr unsigned kAll = 0xffffffffu;
-static_assert(kSmallTile == 2 * kBlock && kWarps == 4);
+static_assert(kTile == 2 * kBlock && kWarps == 4);
 
 /// A chunk of a list as it is drawn.
 struct DrawnChunk {
@@ -61,7 +62,7 @@ class Stager {
       if (i < n) {
         to.splats[i] = staged(record_[j], slot_[j]);
         if (!Mesh || !is_hidden(a, slot_[j], far)) {
-          const ReachedBlocks blocks(bounds_of(record_[j].x, record_[j].y), tile_x, tile_y, kSmallTile);
+          const ReachedBlocks blocks(bounds_of(record_[j].x, record_[j].y), tile_x, tile_y, kTile);
           mask = a.elliptic && blocks.many()
                      ? blocks.of_ellipse(geometry_of(record_[j]), a.log2_alpha_min)
                      : blocks.of_bounds();
@@ -120,7 +121,7 @@ class Stager {
 /// half's; the second stages what is drawn next. For DepthMode::median the slot of the median Gaussian
 /// is left in the image.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh>
-__global__ void __launch_bounds__(2 * kThreads, kBlocksPerProcessor)
+__global__ void __launch_bounds__(2 * kThreads, Policy::kResident)
     blend_small_kernel(const __grid_constant__ BlendArgs b) {
   __shared__ __align__(16) unsigned char memory[sizeof(SmallShared)];
   SmallShared& s = *reinterpret_cast<SmallShared*>(memory);
@@ -128,8 +129,8 @@ __global__ void __launch_bounds__(2 * kThreads, kBlocksPerProcessor)
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
   const std::uint32_t ordered = a.tile_order[blockIdx.x], camera = ordered / tiles,
                       tile = ordered % tiles;
-  const int tile_x = static_cast<int>(tile) % a.grid.columns * kSmallTile;
-  const int tile_y = static_cast<int>(tile) / a.grid.columns * kSmallTile;
+  const int tile_x = static_cast<int>(tile) % a.grid.columns * kTile;
+  const int tile_y = static_cast<int>(tile) / a.grid.columns * kTile;
   const bool draws = threadIdx.x < kThreads;
   const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32 % kWarps, at = lane % 16;
   const int x = tile_x + static_cast<int>(warp % 2 * kBlock + at % kBlock);

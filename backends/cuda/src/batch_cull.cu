@@ -7,7 +7,7 @@ namespace gsnav::cuda {
 
 namespace {
 
-constexpr unsigned kThreads = 256, kWarps = kThreads / 32;
+constexpr unsigned kThreads = policy::Cull::kThreads, kWarps = kThreads / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
 /// Whether part `part` of the chunk may have visible Gaussians: by bounds of its own, or by the chunk's.
@@ -114,7 +114,8 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
 }  // namespace
 
 void launch_culling(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
-  cull_kernel<<<static_cast<unsigned>(multiprocessors) * 8, kThreads, 0, stream>>>(args);
+  cull_kernel<<<static_cast<unsigned>(multiprocessors) * policy::Cull::kBlocks, kThreads, 0, stream>>>(
+      args);
 }
 
 }  // namespace gsnav::cuda

@@ -127,7 +127,8 @@ std::size_t CudaBatchRenderer::capacity(std::span<const GaussianSet> sets,
                                         std::span<const BatchCamera> cameras) const {
   if (cameras.empty()) return 0;
   const Camera& camera = cameras[0].camera;
-  const std::size_t tiles = TileGrid::of(camera.width, camera.height, cuda::kBatchTile).count();
+  const std::size_t tiles =
+      TileGrid::of(camera.width, camera.height, cuda::policy::Batch::kTile).count();
   const std::size_t most = std::min({cameras.size(), cuda::kMostCameras, cuda::kMostTiles / tiles,
                                      state_->measured_capacity(cameras.size())});
   std::vector<std::uint32_t> instances(sets.size());

@@ -4,7 +4,7 @@
 #include "batch_tiles.cuh"
 
 // Pairs as they are found, into lists that have room for so many each: nothing is found twice. What
-// comes beyond is queued.
+// comes beyond the room is queued, and so are splats of very many tiles, row by row.
 
 namespace gsnav::cuda {
 
@@ -82,6 +82,54 @@ class NearPairs {
 
   std::uint32_t tile_ = 0, columns_ = 0;
   WarpPairs pairs_[4];
+};
+
+/// The rows of tiles of a splat that binning takes row by row.
+struct LargeRows {
+  std::uint32_t first, count;
+};
+
+__device__ inline LargeRows large_rows(const BatchArgs& a, const SplatBounds& b) {
+  const int shift = a.grid.tile_shift();
+  const std::uint32_t first = static_cast<std::uint32_t>(b.y0 >> shift);
+  return {first, static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1 - first};
+}
+
+__device__ inline void queue_large_row(const BatchArgs& a, unsigned long long place,
+                                       const SplatKey& splat, std::uint32_t row) {
+  if (place < a.large_capacity) a.large[place] = {splat, row};
+}
+
+/// Queues the rows of the lanes that have some; all lanes call both, `ask` first, so that nobody waits
+/// for the counter until `put`.
+class LargeQueue {
+ public:
+  __device__ void ask(const BatchArgs& a, const LargeRows& rows) {
+    any_ = __any_sync(0xffffffffu, rows.count != 0);
+    if (!any_) return;
+    const std::uint32_t end = sum_to_lane(rows.count);
+    begin_ = end - rows.count;
+    if (threadIdx.x % 32 == 31)
+      base_ = atomicAdd(&a.counters->large, static_cast<unsigned long long>(end));
+  }
+  __device__ void put(const BatchArgs& a, const SplatKey& splat, const LargeRows& rows) const {
+    if (!any_) return;
+    const unsigned long long base = __shfl_sync(0xffffffffu, base_, 31);
+    share_in_warp(rows.count, [&](unsigned owner, std::uint32_t k) {
+      const unsigned from = owner % 32;
+      const std::uint32_t place = __shfl_sync(0xffffffffu, begin_, from) + k,
+                          row = __shfl_sync(0xffffffffu, rows.first, from) + k;
+      const SplatKey of{__shfl_sync(0xffffffffu, splat.slot, from),
+                        __shfl_sync(0xffffffffu, splat.key, from),
+                        __shfl_sync(0xffffffffu, splat.camera, from)};
+      if (owner < 32) queue_large_row(a, base + place, of, row);
+    });
+  }
+
+ private:
+  bool any_ = false;
+  std::uint32_t begin_ = 0;      ///< of the lane's, among the warp's
+  unsigned long long base_ = 0;  ///< of lane 31: where the warp's begin
 };
 
 }  // namespace gsnav::cuda

@@ -13,9 +13,7 @@ namespace gsnav {
 
 namespace {
 
-// What cameras of a wave may take together, where one alone does not take more: 170 MB of vertices, 130
-// of pixels.
-constexpr std::size_t kWaveVertices = std::size_t{1} << 22, kWavePixels = std::size_t{1} << 24;
+using Policy = cuda::policy::Mesh;
 
 std::uint32_t chunks_of(std::size_t n) {
   return static_cast<std::uint32_t>((n + kMeshChunk - 1) / kMeshChunk);
@@ -28,7 +26,7 @@ Status CudaBatchRenderer::State::list_meshes(std::span<const BatchCamera> camera
                                              std::uint64_t& most_triangles) {
   const std::size_t pixels =
       static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
-  cuda::Flight& flight = flights[calls % cuda::kInFlight];
+  cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   meshes.placements.clear();
   meshes.places.clear();
   meshes.chunk_begins.clear();
@@ -52,8 +50,8 @@ Status CudaBatchRenderer::State::list_meshes(std::span<const BatchCamera> camera
       vertices += p.mesh.vertices.size;
       of_camera += p.mesh.triangle_count();
     }
-    if (meshes.waves.empty() || meshes.waves.back().vertices + vertices > kWaveVertices ||
-        (meshes.waves.back().cameras + 1) * pixels > kWavePixels) {
+    if (meshes.waves.empty() || meshes.waves.back().vertices + vertices > Policy::kWaveVertices ||
+        (meshes.waves.back().cameras + 1) * pixels > Policy::kWavePixels) {
       meshes.waves.push_back({c, static_cast<std::uint32_t>(first),
                               static_cast<std::uint32_t>(meshes.chunk_begins.size()), 0, 0, 0, 0, 0});
       meshes.chunk_begins.push_back(0);
@@ -78,7 +76,7 @@ Status CudaBatchRenderer::State::list_meshes(std::span<const BatchCamera> camera
 
 /// Copies the lists, cameras and lights into the call's pinned memory.
 void CudaBatchRenderer::State::write_mesh_inputs(std::span<const BatchCamera> cameras) {
-  cuda::Flight& flight = flights[calls % cuda::kInFlight];
+  cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   cuda::Layout layout;
   meshes.at_placements = layout.add<MeshPlacement>(meshes.placements.size());
   meshes.at_places = layout.add<cuda::MeshPlace>(meshes.places.size());
@@ -104,7 +102,7 @@ void CudaBatchRenderer::State::write_mesh_inputs(std::span<const BatchCamera> ca
 }
 
 Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> cameras) {
-  cuda::Flight& flight = flights[calls % cuda::kInFlight];
+  cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   flight.mesh_triangles = 0;
   meshes.waves.clear();
   flight.has_meshes = std::any_of(cameras.begin(), cameras.end(),
@@ -122,8 +120,8 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
   raster.mesh = {meshes.depth.data(), color ? meshes.color.data() : nullptr, {}};
   raster.exp2_method = Exp2::degree5;  // as frames with meshes have it
   if (triangle_capacity == 0) {        // a guess, as that of slots
-    triangle_capacity =
-        static_cast<std::uint32_t>(std::clamp<std::uint64_t>(most_triangles / 2, 1u << 14, 1u << 21));
+    triangle_capacity = static_cast<std::uint32_t>(
+        std::clamp<std::uint64_t>(most_triangles / 2, Policy::kLeastTriangles, Policy::kMostTriangles));
   }
   return {};
 }

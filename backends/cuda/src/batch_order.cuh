@@ -11,15 +11,13 @@
 
 namespace gsnav::cuda {
 
-inline constexpr int kOrderThreads = 128;
-inline constexpr int kOrderItems = 4;  ///< a thread
-static_assert(kOrderThreads * kOrderItems == kOrderBatch);
-inline constexpr int kOrderBinBits = 7, kOrderBins = 1 << kOrderBinBits;
-inline constexpr int kOrderLevels = 10;  ///< of 7 bits: five for the key, five for the rank
+inline constexpr int kOrderThreads = policy::Order::kThreads, kOrderItems = policy::Order::kItems;
+inline constexpr int kOrderBinBits = policy::Order::kBinBits, kOrderBins = 1 << kOrderBinBits;
+inline constexpr int kOrderLevels = 2 * ((32 + kOrderBinBits - 1) / kOrderBinBits);  ///< of key and rank
 inline constexpr std::size_t kOrderLent = 12800;
 
 /// A batch is scattered into so many buckets by key; what shares one is put in order afterwards.
-inline constexpr int kBucketBits = 10, kBuckets = 1 << kBucketBits;
+inline constexpr int kBucketBits = policy::Order::kBucketBits, kBuckets = 1 << kBucketBits;
 inline constexpr int kThreadBuckets = kBuckets / kOrderThreads;
 
 using OrderSort = cub::BlockRadixSort<std::uint32_t, kOrderThreads, kOrderItems, std::uint32_t>;
@@ -126,7 +124,6 @@ struct PairsAt {
 __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
                                                const PairsAt pairs, std::uint32_t begin_pair,
                                                std::uint32_t n, std::uint32_t low, std::uint32_t high) {
-  constexpr std::uint32_t kLongest = 64;  // bucket that is put in order by comparing all with all
   Pair pair[kOrderItems];
   std::uint32_t place[kOrderItems];
   for (unsigned j = 0; j < kOrderItems; ++j) {
@@ -160,7 +157,7 @@ __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& 
     total += four.x + four.y + four.z + four.w;
     largest = max(largest, max(max(four.x, four.y), max(four.z, four.w)));
   }
-  if (largest > kLongest) s.long_run = 1;
+  if (largest > policy::Order::kLongestBucket) s.long_run = 1;
   OrderScan(s.sorting.scan).ExclusiveSum(total, begin);
   for (int k = 0; k < kThreadBuckets / 4; ++k) {
     uint4 four = mine[k];
@@ -200,7 +197,7 @@ __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& 
 template <class F>
 __device__ inline void for_each_pair(const PairsAt& pairs, std::uint32_t begin, std::uint32_t end,
                                      const F& f) {
-  constexpr unsigned kFetched = 8;
+  constexpr unsigned kFetched = policy::Order::kFetched;
   for (std::uint32_t first = begin + threadIdx.x; first < end; first += kFetched * kOrderThreads) {
     Pair fetched[kFetched];
     for (unsigned j = 0; j < kFetched; ++j) {
@@ -259,121 +256,5 @@ __device__ __noinline__ inline void partition(OrderShared& s, const BatchArgs& a
 }
 
 }  // namespace ordering
-
-/// Reads a tile's list front to back, up to kOrderBatch splats at a time.
-class TileOrder {
- public:
-  __device__ TileOrder(const BatchArgs& a, std::uint32_t tile, std::uint32_t camera)
-      : tile_(tile), camera_(camera), begin_(a.tile_begins[tile]), end_(begin_ + a.tile_counts[tile]) {}
-  __device__ TileOrder(const ListPart& part, std::uint32_t camera)
-      : tile_(part.tile), camera_(camera), begin_(part.begin), end_(part.end), bin_(part.bin) {}
-
-  /// Leaves the next splats in s.slots and returns how many; 0: no more.
-  __device__ __noinline__ std::uint32_t next(OrderShared& s, const BatchArgs& a) {
-    if (level_ >= 0) {
-      const std::uint32_t n = next_of_bin(s, a);
-      if (n != 0) return n;
-    }
-    if (begin_ == end_) return 0;
-    const Bins bins = take(a);
-    const std::uint32_t begin = begin_, n = bins.end - begin;
-    begin_ = bins.end;
-    bin_ = bins.next;
-    if (n <= kOrderBatch) {
-      ordering::sort_batch(s, a, camera_, list(a), begin, n, bins.low, bins.high);
-      return n;
-    }
-    level_ = 0;
-    ordering::partition(s, a, camera_, list(a), bins_of_list(a), begin, n, 0);
-    return next_of_bin(s, a);
-  }
-
- private:
-  static constexpr int kNone = -1;
-
-  /// Bins of depth that are read together: pairs up to `end`, of keys in [low, high]; low > high: not
-  /// known.
-  struct Bins {
-    std::uint32_t end, next, low, high;
-  };
-
-  __device__ const std::uint32_t* bin_ends(const BatchArgs& a) const {
-    return a.bins + (std::size_t{tile_} << a.depth_bins.bits);
-  }
-
-  /// As many bins as a batch holds, but one at least. Every warp finds out by itself.
-  __device__ Bins take(const BatchArgs& a) const {
-    constexpr std::uint32_t kNoBin = 0xffffffffu;
-    const DepthBins& bins = a.depth_bins;
-    if (!bins.many() || end_ - begin_ <= kOrderBatch) return {end_, bins.count(), kNoBin, 0};
-    const std::uint32_t* const ends = bin_ends(a);
-    const std::uint32_t lane = threadIdx.x % 32;
-    std::uint32_t bin = bin_, end = begin_;
-    for (;;) {
-      const std::uint32_t mine = bin + lane < bins.count() ? min(ends[bin + lane], end_) : kNoBin;
-      const bool fits = mine != kNoBin && mine - begin_ <= kOrderBatch;
-      const int fitting = __popc(__ballot_sync(0xffffffffu, fits));
-      if (fitting > 0) end = __shfl_sync(0xffffffffu, mine, fitting - 1);
-      if (fitting < 32 && end == begin_) {  // the next by itself is longer
-        end = __shfl_sync(0xffffffffu, mine, fitting);
-        bin += static_cast<std::uint32_t>(fitting) + 1;
-        break;
-      }
-      bin += static_cast<std::uint32_t>(fitting);
-      if (fitting < 32) break;
-    }
-    if (bin_ == 0 || bin == bins.count()) return {end, bin, kNoBin, 0};
-    return {end, bin, bins.base + (bin_ << bins.shift), bins.base + (bin << bins.shift) - 1};
-  }
-
-  /// Of a bin that is longer than a batch.
-  __device__ std::uint32_t next_of_bin(OrderShared& s, const BatchArgs& a) {
-    while (level_ >= 0) {
-      const std::uint32_t* begins = s.begins[level_];
-      std::uint32_t bin = s.next_bin[level_];
-      while (bin < kOrderBins && begins[bin + 1] == begins[bin]) ++bin;
-      if (bin == kOrderBins) {
-        --level_;
-        continue;
-      }
-      // As many bins as fit, but at least one.
-      const std::uint32_t end = last_start(bin + 1, std::uint32_t{kOrderBins + 1}, [&](std::uint32_t i) {
-        return begins[i] - begins[bin] <= kOrderBatch;
-      });
-      const std::uint32_t begin = begins[bin], n = begins[end] - begin;
-      __syncthreads();
-      if (threadIdx.x == 0) s.next_bin[level_] = end;
-      const ordering::PairsAt here = level_ % 2 == 0 ? bins_of_list(a) : list(a);
-      if (n <= kOrderBatch) {
-        const int shift = s.shifts[level_];
-        std::uint32_t low = 0xffffffffu, high = 0;
-        if (shift != kByRank) {
-          low = s.bases[level_] + (bin << shift);
-          high = s.bases[level_] + (end << shift) - 1;
-        }
-        ordering::sort_batch(s, a, camera_, here, begin, n, low, high);
-        return n;
-      }
-      ++level_;
-      ordering::partition(s, a, camera_, here, level_ % 2 == 0 ? bins_of_list(a) : list(a), begin, n,
-                          level_);
-    }
-    return 0;
-  }
-
-  static constexpr std::uint32_t kNowhere = 0xffffffffu;
-  __device__ ordering::PairsAt list(const BatchArgs& a) const {
-    if (a.list_room == 0) return {a.pairs, 0, kNowhere, 0};
-    return {a.pairs, 0, (tile_ + 1) * a.list_room, a.tile_shifts[tile_].x};
-  }
-  /// What the bins of every other level are written to.
-  __device__ ordering::PairsAt bins_of_list(const BatchArgs& a) const {
-    return {a.pairs_alt, a.list_room != 0 ? a.tile_shifts[tile_].y : 0, kNowhere, 0};
-  }
-
-  std::uint32_t tile_, camera_, begin_, end_;
-  std::uint32_t bin_ = 0;  ///< the next of depth
-  int level_ = kNone;      ///< of the bin that is being read
-};
 
 }  // namespace gsnav::cuda

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
-#include "batch_order.cuh"
+#include "batch_tile_order.cuh"
 
 // Few cameras: parts of lists are put in order by themselves, by a warp each, or by a block where they
 // are long. Large images: so are whole lists, where they are short.
@@ -10,7 +10,8 @@ namespace gsnav::cuda {
 
 namespace {
 
-constexpr unsigned kThreads = kOrderThreads, kWarps = kThreads / 32;
+using Policy = policy::Order;
+constexpr unsigned kThreads = Policy::kThreads, kWarps = kThreads / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
 /// Puts the first of two before the second, or the other way round.
@@ -61,7 +62,7 @@ __device__ void sort_in_warp(std::uint64_t (&v)[K]) {
 template <int K>
 __device__ bool order_equals(const BatchArgs& a, std::uint32_t camera, std::uint64_t (&v)[K],
                              std::uint32_t n) {
-  constexpr int kMost = 8;
+  constexpr int kMost = Policy::kTieRounds;
   const unsigned lane = threadIdx.x % 32;
   const auto key = [](std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); };
   std::uint64_t before = __shfl_up_sync(kAll, v[K - 1], 1), after = __shfl_down_sync(kAll, v[0], 1);
@@ -192,12 +193,12 @@ __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a
 void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
   const unsigned processors = static_cast<unsigned>(multiprocessors);
   if (args.short_lists) {
-    order_lists_kernel<<<std::min(processors * 16, (args.tiles + kWarps - 1) / kWarps), kThreads, 0,
-                         stream>>>(args);
+    order_lists_kernel<<<std::min(processors * Policy::kListBlocks, (args.tiles + kWarps - 1) / kWarps),
+                         kThreads, 0, stream>>>(args);
     return;
   }
-  order_kernel<<<processors * 8, kThreads, 0, stream>>>(args);
-  order_long_kernel<<<processors * 6, kThreads, 0, stream>>>(args);
+  order_kernel<<<processors * Policy::kPartBlocks, kThreads, 0, stream>>>(args);
+  order_long_kernel<<<processors * Policy::kLongBlocks, kThreads, 0, stream>>>(args);
 }
 
 }  // namespace gsnav::cuda

@@ -20,35 +20,34 @@ using cuda::BatchSet;
 /// too many; of more Gaussians lists are longer.
 bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussians,
                int multiprocessors) {
-  constexpr std::uint64_t kSmallImage = 512, kManyGaussians = 2'500'000;
-  const std::uint64_t at_a_time = gaussians >= kManyGaussians * cameras ? 32 : 16;
-  return tiles <= kSmallImage &&
-         cameras * tiles <= at_a_time * static_cast<std::uint64_t>(multiprocessors);
+  using Policy = cuda::policy::Batch;
+  const std::uint64_t each =
+      gaussians >= Policy::kManyGaussians * cameras ? 2 * Policy::kFewTilesEach : Policy::kFewTilesEach;
+  return tiles <= Policy::kFewTiles &&
+         cameras * tiles <= each * static_cast<std::uint64_t>(multiprocessors);
 }
 
 /// Whether lists of an image of so many tiles are short, for the most part: what takes a block long is
 /// then not to draw one but to put it in order.
 bool has_short_lists(std::uint64_t tiles, int multiprocessors) {
-  return tiles > 16 * static_cast<std::uint64_t>(multiprocessors);
+  return tiles > cuda::policy::Batch::kShortListTiles * static_cast<std::uint64_t>(multiprocessors);
 }
 
-/// Eight octaves from the nearest near plane on, or from kNear, as finely as counters in the GPU's cache
-/// allow. An agent's near plane is a centimetre off: octaves up to its body's radius would be spent on
-/// nothing, and all that lies beyond 2.5 m would share the last bin.
+/// Eight octaves from the nearest near plane on, or from policy::Bin::kNear, as finely as counters in
+/// the GPU's cache allow. An agent's near plane is a centimetre off: octaves up to its body's radius
+/// would be spent on nothing, and all that lies beyond 2.5 m would share the last bin.
 cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits, std::uint32_t tiles) {
-  constexpr std::uint32_t kCounters = 1u << 22;
-  constexpr int kOctaves = 3;      // log2
-  constexpr float kNear = 0.125f;  // metres
-  int bits = cuda::kMinDepthBits;
-  while (bits < cuda::kMaxDepthBits && std::uint64_t{tiles} << (bits + 1) <= kCounters) ++bits;
+  using Policy = cuda::policy::Bin;
+  int bits = Policy::kMinDepthBits;
+  while (bits < Policy::kMaxDepthBits && std::uint64_t{tiles} << (bits + 1) <= Policy::kCounters) ++bits;
   double near_plane = cameras[0].camera.near_plane;
   for (const BatchCamera& c : cameras) near_plane = std::min<double>(near_plane, c.camera.near_plane);
   const KeyCode code = KeyCode::of(key_bits, static_cast<float>(near_plane));
   // Bits of positive floats are in their order; of keys in fewer bits so are the codes, which begin at
   // the near plane.
-  const float first = std::max(static_cast<float>(near_plane), kNear);
+  const float first = std::max(static_cast<float>(near_plane), Policy::kNear);
   const std::uint32_t base = code.base == 0 ? bits_of(first) : code(first);
-  return {base, std::max(0, 23 - code.shift + kOctaves - bits), bits};
+  return {base, std::max(0, 23 - code.shift + Policy::kOctaves - bits), bits};
 }
 
 cuda::PlainCamera plain_camera(const BatchInstance& instance, const Vec3d& offset) {
@@ -103,7 +102,7 @@ bool has_plain_rules(const RenderConfig& config, std::span<const GaussianSet> se
 /// Of lists of the prepared call that hold so many pairs together: twice the mean. Few lists are much
 /// longer, but have much of the pairs.
 std::uint32_t CudaBatchRenderer::State::room_for(std::uint64_t pairs) const {
-  constexpr std::uint64_t kPairs = 32;
+  constexpr std::uint64_t kPairs = cuda::policy::Capacity::kRoomStep;
   const std::uint64_t tiles = args.tiles;
   return static_cast<std::uint32_t>(
       std::min<std::uint64_t>((2 * pairs + tiles * kPairs) / (tiles * kPairs) * kPairs,
@@ -144,7 +143,7 @@ cuda::InputPlaces CudaBatchRenderer::State::reserve_inputs(std::size_t sets, std
   at.first = layout.add<std::uint32_t>(cameras + 1);
   at.list = layout.add<std::uint32_t>(seen.size());
   at.offsets = layout.add<Vec3d>(origins);
-  cuda::Flight& flight = flights[calls % cuda::kInFlight];
+  cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   cuda::need(cudaEventSynchronize(flight.done), "waiting for an earlier batch");
   flight.inputs.reserve(layout.bytes());
   inputs.resize_discard(layout.bytes());
@@ -210,9 +209,9 @@ bool CudaBatchRenderer::State::plan_units(std::span<const GaussianSet> sets,
 bool CudaBatchRenderer::State::plan_tiles(std::span<const BatchCamera> cameras,
                                           std::uint64_t gaussians) {
   const int width = cameras[0].camera.width, height = cameras[0].camera.height;
-  args.grid = TileGrid::of(width, height, cuda::kBatchTile);
+  args.grid = TileGrid::of(width, height, cuda::policy::Batch::kTile);
   const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, multiprocessors);
-  if (few) args.grid = TileGrid::of(width, height, cuda::kSmallTile);
+  if (few) args.grid = TileGrid::of(width, height, cuda::policy::Batch::kSmallTile);
   args.tiles = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(args.cameras * std::uint64_t{args.grid.count()}, ~std::uint32_t{0}));
   args.short_lists = !few && has_short_lists(args.grid.count(), multiprocessors);
@@ -220,7 +219,8 @@ bool CudaBatchRenderer::State::plan_tiles(std::span<const BatchCamera> cameras,
       few ? depth_bins_of(cameras, config.quality.key_bits, args.tiles) : cuda::DepthBins{};
   args.log2_alpha_min = static_cast<float>(std::log2(config.quality.alpha_min));
   args.elliptic = config.response == Response::ewa;
-  args.slab = args.cameras < 8 ? 64 : 256;
+  using Slabs = cuda::policy::Project;
+  args.slab = args.cameras < Slabs::kFewCameras ? Slabs::kSlabOfFew : Slabs::kSlab;
   return few;
 }
 
@@ -236,29 +236,30 @@ void CudaBatchRenderer::State::set_raster(const BatchImages& images) {
   rgb8 = images.rgb8;
 }
 
-/// Capacities of the first calls, which find out. Of what is drawn by few cameras and by many there is
-/// scratch of its own.
+/// Guesses the capacities that no call has measured yet: the first call of a kind that overflows one
+/// makes it grow and is drawn again. Calls of few cameras and of many use different arrays.
 void CudaBatchRenderer::State::guess_capacities(std::uint64_t gaussians, bool few) {
-  const std::uint32_t slots =
-      static_cast<std::uint32_t>(std::clamp<std::uint64_t>(gaussians / 4, 1u << 16, 1u << 26));
+  using Policy = cuda::policy::Capacity;
+  const std::uint32_t slots = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(
+      gaussians / Policy::kGaussiansPerSlot, Policy::kLeastSlots, Policy::kMostSlots));
   const auto guess = [](std::uint32_t& capacity, std::uint32_t n) {
     if (capacity == 0) capacity = n;
   };
   guess(slot_capacity, slots);
-  guess(hard_capacity, slots / 32);
-  guess(large_capacity, slots / 32);
-  guess(several_capacity, few ? slots / 4 : slots / 16);
+  guess(hard_capacity, slots / Policy::kSlotsPerHard);
+  guess(large_capacity, slots / Policy::kSlotsPerLarge);
+  guess(several_capacity, slots / (few ? Policy::kSlotsPerSeveralOfFew : Policy::kSlotsPerSeveral));
   if (few) {
     // Those that are drawn, and what as many warps as a multiprocessor can have may leave of their
     // slabs.
     entry_capacity =
         gaussians + std::uint64_t{64} * static_cast<std::uint64_t>(multiprocessors) * args.slab;
-    guess(pair_capacity, 2 * slots);
+    guess(pair_capacity, Policy::kPairsPerSlot * slots);
   } else {
     guess(alt_capacity, slots);
-    guess(beyond_capacity, slots / 16);
+    guess(beyond_capacity, slots / Policy::kSlotsPerBeyond);
     if (args.tiles / 2 > room_tiles || args.tiles < room_tiles / 2) {
-      list_room = room_for(std::uint64_t{2} * slots);
+      list_room = room_for(std::uint64_t{Policy::kPairsPerSlot} * slots);
       room_tiles = args.tiles;
     }
   }

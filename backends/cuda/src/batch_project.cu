@@ -8,7 +8,7 @@ namespace gsnav::cuda {
 
 namespace {
 
-constexpr unsigned kProjectWarps = 4, kProjectBlocks = 5;  ///< of a block; of a multiprocessor
+using Policy = policy::Project;
 constexpr unsigned kWarpsPerPart = kChunkPart / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
@@ -50,209 +50,220 @@ __device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32
   if (a.perspectives != nullptr) a.perspectives[of.slot] = s.perspective;
 }
 
-/// The rows of tiles of a splat that binning takes row by row.
-struct LargeRows {
-  std::uint32_t first, count;
+/// What a camera makes of a row.
+struct CameraSplat {
+  bool drawn = false;
+  bool hard = false;  ///< float does not hold its geometry: project_hard_kernel draws it
+  std::uint32_t code = 0, camera = 0;
+  RowKey<float> key;
+  Splat splat;
 };
 
-__device__ LargeRows large_rows(const BatchArgs& a, const SplatBounds& b) {
-  const int shift = a.grid.tile_shift();
-  const std::uint32_t first = static_cast<std::uint32_t>(b.y0 >> shift);
-  return {first, static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1 - first};
-}
-
-__device__ void queue_large_row(const BatchArgs& a, unsigned long long place, const SplatKey& splat,
-                                std::uint32_t row) {
-  if (place < a.large_capacity) a.large[place] = {splat, row};
-}
-
-/// Queues the rows of the lanes that have some; all lanes call both, `ask` first, so that nobody waits
-/// for the counter until `put`.
-class LargeQueue {
+/// What a warp does: it reads 32 Gaussians, half of an item, once, and projects them for each camera of
+/// the mask, or where some of the cameras see some of the rows only (`SomeRows`) those of all cameras
+/// side by side. `Plain`: records of neither depth nor perspective are asked for. `PlainRules`: there
+/// are plain_cameras. `Room`: lists are not counted first. All lanes call every function together.
+template <bool PlainRules, bool Plain, bool SomeRows, bool Room>
+class WarpProjection {
  public:
-  __device__ void ask(const BatchArgs& a, const LargeRows& rows) {
-    any_ = __any_sync(kAll, rows.count != 0);
-    if (!any_) return;
-    const std::uint32_t end = sum_to_lane(rows.count);
-    begin_ = end - rows.count;
-    if (threadIdx.x % 32 == 31)
-      base_ = atomicAdd(&a.counters->large, static_cast<unsigned long long>(end));
+  __device__ WarpProjection(const BatchArgs& args, WarpRows& rows)
+      : a_(args),
+        rows_(rows),
+        slots_(&args.counters->slots, args.slab),
+        several_(&args.counters->several, args.slab) {}
+
+  __device__ void project(const BatchItem& item, std::uint32_t half) {
+    first_instance_ = item.first_instance;
+    gaussians_ = &a_.instances[first_instance_].args.gaussians;
+    first_ = item.part * kChunkPart + half % kWarpsPerPart * 32;
+    const unsigned lane = threadIdx.x % 32;
+    const unsigned existing = rows_there(gaussians_->size(), first_);
+    unsigned seen = 0;  // rows, of the lane's instance
+    if constexpr (SomeRows) {
+      if ((item.mask >> lane & 1u) != 0) seen = existing & seen_rows_of(lane);
+      if (!__any_sync(kAll, seen != 0)) return;
+    }
+    read(item.part, existing != 0);
+    if constexpr (SomeRows) {
+      share_in_warp(static_cast<std::uint32_t>(__popc(seen)), [&](unsigned owner, std::uint32_t n) {
+        const unsigned from = owner % 32, of_owner = __shfl_sync(kAll, seen, from);
+        // What has nothing left goes with the first instance.
+        draw(owner < 32, first_instance_ + (owner < 32 ? from : 0u),
+             owner < 32 ? nth_bit<32>(of_owner, n) : 0u);
+      });
+    } else {
+      for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
+        draw((existing >> lane & 1u) != 0,
+             first_instance_ + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1, lane);
+      }
+    }
+    if (!has_sh_) wait_for_sh();
   }
-  __device__ void put(const BatchArgs& a, const SplatKey& splat, const LargeRows& rows) const {
-    if (!any_) return;
-    const unsigned long long base = __shfl_sync(kAll, base_, 31);
-    share_in_warp(rows.count, [&](unsigned owner, std::uint32_t k) {
-      const unsigned from = owner % 32;
-      const std::uint32_t place = __shfl_sync(kAll, begin_, from) + k,
-                          row = __shfl_sync(kAll, rows.first, from) + k;
-      const SplatKey of{__shfl_sync(kAll, splat.slot, from), __shfl_sync(kAll, splat.key, from),
-                        __shfl_sync(kAll, splat.camera, from)};
-      if (owner < 32) queue_large_row(a, base + place, of, row);
+
+  /// Marks places that were taken and not used.
+  __device__ void mark_rest() const {
+    if constexpr (!Room) {
+      slots_.rest([&](std::uint64_t slot) {
+        if (slot < a_.slot_capacity) a_.entries[slot] = {0, 0, 0, kNoSlot};
+      });
+    }
+    several_.rest([&](std::uint64_t place) {
+      if (place < a_.several_capacity) a_.several[place] = {0, 0, kNoSlot};
     });
   }
 
  private:
-  bool any_ = false;
-  std::uint32_t begin_ = 0;      ///< of the lane's, among the warp's
-  unsigned long long base_ = 0;  ///< of lane 31: where the warp's begin
+  __device__ std::uint32_t seen_rows_of(unsigned lane) const {
+    return a_.instances[first_instance_ + lane]
+        .args.seen_rows(first_ / kProjectChunk)
+        .word(first_ % kProjectChunk / 32);
+  }
+
+  /// Reads the rows, and asks for their SH coefficients.
+  __device__ void read(std::uint32_t part, bool any) {
+    const LaneRow read = read_row<PlainRules>(gaussians_->shape, first_ + threadIdx.x % 32);
+    // Instances of a set are drawn to one degree.
+    degree_ =
+        gaussians_->color.degree_of(part * kChunkPart, a_.instances[first_instance_].args.sh_degree);
+    has_sh_ = !a_.color || degree_ == 0 || !any;
+    __syncwarp();  // all lanes are done with the rows before
+    if (!has_sh_) ask_for_sh(gaussians_->color, gaussians_->size(), degree_, first_, rows_);
+    keep_row(read, rows_);
+  }
+
+  /// Row first_ + at for an instance, of lanes that `exist`.
+  __device__ void draw(bool exists, std::uint32_t index, unsigned at) {
+    const std::uint32_t row = static_cast<std::uint32_t>(first_ + at);
+    CameraSplat seen;
+    see(exists, index, at, seen);
+    const bool wanted = seen.drawn || seen.hard;
+    const std::uint64_t taken = slots_.take(wanted);
+    const std::uint32_t slot =
+        wanted && taken < a_.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
+    if (seen.hard) queue_hard({slot, index, row});
+    list(seen, slot, index, at);
+  }
+
+  /// Projects row first_ + at for an instance.
+  __device__ void see(bool exists, std::uint32_t index, unsigned at, CameraSplat& out) const {
+    // Of what lies beyond the near plane.
+    const auto project_row = [&](const ProjectionCamera<float>& camera, const auto& from,
+                                 const auto& camera64) {
+      const SeenRow<float> seen_row(camera, from, out.key);
+      if (!seen_row.splat.visible) return;
+      out.hard = gsnav::detail::needs_double(camera, seen_row.splat);
+      out.drawn = !out.hard && make_splat<Plain>(camera, camera64(), a_.depths != nullptr, out.key,
+                                                 seen_row, out.splat);
+    };
+    if constexpr (PlainRules) {
+      const PlainCamera& packed = a_.plain_cameras[index];
+      const PlainRow from({rows_, at}, packed);
+      out.key = row_key<float>(key_camera_of(packed), from);
+      out.camera = packed.axes.camera;
+      const float near_plane = packed.key.near_plane;
+      if (exists && out.key.z > near_plane) {
+        ProjectionCamera<float> camera = camera_of(a_, packed.axes);
+        camera.near_plane = near_plane;
+        out.code = packed.code.key(out.key.z);
+        project_row(camera, from, [&] { return camera_of(PlainCamera::Mean(packed.mean)); });
+      }
+    } else {
+      const BatchInstance& instance = a_.instances[index];
+      const ViewedSet<float>& args = instance.args;
+      const InstanceRow from({rows_, at}, {{gaussians_->shape, exists ? first_ + at : 0}, args.offsets});
+      out.key = row_key<float>(args.camera64, from);
+      out.camera = instance.camera;
+      if (exists && out.key.z > args.camera.near_plane) {
+        out.code = args.camera.key_code(sort_key(args.camera64, out.key));
+        project_row(args.camera, from,
+                    [&]() -> const ProjectionCamera<double>& { return args.camera64; });
+      }
+    }
+  }
+
+  __device__ void queue_hard(const HardSplat& splat) const {
+    const unsigned long long place = atomicAdd(&a_.counters->hard, 1ull);
+    if (!Room && splat.slot != kNoSlot)
+      a_.entries[splat.slot] = {0, 0, 0, kNoSlot};  // until it has a record
+    if (place < a_.hard_capacity) a_.hard[place] = splat;
+  }
+
+  /// Writes the record of a splat that is drawn, and its pairs; or queues it where another kernel finds
+  /// its tiles.
+  __device__ void list(const CameraSplat& seen, std::uint32_t slot, std::uint32_t index, unsigned at) {
+    const SplatKey of{slot, seen.code, seen.camera};
+    const SplatBounds& bounds = seen.splat.bounds;
+    const bool listed = seen.drawn && slot != kNoSlot;
+    LargeRows large{0, 0};
+    if (listed && is_large(a_, bounds)) large = large_rows(a_, bounds);
+    LargeQueue queue;
+    queue.ask(a_, large);
+    const bool small = listed && large.count == 0;
+    const bool queued = small && (Room ? is_wide(a_, bounds) : window_of(a_, bounds).tiles == 0);
+    NearPairs pairs;
+    if constexpr (Room) pairs.ask(a_, seen.camera, small && !queued, bounds);
+    if (!has_sh_ && __any_sync(kAll, seen.drawn)) {
+      wait_for_sh();
+      has_sh_ = true;
+    }
+    if (listed) write(of, seen, index, at);
+    if constexpr (Room) {
+      pairs.put(a_, {seen.code, slot});
+    } else if (small && !queued) {
+      add_to_bin(a_, tile_of(a_, seen.camera, window_of(a_, bounds), 0), seen.code);
+    }
+    queue.put(a_, of, large);
+    if (__any_sync(kAll, queued)) {
+      const std::uint64_t place = several_.take(queued);
+      if (queued && place < a_.several_capacity) a_.several[place] = of;
+    }
+  }
+
+  __device__ void write(const SplatKey& of, const CameraSplat& seen, std::uint32_t index,
+                        unsigned at) const {
+    std::uint32_t first_rank;
+    if constexpr (PlainRules) {
+      first_rank = a_.plain_cameras[index].code.first_rank;
+    } else {
+      first_rank = a_.instances[index].args.first_rank;
+    }
+    write_record<Plain, Room>(
+        a_, of, first_rank + static_cast<std::uint32_t>(first_ + at), seen.splat,
+        a_.color ? row_color<PlainRules>(gaussians_->color, degree_, first_, at, rows_, seen.key.delta)
+                 : SplatColor<float>{});
+  }
+
+  const BatchArgs& a_;
+  WarpRows& rows_;
+  WarpSlab slots_, several_;
+  // Of the present item.
+  const GaussianRows* gaussians_ = nullptr;
+  std::uint32_t first_instance_ = 0;
+  std::size_t first_ = 0;  ///< row of lane 0
+  int degree_ = 0;
+  bool has_sh_ = false;  ///< coefficients are there, or nobody wants them
 };
 
-/// A warp half of an item: Gaussians are read once and projected for each camera of the mask, or where
-/// some of the cameras see some of the rows only (`SomeRows`) those of all cameras side by side.
-/// `Plain`: records of neither depth nor perspective are asked for. `PlainRules`: there are
-/// plain_cameras. `Room`: lists are not counted first.
 template <bool PlainRules, bool Plain, bool SomeRows, bool Room>
-__global__ void __launch_bounds__(32 * kProjectWarps, kProjectBlocks) project_kernel(const BatchArgs a) {
-  __shared__ WarpRows shared[kProjectWarps];
-  const unsigned lane = threadIdx.x % 32;
-  WarpRows& rows = shared[threadIdx.x / 32];
+__global__ void __launch_bounds__(32 * Policy::kWarps, Policy::kResident)
+    project_kernel(const BatchArgs a) {
+  __shared__ WarpRows shared[Policy::kWarps];
+  WarpProjection<PlainRules, Plain, SomeRows, Room> warp(a, shared[threadIdx.x / 32]);
   const std::uint32_t halves = a.counters->items * kWarpsPerPart;
-  WarpSlab slots(&a.counters->slots, a.slab), several(&a.counters->several, a.slab);
   const auto item_of = [&](std::uint32_t half) {
     return half < halves ? a.items[half / kWarpsPerPart] : BatchItem{};
   };
-  std::uint32_t half = blockIdx.x * kProjectWarps + threadIdx.x / 32;
+  std::uint32_t half = blockIdx.x * Policy::kWarps + threadIdx.x / 32;
   BatchItem next = item_of(half);
-  for (; half < halves; half += gridDim.x * kProjectWarps) {
+  for (; half < halves; half += gridDim.x * Policy::kWarps) {
     const BatchItem item = next;
-    next = item_of(half + gridDim.x * kProjectWarps);
-    const GaussianRows& gs = a.instances[item.first_instance].args.gaussians;
-    const std::size_t size = gs.size();
-    const std::size_t first = item.part * kChunkPart + half % kWarpsPerPart * 32;  // row of lane 0
-    const unsigned existing = rows_there(size, first);
-    // Of the lane's instance.
-    unsigned mine = 0;
-    if constexpr (SomeRows) {
-      if ((item.mask >> lane & 1u) != 0) {
-        mine = existing & a.instances[item.first_instance + lane]
-                              .args.seen_rows(first / kProjectChunk)
-                              .word(first % kProjectChunk / 32);
-      }
-      if (!__any_sync(kAll, mine != 0)) continue;
-    }
-    const LaneRow read = read_row<PlainRules>(gs.shape, first + lane);
-    // Instances of a set are drawn to one degree.
-    const int degree =
-        gs.color.degree_of(item.part * kChunkPart, a.instances[item.first_instance].args.sh_degree);
-    bool has_sh = !a.color || degree == 0 || existing == 0;
-    __syncwarp();  // all lanes are done with the rows before
-    if (!has_sh) ask_for_sh(gs.color, size, degree, first, rows);
-    keep_row(read, rows);
-    // Of lanes that `exist`: row first + at for an instance. All lanes call it together.
-    const auto draw_row = [&](bool exists, std::uint32_t index, unsigned at) {
-      const std::size_t row = first + at;
-      bool drawn = false, hard = false;
-      std::uint32_t code = 0, camera_index = 0;
-      Splat splat;
-      RowKey<float> key;
-      // Of what lies beyond the near plane: the splat, or that it is hard.
-      const auto project_row = [&](const ProjectionCamera<float>& camera, const auto& from,
-                                   const auto& camera64) {
-        const SeenRow<float> seen_row(camera, from, key);
-        if (!seen_row.splat.visible) return;
-        hard = gsnav::detail::needs_double(camera, seen_row.splat);
-        drawn =
-            !hard && make_splat<Plain>(camera, camera64(), a.depths != nullptr, key, seen_row, splat);
-      };
-      if constexpr (PlainRules) {
-        const PlainCamera& packed = a.plain_cameras[index];
-        const PlainRow from({rows, at}, packed);
-        key = row_key<float>(key_camera_of(packed), from);
-        camera_index = packed.axes.camera;
-        const float near_plane = packed.key.near_plane;
-        if (exists && key.z > near_plane) {
-          ProjectionCamera<float> camera = camera_of(a, packed.axes);
-          camera.near_plane = near_plane;
-          code = packed.code.key(key.z);
-          project_row(camera, from, [&] { return camera_of(PlainCamera::Mean(packed.mean)); });
-        }
-      } else {
-        const BatchInstance& instance = a.instances[index];
-        const ViewedSet<float>& args = instance.args;
-        const InstanceRow from({rows, at}, {{gs.shape, exists ? row : 0}, args.offsets});
-        key = row_key<float>(args.camera64, from);
-        camera_index = instance.camera;
-        if (exists && key.z > args.camera.near_plane) {
-          code = args.camera.key_code(sort_key(args.camera64, key));
-          project_row(args.camera, from,
-                      [&]() -> const ProjectionCamera<double>& { return args.camera64; });
-        }
-      }
-      const bool wanted = drawn || hard;
-      const std::uint64_t taken = slots.take(wanted);
-      const std::uint32_t slot =
-          wanted && taken < a.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
-      if (hard) {
-        const unsigned long long place = atomicAdd(&a.counters->hard, 1ull);
-        if (!Room && slot != kNoSlot) a.entries[slot] = {0, 0, 0, kNoSlot};  // until it has a record
-        if (place < a.hard_capacity) a.hard[place] = {slot, index, static_cast<std::uint32_t>(row)};
-      }
-      const SplatKey of{slot, code, camera_index};
-      const bool listed = drawn && slot != kNoSlot;
-      LargeRows large{0, 0};
-      if (listed && is_large(a, splat.bounds)) large = large_rows(a, splat.bounds);
-      LargeQueue queue;
-      queue.ask(a, large);
-      const bool small = listed && large.count == 0;
-      // Those whose tiles another kernel finds.
-      const bool queued =
-          small && (Room ? is_wide(a, splat.bounds) : window_of(a, splat.bounds).tiles == 0);
-      NearPairs pairs;
-      if constexpr (Room) pairs.ask(a, camera_index, small && !queued, splat.bounds);
-      if (!has_sh && __any_sync(kAll, drawn)) {
-        wait_for_sh();
-        has_sh = true;
-      }
-      if (listed) {
-        std::uint32_t first_rank;
-        if constexpr (PlainRules) {
-          first_rank = a.plain_cameras[index].code.first_rank;
-        } else {
-          first_rank = a.instances[index].args.first_rank;
-        }
-        write_record<Plain, Room>(
-            a, of, first_rank + static_cast<std::uint32_t>(row), splat,
-            a.color ? row_color<PlainRules>(gs.color, degree, first, at, rows, key.delta)
-                    : SplatColor<float>{});
-      }
-      if constexpr (Room) {
-        pairs.put(a, {code, slot});
-      } else if (small && !queued) {
-        add_to_bin(a, tile_of(a, camera_index, window_of(a, splat.bounds), 0), code);
-      }
-      queue.put(a, of, large);
-      if (__any_sync(kAll, queued)) {
-        const std::uint64_t place = several.take(queued);
-        if (queued && place < a.several_capacity) a.several[place] = of;
-      }
-    };
-    if constexpr (SomeRows) {
-      share_in_warp(static_cast<std::uint32_t>(__popc(mine)), [&](unsigned owner, std::uint32_t n) {
-        const unsigned from = owner % 32, of_owner = __shfl_sync(kAll, mine, from);
-        // What has nothing left goes with the first instance.
-        draw_row(owner < 32, item.first_instance + (owner < 32 ? from : 0u),
-                 owner < 32 ? nth_bit<32>(of_owner, n) : 0u);
-      });
-    } else {
-      for (std::uint32_t mask = item.mask; mask != 0; mask &= mask - 1) {
-        draw_row((existing >> lane & 1u) != 0,
-                 item.first_instance + static_cast<std::uint32_t>(__ffs(static_cast<int>(mask))) - 1,
-                 lane);
-      }
-    }
-    if (!has_sh) wait_for_sh();
+    next = item_of(half + gridDim.x * Policy::kWarps);
+    warp.project(item, half);
   }
-  if constexpr (!Room) {
-    slots.rest([&](std::uint64_t slot) {
-      if (slot < a.slot_capacity) a.entries[slot] = {0, 0, 0, kNoSlot};
-    });
-  }
-  several.rest([&](std::uint64_t place) {
-    if (place < a.several_capacity) a.several[place] = {0, 0, kNoSlot};
-  });
+  warp.mark_rest();
 }
 
-__global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
+__global__ void __launch_bounds__(Policy::kHardThreads) project_hard_kernel(const BatchArgs a) {
   const std::uint32_t n = used(a.counters->hard, a.hard_capacity);
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += gridDim.x * blockDim.x) {
     const HardSplat h = a.hard[i];
@@ -294,11 +305,11 @@ __global__ void __launch_bounds__(128) project_hard_kernel(const BatchArgs a) {
 }  // namespace
 
 void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
-  const unsigned blocks = static_cast<unsigned>(multiprocessors) * 8;
+  const unsigned blocks = static_cast<unsigned>(multiprocessors) * Policy::kHardBlocks;
   const bool plain = args.depths == nullptr && args.perspectives == nullptr;
   const auto project = [&](auto kernel) {
-    kernel<<<static_cast<unsigned>(multiprocessors) * kProjectBlocks, 32 * kProjectWarps, 0, stream>>>(
-        args);
+    kernel<<<static_cast<unsigned>(multiprocessors) * Policy::kResident, 32 * Policy::kWarps, 0,
+             stream>>>(args);
   };
   const auto of_lists = [&]<bool SomeRows, bool Room>() {
     if (plain && args.plain_cameras != nullptr)
@@ -313,7 +324,7 @@ void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t 
     args.list_room != 0 ? of_lists.template operator()<false, true>()
                         : of_lists.template operator()<false, false>();
   }
-  project_hard_kernel<<<blocks, 128, 0, stream>>>(args);
+  project_hard_kernel<<<blocks, Policy::kHardThreads, 0, stream>>>(args);
 }
 
 }  // namespace gsnav::cuda

@@ -57,7 +57,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.tile_begins = with_room(tile_begins, args.tiles);
   args.tile_shifts = counted ? nullptr : with_room(tile_shifts, args.tiles);
   args.tile_order = with_room(tile_order, args.tiles);
-  args.part_capacity = counted ? args.tiles + pair_capacity / cuda::kPartLength : 0;
+  args.part_capacity = counted ? args.tiles + pair_capacity / cuda::policy::Bin::kPartLength : 0;
   args.parts = exactly(parts, args.part_capacity);
   args.long_parts = exactly(long_parts, args.part_capacity);
   args.pairs = exactly(
@@ -71,7 +71,8 @@ void CudaBatchRenderer::State::size_scratch() {
                              static_cast<std::size_t>(args.grid.height);
   const bool records_depths =
       mode == DepthMode::any || !raster.mesh.empty() ||
-      (mode == DepthMode::median && 2 * pixels >= 5 * std::size_t{slot_capacity});
+      (mode == DepthMode::median &&
+       2 * pixels >= cuda::policy::Capacity::kHalfPixelsPerDepth * slot_capacity);
   const bool perspective = config.response != Response::ewa;
   args.depths = records_depths ? exactly(depths, slot_capacity) : nullptr;
   args.perspectives = perspective ? exactly(perspectives, slot_capacity) : nullptr;
@@ -98,7 +99,8 @@ void CudaBatchRenderer::State::fit_room(const cuda::BatchCounters& n) {
   if (args.list_room == 0) return;
   // Not for little: arrays would move and launches be recorded again.
   const std::uint32_t wanted = room_for(n.pairs);
-  if (n.beyond > n.pairs / 16 && wanted > list_room + list_room / 8) list_room = wanted;
+  if (n.beyond > n.pairs / cuda::policy::Capacity::kPairsPerBeyond && wanted > list_room + list_room / 8)
+    list_room = wanted;
 }
 
 void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
@@ -132,7 +134,7 @@ cudaGraphExec_t CudaBatchRenderer::State::record(const cuda::Flight& flight) {
 }
 
 Status CudaBatchRenderer::State::launch() {
-  cuda::Flight& flight = flights[calls % cuda::kInFlight];
+  cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   if (flight.has_meshes) size_layers();
   flight.triangle_capacity = triangle_capacity;
   size_scratch();
@@ -171,9 +173,10 @@ Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<co
   State& s = *state_;
   if (Status status = validate(s.config); !status) return status;
   if (Status status = cuda::check_batch(sets, cameras, s.config); !status) return status;
-  if (s.calls - s.finished >= cuda::kInFlight) {
+  if (s.calls - s.finished >= cuda::policy::Batch::kInFlight) {
     return {Errc::invalid_argument, "CudaBatchRenderer: call finish() at least once in " +
-                                        std::to_string(cuda::kInFlight) + " calls of render()"};
+                                        std::to_string(cuda::policy::Batch::kInFlight) +
+                                        " calls of render()"};
   }
   s.prepared = false;
   if (Status status = s.prepare(sets, cameras, images); !status) return status;
@@ -213,7 +216,7 @@ Status CudaBatchRenderer::finish() {
   s.stats.reruns = 0;
   bool lost = false;
   while (s.finished < s.calls) {
-    const cuda::Flight& flight = s.flights[s.finished % cuda::kInFlight];
+    const cuda::Flight& flight = s.flights[s.finished % cuda::policy::Batch::kInFlight];
     const cudaError_t e = cudaEventSynchronize(flight.done);
     if (e != cudaSuccess) {
       return {Errc::backend_failure, std::string("CudaBatchRenderer: the batch failed on the device: ") +

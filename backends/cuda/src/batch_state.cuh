@@ -16,8 +16,6 @@ namespace gsnav {
 
 namespace cuda {
 
-inline constexpr int kInFlight = 3;  ///< calls that may be under way before one is waited for
-
 inline void need(cudaError_t e, const char* what) {
   if (e != cudaSuccess) {
     detail::fail(e == cudaErrorMemoryAllocation ? Errc::out_of_memory : Errc::backend_failure,
@@ -257,7 +255,7 @@ struct CudaBatchRenderer::State {
   CudaBackend& backend;
   RenderConfig config;
   int multiprocessors = 0;
-  std::array<cuda::Flight, cuda::kInFlight> flights;
+  std::array<cuda::Flight, cuda::policy::Batch::kInFlight> flights;
   std::size_t calls = 0, finished = 0;  ///< calls made; calls whose counts have been looked at
   Array<unsigned char> inputs;
   Array<cuda::BatchItem> items;

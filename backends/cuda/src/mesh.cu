@@ -4,12 +4,10 @@
 #include <cub/block/block_scan.cuh>
 
 #include "gsnav/backends/cuda/device.cuh"
-#include "mesh.cuh"
-#include "search.cuh"
+#include "mesh_work.cuh"
 
-// Meshes on the device (docs/composition.md): the kernels of the CPU, a vertex, a triangle or a pixel a
-// thread. Which triangle a pixel shows is found without lists of tiles: the largest of (1/z, first
-// triangle) in one atomic word.
+// Meshes on the device (docs/composition.md): a thread a vertex, a triangle or a pixel. There are no
+// tile lists: an atomic maximum of PixelWord finds the triangle that a pixel shows.
 
 namespace gsnav {
 
@@ -18,77 +16,10 @@ namespace cuda {
 namespace {
 
 constexpr unsigned kThreads = kMeshChunk;  ///< of a block that takes a chunk
-constexpr unsigned kScanThreads = 1024;
-constexpr int kSmallBox = 8;  ///< a thread draws triangles of up to kSmallBox^2 pixels by itself
-constexpr int kUnit = 32;     ///< larger ones are drawn in squares of so many pixels, a warp each
+using Policy = policy::Mesh;
+constexpr unsigned kScanThreads = Policy::kScanThreads, kDrawThreads = Policy::kDrawThreads;
+constexpr int kSmallBox = Policy::kSmallBox, kUnit = Policy::kUnit;
 constexpr unsigned kUnitBits = 40;
-
-/// The work of one camera: lists of chunks, and counts that the host has been told.
-struct OneCamera {
-  std::uint32_t triangles = 0;
-  __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>& args) const {
-    return args.vertex_chunks[blockIdx.x];
-  }
-  __device__ MeshChunk triangle_chunk(const MeshSetupArgs<float>& args) const {
-    return args.triangle_chunks[blockIdx.x];
-  }
-  __device__ const MeshCamera& lens(const MeshSetupArgs<float>& args, std::uint32_t) const {
-    return args.camera;
-  }
-  __device__ void note(const MeshSetupArgs<float>& args, int not_finite) const {
-    args.not_finite[blockIdx.x] = static_cast<std::uint32_t>(not_finite);
-  }
-  __device__ std::uint64_t first_triangle(const MeshSetupArgs<float>& args, std::uint32_t) const {
-    return args.offsets[blockIdx.x];
-  }
-  __device__ std::uint64_t room() const { return ~std::uint64_t{0}; }
-  __device__ std::uint64_t count() const { return triangles; }
-  __device__ std::size_t camera_of(std::uint32_t) const { return 0; }
-};
-
-/// That of several: a chunk's placement is searched for, and counts stay here.
-struct ManyCameras {
-  MeshWave wave;
-  __device__ MeshChunk chunk(std::uint32_t MeshPlace::*first) const {
-    const std::uint32_t place = last_start(std::uint32_t{0}, wave.placements, [&](std::uint32_t i) {
-      return wave.places[i].*first <= blockIdx.x;
-    });
-    return {place, static_cast<std::uint32_t>((blockIdx.x - wave.places[place].*first) * kMeshChunk)};
-  }
-  __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>&) const {
-    return chunk(&MeshPlace::vertex_chunk);
-  }
-  __device__ MeshChunk triangle_chunk(const MeshSetupArgs<float>&) const {
-    return chunk(&MeshPlace::triangle_chunk);
-  }
-  __device__ const MeshCamera& lens(const MeshSetupArgs<float>&, std::uint32_t placement) const {
-    return wave.cameras[wave.places[placement].camera];
-  }
-  __device__ void note(const MeshSetupArgs<float>&, int not_finite) const {
-    if (not_finite != 0)
-      atomicAdd(&wave.counters->not_finite, static_cast<unsigned long long>(not_finite));
-  }
-  __device__ std::uint64_t first_triangle(const MeshSetupArgs<float>& args,
-                                          std::uint32_t placement) const {
-    return wave.camera_begins[wave.places[placement].camera] + args.offsets[blockIdx.x];
-  }
-  __device__ std::uint64_t room() const { return wave.capacity; }
-  __device__ std::uint64_t count() const {
-    return wave.counters->triangles < wave.capacity ? wave.counters->triangles : wave.capacity;
-  }
-  __device__ std::size_t camera_of(std::uint32_t placement) const {
-    return wave.places[placement].camera;
-  }
-};
-
-/// `args` as the camera of a placement has them.
-template <class Work>
-__device__ MeshSetupArgs<float> seen_by(const MeshSetupArgs<float>& args, const Work& work,
-                                        std::uint32_t placement) {
-  MeshSetupArgs<float> out = args;
-  out.camera = work.lens(args, placement);
-  return out;
-}
 
 template <class Work>
 __global__ void __launch_bounds__(kThreads)
@@ -191,8 +122,7 @@ __device__ void show(const MeshRasterArgs<float>& args, const MeshTriangle<float
                      int x, int y, PixelWord* pixels) {
   const float inverse_z = mesh_inverse_z(t, x, y);
   if (!(inverse_z > 0) || mesh_hole(args, t, x, y, inverse_z)) return;
-  // Of equally near ones the first is the largest word.
-  const PixelWord word = PixelWord{__float_as_uint(inverse_z)} << 32 | (0xffffffffu - id);
+  const PixelWord word = word_of(inverse_z, id);
   PixelWord* const at = pixels +
                         static_cast<std::size_t>(y) * static_cast<std::size_t>(args.bin.grid.width) +
                         static_cast<std::size_t>(x);
@@ -234,12 +164,13 @@ __device__ void draw_small(const MeshRasterArgs<float>& args, const Work& work, 
   }
 }
 
-/// A thread a triangle, of the kMostLarge from `begin` on.
+/// A thread a triangle, of the Policy::kMostLarge from `begin` on.
 template <class Work>
-__global__ void __launch_bounds__(128)
+__global__ void __launch_bounds__(kDrawThreads)
     draw_small_kernel(const MeshRasterArgs<float> args, const Work work, std::uint64_t begin,
                       PixelWord* pixels, LargeTriangle* large, unsigned long long* count) {
-  const std::uint64_t n = work.count(), end = begin + kMostLarge < n ? begin + kMostLarge : n;
+  const std::uint64_t n = work.count(),
+                      end = begin + Policy::kMostLarge < n ? begin + Policy::kMostLarge : n;
   const std::uint64_t stride = std::uint64_t{gridDim.x} * blockDim.x;
   for (std::uint64_t id = begin + std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x; id < end;
        id += stride) {
@@ -249,7 +180,7 @@ __global__ void __launch_bounds__(128)
 
 /// A warp a square of a large triangle: a column a lane.
 template <class Work>
-__global__ void __launch_bounds__(128)
+__global__ void __launch_bounds__(kDrawThreads)
     draw_large_kernel(const MeshRasterArgs<float> args, const Work work, PixelWord* all,
                       const LargeTriangle* large, const unsigned long long* count) {
   const std::uint64_t units = *count & ((1ull << kUnitBits) - 1), triangles = *count >> kUnitBits;
@@ -272,14 +203,6 @@ __global__ void __launch_bounds__(128)
       e.step_down();
     }
   }
-}
-
-/// Infinity where there is no triangle.
-__device__ float depth_of(PixelWord word) {
-  return 1.0f / __uint_as_float(static_cast<unsigned>(word >> 32));
-}
-__device__ std::uint32_t triangle_of(PixelWord word) {
-  return word == 0 ? kNoTriangle : 0xffffffffu - static_cast<std::uint32_t>(word);
 }
 
 /// A block a tile: depths, triangles and the tile's farthest from the words of its pixels.
@@ -306,7 +229,7 @@ __global__ void __launch_bounds__(1024)
 }
 
 /// A thread a pixel of one of the cameras: its depth, and its colour where that is asked for.
-__global__ void __launch_bounds__(128)
+__global__ void __launch_bounds__(kDrawThreads)
     finish_pixels_kernel(MeshShadeArgs<float> shade, const MeshWave wave, std::size_t pixels) {
   const std::size_t pixel = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x,
                     at = blockIdx.y * pixels + pixel;
@@ -322,6 +245,21 @@ __global__ void __launch_bounds__(128)
   shade.diffuse = light.diffuse;
   shade.images.color = wave.color + 3 * blockIdx.y * pixels;
   shade_mesh_pixel(shade, pixel, triangle_of(word), depth);
+}
+
+/// Draws up to `count` triangles. `blocks`: of a launch, at most; `queue`: large_bytes(count).
+template <class Work>
+void draw_triangles(const MeshRasterArgs<float>& args, const Work& work, std::uint64_t count,
+                    unsigned blocks, PixelWord* pixels, unsigned long long* queue, cudaStream_t stream) {
+  auto* const large = reinterpret_cast<LargeTriangle*>(queue + 2);
+  for (std::uint64_t begin = 0; begin < count; begin += Policy::kMostLarge) {
+    const std::uint64_t most = std::min<std::uint64_t>(count - begin, Policy::kMostLarge);
+    const auto needed = static_cast<unsigned>((most + kDrawThreads - 1) / kDrawThreads);
+    cudaMemsetAsync(queue, 0, sizeof *queue, stream);
+    draw_small_kernel<<<std::min(needed, blocks), kDrawThreads, 0, stream>>>(args, work, begin, pixels,
+                                                                             large, queue);
+    draw_large_kernel<<<blocks, kDrawThreads, 0, stream>>>(args, work, pixels, large, queue);
+  }
 }
 
 struct ShadePixel {
@@ -347,24 +285,17 @@ void launch_mesh_wave(const MeshSetupArgs<float>& setup, int width, int height, 
     scan_cameras_kernel<<<wave.camera_count, kScanThreads, 0, stream>>>(setup, wave);
     begin_cameras_kernel<<<1, kScanThreads, 0, stream>>>(wave);
     write_triangles_kernel<<<wave.triangle_chunks, kThreads, 0, stream>>>(setup, work);
-    auto* const large = reinterpret_cast<LargeTriangle*>(wave.large + 2);
-    for (std::uint64_t begin = 0; begin < wave.capacity; begin += kMostLarge) {
-      const std::uint64_t most = wave.capacity - begin < kMostLarge ? wave.capacity - begin : kMostLarge;
-      const std::uint64_t blocks = (most + 127) / 128,
-                          full = static_cast<std::uint64_t>(multiprocessors) * 16;
-      cudaMemsetAsync(wave.large, 0, sizeof *wave.large, stream);
-      draw_small_kernel<<<static_cast<unsigned>(blocks < full ? blocks : full), 128, 0, stream>>>(
-          raster, work, begin, wave.pixels, large, wave.large);
-      draw_large_kernel<<<static_cast<unsigned>(full), 128, 0, stream>>>(raster, work, wave.pixels,
-                                                                         large, wave.large);
-    }
+    draw_triangles(raster, work, wave.capacity,
+                   static_cast<unsigned>(multiprocessors) * Policy::kDrawBlocks, wave.pixels, wave.large,
+                   stream);
   }
   MeshShadeArgs<float> shade;
   shade.placements = setup.placements;
   shade.triangles = setup.triangles;
   shade.width = static_cast<std::size_t>(width);
-  const dim3 blocks(static_cast<unsigned>((pixels + 127) / 128), wave.camera_count);
-  finish_pixels_kernel<<<blocks, 128, 0, stream>>>(shade, wave, pixels);
+  const dim3 blocks(static_cast<unsigned>((pixels + kDrawThreads - 1) / kDrawThreads),
+                    wave.camera_count);
+  finish_pixels_kernel<<<blocks, kDrawThreads, 0, stream>>>(shade, wave, pixels);
 }
 
 }  // namespace cuda
@@ -398,23 +329,15 @@ void CudaBackend::run(stage::Each, std::size_t chunks, const WriteMeshTriangles<
 
 void CudaBackend::run(stage::RasterizeMesh, const MeshRasterArgs<float>& args) {
   if (!usable()) return;
-  using cuda::LargeTriangle;
   const TileGrid& grid = args.bin.grid;
   const std::size_t n = args.triangles.size;
   const std::size_t bytes = static_cast<std::size_t>(grid.width) *
                             static_cast<std::size_t>(grid.height) * sizeof(cuda::PixelWord);
   auto* const pixels = static_cast<cuda::PixelWord*>(scratch(kMeshPixels, bytes));
-  auto* const count = static_cast<unsigned long long*>(scratch(kMeshLarge, cuda::large_bytes(n)));
-  auto* const large = reinterpret_cast<LargeTriangle*>(count + 2);
+  auto* const queue = static_cast<unsigned long long*>(scratch(kMeshLarge, cuda::large_bytes(n)));
   fill(pixels, 0, bytes);
-  const cuda::OneCamera work{static_cast<std::uint32_t>(n)};
-  for (std::size_t begin = 0; begin < n; begin += cuda::kMostLarge) {
-    const std::size_t end = std::min(n, begin + cuda::kMostLarge);
-    fill(count, 0, sizeof *count);
-    cuda::draw_small_kernel<<<static_cast<unsigned>((end - begin + 127) / 128), 128, 0, stream_>>>(
-        args, work, begin, pixels, large, count);
-    cuda::draw_large_kernel<<<2048, 128, 0, stream_>>>(args, work, pixels, large, count);
-  }
+  cuda::draw_triangles(args, cuda::OneCamera{static_cast<std::uint32_t>(n)}, n,
+                       cuda::policy::Mesh::kFrameDrawBlocks, pixels, queue, stream_);
   const unsigned threads = static_cast<unsigned>(grid.tile_size * grid.tile_size);
   cuda::resolve_kernel<<<static_cast<unsigned>(grid.count()), threads, 0, stream_>>>(args, pixels);
   note(cudaGetLastError(), "the drawing of triangles");

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "gsnav/backends/cuda/policy.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
 
 // The meshes of several cameras drawn together.
@@ -16,15 +17,26 @@ namespace gsnav::cuda {
 /// equally near ones the first, is the largest word. 0: nothing.
 using PixelWord = unsigned long long;
 
+__device__ inline PixelWord word_of(float inverse_z, std::uint32_t triangle) {
+  return PixelWord{__float_as_uint(inverse_z)} << 32 | (0xffffffffu - triangle);
+}
+/// Infinity where there is no triangle.
+__device__ inline float depth_of(PixelWord word) {
+  return 1.0f / __uint_as_float(static_cast<unsigned>(word >> 32));
+}
+__device__ inline std::uint32_t triangle_of(PixelWord word) {
+  return word == 0 ? kNoTriangle : 0xffffffffu - static_cast<std::uint32_t>(word);
+}
+
 /// A triangle drawn in squares, the first of which is number `unit`.
 struct LargeTriangle {
   std::uint64_t unit;
   std::uint32_t triangle;
 };
-inline constexpr std::size_t kMostLarge = std::size_t{1} << 24;  ///< triangles a launch
 /// A list of large triangles behind its counter.
 inline std::size_t large_bytes(std::size_t triangles) noexcept {
-  return 16 + (triangles < kMostLarge ? triangles : kMostLarge) * sizeof(LargeTriangle);
+  return 16 + (triangles < policy::Mesh::kMostLarge ? triangles : policy::Mesh::kMostLarge) *
+                  sizeof(LargeTriangle);
 }
 
 /// The first of a placement's work items among those of its wave, and the camera that sees it.

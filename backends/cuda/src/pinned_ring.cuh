@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstring>
 
+#include "gsnav/backends/cuda/policy.hpp"
+
 namespace gsnav::cuda {
 
 /// Pinned blocks that small copies to the device go through, in turn: a copy from pageable memory may
@@ -13,7 +15,7 @@ namespace gsnav::cuda {
 /// is waited for.
 class PinnedRing {
  public:
-  static constexpr std::size_t kMaxBytes = std::size_t{1} << 20;  ///< of one copy
+  static constexpr std::size_t kMaxBytes = policy::Upload::kMaxBytes;
 
   PinnedRing() = default;
   PinnedRing(const PinnedRing&) = delete;
@@ -51,7 +53,7 @@ class PinnedRing {
   }
 
  private:
-  static constexpr std::size_t kBlocks = 8;
+  static constexpr std::size_t kBlocks = policy::Upload::kBlocks;
   struct Block {
     void* data = nullptr;
     std::size_t capacity = 0;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "gsnav/backends/cuda.hpp"
+#include "gsnav/backends/cuda/policy.hpp"
 #include "search.cuh"
 
 // Skinning of many avatars by one launch, or two where some have four influences and some eight.
@@ -12,12 +13,10 @@ namespace gsnav {
 
 namespace {
 
-constexpr unsigned kThreads = 256;
+using Policy = cuda::policy::Skin;
+constexpr unsigned kThreads = Policy::kThreads;
 template <int K>
-constexpr unsigned kBlocks = K == kInfluences4 ? 4 : 3;  ///< of a multiprocessor: what registers allow
-constexpr std::size_t kMaxShared = 48 * 1024;
-constexpr unsigned kMostCopies = 8;
-constexpr std::uint32_t kFewJobs = 20;  ///< whose arrays go with the launch
+constexpr unsigned kBlocks = K == kInfluences4 ? Policy::kResident4 : Policy::kResident8;
 static_assert(sizeof(Affine3<float>) == 3 * sizeof(float4));
 
 /// An avatar, and the first of the pieces of kThreads Gaussians that it is cut into.
@@ -41,7 +40,7 @@ struct SkinLaunch {
   const SkinJob* table;  ///< null: `few` has them
   std::uint32_t count, pieces;
   unsigned copies;  ///< of each joint in shared memory
-  SkinJob few[kFewJobs];
+  SkinJob few[Policy::kFewJobs];
 };
 static_assert(sizeof(SkinLaunch) <= 4096 - 64);
 
@@ -116,7 +115,7 @@ __global__ void __launch_bounds__(kThreads, kBlocks<K>)
     const std::uint32_t end_row = min((last - job.first_piece) * kThreads, job.size);
     piece = last;
     const unsigned copies = launch.copies;
-    const bool fits = job.joint_count * sizeof(Affine3<float>) <= kMaxShared / copies;
+    const bool fits = job.joint_count * sizeof(Affine3<float>) <= Policy::kMaxShared / copies;
     __syncthreads();  // all are done with the avatar before
     if (!Few && threadIdx.x == 0) kept = job;
     if (fits) {
@@ -201,14 +200,14 @@ void CudaBackend::run(stage::SkinAll, std::span<const SkinningArgs<float>> avata
       if (args.size() == 0 || args.influences != influences) continue;
       jobs.push_back(job_of(args, launch.pieces));
       launch.pieces += static_cast<std::uint32_t>((args.size() + kThreads - 1) / kThreads);
-      if (args.joints.size * sizeof(Affine3<float>) <= kMaxShared)
+      if (args.joints.size * sizeof(Affine3<float>) <= Policy::kMaxShared)
         most = std::max(most, args.joints.size);
     }
     if (jobs.empty()) continue;
     launch.count = static_cast<std::uint32_t>(jobs.size());
-    launch.copies = kMostCopies;
-    while (most * sizeof(Affine3<float>) > kMaxShared / launch.copies) launch.copies /= 2;
-    if (jobs.size() <= kFewJobs) {
+    launch.copies = Policy::kMostCopies;
+    while (most * sizeof(Affine3<float>) > Policy::kMaxShared / launch.copies) launch.copies /= 2;
+    if (jobs.size() <= Policy::kFewJobs) {
       std::copy(jobs.begin(), jobs.end(), launch.few);
     } else {
       auto* const table = static_cast<SkinJob*>(scratch(kSkinJobs, jobs.size() * sizeof(SkinJob)));

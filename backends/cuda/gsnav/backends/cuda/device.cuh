@@ -6,6 +6,7 @@
 #include <cub/block/block_scan.cuh>
 
 #include "gsnav/backends/cuda.hpp"
+#include "gsnav/backends/cuda/policy.hpp"
 
 // Device code of gsnav::cuda: the library's kernels in loop nests that suit a GPU.
 
@@ -18,7 +19,7 @@ __global__ void for_each(std::size_t n, const F f) {
   if (i < n) f(i);
 }
 
-inline constexpr int kProjectThreads = 128;
+inline constexpr int kProjectThreads = policy::Stages::kProjectThreads;
 
 /// One block a chunk: Gaussians are projected side by side, survivors packed in order by a block scan.
 static __global__ void __launch_bounds__(kProjectThreads)
@@ -87,7 +88,7 @@ struct EmitSplatTiles {
   }
 };
 
-inline constexpr int kRasterBatch = 64;
+inline constexpr int kRasterBatch = policy::Stages::kBlendChunk;
 
 /// One block a tile, one thread a pixel; splats come through shared memory in batches. `Mesh`: the frame
 /// has one.
@@ -141,7 +142,7 @@ __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float>
 template <class F>
 void CudaBackend::parallel_for(std::size_t n, const F& f) {
   if (n == 0 || !usable()) return;
-  constexpr unsigned kThreads = 128;
+  constexpr unsigned kThreads = cuda::policy::Stages::kEachThreads;
   const std::size_t blocks = (n + kThreads - 1) / kThreads;
   if (blocks > 0x7fffffffu)
     return note(cudaErrorInvalidConfiguration, "a launch of too many work items");
