@@ -36,9 +36,9 @@ function(gsnav_executable name)
   target_link_libraries(${name} PRIVATE gsnav ${ARG_LIBS})
 endfunction()
 
-set(GSNAV_BRIEF_TESTS_FLAGS "" CACHE STRING "Further options of the compiler for tests that run for seconds (a list)")
+set(GSNAV_BRIEF_TESTS_FLAGS "" CACHE STRING "Further options of the compiler for tests whose time is not in their own code (a list)")
 
-# gsnav_brief_test(target): takes longer to compile than to run. Sanitizers leave it without optimisation.
+# gsnav_brief_test(target): its own code takes longer to compile than to run. Sanitizers do not optimise it.
 function(gsnav_brief_test target)
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:${GSNAV_BRIEF_TESTS_FLAGS}>")
 endfunction()

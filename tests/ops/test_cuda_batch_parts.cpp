@@ -131,6 +131,7 @@ TEST_CASE("cuda batch: bounds of parts do not show") {
   std::uint64_t parts_read = 0, of_chunks = 0;
   for (const Response response : {Response::ewa, Response::ray}) {
     for (const int count : {1, 3, 8, 40}) {
+      if (is_emulated() && response == Response::ray && count != 3) continue;
       CAPTURE(count);
       RenderConfig config;
       config.response = response;
