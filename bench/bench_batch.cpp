@@ -264,7 +264,7 @@ int main(int argc, char** argv) {
   const GaussianArrays<CudaBackend> arrays(cuda, shown);
   if (visible) g_visible = gsnav_bench::workload_visible_sets(sets_of);
   OpenMPBackend cpu;
-  Renderer<double, OpenMPBackend> reference(cpu);
+  BasicRenderer<double, OpenMPBackend> reference(cpu);
   std::vector<Camera> cameras;
   for (const BatchCamera& c : cameras_of(0, kReferenceViews)) cameras.push_back(c.camera);
   const std::vector<GaussianSet> sets{gsnav_bench::workload().cloud.set()};

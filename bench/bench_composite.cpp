@@ -92,7 +92,7 @@ void print_rows(B& backend, const std::string& where, const Shown& shown) {
         Row{"hard_depth", true, true, Composite::hard_depth}}) {
     RenderConfig config;
     config.composite = row.composite;
-    Renderer<float, B> renderer(backend, config);
+    BasicRenderer<float, B> renderer(backend, config);
     std::vector<MeshInstance> seen = instances;
     for (MeshInstance& i : seen) {
       i.mesh.two_sided = row.through;

@@ -77,7 +77,7 @@ Times measure(int threads, const std::vector<Camera>& cameras) {
   RenderConfig config;
   config.outputs = kRgb;
   config.quality = Quality::fast();
-  Renderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
   const GaussianSet set = gsnav_bench::workload().cloud.set();
   Frames<float> frames;
   Times t;

@@ -44,7 +44,7 @@ void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const
   RenderConfig config;
   config.outputs = kRgb;
   config.quality = Quality::fast();
-  Renderer<float, OpenMPBackend> renderer(one, config);
+  BasicRenderer<float, OpenMPBackend> renderer(one, config);
   LodCut cut(tree, cloud);
   LodChoice choice;
   choice.pixels = std::max(pixels, 1e-3);

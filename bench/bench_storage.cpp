@@ -53,7 +53,7 @@ double frame_time(OpenMPBackend& backend, const GaussianSet& set, const std::vec
                   int repeats) {
   RenderConfig config;
   config.outputs = kRgb;
-  Renderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
   Frames<float> frames;
   std::vector<double> times;
   for (int r = 0; r <= repeats; ++r) {

@@ -55,7 +55,7 @@ LodViews lod_views(const GaussianCloud& cloud, const std::vector<Camera>& camera
   OpenMPBackend all;
   RenderConfig exact;
   exact.outputs = kRgb | kMedianDepth;
-  Renderer<float, OpenMPBackend> renderer(all, exact);
+  BasicRenderer<float, OpenMPBackend> renderer(all, exact);
   LodViews views;
   views.cameras = cameras;
   for (const Camera& camera : cameras) {

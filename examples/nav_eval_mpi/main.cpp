@@ -74,9 +74,9 @@ gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o,
                           ? gsnav::Device::parse("cuda:" + std::to_string(ranks.on_node % gpus))
                           : gsnav_tools::device_of(backend, o.threads);
   if (!device) return device.status();
-  auto made = gsnav::DeviceSimulator::create(*device, stage.scene, stage.config);
+  auto made = gsnav::Simulator::create(*device, stage.scene, stage.config);
   if (!made) return made.status();
-  auto eye = std::make_shared<gsnav::DeviceSimulator>(std::move(*made));
+  auto eye = std::make_shared<gsnav::Simulator>(std::move(*made));
   return Look([eye](const gsnav::World& world) {
     if (Status s = eye->set_state(world.state()); !s) return s;
     return eye->observe().status();

@@ -42,7 +42,7 @@ Status run(const gsnav::Device& device, const Options& options) {
   config.visible_sets = options.visible_sets;
   const auto episodes = make_episodes(options, setup.scene, config.task);
   if (!episodes) return episodes.status();
-  auto made = gsnav::DeviceSimulator::create(device, setup.scene, config);
+  auto made = gsnav::Simulator::create(device, setup.scene, config);
   if (!made) return made.status();
   auto& sim = *made;
 

@@ -32,14 +32,14 @@ class RendererOn final : public RendererEngine {
   void set_config(const RenderConfig& config) override { config_ = scene_.render_config(config); }
 
   Status render(std::span<const Camera> cameras, double time, Frames<float>& out) override {
-    if (Status s = Renderer<float, B>::size_frames(cameras, config_.outputs, out); !s) return s;
+    if (Status s = BasicRenderer<float, B>::size_frames(cameras, config_.outputs, out); !s) return s;
     scene_.make_slots(1);
     if (Status s = scene_.prepare(0, time, cameras, config_); !s) return s;
     if (Status s = scene_.pose_prepared(0); !s) return s;
     requests_.clear();
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      requests_.push_back({{scene_.sets(0), &cameras[c], &config_, Renderer<float, B>::images_of(out, c),
-                            scene_.meshes()},
+      requests_.push_back({{scene_.sets(0), &cameras[c], &config_,
+                            BasicRenderer<float, B>::images_of(out, c), scene_.meshes()},
                            scene_.detail()});
     }
     if (Status s = images_.render(requests_, ImageMemory::host); !s) return s;
@@ -58,7 +58,7 @@ class RendererOn final : public RendererEngine {
 template <class B>
 class SimulatorOn final : public SimulatorEngine {
  public:
-  SimulatorOn(std::unique_ptr<B> backend, Simulator<B> simulator)
+  SimulatorOn(std::unique_ptr<B> backend, BasicSimulator<B> simulator)
       : backend_(std::move(backend)), sim_(std::move(simulator)) {}
 
   Result<Observations> reset(const PointNavEpisode& episode) override { return sim_.reset(episode); }
@@ -82,13 +82,13 @@ class SimulatorOn final : public SimulatorEngine {
 
  private:
   std::unique_ptr<B> backend_;
-  Simulator<B> sim_;
+  BasicSimulator<B> sim_;
 };
 
 template <class B>
 class BatchOn final : public BatchEngine {
  public:
-  BatchOn(std::unique_ptr<B> backend, BatchSimulator<B> simulator)
+  BatchOn(std::unique_ptr<B> backend, BasicBatchSimulator<B> simulator)
       : backend_(std::move(backend)), sim_(std::move(simulator)) {}
 
   std::size_t environments() const noexcept override { return sim_.environments(); }
@@ -107,7 +107,7 @@ class BatchOn final : public BatchEngine {
 
  private:
   std::unique_ptr<B> backend_;
-  BatchSimulator<B> sim_;
+  BasicBatchSimulator<B> sim_;
 };
 
 /// `make`: a std::unique_ptr<B> of a Device.
@@ -122,19 +122,20 @@ constexpr EngineFactory engines_on() {
          World::BodySource others) -> Result<std::unique_ptr<SimulatorEngine>> {
         std::unique_ptr<B> backend = make(device);
         auto sim =
-            Simulator<B>::create(*backend, std::move(scene), std::move(config), std::move(others));
+            BasicSimulator<B>::create(*backend, std::move(scene), std::move(config), std::move(others));
         if (!sim) return sim.status();
         return std::unique_ptr<SimulatorEngine>(
             std::make_unique<SimulatorOn<B>>(std::move(backend), std::move(*sim)));
       },
       [](const Device& device, BatchParts p) -> Result<std::unique_ptr<BatchEngine>> {
         std::unique_ptr<B> backend = make(device);
-        auto sim = p.library != nullptr
-                       ? BatchSimulator<B>::create_from_library(*backend, std::move(p.library),
-                                                                std::move(p.config), p.environments,
-                                                                std::move(p.next_episode))
-                       : BatchSimulator<B>::create(*backend, std::move(p.scenes), std::move(p.config),
-                                                   p.environments, std::move(p.next_episode));
+        auto sim =
+            p.library != nullptr
+                ? BasicBatchSimulator<B>::create_from_library(*backend, std::move(p.library),
+                                                              std::move(p.config), p.environments,
+                                                              std::move(p.next_episode))
+                : BasicBatchSimulator<B>::create(*backend, std::move(p.scenes), std::move(p.config),
+                                                 p.environments, std::move(p.next_episode));
         if (!sim) return sim.status();
         return std::unique_ptr<BatchEngine>(
             std::make_unique<BatchOn<B>>(std::move(backend), std::move(*sim)));

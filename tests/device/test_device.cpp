@@ -109,13 +109,13 @@ TEST_CASE("renderer: the bits of the template, on every device, with people at a
   SerialBackend backend;
   SceneOnBackend<SerialBackend> scene(backend, flat());
   REQUIRE(scene.pose(0, 1.5).ok());
-  Renderer<float, SerialBackend> renderer(backend, scene.render_config(options.render));
+  BasicRenderer<float, SerialBackend> renderer(backend, scene.render_config(options.render));
   const auto want = renderer.render(scene.sets(0), cameras).value();
   for (const Device& device : devices()) {
     CAPTURE(device.name());
-    auto made = DeviceRenderer::create(device, flat(), options);
+    auto made = Renderer::create(device, flat(), options);
     REQUIRE(made.ok());
-    DeviceRenderer moved = std::move(*made);
+    Renderer moved = std::move(*made);
     const auto got = moved.render(cameras, 1.5).value();
     CHECK(got.rgb == want.rgb);
     CHECK(got.alpha == want.alpha);
@@ -130,7 +130,7 @@ TEST_CASE("renderer: the bits of the template, on every device, with people at a
 
 TEST_CASE("renderer: a cloud alone, rules that change, errors that name what is wrong") {
   const GaussianCloud cloud = make_default_scene(0.05).value().cloud;
-  auto renderer = DeviceRenderer::create(Device(), cloud).value();
+  auto renderer = Renderer::create(Device(), cloud).value();
   const Camera camera = camera_in_flat(0);
   const auto frames = renderer.render(camera).value();
   CHECK(frames.rgb.size() == 48 * 32 * 3);
@@ -151,11 +151,11 @@ TEST_CASE("renderer: a cloud alone, rules that change, errors that name what is 
   const std::vector<Camera> sizes{camera, Camera::look_at({0, 1, 0}, {1, 1, 0}, {0, 1, 0}, 8, 8, 90)};
   CHECK(renderer.render(sizes).code() == Errc::invalid_argument);
   CHECK(renderer.render(std::span<const Camera>()).code() == Errc::invalid_argument);
-  CHECK(DeviceRenderer::create(Device(), std::shared_ptr<const SimulatorScene>()).code() ==
+  CHECK(Renderer::create(Device(), std::shared_ptr<const SimulatorScene>()).code() ==
         Errc::invalid_argument);
   RenderOptions lod;
   lod.detail.lod = LodChoice{};
-  CHECK(has(DeviceRenderer::create(Device(), flat(), lod).message(), "lod is null"));
+  CHECK(has(Renderer::create(Device(), flat(), lod).message(), "lod is null"));
 }
 
 TEST_CASE("simulator: the bits of the template, on every device") {
@@ -163,10 +163,10 @@ TEST_CASE("simulator: the bits of the template, on every device") {
   for (const Device& device : devices()) {
     CAPTURE(device.name());
     SerialBackend backend;
-    auto want = Simulator<SerialBackend>::create(backend, flat(), small_rgbd()).value();
-    auto made = DeviceSimulator::create(device, flat(), small_rgbd());
+    auto want = BasicSimulator<SerialBackend>::create(backend, flat(), small_rgbd()).value();
+    auto made = Simulator::create(device, flat(), small_rgbd());
     REQUIRE(made.ok());
-    DeviceSimulator sim = std::move(*made);
+    Simulator sim = std::move(*made);
     CHECK(sim.device() == device);
     CHECK(&sim.scene() == flat().get());
     const GeodesicFollower policy;
@@ -198,11 +198,10 @@ TEST_CASE("simulator: the bits of the template, on every device") {
 TEST_CASE("simulator: what is wrong is an error, never an exception") {
   SimulatorConfig config = small_rgbd();
   config.sensors[0].hfov = 500;
-  CHECK(has(DeviceSimulator::create(Device(), flat(), config).message(), "hfov"));
-  CHECK(
-      DeviceSimulator::create(Device(), std::shared_ptr<const SimulatorScene>(), small_rgbd()).code() ==
-      Errc::invalid_argument);
-  auto sim = DeviceSimulator::create(Device(), flat(), small_rgbd()).value();
+  CHECK(has(Simulator::create(Device(), flat(), config).message(), "hfov"));
+  CHECK(Simulator::create(Device(), std::shared_ptr<const SimulatorScene>(), small_rgbd()).code() ==
+        Errc::invalid_argument);
+  auto sim = Simulator::create(Device(), flat(), small_rgbd()).value();
   CHECK(sim.step(Action::move_forward).code() == Errc::invalid_argument);  // before reset
   CHECK(sim.set_agent({std::nan(""), 0, 0}, 0).code() == Errc::invalid_argument);
 }
@@ -217,9 +216,9 @@ TEST_CASE("batch simulator: the bits of the template, on every device") {
     CAPTURE(device.name());
     SerialBackend backend;
     auto want = make_batch_simulator(backend, {flat()}, config, 3, episode_of).value();
-    auto made = DeviceBatchSimulator::create(device, {flat()}, config, 3, episode_of);
+    auto made = BatchSimulator::create(device, {flat()}, config, 3, episode_of);
     REQUIRE(made.ok());
-    DeviceBatchSimulator sim = std::move(*made);
+    BatchSimulator sim = std::move(*made);
     REQUIRE(sim.environments() == 3);
     const auto check_steps = [](const BatchStep& a, const BatchStep& b) {
       CHECK(std::ranges::equal(a.rewards, b.rewards));
@@ -238,6 +237,6 @@ TEST_CASE("batch simulator: the bits of the template, on every device") {
     CHECK(made->reset().code() == Errc::invalid_argument);
     CHECK(sim.step(std::vector<Action>(2)).code() == Errc::invalid_argument);
   }
-  CHECK(DeviceBatchSimulator::create_from_library(Device(), nullptr, config, 1, episode_of).code() ==
+  CHECK(BatchSimulator::create_from_library(Device(), nullptr, config, 1, episode_of).code() ==
         Errc::invalid_argument);
 }

@@ -43,7 +43,7 @@ TEST_CASE("real scenes: every file is read, fits its report and is seen") {
   if (scenes.empty()) return;
   CHECK(scenes.size() >= 18);
   SerialBackend backend;
-  Renderer<float, SerialBackend> renderer(backend);
+  BasicRenderer<float, SerialBackend> renderer(backend);
   for (const std::string& path : scenes) {
     CAPTURE(path);
     const auto loaded = io::load_scene(path);

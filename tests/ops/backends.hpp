@@ -45,7 +45,7 @@ static_assert(gsnav::Backend<ToyBackend>);
 template <class S, class B>
 gsnav::Frames<S> render(B& backend, const std::vector<gsnav::GaussianSet>& sets,
                         const gsnav::Camera& camera, const gsnav::RenderConfig& config = {}) {
-  gsnav::Renderer<S, B> renderer(backend, config);
+  gsnav::BasicRenderer<S, B> renderer(backend, config);
   return renderer.render(sets, std::vector<gsnav::Camera>{camera}).value();
 }
 

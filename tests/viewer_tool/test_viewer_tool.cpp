@@ -114,8 +114,7 @@ std::vector<std::uint16_t> truth(const Json& state) {
   o.height = kHeight;
   const auto stage = gsnav_eval::prepare(o).value();
   auto sim =
-      gsnav::DeviceSimulator::create(gsnav::Device::parse("cpu:2").value(), stage.scene, stage.config)
-          .value();
+      gsnav::Simulator::create(gsnav::Device::parse("cpu:2").value(), stage.scene, stage.config).value();
   gsnav::PointNavEpisode episode = stage.episodes[0];
   episode.start_time = state["time"].get<double>();
   sim.reset(episode).value();

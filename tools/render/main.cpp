@@ -139,7 +139,7 @@ int run(B& backend, const Options& o, const Cloud& cloud, const Scene& scene) {
   const LodTree* const tree = scene.tree ? &*scene.tree : nullptr;
   const VisibleSets* const visible_sets = scene.visible ? &*scene.visible : nullptr;
   const RenderConfig config = config_of(o, scene);
-  Renderer<S, B> renderer(backend, config);
+  BasicRenderer<S, B> renderer(backend, config);
   const bool profiled = is_host_backend<B> || tree == nullptr;
   const GaussianArrays<B> arrays =
       profiled ? GaussianArrays<B>(backend, cloud, scene.profile) : GaussianArrays<B>(backend, cloud);
