@@ -23,8 +23,8 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/eval/image_error.hpp"
 #include "gsnav/eval/oracle.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "samples.hpp"
 #include "workload.hpp"
 #if defined(GSNAV_HAS_CUDA)

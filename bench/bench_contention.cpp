@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "samples.hpp"
 #include "workload.hpp"
 

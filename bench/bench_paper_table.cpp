@@ -15,7 +15,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
 #include "report/runner_system.hpp"

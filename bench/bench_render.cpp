@@ -30,7 +30,7 @@
 #endif
 #include "gsnav/detail/eval/depth_error.hpp"
 #include "gsnav/eval/image_error.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "reference.hpp"
 #include "samples.hpp"
 #include "workload.hpp"

@@ -16,7 +16,7 @@
 #include "gsnav/detail/avatar/proxy_fit.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/avatar/weight_gradients.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace {

@@ -18,7 +18,7 @@
 
 #include "floor_loops.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "samples.hpp"
 #include "stage_times.hpp"
 #include "workload.hpp"

@@ -17,7 +17,7 @@
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace {

@@ -8,7 +8,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/eval/oracle_photo.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "samples.hpp"
 
 using namespace gsnav;

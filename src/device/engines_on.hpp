@@ -11,8 +11,8 @@
 #include "engines.hpp"
 #include "gsnav/detail/sim/image_renderer.hpp"
 #include "gsnav/detail/sim/scene_on_backend.hpp"
-#include "gsnav/sim/batch.hpp"
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/basic_batch.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 
 // The engines on a backend B. Each has a backend of its own; `MakeBackend` makes one of a Device.
 

@@ -15,7 +15,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/avatar/mesh_avatar.hpp"
 #include "gsnav/detail/avatar/mesh_surface.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

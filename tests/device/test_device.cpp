@@ -12,11 +12,11 @@
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
-#include "gsnav/sim/simulator.hpp"
 
 using namespace gsnav;
 

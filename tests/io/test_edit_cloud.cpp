@@ -7,7 +7,7 @@
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "row_clouds.hpp"
 #include "support/compiled_frames.hpp"
 

@@ -6,7 +6,7 @@
 #include "check_cloud.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/data.hpp"
 

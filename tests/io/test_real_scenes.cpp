@@ -7,7 +7,7 @@
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "real_scenes.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/sanitized.hpp"

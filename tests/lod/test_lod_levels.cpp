@@ -10,8 +10,8 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/eval/oracle_photo.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "level_support.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"

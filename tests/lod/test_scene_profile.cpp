@@ -15,8 +15,8 @@
 #include "gsnav/detail/scene/ledger.hpp"
 #include "gsnav/detail/scene/scene_profile.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "support/compiled_frames.hpp"
 #if defined(_OPENMP)
 #include "gsnav/backends/openmp.hpp"

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "nav/cases.hpp"
 #include "same_bits.hpp"
 #include "sim_scene.hpp"

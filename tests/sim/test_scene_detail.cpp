@@ -8,7 +8,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "lod/level_support.hpp"
 #include "same_bits.hpp"
 #include "sim_scene.hpp"

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 
 namespace gsnav_convert {
 

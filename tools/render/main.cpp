@@ -22,9 +22,9 @@
 #endif
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/prepare.hpp"
-#include "gsnav/scene/renderer.hpp"
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 #include "options.hpp"
 #include "scene.hpp"
 

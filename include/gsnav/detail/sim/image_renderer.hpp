@@ -8,7 +8,7 @@
 
 #include "gsnav/detail/sim/frame_batch.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/config.hpp"
 
 namespace gsnav {

@@ -14,7 +14,7 @@
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/scene.hpp"
 
 namespace gsnav {

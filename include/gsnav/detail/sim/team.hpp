@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 
 namespace gsnav {
 

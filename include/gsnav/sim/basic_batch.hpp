@@ -18,8 +18,8 @@
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
 #include "gsnav/detail/sim/team.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 #include "gsnav/sim/config.hpp"
-#include "gsnav/sim/simulator.hpp"
 
 namespace gsnav {
 
