@@ -82,6 +82,11 @@ Status Renderer::set_config(const RenderConfig& config) {
   engine_->set_config(config);
   return {};
 }
+Status Renderer::set_light(const MeshLight& light) {
+  if (engine_ == nullptr) return moved_from("Renderer");
+  engine_->set_light(light);
+  return {};
+}
 
 // ---- Simulator
 

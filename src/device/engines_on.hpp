@@ -25,11 +25,13 @@ class RendererOn final : public RendererEngine {
              const RenderOptions& options)
       : backend_(std::move(backend)),
         scene_(*backend_, std::move(scene), options.detail),
-        images_(*backend_) {
+        images_(*backend_),
+        light_(scene_.meshes().light) {
     set_config(options.render);
   }
 
   void set_config(const RenderConfig& config) override { config_ = scene_.render_config(config); }
+  void set_light(const MeshLight& light) override { light_ = light; }
 
   Status render(std::span<const Camera> cameras, double time, Frames<float>& out) override {
     if (Status s = BasicRenderer<float, B>::size_frames(cameras, config_.outputs, out); !s) return s;
@@ -38,8 +40,11 @@ class RendererOn final : public RendererEngine {
     if (Status s = scene_.pose_prepared(0); !s) return s;
     requests_.clear();
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      requests_.push_back({{scene_.sets(0), &cameras[c], &config_,
-                            BasicRenderer<float, B>::images_of(out, c), scene_.meshes()},
+      requests_.push_back({{scene_.sets(0),
+                            &cameras[c],
+                            &config_,
+                            BasicRenderer<float, B>::images_of(out, c),
+                            {scene_.meshes().instances, light_}},
                            scene_.detail()});
     }
     if (Status s = images_.render(requests_, ImageMemory::host); !s) return s;
@@ -51,6 +56,7 @@ class RendererOn final : public RendererEngine {
   std::unique_ptr<B> backend_;
   SceneOnBackend<B> scene_;
   ImageRenderer<B> images_;
+  MeshLight light_;
   RenderConfig config_;
   std::vector<ImageRequest> requests_;
 };

@@ -9,6 +9,7 @@
 
 #include "doctest/doctest.h"
 #include "gsnav/backends/serial.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
@@ -17,8 +18,11 @@
 #include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
+#include "sim/mesh_box.hpp"
+#include "support/scenes.hpp"
 
 using namespace gsnav;
+using namespace gsnav_test;
 
 namespace {
 
@@ -156,6 +160,75 @@ TEST_CASE("renderer: a cloud alone, rules that change, errors that name what is 
   RenderOptions lod;
   lod.detail.lod = LodChoice{};
   CHECK(has(Renderer::create(Device(), flat(), lod).message(), "lod is null"));
+}
+
+TEST_CASE("renderer: packed clouds, bands of a profile and a light on meshes, on every device") {
+  GaussianCloud cloud = random_cloud(12, {.count = 2500});
+  sort_spatially(cloud);
+  SceneProfile bands;  // chunk c has the SH bands up to c % 4
+  for (std::size_t c = 0; c < cloud.view().chunk_count(); ++c)
+    bands.chunk_sh_degrees.push_back(static_cast<std::uint8_t>(c % 4));
+  SimulatorScene as_floats, as_packed;
+  as_floats.assets.push_back({std::make_shared<const GaussianCloud>(cloud)});
+  as_floats.assets[0].profile = std::make_shared<const SceneProfile>(bands);
+  as_packed.assets.push_back({});
+  as_packed.assets[0].packed = std::make_shared<const PackedCloud>(pack_cloud(cloud));
+  SceneMesh mesh = turned_box(0.6);
+  mesh.world_from_surface.translation = {0.3, -0.4, 3};
+  as_packed.meshes.push_back(mesh);
+  MeshLight light;
+  light.unlit = false;
+  light.direction = {0.2, -0.3, -1};
+
+  const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 48, 32, 70);
+  SerialBackend backend;
+  BasicRenderer<float, SerialBackend> renderer(backend);
+  const auto all_bands = renderer.render(cloud.set(), camera).value().rgb;
+  const auto some_bands = renderer.render(bands.applied_to(cloud.set()), camera).value().rgb;
+  REQUIRE(some_bands != all_bands);
+  const GaussianSet packed = as_packed.assets[0].packed->set();
+  const auto instances = mesh.surface->in_world(mesh.world_from_surface);
+  renderer.set_meshes(instances);
+  const auto unlit = renderer.render(packed, camera).value().rgb;
+  renderer.set_meshes(instances, light);
+  const auto lit = renderer.render(packed, camera).value().rgb;
+  REQUIRE(unlit != lit);
+  for (const Device& device : devices()) {
+    CAPTURE(device.name());
+    const auto draw = [&](const SimulatorScene& scene) {
+      return Renderer::create(device, std::make_shared<const SimulatorScene>(scene)).value();
+    };
+    CHECK(draw(as_floats).render(camera).value().rgb == some_bands);
+    Renderer of_packed = draw(as_packed);
+    CHECK(of_packed.render(camera).value().rgb == unlit);
+    REQUIRE(of_packed.set_light(light).ok());
+    CHECK(of_packed.render(camera).value().rgb == lit);
+    const Renderer moved = std::move(of_packed);
+    CHECK(of_packed.set_light(light).code() == Errc::invalid_argument);
+  }
+}
+
+TEST_CASE("renderer: assets that cannot be drawn so are named") {
+  const auto cloud = std::make_shared<const GaussianCloud>(random_cloud(12, {.count = 300}));
+  const auto message = [](SceneAsset asset, const RenderOptions& how = {}) {
+    SimulatorScene scene;
+    scene.assets.push_back(std::move(asset));
+    return Renderer::create(Device(), std::make_shared<const SimulatorScene>(std::move(scene)), how)
+        .message();
+  };
+  CHECK(has(message({}), "assets[0].cloud is null"));
+  SceneAsset asset{cloud};
+  asset.profile = std::make_shared<const SceneProfile>();
+  CHECK(has(message(asset), "assets[0].profile is of another cloud"));
+  asset = {cloud};
+  asset.packed = std::make_shared<const PackedCloud>(pack_cloud(*cloud));
+  CHECK(has(message(asset), "assets[0].packed"));
+  asset.cloud = nullptr;
+  RenderOptions how;
+  how.detail.visible_sets = true;
+  CHECK(has(message(asset, how), "visible_sets"));
+  how.detail.lod = LodChoice{};
+  CHECK(has(message(asset, how), "lod: SimulatorScene.assets[0].packed"));
 }
 
 TEST_CASE("simulator: the bits of the template, on every device") {

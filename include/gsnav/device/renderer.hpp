@@ -46,9 +46,9 @@ class Renderer {
   ~Renderer();
 
   /// Renders from each camera, which have one size, with avatars where they are at `time`, seconds on
-  /// the scene's clock. Images are those that RenderConfig::outputs names. Errors: invalid_argument
-  /// naming the field, no camera, or cameras of several sizes; unsupported; out_of_memory;
-  /// backend_failure.
+  /// the scene's clock. Images are those that RenderConfig::outputs names; CPUs fill Frames::stats.
+  /// Errors: invalid_argument naming the field, no camera, or cameras of several sizes; unsupported;
+  /// out_of_memory; backend_failure.
   Status render(std::span<const Camera> cameras, Frames<float>& out, double time = 0);
   Result<Frames<float>> render(std::span<const Camera> cameras, double time = 0);
   Result<Frames<float>> render(const Camera& camera, double time = 0);
@@ -56,6 +56,8 @@ class Renderer {
   const Device& device() const noexcept { return device_; }
   /// The rules that frames are drawn by from now on.
   Status set_config(const RenderConfig& config);
+  /// The light on the scene's meshes from now on, in place of SimulatorScene::light.
+  Status set_light(const MeshLight& light);
 
  private:
   Renderer(const Device& device, std::unique_ptr<detail::RendererEngine> engine) noexcept;
