@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "../common/device_option.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "overlay.hpp"
 
@@ -73,15 +72,13 @@ Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& opti
                                       gsnav::append_bodies(*scene, t0, t1, out);
                                     });
   if (!world) return world.status();
-  const auto device = gsnav_tools::device_of("openmp", options.threads);
-  if (!device) return device.status();
   gsnav::RenderOptions draws{stage.config.render};
   draws.render.outputs = gsnav::kRgb | gsnav::kMedianDepth;
-  auto renderer = gsnav::Renderer::create(*device, stage.scene, draws);
+  auto renderer = gsnav::Renderer::create(options.device, stage.scene, draws);
   if (!renderer) return renderer.status();
   auto empty = std::make_shared<gsnav::SimulatorScene>(*stage.scene);
   empty->avatars.clear();
-  auto without_people = gsnav::Renderer::create(*device, std::move(empty), draws);
+  auto without_people = gsnav::Renderer::create(options.device, std::move(empty), draws);
   if (!without_people) return without_people.status();
   std::unique_ptr<Session> s(new Session(options, std::move(stage), how, std::move(*world),
                                          std::move(*renderer), std::move(*without_people)));
