@@ -27,8 +27,8 @@
 #include "error.hpp"
 #include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "samples.hpp"
 #include "visible_workload.hpp"
 #include "workload.hpp"
@@ -264,7 +264,7 @@ int main(int argc, char** argv) {
   const GaussianArrays<CudaBackend> arrays(cuda, shown);
   if (visible) g_visible = gsnav_bench::workload_visible_sets(sets_of);
   OpenMPBackend cpu;
-  Renderer<double, OpenMPBackend> reference(cpu);
+  BasicRenderer<double, OpenMPBackend> reference(cpu);
   std::vector<Camera> cameras;
   for (const BatchCamera& c : cameras_of(0, kReferenceViews)) cameras.push_back(c.camera);
   const std::vector<GaussianSet> sets{gsnav_bench::workload().cloud.set()};

@@ -23,8 +23,8 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/eval/image_error.hpp"
 #include "gsnav/eval/oracle.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "samples.hpp"
 #include "workload.hpp"
 #if defined(GSNAV_HAS_CUDA)
@@ -92,7 +92,7 @@ void print_rows(B& backend, const std::string& where, const Shown& shown) {
         Row{"hard_depth", true, true, Composite::hard_depth}}) {
     RenderConfig config;
     config.composite = row.composite;
-    Renderer<float, B> renderer(backend, config);
+    BasicRenderer<float, B> renderer(backend, config);
     std::vector<MeshInstance> seen = instances;
     for (MeshInstance& i : seen) {
       i.mesh.two_sided = row.through;

@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "samples.hpp"
 #include "workload.hpp"
 
@@ -77,7 +77,7 @@ Times measure(int threads, const std::vector<Camera>& cameras) {
   RenderConfig config;
   config.outputs = kRgb;
   config.quality = Quality::fast();
-  Renderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
   const GaussianSet set = gsnav_bench::workload().cloud.set();
   Frames<float> frames;
   Times t;

@@ -20,8 +20,8 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #include "lod_rows.hpp"
 #include "visible_workload.hpp"
@@ -44,7 +44,7 @@ void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const
   RenderConfig config;
   config.outputs = kRgb;
   config.quality = Quality::fast();
-  Renderer<float, OpenMPBackend> renderer(one, config);
+  BasicRenderer<float, OpenMPBackend> renderer(one, config);
   LodCut cut(tree, cloud);
   LodChoice choice;
   choice.pixels = std::max(pixels, 1e-3);

@@ -15,7 +15,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
 #include "report/runner_system.hpp"
@@ -84,7 +84,7 @@ Place make_place(double millions, std::size_t people) {
 /// One simulator plays episodes by the follower; the first actions find the scratch that is taken.
 template <class B>
 Row play_one(B& backend, const Options& o, const Place& place) {
-  auto sim = Simulator<B>::create(backend, place.scene, place.config).value();
+  auto sim = BasicSimulator<B>::create(backend, place.scene, place.config).value();
   const GeodesicFollower follower;
   std::size_t episode = 0;
   double total = 0, beside = 0;
@@ -117,7 +117,7 @@ Row play_many(B& backend, const Options& o, const Place& place) {
     return BatchEpisode{0, place.episodes[(7 * e + count) % place.episodes.size()]};
   };
   auto sim =
-      BatchSimulator<B>::create(backend, {place.scene}, config, o.environments, episode_of).value();
+      BasicBatchSimulator<B>::create(backend, {place.scene}, config, o.environments, episode_of).value();
   sim.reset().value();
   const GeodesicFollower follower;
   std::vector<Action> actions(o.environments);

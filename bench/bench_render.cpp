@@ -30,7 +30,7 @@
 #endif
 #include "gsnav/detail/eval/depth_error.hpp"
 #include "gsnav/eval/image_error.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "reference.hpp"
 #include "samples.hpp"
 #include "workload.hpp"
@@ -114,7 +114,7 @@ const std::vector<gsnav_bench::FrameWork>& work_of_views(const Variant& v, int w
 /// What images are off by: the worst of the judged views. Pixels that rounding alone decides count in
 /// the PSNR only.
 template <class B>
-void judge(benchmark::State& state, Renderer<float, B>& renderer, std::span<const GaussianSet> sets,
+void judge(benchmark::State& state, BasicRenderer<float, B>& renderer, std::span<const GaussianSet> sets,
            const Variant& v, const std::vector<Camera>& cameras) {
   const std::vector<Camera> judged = gsnav_bench::judged_views(cameras);
   const auto& truth = gsnav_bench::references(v.cloud(), cameras);
@@ -153,7 +153,7 @@ void render_frames(benchmark::State& state, B& backend, const Variant& v, int wi
     for (std::size_t k = 0; k < 9; ++k)
       sets[0].gaussians.shape.axes.set(k, view_of(axes_of_workload()[k]));
   }
-  Renderer<float, B> renderer(backend, v.config());
+  BasicRenderer<float, B> renderer(backend, v.config());
   Frames<float> frames;
   double visible = 0, pairs = 0, count = 0;
   const auto draw = [&](std::size_t c) {
@@ -205,7 +205,7 @@ void render_batch(benchmark::State& state, B& backend, const Variant& v, int wid
   for (std::size_t c = 0; c < kBatch; ++c) cameras.push_back(views[c % views.size()]);
   const GaussianArrays<B> arrays(backend, v.cloud());
   const std::vector<GaussianSet> sets{arrays.set()};
-  Renderer<float, B> batch_renderer(backend, v.config()), single_renderer(backend, v.config());
+  BasicRenderer<float, B> batch_renderer(backend, v.config()), single_renderer(backend, v.config());
   Frames<float> batch, single;
   std::vector<double> batch_ms, single_ms;
   double differ = 0;

@@ -16,7 +16,7 @@
 #include "gsnav/detail/avatar/proxy_fit.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/avatar/weight_gradients.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace {
@@ -97,7 +97,7 @@ BENCHMARK(step_batch)
 void step_one(benchmark::State& state) {
   const auto scene = flat(static_cast<int>(state.range(0)));
   OpenMPBackend backend(1);
-  auto sim = Simulator<OpenMPBackend>::create(backend, scene, without_pictures()).value();
+  auto sim = BasicSimulator<OpenMPBackend>::create(backend, scene, without_pictures()).value();
   World world = sim.world();
   const EpisodeSource source = generated(scene, kAtOnce);
   std::size_t count = 0;

@@ -9,9 +9,9 @@
 #include "device_time.hpp"
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/cuda/pinned.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
-#include "gsnav/sim/simulator.hpp"
 #include "samples.hpp"
 
 namespace {
@@ -23,8 +23,8 @@ constexpr double kGaussiansAtOne = 390000;  // of the flat with density 1, about
 constexpr int kSide = 256;
 constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
 
-/// Simulator::observe() of RGB and depth, 256 x 256, along a follower's way; the time is that of the
-/// call. Counters, all medians: draw_us, what the device takes for the scene from the same cameras,
+/// BasicSimulator::observe() of RGB and depth, 256 x 256, along a follower's way; the time is that of
+/// the call. Counters, all medians: draw_us, what the device takes for the scene from the same cameras,
 /// without people; copy_us, for their images to page-locked memory; host_us, what is left of the call;
 /// world_us, an action without a picture, outside of it. Arguments: thousands of Gaussians, people.
 void observe_cuda(benchmark::State& state) {
@@ -41,7 +41,7 @@ void observe_cuda(benchmark::State& state) {
                               1e3 * static_cast<double>(state.range(0)) / kGaussiansAtOne, config.task)
           .value());
   const auto episodes = generate_episodes(*scene->navmesh, 16, 1).value();
-  auto sim = Simulator<CudaBackend>::create(cuda, scene, config).value();
+  auto sim = BasicSimulator<CudaBackend>::create(cuda, scene, config).value();
 
   CudaBatchRenderer renderer(cuda, sim.config().render);
   std::vector<GaussianArrays<CudaBackend>> arrays;

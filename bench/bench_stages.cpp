@@ -18,7 +18,7 @@
 
 #include "floor_loops.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "samples.hpp"
 #include "stage_times.hpp"
 #include "workload.hpp"
@@ -59,8 +59,8 @@ Measured measure(const Variant& v, const std::vector<Camera>& cameras, int threa
   const GaussianSet set = (v.base_color ? base_color_cloud() : workload().cloud).set();
   OpenMPBackend plain_backend(threads);
   TimedBackend<OpenMPBackend> timed_backend(threads);
-  Renderer<float, OpenMPBackend> plain(plain_backend, config);
-  Renderer<float, TimedBackend<OpenMPBackend>> timed(timed_backend, config);
+  BasicRenderer<float, OpenMPBackend> plain(plain_backend, config);
+  BasicRenderer<float, TimedBackend<OpenMPBackend>> timed(timed_backend, config);
   Frames<float> frames;
   std::array<std::vector<double>, kStages> stages;
   std::vector<double> whole;

@@ -17,7 +17,7 @@
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/default_scene.hpp"
 
 namespace {
@@ -53,7 +53,7 @@ double frame_time(OpenMPBackend& backend, const GaussianSet& set, const std::vec
                   int repeats) {
   RenderConfig config;
   config.outputs = kRgb;
-  Renderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
   Frames<float> frames;
   std::vector<double> times;
   for (int r = 0; r <= repeats; ++r) {

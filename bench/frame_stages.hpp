@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gsnav/render/render.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 
 namespace gsnav_bench {
 

@@ -8,7 +8,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/eval/oracle_photo.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "samples.hpp"
 
 using namespace gsnav;
@@ -55,7 +55,7 @@ LodViews lod_views(const GaussianCloud& cloud, const std::vector<Camera>& camera
   OpenMPBackend all;
   RenderConfig exact;
   exact.outputs = kRgb | kMedianDepth;
-  Renderer<float, OpenMPBackend> renderer(all, exact);
+  BasicRenderer<float, OpenMPBackend> renderer(all, exact);
   LodViews views;
   views.cameras = cameras;
   for (const Camera& camera : cameras) {

@@ -11,7 +11,7 @@
 #include "device_time.hpp"
 #include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "lod_rows.hpp"
 
 using namespace gsnav;

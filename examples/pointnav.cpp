@@ -10,8 +10,7 @@ int main(int argc, char** argv) {
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
   auto scene = gsnav::default_simulator_scene(3).value();
   auto episodes = gsnav::generate_episodes(*scene.navmesh, 3, 1).value();
-  auto sim =
-      gsnav::DeviceSimulator::create(device, scene, {.sensors = gsnav::rgbd_sensors(128, 128)}).value();
+  auto sim = gsnav::Simulator::create(device, scene, {.sensors = gsnav::rgbd_sensors(128, 128)}).value();
   gsnav::GeodesicFollower policy;
   for (const auto& episode : episodes) {
     auto obs = sim.reset(episode).value();

@@ -14,8 +14,8 @@ int main(int argc, char** argv) {
   auto episode_of = [&](std::size_t e, std::size_t k) -> gsnav::Result<gsnav::BatchEpisode> {
     return gsnav::BatchEpisode{0, episodes[(16 * k + e) % 64]};
   };
-  auto sim = gsnav::DeviceBatchSimulator::create(
-                 device, {scene}, {{.sensors = gsnav::rgbd_sensors(64, 64)}}, 16, episode_of)
+  auto sim = gsnav::BatchSimulator::create(device, {scene}, {{.sensors = gsnav::rgbd_sensors(64, 64)}},
+                                           16, episode_of)
                  .value();
   gsnav::GeodesicFollower policy;
   auto out = sim.reset().value();

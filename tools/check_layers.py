@@ -91,12 +91,12 @@ def self_test():
             "backends/x/gsnav/backends/x.hpp": '"gsnav/render/render.hpp"'}
     bad = {"include/gsnav/core/up.hpp": '"gsnav/frame/sh.hpp"',
            "include/gsnav/scene/sideways.hpp": '"gsnav/nav/navmesh.hpp"',
-           "include/gsnav/avatar/not_data.hpp": '"gsnav/scene/renderer.hpp"',
+           "include/gsnav/avatar/not_data.hpp": '"gsnav/scene/basic_renderer.hpp"',
            "include/gsnav/render/backend.hpp": "<gsnav/backends/serial.hpp>",
            "include/gsnav/scene/library.hpp": "<Eigen/Core>", "tools/t/main.cpp": '"gsnav/detail/io/ply.hpp"',
            "src/sim/reads.cpp": '#  include "../io/private.hpp"', "src/io/private.hpp": "",
            "backends/y/gsnav/backends/y.hpp": '"gsnav/backends/x.hpp"',
-           "backends/z/src/z.cpp": '"gsnav/scene/renderer.hpp"', "src/other/o.cpp": ""}
+           "backends/z/src/z.cpp": '"gsnav/scene/basic_renderer.hpp"', "src/other/o.cpp": ""}
     with tempfile.TemporaryDirectory() as scratch:
         root = pathlib.Path(scratch)
         for name, include in {**good, **bad}.items():

@@ -7,7 +7,7 @@
 #include "cache.hpp"
 #include "csv.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 
 namespace gsnav_report {
 

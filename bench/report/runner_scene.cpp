@@ -55,7 +55,7 @@ Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s
     out.cell_known = cell.has_value();
     if (cell) set.selection.seen = scene_.visible->seen_from(*cell);
   }
-  Renderer<float, B> renderer(backend, render_config(s, cloud.sort_order));
+  BasicRenderer<float, B> renderer(backend, render_config(s, cloud.sort_order));
   const Result<const LodTree*> tree = tree_of(s);
   if (!tree) return tree.status();
   std::optional<LodCut> cut;

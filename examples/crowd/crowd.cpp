@@ -7,7 +7,7 @@
 
 #include "gsnav/nav.hpp"
 #include "gsnav/sim.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 
 using namespace gsnav;
 

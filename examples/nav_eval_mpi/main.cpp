@@ -13,7 +13,6 @@
 #include <string>
 #include <vector>
 
-#include "../../tools/common/device_option.hpp"
 #include "../../tools/eval/run.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
@@ -63,27 +62,31 @@ struct Ranks {
 
 using Look = std::function<Status(const gsnav::World&)>;
 
+/// What a rank draws on. Ranks of one machine take its GPUs in turn, from the one that --device names.
+gsnav::Result<gsnav::Device> device_of(const Ranks& ranks, const gsnav::Device& named) {
+  if (named.kind() != gsnav::DeviceKind::cuda) return named;
+  const auto gpus = std::ranges::count_if(gsnav::Device::available(),
+                                          [](const std::string& d) { return d.starts_with("cuda"); });
+  return gsnav::Device::parse("cuda:" + std::to_string((named.index() + ranks.on_node) % gpus));
+}
+
 /// Draws the agent's sensors, as for a policy that looks. The policies here do not: the numbers are the
 /// same.
 gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o,
-                           const gsnav_eval::Stage& stage, const std::string& backend) {
-  if (backend == "none") return Look{};
-  const auto gpus = std::ranges::count_if(gsnav::Device::available(),
-                                          [](const std::string& d) { return d.starts_with("cuda"); });
-  const auto device = backend == "cuda" && gpus > 0
-                          ? gsnav::Device::parse("cuda:" + std::to_string(ranks.on_node % gpus))
-                          : gsnav_tools::device_of(backend, o.threads);
+                           const gsnav_eval::Stage& stage, bool draw) {
+  if (!draw) return Look{};
+  const auto device = device_of(ranks, o.device);
   if (!device) return device.status();
-  auto made = gsnav::DeviceSimulator::create(*device, stage.scene, stage.config);
+  auto made = gsnav::Simulator::create(*device, stage.scene, stage.config);
   if (!made) return made.status();
-  auto eye = std::make_shared<gsnav::DeviceSimulator>(std::move(*made));
+  auto eye = std::make_shared<gsnav::Simulator>(std::move(*made));
   return Look([eye](const gsnav::World& world) {
     if (Status s = eye->set_state(world.state()); !s) return s;
     return eye->observe().status();
   });
 }
 
-Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& backend) {
+Status run(const Ranks& ranks, const gsnav_eval::Options& o, bool draw) {
   if (Status s = gsnav::make_output_folder(o.out); !s) return s;
   if (Status s = gsnav_eval::Journal::check_options(o.out, o); !s) return s;
   const auto stage = gsnav_eval::prepare(o);
@@ -103,7 +106,7 @@ Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& 
 
   auto world = gsnav_eval::make_world(*stage);
   if (!world) return world.status();
-  const auto look = looker(ranks, o, *stage, backend);
+  const auto look = looker(ranks, o, *stage, draw);
   if (!look) return look.status();
   std::string lines;
   for (std::size_t k = static_cast<std::size_t>(ranks.rank); k < missing.size();
@@ -137,19 +140,16 @@ Status run(const Ranks& ranks, const gsnav_eval::Options& o, const std::string& 
 int main(int argc, char** argv) {
   const Ranks ranks(&argc, &argv);
   gsnav_eval::Options o;
-  std::string backend = "none";
+  bool draw = false;
   CLI::App app{
       "Evaluates a policy over MPI ranks, to the journal of gsnav-eval, which makes the page of it."};
   gsnav_eval::add_world_options(app, o);
-  app.add_option(
-         "--draw", backend,
-         "what the agent sees at each step, by openmp or by cuda (one GPU a rank); none: nothing")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"none", "openmp", "cuda"}));
+  app.add_flag("--draw", draw,
+               "draw what the agent sees at each step; ranks of a machine take its GPUs in turn");
   CLI11_PARSE(app, argc, argv);
   Status s;
   try {
-    s = run(ranks, o, backend);
+    s = run(ranks, o, draw);
   } catch (const std::exception& e) {
     s = {gsnav::Errc::out_of_memory, e.what()};
   }

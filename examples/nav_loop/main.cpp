@@ -24,7 +24,7 @@ double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
 }
 
-Status run(const gsnav::Device& device, const Options& options) {
+Status run(const Options& options) {
   Recorder recorder(options);
   if (Status s = recorder.open(); !s) return s;
   auto prepared = prepare(options);
@@ -42,7 +42,7 @@ Status run(const gsnav::Device& device, const Options& options) {
   config.visible_sets = options.visible_sets;
   const auto episodes = make_episodes(options, setup.scene, config.task);
   if (!episodes) return episodes.status();
-  auto made = gsnav::DeviceSimulator::create(device, setup.scene, config);
+  auto made = gsnav::Simulator::create(options.device, setup.scene, config);
   if (!made) return made.status();
   auto& sim = *made;
 
@@ -92,7 +92,7 @@ Status run(const gsnav::Device& device, const Options& options) {
   if (Status s = recorder.finish(setup.scene); !s) return s;
   print_table(options, setup.facts, records, t);
   if (Status s = write_json(options.out + "/metrics.json", options, setup.facts, records); !s) return s;
-  if (Status s = write_timings(options.out + "/timings.json", t); !s) return s;
+  if (Status s = write_timings(options.out + "/timings.json", options.device, t); !s) return s;
   std::printf("Pictures, metrics.json and timings.json are in %s\n",
               gsnav::printable(options.out).c_str());
   return {};
@@ -103,9 +103,6 @@ Status run(const gsnav::Device& device, const Options& options) {
 
 int main(int argc, char** argv) try {
   nav_loop::Options o;
-#if !defined(NAV_LOOP_OPENMP)
-  o.backend = "serial";
-#endif
   CLI::App app{
       "Runs PointNav episodes in a scene of Gaussians with people walking in it, and writes frames, a "
       "strip, a\n"
@@ -122,12 +119,7 @@ int main(int argc, char** argv) try {
   app.add_option("--episodes", o.episodes, "episodes to run")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
-  app.add_option("--backend", o.backend, "what renders")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"serial", "openmp", "cuda"}));
-  app.add_option("--threads", o.threads, "threads of the openmp backend, 0: all")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
+  gsnav_tools::add_device_option(app, o.device);
   app.add_option("--seed", o.seed, "decides episodes and ways; the same seed gives the same run")
       ->capture_default_str();
   app.add_option("--out", o.out, "folder for everything written; made where missing")
@@ -181,8 +173,7 @@ int main(int argc, char** argv) try {
     return 2;
   }
 
-  const auto device = gsnav_tools::device_of(o.backend, o.threads);
-  const gsnav::Status s = device ? nav_loop::run(*device, o) : device.status();
+  const gsnav::Status s = nav_loop::run(o);
   if (!s) std::fprintf(stderr, "nav_loop: %s\n", s.message().c_str());
   return s ? 0 : 1;
 } catch (const std::exception& e) {

@@ -6,6 +6,7 @@
 
 #include "../../tools/common/navmesh_options.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/device/device.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 
@@ -18,8 +19,7 @@ struct Options : NavMeshOptions {
   std::string up = "y";
   int avatars = 3;
   int episodes = 10;
-  std::string backend = "openmp";
-  int threads = 0;
+  gsnav::Device device;  ///< what renders
   std::uint64_t seed = 1;
   std::string out = "out";
   int width = 256, height = 256;

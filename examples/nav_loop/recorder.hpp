@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 #include "map.hpp"
 #include "options.hpp"
 

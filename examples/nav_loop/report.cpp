@@ -49,10 +49,9 @@ void print_table(const Options& options, const SceneFacts& facts,
   const gsnav::MetricsSummary s = gsnav::summarize(metrics);
   std::size_t pushed = 0;
   for (const EpisodeRecord& r : records) pushed += r.pushed ? 1 : 0;
-  std::printf(
-      "\n%s: %zu Gaussians, %d avatars (%zu Gaussians each), NavMesh %.1f m2 (%s), backend %s\n\n",
-      facts.name.c_str(), facts.gaussians, options.avatars, facts.avatar_gaussians, facts.area,
-      facts.navmesh_source.c_str(), facts.backend.c_str());
+  std::printf("\n%s: %zu Gaussians, %d avatars (%zu Gaussians each), NavMesh %.1f m2 (%s), on %s\n\n",
+              facts.name.c_str(), facts.gaussians, options.avatars, facts.avatar_gaussians, facts.area,
+              facts.navmesh_source.c_str(), options.device.name().c_str());
   std::printf("  %-34s %10zu\n", "episodes", s.episodes);
   const auto row = [](const char* name, double v, const char* format = "%10.3f") {
     std::printf("  %-34s ", name);
@@ -86,12 +85,17 @@ gsnav::Status write_json(const std::string& path, const Options& o, const SceneF
   nlohmann::ordered_json j;
   j["gsnav"] = std::to_string(GSNAV_VERSION_MAJOR) + "." + std::to_string(GSNAV_VERSION_MINOR) + "." +
                std::to_string(GSNAV_VERSION_PATCH);
-  j["config"] = {{"scene", f.name},      {"up", o.up},
-                 {"avatars", o.avatars}, {"episodes", o.episodes},
-                 {"backend", f.backend}, {"seed", o.seed},
-                 {"width", o.width},     {"height", o.height},
-                 {"hfov", o.hfov},       {"eye_height", o.eye_height},
-                 {"profile", o.profile}, {"max_steps", o.max_steps}};
+  j["config"] = {{"scene", f.name},
+                 {"up", o.up},
+                 {"avatars", o.avatars},
+                 {"episodes", o.episodes},
+                 {"seed", o.seed},
+                 {"width", o.width},
+                 {"height", o.height},
+                 {"hfov", o.hfov},
+                 {"eye_height", o.eye_height},
+                 {"profile", o.profile},
+                 {"max_steps", o.max_steps}};
   j["scene"] = {{"gaussians", f.gaussians},
                 {"avatar_gaussians", f.avatar_gaussians},
                 {"navmesh", f.navmesh_source},
@@ -114,8 +118,9 @@ gsnav::Status write_json(const std::string& path, const Options& o, const SceneF
   return gsnav::replace_file(path, j.dump(2) + "\n");
 }
 
-gsnav::Status write_timings(const std::string& path, const Timings& t) {
-  const nlohmann::ordered_json j{{"load_s", t.load},
+gsnav::Status write_timings(const std::string& path, const gsnav::Device& device, const Timings& t) {
+  const nlohmann::ordered_json j{{"device", device.description()},
+                                 {"load_s", t.load},
                                  {"navmesh_s", t.navmesh},
                                  {"physics_ms_per_step", 1e3 * per(t.physics, t.steps)},
                                  {"render_ms", 1e3 * per(t.render, t.renders)},

@@ -20,7 +20,6 @@ struct Timings {
 /// What the report says about where the run took place.
 struct SceneFacts {
   std::string name;
-  std::string backend;
   std::string navmesh_source;
   std::size_t gaussians = 0, avatar_gaussians = 0;
   std::size_t navmesh_polygons = 0, islands = 0;
@@ -52,7 +51,8 @@ void print_table(const Options& options, const SceneFacts& facts,
 /// naming the path.
 gsnav::Status write_json(const std::string& path, const Options& options, const SceneFacts& facts,
                          const std::vector<EpisodeRecord>& records);
-/// Writes timings.json: seconds and milliseconds of this run. Errors likewise.
-gsnav::Status write_timings(const std::string& path, const Timings& timings);
+/// Writes timings.json: the device, seconds and milliseconds of this run. Errors likewise.
+gsnav::Status write_timings(const std::string& path, const gsnav::Device& device,
+                            const Timings& timings);
 
 }  // namespace nav_loop

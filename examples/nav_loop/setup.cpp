@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <optional>
 
-#include "../../tools/common/device_option.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/io.hpp"
@@ -30,9 +29,7 @@ double seconds_since(Clock::time_point t) {
 
 /// Levels of detail: those beside the scene's file, or built; the embedded flat's are built.
 Result<gsnav::LodTree> levels_of(const Options& options, const gsnav::GaussianCloud& cloud) {
-  const auto device = gsnav_tools::device_of(options.backend, options.threads);
-  if (!device) return device.status();
-  const auto build = [&] { return gsnav::build_lod(*device, cloud); };
+  const auto build = [&] { return gsnav::build_lod(options.device, cloud); };
   if (options.scene.empty()) return build();
   auto cached = gsnav::io::cached_lod(options.scene, cloud, {}, build);
   if (!cached) return cached.status();
@@ -51,10 +48,8 @@ Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::
   const double heights[] = {options.eye_height};
   const auto viewpoints = gsnav::navmesh_viewpoints(navmesh, heights, settings.spacing());
   if (!viewpoints) return viewpoints.status();
-  const auto device = gsnav_tools::device_of(options.backend, options.threads);
-  if (!device) return device.status();
   const auto build = [&] {
-    return gsnav::build_visible_sets(*device, *asset.cloud, *viewpoints, settings,
+    return gsnav::build_visible_sets(options.device, *asset.cloud, *viewpoints, settings,
                                      asset.world_from_asset);
   };
   if (options.scene.empty()) return build();
@@ -79,7 +74,6 @@ std::vector<gsnav::SensorSpec> sensors_of(const Options& options) {
 
 Result<Setup> prepare(const Options& options) {
   Setup setup;
-  setup.facts.backend = options.backend;
   setup.facts.name = options.scene.empty() ? "embedded flat" : options.scene;
   std::vector<Vec3d> vertices;
   std::vector<gsnav::NavMesh::Triangle> triangles;

@@ -2,8 +2,8 @@
 #pragma once
 
 // Scenes and images: clouds of Gaussians, meshes, cameras, and the renderer on a device chosen at run
-// time. Link gsnav::device. A backend of your own: scene/renderer.hpp. What is made of a cloud before it
-// is drawn: scene/prepare.hpp.
+// time. Link gsnav::device. BasicRenderer, over a backend of your choice: scene/basic_renderer.hpp. What
+// is made of a cloud before it is drawn: scene/prepare.hpp.
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/frame/color_space.hpp"

@@ -2,7 +2,8 @@
 #pragma once
 
 // The simulator on a device chosen at run time: scenes, sensors, actions, episodes, metrics, people and
-// batches. Link gsnav::device. On a backend of your own: sim/simulator.hpp and sim/batch.hpp.
+// batches. Link gsnav::device. BasicSimulator and BasicBatchSimulator, over a backend of your choice:
+// sim/basic_simulator.hpp and sim/basic_batch.hpp.
 
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/body_cache.hpp"

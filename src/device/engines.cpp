@@ -39,122 +39,119 @@ auto on_engine(const std::unique_ptr<Engine>& engine, const char* what, F&& f) -
 
 }  // namespace
 
-// ---- DeviceRenderer
+// ---- Renderer
 
-DeviceRenderer::DeviceRenderer(const Device& device,
-                               std::unique_ptr<detail::RendererEngine> engine) noexcept
+Renderer::Renderer(const Device& device, std::unique_ptr<detail::RendererEngine> engine) noexcept
     : device_(device), engine_(std::move(engine)) {}
-DeviceRenderer::DeviceRenderer(DeviceRenderer&&) noexcept = default;
-DeviceRenderer& DeviceRenderer::operator=(DeviceRenderer&&) noexcept = default;
-DeviceRenderer::~DeviceRenderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+Renderer::~Renderer() = default;
 
-Result<DeviceRenderer> DeviceRenderer::create(const Device& device,
-                                              std::shared_ptr<const SimulatorScene> scene,
-                                              RenderOptions options) {
-  if (scene == nullptr) return {Errc::invalid_argument, "DeviceRenderer: the scene is null"};
+Result<Renderer> Renderer::create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
+                                  RenderOptions options) {
+  if (scene == nullptr) return {Errc::invalid_argument, "Renderer: the scene is null"};
   if (Status s = validate_assets(*scene); !s) return s;
   if (Status s = validate(options.render); !s) return s;
   if (Status s = validate_detail(*scene, options.detail); !s) return s;
-  return detail::guarded([&]() -> Result<DeviceRenderer> {
+  return detail::guarded([&]() -> Result<Renderer> {
     const auto engines = engines_of(device);
     if (!engines) return engines.status();
-    return DeviceRenderer(device, (*engines)->renderer(device, std::move(scene), options));
+    return Renderer(device, (*engines)->renderer(device, std::move(scene), options));
   });
 }
-Result<DeviceRenderer> DeviceRenderer::create(const Device& device, GaussianCloud cloud,
-                                              RenderOptions options) {
+Result<Renderer> Renderer::create(const Device& device, GaussianCloud cloud, RenderOptions options) {
   SimulatorScene scene;
   scene.assets.push_back({std::make_shared<const GaussianCloud>(std::move(cloud))});
   return create(device, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(options));
 }
 
-Status DeviceRenderer::render(std::span<const Camera> cameras, Frames<float>& out, double time) {
-  return on_engine(engine_, "DeviceRenderer",
-                   [&](auto& engine) { return engine.render(cameras, time, out); });
+Status Renderer::render(std::span<const Camera> cameras, Frames<float>& out, double time) {
+  return on_engine(engine_, "Renderer", [&](auto& engine) { return engine.render(cameras, time, out); });
 }
-Result<Frames<float>> DeviceRenderer::render(std::span<const Camera> cameras, double time) {
+Result<Frames<float>> Renderer::render(std::span<const Camera> cameras, double time) {
   Frames<float> frames;
   if (Status s = render(cameras, frames, time); !s) return s;
   return frames;
 }
-Result<Frames<float>> DeviceRenderer::render(const Camera& camera, double time) {
+Result<Frames<float>> Renderer::render(const Camera& camera, double time) {
   return render(std::span(&camera, 1), time);
 }
-Status DeviceRenderer::set_config(const RenderConfig& config) {
-  if (engine_ == nullptr) return moved_from("DeviceRenderer");
+Status Renderer::set_config(const RenderConfig& config) {
+  if (engine_ == nullptr) return moved_from("Renderer");
   if (Status s = validate(config); !s) return s;
   engine_->set_config(config);
   return {};
 }
+Status Renderer::set_light(const MeshLight& light) {
+  if (engine_ == nullptr) return moved_from("Renderer");
+  engine_->set_light(light);
+  return {};
+}
 
-// ---- DeviceSimulator
+// ---- Simulator
 
-DeviceSimulator::DeviceSimulator(const Device& device,
-                                 std::unique_ptr<detail::SimulatorEngine> engine) noexcept
+Simulator::Simulator(const Device& device, std::unique_ptr<detail::SimulatorEngine> engine) noexcept
     : device_(device), engine_(std::move(engine)) {}
-DeviceSimulator::DeviceSimulator(DeviceSimulator&&) noexcept = default;
-DeviceSimulator& DeviceSimulator::operator=(DeviceSimulator&&) noexcept = default;
-DeviceSimulator::~DeviceSimulator() = default;
+Simulator::Simulator(Simulator&&) noexcept = default;
+Simulator& Simulator::operator=(Simulator&&) noexcept = default;
+Simulator::~Simulator() = default;
 
-Result<DeviceSimulator> DeviceSimulator::create(const Device& device,
-                                                std::shared_ptr<const SimulatorScene> scene,
-                                                SimulatorConfig config, World::BodySource others) {
-  return detail::guarded([&]() -> Result<DeviceSimulator> {
+Result<Simulator> Simulator::create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
+                                    SimulatorConfig config, World::BodySource others) {
+  return detail::guarded([&]() -> Result<Simulator> {
     const auto engines = engines_of(device);
     if (!engines) return engines.status();
     auto engine = (*engines)->simulator(device, std::move(scene), std::move(config), std::move(others));
     if (!engine) return engine.status();
-    return DeviceSimulator(device, std::move(*engine));
+    return Simulator(device, std::move(*engine));
   });
 }
-Result<DeviceSimulator> DeviceSimulator::create(const Device& device, SimulatorScene scene,
-                                                SimulatorConfig config) {
+Result<Simulator> Simulator::create(const Device& device, SimulatorScene scene, SimulatorConfig config) {
   return create(device, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(config));
 }
 
-Result<Observations> DeviceSimulator::reset(const PointNavEpisode& episode) {
-  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.reset(episode); });
+Result<Observations> Simulator::reset(const PointNavEpisode& episode) {
+  return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.reset(episode); });
 }
-Result<Observations> DeviceSimulator::step(Action action) {
-  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.step(action); });
+Result<Observations> Simulator::step(Action action) {
+  return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.step(action); });
 }
-Result<Observations> DeviceSimulator::step(const VelocityCommand& command) {
-  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.step(command); });
+Result<Observations> Simulator::step(const VelocityCommand& command) {
+  return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.step(command); });
 }
-Result<Observations> DeviceSimulator::observe() {
-  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.observe(); });
+Result<Observations> Simulator::observe() {
+  return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.observe(); });
 }
-bool DeviceSimulator::done() const noexcept { return engine_ == nullptr || world().done(); }
-EpisodeMetrics DeviceSimulator::metrics() const { return world().metrics(); }
-const World& DeviceSimulator::world() const noexcept { return engine_->world(); }
-const SimulatorScene& DeviceSimulator::scene() const noexcept { return engine_->scene(); }
-const SimulatorConfig& DeviceSimulator::config() const noexcept { return engine_->config(); }
-Status DeviceSimulator::set_state(const WorldState& state) {
-  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.set_state(state); });
+bool Simulator::done() const noexcept { return engine_ == nullptr || world().done(); }
+EpisodeMetrics Simulator::metrics() const { return world().metrics(); }
+const World& Simulator::world() const noexcept { return engine_->world(); }
+const SimulatorScene& Simulator::scene() const noexcept { return engine_->scene(); }
+const SimulatorConfig& Simulator::config() const noexcept { return engine_->config(); }
+Status Simulator::set_state(const WorldState& state) {
+  return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.set_state(state); });
 }
-Status DeviceSimulator::set_agent(const Vec3d& position, double yaw, double pitch) {
-  return on_engine(engine_, "DeviceSimulator",
+Status Simulator::set_agent(const Vec3d& position, double yaw, double pitch) {
+  return on_engine(engine_, "Simulator",
                    [&](auto& engine) { return engine.set_agent(position, yaw, pitch); });
 }
-void DeviceSimulator::set_seed(std::uint64_t seed) noexcept { engine_->set_seed(seed); }
-void DeviceSimulator::set_rendering(bool on) noexcept { engine_->set_rendering(on); }
-std::size_t DeviceSimulator::render_count() const noexcept { return engine_->render_count(); }
-Result<const Frames<float>*> DeviceSimulator::render(const Camera& camera, unsigned outputs) {
-  return on_engine(engine_, "DeviceSimulator",
-                   [&](auto& engine) { return engine.render(camera, outputs); });
+void Simulator::set_seed(std::uint64_t seed) noexcept { engine_->set_seed(seed); }
+void Simulator::set_rendering(bool on) noexcept { engine_->set_rendering(on); }
+std::size_t Simulator::render_count() const noexcept { return engine_->render_count(); }
+Result<const Frames<float>*> Simulator::render(const Camera& camera, unsigned outputs) {
+  return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.render(camera, outputs); });
 }
-Result<std::span<const Observation>> DeviceSimulator::goal_images() {
-  return on_engine(engine_, "DeviceSimulator", [&](auto& engine) { return engine.goal_images(); });
+Result<std::span<const Observation>> Simulator::goal_images() {
+  return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.goal_images(); });
 }
 
-// ---- DeviceBatchSimulator
+// ---- BatchSimulator
 
-DeviceBatchSimulator::DeviceBatchSimulator(const Device& device,
-                                           std::unique_ptr<detail::BatchEngine> engine) noexcept
+BatchSimulator::BatchSimulator(const Device& device,
+                               std::unique_ptr<detail::BatchEngine> engine) noexcept
     : device_(device), engine_(std::move(engine)) {}
-DeviceBatchSimulator::DeviceBatchSimulator(DeviceBatchSimulator&&) noexcept = default;
-DeviceBatchSimulator& DeviceBatchSimulator::operator=(DeviceBatchSimulator&&) noexcept = default;
-DeviceBatchSimulator::~DeviceBatchSimulator() = default;
+BatchSimulator::BatchSimulator(BatchSimulator&&) noexcept = default;
+BatchSimulator& BatchSimulator::operator=(BatchSimulator&&) noexcept = default;
+BatchSimulator::~BatchSimulator() = default;
 
 namespace {
 
@@ -168,45 +165,47 @@ Result<std::unique_ptr<detail::BatchEngine>> make_batch(const Device& device, de
 
 }  // namespace
 
-Result<DeviceBatchSimulator> DeviceBatchSimulator::create(
-    const Device& device, std::vector<std::shared_ptr<const SimulatorScene>> scenes, BatchConfig config,
-    std::size_t environments, EpisodeSource next_episode) {
+Result<BatchSimulator> BatchSimulator::create(const Device& device,
+                                              std::vector<std::shared_ptr<const SimulatorScene>> scenes,
+                                              BatchConfig config, std::size_t environments,
+                                              EpisodeSource next_episode) {
   auto engine = make_batch(
       device, {std::move(scenes), nullptr, std::move(config), environments, std::move(next_episode)});
   if (!engine) return engine.status();
-  return DeviceBatchSimulator(device, std::move(*engine));
+  return BatchSimulator(device, std::move(*engine));
 }
-Result<DeviceBatchSimulator> DeviceBatchSimulator::create_from_library(
-    const Device& device, std::shared_ptr<SceneLibrary> library, BatchConfig config,
-    std::size_t environments, EpisodeSource next_episode) {
+Result<BatchSimulator> BatchSimulator::create_from_library(const Device& device,
+                                                           std::shared_ptr<SceneLibrary> library,
+                                                           BatchConfig config, std::size_t environments,
+                                                           EpisodeSource next_episode) {
   if (library == nullptr)
-    return {Errc::invalid_argument, "DeviceBatchSimulator: the library of scenes is null"};
+    return {Errc::invalid_argument, "BatchSimulator: the library of scenes is null"};
   auto engine = make_batch(
       device, {{}, std::move(library), std::move(config), environments, std::move(next_episode)});
   if (!engine) return engine.status();
-  return DeviceBatchSimulator(device, std::move(*engine));
+  return BatchSimulator(device, std::move(*engine));
 }
 
-std::size_t DeviceBatchSimulator::environments() const noexcept {
+std::size_t BatchSimulator::environments() const noexcept {
   return engine_ == nullptr ? 0 : engine_->environments();
 }
-const World& DeviceBatchSimulator::world(std::size_t environment) const noexcept {
+const World& BatchSimulator::world(std::size_t environment) const noexcept {
   return engine_->world(environment);
 }
-std::size_t DeviceBatchSimulator::scene_of(std::size_t environment) const noexcept {
+std::size_t BatchSimulator::scene_of(std::size_t environment) const noexcept {
   return engine_->scene_of(environment);
 }
-Result<BatchStep> DeviceBatchSimulator::reset(std::span<const std::uint8_t> mask) {
-  return on_engine(engine_, "DeviceBatchSimulator", [&](auto& engine) { return engine.reset(mask); });
+Result<BatchStep> BatchSimulator::reset(std::span<const std::uint8_t> mask) {
+  return on_engine(engine_, "BatchSimulator", [&](auto& engine) { return engine.reset(mask); });
 }
-Result<BatchStep> DeviceBatchSimulator::step(std::span<const Action> actions) {
-  return on_engine(engine_, "DeviceBatchSimulator", [&](auto& engine) { return engine.step(actions); });
+Result<BatchStep> BatchSimulator::step(std::span<const Action> actions) {
+  return on_engine(engine_, "BatchSimulator", [&](auto& engine) { return engine.step(actions); });
 }
-Result<BatchStep> DeviceBatchSimulator::step(std::span<const VelocityCommand> commands) {
-  return on_engine(engine_, "DeviceBatchSimulator", [&](auto& engine) { return engine.step(commands); });
+Result<BatchStep> BatchSimulator::step(std::span<const VelocityCommand> commands) {
+  return on_engine(engine_, "BatchSimulator", [&](auto& engine) { return engine.step(commands); });
 }
-std::size_t DeviceBatchSimulator::render_count() const noexcept { return engine_->render_count(); }
-std::size_t DeviceBatchSimulator::pose_count() const noexcept { return engine_->pose_count(); }
-void DeviceBatchSimulator::set_rendering(bool on) noexcept { engine_->set_rendering(on); }
+std::size_t BatchSimulator::render_count() const noexcept { return engine_->render_count(); }
+std::size_t BatchSimulator::pose_count() const noexcept { return engine_->pose_count(); }
+void BatchSimulator::set_rendering(bool on) noexcept { engine_->set_rendering(on); }
 
 }  // namespace gsnav

@@ -21,6 +21,7 @@ class RendererEngine {
   virtual ~RendererEngine() = default;
   virtual Status render(std::span<const Camera> cameras, double time, Frames<float>& out) = 0;
   virtual void set_config(const RenderConfig& config) = 0;
+  virtual void set_light(const MeshLight& light) = 0;
 };
 
 class SimulatorEngine {

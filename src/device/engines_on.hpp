@@ -11,8 +11,8 @@
 #include "engines.hpp"
 #include "gsnav/detail/sim/image_renderer.hpp"
 #include "gsnav/detail/sim/scene_on_backend.hpp"
-#include "gsnav/sim/batch.hpp"
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/basic_batch.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 
 // The engines on a backend B. Each has a backend of its own; `MakeBackend` makes one of a Device.
 
@@ -25,21 +25,26 @@ class RendererOn final : public RendererEngine {
              const RenderOptions& options)
       : backend_(std::move(backend)),
         scene_(*backend_, std::move(scene), options.detail),
-        images_(*backend_) {
+        images_(*backend_),
+        light_(scene_.meshes().light) {
     set_config(options.render);
   }
 
   void set_config(const RenderConfig& config) override { config_ = scene_.render_config(config); }
+  void set_light(const MeshLight& light) override { light_ = light; }
 
   Status render(std::span<const Camera> cameras, double time, Frames<float>& out) override {
-    if (Status s = Renderer<float, B>::size_frames(cameras, config_.outputs, out); !s) return s;
+    if (Status s = BasicRenderer<float, B>::size_frames(cameras, config_.outputs, out); !s) return s;
     scene_.make_slots(1);
     if (Status s = scene_.prepare(0, time, cameras, config_); !s) return s;
     if (Status s = scene_.pose_prepared(0); !s) return s;
     requests_.clear();
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      requests_.push_back({{scene_.sets(0), &cameras[c], &config_, Renderer<float, B>::images_of(out, c),
-                            scene_.meshes()},
+      requests_.push_back({{scene_.sets(0),
+                            &cameras[c],
+                            &config_,
+                            BasicRenderer<float, B>::images_of(out, c),
+                            {scene_.meshes().instances, light_}},
                            scene_.detail()});
     }
     if (Status s = images_.render(requests_, ImageMemory::host); !s) return s;
@@ -51,6 +56,7 @@ class RendererOn final : public RendererEngine {
   std::unique_ptr<B> backend_;
   SceneOnBackend<B> scene_;
   ImageRenderer<B> images_;
+  MeshLight light_;
   RenderConfig config_;
   std::vector<ImageRequest> requests_;
 };
@@ -58,7 +64,7 @@ class RendererOn final : public RendererEngine {
 template <class B>
 class SimulatorOn final : public SimulatorEngine {
  public:
-  SimulatorOn(std::unique_ptr<B> backend, Simulator<B> simulator)
+  SimulatorOn(std::unique_ptr<B> backend, BasicSimulator<B> simulator)
       : backend_(std::move(backend)), sim_(std::move(simulator)) {}
 
   Result<Observations> reset(const PointNavEpisode& episode) override { return sim_.reset(episode); }
@@ -82,13 +88,13 @@ class SimulatorOn final : public SimulatorEngine {
 
  private:
   std::unique_ptr<B> backend_;
-  Simulator<B> sim_;
+  BasicSimulator<B> sim_;
 };
 
 template <class B>
 class BatchOn final : public BatchEngine {
  public:
-  BatchOn(std::unique_ptr<B> backend, BatchSimulator<B> simulator)
+  BatchOn(std::unique_ptr<B> backend, BasicBatchSimulator<B> simulator)
       : backend_(std::move(backend)), sim_(std::move(simulator)) {}
 
   std::size_t environments() const noexcept override { return sim_.environments(); }
@@ -107,7 +113,7 @@ class BatchOn final : public BatchEngine {
 
  private:
   std::unique_ptr<B> backend_;
-  BatchSimulator<B> sim_;
+  BasicBatchSimulator<B> sim_;
 };
 
 /// `make`: a std::unique_ptr<B> of a Device.
@@ -122,19 +128,20 @@ constexpr EngineFactory engines_on() {
          World::BodySource others) -> Result<std::unique_ptr<SimulatorEngine>> {
         std::unique_ptr<B> backend = make(device);
         auto sim =
-            Simulator<B>::create(*backend, std::move(scene), std::move(config), std::move(others));
+            BasicSimulator<B>::create(*backend, std::move(scene), std::move(config), std::move(others));
         if (!sim) return sim.status();
         return std::unique_ptr<SimulatorEngine>(
             std::make_unique<SimulatorOn<B>>(std::move(backend), std::move(*sim)));
       },
       [](const Device& device, BatchParts p) -> Result<std::unique_ptr<BatchEngine>> {
         std::unique_ptr<B> backend = make(device);
-        auto sim = p.library != nullptr
-                       ? BatchSimulator<B>::create_from_library(*backend, std::move(p.library),
-                                                                std::move(p.config), p.environments,
-                                                                std::move(p.next_episode))
-                       : BatchSimulator<B>::create(*backend, std::move(p.scenes), std::move(p.config),
-                                                   p.environments, std::move(p.next_episode));
+        auto sim =
+            p.library != nullptr
+                ? BasicBatchSimulator<B>::create_from_library(*backend, std::move(p.library),
+                                                              std::move(p.config), p.environments,
+                                                              std::move(p.next_episode))
+                : BasicBatchSimulator<B>::create(*backend, std::move(p.scenes), std::move(p.config),
+                                                 p.environments, std::move(p.next_episode));
         if (!sim) return sim.status();
         return std::unique_ptr<BatchEngine>(
             std::make_unique<BatchOn<B>>(std::move(backend), std::move(*sim)));

@@ -6,9 +6,15 @@
 #include <span>
 #include <string>
 
+#include "gsnav/detail/scene/needed_bands.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav {
+
+SortOrder SceneAsset::sort_order() const noexcept {
+  return packed != nullptr ? packed->rest.sort_order : cloud->sort_order;
+}
 
 Status validate(const SimulatorScene& scene) {
   if (scene.navmesh == nullptr) return {Errc::invalid_argument, "SimulatorScene.navmesh is null"};
@@ -17,9 +23,16 @@ Status validate(const SimulatorScene& scene) {
 
 Status validate_assets(const SimulatorScene& scene) {
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
-    if (scene.assets[i].cloud == nullptr) {
-      return {Errc::invalid_argument, "SimulatorScene.assets[" + std::to_string(i) + "].cloud is null"};
-    }
+    const SceneAsset& a = scene.assets[i];
+    const auto bad = [i](const char* what) {
+      return Status(Errc::invalid_argument, "SimulatorScene.assets[" + std::to_string(i) + "]." + what);
+    };
+    if (a.cloud == nullptr && a.packed == nullptr) return bad("cloud is null");
+    if (a.cloud != nullptr && a.packed != nullptr)
+      return bad("packed is there and cloud too: one is drawn");
+    const std::size_t chunks = (a.packed != nullptr ? a.packed->view() : a.cloud->view()).chunk_count();
+    if (a.profile != nullptr && a.profile->chunk_sh_degrees.size() != chunks)
+      return bad("profile is of another cloud");
   }
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     if (scene.meshes[i].surface == nullptr) {
@@ -40,6 +53,9 @@ Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice) 
       return Status(Errc::invalid_argument, "SimulatorConfig." + field + ": SimulatorScene.assets[" +
                                                 std::to_string(i) + "]." + what);
     };
+    if (a.packed != nullptr && (choice.lod || choice.visible_sets)) {
+      return bad(choice.lod ? "lod" : "visible_sets", "packed: only `cloud` can be drawn so");
+    }
     if (choice.visible_sets &&
         (a.visible == nullptr || a.visible->cloud_chunks != a.cloud->view().chunk_count())) {
       return bad("visible_sets",

@@ -40,7 +40,8 @@ Result<SimulatorScene> load(const SceneEntry& entry) {
 std::size_t scene_bytes(const SimulatorScene& scene) noexcept {
   std::size_t sum = 0;
   for (const SceneAsset& a : scene.assets) {
-    sum += cloud_bytes(*a.cloud) + (a.visible != nullptr ? a.visible->bytes() : 0);
+    sum += a.packed != nullptr ? a.packed->bytes() : cloud_bytes(*a.cloud);
+    sum += a.visible != nullptr ? a.visible->bytes() : 0;
   }
   const AvatarAsset* last = nullptr;
   for (const AvatarActor& a : scene.avatars) {

@@ -15,7 +15,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/avatar/mesh_avatar.hpp"
 #include "gsnav/detail/avatar/mesh_surface.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -70,7 +70,7 @@ Comparison compare(const SkinnedMesh& mesh, const AvatarAsset& asset, const Loca
   skin.pose(actor, 0).throw_if_error();
   RenderConfig config;
   config.outputs = kRgb | kAlpha | kMedianDepth;
-  Renderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
   const auto frame = renderer.render(skin.set(), camera).value();
   auto vertices = skinned_vertices(mesh, times_binds(mesh.skeleton, joints_at(mesh.skeleton, pose)));
   for (Vec3d& v : vertices) v += pose.root;

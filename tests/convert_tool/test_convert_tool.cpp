@@ -187,7 +187,7 @@ TEST_CASE("convert: a format that is drawn in another order is judged as it is d
     RenderConfig config;
     config.sort_order = cloud.sort_order;
     std::vector<float> rgb;
-    Renderer<float, SerialBackend> renderer(backend, config);
+    BasicRenderer<float, SerialBackend> renderer(backend, config);
     for (const Camera& c : cameras) {
       const auto frame = renderer.render(cloud.set(), c).value();
       rgb.insert(rgb.end(), frame.rgb.begin(), frame.rgb.end());

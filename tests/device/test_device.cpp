@@ -9,16 +9,20 @@
 
 #include "doctest/doctest.h"
 #include "gsnav/backends/serial.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 #include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/people.hpp"
-#include "gsnav/sim/simulator.hpp"
+#include "sim/mesh_box.hpp"
+#include "support/scenes.hpp"
 
 using namespace gsnav;
+using namespace gsnav_test;
 
 namespace {
 
@@ -109,13 +113,13 @@ TEST_CASE("renderer: the bits of the template, on every device, with people at a
   SerialBackend backend;
   SceneOnBackend<SerialBackend> scene(backend, flat());
   REQUIRE(scene.pose(0, 1.5).ok());
-  Renderer<float, SerialBackend> renderer(backend, scene.render_config(options.render));
+  BasicRenderer<float, SerialBackend> renderer(backend, scene.render_config(options.render));
   const auto want = renderer.render(scene.sets(0), cameras).value();
   for (const Device& device : devices()) {
     CAPTURE(device.name());
-    auto made = DeviceRenderer::create(device, flat(), options);
+    auto made = Renderer::create(device, flat(), options);
     REQUIRE(made.ok());
-    DeviceRenderer moved = std::move(*made);
+    Renderer moved = std::move(*made);
     const auto got = moved.render(cameras, 1.5).value();
     CHECK(got.rgb == want.rgb);
     CHECK(got.alpha == want.alpha);
@@ -130,7 +134,7 @@ TEST_CASE("renderer: the bits of the template, on every device, with people at a
 
 TEST_CASE("renderer: a cloud alone, rules that change, errors that name what is wrong") {
   const GaussianCloud cloud = make_default_scene(0.05).value().cloud;
-  auto renderer = DeviceRenderer::create(Device(), cloud).value();
+  auto renderer = Renderer::create(Device(), cloud).value();
   const Camera camera = camera_in_flat(0);
   const auto frames = renderer.render(camera).value();
   CHECK(frames.rgb.size() == 48 * 32 * 3);
@@ -151,11 +155,80 @@ TEST_CASE("renderer: a cloud alone, rules that change, errors that name what is 
   const std::vector<Camera> sizes{camera, Camera::look_at({0, 1, 0}, {1, 1, 0}, {0, 1, 0}, 8, 8, 90)};
   CHECK(renderer.render(sizes).code() == Errc::invalid_argument);
   CHECK(renderer.render(std::span<const Camera>()).code() == Errc::invalid_argument);
-  CHECK(DeviceRenderer::create(Device(), std::shared_ptr<const SimulatorScene>()).code() ==
+  CHECK(Renderer::create(Device(), std::shared_ptr<const SimulatorScene>()).code() ==
         Errc::invalid_argument);
   RenderOptions lod;
   lod.detail.lod = LodChoice{};
-  CHECK(has(DeviceRenderer::create(Device(), flat(), lod).message(), "lod is null"));
+  CHECK(has(Renderer::create(Device(), flat(), lod).message(), "lod is null"));
+}
+
+TEST_CASE("renderer: packed clouds, bands of a profile and a light on meshes, on every device") {
+  GaussianCloud cloud = random_cloud(12, {.count = 2500});
+  sort_spatially(cloud);
+  SceneProfile bands;  // chunk c has the SH bands up to c % 4
+  for (std::size_t c = 0; c < cloud.view().chunk_count(); ++c)
+    bands.chunk_sh_degrees.push_back(static_cast<std::uint8_t>(c % 4));
+  SimulatorScene as_floats, as_packed;
+  as_floats.assets.push_back({std::make_shared<const GaussianCloud>(cloud)});
+  as_floats.assets[0].profile = std::make_shared<const SceneProfile>(bands);
+  as_packed.assets.push_back({});
+  as_packed.assets[0].packed = std::make_shared<const PackedCloud>(pack_cloud(cloud));
+  SceneMesh mesh = turned_box(0.6);
+  mesh.world_from_surface.translation = {0.3, -0.4, 3};
+  as_packed.meshes.push_back(mesh);
+  MeshLight light;
+  light.unlit = false;
+  light.direction = {0.2, -0.3, -1};
+
+  const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 48, 32, 70);
+  SerialBackend backend;
+  BasicRenderer<float, SerialBackend> renderer(backend);
+  const auto all_bands = renderer.render(cloud.set(), camera).value().rgb;
+  const auto some_bands = renderer.render(bands.applied_to(cloud.set()), camera).value().rgb;
+  REQUIRE(some_bands != all_bands);
+  const GaussianSet packed = as_packed.assets[0].packed->set();
+  const auto instances = mesh.surface->in_world(mesh.world_from_surface);
+  renderer.set_meshes(instances);
+  const auto unlit = renderer.render(packed, camera).value().rgb;
+  renderer.set_meshes(instances, light);
+  const auto lit = renderer.render(packed, camera).value().rgb;
+  REQUIRE(unlit != lit);
+  for (const Device& device : devices()) {
+    CAPTURE(device.name());
+    const auto draw = [&](const SimulatorScene& scene) {
+      return Renderer::create(device, std::make_shared<const SimulatorScene>(scene)).value();
+    };
+    CHECK(draw(as_floats).render(camera).value().rgb == some_bands);
+    Renderer of_packed = draw(as_packed);
+    CHECK(of_packed.render(camera).value().rgb == unlit);
+    REQUIRE(of_packed.set_light(light).ok());
+    CHECK(of_packed.render(camera).value().rgb == lit);
+    const Renderer moved = std::move(of_packed);
+    CHECK(of_packed.set_light(light).code() == Errc::invalid_argument);
+  }
+}
+
+TEST_CASE("renderer: assets that cannot be drawn so are named") {
+  const auto cloud = std::make_shared<const GaussianCloud>(random_cloud(12, {.count = 300}));
+  const auto message = [](SceneAsset asset, const RenderOptions& how = {}) {
+    SimulatorScene scene;
+    scene.assets.push_back(std::move(asset));
+    return Renderer::create(Device(), std::make_shared<const SimulatorScene>(std::move(scene)), how)
+        .message();
+  };
+  CHECK(has(message({}), "assets[0].cloud is null"));
+  SceneAsset asset{cloud};
+  asset.profile = std::make_shared<const SceneProfile>();
+  CHECK(has(message(asset), "assets[0].profile is of another cloud"));
+  asset = {cloud};
+  asset.packed = std::make_shared<const PackedCloud>(pack_cloud(*cloud));
+  CHECK(has(message(asset), "assets[0].packed"));
+  asset.cloud = nullptr;
+  RenderOptions how;
+  how.detail.visible_sets = true;
+  CHECK(has(message(asset, how), "visible_sets"));
+  how.detail.lod = LodChoice{};
+  CHECK(has(message(asset, how), "lod: SimulatorScene.assets[0].packed"));
 }
 
 TEST_CASE("simulator: the bits of the template, on every device") {
@@ -163,10 +236,10 @@ TEST_CASE("simulator: the bits of the template, on every device") {
   for (const Device& device : devices()) {
     CAPTURE(device.name());
     SerialBackend backend;
-    auto want = Simulator<SerialBackend>::create(backend, flat(), small_rgbd()).value();
-    auto made = DeviceSimulator::create(device, flat(), small_rgbd());
+    auto want = BasicSimulator<SerialBackend>::create(backend, flat(), small_rgbd()).value();
+    auto made = Simulator::create(device, flat(), small_rgbd());
     REQUIRE(made.ok());
-    DeviceSimulator sim = std::move(*made);
+    Simulator sim = std::move(*made);
     CHECK(sim.device() == device);
     CHECK(&sim.scene() == flat().get());
     const GeodesicFollower policy;
@@ -198,11 +271,10 @@ TEST_CASE("simulator: the bits of the template, on every device") {
 TEST_CASE("simulator: what is wrong is an error, never an exception") {
   SimulatorConfig config = small_rgbd();
   config.sensors[0].hfov = 500;
-  CHECK(has(DeviceSimulator::create(Device(), flat(), config).message(), "hfov"));
-  CHECK(
-      DeviceSimulator::create(Device(), std::shared_ptr<const SimulatorScene>(), small_rgbd()).code() ==
-      Errc::invalid_argument);
-  auto sim = DeviceSimulator::create(Device(), flat(), small_rgbd()).value();
+  CHECK(has(Simulator::create(Device(), flat(), config).message(), "hfov"));
+  CHECK(Simulator::create(Device(), std::shared_ptr<const SimulatorScene>(), small_rgbd()).code() ==
+        Errc::invalid_argument);
+  auto sim = Simulator::create(Device(), flat(), small_rgbd()).value();
   CHECK(sim.step(Action::move_forward).code() == Errc::invalid_argument);  // before reset
   CHECK(sim.set_agent({std::nan(""), 0, 0}, 0).code() == Errc::invalid_argument);
 }
@@ -217,9 +289,9 @@ TEST_CASE("batch simulator: the bits of the template, on every device") {
     CAPTURE(device.name());
     SerialBackend backend;
     auto want = make_batch_simulator(backend, {flat()}, config, 3, episode_of).value();
-    auto made = DeviceBatchSimulator::create(device, {flat()}, config, 3, episode_of);
+    auto made = BatchSimulator::create(device, {flat()}, config, 3, episode_of);
     REQUIRE(made.ok());
-    DeviceBatchSimulator sim = std::move(*made);
+    BatchSimulator sim = std::move(*made);
     REQUIRE(sim.environments() == 3);
     const auto check_steps = [](const BatchStep& a, const BatchStep& b) {
       CHECK(std::ranges::equal(a.rewards, b.rewards));
@@ -238,6 +310,6 @@ TEST_CASE("batch simulator: the bits of the template, on every device") {
     CHECK(made->reset().code() == Errc::invalid_argument);
     CHECK(sim.step(std::vector<Action>(2)).code() == Errc::invalid_argument);
   }
-  CHECK(DeviceBatchSimulator::create_from_library(Device(), nullptr, config, 1, episode_of).code() ==
+  CHECK(BatchSimulator::create_from_library(Device(), nullptr, config, 1, episode_of).code() ==
         Errc::invalid_argument);
 }

@@ -7,7 +7,7 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/detail/eval/oracle_photo.hpp"
 #include "gsnav/eval/oracle.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #if defined(_OPENMP)
 #include "gsnav/backends/openmp.hpp"
 #endif

@@ -199,7 +199,7 @@ TEST_CASE("oracle: the renderer in double gives the same image to rounding") {
     rules.quality.max_sh_degree = 1;
     if (sort == SortOrder::camera_distance) rules.quality.key_bits = 14;  // ties by the hundred
     SerialBackend serial;
-    Renderer<double, SerialBackend> renderer(serial, rules);
+    BasicRenderer<double, SerialBackend> renderer(serial, rules);
     const auto rendered = renderer.render(two.sets, {{two.camera}}).value();
     const OracleFrames f = oracle(two.sets, two.camera, {.rules = rules});
     std::vector<bool> skip(f.alpha.size());
@@ -226,7 +226,7 @@ TEST_CASE("oracle: the renderer's exact response is the ray oracle's, found anot
   const OracleFrames f = oracle(two.sets, two.camera, config);
   config.rules.response = Response::ray;
   SerialBackend serial;
-  Renderer<double, SerialBackend> renderer(serial, config.rules);
+  BasicRenderer<double, SerialBackend> renderer(serial, config.rules);
   const auto rendered = renderer.render(two.sets, {{two.camera}}).value();
   std::vector<bool> skip(f.alpha.size());
   for (std::size_t p = 0; p < skip.size(); ++p) skip[p] = f.undecided[p] != 0;

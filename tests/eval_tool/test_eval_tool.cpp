@@ -340,8 +340,8 @@ TEST_CASE("equal evaluations write equal bytes, on any number of threads") {
   const TempFolder folder("eval");
   const std::string options =
       kSparse + "--avatars 2 --episodes 3 --max-steps 25 --pictures 0 --policy random ";
-  REQUIRE(run_command(GSNAV_EVAL, options + "--threads 1 --out one", folder.path()).ok);
-  REQUIRE(run_command(GSNAV_EVAL, options + "--threads 3 --out three", folder.path()).ok);
+  REQUIRE(run_command(GSNAV_EVAL, options + "--device cpu:1 --out one", folder.path()).ok);
+  REQUIRE(run_command(GSNAV_EVAL, options + "--device cpu:3 --out three", folder.path()).ok);
   const std::string one = read_file(folder / "one/metrics.json");
   CHECK(one == read_file(folder / "three/metrics.json"));
   for (const char* name : {"\"psc\":", "\"human_collision_episode_rate\":",
@@ -516,7 +516,7 @@ TEST_CASE(
   };
   const std::string one = ranks(1, "one");
   CHECK(ranks(4, "four") == one);
-  CHECK(ranks(2, "drawn", " --draw openmp --threads 1 --width 24 --height 16") == one);
+  CHECK(ranks(2, "drawn", " --draw --device cpu:1 --width 24 --height 16") == one);
   // As a rank that is killed leaves its journal: its last line cut, and all of it gone that was not yet
   // on disk.
   const std::string second = read_file(folder / "four/journal.2.jsonl"),

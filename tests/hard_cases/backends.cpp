@@ -23,7 +23,7 @@ Frames<S> CaseRenderer<S, B>::render(const std::vector<Placed>& scene,
   for (const MeshInstance& m : meshes) {
     instances.push_back(mesh_arrays.emplace_back(*backend_, m.mesh).instance(m.world_from_mesh, m.id));
   }
-  Renderer<S, B> renderer(*backend_, config);
+  BasicRenderer<S, B> renderer(*backend_, config);
   renderer.set_meshes(instances);
   Frames<S> frames = renderer.render(sets, cameras).value();
   record_hashes(frames, this->name());
@@ -41,7 +41,7 @@ Frames<S> CaseRenderer<S, B>::render_with(const GaussianCloud& cloud, const SetE
   }
   for (std::size_t k = 0; k < 9 && !extras.axes[0].empty(); ++k)
     set.gaussians.shape.axes.set(k, more.in(extras.axes[k]));
-  Renderer<S, B> renderer(*backend_, config);
+  BasicRenderer<S, B> renderer(*backend_, config);
   return renderer.render(set, camera).value();
 }
 

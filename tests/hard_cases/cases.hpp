@@ -14,8 +14,8 @@
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/quat.hpp"
 #include "gsnav/render/config.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
-#include "gsnav/scene/renderer.hpp"
 
 // Inputs that several hard cases share.
 

@@ -372,7 +372,7 @@ TEST_CASE("moved instances, no Gaussians, and a backend with a form of its own o
   SerialBackend serial;
   MeshScene scene;
   scene.add(sphere(0.5, 64, 32)).value();
-  Renderer<float, SerialBackend> renderer(serial);
+  BasicRenderer<float, SerialBackend> renderer(serial);
   for (const double x : {-0.4, 0.0, 0.7}) {
     const MeshInstance instance = scene.instance(0, {{}, {x, 0, 3}, 1});
     renderer.set_meshes({&instance, 1});
@@ -388,7 +388,7 @@ TEST_CASE("moved instances, no Gaussians, and a backend with a form of its own o
   struct OwnBlending : SerialBackend {
     void run(stage::Blend, const RasterArgs<float>&) {}
   } own;
-  Renderer<float, OwnBlending> other(own);
+  BasicRenderer<float, OwnBlending> other(own);
   const MeshInstance instance = scene.instance(0, {{}, {0, 0, 3}, 1});
   renderer.set_meshes({&instance, 1});
   other.set_meshes({&instance, 1});

@@ -95,7 +95,7 @@ TEST_CASE("count_culled: what single Gaussians and boxes say, each by itself") {
       655,
       {.count = 1200, .sh_degree = 0, .needle = 0.05, .scale = 0.3, .center = {0, 0, 0}, .extent = 6}));
   SerialBackend backend;
-  Renderer<float, SerialBackend> renderer(backend);
+  BasicRenderer<float, SerialBackend> renderer(backend);
   Rng rng(656);
   std::uint64_t emitting = 0;
   for (int i = 0; i < 6; ++i) {

@@ -78,7 +78,7 @@ TEST_CASE("N63_determinism_100") {
     using B = std::remove_cvref_t<decltype(renderer.backend())>;
     const GaussianArrays<B> first(renderer.backend(), a), second(renderer.backend(), b);
     const std::vector<GaussianSet> sets{first.set(), second.set()};
-    Renderer<typename R::scalar, B> r(renderer.backend(), all_outputs());
+    BasicRenderer<typename R::scalar, B> r(renderer.backend(), all_outputs());
     std::vector<std::uint64_t> one;
     for (std::size_t c = 0; c < all.size(); ++c) {
       one.push_back(hash_of(r.render(sets, std::span(&all[c], 1)).value(), 0));

@@ -424,7 +424,7 @@ TEST_CASE("holes that a mask cuts: what is behind is seen, by texel and by verte
     Panes cut;
     cut.add(lattice);
     SerialBackend serial;
-    Renderer<double, SerialBackend> renderer(serial, all_outputs());
+    BasicRenderer<double, SerialBackend> renderer(serial, all_outputs());
     renderer.set_meshes(cut.instances);
     const auto f = renderer.render({}, std::vector<Camera>{camera}).value();
     CHECK(std::count(f.alpha.begin(), f.alpha.end(), 1.0) == covered);

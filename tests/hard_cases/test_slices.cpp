@@ -196,7 +196,7 @@ TEST_CASE("slices of depth by distance, where the viewmat is as little rigid as 
     std::vector<float> first;
     for (const int slices : {1, 4, 8}) {
       config.tuning.depth_slices = slices;
-      Renderer<float, OpenMPBackend> renderer(backend, config);
+      BasicRenderer<float, OpenMPBackend> renderer(backend, config);
       const auto frame = renderer.render(cloud.set(), camera).value();
       if (slices == 1) first = frame.rgb;
       CAPTURE(grow);

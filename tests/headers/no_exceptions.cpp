@@ -17,7 +17,7 @@ int main() {
   cloud.sh0 = {1, 1, 1};
 
   SerialBackend backend;
-  Renderer<float, SerialBackend> renderer(backend);
+  BasicRenderer<float, SerialBackend> renderer(backend);
   const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 32, 32, 90);
   const auto frames = renderer.render(cloud.set(), camera);
   if (!frames || !(frames.value().alpha[16 * 32 + 16] > 0.8f)) return 1;

@@ -7,6 +7,6 @@ std::size_t scratch_of_second_unit();
 
 std::size_t scratch_of_second_unit() {
   gsnav::SerialBackend backend;
-  const gsnav::Renderer<float, gsnav::SerialBackend> renderer(backend);
+  const gsnav::BasicRenderer<float, gsnav::SerialBackend> renderer(backend);
   return renderer.scratch_bytes();
 }

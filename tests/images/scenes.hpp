@@ -11,9 +11,9 @@
 #include "gsnav/detail/sim/scene_on_backend.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/render/config.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/mesh_scene.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/renderer.hpp"
 
 // Scenes in every storage and with every selection of rows, and how they come to a backend.
 

@@ -30,7 +30,7 @@ namespace {
 template <class S, class B>
 Frames<S> draw(B& backend, const ImageScene& scene, const std::string& name) {
   const SceneThere<B> there(backend, scene);
-  Renderer<S, B> renderer(backend, there.config());
+  BasicRenderer<S, B> renderer(backend, there.config());
   renderer.set_meshes(there.meshes());
   Frames<S> frames = renderer.render(there.sets(), std::span(&scene.camera, 1)).value();
   record_hashes(frames, name + ", " + scene.name);

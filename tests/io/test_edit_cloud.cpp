@@ -7,7 +7,7 @@
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "row_clouds.hpp"
 #include "support/compiled_frames.hpp"
 
@@ -19,7 +19,7 @@ namespace {
 std::vector<double> image_of(const GaussianCloud& cloud, const Similarity& asset,
                              const Similarity& camera) {
   SerialBackend backend;
-  Renderer<double, SerialBackend> renderer(backend);
+  BasicRenderer<double, SerialBackend> renderer(backend);
   const Vec3d eye = camera * Vec3d{2, -3, -14}, target = camera * Vec3d{0.3, 0.2, 0};
   const Camera view = Camera::look_at(eye, target, rotate(camera.rotation, {0.1, -1, 0.2}), 48, 40, 70);
   return renderer.render(cloud.set(asset), view).value().rgb;

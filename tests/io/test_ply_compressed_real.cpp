@@ -6,7 +6,7 @@
 #include "check_cloud.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/data.hpp"
 
@@ -96,7 +96,7 @@ TEST_CASE("compressed ply: the statue looks as it does in its SOG") {
   // The two files are turned against each other by half a turn about z.
   const Similarity turn{Quatd{0, 0, 0, 1}, {}, 1.0};
   SerialBackend backend;
-  Renderer<float, SerialBackend> renderer(backend);
+  BasicRenderer<float, SerialBackend> renderer(backend);
   const Vec3d centre{0.15, -0.73, -0.1};
   for (const Vec3d& eye : {Vec3d{0.15, -0.73, -5}, Vec3d{5, -1, 0}, Vec3d{-2, -3, 4}}) {
     const Camera camera = Camera::look_at(eye, centre, {0, -1, 0}, 160, 160, 50);

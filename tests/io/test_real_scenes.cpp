@@ -7,7 +7,7 @@
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "real_scenes.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/sanitized.hpp"
@@ -43,7 +43,7 @@ TEST_CASE("real scenes: every file is read, fits its report and is seen") {
   if (scenes.empty()) return;
   CHECK(scenes.size() >= 18);
   SerialBackend backend;
-  Renderer<float, SerialBackend> renderer(backend);
+  BasicRenderer<float, SerialBackend> renderer(backend);
   for (const std::string& path : scenes) {
     CAPTURE(path);
     const auto loaded = io::load_scene(path);

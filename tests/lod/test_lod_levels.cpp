@@ -10,8 +10,8 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/eval/oracle_photo.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "level_support.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
@@ -134,7 +134,7 @@ TEST_CASE("lod levels: the finest cut has the bits of the finest level, as any s
   GaussianCloud finest = wall_levels()[0].cloud;
   sort_spatially(finest);
   OpenMPBackend backend(2);
-  Renderer<float, OpenMPBackend> renderer(backend);
+  BasicRenderer<float, OpenMPBackend> renderer(backend);
   LodCut cut(set.tree, set.cloud);
   LodChoice choice;
   choice.pixels = 1e-9;
@@ -204,7 +204,7 @@ TEST_CASE(
   OpenMPBackend backend;
   RenderConfig config;
   config.outputs = kRgb;
-  Renderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
   LodCut cut(set.tree, set.cloud);
   const GaussianSet whole = set.cloud.set();
   bool fewer = false;

@@ -10,8 +10,8 @@
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/detail/eval/oracle_photo.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "lod_support.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
@@ -35,7 +35,7 @@ TEST_CASE("lod photo: a Gaussian's light does not depend on how much a pixel blu
   RenderConfig config;
   config.outputs = kAlpha;
   config.quality.alpha_min = 1e-7;
-  Renderer<double, SerialBackend> renderer(backend, config);
+  BasicRenderer<double, SerialBackend> renderer(backend, config);
   const double per_metre = camera.fx / 5;
   for (const float base : {0.0f, 0.02f, 0.3f}) {
     for (const float blur : {0.3f, 0.5f}) {
@@ -64,7 +64,7 @@ TEST_CASE("lod photo: base_eps2d = eps2d is the classic filter") {
   const GaussianCloud cloud = random_cloud(5, {.count = 300});
   const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 40, 30, 70);
   SerialBackend backend;
-  Renderer<double, SerialBackend> renderer(backend);
+  BasicRenderer<double, SerialBackend> renderer(backend);
   GaussianSet set = cloud.set();
   const auto classic = renderer.render(set, camera).value();
   set.filter = Filter::mip;
@@ -80,8 +80,8 @@ TEST_CASE("lod photo: nearer to the photo than direct rendering, in every view (
   const LodTree tree = build_lod(backend, cloud).value();
   RenderConfig config;
   config.outputs = kRgb;
-  Renderer<float, OpenMPBackend> renderer(backend, config);
-  Renderer<float, OpenMPBackend> lods(backend, lod_config(config));
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> lods(backend, lod_config(config));
   LodCut cut(tree, cloud);
   double gain = 0;
   std::uint64_t drawn = 0, shown = 0;
@@ -123,7 +123,7 @@ TEST_CASE(
   const LodTree tree = build_lod(backend, cloud).value();
   RenderConfig config;
   config.outputs = kRgb;
-  Renderer<float, OpenMPBackend> renderer(backend, config), lods(backend, lod_config(config));
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config), lods(backend, lod_config(config));
   LodCut cut(tree, cloud);
   const GaussianSet whole = cloud.set();
   for (const double x : {-1.0, 0.0, 0.7}) {

@@ -9,8 +9,8 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "lod_support.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
@@ -239,7 +239,7 @@ TEST_CASE("lod cut: the finest is the cloud itself, bit for bit") {
   LodChoice choice;
   choice.pixels = 1e-9;
   const Camera camera = Camera::look_at({0.3, 0, 0}, {0, 0, 4}, {0, -1, 0}, 96, 64, 60);
-  Renderer<float, OpenMPBackend> renderer(backend);
+  BasicRenderer<float, OpenMPBackend> renderer(backend);
   const auto a = renderer.render(cut.select(camera, choice), std::span(&camera, 1)).value();
   const auto b = renderer.render(LodCut::photo_set(cloud, choice), camera).value();
   CHECK(a.rgb == b.rgb);

@@ -15,8 +15,8 @@
 #include "gsnav/detail/scene/ledger.hpp"
 #include "gsnav/detail/scene/scene_profile.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
 
@@ -59,9 +59,9 @@ TEST_CASE("scene profile: bands of zeros are not read, and no bit changes") {
   };
   OpenMPBackend openmp(2);
   SerialBackend serial;
-  Renderer<float, OpenMPBackend> lanes(openmp);
-  Renderer<float, SerialBackend> one(serial);
-  Renderer<double, SerialBackend> reference(serial);
+  BasicRenderer<float, OpenMPBackend> lanes(openmp);
+  BasicRenderer<float, SerialBackend> one(serial);
+  BasicRenderer<double, SerialBackend> reference(serial);
   check(lanes);
   check(one);
   check(reference);
@@ -132,8 +132,8 @@ void check_dropped(Cloud cloud, int most, std::size_t bytes_a_number, double uns
   };
   OpenMPBackend openmp(2);
   SerialBackend serial;
-  Renderer<float, OpenMPBackend> lanes(openmp);
-  Renderer<float, SerialBackend> one(serial);
+  BasicRenderer<float, OpenMPBackend> lanes(openmp);
+  BasicRenderer<float, SerialBackend> one(serial);
   check(lanes);
   check(one);
 }
@@ -231,7 +231,7 @@ TEST_CASE("ledger: its counts are those of the frame") {
   SerialBackend backend;
   RenderConfig config;
   config.quality.exponential = Exponential::fast;
-  Renderer<float, SerialBackend> renderer(backend, config);
+  BasicRenderer<float, SerialBackend> renderer(backend, config);
   const GaussianSet set = profile.applied_to(cloud.set());
   const auto f = renderer.render(set, camera).value();
   const FrameLedger l = frame_ledger(std::span(&set, 1), camera, config, f.stats[0], nullptr, &profile);

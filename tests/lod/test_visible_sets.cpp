@@ -13,8 +13,8 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/scene/renderer.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #include "level_support.hpp"
 #include "lod_support.hpp"
@@ -94,7 +94,7 @@ TEST_CASE("row weights: of a few Gaussians, what an image of each alone in white
   SerialBackend serial;
   RenderConfig config;
   config.outputs = kRgb;
-  Renderer<double, SerialBackend> renderer(serial, config);
+  BasicRenderer<double, SerialBackend> renderer(serial, config);
   int seen = 0;
   for (const std::size_t i : kept) {
     GaussianCloud white = cloud;
@@ -138,7 +138,8 @@ TEST_CASE(
     RenderConfig config;
     config.outputs = kRgb | kAlpha | kMedianDepth;
     const auto same = [&](auto& backend, auto scalar) {
-      Renderer<decltype(scalar), std::remove_reference_t<decltype(backend)>> renderer(backend, config);
+      BasicRenderer<decltype(scalar), std::remove_reference_t<decltype(backend)>> renderer(backend,
+                                                                                           config);
       const auto part = renderer.render(set, camera).value(),
                  want = renderer.render(rest.set(), camera).value();
       CHECK(part.rgb == want.rgb);
@@ -159,7 +160,7 @@ TEST_CASE(
   GaussianSet set = cloud.set();
   const std::vector<std::uint32_t> words = seen_words(std::vector<bool>(cloud.size(), true));
   const auto render = [&] {
-    return Renderer<float, SerialBackend>(serial, {})
+    return BasicRenderer<float, SerialBackend>(serial, {})
         .render(set, Camera::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 8, 8, 80));
   };
   set.selection.seen = {words.data(), words.size()};
@@ -216,9 +217,9 @@ TEST_CASE("visible sets: what is behind a wall is left out, and no image shows i
   RenderConfig config;
   config.outputs = kRgb;
   config.quality.exponential = Exponential::fast;
-  Renderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
   config.tuning.depth_slices = 3;
-  Renderer<float, OpenMPBackend> sliced(backend, config);
+  BasicRenderer<float, OpenMPBackend> sliced(backend, config);
   Rng rng(5);
   int known = 0, hidden = 0;
   for (int i = 0; i < 30; ++i) {
@@ -295,7 +296,7 @@ TEST_CASE("visible sets: of a placed cloud in its own frame") {
   REQUIRE(cell);
   RenderConfig config;
   config.outputs = kRgb;
-  Renderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
   GaussianSet part = rooms().set(placed);
   part.selection.seen = sets.seen_from(*cell);
   CHECK(psnr(renderer.render(rooms().set(placed), camera).value().rgb,

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "support/compiled_frames.hpp"
 #if defined(_OPENMP)
 #include "gsnav/backends/openmp.hpp"
@@ -45,7 +45,7 @@ static_assert(gsnav::Backend<ToyBackend>);
 template <class S, class B>
 gsnav::Frames<S> render(B& backend, const std::vector<gsnav::GaussianSet>& sets,
                         const gsnav::Camera& camera, const gsnav::RenderConfig& config = {}) {
-  gsnav::Renderer<S, B> renderer(backend, config);
+  gsnav::BasicRenderer<S, B> renderer(backend, config);
   return renderer.render(sets, std::vector<gsnav::Camera>{camera}).value();
 }
 

@@ -86,7 +86,7 @@ inline Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& s
                             const std::vector<Camera>& cameras, const Lists& lists, RenderConfig config,
                             unsigned outputs, const std::vector<MeshFrame>& meshes = {}) {
   config.outputs = outputs;
-  Renderer<float, CudaBackend> renderer(cuda, config);
+  BasicRenderer<float, CudaBackend> renderer(cuda, config);
   Frames<float> all;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     std::vector<GaussianSet> seen;

@@ -21,7 +21,7 @@ TEST_CASE("a third-party backend of six members runs the whole pipeline") {
 
   ToyBackend toy;
   const GaussianArrays<ToyBackend> arrays(toy, cloud);
-  Renderer<float, ToyBackend> renderer(toy, config);
+  BasicRenderer<float, ToyBackend> renderer(toy, config);
   const std::vector<GaussianSet> sets{arrays.set()};
   const std::vector<Camera> cameras{camera};
   const auto frames = renderer.render(sets, cameras).value();

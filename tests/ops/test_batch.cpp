@@ -51,14 +51,14 @@ TEST_CASE("a batch has the bits of its single frames, for any number of cameras 
   config.outputs = kRgb | kAlpha | kAnyDepth;
   const std::vector<Camera> views = cameras(19);
   OpenMPBackend one(1);
-  Renderer<float, OpenMPBackend> single(one, config);
+  BasicRenderer<float, OpenMPBackend> single(one, config);
   std::vector<Frames<float>> expected;
   for (const Camera& view : views)
     expected.push_back(single.render(sets, std::vector<Camera>{view}).value());
   REQUIRE(expected[0].stats[0].visible > 0);
   for (const int threads : {1, 2, 3, 8}) {
     OpenMPBackend backend(threads);
-    Renderer<float, OpenMPBackend> renderer(backend, config);
+    BasicRenderer<float, OpenMPBackend> renderer(backend, config);
     Frames<float> frames;
     for (const std::size_t n : {19u, 2u, 5u, 16u, 19u}) {  // scratch that was used for more and for less
       REQUIRE(renderer.render(sets, std::span(views).first(n), frames).ok());
@@ -79,7 +79,7 @@ TEST_CASE("a batch's scratch grows with threads, not with cameras") {
   std::vector<Camera> many;
   for (int k = 0; k < 4; ++k) many.insert(many.end(), few.begin(), few.end());
   OpenMPBackend backend(2);
-  Renderer<float, OpenMPBackend> renderer(backend);
+  BasicRenderer<float, OpenMPBackend> renderer(backend);
   REQUIRE(renderer.render(sets, few).ok());
   const std::size_t bytes = renderer.scratch_bytes();
   REQUIRE(renderer.render(sets, many).ok());
@@ -91,7 +91,7 @@ TEST_CASE("what is wrong with a batch is named") {
   GaussianSet bad = cloud.set();
   bad.eps2d = -1;
   OpenMPBackend backend(2);
-  Renderer<float, OpenMPBackend> renderer(backend);
+  BasicRenderer<float, OpenMPBackend> renderer(backend);
   const Status s = renderer.render(std::vector<GaussianSet>{bad}, cameras(12)).status();
   CHECK(s.code() == Errc::invalid_argument);
   CHECK(s.message().find("eps2d") != std::string::npos);

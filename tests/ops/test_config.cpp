@@ -21,7 +21,7 @@ namespace {
 
 std::string error_of(const GaussianSet& set, const Camera& camera, const RenderConfig& config) {
   SerialBackend serial;
-  Renderer<float, SerialBackend> renderer(serial, config);
+  BasicRenderer<float, SerialBackend> renderer(serial, config);
   const auto r = renderer.render(set, camera);
   CHECK(r.code() == (r.ok() ? Errc::ok : Errc::invalid_argument));
   return r.message();
@@ -52,7 +52,7 @@ TEST_CASE("a renderer without memory returns an error that says for what") {
   camera.set_hfov(320, 240, 90);
   for (const bool throws : {false, true}) {
     FullBackend full(throws);
-    Renderer<float, FullBackend> renderer(full);
+    BasicRenderer<float, FullBackend> renderer(full);
     const auto r = renderer.render(cloud.set(), camera);
     CHECK(r.code() == Errc::out_of_memory);
     for (const char* part : {"320 x 240", "10 Gaussians", "bytes"}) CHECK(names(r.message(), part));
@@ -70,7 +70,7 @@ TEST_CASE("images that no machine holds are refused before they are allocated") 
   camera.set_hfov(16384, 16384, 90);
   const std::vector<Camera> cameras(20000, camera);  // 100 TB
   SerialBackend serial;
-  Renderer<float, SerialBackend> renderer(serial);
+  BasicRenderer<float, SerialBackend> renderer(serial);
   const GaussianSet set = cloud.set();
   const auto r = renderer.render(std::span(&set, 1), cameras);
   CHECK(r.code() == Errc::out_of_memory);
@@ -83,7 +83,7 @@ TEST_CASE("null spans with a size are refused") {
   const GaussianSet set = cloud.set();
   const Camera camera;
   SerialBackend serial;
-  Renderer<float, SerialBackend> renderer(serial);
+  BasicRenderer<float, SerialBackend> renderer(serial);
   const std::span<const Camera> no_cameras(static_cast<const Camera*>(nullptr), 1);
   const std::span<const GaussianSet> no_sets(static_cast<const GaussianSet*>(nullptr), 1);
   CHECK(renderer.render(std::span(&set, 1), no_cameras).code() == Errc::invalid_argument);
@@ -97,9 +97,9 @@ TEST_CASE("null spans with a size are refused") {
 TEST_CASE("a renderer that was moved from renders on, and denormals flushed to zero change no bit") {
   const GaussianCloud cloud = random_cloud(1, {.count = 500});
   SerialBackend serial;
-  Renderer<float, SerialBackend> renderer(serial);
+  BasicRenderer<float, SerialBackend> renderer(serial);
   const auto before = renderer.render(cloud.set(), Camera{}).value();
-  Renderer<float, SerialBackend> other(std::move(renderer));
+  BasicRenderer<float, SerialBackend> other(std::move(renderer));
   CHECK(other.render(cloud.set(), Camera{}).value().rgb == before.rgb);
   CHECK(renderer.render(cloud.set(), Camera{}).value().rgb == before.rgb);
 #if defined(__SSE2__)
@@ -191,7 +191,7 @@ TEST_CASE("an empty scene shows the background") {
   SerialBackend serial;
   RenderConfig config;
   config.background = {0.25, 0.5, 0.75};
-  Renderer<float, SerialBackend> renderer(serial, config);
+  BasicRenderer<float, SerialBackend> renderer(serial, config);
   Camera camera;
   camera.set_hfov(33, 17, 90);
   const std::vector<Camera> cameras{camera};

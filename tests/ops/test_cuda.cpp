@@ -24,7 +24,7 @@ Frames<float> on_gpu(CudaBackend& cuda, const std::vector<const GaussianCloud*>&
   std::vector<GaussianSet> sets;
   arrays.reserve(clouds.size());
   for (const GaussianCloud* c : clouds) sets.push_back(arrays.emplace_back(cuda, *c).set());
-  Renderer<float, CudaBackend> renderer(cuda, config);
+  BasicRenderer<float, CudaBackend> renderer(cuda, config);
   return renderer.render(sets, std::vector<Camera>{camera}).value();
 }
 

@@ -52,7 +52,7 @@ void for_each_host(const F& f) {
 template <class S, class B>
 Frames<S> render_with_meshes(B& backend, const std::vector<GaussianSet>& sets,
                              const std::vector<MeshInstance>& meshes, const Camera& camera) {
-  Renderer<S, B> renderer(backend, {});
+  BasicRenderer<S, B> renderer(backend, {});
   renderer.set_meshes(meshes);
   return renderer.render(sets, std::vector<Camera>{camera}).value();
 }

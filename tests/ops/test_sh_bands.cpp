@@ -126,7 +126,7 @@ TEST_CASE("cuda: SH bands that chunks do not need are not read, in batches and a
           check_same(got.frames, singly(cuda, {some.set()}, cameras, {}, config, kMedianOnly));
           // The contract's bound between the GPU and the CPU, which reads by the same rule.
           SerialBackend serial;
-          Renderer<float, SerialBackend> on_cpu(serial, config);
+          BasicRenderer<float, SerialBackend> on_cpu(serial, config);
           const Frames<float> cpu =
               on_cpu.render(std::vector<GaussianSet>{b.profile.applied_to(b.marked.set())}, cameras)
                   .value();

@@ -42,7 +42,7 @@ std::vector<Camera> cameras(std::size_t n) {
 std::vector<std::size_t> calls_of_steady_frames(int threads, const RenderConfig& config,
                                                 std::size_t batch, int frames) {
   OpenMPBackend backend(threads);
-  Renderer<float, OpenMPBackend> renderer(backend, config);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, config);
   const std::vector<GaussianSet> sets{cloud().set()};
   const std::vector<Camera> views = cameras(batch);
   Frames<float> out;
@@ -131,7 +131,7 @@ TEST_CASE(
   for (const int threads : {1, 2}) {
     OpenMPBackend backend(threads);
     const auto render = [&](const GaussianSet& set, const RenderConfig& config) {
-      Renderer<float, OpenMPBackend> renderer(backend, config);
+      BasicRenderer<float, OpenMPBackend> renderer(backend, config);
       return renderer.render(std::span(&set, 1), views).value();
     };
     GaussianSet without_color = cloud().set(), base_only = cloud().set();

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "nav/cases.hpp"
 #include "same_bits.hpp"
 #include "sim_scene.hpp"
@@ -53,13 +53,13 @@ TEST_CASE("a batch has the bits of single simulators over 1,000 random steps amo
   auto batch = make_batch_simulator(backend, scenes, config, kEnvironments, wandering).value();
 
   // Each environment by hand: a simulator for each scene.
-  std::vector<std::vector<Simulator<OpenMPBackend>>> single(kEnvironments);
+  std::vector<std::vector<BasicSimulator<OpenMPBackend>>> single(kEnvironments);
   std::vector<std::size_t> count(kEnvironments), scene(kEnvironments);
   for (std::size_t e = 0; e < kEnvironments; ++e) {
     SimulatorConfig own = config;
     own.seed = config.seed + e;
     for (const auto& s : scenes) {
-      single[e].push_back(Simulator<OpenMPBackend>::create(single_backend, s, own).value());
+      single[e].push_back(BasicSimulator<OpenMPBackend>::create(single_backend, s, own).value());
     }
   }
   const auto begin = [&](std::size_t e) {
@@ -89,7 +89,7 @@ TEST_CASE("a batch has the bits of single simulators over 1,000 random steps amo
     }
     out = batch.step(actions).value();
     for (std::size_t e = 0; e < kEnvironments; ++e) {
-      Simulator<OpenMPBackend>& sim = single[e][scene[e]];
+      BasicSimulator<OpenMPBackend>& sim = single[e][scene[e]];
       compare(e, sim.done() ? begin(e) : sim.step(actions[e]).value(), out);
       const bool done = single[e][scene[e]].done();
       wrong += done == (out.terminated[e] != 0 || out.truncated[e] != 0) ? 0 : 1;
@@ -114,10 +114,10 @@ TEST_CASE("a batch that is steered by velocities has the bits of single simulato
     return b;
   };
   auto batch = make_batch_simulator(backend, {scene}, config, kEnvironments, first).value();
-  std::vector<Simulator<OpenMPBackend>> single;
+  std::vector<BasicSimulator<OpenMPBackend>> single;
   batch.reset().value();
   for (std::size_t e = 0; e < kEnvironments; ++e) {
-    single.push_back(Simulator<OpenMPBackend>::create(single_backend, scene, config).value());
+    single.push_back(BasicSimulator<OpenMPBackend>::create(single_backend, scene, config).value());
     single[e].reset(first(e, 0).value().episode).value();
   }
   Rng rng(12);
@@ -158,7 +158,7 @@ struct Modes {
   }
   OpenMPBackend backend{1};
   BatchConfig config;
-  std::optional<BatchSimulator<OpenMPBackend>> sim;
+  std::optional<BasicBatchSimulator<OpenMPBackend>> sim;
 };
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "mesh_box.hpp"
 #include "ops/no_gpu.hpp"
 #include "sim_scene.hpp"

@@ -13,7 +13,7 @@
 #include "gsnav/detail/core/host_array.hpp"
 #include "gsnav/detail/frame/cut_depth.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "mesh_box.hpp"
 #include "ops/backends.hpp"
 #include "sim_scene.hpp"

@@ -8,7 +8,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "lod/level_support.hpp"
 #include "same_bits.hpp"
 #include "sim_scene.hpp"
@@ -81,7 +81,7 @@ TEST_CASE(
   for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
   RenderConfig rules = lod_config({}, cut.stats());
   rules.outputs = kRgb | kMedianDepth;
-  Renderer<float, OpenMPBackend> renderer(backend, rules);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, rules);
   const auto frames = renderer.render(sets, std::span(&camera, 1)).value();
   CHECK(same_bits(obs["rgb"], frames.rgb));
   // A spectator at the same place too.
@@ -105,16 +105,16 @@ TEST_CASE(
   config.lod = coarse();
   OpenMPBackend backend(2), single_backend(1);
   auto batch = make_batch_simulator(backend, scenes, config, kEnvironments, wandering).value();
-  std::vector<Simulator<OpenMPBackend>> single;
+  std::vector<BasicSimulator<OpenMPBackend>> single;
   for (const auto& scene : scenes) {
-    single.push_back(Simulator<OpenMPBackend>::create(single_backend, scene, config).value());
+    single.push_back(BasicSimulator<OpenMPBackend>::create(single_backend, scene, config).value());
   }
   auto out = batch.reset().value();
   Rng rng(31);
   for (int step = 0; step < 40; ++step) {
     for (std::size_t e = 0; e < kEnvironments; ++e) {
       // One simulator, brought from state to state.
-      Simulator<OpenMPBackend>& alone = single[batch.scene_of(e)];
+      BasicSimulator<OpenMPBackend>& alone = single[batch.scene_of(e)];
       REQUIRE(alone.set_state(batch.world(e).state()).ok());
       const auto seen = alone.observe().value();
       for (std::size_t i = 0; i < config.sensors.size(); ++i) {
@@ -207,7 +207,7 @@ TEST_CASE(
   for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
   RenderConfig rules = lod_config({}, levels ? cut.stats() : LodStats{});
   rules.outputs = kRgb | kMedianDepth;
-  Renderer<float, OpenMPBackend> renderer(backend, rules);
+  BasicRenderer<float, OpenMPBackend> renderer(backend, rules);
   const auto frames = renderer.render(sets, std::span(&camera, 1)).value();
   CHECK(same_bits(obs["rgb"], frames.rgb));
 
@@ -216,7 +216,7 @@ TEST_CASE(
   batched.task.max_steps = 20;
   const auto shared = std::make_shared<const SimulatorScene>(scene);
   auto batch = make_batch_simulator(backend, {shared}, batched, 2, wandering).value();
-  auto alone = Simulator<OpenMPBackend>::create(backend, shared, batched).value();
+  auto alone = BasicSimulator<OpenMPBackend>::create(backend, shared, batched).value();
   auto out = batch.reset().value();
   Rng rng(5);
   for (int step = 0; step < 5; ++step) {

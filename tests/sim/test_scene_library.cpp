@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "sim_scene.hpp"
 
 using namespace gsnav;

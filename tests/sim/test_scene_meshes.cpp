@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "mesh_box.hpp"
 #include "ops/backends.hpp"
 #include "sim_scene.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 #include "sim_scene.hpp"
 #include "support/compiled_frames.hpp"
 

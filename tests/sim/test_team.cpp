@@ -32,7 +32,7 @@ SimulatorConfig body(double radius, double height) {
 }
 
 /// Horizontal gap between two upright agents that overlap in height.
-double gap(const Simulator<SerialBackend>& a, const Simulator<SerialBackend>& b) {
+double gap(const BasicSimulator<SerialBackend>& a, const BasicSimulator<SerialBackend>& b) {
   const Vec3d d = a.agent().position - b.agent().position;
   return std::hypot(d.x, d.z) - a.config().task.agent_radius - b.config().task.agent_radius;
 }

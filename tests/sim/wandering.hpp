@@ -5,7 +5,7 @@
 #include <string>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/sim/batch.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "sim_scene.hpp"
 
 namespace gsnav_test {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "gsnav/backends/serial.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/skin/skin.hpp"
 
 // What tests render and skin with on the serial backend, compiled once for all of them

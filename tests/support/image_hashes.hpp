@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "gsnav/detail/scene/content_hash.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 
 namespace gsnav_test {
 

@@ -33,8 +33,8 @@ namespace {
 
 constexpr int kWidth = 320, kHeight = 240;
 constexpr double kDensity = 0.25;  // each viewer makes the flat anew
-const std::vector<std::string> kScene{"--avatars", "2",   "--episodes", "2", "--width",   "320",
-                                      "--height",  "240", "--threads",  "2", "--density", "0.25"};
+const std::vector<std::string> kScene{"--avatars", "2",   "--episodes", "2",     "--width",   "320",
+                                      "--height",  "240", "--device",   "cpu:2", "--density", "0.25"};
 
 /// The viewer in a process of its own, at a free port.
 class Viewer {
@@ -114,8 +114,7 @@ std::vector<std::uint16_t> truth(const Json& state) {
   o.height = kHeight;
   const auto stage = gsnav_eval::prepare(o).value();
   auto sim =
-      gsnav::DeviceSimulator::create(gsnav::Device::parse("cpu:2").value(), stage.scene, stage.config)
-          .value();
+      gsnav::Simulator::create(gsnav::Device::parse("cpu:2").value(), stage.scene, stage.config).value();
   gsnav::PointNavEpisode episode = stage.episodes[0];
   episode.start_time = state["time"].get<double>();
   sim.reset(episode).value();
@@ -276,11 +275,12 @@ TEST_CASE("a scene whose name is no UTF-8 is shown") {
 TEST_CASE("memory that runs out while a frame is drawn is said, and ends the viewer with 1") {
   const TempFolder folder("viewer_memory");
   // What a page of this size takes is refused by the system; loading takes less.
-  Process limited({"/bin/bash", "-c",
-                   "ulimit -v 650000; exec " + quoted(GSNAV_VIEWER) +
-                       " --port 0 --paused --density 0.05 --avatars 0 --episodes 1 --threads 1 --width "
-                       "4096 --height 4096"},
-                  folder.path());
+  Process limited(
+      {"/bin/bash", "-c",
+       "ulimit -v 650000; exec " + quoted(GSNAV_VIEWER) +
+           " --port 0 --paused --density 0.05 --avatars 0 --episodes 1 --device cpu:1 --width "
+           "4096 --height 4096"},
+      folder.path());
   std::string line;
   for (int i = 0; i < 3000 && !contains(line, "http://") && limited.runs(); ++i) {
     usleep(20000);

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 
 namespace gsnav_convert {
 
@@ -55,7 +55,7 @@ Result<ImageErrors> image_errors(const GaussianCloud& source, const GaussianClou
   const auto renderer_of = [&](const GaussianCloud& cloud) {
     RenderConfig config;
     config.sort_order = cloud.sort_order;
-    return Renderer<float, OpenMPBackend>(backend, config);
+    return BasicRenderer<float, OpenMPBackend>(backend, config);
   };
   auto renderer = renderer_of(source), renderer_made = renderer_of(made);
   const auto psnr = [](double squares, double n) {

@@ -55,7 +55,7 @@ std::string timings_json(const Options& o, const Timings& t) {
               {"play_s", t.play},
               {"pictures_s", t.pictures},
               {"episodes_played", t.played},
-              {"threads", o.threads}}
+              {"device", o.device.description()}}
              .dump(2) +
          "\n";
 }

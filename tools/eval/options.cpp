@@ -8,6 +8,8 @@
 #include <string_view>
 #include <type_traits>
 
+#include "../common/device_option.hpp"
+
 namespace gsnav_eval {
 namespace {
 
@@ -127,9 +129,7 @@ void add_scene_options(CLI::App& app, Options& o) {
   app.add_option("--eye-height", o.eye_height, "camera above the floor, metres")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3.0));
-  app.add_option("--threads", o.threads, "threads, 0: all")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
+  gsnav_tools::add_device_option(app, o.device);
 }
 
 void add_world_options(CLI::App& app, Options& o) {

@@ -35,7 +35,7 @@ struct OptionValue {
   OptionRole role = OptionRole::result;
   bool names_file = false;  ///< the value is a file's name
 };
-/// All options that decide something: not --out, and not --threads, which changes no bit.
+/// All options that decide something: not --out, and not --device, which changes no metric.
 std::vector<OptionValue> option_values(const Options& options);
 /// Sets those options that `app` was not given from `values`, by the rules of the command line. Errors:
 /// invalid_argument, naming the option.

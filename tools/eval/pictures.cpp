@@ -5,7 +5,6 @@
 
 #include "../../examples/nav_loop/canvas.hpp"
 #include "../../examples/nav_loop/map.hpp"
-#include "../common/device_option.hpp"
 #include "gsnav/io/image_file.hpp"
 
 namespace gsnav_eval {
@@ -19,9 +18,7 @@ constexpr std::size_t kShots = 4;
 }  // namespace
 
 Result<Simulator> make_simulator(const Options& options, const Stage& stage) {
-  const auto device = gsnav_tools::device_of("openmp", options.threads);
-  if (!device) return device.status();
-  return Simulator::create(*device, stage.scene, stage.config);
+  return Simulator::create(options.device, stage.scene, stage.config);
 }
 
 Status draw(Simulator& sim, const Stage& stage, const Record& record, const std::filesystem::path& strip,

@@ -8,9 +8,9 @@
 
 namespace gsnav_eval {
 
-using Simulator = gsnav::DeviceSimulator;
+using gsnav::Simulator;
 
-/// The simulator that draws for an evaluation. Errors: as of DeviceSimulator::create.
+/// The simulator that draws for an evaluation. Errors: as of Simulator::create.
 gsnav::Result<Simulator> make_simulator(const Options& options, const Stage& stage);
 
 /// Plays a record's actions again. Errors: invalid_file where they do not lead to its metrics (another

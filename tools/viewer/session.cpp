@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "../common/device_option.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "overlay.hpp"
 
@@ -73,15 +72,13 @@ Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& opti
                                       gsnav::append_bodies(*scene, t0, t1, out);
                                     });
   if (!world) return world.status();
-  const auto device = gsnav_tools::device_of("openmp", options.threads);
-  if (!device) return device.status();
   gsnav::RenderOptions draws{stage.config.render};
   draws.render.outputs = gsnav::kRgb | gsnav::kMedianDepth;
-  auto renderer = gsnav::DeviceRenderer::create(*device, stage.scene, draws);
+  auto renderer = gsnav::Renderer::create(options.device, stage.scene, draws);
   if (!renderer) return renderer.status();
   auto empty = std::make_shared<gsnav::SimulatorScene>(*stage.scene);
   empty->avatars.clear();
-  auto without_people = gsnav::DeviceRenderer::create(*device, std::move(empty), draws);
+  auto without_people = gsnav::Renderer::create(options.device, std::move(empty), draws);
   if (!without_people) return without_people.status();
   std::unique_ptr<Session> s(new Session(options, std::move(stage), how, std::move(*world),
                                          std::move(*renderer), std::move(*without_people)));
@@ -90,8 +87,7 @@ Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& opti
 }
 
 Session::Session(const gsnav_eval::Options& options, gsnav_eval::Stage stage, const SessionOptions& how,
-                 gsnav::World world, gsnav::DeviceRenderer renderer,
-                 gsnav::DeviceRenderer without_people)
+                 gsnav::World world, gsnav::Renderer renderer, gsnav::Renderer without_people)
     : stage_(std::move(stage)),
       how_(how),
       depth_colors_(depth_colors(how)),
@@ -235,7 +231,7 @@ Status Session::draw_view(const Controls& c, const gsnav::CapsuleSet& bodies) {
   const gsnav::AgentPose& agent = world_.agent();
   const gsnav::Camera camera =
       gsnav::sensor_camera(stage_.config.sensors.front(), agent.position, agent.rotation(), agent.pitch);
-  gsnav::DeviceRenderer& renderer = c.people ? renderer_ : without_people_;
+  gsnav::Renderer& renderer = c.people ? renderer_ : without_people_;
   if (Status s = renderer.render(std::span(&camera, 1), frames_, world_.time()); !s) return s;
   std::vector<std::uint8_t> rgb(frames_.rgb.size());
   gsnav::to_bytes(frames_.rgb, rgb);

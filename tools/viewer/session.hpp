@@ -51,7 +51,7 @@ class Session {
  private:
   using Clock = std::chrono::steady_clock;
   Session(const gsnav_eval::Options& options, gsnav_eval::Stage stage, const SessionOptions& how,
-          gsnav::World world, gsnav::DeviceRenderer renderer, gsnav::DeviceRenderer without_people);
+          gsnav::World world, gsnav::Renderer renderer, gsnav::Renderer without_people);
 
   gsnav::Status begin_episode(std::size_t number);
   gsnav::Status advance(const Controls& c, int actions);
@@ -68,7 +68,7 @@ class Session {
   std::vector<std::string> depth_colors_;
   std::string scene_name_;
   gsnav::World world_;
-  gsnav::DeviceRenderer renderer_, without_people_;
+  gsnav::Renderer renderer_, without_people_;
   gsnav::Frames<float> frames_;
   std::vector<std::array<gsnav::Vec3d, 3>>
       walkable_;  // triangles of the NavMesh's islands that are no table tops

@@ -26,30 +26,29 @@ struct RenderOptions {
 };
 
 /// Renders a scene on any device: Gaussians, meshes and avatars in one image. It holds the scene in the
-/// device's memory and keeps its scratch between calls. Images have the bits of Renderer<float, B>,
+/// device's memory and keeps its scratch between calls. Images have the bits of BasicRenderer<float, B>,
 /// where B is the device's backend. It may be moved; one that was moved from answers with
 /// invalid_argument. Calls of one renderer must not overlap.
 ///
 ///     auto device = gsnav::Device::parse("best").value();
-///     auto renderer = gsnav::DeviceRenderer::create(device, cloud).value();
+///     auto renderer = gsnav::Renderer::create(device, cloud).value();
 ///     auto frames = renderer.render(camera).value();   // frames.rgb, frames.median_depth, ...
-class DeviceRenderer {
+class Renderer {
  public:
   /// The scene needs no NavMesh. Errors: invalid_argument naming the part or the field; unsupported
   /// where the device is not there; out_of_memory; backend_failure.
-  static Result<DeviceRenderer> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
-                                       RenderOptions options = {});
+  static Result<Renderer> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
+                                 RenderOptions options = {});
   /// Of one cloud, placed at the world's origin.
-  static Result<DeviceRenderer> create(const Device& device, GaussianCloud cloud,
-                                       RenderOptions options = {});
-  DeviceRenderer(DeviceRenderer&&) noexcept;
-  DeviceRenderer& operator=(DeviceRenderer&&) noexcept;
-  ~DeviceRenderer();
+  static Result<Renderer> create(const Device& device, GaussianCloud cloud, RenderOptions options = {});
+  Renderer(Renderer&&) noexcept;
+  Renderer& operator=(Renderer&&) noexcept;
+  ~Renderer();
 
   /// Renders from each camera, which have one size, with avatars where they are at `time`, seconds on
-  /// the scene's clock. Images are those that RenderConfig::outputs names. Errors: invalid_argument
-  /// naming the field, no camera, or cameras of several sizes; unsupported; out_of_memory;
-  /// backend_failure.
+  /// the scene's clock. Images are those that RenderConfig::outputs names; CPUs fill Frames::stats.
+  /// Errors: invalid_argument naming the field, no camera, or cameras of several sizes; unsupported;
+  /// out_of_memory; backend_failure.
   Status render(std::span<const Camera> cameras, Frames<float>& out, double time = 0);
   Result<Frames<float>> render(std::span<const Camera> cameras, double time = 0);
   Result<Frames<float>> render(const Camera& camera, double time = 0);
@@ -57,9 +56,11 @@ class DeviceRenderer {
   const Device& device() const noexcept { return device_; }
   /// The rules that frames are drawn by from now on.
   Status set_config(const RenderConfig& config);
+  /// The light on the scene's meshes from now on, in place of SimulatorScene::light.
+  Status set_light(const MeshLight& light);
 
  private:
-  DeviceRenderer(const Device& device, std::unique_ptr<detail::RendererEngine> engine) noexcept;
+  Renderer(const Device& device, std::unique_ptr<detail::RendererEngine> engine) noexcept;
 
   Device device_;
   std::unique_ptr<detail::RendererEngine> engine_;

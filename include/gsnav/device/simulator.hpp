@@ -24,27 +24,26 @@ class BatchEngine;
 class SimulatorEngine;
 }  // namespace detail
 
-/// A simulator on any device: scene, avatars, agent, sensors and the PointNav task. It is Simulator<B>,
-/// where B is the device's backend, compiled once: the same calls give the same bits. It may be moved.
-/// In one that was moved from, calls that can fail answer invalid_argument; make no others.
+/// A simulator on any device: scene, avatars, agent, sensors and the PointNav task. It is
+/// BasicSimulator<B>, where B is the device's backend, compiled once: the same calls give the same bits.
+/// It may be moved. In one that was moved from, calls that can fail answer invalid_argument; make no
+/// others.
 ///
-///     auto sim = gsnav::DeviceSimulator::create(device, scene, config).value();
+///     auto sim = gsnav::Simulator::create(device, scene, config).value();
 ///     auto obs = sim.reset(episode).value();
 ///     while (!sim.done()) obs = sim.step(policy(obs)).value();
 ///     auto metrics = sim.metrics();
-class DeviceSimulator {
+class Simulator {
  public:
   /// Errors: invalid_argument naming the field, sensor or asset; unsupported where the device is not
   /// there; out_of_memory; backend_failure. `others` adds bodies to the scene's avatars, numbered behind
   /// them.
-  static Result<DeviceSimulator> create(const Device& device,
-                                        std::shared_ptr<const SimulatorScene> scene,
-                                        SimulatorConfig config, World::BodySource others = {});
-  static Result<DeviceSimulator> create(const Device& device, SimulatorScene scene,
-                                        SimulatorConfig config);
-  DeviceSimulator(DeviceSimulator&&) noexcept;
-  DeviceSimulator& operator=(DeviceSimulator&&) noexcept;
-  ~DeviceSimulator();
+  static Result<Simulator> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
+                                  SimulatorConfig config, World::BodySource others = {});
+  static Result<Simulator> create(const Device& device, SimulatorScene scene, SimulatorConfig config);
+  Simulator(Simulator&&) noexcept;
+  Simulator& operator=(Simulator&&) noexcept;
+  ~Simulator();
 
   /// Begins an episode. Errors: what World::reset reports; rendering.
   Result<Observations> reset(const PointNavEpisode& episode);
@@ -78,44 +77,44 @@ class DeviceSimulator {
   std::size_t render_count() const noexcept;
 
   /// Renders any camera at the present time (a map, a spectator). Images live until the next call.
-  /// Errors: of DeviceRenderer::render.
+  /// Errors: of Renderer::render.
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb);
   /// The goal of ImageNav: what an agent at the episode's goal sees, with nobody about. In the sensors'
   /// order; they live until the next call. Errors: invalid_argument before reset; rendering.
   Result<std::span<const Observation>> goal_images();
 
  private:
-  DeviceSimulator(const Device& device, std::unique_ptr<detail::SimulatorEngine> engine) noexcept;
+  Simulator(const Device& device, std::unique_ptr<detail::SimulatorEngine> engine) noexcept;
 
   Device device_;
   std::unique_ptr<detail::SimulatorEngine> engine_;
 };
 
-/// N environments over M scenes on any device: BatchSimulator<B>, where B is the device's backend,
+/// N environments over M scenes on any device: BasicBatchSimulator<B>, where B is the device's backend,
 /// compiled once. It may be moved; one that was moved from has no environments and answers with
 /// invalid_argument. After an error reset() begins anew.
 ///
-///     auto sim = gsnav::DeviceBatchSimulator::create(device, scenes, config, 256, episode_of).value();
+///     auto sim = gsnav::BatchSimulator::create(device, scenes, config, 256, episode_of).value();
 ///     auto out = sim.reset().value();
 ///     while (running) out = sim.step(policy(out)).value();
-class DeviceBatchSimulator {
+class BatchSimulator {
  public:
   /// `next_episode` is asked for each episode of each environment; see EpisodeSource. Errors:
   /// invalid_argument naming the field, sensor or scene; unsupported where the device is not there, or
   /// naming a sensor whose images cannot stay where BatchConfig::images says; out_of_memory;
   /// backend_failure.
-  static Result<DeviceBatchSimulator> create(const Device& device,
-                                             std::vector<std::shared_ptr<const SimulatorScene>> scenes,
-                                             BatchConfig config, std::size_t environments,
-                                             EpisodeSource next_episode);
+  static Result<BatchSimulator> create(const Device& device,
+                                       std::vector<std::shared_ptr<const SimulatorScene>> scenes,
+                                       BatchConfig config, std::size_t environments,
+                                       EpisodeSource next_episode);
   /// The same over scenes that are loaded in the background and leave when they are not needed.
-  static Result<DeviceBatchSimulator> create_from_library(const Device& device,
-                                                          std::shared_ptr<SceneLibrary> library,
-                                                          BatchConfig config, std::size_t environments,
-                                                          EpisodeSource next_episode);
-  DeviceBatchSimulator(DeviceBatchSimulator&&) noexcept;
-  DeviceBatchSimulator& operator=(DeviceBatchSimulator&&) noexcept;
-  ~DeviceBatchSimulator();
+  static Result<BatchSimulator> create_from_library(const Device& device,
+                                                    std::shared_ptr<SceneLibrary> library,
+                                                    BatchConfig config, std::size_t environments,
+                                                    EpisodeSource next_episode);
+  BatchSimulator(BatchSimulator&&) noexcept;
+  BatchSimulator& operator=(BatchSimulator&&) noexcept;
+  ~BatchSimulator();
 
   std::size_t environments() const noexcept;
   const World& world(std::size_t environment) const noexcept;
@@ -137,7 +136,7 @@ class DeviceBatchSimulator {
   void set_rendering(bool on) noexcept;
 
  private:
-  DeviceBatchSimulator(const Device& device, std::unique_ptr<detail::BatchEngine> engine) noexcept;
+  BatchSimulator(const Device& device, std::unique_ptr<detail::BatchEngine> engine) noexcept;
 
   Device device_;
   std::unique_ptr<detail::BatchEngine> engine_;

@@ -59,7 +59,7 @@ inline Status validate(const SimulatorScene& scene, const SimulatorConfig& confi
   if (Status s = validate(scene); !s) return s;
   const SortOrder asked = config.render.sort_order;
   if (asked != SortOrder::z_depth && !scene.assets.empty() &&
-      asked != scene.assets.front().cloud->sort_order) {
+      asked != scene.assets.front().sort_order()) {
     return {
         Errc::invalid_argument,
         "SimulatorConfig.render.sort_order: SimulatorScene.assets[0] has another; leave the default"};

@@ -16,17 +16,26 @@
 
 namespace gsnav {
 
+struct PackedCloud;
+struct SceneProfile;
 struct VisibleSets;
 
-/// A cloud and how it stands in the world.
+/// A cloud, as floats or packed, and how it stands in the world.
 struct SceneAsset {
-  std::shared_ptr<const GaussianCloud> cloud;
+  std::shared_ptr<const GaussianCloud> cloud;  ///< null where `packed` is set
   Similarity world_from_asset{};
   /// Its levels of detail (build_lod, io::cached_lod); read where SimulatorConfig::lod is set.
   std::shared_ptr<const LodTree> lod{};
   /// What is seen of it from where agents go (build_visible_sets, io::cached_visible_sets); read where
   /// SimulatorConfig::visible_sets is set.
   std::shared_ptr<const VisibleSets> visible{};
+  /// In place of `cloud`. It has no levels of detail and no visible sets.
+  std::shared_ptr<const PackedCloud> packed{};
+  /// SH bands that its chunks need (profile_scene), the others are not read; null: all are. Levels of
+  /// detail read all.
+  std::shared_ptr<const SceneProfile> profile{};
+
+  SortOrder sort_order() const noexcept;
 };
 
 /// A surface of triangles and how it stands in the world; seen among the Gaussians

@@ -55,7 +55,7 @@ bool renders_one_gaussian(B& backend) {
   cloud.quats[0] = {1};
   cloud.opacities = {0.9f};
   cloud.sh0 = {1, 1, 1};
-  gsnav::Renderer<float, B> renderer(backend);
+  gsnav::BasicRenderer<float, B> renderer(backend);
   const auto camera = gsnav::Camera::look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 32, 32, 90);
   return renderer.render(cloud.set(), camera).value().alpha[16 * 32 + 16] > 0.8f;
 }
@@ -87,7 +87,7 @@ int main() {
 #endif
 #if defined(WITH_DEVICE)
   check("device", gsnav::Device::parse("best").ok() &&
-                      gsnav::DeviceRenderer::create(gsnav::Device(), gsnav::GaussianCloud{}).ok());
+                      gsnav::Renderer::create(gsnav::Device(), gsnav::GaussianCloud{}).ok());
 #endif
 #if defined(WITH_EVAL)
   check("eval", gsnav::eval::ssim(std::vector<float>{1, 0, 0}, std::vector<float>{1, 0, 0}, 1, 1).ok());

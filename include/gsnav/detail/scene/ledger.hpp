@@ -23,7 +23,7 @@ namespace gsnav {
 struct FrameLedger {
   // Skipped without any change of the image.
   CullCounts culled;              ///< by chunks out of view or not in the cut
-  std::uint64_t visible = 0;      ///< RenderStats::visible
+  std::uint64_t visible = 0;      ///< RenderStats::visible; 0 where the device does not count
   std::uint64_t transparent = 0;  ///< left out when the scene was read: below 1/255 everywhere
   // Changed.
   std::uint64_t converted =
@@ -102,9 +102,10 @@ inline std::string ledger_text(const FrameLedger& l) {
       "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% "
       "of what could "
       "be); "
-      "%llu touched, %.2f for each that reaches a tile; %llu drawn",
+      "%llu touched, %.2f for each that reaches a tile%s",
       count(n.removed()), count(n.rows), share(n.removed(), n.rows), share(n.removed(), n.removable()),
-      count(n.touched), n.touched_per_emitting(), count(l.visible));
+      count(n.touched), n.touched_per_emitting(),
+      l.visible == 0 ? "" : ("; " + std::to_string(l.visible) + " drawn").c_str());
   if (l.transparent != 0)
     line("skipped, same bits: %llu Gaussians below 1/255 everywhere", count(l.transparent));
   if (l.sh_skipped != 0) {

@@ -19,8 +19,8 @@ struct PlacedMeshes {
   std::vector<TexturedScene::Instance> instances;
   std::vector<std::string> warnings;  ///< what is drawn otherwise than asked for
 
-  /// All of it in the world, for Renderer::set_meshes on host backends; ids count from `first_id`. Good
-  /// while this is.
+  /// All of it in the world, for BasicRenderer::set_meshes on host backends; ids count from `first_id`.
+  /// Good while this is.
   std::vector<MeshInstance> in_world(const Similarity& world_from_scene = {},
                                      std::uint32_t first_id = 0) const {
     std::vector<MeshInstance> all;

@@ -7,7 +7,7 @@
 
 #include "gsnav/detail/render/at_time.hpp"
 #include "gsnav/detail/scene/temporal_edit.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 
 namespace gsnav {
 

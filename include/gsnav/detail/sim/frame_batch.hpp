@@ -32,7 +32,7 @@ concept BatchBackend = Backend<B> && !is_host_backend<B> &&
 };
 
 /// Draws frames that share nothing by a backend's batched renderer: all frames of one size, rules and
-/// images by one call, or by as few as it has the capacity for. The bits are those of Renderer.
+/// images by one call, or by as few as it has the capacity for. The bits are those of BasicRenderer.
 template <BatchBackend B>
 class FrameBatch {
  public:

@@ -8,7 +8,7 @@
 
 #include "gsnav/detail/sim/frame_batch.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/config.hpp"
 
 namespace gsnav {
@@ -29,7 +29,8 @@ struct ImageRequest : FrameJob<float> {
 };
 
 /// Draws frames that share nothing: chooses what each shows of its assets, then draws what a batched
-/// renderer of the backend supports by that, and everything else by Renderer. The bits are the same.
+/// renderer of the backend supports by that, and everything else by BasicRenderer. The bits are the
+/// same.
 template <Backend B>
 class ImageRenderer {
  public:
@@ -109,7 +110,7 @@ class ImageRenderer {
   }
 
   B* backend_;
-  Renderer<float, B> renderer_;
+  BasicRenderer<float, B> renderer_;
   [[no_unique_address]] typename BatchesOf<B>::type batches_;
   ChosenChunks<B> chosen_;
   std::vector<DetailSets> cuts_;  // of each of these

@@ -14,7 +14,7 @@
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/scene.hpp"
 
 namespace gsnav {
@@ -31,7 +31,8 @@ class SceneOnBackend {
       : backend_(&backend), scene_(std::move(scene)) {
     if (choice.lod) detail_.choice = *choice.lod;
     for (const SceneAsset& a : scene_->assets) {
-      sets_.push_back(arrays_.emplace_back(backend, *a.cloud).set(a.world_from_asset));
+      arrays_.push_back(arrays_of(a, choice.lod ? nullptr : a.profile.get()));
+      sets_.push_back(arrays_.back().set(a.world_from_asset));
       if (!choice.lod && !choice.visible_sets) continue;
       detail_.assets.push_back({choice.lod ? a.lod.get() : nullptr, a.cloud.get(), a.world_from_asset});
       if (choice.visible_sets) detail_.assets.back().visible = a.visible.get();
@@ -62,7 +63,7 @@ class SceneOnBackend {
   /// visible sets, where it has them.
   RenderConfig render_config(RenderConfig config) const noexcept {
     if (detail() != nullptr) config = lod_config(config);
-    if (!scene_->assets.empty()) config.sort_order = scene_->assets.front().cloud->sort_order;
+    if (!scene_->assets.empty()) config.sort_order = scene_->assets.front().sort_order();
     return config;
   }
   /// The scene without its avatars.
@@ -117,6 +118,14 @@ class SceneOnBackend {
       slots_.push_back(std::move(s));
     }
     return *slots_[slot];
+  }
+
+  GaussianArrays<B> arrays_of(const SceneAsset& asset, const SceneProfile* profile) const {
+    const auto of = [&](const auto& cloud) {
+      return profile != nullptr ? GaussianArrays<B>(*backend_, cloud, *profile)
+                                : GaussianArrays<B>(*backend_, cloud);
+    };
+    return asset.packed != nullptr ? of(*asset.packed) : of(*asset.cloud);
   }
 
   void place(std::size_t mesh) {

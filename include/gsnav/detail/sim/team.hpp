@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 
 namespace gsnav {
 
@@ -49,7 +49,7 @@ class TeamBodies {
 template <Backend B>
 class Team {
  public:
-  /// One config for each agent; their control periods must be one. Errors: what Simulator::create
+  /// One config for each agent; their control periods must be one. Errors: what BasicSimulator::create
   /// reports, with the agent's number; invalid_argument (no agent, other control periods).
   static Result<Team> create(B& backend, SimulatorScene scene, std::vector<SimulatorConfig> agents) {
     if (agents.empty()) return {Errc::invalid_argument, "Team: no agent"};
@@ -65,7 +65,7 @@ class Team {
                                                                                  auto& out) {
         bodies->append(i, static_cast<std::uint32_t>(n), out);
       };
-      auto sim = Simulator<B>::create(backend, shared, std::move(agents[i]), others);
+      auto sim = BasicSimulator<B>::create(backend, shared, std::move(agents[i]), others);
       if (!sim) return {sim.code(), "Team: agent " + std::to_string(i) + ": " + sim.message()};
       team.agents_.push_back(std::move(*sim));
     }
@@ -73,16 +73,16 @@ class Team {
   }
 
   std::size_t size() const noexcept { return agents_.size(); }
-  Simulator<B>& operator[](std::size_t agent) noexcept { return agents_[agent]; }
+  BasicSimulator<B>& operator[](std::size_t agent) noexcept { return agents_[agent]; }
   bool done() const noexcept {
-    for (const Simulator<B>& a : agents_) {
+    for (const BasicSimulator<B>& a : agents_) {
       if (!a.done()) return false;
     }
     return true;
   }
 
   /// Begins an episode for each agent, at one start time. Errors: invalid_argument (another number of
-  /// episodes, other start times); what Simulator::reset reports.
+  /// episodes, other start times); what BasicSimulator::reset reports.
   Result<std::vector<Observations>> reset(std::span<const PointNavEpisode> episodes) {
     if (episodes.size() != size()) return wrong_number("episodes", episodes.size());
     for (std::size_t i = 0; i < size(); ++i) {
@@ -106,7 +106,7 @@ class Team {
   }
 
   /// One action for each agent; of those whose episode is over none is taken. Errors: invalid_argument
-  /// (another number of actions); what Simulator::step reports.
+  /// (another number of actions); what BasicSimulator::step reports.
   Result<std::vector<Observations>> step(std::span<const Action> actions) {
     if (actions.size() != size()) return wrong_number("actions", actions.size());
     for (std::size_t i = 0; i < size(); ++i) {
@@ -137,14 +137,14 @@ class Team {
   }
 
   void stand(std::size_t i) {
-    const Simulator<B>& a = agents_[i];
+    const BasicSimulator<B>& a = agents_[i];
     (*bodies_)[i] = {a.agent().position, a.config().task.agent_radius, a.config().task.agent_height,
                      true};
   }
 
   Result<std::vector<Observations>> observe() {
     std::vector<Observations> out;
-    for (Simulator<B>& a : agents_) {
+    for (BasicSimulator<B>& a : agents_) {
       Result<Observations> r = a.observe();
       if (!r) return r.status();
       out.push_back(std::move(*r));
@@ -153,7 +153,7 @@ class Team {
   }
 
   std::shared_ptr<TeamBodies> bodies_;
-  std::vector<Simulator<B>> agents_;
+  std::vector<BasicSimulator<B>> agents_;
 };
 
 }  // namespace gsnav

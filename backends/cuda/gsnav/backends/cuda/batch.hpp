@@ -45,7 +45,7 @@ struct BatchStats {
 };
 
 /// Draws many cameras in one call on one GPU; docs/cuda.md says how. Images have the bits that
-/// `Renderer<float, CudaBackend>` gives each camera alone, whatever the batch.
+/// `BasicRenderer<float, CudaBackend>` gives each camera alone, whatever the batch.
 ///
 ///     gsnav::CudaBatchRenderer batch(cuda, config);
 ///     batch.render(sets, cameras, images).throw_if_error();   // returns at once

@@ -18,12 +18,13 @@
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
 #include "gsnav/detail/sim/team.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 #include "gsnav/sim/config.hpp"
-#include "gsnav/sim/simulator.hpp"
 
 namespace gsnav {
 
-/// N environments over M scenes that they share: what N Simulators would do, bit for bit, by one call.
+/// N environments over M scenes that they share, on a backend of your choice; BatchSimulator takes a
+/// Device. One call does what N simulators would do, bit for bit.
 ///
 ///     auto sim = make_batch_simulator(backend, scenes, config, 256, episode_of).value();
 ///     auto out = sim.reset().value();
@@ -34,15 +35,15 @@ namespace gsnav {
 /// look at them. The backend must outlive it. After an error reset() begins anew. One that was moved
 /// from has no environments and answers with invalid_argument.
 template <Backend B>
-class BatchSimulator {
+class BasicBatchSimulator {
  public:
   /// `next_episode` is asked for each episode of each environment; see EpisodeSource. Errors:
   /// invalid_argument (names the field, sensor or scene); unsupported, naming a sensor whose images
   /// cannot stay where BatchConfig::images says.
-  static Result<BatchSimulator> create(B& backend,
-                                       std::vector<std::shared_ptr<const SimulatorScene>> scenes,
-                                       BatchConfig config, std::size_t environments,
-                                       EpisodeSource next_episode) {
+  static Result<BasicBatchSimulator> create(B& backend,
+                                            std::vector<std::shared_ptr<const SimulatorScene>> scenes,
+                                            BatchConfig config, std::size_t environments,
+                                            EpisodeSource next_episode) {
     for (const auto& scene : scenes) {
       if (scene == nullptr) return {Errc::invalid_argument, "BatchSimulator: a scene is null"};
       if (Status s = validate(*scene, config); !s) return s;
@@ -56,9 +57,10 @@ class BatchSimulator {
   /// `next_episode` is asked for the next episode of an environment already when one begins, so that its
   /// scene can be loaded meanwhile. Errors: as above; invalid_argument where `library` is null. What
   /// loading a scene reports comes from the reset or step that needs it.
-  static Result<BatchSimulator> create_from_library(B& backend, std::shared_ptr<SceneLibrary> library,
-                                                    BatchConfig config, std::size_t environments,
-                                                    EpisodeSource next_episode) {
+  static Result<BasicBatchSimulator> create_from_library(B& backend,
+                                                         std::shared_ptr<SceneLibrary> library,
+                                                         BatchConfig config, std::size_t environments,
+                                                         EpisodeSource next_episode) {
     if (library == nullptr)
       return {Errc::invalid_argument, "BatchSimulator: the library of scenes is null"};
     return create(
@@ -84,7 +86,7 @@ class BatchSimulator {
   /// environment that is done, with AutoReset::disabled; before reset), with the environment's number;
   /// what World::step reports; rendering.
   Result<BatchStep> step(std::span<const Action> actions) { return act(actions); }
-  /// The same by velocities, as Simulator::step(VelocityCommand).
+  /// The same by velocities, as BasicSimulator::step(VelocityCommand).
   Result<BatchStep> step(std::span<const VelocityCommand> commands) { return act(commands); }
 
   /// Renders made so far, and how many times an avatar was skinned for them.
@@ -96,10 +98,10 @@ class BatchSimulator {
   using ScenePointer = std::shared_ptr<const SimulatorScene>;
   using SceneOf = typename BatchScenes<B>::SceneOf;
 
-  static Result<BatchSimulator> create(B& backend, SceneOf scene_of,
-                                       std::function<void(std::size_t)> prefetch, std::size_t scenes,
-                                       BatchConfig config, std::size_t environments,
-                                       EpisodeSource next_episode) {
+  static Result<BasicBatchSimulator> create(B& backend, SceneOf scene_of,
+                                            std::function<void(std::size_t)> prefetch,
+                                            std::size_t scenes, BatchConfig config,
+                                            std::size_t environments, EpisodeSource next_episode) {
     if (Status s = validate(static_cast<const SimulatorConfig&>(config)); !s) return s;
     if (config.images > ImageMemory::backend) {
       return {Errc::invalid_argument,
@@ -138,12 +140,12 @@ class BatchSimulator {
       if (Status s = validate(**scene, config); !s) return s;
       return scene;
     };
-    return BatchSimulator(backend, std::move(*worlds), std::move(config), std::move(checked), scenes,
-                          scenes_leave);
+    return BasicBatchSimulator(backend, std::move(*worlds), std::move(config), std::move(checked),
+                               scenes, scenes_leave);
   }
 
-  BatchSimulator(B& backend, BatchWorld worlds, BatchConfig config, SceneOf scene_of, std::size_t scenes,
-                 bool scenes_leave)
+  BasicBatchSimulator(B& backend, BatchWorld worlds, BatchConfig config, SceneOf scene_of,
+                      std::size_t scenes, bool scenes_leave)
       : backend_(&backend),
         worlds_(std::move(worlds)),
         config_(std::move(config)),
@@ -273,23 +275,23 @@ class BatchSimulator {
   std::vector<SceneView> views_;
 };
 
-/// BatchSimulator<B>::create, and create_from_library, with B deduced.
+/// BasicBatchSimulator<B>::create, and create_from_library, with B deduced.
 template <Backend B>
-Result<BatchSimulator<B>> make_batch_simulator(B& backend,
-                                               std::vector<std::shared_ptr<const SimulatorScene>> scenes,
-                                               BatchConfig config, std::size_t environments,
-                                               EpisodeSource next_episode) {
-  return BatchSimulator<B>::create(backend, std::move(scenes), std::move(config), environments,
-                                   std::move(next_episode));
+Result<BasicBatchSimulator<B>> make_batch_simulator(
+    B& backend, std::vector<std::shared_ptr<const SimulatorScene>> scenes, BatchConfig config,
+    std::size_t environments, EpisodeSource next_episode) {
+  return BasicBatchSimulator<B>::create(backend, std::move(scenes), std::move(config), environments,
+                                        std::move(next_episode));
 }
 
 template <Backend B>
-Result<BatchSimulator<B>> make_batch_simulator_from_library(B& backend,
-                                                            std::shared_ptr<SceneLibrary> library,
-                                                            BatchConfig config, std::size_t environments,
-                                                            EpisodeSource next_episode) {
-  return BatchSimulator<B>::create_from_library(backend, std::move(library), std::move(config),
-                                                environments, std::move(next_episode));
+Result<BasicBatchSimulator<B>> make_batch_simulator_from_library(B& backend,
+                                                                 std::shared_ptr<SceneLibrary> library,
+                                                                 BatchConfig config,
+                                                                 std::size_t environments,
+                                                                 EpisodeSource next_episode) {
+  return BasicBatchSimulator<B>::create_from_library(backend, std::move(library), std::move(config),
+                                                     environments, std::move(next_episode));
 }
 
 }  // namespace gsnav

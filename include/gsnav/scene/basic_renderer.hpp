@@ -23,19 +23,20 @@
 
 namespace gsnav {
 
-/// Renders Gaussians on a backend. Keeps its scratch between calls: a steady frame allocates nothing
-/// but what its caller's vectors need. `S` is the scalar of all arithmetic; sort keys are float32 for
-/// every S. The backend must outlive it. One that was moved from has its settings, no meshes and no
-/// scratch, and may render on. Floating point must round to nearest (fegetround() == FE_TONEAREST, as a
-/// program starts): in other modes images have other bits. Flushing denormals to zero changes none.
+/// The renderer over a scalar and a backend of your choice; Renderer takes a Device. Keeps its scratch
+/// between calls: a steady frame allocates nothing but what its caller's vectors need. `S` is the scalar
+/// of all arithmetic; sort keys are float32 for every S. The backend must outlive it. One that was moved
+/// from has its settings, no meshes and no scratch, and may render on. Floating point must round to
+/// nearest (fegetround() == FE_TONEAREST, as a program starts): in other modes images have other bits.
+/// Flushing denormals to zero changes none.
 ///
 ///     gsnav::SerialBackend backend;
-///     gsnav::Renderer<float, gsnav::SerialBackend> renderer(backend);
+///     gsnav::BasicRenderer<float, gsnav::SerialBackend> renderer(backend);
 ///     auto frames = renderer.render({{cloud.set()}}, {{camera}}).value();   // frames.rgb, ...
 template <class S, Backend B>
-class Renderer {
+class BasicRenderer {
  public:
-  explicit Renderer(B& backend, const RenderConfig& config = {})
+  explicit BasicRenderer(B& backend, const RenderConfig& config = {})
       : backend_(&backend), config_(config), workspace_(backend), device_images_(backend) {}
 
   const RenderConfig& config() const noexcept { return config_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/simulator.hpp"
+#include "gsnav/sim/basic_simulator.hpp"
 
 #include <string_view>
 

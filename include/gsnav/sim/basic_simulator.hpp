@@ -23,7 +23,8 @@ std::uint64_t noise_seed(std::uint64_t seed, const WorldState& state) noexcept;
 /// so that an episode has one goal image.
 Quatd goal_rotation(const PointNavEpisode& episode) noexcept;
 
-/// A simulator: scene, avatars, agent, sensors and the PointNav task, rendered on backend B.
+/// The simulator over a backend of your choice; Simulator takes a Device. Scene, avatars, agent,
+/// sensors and the PointNav task.
 ///
 ///     auto sim = make_simulator(backend, scene, config).value();
 ///     auto obs = sim.reset(episode).value();
@@ -36,15 +37,15 @@ Quatd goal_rotation(const PointNavEpisode& episode) noexcept;
 /// moved from answers whatever can fail with invalid_argument; world().navmesh() and avatars() must not
 /// be asked of it.
 template <Backend B>
-class Simulator {
+class BasicSimulator {
  public:
   /// Errors: invalid_argument (names the field, sensor or asset).
-  static Result<Simulator> create(B& backend, SimulatorScene scene, SimulatorConfig config) {
+  static Result<BasicSimulator> create(B& backend, SimulatorScene scene, SimulatorConfig config) {
     return create(backend, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(config));
   }
   /// `others` adds bodies to the scene's avatars, numbered behind them. Errors: as above.
-  static Result<Simulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene,
-                                  SimulatorConfig config, World::BodySource others = {}) {
+  static Result<BasicSimulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene,
+                                       SimulatorConfig config, World::BodySource others = {}) {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
     if (Status s = validate(config); !s) return s;
     if (Status s = validate(*scene, config); !s) return s;
@@ -54,7 +55,7 @@ class Simulator {
           if (others) others(t0, t1, out);
         });
     if (!world) return world.status();
-    return Simulator(backend, std::move(*world), std::move(config), std::move(scene));
+    return BasicSimulator(backend, std::move(*world), std::move(config), std::move(scene));
   }
 
   /// Begins an episode. Errors: what World::reset reports; rendering.
@@ -122,7 +123,7 @@ class Simulator {
   std::size_t render_count() const noexcept { return rig_.render_count() + spectator_count_; }
 
   /// Renders any camera at the present time (a map, a spectator). Images live until the next call.
-  /// Errors: what Renderer::render reports.
+  /// Errors: what BasicRenderer::render reports.
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) {
     if (Status s = alive(); !s) return s;
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
@@ -159,7 +160,8 @@ class Simulator {
                : Status();
   }
 
-  Simulator(B& backend, World world, SimulatorConfig config, std::shared_ptr<const SimulatorScene> scene)
+  BasicSimulator(B& backend, World world, SimulatorConfig config,
+                 std::shared_ptr<const SimulatorScene> scene)
       : world_(std::move(world)),
         config_(std::move(config)),
         scene_(backend, std::move(scene), detail_choice(config_)),
@@ -180,10 +182,10 @@ class Simulator {
   std::size_t spectator_count_ = 0;
 };
 
-/// Simulator<B>::create with B deduced.
+/// BasicSimulator<B>::create with B deduced.
 template <Backend B>
-Result<Simulator<B>> make_simulator(B& backend, SimulatorScene scene, SimulatorConfig config) {
-  return Simulator<B>::create(backend, std::move(scene), std::move(config));
+Result<BasicSimulator<B>> make_simulator(B& backend, SimulatorScene scene, SimulatorConfig config) {
+  return BasicSimulator<B>::create(backend, std::move(scene), std::move(config));
 }
 
 }  // namespace gsnav
