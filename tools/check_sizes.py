@@ -27,7 +27,6 @@ LONG_FUNCTIONS = {
     "bench/bench_storage.cpp": 92,
     "include/gsnav/detail/scene/lod_levels.hpp": 86,
     "include/gsnav/detail/sim/semantic_frame.hpp": 86,
-    "src/avatar/clip_walk.cpp": 103,
     "src/avatar/retarget.cpp": 111,
     "tools/avatar/walk.cpp": 85,
 }
