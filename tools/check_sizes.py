@@ -21,7 +21,6 @@ LONG_FILES = {
 }
 LONG_FUNCTIONS = {
     "backends/cuda/src/batch_project.cu": 149,
-    "bench/bench_storage.cpp": 92,
     "include/gsnav/detail/sim/semantic_frame.hpp": 86,
     "tools/avatar/walk.cpp": 85,
 }
