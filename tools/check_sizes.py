@@ -16,8 +16,6 @@ SOURCES = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".inl"}
 LONG_FILES = {
     "backends/cuda/src/batch_order.cuh": 379,
     "backends/cuda/src/mesh.cu": 427,
-    "bench/bench_kernels_body.cpp": 379,
-    "bench/floor_loops.cpp": 360,
 }
 LONG_FUNCTIONS = {
     "backends/cuda/src/batch_project.cu": 149,
