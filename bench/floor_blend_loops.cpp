@@ -17,7 +17,7 @@ using Ints = F::ints;
 constexpr __mmask16 kAll = 0xffff;  // g++ 12 warns of the unmasked forms' undefined source
 #endif
 
-/// Square root to at least 14 bits: what a footprint padded by a thousandth of a pixel can do with.
+/// Square root to at least 14 bits: enough for a footprint that is padded by a thousandth of a pixel.
 F root(F x) noexcept {
 #if defined(__AVX512F__)
   if constexpr (kLanes == 16) {
@@ -31,9 +31,8 @@ F root(F x) noexcept {
 
 Ints truncated(F x) noexcept { return __builtin_convertvector(x.v, Ints); }
 
-/// Ellipses of many pairs by planes, relative to the corner of the pair's tile: mean, half width, the
-/// height at which the ellipse is widest to the right, 1 / half height, and the slope of its middle
-/// line.
+/// Ellipses of many pairs (splat, tile) by planes, relative to the tile's corner: mean, half width, the
+/// height at which the right edge is farthest, 1 / half height, and the slope of the middle line.
 struct Ellipses {
   const float *x, *y, *half_width, *widest, *inv_height, *slope;
 };
@@ -47,7 +46,7 @@ Ints block_masks(const Ellipses& e, std::size_t i) noexcept {
   for (int strip = 0; strip < 4; ++strip) {
     const float first = 4.0f * static_cast<float>(strip) + 0.5f;
     const F low = F(first) - y, high = F(first + 3.0f) - y;  // rows of pixel centres
-    // The right edge is farthest at `widest`, the left one at -widest, or at the strip's nearer border.
+    // The right edge is farthest at `widest` and the left one at -widest, each clamped to the strip.
     const auto edge = [&](F at) {
       const F n = at * inv;
       return std::pair<F, F>(half * root(fma(-n, n, F(1.0f))), fma(slope, at, x));
@@ -99,13 +98,12 @@ struct alignas(64) BlockSplat {
   float a, w1, k, b, w2, log2_opacity, r, g, blue;
 };
 
-/// alpha = 2^e without clamps by a cubic; zero below log2(1/255).
+/// alpha = 2^e by a cubic polynomial; zero below log2(1/255).
 F alpha_of(F e) noexcept {
   const auto hit = e >= F(-7.9943534f);
 #if defined(__AVX512DQ__)
   if constexpr (kLanes == 16) {
-    // e - floor(e), 2^f over [0, 1] by a cubic (relative error 1e-4), and 2^floor(e) by the instruction
-    // made for it.
+    // 2^f of f = e - floor(e) by a cubic (relative error 1e-4), scaled by 2^floor(e).
     const __m512 v = reinterpret_cast<__m512>(e.v);
     const F f(reinterpret_cast<F::vector>(_mm512_maskz_reduce_ps(kAll, v, 0x01)));
     F p = fma(f, F(0.078967257f), F(0.22469316f));
@@ -122,8 +120,8 @@ F alpha_of(F e) noexcept {
   return select(hit, gsnav::min(alpha, F(0.99f)), F(0.0f));
 }
 
-/// Splats onto one 8x8 block: a pack is eight columns of one row, two or (of half a row) so many; the
-/// exponent's first square belongs to the column and is shared by all of a splat's packs.
+/// Blends splats onto one block of 8x8 pixels. A pack holds rows of eight columns, or half a row. The
+/// first square of the exponent depends on the column only, so that the packs of a splat share it.
 template <bool Color>
 void blend_block(const BlockSplat* splats, std::size_t n, float* out) noexcept {
   constexpr int kPacks = 64 / kLanes, kColumnPacks = kLanes < 8 ? 8 / kLanes : 1;

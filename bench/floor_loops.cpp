@@ -59,7 +59,7 @@ double measure_sort_ns(int threads) {
   const std::unique_ptr<std::uint64_t[]> input(new std::uint64_t[kKeys]), a(new std::uint64_t[kKeys]),
       b(new std::uint64_t[kKeys]);
   const std::size_t pieces = static_cast<std::size_t>(threads);
-  // Both passes' counts of all threads; a thread's own lie together.
+  // Counts of both passes and all threads; those of a thread lie together.
   const std::unique_ptr<std::uint32_t[]> counts(new std::uint32_t[2 * pieces * kDigits]);
   Rng rng(1);
   for (std::size_t i = 0; i < kKeys; ++i) {
@@ -77,7 +77,7 @@ double measure_sort_ns(int threads) {
         const std::uint64_t* from = pass == 0 ? input.get() : a.get();
         std::uint64_t* to = pass == 0 ? a.get() : b.get();
         std::uint32_t* own = counts.get() + (static_cast<std::size_t>(pass) * pieces + t) * kDigits;
-        // One thread alone counts both passes in one reading; of several each sees its own part anew.
+        // One thread counts for both passes in one reading. Several read their parts anew in each pass.
         if (pass == 0 || pieces > 1) {
           for (std::size_t d = 0; d < kDigits * (pieces == 1 ? 2 : 1); ++d) own[d] = 0;
           for (std::size_t i = begin; i < end; ++i) {
@@ -128,8 +128,8 @@ double measure_bin_ns() {
   const std::unique_ptr<Pair[]> pairs(new Pair[count + 4]);
   const std::unique_ptr<std::uint32_t[]> lists(new std::uint32_t[count]);
   const double ns = best_ns(20, [&] {
-    // Four pairs are always written and as many kept as there are tiles: a branch on that could not be
-    // predicted. More than 2x2 tiles are rare and would take one.
+    // Always write four pairs and keep as many as there are tiles: a branch on their number could not be
+    // predicted. More than 2x2 tiles are rare and not counted here.
     Pair* end = pairs.get();
     for (std::uint32_t i = 0; i < kSplats; ++i) {
       const Range r = ranges[i];
