@@ -16,12 +16,12 @@
 #include <string>
 #include <vector>
 
+#include "cloud_or_flat.hpp"
 #include "compare.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace {
 
@@ -119,18 +119,12 @@ int main(int argc, char** argv) {
   app.add_option("--views", views, "Images of 640x480 for the PSNR");
   app.add_flag("--markdown", markdown, "Print the table as docs/formats.md has it");
   CLI11_PARSE(app, argc, argv);
-  GaussianCloud source;
-  if (scene.empty()) {
-    source = make_default_scene(1.0).value().cloud;
-    sort_spatially(source);
-  } else {
-    auto loaded = io::load_scene(scene);
-    if (!loaded) {
-      std::fprintf(stderr, "bench_io: %s\n", loaded.message().c_str());
-      return 1;
-    }
-    source = std::move(loaded->cloud);
+  const auto loaded = gsnav_bench::cloud_or_flat(scene);
+  if (!loaded) {
+    std::fprintf(stderr, "bench_io: %s\n", loaded.message().c_str());
+    return 1;
   }
+  const GaussianCloud& source = *loaded;
   const auto cameras = views_around(source, guess_up(source).up, views, 640, 480);
   const double n = static_cast<double>(source.size());
   std::printf("%zu Gaussians of SH degree %d, %.1f MB in memory\n\n", source.size(), source.sh_degree,

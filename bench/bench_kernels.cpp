@@ -7,6 +7,7 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   gsnav_bench::register_frame_kernels();
+  gsnav_bench::register_skin_kernels();
   gsnav_bench::register_body_kernels();
   gsnav_bench::register_capsule_kernels();
   benchmark::RunSpecifiedBenchmarks();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench_storage [--scene FILE] [--cameras FILE] [--threads N]: a scene in each way of keeping it in
-// memory: what that takes, what it changes, and the time of a frame (RGB, median over views and
-// repeats), one row each, and what each packed plane changes by itself, as in docs/formats.md.
+// bench_storage [--scene FILE] [--cameras FILE] [--threads N]: compares the ways of keeping a scene in
+// memory. A row each: bytes, time of a frame (RGB, median over views and repeats), and how much images
+// change. Then what each packed plane changes by itself (docs/formats.md).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -10,15 +10,13 @@
 #include <utility>
 #include <vector>
 
+#include "cloud_or_flat.hpp"
 #include "compare.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
-#include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace {
 
@@ -68,6 +66,82 @@ double frame_time(OpenMPBackend& backend, const GaussianSet& set, const std::vec
   return times[times.size() / 2];
 }
 
+/// The ways of keeping a cloud in memory that are compared.
+struct Storages {
+  GaussianCloud full, compact;
+  PackedCloud packed, packed_means;  ///< the latter with means in 16 bits
+  PackErrors errors;                 ///< of packed_means
+
+  explicit Storages(GaussianCloud cloud)
+      : full(std::move(cloud)), compact(full), packed(pack_cloud(full)) {
+    compact_sh(compact);
+    PackLimits limits;
+    limits.mean = 0.1;  // of a Gaussian's deviation, which no mean moves by more than
+    packed_means = pack_cloud(full, limits, &errors);
+  }
+};
+
+gsnav_convert::ImageErrors image_errors(const GaussianCloud& full, const GaussianCloud& other,
+                                        const std::vector<Camera>& cameras) {
+  return gsnav_convert::image_errors(full, other, resized(cameras, kSizes[1])).value();
+}
+
+void print_storages(const Storages& s, const std::vector<Camera>& cameras, int threads, int repeats) {
+  OpenMPBackend backend(threads);
+  std::printf(
+      "| storage | MB | bytes each | 256x256, ms | 640x480, ms | 1920x1080, ms | PSNR, dB | worst view, "
+      "dB |\n");
+  std::printf("| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+  const auto row = [&](const char* name, std::size_t bytes, const GaussianSet& set,
+                       const GaussianCloud* floats) {
+    std::printf("| %s | %.1f | %.1f |", name, static_cast<double>(bytes) / 1e6,
+                static_cast<double>(bytes) / static_cast<double>(s.full.size()));
+    for (const Size& size : kSizes)
+      std::printf(" %.2f |", frame_time(backend, set, resized(cameras, size), repeats));
+    if (floats == nullptr) {
+      std::printf(" | |\n");
+    } else {
+      const auto images = image_errors(s.full, *floats, cameras);
+      std::printf(" %.1f | %.1f |\n", images.psnr, images.worst);
+    }
+  };
+  GaussianCloud widened = s.compact;
+  expand_sh(widened);
+  const GaussianCloud unpacked = unpack_cloud(s.packed), unpacked_means = unpack_cloud(s.packed_means);
+  row("full", s.full.bytes(), s.full.set(), nullptr);
+  row("compact", s.compact.bytes(), s.compact.set(), &widened);
+  row("packed", s.packed.bytes(), s.packed.set(), &unpacked);
+  row("packed, means too", s.packed_means.bytes(), s.packed_means.set(), &unpacked_means);
+}
+
+void print_pack_errors(const PackErrors& e) {
+  std::printf(
+      "\nthe last changes means by up to %.2g m (%.2g of a Gaussian's largest deviation), scales by "
+      "%.2g of the largest,\n"
+      "rotations by %.2g rad, opacities by %.2g, coefficients of degree 0 by %.2g, others by %.2g (root "
+      "mean square %.2g)\n",
+      e.mean, e.mean_deviations, e.scale, e.rotation, e.opacity, e.sh0, e.sh, e.sh_rms);
+}
+
+/// What each packed plane changes in an image by itself.
+void print_planes(const Storages& s, const std::vector<Camera>& cameras) {
+  const GaussianCloud unpacked = unpack_cloud(s.packed_means);
+  std::printf("\n| packed alone | PSNR, dB | worst view, dB |\n| --- | --- | --- |\n");
+  const auto alone = [&](const char* name, auto GaussianCloud::*plane) {
+    GaussianCloud one = s.full;
+    one.*plane = unpacked.*plane;
+    one.chunk_bounds.clear();  // they are those of the planes together
+    const auto images = image_errors(s.full, one, cameras);
+    std::printf("| %s | %.1f | %.1f |\n", name, images.psnr, images.worst);
+  };
+  alone("means", &GaussianCloud::means);
+  alone("scales", &GaussianCloud::scales);
+  alone("rotations", &GaussianCloud::quats);
+  alone("opacities", &GaussianCloud::opacities);
+  alone("colours of degree 0", &GaussianCloud::sh0);
+  alone("SH bands", &GaussianCloud::shN);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -80,19 +154,12 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "All cores if not given");
   app.add_option("--repeats", repeats, "Frames of each view")->check(CLI::Range(1, 1000));
   CLI11_PARSE(app, argc, argv);
-  GaussianCloud full;
-  if (scene.empty()) {
-    full = make_default_scene(1.0).value().cloud;
-    sort_spatially(full);
-  } else {
-    auto loaded = io::load_scene(scene);
-    if (!loaded) {
-      std::fprintf(stderr, "bench_storage: %s\n", loaded.message().c_str());
-      return 1;
-    }
-    full = std::move(loaded->cloud);
+  auto cloud = gsnav_bench::cloud_or_flat(scene);
+  if (!cloud) {
+    std::fprintf(stderr, "bench_storage: %s\n", cloud.message().c_str());
+    return 1;
   }
-  std::vector<Camera> cameras = views_around(full, guess_up(full).up, 4, 640, 480);
+  std::vector<Camera> cameras = views_around(*cloud, guess_up(*cloud).up, 4, 640, 480);
   if (!cameras_path.empty()) {
     auto read = io::load_cameras(cameras_path);
     if (!read) {
@@ -101,64 +168,12 @@ int main(int argc, char** argv) {
     }
     cameras = std::move(*read);
   }
-  GaussianCloud compact = full;
-  compact_sh(compact);
-  // What means in 16 bits would save and cost, where none moves by more than a tenth of its Gaussian's
-  // deviation.
-  PackLimits all_planes;
-  all_planes.mean = 0.1;
-  PackErrors errors;
-  const PackedCloud packed = pack_cloud(full), smaller = pack_cloud(full, all_planes, &errors);
-  GaussianCloud unpacked = unpack_cloud(smaller), widened = compact;
-  const GaussianCloud unpacked_default = unpack_cloud(packed);
-  expand_sh(widened);
+  const Storages storages(std::move(*cloud));
   std::printf("%zu Gaussians of SH degree %d; packed, means too: means in %d bits, SH in %d\n\n",
-              full.size(), full.sh_degree, errors.mean_bits, errors.sh_bits);
-  OpenMPBackend backend(threads);
-  std::printf(
-      "| storage | MB | bytes each | 256x256, ms | 640x480, ms | 1920x1080, ms | PSNR, dB | worst view, "
-      "dB |\n");
-  std::printf("| --- | --- | --- | --- | --- | --- | --- | --- |\n");
-  const auto row = [&](const char* name, std::size_t bytes, const GaussianSet& set,
-                       const GaussianCloud* floats) {
-    std::printf("| %s | %.1f | %.1f |", name, static_cast<double>(bytes) / 1e6,
-                static_cast<double>(bytes) / static_cast<double>(full.size()));
-    for (const Size& size : kSizes)
-      std::printf(" %.2f |", frame_time(backend, set, resized(cameras, size), repeats));
-    if (floats == nullptr) {
-      std::printf(" | |\n");
-    } else {
-      const auto images =
-          gsnav_convert::image_errors(full, *floats, resized(cameras, kSizes[1])).value();
-      std::printf(" %.1f | %.1f |\n", images.psnr, images.worst);
-    }
-  };
-  row("full", full.bytes(), full.set(), nullptr);
-  row("compact", compact.bytes(), compact.set(), &widened);
-  row("packed", packed.bytes(), packed.set(), &unpacked_default);
-  row("packed, means too", smaller.bytes(), smaller.set(), &unpacked);
-  std::printf(
-      "\nthe last changes means by up to %.2g m (%.2g of a Gaussian's largest deviation), scales by "
-      "%.2g of the "
-      "largest,\n"
-      "rotations by %.2g rad, opacities by %.2g, coefficients of degree 0 by %.2g, others by %.2g (root "
-      "mean square "
-      "%.2g)\n",
-      errors.mean, errors.mean_deviations, errors.scale, errors.rotation, errors.opacity, errors.sh0,
-      errors.sh, errors.sh_rms);
-  std::printf("\n| packed alone | PSNR, dB | worst view, dB |\n| --- | --- | --- |\n");
-  const auto alone = [&](const char* name, const auto& replace) {
-    GaussianCloud one = full;
-    replace(one);
-    one.chunk_bounds.clear();  // they are those of the planes together
-    const auto images = gsnav_convert::image_errors(full, one, resized(cameras, kSizes[1])).value();
-    std::printf("| %s | %.1f | %.1f |\n", name, images.psnr, images.worst);
-  };
-  alone("means", [&](GaussianCloud& c) { c.means = unpacked.means; });
-  alone("scales", [&](GaussianCloud& c) { c.scales = unpacked.scales; });
-  alone("rotations", [&](GaussianCloud& c) { c.quats = unpacked.quats; });
-  alone("opacities", [&](GaussianCloud& c) { c.opacities = unpacked.opacities; });
-  alone("colours of degree 0", [&](GaussianCloud& c) { c.sh0 = unpacked.sh0; });
-  alone("SH bands", [&](GaussianCloud& c) { c.shN = unpacked.shN; });
+              storages.full.size(), storages.full.sh_degree, storages.errors.mean_bits,
+              storages.errors.sh_bits);
+  print_storages(storages, cameras, threads, repeats);
+  print_pack_errors(storages.errors);
+  print_planes(storages, cameras);
   return 0;
 }

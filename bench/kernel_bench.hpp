@@ -17,6 +17,7 @@
 #include "gsnav/backends/cuda.hpp"
 #endif
 #include "gsnav/core/rng.hpp"
+#include "gsnav/math/quat.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 // What the families of kernel benchmarks share: how rows are named and which backends they run on.
@@ -25,7 +26,8 @@ namespace gsnav_bench {
 
 // One function a family, called by main.
 void register_frame_kernels();    // projection, SH, keys, sort, bin, blend
-void register_body_kernels();     // skinning, polar rotation, forward kinematics
+void register_skin_kernels();     // linear blend skinning
+void register_body_kernels();     // polar rotation, forward kinematics
 void register_capsule_kernels();  // distance, time of impact
 
 /// Its time is what the body says (SetIterationTime), or else that of a clock.
@@ -105,6 +107,15 @@ void time_items(benchmark::State& state, B& backend, std::size_t n, const F& f,
     benchmark::ClobberMemory();
   }
   count(state, n, bytes_per_item);
+}
+
+/// Joints of an SMPL-X body.
+inline constexpr std::size_t kJoints = 55;
+
+/// A rotation about any axis by up to `most` radians.
+inline gsnav::Quat<double> random_turn(gsnav::Rng& rng, double most) {
+  return gsnav::axis_angle(gsnav::normalized(gsnav::Vec3d{rng.normal(), rng.normal(), rng.normal()}),
+                           rng.uniform(0, most));
 }
 
 /// A wall of n Gaussians three metres ahead, one in ten a needle.

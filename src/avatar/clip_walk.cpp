@@ -36,7 +36,7 @@ double median(std::vector<double> v) {
   return v[v.size() / 2];
 }
 
-/// Means over a round's values, `reach` to each side.
+/// Means of the values of a round, over `reach` values to each side.
 std::vector<double> smoothed(const std::vector<double>& v, std::size_t reach) {
   const std::size_t n = v.size();
   std::vector<double> out(n, 0.0);
@@ -45,6 +45,103 @@ std::vector<double> smoothed(const std::vector<double>& v, std::size_t reach) {
     out[k] /= static_cast<double>(2 * reach + 1);
   }
   return out;
+}
+
+/// Where the points of both soles are at each key of a cycle.
+class SolePaths {
+ public:
+  SolePaths(const Skeleton& skeleton, const std::vector<Foot>& feet,
+            const std::vector<LocalPose>& cycle) {
+    double least = std::numeric_limits<double>::max();
+    std::vector<Affine3<double>> globals;
+    for (std::size_t k = 0; k < cycle.size(); ++k) {
+      forward_kinematics(skeleton, cycle[k], globals);
+      std::vector<Vec3d>& at = at_.emplace_back();
+      for (const Foot& foot : feet) {
+        for (const SolePoint& p : foot.sole) at.push_back(globals[p.joint] * p.local + cycle[k].root);
+      }
+      const double apart =
+          norm(globals[feet[0].joints[0]].translation - globals[feet[1].joints[0]].translation);
+      if (apart < least) least = apart, closest_ = k;
+    }
+  }
+
+  /// The key at which the feet are closest together.
+  std::size_t closest() const { return closest_; }
+
+  /// Height of the lower sole at each key, without the tips of the toes, whose place is a guess.
+  std::vector<double> heights() const {
+    std::vector<double> out;
+    for (const std::vector<Vec3d>& at : at_) {
+      out.push_back(std::numeric_limits<double>::max());
+      for (std::size_t i = 0; i < at.size(); ++i) {
+        if (i % 3 != 2) out.back() = min(out.back(), at[i].y);
+      }
+    }
+    return out;
+  }
+
+  void lower(const std::vector<double>& by) {
+    for (std::size_t k = 0; k < at_.size(); ++k) {
+      for (Vec3d& p : at_[k]) p.y -= by[k];
+    }
+  }
+
+  /// Where the toes point, along the ground; any length.
+  Vec3d toes() const {
+    Vec3d out{};
+    for (const std::vector<Vec3d>& at : at_) {
+      for (std::size_t i = 0; i + 2 < at.size(); i += 3) out += at[i + 2] - at[i];
+    }
+    out.y = 0;
+    return out;
+  }
+
+  /// How far the body moves from each key to the next, along the ground: as far as the foot that is down
+  /// stays behind. That foot is low, and moves back against the unit vector `ahead`.
+  std::vector<Vec3d> steps(const Vec3d& ahead) const {
+    std::vector<double> lowest(at_[0].size(), std::numeric_limits<double>::max());
+    for (const std::vector<Vec3d>& at : at_) {
+      for (std::size_t i = 0; i < at.size(); ++i) lowest[i] = min(lowest[i], at[i].y);
+    }
+    std::vector<Vec3d> out;
+    for (std::size_t k = 0; k < at_.size(); ++k) {
+      const std::vector<Vec3d>&at = at_[k], &next = at_[(k + 1) % at_.size()];
+      double sum = 1e-12;
+      Vec3d step{};
+      for (std::size_t i = 0; i < at.size(); ++i) {
+        const double up = 0.5 * (at[i].y + next[i].y) - lowest[i];
+        const Vec3d d{at[i].x - next[i].x, 0, at[i].z - next[i].z};
+        const double back = max(0.0, dot(d, ahead));
+        const double w = std::exp(-up / 0.015) * back * back * 1e6;
+        step += d * w;
+        sum += w;
+      }
+      out.push_back(step * (1.0 / sum));
+    }
+    return out;
+  }
+
+ private:
+  std::vector<std::vector<Vec3d>> at_;  ///< [key][point]: heel, ball and tip of each foot
+  std::size_t closest_ = 0;
+};
+
+/// Turns the roots of all poses, and puts the first joint above the middle of the feet as it stood on
+/// average.
+void turn_roots(const Skeleton& skeleton, const Quatd& turn, std::vector<LocalPose>& cycle) {
+  const Affine3<double> turned{rotation_matrix(turn), {}};
+  Vec3d mean{};
+  for (const LocalPose& p : cycle) {
+    mean += p.translations[0] * (1.0 / static_cast<double>(cycle.size()));
+  }
+  for (LocalPose& p : cycle) {
+    for (std::size_t j = 0; j < skeleton.size(); ++j) {
+      if (skeleton.parents[j] >= 0) continue;
+      p.rotations[j] = turn * p.rotations[j];
+      p.translations[j] = turned * (p.translations[j] - Vec3d{mean.x, 0, mean.z});
+    }
+  }
 }
 
 }  // namespace
@@ -96,7 +193,8 @@ void ClipWalk::pose(const MotionInput& input, LocalPose& out) const {
   const double u = clamp((d - way_[b - 1]) / (way_[b] - way_[b - 1]), 0.0, 1.0);
   LocalPose& walk = out;
   blend(cycle_[b - 1], cycle_[b % cycle_.size()], u, walk);
-  // Steps are as long as ever at half the speed; a turn on the spot lifts the feet a little.
+  // Slow steps keep their length down to about half the speed. A turn on the spot lifts the feet a
+  // little.
   const double slow = 1.0 - clamp(input.walking, 0.0, 1.0);
   const double share = max(1.0 - slow * slow * slow, 0.35 * clamp(input.turning, 0.0, 1.0));
   if (share < 1.0) {
@@ -109,7 +207,7 @@ void ClipWalk::find_cycle(const MotionClip& clip, std::size_t& first, std::size_
   const std::size_t n = clip.frames();
   first = 0;
   keys = n - 1;
-  // The greatest change within the clip says what "the same" is.
+  // Poses are "the same" relative to the greatest difference within the clip.
   double most = 0.0;
   for (std::size_t k = 0; k < n; k += max<std::size_t>(1, n / 50))
     most = max(most, difference(clip, 0, k));
@@ -129,10 +227,11 @@ void ClipWalk::find_cycle(const MotionClip& clip, std::size_t& first, std::size_
     for (std::size_t b = a + max<std::size_t>(4, span(0.7)); b + tenth < n && b <= a + span(1.8); ++b) {
       if (path && (speed(b) < 0.8 || norm(clip.root_translation[b] - clip.root_translation[a]) < 0.8))
         continue;
-      // The poses and where they come from and go.
+      // Compare the poses, those before and those after.
       double d = difference(clip, a, b) + difference(clip, a - tenth, b - tenth) +
                  difference(clip, a + tenth, b + tenth);
-      // Of parts that close as well the one that leads further: two short steps are no cycle.
+      // Of parts that close equally well, prefer the one that leads further: two short steps are no
+      // cycle.
       const double way = path ? norm(clip.root_translation[b] - clip.root_translation[a]) : 1.0;
       d /= way;
       if (d < best) best = d, first = a, keys = b - a;
@@ -165,105 +264,45 @@ void ClipWalk::close(const MotionClip& clip, std::size_t first, std::size_t keys
 
 Status ClipWalk::lead(const Skeleton& skeleton, Vec3d ahead) {
   const std::size_t n = cycle_.size();
-  std::vector<SolePoint> points;
-  for (const Foot& foot : feet_) points.insert(points.end(), foot.sole.begin(), foot.sole.end());
-  std::vector<std::vector<Vec3d>> at(n);
-  std::vector<double> lowest(points.size(), std::numeric_limits<double>::max());
-  std::vector<Affine3<double>> globals;
-  double closest = std::numeric_limits<double>::max();
-  std::size_t still = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    forward_kinematics(skeleton, cycle_[k], globals);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      at[k].push_back(globals[points[i].joint] * points[i].local + cycle_[k].root);
-      lowest[i] = min(lowest[i], at[k][i].y);
-    }
-    const double apart =
-        norm(globals[feet_[0].joints[0]].translation - globals[feet_[1].joints[0]].translation);
-    if (apart < closest) closest = apart, still = k, still_ = cycle_[k];
-  }
-  // One foot is on the floor at nearly every key; the tip of the toes may be a little off where it is
-  // taken to be.
-  std::vector<double> soles;
-  for (std::size_t k = 0; k < n; ++k) {
-    soles.push_back(std::numeric_limits<double>::max());
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (i % 3 != 2) soles.back() = min(soles.back(), at[k][i].y);
-    }
-  }
+  SolePaths soles(skeleton, feet_, cycle_);
+  // One foot is on the floor at nearly every key.
+  const std::vector<double> heights = soles.heights();
   const std::vector<double> sunk =
-      options_.grounded ? smoothed(soles, n / 24) : std::vector(n, median(soles));
-  std::fill(lowest.begin(), lowest.end(), std::numeric_limits<double>::max());
-  for (std::size_t k = 0; k < n; ++k) {
-    cycle_[k].root.y -= sunk[k];
-    for (std::size_t i = 0; i < points.size(); ++i) lowest[i] = min(lowest[i], at[k][i].y -= sunk[k]);
-  }
-  still_.root.y -= sunk[still];
-  // The foot that is down is low and moves back against the body: from where the toes point if the clip
-  // does not say.
-  if (!(norm(ahead) > 0)) {
-    for (std::size_t k = 0; k < n; ++k) {
-      for (std::size_t i = 0; i + 2 < points.size(); i += 3) ahead += at[k][i + 2] - at[k][i];
-    }
-    ahead.y = 0;
-  }
-  std::vector<Vec3d> step(n);
-  Vec3d total = ahead;
+      options_.grounded ? smoothed(heights, n / 24) : std::vector(n, median(heights));
+  soles.lower(sunk);
+  for (std::size_t k = 0; k < n; ++k) cycle_[k].root.y -= sunk[k];
+
+  // The feet's own direction replaces the first guess.
+  Vec3d total = norm(ahead) > 0 ? ahead : soles.toes();
+  std::vector<Vec3d> steps;
   for (int pass = 0; pass < 2; ++pass) {
-    ahead = norm(total) > 0 ? normalized(total) : Vec3d{};
+    steps = soles.steps(norm(total) > 0 ? normalized(total) : Vec3d{});
     total = {};
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::size_t next = (k + 1) % n;
-      double sum = 1e-12;
-      step[k] = {};
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        const double up = 0.5 * (at[k][i].y + at[next][i].y) - lowest[i];
-        const Vec3d d{at[k][i].x - at[next][i].x, 0, at[k][i].z - at[next][i].z};
-        const double back = max(0.0, dot(d, ahead));
-        const double w = std::exp(-up / 0.015) * back * back * 1e6;
-        step[k] += d * w;
-        sum += w;
-      }
-      step[k] = step[k] * (1.0 / sum);
-      total += step[k];
-    }
+    for (const Vec3d& step : steps) total += step;
   }
   const double stride = std::hypot(total.x, total.z);
   if (!(stride > 0.1))
     return {Errc::invalid_argument,
             "ClipWalk: the feet lead " + std::to_string(stride) + " m in a cycle"};
+
   const Quatd turn = axis_angle(Vec3d{0, 1, 0}, -std::atan2(-total.x, -total.z));
-  const Affine3<double> turned{rotation_matrix(turn), {}};
+  const Mat3d turned = rotation_matrix(turn);
   way_.assign(1, 0.0);
-  double side = 0.0;
   std::vector<double> sides{0.0};
-  for (std::size_t k = 0; k < n; ++k) {
-    const Vec3d d = turned.linear * step[k];
-    // Never back: where a foot lands the other one takes over.
+  for (const Vec3d& step : steps) {
+    const Vec3d d = turned * step;
+    // Never back, also where one foot takes over from the other.
     way_.push_back(way_.back() + max(-d.z, 0.05 * stride / static_cast<double>(n)));
-    sides.push_back(side += d.x);
+    sides.push_back(sides.back() + d.x);
   }
   const double shrink = stride / way_.back();
   for (double& v : way_) v *= shrink;
   double middle = 0.0;
   for (const double s : sides) middle += s / static_cast<double>(sides.size());
-  // The root joint as it stood over the middle of its feet.
-  Vec3d mean{};
-  for (const LocalPose& p : cycle_) mean += p.translations[0] * (1.0 / static_cast<double>(n));
-  for (std::size_t k = 0; k < n; ++k) {
-    LocalPose& p = cycle_[k];
-    for (std::size_t j = 0; j < skeleton.size(); ++j) {
-      if (skeleton.parents[j] >= 0) continue;
-      p.rotations[j] = turn * p.rotations[j];
-      p.translations[j] = turned * (p.translations[j] - Vec3d{mean.x, 0, mean.z});
-    }
-    p.root.x = sides[k] - middle;
-  }
-  for (std::size_t j = 0; j < skeleton.size(); ++j) {
-    if (skeleton.parents[j] >= 0) continue;
-    still_.rotations[j] = turn * still_.rotations[j];
-    still_.translations[j] = turned * (still_.translations[j] - Vec3d{mean.x, 0, mean.z});
-  }
+
+  turn_roots(skeleton, turn, cycle_);
+  still_ = cycle_[soles.closest()];
+  for (std::size_t k = 0; k < n; ++k) cycle_[k].root.x = sides[k] - middle;
   return {};
 }
 

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 #include <utility>
 
+#include "avatar_arrays.hpp"
 #include "file.hpp"
 #include "gsnav/detail/avatar/smpl_joints.hpp"
 #include "gsnav/detail/avatar/weight_gradients.hpp"
@@ -54,7 +54,7 @@ class AvatarReader {
     std::vector<Affine3<double>> globals;
     for (std::size_t j = 0; j < joints; ++j) {
       const Affine3<double>& m = skeleton.inverse_binds[j];
-      // Exactly rigid, which float32 matrices are not.
+      // Float32 matrices are only nearly rigid.
       globals.push_back(rigid_inverse(Affine3<double>{polar_rotation(m.linear), m.translation}));
       const std::int32_t parent = skeleton.parents[j];
       skeleton.rest_local.push_back(parent < 0 || static_cast<std::size_t>(parent) >= j
@@ -113,144 +113,31 @@ class AvatarReader {
   }
 
   Status read_arrays() {
-    const auto take = [&](NpyArray& to, const std::string& key, const std::vector<std::size_t>& shape) {
-      auto a = arrays_.read(key, shape);
-      if (!a) return a.status();
-      to = std::move(*a);
-      return Status();
-    };
-    constexpr std::size_t any = NpzArrays::kAny;
-    if (!file_.contains("means") && file_.contains("_xyz")) return read_gart();
-    if (Status s = take(means_, "means", {any, 3}); !s) return s;
-    count_ = means_.shape[0];
-    if (count_ == 0) return bad("means has no Gaussians");
-    if (Status s = take(scales_, "scales", {count_, 3}); !s) return s;
-    if (Status s = take(quats_, "quats", {count_, 4}); !s) return s;
-    if (Status s = take(opacities_, "opacities", {count_, 1}); !s) return s;
-    if (Status s = take(weights_, "lbs_weights", {count_, out_.asset.skeleton.size()}); !s) return s;
-    if (Status s = check_ranges(); !s) return s;
-    return read_sh();
-  }
-
-  /// GART's parameters before their activations, as its model names them.
-  Status read_gart() {
-    constexpr std::size_t any = NpzArrays::kAny;
-    const auto take = [&](NpyArray& to, const char* key, const std::vector<std::size_t>& shape) {
-      auto a = arrays_.read(key, shape);
-      if (a) to = std::move(*a);
-      return a.status();
-    };
-    if (Status s = take(means_, "_xyz", {any, 3}); !s) return s;
-    count_ = means_.shape[0];
-    if (count_ == 0) return bad("_xyz has no Gaussians");
-    if (Status s = take(scales_, "_scaling", {count_, 3}); !s) return s;
-    if (Status s = take(quats_, "_rotation", {count_, 4}); !s) return s;
-    if (Status s = take(opacities_, "_opacity", {count_, 1}); !s) return s;
-    if (Status s = take(weights_, "lbs_weights", {count_, out_.asset.skeleton.size()}); !s) return s;
-    double limits[2] = {0.0, 0.1};
-    for (std::size_t k = 0; k < 2; ++k) {
-      const char* key = k == 0 ? "min_scale" : "max_scale";
-      if (!file_.contains(key)) continue;
-      const auto v = arrays_.number(key);
-      if (!v) return v.status();
-      limits[k] = *v;
-    }
-    const auto sigmoid = [](double x) { return 1.0 / (1.0 + std::exp(-x)); };
-    for (double& v : scales_.values) v = limits[0] + sigmoid(v) * (limits[1] - limits[0]);
-    for (double& v : opacities_.values) v = sigmoid(v);
-    // Weights are trilinear samples and corrections on top of them, which may be a little below zero.
-    for (double& v : weights_.values) v = std::max(v, 0.0);
-    if (Status s = check_ranges(); !s) return s;
-    NpyArray dc, rest;
-    if (Status s = take(dc, "_features_dc", {count_, 3}); !s) return s;
-    if (file_.contains("_features_rest")) {
-      auto a = arrays_.read("_features_rest", {});
-      if (!a) return a.status();
-      if (a->values.size() % (3 * count_) != 0)
-        return bad("_features_rest has the shape " + detail::shape_text(a->shape));
-      rest = std::move(*a);
-    }
-    const std::size_t more = rest.values.size() / count_;
-    shs_.shape = {count_, 1 + more / 3, 3};
-    for (std::size_t i = 0; i < count_; ++i) {
-      shs_.values.insert(shs_.values.end(), dc.values.begin() + static_cast<std::ptrdiff_t>(3 * i),
-                         dc.values.begin() + static_cast<std::ptrdiff_t>(3 * i + 3));
-      shs_.values.insert(shs_.values.end(), rest.values.begin() + static_cast<std::ptrdiff_t>(more * i),
-                         rest.values.begin() + static_cast<std::ptrdiff_t>(more * (i + 1)));
-    }
-    return find_degree("_features_rest");
-  }
-
-  Status check_ranges() const {
-    for (const auto& [array, name, most] :
-         {std::tuple{&scales_, "scales", HUGE_VAL}, std::tuple{&opacities_, "opacities", 1.0},
-          std::tuple{&weights_, "lbs_weights", HUGE_VAL}}) {
-      const std::size_t row = array->values.size() / count_;
-      for (std::size_t i = 0; i < array->values.size(); ++i) {
-        const double v = array->values[i];
-        if (!(v >= 0 && v <= most)) {
-          return bad(std::string(name) + ": row " + std::to_string(i / row) + " has " +
-                     std::to_string(v));
-        }
-      }
-    }
-    return {};
-  }
-
-  /// The degree of `shs_`; `name` is the array's that says how many coefficients there are.
-  Status find_degree(const char* name) {
-    const std::size_t k = shs_.shape[1];
-    degree_ = 0;
-    while (static_cast<std::size_t>(sh_coefficient_count(degree_)) < k && degree_ < kMaxShDegree)
-      ++degree_;
-    if (static_cast<std::size_t>(sh_coefficient_count(degree_)) == k) return {};
-    return {Errc::unsupported, file_.source() + ": " + name + " has " + std::to_string(k) +
-                                   " coefficients, must be 1, 4, 9 or 16"};
-  }
-
-  Status read_sh() {
-    auto a = arrays_.read("shs", {});
-    if (!a) return a.status();
-    const auto& shape = a->shape;
-    const std::size_t k = shape.size() == 2 ? 1 : shape.size() == 3 ? shape[1] : 0;
-    if (k == 0 || shape[0] != count_ || shape.back() != 3) {
-      return bad("shs has the shape " + detail::shape_text(shape) + ", must be [" +
-                 std::to_string(count_) + ", 3] or [" + std::to_string(count_) + ", K, 3]");
-    }
-    shs_ = std::move(*a);
-    shs_.shape = {count_, k, 3};
-    if (Status s = find_degree("shs"); !s) return s;
-    const bool could_be_rgb = k == 1 && std::all_of(shs_.values.begin(), shs_.values.end(),
-                                                    [](double v) { return v >= 0 && v <= 1; });
-    if (k == 1 && (options_.colors == AvatarColors::rgb ||
-                   (options_.colors == AvatarColors::guess && could_be_rgb))) {
-      for (double& v : shs_.values) v = (v - 0.5) / kSh0;
-      if (options_.colors == AvatarColors::guess) {
-        out_.report.warnings.push_back("shs: all values lie in [0, 1] and were taken as RGB");
-      }
-    }
-    return {};
+    auto in = detail::read_avatar_arrays(arrays_, out_.asset.skeleton.size(), options_.colors,
+                                         out_.report.warnings);
+    if (in) in_ = std::move(*in);
+    return in.status();
   }
 
   Status read_cloud() {
-    const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(degree_) - 1);
-    GaussianCloudBuilder builder(degree_, file_.source());
+    const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(in_.sh_degree) - 1);
+    GaussianCloudBuilder builder(in_.sh_degree, file_.source());
     builder.report().warnings = std::move(out_.report.warnings);
-    builder.reserve(count_);
+    builder.reserve(in_.count);
     std::vector<float> shn(rest);
     RawGaussian raw;
-    for (std::size_t i = 0; i < count_; ++i) {
-      const double* sh = &shs_.values[i * (3 + rest)];
+    for (std::size_t i = 0; i < in_.count; ++i) {
+      const double* sh = &in_.shs.values[i * (3 + rest)];
       for (std::size_t k = 0; k < 3; ++k) {
-        raw.mean[static_cast<int>(k)] = means_.values[3 * i + k];
-        raw.log_scales[static_cast<int>(k)] = std::log(scales_.values[3 * i + k]);
+        raw.mean[static_cast<int>(k)] = in_.means.values[3 * i + k];
+        raw.log_scales[static_cast<int>(k)] = std::log(in_.scales.values[3 * i + k]);
         raw.sh0[k] = static_cast<float>(sh[k]);
       }
       for (std::size_t k = 0; k < rest; ++k) shn[k] = static_cast<float>(sh[3 + k]);
       raw.shN = shn.data();
-      const double* q = &quats_.values[4 * i];
+      const double* q = &in_.quats.values[4 * i];
       raw.quat = {q[0], q[1], q[2], q[3]};
-      const double o = opacities_.values[i];
+      const double o = in_.opacities.values[i];
       raw.opacity_logit = std::log(o) - std::log1p(-o);
       if (builder.add(raw)) kept_.push_back(i);
     }
@@ -268,7 +155,7 @@ class AvatarReader {
     weights.reserve(kept_.size() * joints);
     std::size_t unequal = 0;
     for (const std::size_t i : kept_) {
-      const double* row = &weights_.values[i * joints];
+      const double* row = &in_.weights.values[i * joints];
       double sum = 0.0;
       for (std::size_t j = 0; j < joints; ++j) {
         indices.push_back(static_cast<std::uint16_t>(j));
@@ -308,10 +195,10 @@ class AvatarReader {
                ", must be 0 (linear), 1 (with stretch) or 2 (dual quaternions)");
   }
 
-  /// Capsules fixed to joints, where the file has some.
+  /// Capsules fixed to joints, if the file has any.
   Status read_capsules() {
     if (!file_.contains("capsules")) return {};
-    const auto capsules = arrays_.read("capsules", {NpzArrays::kAny, 7});
+    const auto capsules = arrays_.read("capsules", {detail::NpzArrays::kAny, 7});
     if (!capsules) return capsules.status();
     const std::size_t count = capsules->values.size() / 7;
     const auto joints = arrays_.read("capsule_joints", {count});
@@ -330,16 +217,12 @@ class AvatarReader {
     return {};
   }
 
-  using NpzArrays = detail::NpzArrays;
-
   const NpzFile& file_;
-  NpzArrays arrays_;
+  detail::NpzArrays arrays_;
   const LoadAvatarOptions& options_;
+  detail::AvatarArrays in_;
   LoadedAvatar out_;
-  NpyArray means_, shs_, scales_, quats_, opacities_, weights_;
-  std::vector<std::size_t> kept_;  // rows of the file that are in the cloud
-  std::size_t count_ = 0;
-  int degree_ = 0;
+  std::vector<std::size_t> kept_;  ///< rows of the file that are in the cloud
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "field_cells.hpp"
 
 #include <cmath>
+#include <functional>
 #include <initializer_list>
 #include <utility>
 #include <vector>
@@ -9,11 +10,11 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kMargin = 1e-9;     // metres: a cell and a face reach so far beyond their sides
-constexpr double kRounding = 1e-12;  // metres: what rounding may add to a length
-constexpr double kAtBend = 1e-9;     // metres: the direction to a point so near is not known
+constexpr double kMargin = 1e-9;     // metres by which a cell and a face reach beyond their sides
+constexpr double kRounding = 1e-12;  // metres that rounding may add to a length
+constexpr double kAtBend = 1e-9;     // metres: the direction to a nearer point is not known
 
-/// What of a convex polygon lies left of the line through p along d; 0 is on the line.
+/// Cuts a convex polygon to the part on the left of the line through p along d.
 void cut(std::vector<Flat>& polygon, std::vector<Flat>& scratch, const Flat& p, const Flat& d) {
   scratch.clear();
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -24,6 +25,164 @@ void cut(std::vector<Flat>& polygon, std::vector<Flat>& scratch, const Flat& p, 
   }
   polygon.swap(scratch);
 }
+
+/// Builds the block of numbers of a face's cells (FieldCells::block_).
+class CellsBuilder {
+ public:
+  CellsBuilder(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
+               std::span<const FieldSource> sources, double relative_error)
+      : mesh_(mesh),
+        face_(mesh.faces[face]),
+        grid_(grid),
+        sources_(sources),
+        relative_error_(relative_error),
+        width_(grid.columns_a_metre > 0 ? 1.0 / grid.columns_a_metre : 0.0),
+        depth_(grid.rows_a_metre > 0 ? 1.0 / grid.rows_a_metre : 0.0),
+        heads_(std::size_t{grid.columns} * grid.rows, 0) {}
+
+  void build() {
+    const std::size_t most = FieldCells::kMostCopies * sources_.size();
+    const bool one = !(width_ > 0 && depth_ > 0);
+    for (std::size_t cell = 0; cell < heads_.size() && !one && copies_ <= most; ++cell) add(cell);
+    if (one || copies_ > most) share_all();
+  }
+
+  std::unique_ptr<std::uint64_t[]> block() const {
+    auto out = std::make_unique_for_overwrite<std::uint64_t[]>(heads_.size() + numbers_.size());
+    std::copy(heads_.begin(), heads_.end(), out.get());
+    std::copy(numbers_.begin(), numbers_.end(), out.get() + heads_.size());
+    return out;
+  }
+
+ private:
+  struct Candidate {
+    double at_middle = 0;
+    std::uint32_t source = 0;
+  };
+
+  void add(std::size_t cell) {
+    const std::size_t begin = numbers_.size();
+    heads_[cell] = head(begin, 0, 0);
+    cut_part(cell);
+    if (part_.empty()) return;
+    find_middle();
+    find_candidates();
+    lengths_.clear();
+    windows_.clear();
+    for (const Candidate& c : candidates_) {
+      const FieldSource& s = sources_[c.source];
+      if (!may_be_least(c)) continue;
+      for (const Flat& p : part_) lengths_.push_back(s.length_to(p));
+      ++copies_;
+      put_source(s);
+    }
+    heads_[cell] = head(begin, (numbers_.size() - begin) / 3, windows_.size() / 7);
+    numbers_.insert(numbers_.end(), windows_.begin(), windows_.end());
+  }
+
+  /// The part of a cell that is in the face.
+  void cut_part(std::size_t cell) {
+    const Flat a = grid_.low + Flat{static_cast<double>(cell % grid_.columns) * width_ - kMargin,
+                                    static_cast<double>(cell / grid_.columns) * depth_ - kMargin};
+    const Flat b = a + Flat{width_ + 2 * kMargin, depth_ + 2 * kMargin};
+    part_ = {a, {b.x, a.y}, b, {a.x, b.y}};
+    for (std::uint32_t k = 0; k < face_.count && !part_.empty(); ++k) {
+      const UnfoldedMesh::Edge& e = mesh_.edges[face_.first + k];
+      const Flat d = mesh_.edges[mesh_.next(face_.first + k)].at - e.at;
+      const double l = length(d);
+      if (l > 0) cut(part_, scratch_, e.at + Flat{d.y, -d.x} * (kMargin / l), d);
+    }
+  }
+
+  void find_middle() {
+    middle_ = {};
+    radius_ = 0;
+    for (const Flat& p : part_) middle_ = middle_ + p * (1.0 / static_cast<double>(part_.size()));
+    for (const Flat& p : part_) radius_ = max(radius_, length(p - middle_));
+  }
+
+  /// The sources that can be least in the part, the least at its middle first. No length changes faster
+  /// than its end moves.
+  void find_candidates() {
+    candidates_.clear();
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::uint32_t i = 0; i < sources_.size(); ++i) {
+      candidates_.push_back({sources_[i].length_to(middle_), i});
+      nearest = min(nearest, candidates_.back().at_middle);
+    }
+    std::erase_if(candidates_,
+                  [&](const Candidate& c) { return c.at_middle > nearest + 2 * radius_ + kRounding; });
+    std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& x, const Candidate& y) {
+      return std::pair(x.at_middle, x.source) < std::pair(y.at_middle, y.source);
+    });
+  }
+
+  /// False where the source's tangent at the middle is nowhere below the lengths of one that is kept.
+  bool may_be_least(const Candidate& c) {
+    const Flat back = middle_ - sources_[c.source].last_bend(middle_);
+    const double away = length(back);
+    tangents_.clear();
+    for (const Flat& p : part_) {
+      const double rise = away > kAtBend ? dot(back, p - middle_) / away : -length(p - middle_);
+      tangents_.push_back((c.at_middle + rise) * (1 + relative_error_) + kRounding);
+    }
+    for (std::size_t k = 0; k < lengths_.size(); k += part_.size()) {
+      const auto kept = lengths_.begin() + static_cast<std::ptrdiff_t>(k);
+      if (std::equal(tangents_.begin(), tangents_.end(), kept, std::greater_equal<>())) return false;
+    }
+    return true;
+  }
+
+  /// Where the ways to all corners of the part have the same last bend, so have those to all of it.
+  void put_source(const FieldSource& s) {
+    const auto all = [&](const auto& test) { return std::all_of(part_.begin(), part_.end(), test); };
+    const auto right = [&](const Flat& p) { return cross(s.right - s.root, p - s.root); };
+    const auto left = [&](const Flat& p) { return cross(s.left - s.root, p - s.root); };
+    if (all([&](const Flat& p) { return right(p) >= 0 && left(p) <= 0; })) {
+      put(numbers_, {s.root.x, s.root.y, s.g});
+    } else if (all([&](const Flat& p) { return right(p) < 0; })) {
+      put(numbers_, {s.right.x, s.right.y, s.g + length(s.right - s.root)});
+    } else if (all([&](const Flat& p) { return right(p) >= 0 && left(p) > 0; })) {
+      put(numbers_, {s.left.x, s.left.y, s.g + length(s.left - s.root)});
+    } else {
+      put_window(windows_, s);
+    }
+  }
+
+  /// Gives every cell all sources.
+  void share_all() {
+    numbers_.clear();
+    for (const FieldSource& s : sources_) put_window(numbers_, s);
+    std::fill(heads_.begin(), heads_.end(), head(0, 0, sources_.size()));
+  }
+
+  static void put(std::vector<std::uint64_t>& to, std::initializer_list<double> values) {
+    for (const double v : values) to.push_back(std::bit_cast<std::uint64_t>(v));
+  }
+  static void put_window(std::vector<std::uint64_t>& to, const FieldSource& s) {
+    put(to, {s.root.x, s.root.y, s.right.x, s.right.y, s.left.x, s.left.y, s.g});
+  }
+  std::uint64_t head(std::size_t begin, std::size_t points, std::size_t windows) const {
+    return (std::uint64_t{heads_.size()} + begin) << 32 | std::uint64_t{points} << 16 |
+           std::uint64_t{windows};
+  }
+
+  const UnfoldedMesh& mesh_;
+  const UnfoldedMesh::Face& face_;
+  const FieldGrid& grid_;
+  std::span<const FieldSource> sources_;
+  double relative_error_;
+  double width_, depth_;  ///< of a cell, metres
+  std::vector<std::uint64_t> heads_, numbers_;
+  std::size_t copies_ = 0;
+  // Of the cell at hand:
+  std::vector<Flat> part_, scratch_;
+  Flat middle_;  ///< mean of the part's corners
+  double radius_ = 0;
+  std::vector<Candidate> candidates_;
+  std::vector<double> tangents_, lengths_;  ///< at the part's corners; `lengths_` of each kept source
+  std::vector<std::uint64_t> windows_;      ///< follow the cell's points
+};
 
 }  // namespace
 
@@ -48,107 +207,9 @@ FieldGrid::FieldGrid(const UnfoldedMesh& mesh, std::uint32_t face, std::size_t s
 
 FieldCells::FieldCells(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
                        std::span<const FieldSource> sources, double relative_error) {
-  struct Candidate {
-    double at_middle = 0;
-    std::uint32_t source = 0;
-  };
-  const UnfoldedMesh::Face& f = mesh.faces[face];
-  const std::size_t cells = std::size_t{grid.columns} * grid.rows;
-  std::vector<std::uint64_t> heads(cells, 0), numbers,
-      windows;  // windows of a cell, to follow its points
-  const auto put = [](std::vector<std::uint64_t>& to, std::initializer_list<double> values) {
-    for (const double v : values) to.push_back(std::bit_cast<std::uint64_t>(v));
-  };
-  const auto put_window = [&](std::vector<std::uint64_t>& to, const FieldSource& s) {
-    put(to, {s.root.x, s.root.y, s.right.x, s.right.y, s.left.x, s.left.y, s.g});
-  };
-  const auto head = [&](std::size_t begin, std::size_t points, std::size_t with_window) {
-    return (std::uint64_t{cells} + begin) << 32 | std::uint64_t{points} << 16 |
-           std::uint64_t{with_window};
-  };
-  std::vector<Candidate> candidates;
-  std::vector<Flat> part, scratch;
-  std::vector<double> tangents,
-      lengths;  // at the part's corners; of those that are kept, one after the other
-  std::size_t copies = 0;
-  const double width = grid.columns_a_metre > 0 ? 1.0 / grid.columns_a_metre : 0.0;
-  const double depth = grid.rows_a_metre > 0 ? 1.0 / grid.rows_a_metre : 0.0;
-  const bool one = !(width > 0 && depth > 0);
-  for (std::size_t cell = 0; cell < cells && !one && copies <= kMostCopies * sources.size(); ++cell) {
-    const Flat a = grid.low + Flat{static_cast<double>(cell % grid.columns) * width - kMargin,
-                                   static_cast<double>(cell / grid.columns) * depth - kMargin};
-    const Flat b = a + Flat{width + 2 * kMargin, depth + 2 * kMargin};
-    part = {a, {b.x, a.y}, b, {a.x, b.y}};
-    for (std::uint32_t k = 0; k < f.count && !part.empty(); ++k) {
-      const UnfoldedMesh::Edge& e = mesh.edges[f.first + k];
-      const Flat d = mesh.edges[mesh.next(f.first + k)].at - e.at;
-      const double l = length(d);
-      if (l > 0) cut(part, scratch, e.at + Flat{d.y, -d.x} * (kMargin / l), d);
-    }
-    heads[cell] = head(numbers.size(), 0, 0);
-    if (part.empty()) continue;
-    Flat middle;
-    for (const Flat& p : part) middle = middle + p * (1.0 / static_cast<double>(part.size()));
-    double radius = 0, nearest = std::numeric_limits<double>::infinity();
-    for (const Flat& p : part) radius = max(radius, length(p - middle));
-    candidates.clear();
-    for (std::uint32_t i = 0; i < sources.size(); ++i) {
-      candidates.push_back({sources[i].length_to(middle), i});
-      nearest = min(nearest, candidates.back().at_middle);
-    }
-    // No length changes faster than its end moves.
-    std::erase_if(candidates,
-                  [&](const Candidate& c) { return c.at_middle > nearest + 2 * radius + kRounding; });
-    std::sort(candidates.begin(), candidates.end(), [](const Candidate& x, const Candidate& y) {
-      return std::pair(x.at_middle, x.source) < std::pair(y.at_middle, y.source);
-    });
-    lengths.clear();
-    windows.clear();
-    const std::size_t begin = numbers.size();
-    for (const Candidate& c : candidates) {
-      const FieldSource& s = sources[c.source];
-      const Flat back = middle - s.last_bend(middle);
-      const double away = length(back);
-      tangents.clear();
-      for (const Flat& p : part) {
-        const double rise = away > kAtBend ? dot(back, p - middle) / away : -length(p - middle);
-        tangents.push_back((c.at_middle + rise) * (1 + relative_error) + kRounding);
-      }
-      bool needed = true;
-      for (std::size_t k = 0; k < lengths.size() && needed; k += part.size()) {
-        bool above = true;
-        for (std::size_t q = 0; q < part.size() && above; ++q) above = tangents[q] >= lengths[k + q];
-        needed = !above;
-      }
-      if (!needed) continue;
-      for (const Flat& p : part) lengths.push_back(s.length_to(p));
-      ++copies;
-      // Where the ways to the corners do not differ in where they bend, those to all of the part do not.
-      const auto all = [&](const auto& test) { return std::all_of(part.begin(), part.end(), test); };
-      const auto right = [&](const Flat& p) { return cross(s.right - s.root, p - s.root); };
-      const auto left = [&](const Flat& p) { return cross(s.left - s.root, p - s.root); };
-      if (all([&](const Flat& p) { return right(p) >= 0 && left(p) <= 0; })) {
-        put(numbers, {s.root.x, s.root.y, s.g});
-      } else if (all([&](const Flat& p) { return right(p) < 0; })) {
-        put(numbers, {s.right.x, s.right.y, s.g + length(s.right - s.root)});
-      } else if (all([&](const Flat& p) { return right(p) >= 0 && left(p) > 0; })) {
-        put(numbers, {s.left.x, s.left.y, s.g + length(s.left - s.root)});
-      } else {
-        put_window(windows, s);
-      }
-    }
-    const std::size_t points = (numbers.size() - begin) / 3;
-    heads[cell] = head(begin, points, windows.size() / 7);
-    numbers.insert(numbers.end(), windows.begin(), windows.end());
-  }
-  if (one || copies > kMostCopies * sources.size()) {
-    numbers.clear();
-    for (const FieldSource& s : sources) put_window(numbers, s);
-    std::fill(heads.begin(), heads.end(), head(0, 0, sources.size()));
-  }
-  block_ = std::make_unique_for_overwrite<std::uint64_t[]>(cells + numbers.size());
-  std::copy(heads.begin(), heads.end(), block_.get());
-  std::copy(numbers.begin(), numbers.end(), block_.get() + cells);
+  CellsBuilder builder(mesh, face, grid, sources, relative_error);
+  builder.build();
+  block_ = builder.block();
 }
 
 }  // namespace gsnav::detail

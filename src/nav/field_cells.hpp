@@ -13,20 +13,20 @@
 
 namespace gsnav::detail {
 
-/// A point in the plane of a face with its distance to the goal, and the window of the face's edge that
-/// it sees the face through; no width where it lies in or on the face.
+/// A point in the plane of a face with its distance to the goal, and the window of an edge through which
+/// it sees the face. The window has no width where the point lies in the face.
 struct FieldSource {
   Flat root, right, left;
   double g = 0;
 
-  /// Where the shortest way from the root through the window to p bends last: at the root or an end of
-  /// the window.
+  /// The last bend of the shortest way from the root through the window to p: the root or an end of the
+  /// window.
   Flat last_bend(const Flat& p) const noexcept {
     const Flat d = p - root;
     const double r = cross(right - root, d), l = cross(left - root, d);
     return r >= 0 && l <= 0 ? root : r < 0 ? right : left;
   }
-  /// Length of that way, with the root's own.
+  /// Length of that way plus the root's distance.
   double length_to(const Flat& p) const noexcept {
     const Flat end = last_bend(p);
     const bool bent = end.x != root.x || end.y != root.y;
@@ -44,10 +44,10 @@ struct FieldSource {
   }
 };
 
-/// The grid that a face is cut into cells by, of so many sources.
+/// The grid that cuts a face into cells.
 struct FieldGrid {
-  /// A face has about kCellsASource cells a source, none of them below kLeastSide metres, and at most
-  /// kMostAcross of them side by side.
+  /// A face has about kCellsASource cells a source, of at least kLeastSide metres, and at most
+  /// kMostAcross of them in a row.
   static constexpr double kCellsASource = 2.0, kLeastSide = 0.2, kMostAcross = 64;
 
   Flat low;
@@ -66,16 +66,16 @@ struct FieldGrid {
 
 /// The cells of a face, each with the sources that can be least in it, in one piece of memory.
 ///
-/// In the part of a cell that is in the face the length of a source's way is convex in its end, so that
-/// it is nowhere below its tangent at a point of that part. Where this tangent is no less than another's
-/// lengths at all corners of the part, it is so everywhere, because their difference is convex: the
-/// source is left out. With a relative error eps the tangent times 1 + eps is taken, and what is found
-/// is at most so much above the least. A source that all of the part is seen from, or that all ways to
-/// the part leave at one end of its window, is kept as a point.
+/// In the part of a cell that is in the face, the length of a source's way is convex in its end, so that
+/// it is nowhere below its tangent at a point of that part. A source is left out where this tangent is
+/// at least the lengths of another source at all corners of the part: their difference is convex, so the
+/// same holds in all of the part. With a relative error eps the tangent is multiplied by 1 + eps, and
+/// the result is at most that much above the least. A source is stored as a point where it sees all of
+/// the part, or where all ways to the part bend at the same end of its window.
 class FieldCells {
  public:
-  /// At most so many sources in the cells for each of the face's own; where that is not enough, all
-  /// cells share them all.
+  /// Most copies in the cells for each source of the face. Where that is not enough, all cells share all
+  /// sources.
   static constexpr std::size_t kMostCopies = 16;
   static constexpr std::size_t kMostSources = 0xffff;  ///< of a face
 

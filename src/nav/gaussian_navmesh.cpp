@@ -51,7 +51,7 @@ Status validate(const GaussianNavOptions& o) {
   return {};
 }
 
-/// Drops pieces of the floor that are too small to be a place.
+/// Drops pieces of the floor that are smaller than `min_area`.
 struct Pruner {
   double min_area;
   GaussianNavReport& report;
@@ -90,32 +90,57 @@ struct Pruner {
   }
 };
 
-/// Cells of the heightfield below the grid's own first ones.
-struct Offset {
-  int x = 0, y = 0, z = 0;
+/// The box of the NavMesh: the voxels' grid, enlarged by whole cells where triangles reach beyond it.
+struct Extent {
+  Vec3d low, high;
+  int x = 0, y = 0, z = 0;  ///< cells below the grid's first ones
+
+  explicit Extent(const VoxelGrid& g)
+      : low(g.low),
+        high(g.low + Vec3d{static_cast<double>(g.nx) * g.cell, static_cast<double>(g.ny) * g.level,
+                           static_cast<double>(g.nz) * g.cell}) {}
+  Extent(const VoxelGrid& g, const Aabb<double>& triangles) : Extent(g) {
+    const auto below = [](double grid, double mesh, double cell) {
+      return max(std::ceil((grid - mesh) / cell), 0.0);
+    };
+    const Vec3d n{below(g.low.x, triangles.low.x, g.cell), below(g.low.y, triangles.low.y, g.level),
+                  below(g.low.z, triangles.low.z, g.cell)};
+    low = g.low - Vec3d{n.x * g.cell, n.y * g.level, n.z * g.cell};
+    for (int k = 0; k < 3; ++k) high[k] = max(high[k], triangles.high[k] + (k == 1 ? g.level : g.cell));
+    constexpr double kMost = 65000;  // a larger grid is refused later
+    x = static_cast<int>(min(n.x, kMost));
+    y = static_cast<int>(min(n.y, kMost));
+    z = static_cast<int>(min(n.z, kMost));
+  }
 };
 
-/// Adds the solid runs and floors of the grid to a field whose first column is (x0, z0) of the whole
-/// field's.
+/// A run of levels in one column.
+struct Piece {
+  std::size_t low, end;
+  bool floor;
+};
+
+/// The solid runs and floors of a column, lowest first.
+void read_column(const VoxelGrid& g, const detail::FloorTops& floors, std::size_t column,
+                 std::vector<Piece>& out) {
+  out.clear();
+  for (const detail::SolidRun& r : g.runs_of(column)) out.push_back({r.low, r.end, false});
+  for (std::uint32_t i = floors.first[column]; i < floors.first[column + 1]; ++i) {
+    out.push_back({floors.tops[i], floors.tops[i] + std::size_t{1}, true});
+  }
+  std::sort(out.begin(), out.end(), [](const Piece& a, const Piece& b) { return a.low < b.low; });
+}
+
+/// Adds the solid runs and floors of the grid to a field whose first column is (x0, z0) of the extent.
 Status add_spans(detail::RecastLog& log, const VoxelGrid& g, const detail::FloorTops& floors, int climb,
-                 const Offset& o, int x0, int z0, rcHeightfield& field) {
-  struct Piece {
-    std::size_t low, end;
-    bool floor;
-  };
+                 const Extent& o, int x0, int z0, rcHeightfield& field) {
   std::vector<Piece> pieces;
   const int nx = static_cast<int>(g.nx), nz = static_cast<int>(g.nz);
   for (int fz = max(0, o.z - z0); fz < min(field.height, nz + o.z - z0); ++fz) {
     for (int fx = max(0, o.x - x0); fx < min(field.width, nx + o.x - x0); ++fx) {
       const auto c =
           static_cast<std::size_t>(fx + x0 - o.x) + g.nx * static_cast<std::size_t>(fz + z0 - o.z);
-      pieces.clear();
-      for (const detail::SolidRun& r : g.runs_of(c)) pieces.push_back({r.low, r.end, false});
-      for (std::uint32_t i = floors.first[c]; i < floors.first[c + 1]; ++i) {
-        pieces.push_back({floors.tops[i], floors.tops[i] + std::size_t{1}, true});
-      }
-      std::sort(pieces.begin(), pieces.end(),
-                [](const Piece& a, const Piece& b) { return a.low < b.low; });
+      read_column(g, floors, c, pieces);
       for (std::size_t i = 0; i < pieces.size();) {
         const std::size_t low = pieces[i].low, from = i;
         std::size_t end = pieces[i].end;
@@ -135,8 +160,89 @@ Status add_spans(detail::RecastLog& log, const VoxelGrid& g, const detail::Floor
   return {};
 }
 
-constexpr std::size_t kOneTile = std::size_t{1} << 22;  // columns that are built as one tile
-constexpr int kTileCells = 512;                         // a side, above that
+constexpr std::size_t kOneTile = std::size_t{1} << 22;  // most columns that are built as one tile
+constexpr int kTileCells = 512;                         // side of a tile above that
+
+detail::FloorSettings floor_settings(const NavMeshSettings& settings, const GaussianNavOptions& options,
+                                     const VoxelGrid& g) {
+  const detail::VoxelSettings cells(settings);
+  return {static_cast<std::size_t>(cells.height), static_cast<std::size_t>(cells.climb),
+          static_cast<std::size_t>(std::floor(options.floor_band / g.level + 1e-6)),
+          std::tan(settings.agent_max_slope * 3.14159265358979323846 / 180.0)};
+}
+
+Status no_floor(const NavMeshSettings& settings, const GaussianNavOptions& options, const VoxelGrid& g,
+                const GaussianNavReport& report, double most_area) {
+  return {Errc::nothing_navigable,
+          "NavMesh from Gaussians: no floor: at no height does solid ground with " +
+              std::to_string(settings.agent_height) + " m (agent_height) free above cover " +
+              std::to_string(max(options.min_island_area, g.cell * g.cell)) + " m2; the most is " +
+              std::to_string(most_area) + " m2, of " + std::to_string(report.solid_voxels) +
+              " solid voxels"};
+}
+
+/// Refuses a ground that is seen from below: things stand on the ground, and under it there is only
+/// noise.
+Status check_upright(const GaussianNavReport& report, std::size_t floors) {
+  constexpr double kHanging = 4;
+  if (report.ceiling_share > 0.5 || report.solid_below * 20 <= floors ||
+      !(static_cast<double>(report.solid_below) > kHanging * static_cast<double>(report.solid_above)))
+    return {};
+  return {Errc::nothing_navigable,
+          "NavMesh from Gaussians: the ground at y = " + std::to_string(report.floor_y) +
+              " is seen from below: " + std::to_string(report.solid_below) +
+              " solid voxels hang under it, " + std::to_string(report.solid_above) +
+              " stand on it. Give the axis that points up (--up), or clear "
+              "GaussianNavOptions.refuse_underside"};
+}
+
+/// What a NavMesh is built from.
+struct NavGround {
+  const NavMeshSettings& settings;
+  const GaussianNavOptions& options;
+  const VoxelGrid& grid;
+  const detail::FloorTops& floors;
+  std::span<const Vec3d> vertices;
+  std::span<const NavMesh::Triangle> triangles;
+  Extent extent;
+  std::function<double(const Vec3d&)> height;  ///< of the triangles; empty without any
+
+  /// Tops of voxels stand half a voxel above the surface in them.
+  Vec3d origin() const { return extent.low - Vec3d{0, 0.5 * grid.level, 0}; }
+
+  Status add_to(detail::RecastLog& log, int x0, int z0, rcHeightfield& field) const {
+    return add_spans(log, grid, floors, detail::VoxelSettings(settings).climb, extent, x0, z0, field);
+  }
+};
+
+Result<NavMesh> build_in_tiles(const NavGround& ground, const NavMeshSettings& tiled) {
+  const GaussianNavOptions& options = ground.options;
+  detail::TileHooks hooks;
+  hooks.fill = [&](detail::RecastLog& log, int x0, int z0, rcHeightfield& field) {
+    return ground.add_to(log, x0, z0, field);
+  };
+  hooks.height = ground.height ? ground.height : [](const Vec3d& p) { return p.y; };
+  hooks.least_area = options.min_island_area;
+  if (options.progress) hooks.progress = [&](double share) { options.progress("polygons", share); };
+  return detail::build_in_tiles(tiled, ground.vertices, ground.triangles, ground.origin(),
+                                {{}, ground.extent.high - ground.extent.low}, options.threads, hooks);
+}
+
+Result<NavMesh> build_whole(const NavGround& ground, GaussianNavReport& report) {
+  const NavMeshSettings& settings = ground.settings;
+  detail::RecastLog log;
+  auto field = detail::make_heightfield(log, settings, {}, ground.extent.high - ground.extent.low);
+  if (!field.ok()) return field.status();
+  if (Status s = ground.add_to(log, 0, 0, **field); !s.ok()) return s;
+  if (!ground.triangles.empty()) {
+    if (Status s = detail::rasterise(log, settings, ground.vertices, ground.triangles, ground.origin(),
+                                     **field);
+        !s.ok())
+      return s;
+  }
+  return detail::finish_navmesh(log, settings, **field, ground.origin(),
+                                {Pruner{ground.options.min_island_area, report}, ground.height});
+}
 
 }  // namespace
 
@@ -161,91 +267,31 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
   auto voxels = detail::voxelise(settings, sets, options, pool, report);
   if (!voxels.ok()) return voxels.status();
   VoxelGrid& g = *voxels;
-  const detail::VoxelSettings cells(settings);
-  const detail::FloorSettings look{
-      static_cast<std::size_t>(cells.height), static_cast<std::size_t>(cells.climb),
-      static_cast<std::size_t>(std::floor(options.floor_band / g.level + 1e-6)),
-      std::tan(settings.agent_max_slope * 3.14159265358979323846 / 180.0)};
   double most_area = 0;
-  detail::FloorTops floors = detail::find_floors(g, look, options, pool, report, most_area);
+  detail::FloorTops floors =
+      detail::find_floors(g, floor_settings(settings, options, g), options, pool, report, most_area);
   if (floors.first.empty()) {
-    if (triangles.empty()) {
-      return Status(Errc::nothing_navigable,
-                    "NavMesh from Gaussians: no floor: at no height does solid ground with " +
-                        std::to_string(settings.agent_height) + " m (agent_height) free above cover " +
-                        std::to_string(max(options.min_island_area, g.cell * g.cell)) +
-                        " m2; the most is " + std::to_string(most_area) + " m2, of " +
-                        std::to_string(report.solid_voxels) + " solid voxels");
-    }
+    if (triangles.empty()) return no_floor(settings, options, g, report, most_area);
     floors.first.assign(g.nx * g.nz + 1, 0);
   }
-  // Things stand on the ground; under it there is noise.
-  constexpr double kHanging = 4;
-  if (options.refuse_underside && triangles.empty() && report.ceiling_share <= 0.5 &&
-      static_cast<double>(report.solid_below) > kHanging * static_cast<double>(report.solid_above) &&
-      report.solid_below * 20 > floors.tops.size()) {
-    return Status(Errc::nothing_navigable,
-                  "NavMesh from Gaussians: the ground at y = " + std::to_string(report.floor_y) +
-                      " is seen from below: " + std::to_string(report.solid_below) +
-                      " solid voxels hang under it, " + std::to_string(report.solid_above) +
-                      " stand on it. Give the axis that points up (--up), or clear "
-                      "GaussianNavOptions.refuse_underside");
+  if (options.refuse_underside && triangles.empty()) {
+    if (Status s = check_upright(report, floors.tops.size()); !s.ok()) return s;
   }
-
-  // The voxels' grid, by whole cells as much larger as the triangles need.
-  Vec3d low = g.low,
-        high = g.low + Vec3d{static_cast<double>(g.nx) * g.cell, static_cast<double>(g.ny) * g.level,
-                             static_cast<double>(g.nz) * g.cell};
-  Offset offset;
-  if (!triangles.empty()) {
-    const auto below = [](double grid, double mesh, double cell) {
-      return max(std::ceil((grid - mesh) / cell), 0.0);
-    };
-    const double x = below(g.low.x, box->low.x, g.cell), y = below(g.low.y, box->low.y, g.level),
-                 z = below(g.low.z, box->low.z, g.cell);
-    low = g.low - Vec3d{x * g.cell, y * g.level, z * g.cell};
-    for (int k = 0; k < 3; ++k) high[k] = max(high[k], box->high[k] + (k == 1 ? g.level : g.cell));
-    constexpr double kMost = 65000;  // more is refused with the grid
-    offset = {static_cast<int>(min(x, kMost)), static_cast<int>(min(y, kMost)),
-              static_cast<int>(min(z, kMost))};
-  }
-  // Tops of voxels stand half a voxel above the surface in them.
-  const Vec3d origin = low - Vec3d{0, 0.5 * g.level, 0};
+  NavGround ground{
+      settings, options, g, floors, vertices, triangles, triangles.empty() ? Extent(g) : Extent(g, *box),
+      {}};
   std::optional<detail::TriangleHeights> heights;
-  std::function<double(const Vec3d&)> height;
   if (!triangles.empty()) {
+    const Vec3d origin = ground.origin();
     heights.emplace(vertices, triangles, origin, Aabb<double>{box->low - origin, box->high - origin});
-    height = [&](const Vec3d& p) {
+    ground.height = [&](const Vec3d& p) {
       return heights->at(p, 1.01 * settings.cell_height + settings.cell_size, 0.5 * settings.cell_height)
           .value_or(p.y);
     };
   }
-  const auto build = [&]() -> Result<NavMesh> {
-    NavMeshSettings made = settings;
-    if (made.tile_size == 0 && g.nx * g.nz > kOneTile) made.tile_size = kTileCells;
-    if (made.tile_size > 0) {
-      detail::TileHooks hooks;
-      hooks.fill = [&](detail::RecastLog& log, int x0, int z0, rcHeightfield& field) {
-        return add_spans(log, g, floors, cells.climb, offset, x0, z0, field);
-      };
-      hooks.height = height ? height : [](const Vec3d& p) { return p.y; };
-      hooks.least_area = options.min_island_area;
-      if (options.progress) hooks.progress = [&](double share) { options.progress("polygons", share); };
-      return detail::build_in_tiles(made, vertices, triangles, origin, {{}, high - low}, options.threads,
-                                    hooks);
-    }
-    detail::RecastLog log;
-    auto field = detail::make_heightfield(log, made, {}, high - low);
-    if (!field.ok()) return field.status();
-    if (Status s = add_spans(log, g, floors, cells.climb, offset, 0, 0, **field); !s.ok()) return s;
-    if (!triangles.empty()) {
-      if (Status s = detail::rasterise(log, made, vertices, triangles, origin, **field); !s.ok())
-        return s;
-    }
-    return detail::finish_navmesh(log, made, **field, origin,
-                                  {Pruner{options.min_island_area, report}, height});
-  };
-  auto mesh = build();
+  NavMeshSettings tiled = settings;
+  if (tiled.tile_size == 0 && g.nx * g.nz > kOneTile) tiled.tile_size = kTileCells;
+  auto mesh = tiled.tile_size > 0 ? build_in_tiles(ground, tiled) : build_whole(ground, report);
   if (!mesh.ok()) {
     return Status(mesh.code(),
                   mesh.message() + "; floor found at y = " + std::to_string(report.floor_y) +

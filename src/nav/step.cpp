@@ -20,7 +20,7 @@ bool valid(const AgentState& a) noexcept {
          std::abs(a.position.y) <= kMaxCoordinate && std::abs(a.position.z) <= kMaxCoordinate;
 }
 
-/// How far two boxes are apart, at least.
+/// Distance of two boxes.
 double distance(const Aabb<double>& a, const Aabb<double>& b) noexcept {
   double d2 = 0;
   for (int k = 0; k < 3; ++k) {
@@ -37,9 +37,9 @@ struct Stepper {
   const CapsuleSet& bodies;
   SweepRules<double> rules;
   StepResult& out;
-  bool alone = false;  ///< nobody is near the way ahead
+  bool alone = false;  ///< no body is near the way ahead
 
-  /// What the agent may touch on the way through `places`.
+  /// Adds what the agent may touch at a place.
   void add_reach(Aabb<double>& box, const Vec3d& place) const {
     const Capsule<double> solid = agent_capsule(place, agent.radius, agent.height);
     const double reach = solid.radius + 2 * rules.skin + kShortest;
@@ -49,8 +49,8 @@ struct Stepper {
     }
   }
 
-  /// Looks whether anybody is near the whole of a way that begins where the agent is. A body whose swept
-  /// box stays away cannot be hit, so leaving all of them out changes no bit.
+  /// Finds out whether any body is near a way that begins where the agent is. A body whose swept box
+  /// stays away cannot be hit, so leaving all of them out changes no bit.
   void look_around(std::span<const WalkPoint> way) {
     alone = bodies.empty();
     if (alone) return;
@@ -89,14 +89,14 @@ struct Stepper {
     out.toi = u;
     out.avatar = hit.avatar;
     out.bone = hit.bone;
-    // The sweep worked relative to the leg's start.
+    // The sweep's coordinates are relative to the leg's start.
     out.contact_point =
         hit.sweep.point + agent_capsule(out.path.back().position, agent.radius, agent.height).p0;
     out.normal = hit.sweep.normal;
     out.agent_caused = hit.sweep.agent_closing;
   }
 
-  /// Goes from the end of the path to `to`, or as far as bodies let it. Returns the impact that stopped
+  /// Goes from the end of the path to `to`, or as far as bodies permit. Returns the impact that stopped
   /// it.
   FirstImpact<double> go(const WalkPoint& to) const {
     if (alone) {
@@ -120,6 +120,34 @@ struct Stepper {
     return hit;
   }
 
+  /// Follows a walk until a body stops it. `fraction`, of the walk that was done, counts its legs only:
+  /// the first point may lie off the start (a centimetre above a bump, or where the agent was put), and
+  /// the way onto it is swept too.
+  struct Followed {
+    FirstImpact<double> hit;
+    double fraction = 0;
+    bool turned_back = false;  ///< a wall turned what a body had turned against the desired way
+  };
+  Followed follow(const SurfaceWalk& walk, const Vec3d& desired) const {
+    const double begin = out.path.back().fraction, span = 1.0 - begin;
+    Followed done;
+    out.path.back().poly = walk.points[0].poly;
+    if (norm(walk.points[0].position - out.path.back().position) > kRounding) {
+      done.hit = go({walk.points[0].position, walk.points[0].poly, begin});
+    }
+    for (std::size_t i = 1; i < walk.points.size() && !done.hit.hit; ++i) {
+      const WalkPoint& p = walk.points[i];
+      const Vec3d leg = p.position - walk.points[i - 1].position;
+      done.turned_back =
+          leg.x * desired.x + leg.z * desired.z < -kRounding * length_xz(desired) * length_xz(leg);
+      if (done.turned_back) break;
+      done.hit = go({p.position, p.poly, begin + p.fraction * span});
+      done.fraction = p.fraction;
+      if (done.hit.hit && span > 0) done.fraction = (out.path.back().fraction - begin) / span;
+    }
+    return done;
+  }
+
   /// The agent stands where it is for the rest of the tick.
   void stand() const {
     if (alone) return;
@@ -133,8 +161,8 @@ struct Stepper {
   }
 };
 
-/// What is left of `motion` (ground plane) after removing what goes against the contact normals met so
-/// far; zero in a corner between two.
+/// `motion` (ground plane) without its parts against the contact normals met so far; zero in a corner
+/// between two.
 Vec3d along_contacts(const Vec3d& motion, const SmallVector<Vec3d, 4>& normals) noexcept {
   Vec3d v = motion;
   for (std::size_t i = normals.size(); i-- > 0;) {
@@ -145,6 +173,49 @@ Vec3d along_contacts(const Vec3d& motion, const SmallVector<Vec3d, 4>& normals) 
     if (dot(v, n) < -kRounding * norm(motion)) return {};
   }
   return v;
+}
+
+/// Walks and slides along bodies until the motion is used up. False where the agent is not on the mesh.
+bool walk_and_slide(const NavMesh& mesh, const Vec3d& desired, const StepOptions& options,
+                    Stepper& stepper) {
+  StepResult& out = stepper.out;
+  Vec3d motion{desired.x, 0, desired.z};
+  SmallVector<Vec3d, 4> normals;
+  for (int slides = 0;; ++slides) {
+    const SurfaceWalk walk =
+        mesh.walk({out.path.back().position, out.path.back().poly}, motion, options.slide);
+    if (walk.points.empty()) return slides > 0;
+    if (walk.hit_wall) {
+      out.hit_wall = true;
+      out.wall_normal = walk.wall_normal;
+    }
+    stepper.look_around(walk.points);
+    const Stepper::Followed done = stepper.follow(walk, desired);
+    if (done.turned_back || !done.hit.hit || !options.slide || slides >= options.max_slides) return true;
+    const Vec3d n{done.hit.sweep.normal.x, 0, done.hit.sweep.normal.z};
+    if (!(norm(n) > 1e-6)) return true;  // from straight above or below: no way along the ground
+    normals.push_back(normalized(n));
+    motion = along_contacts(motion * (1.0 - done.fraction), normals);
+    if (!(norm(motion) > kShortest) || !(dot(motion, desired) > 0)) return true;
+  }
+}
+
+/// Finds the surface under an agent that does not move. False where there is none.
+bool stand_on(const NavMesh& mesh, const StepOptions& options, Stepper& stepper) {
+  WalkPoint& at = stepper.out.path.back();
+  const SurfaceWalk here = mesh.walk({at.position, at.poly}, {}, options.slide);
+  if (here.points.empty()) return false;
+  at.poly = here.points[0].poly;
+  stepper.look_around({});
+  return true;
+}
+
+double length_xz(std::span<const WalkPoint> path) noexcept {
+  double sum = 0;
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    sum += length_xz(path[i].position - path[i - 1].position);
+  }
+  return sum;
 }
 
 }  // namespace
@@ -166,71 +237,18 @@ StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& asked
   Stepper stepper{agent, bodies, rules, out};
   out.path.push_back({agent.position, agent.poly, 0.0});
   const double asked = length_xz(desired);
-  if (!(asked > 0)) {
-    // No way to go: is there a surface to stand on?
-    const SurfaceWalk here = mesh.walk({agent.position, agent.poly}, {}, options.slide);
-    if (here.points.empty()) {
-      out.blocked_by = BlockedBy::invalid;
-      return out;
-    }
-    out.path.back().poly = here.points[0].poly;
-    stepper.look_around({});
-  }
-
-  Vec3d motion{desired.x, 0, desired.z};
-  SmallVector<Vec3d, 4> normals;
-  for (int slides = 0; asked > 0; ++slides) {
-    const double begin = out.path.back().fraction, span = 1.0 - begin;
-    const SurfaceWalk walk =
-        mesh.walk({out.path.back().position, out.path.back().poly}, motion, options.slide);
-    if (walk.points.empty()) {
-      if (slides == 0) {
-        out.blocked_by = BlockedBy::invalid;
-        return out;
-      }
-      break;
-    }
-    if (walk.hit_wall) {
-      out.hit_wall = true;
-      out.wall_normal = walk.wall_normal;
-    }
-    stepper.look_around(walk.points);
-    FirstImpact<double> hit;
-    double walked = 0;  // fraction of `motion` used up
-    // The start may lie off the surface (a centimetre above a bump, or where it was put): that way onto
-    // it is swept too.
-    out.path.back().poly = walk.points[0].poly;
-    if (norm(walk.points[0].position - out.path.back().position) > kRounding) {
-      hit = stepper.go({walk.points[0].position, walk.points[0].poly, begin});
-    }
-    bool back = false;
-    for (std::size_t i = 1; i < walk.points.size() && !hit.hit; ++i) {
-      const WalkPoint& p = walk.points[i];
-      // A wall may turn what a body has turned already against the way that was asked for.
-      const Vec3d leg = p.position - walk.points[i - 1].position;
-      back = leg.x * desired.x + leg.z * desired.z < -kRounding * asked * length_xz(leg);
-      if (back) break;
-      hit = stepper.go({p.position, p.poly, begin + p.fraction * span});
-      walked = p.fraction;
-      if (hit.hit && span > 0) walked = (out.path.back().fraction - begin) / span;
-    }
-    if (back || !hit.hit || !options.slide || slides >= options.max_slides) break;
-    const Vec3d n{hit.sweep.normal.x, 0, hit.sweep.normal.z};
-    if (!(norm(n) > 1e-6)) break;  // from straight above or below: no way along the ground
-    normals.push_back(normalized(n));
-    motion = along_contacts(motion * (1.0 - walked), normals);
-    if (!(norm(motion) > kShortest) || !(dot(motion, desired) > 0)) break;
+  const bool on_mesh =
+      asked > 0 ? walk_and_slide(mesh, desired, options, stepper) : stand_on(mesh, options, stepper);
+  if (!on_mesh) {
+    out.blocked_by = BlockedBy::invalid;
+    return out;
   }
   stepper.stand();
 
   const WalkPoint& last = out.path.back();
   out.position = last.position;
   out.poly = last.poly;
-  double distance = 0;
-  for (std::size_t i = 1; i < out.path.size(); ++i) {
-    distance += length_xz(out.path[i].position - out.path[i - 1].position);
-  }
-  out.fraction = asked > 0 ? min(distance / asked, 1.0) : 1.0;
+  out.fraction = asked > 0 ? min(length_xz(out.path) / asked, 1.0) : 1.0;
   if (out.blocked_by == BlockedBy::none && out.hit_wall) out.blocked_by = BlockedBy::wall;
   return out;
 }
@@ -244,7 +262,7 @@ Clearance clearance(const AgentState& agent, const CapsuleSet& bodies, double t)
   Aabb<double> box;
   box.add(solid.p0 - r);
   box.add(solid.p1 + r);
-  // The avatar whose box is nearest first: most of the others are then too far to look at.
+  // Begin with the avatar whose box is nearest: most of the others are then too far away to matter.
   const std::span<const CapsuleSet::Group> groups = bodies.groups();
   std::size_t first = 0;
   double nearest = std::numeric_limits<double>::infinity();

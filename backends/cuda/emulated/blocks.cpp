@@ -1,70 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <memory>
 #include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "fiber.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav_emulated_device.hpp"
 #include "settings.hpp"
 
-#if defined(__SANITIZE_ADDRESS__)
-#define GSNAV_ASAN 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define GSNAV_ASAN 1
-#endif
-#endif
-#if defined(GSNAV_ASAN)
-#include <pthread.h>
-#include <sanitizer/common_interface_defs.h>
-#endif
-
-// Each thread of a block has a stack of its own, and leaves the processor where it waits for others: at
-// a barrier of the block, or at an operation of its warp. One thread of the host runs them all.
+// Each thread of a block is a fiber that yields where it waits for others: at a barrier of the block or
+// at an operation of its warp. One thread of the host runs them all.
 
 namespace gsnav::emulated {
-
-// void gsnav_emulated_switch(void** from, void* to): keeps what a call keeps (System V), leaves its
-// stack in *from and goes on where `to` was left.
-extern "C" void gsnav_emulated_switch(void** from, void* to);
-asm(R"(
-.text
-.globl gsnav_emulated_switch
-.hidden gsnav_emulated_switch
-.type gsnav_emulated_switch, @function
-gsnav_emulated_switch:
-  pushq %rbp
-  pushq %rbx
-  pushq %r12
-  pushq %r13
-  pushq %r14
-  pushq %r15
-  movq %rsp, (%rdi)
-  movq %rsi, %rsp
-  popq %r15
-  popq %r14
-  popq %r13
-  popq %r12
-  popq %rbx
-  popq %rbp
-  ret
-.size gsnav_emulated_switch, .-gsnav_emulated_switch
-)");
 
 namespace {
 
 constexpr unsigned kMostThreads = 1024, kWarp = 32;
-constexpr std::size_t kStackBytes = 256 << 10;
+/// Times that paused threads are woken while no other thread makes progress.
 constexpr unsigned kMostInVain = 10000;
 
 struct Thread {
@@ -73,41 +31,35 @@ struct Thread {
   const char* what = nullptr;
   Gathered* gathered = nullptr;
   dim3 index;
-  void* sp = nullptr;
-  char* stack = nullptr;
-  std::vector<std::pair<void*, std::vector<char>>> copies;  // asked for, not waited for yet
-#if defined(GSNAV_ASAN)
-  void* fake_stack = nullptr;
-#endif
+  Fiber fiber;
+  std::vector<std::pair<void*, std::vector<char>>> copies;  ///< started, not yet waited for
 };
 
-/// Which of its threads are where.
+/// Sets of a warp's threads, one bit each.
 struct Warp {
   unsigned there = 0, ready = 0, at_warp = 0, at_block = 0, paused = 0, done = 0;
   std::array<Gathered, kWarp> gathered;
 };
 
-/// Of the lowest bit set.
+/// Number of the lowest set bit.
 unsigned first_of(unsigned bits) { return static_cast<unsigned>(__builtin_ctz(bits)); }
+
+/// What every thread of a grid runs.
+struct Kernel {
+  const char* name = "";
+  void (*thread)(const void* arguments) = nullptr;
+  const void* arguments = nullptr;
+};
 
 class Block {
  public:
-  Block() : threads_(kMostThreads), warps_(kMostThreads / kWarp) {
-#if defined(GSNAV_ASAN)
-    pthread_attr_t attributes;
-    void* bottom = nullptr;
-    pthread_getattr_np(pthread_self(), &attributes);
-    pthread_attr_getstack(&attributes, &bottom, &scheduler_bytes_);
-    pthread_attr_destroy(&attributes);
-    scheduler_stack_ = bottom;
-#endif
+  Block() : scheduler_(Fiber::of_this_thread()), threads_(kMostThreads), warps_(kMostThreads / kWarp) {
     for (Warp& w : warps_) {
       for (Gathered& g : w.gathered) g.readers = 0;
     }
   }
 
-  void run(const Launch& launch, const dim3& at, const char* name, void (*thread)(const void*),
-           const void* arguments);
+  void run(const Launch& launch, const dim3& at, const Kernel& kernel);
   Gathered& gather(unsigned mask, std::uint64_t value, const char* what);
   int barrier(int number);
   void interleave();
@@ -122,7 +74,10 @@ class Block {
   };
 
   static void main();
-  void prepare(Thread& t);
+  /// Puts all threads at the start of the kernel.
+  void start(const Launch& launch);
+  /// Runs the threads of a warp that can run. False where none can.
+  bool run_warp(unsigned index);
   void enter(unsigned index);
   void resume(unsigned index);
   void leave();
@@ -130,27 +85,21 @@ class Block {
   bool wake_paused();
   std::string who_waits() const;
   Warp& warp() { return warps_[current_ / kWarp]; }
+  unsigned warp_count() const { return (size_ + kWarp - 1) / kWarp; }
   unsigned bit() const { return 1u << current_ % kWarp; }
   [[noreturn]] void fail(const std::string& why) const;
 
+  Fiber scheduler_;
   std::vector<Thread> threads_;
   std::vector<Warp> warps_;
   std::vector<Line> shared_;
   unsigned size_ = 0, current_ = 0, alive_ = 0, waiting_ = 0;
   int sum_ = 0, result_ = 0;
-  unsigned in_vain_ = 0;  ///< times that those who pause were asked again, and nobody did anything else
+  unsigned in_vain_ = 0;               ///< times that paused threads were woken since the last progress
   const std::uint64_t seed_ = seed();  ///< of GSNAV_EMULATED_SEED
   Rng random_;
-  void* scheduler_ = nullptr;
-  const char* name_ = "";
+  Kernel kernel_;
   dim3 at_;
-  void (*thread_)(const void*) = nullptr;
-  const void* arguments_ = nullptr;
-#if defined(GSNAV_ASAN)
-  void* scheduler_fake_stack_ = nullptr;
-  const void* scheduler_stack_ = nullptr;
-  std::size_t scheduler_bytes_ = 0;
-#endif
 };
 
 Block& block() {
@@ -159,19 +108,17 @@ Block& block() {
 }
 
 void Block::fail(const std::string& why) const {
-  std::fprintf(stderr, "emulated device: %s, block (%u, %u, %u), thread %u: %s\n", name_, at_.x, at_.y,
-               at_.z, current_, why.c_str());
+  std::fprintf(stderr, "emulated device: %s, block (%u, %u, %u), thread %u: %s\n", kernel_.name, at_.x,
+               at_.y, at_.z, current_, why.c_str());
   std::abort();
 }
 
-/// Where a thread's stack begins; a thread runs one block after the other on it.
+/// What a thread's fiber runs: the thread of that number of one block after the other.
 void Block::main() {
   Block& b = block();
-#if defined(GSNAV_ASAN)
-  __sanitizer_finish_switch_fiber(nullptr, nullptr, nullptr);
-#endif
+  Fiber::began();
   for (;;) {
-    b.thread_(b.arguments_);
+    b.kernel_.thread(b.kernel_.arguments);
     if (!b.self().copies.empty()) b.fail("ended before its copies into shared memory were waited for");
     b.warp().done |= b.bit();
     b.in_vain_ = 0;
@@ -181,20 +128,6 @@ void Block::main() {
   }
 }
 
-void Block::prepare(Thread& t) {
-  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-  void* const memory = mmap(nullptr, kStackBytes + page, PROT_READ | PROT_WRITE,
-                            MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
-  if (memory == MAP_FAILED || mprotect(memory, page, PROT_NONE) != 0) fail("no memory for its stack");
-  t.stack = static_cast<char*>(memory) + page;
-  // As if main() had been called: its return address, which nobody uses, 8 bytes below a line of 16.
-  auto** top = reinterpret_cast<void**>(t.stack + kStackBytes) - 1;
-  *top = nullptr;
-  *--top = reinterpret_cast<void*>(&Block::main);
-  for (int i = 0; i < 6; ++i) *--top = nullptr;
-  t.sp = top;
-}
-
 void Block::enter(unsigned index) {
   current_ = index;
   threadIdx = threads_[index].index;
@@ -202,37 +135,19 @@ void Block::enter(unsigned index) {
 
 void Block::resume(unsigned index) {
   enter(index);
-  Thread& t = threads_[index];
-#if defined(GSNAV_ASAN)
-  __sanitizer_start_switch_fiber(&scheduler_fake_stack_, t.stack, kStackBytes);
-#endif
-  gsnav_emulated_switch(&scheduler_, t.sp);
-#if defined(GSNAV_ASAN)
-  __sanitizer_finish_switch_fiber(scheduler_fake_stack_, nullptr, nullptr);
-#endif
+  Fiber::change(scheduler_, self().fiber);
 }
 
 void Block::leave() {
-  Thread& t = self();
+  Fiber& own = self().fiber;
   Warp& w = warp();
-  if (seed_ == 0 && w.ready != 0) {  // another of the warp, without a way through the scheduler
-    const unsigned next = current_ / kWarp * kWarp + first_of(w.ready);
-    w.ready &= w.ready - 1;
-    if (next == current_) return;
-    enter(next);
-#if defined(GSNAV_ASAN)
-    __sanitizer_start_switch_fiber(&t.fake_stack, self().stack, kStackBytes);
-#endif
-    gsnav_emulated_switch(&t.sp, self().sp);
-  } else {
-#if defined(GSNAV_ASAN)
-    __sanitizer_start_switch_fiber(&t.fake_stack, scheduler_stack_, scheduler_bytes_);
-#endif
-    gsnav_emulated_switch(&t.sp, scheduler_);
-  }
-#if defined(GSNAV_ASAN)
-  __sanitizer_finish_switch_fiber(t.fake_stack, nullptr, nullptr);
-#endif
+  if (seed_ != 0 || w.ready == 0) return Fiber::change(own, scheduler_);
+  // The next thread of the warp, without a way through the scheduler.
+  const unsigned next = current_ / kWarp * kWarp + first_of(w.ready);
+  w.ready &= w.ready - 1;
+  if (next == current_) return;
+  enter(next);
+  Fiber::change(own, self().fiber);
 }
 
 Gathered& Block::gather(unsigned mask, std::uint64_t value, const char* what) {
@@ -313,50 +228,52 @@ bool Block::wake_paused() {
   return any && ++in_vain_ < kMostInVain;
 }
 
-void Block::run(const Launch& launch, const dim3& at, const char* name, void (*thread)(const void*),
-                const void* arguments) {
-  name_ = name;
-  at_ = at;
-  thread_ = thread;
-  arguments_ = arguments;
+void Block::start(const Launch& launch) {
   size_ = alive_ = launch.block.x * launch.block.y * launch.block.z;
   waiting_ = 0;
   in_vain_ = 0;
   sum_ = 0;
-  random_ = Rng(seed_ ^ (std::uint64_t{at.y} << 32 | at.x));
-  blockIdx = at;
-  blockDim = launch.block;
-  gridDim = launch.grid;
+  random_ = Rng(seed_ ^ (std::uint64_t{at_.y} << 32 | at_.x));
   shared_.assign((launch.shared + sizeof(Line) - 1) / sizeof(Line), Line{});
   if (!shared_.empty()) std::memset(shared_.data(), 0xd7, shared_.size() * sizeof(Line));
   for (unsigned i = 0; i < size_; ++i) {
     Thread& t = threads_[i];
-    if (t.stack == nullptr) prepare(t);
+    if (!t.fiber.start(&Block::main)) fail("no memory for its stack");
     t.index = dim3(i % launch.block.x, i / launch.block.x % launch.block.y,
                    i / launch.block.x / launch.block.y);
   }
-  const unsigned count = (size_ + kWarp - 1) / kWarp;
-  for (unsigned i = 0; i < count; ++i) {
+  for (unsigned i = 0; i < warp_count(); ++i) {
     Warp& w = warps_[i];
     w.there = w.ready = size_ - i * kWarp >= kWarp ? ~0u : (1u << size_ % kWarp) - 1;
     w.at_warp = w.at_block = w.paused = w.done = 0;
   }
+}
+
+bool Block::run_warp(unsigned index) {
+  Warp& w = warps_[index];
+  bool any = false;
+  // Until all its threads wait. With a seed another warp may be chosen earlier.
+  while (w.ready != 0 && (seed_ == 0 || random_.below(64) != 0)) {
+    any = true;
+    const unsigned turn = seed_ == 0 ? 0 : static_cast<unsigned>(random_.below(kWarp));
+    const unsigned above = w.ready & ~0u << turn, lane = first_of(above != 0 ? above : w.ready);
+    w.ready &= ~(1u << lane);
+    resume(index * kWarp + lane);
+  }
+  return any || w.ready != 0;
+}
+
+void Block::run(const Launch& launch, const dim3& at, const Kernel& kernel) {
+  kernel_ = kernel;
+  blockIdx = at_ = at;
+  blockDim = launch.block;
+  gridDim = launch.grid;
+  start(launch);
   while (alive_ != 0) {
     bool any = false;
+    const unsigned count = warp_count();
     const unsigned first = seed_ == 0 ? 0 : static_cast<unsigned>(random_.below(count));
-    for (unsigned i = 0; i < count; ++i) {
-      const unsigned index = (first + i) % count;
-      Warp& w = warps_[index];
-      // As far as it gets; with a seed another warp may go on before that.
-      while (w.ready != 0 && (seed_ == 0 || random_.below(64) != 0)) {
-        any = true;
-        const unsigned turn = seed_ == 0 ? 0 : static_cast<unsigned>(random_.below(kWarp));
-        const unsigned above = w.ready & ~0u << turn, lane = first_of(above != 0 ? above : w.ready);
-        w.ready &= ~(1u << lane);
-        resume(index * kWarp + lane);
-      }
-      any = any || w.ready != 0;
-    }
+    for (unsigned i = 0; i < count; ++i) any = run_warp((first + i) % count) || any;
     if (!any && alive_ != 0 && !wake_paused()) fail("threads wait for one another:" + who_waits());
   }
 }
@@ -403,7 +320,7 @@ void run_grid(const Launch& launch, const char* name, void (*thread)(const void*
               const void* arguments) {
   const dim3& g = launch.grid;
   const std::uint64_t blocks = std::uint64_t{g.x} * g.y * g.z;
-  // Each once, in an order of its own: a step that shares no divisor with their number.
+  // A step that shares no divisor with the number of blocks visits each block once.
   std::uint64_t step = 1, at = 0;
   if (seed() != 0 && blocks > 2) {
     Rng rng(seed());
@@ -413,10 +330,9 @@ void run_grid(const Launch& launch, const char* name, void (*thread)(const void*
     at = rng.below(blocks);
   }
   for (std::uint64_t i = 0; i < blocks; ++i, at = (at + step) % blocks) {
-    block().run(launch,
-                dim3(static_cast<unsigned>(at % g.x), static_cast<unsigned>(at / g.x % g.y),
-                     static_cast<unsigned>(at / g.x / g.y)),
-                name, thread, arguments);
+    const dim3 index(static_cast<unsigned>(at % g.x), static_cast<unsigned>(at / g.x % g.y),
+                     static_cast<unsigned>(at / g.x / g.y));
+    block().run(launch, index, {name, thread, arguments});
   }
 }
 

@@ -5,25 +5,24 @@
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/math/vec.hpp"
 
-// Distance and time of impact of capsules, for scalars and lane packs. Nothing here branches on data
-// except to leave a loop that no lane needs any more. Float inputs must be relative to an origin near
-// the agent (subtract in double first): at 1000 m a float cannot hold a millimetre.
+// Distance and time of impact of capsules, for scalars and lane packs. Nothing here branches on data,
+// except where no lane needs what a branch computes. Float inputs must be relative to an origin near the
+// agent (subtract in double first): at 1000 m a float cannot hold a millimetre.
 
 namespace gsnav {
 
 /// Rules of a sweep. All lengths in metres.
 template <class S>
 struct SweepRules {
-  /// A moving agent comes to rest this far from a body; contact is declared at half of it, so that
-  /// sliding along a body is free of rounding.
+  /// A moving agent comes to rest this far from a body. Contact is declared at half of it, so that
+  /// rounding does not stop an agent that slides along a body.
   S skin = S(1e-4);
   /// The advance ends when the gap is within this of its target.
   S tolerance = sizeof(S) > 4 ? S(1e-6) : S(4e-6);
   /// A change of gap smaller than this is rounding.
   S slack = sizeof(S) > 4 ? S(1e-12) : S(1e-6);
-  /// Evaluations at most. Part of the result: at the cap the time reached is returned as blocked. In
-  /// double no pair of 800,000 with axes of up to 3 km needed more; in float, which stalls before it
-  /// arrives, 1 in 10^4 stops short.
+  /// Most evaluations. Where they do not suffice, the agent stops at the time reached. In double no pair
+  /// of 800,000 with axes of up to 3 km needed more; in float 1 in 10^4 stops short.
   int max_iterations = sizeof(S) > 4 ? 512 : 64;
 };
 
@@ -31,9 +30,9 @@ struct SweepRules {
 template <class L>
 struct SweepResult {
   mask_of<L> hit;            ///< the agent has to stop
-  mask_of<L> pushed;         ///< the body came closer from contact without the agent's doing
-  L time;                    ///< where the agent rests, in [0, 1]; 1 without a hit
-  L contact_time;            ///< where contact was declared, >= time
+  mask_of<L> pushed;         ///< in contact, the body came closer by its own motion alone
+  L time;                    ///< when the agent comes to rest, in [0, 1]; 1 without a hit
+  L contact_time;            ///< when contact was declared, >= time
   L start_gap;               ///< signed gap at time 0
   L gap;                     ///< signed gap at the last evaluation
   Vec3<L> normal;            ///< unit, from the body to the agent, at contact
@@ -43,28 +42,70 @@ struct SweepResult {
 
 namespace detail {
 
-/// Two moving capsules on both sides of the plane across their closest points: how far apart each pair
-/// of ends is along its normal, and how fast that becomes less.
+/// Velocities of the ends of two moving capsules and growth of their radii, a unit of time.
+template <class L>
+struct PairMotion {
+  Vec3<L> agent[2], body[2];
+  L agent_growth, growth;  ///< of the agent's radius; of both radii together
+
+  GSNAV_HD PairMotion(const MovingCapsule<L>& a, const MovingCapsule<L>& b) noexcept
+      : agent{a.end.p0 - a.begin.p0, a.end.p1 - a.begin.p1},
+        body{b.end.p0 - b.begin.p0, b.end.p1 - b.begin.p1},
+        agent_growth(a.end.radius - a.begin.radius),
+        growth(agent_growth + (b.end.radius - b.begin.radius)) {}
+
+  /// By how much the agent itself can reduce the gap.
+  GSNAV_HD L agent_speed() const noexcept {
+    return sqrt(max(dot(agent[0], agent[0]), dot(agent[1], agent[1]))) + abs(agent_growth);
+  }
+
+  /// Greatest speed of an end of one capsule relative to an end of the other; more than 0.
+  GSNAV_HD L fastest_pair() const noexcept {
+    using S = scalar_of<L>;
+    L speed2(S(0));
+    for (int k = 0; k < 4; ++k) {
+      const Vec3<L> r = agent[k >> 1] - body[k & 1];
+      speed2 = max(speed2, dot(r, r));
+    }
+    return sqrt(max(speed2, L(least_normal<S>())));
+  }
+};
+
+/// Closest points of the axes. Where the axes meet, both directions across them are normals: the one
+/// against which the agent leaves on the side that it is heading for.
+template <class L>
+GSNAV_HD SegmentDistance<L> axis_distance(const Capsule<L>& a, const Capsule<L>& b,
+                                          const PairMotion<L>& motion) noexcept {
+  const L zero(scalar_of<L>(0));
+  SegmentDistance<L> d = segment_distance(a.p0, a.p1, b.p0, b.p1);
+  const auto other_side =
+      (d.distance <= zero) && (dot(d.normal, motion.agent[0] + motion.agent[1]) > zero);
+  d.normal = select_vec(other_side, -d.normal, d.normal);
+  return d;
+}
+
+/// The plane across the closest points of two moving capsules, which separates them: for each pair of
+/// ends, the distance along the plane's normal and how fast it shrinks.
 template <class L>
 struct PlaneBetween {
   L sep[4], closing[4];
   L agent[2];  ///< speed of the agent's ends towards the body
 
   GSNAV_HD PlaneBetween(const SegmentDistance<L>& d, L gap, const Capsule<L>& a, const Capsule<L>& b,
-                        const Vec3<L> (&va)[2], const Vec3<L> (&vb)[2], L growth) noexcept
-      : agent{dot(d.normal, va[0]), dot(d.normal, va[1])} {
-    const L nb[2] = {dot(d.normal, vb[0]), dot(d.normal, vb[1])};
+                        const PairMotion<L>& motion) noexcept
+      : agent{dot(d.normal, motion.agent[0]), dot(d.normal, motion.agent[1])} {
+    const L nb[2] = {dot(d.normal, motion.body[0]), dot(d.normal, motion.body[1])};
     const Vec3<L> pa[2] = {a.p0 - d.on_a, a.p1 - d.on_a}, pb[2] = {b.p0 - d.on_b, b.p1 - d.on_b};
     for (int k = 0; k < 4; ++k) {
       const int ia = k >> 1, ib = k & 1;
       // Relative to the witness points, whose separation is the gap: large offsets cancel exactly.
       sep[k] = gap + dot(d.normal, pb[ib]) - dot(d.normal, pa[ia]);
-      closing[k] = agent[ia] - nb[ib] + growth;
+      closing[k] = agent[ia] - nb[ib] + motion.growth;
     }
   }
 
-  /// A time before which the gap is more than `to`, since the plane still separates them by that;
-  /// `never` where no pair of ends comes closer.
+  /// A time before which the gap is more than `to`, because the plane still separates the capsules by
+  /// that; `never` where no pair of ends comes closer.
   GSNAV_HD L time_to(L to, L never) const noexcept {
     using S = scalar_of<L>;
     const L zero(S(0)), one(S(1));
@@ -78,22 +119,22 @@ struct PlaneBetween {
   }
 };
 
-/// Greatest speed of an end of one capsule relative to an end of the other; more than 0.
+/// How long before contact the agent has to rest to be `half` a skin further away, along at most two
+/// skins of relative motion: at grazing speed a little gap can be a long way.
 template <class L>
-GSNAV_HD L fastest_pair(const Vec3<L> (&va)[2], const Vec3<L> (&vb)[2]) noexcept {
+GSNAV_HD L time_back(const PlaneBetween<L>& plane, const PairMotion<L>& motion, L half,
+                     L skin) noexcept {
   using S = scalar_of<L>;
-  L speed2(S(0));
-  for (int k = 0; k < 4; ++k) {
-    const Vec3<L> r = va[k >> 1] - vb[k & 1];
-    speed2 = max(speed2, dot(r, r));
-  }
-  return sqrt(max(speed2, L(least_normal<S>())));
+  const L tiny(least_normal<S>());
+  L fastest(S(0));
+  for (int k = 0; k < 4; ++k) fastest = max(fastest, plane.closing[k]);
+  return min(half / max(fastest, tiny), (skin + skin) / motion.fastest_pair());
 }
 
-/// How long an agent that a body has pushed may go on before it is looked at again whether it goes
-/// deeper by itself. The direction between two axes turns by about relative speed / distance: an agent
-/// that moves away at `-rate` cannot come closer before it has turned by as much, and one that moves
-/// along the body gets deeper with the square of time, which is kept to about the skin.
+/// How long an agent that a body has pushed may go on before the next check whether it goes deeper by
+/// itself. The direction between two axes turns by about relative speed / distance. An agent that moves
+/// away at `-rate` cannot come closer before that direction has turned far enough. One that moves along
+/// the body gets deeper with the square of time, which is limited to about the skin.
 template <class L>
 GSNAV_HD L time_to_look(L skin, L agent_speed, L rate, L axes_apart, L relative_speed) noexcept {
   using S = scalar_of<L>;
@@ -104,39 +145,33 @@ GSNAV_HD L time_to_look(L skin, L agent_speed, L rate, L axes_apart, L relative_
   return max(max(along, away), least);
 }
 
-/// `sweep`, up to `steps` evaluations of it: lanes that are not in `unfinished` have their result.
+/// `sweep`, up to `steps` evaluations of it. Lanes outside of `unfinished` have their result.
+///
+/// A lane is `strict` once its agent has been clear of the body: then contact stops it. Until then
+/// `floor` is the least gap so far. A body may reduce it: the next check is a little later (`looking`).
+/// Where that check finds that the agent itself went deeper, the time since which it did is searched for
+/// between `good` and `over` (`narrowing`).
 template <class L, class S = scalar_of<L>>
 GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
                                     const SweepRules<S>& rules, int steps,
                                     mask_of<L>& unfinished) noexcept {
   const L zero(S(0)), one(S(1)), never(S(4));
   const L skin(rules.skin), target(rules.skin * S(0.5)), tolerance(rules.tolerance), slack(rules.slack);
-  const Vec3<L> va[2] = {agent.end.p0 - agent.begin.p0, agent.end.p1 - agent.begin.p1};
-  const Vec3<L> vb[2] = {body.end.p0 - body.begin.p0, body.end.p1 - body.begin.p1};
-  const L agent_growth = agent.end.radius - agent.begin.radius;
-  const L growth = agent_growth + (body.end.radius - body.begin.radius);
-  // By how much the agent itself can go deeper, a unit of time, and how much of that a search may leave.
-  const L agent_speed = sqrt(max(dot(va[0], va[0]), dot(va[1], va[1]))) + abs(agent_growth);
-  const L enough = max(tolerance, skin * L(S(0.0625)));
+  const PairMotion<L> motion(agent, body);
+  const L agent_speed = motion.agent_speed();
+  const L enough = max(tolerance, skin * L(S(0.0625)));  // how much deeper a search may leave the agent
 
   SweepResult<L> out{};
   auto active = zero < one;
   const auto nowhere = one < zero;
   out.hit = out.pushed = out.agent_closing = nowhere;
   out.time = out.contact_time = one;
-  // Without a start that is clear, `floor` is the least gap so far: whoever makes it less deepens the
-  // overlap. A body may. Where it has, the next look is a little later (`looking`); where the agent
-  // turns out to have gone deeper by itself, the time after which it did is searched for between `good`
-  // and `over` (`narrowing`).
   L t = zero, floor = zero, good = zero, over = zero;
   auto strict = active;
   auto looking = nowhere, narrowing = nowhere;
   for (int i = 0; i < steps; ++i) {
     const Capsule<L> a = lerp(agent.begin, agent.end, t), b = lerp(body.begin, body.end, t);
-    SegmentDistance<L> d = segment_distance(a.p0, a.p1, b.p0, b.p1);
-    // Where axes meet either side is as near: the agent goes out on the one that it is heading for.
-    const auto other_side = (d.distance <= zero) && (dot(d.normal, va[0] + va[1]) > zero);
-    d.normal = select_vec(other_side, -d.normal, d.normal);
+    const SegmentDistance<L> d = axis_distance(a, b, motion);
     const L radii = a.radius + b.radius;
     const L gap = d.distance - radii;
     if (i == 0) {
@@ -150,8 +185,8 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
     looking = looking && !strict;
     narrowing = narrowing && !strict;
 
-    const detail::PlaneBetween<L> plane(d, gap, a, b, va, vb, growth);
-    const L agent_rate = max(plane.agent[0], plane.agent[1]) + agent_growth;
+    const PlaneBetween<L> plane(d, gap, a, b, motion);
+    const L agent_rate = max(plane.agent[0], plane.agent[1]) + motion.agent_growth;
     const auto agent_closes = agent_rate > slack;
     const auto wrong = active && looking && agent_closes && (gap < floor - tolerance);
     floor = select(looking && !wrong, min(floor, gap), floor);
@@ -165,12 +200,7 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
     const auto pushed = arrived && !stops;
     const auto last = i + 1 == rules.max_iterations ? active && !done : stops;
     if (any(last)) {
-      // Half a skin back along the motion, two skins of relative path at most: at grazing speed half a
-      // skin of gap can be a long way.
-      const L tiny(detail::least_normal<S>());
-      L fastest(S(0));
-      for (int k = 0; k < 4; ++k) fastest = max(fastest, plane.closing[k]);
-      const L back = min(target / max(fastest, tiny), (skin + skin) / detail::fastest_pair(va, vb));
+      const L back = time_back(plane, motion, target, skin);
       out.hit = out.hit || last;
       const L rest = select(wrong, good, max(t - select(strict, back, zero), zero));
       out.time = select(last, rest, out.time);
@@ -184,8 +214,8 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
     good = select(wrong, good, t);
     L next = t + dt;
     if (any(pushed || narrowing)) {
-      const L speed = detail::fastest_pair(va, vb) + abs(growth);
-      const L look = t + detail::time_to_look(skin, agent_speed, agent_rate, d.distance, speed);
+      const L speed = motion.fastest_pair() + abs(motion.growth);
+      const L look = t + time_to_look(skin, agent_speed, agent_rate, d.distance, speed);
       next = select(pushed, min(look, one), next);
       const L half = L(S(0.5)) * (good + over);
       const auto near = !wrong && ((over - good) * agent_speed <= enough);
@@ -208,14 +238,14 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
 /// linearly in endpoints and radius, over a common interval mapped to [0, 1].
 ///
 /// Directional conservative advancement: along the normal n of the closest points each of the four
-/// endpoint pairs separates at a constant rate, so the first time at which any of them reaches the
-/// target is a time before which the plane still separates the two. An advance cannot overshoot, at
-/// any speed. `time` is at or before `contact_time`, and every earlier time is free.
+/// endpoint pairs separates at a constant rate. Before the first of them reaches the target distance,
+/// the plane still separates the two, so an advance cannot overshoot at any speed. `time` is at or
+/// before `contact_time`, and every earlier time is free.
 ///
-/// A start closer than skin/4 (overlap included) is judged by what the agent itself adds: motion that
-/// does not deepen, or that only the body deepens, goes on; `pushed` reports the latter. The agent stops
-/// where it would itself make the gap less than it has been so far, within about twice the skin (1.1e-4
-/// m in 12,600 steps with pushes at the default skin).
+/// From a start closer than skin/4, overlap included, the agent goes on as long as it does not itself
+/// reduce the gap below what it has been so far, within about twice the skin (1.1e-4 m in 12,600 steps
+/// with pushes at the default skin). A gap that the body alone reduces does not stop it; `pushed`
+/// reports that.
 template <class L, class S = scalar_of<L>>
 GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
                               const SweepRules<S>& rules) noexcept {
@@ -223,22 +253,19 @@ GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule
   return detail::sweep_steps(agent, body, rules, rules.max_iterations, unfinished);
 }
 
-/// The least gap of two capsules that move linearly over the unit interval, or `best` where it is not
-/// less than that: at most `tolerance` (metres, > 0) too large. The same plane tells how long nothing
-/// nearer can come.
+/// The least gap of two capsules that move linearly over the unit interval, at most `tolerance` (metres,
+/// > 0) too large; `best` where that is less. The plane between them tells for how long they cannot come
+/// nearer.
 template <class S>
 GSNAV_HD S least_gap(const MovingCapsule<S>& agent, const MovingCapsule<S>& body, S best,
                      S tolerance) noexcept {
-  const Vec3<S> va[2] = {agent.end.p0 - agent.begin.p0, agent.end.p1 - agent.begin.p1};
-  const Vec3<S> vb[2] = {body.end.p0 - body.begin.p0, body.end.p1 - body.begin.p1};
-  const S growth = (agent.end.radius - agent.begin.radius) + (body.end.radius - body.begin.radius);
+  const detail::PairMotion<S> motion(agent, body);
   for (S t = S(0);;) {
     const Capsule<S> a = lerp(agent.begin, agent.end, t), b = lerp(body.begin, body.end, t);
     const SegmentDistance<S> d = segment_distance(a.p0, a.p1, b.p0, b.p1);
     const S gap = d.distance - a.radius - b.radius;
     best = min(best, gap);
-    const S next =
-        t + detail::PlaneBetween<S>(d, gap, a, b, va, vb, growth).time_to(best - tolerance, S(4));
+    const S next = t + detail::PlaneBetween<S>(d, gap, a, b, motion).time_to(best - tolerance, S(4));
     if (!(next > t && next < S(1))) return best;
     t = next;
   }

@@ -22,14 +22,14 @@
 
 namespace gsnav {
 
-/// One level of a set that ships them: Gaussians, and the box that each belongs to.
+/// One level of a set that ships its levels: Gaussians, and the box that each belongs to.
 struct LodLevel {
-  GaussianCloud cloud;               ///< rows as they were read
+  GaussianCloud cloud;               ///< rows in the order of the file
   std::vector<std::uint32_t> boxes;  ///< [N]
 };
 
-/// A cloud in chunks that belong to one box each, and its levels of detail. The last chunk of a box is
-/// filled with transparent rows.
+/// A cloud whose chunks belong to one box each, and its levels of detail. The last chunk of a box is
+/// filled up with transparent rows.
 struct LeveledCloud {
   GaussianCloud cloud;
   LodTree tree;
@@ -37,13 +37,16 @@ struct LeveledCloud {
 
 namespace detail {
 
-/// Where a box's rows are after box_order.
+/// Where a box's rows of one level are.
 struct BoxRows {
-  std::uint32_t first = 0, count = 0;  ///< of the level as it was read, by box
+  std::uint32_t first = 0, count = 0;  ///< rows of the level, sorted by box but not filled up
   std::uint32_t first_chunk = 0, chunks = 0;
+
+  /// The i-th row in the chunks.
+  std::size_t row(std::size_t i) const noexcept { return first_chunk * kProjectChunk + i; }
 };
 
-/// Rows of all levels once their boxes are in chunks of their own.
+/// Rows of all levels once each box has chunks of its own.
 inline std::size_t filled_rows(const std::vector<LodLevel>& levels, std::size_t boxes) {
   std::size_t chunks = 0;
   std::vector<std::uint32_t> counts;
@@ -55,8 +58,8 @@ inline std::size_t filled_rows(const std::vector<LodLevel>& levels, std::size_t 
   return chunks * kProjectChunk;
 }
 
-/// Brings the rows of a level together by box, along Hilbert's curve within each, the largest behind the
-/// others as in sort_spatially, and fills up chunks. `row_ids` keeps the places.
+/// Sorts the rows of a level by box, within a box along Hilbert's curve with the largest last as in
+/// sort_spatially, and fills up chunks. `row_ids` keeps the rows' places in the file.
 template <Backend B>
 std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) {
   GaussianCloud& in = level.cloud;
@@ -98,8 +101,7 @@ std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) 
       return codes[x] != codes[y] ? codes[x] < codes[y] : x < y;
     });
     for (std::size_t k = 0; k < out[b].chunks * kProjectChunk; ++k) {
-      from[out[b].first_chunk * kProjectChunk + k] =
-          order[out[b].first + std::min<std::size_t>(k, out[b].count - 1)];
+      from[out[b].row(k)] = order[out[b].first + std::min<std::size_t>(k, out[b].count - 1)];
     }
   });
   static_cast<void>(backend.synchronize());
@@ -123,8 +125,7 @@ std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) 
   in.row_ids = std::move(from);
   std::uint32_t filled = static_cast<std::uint32_t>(n);
   for (const BoxRows& b : out) {
-    for (std::size_t i = b.first_chunk * kProjectChunk + b.count;
-         i < (b.first_chunk + b.chunks) * kProjectChunk; ++i) {
+    for (std::size_t i = b.row(b.count); i < b.row(b.chunks * kProjectChunk); ++i) {
       in.opacities[i] = 0;
       in.row_ids[i] = filled++;
     }
@@ -138,114 +139,142 @@ std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) 
 inline double distance_to_level(const GaussianCloud& fine, const BoxRows& in_fine,
                                 const GaussianCloud& coarse, const BoxRows& in_coarse) {
   std::vector<Vec3d> points(in_coarse.count);
-  for (std::size_t i = 0; i < points.size(); ++i)
-    points[i] = coarse.mean(in_coarse.first_chunk * kProjectChunk + i);
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = coarse.mean(in_coarse.row(i));
   const PointTree tree(points);
   double squares = 0, mass = 0;
   for (std::size_t i = 0; i < in_fine.count; ++i) {
-    const LodGaussian g = lod_gaussian(fine, in_fine.first_chunk * kProjectChunk + i, 0);
+    const LodGaussian g = lod_gaussian(fine, in_fine.row(i), 0);
     squares += g.mass * tree.nearest_squared(g.mean);
     mass += g.mass;
   }
   return mass > 0 ? std::sqrt(squares / mass) : 0;
 }
 
+inline Status bad_level(std::size_t level, const std::string& what) {
+  return {Errc::invalid_argument, "join_levels: level " + std::to_string(level) + ": " + what};
+}
+
+inline Status check_levels(const std::vector<LodLevel>& levels, std::size_t boxes) {
+  if (levels.empty()) return {Errc::invalid_argument, "join_levels: there is no level"};
+  std::size_t all = 0;
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    const LodLevel& level = levels[l];
+    if (level.boxes.size() != level.cloud.size()) {
+      return bad_level(l, std::to_string(level.boxes.size()) + " boxes for " +
+                              std::to_string(level.cloud.size()) + " rows");
+    }
+    if (!level.cloud.shN_half.empty()) return bad_level(l, "compact: expand_sh first");
+    all += level.cloud.size();
+    for (const std::uint32_t b : level.boxes) {
+      if (b >= boxes) return bad_level(l, "box " + std::to_string(b) + " of " + std::to_string(boxes));
+    }
+  }
+  if (filled_rows(levels, boxes) <= 4 * all + (std::size_t{1} << 20)) return {};
+  return {Errc::unsupported, "join_levels: " + std::to_string(all) +
+                                 " rows in so many small boxes that chunks of " +
+                                 std::to_string(kProjectChunk) + " would be mostly empty"};
+}
+
+/// The levels with their rows in chunks, and the forest over them.
+struct LevelForest {
+  std::vector<LodLevel> levels;
+  std::vector<std::vector<BoxRows>> rows;  ///< [level][box]
+  LodTree tree;
+  std::vector<std::uint32_t> box_of;  ///< of each node
+
+  /// Makes a node of each box at each level, from the finest to the coarsest.
+  void add_nodes() {
+    std::vector<std::uint32_t> node_of(rows[0].size(), LodPlace::kNone);  // the coarsest so far, by box
+    std::uint32_t first_chunk = 0;                                        // of the level, in merged
+    for (std::size_t l = 0; l < levels.size(); ++l) {
+      tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
+      for (std::uint32_t b = 0; b < node_of.size(); ++b) {
+        const BoxRows& r = rows[l][b];
+        if (r.count == 0 || (l > 0 && node_of[b] == LodPlace::kNone)) continue;
+        tree.places.push_back(
+            {r.first_chunk + first_chunk, r.chunks, node_of[b], r.count, rows[0][b].count});
+        node_of[b] = static_cast<std::uint32_t>(tree.nodes.size());
+        tree.nodes.emplace_back();
+        box_of.push_back(b);
+      }
+      if (l > 0) first_chunk += static_cast<std::uint32_t>(levels[l].cloud.chunk_bounds.size());
+    }
+    tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
+    for (const std::uint32_t node : node_of) {
+      if (node != LodPlace::kNone) tree.roots.push_back(node);
+    }
+  }
+
+  /// A node of level l, whose finer node is known.
+  LodNode measured(std::size_t at, std::size_t l) const {
+    const std::uint32_t b = box_of[at];
+    const BoxRows& r = rows[l][b];
+    const GaussianCloud& own = levels[l].cloud;
+    LodNode node;
+    node.reach = own.chunk_bounds[r.first_chunk];
+    for (std::uint32_t c = 1; c < r.chunks; ++c) {
+      node.reach = both(node.reach, own.chunk_bounds[r.first_chunk + c]);
+    }
+    if (l == 0) {
+      LodGrain grain;
+      for (std::size_t k = 0; k < r.count; ++k) grain.add(lod_gaussian(own, r.row(k), 0));
+      node.grain = grain.size();
+      return node;
+    }
+    const LodNode& finer = tree.nodes[tree.places[at].finer];
+    node.grain = finer.grain;
+    node.reach = both(node.reach, finer.reach);
+    const double distance = distance_to_level(levels[0].cloud, rows[0][b], own, r);
+    node.error = std::max(finer.error, static_cast<float>(distance));
+    return node;
+  }
+
+  template <Backend B>
+  Status measure_nodes(B& backend) {
+    for (std::size_t l = 0; l < levels.size(); ++l) {
+      const std::size_t first = tree.level_begin[l], end = tree.level_begin[l + 1];
+      backend.parallel_for(end - first,
+                           [&](std::size_t i) { tree.nodes[first + i] = measured(first + i, l); });
+      if (Status s = backend.synchronize(); !s) return s;
+    }
+    return {};
+  }
+
+  /// Moves all levels but the finest to `tree.merged`.
+  template <Backend B>
+  Status merge_levels(B& backend) {
+    for (std::size_t l = 1; l < levels.size(); ++l) {
+      if (Status s = append(tree.merged, levels[l].cloud); !s) return bad_level(l, s.message());
+      levels[l].cloud = {};
+    }
+    tree.merged.row_ids.clear();
+    if (tree.merged.size() != 0) bound_chunks(backend, tree.merged);
+    return {};
+  }
+};
+
 }  // namespace detail
 
-/// Makes a cloud and its levels of detail of the levels that a set ships, finest first. Level k holds,
-/// of each box that has one, the k-th level that is there; boxes without rows in the first are not
-/// shown. A node's error is the root mean square distance, by mass, from the box's finest Gaussians to
-/// the nearest of the node's own, and not below that of a finer node. The same bits for any number of
-/// threads. Levels are used up. Errors: invalid_argument (no level, compact SH, a box that is not one of
+/// Makes a cloud with levels of detail from the levels that a set ships, finest first. A box's level k
+/// is the k-th level that has the box. Boxes without rows in the first level are not shown. A node's
+/// error is the root mean square distance, by mass, from the box's finest Gaussians to the nearest of
+/// the node's own, and at least that of the finer node. The same bits for any number of threads. The
+/// levels are consumed. Errors: invalid_argument (no level, compact SH, a box that is not one of
 /// `boxes`, levels of different filters); unsupported (boxes so small that filling their chunks would
 /// take many times the rows).
 template <Backend B>
 requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::vector<LodLevel> levels,
                                                              std::size_t boxes) {
-  const auto bad = [](std::size_t l, const std::string& what) {
-    return Status(Errc::invalid_argument, "join_levels: level " + std::to_string(l) + ": " + what);
-  };
-  if (levels.empty()) return Status(Errc::invalid_argument, "join_levels: there is no level");
-  std::vector<std::vector<detail::BoxRows>> rows;
-  std::size_t all = 0;
-  for (std::size_t l = 0; l < levels.size(); ++l) {
-    const LodLevel& level = levels[l];
-    if (level.boxes.size() != level.cloud.size()) {
-      return bad(l, std::to_string(level.boxes.size()) + " boxes for " +
-                        std::to_string(level.cloud.size()) + " rows");
-    }
-    if (!level.cloud.shN_half.empty()) return bad(l, "compact: expand_sh first");
-    all += level.cloud.size();
-    for (const std::uint32_t b : level.boxes) {
-      if (b >= boxes) return bad(l, "box " + std::to_string(b) + " of " + std::to_string(boxes));
-    }
+  if (Status s = detail::check_levels(levels, boxes); !s) return s;
+  detail::LevelForest forest;
+  forest.levels = std::move(levels);
+  for (LodLevel& level : forest.levels) {
+    forest.rows.push_back(detail::sort_boxes(backend, level, boxes));
   }
-  if (detail::filled_rows(levels, boxes) > 4 * all + (std::size_t{1} << 20)) {
-    return Status(Errc::unsupported, "join_levels: " + std::to_string(all) +
-                                         " rows in so many small boxes that chunks of " +
-                                         std::to_string(kProjectChunk) + " would be mostly empty");
-  }
-  for (LodLevel& level : levels) rows.push_back(detail::sort_boxes(backend, level, boxes));
-
-  LeveledCloud out;
-  LodTree& tree = out.tree;
-  std::vector<std::uint32_t> node_of(boxes, LodPlace::kNone);  // the coarsest so far
-  std::vector<std::uint32_t> box_of;                           // of each node
-  std::uint32_t first_chunk = 0;                               // of the level, in merged
-  for (std::size_t l = 0; l < levels.size(); ++l) {
-    tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
-    for (std::uint32_t b = 0; b < boxes; ++b) {
-      const detail::BoxRows& r = rows[l][b];
-      if (r.count == 0 || (l > 0 && node_of[b] == LodPlace::kNone)) continue;
-      LodPlace place{r.first_chunk + first_chunk, r.chunks, node_of[b], r.count, rows[0][b].count};
-      node_of[b] = static_cast<std::uint32_t>(tree.nodes.size());
-      tree.nodes.emplace_back();
-      tree.places.push_back(place);
-      box_of.push_back(b);
-    }
-    if (l > 0) first_chunk += static_cast<std::uint32_t>(levels[l].cloud.chunk_bounds.size());
-  }
-  tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
-  for (const std::uint32_t node : node_of) {
-    if (node != LodPlace::kNone) tree.roots.push_back(node);
-  }
-
-  for (std::size_t l = 0; l < levels.size(); ++l) {
-    const GaussianCloud& own = levels[l].cloud;
-    backend.parallel_for(tree.level_begin[l + 1] - tree.level_begin[l], [&](std::size_t i) {
-      const std::size_t at = tree.level_begin[l] + i;
-      const std::uint32_t b = box_of[at];
-      LodNode& node = tree.nodes[at];
-      const detail::BoxRows& r = rows[l][b];
-      node.reach = own.chunk_bounds[r.first_chunk];
-      for (std::uint32_t c = 1; c < r.chunks; ++c) {
-        node.reach = detail::both(node.reach, own.chunk_bounds[r.first_chunk + c]);
-      }
-      if (l == 0) {
-        detail::LodGrain grain;
-        for (std::size_t k = 0; k < r.count; ++k) {
-          grain.add(detail::lod_gaussian(own, r.first_chunk * kProjectChunk + k, 0));
-        }
-        node.grain = grain.size();
-        return;
-      }
-      const LodNode& finer = tree.nodes[tree.places[at].finer];
-      node.grain = finer.grain;
-      node.reach = detail::both(node.reach, finer.reach);
-      node.error =
-          std::max(finer.error,
-                   static_cast<float>(detail::distance_to_level(levels[0].cloud, rows[0][b], own, r)));
-    });
-    if (Status s = backend.synchronize(); !s) return s;
-  }
-  for (std::size_t l = 1; l < levels.size(); ++l) {
-    if (Status s = append(tree.merged, levels[l].cloud); !s) return bad(l, s.message());
-    levels[l].cloud = {};
-  }
-  tree.merged.row_ids.clear();
-  if (tree.merged.size() != 0) bound_chunks(backend, tree.merged);
-  out.cloud = std::move(levels[0].cloud);
-  return out;
+  forest.add_nodes();
+  if (Status s = forest.measure_nodes(backend); !s) return s;
+  if (Status s = forest.merge_levels(backend); !s) return s;
+  return LeveledCloud{std::move(forest.levels[0].cloud), std::move(forest.tree)};
 }
 
 }  // namespace gsnav
