@@ -17,11 +17,11 @@
 #include <vector>
 
 #include "compare.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace {
 

@@ -9,8 +9,8 @@
 #include "device_time.hpp"
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/cuda/pinned.hpp"
+#include "gsnav/detail/demo/people.hpp"
 #include "gsnav/sim/follower.hpp"
-#include "gsnav/sim/people.hpp"
 #include "gsnav/sim/simulator.hpp"
 #include "samples.hpp"
 

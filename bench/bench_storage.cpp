@@ -12,13 +12,13 @@
 
 #include "compare.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/renderer.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace {
 

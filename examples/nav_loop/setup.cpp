@@ -7,14 +7,14 @@
 
 #include "../../tools/common/device_option.hpp"
 #include "gsnav/core/printable.hpp"
+#include "gsnav/demo.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/nav.hpp"
 #include "gsnav/render.hpp"
 #include "gsnav/scene/prepare.hpp"
-#include "gsnav/sim/default_scene.hpp"
-#include "gsnav/sim/people.hpp"
+#include "gsnav/sim.hpp"
 
 namespace nav_loop {
 namespace {

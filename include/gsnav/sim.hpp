@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The simulator on a device chosen at run time: scenes, sensors, actions, episodes, metrics, people and
-// batches. Link gsnav::device. On a backend of your own: sim/simulator.hpp and sim/batch.hpp.
+// The simulator on a device chosen at run time: scenes, sensors, actions, episodes, metrics and batches.
+// Link gsnav::device. On a backend of your own: sim/simulator.hpp and sim/batch.hpp.
 
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/body_cache.hpp"
@@ -15,14 +15,13 @@
 #include "gsnav/detail/sim/reward.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
 #include "gsnav/detail/sim/sensor.hpp"
+#include "gsnav/detail/sim/start_times.hpp"
 #include "gsnav/detail/sim/task.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/config.hpp"
-#include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/metrics.hpp"
-#include "gsnav/sim/people.hpp"
 #include "gsnav/sim/scene.hpp"
 #include "gsnav/sim/world.hpp"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "avatar/support.hpp"
+#include "gsnav/detail/rigging/proxy_fit.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

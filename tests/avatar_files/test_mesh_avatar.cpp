@@ -13,8 +13,8 @@
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/skinned_gaussians.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/detail/avatar/mesh_avatar.hpp"
-#include "gsnav/detail/avatar/mesh_surface.hpp"
+#include "gsnav/detail/rigging/mesh_avatar.hpp"
+#include "gsnav/detail/rigging/mesh_surface.hpp"
 #include "gsnav/scene/renderer.hpp"
 
 using namespace gsnav;

@@ -9,13 +9,13 @@
 
 #include "doctest/doctest.h"
 #include "gsnav/backends/serial.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
+#include "gsnav/detail/demo/people.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/batch.hpp"
-#include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/follower.hpp"
-#include "gsnav/sim/people.hpp"
 #include "gsnav/sim/simulator.hpp"
 
 using namespace gsnav;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/people.hpp"
+#include "gsnav/detail/demo/people.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,9 +8,10 @@
 #include <optional>
 #include <utility>
 
-#include "gsnav/detail/avatar/avatar.hpp"
-#include "gsnav/detail/nav/step.hpp"
-#include "gsnav/sim/default_scene.hpp"
+#include "gsnav/core/rng.hpp"
+#include "gsnav/detail/avatar/trajectory.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 
 namespace gsnav {
 namespace {
@@ -109,25 +110,6 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
     ways.push_back(std::move(*best));
   }
   return people;
-}
-
-Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene,
-                        const TaskConfig& task, std::uint64_t seed) {
-  Rng rng(seed ^ 0x7469636bull);
-  for (PointNavEpisode& e : episodes) {
-    for (int tries = 0; tries < 100; ++tries) {
-      // At a multiple of the control period many episodes meet the same moments, whose bodies are then
-      // made once.
-      e.start_time = task.control_period * std::floor(rng.uniform(0.0, 600.0) / task.control_period);
-      std::vector<DynamicCapsule> now;
-      append_bodies(scene, e.start_time, e.start_time, now);
-      const auto bodies = CapsuleSet::create(std::move(now), e.start_time, e.start_time);
-      if (!bodies) return bodies.status();
-      const AgentState agent{e.start_position, task.agent_radius, task.agent_height};
-      if (clearance(agent, *bodies, e.start_time).distance > 0.6) break;
-    }
-  }
-  return {};
 }
 
 Result<SimulatorScene> default_simulator_scene(std::size_t people, std::uint64_t seed, double density,

@@ -5,8 +5,8 @@
 #include <functional>
 #include <vector>
 
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/math/quat.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav::flat {
 

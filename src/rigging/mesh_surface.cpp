@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/mesh_surface.hpp"
+#include "gsnav/detail/rigging/mesh_surface.hpp"
 
 #include <algorithm>
 #include <array>

@@ -7,7 +7,7 @@
 
 #include "body_shape.hpp"
 #include "gsnav/avatar/skeleton.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 
 namespace gsnav::detail {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/capsule_volume.hpp"
+#include "gsnav/detail/rigging/capsule_volume.hpp"
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "../avatar/nearest_points.hpp"
 #include "gsnav/math/functions.hpp"
-#include "nearest_points.hpp"
 
 namespace gsnav {
 

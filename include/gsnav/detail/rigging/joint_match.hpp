@@ -4,7 +4,7 @@
 #include <array>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/avatar/retarget.hpp"
+#include "gsnav/detail/rigging/retarget.hpp"
 
 namespace gsnav {
 

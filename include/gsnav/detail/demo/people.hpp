@@ -3,10 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
-#include "gsnav/detail/sim/episode.hpp"
 #include "gsnav/detail/sim/task.hpp"
 #include "gsnav/sim/scene.hpp"
 
@@ -24,15 +22,8 @@ Vec3d person_color(std::size_t index) noexcept;
 Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count,
                                                 std::uint64_t seed, double density = 1.0);
 
-/// Gives each episode a start time, a multiple of the control period in [0, 600) s, at which no avatar
-/// is within 0.6 m of its start (the last of a hundred tries where there is none). Errors: what
-/// CapsuleSet::create reports.
-Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene,
-                        const TaskConfig& task, std::uint64_t seed);
-
-/// The embedded flat (default_scene.hpp) with its NavMesh for a body as of `task` and people who walk in
-/// it; `density`: of the flat's Gaussians, not of people's (walking_people). Errors: what the parts
-/// report.
+/// The embedded flat with its NavMesh for a body as of `task` and people who walk in it; `density`: of
+/// the flat's Gaussians, not of people's (walking_people). Errors: what the parts report.
 Result<SimulatorScene> default_simulator_scene(std::size_t people = 3, std::uint64_t seed = 1,
                                                double density = 1.0, const TaskConfig& task = {});
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/gait.hpp"
+#include "gsnav/detail/demo/gait.hpp"
 
 #include <cmath>
 #include <cstddef>

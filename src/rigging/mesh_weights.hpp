@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/detail/avatar/mesh_avatar.hpp"
+#include "gsnav/detail/rigging/mesh_avatar.hpp"
 
 namespace gsnav::detail {
 

@@ -6,7 +6,7 @@
 
 #include "gsnav/avatar/motion.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/avatar/foot_contact.hpp"
+#include "gsnav/detail/rigging/foot_contact.hpp"
 
 namespace gsnav {
 

@@ -11,13 +11,13 @@
 #include <utility>
 #include <vector>
 
+#include "../rigging/point_grid.hpp"
 #include "body_shape.hpp"
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "humanoid_body.hpp"
-#include "point_grid.hpp"
 
 namespace gsnav::detail {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/foot_lock.hpp"
+#include "gsnav/detail/rigging/foot_lock.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/retarget.hpp"
+#include "gsnav/detail/rigging/retarget.hpp"
 
 #include <algorithm>
 #include <cstddef>

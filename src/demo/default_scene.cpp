@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/sim/default_scene.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
 
 #include <string>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/foot_contact.hpp"
+#include "gsnav/detail/rigging/foot_contact.hpp"
 
 #include <algorithm>
 #include <cmath>

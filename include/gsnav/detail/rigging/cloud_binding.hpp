@@ -9,9 +9,9 @@
 
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/avatar/mesh_avatar.hpp"
 #include "gsnav/detail/avatar/skinned_mesh.hpp"
 #include "gsnav/detail/avatar/weight_truncation.hpp"
+#include "gsnav/detail/rigging/mesh_avatar.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 

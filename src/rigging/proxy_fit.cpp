@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/proxy_fit.hpp"
+#include "gsnav/detail/rigging/proxy_fit.hpp"
 
 #include <algorithm>
 #include <cstddef>

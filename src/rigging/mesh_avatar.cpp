@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/mesh_avatar.hpp"
+#include "gsnav/detail/rigging/mesh_avatar.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/detail/avatar/mesh_surface.hpp"
+#include "gsnav/detail/rigging/mesh_surface.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "mesh_weights.hpp"
 #include "point_grid.hpp"

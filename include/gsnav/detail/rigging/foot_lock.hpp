@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/avatar/foot_contact.hpp"
+#include "gsnav/detail/rigging/foot_contact.hpp"
 
 namespace gsnav {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/cloud_binding.hpp"
+#include "gsnav/detail/rigging/cloud_binding.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/detail/avatar/proxy_fit.hpp"
+#include "gsnav/detail/rigging/proxy_fit.hpp"
 #include "humanoid_body.hpp"
 #include "humanoid_surface.hpp"
 

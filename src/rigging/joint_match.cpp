@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/joint_match.hpp"
+#include "gsnav/detail/rigging/joint_match.hpp"
 
 #include <array>
 #include <cctype>

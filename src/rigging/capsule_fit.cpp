@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/capsule_fit.hpp"
+#include "gsnav/detail/rigging/capsule_fit.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/detail/avatar/capsule_volume.hpp"
-#include "gsnav/detail/avatar/proxy_fit.hpp"
+#include "gsnav/detail/rigging/capsule_volume.hpp"
+#include "gsnav/detail/rigging/proxy_fit.hpp"
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/sweep/capsule.hpp"
 

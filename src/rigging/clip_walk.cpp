@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/detail/avatar/clip_walk.hpp"
+#include "gsnav/detail/rigging/clip_walk.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -8,7 +8,7 @@
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/avatar/gait.hpp"
+#include "gsnav/detail/demo/gait.hpp"
 
 namespace gsnav {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "body_shape.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 
 namespace gsnav::detail {
 
