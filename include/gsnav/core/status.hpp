@@ -3,7 +3,6 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <new>
 #include <stdexcept>
 #include <string>
 #include <utility>

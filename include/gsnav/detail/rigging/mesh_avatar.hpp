@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/core/status.hpp"

@@ -11,7 +11,6 @@
 #include <memory>
 #include <span>
 #include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
