@@ -233,9 +233,7 @@ CapsuleReport measure_capsules(const AvatarAsset& asset, const std::vector<Proxy
 Result<CapsuleReport> fit_body_capsules(AvatarAsset& asset,
                                         const std::vector<std::vector<Affine3<double>>>& poses,
                                         const CapsuleFitOptions& options) {
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "fit_body_capsules: " + what);
-  };
+  const BadArgument bad{"fit_body_capsules: "};
   if (Status s = asset.validate(); !s) return s;
   if (poses.empty() || asset.size() == 0) return bad("no poses or no Gaussians");
   for (const auto& pose : poses) {

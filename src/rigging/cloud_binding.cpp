@@ -118,9 +118,7 @@ std::uint64_t NearestTriangle::key(std::int64_t x, std::int64_t y, std::int64_t 
 
 Result<BoundCloud> bind_cloud(const GaussianCloud& cloud, const SkinnedMesh& mesh,
                               const CloudBindingOptions& options) {
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "bind_cloud: " + what);
-  };
+  const BadArgument bad{"bind_cloud: "};
   if (Status s = mesh.validate(); !s) return s;
   const Similarity& to = options.mesh_from_cloud;
   if (!(to.scale > 0) || !is_finite(to.scale) || !is_finite(to.translation))

@@ -57,9 +57,7 @@ double reach(const Leg& leg, const Vec3d& offset, std::vector<Affine3<double>>& 
 }  // namespace
 
 Result<std::vector<Leg>> find_legs(const Skeleton& skeleton, const std::vector<Foot>& feet) {
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "find_legs: " + what);
-  };
+  const BadArgument bad{"find_legs: "};
   if (feet.size() != 2) return bad(std::to_string(feet.size()) + " feet, must be 2");
   const auto rest = skeleton.rest_globals();
   const auto above = [&](std::size_t j) {  // itself first

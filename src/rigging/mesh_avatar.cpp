@@ -102,9 +102,7 @@ Status finish_avatar(AvatarAsset& asset, GaussianCloudBuilder& builder,
 }  // namespace detail
 
 Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAvatarOptions& options) {
-  const auto bad = [](const char* what) {
-    return Status(Errc::invalid_argument, std::string("MeshAvatarOptions.") + what);
-  };
+  const BadArgument bad{"MeshAvatarOptions."};
   if (Status s = mesh.validate(); !s) return s;
   if (options.gaussians < 100 || options.gaussians > 4000000)
     return bad("gaussians must be in [100, 4000000]");
