@@ -61,10 +61,7 @@ std::vector<ProxyCapsule> humanoid_capsules(const Skeleton& skeleton, double sca
 }  // namespace
 
 Status validate(const HumanoidOptions& o) {
-  const auto bad = [](const char* field, double value, const char* rule) {
-    return Status(Errc::invalid_argument,
-                  std::string("HumanoidOptions.") + field + " = " + std::to_string(value) + ": " + rule);
-  };
+  const BadArgument bad{"HumanoidOptions."};
   if (!(o.height >= 1.0 && o.height <= 2.2)) return bad("height", o.height, "must be in [1, 2.2]");
   if (!(o.build >= 0.8 && o.build <= 1.3)) return bad("build", o.build, "must be in [0.8, 1.3]");
   if (!(o.shoulders >= 0.85 && o.shoulders <= 1.15))
@@ -146,12 +143,6 @@ Result<AvatarActor> make_walker(std::shared_ptr<const AvatarAsset> asset,
   if (!motion) return motion.status();
   return AvatarActor::create(std::move(asset), std::make_shared<const WalkMotion>(std::move(*motion)),
                              std::make_shared<const WalkTrajectory>(std::move(*path)), options);
-}
-
-Result<AvatarActor> make_stander(std::shared_ptr<const AvatarAsset> asset, const Vec3d& position,
-                                 double yaw, const ActorOptions& options) {
-  return AvatarActor::create(std::move(asset), nullptr,
-                             std::make_shared<const StandingTrajectory>(position, yaw), options);
 }
 
 }  // namespace gsnav

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 namespace gsnav {
 
@@ -63,19 +62,6 @@ std::array<double, 4> MeshColors::sample(const TextureImage& t, double u, double
         &t.rgba[4 * (wrap(std::floor(y) + dy, t.height) * t.width + wrap(std::floor(x) + dx, t.width))];
     for (std::size_t k = 0; k < 3; ++k) out[k] += w * linear_[p[k]];
     out[3] += w * p[3] / 255.0;
-  }
-  return out;
-}
-
-std::vector<Vec3d> skinned_vertices(const SkinnedMesh& mesh,
-                                    const std::vector<Affine3<double>>& joints) {
-  std::vector<Vec3d> out(mesh.positions.size());
-  for (std::size_t v = 0; v < out.size(); ++v) {
-    for (std::size_t k = v * mesh.influences; k < (v + 1) * mesh.influences; ++k) {
-      if (mesh.weights[k] > 0)
-        out[v] +=
-            (joints[mesh.joint_indices[k]] * mesh.positions[v]) * static_cast<double>(mesh.weights[k]);
-    }
   }
   return out;
 }

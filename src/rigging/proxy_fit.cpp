@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -36,22 +35,6 @@ std::vector<Vec3d> skinned_centers(const AvatarAsset& asset,
         out[i] += (joints[asset.joint_indices[k]] * p) * weight_of_parts(asset.skinning_weights[k]);
       }
     }
-  }
-  return out;
-}
-
-std::vector<ProxyCapsule> bone_capsules(const Skeleton& skeleton, double shortest) {
-  std::vector<ProxyCapsule> out;
-  std::vector<bool> has_child(skeleton.size(), false);
-  for (std::size_t j = 0; j < skeleton.size(); ++j) {
-    const std::int32_t p = skeleton.parents[j];
-    if (p < 0) continue;
-    has_child[static_cast<std::size_t>(p)] = true;
-    const Vec3d tip = skeleton.rest_local[j].translation;
-    if (norm(tip) >= shortest) out.push_back({static_cast<std::uint16_t>(p), {}, tip, 0.0});
-  }
-  for (std::size_t j = 0; j < skeleton.size(); ++j) {
-    if (!has_child[j]) out.push_back({static_cast<std::uint16_t>(j), {}, {}, 0.0});
   }
   return out;
 }
@@ -130,21 +113,6 @@ void fit_capsules(AvatarAsset& asset, const std::vector<std::vector<Affine3<doub
     fitted.push_back(capsule);
   }
   capsules = std::move(fitted);
-}
-
-double capsule_coverage(const std::vector<Capsule<double>>& capsules, const std::vector<Vec3d>& points,
-                        double slack) {
-  std::size_t inside = 0;
-  for (const Vec3d& p : points) {
-    for (const Capsule<double>& c : capsules) {
-      const double r = c.radius + slack;
-      if (segment_distance2(c.p0, c.p1, p) <= r * r) {
-        ++inside;
-        break;
-      }
-    }
-  }
-  return points.empty() ? 1.0 : static_cast<double>(inside) / static_cast<double>(points.size());
 }
 
 }  // namespace gsnav

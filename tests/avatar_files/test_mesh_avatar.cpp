@@ -52,6 +52,20 @@ SkinnedMesh tube() {
   return m;
 }
 
+/// The mesh's vertices posed by joint matrices (joint to root frame times inverse bind, [J]).
+std::vector<Vec3d> skinned_vertices(const SkinnedMesh& mesh,
+                                    const std::vector<Affine3<double>>& joints) {
+  std::vector<Vec3d> out(mesh.positions.size());
+  for (std::size_t v = 0; v < out.size(); ++v) {
+    for (std::size_t k = v * mesh.influences; k < (v + 1) * mesh.influences; ++k) {
+      if (mesh.weights[k] > 0)
+        out[v] +=
+            (joints[mesh.joint_indices[k]] * mesh.positions[v]) * static_cast<double>(mesh.weights[k]);
+    }
+  }
+  return out;
+}
+
 /// What a picture of the avatar is beside one of the mesh.
 struct Comparison {
   double union_share = 0;  // of pixels that both cover, of those that one does

@@ -50,9 +50,4 @@ Result<AvatarActor> make_walker(std::shared_ptr<const AvatarAsset> asset,
                                 const std::vector<Vec3d>& points, const WalkOptions& walk = {},
                                 const ActorOptions& options = {});
 
-/// Somebody who stands at `position`, turned by `yaw` (radians about +Y), in the asset's idle pose.
-/// Metres. Errors: as of AvatarActor::create.
-Result<AvatarActor> make_stander(std::shared_ptr<const AvatarAsset> asset, const Vec3d& position,
-                                 double yaw = 0.0, const ActorOptions& options = {});
-
 }  // namespace gsnav

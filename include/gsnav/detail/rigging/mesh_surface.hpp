@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <vector>
 
 #include "gsnav/detail/avatar/skinned_mesh.hpp"
 
@@ -34,8 +33,5 @@ class MeshColors {
   const SkinnedMesh& mesh_;
   std::array<double, 256> linear_{};
 };
-
-/// The mesh's vertices posed by joint matrices (joint to root frame times inverse bind, [J]).
-std::vector<Vec3d> skinned_vertices(const SkinnedMesh& mesh, const std::vector<Affine3<double>>& joints);
 
 }  // namespace gsnav

@@ -20,19 +20,11 @@ inline double segment_distance2(const Vec3d& a, const Vec3d& b, const Vec3d& p) 
 /// Canonical Gaussian centres after skinning by joint matrices (double, root frame, metres).
 std::vector<Vec3d> skinned_centers(const AvatarAsset& asset, const std::vector<Affine3<double>>& joints);
 
-/// One capsule per bone, as a start for `fit_capsules`: from each joint to each of its children that is
-/// at least `shortest` metres away; leaf joints get a point. Radii are zero.
-std::vector<ProxyCapsule> bone_capsules(const Skeleton& skeleton, double shortest = 0.02);
-
 /// Fits `capsules` of the asset to its Gaussians over poses (joint to root frame each, [J]): every
 /// centre goes to the capsule whose axis is nearest in the bind pose among those of its joints, then
 /// ends are drawn in or out along the axis and the radius is the `percentile` of the distances in all
 /// poses. Capsules that get no Gaussian are dropped.
 void fit_capsules(AvatarAsset& asset, const std::vector<std::vector<Affine3<double>>>& poses,
                   double percentile = 0.99);
-
-/// Share of points within at least one capsule grown by `slack` metres.
-double capsule_coverage(const std::vector<Capsule<double>>& capsules, const std::vector<Vec3d>& points,
-                        double slack = 0.0);
 
 }  // namespace gsnav
