@@ -188,25 +188,25 @@ requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::ve
 
   LeveledCloud out;
   LodTree& tree = out.tree;
-  std::vector<std::uint32_t> node_of(boxes, LodPlace::kNone);  // the coarsest so far
-  std::vector<std::uint32_t> box_of;                           // of each node
-  std::uint32_t first_chunk = 0;                               // of the level, in merged
+  std::vector<std::uint32_t> node_of(boxes, LodBox::kNone);  // the coarsest so far
+  std::vector<std::uint32_t> box_of;                         // of each node
+  std::uint32_t first_chunk = 0;                             // of the level, in merged
   for (std::size_t l = 0; l < levels.size(); ++l) {
     tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
     for (std::uint32_t b = 0; b < boxes; ++b) {
       const detail::BoxRows& r = rows[l][b];
-      if (r.count == 0 || (l > 0 && node_of[b] == LodPlace::kNone)) continue;
-      LodPlace place{r.first_chunk + first_chunk, r.chunks, node_of[b], r.count, rows[0][b].count};
+      if (r.count == 0 || (l > 0 && node_of[b] == LodBox::kNone)) continue;
+      LodBox box{r.first_chunk + first_chunk, r.chunks, node_of[b], r.count, rows[0][b].count};
       node_of[b] = static_cast<std::uint32_t>(tree.nodes.size());
       tree.nodes.emplace_back();
-      tree.places.push_back(place);
+      tree.boxes.push_back(box);
       box_of.push_back(b);
     }
     if (l > 0) first_chunk += static_cast<std::uint32_t>(levels[l].cloud.chunk_bounds.size());
   }
   tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
   for (const std::uint32_t node : node_of) {
-    if (node != LodPlace::kNone) tree.roots.push_back(node);
+    if (node != LodBox::kNone) tree.roots.push_back(node);
   }
 
   for (std::size_t l = 0; l < levels.size(); ++l) {
@@ -228,7 +228,7 @@ requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::ve
         node.grain = grain.size();
         return;
       }
-      const LodNode& finer = tree.nodes[tree.places[at].finer];
+      const LodNode& finer = tree.nodes[tree.boxes[at].finer];
       node.grain = finer.grain;
       node.reach = detail::both(node.reach, finer.reach);
       node.error =
