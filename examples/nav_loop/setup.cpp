@@ -67,7 +67,7 @@ Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::
 
 /// Lets go of SH bands that cannot be seen.
 void fit_storage(gsnav::GaussianCloud& cloud, double unseen) {
-  gsnav::SceneProfile profile = gsnav::profile_scene(cloud, unseen);
+  gsnav::SceneBands profile = gsnav::scene_bands(cloud, unseen);
   gsnav::drop_bands(cloud, profile);
 }
 

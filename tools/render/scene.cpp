@@ -125,14 +125,14 @@ Status read_visible_sets(const Options& o, Scene& scene) {
 void profile_clouds(const Options& o, Scene& scene) {
   // What cannot be seen is not held and not read; in exact, what is zero.
   const auto fit = [unseen = o.profile == "exact" ? 0 : kUnseenColor](auto& cloud) {
-    SceneProfile made = profile_scene(cloud, unseen);
+    SceneBands made = scene_bands(cloud, unseen);
     drop_bands(cloud, made);
     return made;
   };
-  SceneProfile& profile = scene.profile;
+  SceneBands& profile = scene.profile;
   profile = scene.packed ? fit(*scene.packed) : fit(scene.full);
   if (scene.tree) {
-    const SceneProfile merged = fit(scene.tree->merged);
+    const SceneBands merged = fit(scene.tree->merged);
     profile.bytes_let_go += merged.bytes_let_go;
     profile.color_error = std::max(profile.color_error, merged.color_error);
   }

@@ -19,7 +19,7 @@ struct Scene {
   std::optional<LodTree> tree;         ///< where the profile is lod
   std::optional<VisibleSets> visible;  ///< where some are given
   LoadReport report;
-  SceneProfile profile;
+  SceneBands profile;
   std::vector<PlacedMeshes> meshes;
   std::vector<Camera> cameras;
 };

@@ -23,8 +23,8 @@ inline constexpr double kUnseenColor = 1.0 / 1020;
 /// Gaussian and channel of the chunk, they change the colour by at most `unseen`, seen from anywhere. By
 /// the addition theorem a band l of coefficients c is at most |c| sqrt((2 l + 1) / (4 pi)). `unseen` = 0
 /// leaves out zeros alone: the same bits. `cloud`: arrays in host memory, packed ones too.
-inline SceneProfile profile_scene(const GaussianRows& cloud, double unseen = 0) {
-  SceneProfile out;
+inline SceneBands scene_bands(const GaussianRows& cloud, double unseen = 0) {
+  SceneBands out;
   const ColorRows& sh = cloud.color;
   const std::size_t size = cloud.size(), rest = sh.rest();
   out.chunk_sh_degrees.assign(cloud.chunk_count(), static_cast<std::uint8_t>(sh.degree));
@@ -71,8 +71,8 @@ inline SceneProfile profile_scene(const GaussianRows& cloud, double unseen = 0) 
 /// Of a GaussianCloud or a PackedCloud.
 template <class Cloud>
 requires requires(const Cloud& c) { c.view(); }
-SceneProfile profile_scene(const Cloud& cloud, double unseen = 0) {
-  return profile_scene(cloud.view(), unseen);
+SceneBands scene_bands(const Cloud& cloud, double unseen = 0) {
+  return scene_bands(cloud.view(), unseen);
 }
 
 }  // namespace gsnav
