@@ -58,7 +58,7 @@ class SemanticFrames {
     for (std::size_t i = 0; i < black.size(); ++i) {
       if (Status s = validate(black[i]); !s) return s;
       black[i].id = static_cast<std::uint32_t>(i);
-      black[i].mesh.plain = true;
+      black[i].mesh.base_color_only = true;
       black[i].mesh.base_color = {0, 0, 0};
       black[i].mesh.unlit = true;
     }
