@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/detail/render/frame_lanes.hpp"
+#include "gsnav/detail/render/thread_frames.hpp"
 #include "gsnav/render/config.hpp"
 
 namespace gsnav {

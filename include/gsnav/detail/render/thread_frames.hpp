@@ -20,7 +20,7 @@ namespace gsnav {
 
 /// Backends whose batches may be cut by camera: each thread renders whole frames.
 template <class B>
-concept LaneBackend = Backend<B> && is_host_backend<B> && requires(const B& b) {
+concept ThreadFramesBackend = Backend<B> && is_host_backend<B> && requires(const B& b) {
   { b.one_thread() } -> std::same_as<B>;
 };
 
@@ -34,13 +34,13 @@ struct FrameJob {
   MeshFrame meshes{};
 };
 
-/// Renders batches with one lane a thread: no thread waits for another within a frame. Scratch grows
-/// with threads, not with cameras, and is the same for all lanes, so that a batch like one before it
-/// allocates nothing, whichever lane takes which camera.
-template <class S, LaneBackend B>
-class FrameLanes {
+/// Renders batches with one worker a thread: no thread waits for another within a frame. Scratch grows
+/// with threads, not with cameras, and is the same for all workers, so that a batch like one before it
+/// allocates nothing, whichever worker takes which camera.
+template <class S, ThreadFramesBackend B>
+class ThreadFrames {
  public:
-  /// Whether a batch keeps all threads busy for long enough that lanes pay.
+  /// Whether a batch keeps all threads busy for long enough that workers pay.
   static bool worth_it(const B& backend, std::size_t cameras) noexcept {
     return cameras > 1 && cameras >= 2 * concurrency_of(backend);
   }
@@ -49,18 +49,19 @@ class FrameLanes {
   /// frame's error, by number, is returned; out_of_memory too.
   template <class JobOf>
   Status render(B& backend, std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
-    while (lanes_.size() < concurrency_of(backend)) lanes_.push_back(std::make_unique<Lane>(backend));
+    while (workers_.size() < concurrency_of(backend))
+      workers_.push_back(std::make_unique<Worker>(backend));
     std::mutex mutex;
     std::size_t failed = count;
     Status result;
     backend.parallel_for(count, [&](std::size_t c) {
-      Lane& lane = take();
+      Worker& worker = take();
       Status s = detail::guarded([&] {
         const FrameJob<S> job = job_of(c);
-        return render_composite<S, B>(lane.backend, lane.workspace, job.sets, job.meshes, *job.camera,
-                                      *job.config, job.images, &stats[c]);
+        return render_composite<S, B>(worker.backend, worker.workspace, job.sets, job.meshes,
+                                      *job.camera, *job.config, job.images, &stats[c]);
       });
-      lane.taken.store(false, std::memory_order_release);
+      worker.taken.store(false, std::memory_order_release);
       if (s.ok()) return;
       const std::lock_guard lock(mutex);
       if (c < failed) {
@@ -74,36 +75,36 @@ class FrameLanes {
 
   std::size_t bytes() const noexcept {
     std::size_t sum = 0;
-    for (const auto& lane : lanes_) sum += lane->workspace.bytes();
+    for (const auto& worker : workers_) sum += worker->workspace.bytes();
     return sum;
   }
 
  private:
-  struct Lane {
-    explicit Lane(const B& b) : backend(b.one_thread()), workspace(backend) {}
+  struct Worker {
+    explicit Worker(const B& b) : backend(b.one_thread()), workspace(backend) {}
     B backend;
     RenderWorkspace<S, B> workspace;
     std::atomic<bool> taken{false};
   };
 
-  /// A lane that nobody is in: there are as many as threads.
-  Lane& take() noexcept {
+  /// A worker that nobody is in: there are as many as threads.
+  Worker& take() noexcept {
     while (true) {
-      for (const auto& lane : lanes_) {
-        if (!lane->taken.exchange(true, std::memory_order_acquire)) return *lane;
+      for (const auto& worker : workers_) {
+        if (!worker->taken.exchange(true, std::memory_order_acquire)) return *worker;
       }
       std::this_thread::yield();
     }
   }
 
   Status even_out() {
-    RenderWorkspace<S, B>& most = lanes_.front()->workspace;
-    for (const auto& lane : lanes_) most.grow_to(lane->workspace);
-    for (const auto& lane : lanes_) lane->workspace.grow_to(most);
+    RenderWorkspace<S, B>& most = workers_.front()->workspace;
+    for (const auto& worker : workers_) most.grow_to(worker->workspace);
+    for (const auto& worker : workers_) worker->workspace.grow_to(most);
     return {};
   }
 
-  std::vector<std::unique_ptr<Lane>> lanes_;
+  std::vector<std::unique_ptr<Worker>> workers_;
 };
 
 }  // namespace gsnav
